@@ -3,6 +3,8 @@
 
 mod cli_support;
 
+use std::path::Path;
+
 use cli_support::{acts, fmlgs, folder, tiny_splat};
 
 #[test]
@@ -31,6 +33,9 @@ fn arguments_that_make_no_sense_exit_with_2() {
         &["render", splat, "--out", "a.jpg"],
         &["render", splat, "--what", "picture", "--out", "a.npy"],
         &["export", splat, "--out", "a.obj"],
+        &["export", splat, "--out", "a.ply", "--crop", "0,0,0,1,1"],
+        &["export", splat, "--out", "a.ply", "--crop", "1,0,0,0,1,1"],
+        &["export", splat, "--out", "a.ply", "--outside"],
         &["synth", "a.glb", "--out", "x", "--views", "2", "--held-out", "2"],
         &["query", splat, "x", "--tolerance", "nan"],
         &["query", splat, "x", "--top", "0"],
@@ -212,4 +217,15 @@ fn a_splat_is_drawn_and_exported_again() {
     assert_eq!(again["gaussians"], 3);
     fmlgs(&["render", &at("new/b.ply"), "--size", "64x48", "--out", &at("b.png")]).ok();
     assert_eq!(image::open(at("b.png")).unwrap().to_rgb8(), picture, "export changed the picture");
+
+    // The three stand at x = -1, 0 and 1.
+    let xs = |more: &[&str]| {
+        fmlgs(&[&["export", splat, "--out", &at("cut.ply"), "--crop"], more].concat()).ok();
+        let cut = fmlgs::io::splat_ply::read(Path::new(&at("cut.ply"))).unwrap();
+        cut.positions.iter().map(|p| p[0]).collect::<Vec<_>>()
+    };
+    assert_eq!(xs(&["-1.5,-1,-1,0.5,1,1"]), [-1.0, 0.0]);
+    assert_eq!(xs(&["-1.5,-1,-1,0.5,1,1", "--outside"]), [1.0]);
+    let empty = ["export", splat, "--out", &at("none.ply"), "--crop", "5,5,5,6,6,6"];
+    assert!(fmlgs(&empty).fails_with(1).stderr.contains("no Gaussian") && !Path::new(&at("none.ply")).exists());
 }

@@ -45,7 +45,7 @@ fn a_scene_is_flown_through_filmed_and_talked_to() {
     assert_eq!(flown, 10);
 
     // The agent: a flight, a movement, a refusal, something that is not there.
-    let transcript = at("talk.md");
+    let transcript = at("conversation.md");
     let go = format!("go to the {name}");
     let talk = run(&["agent", &scene, &go, "step back", "--transcript", &transcript, "--json"]).ok().json();
     let requests = talk["requests"].as_array().unwrap();

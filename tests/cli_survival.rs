@@ -98,7 +98,7 @@ fn ctrl_c_saves_and_exits_with_130() {
         send(&child, signal);
         let done: Done = child.wait_with_output().unwrap().into();
         let done = done.fails_with(130);
-        assert!(done.stderr.contains("cancelled:") && done.stderr.contains("goes on"), "{}", done.stderr);
+        assert!(done.stderr.contains("canceled:") && done.stderr.contains("resumes"), "{}", done.stderr);
         assert_eq!(done.json()["end"], "cancelled");
         assert!(done.json()["steps"].as_u64().unwrap() > 0);
         // What was trained so far can be looked at.
@@ -227,7 +227,7 @@ fn a_finished_training_is_left_alone_and_objects_survive_one_that_goes_on() {
     let (known, before) = (names(), query("box 1"));
     assert!(before > 20, "{before}");
     let gone_on = train("600").ok();
-    assert!(gone_on.stderr.contains("carried over") && gone_on.stderr.contains("earlier"), "{}", gone_on.stderr);
+    assert!(gone_on.stderr.contains("transferred") && gone_on.stderr.contains("earlier"), "{}", gone_on.stderr);
     assert_eq!(names(), known);
     let after = query("box 1");
     assert!(after > before / 2 && after < 2 * before, "{before} px, then {after}");
@@ -248,7 +248,7 @@ fn a_finished_training_is_left_alone_and_objects_survive_one_that_goes_on() {
     // Other settings, or no checkpoint: refused, with the way out.
     assert!(train("700").fails_with(1).stderr.contains("choose another folder"));
     std::fs::remove_file(out.join("checkpoint.bin")).unwrap();
-    assert!(train("600").fails_with(1).stderr.contains("no checkpoint to go on from"));
+    assert!(train("600").fails_with(1).stderr.contains("no checkpoint to resume from"));
     assert!(fmlgs(&train_arguments(photos, photos, "5")).fails_with(1).stderr.contains("holds the photos"));
 }
 
@@ -367,7 +367,7 @@ fn a_scene_of_the_first_version_opens_answers_and_goes_on() {
     let gone_on = fmlgs(&["train", scene, "--json"]).ok();
     let done = gone_on.json();
     assert_eq!((&done["end"], &done["steps"]), (&"finished".into(), &80.into()));
-    assert!(gone_on.stderr.contains("carried over"), "{}", gone_on.stderr);
+    assert!(gone_on.stderr.contains("transferred"), "{}", gone_on.stderr);
     assert!(!gone_on.stderr.contains("cannot be shown"), "{}", gone_on.stderr);
     assert!(!std::fs::read(&checkpoint).unwrap().starts_with(b"FMLGSCP1"), "it is written as it is now");
     assert_eq!(query("box 1").ok().json()["answer"], "found");

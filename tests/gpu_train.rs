@@ -29,7 +29,7 @@ fn noise_photo(size: [u32; 2], covered: bool, seed: u64) -> PhotoPixels {
     }
 }
 
-/// Loss and gradient in f64 as the CPU trainer forms them: the picture faded towards the photo
+/// Loss and gradient in f64 as the CPU trainer forms them: the picture faded toward the photo
 /// where that is not covered.
 fn oracle(rendered: &[[f64; 3]], photo: &PhotoPixels) -> (f64, Vec<f64>) {
     let share = |i: usize| photo.coverage.as_ref().map_or(1.0, |c| f64::from(c[i]) / 255.0);

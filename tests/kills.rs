@@ -278,7 +278,7 @@ fn photos_being_made() {
             code => {
                 refused += 1;
                 // Nothing yet, or photos whose poses were not written yet.
-                let refusals = ["nothing that can be opened", "no camera poses"];
+                let refusals = ["that FMLGS can open", "no camera poses"];
                 assert!(code == Some(1) && refusals.iter().any(|r| info.stderr.contains(r)), "{}", info.stderr);
             }
         }

@@ -175,7 +175,7 @@ fn answers_say_when_nothing_or_several_fit() {
 }
 
 #[test]
-fn parts_are_moved_towards_their_whole_and_made_unit_again() {
+fn parts_are_moved_toward_their_whole_and_made_unit_again() {
     let Some(scene) = load() else { return };
     let (bear, nose) = (scene.best("stuffed bear"), scene.best("bear nose"));
     assert_ne!(bear, nose);

@@ -5,6 +5,7 @@
 mod ui_common;
 
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect, vec2};
 use egui_kittest::Harness;
@@ -24,12 +25,11 @@ const SHADE: IdentityId = 3;
 const BOX: IdentityId = 4;
 
 /// Gaussians that fill a box evenly, all of one size.
-fn fill(cloud: &mut GaussianCloud, of: &mut Vec<IdentityId>, id: IdentityId, min: [f32; 3], max: [f32; 3]) {
-    const N: usize = 9;
-    let at = |k: usize, axis: usize| min[axis] + (max[axis] - min[axis]) * k as f32 / (N - 1) as f32;
-    for i in 0..N * N * N {
-        let p = [at(i % N, 0), at(i / N % N, 1), at(i / N / N, 2)];
-        let half = (0..3).map(|a| 0.6 * (max[a] - min[a]) / (N - 1) as f32).fold(0.0, f32::max);
+fn fill(cloud: &mut GaussianCloud, of: &mut Vec<IdentityId>, n: usize, id: IdentityId, [min, max]: [[f32; 3]; 2]) {
+    let at = |k: usize, axis: usize| min[axis] + (max[axis] - min[axis]) * k as f32 / (n - 1) as f32;
+    for i in 0..n * n * n {
+        let p = [at(i % n, 0), at(i / n % n, 1), at(i / n / n, 2)];
+        let half = (0..3).map(|a| 0.6 * (max[a] - min[a]) / (n - 1) as f32).fold(0.0, f32::max);
         cloud.positions.push(p);
         cloud.log_scales.push([half.max(0.01).ln(); 3]);
         cloud.quaternions.push([1.0, 0.0, 0.0, 0.0]);
@@ -39,13 +39,17 @@ fn fill(cloud: &mut GaussianCloud, of: &mut Vec<IdentityId>, id: IdentityId, min
     }
 }
 
-/// The scene, saved into `folder`. Up is -y, as where photos say nothing else.
-fn write_scene(folder: &Path) -> PathBuf {
+/// The scene with `n`^3 Gaussians in each of its things, saved into `folder`. Up is -y, as where photos say nothing else.
+fn write_scene(folder: &Path, n: usize) -> PathBuf {
     let (mut cloud, mut of) = (GaussianCloud::default(), Vec::new());
-    fill(&mut cloud, &mut of, TABLE, [-2.0, 0.0, -2.0], [2.0, 0.3, 2.0]);
-    fill(&mut cloud, &mut of, LAMP, [-0.3, -0.7, -0.3], [0.3, -0.1, 0.3]);
-    fill(&mut cloud, &mut of, SHADE, [-0.6, -1.6, -0.6], [0.6, -0.8, 0.6]);
-    fill(&mut cloud, &mut of, BOX, [3.0, -0.2, 3.0], [3.2, 0.0, 3.2]);
+    for (id, room) in [
+        (TABLE, [[-2.0, 0.0, -2.0], [2.0, 0.3, 2.0]]),
+        (LAMP, [[-0.3, -0.7, -0.3], [0.3, -0.1, 0.3]]),
+        (SHADE, [[-0.6, -1.6, -0.6], [0.6, -0.8, 0.6]]),
+        (BOX, [[3.0, -0.2, 3.0], [3.2, 0.0, 3.2]]),
+    ] {
+        fill(&mut cloud, &mut of, n, id, room);
+    }
     let mut all = Identities::default();
     all.add(Level::Object, NOBODY, vec!["table".into()]);
     all.add(Level::Object, NOBODY, vec!["lamp".into()]);
@@ -70,8 +74,13 @@ struct Window {
 impl Window {
     /// The scene with all that its pixels belong to.
     fn new() -> Self {
+        Self::of(9)
+    }
+
+    /// With so many Gaussians along each side of each thing.
+    fn of(n: usize) -> Self {
         let folder = tempfile::tempdir().expect("folder");
-        let first = Action::Open(write_scene(folder.path()));
+        let first = Action::Open(write_scene(folder.path(), n));
         let harness = ui_common::window(Folders { data: folder.path().join("data") }, Some(first));
         let mut w = Self { harness, _folder: folder };
         w.until("the scene", |a| a.state.semantics.is_some() && a.viewport.picture().is_some_and(|p| p.full));
@@ -191,11 +200,11 @@ fn things_are_pointed_at_selected_isolated_and_hidden() {
     // The menu of a right click is about what is under the cursor.
     w.click(shade, PointerButton::Secondary, plain);
     assert_eq!(w.selected(), Some(LAMP));
-    assert!(w.shows("Mark as a query") && w.shows("Export as .ply"), "the menu");
-    w.harness.get_by_label("Mark as a query").click();
+    assert!(w.shows("Query this") && w.shows("Export as .ply"), "the menu");
+    w.harness.get_by_label("Query this").click();
     w.harness.run_steps(4);
     assert_eq!(w.app().viewport.queries.found(), [LAMP]);
-    assert!(!w.shows("Mark as a query"), "a choice closes it");
+    assert!(!w.shows("Query this"), "a choice closes it");
 }
 
 #[test]
@@ -241,5 +250,48 @@ fn what_is_not_in_view_is_marked_and_masks_follow_the_eye() {
     w.harness.run_steps(3);
     assert!(w.shows("One color per object"), "the legend");
     w.ask(Action::Tint(ColorBy::Objects));
-    assert!(!w.shows("One color per object"), "once more for the picture");
+    assert!(!w.shows("One color per object"), "again for the RGB image");
+}
+
+/// Prints how long it takes from the cursor, and from a click, to the outline (docs/measured.md).
+#[test]
+#[ignore = "prints timings"]
+fn times_of_hover_and_click() {
+    for n in [30, 50] {
+        let mut w = Window::of(n);
+        let still = w.app().viewport.picture().map_or(0.0, |p| 1e3 * p.secs);
+        let places = [w.place_of(TABLE), w.place_of(SHADE)];
+        let mut times = [Vec::new(), Vec::new(), Vec::new()];
+        for k in 0..20 {
+            let at = places[k % 2];
+            let start = Instant::now();
+            w.harness.hover_at(at);
+            w.harness.step();
+            times[0].push(start.elapsed());
+            assert!(w.app().viewport.picking.hovered().is_some());
+            let start = Instant::now();
+            for pressed in [true, false] {
+                let (button, modifiers) = (PointerButton::Primary, Modifiers::NONE);
+                w.harness.event(Event::PointerButton { pos: at, button, pressed, modifiers });
+                w.harness.step();
+            }
+            w.harness.step();
+            times[1].push(start.elapsed());
+            assert!(w.selected().is_some());
+            w.harness.run_steps(60);
+            w.ask(Action::Select(None));
+            let start = Instant::now();
+            w.harness.step();
+            times[2].push(start.elapsed());
+        }
+        let median = |times: &mut Vec<Duration>| {
+            times.sort();
+            times[times.len() / 2].as_secs_f64() * 1e3
+        };
+        let [hover, click, idle] = times.each_mut().map(median);
+        println!(
+            "{} Gaussians: picture {still:.1} ms; hover {hover:.1} ms, click {click:.1} ms, a frame of nothing new {idle:.1} ms",
+            4 * n * n * n
+        );
+    }
 }

@@ -1,12 +1,16 @@
 //! The whole window, headless: what the user sees and does, with the software adapter.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[path = "ui_window/crop.rs"]
+mod crop;
 #[path = "ui_window/demo.rs"]
 mod demo;
 #[path = "ui_window/edits.rs"]
 mod edits;
 #[path = "ui_window/hands.rs"]
 mod hands;
+#[path = "ui_window/keyboard.rs"]
+mod keyboard;
 #[path = "ui_window/objects.rs"]
 mod objects;
 #[path = "ui_window/panes.rs"]
@@ -17,6 +21,8 @@ mod phrases;
 mod problems;
 #[path = "ui_window/report.rs"]
 mod report;
+#[path = "ui_window/split.rs"]
+mod split;
 mod ui_common;
 
 use std::path::{Path, PathBuf};

@@ -173,7 +173,7 @@ fn conflict(world: &dyn World, call: &ToolCall, id: Option<IdentityId>) -> Optio
         ToolCall::GoTo { .. } | ToolCall::LookAt { .. } | ToolCall::Measure { .. } | ToolCall::Export { .. }
             if facts.bounds.is_none() =>
         {
-            format!("{} has no matter in this scene, only a name.", capital(&it))
+            format!("{} has no Gaussians in this scene, only a name.", capital(&it))
         }
         _ => return None,
     };
@@ -187,15 +187,15 @@ fn question(world: &dyn World, call: &ToolCall, policy: &Policy, id: Option<Iden
     match (permission, call) {
         (Permission::ConfirmOverwrite, ToolCall::Export { .. }) => {
             let path = id.and_then(|id| world.export_replaces(id))?;
-            Some(format!("Exporting {it} would replace {path}. Shall I? (yes or no)"))
+            Some(format!("Exporting {it} would replace {path}. Continue? (yes or no)"))
         }
         (Permission::ConfirmOverwrite | Permission::Free | Permission::Never, _) => None,
         (Permission::Confirm, ToolCall::Remove { .. }) => {
-            Some(format!("I can only hide {it}: it stays in the scene's files. Shall I? (yes or no)"))
+            Some(format!("I can only hide {it}: it stays in the scene's files. Continue? (yes or no)"))
         }
         (Permission::Confirm, ToolCall::Rename { name, .. }) => Some(format!("Rename {it} to '{name}'? (yes or no)")),
         (Permission::Confirm, ToolCall::AskUser { .. }) => None,
-        (Permission::Confirm, other) => Some(format!("{}: shall I? (yes or no)", other.line(world.identities()))),
+        (Permission::Confirm, other) => Some(format!("{}: continue? (yes or no)", other.line(world.identities()))),
     }
 }
 
@@ -332,7 +332,7 @@ fn act(
         }
         ToolCall::Measure { to, .. } => measure(world, id, to.as_ref(), other)?,
         ToolCall::AskUser { question, .. } => question.clone(),
-        ToolCall::Undo {} => format!("Taken back: {}.", world.undo().map_err(failed)?),
+        ToolCall::Undo {} => format!("Undone: {}.", world.undo().map_err(failed)?),
         ToolCall::Export { .. } => format!("{} is written to {}.", capital(&it), world.export(id).map_err(failed)?),
     })
 }

@@ -77,7 +77,7 @@ pub(super) fn measure(
     to: Option<&Reference>,
     other: Option<IdentityId>,
 ) -> Result<String, Refusal> {
-    let nothing = || Refusal::new(RefusalKind::Conflict, "It has no matter that could be measured.");
+    let nothing = || Refusal::new(RefusalKind::Conflict, "It has no Gaussians to measure.");
     let own = world.facts(id).and_then(|f| f.bounds).ok_or_else(nothing)?;
     let it = capital(&the(world, id));
     Ok(match to {

@@ -262,8 +262,7 @@ impl World for SceneWorld {
 
     fn look_at(&mut self, id: IdentityId) -> Result<Arrival, Unreachable> {
         let center = self.bounds.get(id as usize).copied().flatten().map(|b| b.center());
-        let center =
-            center.ok_or_else(|| Unreachable { reason: "nothing in the scene belongs to it".into(), nearest: None })?;
+        let center = center.ok_or_else(|| Unreachable { reason: "it has no Gaussians".into(), nearest: None })?;
         let eye = self.eye;
         let to = Pose::looking_at(eye.center, center, self.parts.up, eye.fov_y_rad, &eye.world_from_camera);
         let what = format!("looking at {}", self.name(id));
@@ -355,7 +354,7 @@ impl World for SceneWorld {
 
     fn undo(&mut self) -> Result<String, WorldError> {
         let Some(done) = self.done.take() else {
-            let what = self.undoable.take().ok_or_else(|| WorldError("There is nothing to take back.".into()))?;
+            let what = self.undoable.take().ok_or_else(|| WorldError("Nothing to undo.".into()))?;
             (self.emit)(Effect::Undo);
             return Ok(what);
         };
@@ -386,7 +385,7 @@ impl World for SceneWorld {
         let failed = |e: &dyn std::fmt::Display| WorldError(format!("{}: {e}", file.display()));
         let members = self.parts.map.members(id);
         if members.is_empty() {
-            return Err(WorldError(format!("nothing in the scene belongs to {}", self.name(id))));
+            return Err(WorldError(format!("{} has no Gaussians", self.name(id))));
         }
         export::ply(&file, &self.parts.cloud.select(&members)).map_err(|e| failed(&e))?;
         Ok(file.display().to_string())

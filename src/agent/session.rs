@@ -113,7 +113,7 @@ impl Session {
     fn answer(&mut self, world: &mut dyn World, text: &str, sink: &mut ProgressSink<'_>) -> Reply {
         if !text.chars().any(char::is_alphanumeric) {
             return self
-                .refuse(RefusalKind::Unclear, "Emit me what you would like to see, such as 'show me the lamp'.");
+                .refuse(RefusalKind::Unclear, "Tell me what you would like to see, such as 'show me the lamp'.");
         }
         if text.chars().count() > MAX_CHARS {
             let text = format!("That is too long for me: say it in fewer than {MAX_CHARS} characters.");

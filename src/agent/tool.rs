@@ -46,7 +46,7 @@ pub enum ToolCall {
         #[serde(default = "camera_args::normal", deserialize_with = "camera_args::closeness")]
         closeness: f64,
     },
-    /// Turn towards a target without moving.
+    /// Turn toward a target without moving.
     LookAt {
         target: Target,
     },
@@ -81,7 +81,7 @@ pub enum ToolCall {
         target: Target,
         name: String,
     },
-    /// Emit about a thing, or about what is in the view.
+    /// Describe a thing, or what is in the view.
     Describe {
         /// Which; none for the view.
         #[serde(default)]

@@ -191,7 +191,7 @@ mod tests {
     fn a_transcript_is_read_by_people_and_programs() {
         let mut t = Transcript::default();
         t.add(What::User { text: "hide\n# the `mug`".into() });
-        t.add(What::Result { call: ToolCall::Undo {}, line: "undo()".into(), text: "Taken back.".into(), done: true });
+        t.add(What::Result { call: ToolCall::Undo {}, line: "undo()".into(), text: "Undone.".into(), done: true });
         let json: serde_json::Value = serde_json::from_str(&t.to_json()).expect("JSON");
         assert_eq!(json["entries"][1]["call"]["name"], "undo");
         let text = t.to_markdown();

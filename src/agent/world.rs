@@ -80,7 +80,7 @@ pub trait World {
     /// Flies to an identity, to see it from `side`: 1 as close as usual, 2 twice as close.
     fn go_to(&mut self, id: IdentityId, side: Side, closeness: f64) -> Result<Arrival, Unreachable>;
 
-    /// Turns towards an identity.
+    /// Turns toward an identity.
     fn look_at(&mut self, id: IdentityId) -> Result<Arrival, Unreachable>;
 
     /// Moves the eye; stops before occupied space.

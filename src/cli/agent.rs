@@ -18,13 +18,13 @@ use crate::navigate::Pose;
 const EXAMPLES: &str = "Examples:\n  \
     fmlgs agent scene/ \"show me the handle of the kettle from the other side\" \"step back half a meter\"\n  \
     fmlgs agent scene/ \"what is on the table?\" --json\n  \
-    fmlgs agent scene/ \"go to the lamp\" --view lamp.png --transcript talk.md\n  \
+    fmlgs agent scene/ \"go to the lamp\" --view lamp.png --transcript conversation.md\n  \
     fmlgs agent scene/ --planner llm --url http://127.0.0.1:11434/v1 --model qwen3 \"find something to cut with\"";
 
-/// Talk to a scene: it shows, goes there, tells, hides, measures
+/// Chat with a scene: it shows, goes there, describes, hides, measures
 ///
-/// Each TEXT is one request of the same talk; without any, requests are read from standard input, one
-/// a line. The planner 'commands' is built in; 'llm' asks a chat model behind an OpenAI-compatible
+/// Each TEXT is one request of the same conversation; without any, requests are read from standard input, one
+/// per line. The planner 'commands' is built in; 'llm' asks a chat model behind an OpenAI-compatible
 /// address. Exit code 1 if the last request was refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = format!("{EXAMPLES}\n\n{SENT}"))]
@@ -61,7 +61,7 @@ pub(crate) struct AgentArgs {
     /// Length of a scene unit in meters [default: the scene's own, if that is known]
     #[arg(long, alias = "metres", value_parser = number::within(1e-9..=1e9))]
     meters: Option<f64>,
-    /// Write the picture at the end
+    /// Write the image at the end
     #[arg(long)]
     view: Option<PathBuf>,
     /// Write everything that was said and done: .json, or .md to be read
@@ -222,7 +222,7 @@ impl<R: BufRead> Requests<R> {
             return Err(bad(format!("a request has at most {MAX_REQUEST_BYTES} bytes")));
         }
         if self.line > MAX_REQUESTS {
-            return Err(bad(format!("a talk has at most {MAX_REQUESTS} requests; go on with another")));
+            return Err(bad(format!("a conversation has at most {MAX_REQUESTS} requests; start another")));
         }
         String::from_utf8(bytes).map(Some).map_err(|_| bad("it is not UTF-8 text".into()))
     }
@@ -253,7 +253,7 @@ impl Talk {
         };
         let reply = session.say(world, text, &mut on, interrupt::flag());
         if interrupt::asked_to_stop() {
-            return Err(CliError::Cancelled("the talk ends here".into()));
+            return Err(CliError::Cancelled("the conversation ends here".into()));
         }
         let done = std::mem::take(&mut *effects.lock().unwrap_or_else(PoisonError::into_inner));
         self.refused = reply.refused.as_ref().map(|r| r.text.clone());
@@ -290,7 +290,7 @@ fn line(effect: &Effect) -> Option<String> {
         }
         Effect::Mark(ids) => Some(format!("marks {} of them", ids.len())),
         Effect::Undo => None,
-        Effect::Hidden(ids) | Effect::HiddenUndone(ids) => Some(format!("leaves {} out of the picture", ids.len())),
+        Effect::Hidden(ids) | Effect::HiddenUndone(ids) => Some(format!("hides {} of them", ids.len())),
         Effect::Renamed(id, name) | Effect::RenameUndone(id, name) => Some(format!("calls #{id} {name}")),
         Effect::Explored(_) => None,
     }

@@ -73,7 +73,7 @@ impl CliError {
                 ExitCode::FAILURE
             }
             Self::Cancelled(text) => {
-                output::note(&format!("cancelled: {text}"));
+                output::note(&format!("canceled: {text}"));
                 ExitCode::from(130)
             }
         }

@@ -29,7 +29,7 @@ pub(crate) struct EvalArgs {
     /// Dataset with the photos [default: where the scene's photos are]
     #[arg(long)]
     photos: Option<PathBuf>,
-    /// Longer side of the compared pictures in px [default: as in training, else 512]
+    /// Longer side of the compared images in px [default: as in training, else 512]
     #[arg(long, value_parser = clap::value_parser!(u32).range(16..=16384))]
     max_side: Option<u32>,
     /// Which photos count as held out: every n-th, 0 = all photos [default: as in training, else 8]
@@ -38,7 +38,7 @@ pub(crate) struct EvalArgs {
     /// Compare the black borders of photos that were undistorted elsewhere, too
     #[arg(long)]
     keep_borders: bool,
-    /// Folder for pictures: photo, render and difference side by side
+    /// Folder for images: photo, render and difference side by side
     #[arg(long)]
     pictures: Option<PathBuf>,
     /// Compare objects and parts instead, with these labels: each named region of a held-out photo

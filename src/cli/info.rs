@@ -25,7 +25,7 @@ use crate::scene::{Bounds, Dataset, ScenePlan, SemanticMap};
 pub(crate) struct InfoArgs {
     /// Dataset folder, transforms.json, splat file or trained scene
     path: PathBuf,
-    /// Training pictures are limited to this many px along the longer side; the plan depends on it
+    /// Training images are limited to this many px along the longer side; the plan depends on it
     #[arg(long, default_value_t = TrainConfig::default().max_side_px, value_parser = clap::value_parser!(u32).range(1..=16384))]
     max_side: u32,
     #[command(flatten)]
@@ -155,9 +155,9 @@ fn of_trained(s: &Scene, folder: &Path) -> (Facts, Option<SemanticMap>) {
     };
     let of_others = matches!(map, Ok(None)) && folder.join(MAP_FILE).exists();
     let warning = match &map {
-        Err(e) => Some(format!("its objects cannot be read ('fmlgs preprocess' finds them anew): {e}")),
+        Err(e) => Some(format!("its objects cannot be read ('fmlgs preprocess' finds them again): {e}")),
         Ok(None) if of_others => Some(format!(
-            "{} is of other Gaussians than {}, so no objects are known; 'fmlgs preprocess' finds them anew",
+            "{} is of other Gaussians than {}, so no objects are known; 'fmlgs preprocess' finds them again",
             MAP_FILE, CLOUD_FILE
         )),
         Ok(_) => None,

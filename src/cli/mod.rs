@@ -48,8 +48,8 @@ const EXIT_CODES: &str = "\
 Exit codes:
   0    done
   1    failed; the message names the file, the place in it and what can be done
-  2    the arguments make no sense
-  130  cancelled (Ctrl-C, SIGTERM, SIGHUP); what was done so far is saved where the command saves anything";
+  2    invalid arguments
+  130  canceled (Ctrl-C, SIGTERM, SIGHUP); what was done so far is saved where the command saves anything";
 
 const EXAMPLES: &str = "\
 Examples:

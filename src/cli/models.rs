@@ -48,7 +48,7 @@ enum Command {
     },
     /// Compare all files that are here with their checksums
     Check,
-    /// Run the models that look at pictures and phrases once, and time them
+    /// Run the models that look at images and phrases once, and time them
     Bench,
 }
 
@@ -156,7 +156,7 @@ fn bench(as_json: bool) -> Result<(), CliError> {
     if as_json {
         return output::print_json(&json!({ "engine": engine, "device": device, "models": times }));
     }
-    let mut rows = vec![["model", "load ms", "picture ms", "phrase ms"].map(str::to_owned).to_vec()];
+    let mut rows = vec![["model", "load ms", "image ms", "phrase ms"].map(str::to_owned).to_vec()];
     let ms = |v: f64| format!("{v:.2}");
     rows.extend(times.iter().map(|t| vec![t.id.clone(), ms(t.load_ms), ms(t.picture_ms), ms(t.phrase_ms)]));
     output::print(&format!("{}\nmedians of {RUNS} runs, {engine} on the {device}", output::table(&rows)))

@@ -44,7 +44,7 @@ pub(crate) struct PathArgs {
     /// Distance to the target as a multiple of the usual one
     #[arg(long, default_value_t = 1.0, value_parser = number::within(0.01..=100.0))]
     distance: f64,
-    /// Width by height of the picture
+    /// Width by height of the image
     #[arg(long, default_value_t = 16.0 / 9.0, value_parser = number::within(0.05..=20.0))]
     aspect: f64,
     /// Poses of the flight
@@ -57,7 +57,7 @@ pub(crate) struct PathArgs {
     /// With this many cameras: some left out, or more added nearby; may be given several times
     #[arg(long, requires = "survey", value_parser = number::within(1..=10_000_u32))]
     cameras: Vec<u32>,
-    /// Hold the paper's interpolation beside it, as it is printed and through all keypoints of the route
+    /// Also evaluate the paper's interpolation, as printed and through all keypoints of the route
     #[arg(long)]
     compare: bool,
     /// Write the flight as a camera path: .json of this program, or .nerfstudio.json
@@ -132,7 +132,7 @@ pub(crate) fn run(args: PathArgs) -> Result<(), CliError> {
     let body = kinds.into_iter().filter_map(|(name, s)| Some(row(name, s?)));
     let table = rows(&["way", "largest step", "largest turn", "least clearance", "poses too near"], body);
     output::print(&format!(
-        "to {what}: {:.2} units in {:.1} s, {} poses\n{}\nscene looked at in {build_ms:.0} ms, way found in {route_ms:.0} ms",
+        "to {what}: {:.2} units in {:.1} s, {} poses\n{}\ngraph built in {build_ms:.0} ms, route found in {route_ms:.0} ms",
         flight.length,
         flight.seconds,
         flight.poses.len(),

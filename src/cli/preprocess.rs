@@ -62,8 +62,8 @@ pub(crate) struct PreprocessArgs {
     /// Steps of training codes
     #[arg(long, default_value_t = CODE_STEPS, value_parser = number::within(0..=10_000_000_u64))]
     code_steps: u64,
-    /// What looks at the objects, so that they are found by what they look like: 'demo', a model of
-    /// 'fmlgs models', the path of a model's .json, or 'none' [default: the best that is here]
+    /// Encoder for open-vocabulary queries: 'demo', a model of 'fmlgs models', the path of a model's .json, or
+    /// 'none' [default: the best that is here]
     #[arg(long)]
     encoder: Option<String>,
     #[command(flatten)]

@@ -40,10 +40,10 @@ pub(crate) struct RenderArgs {
     /// Dataset whose cameras to use, for a splat that came without
     #[arg(long)]
     photos: Option<PathBuf>,
-    /// Size of the picture, for example 1280x720 [default: the camera's own]
+    /// Size of the image, for example 1280x720 [default: the camera's own]
     #[arg(long, value_parser = view::parse_size, conflicts_with = "max_side")]
     size: Option<[u32; 2]>,
-    /// Shrink the picture to at most this many px along its longer side
+    /// Shrink the image to at most this many px along its longer side
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16384))]
     max_side: Option<u32>,
     /// What to draw
@@ -55,13 +55,13 @@ pub(crate) struct RenderArgs {
     /// Draw a video along this camera path instead: .mp4, .gif, .webp, or a folder of frames
     #[arg(long, conflicts_with_all = ["camera", "what"])]
     path: Option<PathBuf>,
-    /// Pictures per second of the video [default: the path's own]
+    /// Frames per second of the video [default: the path's own]
     #[arg(long, requires = "path", value_parser = number::within(0.01..=CameraPath::MAX_FPS))]
     fps: Option<f64>,
     /// Quality of the video, 0 to 100
     #[arg(long, default_value_t = 80, value_parser = clap::value_parser!(u8).range(0..=100))]
     quality: u8,
-    /// Mark what is asked for in every picture of the video
+    /// Mark what is asked for in every frame of the video
     #[arg(long, requires = "path")]
     mark: Option<String>,
     /// Let this ffmpeg write the video
@@ -158,7 +158,7 @@ fn video(args: &RenderArgs, path: &Path, quiet: bool) -> Result<(), CliError> {
     if let Some(program) = &args.ffmpeg {
         settings.encoder = VideoEncoder::Ffmpeg { program: program.clone(), args: Vec::new() };
     }
-    let cameras: Vec<Camera> = spline.pictures(fps, MOST_PICTURES).iter().map(|p| p.camera(width, height)).collect();
+    let cameras: Vec<Camera> = spline.poses(fps, MOST_PICTURES).iter().map(|p| p.camera(width, height)).collect();
     let marked = match &args.mark {
         Some(query) => {
             let map = scene.semantics()?;
@@ -180,7 +180,7 @@ fn video(args: &RenderArgs, path: &Path, quiet: bool) -> Result<(), CliError> {
         }));
     }
     output::print(&format!(
-        "{}: {} pictures of {w} x {h} px, {:.1} s long, {:.1} MB, drawn in {secs:.1} s on {}",
+        "{}: {} frames of {w} x {h} px, {:.1} s long, {:.1} MB, drawn in {secs:.1} s on {}",
         summary.path.display(),
         summary.frames,
         summary.secs,

@@ -11,7 +11,7 @@ use crate::jobs::synth::{self, Levels, Rig, SynthOptions, SynthReport};
 /// Render a glTF scene into posed photos with object and part ids
 ///
 /// Writes a dataset that 'fmlgs train' opens: photos, cameras, depth, sparse points, and for every
-/// pixel which object and which part it shows (16-bit PNG, named in identities.json). The pictures
+/// pixel which object and which part it shows (16-bit PNG, named in identities.json). The images
 /// come from ray casting, which shares no code with the splat renderer.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \

@@ -26,9 +26,9 @@ use crate::scene::Dataset;
     fmlgs train photos/ --out scene/ --steps 30000 --max-side 1600\n  \
     fmlgs train photos/ --out quick/ --steps 500 --max-side 256 --no-densify\n  \
     fmlgs train other/ --preset scene/training.toml\n  \
-    fmlgs train scene/                       go on with a scene that was cancelled, same settings")]
+    fmlgs train scene/                       resume a scene that was canceled, same settings")]
 pub(crate) struct TrainArgs {
-    /// Dataset folder or transforms.json; or a trained scene, to go on with it
+    /// Dataset folder or transforms.json; or a trained scene, to resume it
     data: PathBuf,
     /// Folder of the trained scene [default: out/NAME, the name of the dataset; out/NAME-2 and so on where that
     /// was trained with other settings]
@@ -53,7 +53,7 @@ pub(crate) struct TrainOverrides {
     /// Optimizer steps in all; every schedule scales with it [default: 7000]
     #[arg(long, value_parser = number::within(1..=1_000_000_000_u64))]
     pub(crate) steps: Option<u64>,
-    /// Longer side of the training pictures in px; photos are never enlarged [default: 512]
+    /// Longer side of the training images in px; photos are never enlarged [default: 512]
     #[arg(long, value_parser = clap::value_parser!(u32).range(16..=16384))]
     pub(crate) max_side: Option<u32>,
     /// Hold out every n-th photo, 0 = none [default: 8]
@@ -200,7 +200,7 @@ pub(crate) fn run(args: TrainArgs, quiet: bool) -> Result<(), CliError> {
         return Ok(());
     }
     let (steps, all) = (outcome.steps, config.steps);
-    Err(CliError::Cancelled(format!("{steps} of {all} steps are saved in {out}; the same command goes on from there")))
+    Err(CliError::Cancelled(format!("{steps} of {all} steps are saved in {out}; the same command resumes from there")))
 }
 
 #[cfg(test)]

@@ -20,7 +20,7 @@ pub enum IoError {
     Protected { path: PathBuf, folder: PathBuf },
     #[error("{folder} is being written by {holder}; wait until that is done, or choose another folder")]
     Busy { folder: PathBuf, holder: String },
-    #[error("the scene in {folder} was saved by somebody else since it was opened; open it again")]
+    #[error("the scene in {folder} was changed by another program since it was opened; open it again")]
     Changed { folder: PathBuf },
     #[error("{path} was not saved together with {with}: {remedy}")]
     Torn { path: PathBuf, with: &'static str, remedy: &'static str },
@@ -55,7 +55,7 @@ pub enum IoError {
     #[error("{path} is {} x {} px, but its camera is for {} x {} px and no scaled version of that",
         found.0, found.1, expected.0, expected.1)]
     PhotoSize { path: PathBuf, found: (u32, u32), expected: (u32, u32) },
-    #[error("{path} is a picture of {width_px} x {height_px} px")]
+    #[error("{path} is an image of {width_px} x {height_px} px")]
     EmptyPicture { path: PathBuf, width_px: u32, height_px: u32 },
     #[error("{path} shows nothing: every pixel is transparent or outside of its lens; take it out of the data set")]
     NothingShown { path: PathBuf },
@@ -82,7 +82,7 @@ impl IoError {
 pub enum OpenError {
     #[error("{path} does not exist")]
     NotFound { path: PathBuf },
-    #[error("{path} is nothing that can be opened. Looked for: {looked_for}. Found: {found}.")]
+    #[error("{path} is not a scene, splat or photo set that FMLGS can open. Looked for: {looked_for}. Found: {found}.")]
     Unrecognized { path: PathBuf, looked_for: String, found: String },
     /// Photos alone.
     #[error("{}: {} photos, no camera poses", .0.images.display(), .0.photos.len())]

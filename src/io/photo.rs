@@ -90,7 +90,7 @@ pub(super) fn decode_rgba(bytes: &[u8], limit_px: u64, path: &Path) -> Result<Rg
 }
 
 /// Decodes the bytes of a gray picture, 8 or 16 bits a pixel; `path` is for errors.
-pub(super) fn decode_grey16(bytes: &[u8], path: &Path) -> Result<ImageBuffer<Luma<u16>, Vec<u16>>, IoError> {
+pub(super) fn decode_gray16(bytes: &[u8], path: &Path) -> Result<ImageBuffer<Luma<u16>, Vec<u16>>, IoError> {
     match DynamicImage::from_decoder(decoder(bytes, path)?).map_err(|e| failed(path, &e))? {
         DynamicImage::ImageLuma16(gray) => Ok(gray),
         DynamicImage::ImageLuma8(gray) => {

@@ -10,7 +10,7 @@ use super::{IoError, files, photo_list};
 use crate::scene::{Camera, SparsePoint};
 
 /// Color of points that have none.
-const GREY: u8 = 128;
+const GRAY: u8 = 128;
 
 pub(crate) fn read(path: &Path) -> Result<Vec<SparsePoint>, IoError> {
     parse(&files::read(path, u64::MAX)?, path)
@@ -31,7 +31,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Vec<SparsePoint>, IoError> {
             let row = table.row(i);
             SparsePoint {
                 position: DVec3::from_array(xyz.map(|c| c.f64(row))),
-                rgb: rgb.map_or([GREY; 3], |c| c.map(|c| byte(c.scalar, c.f64(row)))),
+                rgb: rgb.map_or([GRAY; 3], |c| c.map(|c| byte(c.scalar, c.f64(row)))),
             }
         })
         .collect();
@@ -128,7 +128,7 @@ mod tests {
         let e = parse_bytes(text.replace("NaN", "-1e30").as_bytes()).expect_err("far");
         let told = e.to_string();
         assert!(told.contains("vertex 1: y = -1") && told.contains("is farther than 1e12 units"), "{e}");
-        assert_eq!(parse_bytes(text.replace("NaN", "2").as_bytes()).expect("finite")[1].rgb, [GREY; 3]);
+        assert_eq!(parse_bytes(text.replace("NaN", "2").as_bytes()).expect("finite")[1].rgb, [GRAY; 3]);
     }
 
     #[test]

@@ -133,7 +133,7 @@ fn features(path: &Path, bytes: &[u8], encoder: String, identities: &Identities)
         .map(|(i, n)| ViewFeatures { raw: rows(raw.data(), i, n), deviated: rows(deviated.data(), i, n) })
         .collect();
     let language = LanguageFeatures { encoder, dimension, by_identity: of };
-    if language.is_valid(identities) { Ok(language) } else { Err(broken("raw", "a value that is no number")) }
+    if language.is_valid(identities) { Ok(language) } else { Err(broken("raw", "a value that is not a number")) }
 }
 
 fn header(path: &Path, bytes: &[u8]) -> Result<Header, IoError> {
@@ -150,7 +150,7 @@ fn header(path: &Path, bytes: &[u8]) -> Result<Header, IoError> {
     let bad = header.identities.iter().find(|(id, i)| i.parent >= *id || i.code.iter().any(|c| !c.is_finite()));
     match bad {
         Some((id, _)) => {
-            Err(broken(format!("identity {id} has a parent that follows it, or a code that is no number")))
+            Err(broken(format!("identity {id} has a parent that follows it, or a code that is not a number")))
         }
         None => Ok(header),
     }

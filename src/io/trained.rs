@@ -78,7 +78,7 @@ fn load_once(folder: &Path) -> Result<TrainedScene, IoError> {
     let cloud = splat_ply::read(&path)?;
     let state = splat_ply::state(&path)?;
     if info.state.is_some() && info.state != state {
-        let remedy = "put back the file that was; or open it by itself; or, to go on with it as it is, delete the \
+        let remedy = "put back the file that was; or open it by itself; or, to use it as it is, delete the \
                       line \"state\" from scene.json";
         return Err(IoError::Torn { path, with: SCENE_FILE, remedy });
     }

@@ -95,7 +95,7 @@ pub(crate) fn unpacked(folders: &Folders) -> Result<PathBuf, IoError> {
         Err(_) if is_there() => Ok(folder),
         Err(_) if folder.exists() => Err(IoError::Occupied {
             folder,
-            what: "is the demo's and holds no scene any more; remove it and try again",
+            what: "is the demo folder but no longer holds a scene; remove it and try again",
         }),
         result => result.map(|()| folder),
     }

@@ -98,7 +98,7 @@ pub(crate) fn find_and_ask(
     let find_secs = start.elapsed().as_secs_f64();
     let (kept, _) = SceneFolder::hold(scene, "storing objects")?.replace_map(job.state.as_deref(), &map, &job.cloud)?;
     if let Some(kept) = kept {
-        observer.note(Severity::Info, format!("The objects and parts before are kept in {}", kept.display()));
+        observer.note(Severity::Info, format!("The previous objects and parts are kept in {}", kept.display()));
     }
     observer.note(Severity::Info, format!("{} objects and parts found", map.identities.len()));
     Ok(DemoQueries { find_secs, ..ask(&map, photos, job, Some(pictures))? })
@@ -116,7 +116,7 @@ pub(crate) fn ask(
     pictures: Option<&Path>,
 ) -> Result<DemoQueries, JobError> {
     let mut segmenter = FileMasks(Labels::open(photos)?);
-    let mut asker = QueryEngine::new(map.language.as_ref())?;
+    let mut engine = QueryEngine::new(map.language.as_ref())?;
     let (mut units, mut asked) = (Vec::new(), Vec::new());
     let mut renderer = Renderer::new();
     for (k, &i) in job.views.iter().enumerate() {
@@ -133,7 +133,7 @@ pub(crate) fn ask(
         };
         let mut failed = None;
         let mut by_name = |text: &str| {
-            asker.ask(map, text, LevelFilter::Auto).unwrap_or_else(|e| {
+            engine.ask(map, text, LevelFilter::Auto).unwrap_or_else(|e| {
                 failed.get_or_insert(e);
                 None
             })
@@ -144,7 +144,7 @@ pub(crate) fn ask(
         }
         for (n, question) in QUESTIONS.iter().enumerate().filter(|_| k == 0) {
             let start = Instant::now();
-            let Some(answered) = asker.ask(map, question, LevelFilter::Auto)? else { continue };
+            let Some(answered) = engine.ask(map, question, LevelFilter::Auto)? else { continue };
             let mask = answered.mask(&view, &map.identities, 1);
             let millis = start.elapsed().as_secs_f64() * 1e3;
             if let Some(pictures) = pictures {

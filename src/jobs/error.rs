@@ -24,7 +24,7 @@ use crate::render::{DrawError, GpuError, RenderError};
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum JobError {
-    #[error("cancelled")]
+    #[error("canceled")]
     Interrupted(#[from] Interrupted),
     #[error(transparent)]
     Open(#[from] OpenError),
@@ -32,28 +32,28 @@ pub enum JobError {
     NotTrained(PathBuf),
     #[error("{} holds Gaussians; a folder of posed photos is needed here", .0.display())]
     NoPhotos(PathBuf),
-    #[error("{} is no trained scene; the result is stored in its folder", .0.display())]
+    #[error("{} is not a trained scene, in whose folder the result is stored", .0.display())]
     NoScene(PathBuf),
-    #[error("{}: its photos are not known or no longer there", .0.display())]
+    #[error("{}: its photos cannot be found", .0.display())]
     PhotosGone(PathBuf),
     #[error("{}: no photo is held out, so there is nothing to measure on", .0.display())]
     NothingHeldOut(PathBuf),
     #[error("no photo that was trained on is called '{0}'")]
     UnknownPhoto(String),
-    #[error("{} knows no objects yet", .0.display())]
+    #[error("{} has no objects yet", .0.display())]
     NoObjects(PathBuf),
-    #[error("there is nothing to look for in the query; type an object's name")]
+    #[error("the query is empty; type an object's name")]
     EmptyQuery,
-    #[error("nothing here fits '{0}'")]
+    #[error("no match for '{0}'")]
     NoMatch(String),
     #[error("{0}")]
     Phrases(String),
-    #[error("no Gaussian is left to write")]
+    #[error("no Gaussians left to export")]
     NoGaussians,
     #[error("{0}")]
     Protocol(String),
     /// Another program failed.
-    #[error("{doing}: {} failed ({why}). Its last words:\n{said}", .program.display())]
+    #[error("{doing}: {} failed ({why}). Last output:\n{said}", .program.display())]
     Program {
         /// The program.
         program: PathBuf,
@@ -68,7 +68,7 @@ pub enum JobError {
     #[error("neither COLMAP nor GLOMAP is installed here: 'colmap' is not found on the PATH")]
     NoTools,
     /// Photos that do not hang together.
-    #[error("{}: no camera poses were found; the photos overlap too little or show too little texture", .0.display())]
+    #[error("{}: no camera poses were found; the photos overlap too little or have too little texture", .0.display())]
     NoPosesFound(PathBuf),
     /// The memory that is free is not enough.
     #[error(transparent)]

@@ -105,7 +105,7 @@ pub(crate) fn run(
     let mut known = FileMasks(Labels::open(labels)?);
     let views = labeled(comparison, map, &mut known)?;
     if views.is_empty() {
-        let text = format!("{}: no photo to compare with has labels", labels.display());
+        let text = format!("{}: none of the compared photos has labels", labels.display());
         return Err(JobError::Protocol(text));
     }
     if let Some(folder) = &comparison.pictures {
@@ -189,7 +189,7 @@ fn compare(
 
 fn recall(map: &SemanticMap, views: &[LabeledView<'_>]) -> Result<(Vec<Unit>, ProtocolSummary), JobError> {
     let language = map.language.as_ref().ok_or_else(|| {
-        let text = "no encoder has looked at this scene; run 'fmlgs preprocess' on it with --encoder demo";
+        let text = "this scene has no embeddings; run 'fmlgs preprocess' on it with --encoder demo";
         JobError::Protocol(text.into())
     })?;
     let mut encoder = crate::models::encoder(&language.encoder)?;

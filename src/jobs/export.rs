@@ -11,11 +11,17 @@ use serde::Serialize;
 use super::JobError;
 use crate::io::{self, IoError, atomic, scene_files, splat_ply, trained};
 use crate::navigate::{CameraSpline, Pose, Speed};
-use crate::scene::{CameraPath, GaussianCloud, PathKey, PhotoPixels};
+use crate::scene::{CameraPath, CropBox, GaussianCloud, PathKey, PhotoPixels};
 
 pub(crate) fn ply(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     make_parent(path)?;
     splat_ply::write(path, cloud)
+}
+
+/// The Gaussians that a crop box keeps, if it keeps any.
+pub(crate) fn cropped(cloud: &GaussianCloud, crop: &CropBox) -> Result<GaussianCloud, JobError> {
+    let kept = crop.crop(cloud);
+    if kept.is_empty() { Err(JobError::NoGaussians) } else { Ok(kept) }
 }
 
 pub(crate) fn text(path: &Path, text: &str) -> Result<(), IoError> {
@@ -69,7 +75,7 @@ pub(crate) fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result
         return io::camera_path::write(file, path);
     }
     let spline = CameraSpline::new(path, Speed::Constant);
-    let poses = spline.map_or_else(Vec::new, |spline| spline.pictures(path.fps, CameraPath::MAX_KEYS as f64));
+    let poses = spline.map_or_else(Vec::new, |spline| spline.poses(path.fps, CameraPath::MAX_KEYS as f64));
     let frames: Vec<PathKey> = poses.iter().map(Pose::key).collect();
     io::camera_path::nerfstudio::write(file, path, &frames, (1280, (1280.0 / aspect.max(0.01)) as u32))
 }

@@ -152,7 +152,7 @@ pub(crate) fn run(
     let found = find_objects(cloud, &photos, settings, tools, &options, observer)?;
     let (kept, state) = scene.replace_map(known, &found.map, cloud)?;
     if let Some(kept) = kept {
-        observer.note(Severity::Info, format!("The objects and parts before are kept in {}", kept.display()));
+        observer.note(Severity::Info, format!("The previous objects and parts are kept in {}", kept.display()));
     }
     Ok(FoundObjects { found, photos, state, secs: start.elapsed().as_secs_f64() })
 }

@@ -15,6 +15,7 @@ pub(crate) mod export;
 pub mod find_objects;
 pub(crate) mod folders;
 pub(crate) mod go_to;
+pub(crate) mod inspect;
 pub(crate) mod models;
 pub mod open;
 pub mod phrases;

@@ -59,7 +59,7 @@ pub(crate) fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer)
         })?,
         Source::Brought(brought) => entry.add(&folder, brought)?,
         Source::Fetch(from) => entry.fetch(&folder, from, Patience::default(), &mut |name, there, all| {
-            ticker.enter(format!("Fetching {name} (kB)"), all.unwrap_or(there) / 1000);
+            ticker.enter(format!("Downloading {name} (kB)"), all.unwrap_or(there) / 1000);
             ticker.tick((there / 1000) as usize, observer).is_ok()
         })?,
     }

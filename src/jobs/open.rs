@@ -252,7 +252,9 @@ pub(crate) fn known_objects(scene: &Scene, observer: &mut dyn Observer) -> Optio
         Err(e) => {
             observer.note(
                 Severity::Warning,
-                format!("Its objects cannot be shown: {e}. Find them again (Objects pane, or fmlgs preprocess)"),
+                format!(
+                    "The scene's objects cannot be loaded: {e}. Find them again (Objects pane, or fmlgs preprocess)"
+                ),
             );
             None
         }
@@ -288,7 +290,7 @@ fn tolerant(path: &Path, scene: TrainedScene, observer: &mut dyn Observer) -> Sc
     let config = TrainConfig::stored(&scene.folder, scene.info.config.clone()).unwrap_or_else(|e| {
         observer.note(
             Severity::Warning,
-            format!("It may not look as it was trained: {e}. Train again, or restore the file"),
+            format!("The scene may not look as trained: {e}. Train again, or restore the file"),
         );
         TrainConfig::default()
     });
@@ -299,9 +301,9 @@ fn tolerant(path: &Path, scene: TrainedScene, observer: &mut dyn Observer) -> Sc
 fn photos_of(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<Dataset>> {
     let why = match scene.dataset_path.as_deref().map(|p| (io::open(p), p)) {
         Some((Ok(Opened::Dataset(dataset)), _)) => return Some(Arc::new(dataset)),
-        Some((Ok(_), p)) => format!("{} holds no photos any more; the scene opens without them", p.display()),
+        Some((Ok(_), p)) => format!("{} no longer holds photos; the scene opens without them", p.display()),
         Some((Err(e), _)) => format!("The photos cannot be read, the scene opens without them: {e}"),
-        None => "The photos are not where they were; the scene opens without them".into(),
+        None => "The photos were moved or deleted; the scene opens without them".into(),
     };
     observer.note(Severity::Warning, why);
     None

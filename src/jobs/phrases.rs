@@ -1,5 +1,7 @@
 //! A list of phrases asked of some views: scores, areas, IoU with true masks, and the masks as files.
 
+pub(crate) mod colors;
+
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -8,6 +10,7 @@ use std::sync::Arc;
 use serde::Serialize;
 use serde_json::{Value, json};
 
+use self::colors::PhraseColors;
 use super::JobError;
 use super::query::{ViewMaps, write_mask};
 use crate::io::labels::{pictures, rle::Rle};
@@ -43,6 +46,8 @@ pub struct PhrasesRequest {
     /// Views with their names.
     pub(crate) views: Vec<(String, Camera)>,
     pub(crate) phrases: Vec<String>,
+    /// Those that phrases have already.
+    pub(crate) colors: PhraseColors,
     pub(crate) level: LevelFilter,
     /// How pixels are matched, and the largest difference per channel.
     pub(crate) matching: (MatchMode, f32),
@@ -58,6 +63,8 @@ pub struct PhrasesRequest {
 pub struct PhraseRow {
     pub(crate) view: String,
     pub(crate) phrase: String,
+    /// In which it is shown, red, green and blue.
+    pub(crate) color: [u8; 3],
     /// "found", "ambiguous" or "not found".
     pub(crate) verdict: &'static str,
     /// "certain", "likely" or "guess".
@@ -80,8 +87,8 @@ pub struct PhraseRow {
 pub(crate) fn listed(text: &str) -> Result<Vec<String>, JobError> {
     let phrases: Vec<String> = text.lines().map(str::trim).filter(|l| !l.is_empty()).map(str::to_owned).collect();
     match phrases.len() {
-        0 => Err(JobError::Phrases("the list has no phrase: write one a line".into())),
-        n if n > MOST => Err(JobError::Phrases(format!("{n} phrases are more than {MOST}: split the list"))),
+        0 => Err(JobError::Phrases("the list is empty: write one phrase per line".into())),
+        n if n > MOST => Err(JobError::Phrases(format!("{n} phrases exceed the limit of {MOST}: split the list"))),
         _ => Ok(phrases),
     }
 }
@@ -110,9 +117,11 @@ pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Resu
         let ignored = answered.ignored_words(&map.identities, &reading.phrase, &unknown);
         asked.push((answered.certainty(&ignored), answered));
     }
+    let mut colors = request.colors.clone();
+    colors.keep_all(phrases);
     let (stems, mut coco) = (stems(phrases), Coco::default());
     let (mut rows, mut renderer) = (Vec::new(), Renderer::new());
-    let mut ticker = Ticker::new("Asking phrases", views.len());
+    let mut ticker = Ticker::new("Running the phrase list", views.len());
     for (k, (view, camera)) in views.iter().enumerate() {
         ticker.tick(k, observer)?;
         let blend = request.matching.0 == MatchMode::Blend;
@@ -126,14 +135,15 @@ pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Resu
                 write_mask(&folder.join("masks").join(&place), &mask)?;
                 coco.mask(i, &mask, answered);
             }
-            rows.push(row(view, &phrases[i], (*certainty, answered), map, &mask, iou));
+            let phrase = (&*phrases[i], colors.of(&phrases[i]));
+            rows.push(row(view, phrase, (*certainty, answered), map, &mask, iou));
         }
     }
     ticker.tick(views.len(), observer)?;
     if let Some(folder) = &request.export {
         let csv = csv(&rows);
         atomic::write(&folder.join("phrases.csv"), |w| w.write_all(csv.as_bytes()))?;
-        let coco = coco.document(phrases);
+        let coco = coco.document(phrases, &colors);
         atomic::write(&folder.join("coco.json"), |w| Ok(serde_json::to_writer(w, &coco)?))?;
     }
     Ok(rows)
@@ -185,7 +195,7 @@ pub(crate) fn fitted(mask: Mask, width_px: usize, height_px: usize, place: &Path
 
 fn row(
     view: &str,
-    phrase: &str,
+    (phrase, color): (&str, [u8; 3]),
     (certainty, answered): (Certainty, &QueryAnswer),
     map: &SemanticMap,
     mask: &Mask,
@@ -197,6 +207,7 @@ fn row(
     PhraseRow {
         view: view.into(),
         phrase: phrase.into(),
+        color,
         verdict: answered.answer.verdict(),
         certainty: certainty.into(),
         answer: names.join("; "),
@@ -215,12 +226,17 @@ fn csv(rows: &[PhraseRow]) -> String {
         let text = if text.starts_with(['=', '+', '-', '@']) { format!("'{text}") } else { text.to_owned() };
         format!("\"{}\"", text.replace('"', "\"\""))
     };
-    let mut all = String::from("view,phrase,verdict,certainty,answer,score,margin,area_px,share,iou\n");
+    let mut all = String::from("view,phrase,verdict,certainty,answer,score,margin,area_px,share,iou,color\n");
     for r in rows {
         let iou = r.iou.map_or_else(String::new, |v| format!("{v:.6}"));
+        let [red, green, blue] = r.color;
         let texts = [&*r.view, &r.phrase, r.verdict, r.certainty, &r.answer].map(cell).join(",");
         // Writing to a text cannot fail.
-        let _ = writeln!(all, "{texts},{:.6},{:.6},{},{:.8},{iou}", r.score, r.margin, r.area_px, r.share);
+        let _ = writeln!(
+            all,
+            "{texts},{:.6},{:.6},{},{:.8},{iou},#{red:02x}{green:02x}{blue:02x}",
+            r.score, r.margin, r.area_px, r.share
+        );
     }
     all
 }
@@ -255,8 +271,12 @@ impl Coco {
         }));
     }
 
-    fn document(self, phrases: &[String]) -> Value {
-        let category = |(i, phrase): (usize, &String)| json!({ "id": i + 1, "name": phrase, "supercategory": "" });
+    fn document(self, phrases: &[String], colors: &PhraseColors) -> Value {
+        // Colors as COCO's panoptic categories have them.
+        let category = |(i, phrase): (usize, &String)| {
+            let color = colors.of(phrase);
+            json!({ "id": i + 1, "name": phrase, "supercategory": "", "color": color })
+        };
         json!({
             "images": self.images,
             "annotations": self.annotations,

@@ -29,7 +29,7 @@ pub(crate) fn read(path: &Path) -> Result<TrainConfig, IoError> {
     let known = fields(&TrainConfig::default());
     if let Some(name) = table.keys().find(|name| !known.contains_key(*name)) {
         let names = known.keys().cloned().collect::<Vec<_>>().join(", ");
-        return Err(broken(&format!("'{name}'"), format!("there is no such setting; there are {names}")));
+        return Err(broken(&format!("'{name}'"), format!("unknown setting; known are {names}")));
     }
     table.try_into().map_err(|e: toml::de::Error| broken("the settings", e.to_string()))
 }

@@ -1,7 +1,7 @@
 //! Small pictures of a scene's objects and parts, as its first view sees them, and what those without a name look like.
 
 use super::JobError;
-use crate::pipeline::semantics::thumbnails::{Thumbnails, portraits};
+use crate::pipeline::semantics::thumbnails::{Thumbnails, draw_thumbnails};
 use crate::render::RenderSettings;
 use crate::scene::appearance::{self, Appearance};
 use crate::scene::resource_log::{self, ResourceKind};
@@ -23,7 +23,7 @@ pub(crate) fn draw(
     home: &HomeView,
 ) -> Result<ThumbnailSet, JobError> {
     let from = home.camera.as_ref().map_or(home.bounds.center() + home.up, |c| c.center);
-    resource_log::record(ResourceKind::Thumbnails, "portraits of objects and parts", "a list of them is shown", 0);
+    resource_log::record(ResourceKind::Thumbnails, "thumbnails of objects and parts", "a list of them is shown", 0);
     let appearances = appearance::of_unnamed(cloud, map);
-    Ok(ThumbnailSet { pictures: portraits(cloud, map, settings, from, home.up)?, appearances })
+    Ok(ThumbnailSet { pictures: draw_thumbnails(cloud, map, settings, from, home.up)?, appearances })
 }

@@ -55,7 +55,7 @@ pub(crate) fn run(
                 if trained::is_scene(&out)
                     && let Err(e) = presets::keep(&out, config)
                 {
-                    observer.note(Severity::Warning, format!("The settings are not kept as a file: {e}"));
+                    observer.note(Severity::Warning, format!("The settings could not be saved to a file: {e}"));
                 }
                 return finished(outcome, out, observer);
             }

@@ -81,6 +81,18 @@ impl Report {
         let mut report: Self = serde_json::from_value(value).map_err(json)?;
         // As earlier reports spell it.
         report.computer.build = report.computer.build.replace("optimised", "optimized");
+        let (before, now) = ("localisation", "localization");
+        for stage in &mut report.stages {
+            stage.measures.iter_mut().filter(|m| m.name == before).for_each(|m| m.name = now.into());
+            for point in &mut stage.points {
+                if point.method == before {
+                    point.method = now.into();
+                }
+                if let Some(values) = point.values.remove(before) {
+                    point.values.insert(now.into(), values);
+                }
+            }
+        }
         Ok(report)
     }
 
@@ -106,6 +118,25 @@ mod tests {
         report.write(&folder.path().join(FILE)).expect("written");
         assert_eq!(Report::read(folder.path()).expect("folder"), report);
         assert_eq!(Report::read(&folder.path().join(FILE)).expect("file"), report);
+    }
+
+    #[test]
+    fn names_as_earlier_reports_spell_them_are_read_as_now() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join(FILE);
+        let mut now = example();
+        let stage = &mut now.stages[0];
+        stage.measures[0].name = "localization".into();
+        for point in &mut stage.points {
+            let (_, values) = point.values.pop_first().expect("measured");
+            point.values.insert("localization".into(), values);
+            point.method = "localization".into();
+        }
+        let text = serde_json::to_string(&now).expect("JSON");
+        let before = text.replace("localization", "localisation");
+        assert_ne!(text, before);
+        std::fs::write(&path, before).expect("written");
+        assert_eq!(Report::read(&path).expect("read"), now);
     }
 
     #[test]

@@ -56,8 +56,8 @@ mod tests {
         };
         let stage = Stage {
             name: StageName::Render,
-            secs_of: "one picture".into(),
-            reference: "the exact picture".into(),
+            secs_of: "one frame".into(),
+            reference: "the exact image".into(),
             input: BTreeMap::from([("size".into(), "64 x 48 px".into())]),
             seeds: vec![0, 1, 2],
             planned: 4,

@@ -17,7 +17,7 @@ nav a{margin-right:1.2em}summary{cursor:pointer}";
 
 /// The page.
 pub fn html(report: &Report) -> String {
-    let title = format!("Error against run time: {}", report.scene);
+    let title = format!("Error vs. run time: {}", report.scene);
     let mut out = format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" \
          content=\"width=device-width\"><title>{0}</title><style>{STYLE}</style></head><body>\n<h1>{0}</h1>\n\

@@ -15,7 +15,7 @@ use crate::math::format::bytes;
 use crate::models;
 use crate::navigate::Navigator;
 use crate::pipeline::semantics::code_map::CodeMap;
-use crate::pipeline::semantics::thumbnails::portraits;
+use crate::pipeline::semantics::thumbnails::draw_thumbnails;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{BackendChoice, Device, RenderSettings, Renderer, real_gpu};
 use crate::scene::plan::{Overrides, ScenePlan, When};
@@ -176,7 +176,7 @@ fn at_opening(scene: &OpenScene, plan: &ScenePlan, settings: &RenderSettings) ->
     let map = scene.map.as_deref();
     let thumbnails = map.filter(|_| plan.thumbnails == When::Always).map(|map| {
         let from = scene.first.center;
-        portraits(&scene.cloud, map, settings, from, scene.up).map_err(failed)
+        draw_thumbnails(&scene.cloud, map, settings, from, scene.up).map_err(failed)
     });
     let language = map.and_then(|m| m.language.as_ref()).filter(|_| plan.encoder == When::Always);
     let encoder = language.map(|language| {

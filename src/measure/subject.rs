@@ -79,11 +79,10 @@ impl Subject {
             StageName::Render => self.cameras.is_empty().then_some("cameras"),
             StageName::Train => photos,
             StageName::Features => photos.or(labels),
-            StageName::Query => {
-                photos.or(labels).or(self.language().is_none().then_some(
-                    "objects that an encoder has looked at: run 'fmlgs preprocess' on it with --encoder demo",
-                ))
-            }
+            StageName::Query => photos.or(labels).or(self
+                .language()
+                .is_none()
+                .then_some("embeddings of its objects: run 'fmlgs preprocess' on it with --encoder demo")),
             StageName::Path => self.cameras.is_empty().then_some("cameras"),
             StageName::Depth => match &self.dataset {
                 Some(d) => {

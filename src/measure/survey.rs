@@ -62,7 +62,7 @@ impl Sum {
 pub(crate) enum Ends {
     Keypoints,
     /// Places close to occupied space: from under the table to behind the lamp.
-    CloseToMatter,
+    CloseToSurface,
 }
 
 /// Poses that flights begin and end with. Places close to occupied space look as the nearest keypoint does.
@@ -151,7 +151,7 @@ pub(crate) fn surveyed(cloud: &GaussianCloud, own: &[Camera], count: usize, flig
     navigator.graph.look_at_all(&navigator.occupancy);
     let build_secs = start.elapsed().as_secs_f64();
     let parts = navigator.graph.parts(&navigator.occupancy).into_iter().max().map_or(0, |p| p + 1);
-    let kinds = [("keypoints", Ends::Keypoints), ("close to occupied space", Ends::CloseToMatter)];
+    let kinds = [("keypoints", Ends::Keypoints), ("close to occupied space", Ends::CloseToSurface)];
     let found = kinds.map(|(between, ends)| (between, survey(&navigator, ends, flights, frames, SEED)));
     Surveyed { cameras: count, navigator, parts, occupancy_secs, build_secs, found }
 }
@@ -264,7 +264,7 @@ mod tests {
         assert!(ours.rotation_error < 1e-9, "{ours:?}");
         assert!(paper.rotation_error > 0.1 && through.rotation_error > 1e-3, "{paper:?} {through:?}");
         assert!(through.largest_turn > 1.5 * ours.largest_turn, "{through:?} {ours:?}");
-        let close = self::survey(&navigator, Ends::CloseToMatter, 10, 60, 7);
+        let close = self::survey(&navigator, Ends::CloseToSurface, 10, 60, 7);
         assert!(close.ours.flights + close.no_route == 10 && close.ours.poses_too_near == 0, "{close:?}");
     }
 }

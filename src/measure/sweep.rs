@@ -80,7 +80,7 @@ impl<'a> Study<'a> {
     pub(crate) fn measured(&mut self, method: &str, setting: &str, seed: u64) -> Trial {
         let is = |c: &SweepCase| c.method == method && c.setting.contains(setting);
         let k = self.cases.iter().position(is).expect("a case");
-        (self.run)(k, seed, &mut crate::pipeline::observer::Silent).expect("runs").expect("not cancelled")
+        (self.run)(k, seed, &mut crate::pipeline::observer::Silent).expect("runs").expect("not canceled")
     }
 }
 

@@ -29,7 +29,7 @@ pub enum ModelError {
         "the model {model} knows {tokens} tokens, and the phrase has number {token}; it was exported with another vocabulary"
     )]
     Token { model: String, token: i64, tokens: usize },
-    #[error("the picture has no pixels, or no picture was looked at yet")]
+    #[error("the image has no pixels, or no image was encoded yet")]
     NoPicture,
     #[error("no object is marked in any frame")]
     NothingMarked,
@@ -45,7 +45,7 @@ pub enum ModelError {
         "a tile of {side_px} px with {pixels} pixels, where {expected_px} x {expected_px} is expected; cut it to that size"
     )]
     TileSize { side_px: usize, pixels: usize, expected_px: usize },
-    #[error("the tile has a color that is no number at pixel {pixel}")]
+    #[error("the tile has a color that is not a number at pixel {pixel}")]
     TileColor { pixel: usize },
     #[error("no known word in the phrase; unknown: {}", if unknown.is_empty() { "(it has no words)".to_owned() } else { unknown.join(", ") })]
     NoKnownWord { unknown: Vec<String> },

@@ -75,7 +75,7 @@ pub enum FetchError {
     Checksum { path: PathBuf, got: String, expected: String },
     #[error("{path}: {source}")]
     File { path: PathBuf, source: io::Error },
-    #[error("cancelled after {got} bytes; what arrived is kept")]
+    #[error("canceled after {got} bytes; what arrived is kept")]
     Cancelled { got: u64 },
 }
 

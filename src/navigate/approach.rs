@@ -35,10 +35,10 @@ pub(crate) struct Approach {
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ApproachError {
     /// It has no Gaussians.
-    #[error("nothing in the scene belongs to it, so there is no place to look at")]
+    #[error("it has no Gaussians, so there is nothing to look at")]
     Nothing,
     /// It is hidden from wherever one could stand.
-    #[error("it cannot be seen from any place where the camera may be")]
+    #[error("it is not visible from any reachable viewpoint")]
     Unseen,
     /// There is no way; the nearest view that can be reached is offered, if it is seen from there.
     #[error("{why}")]

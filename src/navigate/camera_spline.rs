@@ -99,7 +99,7 @@ impl CameraSpline {
     }
 
     /// Its poses for a video with so many pictures a second, both ends included; at most `most` and one.
-    pub(crate) fn pictures(&self, fps: f64, most: f64) -> Vec<Pose> {
+    pub(crate) fn poses(&self, fps: f64, most: f64) -> Vec<Pose> {
         self.flight(steps_of(self.seconds, fps, most) + 1).poses
     }
 

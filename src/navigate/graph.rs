@@ -15,7 +15,7 @@ use super::occupancy::OccupancyGrid;
 
 /// Neighbors that a keypoint is tried to be connected with: more than the six of its own star, so
 /// that stars hang together.
-const NEIGHBOURS: usize = 14;
+const NEIGHBORS: usize = 14;
 /// Unit in which lengths are counted, as a share of a voxel: the search adds whole numbers, so that
 /// equal routes are equal.
 const UNIT: f64 = 1e-6;
@@ -54,7 +54,7 @@ impl Graph {
         let places = places(&keypoints);
         let near = |i: usize| {
             let found = places.nearest_neighbor_iter(keypoints[i].center.to_array());
-            found.map(|p| p.data).filter(move |j| *j != i).take(NEIGHBOURS)
+            found.map(|p| p.data).filter(move |j| *j != i).take(NEIGHBORS)
         };
         let mut pairs: Vec<[u32; 2]> = (0..keypoints.len())
             .into_par_iter()

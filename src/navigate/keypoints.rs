@@ -103,7 +103,7 @@ mod tests {
 
     #[test]
     fn keypoints_inside_matter_are_rejected() {
-        // The neighbors of the second camera towards the wall would stand in it.
+        // The neighbors of the second camera toward the wall would stand in it.
         let cameras = [camera_at(DVec3::new(0.0, 0.0, 0.9)), camera_at(DVec3::new(0.0, 0.0, 0.3))];
         let eyes: Vec<DVec3> = cameras.iter().map(|c| c.center).collect();
         let occupancy = OccupancyGrid::of(&cloud_of_wall(0.0), &eyes, 0.05);

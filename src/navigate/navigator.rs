@@ -40,15 +40,13 @@ pub struct Navigator {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoRoute {
     /// There are no keypoints.
-    #[error("there is nowhere to stand: the scene came without cameras, or all of them are inside occupied space")]
+    #[error("no reachable viewpoint: the scene has no cameras, or all of them are inside occupied space")]
     NoKeypoints,
     /// The eye cannot get away from where it is.
-    #[error("there is no way out of where the eye is: occupied space is all around it")]
+    #[error("the camera is enclosed by occupied space")]
     Enclosed,
     /// The goal lies in a part that cannot be reached.
-    #[error(
-        "there is no way there that keeps clear of occupied space; the nearest that can be reached is {distance:.2} units away from it"
-    )]
+    #[error("no route avoids occupied space; the nearest reachable viewpoint is {distance:.2} units away")]
     Parted {
         /// The nearest keypoint to it that can be reached.
         nearest: usize,
@@ -56,7 +54,7 @@ pub enum NoRoute {
         distance: f64,
     },
     /// The goal is inside occupied space, or outside of what is known.
-    #[error("one cannot stand there: it is inside occupied space or outside of the scene")]
+    #[error("that place is not reachable: it is inside occupied space or outside the scene")]
     Inside,
 }
 

@@ -204,7 +204,7 @@ impl OccupancyGrid {
         Some((base, f))
     }
 
-    /// How far one can go from `a` towards `b` with at least `clearance` to all occupied space, within what is
+    /// How far one can go from `a` toward `b` with at least `clearance` to all occupied space, within what is
     /// known, as a share of the way, 0 to 1.
     ///
     /// Steps are as long as the distance field allows, which changes by no more than the way that is

@@ -38,7 +38,7 @@ pub struct Progress {
 
 /// The observer asked to stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
-#[error("cancelled")]
+#[error("canceled")]
 pub struct Interrupted;
 
 impl Interrupted {

@@ -29,9 +29,9 @@ pub enum VideoError {
     #[error(transparent)]
     Identities(#[from] RenderError),
     #[error(transparent)]
-    Animation(#[from] VideoFileError),
+    File(#[from] VideoFileError),
     /// The observer asked to stop; nothing is left of the video.
-    #[error("cancelled")]
+    #[error("canceled")]
     Interrupted(#[from] Interrupted),
 }
 
@@ -88,7 +88,7 @@ mod tests {
     use crate::pipeline::observer::{Signal, Silent};
 
     #[test]
-    fn a_film_has_a_frame_per_camera_and_a_cancelled_one_leaves_nothing() {
+    fn a_video_has_a_frame_per_camera_and_a_canceled_one_leaves_nothing() {
         struct Impatient;
         impl Observer for Impatient {
             fn signal(&self) -> Signal {

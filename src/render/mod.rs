@@ -152,7 +152,7 @@ pub struct Frame<R> {
     /// Depth at which transmittance first falls to one half, 0 where it never does; empty unless
     /// asked for. Carries a gradient for surfels only.
     pub median_depth: Vec<R>,
-    /// Normals of surfels, towards the camera in world axes, `sum(w n)`; empty for Gaussians and
+    /// Normals of surfels, toward the camera in world axes, `sum(w n)`; empty for Gaussians and
     /// without depth.
     pub normals: [Vec<R>; 3],
     /// How far surfels along a ray are apart: the sum over pairs of `w_i w_j (1/z_i - 1/z_j)²`;

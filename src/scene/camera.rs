@@ -41,7 +41,7 @@ pub enum CameraError {
         Camera::FOCAL_SIDES.end()
     )]
     Lens { focal_px: f64, side_px: u32 },
-    #[error("principal point ({0:e}, {1:e}) px is over {max:e} picture sides away from the picture", max = Camera::PRINCIPAL_SIDES)]
+    #[error("principal point ({0:e}, {1:e}) px is over {max:e} image sides away from the image", max = Camera::PRINCIPAL_SIDES)]
     Off(f64, f64),
     #[error("the camera center ({0:e}, {1:e}, {2:e}) is farther than {max:e} units from the origin", max = Camera::FARTHEST)]
     Far(f64, f64, f64),

@@ -22,7 +22,7 @@ pub struct LanguageFeatures {
 pub struct ViewFeatures {
     /// Of the identity's own picture.
     pub raw: Vec<Vec<f32>>,
-    /// Of a part, moved towards its whole's (the paper's semantic deviation); of an object, as raw.
+    /// Of a part, moved toward its whole's (the paper's semantic deviation); of an object, as raw.
     pub deviated: Vec<Vec<f32>>,
 }
 

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use super::app::App;
 use super::chat::Snapshot;
-use super::color_by::ColorBy;
 use super::context::SceneContext;
 use super::dialogs::Question;
 use super::history::EditStep;
@@ -18,12 +17,12 @@ use crate::jobs::find_objects::FindRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached};
 use crate::measure::is_report;
 use crate::navigate::FRAMES;
-use crate::navigate::target::{Side, ViewPreference};
+use crate::navigate::target::ViewPreference;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::IdentityId;
 use crate::scene::plan::When;
 use crate::ui::actions::{Action, Pane};
-use crate::worker::{Command, JobId, JobKind, ViewMode};
+use crate::worker::{Command, JobId, JobKind};
 
 impl App {
     /// Does what a user asked for.
@@ -43,10 +42,8 @@ impl App {
                     self.worker.cancel(job.id);
                 }
             }
-            Action::Dismiss if self.viewport.is_measuring() => self.view(&Action::Measure, ctx),
-            Action::Dismiss if self.viewport.picking.selected().is_some() => self.view(&Action::Select(None), ctx),
-            Action::Dismiss if self.full_view => self.arrange(&Action::FillWindow, ctx),
-            Action::Dismiss => self.act(Action::Cancel, ctx),
+            Action::Dismiss => self.dismiss(ctx),
+            Action::InspectAt(at) => self.inspect(at),
             Action::Evaluate => self.evaluate(),
             Action::FindObjects => self.find_objects(None),
             Action::FetchModel(id) => self.install_model(id, None),
@@ -64,28 +61,21 @@ impl App {
                     self.submit(Command::SetScale { out, meters_per_unit });
                 }
             }
-            Action::Show(mode) => {
-                self.layout.mode = mode;
-                // The picture is the picture.
-                if mode == ViewMode::Rgb {
-                    self.viewport.queries.tint(ColorBy::Masks);
-                }
-            }
-            Action::Tint(by) => self.viewport.queries.tint(by),
+            Action::Show(_)
+            | Action::Tint(_)
+            | Action::ToggleTimes
+            | Action::ToggleCompare
+            | Action::ToggleSplit
+            | Action::OtherView
+            | Action::ToggleDim
+            | Action::OpenBeside(_)
+            | Action::ToggleCameras => self.look(action, ctx),
             Action::OpenReport(path) => self.read_report(path, false),
             Action::CompareReport(path) => self.read_report(path, true),
             Action::EndComparison => self.state.second_report = None,
             Action::BenchmarkRendering => self.measure_drawing(),
             Action::ApplySetting(stage, knobs) => self.apply_setting(stage, &knobs),
             Action::ResetRenderSettings => self.viewport.overrides = RenderOverrides::default(),
-            Action::ToggleTimes => self.layout.times = !self.layout.times,
-            Action::ToggleCompare => {
-                self.layout.compare = !self.layout.compare;
-                if self.layout.compare && self.viewport.photo_index().is_none() {
-                    self.view(&Action::NextPhoto, ctx);
-                }
-            }
-            Action::ToggleCameras => self.layout.cameras = !self.layout.cameras,
             Action::TogglePane(pane) => self.layout.toggle(pane),
             Action::ShowPane(pane) => self.layout.show(pane),
             Action::FillWindow
@@ -122,11 +112,14 @@ impl App {
             | Action::OpenFile
             | Action::ExportPly
             | Action::ExportTarget(_)
+            | Action::ExportCrop
             | Action::Screenshot
             | Action::ChooseMasks
             | Action::AddModel(_)
             | Action::ExportPhrases
             | Action::ChooseTrueMask
+            | Action::SaveTrueMask
+            | Action::ChooseBeside
             | Action::ChooseReport
             | Action::ChooseSecondReport
             | Action::OpenPath
@@ -134,9 +127,14 @@ impl App {
             | Action::ExportVideo
             | Action::SaveChat => self.choose(action),
             Action::IsolateSelected | Action::HideSelected | Action::GoToSelected => self.act_on_selected(&action, ctx),
+            Action::SelectNext | Action::SelectPrevious | Action::SelectInner => self.select_another(&action, ctx),
             Action::FrameScene
+            | Action::Crop
+            | Action::SetCrop(_)
+            | Action::Inspect
             | Action::Select(_)
             | Action::Paint(_)
+            | Action::PaintTrueMask
             | Action::Isolate(_)
             | Action::Hide(_)
             | Action::ResetView
@@ -151,33 +149,13 @@ impl App {
         }
     }
 
-    fn view(&mut self, action: &Action, ctx: &egui::Context) {
-        let now = ctx.input(|i| i.time);
-        self.viewport.act(action, &self.state, &self.worker, now);
-    }
-
-    /// Does what a key means for what is selected.
-    fn act_on_selected(&mut self, action: &Action, ctx: &egui::Context) {
-        let Some(id) = self.viewport.picking.selected() else {
-            return self.state.toast(Tone::Info, "Nothing is selected: click an object in the view.");
-        };
-        let action = match action {
-            Action::HideSelected => Action::Hide(id),
-            Action::GoToSelected => Action::GoToTarget(id, Side::Best),
-            _ => Action::Isolate(Some(id).filter(|_| !self.viewport.visibility.is_isolated())),
-        };
-        self.act(action, ctx);
-    }
-
     /// Opens something else; asks first if that ends a running job.
     fn replace_scene(&mut self, action: Action) {
         match self.state.job.as_ref().map(|j| (j.kind, j.title.clone())) {
             None => self.open(action),
             Some((_, title)) => {
                 self.question = Some(Question {
-                    text: format!(
-                        "{title} is still running. Cancel it and continue? What it has saved so far is kept."
-                    ),
+                    text: format!("{title} is still running. Cancel it and continue? Saved progress is kept."),
                     yes: "Cancel and continue",
                     no: "Keep running",
                     action,
@@ -240,9 +218,9 @@ impl App {
                 let (cloud, config) = (Arc::clone(&cloud), self.layout.config.clone());
                 self.submit(Command::Evaluate { dataset, cloud, config, out });
             }
-            _ => self
-                .state
-                .toast(Tone::Warning, "Train first: quality is measured on trained Gaussians and held-out photos."),
+            _ => {
+                self.state.toast(Tone::Warning, "Train first: evaluation needs trained Gaussians and held-out photos.")
+            }
         }
     }
 
@@ -250,7 +228,7 @@ impl App {
     pub(super) fn find_objects(&mut self, masks: Option<PathBuf>) {
         let scene = self.state.scene.clone();
         let Some((scene, dataset)) = scene.as_ref().and_then(|s| Some((s, s.dataset.clone()?))) else {
-            self.state.toast(Tone::Warning, "Open a folder of posed photos first: masks belong to photos.");
+            self.state.toast(Tone::Warning, "Open a folder of posed photos first: masks refer to photos.");
             return;
         };
         let masks = masks.or_else(|| scene.masks.clone());
@@ -267,7 +245,7 @@ impl App {
                     with: self.layout.finding.clone(),
                 })));
             }
-            None => self.state.toast(Tone::Warning, "Train first: objects consist of trained Gaussians."),
+            None => self.state.toast(Tone::Warning, "Train first: objects are found among trained Gaussians."),
         }
     }
 
@@ -325,7 +303,7 @@ impl App {
         let Some(SceneContext { scene, cloud, map: Some(map), settings, cameras, up, eye, aspect, explored }) =
             self.context()
         else {
-            self.chat.answer("There is no scene with objects yet: open or train one, and find its objects.");
+            self.chat.answer("Open or train a scene and find its objects first.");
             return;
         };
         let snapshot = Snapshot {
@@ -373,26 +351,15 @@ impl App {
         }
     }
 
-    /// Makes a text field of the name that was chosen last.
-    fn start_renaming(&mut self) {
-        let found = || self.viewport.queries.found().first().copied();
-        let chosen = self.viewport.picking.selected().or_else(found);
-        match (chosen, self.state.semantics.clone()) {
-            (Some(id), Some(map)) => {
-                self.layout.show(Pane::Objects);
-                self.objects.rename(id, &map.identities);
-            }
-            _ => self
-                .state
-                .toast(Tone::Info, "Choose what to rename first: click it in the view or its name in the list."),
-        }
-    }
-
     fn type_question(&mut self) {
         if self.state.semantics.is_some() {
+            // Another scene in the second view is not asked.
+            if self.state.beside.is_some() {
+                self.viewport.queries.work_in(false);
+            }
             self.viewport.queries.start_typing();
         } else {
-            self.state.toast(Tone::Warning, "There is nothing to query yet: find the objects first (Objects pane).");
+            self.state.toast(Tone::Warning, "Nothing to query yet: find objects first (Objects pane).");
         }
     }
 }

@@ -8,8 +8,8 @@ use super::app::App;
 use super::camera;
 use super::context::SceneContext;
 use super::state::Tone;
-use crate::jobs::presets;
 use crate::jobs::video::VideoRequest;
+use crate::jobs::{export, presets};
 use crate::render::BackendChoice;
 use crate::worker::{Command, Failure};
 
@@ -19,20 +19,29 @@ impl App {
         match presets::read(path) {
             Ok(config) => {
                 self.layout.config = config;
-                self.state.toast(Tone::Good, format!("The next training has the settings of {}", path.display()));
+                self.state.toast(Tone::Good, format!("The next training uses the settings of {}", path.display()));
             }
             Err(e) => self.state.fail("Reading training settings", Failure::of(&e, "")),
         }
     }
 
     pub(super) fn choose(&mut self, action: Action) {
-        let writes = matches!(action, Action::ExportPly | Action::ExportTarget(_) | Action::Screenshot);
+        let writes =
+            matches!(action, Action::ExportPly | Action::ExportTarget(_) | Action::ExportCrop | Action::Screenshot);
         if writes && self.viewport.picture().is_none() {
-            self.state.toast(Tone::Warning, "There is nothing to save yet: open a scene first.");
+            self.state.toast(Tone::Warning, "Nothing to save yet: open a scene first.");
+            return;
+        }
+        if action == Action::SaveTrueMask && self.viewport.queries.truth().is_none() {
+            return self.state.toast(Tone::Info, "This view has no true mask: load or paint one.");
+        }
+        if action == Action::ExportCrop && self.viewport.visibility.crop().is_none() {
+            self.state.toast(Tone::Info, "There is no crop box yet: press B.");
             return;
         }
         let scene = self.state.scene.as_ref().map_or_else(|| "scene".to_owned(), |s| s.name.clone());
         let name = match (&action, &self.state.semantics) {
+            (Action::ExportCrop, _) => format!("{scene}-cropped"),
             (Action::ExportTarget(id), Some(map)) => map.identities.full_name(*id).replace(['/', '\\', ' '], "-"),
             _ => scene,
         };
@@ -65,6 +74,16 @@ impl App {
                     self.submit(Command::Export { cloud, path });
                 }
             }
+            Action::ExportCrop => {
+                if let (Some(cloud), Some(crop)) = (self.viewport.cloud(), self.viewport.visibility.crop()) {
+                    match export::cropped(cloud, &crop) {
+                        Ok(kept) => {
+                            self.submit(Command::Export { cloud: Arc::new(kept), path });
+                        }
+                        Err(e) => self.state.toast(Tone::Warning, format!("Nothing is exported: {e}.")),
+                    }
+                }
+            }
             Action::OpenPath => match camera::read(&path) {
                 Ok(read) => {
                     self.camera.open(read);
@@ -75,13 +94,15 @@ impl App {
                 }
             },
             Action::SavePath => match camera::write(&path, &self.camera.path, self.viewport.aspect()) {
-                Ok(()) => self.state.toast(Tone::Good, format!("Wrote {}", path.display())),
+                Ok(()) => self.state.toast(Tone::Good, format!("Saved to {}", path.display())),
                 Err(message) => {
                     self.state.fail("Saving the camera path", Failure { message, remedy: String::new() });
                 }
             },
             Action::ExportVideo => self.export_video(path),
             Action::SaveChat => self.save_chat(&path),
+            Action::ChooseBeside => self.ask(Action::OpenBeside(Some(path))),
+            Action::SaveTrueMask => self.save_true_mask(&path),
             Action::Screenshot => {
                 if let Some(pixels) = self.viewport.pixels() {
                     self.submit(Command::Picture { pixels: Arc::new(pixels), path });
@@ -95,7 +116,7 @@ impl App {
     fn export_video(&mut self, out: PathBuf) {
         let Some(SceneContext { cloud, map, settings: draw, aspect, .. }) = self.context() else { return };
         let Some((cameras, settings)) = self.camera.video(&out, aspect) else {
-            self.state.toast(Tone::Warning, "There is nothing to export: add keyframes, or go to something first.");
+            self.state.toast(Tone::Warning, "Nothing to export: add keyframes, or fly to an object first.");
             return;
         };
         let found = self.viewport.queries.found();
@@ -107,8 +128,8 @@ impl App {
     fn save_chat(&mut self, path: &Path) {
         let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
         let Some(text) = self.chat.transcript(json).map(str::to_owned) else { return };
-        match crate::jobs::export::text(path, &text) {
-            Ok(()) => self.state.toast(Tone::Good, format!("Wrote {}", path.display())),
+        match export::text(path, &text) {
+            Ok(()) => self.state.toast(Tone::Good, format!("Saved to {}", path.display())),
             Err(e) => self.state.fail("Saving the conversation", Failure::of(&e, "")),
         }
     }

@@ -7,7 +7,9 @@ use super::actions::Pane;
 use super::app::App;
 use super::context::SceneContext;
 use super::state::Tone;
+use crate::jobs::export;
 use crate::jobs::phrases::{self, PhrasesRequest, TrueMasks};
+use crate::jobs::query::write_mask;
 use crate::scene::{Camera, LevelFilter};
 use crate::worker::{Command, Failure};
 
@@ -23,7 +25,7 @@ impl App {
             Err(e) => return self.state.toast(Tone::Warning, e.to_string()),
         };
         let Some(SceneContext { cloud, map: Some(map), settings, scene, .. }) = self.context() else {
-            return self.state.toast(Tone::Warning, "Find objects first: they are what phrases are asked of.");
+            return self.state.toast(Tone::Warning, "Find objects first: queries search among them.");
         };
         let photos = scene.dataset.as_ref().filter(|_| self.phrases.all_photos);
         let views: Vec<(String, Camera)> = match (photos, self.viewport.picture()) {
@@ -33,11 +35,13 @@ impl App {
         };
         // A mask is of one view alone.
         let truth = self.viewport.queries.truth().filter(|_| photos.is_none()).map_or(TrueMasks::None, TrueMasks::Mask);
+        let colors = self.viewport.queries.colors_of(&phrases);
         self.submit(Command::Phrases(Box::new(PhrasesRequest {
             cloud: Arc::clone(&cloud),
             map: Arc::clone(&map),
             settings,
             views,
+            colors,
             phrases,
             level: LevelFilter::Auto,
             matching: self.viewport.queries.matching(),
@@ -60,6 +64,15 @@ impl App {
                 self.viewport.queries.compare_with(Some((Arc::new(mask), pose)));
             }
             Err(e) => self.state.fail("Opening the true mask", Failure::of(&e, "Choose a .png of this view.")),
+        }
+    }
+
+    /// Writes the true mask of the present view.
+    pub(super) fn save_true_mask(&mut self, path: &Path) {
+        let Some(mask) = self.viewport.queries.truth() else { return };
+        match export::check(path, &[".png"], &[]).and_then(|()| write_mask(path, &mask)) {
+            Ok(()) => self.state.toast(Tone::Good, format!("Wrote {}", path.display())),
+            Err(e) => self.state.fail("Saving the true mask", Failure::of(&e, "Choose another place.")),
         }
     }
 }

@@ -23,11 +23,11 @@ impl App {
         let scene = self.state.scene.clone();
         let cloud = self.viewport.cloud().cloned().filter(|_| self.state.is_trained());
         let (Some(scene), Some(cloud)) = (scene, cloud) else {
-            self.state.toast(Tone::Warning, "Open or train a scene first: its Gaussians are what is rendered.");
+            self.state.toast(Tone::Warning, "Open or train a scene first: there is nothing to render.");
             return;
         };
         if let Some(job) = &self.state.job {
-            let text = format!("{} is still running; cancel it first (Esc), or it would distort the times.", job.title);
+            let text = format!("{} is still running and would distort the times; cancel it first (Esc).", job.title);
             self.state.toast(Tone::Warning, text);
             return;
         }
@@ -53,17 +53,17 @@ impl App {
             StageName::Train => turned(&self.layout.config, knobs).map(|config| {
                 self.layout.config = config;
                 self.layout.show(Pane::Training);
-                "The next training will use it (pane Training)"
+                "The next training will use this setting (Training pane)"
             }),
             StageName::Render => turned(&self.viewport.overrides, knobs).map(|drawing| {
                 self.viewport.overrides = drawing;
-                "The view is rendered with it; videos and exports stay as they are"
+                "The view now uses this setting; videos and exports do not"
             }),
             _ => Err("the window has no setting for it".into()),
         };
         match done {
             Ok(text) => self.state.toast(Tone::Good, text),
-            Err(text) => self.state.toast(Tone::Warning, format!("This cannot be applied: {text}")),
+            Err(text) => self.state.toast(Tone::Warning, format!("Cannot apply: {text}")),
         }
     }
 }

@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 
 use egui::ThemePreference;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
@@ -12,7 +12,7 @@ use crate::io::unposed::Unposed;
 use crate::measure::{Knobs, StageName};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
-use crate::scene::{IdentityId, NOBODY};
+use crate::scene::{CropBox, IdentityId, NOBODY};
 use crate::ui::color_by::ColorBy;
 use crate::worker::{Start, ViewMode};
 
@@ -137,24 +137,24 @@ macro_rules! actions {
 actions! {
     OpenFolder: "Open folder\u{2026}",
         "COLMAP, transforms.json (nerfstudio, instant-ngp, Blender), LLFF, or a trained scene.", "Ctrl+O";
-    OpenFile: "Open file\u{2026}", "A splat .ply, a transforms.json, or the scene.json of a trained scene.";
+    OpenFile: "Open file\u{2026}", "A splat (.ply, .sog, .gltf, .glb), a transforms.json, or the scene.json of a trained scene.";
     Open(path: PathBuf): format!("Open {}", path.display()), "Open this path.";
     FindPoses(photos: Box<Unposed>): format!("Find the camera poses of {}", photos.folder.display()),
         "Run COLMAP on the photos, in a folder of its own, and open the result.";
-    OpenDemo: "Open the demo", "A trained tabletop with its objects and parts, ready to be asked. Needs no download.";
+    OpenDemo: "Open the demo", "A trained tabletop with objects and parts, ready for queries. No download needed.";
     TrainDemo: "Train the demo yourself",
-        "Render the tabletop into posed photos, open them and train at once. Needs no download.";
+        "Render posed photos of the tabletop and train on them. No download needed.";
     ExportPly: "Export Gaussians as .ply\u{2026}", "Write the Gaussians in the format that 3DGS viewers read.", "Ctrl+E";
     Screenshot: "Save the view as .png\u{2026}", "Write the image in the viewport, without the drawn cameras.", "Ctrl+S";
     StartTraining: "Start training",
         "Fit Gaussians to the photos. Resumes from the last checkpoint if the settings are the same.", "Ctrl+T";
     PauseTraining: "Pause or resume training", "Pause training without losing its state.", "T";
-    Cancel: "Cancel the running job", "Stop the running job at its next step. What is trained so far stays.";
+    Cancel: "Cancel the running job", "Stop the running job at its next step. Progress so far is kept.";
     Dismiss: "Deselect, or cancel the running job", "Deselect what is selected; with nothing selected, stop the running job.",
         "Escape";
-    Evaluate: "Evaluate on held-out photos", "PSNR and SSIM on the photos that training does not see.";
+    Evaluate: "Evaluate on held-out photos", "PSNR and SSIM on photos held out from training.";
     FindObjects: "Find objects and parts",
-        "Lift the masks that came with the photos, or else regions of uniform color, to the Gaussians and every view.";
+        "From the masks that came with the photos, or else from regions of uniform color.";
     ChooseMasks: "Find objects with other masks\u{2026}",
         "Id maps of fmlgs synth, ISAT files, folders of SPIn-NeRF, 3D-OVS or LERF-Mask; one labeled photo is enough.";
     FetchModel(id: String): format!("Download the model {id}"), "Download it, verify it, and use it from then on.";
@@ -162,37 +162,45 @@ actions! {
         "Choose a folder with its files; they are verified and copied.";
     TypeQuery: "Query an object or a part", "A name, or \"the button of the red controller\".", "/";
     Ask(text: String): format!("Query {text}"), "A name, or \"the button of the red controller\".";
-    RunPhrases(to: Option<PathBuf>): to.as_ref().map_or_else(|| "Ask the list of phrases".into(),
-            |to| format!("Write the masks of the phrases to {}", to.display())),
-        "Ask every phrase of the list, in this view or in all photos.";
-    ExportPhrases: "Export the masks of the phrases\u{2026}", "As .png, COCO .json and a .csv table, into a folder.";
+    RunPhrases(to: Option<PathBuf>): to.as_ref().map_or_else(|| "Run the phrase list".into(),
+            |to| format!("Export phrase masks to {}", to.display())),
+        "Query every phrase of the list, in this view or in all photos.";
+    ExportPhrases: "Export phrase masks\u{2026}", "As .png, COCO .json and a .csv table, in a folder.";
     ChooseTrueMask: "Compare with a true mask\u{2026}",
-        "A picture of this view, white where the object is: hits, misses, false alarms and IoU are shown.";
+        "A .png of this view, white where the object is. Shows hits, misses, false alarms and IoU.";
     TrueMask(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison with a true mask".into(),
             |p| format!("Compare with the true mask {}", p.display())),
-        "Hits, misses and false alarms of the newest answer, and its IoU.";
+        "Hits, misses, false alarms and IoU of the latest answer.";
+    PaintTrueMask: "Paint a true mask",
+        "Paint what the answer should be in this view. Shows hits, misses, false alarms and IoU.";
+    SaveTrueMask: "Save the true mask as .png\u{2026}", "White where the object is; can be loaded again.";
     GoToTarget(id: IdentityId, side: Side): format!("Go to #{id}, {}", side.text()),
-        "Fly to where it is seen best, around everything in between.";
+        "Fly to its best view, around obstacles.";
     PlayPath: "Play or pause the camera path", "Fly along the path, or pause where you are.", "Space";
     StepBack: "Previous frame", "Move back along the path by one frame.", ",";
     StepForward: "Next frame", "Move forward along the path by one frame.", ".";
-    AddKey: "Add the view as a keyframe", "The camera path will pass here, looking this way.", "K";
+    AddKey: "Add keyframe", "Add the current view to the camera path.", "K";
     OpenPath: "Open a camera path\u{2026}", "A path of this program, or of nerfstudio's viewer.";
     SavePath: "Save the camera path\u{2026}", "As .json; for nerfstudio, end its name in .nerfstudio.json.";
     ExportVideo: "Export video\u{2026}", "H.264 (.mp4), .gif, .webp, or .png frames in a folder.";
-    StartChat: "Chat", "Ask in plain sentences: show me the lid of the kettle, then step back.", "Enter";
+    StartChat: "Chat", "Type a command, such as \u{201c}show me the lid of the kettle\u{201d}. \u{201c}help\u{201d} lists all.", "Enter";
     SaveChat: "Save conversation\u{2026}", "As Markdown, or .json, with every step and its result.";
     Select(id: Option<IdentityId>): id.map_or_else(|| "Deselect".into(), |id| format!("Select #{id}")),
-        "Outline it in the view; keys and menus are about it.";
+        "Outline it in the view; keys and menus act on it.";
+    SelectNext: "Select the next object", "In the order of the list; with a part selected, the part next to it.", "N";
+    SelectPrevious: "Select the previous object", "In the order of the list; with a part selected, the part before it.", "P";
+    SelectInner: "Select a part of the selection", "The first part of what is selected; N and P go through the others.", "O";
     IsolateSelected: "Isolate the selection",
-        "Draw nothing else, or everything again.", "I";
-    HideSelected: "Hide the selection", "Leave it out of the view.", "H";
-    GoToSelected: "Go to the selection", "Fly to where it is seen best.", "G";
+        "Show only the selection, or everything again.", "I";
+    HideSelected: "Hide the selection", "Do not show it in the view.", "H";
+    GoToSelected: "Go to the selection", "Fly to its best view.", "G";
     Isolate(only: Option<IdentityId>): only.map_or_else(|| "Show all objects".into(), |id| format!("Show only #{id}")),
-        "Draw everything again that was hidden.";
-    Hide(id: IdentityId): format!("Hide or show #{id}"), "Leave it out of the view, or draw it again.";
+        "Show everything that was hidden.";
+    Hide(id: IdentityId): format!("Hide or show #{id}"), "Hide it in the view, or show it again.";
     ExportTarget(id: IdentityId): format!("Export #{id} as .ply\u{2026}"),
         "Write its Gaussians in the format that 3DGS viewers read.";
+    ExportCrop: "Export what the crop box keeps\u{2026}",
+        "Write the Gaussians whose centers it keeps, hidden ones too, in the format that 3DGS viewers read.";
     Change(edit: Edit): match edit {
             Edit::Rename(_, name) => format!("Rename to {name}"),
             Edit::Merge(from, into) => format!("Merge #{from} into #{into}"),
@@ -204,18 +212,24 @@ actions! {
             Some(NOBODY) => "Paint a new object".to_owned(),
             Some(id) => format!("Paint a new part of #{id}"),
         }, "Drag over it or click on it in the view; its Gaussians become a new object or part.";
-    AddPainted: "Add what is painted", "Make the painted Gaussians a new object or part.";
-    Rename: "Rename", "Type a new name for the object or part that was chosen last.", "F2";
-    Undo: "Undo", "Take the last change of objects, of what is shown or of the camera path back.", "Ctrl+Z";
-    Redo: "Redo", "Make the change again that was undone.", "Ctrl+Y";
-    FrameScene: "Frame the selection or the scene", "Move until all of what is selected is in view, or else the whole scene.", "F";
-    ResetView: "Reset the view", "Return to the view with which the scene opened.", "Home";
+    AddPainted: "Add painted selection", "Make the painted Gaussians a new object or part.";
+    Rename: "Rename", "Type a new name for the selected object or part.", "F2";
+    Undo: "Undo", "Undo the last change to objects, visibility or the camera path.", "Ctrl+Z";
+    Redo: "Redo", "Redo the last undone change.", "Ctrl+Y";
+    FrameScene: "Frame the selection or the scene", "Move until the selection, or the whole scene, fits the view.", "F";
+    ResetView: "Reset the view", "Return to the scene's initial view.", "Home";
     TurnUp(axis: Axis): format!("Make {} the up direction", axis.text()), "For scenes that lie on their side.";
     SetUp(up: DVec3): format!("Make ({:.2}, {:.2}, {:.2}) the up direction", up.x, up.y, up.z),
-        "The plane that was picked becomes the floor.";
-    Measure: "Measure a distance", "Click two points on surfaces; set the scale from a length that you know.", "M";
+        "Use the picked plane as the floor.";
+    Measure: "Measure a distance", "Click two points on surfaces; set the scale from a known length.", "M";
+    Crop: "Crop box", "Show only the Gaussians in a box: drag its faces or type its corners.", "B";
+    SetCrop(crop: Option<CropBox>): if crop.is_some() { "Crop the view" } else { "Remove the crop box" },
+        "Show only what a box keeps, or everything again.";
+    Inspect: "Inspect Gaussians", "Click a pixel to see every property of its Gaussians.", "X";
+    InspectAt(at: DVec2): format!("Inspect the Gaussians at ({:.2}, {:.2})", at.x, at.y),
+        "Every property of the Gaussians of a pixel.";
     SetScale(meters: f64): format!("Set the scale to {meters} m per unit"),
-        "Lengths are shown in meters from now on; kept with the scene.";
+        "Show lengths in meters; saved with the scene.";
     PreviousPhoto: "Previous photo", "Look through the camera of the previous photo.", "[";
     NextPhoto: "Next photo", "Look through the camera of the next photo.", "]";
     GoToPhoto(index: usize): format!("Go to photo {}", index + 1), "Look through the camera of this photo.";
@@ -224,26 +238,33 @@ actions! {
             other => format!("Show {}", other.text().to_lowercase()),
         }, "Choose what the viewport shows.";
     Tint(by: ColorBy): format!("Color by {}", by.text().to_lowercase()),
-        "Color what is in view by what it is; once more for the picture.";
+        "Color the view this way; again for the RGB image.";
     ToggleCompare: "Compare with the photo", "Show the photo beside the rendering with a slider between them.", "C";
-    ToggleCameras: "Show or hide cameras", "Draw the camera of every photo into the view.", "V";
+    ToggleSplit: "Split view", "Two views of the scene by one camera, each with its own query and colors.", "8";
+    OtherView: "Work in the other view", "Keys, queries and colors act on it from now on.", "0";
+    ChooseBeside: "Compare with another scene\u{2026}",
+        "Show its Gaussians in the second view by the same camera: two trainings of the same photos.";
+    OpenBeside(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison with another scene".into(),
+            |p| format!("Compare with the scene {}", p.display())), "Show its Gaussians in the second view.";
+    ToggleDim: "Dim the rest", "Darken everything except answers and the selection.", "9";
+    ToggleCameras: "Show or hide cameras", "Show the camera of every photo in the view.", "V";
     TogglePane(pane: Pane): format!("Show or hide the {} pane", pane.text().to_lowercase()),
-        "Show this part of the window, or make room for others.";
-    FillWindow: "Fill the window with the view", "Nothing but the view, on the whole screen; once more for all the rest.", "F11";
-    ResetPanes: "Reset the panes", "Put every pane back to where it stood at first.";
+        "Show or hide this pane.";
+    FillWindow: "Fill the window with the view", "Show only the view, full screen; again to show everything.", "F11";
+    ResetPanes: "Reset the panes", "Put every pane back in its initial place.";
     UseTheme(theme: ThemePreference): match theme {
             ThemePreference::Dark => "Dark theme",
             ThemePreference::Light => "Light theme",
-            ThemePreference::System => "The system's theme",
-        }, "The picture is on dark ground in each.";
+            ThemePreference::System => "System theme",
+        }, "The view keeps its dark background.";
     LargerText: "Larger text", "Enlarge everything in the window.";
-    SmallerText: "Smaller text", "Make everything in the window smaller.";
-    NormalText: "Text of normal size", "Everything in the window as large as it was at first.";
-    ShowPane(pane: Pane): format!("Show the {} pane", pane.text().to_lowercase()), "Bring this part of the window up.";
-    ChooseReport: "Open a report\u{2026}", "A report.json of fmlgs report: error against run time of every setting.";
-    ChooseSecondReport: "Compare with another report\u{2026}", "Plotted with hollow markers, its numbers side by side.";
+    SmallerText: "Smaller text", "Reduce everything in the window.";
+    NormalText: "Normal text size", "Reset the size of everything in the window.";
+    ShowPane(pane: Pane): format!("Show the {} pane", pane.text().to_lowercase()), "Open this pane.";
+    ChooseReport: "Open a report\u{2026}", "A report.json of fmlgs report: error vs. run time of every setting.";
+    ChooseSecondReport: "Compare with another report\u{2026}", "Shown with hollow markers, and side by side in the tables.";
     OpenReport(path: PathBuf): format!("Open the report {}", path.display()), "Read this report.";
-    CompareReport(path: PathBuf): format!("Compare with the report {}", path.display()), "Read this second report.";
+    CompareReport(path: PathBuf): format!("Compare with the report {}", path.display()), "Open it as the second report.";
     EndComparison: "Stop comparing reports", "Close the second report.";
     BenchmarkRendering: "Benchmark rendering",
         "Render a few views with many settings and compare them with the exact image. Takes minutes; can be canceled and resumed.";
@@ -267,7 +288,7 @@ impl Action {
         let mut all = Self::plain();
         // Without a brush there is nothing to add.
         all.retain(|a| *a != Self::AddPainted);
-        all.extend([Self::Isolate(None), Self::Paint(Some(NOBODY))]);
+        all.extend([Self::Isolate(None), Self::Paint(Some(NOBODY)), Self::SetCrop(None)]);
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::ShowPane(*pane)));
         all.extend(THEMES.map(Self::UseTheme));
@@ -280,13 +301,14 @@ impl Action {
     /// One sentence on what it does.
     pub(crate) fn tooltip(&self) -> &'static str {
         match self {
-            Self::Isolate(Some(_)) => "Draw nothing else.",
+            Self::Isolate(Some(_)) => "Show nothing else.",
             Self::Show(ViewMode::Rgb) => "The rendered image.",
             Self::Show(ViewMode::Depth) => "Distance from the camera, near to far as blue to red.",
             Self::Show(ViewMode::Alpha) => "Accumulated opacity, black to white.",
             Self::Show(ViewMode::Difference) => {
                 "Absolute difference from the photo, amplified four times. Needs a photo's view."
             }
+            Self::Show(ViewMode::Photo) => "The photo through whose camera the view looks. Needs a photo's view.",
             other => other.row().0,
         }
     }

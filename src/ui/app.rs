@@ -210,7 +210,9 @@ impl App {
         let bar = Frame::new().fill(theme::panel()).inner_margin(Margin::symmetric(10, 6));
         if !self.fills_window() {
             let Self { state, layout, actions, viewport, .. } = self;
-            Panel::top("menus").frame(bar).show(ui, |ui| bars::top(ui, state, layout, actions));
+            Panel::top("menus")
+                .frame(bar)
+                .show(ui, |ui| bars::top(ui, state, layout, viewport.queries.is_second(), actions));
             Panel::bottom("status")
                 .frame(bar)
                 .show(ui, |ui| bars::status(ui, state, layout, viewport.picture(), actions));

@@ -167,7 +167,7 @@ impl Chat {
         let (ready, mut say) = (identities.is_some(), None);
         if self.lines.is_empty() {
             ui.label(
-                RichText::new("Type a command: it finds things, goes there, measures, hides. 'help' lists them all.")
+                RichText::new("Type a command to find, visit, measure or hide things. \u{201c}help\u{201d} lists all.")
                     .color(theme::weak()),
             );
             ui.horizontal_wrapped(|ui| {

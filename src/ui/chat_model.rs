@@ -68,7 +68,7 @@ impl ModelChooser {
                 .on_hover_text("The built-in commands; no network.");
             ui.selectable_value(&mut settings.use_model, true, "Chat model").on_hover_text(SENT);
         });
-        planner.response.accessible_name("What reads sentences");
+        planner.response.accessible_name("Planner");
         if settings.use_model {
             let open = ui.menu_button("Address\u{2026}", |ui| self.settings(ui, &mut settings.model));
             if open.inner.is_none() {
@@ -85,7 +85,7 @@ impl ModelChooser {
         }
         match self.found.answer() {
             None => drop(ui.weak("Looking for chat models on this machine\u{2026}")),
-            Some(none) if none.is_empty() => drop(ui.weak("No chat model's server answers on this machine.")),
+            Some(none) if none.is_empty() => drop(ui.weak("No chat model server found on this machine.")),
             Some(found) => {
                 for server in found {
                     ui.label(RichText::new(format!("{}, on this machine", server.kind)).small().color(theme::weak()));
@@ -102,11 +102,11 @@ impl ModelChooser {
         ui.separator();
         for (label, value, hint) in [
             ("Address", &mut model.base_url, "http://127.0.0.1:11434/v1"),
-            ("Model", &mut model.model, "its name there"),
-            ("Key from variable", &mut model.key_variable, "name of an environment variable; empty for none"),
+            ("Model", &mut model.model, "model name on the server"),
+            ("API key variable", &mut model.key_variable, "environment variable; empty if none"),
         ] {
             ui.label(RichText::new(label).small().color(theme::weak()));
-            ui.add(TextEdit::singleline(value).hint_text(hint).desired_width(f32::INFINITY));
+            ui.add(TextEdit::singleline(value).hint_text(hint).desired_width(f32::INFINITY)).accessible_name(label);
         }
         let is_waiting = matches!(self.tested, Asked::Waiting(_));
         ui.horizontal_wrapped(|ui| {

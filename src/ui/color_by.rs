@@ -18,9 +18,10 @@ pub enum ColorBy {
     /// The codes of the pixels, blended or exact.
     Codes,
     /// The three main directions of the language features.
+    #[strum(serialize = "Embeddings")]
     Features,
     /// Where blended codes mean something else than the winning identities.
-    #[strum(serialize = "Exact \u{2260} blended")]
+    #[strum(serialize = "Blending errors")]
     Difference,
 }
 

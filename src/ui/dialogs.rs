@@ -31,7 +31,7 @@ pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox) -> bool {
             ui.label(RichText::new(&error.failure.remedy).color(theme::text()).strong());
         }
         ui.add_space(6.0);
-        ui.weak("What was open is unchanged.");
+        ui.weak("The open scene is unchanged.");
         ui.add_space(12.0);
         ui.horizontal(|ui| {
             let close = ui.add(theme::primary_button("Close")).clicked();
@@ -48,7 +48,7 @@ pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox) -> bool {
 
 /// Asks a question. `Some(true)` to go ahead, `Some(false)` not to, `None` while no one answered.
 pub(crate) fn show_question(ctx: &egui::Context, text: &str, yes: &str, no: &str) -> Option<bool> {
-    let response = Modal::new(Id::unique("question")).frame(theme::dialog()).show(ctx, |ui| {
+    let response = Modal::new(Id::unique("dialog question")).frame(theme::dialog()).show(ctx, |ui| {
         ui.set_width(420.0);
         ui.label(text);
         ui.add_space(12.0);

@@ -106,11 +106,13 @@ impl App {
     }
 
     fn show_state(&mut self, view: ViewState) {
-        let ViewState { hidden, mode, cameras, path, kept } = view;
+        let ViewState { hidden, crop, modes, split, dim, cameras, path, kept } = view;
         if self.viewport.visibility.hidden() != &hidden {
             self.viewport.visibility.set_hidden(hidden);
         }
-        (self.layout.mode, self.layout.cameras) = (mode, cameras);
+        self.viewport.visibility.set_crop(crop);
+        ([self.layout.mode, self.layout.second_mode], self.layout.cameras) = (modes, cameras);
+        (self.layout.split_view, self.layout.dim) = (split, dim);
         self.camera.set_path(path);
         if let Some(map) = self.state.semantics.clone() {
             self.viewport.queries.keep_only(&kept, &map);
@@ -121,7 +123,10 @@ impl App {
         let (layout, viewport) = (&self.layout, &self.viewport);
         let view = ViewState {
             hidden: viewport.visibility.hidden().clone(),
-            mode: layout.mode,
+            crop: viewport.visibility.crop(),
+            modes: [layout.mode, layout.second_mode],
+            split: layout.split_view,
+            dim: layout.dim,
             cameras: layout.cameras,
             path: self.camera.path.clone(),
             kept: viewport.queries.kept_texts(),
@@ -130,16 +135,16 @@ impl App {
         EditSnapshot { scene: self.state.scene_number, map, view }
     }
 
-    /// Takes into the history what was done since, unless objects and parts are about to change. The path only
-    /// `at_rest`, when no drag and no typing is under way.
+    /// Takes into the history what was done since, unless objects and parts are about to change. The path and
+    /// the crop box only `at_rest`, when no drag and no typing is under way.
     pub(super) fn settle(&mut self, at_rest: bool) {
         if self.editing.is_some() {
             return;
         }
         let mut now = self.snapshot();
         let before = self.state.changes.now().filter(|before| before.scene == now.scene);
-        if let Some(path) = before.filter(|_| !at_rest).map(|before| before.view.path.clone()) {
-            now.view.path = path;
+        if let Some(before) = before.filter(|_| !at_rest) {
+            (now.view.path, now.view.crop) = (before.view.path.clone(), before.view.crop);
         }
         let shown = before.is_some_and(|before| before.view.hidden != now.view.hidden);
         let Some(what) = self.state.changes.settle(&now, None) else { return };

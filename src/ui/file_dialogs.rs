@@ -5,7 +5,7 @@ use std::pin::Pin;
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
-use egui::{Align2, Context, Id, LayerId, Order};
+use egui::{Align2, Context, Id, LayerId, Order, TextEdit};
 use egui_file::FileDialog;
 use rfd::{AsyncFileDialog, FileHandle};
 
@@ -173,7 +173,7 @@ impl Own {
     /// Draws it. `Some(None)` once it is closed without a path.
     fn show(&mut self, ctx: &Context) -> Option<Option<PathBuf>> {
         if let Some(path) = &self.replaces {
-            let text = format!("{} is there already. Replace it?", path.display());
+            let text = format!("{} already exists. Replace it?", path.display());
             let replace = show_question(ctx, &text, "Replace", "Choose another name")?;
             let path = self.replaces.take();
             if replace {
@@ -182,7 +182,9 @@ impl Own {
             self.dialog.open();
         }
         ctx.memory_mut(|m| m.set_modal_layer(Self::layer()));
-        match self.dialog.show(ctx).state() {
+        let state = self.dialog.show(ctx).state();
+        name_fields(ctx);
+        match state {
             egui_file::State::Open => None,
             egui_file::State::Selected => {
                 let path = self.dialog.path().map(Path::to_path_buf)?;
@@ -197,22 +199,33 @@ impl Own {
     }
 }
 
+/// Gives the dialog's fields names, which its crate does not.
+fn name_fields(ctx: &Context) {
+    let all: Vec<Id> = ctx.viewport(|v| v.this_pass.widgets.get_layer(Own::layer()).map(|w| w.id).collect());
+    let fields = all.into_iter().filter(|id| TextEdit::load_state(ctx, *id).is_some());
+    for (field, name) in fields.zip(["Folder", "File name"]) {
+        ctx.accesskit_node_builder(field, |node| node.set_label(name));
+    }
+}
+
 /// Title and kind of dialog of an action that needs a path; `name` is what is proposed for a new file.
 fn dialog(action: &Action, name: &str) -> Option<(String, Kind)> {
     let save = |ending: &str| Kind::Save(format!("{name}{ending}"));
     let (title, kind) = match action {
         Action::OpenFolder => ("Open a folder of photos or a trained scene", Kind::Folder),
-        Action::OpenFile => ("Open a scene", Kind::File("Scenes", &["ply", "json", "toml"])),
+        Action::OpenFile => ("Open a scene", Kind::File("Scenes", &["ply", "sog", "gltf", "glb", "json", "toml"])),
         Action::AddModel(id) => return Some((format!("Choose the folder with the files of {id}"), Kind::Folder)),
         Action::ExportPhrases => ("Choose a folder for the masks", Kind::Folder),
         Action::ChooseTrueMask => ("Choose the true mask of this view", Kind::File("Masks", &["png"])),
         Action::ChooseMasks => ("Choose the folder with the masks", Kind::Folder),
-        Action::ExportPly | Action::ExportTarget(_) => ("Export Gaussians", save(".ply")),
+        Action::ExportPly | Action::ExportTarget(_) | Action::ExportCrop => ("Export Gaussians", save(".ply")),
         Action::OpenPath => ("Open a camera path", Kind::File("Camera paths", &["json"])),
+        Action::ChooseBeside => ("Open the folder of another scene", Kind::Folder),
         Action::ChooseReport | Action::ChooseSecondReport => ("Open a report", Kind::File("Reports", &["json"])),
         Action::SavePath => ("Save the camera path", save("-path.json")),
         Action::SaveChat => ("Save the conversation", save("-conversation.md")),
         Action::ExportVideo => ("Export video", save(".mp4")),
+        Action::SaveTrueMask => ("Save the true mask", save("-true-mask.png")),
         Action::Screenshot => ("Save the view", save(".png")),
         _ => return None,
     };

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use crate::jobs::edit::EditRequest;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::undo::UndoHistory;
-use crate::scene::{CameraPath, Identities, IdentityId, NOBODY, SemanticMap};
+use crate::scene::{CameraPath, CropBox, Identities, IdentityId, NOBODY, SemanticMap};
 use crate::worker::{JobId, ViewMode};
 
 /// What can be changed back beside objects and parts.
@@ -18,11 +18,15 @@ use crate::worker::{JobId, ViewMode};
 pub(crate) struct ViewState {
     /// Whose own Gaussians are left out.
     pub(crate) hidden: BTreeSet<IdentityId>,
-    pub(crate) mode: ViewMode,
+    pub(crate) crop: Option<CropBox>,
+    /// What the two views show, and whether there are two.
+    pub(crate) modes: [ViewMode; 2],
+    pub(crate) split: bool,
+    pub(crate) dim: bool,
     pub(crate) cameras: bool,
     pub(crate) path: CameraPath,
-    /// Queries that are kept on screen.
-    pub(crate) kept: Vec<String>,
+    /// Queries that are kept on screen, in the first and the second view.
+    pub(crate) kept: [Vec<String>; 2],
 }
 
 /// All that can be changed back.
@@ -146,6 +150,15 @@ fn described(before: &ViewState, now: &ViewState, all: Option<&Identities>) -> S
     if before.hidden != now.hidden {
         return all.map_or_else(String::new, |all| shown_text(&before.hidden, &now.hidden, all));
     }
+    if before.crop != now.crop {
+        return match (before.crop, now.crop) {
+            (None, _) => "cropped the view",
+            (_, None) => "removed the crop box",
+            (Some(before), Some(now)) if before.outside != now.outside => "inverted the crop box",
+            _ => "changed the crop box",
+        }
+        .to_owned();
+    }
     if before.path != now.path {
         let (n, keys) = (now.path.keys.len(), before.path.keys.len());
         let what = match n.abs_diff(keys) {
@@ -156,11 +169,17 @@ fn described(before: &ViewState, now: &ViewState, all: Option<&Identities>) -> S
         };
         return what.to_owned();
     }
-    if before.mode != now.mode {
-        return match now.mode {
+    if let Some((_, now)) = before.modes.iter().zip(now.modes).find(|(before, now)| *before != now) {
+        return match now {
             ViewMode::Rgb => "showed RGB".to_owned(),
             other => format!("showed {}", other.text().to_lowercase()),
         };
+    }
+    if before.split != now.split {
+        return if now.split { "split the view" } else { "ended the split view" }.to_owned();
+    }
+    if before.dim != now.dim {
+        return if now.dim { "dimmed the rest" } else { "ended dimming" }.to_owned();
     }
     if before.cameras != now.cameras {
         return format!("{} the cameras", if now.cameras { "showed" } else { "hid" });
@@ -231,7 +250,16 @@ mod tests {
 
     fn start() -> (ChangeHistory, EditSnapshot) {
         let path = CameraPath { keys: Vec::new(), closed: false, fps: 30.0, seconds: 5.0 };
-        let view = ViewState { hidden: BTreeSet::new(), mode: ViewMode::Rgb, cameras: true, path, kept: Vec::new() };
+        let view = ViewState {
+            hidden: BTreeSet::new(),
+            crop: None,
+            modes: [ViewMode::Rgb; 2],
+            split: false,
+            dim: false,
+            cameras: true,
+            path,
+            kept: Default::default(),
+        };
         let now = EditSnapshot { scene: 1, map: Some(lamp()), view };
         let mut history = ChangeHistory::default();
         assert_eq!(history.settle(&now, None), None);
@@ -248,11 +276,13 @@ mod tests {
         assert_eq!(done(&mut history, &now, Some("split lamp")), "split lamp");
         now.view.path.keys.push(PathKey::of_pose(DVec3::ZERO, DMat3::IDENTITY, 1.0));
         assert_eq!(done(&mut history, &now, None), "added a keyframe");
-        now.view.mode = ViewMode::Depth;
+        now.view.modes[0] = ViewMode::Depth;
         assert_eq!(done(&mut history, &now, None), "showed depth");
+        now.view.split = true;
+        assert_eq!(done(&mut history, &now, None), "split the view");
         assert_eq!(history.settle(&now, None), None, "nothing has changed");
         let back: Vec<String> = std::iter::from_fn(|| history.go(false)).map(|(what, _)| what).collect();
-        assert_eq!(back, ["showed depth", "added a keyframe", "split lamp", "showed only lamp"]);
+        assert_eq!(back, ["split the view", "showed depth", "added a keyframe", "split lamp", "showed only lamp"]);
         assert_eq!((history.last(), history.next()), (None, Some("showed only lamp")));
         let (_, again) = history.go(true).expect("something to redo");
         assert!(again.view.hidden.len() == 2 && again.view.path.keys.is_empty());

@@ -5,7 +5,7 @@ use egui::{Event, Id, Key, KeyboardShortcut, Modifiers};
 use crate::ui::actions::{Action, Shortcut};
 
 /// Mouse gestures and held keys in the viewport, which are no actions: for the shortcut sheet.
-pub(crate) const GESTURES: [(&str, &str); 10] = [
+pub(crate) const GESTURES: [(&str, &str); 14] = [
     ("W A S D", "Fly forward, left, back, right"),
     ("Q  E", "Fly down, up"),
     ("Shift  Alt", "Fly faster, slower (held)"),
@@ -13,9 +13,13 @@ pub(crate) const GESTURES: [(&str, &str); 10] = [
     ("Right drag", "Pan"),
     ("Wheel", "Zoom toward the cursor"),
     ("Double click", "Set the pivot to what is under the cursor"),
-    ("Click", "Select the object; again or Alt: the part"),
-    ("Right click", "The menu of what is there"),
+    ("Click", "Select the object; again, or with Alt, the part"),
+    ("Right click", "Context menu"),
+    ("Shift drag", "Erase, while painting"),
+    ("Click in a view", "Work there, in a split view"),
     ("Click on a camera", "Look through it"),
+    ("Tab  Shift+Tab", "Next, previous button or field"),
+    ("Space  Arrows", "Press it, change it"),
 ];
 
 /// The binding in the window toolkit's terms; `None` if it has no key of that name.
@@ -102,6 +106,19 @@ pub(crate) fn pressed(ctx: &egui::Context) -> Vec<Action> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_guide_lists_every_key() {
+        let guide = include_str!("../../docs/guide.md");
+        let table = guide.split("\n## ").find(|section| section.starts_with("Keys\n")).expect("a section of keys");
+        let listed = |key: &str| table.contains(&format!("`{key}`"));
+        for action in Action::all() {
+            if let Some(Shortcut { ctrl, key }) = action.shortcut() {
+                assert!(listed(&format!("{}{key}", if ctrl { "Ctrl+" } else { "" })), "{action:?}: {key}");
+            }
+        }
+        assert!(!listed("Ctrl+J"), "no action has it");
+    }
 
     #[test]
     fn every_shortcut_names_a_real_key() {

@@ -62,6 +62,11 @@ pub struct Layout {
     pub(crate) split: f32,
     /// What the viewport shows.
     pub mode: ViewMode,
+    /// Whether there are two views of the scene, and what the second shows.
+    pub split_view: bool,
+    pub second_mode: ViewMode,
+    /// Whether everything is dimmed but answers and the selection.
+    pub dim: bool,
     /// How the plots of training are drawn.
     pub(crate) plots: PlotSettings,
     /// Whether the times of a frame's stages are shown.
@@ -91,6 +96,9 @@ impl Default for Layout {
             compare: false,
             split: 0.5,
             mode: ViewMode::Rgb,
+            split_view: false,
+            second_mode: ViewMode::Rgb,
+            dim: false,
             plots: PlotSettings::default(),
             times: false,
             config: TrainConfig { steps: 3_000, eval_every: 250, ..TrainConfig::default() },
@@ -115,6 +123,11 @@ impl Layout {
 
     pub(crate) fn save(&self, storage: &mut dyn eframe::Storage) {
         eframe::set_value(storage, KEY, self);
+    }
+
+    /// What the first or the second view shows.
+    pub(crate) fn mode_of(&mut self, second: bool) -> &mut ViewMode {
+        if second { &mut self.second_mode } else { &mut self.mode }
     }
 
     /// Whether a pane is shown.

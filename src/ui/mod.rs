@@ -6,11 +6,14 @@
 
 mod act;
 mod act_file;
+mod act_look;
 mod act_phrases;
 mod act_report;
+mod act_view;
 mod act_window;
 pub mod actions;
 pub mod app;
+pub(crate) mod beside;
 pub(crate) mod camera;
 pub(crate) mod chat;
 pub(crate) mod chat_model;

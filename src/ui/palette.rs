@@ -59,7 +59,7 @@ impl Palette {
                 ui.add_space(4.0);
                 ScrollArea::vertical().max_height(380.0).auto_shrink([false, true]).show(ui, |ui| {
                     if found.is_empty() {
-                        ui.weak("No action of that name.");
+                        ui.weak("No matching action.");
                     }
                     for (i, action) in found.iter().enumerate() {
                         let row = egui::Button::selectable(i == self.selected, title(action))
@@ -136,7 +136,7 @@ pub(crate) fn shortcut_sheet(ctx: &egui::Context, open: &mut bool) {
         });
         ui.add_space(8.0);
         ui.horizontal(|ui| {
-            ui.weak("While a text field has the focus, plain keys go to it.");
+            ui.weak("While a text field is focused, single keys type into it.");
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| ui.button("Close").clicked()).inner
         })
         .inner

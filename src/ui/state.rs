@@ -7,6 +7,7 @@ use std::sync::Arc;
 pub use self::messages::{ErrorBox, LogLine};
 pub(crate) use self::messages::{Toast, Tone};
 use super::actions::Action;
+use super::beside::Beside;
 use super::history::ChangeHistory;
 use super::labels::{PhraseTable, ScreenNames};
 pub(crate) use super::train_history::TrainHistory;
@@ -14,6 +15,7 @@ use crate::io::unposed::Unposed;
 use crate::jobs::OpenedScene;
 use crate::jobs::demo::QUESTION;
 use crate::jobs::go_to::{Approached, Explored};
+use crate::jobs::inspect::InspectedPixel;
 use crate::jobs::models::ModelList;
 use crate::jobs::thumbnails::ThumbnailSet;
 use crate::math::format;
@@ -53,6 +55,8 @@ pub struct ShownReport {
 pub struct AppState {
     /// The scene on screen.
     pub scene: Option<Arc<OpenedScene>>,
+    /// What is seen of another one, in the second view.
+    pub beside: Option<Beside>,
     /// Counts the scenes shown so far; changes when `scene` does.
     pub(crate) scene_number: u64,
     /// What is left out for the scene, and why.
@@ -71,6 +75,8 @@ pub struct AppState {
     pub explored: Option<Arc<Explored>>,
     /// The way that was looked for last, until the window takes it.
     pub(crate) visited: Option<Approached>,
+    /// The pixel that was looked into last, until the window takes it.
+    pub(crate) inspected: Option<Arc<InspectedPixel>>,
     /// Models and the engine that runs them, once they were listed.
     pub(crate) models: Option<Arc<ModelList>>,
     /// Models that were put in place so far.
@@ -271,6 +277,12 @@ impl AppState {
                     _ => None,
                 });
             }
+            Outcome::Beside(scene) => {
+                self.beside = Beside::of(*scene);
+                if self.beside.is_none() {
+                    self.toast(Tone::Warning, "There is nothing to compare with: it has no Gaussians.");
+                }
+            }
             Outcome::Trained { evaluations, out, semantics, facts } => {
                 let carried = semantics.is_some();
                 if self.training_job == Some(job) {
@@ -295,7 +307,7 @@ impl AppState {
                 self.history.evaluations.push(e);
             }
             Outcome::Objects(map) => {
-                self.toast(Tone::Good, format!("{} objects and parts found; query one", map.identities.len()));
+                self.toast(Tone::Good, format!("{} objects and parts found", map.identities.len()));
                 self.set_semantics(Some(map));
             }
             Outcome::Edited(map) => self.set_semantics(Some(map)),
@@ -303,18 +315,19 @@ impl AppState {
             Outcome::Scale(meters, stored) => {
                 let scaled = |s: &Arc<OpenedScene>| OpenedScene { metres_per_unit: Some(meters), ..(**s).clone() };
                 self.scene = self.scene.as_ref().map(scaled).map(Arc::new);
-                let kept = if stored { "kept with the scene" } else { "not kept: the scene is not saved yet" };
+                let kept = if stored { "saved with the scene" } else { "not saved: save or train the scene first" };
                 self.toast(Tone::Good, format!("1 unit is {}, {kept}", format::length(1.0, Some(meters))));
             }
             Outcome::Models(models) => self.models = Some(models),
             Outcome::ModelInstalled(id) => {
                 self.models_installed += 1;
-                self.toast(Tone::Good, format!("The model {id} can be used now"));
+                self.toast(Tone::Good, format!("Model {id} is ready"));
             }
             Outcome::Approached(explored, visited) => {
                 self.explored = Some(explored);
                 self.visited = Some(visited);
             }
+            Outcome::Inspected(pixel) => self.inspected = Some(pixel),
             Outcome::Explored(explored) => self.explored = Some(explored),
             Outcome::Report { path, report, second } => {
                 let shown = Some(ShownReport { path, report });
@@ -325,7 +338,7 @@ impl AppState {
             }
             Outcome::Thumbnails(map, drawn) => self.thumbnails = Some((map, drawn)),
             Outcome::Phrases(rows, to) => self.phrases.finished(rows, to),
-            Outcome::Written(path) => self.toast(Tone::Good, format!("Wrote {}", path.display())),
+            Outcome::Written(path) => self.toast(Tone::Good, format!("Saved to {}", path.display())),
             Outcome::Unposed(photos) => self.unposed = Some(photos),
             Outcome::Kept => {}
             Outcome::RecentPictures(pictures) => self.recent_pictures = pictures,
@@ -359,6 +372,7 @@ impl AppState {
             self.remember(scene.path.clone());
         }
         self.scene_number += 1;
+        self.beside = None;
         self.set_facts(scene.facts.clone());
         self.antialias = scene.render.antialias;
         self.set_semantics(scene.semantics.clone());

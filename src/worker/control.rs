@@ -1,4 +1,4 @@
-//! How a running job is paused and cancelled: two flags that it looks at on every step.
+//! How a running job is paused and canceled: two flags that it looks at on every step.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -22,7 +22,7 @@ impl Control {
         self.pause.store(paused, Ordering::Release);
     }
 
-    /// What the job is to do now; cancelling goes before pausing.
+    /// What the job is to do now; canceling goes before pausing.
     pub(crate) fn signal(&self) -> Signal {
         if self.cancel.load(Ordering::Acquire) {
             Signal::Cancel
@@ -39,7 +39,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn cancelling_beats_pausing() {
+    fn canceling_beats_pausing() {
         let c = Control::default();
         assert_eq!(c.signal(), Signal::Continue);
         c.set_paused(true);

@@ -12,8 +12,8 @@ use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
-    Folders, JobError, OpenedScene, Scene, demo, edit, export, find_objects, go_to, models, open, phrases, plan, poses,
-    recent, report, scale, thumbnails, train, video,
+    Folders, JobError, OpenedScene, Scene, demo, edit, export, find_objects, go_to, inspect, models, open, phrases,
+    plan, poses, recent, report, scale, thumbnails, train, video,
 };
 use crate::measure::{End, FILE, Report};
 use crate::pipeline::observer::{Observer, Severity};
@@ -85,6 +85,9 @@ impl Jobs for PipelineJobs {
                 Err(JobError::Open(OpenError::NoPoses(photos))) => Outcome::Unposed(photos),
                 opened => self.opened(opened?),
             },
+            Command::OpenBeside { path } => {
+                Outcome::Beside(Box::new(open::open(&path, &self.folders, self.machine(), observer)?))
+            }
             Command::FindPoses(photos) => {
                 let tools = poses::PoseTools::installed().ok_or(JobError::NoTools)?;
                 let found = poses::find(&photos, &tools, &self.folders, observer)?;
@@ -147,6 +150,7 @@ impl Jobs for PipelineJobs {
                 let (explored, visited) = go_to::visit(*request);
                 Outcome::Approached(explored, visited)
             }
+            Command::Inspect(request) => Outcome::Inspected(Arc::new(inspect::run(*request)?)),
             Command::ListModels => Outcome::Models(Arc::new(models::list())),
             Command::Explore { cloud, cameras, up } => {
                 Outcome::Explored(Arc::new(go_to::Explored::new(cloud, &cameras, up)))

@@ -5,6 +5,8 @@
 pub enum JobKind {
     /// Reads a file or folder.
     Open,
+    /// Reads a scene to be seen beside the one on screen.
+    Beside,
     /// Reads the trained demo.
     Demo,
     /// Makes the demo's photos and reads them.
@@ -45,6 +47,8 @@ pub enum JobKind {
     Scale,
     /// Asks a list of phrases.
     Phrases,
+    /// Looks into a pixel.
+    Inspect,
 }
 
 impl JobKind {
@@ -60,8 +64,12 @@ impl JobKind {
             Self::DemoPhotos | Self::Poses | Self::Model | Self::Video | Self::Measure | Self::Phrases => {
                 WorkerThread::Long
             }
-            Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Thumbnails => WorkerThread::Short,
-            Self::Models | Self::Explore | Self::Approach | Self::Scale | Self::Report => WorkerThread::Short,
+            Self::Beside | Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Thumbnails => {
+                WorkerThread::Short
+            }
+            Self::Models | Self::Explore | Self::Approach | Self::Scale | Self::Report | Self::Inspect => {
+                WorkerThread::Short
+            }
         }
     }
 }

@@ -10,6 +10,7 @@ pub use super::kind::{JobKind, WorkerThread};
 use crate::io::unposed::Unposed;
 use crate::jobs::edit::EditRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
+use crate::jobs::inspect::{InspectRequest, InspectedPixel};
 use crate::jobs::models::ModelList;
 use crate::jobs::phrases::{PhraseRow, PhrasesRequest};
 use crate::jobs::report::ReportRequest;
@@ -44,6 +45,11 @@ pub enum Start {
 pub enum Command {
     /// Read a dataset, a splat or a trained scene.
     Open {
+        /// File or folder.
+        path: PathBuf,
+    },
+    /// Read a scene whose Gaussians are to be seen beside those on screen.
+    OpenBeside {
         /// File or folder.
         path: PathBuf,
     },
@@ -140,6 +146,8 @@ pub enum Command {
     },
     /// Find the way to where an identity is seen best.
     Approach(Box<ApproachRequest>),
+    /// Find the Gaussians of a pixel.
+    Inspect(Box<InspectRequest>),
     /// Draw a video.
     Video(Box<VideoRequest>),
     /// Measure error against run time of drawing, and write it as a report.
@@ -178,6 +186,7 @@ impl Command {
     pub(crate) fn kind(&self) -> JobKind {
         match self {
             Self::Open { .. } => JobKind::Open,
+            Self::OpenBeside { .. } => JobKind::Beside,
             Self::Demo => JobKind::Demo,
             Self::DemoPhotos => JobKind::DemoPhotos,
             Self::FindPoses(_) => JobKind::Poses,
@@ -193,6 +202,7 @@ impl Command {
             Self::Explore { .. } => JobKind::Explore,
             Self::InstallModel { .. } => JobKind::Model,
             Self::Approach(_) => JobKind::Approach,
+            Self::Inspect(_) => JobKind::Inspect,
             Self::Video(_) => JobKind::Video,
             Self::Measure(_) => JobKind::Measure,
             Self::Phrases(_) => JobKind::Phrases,
@@ -207,6 +217,7 @@ impl Command {
             |p: &PathBuf| p.file_name().map_or_else(|| p.display().to_string(), |n| n.to_string_lossy().into_owned());
         match self {
             Self::Open { path } => format!("Opening {}", name(path)),
+            Self::OpenBeside { path } => format!("Opening {} beside", name(path)),
             Self::Demo => "Opening the demo".into(),
             Self::DemoPhotos => "Rendering the demo scene".into(),
             Self::FindPoses(photos) => format!("Finding camera poses of {}", name(&photos.folder)),
@@ -214,21 +225,22 @@ impl Command {
             Self::Evaluate { dataset, .. } => format!("Evaluating {}", dataset.name),
             Self::FindObjects(request) => format!("Finding objects in {}", request.dataset.name),
             Self::EditObjects { .. } => "Editing objects".into(),
-            Self::SetScale { .. } => "Storing the scale".into(),
+            Self::SetScale { .. } => "Saving the scale".into(),
             Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
             Self::Photo { photo, .. } => format!("Loading {}", photo.name),
-            Self::KeepPicture { of, .. } => format!("Keeping a picture of {}", name(of)),
-            Self::RecentPictures(_) => "Reading pictures of recent scenes".into(),
+            Self::KeepPicture { of, .. } => format!("Saving the thumbnail of {}", name(of)),
+            Self::RecentPictures(_) => "Loading thumbnails of recent scenes".into(),
             Self::Thumbnails { .. } => "Rendering thumbnails".into(),
             Self::ListModels => "Listing models".into(),
-            Self::Explore { .. } => "Exploring where one can go".into(),
+            Self::Explore { .. } => "Building the navigation graph".into(),
             Self::InstallModel { id, .. } => format!("Installing the model {id}"),
             Self::Approach(request) => {
                 format!("Planning the flight to {}", request.map.identities.full_name(request.id))
             }
+            Self::Inspect(_) => "Looking into a pixel".into(),
             Self::Video(request) => format!("Rendering {}", name(&request.out)),
             Self::Measure(_) => "Benchmarking rendering".into(),
-            Self::Phrases(_) => "Asking a list of phrases".into(),
+            Self::Phrases(_) => "Running the phrase list".into(),
             Self::ReadReport { path, .. } => format!("Opening the report {}", name(path)),
         }
     }
@@ -239,6 +251,8 @@ impl Command {
 pub enum Outcome {
     /// A scene was read.
     Opened(Box<OpenedScene>),
+    /// One to be seen beside it was.
+    Beside(Box<OpenedScene>),
     /// There are photos, and nobody knows from where they were taken.
     Unposed(Box<Unposed>),
     /// Training is done; the Gaussians lie in the slot.
@@ -279,7 +293,7 @@ pub enum Outcome {
         /// Whether it is to be compared with the one that is shown.
         second: bool,
     },
-    /// Portraits of objects and parts by number less one, as `semantics::portraits` draws them.
+    /// Thumbnails of objects and parts by number less one.
     Thumbnails(Arc<SemanticMap>, ThumbnailSet),
     /// The models were listed.
     Models(Arc<ModelList>),
@@ -289,6 +303,8 @@ pub enum Outcome {
     Explored(Arc<Explored>),
     /// The way to an identity, or why there is none; and what was learned of the scene.
     Approached(Arc<Explored>, Approached),
+    /// The Gaussians of a pixel were found.
+    Inspected(Arc<InspectedPixel>),
     /// A photo was loaded.
     Photo {
         /// Its index in the dataset.

@@ -11,7 +11,7 @@ use super::failure::Failure;
 use super::observer::Repaint;
 use super::thread::panic_failure;
 use super::view_renderer::ViewRenderer;
-pub use super::view_request::{QualityBudget, SkipPasses, ViewPicture, ViewRequest, ViewResult};
+pub use super::view_request::{QualityBudget, SecondPicture, SkipPasses, ViewPicture, ViewRequest, ViewResult};
 use crate::jobs::query::ViewMaps;
 use crate::render::{RenderError, Renderer};
 use crate::scene::Camera;
@@ -53,13 +53,13 @@ impl ViewLane {
         let (box_, out, mapped) = (Arc::clone(&mailbox), Arc::clone(&pictures), Arc::clone(&maps));
         let (mut mapper, mut mapped_before) = (Renderer::new(), false);
         let work = move || {
-            let mut painter: Option<ViewRenderer> = None;
+            let mut renderer: Option<ViewRenderer> = None;
             let mut patience = None;
             loop {
                 let request = match next(&box_, patience.take()) {
                     Waited::Request(request) => request,
                     Waited::InVain => {
-                        painter.iter_mut().for_each(|p| p.renderer.rest());
+                        renderer.iter_mut().for_each(|p| p.renderer.rest());
                         mapper = Renderer::new();
                         continue;
                     }
@@ -67,11 +67,11 @@ impl ViewLane {
                 };
                 patience = request.skip.buffers.then_some(REST);
                 // Looking for a GPU takes a moment; here no one waits for it.
-                let painter = match painter.take().filter(|p| p.without_gpu == request.skip.gpu) {
-                    Some(known) => painter.insert(known),
-                    None => painter.insert(ViewRenderer::without_gpu(request.skip.gpu)),
+                let renderer = match renderer.take().filter(|p| p.without_gpu == request.skip.gpu) {
+                    Some(known) => renderer.insert(known),
+                    None => renderer.insert(ViewRenderer::without_gpu(request.skip.gpu)),
                 };
-                let drawn = painter.draw(&request);
+                let drawn = renderer.draw(&request);
                 let (exact, start) = (request.budget == QualityBudget::Full, Instant::now());
                 let camera = match &drawn {
                     // While the eye moves both come together, or masks would trail behind.
@@ -93,8 +93,8 @@ impl ViewLane {
                         let pixels = maps.identities.identity.len() as u64;
                         resource_log::record(
                             ResourceKind::Maps,
-                            "maps of the view",
-                            "something is asked of it",
+                            "feature maps of the view",
+                            "something is queried",
                             pixels * 12,
                         );
                     }
@@ -218,6 +218,8 @@ mod tests {
                 camera: Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 32, 24)
                     .expect("valid"),
                 mode: ViewMode::Rgb,
+                second: None,
+                beside: None,
                 settings: RenderSettings::default(),
                 budget: QualityBudget::Full,
                 photo: None,

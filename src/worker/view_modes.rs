@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
 use crate::math::colormap::Colormap;
-use crate::math::resize::nearest;
+use crate::math::resize::{Filter, nearest, resize};
 use crate::math::stats::quantile;
 use crate::pipeline::metrics;
 use crate::render::Frame;
@@ -24,11 +24,18 @@ pub enum ViewMode {
     Alpha,
     /// Absolute difference from the photo.
     Difference,
+    /// The photo itself.
+    Photo,
 }
 
 impl ViewMode {
     pub(crate) fn text(self) -> &'static str {
         self.into()
+    }
+
+    /// Whether it shows something only where a photo is looked through.
+    pub(crate) fn needs_photo(self) -> bool {
+        matches!(self, Self::Difference | Self::Photo)
     }
 }
 
@@ -61,7 +68,11 @@ pub(super) fn paint(frame: &Frame<f32>, mode: ViewMode, photo: Option<&PhotoPixe
             Drawn { rgb, depth_range: None, psnr }
         }
         (ViewMode::Difference, Some(p)) => Drawn { rgb: difference(frame, p), depth_range: None, psnr },
-        (ViewMode::Rgb | ViewMode::Difference, _) => Drawn { rgb: rgb(), depth_range: None, psnr },
+        (ViewMode::Photo, Some(p)) => {
+            let (from, to) = ((p.width_px as usize, p.height_px as usize), (frame.width_px, frame.height_px));
+            Drawn { rgb: resize(&p.rgb, from, to, Filter::Bilinear), depth_range: None, psnr }
+        }
+        (ViewMode::Rgb | ViewMode::Difference | ViewMode::Photo, _) => Drawn { rgb: rgb(), depth_range: None, psnr },
     }
 }
 
@@ -134,6 +145,9 @@ mod tests {
     #[test]
     fn a_photo_of_another_size_is_sampled_at_pixel_centers() {
         let big = PhotoPixels { width_px: 4, height_px: 4, rgb: (0..16).map(|i| [i; 3]).collect(), coverage: None };
+        assert_eq!(paint(&frame(0.0), ViewMode::Photo, Some(&photo(7, None))).rgb, vec![[7; 3]; 4], "as it is");
+        assert_eq!(paint(&frame(0.0), ViewMode::Photo, Some(&big)).rgb.len(), 4);
+        assert_eq!(paint(&frame(0.0), ViewMode::Photo, None).rgb, vec![[0; 3]; 4], "the rendering without one");
         let drawn = paint(&frame(0.0), ViewMode::Difference, Some(&big));
         assert_eq!(drawn.rgb.iter().map(|p| p[0] / 4).collect::<Vec<_>>(), vec![5, 7, 13, 15]);
     }

@@ -7,7 +7,7 @@ use std::time::Instant;
 use super::failure::Failure;
 use super::thread::panic_failure;
 use super::view_modes::{self, ViewMode};
-use super::view_request::{QualityBudget, ViewPicture, ViewRequest, ViewResult};
+use super::view_request::{QualityBudget, SecondPicture, ViewPicture, ViewRequest, ViewResult};
 use crate::render::{self, BackendChoice, Frame, RenderSettings, Renderer};
 use crate::scene::Camera;
 
@@ -21,6 +21,8 @@ pub(super) struct ViewRenderer {
     pub(super) without_gpu: bool,
     /// Why the CPU draws though there is a GPU.
     instead_of_gpu: Option<String>,
+    /// Draws the Gaussians of a second view, if they are others.
+    beside: Option<Box<Self>>,
     /// What frames cost lately; `None` before the first.
     cost: Option<Speed>,
 }
@@ -38,7 +40,7 @@ impl ViewRenderer {
         let choice = if without_gpu { BackendChoice::Cpu } else { BackendChoice::Auto };
         let mut instead_of_gpu = None;
         let renderer = Renderer::choose(choice, |why| instead_of_gpu = Some(why)).unwrap_or_default();
-        Self { renderer, without_gpu, instead_of_gpu, cost: None }
+        Self { renderer, without_gpu, instead_of_gpu, beside: None, cost: None }
     }
 
     /// Goes on with the CPU: a GPU has failed, or buffers may be in any state.
@@ -50,7 +52,21 @@ impl ViewRenderer {
     }
 
     pub(super) fn draw(&mut self, request: &ViewRequest) -> ViewResult {
-        let camera = self.fitting_camera(&request.camera, request.budget, request.follow);
+        let shares = 1 + u8::from(request.follow) + u8::from(request.beside.is_some());
+        let camera = self.fitting_camera(&request.camera, request.budget, shares);
+        let drawn = self.draw_at(request, camera.clone())?;
+        let Some((cloud, settings)) = request.beside.clone() else {
+            self.beside = None;
+            return Ok(Arc::new(drawn));
+        };
+        let mode = request.second.unwrap_or(request.mode);
+        let other = ViewRequest { cloud, settings, mode, second: None, ..request.clone() };
+        let painter = self.beside.get_or_insert_with(|| Box::new(Self::without_gpu(self.without_gpu)));
+        let ViewPicture { rgb, depth_range, psnr, .. } = painter.draw_at(&other, camera)?;
+        Ok(Arc::new(ViewPicture { second: Some(SecondPicture { rgb, depth_range, psnr }), ..drawn }))
+    }
+
+    fn draw_at(&mut self, request: &ViewRequest, camera: Camera) -> Result<ViewPicture, Failure> {
         let full = camera == request.camera;
         // Without times there is still a frame.
         let _ = self.renderer.time_stages(request.timed);
@@ -67,10 +83,15 @@ impl ViewRenderer {
         self.learn(secs, f64::from(camera.width_px * camera.height_px));
         let stages = self.renderer.stage_times();
         let start = Instant::now();
-        let drawn = view_modes::paint(&frame, request.mode, request.photo.as_deref());
+        let paint = |mode| view_modes::paint(&frame, mode, request.photo.as_deref());
+        let drawn = paint(request.mode);
+        let second = request.second.map(|mode| {
+            let view_modes::Drawn { rgb, depth_range, psnr } = paint(mode);
+            SecondPicture { rgb, depth_range, psnr }
+        });
         let paint_secs = start.elapsed().as_secs_f64();
         let median_depth = (!frame.median_depth.is_empty()).then_some(frame.median_depth);
-        Ok(Arc::new(ViewPicture {
+        Ok(ViewPicture {
             ticket: request.ticket,
             full,
             camera,
@@ -78,16 +99,18 @@ impl ViewRenderer {
             median_depth,
             depth_range: drawn.depth_range,
             psnr: drawn.psnr,
+            second,
             secs,
             stages,
             paint_secs,
             drawn_by: self.renderer.name().to_owned(),
             instead_of_gpu: self.instead_of_gpu.clone(),
-        }))
+        })
     }
 
     fn try_render(&mut self, request: &ViewRequest, camera: &Camera) -> Result<Frame<f32>, Failure> {
-        let depth = request.budget == QualityBudget::Full || request.mode == ViewMode::Depth || !request.skip.depth;
+        let shows_depth = [Some(request.mode), request.second].contains(&Some(ViewMode::Depth));
+        let depth = request.budget == QualityBudget::Full || shows_depth || !request.skip.depth;
         let settings = RenderSettings { depth, ..request.settings.clone() };
         match catch_unwind(AssertUnwindSafe(|| self.renderer.draw(&request.cloud, camera, &settings))) {
             Ok(result) => result.map_err(|e| Failure::of(&e, "Reset the view (Home), or open the scene again.")),
@@ -111,12 +134,13 @@ impl ViewRenderer {
         });
     }
 
-    /// The camera at a resolution that is likely to keep to the budget, of which masks that follow take a half.
-    fn fitting_camera(&self, camera: &Camera, budget: QualityBudget, follow: bool) -> Camera {
+    /// The camera at a resolution that is likely to keep to the budget, which is shared with masks that follow and with
+    /// other Gaussians.
+    fn fitting_camera(&self, camera: &Camera, budget: QualityBudget, shares: u8) -> Camera {
         let pixels = f64::from(camera.width_px) * f64::from(camera.height_px);
         // The first frame says how fast this machine is with this scene; it must be quick itself.
         let cost = self.cost.unwrap_or(Speed { fixed_secs: 0.0, secs_per_px: 4e-7 });
-        let Some(secs) = budget.secs().map(|secs| if follow { 0.5 * secs } else { secs }) else {
+        let Some(secs) = budget.secs().map(|secs| secs / f64::from(shares)) else {
             return camera.clone();
         };
         // Where the fixed part alone breaks the budget, smaller frames would help no one.
@@ -145,19 +169,20 @@ mod tests {
             renderer: Renderer::new(),
             without_gpu: true,
             instead_of_gpu: None,
+            beside: None,
             cost: Some(Speed { fixed_secs, secs_per_px }),
         };
         let slow = of(0.0, 1e-6);
-        let moving = slow.fitting_camera(&camera, QualityBudget::Moving, false);
+        let moving = slow.fitting_camera(&camera, QualityBudget::Moving, 1);
         assert_eq!(moving.width_px, 300, "never smaller");
         let quicker = of(0.0, 2e-7);
-        let fits = |follow| quicker.fitting_camera(&camera, QualityBudget::Moving, follow).width_px;
-        assert!(300 < fits(true) && fits(true) < fits(false) && fits(false) < 1000, "{} {}", fits(true), fits(false));
+        let fits = |shares| quicker.fitting_camera(&camera, QualityBudget::Moving, shares).width_px;
+        assert!(300 < fits(2) && fits(2) < fits(1) && fits(1) < 1000, "{} {}", fits(2), fits(1));
         assert!((f64::from(moving.width_px) / f64::from(moving.height_px) - 5.0 / 3.0).abs() < 0.02);
-        assert!(slow.fitting_camera(&camera, QualityBudget::Shared, false).width_px > moving.width_px);
-        assert_eq!(slow.fitting_camera(&camera, QualityBudget::Full, false), camera);
-        assert_eq!(of(0.0, 1e-9).fitting_camera(&camera, QualityBudget::Moving, false), camera);
+        assert!(slow.fitting_camera(&camera, QualityBudget::Shared, 1).width_px > moving.width_px);
+        assert_eq!(slow.fitting_camera(&camera, QualityBudget::Full, 1), camera);
+        assert_eq!(of(0.0, 1e-9).fitting_camera(&camera, QualityBudget::Moving, 1), camera);
         // A scene whose Gaussians alone take longer than the budget is not drawn any smaller for it.
-        assert_eq!(of(5.0, 1e-9).fitting_camera(&camera, QualityBudget::Moving, false), camera);
+        assert_eq!(of(5.0, 1e-9).fitting_camera(&camera, QualityBudget::Moving, 1), camera);
     }
 }

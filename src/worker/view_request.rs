@@ -17,6 +17,10 @@ pub struct ViewRequest {
     pub camera: Camera,
     /// What of it.
     pub mode: ViewMode,
+    /// What of it beside that, in a second view.
+    pub second: Option<ViewMode>,
+    /// Whose Gaussians the second view shows, if they are others, and how they are drawn.
+    pub beside: Option<(Arc<GaussianCloud>, RenderSettings)>,
     /// How: degree of the colors, background, filter. Depth is drawn where it is needed.
     pub settings: RenderSettings,
     /// How long it may take.
@@ -82,6 +86,16 @@ impl QualityBudget {
     }
 }
 
+/// A drawn view as a second view shows it.
+#[derive(Clone, Debug)]
+pub struct SecondPicture {
+    /// Row-major sRGB.
+    pub rgb: Vec<[u8; 3]>,
+    pub(crate) depth_range: Option<(f32, f32)>,
+    /// As in the first view.
+    pub psnr: Option<f64>,
+}
+
 /// A drawn view.
 #[derive(Clone, Debug)]
 pub struct ViewPicture {
@@ -99,8 +113,10 @@ pub struct ViewPicture {
     pub(crate) depth_range: Option<(f32, f32)>,
     /// PSNR in dB against the photo, if the request had one.
     pub psnr: Option<f64>,
+    /// The same frame as the second view shows it, with its depths, if that was wanted.
+    pub second: Option<SecondPicture>,
     /// Seconds that rendering took.
-    pub(crate) secs: f64,
+    pub secs: f64,
     /// The same by stage, where that is known.
     pub(crate) stages: StageTimes,
     /// Seconds from colors to bytes: depth scales, differences.

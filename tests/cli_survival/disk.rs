@@ -50,7 +50,7 @@ fn a_full_disk_is_named_and_ends_nothing() {
     wait_for_checkpoints(&mut child, &checkpoint, 2);
     let filler = small.join("filler");
     fill(&filler);
-    let line = wait_for_line(&told, "No checkpoint was saved, the training goes on");
+    let line = wait_for_line(&told, "Checkpoint not saved, training continues");
     assert!(line.contains("checkpoint.bin") && line.contains("the disk is full"), "{line}");
     // The checkpoint before is whole, and with space again there are new ones.
     let before = std::fs::read(&checkpoint).unwrap();
@@ -67,7 +67,7 @@ fn a_full_disk_is_named_and_ends_nothing() {
     wait_for_line(&told, "Continuing at step");
     wait_for_checkpoints(&mut child, &checkpoint, 2);
     fill(&filler);
-    wait_for_line(&told, "No checkpoint was saved");
+    wait_for_line(&told, "Checkpoint not saved");
     send(&child, "-TERM");
     assert_eq!(child.wait().unwrap().code(), Some(1));
     let error = wait_for_line(&told, "error: ");

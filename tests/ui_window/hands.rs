@@ -157,14 +157,14 @@ fn without_a_dialog_of_the_system_files_are_chosen_in_the_window() {
     let before = std::fs::read(&splat).expect("there");
     w.click("Save");
     w.harness.run_steps(3);
-    assert!(w.shows("is there already. Replace it?"));
+    assert!(w.shows("already exists. Replace it?"));
     w.click("Choose another name");
     assert!(w.app().chooses_file(), "it goes on");
     assert_eq!(std::fs::read(&splat).expect("there"), before);
     w.click("Save");
     w.harness.run_steps(3);
     w.click("Replace");
-    w.until("it is written", |a| a.state.log.iter().any(|l| l.text.starts_with("Wrote ")));
+    w.until("it is written", |a| a.state.log.iter().any(|l| l.text.starts_with("Saved to ")));
     assert!(!w.app().chooses_file());
 
     w.ask(Action::OpenFile);

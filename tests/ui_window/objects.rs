@@ -14,7 +14,7 @@ fn objects_are_found_asked_for_renamed_hidden_and_undone() {
     w.until("the photos", |a| a.state.scene.is_some());
     w.harness.key_press(egui::Key::Slash);
     w.harness.run_steps(3);
-    assert!(w.shows("find the objects first"), "asking needs objects");
+    assert!(w.shows("find objects first"), "asking needs objects");
     w.harness.state_mut().layout.config.steps = 60;
     w.ask(Action::StartTraining);
     w.until("objects after training", |a| a.state.semantics.is_some());

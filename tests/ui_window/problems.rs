@@ -17,9 +17,9 @@ fn a_damaged_map_is_said_over_the_view_until_it_is_dismissed() {
     std::fs::write(&map, &bytes[..bytes.len() / 2]).expect("written");
     let mut w = Window::new(Some(Action::Open(scene.clone())));
     w.until("a picture", |a| a.viewport.picture().is_some());
-    assert!(w.shows("objects cannot be shown") && w.shows("Find them again"), "what is wrong and what to do");
+    assert!(w.shows("objects cannot be loaded") && w.shows("Find them again"), "what is wrong and what to do");
     w.click("Dismiss");
-    assert!(!w.shows("objects cannot be shown"));
+    assert!(!w.shows("objects cannot be loaded"));
 
     std::fs::write(&map, &bytes).expect("written");
     w.ask(Action::Open(scene));

@@ -5,7 +5,7 @@ use fmlgs::measure::{self, ErrorKind, Knobs, Measure, Point, Report, Rule, Sampl
 use super::*;
 
 /// A report of two stages, whose settings the window has.
-fn write_report(folder: &Path, times: f64, cores: usize) {
+pub(crate) fn write_report(folder: &Path, times: f64, cores: usize) {
     let sample = |v: f64| {
         let mut s = Sample::default();
         [v, 1.1 * v, 0.9 * v].iter().for_each(|v| s.add(*v));
@@ -60,7 +60,7 @@ fn a_report_is_opened_compared_and_its_settings_are_applied() {
     let mut w = Window::new(Some(Action::Open(write_splat(folder.path()))));
     w.until("the splat", |a| a.viewport.picture().is_some_and(|p| p.full));
     w.ask(Action::TogglePane(Pane::Report));
-    assert!(w.shows("Error against run time") && w.shows("fmlgs report") && w.shows("Benchmark rendering"));
+    assert!(w.shows("Error vs. run time") && w.shows("fmlgs report") && w.shows("Benchmark rendering"));
 
     // As if it was dropped: it is no scene, and takes no scene's place.
     w.ask(Action::Open(at("one")));

@@ -178,9 +178,7 @@ impl Llm {
             let next = asked_wait.map_or(own, |w| w.max(own));
             if next > self.patience.longest_pause {
                 let secs = next.as_secs();
-                return Err(self.failed(&format!(
-                    "The chat model wants to be left alone for {secs} s ({problem}). Try again then."
-                )));
+                return Err(self.failed(&format!("The chat model is rate-limited ({problem}); try again in {secs} s.")));
             }
             if self.begun.elapsed() + next > self.patience.request {
                 return Err(self.failed(&format!("The chat model gave no answer in time: {problem}.")));

@@ -18,8 +18,8 @@ const LONGEST_NAME: usize = 80;
 /// What goes to a chat model and what does not, for whoever chooses one. docs/guide.md says the same.
 pub const SENT: &str = "Sent to the chat model: what you write; of the scene's objects and parts their numbers, names, \
     wholes, and whether they are hidden or in view, which of them was spoken of last, and whether the length of a meter \
-    is known; what came of each step, with the sizes and distances that were asked for; the talk so far; the \
-    tools that the policy permits; the model's name. Not sent: pictures, Gaussians, cameras, paths and names of files, \
+    is known; what came of each step, with the sizes and distances that were asked for; the conversation so far; \
+    the tools that the policy permits; the model's name. Not sent: images, Gaussians, cameras, paths and names of files, \
     why something failed on this machine. The key goes into one header of the request and nowhere else.";
 
 pub(crate) const TASK: &str = "You help a person look around in a 3D scene in a viewer, by calling the tools. Rules: \

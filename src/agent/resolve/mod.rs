@@ -180,7 +180,7 @@ impl Resolver<'_> {
             [only] => Ok(*only),
             several => {
                 let names: Vec<String> = several.iter().take(6).map(|id| the(self.world, *id)).collect();
-                let text = format!("Several things fit equally: {}. Please say which one in full.", join(&names));
+                let text = format!("Several things match equally: {}. Please say which one in full.", join(&names));
                 Err(Lost::new(RefusalKind::Unclear, text, several.to_vec()))
             }
         }
@@ -243,7 +243,7 @@ impl Resolver<'_> {
         if ids.is_empty() {
             return Ok(None);
         }
-        self.note = "(Found by embedding: no name here says so.)".into();
+        self.note = "(Found by embedding, not by name.)".into();
         Ok(Some(ids))
     }
 

@@ -34,7 +34,7 @@ pub(crate) struct QueryArgs {
     /// What to look for
     #[arg(required_unless_present = "phrases", conflicts_with = "phrases")]
     text: Option<String>,
-    /// Ask every phrase of a text file, one a line, instead of one
+    /// Ask every phrase of a text file, one per line, instead of one
     #[arg(long, value_name = "FILE", conflicts_with_all = ["mask", "heat"])]
     phrases: Option<PathBuf>,
     /// Views for --phrases: 'all' photos, or some by index or name, with commas between [default: --camera]
@@ -67,7 +67,7 @@ pub(crate) struct QueryArgs {
     /// Write the mask of the answer: white on black
     #[arg(long)]
     mask: Option<PathBuf>,
-    /// Write the relevancy of every pixel over the picture
+    /// Write the relevancy of every pixel over the image
     #[arg(long)]
     heat: Option<PathBuf>,
     /// Print one JSON document
@@ -143,7 +143,7 @@ fn tell(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -
                 [] => String::new(),
                 words => format!("; words that are not known: {}", words.join(", ")),
             };
-            Err(CliError::failed(format!("nothing here fits '{text}'{near}{known}")))
+            Err(CliError::failed(format!("no match for '{text}'{near}{known}")))
         }
         _ if args.json => Ok(()),
         _ => {

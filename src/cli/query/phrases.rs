@@ -8,6 +8,7 @@ use serde_json::json;
 use super::QueryArgs;
 use crate::cli::progress::Console;
 use crate::cli::{CliError, output, view};
+use crate::jobs::phrases::colors::PhraseColors;
 use crate::jobs::phrases::{self, PhraseRow, PhrasesRequest, TrueMasks};
 use crate::jobs::{Scene, export, render};
 use crate::pipeline::semantics::matching::MatchMode;
@@ -27,6 +28,7 @@ pub(super) fn run(args: &QueryArgs, list: &Path, scene: &Scene, map: SemanticMap
         settings: scene.settings.clone(),
         views: views(args, scene)?,
         phrases: phrases::read(list)?,
+        colors: PhraseColors::default(),
         level: args.kind,
         matching: (if args.blend { MatchMode::Blend } else { MatchMode::Exact }, args.tolerance / 255.0),
         top: args.top,

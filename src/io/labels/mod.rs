@@ -210,7 +210,7 @@ fn entries(folder: &Path) -> Vec<String> {
 fn read_ids(path: &Path, sheet: Sheet<'_>, masks: usize) -> Result<(usize, usize, Vec<u16>), IoError> {
     sheet.check(path, super::photo::size(path)?, masks)?;
     let bytes = files::read(path, files::MAX_PICTURE_BYTES)?;
-    let ids = super::photo::decode_grey16(&bytes, path)?;
+    let ids = super::photo::decode_gray16(&bytes, path)?;
     Ok((ids.width() as usize, ids.height() as usize, ids.into_raw()))
 }
 

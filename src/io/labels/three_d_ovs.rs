@@ -47,7 +47,7 @@ pub(crate) fn find(root: &Path) -> Result<Option<Pictures>, IoError> {
         }
     }
     if of.is_empty() {
-        let reason = "no picture in the folders beside it is named after one of its classes".into();
+        let reason = "no image in the folders beside it is named after one of its classes".into();
         return Err(IoError::Syntax { path: list, place: format!("{} classes", classes.len()), reason });
     }
     Ok(Some(Pictures { of, least: u8::MAX, level: Some(Level::Object) }))

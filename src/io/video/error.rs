@@ -26,7 +26,7 @@ pub enum VideoFileError {
     Encoder { path: PathBuf, reason: String },
     #[error("cannot start '{program}': {cause}; install ffmpeg or give its path, or use the built-in encoder")]
     Program { program: PathBuf, cause: std::io::Error },
-    #[error("{path} was not written: '{program}' ended with {status}. Its last words:\n{last_words}")]
+    #[error("{path} was not written: '{program}' ended with {status}. Last output:\n{last_words}")]
     ProgramFailed { path: PathBuf, program: PathBuf, status: String, last_words: String },
     #[error(transparent)]
     Io(#[from] IoError),

@@ -34,6 +34,7 @@ fn request(phrases: &[&str]) -> PhrasesRequest {
         settings: RenderSettings::default(),
         views: vec![("images/0.png".into(), eye(0.0)), ("images/1.png".into(), eye(9.0))],
         phrases: phrases.iter().map(|p| (*p).to_owned()).collect(),
+        colors: PhraseColors::default(),
         level: LevelFilter::Auto,
         matching: (MatchMode::Exact, 0.02),
         top: 1,
@@ -81,6 +82,11 @@ fn masks_are_written_in_three_forms_and_compared_with_what_was_written() {
 
     let coco: Value = files::read_json(&folder.path().join("coco.json")).expect("JSON");
     assert_eq!(coco["categories"][2]["name"], "Mug!");
+    let colors: Vec<&Value> = (0..3).map(|i| &coco["categories"][i]["color"]).collect();
+    assert!(
+        colors[0] != colors[1] && *colors[0] == json!(rows[0].color) && rows[0].color == rows[3].color,
+        "{colors:?}"
+    );
     assert_eq!(
         (coco["images"].as_array().map(Vec::len), coco["annotations"].as_array().map(Vec::len)),
         (Some(2), Some(3))
@@ -101,7 +107,7 @@ fn masks_are_written_in_three_forms_and_compared_with_what_was_written() {
 #[test]
 fn lists_and_masks_that_make_no_sense_are_refused() {
     assert_eq!(listed(" lamp \n\n #3\r\n").expect("two"), ["lamp", "#3"]);
-    assert!(listed("\n \n").is_err_and(|e| e.to_string().contains("one a line")));
+    assert!(listed("\n \n").is_err_and(|e| e.to_string().contains("one phrase per line")));
     assert!(listed(&"lamp\n".repeat(MOST + 1)).is_err_and(|e| e.to_string().contains("split")));
     assert!(matches!(run(&request(&["?"]), &mut Silent), Err(JobError::EmptyQuery)));
     let place = Path::new("a/b.png");
@@ -120,6 +126,7 @@ fn names_are_safe_for_files_and_tables() {
     assert_eq!(stems(&["a b".into(), "a-b".into(), "A B".into()]), ["a_b", "a_b_2", "a_b_3"]);
     let row = PhraseRow {
         view: "v".into(),
+        color: [255, 9, 0],
         phrase: "=1+\"x\"".into(),
         verdict: "found",
         certainty: "guess",
@@ -130,8 +137,7 @@ fn names_are_safe_for_files_and_tables() {
         share: 0.25,
         iou: Some(0.5),
     };
-    assert!(
-        csv(&[row])
-            .ends_with("\"v\",\"'=1+\"\"x\"\"\",\"found\",\"guess\",\"\",0.500000,0.000000,1,0.25000000,0.500000\n")
-    );
+    assert!(csv(&[row]).ends_with(
+        "\"v\",\"'=1+\"\"x\"\"\",\"found\",\"guess\",\"\",0.500000,0.000000,1,0.25000000,0.500000,#ff0900\n"
+    ));
 }

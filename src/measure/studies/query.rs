@@ -57,7 +57,7 @@ pub(crate) fn study<'a>(
     repeats: u32,
     mut input: StudyInput,
 ) -> Result<Study<'a>, StudyError> {
-    let language = map.language.as_ref().ok_or_else(|| failed("no encoder has looked at this scene"))?;
+    let language = map.language.as_ref().ok_or_else(|| failed("this scene has no embeddings"))?;
     let queries: usize = views.iter().map(|v| v.categories.len()).sum();
     input.insert("queries".into(), format!("{queries} in {} views", views.len()));
     input.insert("identities".into(), map.identities.len().to_string());
@@ -65,7 +65,7 @@ pub(crate) fn study<'a>(
     let measures = vec![
         overlap("mIoU", "mean overlap of the answer's mask with the label, over all names of the views"),
         overlap("part recall", "share of parts that are answered with an overlap of a half or more"),
-        overlap("localisation", "share of names whose most relevant pixel lies in their box (LangSplat's protocol)"),
+        overlap("localization", "share of names whose most relevant pixel lies in their box (LangSplat's protocol)"),
         overlap("object mIoU", "mean overlap of objects"),
         overlap("part mIoU", "mean overlap of parts"),
         error("not understood", "share of names of which the encoder knows no word; they count as an overlap of 0"),
@@ -132,7 +132,7 @@ pub(crate) fn study<'a>(
         let values = vec![
             ("mIoU", mean(&all)),
             ("part recall", mean(&recalled)),
-            ("localisation", mean(&hits)),
+            ("localization", mean(&hits)),
             ("object mIoU", mean(&ious[0])),
             ("part mIoU", mean(&ious[1])),
             ("not understood", mean(&not_understood)),
@@ -181,7 +181,7 @@ fn variants() -> Variants<Variant> {
         (Strategy::WholeFirst, "whole first"),
     ] {
         let options = Some(EmbeddingOptions { strategy, ..options });
-        add("localisation", words, ("strategy", json!(words)), Variant { options, ..base });
+        add("localization", words, ("strategy", json!(words)), Variant { options, ..base });
     }
     let raw = Some(EmbeddingOptions { parts: PartFeatures::Raw, ..options });
     add("part features", "without deviation", ("parts", json!("raw")), Variant { options: raw, ..base });

@@ -72,7 +72,7 @@ pub(crate) fn study(
     ];
     // One step of an 8-bit image.
     let rule = Rule::new("RMS error", 1.1, 1.0 / 255.0, 0.0);
-    let words = ["one picture", "images are compared with the same in double precision without cut-offs"];
+    let words = ["one frame", "images are compared with the same in double precision without cut-offs"];
     let stage = Stage::new(StageName::Render, words, (input, repeats), rule, measures);
 
     let double = cloud.cast::<f64>();

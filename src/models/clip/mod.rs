@@ -64,7 +64,7 @@ impl ClipEncoder {
         manifest::check_length(path, "embed_dim", about.embed_dim, 1 << 16)?;
         manifest::check_length(path, "context_length", about.context_length, 1 << 12)?;
         if height != width {
-            return Err(refused(format!("pictures of {width} x {height} px; only square ones are supported")));
+            return Err(refused(format!("images of {width} x {height} px; only square ones are supported")));
         }
         if about.tokenizer.kind != "clip-bpe" || about.vocab_size > VOCABULARY {
             return Err(refused(format!(

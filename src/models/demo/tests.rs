@@ -128,7 +128,7 @@ fn what_cannot_be_encoded_is_refused() {
 }
 
 /// Share of the tiles whose query finds a tile with the same query: things among things, parts
-/// (deviated towards their things) among parts.
+/// (deviated toward their things) among parts.
 fn top_1(list: &HeldOut, features: &[Vec<f32>], queries: &[Vec<f32>], parts: bool) -> f64 {
     let among: Vec<usize> = (0..list.tiles.len()).filter(|&k| list.tiles[k].thing.is_some() == parts).collect();
     let right = among.iter().filter(|&&k| {

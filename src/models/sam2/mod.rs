@@ -112,7 +112,7 @@ impl Sam2 {
         manifest::check_length(path, "memories", about.memories, 1 << 10)?;
         manifest::check_length(path, "pointers", about.pointers, 1 << 16)?;
         if image_size % 16 != 0 || about.memories < 2 {
-            let problem = format!("a side of {image_size} px and {} memories make no sense", about.memories);
+            let problem = format!("a side of {image_size} px and {} memories are invalid", about.memories);
             return Err(ModelError::Metadata { path: path.into(), problem });
         }
         let prepare = Prepare { side_px: image_size, filter: Filter::Bicubic, side: FitSide::Both, mean, std };

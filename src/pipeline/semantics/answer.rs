@@ -50,7 +50,7 @@ pub struct QueryAnswer {
 #[derive(Clone, Copy)]
 pub(crate) struct Language<'a> {
     pub(crate) features: &'a LanguageFeatures,
-    /// With the query's phrases learnt; see [`phrases_of`].
+    /// With the query's phrases learned; see [`phrases_of`].
     pub(crate) phrases: &'a TextEmbeddings,
     pub(crate) options: EmbeddingOptions,
 }

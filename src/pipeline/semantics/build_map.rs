@@ -178,8 +178,8 @@ fn unknown(views: &[ViewReport], photos: &[Photo], share: f64) -> Option<String>
     let many: Vec<&ViewReport> = views.iter().filter(|v| v.unknown > share).collect();
     let worst = many.iter().max_by(|a, b| a.unknown.total_cmp(&b.unknown))?;
     Some(format!(
-        "{} of {} photos show more than {:.0}% that no mask has reached (most: {}, {:.0}%); what is there goes to what \
-         it hangs together with",
+        "{} of {} photos have over {:.0} % unlabeled pixels (worst: {}, {:.0} %); Gaussians there inherit from \
+         connected ones",
         many.len(),
         photos.len(),
         100.0 * share,
@@ -327,13 +327,16 @@ mod tests {
         // The far photo shows the cat, too different in color to be taken for a piece of what is near.
         assert!((0.01..0.3).contains(&found.views[1].unknown) && found.views[0].unknown == 0.0);
         assert!(
-            notes.0.iter().any(|n| n.starts_with("1 of 2 photos show more than 0%") && n.contains("far")),
+            notes.0.iter().any(|n| n.starts_with("1 of 2 photos have over 0 % unlabeled") && n.contains("far")),
             "{:?}",
             notes.0
         );
         let views = [0.2, 0.5].map(|unknown| ViewReport { photo: 0, unknown, seen: vec![] });
         let text = unknown(&views, &photos(), 0.1).expect("two");
-        assert!(text.starts_with("2 of 2 photos show more than 10%") && text.contains("most: near, 50%"), "{text}");
+        assert!(
+            text.starts_with("2 of 2 photos have over 10 % unlabeled") && text.contains("worst: near, 50 %"),
+            "{text}"
+        );
         assert_eq!(unknown(&views, &photos(), 0.5), None, "as much is not more");
     }
 

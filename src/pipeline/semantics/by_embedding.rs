@@ -11,7 +11,7 @@ use crate::scene::{LanguageFeatures, ViewFeatures};
 
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) enum PartFeatures {
-    /// Moved towards their whole's: the paper's semantic deviation.
+    /// Moved toward their whole's: the paper's semantic deviation.
     #[default]
     Deviated,
     Raw,
@@ -166,7 +166,7 @@ mod tests {
         assert!((by.advantages("lid", Some("pot"))[1] - 0.1).abs() < 1e-6);
         by.options.parts = PartFeatures::Raw;
         assert!((by.advantages("lid", None)[1] - 0.5).abs() < 1e-6);
-        assert!(by.advantages("never learnt", None).iter().all(|d| *d == f32::NEG_INFINITY));
+        assert!(by.advantages("never learned", None).iter().all(|d| *d == f32::NEG_INFINITY));
     }
 
     #[test]

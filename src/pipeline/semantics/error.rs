@@ -19,6 +19,6 @@ pub enum FindError {
     Render(String, RenderError),
     #[error("training codes: {0}")]
     Lift(#[from] RenderError),
-    #[error("cancelled")]
+    #[error("canceled")]
     Interrupted(#[from] Interrupted),
 }

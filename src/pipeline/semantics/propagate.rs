@@ -14,7 +14,7 @@ use crate::math::stats::median;
 use crate::scene::{GaussianCloud, NOBODY};
 
 /// Neighbors of a Gaussian.
-const NEIGHBOURS: usize = 8;
+const NEIGHBORS: usize = 8;
 /// How many usual distances between neighbors a full step in color is as far as.
 const COLOR_WEIGHT: f64 = 12.0;
 /// Path length, in usual distances between neighbors, beyond which nothing is inherited.
@@ -33,7 +33,7 @@ pub(crate) fn extend(cloud: &GaussianCloud, assignments: &mut [Assignment]) {
     let near: Vec<Vec<(usize, f64)>> = points
         .par_iter()
         .map(|p| {
-            let around = tree.nearest_neighbor_iter_with_distance_2(*p.geom()).skip(1).take(NEIGHBOURS);
+            let around = tree.nearest_neighbor_iter_with_distance_2(*p.geom()).skip(1).take(NEIGHBORS);
             around.map(|(q, d)| (q.data, d.sqrt())).collect()
         })
         .collect();

@@ -27,7 +27,7 @@ pub fn score(advantage: f32, temperature: f32) -> f32 {
     1.0 / (1.0 + (-temperature * advantage).exp())
 }
 
-/// A part's feature moved towards its whole's (the paper's semantic deviation), of unit length
+/// A part's feature moved toward its whole's (the paper's semantic deviation), of unit length
 /// again: the sum of two unit vectors is shorter, which would penalize parts. `None` if the two
 /// cancel out.
 pub fn deviate(part: &[f32], whole: &[f32], part_weight: f32) -> Option<Vec<f32>> {

@@ -15,7 +15,7 @@ const FOV_RAD: f64 = 0.5;
 pub(crate) type Thumbnails = Vec<Option<Vec<[u8; 3]>>>;
 
 /// A picture of every identity as somebody at `from` sees it.
-pub(crate) fn portraits(
+pub(crate) fn draw_thumbnails(
     cloud: &GaussianCloud,
     map: &SemanticMap,
     settings: &RenderSettings,
@@ -38,13 +38,13 @@ pub(crate) fn portraits(
 fn camera(cloud: &GaussianCloud, from: DVec3, up: DVec3) -> Option<Camera> {
     let bounds = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i)))?;
     let center = bounds.center();
-    let towards = (from - center).try_normalize().unwrap_or(up);
+    let toward = (from - center).try_normalize().unwrap_or(up);
     // Seen along the upward axis, any other is up.
-    let up = if towards.dot(up).abs() > 0.99 { up.any_orthonormal_vector() } else { up };
+    let up = if toward.dot(up).abs() > 0.99 { up.any_orthonormal_vector() } else { up };
     let radius = (0.5 * bounds.size().length()).max(1e-9);
     let distance = radius / (0.5 * FOV_RAD).sin();
     let side = SIDE_PX as u32;
-    Camera::look_at(center + towards * distance, center, up, FOV_RAD, side, side)
+    Camera::look_at(center + toward * distance, center, up, FOV_RAD, side, side)
 }
 
 #[cfg(test)]
@@ -75,7 +75,7 @@ mod tests {
         let settings = RenderSettings::default();
         // From above too, where up and the line of sight are the same.
         for from in [DVec3::new(5.0, 1.0, 0.0), DVec3::new(0.0, 0.0, 9.0)] {
-            let list = portraits(&cloud, &map, &settings, from, DVec3::Z).expect("drawn");
+            let list = draw_thumbnails(&cloud, &map, &settings, from, DVec3::Z).expect("drawn");
             assert_eq!(list.len(), 3);
             assert!(list[0].is_some() && list[1].is_some() && list[2].is_none(), "nothing to draw");
             for picture in list.iter().flatten() {

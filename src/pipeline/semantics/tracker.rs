@@ -228,13 +228,16 @@ impl Tracker<'_> {
         let name = |id: &IdentityId| self.identities.full_name(*id);
         match what {
             Disagreement::Split(of) => {
-                format!("{} is seen in two pieces; one becomes an identity of its own", name(of))
+                format!("{} appears in two pieces; one becomes a new identity", name(of))
             }
             Disagreement::Merge(all) => {
-                format!("one mask covers {}; they stay apart", all.iter().map(name).collect::<Vec<_>>().join(" and "))
+                format!(
+                    "one mask covers {}; they are kept separate",
+                    all.iter().map(name).collect::<Vec<_>>().join(" and ")
+                )
             }
-            Disagreement::Drift(id) => format!("{} was followed to where it is not, and is left out there", name(id)),
-            Disagreement::Switch(is, other) => format!("{} is where {} was thought to be", name(is), name(other)),
+            Disagreement::Drift(id) => format!("{} was tracked to a wrong place and is ignored there", name(id)),
+            Disagreement::Switch(is, other) => format!("{} was found where {} was expected", name(is), name(other)),
         }
     }
 
@@ -252,7 +255,7 @@ impl Tracker<'_> {
     }
 
     fn look(&mut self, round: usize, observer: &mut dyn Observer) -> Result<Vec<ViewReport>, FindError> {
-        let mut ticker = Ticker::new(format!("Carrying identities to all views, round {round}"), self.photos.len());
+        let mut ticker = Ticker::new(format!("Propagating identities to all views, round {round}"), self.photos.len());
         observer.proceed()?;
         // To see how much is unknown, small pictures will do.
         let side = self.options.max_side_px.min(256);

@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn codes_are_learnt_from_masks() {
+    fn codes_are_learned_from_masks() {
         let (codes, of, loss) = train(400, |l| l);
         assert_eq!(of, [1, 2], "{codes:?}");
         for (code, wanted) in codes.iter().zip([[0.9, 0.2, 0.5, 0.5, 0.5, 0.5], [0.9, 0.2, 0.5, 0.1, 0.3, 0.8]]) {
@@ -203,7 +203,7 @@ mod tests {
         }
         let (_, _, first) = train(1, |l| l);
         assert!(loss < 0.8 * first, "{loss} {first}");
-        // Without masks nothing is learnt; with the wrong ones, the wrong thing.
+        // Without masks nothing is learned; with the wrong ones, the wrong thing.
         let (codes, of, _) = train(100, |_| UNKNOWN);
         assert_eq!((codes[0], of), ([0.5; 6], vec![NOBODY; 2]));
         let (_, of, _) = train(400, |l| [0, 2, 1].get(l as usize).copied().unwrap_or(l));

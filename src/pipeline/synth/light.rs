@@ -16,11 +16,11 @@ use super::trace::Tracer;
 /// Directions from which light is gathered, over the whole sphere: fewer where there are many
 /// vertices.
 const SKY_DIRECTIONS: std::ops::RangeInclusive<usize> = 40..=96;
-/// Rays towards the sky in all, as far as the least number of directions allows.
+/// Rays toward the sky in all, as far as the least number of directions allows.
 const SKY_RAYS: usize = 10_000_000;
 /// Points on the key light.
 const KEY_POINTS: usize = 9;
-/// Towards the middle of the key light (y is up).
+/// Toward the middle of the key light (y is up).
 const KEY: Vec3A = Vec3A::new(-0.48, 0.79, 0.38);
 /// Tangent of the key light's angular radius.
 const KEY_SPREAD: f32 = 0.09;
@@ -129,12 +129,12 @@ pub(crate) struct Lit<'a> {
     pub(crate) materials: &'a Materials,
 }
 
-/// Highlight of the key light: normal, direction towards the eye, roughness, reflectance at normal
+/// Highlight of the key light: normal, direction toward the eye, roughness, reflectance at normal
 /// incidence. Normalized Blinn-Phong.
 pub(crate) fn highlight(normal: Vec3A, to_eye: Vec3A, roughness: f32, reflectance: Vec3A) -> Vec3A {
-    let towards = KEY.normalize_or_zero();
-    let half = (towards + to_eye).normalize_or_zero();
-    let (n_h, n_l) = (normal.dot(half).max(0.0), normal.dot(towards).max(0.0));
+    let toward = KEY.normalize_or_zero();
+    let half = (toward + to_eye).normalize_or_zero();
+    let (n_h, n_l) = (normal.dot(half).max(0.0), normal.dot(toward).max(0.0));
     let alpha = roughness.clamp(0.25, 1.0).powi(2);
     let exponent = 2.0 / (alpha * alpha) - 2.0;
     KEY_COLOR * reflectance * (n_l * (exponent + 2.0) / 8.0 * n_h.powf(exponent))
@@ -163,7 +163,7 @@ pub(crate) fn fibonacci_sphere(n: usize) -> Vec<Vec3A> {
         .collect()
 }
 
-/// Unit directions towards points on the key light's disc.
+/// Unit directions toward points on the key light's disc.
 fn key_directions() -> Vec<Vec3A> {
     let axis = KEY.normalize_or_zero();
     let side = axis.any_orthonormal_vector();

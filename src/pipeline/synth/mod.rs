@@ -75,7 +75,7 @@ pub enum SynthError {
     Write { path: PathBuf, source: std::io::Error },
     #[error(transparent)]
     Folder(#[from] IoError),
-    #[error("cancelled")]
+    #[error("canceled")]
     Interrupted(#[from] Interrupted),
 }
 

@@ -116,7 +116,7 @@ impl Placer<'_> {
         best.unwrap_or_else(|| self.around(aim, 1.0, GOLDEN * k as f64, 1.0))
     }
 
-    /// Whether the first surface towards the object's middle is near the object.
+    /// Whether the first surface toward the object's middle is near the object.
     fn sees(&self, camera: &Camera, object: &Bounds) -> bool {
         let target = self.surface.local(object.center());
         let origin = self.surface.local(camera.center);

@@ -58,7 +58,7 @@ pub enum CheckpointError {
     Io(#[from] IoError),
     #[error("{path} is damaged or no checkpoint ({reason}); choose another folder to train anew")]
     Damaged { path: std::path::PathBuf, reason: String },
-    #[error("{folder} holds a trained scene, but no checkpoint to go on from; choose another folder for the result")]
+    #[error("{folder} holds a trained scene, but no checkpoint to resume from; choose another folder for the result")]
     Missing { folder: std::path::PathBuf },
     #[error("{path} belongs to a run with other {what}; choose another folder for the result")]
     OtherRun { path: std::path::PathBuf, what: &'static str },

@@ -59,7 +59,7 @@ pub struct TrainConfig {
 /// Stored settings that cannot be read: defaults in their place would train or draw something else.
 #[derive(Debug, thiserror::Error)]
 #[error(
-    "{path}: the settings of the training ('config') cannot be read: {cause}; mend them, or take the entry out to go on with the defaults"
+    "{path}: the settings of the training ('config') cannot be read: {cause}; fix them, or remove the entry to use the defaults"
 )]
 pub struct UnreadableConfig {
     path: String,
@@ -86,7 +86,7 @@ impl TrainConfig {
             return bad("the number of steps must be at least 1");
         }
         if self.max_side_px < 16 {
-            return bad("the longest side of the training pictures must be at least 16 px");
+            return bad("the longest side of the training images must be at least 16 px");
         }
         if !(0.0..=1.0).contains(&self.coarse_share) {
             return bad("the share of steps at half the size must be 0 to 1");

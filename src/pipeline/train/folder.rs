@@ -84,7 +84,7 @@ pub(super) fn objects_for(
     let before = trained::load(folder)
         .and_then(|s| Ok((semantic_map::load(folder, s.state.as_deref(), &s.cloud)?, s.cloud)))
         .inspect_err(|e| {
-            observer.note(Severity::Warning, format!("Its objects and parts cannot be carried over: {e}"))
+            observer.note(Severity::Warning, format!("The scene's objects and parts cannot be transferred: {e}"))
         });
     let before = before.ok().and_then(|(map, cloud)| Some((map?, cloud)));
     if let Some((map, old)) = &before
@@ -98,8 +98,8 @@ pub(super) fn objects_for(
     Ok(before.map(|(map, old)| {
         let (map, share) = carry::carry(&map, &old, cloud);
         let text = format!(
-            "Its objects and parts were carried over to {:.1} % of the Gaussians, by place; 'fmlgs preprocess' finds \
-             them anew",
+            "The scene's objects and parts were transferred to {:.1} % of the Gaussians, by place; 'fmlgs preprocess' finds \
+             them again",
             100.0 * share
         );
         observer.note(Severity::Info, text);

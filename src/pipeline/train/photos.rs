@@ -21,7 +21,7 @@ pub(crate) fn load_views(
     let borders = Borders::of(dataset, &training, config.max_side_px).map_err(TrainError::Photo)?;
     if borders.share() > 0.0 {
         let percent = 100.0 * borders.share();
-        observer.note(Severity::Info, format!("{stage}: a black border ({percent:.1}% of the picture) is left out"));
+        observer.note(Severity::Info, format!("{stage}: a black border ({percent:.1} % of the image) is left out"));
     }
     let mut views = Vec::with_capacity(indices.len());
     if observer.proceed().is_err() {

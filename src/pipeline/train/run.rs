@@ -227,7 +227,7 @@ impl<'a> Job<'a> {
                 match self.checkpoint() {
                     // A full disk now is no reason to lose what is in memory.
                     Err(TrainError::Save(e)) if !std::mem::replace(&mut self.unsaved, true) => {
-                        observer.note(Severity::Warning, format!("No checkpoint was saved, the training goes on: {e}"));
+                        observer.note(Severity::Warning, format!("Checkpoint not saved, training continues: {e}"));
                     }
                     Err(TrainError::Save(_)) => {}
                     Err(e) => return Err(e),

@@ -27,7 +27,7 @@ fn thinnest<R: Real>(log_scale: [R; 3]) -> usize {
     (0..3).fold(0, |best, k| if log_scale[k] <= log_scale[best] { k } else { best })
 }
 
-/// The thinnest axis of a Gaussian, its number and the sign that turns it towards `eye`, which is
+/// The thinnest axis of a Gaussian, its number and the sign that turns it toward `eye`, which is
 /// the camera's center relative to the cloud's origin; `None` for a degenerate rotation.
 #[inline(always)]
 fn facing<R: Real>(gaussian: &Gaussian<'_, R>, eye: [R; 3]) -> Option<([R; 3], usize, R)> {
@@ -44,7 +44,7 @@ pub fn eye<R: Real>(camera: &Camera, cloud: &GaussianCloud<R>) -> [R; 3] {
     (camera.center - cloud.origin).to_array().map(R::of)
 }
 
-/// Unit normals of all Gaussians in world axes, as three extra channels: the thinnest axis, towards
+/// Unit normals of all Gaussians in world axes, as three extra channels: the thinnest axis, toward
 /// the camera; 0 for a degenerate rotation.
 pub fn of_gaussians<R: Real>(cloud: &GaussianCloud<R>, camera: &Camera, out: &mut Vec<R>) {
     let eye = eye(camera, cloud);
@@ -122,7 +122,7 @@ fn differences<R: Real>(depth: &[R], rays: &Rays<R>, width: usize, x: usize, y: 
     Some([along_x, minus(point(x, y + 1)?, point(x, y - 1)?)])
 }
 
-/// Unit normals of the surface that `depth` describes, towards the camera in world axes, row by
+/// Unit normals of the surface that `depth` describes, toward the camera in world axes, row by
 /// row; 0 at the picture's border and where a neighbor has no depth.
 pub(crate) fn of_depth<R: Real>(depth: &[R], camera: &Camera) -> Vec<[R; 3]> {
     let (width, rays) = (camera.width_px as usize, Rays::new(camera));

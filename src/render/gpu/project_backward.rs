@@ -37,16 +37,16 @@ impl ProjectBackward {
         stage.run(&self.main, &buffers, [bindings.gaussians.div_ceil(64), 1, 1]);
     }
 
-    /// Records the gathering of screen gradients and radii into `growth`.
+    /// Records the gathering of screen gradients and radii into `statistics`.
     pub(crate) fn encode_statistics(
         &self,
         stage: &mut RecordedStage<'_>,
         bindings: FrameBindings<'_>,
         splats: &wgpu::Buffer,
         gradient: &Parameters,
-        growth: &wgpu::Buffer,
+        statistics: &wgpu::Buffer,
     ) {
-        let buffers = [bindings.view, splats, &gradient.buffers[0], growth, bindings.counters];
+        let buffers = [bindings.view, splats, &gradient.buffers[0], statistics, bindings.counters];
         stage.run(&self.statistics, &buffers, [bindings.gaussians.div_ceil(256), 1, 1]);
     }
 }

@@ -64,7 +64,7 @@ pub struct GpuTrainer {
     cloud: Parameters,
     gradient: Parameters,
     moments: [Parameters; 2],
-    growth: wgpu::Buffer,
+    statistics: wgpu::Buffer,
     gradients: BlendGradients,
     gradient_capacity: [usize; 2],
     features: wgpu::Buffer,
@@ -98,7 +98,7 @@ impl GpuTrainer {
             cloud: empty("cloud")?,
             gradient: empty("gradient of the cloud")?,
             moments: [empty("first moments")?, empty("second moments")?],
-            growth: device.storage("density statistics", 0)?,
+            statistics: device.storage("density statistics", 0)?,
             gradients: BlendGradients::new(device, 0, 0, 0, 1)?,
             gradient_capacity: [0, 0],
             features: device.storage("features", 0)?,
@@ -156,13 +156,13 @@ impl GpuTrainer {
                 Ok(made) => (roomy, made),
                 Err(_) => (n, make(n)?),
             };
-            let ([cloud, gradient, first], second, growth) = made;
-            (self.cloud, self.gradient, self.moments, self.growth) = (cloud, gradient, [first, second], growth);
+            let ([cloud, gradient, first], second, statistics) = made;
+            (self.cloud, self.gradient, self.moments, self.statistics) = (cloud, gradient, [first, second], statistics);
             self.capacity = capacity;
         }
         self.cloud.write(device, &Packed::of(cloud));
         let mut recorder = Recorder::new(device, None);
-        recorder.clear(&self.growth);
+        recorder.clear(&self.statistics);
         self.moments.iter().flat_map(|m| &m.buffers).for_each(|b| recorder.clear(b));
         recorder.submit();
         if let Some(moments) = moments {
@@ -229,7 +229,7 @@ impl GpuTrainer {
         });
         recorder.stage("project backward", |s| {
             self.project_backward.encode(s, bindings, &self.cloud, (splats, &self.gradients.splats), &self.gradient);
-            self.project_backward.encode_statistics(s, bindings, splats, &self.gradient, &self.growth);
+            self.project_backward.encode_statistics(s, bindings, splats, &self.gradient, &self.statistics);
         });
         recorder.stage("adam", |s| {
             let on = AdamBuffers { parameters: &self.cloud, gradient: &self.gradient, moments: &self.moments };
@@ -286,7 +286,7 @@ impl GpuTrainer {
 
     /// Statistics for density control since the cloud was uploaded. Waits for the device.
     pub fn stats(&self) -> Result<DensityStats, GpuError> {
-        let bytes = self.device.read(&[(&self.growth, self.len() as u64 * 16)])?;
+        let bytes = self.device.read(&[(&self.statistics, self.len() as u64 * 16)])?;
         let rows: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes[0]);
         Ok(DensityStats {
             gradient: rows.iter().map(|r| r[0]).collect(),

@@ -23,7 +23,7 @@ fn line(item: Item, plan: &ScenePlan) -> Option<PlanLine> {
         item,
         subject: item.subject().into(),
         choice: if overridden { alternative.unwrap_or_default().into() } else { choice },
-        reason: if overridden { format!("Set by the user. By itself: {reason}") } else { reason },
+        reason: if overridden { format!("Set by the user. Automatic choice: {reason}") } else { reason },
         saving,
         alternative: alternative.map(str::to_owned),
         overridden,

@@ -184,7 +184,7 @@ fn lines_say_what_is_left_out_and_how_much_that_is() {
     let all = ScenePlan::new(p.facts.clone(), &Overrides::everything());
     let (auto, wanted) = (line(&p, Item::Photos).1, line(&all, Item::Photos).1);
     assert!(auto.starts_with("Training is"), "{auto}");
-    assert_eq!(wanted, format!("Set by the user. By itself: {auto}"));
+    assert_eq!(wanted, format!("Set by the user. Automatic choice: {auto}"));
     let none = plan(|facts| facts.with_semantics(Some(&objects(false, false))));
     assert_eq!(line(&none, Item::Parts).0, "off");
     assert_eq!(line(&none, Item::Parts).2, "3 of 6 channels of blended codes");

@@ -72,32 +72,40 @@ fn row(ui: &mut Ui, i: usize, key: &mut PathKey, chosen: bool) -> Option<KeyChan
     if ui.selectable_label(chosen, format!("{}", i + 1)).clicked() {
         wanted_change = Some(KeyChange::Choose);
     }
+    let named = |what: &str| format!("{what} of keyframe {}", i + 1);
     let mut name = key.name.clone().unwrap_or_default();
     let edit = TextEdit::singleline(&mut name).desired_width(120.0).char_limit(80).hint_text("name");
-    ui.add_sized(egui::vec2(130.0, 20.0), edit);
+    ui.add_sized(egui::vec2(130.0, 20.0), edit).accessible_name(named("Name"));
     key.name = Some(name).filter(|n| !n.is_empty());
     ui.horizontal(|ui| {
         let mut fixed = key.time_secs.is_some();
-        if ui.checkbox(&mut fixed, "").on_hover_text("Fix the time at which it is reached.").changed() {
+        let fix = ui.checkbox(&mut fixed, "").on_hover_text("Fix the time of this keyframe.");
+        if fix.accessible_name(named("Fixed time")).changed() {
             key.time_secs = fixed.then_some(i as f64);
         }
         match &mut key.time_secs {
-            Some(time) => drop(ui.add(DragValue::new(time).range(0.0..=3600.0).speed(0.02).suffix(" s"))),
-            None => drop(ui.label(caption("even"))),
-        }
+            Some(time) => {
+                let time = DragValue::new(time).range(0.0..=3600.0).speed(0.02).suffix(" s");
+                ui.add(time).accessible_name(named("Time"))
+            }
+            None => ui.label(caption("even")),
+        };
     });
     let mut degrees = key.fov_y_rad.to_degrees();
-    if ui.add(DragValue::new(&mut degrees).range(5.0..=150.0).speed(0.2).suffix("\u{b0}")).changed() {
+    let fov = DragValue::new(&mut degrees).range(5.0..=150.0).speed(0.2).suffix("\u{b0}");
+    if ui.add(fov).accessible_name(named("Field of view")).changed() {
         key.fov_y_rad = degrees.to_radians();
     }
     let mut roll = key.roll_rad.to_degrees();
-    if ui.add(DragValue::new(&mut roll).range(-180.0..=180.0).speed(0.5).suffix("\u{b0}")).changed() {
+    let angle = DragValue::new(&mut roll).range(-180.0..=180.0).speed(0.5).suffix("\u{b0}");
+    if ui.add(angle).accessible_name(named("Roll")).changed() {
         key.roll_rad = roll.to_radians();
     }
-    ui.add(DragValue::new(&mut key.dwell_secs).range(0.0..=600.0).speed(0.02).suffix(" s"));
+    let wait = DragValue::new(&mut key.dwell_secs).range(0.0..=600.0).speed(0.02).suffix(" s");
+    ui.add(wait).accessible_name(named("Wait"));
     let buttons = [
-        ("Go", "Move the view here.", KeyChange::Go),
-        ("Set", "Replace this keyframe by the current view.", KeyChange::Update),
+        ("Go", "Move the view to this keyframe.", KeyChange::Go),
+        ("Update", "Replace this keyframe with the current view.", KeyChange::Update),
         ("Copy", "Insert a copy after it.", KeyChange::Copy),
         ("Earlier", "Swap it with the previous keyframe.", KeyChange::Up),
         ("Later", "Swap it with the next keyframe.", KeyChange::Down),

@@ -196,8 +196,8 @@ impl CameraPane {
         if self.path.keys.is_empty() {
             ui.add_space(4.0);
             ui.weak(
-                "No keyframes yet. Move the view and add it (K), open a path, or find something and go there: the \
-                 flight can be converted to a path.",
+                "No keyframes yet. Add the current view (K), open a path, or go to an object and convert the \
+                 flight.",
             );
         } else {
             wanted = keys::show(ui, self, eye).or(wanted);
@@ -213,19 +213,21 @@ impl CameraPane {
         let entries = entries.map(|(symbol, action)| (symbol, tip(&action), action));
         for (symbol, tip, action) in entries {
             let button = Button::new(symbol).min_size(egui::vec2(28.0, 24.0));
-            if ui.add_enabled(has_clip, button).on_hover_text(tip).clicked() {
+            let button = ui.add_enabled(has_clip, button).on_hover_text(tip);
+            if button.accessible_name(action.text()).clicked() {
                 actions.push(action);
             }
         }
         ui.checkbox(&mut self.player.looped, "Loop");
-        ComboBox::from_id_salt("rate").selected_text(format!("{}\u{d7}", self.player.rate)).width(56.0).show_ui(
-            ui,
-            |ui| {
+        let rate = ComboBox::from_id_salt("rate")
+            .selected_text(format!("{}\u{d7}", self.player.rate))
+            .width(56.0)
+            .show_ui(ui, |ui| {
                 for rate in [0.25, 0.5, 1.0, 2.0, 4.0] {
                     ui.selectable_value(&mut self.player.rate, rate, format!("{rate}\u{d7}"));
                 }
-            },
-        );
+            });
+        rate.response.accessible_name("Playback speed");
         let seconds = self.player.clip().map_or(0.0, Clip::seconds);
         ui.label(RichText::new(format!("{:.2} / {seconds:.2} s", self.player.time)).monospace());
         let what = match self.player.clip() {
@@ -301,7 +303,7 @@ impl CameraPane {
         ui.checkbox(&mut self.path.closed, "Closed loop")
             .on_hover_text("Continue from the last keyframe to the first.");
         let mut eased = self.speed == Speed::Eased;
-        ui.checkbox(&mut eased, "Ease in/out").on_hover_text("Start and stop smoothly, at waits too.");
+        ui.checkbox(&mut eased, "Ease in/out").on_hover_text("Start and stop smoothly, also at waits.");
         self.speed = if eased { Speed::Eased } else { Speed::Constant };
     }
 
@@ -312,15 +314,17 @@ impl CameraPane {
         if button.on_hover_text(Action::ExportVideo.tooltip()).on_disabled_hover_text(why).clicked() {
             actions.push(Action::ExportVideo);
         }
-        ComboBox::from_id_salt("video height").selected_text(format!("{} px", self.video_height)).width(72.0).show_ui(
-            ui,
-            |ui| {
+        let height = ComboBox::from_id_salt("video height")
+            .selected_text(format!("{} px", self.video_height))
+            .width(72.0)
+            .show_ui(ui, |ui| {
                 for height in [360, 480, 720, 1080, 2160] {
                     ui.selectable_value(&mut self.video_height, height, format!("{height} px"));
                 }
-            },
-        );
-        ui.add(DragValue::new(&mut self.path.fps).range(1.0..=120.0).speed(0.2).suffix(" fps"));
+            });
+        height.response.accessible_name("Video height");
+        ui.add(DragValue::new(&mut self.path.fps).range(1.0..=120.0).speed(0.2).suffix(" fps"))
+            .accessible_name("Frames per second");
         ui.add(Slider::new(&mut self.quality, 0..=100).text("Quality"));
         ui.checkbox(&mut self.mark, "Highlight")
             .on_hover_text("Highlight what the query found in every frame of the video.");

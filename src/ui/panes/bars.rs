@@ -14,8 +14,8 @@ use crate::ui::actions::{Action, Axis, Pane, THEMES};
 use crate::worker::ViewMode;
 use crate::worker::view::ViewPicture;
 
-/// Draws the bar at the top.
-pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut Vec<Action>) {
+/// Draws the bar at the top; `second` is whether the second view is worked in.
+pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bool, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         let has_scene = state.scene.is_some();
         let has_photos = state.scene.as_ref().is_some_and(|s| s.dataset.is_some());
@@ -39,6 +39,7 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut 
             });
             ui.separator();
             item(ui, has_scene, None, Action::ExportPly, actions);
+            item(ui, has_scene, None, Action::ExportCrop, actions);
             item(ui, has_scene, None, Action::Screenshot, actions);
             ui.separator();
             item(ui, true, None, Action::Quit, actions);
@@ -54,12 +55,21 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &Layout, actions: &mut 
         ui.menu_button("View", |ui| {
             ui.set_min_width(280.0);
             for &mode in ViewMode::VARIANTS {
-                item(ui, has_scene, Some(layout.mode == mode), Action::Show(mode), actions);
+                item(ui, has_scene, Some(*layout.mode_of(second) == mode), Action::Show(mode), actions);
             }
             ui.separator();
             item(ui, has_photos, Some(layout.cameras), Action::ToggleCameras, actions);
             item(ui, has_photos, Some(layout.compare), Action::ToggleCompare, actions);
+            item(ui, has_scene, Some(layout.split_view), Action::ToggleSplit, actions);
+            item(ui, layout.split_view, None, Action::OtherView, actions);
+            let beside = state.beside.as_ref().map_or(Action::ChooseBeside, |_| Action::OpenBeside(None));
+            item(ui, has_scene, None, beside, actions);
+            item(ui, state.semantics.is_some(), Some(layout.dim), Action::ToggleDim, actions);
             item(ui, has_scene, Some(layout.times), Action::ToggleTimes, actions);
+            ui.separator();
+            for action in [Action::Measure, Action::Crop, Action::Inspect] {
+                item(ui, has_scene, None, action, actions);
+            }
             ui.separator();
             for action in [Action::FrameScene, Action::ResetView] {
                 item(ui, has_scene, None, action, actions);
@@ -176,7 +186,7 @@ pub(crate) fn status(
                 actions.push(Action::TogglePane(Pane::Log));
             }
             if let Some(p) = picture {
-                let text = RichText::new(format!("Rendered on the {}", p.drawn_by)).small();
+                let text = RichText::new(format!("Rendered on {}", p.drawn_by)).small();
                 match &p.instead_of_gpu {
                     Some(why) => ui.label(text.color(theme::warning())).on_hover_text(why),
                     None => ui.label(text.color(theme::weak())),

@@ -144,7 +144,7 @@ impl PhotoThumbnails {
                 painter.image(texture.id(), Rect::from_center_size(picture.center(), s * scale), uv, Color32::WHITE);
             }
             None if self.failed.contains(&index) => {
-                text(ui, picture.center(), egui::Align2::CENTER_CENTER, "not readable", theme::warning());
+                text(ui, picture.center(), egui::Align2::CENTER_CENTER, "unreadable", theme::warning());
             }
             None => {}
         }
@@ -162,7 +162,7 @@ impl PhotoThumbnails {
         if let Some(psnr) = caption.psnr {
             text(ui, pos2(rect.right() - 2.0, y), egui::Align2::RIGHT_CENTER, &format!("{psnr:.1} dB"), theme::text());
         }
-        let use_ = if caption.held { "held-out for evaluation" } else { "used for training" };
+        let use_ = if caption.held { "held out for evaluation" } else { "used for training" };
         response.on_hover_text(format!("{}\n{use_}\nClick to look through its camera", caption.name)).clicked()
     }
 }

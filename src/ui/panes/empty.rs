@@ -82,7 +82,7 @@ impl FirstPage {
                 ui.vertical(|ui| {
                     ui.set_width(width);
                     ui.label(RichText::new("FMLGS").size(34.0).strong().color(theme::text()));
-                    let what = "From posed photos to 3D Gaussians that know their objects and parts";
+                    let what = "3D Gaussians with objects and parts, from posed photos";
                     ui.label(RichText::new(what).size(15.0).color(theme::weak()));
                     ui.add_space(16.0);
                     self.start(ui, width, actions);
@@ -101,7 +101,7 @@ impl FirstPage {
                 let size = vec2(0.55, 0.4125) * width;
                 let picture = Image::new(texture).fit_to_exact_size(size).corner_radius(8).sense(Sense::click());
                 let tip = Action::OpenDemo.tooltip();
-                let shown = ui.add(picture.alt_text("Picture of the demo")).on_hover_text(tip);
+                let shown = ui.add(picture.alt_text("Demo image")).on_hover_text(tip);
                 if shown.on_hover_cursor(egui::CursorIcon::PointingHand).clicked() {
                     actions.push(Action::OpenDemo);
                 }
@@ -118,7 +118,7 @@ impl FirstPage {
                 button(ui, Button::new("Train it yourself"), Action::TrainDemo);
                 ui.label(
                     RichText::new(format!(
-                        "Trained, with its objects found and \u{201c}{}\u{201d} asked.",
+                        "Trained, objects found, query \u{201c}{}\u{201d} answered.",
                         demo::QUESTION
                     ))
                     .small()
@@ -220,7 +220,7 @@ fn busy(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
         if job.kind == JobKind::DemoPhotos {
             ui.add_space(6.0);
             ui.label(
-                RichText::new("The photos are rendered once; training then starts by itself.").color(theme::weak()),
+                RichText::new("The photos are rendered once; training then starts automatically.").color(theme::weak()),
             );
         }
         ui.add_space(14.0);

@@ -61,21 +61,18 @@ fn choose(ui: &mut Ui, models: &[(ModelEntry, ModelState)], finding: &mut FindSe
     egui::Grid::new("finding").num_columns(2).show(ui, |ui| {
         ui.weak("Masks");
         one_of(ui, "masks", &mut finding.segmenter, &segmenters)
-            .on_hover_text("Used where no masks came with the photos and none were chosen.");
+            .on_hover_text("Used if the photos came without masks and none were chosen.");
         ui.end_row();
-        ui.weak("Tracking");
-        let names = [
-            (Carry::Gaussians, "Gaussians"),
-            (Carry::Sam2, "Gaussians and SAM 2"),
-            (Carry::Both, "both, Gaussians decide"),
-        ];
+        ui.weak("Tracker");
+        let names = [(Carry::Gaussians, "Gaussians"), (Carry::Sam2, "SAM 2"), (Carry::Both, "Gaussians + SAM 2")];
         let chosen = names.iter().find(|(c, _)| *c == finding.carry).map_or("", |(_, name)| *name);
         ui.add_enabled_ui(follows || finding.carry != Carry::Gaussians, |ui| {
-            egui::ComboBox::from_id_salt("carry").selected_text(chosen).width(180.0).show_ui(ui, |ui| {
+            let combo = egui::ComboBox::from_id_salt("carry").selected_text(chosen).width(180.0).show_ui(ui, |ui| {
                 for (carry, name) in names {
                     ui.selectable_value(&mut finding.carry, carry, name);
                 }
             });
+            combo.response.accessible_name("Tracking");
         })
         .response
         .on_disabled_hover_text("Tracking masks from photo to photo needs SAM 2.");
@@ -86,20 +83,22 @@ fn choose(ui: &mut Ui, models: &[(ModelEntry, ModelState)], finding: &mut FindSe
         ui.end_row();
         ui.weak("Codes");
         let names = [
-            (Lifting::Votes, "of the votes"),
-            (Lifting::Refined, "of the votes, then trained"),
-            (Lifting::Paper, "trained alone, as in the paper"),
+            (Lifting::Votes, "from votes"),
+            (Lifting::Refined, "from votes, then refined"),
+            (Lifting::Paper, "trained only, as in the paper"),
         ];
         let chosen = names.iter().find(|(l, _)| *l == finding.lifting).map_or("", |(_, name)| *name);
-        egui::ComboBox::from_id_salt("lifting").selected_text(chosen).width(180.0).show_ui(ui, |ui| {
+        let combo = egui::ComboBox::from_id_salt("lifting").selected_text(chosen).width(180.0).show_ui(ui, |ui| {
             for (lifting, name) in names {
                 ui.selectable_value(&mut finding.lifting, lifting, name);
             }
         });
+        combo.response.accessible_name("Codes");
         ui.end_row();
         ui.weak("Photos");
-        ui.add(egui::DragValue::new(&mut finding.max_seeds).range(1..=100_000).suffix(" at most"))
-            .on_hover_text("Photos whose masks are used: more are taken where those before leave much unknown.");
+        ui.add(egui::DragValue::new(&mut finding.max_seeds).range(1..=100_000).suffix(" max."))
+            .accessible_name("Photos with masks")
+            .on_hover_text("Upper limit of photos that contribute masks; more are added while much is unlabeled.");
         ui.end_row();
     });
     ui.add_space(4.0);

@@ -128,7 +128,8 @@ impl Tree<'_> {
             state.set_open(true);
         }
         let header = state.show_header(ui, |ui| self.row(ui, id, actions));
-        header.body(|ui| self.branches(ui, Id::unique("pieces").with(id), pieces, actions));
+        let body = header.body(|ui| self.branches(ui, Id::unique("pieces").with(id), pieces, actions));
+        body.0.accessible_name(format!("Parts of {}", self.identities.full_name(id)));
     }
 
     /// Tick, thumbnail, color and name from the left; Gaussians and menu from the right.
@@ -234,7 +235,7 @@ impl Tree<'_> {
                 (Action::Paint(Some(id)), "Paint a new part\u{2026}"),
                 (Action::GoToTarget(id, Side::Best), "Go there"),
                 (Action::Isolate(Some(id)), "Isolate"),
-                (Action::ExportTarget(id), "Export\u{2026}"),
+                (Action::ExportTarget(id), "Export as .ply\u{2026}"),
             ] {
                 if ui.button(text).on_hover_text(action.tooltip()).clicked() {
                     actions.push(action);
@@ -258,8 +259,8 @@ fn show_how_to_begin(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     let why = if state.is_trained() { "Another job is running." } else { "Train the scene first." };
     let button = |text: &str| Button::new(text.to_owned()).min_size(vec2(170.0, 28.0));
     if !has_masks {
-        let text = "No masks came with these photos. Without any, regions of uniform color become objects and parts: \
-                    unnamed and rough.";
+        let text = "These photos came without masks. Regions of uniform color are used instead: rough and \
+                    unnamed.";
         ui.label(RichText::new(text).color(theme::weak()));
     }
     let action = Action::FindObjects;

@@ -25,23 +25,24 @@ impl PhrasesPane {
             ui.vertical(|ui| {
                 ui.set_width(230.0);
                 ui.horizontal(|ui| {
-                    if ui.button("Ask").on_hover_text(Action::RunPhrases(None).tooltip()).clicked() {
+                    if ui.button("Run").on_hover_text(Action::RunPhrases(None).tooltip()).clicked() {
                         actions.push(Action::RunPhrases(None));
                     }
                     ui.selectable_value(&mut self.all_photos, false, "this view");
                     ui.selectable_value(&mut self.all_photos, true, "all photos");
                 });
                 let edit = TextEdit::multiline(&mut self.text)
-                    .hint_text("One phrase a line:\nkettle spout\na button of the red controller")
+                    .hint_text("One phrase per line:\nkettle spout\na button of the red controller")
                     .desired_rows(4)
                     .desired_width(f32::INFINITY);
                 ScrollArea::vertical().id_salt("phrases").max_height(ui.available_height() - 34.0).show(ui, |ui| {
-                    ui.add(edit);
+                    ui.add(edit).accessible_name("Phrases");
                 });
                 ui.horizontal(|ui| {
                     let mask = if comparing { Action::TrueMask(None) } else { Action::ChooseTrueMask };
                     let text = if comparing { "End comparison" } else { "True mask\u{2026}" };
-                    for (action, text) in [(Action::ExportPhrases, "Export masks\u{2026}"), (mask, text)] {
+                    let paint = (Action::PaintTrueMask, "Paint it");
+                    for (action, text) in [(Action::ExportPhrases, "Export\u{2026}"), (mask, text), paint] {
                         if ui.small_button(text).on_hover_text(action.tooltip()).clicked() {
                             actions.push(action);
                         }
@@ -57,7 +58,7 @@ impl PhrasesPane {
 fn show_rows(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     let rows = &state.phrases.rows;
     if rows.is_empty() {
-        ui.weak("Type some phrases and ask: answers, areas and IoU with a true mask are listed here.");
+        ui.weak("Enter phrases and run them: answers, areas and IoU with a true mask appear here.");
         return;
     }
     let found = rows.iter().filter(|r| !r.answer.is_empty()).count();
@@ -75,19 +76,21 @@ fn show_rows(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
             rows.iter().take(SHOWN).for_each(|row| show_row(ui, row, actions));
         });
         if rows.len() > SHOWN {
-            ui.weak(format!("{} more: export them", count((rows.len() - SHOWN) as u64)));
+            ui.weak(format!("{} more rows in the export", count((rows.len() - SHOWN) as u64)));
         }
     });
 }
 
 fn show_row(ui: &mut Ui, row: &PhraseRow, actions: &mut Vec<Action>) {
     ui.weak(&row.view);
-    if ui.link(&row.phrase).on_hover_text("Query it in the view").clicked() {
+    let [red, green, blue] = row.color;
+    let phrase = RichText::new(&row.phrase).color(egui::Color32::from_rgb(red, green, blue));
+    if ui.link(phrase).on_hover_text("Query it in the view").clicked() {
         actions.push(Action::Ask(row.phrase.clone()));
     }
     ui.label(if row.answer.is_empty() { row.verdict } else { &row.answer });
     ui.weak(if row.answer.is_empty() { "" } else { row.certainty });
-    ui.label(format!("{:.2}", row.score)).on_hover_text(format!("{:.2} over the next", row.margin));
+    ui.label(format!("{:.2}", row.score)).on_hover_text(format!("margin {:.2}", row.margin));
     let share = format!("{:.2} % of the view", 100.0 * row.share);
     ui.label(format!("{} px", count(row.area_px as u64))).on_hover_text(share);
     ui.label(row.iou.map_or_else(String::new, |v| format!("{v:.3}")));

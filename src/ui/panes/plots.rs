@@ -31,7 +31,7 @@ pub(crate) fn show(
     ui.horizontal(|ui| {
         let id = ui.label("Smoothing").id;
         ui.add(Slider::new(&mut settings.smoothing, 0.0..=20.0).suffix(" %").fixed_decimals(0)).labelled_by(id);
-        ui.checkbox(&mut settings.log, "Log loss");
+        ui.checkbox(&mut settings.log, "Log-scale loss");
     });
     let PlotSettings { smoothing, log, .. } = *settings;
     let smooth = |points: &[[f64; 2]]| smooth(points, smoothing);
@@ -49,7 +49,7 @@ pub(crate) fn show(
     let dashed = |name: &str, points: &[[f64; 2]]| {
         Line::new(name, smooth(points)).color(theme::weak()).width(1.2).style(LineStyle::dashed_loose())
     };
-    plot("psnr", "PSNR (dB)", *axis)
+    let psnr_plot = plot("psnr", "PSNR (dB)", *axis)
         .legend(Legend::default().position(egui_plot::Corner::RightBottom).background_alpha(0.5))
         .show(ui, |p| {
             let colors = [theme::warning(), theme::good()].into_iter().cycle();
@@ -57,10 +57,10 @@ pub(crate) fn show(
                 p.line(Line::new(name.clone(), PlotPoints::from(curve.clone())).color(color).width(1.2));
             }
             if before {
-                p.line(dashed("training before", &psnr(previous)));
+                p.line(dashed("training photos (previous run)", &psnr(previous)));
                 let held = PlotPoints::from(held(previous));
                 p.line(
-                    Line::new("held-out before", held)
+                    Line::new("held-out photos (previous run)", held)
                         .color(theme::warning())
                         .width(1.4)
                         .style(LineStyle::dashed_loose()),
@@ -76,18 +76,20 @@ pub(crate) fn show(
                     .color(theme::accent()),
             );
         });
+    psnr_plot.response.accessible_name("Plot of PSNR");
     theme::section(ui, "Loss (L1 + 0.2 D-SSIM)");
     let loss_plot = plot("loss", if log { "log10 loss" } else { "Loss" }, *axis);
     let loss_plot = match log {
         true => loss_plot.y_axis_formatter(|mark, _| format!("{:.2e}", 10_f64.powf(mark.value))),
         false => loss_plot.include_y(0.0),
     };
-    loss_plot.show(ui, |p| {
+    let loss_plot = loss_plot.show(ui, |p| {
         if before {
             p.line(dashed("before", &loss(previous)));
         }
         p.line(Line::new("loss", smooth(&loss(history))).color(theme::accent()).width(1.5));
     });
+    loss_plot.response.accessible_name("Plot of the loss");
 }
 
 fn plot(name: &'static str, quantity: &'static str, axis: PlotAxis) -> Plot<'static> {

@@ -13,18 +13,19 @@ pub(crate) fn show(ui: &mut Ui, state: &mut AppState) {
     if state.problems.is_empty() {
         return;
     }
-    let bar = Frame::new().fill(theme::warning().gamma_multiply(0.16)).inner_margin(Margin::symmetric(10, 6));
+    let bar =
+        Frame::new().fill(theme::panel().lerp_to_gamma(theme::warning(), 0.16)).inner_margin(Margin::symmetric(10, 6));
     let mut dismissed = None;
     Panel::top("problems").frame(bar).show(ui, |ui| {
         for (i, (_, text)) in state.problems.iter().enumerate().take(MOST) {
             ui.horizontal(|ui| {
                 theme::mark(ui, Tone::Warning, 18.0);
-                let width = ui.available_width() - 90.0;
-                ui.allocate_ui(egui::vec2(width, 0.0), |ui| ui.add(egui::Label::new(text).wrap()));
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                     if ui.add(Button::new("Dismiss").small()).clicked() {
                         dismissed = Some(i);
                     }
+                    let rest = egui::Layout::left_to_right(egui::Align::Center);
+                    ui.with_layout(rest, |ui| ui.add(egui::Label::new(text).wrap()));
                 });
             });
         }

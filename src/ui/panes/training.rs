@@ -88,7 +88,7 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
             config.max_side_px = side;
         }
         ui.end_row();
-        let id = label(ui, "Color", "Highest spherical-harmonics degree: 0 is the same color from everywhere.");
+        let id = label(ui, "Color", "Highest spherical-harmonics degree; 0 = view-independent color.");
         ui.add(Slider::new(&mut config.sh_degree, 0..=3).prefix("SH degree ")).labelled_by(id);
         ui.end_row();
         let id = label(ui, "Holdout", "Photos kept for evaluation. Datasets that mark test photos use those.");
@@ -99,11 +99,12 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
         ui.add(DragValue::new(&mut config.holdout_every).range(0..=100).speed(0.1).custom_formatter(shown))
             .labelled_by(id);
         ui.end_row();
-        let id = label(ui, "Gaussians", "Adds Gaussians where detail is missing and removes idle ones.");
+        let id =
+            label(ui, "Gaussians", "Adds Gaussians where detail is missing; removes transparent and oversized ones.");
         ui.checkbox(&mut config.densify, "densify and prune").labelled_by(id);
         ui.end_row();
     });
-    ui.collapsing("More", |ui| {
+    ui.collapsing("Advanced", |ui| {
         ui.checkbox(&mut config.antialias, "Anti-aliasing (2-D filter of Mip-Splatting)");
         let mut limited = config.max_gaussians.is_some();
         ui.horizontal(|ui| {
@@ -130,7 +131,7 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
             if ui.button("Copy settings as TOML").on_hover_text(tip).clicked() {
                 ui.ctx().copy_text(presets::text(config));
             }
-            if ui.button("Defaults").on_hover_text("Set every training setting back.").clicked() {
+            if ui.button("Defaults").on_hover_text("Reset all training settings.").clicked() {
                 *config = Layout::default().config;
             }
         });

@@ -15,7 +15,7 @@ pub(crate) fn show(ctx: &egui::Context, photos: &Unposed, actions: &mut Vec<Acti
         ui.heading(format!("{} photos, no camera poses", photos.photos.len()));
         ui.weak(text::path(&photos.images));
         ui.add_space(6.0);
-        ui.label("Training needs to know from where each photo was taken. COLMAP finds that from the photos alone.");
+        ui.label("Training needs the camera pose of every photo. COLMAP estimates poses from the photos alone.");
         ui.add_space(10.0);
         let mut stays = true;
         let tools = PoseTools::installed();
@@ -25,9 +25,7 @@ pub(crate) fn show(ctx: &egui::Context, photos: &Unposed, actions: &mut Vec<Acti
                 actions.push(Action::FindPoses(Box::new(photos.clone())));
                 stays = false;
             }
-            ui.weak(
-                "Minutes for a hundred photos; can be canceled and goes on where it was. The photos stay as they are.",
-            );
+            ui.weak("Takes minutes per hundred photos; can be canceled and resumed. The photos are not changed.");
         }
         let commands = poses::commands(photos);
         let list = |ui: &mut egui::Ui| {
@@ -47,9 +45,9 @@ pub(crate) fn show(ctx: &egui::Context, photos: &Unposed, actions: &mut Vec<Acti
         };
         ui.add_space(6.0);
         if tools.is_some() {
-            ui.collapsing("By hand", list);
+            ui.collapsing("Manually", list);
         } else {
-            ui.label("It is not installed here (no 'colmap' on the PATH). Install it from colmap.github.io, then run:");
+            ui.label("COLMAP is not installed (no 'colmap' on the PATH). Install it from colmap.github.io, then run:");
             list(ui);
         }
         ui.add_space(10.0);

@@ -136,7 +136,7 @@ fn long_histories_are_thinned_and_keep_their_ends() {
 }
 
 #[test]
-fn reports_are_shown_and_compared_and_a_cancelled_measurement_is_read() {
+fn reports_are_shown_and_compared_and_a_canceled_measurement_is_read() {
     use crate::measure::{Computer, Report, VERSION};
     let read = |scene: &str, second| {
         let computer = Computer::default();

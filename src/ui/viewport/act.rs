@@ -2,12 +2,14 @@
 
 use glam::DVec3;
 
-use super::brush::Brush;
+use super::brush::{Brush, Purpose};
 use super::eye::Eye;
+use super::inspector::Inspector;
 use super::photo::PhotoView;
 use super::ruler::Ruler;
 use super::{AppState, OpenedScene, Viewport};
 use crate::navigate::Pose;
+use crate::scene::CropBox;
 use crate::ui::actions::Action;
 use crate::worker::Worker;
 
@@ -23,7 +25,10 @@ impl Viewport {
                 let selected = self.selected_bounds(state.semantics.as_ref());
                 self.eye.frame(selected.as_ref().unwrap_or(&scene.home.bounds));
             }
-            Action::Paint(of) => self.brush = of.filter(|_| state.semantics.is_some()).map(Brush::new),
+            Action::Paint(of) => {
+                self.brush = of.filter(|_| state.semantics.is_some()).map(|of| Brush::new(Purpose::Piece(of)));
+            }
+            Action::PaintTrueMask => self.brush = all.map(|_| Brush::new(Purpose::TrueMask)),
             Action::Select(id) => return self.picking.select(*id),
             Action::Isolate(only) => return all.map_or((), |all| self.visibility.isolate(all, *only)),
             Action::Hide(id) => return all.map_or((), |all| self.visibility.toggle(all, *id)),
@@ -31,10 +36,8 @@ impl Viewport {
                 self.photo = None;
                 self.eye = Eye::home(&scene.home, self.up);
             }
-            Action::Measure => {
-                self.ruler = if self.ruler.is_some() { None } else { Some(Ruler::default()) };
-                return;
-            }
+            Action::Measure | Action::Crop | Action::Inspect => return self.toggle_tool(action, &scene),
+            Action::SetCrop(crop) => return self.visibility.set_crop(*crop),
             Action::TurnUp(axis) => self.turn_up(axis.vector()),
             Action::SetUp(up) => self.turn_up(*up),
             Action::NextPhoto if photos > 0 => self.look_through(here.map_or(0, |i| (i + 1) % photos), &scene, worker),
@@ -45,6 +48,34 @@ impl Viewport {
             _ => return,
         }
         self.moved_at = now;
+    }
+
+    /// Which action ends the tool that is in use.
+    pub(crate) fn tool(&self) -> Option<Action> {
+        let tools = [
+            (self.brush.is_some(), Action::Paint(None)),
+            (self.ruler.is_some(), Action::Measure),
+            (self.cropping, Action::Crop),
+            (self.inspector.is_some(), Action::Inspect),
+        ];
+        tools.into_iter().find(|(used, _)| *used).map(|(_, action)| action)
+    }
+
+    /// Takes up a tool in place of the one in use, or puts it away.
+    fn toggle_tool(&mut self, action: &Action, scene: &OpenedScene) {
+        let begins = self.tool().as_ref() != Some(action);
+        (self.ruler, self.cropping, self.inspector) = (None, false, None);
+        match action {
+            _ if !begins => {}
+            Action::Measure => self.ruler = Some(Ruler::default()),
+            Action::Inspect => self.inspector = Some(Inspector::default()),
+            _ => {
+                self.cropping = true;
+                let crop = self.visibility.crop();
+                let all = CropBox { bounds: scene.home.bounds, outside: false };
+                self.visibility.set_crop(Some(crop.unwrap_or(all)));
+            }
+        }
     }
 
     fn look_through(&mut self, index: usize, scene: &OpenedScene, worker: &Worker) {

@@ -1,5 +1,7 @@
 //! Marking a new piece by hand: dragging paints, a click takes what has the same color around it.
 
+use std::sync::Arc;
+
 use egui::{Align2, Area, Color32, ColorImage, Id, Order, Rect, Slider, TextEdit, TextureHandle, TextureOptions, Ui};
 
 use super::super::state::AppState;
@@ -17,10 +19,18 @@ const SAME_COLOR: u8 = 14;
 /// Color of the paint: nothing in a scene is likely to have it.
 const PAINT: [u8; 3] = [255, 60, 200];
 
+/// What the paint is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Purpose {
+    /// A new piece of an identity; of no one, an object.
+    Piece(IdentityId),
+    /// What answers are compared with in this view.
+    TrueMask,
+}
+
 /// What is being marked.
 pub(crate) struct Brush {
-    /// Whose piece it will be; of no one, an object.
-    pub(crate) of: IdentityId,
+    pub(crate) purpose: Purpose,
     name: String,
     radius_px: f32,
     /// The view that is painted on.
@@ -31,23 +41,25 @@ pub(crate) struct Brush {
 }
 
 impl Brush {
-    /// An empty brush for a piece of `of`.
-    pub(crate) fn new(of: IdentityId) -> Self {
+    /// An empty brush.
+    pub(crate) fn new(purpose: Purpose) -> Self {
         let mask = Mask::empty(0, 0);
-        Self { of, name: String::new(), radius_px: 12.0, camera: None, mask, changed: false, texture: None }
+        Self { purpose, name: String::new(), radius_px: 12.0, camera: None, mask, changed: false, texture: None }
     }
 
-    /// Starts over if the view has changed: paint lies on one view.
-    pub(crate) fn on_view(&mut self, camera: &Camera) {
+    /// Starts over if the view has changed, with what is known of it already: paint lies on one view.
+    pub(crate) fn on_view(&mut self, camera: &Camera, known: Option<&Mask>) {
         if self.camera.as_ref() != Some(camera) {
-            self.mask = Mask::empty(camera.width_px as usize, camera.height_px as usize);
+            let (width_px, height_px) = (camera.width_px as usize, camera.height_px as usize);
+            self.mask = known.map_or_else(|| Mask::empty(width_px, height_px), |m| m.resized(width_px, height_px));
             self.camera = Some(camera.clone());
             self.changed = true;
         }
     }
 
-    /// Paints a dab around a pixel.
-    pub(crate) fn dab(&mut self, at: [f32; 2], scale: f32) {
+    /// Paints a dab around a pixel, or erases one.
+    pub(crate) fn dab(&mut self, at: [f32; 2], scale: f32, erase: bool) {
+        let mut dab = Mask::empty(self.mask.width_px(), self.mask.height_px());
         let (w, h) = (self.mask.width_px() as i64, self.mask.height_px() as i64);
         let r = (self.radius_px * scale).max(1.0);
         let reach = r.ceil() as i64;
@@ -55,23 +67,41 @@ impl Brush {
         for y in (cy - reach).max(0)..(cy + reach + 1).min(h) {
             for x in (cx - reach).max(0)..(cx + reach + 1).min(w) {
                 if ((x - cx).pow(2) + (y - cy).pow(2)) as f32 <= r * r {
-                    self.mask.insert((y * w + x) as usize);
+                    dab.insert((y * w + x) as usize);
                 }
             }
+        }
+        self.take(&dab, erase);
+    }
+
+    fn take(&mut self, pixels: &Mask, erase: bool) {
+        if erase {
+            self.mask.subtract(pixels)
+        } else {
+            self.mask.add(pixels)
         }
         self.changed = true;
     }
 
-    /// Marks what hangs together with a pixel in color and belongs to the same whole.
-    pub(crate) fn flood(&mut self, at: [usize; 2], rgb: &[[u8; 3]], map: &ViewMap, identities: &Identities) {
+    /// Marks what hangs together with a pixel in color and belongs to the same whole, or erases it.
+    pub(crate) fn flood(
+        &mut self,
+        at: [usize; 2],
+        rgb: &[[u8; 3]],
+        (map, identities): (&ViewMap, &Identities),
+        erase: bool,
+    ) {
         let (w, h) = (self.mask.width_px(), self.mask.height_px());
         if rgb.len() != w * h || map.identity.len() != w * h || at[0] >= w || at[1] >= h {
             return;
         }
-        let inside = identities.descendants(self.of);
-        let mine = |i: usize| {
-            let id = map.identity[i];
-            if self.of == NOBODY { id == NOBODY } else { inside.get(id as usize) == Some(&true) }
+        let inside = match self.purpose {
+            Purpose::Piece(of) if of != NOBODY => Some(identities.descendants(of)),
+            _ => None,
+        };
+        let mine = |i: usize| match &inside {
+            Some(inside) => inside.get(map.identity[i] as usize) == Some(&true),
+            None => self.purpose == Purpose::TrueMask || map.identity[i] == NOBODY,
         };
         let first = at[1] * w + at[0];
         let alike = |a: usize, b: usize| rgb[a].iter().zip(rgb[b]).all(|(a, b)| a.abs_diff(b) <= SAME_COLOR);
@@ -88,12 +118,11 @@ impl Brush {
             seen.insert(i);
             open.extend(neighbors(i, w, w * h).filter(|j| alike(i, *j)));
         }
-        self.mask.add(&seen);
-        self.changed = true;
+        self.take(&seen, erase);
     }
 
-    /// The paint, over the frame in `rect`.
-    pub(crate) fn paint(&mut self, ui: &Ui, rect: Rect) {
+    /// The paint, over the frame in `rect`. A true mask not `plainly`: hits and misses are drawn instead.
+    pub(crate) fn paint(&mut self, ui: &Ui, rect: Rect, plainly: bool) {
         if std::mem::take(&mut self.changed) {
             let size = [self.mask.width_px(), self.mask.height_px()];
             let pixel = |i| {
@@ -109,7 +138,9 @@ impl Brush {
                 None => self.texture = Some(ui.ctx().load_texture("paint", image, TextureOptions::LINEAR)),
             }
         }
-        if let Some(texture) = self.texture.as_ref().filter(|_| !self.mask.is_empty()) {
+        if let Some(texture) =
+            self.texture.as_ref().filter(|_| !self.mask.is_empty() && (plainly || self.purpose != Purpose::TrueMask))
+        {
             let uv = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
             ui.painter().image(texture.id(), rect, uv, Color32::WHITE);
         }
@@ -124,14 +155,25 @@ impl Brush {
         area.show(ui.ctx(), |ui| {
             theme::overlay().show(ui, |ui| {
                 ui.set_width(430.0);
-                let what = match self.of {
-                    NOBODY => "a new object".to_owned(),
-                    of => format!("a new part of the {}", identities.full_name(of)),
+                let what = match self.purpose {
+                    Purpose::Piece(NOBODY) => "a new object".to_owned(),
+                    Purpose::Piece(of) => format!("a new part of the {}", identities.full_name(of)),
+                    Purpose::TrueMask => "the true mask of this view".to_owned(),
                 };
                 ui.label(format!("Paint {what}: drag to paint, click to select what has the same color."));
-                ui.weak("Right-drag and the wheel move the view; moving it clears what was painted.");
+                ui.weak("Shift erases. Right-drag and wheel move the view; the paint belongs to this one.");
                 ui.horizontal(|ui| {
-                    ui.add(TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80).desired_width(120.0));
+                    if self.purpose == Purpose::TrueMask {
+                        ui.add(Slider::new(&mut self.radius_px, 2.0..=60.0).show_value(false).text("brush"));
+                        self.true_mask_buttons(ui, actions);
+                    }
+                });
+                if self.purpose == Purpose::TrueMask {
+                    return;
+                }
+                ui.horizontal(|ui| {
+                    let name = TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80);
+                    ui.add(name.desired_width(120.0)).accessible_name("Name of what is painted");
                     ui.add(Slider::new(&mut self.radius_px, 2.0..=60.0).show_value(false).text("brush"));
                 });
                 ui.horizontal(|ui| {
@@ -150,34 +192,59 @@ impl Brush {
         });
     }
 
+    fn true_mask_buttons(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
+        let ready = !self.mask.is_empty();
+        if ui.add_enabled(ready, egui::Button::new("Save\u{2026}")).clicked() {
+            actions.push(Action::SaveTrueMask);
+        }
+        if ui.button("Clear").clicked() {
+            self.camera = None;
+            actions.push(Action::TrueMask(None));
+        }
+        if ui.button("Done").clicked() {
+            actions.push(Action::Paint(None));
+        }
+    }
+
     /// The edit that adds what is marked; `None` if nothing is.
     pub(crate) fn request(&self) -> Option<EditRequest> {
+        let Purpose::Piece(of) = self.purpose else { return None };
         let camera = self.camera.clone().filter(|_| !self.mask.is_empty())?;
-        let (of, name, mask) = (self.of, self.name.trim().to_owned(), self.mask.clone());
+        let (name, mask) = (self.name.trim().to_owned(), self.mask.clone());
         Some(EditRequest::Paint { of, name, camera: Box::new(camera), mask })
     }
 }
 
 impl Viewport {
-    /// Paints where the pointer drags, floods where it clicks.
+    /// Paints where the pointer drags, floods where it clicks; erases with Shift.
     pub(super) fn use_brush(&mut self, response: &egui::Response, rect: Rect, state: &AppState) {
         let (Some(brush), Some(picture)) = (&mut self.brush, self.display.picture()) else { return };
         let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
-        // Only a full frame has the pixels that the maps have.
-        if !picture.full {
+        // Only a full frame has the pixels that the maps have, and one that is late is not what the eye sees.
+        if !picture.full || picture.ticket != self.requests.ticket() {
             return;
         }
-        brush.on_view(&picture.camera);
+        let is_true = brush.purpose == Purpose::TrueMask;
+        brush.on_view(&picture.camera, self.queries.truth().filter(|_| is_true).as_deref());
         let Some(pos) = response.interact_pointer_pos() else { return };
         let scale = picture.camera.width_px as f32 / shown.width();
         let at = [(pos.x - shown.left()) * scale, (pos.y - shown.top()) * scale];
+        let erase = response.ctx.input(|i| i.modifiers.shift);
         if response.dragged_by(egui::PointerButton::Primary) {
-            brush.dab(at, scale);
+            brush.dab(at, scale, erase);
         } else if response.clicked()
             && let (Some(maps), Some(semantics)) = (self.queries.maps(), &state.semantics)
             && at.iter().all(|v| *v >= 0.0)
         {
-            brush.flood([at[0] as usize, at[1] as usize], &picture.rgb, &maps.identities, &semantics.identities);
+            let known = (&maps.identities, &semantics.identities);
+            brush.flood([at[0] as usize, at[1] as usize], &picture.rgb, known, erase);
+        } else {
+            return;
+        }
+        if is_true {
+            let mask = Arc::new(brush.mask.clone());
+            let pose = self.pose();
+            self.queries.compare_with(Some((mask, pose)));
         }
     }
 }
@@ -196,16 +263,36 @@ mod tests {
         let identity = (0..100).map(|i| if i % 10 < 8 { doll } else { NOBODY }).collect();
         let map = ViewMap::certain(10, identity);
         let rgb: Vec<[u8; 3]> = (0..100).map(|i| if i % 10 >= 4 { [200, 0, 0] } else { [0, 0, 200] }).collect();
-        let mut brush = Brush::new(doll);
-        brush.on_view(&camera);
+        let mut brush = Brush::new(Purpose::Piece(doll));
+        brush.on_view(&camera, None);
         assert!(brush.request().is_none());
-        brush.flood([5, 5], &rgb, &map, &all);
+        brush.flood([5, 5], &rgb, (&map, &all), false);
         assert_eq!(brush.mask.area(), 40, "columns 4 to 7");
-        brush.dab([1.0, 1.0], 0.1);
+        brush.dab([1.0, 1.0], 0.1, false);
         assert!(brush.mask.contains(11) && brush.mask.area() < 50);
         assert!(matches!(brush.request(), Some(EditRequest::Paint { of, .. }) if of == doll));
         // Another view: the paint is gone.
-        brush.on_view(&camera.resized(12, 12));
+        brush.on_view(&camera.resized(12, 12), None);
         assert!(brush.mask.is_empty());
+    }
+
+    #[test]
+    fn a_true_mask_is_erased_taken_up_again_and_no_piece() {
+        let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 10, 10).expect("valid");
+        let map = ViewMap::certain(10, vec![NOBODY; 100]);
+        let rgb: Vec<[u8; 3]> = (0..100).map(|i| if i % 10 >= 4 { [200, 0, 0] } else { [0, 0, 200] }).collect();
+        let mut brush = Brush::new(Purpose::TrueMask);
+        brush.on_view(&camera, None);
+        brush.flood([5, 5], &rgb, (&map, &Identities::default()), false);
+        let before = brush.mask.area();
+        brush.dab([7.0, 7.0], 0.1, true);
+        assert!(before == 60 && brush.mask.area() < before && brush.request().is_none());
+        let known = brush.mask.clone();
+        brush.on_view(&camera.resized(12, 12), None);
+        assert!(brush.mask.is_empty());
+        brush.on_view(&camera, Some(&known));
+        assert_eq!(brush.mask, known, "back again");
+        brush.flood([5, 5], &rgb, (&map, &Identities::default()), true);
+        assert!(brush.mask.area() < known.area());
     }
 }

@@ -1,5 +1,6 @@
 //! The newest frame on screen: taken from where it is published, uploaded, painted and picked from.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -14,11 +15,16 @@ use crate::scene::resource_log::{self, ResourceKind};
 use crate::worker::view::{MappedView, ViewPicture, ViewResult};
 use crate::worker::{Failure, Slot, Versioned};
 
+/// Over so many seconds frames are counted.
+const RATE_SECS: f64 = 2.0;
+
 /// What is on screen.
 #[derive(Default)]
 pub(super) struct Display {
     picture: Option<Arc<ViewPicture>>,
     texture: Option<TextureHandle>,
+    /// What the second view shows, where that is something else.
+    second: Option<TextureHandle>,
     error: Option<String>,
     /// Why it is not known what the pixels of this view belong to.
     unmapped: Option<String>,
@@ -32,6 +38,8 @@ pub(super) struct Display {
     mapped: u64,
     /// Times of the newest frames, while they are shown.
     times: Option<FrameTimes>,
+    /// When frames came lately, in window time.
+    arrivals: VecDeque<f64>,
 }
 
 impl Display {
@@ -51,7 +59,7 @@ impl Display {
 
     /// Forgets the frame of another scene.
     pub(super) fn clear(&mut self) {
-        (self.picture, self.texture, self.error, self.unmapped) = (None, None, None, None);
+        (self.picture, self.texture, self.second, self.error, self.unmapped) = (None, None, None, None, None);
     }
 
     /// Forgets why there are no maps: the view is another.
@@ -91,12 +99,14 @@ impl Display {
         };
         let start = Instant::now();
         let size = [picture.camera.width_px as usize, picture.camera.height_px as usize];
-        let pixels = picture.rgb.iter().map(|&[r, g, b]| Color32::from_rgb(r, g, b)).collect();
-        let image = ColorImage::new(size, pixels);
-        match &mut self.texture {
-            Some(texture) => texture.set(image, TextureOptions::LINEAR),
-            None => self.texture = Some(ctx.load_texture("viewport", image, TextureOptions::LINEAR)),
+        upload(ctx, &mut self.texture, size, &picture.rgb);
+        match &picture.second {
+            Some(second) => upload(ctx, &mut self.second, size, &second.rgb),
+            None => self.second = None,
         }
+        let now = ctx.input(|i| i.time);
+        self.arrivals.retain(|at| now - at < RATE_SECS);
+        self.arrivals.push_back(now);
         if self.picture.is_none() {
             resource_log::record(ResourceKind::Picture, "first frame", "the scene is on screen", 0);
         }
@@ -105,6 +115,14 @@ impl Display {
         }
         self.picture = Some(Arc::clone(picture));
         self.error = None;
+    }
+
+    /// Frames per second lately, if there were enough.
+    pub(super) fn rate(&self, now: f64) -> Option<f64> {
+        let first = self.arrivals.iter().find(|at| now - **at < RATE_SECS)?;
+        let frames = self.arrivals.iter().filter(|at| *at > first).count();
+        let secs = self.arrivals.back()? - first;
+        (secs > 0.0).then(|| frames as f64 / secs)
     }
 
     /// What the pixels belong to, if that has come since, and whether the view rests: then maps of an earlier request
@@ -125,13 +143,13 @@ impl Display {
         None
     }
 
-    /// Paints the frame into `shown`, a part of the viewport's `rect`.
-    pub(super) fn paint(&self, ui: &Ui, rect: Rect, shown: Rect) {
+    /// Paints the frame into `shown`, a part of the view's `rect`; the first or the second view.
+    pub(super) fn paint(&self, ui: &Ui, (rect, shown): (Rect, Rect), second: bool) {
         // Filling what the frame covers anyway would be a fifth of a redraw on an emulated adapter.
         if self.texture.is_none() || shown != rect {
             ui.painter().rect_filled(rect, 0.0, theme::canvas());
         }
-        if let Some(texture) = &self.texture {
+        if let Some(texture) = self.second.as_ref().filter(|_| second).or(self.texture.as_ref()) {
             let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
             ui.painter().image(texture.id(), shown, uv, Color32::WHITE);
         }
@@ -149,6 +167,16 @@ impl Display {
         let index = px.y as usize * picture.camera.width_px as usize + px.x as usize;
         let depth = f64::from(*picture.median_depth.as_ref()?.get(index)?);
         (depth > 0.0).then(|| picture.camera.center + picture.camera.ray(at * size) * depth)
+    }
+}
+
+/// Pixels as a texture.
+fn upload(ctx: &egui::Context, texture: &mut Option<TextureHandle>, size: [usize; 2], rgb: &[[u8; 3]]) {
+    let pixels = rgb.iter().map(|&[r, g, b]| Color32::from_rgb(r, g, b)).collect();
+    let image = ColorImage::new(size, pixels);
+    match texture {
+        Some(texture) => texture.set(image, TextureOptions::LINEAR),
+        None => *texture = Some(ctx.load_texture("viewport", image, TextureOptions::LINEAR)),
     }
 }
 
@@ -174,6 +202,7 @@ mod tests {
             median_depth: Some(depth),
             depth_range: None,
             psnr: None,
+            second: None,
             secs: 0.1,
             stages: Vec::new(),
             paint_secs: 0.0,
@@ -210,6 +239,16 @@ mod tests {
         assert!(display.picture().is_some(), "the last frame stays");
         display.clear();
         assert!(display.picture().is_none() && display.errors().next().is_none());
+    }
+
+    #[test]
+    fn the_rate_is_that_of_the_last_seconds() {
+        let mut display = Display { arrivals: [1.0, 1.1, 1.2, 1.3].into(), ..Display::default() };
+        assert!(display.rate(1.35).is_some_and(|fps| (fps - 10.0).abs() < 1e-9));
+        assert!(display.rate(3.15).is_some_and(|fps| (fps - 10.0).abs() < 1e-9), "of those that are no older");
+        assert_eq!(display.rate(3.25), None, "a single frame has no rate");
+        display.arrivals.clear();
+        assert_eq!(display.rate(1.0), None);
     }
 
     #[test]

@@ -33,8 +33,8 @@ impl FrameTimes {
         let mut stages = picture.stages.clone();
         // Waiting for the device and copying are in the whole, but in no stage.
         let known: f64 = stages.iter().map(|s| s.1).sum();
-        stages.push((if self.has_stages { "rest of rendering" } else { "draw" }, (picture.secs - known).max(0.0)));
-        stages.extend([("to 8 bits", picture.paint_secs), ("upload", upload_secs)]);
+        stages.push((if self.has_stages { "other rendering" } else { "draw" }, (picture.secs - known).max(0.0)));
+        stages.extend([("8-bit conversion", picture.paint_secs), ("upload", upload_secs)]);
         stages.push(("total", picture.secs + picture.paint_secs + upload_secs));
         push(&mut self.frames, stages);
     }
@@ -81,7 +81,7 @@ impl FrameTimes {
                 }
             });
             if !self.has_stages {
-                ui.label(small("This device reports no stages, only the total.").color(theme::warning()));
+                ui.label(small("This device reports only the total.").color(theme::warning()));
             }
         });
     }
@@ -109,6 +109,7 @@ mod tests {
             median_depth: None,
             depth_range: None,
             psnr: None,
+            second: None,
             secs: 0.5 + blend,
             stages: if stages { vec![("project", 0.25), ("blend", blend)] } else { Vec::new() },
             paint_secs: 0.125,
@@ -125,7 +126,7 @@ mod tests {
         times.add_maps(0.5);
         let row = |name: &str| times.rows().into_iter().find(|r| r.0 == name).map(|r| (r.1, r.2));
         assert_eq!(row("blend"), Some((2.0, 2.0)));
-        assert_eq!(row("rest of rendering"), Some((0.25, 0.25)));
+        assert_eq!(row("other rendering"), Some((0.25, 0.25)));
         assert_eq!(row("total"), Some((2.875, 2.875)));
         assert_eq!(row("feature maps, at rest"), Some((0.5, 0.5)));
         (0..2 * MOST).for_each(|_| times.add(&picture(4.0, false), 0.0));

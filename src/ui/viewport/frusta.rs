@@ -31,7 +31,7 @@ impl Viewport {
         let size = 0.09 * scene.home.bounds.radius();
         let held_out: std::collections::HashSet<usize> =
             dataset.split(layout.config.holdout_every).1.into_iter().collect();
-        let cursor = response.hover_pos();
+        let cursor = response.hover_pos().filter(|pos| rect.contains(*pos));
         let place = |p: DVec2| rect.min + egui::vec2(p.x as f32, p.y as f32);
         let nearest = cursor.and_then(|cursor| {
             let apexes = dataset.photos.iter().enumerate();
@@ -99,7 +99,7 @@ fn draw(painter: &Painter, eye: &Camera, camera: &Camera, size: f64, place: impl
 }
 
 /// The part of a segment in front of the eye, projected; `None` if all of it is behind.
-fn clipped(eye: &Camera, a: DVec3, b: DVec3) -> Option<(DVec2, DVec2)> {
+pub(super) fn clipped(eye: &Camera, a: DVec3, b: DVec3) -> Option<(DVec2, DVec2)> {
     const NEAR: f64 = 1e-3;
     let (za, zb) = (eye.camera_from_world(a).z, eye.camera_from_world(b).z);
     let near = NEAR * za.abs().max(zb.abs());

@@ -24,18 +24,18 @@ pub(super) fn show(ui: &mut Ui, settings: &mut OverlaySettings, depth: Option<(f
         }
         let meaning = match settings.color_by {
             ColorBy::Masks => return,
-            ColorBy::Heat => "Relevancy to the newest query",
+            ColorBy::Heat => "Relevancy to the latest query",
             ColorBy::Objects => "One color per object",
             ColorBy::Parts => "One color per part",
             ColorBy::Codes => "Identity codes as colors",
-            ColorBy::Features => "Embeddings: like colors, like things",
+            ColorBy::Features => "Embeddings: similar colors = similar things",
             ColorBy::Difference => "Where blended codes differ",
         };
         ui.label(RichText::new(meaning).small());
         if settings.color_by == ColorBy::Heat {
             bar(ui, settings.colormap, ["0", "1"].map(String::from));
             ui.add(Slider::new(&mut settings.threshold, 0.0..=1.0).fixed_decimals(2).text("threshold"))
-                .on_hover_text("Outline all pixels of at least this relevancy; 0 = none");
+                .on_hover_text("Outline pixels with at least this relevancy; 0 = off");
         }
         ui.add(Slider::new(&mut settings.opacity, 0.0..=1.0).fixed_decimals(2).text("opacity"));
     });

@@ -117,10 +117,10 @@ impl Viewport {
             let at = match mark(inside as f32 / points.len() as f32, size) {
                 Mark::None => continue,
                 Mark::Arrow => arrow(&painter, shown, way(&eye, &points), color, &name),
-                Mark::Ghost => ghost(&painter, &hull(places), color, &format!("{name}, hidden from here")),
+                Mark::Ghost => ghost(&painter, &hull(places), color, &format!("{name} (occluded)")),
                 Mark::Ring => ring(&painter, middle(&places), color),
             };
-            let button = ui.interact(at, ui.scope_id().with(("mark", id)), Sense::click());
+            let button = ui.interact(at, ui.scope_id().with(("mark", id, self.queries.is_second())), Sense::click());
             button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Fly to {name}")));
             if button.on_hover_text("Click to fly there").on_hover_cursor(egui::CursorIcon::PointingHand).clicked() {
                 actions.push(Action::GoToTarget(id, Side::Best));

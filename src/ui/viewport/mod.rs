@@ -2,11 +2,13 @@
 
 mod act;
 pub(crate) mod brush;
+mod crop;
 mod display;
 pub mod eye;
 pub(crate) mod frame_times;
 mod frusta;
 mod input;
+mod inspector;
 mod legend;
 mod marks;
 mod outline;
@@ -18,6 +20,7 @@ pub(crate) mod query;
 mod request;
 mod route;
 mod ruler;
+mod split;
 pub(crate) mod visible;
 
 use std::sync::Arc;
@@ -28,6 +31,7 @@ use glam::{DVec2, DVec3};
 use self::brush::Brush;
 use self::display::Display;
 use self::eye::Eye;
+use self::inspector::Inspector;
 use self::marks::Marks;
 use self::overrides::RenderOverrides;
 use self::photo::PhotoView;
@@ -35,6 +39,7 @@ use self::picking::Picking;
 use self::query::Queries;
 use self::request::Requests;
 use self::ruler::Ruler;
+use self::split::Views;
 use self::visible::Visibility;
 use super::camera::CameraPane;
 use super::layout::Layout;
@@ -72,6 +77,10 @@ pub struct Viewport {
     marks: Marks,
     /// What is being measured.
     ruler: Option<Ruler>,
+    /// Whether the crop box is on screen, to be changed.
+    cropping: bool,
+    /// What is being inspected.
+    inspector: Option<Inspector>,
     /// What is being marked by hand.
     pub(crate) brush: Option<Brush>,
     /// Render settings in place of the scene's own.
@@ -100,6 +109,8 @@ impl Viewport {
             picking: Picking::default(),
             marks: Marks::default(),
             ruler: None,
+            cropping: false,
+            inspector: None,
             brush: None,
             overrides: RenderOverrides::default(),
             zoom_anchor: None,
@@ -121,11 +132,13 @@ impl Viewport {
         self.photo.as_ref().map(PhotoView::index)
     }
 
-    /// The frame as pixels, for saving.
+    /// The frame as pixels, for saving: that of the view that is worked in.
     pub(crate) fn pixels(&self) -> Option<PhotoPixels> {
         let p = self.picture()?;
         let (width_px, height_px) = (p.camera.width_px, p.camera.height_px);
-        Some(PhotoPixels { width_px, height_px, rgb: p.rgb.clone(), coverage: None })
+        let second = p.second.as_ref().filter(|_| self.queries.is_second());
+        let rgb = second.map_or(&p.rgb, |second| &second.rgb).clone();
+        Some(PhotoPixels { width_px, height_px, rgb, coverage: None })
     }
 
     /// Takes over a new scene, new Gaussians and loaded photos.
@@ -140,7 +153,7 @@ impl Viewport {
             self.queries.clear();
             self.visibility = Visibility::default();
             self.picking = Picking::default();
-            self.ruler = None;
+            (self.ruler, self.cropping, self.inspector) = (None, false, None);
             self.brush = None;
             self.overrides = RenderOverrides::default();
             self.eye = Eye::home(&scene.home, None);
@@ -152,12 +165,15 @@ impl Viewport {
                 self.set_cloud(Some(Arc::clone(cloud)));
             }
         }
+        if let (Some(found), Some(inspector)) = (state.inspected.take(), &mut self.inspector) {
+            inspector.take(found);
+        }
         if let Some(why) = self.display.newly_instead_of_gpu() {
             state.toast(Tone::Warning, why);
         }
         if let Some(why) = self.queries.newly_failed() {
             let remedy = "Install the encoder (Models pane), or find the objects again with another";
-            state.problem(None, &format!("Queries find names only, the text encoder failed: {why}. {remedy}."));
+            state.problem(None, &format!("The text encoder failed, so queries match names only: {why}. {remedy}."));
         }
         if let Some(photo) = &mut self.photo {
             photo.take_loaded(state);
@@ -221,48 +237,90 @@ impl Viewport {
         actions: &mut Vec<Action>,
     ) {
         let Some(scene) = state.scene.clone() else { return };
-        let rect = ui.available_rect_before_wrap();
-        let response = ui.allocate_rect(rect, Sense::click_and_drag());
+        let whole = ui.available_rect_before_wrap();
+        let response = ui.allocate_rect(whole, Sense::click_and_drag());
         response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Viewport"));
+        let views = Views::of(whole, layout.split_view);
+        self.work_where_pressed(ui, &views);
         self.display.time_frames(layout.times);
         self.take_frame(ui.ctx());
         let now = ui.input(|i| i.time);
-        self.use_brush(&response, rect, state);
-        if self.handle_input(ui, &response, rect, &scene) {
+        let under = views.under_pointer(ui);
+        self.use_brush(&response, under, state);
+        if self.handle_input(ui, &response, under, &scene) {
             self.leave_photo();
             self.moved_at = now;
         }
-        let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
+        let shown = self.photo.as_mut().map_or(views.first, |p| p.fit(views.first));
+        // All views have the same size: what is at a place of one is at the same place of the others.
+        let shown_in = |view: Rect| shown.translate(view.min - views.first.min);
         self.request(ui, shown, state, layout, now);
-        self.display.paint(ui, rect, shown);
         if let Some(semantics) = &state.semantics {
             self.queries.keep_up(ui.ctx(), semantics, &state.plan);
             self.queries.stand(self.pose());
-            self.queries.paint(ui, shown, semantics);
         }
-        if let Some(photo) = self.photo.as_mut().filter(|_| layout.compare) {
-            photo.show_split(ui, shown, &mut layout.split);
+        let takes_clicks = self.is_measuring() || self.is_inspecting();
+        let (mut on_camera, mut works_in) = (false, self.queries.is_second());
+        for (second, rect) in views.each() {
+            self.queries.work_in(second);
+            self.display.paint(ui, (rect, shown_in(rect)), second);
+            // Answers are of the scene, not of another one beside it.
+            let is_other = second && state.beside.is_some();
+            if let Some(semantics) = state.semantics.as_ref().filter(|_| !is_other) {
+                let lit = layout.dim.then(|| self.picking.selected().into_iter().collect());
+                self.queries.paint(ui, shown_in(rect), semantics, lit);
+            }
+            if let Some(photo) = self.photo.as_mut().filter(|_| layout.compare && !second) {
+                photo.show_split(ui, shown, &mut layout.split);
+            }
+            on_camera |= layout.cameras
+                && self.photo.is_none()
+                && !takes_clicks
+                && self.show_frusta(ui, rect, &scene, &response, layout, actions);
         }
-        let on_camera =
-            layout.cameras && self.photo.is_none() && self.show_frusta(ui, rect, &scene, &response, layout, actions);
-        let meters = scene.meters_per_unit();
-        self.show_ruler(ui, &response, shown, meters, actions);
-        if let Some(semantics) = state.semantics.as_ref().filter(|_| self.brush.is_none() && !self.is_measuring()) {
-            self.show_picking(ui, &response, shown, (semantics, &state.labels), on_camera, actions);
-            if let Some(cloud) = self.cloud.clone() {
+        let picks = self.brush.is_none() && !takes_clicks;
+        if let Some(semantics) = state.semantics.as_ref().filter(|_| picks) {
+            let is_other = state.beside.is_some() && under != views.first;
+            let maps = self.queries.maps().map(|m| &***m).filter(|_| !on_camera && !is_other);
+            self.picking.update(&response, shown_in(under), (semantics, &state.labels), maps, actions);
+        }
+        self.show_crop(ui, shown, state, actions);
+        self.show_inspector(ui, &response, shown, state, actions);
+        for (second, rect) in views.each() {
+            self.queries.work_in(second);
+            let shown = shown_in(rect);
+            self.show_ruler(ui, &response, shown, scene.meters_per_unit());
+            let is_other = second && state.beside.is_some();
+            if let (Some(semantics), Some(cloud)) = (&state.semantics, self.cloud.clone())
+                && picks
+                && !is_other
+            {
+                if let Some(maps) = self.queries.shown_maps().cloned() {
+                    self.picking.paint(ui, shown, (semantics, &state.labels), &maps);
+                }
                 self.show_marks(ui, shown, &cloud, (semantics, &state.labels), actions);
             }
+            if let Some(pane) = route {
+                self.show_route(ui, rect, pane, state.explored.as_deref());
+            }
+            self.show_overlay(ui, rect, &scene, state, layout, actions);
+            if let (Some(brush), Some(_)) = (&mut self.brush, &state.semantics) {
+                brush.paint(ui, shown, !self.queries.compares());
+            }
+            if let (Some(semantics), Some(cloud)) = (&state.semantics, &self.cloud)
+                && !is_other
+                && self.queries.show(ui, rect, state, semantics, cloud, actions)
+            {
+                works_in = second;
+            }
+            if views.is_split() && works_in == second {
+                split::mark_worked_in(ui, rect);
+            }
         }
-        if let Some(pane) = route {
-            self.show_route(ui, rect, pane, state.explored.as_deref());
-        }
-        self.show_overlay(ui, rect, &scene, state, layout, actions);
+        self.queries.work_in(works_in);
+        self.show_ruler_card(ui, whole, scene.meters_per_unit(), actions);
         if let (Some(brush), Some(semantics)) = (&mut self.brush, &state.semantics) {
-            brush.paint(ui, shown);
-            brush.show(ui, shown, &semantics.identities, actions);
-        }
-        if let (Some(semantics), Some(cloud)) = (&state.semantics, &self.cloud) {
-            self.queries.show(ui, shown, state, semantics, cloud, actions);
+            brush.show(ui, whole, &semantics.identities, actions);
         }
     }
 

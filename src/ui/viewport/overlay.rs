@@ -1,6 +1,6 @@
 //! What lies over the frame: the choice of modes, the photo's name, and facts about the frame.
 
-use egui::{Align2, Area, Id, Order, Rect, RichText, Ui};
+use egui::{Align2, Area, ComboBox, Id, Order, Rect, RichText, Ui};
 use strum::VariantArray;
 
 use super::super::layout::Layout;
@@ -11,37 +11,64 @@ use crate::jobs::OpenedScene;
 use crate::math::format;
 use crate::scene::text;
 use crate::ui::actions::Action;
+use crate::ui::color_by::ColorBy;
 use crate::worker::ViewMode;
+use crate::worker::view::ViewPicture;
+
+/// Views that are less wide than this have menus in place of buttons, points.
+const NARROW: f32 = 480.0;
+
+/// In views that are lower than this are few cards, points.
+const LOW: f32 = 330.0;
+
+/// A card over a view.
+fn card(ui: &Ui, rect: Rect, name: &'static str, (align, down): (Align2, f32), add: impl FnOnce(&mut Ui)) {
+    let at = align.pos_in_rect(&rect.shrink(12.0)) + egui::vec2(0.0, down);
+    let area = Area::new(Id::unique(name)).order(Order::Middle).pivot(align).fixed_pos(at).constrain_to(rect);
+    area.show(ui.ctx(), |ui| theme::overlay().show(ui, |ui| ui.horizontal(|ui| add(ui))));
+}
 
 impl Viewport {
+    /// What lies over the view of the queries that are worked in now.
     pub(super) fn show_overlay(
         &mut self,
         ui: &Ui,
         rect: Rect,
         scene: &OpenedScene,
         state: &AppState,
-        layout: &Layout,
+        layout: &mut Layout,
         actions: &mut Vec<Action>,
     ) {
-        let card = |name: &'static str, align: Align2, down: f32, add: &mut dyn FnMut(&mut Ui)| {
-            let at = align.pos_in_rect(&rect.shrink(12.0)) + egui::vec2(0.0, down);
-            Area::new(Id::unique(name)).order(Order::Middle).pivot(align).fixed_pos(at).constrain_to(rect).show(
-                ui.ctx(),
-                |ui| {
-                    theme::overlay().show(ui, |ui| ui.horizontal(|ui| add(ui)));
-                },
-            );
-        };
+        let second = self.queries.is_second();
         let has_photos = scene.dataset.as_ref().is_some_and(|d| !d.photos.is_empty());
-        card("modes", Align2::LEFT_TOP, 0.0, &mut |ui| self.modes(ui, layout, has_photos, actions));
+        let (modes, legend) = if second { ("second modes", "second legend") } else { ("modes", "legend") };
+        let menus = layout.split_view || rect.width() < NARROW;
+        let is_other = second && state.beside.is_some();
+        card(ui, rect, modes, (Align2::LEFT_TOP, 0.0), |ui| {
+            self.modes(ui, layout, (menus, is_other), has_photos, actions);
+        });
+        let beside = |p: &ViewPicture| p.second.as_ref().filter(|_| second).map(|other| other.depth_range);
+        let depth = self.picture().and_then(|p| beside(p).unwrap_or(p.depth_range));
+        if legend::is_needed(self.queries.settings(), depth) && rect.height() > LOW && !is_other {
+            card(ui, rect, legend, (Align2::RIGHT_BOTTOM, 0.0), |ui| legend::show(ui, self.queries.settings(), depth));
+        }
+        if second {
+            if let Some(beside) = &state.beside {
+                card(ui, rect, "beside", (Align2::RIGHT_TOP, 0.0), |ui| self.beside_bar(ui, &beside.name, actions));
+            }
+            return;
+        }
         if has_photos {
             // Beside the modes where there is room and no query box, else below them.
             let beside = rect.width() > 860.0 && state.semantics.is_none();
             let (align, down) = if beside { (Align2::RIGHT_TOP, 0.0) } else { (Align2::LEFT_TOP, 46.0) };
-            card("photo", align, down, &mut |ui| self.photo_bar(ui, scene, layout, actions));
+            card(ui, rect, "photo", (align, down), |ui| self.photo_bar(ui, scene, layout, actions));
         }
-        if let Some(facts) = self.facts(layout, state) {
-            card("facts", Align2::LEFT_BOTTOM, 0.0, &mut |ui| {
+        let now = ui.input(|i| i.time);
+        let rate = self.display.rate(now).filter(|_| self.moves(now)).map(rate_text);
+        let facts = if rect.height() > LOW { self.facts(layout, state, rate) } else { rate };
+        if let Some(facts) = facts {
+            card(ui, rect, "facts", (Align2::LEFT_BOTTOM, 0.0), |ui| {
                 ui.label(RichText::new(&facts).small().color(theme::weak()));
                 if let Some(words) = self.overrides.words() {
                     ui.label(RichText::new(format!("rendered with {words}")).small().color(theme::warning()));
@@ -52,16 +79,12 @@ impl Viewport {
                 }
             });
         }
-        let depth = self.picture().and_then(|p| p.depth_range);
-        if legend::is_needed(self.queries.settings(), depth) && rect.height() > 330.0 {
-            card("legend", Align2::RIGHT_BOTTOM, 0.0, &mut |ui| legend::show(ui, self.queries.settings(), depth));
-        }
         // A small view is for the frame.
-        if let Some(times) = self.display.times().filter(|_| rect.height() > 330.0) {
-            card("times", Align2::LEFT_BOTTOM, -46.0, &mut |ui| times.show(ui));
+        if let Some(times) = self.display.times().filter(|_| rect.height() > LOW) {
+            card(ui, rect, "times", (Align2::LEFT_BOTTOM, -46.0), |ui| times.show(ui));
         }
         if self.display.errors().next().is_some() {
-            card("view error", Align2::CENTER_CENTER, 0.0, &mut |ui| {
+            card(ui, rect, "view error", (Align2::CENTER_CENTER, 0.0), |ui| {
                 for error in self.display.errors() {
                     ui.colored_label(theme::error(), error);
                 }
@@ -69,19 +92,58 @@ impl Viewport {
         }
     }
 
-    fn modes(&self, ui: &mut Ui, layout: &Layout, has_photos: bool, actions: &mut Vec<Action>) {
-        ui.spacing_mut().item_spacing.x = 2.0;
-        for &mode in ViewMode::VARIANTS {
-            if mode == ViewMode::Difference && !has_photos {
-                continue;
-            }
-            let action = Action::Show(mode);
-            let tip = format!("{}  {}", action.tooltip(), keys::label(ui.ctx(), &action));
-            if ui.selectable_label(layout.mode == mode, mode.text()).on_hover_text(tip).clicked() {
-                actions.push(action);
-            }
+    /// Which scene is seen in the second view, and how well.
+    fn beside_bar(&self, ui: &mut Ui, name: &str, actions: &mut Vec<Action>) {
+        ui.label(RichText::new(text::elided(name, 40)).strong()).on_hover_text(name);
+        if let Some(psnr) = self.picture().and_then(|p| p.second.as_ref()?.psnr) {
+            ui.colored_label(theme::accent(), format!("preview {}", format::decibel(psnr)));
         }
-        if has_photos {
+        let close = ui.button("\u{d7}").on_hover_text(Action::OpenBeside(None).text());
+        if close.accessible_name(Action::OpenBeside(None).text()).clicked() {
+            actions.push(Action::OpenBeside(None));
+        }
+    }
+
+    /// The choice of what the view shows: menus where it is narrow or there is another one.
+    fn modes(
+        &mut self,
+        ui: &mut Ui,
+        layout: &mut Layout,
+        (menus, is_other): (bool, bool),
+        has_photos: bool,
+        actions: &mut Vec<Action>,
+    ) {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        let shown = *layout.mode_of(self.queries.is_second());
+        let mut buttons = |ui: &mut Ui| {
+            for &mode in ViewMode::VARIANTS.iter().filter(|mode| has_photos || !mode.needs_photo()) {
+                let action = Action::Show(mode);
+                let tip = format!("{}  {}", action.tooltip(), keys::label(ui.ctx(), &action));
+                if ui.selectable_label(shown == mode, mode.text()).on_hover_text(tip).clicked() {
+                    actions.push(action);
+                }
+            }
+        };
+        if menus {
+            let mode = ComboBox::from_id_salt("mode").selected_text(shown.text()).width(76.0).show_ui(ui, buttons);
+            mode.response.on_hover_text("What the view shows").accessible_name("Mode");
+            if is_other {
+                return;
+            }
+            let colored_by = self.queries.settings().color_by;
+            let tints = ComboBox::from_id_salt("color by").selected_text(colored_by.text()).width(86.0);
+            let tints = tints.show_ui(ui, |ui| {
+                for &by in ColorBy::VARIANTS {
+                    if ui.selectable_label(colored_by == by, by.text()).clicked() && colored_by != by {
+                        self.queries.tint(by);
+                    }
+                }
+            });
+            tints.response.on_hover_text("What colors it beside that").accessible_name("Color by");
+        } else {
+            buttons(ui);
+        }
+        if has_photos && !self.queries.is_second() {
             ui.separator();
             let tip = format!("{}  {}", Action::ToggleCameras.tooltip(), keys::label(ui.ctx(), &Action::ToggleCameras));
             if ui.selectable_label(layout.cameras, "Cameras").on_hover_text(tip).clicked() {
@@ -105,10 +167,10 @@ impl Viewport {
                 ui.label(RichText::new(text::elided(&p.name(), 28)).strong()).on_hover_text(&*p.name());
                 ui.weak(format!("{} of {total}", p.index() + 1));
                 if let Some(psnr) = self.picture().and_then(|p| p.psnr) {
-                    ui.label(RichText::new(format!("preview {}", format::decibel(psnr))).color(theme::accent())).on_hover_text(
-                        "PSNR of what is on screen against the photo, at the size on screen. The evaluation's number \
-                         is at the photo's size in training.",
-                    );
+                    ui.label(RichText::new(format!("preview {}", format::decibel(psnr))).color(theme::accent()))
+                        .on_hover_text(
+                            "PSNR of the view at screen resolution. Evaluation uses the training resolution.",
+                        );
                 }
                 if p.failed() {
                     ui.colored_label(theme::warning(), "photo not loaded");
@@ -119,7 +181,8 @@ impl Viewport {
             }
         }
         step(ui, "›", Action::NextPhoto, actions);
-        if self.photo.is_some() {
+        // Half a view is too narrow for the slider's button, and shows the photo otherwise.
+        if self.photo.is_some() && (!layout.split_view || layout.compare) {
             ui.separator();
             let tip = format!("{}  {}", Action::ToggleCompare.tooltip(), keys::label(ui.ctx(), &Action::ToggleCompare));
             if ui.selectable_label(layout.compare, "Compare").on_hover_text(tip).clicked() {
@@ -129,26 +192,36 @@ impl Viewport {
     }
 
     /// One line about the frame.
-    fn facts(&self, layout: &Layout, state: &AppState) -> Option<String> {
+    fn facts(&self, layout: &Layout, state: &AppState, rate: Option<String>) -> Option<String> {
         let p = self.picture()?;
         let mut parts = vec![
             format!("{} \u{d7} {} px", p.camera.width_px, p.camera.height_px),
             format::millis(p.secs),
-            format!("{} Gaussians", format::count(self.cloud.as_ref().map_or(0, |c| c.len()) as u64)),
+            match (self.visibility.count(), self.cloud.as_ref().map_or(0, |c| c.len()) as u64) {
+                (Some(drawn), all) => format!("{} of {} Gaussians", format::count(drawn as u64), format::count(all)),
+                (None, all) => format!("{} Gaussians", format::count(all)),
+            },
         ];
         if let Some((near, far)) = p.depth_range {
             parts.push(format!("depth {near:.2} to {far:.2}, blue to red"));
         }
-        if layout.mode == ViewMode::Difference {
-            parts.push(match (&self.photo, p.psnr) {
-                (None, _) => "choose a photo to see the difference ( [ or ] )".into(),
-                (Some(_), _) => "difference \u{d7} 4".into(),
-            });
+        let modes = [Some(layout.mode), layout.split_view.then_some(layout.second_mode)];
+        match &self.photo {
+            None if modes.iter().flatten().any(|mode| mode.needs_photo()) => {
+                parts.push("choose a photo ( [ or ] )".into())
+            }
+            Some(_) if modes.contains(&Some(ViewMode::Difference)) => parts.push("difference \u{d7} 4".into()),
+            _ => {}
         }
         let trained = state.training_job.is_some() || state.scene.as_ref().is_some_and(|s| s.trained);
         if !trained {
             parts.push("sparse points, not trained yet".into());
         }
+        parts.extend(rate);
         Some(parts.join("  ·  "))
     }
+}
+
+fn rate_text(fps: f64) -> String {
+    if fps < 10.0 { format!("{fps:.1} fps") } else { format!("{fps:.0} fps") }
 }

@@ -31,7 +31,7 @@ impl RenderOverrides {
     pub(crate) fn problem(&self) -> Option<&'static str> {
         let share = |v: f64| (1e-9..1.0).contains(&v);
         match self {
-            Self { sh_degree: Some(4..), .. } => Some("there is no such spherical-harmonics degree"),
+            Self { sh_degree: Some(4..), .. } => Some("invalid spherical-harmonics degree"),
             Self { cutoffs: Some(c), .. } if !share(c.alpha) || !share(c.transmittance) => {
                 Some("cutoffs lie between 0 and 1")
             }

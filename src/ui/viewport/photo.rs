@@ -10,6 +10,9 @@ use super::super::theme;
 use crate::scene::{Camera, Photo, PhotoPixels};
 use crate::worker::{Command, JobId, Worker};
 
+/// How far an arrow key moves the border between photo and rendering, as a share of the frame.
+const KEY_STEP: f32 = 0.05;
+
 /// Longest side at which the photo beside the frame is loaded, in px.
 const SIDE_PX: u32 = 1600;
 
@@ -94,10 +97,21 @@ impl PhotoView {
         let response =
             ui.interact(grip, ui.scope_id().with("split"), Sense::drag()).on_hover_cursor(CursorIcon::ResizeHorizontal);
         if let Some(pos) = response.interact_pointer_pos().filter(|_| response.dragged()) {
-            *split = ((pos.x - shown.left()) / shown.width().max(1.0)).clamp(0.02, 0.98);
+            *split = (pos.x - shown.left()) / shown.width().max(1.0);
         }
-        let color =
-            if response.hovered() || response.dragged() { theme::accent() } else { Color32::from_white_alpha(220) };
+        response.widget_info(|| egui::WidgetInfo::slider(true, f64::from(*split), "Compare with the photo"));
+        if response.has_focus() {
+            let sideways = egui::EventFilter { horizontal_arrows: true, ..Default::default() };
+            ui.memory_mut(|m| m.set_focus_lock_filter(response.id, sideways));
+            let steps = |key| ui.input(|i| i.num_presses(key)) as f32;
+            *split += KEY_STEP * (steps(egui::Key::ArrowRight) - steps(egui::Key::ArrowLeft));
+        }
+        *split = split.clamp(0.02, 0.98);
+        let color = if response.hovered() || response.dragged() || response.has_focus() {
+            theme::accent()
+        } else {
+            Color32::from_white_alpha(220)
+        };
         ui.painter().vline(x, shown.y_range(), Stroke::new(1.5, color));
         ui.painter().circle(pos2(x, shown.center().y), 9.0, theme::panel(), Stroke::new(1.5, color));
         for (side, text, align) in

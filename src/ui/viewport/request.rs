@@ -6,6 +6,7 @@ use egui::{Rect, Ui};
 
 use super::Viewport;
 use super::photo::PhotoView;
+use super::visible::VisibleCloud;
 use crate::render::RenderSettings;
 use crate::scene::plan::When;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels, SemanticMap};
@@ -24,6 +25,10 @@ pub(super) struct Wanted {
     pub(super) cloud: Versioned<GaussianCloud>,
     pub(super) camera: Camera,
     pub(super) mode: ViewMode,
+    /// What a second view shows, if it is something else.
+    pub(super) second: Option<ViewMode>,
+    /// Whose Gaussians, if they are others.
+    pub(super) beside: Option<(Versioned<GaussianCloud>, RenderSettings)>,
     pub(super) settings: RenderSettings,
     pub(super) budget: QualityBudget,
     pub(super) photo: Option<Arc<PhotoPixels>>,
@@ -43,6 +48,8 @@ struct Key {
     cloud: u64,
     semantics: Option<u64>,
     mode: ViewMode,
+    second: Option<ViewMode>,
+    beside: Option<u64>,
     settings: RenderSettings,
     budget: QualityBudget,
     with_photo: bool,
@@ -83,12 +90,28 @@ impl Requests {
     /// The request for what is wanted, if it is not what was asked for last or wanted `again`; and what
     /// of its pixels is new.
     pub(super) fn next(&mut self, wanted: Wanted, again: bool) -> Option<(ViewRequest, Moved)> {
-        let Wanted { cloud, camera, mode, settings, budget, photo, semantics, codes, follow, skip, timed } = wanted;
+        let Wanted {
+            cloud,
+            camera,
+            mode,
+            second,
+            beside,
+            settings,
+            budget,
+            photo,
+            semantics,
+            codes,
+            follow,
+            skip,
+            timed,
+        } = wanted;
         let key = Key {
             camera: camera.clone(),
             cloud: cloud.generation(),
             semantics: semantics.as_ref().map(Versioned::generation),
             mode,
+            second,
+            beside: beside.as_ref().map(|b| b.0.generation()),
             settings: settings.clone(),
             budget,
             with_photo: photo.is_some(),
@@ -111,29 +134,39 @@ impl Requests {
         self.ticket += 1;
         let (cloud, semantics) = (Arc::clone(&cloud), semantics.as_deref().cloned());
         let ticket = self.ticket;
-        let request =
-            ViewRequest { cloud, camera, mode, settings, budget, photo, semantics, follow, codes, skip, timed, ticket };
+        let request = ViewRequest {
+            cloud,
+            camera,
+            mode,
+            second,
+            beside: beside.map(|(cloud, settings)| (Arc::clone(&cloud), settings)),
+            settings,
+            budget,
+            photo,
+            semantics,
+            follow,
+            codes,
+            skip,
+            timed,
+            ticket,
+        };
         Some((request, moved))
     }
 }
 
 impl Viewport {
+    /// Whether the eye moves.
+    pub(super) fn moves(&self, now: f64) -> bool {
+        now - self.moved_at < REST_SECS
+    }
+
     /// Asks for a new frame if anything changed.
     pub(super) fn request(&mut self, ui: &Ui, shown: Rect, state: &AppState, layout: &Layout, now: f64) {
         let Some(cloud) = self.cloud.clone() else { return };
         let plan = &state.plan;
-        let (cloud, semantics) = match &state.semantics {
-            Some(semantics) => {
-                let (cloud, semantics) = self.visibility.apply(&cloud, semantics);
-                (
-                    cloud,
-                    Some(semantics).filter(|_| {
-                        plan.maps.now(self.queries.wanted() || self.picking.wanted() || self.brush.is_some())
-                    }),
-                )
-            }
-            None => (cloud, None),
-        };
+        let VisibleCloud { cloud, semantics, .. } = self.visibility.apply(&cloud, state.semantics.as_ref());
+        let with_maps = plan.maps.now(self.queries.wanted() || self.picking.wanted() || self.brush.is_some());
+        let semantics = semantics.filter(|_| with_maps);
         let rests = now - self.moved_at - REST_SECS;
         if rests < 0.0 {
             ui.ctx().request_repaint_after_secs((-rests + 0.01) as f32);
@@ -157,10 +190,16 @@ impl Viewport {
         // A newer request would keep what belongs to the last one from ever being drawn.
         let drawn = self.display.picture().is_some_and(|p| p.ticket == self.requests.ticket())
             && (semantics.is_none() || self.queries.maps().is_some());
+        let beside = state.beside.as_ref().map(|b| (b.cloud.clone(), b.settings.clone()));
         let wanted = Wanted {
             cloud,
             camera: camera.limited_to(MAX_SIDE_PX),
             mode: layout.mode,
+            second: layout
+                .split_view
+                .then_some(layout.second_mode)
+                .filter(|mode| *mode != layout.mode || state.beside.is_some()),
+            beside: beside.filter(|_| layout.split_view),
             settings: self.overrides.over(state.render_settings(), self.on_gpu()),
             budget,
             photo: self.photo.as_ref().and_then(PhotoView::pixels),
@@ -194,6 +233,8 @@ mod tests {
                 cloud: cloud.clone(),
                 camera: Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 8, 8).expect("valid"),
                 mode: ViewMode::Rgb,
+                second: None,
+                beside: None,
                 settings: RenderSettings::default(),
                 budget: QualityBudget::Full,
                 photo: None,
@@ -218,11 +259,15 @@ mod tests {
         assert_eq!(next(&|w| w.budget = QualityBudget::Moving, false), Some((3, Moved::Nothing)));
         assert_eq!(next(&|w| w.settings.sh_degree = 1, false), Some((4, Moved::Nothing)));
         assert_eq!(next(&|w| w.photo = Some(Arc::clone(&photo)), false), Some((5, Moved::Nothing)));
-        assert_eq!(next(&|w| w.camera.center.x += 1.0, false), Some((6, Moved::Eye)));
-        assert_eq!(next(&|_| {}, false), Some((7, Moved::Eye)), "and back");
+        assert_eq!(next(&|w| w.second = Some(ViewMode::Depth), false), Some((6, Moved::Nothing)));
+        let other = Versioned::new(Arc::clone(&cloud));
+        let beside = |w: &mut Wanted| w.beside = Some((other.clone(), RenderSettings::default()));
+        assert_eq!(next(&beside, false), Some((7, Moved::Nothing)));
+        assert_eq!(next(&|w| w.camera.center.x += 1.0, false), Some((8, Moved::Eye)));
+        assert_eq!(next(&|_| {}, false), Some((9, Moved::Eye)), "and back");
         // The same Gaussians, published anew.
         let newer = Versioned::new(Arc::clone(&cloud));
-        assert_eq!(next(&|w| w.cloud = newer.clone(), false), Some((8, Moved::Scene)));
+        assert_eq!(next(&|w| w.cloud = newer.clone(), false), Some((10, Moved::Scene)));
         assert_eq!(next(&|w| w.cloud = newer.clone(), false), None);
         requests.forget();
         assert!(requests.next(wanted(&|w| w.cloud = newer.clone()), false).is_some(), "another scene");

@@ -54,21 +54,15 @@ impl Viewport {
         self.ruler.is_some()
     }
 
-    /// Takes clicks, draws the points and what lies between them, and says what that measures.
-    pub(super) fn show_ruler(
-        &mut self,
-        ui: &Ui,
-        response: &Response,
-        shown: Rect,
-        meters_per_unit: Option<f64>,
-        actions: &mut Vec<Action>,
-    ) {
+    /// Takes clicks in a view, draws the points and what lies between them.
+    pub(super) fn show_ruler(&mut self, ui: &Ui, response: &Response, shown: Rect, meters_per_unit: Option<f64>) {
         let Some(mut ruler) = self.ruler.take() else { return };
         let surface = |pos: Pos2| {
             let at = (pos - shown.min) / shown.size();
             self.display.picked(DVec2::new(f64::from(at.x), f64::from(at.y)), &self.eye)
         };
-        if let Some(point) = response.interact_pointer_pos().filter(|_| response.clicked()).and_then(surface) {
+        let clicked = response.interact_pointer_pos().filter(|pos| response.clicked() && shown.contains(*pos));
+        if let Some(point) = clicked.and_then(surface) {
             ruler.put(point);
         }
         let eye = self.overlay_camera(shown);
@@ -93,7 +87,20 @@ impl Viewport {
         for at in places.iter().flatten() {
             painter.circle(*at, 5.0, theme::warning(), Stroke::new(1.5, Color32::from_black_alpha(200)));
         }
-        self.ruler = ruler_card(ui, shown, ruler, self.eye.center, meters_per_unit, actions);
+        self.ruler = Some(ruler);
+    }
+
+    /// Says what the points measure.
+    pub(super) fn show_ruler_card(
+        &mut self,
+        ui: &Ui,
+        rect: Rect,
+        meters_per_unit: Option<f64>,
+        actions: &mut Vec<Action>,
+    ) {
+        if let Some(ruler) = self.ruler.take() {
+            self.ruler = ruler_card(ui, rect, ruler, self.eye.center, meters_per_unit, actions);
+        }
     }
 }
 
@@ -113,13 +120,13 @@ fn ruler_card(
         theme::overlay().show(ui, |ui| {
             ui.horizontal(|ui| {
                 let next = match ruler.points.len() {
-                    0 => "Click a surface: the first end".to_owned(),
-                    1 => "Click the second end".to_owned(),
+                    0 => "Click the first point on a surface".to_owned(),
+                    1 => "Click the second point".to_owned(),
                     _ => ruler.distance().map_or_else(
-                        || "The points are the same: click anew".to_owned(),
+                        || "The points coincide: click again".to_owned(),
                         |d| match meters_per_unit {
                             Some(_) => format!("{}, {}", format::length(d, meters_per_unit), format::length(d, None)),
-                            None => format!("{}; the scale is not known", format::length(d, None)),
+                            None => format!("{} (scale unknown)", format::length(d, None)),
                         },
                     ),
                 };
@@ -131,24 +138,24 @@ fn ruler_card(
             });
             if ruler.distance().is_some() {
                 ui.horizontal(|ui| {
-                    ui.label("It is really");
+                    ui.label("True length");
                     ui.add(TextEdit::singleline(&mut ruler.known).hint_text("0.30").desired_width(60.0)).widget_info(
                         || egui::WidgetInfo::labeled(egui::Role::TextInput, true, "True length in meters"),
                     );
-                    ui.label("m long:");
+                    ui.label("m");
                     let scale = ruler.scale();
-                    let set = ui.add_enabled(scale.is_some(), egui::Button::new("Set the scale"));
+                    let set = ui.add_enabled(scale.is_some(), egui::Button::new("Set scale"));
                     if let Some(scale) = scale.filter(|_| set.clicked()) {
                         actions.push(Action::SetScale(scale));
                     }
                 });
             }
             match ruler.normal(eye) {
-                Some(normal) if ui.button("Make these three points the floor").clicked() => {
+                Some(normal) if ui.button("Use these three points as the floor").clicked() => {
                     actions.push(Action::SetUp(normal));
                 }
                 None if ruler.points.len() == 2 => {
-                    ui.weak("A third click on the floor, and these three can be made the floor.");
+                    ui.weak("Click a third point to define the floor.");
                 }
                 _ => {}
             }
@@ -175,7 +182,7 @@ mod tests {
             assert_eq!(ruler.scale(), scale, "{typed}");
         }
         ruler.put(DVec3::new(3.0, 1.0, 0.0));
-        assert_eq!(ruler.normal(DVec3::new(0.0, 0.0, -5.0)), Some(DVec3::NEG_Z), "towards the eye");
+        assert_eq!(ruler.normal(DVec3::new(0.0, 0.0, -5.0)), Some(DVec3::NEG_Z), "toward the eye");
         assert_eq!(ruler.normal(DVec3::new(0.0, 0.0, 5.0)), Some(DVec3::Z));
         ruler.put(DVec3::ZERO);
         assert_eq!((ruler.points.len(), ruler.distance()), (1, None), "the fourth begins anew");

@@ -1,9 +1,9 @@
-//! Which identities are drawn: hidden ones left out, or one alone.
+//! What of a scene is drawn: hidden identities left out, or one alone, inside a crop box.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY, SemanticMap};
+use crate::scene::{CropBox, GaussianCloud, Identities, IdentityId, NOBODY, SemanticMap};
 use crate::worker::Versioned;
 
 /// What of a scene is drawn.
@@ -11,19 +11,23 @@ use crate::worker::Versioned;
 pub(crate) struct Visibility {
     /// Whose own Gaussians are left out; nobody's have the number of nobody.
     hidden: BTreeSet<IdentityId>,
-    /// The Gaussians that are left, with what they were made from.
-    left: Option<Left>,
+    /// What of the rest is kept.
+    crop: Option<CropBox>,
+    /// The Gaussians that are left, with the generations of what they were made from.
+    left: Option<((u64, Option<u64>), VisibleCloud)>,
 }
 
+/// The Gaussians that are drawn.
 #[derive(Clone, Debug)]
-struct Left {
-    of: (u64, u64),
-    cloud: Versioned<GaussianCloud>,
-    semantics: Versioned<SemanticMap>,
+pub(crate) struct VisibleCloud {
+    pub(crate) cloud: Versioned<GaussianCloud>,
+    pub(crate) semantics: Option<Versioned<SemanticMap>>,
+    /// Their numbers in the whole cloud, if they are not all of it.
+    pub(crate) numbers: Option<Arc<Vec<usize>>>,
 }
 
 impl Visibility {
-    /// Whether anything is left out.
+    /// Whether anything is hidden.
     pub(crate) fn is_partial(&self) -> bool {
         !self.hidden.is_empty()
     }
@@ -47,7 +51,19 @@ impl Visibility {
 
     /// Leaves out these and no others.
     pub(crate) fn set_hidden(&mut self, ids: impl IntoIterator<Item = IdentityId>) {
-        *self = Self { hidden: ids.into_iter().collect(), left: None };
+        (self.hidden, self.left) = (ids.into_iter().collect(), None);
+    }
+
+    /// What is kept of all that is not hidden.
+    pub(crate) fn crop(&self) -> Option<CropBox> {
+        self.crop
+    }
+
+    /// Keeps this of all that is not hidden.
+    pub(crate) fn set_crop(&mut self, crop: Option<CropBox>) {
+        if self.crop != crop {
+            (self.crop, self.left) = (crop, None);
+        }
     }
 
     /// Hides an identity with its pieces, or shows them again if none is drawn.
@@ -78,27 +94,39 @@ impl Visibility {
         self.set_hidden(self.hidden.iter().filter_map(now).collect::<Vec<_>>());
     }
 
+    /// How many Gaussians are drawn, if not all.
+    pub(crate) fn count(&self) -> Option<usize> {
+        self.left.as_ref().map(|(_, visible)| visible.cloud.len())
+    }
+
     /// The Gaussians to draw and what they belong to.
     pub(crate) fn apply(
         &mut self,
         cloud: &Versioned<GaussianCloud>,
-        semantics: &Versioned<SemanticMap>,
-    ) -> (Versioned<GaussianCloud>, Versioned<SemanticMap>) {
-        if !self.is_partial() || semantics.identity_of.len() != cloud.len() {
-            return (cloud.clone(), semantics.clone());
+        semantics: Option<&Versioned<SemanticMap>>,
+    ) -> VisibleCloud {
+        let all = || VisibleCloud { cloud: cloud.clone(), semantics: semantics.cloned(), numbers: None };
+        let fits = semantics.is_none_or(|map| map.identity_of.len() == cloud.len());
+        if !fits || self.crop.is_none() && (self.hidden.is_empty() || semantics.is_none()) {
+            self.left = None;
+            return all();
         }
-        let of = (cloud.generation(), semantics.generation());
-        if self.left.as_ref().is_none_or(|l| l.of != of) {
-            let kept: Vec<usize> =
-                (0..cloud.len()).filter(|&i| !self.hidden.contains(&semantics.identity_of[i])).collect();
-            let (cloud, semantics) = (cloud.select(&kept), semantics.select(&kept));
-            let (cloud, semantics) = (Versioned::new(Arc::new(cloud)), Versioned::new(Arc::new(semantics)));
-            self.left = Some(Left { of, cloud, semantics });
+        let of = (cloud.generation(), semantics.map(Versioned::generation));
+        if let Some((_, visible)) = self.left.as_ref().filter(|(made_of, _)| *made_of == of) {
+            return visible.clone();
         }
-        match &self.left {
-            Some(l) => (l.cloud.clone(), l.semantics.clone()),
-            None => (cloud.clone(), semantics.clone()),
-        }
+        let drawn = |i: &usize| {
+            semantics.is_none_or(|map| !self.hidden.contains(&map.identity_of[*i]))
+                && self.crop.is_none_or(|crop| crop.keeps(cloud.world_position(*i)))
+        };
+        let kept: Vec<usize> = (0..cloud.len()).filter(drawn).collect();
+        let visible = VisibleCloud {
+            cloud: Versioned::new(Arc::new(cloud.select(&kept))),
+            semantics: semantics.map(|map| Versioned::new(Arc::new(map.select(&kept)))),
+            numbers: Some(Arc::new(kept)),
+        };
+        self.left = Some((of, visible.clone()));
+        visible
     }
 }
 
@@ -109,8 +137,10 @@ fn pieces(all: &Identities, id: IdentityId) -> impl Iterator<Item = IdentityId> 
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
-    use crate::scene::Level;
+    use crate::scene::{Bounds, Level};
 
     #[test]
     fn what_is_hidden_is_not_drawn() {
@@ -125,9 +155,12 @@ mod tests {
         let cloud = Versioned::new(Arc::new(cloud));
         let mut v = Visibility::default();
         let xs = |v: &mut Visibility| {
-            let (cloud, map) = v.apply(&cloud, &map);
-            assert_eq!(cloud.len(), map.identity_of.len());
-            cloud.positions.iter().map(|p| p[0] as i32).collect::<Vec<_>>()
+            let visible = v.apply(&cloud, Some(&map));
+            assert_eq!(Some(visible.cloud.len()), visible.semantics.map(|map| map.identity_of.len()));
+            let xs: Vec<i32> = visible.cloud.positions.iter().map(|p| p[0] as i32).collect();
+            let numbers = visible.numbers.map_or_else(|| vec![0, 1, 2, 3], |numbers| numbers.to_vec());
+            assert_eq!(xs, numbers.into_iter().map(|i| i as i32).collect::<Vec<_>>(), "each knows its number");
+            xs
         };
         let all = &map.identities;
         assert_eq!(xs(&mut v), [0, 1, 2, 3]);
@@ -142,7 +175,20 @@ mod tests {
         v.toggle(all, cat);
         assert_eq!(xs(&mut v), [0, 1, 2], "a tick adds to what is isolated");
         v.isolate(all, None);
-        assert_eq!((xs(&mut v).len(), v.is_partial()), (4, false));
+        assert_eq!((xs(&mut v).len(), v.is_partial(), v.count()), (4, false, None));
+
+        let bounds = Bounds { min: DVec3::new(0.5, -1.0, -1.0), max: DVec3::new(2.5, 1.0, 1.0) };
+        let crop = CropBox { bounds, outside: false };
+        v.set_crop(Some(crop));
+        assert_eq!((xs(&mut v), v.count()), (vec![1, 2], Some(2)));
+        v.toggle(all, eye);
+        assert_eq!(xs(&mut v), [2], "hidden and cropped");
+        v.set_crop(Some(CropBox { outside: true, ..crop }));
+        assert_eq!(xs(&mut v), [0, 3]);
+        let alone = v.apply(&cloud, None);
+        assert_eq!((alone.cloud.len(), alone.semantics.is_none()), (2, true), "a scene without objects is cropped too");
+        v.set_crop(None);
+        assert_eq!(xs(&mut v), [0, 2, 3]);
     }
 
     #[test]

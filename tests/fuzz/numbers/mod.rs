@@ -58,7 +58,7 @@ const AREAS: [(&str, Trial); 7] = [
     ("training", scenes::training),
     ("relevancy", meaning::relevancy),
     ("codes", meaning::codes),
-    ("localising", meaning::localizing),
+    ("localizing", meaning::localizing),
     ("moving", ways::moving),
 ];
 

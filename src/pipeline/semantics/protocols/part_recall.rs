@@ -16,7 +16,7 @@ pub(crate) const HIT_IOU: f64 = 0.5;
 pub(crate) struct Components {
     /// Parts are extracted, not objects alone.
     pub(crate) extraction: bool,
-    /// Parts' features are moved towards their objects'.
+    /// Parts' features are moved toward their objects'.
     pub(crate) deviation: bool,
     /// Localization in the paper's two steps.
     pub(crate) localization: bool,

@@ -93,8 +93,8 @@ fn poses_and_points_fit_the_photos() {
     for frame in transforms["frames"].as_array().unwrap() {
         let m = |r: usize, c: usize| frame["transform_matrix"][r][c].as_f64().unwrap();
         let (eye, back) = (DVec3::new(m(0, 3), m(1, 3), m(2, 3)), DVec3::new(m(0, 2), m(1, 2), m(2, 2)));
-        let towards = (DVec3::new(0.15, 0.15, 0.1) - eye).normalize_or_zero();
-        assert!(towards.dot(-back) > 0.98, "{towards} {back}");
+        let toward = (DVec3::new(0.15, 0.15, 0.1) - eye).normalize_or_zero();
+        assert!(toward.dot(-back) > 0.98, "{toward} {back}");
         assert!(m(1, 1) > 0.2, "up is up");
     }
 }
@@ -138,7 +138,7 @@ fn wrong_settings_are_named() {
 }
 
 #[test]
-fn cancelling_leaves_no_data_set() {
+fn canceling_leaves_no_data_set() {
     struct Stop;
     impl Observer for Stop {
         fn signal(&self) -> Signal {

@@ -29,7 +29,7 @@ pub(crate) struct SurfelGeometry<R> {
     /// Determinant of `across`, not negative.
     pub(crate) determinant: R,
     pub(crate) center: [R; 2],
-    /// Unit normal towards the camera, world axes.
+    /// Unit normal toward the camera, world axes.
     pub(crate) normal: [R; 3],
 }
 

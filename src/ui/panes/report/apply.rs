@@ -72,7 +72,7 @@ fn training(stage: &Stage, point: &Point, now: &Now<'_>) -> Taken {
 }
 
 fn drawing(stage: &Stage, point: &Point, now: &Now<'_>) -> Taken {
-    let own = now.own.ok_or("Open a scene first: there is nothing to draw yet.")?;
+    let own = now.own.ok_or("Open a scene first: there is nothing to render yet.")?;
     let names = fields(&RenderOverrides::default());
     if let Some(name) = point.knobs.keys().find(|name| !names.contains_key(*name)) {
         return Err(no_setting(name).into());
@@ -96,7 +96,7 @@ fn no_setting(name: &str) -> &'static str {
         "precision" => "The view is rendered in single precision; the others are measured for comparison.",
         "backend" => "The backend is chosen when the window opens: a real GPU if there is one, else the CPU.",
         "scale" => "The view adapts its resolution: lower while the camera moves, full at rest.",
-        "keep_order" | "degrees" => "A depth order that is never renewed would be wrong as soon as the camera moves.",
+        "keep_order" | "degrees" => "A reused depth order is wrong as soon as the camera moves.",
         _ => "The view has no such setting.",
     }
 }

@@ -9,10 +9,10 @@ use crate::ui::actions::Action;
 use crate::worker::JobKind;
 
 pub(crate) fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
-    ui.label(RichText::new("Error against run time").strong());
+    ui.label(RichText::new("Error vs. run time").strong());
     ui.label(
-        "Every setting that trades accuracy for time can be measured. A report holds the measurements; here they are \
-         plotted, the Pareto front is marked, and a click applies a setting.",
+        "A report holds measurements of every setting that trades accuracy for time. Click a point to apply its \
+         setting.",
     );
     ui.add_space(6.0);
     if let Some(job) = state.job.as_ref().filter(|j| j.kind == JobKind::Measure) {
@@ -21,7 +21,7 @@ pub(crate) fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
             let share = p.done as f32 / p.total.max(1) as f32;
             ui.add(egui::ProgressBar::new(share).desired_width(320.0).desired_height(6.0).fill(theme::accent()));
             ui.weak(format!(
-                "{} of {} measurements. Leave the view alone: rendering it distorts the measurement.",
+                "{} of {} measurements. Do not move the view: rendering distorts the times.",
                 p.done, p.total
             ));
         } else {
@@ -62,7 +62,7 @@ pub(crate) fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
             ui.ctx().copy_text(command);
         }
     });
-    ui.weak("Then drop its folder onto the window.");
+    ui.weak("Then drop the report folder onto the window.");
 }
 
 /// The command that measures the open scene.

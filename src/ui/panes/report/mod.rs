@@ -51,7 +51,7 @@ impl ReportPane {
             return;
         };
         let Some(measure) = self.measure_of(stage) else {
-            ui.weak("This stage has no measure.");
+            ui.weak("This stage has no metric.");
             return;
         };
         let second_report = second.as_ref().map(|s| &*s.report);
@@ -86,7 +86,7 @@ impl ReportPane {
                 let title = format!("Measurements ({})", stage.points.len());
                 let in_table = section(ui, &title, true, |ui| tables::points(ui, stage, measure, selected));
                 clicked = clicked.or(in_table.flatten());
-                section(ui, "Defaults by the rule", true, |ui| tables::choices(ui, stage));
+                section(ui, "Defaults check", true, |ui| tables::choices(ui, stage));
                 if !stage.orders.is_empty() {
                     section(ui, "Orders of convergence", true, |ui| tables::orders(ui, stage));
                 }
@@ -142,7 +142,7 @@ impl ReportPane {
         actions: &mut Vec<Action>,
     ) {
         ui.horizontal_wrapped(|ui| {
-            ui.label(RichText::new("Error against run time").strong());
+            ui.label(RichText::new("Error vs. run time").strong());
             ui.label(RichText::new(name(shown)).color(theme::weak())).on_hover_text(text::path(&shown.path));
             if let Some(second) = second {
                 ui.label(RichText::new(format!("compared with {} (hollow)", name(second))).color(theme::accent()))
@@ -166,7 +166,7 @@ impl ReportPane {
                         }
                     }
                 });
-                names.response.on_hover_text(&measure.meaning).accessible_name("Measure");
+                names.response.on_hover_text(&measure.meaning).accessible_name("Metric");
             }
             ui.separator();
             button(ui, "Open\u{2026}", &Action::ChooseReport, true, actions);
@@ -211,7 +211,7 @@ fn warnings(ui: &mut Ui, stage: &Stage, report: &Report, second: Option<&Report>
     if !stage.complete() {
         let done = stage.points.iter().filter(|p| p.secs.each.len() >= stage.seeds.len()).count();
         let text = format!(
-            "Not complete: {done} of {} settings were measured {} times. The same command continues with the rest.",
+            "Incomplete: {done} of {} settings measured {} times. Run the same command to continue.",
             stage.planned,
             stage.seeds.len()
         );
@@ -220,11 +220,11 @@ fn warnings(ui: &mut Ui, stage: &Stage, report: &Report, second: Option<&Report>
     let Some(second) = second else { return };
     let differs = report.differs_from(second);
     if !differs.is_empty() {
-        let text = format!("Measured under other conditions, so times do not compare: {}", differs.join("; "));
+        let text = format!("Measured under different conditions; times are not comparable: {}", differs.join("; "));
         warn(ui, text::elided(&text, 180)).on_hover_text(differs.join("\n"));
     }
     if second.stage(stage.name).is_none() {
-        warn(ui, format!("The second report has nothing about: {}.", stage.name.title().to_lowercase()));
+        warn(ui, format!("Missing from the second report: {}.", stage.name.title().to_lowercase()));
     }
 }
 

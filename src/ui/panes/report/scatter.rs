@@ -50,6 +50,7 @@ impl<'a> Scatter<'a> {
             .label_formatter(|_| None)
             .legend(Legend::default().position(corner).text_style(egui::TextStyle::Small).background_alpha(0.6));
         let shown = plot.show(ui, |p| self.items().into_iter().for_each(|item| item.add_to(p)));
+        shown.response.clone().accessible_name(format!("Plot of {} against run time", measure.error_name()));
         let nearest = self.nearest(&shown.response, &shown.transform);
         if let Some(point) = nearest {
             let stage = if self.second.is_some_and(|s| s.points.iter().any(|p| std::ptr::eq(p, point))) {

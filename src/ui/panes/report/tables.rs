@@ -58,7 +58,7 @@ pub(crate) fn choices(ui: &mut Ui, stage: &Stage) {
     }
     let Some(measure) = stage.measure(&stage.rule.measure) else { return };
     Grid::new("choices").num_columns(4).striped(true).spacing([12.0, 1.0]).min_row_height(20.0).show(ui, |ui| {
-        head(ui, &["knob", "default", "by the rule", "time, error of both"]);
+        head(ui, &["setting", "default", "recommended", "time, error (default; recommended)"]);
         for c in &choices {
             ui.label(c.method);
             verdict(ui, c.holds, ["holds", "does not hold"]);

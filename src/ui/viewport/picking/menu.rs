@@ -29,7 +29,7 @@ pub(super) fn show(
     ui.label(RichText::new(text::elided(&names.full_name(all, id), 48)).strong());
     ui.separator();
     row(ui, Action::GoToTarget(id, Side::Best), "Go there");
-    row(ui, Action::Ask(all.full_name(id)), "Mark as a query");
+    row(ui, Action::Ask(all.full_name(id)), "Query this");
     row(ui, Action::Rename, "Rename\u{2026}");
     row(ui, Action::Isolate(Some(id)), "Isolate");
     row(ui, Action::Hide(id), "Hide");

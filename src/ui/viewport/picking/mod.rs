@@ -9,7 +9,7 @@ use egui::{Color32, FontId, Pos2, Rect, Response, TextureHandle, TextureOptions,
 
 use super::super::labels::ScreenNames;
 use super::super::theme;
-use super::{Viewport, outline};
+use super::outline;
 use crate::jobs::query::ViewMaps;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{Identities, IdentityId, PixelBox, SemanticMap, text};
@@ -43,25 +43,6 @@ struct Drawn {
     texture: Option<TextureHandle>,
 }
 
-impl Viewport {
-    /// Outlines what is selected and what the cursor points at, unless that is a camera, and takes clicks.
-    pub(super) fn show_picking(
-        &mut self,
-        ui: &Ui,
-        response: &Response,
-        shown: Rect,
-        (semantics, names): (&Versioned<SemanticMap>, &ScreenNames),
-        on_camera: bool,
-        actions: &mut Vec<Action>,
-    ) {
-        let maps = self.queries.maps().map(|m| &***m);
-        self.picking.update(response, shown, (semantics, names), maps.filter(|_| !on_camera), actions);
-        if let Some(maps) = self.queries.shown_maps().cloned() {
-            self.picking.paint(ui, shown, (semantics, names), &maps);
-        }
-    }
-}
-
 impl Picking {
     /// What is selected.
     pub fn selected(&self) -> Option<IdentityId> {
@@ -83,7 +64,7 @@ impl Picking {
         self.selected = id;
     }
 
-    /// Takes the cursor in: what it points at, what was clicked, and the menu of a right click.
+    /// Takes the cursor in, which is at a pixel of `maps` where they are known and it is not on a camera: what it points at, what was clicked, and the menu of a right click.
     pub(super) fn update(
         &mut self,
         response: &Response,
@@ -129,7 +110,9 @@ impl Picking {
             let Some(id) = id else { continue };
             drawn.paint(ui, shown, semantics, maps, id, color);
         }
-        if let (Some(id), Some(pos)) = (self.hovered, ui.input(|i| i.pointer.hover_pos())) {
+        if let (Some(id), Some(pos)) =
+            (self.hovered, ui.input(|i| i.pointer.hover_pos().filter(|pos| shown.contains(*pos))))
+        {
             label(ui, shown, pos, &text::elided(&names.full_name(&semantics.identities, id), 60));
         }
     }

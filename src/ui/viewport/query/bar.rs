@@ -2,7 +2,8 @@
 
 use egui::{Id, Key, Modifiers, RichText, TextEdit, Ui};
 
-use super::{COLORS, MOST, Queries};
+use super::{MOST, Queries};
+use crate::jobs::phrases::colors::PhraseColors;
 use crate::pipeline::semantics::names;
 use crate::scene::SemanticMap;
 use crate::ui::actions::{Action, Pane};
@@ -13,7 +14,8 @@ use crate::ui::theme;
 const OFFERED: usize = 5;
 
 impl Queries {
-    pub(super) fn show_bar(&mut self, ui: &mut Ui, semantics: &SemanticMap, actions: &mut Vec<Action>) {
+    /// The box. Whether it has the keyboard.
+    pub(super) fn show_bar(&mut self, ui: &mut Ui, semantics: &SemanticMap, actions: &mut Vec<Action>) -> bool {
         let id = ui.scope_id().with("typed");
         // Taken before the field sees them: it would move its cursor.
         let focused = ui.memory(|m| m.has_focus(id));
@@ -25,42 +27,48 @@ impl Queries {
         let complete = focused && !offered.is_empty() && ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Tab));
         ui.horizontal(|ui| {
             let width = ui.available_width() - 72.0;
-            let edit = TextEdit::singleline(&mut self.typed)
+            let edit = TextEdit::singleline(&mut self.side.typed)
                 .id(id)
-                .hint_text("Query an object, or \"the button of the red controller\"   ( / )")
+                .hint_text("Find an object or part, e.g. \u{201c}the button of the red controller\u{201d}  ( / )")
                 .char_limit(2_000)
                 // Tab completes, as long as there is something to complete to.
                 .lock_focus(!offered.is_empty())
                 .desired_width(width);
-            let response = ui.add(edit).accessible_name("Query");
-            if std::mem::take(&mut self.focus) || complete {
+            let name = if self.is_second { "Query of the second view" } else { "Query" };
+            let response = ui.add(edit).accessible_name(name);
+            if std::mem::take(&mut self.side.focus) || complete {
                 response.request_focus();
             }
             if complete {
-                self.typed.clone_from(&offered[0]);
-                cursor_to_end(ui.ctx(), id, &self.typed);
+                self.side.typed.clone_from(&offered[0]);
+                cursor_to_end(ui.ctx(), id, &self.side.typed);
             }
             if response.changed() || complete {
-                self.recalled = None;
-                let typed = self.typed.clone();
-                self.live = self.asked(&typed, semantics);
+                self.side.recalled = None;
+                let typed = self.side.typed.clone();
+                self.side.live = self.asked(&typed, semantics);
+            }
+            if response.lost_focus() {
+                let typed = self.side.typed.clone();
+                self.colors.keep(&typed);
             }
             if response.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter)) {
                 self.keep();
                 response.request_focus();
             }
             let details = ui.button("Details");
-            if details.on_hover_text("All of the answer, and how answers are found and drawn").clicked() {
+            if details.on_hover_text("Full answer, search and overlay settings").clicked() {
                 actions.push(Action::TogglePane(Pane::Query));
             }
         });
-        if focused && !self.typed.is_empty() && offered.first().is_some_and(|o| *o != self.typed) {
+        if focused && !self.side.typed.is_empty() && offered.first().is_some_and(|o| *o != self.side.typed) {
             self.show_offered(ui, &offered, semantics);
         }
+        focused
     }
 
     fn offered(&self, semantics: &SemanticMap) -> Vec<String> {
-        let typed = self.typed.trim();
+        let typed = self.side.typed.trim();
         if typed.is_empty() { Vec::new() } else { names::completions(&semantics.identities, typed, OFFERED) }
     }
 
@@ -76,7 +84,7 @@ impl Queries {
         });
         if let Some(text) = taken {
             self.ask(&text, semantics);
-            self.focus = true;
+            self.side.focus = true;
         }
     }
 
@@ -84,7 +92,7 @@ impl Queries {
     fn recall(&mut self, ui: &Ui, field: Id, semantics: &SemanticMap) {
         let pressed = |key| ui.input_mut(|i| i.consume_key(Modifiers::NONE, key));
         let n = self.history.len();
-        let next = match self.recalled {
+        let next = match self.side.recalled {
             _ if n == 0 => return,
             None if pressed(Key::ArrowUp) => Some(n - 1),
             Some(at) if pressed(Key::ArrowUp) => Some(at.saturating_sub(1)),
@@ -94,44 +102,52 @@ impl Queries {
         let text = next.and_then(|i| self.history.get(i)).cloned().unwrap_or_default();
         self.ask(&text, semantics);
         cursor_to_end(ui.ctx(), field, &text);
-        self.recalled = next;
+        self.side.recalled = next;
     }
 
-    /// The queries that stay on screen.
-    pub(crate) fn kept_texts(&self) -> Vec<String> {
-        self.kept.iter().map(|q| q.text.clone()).collect()
+    /// The colors that these phrases have from now on, and all others that have one.
+    pub(crate) fn colors_of(&mut self, phrases: &[String]) -> PhraseColors {
+        self.colors.keep_all(phrases);
+        self.colors.clone()
     }
 
-    /// Keeps these queries on screen, and no others.
-    pub(crate) fn keep_only(&mut self, texts: &[String], semantics: &SemanticMap) {
-        if self.kept.iter().map(|q| &q.text).ne(texts) {
-            self.kept = texts.iter().filter_map(|text| self.asked(text, semantics)).collect();
+    /// Keeps these queries on screen, and no others, in the first and the second view.
+    pub(crate) fn keep_only(&mut self, texts: &[Vec<String>; 2], semantics: &SemanticMap) {
+        for (second, texts) in [false, true].into_iter().zip(texts) {
+            self.in_view(second, |all| all.keep_here(texts, semantics));
+        }
+    }
+
+    fn keep_here(&mut self, texts: &[String], semantics: &SemanticMap) {
+        if self.side.kept.iter().map(|q| &q.text).ne(texts) {
+            self.side.kept = texts.iter().filter_map(|text| self.asked(text, semantics)).collect();
         }
     }
 
     /// Keeps the query being typed on screen, and makes room for the next.
     pub(super) fn keep(&mut self) {
-        let Some(live) = self.live.take() else { return };
-        self.kept.retain(|q| q.text != live.text);
-        if self.kept.len() == MOST {
-            self.kept.remove(0);
+        let Some(live) = self.side.live.take() else { return };
+        self.side.kept.retain(|q| q.text != live.text);
+        if self.side.kept.len() == MOST {
+            self.side.kept.remove(0);
         }
+        self.colors.keep(&live.text);
         self.history.retain(|t| *t != live.text);
         self.history.push(live.text.clone());
-        self.recalled = None;
-        self.kept.push(live);
-        self.typed.clear();
+        self.side.recalled = None;
+        self.side.kept.push(live);
+        self.side.typed.clear();
     }
 
     /// Chips of the queries that stay on screen.
     pub(super) fn show_kept(&mut self, ui: &mut Ui) {
-        if self.kept.is_empty() {
+        if self.side.kept.is_empty() {
             return;
         }
         let mut gone = None;
         ui.horizontal_wrapped(|ui| {
-            for (k, question) in self.kept.iter().enumerate() {
-                let [r, g, b] = COLORS[k % COLORS.len()];
+            for (k, question) in self.side.kept.iter().enumerate() {
+                let [r, g, b] = self.colors.of(&question.text);
                 let text = RichText::new(format!("{}  \u{00d7}", question.text)).small();
                 let chip = ui.button(text.color(egui::Color32::from_rgb(r, g, b)));
                 if chip.on_hover_text("Remove this query").clicked() {
@@ -140,7 +156,7 @@ impl Queries {
             }
         });
         if let Some(k) = gone {
-            self.kept.remove(k);
+            self.side.kept.remove(k);
         }
     }
 }

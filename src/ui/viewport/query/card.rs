@@ -36,13 +36,13 @@ impl Queries {
         if !ignored.is_empty() {
             ui.colored_label(theme::warning(), format!("Ignored: \"{}\".", text::shortened(&ignored, 80)));
         }
-        let shown = newest.shown(&self.settings);
+        let shown = newest.shown(&self.side.settings);
         match (&newest.answered.answer, shown.first()) {
             (Answer::NotFound(_), None) => self.show_nothing(ui, &newest, semantics),
             (Answer::Ambiguous(_), Some(_)) if newest.chosen.is_none() => {
                 let mut chosen = None;
                 ui.horizontal_wrapped(|ui| {
-                    ui.colored_label(theme::warning(), format!("Ambiguous: {} fit equally.", shown.len()));
+                    ui.colored_label(theme::warning(), format!("Ambiguous: {} equal matches.", shown.len()));
                     for id in shown.iter().take(NAMED) {
                         if ui.small_button(state.labels.full_name(&semantics.identities, *id)).clicked() {
                             chosen = Some(*id);
@@ -59,7 +59,7 @@ impl Queries {
                     ui.add(egui::Label::new(RichText::new(name).strong()).truncate());
                     certainty(ui, &newest);
                     if let Some(bounds) = facts.bounds {
-                        ui.weak(size_text(bounds, state)).on_hover_text("Longest edge of its box");
+                        ui.weak(size_text(bounds, state)).on_hover_text("Longest edge of its bounding box");
                     }
                     if pixels == Some(0) {
                         ui.colored_label(theme::warning(), "not in this view");
@@ -74,7 +74,7 @@ impl Queries {
             }
             _ => {}
         }
-        if let Some(comparison) = &self.comparison {
+        if let Some(comparison) = &self.side.comparison {
             comparison.show(ui);
         }
         if let Some(trouble) = self.embeddings.problem() {
@@ -115,7 +115,7 @@ fn certainty(ui: &mut Ui, newest: &super::Asked) {
         Basis::Embedding => "by embedding",
     };
     let numbers = newest.answered.answer.hits().first().map_or_else(String::new, |hit| {
-        format!("Score {:.2} of 1, {:.2} over the next, found {by}", hit.score, hit.margin.max(0.0))
+        format!("Score {:.2}, margin {:.2}, found {by}", hit.score, hit.margin.max(0.0))
     });
     ui.colored_label(color, <&str>::from(certainty)).on_hover_text(numbers);
 }
@@ -143,16 +143,16 @@ impl Queries {
         semantics: &Versioned<SemanticMap>,
         cloud: &GaussianCloud,
     ) -> Facts {
-        let OverlaySettings { mode, tolerance, .. } = self.settings;
+        let OverlaySettings { mode, tolerance, .. } = self.side.settings;
         let of = (semantics.generation(), target, mode, tolerance.to_bits());
-        if let Some(facts) = self.facts.as_ref().filter(|f| f.of == of) {
+        if let Some(facts) = self.side.facts.as_ref().filter(|f| f.of == of) {
             return facts.clone();
         }
         let inside = matching::gaussians(semantics, target, mode, tolerance);
         let gaussians = inside.iter().filter(|g| **g).count();
         let points = (0..cloud.len()).filter(|&i| inside.get(i) == Some(&true)).map(|i| cloud.world_position(i));
         let facts = Facts { of, gaussians, bounds: Bounds::robust(points) };
-        self.facts = Some(facts.clone());
+        self.side.facts = Some(facts.clone());
         facts
     }
 }

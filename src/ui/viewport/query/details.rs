@@ -23,7 +23,7 @@ impl Viewport {
     /// The pane of the query: its answer and the options.
     pub(crate) fn show_query(&mut self, ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
         let (Some(semantics), Some(cloud)) = (&state.semantics, &self.cloud) else {
-            ui.weak("Find objects first: they are what queries find.");
+            ui.weak("Find objects first: queries search among them.");
             return;
         };
         self.queries.show_details(ui, state, semantics, cloud, actions);
@@ -44,7 +44,7 @@ impl Queries {
         match self.newest().cloned() {
             Some(newest) => {
                 self.show_hits(ui, &newest, state, semantics);
-                if let Some(&target) = newest.shown(&self.settings).first() {
+                if let Some(&target) = newest.shown(&self.side.settings).first() {
                     let facts = self.facts_of(target, semantics, cloud);
                     show_target(ui, target, &facts, state, actions);
                 }
@@ -52,21 +52,21 @@ impl Queries {
                     Basis::Names => "by name",
                     Basis::Embedding => "by embedding",
                 };
-                times::show(ui, basis, &newest.answered.stages.and(self.paint_ms));
+                times::show(ui, basis, &newest.answered.stages.and(self.side.paint_ms));
             }
             None => {
-                ui.weak("Nothing is asked yet: type into the box in the view ( / ).");
+                ui.weak("No query yet: type into the box in the view ( / ).");
             }
         }
         ui.add_space(6.0);
-        let heat = (!self.heat.is_empty()).then_some(self.heat.as_slice());
-        if settings::show(ui, &mut self.settings, heat) {
+        let heat = (!self.side.heat.is_empty()).then_some(self.side.heat.as_slice());
+        if settings::show(ui, &mut self.side.settings, heat) {
             self.ask_again(semantics);
         }
     }
 
     fn show_hits(&mut self, ui: &mut Ui, newest: &super::Asked, state: &AppState, semantics: &Versioned<SemanticMap>) {
-        let shown = newest.shown(&self.settings);
+        let shown = newest.shown(&self.side.settings);
         let hits = newest.answered.answer.hits().iter().filter(|h| h.score > 0.0).take(LISTED);
         let mut chosen = None;
         egui::Grid::new("hits").num_columns(4).striped(true).show(ui, |ui| {
@@ -76,7 +76,7 @@ impl Queries {
                     chosen = Some(hit.identity);
                 }
                 ui.weak(format!("{:.2}", hit.score)).on_hover_text("Score from 0 to 1");
-                ui.weak(format!("+{:.2}", hit.margin.max(0.0))).on_hover_text("Margin over the next");
+                ui.weak(format!("+{:.2}", hit.margin.max(0.0))).on_hover_text("Margin over the next match");
                 let pixels = match self.area_of(semantics, hit.identity) {
                     Some(0) => "not in this view".to_owned(),
                     Some(n) => format!("{} px", format::count(n as u64)),
@@ -98,7 +98,7 @@ fn show_target(ui: &mut Ui, target: IdentityId, facts: &Facts, state: &AppState,
     let gaussians = format::things(facts.gaussians, "Gaussian");
     ui.label(RichText::new(format!("{gaussians}{size}")).small().color(theme::weak()));
     ui.horizontal(|ui| {
-        ui.menu_button(RichText::new("Go there from\u{2026}").small(), |ui| {
+        ui.menu_button(RichText::new("Go there\u{2026}").small(), |ui| {
             for &side in Side::VARIANTS {
                 if ui.button(side.text()).clicked() {
                     actions.push(Action::GoToTarget(target, side));
@@ -109,7 +109,7 @@ fn show_target(ui: &mut Ui, target: IdentityId, facts: &Facts, state: &AppState,
         for (action, text) in [
             (Action::Isolate(Some(target)), "Isolate"),
             (Action::Hide(target), "Hide"),
-            (Action::ExportTarget(target), "Export\u{2026}"),
+            (Action::ExportTarget(target), "Export as .ply\u{2026}"),
         ] {
             if ui.small_button(text).on_hover_text(action.tooltip()).clicked() {
                 actions.push(action);

@@ -9,34 +9,33 @@ mod card;
 mod details;
 mod embeddings;
 mod overlay;
+mod paint;
 mod panel;
 mod settings;
+mod side;
 mod times;
 mod truth;
 
 use std::collections::BTreeMap;
-use std::time::Instant;
 
-use egui::{Color32, Rect, TextureHandle, TextureOptions, Ui, Vec2, vec2};
+use egui::{Color32, Vec2, vec2};
 
 use self::embeddings::Embeddings;
 pub(crate) use self::settings::OverlaySettings;
+use self::side::{Areas, QuerySide};
+use crate::jobs::phrases::colors::PhraseColors;
 use crate::jobs::query::{ViewMaps, answer_encoded};
 use crate::navigate::Pose;
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::names;
 use crate::pipeline::semantics::reading::QueryReading;
-use crate::pipeline::semantics::timing::{StagesMs, ms_since};
 use crate::scene::{IdentityId, Mask, ScenePlan, SemanticMap};
 use crate::ui::color_by::ColorBy;
 use crate::worker::Versioned;
 
-/// Colors of queries, in turn.
-const COLORS: [[u8; 3]; 6] =
-    [[255, 179, 0], [0, 200, 215], [233, 84, 150], [128, 215, 70], [160, 130, 255], [255, 120, 70]];
 /// Queries that are kept on screen.
-const MOST: usize = COLORS.len();
+const MOST: usize = 6;
 
 /// A query with its answer.
 #[derive(Clone, Debug, PartialEq)]
@@ -64,31 +63,19 @@ impl Asked {
     }
 }
 
-/// What the overlay was painted for.
-#[derive(Clone, PartialEq)]
-struct Painted {
-    maps: u64,
-    semantics: u64,
-    shown: Vec<Vec<IdentityId>>,
-    newest: Option<String>,
-    settings: OverlaySettings,
-}
-
 /// The queries on screen.
 #[derive(Default)]
 pub struct Queries {
-    typed: String,
-    /// Set while the box is to take the keyboard.
-    focus: bool,
+    /// Of the view that is worked in, and of the other one.
+    side: QuerySide,
+    other: QuerySide,
+    /// Whether the second of two views is the one that is worked in.
+    is_second: bool,
     /// Whether anything was asked in this scene, or begun to be.
     wanted: bool,
-    /// Place in the history while going through it.
-    recalled: Option<usize>,
-    settings: OverlaySettings,
-    live: Option<Asked>,
-    kept: Vec<Asked>,
     /// What was asked, oldest first.
     history: Vec<String>,
+    colors: PhraseColors,
     maps: Option<Versioned<ViewMaps>>,
     /// The same while the eye moves, at the resolution of the frame.
     moving: Option<Versioned<ViewMaps>>,
@@ -98,59 +85,41 @@ pub struct Queries {
     embeddings: Embeddings,
     /// Why there are none, once that was reported.
     reported: Option<String>,
-    /// Relevancy of the pixels, for the histogram.
-    heat: Vec<f32>,
-    texture: Option<TextureHandle>,
-    painted: Option<Painted>,
-    /// What answers are compared with, where the eye is, and what that came to.
+    /// What answers are compared with, and where the eye is.
     truth: Option<truth::ViewTruth>,
     eye: Option<Pose>,
-    comparison: Option<truth::TruthComparison>,
-    /// Of the target that is shown.
-    facts: Option<card::Facts>,
-    /// Pixels of identities in the present view, counted as they are listed.
-    areas: Areas,
-    /// What finding the pixels and drawing them took, of all queries on screen.
-    paint_ms: StagesMs,
-}
-
-/// Pixels of identities in a view, for one way of matching.
-#[derive(Default)]
-struct Areas {
-    /// View, objects and match that they were counted for.
-    of: (u64, u64, MatchMode, u32),
-    known: BTreeMap<IdentityId, (usize, Option<Vec2>)>,
 }
 
 impl Queries {
     /// All queries, the one being typed last.
     pub fn all(&self) -> impl Iterator<Item = &Asked> {
-        self.kept.iter().chain(&self.live)
+        self.side.all()
     }
 
     /// The query that is answered on screen.
     fn newest(&self) -> Option<&Asked> {
-        self.live.as_ref().or(self.kept.last())
+        self.side.live.as_ref().or(self.side.kept.last())
     }
 
     /// Shows this hit of the newest query alone, or the best again.
     fn choose(&mut self, chosen: Option<IdentityId>) {
-        if let (Some(id), Some(newest)) = (chosen, self.live.as_mut().or(self.kept.last_mut())) {
+        if let (Some(id), Some(newest)) = (chosen, self.side.live.as_mut().or(self.side.kept.last_mut())) {
             newest.chosen = (newest.chosen != Some(id)).then_some(id);
         }
     }
 
     /// The identities that are found on screen.
     pub fn found(&self) -> Vec<IdentityId> {
-        self.all().flat_map(|asked| asked.shown(&self.settings)).collect()
+        self.all().flat_map(|asked| asked.shown(&self.side.settings)).collect()
     }
 
     /// The same with the colors of their queries.
     pub(super) fn found_colors(&self) -> Vec<(IdentityId, Color32)> {
-        let colors = COLORS.map(|[r, g, b]| Color32::from_rgb(r, g, b));
-        let colored =
-            |(k, q): (usize, &Asked)| q.shown(&self.settings).into_iter().map(move |id| (id, colors[k % COLORS.len()]));
-        self.all().enumerate().flat_map(colored).collect()
+        let colored = |q: &Asked| {
+            let [r, g, b] = self.colors.of(&q.text);
+            q.shown(&self.side.settings).into_iter().map(move |id| (id, Color32::from_rgb(r, g, b)))
+        };
+        self.all().flat_map(colored).collect()
     }
 
     /// What the present view's pixels belong to, once that is drawn.
@@ -165,12 +134,13 @@ impl Queries {
 
     /// Whether blended codes of the view are wanted.
     pub(crate) fn wants_codes(&self) -> bool {
-        self.settings.mode == MatchMode::Blend || self.settings.color_by == ColorBy::Difference
+        let needs = |s: &OverlaySettings| s.mode == MatchMode::Blend || s.color_by == ColorBy::Difference;
+        self.sides().iter().any(|side| needs(&side.settings))
     }
 
     /// Puts the cursor into the box.
     pub(crate) fn start_typing(&mut self) {
-        (self.focus, self.wanted) = (true, true);
+        (self.side.focus, self.wanted) = (true, true);
     }
 
     /// Answers anew where objects and parts, or embeddings, have changed.
@@ -178,7 +148,7 @@ impl Queries {
         let encoder = semantics.language.as_ref().map(|l| l.encoder.as_str());
         let now = semantics.generation();
         // One that is of no more use goes at once, one that is new waits for a query.
-        let texts = self.all().map(|q| q.reading.phrase.clone()).collect();
+        let texts = self.sides().into_iter().flat_map(QuerySide::all).map(|q| q.reading.phrase.clone()).collect();
         let encoded =
             (encoder.is_none() || plan.encoder.now(self.wanted)) && self.embeddings.keep_up(ctx, encoder, texts);
         if encoded || self.answered_for != now {
@@ -189,35 +159,42 @@ impl Queries {
 
     /// Asks as if it had been typed.
     pub(crate) fn ask(&mut self, text: &str, semantics: &SemanticMap) {
-        self.typed = text.to_owned();
+        self.side.typed = text.to_owned();
         self.wanted = true;
-        self.live = self.asked(text, semantics);
+        self.colors.keep(text);
+        self.side.live = self.asked(text, semantics);
     }
 
     /// Shows the answers to these queries, and no others.
     pub(crate) fn mark(&mut self, texts: &[String], semantics: &SemanticMap) {
-        self.typed.clear();
+        self.side.typed.clear();
         self.wanted = true;
-        self.kept = texts.iter().filter_map(|text| self.asked(text, semantics)).collect();
-        self.live = None;
-        if let Some(last) = self.kept.pop() {
-            self.typed.clone_from(&last.text);
-            self.live = Some(last);
+        self.colors.keep_all(texts);
+        self.side.kept = texts.iter().filter_map(|text| self.asked(text, semantics)).collect();
+        self.side.live = None;
+        if let Some(last) = self.side.kept.pop() {
+            self.side.typed.clone_from(&last.text);
+            self.side.live = Some(last);
         }
     }
 
     /// Answers all queries anew: identities have changed.
     pub(crate) fn ask_again(&mut self, semantics: &SemanticMap) {
-        let texts: Vec<String> = self.kept.iter().map(|q| q.text.clone()).collect();
-        self.kept = texts.iter().filter_map(|text| self.asked(text, semantics)).collect();
-        self.live = self.live.take().and_then(|q| self.asked(&q.text, semantics));
+        for second in [false, true] {
+            self.in_view(second, |all| {
+                let kept = std::mem::take(&mut all.side.kept);
+                all.side.kept = kept.iter().filter_map(|q| all.asked(&q.text, semantics)).collect();
+                all.side.live = all.side.live.take().and_then(|q| all.asked(&q.text, semantics));
+            });
+        }
     }
 
     /// Forgets queries and answers: another scene.
     pub(crate) fn clear(&mut self) {
-        let history = std::mem::take(&mut self.history);
-        let embeddings = std::mem::take(&mut self.embeddings);
-        *self = Self { settings: self.settings, history, embeddings, ..Self::default() };
+        let before = std::mem::take(self);
+        let (side, other) = (before.side.cleared(), before.other.cleared());
+        let Self { is_second, history, colors, embeddings, .. } = before;
+        *self = Self { side, other, is_second, history, colors, embeddings, ..Self::default() };
     }
 
     /// Why only names are understood, once for each reason.
@@ -245,26 +222,26 @@ impl Queries {
 
     /// Colors the view by this; by nothing but masks if it is colored so.
     pub(crate) fn tint(&mut self, by: ColorBy) {
-        self.settings.color_by = if self.settings.color_by == by { ColorBy::Masks } else { by };
+        self.side.settings.color_by = if self.side.settings.color_by == by { ColorBy::Masks } else { by };
         self.wanted = true;
     }
 
     /// How answers are drawn.
     pub(super) fn settings(&mut self) -> &mut OverlaySettings {
-        &mut self.settings
+        &mut self.side.settings
     }
 
     /// Whether anything is drawn over the frame that depends on what its pixels belong to.
     pub(super) fn tints(&self) -> bool {
-        self.painted.is_some()
+        self.sides().iter().any(|side| side.painted.is_some())
     }
 
     fn asked(&self, text: &str, semantics: &SemanticMap) -> Option<Asked> {
         let text = text.trim();
-        let reading = QueryReading::new(&semantics.identities, text, self.settings.kind)?;
+        let reading = QueryReading::new(&semantics.identities, text, self.side.settings.kind)?;
         let phrase = &reading.phrase;
         let encoded = self.embeddings.of(phrase);
-        let mut answered = answer_encoded(semantics, phrase, self.settings.kind, self.embeddings.phrases(phrase));
+        let mut answered = answer_encoded(semantics, phrase, self.side.settings.kind, self.embeddings.phrases(phrase));
         answered.stages.encode = encoded.map_or(0.0, |t| t.encode_ms);
         let to_encoder = encoded.map(|t| t.unknown.as_slice());
         let unknown = names::unknown_to_all(&semantics.identities, &phrase.text, to_encoder);
@@ -275,7 +252,7 @@ impl Queries {
 
     /// The target's pixels in the present view.
     fn mask_of(&self, maps: &ViewMaps, semantics: &SemanticMap, target: IdentityId) -> Mask {
-        maps.mask(semantics, target, self.settings.mode, self.settings.tolerance)
+        maps.mask(semantics, target, self.side.settings.mode, self.side.settings.tolerance)
     }
 
     /// Pixels of an identity in the present view, if that is drawn.
@@ -292,88 +269,19 @@ impl Queries {
     /// Both, found once for a view.
     fn measured(&mut self, semantics: &Versioned<SemanticMap>, id: IdentityId) -> Option<(usize, Option<Vec2>)> {
         let maps = self.maps.clone()?;
-        let OverlaySettings { mode, tolerance, .. } = self.settings;
+        let OverlaySettings { mode, tolerance, .. } = self.side.settings;
         let of = (maps.generation(), semantics.generation(), mode, tolerance.to_bits());
-        if self.areas.of != of {
-            self.areas = Areas { of, known: BTreeMap::new() };
+        if self.side.areas.of != of {
+            self.side.areas = Areas { of, known: BTreeMap::new() };
         }
-        if let Some(known) = self.areas.known.get(&id) {
+        if let Some(known) = self.side.areas.known.get(&id) {
             return Some(*known);
         }
         let mask = self.mask_of(&maps, semantics, id);
         let of = vec2(mask.width_px() as f32, mask.height_px() as f32);
         let span = mask.bounds().map(|b| vec2(b.x.len() as f32, b.y.len() as f32) / of);
-        self.areas.known.insert(id, (mask.area(), span));
+        self.side.areas.known.insert(id, (mask.area(), span));
         Some((mask.area(), span))
-    }
-
-    /// Masks and tints over the frame in `rect`.
-    pub(crate) fn paint(&mut self, ui: &Ui, rect: Rect, semantics: &Versioned<SemanticMap>) {
-        let Some(maps) = self.shown_maps().cloned() else { return };
-        let shown: Vec<Vec<IdentityId>> = self.all().map(|q| q.shown(&self.settings)).collect();
-        let newest = self.all().last().map(|q| q.text.clone());
-        let nothing =
-            shown.iter().all(Vec::is_empty) && matches!(self.settings.color_by, ColorBy::Masks | ColorBy::Heat);
-        if nothing && (newest.is_none() || self.settings.color_by == ColorBy::Masks) && self.settings.threshold <= 0.0 {
-            (self.painted, self.paint_ms) = (None, StagesMs::default());
-            return;
-        }
-        let painted = Painted {
-            maps: maps.generation(),
-            semantics: semantics.generation(),
-            shown,
-            newest,
-            settings: self.settings,
-        };
-        if self.painted.as_ref() != Some(&painted) {
-            let start = Instant::now();
-            let image = self.image(&maps, &painted.shown, semantics);
-            match &mut self.texture {
-                Some(texture) => texture.set(image, TextureOptions::LINEAR),
-                None => self.texture = Some(ui.ctx().load_texture("masks", image, TextureOptions::LINEAR)),
-            }
-            self.paint_ms.draw = ms_since(start) - self.paint_ms.mask;
-            self.painted = Some(painted);
-        }
-        if let Some(texture) = &self.texture {
-            let uv = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
-            ui.painter().image(texture.id(), rect, uv, Color32::WHITE);
-        }
-    }
-
-    fn image(&mut self, maps: &ViewMaps, shown: &[Vec<IdentityId>], semantics: &SemanticMap) -> egui::ColorImage {
-        let union = |ids: &Vec<IdentityId>| {
-            let mut mask = Mask::empty(maps.identities.width_px, maps.identities.height_px);
-            ids.iter().for_each(|id| mask.add(&self.mask_of(maps, semantics, *id)));
-            mask
-        };
-        let start = Instant::now();
-        let masks: Vec<([u8; 3], Mask)> =
-            shown.iter().enumerate().map(|(k, ids)| (COLORS[k % COLORS.len()], union(ids))).collect();
-        let masks = self.compared(masks);
-        self.paint_ms.mask = ms_since(start);
-        let newest = self.all().last();
-        let relevancy = newest.map_or_else(Vec::new, |q| q.answered.relevancy.clone());
-        let features = match (&semantics.language, self.settings.color_by) {
-            (Some(language), ColorBy::Features) => {
-                let of = |f: &crate::scene::ViewFeatures| f.deviated.first().cloned();
-                let vectors: Vec<Option<Vec<f32>>> =
-                    std::iter::once(None).chain(language.by_identity.iter().map(of)).collect();
-                overlay::main_directions(&vectors.iter().map(Option::as_deref).collect::<Vec<_>>())
-            }
-            _ => Vec::new(),
-        };
-        self.heat = newest.map_or_else(Vec::new, |q| q.answered.heat(&maps.identities));
-        let layers = overlay::Layers {
-            map: &maps.identities,
-            codes: maps.codes.as_ref(),
-            identities: &semantics.identities,
-            masks: &masks,
-            relevancy: &relevancy,
-            features: &features,
-            settings: self.settings,
-        };
-        layers.paint()
     }
 }
 

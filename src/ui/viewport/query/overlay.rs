@@ -13,6 +13,9 @@ use crate::scene::semantic_map::CODE_CHANNELS;
 use crate::scene::{Identities, IdentityId, Level, Mask};
 use crate::ui::color_by::ColorBy;
 
+/// Over what is neither found nor selected.
+const DIM: Color32 = Color32::from_black_alpha(165);
+
 /// Where blended codes differ.
 const DIFFERENT: [u8; 3] = [255, 60, 160];
 
@@ -25,6 +28,8 @@ pub(crate) struct Layers<'a> {
     pub(crate) identities: &'a Identities,
     /// Masks of the answers, with their colors; later ones on top.
     pub(crate) masks: &'a [([u8; 3], Mask)],
+    /// What stays bright while everything else is dimmed.
+    pub(crate) lit: Option<&'a Mask>,
     /// Relevancy of each identity by number.
     pub(crate) relevancy: &'a [f32],
     /// Colors of the language features of each identity by number.
@@ -50,6 +55,7 @@ impl Layers<'_> {
             let topmost = outlines.filter(|o| o.1 != Outline::Outside).min_by_key(|o| o.1 == Outline::Halo);
             match topmost.filter(|o| filled || o.1 != Outline::Fill) {
                 Some((color, outline)) => outline.color(*color).unwrap_or_default(),
+                None if self.lit.is_some_and(|lit| !lit.contains(i)) => DIM,
                 None => {
                     let own = || tints.get(self.map.identity[i] as usize).copied().flatten();
                     let tint = match self.settings.color_by {
@@ -168,6 +174,7 @@ mod tests {
             codes: None,
             identities: &identities,
             masks: &masks,
+            lit: None,
             relevancy: &relevancy,
             features: &[],
             settings,
@@ -181,6 +188,28 @@ mod tests {
         let of = |outline: Outline| outline.color([255, 179, 0]).expect("a color");
         assert_eq!((image.pixels[8], image.pixels[9]), (Color32::TRANSPARENT, of(Outline::Halo)));
         assert_eq!((image.pixels[10], image.pixels[12]), (of(Outline::Line), of(Outline::Fill)));
+    }
+
+    #[test]
+    fn all_is_dimmed_but_what_is_lit() {
+        let (identities, map) = scene();
+        let masks = [([255, 179, 0], map.mask(&identities, 2))];
+        let lit = map.mask(&identities, 2);
+        let mut layers = Layers {
+            map: &map,
+            codes: None,
+            identities: &identities,
+            masks: &masks,
+            lit: Some(&lit),
+            relevancy: &[],
+            features: &[],
+            settings: OverlaySettings::default(),
+        };
+        let image = layers.paint();
+        assert_eq!((image.pixels[8], image.pixels[12]), (DIM, Outline::Fill.color([255, 179, 0]).expect("a fill")));
+        assert_eq!(image.pixels.iter().filter(|p| **p == DIM).count(), 3, "not the halo");
+        layers.lit = None;
+        assert!(layers.paint().pixels.iter().all(|p| *p != DIM), "the control");
     }
 
     #[test]
@@ -209,6 +238,7 @@ mod tests {
             codes: Some(&codes),
             identities: &identities,
             masks: &[],
+            lit: None,
             relevancy: &[],
             features: &[],
             settings,

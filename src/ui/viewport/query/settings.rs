@@ -50,34 +50,43 @@ impl Default for OverlaySettings {
 pub(crate) fn show(ui: &mut Ui, settings: &mut OverlaySettings, heat: Option<&[f32]>) -> bool {
     let kind = settings.kind;
     egui::Grid::new("overlay settings").num_columns(2).spacing(vec2(10.0, 5.0)).show(ui, |ui| {
-        ui.weak("Level");
+        ui.weak("Search in");
         ui.horizontal(|ui| {
             for (kind, text) in
-                [(LevelFilter::Auto, "from the query"), (LevelFilter::Object, "objects"), (LevelFilter::Part, "parts")]
+                [(LevelFilter::Auto, "auto"), (LevelFilter::Object, "objects"), (LevelFilter::Part, "parts")]
             {
                 ui.selectable_value(&mut settings.kind, kind, text);
             }
         });
         ui.end_row();
         ui.weak("Top answers");
-        ui.add(Slider::new(&mut settings.top, 1..=8)).on_hover_text("How many answers are outlined at once");
+        let top = ui.add(Slider::new(&mut settings.top, 1..=8)).accessible_name("Top answers");
+        top.on_hover_text("How many answers are outlined at once");
         ui.end_row();
         ui.weak("Color by");
         ui.horizontal(|ui| {
-            ComboBox::from_id_salt("color by").selected_text(settings.color_by.text()).width(112.0).show_ui(ui, |ui| {
-                for &tint in ColorBy::VARIANTS {
-                    ui.selectable_value(&mut settings.color_by, tint, tint.text());
-                }
-            });
-            ComboBox::from_id_salt("colormap").selected_text(settings.colormap.text()).width(70.0).show_ui(ui, |ui| {
-                for &map in Colormap::VARIANTS {
-                    ui.selectable_value(&mut settings.colormap, map, map.text());
-                }
-            });
+            let color = ComboBox::from_id_salt("color by")
+                .selected_text(settings.color_by.text())
+                .width(112.0)
+                .show_ui(ui, |ui| {
+                    for &tint in ColorBy::VARIANTS {
+                        ui.selectable_value(&mut settings.color_by, tint, tint.text());
+                    }
+                });
+            color.response.accessible_name("Color by");
+            let colors = ComboBox::from_id_salt("colormap")
+                .selected_text(settings.colormap.text())
+                .width(70.0)
+                .show_ui(ui, |ui| {
+                    for &map in Colormap::VARIANTS {
+                        ui.selectable_value(&mut settings.colormap, map, map.text());
+                    }
+                });
+            colors.response.accessible_name("Color map");
         });
         ui.end_row();
         ui.weak("Opacity");
-        ui.add(Slider::new(&mut settings.opacity, 0.0..=1.0).fixed_decimals(2));
+        ui.add(Slider::new(&mut settings.opacity, 0.0..=1.0).fixed_decimals(2)).accessible_name("Opacity");
         ui.end_row();
         ui.weak("Mask");
         ui.horizontal(|ui| {
@@ -90,7 +99,8 @@ pub(crate) fn show(ui: &mut Ui, settings: &mut OverlaySettings, heat: Option<&[f
         ui.weak("Tolerance");
         let mut steps = settings.tolerance * 255.0;
         let slider = Slider::new(&mut steps, 0.0..=64.0).fixed_decimals(0).suffix(" / 255");
-        if ui.add(slider).on_hover_text("Largest difference per channel from the target's code").changed() {
+        let slider = ui.add(slider).accessible_name("Tolerance");
+        if slider.on_hover_text("Largest difference per channel from the target's code").changed() {
             settings.tolerance = steps / 255.0;
         }
         ui.end_row();
@@ -116,7 +126,8 @@ fn histogram(ui: &mut Ui, settings: &mut OverlaySettings, heat: &[f32]) {
         }
     });
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), 54.0), Sense::click_and_drag());
-    let response = response.on_hover_text("Drag: outline all pixels of at least this relevancy. Double-click: none");
+    response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Relevancy threshold"));
+    let response = response.on_hover_text("Drag: outline pixels with at least this relevancy. Double-click: off");
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 3.0, theme::canvas());
     // Logarithmic: most pixels have nothing to do with a query.

@@ -16,7 +16,7 @@ fn a_question_is_kept_and_answers_follow_the_names() {
     queries.ask("the lamp's shade", &semantics);
     queries.keep();
     queries.ask("lamp", &semantics);
-    let shown = |q: &Queries| q.all().map(|a| a.shown(&q.settings)).collect::<Vec<_>>();
+    let shown = |q: &Queries| q.all().map(|a| a.shown(&q.side.settings)).collect::<Vec<_>>();
     assert_eq!(shown(&queries), [vec![2], vec![1]]);
     queries.ask("giraffe", &semantics);
     assert!(shown(&queries)[1].is_empty());
@@ -24,7 +24,7 @@ fn a_question_is_kept_and_answers_follow_the_names() {
     queries.ask_again(&semantics);
     assert_eq!(shown(&queries), [Vec::new(), vec![2]]);
     queries.ask("  ", &semantics);
-    assert!(queries.live.is_none());
+    assert!(queries.side.live.is_none());
 }
 
 #[test]
@@ -36,5 +36,36 @@ fn history_is_kept_once_each() {
     }
     assert_eq!(queries.history, ["shade", "lamp"]);
     queries.clear();
-    assert_eq!((queries.history.len(), queries.kept.len()), (2, 0));
+    assert_eq!((queries.history.len(), queries.side.kept.len()), (2, 0));
+}
+
+#[test]
+fn two_views_have_their_own_queries_and_the_same_colors() {
+    let (semantics, mut queries) = (semantics(), Queries::default());
+    queries.ask("lamp", &semantics);
+    queries.in_view(true, |second| {
+        assert!(second.all().next().is_none(), "nothing is asked there yet");
+        second.ask("the lamp's shade", &semantics);
+        second.keep();
+        second.tint(ColorBy::Objects);
+    });
+    assert!(!queries.is_second() && queries.side.settings.color_by == ColorBy::Masks);
+    queries.ask_again(&semantics);
+    let colors = |q: &mut Queries, second| q.in_view(second, |q| q.found_colors());
+    let (first, second) = (colors(&mut queries, false), colors(&mut queries, true));
+    assert_eq!((first[0].0, second[0].0), (1, 2));
+    assert_ne!(first[0].1, second[0].1);
+    // The other way around, each has its color.
+    queries.ask("the  Lamp's shade", &semantics);
+    queries.in_view(true, |q| q.mark(&["lamp".into()], &semantics));
+    assert_eq!((colors(&mut queries, false)[0].1, colors(&mut queries, true)[0].1), (second[0].1, first[0].1));
+    assert_eq!(queries.kept_texts(), [Vec::<String>::new(), Vec::new()]);
+    queries.work_in(true);
+    queries.keep();
+    assert_eq!(queries.kept_texts(), [vec![], vec!["lamp".to_owned()]], "in the order of the views");
+    queries.keep_only(&[vec!["lamp".into()], vec![]], &semantics);
+    assert_eq!(queries.kept_texts(), [vec!["lamp".to_owned()], vec![]]);
+    queries.clear();
+    assert!(queries.is_second() && queries.in_view(false, |q| q.all().next().is_none()));
+    assert_eq!(queries.colors.of("lamp"), [255, 179, 0], "known in the next scene too");
 }

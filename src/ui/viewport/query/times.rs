@@ -16,11 +16,11 @@ const COLORS: [Color32; 5] = [
 ];
 
 /// What each stage is, for the user.
-const MEANING: &str = "encode: the words become vectors; nothing to do where they were typed before\n\
-    relevancy: every object and part is scored\n\
-    localize: those that are meant are chosen\n\
-    mask: their pixels in this view are found\n\
-    draw: the pixels become an overlay";
+const MEANING: &str = "encode: text to embeddings (cached)\n\
+    relevancy: score every object and part\n\
+    localize: choose the matches\n\
+    mask: find their pixels in this view\n\
+    draw: paint the overlay";
 
 /// Draws the bar with its numbers.
 pub(crate) fn show(ui: &mut Ui, basis: &str, stages: &StagesMs) {

@@ -30,7 +30,7 @@ impl Queries {
     /// Compares answers with a mask of the view from this pose; with none, shows them plainly again.
     pub(crate) fn compare_with(&mut self, truth: Option<(Arc<Mask>, Pose)>) {
         self.truth = truth.map(|(mask, at)| ViewTruth { mask, at });
-        (self.painted, self.comparison) = (None, None);
+        self.forget_painted();
     }
 
     /// Says where the eye is: a mask is true of one view alone.
@@ -38,7 +38,7 @@ impl Queries {
         if self.eye != Some(pose) {
             self.eye = Some(pose);
             if self.truth.is_some() {
-                (self.painted, self.comparison) = (None, None);
+                self.forget_painted();
             }
         }
     }
@@ -49,9 +49,14 @@ impl Queries {
         self.truth.as_ref().filter(here).map(|t| Arc::clone(&t.mask))
     }
 
+    /// Whether the answer of the view is shown against the truth.
+    pub(crate) fn compares(&self) -> bool {
+        self.side.comparison.is_some()
+    }
+
     /// How pixels are matched, and the largest difference per channel.
     pub(crate) fn matching(&self) -> (MatchMode, f32) {
-        (self.settings.mode, self.settings.tolerance)
+        (self.side.settings.mode, self.side.settings.tolerance)
     }
 
     /// The masks as they are drawn: the newest against the truth of this view, where there is one.
@@ -59,7 +64,7 @@ impl Queries {
         let (Some(truth), Some((_, newest))) = (self.truth(), masks.last()) else { return masks };
         let truth = truth.resized(newest.width_px(), newest.height_px());
         let (comparison, masks) = compare(newest, &truth);
-        self.comparison = Some(comparison);
+        self.side.comparison = Some(comparison);
         COLORS.into_iter().zip(masks).collect()
     }
 }
@@ -128,8 +133,8 @@ mod tests {
         assert!(queries.truth().is_some(), "back again");
         let masks = queries.compared(vec![([1; 3], Mask::from_fn(2, 2, |i| i == 0))]);
         assert_eq!(masks.iter().map(|m| m.1.area()).collect::<Vec<_>>(), [1, 3, 0]);
-        assert_eq!(queries.comparison.as_ref().map(|c| c.iou), Some(0.25));
+        assert_eq!(queries.side.comparison.as_ref().map(|c| c.iou), Some(0.25));
         queries.compare_with(None);
-        assert!(queries.truth().is_none() && queries.comparison.is_none());
+        assert!(queries.truth().is_none() && queries.side.comparison.is_none());
     }
 }

@@ -1,0 +1,113 @@
+//! What the actions about the view and what is selected in it do.
+
+use egui::Context;
+use glam::DVec2;
+
+use super::app::App;
+use super::labels;
+use super::state::Tone;
+use crate::navigate::target::Side;
+use crate::scene::{Identities, IdentityId, NOBODY};
+use crate::ui::actions::{Action, Pane};
+use crate::worker::Command;
+
+impl App {
+    pub(super) fn view(&mut self, action: &Action, ctx: &Context) {
+        let now = ctx.input(|i| i.time);
+        self.viewport.act(action, &self.state, &self.worker, now);
+        if *action == Action::Inspect && self.viewport.is_inspecting() {
+            self.inspect(DVec2::splat(0.5));
+        }
+    }
+
+    /// Ends what was begun last: a tool, a selection, the running job.
+    pub(super) fn dismiss(&mut self, ctx: &Context) {
+        match self.viewport.tool() {
+            Some(tool) => self.view(&tool, ctx),
+            None if self.viewport.picking.selected().is_some() => self.view(&Action::Select(None), ctx),
+            None if self.full_view => self.arrange(&Action::FillWindow, ctx),
+            None => self.act(Action::Cancel, ctx),
+        }
+    }
+
+    /// Looks into the pixel at a relative place of the view.
+    pub(super) fn inspect(&mut self, at: DVec2) {
+        if let Some(request) = self.viewport.inspect_request(at, &self.state) {
+            self.submit(Command::Inspect(Box::new(request)));
+        }
+    }
+
+    /// What is selected, or else what was asked for.
+    fn chosen_identity(&self) -> Option<IdentityId> {
+        self.viewport.picking.selected().or_else(|| self.viewport.queries.found().first().copied())
+    }
+
+    /// Does what a key means for what is selected.
+    pub(super) fn act_on_selected(&mut self, action: &Action, ctx: &Context) {
+        let Some(id) = self.chosen_identity() else {
+            return self.state.toast(Tone::Info, "Nothing is selected: click an object in the view, or press N.");
+        };
+        let action = match action {
+            Action::HideSelected => Action::Hide(id),
+            Action::GoToSelected => Action::GoToTarget(id, Side::Best),
+            _ => Action::Isolate(Some(id).filter(|_| !self.viewport.visibility.is_isolated())),
+        };
+        self.act(action, ctx);
+    }
+
+    /// Selects the next object, or the part next to the one that is selected; the one before; or the first part of
+    /// what is selected. The order is that of the list.
+    pub(super) fn select_another(&mut self, action: &Action, ctx: &Context) {
+        let Some(map) = self.state.semantics.clone() else {
+            return self.state.toast(Tone::Info, "There are no objects yet: find them first (Objects pane).");
+        };
+        let all = &map.identities;
+        let selected = self.viewport.picking.selected();
+        let next = match (action, selected) {
+            (Action::SelectInner, selected) => {
+                let Some(whole) = selected.or_else(|| self.chosen_identity()) else {
+                    return self.state.toast(Tone::Info, "Nothing is selected: press N first.");
+                };
+                let first = listed(all, &self.state.sizes, whole).first().copied();
+                if first.is_none() {
+                    let name = self.state.labels.full_name(all, whole);
+                    return self.state.toast(Tone::Info, format!("{name} has no parts."));
+                }
+                first
+            }
+            (_, selected) => {
+                let parent = selected.and_then(|id| all.get(id)).map_or(NOBODY, |i| i.parent);
+                let list = listed(all, &self.state.sizes, parent);
+                let back = *action == Action::SelectPrevious;
+                let at = selected.and_then(|id| list.iter().position(|i| *i == id));
+                let step = if back { list.len().saturating_sub(1) } else { 1 };
+                let first = if back { list.last() } else { list.first() };
+                at.map_or(first, |at| list.get((at + step) % list.len())).copied()
+            }
+        };
+        if next.is_some() {
+            self.view(&Action::Select(next), ctx);
+        }
+    }
+
+    /// Makes a text field of the name that was chosen last.
+    pub(super) fn start_renaming(&mut self) {
+        match (self.chosen_identity(), self.state.semantics.clone()) {
+            (Some(id), Some(map)) => {
+                self.layout.show(Pane::Objects);
+                self.objects.rename(id, &map.identities);
+            }
+            _ => self
+                .state
+                .toast(Tone::Info, "Choose what to rename first: click it in the view or its name in the list."),
+        }
+    }
+}
+
+/// The pieces of an identity, or the objects, as the list has them.
+fn listed(all: &Identities, sizes: &[usize], of: IdentityId) -> Vec<IdentityId> {
+    let ids = all.iter().filter(|(_, i)| i.parent == of).map(|(id, _)| id).collect();
+    let (mut shown, mut tiny) = labels::listed(all, sizes, ids);
+    shown.append(&mut tiny);
+    shown
+}

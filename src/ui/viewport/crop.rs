@@ -1,0 +1,183 @@
+//! The crop box in the view: its edges, faces that are dragged, and a card with its corners as numbers.
+
+use egui::{
+    Align2, Area, Button, Color32, CursorIcon, DragValue, Grid, Id, Order, Pos2, Rect, Sense, Stroke, Ui, Vec2, vec2,
+};
+use glam::DVec3;
+
+use super::super::{keys, theme};
+use super::Viewport;
+use super::frusta::clipped;
+use crate::math::format;
+use crate::scene::{Bounds, Camera, CropBox};
+use crate::ui::actions::Action;
+use crate::ui::state::AppState;
+
+/// Radius of what a face is dragged by, points.
+const HANDLE: f32 = 6.0;
+/// Steps from one side of a scene to the other while a number is dragged.
+const STEPS: f64 = 500.0;
+
+impl Viewport {
+    /// Draws the box and takes what is done to it.
+    pub(super) fn show_crop(&mut self, ui: &Ui, shown: Rect, state: &AppState, actions: &mut Vec<Action>) {
+        let Some(scene) = state.scene.as_ref().filter(|_| self.cropping) else { return };
+        let before = self.visibility.crop();
+        let mut crop = before;
+        if let Some(crop) = &mut crop {
+            let eye = self.overlay_camera(shown);
+            draw_edges(ui, shown, &eye, &crop.bounds);
+            for axis in 0..3 {
+                for high in [false, true] {
+                    drag_face(ui, shown, &eye, crop, axis, high);
+                }
+            }
+        }
+        let selected = self.selected_bounds(state.semantics.as_ref());
+        // Above the facts about the frame.
+        let at = Align2::LEFT_BOTTOM.pos_in_rect(&shown.shrink(12.0)) - vec2(0.0, 40.0);
+        let area = Area::new(Id::unique("crop")).order(Order::Middle).pivot(Align2::LEFT_BOTTOM).fixed_pos(at);
+        area.constrain_to(shown).show(ui.ctx(), |ui| {
+            theme::overlay().show(ui, |ui| {
+                if let Some(crop) = &mut crop {
+                    numbers(ui, crop, 2.0 * scene.home.bounds.radius() / STEPS);
+                }
+                ui.horizontal(|ui| {
+                    let mut fit = |ui: &mut Ui, text: &str, tip: &str, to: Option<Bounds>| {
+                        let button = ui.add_enabled(to.is_some(), Button::new(text)).on_hover_text(tip);
+                        if let Some(bounds) = to.filter(|_| button.clicked()) {
+                            crop = Some(CropBox { bounds, outside: crop.is_some_and(|c| c.outside) });
+                        }
+                    };
+                    fit(ui, "Fit scene", "The box of the scene without its stray points.", Some(scene.home.bounds));
+                    fit(ui, "Fit selection", "The box of what is selected.", selected);
+                    if ui.add_enabled(crop.is_some(), Button::new("Remove")).on_hover_text("Show all again.").clicked()
+                    {
+                        crop = None;
+                    }
+                });
+                ui.horizontal(|ui| {
+                    let export = Action::ExportCrop;
+                    let button = ui.add_enabled(crop.is_some(), Button::new("Export\u{2026}"));
+                    if button.on_hover_text(export.text()).clicked() {
+                        actions.push(export);
+                    }
+                    let close = ui
+                        .button("Close")
+                        .on_hover_text(format!("What is cropped stays so.  {}", keys::label(ui.ctx(), &Action::Crop)));
+                    if close.clicked() {
+                        actions.push(Action::Crop);
+                    }
+                    if let Some(count) = self.visibility.count() {
+                        ui.weak(format!("{} Gaussians", format::count(count as u64)));
+                    }
+                });
+            });
+        });
+        if crop != before {
+            self.visibility.set_crop(crop);
+            ui.ctx().request_repaint();
+        }
+    }
+}
+
+/// The corners, scene units, and whether what is outside is kept.
+fn numbers(ui: &mut Ui, crop: &mut CropBox, step: f64) {
+    Grid::new("crop corners").num_columns(4).spacing([8.0, 4.0]).show(ui, |ui| {
+        for high in [false, true] {
+            let corner = if high { "To" } else { "From" };
+            ui.label(corner);
+            for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+                let Bounds { min, max } = crop.bounds;
+                let (mut value, range) = match high {
+                    true => (max[axis], min[axis]..=f64::INFINITY),
+                    false => (min[axis], f64::NEG_INFINITY..=max[axis]),
+                };
+                let field = DragValue::new(&mut value).speed(step).range(range).max_decimals(4);
+                let field = ui.add(field.prefix(format!("{name} "))).accessible_name(format!("{corner} {name}"));
+                if field.changed() {
+                    crop.put_face(axis, high, value);
+                }
+            }
+            ui.end_row();
+        }
+    });
+    ui.checkbox(&mut crop.outside, "Keep what is outside").on_hover_text("Show what is not in the box instead.");
+}
+
+fn corner(bounds: &Bounds, i: usize) -> DVec3 {
+    let Bounds { min, max } = bounds;
+    DVec3::from_array(std::array::from_fn(|axis| if i >> axis & 1 == 1 { max[axis] } else { min[axis] }))
+}
+
+/// The twelve edges.
+fn draw_edges(ui: &Ui, shown: Rect, eye: &Camera, bounds: &Bounds) {
+    let painter = ui.painter_at(shown);
+    let place = |p: glam::DVec2| shown.min + vec2(p.x as f32, p.y as f32);
+    for axis in 0..3 {
+        for i in (0..8).filter(|i| i >> axis & 1 == 0) {
+            let Some((a, b)) = clipped(eye, corner(bounds, i), corner(bounds, i | 1 << axis)) else { continue };
+            for stroke in [Stroke::new(3.0, Color32::from_black_alpha(110)), Stroke::new(1.3, theme::warning())] {
+                painter.line_segment([place(a), place(b)], stroke);
+            }
+        }
+    }
+}
+
+/// The middle of a face, by which it is dragged along its axis.
+fn drag_face(ui: &Ui, shown: Rect, eye: &Camera, crop: &mut CropBox, axis: usize, high: bool) {
+    let Bounds { min, max } = crop.bounds;
+    let mut middle = crop.bounds.center();
+    middle[axis] = if high { max[axis] } else { min[axis] };
+    let Some((at, along)) = on_screen(eye, shown, middle, axis) else { return };
+    // Dragged only: what can be had by keys are the numbers.
+    let id = Id::unique("crop face").with((axis, high));
+    let handle = ui.interact(Rect::from_center_size(at, Vec2::splat(3.0 * HANDLE)), id, Sense::DRAG);
+    if handle.dragged() {
+        crop.put_face(axis, high, middle[axis] + travel(handle.drag_delta(), along));
+    }
+    let held = handle.hovered() || handle.dragged();
+    let fill = if held { theme::accent() } else { theme::warning() };
+    ui.painter_at(shown).circle(at, HANDLE, fill, Stroke::new(1.5, Color32::from_black_alpha(200)));
+    if held {
+        handle.on_hover_and_drag_cursor(CursorIcon::Grab).on_hover_text("Drag the face of the crop box");
+    }
+}
+
+/// Where a point is in the view, and how far it goes there by one unit along an axis.
+fn on_screen(eye: &Camera, shown: Rect, p: DVec3, axis: usize) -> Option<(Pos2, Vec2)> {
+    let step = 1e-3 * (p - eye.center).length();
+    let mut beside = p;
+    beside[axis] += step;
+    let (a, b) = (eye.project(p)?, eye.project(beside)?);
+    let along = (b - a) / step;
+    let at = shown.min + vec2(a.x as f32, a.y as f32);
+    shown.contains(at).then_some((at, vec2(along.x as f32, along.y as f32)))
+}
+
+/// How far a face goes along its axis when the cursor moves so in the view, `along` being what one unit is there.
+fn travel(drag: Vec2, along: Vec2) -> f64 {
+    // An axis that points at the eye would carry it away.
+    let length_sq = along.length_sq();
+    if length_sq < 1.0 { 0.0 } else { f64::from(drag.dot(along) / length_sq) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_face_follows_the_cursor_along_its_axis() {
+        let eye = Camera::look_at(DVec3::new(0.0, -5.0, 0.0), DVec3::ZERO, DVec3::Z, 0.8, 400, 300).expect("valid");
+        let shown = Rect::from_min_size(egui::pos2(20.0, 30.0), vec2(400.0, 300.0));
+        let (at, along) = on_screen(&eye, shown, DVec3::X, 0).expect("in view");
+        assert!(along.x > 1.0 && along.y.abs() < 1e-2, "{along:?}");
+        // Where the cursor goes, there the face is.
+        let moved = travel(vec2(40.0, 7.0), along);
+        let (there, _) = on_screen(&eye, shown, DVec3::X + DVec3::X * moved, 0).expect("in view");
+        assert!((there.x - at.x - 40.0).abs() < 0.1, "{there:?} {at:?}");
+        let (_, towards) = on_screen(&eye, shown, DVec3::ZERO, 1).expect("in view");
+        assert_eq!(travel(vec2(40.0, 0.0), towards), 0.0, "an axis towards the eye is not dragged");
+        assert!(on_screen(&eye, shown, DVec3::X * 50.0, 0).is_none(), "beside the view");
+    }
+}

@@ -1,0 +1,245 @@
+//! The inspector: what a pixel consists of, Gaussian by Gaussian, with every property of each.
+
+use egui::{
+    Align2, Area, Button, Color32, Grid, Id, Order, Rect, Response, RichText, ScrollArea, Sense, Stroke, Ui, vec2,
+};
+use glam::{DQuat, DVec2, DVec3};
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use super::super::{keys, theme};
+use super::frusta::clipped;
+use super::visible::VisibleCloud;
+use super::{AppState, Viewport};
+use crate::jobs::inspect::{GaussianRecord, InspectRequest, InspectedPixel, PixelRecord};
+use crate::math::format;
+use crate::scene::Camera;
+use crate::ui::actions::Action;
+
+/// Standard deviations at which a Gaussian is outlined.
+const OUTLINE_SIGMA: f64 = 2.0;
+/// Corners of an outline.
+const CORNERS: usize = 48;
+
+/// The pixel that was looked into, and which of its Gaussians is shown.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Inspector {
+    pixel: Option<Arc<InspectedPixel>>,
+    /// Whether another is being looked into.
+    waits: bool,
+    place: usize,
+    record: Option<GaussianRecord>,
+}
+
+impl Inspector {
+    /// Shows a pixel from its largest Gaussian on.
+    pub(crate) fn take(&mut self, pixel: Arc<InspectedPixel>) {
+        self.record = pixel.record(0);
+        (self.pixel, self.place, self.waits) = (Some(pixel), 0, false);
+    }
+
+    fn go(&mut self, place: usize) {
+        if let Some(record) = self.pixel.as_ref().and_then(|pixel| pixel.record(place)) {
+            (self.place, self.record) = (place, Some(record));
+        }
+    }
+}
+
+impl Viewport {
+    /// Whether Gaussians are being inspected.
+    pub(crate) fn is_inspecting(&self) -> bool {
+        self.inspector.is_some()
+    }
+
+    /// What there is to look into at a relative place of the view.
+    pub(crate) fn inspect_request(&mut self, at: DVec2, state: &AppState) -> Option<InspectRequest> {
+        let (cloud, camera) = (self.cloud.clone()?, self.picture()?.camera.clone());
+        let VisibleCloud { cloud, semantics, numbers } = self.visibility.apply(&cloud, state.semantics.as_ref());
+        let size = DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px));
+        let pixel = (at * size).clamp(DVec2::ZERO, size - 1.0);
+        self.inspector.iter_mut().for_each(|inspector| inspector.waits = true);
+        Some(InspectRequest {
+            cloud: Arc::clone(&cloud),
+            map: semantics.as_deref().cloned(),
+            numbers,
+            settings: self.overrides.over(state.render_settings(), self.on_gpu()),
+            camera,
+            pixel: [pixel.x as u32, pixel.y as u32],
+        })
+    }
+
+    /// Takes clicks, outlines the Gaussian and tells all of it.
+    pub(super) fn show_inspector(
+        &mut self,
+        ui: &Ui,
+        response: &Response,
+        shown: Rect,
+        state: &AppState,
+        actions: &mut Vec<Action>,
+    ) {
+        let eye = self.overlay_camera(shown);
+        let Some(inspector) = &mut self.inspector else { return };
+        if let Some(pos) = response.interact_pointer_pos().filter(|pos| response.clicked() && shown.contains(*pos)) {
+            let at = (pos - shown.min) / shown.size();
+            actions.push(Action::InspectAt(DVec2::new(f64::from(at.x), f64::from(at.y))));
+        }
+        if let (Some(pixel), Some(record)) = (&inspector.pixel, &inspector.record) {
+            outline(ui, shown, &eye, pixel, record);
+        }
+        // Above the facts about the frame.
+        let at = Align2::LEFT_BOTTOM.pos_in_rect(&shown.shrink(12.0)) - vec2(0.0, 40.0);
+        let area = Area::new(Id::unique("inspector")).order(Order::Middle).pivot(Align2::LEFT_BOTTOM).fixed_pos(at);
+        let drawn = area.constrain_to(shown).show(ui.ctx(), |ui| {
+            theme::overlay().show(ui, |ui| {
+                ui.set_width((shown.width() - 44.0).clamp(120.0, 330.0));
+                card(ui, inspector, (shown.height() - 190.0).clamp(90.0, 420.0), state, actions);
+            });
+        });
+        // It has grown: the next frame puts it where it fits.
+        if drawn.response.rect.bottom() > at.y + 1.0 {
+            ui.ctx().request_repaint();
+        }
+    }
+}
+
+fn card(ui: &mut Ui, inspector: &mut Inspector, height: f32, state: &AppState, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Gaussian").strong());
+        let of = inspector.pixel.as_ref().map_or(0, |pixel| pixel.weights.len());
+        let (place, mut wanted) = (inspector.place, None);
+        let mut step = |ui: &mut Ui, text: &str, name: &str, to: Option<usize>| {
+            let button = ui.add_enabled(to.is_some(), Button::new(text)).on_hover_text(name);
+            if button.accessible_name(name).clicked() {
+                wanted = to;
+            }
+        };
+        step(ui, "\u{2039}", "Previous Gaussian", place.checked_sub(1));
+        step(ui, "\u{203a}", "Next Gaussian", Some(place + 1).filter(|next| *next < of));
+        if of > 0 {
+            ui.weak(format!("{} of {} by weight", place + 1, format::count(of as u64)));
+        }
+        if let Some(place) = wanted {
+            inspector.go(place);
+        }
+    });
+    match (&inspector.record, inspector.waits) {
+        (Some(record), _) => {
+            ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
+                properties(ui, record, state);
+            });
+        }
+        (None, true) => {
+            ui.weak("Looking into the pixel\u{2026}");
+        }
+        (None, false) => {
+            ui.weak("No Gaussian is drawn there. Click a place in the view.");
+        }
+    }
+    ui.horizontal(|ui| {
+        let copy = ui.add_enabled(inspector.record.is_some(), Button::new("Copy")).on_hover_text("As JSON");
+        if let Some(record) = inspector.record.as_ref().filter(|_| copy.clicked()) {
+            // Numbers and names always have a form in JSON.
+            ui.ctx().copy_text(serde_json::to_string_pretty(record).unwrap_or_default());
+        }
+        let close = ui.button("Close").on_hover_text(keys::label(ui.ctx(), &Action::Inspect));
+        if close.clicked() {
+            actions.push(Action::Inspect);
+        }
+    });
+}
+
+fn properties(ui: &mut Ui, record: &GaussianRecord, state: &AppState) {
+    let meters = state.scene.as_ref().and_then(|s| s.meters_per_unit());
+    let list = |values: &[f64]| values.iter().map(|v| format::short(*v)).collect::<Vec<_>>().join(", ");
+    let wide = |values: &[f32]| values.iter().map(|v| f64::from(*v)).collect::<Vec<_>>();
+    let of = |what: f32| format!("{:.1} %", 100.0 * what);
+    let mut more: Vec<(String, String)> = Vec::new();
+    for identity in &record.identities {
+        let name = state.semantics.as_ref().map(|map| state.labels.name(&map.identities, identity.number));
+        let (name, share) = (name.unwrap_or_default(), of(identity.pixel_share));
+        let text = format!("{name}, weight {:.2}, {share} of the pixel", identity.weight);
+        more.push((format!("{:?}", identity.level), text));
+    }
+    if record.identities.is_empty() && record.codes.is_some() {
+        more.push(("Belongs to".into(), "nothing".into()));
+    }
+    for (name, code) in ["Object code", "Part code"].iter().zip(record.codes.iter().flatten()) {
+        more.push(((*name).into(), list(&wide(code))));
+    }
+    more.extend(record.extras.iter().map(|(name, value)| (name.clone(), format::number(f64::from(*value)))));
+    let row = |ui: &mut Ui, name: &str, value: String| {
+        ui.label(RichText::new(name).color(theme::weak()));
+        ui.add(egui::Label::new(value).wrap());
+        ui.end_row();
+    };
+    Grid::new("gaussian").num_columns(2).spacing([10.0, 3.0]).show(ui, |ui| {
+        let PixelRecord { x, y, weight, share, .. } = record.pixel;
+        row(ui, "Number", format!("#{}", record.number));
+        row(ui, "Weight", format!("{weight:.4}, {} of pixel ({x}, {y})", of(share)));
+        row(ui, "Center", format!("{} units", list(&record.center)));
+        row(ui, "Scales", record.scales.map(|s| format::length(s, meters)).join(", "));
+        row(ui, "Rotation", record.rotation_wxyz.map_or_else(|| format::NONE.into(), |q| list(&wide(&q))));
+        row(ui, "Opacity", format!("{:.4}", record.opacity));
+        for (name, color) in [("Color from here", record.color), ("Base color", record.base_color)] {
+            ui.label(RichText::new(name).color(theme::weak()));
+            ui.horizontal(|ui| {
+                let (rect, _) = ui.allocate_exact_size(vec2(22.0, 14.0), Sense::hover());
+                let [r, g, b] = color.map(|c| (255.0 * c.clamp(0.0, 1.0)).round() as u8);
+                ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(r, g, b));
+                ui.label(list(&wide(&color)));
+            });
+            ui.end_row();
+        }
+        more.into_iter().for_each(|(name, value)| row(ui, &name, value));
+    });
+    ui.collapsing("Spherical harmonics", |ui| {
+        Grid::new("harmonics").num_columns(4).striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
+            for title in ["Band, order", "Red", "Green", "Blue"] {
+                ui.label(RichText::new(title).small().color(theme::weak()));
+            }
+            ui.end_row();
+            for (i, rgb) in record.sh.iter().enumerate() {
+                let band = i.isqrt();
+                ui.label(format!("{band}, {}", i as i64 - (band * band + band) as i64));
+                for value in rgb {
+                    ui.label(RichText::new(format!("{value:.4}")).monospace());
+                }
+                ui.end_row();
+            }
+        });
+    });
+}
+
+/// A cross on the pixel, while the view is that of the picture, and the Gaussian's three ellipses.
+fn outline(ui: &Ui, shown: Rect, eye: &Camera, pixel: &InspectedPixel, record: &GaussianRecord) {
+    let painter = ui.painter_at(shown);
+    let strokes = [Stroke::new(3.0, Color32::from_black_alpha(140)), Stroke::new(1.2, theme::accent())];
+    let rotation = record.rotation_wxyz.map_or(DQuat::IDENTITY, |[w, x, y, z]| {
+        DQuat::from_xyzw(f64::from(x), f64::from(y), f64::from(z), f64::from(w))
+    });
+    let (center, scales) = (DVec3::from_array(record.center), DVec3::from_array(record.scales) * OUTLINE_SIGMA);
+    let place = |p: DVec2| shown.min + vec2(p.x as f32, p.y as f32);
+    for stroke in strokes {
+        for axis in 0..3 {
+            let (a, b) = (axis, (axis + 1) % 3);
+            let corner = |k: usize| {
+                let mut p = DVec3::ZERO;
+                (p[b], p[a]) = (TAU * k as f64 / CORNERS as f64).sin_cos();
+                center + rotation * (p * scales)
+            };
+            for k in 0..CORNERS {
+                if let Some((a, b)) = clipped(eye, corner(k), corner(k + 1)) {
+                    painter.line_segment([place(a), place(b)], stroke);
+                }
+            }
+        }
+        let InspectRequest { camera, pixel: [x, y], .. } = &pixel.request;
+        if camera.center == eye.center && camera.world_from_camera == eye.world_from_camera {
+            let scale = vec2(shown.width() / camera.width_px as f32, shown.height() / camera.height_px as f32);
+            let at = shown.min + vec2(*x as f32 + 0.5, *y as f32 + 0.5) * scale;
+            for way in [vec2(1.0, 0.0), vec2(0.0, 1.0), vec2(-1.0, 0.0), vec2(0.0, -1.0)] {
+                painter.line_segment([at + 4.0 * way, at + 10.0 * way], stroke);
+            }
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! What is asked in one of two views of the same scene: maps, embeddings and the history are common to both.
+
+use std::collections::BTreeMap;
+
+use egui::{TextureHandle, Vec2};
+
+use super::paint::Painted;
+use super::{Asked, OverlaySettings, Queries, card, truth};
+use crate::pipeline::semantics::matching::MatchMode;
+use crate::pipeline::semantics::timing::StagesMs;
+use crate::scene::IdentityId;
+
+/// The queries of a view and what they draw.
+#[derive(Default)]
+pub(super) struct QuerySide {
+    pub(super) typed: String,
+    /// Set while the box is to take the keyboard.
+    pub(super) focus: bool,
+    /// Place in the history while going through it.
+    pub(super) recalled: Option<usize>,
+    pub(super) settings: OverlaySettings,
+    pub(super) live: Option<Asked>,
+    pub(super) kept: Vec<Asked>,
+    /// Relevancy of the pixels, for the histogram.
+    pub(super) heat: Vec<f32>,
+    pub(super) texture: Option<TextureHandle>,
+    pub(super) painted: Option<Painted>,
+    /// What comparing with the true mask came to.
+    pub(super) comparison: Option<truth::TruthComparison>,
+    /// Of the target that is shown.
+    pub(super) facts: Option<card::Facts>,
+    /// Pixels of identities in the present view, counted as they are listed.
+    pub(super) areas: Areas,
+    /// What finding the pixels and drawing them took, of all queries on screen.
+    pub(super) paint_ms: StagesMs,
+}
+
+/// Pixels of identities in a view, for one way of matching.
+#[derive(Default)]
+pub(super) struct Areas {
+    /// View, objects and match that they were counted for.
+    pub(super) of: (u64, u64, MatchMode, u32),
+    pub(super) known: BTreeMap<IdentityId, (usize, Option<Vec2>)>,
+}
+
+impl QuerySide {
+    /// All queries, the one being typed last.
+    pub(super) fn all(&self) -> impl Iterator<Item = &Asked> {
+        self.kept.iter().chain(&self.live)
+    }
+
+    /// Without queries and answers.
+    pub(super) fn cleared(self) -> Self {
+        Self { settings: self.settings, ..Self::default() }
+    }
+
+    fn kept_texts(&self) -> Vec<String> {
+        self.kept.iter().map(|q| q.text.clone()).collect()
+    }
+}
+
+impl Queries {
+    /// The queries of the view that is worked in, and of the other one.
+    pub(super) fn sides(&self) -> [&QuerySide; 2] {
+        [&self.side, &self.other]
+    }
+
+    /// Whether the second of two views is the one that is worked in: what is asked, is asked there.
+    pub fn is_second(&self) -> bool {
+        self.is_second
+    }
+
+    /// Works in the first or the second of two views from now on.
+    pub(crate) fn work_in(&mut self, second: bool) {
+        if self.is_second != second {
+            std::mem::swap(&mut self.side, &mut self.other);
+            self.is_second = second;
+        }
+    }
+
+    /// Does something in the first or the second of two views.
+    pub fn in_view<R>(&mut self, second: bool, act: impl FnOnce(&mut Self) -> R) -> R {
+        let before = self.is_second;
+        self.work_in(second);
+        let result = act(self);
+        self.work_in(before);
+        result
+    }
+
+    /// The queries that stay on screen, in the first and the second view.
+    pub(crate) fn kept_texts(&self) -> [Vec<String>; 2] {
+        let [side, other] = self.sides().map(QuerySide::kept_texts);
+        if self.is_second { [other, side] } else { [side, other] }
+    }
+
+    /// Paints anew and compares anew, in both views.
+    pub(super) fn forget_painted(&mut self) {
+        for side in [&mut self.side, &mut self.other] {
+            (side.painted, side.comparison) = (None, None);
+        }
+    }
+}

@@ -1,0 +1,94 @@
+//! Two views of the scene side by side, seen by one camera: each has its own colors and its own queries. One of them
+//! is worked in: the one that was pressed last.
+
+use egui::{Order, Pos2, Rect, Stroke, StrokeKind, Ui, vec2};
+
+use super::super::theme;
+use super::Viewport;
+
+/// Between the views, points.
+const GAP: f32 = 2.0;
+
+/// Where the views are.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Views {
+    pub(super) first: Rect,
+    second: Option<Rect>,
+}
+
+impl Views {
+    /// One view in all of `whole`, or two of the same size along its longer side.
+    pub(super) fn of(whole: Rect, split: bool) -> Self {
+        let half = match whole.width() >= whole.height() {
+            true => vec2(((whole.width() - GAP) / 2.0).floor(), whole.height()),
+            false => vec2(whole.width(), ((whole.height() - GAP) / 2.0).floor()),
+        };
+        let (first, second) = (Rect::from_min_size(whole.min, half), Rect::from_min_size(whole.max - half, half));
+        match split {
+            true => Self { first, second: Some(second) },
+            false => Self { first: whole, second: None },
+        }
+    }
+
+    pub(super) fn is_split(&self) -> bool {
+        self.second.is_some()
+    }
+
+    /// All of them, and whether it is the second.
+    pub(super) fn each(self) -> impl Iterator<Item = (bool, Rect)> {
+        std::iter::once((false, self.first)).chain(self.second.map(|rect| (true, rect)))
+    }
+
+    /// The view at a place, else the first.
+    fn at(&self, pos: Option<Pos2>) -> (bool, Rect) {
+        let here = pos.and_then(|pos| self.each().find(|(_, rect)| rect.contains(pos)));
+        here.unwrap_or((false, self.first))
+    }
+
+    /// The view that the pointer is in; while a button is down, that in which it was pressed.
+    pub(super) fn under_pointer(&self, ui: &Ui) -> Rect {
+        self.at(ui.input(|i| i.pointer.press_origin().or(i.pointer.latest_pos()))).1
+    }
+}
+
+impl Viewport {
+    /// Works in the view that was just pressed, be it on a card over it.
+    pub(super) fn work_where_pressed(&mut self, ui: &Ui, views: &Views) {
+        if !views.is_split() {
+            return self.queries.work_in(false);
+        }
+        let pressed = ui.input(|i| i.pointer.interact_pos().filter(|_| i.pointer.any_pressed()));
+        let is_ours = |pos: &Pos2| ui.layer_id_at(*pos).is_none_or(|layer| layer.order <= Order::Middle);
+        if let Some((second, rect)) = pressed.filter(is_ours).map(|pos| views.at(Some(pos)))
+            && pressed.is_some_and(|pos| rect.contains(pos))
+        {
+            self.queries.work_in(second);
+        }
+    }
+}
+
+/// Frames the view that is worked in.
+pub(super) fn mark_worked_in(ui: &Ui, rect: Rect) {
+    ui.painter().rect_stroke(rect, 0.0, Stroke::new(1.5, theme::accent()), StrokeKind::Inside);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use egui::pos2;
+
+    #[test]
+    fn views_have_the_same_size_and_lie_along_the_longer_side() {
+        let wide = Rect::from_min_size(pos2(10.0, 20.0), vec2(801.0, 400.0));
+        assert_eq!(Views::of(wide, false).each().collect::<Vec<_>>(), [(false, wide)]);
+        for whole in [wide, Rect::from_min_size(pos2(10.0, 20.0), vec2(300.0, 700.0))] {
+            let views = Views::of(whole, true);
+            let rects: Vec<Rect> = views.each().map(|v| v.1).collect();
+            assert_eq!(rects[0].size(), rects[1].size());
+            assert!(!rects[0].intersects(rects[1]) && rects.iter().all(|r| whole.contains_rect(*r)));
+            assert_eq!(rects[0].left() == rects[1].left(), whole.height() > whole.width());
+            assert_eq!(views.at(Some(rects[1].center())), (true, rects[1]));
+            assert_eq!((views.at(None), views.at(Some(pos2(0.0, 0.0)))), ((false, rects[0]), (false, rects[0])));
+        }
+    }
+}
