@@ -189,6 +189,9 @@ fn the_command_line_says_what_is_here_and_what_to_do() {
     assert!(error.contains("no-such-model"), "{error}");
     let error = run(&["models", "add", "clip-vit-b16", "/nowhere"]).fails_with(1).stderr;
     assert!(error.contains("clip-vit-b16.json"), "{error}");
+    // The description of exported files stands for their folder.
+    let error = run(&["models", "add", "sam-vit-b", "/nowhere/exported.json"]).fails_with(1).stderr;
+    assert!(error.contains("/nowhere/sam-vit-b.json"), "{error}");
     assert!(run(&["models", "check"]).ok().stdout.contains("demo: right"));
     // An air-gapped machine: the address cannot be reached.
     let port = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("bound").port();

@@ -44,7 +44,7 @@ pub(crate) fn list() -> ModelList {
 pub(crate) enum Source<'a> {
     /// An address; `None` = the one in the list.
     Fetch(Option<&'a str>),
-    /// A folder with its files, or its official checkpoint.
+    /// A folder with its files, or the description in it; or its official checkpoint.
     Brought(&'a Path),
 }
 
@@ -53,6 +53,9 @@ pub(crate) fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer)
     let (folder, mut ticker) = (catalog::folder(), Ticker::new("", 0));
     let entry = catalog::entry(id)?;
     match source {
+        Source::Brought(file) if file.extension().is_some_and(|e| e == "json") => {
+            entry.add(&folder, file.parent().unwrap_or(file))?;
+        }
         Source::Brought(file) if file.is_file() => entry.add_checkpoint(&folder, file, &mut |done, all| {
             ticker.enter(format!("Writing the weights of {id}"), all);
             ticker.tick(done as usize, observer).is_ok()

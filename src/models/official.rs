@@ -80,7 +80,8 @@ impl ModelEntry {
         if sha256.as_deref().is_none_or(|sha256| fetch::check(&to, sha256).is_err()) {
             fetch::fetch(&wanted, patience, &mut |there, all| progress(&name, there, all))?;
         }
-        let made = self.add_checkpoint(folder, &to, &mut |done, all| progress(&self.description, done, Some(all)));
+        let bytes = std::fs::metadata(&to).map_or(0, |m| m.len());
+        let made = self.add_checkpoint(folder, &to, &mut |_, _| progress(&name, bytes, Some(bytes)));
         // Whoever stops it does not want to fetch it again.
         if !matches!(made, Err(InstallError::Model(ModelError::Cancelled))) {
             // One that stays is in nobody's way.
@@ -120,7 +121,7 @@ mod tests {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let url = format!("http://{}/clip.pt", listener.local_addr().expect("bound"));
         let files: Vec<Vec<u8>> = files.iter().map(|name| std::fs::read(fixture(name)).expect("a fixture")).collect();
-        std::thread::spawn(move || {
+        let serve = move || {
             for bytes in files {
                 let Ok((mut stream, _)) = listener.accept() else { return };
                 let lines = BufReader::new(stream.try_clone().expect("a stream")).lines();
@@ -129,7 +130,8 @@ mod tests {
                 // Whoever called may have gone.
                 let _ = stream.write_all(&[head.as_bytes(), &bytes].concat());
             }
-        });
+        };
+        std::thread::Builder::new().name("server".into()).spawn(serve).expect("a thread");
         url
     }
 
@@ -137,7 +139,7 @@ mod tests {
     fn a_checkpoint_is_fetched_and_made_into_a_model() {
         let folder = tempfile::tempdir().expect("folder");
         let entry = reduced(&server(&["clip.pt", "tiny.pt", "clip.pt", "tiny.pt"]));
-        let mut fetch = || entry.fetch(folder.path(), None, Patience::default(), &mut |_, _, _| true);
+        let fetch = || entry.fetch(folder.path(), None, Patience::default(), &mut |_, _, _| true);
         let names = || {
             let names = std::fs::read_dir(folder.path()).expect("a folder").map(|e| e.expect("a file").file_name());
             let mut names: Vec<String> = names.map(|n| n.to_string_lossy().into_owned()).collect();

@@ -201,7 +201,7 @@ fn write_weight(out: &mut dyn Write, name: &str, shape: &[u64], numbers: &[f32])
     const NAME: u8 = 8 << 3 | 2;
     const RAW_DATA: u8 = 9 << 3 | 2;
     const FLOAT: u8 = 1;
-    let raw = numbers.len() * size_of::<f32>();
+    let raw = size_of_val(numbers);
     let mut tensor = Vec::new();
     for length in shape {
         tensor.push(DIMS);
