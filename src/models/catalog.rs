@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::fetch::{self, FetchError, FileToFetch, Patience};
-use super::{ModelError, manifest, official};
+use super::{ModelError, manifest};
 use crate::io::data_folder::data_folder;
 
 const LIST: &str = include_str!("../../assets/models.toml");
@@ -204,10 +204,9 @@ impl ModelEntry {
     }
 
     /// Fetches what is not here yet from its address, or from that of another `from` folder, into
-    /// `folder`, and checks it; of a model that can be made of its official checkpoint, that, from its
-    /// makers or from the address of a file. `progress` is told the file, its bytes that are there and those that
+    /// `folder`, and checks it. `progress` is told the file, its bytes that are there and those that
     /// there will be, and says whether to go on.
-    pub fn fetch(
+    pub(super) fn fetch_files(
         &self,
         folder: &Path,
         from: Option<&str>,
@@ -216,12 +215,6 @@ impl ModelEntry {
     ) -> Result<(), InstallError> {
         if self.built_in {
             return Err(InstallError::BuiltIn(self.id.clone()));
-        }
-        if let Some(official) = &self.checkpoint {
-            let address = from.filter(|from| official::is_checkpoint(from));
-            if let Some(url) = address.or(Some(&*official.url).filter(|_| from.is_none())) {
-                return self.fetch_checkpoint(official, folder, url, patience, progress);
-            }
         }
         let base = from.or(self.url.as_deref()).ok_or_else(|| InstallError::NoAddress {
             id: self.id.clone(),

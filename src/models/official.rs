@@ -27,7 +27,7 @@ fn template(id: &str) -> Option<&'static [u8]> {
 }
 
 /// Whether an address is that of a checkpoint, not that of a folder.
-pub(super) fn is_checkpoint(address: &str) -> bool {
+fn is_checkpoint(address: &str) -> bool {
     ENDINGS.iter().any(|ending| address.ends_with(ending))
 }
 
@@ -56,8 +56,27 @@ impl ModelEntry {
         self.verify(folder)
     }
 
+    /// Fetches it into `folder` and checks it: its files, or, of a model that can be made of its official checkpoint,
+    /// that. `from` is the address of a folder of such files or of such a checkpoint, instead of the listed one.
+    /// `progress` is told the file, its bytes that are there and those that there will be, and says whether to go on.
+    pub fn fetch(
+        &self,
+        folder: &Path,
+        from: Option<&str>,
+        patience: Patience,
+        progress: &mut dyn FnMut(&str, u64, Option<u64>) -> bool,
+    ) -> Result<(), InstallError> {
+        match (&self.checkpoint, from) {
+            (Some(official), None) => self.fetch_checkpoint(official, folder, &official.url, patience, progress),
+            (Some(official), Some(url)) if is_checkpoint(url) => {
+                self.fetch_checkpoint(official, folder, url, patience, progress)
+            }
+            _ => self.fetch_files(folder, from, patience, progress),
+        }
+    }
+
     /// Fetches its checkpoint, makes it of that, and removes the checkpoint.
-    pub(super) fn fetch_checkpoint(
+    fn fetch_checkpoint(
         &self,
         official: &OfficialFile,
         folder: &Path,

@@ -18,7 +18,7 @@ use sha2::{Digest, Sha256};
 use zip::ZipArchive;
 
 use super::ModelError;
-use super::checkpoint::{Checkpoint, CheckpointError};
+use super::checkpoint::{WeightFile, WeightFileError};
 use crate::io::error::write_error;
 use crate::io::temporary::temporary_folder;
 
@@ -75,8 +75,8 @@ impl<'a> Template<'a> {
         description: &str,
         progress: &mut dyn FnMut(u64, u64) -> bool,
     ) -> Result<(), ModelError> {
-        let refused = |e: CheckpointError| ModelError::Metadata { path: checkpoint.into(), problem: e.to_string() };
-        let mut weights = Checkpoint::open(checkpoint)?;
+        let refused = |e: WeightFileError| ModelError::Metadata { path: checkpoint.into(), problem: e.to_string() };
+        let mut weights = WeightFile::open(checkpoint)?;
         let root = self.root(&weights);
         self.check(&weights, root).map_err(refused)?;
         std::fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
@@ -123,7 +123,7 @@ impl<'a> Template<'a> {
     }
 
     /// The folder of the checkpoint in which most of the tensors lie.
-    fn root(&self, weights: &Checkpoint) -> &'static str {
+    fn root(&self, weights: &WeightFile) -> &'static str {
         let found = |root: &&str| {
             self.table.tensors.keys().filter(|t| weights.tensors.contains_key(&format!("{root}{t}"))).count()
         };
@@ -132,8 +132,8 @@ impl<'a> Template<'a> {
     }
 
     /// Whether the checkpoint has the tensors that are wanted, as they are wanted, and no others.
-    fn check(&self, weights: &Checkpoint, root: &str) -> Result<(), CheckpointError> {
-        let refused = |name: &str, problem: String| Err(CheckpointError::Tensor { name: name.into(), problem });
+    fn check(&self, weights: &WeightFile, root: &str) -> Result<(), WeightFileError> {
+        let refused = |name: &str, problem: String| Err(WeightFileError::Tensor { name: name.into(), problem });
         for (tensor, shape) in &self.table.tensors {
             let name = format!("{root}{tensor}");
             match weights.tensors.get(&name) {

@@ -23,7 +23,7 @@ use super::ModelError;
 
 /// Why a checkpoint cannot be read.
 #[derive(Debug, thiserror::Error)]
-pub(crate) enum CheckpointError {
+pub(crate) enum WeightFileError {
     #[error("{0}")]
     Read(#[from] io::Error),
     #[error(
@@ -177,14 +177,14 @@ enum Source {
 }
 
 /// An open checkpoint.
-pub(crate) struct Checkpoint {
+pub(crate) struct WeightFile {
     source: Source,
     pub(crate) tensors: BTreeMap<String, StoredTensor>,
     /// The storage that was read last: tensors may share one.
     last: Option<(Place, Vec<u8>)>,
 }
 
-impl Checkpoint {
+impl WeightFile {
     /// Opens a file and reads what it is about, but no numbers.
     pub(crate) fn open(path: &Path) -> Result<Self, ModelError> {
         let failed = |problem: String| ModelError::Metadata { path: path.into(), problem };
@@ -192,7 +192,7 @@ impl Checkpoint {
         Self::of(file).map_err(|e| failed(e.to_string()))
     }
 
-    fn of(mut file: File) -> Result<Self, CheckpointError> {
+    fn of(mut file: File) -> Result<Self, WeightFileError> {
         let mut start = [0; 9];
         let read = file.read(&mut start)?;
         file.seek(SeekFrom::Start(0))?;
@@ -203,14 +203,14 @@ impl Checkpoint {
             let tensors = safe::open(&mut file)?;
             (Source::Flat(file), tensors)
         } else {
-            return Err(CheckpointError::Kind);
+            return Err(WeightFileError::Kind);
         };
         Ok(Self { source, tensors, last: None })
     }
 
     /// The numbers of a tensor, row-major.
-    pub(crate) fn floats(&mut self, name: &str) -> Result<Vec<f32>, CheckpointError> {
-        let failed = |problem: String| CheckpointError::Tensor { name: name.into(), problem };
+    pub(crate) fn floats(&mut self, name: &str) -> Result<Vec<f32>, WeightFileError> {
+        let failed = |problem: String| WeightFileError::Tensor { name: name.into(), problem };
         let tensor = self.tensors.get(name).ok_or_else(|| failed("is not there".into()))?.clone();
         if !tensor.dtype.is_float() {
             return Err(failed("has whole numbers where fractions are expected".into()));

@@ -14,7 +14,7 @@ pub(super) enum Value {
 }
 
 #[derive(Debug)]
-pub(super) enum Node {
+pub(super) enum PickleNode {
     List(Vec<Value>),
     Tuple(Vec<Value>),
     Dict(Vec<(Value, Value)>),

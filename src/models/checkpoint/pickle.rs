@@ -4,20 +4,20 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use super::CheckpointError;
-use super::parts::{Global, Node, Storage, TensorRecord, Value};
+use super::WeightFileError;
+use super::parts::{Global, PickleNode, Storage, TensorRecord, Value};
 
 /// Most objects of a pickle; the official files have some thousands.
 const MOST_OBJECTS: usize = 1 << 20;
 /// Most axes of a tensor.
 const MOST_AXES: usize = 8;
 
-type Result<T> = std::result::Result<T, CheckpointError>;
+type Result<T> = std::result::Result<T, WeightFileError>;
 
 /// What a pickle says.
 #[derive(Debug)]
 pub(super) struct Pickle {
-    pub(super) nodes: Vec<Node>,
+    pub(super) nodes: Vec<PickleNode>,
     pub(super) root: Value,
 }
 
@@ -36,7 +36,7 @@ struct Machine<'a> {
     /// Heights of the stack.
     marks: Vec<usize>,
     memo: HashMap<u32, Value>,
-    nodes: Vec<Node>,
+    nodes: Vec<PickleNode>,
 }
 
 impl Machine<'_> {
@@ -69,17 +69,17 @@ impl Machine<'_> {
                     let [length] = self.take()?;
                     self.text(usize::from(length))?;
                 }
-                b')' => self.node(Node::Tuple(Vec::new()))?,
+                b')' => self.node(PickleNode::Tuple(Vec::new()))?,
                 0x85..=0x87 => {
                     let mut items = (0x84..opcode).map(|_| self.pop()).collect::<Result<Vec<_>>>()?;
                     items.reverse();
-                    self.node(Node::Tuple(items))?;
+                    self.node(PickleNode::Tuple(items))?;
                 }
                 b't' => {
                     let items = self.marked()?;
-                    self.node(Node::Tuple(items))?;
+                    self.node(PickleNode::Tuple(items))?;
                 }
-                b']' => self.node(Node::List(Vec::new()))?,
+                b']' => self.node(PickleNode::List(Vec::new()))?,
                 b'a' => {
                     let item = self.pop()?;
                     self.extend(vec![item])?;
@@ -88,7 +88,7 @@ impl Machine<'_> {
                     let items = self.marked()?;
                     self.extend(items)?;
                 }
-                b'}' => self.node(Node::Dict(Vec::new()))?,
+                b'}' => self.node(PickleNode::Dict(Vec::new()))?,
                 b's' => {
                     let value = self.pop()?;
                     let key = self.pop()?;
@@ -128,23 +128,23 @@ impl Machine<'_> {
                 0x81 => {
                     let (_arguments, class) = (self.pop()?, self.pop()?);
                     match self.of(&class) {
-                        Some(Node::Global(Global::Module)) => self.node(Node::Module(None))?,
+                        Some(PickleNode::Global(Global::Module)) => self.node(PickleNode::Module(None))?,
                         _ => return Err(self.malformed("an object that is no module")),
                     }
                 }
                 b'b' => self.build()?,
-                opcode => return Err(CheckpointError::Opcode { opcode, at: begin }),
+                opcode => return Err(WeightFileError::Opcode { opcode, at: begin }),
             }
         }
     }
 
-    fn malformed(&self, what: &str) -> CheckpointError {
-        CheckpointError::Pickle { what: what.into(), at: self.at }
+    fn malformed(&self, what: &str) -> WeightFileError {
+        WeightFileError::Pickle { what: what.into(), at: self.at }
     }
 
     fn slice(&mut self, length: usize) -> Result<&[u8]> {
         let end = self.at.checked_add(length).filter(|end| *end <= self.bytes.len());
-        let end = end.ok_or_else(|| CheckpointError::Pickle { what: "its end".into(), at: self.bytes.len() })?;
+        let end = end.ok_or_else(|| WeightFileError::Pickle { what: "its end".into(), at: self.bytes.len() })?;
         let begin = std::mem::replace(&mut self.at, end);
         Ok(&self.bytes[begin..end])
     }
@@ -190,21 +190,21 @@ impl Machine<'_> {
 
     fn push(&mut self, value: Value) -> Result<()> {
         if self.stack.len() >= MOST_OBJECTS {
-            return Err(CheckpointError::TooMany { what: "objects", most: MOST_OBJECTS });
+            return Err(WeightFileError::TooMany { what: "objects", most: MOST_OBJECTS });
         }
         self.stack.push(value);
         Ok(())
     }
 
-    fn node(&mut self, node: Node) -> Result<()> {
+    fn node(&mut self, node: PickleNode) -> Result<()> {
         if self.nodes.len() >= MOST_OBJECTS {
-            return Err(CheckpointError::TooMany { what: "objects", most: MOST_OBJECTS });
+            return Err(WeightFileError::TooMany { what: "objects", most: MOST_OBJECTS });
         }
         self.nodes.push(node);
         self.push(Value::Node(self.nodes.len() - 1))
     }
 
-    fn of(&self, value: &Value) -> Option<&Node> {
+    fn of(&self, value: &Value) -> Option<&PickleNode> {
         match value {
             Value::Node(i) => self.nodes.get(*i),
             _ => None,
@@ -218,7 +218,7 @@ impl Machine<'_> {
     }
 
     /// The node on top of the stack, which stays.
-    fn top(&mut self) -> Result<&mut Node> {
+    fn top(&mut self) -> Result<&mut PickleNode> {
         let top = self.stack.last().cloned();
         match top {
             Some(Value::Node(i)) if i < self.nodes.len() => Ok(&mut self.nodes[i]),
@@ -233,7 +233,7 @@ impl Machine<'_> {
 
     fn extend(&mut self, items: Vec<Value>) -> Result<()> {
         match self.top()? {
-            Node::List(list) => list.extend(items),
+            PickleNode::List(list) => list.extend(items),
             _ => return Err(self.malformed("an item of no list")),
         }
         Ok(())
@@ -242,7 +242,7 @@ impl Machine<'_> {
     fn set(&mut self, items: Vec<Value>) -> Result<()> {
         let odd = items.len() % 2 == 1;
         match self.top()? {
-            Node::Dict(dict) if !odd => {
+            PickleNode::Dict(dict) if !odd => {
                 let mut items = items.into_iter();
                 while let (Some(key), Some(value)) = (items.next(), items.next()) {
                     dict.push((key, value));
@@ -256,7 +256,7 @@ impl Machine<'_> {
     fn remember(&mut self, key: u32) -> Result<()> {
         let top = self.stack.last().cloned().ok_or_else(|| self.malformed("a value that is not there"))?;
         if self.memo.len() >= MOST_OBJECTS {
-            return Err(CheckpointError::TooMany { what: "objects", most: MOST_OBJECTS });
+            return Err(WeightFileError::TooMany { what: "objects", most: MOST_OBJECTS });
         }
         self.memo.insert(key, top);
         Ok(())
@@ -269,13 +269,13 @@ impl Machine<'_> {
 
     fn global(&mut self, module: &str, name: &str) -> Result<()> {
         let global = Global::named(module, name);
-        let global = global.ok_or_else(|| CheckpointError::Global { name: format!("{module}.{name}") })?;
-        self.node(Node::Global(global))
+        let global = global.ok_or_else(|| WeightFileError::Global { name: format!("{module}.{name}") })?;
+        self.node(PickleNode::Global(global))
     }
 
     fn items(&self, value: &Value) -> &[Value] {
         match self.of(value) {
-            Some(Node::Tuple(items) | Node::List(items)) => items,
+            Some(PickleNode::Tuple(items) | PickleNode::List(items)) => items,
             _ => &[],
         }
     }
@@ -286,7 +286,7 @@ impl Machine<'_> {
         let storage = match self.items(&id) {
             [Value::Text(kind), class, Value::Text(key), _device, Value::Int(elements)] if &**kind == "storage" => {
                 match (self.of(class), usize::try_from(*elements)) {
-                    (Some(Node::Global(Global::Storage(dtype))), Ok(elements)) => {
+                    (Some(PickleNode::Global(Global::Storage(dtype))), Ok(elements)) => {
                         Some(Storage { key: key.clone(), dtype: *dtype, elements })
                     }
                     _ => None,
@@ -294,16 +294,16 @@ impl Machine<'_> {
             }
             _ => None,
         };
-        self.node(Node::Storage(storage.ok_or_else(|| self.malformed("a storage without type, name or size"))?))
+        self.node(PickleNode::Storage(storage.ok_or_else(|| self.malformed("a storage without type, name or size"))?))
     }
 
     fn call(&mut self) -> Result<()> {
         let (arguments, function) = (self.pop()?, self.pop()?);
-        let Some(Node::Global(function)) = self.of(&function) else {
+        let Some(PickleNode::Global(function)) = self.of(&function) else {
             return Err(self.malformed("a call of no function"));
         };
         match function {
-            Global::OrderedDict if self.items(&arguments).is_empty() => self.node(Node::Dict(Vec::new())),
+            Global::OrderedDict if self.items(&arguments).is_empty() => self.node(PickleNode::Dict(Vec::new())),
             Global::First => {
                 let first = self.items(&arguments).first().cloned();
                 let first = first.ok_or_else(|| self.malformed("a call without argument"))?;
@@ -311,7 +311,9 @@ impl Machine<'_> {
             }
             Global::Tensor => {
                 let tensor = self.tensor(&arguments);
-                self.node(Node::Tensor(tensor.ok_or_else(|| self.malformed("a tensor without storage or shape"))?))
+                self.node(PickleNode::Tensor(
+                    tensor.ok_or_else(|| self.malformed("a tensor without storage or shape"))?,
+                ))
             }
             _ => Err(self.malformed("a call of what is no function")),
         }
@@ -320,7 +322,7 @@ impl Machine<'_> {
     /// `(storage, offset, shape, strides, ...)`.
     fn tensor(&self, arguments: &Value) -> Option<TensorRecord> {
         let [storage, Value::Int(offset), shape, strides, ..] = self.items(arguments) else { return None };
-        let Some(Node::Storage(storage)) = self.of(storage) else { return None };
+        let Some(PickleNode::Storage(storage)) = self.of(storage) else { return None };
         let lengths = |value: &Value| -> Option<Vec<usize>> {
             if self.items(value).len() > MOST_AXES {
                 return None;
@@ -342,9 +344,9 @@ impl Machine<'_> {
     fn build(&mut self) -> Result<()> {
         let state = self.pop()?;
         match self.top()? {
-            Node::Module(attributes) => *attributes = Some(state),
+            PickleNode::Module(attributes) => *attributes = Some(state),
             // What hangs on a dictionary of tensors: versions of modules.
-            Node::Dict(_) => {}
+            PickleNode::Dict(_) => {}
             _ => return Err(self.malformed("attributes of what has none")),
         }
         Ok(())

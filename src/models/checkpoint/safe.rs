@@ -6,16 +6,16 @@ use std::io::{Read, Seek, SeekFrom};
 
 use safetensors::tensor::Metadata;
 
-use super::{CheckpointError, Dtype, Place, StoredTensor};
+use super::{Dtype, Place, StoredTensor, WeightFileError};
 
 /// Largest header; those of official files have some 100 kB.
 const MOST_HEADER: u64 = 16 << 20;
 
-type Result<T> = std::result::Result<T, CheckpointError>;
+type Result<T> = std::result::Result<T, WeightFileError>;
 
 /// The tensors of a file.
 pub(super) fn open(file: &mut File) -> Result<BTreeMap<String, StoredTensor>> {
-    let broken = |problem: String| CheckpointError::Safetensors(problem);
+    let broken = |problem: String| WeightFileError::Safetensors(problem);
     let bytes = file.metadata()?.len();
     let mut header = vec![0; 8];
     file.read_exact(&mut header)?;
@@ -41,7 +41,7 @@ pub(super) fn open(file: &mut File) -> Result<BTreeMap<String, StoredTensor>> {
             Safe::BF16 => Dtype::Bf16,
             other => Dtype::Whole((other.bitsize() / 8).max(1)),
         };
-        let failed = |problem: String| CheckpointError::Tensor { name: name.clone(), problem };
+        let failed = |problem: String| WeightFileError::Tensor { name: name.clone(), problem };
         let (begin, end) = info.data_offsets;
         let length = end.checked_sub(begin).ok_or_else(|| failed(format!("ends at byte {end}, before {begin}")))?;
         let mut strides = vec![1; info.shape.len()];

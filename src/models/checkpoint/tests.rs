@@ -12,11 +12,11 @@ fn fixture(name: &str) -> Vec<u8> {
     std::fs::read(path).expect("a fixture")
 }
 
-fn open(bytes: &[u8]) -> Result<Checkpoint, CheckpointError> {
+fn open(bytes: &[u8]) -> Result<WeightFile, WeightFileError> {
     let mut file = tempfile::tempfile().expect("a file");
     file.write_all(bytes).expect("written");
     file.seek(SeekFrom::Start(0)).expect("turned back");
-    Checkpoint::of(file)
+    WeightFile::of(file)
 }
 
 /// The k-th number is k / 8.
@@ -71,7 +71,7 @@ fn torch_script_and_safetensors_are_read() {
 }
 
 /// Reads all that can be read.
-fn all(bytes: &[u8]) -> Result<usize, CheckpointError> {
+fn all(bytes: &[u8]) -> Result<usize, WeightFileError> {
     let mut file = open(bytes)?;
     let floats: Vec<String> = file.tensors.iter().filter(|(_, t)| t.dtype.is_float()).map(|(n, _)| n.clone()).collect();
     floats.iter().try_for_each(|name| file.floats(name).map(drop))?;
@@ -200,6 +200,6 @@ fn tensors_lie_within_what_is_stored_for_them() {
     assert!(all(&big).expect_err("turned").to_string().contains("little-endian"));
     let other = archive(&[("readme.txt", b"hello")], CompressionMethod::Stored);
     for bytes in [&other[..], b"", b"\x80\x02cposix\nsystem\n", &[0; 100]] {
-        assert!(matches!(all(bytes), Err(CheckpointError::Kind)));
+        assert!(matches!(all(bytes), Err(WeightFileError::Kind)));
     }
 }

@@ -6,9 +6,9 @@ use std::io::{BufReader, Read};
 
 use zip::{CompressionMethod, ZipArchive};
 
-use super::parts::{Node, TensorRecord, Value};
+use super::parts::{PickleNode, TensorRecord, Value};
 use super::pickle::{self, Pickle};
-use super::{CheckpointError, Place, StoredTensor};
+use super::{Place, StoredTensor, WeightFileError};
 
 /// Largest pickle; those of official files have some 100 kB.
 const MOST_PICKLE: u64 = 8 << 20;
@@ -21,7 +21,7 @@ const MOST_NAME: usize = 1 << 10;
 const MOST_VISITS: usize = 1 << 20;
 
 type Archive = ZipArchive<BufReader<File>>;
-type Result<T> = std::result::Result<T, CheckpointError>;
+type Result<T> = std::result::Result<T, WeightFileError>;
 
 /// The archive and its tensors.
 pub(super) fn open(file: File) -> Result<(Archive, BTreeMap<String, StoredTensor>)> {
@@ -29,21 +29,21 @@ pub(super) fn open(file: File) -> Result<(Archive, BTreeMap<String, StoredTensor
     let names = archive.file_names().map(|n| Ok(n?.into_owned())).collect::<Result<Vec<String>>>()?;
     // The folder has the name under which the file was saved first.
     let is_pickle = |name: &&String| name.strip_suffix("/data.pkl").is_some_and(|root| !root.contains('/'));
-    let pickled = names.iter().find(is_pickle).ok_or(CheckpointError::Kind)?;
+    let pickled = names.iter().find(is_pickle).ok_or(WeightFileError::Kind)?;
     let root = pickled.trim_end_matches("data.pkl");
     if let Some(i) = archive.index_for_name(&format!("{root}byteorder"))
         && entry(&mut archive, i, 16)? != b"little"
     {
         let problem = "says that its numbers are not little-endian; save it on another machine".into();
-        return Err(CheckpointError::Entry { entry: format!("{root}byteorder"), problem });
+        return Err(WeightFileError::Entry { entry: format!("{root}byteorder"), problem });
     }
-    let index = archive.index_for_name(pickled).ok_or(CheckpointError::Kind)?;
+    let index = archive.index_for_name(pickled).ok_or(WeightFileError::Kind)?;
     let pickle = pickle::read(&entry(&mut archive, index, MOST_PICKLE)?)?;
     let mut tensors = BTreeMap::new();
     for (name, record) in records(&pickle)? {
         let tensor = stored(&mut archive, root, &name, record)?;
         if tensors.insert(name.clone(), tensor).is_some() {
-            return Err(CheckpointError::Tensor { name, problem: "is there twice".into() });
+            return Err(WeightFileError::Tensor { name, problem: "is there twice".into() });
         }
     }
     Ok((archive, tensors))
@@ -61,7 +61,7 @@ pub(super) fn storage(archive: &mut Archive, place: Place) -> Result<Vec<u8>> {
 fn entry(archive: &mut Archive, index: usize, most: u64) -> Result<Vec<u8>> {
     let mut file = archive.by_index(index)?;
     let entry = file.name().map(|n| n.into_owned()).unwrap_or_default();
-    let refused = |problem: String| CheckpointError::Entry { entry: entry.clone(), problem };
+    let refused = |problem: String| WeightFileError::Entry { entry: entry.clone(), problem };
     let size = file.size();
     if file.compression() != CompressionMethod::Stored || file.compressed_size() != size {
         return Err(refused("is compressed, as PyTorch does not do it; save the checkpoint anew there".into()));
@@ -80,7 +80,7 @@ fn entry(archive: &mut Archive, index: usize, most: u64) -> Result<Vec<u8>> {
 }
 
 fn stored(archive: &mut Archive, root: &str, name: &str, record: TensorRecord) -> Result<StoredTensor> {
-    let failed = |problem: String| CheckpointError::Tensor { name: name.into(), problem };
+    let failed = |problem: String| WeightFileError::Tensor { name: name.into(), problem };
     let key = &*record.storage;
     if key.is_empty() || !key.bytes().all(|b| b.is_ascii_alphanumeric()) {
         return Err(failed(format!("is stored in '{key}', which is no name of an entry")));
@@ -105,25 +105,25 @@ fn records(pickle: &Pickle) -> Result<Vec<(String, TensorRecord)>> {
     while let Some((name, value, depth)) = open.pop() {
         let Value::Node(node) = value else { continue };
         if depth > MOST_DEPTH {
-            return Err(CheckpointError::TooMany { what: "levels", most: MOST_DEPTH });
+            return Err(WeightFileError::TooMany { what: "levels", most: MOST_DEPTH });
         }
         let mut below = |key: &str, value: &Value| {
             visits += 1;
             if visits > MOST_VISITS {
-                return Err(CheckpointError::TooMany { what: "values", most: MOST_VISITS });
+                return Err(WeightFileError::TooMany { what: "values", most: MOST_VISITS });
             }
             if name.len() + key.len() > MOST_NAME {
-                return Err(CheckpointError::TooMany { what: "letters in a name", most: MOST_NAME });
+                return Err(WeightFileError::TooMany { what: "letters in a name", most: MOST_NAME });
             }
             let name = if name.is_empty() { key.to_owned() } else { format!("{name}.{key}") };
             open.push((name, value.clone(), depth + 1));
             Ok(())
         };
         match &pickle.nodes[node] {
-            Node::Tensor(record) if found.len() < MOST_TENSORS => found.push((name, record.clone())),
-            Node::Tensor(_) => return Err(CheckpointError::TooMany { what: "tensors", most: MOST_TENSORS }),
-            Node::Module(Some(attributes)) => open.push((name, attributes.clone(), depth + 1)),
-            Node::Dict(entries) => {
+            PickleNode::Tensor(record) if found.len() < MOST_TENSORS => found.push((name, record.clone())),
+            PickleNode::Tensor(_) => return Err(WeightFileError::TooMany { what: "tensors", most: MOST_TENSORS }),
+            PickleNode::Module(Some(attributes)) => open.push((name, attributes.clone(), depth + 1)),
+            PickleNode::Dict(entries) => {
                 for (key, value) in entries {
                     match key {
                         Value::Text(key) => below(key, value)?,
@@ -132,12 +132,12 @@ fn records(pickle: &Pickle) -> Result<Vec<(String, TensorRecord)>> {
                     }
                 }
             }
-            Node::List(items) | Node::Tuple(items) => {
+            PickleNode::List(items) | PickleNode::Tuple(items) => {
                 for (i, item) in items.iter().enumerate() {
                     below(&i.to_string(), item)?;
                 }
             }
-            Node::Global(_) | Node::Storage(_) | Node::Module(None) => {}
+            PickleNode::Global(_) | PickleNode::Storage(_) | PickleNode::Module(None) => {}
         }
     }
     Ok(found)

@@ -37,7 +37,7 @@ fn embeddings(description: &Path) -> Vec<f32> {
 
 /// The official weights, to be changed.
 fn weights() -> Weights {
-    let mut file = Checkpoint::open(&fixture("clip.pt")).expect("opens");
+    let mut file = WeightFile::open(&fixture("clip.pt")).expect("opens");
     let shapes: Vec<(String, Vec<usize>)> = file.tensors.iter().map(|(n, t)| (n.clone(), t.shape.clone())).collect();
     let one = |(name, shape): (String, Vec<usize>)| {
         let floats = file.floats(&name).expect("numbers");
