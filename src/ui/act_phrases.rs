@@ -71,7 +71,7 @@ impl App {
     pub(super) fn save_true_mask(&mut self, path: &Path) {
         let Some(mask) = self.viewport.queries.truth() else { return };
         match export::check(path, &[".png"], &[]).and_then(|()| write_mask(path, &mask)) {
-            Ok(()) => self.state.toast(Tone::Good, format!("Wrote {}", path.display())),
+            Ok(()) => self.state.toast(Tone::Good, format!("Saved to {}", path.display())),
             Err(e) => self.state.fail("Saving the true mask", Failure::of(&e, "Choose another place.")),
         }
     }

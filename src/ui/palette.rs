@@ -117,7 +117,7 @@ pub(crate) fn shortcut_sheet(ctx: &egui::Context, open: &mut bool) {
         return;
     }
     let response = egui::Modal::new(egui::Id::unique("shortcuts")).frame(theme::dialog()).show(ctx, |ui| {
-        ui.set_width(640.0);
+        ui.set_width((ctx.content_rect().width() - 80.0).min(760.0));
         ui.heading("Keyboard and mouse");
         ui.add_space(8.0);
         // A small window has no room for all of them.
@@ -148,7 +148,9 @@ pub(crate) fn shortcut_sheet(ctx: &egui::Context, open: &mut bool) {
 
 fn sheet_grid(ui: &mut egui::Ui, title: &str, rows: &[(String, String)]) {
     theme::section(ui, title);
-    egui::Grid::new(title).num_columns(2).spacing([16.0, 5.0]).min_col_width(70.0).show(ui, |ui| {
+    // What is wider than its column is wrapped.
+    let grid = egui::Grid::new(title).num_columns(2).spacing([16.0, 5.0]).min_col_width(70.0);
+    grid.max_col_width(ui.available_width() - 110.0).show(ui, |ui| {
         for (key, text) in rows {
             ui.label(RichText::new(key).monospace().color(theme::accent()));
             ui.label(text);

@@ -70,7 +70,7 @@ fn a_crop_box_is_drawn_inverted_undone_and_exported() {
     w.click("Export\u{2026}");
     w.until("a dialog", |a| a.chooses_file());
     w.click("Save");
-    w.until("it is written", |a| a.state.log.iter().any(|l| l.text.starts_with("Wrote ")));
+    w.until("it is written", |a| a.state.log.iter().any(|l| l.text.starts_with("Saved to ")));
     let files = std::fs::read_dir(folder.path()).expect("folder").map(|f| f.expect("file").path());
     let path = files.into_iter().find(|f| f.to_string_lossy().ends_with("-cropped.ply")).expect("a file");
     let written = fmlgs::io::splat_ply::read(&path).expect("a splat");

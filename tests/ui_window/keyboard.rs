@@ -115,7 +115,7 @@ fn all_of_a_session_is_done_by_keys_alone() {
     w.until("a dialog", |a| a.chooses_file());
     tab_to(&mut w, Role::Button, "Save");
     w.press(Key::Space);
-    w.until("it is written", |a| a.state.log.iter().any(|l| l.text.starts_with("Wrote ")));
+    w.until("it is written", |a| a.state.log.iter().any(|l| l.text.starts_with("Saved to ")));
 
     // A setting of the next training.
     palette(&mut w, "show the training pane");

@@ -67,10 +67,14 @@ impl Viewport {
         let now = ui.input(|i| i.time);
         let rate = self.display.rate(now).filter(|_| self.moves(now)).map(rate_text);
         let facts = if rect.height() > LOW { self.facts(layout, state, rate) } else { rate };
-        if let Some(facts) = facts {
+        // That it is drawn otherwise than the scene says must be seen in the smallest view.
+        let words = self.overrides.words();
+        if facts.is_some() || words.is_some() {
             card(ui, rect, "facts", (Align2::LEFT_BOTTOM, 0.0), |ui| {
-                ui.label(RichText::new(&facts).small().color(theme::weak()));
-                if let Some(words) = self.overrides.words() {
+                if let Some(facts) = &facts {
+                    ui.label(RichText::new(facts).small().color(theme::weak()));
+                }
+                if let Some(words) = words {
                     ui.label(RichText::new(format!("rendered with {words}")).small().color(theme::warning()));
                     let reset = ui.small_button("Reset").on_hover_text(Action::ResetRenderSettings.tooltip());
                     if reset.accessible_name(Action::ResetRenderSettings.text()).clicked() {
