@@ -180,14 +180,18 @@ fn the_command_line_says_what_is_here_and_what_to_do() {
     assert!(state("clip-vit-b16")["missing"].as_array().is_some_and(|files| files.len() == 3));
     assert!(list["engine"].as_str().is_some_and(|e| e.contains("tract")) && list["device"] == "processor");
     let text = run(&["models"]).ok().stdout;
-    assert!(text.contains("sam2.1-tiny") && text.contains("not here") && text.contains("tools/export"), "{text}");
-    // Without an address nothing is fetched, and the error says what to do instead.
-    let error = run(&["models", "fetch", "clip-vit-b16"]).fails_with(1).stderr;
-    assert!(error.contains("export_clip.py") && error.contains("--from"), "{error}");
+    assert!(text.contains("sam2.1-tiny") && text.contains("not here") && text.contains("models fetch"), "{text}");
+    // A checkpoint of another model is refused by the name of a tensor, whatever way it comes.
+    let other = fixtures().join("tiny.pt");
+    let error = run(&["-q", "models", "add", "clip-vit-b16", &other.display().to_string()]).fails_with(1).stderr;
+    assert!(error.contains("tiny.pt") && error.contains("tensor '") && error.contains("missing"), "{error}");
     let error = run(&["models", "fetch", "no-such-model"]).fails_with(1).stderr;
     assert!(error.contains("no-such-model"), "{error}");
     let error = run(&["models", "add", "clip-vit-b16", "/nowhere"]).fails_with(1).stderr;
     assert!(error.contains("clip-vit-b16.json"), "{error}");
+    // The description of exported files stands for their folder.
+    let error = run(&["models", "add", "sam-vit-b", "/nowhere/exported.json"]).fails_with(1).stderr;
+    assert!(error.contains("/nowhere/sam-vit-b.json"), "{error}");
     assert!(run(&["models", "check"]).ok().stdout.contains("demo: right"));
     // An air-gapped machine: the address cannot be reached.
     let port = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("bound").port();

@@ -39,7 +39,7 @@ fn digest(version: u8) -> String {
 }
 
 fn get(server: &Server, to: &Path, bytes: Option<u64>, sha256: Option<&str>) -> Result<(), FetchError> {
-    fetch(&FileToFetch { url: &server.url, to, bytes, sha256 }, impatient(), &mut |_, _| true)
+    fetch(&FileToFetch { url: &server.url, to, bytes, most: MOST_UNPROMISED, sha256 }, impatient(), &mut |_, _| true)
 }
 
 fn is_right(to: &Path, version: u8) -> bool {
@@ -51,7 +51,8 @@ fn is_right(to: &Path, version: u8) -> bool {
 fn a_file_arrives_whole_and_is_checked() {
     let (s, p, digest) = (server(&[Turn::Serve]), place(), digest(0));
     let mut seen = Vec::new();
-    let wanted = FileToFetch { url: &s.url, to: &p.to, bytes: Some(200_000), sha256: Some(&digest) };
+    let wanted =
+        FileToFetch { url: &s.url, to: &p.to, bytes: Some(200_000), most: MOST_UNPROMISED, sha256: Some(&digest) };
     fetch(&wanted, impatient(), &mut |there, all| {
         seen.push((there, all));
         true
@@ -151,7 +152,11 @@ fn without_a_network_the_error_says_what_to_do() {
     // A port that was free a moment ago.
     let port = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("bound").port();
     let url = format!("http://127.0.0.1:{port}/model.onnx");
-    let error = fetch(&FileToFetch { url: &url, to: &p.to, bytes: None, sha256: None }, impatient(), &mut |_, _| true);
+    let error = fetch(
+        &FileToFetch { url: &url, to: &p.to, bytes: None, most: MOST_UNPROMISED, sha256: None },
+        impatient(),
+        &mut |_, _| true,
+    );
     let error = error.expect_err("nobody there");
     assert!(matches!(error, FetchError::Unreachable { .. }));
     assert!(error.to_string().contains("bring the file yourself"), "{error}");
@@ -160,7 +165,7 @@ fn without_a_network_the_error_says_what_to_do() {
 #[test]
 fn cancelling_keeps_what_arrived() {
     let (s, p) = (server(&[Turn::Serve]), place());
-    let wanted = FileToFetch { url: &s.url, to: &p.to, bytes: None, sha256: None };
+    let wanted = FileToFetch { url: &s.url, to: &p.to, bytes: None, most: MOST_UNPROMISED, sha256: None };
     let error = fetch(&wanted, impatient(), &mut |there, _| there < 60_000).expect_err("cancelled");
     let FetchError::Cancelled { got } = error else { panic!("{error}") };
     assert!((60_000..200_000).contains(&got));
@@ -215,7 +220,7 @@ fn a_silent_download_ends_when_somebody_asks() {
     let patient = Patience { stall: Duration::from_secs(60), ..impatient() };
     for (turn, kept) in [(Turn::Silent, 0), (Turn::StallAfter(10_000), 10_000), (Turn::DribbleAfter(10_000), 10_000)] {
         let (s, p) = (server(&[turn]), place());
-        let wanted = FileToFetch { url: &s.url, to: &p.to, bytes: Some(200_000), sha256: None };
+        let wanted = FileToFetch { url: &s.url, to: &p.to, bytes: Some(200_000), most: MOST_UNPROMISED, sha256: None };
         let mut asked: Option<Instant> = None;
         let error = fetch(&wanted, patient, &mut |there, _| {
             let is_asked = !s.log.lock().expect("log").is_empty();
@@ -234,7 +239,7 @@ fn a_silent_download_ends_when_somebody_asks() {
     let (s, p) = (server(&[Turn::Status(503)]), place());
     let slow = Patience { pause: Duration::from_secs(60), ..impatient() };
     let begin = Instant::now();
-    let wanted = FileToFetch { url: &s.url, to: &p.to, bytes: None, sha256: None };
+    let wanted = FileToFetch { url: &s.url, to: &p.to, bytes: None, most: MOST_UNPROMISED, sha256: None };
     let error = fetch(&wanted, slow, &mut |_, _| s.log.lock().expect("log").is_empty()).expect_err("ended");
     assert!(matches!(error, FetchError::Cancelled { .. }) && begin.elapsed() < SOON, "{error}");
 }

@@ -7,7 +7,6 @@ use serde_json::json;
 use super::progress::Console;
 use super::{CliError, output};
 use crate::jobs::models::{self, ModelEntry, ModelList, ModelRole, ModelState, Source};
-use crate::pipeline::observer::Silent;
 
 /// List, fetch and check the neural networks
 ///
@@ -18,6 +17,7 @@ use crate::pipeline::observer::Silent;
 #[command(after_help = "Examples:\n  \
     fmlgs models                                   what is here, what is missing, what each adds\n  \
     fmlgs models fetch sam2.1-tiny --from https://files.example.org/models\n  \
+    fmlgs models add clip-vit-b16 open_clip_pytorch_model.bin   make it of the official checkpoint\n  \
     fmlgs models add clip-vit-b16 exported/        take over files that you bring\n  \
     fmlgs models check                             compare all files with their checksums")]
 pub(crate) struct ModelsArgs {
@@ -34,16 +34,17 @@ enum Command {
     Fetch {
         /// Its name
         id: String,
-        /// Address of a folder that has its files [default: the one in the list]
+        /// Address of a folder that has its files, or of its checkpoint [default: the one in the list]
         #[arg(long)]
         from: Option<String>,
     },
-    /// Take over the files of a model from a folder
+    /// Make a model of its official checkpoint, or take over its files from a folder
     Add {
         /// Its name
         id: String,
-        /// The folder
-        folder: PathBuf,
+        /// The checkpoint (.pt, .pth, .bin, .safetensors), or the folder
+        #[arg(value_name = "FILE")]
+        brought: PathBuf,
     },
     /// Compare all files that are here with their checksums
     Check,
@@ -55,8 +56,8 @@ pub(crate) fn run(args: ModelsArgs, quiet: bool) -> Result<(), CliError> {
     match args.command {
         None => list(args.json),
         Some(Command::Fetch { id, from }) => fetch(&id, from.as_deref(), quiet),
-        Some(Command::Add { id, folder }) => {
-            let entry = models::install(&id, Source::Folder(&folder), &mut Silent)?;
+        Some(Command::Add { id, brought }) => {
+            let entry = models::install(&id, Source::Brought(&brought), &mut Console::new(quiet))?;
             output::print(&format!("'{id}' is here now: {}", entry.adds))
         }
         Some(Command::Check) => check(args.json),
@@ -110,7 +111,7 @@ fn state_text(entry: &ModelEntry, state: &ModelState) -> (String, String) {
     match state {
         ModelState::BuiltIn => ("built in".into(), String::new()),
         ModelState::Here => ("here".into(), String::new()),
-        ModelState::Missing(_) if entry.url.is_some() => {
+        ModelState::Missing(_) if entry.is_hosted() => {
             ("not here".into(), format!("Get it: fmlgs models fetch {}", entry.id))
         }
         ModelState::Missing(_) => (

@@ -36,7 +36,7 @@ mod scene_info;
 pub mod semantic_map;
 pub mod sog;
 pub mod splat_ply;
-mod temporary;
+pub(crate) mod temporary;
 pub mod trained;
 pub mod transforms;
 pub(crate) mod unposed;

@@ -46,14 +46,14 @@ pub(super) fn temporary_file(path: &Path, extension: &str) -> io::Result<NamedTe
 }
 
 /// A temporary folder that is kept from being swept away for as long as this lives.
-pub(super) struct TemporaryFolder {
+pub(crate) struct TemporaryFolder {
     /// The folder; removed when this is dropped.
     pub(crate) folder: TempDir,
     _held: Option<File>,
 }
 
 /// An empty temporary folder in `parent` for what is to be called `name`.
-pub(super) fn temporary_folder(parent: &Path, name: &str) -> io::Result<TemporaryFolder> {
+pub(crate) fn temporary_folder(parent: &Path, name: &str) -> io::Result<TemporaryFolder> {
     sweep_once(parent);
     loop {
         let mut builder = Builder::new();

@@ -118,7 +118,12 @@ pub enum JobError {
 
 impl JobError {
     pub(crate) fn is_cancelled(&self) -> bool {
-        let fetch = matches!(self, Self::Install(InstallError::Fetch(FetchError::Cancelled { .. })));
+        let fetch = matches!(
+            self,
+            Self::Install(
+                InstallError::Fetch(FetchError::Cancelled { .. }) | InstallError::Model(ModelError::Cancelled)
+            )
+        );
         fetch || Interrupted::is_cause_of(self)
     }
 }

@@ -44,7 +44,8 @@ pub(crate) fn list() -> ModelList {
 pub(crate) enum Source<'a> {
     /// An address; `None` = the one in the list.
     Fetch(Option<&'a str>),
-    Folder(&'a Path),
+    /// A folder with its files, or the description in it; or its official checkpoint.
+    Brought(&'a Path),
 }
 
 /// Puts the model called `id` in place.
@@ -52,7 +53,14 @@ pub(crate) fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer)
     let (folder, mut ticker) = (catalog::folder(), Ticker::new("", 0));
     let entry = catalog::entry(id)?;
     match source {
-        Source::Folder(brought) => entry.add(&folder, brought)?,
+        Source::Brought(file) if file.extension().is_some_and(|e| e == "json") => {
+            entry.add(&folder, file.parent().unwrap_or(file))?;
+        }
+        Source::Brought(file) if file.is_file() => entry.add_checkpoint(&folder, file, &mut |done, all| {
+            ticker.enter(format!("Writing the weights of {id}"), all);
+            ticker.tick(done as usize, observer).is_ok()
+        })?,
+        Source::Brought(brought) => entry.add(&folder, brought)?,
         Source::Fetch(from) => entry.fetch(&folder, from, Patience::default(), &mut |name, there, all| {
             ticker.enter(format!("Downloading {name} (kB)"), all.unwrap_or(there) / 1000);
             ticker.tick((there / 1000) as usize, observer).is_ok()

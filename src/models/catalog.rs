@@ -56,6 +56,22 @@ pub struct ModelEntry {
     /// Its graphs.
     #[serde(default)]
     pub file: Vec<ListedFile>,
+    /// The official file that it can be made of.
+    #[serde(default)]
+    pub checkpoint: Option<OfficialFile>,
+}
+
+/// A file with the weights of a model, as its makers publish it.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OfficialFile {
+    /// Its address.
+    pub url: String,
+    /// About how large it is, MB.
+    pub megabytes: u64,
+    /// Its checksum, if its makers publish one.
+    #[serde(default)]
+    pub sha256: Option<String>,
 }
 
 /// A graph of a listed model.
@@ -95,6 +111,8 @@ pub enum InstallError {
     Unknown(String),
     #[error("'{0}' is part of the program")]
     BuiltIn(String),
+    #[error("'{id}' cannot be made of a checkpoint here; give a folder with its files, made by tools/export/{export}")]
+    NoTemplate { id: String, export: String },
     #[error(
         "no address is known for '{id}'. Make its files of the official checkpoint ({source_page}): python tools/export/{export} \
          --out FOLDER, then 'fmlgs models add {id} FOLDER'; or give the address of a folder that has them with --from"
@@ -139,6 +157,16 @@ impl ModelEntry {
         self.file.iter().map(|f| f.megabytes).sum()
     }
 
+    /// Whether there is an address that it can be fetched from.
+    pub(crate) fn is_hosted(&self) -> bool {
+        self.url.is_some() || self.checkpoint.is_some()
+    }
+
+    /// About how much is fetched, MB.
+    pub(crate) fn download_megabytes(&self) -> u64 {
+        self.checkpoint.as_ref().map_or_else(|| self.megabytes(), |c| c.megabytes)
+    }
+
     /// Whether it can be used from `folder`. Sizes are compared, contents are not: see
     /// [`Self::verify`].
     pub fn state(&self, folder: &Path) -> ModelState {
@@ -178,7 +206,7 @@ impl ModelEntry {
     /// Fetches what is not here yet from its address, or from that of another `from` folder, into
     /// `folder`, and checks it. `progress` is told the file, its bytes that are there and those that
     /// there will be, and says whether to go on.
-    pub fn fetch(
+    pub(super) fn fetch_files(
         &self,
         folder: &Path,
         from: Option<&str>,
@@ -196,7 +224,8 @@ impl ModelEntry {
         let address = |name: &str| format!("{}/{name}", base.trim_end_matches('/'));
         let mut get = |name: &str, bytes: Option<u64>, sha256: Option<&str>| {
             let to = folder.join(name);
-            let wanted = FileToFetch { url: &address(name), to: &to, bytes, sha256 };
+            let most = fetch::MOST_UNPROMISED;
+            let wanted = FileToFetch { url: &address(name), to: &to, bytes, most, sha256 };
             fetch::fetch(&wanted, patience, &mut |there, all| progress(name, there, all))
         };
         // The description says what the graphs must be; fetched anew, it is that of these graphs.

@@ -35,6 +35,10 @@ pub enum ModelError {
     NothingMarked,
     #[error("{path}: {problem}")]
     Metadata { path: std::path::PathBuf, problem: String },
+    #[error(transparent)]
+    File(#[from] crate::io::IoError),
+    #[error("cancelled")]
+    Cancelled,
     #[error("the word list {file} is damaged: {problem}")]
     Vocabulary { file: String, problem: String },
     #[error(

@@ -27,8 +27,10 @@ pub struct FileToFetch<'a> {
     pub url: &'a str,
     /// The file that it becomes, once it is complete and right.
     pub to: &'a Path,
-    /// Its size, if that is known; else it is at most [`MOST_UNPROMISED`].
+    /// Its size, if that is known.
     pub bytes: Option<u64>,
+    /// Its largest size, if that is not known.
+    pub most: u64,
     /// Its SHA-256 in hexadecimal digits, if that is known.
     pub sha256: Option<&'a str>,
 }
@@ -65,7 +67,7 @@ pub enum FetchError {
     Truncated { url: String, got: u64, expected: u64 },
     #[error("{url} offers {offered} bytes, but the file has {expected}; it is another file, and was not taken")]
     OtherSize { url: String, offered: u64, expected: u64 },
-    #[error("{url} is larger than the {most} bytes that a description may have; it is another file, and was not taken")]
+    #[error("{url} is larger than the {most} bytes that it may have; it is another file, and was not taken")]
     TooLarge { url: String, most: u64 },
     #[error("{url} is a web page, not a file (a sign-in, or an error page?)")]
     WebPage { url: String },
@@ -215,7 +217,7 @@ fn receive(
     progress: &mut dyn FnMut(u64, Option<u64>) -> bool,
 ) -> Result<(), FetchError> {
     let url = wanted.url.to_owned();
-    let most = wanted.bytes.unwrap_or(MOST_UNPROMISED);
+    let most = wanted.bytes.unwrap_or(wanted.most);
     let too_large = |offered| match wanted.bytes {
         Some(expected) => FetchError::OtherSize { url: url.clone(), offered, expected },
         None => FetchError::TooLarge { url: url.clone(), most },

@@ -3,9 +3,11 @@
 //! A network is an ONNX file, run by [`engine`]. [`Encoder`] compares pictures with phrases:
 //! [`DemoEncoder`] is the small one that comes with the program (made by `tools/encoder`),
 //! [`ClipEncoder`] the one of the paper. [`sam`] and [`sam2`] find masks. [`catalog`] knows which
-//! there are, and [`fetch`] brings them.
+//! there are, and [`fetch`] brings them; `template` makes them of
+//! official checkpoints.
 
 pub mod catalog;
+mod checkpoint;
 pub mod clip;
 mod demo;
 pub(crate) mod engine;
@@ -13,10 +15,12 @@ mod error;
 pub mod fetch;
 pub mod manifest;
 pub mod network;
+mod official;
 pub mod preprocess;
 pub mod sam;
 pub mod sam2;
 pub mod session_cache;
+mod template;
 mod tile;
 mod vocabulary;
 mod words;

@@ -214,7 +214,10 @@ fn dialog(action: &Action, name: &str) -> Option<(String, Kind)> {
     let (title, kind) = match action {
         Action::OpenFolder => ("Open a folder of photos or a trained scene", Kind::Folder),
         Action::OpenFile => ("Open a scene", Kind::File("Scenes", &["ply", "sog", "gltf", "glb", "json", "toml"])),
-        Action::AddModel(id) => return Some((format!("Choose the folder with the files of {id}"), Kind::Folder)),
+        Action::AddModel(id) => {
+            let title = format!("Choose the checkpoint of {id}, or the description (.json) of its exported files");
+            return Some((title, Kind::File("Networks", &["pt", "pth", "bin", "safetensors", "json"])));
+        }
         Action::ExportPhrases => ("Choose a folder for the masks", Kind::Folder),
         Action::ChooseTrueMask => ("Choose the true mask of this view", Kind::File("Masks", &["png"])),
         Action::ChooseMasks => ("Choose the folder with the masks", Kind::Folder),

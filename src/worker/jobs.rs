@@ -142,7 +142,7 @@ impl Jobs for PipelineJobs {
             }
             Command::RecentPictures(of) => Outcome::RecentPictures(recent::load(&self.folders, of)),
             Command::InstallModel { id, brought } => {
-                let source = brought.as_deref().map_or(Source::Fetch(None), Source::Folder);
+                let source = brought.as_deref().map_or(Source::Fetch(None), Source::Brought);
                 models::install(&id, source, observer)?;
                 Outcome::ModelInstalled(id)
             }

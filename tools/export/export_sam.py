@@ -13,7 +13,7 @@ from segment_anything.modeling import image_encoder as official
 
 import graphs
 import sam_models
-from prompts import embed_points
+from prompts import dense_position, embed_points
 
 
 class Encoder(torch.nn.Module):
@@ -33,7 +33,8 @@ class Decoder(torch.nn.Module):
     def __init__(self, model):
         super().__init__()
         self.prompt, self.decoder, self.side = model.prompt_encoder, model.mask_decoder, model.image_encoder.img_size
-        self.register_buffer("dense_position", model.prompt_encoder.get_dense_pe().detach())
+        # Of the weights: in a template the graph computes it.
+        self.register_buffer("dense_position", model.prompt_encoder.get_dense_pe().detach() if graphs.FOLD else None)
 
     def forward(self, image_embeddings, point_coords, point_labels, mask_input, has_mask):
         p, d = self.prompt, self.decoder
@@ -42,7 +43,8 @@ class Decoder(torch.nn.Module):
         dense = given * p.mask_downscaling(mask_input) + (1 - given) * p.no_mask_embed.weight.reshape(1, -1, 1, 1)
         own = torch.cat([d.iou_token.weight, d.mask_tokens.weight])[None]
         tokens = torch.cat([own + torch.zeros_like(sparse[:, :1, :1]), sparse], dim=1)
-        hidden, source = d.transformer(image_embeddings + dense, self.dense_position, tokens)
+        position = dense_position(p) if self.dense_position is None else self.dense_position
+        hidden, source = d.transformer(image_embeddings + dense, position, tokens)
         mask_tokens = hidden[:, 1:1 + d.num_mask_tokens]
         h, w = image_embeddings.shape[-2:]
         features = d.output_upscaling(source.transpose(1, 2).reshape(-1, d.transformer_dim, h, w))

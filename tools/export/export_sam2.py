@@ -17,7 +17,7 @@ import torch.nn.functional as F
 import graphs
 import matrices
 import sam2_models
-from prompts import embed_points
+from prompts import dense_position, embed_points
 
 # Rows of queries that attend to the memories at a time. At full size all 4,096 together would need
 # half a gigabyte of scores per layer; the result does not depend on it.
@@ -32,12 +32,22 @@ class Encoder(torch.nn.Module):
         self.model = model
         trunk, side = model.image_encoder.trunk, model.image_size // 4
         table = trunk._get_pos_embed((side, side)).detach()
-        # The table is stretched with a bicubic filter: done once here, a constant in the graph.
-        trunk._get_pos_embed = lambda size: table
+        # The table is stretched with a bicubic filter: done once here, a constant in the graph; in a template by the
+        # graph, as products.
+        trunk._get_pos_embed = (lambda size: table) if graphs.FOLD else (lambda size: stretched(trunk, side))
 
     def forward(self, image):
         maps = self.model.forward_image(image)["backbone_fpn"]
         return maps[2], maps[0], maps[1]
+
+
+def stretched(trunk, side):
+    """The official `_get_pos_embed` of a square, with products."""
+    table, window = trunk.pos_embed, trunk.pos_embed_window
+    up = matrices.resizing(table.shape[-1], side, False, "bicubic")
+    tiles = side // window.shape[-1]
+    tiled = torch.cat([torch.cat([window] * tiles, dim=2)] * tiles, dim=3)
+    return (up @ table @ up.T + tiled).permute(0, 2, 3, 1)
 
 
 class Decoder(torch.nn.Module):
@@ -48,7 +58,8 @@ class Decoder(torch.nn.Module):
         self.prompt, self.decoder, self.pointer = model.sam_prompt_encoder, model.sam_mask_decoder, model.obj_ptr_proj
         self.soft, self.fixed = model.soft_no_obj_ptr, model.fixed_no_obj_ptr
         self.no_pointer, self.side = model.no_obj_ptr, model.image_size
-        self.register_buffer("dense_position", model.sam_prompt_encoder.get_dense_pe().detach())
+        # Of the weights: in a template the graph computes it.
+        self.register_buffer("dense_position", model.sam_prompt_encoder.get_dense_pe().detach() if graphs.FOLD else None)
 
     def forward(self, image_embeddings, high_res_features1, high_res_features2, point_coords, point_labels, mask_input, has_mask):
         p, d = self.prompt, self.decoder
@@ -57,7 +68,8 @@ class Decoder(torch.nn.Module):
         dense = given * p.mask_downscaling(mask_input) + (1 - given) * p.no_mask_embed.weight.reshape(1, -1, 1, 1)
         own = torch.cat([d.obj_score_token.weight, d.iou_token.weight, d.mask_tokens.weight])[None]
         tokens = torch.cat([own + torch.zeros_like(sparse[:, :1, :1]), sparse], dim=1)
-        hidden, source = d.transformer(image_embeddings + dense, self.dense_position, tokens)
+        position = dense_position(p) if self.dense_position is None else self.dense_position
+        hidden, source = d.transformer(image_embeddings + dense, position, tokens)
         mask_tokens = hidden[:, 2:2 + d.num_mask_tokens]
         h, w = image_embeddings.shape[-2:]
         source = source.transpose(1, 2).reshape(-1, d.transformer_dim, h, w)
@@ -122,17 +134,17 @@ class MemoryAttention(torch.nn.Module):
         self.timed, self.projected = model.add_tpos_enc_to_obj_ptrs, model.proj_tpos_enc_in_obj_ptrs
         hw = self.side * self.side
         position = model.image_encoder.neck.position_encoding(torch.zeros(1, self.width, self.side, self.side))
-        self.register_buffer("image_position", position.flatten(2).transpose(1, 2))  # [1,hw,C]
+        self.image_position = self.table(position.flatten(2).transpose(1, 2))  # [1,hw,C]
         position = model.memory_encoder.position_encoding(torch.zeros(1, self.memory_width, self.side, self.side))
-        self.register_buffer("memory_position", position.flatten(2).transpose(1, 2))  # [1,hw,64]
+        self.memory_position = self.table(position.flatten(2).transpose(1, 2))  # [1,hw,64]
         self.register_buffer("times", model.maskmem_tpos_enc.detach().reshape(-1, 1, self.memory_width))  # [7,1,64]
         first = model.memory_attention.layers[0]
         if first.self_attn.num_heads != 1 or first.cross_attn_image.num_heads != 1 or first.pos_enc_at_attn or first.pos_enc_at_cross_attn_queries:
             raise SystemExit("this memory attention is of a kind that no published configuration has")
         rotation = first.self_attn.compute_cis(end_x=self.side, end_y=self.side)  # [hw,C/2]
         # Pairs (even, odd) turn together; each factor is repeated for both members.
-        self.register_buffer("cosine", rotation.real.repeat_interleave(2, dim=-1).float().contiguous())
-        self.register_buffer("sine", rotation.imag.repeat_interleave(2, dim=-1).float().contiguous())
+        self.cosine = self.table(rotation.real.repeat_interleave(2, dim=-1).float())
+        self.sine = self.table(rotation.imag.repeat_interleave(2, dim=-1).float())
         # x @ swap = (-x1, x0, -x3, x2, ...): the quarter turn of every pair.
         swap = torch.zeros(self.width, self.width)
         even = torch.arange(0, self.width, 2)
@@ -142,13 +154,17 @@ class MemoryAttention(torch.nn.Module):
         self.register_buffer("periods", 10000.0 ** (2 * (torch.arange(half).float() // 2) / half))
         self.tokens = hw
 
+    def table(self, values):
+        """A table of positions: a constant, in a template made of its rows and columns."""
+        return matrices.Constant(values) if graphs.FOLD else matrices.Separable(values, self.side, self.side)
+
     def turned(self, x):
-        return x * self.cosine + (x @ self.swap) * self.sine
+        return x * self.cosine() + (x @ self.swap) * self.sine()
 
     def forward(self, image_embeddings, memory_features, memory_time, memory_valid, object_pointers, pointer_offset, pointer_valid):
         c, m, hw, parts = self.width, self.memory_width, self.tokens, self.width // self.memory_width
         memory = memory_features.reshape(-1, m, hw).transpose(1, 2)  # [m,hw,64]
-        memory_at = memory + self.memory_position + self.times[memory_time]
+        memory_at = memory + self.memory_position() + self.times[memory_time]
         pointers = object_pointers.reshape(-1, parts, m)
         pointers_at = pointers
         if self.timed:
@@ -161,7 +177,7 @@ class MemoryAttention(torch.nn.Module):
         values = torch.cat([memory.reshape(1, -1, m), pointers.reshape(1, -1, m)], dim=1)
         x = image_embeddings.reshape(1, c, hw).transpose(1, 2)
         if self.attention.pos_enc_at_input:
-            x = x + 0.1 * self.image_position
+            x = x + 0.1 * self.image_position()
         for layer in self.attention.layers:
             a, y = layer.self_attn, layer.norm1(x)
             q, k, v = self.turned(a.q_proj(y)), self.turned(a.k_proj(y)), a.v_proj(y)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import torch
 
-PARTS = ("tokens", "clip", "sam", "automatic", "sam2")
+PARTS = ("tokens", "clip", "sam", "automatic", "sam2", "checkpoints")
 
 
 def main():
@@ -39,6 +39,9 @@ def main():
     if "sam2" in a.only:
         import fixture_sam2_write
         fixture_sam2_write.write(a.out)
+    if "checkpoints" in a.only:
+        import fixture_checkpoints
+        fixture_checkpoints.write(a.out)
     for file in sorted(a.out.iterdir()):
         file.chmod(0o644)
     print(f"{sum(f.stat().st_size for f in a.out.iterdir()):,} bytes in all")

@@ -14,6 +14,8 @@ import onnxruntime
 import torch
 
 OPSET = 17
+# Whether what depends on weights alone is computed here. Not for templates, whose weights come later: engines do it then.
+FOLD = True
 FORBIDDEN = {"Loop", "If", "Scan", "SequenceEmpty", "SequenceInsert", "ConcatFromSequence", "SequenceAt", "NonZero", "Unique"}
 
 
@@ -27,7 +29,7 @@ def export(module, inputs, outputs, path, dynamic=None):
     torch.backends.mha.set_fastpath_enabled(False)
     with torch.no_grad():
         torch.onnx.export(module, tuple(inputs.values()), str(path), input_names=list(inputs), output_names=list(outputs),
-                          dynamic_axes=dynamic or {}, opset_version=OPSET, dynamo=False, do_constant_folding=True)
+                          dynamic_axes=dynamic or {}, opset_version=OPSET, dynamo=False, do_constant_folding=FOLD)
     model = onnx.load(str(path))
     label_shapes(model, inputs, dynamic or {})
     present = {node.op_type for node in model.graph.node} & FORBIDDEN

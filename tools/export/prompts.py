@@ -14,3 +14,11 @@ def embed_points(prompt, coords, labels, side):
     for value, table in [(-1, prompt.not_a_point_embed), *enumerate(prompt.point_embeddings)]:
         embedding = embedding + (labels == value).to(embedding.dtype) * table.weight
     return embedding
+
+
+def dense_position(prompt):
+    """The official `get_dense_pe`, of a constant grid."""
+    h, w = prompt.image_embedding_size
+    y, x = torch.meshgrid((torch.arange(h) + 0.5) / h, (torch.arange(w) + 0.5) / w, indexing="ij")
+    grid = torch.stack([x, y], dim=-1).numpy()
+    return prompt.pe_layer._pe_encoding(torch.from_numpy(grid)).permute(2, 0, 1)[None]

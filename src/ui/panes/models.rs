@@ -138,9 +138,9 @@ fn one(ui: &mut Ui, entry: &ModelEntry, model: &ModelState, idle: bool, actions:
     if matches!(model, ModelState::Missing(_) | ModelState::Broken(_)) {
         ui.horizontal(|ui| {
             let button = |text: &str| Button::new(text.to_owned()).small();
-            if entry.url.is_some() {
+            if entry.is_hosted() {
                 let fetch = Action::FetchModel(entry.id.clone());
-                let text = format!("Download {} MB", entry.megabytes());
+                let text = format!("Download {} MB", entry.download_megabytes());
                 if ui.add_enabled(idle, button(&text)).on_hover_text(fetch.tooltip()).clicked() {
                     actions.push(fetch);
                 }
@@ -150,7 +150,15 @@ fn one(ui: &mut Ui, entry: &ModelEntry, model: &ModelState, idle: bool, actions:
                 actions.push(add);
             }
         });
-        if entry.url.is_none() {
+        if let Some(official) = &entry.checkpoint {
+            let text = format!(
+                "From its makers ({}; {}), made into {} MB here. This address has not been tried yet.",
+                official.url,
+                entry.license,
+                entry.megabytes()
+            );
+            ui.label(RichText::new(text).small().color(theme::weak()));
+        } else if !entry.is_hosted() {
             let text = format!(
                 "Its files are not hosted yet ({} MB, {}). tools/export creates them from the official checkpoint.",
                 entry.megabytes(),

@@ -1,0 +1,144 @@
+//! The zip archives of `torch.save` and of TorchScript: a pickle of tensors, and an entry of bytes for each storage.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{BufReader, Read};
+
+use zip::{CompressionMethod, ZipArchive};
+
+use super::parts::{PickleNode, TensorRecord, Value};
+use super::pickle::{self, Pickle};
+use super::{Place, StoredTensor, WeightFileError};
+
+/// Largest pickle; those of official files have some 100 kB.
+const MOST_PICKLE: u64 = 8 << 20;
+/// How deep dictionaries and modules may nest.
+const MOST_DEPTH: usize = 64;
+const MOST_TENSORS: usize = 1 << 16;
+/// Longest name of a tensor, bytes.
+const MOST_NAME: usize = 1 << 10;
+/// Most values that are looked at in search of tensors: shared ones count as often as they are met.
+const MOST_VISITS: usize = 1 << 20;
+
+type Archive = ZipArchive<BufReader<File>>;
+type Result<T> = std::result::Result<T, WeightFileError>;
+
+/// The archive and its tensors.
+pub(super) fn open(file: File) -> Result<(Archive, BTreeMap<String, StoredTensor>)> {
+    let mut archive = ZipArchive::new(BufReader::new(file))?;
+    let names = archive.file_names().map(|n| Ok(n?.into_owned())).collect::<Result<Vec<String>>>()?;
+    // The folder has the name under which the file was saved first.
+    let is_pickle = |name: &&String| name.strip_suffix("/data.pkl").is_some_and(|root| !root.contains('/'));
+    let pickled = names.iter().find(is_pickle).ok_or(WeightFileError::Kind)?;
+    let root = pickled.trim_end_matches("data.pkl");
+    if let Some(i) = archive.index_for_name(&format!("{root}byteorder"))
+        && entry(&mut archive, i, 16)? != b"little"
+    {
+        let problem = "says that its numbers are not little-endian; save it on another machine".into();
+        return Err(WeightFileError::Entry { entry: format!("{root}byteorder"), problem });
+    }
+    let index = archive.index_for_name(pickled).ok_or(WeightFileError::Kind)?;
+    let pickle = pickle::read(&entry(&mut archive, index, MOST_PICKLE)?)?;
+    let mut tensors = BTreeMap::new();
+    for (name, record) in records(&pickle)? {
+        let tensor = stored(&mut archive, root, &name, record)?;
+        if tensors.insert(name.clone(), tensor).is_some() {
+            return Err(WeightFileError::Tensor { name, problem: "is there twice".into() });
+        }
+    }
+    Ok((archive, tensors))
+}
+
+/// The bytes of a storage, compared with their checksum.
+pub(super) fn storage(archive: &mut Archive, place: Place) -> Result<Vec<u8>> {
+    match place {
+        Place::Entry(i) => entry(archive, i, u64::MAX),
+        Place::Range(..) => Ok(Vec::new()),
+    }
+}
+
+/// An entry of at most `most` bytes. PyTorch compresses none that is read here, so that none is larger than its file.
+fn entry(archive: &mut Archive, index: usize, most: u64) -> Result<Vec<u8>> {
+    let mut file = archive.by_index(index)?;
+    let entry = file.name().map(|n| n.into_owned()).unwrap_or_default();
+    let refused = |problem: String| WeightFileError::Entry { entry: entry.clone(), problem };
+    let size = file.size();
+    if file.compression() != CompressionMethod::Stored || file.compressed_size() != size {
+        return Err(refused("is compressed, as PyTorch does not do it; save the checkpoint anew there".into()));
+    }
+    if size > most {
+        return Err(refused(format!("has {size} bytes, more than the {most} that are possible")));
+    }
+    let mut bytes = Vec::new();
+    (&mut file).take(size).read_to_end(&mut bytes).map_err(|e| refused(format!("cannot be read: {e}")))?;
+    // One read more, at the end, compares the checksum.
+    let more = file.read(&mut [0; 1]).map_err(|e| refused(format!("is damaged: {e}")))?;
+    if bytes.len() as u64 != size || more > 0 {
+        return Err(refused(format!("has another size than the {size} bytes that it states")));
+    }
+    Ok(bytes)
+}
+
+fn stored(archive: &mut Archive, root: &str, name: &str, record: TensorRecord) -> Result<StoredTensor> {
+    let failed = |problem: String| WeightFileError::Tensor { name: name.into(), problem };
+    let key = &*record.storage;
+    if key.is_empty() || !key.bytes().all(|b| b.is_ascii_alphanumeric()) {
+        return Err(failed(format!("is stored in '{key}', which is no name of an entry")));
+    }
+    let path = format!("{root}data/{key}");
+    let index = archive.index_for_name(&path);
+    let index = index.ok_or_else(|| failed(format!("is stored in '{path}', which is not in the archive")))?;
+    let size = archive.by_index_raw(index)?.size();
+    if record.elements.checked_mul(record.dtype.bytes()).is_none_or(|bytes| bytes as u64 != size) {
+        let (elements, bytes) = (record.elements, record.dtype.bytes());
+        return Err(failed(format!("states {elements} numbers of {bytes} bytes, but '{path}' has {size} bytes")));
+    }
+    let view = (record.shape, record.strides, record.offset);
+    StoredTensor::new(record.dtype, view, record.elements, Place::Entry(index)).map_err(failed)
+}
+
+/// All tensors of a pickle, with the keys that lead to them joined by dots.
+fn records(pickle: &Pickle) -> Result<Vec<(String, TensorRecord)>> {
+    let mut found = Vec::new();
+    let mut open = vec![(String::new(), pickle.root.clone(), 0)];
+    let mut visits = 0;
+    while let Some((name, value, depth)) = open.pop() {
+        let Value::Node(node) = value else { continue };
+        if depth > MOST_DEPTH {
+            return Err(WeightFileError::TooMany { what: "levels", most: MOST_DEPTH });
+        }
+        let mut below = |key: &str, value: &Value| {
+            visits += 1;
+            if visits > MOST_VISITS {
+                return Err(WeightFileError::TooMany { what: "values", most: MOST_VISITS });
+            }
+            if name.len() + key.len() > MOST_NAME {
+                return Err(WeightFileError::TooMany { what: "letters in a name", most: MOST_NAME });
+            }
+            let name = if name.is_empty() { key.to_owned() } else { format!("{name}.{key}") };
+            open.push((name, value.clone(), depth + 1));
+            Ok(())
+        };
+        match &pickle.nodes[node] {
+            PickleNode::Tensor(record) if found.len() < MOST_TENSORS => found.push((name, record.clone())),
+            PickleNode::Tensor(_) => return Err(WeightFileError::TooMany { what: "tensors", most: MOST_TENSORS }),
+            PickleNode::Module(Some(attributes)) => open.push((name, attributes.clone(), depth + 1)),
+            PickleNode::Dict(entries) => {
+                for (key, value) in entries {
+                    match key {
+                        Value::Text(key) => below(key, value)?,
+                        Value::Int(key) => below(&key.to_string(), value)?,
+                        _ => {}
+                    }
+                }
+            }
+            PickleNode::List(items) | PickleNode::Tuple(items) => {
+                for (i, item) in items.iter().enumerate() {
+                    below(&i.to_string(), item)?;
+                }
+            }
+            PickleNode::Global(_) | PickleNode::Storage(_) | PickleNode::Module(None) => {}
+        }
+    }
+    Ok(found)
+}

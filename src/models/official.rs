@@ -1,0 +1,210 @@
+//! Models made here of the files that their makers publish.
+
+use std::path::Path;
+
+use serde::Deserialize;
+
+use super::catalog::{InstallError, ModelEntry, OfficialFile};
+use super::fetch::{self, FileToFetch, Patience};
+use super::template::Template;
+use super::{ModelError, manifest};
+
+/// Endings of checkpoints.
+const ENDINGS: [&str; 4] = [".pt", ".pth", ".bin", ".safetensors"];
+
+/// The template of a model, where there is one.
+fn template(id: &str) -> Option<&'static [u8]> {
+    Some(match id {
+        "clip-vit-b16" => include_bytes!("../../assets/models/clip-vit-b16.zip"),
+        "clip-vit-b32" => include_bytes!("../../assets/models/clip-vit-b32.zip"),
+        "clip-vit-b16-openai" => include_bytes!("../../assets/models/clip-vit-b16-openai.zip"),
+        "sam2.1-tiny" => include_bytes!("../../assets/models/sam2.1-tiny.zip"),
+        "sam-vit-b" => include_bytes!("../../assets/models/sam-vit-b.zip"),
+        #[cfg(test)]
+        "reduced" => include_bytes!("../../tests/fixtures/networks/clip_template.zip"),
+        _ => return None,
+    })
+}
+
+/// Whether an address is that of a checkpoint, not that of a folder.
+fn is_checkpoint(address: &str) -> bool {
+    ENDINGS.iter().any(|ending| address.ends_with(ending))
+}
+
+/// What a description says of the checkpoint that a model was made of.
+#[derive(Deserialize)]
+struct Origin {
+    checkpoint_sha256: Option<String>,
+}
+
+impl ModelEntry {
+    /// Makes it of an official checkpoint that somebody brings, and checks it. `progress` is told the weights that are
+    /// written and all of them, and says whether to go on.
+    pub fn add_checkpoint(
+        &self,
+        folder: &Path,
+        checkpoint: &Path,
+        progress: &mut dyn FnMut(u64, u64) -> bool,
+    ) -> Result<(), InstallError> {
+        if self.built_in {
+            return Err(InstallError::BuiltIn(self.id.clone()));
+        }
+        let template = template(&self.id);
+        let template =
+            template.ok_or_else(|| InstallError::NoTemplate { id: self.id.clone(), export: self.export.clone() })?;
+        Template::read(template)?.fill(checkpoint, folder, &self.description, progress)?;
+        self.verify(folder)
+    }
+
+    /// Fetches it into `folder` and checks it: its files, or, of a model that can be made of its official checkpoint,
+    /// that. `from` is the address of a folder of such files or of such a checkpoint, instead of the listed one.
+    /// `progress` is told the file, its bytes that are there and those that there will be, and says whether to go on.
+    pub fn fetch(
+        &self,
+        folder: &Path,
+        from: Option<&str>,
+        patience: Patience,
+        progress: &mut dyn FnMut(&str, u64, Option<u64>) -> bool,
+    ) -> Result<(), InstallError> {
+        match (&self.checkpoint, from) {
+            (Some(official), None) => self.fetch_checkpoint(official, folder, &official.url, patience, progress),
+            (Some(official), Some(url)) if is_checkpoint(url) => {
+                self.fetch_checkpoint(official, folder, url, patience, progress)
+            }
+            _ => self.fetch_files(folder, from, patience, progress),
+        }
+    }
+
+    /// Fetches its checkpoint, makes it of that, and removes the checkpoint.
+    fn fetch_checkpoint(
+        &self,
+        official: &OfficialFile,
+        folder: &Path,
+        url: &str,
+        patience: Patience,
+        progress: &mut dyn FnMut(&str, u64, Option<u64>) -> bool,
+    ) -> Result<(), InstallError> {
+        if self.verify(folder).is_ok() {
+            return Ok(());
+        }
+        let name = format!("{}.checkpoint", self.id);
+        let to = folder.join(&name);
+        // Without a published checksum, the first file that was taken is the right one from then on.
+        let description = self.description_in(folder);
+        let kind = manifest::kind(&description).ok();
+        let origin = kind.and_then(|kind| manifest::read::<Origin>(&description, &kind).ok());
+        let sha256 = official.sha256.clone().or_else(|| origin?.checkpoint_sha256);
+        let most = official.megabytes * 1_100_000;
+        let wanted = FileToFetch { url, to: &to, bytes: None, most, sha256: sha256.as_deref() };
+        if sha256.as_deref().is_none_or(|sha256| fetch::check(&to, sha256).is_err()) {
+            fetch::fetch(&wanted, patience, &mut |there, all| progress(&name, there, all))?;
+        }
+        let bytes = std::fs::metadata(&to).map_or(0, |m| m.len());
+        let made = self.add_checkpoint(folder, &to, &mut |_, _| progress(&name, bytes, Some(bytes)));
+        // Whoever stops it does not want to fetch it again.
+        if !matches!(made, Err(InstallError::Model(ModelError::Cancelled))) {
+            // One that stays is in nobody's way.
+            let _ = std::fs::remove_file(&to);
+        }
+        made
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{BufRead, BufReader, Write};
+    use std::net::TcpListener;
+    use std::path::PathBuf;
+
+    use super::*;
+    use crate::models::catalog::ModelState;
+    use crate::models::fetch::FetchError;
+
+    fn fixture(name: &str) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/networks").join(name)
+    }
+
+    /// The reduced CLIP as if it were listed, with its checkpoint at an address.
+    fn reduced(url: &str) -> ModelEntry {
+        let file = |name: &str| serde_json::json!({ "name": name, "megabytes": 1 });
+        serde_json::from_value(serde_json::json!({
+            "id": "reduced", "role": "encoder", "title": "Reduced", "adds": "Nothing.", "license": "MIT",
+            "source": "here", "description": "clip.json", "file": [file("clip_image.onnx"), file("clip_text.onnx")],
+            "checkpoint": { "url": url, "megabytes": 1 },
+        }))
+        .expect("an entry")
+    }
+
+    /// Serves one file after another, whatever is asked for.
+    fn server(files: &[&str]) -> String {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let url = format!("http://{}/clip.pt", listener.local_addr().expect("bound"));
+        let files: Vec<Vec<u8>> = files.iter().map(|name| std::fs::read(fixture(name)).expect("a fixture")).collect();
+        let serve = move || {
+            for bytes in files {
+                let Ok((mut stream, _)) = listener.accept() else { return };
+                let lines = BufReader::new(stream.try_clone().expect("a stream")).lines();
+                let _ = lines.map_while(Result::ok).take_while(|line| !line.is_empty()).count();
+                let head = format!("HTTP/1.1 200 OK\r\nContent-Length: {}\r\nConnection: close\r\n\r\n", bytes.len());
+                // Whoever called may have gone.
+                let _ = stream.write_all(&[head.as_bytes(), &bytes].concat());
+            }
+        };
+        std::thread::Builder::new().name("server".into()).spawn(serve).expect("a thread");
+        url
+    }
+
+    #[test]
+    fn a_checkpoint_is_fetched_and_made_into_a_model() {
+        let folder = tempfile::tempdir().expect("folder");
+        let entry = reduced(&server(&["clip.pt", "tiny.pt", "clip.pt", "tiny.pt"]));
+        let fetch = || entry.fetch(folder.path(), None, Patience::default(), &mut |_, _, _| true);
+        let names = || {
+            let names = std::fs::read_dir(folder.path()).expect("a folder").map(|e| e.expect("a file").file_name());
+            let mut names: Vec<String> = names.map(|n| n.to_string_lossy().into_owned()).collect();
+            names.sort();
+            names
+        };
+        fetch().expect("fetched");
+        assert_eq!(names(), ["clip.json", "clip_image.onnx", "clip_text.onnx"]);
+        assert_eq!(entry.state(folder.path()), ModelState::Here);
+        // What is here is not fetched again.
+        fetch().expect("here");
+        // Broken, it is; another file than the first time is not taken.
+        std::fs::write(folder.path().join("clip_text.onnx"), "broken").expect("written");
+        assert!(matches!(fetch(), Err(InstallError::Fetch(FetchError::Checksum { .. }))));
+        assert_eq!(names(), ["clip.json", "clip_image.onnx", "clip_text.onnx"]);
+        fetch().expect("mended");
+        entry.verify(folder.path()).expect("right");
+        // Of a new folder, the fourth answer is the first that it hears of: that of another model.
+        let fresh = tempfile::tempdir().expect("folder");
+        let error = entry.fetch(fresh.path(), None, Patience::default(), &mut |_, _, _| true);
+        assert!(error.expect_err("another model").to_string().contains("missing"));
+        assert_eq!(std::fs::read_dir(fresh.path()).expect("a folder").count(), 0);
+    }
+
+    #[test]
+    fn every_listed_checkpoint_has_its_template() {
+        let all = crate::models::catalog::entries().expect("the list");
+        let mut made = 0;
+        for entry in all {
+            let bytes = template(&entry.id);
+            assert_eq!(bytes.is_some(), entry.checkpoint.is_some(), "{}", entry.id);
+            let Some(bytes) = bytes else { continue };
+            assert!(bytes.len() < 1 << 20, "{}: {} bytes", entry.id, bytes.len());
+            let template = Template::read(bytes).expect("reads");
+            assert_eq!(template.files().expect("graphs"), entry.file.iter().map(|f| f.name.clone()).collect());
+            // Checkpoints of other models are told by their tensors, and nothing is left behind.
+            let folder = tempfile::tempdir().expect("folder");
+            let error = entry.add_checkpoint(&folder.path().join("models"), &fixture("clip.pt"), &mut |_, _| true);
+            let error = error.expect_err("the reduced one").to_string();
+            assert!(error.contains("clip.pt: its tensor '"), "{error}");
+            assert!(!folder.path().join("models").exists());
+            made += 1;
+        }
+        assert!(made >= 5);
+        let none =
+            reduced("http://127.0.0.1/").add_checkpoint(Path::new("/nowhere"), &fixture("none"), &mut |_, _| true);
+        assert!(matches!(none, Err(InstallError::Model(ModelError::Metadata { .. }))));
+    }
+}

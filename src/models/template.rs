@@ -1,0 +1,236 @@
+//! Templates: the graphs of a model without their weights, which an official checkpoint fills.
+//!
+//! `tools/export/template.py` makes one: an archive of graphs and of `template.json`, which says which tensor each
+//! weight is. Messages of protocol buffers merge when they stand one after another, so a filled graph is its
+//! template followed by the weights, and no graph has to be understood here.
+
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::{self, BufWriter, Cursor, Read, Write};
+use std::path::Path;
+
+use serde::Deserialize;
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+use zip::ZipArchive;
+
+use super::ModelError;
+use super::checkpoint::{WeightFile, WeightFileError};
+use crate::io::error::write_error;
+use crate::io::temporary::temporary_folder;
+
+/// Folders of a checkpoint in which its tensors may lie.
+const ROOTS: [&str; 4] = ["", "model.", "state_dict.", "module."];
+/// Last names of numbers that official files have beside the weights: settings, and what follows from the settings.
+const SETTINGS: [&str; 5] = ["attn_mask", "context_length", "input_resolution", "position_ids", "vocab_size"];
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Table {
+    /// What describes the model, less what follows from the weights.
+    description: serde_json::Map<String, Value>,
+    /// By role of a graph: name of a weight, tensor, and shape.
+    weights: BTreeMap<String, Vec<(String, String, Vec<u64>)>>,
+    /// Fields of the description that are tensors.
+    values: BTreeMap<String, String>,
+    /// Shapes of the tensors.
+    tensors: BTreeMap<String, Vec<usize>>,
+    /// Tensors that official checkpoints have and no graph needs.
+    unused: Vec<String>,
+}
+
+/// A template that was read.
+pub(crate) struct Template<'a> {
+    table: Table,
+    archive: ZipArchive<Cursor<&'a [u8]>>,
+}
+
+impl<'a> Template<'a> {
+    /// Reads a template that comes with the program.
+    pub(crate) fn read(bytes: &'a [u8]) -> Result<Self, ModelError> {
+        let broken =
+            |e: &dyn std::fmt::Display| ModelError::Metadata { path: "template.json".into(), problem: e.to_string() };
+        let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(|e| broken(&e))?;
+        let table = archive.by_name("template.json").map_err(|e| broken(&e))?;
+        let table = serde_json::from_reader(table).map_err(|e| broken(&e))?;
+        Ok(Self { table, archive })
+    }
+
+    /// Names of the graphs that it makes.
+    #[cfg(test)]
+    pub(super) fn files(&self) -> Result<std::collections::BTreeSet<String>, ModelError> {
+        Ok(self.archive.file_names().flatten().map(|n| n.into_owned()).filter(|n| n != "template.json").collect())
+    }
+
+    /// Fills the graphs with the weights of a checkpoint and writes them into `folder`, with the `description`, the
+    /// last of all. Everything is there then, or nothing. `progress` is told the weights that are written and all
+    /// of them, and says whether to go on.
+    pub(crate) fn fill(
+        &mut self,
+        checkpoint: &Path,
+        folder: &Path,
+        description: &str,
+        progress: &mut dyn FnMut(u64, u64) -> bool,
+    ) -> Result<(), ModelError> {
+        let refused = |e: WeightFileError| ModelError::Metadata { path: checkpoint.into(), problem: e.to_string() };
+        let mut weights = WeightFile::open(checkpoint)?;
+        let root = self.root(&weights);
+        self.check(&weights, root).map_err(refused)?;
+        std::fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
+        let held = temporary_folder(folder, description).map_err(|e| failed(folder, e))?;
+        let draft = held.folder.path();
+        let all = self.table.weights.values().map(|w| w.len() as u64).sum();
+        let (mut done, mut about) = (0, self.table.description.clone());
+        let mut files = Vec::new();
+        for (role, rows) in &self.table.weights {
+            let name = about["graphs"][role]["file"].as_str().unwrap_or_default().to_owned();
+            let path = draft.join(&name);
+            let mut graph = Vec::new();
+            let mut found = self.archive.by_name(&name).map_err(io::Error::other).map_err(|e| failed(&path, e))?;
+            found.read_to_end(&mut graph).map_err(|e| failed(&path, e))?;
+            let file = File::create(&path).map_err(|e| failed(&path, e))?;
+            let mut out = Sink { file: BufWriter::new(file), hash: Sha256::new(), bytes: 0 };
+            out.write_all(&graph).map_err(|e| failed(&path, e))?;
+            for (weight, tensor, shape) in rows {
+                let numbers = weights.floats(&format!("{root}{tensor}")).map_err(refused)?;
+                write_weight(&mut out, weight, shape, &numbers).map_err(|e| failed(&path, e))?;
+                done += 1;
+                if !progress(done, all) {
+                    return Err(ModelError::Cancelled);
+                }
+            }
+            out.flush().and_then(|()| out.file.get_ref().sync_all()).map_err(|e| failed(&path, e))?;
+            about["graphs"][role]["bytes"] = out.bytes.into();
+            about["graphs"][role]["sha256"] = hex(&out.hash.finalize()).into();
+            files.push(name);
+        }
+        for (field, tensor) in &self.table.values {
+            about.insert(field.clone(), json!(weights.floats(&format!("{root}{tensor}")).map_err(refused)?));
+        }
+        let source = super::fetch::sha256(checkpoint).map_err(|e| failed(checkpoint, e))?;
+        about.insert("checkpoint_sha256".into(), source.into());
+        let path = draft.join(description);
+        std::fs::write(&path, format!("{:#}\n", Value::Object(about))).map_err(|e| failed(&path, e))?;
+        files.push(description.to_owned());
+        for name in files {
+            let to = folder.join(&name);
+            std::fs::rename(draft.join(&name), &to).map_err(|e| failed(&to, e))?;
+        }
+        Ok(())
+    }
+
+    /// The folder of the checkpoint in which most of the tensors lie.
+    fn root(&self, weights: &WeightFile) -> &'static str {
+        let found = |root: &&str| {
+            self.table.tensors.keys().filter(|t| weights.tensors.contains_key(&format!("{root}{t}"))).count()
+        };
+        // Of equals the last one counts.
+        ROOTS.into_iter().rev().max_by_key(found).unwrap_or_default()
+    }
+
+    /// Whether the checkpoint has the tensors that are wanted, as they are wanted, and no others.
+    fn check(&self, weights: &WeightFile, root: &str) -> Result<(), WeightFileError> {
+        let refused = |name: &str, problem: String| Err(WeightFileError::Tensor { name: name.into(), problem });
+        for (tensor, shape) in &self.table.tensors {
+            let name = format!("{root}{tensor}");
+            match weights.tensors.get(&name) {
+                None => return refused(&name, "is missing; it is the checkpoint of another model".into()),
+                Some(stored) if stored.shape != *shape => {
+                    let got = &stored.shape;
+                    return refused(
+                        &name,
+                        format!("has the shape {got:?}, not {shape:?}; it is that of another model"),
+                    );
+                }
+                Some(stored) if !stored.dtype.is_float() => {
+                    return refused(&name, "has whole numbers where fractions are expected".into());
+                }
+                Some(_) => {}
+            }
+        }
+        for name in weights.tensors.keys() {
+            let Some(tensor) = name.strip_prefix(root) else { continue };
+            let is_setting = tensor.rsplit('.').next().is_some_and(|last| SETTINGS.contains(&last));
+            if !is_setting && !self.table.tensors.contains_key(tensor) && !self.table.unused.iter().any(|t| t == tensor)
+            {
+                return refused(name, "is unknown to this model; it is the checkpoint of another one".into());
+            }
+        }
+        Ok(())
+    }
+}
+
+fn failed(path: &Path, e: io::Error) -> ModelError {
+    ModelError::File(write_error(path, e))
+}
+
+fn hex(digest: &[u8]) -> String {
+    digest.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+/// A file, with the checksum of what was written.
+struct Sink {
+    file: BufWriter<File>,
+    hash: Sha256,
+    bytes: u64,
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.file.write_all(bytes)?;
+        self.hash.update(bytes);
+        self.bytes += bytes.len() as u64;
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+/// A model that has nothing but one weight: `ModelProto.graph.initializer` of ONNX.
+fn write_weight(out: &mut dyn Write, name: &str, shape: &[u64], numbers: &[f32]) -> io::Result<()> {
+    // Numbers of fields, with the kind of what follows: a number, or so many bytes.
+    const GRAPH: u8 = 7 << 3 | 2;
+    const INITIALIZER: u8 = 5 << 3 | 2;
+    const DIMS: u8 = 1 << 3;
+    const DATA_TYPE: u8 = 2 << 3;
+    const NAME: u8 = 8 << 3 | 2;
+    const RAW_DATA: u8 = 9 << 3 | 2;
+    const FLOAT: u8 = 1;
+    let raw = size_of_val(numbers);
+    let mut tensor = Vec::new();
+    for length in shape {
+        tensor.push(DIMS);
+        push_varint(&mut tensor, *length);
+    }
+    tensor.extend([DATA_TYPE, FLOAT, NAME]);
+    push_varint(&mut tensor, name.len() as u64);
+    tensor.extend(name.as_bytes());
+    tensor.push(RAW_DATA);
+    push_varint(&mut tensor, raw as u64);
+    let mut inner = vec![INITIALIZER];
+    push_varint(&mut inner, (tensor.len() + raw) as u64);
+    let mut head = vec![GRAPH];
+    push_varint(&mut head, (inner.len() + tensor.len() + raw) as u64);
+    for bytes in [&head, &inner, &tensor] {
+        out.write_all(bytes)?;
+    }
+    for some in numbers.chunks(1 << 14) {
+        let bytes: Vec<u8> = some.iter().flat_map(|v| v.to_le_bytes()).collect();
+        out.write_all(&bytes)?;
+    }
+    Ok(())
+}
+
+/// Seven bits a byte, the lowest first; all but the last have the highest bit set.
+fn push_varint(bytes: &mut Vec<u8>, mut value: u64) {
+    while value >= 0x80 {
+        bytes.push(value as u8 | 0x80);
+        value >>= 7;
+    }
+    bytes.push(value as u8);
+}
