@@ -3,7 +3,9 @@
 use egui::accesskit::Role;
 use egui::{Key, Rect};
 use egui_kittest::kittest::{NodeT, Queryable};
+use glam::DVec3;
 
+use fmlgs::scene::{Bounds, CropBox};
 use fmlgs::ui::actions::{Action, Pane};
 use fmlgs::ui::app::App;
 
@@ -191,4 +193,43 @@ fn the_palette_and_the_shortcut_sheet_list_the_actions() {
     w.harness.key_press(egui::Key::F1);
     w.harness.run_steps(3);
     assert!(w.shows("Keyboard and mouse") && w.shows("Ctrl+P"));
+}
+
+#[test]
+fn escape_closes_an_open_menu_and_nothing_else() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    w.ask(Action::Select(Some(1)));
+    w.click("View");
+    assert!(w.shows("Frame the selection"));
+    w.press(Key::Escape);
+    w.harness.run_steps(3);
+    assert!(!w.shows("Frame the selection"), "the menu is closed");
+    assert_eq!(w.app().viewport.picking.selected(), Some(1), "what was selected stays");
+    w.press(Key::Escape);
+    assert_eq!(w.app().viewport.picking.selected(), None, "without a menu it deselects");
+}
+
+#[test]
+fn an_answer_says_why_nothing_of_it_is_drawn() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    w.ask(Action::Ask("box 0".into()));
+    w.until("maps", |a| a.viewport.queries.maps().is_some());
+    assert!(!w.shows("It is "), "it is in view");
+    w.ask(Action::Hide(1));
+    w.until("maps without it", |a| a.viewport.queries.maps().is_some());
+    w.harness.run_steps(4);
+    assert!(w.shows("It is hidden."));
+    w.click("Show it");
+    w.harness.run_steps(4);
+    assert!(!w.shows("It is hidden."));
+    let nowhere = Bounds { min: DVec3::splat(1e3), max: DVec3::splat(2e3) };
+    w.ask(Action::SetCrop(Some(CropBox { bounds: nowhere, outside: false })));
+    w.harness.run_steps(4);
+    assert!(w.shows("It is outside the crop box.") && w.shows("cropped"));
+    w.ask(Action::SetCrop(None));
+    w.until("maps with it", |a| a.viewport.queries.maps().is_some());
+    w.harness.run_steps(4);
+    assert!(!w.shows("outside the crop box") && !w.shows("cropped"));
 }

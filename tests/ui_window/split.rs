@@ -11,7 +11,7 @@ use super::edits::window;
 use super::{Window, write_splat};
 
 /// Colors of the first and the second phrase that is asked.
-const COLORS: [[u8; 3]; 2] = [[255, 179, 0], [0, 200, 215]];
+const COLORS: [[u8; 3]; 2] = [[255, 179, 0], [225, 90, 255]];
 
 fn view(w: &Window) -> Rect {
     w.harness.get_by_label("Viewport").rect()
