@@ -114,6 +114,18 @@ fn blocks(cloud: &mut GaussianCloud) -> impl Iterator<Item = Slices<'_>> {
         })
 }
 
+/// Updates numbers with their moments; how many gradients were outliers. A plain loop: closures are calls for a few
+/// numbers each, and then not in the vectors of the caller.
+#[inline(always)]
+fn update_all(adam: &AdamStep, [p, m, v]: [&mut [f32]; 3], g: &[f32], rate: f32) -> usize {
+    let (p, m, v) = (&mut p[..g.len()], &mut m[..g.len()], &mut v[..g.len()]);
+    let mut outliers = 0_u32;
+    for i in 0..g.len() {
+        outliers += u32::from(adam.update(&mut p[i], g[i], &mut m[i], &mut v[i], rate));
+    }
+    outliers as usize
+}
+
 /// Updates a block and returns what it left out.
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
 fn step_block(renderer: &DifferentiableRenderer, block: &mut Block<'_>, update: &Update) -> StepStats {
@@ -147,22 +159,14 @@ fn step_block(renderer: &DifferentiableRenderer, block: &mut Block<'_>, update: 
         gradient[i] += g.screen;
         seen[i] += 1;
         radius[i] = radius[i].max(g.radius_px * radius_scale);
-        let mut step = |p: &mut [f32], m: &mut [f32], v: &mut [f32], g: &[f32], rate: f32| {
-            for (((p, m), v), g) in p.iter_mut().zip(m).zip(v).zip(g) {
-                left.outliers += usize::from(adam.update(p, *g, m, v, rate));
-            }
-        };
-        step(&mut p.positions[i], &mut m.positions[i], &mut v.positions[i], &g.position, rates.position);
-        step(&mut p.log_scales[i], &mut m.log_scales[i], &mut v.log_scales[i], &g.log_scale, rates.log_scale);
-        step(&mut p.quaternions[i], &mut m.quaternions[i], &mut v.quaternions[i], &g.quaternion, rates.quaternion);
-        let o = i..i + 1;
-        step(
-            &mut p.opacity_logits[o.clone()],
-            &mut m.opacity_logits[o.clone()],
-            &mut v.opacity_logits[o],
-            &[g.opacity_logit],
-            rates.opacity_logit,
-        );
+        let position = [&mut p.positions[i], &mut m.positions[i], &mut v.positions[i]].map(<[f32; 3]>::as_mut_slice);
+        let scale = [&mut p.log_scales[i], &mut m.log_scales[i], &mut v.log_scales[i]].map(<[f32; 3]>::as_mut_slice);
+        let turn = [&mut p.quaternions[i], &mut m.quaternions[i], &mut v.quaternions[i]];
+        let opacity = [&mut p.opacity_logits[i], &mut m.opacity_logits[i], &mut v.opacity_logits[i]];
+        left.outliers += update_all(adam, position, &g.position, rates.position)
+            + update_all(adam, scale, &g.log_scale, rates.log_scale)
+            + update_all(adam, turn.map(<[f32; 4]>::as_mut_slice), &g.quaternion, rates.quaternion)
+            + update_all(adam, opacity.map(std::slice::from_mut), &[g.opacity_logit], rates.opacity_logit);
         // All SH coefficients in one loop, which then runs in vectors.
         let mut d_sh = [0.0; 48];
         for (d, (k, c)) in d_sh.iter_mut().zip((0..*active).flat_map(|k| (0..3).map(move |c| (k, c)))) {
@@ -172,8 +176,8 @@ fn step_block(renderer: &DifferentiableRenderer, block: &mut Block<'_>, update: 
         let (p, m, v) = (&mut p.sh[own.clone()], &mut m.sh[own.clone()], &mut v.sh[own]);
         let (p, m, v) = (p.as_flattened_mut(), m.as_flattened_mut(), v.as_flattened_mut());
         let ((p0, p1), (m0, m1), (v0, v1)) = (p.split_at_mut(3), m.split_at_mut(3), v.split_at_mut(3));
-        step(p0, m0, v0, &d_sh[..3], rates.sh_constant);
-        step(p1, m1, v1, &d_sh[3..3 * active], rates.sh_rest);
+        left.outliers += update_all(adam, [p0, m0, v0], &d_sh[..3], rates.sh_constant)
+            + update_all(adam, [p1, m1, v1], &d_sh[3..3 * active], rates.sh_rest);
     }
     left
 }
