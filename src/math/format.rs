@@ -44,6 +44,16 @@ pub(crate) fn duration(secs: f64) -> String {
     }
 }
 
+/// A time that is only estimated: "40 s", "12 min", "3.5 h".
+pub(crate) fn roughly(secs: f64) -> String {
+    match secs {
+        s if !s.is_finite() || s < 0.0 => NONE.into(),
+        s if s < 90.0 => format!("{} s", (s / 5.0).ceil() * 5.0),
+        s if s < 5400.0 => format!("{:.0} min", s / 60.0),
+        s => format!("{:.1} h", s / 3600.0),
+    }
+}
+
 /// A measured time with four significant digits: "3.200 ms".
 pub(crate) fn seconds(secs: f64) -> String {
     match secs {
