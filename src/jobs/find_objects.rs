@@ -137,7 +137,7 @@ pub(crate) fn run(
         (None, Some(name)) => Some(name.to_owned()),
         (None, None) => catalog::usable(ModelRole::Segmenter, &mut warn)?.into_iter().next(),
     };
-    let mut segmenter = segmenter(masks, cloud, settings, network.as_deref())?;
+    let mut segmenter = segmenter(masks, cloud, settings, network.as_deref(), folder.join("cache"))?;
     let mut encoder = match with.encoder.as_deref() {
         Some(NO_ENCODER) => None,
         Some(name) => Some(models::encoder(name)?),
