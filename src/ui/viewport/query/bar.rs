@@ -7,7 +7,7 @@ use crate::jobs::phrases::colors::PhraseColors;
 use crate::pipeline::semantics::names;
 use crate::scene::SemanticMap;
 use crate::ui::actions::{Action, Pane};
-use crate::ui::text_field::cursor_to_end;
+use crate::ui::text_field::{cursor_to_end, select_all};
 use crate::ui::theme;
 
 /// Completions that are offered.
@@ -36,8 +36,13 @@ impl Queries {
                 .desired_width(width);
             let name = if self.is_second { "Query of the second view" } else { "Query" };
             let response = ui.add(edit).accessible_name(name);
-            if std::mem::take(&mut self.side.focus) || complete {
+            let starts = std::mem::take(&mut self.side.focus);
+            if starts || complete {
                 response.request_focus();
+            }
+            if starts {
+                // What is typed now takes the place of the query before.
+                select_all(ui.ctx(), id, &self.side.typed);
             }
             if complete {
                 self.side.typed.clone_from(&offered[0]);
