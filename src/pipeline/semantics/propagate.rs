@@ -18,7 +18,7 @@ const NEIGHBORS: usize = 8;
 /// How many usual distances between neighbors a full step in color is as far as.
 const COLOR_WEIGHT: f64 = 12.0;
 /// Path length, in usual distances between neighbors, beyond which nothing is inherited.
-const FARTHEST: f64 = 40.0;
+const FARTHEST_: f64 = 40.0;
 
 /// Every Gaussian without a vote inherits from the one with a vote that is nearest along the
 /// graph of neighbors, where a step is longer the more the colors differ. What is nobody's is
@@ -55,6 +55,8 @@ pub(crate) fn extend(cloud: &GaussianCloud, assignments: &mut [Assignment]) {
             edges[j].push((i, length));
         }
     }
+    #[allow(non_snake_case)]
+    let FARTHEST = std::env::var("G_FAR").ok().and_then(|s| s.parse().ok()).unwrap_or(FARTHEST_);
     let mut distance: Vec<f64> =
         assignments.iter().map(|b| if b.identity == UNKNOWN { f64::INFINITY } else { 0.0 }).collect();
     // Non-negative floats order like their bits.

@@ -19,7 +19,12 @@ const KEPT: usize = 8;
 pub(crate) struct Votes {
     /// Per Gaussian: identity and weight in px, any order, each identity once.
     by_gaussian: Vec<Vec<(IdentityId, f32)>>,
+    /// Per Gaussian: the largest share of a view's weight that it has in any view that was looked at.
+    best: Vec<f32>,
 }
+
+/// Share of its weight in the view that shows it best that a Gaussian must have in a view to be voted on there.
+const LEAST_SEEN: f32 = 0.1;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Assignment {
@@ -33,13 +38,47 @@ pub(crate) struct Assignment {
 impl Votes {
     /// No votes for `n` Gaussians.
     pub(crate) fn new(n: usize) -> Self {
-        Self { by_gaussian: vec![Vec::new(); n] }
+        Self { by_gaussian: vec![Vec::new(); n], best: vec![0.0; n] }
     }
 
     /// Weight of all votes for Gaussian `i`, px.
     #[cfg(test)]
     fn weight(&self, i: usize) -> f32 {
         self.by_gaussian[i].iter().map(|v| v.1).sum()
+    }
+
+    /// Takes note of how well each Gaussian is seen in a view: where it is seen much worse than elsewhere, it is
+    /// behind something, and what is there in the photo says nothing about it.
+    pub(crate) fn see(
+        &mut self,
+        renderer: &mut Renderer,
+        cloud: &GaussianCloud,
+        camera: &Camera,
+        settings: &RenderSettings,
+    ) -> Result<(), RenderError> {
+        let pixels = camera.width_px as usize * camera.height_px as usize;
+        let labels = vec![UNKNOWN; pixels];
+        let found = self.found(renderer, cloud, camera, settings, &labels)?;
+        let totals = totals(cloud.len(), &found);
+        self.best.iter_mut().zip(totals).for_each(|(best, total)| *best = best.max(total / pixels as f32));
+        Ok(())
+    }
+
+    fn found(
+        &self,
+        renderer: &mut Renderer,
+        cloud: &GaussianCloud,
+        camera: &Camera,
+        settings: &RenderSettings,
+        labels: &[IdentityId],
+    ) -> Result<Vec<(u32, IdentityId, f32)>, RenderError> {
+        let (width, height) = (camera.width_px as usize, camera.height_px as usize);
+        assert_eq!(labels.len(), width * height, "one label per pixel");
+        let row = || Row { labels, width, gaussian: u32::MAX, sums: Vec::new(), found: Vec::new() };
+        let mut rows: Vec<Row<'_>> = (0..height.div_ceil(TILE_PX)).map(|_| row()).collect();
+        renderer.contributions(cloud, camera, settings, &mut rows)?;
+        rows.iter_mut().for_each(Row::finish);
+        Ok(rows.into_iter().flat_map(|r| r.found).collect())
     }
 
     /// Adds the votes of one view. `labels` holds the innermost identity of each pixel, row-major.
@@ -51,15 +90,14 @@ impl Votes {
         settings: &RenderSettings,
         labels: &[IdentityId],
     ) -> Result<(), RenderError> {
-        let (width, height) = (camera.width_px as usize, camera.height_px as usize);
-        assert_eq!(labels.len(), width * height, "one label per pixel");
-        let row = || Row { labels, width, gaussian: u32::MAX, sums: Vec::new(), found: Vec::new() };
-        let mut rows: Vec<Row<'_>> = (0..height.div_ceil(TILE_PX)).map(|_| row()).collect();
-        renderer.contributions(cloud, camera, settings, &mut rows)?;
-        for mut row in rows {
-            row.finish();
-            for (gaussian, identity, weight) in row.found {
-                add(&mut self.by_gaussian[gaussian as usize], identity, weight);
+        let found = self.found(renderer, cloud, camera, settings, labels)?;
+        let totals = totals(cloud.len(), &found);
+        let least_share = std::env::var("G_SEEN").ok().and_then(|s| s.parse().ok()).unwrap_or(LEAST_SEEN);
+        let pixels = labels.len() as f32;
+        for (gaussian, identity, weight) in found.into_iter().filter(|f| f.1 != UNKNOWN) {
+            let g = gaussian as usize;
+            if totals[g] >= least_share * pixels * self.best[g] {
+                add(&mut self.by_gaussian[g], identity, weight);
             }
         }
         if CHECKED {
@@ -75,6 +113,13 @@ impl Votes {
         let objects: Vec<IdentityId> = (0..=identities.len() as IdentityId).map(|i| identities.object_of(i)).collect();
         self.by_gaussian.par_iter().map(|votes| decide(votes, &objects, least)).collect()
     }
+}
+
+/// Weight of each Gaussian in a view, px.
+fn totals(n: usize, found: &[(u32, IdentityId, f32)]) -> Vec<f32> {
+    let mut totals = vec![0.0; n];
+    found.iter().for_each(|f| totals[f.0 as usize] += f.2);
+    totals
 }
 
 fn add(votes: &mut Vec<(IdentityId, f32)>, identity: IdentityId, weight: f32) {
@@ -134,7 +179,7 @@ impl ContributionSink<f32> for Row<'_> {
         }
         let end = (x + weights.len()).min(self.width);
         for (&label, &weight) in self.labels[y * self.width + x..y * self.width + end].iter().zip(weights) {
-            if weight > 0.0 && label != UNKNOWN {
+            if weight > 0.0 {
                 match self.sums.iter_mut().find(|s| s.0 == label) {
                     Some(s) => s.1 += weight,
                     None => self.sums.push((label, weight)),
