@@ -156,7 +156,7 @@ impl Viewport {
         } else {
             buttons(ui);
         }
-        if has_photos && !self.queries.is_second() {
+        if has_photos {
             ui.separator();
             let tip = format!("{}  {}", Action::ToggleCameras.tooltip(), keys::label(ui.ctx(), &Action::ToggleCameras));
             if ui.selectable_label(layout.cameras, "Cameras").on_hover_text(tip).clicked() {
