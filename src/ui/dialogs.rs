@@ -16,8 +16,8 @@ pub(crate) struct Question {
     pub(crate) action: Action,
 }
 
-/// Shows an error until it is read. Returns whether it was.
-pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox, has_scene: bool) -> bool {
+/// Shows an error until it is read. Returns whether it was; where something could not be opened, another may be.
+pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox, has_scene: bool, actions: &mut Vec<Action>) -> bool {
     let response = Modal::new(Id::unique("error")).frame(theme::dialog()).show(ctx, |ui| {
         ui.set_width(480.0);
         ui.horizontal(|ui| {
@@ -36,7 +36,11 @@ pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox, has_scene: bool)
         }
         ui.add_space(12.0);
         ui.horizontal(|ui| {
-            let close = ui.add(theme::primary_button("Close")).clicked();
+            let mut close = ui.add(theme::primary_button("Close")).clicked();
+            if error.doing.starts_with("Opening") && ui.button("Open another\u{2026}").clicked() {
+                actions.push(Action::OpenFile);
+                close = true;
+            }
             if ui.button("Copy message").clicked() {
                 let f = &error.failure;
                 ui.ctx().copy_text(format!("{}: {}\n{}", error.doing, f.message, f.remedy));

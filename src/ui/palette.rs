@@ -105,10 +105,27 @@ fn matches(query: &str, layout: &Layout) -> Vec<Action> {
     let query = path.to_lowercase();
     let words: Vec<&str> = query.split_whitespace().collect();
     let can_be_done = |a: &Action| !matches!(a, Action::TogglePane(pane) if !layout.shows(*pane));
-    let is_asked_for = |a: &Action| words.iter().all(|w| title(a).to_lowercase().contains(w));
+    let is_asked_for = |a: &Action| {
+        let title = format!("{} {}", title(a).to_lowercase(), other_words(a));
+        words.iter().all(|w| title.contains(w))
+    };
     let mut found: Vec<Action> = Action::all().into_iter().filter(|a| can_be_done(a) && is_asked_for(a)).collect();
-    found.sort_by_key(|a| !title(a).to_lowercase().starts_with(&query));
+    // Whoever types a pane's name means the pane.
+    let is_pane = |a: &Action| match a {
+        Action::ShowPane(pane) | Action::TogglePane(pane) => pane.text().to_lowercase().starts_with(&query),
+        _ => false,
+    };
+    found.sort_by_key(|a| !title(a).to_lowercase().starts_with(&query) && !is_pane(a));
     found
+}
+
+/// What else an action is called.
+fn other_words(action: &Action) -> &'static str {
+    match action {
+        Action::ShowPane(_) => "open",
+        Action::TogglePane(_) => "close",
+        _ => "",
+    }
 }
 
 /// Draws the shortcut sheet while `open`.
@@ -130,8 +147,11 @@ pub(crate) fn shortcut_sheet(ctx: &egui::Context, open: &mut bool) {
                     .map(|a| (keys::label(left.ctx(), &a), a.text()))
                     .collect();
                 let gestures = keys::GESTURES.map(|(k, t)| (k.to_owned(), t.to_owned()));
-                sheet_grid(left, "Actions", &bound);
+                // Both columns are of a height.
+                let (first, second) = bound.split_at(bound.len().min((bound.len() + gestures.len()).div_ceil(2)));
+                sheet_grid(left, "Actions", first);
                 sheet_grid(right, "In the viewport", &gestures);
+                sheet_grid(right, "More actions", second);
             });
         });
         ui.add_space(8.0);
@@ -186,6 +206,8 @@ mod tests {
         assert_eq!(found("show scene plan"), vec![Action::ShowPane(Pane::Plan)]);
         assert_eq!(found("hide scene plan"), vec![Action::TogglePane(Pane::Plan)]);
         assert!(found("hide camera path").is_empty(), "it is hidden already");
+        assert_eq!(found("close scene plan"), vec![Action::TogglePane(Pane::Plan)]);
+        assert_eq!(found("camera path").first(), Some(&Action::ShowPane(Pane::Camera)), "before what plays it");
     }
 
     #[test]

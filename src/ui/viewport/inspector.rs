@@ -176,7 +176,8 @@ fn properties(ui: &mut Ui, record: &GaussianRecord, state: &AppState) {
         let PixelRecord { x, y, weight, share, .. } = record.pixel;
         row(ui, "Number", format!("#{}", record.number));
         row(ui, "Weight", format!("{weight:.4}, {} of pixel ({x}, {y})", of(share)));
-        row(ui, "Center", format!("{} units", list(&record.center)));
+        let center = record.center.map(|v| meters.map_or(v, |scale| v * scale));
+        row(ui, "Center", format!("{} {}", list(&center), if meters.is_some() { "m" } else { "units" }));
         row(ui, "Scales", record.scales.map(|s| format::length(s, meters)).join(", "));
         row(ui, "Rotation", record.rotation_wxyz.map_or_else(|| format::NONE.into(), |q| list(&wide(&q))));
         row(ui, "Opacity", format!("{:.4}", record.opacity));

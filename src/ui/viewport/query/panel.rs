@@ -69,8 +69,9 @@ impl Queries {
         (semantics, cloud, visibility): (&Versioned<SemanticMap>, &GaussianCloud, &Visibility),
         actions: &mut Vec<Action>,
     ) -> bool {
+        let row = vec2(ui.available_width(), ui.spacing().interact_size.y);
         let (focused, offered) = ui
-            .with_layout(Layout::right_to_left(Align::Center), |ui| {
+            .allocate_ui_with_layout(row, Layout::right_to_left(Align::Center), |ui| {
                 if is_small {
                     let (symbol, text) = match is_folded {
                         true => ("\u{23f7}", "Unfold the answer"),
@@ -80,15 +81,14 @@ impl Queries {
                         self.side.unfolded = is_folded;
                     }
                 }
-                match is_folded {
-                    true => self.show_in_short(ui, state, semantics, visibility),
-                    false => {
-                        let details = ui.button("Details");
-                        if details.on_hover_text("Full answer, search and overlay settings").clicked() {
-                            actions.push(Action::TogglePane(Pane::Query));
-                        }
-                        self.show_pin(ui);
+                if is_folded {
+                    self.show_in_short(ui, state, semantics, visibility);
+                } else {
+                    let details = ui.button("Details");
+                    if details.on_hover_text("Full answer, search and overlay settings").clicked() {
+                        actions.push(Action::TogglePane(Pane::Query));
                     }
+                    self.show_pin(ui);
                 }
                 self.show_field(ui, ui.available_width(), semantics)
             })
