@@ -42,39 +42,36 @@ impl Palette {
         self.selected = self.selected.min(last);
         let entered = step(Key::Enter);
         let mut chosen = if entered { found.get(self.selected).cloned() } else { None };
-        let area = egui::Modal::default_area(egui::Id::unique("palette")).anchor(Align2::CENTER_TOP, [0.0, 90.0]);
-        let response = egui::Modal::new(egui::Id::unique("palette"))
-            .frame(theme::dialog().inner_margin(12))
-            .area(area)
-            .show(ctx, |ui| {
-                ui.set_width(520.0);
-                let edit = TextEdit::singleline(&mut self.query)
-                    .hint_text("Type an action, or a path to open")
-                    .desired_width(f32::INFINITY);
-                let edit = ui.add(edit).accessible_name("Search actions");
-                edit.request_focus();
-                if edit.changed() {
-                    self.selected = 0;
+        let area = theme::dialog_area("palette").anchor(Align2::CENTER_TOP, [0.0, 90.0]);
+        let response = theme::dialog("palette").area(area).show(ctx, |ui| {
+            ui.set_width(520.0);
+            let edit = TextEdit::singleline(&mut self.query)
+                .hint_text("Type an action, or a path to open")
+                .desired_width(f32::INFINITY);
+            let edit = ui.add(edit).accessible_name("Search actions");
+            edit.request_focus();
+            if edit.changed() {
+                self.selected = 0;
+            }
+            ui.add_space(4.0);
+            ScrollArea::vertical().max_height(380.0).auto_shrink([false, true]).show(ui, |ui| {
+                if found.is_empty() {
+                    ui.weak("No matching action.");
                 }
-                ui.add_space(4.0);
-                ScrollArea::vertical().max_height(380.0).auto_shrink([false, true]).show(ui, |ui| {
-                    if found.is_empty() {
-                        ui.weak("No matching action.");
+                for (i, action) in found.iter().enumerate() {
+                    let row = egui::Button::selectable(i == self.selected, title(action))
+                        .shortcut_text(keys::label(ui.ctx(), action))
+                        .min_size(egui::vec2(ui.available_width(), 28.0));
+                    let row = ui.add(row).on_hover_text(action.tooltip());
+                    if i == self.selected && (entered || edit.changed() || step_keys(ui)) {
+                        row.scroll_to_me(None);
                     }
-                    for (i, action) in found.iter().enumerate() {
-                        let row = egui::Button::selectable(i == self.selected, title(action))
-                            .shortcut_text(keys::label(ui.ctx(), action))
-                            .min_size(egui::vec2(ui.available_width(), 28.0));
-                        let row = ui.add(row).on_hover_text(action.tooltip());
-                        if i == self.selected && (entered || edit.changed() || step_keys(ui)) {
-                            row.scroll_to_me(None);
-                        }
-                        if row.clicked() {
-                            chosen = Some(action.clone());
-                        }
+                    if row.clicked() {
+                        chosen = Some(action.clone());
                     }
-                });
+                }
             });
+        });
         if chosen.is_some() || response.should_close() {
             self.open = false;
         }
@@ -133,7 +130,7 @@ pub(crate) fn shortcut_sheet(ctx: &egui::Context, open: &mut bool) {
     if !*open {
         return;
     }
-    let response = egui::Modal::new(egui::Id::unique("shortcuts")).frame(theme::dialog()).show(ctx, |ui| {
+    let response = theme::dialog("shortcuts").show(ctx, |ui| {
         ui.set_width((ctx.content_rect().width() - 80.0).min(760.0));
         ui.heading("Keyboard and mouse");
         ui.add_space(8.0);

@@ -144,6 +144,9 @@ impl Queries {
         visibility: &Visibility,
     ) -> Option<(String, Color32, String)> {
         let newest = self.side.live.clone()?;
+        if let Some(comparison) = &self.side.comparison {
+            return Some((comparison.figure(), theme::text(), newest.text));
+        }
         let shown = newest.shown(&self.side.settings);
         match (&newest.answered.answer, shown.first()) {
             (Answer::NotFound(_), None) => (self.is_settled(ui) && !newest.pending)

@@ -22,7 +22,7 @@ fn on_screen(ctx: &Context, name: &'static str) -> Option<Rect> {
 }
 
 /// Views that are smaller than this have the answer in a word, points.
-const SMALL: Vec2 = vec2(620.0, 420.0);
+const SMALL: Vec2 = vec2(540.0, 420.0);
 
 impl Queries {
     /// The field, the answer, and the queries that are pinned. Whether the field has the keyboard. The card keeps
@@ -49,14 +49,11 @@ impl Queries {
         }
         let name = if self.is_second() { "second question" } else { "question" };
         let area = Area::new(Id::unique(name)).order(Order::Middle).pivot(Align2::RIGHT_TOP).fixed_pos(at);
-        let shown = area.constrain_to(rect).show(ui.ctx(), |ui| {
-            let frame = theme::overlay().show(ui, |ui| {
-                ui.set_width(width);
-                let height = (rect.bottom() - at.y - 2.5 * MARGIN).max(60.0);
-                let scrolled = ScrollArea::vertical().max_height(height).min_scrolled_height(height);
-                scrolled.show(ui, |ui| self.card(ui, (is_small, is_folded), state, of, actions)).inner
-            });
-            frame.inner
+        let shown = theme::card(ui.ctx(), area.constrain_to(rect), |ui| {
+            ui.set_width(width);
+            let height = (rect.bottom() - at.y - 2.5 * MARGIN).max(60.0);
+            let scrolled = ScrollArea::vertical().max_height(height).min_scrolled_height(height);
+            scrolled.show(ui, |ui| self.card(ui, (is_small, is_folded), state, of, actions)).inner
         });
         shown.inner
     }
