@@ -97,6 +97,7 @@ fn a_name_is_typed_in_its_row() {
     // A name of letters that no font of the window has: drawing it would fail the test.
     w.ask(Action::Change(Edit::Rename(1, "\u{6c34}\u{58f6}".into())));
     w.until("the Chinese name", |a| name(a, 1) == "\u{6c34}\u{58f6}");
+    assert!(!said(w.app(), "to no"), "what was left by Escape is not taken over later");
     assert!(w.is_drawn());
 }
 

@@ -199,6 +199,19 @@ fn the_palette_and_the_shortcut_sheet_list_the_actions() {
 }
 
 #[test]
+fn what_is_typed_takes_the_place_of_the_query_before() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    w.ask(Action::Ask("box 0".into()));
+    assert_eq!(w.app().viewport.queries.found(), [1]);
+    w.press(Key::Slash);
+    w.harness.run_steps(2);
+    w.types("box 1");
+    w.harness.run_steps(2);
+    assert_eq!(w.app().viewport.queries.found(), [2], "not \"box 0box 1\"");
+}
+
+#[test]
 fn escape_closes_an_open_menu_and_nothing_else() {
     let folder = tempfile::tempdir().expect("folder");
     let mut w = window(folder.path());
