@@ -20,7 +20,7 @@ use super::network::{Network, guarded};
 use super::session_cache;
 use crate::scene::resource_log::{self, ResourceKind};
 
-const MODEL_USE: &str = "it is about to run for the first time";
+const MODEL_USE: &str = "its first use";
 
 pub(crate) struct Engine {
     environment: Environment,

@@ -96,6 +96,9 @@ impl App {
             Action::Undo => self.edit(EditStep::Undo),
             Action::Redo => self.edit(EditStep::Redo),
             Action::GoToTarget(id, side) => self.visit(id, ViewPreference { side, ..ViewPreference::default() }),
+            Action::PlayPath | Action::StepBack | Action::StepForward if !self.camera.has_clip() => {
+                self.state.toast(Tone::Info, "Nothing to play: add keyframes (K), or go to an object first.");
+            }
             Action::PlayPath => self.camera.toggle(),
             Action::StepBack => self.step_in_time(-1.0, ctx),
             Action::StepForward => self.step_in_time(1.0, ctx),
@@ -267,7 +270,7 @@ impl App {
         }
         if let Some(visit) = flight {
             self.viewport.turn_about(visit.target);
-            self.camera.play_flight(visit.flight);
+            self.camera.play_flight(visit.flight, name);
         }
     }
 
@@ -308,7 +311,7 @@ impl App {
                 if let Some(point) = about {
                     self.viewport.turn_about(point);
                 }
-                self.camera.play_flight(*flight);
+                self.camera.play_flight(*flight, String::new());
             }
             Effect::Mark(ids) => {
                 if let Some(map) = self.state.semantics.clone() {

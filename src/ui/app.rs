@@ -157,8 +157,9 @@ impl App {
         self.state.replan(&self.layout.plan, self.layout.config.limits());
         for load in resource_log::since(self.traced) {
             self.traced += 1;
-            self.state.say(super::state::Tone::Info, load.line());
+            self.state.say(super::state::Tone::Info, load.text());
         }
+        self.state.stamp_log(resource_log::now_secs());
         // Once there are objects, they are what a user works with.
         let has_objects = self.state.semantics.is_some();
         let news = if has_objects { Pane::Objects } else { Pane::Training };
@@ -314,8 +315,9 @@ impl App {
         {
             self.state.unposed = None;
         }
-        if self.state.error.as_ref().is_some_and(|e| dialogs::show_error(ctx, e, self.state.scene.is_some())) {
-            self.state.error = None;
+        let Self { state, actions, .. } = self;
+        if state.error.as_ref().is_some_and(|e| dialogs::show_error(ctx, e, state.scene.is_some(), actions)) {
+            state.error = None;
         }
         if let Some((action, path)) = self.dialogs.show(ctx) {
             self.chosen(action, path);
@@ -344,7 +346,7 @@ impl DockContents for App {
         let Place::Pane(pane) = place else { return self.show_view(ui) };
         Frame::new().fill(theme::panel()).inner_margin(Margin::same(12)).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
-            if matches!(pane, Pane::Training | Pane::Objects | Pane::Query | Pane::Plan | Pane::Models) {
+            if matches!(pane, Pane::Training | Pane::Query | Pane::Plan | Pane::Models) {
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| self.show_pane(ui, pane));
             } else {
                 self.show_pane(ui, pane);

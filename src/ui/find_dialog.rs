@@ -1,7 +1,7 @@
 //! The way to objects and parts where photos came without labels: what each means can and cannot do, what it costs,
 //! what has to be downloaded first. Whoever agrees need not come back: downloads are followed by the search.
 
-use egui::{Id, Modal, RichText, ScrollArea, Ui};
+use egui::{RichText, ScrollArea, Ui};
 
 use super::state::AppState;
 use super::theme;
@@ -49,7 +49,7 @@ impl FindDialog {
         if !self.open {
             return None;
         }
-        let response = Modal::new(Id::unique("find objects")).frame(theme::dialog()).show(ctx, |ui| {
+        let response = theme::dialog("find objects").show(ctx, |ui| {
             let room = ctx.content_rect().size();
             ui.set_width((room.x - 80.0).min(600.0));
             ui.heading("Find objects and parts");

@@ -83,6 +83,10 @@ fn a_name_is_typed_in_its_row() {
     assert!(said(w.app(), "Renamed box 0 to wade") && !w.shows("New name"));
     assert_eq!(center(w.app()), home, "letters are no flight");
 
+    let menus = |w: &Window| w.harness.query_all_by_role_and_label(Role::Button, "\u{2026}").count();
+    w.harness.hover_at(egui::pos2(5.0, 5.0));
+    w.harness.run_steps(2);
+    assert_eq!(menus(&w), 1, "the menu of what is selected, for the keyboard; names have their room");
     w.press(Key::F2);
     assert!(w.shows("New name"), "F2 renames what was chosen last");
     w.types("no");

@@ -42,19 +42,19 @@ impl LookTime {
     }
 
     pub(crate) fn text(self) -> String {
-        format!("about {} a photo here (estimate)", format::roughly(self.secs))
+        format!("{} a photo here, by estimate", format::about(self.secs))
     }
 }
 
 /// How long finding takes where up to `most_photos` are looked at.
 pub(crate) fn sentence(look: LookTime, most_photos: usize) -> String {
-    let all = format::roughly(look.secs * most_photos as f64);
+    let all = format::about(look.secs * most_photos as f64);
     match most_photos {
-        0 | 1 => format!("Looking at the photo takes about {all}."),
+        0 | 1 => format!("Looking at the photo takes {all}."),
         n => format!(
-            "Looking at 1 to {n} photos takes about {} each: {all} at most. One photo may be enough; more are looked at only where \
+            "Looking at 1 to {n} photos takes {} each, {all} at most. One photo may be enough; more are looked at only where \
              something is still unknown.",
-            format::roughly(look.secs)
+            format::about(look.secs)
         ),
     }
 }

@@ -186,10 +186,7 @@ fn facts(ui: &mut Ui, state: &AppState, job: Option<&RunningJob>) {
         ("Loss", last.map_or_else(dash, |m| format!("{:.4}", m.loss))),
         ("Rate", progress.map_or_else(dash, |p| format::rate(p.rate, "steps"))),
         ("Elapsed", last.map(|m| m.secs).or(held.map(|e| e.secs)).map_or_else(dash, format::duration)),
-        (
-            "Remaining",
-            progress.and_then(crate::pipeline::observer::Progress::eta_secs).map_or_else(dash, format::duration),
-        ),
+        ("Remaining", job.and_then(|j| j.left_secs).map_or_else(dash, format::about)),
     ];
     egui::Frame::new().fill(theme::surface()).corner_radius(8).inner_margin(10).show(ui, |ui| {
         ui.columns_const(|[a, b]| {
