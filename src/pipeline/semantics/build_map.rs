@@ -17,6 +17,7 @@ use super::tracker::{TrackOptions, Tracked, ViewReport, track};
 use super::train_codes::{CodeTraining, CodeView, decode, train_codes};
 use super::view_map::ViewMap;
 use crate::io::labels::Labels;
+use crate::math::format;
 use crate::models::Encoder;
 use crate::pipeline::observer::{Observer, Severity};
 use crate::render::{RenderSettings, Renderer};
@@ -179,11 +180,11 @@ fn unknown(views: &[ViewReport], photos: &[Photo], share: f64) -> Option<String>
     let many: Vec<&ViewReport> = views.iter().filter(|v| v.unknown > share).collect();
     let worst = many.iter().max_by(|a, b| a.unknown.total_cmp(&b.unknown))?;
     Some(format!(
-        "{} of {} photos have over {:.0} % unlabeled pixels (worst: {}, {:.0} %); Gaussians there inherit from \
-         connected ones",
+        "{} of {} photos have over {} unknown pixels (worst: {}, {:.0} %): no mask, and nothing that looks like what \
+         masks show; label one of them to name what is there",
         many.len(),
         photos.len(),
-        100.0 * share,
+        format::share(share),
         photos[worst.photo].name,
         100.0 * worst.unknown
     ))

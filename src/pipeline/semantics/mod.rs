@@ -15,7 +15,6 @@ pub mod by_embedding;
 pub(crate) mod carry;
 pub mod code_map;
 pub mod codes;
-pub(crate) mod complete;
 pub mod edit;
 pub(crate) mod embed;
 pub(crate) mod error;

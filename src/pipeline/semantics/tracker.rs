@@ -2,18 +2,17 @@
 //! the votes are drawn into the other views, and photos of which too much is unknown are segmented
 //! too, their masks linked to what is known. No network is needed.
 
+mod complete;
+
 use std::time::Instant;
 
 use super::associate::{Disagreement, Link, disagreements, link};
-use super::complete::{ColorModels, GrowOptions, Terrain, grow};
 use super::error::FindError;
 use super::propagate::extend;
-use super::regions::shape::ends_of;
 use super::sam2_tracker::{LABEL_SIDE_PX, Sam2Tracker};
 use super::segmenter::{FoundMask, Segmenter};
 use super::view_map::ViewMap;
 use super::votes::{Assignment, UNKNOWN, Votes};
-use crate::io;
 use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY, Photo};
@@ -26,10 +25,10 @@ const DRIFT: f64 = 0.2;
 /// Pixels from which each of them says something.
 const DRIFT_PX: usize = 30;
 
+/// Steps between Gaussians over which what no photo shows (the inside of things) belongs to what is around it.
+const HIDDEN_STEPS: f64 = 4.0;
 /// Longer side of the views in which it is looked how well Gaussians are seen, px.
 const SEE_SIDE_PX: u32 = 256;
-/// Longer side of the photos that complete what is known, px.
-const COMPLETE_SIDE_PX: u32 = 320;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TrackOptions {
@@ -75,7 +74,7 @@ pub(crate) struct Tracked {
     pub(crate) assignments: Vec<Assignment>,
     /// The photos that were segmented, in order.
     pub(crate) seeds: Vec<usize>,
-    /// Every photo, before identities were extended to Gaussians that no photo voted for.
+    /// Every photo, with all that photos say and nothing that is only inherited.
     pub(crate) views: Vec<ViewReport>,
     /// Where masks and what was known disagreed, with the photo.
     pub(crate) disagreements: Vec<(usize, Disagreement)>,
@@ -112,10 +111,7 @@ pub(crate) fn track(
         segment_secs: 0.0,
     };
     let (start, mut follow_secs, mut encode_secs) = (Instant::now(), 0.0, 0.0);
-    for photo in photos {
-        let camera = photo.camera.limited_to(SEE_SIDE_PX);
-        t.votes.see(&mut t.renderer, cloud, &camera, settings).map_err(|e| FindError::Render(photo.name.clone(), e))?;
-    }
+    t.see(observer)?;
     let mut seeds = vec![first];
     let mut tried = vec![false; photos.len()];
     let seeded = t.seed(first, segmenter, observer)?;
@@ -138,8 +134,9 @@ pub(crate) fn track(
         }
     };
     t.complete(&views, observer)?;
+    let views = t.look(seeds.len() + 1, observer)?;
     let mut assignments = t.votes.decide(&t.identities, LEAST_VOTES);
-    extend(cloud, &mut assignments);
+    extend(cloud, &mut assignments, HIDDEN_STEPS);
     let carry_secs = start.elapsed().as_secs_f64() - t.segment_secs - encode_secs - follow_secs;
     let secs = vec![
         ("segment", t.segment_secs),
@@ -166,6 +163,19 @@ struct Tracker<'a> {
 }
 
 impl Tracker<'_> {
+    /// Looks how well each Gaussian is seen in every photo, before any votes.
+    fn see(&mut self, observer: &mut dyn Observer) -> Result<(), FindError> {
+        let mut ticker = Ticker::new("Looking what each photo shows", self.photos.len());
+        for (i, photo) in self.photos.iter().enumerate() {
+            let camera = photo.camera.limited_to(SEE_SIDE_PX);
+            self.votes
+                .see(&mut self.renderer, self.cloud, &camera, self.settings)
+                .map_err(|e| FindError::Render(photo.name.clone(), e))?;
+            ticker.tick(i + 1, observer)?;
+        }
+        Ok(())
+    }
+
     /// Segments a photo, links its masks to known identities, and lets them vote. The masks and whose
     /// they are; `None` if there was nothing in it.
     fn seed(
@@ -237,45 +247,6 @@ impl Tracker<'_> {
         Ok(())
     }
 
-    /// Lets the photos complete what is known, those of which most is known first; what each adds is known to the next.
-    fn complete(&mut self, views: &[ViewReport], observer: &mut dyn Observer) -> Result<(), FindError> {
-        if std::env::var_os("G_OFF").is_some() {
-            return Ok(());
-        }
-        let options = GrowOptions::default();
-        let mut order: Vec<&ViewReport> = views.iter().filter(|v| v.unknown > 0.0).collect();
-        order.sort_by(|a, b| a.unknown.total_cmp(&b.unknown).then(a.photo.cmp(&b.photo)));
-        let mut ticker = Ticker::new("Completing identities in the photos", 2 * order.len());
-        let mut colors = ColorModels::new(self.identities.len());
-        let mut terrains = Vec::with_capacity(order.len());
-        let of: Vec<IdentityId> = self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect();
-        for (i, view) in order.iter().enumerate() {
-            let photo = &self.photos[view.photo];
-            let pixels = io::photo::load(photo, COMPLETE_SIDE_PX)?;
-            let camera = photo.camera.limited_to(COMPLETE_SIDE_PX);
-            let ends = ends_of(self.cloud, self.settings, &camera);
-            let terrain = Terrain::new(pixels.width_px as usize, &pixels.rgb, ends.as_deref(), &options);
-            let map = self.map_of(view.photo, COMPLETE_SIDE_PX, &of)?;
-            colors.add(&terrain, &sure(&map, options.share));
-            terrains.push(terrain);
-            ticker.tick(i + 1, observer)?;
-        }
-        colors.compare(options.unseen);
-        for (i, (view, terrain)) in order.iter().zip(&terrains).enumerate() {
-            let map = self.map(view.photo, COMPLETE_SIDE_PX)?;
-            let known = sure(&map, options.share);
-            let (mut labels, _) = grow(terrain, &known, &colors, &options);
-            labels.iter_mut().zip(&known).filter(|(_, k)| **k != UNKNOWN).for_each(|(l, _)| *l = UNKNOWN);
-            let photo = &self.photos[view.photo];
-            let camera = photo.camera.limited_to(COMPLETE_SIDE_PX);
-            self.votes
-                .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
-                .map_err(|e| FindError::Render(photo.name.clone(), e))?;
-            ticker.tick(order.len() + i + 1, observer)?;
-        }
-        Ok(())
-    }
-
     fn told(&self, what: &Disagreement) -> String {
         let name = |id: &IdentityId| self.identities.full_name(*id);
         match what {
@@ -320,12 +291,6 @@ impl Tracker<'_> {
         }
         Ok(views)
     }
-}
-
-/// What is known beyond doubt of a view; `UNKNOWN` elsewhere.
-fn sure(map: &ViewMap, share: f32) -> Vec<IdentityId> {
-    let sure = |i: usize| map.alpha[i] >= 0.5 && map.share[i] >= share;
-    (0..map.identity.len()).map(|i| if sure(i) { map.identity[i] } else { UNKNOWN }).collect()
 }
 
 /// The identities that two label maps of one view put in different places: both show them, and they

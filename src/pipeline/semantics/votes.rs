@@ -1,6 +1,7 @@
 //! Closed-form lifting: every Gaussian takes the weighted vote of the pixels it contributed to
 //! (weight = alpha x transmittance), which gives its identity at all levels in one pass.
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::math::finite::{CHECKED, all_finite};
@@ -19,7 +20,7 @@ const KEPT: usize = 8;
 pub(crate) struct Votes {
     /// Per Gaussian: identity and weight in px, any order, each identity once.
     by_gaussian: Vec<Vec<(IdentityId, f32)>>,
-    /// Per Gaussian: the largest share of a view's weight that it has in any view that was looked at.
+    /// Per Gaussian: the largest area that it shows in any view that was looked at.
     best: Vec<f32>,
 }
 
@@ -56,11 +57,10 @@ impl Votes {
         camera: &Camera,
         settings: &RenderSettings,
     ) -> Result<(), RenderError> {
-        let pixels = camera.width_px as usize * camera.height_px as usize;
-        let labels = vec![UNKNOWN; pixels];
+        let labels = vec![UNKNOWN; camera.width_px as usize * camera.height_px as usize];
         let found = self.found(renderer, cloud, camera, settings, &labels)?;
-        let totals = totals(cloud.len(), &found);
-        self.best.iter_mut().zip(totals).for_each(|(best, total)| *best = best.max(total / pixels as f32));
+        let areas = areas(cloud, camera, &found);
+        self.best.iter_mut().zip(areas).for_each(|(best, area)| *best = best.max(area));
         Ok(())
     }
 
@@ -91,12 +91,10 @@ impl Votes {
         labels: &[IdentityId],
     ) -> Result<(), RenderError> {
         let found = self.found(renderer, cloud, camera, settings, labels)?;
-        let totals = totals(cloud.len(), &found);
-        let least_share = std::env::var("G_SEEN").ok().and_then(|s| s.parse().ok()).unwrap_or(LEAST_SEEN);
-        let pixels = labels.len() as f32;
+        let areas = areas(cloud, camera, &found);
         for (gaussian, identity, weight) in found.into_iter().filter(|f| f.1 != UNKNOWN) {
             let g = gaussian as usize;
-            if totals[g] >= least_share * pixels * self.best[g] {
+            if areas[g] >= LEAST_SEEN * self.best[g] {
                 add(&mut self.by_gaussian[g], identity, weight);
             }
         }
@@ -115,11 +113,17 @@ impl Votes {
     }
 }
 
-/// Weight of each Gaussian in a view, px.
-fn totals(n: usize, found: &[(u32, IdentityId, f32)]) -> Vec<f32> {
-    let mut totals = vec![0.0; n];
-    found.iter().for_each(|f| totals[f.0 as usize] += f.2);
-    totals
+/// Weight of each Gaussian in a view as an area, so that near views and far ones compare: square units.
+fn areas(cloud: &GaussianCloud, camera: &Camera, found: &[(u32, IdentityId, f32)]) -> Vec<f32> {
+    let mut areas = vec![0.0; cloud.len()];
+    found.iter().for_each(|f| areas[f.0 as usize] += f.2);
+    let axis = camera.world_from_camera * DVec3::Z;
+    let focal = camera.focal_px.x * camera.focal_px.y;
+    for (area, p) in areas.iter_mut().zip(&cloud.positions).filter(|(a, _)| **a > 0.0) {
+        let depth = (cloud.origin + DVec3::from(p.map(f64::from)) - camera.center).dot(axis);
+        *area *= (depth * depth / focal) as f32;
+    }
+    areas
 }
 
 fn add(votes: &mut Vec<(IdentityId, f32)>, identity: IdentityId, weight: f32) {
@@ -191,8 +195,6 @@ impl ContributionSink<f32> for Row<'_> {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
-
     use super::*;
     use crate::scene::Level;
 
@@ -204,6 +206,7 @@ mod tests {
         let (eye, ear) = (all.add(Level::Part, doll, vec![]), all.add(Level::Part, doll, vec![]));
         let votes = Votes {
             by_gaussian: vec![vec![(eye, 2.0), (ear, 3.0), (cat, 4.0)], vec![(NOBODY, 1.0)], vec![], vec![(cat, 0.01)]],
+            best: Vec::new(),
         };
         let b = votes.decide(&all, 0.05);
         assert_eq!(b[0].identity, ear);
@@ -236,6 +239,27 @@ mod tests {
     }
 
     #[test]
+    fn what_is_behind_something_in_a_photo_is_not_voted_on_there() {
+        // An opaque disc before a wall's Gaussian; from the side both are seen.
+        let mut cloud = GaussianCloud::isotropic(vec![[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]], -1.0, 8.0);
+        cloud.log_scales[1] = [-1.5; 3];
+        let from = |x: f64, z: f64| Camera::look_at(DVec3::new(x, 0.0, z), DVec3::Z, DVec3::NEG_Y, 0.9, 64, 48);
+        let [front, side] = [from(0.0, -4.0), from(6.0, 1.0)].map(|c| c.expect("valid"));
+        let (mut renderer, settings, all) = (Renderer::new(), RenderSettings::default(), Identities::objects(1));
+        let mut voted = |seen: bool| {
+            let mut votes = Votes::new(2);
+            if seen {
+                votes.see(&mut renderer, &cloud, &side, &settings).expect("drawn");
+            }
+            let labels = vec![1; 64 * 48];
+            votes.add_view(&mut renderer, &cloud, &front, &settings, &labels).expect("drawn");
+            votes.decide(&all, 1e-6).iter().map(|a| a.identity).collect::<Vec<_>>()
+        };
+        assert_eq!(voted(true), [1, UNKNOWN]);
+        assert_eq!(voted(false), [1, 1], "the control: some light gets through");
+    }
+
+    #[test]
     fn the_lightest_vote_of_many_gives_way() {
         let mut votes = Vec::new();
         (1..=KEPT as IdentityId).for_each(|id| add(&mut votes, id, id as f32));
@@ -247,7 +271,7 @@ mod tests {
         assert!(votes.iter().all(|v| v.0 != 51), "as light as the lightest");
         add(&mut votes, 52, 1.5);
         assert!(votes.contains(&(52, 1.5)) && votes.iter().all(|v| v.0 != 1) && votes.len() == KEPT);
-        let all = Votes { by_gaussian: vec![votes, vec![]] };
+        let all = Votes { by_gaussian: vec![votes, vec![]], best: Vec::new() };
         assert_eq!(all.weight(1), 0.0);
         assert_eq!(all.weight(0), 2.0 + 3.5 + 4.0 + 5.0 + 6.0 + 7.0 + 8.0 + 1.5);
     }
@@ -255,7 +279,8 @@ mod tests {
     #[test]
     fn votes_are_decided_by_weight_and_ties_by_number() {
         let all = Identities::objects(3);
-        let votes = Votes { by_gaussian: vec![vec![(3, 1.0), (2, 1.0), (1, 0.5)], vec![(2, 0.05)], vec![(1, 0.0)]] };
+        let by_gaussian = vec![vec![(3, 1.0), (2, 1.0), (1, 0.5)], vec![(2, 0.05)], vec![(1, 0.0)]];
+        let votes = Votes { by_gaussian, best: Vec::new() };
         let b = votes.decide(&all, 0.05);
         assert_eq!(
             (b[0], b[1].identity),
