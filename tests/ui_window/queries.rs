@@ -103,8 +103,8 @@ fn an_answer_in_a_small_view_is_a_line_that_unfolds() {
         let (first, second) = if split { parts } else { (whole, whole) };
         let folded = share(&w, "question", first);
         assert!(folded < 0.13 && w.shows("certain") && !w.shows("Go there"), "{size:?}: {folded}");
-        let mut unfold = w.harness.query_all_by_label("Unfold the answer");
-        unfold.find(|button| first.contains_rect(button.rect())).expect("a button").click();
+        let is_firsts = |button: &egui_kittest::Node<'_>| first.contains_rect(button.rect());
+        w.harness.query_all_by_label("Unfold the answer").find(is_firsts).expect("a button").click();
         w.harness.run_steps(4);
         assert!(w.shows("Go there") && share(&w, "question", first) > folded, "{size:?}: all of it");
         w.click("Fold the answer");
