@@ -6,11 +6,13 @@ use std::sync::Arc;
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 
+use super::act_find::AwaitedModels;
 use super::camera::CameraPane;
 use super::chat::Chat;
 use super::dialogs::{self, Question};
 use super::dock::{DockContents, Place};
 use super::file_dialogs::FileDialogs;
+use super::find_dialog::FindDialog;
 use super::history::{EditStep, Editing};
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
@@ -40,6 +42,8 @@ pub struct App {
     pub(super) repaint: Repaint,
     pub(super) dialogs: FileDialogs,
     pub(super) question: Option<Question>,
+    pub(super) find_dialog: FindDialog,
+    pub(super) awaited: Option<AwaitedModels>,
     pub(super) palette: Palette,
     pub(super) sheet: bool,
     first_page: FirstPage,
@@ -98,6 +102,8 @@ impl App {
             repaint,
             dialogs: FileDialogs::default(),
             question: None,
+            find_dialog: FindDialog::default(),
+            awaited: None,
             palette: Palette::default(),
             sheet: false,
             first_page: FirstPage::default(),
@@ -144,6 +150,7 @@ impl App {
     /// Takes in everything that happened since.
     fn take_events(&mut self, ctx: &egui::Context) {
         while let Some(event) = self.worker.next_event() {
+            self.hear(&event);
             let next = self.state.apply(event);
             self.actions.extend(next);
         }
@@ -193,6 +200,7 @@ impl App {
         let has_dialog = self.state.error.is_some()
             || self.state.unposed.is_some()
             || self.question.is_some()
+            || self.find_dialog.is_open()
             || self.dialogs.is_own_open();
         // Keys are the open menu's; Escape closes it, and nothing else.
         let has_menu = egui::Popup::is_any_open(ctx);
@@ -297,6 +305,10 @@ impl App {
             && yes
         {
             self.give_up_and(question.action);
+        }
+        let max_seeds = self.layout.finding.max_seeds;
+        if let Some(means) = self.find_dialog.show(ctx, &self.state, max_seeds, &mut self.actions) {
+            self.find_with(means);
         }
         if let Some(photos) = &self.state.unposed
             && !unposed::show(ctx, photos, &mut self.actions)

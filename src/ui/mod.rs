@@ -6,6 +6,7 @@
 
 mod act;
 mod act_file;
+mod act_find;
 mod act_look;
 mod act_phrases;
 mod act_report;
@@ -24,6 +25,7 @@ pub(crate) mod dialogs;
 mod dock;
 mod edits;
 mod file_dialogs;
+mod find_dialog;
 mod fonts;
 mod history;
 pub(crate) mod keys;

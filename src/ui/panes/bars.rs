@@ -112,7 +112,7 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
         ui.menu_button("Train", |ui| {
             ui.set_min_width(260.0);
             item(ui, has_photos && state.job.is_none(), None, Action::StartTraining, actions);
-            item(ui, state.is_training(), None, Action::PauseTraining, actions);
+            item(ui, state.job.as_ref().is_some_and(|j| j.kind.can_pause()), None, Action::PauseJob, actions);
             item(ui, state.job.is_some(), None, Action::Cancel, actions);
             item(ui, has_photos && state.job.is_none(), None, Action::Evaluate, actions);
         });
@@ -180,6 +180,10 @@ pub(crate) fn status(
                     progress(ui, p, job);
                 }
                 let elsewhere = state.scene.is_none() || state.is_training() && layout.shows(Pane::Training);
+                let pause = if job.paused { "Resume" } else { "Pause" };
+                if !elsewhere && job.kind.can_pause() && ui.small_button(pause).on_hover_text("T").clicked() {
+                    actions.push(Action::PauseJob);
+                }
                 if !elsewhere && ui.small_button("Cancel").on_hover_text("Esc").clicked() {
                     actions.push(Action::Cancel);
                 }

@@ -273,12 +273,13 @@ fn show_how_to_begin(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     let why = if state.is_trained() { "Another job is running." } else { "Train the scene first." };
     let button = |text: &str| Button::new(text.to_owned()).min_size(vec2(170.0, 28.0));
     if !has_masks {
-        let text = "These photos came without masks. Regions of uniform color are used instead: rough and \
-                    unnamed.";
+        let text = "These photos came without labels: choose what looks at them.";
         ui.label(RichText::new(text).color(theme::weak()));
     }
     let action = Action::FindObjects;
-    let found = ui.add_enabled(idle, button("Find objects")).on_disabled_hover_text(why);
+    let found = ui
+        .add_enabled(idle, button(if has_masks { "Find objects" } else { "Find objects\u{2026}" }))
+        .on_disabled_hover_text(why);
     if found.on_hover_text(action.tooltip()).clicked() {
         actions.push(action);
     }

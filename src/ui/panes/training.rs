@@ -153,10 +153,10 @@ fn running(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         let pause = if job.paused { "Resume" } else { "Pause" };
         let size = egui::vec2(92.0, 28.0);
-        let tip = format!("{}  T", Action::PauseTraining.tooltip());
+        let tip = format!("{}  T", Action::PauseJob.tooltip());
         let button = if job.paused { theme::primary_button(pause) } else { egui::Button::new(pause) };
         if ui.add(button.min_size(size)).on_hover_text(tip).clicked() {
-            actions.push(Action::PauseTraining);
+            actions.push(Action::PauseJob);
         }
         let tip = format!("{}  Esc", Action::Cancel.tooltip());
         if ui.add(egui::Button::new("Cancel").min_size(size)).on_hover_text(tip).clicked() {
