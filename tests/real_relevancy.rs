@@ -7,11 +7,12 @@ mod common;
 
 use fmlgs::math::stats;
 use fmlgs::math::vector::{dot, unit};
-use fmlgs::pipeline::semantics::by_embedding::{EmbeddingOptions, EmbeddingScorer, TextEmbeddings};
+use fmlgs::pipeline::semantics::by_embedding::{EmbeddingScorer, TextEmbeddings};
 use fmlgs::pipeline::semantics::localize::{Answer, localize};
 use fmlgs::pipeline::semantics::parse::ParsedQuery;
-use fmlgs::pipeline::semantics::relevancy::{CANONICAL, PART_WEIGHT, advantage, deviate, score};
-use fmlgs::scene::{Identities, IdentityId, LanguageFeatures, Level, LevelFilter, NOBODY, ViewFeatures};
+use fmlgs::pipeline::semantics::recipe::{PAPERS_PHRASES, Recipe, Rejection};
+use fmlgs::pipeline::semantics::relevancy::{advantage, deviate, score};
+use fmlgs::scene::{Identities, IdentityId, LanguageFeatures, Level, LevelFilter, NOBODY, PART_WEIGHT, ViewFeatures};
 
 /// Queries of the LERF evaluation that have an embedding.
 const QUERIES: [&str; 17] = [
@@ -71,8 +72,18 @@ impl Scene {
         self.texts.iter().find(|t| t.0 == name).unwrap_or_else(|| panic!("{name}")).1.clone()
     }
 
+    /// Embeddings of questions and of all phrases that answering them by `recipe` needs, as far as there are any.
+    fn phrases<'q>(&self, questions: impl IntoIterator<Item = &'q str>, recipe: &Recipe) -> TextEmbeddings {
+        let mut phrases = TextEmbeddings::default();
+        let known = |p: &str| self.texts.iter().find(|t| t.0.eq_ignore_ascii_case(p)).map(|t| t.1.clone()).ok_or(());
+        for question in questions {
+            phrases.learn(&plain(question), recipe, known).expect("known");
+        }
+        phrases
+    }
+
     fn canonical(&self) -> Vec<Vec<f32>> {
-        CANONICAL.iter().map(|c| self.text(c)).collect()
+        PAPERS_PHRASES.iter().map(|c| self.text(c)).collect()
     }
 
     /// Advantages of all identities for a query.
@@ -85,6 +96,11 @@ impl Scene {
         let d = self.advantages(query);
         (0..d.len()).max_by(|&a, &b| d[a].total_cmp(&d[b])).expect("identities")
     }
+}
+
+/// A question that says of no piece what it is a piece of.
+fn plain(text: &str) -> ParsedQuery {
+    ParsedQuery { text: text.to_lowercase(), target: text.to_lowercase(), whole: None }
 }
 
 #[test]
@@ -159,12 +175,11 @@ fn answers_say_when_nothing_or_several_fit() {
     language.by_identity.iter().for_each(|_| {
         identities.add(Level::Object, NOBODY, Vec::new());
     });
-    let mut phrases = TextEmbeddings::default();
-    phrases.learn(&QUERIES, |p| Ok::<_, ()>(scene.text(p))).expect("known");
+    let recipe = Recipe { rejection: Rejection::Canonical, ..Recipe::default() };
+    let phrases = scene.phrases(QUERIES, &recipe);
     let ask = |query: &str| {
-        let phrase = ParsedQuery { text: query.into(), target: query.into(), whole: None };
-        let options = EmbeddingOptions::default();
-        localize(&identities, &phrase, LevelFilter::Auto, &mut EmbeddingScorer::new(&language, &phrases, options))
+        let mut scorer = EmbeddingScorer::new(&identities, &language, &phrases, &recipe);
+        localize(&identities, &plain(query), LevelFilter::Auto, recipe.strategy, &mut scorer)
     };
     assert!(matches!(ask("dall-e brand"), Answer::NotFound(_)), "less relevant than a canonical phrase");
     assert!(matches!(ask("spoon"), Answer::Ambiguous(_)), "two within 0.005");
@@ -199,8 +214,9 @@ fn parts_are_moved_toward_their_whole_and_made_unit_again() {
 #[test]
 fn an_identity_counts_by_its_best_view() {
     let Some(scene) = load() else { return };
-    let mut phrases = TextEmbeddings::default();
-    phrases.learn(&QUERIES, |p| Ok::<_, ()>(scene.text(p))).expect("known");
+    let recipe = Recipe::default();
+    let phrases = scene.phrases(QUERIES, &recipe);
+    let identities = Identities::objects(scene.single.len());
     type Views = Vec<Vec<f32>>;
     let language = |views: &dyn Fn(&[Vec<f32>]) -> Views| {
         let of = scene.many.iter().map(|all| views(&all[..all.len().min(4)]));
@@ -214,7 +230,7 @@ fn an_identity_counts_by_its_best_view() {
     let (all, first) = (language(&<[_]>::to_vec), language(&|v| v.iter().take(1).cloned().collect()));
     let mean = language(&mean);
     let advantage_of = |features: &LanguageFeatures, query: &str, target: usize| {
-        EmbeddingScorer::new(features, &phrases, EmbeddingOptions::default()).advantages(query, None)[target]
+        EmbeddingScorer::new(&identities, features, &phrases, &recipe).advantages(query, None)[target]
     };
     let (mut compared, mut over_mean, mut over_first) = (0, 0, 0);
     for query in QUERIES {

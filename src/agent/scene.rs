@@ -17,6 +17,7 @@ use crate::navigate::approach::Approach;
 use crate::navigate::target::{Side, ViewPreference};
 use crate::navigate::{CameraTrajectory, FRAMES, Pose, Speed};
 use crate::pipeline::semantics::answer::QueryAnswer;
+use crate::pipeline::semantics::recipe::{Recipe, Understanding};
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Bounds, Identities, IdentityId, LevelFilter, SemanticMap, text};
 
@@ -75,7 +76,7 @@ impl SceneWorld {
     /// # Errors
     /// If the encoder that looked at it cannot be loaded.
     pub fn new(parts: Parts, eye: Pose, aspect: f64, emit: Emit) -> Result<Self, WorldError> {
-        let engine = QueryEngine::new(parts.map.language.as_ref()).map_err(|e| WorldError(e.to_string()))?;
+        let engine = engine(&parts.map, parts.recipe.clone())?;
         let n = parts.map.identities.len() + 1;
         let bounds = parts.bounds();
         Ok(Self {
@@ -109,6 +110,18 @@ impl SceneWorld {
             self.done = UndoHistory::default();
             self.hidden = hidden;
         }
+    }
+
+    /// Answers by this recipe from now on.
+    ///
+    /// # Errors
+    /// If the encoder that looked at the scene cannot be loaded.
+    pub(crate) fn answer_by(&mut self, recipe: &Recipe) -> Result<(), WorldError> {
+        if self.parts.recipe != *recipe {
+            self.engine = engine(&self.parts.map, recipe.clone())?;
+            self.parts.recipe = recipe.clone();
+        }
+        Ok(())
     }
 
     /// Where the eye is.
@@ -179,7 +192,15 @@ impl SceneWorld {
     }
 }
 
+fn engine(map: &SemanticMap, recipe: Recipe) -> Result<QueryEngine, WorldError> {
+    QueryEngine::new(map.language.as_ref(), recipe).map_err(|e| WorldError(e.to_string()))
+}
+
 impl World for SceneWorld {
+    fn understanding(&self) -> Understanding {
+        self.parts.recipe.understanding
+    }
+
     fn identities(&self) -> &Identities {
         &self.parts.map.identities
     }

@@ -32,6 +32,7 @@ fn renamed() -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
         up: DVec3::Z,
         meters: None,
         exports: PathBuf::new(),
+        recipe: Default::default(),
         explored: None,
     };
     let said = Arc::clone(&effects);

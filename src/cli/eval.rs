@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use super::progress::Console;
+use super::recipe::RecipeArgs;
 use super::{CliError, eval_depth, eval_masks, number, output};
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::evaluate_masks::Protocol;
@@ -25,7 +26,7 @@ use crate::jobs::{export, open};
     fmlgs eval splat.ply --photos photos/ --max-side 1600 --json")]
 pub(crate) struct EvalArgs {
     /// Trained scene or splat file
-    scene: PathBuf,
+    pub(super) scene: PathBuf,
     /// Dataset with the photos [default: where the scene's photos are]
     #[arg(long)]
     photos: Option<PathBuf>,
@@ -47,16 +48,18 @@ pub(crate) struct EvalArgs {
     masks: Option<PathBuf>,
     /// How objects and parts are compared
     #[arg(long, value_enum, default_value_t = Protocol::Masks, requires = "masks")]
-    protocol: Protocol,
+    pub(super) protocol: Protocol,
     /// What to ask for, where labels do not name it (spin-nerf)
     #[arg(long, requires = "masks")]
-    query: Option<String>,
+    pub(super) query: Option<String>,
     /// Compare depth instead, with the true depths that came with synthetic photos
     #[arg(long, conflicts_with = "masks")]
     depth: bool,
     /// Print one JSON document
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
+    #[command(flatten)]
+    pub(super) recipe: RecipeArgs,
 }
 
 impl EvalArgs {
@@ -79,7 +82,7 @@ impl EvalArgs {
 pub(crate) fn run(args: EvalArgs, quiet: bool) -> Result<(), CliError> {
     let comparison = args.check()?;
     if let Some(labels) = &args.masks {
-        return eval_masks::run(&args.scene, labels, args.protocol, args.query.as_deref(), &comparison, args.json);
+        return eval_masks::run(&args, labels, &comparison);
     }
     let mut console = Console::new(quiet);
     if args.depth {

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use serde_json::json;
 
+use super::eval::EvalArgs;
 use super::{CliError, output};
 use crate::jobs::evaluate::PhotoComparison;
 use crate::jobs::evaluate_masks::{self, Protocol, ProtocolSummary};
@@ -13,20 +14,15 @@ use crate::pipeline::semantics::protocols::part_recall::{HIT_IOU, Row};
 /// Rows of the table at most; the worst come first.
 const ROWS: usize = 12;
 
-pub(crate) fn run(
-    scene: &Path,
-    labels: &Path,
-    protocol: Protocol,
-    query: Option<&str>,
-    comparison: &PhotoComparison,
-    as_json: bool,
-) -> Result<(), CliError> {
-    let scores = evaluate_masks::run(comparison, scene, labels, protocol, query)?;
+pub(crate) fn run(args: &EvalArgs, labels: &Path, comparison: &PhotoComparison) -> Result<(), CliError> {
+    let EvalArgs { scene, protocol, query, .. } = args;
+    let (protocol, recipe) = (*protocol, args.recipe.recipe());
+    let scores = evaluate_masks::run(comparison, scene, labels, protocol, query.as_deref(), &recipe)?;
     let name = clap::ValueEnum::to_possible_value(&protocol).map_or_else(String::new, |v| v.get_name().to_owned());
     let (views, trained, (miou, miou_by_view)) = (scores.views, scores.trained_on, scores.miou());
-    if as_json {
+    if args.json {
         let mut value = json!({
-            "scene": scene, "protocol": name, "views": views, "views_trained_on": trained, "units": scores.units,
+            "scene": scene, "protocol": name, "views": views, "views_trained_on": trained, "units": scores.units, "recipe": recipe, "unmet": scores.unmet,
         });
         if let (Some(all), Some(own)) = (value.as_object_mut(), serde_json::to_value(&scores.summary)?.as_object()) {
             all.extend(own.clone());
@@ -36,7 +32,9 @@ pub(crate) fn run(
         }
         return output::print_json(&value);
     }
-    let mut lines = vec![summary(&scores.summary)];
+    let mut lines = vec![recipe.to_string()];
+    lines.extend(scores.unmet.iter().map(|text| format!("note: {text}")));
+    lines.push(summary(&scores.summary));
     if protocol != Protocol::PartRecall {
         lines.push(format!("mean IoU {miou:.4} over queries, {miou_by_view:.4} over views"));
     }

@@ -16,6 +16,7 @@ use crate::pipeline::semantics::protocols::{
     selection_3d, spin_nerf,
 };
 use crate::pipeline::semantics::query_engine::QueryEngine;
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
@@ -82,6 +83,8 @@ pub(crate) struct MaskScores {
     pub(crate) trained_on: usize,
     pub(crate) units: Vec<Unit>,
     pub(crate) summary: ProtocolSummary,
+    /// What of the recipe the scene was not prepared for.
+    pub(crate) unmet: Vec<String>,
 }
 
 impl MaskScores {
@@ -99,6 +102,7 @@ pub(crate) fn run(
     labels: &Path,
     protocol: Protocol,
     query: Option<&str>,
+    recipe: &Recipe,
 ) -> Result<MaskScores, JobError> {
     let map = io::semantic_map::load(scene, comparison.state.as_deref(), &comparison.cloud)?;
     let map = &map.ok_or_else(|| JobError::NoObjects(scene.into()))?;
@@ -113,9 +117,9 @@ pub(crate) fn run(
     }
     let list: Vec<LabeledView<'_>> = views.iter().map(Drawn::labeled).collect();
     let (units, summary) = match protocol {
-        Protocol::PartRecall => recall(map, &list)?,
+        Protocol::PartRecall => recall(map, recipe, &list)?,
         _ => {
-            let mut engine = QueryEngine::new(map.language.as_ref())?;
+            let mut engine = QueryEngine::new(map.language.as_ref(), recipe.clone())?;
             let mut failed = None;
             let mut ask = |text: &str| {
                 engine.ask(map, text, LevelFilter::Auto).unwrap_or_else(|e| {
@@ -129,7 +133,7 @@ pub(crate) fn run(
         }
     };
     let trained_on = views.iter().filter(|v| v.trained_on).count();
-    Ok(MaskScores { views: views.len(), trained_on, units, summary })
+    Ok(MaskScores { views: views.len(), trained_on, units, summary, unmet: recipe.unmet(map) })
 }
 
 fn compare(
@@ -187,7 +191,11 @@ fn compare(
     Ok((units, summary))
 }
 
-fn recall(map: &SemanticMap, views: &[LabeledView<'_>]) -> Result<(Vec<Unit>, ProtocolSummary), JobError> {
+fn recall(
+    map: &SemanticMap,
+    recipe: &Recipe,
+    views: &[LabeledView<'_>],
+) -> Result<(Vec<Unit>, ProtocolSummary), JobError> {
     let language = map.language.as_ref().ok_or_else(|| {
         let text = "this scene has no embeddings; run 'fmlgs preprocess' on it with --encoder demo";
         JobError::Protocol(text.into())
@@ -195,7 +203,7 @@ fn recall(map: &SemanticMap, views: &[LabeledView<'_>]) -> Result<(Vec<Unit>, Pr
     let mut encoder = crate::models::encoder(&language.encoder)?;
     let mut rows = Vec::new();
     for components in part_recall::Components::ROWS {
-        rows.push(part_recall::row(components, map, language, views, |p| encoder.text(p))?);
+        rows.push(part_recall::row((components, recipe), map, language, views, |p| encoder.text(p))?);
     }
     // The paper's full method, not ours, is what others can compare with.
     let units = rows.iter().rfind(|r| r.components.localization).map(|r| r.units.clone()).unwrap_or_default();

@@ -17,6 +17,7 @@ use super::world::World;
 use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::localize::Answer;
 use crate::pipeline::semantics::reading::{mend, mended_text};
+use crate::pipeline::semantics::recipe::Understanding;
 use crate::scene::{Bounds, IdentityId, Level, LevelFilter};
 
 /// What words come to.
@@ -193,6 +194,11 @@ impl Resolver<'_> {
         let wished = all.iter().filter(|(_, i)| self.level.accepts(i.level)).map(|(id, _)| id);
         let everyone: Vec<IdentityId> = wished.filter(|id| self.world.facts(*id).is_some()).collect();
         let Some((head, rest)) = words.split_last() else { return Err(self.not_found("that", &[])) };
+        if self.world.understanding() == Understanding::Embedding {
+            let text = words.join(" ");
+            let found = self.by_embedding(&text, self.level)?;
+            return found.map(Set::new).ok_or_else(|| self.not_found(&text, words));
+        }
         let own = |id: IdentityId| all.get(id).map(|i| i.names.as_slice()).unwrap_or_default();
         let line_has = |id: IdentityId, word: &String| {
             all.ancestors(id).any(|i| own(i).iter().any(|name| name_words(name).contains(word)))
@@ -297,7 +303,11 @@ impl Resolver<'_> {
                 return Ok(set);
             }
         }
-        let meant = self.by_embedding(&format!("{said} of the {name}"), LevelFilter::Part)?.unwrap_or_default();
+        let of = match whole {
+            Noun::Named(words) if self.world.understanding() == Understanding::Embedding => words.join(" "),
+            _ => name.clone(),
+        };
+        let meant = self.by_embedding(&format!("{said} of the {of}"), LevelFilter::Part)?.unwrap_or_default();
         let meant: Vec<IdentityId> = meant.into_iter().filter(is_in).collect();
         if !meant.is_empty() {
             return Ok(Set::new(meant));

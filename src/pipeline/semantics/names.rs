@@ -3,8 +3,10 @@
 
 use std::collections::HashSet;
 
-use super::localize::Scorer;
-use super::parse::{MAX_CHARS, is_glue};
+use super::colors;
+use super::localize::{Hit, Scorer};
+use super::parse::{MAX_CHARS, ParsedQuery, is_glue};
+use super::recipe::Rejection;
 use crate::scene::{Identities, IdentityId};
 
 /// Score under which a name is not what was asked for.
@@ -13,20 +15,43 @@ pub(crate) const THRESHOLD: f32 = 0.45;
 pub(crate) const RESOLUTION: f32 = 0.02;
 
 /// Scores by names alone.
-pub(crate) struct ByName<'a>(pub(crate) &'a Identities);
+pub(crate) struct ByName<'a> {
+    pub(crate) identities: &'a Identities,
+    pub(crate) rejection: Rejection,
+}
 
 impl Scorer for ByName<'_> {
     fn scores(&mut self, phrase: &str, _against: Option<&str>) -> Vec<f32> {
-        scores(self.0, phrase)
+        scores(self.identities, phrase)
     }
 
     fn threshold(&self) -> f32 {
-        THRESHOLD
+        if self.rejection == Rejection::Never { 0.0 } else { THRESHOLD }
+    }
+
+    fn rejects(&mut self, phrase: &ParsedQuery, hit: &Hit) -> bool {
+        let all = self.identities;
+        let wholes = || all.ancestors(hit.identity).skip(1);
+        self.rejection == Rejection::Strict
+            && (is_another(all, &phrase.target, std::iter::once(hit.identity))
+                || phrase.whole.as_ref().is_some_and(|whole| is_another(all, whole, wholes())))
     }
 
     fn resolution(&self) -> f32 {
         RESOLUTION
     }
+}
+
+/// Whether names say that none of `ids` is meant: another color, or nothing in common but a color.
+fn is_another(identities: &Identities, phrase: &str, ids: impl Iterator<Item = IdentityId>) -> bool {
+    let (asked, kind) = (colors::said(phrase), colors::without(phrase));
+    let fits = |name: &String| {
+        let has = colors::said(name);
+        let same = asked.is_empty() || has.is_empty() || asked.iter().any(|c| has.contains(c));
+        same && (asked.is_empty() || words(name).iter().any(|w| kind.contains(w)))
+    };
+    let mut named = ids.filter_map(|id| identities.get(id)).filter(|i| !i.names.is_empty()).peekable();
+    named.peek().is_some() && !named.any(|i| i.names.iter().any(fits))
 }
 
 /// Score of every identity for a phrase, by number less one: 1 for the same name, 0 for nothing in
@@ -201,7 +226,7 @@ mod tests {
         assert_eq!(of(None), ["green", "zebra"]);
         assert_eq!(of(Some(&["zebra", "button"])), ["zebra"]);
         assert!(of(Some(&[])).is_empty());
-        let by = ByName(&all);
+        let by = ByName { identities: &all, rejection: Rejection::Canonical };
         assert_eq!((by.threshold(), by.resolution()), (THRESHOLD, RESOLUTION));
         assert_eq!(unknown_words(&all, "#4 #5"), ["5"], "a number is known, where nothing has a name");
     }

@@ -1,7 +1,7 @@
 //! What must fail the bars: scenes that were harmed before they are asked, and questions for what is not there.
 
-use crate::pipeline::semantics::relevancy::{PART_WEIGHT, deviate};
-use crate::scene::{Identities, IdentityId, Level, SemanticMap};
+use crate::pipeline::semantics::relevancy::deviate;
+use crate::scene::{Identities, IdentityId, Level, PART_WEIGHT, SemanticMap};
 
 /// Colors that things of these scenes may have.
 const COLORS: [&str; 12] =

@@ -7,6 +7,8 @@ use egui::{TextureHandle, Vec2};
 use super::paint::Painted;
 use super::{Asked, OverlaySettings, Queries, card, truth};
 use crate::pipeline::semantics::matching::MatchMode;
+use crate::pipeline::semantics::parse::ParsedQuery;
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::timing::StagesMs;
 use crate::scene::IdentityId;
 
@@ -47,6 +49,11 @@ impl QuerySide {
     /// All queries, the one being typed last.
     pub(super) fn all(&self) -> impl Iterator<Item = &Asked> {
         self.kept.iter().chain(&self.live)
+    }
+
+    /// What is asked, for the text encoder.
+    pub(super) fn texts(&self) -> impl Iterator<Item = (ParsedQuery, Recipe)> {
+        self.all().map(|q| (q.reading.phrase.clone(), self.settings.recipe.clone()))
     }
 
     /// Without queries and answers.

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::Queries;
 use crate::navigate::Pose;
-use crate::pipeline::semantics::matching::MatchMode;
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::scene::Mask;
 
 /// Hits, misses and false alarms, told apart by those who see no red or no green too.
@@ -55,8 +55,8 @@ impl Queries {
     }
 
     /// How pixels are matched, and the largest difference per channel.
-    pub(crate) fn matching(&self) -> (MatchMode, f32) {
-        (self.side.settings.mode, self.side.settings.tolerance)
+    pub(crate) fn recipe(&self) -> &Recipe {
+        &self.side.settings.recipe
     }
 
     /// The masks as they are drawn: the newest against the truth of this view, where there is one.
