@@ -35,6 +35,13 @@ const QUERIES: [&str; 17] = [
     "yellow pouf",
 ];
 
+/// Phrases of other scenes: nothing of it is in this one.
+const ABSENT: &str = "pink ice cream, Stainless steel pots, pot, toy elephant, pirate hat, kamaboko, chopsticks, toilet, \
+    toy cat statue, ketchup, rubics cube, refrigerator, jake, wavy noodles, rubber duck with hat, egg, showercurtain, books, \
+    ceiling, pikachu, frog cup, blinds, tesla door handle, corn, sink, miffy, pumpkin, bathtub, person, onion segments, \
+    red toy chair, spatula, nightstand, television, rubber duck with buoy, nori, dresser, porcelain hand, bookshelf, \
+    ottolenghi, sake cup, green toy chair, pour-over vessel, mirror, toaster, plastic ladle, old camera, waldo";
+
 struct Scene {
     /// One view of each identity.
     single: Vec<Vec<f32>>,
@@ -80,6 +87,25 @@ impl Scene {
             phrases.learn(&plain(question), recipe, known).expect("known");
         }
         phrases
+    }
+
+    /// Four views of each identity, as many as a scene keeps; the nose is a part of the bear, deviated by `weight`.
+    fn language(&self, weight: f32) -> (Identities, LanguageFeatures) {
+        let (bear, nose) = (self.best("stuffed bear"), self.best("bear nose"));
+        let mut order: Vec<usize> = (0..self.single.len()).filter(|k| ![bear, nose].contains(k)).collect();
+        order.splice(0..0, [bear, nose]);
+        let mut identities = Identities::default();
+        let mut by_identity = Vec::new();
+        for (id, k) in order.into_iter().enumerate() {
+            let (level, parent) = if id == 1 { (Level::Part, 1) } else { (Level::Object, NOBODY) };
+            identities.add(level, parent, Vec::new());
+            let raw: Vec<Vec<f32>> =
+                std::iter::once(&self.single[k]).chain(self.many[k].iter().take(3)).cloned().collect();
+            let moved = |v: &Vec<f32>| deviate(v, &self.single[bear], weight).expect("a direction");
+            let deviated = if id == 1 { raw.iter().map(moved).collect() } else { raw.clone() };
+            by_identity.push(ViewFeatures { raw, deviated });
+        }
+        (identities, LanguageFeatures { encoder: "clip".into(), dimension: 512, by_identity })
     }
 
     fn canonical(&self) -> Vec<Vec<f32>> {
@@ -247,4 +273,64 @@ fn an_identity_counts_by_its_best_view() {
     assert!(compared >= 12 && over_mean == compared, "{over_mean} of {compared}");
     // The control: one view is not all that there is.
     assert!(over_first >= 7, "{over_first} of {compared}");
+}
+
+/// How many of the questions are answered, by this recipe.
+fn answered(scene: &Scene, recipe: &Recipe, questions: &[&str]) -> usize {
+    let (identities, language) = scene.language(recipe.preparation.part_weight);
+    let phrases = scene.phrases(questions.iter().copied(), recipe);
+    let is_found = |question: &&&str| {
+        let mut scorer = EmbeddingScorer::new(&identities, &language, &phrases, recipe);
+        let answer = localize(&identities, &plain(question), LevelFilter::Auto, recipe.strategy, &mut scorer);
+        !matches!(answer, Answer::NotFound(_))
+    };
+    questions.iter().filter(is_found).count()
+}
+
+#[test]
+fn most_of_what_is_absent_is_rejected_by_confidence_and_little_by_canonical_phrases() {
+    let Some(scene) = load() else { return };
+    let absent: Vec<&str> = ABSENT.split(", ").map(str::trim).collect();
+    let of = |recipe: &Recipe| [answered(&scene, recipe, &QUERIES), answered(&scene, recipe, &absent)];
+    let by = |rejection| of(&Recipe { rejection, ..Recipe::default() });
+    let paper = of(&Recipe::paper());
+    let [never, canonical, strict] = [Rejection::Never, Rejection::Canonical, Rejection::Strict].map(by);
+    println!("answered of {} there and {} absent: paper {paper:?}, never {never:?}", QUERIES.len(), absent.len());
+    println!("canonical {canonical:?}, strict {strict:?}");
+    assert_eq!((paper, never), ([QUERIES.len(), absent.len()], [QUERIES.len(), absent.len()]));
+    assert!(canonical[0] == QUERIES.len() && canonical[1] > 35, "{canonical:?}");
+    assert!(strict[0] >= 13 && strict[1] <= 10, "{strict:?}");
+}
+
+#[test]
+fn deviation_helps_a_part_that_is_asked_for_with_its_whole_and_the_second_step_finds_it() {
+    let Some(scene) = load() else { return };
+    let advantage = |question: &str, weight: f32, id: usize| {
+        let (identities, language) = scene.language(weight);
+        let recipe = Recipe::paper();
+        let phrases = scene.phrases([question], &recipe);
+        EmbeddingScorer::new(&identities, &language, &phrases, &recipe).advantages(question, None)[id - 1]
+    };
+    let (bear, nose) = (advantage("bear nose", 1.0, 1), advantage("bear nose", 1.0, 2));
+    let deviated = advantage("bear nose", PART_WEIGHT, 2);
+    println!("\"bear nose\": bear {bear:.4}, nose {nose:.4}, nose deviated {deviated:.4}");
+    assert!(deviated > nose && deviated > bear, "{deviated} {nose} {bear}");
+    // Without its whole in the words, deviation costs a part what it says of itself.
+    let hooves = |weight: f32| {
+        let (whole, part) = (&scene.single[scene.best("sheep")], &scene.single[scene.best("hooves")]);
+        let v = deviate(part, whole, weight).expect("a direction");
+        fmlgs::pipeline::semantics::relevancy::advantage(&v, &scene.text("hooves"), &scene.canonical())
+    };
+    println!("\"hooves\": hooves {:.4}, deviated {:.4}", hooves(1.0), hooves(PART_WEIGHT));
+    assert!(hooves(PART_WEIGHT) < hooves(1.0));
+    // A forced kind and the compound alone find the nose; an object that is forced is the bear.
+    let ask = |level: LevelFilter| {
+        let recipe = Recipe::paper();
+        let (identities, language) = scene.language(PART_WEIGHT);
+        let phrases = scene.phrases(["bear nose"], &recipe);
+        let mut scorer = EmbeddingScorer::new(&identities, &language, &phrases, &recipe);
+        localize(&identities, &plain("bear nose"), level, recipe.strategy, &mut scorer).hits()[0].identity
+    };
+    assert_eq!((ask(LevelFilter::Auto), ask(LevelFilter::Part)), (2, 2));
+    assert_ne!(ask(LevelFilter::Object), 2);
 }

@@ -13,7 +13,7 @@ use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::protocols::{
     AskedScene, Category, LabeledView, Unit, categories, fastlgs_ex, langsplat, masks, means, multi_class, part_recall,
-    selection_3d, spin_nerf,
+    recipes, selection_3d, spin_nerf,
 };
 use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::recipe::Recipe;
@@ -41,6 +41,8 @@ pub(crate) enum Protocol {
     Ovs3d,
     /// Part queries by embedding alone, with the paper's components switched on one after another
     PartRecall,
+    /// What is found and what is rightly not found, by names, embeddings and both, by each strategy and rule
+    Recipes,
 }
 
 /// What the [`Protocol`] of the same name counts besides the IoU of each query.
@@ -74,6 +76,11 @@ pub(crate) enum ProtocolSummary {
     PartRecall {
         encoder: String,
         rows: Vec<part_recall::Row>,
+    },
+    Recipes {
+        /// Questions for what is not there: other kinds, other colors, parts that a thing lacks.
+        absent: [usize; 3],
+        rows: Vec<recipes::Row>,
     },
 }
 
@@ -118,6 +125,7 @@ pub(crate) fn run(
     let list: Vec<LabeledView<'_>> = views.iter().map(Drawn::labeled).collect();
     let (units, summary) = match protocol {
         Protocol::PartRecall => recall(map, recipe, &list)?,
+        Protocol::Recipes => (Vec::new(), compare_recipes(map, recipe, &list)?),
         _ => {
             let mut engine = QueryEngine::new(map.language.as_ref(), recipe.clone())?;
             let mut failed = None;
@@ -155,7 +163,7 @@ fn compare(
             let hits = units.iter().filter(|u| u.hit == Some(true)).count();
             ProtocolSummary::Langsplat { localization: hits as f64 / units.len().max(1) as f64 }
         }
-        Protocol::FastlgsEx | Protocol::PartRecall => {
+        Protocol::FastlgsEx | Protocol::PartRecall | Protocol::Recipes => {
             let mut pool = fastlgs_ex::Pool::default();
             views.iter().for_each(|v| units.extend(fastlgs_ex::compare(scene, v, &mut pool)));
             ProtocolSummary::FastlgsEx {}
@@ -208,6 +216,17 @@ fn recall(
     // The paper's full method, not ours, is what others can compare with.
     let units = rows.iter().rfind(|r| r.components.localization).map(|r| r.units.clone()).unwrap_or_default();
     Ok((units, ProtocolSummary::PartRecall { encoder: language.encoder.clone(), rows }))
+}
+
+fn compare_recipes(map: &SemanticMap, recipe: &Recipe, views: &[LabeledView<'_>]) -> Result<ProtocolSummary, JobError> {
+    let absent = recipes::Absent::of(&map.identities);
+    let mut engine = QueryEngine::new(map.language.as_ref(), Recipe::default())?;
+    let mut rows = Vec::new();
+    for recipe in recipes::compared(recipe) {
+        rows.push(recipes::row(recipe, map, &mut engine, views, &absent)?);
+    }
+    let counts = [&absent.kinds, &absent.colors, &absent.parts].map(Vec::len);
+    Ok(ProtocolSummary::Recipes { absent: counts, rows })
 }
 
 /// A labeled photo and what is drawn of its view.

@@ -84,6 +84,8 @@ pub(crate) struct QueryResult {
     pub(crate) reading: QueryReading,
     pub(crate) mask: Mask,
     pub(crate) unknown_words: Vec<String>,
+    /// Canonical phrases that the encoder could not read and that were left out.
+    pub(crate) unread: Vec<String>,
     /// Words that the answer does not rest on.
     pub(crate) ignored_words: Vec<String>,
     /// Milliseconds from the text to the mask, the view there.
@@ -105,7 +107,7 @@ pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &QueryRequest<'_>) 
     let query_ms = ms_since(start);
     let unknown_words = engine.unknown_words(&map.identities, &reading.phrase);
     let ignored_words = answered.ignored_words(&map.identities, &reading.phrase, &unknown_words);
-    Ok(QueryResult { answered, reading, mask, unknown_words, ignored_words, query_ms, maps })
+    Ok(QueryResult { answered, reading, mask, unknown_words, unread: engine.unread(), ignored_words, query_ms, maps })
 }
 
 /// The identities that are meant, at most `top` of them.

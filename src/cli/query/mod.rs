@@ -105,7 +105,10 @@ fn tell(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -
     let QueryResult { answered, reading, mask, unknown_words: unknown, ignored_words: ignored, query_ms, .. } = result;
     let full_name = |hit: &Hit| map.identities.full_name(hit.identity);
     let basis = if answered.basis == Basis::Names { "names" } else { "looks" };
-    let lines = args.recipe.lines(map);
+    let mut lines = args.recipe.lines(map);
+    if !result.unread.is_empty() {
+        lines.push(format!("note: the encoder cannot read these canonical phrases: {}", result.unread.join(", ")));
+    }
     if !args.json && !lines.is_empty() {
         output::print(&lines.join("\n"))?;
     }
@@ -129,6 +132,7 @@ fn tell(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -
             "stages_ms": answered.stages,
             "recipe": answered.recipe,
             "unmet": answered.recipe.unmet(map),
+            "unread": result.unread,
         }))?;
     }
     match answer {

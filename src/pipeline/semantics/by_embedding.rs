@@ -55,6 +55,11 @@ impl TextEmbeddings {
         }
     }
 
+    /// Whether the encoder was asked for a phrase in vain.
+    pub(crate) fn is_unreadable(&self, phrase: &str) -> bool {
+        matches!(self.0.get(phrase), Some(None))
+    }
+
     pub(crate) fn get(&self, phrase: &str) -> Option<&[f32]> {
         self.0.get(phrase)?.as_deref()
     }
@@ -182,7 +187,7 @@ impl Scorer for EmbeddingScorer<'_> {
 /// How much more relevant than any canonical phrase an identity must be to be what was asked for: nearly everything is
 /// a little more like some phrase to the encoders of photos (docs/measured.md).
 pub(crate) fn least_advantage(encoder: &str) -> f32 {
-    if encoder == models::DEMO { 0.0 } else { 0.025 }
+    if encoder == models::DEMO { 0.0 } else { 0.03 }
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ mod controls;
 use std::collections::HashMap;
 use std::path::Path;
 
-use self::controls::{ABSENT, Harm, harmed, wrong_colors};
+use self::controls::{Harm, harmed};
 use super::answer::{Language, QueryAnswer, by_embedding, by_name};
 use super::build_map::{FindOptions, Tools, find_objects};
 use super::by_embedding::TextEmbeddings;
@@ -17,6 +17,7 @@ use super::localize::Answer;
 use super::names;
 use super::parse::ParsedQuery;
 use super::protocols::part_recall::{self, Components};
+use super::protocols::recipes::Absent;
 use super::protocols::{AskedScene, Category, LabeledView, categories, masks};
 use super::recipe::{PAPERS_PHRASES, Recipe};
 use super::segmenter::{FileMasks, Segmenter};
@@ -241,7 +242,8 @@ fn figures(scene: &Scene, map: &SemanticMap, trained: &SemanticMap, encoder: &mu
         }
     }
     let share = |list: &[bool]| list.iter().filter(|found| **found).count() as f64 / list.len() as f64;
-    let not_there = [ABSENT.split(", ").map(str::to_owned).collect(), wrong_colors(&map.identities)];
+    let absent = Absent::of(&map.identities);
+    let not_there = [absent.kinds, absent.colors];
     let is_found = |answered: QueryAnswer| !matches!(answered.answer, Answer::NotFound(_));
     let mut seen = |name: &String| by_looks(map, features, &mut book, encoder, name).map(is_found);
     let named = |name: &String| {

@@ -15,7 +15,7 @@ pub mod by_embedding;
 pub(crate) mod carry;
 pub mod code_map;
 pub mod codes;
-mod colors;
+pub(crate) mod colors;
 pub mod edit;
 pub(crate) mod embed;
 pub(crate) mod error;

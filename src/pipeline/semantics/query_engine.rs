@@ -40,6 +40,17 @@ impl QueryEngine {
         reading.map(|reading| self.answer(map, &reading.phrase, level)).transpose()
     }
 
+    /// Answers by this recipe from now on, with the encoder that is there.
+    pub(crate) fn answer_by(&mut self, recipe: Recipe) {
+        self.recipe = recipe;
+    }
+
+    /// The canonical phrases of the recipe that the encoder could not read.
+    pub(crate) fn unread(&self) -> Vec<String> {
+        let missing = |p: &&str| self.phrases.is_unreadable(p);
+        self.recipe.canonical.iter().filter(missing).map(str::to_owned).collect()
+    }
+
     /// Reads a question; `None` if there is nothing in it.
     pub(crate) fn read(&self, identities: &Identities, text: &str, level: LevelFilter) -> Option<QueryReading> {
         QueryReading::new(identities, text, level, &self.recipe)
@@ -56,7 +67,8 @@ impl QueryEngine {
         level: LevelFilter,
     ) -> Result<QueryAnswer, ModelError> {
         let start = Instant::now();
-        let known = match &mut self.encoder {
+        let wanted = self.recipe.understanding != Understanding::Names;
+        let known = match self.encoder.as_mut().filter(|_| wanted) {
             Some(encoder) => match self.phrases.learn(phrase, &self.recipe, |p| encoder.text(p)) {
                 Ok(()) => true,
                 // Words that nobody knows are no failure: names may know them.

@@ -3,9 +3,34 @@
 use egui::{ComboBox, TextEdit, Ui};
 use strum::VariantArray;
 
+use super::Queries;
 use crate::pipeline::semantics::recipe::{
     CanonicalPhrases, PartFeatures, Recipe, RecipeName, Rejection, RelevancyScale, Strategy, Understanding,
 };
+use crate::scene::SemanticMap;
+
+impl Queries {
+    /// How queries are answered in the view that is worked in.
+    pub(crate) fn recipe(&self) -> &Recipe {
+        &self.side.settings.recipe
+    }
+
+    /// How they are answered in the first and the second view.
+    pub(crate) fn recipes(&self) -> [Recipe; 2] {
+        let [side, other] = self.sides().map(|side| side.settings.recipe.clone());
+        if self.is_second { [other, side] } else { [side, other] }
+    }
+
+    /// Answers by these recipes in the first and the second view.
+    pub(crate) fn set_recipes(&mut self, recipes: &[Recipe; 2], semantics: &SemanticMap) {
+        if self.recipes() != *recipes {
+            for (second, recipe) in [false, true].into_iter().zip(recipes) {
+                self.in_view(second, |all| all.side.settings.recipe = recipe.clone());
+            }
+            self.ask_again(semantics);
+        }
+    }
+}
 
 /// The rows of the recipe in a grid of two columns.
 pub(super) fn show(ui: &mut Ui, recipe: &mut Recipe) {
