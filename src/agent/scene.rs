@@ -6,6 +6,8 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use super::camera_args::{Direction, Distance, NORMAL};
+pub use super::effect::Effect;
+use super::effect::Emit;
 use super::relation::{Extent, Viewpoint};
 pub use super::view_shares::Parts;
 use super::view_shares::ViewShares;
@@ -25,28 +27,6 @@ use crate::scene::{Bounds, Identities, IdentityId, LevelFilter, SemanticMap, tex
 const MEASURED_POINTS: usize = 2048;
 /// A step, as a multiple of the distance that flights keep to occupied space.
 const STEP: f64 = 6.0;
-
-/// A change of what is shown, for whoever shows the scene.
-#[derive(Clone, Debug)]
-pub enum Effect {
-    /// The camera flies; the point is what it turns about from then on.
-    Fly(Box<CameraTrajectory>, Option<DVec3>),
-    /// These are marked, and nothing else.
-    Mark(Vec<IdentityId>),
-    /// Whose own Gaussians are left out of the picture.
-    Hidden(Vec<IdentityId>),
-    /// The last change of that was undone: these are left out again.
-    HiddenUndone(Vec<IdentityId>),
-    /// What the user did last is to be undone.
-    Undo,
-    Renamed(IdentityId, String),
-    /// The last change of a name was undone: it is called this again.
-    RenameUndone(IdentityId, String),
-    /// The scene was looked at: which space is occupied is known.
-    Explored(Arc<Explored>),
-}
-
-pub(crate) type Emit = Box<dyn FnMut(Effect) + Send>;
 
 /// A scene that the agent acts in.
 pub struct SceneWorld {

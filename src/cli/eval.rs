@@ -26,7 +26,7 @@ use crate::jobs::{export, open};
     fmlgs eval splat.ply --photos photos/ --max-side 1600 --json")]
 pub(crate) struct EvalArgs {
     /// Trained scene or splat file
-    pub(super) scene: PathBuf,
+    scene: PathBuf,
     /// Dataset with the photos [default: where the scene's photos are]
     #[arg(long)]
     photos: Option<PathBuf>,
@@ -48,18 +48,18 @@ pub(crate) struct EvalArgs {
     masks: Option<PathBuf>,
     /// How objects and parts are compared
     #[arg(long, value_enum, default_value_t = Protocol::Masks, requires = "masks")]
-    pub(super) protocol: Protocol,
+    protocol: Protocol,
     /// What to ask for, where labels do not name it (spin-nerf)
     #[arg(long, requires = "masks")]
-    pub(super) query: Option<String>,
+    query: Option<String>,
     /// Compare depth instead, with the true depths that came with synthetic photos
     #[arg(long, conflicts_with = "masks")]
     depth: bool,
     /// Print one JSON document
     #[arg(long)]
-    pub(super) json: bool,
+    json: bool,
     #[command(flatten)]
-    pub(super) recipe: RecipeArgs,
+    recipe: RecipeArgs,
 }
 
 impl EvalArgs {
@@ -82,7 +82,8 @@ impl EvalArgs {
 pub(crate) fn run(args: EvalArgs, quiet: bool) -> Result<(), CliError> {
     let comparison = args.check()?;
     if let Some(labels) = &args.masks {
-        return eval_masks::run(&args, labels, &comparison);
+        let how = (args.protocol, args.query.as_deref(), &args.recipe.recipe());
+        return eval_masks::run(&args.scene, labels, how, &comparison, args.json);
     }
     let mut console = Console::new(quiet);
     if args.depth {

@@ -4,24 +4,28 @@ use std::path::Path;
 
 use serde_json::json;
 
-use super::eval::EvalArgs;
 use super::{CliError, output};
 use crate::jobs::evaluate::PhotoComparison;
 use crate::jobs::evaluate_masks::{self, Protocol, ProtocolSummary};
 use crate::pipeline::semantics::protocols::Unit;
 use crate::pipeline::semantics::protocols::part_recall::{HIT_IOU, Row};
 use crate::pipeline::semantics::protocols::recipes;
+use crate::pipeline::semantics::recipe::Recipe;
 
 /// Rows of the table at most; the worst come first.
 const ROWS: usize = 12;
 
-pub(crate) fn run(args: &EvalArgs, labels: &Path, comparison: &PhotoComparison) -> Result<(), CliError> {
-    let EvalArgs { scene, protocol, query, .. } = args;
-    let (protocol, recipe) = (*protocol, args.recipe.recipe());
-    let scores = evaluate_masks::run(comparison, scene, labels, protocol, query.as_deref(), &recipe)?;
+pub(crate) fn run(
+    scene: &Path,
+    labels: &Path,
+    (protocol, query, recipe): (Protocol, Option<&str>, &Recipe),
+    comparison: &PhotoComparison,
+    as_json: bool,
+) -> Result<(), CliError> {
+    let scores = evaluate_masks::run(comparison, scene, labels, protocol, query, recipe)?;
     let name = clap::ValueEnum::to_possible_value(&protocol).map_or_else(String::new, |v| v.get_name().to_owned());
     let (views, trained, (miou, miou_by_view)) = (scores.views, scores.trained_on, scores.miou());
-    if args.json {
+    if as_json {
         let mut value = json!({
             "scene": scene, "protocol": name, "views": views, "views_trained_on": trained, "units": scores.units, "recipe": recipe, "unmet": scores.unmet,
         });

@@ -1,6 +1,6 @@
 //! Words for colors in questions and names: a thing of another color is another thing.
 
-use super::names::words;
+use super::words::words;
 
 /// Words for colors, those that mean much the same in one row.
 const COLORS: [&[&str]; 12] = [

@@ -43,3 +43,4 @@ pub(crate) mod tracker;
 pub(crate) mod train_codes;
 pub mod view_map;
 pub(crate) mod votes;
+pub(crate) mod words;

@@ -5,8 +5,9 @@ use std::collections::HashSet;
 
 use super::colors;
 use super::localize::{Hit, Scorer};
-use super::parse::{MAX_CHARS, ParsedQuery, is_glue};
+use super::parse::{ParsedQuery, is_glue};
 use super::recipe::Rejection;
+use super::words::words;
 use crate::scene::{Identities, IdentityId};
 
 /// Score under which a name is not what was asked for.
@@ -109,37 +110,6 @@ pub(crate) fn completions(identities: &Identities, typed: &str, most: usize) -> 
     found
 }
 
-/// Lower-case words of a name; an English plural counts like its singular.
-pub(crate) fn words(text: &str) -> Vec<String> {
-    written(text).map(|w| singular(&w)).collect()
-}
-
-/// Lower-case words of a name as they are written.
-pub(super) fn written(text: &str) -> impl Iterator<Item = String> {
-    // Nobody's name is longer, and comparing every letter of a pasted book would take long.
-    let lower = text.chars().take(MAX_CHARS).collect::<String>().to_lowercase();
-    let apart = lower.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty() && *w != "s");
-    apart.map(str::to_owned).collect::<Vec<_>>().into_iter()
-}
-
-/// A word without an English plural's ending.
-pub(crate) fn singular(word: &str) -> String {
-    for (end, instead) in [("knives", "knife"), ("shelves", "shelf"), ("ies", "y")] {
-        if let Some(stem) = word.strip_suffix(end).filter(|s| s.len() > 1 || end.len() > 3) {
-            return format!("{stem}{instead}");
-        }
-    }
-    for end in ["sses", "xes", "ches", "shes"] {
-        if word.ends_with(end) {
-            return word[..word.len() - 2].into();
-        }
-    }
-    match word.strip_suffix('s') {
-        Some(stem) if stem.chars().count() > 2 && !stem.ends_with(['s', 'u', 'i']) => stem.into(),
-        _ => word.into(),
-    }
-}
-
 /// Harmonic mean of how much of the phrase is in the name and how much of the name in the phrase.
 fn similarity(phrase: &[String], name: &[String]) -> f64 {
     let covered =
@@ -151,6 +121,7 @@ fn similarity(phrase: &[String], name: &[String]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pipeline::semantics::words::singular;
     use crate::scene::{Level, NOBODY};
 
     fn scene() -> Identities {

@@ -3,9 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use super::names::{singular, words, written};
 use super::parse::{MAX_CHARS, ParsedQuery, is_glue};
 use super::recipe::{Recipe, Understanding};
+use super::words::{singular, words, written};
 use crate::models;
 use crate::scene::{Identities, IdentityId, LevelFilter};
 

@@ -8,7 +8,7 @@ use crate::math::stats::mean;
 use crate::models::ModelError;
 use crate::pipeline::semantics::colors;
 use crate::pipeline::semantics::localize::Answer;
-use crate::pipeline::semantics::names::words;
+use crate::pipeline::semantics::words::words;
 use crate::pipeline::semantics::protocols::part_recall::HIT_IOU;
 use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::recipe::{PartFeatures, Recipe, Rejection, Strategy, Understanding};
