@@ -106,7 +106,7 @@ impl App {
     }
 
     fn show_state(&mut self, view: ViewState) {
-        let ViewState { hidden, crop, modes, split, dim, cameras, path, kept, recipes } = view;
+        let ViewState { hidden, crop, modes, split, dim, cameras, path, pinned, recipes } = view;
         if self.viewport.visibility.hidden() != &hidden {
             self.viewport.visibility.set_hidden(hidden);
         }
@@ -116,7 +116,7 @@ impl App {
         self.camera.set_path(path);
         if let Some(map) = self.state.semantics.clone() {
             self.viewport.queries.set_recipes(&recipes, &map);
-            self.viewport.queries.keep_only(&kept, &map);
+            self.viewport.queries.pin_only(&pinned, &map);
         }
     }
 
@@ -130,7 +130,7 @@ impl App {
             dim: layout.dim,
             cameras: layout.cameras,
             path: self.camera.path.clone(),
-            kept: viewport.queries.kept_texts(),
+            pinned: viewport.queries.pinned_texts(),
             recipes: viewport.queries.recipes(),
         };
         let map = self.state.semantics.as_deref().cloned();

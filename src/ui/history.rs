@@ -26,8 +26,8 @@ pub(crate) struct ViewState {
     pub(crate) dim: bool,
     pub(crate) cameras: bool,
     pub(crate) path: CameraPath,
-    /// Queries that are kept on screen, in the first and the second view.
-    pub(crate) kept: [Vec<String>; 2],
+    /// Queries that are pinned, in the first and the second view.
+    pub(crate) pinned: [Vec<String>; 2],
     /// How queries are answered there.
     pub(crate) recipes: [Recipe; 2],
 }
@@ -190,7 +190,7 @@ fn described(before: &ViewState, now: &ViewState, all: Option<&Identities>) -> S
     if before.recipes != now.recipes {
         return "changed the recipe".to_owned();
     }
-    "changed the queries on screen".to_owned()
+    "changed what is pinned".to_owned()
 }
 
 fn shown_text(before: &BTreeSet<IdentityId>, now: &BTreeSet<IdentityId>, all: &Identities) -> String {
@@ -264,7 +264,7 @@ mod tests {
             dim: false,
             cameras: true,
             path,
-            kept: Default::default(),
+            pinned: Default::default(),
             recipes: Default::default(),
         };
         let now = EditSnapshot { scene: 1, map: Some(lamp()), view };

@@ -1,6 +1,6 @@
 //! The whole way from trained Gaussians and masks to a semantic map.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
@@ -75,16 +75,17 @@ pub(crate) struct Found {
 }
 
 /// What finds the masks of photos that `cloud` was trained on: files, where there are any, else the
-/// network of this name, else regions of the photos.
+/// network of this name, else regions of the photos. What a network finds is kept in `cache`.
 pub(crate) fn segmenter<'a>(
     files: Option<&Path>,
     cloud: &'a GaussianCloud,
     settings: &'a RenderSettings,
     network: Option<&str>,
+    cache: PathBuf,
 ) -> Result<Box<dyn Segmenter + 'a>, FindError> {
     Ok(match (files, network) {
         (Some(files), _) => Box::new(FileMasks(Labels::open(files)?)),
-        (None, Some(network)) => Box::new(NetworkMasks::open(network)?),
+        (None, Some(network)) => Box::new(NetworkMasks::open_kept(network, cache)?),
         (None, None) => Box::new(Regions { trained: Some((cloud, settings)), ..Regions::default() }),
     })
 }
@@ -343,6 +344,27 @@ mod tests {
             let far = |a: &[f32; 6], b: &[f32; 6]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             let worst = map.codes.iter().zip(&votes.codes).map(|(a, b)| far(a, b)).fold(0.0, f32::max);
             assert!(worst < 0.25, "{lifting:?}: {worst}");
+        }
+    }
+
+    #[test]
+    fn codes_are_trained_on_masks_and_never_on_what_votes_make_of_them() {
+        struct Notes(Vec<String>);
+        impl Observer for Notes {
+            fn note(&mut self, _: Severity, text: String) {
+                self.0.push(text);
+            }
+        }
+        for (max_seeds, masks) in [(1, "1 of 2"), (12, "2 of 2")] {
+            let mut notes = Notes(vec![]);
+            let told = Told { named: true, covers: true };
+            let map = find(told, (Lifting::Paper, 60), max_seeds, &mut notes).expect("found").map;
+            assert!(notes.0.iter().any(|n| n.contains(&format!("the masks of {masks} photos"))), "{:?}", notes.0);
+            // What no mask shows keeps the background's codes, though the Gaussians beside it had votes.
+            let untouched = map.codes[9..].iter().all(|c| c.iter().all(|v| (v - 0.5).abs() < 1e-6));
+            assert_eq!(untouched, max_seeds == 1);
+            let prepared = Preparation { lifting: Lifting::Paper, ..Preparation::default() };
+            assert_eq!(map.prepared, Some(prepared), "it is stored how it was made");
         }
     }
 
