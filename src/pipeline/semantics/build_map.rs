@@ -16,7 +16,6 @@ use super::segmenter::{FileMasks, Segmenter};
 use super::tracker::{TrackOptions, Tracked, ViewReport, track};
 use super::train_codes::{CodeTraining, CodeView, decode, train_codes};
 use crate::io::labels::Labels;
-use crate::math::format;
 use crate::models::Encoder;
 use crate::pipeline::observer::{Observer, Severity};
 use crate::render::RenderSettings;
@@ -174,7 +173,7 @@ fn unknown(views: &[ViewReport], photos: &[Photo], share: f64) -> Option<String>
          masks show; label one of them to name what is there",
         many.len(),
         photos.len(),
-        format::share(share),
+        format_args!("{:.1} %", 100.0 * share),
         photos[worst.photo].name,
         100.0 * worst.unknown
     ))

@@ -242,7 +242,7 @@ mod tests {
     fn what_is_behind_something_in_a_photo_is_not_voted_on_there() {
         // An opaque disc before a wall's Gaussian; from the side both are seen.
         let mut cloud = GaussianCloud::isotropic(vec![[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]], -1.0, 8.0);
-        cloud.log_scales[1] = [-1.5; 3];
+        cloud.log_scales = vec![[0.2; 3], [-1.5; 3]];
         let from = |x: f64, z: f64| Camera::look_at(DVec3::new(x, 0.0, z), DVec3::Z, DVec3::NEG_Y, 0.9, 64, 48);
         let [front, side] = [from(0.0, -4.0), from(6.0, 1.0)].map(|c| c.expect("valid"));
         let (mut renderer, settings, all) = (Renderer::new(), RenderSettings::default(), Identities::objects(1));
@@ -297,6 +297,7 @@ mod tests {
         row.add(8, 0, 0, &[1.0; 8]);
         row.finish();
         row.found.retain(|f| f.2 > 0.0);
-        assert_eq!(row.found, [(7, 2, 0.5), (7, 1, 0.25), (8, 1, 2.0), (8, 2, 1.0)]);
+        let all = [(7, 2, 0.5), (7, UNKNOWN, 0.5), (7, 1, 0.25), (8, 1, 2.0), (8, 2, 1.0), (8, UNKNOWN, 1.0)];
+        assert_eq!(row.found, all);
     }
 }
