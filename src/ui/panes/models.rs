@@ -132,7 +132,7 @@ fn one(ui: &mut Ui, entry: &ModelEntry, model: &ModelState, idle: bool, actions:
         };
         ui.label(RichText::new(text).small().color(color));
     });
-    ui.label(RichText::new(&entry.adds).small().color(theme::weak()));
+    ui.label(RichText::new(format!("{} {}", entry.adds, entry.speed)).small().color(theme::weak()));
     if let ModelState::Broken(problem) = model {
         ui.label(RichText::new(problem).small().color(theme::warning()));
     }
@@ -151,21 +151,9 @@ fn one(ui: &mut Ui, entry: &ModelEntry, model: &ModelState, idle: bool, actions:
                 actions.push(add);
             }
         });
-        if let Some(official) = &entry.checkpoint {
-            let text = format!(
-                "From its makers ({}; {}), made into {} MB here. This address has not been tried yet.",
-                official.url,
-                entry.license,
-                entry.megabytes()
-            );
-            ui.label(RichText::new(text).small().color(theme::weak()));
-        } else if !entry.is_hosted() {
-            let text = format!(
-                "Its files are not hosted yet ({} MB, {}). tools/export creates them from the official checkpoint.",
-                entry.megabytes(),
-                entry.license
-            );
-            ui.label(RichText::new(text).small().color(theme::weak()));
+        let origin = entry.origin();
+        if !origin.is_empty() {
+            ui.label(RichText::new(origin).small().color(theme::weak()));
         }
     }
     ui.add_space(4.0);

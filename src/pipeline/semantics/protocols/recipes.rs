@@ -8,10 +8,10 @@ use crate::math::stats::mean;
 use crate::models::ModelError;
 use crate::pipeline::semantics::colors;
 use crate::pipeline::semantics::localize::Answer;
-use crate::pipeline::semantics::words::words;
 use crate::pipeline::semantics::protocols::part_recall::HIT_IOU;
 use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::recipe::{PartFeatures, Recipe, Rejection, Strategy, Understanding};
+use crate::pipeline::semantics::words::words;
 use crate::scene::{Identities, IdentityId, Level, LevelFilter, SemanticMap};
 
 /// Things that may be absent, and parts of them. Those whose words a scene knows are not asked for.
