@@ -62,18 +62,35 @@ pub struct ModelEntry {
     pub checkpoint: Option<OfficialFile>,
     /// The same by system, for what is a program: that of this one becomes `checkpoint`.
     #[serde(default)]
-    archive: Vec<SystemArchive>,
+    pub(crate) archive: Vec<SystemArchive>,
     /// How fast it is without a GPU.
     #[serde(default)]
     pub speed: String,
     /// What it is known to answer with the official weights.
     #[serde(default)]
-    pub known: Option<KnownAnswer>,
+    pub(crate) known: Option<KnownAnswer>,
+    /// Whether it is what to begin with, of those with its role.
+    #[serde(default)]
+    pub(crate) recommended: bool,
+    /// How long a segmenter looks for everything in a photo.
+    #[serde(default)]
+    pub(crate) photo_seconds: Option<PhotoSeconds>,
+}
+
+/// Seconds on two cores, measured.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct PhotoSeconds {
+    /// With ONNX Runtime.
+    pub(crate) onnx_runtime: f64,
+    /// With the engine that is built in.
+    #[serde(default)]
+    pub(crate) built_in: Option<f64>,
 }
 
 /// An archive with a program for one kind of machine.
 #[derive(Clone, Debug, Deserialize)]
-struct SystemArchive {
+pub(crate) struct SystemArchive {
     /// As Rust names it.
     system: String,
     architecture: String,
@@ -122,6 +139,12 @@ pub enum ModelState {
     Missing(Vec<String>),
     /// Something is wrong with a file.
     Broken(String),
+}
+
+impl ModelState {
+    pub(crate) fn is_usable(&self) -> bool {
+        matches!(self, Self::BuiltIn | Self::Here)
+    }
 }
 
 /// Why a model could not be put in place.

@@ -21,9 +21,9 @@ use super::{ModelError, folder, session_cache};
 use crate::scene::resource_log::{self, ResourceKind};
 
 /// The description of the library that was fetched.
-pub(super) const LIBRARY: &str = "onnxruntime.json";
+const LIBRARY: &str = "onnxruntime.json";
 
-const MODEL_USE: &str = "it is about to run for the first time";
+const MODEL_USE: &str = "its first use";
 
 pub(crate) struct Engine {
     environment: Environment,
@@ -210,6 +210,11 @@ impl Engine {
         &self.name
     }
 
+    /// Whether it is ONNX Runtime.
+    pub(crate) fn is_fast(&self) -> bool {
+        !self.name.starts_with("tract")
+    }
+
     pub(crate) fn device(&self) -> &'static str {
         self.device.map_or("processor", Device::text)
     }
@@ -262,7 +267,7 @@ impl Engine {
             Some(device) => load(Some(device)).or_else(|e| refused(device, e)),
             None => load(None),
         });
-        let engine = if self.name.starts_with("tract") { "built-in" } else { "ONNX Runtime" };
+        let engine = if self.is_fast() { "ONNX Runtime" } else { "built-in" };
         session.map_err(|problem| ModelError::Load { model: name.into(), engine, problem })
     }
 }

@@ -36,6 +36,17 @@ fn is_checkpoint(address: &str) -> bool {
     ENDINGS.iter().any(|ending| address.ends_with(ending))
 }
 
+/// The folder that official files are fetched from instead of from their makers, if somebody says so.
+fn mirror() -> Option<String> {
+    std::env::var("FMLGS_MODELS_FROM").ok().filter(|url| !url.is_empty())
+}
+
+/// Where an official file is fetched from.
+fn in_mirror(url: &str, mirror: Option<&str>) -> String {
+    let name = url.rsplit('/').next().unwrap_or_default();
+    mirror.map_or_else(|| url.to_owned(), |folder| format!("{}/{name}", folder.trim_end_matches('/')))
+}
+
 /// What a description says of the checkpoint that a model was made of.
 #[derive(Deserialize)]
 struct Origin {
@@ -76,8 +87,12 @@ impl ModelEntry {
         patience: Patience,
         progress: &mut dyn FnMut(&str, u64, Option<u64>) -> bool,
     ) -> Result<(), InstallError> {
+        let mirror = mirror();
         match (&self.checkpoint, from) {
-            (Some(official), None) => self.fetch_checkpoint(official, folder, &official.url, patience, progress)?,
+            (Some(official), None) => {
+                let address = in_mirror(&official.url, mirror.as_deref());
+                self.fetch_checkpoint(official, folder, &address, patience, progress)?;
+            }
             (Some(official), Some(url)) if is_checkpoint(url) => {
                 self.fetch_checkpoint(official, folder, url, patience, progress)?;
             }
@@ -85,11 +100,12 @@ impl ModelEntry {
         }
         if let (Some(known), None) = (&self.known, from) {
             let to = known.picture_in(folder);
-            let wanted =
-                FileToFetch { url: &known.picture, to: &to, bytes: None, most: fetch::MOST_UNPROMISED, sha256: None };
+            let url = in_mirror(&known.picture, mirror.as_deref());
+            let wanted = FileToFetch { url: &url, to: &to, bytes: None, most: fetch::MOST_UNPROMISED, sha256: None };
             if !to.is_file() {
                 // The model is as good without; who checks it is told that the picture is missing.
-                let _ = fetch::fetch(&wanted, patience, &mut |there, all| progress("picture", there, all));
+                let once = Patience { attempts: 1, ..patience };
+                let _ = fetch::fetch(&wanted, once, &mut |there, all| progress("picture", there, all));
             }
         }
         Ok(())
@@ -153,6 +169,13 @@ mod tests {
             "checkpoint": { "url": url, "megabytes": 1 },
         }))
         .expect("an entry")
+    }
+
+    #[test]
+    fn a_mirror_has_the_file_under_its_own_name() {
+        let url = "https://makers.example/a/b/net.pt";
+        assert_eq!(in_mirror(url, None), url);
+        assert_eq!(in_mirror(url, Some("http://lab.example/nets/")), "http://lab.example/nets/net.pt");
     }
 
     /// Serves one file after another, whatever is asked for.
