@@ -153,9 +153,8 @@ impl Scene {
 fn by_names(scene: &Scene, map: &SemanticMap) -> [f64; 2] {
     let drawn = scene.drawn(map);
     let blended = CodeMap::default();
-    let mut ask = |text: &str| {
-        ParsedQuery::parse(text).map(|p| by_name(&map.identities, &p, LevelFilter::Auto, &plain()))
-    };
+    let mut ask =
+        |text: &str| ParsedQuery::parse(text).map(|p| by_name(&map.identities, &p, LevelFilter::Auto, &plain()));
     let mut asked = AskedScene { map, ask: &mut ask };
     let views = scene.views(&drawn, &blended);
     masks::by_level(&views.iter().flat_map(|v| masks::compare(&mut asked, v)).collect::<Vec<_>>())
