@@ -6,7 +6,8 @@ use super::super::state::AppState;
 use super::super::theme;
 use crate::jobs::find_objects::FindSettings;
 use crate::jobs::models::{ModelEntry, ModelRole, ModelState, SAM2};
-use crate::pipeline::semantics::build_map::{Carry, Lifting, REGIONS};
+use crate::pipeline::semantics::build_map::{Carry, REGIONS};
+use crate::scene::Lifting;
 use crate::ui::actions::Action;
 use crate::worker::{Command, Worker};
 
@@ -87,10 +88,10 @@ fn choose(ui: &mut Ui, models: &[(ModelEntry, ModelState)], finding: &mut FindSe
             (Lifting::Refined, "from votes, then refined"),
             (Lifting::Paper, "trained only, as in the paper"),
         ];
-        let chosen = names.iter().find(|(l, _)| *l == finding.lifting).map_or("", |(_, name)| *name);
+        let chosen = names.iter().find(|(l, _)| *l == finding.preparation.lifting).map_or("", |(_, name)| *name);
         let combo = egui::ComboBox::from_id_salt("lifting").selected_text(chosen).width(180.0).show_ui(ui, |ui| {
             for (lifting, name) in names {
-                ui.selectable_value(&mut finding.lifting, lifting, name);
+                ui.selectable_value(&mut finding.preparation.lifting, lifting, name);
             }
         });
         combo.response.accessible_name("Codes");

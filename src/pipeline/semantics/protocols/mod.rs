@@ -10,6 +10,7 @@ pub(crate) mod langsplat;
 pub(crate) mod masks;
 pub(crate) mod multi_class;
 pub(crate) mod part_recall;
+pub(crate) mod recipes;
 pub(crate) mod selection_3d;
 pub(crate) mod spin_nerf;
 

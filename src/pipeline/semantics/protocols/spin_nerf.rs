@@ -20,7 +20,7 @@ pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>, query:
     let mut truth = Mask::empty(first.mask.width_px(), first.mask.height_px());
     view.categories.iter().for_each(|c| truth.add(&c.mask));
     let answered = (scene.ask)(query);
-    let mask = answered.map(|a| a.mask(view.exact, &scene.map.identities, 1));
+    let mask = answered.map(|a| a.mask(view.exact, Some(view.blended), &scene.map.identities, 1));
     let mask = mask.unwrap_or_else(|| Mask::empty(view.exact.width_px, view.exact.height_px));
     let (iou, accuracy) = score(&mask, &truth);
     let unit = Unit { query: query.into(), ..first.unit(view.name, iou, None) };
