@@ -7,9 +7,11 @@
 mod by_hand;
 pub(crate) mod fastlgs_ex;
 pub(crate) mod langsplat;
+pub(crate) mod lerf_rule;
 pub(crate) mod masks;
 pub(crate) mod multi_class;
 pub(crate) mod part_recall;
+pub(crate) mod raw_features;
 pub(crate) mod selection_3d;
 pub(crate) mod spin_nerf;
 
