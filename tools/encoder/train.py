@@ -136,6 +136,7 @@ def main():
     ap.add_argument("--least-px", type=int, default=40)
     ap.add_argument("--weight", type=float, default=.35, help="of being above or below the canonical phrases")
     ap.add_argument("--start")
+    ap.add_argument("--look-every", type=float, default=200, help="seconds between looks at a few held-out scenes")
     ap.add_argument("--threads", type=int, default=2)
     ap.add_argument("--seed", type=int, default=0)
     a = ap.parse_args()
@@ -167,7 +168,7 @@ def main():
         if step % 25 == 0:
             print(f"{step} {time.time() - began:.0f}s rank {losses[0]:.3f} found {losses[1]:.3f} absent {losses[2]:.3f} scale {scale.exp():.1f}",
                   flush=True)
-        if time.time() - last > 200:
+        if time.time() - last > a.look_every:
             last = time.time()
             torch.save({"image": image.state_dict(), "text": text.state_dict()}, a.out)
             print(evaluate.summary(evaluate.measure(image, text, held, most=8)), flush=True)

@@ -109,7 +109,8 @@ pub(super) fn printed(table: PaperTable) -> Vec<PrintedTable> {
             ],
         }],
         PaperTable::PartAblation => {
-            let title = "Ablation on multilevel extraction (ME), semantic deviation (SD) and multilevel localization (ML)";
+            let title =
+                "Ablation on multilevel extraction (ME), semantic deviation (SD) and multilevel localization (ML)";
             let of = |metric, rows| PrintedTable { metric, title, scenes: &[], rows };
             vec![
                 of(RECALL, &[("none", &[1.1]), ("ME", &[5.3]), ("ME + SD", &[41.6]), ("ME + SD + ML", &[66.7])]),

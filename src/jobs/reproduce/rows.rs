@@ -78,9 +78,10 @@ pub(super) fn measure(
     drawn: &[Drawn],
     query: &str,
 ) -> Result<Asked, JobError> {
-    let language = map.language.as_ref().ok_or_else(|| {
-        JobError::Protocol("the scene has no embeddings, although an encoder was given".into())
-    })?;
+    let language = map
+        .language
+        .as_ref()
+        .ok_or_else(|| JobError::Protocol("the scene has no embeddings, although an encoder was given".into()))?;
     let views: Vec<LabeledView<'_>> = drawn.iter().map(Drawn::labeled).collect();
     let encoder = crate::models::encoder(&language.encoder)?;
     let mut by = ByEmbedding { encoder, phrases: TextEmbeddings::default(), unknown: BTreeSet::new() };
@@ -183,7 +184,13 @@ impl Table<'_> {
         }
     }
 
-    fn row(&self, name: &str, map: &SemanticMap, views: &[LabeledView<'_>], ask: Ask<'_>) -> Result<RowResult, JobError> {
+    fn row(
+        &self,
+        name: &str,
+        map: &SemanticMap,
+        views: &[LabeledView<'_>],
+        ask: Ask<'_>,
+    ) -> Result<RowResult, JobError> {
         let mut failed = None;
         let mut quiet = |text: &str| {
             ask(text).unwrap_or_else(|e| {

@@ -149,7 +149,8 @@ fn measured_rows(metric: &str, scenes: &[SceneResult]) -> Vec<TableRow> {
     }
     let of = |name: &str| {
         let scores = |s: &SceneResult| s.rows.iter().find(|r| r.name == name)?.scores.get(metric).cloned();
-        let scores: Vec<(String, Vec<f64>)> = scenes.iter().filter_map(|s| Some((s.scene.clone(), scores(s)?))).collect();
+        let scores: Vec<(String, Vec<f64>)> =
+            scenes.iter().filter_map(|s| Some((s.scene.clone(), scores(s)?))).collect();
         // A scene in which nothing is asked has no mean.
         let asked = scores.into_iter().filter(|s| !s.1.is_empty()).collect::<Vec<_>>();
         let all: Vec<f64> = asked.iter().flat_map(|s| s.1.iter().copied()).collect();
@@ -210,7 +211,9 @@ fn notes(settings: &ReproduceSettings, scenes: &[SceneResult]) -> Vec<String> {
         },
         match settings.labeled_in_training {
             true => "Labeled photos were trained on, as in the literature.".into(),
-            false => "Labeled photos that are compared were held out of training; in the literature they are not.".into(),
+            false => {
+                "Labeled photos that are compared were held out of training; in the literature they are not.".into()
+            }
         },
         "Rows in bold are measured here. Baselines among them are what pieces of this program can stand for, not the \
          programs of their authors. All ask by embedding, whatever the labels call things, but 'by name'."

@@ -30,12 +30,7 @@ impl RawFeatures {
     }
 
     /// Relevancy of every pixel, 0 to 1; `None` if the phrase was never learned.
-    pub(crate) fn relevancy(
-        &self,
-        view: &[PixelWeights],
-        phrase: &str,
-        phrases: &TextEmbeddings,
-    ) -> Option<Vec<f32>> {
+    pub(crate) fn relevancy(&self, view: &[PixelWeights], phrase: &str, phrases: &TextEmbeddings) -> Option<Vec<f32>> {
         let toward = |phrase: &str| {
             let phrase = phrases.get(phrase)?;
             Some(self.of.iter().map(|f| dot(f, phrase)).collect::<Vec<f32>>())
