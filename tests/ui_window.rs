@@ -19,6 +19,8 @@ mod panes;
 mod phrases;
 #[path = "ui_window/problems.rs"]
 mod problems;
+#[path = "ui_window/queries.rs"]
+mod queries;
 #[path = "ui_window/report.rs"]
 mod report;
 #[path = "ui_window/split.rs"]
@@ -149,7 +151,7 @@ fn a_path_that_is_not_there_gives_an_error_and_loses_nothing() {
     w.ask(Action::Open("/no/such/scene".into()));
     w.until("the error", |a| a.state.error.is_some());
     assert!(w.shows("/no/such/scene"), "the error names the path");
-    assert!(w.shows("Check the path"), "and a remedy");
+    assert!(w.shows("Check the path") && w.shows("Open another"), "and a remedy");
     assert_eq!(w.app().state.scene.as_ref().map(|s| s.name.as_str()), Some("dots"));
     w.click("Close");
     assert!(w.app().state.error.is_none());
@@ -256,7 +258,9 @@ fn training_moves_the_plot_pauses_resumes_and_is_cancelled() {
     w.harness.state_mut().layout.config.steps = 50_000;
     w.click("Start training");
     w.until("the plot", |a| a.state.history.steps.len() >= 5);
-    assert!(w.shows("Pause") && w.shows("Held-out PSNR"));
+    assert!(w.shows("Pause") && w.shows("Held-out PSNR") && w.shows("Plot of PSNR"));
+    w.click("Loss");
+    assert!(w.shows("Plot of the loss") && !w.shows("Plot of PSNR"), "one plot at a time");
     let before = w.app().viewport.picture().map(|p| p.ticket);
     w.until("a newer picture of the scene", |a| a.viewport.picture().map(|p| p.ticket) > before);
 

@@ -107,10 +107,7 @@ pub(crate) fn unpacked(folders: &Folders) -> Result<PathBuf, IoError> {
 /// As [`unpacked`] and [`open::open`].
 pub(crate) fn open(folders: &Folders, machine: &Machine, observer: &mut dyn Observer) -> Result<OpenedScene, JobError> {
     let mut scene = open::open(&unpacked(folders)?.join("scene"), folders, machine, observer)?;
-    scene.name = "Demo".into();
-    if let Some(dataset) = scene.dataset.as_mut().map(Arc::make_mut) {
-        dataset.name = "Demo".into();
-    }
+    call(&mut scene, "Demo");
     let photo = scene.dataset.as_ref().and_then(|d| d.photos.get(DemoRecipe::shipped().home));
     scene.home.camera = photo.map(|p| p.camera.clone()).or(scene.home.camera);
     Ok(scene)
@@ -127,7 +124,17 @@ pub(crate) fn open_photos(
 ) -> Result<OpenedScene, JobError> {
     let out = folders.demo();
     photograph(&out, &demo::demo_options(), observer)?;
-    open::open(&out, folders, machine, observer)
+    let mut scene = open::open(&out, folders, machine, observer)?;
+    call(&mut scene, "Demo photos");
+    Ok(scene)
+}
+
+/// Gives a scene a name other than its folder's.
+fn call(scene: &mut OpenedScene, name: &str) {
+    scene.name = name.into();
+    if let Some(dataset) = scene.dataset.as_mut().map(Arc::make_mut) {
+        dataset.name = name.into();
+    }
 }
 
 /// Compares the trained demo with its held-out photos and asks its questions; heat maps go to `pictures`.

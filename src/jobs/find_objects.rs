@@ -1,11 +1,14 @@
 //! Finding the objects and parts of a trained scene, and storing them with it.
 
+pub(crate) mod forecast;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
+use self::forecast::LookTime;
 use super::{JobError, evaluate};
 use crate::io::trained::{self, CLOUD_FILE};
 use crate::io::{IoError, SceneFolder, splat_ply};
@@ -134,7 +137,7 @@ pub(crate) fn run(
         (None, Some(name)) => Some(name.to_owned()),
         (None, None) => catalog::usable(ModelRole::Segmenter, &mut warn)?.into_iter().next(),
     };
-    let mut segmenter = segmenter(masks, cloud, settings, network.as_deref())?;
+    let mut segmenter = segmenter(masks, cloud, settings, network.as_deref(), folder.join("cache"))?;
     let mut encoder = match with.encoder.as_deref() {
         Some(NO_ENCODER) => None,
         Some(name) => Some(models::encoder(name)?),
@@ -143,6 +146,10 @@ pub(crate) fn run(
             .inspect_err(|e| warn(format!("Objects are found without embeddings: {e}")))
             .ok(),
     };
+    if let Some(look) = network.as_deref().and_then(LookTime::of_installed) {
+        let most = photos.len().min(options.track.max_seeds);
+        observer.note(Severity::Info, forecast::sentence(look, most));
+    }
     let mut follower = match with.carry {
         Carry::Gaussians => None,
         _ => Some(Sam2Tracker::open(&with.tracker, Some(folder.join("cache")))?),

@@ -17,6 +17,10 @@ use crate::pipeline::observer::{Observer, Ticker};
 pub struct ModelList {
     /// What runs them, and on what; `None` if that cannot be used.
     pub(crate) engine: Option<[String; 2]>,
+    /// Whether that is the fast one.
+    pub(crate) is_fast: bool,
+    /// Cores of this machine.
+    pub(crate) cores: usize,
     /// What is wrong with it, or could be better.
     pub(crate) note: Option<String>,
     /// Where they lie.
@@ -24,19 +28,40 @@ pub struct ModelList {
     pub(crate) models: Vec<(ModelEntry, ModelState)>,
 }
 
+impl ModelList {
+    /// The models for one purpose.
+    pub(crate) fn of(&self, role: ModelRole) -> impl Iterator<Item = (&ModelEntry, &ModelState)> {
+        self.models.iter().filter(move |(e, _)| e.role == role).map(|(e, s)| (e, s))
+    }
+
+    /// What to propose for it: what was installed, else what is recommended, else what is built in.
+    pub(crate) fn best(&self, role: ModelRole) -> Option<&ModelEntry> {
+        let rank = |(e, s): &(&ModelEntry, &ModelState)| match s {
+            ModelState::Here => 0,
+            ModelState::Missing(_) if e.recommended => 1,
+            ModelState::BuiltIn => 2,
+            _ => 3,
+        };
+        self.of(role).filter(|m| rank(m) < 3).min_by_key(rank).map(|(e, _)| e)
+    }
+}
+
 /// Lists the models, installed or not: reads and verifies files.
 pub(crate) fn list() -> ModelList {
-    let (engine, mut note) = match engine() {
+    let found = engine();
+    let is_fast = found.as_ref().is_ok_and(|e| e.is_fast());
+    let (engine, mut note) = match found {
         Ok(engine) => (Some([engine.name(), engine.device()].map(str::to_owned)), engine.note().map(str::to_owned)),
         Err(e) => (None, Some(e.to_string())),
     };
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let folder = catalog::folder();
     let models = catalog::entries().unwrap_or_else(|e| {
         note = Some(e.to_string());
         Vec::new()
     });
     let models = models.into_iter().map(|e| (e.clone(), e.state(&folder))).collect();
-    ModelList { engine, note, folder, models }
+    ModelList { engine, is_fast, cores, note, folder, models }
 }
 
 /// Where the files of a model come from.

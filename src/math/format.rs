@@ -44,6 +44,16 @@ pub(crate) fn duration(secs: f64) -> String {
     }
 }
 
+/// A time that is a guess: "40 s", "about 15 min", "about 1.5 h".
+pub(crate) fn about(secs: f64) -> String {
+    match secs {
+        s if !s.is_finite() || s < 0.0 => NONE.into(),
+        s if s < 90.0 => format!("{} s", (s / 10.0).ceil() * 10.0),
+        s if s < 5_400.0 => format!("about {} min", (s / 60.0).round()),
+        s => format!("about {} h", (s / 1_800.0).round() / 2.0),
+    }
+}
+
 /// A measured time with four significant digits: "3.200 ms".
 pub(crate) fn seconds(secs: f64) -> String {
     match secs {
@@ -149,6 +159,12 @@ mod tests {
         assert_eq!([12.345, 1234.0, 0.0].map(|r| rate(r, "steps")), ["12.3 steps/s", "1,234 steps/s", "–"]);
         assert_eq!([1.234e-5, 1.234e-3, 0.1234, 16.0].map(millis), ["0.012 ms", "1.23 ms", "123 ms", "16.0 s"]);
         assert_eq!([23.412, f64::INFINITY].map(decibel), ["23.41 dB", "–"]);
+    }
+
+    #[test]
+    fn guesses_are_round() {
+        let guesses = [3.0, 84.0, 880.0, 5_500.0, 9_000.0, f64::NAN].map(about);
+        assert_eq!(guesses, ["10 s", "90 s", "about 15 min", "about 1.5 h", "about 2.5 h", "–"]);
     }
 
     #[test]

@@ -59,6 +59,23 @@ pub struct ModelEntry {
     /// The official file that it can be made of.
     #[serde(default)]
     pub checkpoint: Option<OfficialFile>,
+    /// Whether it is what to begin with, of those with its role.
+    #[serde(default)]
+    pub(crate) recommended: bool,
+    /// How long a segmenter looks for everything in a photo.
+    #[serde(default)]
+    pub(crate) photo_seconds: Option<PhotoSeconds>,
+}
+
+/// Seconds on two cores, measured.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct PhotoSeconds {
+    /// With ONNX Runtime.
+    pub(crate) onnx_runtime: f64,
+    /// With the engine that is built in.
+    #[serde(default)]
+    pub(crate) built_in: Option<f64>,
 }
 
 /// A file with the weights of a model, as its makers publish it.
@@ -101,6 +118,12 @@ pub enum ModelState {
     Missing(Vec<String>),
     /// Something is wrong with a file.
     Broken(String),
+}
+
+impl ModelState {
+    pub(crate) fn is_usable(&self) -> bool {
+        matches!(self, Self::BuiltIn | Self::Here)
+    }
 }
 
 /// Why a model could not be put in place.

@@ -20,7 +20,7 @@ use super::network::{Network, guarded};
 use super::session_cache;
 use crate::scene::resource_log::{self, ResourceKind};
 
-const MODEL_USE: &str = "it is about to run for the first time";
+const MODEL_USE: &str = "its first use";
 
 pub(crate) struct Engine {
     environment: Environment,
@@ -164,6 +164,11 @@ impl Engine {
         &self.name
     }
 
+    /// Whether it is ONNX Runtime.
+    pub(crate) fn is_fast(&self) -> bool {
+        !self.name.starts_with("tract")
+    }
+
     pub(crate) fn device(&self) -> &'static str {
         self.device.map_or("processor", Device::text)
     }
@@ -216,7 +221,7 @@ impl Engine {
             Some(device) => load(Some(device)).or_else(|e| refused(device, e)),
             None => load(None),
         });
-        let engine = if self.name.starts_with("tract") { "built-in" } else { "ONNX Runtime" };
+        let engine = if self.is_fast() { "ONNX Runtime" } else { "built-in" };
         session.map_err(|problem| ModelError::Load { model: name.into(), engine, problem })
     }
 }

@@ -337,9 +337,12 @@ impl Wait {
         progress: &mut dyn FnMut(u64, Option<u64>) -> bool,
     ) -> Result<Option<ResponsePart>, Ended> {
         loop {
+            let asked = Instant::now();
             if !progress(there, expected) {
                 return Err(Ended::Cancelled);
             }
+            // It may have waited out a pause, which is not the server's silence.
+            self.since += asked.elapsed();
             let piece = match self.pieces.recv_timeout(TICK) {
                 Ok(piece) => piece,
                 Err(RecvTimeoutError::Disconnected) => return Ok(None),

@@ -31,6 +31,19 @@ fn is_checkpoint(address: &str) -> bool {
     ENDINGS.iter().any(|ending| address.ends_with(ending))
 }
 
+/// The folder that official files are fetched from instead of from their makers, if somebody says so.
+fn mirror() -> Option<String> {
+    std::env::var("FMLGS_MODELS_FROM").ok().filter(|url| !url.is_empty())
+}
+
+impl OfficialFile {
+    /// Where it is fetched from.
+    fn address(&self, mirror: Option<&str>) -> String {
+        let name = self.url.rsplit('/').next().unwrap_or_default();
+        mirror.map_or_else(|| self.url.clone(), |folder| format!("{}/{name}", folder.trim_end_matches('/')))
+    }
+}
+
 /// What a description says of the checkpoint that a model was made of.
 #[derive(Deserialize)]
 struct Origin {
@@ -67,7 +80,9 @@ impl ModelEntry {
         progress: &mut dyn FnMut(&str, u64, Option<u64>) -> bool,
     ) -> Result<(), InstallError> {
         match (&self.checkpoint, from) {
-            (Some(official), None) => self.fetch_checkpoint(official, folder, &official.url, patience, progress),
+            (Some(official), None) => {
+                self.fetch_checkpoint(official, folder, &official.address(mirror().as_deref()), patience, progress)
+            }
             (Some(official), Some(url)) if is_checkpoint(url) => {
                 self.fetch_checkpoint(official, folder, url, patience, progress)
             }
@@ -133,6 +148,13 @@ mod tests {
             "checkpoint": { "url": url, "megabytes": 1 },
         }))
         .expect("an entry")
+    }
+
+    #[test]
+    fn a_mirror_has_the_file_under_its_own_name() {
+        let file = OfficialFile { url: "https://makers.example/a/b/net.pt".into(), megabytes: 1, sha256: None };
+        assert_eq!(file.address(None), file.url);
+        assert_eq!(file.address(Some("http://lab.example/nets/")), "http://lab.example/nets/net.pt");
     }
 
     /// Serves one file after another, whatever is asked for.

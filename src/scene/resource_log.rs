@@ -40,8 +40,13 @@ pub struct ResourceEntry {
 impl ResourceEntry {
     /// As a line: "2.31 s  loaded the network demo, 1.2 MB: a phrase is compared with looks".
     pub(crate) fn line(&self) -> String {
+        format!("{:7.2} s  {}", self.at_secs, self.text())
+    }
+
+    /// The same without its time.
+    pub(crate) fn text(&self) -> String {
         let size = if self.bytes > 0 { format!(", {}", bytes(self.bytes)) } else { String::new() };
-        format!("{:7.2} s  {}{size}: {}", self.at_secs, self.what, self.why)
+        format!("{}{size}: {}", self.what, self.why)
     }
 }
 
@@ -62,9 +67,14 @@ fn lock() -> MutexGuard<'static, ResourceLog> {
     LOG.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
+/// Seconds since the log began.
+pub(crate) fn now_secs() -> f64 {
+    START.get_or_init(Instant::now).elapsed().as_secs_f64()
+}
+
 /// Adds to the log.
 pub(crate) fn record(kind: ResourceKind, what: impl Into<String>, why: &'static str, bytes: u64) {
-    let at_secs = START.get_or_init(Instant::now).elapsed().as_secs_f64();
+    let at_secs = now_secs();
     let entry = ResourceEntry { at_secs, kind, what: what.into(), why, bytes };
     let mut log = lock();
     if let Some(listener) = log.listener {

@@ -13,7 +13,6 @@ use super::viewport::brush::Brush;
 use super::viewport::overrides::RenderOverrides;
 use crate::agent::scene::{Effect, Parts};
 use crate::jobs::edit::EditRequest;
-use crate::jobs::find_objects::FindRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached};
 use crate::measure::is_report;
 use crate::navigate::FRAMES;
@@ -22,7 +21,7 @@ use crate::pipeline::semantics::edit::Edit;
 use crate::scene::IdentityId;
 use crate::scene::plan::When;
 use crate::ui::actions::{Action, Pane};
-use crate::worker::{Command, JobId, JobKind};
+use crate::worker::{Command, JobId};
 
 impl App {
     /// Does what a user asked for.
@@ -32,8 +31,8 @@ impl App {
             Action::Open(path) if path.extension().is_some_and(|e| e == "toml") => self.read_preset(&path),
             Action::OpenDemo | Action::TrainDemo | Action::Open(_) | Action::FindPoses(_) => self.replace_scene(action),
             Action::StartTraining => self.start_training(),
-            Action::PauseTraining => {
-                if let Some(job) = self.state.job.as_ref().filter(|j| j.kind == JobKind::Train) {
+            Action::PauseJob => {
+                if let Some(job) = self.state.job.as_ref().filter(|j| j.kind.can_pause()) {
                     self.worker.set_paused(job.id, !job.paused);
                 }
             }
@@ -45,7 +44,7 @@ impl App {
             Action::Dismiss => self.dismiss(ctx),
             Action::InspectAt(at) => self.inspect(at),
             Action::Evaluate => self.evaluate(),
-            Action::FindObjects => self.find_objects(None),
+            Action::FindObjects => self.find_objects(),
             Action::FetchModel(id) => self.install_model(id, None),
             Action::TypeQuery => self.type_question(),
             Action::Ask(text) => {
@@ -97,6 +96,9 @@ impl App {
             Action::Undo => self.edit(EditStep::Undo),
             Action::Redo => self.edit(EditStep::Redo),
             Action::GoToTarget(id, side) => self.visit(id, ViewPreference { side, ..ViewPreference::default() }),
+            Action::PlayPath | Action::StepBack | Action::StepForward if !self.camera.has_clip() => {
+                self.state.toast(Tone::Info, "Nothing to play: add keyframes (K), or go to an object first.");
+            }
             Action::PlayPath => self.camera.toggle(),
             Action::StepBack => self.step_in_time(-1.0, ctx),
             Action::StepForward => self.step_in_time(1.0, ctx),
@@ -224,31 +226,6 @@ impl App {
         }
     }
 
-    /// Finds objects and parts with these masks, those that came with the photos, or none.
-    pub(super) fn find_objects(&mut self, masks: Option<PathBuf>) {
-        let scene = self.state.scene.clone();
-        let Some((scene, dataset)) = scene.as_ref().and_then(|s| Some((s, s.dataset.clone()?))) else {
-            self.state.toast(Tone::Warning, "Open a folder of posed photos first: masks refer to photos.");
-            return;
-        };
-        let masks = masks.or_else(|| scene.masks.clone());
-        match self.viewport.cloud().cloned().filter(|_| self.state.is_trained()) {
-            Some(cloud) => {
-                self.submit(Command::FindObjects(Box::new(FindRequest {
-                    folder: scene.out.clone(),
-                    cloud: Arc::clone(&cloud),
-                    settings: self.state.render_settings(),
-                    dataset,
-                    holdout_every: self.layout.config.holdout_every,
-                    masks,
-                    side_px: self.state.plan.object_side_px,
-                    with: self.layout.finding.clone(),
-                })));
-            }
-            None => self.state.toast(Tone::Warning, "Train first: objects are found among trained Gaussians."),
-        }
-    }
-
     fn step_in_time(&mut self, pictures: f64, ctx: &egui::Context) {
         if let Some(pose) = self.camera.step(pictures) {
             self.viewport.stand(&pose, &self.state, ctx.input(|i| i.time));
@@ -293,7 +270,7 @@ impl App {
         }
         if let Some(visit) = flight {
             self.viewport.turn_about(visit.target);
-            self.camera.play_flight(visit.flight);
+            self.camera.play_flight(visit.flight, name);
         }
     }
 
@@ -334,7 +311,7 @@ impl App {
                 if let Some(point) = about {
                     self.viewport.turn_about(point);
                 }
-                self.camera.play_flight(*flight);
+                self.camera.play_flight(*flight, String::new());
             }
             Effect::Mark(ids) => {
                 if let Some(map) = self.state.semantics.clone() {

@@ -61,7 +61,7 @@ impl App {
             Action::ChooseTrueMask => self.ask(Action::TrueMask(Some(path))),
             Action::ChooseReport => self.read_report(path, false),
             Action::ChooseSecondReport => self.read_report(path, true),
-            Action::ChooseMasks => self.find_objects(Some(path)),
+            Action::ChooseMasks => self.find_objects_by(Some(path)),
             Action::AddModel(id) => self.install_model(id, Some(path)),
             Action::ExportPly => {
                 if let Some(cloud) = self.viewport.cloud() {

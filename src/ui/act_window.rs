@@ -3,6 +3,7 @@
 use super::app::App;
 use super::dock::Dock;
 use super::layout::Layout;
+use super::state::Tone;
 use crate::ui::actions::Action;
 
 impl App {
@@ -12,6 +13,9 @@ impl App {
             Action::FillWindow => {
                 self.full_view = !self.full_view;
                 ctx.send_viewport_cmd(egui::ViewportCommand::Fullscreen(self.full_view));
+                if self.full_view {
+                    self.state.toast(Tone::Info, "Esc or F11 brings the panes back.");
+                }
             }
             Action::ResetPanes => {
                 self.layout.dock = Dock::default();

@@ -148,13 +148,13 @@ actions! {
     Screenshot: "Save the view as .png\u{2026}", "Write the image in the viewport, without the drawn cameras.", "Ctrl+S";
     StartTraining: "Start training",
         "Fit Gaussians to the photos. Resumes from the last checkpoint if the settings are the same.", "Ctrl+T";
-    PauseTraining: "Pause or resume training", "Pause training without losing its state.", "T";
+    PauseJob: "Pause or resume the running job", "Training, a search for objects, a download: it waits and loses nothing.", "T";
     Cancel: "Cancel the running job", "Stop the running job at its next step. Progress so far is kept.";
     Dismiss: "Deselect, or cancel the running job", "Deselect what is selected; with nothing selected, stop the running job.",
         "Escape";
     Evaluate: "Evaluate on held-out photos", "PSNR and SSIM on photos held out from training.";
     FindObjects: "Find objects and parts",
-        "From the masks that came with the photos, or else from regions of uniform color.";
+        "From the labels that came with the photos, or else from what networks or colors tell.";
     ChooseMasks: "Find objects with other masks\u{2026}",
         "Id maps of fmlgs synth, ISAT files, folders of SPIn-NeRF, 3D-OVS or LERF-Mask; one labeled photo is enough.";
     FetchModel(id: String): format!("Download the model {id}"), "Download it, verify it, and use it from then on.";

@@ -6,11 +6,13 @@ use std::sync::Arc;
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 
+use super::act_find::AwaitedModels;
 use super::camera::CameraPane;
 use super::chat::Chat;
 use super::dialogs::{self, Question};
 use super::dock::{DockContents, Place};
 use super::file_dialogs::FileDialogs;
+use super::find_dialog::FindDialog;
 use super::history::{EditStep, Editing};
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
@@ -40,6 +42,8 @@ pub struct App {
     pub(super) repaint: Repaint,
     pub(super) dialogs: FileDialogs,
     pub(super) question: Option<Question>,
+    pub(super) find_dialog: FindDialog,
+    pub(super) awaited: Option<AwaitedModels>,
     pub(super) palette: Palette,
     pub(super) sheet: bool,
     first_page: FirstPage,
@@ -98,6 +102,8 @@ impl App {
             repaint,
             dialogs: FileDialogs::default(),
             question: None,
+            find_dialog: FindDialog::default(),
+            awaited: None,
             palette: Palette::default(),
             sheet: false,
             first_page: FirstPage::default(),
@@ -144,14 +150,16 @@ impl App {
     /// Takes in everything that happened since.
     fn take_events(&mut self, ctx: &egui::Context) {
         while let Some(event) = self.worker.next_event() {
+            self.hear(&event);
             let next = self.state.apply(event);
             self.actions.extend(next);
         }
         self.state.replan(&self.layout.plan, self.layout.config.limits());
         for load in resource_log::since(self.traced) {
             self.traced += 1;
-            self.state.say(super::state::Tone::Info, load.line());
+            self.state.say(super::state::Tone::Info, load.text());
         }
+        self.state.stamp_log(resource_log::now_secs());
         // Once there are objects, they are what a user works with.
         let has_objects = self.state.semantics.is_some();
         let news = if has_objects { Pane::Objects } else { Pane::Training };
@@ -192,6 +200,7 @@ impl App {
         let has_dialog = self.state.error.is_some()
             || self.state.unposed.is_some()
             || self.question.is_some()
+            || self.find_dialog.is_open()
             || self.dialogs.is_own_open();
         // Keys are the open menu's; Escape closes it, and nothing else.
         let has_menu = egui::Popup::is_any_open(ctx);
@@ -297,13 +306,18 @@ impl App {
         {
             self.give_up_and(question.action);
         }
+        let max_seeds = self.layout.finding.max_seeds;
+        if let Some(means) = self.find_dialog.show(ctx, &self.state, max_seeds, &mut self.actions) {
+            self.find_with(means);
+        }
         if let Some(photos) = &self.state.unposed
             && !unposed::show(ctx, photos, &mut self.actions)
         {
             self.state.unposed = None;
         }
-        if self.state.error.as_ref().is_some_and(|e| dialogs::show_error(ctx, e, self.state.scene.is_some())) {
-            self.state.error = None;
+        let Self { state, actions, .. } = self;
+        if state.error.as_ref().is_some_and(|e| dialogs::show_error(ctx, e, state.scene.is_some(), actions)) {
+            state.error = None;
         }
         if let Some((action, path)) = self.dialogs.show(ctx) {
             self.chosen(action, path);
@@ -332,7 +346,7 @@ impl DockContents for App {
         let Place::Pane(pane) = place else { return self.show_view(ui) };
         Frame::new().fill(theme::panel()).inner_margin(Margin::same(12)).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
-            if matches!(pane, Pane::Training | Pane::Objects | Pane::Query | Pane::Plan | Pane::Models) {
+            if matches!(pane, Pane::Training | Pane::Query | Pane::Plan | Pane::Models) {
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| self.show_pane(ui, pane));
             } else {
                 self.show_pane(ui, pane);

@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crossbeam_channel::{Receiver, Sender, bounded};
 use egui::{Button, Key, Modifiers, Response, RichText, ScrollArea, TextEdit, Ui};
 
+use super::chat_lines::{self, Line};
 pub(crate) use super::chat_model::ChatSettings;
 use super::chat_model::ModelChooser;
 use super::panes::object_thumbnails::ObjectThumbnails;
@@ -29,8 +30,6 @@ const NEWS: usize = 1024;
 const MAX_LINES: usize = 400;
 /// Ways to continue that are shown at once.
 const CONTINUATIONS: usize = 4;
-/// Side of a candidate's thumbnail, points.
-const THUMBNAIL_PX: f32 = 34.0;
 /// Room for the box, its continuations and the buttons below the talk, points.
 const BELOW_PT: f32 = 130.0;
 
@@ -49,13 +48,6 @@ pub(crate) struct Snapshot {
     pub(crate) hidden: Vec<IdentityId>,
     /// What was done last, which the window can undo.
     pub(crate) undoable: Option<String>,
-}
-
-/// A line of the conversation.
-enum Line {
-    Said(String),
-    Did(String, Option<bool>),
-    Answer { text: String, candidates: Vec<(IdentityId, String)>, refused: Option<Refusal> },
 }
 
 struct Request {
@@ -99,9 +91,9 @@ impl Chat {
         for news in news.try_iter() {
             match news {
                 News::Effect(effect) => effects.push(effect),
-                News::Event(AgentEvent::Call { line, .. }) => self.lines.push(did(&line, None)),
-                News::Event(AgentEvent::Result { text, done }) => self.lines.push(did(&text, Some(done))),
-                News::Event(AgentEvent::Note(text)) => self.lines.push(did(&text, None)),
+                News::Event(AgentEvent::Call { line, .. }) => self.lines.push(chat_lines::did(&line, None)),
+                News::Event(AgentEvent::Result { text, done }) => self.lines.push(chat_lines::did(&text, Some(done))),
+                News::Event(AgentEvent::Note(text)) => self.lines.push(chat_lines::did(&text, None)),
                 News::Event(AgentEvent::Thinking | AgentEvent::Piece(_)) => {}
                 News::Reply { text, candidates, refused, transcript } => {
                     let text = text::lines(&text).into_owned();
@@ -182,9 +174,7 @@ impl Chat {
         } else {
             let height = (ui.available_height() - BELOW_PT).max(60.0);
             ScrollArea::vertical().id_salt("talk").max_height(height).stick_to_bottom(true).show(ui, |ui| {
-                for line in &self.lines {
-                    say = show_line(ui, line, object_thumbnails).or(say.take());
-                }
+                say = chat_lines::show(ui, &self.lines, object_thumbnails).or(say.take());
                 if self.cancel.is_some() {
                     ui.horizontal(|ui| {
                         ui.spinner();
@@ -265,46 +255,6 @@ impl Chat {
         self.typed = format!("{first} ");
         cursor_to_end(ui.ctx(), response.id, &self.typed);
     }
-}
-
-/// A step of the agent, in words that may be a model's.
-fn did(line: &str, done: Option<bool>) -> Line {
-    Line::Did(text::line(line).into_owned(), done)
-}
-
-/// One line; a candidate that was clicked.
-fn show_line(ui: &mut Ui, line: &Line, object_thumbnails: &ObjectThumbnails) -> Option<String> {
-    let mut clicked = None;
-    match line {
-        Line::Said(text) => {
-            ui.add_space(4.0);
-            ui.label(RichText::new(text).strong());
-        }
-        Line::Did(text, done) => {
-            let color = if *done == Some(false) { theme::warning() } else { theme::weak() };
-            ui.label(RichText::new(format!("    {text}")).small().color(color));
-        }
-        Line::Answer { text, candidates, refused } => {
-            match refused {
-                Some(_) => ui.horizontal_wrapped(|ui| {
-                    theme::mark(ui, super::state::Tone::Warning, 16.0);
-                    ui.label(text);
-                }),
-                None => ui.horizontal_wrapped(|ui| {
-                    ui.label(text);
-                }),
-            };
-            ui.horizontal_wrapped(|ui| {
-                for (id, name) in candidates.iter().take(8) {
-                    object_thumbnails.show(ui, *id, THUMBNAIL_PX);
-                    if ui.add(Button::new(name).small()).clicked() {
-                        clicked = Some(name.clone());
-                    }
-                }
-            });
-        }
-    }
-    clicked
 }
 
 /// Starts the agent's thread.

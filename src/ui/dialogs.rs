@@ -1,6 +1,6 @@
 //! Dialogs: errors, and questions before something is given up.
 
-use egui::{Id, Modal, RichText};
+use egui::RichText;
 
 use super::state::{ErrorBox, Tone};
 use super::theme;
@@ -16,9 +16,9 @@ pub(crate) struct Question {
     pub(crate) action: Action,
 }
 
-/// Shows an error until it is read. Returns whether it was.
-pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox, has_scene: bool) -> bool {
-    let response = Modal::new(Id::unique("error")).frame(theme::dialog()).show(ctx, |ui| {
+/// Shows an error until it is read. Returns whether it was; where something could not be opened, another may be.
+pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox, has_scene: bool, actions: &mut Vec<Action>) -> bool {
+    let response = theme::dialog("error").show(ctx, |ui| {
         ui.set_width(480.0);
         ui.horizontal(|ui| {
             theme::mark(ui, Tone::Error, 24.0);
@@ -36,7 +36,11 @@ pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox, has_scene: bool)
         }
         ui.add_space(12.0);
         ui.horizontal(|ui| {
-            let close = ui.add(theme::primary_button("Close")).clicked();
+            let mut close = ui.add(theme::primary_button("Close")).clicked();
+            if error.doing.starts_with("Opening") && ui.button("Open another\u{2026}").clicked() {
+                actions.push(Action::OpenFile);
+                close = true;
+            }
             if ui.button("Copy message").clicked() {
                 let f = &error.failure;
                 ui.ctx().copy_text(format!("{}: {}\n{}", error.doing, f.message, f.remedy));
@@ -50,7 +54,7 @@ pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox, has_scene: bool)
 
 /// Asks a question. `Some(true)` to go ahead, `Some(false)` not to, `None` while no one answered.
 pub(crate) fn show_question(ctx: &egui::Context, text: &str, yes: &str, no: &str) -> Option<bool> {
-    let response = Modal::new(Id::unique("dialog question")).frame(theme::dialog()).show(ctx, |ui| {
+    let response = theme::dialog("dialog question").show(ctx, |ui| {
         ui.set_width(420.0);
         ui.label(text);
         ui.add_space(12.0);

@@ -106,7 +106,7 @@ impl App {
     }
 
     fn show_state(&mut self, view: ViewState) {
-        let ViewState { hidden, crop, modes, split, dim, cameras, path, kept } = view;
+        let ViewState { hidden, crop, modes, split, dim, cameras, path, pinned } = view;
         if self.viewport.visibility.hidden() != &hidden {
             self.viewport.visibility.set_hidden(hidden);
         }
@@ -115,7 +115,7 @@ impl App {
         (self.layout.split_view, self.layout.dim) = (split, dim);
         self.camera.set_path(path);
         if let Some(map) = self.state.semantics.clone() {
-            self.viewport.queries.keep_only(&kept, &map);
+            self.viewport.queries.pin_only(&pinned, &map);
         }
     }
 
@@ -129,7 +129,7 @@ impl App {
             dim: layout.dim,
             cameras: layout.cameras,
             path: self.camera.path.clone(),
-            kept: viewport.queries.kept_texts(),
+            pinned: viewport.queries.pinned_texts(),
         };
         let map = self.state.semantics.as_deref().cloned();
         EditSnapshot { scene: self.state.scene_number, map, view }

@@ -25,8 +25,8 @@ pub(crate) struct ViewState {
     pub(crate) dim: bool,
     pub(crate) cameras: bool,
     pub(crate) path: CameraPath,
-    /// Queries that are kept on screen, in the first and the second view.
-    pub(crate) kept: [Vec<String>; 2],
+    /// Queries that are pinned, in the first and the second view.
+    pub(crate) pinned: [Vec<String>; 2],
 }
 
 /// All that can be changed back.
@@ -184,7 +184,7 @@ fn described(before: &ViewState, now: &ViewState, all: Option<&Identities>) -> S
     if before.cameras != now.cameras {
         return format!("{} the cameras", if now.cameras { "showed" } else { "hid" });
     }
-    "changed the queries on screen".to_owned()
+    "changed what is pinned".to_owned()
 }
 
 fn shown_text(before: &BTreeSet<IdentityId>, now: &BTreeSet<IdentityId>, all: &Identities) -> String {
@@ -258,7 +258,7 @@ mod tests {
             dim: false,
             cameras: true,
             path,
-            kept: Default::default(),
+            pinned: Default::default(),
         };
         let now = EditSnapshot { scene: 1, map: Some(lamp()), view };
         let mut history = ChangeHistory::default();

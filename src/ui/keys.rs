@@ -48,6 +48,9 @@ struct Typing {
     until: f64,
     /// The field with the keyboard, if something was typed into it since Enter: undo belongs to it then.
     unsent: Option<Id>,
+    /// Whether a field has the keyboard, and whether it loses it by Escape now, which is then no shortcut.
+    in_field: bool,
+    leaves: bool,
 }
 
 /// Looks who types; once per frame, before anybody takes keys.
@@ -65,7 +68,8 @@ pub(crate) fn watch_typing(ctx: &egui::Context) {
             false if i.pointer.any_pressed() || i.key_pressed(Key::Escape) => 0.0,
             false => typing.until,
         };
-        Typing { until, unsent }
+        let leaves = typing.in_field && i.key_pressed(Key::Escape);
+        Typing { until, unsent, in_field: field.is_some(), leaves }
     });
     ctx.data_mut(|d| d.insert_temp(Id::NULL, typing));
 }
@@ -91,6 +95,7 @@ pub(crate) fn pressed(ctx: &egui::Context) -> Vec<Action> {
         Shortcut { key, .. } if key.len() > 1 && key.starts_with('F') => false,
         // Space presses the button that has the focus.
         Shortcut { key: "Space", .. } => has_focus || is_typing,
+        Shortcut { key: "Escape", .. } => has_field || typing(ctx).leaves,
         Shortcut { key, .. } => has_field || is_typing && key.len() == 1,
     };
     let mut found = Vec::new();

@@ -25,10 +25,19 @@ pub(crate) enum PlotAxis {
     Steps,
 }
 
+/// What the plot of training shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum PlotQuantity {
+    #[default]
+    Psnr,
+    Loss,
+}
+
 /// How the plots of training are drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct PlotSettings {
+    pub(crate) quantity: PlotQuantity,
     pub(crate) axis: PlotAxis,
     /// Share of the points that a running mean goes over, in percent.
     pub(crate) smoothing: f32,
@@ -38,7 +47,7 @@ pub(crate) struct PlotSettings {
 
 impl Default for PlotSettings {
     fn default() -> Self {
-        Self { axis: PlotAxis::default(), smoothing: 2.0, log: false }
+        Self { quantity: PlotQuantity::default(), axis: PlotAxis::default(), smoothing: 2.0, log: false }
     }
 }
 

@@ -6,6 +6,7 @@
 
 mod act;
 mod act_file;
+mod act_find;
 mod act_look;
 mod act_phrases;
 mod act_report;
@@ -16,13 +17,15 @@ pub mod app;
 pub(crate) mod beside;
 pub(crate) mod camera;
 pub(crate) mod chat;
-pub(crate) mod chat_model;
+mod chat_lines;
+mod chat_model;
 pub mod color_by;
 mod context;
 pub(crate) mod dialogs;
 mod dock;
 mod edits;
 mod file_dialogs;
+mod find_dialog;
 mod fonts;
 mod history;
 pub(crate) mod keys;

@@ -42,39 +42,36 @@ impl Palette {
         self.selected = self.selected.min(last);
         let entered = step(Key::Enter);
         let mut chosen = if entered { found.get(self.selected).cloned() } else { None };
-        let area = egui::Modal::default_area(egui::Id::unique("palette")).anchor(Align2::CENTER_TOP, [0.0, 90.0]);
-        let response = egui::Modal::new(egui::Id::unique("palette"))
-            .frame(theme::dialog().inner_margin(12))
-            .area(area)
-            .show(ctx, |ui| {
-                ui.set_width(520.0);
-                let edit = TextEdit::singleline(&mut self.query)
-                    .hint_text("Type an action, or a path to open")
-                    .desired_width(f32::INFINITY);
-                let edit = ui.add(edit).accessible_name("Search actions");
-                edit.request_focus();
-                if edit.changed() {
-                    self.selected = 0;
+        let area = theme::dialog_area("palette").anchor(Align2::CENTER_TOP, [0.0, 90.0]);
+        let response = theme::dialog("palette").area(area).show(ctx, |ui| {
+            ui.set_width(520.0);
+            let edit = TextEdit::singleline(&mut self.query)
+                .hint_text("Type an action, or a path to open")
+                .desired_width(f32::INFINITY);
+            let edit = ui.add(edit).accessible_name("Search actions");
+            edit.request_focus();
+            if edit.changed() {
+                self.selected = 0;
+            }
+            ui.add_space(4.0);
+            ScrollArea::vertical().max_height(380.0).auto_shrink([false, true]).show(ui, |ui| {
+                if found.is_empty() {
+                    ui.weak("No matching action.");
                 }
-                ui.add_space(4.0);
-                ScrollArea::vertical().max_height(380.0).auto_shrink([false, true]).show(ui, |ui| {
-                    if found.is_empty() {
-                        ui.weak("No matching action.");
+                for (i, action) in found.iter().enumerate() {
+                    let row = egui::Button::selectable(i == self.selected, title(action))
+                        .shortcut_text(keys::label(ui.ctx(), action))
+                        .min_size(egui::vec2(ui.available_width(), 28.0));
+                    let row = ui.add(row).on_hover_text(action.tooltip());
+                    if i == self.selected && (entered || edit.changed() || step_keys(ui)) {
+                        row.scroll_to_me(None);
                     }
-                    for (i, action) in found.iter().enumerate() {
-                        let row = egui::Button::selectable(i == self.selected, title(action))
-                            .shortcut_text(keys::label(ui.ctx(), action))
-                            .min_size(egui::vec2(ui.available_width(), 28.0));
-                        let row = ui.add(row).on_hover_text(action.tooltip());
-                        if i == self.selected && (entered || edit.changed() || step_keys(ui)) {
-                            row.scroll_to_me(None);
-                        }
-                        if row.clicked() {
-                            chosen = Some(action.clone());
-                        }
+                    if row.clicked() {
+                        chosen = Some(action.clone());
                     }
-                });
+                }
             });
+        });
         if chosen.is_some() || response.should_close() {
             self.open = false;
         }
@@ -105,10 +102,27 @@ fn matches(query: &str, layout: &Layout) -> Vec<Action> {
     let query = path.to_lowercase();
     let words: Vec<&str> = query.split_whitespace().collect();
     let can_be_done = |a: &Action| !matches!(a, Action::TogglePane(pane) if !layout.shows(*pane));
-    let is_asked_for = |a: &Action| words.iter().all(|w| title(a).to_lowercase().contains(w));
+    let is_asked_for = |a: &Action| {
+        let title = format!("{} {}", title(a).to_lowercase(), other_words(a));
+        words.iter().all(|w| title.contains(w))
+    };
     let mut found: Vec<Action> = Action::all().into_iter().filter(|a| can_be_done(a) && is_asked_for(a)).collect();
-    found.sort_by_key(|a| !title(a).to_lowercase().starts_with(&query));
+    // Whoever types a pane's name means the pane.
+    let is_pane = |a: &Action| match a {
+        Action::ShowPane(pane) | Action::TogglePane(pane) => pane.text().to_lowercase().starts_with(&query),
+        _ => false,
+    };
+    found.sort_by_key(|a| !title(a).to_lowercase().starts_with(&query) && !is_pane(a));
     found
+}
+
+/// What else an action is called.
+fn other_words(action: &Action) -> &'static str {
+    match action {
+        Action::ShowPane(_) => "open",
+        Action::TogglePane(_) => "close",
+        _ => "",
+    }
 }
 
 /// Draws the shortcut sheet while `open`.
@@ -116,7 +130,7 @@ pub(crate) fn shortcut_sheet(ctx: &egui::Context, open: &mut bool) {
     if !*open {
         return;
     }
-    let response = egui::Modal::new(egui::Id::unique("shortcuts")).frame(theme::dialog()).show(ctx, |ui| {
+    let response = theme::dialog("shortcuts").show(ctx, |ui| {
         ui.set_width((ctx.content_rect().width() - 80.0).min(760.0));
         ui.heading("Keyboard and mouse");
         ui.add_space(8.0);
@@ -130,8 +144,11 @@ pub(crate) fn shortcut_sheet(ctx: &egui::Context, open: &mut bool) {
                     .map(|a| (keys::label(left.ctx(), &a), a.text()))
                     .collect();
                 let gestures = keys::GESTURES.map(|(k, t)| (k.to_owned(), t.to_owned()));
-                sheet_grid(left, "Actions", &bound);
+                // Both columns are of a height.
+                let (first, second) = bound.split_at(bound.len().min((bound.len() + gestures.len()).div_ceil(2)));
+                sheet_grid(left, "Actions", first);
                 sheet_grid(right, "In the viewport", &gestures);
+                sheet_grid(right, "More actions", second);
             });
         });
         ui.add_space(8.0);
@@ -186,6 +203,8 @@ mod tests {
         assert_eq!(found("show scene plan"), vec![Action::ShowPane(Pane::Plan)]);
         assert_eq!(found("hide scene plan"), vec![Action::TogglePane(Pane::Plan)]);
         assert!(found("hide camera path").is_empty(), "it is hidden already");
+        assert_eq!(found("close scene plan"), vec![Action::TogglePane(Pane::Plan)]);
+        assert_eq!(found("camera path").first(), Some(&Action::ShowPane(Pane::Camera)), "before what plays it");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 pub use self::messages::{ErrorBox, LogLine};
 pub(crate) use self::messages::{Toast, Tone};
+pub use self::running::RunningJob;
 use super::actions::Action;
 use super::beside::Beside;
 use super::history::ChangeHistory;
@@ -27,20 +28,10 @@ use crate::scene::{Limits, Overrides, PhotoPixels, SceneFacts, ScenePlan, Semant
 use crate::worker::{Event, Failure, JobId, JobKind, Outcome, Versioned, WorkerThread};
 
 mod messages;
+mod running;
 
 /// Files and folders kept in the recent list.
 const MAX_RECENT: usize = 8;
-
-/// The long job that runs now.
-#[derive(Clone, Debug, PartialEq)]
-pub struct RunningJob {
-    pub(crate) id: JobId,
-    pub(crate) kind: JobKind,
-    pub(crate) title: String,
-    pub(crate) progress: Option<Progress>,
-    /// Whether it waits.
-    pub paused: bool,
-}
 
 /// A report on screen.
 #[derive(Clone, Debug, PartialEq)]
@@ -141,11 +132,11 @@ impl AppState {
                     self.training_job = Some(job);
                 }
                 self.say(Tone::Info, title.clone());
-                self.job = Some(RunningJob { id: job, kind, title, progress: None, paused: false });
+                self.job = Some(RunningJob::begun(job, kind, title));
             }
             Event::Progress(job, progress) => {
                 let stage = text::line(&progress.stage).into_owned();
-                self.with_job(job, |j| j.progress = Some(Progress { stage, ..progress }));
+                self.with_job(job, |j| j.goes_on(Progress { stage, ..progress }));
             }
             Event::Paused(job, paused) => self.with_job(job, |j| j.paused = paused),
             Event::Step(job, metrics) => {

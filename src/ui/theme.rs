@@ -2,7 +2,10 @@
 
 use std::cell::Cell;
 
-use egui::{Color32, CornerRadius, FontId, Margin, RichText, Stroke, Style, TextStyle, Theme, Ui, Visuals, vec2};
+use egui::{
+    Area, Color32, CornerRadius, FontId, Id, InnerResponse, Margin, Modal, Order, RichText, Stroke, Style, TextStyle,
+    Theme, Ui, Visuals, vec2,
+};
 
 use super::state::Tone;
 
@@ -71,6 +74,8 @@ const LIGHT: Colors = Colors {
 thread_local! {
     // Windows draw on one thread each, and a picture's overlays keep to the dark theme within a light window.
     static COLORS: Cell<&'static Colors> = const { Cell::new(&DARK) };
+    // The window's own.
+    static THEME: Cell<Theme> = const { Cell::new(Theme::Dark) };
 }
 
 macro_rules! colors {
@@ -85,17 +90,21 @@ colors!(accent, on_accent, panel, canvas, surface, line, text, weak, good, warni
 
 /// Takes the colors of the window's theme, at the start of a frame.
 pub(crate) fn begin_frame(ctx: &egui::Context) {
+    THEME.set(ctx.theme());
     COLORS.set(colors_of(ctx.theme()));
 }
 
-/// Draws in the dark theme whatever the window's is, cards and menus over it too: colors of a picture are judged on
-/// dark ground.
+/// Draws in the dark theme whatever the window's is: colors of a picture are judged on dark ground.
 pub(crate) fn dark<T>(ui: &mut Ui, add: impl FnOnce(&mut Ui) -> T) -> T {
     let ctx = ui.ctx().clone();
-    let (colors, preference) = (COLORS.replace(&DARK), ctx.options(|o| o.theme_preference));
-    ctx.set_theme(Theme::Dark);
     ui.set_style(ctx.style_of(Theme::Dark));
-    let shown = add(ui);
+    within(&ctx, Theme::Dark, || add(ui))
+}
+
+fn within<T>(ctx: &egui::Context, theme: Theme, add: impl FnOnce() -> T) -> T {
+    let (colors, preference) = (COLORS.replace(colors_of(theme)), ctx.options(|o| o.theme_preference));
+    ctx.set_theme(theme);
+    let shown = add();
     ctx.set_theme(preference);
     COLORS.set(colors);
     shown
@@ -194,9 +203,15 @@ fn visuals(theme: Theme) -> Visuals {
     v
 }
 
-/// The frame of a dialog.
-pub(crate) fn dialog() -> egui::Frame {
-    egui::Frame::new().fill(panel()).stroke(Stroke::new(1.0, line())).corner_radius(10).inner_margin(18)
+/// A dialog. It lies over tooltips of what is behind it, too: those stay until the mouse is moved.
+pub(crate) fn dialog(name: &'static str) -> Modal {
+    let frame = egui::Frame::new().fill(panel()).stroke(Stroke::new(1.0, line())).corner_radius(10).inner_margin(18);
+    Modal::new(Id::unique(name)).frame(frame).area(dialog_area(name))
+}
+
+/// Where a dialog is.
+pub(crate) fn dialog_area(name: &'static str) -> Area {
+    Modal::default_area(Id::unique(name)).order(Order::Tooltip)
 }
 
 /// The one button of a group that a user most likely wants.
@@ -235,7 +250,12 @@ pub(crate) fn mark(ui: &mut Ui, tone: Tone, size: f32) {
     }
 }
 
-/// A translucent card, for what lies over the viewport.
+/// Draws a card over the view, and its menus, in the window's own theme.
+pub(crate) fn card<T>(ctx: &egui::Context, area: Area, add: impl FnOnce(&mut Ui) -> T) -> InnerResponse<T> {
+    within(ctx, THEME.get(), || area.show(ctx, |ui| overlay().show(ui, add).inner))
+}
+
+/// The translucent frame of a card.
 pub(crate) fn overlay() -> egui::Frame {
     egui::Frame::new()
         .fill(COLORS.get().overlay)

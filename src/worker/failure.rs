@@ -45,7 +45,7 @@ fn remedy(error: &JobError) -> &'static str {
     match error {
         JobError::Open(OpenError::NotFound { .. }) => "Check the path: the file may have been moved or renamed.",
         JobError::Open(OpenError::Unrecognized { .. }) => {
-            "Open the folder that holds the photos and their poses, or a splat .ply."
+            "Open the folder that holds the photos and their poses, or a splat (.ply, .sog, .glb)."
         }
         JobError::NothingHeldOut(_) => "Choose how many to hold out in the Training pane.",
         _ => "",

@@ -57,6 +57,11 @@ impl JobKind {
         matches!(self, Self::Open | Self::Demo | Self::DemoPhotos | Self::Poses | Self::Train | Self::Objects)
     }
 
+    /// Whether it waits where it is asked to.
+    pub(crate) fn can_pause(self) -> bool {
+        matches!(self, Self::Train | Self::Objects | Self::Model | Self::Video | Self::Phrases)
+    }
+
     /// Which thread runs it.
     pub(crate) fn lane(self) -> WorkerThread {
         match self {

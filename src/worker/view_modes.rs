@@ -20,10 +20,10 @@ pub enum ViewMode {
     Rgb,
     /// Expected depth, turbo colors from near to far.
     Depth,
-    /// Accumulated opacity.
-    Alpha,
     /// Absolute difference from the photo.
     Difference,
+    /// Accumulated opacity.
+    Alpha,
     /// The photo itself.
     Photo,
 }

@@ -83,6 +83,10 @@ fn a_name_is_typed_in_its_row() {
     assert!(said(w.app(), "Renamed box 0 to wade") && !w.shows("New name"));
     assert_eq!(center(w.app()), home, "letters are no flight");
 
+    let menus = |w: &Window| w.harness.query_all_by_role_and_label(Role::Button, "\u{2026}").count();
+    w.harness.hover_at(egui::pos2(5.0, 5.0));
+    w.harness.run_steps(2);
+    assert_eq!(menus(&w), 1, "the menu of what is selected, for the keyboard; names have their room");
     w.press(Key::F2);
     assert!(w.shows("New name"), "F2 renames what was chosen last");
     w.types("no");
@@ -93,6 +97,7 @@ fn a_name_is_typed_in_its_row() {
     // A name of letters that no font of the window has: drawing it would fail the test.
     w.ask(Action::Change(Edit::Rename(1, "\u{6c34}\u{58f6}".into())));
     w.until("the Chinese name", |a| name(a, 1) == "\u{6c34}\u{58f6}");
+    assert!(!said(w.app(), "to no"), "what was left by Escape is not taken over later");
     assert!(w.is_drawn());
 }
 

@@ -30,6 +30,7 @@ fn the_chat_box_keeps_the_keyboard_while_an_answer_runs() {
     let talk = w.app().conversation().expect("it was said").to_owned();
     assert!(talk.contains("where was box 0") && talk.contains("what was seen"), "{talk}");
     assert_eq!(center(w.app()), home, "no letter flew the camera");
+    assert!(w.shows("1 step") && !w.shows("describe(") && !w.shows("describe {"), "steps are folded once answered");
     assert_eq!(w.harness.get_by_role_and_label(Role::TextInput, "Chat box").value().as_deref(), Some("wasd"));
 }
 
@@ -65,14 +66,15 @@ fn the_query_box_has_tab_and_arrows() {
     assert_eq!(typed(&w), format!("{first}x"), "the cursor is behind it, and in the box");
     w.press(Key::Enter);
     w.types("lamp");
+    assert_eq!(typed(&w), "lamp", "what was asked stays, and what is typed takes its place");
     w.press(Key::Enter);
     w.press(Key::ArrowUp);
     w.types("s");
-    assert_eq!(typed(&w), "lamps", "so it is after going back");
+    assert_eq!(typed(&w), format!("{first}xs"), "the cursor is behind it after going back, too");
 }
 
 /// Where the area of this name is on screen.
-fn area(w: &Window, name: &'static str) -> Rect {
+pub(crate) fn area(w: &Window, name: &'static str) -> Rect {
     w.harness.ctx.memory(|m| m.area_rect(egui::Id::unique(name))).expect("on screen")
 }
 
@@ -106,6 +108,7 @@ fn what_a_card_covers_is_not_under_the_cursor() {
     let mut w = window(folder.path());
     w.harness.set_size([800.0, 600.0].into());
     w.ask(Action::Ask("box 1".into()));
+    w.click("Unfold the answer");
     w.until("maps", |a| a.viewport.queries.maps().is_some());
     w.harness.run_steps(4);
     let (card, view) = (area(&w, "question"), w.harness.get_by_label("Viewport").rect());
@@ -196,10 +199,27 @@ fn the_palette_and_the_shortcut_sheet_list_the_actions() {
 }
 
 #[test]
+fn what_is_typed_takes_the_place_of_the_query_before() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    w.ask(Action::Ask("box 0".into()));
+    assert_eq!(w.app().viewport.queries.found(), [1]);
+    w.press(Key::Slash);
+    w.harness.run_steps(2);
+    w.types("box 1");
+    w.harness.run_steps(2);
+    assert_eq!(w.app().viewport.queries.found(), [2], "not \"box 0box 1\"");
+}
+
+#[test]
 fn escape_closes_an_open_menu_and_nothing_else() {
     let folder = tempfile::tempdir().expect("folder");
     let mut w = window(folder.path());
     w.ask(Action::Select(Some(1)));
+    w.ask(Action::Hide(1));
+    w.click("Edit");
+    assert!(w.shows("Undo: hid box 0"), "the menu says what is undone");
+    w.press(Key::Escape);
     w.click("View");
     assert!(w.shows("Frame the selection"));
     w.press(Key::Escape);

@@ -119,8 +119,21 @@ fn open_file(path: &Path) -> Result<Opened> {
         start => Err(OpenError::Unrecognized {
             path: path.into(),
             looked_for: FILES.into(),
-            found: format!("a file that starts with '{}'", start.escape_ascii()),
+            found: in_words(&name, start).into(),
         }),
+    }
+}
+
+/// What a file is that is of no format known here.
+fn in_words(name: &str, start: &[u8]) -> &'static str {
+    let is_called = |ending: &str| name.ends_with(ending);
+    let is_text = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
+    match start {
+        [] => "an empty file",
+        _ if is_called(".ply") => "a file called .ply without PLY header",
+        _ if is_called(".sog") => "a file called .sog that is no zip archive",
+        _ if start.iter().all(is_text) => "a text file of another kind",
+        _ => "a file of another kind",
     }
 }
 

@@ -24,8 +24,18 @@ fn what_is_not_recognized_says_what_was_looked_for_and_found() {
         assert!(text.contains(part), "'{part}' is missing in: {text}");
     }
     let text = open(&path.join("note0.txt")).expect_err("a note").to_string();
-    for part in [".ply", "note0.txt", "'hell'"] {
+    for part in [".ply", "note0.txt", "a text file of another kind"] {
         assert!(text.contains(part), "'{part}' is missing in: {text}");
+    }
+    for (name, bytes, found) in [
+        ("a.ply", "element", "without PLY header"),
+        ("a.sog", "none", "no zip archive"),
+        ("a.ply", "", "an empty file"),
+        ("a.bin", "\u{1}\u{2}", "a file of another kind"),
+    ] {
+        fs::write(path.join(name), bytes).expect("write");
+        let text = open(&path.join(name)).expect_err(name).to_string();
+        assert!(text.contains(found), "'{found}' is missing in: {text}");
     }
     assert!(matches!(open(&path.join("nothing")), Err(OpenError::NotFound { .. })));
 }

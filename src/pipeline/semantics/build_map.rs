@@ -1,6 +1,6 @@
 //! The whole way from trained Gaussians and masks to a semantic map.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
@@ -83,16 +83,17 @@ pub(crate) struct Found {
 }
 
 /// What finds the masks of photos that `cloud` was trained on: files, where there are any, else the
-/// network of this name, else regions of the photos.
+/// network of this name, else regions of the photos. What a network finds is kept in `cache`.
 pub(crate) fn segmenter<'a>(
     files: Option<&Path>,
     cloud: &'a GaussianCloud,
     settings: &'a RenderSettings,
     network: Option<&str>,
+    cache: PathBuf,
 ) -> Result<Box<dyn Segmenter + 'a>, FindError> {
     Ok(match (files, network) {
         (Some(files), _) => Box::new(FileMasks(Labels::open(files)?)),
-        (None, Some(network)) => Box::new(NetworkMasks::open(network)?),
+        (None, Some(network)) => Box::new(NetworkMasks::open_kept(network, cache)?),
         (None, None) => Box::new(Regions { trained: Some((cloud, settings)), ..Regions::default() }),
     })
 }

@@ -22,6 +22,7 @@ pub(crate) mod error;
 pub(crate) mod filters;
 #[cfg(test)]
 mod heart;
+pub(crate) mod kept_masks;
 pub mod localize;
 pub mod matching;
 pub(crate) mod names;

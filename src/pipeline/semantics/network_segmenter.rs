@@ -1,8 +1,11 @@
 //! Masks found by a network (SAM, SAM 2) that is asked for everything in a photo, sorted into objects
 //! and parts by the paper's filters.
 
+use std::path::PathBuf;
+
 use super::error::FindError;
 use super::filters::{self, FilterOptions};
+use super::kept_masks::KeptMasks;
 use super::segmenter::{FoundMask, Segmenter};
 use crate::io;
 use crate::models::catalog::{self, ModelRole};
@@ -45,6 +48,16 @@ impl NetworkMasks {
             other => return Err(ModelError::Metadata { path, problem: format!("a '{other}' model finds no masks") }),
         };
         Ok(Self { network, options, filters: FilterOptions::default(), tiles: true })
+    }
+
+    /// The same, which looks at a photo once: its answers are kept in `folder`.
+    pub(crate) fn open_kept(name: &str, folder: PathBuf) -> Result<KeptMasks, FindError> {
+        let path = catalog::find(name, ModelRole::Segmenter)?;
+        let open = Self::open(name)?;
+        // The description holds the checksums of the graphs.
+        let description = std::fs::read(&path).map_err(|e| ModelError::Metadata { path, problem: e.to_string() })?;
+        let asked = format!("{:?} {:?} {}", open.options, open.filters, open.tiles);
+        Ok(KeptMasks::new(Box::new(open), folder, &[&description, asked.as_bytes()]))
     }
 
     /// What the network finds in a picture, told as a share of `of` looks of which `done` are done.

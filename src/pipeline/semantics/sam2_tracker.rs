@@ -132,7 +132,7 @@ fn kept_file(folder: &Path, model: (&str, &str), photo: &Photo) -> PathBuf {
     files::renamed(now, first)
 }
 
-fn kept_name((model, digest): (&str, &str), photo: &Photo, written: Option<SystemTime>) -> String {
+pub(super) fn kept_name((model, digest): (&str, &str), photo: &Photo, written: Option<SystemTime>) -> String {
     let mut sum = Sha256::new();
     for part in [photo.path.as_os_str().as_encoded_bytes(), photo.name.as_bytes(), digest.as_bytes()] {
         sum.update((part.len() as u64).to_le_bytes());

@@ -7,10 +7,9 @@ mod timeline;
 use std::collections::VecDeque;
 use std::path::Path;
 
-use egui::{Button, ComboBox, DragValue, Grid, RichText, Slider, Ui};
+use egui::{Button, Checkbox, ComboBox, DragValue, Grid, RichText, Slider, Ui};
 
 use self::player::{Clip, Player};
-use super::panes::bars;
 use super::state::AppState;
 use super::theme;
 use crate::io::video::VideoSettings;
@@ -35,11 +34,18 @@ pub(crate) struct CameraPane {
     quality: u8,
     /// Whether what was found is marked in videos.
     pub(crate) mark: bool,
-    /// Flights that follow the one that is played.
-    next: VecDeque<CameraTrajectory>,
+    /// Whether the view shows where the camera can go.
+    pub(crate) show_reach: bool,
+    /// Flights that follow the one that is played, and where they lead.
+    next: VecDeque<(CameraTrajectory, String)>,
+    /// Where the flight leads that is played.
+    flight_to: String,
     /// The scene that it belongs to.
     scene: u64,
 }
+
+/// Why something cannot be done yet.
+const NO_KEYS: &str = "Needs keyframes: add the current view (K).";
 
 impl Default for CameraPane {
     fn default() -> Self {
@@ -52,7 +58,9 @@ impl Default for CameraPane {
             video_height: 720,
             quality: 80,
             mark: false,
+            show_reach: false,
             next: VecDeque::new(),
+            flight_to: String::new(),
             scene: 0,
         }
     }
@@ -70,17 +78,18 @@ impl CameraPane {
         }
     }
 
-    /// Plays a flight, after those that were asked for before it.
-    pub(crate) fn play_flight(&mut self, flight: CameraTrajectory) {
-        self.next.push_back(flight);
+    /// Plays a flight to what is called this, after those that were asked for before it.
+    pub(crate) fn play_flight(&mut self, flight: CameraTrajectory, to: String) {
+        self.next.push_back((flight, to));
         self.go_on();
     }
 
     /// Plays the next flight, if one waits and none is being played.
     fn go_on(&mut self) {
         if !self.player.playing
-            && let Some(flight) = self.next.pop_front()
+            && let Some((flight, to)) = self.next.pop_front()
         {
+            self.flight_to = to;
             self.player.looped = false;
             self.player.load(Clip::Flight(Box::new(flight)), true);
         }
@@ -90,6 +99,19 @@ impl CameraPane {
     pub(crate) fn tick(&mut self, step_secs: f64) -> Option<Pose> {
         self.go_on();
         self.player.tick(step_secs)
+    }
+
+    /// Whether there is a flight or a path to play.
+    pub(crate) fn has_clip(&self) -> bool {
+        self.player.clip().is_some() || !self.path.keys.is_empty()
+    }
+
+    /// What is played, in words, if it is a flight.
+    fn flight(&self) -> Option<String> {
+        matches!(self.player.clip(), Some(Clip::Flight(_))).then(|| match &*self.flight_to {
+            "" => "Flight".to_owned(),
+            to => format!("Flight to {to}"),
+        })
     }
 
     /// Plays or stops; the path, if nothing else is in.
@@ -230,14 +252,11 @@ impl CameraPane {
         rate.response.accessible_name("Playback speed");
         let seconds = self.player.clip().map_or(0.0, Clip::seconds);
         ui.label(RichText::new(format!("{:.2} / {seconds:.2} s", self.player.time)).monospace());
-        let what = match self.player.clip() {
-            Some(Clip::Flight(_)) => "flight to the target",
-            Some(Clip::Path(_)) => "path",
-            None => "nothing to play",
-        };
-        ui.weak(what);
-        if let Some(rate) = self.player.rate_shown() {
-            ui.weak(format!("{rate:.0} fps"));
+        if let Some(rate) = self.player.rate_shown().filter(|_| self.player.playing) {
+            ui.weak(format!("{rate:.0} frames/s")).on_hover_text("Frames per second that this machine shows.");
+        }
+        if !has_clip {
+            ui.weak("Nothing to play");
         }
         if let Some(Clip::Flight(flight)) = self.player.clip() {
             let flight = (**flight).clone();
@@ -286,17 +305,23 @@ impl CameraPane {
         if ui.button("Add keyframe").on_hover_text(tip).clicked() {
             self.record(eye);
         }
-        bars::history_buttons(ui, &state.changes, actions);
         for (text, action, enabled) in
             [("Open\u{2026}", Action::OpenPath, true), ("Save\u{2026}", Action::SavePath, !self.path.keys.is_empty())]
         {
-            if ui.add_enabled(enabled, Button::new(text)).on_hover_text(action.tooltip()).clicked() {
+            let button = ui.add_enabled(enabled, Button::new(text)).on_disabled_hover_text(NO_KEYS);
+            if button.on_hover_text(action.tooltip()).clicked() {
                 actions.push(action);
             }
         }
+        ui.add_enabled(state.explored.is_some(), Checkbox::new(&mut self.show_reach, "Show reach"))
+            .on_hover_text("Mark the places that the camera can go to: green; red ones cannot be reached from here.")
+            .on_disabled_hover_text("Known once the camera has gone to an object.");
     }
 
     fn timing(&mut self, ui: &mut Ui) {
+        if self.path.keys.is_empty() {
+            ui.disable();
+        }
         let duration = ui.label("Duration").id;
         ui.add(DragValue::new(&mut self.path.seconds).range(0.1..=3600.0).speed(0.05).suffix(" s"))
             .labelled_by(duration);
@@ -309,8 +334,10 @@ impl CameraPane {
 
     fn video_tools(&mut self, ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
         let idle = state.job.is_none() && self.player.clip().is_some();
-        let button = ui.add_enabled(idle, Button::new("Export video\u{2026}"));
-        let why = if state.job.is_some() { "Another job is running." } else { "There is nothing to export." };
+        let flight = self.flight().is_some();
+        let text = if flight { "Export flight as video\u{2026}" } else { "Export video\u{2026}" };
+        let button = ui.add_enabled(idle, Button::new(text));
+        let why = if state.job.is_some() { "Another job is running." } else { NO_KEYS };
         if button.on_hover_text(Action::ExportVideo.tooltip()).on_disabled_hover_text(why).clicked() {
             actions.push(Action::ExportVideo);
         }
@@ -325,7 +352,8 @@ impl CameraPane {
         height.response.accessible_name("Video height");
         ui.add(DragValue::new(&mut self.path.fps).range(1.0..=120.0).speed(0.2).suffix(" fps"))
             .accessible_name("Frames per second");
-        ui.add(Slider::new(&mut self.quality, 0..=100).text("Quality"));
+        let quality = ui.label("Quality").id;
+        ui.add(Slider::new(&mut self.quality, 0..=100)).labelled_by(quality);
         ui.checkbox(&mut self.mark, "Highlight")
             .on_hover_text("Highlight what the query found in every frame of the video.");
     }

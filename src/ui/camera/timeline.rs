@@ -1,6 +1,6 @@
 //! The timeline: where in time one is, and keys that can be dragged to other times.
 
-use egui::{CursorIcon, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
+use egui::{Align2, CursorIcon, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
 
 use super::super::theme;
 use super::CameraPane;
@@ -20,6 +20,11 @@ pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
     let painter = ui.painter_at(rect);
     let track = rect.with_max_y(rect.top() + 24.0);
     painter.rect_filled(track.shrink2(vec2(0.0, 4.0)), 6.0, theme::canvas());
+    // A flight is none of the path below: it says what it is.
+    if let Some(flight) = pane.flight() {
+        painter.rect_filled(track.shrink2(vec2(0.0, 4.0)), 6.0, theme::accent().gamma_multiply(0.2));
+        painter.text(track.center(), Align2::CENTER_CENTER, flight, FontId::proportional(11.0), theme::text());
+    }
     let seconds = pane.player.clip().map_or(0.0, Clip::seconds).max(1e-3);
     let x = |time: f64| line.left() + (time / seconds).clamp(0.0, 1.0) as f32 * line.width();
     let time = |x: f32| f64::from(((x - line.left()) / line.width().max(1.0)).clamp(0.0, 1.0)) * seconds;

@@ -1,11 +1,10 @@
 //! The bar at the top (menus, name of the scene) and the bar at the bottom (the running job).
 
-use egui::{Align, Button, RichText, Ui};
+use egui::{Align, Button, RichText, Stroke, Ui, vec2};
 use strum::VariantArray;
 
-use super::super::history::ChangeHistory;
 use super::super::layout::Layout;
-use super::super::state::AppState;
+use super::super::state::{AppState, RunningJob};
 use super::super::{keys, theme};
 use crate::math::format;
 use crate::pipeline::observer::Progress;
@@ -13,6 +12,9 @@ use crate::scene::text;
 use crate::ui::actions::{Action, Axis, Pane, THEMES};
 use crate::worker::ViewMode;
 use crate::worker::view::ViewPicture;
+
+/// Before the names of a menu that has switches.
+const INDENT: &str = "     ";
 
 /// Draws the bar at the top; `second` is whether the second view is worked in.
 pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bool, actions: &mut Vec<Action>) {
@@ -46,15 +48,17 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
         });
         ui.menu_button("Edit", |ui| {
             ui.set_min_width(260.0);
-            item(ui, state.changes.last().is_some(), None, Action::Undo, actions);
-            item(ui, state.changes.next().is_some(), None, Action::Redo, actions);
+            for (action, what) in [(Action::Undo, state.changes.last()), (Action::Redo, state.changes.next())] {
+                let text = what.map_or_else(|| action.text(), |what| format!("{}: {what}", action.text()));
+                entry(ui, what.is_some(), None, &text, action, actions);
+            }
             ui.separator();
             item(ui, state.semantics.is_some(), None, Action::Rename, actions);
             item(ui, state.semantics.is_some(), None, Action::Isolate(None), actions);
         });
         ui.menu_button("View", |ui| {
             ui.set_min_width(280.0);
-            ui.menu_button("    Show", |ui| {
+            ui.menu_button(format!("{INDENT}Show"), |ui| {
                 for &mode in ViewMode::VARIANTS {
                     item(ui, has_scene, Some(*layout.mode_of(second) == mode), Action::Show(mode), actions);
                 }
@@ -72,7 +76,7 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
             for action in [Action::FrameScene, Action::ResetView] {
                 item(ui, has_scene, Some(false), action, actions);
             }
-            ui.menu_button("    Up direction", |ui| {
+            ui.menu_button(format!("{INDENT}Up direction"), |ui| {
                 for &axis in Axis::VARIANTS {
                     item(ui, has_scene, Some(false), Action::TurnUp(axis), actions);
                 }
@@ -82,14 +86,14 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
             }
             ui.separator();
             item(ui, has_scene, Some(false), Action::FillWindow, actions);
-            ui.menu_button("    Panes", |ui| {
+            ui.menu_button(format!("{INDENT}Panes"), |ui| {
                 for &pane in Pane::VARIANTS {
                     item(ui, true, Some(layout.shows(pane)), Action::TogglePane(pane), actions);
                 }
                 ui.separator();
                 item(ui, true, Some(false), Action::ResetPanes, actions);
             });
-            ui.menu_button("    Theme and text size", |ui| {
+            ui.menu_button(format!("{INDENT}Theme and text size"), |ui| {
                 for theme in THEMES {
                     item(ui, true, Some(layout.theme == theme), Action::UseTheme(theme), actions);
                 }
@@ -108,7 +112,7 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
         ui.menu_button("Train", |ui| {
             ui.set_min_width(260.0);
             item(ui, has_photos && state.job.is_none(), None, Action::StartTraining, actions);
-            item(ui, state.is_training(), None, Action::PauseTraining, actions);
+            item(ui, state.job.as_ref().is_some_and(|j| j.kind.can_pause()), None, Action::PauseJob, actions);
             item(ui, state.job.is_some(), None, Action::Cancel, actions);
             item(ui, has_photos && state.job.is_none(), None, Action::Evaluate, actions);
         });
@@ -131,26 +135,28 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
     });
 }
 
-/// Undo and Redo, which say what of.
-pub(crate) fn history_buttons(ui: &mut Ui, changes: &ChangeHistory, actions: &mut Vec<Action>) {
-    for (action, what) in [(Action::Undo, changes.last()), (Action::Redo, changes.next())] {
-        let button = ui.add_enabled(what.is_some(), Button::new(action.text()));
-        let tip = format!("{}  {}", what.unwrap_or_default(), keys::label(ui.ctx(), &action));
-        if button.on_hover_text(tip).clicked() {
-            actions.push(action);
-        }
-    }
+/// A menu entry; `on` marks a switch, which is called by what it switches.
+fn item(ui: &mut Ui, enabled: bool, on: Option<bool>, action: Action, actions: &mut Vec<Action>) {
+    let text = match &action {
+        Action::ToggleCameras => "Cameras".to_owned(),
+        Action::ToggleTimes => "Frame times".to_owned(),
+        Action::TogglePane(pane) => pane.text().to_owned(),
+        other => other.text(),
+    };
+    entry(ui, enabled, on, &text, action, actions);
 }
 
-/// A menu entry; `on` marks a switch.
-fn item(ui: &mut Ui, enabled: bool, on: Option<bool>, action: Action, actions: &mut Vec<Action>) {
-    let text = match on {
-        Some(true) => format!("\u{2714} {}", action.text()),
-        Some(false) => format!("    {}", action.text()),
-        None => action.text(),
-    };
+fn entry(ui: &mut Ui, enabled: bool, on: Option<bool>, text: &str, action: Action, actions: &mut Vec<Action>) {
+    // All of a menu with switches has room for the check.
+    let text = if on.is_some() { format!("{INDENT}{text}") } else { text.to_owned() };
     let button = Button::new(text).shortcut_text(keys::label(ui.ctx(), &action));
-    if ui.add_enabled(enabled, button).on_hover_text(action.tooltip()).clicked() {
+    let shown = ui.add_enabled(enabled, button).on_hover_text(action.tooltip());
+    if on == Some(true) {
+        let at = shown.rect.left_center() + vec2(15.0, 0.0);
+        let check = [vec2(-4.5, 0.0), vec2(-1.5, 3.5), vec2(4.5, -4.0)].map(|v| at + v);
+        ui.painter().line(check.to_vec(), Stroke::new(1.8, theme::accent()));
+    }
+    if shown.clicked() {
         actions.push(action);
     }
 }
@@ -169,11 +175,15 @@ pub(crate) fn status(
                 dot(ui, if job.paused { theme::warning() } else { theme::accent() });
                 let title = if job.paused { format!("{} (paused)", job.title) } else { job.title.clone() };
                 ui.label(RichText::new(title).strong());
-                if let Some(p) = &job.progress {
-                    progress(ui, p, job.paused);
+                // Once is enough: the pane and the first page have their own.
+                if let Some(p) = job.progress.as_ref().filter(|_| state.scene.is_some()) {
+                    progress(ui, p, job);
                 }
-                // One button is enough: the pane and the first page have their own.
                 let elsewhere = state.scene.is_none() || state.is_training() && layout.shows(Pane::Training);
+                let pause = if job.paused { "Resume" } else { "Pause" };
+                if !elsewhere && job.kind.can_pause() && ui.small_button(pause).on_hover_text("T").clicked() {
+                    actions.push(Action::PauseJob);
+                }
                 if !elsewhere && ui.small_button("Cancel").on_hover_text("Esc").clicked() {
                     actions.push(Action::Cancel);
                 }
@@ -206,13 +216,14 @@ fn dot(ui: &mut Ui, color: egui::Color32) {
     ui.painter().circle_filled(rect.center(), 4.0, color);
 }
 
-fn progress(ui: &mut Ui, p: &Progress, paused: bool) {
+fn progress(ui: &mut Ui, p: &Progress, job: &RunningJob) {
+    let paused = job.paused;
     let fraction = p.done as f32 / p.total.max(1) as f32;
     let fill = if paused { theme::warning() } else { theme::accent() };
     ui.add(egui::ProgressBar::new(fraction).desired_width(140.0).desired_height(6.0).fill(fill));
     let mut parts = vec![format!("{} of {}", format::count(p.done), format::count(p.total))];
-    if p.rate > 0.0 && !paused {
-        parts.push(format!("{} left", p.eta_secs().map_or_else(|| "–".into(), format::duration)));
+    if let Some(secs) = job.left_secs.filter(|_| !paused) {
+        parts.push(format!("{} left", format::about(secs)));
     }
     ui.label(RichText::new(format!("{}  {}", p.stage, parts.join("  ·  "))).color(theme::weak()));
 }

@@ -2,7 +2,7 @@
 
 use egui::{RichText, ScrollArea, Ui};
 
-use super::super::state::AppState;
+use super::super::state::{AppState, LogLine};
 use super::super::theme;
 
 /// Draws the log, newest line at the bottom.
@@ -12,7 +12,7 @@ pub(crate) fn show(ui: &mut Ui, state: &AppState) {
         ui.weak(format!("{} lines", state.log.len()));
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
             if ui.small_button("Copy all").clicked() {
-                let lines: Vec<&str> = state.log.iter().map(|l| l.text.as_str()).collect();
+                let lines: Vec<String> = state.log.iter().map(LogLine::dated).collect();
                 ui.ctx().copy_text(lines.join("\n"));
             }
         });
@@ -24,7 +24,7 @@ pub(crate) fn show(ui: &mut Ui, state: &AppState) {
         state.log.len(),
         |ui, rows| {
             for line in state.log.range(rows) {
-                ui.label(RichText::new(&line.text).monospace().color(theme::tone_color(line.tone)));
+                ui.label(RichText::new(line.dated()).monospace().color(theme::tone_color(line.tone)));
             }
         },
     );

@@ -10,7 +10,6 @@ use super::super::state::AppState;
 use super::super::text_field::select_all;
 use super::super::theme;
 use super::super::viewport::visible::Visibility;
-use super::bars;
 use super::object_thumbnails::ObjectThumbnails;
 use crate::math::format::{self, things};
 use crate::navigate::target::Side;
@@ -28,6 +27,8 @@ const COUNT_PT: f32 = 48.0;
 #[derive(Default)]
 pub(crate) struct ObjectsPane {
     renaming: Option<Renaming>,
+    /// Whose menu is open.
+    menu_of: Option<IdentityId>,
     /// What was selected when it was drawn last.
     selected: Option<IdentityId>,
 }
@@ -74,16 +75,21 @@ impl ObjectsPane {
             if ui.button("Paint an object\u{2026}").on_hover_text(new.tooltip()).clicked() {
                 actions.push(new);
             }
-            bars::history_buttons(ui, &state.changes, actions);
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                ui.label(RichText::new("Gaussians").small().color(theme::weak()));
+            });
         });
         // The list follows what is selected in the view.
         let scroll_to = selected.filter(|_| self.selected != selected);
         self.selected = selected;
-        let renaming = &mut self.renaming;
+        let (renaming, menu_of) = (&mut self.renaming, &mut self.menu_of);
         let (labels, sizes) = (&state.labels, &state.sizes);
-        let mut tree = Tree { identities, labels, sizes, object_thumbnails, visibility, renaming, selected, scroll_to };
-        let roots = identities.iter().filter(|(_, i)| i.parent == NOBODY).map(|(id, _)| id);
-        tree.branches(ui, Id::unique("objects"), roots.collect(), actions);
+        let mut tree =
+            Tree { identities, labels, sizes, object_thumbnails, visibility, renaming, menu_of, selected, scroll_to };
+        let roots = identities.iter().filter(|(_, i)| i.parent == NOBODY).map(|(id, _)| id).collect();
+        ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+            tree.branches(ui, Id::unique("objects"), roots, actions);
+        });
     }
 }
 
@@ -95,6 +101,7 @@ struct Tree<'a> {
     object_thumbnails: &'a ObjectThumbnails,
     visibility: &'a Visibility,
     renaming: &'a mut Option<Renaming>,
+    menu_of: &'a mut Option<IdentityId>,
     selected: Option<IdentityId>,
     /// What is to be brought into view.
     scroll_to: Option<IdentityId>,
@@ -157,12 +164,11 @@ impl Tree<'_> {
                 ui.set_min_width(COUNT_PT);
                 ui.label(size).on_hover_text("Gaussians");
             });
-            ui.scope(|ui| {
-                // Always there for the keyboard, in sight where the mouse is.
+            // Elsewhere the name has its room.
+            if is_hovered || self.selected == Some(id) || *self.menu_of == Some(id) {
                 ui.spacing_mut().button_padding.x = 4.0;
-                ui.set_opacity(if is_hovered || self.selected == Some(id) { 1.0 } else { 0.25 });
                 self.menu(ui, id, actions);
-            });
+            }
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| self.name(ui, id, actions));
         });
     }
@@ -213,7 +219,7 @@ impl Tree<'_> {
     /// What can be corrected about an identity.
     fn menu(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
         let all = self.identities;
-        ui.menu_button("\u{2026}", |ui| {
+        let menu = ui.menu_button("\u{2026}", |ui| {
             if ui.add(Button::new("Rename").shortcut_text("F2")).clicked() {
                 self.start_renaming(id);
                 ui.close();
@@ -245,6 +251,12 @@ impl Tree<'_> {
                 }
             }
         });
+        // It stays while its menu is open, wherever the mouse is.
+        match menu.inner {
+            Some(()) => *self.menu_of = Some(id),
+            None if *self.menu_of == Some(id) => *self.menu_of = None,
+            None => {}
+        }
     }
 }
 
@@ -261,12 +273,13 @@ fn show_how_to_begin(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     let why = if state.is_trained() { "Another job is running." } else { "Train the scene first." };
     let button = |text: &str| Button::new(text.to_owned()).min_size(vec2(170.0, 28.0));
     if !has_masks {
-        let text = "These photos came without masks. Regions of uniform color are used instead: rough and \
-                    unnamed.";
+        let text = "These photos came without labels: choose what looks at them.";
         ui.label(RichText::new(text).color(theme::weak()));
     }
     let action = Action::FindObjects;
-    let found = ui.add_enabled(idle, button("Find objects")).on_disabled_hover_text(why);
+    let found = ui
+        .add_enabled(idle, button(if has_masks { "Find objects" } else { "Find objects\u{2026}" }))
+        .on_disabled_hover_text(why);
     if found.on_hover_text(action.tooltip()).clicked() {
         actions.push(action);
     }

@@ -1,15 +1,20 @@
 //! A list of phrases, asked of this view or of all photos, with their answers as a table.
 
-use egui::{Grid, RichText, ScrollArea, TextEdit, Ui};
+use egui::style::ScrollStyle;
+use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
 
 use super::super::state::AppState;
 use super::super::theme;
 use crate::jobs::phrases::PhraseRow;
 use crate::math::format::{count, things};
+use crate::scene::text::elided;
 use crate::ui::actions::Action;
 
 /// Rows that are shown; files have all.
 const SHOWN: usize = 300;
+
+/// Letters of a phrase and of its answer that are shown.
+const LETTERS: usize = 26;
 
 /// What is typed, and of which views it is asked.
 #[derive(Default)]
@@ -25,25 +30,34 @@ impl PhrasesPane {
             ui.vertical(|ui| {
                 ui.set_width(230.0);
                 ui.horizontal(|ui| {
-                    if ui.button("Run").on_hover_text(Action::RunPhrases(None).tooltip()).clicked() {
-                        actions.push(Action::RunPhrases(None));
-                    }
-                    ui.selectable_value(&mut self.all_photos, false, "this view");
-                    ui.selectable_value(&mut self.all_photos, true, "all photos");
+                    ui.weak("Ask in");
+                    ui.selectable_value(&mut self.all_photos, false, "This view");
+                    ui.selectable_value(&mut self.all_photos, true, "All photos");
                 });
                 let edit = TextEdit::multiline(&mut self.text)
                     .hint_text("One phrase per line:\nkettle spout\na button of the red controller")
                     .desired_rows(4)
                     .desired_width(f32::INFINITY);
-                ScrollArea::vertical().id_salt("phrases").max_height(ui.available_height() - 34.0).show(ui, |ui| {
+                ScrollArea::vertical().id_salt("phrases").max_height(ui.available_height() - 68.0).show(ui, |ui| {
                     ui.add(edit).accessible_name("Phrases");
                 });
                 ui.horizontal(|ui| {
+                    let some = !self.text.trim().is_empty();
+                    for (action, text) in [(Action::RunPhrases(None), "Run"), (Action::ExportPhrases, "Export\u{2026}")]
+                    {
+                        let button = ui.add_enabled(some, Button::new(text)).on_hover_text(action.tooltip());
+                        if button.on_disabled_hover_text("Enter phrases first.").clicked() {
+                            actions.push(action);
+                        }
+                    }
+                });
+                ui.horizontal(|ui| {
+                    ui.weak("True mask");
                     let mask = if comparing { Action::TrueMask(None) } else { Action::ChooseTrueMask };
-                    let text = if comparing { "End comparison" } else { "True mask\u{2026}" };
-                    let paint = (Action::PaintTrueMask, "Paint it");
-                    for (action, text) in [(Action::ExportPhrases, "Export\u{2026}"), (mask, text), paint] {
-                        if ui.small_button(text).on_hover_text(action.tooltip()).clicked() {
+                    let text = if comparing { "End comparison" } else { "Load\u{2026}" };
+                    for (action, text) in [(mask, text), (Action::PaintTrueMask, "Paint")] {
+                        let button = ui.small_button(text).on_hover_text(action.tooltip());
+                        if button.accessible_name(action.text()).clicked() {
                             actions.push(action);
                         }
                     }
@@ -67,13 +81,16 @@ fn show_rows(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     let iou = if known.is_empty() { String::new() } else { format!(", mean IoU {mean:.3} of {}", known.len()) };
     let written = state.phrases.written.as_ref().map(|p| format!(", written to {}", p.display())).unwrap_or_default();
     ui.weak(format!("{found} of {} answered{iou}{written}", things(rows.len(), "question")));
+    // One view is not worth a column.
+    let views = rows.iter().any(|row| row.view != rows[0].view);
+    ui.spacing_mut().scroll = ScrollStyle::solid();
     ScrollArea::both().id_salt("answers").auto_shrink([false, false]).show(ui, |ui| {
-        Grid::new("answers").num_columns(7).striped(true).show(ui, |ui| {
-            for head in ["View", "Phrase", "Answer", "", "Score", "Area", "IoU"] {
+        Grid::new("answers").num_columns(7).striped(true).spacing([12.0, 4.0]).show(ui, |ui| {
+            for head in ["Phrase", "Answer", "", "Score", "Area", "IoU"].into_iter().chain(views.then_some("View")) {
                 ui.label(RichText::new(head).small().color(theme::weak()));
             }
             ui.end_row();
-            rows.iter().take(SHOWN).for_each(|row| show_row(ui, row, actions));
+            rows.iter().take(SHOWN).for_each(|row| show_row(ui, row, views, actions));
         });
         if rows.len() > SHOWN {
             ui.weak(format!("{} more rows in the export", count((rows.len() - SHOWN) as u64)));
@@ -81,18 +98,23 @@ fn show_rows(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     });
 }
 
-fn show_row(ui: &mut Ui, row: &PhraseRow, actions: &mut Vec<Action>) {
-    ui.weak(&row.view);
+fn show_row(ui: &mut Ui, row: &PhraseRow, views: bool, actions: &mut Vec<Action>) {
     let [red, green, blue] = row.color;
-    let phrase = RichText::new(&row.phrase).color(egui::Color32::from_rgb(red, green, blue));
-    if ui.link(phrase).on_hover_text("Query it in the view").clicked() {
+    let found = !row.answer.is_empty();
+    let color = if found { egui::Color32::from_rgb(red, green, blue) } else { theme::weak() };
+    let phrase = RichText::new(elided(&row.phrase, LETTERS)).color(color);
+    if ui.link(phrase).on_hover_text(format!("Query \u{201c}{}\u{201d} in the view", row.phrase)).clicked() {
         actions.push(Action::Ask(row.phrase.clone()));
     }
-    ui.label(if row.answer.is_empty() { row.verdict } else { &row.answer });
-    ui.weak(if row.answer.is_empty() { "" } else { row.certainty });
+    let answer = if found { &row.answer } else { row.verdict };
+    ui.label(elided(answer, LETTERS)).on_hover_text(answer);
+    ui.weak(if found { row.certainty } else { "" });
     ui.label(format!("{:.2}", row.score)).on_hover_text(format!("margin {:.2}", row.margin));
     let share = format!("{:.2} % of the view", 100.0 * row.share);
     ui.label(format!("{} px", count(row.area_px as u64))).on_hover_text(share);
     ui.label(row.iou.map_or_else(String::new, |v| format!("{v:.3}")));
+    if views {
+        ui.weak(&row.view);
+    }
     ui.end_row();
 }

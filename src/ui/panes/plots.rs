@@ -1,9 +1,9 @@
-//! Plots of training: loss and PSNR against seconds or steps.
+//! The plot of training: PSNR or loss against seconds or steps.
 
 use egui::{Slider, Ui, Vec2b};
 use egui_plot::{HoverPosition, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoints, Points};
 
-use super::super::layout::{PlotAxis, PlotSettings};
+use super::super::layout::{PlotAxis, PlotQuantity, PlotSettings};
 use super::super::state::TrainHistory;
 use super::super::theme;
 use crate::pipeline::observer::{Evaluation, StepMetrics};
@@ -11,7 +11,7 @@ use crate::pipeline::observer::{Evaluation, StepMetrics};
 /// PSNR over seconds of another training, with its name.
 pub(crate) type PsnrCurve = (String, Vec<[f64; 2]>);
 
-/// Draws both plots with a common horizontal axis: this training and the one before. The `curves` are of others, and
+/// Draws the plot: this training and the one before. The `curves` are of others, and
 /// drawn over seconds only: how many steps they had does not matter to them.
 pub(crate) fn show(
     ui: &mut Ui,
@@ -19,19 +19,22 @@ pub(crate) fn show(
     curves: &[PsnrCurve],
     settings: &mut PlotSettings,
 ) {
-    let axis = &mut settings.axis;
+    ui.add_space(6.0);
     ui.horizontal(|ui| {
-        theme::section(ui, "Quality");
+        ui.selectable_value(&mut settings.quantity, PlotQuantity::Psnr, "PSNR (dB)");
+        ui.selectable_value(&mut settings.quantity, PlotQuantity::Loss, "Loss");
         ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-            ui.selectable_value(axis, PlotAxis::Steps, "Steps");
-            ui.selectable_value(axis, PlotAxis::Seconds, "Seconds");
-            ui.weak("against");
+            ui.selectable_value(&mut settings.axis, PlotAxis::Steps, "Steps");
+            ui.selectable_value(&mut settings.axis, PlotAxis::Seconds, "Seconds");
         });
     });
     ui.horizontal_wrapped(|ui| {
         let id = ui.label("Smoothing").id;
         ui.add(Slider::new(&mut settings.smoothing, 0.0..=20.0).suffix(" %").fixed_decimals(0)).labelled_by(id);
-        ui.checkbox(&mut settings.log, "Log-scale loss");
+        if settings.quantity == PlotQuantity::Loss {
+            ui.checkbox(&mut settings.log, "Log scale");
+            ui.weak("L1 + 0.2 D-SSIM");
+        }
     });
     let PlotSettings { smoothing, log, .. } = *settings;
     let smooth = |points: &[[f64; 2]]| smooth(points, smoothing);
@@ -49,6 +52,21 @@ pub(crate) fn show(
     let dashed = |name: &str, points: &[[f64; 2]]| {
         Line::new(name, smooth(points)).color(theme::weak()).width(1.2).style(LineStyle::dashed_loose())
     };
+    if settings.quantity == PlotQuantity::Loss {
+        let loss_plot = plot("loss", if log { "log10 loss" } else { "Loss" }, *axis);
+        let loss_plot = match log {
+            true => loss_plot.y_axis_formatter(|mark, _| format!("{:.2e}", 10_f64.powf(mark.value))),
+            false => loss_plot.include_y(0.0),
+        };
+        let loss_plot = loss_plot.show(ui, |p| {
+            if before {
+                p.line(dashed("before", &loss(previous)));
+            }
+            p.line(Line::new("loss", smooth(&loss(history))).color(theme::accent()).width(1.5));
+        });
+        loss_plot.response.accessible_name("Plot of the loss");
+        return;
+    }
     let psnr_plot = plot("psnr", "PSNR (dB)", *axis)
         .legend(Legend::default().position(egui_plot::Corner::RightBottom).background_alpha(0.5))
         .show(ui, |p| {
@@ -77,25 +95,12 @@ pub(crate) fn show(
             );
         });
     psnr_plot.response.accessible_name("Plot of PSNR");
-    theme::section(ui, "Loss (L1 + 0.2 D-SSIM)");
-    let loss_plot = plot("loss", if log { "log10 loss" } else { "Loss" }, *axis);
-    let loss_plot = match log {
-        true => loss_plot.y_axis_formatter(|mark, _| format!("{:.2e}", 10_f64.powf(mark.value))),
-        false => loss_plot.include_y(0.0),
-    };
-    let loss_plot = loss_plot.show(ui, |p| {
-        if before {
-            p.line(dashed("before", &loss(previous)));
-        }
-        p.line(Line::new("loss", smooth(&loss(history))).color(theme::accent()).width(1.5));
-    });
-    loss_plot.response.accessible_name("Plot of the loss");
 }
 
 fn plot(name: &'static str, quantity: &'static str, axis: PlotAxis) -> Plot<'static> {
     let unit = if axis == PlotAxis::Seconds { "s" } else { "steps" };
     Plot::new(name)
-        .height(150.0)
+        .height(180.0)
         .show_background(false)
         .show_grid(Vec2b::new(true, true))
         .grid_color(theme::line())

@@ -153,10 +153,10 @@ fn running(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         let pause = if job.paused { "Resume" } else { "Pause" };
         let size = egui::vec2(92.0, 28.0);
-        let tip = format!("{}  T", Action::PauseTraining.tooltip());
+        let tip = format!("{}  T", Action::PauseJob.tooltip());
         let button = if job.paused { theme::primary_button(pause) } else { egui::Button::new(pause) };
         if ui.add(button.min_size(size)).on_hover_text(tip).clicked() {
-            actions.push(Action::PauseTraining);
+            actions.push(Action::PauseJob);
         }
         let tip = format!("{}  Esc", Action::Cancel.tooltip());
         if ui.add(egui::Button::new("Cancel").min_size(size)).on_hover_text(tip).clicked() {
@@ -186,10 +186,7 @@ fn facts(ui: &mut Ui, state: &AppState, job: Option<&RunningJob>) {
         ("Loss", last.map_or_else(dash, |m| format!("{:.4}", m.loss))),
         ("Rate", progress.map_or_else(dash, |p| format::rate(p.rate, "steps"))),
         ("Elapsed", last.map(|m| m.secs).or(held.map(|e| e.secs)).map_or_else(dash, format::duration)),
-        (
-            "Remaining",
-            progress.and_then(crate::pipeline::observer::Progress::eta_secs).map_or_else(dash, format::duration),
-        ),
+        ("Remaining", job.and_then(|j| j.left_secs).map_or_else(dash, format::about)),
     ];
     egui::Frame::new().fill(theme::surface()).corner_radius(8).inner_margin(10).show(ui, |ui| {
         ui.columns_const(|[a, b]| {

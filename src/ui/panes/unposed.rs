@@ -1,6 +1,6 @@
 //! What to do about photos without camera poses: run COLMAP where it is installed, else its commands to copy.
 
-use egui::{Button, Id, Modal, RichText, ScrollArea, vec2};
+use egui::{Button, RichText, ScrollArea, vec2};
 
 use super::super::theme;
 use crate::io::unposed::Unposed;
@@ -10,7 +10,7 @@ use crate::ui::actions::Action;
 
 /// Draws the dialog. Returns whether it stays.
 pub(crate) fn show(ctx: &egui::Context, photos: &Unposed, actions: &mut Vec<Action>) -> bool {
-    let response = Modal::new(Id::unique("unposed")).frame(theme::dialog()).show(ctx, |ui| {
+    let response = theme::dialog("unposed").show(ctx, |ui| {
         ui.set_width(620.0_f32.min(ui.ctx().content_rect().width() - 80.0));
         ui.heading(format!("{} photos, no camera poses", photos.photos.len()));
         ui.weak(text::path(&photos.images));

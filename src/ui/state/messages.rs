@@ -18,8 +18,10 @@ pub(crate) enum Tone {
 }
 
 /// A line of the log.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LogLine {
+    /// Seconds since the program was started; set once the window has seen it.
+    pub(crate) at_secs: Option<f64>,
     /// How it is meant.
     pub(crate) tone: Tone,
     /// What it says.
@@ -45,13 +47,26 @@ pub struct ErrorBox {
     pub(crate) failure: Failure,
 }
 
+impl LogLine {
+    /// As it is shown and copied: "12.34 s  Trained".
+    pub(crate) fn dated(&self) -> String {
+        let time = self.at_secs.map_or_else(String::new, |secs| format!("{secs:.2} s"));
+        format!("{time:>10}  {}", self.text)
+    }
+}
+
 impl AppState {
     /// Adds a line to the log.
     pub(crate) fn say(&mut self, tone: Tone, text: impl Into<String>) {
         if self.log.len() == MAX_LOG {
             self.log.pop_front();
         }
-        self.log.push_back(LogLine { tone, text: text::line(&text.into()).into_owned() });
+        self.log.push_back(LogLine { at_secs: None, tone, text: text::line(&text.into()).into_owned() });
+    }
+
+    /// Says when lines of the log were written that have come since this was said last.
+    pub(crate) fn stamp_log(&mut self, now_secs: f64) {
+        self.log.iter_mut().rev().take_while(|line| line.at_secs.is_none()).for_each(|l| l.at_secs = Some(now_secs));
     }
 
     /// Shows over the view what is wrong with what is open, until it is dismissed or another job makes it anew.

@@ -237,3 +237,14 @@ fn the_training_before_stays_to_be_compared_with() {
     s.apply(opened("other", &[]));
     assert!(s.previous.steps.is_empty(), "of another scene nothing stays");
 }
+
+#[test]
+fn lines_of_the_log_have_their_time() {
+    let mut s = AppState::default();
+    s.say(Tone::Info, "first");
+    s.stamp_log(1.5);
+    s.say(Tone::Info, "second");
+    s.stamp_log(20.25);
+    let lines: Vec<String> = s.log.iter().map(LogLine::dated).collect();
+    assert_eq!(lines, ["    1.50 s  first", "   20.25 s  second"]);
+}

@@ -152,42 +152,40 @@ impl Brush {
     pub(crate) fn show(&mut self, ui: &Ui, rect: Rect, identities: &Identities, actions: &mut Vec<Action>) {
         let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(44.0));
         let area = Area::new(Id::unique("brush")).order(Order::Foreground).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
-        area.show(ui.ctx(), |ui| {
-            theme::overlay().show(ui, |ui| {
-                ui.set_width(430.0);
-                let what = match self.purpose {
-                    Purpose::Piece(NOBODY) => "a new object".to_owned(),
-                    Purpose::Piece(of) => format!("a new part of the {}", identities.full_name(of)),
-                    Purpose::TrueMask => "the true mask of this view".to_owned(),
-                };
-                ui.label(format!("Paint {what}: drag to paint, click to select what has the same color."));
-                ui.weak("Shift erases. Right-drag and wheel move the view; the paint belongs to this one.");
-                ui.horizontal(|ui| {
-                    if self.purpose == Purpose::TrueMask {
-                        ui.add(Slider::new(&mut self.radius_px, 2.0..=60.0).show_value(false).text("brush"));
-                        self.true_mask_buttons(ui, actions);
-                    }
-                });
+        theme::card(ui.ctx(), area.constrain_to(rect), |ui| {
+            ui.set_width((rect.width() - 40.0).clamp(200.0, 430.0));
+            let what = match self.purpose {
+                Purpose::Piece(NOBODY) => "a new object".to_owned(),
+                Purpose::Piece(of) => format!("a new part of the {}", identities.full_name(of)),
+                Purpose::TrueMask => "the true mask of this view".to_owned(),
+            };
+            ui.label(format!("Paint {what}: drag to paint, click to select what has the same color."));
+            ui.weak("Shift erases. Right-drag and wheel move the view; the paint belongs to this one.");
+            ui.horizontal(|ui| {
                 if self.purpose == Purpose::TrueMask {
-                    return;
-                }
-                ui.horizontal(|ui| {
-                    let name = TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80);
-                    ui.add(name.desired_width(120.0)).accessible_name("Name of what is painted");
                     ui.add(Slider::new(&mut self.radius_px, 2.0..=60.0).show_value(false).text("brush"));
-                });
-                ui.horizontal(|ui| {
-                    let ready = !self.mask.is_empty();
-                    if ui.add_enabled(ready, theme::primary_button("Add")).clicked() {
-                        actions.push(Action::AddPainted);
-                    }
-                    if ui.button("Clear").clicked() {
-                        self.camera = None;
-                    }
-                    if ui.button("Cancel").clicked() {
-                        actions.push(Action::Paint(None));
-                    }
-                });
+                    self.true_mask_buttons(ui, actions);
+                }
+            });
+            if self.purpose == Purpose::TrueMask {
+                return;
+            }
+            ui.horizontal(|ui| {
+                let name = TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80);
+                ui.add(name.desired_width(120.0)).accessible_name("Name of what is painted");
+                ui.add(Slider::new(&mut self.radius_px, 2.0..=60.0).show_value(false).text("brush"));
+            });
+            ui.horizontal(|ui| {
+                let ready = !self.mask.is_empty();
+                if ui.add_enabled(ready, theme::primary_button("Add")).clicked() {
+                    actions.push(Action::AddPainted);
+                }
+                if ui.button("Clear").clicked() {
+                    self.camera = None;
+                }
+                if ui.button("Cancel").clicked() {
+                    actions.push(Action::Paint(None));
+                }
             });
         });
     }

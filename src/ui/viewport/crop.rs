@@ -37,41 +37,39 @@ impl Viewport {
         // Above the facts about the frame.
         let at = Align2::LEFT_BOTTOM.pos_in_rect(&shown.shrink(12.0)) - vec2(0.0, 40.0);
         let area = Area::new(Id::unique("crop")).order(Order::Middle).pivot(Align2::LEFT_BOTTOM).fixed_pos(at);
-        area.constrain_to(shown).show(ui.ctx(), |ui| {
-            theme::overlay().show(ui, |ui| {
-                if let Some(crop) = &mut crop {
-                    numbers(ui, crop, 2.0 * scene.home.bounds.radius() / STEPS);
+        theme::card(ui.ctx(), area.constrain_to(shown), |ui| {
+            if let Some(crop) = &mut crop {
+                numbers(ui, crop, 2.0 * scene.home.bounds.radius() / STEPS);
+            }
+            ui.horizontal(|ui| {
+                let mut fit = |ui: &mut Ui, text: &str, tip: &str, to: Option<Bounds>| {
+                    let button = ui.add_enabled(to.is_some(), Button::new(text)).on_hover_text(tip);
+                    if let Some(bounds) = to.filter(|_| button.clicked()) {
+                        crop = Some(CropBox { bounds, outside: crop.is_some_and(|c| c.outside) });
+                    }
+                };
+                fit(ui, "Fit scene", "The box of the scene without its stray points.", Some(scene.home.bounds));
+                fit(ui, "Fit selection", "The box of what is selected.", selected);
+                if ui.add_enabled(crop.is_some(), Button::new("Remove box")).on_hover_text("Show all again.").clicked()
+                {
+                    crop = None;
                 }
-                ui.horizontal(|ui| {
-                    let mut fit = |ui: &mut Ui, text: &str, tip: &str, to: Option<Bounds>| {
-                        let button = ui.add_enabled(to.is_some(), Button::new(text)).on_hover_text(tip);
-                        if let Some(bounds) = to.filter(|_| button.clicked()) {
-                            crop = Some(CropBox { bounds, outside: crop.is_some_and(|c| c.outside) });
-                        }
-                    };
-                    fit(ui, "Fit scene", "The box of the scene without its stray points.", Some(scene.home.bounds));
-                    fit(ui, "Fit selection", "The box of what is selected.", selected);
-                    if ui.add_enabled(crop.is_some(), Button::new("Remove")).on_hover_text("Show all again.").clicked()
-                    {
-                        crop = None;
-                    }
-                });
-                ui.horizontal(|ui| {
-                    let export = Action::ExportCrop;
-                    let button = ui.add_enabled(crop.is_some(), Button::new("Export\u{2026}"));
-                    if button.on_hover_text(export.text()).clicked() {
-                        actions.push(export);
-                    }
-                    let close = ui
-                        .button("Close")
-                        .on_hover_text(format!("What is cropped stays so.  {}", keys::label(ui.ctx(), &Action::Crop)));
-                    if close.clicked() {
-                        actions.push(Action::Crop);
-                    }
-                    if let Some(count) = self.visibility.count() {
-                        ui.weak(format!("{} Gaussians", format::count(count as u64)));
-                    }
-                });
+            });
+            ui.horizontal(|ui| {
+                let export = Action::ExportCrop;
+                let button = ui.add_enabled(crop.is_some(), Button::new("Export\u{2026}"));
+                if button.on_hover_text(export.text()).clicked() {
+                    actions.push(export);
+                }
+                let close = ui
+                    .button("Close")
+                    .on_hover_text(format!("What is cropped stays so.  {}", keys::label(ui.ctx(), &Action::Crop)));
+                if close.clicked() {
+                    actions.push(Action::Crop);
+                }
+                if let Some(count) = self.visibility.count() {
+                    ui.weak(format!("{} Gaussians", format::count(count as u64)));
+                }
             });
         });
         if crop != before {

@@ -89,11 +89,9 @@ impl Viewport {
         // Above the facts about the frame.
         let at = Align2::LEFT_BOTTOM.pos_in_rect(&shown.shrink(12.0)) - vec2(0.0, 40.0);
         let area = Area::new(Id::unique("inspector")).order(Order::Middle).pivot(Align2::LEFT_BOTTOM).fixed_pos(at);
-        let drawn = area.constrain_to(shown).show(ui.ctx(), |ui| {
-            theme::overlay().show(ui, |ui| {
-                ui.set_width((shown.width() - 44.0).clamp(120.0, 330.0));
-                card(ui, inspector, (shown.height() - 300.0).clamp(90.0, 420.0), state, actions);
-            });
+        let drawn = theme::card(ui.ctx(), area.constrain_to(shown), |ui| {
+            ui.set_width((shown.width() - 44.0).clamp(120.0, 330.0));
+            card(ui, inspector, (shown.height() - 300.0).clamp(90.0, 420.0), state, actions);
         });
         // It has grown: the next frame puts it where it fits.
         if drawn.response.rect.bottom() > at.y + 1.0 {
@@ -176,7 +174,8 @@ fn properties(ui: &mut Ui, record: &GaussianRecord, state: &AppState) {
         let PixelRecord { x, y, weight, share, .. } = record.pixel;
         row(ui, "Number", format!("#{}", record.number));
         row(ui, "Weight", format!("{weight:.4}, {} of pixel ({x}, {y})", of(share)));
-        row(ui, "Center", format!("{} units", list(&record.center)));
+        let center = record.center.map(|v| meters.map_or(v, |scale| v * scale));
+        row(ui, "Center", format!("{} {}", list(&center), if meters.is_some() { "m" } else { "units" }));
         row(ui, "Scales", record.scales.map(|s| format::length(s, meters)).join(", "));
         row(ui, "Rotation", record.rotation_wxyz.map_or_else(|| format::NONE.into(), |q| list(&wide(&q))));
         row(ui, "Opacity", format!("{:.4}", record.opacity));

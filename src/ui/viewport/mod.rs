@@ -309,7 +309,7 @@ impl Viewport {
             }
             if let (Some(semantics), Some(cloud)) = (&state.semantics, &self.cloud)
                 && !is_other
-                && self.queries.show(ui, rect, state, (semantics, cloud, &self.visibility), actions)
+                && self.queries.show(ui, (rect, views.first), state, (semantics, cloud, &self.visibility), actions)
             {
                 works_in = second;
             }
@@ -318,9 +318,10 @@ impl Viewport {
             }
         }
         self.queries.work_in(works_in);
-        self.show_ruler_card(ui, whole, scene.meters_per_unit(), actions);
+        let worked_in = views.each().last().filter(|_| works_in).map_or(views.first, |(_, rect)| rect);
+        self.show_ruler_card(ui, worked_in, scene.meters_per_unit(), actions);
         if let (Some(brush), Some(semantics)) = (&mut self.brush, &state.semantics) {
-            brush.show(ui, whole, &semantics.identities, actions);
+            brush.show(ui, worked_in, &semantics.identities, actions);
         }
     }
 

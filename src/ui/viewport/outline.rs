@@ -4,13 +4,18 @@
 use egui::{Color32, ColorImage};
 use rayon::prelude::*;
 
-use crate::math::grid::neighbors;
+use crate::math::grid::{neighbors, regions};
 use crate::scene::{Mask, PixelBox};
 
 /// Opacity of a mask's fill.
 const FILL: f32 = 0.16;
 /// Around outlines: whatever color is beside them, they stand out.
 const HALO: Color32 = Color32::from_black_alpha(170);
+
+/// Opacity of a contour.
+const CONTOUR: f32 = 0.75;
+/// Pieces this many times smaller than the largest are specks.
+const SPECK: usize = 50;
 
 /// What a pixel is of an outlined mask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -49,14 +54,54 @@ impl Outline {
 /// The outline of a mask in a picture that is no larger than it needs to be, and where in the mask's own that is;
 /// `None` if the mask is empty.
 pub(super) fn image(mask: &Mask, color: [u8; 3]) -> Option<(ColorImage, PixelBox)> {
+    let (mask, at) = cut(mask)?;
+    let pixel = |i: usize| Outline::at(&mask, i).color(color).unwrap_or_default();
+    Some((picture(&mask, pixel), at))
+}
+
+/// The same without fill, one pixel wide, around the mask's larger pieces alone and not around what stands before it.
+pub(super) fn contour(mask: &Mask, color: [u8; 3]) -> Option<(ColorImage, PixelBox)> {
+    let (mask, at) = cut(mask)?;
+    let mask = tidied(&mask);
+    let (w, n) = (mask.width_px(), mask.width_px() * mask.height_px());
+    let differs = |i: usize| neighbors(i, w, n).any(|j| mask.contains(j) != mask.contains(i));
+    let pixel = |i: usize| match (differs(i), mask.contains(i)) {
+        (false, _) => Color32::TRANSPARENT,
+        (true, true) => with_alpha(color, CONTOUR),
+        (true, false) => HALO.gamma_multiply(CONTOUR),
+    };
+    Some((picture(&mask, pixel), at))
+}
+
+fn picture(mask: &Mask, pixel: impl Fn(usize) -> Color32 + Sync + Send) -> ColorImage {
+    let size = [mask.width_px(), mask.height_px()];
+    ColorImage::new(size, (0..size[0] * size[1]).into_par_iter().map(pixel).collect())
+}
+
+/// What a mask holds with a pixel around it, and where that is.
+fn cut(mask: &Mask) -> Option<(Mask, PixelBox)> {
     let inner = mask.bounds()?;
     let (w, h) = (mask.width_px(), mask.height_px());
     let around = |from: usize, to: usize, most: usize| from.saturating_sub(1)..(to + 1).min(most);
     let (x, y) = (around(inner.x.start, inner.x.end, w), around(inner.y.start, inner.y.end, h));
     let width = x.len();
-    let pixel = |k: usize| Outline::at(mask, (y.start + k / width) * w + x.start + k % width).color(color);
-    let pixels = (0..width * y.len()).into_par_iter().map(|k| pixel(k).unwrap_or(Color32::TRANSPARENT)).collect();
-    Some((ColorImage::new([width, y.len()], pixels), PixelBox { x, y }))
+    let inside = |k: usize| mask.contains((y.start + k / width) * w + x.start + k % width);
+    Some((Mask::from_fn(width, y.len(), inside), PixelBox { x, y }))
+}
+
+/// A mask without specks and without holes.
+fn tidied(mask: &Mask) -> Mask {
+    let (w, h) = (mask.width_px(), mask.height_px());
+    let (pieces, sizes) = regions(w, w * h, |i| mask.contains(i));
+    let largest = sizes.iter().copied().max().unwrap_or(0);
+    let (gaps, areas) = regions(w, w * h, |i| !mask.contains(i));
+    let mut is_hole = vec![true; areas.len()];
+    let border = (0..w).flat_map(|x| [x, (h - 1) * w + x]).chain((0..h).flat_map(|y| [y * w, y * w + w - 1]));
+    border.filter(|i| !mask.contains(*i)).for_each(|i| is_hole[gaps[i] as usize - 1] = false);
+    Mask::from_fn(w, h, |i| match mask.contains(i) {
+        true => sizes[pieces[i] as usize - 1] * SPECK >= largest,
+        false => is_hole[gaps[i] as usize - 1],
+    })
 }
 
 /// A color of this opacity.
@@ -80,6 +125,24 @@ mod tests {
             "two pixels of line"
         );
         assert_eq!(Outline::at(&mask, 5), Fill, "the picture's border is no border of the mask");
+    }
+
+    #[test]
+    fn a_contour_leaves_out_specks_and_holes() {
+        // A square of 20 x 20 with a hole in it, and a speck beside it.
+        let is_square = |x: usize, y: usize| (5..25).contains(&x) && (5..25).contains(&y);
+        let is_hole = |x: usize, y: usize| (10..13).contains(&x) && (10..13).contains(&y);
+        let square = Mask::from_fn(40, 30, |i| is_square(i % 40, i / 40));
+        let rough = Mask::from_fn(40, 30, |i| {
+            let (x, y) = (i % 40, i / 40);
+            is_square(x, y) && !is_hole(x, y) || (x, y) == (35, 15)
+        });
+        assert_eq!(tidied(&rough), square);
+        let (image, at) = contour(&rough, [255; 3]).expect("a contour");
+        let lines = image.pixels.iter().filter(|p| **p == with_alpha([255; 3], CONTOUR)).count();
+        assert_eq!((at.x, lines), (4..37, 76), "one pixel wide");
+        let halves = Mask::from_fn(40, 30, |i| is_square(i % 40, i / 40) && i % 40 != 15);
+        assert_eq!(tidied(&halves), halves, "the control: two pieces of a size, and a gap that is no hole");
     }
 
     #[test]

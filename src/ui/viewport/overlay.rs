@@ -1,6 +1,6 @@
 //! What lies over the frame: the choice of modes, the photo's name, and facts about the frame.
 
-use egui::{Align2, Area, ComboBox, Id, Order, Rect, RichText, Ui};
+use egui::{Align2, Area, ComboBox, Id, Order, Rect, RichText, Ui, Vec2, vec2};
 use strum::VariantArray;
 
 use super::super::layout::Layout;
@@ -23,9 +23,9 @@ const LOW: f32 = 330.0;
 
 /// A card over a view.
 fn card(ui: &Ui, rect: Rect, name: &'static str, (align, down): (Align2, f32), add: impl FnOnce(&mut Ui)) {
-    let at = align.pos_in_rect(&rect.shrink(12.0)) + egui::vec2(0.0, down);
+    let at = align.pos_in_rect(&rect.shrink(12.0)) + vec2(0.0, down);
     let area = Area::new(Id::unique(name)).order(Order::Middle).pivot(align).fixed_pos(at).constrain_to(rect);
-    area.show(ui.ctx(), |ui| theme::overlay().show(ui, |ui| ui.horizontal(|ui| add(ui))));
+    theme::card(ui.ctx(), area, |ui| ui.horizontal(|ui| add(ui)));
 }
 
 impl Viewport {
@@ -66,7 +66,8 @@ impl Viewport {
         }
         let now = ui.input(|i| i.time);
         let rate = self.display.rate(now).filter(|_| self.moves(now)).map(rate_text);
-        let facts = if rect.height() > LOW { self.facts(layout, state, rate) } else { rate };
+        let size_px = rect.size() * ui.pixels_per_point();
+        let facts = if rect.height() > LOW { self.facts(size_px, layout, state, rate) } else { rate };
         // That it is drawn otherwise than the scene says must be seen in the smallest view.
         let words = self.overrides.words();
         let is_cropped = self.visibility.crop().is_some();
@@ -156,7 +157,7 @@ impl Viewport {
         } else {
             buttons(ui);
         }
-        if has_photos && !self.queries.is_second() {
+        if has_photos {
             ui.separator();
             let tip = format!("{}  {}", Action::ToggleCameras.tooltip(), keys::label(ui.ctx(), &Action::ToggleCameras));
             if ui.selectable_label(layout.cameras, "Cameras").on_hover_text(tip).clicked() {
@@ -205,10 +206,13 @@ impl Viewport {
     }
 
     /// One line about the frame.
-    fn facts(&self, layout: &Layout, state: &AppState, rate: Option<String>) -> Option<String> {
+    fn facts(&self, view_px: Vec2, layout: &Layout, state: &AppState, rate: Option<String>) -> Option<String> {
         let p = self.picture()?;
+        let drawn_px = vec2(p.camera.width_px as f32, p.camera.height_px as f32);
+        let enlarged = (view_px / drawn_px).min_elem();
         let mut parts = vec![
-            format!("{} \u{d7} {} px", p.camera.width_px, p.camera.height_px),
+            format!("{} \u{d7} {} px", p.camera.width_px, p.camera.height_px)
+                + if p.full && enlarged > 1.05 { ", enlarged" } else { "" },
             format::millis(p.secs),
             match (self.visibility.count(), self.cloud.as_ref().map_or(0, |c| c.len()) as u64) {
                 (Some(drawn), all) => format!("{} of {} Gaussians", format::count(drawn as u64), format::count(all)),

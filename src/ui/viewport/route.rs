@@ -14,7 +14,7 @@ impl Viewport {
         let painter = ui.painter_at(rect);
         let eye = self.overlay_camera(rect);
         let place = |p: DVec3| eye.project(p).map(|q| pos2(rect.left() + q.x as f32, rect.top() + q.y as f32));
-        if let Some(explored) = explored.filter(|_| !pane.player.playing) {
+        if let Some(explored) = explored.filter(|_| pane.show_reach) {
             for (keypoint, part) in explored.navigator.graph.keypoints.iter().zip(&explored.parts) {
                 let Some(at) = place(keypoint.center).filter(|at| rect.contains(*at)) else { continue };
                 let color = if *part == 0 { theme::good() } else { theme::error() };

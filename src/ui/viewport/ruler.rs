@@ -116,50 +116,47 @@ fn ruler_card(
     let mut open = true;
     let at = Align2::CENTER_BOTTOM.pos_in_rect(&shown.shrink(12.0));
     let area = Area::new(Id::unique("ruler")).order(Order::Middle).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
-    area.constrain_to(shown).show(ui.ctx(), |ui| {
-        theme::overlay().show(ui, |ui| {
-            ui.horizontal(|ui| {
-                let next = match ruler.points.len() {
-                    0 => "Click the first point on a surface".to_owned(),
-                    1 => "Click the second point".to_owned(),
-                    _ => ruler.distance().map_or_else(
-                        || "The points coincide: click again".to_owned(),
-                        |d| match meters_per_unit {
-                            Some(_) => format!("{}, {}", format::length(d, meters_per_unit), format::length(d, None)),
-                            None => format!("{} (scale unknown)", format::length(d, None)),
-                        },
-                    ),
-                };
-                ui.label(RichText::new(next).strong());
-                if ui.button("Clear").clicked() {
-                    ruler.points.clear();
-                }
-                open = !ui.button("Close").on_hover_text(Action::Measure.tooltip()).clicked();
-            });
-            if ruler.distance().is_some() {
-                ui.horizontal(|ui| {
-                    ui.label("True length");
-                    ui.add(TextEdit::singleline(&mut ruler.known).hint_text("0.30").desired_width(60.0)).widget_info(
-                        || egui::WidgetInfo::labeled(egui::Role::TextInput, true, "True length in meters"),
-                    );
-                    ui.label("m");
-                    let scale = ruler.scale();
-                    let set = ui.add_enabled(scale.is_some(), egui::Button::new("Set scale"));
-                    if let Some(scale) = scale.filter(|_| set.clicked()) {
-                        actions.push(Action::SetScale(scale));
-                    }
-                });
+    theme::card(ui.ctx(), area.constrain_to(shown), |ui| {
+        ui.horizontal(|ui| {
+            let next = match ruler.points.len() {
+                0 => "Click the first point on a surface".to_owned(),
+                1 => "Click the second point".to_owned(),
+                _ => ruler.distance().map_or_else(
+                    || "The points coincide: click again".to_owned(),
+                    |d| match meters_per_unit {
+                        Some(_) => format!("{}, {}", format::length(d, meters_per_unit), format::length(d, None)),
+                        None => format!("{} (scale unknown)", format::length(d, None)),
+                    },
+                ),
+            };
+            ui.label(RichText::new(next).strong());
+            if ui.button("Clear").clicked() {
+                ruler.points.clear();
             }
-            match ruler.normal(eye) {
-                Some(normal) if ui.button("Use these three points as the floor").clicked() => {
-                    actions.push(Action::SetUp(normal));
-                }
-                None if ruler.points.len() == 2 => {
-                    ui.weak("Click a third point to define the floor.");
-                }
-                _ => {}
-            }
+            open = !ui.button("Close").on_hover_text(Action::Measure.tooltip()).clicked();
         });
+        if ruler.distance().is_some() {
+            ui.horizontal(|ui| {
+                ui.label("True length");
+                ui.add(TextEdit::singleline(&mut ruler.known).hint_text("0.30").desired_width(60.0))
+                    .widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "True length in meters"));
+                ui.label("m");
+                let scale = ruler.scale();
+                let set = ui.add_enabled(scale.is_some(), egui::Button::new("Set scale"));
+                if let Some(scale) = scale.filter(|_| set.clicked()) {
+                    actions.push(Action::SetScale(scale));
+                }
+            });
+        }
+        match ruler.normal(eye) {
+            Some(normal) if ui.button("Use these three points as the floor").clicked() => {
+                actions.push(Action::SetUp(normal));
+            }
+            None if ruler.points.len() == 2 => {
+                ui.weak("Click a third point to define the floor.");
+            }
+            _ => {}
+        }
     });
     open.then_some(ruler)
 }

@@ -5,14 +5,14 @@
 
 mod menu;
 
-use egui::{Color32, FontId, Pos2, Rect, Response, TextureHandle, TextureOptions, Ui, pos2, vec2};
+use egui::{Color32, ColorImage, FontId, Pos2, Rect, Response, TextureHandle, TextureOptions, Ui, pos2, vec2};
 
 use super::super::labels::ScreenNames;
 use super::super::theme;
 use super::outline;
 use crate::jobs::query::ViewMaps;
 use crate::pipeline::semantics::view_map::ViewMap;
-use crate::scene::{Identities, IdentityId, PixelBox, SemanticMap, text};
+use crate::scene::{Identities, IdentityId, Mask, PixelBox, SemanticMap, text};
 use crate::ui::actions::Action;
 use crate::worker::Versioned;
 
@@ -105,13 +105,16 @@ impl Picking {
         (semantics, names): (&Versioned<SemanticMap>, &ScreenNames),
         maps: &Versioned<ViewMaps>,
     ) {
-        let hovered = self.hovered.filter(|id| Some(*id) != self.selected);
-        for (drawn, (id, color)) in self.outlines.iter_mut().zip([(self.selected, SELECTED), (hovered, HOVERED)]) {
-            let Some(id) = id else { continue };
-            drawn.paint(ui, shown, semantics, maps, id, color);
+        // Whoever types is not about to click.
+        let hovered = self.hovered.filter(|_| !ui.ctx().text_edit_focused());
+        let [selected, pointed_at] = &mut self.outlines;
+        if let Some(id) = self.selected {
+            selected.paint(ui, shown, semantics, maps, id, |mask| outline::image(mask, SELECTED));
         }
-        if let (Some(id), Some(pos)) =
-            (self.hovered, ui.input(|i| i.pointer.hover_pos().filter(|pos| shown.contains(*pos))))
+        if let Some(id) = hovered.filter(|id| Some(*id) != self.selected) {
+            pointed_at.paint(ui, shown, semantics, maps, id, |mask| outline::contour(mask, HOVERED));
+        }
+        if let (Some(id), Some(pos)) = (hovered, ui.input(|i| i.pointer.hover_pos().filter(|pos| shown.contains(*pos))))
         {
             label(ui, shown, pos, &text::elided(&names.full_name(&semantics.identities, id), 60));
         }
@@ -126,14 +129,13 @@ impl Drawn {
         semantics: &Versioned<SemanticMap>,
         maps: &Versioned<ViewMaps>,
         id: IdentityId,
-        color: [u8; 3],
+        image: impl Fn(&Mask) -> Option<(ColorImage, PixelBox)>,
     ) {
         let of = Some((maps.generation(), semantics.generation(), id));
         let map = &maps.identities;
         if self.of != of {
             self.of = of;
-            let image = outline::image(&map.mask(&semantics.identities, id), color);
-            self.at = image.map(|(image, at)| {
+            self.at = image(&map.mask(&semantics.identities, id)).map(|(image, at)| {
                 match &mut self.texture {
                     Some(texture) => texture.set(image, TextureOptions::LINEAR),
                     None => self.texture = Some(ui.ctx().load_texture("outline", image, TextureOptions::LINEAR)),

@@ -1,9 +1,11 @@
-//! The answer to the newest query in one line: what is meant, how surely, how large it is, and the way there.
+//! The answer to the query in the field: what is meant, how surely, how large it is, and the way there; in small views
+//! a word.
 
-use egui::{Align, Layout, RichText, Ui};
+use egui::{Align, Color32, Layout, RichText, Ui};
 
 use super::super::visible::Visibility;
-use super::{OverlaySettings, Queries};
+use super::pins::swatch;
+use super::{Asked, OverlaySettings, Queries};
 use crate::math::format;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::answer::{Basis, Certainty};
@@ -28,61 +30,22 @@ impl Queries {
         (semantics, cloud, visibility): (&Versioned<SemanticMap>, &GaussianCloud, &Visibility),
         actions: &mut Vec<Action>,
     ) {
-        let Some(newest) = self.newest().cloned() else { return };
+        let Some(newest) = self.side.live.clone() else { return };
         if let Some(mended) = mended_text(&newest.reading.mended) {
             ui.weak(text::shortened(&mended, 120));
         }
-        let ignored = newest.ignored.join("\", \"");
+        let ignored = newest.ignored.join("\u{201d}, \u{201c}");
         if !ignored.is_empty() {
-            ui.colored_label(theme::warning(), format!("Ignored: \"{}\".", text::shortened(&ignored, 80)));
+            let text = format!("Ignored: \u{201c}{}\u{201d}.", text::shortened(&ignored, 80));
+            ui.colored_label(theme::warning(), text);
         }
         let shown = newest.shown(&self.side.settings);
         match (&newest.answered.answer, shown.first()) {
-            (Answer::NotFound(_), None) => self.show_nothing(ui, &newest, semantics),
+            (Answer::NotFound(_), None) if self.is_settled(ui) => self.show_nothing(ui, &newest, semantics),
             (Answer::Ambiguous(_), Some(_)) if newest.chosen.is_none() => {
-                let mut chosen = None;
-                ui.colored_label(theme::warning(), format!("Ambiguous: {} equal matches.", shown.len()));
-                for id in shown.iter().take(NAMED) {
-                    if ui.small_button(state.labels.full_name(&semantics.identities, *id)).clicked() {
-                        chosen = Some(*id);
-                    }
-                }
-                if let Some(more) = shown.len().checked_sub(NAMED).filter(|more| *more > 0)
-                    && ui.link(format!("{more} more\u{2026}")).clicked()
-                {
-                    actions.push(Action::ShowPane(Pane::Query));
-                }
-                self.choose(chosen);
+                self.show_candidates(ui, state, &newest, &shown, semantics, actions);
             }
-            (_, Some(&target)) => {
-                let facts = self.facts_of(target, semantics, cloud);
-                let pixels = self.area_of(semantics, target);
-                ui.horizontal(|ui| {
-                    let name = state.labels.full_name(&semantics.identities, target);
-                    ui.add(egui::Label::new(RichText::new(name).strong()).truncate());
-                    certainty(ui, &newest);
-                    if let Some(bounds) = facts.bounds {
-                        ui.weak(size_text(bounds, state)).on_hover_text("Longest edge of its bounding box");
-                    }
-                    ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                        let go = Action::GoToTarget(target, Side::Best);
-                        if ui.small_button("Go there").on_hover_text(go.tooltip()).clicked() {
-                            actions.push(go);
-                        }
-                    });
-                });
-                let hidden = visibility.why_not_drawn(&semantics.identities, target);
-                if let Some(why) = hidden.or((pixels == Some(0)).then_some("not in this view")) {
-                    ui.horizontal(|ui| {
-                        ui.colored_label(theme::warning(), format!("It is {why}."));
-                        if visibility.draws(&semantics.identities, target) == Some(false)
-                            && ui.small_button("Show it").clicked()
-                        {
-                            actions.push(Action::Hide(target));
-                        }
-                    });
-                }
-            }
+            (_, Some(&target)) => self.show_target(ui, state, &newest, target, (semantics, cloud, visibility), actions),
             _ => {}
         }
         if let Some(comparison) = &self.side.comparison {
@@ -94,27 +57,148 @@ impl Queries {
         }
     }
 
-    fn show_nothing(&self, ui: &mut Ui, newest: &super::Asked, semantics: &SemanticMap) {
+    /// Which of several is meant.
+    fn show_candidates(
+        &mut self,
+        ui: &mut Ui,
+        state: &AppState,
+        newest: &Asked,
+        shown: &[IdentityId],
+        semantics: &Versioned<SemanticMap>,
+        actions: &mut Vec<Action>,
+    ) {
+        ui.horizontal(|ui| {
+            swatch(ui, self.color_of(newest));
+            ui.strong("Which one?");
+            ui.weak(format!("{} fit equally.", shown.len()));
+        });
+        let mut chosen = None;
+        for id in shown.iter().take(NAMED) {
+            if ui.small_button(state.labels.full_name(&semantics.identities, *id)).clicked() {
+                chosen = Some(*id);
+            }
+        }
+        let more = shown.len().saturating_sub(NAMED);
+        if more > 0 && ui.link(format!("{more} more\u{2026}")).clicked() {
+            actions.push(Action::ShowPane(Pane::Query));
+        }
+        self.choose(chosen);
+    }
+
+    /// What was found.
+    fn show_target(
+        &mut self,
+        ui: &mut Ui,
+        state: &AppState,
+        newest: &Asked,
+        target: IdentityId,
+        (semantics, cloud, visibility): (&Versioned<SemanticMap>, &GaussianCloud, &Visibility),
+        actions: &mut Vec<Action>,
+    ) {
+        let facts = self.facts_of(target, semantics, cloud);
+        ui.horizontal(|ui| {
+            swatch(ui, self.color_of(newest));
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                let go = Action::GoToTarget(target, Side::Best);
+                if ui.small_button("Go there").on_hover_text(go.tooltip()).clicked() {
+                    actions.push(go);
+                }
+                let name = RichText::new(state.labels.full_name(&semantics.identities, target)).strong();
+                ui.with_layout(Layout::left_to_right(Align::Center), |ui| ui.add(egui::Label::new(name).truncate()));
+            });
+        });
+        ui.horizontal(|ui| {
+            let (certainty, color, numbers) = certainty(newest);
+            ui.colored_label(color, certainty).on_hover_text(numbers);
+            if let Some(bounds) = facts.bounds {
+                ui.weak(size_text(bounds, state)).on_hover_text("Longest edge of its bounding box");
+            }
+            if let Some(why) = self.why_unseen(semantics, visibility, target) {
+                ui.colored_label(theme::warning(), format!("It is {why}."));
+                if visibility.draws(&semantics.identities, target) == Some(false)
+                    && ui.small_button("Show it").clicked()
+                {
+                    actions.push(Action::Hide(target));
+                }
+            }
+        });
+    }
+
+    /// Why nothing of an identity is seen, if nothing is.
+    fn why_unseen(
+        &mut self,
+        semantics: &Versioned<SemanticMap>,
+        visibility: &Visibility,
+        target: IdentityId,
+    ) -> Option<&'static str> {
+        let hidden = visibility.why_not_drawn(&semantics.identities, target);
+        hidden.or_else(|| (self.area_of(semantics, target) == Some(0)).then_some("not in this view"))
+    }
+
+    /// The answer in a word or two, with its color and what else is to be said of it.
+    pub(super) fn answer_in_short(
+        &mut self,
+        ui: &Ui,
+        state: &AppState,
+        semantics: &Versioned<SemanticMap>,
+        visibility: &Visibility,
+    ) -> Option<(String, Color32, String)> {
+        let newest = self.side.live.clone()?;
+        if let Some(comparison) = &self.side.comparison {
+            return Some((comparison.figure(), theme::text(), newest.text));
+        }
+        let shown = newest.shown(&self.side.settings);
+        match (&newest.answered.answer, shown.first()) {
+            (Answer::NotFound(_), None) => (self.is_settled(ui) && !newest.pending)
+                .then(|| ("no match".to_owned(), theme::warning(), self.nothing_text(&newest))),
+            (Answer::Ambiguous(_), Some(_)) if newest.chosen.is_none() => {
+                Some((format!("{} fit", shown.len()), theme::warning(), "Which one? Unfold to choose.".to_owned()))
+            }
+            (_, Some(&target)) => {
+                let name = state.labels.full_name(&semantics.identities, target);
+                match self.why_unseen(semantics, visibility, target) {
+                    Some(why) => Some((why.to_owned(), theme::warning(), name)),
+                    None => {
+                        let (certainty, color, numbers) = certainty(&newest);
+                        Some((certainty.to_owned(), color, format!("{name}\n{numbers}")))
+                    }
+                }
+            }
+            _ => None,
+        }
+    }
+
+    fn nothing_text(&self, newest: &Asked) -> String {
+        let unknown = newest.unknown.join("\u{201d}, \u{201c}");
+        match &*text::shortened(&unknown, 80) {
+            "" => "No match.".to_owned(),
+            unknown => format!("No match for \u{201c}{unknown}\u{201d}."),
+        }
+    }
+
+    fn show_nothing(&mut self, ui: &mut Ui, newest: &Asked, semantics: &SemanticMap) {
         if newest.pending {
             ui.weak("Encoding the query\u{2026}");
             return;
         }
-        let unknown = newest.unknown.join("\", \"");
-        let text = match &*text::shortened(&unknown, 80) {
-            "" => "No match.".to_owned(),
-            unknown => format!("No match for \"{unknown}\"."),
-        };
-        ui.colored_label(theme::warning(), text);
-        let known = names::completions(&semantics.identities, "", 6).join(", ");
-        match newest.reading.near.first() {
-            Some((_, other)) => ui.weak(format!("Did you mean \"{other}\"?")),
-            None => ui.weak(format!("Names in this scene: {known}")),
-        };
+        ui.colored_label(theme::warning(), self.nothing_text(newest));
+        ui.horizontal_wrapped(|ui| match newest.reading.near.first() {
+            Some((_, other)) => {
+                ui.weak("Did you mean");
+                self.show_names(ui, std::slice::from_ref(other), semantics);
+            }
+            None => {
+                let mut known = names::completions(&semantics.identities, "", usize::MAX);
+                ui.weak(format!("{}, e.g.", format::things(known.len(), "name")));
+                known.truncate(NAMED);
+                self.show_names(ui, &known, semantics);
+            }
+        });
     }
 }
 
-/// How sure the answer is, with the numbers that say so.
-fn certainty(ui: &mut Ui, newest: &super::Asked) {
+/// How sure the answer is, the color of that, and the numbers that say so.
+fn certainty(newest: &Asked) -> (&'static str, Color32, String) {
     let certainty = newest.answered.certainty(&newest.ignored);
     let color = match certainty {
         Certainty::Certain => theme::good(),
@@ -128,7 +212,7 @@ fn certainty(ui: &mut Ui, newest: &super::Asked) {
     let numbers = newest.answered.answer.hits().first().map_or_else(String::new, |hit| {
         format!("Score {:.2}, margin {:.2}, found {by}", hit.score, hit.margin.max(0.0))
     });
-    ui.colored_label(color, <&str>::from(certainty)).on_hover_text(numbers);
+    (certainty.into(), color, numbers)
 }
 
 /// The longest edge, in the scene's unit.

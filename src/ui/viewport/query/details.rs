@@ -41,7 +41,7 @@ impl Queries {
     ) {
         // Settings are for looking at maps.
         self.wanted = true;
-        match self.newest().cloned() {
+        match self.side.live.clone() {
             Some(newest) => {
                 self.show_hits(ui, &newest, state, semantics);
                 if let Some(&target) = newest.shown(&self.side.settings).first() {
@@ -55,7 +55,7 @@ impl Queries {
                 times::show(ui, basis, &newest.answered.stages.and(self.side.paint_ms));
             }
             None => {
-                ui.weak("No query yet: type into the box in the view ( / ).");
+                ui.weak("No query yet: type into the field in the view ( / ).");
             }
         }
         ui.add_space(6.0);

@@ -1,5 +1,5 @@
-//! Queries asked of the scene: the box to type them into, their answers, and what they draw over
-//! the frame.
+//! Queries asked of the scene: the field to type them into, their answers, and what they draw over
+//! the frame. A query takes the place of the one before, unless that is pinned.
 //!
 //! What the view's pixels belong to is drawn once, when the eye rests; every query then only
 //! reads it, while it is still being typed.
@@ -11,6 +11,7 @@ mod embeddings;
 mod overlay;
 mod paint;
 mod panel;
+mod pins;
 mod settings;
 mod side;
 mod times;
@@ -33,9 +34,6 @@ use crate::pipeline::semantics::reading::QueryReading;
 use crate::scene::{IdentityId, Mask, ScenePlan, SemanticMap};
 use crate::ui::color_by::ColorBy;
 use crate::worker::Versioned;
-
-/// Queries that are kept on screen.
-const MOST: usize = 6;
 
 /// A query with its answer.
 #[derive(Clone, Debug, PartialEq)]
@@ -91,19 +89,14 @@ pub struct Queries {
 }
 
 impl Queries {
-    /// All queries, the one being typed last.
+    /// All queries, the one in the field last.
     pub fn all(&self) -> impl Iterator<Item = &Asked> {
         self.side.all()
     }
 
-    /// The query that is answered on screen.
-    fn newest(&self) -> Option<&Asked> {
-        self.side.live.as_ref().or(self.side.kept.last())
-    }
-
-    /// Shows this hit of the newest query alone, or the best again.
+    /// Shows this hit of the query in the field alone, or the best again.
     fn choose(&mut self, chosen: Option<IdentityId>) {
-        if let (Some(id), Some(newest)) = (chosen, self.side.live.as_mut().or(self.side.kept.last_mut())) {
+        if let (Some(id), Some(newest)) = (chosen, self.side.live.as_mut()) {
             newest.chosen = (newest.chosen != Some(id)).then_some(id);
         }
     }
@@ -138,9 +131,10 @@ impl Queries {
         self.sides().iter().any(|side| needs(&side.settings))
     }
 
-    /// Puts the cursor into the box.
+    /// Puts the cursor into the field.
     pub(crate) fn start_typing(&mut self) {
-        (self.side.focus, self.wanted) = (true, true);
+        self.wanted = true;
+        self.side.start_typing();
     }
 
     /// Answers anew where objects and parts, or embeddings, have changed.
@@ -159,31 +153,33 @@ impl Queries {
 
     /// Asks as if it had been typed.
     pub(crate) fn ask(&mut self, text: &str, semantics: &SemanticMap) {
-        self.side.typed = text.to_owned();
+        (self.side.typed, self.side.typed_at) = (text.to_owned(), None);
         self.wanted = true;
-        self.colors.keep(text);
         self.side.live = self.asked(text, semantics);
+        self.keep_color();
+    }
+
+    /// Gives the query in the field its color for good, if anything has it.
+    fn keep_color(&mut self) {
+        if let Some(live) = self.side.live.as_ref().filter(|q| !q.shown(&self.side.settings).is_empty()) {
+            self.colors.keep(&live.text);
+        }
     }
 
     /// Shows the answers to these queries, and no others.
     pub(crate) fn mark(&mut self, texts: &[String], semantics: &SemanticMap) {
-        self.side.typed.clear();
-        self.wanted = true;
         self.colors.keep_all(texts);
-        self.side.kept = texts.iter().filter_map(|text| self.asked(text, semantics)).collect();
-        self.side.live = None;
-        if let Some(last) = self.side.kept.pop() {
-            self.side.typed.clone_from(&last.text);
-            self.side.live = Some(last);
-        }
+        let (last, others) = texts.split_last().map_or(("", texts), |(last, others)| (last, others));
+        self.side.pinned = others.iter().filter_map(|text| self.asked(text, semantics)).collect();
+        self.ask(last, semantics);
     }
 
     /// Answers all queries anew: identities have changed.
     pub(crate) fn ask_again(&mut self, semantics: &SemanticMap) {
         for second in [false, true] {
             self.in_view(second, |all| {
-                let kept = std::mem::take(&mut all.side.kept);
-                all.side.kept = kept.iter().filter_map(|q| all.asked(&q.text, semantics)).collect();
+                let pinned = std::mem::take(&mut all.side.pinned);
+                all.side.pinned = pinned.iter().filter_map(|q| all.asked(&q.text, semantics)).collect();
                 all.side.live = all.side.live.take().and_then(|q| all.asked(&q.text, semantics));
             });
         }

@@ -14,13 +14,19 @@ use crate::scene::IdentityId;
 #[derive(Default)]
 pub(super) struct QuerySide {
     pub(super) typed: String,
-    /// Set while the box is to take the keyboard.
-    pub(super) focus: bool,
+    /// Window time of the last letter, until Enter says that it was the last.
+    pub(super) typed_at: Option<f64>,
+    /// Frames in which the field is yet to take the keyboard, with all of its text selected.
+    pub(super) focus: u8,
+    /// Whether a small view shows the answer in full, too.
+    pub(super) unfolded: bool,
     /// Place in the history while going through it.
     pub(super) recalled: Option<usize>,
     pub(super) settings: OverlaySettings,
+    /// The query in the field: it takes the place of the one before.
     pub(super) live: Option<Asked>,
-    pub(super) kept: Vec<Asked>,
+    /// Those that were pinned, which stay.
+    pub(super) pinned: Vec<Asked>,
     /// Relevancy of the pixels, for the histogram.
     pub(super) heat: Vec<f32>,
     pub(super) texture: Option<TextureHandle>,
@@ -44,9 +50,19 @@ pub(super) struct Areas {
 }
 
 impl QuerySide {
-    /// All queries, the one being typed last.
+    /// All queries, each once, the one in the field last.
     pub(super) fn all(&self) -> impl Iterator<Item = &Asked> {
-        self.kept.iter().chain(&self.live)
+        self.pinned.iter().filter(|q| !self.is_live(&q.text)).chain(&self.live)
+    }
+
+    /// Whether this query is the one in the field.
+    pub(super) fn is_live(&self, text: &str) -> bool {
+        self.live.as_ref().is_some_and(|live| live.text == text)
+    }
+
+    /// Puts the keyboard into the field, and what is typed next in place of its text.
+    pub(super) fn start_typing(&mut self) {
+        self.focus = 2;
     }
 
     /// Without queries and answers.
@@ -54,8 +70,8 @@ impl QuerySide {
         Self { settings: self.settings, ..Self::default() }
     }
 
-    fn kept_texts(&self) -> Vec<String> {
-        self.kept.iter().map(|q| q.text.clone()).collect()
+    fn pinned_texts(&self) -> Vec<String> {
+        self.pinned.iter().map(|q| q.text.clone()).collect()
     }
 }
 
@@ -87,9 +103,9 @@ impl Queries {
         result
     }
 
-    /// The queries that stay on screen, in the first and the second view.
-    pub(crate) fn kept_texts(&self) -> [Vec<String>; 2] {
-        let [side, other] = self.sides().map(QuerySide::kept_texts);
+    /// The queries that are pinned in the first and the second view.
+    pub(crate) fn pinned_texts(&self) -> [Vec<String>; 2] {
+        let [side, other] = self.sides().map(QuerySide::pinned_texts);
         if self.is_second { [other, side] } else { [side, other] }
     }
 

@@ -1,4 +1,4 @@
-//! Queries that are asked, kept and asked again.
+//! Queries that are asked, pinned and asked again.
 
 use super::*;
 use crate::scene::{Identities, Level, NOBODY};
@@ -11,10 +11,13 @@ fn semantics() -> SemanticMap {
 }
 
 #[test]
-fn a_question_is_kept_and_answers_follow_the_names() {
+fn a_query_is_pinned_and_answers_follow_the_names() {
     let (mut semantics, mut queries) = (semantics(), Queries::default());
+    queries.ask("lamp", &semantics);
     queries.ask("the lamp's shade", &semantics);
-    queries.keep();
+    assert_eq!(queries.all().count(), 1, "one takes the place of the other");
+    queries.pin();
+    assert_eq!(queries.all().count(), 1, "each is there once");
     queries.ask("lamp", &semantics);
     let shown = |q: &Queries| q.all().map(|a| a.shown(&q.side.settings)).collect::<Vec<_>>();
     assert_eq!(shown(&queries), [vec![2], vec![1]]);
@@ -28,15 +31,29 @@ fn a_question_is_kept_and_answers_follow_the_names() {
 }
 
 #[test]
+fn what_is_not_found_has_no_color() {
+    let (semantics, mut queries) = (semantics(), Queries::default());
+    queries.ask("giraffe", &semantics);
+    let not_found = queries.side.live.clone().expect("asked");
+    queries.ask("lamp", &semantics);
+    let found = queries.side.live.clone().expect("asked");
+    assert_eq!((queries.color_of(&not_found), queries.color_of(&found)), (None, Some(Color32::from_rgb(255, 179, 0))));
+    queries.pin();
+    queries.pin();
+    assert!(queries.side.pinned.is_empty(), "the second press takes it back");
+}
+
+#[test]
 fn history_is_kept_once_each() {
     let (semantics, mut queries) = (semantics(), Queries::default());
     for text in ["lamp", "shade", "lamp"] {
         queries.ask(text, &semantics);
-        queries.keep();
+        queries.settle();
+        queries.pin();
     }
     assert_eq!(queries.history, ["shade", "lamp"]);
     queries.clear();
-    assert_eq!((queries.history.len(), queries.side.kept.len()), (2, 0));
+    assert_eq!((queries.history.len(), queries.side.pinned.len()), (2, 0));
 }
 
 #[test]
@@ -46,7 +63,7 @@ fn two_views_have_their_own_queries_and_the_same_colors() {
     queries.in_view(true, |second| {
         assert!(second.all().next().is_none(), "nothing is asked there yet");
         second.ask("the lamp's shade", &semantics);
-        second.keep();
+        second.pin();
         second.tint(ColorBy::Objects);
     });
     assert!(!queries.is_second() && queries.side.settings.color_by == ColorBy::Masks);
@@ -59,12 +76,12 @@ fn two_views_have_their_own_queries_and_the_same_colors() {
     queries.ask("the  Lamp's shade", &semantics);
     queries.in_view(true, |q| q.mark(&["lamp".into()], &semantics));
     assert_eq!((colors(&mut queries, false)[0].1, colors(&mut queries, true)[0].1), (second[0].1, first[0].1));
-    assert_eq!(queries.kept_texts(), [Vec::<String>::new(), Vec::new()]);
+    assert_eq!(queries.pinned_texts(), [Vec::<String>::new(), Vec::new()]);
     queries.work_in(true);
-    queries.keep();
-    assert_eq!(queries.kept_texts(), [vec![], vec!["lamp".to_owned()]], "in the order of the views");
-    queries.keep_only(&[vec!["lamp".into()], vec![]], &semantics);
-    assert_eq!(queries.kept_texts(), [vec!["lamp".to_owned()], vec![]]);
+    queries.pin();
+    assert_eq!(queries.pinned_texts(), [vec![], vec!["lamp".to_owned()]], "in the order of the views");
+    queries.pin_only(&[vec!["lamp".into()], vec![]], &semantics);
+    assert_eq!(queries.pinned_texts(), [vec!["lamp".to_owned()], vec![]]);
     queries.clear();
     assert!(queries.is_second() && queries.in_view(false, |q| q.all().next().is_none()));
     assert_eq!(queries.colors.of("lamp"), [255, 179, 0], "known in the next scene too");

@@ -91,11 +91,16 @@ fn compare(answer: &Mask, truth: &Mask) -> (TruthComparison, [Mask; 3]) {
 }
 
 impl TruthComparison {
+    /// The figure alone.
+    pub(super) fn figure(&self) -> String {
+        format!("IoU {:.3}", self.iou)
+    }
+
     /// The figure, and what the colors mean.
     pub(super) fn show(&self, ui: &mut egui::Ui) {
-        let Self { hits, misses, false_alarms, iou } = self;
+        let Self { hits, misses, false_alarms, .. } = self;
         ui.horizontal_wrapped(|ui| {
-            ui.strong(format!("IoU {iou:.3}"));
+            ui.strong(self.figure());
             let texts = [format!("{hits} px hit"), format!("{misses} missed"), format!("{false_alarms} false alarms")];
             for ([r, g, b], text) in COLORS.into_iter().zip(texts) {
                 ui.colored_label(egui::Color32::from_rgb(r, g, b), text);

@@ -1,0 +1,89 @@
+//! How long looking for masks takes, said before it is begun.
+
+use crate::jobs::models::{ModelEntry, ModelList};
+use crate::math::format;
+use crate::models::catalog;
+use crate::models::engine::engine;
+use crate::pipeline::semantics::build_map::REGIONS;
+
+/// Seconds that color regions take for a photo of 1,024 px on a core; measured.
+const REGIONS_SECS: f64 = 1.0;
+/// Cores on which the times of the list were measured, and those beyond which networks gain little.
+const MEASURED_CORES: usize = 2;
+const MOST_CORES: usize = 8;
+
+/// How long a segmenter looks at one photo here, estimated from times measured elsewhere.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct LookTime {
+    secs: f64,
+}
+
+impl LookTime {
+    /// That of [`REGIONS`], or of a model of the list if its time was measured.
+    pub(crate) fn of(segmenter: &str, known: &ModelList) -> Option<Self> {
+        if segmenter == REGIONS {
+            return Some(Self { secs: REGIONS_SECS });
+        }
+        let entry = known.models.iter().map(|(e, _)| e).find(|e| e.id == segmenter)?;
+        Self::estimated(entry, known.is_fast, known.cores)
+    }
+
+    /// The same for work that has no list at hand.
+    pub(super) fn of_installed(segmenter: &str) -> Option<Self> {
+        let entry = catalog::entry(segmenter).ok()?;
+        let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+        Self::estimated(&entry, engine().ok()?.is_fast(), cores)
+    }
+
+    fn estimated(entry: &ModelEntry, is_fast: bool, cores: usize) -> Option<Self> {
+        let measured = entry.photo_seconds?;
+        let secs = if is_fast { measured.onnx_runtime } else { measured.built_in? };
+        Some(Self { secs: secs * MEASURED_CORES as f64 / cores.clamp(1, MOST_CORES) as f64 })
+    }
+
+    pub(crate) fn text(self) -> String {
+        format!("{} a photo here, by estimate", format::about(self.secs))
+    }
+}
+
+/// How long finding takes where up to `most_photos` are looked at.
+pub(crate) fn sentence(look: LookTime, most_photos: usize) -> String {
+    let all = format::about(look.secs * most_photos as f64);
+    match most_photos {
+        0 | 1 => format!("Looking at the photo takes {all}."),
+        n => format!(
+            "Looking at 1 to {n} photos takes {} each, {all} at most. One photo may be enough; more are looked at only where \
+             something is still unknown.",
+            format::about(look.secs)
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::models::catalog::PhotoSeconds;
+
+    fn entry() -> ModelEntry {
+        catalog::entries().expect("the list").remove(0)
+    }
+
+    #[test]
+    fn more_cores_are_faster_up_to_a_point_and_the_built_in_engine_is_slower() {
+        let measured = Some(PhotoSeconds { onnx_runtime: 60.0, built_in: Some(90.0) });
+        let entry = ModelEntry { photo_seconds: measured, ..entry() };
+        let secs = |fast, cores| LookTime::estimated(&entry, fast, cores).expect("a time").secs;
+        assert_eq!(secs(true, 4) * 2.0, secs(true, 2));
+        assert_eq!(secs(true, 64), secs(true, 8));
+        assert!(secs(false, 2) > secs(true, 2));
+        let unknown = ModelEntry { photo_seconds: None, ..entry };
+        assert_eq!(LookTime::estimated(&unknown, true, 2), None);
+    }
+
+    #[test]
+    fn sentences_name_the_most() {
+        let look = LookTime { secs: 60.0 };
+        assert!(sentence(look, 12).contains("1 to 12 photos") && sentence(look, 12).contains("12 min"));
+        assert!(!sentence(look, 1).contains("most"));
+    }
+}

@@ -1,0 +1,189 @@
+//! The way to objects and parts where photos came without labels: what each means can and cannot do, what it costs,
+//! what has to be downloaded first. Whoever agrees need not come back: downloads are followed by the search.
+
+use egui::{RichText, ScrollArea, Ui};
+
+use super::state::AppState;
+use super::theme;
+use crate::jobs::find_objects::NO_ENCODER;
+use crate::jobs::find_objects::forecast::{self, LookTime};
+use crate::jobs::models::{ModelEntry, ModelList, ModelRole, ModelState};
+use crate::pipeline::semantics::build_map::REGIONS;
+use crate::ui::actions::{Action, Pane};
+
+/// What is chosen so far.
+#[derive(Default)]
+pub(crate) struct FindDialog {
+    open: bool,
+    /// Nothing = not chosen by a user: the best that is here.
+    segmenter: Option<String>,
+    encoder: Option<String>,
+}
+
+/// What a user decided to look for objects with.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Means {
+    pub(crate) segmenter: String,
+    pub(crate) encoder: String,
+    /// Models to download first.
+    pub(crate) missing: Vec<String>,
+}
+
+impl FindDialog {
+    pub(crate) fn open(&mut self) {
+        self.open = true;
+    }
+
+    pub(crate) fn is_open(&self) -> bool {
+        self.open
+    }
+
+    /// Shows it if it is open; what was decided, once that is.
+    pub(crate) fn show(
+        &mut self,
+        ctx: &egui::Context,
+        state: &AppState,
+        max_seeds: usize,
+        actions: &mut Vec<Action>,
+    ) -> Option<Means> {
+        if !self.open {
+            return None;
+        }
+        let response = theme::dialog("find objects").show(ctx, |ui| {
+            let room = ctx.content_rect().size();
+            ui.set_width((room.x - 80.0).min(600.0));
+            ui.heading("Find objects and parts");
+            ui.add_space(4.0);
+            let text = "These photos came without labels. What looks at them decides what can be found, and what can \
+                        be asked for in words.";
+            ui.label(RichText::new(text).color(theme::weak()));
+            let Some(known) = &state.models else {
+                ui.add_space(8.0);
+                ui.weak("Looking for models\u{2026}");
+                return self.buttons(ui, None, actions);
+            };
+            let photos = state.scene.as_ref().and_then(|s| s.dataset.as_ref()).map_or(0, |d| d.photos.len());
+            let means = self.means(known);
+            ScrollArea::vertical()
+                .max_height((room.y - 230.0).max(120.0))
+                .show(ui, |ui| self.choices(ui, known, &means));
+            ui.add_space(6.0);
+            summary(ui, known, &means, photos.min(max_seeds));
+            self.buttons(ui, Some(means), actions)
+        });
+        if response.should_close() {
+            self.open = false;
+        }
+        response.inner.inspect(|_| self.open = false)
+    }
+
+    /// What is chosen, completed by the best that is here.
+    fn means(&self, known: &ModelList) -> Means {
+        let best = |role: ModelRole| known.best(role).map(|e| e.id.clone());
+        let segmenter = self.segmenter.clone().or_else(|| best(ModelRole::Segmenter)).unwrap_or_else(|| REGIONS.into());
+        let encoder = self.encoder.clone().or_else(|| best(ModelRole::Encoder)).unwrap_or_else(|| NO_ENCODER.into());
+        let is_missing = |id: &&String| known.models.iter().any(|(e, s)| e.id == **id && !s.is_usable());
+        let missing = [&segmenter, &encoder].into_iter().filter(is_missing).cloned().collect();
+        Means { segmenter, encoder, missing }
+    }
+
+    fn choices(&mut self, ui: &mut Ui, known: &ModelList, means: &Means) {
+        ui.add_space(6.0);
+        ui.label(RichText::new("What finds the masks of objects and parts").strong());
+        let own = LookTime::of(REGIONS, known);
+        let text = "Rough: a thing of two colors becomes two, neighbors of one color become one.";
+        if choice(ui, means.segmenter == REGIONS, "Uniform color regions (built in)", text, &cost(None, own)) {
+            self.segmenter = Some(REGIONS.into());
+        }
+        for (entry, model) in known.of(ModelRole::Segmenter) {
+            if offered(ui, means.segmenter == entry.id, entry, model, LookTime::of(&entry.id, known)) {
+                self.segmenter = Some(entry.id.clone());
+            }
+        }
+        ui.add_space(8.0);
+        ui.label(RichText::new("What understands words").strong());
+        let text = "Things have numbers, no names. Whatever you name yourself (double-click it in Objects) is found by \
+                    that name.";
+        if choice(ui, means.encoder == NO_ENCODER, "Only names that you give", text, "") {
+            self.encoder = Some(NO_ENCODER.into());
+        }
+        for (entry, model) in known.of(ModelRole::Encoder) {
+            if offered(ui, means.encoder == entry.id, entry, model, None) {
+                self.encoder = Some(entry.id.clone());
+            }
+        }
+    }
+
+    fn buttons(&mut self, ui: &mut Ui, means: Option<Means>, actions: &mut Vec<Action>) -> Option<Means> {
+        ui.add_space(10.0);
+        ui.horizontal(|ui| {
+            let text = match &means {
+                Some(means) if !means.missing.is_empty() => "Download, then find",
+                _ => "Find objects",
+            };
+            let goes = ui.add_enabled(means.is_some(), theme::primary_button(text)).clicked();
+            let cancels = ui.button("Cancel").clicked();
+            let files = ui.button("I have the files\u{2026}").on_hover_text("Add downloaded files in the Models pane.");
+            if files.clicked() {
+                actions.push(Action::ShowPane(Pane::Models));
+            }
+            self.open &= !cancels && !files.clicked();
+            means.filter(|_| goes)
+        })
+        .inner
+    }
+}
+
+/// A model of the list as a choice; whether it was clicked.
+fn offered(ui: &mut Ui, chosen: bool, entry: &ModelEntry, model: &ModelState, look: Option<LookTime>) -> bool {
+    let to_load = (!model.is_usable()).then(|| {
+        if entry.is_hosted() {
+            format!("download of {} MB, {}", entry.download_megabytes(), entry.license)
+        } else {
+            format!("not hosted anywhere; {} MB, {}", entry.megabytes(), entry.license)
+        }
+    });
+    ui.add_enabled_ui(model.is_usable() || entry.is_hosted(), |ui| {
+        choice(ui, chosen, &entry.title, &entry.adds, &cost(to_load, look))
+    })
+    .inner
+}
+
+fn cost(to_load: Option<String>, look: Option<LookTime>) -> String {
+    let time = look.map(|l| l.text());
+    [to_load, time].into_iter().flatten().collect::<Vec<_>>().join("  ·  ")
+}
+
+/// A radio button with what it means below it; whether it was clicked.
+fn choice(ui: &mut Ui, chosen: bool, title: &str, means: &str, costs: &str) -> bool {
+    let clicked = ui.radio(chosen, title).clicked();
+    ui.indent(title, |ui| {
+        ui.label(RichText::new(means).small().color(theme::weak()));
+        if !costs.is_empty() {
+            ui.label(RichText::new(costs).small().color(theme::text()));
+        }
+    });
+    clicked
+}
+
+/// What happens next: sizes, times, and what words will find.
+fn summary(ui: &mut Ui, known: &ModelList, means: &Means, most_photos: usize) {
+    let entry = |id: &String| known.models.iter().find(|(e, _)| e.id == *id).map(|(e, _)| e);
+    let megabytes: u64 = means.missing.iter().filter_map(entry).map(ModelEntry::download_megabytes).sum();
+    let mut parts = Vec::new();
+    if megabytes > 0 {
+        parts.push(format!("Download {megabytes} MB."));
+    }
+    parts.extend(LookTime::of(&means.segmenter, known).map(|look| forecast::sentence(look, most_photos)));
+    ui.label(parts.join(" "));
+    let warning = match means.encoder.as_str() {
+        NO_ENCODER => Some("Words find nothing until you name things."),
+        id if entry(&id.to_owned()).is_some_and(|e| e.built_in) => {
+            Some("The built-in encoder was trained on made-up scenes: on real photos words find next to nothing.")
+        }
+        _ => None,
+    };
+    if let Some(warning) = warning {
+        ui.label(RichText::new(warning).color(theme::warning()));
+    }
+}

@@ -1,0 +1,65 @@
+//! The job that runs, and how long it takes still.
+
+use crate::pipeline::observer::Progress;
+use crate::worker::{JobId, JobKind};
+
+/// Seconds over which forecasts are averaged.
+const FORECAST_SECS: f64 = 30.0;
+
+/// The long job that runs now.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunningJob {
+    pub(crate) id: JobId,
+    pub(crate) kind: JobKind,
+    pub(crate) title: String,
+    pub(crate) progress: Option<Progress>,
+    /// Seconds to go, as far as that is known: the mean of what rates have said lately, which jump.
+    pub(crate) left_secs: Option<f64>,
+    /// Whether it waits.
+    pub paused: bool,
+}
+
+impl RunningJob {
+    pub(super) fn begun(id: JobId, kind: JobKind, title: String) -> Self {
+        Self { id, kind, title, progress: None, left_secs: None, paused: false }
+    }
+
+    pub(super) fn goes_on(&mut self, progress: Progress) {
+        let before = self.progress.replace(progress.clone()).filter(|p| p.stage == progress.stage);
+        let before = before.zip(self.left_secs).map(|(p, left)| (progress.elapsed_secs - p.elapsed_secs, left));
+        self.left_secs = match (progress.eta_secs(), before) {
+            (Some(now), Some((step, left))) => {
+                let expected = left - step;
+                Some((expected + (now - expected) * (1.0 - (-step.max(0.0) / FORECAST_SECS).exp())).max(0.0))
+            }
+            (now, before) => now.or(before.map(|(_, left)| left)),
+        };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(done: u64, elapsed_secs: f64, rate: f64) -> Progress {
+        Progress { stage: "Training".into(), done, total: 3_000, elapsed_secs, rate }
+    }
+
+    #[test]
+    fn a_forecast_does_not_follow_every_jump_of_the_rate() {
+        let mut job = RunningJob::begun(JobId::default(), JobKind::Train, "Training".into());
+        job.goes_on(at(0, 0.0, 0.0));
+        assert_eq!(job.left_secs, None, "nothing is known yet");
+        job.goes_on(at(10, 1.0, 10.0));
+        assert_eq!(job.left_secs, Some(299.0));
+        // For a second it is ten times slower: alone that would say 2,990 s.
+        job.goes_on(at(11, 2.0, 1.0));
+        let left = job.left_secs.expect("known");
+        assert!((299.0..400.0).contains(&left), "{left}");
+        // Where it stays slower, that is what counts.
+        (0..200).for_each(|i| job.goes_on(at(11 + i, 3.0 + i as f64, 1.0)));
+        assert!((job.left_secs.expect("known") - 2_790.0).abs() < 60.0, "{:?}", job.left_secs);
+        job.goes_on(Progress { stage: "Saving".into(), ..at(0, 0.5, 100.0) });
+        assert_eq!(job.left_secs, Some(30.0), "another stage begins anew");
+    }
+}
