@@ -36,8 +36,8 @@ pub(crate) struct ReproduceArgs {
     /// A scene by the name of its folder; may be given several times [default: all]
     #[arg(long = "scene")]
     scenes: Vec<String>,
-    /// Where masks come from: a model of 'fmlgs models', 'regions' (built in, rough), or 'labels' (those of one
-    /// labeled photo) [default: the best model that is here]
+    /// Where masks come from: a model of 'fmlgs models', 'regions' (built in, rough), or 'labels' (those of
+    /// labeled photos that are not compared) [default: the best model that is here]
     #[arg(long)]
     masks: Option<String>,
     /// Encoder of photos and phrases

@@ -44,8 +44,10 @@ impl DemoEncoder {
 
     /// The one whose word list is in the file `path`, its networks beside it.
     pub(super) fn open(path: &Path) -> Result<Self, ModelError> {
-        let damaged =
-            |path: &Path, e: IoError| ModelError::Vocabulary { file: path.display().to_string(), problem: e.to_string() };
+        let damaged = |path: &Path, e: IoError| ModelError::Vocabulary {
+            file: path.display().to_string(),
+            problem: e.to_string(),
+        };
         let half = |name: &'static str| {
             let file = path.with_file_name(name);
             let bytes = files::read(&file, MAX_BYTES).map_err(|e| damaged(&file, e))?;
@@ -91,11 +93,7 @@ impl Encoder for DemoEncoder {
     fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
         let tokens = self.words.encode(phrase)?;
         let tokens = Tensor::new(&[1, tokens.len()], tokens);
-        only(self.text.ready()?.unit_rows(
-            vec![("tokens", tokens.into())],
-            "embedding",
-            self.words.dimension,
-        )?)
+        only(self.text.ready()?.unit_rows(vec![("tokens", tokens.into())], "embedding", self.words.dimension)?)
     }
 
     fn unknown_words(&self, phrase: &str) -> Vec<String> {
@@ -115,11 +113,7 @@ impl DemoEncoder {
         let channel = |c: usize| tile.rgb.iter().map(move |p| p[c].clamp(0.0, 1.0));
         let planes: Vec<f32> = (0..3).flat_map(channel).collect();
         let pixels = Tensor::new(&[1, 3, side, side], planes);
-        only(self.image.ready()?.unit_rows(
-            vec![("tile", pixels.into())],
-            "embedding",
-            self.words.dimension,
-        )?)
+        only(self.image.ready()?.unit_rows(vec![("tile", pixels.into())], "embedding", self.words.dimension)?)
     }
 }
 

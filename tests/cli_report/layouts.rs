@@ -13,7 +13,7 @@ use serde_json::{Value, json};
 use super::cli_support::fmlgs;
 
 /// Size of the photos, px.
-pub const SIZE: [u32; 2] = [320, 240];
+pub const SIZE: [u32; 2] = [400, 300];
 
 /// Photos as `fmlgs synth` leaves them.
 pub struct Rendered {
@@ -32,7 +32,20 @@ impl Rendered {
         let folder = folder.join(scene);
         let glb = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("assets/eval/{scene}.glb"));
         let (views, size) = (views.to_string(), format!("{}x{}", SIZE[0], SIZE[1]));
-        let options = ["--held-out", "0", "--samples", "2", "--points", "12000", "--views", &views, "--size", &size];
+        let options = [
+            "--held-out",
+            "0",
+            "--samples",
+            "2",
+            "--points",
+            "16000",
+            "--views",
+            &views,
+            "--size",
+            &size,
+            "--rig",
+            "survey",
+        ];
         let paths = ["synth", glb.to_str().unwrap(), "--out", folder.to_str().unwrap(), "-q"];
         fmlgs(&[&paths[..], &options].concat()).ok();
         Self::open(folder)
@@ -80,7 +93,10 @@ impl Rendered {
     fn photos(&self, folder: &Path, [w, h]: [u32; 2], name: impl Fn(usize) -> String) {
         fs::create_dir_all(folder).unwrap();
         for view in 0..self.views() {
-            let photo = ImageReader::open(self.photo(view)).unwrap().decode().unwrap().into_rgb8();
+            let mut photo = ImageReader::open(self.photo(view)).unwrap().decode().unwrap().into_rgb8();
+            // These layouts do not tell what is behind everything; nothing is drawn as black.
+            let ids = self.ids(view);
+            photo.pixels_mut().zip(ids.pixels()).filter(|(_, id)| id.0[0] == 0).for_each(|(p, _)| p.0 = [0; 3]);
             let photo = image::imageops::resize(&photo, w, h, image::imageops::FilterType::Triangle);
             photo.save(folder.join(name(view))).unwrap();
         }
@@ -129,8 +145,9 @@ impl Rendered {
         bytes[at..].chunks_exact(15).map(point).collect()
     }
 
-    /// LLFF's `poses_bounds.npy`.
-    fn llff(&self, folder: &Path) {
+    /// LLFF's `poses_bounds.npy`, and what COLMAP leaves where its script made that.
+    fn llff(&self, folder: &Path, name: impl Fn(usize) -> String) {
+        self.colmap(&folder.join("sparse/0"), name);
         let mut values = Vec::new();
         for view in 0..self.views() {
             let (axes, center) = self.pose(view);
@@ -191,7 +208,7 @@ impl Rendered {
         let reduced = SIZE.map(|s| s / 2);
         self.photos(&scene.join("images"), SIZE, |v| format!("IMG_{v:04}.jpg"));
         self.photos(&scene.join("images_2"), reduced, |v| format!("IMG_{v:04}.png"));
-        self.llff(&scene);
+        self.llff(&scene, |v| format!("IMG_{v:04}.jpg"));
         let labels = scene.join("images_2/label");
         fs::create_dir_all(&labels).unwrap();
         for view in 0..self.views() {
@@ -207,7 +224,7 @@ impl Rendered {
     pub fn ovs_3d(&self, data: &Path, scene: &str, labeled: &[usize]) {
         let scene = data.join(scene);
         self.photos(&scene.join("images"), SIZE, |v| format!("{v:02}.jpg"));
-        self.llff(&scene);
+        self.llff(&scene, |v| format!("{v:02}.jpg"));
         let folder = scene.join("segmentations");
         fs::create_dir_all(&folder).unwrap();
         let classes: Vec<&str> = self.objects.iter().map(|o| o.1.as_str()).collect();

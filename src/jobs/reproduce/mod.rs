@@ -80,8 +80,8 @@ pub(crate) fn usual_masks(observer: &mut dyn Observer) -> Result<String, JobErro
     let here = catalog::usable(ModelRole::Segmenter, &mut warn)?.into_iter().next();
     here.ok_or_else(|| {
         let text = "no network that finds masks is on this machine: 'fmlgs models' lists them and 'fmlgs models \
-                    fetch' brings one. Without: --masks regions (built in, rough) or --masks labels (from a labeled \
-                    photo, which measures the carrying of masks and not their finding)";
+                    fetch' brings one. Without: --masks regions (built in, rough) or --masks labels (which measures the \
+                    carrying of masks and not their finding)";
         JobError::Protocol(text.into())
     })
 }

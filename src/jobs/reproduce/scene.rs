@@ -161,9 +161,13 @@ fn objects(
 ) -> Result<FoundFacts, JobError> {
     let scene = open::scene(folder)?;
     let mut with = FindSettings { encoder: Some(settings.encoder.clone()), ..FindSettings::default() };
-    let mut masks = None;
+    let mut masks: Option<PathBuf> = None;
     match settings.masks.as_str() {
-        LABELS => (masks, with.max_seeds) = (Some(input.labels.clone()), 1),
+        LABELS => {
+            masks = Some(input.labels.clone());
+            // Else none might be left to compare with.
+            with.max_seeds = if settings.labeled_in_training { 1 } else { with.max_seeds };
+        }
         REGIONS => with.segmenter = Some(REGIONS.into()),
         network => with.segmenter = Some(network.into()),
     }

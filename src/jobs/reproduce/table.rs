@@ -203,8 +203,8 @@ fn notes(settings: &ReproduceSettings, scenes: &[SceneResult]) -> Vec<String> {
             if settings.encoder == "demo" { " (knows made-up things only)" } else { "" }
         ),
         match settings.masks.as_str() {
-            LABELS => "Masks: those of one labeled photo of each scene, where a segmenter is meant to find them. The \
-                       numbers say how well masks are carried and asked for, not how well they are found."
+            LABELS => "Masks: those of labeled photos that are not compared, where a segmenter is meant to find them. \
+                       The numbers say how well masks are carried and asked for, not how well they are found."
                 .into(),
             REGIONS => "Masks: found by the built-in regions, which are rough; the paper's are SAM's.".into(),
             network => format!("Masks: found by '{network}'."),
