@@ -85,6 +85,8 @@ fn every_stage_is_measured_and_resumed() {
     run(&["query", &scene, "box 1", "--phrases", &words]).fails_with(2);
     run(&["query", &scene, "--phrases", &at("none.txt")]).fails_with(1);
 
+    recipes_are_passed_on_and_printed(&run, &scene, photos, &at("red.ply"));
+
     let wanted = ["report", &scene, "--masks", photos, "--max-side", "64", "--steps", "20", "--train-steps", "20"];
     let rest = ["--views", "1", "--stages", "render,train,features,query,path", "--out", &out, "-q"];
     let read = || -> Value { serde_json::from_slice(&std::fs::read(format!("{out}/report.json")).unwrap()).unwrap() };
@@ -144,4 +146,40 @@ fn every_stage_is_measured_and_resumed() {
     no_labels.fails_with(1);
     run(&["report", &scene, "--stages", "nonesuch"]).fails_with(2);
     run(&["report", "--defaults", &table, "--from", &at("nowhere")]).fails_with(1);
+}
+
+/// Every front end answers by the recipe that it is given, and says which.
+fn recipes_are_passed_on_and_printed(run: &dyn Fn(&[&str]) -> Done, scene: &str, photos: &str, out: &str) {
+    let asked = |text: &str, flags: &[&str]| run(&[&["query", scene, text, "--json"], flags].concat()).ok().json();
+    let (usual, paper) = (asked("box 1", &[]), asked("red", &["--recipe", "paper"]));
+    assert_eq!((&usual["basis"], &usual["recipe"]["strategy"]), (&"names".into(), &"joint".into()));
+    assert_eq!((&paper["basis"], &paper["recipe"]["strategy"]), (&"looks".into(), &"two-steps".into()));
+    assert_eq!((&usual["unmet"], &paper["unmet"].as_array().unwrap().len()), (&Value::Array(vec![]), &2), "{paper}");
+    // Names know the box, the encoder does not; what is printed is what was asked by.
+    run(&["query", scene, "box 1", "--by", "embedding"]).fails_with(1);
+    let told = run(&["query", scene, "red", "--recipe", "paper", "--temperature", "3"]).ok().stdout;
+    assert!(
+        told.starts_with("recipe own: by embedding, strategy two-steps") && told.contains("temperature 3,"),
+        "{told}"
+    );
+    assert!(told.contains("prepared with lifting votes, the recipe says paper"), "{told}");
+    assert!(!run(&["query", scene, "box 1"]).ok().stdout.contains("recipe"));
+    run(&["query", scene, "box 1", "--strategy", "magic"]).fails_with(2);
+    let by_codes = asked("box 1", &["--match", "codes", "--tolerance", "0"]);
+    assert!(by_codes["pixels"].as_u64() < usual["pixels"].as_u64(), "{by_codes}");
+
+    let told = run(&["segment", scene, "red", "--recipe", "paper", "--out", out]).ok().stdout;
+    assert!(told.starts_with("recipe paper: by embedding"), "{told}");
+    let talk = run(&["agent", scene, "where is the box 1?", "--recipe", "default", "--json"]).ok().json();
+    assert_eq!(talk["recipe"], usual["recipe"]);
+    run(&["agent", scene, "where is the box 1?", "--by", "embedding", "--json"]).fails_with(1);
+
+    let eval = |flags: &[&str]| run(&[&["eval", scene, "--masks", photos, "--json"], flags].concat()).ok().json();
+    let by_embedding = eval(&["--by", "embedding"]);
+    assert!(by_embedding["miou"].as_f64() < eval(&[])["miou"].as_f64(), "names are not looked at");
+    assert_eq!(by_embedding["recipe"]["understanding"], "embedding");
+    let table = eval(&["--protocol", "recipes"]);
+    let rows = table["rows"].as_array().unwrap();
+    let recall = |title: &str| rows.iter().find(|r| r["title"] == title).unwrap()["recall"][0].as_f64().unwrap();
+    assert!(rows.len() == 15 && recall("names, joint") > recall("embedding, joint, deviation on"), "{table}");
 }

@@ -61,17 +61,25 @@ fn impatient() -> Patience {
 #[test]
 fn the_list_is_sound() {
     let all = catalog::entries().expect("the list");
-    assert!(all.len() >= 4);
+    let ids: Vec<&str> = all.iter().map(|e| &*e.id).collect();
+    for id in ["sam-vit-h", "mobile-sam", "sam2.1-small", "sam2.1-base-plus", "sam2.1-large"] {
+        assert!(ids.contains(&id), "{id}");
+    }
     for e in &all {
         assert!(!e.title.is_empty() && e.adds.ends_with('.') && !e.license.is_empty(), "{}", e.id);
         assert_eq!(e.built_in, e.description.is_empty(), "{}", e.id);
         assert_eq!(e.built_in, e.file.is_empty(), "{}", e.id);
-        if !e.built_in {
+        assert!(e.speed.ends_with('.') || e.id == "onnxruntime", "{}", e.id);
+        if e.id == "onnxruntime" {
+            // Not made of anything, and for this machine.
+            let archive = e.checkpoint.as_ref().expect("listed for this machine alone");
+            assert!(e.export.is_empty() && archive.url.contains("/v1.24.4/") && e.file.len() == 1);
+        } else if !e.built_in {
             // The export tool that it names is there.
             let tool = e.export.split(' ').next().expect("a tool");
             assert!(Path::new(env!("CARGO_MANIFEST_DIR")).join("tools/export").join(tool).is_file(), "{tool}");
             assert!(e.export.contains(&format!("--name {}", e.id)), "{}", e.export);
-            assert!(e.megabytes() > 100 && e.description == format!("{}.json", e.id));
+            assert!(e.megabytes() >= 40 && e.description == format!("{}.json", e.id));
         }
     }
     assert!(matches!(catalog::entry("no-such-model"), Err(InstallError::Unknown(_))));
@@ -193,11 +201,79 @@ fn the_command_line_says_what_is_here_and_what_to_do() {
     let error = run(&["models", "add", "sam-vit-b", "/nowhere/exported.json"]).fails_with(1).stderr;
     assert!(error.contains("/nowhere/sam-vit-b.json"), "{error}");
     assert!(run(&["models", "check"]).ok().stdout.contains("demo: right"));
+    // Of one model, what it answers too.
+    assert!(run(&["models", "check", "demo"]).ok().stdout.contains("no answer of it is known"));
+    let error = run(&["models", "check", "clip-vit-b32"]).fails_with(1).stderr;
+    assert!(error.contains("clip-vit-b32.json"), "{error}");
+    run(&["models", "check", "--picture", "x.png"]).fails_with(2);
     // An air-gapped machine: the address cannot be reached.
     let port = TcpListener::bind("127.0.0.1:0").expect("a port").local_addr().expect("bound").port();
     let url = format!("http://127.0.0.1:{port}");
     let offline = run(&["-q", "models", "fetch", "sam2.1-tiny", "--from", &url]).fails_with(1).stderr;
     assert!(offline.contains("cannot be reached") && offline.contains("bring the file yourself"), "{offline}");
+}
+
+/// The archive of a release, with the library that the tests' setup fetched.
+#[cfg(target_os = "linux")]
+fn release(library: &Path) -> Vec<u8> {
+    let mut archive = tar::Builder::new(flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast()));
+    let mut link = tar::Header::new_gnu();
+    link.set_entry_type(tar::EntryType::Symlink);
+    link.set_size(0);
+    let name = library.file_name().expect("a name");
+    archive.append_link(&mut link, "onnxruntime-linux/lib/libonnxruntime.so", name).expect("appended");
+    let to = Path::new("onnxruntime-linux/lib").join(name);
+    archive.append_path_with_name(library, to).expect("appended");
+    archive.into_inner().expect("a file").finish().expect("finished")
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn the_fetched_engine_is_the_one_that_runs() {
+    let capi = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/onnxruntime/onnxruntime/capi");
+    let files = fs::read_dir(&capi).into_iter().flatten().flatten().map(|e| e.path());
+    let is_library = |p: &PathBuf| p.file_name().is_some_and(|n| n.to_string_lossy().starts_with("libonnxruntime.so"));
+    let Some(library) = files.into_iter().find(is_library) else {
+        println!("skipped: no ONNX Runtime library in {}", capi.display());
+        return;
+    };
+    let (here, models) = (tempfile::tempdir().expect("folder"), tempfile::tempdir().expect("folder"));
+    fs::write(here.path().join("engine.tgz"), release(&library)).expect("written");
+    fs::write(here.path().join("other.tgz"), "another archive").expect("written");
+    let base = server(here.path());
+    let [url, other] = ["engine", "other"].map(|name| format!("{base}/{name}.tgz"));
+    let run = |arguments: &[&str]| -> cli_support::Done {
+        let mut command = cli_support::command(arguments);
+        command.env_remove("FMLGS_ONNXRUNTIME").env_remove("ORT_DYLIB_PATH").env_remove("VIRTUAL_ENV");
+        command.env("FMLGS_MODELS", models.path()).env("FMLGS_DEVICE", "cpu").output().expect("runs").into()
+    };
+    // Of the listed release another archive is told by its checksum, and nothing is left of it.
+    let error = run(&["-q", "models", "fetch", "onnxruntime", "--from", &other]).fails_with(1).stderr;
+    assert!(error.contains("SHA-256") && error.contains("refused"), "{error}");
+    assert_eq!(fs::read_dir(models.path()).expect("listed").count(), 0);
+    assert!(!run(&["models", "--json"]).ok().json()["engine"].as_str().expect("an engine").contains(".tgz"));
+    // The same entry, of a release without a published one.
+    let entry: ModelEntry = serde_json::from_value(serde_json::json!({
+        "id": "onnxruntime", "role": "engine", "title": "Engine", "adds": "Speed.", "license": "MIT", "source": "here",
+        "description": "onnxruntime.json", "file": [{ "name": "libonnxruntime.so", "megabytes": 22 }],
+        "checkpoint": { "url": url, "megabytes": 200 },
+    }))
+    .expect("an entry");
+    entry.fetch(models.path(), None, impatient(), &mut |_, _, _| true).expect("fetched");
+    assert_eq!(entry.state(models.path()), ModelState::Here);
+    let list = run(&["models", "--json"]).ok().json();
+    let fetched = models.path().join("libonnxruntime.so");
+    assert_eq!(list["engine"], format!("ONNX Runtime ({})", fetched.display()));
+    let answers = run(&["models", "bench", "--json"]).ok().json();
+    assert_eq!(answers["models"][0]["id"], "demo", "it runs networks");
+    // A library that is not what was fetched is not opened.
+    let mut bytes = fs::read(&fetched).expect("read");
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&fetched, bytes).expect("written");
+    let list = run(&["models", "--json"]).ok().json();
+    assert!(list["engine"].as_str().is_some_and(|e| e.contains("tract")), "{list}");
+    assert!(list["note"].as_str().is_some_and(|n| n.contains("refused") && n.contains("fetch it")), "{list}");
 }
 
 /// What `models bench` measures is what the models give; that the engines agree is a test of the library.

@@ -111,6 +111,18 @@ fn pages_and_refusals_are_no_files() {
 }
 
 #[test]
+fn a_server_that_sends_elsewhere_gets_no_file_of_this_machine() {
+    let secret = format!("file://{}/Cargo.toml", env!("CARGO_MANIFEST_DIR"));
+    for to in [&*secret.leak(), "/model.onnx", "gopher://127.0.0.1/model.onnx", "//"] {
+        let (s, p) = (server(&[Turn::Redirect(to)]), place());
+        let error = get(&s, &p.to, None, None).expect_err("nothing to be had");
+        assert!(matches!(error, FetchError::Unreachable { .. } | FetchError::Refused { .. }), "{to}: {error}");
+        assert_eq!(fs::read_dir(p.to.parent().expect("folder")).expect("listed").count(), 0, "{to}: something is left");
+        assert!(s.log.lock().expect("log").len() < 100, "{to}: it goes round in circles");
+    }
+}
+
+#[test]
 fn a_file_that_changes_on_the_way_is_fetched_anew() {
     let (s, p) = (server(&[Turn::BreakAfter(70_000), Turn::Change, Turn::Serve]), place());
     get(&s, &p.to, None, None).expect("fetched");

@@ -7,11 +7,12 @@ mod common;
 
 use fmlgs::math::stats;
 use fmlgs::math::vector::{dot, unit};
-use fmlgs::pipeline::semantics::by_embedding::{EmbeddingOptions, EmbeddingScorer, TextEmbeddings};
+use fmlgs::pipeline::semantics::by_embedding::{EmbeddingScorer, TextEmbeddings};
 use fmlgs::pipeline::semantics::localize::{Answer, localize};
 use fmlgs::pipeline::semantics::parse::ParsedQuery;
-use fmlgs::pipeline::semantics::relevancy::{CANONICAL, PART_WEIGHT, advantage, deviate, score};
-use fmlgs::scene::{Identities, IdentityId, LanguageFeatures, Level, LevelFilter, NOBODY, ViewFeatures};
+use fmlgs::pipeline::semantics::recipe::{PAPERS_PHRASES, Recipe, Rejection};
+use fmlgs::pipeline::semantics::relevancy::{advantage, deviate, score};
+use fmlgs::scene::{Identities, IdentityId, LanguageFeatures, Level, LevelFilter, NOBODY, PART_WEIGHT, ViewFeatures};
 
 /// Queries of the LERF evaluation that have an embedding.
 const QUERIES: [&str; 17] = [
@@ -33,6 +34,13 @@ const QUERIES: [&str; 17] = [
     "three cookies",
     "yellow pouf",
 ];
+
+/// Phrases of other scenes: nothing of it is in this one.
+const ABSENT: &str = "pink ice cream, Stainless steel pots, pot, toy elephant, pirate hat, kamaboko, chopsticks, toilet, \
+    toy cat statue, ketchup, rubics cube, refrigerator, jake, wavy noodles, rubber duck with hat, egg, showercurtain, books, \
+    ceiling, pikachu, frog cup, blinds, tesla door handle, corn, sink, miffy, pumpkin, bathtub, person, onion segments, \
+    red toy chair, spatula, nightstand, television, rubber duck with buoy, nori, dresser, porcelain hand, bookshelf, \
+    ottolenghi, sake cup, green toy chair, pour-over vessel, mirror, toaster, plastic ladle, old camera, waldo";
 
 struct Scene {
     /// One view of each identity.
@@ -71,8 +79,37 @@ impl Scene {
         self.texts.iter().find(|t| t.0 == name).unwrap_or_else(|| panic!("{name}")).1.clone()
     }
 
+    /// Embeddings of questions and of all phrases that answering them by `recipe` needs, as far as there are any.
+    fn phrases<'q>(&self, questions: impl IntoIterator<Item = &'q str>, recipe: &Recipe) -> TextEmbeddings {
+        let mut phrases = TextEmbeddings::default();
+        let known = |p: &str| self.texts.iter().find(|t| t.0.eq_ignore_ascii_case(p)).map(|t| t.1.clone()).ok_or(());
+        for question in questions {
+            phrases.learn(&plain(question), recipe, known).expect("known");
+        }
+        phrases
+    }
+
+    /// Four views of each identity, as many as a scene keeps; the nose is a part of the bear, deviated by `weight`.
+    fn language(&self, weight: f32) -> (Identities, LanguageFeatures) {
+        let (bear, nose) = (self.best("stuffed bear"), self.best("bear nose"));
+        let mut order: Vec<usize> = (0..self.single.len()).filter(|k| ![bear, nose].contains(k)).collect();
+        order.splice(0..0, [bear, nose]);
+        let mut identities = Identities::default();
+        let mut by_identity = Vec::new();
+        for (id, k) in order.into_iter().enumerate() {
+            let (level, parent) = if id == 1 { (Level::Part, 1) } else { (Level::Object, NOBODY) };
+            identities.add(level, parent, Vec::new());
+            let raw: Vec<Vec<f32>> =
+                std::iter::once(&self.single[k]).chain(self.many[k].iter().take(3)).cloned().collect();
+            let moved = |v: &Vec<f32>| deviate(v, &self.single[bear], weight).expect("a direction");
+            let deviated = if id == 1 { raw.iter().map(moved).collect() } else { raw.clone() };
+            by_identity.push(ViewFeatures { raw, deviated });
+        }
+        (identities, LanguageFeatures { encoder: "clip".into(), dimension: 512, by_identity })
+    }
+
     fn canonical(&self) -> Vec<Vec<f32>> {
-        CANONICAL.iter().map(|c| self.text(c)).collect()
+        PAPERS_PHRASES.iter().map(|c| self.text(c)).collect()
     }
 
     /// Advantages of all identities for a query.
@@ -85,6 +122,11 @@ impl Scene {
         let d = self.advantages(query);
         (0..d.len()).max_by(|&a, &b| d[a].total_cmp(&d[b])).expect("identities")
     }
+}
+
+/// A question that says of no piece what it is a piece of.
+fn plain(text: &str) -> ParsedQuery {
+    ParsedQuery { text: text.to_lowercase(), target: text.to_lowercase(), whole: None }
 }
 
 #[test]
@@ -159,12 +201,11 @@ fn answers_say_when_nothing_or_several_fit() {
     language.by_identity.iter().for_each(|_| {
         identities.add(Level::Object, NOBODY, Vec::new());
     });
-    let mut phrases = TextEmbeddings::default();
-    phrases.learn(&QUERIES, |p| Ok::<_, ()>(scene.text(p))).expect("known");
+    let recipe = Recipe { rejection: Rejection::Canonical, ..Recipe::default() };
+    let phrases = scene.phrases(QUERIES, &recipe);
     let ask = |query: &str| {
-        let phrase = ParsedQuery { text: query.into(), target: query.into(), whole: None };
-        let options = EmbeddingOptions::default();
-        localize(&identities, &phrase, LevelFilter::Auto, &mut EmbeddingScorer::new(&language, &phrases, options))
+        let mut scorer = EmbeddingScorer::new(&identities, &language, &phrases, &recipe);
+        localize(&identities, &plain(query), LevelFilter::Auto, recipe.strategy, &mut scorer)
     };
     assert!(matches!(ask("dall-e brand"), Answer::NotFound(_)), "less relevant than a canonical phrase");
     assert!(matches!(ask("spoon"), Answer::Ambiguous(_)), "two within 0.005");
@@ -199,8 +240,9 @@ fn parts_are_moved_toward_their_whole_and_made_unit_again() {
 #[test]
 fn an_identity_counts_by_its_best_view() {
     let Some(scene) = load() else { return };
-    let mut phrases = TextEmbeddings::default();
-    phrases.learn(&QUERIES, |p| Ok::<_, ()>(scene.text(p))).expect("known");
+    let recipe = Recipe::default();
+    let phrases = scene.phrases(QUERIES, &recipe);
+    let identities = Identities::objects(scene.single.len());
     type Views = Vec<Vec<f32>>;
     let language = |views: &dyn Fn(&[Vec<f32>]) -> Views| {
         let of = scene.many.iter().map(|all| views(&all[..all.len().min(4)]));
@@ -214,7 +256,7 @@ fn an_identity_counts_by_its_best_view() {
     let (all, first) = (language(&<[_]>::to_vec), language(&|v| v.iter().take(1).cloned().collect()));
     let mean = language(&mean);
     let advantage_of = |features: &LanguageFeatures, query: &str, target: usize| {
-        EmbeddingScorer::new(features, &phrases, EmbeddingOptions::default()).advantages(query, None)[target]
+        EmbeddingScorer::new(&identities, features, &phrases, &recipe).advantages(query, None)[target]
     };
     let (mut compared, mut over_mean, mut over_first) = (0, 0, 0);
     for query in QUERIES {
@@ -231,6 +273,66 @@ fn an_identity_counts_by_its_best_view() {
     assert!(compared >= 12 && over_mean == compared, "{over_mean} of {compared}");
     // The control: one view is not all that there is.
     assert!(over_first >= 7, "{over_first} of {compared}");
+}
+
+/// How many of the questions are answered, by this recipe.
+fn answered(scene: &Scene, recipe: &Recipe, questions: &[&str]) -> usize {
+    let (identities, language) = scene.language(recipe.preparation.part_weight);
+    let phrases = scene.phrases(questions.iter().copied(), recipe);
+    let is_found = |question: &&&str| {
+        let mut scorer = EmbeddingScorer::new(&identities, &language, &phrases, recipe);
+        let answer = localize(&identities, &plain(question), LevelFilter::Auto, recipe.strategy, &mut scorer);
+        !matches!(answer, Answer::NotFound(_))
+    };
+    questions.iter().filter(is_found).count()
+}
+
+#[test]
+fn most_of_what_is_absent_is_rejected_by_confidence_and_little_by_canonical_phrases() {
+    let Some(scene) = load() else { return };
+    let absent: Vec<&str> = ABSENT.split(", ").map(str::trim).collect();
+    let of = |recipe: &Recipe| [answered(&scene, recipe, &QUERIES), answered(&scene, recipe, &absent)];
+    let by = |rejection| of(&Recipe { rejection, ..Recipe::default() });
+    let paper = of(&Recipe::paper());
+    let [never, canonical, strict] = [Rejection::Never, Rejection::Canonical, Rejection::Strict].map(by);
+    println!("answered of {} there and {} absent: paper {paper:?}, never {never:?}", QUERIES.len(), absent.len());
+    println!("canonical {canonical:?}, strict {strict:?}");
+    assert_eq!((paper, never), ([QUERIES.len(), absent.len()], [QUERIES.len(), absent.len()]));
+    assert!(canonical[0] == QUERIES.len() && canonical[1] > 35, "{canonical:?}");
+    assert!(strict[0] >= 13 && strict[1] <= 10, "{strict:?}");
+}
+
+#[test]
+fn deviation_helps_a_part_that_is_asked_for_with_its_whole_and_the_second_step_finds_it() {
+    let Some(scene) = load() else { return };
+    let advantage = |question: &str, weight: f32, id: usize| {
+        let (identities, language) = scene.language(weight);
+        let recipe = Recipe::paper();
+        let phrases = scene.phrases([question], &recipe);
+        EmbeddingScorer::new(&identities, &language, &phrases, &recipe).advantages(question, None)[id - 1]
+    };
+    let (bear, nose) = (advantage("bear nose", 1.0, 1), advantage("bear nose", 1.0, 2));
+    let deviated = advantage("bear nose", PART_WEIGHT, 2);
+    println!("\"bear nose\": bear {bear:.4}, nose {nose:.4}, nose deviated {deviated:.4}");
+    assert!(deviated > nose && deviated > bear, "{deviated} {nose} {bear}");
+    // Without its whole in the words, deviation costs a part what it says of itself.
+    let hooves = |weight: f32| {
+        let (whole, part) = (&scene.single[scene.best("sheep")], &scene.single[scene.best("hooves")]);
+        let v = deviate(part, whole, weight).expect("a direction");
+        fmlgs::pipeline::semantics::relevancy::advantage(&v, &scene.text("hooves"), &scene.canonical())
+    };
+    println!("\"hooves\": hooves {:.4}, deviated {:.4}", hooves(1.0), hooves(PART_WEIGHT));
+    assert!(hooves(PART_WEIGHT) < hooves(1.0));
+    // A forced kind and the compound alone find the nose; an object that is forced is the bear.
+    let ask = |level: LevelFilter| {
+        let recipe = Recipe::paper();
+        let (identities, language) = scene.language(PART_WEIGHT);
+        let phrases = scene.phrases(["bear nose"], &recipe);
+        let mut scorer = EmbeddingScorer::new(&identities, &language, &phrases, &recipe);
+        localize(&identities, &plain("bear nose"), level, recipe.strategy, &mut scorer).hits()[0].identity
+    };
+    assert_eq!((ask(LevelFilter::Auto), ask(LevelFilter::Part)), (2, 2));
+    assert_ne!(ask(LevelFilter::Object), 2);
 }
 
 /// What semantic deviation does to a part, over all pairs of a view of the part and one of a whole.

@@ -18,6 +18,7 @@ pub mod camera_args;
 pub mod commands;
 pub(crate) mod describe;
 pub(crate) mod dialog;
+mod effect;
 pub(crate) mod event;
 pub mod execute;
 mod language;

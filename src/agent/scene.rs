@@ -6,6 +6,8 @@ use std::sync::Arc;
 use glam::{DMat3, DVec3};
 
 use super::camera_args::{Direction, Distance, NORMAL};
+pub use super::effect::Effect;
+use super::effect::Emit;
 use super::relation::{Extent, Viewpoint};
 pub use super::view_shares::Parts;
 use super::view_shares::ViewShares;
@@ -17,6 +19,7 @@ use crate::navigate::approach::Approach;
 use crate::navigate::target::{Side, ViewPreference};
 use crate::navigate::{CameraTrajectory, FRAMES, Pose, Speed};
 use crate::pipeline::semantics::answer::QueryAnswer;
+use crate::pipeline::semantics::recipe::{Recipe, Understanding};
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Bounds, Identities, IdentityId, LevelFilter, SemanticMap, text};
 
@@ -24,28 +27,6 @@ use crate::scene::{Bounds, Identities, IdentityId, LevelFilter, SemanticMap, tex
 const MEASURED_POINTS: usize = 2048;
 /// A step, as a multiple of the distance that flights keep to occupied space.
 const STEP: f64 = 6.0;
-
-/// A change of what is shown, for whoever shows the scene.
-#[derive(Clone, Debug)]
-pub enum Effect {
-    /// The camera flies; the point is what it turns about from then on.
-    Fly(Box<CameraTrajectory>, Option<DVec3>),
-    /// These are marked, and nothing else.
-    Mark(Vec<IdentityId>),
-    /// Whose own Gaussians are left out of the picture.
-    Hidden(Vec<IdentityId>),
-    /// The last change of that was undone: these are left out again.
-    HiddenUndone(Vec<IdentityId>),
-    /// What the user did last is to be undone.
-    Undo,
-    Renamed(IdentityId, String),
-    /// The last change of a name was undone: it is called this again.
-    RenameUndone(IdentityId, String),
-    /// The scene was looked at: which space is occupied is known.
-    Explored(Arc<Explored>),
-}
-
-pub(crate) type Emit = Box<dyn FnMut(Effect) + Send>;
 
 /// A scene that the agent acts in.
 pub struct SceneWorld {
@@ -75,7 +56,7 @@ impl SceneWorld {
     /// # Errors
     /// If the encoder that looked at it cannot be loaded.
     pub fn new(parts: Parts, eye: Pose, aspect: f64, emit: Emit) -> Result<Self, WorldError> {
-        let engine = QueryEngine::new(parts.map.language.as_ref()).map_err(|e| WorldError(e.to_string()))?;
+        let engine = engine(&parts.map, parts.recipe.clone())?;
         let n = parts.map.identities.len() + 1;
         let bounds = parts.bounds();
         Ok(Self {
@@ -109,6 +90,18 @@ impl SceneWorld {
             self.done = UndoHistory::default();
             self.hidden = hidden;
         }
+    }
+
+    /// Answers by this recipe from now on.
+    ///
+    /// # Errors
+    /// If the encoder that looked at the scene cannot be loaded.
+    pub(crate) fn answer_by(&mut self, recipe: &Recipe) -> Result<(), WorldError> {
+        if self.parts.recipe != *recipe {
+            self.engine = engine(&self.parts.map, recipe.clone())?;
+            self.parts.recipe = recipe.clone();
+        }
+        Ok(())
     }
 
     /// Where the eye is.
@@ -179,7 +172,15 @@ impl SceneWorld {
     }
 }
 
+fn engine(map: &SemanticMap, recipe: Recipe) -> Result<QueryEngine, WorldError> {
+    QueryEngine::new(map.language.as_ref(), recipe).map_err(|e| WorldError(e.to_string()))
+}
+
 impl World for SceneWorld {
+    fn understanding(&self) -> Understanding {
+        self.parts.recipe.understanding
+    }
+
     fn identities(&self) -> &Identities {
         &self.parts.map.identities
     }

@@ -8,8 +8,10 @@ use glam::{DMat3, DVec3};
 use super::scene::{Effect, Parts, SceneWorld};
 use super::world::World;
 use crate::navigate::Pose;
+use crate::pipeline::semantics::answer::Basis;
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::render::RenderSettings;
-use crate::scene::{GaussianCloud, Identities, Level, NOBODY, SemanticMap};
+use crate::scene::{GaussianCloud, Identities, Level, LevelFilter, NOBODY, SemanticMap};
 
 const EYE: Pose = Pose { center: DVec3::ZERO, world_from_camera: DMat3::IDENTITY, fov_y_rad: 0.8 };
 
@@ -32,6 +34,7 @@ fn renamed() -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
         up: DVec3::Z,
         meters: None,
         exports: PathBuf::new(),
+        recipe: Default::default(),
         explored: None,
     };
     let said = Arc::clone(&effects);
@@ -70,4 +73,16 @@ fn what_the_user_did_last_is_undone_by_the_window() {
     assert_eq!(world.undo().expect("the user's"), "hid torch");
     assert!(matches!(effects.lock().expect("no panic").last(), Some(Effect::Undo)));
     assert!(world.undo().is_err(), "once");
+}
+
+#[test]
+fn the_agent_answers_by_the_recipe_of_its_scene() {
+    let (mut world, _) = renamed();
+    let mut basis = |recipe: Option<Recipe>| {
+        recipe.iter().for_each(|recipe| world.answer_by(recipe).expect("no encoder is needed"));
+        let answered = world.locate("torch", LevelFilter::Auto).expect("asked");
+        (answered.basis, answered.chosen(1), answered.recipe)
+    };
+    assert_eq!(basis(None), (Basis::Names, vec![1], Recipe::default()));
+    assert_eq!(basis(Some(Recipe::paper())), (Basis::Embedding, vec![], Recipe::paper()));
 }

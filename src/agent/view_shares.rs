@@ -9,6 +9,7 @@ use glam::DVec3;
 use crate::jobs::go_to::Explored;
 use crate::jobs::query;
 use crate::navigate::Pose;
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::render::RenderSettings;
 use crate::scene::{Bounds, Camera, GaussianCloud, IdentityId, SemanticMap};
 
@@ -22,6 +23,8 @@ pub struct Parts {
     /// Length of a unit in meters, if that is known.
     pub meters: Option<f64>,
     pub exports: PathBuf,
+    /// How questions are answered.
+    pub recipe: Recipe,
     /// What is known of moving about, if the scene was looked at before.
     pub explored: Option<Arc<Explored>>,
 }

@@ -7,6 +7,7 @@ use crate::navigate::target::Side;
 use crate::pipeline::semantics::answer::{QueryAnswer, by_name};
 use crate::pipeline::semantics::localize::Answer;
 use crate::pipeline::semantics::reading::QueryReading;
+use crate::pipeline::semantics::recipe::{Recipe, Understanding};
 use crate::pipeline::semantics::timing::StagesMs;
 use crate::scene::{Bounds, Identities, IdentityId, Level, LevelFilter};
 
@@ -62,6 +63,11 @@ pub trait World {
 
     /// What a query means. Errors if the scene cannot be asked.
     fn locate(&mut self, query: &str, kind: LevelFilter) -> Result<QueryAnswer, WorldError>;
+
+    /// What questions are compared with.
+    fn understanding(&self) -> Understanding {
+        Understanding::Both
+    }
 
     /// What is known of an identity; `None` if it is not (or no more) in the scene.
     fn facts(&self, id: IdentityId) -> Option<IdentityFacts>;
@@ -120,13 +126,15 @@ pub trait World {
 
 /// Answers a query by names alone: a [`World::locate`] for scenes without an encoder.
 pub fn locate_by_names(identities: &Identities, query: &str, kind: LevelFilter) -> QueryAnswer {
-    match QueryReading::new(identities, query, kind) {
-        Some(reading) => by_name(identities, &reading.phrase, kind),
+    let recipe = Recipe::default();
+    match QueryReading::new(identities, query, kind, &recipe) {
+        Some(reading) => by_name(identities, &reading.phrase, kind, &recipe),
         None => QueryAnswer {
             answer: Answer::NotFound(Vec::new()),
             basis: crate::pipeline::semantics::answer::Basis::Names,
             relevancy: vec![0.0; identities.len() + 1],
             stages: StagesMs::default(),
+            recipe,
         },
     }
 }

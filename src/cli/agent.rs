@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::json;
 
+use super::recipe::RecipeArgs;
 use super::{CliError, interrupt, number, output, view};
 use crate::agent::commands::Commands;
 use crate::agent::llm::settings::{LlmSettings, RequestPatience};
@@ -70,6 +71,8 @@ pub(crate) struct AgentArgs {
     /// Print one JSON document
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    recipe: RecipeArgs,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -143,6 +146,10 @@ pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
         export::check(transcript, &[".json", ".md"], &scene.reads())?;
     }
     let map = scene.semantics()?;
+    let lines = args.recipe.lines(&map);
+    if !args.json && !lines.is_empty() {
+        output::print(&lines.join("\n"))?;
+    }
     let camera = view::choose(args.from.as_deref(), &scene)?;
     let parts = Parts {
         cameras: scene.views(),
@@ -152,6 +159,7 @@ pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
         map: Arc::new(map),
         meters: args.meters.or(scene.metres_per_unit),
         exports: folder.join("exports"),
+        recipe: args.recipe.recipe(),
         explored: None,
     };
     let effects: Arc<Mutex<Vec<String>>> = Arc::default();
@@ -189,7 +197,9 @@ pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
         render::picture(path, &cloud, &camera, &settings)?;
     }
     if args.json {
-        output::print_json(&json!({ "planner": session.planner(), "requests": talk.told }))?;
+        output::print_json(&json!({
+            "planner": session.planner(), "requests": talk.told, "recipe": args.recipe.recipe(),
+        }))?;
     }
     match talk.refused {
         Some(text) if !args.json => Err(CliError::failed(format!("the last request was not carried out: {text}"))),

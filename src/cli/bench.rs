@@ -20,11 +20,12 @@ use crate::pipeline::train::TrainConfig;
 #[command(after_help = "Examples:\n  \
     fmlgs bench splat.ply\n  \
     fmlgs bench --queries 100\n  \
+    fmlgs bench --masks mobile-sam --photo photo.jpg\n  \
     fmlgs bench --plan scene/ splat.ply\n  \
     fmlgs bench splats/*.ply photos/ --size 640x480 --size 1280x720 --max-side 504 --gpu --json")]
 pub(crate) struct BenchArgs {
     /// Splats or trained scenes to draw, posed photos to train on
-    #[arg(required_unless_present = "queries")]
+    #[arg(required_unless_present_any = ["queries", "masks"])]
     paths: Vec<PathBuf>,
     /// Size of the drawn images; may be given several times [default: 640x480 1280x720]
     #[arg(long, value_parser = view::parse_size)]
@@ -41,8 +42,14 @@ pub(crate) struct BenchArgs {
     /// Time this many typed queries too, on a made-up view of 1008 x 567 px with 300 objects and parts
     #[arg(long, value_name = "COUNT", value_parser = number::within(1..=100_000_000_usize))]
     queries: Option<usize>,
+    /// Time this network on the masks of everything in a photo: a model's name, or the path of its description
+    #[arg(long, value_name = "MODEL")]
+    masks: Option<String>,
+    /// That photo [default: one is made up]
+    #[arg(long, value_name = "FILE", requires = "masks")]
+    photo: Option<PathBuf>,
     /// Compare each scene's plan with everything enabled, each in processes of its own
-    #[arg(long, conflicts_with_all = ["queries", "gpu", "size"])]
+    #[arg(long, conflicts_with_all = ["queries", "masks", "gpu", "size"])]
     plan: bool,
     /// Processes for each of the two
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100), requires = "plan")]
@@ -72,6 +79,7 @@ pub(crate) fn run(args: BenchArgs, quiet: bool) -> Result<(), CliError> {
         repeats: args.repeats as usize,
         gpu: args.gpu,
         queries: args.queries,
+        masks: args.masks.map(|model| (model, args.photo)),
     };
     let timings = bench::run(&request, &mut console).map_err(|e| CliError::of_work(e, "nothing was printed"))?;
     drop(console);

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use super::progress::Console;
+use super::recipe::RecipeArgs;
 use super::{CliError, eval_depth, eval_masks, number, output};
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::evaluate_masks::Protocol;
@@ -57,6 +58,8 @@ pub(crate) struct EvalArgs {
     /// Print one JSON document
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    recipe: RecipeArgs,
 }
 
 impl EvalArgs {
@@ -79,7 +82,8 @@ impl EvalArgs {
 pub(crate) fn run(args: EvalArgs, quiet: bool) -> Result<(), CliError> {
     let comparison = args.check()?;
     if let Some(labels) = &args.masks {
-        return eval_masks::run(&args.scene, labels, args.protocol, args.query.as_deref(), &comparison, args.json);
+        let how = (args.protocol, args.query.as_deref(), &args.recipe.recipe());
+        return eval_masks::run(&args.scene, labels, how, &comparison, args.json);
     }
     let mut console = Console::new(quiet);
     if args.depth {

@@ -9,6 +9,8 @@ use crate::jobs::evaluate::PhotoComparison;
 use crate::jobs::evaluate_masks::{self, Protocol, ProtocolSummary};
 use crate::pipeline::semantics::protocols::Unit;
 use crate::pipeline::semantics::protocols::part_recall::{HIT_IOU, Row};
+use crate::pipeline::semantics::protocols::recipes;
+use crate::pipeline::semantics::recipe::Recipe;
 
 /// Rows of the table at most; the worst come first.
 const ROWS: usize = 12;
@@ -16,28 +18,32 @@ const ROWS: usize = 12;
 pub(crate) fn run(
     scene: &Path,
     labels: &Path,
-    protocol: Protocol,
-    query: Option<&str>,
+    (protocol, query, recipe): (Protocol, Option<&str>, &Recipe),
     comparison: &PhotoComparison,
     as_json: bool,
 ) -> Result<(), CliError> {
-    let scores = evaluate_masks::run(comparison, scene, labels, protocol, query)?;
+    let scores = evaluate_masks::run(comparison, scene, labels, protocol, query, recipe)?;
     let name = clap::ValueEnum::to_possible_value(&protocol).map_or_else(String::new, |v| v.get_name().to_owned());
     let (views, trained, (miou, miou_by_view)) = (scores.views, scores.trained_on, scores.miou());
     if as_json {
         let mut value = json!({
-            "scene": scene, "protocol": name, "views": views, "views_trained_on": trained, "units": scores.units,
+            "scene": scene, "protocol": name, "views": views, "views_trained_on": trained, "units": scores.units, "recipe": recipe, "unmet": scores.unmet,
         });
         if let (Some(all), Some(own)) = (value.as_object_mut(), serde_json::to_value(&scores.summary)?.as_object()) {
             all.extend(own.clone());
-            if protocol != Protocol::PartRecall {
+            if has_units(protocol) {
                 all.extend([("miou".to_owned(), json!(miou)), ("miou_by_view".to_owned(), json!(miou_by_view))]);
             }
         }
         return output::print_json(&value);
     }
-    let mut lines = vec![summary(&scores.summary)];
-    if protocol != Protocol::PartRecall {
+    let mut lines = vec![recipe.to_string()];
+    lines.extend(scores.unmet.iter().map(|text| format!("note: {text}")));
+    lines.push(summary(&scores.summary));
+    if !has_units(protocol) && protocol != Protocol::PartRecall {
+        return output::print(&lines.join("\n"));
+    }
+    if has_units(protocol) {
         lines.push(format!("mean IoU {miou:.4} over queries, {miou_by_view:.4} over views"));
     }
     let mut worst: Vec<&Unit> = scores.units.iter().collect();
@@ -50,6 +56,11 @@ pub(crate) fn run(
         scores.units.len(),
         lines.join("\n")
     ))
+}
+
+/// Whether the mean over all queries says something.
+fn has_units(protocol: Protocol) -> bool {
+    !matches!(protocol, Protocol::PartRecall | Protocol::Recipes)
 }
 
 /// What the protocol counts, in words.
@@ -73,7 +84,25 @@ fn summary(summary: &ProtocolSummary) -> String {
             let table = output::table(&ablation(rows));
             format!("recall at IoU {}, encoder '{encoder}'\n{table}", HIT_IOU)
         }
+        ProtocolSummary::Recipes { absent, rows } => {
+            let table = output::table(&recipes(rows, *absent));
+            format!("found with IoU {HIT_IOU}; what is absent is rightly not found\n{table}")
+        }
     }
+}
+
+/// Recipes by what they find and what they rightly do not, as a table.
+fn recipes(rows: &[recipes::Row], [kinds, colors, parts]: [usize; 3]) -> Vec<Vec<String>> {
+    let percent = |share: &f64| format!("{:.0}", 100.0 * share);
+    let head = ["objects", "parts", "compounds"].map(|what| format!("{what} found %"));
+    let right = [("kinds", kinds), ("colors", colors), ("parts", parts)];
+    let right = right.map(|(what, n)| format!("of {n} absent {what} %"));
+    let mut table = vec![["".to_owned()].into_iter().chain(head).chain(right).chain(["ms".to_owned()]).collect()];
+    table.extend(rows.iter().map(|r| {
+        let shares = r.recall.iter().chain(&r.rejected).map(percent);
+        std::iter::once(r.title.clone()).chain(shares).chain([format!("{:.2}", r.mean_ms)]).collect()
+    }));
+    table
 }
 
 /// The paper's ablation as a table.

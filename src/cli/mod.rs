@@ -24,6 +24,7 @@ mod preprocess;
 mod process;
 mod progress;
 mod query;
+mod recipe;
 mod render;
 mod report;
 mod reproduce;

@@ -1,12 +1,12 @@
 //! `fmlgs models`: which networks there are, which are here, and how to get the others.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
 use super::progress::Console;
 use super::{CliError, output};
-use crate::jobs::models::{self, ModelEntry, ModelList, ModelRole, ModelState, Source};
+use crate::jobs::models::{self, Asked, ModelEntry, ModelList, ModelRole, ModelState, Source};
 
 /// List, fetch and check the neural networks
 ///
@@ -19,7 +19,9 @@ use crate::jobs::models::{self, ModelEntry, ModelList, ModelRole, ModelState, So
     fmlgs models fetch sam2.1-tiny --from https://files.example.org/models\n  \
     fmlgs models add clip-vit-b16 open_clip_pytorch_model.bin   make it of the official checkpoint\n  \
     fmlgs models add clip-vit-b16 exported/        take over files that you bring\n  \
-    fmlgs models check                             compare all files with their checksums")]
+    fmlgs models fetch onnxruntime                 the fast engine, used from the next start on\n  \
+    fmlgs models check                             compare all files with their checksums\n  \
+    fmlgs models check clip-vit-b32                and what it answers with what was published")]
 pub(crate) struct ModelsArgs {
     #[command(subcommand)]
     command: Option<Command>,
@@ -46,8 +48,14 @@ enum Command {
         #[arg(value_name = "FILE")]
         brought: PathBuf,
     },
-    /// Compare all files that are here with their checksums
-    Check,
+    /// Compare all files that are here with their checksums; of one model, also its answer with a published one
+    Check {
+        /// Its name [default: all, and checksums only]
+        id: Option<String>,
+        /// The picture that the answer is about [default: the one that was fetched with the model]
+        #[arg(long, requires = "id")]
+        picture: Option<PathBuf>,
+    },
     /// Run the models that look at images and phrases once, and time them
     Bench,
 }
@@ -60,7 +68,8 @@ pub(crate) fn run(args: ModelsArgs, quiet: bool) -> Result<(), CliError> {
             let entry = models::install(&id, Source::Brought(&brought), &mut Console::new(quiet))?;
             output::print(&format!("'{id}' is here now: {}", entry.adds))
         }
-        Some(Command::Check) => check(args.json),
+        Some(Command::Check { id: None, .. }) => check(args.json),
+        Some(Command::Check { id: Some(id), picture }) => ask(&id, picture.as_deref(), args.json),
         Some(Command::Bench) => bench(args.json),
     }
 }
@@ -79,7 +88,7 @@ fn list(as_json: bool) -> Result<(), CliError> {
     if as_json {
         let one = |(e, state): &(ModelEntry, ModelState)| {
             json!({ "id": e.id, "role": e.role, "title": e.title, "adds": e.adds, "license": e.license, "source": e.source,
-                "megabytes": e.megabytes(), "state": state })
+                "speed": e.speed, "megabytes": e.megabytes(), "state": state })
         };
         return output::print_json(&json!({
             "engine": engine, "device": device, "note": note, "folder": folder,
@@ -94,9 +103,10 @@ fn list(as_json: bool) -> Result<(), CliError> {
         let role = match e.role {
             ModelRole::Encoder => "looks",
             ModelRole::Segmenter => "masks",
+            ModelRole::Engine => "runs",
         };
         rows.push(vec![e.id.clone(), role.into(), state, size, e.license.clone()]);
-        notes.push_str(&format!("\n{}: {} {how}", e.id, e.adds));
+        notes.push_str(&format!("\n{}: {} {} {how}", e.id, e.adds, e.speed));
     }
     let note = note.map(|n| format!("\nNote: {n}")).unwrap_or_default();
     output::print(&format!(
@@ -112,15 +122,9 @@ fn state_text(entry: &ModelEntry, state: &ModelState) -> (String, String) {
         ModelState::BuiltIn => ("built in".into(), String::new()),
         ModelState::Here => ("here".into(), String::new()),
         ModelState::Missing(_) if entry.is_hosted() => {
-            ("not here".into(), format!("Get it: fmlgs models fetch {}", entry.id))
+            ("not here".into(), format!("Get it: fmlgs models fetch {}. {}", entry.id, entry.origin()))
         }
-        ModelState::Missing(_) => (
-            "not here".into(),
-            format!(
-                "Nobody hosts its files yet. Make them: python tools/export/{} --out FOLDER, then: fmlgs models add {} FOLDER",
-                entry.export, entry.id
-            ),
-        ),
+        ModelState::Missing(_) => ("not here".into(), entry.origin()),
         ModelState::Broken(problem) => ("broken".into(), problem.clone()),
     }
 }
@@ -146,6 +150,42 @@ fn check(as_json: bool) -> Result<(), CliError> {
         return Err(CliError::failed(text));
     }
     Ok(())
+}
+
+/// Compares the files of a model with their checksums, and its answer with the published one.
+fn ask(id: &str, picture: Option<&Path>, as_json: bool) -> Result<(), CliError> {
+    let answer = match models::ask_known(id, picture)? {
+        Asked::Answer(answer) => answer,
+        Asked::NothingKnown if as_json => return output::print_json(&json!({ "id": id, "known": null })),
+        Asked::NothingKnown => {
+            return output::print(&format!("{id}: its files are right; no answer of it is known to compare with"));
+        }
+        Asked::NoPicture { address } => {
+            return Err(CliError::failed(format!(
+                "{id}: its files are right, but the picture that the published answer is about is not here; \
+                 give it with --picture ({address})"
+            )));
+        }
+    };
+    if as_json {
+        output::print_json(&json!({ "id": id, "known": answer }))?;
+    } else {
+        let numbers = |all: &[f64]| all.iter().map(|v| format!("{v:.4}")).collect::<Vec<_>>().join(", ");
+        output::print(&format!(
+            "{id}: its files are right\npublished: {} ({})\nhere:      {}\n{} {}",
+            numbers(&answer.expected),
+            answer.published,
+            numbers(&answer.got),
+            if answer.agrees { "equal within" } else { "not equal within" },
+            answer.tolerance
+        ))?;
+    }
+    if answer.agrees {
+        return Ok(());
+    }
+    Err(CliError::failed(format!(
+        "'{id}' does not answer what was published; its checkpoint or its engine is another one, or the picture is"
+    )))
 }
 
 /// Times every encoder that can be used here on a picture and a phrase.

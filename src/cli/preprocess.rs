@@ -11,9 +11,10 @@ use super::{CliError, number, output};
 use crate::jobs::find_objects::{self, FindRequest, FindSettings, FoundObjects};
 use crate::jobs::models::SAM2;
 use crate::jobs::{JobError, open, plan};
-use crate::pipeline::semantics::build_map::{CODE_STEPS, Carry, Found, Lifting};
+use crate::pipeline::semantics::build_map::{CODE_STEPS, Carry, Found};
+use crate::pipeline::semantics::recipe::RecipeName;
 use crate::pipeline::semantics::tracker::TrackOptions;
-use crate::scene::Level;
+use crate::scene::{Level, Lifting, MaskPrompt, Preparation};
 
 /// Find the objects and parts of a trained scene
 ///
@@ -38,9 +39,18 @@ pub(crate) struct PreprocessArgs {
     /// best model that is here, else regions]
     #[arg(long)]
     segmenter: Option<String>,
-    /// How masks are carried to the other photos
-    #[arg(long, value_enum, default_value_t = Carry::Gaussians)]
-    tracker: Carry,
+    /// What a scene is prepared for: lifting, tracker and prompt at once; what is given beside it differs from it
+    #[arg(long, value_enum, default_value_t = RecipeName::Default)]
+    recipe: RecipeName,
+    /// How masks are carried to the other photos [default: geometry; recipe paper: sam2]
+    #[arg(long, value_enum)]
+    tracker: Option<Carry>,
+    /// What of a mask SAM 2 is given to follow [default: mask; recipe paper: points]
+    #[arg(long, value_enum)]
+    prompt: Option<MaskPrompt>,
+    /// Share of its own embedding that a part keeps in semantic deviation, the paper's w [default: 0.7]
+    #[arg(long, value_parser = number::within(0.0..=1.0_f32))]
+    part_weight: Option<f32>,
     /// The SAM 2 that follows masks: a model of 'fmlgs models', or the path of a model's .json
     #[arg(long, default_value = SAM2)]
     tracker_model: String,
@@ -56,9 +66,9 @@ pub(crate) struct PreprocessArgs {
     /// Share of a photo that may stay unknown before its masks are used too, in percent
     #[arg(long, default_value_t = 100.0 * TrackOptions::default().reseed_share, value_parser = number::within(0.0..=100.0))]
     unknown: f64,
-    /// How Gaussians get their codes
-    #[arg(long, value_enum, default_value_t = Lifting::Votes)]
-    lifting: Lifting,
+    /// How Gaussians get their codes [default: votes; recipe paper: paper]
+    #[arg(long, value_enum)]
+    lifting: Option<Lifting>,
     /// Steps of training codes
     #[arg(long, default_value_t = CODE_STEPS, value_parser = number::within(0..=10_000_000_u64))]
     code_steps: u64,
@@ -86,12 +96,19 @@ fn check_segmenter(args: &PreprocessArgs) -> Result<(), CliError> {
 
 impl PreprocessArgs {
     fn settings(&self) -> FindSettings {
+        let base = self.recipe.recipe().preparation;
+        let by_recipe = if base.prompt.is_some() { Carry::Sam2 } else { Carry::Gaussians };
+        let carry = self.tracker.unwrap_or(by_recipe);
         FindSettings {
             segmenter: self.segmenter.clone().filter(|s| s != "files"),
-            carry: self.tracker,
+            carry,
             tracker: self.tracker_model.clone(),
             encoder: self.encoder.clone(),
-            lifting: self.lifting,
+            preparation: Preparation {
+                lifting: self.lifting.unwrap_or(base.lifting),
+                part_weight: self.part_weight.unwrap_or(base.part_weight),
+                prompt: self.prompt.or(base.prompt).filter(|_| carry != Carry::Gaussians),
+            },
             code_steps: self.code_steps,
             seed: self.seed.clone(),
             max_seeds: self.max_seeds,
@@ -129,6 +146,7 @@ pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
             "scene": args.scene,
             "seeds": map.seeds,
             "secs": secs,
+            "prepared": map.prepared,
             "stages": stages.iter().map(|(stage, secs)| json!({ "stage": stage, "secs": secs })).collect::<Vec<_>>(),
             "identities": list.collect::<Vec<_>>(),
             "views": views.iter().map(|v| json!({

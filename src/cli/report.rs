@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use super::progress::Console;
+use super::recipe::RecipeArgs;
 use super::{CliError, number, output};
 use crate::jobs::export;
 use crate::jobs::report::{self, Measured, ReportRequest};
@@ -64,6 +65,8 @@ pub(crate) struct ReportArgs {
     /// Report (folder or JSON) that the table of defaults is made of; may be given several times
     #[arg(long)]
     from: Vec<PathBuf>,
+    #[command(flatten)]
+    recipe: RecipeArgs,
 }
 
 pub(crate) fn run(args: ReportArgs, quiet: bool) -> Result<(), CliError> {
@@ -81,6 +84,7 @@ pub(crate) fn run(args: ReportArgs, quiet: bool) -> Result<(), CliError> {
         max_side_px: args.max_side,
         views: args.views as usize,
         repeats: args.repeats,
+        recipe: args.recipe.recipe(),
     };
     let subject = report::subject(scene, options)?;
     let ReportArgs { stages, out, fresh, budget, .. } = args;

@@ -2,15 +2,14 @@
 
 use std::path::PathBuf;
 
+use super::recipe::RecipeArgs;
 use super::{CliError, number, output};
 use crate::jobs::{export, open, query, segment};
-use crate::pipeline::semantics::codes::TOLERANCE;
-use crate::pipeline::semantics::matching::MatchMode;
 use crate::scene::LevelFilter;
 
 /// Write the Gaussians of an object or a part as a .ply
 ///
-/// The same match as that of the mask, in space: by identities, or with --blend by the codes of the
+/// The same match as that of the mask, in space: by identities, or with --match codes by the codes of the
 /// Gaussians. Exit code 1 if nothing fits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
@@ -34,23 +33,19 @@ pub(crate) struct SegmentArgs {
     /// Whether an object or a part is meant
     #[arg(long, value_enum, default_value_t = LevelFilter::Auto)]
     kind: LevelFilter,
-    /// Match the codes of the Gaussians instead of their identities
-    #[arg(long)]
-    blend: bool,
-    /// Largest difference per channel of a match, in 255ths
-    #[arg(long, default_value_t = 255.0 * TOLERANCE, value_parser = number::within(0.0..=255.0_f32))]
-    tolerance: f32,
+    #[command(flatten)]
+    recipe: RecipeArgs,
 }
 
 pub(crate) fn run(args: SegmentArgs) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
     export::check(&args.out, &[".ply"], &scene.reads())?;
     let map = scene.semantics()?;
-    let targets = query::identities(&map, &args.text, args.kind, args.top)?;
-    let mode = if args.blend { MatchMode::Blend } else { MatchMode::Exact };
-    let kept = segment::select(&scene.cloud, &map, &targets, mode, args.tolerance / 255.0, args.rest)?;
+    let answered = query::answered(&map, &args.text, args.kind, &args.recipe.recipe())?;
+    let kept = segment::select(&scene.cloud, &map, &answered, args.top, args.rest)?;
     export::ply(&args.out, &kept)?;
-    let names: Vec<String> = targets.iter().map(|id| map.identities.full_name(*id)).collect();
+    let names: Vec<String> = answered.chosen(args.top).iter().map(|id| map.identities.full_name(*id)).collect();
     let what = if args.rest { format!("all but {}", names.join(", ")) } else { names.join(", ") };
-    output::print(&format!("{what}: {} of {} Gaussians in {}", kept.len(), scene.cloud.len(), args.out.display()))
+    let written = format!("{what}: {} of {} Gaussians in {}", kept.len(), scene.cloud.len(), args.out.display());
+    output::print(&args.recipe.lines(&map).into_iter().chain([written]).collect::<Vec<_>>().join("\n"))
 }

@@ -49,6 +49,17 @@ pub fn size(path: &Path) -> Result<(u32, u32), IoError> {
     }
 }
 
+/// Largest picture that is opened for itself, px.
+const MOST_PX: u64 = 1 << 28;
+
+/// A picture as it is stored; what is transparent has its color all the same.
+pub(crate) fn open(path: &Path) -> Result<PhotoPixels, IoError> {
+    let picture = decode_rgba(&files::read(path, files::MAX_PICTURE_BYTES)?, MOST_PX, path)?;
+    let (width_px, height_px) = picture.dimensions();
+    let rgb = picture.pixels().map(|p| [p[0], p[1], p[2]]).collect();
+    Ok(PhotoPixels { width_px, height_px, rgb, coverage: None })
+}
+
 /// Decodes a picture that must be of `expected` size, as 8-bit RGB or RGBA.
 fn decode(path: &Path, expected: (u32, u32)) -> Result<Pixels, IoError> {
     let bytes = files::read(path, files::MAX_PICTURE_BYTES)?;

@@ -2,7 +2,7 @@
 //!
 //! | entry | what |
 //! |---|---|
-//! | metadata `fmlgs` | JSON: `version`, `seeds`, `encoder`, `identities` (`level`, `parent`, `names`, `code`) |
+//! | metadata `fmlgs` | JSON: `version`, `seeds`, `encoder`, `prepared`, `identities` (`level`, `parent`, `names`, `code`) |
 //! | tensor `codes` | `[identities, 3]` f32 |
 //! | tensor `parents` | `[identities]` u32, 0 = none; identities count from 1 |
 //! | tensor `views` | `[identities]` u32, views with language features, if an encoder has looked |
@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{IoError, files};
 use crate::scene::language::MAX_VIEWS;
-use crate::scene::{GaussianCloud, Identities, LanguageFeatures, SemanticMap, ViewFeatures};
+use crate::scene::{GaussianCloud, Identities, LanguageFeatures, Preparation, SemanticMap, ViewFeatures};
 
 /// The file's name in a trained scene's folder.
 pub use super::scene_files::MAP_FILE as FILE;
@@ -39,6 +39,8 @@ struct Header {
     seeds: Vec<String>,
     #[serde(default)]
     encoder: Option<String>,
+    #[serde(default)]
+    prepared: Option<Preparation>,
     identities: Identities,
 }
 
@@ -50,6 +52,7 @@ pub fn encode(map: &SemanticMap, state: Option<&str>, path: &Path) -> Result<Vec
         state: state.map(Into::into),
         seeds: map.seeds.clone(),
         encoder: language.map(|l| l.encoder.clone()),
+        prepared: map.prepared,
         identities: map.identities.clone(),
     };
     let broken = |e: &dyn std::fmt::Display| IoError::syntax(path, "semantic map", e.to_string());
@@ -97,7 +100,7 @@ pub fn load(folder: &Path, state: Option<&str>, cloud: &GaussianCloud) -> Result
         Some(encoder) => Some(features(&path, &bytes, encoder, &header.identities)?),
     };
     let map = SemanticMap::restore(header.identities, header.seeds, cloud).ok_or_else(torn)?;
-    Ok(Some(SemanticMap { language, ..map }))
+    Ok(Some(SemanticMap { language, prepared: header.prepared, ..map }))
 }
 
 /// Features of all identities, those of the views that are missing as zeros.

@@ -6,18 +6,21 @@ use std::sync::Arc;
 use super::{Folders, JobError, open, plan};
 use crate::io::{self, Opened};
 use crate::measure::StudyError;
-use crate::measure::bench::{self, Timings, cpu, gpu, query};
+use crate::measure::bench::{self, Timings, cpu, gpu, masks, query};
 use crate::measure::plan::{OpenScene, PlanCost, PlanVariant, SIZE, cost};
 use crate::models;
 use crate::pipeline::observer::{Interrupted, Observer, Severity, Silent};
+use crate::pipeline::semantics::network_segmenter::NetworkMasks;
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
 use crate::render::Device;
-use crate::scene::Dataset;
+use crate::scene::{Dataset, PhotoPixels};
 
 /// Objects and parts of the view that is asked.
 const QUERY_IDENTITIES: usize = 300;
 /// Its size in px.
 const QUERY_SIZE: [usize; 2] = [1_008, 567];
+/// Size of a made-up photo.
+const PHOTO_SIZE: [u32; 2] = [1_008, 756];
 
 pub(crate) struct BenchRequest {
     /// Splats or trained scenes to draw, posed photos to train on.
@@ -31,6 +34,8 @@ pub(crate) struct BenchRequest {
     pub(crate) gpu: bool,
     /// So many queries are timed.
     pub(crate) queries: Option<usize>,
+    /// Network whose masks of everything in a photo are timed, and the photo, else one is made up.
+    pub(crate) masks: Option<(String, Option<PathBuf>)>,
 }
 
 /// Times stage by stage.
@@ -43,6 +48,15 @@ pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result
     if let Some(count) = request.queries {
         let mut encoder = models::encoder(models::DEMO)?;
         timings.queries = Some(query::time(encoder.as_mut(), QUERY_IDENTITIES, QUERY_SIZE, count)?);
+    }
+    if let Some((model, photo)) = &request.masks {
+        observer.note(Severity::Info, format!("Finding everything in a photo with {model}"));
+        let photo = photo.as_deref().map_or_else(|| Ok(checks()), io::photo::open)?;
+        let mut network = NetworkMasks::open(model)?;
+        let options = network.options;
+        let timed = masks::time(&mut *network.network, &options, &photo, &mut || observer.proceed().is_ok())?;
+        observer.proceed()?;
+        timings.masks = Some(timed);
     }
     for path in &request.paths {
         let name = bench::label(path);
@@ -68,6 +82,16 @@ pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result
         }
     }
     Ok(timings)
+}
+
+/// A made-up photo of squares in many colors.
+fn checks() -> PhotoPixels {
+    let [width_px, height_px] = PHOTO_SIZE;
+    let color = |i: u32| {
+        let (x, y) = (i % width_px / 84, i / width_px / 84);
+        [(x * 20) as u8, (y * 27) as u8, ((x * 7 + y * 13) % 16 * 16) as u8]
+    };
+    PhotoPixels { width_px, height_px, rgb: (0..width_px * height_px).map(color).collect(), coverage: None }
 }
 
 /// The photos to train on, and how.

@@ -15,6 +15,7 @@ use crate::pipeline::observer::{Observer, Severity, Silent};
 use crate::pipeline::semantics::build_map::{FindOptions, Tools, find_objects};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::protocols::{AskedScene, LabeledView, categories, masks};
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::pipeline::semantics::view_map::ViewMap;
@@ -116,7 +117,7 @@ pub(crate) fn ask(
     pictures: Option<&Path>,
 ) -> Result<DemoQueries, JobError> {
     let mut segmenter = FileMasks(Labels::open(photos)?);
-    let mut engine = QueryEngine::new(map.language.as_ref())?;
+    let mut engine = QueryEngine::new(map.language.as_ref(), Recipe::default())?;
     let (mut units, mut asked) = (Vec::new(), Vec::new());
     let mut renderer = Renderer::new();
     for (k, &i) in job.views.iter().enumerate() {
@@ -145,7 +146,7 @@ pub(crate) fn ask(
         for (n, question) in QUESTIONS.iter().enumerate().filter(|_| k == 0) {
             let start = Instant::now();
             let Some(answered) = engine.ask(map, question, LevelFilter::Auto)? else { continue };
-            let mask = answered.mask(&view, &map.identities, 1);
+            let mask = answered.mask(&view, None, &map.identities, 1);
             let millis = start.elapsed().as_secs_f64() * 1e3;
             if let Some(pictures) = pictures {
                 export::make_folder(pictures)?;

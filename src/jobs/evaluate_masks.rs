@@ -13,9 +13,10 @@ use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::protocols::{
     AskedScene, Category, LabeledView, Unit, categories, fastlgs_ex, langsplat, masks, means, multi_class, part_recall,
-    selection_3d, spin_nerf,
+    recipes, selection_3d, spin_nerf,
 };
 use crate::pipeline::semantics::query_engine::QueryEngine;
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
@@ -40,6 +41,8 @@ pub(crate) enum Protocol {
     Ovs3d,
     /// Part queries by embedding alone, with the paper's components switched on one after another
     PartRecall,
+    /// What is found and what is rightly not found, by names, embeddings and both, by each strategy and rule
+    Recipes,
 }
 
 /// What the [`Protocol`] of the same name counts besides the IoU of each query.
@@ -74,6 +77,11 @@ pub(crate) enum ProtocolSummary {
         encoder: String,
         rows: Vec<part_recall::Row>,
     },
+    Recipes {
+        /// Questions for what is not there: other kinds, other colors, parts that a thing lacks.
+        absent: [usize; 3],
+        rows: Vec<recipes::Row>,
+    },
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -82,6 +90,8 @@ pub(crate) struct MaskScores {
     pub(crate) trained_on: usize,
     pub(crate) units: Vec<Unit>,
     pub(crate) summary: ProtocolSummary,
+    /// What of the recipe the scene was not prepared for.
+    pub(crate) unmet: Vec<String>,
 }
 
 impl MaskScores {
@@ -99,6 +109,7 @@ pub(crate) fn run(
     labels: &Path,
     protocol: Protocol,
     query: Option<&str>,
+    recipe: &Recipe,
 ) -> Result<MaskScores, JobError> {
     let map = io::semantic_map::load(scene, comparison.state.as_deref(), &comparison.cloud)?;
     let map = &map.ok_or_else(|| JobError::NoObjects(scene.into()))?;
@@ -113,9 +124,10 @@ pub(crate) fn run(
     }
     let list: Vec<LabeledView<'_>> = views.iter().map(Drawn::labeled).collect();
     let (units, summary) = match protocol {
-        Protocol::PartRecall => recall(map, &list)?,
+        Protocol::PartRecall => recall(map, recipe, &list)?,
+        Protocol::Recipes => (Vec::new(), compare_recipes(map, recipe, &list)?),
         _ => {
-            let mut engine = QueryEngine::new(map.language.as_ref())?;
+            let mut engine = QueryEngine::new(map.language.as_ref(), recipe.clone())?;
             let mut failed = None;
             let mut ask = |text: &str| {
                 engine.ask(map, text, LevelFilter::Auto).unwrap_or_else(|e| {
@@ -129,7 +141,7 @@ pub(crate) fn run(
         }
     };
     let trained_on = views.iter().filter(|v| v.trained_on).count();
-    Ok(MaskScores { views: views.len(), trained_on, units, summary })
+    Ok(MaskScores { views: views.len(), trained_on, units, summary, unmet: recipe.unmet(map) })
 }
 
 fn compare(
@@ -151,7 +163,7 @@ fn compare(
             let hits = units.iter().filter(|u| u.hit == Some(true)).count();
             ProtocolSummary::Langsplat { localization: hits as f64 / units.len().max(1) as f64 }
         }
-        Protocol::FastlgsEx | Protocol::PartRecall => {
+        Protocol::FastlgsEx | Protocol::PartRecall | Protocol::Recipes => {
             let mut pool = fastlgs_ex::Pool::default();
             views.iter().for_each(|v| units.extend(fastlgs_ex::compare(scene, v, &mut pool)));
             ProtocolSummary::FastlgsEx {}
@@ -187,7 +199,11 @@ fn compare(
     Ok((units, summary))
 }
 
-fn recall(map: &SemanticMap, views: &[LabeledView<'_>]) -> Result<(Vec<Unit>, ProtocolSummary), JobError> {
+fn recall(
+    map: &SemanticMap,
+    recipe: &Recipe,
+    views: &[LabeledView<'_>],
+) -> Result<(Vec<Unit>, ProtocolSummary), JobError> {
     let language = map.language.as_ref().ok_or_else(|| {
         let text = "this scene has no embeddings; run 'fmlgs preprocess' on it with --encoder demo";
         JobError::Protocol(text.into())
@@ -195,11 +211,22 @@ fn recall(map: &SemanticMap, views: &[LabeledView<'_>]) -> Result<(Vec<Unit>, Pr
     let mut encoder = crate::models::encoder(&language.encoder)?;
     let mut rows = Vec::new();
     for components in part_recall::Components::ROWS {
-        rows.push(part_recall::row(components, map, language, views, |p| encoder.text(p))?);
+        rows.push(part_recall::row((components, recipe), map, language, views, |p| encoder.text(p))?);
     }
     // The paper's full method, not ours, is what others can compare with.
     let units = rows.iter().rfind(|r| r.components.localization).map(|r| r.units.clone()).unwrap_or_default();
     Ok((units, ProtocolSummary::PartRecall { encoder: language.encoder.clone(), rows }))
+}
+
+fn compare_recipes(map: &SemanticMap, recipe: &Recipe, views: &[LabeledView<'_>]) -> Result<ProtocolSummary, JobError> {
+    let absent = recipes::Absent::of(&map.identities);
+    let mut engine = QueryEngine::new(map.language.as_ref(), Recipe::default())?;
+    let mut rows = Vec::new();
+    for recipe in recipes::compared(recipe) {
+        rows.push(recipes::row(recipe, map, &mut engine, views, &absent)?);
+    }
+    let counts = [&absent.kinds, &absent.colors, &absent.parts].map(Vec::len);
+    Ok(ProtocolSummary::Recipes { absent: counts, rows })
 }
 
 /// A labeled photo and what is drawn of its view.

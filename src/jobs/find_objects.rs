@@ -16,12 +16,12 @@ use crate::models;
 use crate::models::catalog::{self, ModelRole, SAM2};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::build_map::{
-    CODE_STEPS, Carry, FindOptions, Found, Lifting, REGIONS, Tools, find_objects, segmenter,
+    CODE_STEPS, Carry, FindOptions, Found, REGIONS, Tools, find_objects, segmenter,
 };
 use crate::pipeline::semantics::sam2_tracker::Sam2Tracker;
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::render::RenderSettings;
-use crate::scene::{Dataset, GaussianCloud, Photo};
+use crate::scene::{Dataset, GaussianCloud, Photo, Preparation};
 
 /// Name of the encoder that is none.
 pub(crate) const NO_ENCODER: &str = "none";
@@ -38,8 +38,9 @@ pub struct FindSettings {
     pub tracker: String,
     /// The encoder for open-vocabulary queries, or [`NO_ENCODER`].
     pub encoder: Option<String>,
-    /// How Gaussians get their codes.
-    pub lifting: Lifting,
+    /// How Gaussians get their codes, how far parts are deviated, and what SAM 2 is prompted by.
+    #[serde(flatten)]
+    pub preparation: Preparation,
     /// Steps of training codes.
     pub code_steps: u64,
     /// Photo to begin with, by name; `None` = the first with masks.
@@ -58,7 +59,7 @@ impl Default for FindSettings {
             carry: Carry::default(),
             tracker: SAM2.into(),
             encoder: None,
-            lifting: Lifting::default(),
+            preparation: Preparation::default(),
             code_steps: CODE_STEPS,
             seed: None,
             max_seeds,
@@ -127,9 +128,12 @@ pub(crate) fn run(
             reseed_share: with.unknown_share,
             veto: with.carry == Carry::Both,
             max_side_px: request.side_px,
+            prompt: with.preparation.prompt.unwrap_or_default(),
+            ..TrackOptions::default()
         },
-        lifting: with.lifting,
+        lifting: with.preparation.lifting,
         code_steps: with.code_steps,
+        part_weight: with.preparation.part_weight,
     };
     let mut warn = |text: String| observer.note(Severity::Warning, text);
     let network = match (masks, with.segmenter.as_deref()) {

@@ -9,7 +9,7 @@ use crate::models::catalog;
 pub(crate) use crate::models::catalog::{ModelEntry, ModelRole, ModelState, SAM2};
 use crate::models::engine::engine;
 use crate::models::fetch::Patience;
-use crate::models::{self, IdentityCrop, ModelError};
+use crate::models::{self, IdentityCrop, KnownResult, ModelError};
 use crate::pipeline::observer::{Observer, Ticker};
 
 /// Engine and models of this machine.
@@ -55,7 +55,7 @@ pub(crate) fn list() -> ModelList {
         Err(e) => (None, Some(e.to_string())),
     };
     let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    let folder = catalog::folder();
+    let folder = models::folder();
     let models = catalog::entries().unwrap_or_else(|e| {
         note = Some(e.to_string());
         Vec::new()
@@ -75,7 +75,7 @@ pub(crate) enum Source<'a> {
 
 /// Puts the model called `id` in place.
 pub(crate) fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer) -> Result<ModelEntry, JobError> {
-    let (folder, mut ticker) = (catalog::folder(), Ticker::new("", 0));
+    let (folder, mut ticker) = (models::folder(), Ticker::new("", 0));
     let entry = catalog::entry(id)?;
     match source {
         Source::Brought(file) if file.extension().is_some_and(|e| e == "json") => {
@@ -96,10 +96,35 @@ pub(crate) fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer)
 
 /// Compares all files that are here with their checksums: what is wrong with each model, if anything.
 pub fn check() -> Result<Vec<(String, Option<String>)>, JobError> {
-    let folder = catalog::folder();
+    let folder = models::folder();
     let here = |e: &ModelEntry| !matches!(e.state(&folder), ModelState::Missing(_));
     let check = |e: ModelEntry| (e.id.clone(), e.verify(&folder).err().map(|e| e.to_string()));
     Ok(catalog::entries()?.into_iter().filter(here).map(check).collect())
+}
+
+/// What asking a model came to.
+pub(crate) enum Asked {
+    Answer(KnownResult),
+    /// No answer of it was published.
+    NothingKnown,
+    /// The picture is neither here nor given.
+    NoPicture {
+        address: String,
+    },
+}
+
+/// Compares the files of one model with their checksums, and what it answers with what was published, about `picture`
+/// instead of the one that was fetched with it.
+pub(crate) fn ask_known(id: &str, picture: Option<&Path>) -> Result<Asked, JobError> {
+    let (entry, folder) = (catalog::entry(id)?, models::folder());
+    entry.verify(&folder)?;
+    let Some(known) = &entry.known else { return Ok(Asked::NothingKnown) };
+    let path = picture.map_or_else(|| known.picture_in(&folder), Path::to_path_buf);
+    if picture.is_none() && !path.is_file() {
+        return Ok(Asked::NoPicture { address: known.picture.clone() });
+    }
+    let pixels = crate::io::photo::open(&path)?;
+    Ok(Asked::Answer(known.ask(&entry.description_in(&folder), &pixels)?))
 }
 
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]

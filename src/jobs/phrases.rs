@@ -19,7 +19,7 @@ use crate::pipeline::observer::{Observer, Ticker};
 use crate::pipeline::semantics::answer::{Certainty, QueryAnswer};
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::query_engine::QueryEngine;
-use crate::pipeline::semantics::reading::QueryReading;
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, LevelFilter, Mask, SemanticMap};
 
@@ -49,8 +49,7 @@ pub struct PhrasesRequest {
     /// Those that phrases have already.
     pub(crate) colors: PhraseColors,
     pub(crate) level: LevelFilter,
-    /// How pixels are matched, and the largest difference per channel.
-    pub(crate) matching: (MatchMode, f32),
+    pub(crate) recipe: Recipe,
     /// Answers whose pixels go into a mask at most.
     pub(crate) top: usize,
     pub(crate) truth: TrueMasks,
@@ -108,10 +107,10 @@ pub(crate) fn read(path: &Path) -> Result<Vec<String>, JobError> {
 /// If an encoder fails, a view cannot be drawn, or a file not be read or written.
 pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Result<Vec<PhraseRow>, JobError> {
     let PhrasesRequest { cloud, map, settings, views, phrases, level, .. } = request;
-    let mut engine = QueryEngine::new(map.language.as_ref())?;
+    let mut engine = QueryEngine::new(map.language.as_ref(), request.recipe.clone())?;
     let mut asked = Vec::new();
     for phrase in phrases {
-        let reading = QueryReading::new(&map.identities, phrase, *level).ok_or(JobError::EmptyQuery)?;
+        let reading = engine.read(&map.identities, phrase, *level).ok_or(JobError::EmptyQuery)?;
         let answered = engine.answer(map, &reading.phrase, *level)?;
         let unknown = engine.unknown_words(&map.identities, &reading.phrase);
         let ignored = answered.ignored_words(&map.identities, &reading.phrase, &unknown);
@@ -124,11 +123,11 @@ pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Resu
     let mut ticker = Ticker::new("Running the phrase list", views.len());
     for (k, (view, camera)) in views.iter().enumerate() {
         ticker.tick(k, observer)?;
-        let blend = request.matching.0 == MatchMode::Blend;
+        let blend = request.recipe.masks == MatchMode::Codes;
         let maps = ViewMaps::draw(&mut renderer, (cloud, settings), map, camera, blend, map.has_parts())?;
         coco.view(view, camera);
         for (i, (certainty, answered)) in asked.iter().enumerate() {
-            let mask = mask(request, &maps, answered);
+            let mask = maps.of_answer(map, answered, request.top);
             let place = Path::new(&stem(view)).join(format!("{}.png", stems[i]));
             let iou = truth(&request.truth, &place, &mask)?.map(|truth| mask.iou(&truth));
             if let Some(folder) = &request.export {
@@ -147,14 +146,6 @@ pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Resu
         atomic::write(&folder.join("coco.json"), |w| Ok(serde_json::to_writer(w, &coco)?))?;
     }
     Ok(rows)
-}
-
-fn mask(request: &PhrasesRequest, maps: &ViewMaps, answered: &QueryAnswer) -> Mask {
-    let mut mask = Mask::empty(maps.identities.width_px, maps.identities.height_px);
-    let (mode, tolerance) = request.matching;
-    let chosen = answered.chosen(request.top);
-    chosen.into_iter().for_each(|id| mask.add(&maps.mask(&request.map, id, mode, tolerance)));
-    mask
 }
 
 /// The true mask, in the size of `like`.

@@ -12,6 +12,7 @@ use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::matching::{self, MatchMode};
 pub(crate) use crate::pipeline::semantics::query_engine::{QueryEngine, answer_encoded};
 use crate::pipeline::semantics::reading::QueryReading;
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{Features, RenderSettings, Renderer};
@@ -46,10 +47,12 @@ impl ViewMaps {
 
     /// The pixels of an identity; a match differs by at most `tolerance` per channel.
     pub(crate) fn mask(&self, map: &SemanticMap, id: IdentityId, mode: MatchMode, tolerance: f32) -> Mask {
-        match (&self.codes, mode) {
-            (Some(codes), MatchMode::Blend) => matching::blend(codes, &map.identities, id, tolerance),
-            _ => matching::exact(&self.identities, &map.identities, id, tolerance),
-        }
+        matching::pixels((&self.identities, self.codes.as_ref()), &map.identities, id, mode, tolerance)
+    }
+
+    /// The pixels of an answer, of at most `top` identities.
+    pub(crate) fn of_answer(&self, map: &SemanticMap, answered: &QueryAnswer, top: usize) -> Mask {
+        answered.mask(&self.identities, self.codes.as_ref(), &map.identities, top)
     }
 }
 
@@ -68,9 +71,7 @@ pub(crate) struct QueryRequest<'a> {
     pub(crate) text: &'a str,
     pub(crate) level: LevelFilter,
     pub(crate) camera: &'a Camera,
-    pub(crate) mode: MatchMode,
-    /// Largest difference per channel of a match.
-    pub(crate) tolerance: f32,
+    pub(crate) recipe: &'a Recipe,
     /// Answers whose pixels go into the mask at most.
     pub(crate) top: usize,
 }
@@ -83,6 +84,8 @@ pub(crate) struct QueryResult {
     pub(crate) reading: QueryReading,
     pub(crate) mask: Mask,
     pub(crate) unknown_words: Vec<String>,
+    /// Canonical phrases that the encoder could not read and that were left out.
+    pub(crate) unread: Vec<String>,
     /// Words that the answer does not rest on.
     pub(crate) ignored_words: Vec<String>,
     /// Milliseconds from the text to the mask, the view there.
@@ -92,22 +95,19 @@ pub(crate) struct QueryResult {
 
 pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &QueryRequest<'_>) -> Result<QueryResult, JobError> {
     let drawn = (&*scene.cloud, &scene.settings);
-    let blend = request.mode == MatchMode::Blend;
+    let blend = request.recipe.masks == MatchMode::Codes;
     let maps = ViewMaps::draw(&mut Renderer::new(), drawn, map, request.camera, blend, map.has_parts())?;
-    let mut engine = QueryEngine::new(map.language.as_ref())?;
+    let mut engine = QueryEngine::new(map.language.as_ref(), request.recipe.clone())?;
     let start = Instant::now();
-    let reading = QueryReading::new(&map.identities, request.text, request.level).ok_or(JobError::EmptyQuery)?;
+    let reading = engine.read(&map.identities, request.text, request.level).ok_or(JobError::EmptyQuery)?;
     let mut answered = engine.answer(map, &reading.phrase, request.level)?;
     let matching_since = Instant::now();
-    let mut mask = Mask::empty(maps.identities.width_px, maps.identities.height_px);
-    for id in answered.chosen(request.top) {
-        mask.add(&maps.mask(map, id, request.mode, request.tolerance));
-    }
+    let mask = maps.of_answer(map, &answered, request.top);
     answered.stages.mask = ms_since(matching_since);
     let query_ms = ms_since(start);
     let unknown_words = engine.unknown_words(&map.identities, &reading.phrase);
     let ignored_words = answered.ignored_words(&map.identities, &reading.phrase, &unknown_words);
-    Ok(QueryResult { answered, reading, mask, unknown_words, ignored_words, query_ms, maps })
+    Ok(QueryResult { answered, reading, mask, unknown_words, unread: engine.unread(), ignored_words, query_ms, maps })
 }
 
 /// The identities that are meant, at most `top` of them.
@@ -117,9 +117,21 @@ pub(crate) fn identities(
     level: LevelFilter,
     top: usize,
 ) -> Result<Vec<IdentityId>, JobError> {
-    let answered = QueryEngine::new(map.language.as_ref())?.ask(map, text, level)?;
-    let found = answered.map(|a| a.chosen(top)).unwrap_or_default();
-    if found.is_empty() { Err(JobError::NoMatch(text.to_owned())) } else { Ok(found) }
+    Ok(answered(map, text, level, &Recipe::default())?.chosen(top))
+}
+
+/// The answer to a question.
+///
+/// # Errors
+/// If nothing is found, or the encoder fails.
+pub(crate) fn answered(
+    map: &SemanticMap,
+    text: &str,
+    level: LevelFilter,
+    recipe: &Recipe,
+) -> Result<QueryAnswer, JobError> {
+    let answered = QueryEngine::new(map.language.as_ref(), recipe.clone())?.ask(map, text, level)?;
+    answered.filter(|a| !a.chosen(1).is_empty()).ok_or_else(|| JobError::NoMatch(text.to_owned()))
 }
 
 /// Writes the mask, white on black.

@@ -14,6 +14,7 @@ use crate::models;
 use crate::pipeline::depth as true_depth;
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::protocols::categories;
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::segmenter::{FileMasks, FoundMask, Segmenter};
 use crate::pipeline::semantics::tracker::labels_of;
 use crate::pipeline::semantics::train_codes::CodeView;
@@ -30,6 +31,8 @@ pub struct StudyOptions {
     /// Most views that are compared.
     pub(crate) views: usize,
     pub(crate) repeats: u32,
+    /// What queries differ from.
+    pub(crate) recipe: Recipe,
 }
 
 #[derive(Clone, Debug)]
@@ -47,7 +50,15 @@ pub struct Subject {
 
 impl Default for StudyOptions {
     fn default() -> Self {
-        Self { masks: None, steps: vec![300, 1_000], train_steps: 1_000, max_side_px: 256, views: 4, repeats: 3 }
+        Self {
+            masks: None,
+            steps: vec![300, 1_000],
+            train_steps: 1_000,
+            max_side_px: 256,
+            views: 4,
+            repeats: 3,
+            recipe: Recipe::default(),
+        }
     }
 }
 
@@ -189,7 +200,8 @@ impl Subject {
             return Err(self.few_labels("there are no labels of this scene's photos"));
         }
         let input = self.input(&[("photos", which.into())]);
-        query::study((&self.cloud, &self.settings), map, encoder, views, self.options.repeats, input)
+        let how = (self.options.repeats, &self.options.recipe);
+        query::study((&self.cloud, &self.settings), map, encoder, views, how, input)
     }
 
     /// Indices of the labeled photos that training saw, and of those that it did not see.

@@ -10,8 +10,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::fetch::{self, FetchError, FileToFetch, Patience};
-use super::{ModelError, manifest};
-use crate::io::data_folder::data_folder;
+use super::{KnownAnswer, ModelError, folder, manifest};
 
 const LIST: &str = include_str!("../../assets/models.toml");
 
@@ -24,6 +23,8 @@ pub(crate) enum ModelRole {
     /// Compares pictures with phrases.
     Encoder,
     Segmenter,
+    /// Runs networks.
+    Engine,
 }
 
 /// A model of the list.
@@ -65,6 +66,15 @@ pub struct ModelEntry {
     /// How long a segmenter looks for everything in a photo.
     #[serde(default)]
     pub(crate) photo_seconds: Option<PhotoSeconds>,
+    /// The same by system, for what is a program: that of this one becomes `checkpoint`.
+    #[serde(default)]
+    archive: Vec<SystemArchive>,
+    /// How fast it is without a GPU.
+    #[serde(default)]
+    pub speed: String,
+    /// What it is known to answer with the official weights.
+    #[serde(default)]
+    pub known: Option<KnownAnswer>,
 }
 
 /// Seconds on two cores, measured.
@@ -76,6 +86,17 @@ pub(crate) struct PhotoSeconds {
     /// With the engine that is built in.
     #[serde(default)]
     pub(crate) built_in: Option<f64>,
+}
+
+/// An archive with a program for one kind of machine.
+#[derive(Clone, Debug, Deserialize)]
+struct SystemArchive {
+    /// As Rust names it.
+    system: String,
+    architecture: String,
+    /// What is taken out of it.
+    library: ListedFile,
+    file: OfficialFile,
 }
 
 /// A file with the weights of a model, as its makers publish it.
@@ -151,17 +172,22 @@ pub enum InstallError {
 pub fn entries() -> Result<Vec<ModelEntry>, ModelError> {
     let damaged =
         |e: toml::de::Error| ModelError::Metadata { path: "assets/models.toml".into(), problem: e.to_string() };
-    toml::from_str::<List>(LIST).map(|list| list.model).map_err(damaged)
+    let mut all = toml::from_str::<List>(LIST).map_err(damaged)?.model;
+    for entry in &mut all {
+        let fits = |a: &&SystemArchive| a.system == std::env::consts::OS && a.architecture == std::env::consts::ARCH;
+        if let Some(archive) = entry.archive.iter().find(fits) {
+            entry.checkpoint = Some(archive.file.clone());
+            entry.file = vec![archive.library.clone()];
+        }
+    }
+    // A program without an archive for this machine is nothing that could be had.
+    all.retain(|entry| entry.archive.is_empty() || entry.checkpoint.is_some());
+    Ok(all)
 }
 
 /// The model with this name.
 pub fn entry(id: &str) -> Result<ModelEntry, InstallError> {
     entries()?.into_iter().find(|e| e.id == id).ok_or_else(|| InstallError::Unknown(id.to_owned()))
-}
-
-pub(crate) fn folder() -> PathBuf {
-    let set = std::env::var_os("FMLGS_MODELS").filter(|p| !p.is_empty());
-    set.map_or_else(|| data_folder().join("models"), PathBuf::from)
 }
 
 impl ModelEntry {
@@ -188,6 +214,22 @@ impl ModelEntry {
     /// About how much is fetched, MB.
     pub(crate) fn download_megabytes(&self) -> u64 {
         self.checkpoint.as_ref().map_or_else(|| self.megabytes(), |c| c.megabytes)
+    }
+
+    /// Where it comes from and what it becomes, of one that is not here.
+    pub(crate) fn origin(&self) -> String {
+        let (license, megabytes) = (&self.license, self.megabytes());
+        match &self.checkpoint {
+            Some(official) => format!(
+                "From its makers ({}; {license}), made into {megabytes} MB here. This address has not been tried yet.",
+                official.url
+            ),
+            None if self.url.is_some() => String::new(),
+            None => format!(
+                "Its files are not hosted yet ({megabytes} MB, {license}). tools/export creates them from the official \
+                 checkpoint."
+            ),
+        }
     }
 
     /// Whether it can be used from `folder`. Sizes are compared, contents are not: see

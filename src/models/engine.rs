@@ -2,8 +2,8 @@
 //! otherwise. Chosen once, at the first use of a network.
 //!
 //! A library is taken from the path in `FMLGS_ONNXRUNTIME` or `ORT_DYLIB_PATH`, else from the
-//! program's own folder, the active Python environment's `onnxruntime` wheel, or the system's
-//! library folders. One that cannot be loaded, or is older than version 1.24, is left aside, and
+//! models' folder if it was fetched, the program's own folder, the active Python environment's
+//! `onnxruntime` wheel, or the system's library folders. One that cannot be loaded, or is older than version 1.24, is left aside, and
 //! [`Engine::note`] says so. `FMLGS_DEVICE` chooses what it computes on (`cpu`, `cuda`, `tensorrt`,
 //! `coreml`, `directml`); otherwise the first of CUDA, Core ML and DirectML that it offers.
 
@@ -15,10 +15,13 @@ use ort::ep::{CUDA, CoreML, DirectML, ExecutionProvider, ExecutionProviderDispat
 use ort::session::Session;
 use ort::session::builder::GraphOptimizationLevel;
 
-use super::ModelError;
+use super::manifest::{self, GraphFile};
 use super::network::{Network, guarded};
-use super::session_cache;
+use super::{ModelError, folder, session_cache};
 use crate::scene::resource_log::{self, ResourceKind};
+
+/// The description of the library that was fetched.
+pub(super) const LIBRARY: &str = "onnxruntime.json";
 
 const MODEL_USE: &str = "its first use";
 
@@ -86,19 +89,57 @@ pub(crate) fn engine() -> Result<&'static Engine, ModelError> {
     chosen.as_ref().map_err(|(engine, problem)| ModelError::Engine { engine: engine.clone(), problem: problem.clone() })
 }
 
+impl GraphFile {
+    /// The network in the slot; loaded from a folder if it is not there yet, and only if the file is
+    /// what its description says.
+    pub(crate) fn ready<'a>(
+        &self,
+        slot: &'a mut Option<Network>,
+        folder: &Path,
+    ) -> Result<&'a mut Network, ModelError> {
+        let loaded = match slot.take() {
+            Some(network) => network,
+            None => {
+                self.check(folder)?;
+                engine()?.load_file(&folder.join(&self.file))?
+            }
+        };
+        Ok(slot.insert(loaded))
+    }
+}
+
+/// A library that was chosen, or why one that was to be chosen cannot be.
+type Library = Result<PathBuf, (PathBuf, String)>;
+
 /// Where an ONNX Runtime library is, or is said to be.
-fn library() -> Option<PathBuf> {
+fn library() -> Option<Library> {
     let var = |name: &str| std::env::var_os(name).filter(|p| !p.is_empty()).map(PathBuf::from);
     if let Some(path) = var("FMLGS_ONNXRUNTIME").or_else(|| var("ORT_DYLIB_PATH")) {
         // An explicit "none" keeps the built-in engine, whatever is installed.
-        return Some(path).filter(|p| p.as_os_str() != "none");
+        return Some(path).filter(|p| p.as_os_str() != "none").map(Ok);
+    }
+    if let Some(fetched) = fetched(&folder()) {
+        return Some(fetched);
     }
     let own = std::env::current_exe().ok().and_then(|p| p.parent().map(Path::to_path_buf));
     let wheels = ["VIRTUAL_ENV", "CONDA_PREFIX"].into_iter().filter_map(var).flat_map(|p| wheel_folders(&p));
     let system =
         ["/usr/local/lib", "/usr/lib", "/usr/lib/x86_64-linux-gnu", "/usr/lib/aarch64-linux-gnu", "/opt/homebrew/lib"];
     let folders = own.into_iter().chain(wheels).chain(system.map(PathBuf::from));
-    folders.filter_map(|folder| library_in(&folder)).next()
+    folders.filter_map(|folder| library_in(&folder)).next().map(Ok)
+}
+
+/// The library that was fetched into the models' folder, if it is what its description says.
+fn fetched(folder: &Path) -> Option<Library> {
+    let description = folder.join(LIBRARY);
+    if !description.is_file() {
+        return None;
+    }
+    let library = manifest::graphs(&description).and_then(|files| {
+        files.iter().try_for_each(|file| file.check(folder))?;
+        Ok(files.first().map(|file| folder.join(&file.file)))
+    });
+    library.map_err(|e| (description, e.to_string())).transpose()
 }
 
 /// Where a Python environment keeps the library of its `onnxruntime` package.
@@ -126,15 +167,20 @@ pub(super) fn library_in(folder: &Path) -> Option<PathBuf> {
 }
 
 impl Engine {
-    fn choose(library: Option<PathBuf>) -> Result<Self, (String, String)> {
+    fn choose(library: Option<Library>) -> Result<Self, (String, String)> {
         let mut note = None;
-        let (builder, name, is_runtime) = match library.map(|path| (loaded(&path), path)) {
-            Some((Ok(builder), path)) => (builder, format!("ONNX Runtime ({})", path.display()), true),
+        let opened = library.map(|library| {
+            let path = library?;
+            loaded(&path).map(|builder| (builder, path.clone())).map_err(|problem| (path, problem))
+        });
+        let (builder, name, is_runtime) = match opened {
+            Some(Ok((builder, path))) => (builder, format!("ONNX Runtime ({})", path.display()), true),
             other => {
-                if let Some((Err(problem), path)) = other {
+                if let Some(Err((path, problem))) = other {
                     note = Some(format!(
                         "the built-in engine runs the models, because the ONNX Runtime library {} is of no use: \
-                         {problem}; set FMLGS_ONNXRUNTIME to a library of version 1.24 or later, or to 'none'",
+                         {problem}; fetch it ('fmlgs models fetch onnxruntime'), set FMLGS_ONNXRUNTIME to a library of \
+                         version 1.24 or later, or to 'none'",
                         path.display()
                     ));
                 }

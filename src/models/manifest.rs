@@ -7,8 +7,6 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::ModelError;
-use super::engine::engine;
-use super::network::Network;
 
 /// Version of the file that this program reads.
 const VERSION: u64 = 1;
@@ -23,23 +21,6 @@ pub struct GraphFile {
 }
 
 impl GraphFile {
-    /// The network in the slot; loaded from a folder if it is not there yet, and only if the file is
-    /// what its description says.
-    pub(crate) fn ready<'a>(
-        &self,
-        slot: &'a mut Option<Network>,
-        folder: &Path,
-    ) -> Result<&'a mut Network, ModelError> {
-        let loaded = match slot.take() {
-            Some(network) => network,
-            None => {
-                self.check(folder)?;
-                engine()?.load_file(&folder.join(&self.file))?
-            }
-        };
-        Ok(slot.insert(loaded))
-    }
-
     /// Compares its size with what the description says.
     pub fn check_size(&self, folder: &Path) -> Result<(), ModelError> {
         let path = folder.join(&self.file);
@@ -95,7 +76,7 @@ struct AnyModel {
     graphs: BTreeMap<String, GraphFile>,
 }
 
-/// The graphs that a description names.
+/// The files that a description names.
 pub fn graphs(path: &Path) -> Result<Vec<GraphFile>, ModelError> {
     let kind = kind(path)?;
     let graphs: AnyModel = read(path, &kind)?;

@@ -6,6 +6,10 @@
 //! there are, and [`fetch`] brings them; `template` makes them of
 //! official checkpoints.
 
+use std::path::PathBuf;
+
+use crate::io::data_folder::data_folder;
+
 pub mod catalog;
 mod checkpoint;
 pub mod clip;
@@ -13,6 +17,7 @@ mod demo;
 pub(crate) mod engine;
 mod error;
 pub mod fetch;
+mod known;
 pub mod manifest;
 pub mod network;
 mod official;
@@ -22,6 +27,7 @@ pub mod sam2;
 pub mod session_cache;
 mod template;
 mod tile;
+mod unpack;
 mod vocabulary;
 mod words;
 
@@ -31,7 +37,14 @@ pub(crate) use catalog::ModelRole;
 pub use clip::ClipEncoder;
 pub(crate) use demo::DemoEncoder;
 pub use error::ModelError;
+pub(crate) use known::{KnownAnswer, KnownResult};
 pub(crate) use words::is_word;
+
+/// Where models lie.
+pub(crate) fn folder() -> PathBuf {
+    let set = std::env::var_os("FMLGS_MODELS").filter(|p| !p.is_empty());
+    set.map_or_else(|| data_folder().join("models"), PathBuf::from)
+}
 
 /// A picture of one identity: mask on black, padded to a square, side x side, sRGB 0..1, row-major.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,13 +4,13 @@ use std::path::Path;
 
 use serde::Deserialize;
 
-use super::catalog::{InstallError, ModelEntry, OfficialFile};
+use super::catalog::{InstallError, ModelEntry, ModelRole, OfficialFile};
 use super::fetch::{self, FileToFetch, Patience};
 use super::template::Template;
-use super::{ModelError, manifest};
+use super::{ModelError, manifest, unpack};
 
-/// Endings of checkpoints.
-const ENDINGS: [&str; 4] = [".pt", ".pth", ".bin", ".safetensors"];
+/// Endings of checkpoints, and of archives with programs.
+const ENDINGS: [&str; 6] = [".pt", ".pth", ".bin", ".safetensors", ".tgz", ".zip"];
 
 /// The template of a model, where there is one.
 fn template(id: &str) -> Option<&'static [u8]> {
@@ -18,8 +18,13 @@ fn template(id: &str) -> Option<&'static [u8]> {
         "clip-vit-b16" => include_bytes!("../../assets/models/clip-vit-b16.zip"),
         "clip-vit-b32" => include_bytes!("../../assets/models/clip-vit-b32.zip"),
         "clip-vit-b16-openai" => include_bytes!("../../assets/models/clip-vit-b16-openai.zip"),
-        "sam2.1-tiny" => include_bytes!("../../assets/models/sam2.1-tiny.zip"),
+        "mobile-sam" => include_bytes!("../../assets/models/mobile-sam.zip"),
         "sam-vit-b" => include_bytes!("../../assets/models/sam-vit-b.zip"),
+        "sam-vit-h" => include_bytes!("../../assets/models/sam-vit-h.zip"),
+        "sam2.1-tiny" => include_bytes!("../../assets/models/sam2.1-tiny.zip"),
+        "sam2.1-small" => include_bytes!("../../assets/models/sam2.1-small.zip"),
+        "sam2.1-base-plus" => include_bytes!("../../assets/models/sam2.1-base-plus.zip"),
+        "sam2.1-large" => include_bytes!("../../assets/models/sam2.1-large.zip"),
         #[cfg(test)]
         "reduced" => include_bytes!("../../tests/fixtures/networks/clip_template.zip"),
         _ => return None,
@@ -51,7 +56,7 @@ struct Origin {
 }
 
 impl ModelEntry {
-    /// Makes it of an official checkpoint that somebody brings, and checks it. `progress` is told the weights that are
+    /// Makes it of an official checkpoint or archive that somebody brings, and checks it. `progress` is told the weights that are
     /// written and all of them, and says whether to go on.
     pub fn add_checkpoint(
         &self,
@@ -61,6 +66,11 @@ impl ModelEntry {
     ) -> Result<(), InstallError> {
         if self.built_in {
             return Err(InstallError::BuiltIn(self.id.clone()));
+        }
+        if self.role == ModelRole::Engine {
+            let library = self.file.first().map_or("", |f| &f.name);
+            unpack::library(checkpoint, library, folder, &self.description)?;
+            return self.verify(folder);
         }
         let template = template(&self.id);
         let template =
@@ -81,13 +91,23 @@ impl ModelEntry {
     ) -> Result<(), InstallError> {
         match (&self.checkpoint, from) {
             (Some(official), None) => {
-                self.fetch_checkpoint(official, folder, &official.address(mirror().as_deref()), patience, progress)
+                self.fetch_checkpoint(official, folder, &official.address(mirror().as_deref()), patience, progress)?;
             }
             (Some(official), Some(url)) if is_checkpoint(url) => {
-                self.fetch_checkpoint(official, folder, url, patience, progress)
+                self.fetch_checkpoint(official, folder, url, patience, progress)?;
             }
-            _ => self.fetch_files(folder, from, patience, progress),
+            _ => self.fetch_files(folder, from, patience, progress)?,
         }
+        if let (Some(known), None) = (&self.known, from) {
+            let to = known.picture_in(folder);
+            let wanted =
+                FileToFetch { url: &known.picture, to: &to, bytes: None, most: fetch::MOST_UNPROMISED, sha256: None };
+            if !to.is_file() {
+                // The model is as good without; who checks it is told that the picture is missing.
+                let _ = fetch::fetch(&wanted, patience, &mut |there, all| progress("picture", there, all));
+            }
+        }
+        Ok(())
     }
 
     /// Fetches its checkpoint, makes it of that, and removes the checkpoint.
@@ -209,7 +229,7 @@ mod tests {
     fn every_listed_checkpoint_has_its_template() {
         let all = crate::models::catalog::entries().expect("the list");
         let mut made = 0;
-        for entry in all {
+        for entry in all.into_iter().filter(|e| e.role != ModelRole::Engine) {
             let bytes = template(&entry.id);
             assert_eq!(bytes.is_some(), entry.checkpoint.is_some(), "{}", entry.id);
             let Some(bytes) = bytes else { continue };
@@ -224,7 +244,7 @@ mod tests {
             assert!(!folder.path().join("models").exists());
             made += 1;
         }
-        assert!(made >= 5);
+        assert!(made >= 10);
         let none =
             reduced("http://127.0.0.1/").add_checkpoint(Path::new("/nowhere"), &fixture("none"), &mut |_, _| true);
         assert!(matches!(none, Err(InstallError::Model(ModelError::Metadata { .. }))));

@@ -5,6 +5,8 @@
 //! template followed by the weights, and no graph has to be understood here.
 
 #[cfg(test)]
+mod mask_tests;
+#[cfg(test)]
 mod tests;
 
 use std::collections::BTreeMap;

@@ -68,7 +68,7 @@ pub struct Identities {
 
 impl Identities {
     /// So many nameless objects.
-    pub(crate) fn objects(count: usize) -> Self {
+    pub fn objects(count: usize) -> Self {
         let mut all = Self::default();
         for _ in 0..count {
             all.add(Level::Object, NOBODY, Vec::new());

@@ -1,6 +1,6 @@
 //! Identities together with the Gaussians that belong to them.
 
-use super::{ExtraProperty, GaussianCloud, Identities, IdentityId, LanguageFeatures, NOBODY};
+use super::{ExtraProperty, GaussianCloud, Identities, IdentityId, LanguageFeatures, NOBODY, Preparation};
 
 /// Channels of a Gaussian's codes: those of its object, then those of its part.
 pub(crate) const CODE_CHANNELS: usize = 6;
@@ -35,6 +35,8 @@ pub struct SemanticMap {
     pub language: Option<LanguageFeatures>,
     /// Names of the photos whose masks it comes from.
     pub seeds: Vec<String>,
+    /// How it was prepared, if that is known.
+    pub prepared: Option<Preparation>,
 }
 
 impl SemanticMap {
@@ -42,7 +44,7 @@ impl SemanticMap {
     pub fn from_identities(identities: Identities, of: Vec<IdentityId>, margin: Vec<f32>, seeds: Vec<String>) -> Self {
         let by_id: Vec<_> = (0..=identities.len() as IdentityId).map(|id| identities.codes(id)).collect();
         let codes = of.iter().map(|id| by_id.get(*id as usize).copied().unwrap_or(by_id[0])).collect();
-        Self { identities, identity_of: of, margin, codes, language: None, seeds }
+        Self { identities, identity_of: of, margin, codes, language: None, seeds, prepared: None }
     }
 
     /// Writes identities, margins and codes into the cloud's extra properties.
@@ -93,6 +95,7 @@ impl SemanticMap {
             codes: gaussians.iter().map(|&i| self.codes[i]).collect(),
             language: None,
             seeds: self.seeds.clone(),
+            prepared: self.prepared,
         }
     }
 

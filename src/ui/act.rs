@@ -293,6 +293,7 @@ impl App {
                 up,
                 meters: scene.meters_per_unit(),
                 exports: scene.out.join("exports"),
+                recipe: self.viewport.queries.recipe().clone(),
                 explored,
             },
             scene: self.state.scene_number,

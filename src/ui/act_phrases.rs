@@ -44,7 +44,7 @@ impl App {
             colors,
             phrases,
             level: LevelFilter::Auto,
-            matching: self.viewport.queries.matching(),
+            recipe: self.viewport.queries.recipe().clone(),
             top: 1,
             truth,
             export: to,

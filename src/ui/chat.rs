@@ -316,7 +316,7 @@ impl Agent {
     /// Brings session and world up to date.
     fn get_ready(&mut self, snapshot: Snapshot, settings: ChatSettings) -> Result<(), String> {
         let Snapshot { parts, cloud, scene, eye, aspect, hidden, undoable } = snapshot;
-        let (key, map) = ((scene, cloud), Arc::clone(&parts.map));
+        let (key, map, recipe) = ((scene, cloud), Arc::clone(&parts.map), parts.recipe.clone());
         if self.world.as_ref().is_none_or(|(known, _)| *known != key) {
             let (news, repaint) = (self.news.clone(), Arc::clone(&self.repaint));
             let emit = Box::new(move |effect: Effect| {
@@ -330,6 +330,7 @@ impl Agent {
         }
         if let Some((_, world)) = &mut self.world {
             world.keep_up(eye, aspect, &hidden, &map);
+            world.answer_by(&recipe).map_err(|e| e.to_string())?;
             world.undoable = undoable;
         }
         if self.session.as_ref().is_none_or(|(known, _)| *known != settings) {

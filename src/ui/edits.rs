@@ -106,7 +106,7 @@ impl App {
     }
 
     fn show_state(&mut self, view: ViewState) {
-        let ViewState { hidden, crop, modes, split, dim, cameras, path, pinned } = view;
+        let ViewState { hidden, crop, modes, split, dim, cameras, path, pinned, recipes } = view;
         if self.viewport.visibility.hidden() != &hidden {
             self.viewport.visibility.set_hidden(hidden);
         }
@@ -115,6 +115,7 @@ impl App {
         (self.layout.split_view, self.layout.dim) = (split, dim);
         self.camera.set_path(path);
         if let Some(map) = self.state.semantics.clone() {
+            self.viewport.queries.set_recipes(&recipes, &map);
             self.viewport.queries.pin_only(&pinned, &map);
         }
     }
@@ -130,6 +131,7 @@ impl App {
             cameras: layout.cameras,
             path: self.camera.path.clone(),
             pinned: viewport.queries.pinned_texts(),
+            recipes: viewport.queries.recipes(),
         };
         let map = self.state.semantics.as_deref().cloned();
         EditSnapshot { scene: self.state.scene_number, map, view }

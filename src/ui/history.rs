@@ -9,6 +9,7 @@ use std::sync::Arc;
 
 use crate::jobs::edit::EditRequest;
 use crate::pipeline::semantics::edit::Edit;
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::scene::undo::UndoHistory;
 use crate::scene::{CameraPath, CropBox, Identities, IdentityId, NOBODY, SemanticMap};
 use crate::worker::{JobId, ViewMode};
@@ -27,6 +28,8 @@ pub(crate) struct ViewState {
     pub(crate) path: CameraPath,
     /// Queries that are pinned, in the first and the second view.
     pub(crate) pinned: [Vec<String>; 2],
+    /// How queries are answered there.
+    pub(crate) recipes: [Recipe; 2],
 }
 
 /// All that can be changed back.
@@ -184,6 +187,9 @@ fn described(before: &ViewState, now: &ViewState, all: Option<&Identities>) -> S
     if before.cameras != now.cameras {
         return format!("{} the cameras", if now.cameras { "showed" } else { "hid" });
     }
+    if before.recipes != now.recipes {
+        return "changed the recipe".to_owned();
+    }
     "changed what is pinned".to_owned()
 }
 
@@ -259,6 +265,7 @@ mod tests {
             cameras: true,
             path,
             pinned: Default::default(),
+            recipes: Default::default(),
         };
         let now = EditSnapshot { scene: 1, map: Some(lamp()), view };
         let mut history = ChangeHistory::default();
@@ -280,9 +287,21 @@ mod tests {
         assert_eq!(done(&mut history, &now, None), "showed depth");
         now.view.split = true;
         assert_eq!(done(&mut history, &now, None), "split the view");
+        now.view.recipes[1] = Recipe::paper();
+        assert_eq!(done(&mut history, &now, None), "changed the recipe");
         assert_eq!(history.settle(&now, None), None, "nothing has changed");
         let back: Vec<String> = std::iter::from_fn(|| history.go(false)).map(|(what, _)| what).collect();
-        assert_eq!(back, ["split the view", "showed depth", "added a keyframe", "split lamp", "showed only lamp"]);
+        assert_eq!(
+            back,
+            [
+                "changed the recipe",
+                "split the view",
+                "showed depth",
+                "added a keyframe",
+                "split lamp",
+                "showed only lamp"
+            ]
+        );
         assert_eq!((history.last(), history.next()), (None, Some("showed only lamp")));
         let (_, again) = history.go(true).expect("something to redo");
         assert!(again.view.hidden.len() == 2 && again.view.path.keys.is_empty());

@@ -8,10 +8,9 @@ use crossbeam_channel::{Sender, bounded};
 
 use super::{Repaint, Slot};
 use crate::models::{self, Encoder, ModelError};
-use crate::pipeline::semantics::answer::phrases_of;
 use crate::pipeline::semantics::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::parse::ParsedQuery;
-use crate::pipeline::semantics::relevancy::CANONICAL;
+use crate::pipeline::semantics::recipe::{PAPERS_PHRASES, Recipe};
 use crate::pipeline::semantics::timing::ms_since;
 
 /// Requests that may wait; only the newest is read.
@@ -40,21 +39,24 @@ pub(crate) struct EncodedText {
     pub(crate) encode_ms: f64,
 }
 
+/// Texts, each with the recipe that it is answered by: that says which other phrases are needed.
+pub(crate) type TextRequest = Vec<(ParsedQuery, Recipe)>;
+
 /// Handle of the thread. Dropping it ends the thread.
 pub(crate) struct TextEncoder {
-    texts: Sender<Vec<ParsedQuery>>,
+    texts: Sender<TextRequest>,
     encoded: Arc<Slot<Encoded>>,
 }
 
 impl TextEncoder {
     /// Loads the encoder of this name and waits for texts. Fails only if the system gives no thread.
     pub(crate) fn start(name: String, repaint: Repaint) -> std::io::Result<Self> {
-        let (sender, texts) = bounded::<Vec<ParsedQuery>>(QUEUED);
+        let (sender, texts) = bounded::<TextRequest>(QUEUED);
         let encoded = Arc::new(Slot::default());
         let slot = Arc::clone(&encoded);
         let work = move || {
             // Networks are prepared at the first use, which shall not be a user's.
-            let ready = models::encoder(&name).and_then(|mut e| e.text(CANONICAL[0]).map(|_| e));
+            let ready = models::encoder(&name).and_then(|mut e| e.text(PAPERS_PHRASES[0]).map(|_| e));
             let mut encoder = match ready {
                 Ok(encoder) => encoder,
                 Err(e) => {
@@ -79,7 +81,7 @@ impl TextEncoder {
     }
 
     /// Asks for all texts that are on screen. Whether there was room for that.
-    pub(crate) fn request(&self, texts: Vec<ParsedQuery>) -> bool {
+    pub(crate) fn request(&self, texts: TextRequest) -> bool {
         self.texts.try_send(texts).is_ok()
     }
 
@@ -90,15 +92,14 @@ impl TextEncoder {
 }
 
 /// Encodes the phrases of these texts, as far as they are not `known` from before.
-fn encode(encoder: &mut dyn Encoder, known: &mut TextEmbeddings, texts: Vec<ParsedQuery>) -> Encoded {
+fn encode(encoder: &mut dyn Encoder, known: &mut TextEmbeddings, texts: TextRequest) -> Encoded {
     let mut encoded = Encoded::default();
-    for phrase in texts {
+    for (phrase, recipe) in texts {
         let start = Instant::now();
-        let phrases = phrases_of(&phrase);
-        let learned = known.learn(&phrases, |p| encoder.text(p));
+        let learned = known.learn(&phrase, &recipe, |p| encoder.text(p));
         let copy = |p: &str| known.get(p).map(<[f32]>::to_vec).ok_or(());
         let one = EncodedText {
-            known: learned.is_ok() && encoded.phrases.learn(&phrases, copy).is_ok(),
+            known: learned.is_ok() && encoded.phrases.learn(&phrase, &recipe, copy).is_ok(),
             unknown: encoder.unknown_words(&phrase.text),
             problem: match learned {
                 // A word that it does not know is no failure.
@@ -158,7 +159,7 @@ mod tests {
     fn texts_are_encoded_once_and_failures_are_reported() {
         let (mut script, mut known) = (Script::default(), TextEmbeddings::default());
         let parsed = |text: &str| ParsedQuery::parse(text).expect("words");
-        let texts = || ["lamp", "giraffe", "broken"].map(parsed).to_vec();
+        let texts = || ["lamp", "giraffe", "broken"].map(|t| (parsed(t), Recipe::default())).to_vec();
         let encoded = encode(&mut script, &mut known, texts());
         let of = |text: &str| encoded.texts[&parsed(text)].clone();
         assert!(of("lamp").known && of("lamp").problem.is_none() && encoded.phrases.get("lamp").is_some());

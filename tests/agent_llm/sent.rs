@@ -41,6 +41,7 @@ fn kettle(exports: &Path) -> SceneWorld {
         up: DVec3::NEG_Y,
         meters: Some(1.0),
         exports: exports.into(),
+        recipe: Default::default(),
         explored: None,
     };
     SceneWorld::new(parts, Pose::of(&camera), 4.0 / 3.0, Box::new(|_| {})).expect("a world")

@@ -21,6 +21,8 @@ pub enum Turn {
     Page,
     /// This status and nothing else.
     Status(u16),
+    /// Sends whoever asks to another address.
+    Redirect(&'static str),
     /// From now on another file.
     Change,
     /// Serves all of it, whatever range was asked for.
@@ -111,6 +113,7 @@ fn answer(stream: &mut TcpStream, turn: Turn, version: u8, log: &Log) -> std::io
     let mut head = match (turn, start) {
         (Turn::Page, _) => "HTTP/1.1 200 OK\r\nContent-Type: text/html; charset=utf-8\r\n".to_owned(),
         (Turn::Status(status), _) => format!("HTTP/1.1 {status} No\r\n"),
+        (Turn::Redirect(to), _) => format!("HTTP/1.1 302 Found\r\nLocation: {to}\r\n"),
         (Turn::WrongRange, _) => format!("HTTP/1.1 206 Partial\r\nContent-Range: bytes 7-9/{}\r\n", all.len()),
         (_, Some(start)) => {
             format!("HTTP/1.1 206 Partial\r\nContent-Range: bytes {start}-{}/{}\r\n", all.len() - 1, all.len())
@@ -119,7 +122,7 @@ fn answer(stream: &mut TcpStream, turn: Turn, version: u8, log: &Log) -> std::io
     };
     let claimed = match turn {
         Turn::Claim(bytes) => bytes,
-        Turn::Status(_) => 0,
+        Turn::Status(_) | Turn::Redirect(_) => 0,
         _ => body.len(),
     };
     head += &format!("ETag: {tag}\r\nContent-Length: {claimed}\r\nConnection: close\r\n\r\n");
@@ -139,7 +142,7 @@ fn answer(stream: &mut TcpStream, turn: Turn, version: u8, log: &Log) -> std::io
             }
             Ok(())
         }
-        Turn::Status(_) => Ok(()),
+        Turn::Status(_) | Turn::Redirect(_) => Ok(()),
         _ => stream.write_all(body),
     }
 }

@@ -205,8 +205,11 @@ def check_conditioned(tracker, report, tensors, track):
         return embeddings
     run_track(tracker, {**track, "passes": {"forward": None}}, tensors, watch)
     for frame in (4, 8, 11):
-        error = relative_error(np.stack(seen[frame]), tensors[f"first.conditioned{frame}"])
-        report.holds(f"track first: embeddings after memory attention, frame {frame}", error, error < 2e-3)
+        got, expected = np.stack(seen[frame]).astype(float), tensors[f"first.conditioned{frame}"]
+        # Memories are kept in 16 bits: where one falls on the other side of a rounding, a few numbers move by some
+        # thousandths. The mean tells, as for memories themselves.
+        error = float(np.abs(got - expected).mean() / np.abs(expected).mean())
+        report.holds(f"track first: embeddings after memory attention, frame {frame}", error, error < 1e-3, "mean error")
 
 
 def check_automatic(folder, report):

@@ -17,6 +17,7 @@ import torch.nn.functional as F
 import graphs
 import matrices
 import sam2_models
+import two_way
 from prompts import dense_position, embed_points
 
 # Rows of queries that attend to the memories at a time. At full size all 4,096 together would need
@@ -31,10 +32,8 @@ class Encoder(torch.nn.Module):
         super().__init__()
         self.model = model
         trunk, side = model.image_encoder.trunk, model.image_size // 4
-        table = trunk._get_pos_embed((side, side)).detach()
-        # The table is stretched with a bicubic filter: done once here, a constant in the graph; in a template by the
-        # graph, as products.
-        trunk._get_pos_embed = (lambda size: table) if graphs.FOLD else (lambda size: stretched(trunk, side))
+        # The table is stretched with a bicubic filter: by the graph, as products.
+        trunk._get_pos_embed = lambda size: stretched(trunk, side)
 
     def forward(self, image):
         maps = self.model.forward_image(image)["backbone_fpn"]
@@ -58,8 +57,6 @@ class Decoder(torch.nn.Module):
         self.prompt, self.decoder, self.pointer = model.sam_prompt_encoder, model.sam_mask_decoder, model.obj_ptr_proj
         self.soft, self.fixed = model.soft_no_obj_ptr, model.fixed_no_obj_ptr
         self.no_pointer, self.side = model.no_obj_ptr, model.image_size
-        # Of the weights: in a template the graph computes it.
-        self.register_buffer("dense_position", model.sam_prompt_encoder.get_dense_pe().detach() if graphs.FOLD else None)
 
     def forward(self, image_embeddings, high_res_features1, high_res_features2, point_coords, point_labels, mask_input, has_mask):
         p, d = self.prompt, self.decoder
@@ -68,16 +65,9 @@ class Decoder(torch.nn.Module):
         dense = given * p.mask_downscaling(mask_input) + (1 - given) * p.no_mask_embed.weight.reshape(1, -1, 1, 1)
         own = torch.cat([d.obj_score_token.weight, d.iou_token.weight, d.mask_tokens.weight])[None]
         tokens = torch.cat([own + torch.zeros_like(sparse[:, :1, :1]), sparse], dim=1)
-        position = dense_position(p) if self.dense_position is None else self.dense_position
-        hidden, source = d.transformer(image_embeddings + dense, position, tokens)
+        hidden, source = two_way.transformer(d.transformer, image_embeddings + dense, dense_position(p), tokens)
         mask_tokens = hidden[:, 2:2 + d.num_mask_tokens]
-        h, w = image_embeddings.shape[-2:]
-        source = source.transpose(1, 2).reshape(-1, d.transformer_dim, h, w)
-        up, norm, act, up2, act2 = d.output_upscaling
-        features = act(norm(up(source) + high_res_features2))
-        features = act2(up2(features) + high_res_features1)
-        hyper = torch.stack([mlp(mask_tokens[:, i]) for i, mlp in enumerate(d.output_hypernetworks_mlps)], dim=1)
-        masks = (hyper @ features.reshape(-1, d.transformer_dim // 8, 16 * h * w)).reshape(-1, d.num_mask_tokens, 4 * h, 4 * w)
+        masks = two_way.masks(d, source, mask_tokens, self.side // 16, high_res_features1, high_res_features2)
         score = d.pred_obj_score_head(hidden[:, 0])
         there = torch.sigmoid(score) if self.soft else (score > 0).to(score.dtype)
         there = there[:, None]
@@ -155,8 +145,8 @@ class MemoryAttention(torch.nn.Module):
         self.tokens = hw
 
     def table(self, values):
-        """A table of positions: a constant, in a template made of its rows and columns."""
-        return matrices.Constant(values) if graphs.FOLD else matrices.Separable(values, self.side, self.side)
+        """A table of positions, made of its rows and columns."""
+        return matrices.Separable(values, self.side, self.side)
 
     def turned(self, x):
         return x * self.cosine() + (x @ self.swap) * self.sine()

@@ -1,5 +1,5 @@
-"""Checkpoint fixtures: the reduced CLIP as the official code stores it and its template, and small files of every
-kind that the program reads, whose numbers follow a rule: the k-th of a tensor is k / 8."""
+"""Checkpoint fixtures: the reduced networks as the official code stores them and their templates, and small files of
+every kind that the program reads, whose numbers follow a rule: the k-th of a tensor is k / 8."""
 
 from collections import OrderedDict
 
@@ -52,3 +52,28 @@ def write(out):
     # Of other weights, so that none of them can stay in it.
     template.write(export_clip, export_clip.load(seed=99, reduced=True), None, "clip", out)
     (out / "clip.zip").rename(out / "clip_template.zip")
+
+
+def write_masks(out):
+    """Of SAM, SAM 2 and MobileSAM; the graphs of the first two are those of their other fixtures."""
+    import export_sam
+    import export_sam2
+    import fixture_sam
+    import fixture_sam2
+    import sam2_models
+    import sam_models
+    mobile = sam_models.load("vit_t", None, 4, True)
+    graphs.FOLD = True
+    export_sam.write(mobile, out, "mobile", "vit_t reduced")
+    torch.save(fixture_sam.model().state_dict(), out / "sam.pth")
+    torch.save({"model": fixture_sam2.model().state_dict()}, out / "sam2.pt")
+    torch.save(mobile.state_dict(), out / "mobile.pt")
+    graphs.FOLD = False
+    whole = export_sam.MOST_WEIGHTS
+    for name, kind, export, model in (("sam", "sam", export_sam, sam_models.load(seed=99, small=True)),
+                                      ("sam", "sam_parts", export_sam, sam_models.load(seed=99, small=True)),
+                                      ("sam2", "sam2", export_sam2, sam2_models.load(seed=99, reduced=True)),
+                                      ("mobile", "mobile", export_sam, sam_models.load("vit_t", None, 99, True))):
+        export_sam.MOST_WEIGHTS = 0 if kind == "sam_parts" else whole
+        template.write(export, model, None, name, out)
+        (out / f"{name}.zip").rename(out / f"{kind}_template.zip")

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import torch
 
-PARTS = ("tokens", "clip", "sam", "automatic", "sam2", "checkpoints")
+PARTS = ("tokens", "clip", "sam", "automatic", "sam2", "checkpoints", "mask_checkpoints")
 
 
 def main():
@@ -42,6 +42,9 @@ def main():
     if "checkpoints" in a.only:
         import fixture_checkpoints
         fixture_checkpoints.write(a.out)
+    if "mask_checkpoints" in a.only:
+        import fixture_checkpoints
+        fixture_checkpoints.write_masks(a.out)
     for file in sorted(a.out.iterdir()):
         file.chmod(0o644)
     print(f"{sum(f.stat().st_size for f in a.out.iterdir()):,} bytes in all")

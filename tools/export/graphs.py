@@ -29,7 +29,9 @@ def export(module, inputs, outputs, path, dynamic=None):
     torch.backends.mha.set_fastpath_enabled(False)
     with torch.no_grad():
         torch.onnx.export(module, tuple(inputs.values()), str(path), input_names=list(inputs), output_names=list(outputs),
-                          dynamic_axes=dynamic or {}, opset_version=OPSET, dynamo=False, do_constant_folding=FOLD)
+                          dynamic_axes=dynamic or {}, opset_version=OPSET, dynamo=False, do_constant_folding=FOLD,
+                          # Otherwise norms over batches are folded into the convolutions before them; engines do that too.
+                          training=torch.onnx.TrainingMode.PRESERVE)
     model = onnx.load(str(path))
     label_shapes(model, inputs, dynamic or {})
     present = {node.op_type for node in model.graph.node} & FORBIDDEN

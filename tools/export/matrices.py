@@ -17,7 +17,7 @@ def resizing(inputs, outputs, antialias, mode="bilinear"):
 
 class Separable(torch.nn.Module):
     """A table [h*w,C] each of whose channels depends on the row alone or on the column alone, made of one row and one
-    column of it when it is asked: for templates, which are to be small."""
+    column of it when it is asked: a graph that is filled with weights later is to be small."""
 
     def __init__(self, table, h, w):
         super().__init__()
@@ -30,14 +30,3 @@ class Separable(torch.nn.Module):
 
     def forward(self):
         return (self.rows + self.columns).reshape(self.rows.shape[0] * self.columns.shape[1], -1)
-
-
-class Constant(torch.nn.Module):
-    """A table as it is."""
-
-    def __init__(self, table):
-        super().__init__()
-        self.register_buffer("table", table.contiguous())
-
-    def forward(self):
-        return self.table

@@ -41,13 +41,16 @@ def load(kind, model, seed, reduced):
         return export, sam2_models.load(model, None, seed, reduced), model
     import export_sam as export
     import sam_models
+    if reduced and model == "vit_h":
+        # In two parts, as at full size.
+        export.MOST_WEIGHTS = 0
     return export, sam_models.load(model, None, seed, reduced), model
 
 
 def stripped(path, state):
     """A graph without its weights, and [initializer, tensor] of those."""
     graph, weights = onnx.load(str(path)), []
-    known = {content(v): k for k, v in state.items()}
+    known = {content(v): k for k, v in state.items() if v.dtype == np.float32}
     kept = []
     for tensor in graph.graph.initializer:
         array = numpy_helper.to_array(tensor)
@@ -73,7 +76,7 @@ def learned(value, state):
 
 def write(export, model, architecture, name, out):
     state = {k: v.detach().numpy() for k, v in model.state_dict().items()}
-    contents = [content(v) for v in state.values()]
+    contents = [content(v) for v in state.values() if v.dtype == np.float32]
     if len(set(contents)) != len(contents):
         raise SystemExit("two tensors of the checkpoint are alike; weights would not be told apart")
     with tempfile.TemporaryDirectory() as folder:

@@ -22,11 +22,16 @@ def randomise(module, seed, gain=1.0):
         # Random frequencies of point encodings: drawn when the official module is made, from no seed.
         if name.endswith("positional_encoding_gaussian_matrix"):
             buffer.copy_(torch.randn(buffer.shape, generator=g))
+        # What batches were like: of norms over batches.
+        elif name.endswith("running_mean"):
+            buffer.copy_(0.1 * torch.randn(buffer.shape, generator=g))
+        elif name.endswith("running_var"):
+            buffer.copy_(0.5 + torch.rand(buffer.shape, generator=g))
 
     def normal(p, deviation):
         return torch.randn(p.shape, generator=g) * deviation
 
-    norms = (torch.nn.LayerNorm,)
+    norms = (torch.nn.LayerNorm, torch.nn.BatchNorm2d)
     for name, owner in module.named_modules():
         is_norm = isinstance(owner, norms) or type(owner).__name__.startswith("LayerNorm")
         for key, p in owner.named_parameters(recurse=False):

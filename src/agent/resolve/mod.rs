@@ -2,6 +2,7 @@
 //! pronouns. What several things fit equally is said to be so, what nothing fits is not there; nothing is
 //! guessed. What no name says is asked of the scene's encoder, if it has one.
 
+mod embedded;
 mod noun;
 
 pub(crate) use noun::{NameWords, is_thing, name_words, words_of};
@@ -14,9 +15,8 @@ use super::refusal::{Refusal, RefusalKind};
 use super::relation::{Relation, fit, gap};
 use super::words::{alike, singular};
 use super::world::World;
-use crate::pipeline::semantics::answer::Basis;
-use crate::pipeline::semantics::localize::Answer;
 use crate::pipeline::semantics::reading::{mend, mended_text};
+use crate::pipeline::semantics::recipe::Understanding;
 use crate::scene::{Bounds, IdentityId, Level, LevelFilter};
 
 /// What words come to.
@@ -193,6 +193,9 @@ impl Resolver<'_> {
         let wished = all.iter().filter(|(_, i)| self.level.accepts(i.level)).map(|(id, _)| id);
         let everyone: Vec<IdentityId> = wished.filter(|id| self.world.facts(*id).is_some()).collect();
         let Some((head, rest)) = words.split_last() else { return Err(self.not_found("that", &[])) };
+        if self.world.understanding() == Understanding::Embedding {
+            return self.embedded(words);
+        }
         let own = |id: IdentityId| all.get(id).map(|i| i.names.as_slice()).unwrap_or_default();
         let line_has = |id: IdentityId, word: &String| {
             all.ancestors(id).any(|i| own(i).iter().any(|name| name_words(name).contains(word)))
@@ -224,27 +227,7 @@ impl Resolver<'_> {
         if !ids.is_empty() {
             return Ok(Set { ids, exact });
         }
-        let text = words.join(" ");
-        match self.by_embedding(&text, self.level)? {
-            Some(ids) => Ok(Set::new(ids)),
-            None => Err(self.not_found(&text, words)),
-        }
-    }
-
-    /// What the scene's encoder says, where it has one and that finds something.
-    fn by_embedding(&mut self, text: &str, kind: LevelFilter) -> Result<Option<Vec<IdentityId>>, Lost> {
-        let found = self.world.locate(text, kind).map_err(|e| Lost::new(RefusalKind::Failed, e.0, Vec::new()))?;
-        let ids = match (&found.basis, &found.answer) {
-            (Basis::Embedding, Answer::Found(_)) => found.chosen(1),
-            (Basis::Embedding, Answer::Ambiguous(_)) => found.chosen(2),
-            _ => Vec::new(),
-        };
-        let ids: Vec<IdentityId> = ids.into_iter().filter(|id| self.world.facts(*id).is_some()).take(12).collect();
-        if ids.is_empty() {
-            return Ok(None);
-        }
-        self.note = "(Found by embedding, not by name.)".into();
-        Ok(Some(ids))
+        self.embedded(words)
     }
 
     /// Nothing is called so: the nearest names, by words they share or slips of them.
@@ -297,7 +280,11 @@ impl Resolver<'_> {
                 return Ok(set);
             }
         }
-        let meant = self.by_embedding(&format!("{said} of the {name}"), LevelFilter::Part)?.unwrap_or_default();
+        let of = match whole {
+            Noun::Named(words) if self.world.understanding() == Understanding::Embedding => words.join(" "),
+            _ => name.clone(),
+        };
+        let meant = self.by_embedding(&format!("{said} of the {of}"), LevelFilter::Part)?.unwrap_or_default();
         let meant: Vec<IdentityId> = meant.into_iter().filter(is_in).collect();
         if !meant.is_empty() {
             return Ok(Set::new(meant));

@@ -7,13 +7,12 @@ use std::time::Instant;
 
 use serde_json::{Value, json};
 
+use super::recipe::RecipeArgs;
 use super::{CliError, number, output, view};
 use crate::jobs::query::{self, QueryRequest, QueryResult};
 use crate::jobs::{export, open, render};
 use crate::pipeline::semantics::answer::Basis;
-use crate::pipeline::semantics::codes::TOLERANCE;
 use crate::pipeline::semantics::localize::{Answer, Hit};
-use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::reading::mended_text;
 use crate::pipeline::semantics::timing::ms_since;
 use crate::scene::{LevelFilter, SemanticMap};
@@ -21,12 +20,14 @@ use crate::scene::{LevelFilter, SemanticMap};
 /// Ask a scene for an object or a part
 ///
 /// "X of the Y" and "Y's X" ask for a part. Answers by the names that identities have, else by what
-/// they look like to the encoder that has looked at them. Exit code 1 if nothing fits.
+/// they look like to the encoder that has looked at them; --recipe paper asks as the paper does. Exit code 1 if
+/// nothing fits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs query scene/ \"a button of the red controller\"\n  \
     fmlgs query scene/ \"the lamp's shade\" --camera 12 --mask mask.png --heat heat.png\n  \
     fmlgs query scene/ lamp --kind object --json\n  \
+    fmlgs query scene/ \"bear nose\" --recipe paper --heat heat.png\n  \
     fmlgs query scene/ --phrases words.txt --views all --export masks/ --truth true_masks/")]
 pub(crate) struct QueryArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
@@ -58,12 +59,6 @@ pub(crate) struct QueryArgs {
     /// Answers whose pixels go into the mask at most
     #[arg(long, default_value_t = 1, value_parser = number::within(1..=100_000_usize))]
     top: usize,
-    /// Match alpha-blended codes, as the paper does, instead of identities
-    #[arg(long)]
-    blend: bool,
-    /// Largest difference per channel of a match, in 255ths
-    #[arg(long, default_value_t = 255.0 * TOLERANCE, value_parser = number::within(0.0..=255.0_f32))]
-    tolerance: f32,
     /// Write the mask of the answer: white on black
     #[arg(long)]
     mask: Option<PathBuf>,
@@ -73,6 +68,8 @@ pub(crate) struct QueryArgs {
     /// Print one JSON document
     #[arg(long)]
     json: bool,
+    #[command(flatten)]
+    recipe: RecipeArgs,
 }
 
 pub(crate) fn run(args: QueryArgs) -> Result<(), CliError> {
@@ -87,14 +84,8 @@ pub(crate) fn run(args: QueryArgs) -> Result<(), CliError> {
     let text = args.text.as_deref().unwrap_or_default();
     let camera = view::choose(args.camera.as_deref(), &scene)?.limited_to(args.max_side);
     render::check_room(camera.width_px, camera.height_px)?;
-    let request = QueryRequest {
-        text,
-        level: args.kind,
-        camera: &camera,
-        mode: if args.blend { MatchMode::Blend } else { MatchMode::Exact },
-        tolerance: args.tolerance / 255.0,
-        top: args.top,
-    };
+    let request =
+        QueryRequest { text, level: args.kind, camera: &camera, recipe: &args.recipe.recipe(), top: args.top };
     let mut result = query::run(&scene, &map, &request)?;
     let drawing_since = Instant::now();
     if let Some(path) = &args.mask {
@@ -114,6 +105,13 @@ fn tell(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -
     let QueryResult { answered, reading, mask, unknown_words: unknown, ignored_words: ignored, query_ms, .. } = result;
     let full_name = |hit: &Hit| map.identities.full_name(hit.identity);
     let basis = if answered.basis == Basis::Names { "names" } else { "looks" };
+    let mut lines = args.recipe.lines(map);
+    if !result.unread.is_empty() {
+        lines.push(format!("note: the encoder cannot read these canonical phrases: {}", result.unread.join(", ")));
+    }
+    if !args.json && !lines.is_empty() {
+        output::print(&lines.join("\n"))?;
+    }
     let answer = &answered.answer;
     let hits = answer.hits();
     if args.json {
@@ -132,6 +130,9 @@ fn tell(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -
             "mended": reading.mended.iter().map(|(typed, read)| json!({ "typed": typed, "read": read })).collect::<Vec<_>>(),
             "query_ms": query_ms,
             "stages_ms": answered.stages,
+            "recipe": answered.recipe,
+            "unmet": answered.recipe.unmet(map),
+            "unread": result.unread,
         }))?;
     }
     match answer {

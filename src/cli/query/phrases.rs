@@ -11,7 +11,6 @@ use crate::cli::{CliError, output, view};
 use crate::jobs::phrases::colors::PhraseColors;
 use crate::jobs::phrases::{self, PhraseRow, PhrasesRequest, TrueMasks};
 use crate::jobs::{Scene, export, render};
-use crate::pipeline::semantics::matching::MatchMode;
 use crate::scene::{Camera, SemanticMap};
 
 /// Rows of the printed table at most; files have all.
@@ -22,6 +21,7 @@ pub(super) fn run(args: &QueryArgs, list: &Path, scene: &Scene, map: SemanticMap
         export::check_folder(folder, &scene.reads())?;
         export::make_folder(folder)?;
     }
+    let lines = args.recipe.lines(&map);
     let request = PhrasesRequest {
         cloud: Arc::clone(&scene.cloud),
         map: Arc::new(map),
@@ -30,16 +30,16 @@ pub(super) fn run(args: &QueryArgs, list: &Path, scene: &Scene, map: SemanticMap
         phrases: phrases::read(list)?,
         colors: PhraseColors::default(),
         level: args.kind,
-        matching: (if args.blend { MatchMode::Blend } else { MatchMode::Exact }, args.tolerance / 255.0),
+        recipe: args.recipe.recipe(),
         top: args.top,
         truth: args.truth.clone().map_or(TrueMasks::None, TrueMasks::Folder),
         export: args.export.clone(),
     };
     let rows = phrases::run(&request, &mut Console::new(args.json))?;
     if args.json {
-        return output::print_json(&json!({ "rows": rows, "mean_iou": mean_iou(&rows) }));
+        return output::print_json(&json!({ "rows": rows, "mean_iou": mean_iou(&rows), "recipe": request.recipe }));
     }
-    let mut text = output::table(&table(&rows));
+    let mut text = lines.into_iter().map(|line| line + "\n").collect::<String>() + &output::table(&table(&rows));
     if rows.len() > ROWS {
         text += &format!("\n{} more rows: see --export or --json", rows.len() - ROWS);
     }

@@ -3,6 +3,7 @@
 use super::*;
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::query_engine::QueryEngine;
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{LevelFilter, SemanticMap};
 
@@ -85,12 +86,12 @@ fn the_first_question_is_answered_by_buttons_that_are_seen() {
     let view =
         ViewMap::render(&mut renderer, &scene.cloud, &map.identity_of, &map.identities, &camera, &scene.settings);
     let view = view.expect("drawn");
-    let mut engine = QueryEngine::new(map.language.as_ref()).expect("an engine");
+    let mut engine = QueryEngine::new(map.language.as_ref(), Recipe::default()).expect("an engine");
     let answered = engine.ask(&map, QUESTION, LevelFilter::Auto).expect("asked").expect("words");
     let names: Vec<String> = answered.chosen(1).iter().map(|id| map.identities.full_name(*id)).collect();
     assert!(!names.is_empty(), "{QUESTION}");
     assert!(names.iter().all(|n| n.contains("button") && n.ends_with("of the red controller")), "{names:?}");
-    let seen = answered.mask(&view, &map.identities, 1).area();
+    let seen = answered.mask(&view, None, &map.identities, 1).area();
     assert!(seen >= 20, "{seen} px are seen from where it opens");
 }
 

@@ -71,13 +71,14 @@ mod tests {
     #[test]
     fn more_cores_are_faster_up_to_a_point_and_the_built_in_engine_is_slower() {
         let measured = Some(PhotoSeconds { onnx_runtime: 60.0, built_in: Some(90.0) });
-        let entry = ModelEntry { photo_seconds: measured, ..entry() };
+        let mut entry = entry();
+        entry.photo_seconds = measured;
         let secs = |fast, cores| LookTime::estimated(&entry, fast, cores).expect("a time").secs;
         assert_eq!(secs(true, 4) * 2.0, secs(true, 2));
         assert_eq!(secs(true, 64), secs(true, 8));
         assert!(secs(false, 2) > secs(true, 2));
-        let unknown = ModelEntry { photo_seconds: None, ..entry };
-        assert_eq!(LookTime::estimated(&unknown, true, 2), None);
+        entry.photo_seconds = None;
+        assert_eq!(LookTime::estimated(&entry, true, 2), None);
     }
 
     #[test]

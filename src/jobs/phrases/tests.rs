@@ -36,7 +36,7 @@ fn request(phrases: &[&str]) -> PhrasesRequest {
         phrases: phrases.iter().map(|p| (*p).to_owned()).collect(),
         colors: PhraseColors::default(),
         level: LevelFilter::Auto,
-        matching: (MatchMode::Exact, 0.02),
+        recipe: Recipe::default(),
         top: 1,
         truth: TrueMasks::None,
         export: None,

@@ -14,10 +14,9 @@ use crate::jobs::evaluate_masks::Drawn;
 use crate::math::stats::quantile;
 use crate::models::{Encoder, ModelError};
 use crate::pipeline::semantics::answer::{QueryAnswer, by_name};
-use crate::pipeline::semantics::by_embedding::{EmbeddingOptions, PartFeatures, TextEmbeddings};
+use crate::pipeline::semantics::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::by_similarity::{ALIKE, rejoined};
 use crate::pipeline::semantics::code_map::CodeMap;
-use crate::pipeline::semantics::localize::Strategy;
 use crate::pipeline::semantics::parse::ParsedQuery;
 use crate::pipeline::semantics::protocols::part_recall::{self, Components, objects_alone};
 use crate::pipeline::semantics::protocols::raw_features::RawFeatures;
@@ -25,6 +24,7 @@ use crate::pipeline::semantics::protocols::{
     AskedScene, LabeledView, Unit, fastlgs_ex, langsplat, lerf_rule, multi_class, spin_nerf,
 };
 use crate::pipeline::semantics::query_engine::ask_by_embedding;
+use crate::pipeline::semantics::recipe::{PartFeatures, Recipe, RelevancyScale, Strategy, Understanding};
 use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::semantics::view_map::{ViewMap, weights};
 use crate::render::Renderer;
@@ -56,15 +56,21 @@ pub(super) struct Asked {
     pub(super) unknown_phrases: Vec<String>,
 }
 
-/// How this program asks, and how the paper does. Where recipes are chosen, they are chosen here.
-fn ways() -> [(&'static str, EmbeddingOptions); 4] {
-    let way = |strategy, parts| EmbeddingOptions { strategy, parts, ..EmbeddingOptions::default() };
+/// How this program asks, and how the paper does: their recipes, by embedding alone, for objects that were found in
+/// this program's way.
+fn ways() -> [(&'static str, Recipe); 4] {
+    let paper = Recipe::paper();
+    let raw = Recipe { parts: PartFeatures::Raw, ..paper.clone() };
     [
-        ("this program", EmbeddingOptions::default()),
-        ("the paper's two steps", way(Strategy::Paper, PartFeatures::Deviated)),
-        ("the paper's two steps, parts not deviated", way(Strategy::Paper, PartFeatures::Raw)),
-        (SINGLE_LEVEL, way(Strategy::OneStep, PartFeatures::Raw)),
+        ("this program", ours()),
+        ("the paper's two steps", paper),
+        ("the paper's two steps, parts not deviated", raw.clone()),
+        (SINGLE_LEVEL, Recipe { strategy: Strategy::OneStep, ..raw }),
     ]
+}
+
+fn ours() -> Recipe {
+    Recipe { understanding: Understanding::Embedding, ..Recipe::default() }
 }
 
 const SINGLE_LEVEL: &str = "single level without deviation";
@@ -88,9 +94,8 @@ pub(super) fn measure(
     let table = Table { which: settings.table, query, classes: classes(&views) };
     let mut rows = Vec::new();
     if settings.table == PaperTable::PartAblation {
-        by.phrases.learn(&[], |p| by.encoder.text(p))?;
         for components in Components::ROWS {
-            let row = part_recall::row(components, map, language, &views, |p| by.encoder.text(p))?;
+            let row = part_recall::row((components, &ours()), map, language, &views, |p| by.encoder.text(p))?;
             let percent = |value: &dyn Fn(f64) -> f64| row.units.iter().map(|u| 100.0 * value(u.iou)).collect();
             let recall = percent(&|iou| if iou >= part_recall::HIT_IOU { 1.0 } else { 0.0 });
             let scores = BTreeMap::from([(RECALL.into(), recall), (PART_IOU.into(), percent(&|iou| iou))]);
@@ -98,9 +103,9 @@ pub(super) fn measure(
         }
     } else {
         let objects = objects_alone(language, &map.identities);
-        for (name, options) in ways() {
+        for (name, recipe) in ways() {
             let features = if name == SINGLE_LEVEL { &objects } else { language };
-            rows.push(table.row(name, map, &views, &mut |text| by.ask(map, (features, options), text))?);
+            rows.push(table.row(name, map, &views, &mut |text| by.ask(map, (features, &recipe), text))?);
         }
         if let Some(joined) = rejoined(map, &comparison.cloud) {
             rows.push(similarity_row(&table, comparison, &joined, &views, &mut by)?);
@@ -109,7 +114,7 @@ pub(super) fn measure(
         if map.identities.iter().any(|(_, i)| !i.names.is_empty()) {
             let mut ask = |text: &str| {
                 let phrase = ParsedQuery::parse(text);
-                Ok(phrase.map(|p| by_name(&map.identities, &p, LevelFilter::Auto)))
+                Ok(phrase.map(|p| by_name(&map.identities, &p, LevelFilter::Auto, &Recipe::default())))
             };
             rows.push(table.row(BY_NAME, map, &views, &mut ask)?);
         }
@@ -145,7 +150,7 @@ impl ByEmbedding {
     fn ask(
         &mut self,
         map: &SemanticMap,
-        how: (&LanguageFeatures, EmbeddingOptions),
+        how: (&LanguageFeatures, &Recipe),
         text: &str,
     ) -> Result<Option<QueryAnswer>, ModelError> {
         let encode = |p: &str| self.encoder.text(p);
@@ -289,8 +294,8 @@ fn similarity_row(
         return Err(JobError::Protocol("the scene has no embeddings".into()));
     };
     let name = format!("features mapped by similarity (cosine {ALIKE}) instead of identity");
-    let options = EmbeddingOptions { strategy: Strategy::OneStep, parts: PartFeatures::Raw, ..Default::default() };
-    table.row(&name, joined, &views, &mut |text| by.ask(joined, (features, options), text))
+    let recipe = Recipe { strategy: Strategy::OneStep, parts: PartFeatures::Raw, ..Recipe::paper() };
+    table.row(&name, joined, &views, &mut |text| by.ask(joined, (features, &recipe), text))
 }
 
 /// Rows with LERF's rule for masks: on identities, and on raw features per Gaussian.
@@ -301,9 +306,10 @@ fn rule_rows(
     views: &[LabeledView<'_>],
     by: &mut ByEmbedding,
 ) -> Result<[RowResult; 2], JobError> {
-    let options = EmbeddingOptions { strategy: Strategy::Paper, ..EmbeddingOptions::default() };
+    // The rule scales relevancy itself.
+    let recipe = Recipe { scale: RelevancyScale::Raw, ..Recipe::paper() };
     let ruled = table.ruled_row("the paper's two steps, LERF's mask rule", views, &mut |k, phrase| {
-        Ok(by.ask(map, (language, options), phrase)?.map(|a| a.heat(views[k].exact)))
+        Ok(by.ask(map, (language, &recipe), phrase)?.map(|a| a.heat(views[k].exact)))
     })?;
     let PhotoComparison { cloud, settings, .. } = comparison;
     let mut renderer = Renderer::new();
@@ -313,8 +319,8 @@ fn rule_rows(
     let blended = table.ruled_row("raw features per Gaussian, LERF's mask rule", views, &mut |k, phrase| {
         let Some(parsed) = ParsedQuery::parse(phrase) else { return Ok(None) };
         // It learns the phrase, and notes what is unknown.
-        by.ask(map, (language, options), phrase)?;
-        Ok(raw.relevancy(&pixels[k], &parsed.text, &by.phrases))
+        by.ask(map, (language, &recipe), phrase)?;
+        Ok(raw.relevancy(&pixels[k], &parsed.text, &by.phrases, &recipe))
     })?;
     Ok([ruled, blended])
 }
@@ -326,16 +332,16 @@ fn times(
     views: &[LabeledView<'_>],
     by: &mut ByEmbedding,
 ) -> Result<QueryTimes, JobError> {
-    let mut canonical = TextEmbeddings::default();
-    canonical.learn(&[], |p| by.encoder.text(p))?;
+    let (mut canonical, recipe) = (TextEmbeddings::default(), ours());
+    canonical.learn_canonical(&recipe, |p| by.encoder.text(p));
     let (mut whole, mut without) = (Vec::new(), Vec::new());
     for view in views {
         for phrase in table.phrases(view) {
             by.phrases = canonical.clone();
             let start = Instant::now();
-            let answered = by.ask(map, (language, EmbeddingOptions::default()), phrase)?;
+            let answered = by.ask(map, (language, &recipe), phrase)?;
             let Some(answered) = answered else { continue };
-            std::hint::black_box(answered.mask(view.exact, &map.identities, 1));
+            std::hint::black_box(answered.mask(view.exact, Some(view.blended), &map.identities, 1));
             let ms = ms_since(start);
             whole.push(ms);
             without.push(ms - answered.stages.encode);

@@ -3,6 +3,7 @@
 
 pub(crate) mod cpu;
 pub mod gpu;
+pub(crate) mod masks;
 pub(crate) mod query;
 
 pub(crate) use cpu::{label, one_core_limit};
@@ -12,6 +13,7 @@ use serde::Serialize;
 
 use self::cpu::{RenderTiming, StepTiming};
 use self::gpu::Timing;
+use self::masks::MasksTiming;
 use self::query::QueryTiming;
 use super::table::{Rows, rows};
 use crate::math::Real;
@@ -42,6 +44,8 @@ pub(crate) struct Timings {
     pub(crate) one_core_products_per_sec: f64,
     /// Typed queries, if they were asked for.
     pub(crate) queries: Option<QueryTiming>,
+    /// Masks of everything in a photo, if they were asked for.
+    pub(crate) masks: Option<MasksTiming>,
 }
 
 impl Timings {
@@ -49,6 +53,7 @@ impl Timings {
     pub(crate) fn tables(&self) -> Vec<(Rows, String)> {
         let size = |[w, h]: [u32; 2]| format!("{w}x{h}");
         let mut all: Vec<(Rows, String)> = self.queries.iter().map(QueryTiming::table).collect();
+        all.extend(self.masks.iter().map(MasksTiming::table));
         let head = ["drawing, CPU", "Gaussians", "size", "ms", "project", "sort", "bin", "blend", "products", "per s"];
         let drawn = self.render.iter().map(|t| {
             let mut row = vec![t.name.clone(), t.gaussians.to_string(), size(t.size), format!("{:.1}", t.total_ms)];

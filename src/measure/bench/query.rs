@@ -11,10 +11,11 @@ use super::super::table::{Rows, rows};
 use crate::math::stats::quantile;
 use crate::math::vector::unit;
 use crate::models::{Encoder, ModelError};
-use crate::pipeline::semantics::by_embedding::{EmbeddingOptions, TextEmbeddings};
+use crate::pipeline::semantics::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::codes::{self, TOLERANCE};
 use crate::pipeline::semantics::matching;
 use crate::pipeline::semantics::query_engine::ask_by_embedding;
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::timing::{Stages, StagesMs, ms_since};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::language::MAX_VIEWS;
@@ -83,7 +84,8 @@ pub(crate) fn time(
     let mut each: Vec<StagesMs> = Vec::with_capacity(queries);
     // Canonical phrases are encoded when a scene opens, once.
     let mut canonical = TextEmbeddings::default();
-    canonical.learn(&[], |p| encoder.text(p))?;
+    let recipe = Recipe::default();
+    canonical.learn_canonical(&recipe, |p| encoder.text(p));
     for _ in 0..queries {
         let word = |list: &[&str], rng: &mut Pcg64Mcg| list.choose(rng).copied().unwrap_or("mug").to_owned();
         let (color, thing) = (word(&COLORS, &mut rng), word(&THINGS, &mut rng));
@@ -92,7 +94,7 @@ pub(crate) fn time(
             false => format!("a {color} {thing}"),
         };
         let mut phrases = canonical.clone();
-        let how = (&features, EmbeddingOptions::default());
+        let how = (&features, &recipe);
         let Some(answered) = ask_by_embedding(&all, how, &text, &mut phrases, |p| encoder.text(p))? else { continue };
         let target = answered.answer.hits().first().map_or(NOBODY, |h| h.identity);
         let start = Instant::now();

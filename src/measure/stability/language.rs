@@ -8,6 +8,7 @@ use crate::math::vector::unit;
 use crate::pipeline::semantics::codes::{self, TOLERANCE};
 use crate::pipeline::semantics::localize::{Scorer, localize};
 use crate::pipeline::semantics::parse::ParsedQuery;
+use crate::pipeline::semantics::recipe::Strategy;
 use crate::pipeline::semantics::relevancy::{advantage, deviate, score};
 use crate::scene::{Identities, LevelFilter};
 
@@ -105,8 +106,13 @@ pub(crate) fn cases() -> Vec<Case> {
         language("a score that is NaN hides nothing", |faulty| {
             let Some(phrase) = ParsedQuery::parse("lamp") else { return Finding::is("no phrase", false) };
             let best = if faulty { f32::NAN } else { 0.9 };
-            let answer =
-                localize(&identities(4), &phrase, LevelFilter::Auto, &mut Fixed([f32::NAN, best, f32::NAN, 0.2]));
+            let answer = localize(
+                &identities(4),
+                &phrase,
+                LevelFilter::Auto,
+                Strategy::WholeFirst,
+                &mut Fixed([f32::NAN, best, f32::NAN, 0.2]),
+            );
             let first = answer.hits().first().map(|h| h.identity);
             Finding::is(format!("{}, {} answers", answer.verdict(), answer.hits().len()), first == Some(2))
         }),

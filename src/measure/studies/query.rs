@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use serde_json::{Value, json};
+use strum::VariantArray;
 
 use super::{StudyInput, Variants, error, overlap};
 use crate::math::stats::mean;
@@ -10,15 +11,14 @@ use crate::measure::sweep::failed;
 use crate::measure::{Rule, Stage, StageName, Study, StudyError, Trial};
 use crate::models::{Encoder, ModelError};
 use crate::pipeline::semantics::answer::{QueryAnswer, by_name};
-use crate::pipeline::semantics::by_embedding::{EmbeddingOptions, PartFeatures, TextEmbeddings};
+use crate::pipeline::semantics::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::code_map::CodeMap;
-use crate::pipeline::semantics::codes::TOLERANCE;
-use crate::pipeline::semantics::localize::Strategy;
-use crate::pipeline::semantics::matching;
+use crate::pipeline::semantics::matching::{self, MatchMode};
 use crate::pipeline::semantics::parse::ParsedQuery;
 use crate::pipeline::semantics::protocols::part_recall::HIT_IOU;
 use crate::pipeline::semantics::protocols::{AskedScene, Category, LabeledView, langsplat};
 use crate::pipeline::semantics::query_engine::ask_by_embedding;
+use crate::pipeline::semantics::recipe::{PartFeatures, Recipe, Strategy, Understanding};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, LanguageFeatures, Level, LevelFilter, Mask, SemanticMap};
@@ -36,13 +36,11 @@ enum Precision {
     Byte,
 }
 
-#[derive(Clone, Copy)]
+#[derive(Clone)]
 struct Variant {
-    /// `None` asks by names alone.
-    options: Option<EmbeddingOptions>,
+    recipe: Recipe,
     /// Maps of the view are smaller by this factor.
     smaller: u32,
-    blend: bool,
     precision: Precision,
     /// Share of the objects that can be found.
     share: f64,
@@ -54,7 +52,7 @@ pub(crate) fn study<'a>(
     map: &'a SemanticMap,
     mut encoder: Box<dyn Encoder>,
     views: Vec<LabeledScene>,
-    repeats: u32,
+    (repeats, recipe): (u32, &Recipe),
     mut input: StudyInput,
 ) -> Result<Study<'a>, StudyError> {
     let language = map.language.as_ref().ok_or_else(|| failed("this scene has no embeddings"))?;
@@ -62,6 +60,7 @@ pub(crate) fn study<'a>(
     input.insert("queries".into(), format!("{queries} in {} views", views.len()));
     input.insert("identities".into(), map.identities.len().to_string());
     input.insert("encoder".into(), language.encoder.clone());
+    input.insert("recipe".into(), recipe.to_string());
     let measures = vec![
         overlap("mIoU", "mean overlap of the answer's mask with the label, over all names of the views"),
         overlap("part recall", "share of parts that are answered with an overlap of a half or more"),
@@ -77,10 +76,10 @@ pub(crate) fn study<'a>(
     ];
     let rule = Rule::new("mIoU", 1.02, 0.0, 5e-3);
     let stage = Stage::new(StageName::Query, words, (input, repeats), rule, measures);
-    Ok(Study::new(stage, variants().0, move |variant: &Variant, _seed, observer| {
+    Ok(Study::new(stage, variants(recipe).0, move |variant: &Variant, _seed, observer| {
         let features = reduced(language, map, variant);
         let mut canonical = TextEmbeddings::default();
-        canonical.learn(&[], |p| encoder.text(p)).map_err(failed)?;
+        canonical.learn_canonical(&variant.recipe, |p| encoder.text(p));
         let mut renderer = Renderer::new();
         let (mut secs, mut ious, mut hits) = (Vec::new(), [Vec::new(), Vec::new()], Vec::new());
         let (mut not_understood, mut broken) = (Vec::new(), None);
@@ -92,7 +91,7 @@ pub(crate) fn study<'a>(
             let small = view.camera.resized((w / variant.smaller).max(1), (h / variant.smaller).max(1));
             let (of, all) = (&map.identity_of, &map.identities);
             let exact = ViewMap::render(&mut renderer, cloud, of, all, &small, settings).map_err(failed)?;
-            let blended = match variant.blend {
+            let blended = match variant.recipe.masks == MatchMode::Codes {
                 true => CodeMap::render(&mut renderer, cloud, &map.codes, true, &small, settings).map_err(failed)?,
                 false => CodeMap::default(),
             };
@@ -168,34 +167,50 @@ fn round(v: &mut [f32], precision: Precision) {
     }
 }
 
-fn variants() -> Variants<Variant> {
-    let options = EmbeddingOptions::default();
-    let base = Variant { options: Some(options), smaller: 1, blend: false, precision: Precision::Stored, share: 1.0 };
-    let mut all = Variants::new("part and whole at once, exact masks", base);
+fn variants(recipe: &Recipe) -> Variants<Variant> {
+    let recipe = Recipe { understanding: Understanding::Embedding, ..recipe.clone() };
+    let base = Variant { recipe: recipe.clone(), smaller: 1, precision: Precision::Stored, share: 1.0 };
+    let mut all = Variants::new(format!("{}, {}", words(recipe.strategy), recipe.masks), base.clone());
     let mut add = |method: &str, setting: &str, knob: (&str, Value), variant: Variant| {
         all.add(method, setting, &[knob], variant);
     };
-    for (strategy, words) in [
-        (Strategy::Paper, "the paper's two steps"),
-        (Strategy::OneStep, "one step"),
-        (Strategy::WholeFirst, "whole first"),
-    ] {
-        let options = Some(EmbeddingOptions { strategy, ..options });
-        add("localization", words, ("strategy", json!(words)), Variant { options, ..base });
+    let other = |recipe: Recipe| Variant { recipe, ..base.clone() };
+    for &strategy in Strategy::VARIANTS.iter().filter(|s| **s != recipe.strategy) {
+        let words = words(strategy);
+        add("localization", words, ("strategy", json!(words)), other(Recipe { strategy, ..recipe.clone() }));
     }
-    let raw = Some(EmbeddingOptions { parts: PartFeatures::Raw, ..options });
-    add("part features", "without deviation", ("parts", json!("raw")), Variant { options: raw, ..base });
-    add("encoder", "none: names alone", ("encoder", json!("names")), Variant { options: None, ..base });
+    let (parts, knob, setting) = match recipe.parts {
+        PartFeatures::Deviated => (PartFeatures::Raw, "raw", "without deviation"),
+        PartFeatures::Raw => (PartFeatures::Deviated, "deviated", "with deviation"),
+    };
+    add("part features", setting, ("parts", json!(knob)), other(Recipe { parts, ..recipe.clone() }));
+    let names = Recipe { understanding: Understanding::Names, ..recipe.clone() };
+    add("encoder", "none: names alone", ("encoder", json!("names")), other(names));
     for (smaller, words) in [(2, "1/2 of the size"), (4, "1/4 of the size")] {
-        add("map resolution", words, ("scale", json!(1.0 / f64::from(smaller))), Variant { smaller, ..base });
+        let variant = Variant { smaller, ..base.clone() };
+        add("map resolution", words, ("scale", json!(1.0 / f64::from(smaller))), variant);
     }
-    add("decoding", "blended codes", ("read", json!("blend")), Variant { blend: true, ..base });
-    add("precision", "16 bits", ("precision", json!(16)), Variant { precision: Precision::Half, ..base });
-    add("precision", "8 bits", ("precision", json!(8)), Variant { precision: Precision::Byte, ..base });
+    let codes = Recipe { masks: MatchMode::Codes, ..recipe.clone() };
+    if codes != recipe {
+        add("decoding", "blended codes", ("read", json!("blend")), other(codes));
+    }
+    for (bits, precision) in [(16, Precision::Half), (8, Precision::Byte)] {
+        let variant = Variant { precision, ..base.clone() };
+        add("precision", &format!("{bits} bits"), ("precision", json!(bits)), variant);
+    }
     for (share, words) in [(0.25, "a quarter of the objects"), (0.5, "half of the objects")] {
-        add("identities", words, ("share", json!(share)), Variant { share, ..base });
+        add("identities", words, ("share", json!(share)), Variant { share, ..base.clone() });
     }
     all
+}
+
+fn words(strategy: Strategy) -> &'static str {
+    match strategy {
+        Strategy::Joint => "part and whole at once",
+        Strategy::TwoSteps => "the paper's two steps",
+        Strategy::OneStep => "one step",
+        Strategy::WholeFirst => "whole first",
+    }
 }
 
 /// Answers a name; `None` if there is nothing in it, or no word that the encoder knows.
@@ -207,10 +222,11 @@ fn ask(
     mut phrases: TextEmbeddings,
     encoder: &mut dyn Encoder,
 ) -> Result<Option<QueryAnswer>, StudyError> {
-    let Some(options) = variant.options else {
-        return Ok(ParsedQuery::parse(text).map(|phrase| by_name(&map.identities, &phrase, LevelFilter::Auto)));
-    };
-    match ask_by_embedding(&map.identities, (features, options), text, &mut phrases, |p| encoder.text(p)) {
+    let recipe = &variant.recipe;
+    if recipe.understanding == Understanding::Names {
+        return Ok(ParsedQuery::parse(text).map(|phrase| by_name(&map.identities, &phrase, LevelFilter::Auto, recipe)));
+    }
+    match ask_by_embedding(&map.identities, (features, recipe), text, &mut phrases, |p| encoder.text(p)) {
         Err(ModelError::NoKnownWord { .. }) => Ok(None),
         answered => answered.map_err(failed),
     }
@@ -221,10 +237,8 @@ fn found(answered: &QueryAnswer, exact: &ViewMap, blended: &CodeMap, map: &Seman
     let Some(best) = answered.answer.hits().first().map(|h| h.identity) else {
         return Mask::empty(exact.width_px, exact.height_px);
     };
-    match variant.blend {
-        true => matching::blend(blended, &map.identities, best, TOLERANCE),
-        false => matching::exact(exact, &map.identities, best, TOLERANCE),
-    }
+    let Recipe { masks, tolerance, .. } = variant.recipe;
+    matching::pixels((exact, Some(blended)), &map.identities, best, masks, tolerance)
 }
 
 #[cfg(test)]

@@ -165,6 +165,55 @@ fn what_grows_or_never_ends_is_refused() {
     assert!(all(&bomb).expect_err("a bomb").to_string().contains("compressed"));
 }
 
+#[test]
+fn headers_of_safetensors_are_not_believed() {
+    let with = |stated: u64, header: &str, body: usize| {
+        [&stated.to_le_bytes()[..], header.as_bytes(), &vec![0; body]].concat()
+    };
+    let of = |header: &str, body: usize| with(header.len() as u64, header, body);
+    let tensor = |shape: &str, from: u64, to: u64| {
+        format!(r#"{{"t":{{"dtype":"F32","shape":[{shape}],"data_offsets":[{from},{to}]}}}}"#)
+    };
+    assert_eq!(all(&of(&tensor("2,2", 0, 16), 16)).expect("sound"), 1);
+    let huge = u64::MAX.to_string();
+    for (what, bytes) in [
+        ("a header longer than the file", with(1 << 20, "{", 16)),
+        ("a header longer than memory", with(u64::MAX, "{", 16)),
+        ("numbers beyond the file", of(&tensor("2,2", 0, 1 << 40), 16)),
+        ("numbers that begin beyond the file", of(&tensor("2,2", 1 << 40, (1 << 40) + 16), 16)),
+        ("an end before the beginning", of(&tensor("2,2", 16, 0), 16)),
+        ("a shape larger than its numbers", of(&tensor("2,200", 0, 16), 16)),
+        ("a shape that overflows", of(&tensor(&format!("{huge},{huge}"), 0, 16), 16)),
+        ("a deep header", of(&format!("{}{}", r#"{"a":"#.repeat(5_000), "}".repeat(5_000)), 16)),
+        ("no JSON", of("{\u{0}}", 16)),
+    ] {
+        assert!(all(&bytes).is_err(), "{what}");
+    }
+}
+
+#[test]
+fn sizes_in_an_archive_are_not_believed() {
+    let pickle = tensor("0", 4, 0, &[2, 2], &[2, 1]);
+    let sound = archive(&[("x/data.pkl", &pickle), ("x/data/0", &[7; 16])], CompressionMethod::Stored);
+    assert_eq!(all(&sound).expect("sound"), 1);
+    let entries: Vec<usize> = (0..sound.len() - 4).filter(|i| sound[*i..].starts_with(b"PK\x01\x02")).collect();
+    assert_eq!(entries.len(), 2);
+    // The storage's sizes in the directory at the end: packed, unpacked, both.
+    for fields in [&[20][..], &[24], &[20, 24]] {
+        for stated in [0_u32, 15, 17, u32::MAX - 1, u32::MAX] {
+            let mut lying = sound.clone();
+            for field in fields {
+                lying[entries[1] + field..][..4].copy_from_slice(&stated.to_le_bytes());
+            }
+            assert!(all(&lying).is_err(), "{stated} at {fields:?}");
+        }
+    }
+    // Two entries of one name, and many that are nothing.
+    let names: Vec<String> = (0..2_000).map(|i| format!("x/{i}")).collect();
+    let many: Vec<(&str, &[u8])> = names.iter().map(|n| (&**n, &b""[..])).collect();
+    assert!(matches!(all(&archive(&many, CompressionMethod::Stored)), Err(WeightFileError::Kind)));
+}
+
 /// A pickle of one tensor 't' of `shape` in the entry `key`.
 fn tensor(key: &str, elements: u8, offset: u8, shape: &[u8], strides: &[u8]) -> Vec<u8> {
     let text = |s: &str| [&[b'X'][..], &(s.len() as u32).to_le_bytes(), s.as_bytes()].concat();

@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 
-use super::PromptedMasks;
+use super::{PromptedMasks, in_square};
 use crate::math::grid::regions;
 use crate::models::ModelError;
 use crate::models::network::Tensor;
@@ -116,20 +116,13 @@ pub fn everything(
         network.look(&cut(picture, crop))?;
         let per_side = (options.points_per_side / options.crop_point_divisor.max(1).pow(*layer)).max(1);
         let points = grid(per_side);
+        let scale = in_square(network, [w, h]);
         let mut of_crop = Vec::new();
         for (k, batch) in points.chunks(options.batch.max(1)).enumerate() {
             let share = (done as f64 + (k * options.batch) as f64 / points.len() as f64) / boxes.len() as f64;
             if !go_on(share) {
                 return Ok(collector.finish(boxes.len() > 1));
             }
-            let scale = match fit {
-                // Whole pixels of the square, as the picture itself is resized.
-                FitSide::Longer => [w, h].map(|n| {
-                    let used = (n as f64 * side as f64 / w.max(h) as f64 + 0.5).floor();
-                    used / n as f64
-                }),
-                _ => [side as f64 / w as f64, side as f64 / h as f64],
-            };
             // The point, and the empty one that marks the absence of a box.
             let coords = batch
                 .iter()

@@ -43,6 +43,16 @@ pub trait PromptedMasks {
     fn fit(&self) -> FitSide;
 }
 
+/// Lengths in the network's square of a px of a picture of this size, along each axis.
+pub(super) fn in_square(network: &dyn PromptedMasks, size: [usize; 2]) -> [f64; 2] {
+    let side = network.side_px() as f64;
+    match network.fit() {
+        // Whole pixels of the square, as the picture itself is resized.
+        FitSide::Longer => size.map(|n| (n as f64 * side / size[0].max(size[1]) as f64 + 0.5).floor() / n as f64),
+        _ => size.map(|n| side / n as f64),
+    }
+}
+
 #[derive(Clone, Debug, Deserialize)]
 struct Metadata {
     name: String,
@@ -50,11 +60,16 @@ struct Metadata {
     mean: [f32; 3],
     std: [f32; 3],
     graphs: Graphs,
+    /// Whether it is made for small machines.
+    #[serde(default)]
+    small: bool,
 }
 
 #[derive(Clone, Debug, Deserialize)]
 struct Graphs {
     encoder: manifest::GraphFile,
+    /// Its second half, of one that is too large for one file.
+    encoder_rest: Option<manifest::GraphFile>,
     decoder: manifest::GraphFile,
 }
 
@@ -64,6 +79,7 @@ pub struct Sam {
     about: Metadata,
     prepare: Prepare,
     encoder: Option<Network>,
+    encoder_rest: Option<Network>,
     decoder: Option<Network>,
     embeddings: Option<Tensor>,
 }
@@ -76,7 +92,12 @@ impl Sam {
         manifest::check_pictures(path, image_size, mean, std)?;
         let prepare = Prepare { side_px: image_size, filter: Filter::Bilinear, side: FitSide::Longer, mean, std };
         let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-        Ok(Self { folder, about, prepare, encoder: None, decoder: None, embeddings: None })
+        Ok(Self { folder, about, prepare, encoder: None, encoder_rest: None, decoder: None, embeddings: None })
+    }
+
+    /// Whether it is made for small machines, and to be asked sparingly.
+    pub(crate) fn is_small(&self) -> bool {
+        self.about.small
     }
 
     /// What the network made of the picture it looked at.
@@ -94,7 +115,12 @@ impl PromptedMasks for Sam {
         self.embeddings = None;
         let image = self.prepare.picture(picture).ok_or(ModelError::NoPicture)?;
         let encoder = self.about.graphs.encoder.ready(&mut self.encoder, &self.folder)?;
-        self.embeddings = Some(encoder.run(vec![("image", image.into())])?.take("image_embeddings")?);
+        let mut out = encoder.run(vec![("image", image.into())])?;
+        if let Some(rest) = &self.about.graphs.encoder_rest {
+            let rest = rest.ready(&mut self.encoder_rest, &self.folder)?;
+            out = rest.run(vec![("hidden", out.take("hidden")?.into())])?;
+        }
+        self.embeddings = Some(out.take("image_embeddings")?);
         Ok(())
     }
 

@@ -9,9 +9,9 @@ use crate::math::stats;
 use crate::models::clip::ClipEncoder;
 use crate::models::network::Tensor;
 
-type Weights = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
+pub(super) type Weights = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
 
-fn fixture(name: &str) -> PathBuf {
+pub(super) fn fixture(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/networks").join(name)
 }
 
@@ -35,10 +35,15 @@ fn embeddings(description: &Path) -> Vec<f32> {
     [pictures.concat(), texts.concat()].concat()
 }
 
-/// The official weights, to be changed.
 fn weights() -> Weights {
-    let mut file = WeightFile::open(&fixture("clip.pt")).expect("opens");
-    let shapes: Vec<(String, Vec<usize>)> = file.tensors.iter().map(|(n, t)| (n.clone(), t.shape.clone())).collect();
+    weights_of("clip.pt")
+}
+
+/// The official weights, to be changed; those with fractions.
+pub(super) fn weights_of(checkpoint: &str) -> Weights {
+    let mut file = WeightFile::open(&fixture(checkpoint)).expect("opens");
+    let floats = file.tensors.iter().filter(|(_, t)| t.dtype.is_float());
+    let shapes: Vec<(String, Vec<usize>)> = floats.map(|(n, t)| (n.clone(), t.shape.clone())).collect();
     let one = |(name, shape): (String, Vec<usize>)| {
         let floats = file.floats(&name).expect("numbers");
         (name, (shape, floats))
@@ -46,7 +51,7 @@ fn weights() -> Weights {
     shapes.into_iter().map(one).collect()
 }
 
-fn store(weights: &Weights, path: &Path) {
+pub(super) fn store(weights: &Weights, path: &Path) {
     let bytes: Vec<Vec<u8>> =
         weights.values().map(|(_, floats)| floats.iter().flat_map(|v| v.to_le_bytes()).collect()).collect();
     let views = weights.iter().zip(&bytes).map(|((name, (shape, _)), bytes)| {
@@ -55,13 +60,13 @@ fn store(weights: &Weights, path: &Path) {
     std::fs::write(path, safetensors::serialize(views, None).expect("stored")).expect("written");
 }
 
-fn swap(weights: &mut Weights, a: &str, b: &str) {
+pub(super) fn swap(weights: &mut Weights, a: &str, b: &str) {
     let first = weights[a].1.clone();
     let second = std::mem::replace(&mut weights.get_mut(b).expect("b").1, first);
     weights.get_mut(a).expect("a").1 = second;
 }
 
-fn transpose(weights: &mut Weights, name: &str) {
+pub(super) fn transpose(weights: &mut Weights, name: &str) {
     let (shape, floats) = weights.get_mut(name).expect("a matrix");
     let (rows, columns) = (shape[0], shape[1]);
     *floats = (0..rows * columns).map(|i| floats[i % rows * columns + i / rows]).collect();

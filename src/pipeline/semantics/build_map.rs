@@ -15,31 +15,16 @@ use super::sam2_tracker::Sam2Tracker;
 use super::segmenter::{FileMasks, Segmenter};
 use super::tracker::{TrackOptions, Tracked, ViewReport, track};
 use super::train_codes::{CodeTraining, CodeView, decode, train_codes};
-use super::view_map::ViewMap;
 use crate::io::labels::Labels;
 use crate::models::Encoder;
 use crate::pipeline::observer::{Observer, Severity};
-use crate::render::{RenderSettings, Renderer};
+use crate::render::RenderSettings;
 use crate::scene::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
-use crate::scene::{GaussianCloud, IdentityId, Photo, SemanticMap};
+use crate::scene::{GaussianCloud, IdentityId, Lifting, PART_WEIGHT, Photo, Preparation, SemanticMap};
 
-/// Longer side of the masks that codes are trained on, px.
-const CODE_SIDE_PX: u32 = 256;
 pub(crate) const CODE_STEPS: u64 = 1_000;
 /// Seed of the order in which views are trained on.
 const SEED: u64 = 0;
-
-/// How Gaussians get their codes.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-pub enum Lifting {
-    /// Those of the identities they voted for
-    #[default]
-    Votes,
-    /// The same, refined by training
-    Refined,
-    /// By training alone, as in the paper; identities are read off the trained codes
-    Paper,
-}
 
 /// How masks are carried to the other photos.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
@@ -63,11 +48,18 @@ pub(crate) struct FindOptions {
     pub(crate) lifting: Lifting,
     /// Steps of training codes, where they are trained.
     pub(crate) code_steps: u64,
+    /// Share of its own embedding that a part keeps in semantic deviation.
+    pub(crate) part_weight: f32,
 }
 
 impl Default for FindOptions {
     fn default() -> Self {
-        Self { track: TrackOptions::default(), lifting: Lifting::default(), code_steps: CODE_STEPS }
+        Self {
+            track: TrackOptions::default(),
+            lifting: Lifting::default(),
+            code_steps: CODE_STEPS,
+            part_weight: PART_WEIGHT,
+        }
     }
 }
 
@@ -118,7 +110,10 @@ pub(crate) fn find_objects(
     observer: &mut dyn Observer,
 ) -> Result<Found, FindError> {
     let Tools { segmenter, follower, encoder } = tools;
-    let tracked = track(cloud, photos, settings, segmenter, follower, &options.track, observer)?;
+    let prompt = follower.is_some().then_some(options.track.prompt);
+    let keep_masks = options.lifting != Lifting::Votes;
+    let how = TrackOptions { keep_masks, ..options.track.clone() };
+    let tracked = track(cloud, photos, settings, segmenter, follower, &how, observer)?;
     if let Some(text) = unknown(&tracked.views, photos, options.track.reseed_share) {
         observer.note(Severity::Info, text);
     }
@@ -129,44 +124,39 @@ pub(crate) fn find_objects(
     let margin = tracked.assignments.iter().map(|b| b.margin).collect();
     let seeds = tracked.seeds.iter().map(|&i| photos[i].name.clone()).collect();
     let mut map = SemanticMap::from_identities(identities, of, margin, seeds);
-    let Tracked { views, disagreements, mut secs, .. } = tracked;
+    map.prepared = Some(Preparation { lifting: options.lifting, part_weight: options.part_weight, prompt });
+    let Tracked { views, disagreements, masks, mut secs, .. } = tracked;
     let mut timed = |stage: &'static str, start: Instant| secs.push((stage, start.elapsed().as_secs_f64()));
     let start = Instant::now();
-    lift(&mut map, cloud, photos, settings, options, observer)?;
+    if options.lifting != Lifting::Votes {
+        let text = format!("Codes are trained on the masks of {} of {} photos", masks.len(), photos.len());
+        observer.note(Severity::Info, text);
+        lift(&mut map, cloud, &masks, settings, options, observer)?;
+    }
     timed("train codes", start);
     if let Some(encoder) = encoder {
         let start = Instant::now();
-        map.language = Some(embed(cloud, &map, photos, settings, encoder, observer)?);
+        map.language = Some(embed(cloud, &map, photos, settings, options.part_weight, encoder, observer)?);
         timed("look at identities", start);
     }
     Ok(Found { map, views, disagreements, secs })
 }
 
-/// Trains the codes of the Gaussians, where that is wanted, on the masks as they were tracked.
+/// Trains the codes of the Gaussians on the masks that were found and followed, never on what the votes make of them.
 fn lift(
     map: &mut SemanticMap,
     cloud: &GaussianCloud,
-    photos: &[Photo],
+    views: &[CodeView],
     settings: &RenderSettings,
     options: &FindOptions,
     observer: &mut dyn Observer,
 ) -> Result<(), FindError> {
-    if options.lifting == Lifting::Votes {
-        return Ok(());
-    }
-    let mut renderer = Renderer::new();
-    let mut views = Vec::with_capacity(photos.len());
-    for photo in photos {
-        let camera = photo.camera.limited_to(CODE_SIDE_PX);
-        let seen = ViewMap::render(&mut renderer, cloud, &map.identity_of, &map.identities, &camera, settings)?;
-        views.push(CodeView { camera, labels: seen.identity });
-    }
     if options.lifting == Lifting::Paper {
         let nothing: [f32; CODE_CHANNELS] = std::array::from_fn(|c| BACKGROUND_CODE[c % 3]);
         map.codes.fill(nothing);
     }
     let training = CodeTraining { steps: options.code_steps, seed: SEED };
-    train_codes(cloud, &mut map.codes, &views, &map.identities, settings, training, observer)?;
+    train_codes(cloud, &mut map.codes, views, &map.identities, settings, training, observer)?;
     observer.proceed()?;
     if options.lifting == Lifting::Paper {
         map.identity_of = decode(&map.codes, &map.identities);
@@ -198,6 +188,8 @@ mod tests {
     use super::*;
     use crate::pipeline::observer::{Interrupted, Signal, Silent};
     use crate::pipeline::semantics::segmenter::FoundMask;
+    use crate::pipeline::semantics::view_map::ViewMap;
+    use crate::render::Renderer;
     use crate::scene::{Camera, Identities, Level as Of, Mask, NOBODY};
 
     /// A doll with an eye on the left, a cat on the right: whose the Gaussians are.
@@ -284,7 +276,7 @@ mod tests {
         let mut told = told;
         let tools = Tools { segmenter: &mut told, follower: None, encoder: None };
         let track = TrackOptions { max_seeds, ..TrackOptions::default() };
-        let options = FindOptions { track, lifting, code_steps };
+        let options = FindOptions { track, lifting, code_steps, ..FindOptions::default() };
         find_objects(&cloud(), &photos(), &RenderSettings::default(), tools, &options, observer)
     }
 
@@ -352,6 +344,27 @@ mod tests {
             let far = |a: &[f32; 6], b: &[f32; 6]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
             let worst = map.codes.iter().zip(&votes.codes).map(|(a, b)| far(a, b)).fold(0.0, f32::max);
             assert!(worst < 0.25, "{lifting:?}: {worst}");
+        }
+    }
+
+    #[test]
+    fn codes_are_trained_on_masks_and_never_on_what_votes_make_of_them() {
+        struct Notes(Vec<String>);
+        impl Observer for Notes {
+            fn note(&mut self, _: Severity, text: String) {
+                self.0.push(text);
+            }
+        }
+        for (max_seeds, masks) in [(1, "1 of 2"), (12, "2 of 2")] {
+            let mut notes = Notes(vec![]);
+            let told = Told { named: true, covers: true };
+            let map = find(told, (Lifting::Paper, 60), max_seeds, &mut notes).expect("found").map;
+            assert!(notes.0.iter().any(|n| n.contains(&format!("the masks of {masks} photos"))), "{:?}", notes.0);
+            // What no mask shows keeps the background's codes, though the Gaussians beside it had votes.
+            let untouched = map.codes[9..].iter().all(|c| c.iter().all(|v| (v - 0.5).abs() < 1e-6));
+            assert_eq!(untouched, max_seeds == 1);
+            let prepared = Preparation { lifting: Lifting::Paper, ..Preparation::default() };
+            assert_eq!(map.prepared, Some(prepared), "it is stored how it was made");
         }
     }
 

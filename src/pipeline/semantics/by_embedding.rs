@@ -4,59 +4,89 @@ use std::collections::HashMap;
 
 use rayon::prelude::*;
 
-use super::localize::{Scorer, Strategy};
-use super::relevancy::{CANONICAL, TEMPERATURE, advantage, score};
+use super::colors;
+use super::localize::{Hit, Scorer};
+use super::parse::ParsedQuery;
+use super::recipe::{PartFeatures, Recipe, Rejection, Strategy};
+use super::relevancy::{advantage, score};
 use crate::math::finite::{all_finite, insist};
-use crate::scene::{LanguageFeatures, ViewFeatures};
+use crate::models;
+use crate::scene::{Identities, IdentityId, LanguageFeatures, ViewFeatures};
 
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum PartFeatures {
-    /// Moved toward their whole's: the paper's semantic deviation.
-    #[default]
-    Deviated,
-    Raw,
-}
-
-/// How scores are made.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EmbeddingOptions {
-    pub(crate) parts: PartFeatures,
-    pub(crate) strategy: Strategy,
-    /// Spread of the scores; the order does not depend on it.
-    pub(crate) temperature: f32,
-}
-
-impl Default for EmbeddingOptions {
-    fn default() -> Self {
-        Self { parts: PartFeatures::Deviated, strategy: Strategy::Joint, temperature: TEMPERATURE }
-    }
-}
-
-/// Embeddings of phrases, kept from query to query.
+/// Embeddings of phrases, kept from query to query; `None` for those that the encoder could not read.
 #[derive(Clone, Debug, Default)]
-pub struct TextEmbeddings(HashMap<String, Vec<f32>>);
+pub struct TextEmbeddings(HashMap<String, Option<Vec<f32>>>);
 
 impl TextEmbeddings {
     /// Phrases that are kept at most.
     const MOST: usize = 4_096;
 
-    /// Adds the embedding that `encode` makes of each phrase, and of the canonical ones, unless it is
-    /// there already.
-    pub fn learn<E>(&mut self, phrases: &[&str], mut encode: impl FnMut(&str) -> Result<Vec<f32>, E>) -> Result<(), E> {
+    /// Adds the embeddings that `encode` makes of the phrases that answering a question by this recipe needs, unless
+    /// they are there already. Only those of the question itself have to be understood.
+    pub fn learn<E>(
+        &mut self,
+        phrase: &ParsedQuery,
+        recipe: &Recipe,
+        mut encode: impl FnMut(&str) -> Result<Vec<f32>, E>,
+    ) -> Result<(), E> {
         if self.0.len() > Self::MOST {
             self.0.clear();
         }
-        for phrase in phrases.iter().chain(&CANONICAL) {
-            if !self.0.contains_key(*phrase) {
-                self.0.insert((*phrase).to_owned(), encode(phrase)?);
+        for needed in std::iter::once(&phrase.text).chain(&phrase.whole) {
+            if self.get(needed).is_none() {
+                self.0.insert(needed.clone(), Some(encode(needed)?));
             }
         }
+        self.try_to_learn(helpful(phrase, recipe), encode);
         Ok(())
     }
 
-    pub(crate) fn get(&self, phrase: &str) -> Option<&[f32]> {
-        self.0.get(phrase).map(Vec::as_slice)
+    /// Adds the embeddings of the canonical phrases of a recipe.
+    pub(crate) fn learn_canonical<E>(&mut self, recipe: &Recipe, encode: impl FnMut(&str) -> Result<Vec<f32>, E>) {
+        self.try_to_learn(recipe.canonical.iter().map(str::to_owned).collect(), encode);
     }
+
+    fn try_to_learn<E>(&mut self, phrases: Vec<String>, mut encode: impl FnMut(&str) -> Result<Vec<f32>, E>) {
+        for phrase in phrases {
+            if !self.0.contains_key(&phrase) {
+                let embedding = encode(&phrase).ok();
+                self.0.insert(phrase, embedding);
+            }
+        }
+    }
+
+    /// Whether the encoder was asked for a phrase in vain.
+    pub(crate) fn is_unreadable(&self, phrase: &str) -> bool {
+        matches!(self.0.get(phrase), Some(None))
+    }
+
+    pub(crate) fn get(&self, phrase: &str) -> Option<&[f32]> {
+        self.0.get(phrase)?.as_deref()
+    }
+}
+
+/// Phrases that a question is answered with, besides its own.
+fn helpful(phrase: &ParsedQuery, recipe: &Recipe) -> Vec<String> {
+    let mut all: Vec<String> = recipe.canonical.iter().map(str::to_owned).collect();
+    if matches!(recipe.strategy, Strategy::TwoSteps | Strategy::Joint) {
+        all.extend(phrase.implied_whole().map(str::to_owned));
+    }
+    if recipe.strategy == Strategy::WholeFirst {
+        all.push(phrase.target.clone());
+    }
+    if recipe.rejection == Rejection::Strict {
+        for said in colored(phrase) {
+            all.push(said.to_owned());
+            all.extend(colors::alternatives(said));
+        }
+    }
+    all
+}
+
+/// The phrases of a question that say what color something has: its own, and the whole's.
+fn colored(phrase: &ParsedQuery) -> impl Iterator<Item = &str> {
+    let own = if phrase.whole.is_some() { &phrase.target } else { &phrase.text };
+    std::iter::once(own).chain(&phrase.whole).map(String::as_str).filter(|said| !colors::said(said).is_empty())
 }
 
 /// Score above which an identity is nearer to the query than to any canonical phrase.
@@ -72,31 +102,51 @@ const IDENTITIES_PER_TASK: usize = 32;
 
 /// Scores by language features.
 pub struct EmbeddingScorer<'a> {
+    pub(crate) identities: &'a Identities,
     pub(crate) features: &'a LanguageFeatures,
     /// Embeddings of the phrases that will be asked for; others score nothing.
     pub(crate) phrases: &'a TextEmbeddings,
-    pub(crate) options: EmbeddingOptions,
+    pub(crate) recipe: &'a Recipe,
     known: Vec<(String, Option<String>, Vec<f32>)>,
 }
 
 impl<'a> EmbeddingScorer<'a> {
     /// Scores by these features and encoded phrases.
-    pub fn new(features: &'a LanguageFeatures, phrases: &'a TextEmbeddings, options: EmbeddingOptions) -> Self {
-        Self { features, phrases, options, known: Vec::new() }
+    pub fn new(
+        identities: &'a Identities,
+        features: &'a LanguageFeatures,
+        phrases: &'a TextEmbeddings,
+        recipe: &'a Recipe,
+    ) -> Self {
+        Self { identities, features, phrases, recipe, known: Vec::new() }
     }
 
     /// Advantage of every identity, by number less one: that of its best view. Negative infinity
     /// without features.
     pub fn advantages(&self, phrase: &str, against: Option<&str>) -> Vec<f32> {
         let query = self.phrases.get(phrase);
-        let canonical: Vec<Vec<f32>> =
-            CANONICAL.into_iter().chain(against).filter_map(|p| self.phrases.get(p)).map(<[f32]>::to_vec).collect();
-        let best = |f: &ViewFeatures| {
-            let views = if self.options.parts == PartFeatures::Raw { &f.raw } else { &f.deviated };
-            let each = query.into_iter().flat_map(|q| views.iter().map(move |v| (v, q)));
-            each.map(|(v, q)| advantage(v, q, &canonical)).fold(f32::NEG_INFINITY, f32::max)
-        };
+        let canonical = self.embeddings(self.recipe.canonical.iter().chain(against));
+        let best = |f: &ViewFeatures| query.map_or(f32::NEG_INFINITY, |q| self.best_view(f, q, &canonical));
         self.features.by_identity.par_iter().with_min_len(IDENTITIES_PER_TASK).map(best).collect()
+    }
+
+    fn embeddings<'p>(&self, phrases: impl Iterator<Item = &'p str>) -> Vec<Vec<f32>> {
+        phrases.filter_map(|p| self.phrases.get(p)).map(<[f32]>::to_vec).collect()
+    }
+
+    fn best_view(&self, f: &ViewFeatures, query: &[f32], canonical: &[Vec<f32>]) -> f32 {
+        let views = if self.recipe.parts == PartFeatures::Raw { &f.raw } else { &f.deviated };
+        views.iter().map(|v| advantage(v, query, canonical)).fold(f32::NEG_INFINITY, f32::max)
+    }
+
+    /// Whether an identity is more like the phrase with another color than like the phrase.
+    fn has_another_color(&self, phrase: &str, id: IdentityId) -> bool {
+        let others = colors::alternatives(phrase);
+        let others = self.embeddings(others.iter().map(String::as_str));
+        let (Some(query), Some(f)) = (self.phrases.get(phrase), self.features.by_identity.get(id as usize - 1)) else {
+            return false;
+        };
+        !others.is_empty() && self.best_view(f, query, &others) < 0.0
     }
 }
 
@@ -106,27 +156,43 @@ impl Scorer for EmbeddingScorer<'_> {
             return known.2.clone();
         }
         let advantages = self.advantages(phrase, against).into_iter();
-        let scores: Vec<f32> = advantages.map(|d| score(d, self.options.temperature)).collect();
+        let scores: Vec<f32> = advantages.map(|d| score(d, self.recipe.temperature)).collect();
         insist(|| all_finite("relevancy", "score", &scores));
         self.known.push((phrase.to_owned(), against.map(str::to_owned), scores.clone()));
         scores
     }
 
-    fn strategy(&self) -> Strategy {
-        self.options.strategy
-    }
-
     fn threshold(&self) -> f32 {
-        THRESHOLD
+        if self.recipe.rejection == Rejection::Never { 0.0 } else { THRESHOLD }
     }
 
     fn resolution(&self) -> f32 {
-        resolution(self.options.temperature)
+        resolution(self.recipe.temperature)
     }
+
+    fn rejects(&mut self, phrase: &ParsedQuery, hit: &Hit) -> bool {
+        if self.recipe.rejection != Rejection::Strict {
+            return false;
+        }
+        let whole = || self.identities.object_of(hit.identity);
+        let other = |said: &str| {
+            let of_whole = phrase.whole.as_deref() == Some(said);
+            self.has_another_color(said, if of_whole { whole() } else { hit.identity })
+        };
+        hit.score < score(least_advantage(&self.features.encoder), self.recipe.temperature)
+            || colored(phrase).any(other)
+    }
+}
+
+/// How much more relevant than any canonical phrase an identity must be to be what was asked for: nearly everything is
+/// a little more like some phrase to the encoders of photos (docs/measured.md).
+pub(crate) fn least_advantage(encoder: &str) -> f32 {
+    if encoder == models::DEMO { 0.0 } else { 0.03 }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::recipe::PAPERS_PHRASES;
     use super::*;
 
     fn features() -> LanguageFeatures {
@@ -150,21 +216,33 @@ mod tests {
                 _ => vec![0.5, 0.5],
             })
         };
-        book.learn(&["lid", "pot"], encode).expect("encodes");
+        for phrase in ["lid", "pot"] {
+            book.learn(&parsed(phrase), &Recipe::default(), encode).expect("encodes");
+        }
         book
+    }
+
+    fn parsed(phrase: &str) -> ParsedQuery {
+        ParsedQuery::parse(phrase).expect("words")
+    }
+
+    fn all() -> Identities {
+        Identities::objects(3)
     }
 
     #[test]
     fn the_best_view_counts_and_features_can_be_chosen() {
         let (features, phrases) = (features(), book());
-        let mut by = EmbeddingScorer::new(&features, &phrases, EmbeddingOptions::default());
+        let (all, recipe) = (all(), Recipe::default());
+        let mut by = EmbeddingScorer::new(&all, &features, &phrases, &recipe);
         let d = by.advantages("lid", None);
         assert!((d[0] + 0.5).abs() < 1e-6 && (d[1] - 0.1).abs() < 1e-6 && d[2] == f32::NEG_INFINITY, "{d:?}");
         let s = by.scores("lid", None);
         assert!(s[0] < 0.5 && s[1] > 0.5 && s[2] == 0.0);
         // The whole's phrase is one more thing to be better than.
         assert!((by.advantages("lid", Some("pot"))[1] - 0.1).abs() < 1e-6);
-        by.options.parts = PartFeatures::Raw;
+        let raw = Recipe { parts: PartFeatures::Raw, ..Recipe::default() };
+        by.recipe = &raw;
         assert!((by.advantages("lid", None)[1] - 0.5).abs() < 1e-6);
         assert!(by.advantages("never learned", None).iter().all(|d| *d == f32::NEG_INFINITY));
     }
@@ -174,44 +252,73 @@ mod tests {
         let mut book = TextEmbeddings::default();
         let mut calls = 0;
         for _ in 0..3 {
-            book.learn(&["lid"], |_| {
+            let encode = |_: &str| {
                 calls += 1;
                 Ok::<_, ()>(vec![1.0])
-            })
-            .expect("encodes");
+            };
+            book.learn(&parsed("lid"), &Recipe::default(), encode).expect("encodes");
         }
-        assert_eq!(calls, 1 + CANONICAL.len());
-        assert_eq!(book.learn(&["pot"], |_| Err("no")), Err("no"));
+        assert_eq!(calls, 1 + PAPERS_PHRASES.len());
+        assert_eq!(book.learn(&parsed("pot"), &Recipe::default(), |_| Err("no")), Err("no"));
         assert!(book.get("pot").is_none());
     }
 
     #[test]
     fn scores_are_kept_by_phrase_and_whole() {
-        let (features, phrases) = (features(), book());
+        let (features, phrases, all, recipe) = (features(), book(), all(), Recipe::default());
         let fresh = |phrase: &str, whole: Option<&str>| {
-            EmbeddingScorer::new(&features, &phrases, EmbeddingOptions::default()).scores(phrase, whole)
+            EmbeddingScorer::new(&all, &features, &phrases, &recipe).scores(phrase, whole)
         };
         let asked = [("lid", None), ("pot", None), ("lid", Some("pot")), ("pot", Some("lid")), ("lid", None)];
-        let mut by = EmbeddingScorer::new(&features, &phrases, EmbeddingOptions::default());
+        let mut by = EmbeddingScorer::new(&all, &features, &phrases, &recipe);
         for (phrase, whole) in asked {
             assert_eq!(by.scores(phrase, whole), fresh(phrase, whole), "{phrase} {whole:?}");
         }
         assert_ne!(fresh("lid", None), fresh("pot", None));
         assert_ne!(fresh("pot", None), fresh("pot", Some("pot")));
         // The slope of the logistic curve at its middle is a quarter.
-        assert!((resolution(TEMPERATURE) - 0.005 * TEMPERATURE / 4.0).abs() < 1e-5);
-        assert_eq!((by.strategy(), by.threshold()), (Strategy::Joint, THRESHOLD));
-        assert!((by.resolution() - resolution(TEMPERATURE)).abs() < 1e-9);
+        let temperature = recipe.temperature;
+        assert!((resolution(temperature) - 0.005 * temperature / 4.0).abs() < 1e-5);
+        assert_eq!(by.threshold(), THRESHOLD);
+        assert!((by.resolution() - resolution(temperature)).abs() < 1e-9);
     }
 
     #[test]
     fn a_full_book_begins_anew() {
         let mut book = TextEmbeddings::default();
-        let many: Vec<String> = (0..=TextEmbeddings::MOST).map(|i| i.to_string()).collect();
-        let encode = |_: &str| Ok::<_, ()>(vec![1.0]);
-        book.learn(&many.iter().map(String::as_str).collect::<Vec<_>>(), encode).expect("encodes");
-        assert!(book.get("7").is_some());
-        book.learn(&["lid"], encode).expect("encodes");
-        assert!(book.get("7").is_none() && book.get("lid").is_some() && book.get("texture").is_some());
+        let recipe = Recipe::default();
+        let learn = |phrase: &str, book: &mut TextEmbeddings| {
+            book.learn(&parsed(phrase), &recipe, |_| Ok::<_, ()>(vec![1.0])).expect("encodes")
+        };
+        (0..=TextEmbeddings::MOST).for_each(|i| learn(&i.to_string(), &mut book));
+        assert!(book.get("4096").is_some());
+        learn("lid", &mut book);
+        assert!(book.get("4096").is_none() && book.get("lid").is_some() && book.get("texture").is_some());
+    }
+
+    #[test]
+    fn the_recipe_says_which_phrases_are_needed() {
+        let learned = |phrase: &str, recipe: Recipe| {
+            let mut asked = Vec::new();
+            let encode = |p: &str| {
+                asked.push(p.to_owned());
+                if p == "bear" { Err("no") } else { Ok(vec![1.0]) }
+            };
+            let mut book = TextEmbeddings::default();
+            book.learn(&parsed(phrase), &recipe, encode).expect("only what was asked has to be understood");
+            asked
+        };
+        let of = |strategy, rejection| Recipe { strategy, rejection, ..Recipe::default() };
+        let canonical = PAPERS_PHRASES.map(str::to_owned);
+        let plain = of(Strategy::OneStep, Rejection::Canonical);
+        let with = |first: &[&str]| [first.iter().map(|p| (*p).to_owned()).collect(), canonical.to_vec()].concat();
+        assert_eq!(learned("bear nose", plain.clone()), with(&["bear nose"]));
+        let lerf = Recipe { canonical: "lerf".parse().expect("four"), ..plain.clone() };
+        assert_eq!(learned("mug", lerf), ["mug", "object", "things", "stuff", "texture"]);
+        let steps = learned("bear nose", of(Strategy::TwoSteps, Rejection::Canonical));
+        assert_eq!(steps, [with(&["bear nose"]), vec!["bear".into()]].concat());
+        assert_eq!(learned("nose of the bear mask", plain), with(&["nose of the bear mask", "bear mask"]));
+        let colored = learned("lid of the red pot", of(Strategy::OneStep, Rejection::Strict));
+        assert!(colored.contains(&"blue pot".into()) && !colored.iter().any(|p| p.starts_with("lid of the b")));
     }
 }

@@ -3,7 +3,7 @@
 use std::collections::{BTreeSet, HashMap};
 
 use super::error::FindError;
-use super::relevancy::{PART_WEIGHT, deviate};
+use super::relevancy::deviate;
 use super::view_map::ViewMap;
 use crate::io;
 use crate::models::{Encoder, IdentityCrop, ModelError};
@@ -21,12 +21,14 @@ const COUNT_SIDE_PX: u32 = 256;
 /// Pixels of such a view that must show an identity for it to be looked at.
 const LEAST_PX: usize = 12;
 
-/// Lets `encoder` look at every identity of `map`, in up to [`MAX_VIEWS`] of the `photos`.
+/// Lets `encoder` look at every identity of `map`, in up to [`MAX_VIEWS`] of the `photos`. Parts keep `part_weight` of
+/// their own embedding.
 pub(crate) fn embed(
     cloud: &GaussianCloud,
     map: &SemanticMap,
     photos: &[Photo],
     settings: &RenderSettings,
+    part_weight: f32,
     encoder: &mut dyn Encoder,
     observer: &mut dyn Observer,
 ) -> Result<LanguageFeatures, FindError> {
@@ -62,7 +64,7 @@ pub(crate) fn embed(
         for &id in &wanted[photo] {
             let Some(raw) = eye.seen(id) else { continue };
             let whole = whole_of(id).and_then(|whole| eye.seen(whole));
-            let deviated = whole.and_then(|whole| deviate(&raw, &whole, PART_WEIGHT)).unwrap_or_else(|| raw.clone());
+            let deviated = whole.and_then(|whole| deviate(&raw, &whole, part_weight)).unwrap_or_else(|| raw.clone());
             let features = &mut of[id as usize - 1];
             features.raw.push(raw);
             features.deviated.push(deviated);
@@ -146,7 +148,7 @@ mod tests {
 
     use super::*;
     use crate::pipeline::observer::{Signal, Silent};
-    use crate::scene::{Camera, NOBODY};
+    use crate::scene::{Camera, NOBODY, PART_WEIGHT};
 
     /// Sees whether there is red in a picture, and nothing else.
     struct Reddish {
@@ -212,7 +214,7 @@ mod tests {
         let (cloud, map, photos) = doll(folder.path());
         let mut encoder = Reddish { side_px: None, tiles: vec![] };
         let settings = RenderSettings::default();
-        let language = embed(&cloud, &map, &photos, &settings, &mut encoder, &mut Silent).expect("looks");
+        let language = embed(&cloud, &map, &photos, &settings, PART_WEIGHT, &mut encoder, &mut Silent).expect("looks");
         assert_eq!((language.encoder.as_str(), language.dimension), ("reddish", 2));
         assert!(language.is_valid(&map.identities));
         let [doll, eye, nowhere] = &language.by_identity[..] else { panic!("{language:?}") };
@@ -226,7 +228,7 @@ mod tests {
         // Tiles as large as what is seen, unless the encoder wants them otherwise.
         assert!(encoder.tiles.iter().all(|side| (10..=96).contains(side)), "{:?}", encoder.tiles);
         let mut encoder = Reddish { side_px: Some(7), tiles: vec![] };
-        embed(&cloud, &map, &photos, &settings, &mut encoder, &mut Silent).expect("looks");
+        embed(&cloud, &map, &photos, &settings, PART_WEIGHT, &mut encoder, &mut Silent).expect("looks");
         assert_eq!(encoder.tiles, [7; 2 * MAX_VIEWS], "one tile of each identity in each of the best views");
     }
 
@@ -241,7 +243,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let (cloud, map, photos) = doll(folder.path());
         let mut encoder = Reddish { side_px: None, tiles: vec![] };
-        let stopped = embed(&cloud, &map, &photos, &RenderSettings::default(), &mut encoder, &mut Stop);
+        let stopped = embed(&cloud, &map, &photos, &RenderSettings::default(), PART_WEIGHT, &mut encoder, &mut Stop);
         assert!(matches!(stopped, Err(FindError::Interrupted(_))), "{stopped:?}");
     }
 

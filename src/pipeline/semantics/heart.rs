@@ -8,17 +8,18 @@ mod controls;
 use std::collections::HashMap;
 use std::path::Path;
 
-use self::controls::{ABSENT, Harm, harmed, wrong_colors};
-use super::answer::{Language, QueryAnswer, by_embedding, by_name, phrases_of};
-use super::build_map::{FindOptions, Lifting, Tools, find_objects};
-use super::by_embedding::{EmbeddingOptions, TextEmbeddings};
+use self::controls::{Harm, harmed};
+use super::answer::{Language, QueryAnswer, by_embedding, by_name};
+use super::build_map::{FindOptions, Tools, find_objects};
+use super::by_embedding::TextEmbeddings;
 use super::code_map::CodeMap;
 use super::localize::Answer;
 use super::names;
 use super::parse::ParsedQuery;
 use super::protocols::part_recall::{self, Components};
+use super::protocols::recipes::Absent;
 use super::protocols::{AskedScene, Category, LabeledView, categories, masks};
-use super::relevancy::CANONICAL;
+use super::recipe::{PAPERS_PHRASES, Recipe};
 use super::segmenter::{FileMasks, Segmenter};
 use super::view_map::ViewMap;
 use crate::io::{self, Opened, labels::Labels};
@@ -28,7 +29,7 @@ use crate::pipeline::observer::Silent;
 use crate::pipeline::synth::{self, Rig, SynthOptions};
 use crate::pipeline::train::{self, TrainConfig};
 use crate::render::{BackendChoice, RenderSettings, Renderer};
-use crate::scene::{Camera, GaussianCloud, LanguageFeatures, Level, LevelFilter, Photo, SemanticMap};
+use crate::scene::{Camera, GaussianCloud, LanguageFeatures, Level, LevelFilter, Lifting, Photo, SemanticMap};
 
 /// What is measured on.
 const SCENES: [&str; 2] = ["desk", "kitchen"];
@@ -148,7 +149,9 @@ impl Scene {
 fn by_names(scene: &Scene, map: &SemanticMap) -> [f64; 2] {
     let drawn = scene.drawn(map);
     let blended = CodeMap::default();
-    let mut ask = |text: &str| ParsedQuery::parse(text).map(|p| by_name(&map.identities, &p, LevelFilter::Auto));
+    let mut ask = |text: &str| {
+        ParsedQuery::parse(text).map(|p| by_name(&map.identities, &p, LevelFilter::Auto, &Recipe::default()))
+    };
     let mut asked = AskedScene { map, ask: &mut ask };
     let views = scene.views(&drawn, &blended);
     masks::by_level(&views.iter().flat_map(|v| masks::compare(&mut asked, v)).collect::<Vec<_>>())
@@ -163,9 +166,10 @@ fn by_looks(
     text: &str,
 ) -> Option<QueryAnswer> {
     let phrase = ParsedQuery::parse(text)?;
-    book.learn(&phrases_of(&phrase), |p| encoder.text(p)).ok()?;
-    let language = Language { features, phrases: book, options: EmbeddingOptions::default() };
-    Some(by_embedding(&map.identities, &phrase, LevelFilter::Auto, language))
+    let recipe = Recipe::default();
+    book.learn(&phrase, &recipe, |p| encoder.text(p)).ok()?;
+    let language = Language { features, phrases: book };
+    Some(by_embedding(&map.identities, &phrase, LevelFilter::Auto, &recipe, language))
 }
 
 fn measure(seed: u64, harms: &[Harm]) -> Vec<Figures> {
@@ -208,7 +212,7 @@ struct Known<'a> {
 
 impl Known<'_> {
     fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
-        if self.harm == Harm::Canonical && CANONICAL.contains(&phrase) {
+        if self.harm == Harm::Canonical && PAPERS_PHRASES.contains(&phrase) {
             return Ok(vec![0.0; self.encoder.dimension()]);
         }
         if !self.texts.contains_key(phrase) {
@@ -222,8 +226,9 @@ fn figures(scene: &Scene, map: &SemanticMap, trained: &SemanticMap, encoder: &mu
     let features = map.language.as_ref().expect("looked at");
     let (drawn, blended) = (scene.drawn(map), CodeMap::default());
     let views = scene.views(&drawn, &blended);
-    let recall = Components::ROWS
-        .map(|row| part_recall::row(row, map, features, &views, |p| encoder.text(p)).expect("encodes").recall);
+    let recall = Components::ROWS.map(|row| {
+        part_recall::row((row, &Recipe::default()), map, features, &views, |p| encoder.text(p)).expect("encodes").recall
+    });
     let mut book = TextEmbeddings::default();
     let (mut objects, mut present) = (Vec::new(), Vec::new());
     for view in &views {
@@ -237,11 +242,13 @@ fn figures(scene: &Scene, map: &SemanticMap, trained: &SemanticMap, encoder: &mu
         }
     }
     let share = |list: &[bool]| list.iter().filter(|found| **found).count() as f64 / list.len() as f64;
-    let not_there = [ABSENT.split(", ").map(str::to_owned).collect(), wrong_colors(&map.identities)];
+    let absent = Absent::of(&map.identities);
+    let not_there = [absent.kinds, absent.colors];
     let is_found = |answered: QueryAnswer| !matches!(answered.answer, Answer::NotFound(_));
     let mut seen = |name: &String| by_looks(map, features, &mut book, encoder, name).map(is_found);
-    let named =
-        |name: &String| ParsedQuery::parse(name).map(|p| is_found(by_name(&map.identities, &p, LevelFilter::Auto)));
+    let named = |name: &String| {
+        ParsedQuery::parse(name).map(|p| is_found(by_name(&map.identities, &p, LevelFilter::Auto, &Recipe::default())))
+    };
     let found = |list: &Vec<String>, ask: &mut dyn FnMut(&String) -> Option<bool>| {
         share(&list.iter().map(|name| ask(name).expect("its words are known")).collect::<Vec<_>>())
     };

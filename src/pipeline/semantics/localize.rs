@@ -2,27 +2,11 @@
 //! "ambiguous" among the answers.
 
 use super::parse::ParsedQuery;
+use super::recipe::Strategy;
 use crate::scene::{Identities, IdentityId, Level, LevelFilter};
 
 /// Answers that are given at most.
 const TOP: usize = 8;
-
-/// How a piece of a whole is looked for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Strategy {
-    /// The whole by its own phrase, then its pieces by theirs. For scores that treat words one by
-    /// one, such as names.
-    #[default]
-    WholeFirst,
-    /// The paper's two steps: the whole query first; only if an object wins, its parts compete, with
-    /// the object's phrase among the canonical ones.
-    Paper,
-    /// The whole query once, whatever wins.
-    OneStep,
-    /// Every part by the whole query and its object by the whole's phrase at once: neither alone
-    /// decides, so one slip in the first step does not lose the part.
-    Joint,
-}
 
 /// Scores identities for phrases, by number less one; higher is better.
 pub trait Scorer {
@@ -31,16 +15,16 @@ pub trait Scorer {
     /// second step).
     fn scores(&mut self, phrase: &str, against: Option<&str>) -> Vec<f32>;
 
-    /// How this scorer finds pieces of wholes best.
-    fn strategy(&self) -> Strategy {
-        Strategy::WholeFirst
-    }
-
     /// Score under which an identity is not what was asked for.
     fn threshold(&self) -> f32;
 
     /// Difference of scores under which two identities cannot be told apart.
     fn resolution(&self) -> f32;
+
+    /// Whether what fits best is not what was asked for, though its score would do.
+    fn rejects(&mut self, _phrase: &ParsedQuery, _hit: &Hit) -> bool {
+        false
+    }
 }
 
 /// An identity that may be meant.
@@ -84,50 +68,116 @@ impl Answer {
 }
 
 /// Finds what `phrase` means among the identities.
-pub fn localize(identities: &Identities, phrase: &ParsedQuery, level: LevelFilter, scorer: &mut dyn Scorer) -> Answer {
-    match (&phrase.whole, level, scorer.strategy()) {
-        (Some(whole), LevelFilter::Auto | LevelFilter::Part, Strategy::WholeFirst) => {
+pub fn localize(
+    identities: &Identities,
+    phrase: &ParsedQuery,
+    level: LevelFilter,
+    strategy: Strategy,
+    scorer: &mut dyn Scorer,
+) -> Answer {
+    let answer = meant(identities, phrase, level, strategy, scorer);
+    match answer {
+        Answer::Found(hits) | Answer::Ambiguous(hits) if scorer.rejects(phrase, &hits[0]) => Answer::NotFound(hits),
+        other => other,
+    }
+}
+
+/// What is meant by scores alone.
+fn meant(
+    identities: &Identities,
+    phrase: &ParsedQuery,
+    level: LevelFilter,
+    strategy: Strategy,
+    scorer: &mut dyn Scorer,
+) -> Answer {
+    let (text, whole) = (phrase.text.as_str(), phrase.whole.as_deref());
+    match (strategy, whole, level) {
+        (Strategy::WholeFirst, Some(whole), LevelFilter::Auto | LevelFilter::Part) => {
             piece_of(identities, &phrase.target, whole, scorer)
         }
-        (Some(whole), LevelFilter::Auto | LevelFilter::Part, Strategy::Paper) => {
-            two_steps(identities, &phrase.text, whole, scorer)
-        }
-        (Some(whole), LevelFilter::Auto | LevelFilter::Part, Strategy::Joint) => {
-            jointly(identities, &phrase.text, whole, scorer)
-        }
-        (_, _, strategy) => {
-            let text = if strategy == Strategy::WholeFirst { &phrase.target } else { &phrase.text };
-            let scores = scorer.scores(text, None);
-            let wanted = |own: Level| match level {
-                LevelFilter::Auto => true,
-                LevelFilter::Object => own == Level::Object,
-                LevelFilter::Part => own == Level::Part,
-            };
-            let all = identities.iter().filter(|(_, i)| wanted(i.level)).map(|(id, _)| id);
-            judge(identities, rank(all, &scores), scorer)
+        (Strategy::WholeFirst, ..) => once(identities, &phrase.target, level, scorer),
+        (Strategy::OneStep, ..) | (_, _, LevelFilter::Object) => once(identities, text, level, scorer),
+        (Strategy::TwoSteps, ..) => two_steps(identities, phrase, level, scorer),
+        (Strategy::Joint, Some(whole), _) => jointly(identities, text, whole, scorer),
+        (Strategy::Joint, None, LevelFilter::Part) => once(identities, text, level, scorer),
+        (Strategy::Joint, None, LevelFilter::Auto) => {
+            let ranked = ranked(identities, &scorer.scores(text, None), level);
+            match winning_object(identities, &ranked).and_then(|object| implied(phrase, object, scorer)) {
+                Some(whole) => part_or_object(identities, text, whole, ranked, scorer),
+                None => judge(identities, ranked, scorer),
+            }
         }
     }
 }
 
-/// The paper's steps for a query that is about a piece.
-fn two_steps(identities: &Identities, text: &str, whole: &str, scorer: &mut dyn Scorer) -> Answer {
+/// One ranking of all identities of a level.
+fn once(identities: &Identities, text: &str, level: LevelFilter, scorer: &mut dyn Scorer) -> Answer {
+    let scores = scorer.scores(text, None);
+    judge(identities, ranked(identities, &scores, level), scorer)
+}
+
+fn ranked(identities: &Identities, scores: &[f32], level: LevelFilter) -> Vec<Hit> {
+    rank(identities.iter().filter(|(_, i)| level.accepts(i.level)).map(|(id, _)| id), scores)
+}
+
+fn winning_object(identities: &Identities, ranked: &[Hit]) -> Option<IdentityId> {
+    let first = ranked.first()?.identity;
+    identities.get(first).filter(|i| i.level == Level::Object).map(|_| first)
+}
+
+/// The paper's steps: the whole query first; if an object wins, its parts compete, with the object's phrase among the
+/// canonical ones.
+fn two_steps(identities: &Identities, phrase: &ParsedQuery, level: LevelFilter, scorer: &mut dyn Scorer) -> Answer {
+    let text = phrase.text.as_str();
     let step1 = scorer.scores(text, None);
-    let ranked = rank(identities.iter().map(|(id, _)| id), &step1);
-    let preliminary = ranked.first().map(|h| h.identity);
-    let object = preliminary.filter(|id| identities.get(*id).is_some_and(|i| i.level == Level::Object));
-    let Some(object) = object else { return judge(identities, ranked, scorer) };
-    if ranked[0].score < scorer.threshold() {
-        return Answer::NotFound(ranked);
+    let hits = ranked(identities, &step1, LevelFilter::Auto);
+    let Some(object) = winning_object(identities, &hits) else {
+        return judge(identities, ranked(identities, &step1, level), scorer);
+    };
+    let whole = phrase.whole.as_deref().or_else(|| implied(phrase, object, scorer));
+    match (whole, &phrase.whole, level) {
+        // Without grammar, only what the object's phrase alone describes as well may be about a piece.
+        (None, _, LevelFilter::Auto | LevelFilter::Object) => return judge(identities, hits, scorer),
+        (Some(whole), None, LevelFilter::Auto) => return part_or_object(identities, text, whole, hits, scorer),
+        _ => {}
     }
     let pieces: Vec<IdentityId> =
         identities.iter().map(|(id, _)| id).filter(|id| is_piece(identities, *id, object)).collect();
-    if pieces.is_empty() {
-        return Answer::NotFound(ranked);
+    if hits[0].score < scorer.threshold() {
+        return Answer::NotFound(hits);
     }
-    let against = scorer.scores(text, Some(whole));
+    if pieces.is_empty() {
+        // Where nothing is never the answer, what is most like the question is.
+        let never = scorer.threshold() <= 0.0;
+        return if never { once(identities, text, level, scorer) } else { Answer::NotFound(hits) };
+    }
+    let against = scorer.scores(text, whole);
     // The object's phrase can push every part down; then the order of step 1 stands.
     let usable = pieces.iter().any(|id| against[*id as usize - 1] >= scorer.threshold());
     judge(identities, rank(pieces.into_iter(), if usable { &against } else { &step1 }), scorer)
+}
+
+/// The phrase of the whole in a query that does not say what it is a piece of: all but its last word ("bear nose"),
+/// if that describes the object at least as well as all of it.
+fn implied<'a>(phrase: &'a ParsedQuery, object: IdentityId, scorer: &mut dyn Scorer) -> Option<&'a str> {
+    let whole = phrase.implied_whole()?;
+    let by = |text: &str, scorer: &mut dyn Scorer| scorer.scores(text, None)[object as usize - 1];
+    let (by_whole, by_all) = (by(whole, scorer), by(&phrase.text, scorer));
+    (by_whole >= by_all && by_whole > 0.0).then_some(whole)
+}
+
+/// The part of the winning object that is more like the query than like the object's phrase, if there is one, else
+/// the object.
+fn part_or_object(identities: &Identities, text: &str, whole: &str, hits: Vec<Hit>, scorer: &mut dyn Scorer) -> Answer {
+    let object = hits[0];
+    let against = scorer.scores(text, Some(whole));
+    let pieces = identities.iter().map(|(id, _)| id).filter(|id| is_piece(identities, *id, object.identity));
+    let parts = rank(pieces, &against);
+    let more = |part: &Hit| part.score > against[object.identity as usize - 1].max(0.5);
+    match parts.first().is_some_and(more) && object.score >= scorer.threshold() {
+        true => judge(identities, parts, scorer),
+        false => judge(identities, hits, scorer),
+    }
 }
 
 /// Parts by both phrases at once: the mean of both scores on the logistic scale, on which they are
@@ -189,6 +239,7 @@ fn rank(candidates: impl Iterator<Item = IdentityId>, scores: &[f32]) -> Vec<Hit
     hits
 }
 
+/// Whether the first hit is meant, nothing is, or others could be as well.
 fn judge(identities: &Identities, hits: Vec<Hit>, scorer: &dyn Scorer) -> Answer {
     let Some(first) = hits.first().filter(|h| h.score > 0.0 && h.score >= scorer.threshold()) else {
         return Answer::NotFound(hits);
@@ -205,195 +256,4 @@ fn judge(identities: &Identities, hits: Vec<Hit>, scorer: &dyn Scorer) -> Answer
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::names::ByName;
-    use super::*;
-    use crate::scene::NOBODY;
-
-    fn scene() -> Identities {
-        let mut all = Identities::default();
-        for color in ["red", "blue"] {
-            let controller = all.add(Level::Object, NOBODY, vec![format!("{color} controller")]);
-            for part in ["button a", "left stick"] {
-                all.add(Level::Part, controller, vec![part.into()]);
-            }
-        }
-        all.add(Level::Object, NOBODY, vec!["lamp".into()]);
-        all
-    }
-
-    fn ask(query: &str, level: LevelFilter) -> (Answer, Vec<String>) {
-        let all = scene();
-        let phrase = ParsedQuery::parse(query).expect("a phrase");
-        let answer = localize(&all, &phrase, level, &mut ByName(&all));
-        let names = answer.hits().iter().map(|h| {
-            let line: Vec<String> = all.ancestors(h.identity).map(|i| all.name(i)).collect();
-            line.join(" < ")
-        });
-        let names = names.collect();
-        (answer, names)
-    }
-
-    #[test]
-    fn the_whole_decides_between_pieces_of_the_same_name() {
-        for color in ["red", "blue"] {
-            let (answer, names) = ask(&format!("a button of the {color} controller"), LevelFilter::Auto);
-            assert!(matches!(answer, Answer::Found(_)), "{answer:?}");
-            assert_eq!(names[0], format!("button a < {color} controller"));
-        }
-        let (answer, names) = ask("button a", LevelFilter::Auto);
-        assert!(matches!(answer, Answer::Ambiguous(_)), "{answer:?}");
-        assert_eq!(names[..2], ["button a < red controller", "button a < blue controller"]);
-    }
-
-    #[test]
-    fn a_kind_can_be_forced() {
-        assert_eq!(ask("red controller", LevelFilter::Auto).1[0], "red controller");
-        assert!(matches!(ask("red controller", LevelFilter::Part).0, Answer::NotFound(_)));
-        assert_eq!(ask("left stick of the blue controller", LevelFilter::Object).0.hits().len(), 3);
-    }
-
-    #[test]
-    fn what_is_not_there_is_not_found() {
-        for absent in ["giraffe", "wing of the giraffe", "antenna of the red controller", "shade of the lamp"] {
-            assert!(matches!(ask(absent, LevelFilter::Auto).0, Answer::NotFound(_)), "{absent}");
-        }
-        let all = Identities::default();
-        let phrase = ParsedQuery::parse("lamp").expect("a phrase");
-        assert_eq!(localize(&all, &phrase, LevelFilter::Auto, &mut ByName(&all)), Answer::NotFound(vec![]));
-    }
-
-    /// Scores from a table: (phrase, against) -> score per identity.
-    struct Table(Strategy, Vec<(&'static str, Option<&'static str>, Vec<f32>)>);
-
-    impl Scorer for Table {
-        fn scores(&mut self, phrase: &str, against: Option<&str>) -> Vec<f32> {
-            let row = self.1.iter().find(|r| (r.0, r.1) == (phrase, against));
-            row.unwrap_or_else(|| panic!("{phrase:?} {against:?}")).2.clone()
-        }
-
-        fn strategy(&self) -> Strategy {
-            self.0
-        }
-
-        fn threshold(&self) -> f32 {
-            0.5
-        }
-
-        fn resolution(&self) -> f32 {
-            0.001
-        }
-    }
-
-    #[test]
-    fn the_papers_second_step_looks_inside_the_winning_object() {
-        let all = scene();
-        let phrase = ParsedQuery::parse("a button of the red controller").expect("a phrase");
-        let text = "button of the red controller";
-        // Identities: 1 red (2 button, 3 stick), 4 blue (5, 6), 7 lamp.
-        let step1 = vec![0.9, 0.6, 0.7, 0.8, 0.55, 0.5, 0.1];
-        let step2 = vec![0.2, 0.65, 0.6, 0.2, 0.7, 0.5, 0.1];
-        let table = |strategy, step1: Vec<f32>, step2: Vec<f32>| {
-            Table(strategy, vec![(text, None, step1), (text, Some("red controller"), step2)])
-        };
-        let ask = |mut t: Table| localize(&all, &phrase, LevelFilter::Auto, &mut t);
-        assert_eq!(ask(table(Strategy::OneStep, step1.clone(), step2.clone())).hits()[0].identity, 1);
-        assert_eq!(ask(table(Strategy::Paper, step1.clone(), step2)).hits()[0].identity, 2);
-        // Pushed below the threshold, all of them: the order of step 1 stands.
-        let low = vec![0.1; 7];
-        assert_eq!(ask(table(Strategy::Paper, step1.clone(), low)).hits()[0].identity, 3);
-        // A part that wins at once is the answer.
-        let part_wins = vec![0.5, 0.6, 0.7, 0.5, 0.95, 0.5, 0.1];
-        assert_eq!(ask(table(Strategy::Paper, part_wins, step1)).hits()[0].identity, 5);
-        let nothing = vec![0.4; 7];
-        assert!(matches!(ask(table(Strategy::Paper, nothing.clone(), nothing)), Answer::NotFound(_)));
-    }
-
-    #[test]
-    fn both_phrases_together_survive_a_slip_of_either() {
-        let all = scene();
-        let phrase = ParsedQuery::parse("a button of the red controller").expect("a phrase");
-        let text = "button of the red controller";
-        // Identities: 1 red (2 button, 3 stick), 4 blue (5, 6), 7 lamp.
-        let ask = |by_text: [f32; 7], by_whole: [f32; 7]| {
-            let rows = vec![(text, None, by_text.to_vec()), ("red controller", None, by_whole.to_vec())];
-            localize(&all, &phrase, LevelFilter::Auto, &mut Table(Strategy::Joint, rows))
-        };
-        // The blue button is a little more like a button; the red controller is clearly the red one.
-        let answer = ask([0.9, 0.6, 0.4, 0.8, 0.63, 0.4, 0.1], [0.9, 0.1, 0.1, 0.4, 0.1, 0.1, 0.1]);
-        assert!(matches!(&answer, Answer::Found(hits) if hits[0].identity == 2), "{answer:?}");
-        // The blue controller is a little redder; the red button is clearly the one.
-        let answer = ask([0.5, 0.8, 0.4, 0.5, 0.4, 0.4, 0.1], [0.6, 0.1, 0.1, 0.65, 0.1, 0.1, 0.1]);
-        assert!(matches!(&answer, Answer::Found(hits) if hits[0].identity == 2), "{answer:?}");
-        assert!(matches!(ask([0.4; 7], [0.4; 7]), Answer::NotFound(_)));
-    }
-
-    #[test]
-    fn one_usable_piece_is_enough_and_the_threshold_itself_counts() {
-        let all = scene();
-        let phrase = ParsedQuery::parse("a button of the red controller").expect("a phrase");
-        let text = "button of the red controller";
-        // Identities: 1 red (2 button, 3 stick), 4 blue (5, 6), 7 lamp.
-        let paper = |step1: [f32; 7], step2: [f32; 7]| {
-            let rows = vec![(text, None, step1.to_vec()), (text, Some("red controller"), step2.to_vec())];
-            localize(&all, &phrase, LevelFilter::Auto, &mut Table(Strategy::Paper, rows))
-        };
-        // The object wins with just the threshold; of its pieces only the first reaches it.
-        let answer = paper([0.5, 0.3, 0.4, 0.2, 0.1, 0.1, 0.1], [0.9, 0.5, 0.4, 0.9, 0.9, 0.9, 0.9]);
-        assert_eq!((answer.verdict(), answer.hits()[0].identity, answer.hits().len()), ("found", 2, 2));
-        assert!((answer.hits()[0].margin - 0.1).abs() < 1e-6 && answer.hits()[1].margin == 0.4);
-        // None reaches it: the order of step 1, in which none does either.
-        let answer = paper([0.5, 0.3, 0.4, 0.2, 0.1, 0.1, 0.1], [0.9, 0.49, 0.4, 0.9, 0.9, 0.9, 0.9]);
-        assert_eq!((answer.verdict(), answer.hits()[0].identity), ("not found", 3));
-        // An object without parts has no piece.
-        assert_eq!(paper([0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.9], [0.9; 7]).verdict(), "not found");
-    }
-
-    #[test]
-    fn the_whole_by_its_phrase_then_its_pieces_by_theirs() {
-        let all = scene();
-        let phrase = ParsedQuery::parse("a button of the red controller").expect("a phrase");
-        let first = |whole: [f32; 7], plain: [f32; 7], against: [f32; 7]| {
-            let rows = vec![
-                ("red controller", None, whole.to_vec()),
-                ("button", None, plain.to_vec()),
-                ("button", Some("red controller"), against.to_vec()),
-            ];
-            localize(&all, &phrase, LevelFilter::Auto, &mut Table(Strategy::WholeFirst, rows))
-        };
-        let pieces = |answer: &Answer| answer.hits().iter().map(|h| h.identity).collect::<Vec<_>>();
-        let whole = [0.9, 0.1, 0.1, 0.8, 0.1, 0.1, 0.95];
-        // The lamp fits best but has no pieces; the red one's compete, by the second step.
-        let answer = first(whole, [0.1, 0.6, 0.9, 0.1, 0.9, 0.9, 0.1], [0.1, 0.7, 0.5, 0.1, 0.9, 0.9, 0.1]);
-        assert_eq!((pieces(&answer), answer.verdict()), (vec![2, 3], "found"));
-        // Pushed below the threshold, all of them: the first order.
-        let answer = first(whole, [0.1, 0.6, 0.9, 0.1, 0.9, 0.9, 0.1], [0.1, 0.4, 0.3, 0.1, 0.9, 0.9, 0.1]);
-        assert_eq!(pieces(&answer), [3, 2]);
-        // Wholes that cannot be told apart both take part; those just told apart do not.
-        let alike = [0.9, 0.1, 0.1, 0.8995, 0.1, 0.1, 0.1];
-        let scores = [0.1, 0.6, 0.5, 0.1, 0.7, 0.5, 0.1];
-        assert_eq!(pieces(&first(alike, scores, scores)), [5, 2, 3, 6]);
-        let apart = [0.9, 0.1, 0.1, 0.899, 0.1, 0.1, 0.1];
-        assert_eq!(pieces(&first(apart, scores, scores)), [2, 3]);
-        let low = [0.4; 7];
-        assert_eq!(first(low, scores, scores).verdict(), "not found");
-    }
-
-    #[test]
-    fn two_that_are_nearly_alike_are_ambiguous_unless_one_is_in_the_other() {
-        let all = scene();
-        let phrase = ParsedQuery::parse("thing").expect("a phrase");
-        let ask = |scores: [f32; 7]| {
-            let mut table = Table(Strategy::OneStep, vec![("thing", None, scores.to_vec())]);
-            localize(&all, &phrase, LevelFilter::Auto, &mut table)
-        };
-        assert_eq!(ask([0.9, 0.1, 0.1, 0.8995, 0.1, 0.1, 0.1]).verdict(), "ambiguous");
-        assert_eq!(ask([0.9, 0.1, 0.1, 0.898, 0.1, 0.1, 0.1]).verdict(), "found");
-        assert_eq!(ask([0.9, 0.8995, 0.1, 0.1, 0.1, 0.1, 0.1]).verdict(), "found", "a piece of it");
-        assert_eq!(ask([0.8995, 0.9, 0.1, 0.1, 0.1, 0.1, 0.1]).verdict(), "found", "its whole");
-        let answer = ask([f32::NAN, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6]);
-        let order: Vec<_> = answer.hits().iter().map(|h| h.identity).collect();
-        assert_eq!(order, [7, 6, 5, 4, 3, 2], "what is no number is none");
-        assert!(answer.hits().iter().take(5).all(|h| (h.margin - 0.1).abs() < 1e-6), "{answer:?}");
-    }
-}
+mod tests;

@@ -5,19 +5,25 @@
 //! the match is that identity; a wider one takes in what lies near it in code space. In `blend` mode
 //! a pixel has the alpha-blended codes of its Gaussians, as in the paper.
 
+use serde::{Deserialize, Serialize};
+
 use super::code_map::CodeMap;
 use super::codes::matches;
 use super::view_map::ViewMap;
 use crate::scene::{Identities, IdentityId, Level, Mask, SemanticMap};
 
 /// Where the codes of pixels come from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum MatchMode {
-    /// Codes of the winning identities.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum, strum::Display)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum MatchMode {
+    /// Codes of the winning identities
     #[default]
-    Exact,
-    /// Alpha-blended codes.
-    Blend,
+    Identities,
+    /// Alpha-blended codes, as in the paper
+    Codes,
+    /// Relevancy over 20 % of LERF's scale, whatever the answer
+    Relevancy,
 }
 
 /// For each number from 0, whether what has that identity matches the target: its code, or that of
@@ -30,6 +36,20 @@ pub(crate) fn matching(identities: &Identities, target: IdentityId, tolerance: f
         found[id as usize] = id == target || own || found[identity.parent as usize];
     }
     found
+}
+
+/// The target's pixels; without blended codes, by the winning identities.
+pub(crate) fn pixels(
+    (map, codes): (&ViewMap, Option<&CodeMap>),
+    identities: &Identities,
+    target: IdentityId,
+    mode: MatchMode,
+    tolerance: f32,
+) -> Mask {
+    match (codes, mode) {
+        (Some(codes), MatchMode::Codes) => blend(codes, identities, target, tolerance),
+        _ => exact(map, identities, target, tolerance),
+    }
 }
 
 /// The target's pixels by the winning identities.
@@ -62,11 +82,11 @@ pub fn blend(map: &CodeMap, identities: &Identities, target: IdentityId, toleran
 /// The target's Gaussians, by the same match.
 pub(crate) fn gaussians(map: &SemanticMap, target: IdentityId, mode: MatchMode, tolerance: f32) -> Vec<bool> {
     match mode {
-        MatchMode::Exact => {
+        MatchMode::Identities | MatchMode::Relevancy => {
             let found = matching(&map.identities, target, tolerance);
             map.identity_of.iter().map(|id| found.get(*id as usize).copied().unwrap_or(false)).collect()
         }
-        MatchMode::Blend => {
+        MatchMode::Codes => {
             let wanted = codes_of(&map.identities, target);
             let of_level = |codes: &[f32; 6], level| match level {
                 Level::Object => [codes[0], codes[1], codes[2]],
@@ -110,7 +130,7 @@ mod tests {
     #[test]
     fn the_usual_tolerance_is_the_identity_and_a_wide_one_its_neighbors() {
         let map = scene();
-        for mode in [MatchMode::Exact, MatchMode::Blend] {
+        for mode in [MatchMode::Identities, MatchMode::Codes] {
             let found = |target, tolerance| gaussians(&map, target, mode, tolerance);
             assert_eq!(found(1, 0.02), [true, false, true, true, false], "{mode:?}");
             assert_eq!(found(1, 0.06), [true, true, true, true, false], "{mode:?}");
@@ -127,7 +147,7 @@ mod tests {
         let planes = std::array::from_fn(|c| map.codes.iter().map(|codes| codes[c]).collect());
         let mut codes = CodeMap { width_px: 5, height_px: 1, planes };
         for (target, tolerance) in [(1, 0.02), (1, 0.06), (2, 0.02), (3, 0.02), (4, 0.02)] {
-            let wanted = gaussians(&map, target, MatchMode::Exact, tolerance);
+            let wanted = gaussians(&map, target, MatchMode::Identities, tolerance);
             let wanted = Mask::from_fn(5, 1, |i| wanted[i]);
             assert_eq!(exact(&view, &map.identities, target, tolerance), wanted);
             assert_eq!(blend(&codes, &map.identities, target, tolerance), wanted);

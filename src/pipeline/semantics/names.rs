@@ -3,8 +3,11 @@
 
 use std::collections::HashSet;
 
-use super::localize::Scorer;
-use super::parse::{MAX_CHARS, is_glue};
+use super::colors;
+use super::localize::{Hit, Scorer};
+use super::parse::{ParsedQuery, is_glue};
+use super::recipe::Rejection;
+use super::words::words;
 use crate::scene::{Identities, IdentityId};
 
 /// Score under which a name is not what was asked for.
@@ -13,20 +16,43 @@ pub(crate) const THRESHOLD: f32 = 0.45;
 pub(crate) const RESOLUTION: f32 = 0.02;
 
 /// Scores by names alone.
-pub(crate) struct ByName<'a>(pub(crate) &'a Identities);
+pub(crate) struct ByName<'a> {
+    pub(crate) identities: &'a Identities,
+    pub(crate) rejection: Rejection,
+}
 
 impl Scorer for ByName<'_> {
     fn scores(&mut self, phrase: &str, _against: Option<&str>) -> Vec<f32> {
-        scores(self.0, phrase)
+        scores(self.identities, phrase)
     }
 
     fn threshold(&self) -> f32 {
-        THRESHOLD
+        if self.rejection == Rejection::Never { 0.0 } else { THRESHOLD }
+    }
+
+    fn rejects(&mut self, phrase: &ParsedQuery, hit: &Hit) -> bool {
+        let all = self.identities;
+        let wholes = || all.ancestors(hit.identity).skip(1);
+        self.rejection == Rejection::Strict
+            && (is_another(all, &phrase.target, std::iter::once(hit.identity))
+                || phrase.whole.as_ref().is_some_and(|whole| is_another(all, whole, wholes())))
     }
 
     fn resolution(&self) -> f32 {
         RESOLUTION
     }
+}
+
+/// Whether names say that none of `ids` is meant: another color, or nothing in common but a color.
+fn is_another(identities: &Identities, phrase: &str, ids: impl Iterator<Item = IdentityId>) -> bool {
+    let (asked, kind) = (colors::said(phrase), colors::without(phrase));
+    let fits = |name: &String| {
+        let has = colors::said(name);
+        let same = asked.is_empty() || has.is_empty() || asked.iter().any(|c| has.contains(c));
+        same && (asked.is_empty() || words(name).iter().any(|w| kind.contains(w)))
+    };
+    let mut named = ids.filter_map(|id| identities.get(id)).filter(|i| !i.names.is_empty()).peekable();
+    named.peek().is_some() && !named.any(|i| i.names.iter().any(fits))
 }
 
 /// Score of every identity for a phrase, by number less one: 1 for the same name, 0 for nothing in
@@ -84,37 +110,6 @@ pub(crate) fn completions(identities: &Identities, typed: &str, most: usize) -> 
     found
 }
 
-/// Lower-case words of a name; an English plural counts like its singular.
-pub(crate) fn words(text: &str) -> Vec<String> {
-    written(text).map(|w| singular(&w)).collect()
-}
-
-/// Lower-case words of a name as they are written.
-pub(super) fn written(text: &str) -> impl Iterator<Item = String> {
-    // Nobody's name is longer, and comparing every letter of a pasted book would take long.
-    let lower = text.chars().take(MAX_CHARS).collect::<String>().to_lowercase();
-    let apart = lower.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty() && *w != "s");
-    apart.map(str::to_owned).collect::<Vec<_>>().into_iter()
-}
-
-/// A word without an English plural's ending.
-pub(crate) fn singular(word: &str) -> String {
-    for (end, instead) in [("knives", "knife"), ("shelves", "shelf"), ("ies", "y")] {
-        if let Some(stem) = word.strip_suffix(end).filter(|s| s.len() > 1 || end.len() > 3) {
-            return format!("{stem}{instead}");
-        }
-    }
-    for end in ["sses", "xes", "ches", "shes"] {
-        if word.ends_with(end) {
-            return word[..word.len() - 2].into();
-        }
-    }
-    match word.strip_suffix('s') {
-        Some(stem) if stem.chars().count() > 2 && !stem.ends_with(['s', 'u', 'i']) => stem.into(),
-        _ => word.into(),
-    }
-}
-
 /// Harmonic mean of how much of the phrase is in the name and how much of the name in the phrase.
 fn similarity(phrase: &[String], name: &[String]) -> f64 {
     let covered =
@@ -126,6 +121,7 @@ fn similarity(phrase: &[String], name: &[String]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pipeline::semantics::words::singular;
     use crate::scene::{Level, NOBODY};
 
     fn scene() -> Identities {
@@ -201,7 +197,7 @@ mod tests {
         assert_eq!(of(None), ["green", "zebra"]);
         assert_eq!(of(Some(&["zebra", "button"])), ["zebra"]);
         assert!(of(Some(&[])).is_empty());
-        let by = ByName(&all);
+        let by = ByName { identities: &all, rejection: Rejection::Canonical };
         assert_eq!((by.threshold(), by.resolution()), (THRESHOLD, RESOLUTION));
         assert_eq!(unknown_words(&all, "#4 #5"), ["5"], "a number is known, where nothing has a name");
     }

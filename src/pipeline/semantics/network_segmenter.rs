@@ -17,19 +17,23 @@ use crate::pipeline::observer::{Interrupted, Observer, Ticker};
 use crate::scene::{Level, Mask, Photo, PhotoPixels};
 
 pub(crate) struct NetworkMasks {
-    network: Box<dyn PromptedMasks>,
+    pub(crate) network: Box<dyn PromptedMasks>,
     pub(crate) options: AutomaticOptions,
     /// Which of those are objects, and parts.
     pub(crate) filters: FilterOptions,
     /// Whether each object's own tile is segmented for its parts, as the paper does: finer, for the time
     /// of one more look per object.
     pub(crate) tiles: bool,
+    /// Points along a side of the grid on those.
+    tile_points: usize,
 }
 
 /// Overlap from which the less sure of two masks is left out (LangSplat's).
 const MASK_NMS: f64 = 0.8;
 /// Predicted IoU times stability from which a mask is taken (LangSplat's).
 const LEAST_SCORE: f32 = 0.7;
+/// Points along a side of the grid on a tile, for networks that are made for small machines.
+const TILE_POINTS_OF_SMALL: usize = 16;
 /// Side of an object's box from which its tile is worth a look of its own, px.
 const LEAST_TILE_PX: usize = 32;
 
@@ -38,8 +42,17 @@ impl NetworkMasks {
     pub(crate) fn open(name: &str) -> Result<Self, ModelError> {
         let path = catalog::find(name, ModelRole::Segmenter)?;
         let mut options = AutomaticOptions::default();
+        let mut tile_points = options.points_per_side;
         let network: Box<dyn PromptedMasks> = match manifest::kind(&path)?.as_str() {
-            "sam" => Box::new(Sam::open(&path)?),
+            "sam" => {
+                let sam = Sam::open(&path)?;
+                if sam.is_small() {
+                    // As its makers use it, so that a photo takes less than a minute.
+                    options.crop_layers = 0;
+                    tile_points = TILE_POINTS_OF_SMALL;
+                }
+                Box::new(sam)
+            }
             "sam2" => {
                 // Its small regions are those of low-resolution masks, 16 times as coarse.
                 options.least_region_px /= 16;
@@ -47,7 +60,7 @@ impl NetworkMasks {
             }
             other => return Err(ModelError::Metadata { path, problem: format!("a '{other}' model finds no masks") }),
         };
-        Ok(Self { network, options, filters: FilterOptions::default(), tiles: true })
+        Ok(Self { network, options, filters: FilterOptions::default(), tiles: true, tile_points })
     }
 
     /// The same, which looks at a photo once: its answers are kept in `folder`.
@@ -91,7 +104,7 @@ impl NetworkMasks {
         let pixel = |i: usize| if object.contains(i) { picture.rgb[i] } else { [0; 3] };
         let rgb = at.y.clone().flat_map(|y| at.x.clone().map(move |x| y * width + x)).map(pixel).collect();
         let tile = PhotoPixels { width_px: at.x.len() as u32, height_px: at.y.len() as u32, rgb, coverage: None };
-        let options = AutomaticOptions { crop_layers: 0, ..self.options };
+        let options = AutomaticOptions { crop_layers: 0, points_per_side: self.tile_points, ..self.options };
         let masks = self.look(&tile, &options, watch)?;
         let place = |mask: Mask| {
             let mut placed = Mask::empty(width, picture.height_px as usize);

@@ -60,6 +60,12 @@ impl ParsedQuery {
         };
         Some(Self { text, target, whole })
     }
+
+    /// What "X Y" is a piece of, if it is one: all but the last word of a query that does not say so by its grammar.
+    pub(crate) fn implied_whole(&self) -> Option<&str> {
+        let (whole, _) = self.text.rsplit_once(' ')?;
+        self.whole.is_none().then_some(whole)
+    }
 }
 
 fn both(all: &[&str], piece: &[&str], whole: &[&str]) -> Option<ParsedQuery> {

@@ -3,11 +3,12 @@
 
 use std::time::Instant;
 
-use super::answer::{Language, QueryAnswer, answer, by_embedding, phrases_of};
-use super::by_embedding::{EmbeddingOptions, TextEmbeddings};
+use super::answer::{Language, QueryAnswer, answer, by_embedding};
+use super::by_embedding::TextEmbeddings;
 use super::names;
 use super::parse::ParsedQuery;
 use super::reading::QueryReading;
+use super::recipe::{Recipe, Understanding};
 use super::timing::{StagesMs, ms_since};
 use crate::models::{self, Encoder, ModelError};
 use crate::scene::{Identities, LanguageFeatures, LevelFilter, SemanticMap};
@@ -17,13 +18,15 @@ use crate::scene::{Identities, LanguageFeatures, LevelFilter, SemanticMap};
 pub(crate) struct QueryEngine {
     encoder: Option<Box<dyn Encoder>>,
     phrases: TextEmbeddings,
+    recipe: Recipe,
 }
 
 impl QueryEngine {
     /// With the encoder that looked at the scene's identities, if one has.
-    pub(crate) fn new(language: Option<&LanguageFeatures>) -> Result<Self, ModelError> {
+    pub(crate) fn new(language: Option<&LanguageFeatures>, recipe: Recipe) -> Result<Self, ModelError> {
+        let language = language.filter(|_| recipe.understanding != Understanding::Names);
         let encoder = language.map(|language| models::encoder(&language.encoder)).transpose()?;
-        Ok(Self { encoder, ..Self::default() })
+        Ok(Self { encoder, recipe, ..Self::default() })
     }
 
     /// Answers a question; `None` if there is nothing in it.
@@ -33,8 +36,24 @@ impl QueryEngine {
         text: &str,
         level: LevelFilter,
     ) -> Result<Option<QueryAnswer>, ModelError> {
-        let reading = QueryReading::new(&map.identities, text, level);
+        let reading = self.read(&map.identities, text, level);
         reading.map(|reading| self.answer(map, &reading.phrase, level)).transpose()
+    }
+
+    /// Answers by this recipe from now on, with the encoder that is there.
+    pub(crate) fn answer_by(&mut self, recipe: Recipe) {
+        self.recipe = recipe;
+    }
+
+    /// The canonical phrases of the recipe that the encoder could not read.
+    pub(crate) fn unread(&self) -> Vec<String> {
+        let missing = |p: &&str| self.phrases.is_unreadable(p);
+        self.recipe.canonical.iter().filter(missing).map(str::to_owned).collect()
+    }
+
+    /// Reads a question; `None` if there is nothing in it.
+    pub(crate) fn read(&self, identities: &Identities, text: &str, level: LevelFilter) -> Option<QueryReading> {
+        QueryReading::new(identities, text, level, &self.recipe)
     }
 
     /// Answers a question that was read.
@@ -48,8 +67,9 @@ impl QueryEngine {
         level: LevelFilter,
     ) -> Result<QueryAnswer, ModelError> {
         let start = Instant::now();
-        let known = match &mut self.encoder {
-            Some(encoder) => match self.phrases.learn(&phrases_of(phrase), |p| encoder.text(p)) {
+        let wanted = self.recipe.understanding != Understanding::Names;
+        let known = match self.encoder.as_mut().filter(|_| wanted) {
+            Some(encoder) => match self.phrases.learn(phrase, &self.recipe, |p| encoder.text(p)) {
                 Ok(()) => true,
                 // Words that nobody knows are no failure: names may know them.
                 Err(ModelError::NoKnownWord { .. }) => false,
@@ -58,7 +78,7 @@ impl QueryEngine {
             None => false,
         };
         let encode = ms_since(start);
-        let answered = answer_encoded(map, phrase, level, known.then_some(&self.phrases));
+        let answered = answer_encoded(map, phrase, level, &self.recipe, known.then_some(&self.phrases));
         Ok(QueryAnswer { stages: StagesMs { encode, ..answered.stages }, ..answered })
     }
 
@@ -74,29 +94,28 @@ pub(crate) fn answer_encoded(
     map: &SemanticMap,
     phrase: &ParsedQuery,
     level: LevelFilter,
+    recipe: &Recipe,
     phrases: Option<&TextEmbeddings>,
 ) -> QueryAnswer {
-    let language = map.language.as_ref().zip(phrases);
-    let language =
-        language.map(|(features, phrases)| Language { features, phrases, options: EmbeddingOptions::default() });
-    answer(&map.identities, phrase, level, language)
+    let language = map.language.as_ref().zip(phrases).map(|(features, phrases)| Language { features, phrases });
+    answer(&map.identities, phrase, level, recipe, language)
 }
 
 /// Answers a question by these `features` alone, whatever identities are called; `None` if there is nothing in
 /// it. `encode` gives the embedding of a phrase, and `phrases` keeps it.
 pub(crate) fn ask_by_embedding<E>(
     identities: &Identities,
-    (features, options): (&LanguageFeatures, EmbeddingOptions),
+    (features, recipe): (&LanguageFeatures, &Recipe),
     text: &str,
     phrases: &mut TextEmbeddings,
     encode: impl FnMut(&str) -> Result<Vec<f32>, E>,
 ) -> Result<Option<QueryAnswer>, E> {
     let start = Instant::now();
     let Some(phrase) = ParsedQuery::parse(text) else { return Ok(None) };
-    phrases.learn(&phrases_of(&phrase), encode)?;
+    phrases.learn(&phrase, recipe, encode)?;
     let encode = ms_since(start);
-    let language = Language { features, phrases, options };
-    let mut answered = by_embedding(identities, &phrase, LevelFilter::Auto, language);
+    let language = Language { features, phrases };
+    let mut answered = by_embedding(identities, &phrase, LevelFilter::Auto, recipe, language);
     answered.stages.encode = encode;
     Ok(Some(answered))
 }

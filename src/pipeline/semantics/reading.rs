@@ -3,8 +3,9 @@
 
 use std::collections::BTreeMap;
 
-use super::names::{singular, words, written};
 use super::parse::{MAX_CHARS, ParsedQuery, is_glue};
+use super::recipe::{Recipe, Understanding};
+use super::words::{singular, words, written};
 use crate::models;
 use crate::scene::{Identities, IdentityId, LevelFilter};
 
@@ -31,7 +32,11 @@ const MOST_WORDS: usize = 10;
 
 impl QueryReading {
     /// Reads a query about these identities; `None` if there is nothing in it.
-    pub(crate) fn new(identities: &Identities, query: &str, level: LevelFilter) -> Option<Self> {
+    pub(crate) fn new(identities: &Identities, query: &str, level: LevelFilter, recipe: &Recipe) -> Option<Self> {
+        if recipe.understanding == Understanding::Embedding {
+            // Names are not looked at.
+            return Some(Self { phrase: ParsedQuery::parse(query)?, mended: Vec::new(), near: Vec::new() });
+        }
         let (text, mended, near) = mend_all(identities, query);
         let parsed = ParsedQuery::parse(&text)?;
         // A level that is asked for is not overruled.
@@ -215,7 +220,7 @@ mod tests {
 
     /// What a question comes to, in the words of the lists.
     fn told(all: &Identities, phrase: &ParsedQuery) -> String {
-        let answered = by_name(all, phrase, LevelFilter::Auto);
+        let answered = by_name(all, phrase, LevelFilter::Auto, &Recipe::default());
         let first = answered.answer.hits().first().map(|h| all.full_name(h.identity)).unwrap_or_default();
         match answered.answer {
             Answer::Found(_) => first,
@@ -225,7 +230,7 @@ mod tests {
     }
 
     fn read(all: &Identities, text: &str) -> QueryReading {
-        QueryReading::new(all, text, LevelFilter::Auto).expect("words")
+        QueryReading::new(all, text, LevelFilter::Auto, &Recipe::default()).expect("words")
     }
 
     #[test]
@@ -247,8 +252,11 @@ mod tests {
         // Without the reading most are wrong, and an object that is asked for is no piece.
         let plain = |row: &&Vec<&str>| told(&all, &ParsedQuery::parse(row[0]).expect("words")) == row[1];
         assert!(lists[0].iter().filter(plain).count() * 4 < lists[0].len());
-        let object = QueryReading::new(&all, "kettle spout", LevelFilter::Object).expect("words");
+        let object = QueryReading::new(&all, "kettle spout", LevelFilter::Object, &Recipe::default()).expect("words");
         assert_eq!((object.phrase.target.as_str(), object.phrase.whole), ("kettle spout", None));
+        // By embedding, names are not looked at: neither compounds nor slips are read by them.
+        let paper = QueryReading::new(&all, "ketle spout", LevelFilter::Auto, &Recipe::paper()).expect("words");
+        assert_eq!((paper.phrase.text.as_str(), paper.phrase.whole, paper.mended), ("ketle spout", None, vec![]));
     }
 
     #[test]
@@ -281,9 +289,9 @@ mod tests {
     #[test]
     fn strange_texts_are_read_in_no_time() {
         let (all, _) = data();
-        assert!(QueryReading::new(&all, " \t", LevelFilter::Auto).is_none());
+        assert!(QueryReading::new(&all, " \t", LevelFilter::Auto, &Recipe::default()).is_none());
         for text in ["lamp ".repeat(5_000), "x".repeat(5_000), "的".repeat(900), "a\u{0}b \u{202e}lmap".into()] {
-            assert!(QueryReading::new(&all, &text, LevelFilter::Auto).is_some());
+            assert!(QueryReading::new(&all, &text, LevelFilter::Auto, &Recipe::default()).is_some());
         }
     }
 }

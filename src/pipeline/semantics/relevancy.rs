@@ -7,13 +7,6 @@
 
 use crate::math::vector::{dot, unit};
 
-/// Phrases that mean anything.
-pub const CANONICAL: [&str; 3] = ["object", "stuff", "texture"];
-/// Temperature that spreads scores over the unit interval, for display.
-pub(crate) const TEMPERATURE: f32 = 10.0;
-/// Share of its own feature that a part keeps.
-pub const PART_WEIGHT: f32 = 0.7;
-
 /// How much nearer a feature is to the query than to the nearest of the `canonical` phrases. Above
 /// zero, it is what was asked for rather than anything.
 pub fn advantage(feature: &[f32], query: &[f32], canonical: &[Vec<f32>]) -> f32 {
@@ -40,6 +33,7 @@ mod tests {
     use rand_pcg::Pcg64Mcg;
 
     use super::*;
+    use crate::scene::PART_WEIGHT;
 
     fn random(rng: &mut Pcg64Mcg) -> Vec<f32> {
         let v: Vec<f32> = (0..16).map(|_| rng.random_range(-1.0..1.0)).collect();

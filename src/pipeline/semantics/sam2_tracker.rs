@@ -8,6 +8,7 @@ use std::time::SystemTime;
 use sha2::{Digest, Sha256};
 
 use super::error::FindError;
+use super::prompt_points::prompt_points;
 use super::segmenter::FoundMask;
 use super::votes::UNKNOWN;
 use crate::io::{self, atomic, files};
@@ -17,7 +18,7 @@ use crate::models::network::Tensor;
 use crate::models::sam2::track::{FrameSource, ObjectId, Prompt, Track, mask_of};
 use crate::models::sam2::{EncodedFrame, Sam2};
 use crate::pipeline::observer::{Observer, Ticker};
-use crate::scene::{IdentityId, Photo};
+use crate::scene::{IdentityId, MaskPrompt, Photo};
 
 /// Objects that are followed together; memory grows with it.
 const BATCH: usize = 16;
@@ -44,8 +45,8 @@ impl Sam2Tracker {
         &mut self,
         photos: &[Photo],
         seed: usize,
-        found: &[FoundMask],
-        ids: &[IdentityId],
+        (found, ids): (&[FoundMask], &[IdentityId]),
+        prompt: MaskPrompt,
         observer: &mut dyn Observer,
     ) -> Result<Vec<Vec<IdentityId>>, FindError> {
         let size = |photo: &Photo| {
@@ -63,7 +64,12 @@ impl Sam2Tracker {
             let mut track = Track::new(&mut self.model, &mut frames, sizes[seed]);
             for (i, mask) in batch.iter().enumerate() {
                 let (w, h) = sizes[seed];
-                track.prompt(seed, (k * BATCH + i) as ObjectId, &Prompt::Mask(mask.mask.resized(w, h)))?;
+                let mask = mask.mask.resized(w, h);
+                let prompt = match prompt {
+                    MaskPrompt::Points => Prompt::Points { points: prompt_points(&mask), around: None },
+                    MaskPrompt::Mask => Prompt::Mask(mask),
+                };
+                track.prompt(seed, (k * BATCH + i) as ObjectId, &prompt)?;
             }
             for backward in [false, true] {
                 track.run(backward, |frame, seen| {

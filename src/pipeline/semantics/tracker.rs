@@ -9,11 +9,12 @@ use super::error::FindError;
 use super::propagate::extend;
 use super::sam2_tracker::{LABEL_SIDE_PX, Sam2Tracker};
 use super::segmenter::{FoundMask, Segmenter};
+use super::train_codes::{CODE_SIDE_PX, CodeView};
 use super::view_map::ViewMap;
 use super::votes::{Assignment, UNKNOWN, Votes};
 use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::render::{RenderSettings, Renderer};
-use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY, Photo};
+use crate::scene::{GaussianCloud, Identities, IdentityId, MaskPrompt, NOBODY, Photo};
 
 /// Least weight of votes, in px of the photos voted on, that says something about a Gaussian.
 const LEAST_VOTES: f32 = 0.05;
@@ -35,11 +36,24 @@ pub(crate) struct TrackOptions {
     pub(crate) max_seeds: usize,
     /// Whether a mask that was followed counts only where the Gaussians do not contradict it.
     pub(crate) veto: bool,
+    /// Whether all photos that have masks are segmented, up to `max_seeds`, be they explained or not: codes are to be
+    /// trained on them.
+    pub(crate) keep_masks: bool,
+    /// What of a mask SAM 2 is given to follow.
+    pub(crate) prompt: MaskPrompt,
 }
 
 impl Default for TrackOptions {
     fn default() -> Self {
-        Self { seed: None, max_side_px: 1_024, reseed_share: 0.005, max_seeds: 12, veto: true }
+        Self {
+            seed: None,
+            max_side_px: 1_024,
+            reseed_share: 0.005,
+            max_seeds: 12,
+            veto: true,
+            keep_masks: false,
+            prompt: MaskPrompt::Mask,
+        }
     }
 }
 
@@ -71,6 +85,8 @@ pub(crate) struct Tracked {
     pub(crate) views: Vec<ViewReport>,
     /// Where masks and what was known disagreed, with the photo.
     pub(crate) disagreements: Vec<(usize, Disagreement)>,
+    /// The masks of the photos that were segmented and of those to which they were followed.
+    pub(crate) masks: Vec<CodeView>,
     /// Seconds that each stage took, in order.
     pub(crate) secs: Vec<(&'static str, f64)>,
 }
@@ -101,6 +117,7 @@ pub(crate) fn track(
         identities: Identities::default(),
         votes: Votes::new(cloud.len()),
         disagreements: Vec::new(),
+        masks: Vec::new(),
         segment_secs: 0.0,
     };
     let (start, mut follow_secs, mut encode_secs) = (Instant::now(), 0.0, 0.0);
@@ -116,7 +133,8 @@ pub(crate) fn track(
     }
     let views = loop {
         let views = t.look(seeds.len(), observer)?;
-        let needy = views.iter().filter(|v| !tried[v.photo] && v.unknown > options.reseed_share);
+        let needy =
+            views.iter().filter(|v| !tried[v.photo] && (options.keep_masks || v.unknown > options.reseed_share));
         let needy = needy.filter(|v| segmenter.covers(&photos[v.photo]));
         let next = needy.max_by(|a, b| a.unknown.total_cmp(&b.unknown)).map(|v| v.photo);
         let Some(next) = next.filter(|_| seeds.len() < options.max_seeds) else { break views };
@@ -134,7 +152,15 @@ pub(crate) fn track(
         ("follow masks", follow_secs),
         ("carry by Gaussians", carry_secs),
     ];
-    Ok(Tracked { identities: t.identities, assignments, seeds, views, disagreements: t.disagreements, secs })
+    Ok(Tracked {
+        identities: t.identities,
+        assignments,
+        seeds,
+        views,
+        disagreements: t.disagreements,
+        masks: t.masks,
+        secs,
+    })
 }
 
 /// Masks of a photo, and whose they are.
@@ -149,6 +175,7 @@ struct Tracker<'a> {
     identities: Identities,
     votes: Votes,
     disagreements: Vec<(usize, Disagreement)>,
+    masks: Vec<CodeView>,
     segment_secs: f64,
 }
 
@@ -192,6 +219,7 @@ impl Tracker<'_> {
         self.votes
             .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
             .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e))?;
+        self.keep(photo, (camera.width_px, camera.height_px), &labels);
         Ok(Some((found, ids)))
     }
 
@@ -204,7 +232,7 @@ impl Tracker<'_> {
         ids: &[IdentityId],
         observer: &mut dyn Observer,
     ) -> Result<(), FindError> {
-        let mut followed = follower.follow(self.photos, seed, found, ids, observer)?;
+        let mut followed = follower.follow(self.photos, seed, (found, ids), self.options.prompt, observer)?;
         // What is known from the seed alone: it shall not be judged by what it is to judge.
         let of: Vec<IdentityId> = self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect();
         for photo in (0..self.photos.len()).filter(|photo| *photo != seed) {
@@ -220,8 +248,23 @@ impl Tracker<'_> {
             self.votes
                 .add_view(&mut self.renderer, self.cloud, &camera, self.settings, labels)
                 .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e))?;
+            self.keep(photo, (camera.width_px, camera.height_px), labels);
         }
         Ok(())
+    }
+
+    /// Keeps the labels of a photo, of this width and height, for codes to be trained on.
+    fn keep(&mut self, photo: usize, (w, h): (u32, u32), labels: &[IdentityId]) {
+        if !self.options.keep_masks {
+            return;
+        }
+        let camera = self.photos[photo].camera.limited_to(CODE_SIDE_PX);
+        let (cw, ch) = (camera.width_px, camera.height_px);
+        let at = |i: u32| {
+            let (x, y) = ((i % cw * 2 + 1) * w / (2 * cw), (i / cw * 2 + 1) * h / (2 * ch));
+            labels[(y * w + x) as usize]
+        };
+        self.masks.push(CodeView { labels: (0..cw * ch).map(at).collect(), camera });
     }
 
     fn told(&self, what: &Disagreement) -> String {

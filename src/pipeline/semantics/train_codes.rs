@@ -16,6 +16,8 @@ use crate::render::{
 use crate::scene::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId};
 
+/// Longer side of the masks that codes are trained on, px.
+pub(crate) const CODE_SIDE_PX: u32 = 256;
 /// Learning rate at the first and at the last step, in units of code space.
 const RATES: [f64; 2] = [0.02, 0.002];
 

@@ -7,7 +7,7 @@ mod timeline;
 use std::collections::VecDeque;
 use std::path::Path;
 
-use egui::{Button, Checkbox, ComboBox, DragValue, Grid, RichText, Slider, Ui};
+use egui::{Align, Button, Checkbox, ComboBox, DragValue, Layout, RichText, Slider, Ui, vec2};
 
 use self::player::{Clip, Player};
 use super::state::AppState;
@@ -43,6 +43,9 @@ pub(crate) struct CameraPane {
     /// The scene that it belongs to.
     scene: u64,
 }
+
+/// Width of the names of rows, points.
+const NAME_PT: f32 = 44.0;
 
 /// Why something cannot be done yet.
 const NO_KEYS: &str = "Needs keyframes: add the current view (K).";
@@ -207,14 +210,13 @@ impl CameraPane {
     ) -> Option<Pose> {
         self.keep_up();
         let mut wanted = None;
-        ui.horizontal(|ui| self.controls(ui, actions));
+        ui.horizontal_wrapped(|ui| self.controls(ui, actions));
         ui.add_space(2.0);
         wanted = timeline::show(ui, self).or(wanted);
         ui.add_space(2.0);
-        Grid::new("camera tools")
-            .num_columns(2)
-            .spacing([12.0, 5.0])
-            .show(ui, |ui| self.tools(ui, state, eye, actions));
+        row(ui, "Path", |ui| self.path_tools(ui, state, eye, actions));
+        row(ui, "Timing", |ui| self.timing(ui));
+        row(ui, "Video", |ui| self.video_tools(ui, state, actions));
         if self.path.keys.is_empty() {
             ui.add_space(4.0);
             ui.weak(
@@ -288,18 +290,6 @@ impl CameraPane {
         self.put_path_in();
     }
 
-    fn tools(&mut self, ui: &mut Ui, state: &AppState, eye: &Pose, actions: &mut Vec<Action>) {
-        ui.label(caption("Path"));
-        ui.horizontal(|ui| self.path_tools(ui, state, eye, actions));
-        ui.end_row();
-        ui.label(caption("Timing"));
-        ui.horizontal(|ui| self.timing(ui));
-        ui.end_row();
-        ui.label(caption("Video"));
-        ui.horizontal(|ui| self.video_tools(ui, state, actions));
-        ui.end_row();
-    }
-
     fn path_tools(&mut self, ui: &mut Ui, state: &AppState, eye: &Pose, actions: &mut Vec<Action>) {
         let tip = format!("{}  {}", Action::AddKey.tooltip(), super::keys::label(ui.ctx(), &Action::AddKey));
         if ui.button("Add keyframe").on_hover_text(tip).clicked() {
@@ -367,6 +357,18 @@ pub(crate) fn read(path: &Path) -> Result<CameraPath, String> {
 /// Writes a path's file, in nerfstudio's format if its name says so.
 pub(crate) fn write(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), String> {
     crate::jobs::export::camera_path(file, path, aspect).map_err(|e| e.to_string())
+}
+
+/// A row of tools behind its name, on several lines where it is narrow.
+fn row(ui: &mut Ui, name: &str, add: impl FnOnce(&mut Ui)) {
+    ui.horizontal_wrapped(|ui| {
+        let size = vec2(NAME_PT, ui.spacing().interact_size.y);
+        ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+            ui.set_min_width(NAME_PT);
+            ui.label(caption(name));
+        });
+        add(ui);
+    });
 }
 
 fn caption(text: &str) -> RichText {

@@ -6,7 +6,8 @@ use super::super::state::AppState;
 use super::super::theme;
 use crate::jobs::find_objects::FindSettings;
 use crate::jobs::models::{ModelEntry, ModelRole, ModelState, SAM2};
-use crate::pipeline::semantics::build_map::{Carry, Lifting, REGIONS};
+use crate::pipeline::semantics::build_map::{Carry, REGIONS};
+use crate::scene::Lifting;
 use crate::ui::actions::Action;
 use crate::worker::{Command, Worker};
 
@@ -87,10 +88,10 @@ fn choose(ui: &mut Ui, models: &[(ModelEntry, ModelState)], finding: &mut FindSe
             (Lifting::Refined, "from votes, then refined"),
             (Lifting::Paper, "trained only, as in the paper"),
         ];
-        let chosen = names.iter().find(|(l, _)| *l == finding.lifting).map_or("", |(_, name)| *name);
+        let chosen = names.iter().find(|(l, _)| *l == finding.preparation.lifting).map_or("", |(_, name)| *name);
         let combo = egui::ComboBox::from_id_salt("lifting").selected_text(chosen).width(180.0).show_ui(ui, |ui| {
             for (lifting, name) in names {
-                ui.selectable_value(&mut finding.lifting, lifting, name);
+                ui.selectable_value(&mut finding.preparation.lifting, lifting, name);
             }
         });
         combo.response.accessible_name("Codes");
@@ -131,7 +132,7 @@ fn one(ui: &mut Ui, entry: &ModelEntry, model: &ModelState, idle: bool, actions:
         };
         ui.label(RichText::new(text).small().color(color));
     });
-    ui.label(RichText::new(&entry.adds).small().color(theme::weak()));
+    ui.label(RichText::new(format!("{} {}", entry.adds, entry.speed)).small().color(theme::weak()));
     if let ModelState::Broken(problem) = model {
         ui.label(RichText::new(problem).small().color(theme::warning()));
     }
@@ -150,21 +151,9 @@ fn one(ui: &mut Ui, entry: &ModelEntry, model: &ModelState, idle: bool, actions:
                 actions.push(add);
             }
         });
-        if let Some(official) = &entry.checkpoint {
-            let text = format!(
-                "From its makers ({}; {}), made into {} MB here. This address has not been tried yet.",
-                official.url,
-                entry.license,
-                entry.megabytes()
-            );
-            ui.label(RichText::new(text).small().color(theme::weak()));
-        } else if !entry.is_hosted() {
-            let text = format!(
-                "Its files are not hosted yet ({} MB, {}). tools/export creates them from the official checkpoint.",
-                entry.megabytes(),
-                entry.license
-            );
-            ui.label(RichText::new(text).small().color(theme::weak()));
+        let origin = entry.origin();
+        if !origin.is_empty() {
+            ui.label(RichText::new(origin).small().color(theme::weak()));
         }
     }
     ui.add_space(4.0);

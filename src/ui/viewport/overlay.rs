@@ -58,7 +58,8 @@ impl Viewport {
             }
             return;
         }
-        if has_photos {
+        // In a low view it is worth its row only while it says which photo that is.
+        if has_photos && (self.photo.is_some() || rect.height() > LOW) {
             // Beside the modes where there is room and no query box, else below them.
             let beside = rect.width() > 860.0 && state.semantics.is_none();
             let (align, down) = if beside { (Align2::RIGHT_TOP, 0.0) } else { (Align2::LEFT_TOP, 46.0) };

@@ -6,8 +6,9 @@ use super::source::Numbers;
 use super::{Verdict, promise};
 use fmlgs::math::vector::{dot, unit};
 use fmlgs::pipeline::semantics::codes::{RADIUS, assign, matches};
-use fmlgs::pipeline::semantics::localize::{Answer, Scorer, Strategy, localize};
+use fmlgs::pipeline::semantics::localize::{Answer, Scorer, localize};
 use fmlgs::pipeline::semantics::parse::ParsedQuery;
+use fmlgs::pipeline::semantics::recipe::Strategy;
 use fmlgs::pipeline::semantics::relevancy::{advantage, deviate, score};
 use fmlgs::scene::{Identities, Level, LevelFilter};
 
@@ -70,7 +71,6 @@ pub fn codes(n: &mut Numbers) -> Verdict {
 struct Anything<'a> {
     n: &'a mut Numbers,
     count: usize,
-    strategy: Strategy,
     asked: Vec<(String, Option<String>, Vec<f32>)>,
 }
 
@@ -83,10 +83,6 @@ impl Scorer for Anything<'_> {
         let scores: Vec<f32> = (0..self.count).map(|_| self.n.around(0.0, 1.0)).collect();
         self.asked.push((phrase.into(), against.map(str::to_owned), scores.clone()));
         scores
-    }
-
-    fn strategy(&self) -> Strategy {
-        self.strategy
     }
 
     fn threshold(&self) -> f32 {
@@ -104,10 +100,10 @@ pub fn localizing(n: &mut Numbers) -> Verdict {
     let all = identities(n, 30);
     let query = n.pick(&["lamp", "lid of the kettle", "the doll's eye", "a of b of c"]);
     let kind = n.pick(&[LevelFilter::Auto, LevelFilter::Object, LevelFilter::Part]);
-    let strategy = n.pick(&[Strategy::WholeFirst, Strategy::Paper, Strategy::OneStep, Strategy::Joint]);
+    let strategy = n.pick(&[Strategy::WholeFirst, Strategy::TwoSteps, Strategy::OneStep, Strategy::Joint]);
     let Some(phrase) = ParsedQuery::parse(query) else { return Verdict::Broken("the phrase is none".into()) };
-    let mut scorer = Anything { n, count: all.len(), strategy, asked: Vec::new() };
-    let answer = localize(&all, &phrase, kind, &mut scorer);
+    let mut scorer = Anything { n, count: all.len(), asked: Vec::new() };
+    let answer = localize(&all, &phrase, kind, strategy, &mut scorer);
     let hits = answer.hits();
     promise!(hits.iter().all(|h| all.get(h.identity).is_some()), "an identity that there is not");
     let ordered = hits.windows(2).all(|w| w[0].score >= w[1].score || w[1].score.is_nan());

@@ -1,17 +1,7 @@
-//! What must fail the bars: scenes that were harmed before they are asked, and questions for what is not there.
+//! What must fail the bars: scenes that were harmed before they are asked.
 
-use crate::pipeline::semantics::relevancy::{PART_WEIGHT, deviate};
-use crate::scene::{Identities, IdentityId, Level, SemanticMap};
-
-/// Colors that things of these scenes may have.
-const COLORS: [&str; 12] =
-    ["black", "blue", "brown", "green", "grey", "orange", "pink", "purple", "red", "turquoise", "white", "yellow"];
-/// What is in neither scene: things, and parts of them.
-pub(super) const ABSENT: &str = "toy car, rocket, house, boat, duck, pot plant, candle, umbrella, bag, teddy bear, alarm clock, smartphone, \
-    headphones, green toy car, red rocket, brown house, white boat, yellow duck, turquoise bag, pink candle, \
-    sail of the boat, hull of the boat, beak of the duck, wings of the duck, roof of the house, \
-    chimney of the house, handle of the umbrella, canopy of the umbrella, buckle of the bag, flap of the bag, \
-    wheels of the toy car, leaves of the pot plant";
+use crate::pipeline::semantics::relevancy::deviate;
+use crate::scene::{Identities, IdentityId, Level, PART_WEIGHT, SemanticMap};
 
 /// What is done to a scene before it is asked.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,18 +59,4 @@ pub(super) fn harmed(map: &SemanticMap, harm: Harm) -> SemanticMap {
         _ => {}
     }
     map
-}
-
-/// Objects of the scene in colors that no object of their kind has.
-pub(super) fn wrong_colors(identities: &Identities) -> Vec<String> {
-    let objects = identities.iter().filter(|(_, i)| i.level == Level::Object).flat_map(|(_, i)| &i.names);
-    let names: Vec<&String> = objects.collect();
-    let mut wrong = Vec::new();
-    for (k, name) in names.iter().enumerate() {
-        let Some((_, kind)) = name.split_once(' ') else { continue };
-        let absent = |c: &&&str| !names.iter().any(|n| **n == format!("{c} {kind}"));
-        let others: Vec<&&str> = COLORS.iter().filter(absent).collect();
-        (0..3).for_each(|j| wrong.push(format!("{} {kind}", others[(k + 4 * j) % others.len()])));
-    }
-    wrong
 }

@@ -9,10 +9,13 @@ use super::*;
 use crate::pipeline::semantics::answer::{Basis, by_name};
 use crate::pipeline::semantics::localize::{Answer, Hit};
 use crate::pipeline::semantics::parse::ParsedQuery;
-use crate::pipeline::semantics::relevancy::{PART_WEIGHT, deviate};
+use crate::pipeline::semantics::recipe::Recipe;
+use crate::pipeline::semantics::relevancy::deviate;
 use crate::pipeline::semantics::timing::StagesMs;
 use crate::render::RenderSettings;
-use crate::scene::{GaussianCloud, Identities, IdentityId, LanguageFeatures, LevelFilter, NOBODY, ViewFeatures};
+use crate::scene::{
+    GaussianCloud, Identities, IdentityId, LanguageFeatures, LevelFilter, NOBODY, PART_WEIGHT, ViewFeatures,
+};
 
 const DOLL: IdentityId = 1;
 const EYE: IdentityId = 2;
@@ -47,7 +50,10 @@ fn label(name: &str, level: Level, size: [usize; 2], inside: impl Fn(usize) -> b
 
 /// Asks a scene by the names of its identities.
 fn named(map: &SemanticMap) -> impl FnMut(&str) -> Option<QueryAnswer> + '_ {
-    |text| ParsedQuery::parse(text).map(|phrase| by_name(&map.identities, &phrase, LevelFilter::Auto))
+    |text| {
+        let phrase = ParsedQuery::parse(text)?;
+        Some(by_name(&map.identities, &phrase, LevelFilter::Auto, &Recipe::default()))
+    }
 }
 
 /// An answer whose relevancies are given, best identity first.
@@ -58,6 +64,7 @@ fn answered(best: IdentityId, relevancy: &[f32]) -> QueryAnswer {
         basis: Basis::Embedding,
         relevancy: relevancy.to_vec(),
         stages: StagesMs::default(),
+        recipe: Recipe::default(),
     }
 }
 
@@ -313,7 +320,8 @@ fn part_recall_rises_with_every_component() {
             _ => mixed(&[(ANYTHING, 1.0)]),
         })
     };
-    let row = |c: Components| part_recall::row(c, &map, &language, &views, encode).expect("encodes");
+    let row =
+        |c: Components| part_recall::row((c, &Recipe::default()), &map, &language, &views, encode).expect("encodes");
     let worked_out = [
         // Objects alone: the whole mug (10 px) for its handle and lid, the whole pan (10 px) for its own.
         [0.2, 0.3, 0.4, 0.2],
@@ -357,7 +365,8 @@ fn an_overlap_of_a_half_is_a_hit_and_less_is_none() {
     for (from, recall, iou) in [(0, 1.0, 0.5), (1, 0.0, 0.25)] {
         let categories = vec![label("handle of the mug", Level::Part, [4, 1], move |i| i >= from)];
         let view = LabeledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
-        let row = part_recall::row(Components::ROWS[4], &map, &language, &[view], encode).expect("encodes");
+        let row = part_recall::row((Components::ROWS[4], &Recipe::default()), &map, &language, &[view], encode)
+            .expect("encodes");
         close(&[row.recall, row.mean_iou], &[recall, iou]);
     }
 }

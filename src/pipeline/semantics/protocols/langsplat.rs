@@ -114,6 +114,7 @@ mod tests {
     use crate::pipeline::semantics::answer::Basis;
     use crate::pipeline::semantics::code_map::CodeMap;
     use crate::pipeline::semantics::localize::Answer;
+    use crate::pipeline::semantics::recipe::Recipe;
     use crate::pipeline::semantics::timing::StagesMs;
     use crate::scene::{Camera, NOBODY, SemanticMap};
     use glam::DVec3;
@@ -171,6 +172,7 @@ mod tests {
                     basis: Basis::Embedding,
                     relevancy: relevancy.clone(),
                     stages: StagesMs::default(),
+                    recipe: Recipe::default(),
                 })
             };
             let boxes = truth.bounds().into_iter().collect();

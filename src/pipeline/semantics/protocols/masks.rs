@@ -5,7 +5,7 @@ use crate::scene::Level;
 
 pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>) -> Vec<Unit> {
     let unit = |c: &Category| {
-        let mask = (scene.ask)(&c.name).map(|a| a.mask(view.exact, &scene.map.identities, 1));
+        let mask = (scene.ask)(&c.name).map(|a| a.mask(view.exact, Some(view.blended), &scene.map.identities, 1));
         c.unit(view.name, mask.map_or(0.0, |m| m.iou(&c.mask)), None)
     };
     view.categories.iter().map(unit).collect()

@@ -12,6 +12,7 @@ pub(crate) mod masks;
 pub(crate) mod multi_class;
 pub(crate) mod part_recall;
 pub(crate) mod raw_features;
+pub(crate) mod recipes;
 pub(crate) mod selection_3d;
 pub(crate) mod spin_nerf;
 

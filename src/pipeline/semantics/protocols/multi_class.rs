@@ -22,7 +22,7 @@ pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>, classe
         Some(truth.unit(view.name, mask.iou(&truth.mask), None))
     };
     let own = |class: usize| {
-        let mask = answers[class].as_ref().map(|a| a.mask(view.exact, identities, 1));
+        let mask = answers[class].as_ref().map(|a| a.mask(view.exact, Some(view.blended), identities, 1));
         unit(class, &mask.unwrap_or_else(|| Mask::empty(w, h)))
     };
     let of_winner = |class: usize| {

@@ -4,9 +4,9 @@
 
 use super::{LabeledView, Unit};
 use crate::math::stats::mean;
-use crate::pipeline::semantics::by_embedding::{EmbeddingOptions, PartFeatures, TextEmbeddings};
-use crate::pipeline::semantics::localize::Strategy;
+use crate::pipeline::semantics::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::query_engine::ask_by_embedding;
+use crate::pipeline::semantics::recipe::{PartFeatures, Recipe, Strategy, Understanding};
 use crate::scene::{Identities, LanguageFeatures, Level, Mask, SemanticMap};
 
 /// IoU from which a query counts as answered.
@@ -38,15 +38,17 @@ impl Components {
         Self { extraction, deviation, localization, joint }
     }
 
-    fn options(self) -> EmbeddingOptions {
-        EmbeddingOptions {
+    /// The rows differ in these; all else is as the recipe says.
+    fn recipe(self, recipe: &Recipe) -> Recipe {
+        Recipe {
+            understanding: Understanding::Embedding,
             parts: if self.deviation { PartFeatures::Deviated } else { PartFeatures::Raw },
             strategy: match self {
                 Self { joint: true, .. } => Strategy::Joint,
-                Self { localization: true, .. } => Strategy::Paper,
+                Self { localization: true, .. } => Strategy::TwoSteps,
                 _ => Strategy::OneStep,
             },
-            ..EmbeddingOptions::default()
+            ..recipe.clone()
         }
     }
 }
@@ -66,7 +68,7 @@ pub(crate) struct Row {
 /// Asks for every part of the `views` by its phrase and compares, for one row of the table. `encode`
 /// gives the embedding of a phrase.
 pub(crate) fn row<E>(
-    components: Components,
+    (components, recipe): (Components, &Recipe),
     map: &SemanticMap,
     language: &LanguageFeatures,
     views: &[LabeledView<'_>],
@@ -77,13 +79,14 @@ pub(crate) fn row<E>(
     let (mut units, mut secs) = (Vec::new(), Vec::new());
     // Canonical phrases are encoded once for all queries.
     let mut phrases = TextEmbeddings::default();
-    phrases.learn(&[], &mut encode)?;
+    let recipe = components.recipe(recipe);
+    phrases.learn_canonical(&recipe, &mut encode);
     for view in views {
         for category in view.categories.iter().filter(|c| c.level == Level::Part) {
             let start = std::time::Instant::now();
             let mut mask = Mask::empty(view.exact.width_px, view.exact.height_px);
-            let how = (features, components.options());
-            let answered = ask_by_embedding(&map.identities, how, &category.name, &mut phrases, &mut encode)?;
+            let answered =
+                ask_by_embedding(&map.identities, (features, &recipe), &category.name, &mut phrases, &mut encode)?;
             // The best is the answer whatever its score: recall asks where, not whether.
             if let Some(best) = answered.iter().flat_map(|a| a.answer.hits()).next() {
                 mask = view.exact.mask(&map.identities, best.identity);

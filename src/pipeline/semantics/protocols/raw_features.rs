@@ -6,7 +6,8 @@
 
 use crate::math::vector::dot;
 use crate::pipeline::semantics::by_embedding::TextEmbeddings;
-use crate::pipeline::semantics::relevancy::{CANONICAL, TEMPERATURE, score};
+use crate::pipeline::semantics::recipe::Recipe;
+use crate::pipeline::semantics::relevancy::score;
 use crate::pipeline::semantics::view_map::PixelWeights;
 use crate::scene::LanguageFeatures;
 
@@ -30,19 +31,25 @@ impl RawFeatures {
     }
 
     /// Relevancy of every pixel, 0 to 1; `None` if the phrase was never learned.
-    pub(crate) fn relevancy(&self, view: &[PixelWeights], phrase: &str, phrases: &TextEmbeddings) -> Option<Vec<f32>> {
+    pub(crate) fn relevancy(
+        &self,
+        view: &[PixelWeights],
+        phrase: &str,
+        phrases: &TextEmbeddings,
+        recipe: &Recipe,
+    ) -> Option<Vec<f32>> {
         let toward = |phrase: &str| {
             let phrase = phrases.get(phrase)?;
             Some(self.of.iter().map(|f| dot(f, phrase)).collect::<Vec<f32>>())
         };
         let query = toward(phrase)?;
-        let canonical: Vec<Vec<f32>> = CANONICAL.into_iter().filter_map(toward).collect();
+        let canonical: Vec<Vec<f32>> = recipe.canonical.iter().filter_map(toward).collect();
         let pixel = |slots: &PixelWeights| {
             let known = || slots.iter().filter(|s| s.1 > 0.0 && (s.0 as usize) < self.of.len());
             let blended = |v: &[f32]| known().map(|s| s.1 * v[s.0 as usize]).sum::<f32>();
             let length = known().map(|s| s.1 * blended(&self.products[s.0 as usize])).sum::<f32>().sqrt();
             let nearest = canonical.iter().map(|c| blended(c)).fold(f32::NEG_INFINITY, f32::max);
-            if length > 1e-6 { score((blended(&query) - nearest) / length, TEMPERATURE) } else { 0.0 }
+            if length > 1e-6 { score((blended(&query) - nearest) / length, recipe.temperature) } else { 0.0 }
         };
         Some(view.iter().map(pixel).collect())
     }
@@ -51,6 +58,7 @@ impl RawFeatures {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pipeline::semantics::parse::ParsedQuery;
     use crate::pipeline::semantics::relevancy::advantage;
     use crate::scene::{NOBODY, ViewFeatures};
 
@@ -68,21 +76,22 @@ mod tests {
                 _ => vec![0.0, 1.0, 0.0],
             })
         };
-        phrases.learn(&["mug"], encode).expect("encodes");
+        let recipe = Recipe::default();
+        phrases.learn(&ParsedQuery::parse("mug").expect("a phrase"), &recipe, encode).expect("encodes");
         let mut mixed: PixelWeights = [(NOBODY, 0.0); 8];
         mixed[..3].copy_from_slice(&[(1, 0.3), (2, 0.5), (NOBODY, 0.1)]);
         let mut alone = mixed;
         alone[1].1 = 0.0;
         let nothing = [(NOBODY, 0.0); 8];
-        let got = raw.relevancy(&[mixed, alone, nothing], "mug", &phrases).expect("learned");
-        let canonical: Vec<Vec<f32>> = CANONICAL.map(|c| encode(c).expect("encodes")).to_vec();
+        let got = raw.relevancy(&[mixed, alone, nothing], "mug", &phrases, &recipe).expect("learned");
+        let canonical: Vec<Vec<f32>> = recipe.canonical.iter().map(|c| encode(c).expect("encodes")).collect();
         let expected = |sum: [f32; 3]| {
             let unit = crate::math::vector::unit(&sum).expect("not zero");
-            score(advantage(&unit, &[0.8, 0.6, 0.0], &canonical), TEMPERATURE)
+            score(advantage(&unit, &[0.8, 0.6, 0.0], &canonical), recipe.temperature)
         };
         assert!((got[0] - expected([0.3, 0.3, 0.4])).abs() < 1e-5, "{got:?}");
         assert!((got[1] - expected([0.3, 0.0, 0.0])).abs() < 1e-5 && got[2] == 0.0, "{got:?}");
         assert!((got[0] - got[1]).abs() > 0.1, "what is blended in counts");
-        assert_eq!(raw.relevancy(&[mixed], "never learned", &phrases), None);
+        assert_eq!(raw.relevancy(&[mixed], "never learned", &phrases, &recipe), None);
     }
 }

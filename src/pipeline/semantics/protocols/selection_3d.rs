@@ -22,7 +22,7 @@ pub(crate) fn compare(
         let targets = (scene.ask)(&category.name).map(|a| a.chosen(1)).unwrap_or_default();
         let mut inside = vec![false; cloud.len()];
         for id in targets {
-            let found = gaussians(scene.map, id, MatchMode::Exact, TOLERANCE);
+            let found = gaussians(scene.map, id, MatchMode::Identities, TOLERANCE);
             inside.iter_mut().zip(found).for_each(|(a, b)| *a |= b);
         }
         let alone = cloud.select(&(0..cloud.len()).filter(|&i| inside[i]).collect::<Vec<_>>());

@@ -5,7 +5,7 @@ use egui::{Align, Color32, Layout, RichText, Ui};
 
 use super::super::visible::Visibility;
 use super::pins::swatch;
-use super::{Asked, OverlaySettings, Queries};
+use super::{Asked, Queries};
 use crate::math::format;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::answer::{Basis, Certainty};
@@ -13,6 +13,7 @@ use crate::pipeline::semantics::localize::Answer;
 use crate::pipeline::semantics::matching::{self, MatchMode};
 use crate::pipeline::semantics::names;
 use crate::pipeline::semantics::reading::mended_text;
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::scene::{Bounds, GaussianCloud, IdentityId, SemanticMap, text};
 use crate::ui::actions::{Action, Pane};
 use crate::ui::state::AppState;
@@ -238,7 +239,7 @@ impl Queries {
         semantics: &Versioned<SemanticMap>,
         cloud: &GaussianCloud,
     ) -> Facts {
-        let OverlaySettings { mode, tolerance, .. } = self.side.settings;
+        let Recipe { masks: mode, tolerance, .. } = self.side.settings.recipe;
         let of = (semantics.generation(), target, mode, tolerance.to_bits());
         if let Some(facts) = self.side.facts.as_ref().filter(|f| f.of == of) {
             return facts.clone();

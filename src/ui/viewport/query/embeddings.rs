@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use crate::pipeline::semantics::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::parse::ParsedQuery;
-use crate::worker::text_encoder::{Encoded, EncodedText, TextEncoder};
+use crate::worker::text_encoder::{Encoded, EncodedText, TextEncoder, TextRequest};
 
 /// What is known of the texts on screen.
 #[derive(Default)]
@@ -16,13 +16,13 @@ pub(super) struct Embeddings {
     seen: u64,
     known: Arc<Encoded>,
     /// The texts that were asked for last.
-    requested: Vec<ParsedQuery>,
+    requested: TextRequest,
 }
 
 impl Embeddings {
     /// Loads the encoder of this name if it is another one than before, asks it for `texts`, and takes over what it
     /// has encoded. Whether anything is new.
-    pub(super) fn keep_up(&mut self, ctx: &egui::Context, name: Option<&str>, texts: Vec<ParsedQuery>) -> bool {
+    pub(super) fn keep_up(&mut self, ctx: &egui::Context, name: Option<&str>, texts: TextRequest) -> bool {
         if self.name.as_deref() != name {
             *self = Self { name: name.map(str::to_owned), ..Self::default() };
             if let Some(name) = self.name.clone() {

@@ -12,6 +12,7 @@ mod overlay;
 mod paint;
 mod panel;
 mod pins;
+mod recipe;
 mod settings;
 mod side;
 mod times;
@@ -31,6 +32,7 @@ use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::names;
 use crate::pipeline::semantics::reading::QueryReading;
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::scene::{IdentityId, Mask, ScenePlan, SemanticMap};
 use crate::ui::color_by::ColorBy;
 use crate::worker::Versioned;
@@ -127,7 +129,7 @@ impl Queries {
 
     /// Whether blended codes of the view are wanted.
     pub(crate) fn wants_codes(&self) -> bool {
-        let needs = |s: &OverlaySettings| s.mode == MatchMode::Blend || s.color_by == ColorBy::Difference;
+        let needs = |s: &OverlaySettings| s.recipe.masks == MatchMode::Codes || s.color_by == ColorBy::Difference;
         self.sides().iter().any(|side| needs(&side.settings))
     }
 
@@ -142,7 +144,7 @@ impl Queries {
         let encoder = semantics.language.as_ref().map(|l| l.encoder.as_str());
         let now = semantics.generation();
         // One that is of no more use goes at once, one that is new waits for a query.
-        let texts = self.sides().into_iter().flat_map(QuerySide::all).map(|q| q.reading.phrase.clone()).collect();
+        let texts = self.sides().into_iter().flat_map(QuerySide::texts).collect();
         let encoded =
             (encoder.is_none() || plan.encoder.now(self.wanted)) && self.embeddings.keep_up(ctx, encoder, texts);
         if encoded || self.answered_for != now {
@@ -234,10 +236,12 @@ impl Queries {
 
     fn asked(&self, text: &str, semantics: &SemanticMap) -> Option<Asked> {
         let text = text.trim();
-        let reading = QueryReading::new(&semantics.identities, text, self.side.settings.kind)?;
+        let reading =
+            QueryReading::new(&semantics.identities, text, self.side.settings.kind, &self.side.settings.recipe)?;
         let phrase = &reading.phrase;
         let encoded = self.embeddings.of(phrase);
-        let mut answered = answer_encoded(semantics, phrase, self.side.settings.kind, self.embeddings.phrases(phrase));
+        let OverlaySettings { kind, recipe, .. } = &self.side.settings;
+        let mut answered = answer_encoded(semantics, phrase, *kind, recipe, self.embeddings.phrases(phrase));
         answered.stages.encode = encoded.map_or(0.0, |t| t.encode_ms);
         let to_encoder = encoded.map(|t| t.unknown.as_slice());
         let unknown = names::unknown_to_all(&semantics.identities, &phrase.text, to_encoder);
@@ -248,7 +252,8 @@ impl Queries {
 
     /// The target's pixels in the present view.
     fn mask_of(&self, maps: &ViewMaps, semantics: &SemanticMap, target: IdentityId) -> Mask {
-        maps.mask(semantics, target, self.side.settings.mode, self.side.settings.tolerance)
+        let Recipe { masks, tolerance, .. } = self.side.settings.recipe;
+        maps.mask(semantics, target, masks, tolerance)
     }
 
     /// Pixels of an identity in the present view, if that is drawn.
@@ -265,8 +270,8 @@ impl Queries {
     /// Both, found once for a view.
     fn measured(&mut self, semantics: &Versioned<SemanticMap>, id: IdentityId) -> Option<(usize, Option<Vec2>)> {
         let maps = self.maps.clone()?;
-        let OverlaySettings { mode, tolerance, .. } = self.side.settings;
-        let of = (maps.generation(), semantics.generation(), mode, tolerance.to_bits());
+        let Recipe { masks, tolerance, .. } = self.side.settings.recipe;
+        let of = (maps.generation(), semantics.generation(), masks, tolerance.to_bits());
         if self.side.areas.of != of {
             self.side.areas = Areas { of, known: BTreeMap::new() };
         }

@@ -79,7 +79,7 @@ impl Layers<'_> {
     fn blended(&self, i: usize) -> Option<[u8; 3]> {
         let codes = self
             .codes
-            .filter(|_| self.settings.color_by == ColorBy::Codes && self.settings.mode == MatchMode::Blend)?;
+            .filter(|_| self.settings.color_by == ColorBy::Codes && self.settings.recipe.masks == MatchMode::Codes)?;
         let of = |level: Level| codes.level(level).iter().map(move |plane| plane.get(i).copied().unwrap_or(f32::NAN));
         // A part where there is one, else the object.
         let part: Vec<f32> = of(Level::Part).collect();
@@ -92,7 +92,7 @@ impl Layers<'_> {
     /// be. Where nothing is, nothing differs.
     fn difference(&self, i: usize, own: &[f32; CODE_CHANNELS]) -> Option<[u8; 3]> {
         let blended = self.codes?.planes.iter().map(|plane| plane.get(i).copied().unwrap_or(f32::NAN));
-        let far = blended.zip(own).any(|(b, o)| (b - o).abs() > self.settings.tolerance);
+        let far = blended.zip(own).any(|(b, o)| (b - o).abs() > self.settings.recipe.tolerance);
         far.then_some(DIFFERENT)
     }
 

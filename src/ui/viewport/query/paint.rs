@@ -4,8 +4,9 @@ use std::time::Instant;
 
 use egui::{Color32, Rect, TextureOptions, Ui};
 
-use super::{OverlaySettings, Queries, overlay};
+use super::{Asked, OverlaySettings, Queries, overlay};
 use crate::jobs::query::ViewMaps;
+use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::timing::{StagesMs, ms_since};
 use crate::scene::{IdentityId, Mask, SemanticMap};
 use crate::ui::color_by::ColorBy;
@@ -34,7 +35,7 @@ impl Queries {
         lit: Option<Vec<IdentityId>>,
     ) {
         let Some(maps) = self.shown_maps().cloned() else { return };
-        let settings = self.side.settings;
+        let settings = self.side.settings.clone();
         let shown: Vec<_> = self.all().map(|q| (self.colors.of(&q.text), q.shown(&settings))).collect();
         let newest = self.all().last().map(|q| q.text.clone());
         let nothing = shown.iter().all(|s| s.1.is_empty())
@@ -69,7 +70,12 @@ impl Queries {
             mask
         };
         let start = Instant::now();
-        let masks: Vec<([u8; 3], Mask)> = painted.shown.iter().map(|(color, ids)| (*color, union(ids))).collect();
+        let by_relevancy = self.side.settings.recipe.masks == MatchMode::Relevancy;
+        let mask = |(q, (color, ids)): (&Asked, &([u8; 3], Vec<IdentityId>))| match q.chosen {
+            None if by_relevancy => (*color, maps.of_answer(semantics, &q.answered, 1)),
+            _ => (*color, union(ids)),
+        };
+        let masks: Vec<([u8; 3], Mask)> = self.all().zip(&painted.shown).map(mask).collect();
         let lit = painted.lit.as_deref().map(|others| {
             let mut lit = union(others);
             masks.iter().for_each(|(_, mask)| lit.add(mask));
@@ -78,7 +84,7 @@ impl Queries {
         let masks = self.compared(masks);
         self.side.paint_ms.mask = ms_since(start);
         let newest = self.all().last();
-        let relevancy = newest.map_or_else(Vec::new, |q| q.answered.relevancy.clone());
+        let relevancy = newest.map_or_else(Vec::new, |q| q.answered.shown_relevancy(&maps.identities));
         let features = match (&semantics.language, self.side.settings.color_by) {
             (Some(language), ColorBy::Features) => {
                 let of = |f: &crate::scene::ViewFeatures| f.deviated.first().cloned();
@@ -98,7 +104,7 @@ impl Queries {
             lit: lit.as_ref().filter(|lit| !lit.is_empty()),
             relevancy: &relevancy,
             features: &features,
-            settings: self.side.settings,
+            settings: self.side.settings.clone(),
         };
         layers.paint()
     }

@@ -53,6 +53,7 @@ impl Queries {
         let pin = ui.add_enabled(found.is_some(), Button::new("Pin").selected(is_pinned));
         if pin.on_hover_text("Keep this answer on screen while you ask for other things.").clicked() {
             self.pin();
+            self.start_typing();
         }
     }
 
@@ -83,6 +84,7 @@ impl Queries {
         });
         if let Some(text) = wanted {
             self.ask(&text, semantics);
+            self.start_typing();
         }
         if let Some(k) = gone {
             self.side.pinned.remove(k);

@@ -4,14 +4,15 @@ use egui::{Color32, ComboBox, Rect, Sense, Slider, Stroke, Ui, pos2, vec2};
 use strum::VariantArray;
 
 use super::super::super::theme;
+use super::recipe;
 use crate::math::colormap::Colormap;
-use crate::pipeline::semantics::codes::TOLERANCE;
 use crate::pipeline::semantics::matching::MatchMode;
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::scene::LevelFilter;
 use crate::ui::color_by::ColorBy;
 
 /// How answers are found and drawn.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(crate) struct OverlaySettings {
     /// What tints the frame.
     pub(crate) color_by: ColorBy,
@@ -22,10 +23,8 @@ pub(crate) struct OverlaySettings {
     pub(crate) kind: LevelFilter,
     /// Answers whose pixels are shown at most.
     pub(crate) top: usize,
-    /// Where the codes that are matched come from.
-    pub(crate) mode: MatchMode,
-    /// Largest difference per channel of a match.
-    pub(crate) tolerance: f32,
+    /// How queries are answered.
+    pub(crate) recipe: Recipe,
     /// Relevancy that is outlined too; 0 = none.
     pub(crate) threshold: f32,
 }
@@ -38,8 +37,7 @@ impl Default for OverlaySettings {
             opacity: 0.6,
             kind: LevelFilter::Auto,
             top: 1,
-            mode: MatchMode::Exact,
-            tolerance: TOLERANCE,
+            recipe: Recipe::default(),
             threshold: 0.0,
         }
     }
@@ -48,7 +46,7 @@ impl Default for OverlaySettings {
 /// The settings. `heat` is the relevancy of the view's pixels, for the histogram. Whether the
 /// query has to be answered anew.
 pub(crate) fn show(ui: &mut Ui, settings: &mut OverlaySettings, heat: Option<&[f32]>) -> bool {
-    let kind = settings.kind;
+    let (kind, recipe) = (settings.kind, settings.recipe.clone());
     egui::Grid::new("overlay settings").num_columns(2).spacing(vec2(10.0, 5.0)).show(ui, |ui| {
         ui.weak("Search in");
         ui.horizontal(|ui| {
@@ -85,30 +83,33 @@ pub(crate) fn show(ui: &mut Ui, settings: &mut OverlaySettings, heat: Option<&[f
             colors.response.accessible_name("Color map");
         });
         ui.end_row();
+        recipe::show(ui, &mut settings.recipe);
         ui.weak("Opacity");
         ui.add(Slider::new(&mut settings.opacity, 0.0..=1.0).fixed_decimals(2)).accessible_name("Opacity");
         ui.end_row();
         ui.weak("Mask");
         ui.horizontal(|ui| {
-            ui.selectable_value(&mut settings.mode, MatchMode::Exact, "exact")
+            ui.selectable_value(&mut settings.recipe.masks, MatchMode::Identities, "exact")
                 .on_hover_text("Pixels of the identity with the largest weight");
-            ui.selectable_value(&mut settings.mode, MatchMode::Blend, "blended")
+            ui.selectable_value(&mut settings.recipe.masks, MatchMode::Codes, "blended")
                 .on_hover_text("Pixels whose alpha-blended code lies within the tolerance, as in the paper");
+            ui.selectable_value(&mut settings.recipe.masks, MatchMode::Relevancy, "relevancy")
+                .on_hover_text("Pixels over 20 % of LERF's scale: from 0.5 to the largest relevancy in the view");
         });
         ui.end_row();
         ui.weak("Tolerance");
-        let mut steps = settings.tolerance * 255.0;
+        let mut steps = settings.recipe.tolerance * 255.0;
         let slider = Slider::new(&mut steps, 0.0..=64.0).fixed_decimals(0).suffix(" / 255");
         let slider = ui.add(slider).accessible_name("Tolerance");
         if slider.on_hover_text("Largest difference per channel from the target's code").changed() {
-            settings.tolerance = steps / 255.0;
+            settings.recipe.tolerance = steps / 255.0;
         }
         ui.end_row();
     });
     if let Some(heat) = heat {
         histogram(ui, settings, heat);
     }
-    settings.kind != kind
+    settings.kind != kind || settings.recipe != recipe
 }
 
 /// Bins of the histogram.

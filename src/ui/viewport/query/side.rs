@@ -7,6 +7,8 @@ use egui::{TextureHandle, Vec2};
 use super::paint::Painted;
 use super::{Asked, OverlaySettings, Queries, card, truth};
 use crate::pipeline::semantics::matching::MatchMode;
+use crate::pipeline::semantics::parse::ParsedQuery;
+use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::timing::StagesMs;
 use crate::scene::IdentityId;
 
@@ -63,6 +65,11 @@ impl QuerySide {
     /// Puts the keyboard into the field, and what is typed next in place of its text.
     pub(super) fn start_typing(&mut self) {
         self.focus = 2;
+    }
+
+    /// What is asked, for the text encoder.
+    pub(super) fn texts(&self) -> impl Iterator<Item = (ParsedQuery, Recipe)> {
+        self.all().map(|q| (q.reading.phrase.clone(), self.settings.recipe.clone()))
     }
 
     /// Without queries and answers.

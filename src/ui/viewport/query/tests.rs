@@ -86,3 +86,28 @@ fn two_views_have_their_own_queries_and_the_same_colors() {
     assert!(queries.is_second() && queries.in_view(false, |q| q.all().next().is_none()));
     assert_eq!(queries.colors.of("lamp"), [255, 179, 0], "known in the next scene too");
 }
+
+#[test]
+fn each_view_answers_by_its_own_recipe() {
+    let (semantics, mut queries) = (semantics(), Queries::default());
+    queries.ask("lamp", &semantics);
+    queries.in_view(true, |second| second.ask("lamp", &semantics));
+    let answers = |queries: &mut Queries| {
+        [false, true].map(|second| {
+            queries.in_view(second, |q| {
+                let asked = q.all().next().expect("asked");
+                (asked.answered.recipe.clone(), asked.shown(&q.side.settings))
+            })
+        })
+    };
+    let default = (Recipe::default(), vec![1]);
+    assert_eq!(answers(&mut queries), [default.clone(), default.clone()]);
+    // By embedding alone nothing is found here: no encoder has looked at the scene.
+    queries.set_recipes(&[Recipe::default(), Recipe::paper()], &semantics);
+    assert_eq!(answers(&mut queries), [default, (Recipe::paper(), vec![])]);
+    assert_eq!(queries.recipes()[1], Recipe::paper());
+    queries.work_in(true);
+    assert_eq!((queries.recipe(), queries.recipes()[0].clone()), (&Recipe::paper(), Recipe::default()));
+    let texts: Vec<Recipe> = queries.sides().into_iter().flat_map(QuerySide::texts).map(|t| t.1).collect();
+    assert_eq!(texts, [Recipe::paper(), Recipe::default()], "the encoder is told");
+}

@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use super::Queries;
 use crate::navigate::Pose;
-use crate::pipeline::semantics::matching::MatchMode;
 use crate::scene::Mask;
 
 /// Hits, misses and false alarms, told apart by those who see no red or no green too.
@@ -52,11 +51,6 @@ impl Queries {
     /// Whether the answer of the view is shown against the truth.
     pub(crate) fn compares(&self) -> bool {
         self.side.comparison.is_some()
-    }
-
-    /// How pixels are matched, and the largest difference per channel.
-    pub(crate) fn matching(&self) -> (MatchMode, f32) {
-        (self.side.settings.mode, self.side.settings.tolerance)
     }
 
     /// The masks as they are drawn: the newest against the truth of this view, where there is one.

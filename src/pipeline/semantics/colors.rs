@@ -1,0 +1,70 @@
+//! Words for colors in questions and names: a thing of another color is another thing.
+
+use super::words::words;
+
+/// Words for colors, those that mean much the same in one row.
+const COLORS: [&[&str]; 12] = [
+    &["black"],
+    &["blue"],
+    &["brown"],
+    &["gray", "grey"],
+    &["green"],
+    &["orange"],
+    &["pink"],
+    &["purple", "violet"],
+    &["red"],
+    &["turquoise", "teal"],
+    &["white"],
+    &["yellow"],
+];
+
+/// The row of a word for a color.
+fn row(word: &str) -> Option<usize> {
+    COLORS.iter().position(|all| all.contains(&word))
+}
+
+/// The colors that a phrase says something has, by row. A last word is the thing itself: an orange.
+pub(crate) fn said(phrase: &str) -> Vec<usize> {
+    let words = words(phrase);
+    words.iter().take(words.len().saturating_sub(1)).filter_map(|w| row(w)).collect()
+}
+
+/// The words of a phrase that are no colors of something.
+pub(crate) fn without(phrase: &str) -> Vec<String> {
+    let words = words(phrase);
+    let last = words.len().saturating_sub(1);
+    words.into_iter().enumerate().filter(|(i, w)| *i == last || row(w).is_none()).map(|(_, w)| w).collect()
+}
+
+/// The phrase with its first color exchanged for each of the others; none if it has no color.
+pub(crate) fn alternatives(phrase: &str) -> Vec<String> {
+    let said: Vec<&str> = phrase.split(' ').collect();
+    let last = said.len() - 1;
+    let Some((at, own)) = said.iter().take(last).enumerate().find_map(|(i, w)| Some((i, row(w)?))) else {
+        return Vec::new();
+    };
+    let exchanged = |other: &&[&str]| {
+        let mut words = said.clone();
+        words[at] = other[0];
+        words.join(" ")
+    };
+    COLORS.iter().enumerate().filter(|(row, _)| *row != own).map(|(_, other)| exchanged(other)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn colors_are_what_something_has_and_not_what_it_is() {
+        assert_eq!(said("red and grey mug").len(), 2);
+        assert_eq!(said("gray mug"), said("grey lamp"));
+        assert!(said("orange").is_empty() && said("mug").is_empty() && said("").is_empty());
+        assert_eq!(without("the red mugs"), ["the", "mug"]);
+        assert_eq!(without("blood orange"), ["blood", "orange"]);
+        let others = alternatives("handle of the red mug");
+        assert_eq!(others.len(), COLORS.len() - 1);
+        assert!(others.contains(&"handle of the blue mug".to_owned()) && !others.iter().any(|o| o.contains("red")));
+        assert!(alternatives("orange").is_empty() && alternatives("mug").is_empty() && alternatives("").is_empty());
+    }
+}

@@ -1,0 +1,266 @@
+//! Localization by scores from tables.
+
+use super::super::names::ByName;
+use super::super::recipe::Rejection;
+use super::*;
+use crate::scene::NOBODY;
+
+fn scene() -> Identities {
+    let mut all = Identities::default();
+    for color in ["red", "blue"] {
+        let controller = all.add(Level::Object, NOBODY, vec![format!("{color} controller")]);
+        for part in ["button a", "left stick"] {
+            all.add(Level::Part, controller, vec![part.into()]);
+        }
+    }
+    all.add(Level::Object, NOBODY, vec!["lamp".into()]);
+    all
+}
+
+fn by_name(all: &Identities, phrase: &ParsedQuery, level: LevelFilter) -> Answer {
+    let mut scorer = ByName { identities: all, rejection: Rejection::Strict };
+    localize(all, phrase, level, Strategy::WholeFirst, &mut scorer)
+}
+
+fn ask(query: &str, level: LevelFilter) -> (Answer, Vec<String>) {
+    let all = scene();
+    let phrase = ParsedQuery::parse(query).expect("a phrase");
+    let answer = by_name(&all, &phrase, level);
+    let names = answer.hits().iter().map(|h| {
+        let line: Vec<String> = all.ancestors(h.identity).map(|i| all.name(i)).collect();
+        line.join(" < ")
+    });
+    let names = names.collect();
+    (answer, names)
+}
+
+#[test]
+fn the_whole_decides_between_pieces_of_the_same_name() {
+    for color in ["red", "blue"] {
+        let (answer, names) = ask(&format!("a button of the {color} controller"), LevelFilter::Auto);
+        assert!(matches!(answer, Answer::Found(_)), "{answer:?}");
+        assert_eq!(names[0], format!("button a < {color} controller"));
+    }
+    let (answer, names) = ask("button a", LevelFilter::Auto);
+    assert!(matches!(answer, Answer::Ambiguous(_)), "{answer:?}");
+    assert_eq!(names[..2], ["button a < red controller", "button a < blue controller"]);
+}
+
+#[test]
+fn a_kind_can_be_forced() {
+    assert_eq!(ask("red controller", LevelFilter::Auto).1[0], "red controller");
+    assert!(matches!(ask("red controller", LevelFilter::Part).0, Answer::NotFound(_)));
+    assert_eq!(ask("left stick of the blue controller", LevelFilter::Object).0.hits().len(), 3);
+}
+
+#[test]
+fn what_is_not_there_is_not_found() {
+    for absent in ["giraffe", "wing of the giraffe", "antenna of the red controller", "shade of the lamp"] {
+        assert!(matches!(ask(absent, LevelFilter::Auto).0, Answer::NotFound(_)), "{absent}");
+    }
+    let all = Identities::default();
+    let phrase = ParsedQuery::parse("lamp").expect("a phrase");
+    assert_eq!(by_name(&all, &phrase, LevelFilter::Auto), Answer::NotFound(vec![]));
+}
+
+/// Scores from a table: (phrase, against) -> score per identity.
+struct Table(Strategy, Vec<(&'static str, Option<&'static str>, Vec<f32>)>);
+
+impl Scorer for Table {
+    fn scores(&mut self, phrase: &str, against: Option<&str>) -> Vec<f32> {
+        let row = self.1.iter().find(|r| (r.0, r.1) == (phrase, against));
+        row.unwrap_or_else(|| panic!("{phrase:?} {against:?}")).2.clone()
+    }
+
+    fn threshold(&self) -> f32 {
+        0.5
+    }
+
+    fn resolution(&self) -> f32 {
+        0.001
+    }
+}
+
+fn by_table(all: &Identities, phrase: &ParsedQuery, level: LevelFilter, mut table: Table) -> Answer {
+    localize(all, phrase, level, table.0, &mut table)
+}
+
+#[test]
+fn the_papers_second_step_looks_inside_the_winning_object() {
+    let all = scene();
+    let phrase = ParsedQuery::parse("a button of the red controller").expect("a phrase");
+    let text = "button of the red controller";
+    // Identities: 1 red (2 button, 3 stick), 4 blue (5, 6), 7 lamp.
+    let step1 = vec![0.9, 0.6, 0.7, 0.8, 0.55, 0.5, 0.1];
+    let step2 = vec![0.2, 0.65, 0.6, 0.2, 0.7, 0.5, 0.1];
+    let table = |strategy, step1: Vec<f32>, step2: Vec<f32>| {
+        Table(strategy, vec![(text, None, step1), (text, Some("red controller"), step2)])
+    };
+    let ask = |t: Table| by_table(&all, &phrase, LevelFilter::Auto, t);
+    assert_eq!(ask(table(Strategy::OneStep, step1.clone(), step2.clone())).hits()[0].identity, 1);
+    assert_eq!(ask(table(Strategy::TwoSteps, step1.clone(), step2)).hits()[0].identity, 2);
+    // Pushed below the threshold, all of them: the order of step 1 stands.
+    let low = vec![0.1; 7];
+    assert_eq!(ask(table(Strategy::TwoSteps, step1.clone(), low)).hits()[0].identity, 3);
+    // A part that wins at once is the answer.
+    let part_wins = vec![0.5, 0.6, 0.7, 0.5, 0.95, 0.5, 0.1];
+    assert_eq!(ask(table(Strategy::TwoSteps, part_wins, step1)).hits()[0].identity, 5);
+    let nothing = vec![0.4; 7];
+    assert!(matches!(ask(table(Strategy::TwoSteps, nothing.clone(), nothing)), Answer::NotFound(_)));
+}
+
+#[test]
+fn both_phrases_together_survive_a_slip_of_either() {
+    let all = scene();
+    let phrase = ParsedQuery::parse("a button of the red controller").expect("a phrase");
+    let text = "button of the red controller";
+    // Identities: 1 red (2 button, 3 stick), 4 blue (5, 6), 7 lamp.
+    let ask = |by_text: [f32; 7], by_whole: [f32; 7]| {
+        let rows = vec![(text, None, by_text.to_vec()), ("red controller", None, by_whole.to_vec())];
+        by_table(&all, &phrase, LevelFilter::Auto, Table(Strategy::Joint, rows))
+    };
+    // The blue button is a little more like a button; the red controller is clearly the red one.
+    let answer = ask([0.9, 0.6, 0.4, 0.8, 0.63, 0.4, 0.1], [0.9, 0.1, 0.1, 0.4, 0.1, 0.1, 0.1]);
+    assert!(matches!(&answer, Answer::Found(hits) if hits[0].identity == 2), "{answer:?}");
+    // The blue controller is a little redder; the red button is clearly the one.
+    let answer = ask([0.5, 0.8, 0.4, 0.5, 0.4, 0.4, 0.1], [0.6, 0.1, 0.1, 0.65, 0.1, 0.1, 0.1]);
+    assert!(matches!(&answer, Answer::Found(hits) if hits[0].identity == 2), "{answer:?}");
+    assert!(matches!(ask([0.4; 7], [0.4; 7]), Answer::NotFound(_)));
+}
+
+#[test]
+fn one_usable_piece_is_enough_and_the_threshold_itself_counts() {
+    let all = scene();
+    let phrase = ParsedQuery::parse("a button of the red controller").expect("a phrase");
+    let text = "button of the red controller";
+    // Identities: 1 red (2 button, 3 stick), 4 blue (5, 6), 7 lamp.
+    let paper = |step1: [f32; 7], step2: [f32; 7]| {
+        let rows = vec![(text, None, step1.to_vec()), (text, Some("red controller"), step2.to_vec())];
+        by_table(&all, &phrase, LevelFilter::Auto, Table(Strategy::TwoSteps, rows))
+    };
+    // The object wins with just the threshold; of its pieces only the first reaches it.
+    let answer = paper([0.5, 0.3, 0.4, 0.2, 0.1, 0.1, 0.1], [0.9, 0.5, 0.4, 0.9, 0.9, 0.9, 0.9]);
+    assert_eq!((answer.verdict(), answer.hits()[0].identity, answer.hits().len()), ("found", 2, 2));
+    assert!((answer.hits()[0].margin - 0.1).abs() < 1e-6 && answer.hits()[1].margin == 0.4);
+    // None reaches it: the order of step 1, in which none does either.
+    let answer = paper([0.5, 0.3, 0.4, 0.2, 0.1, 0.1, 0.1], [0.9, 0.49, 0.4, 0.9, 0.9, 0.9, 0.9]);
+    assert_eq!((answer.verdict(), answer.hits()[0].identity), ("not found", 3));
+    // An object without parts has no piece.
+    assert_eq!(paper([0.1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.9], [0.9; 7]).verdict(), "not found");
+}
+
+#[test]
+fn the_whole_by_its_phrase_then_its_pieces_by_theirs() {
+    let all = scene();
+    let phrase = ParsedQuery::parse("a button of the red controller").expect("a phrase");
+    let first = |whole: [f32; 7], plain: [f32; 7], against: [f32; 7]| {
+        let rows = vec![
+            ("red controller", None, whole.to_vec()),
+            ("button", None, plain.to_vec()),
+            ("button", Some("red controller"), against.to_vec()),
+        ];
+        by_table(&all, &phrase, LevelFilter::Auto, Table(Strategy::WholeFirst, rows))
+    };
+    let pieces = |answer: &Answer| answer.hits().iter().map(|h| h.identity).collect::<Vec<_>>();
+    let whole = [0.9, 0.1, 0.1, 0.8, 0.1, 0.1, 0.95];
+    // The lamp fits best but has no pieces; the red one's compete, by the second step.
+    let answer = first(whole, [0.1, 0.6, 0.9, 0.1, 0.9, 0.9, 0.1], [0.1, 0.7, 0.5, 0.1, 0.9, 0.9, 0.1]);
+    assert_eq!((pieces(&answer), answer.verdict()), (vec![2, 3], "found"));
+    // Pushed below the threshold, all of them: the first order.
+    let answer = first(whole, [0.1, 0.6, 0.9, 0.1, 0.9, 0.9, 0.1], [0.1, 0.4, 0.3, 0.1, 0.9, 0.9, 0.1]);
+    assert_eq!(pieces(&answer), [3, 2]);
+    // Wholes that cannot be told apart both take part; those just told apart do not.
+    let alike = [0.9, 0.1, 0.1, 0.8995, 0.1, 0.1, 0.1];
+    let scores = [0.1, 0.6, 0.5, 0.1, 0.7, 0.5, 0.1];
+    assert_eq!(pieces(&first(alike, scores, scores)), [5, 2, 3, 6]);
+    let apart = [0.9, 0.1, 0.1, 0.899, 0.1, 0.1, 0.1];
+    assert_eq!(pieces(&first(apart, scores, scores)), [2, 3]);
+    let low = [0.4; 7];
+    assert_eq!(first(low, scores, scores).verdict(), "not found");
+}
+
+#[test]
+fn two_that_are_nearly_alike_are_ambiguous_unless_one_is_in_the_other() {
+    let all = scene();
+    let phrase = ParsedQuery::parse("thing").expect("a phrase");
+    let ask = |scores: [f32; 7]| {
+        let table = Table(Strategy::OneStep, vec![("thing", None, scores.to_vec())]);
+        by_table(&all, &phrase, LevelFilter::Auto, table)
+    };
+    assert_eq!(ask([0.9, 0.1, 0.1, 0.8995, 0.1, 0.1, 0.1]).verdict(), "ambiguous");
+    assert_eq!(ask([0.9, 0.1, 0.1, 0.898, 0.1, 0.1, 0.1]).verdict(), "found");
+    assert_eq!(ask([0.9, 0.8995, 0.1, 0.1, 0.1, 0.1, 0.1]).verdict(), "found", "a piece of it");
+    assert_eq!(ask([0.8995, 0.9, 0.1, 0.1, 0.1, 0.1, 0.1]).verdict(), "found", "its whole");
+    let answer = ask([f32::NAN, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6]);
+    let order: Vec<_> = answer.hits().iter().map(|h| h.identity).collect();
+    assert_eq!(order, [7, 6, 5, 4, 3, 2], "what is no number is none");
+    assert!(answer.hits().iter().take(5).all(|h| (h.margin - 0.1).abs() < 1e-6), "{answer:?}");
+}
+
+#[test]
+fn a_compound_and_a_forced_kind_reach_the_second_step_without_grammar() {
+    let all = scene();
+    let text = "controller button";
+    let ask = |level, strategy, step1: [f32; 7], whole: [f32; 7], step2: [f32; 7]| {
+        let phrase = ParsedQuery::parse(text).expect("a phrase");
+        assert_eq!((phrase.whole.as_ref(), phrase.implied_whole()), (None, Some("controller")));
+        let rows = vec![
+            (text, None, step1.to_vec()),
+            ("controller", None, whole.to_vec()),
+            (text, Some("controller"), step2.to_vec()),
+        ];
+        let answer = by_table(&all, &phrase, level, Table(strategy, rows));
+        (answer.verdict(), answer.hits()[0].identity)
+    };
+    // Identities: 1 red (2 button, 3 stick), 4 blue (5, 6), 7 lamp. The red controller wins.
+    let step1 = [0.9, 0.6, 0.7, 0.8, 0.55, 0.5, 0.1];
+    let step2 = [0.3, 0.65, 0.6, 0.2, 0.9, 0.5, 0.1];
+    let (fits, worse) = ([0.95, 0.1, 0.1, 0.9, 0.1, 0.1, 0.1], [0.4, 0.1, 0.1, 0.3, 0.1, 0.1, 0.1]);
+    for strategy in [Strategy::TwoSteps, Strategy::Joint] {
+        // Its own phrase describes it better: its parts compete, without those of others.
+        assert_eq!(ask(LevelFilter::Auto, strategy, step1, fits, step2), ("found", 2), "{strategy}");
+        // No part is more like the question than like the controller, or "controller" describes it worse: it stays.
+        assert_eq!(ask(LevelFilter::Auto, strategy, step1, fits, [0.4; 7]), ("found", 1), "{strategy}");
+        assert_eq!(ask(LevelFilter::Auto, strategy, step1, worse, step2), ("found", 1), "{strategy}");
+        assert_eq!(ask(LevelFilter::Object, strategy, step1, fits, step2), ("found", 1), "{strategy}");
+    }
+    assert_eq!(ask(LevelFilter::Auto, Strategy::OneStep, step1, fits, step2), ("found", 1));
+    assert_eq!(ask(LevelFilter::Part, Strategy::TwoSteps, step1, fits, step2), ("found", 2));
+    // A part that is forced: without a phrase for the whole its parts compete by the question alone.
+    let phrase = ParsedQuery::parse("button").expect("a phrase");
+    let rows = vec![("button", None, step1.to_vec())];
+    let answer = by_table(&all, &phrase, LevelFilter::Part, Table(Strategy::TwoSteps, rows.clone()));
+    assert_eq!(answer.hits().iter().map(|h| h.identity).collect::<Vec<_>>(), [3, 2]);
+    // The control: in one step, parts of everything do.
+    let answer = by_table(&all, &phrase, LevelFilter::Part, Table(Strategy::OneStep, rows));
+    assert_eq!(answer.hits().iter().map(|h| h.identity).collect::<Vec<_>>(), [3, 2, 5, 6]);
+}
+
+#[test]
+fn names_reject_other_colors_and_colors_alone() {
+    let mut all = scene();
+    all.add(Level::Object, NOBODY, vec!["brown chair".into()]);
+    let verdict = |query: &str, rejection| {
+        let phrase = ParsedQuery::parse(query).expect("a phrase");
+        let mut scorer = ByName { identities: &all, rejection };
+        localize(&all, &phrase, LevelFilter::Auto, Strategy::WholeFirst, &mut scorer).verdict()
+    };
+    for wrong in
+        ["green lamp post", "green chair", "brown house", "leg of the brown house", "button a of the green controller"]
+    {
+        assert_eq!(verdict(wrong, Rejection::Strict), "not found", "{wrong}");
+    }
+    // The control: without it, half of the words are enough.
+    assert_ne!(verdict("green chair", Rejection::Canonical), "not found");
+    assert_ne!(verdict("brown house", Rejection::Canonical), "not found");
+    assert_eq!(verdict("giraffe", Rejection::Canonical), "not found");
+    // What has no color in its name may have any.
+    for right in ["green lamp", "brown chair", "chair", "red controller", "button a of the red controller"] {
+        assert_ne!(verdict(right, Rejection::Strict), "not found", "{right}");
+    }
+    assert_eq!(
+        verdict("brown", Rejection::Strict),
+        verdict("brown", Rejection::Canonical),
+        "a color alone is the kind"
+    );
+}

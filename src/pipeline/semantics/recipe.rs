@@ -1,0 +1,343 @@
+//! A recipe: every choice in which this program's way differs from the paper's. One type, which the window, the
+//! command line, the agent and all measurements pass on as it is.
+
+use std::fmt;
+
+use serde::{Deserialize, Serialize};
+
+use super::codes::TOLERANCE;
+use super::matching::MatchMode;
+use crate::scene::{Lifting, MaskPrompt, Preparation, SemanticMap};
+
+/// The canonical phrases of the paper, which mean anything.
+pub const PAPERS_PHRASES: [&str; 3] = ["object", "stuff", "texture"];
+/// Those of LERF.
+const LERFS_PHRASES: [&str; 4] = ["object", "things", "stuff", "texture"];
+/// Temperature that spreads scores over the unit interval, as in LERF.
+const TEMPERATURE: f32 = 10.0;
+
+/// What a question is compared with.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    clap::ValueEnum,
+    strum::Display,
+    strum::VariantArray,
+)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum Understanding {
+    /// The names that identities have
+    Names,
+    /// The embeddings that an encoder made of them, as in the paper
+    Embedding,
+    /// Names first, embeddings where they do not know all words
+    #[default]
+    Both,
+}
+
+/// How a piece of a whole is looked for.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    clap::ValueEnum,
+    strum::Display,
+    strum::VariantArray,
+)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum Strategy {
+    /// Every part by the whole query and its object by the whole's phrase at once (names: whole-first)
+    #[default]
+    Joint,
+    /// The paper's: the query first; if an object wins, its parts compete, with its phrase among the canonical ones
+    TwoSteps,
+    /// The query once, whatever wins
+    OneStep,
+    /// The whole by its own phrase, then its pieces by theirs
+    WholeFirst,
+}
+
+/// Which embeddings of parts are compared.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    clap::ValueEnum,
+    strum::Display,
+    strum::VariantArray,
+)]
+#[serde(rename_all = "lowercase")]
+pub enum PartFeatures {
+    /// Moved toward their whole's: the paper's semantic deviation
+    #[default]
+    #[value(name = "on")]
+    #[serde(rename = "on")]
+    #[strum(serialize = "on")]
+    Deviated,
+    /// As the encoder made them
+    #[value(name = "off")]
+    #[serde(rename = "off")]
+    #[strum(serialize = "off")]
+    Raw,
+}
+
+/// How relevancy is shown.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    clap::ValueEnum,
+    strum::Display,
+    strum::VariantArray,
+)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum RelevancyScale {
+    /// As it is, 0 to 1
+    #[default]
+    Raw,
+    /// LERF's: from 0.5 to the largest in the view
+    Lerf,
+}
+
+/// When nothing fits.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    clap::ValueEnum,
+    strum::Display,
+    strum::VariantArray,
+)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum Rejection {
+    /// Never: what fits best is the answer, as in the paper
+    Never,
+    /// What is less relevant than a canonical phrase
+    Canonical,
+    /// That, what is hardly more relevant for this encoder, and what has another color than was asked for
+    #[default]
+    Strict,
+}
+
+/// The phrases that mean anything: what is asked for must be nearer than they are.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CanonicalPhrases(Vec<String>);
+
+impl CanonicalPhrases {
+    pub(crate) const NAMED: [(&str, &'static [&'static str]); 2] =
+        [("paper", &PAPERS_PHRASES), ("lerf", &LERFS_PHRASES)];
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = &str> {
+        self.0.iter().map(String::as_str)
+    }
+}
+
+impl Default for CanonicalPhrases {
+    fn default() -> Self {
+        Self(PAPERS_PHRASES.map(str::to_owned).to_vec())
+    }
+}
+
+impl std::str::FromStr for CanonicalPhrases {
+    type Err = String;
+
+    /// "paper", "lerf", or phrases with commas between.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let named = Self::NAMED.iter().find(|(name, _)| *name == text.trim()).map(|(_, phrases)| phrases.join(","));
+        let text = named.unwrap_or_else(|| text.to_lowercase());
+        let mut phrases: Vec<String> =
+            text.split(',').map(str::trim).filter(|p| !p.is_empty()).map(str::to_owned).collect();
+        phrases.dedup();
+        match phrases.len() {
+            0 => Err("no phrase is given: write 'paper', 'lerf', or phrases with commas between".into()),
+            n if n > 64 => Err(format!("{n} phrases exceed the limit of 64")),
+            _ => Ok(Self(phrases)),
+        }
+    }
+}
+
+impl fmt::Display for CanonicalPhrases {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0.join(", "))
+    }
+}
+
+/// Every choice of a question, and those that were to be made before, when objects were found.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Recipe {
+    /// What questions are compared with.
+    pub understanding: Understanding,
+    /// How pieces are looked for.
+    pub strategy: Strategy,
+    /// Whether parts are deviated.
+    #[serde(rename = "deviation")]
+    pub parts: PartFeatures,
+    /// Phrases that mean anything.
+    pub canonical: CanonicalPhrases,
+    /// Spread of the scores; the order does not depend on it.
+    pub temperature: f32,
+    /// How relevancy is shown.
+    #[serde(rename = "relevancy")]
+    pub scale: RelevancyScale,
+    /// What pixels and Gaussians belong to an answer.
+    #[serde(rename = "match")]
+    pub masks: MatchMode,
+    /// Largest difference per channel of a match.
+    pub tolerance: f32,
+    /// When nothing fits.
+    #[serde(rename = "not_found")]
+    pub rejection: Rejection,
+    /// What was to be chosen when objects were found.
+    pub preparation: Preparation,
+}
+
+impl Default for Recipe {
+    fn default() -> Self {
+        Self {
+            understanding: Understanding::default(),
+            strategy: Strategy::default(),
+            parts: PartFeatures::default(),
+            canonical: CanonicalPhrases::default(),
+            temperature: TEMPERATURE,
+            scale: RelevancyScale::default(),
+            masks: MatchMode::default(),
+            tolerance: TOLERANCE,
+            rejection: Rejection::default(),
+            preparation: Preparation::default(),
+        }
+    }
+}
+
+/// Recipes that have a name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, strum::Display, strum::VariantArray)]
+#[strum(serialize_all = "kebab-case")]
+pub enum RecipeName {
+    /// This program's way
+    Default,
+    /// The paper's
+    Paper,
+}
+
+impl RecipeName {
+    /// All of its choices.
+    pub fn recipe(self) -> Recipe {
+        match self {
+            Self::Default => Recipe::default(),
+            Self::Paper => Recipe::paper(),
+        }
+    }
+}
+
+impl Recipe {
+    /// All of the paper's choices.
+    pub fn paper() -> Self {
+        Self {
+            understanding: Understanding::Embedding,
+            strategy: Strategy::TwoSteps,
+            temperature: 1.0,
+            scale: RelevancyScale::Lerf,
+            masks: MatchMode::Codes,
+            rejection: Rejection::Never,
+            preparation: Preparation {
+                lifting: Lifting::Paper,
+                prompt: Some(MaskPrompt::Points),
+                ..Preparation::default()
+            },
+            ..Self::default()
+        }
+    }
+
+    /// The name of this recipe; `None` if it is one of nobody's making but the user's.
+    pub fn name(&self) -> Option<RecipeName> {
+        [RecipeName::Default, RecipeName::Paper].into_iter().find(|name| *self == name.recipe())
+    }
+
+    /// What of this recipe a scene was not prepared for: it answers otherwise than the recipe says.
+    pub(crate) fn unmet(&self, map: &SemanticMap) -> Vec<String> {
+        let mut unmet = Vec::new();
+        if self.understanding == Understanding::Embedding && map.language.is_none() {
+            unmet.push("no encoder has looked at this scene, so nothing is found by embedding: prepare it with 'fmlgs preprocess --encoder'".into());
+        }
+        let wanted = self.preparation;
+        let Some(found) = map.prepared else {
+            if wanted != Preparation::default() {
+                unmet.push(
+                    "this scene does not say how its objects were found; 'fmlgs preprocess --recipe' finds them anew"
+                        .into(),
+                );
+            }
+            return unmet;
+        };
+        let mut differs = |what: &str, wanted: String, found: String| {
+            if wanted != found {
+                unmet.push(format!(
+                    "this scene was prepared with {what} {found}, the recipe says {wanted}; 'fmlgs preprocess' decides that"
+                ));
+            }
+        };
+        differs("lifting", wanted.lifting.to_string(), found.lifting.to_string());
+        if self.understanding != Understanding::Names && self.parts == PartFeatures::Deviated {
+            differs("part weight", wanted.part_weight.to_string(), found.part_weight.to_string());
+        }
+        // How masks were followed matters to those who ask for one way of following them.
+        if let Some(prompt) = wanted.prompt {
+            let found = found.prompt.map_or_else(|| "none (masks carried by the Gaussians)".into(), |p| p.to_string());
+            differs("SAM 2's prompt", prompt.to_string(), found);
+        }
+        unmet
+    }
+}
+
+/// The name, if it has one, and all choices.
+impl fmt::Display for Recipe {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let name = self.name().map_or_else(|| "own".into(), |n| n.to_string());
+        let Preparation { lifting, part_weight, prompt } = self.preparation;
+        write!(
+            f,
+            "recipe {name}: by {}, strategy {}, deviation {} (part weight {part_weight}), canonical phrases {}, \
+             temperature {}, relevancy {}, match {} within {:.0}/255, not found {}, lifting {lifting}",
+            self.understanding,
+            self.strategy,
+            self.parts,
+            self.canonical,
+            self.temperature,
+            self.scale,
+            self.masks,
+            255.0 * self.tolerance,
+            self.rejection,
+        )?;
+        prompt.map_or(Ok(()), |prompt| write!(f, ", SAM 2 prompted by {prompt}"))
+    }
+}

@@ -1,0 +1,61 @@
+//! What was chosen when the objects and parts of a scene were found: queries cannot change it afterwards.
+
+use serde::{Deserialize, Serialize};
+
+/// How Gaussians get their codes.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    clap::ValueEnum,
+    strum::Display,
+    strum::VariantArray,
+)]
+#[strum(serialize_all = "kebab-case")]
+pub enum Lifting {
+    /// Those of the identities they voted for
+    #[default]
+    Votes,
+    /// The same, refined by training
+    Refined,
+    /// By training alone, as in the paper; identities are read off the trained codes
+    Paper,
+}
+
+/// What of a mask SAM 2 is given to follow.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum, strum::Display)]
+#[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "kebab-case")]
+pub enum MaskPrompt {
+    /// All of it
+    #[default]
+    Mask,
+    /// Points drawn from it, as in the paper (Algorithm 1)
+    Points,
+}
+
+/// Share of its own embedding that a part keeps in semantic deviation, the paper's `w`.
+pub const PART_WEIGHT: f32 = 0.7;
+
+/// The choices of a recipe that are made when objects and parts are found.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Preparation {
+    /// How Gaussians got their codes.
+    pub lifting: Lifting,
+    /// Share of its own embedding that a part kept in semantic deviation.
+    pub part_weight: f32,
+    /// What of each mask SAM 2 followed; `None` if the Gaussians alone carried masks on.
+    pub prompt: Option<MaskPrompt>,
+}
+
+impl Default for Preparation {
+    fn default() -> Self {
+        Self { lifting: Lifting::default(), part_weight: PART_WEIGHT, prompt: None }
+    }
+}

@@ -1,0 +1,101 @@
+//! The recipe of a view's queries: this program's way, the paper's, or single choices of either.
+
+use egui::{ComboBox, TextEdit, Ui};
+use strum::VariantArray;
+
+use super::Queries;
+use crate::pipeline::semantics::recipe::{
+    CanonicalPhrases, PartFeatures, Recipe, RecipeName, Rejection, RelevancyScale, Strategy, Understanding,
+};
+use crate::scene::SemanticMap;
+
+impl Queries {
+    /// How queries are answered in the view that is worked in.
+    pub(crate) fn recipe(&self) -> &Recipe {
+        &self.side.settings.recipe
+    }
+
+    /// How they are answered in the first and the second view.
+    pub(crate) fn recipes(&self) -> [Recipe; 2] {
+        let [side, other] = self.sides().map(|side| side.settings.recipe.clone());
+        if self.is_second { [other, side] } else { [side, other] }
+    }
+
+    /// Answers by these recipes in the first and the second view.
+    pub(crate) fn set_recipes(&mut self, recipes: &[Recipe; 2], semantics: &SemanticMap) {
+        if self.recipes() != *recipes {
+            for (second, recipe) in [false, true].into_iter().zip(recipes) {
+                self.in_view(second, |all| all.side.settings.recipe = recipe.clone());
+            }
+            self.ask_again(semantics);
+        }
+    }
+}
+
+/// The rows of the recipe in a grid of two columns.
+pub(super) fn show(ui: &mut Ui, recipe: &mut Recipe) {
+    ui.weak("Recipe");
+    ui.horizontal(|ui| {
+        let name = recipe.name();
+        for (other, text, hint) in [
+            (RecipeName::Default, "default", "This program's way: names first, embeddings where they know no more"),
+            (RecipeName::Paper, "paper", "All of the paper's choices: by embedding, in two steps, never 'not found'"),
+        ] {
+            let label = ui.selectable_label(name == Some(other), text).on_hover_text(hint);
+            if label.clicked() {
+                *recipe = other.recipe();
+            }
+        }
+        if name.is_none() {
+            ui.weak("own");
+        }
+        ui.menu_button("Choices\u{2026}", |ui| choices(ui, recipe)).response.on_hover_text(recipe.to_string());
+    });
+    ui.end_row();
+}
+
+fn choices(ui: &mut Ui, recipe: &mut Recipe) {
+    egui::Grid::new("recipe").num_columns(2).show(ui, |ui| {
+        one_of(ui, "By", Understanding::VARIANTS, &mut recipe.understanding);
+        one_of(ui, "Parts of wholes", Strategy::VARIANTS, &mut recipe.strategy);
+        one_of(ui, "Deviation", PartFeatures::VARIANTS, &mut recipe.parts);
+        one_of(ui, "Relevancy", RelevancyScale::VARIANTS, &mut recipe.scale);
+        one_of(ui, "Not found", Rejection::VARIANTS, &mut recipe.rejection);
+        ui.weak("Temperature");
+        ui.add(egui::DragValue::new(&mut recipe.temperature).range(0.1..=100.0).speed(0.1))
+            .accessible_name("Temperature");
+        ui.end_row();
+        canonical(ui, &mut recipe.canonical);
+    });
+}
+
+/// The canonical phrases, taken over when the field is left.
+fn canonical(ui: &mut Ui, phrases: &mut CanonicalPhrases) {
+    ui.weak("Canonical phrases");
+    let id = ui.scope_id().with("canonical phrases");
+    let mut typed = ui.data_mut(|d| d.get_temp::<String>(id)).unwrap_or_else(|| phrases.to_string());
+    let field = ui.add(TextEdit::singleline(&mut typed).desired_width(180.0)).accessible_name("Canonical phrases");
+    let field = field.on_hover_text("With commas between; 'paper' and 'lerf' are lists of their own");
+    if field.lost_focus() {
+        if let Ok(new) = typed.parse() {
+            *phrases = new;
+        }
+    }
+    if field.has_focus() {
+        ui.data_mut(|d| d.insert_temp(id, typed));
+    } else {
+        ui.data_mut(|d| d.remove::<String>(id));
+    }
+    ui.end_row();
+}
+
+fn one_of<T: Copy + PartialEq + ToString>(ui: &mut Ui, what: &str, all: &[T], chosen: &mut T) {
+    ui.weak(what);
+    let combo = ComboBox::from_id_salt(what).selected_text(chosen.to_string()).width(110.0).show_ui(ui, |ui| {
+        for value in all {
+            ui.selectable_value(chosen, *value, value.to_string());
+        }
+    });
+    combo.response.accessible_name(what);
+    ui.end_row();
+}
