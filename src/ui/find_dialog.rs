@@ -114,6 +114,19 @@ impl FindDialog {
         }
     }
 
+    /// Offers the fast engine where it is not there.
+    fn engine(ui: &mut Ui, known: &ModelList, actions: &mut Vec<Action>) {
+        let fast = known.of(ModelRole::Engine).find(|(e, s)| !known.is_fast && !s.is_usable() && e.is_hosted());
+        let Some((entry, _)) = fast else { return };
+        ui.add_space(8.0);
+        ui.label(RichText::new("What runs them").strong());
+        ui.label(RichText::new(&entry.adds).small().color(theme::weak()));
+        let text = format!("Download {} ({} MB, {})", entry.title, entry.download_megabytes(), entry.license);
+        if ui.small_button(text).clicked() {
+            actions.push(Action::FetchModel(entry.id.clone()));
+        }
+    }
+
     fn buttons(&mut self, ui: &mut Ui, means: Option<Means>, actions: &mut Vec<Action>) -> Option<Means> {
         ui.add_space(10.0);
         ui.horizontal(|ui| {
