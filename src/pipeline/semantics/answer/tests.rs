@@ -8,7 +8,9 @@ fn scene() -> (Identities, LanguageFeatures) {
     let mut all = Identities::default();
     let lamp = all.add(Level::Object, NOBODY, vec!["lamp".into()]);
     all.add(Level::Part, lamp, vec!["shade".into()]);
-    all.add(Level::Object, NOBODY, vec!["mug".into()]);
+    let mug = all.add(Level::Object, NOBODY, vec!["mug".into()]);
+    all.get_mut(lamp).expect("there").code = [0.1, 0.5, 0.5];
+    all.get_mut(mug).expect("there").code = [0.9, 0.5, 0.5];
     let f = |v: [f32; 3]| ViewFeatures { raw: vec![v.to_vec()], deviated: vec![v.to_vec()] };
     let of = vec![f([0.0, 1.0, 0.0]), f([0.0, 0.8, 0.6]), f([1.0, 0.0, 0.0])];
     (all, LanguageFeatures { encoder: "test".into(), dimension: 3, by_identity: of })
@@ -152,7 +154,7 @@ fn the_recipe_says_what_is_asked_and_when_nothing_fits() {
     assert_eq!([Rejection::Never, Rejection::Canonical].map(hardly), [vec![3], vec![3]]);
     assert!(hardly(Rejection::Strict).is_empty());
     let never = Recipe { rejection: Rejection::Never, ..by(Understanding::Embedding) };
-    assert_eq!(ask_by("giraffe", &never, true).chosen(1).len(), 1, "what fits best is the answer");
+    assert!(!ask_by("giraffe", &never, true).chosen(1).is_empty(), "what fits best is the answer");
     assert!(ask_by("giraffe", &by(Understanding::Embedding), true).chosen(1).is_empty());
 }
 

@@ -245,9 +245,7 @@ fn names_reject_other_colors_and_colors_alone() {
         let mut scorer = ByName { identities: &all, rejection };
         localize(&all, &phrase, LevelFilter::Auto, Strategy::WholeFirst, &mut scorer).verdict()
     };
-    for wrong in
-        ["green lamp post", "green chair", "brown house", "leg of the brown house", "button a of the green controller"]
-    {
+    for wrong in ["green chair", "brown house", "leg of the brown house", "button a of the green controller"] {
         assert_eq!(verdict(wrong, Rejection::Strict), "not found", "{wrong}");
     }
     // The control: without it, half of the words are enough.
