@@ -209,15 +209,20 @@ impl Rendered {
         self.photos(&scene.join("images"), SIZE, |v| format!("IMG_{v:04}.jpg"));
         self.photos(&scene.join("images_2"), reduced, |v| format!("IMG_{v:04}.png"));
         self.llff(&scene, |v| format!("IMG_{v:04}.jpg"));
-        let labels = scene.join("images_2/label");
+        self.spin_labels(&scene, object);
+    }
+
+    /// The masks of an object in a scene of SPIn-NeRF's.
+    pub fn spin_labels(&self, scene: &Path, object: &str) {
+        let (labels, [w, h]) = (scene.join("images_2/label"), SIZE.map(|s| s / 2));
         fs::create_dir_all(&labels).unwrap();
         for view in 0..self.views() {
             let mask = self.mask(view, object);
-            let small = image::imageops::resize(&mask, reduced[0], reduced[1], image::imageops::FilterType::Nearest);
+            let small = image::imageops::resize(&mask, w, h, image::imageops::FilterType::Nearest);
             small.save(labels.join(format!("IMG_{view:04}.png"))).unwrap();
         }
         // Its helper pictures, which are no labels.
-        GrayImage::new(reduced[0], reduced[1]).save(labels.join("IMG_0000_cutout.png")).unwrap();
+        GrayImage::new(w, h).save(labels.join("IMG_0000_cutout.png")).unwrap();
     }
 
     /// `data/SCENE` as in 3D-OVS: masks of every class in the photos `labeled`.

@@ -50,7 +50,7 @@ pub(super) struct QueryTimes {
 }
 
 #[derive(Default)]
-pub(super) struct Asked {
+pub(super) struct MeasuredRows {
     pub(super) rows: Vec<RowResult>,
     pub(super) times: QueryTimes,
     pub(super) unknown_phrases: Vec<String>,
@@ -83,7 +83,7 @@ pub(super) fn measure(
     map: &SemanticMap,
     drawn: &[Drawn],
     query: &str,
-) -> Result<Asked, JobError> {
+) -> Result<MeasuredRows, JobError> {
     let language = map
         .language
         .as_ref()
@@ -120,7 +120,7 @@ pub(super) fn measure(
         }
     }
     let times = times(&table, (map, language), &views, &mut by)?;
-    Ok(Asked { rows, times, unknown_phrases: by.unknown.into_iter().collect() })
+    Ok(MeasuredRows { rows, times, unknown_phrases: by.unknown.into_iter().collect() })
 }
 
 fn components_name(c: Components) -> &'static str {
