@@ -64,9 +64,10 @@ impl FindDialog {
             };
             let photos = state.scene.as_ref().and_then(|s| s.dataset.as_ref()).map_or(0, |d| d.photos.len());
             let means = self.means(known);
-            ScrollArea::vertical()
-                .max_height((room.y - 230.0).max(120.0))
-                .show(ui, |ui| self.choices(ui, known, &means));
+            ScrollArea::vertical().max_height((room.y - 230.0).max(120.0)).show(ui, |ui| {
+                self.choices(ui, known, &means);
+                Self::engine(ui, known, actions);
+            });
             ui.add_space(6.0);
             summary(ui, known, &means, photos.min(max_seeds));
             self.buttons(ui, Some(means), actions)
