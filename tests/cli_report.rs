@@ -1,8 +1,12 @@
 //! The real binary measures error against run time: every stage, stopped and resumed, refused
-//! where it must be.
+//! where it must be; and makes the paper's tables ([`reproduce`]).
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod cli_support;
+#[path = "cli_report/layouts.rs"]
+mod layouts;
+#[path = "cli_report/reproduce.rs"]
+mod reproduce;
 
 use cli_support::{Done, command, folder, tiny_dataset};
 use serde_json::Value;

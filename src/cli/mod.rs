@@ -27,6 +27,7 @@ mod query;
 mod recipe;
 mod render;
 mod report;
+mod reproduce;
 mod segment;
 mod synth;
 mod train;
@@ -109,6 +110,7 @@ enum Command {
     Export(export::ExportArgs),
     Bench(bench::BenchArgs),
     Report(report::ReportArgs),
+    Reproduce(reproduce::ReproduceArgs),
     CheckStability(check_stability::CheckStabilityArgs),
 }
 
@@ -179,6 +181,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Export(args) => export::run(args),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Report(args) => report::run(args, quiet),
+        Command::Reproduce(args) => reproduce::run(args, quiet),
         Command::CheckStability(args) => check_stability::run(args),
     }
 }

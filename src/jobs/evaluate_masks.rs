@@ -230,10 +230,10 @@ fn compare_recipes(map: &SemanticMap, recipe: &Recipe, views: &[LabeledView<'_>]
 }
 
 /// A labeled photo and what is drawn of its view.
-struct Drawn {
+pub(crate) struct Drawn {
     index: usize,
     name: String,
-    camera: Camera,
+    pub(crate) camera: Camera,
     trained_on: bool,
     exact: ViewMap,
     blended: CodeMap,
@@ -241,7 +241,7 @@ struct Drawn {
 }
 
 impl Drawn {
-    fn labeled(&self) -> LabeledView<'_> {
+    pub(crate) fn labeled(&self) -> LabeledView<'_> {
         LabeledView {
             name: &self.name,
             camera: &self.camera,
@@ -255,15 +255,27 @@ impl Drawn {
 /// The held-out photos with labels; else those that were trained on, as long as no mask of theirs was
 /// used.
 fn labeled(comparison: &PhotoComparison, map: &SemanticMap, labels: &mut FileMasks) -> Result<Vec<Drawn>, JobError> {
-    let PhotoComparison { cloud, settings, max_side_px, .. } = comparison;
     let photos = &comparison.dataset.photos;
     let held: Vec<usize> = comparison.views.iter().copied().filter(|&i| labels.covers(&photos[i])).collect();
     let trained_on = held.is_empty();
     let free = |&i: &usize| labels.covers(&photos[i]) && !map.seeds.contains(&photos[i].name);
     let views: Vec<usize> = if trained_on { (0..photos.len()).filter(free).collect() } else { held };
+    draw(comparison, map, labels, &views, trained_on)
+}
+
+/// What is to be compared in these `views` of the photos.
+pub(crate) fn draw(
+    comparison: &PhotoComparison,
+    map: &SemanticMap,
+    labels: &mut FileMasks,
+    views: &[usize],
+    trained_on: bool,
+) -> Result<Vec<Drawn>, JobError> {
+    let PhotoComparison { cloud, settings, max_side_px, .. } = comparison;
+    let photos = &comparison.dataset.photos;
     let mut renderer = Renderer::new();
     let mut drawn = Vec::with_capacity(views.len());
-    for index in views {
+    for &index in views {
         let photo = &photos[index];
         let camera = photo.camera.limited_to(*max_side_px);
         let exact = ViewMap::render(&mut renderer, cloud, &map.identity_of, &map.identities, &camera, settings)?;

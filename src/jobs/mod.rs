@@ -26,6 +26,7 @@ pub(crate) mod query;
 pub(crate) mod recent;
 pub(crate) mod render;
 pub(crate) mod report;
+pub(crate) mod reproduce;
 pub(crate) mod scale;
 pub(crate) mod segment;
 pub(crate) mod sparse_cloud;

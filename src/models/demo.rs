@@ -1,43 +1,81 @@
 //! The encoder that comes with the program: two small networks that this project trained on its own
 //! renders (`tools/encoder`), so that queries work with nothing to download.
 
+use std::borrow::Cow;
+use std::path::Path;
+
 use super::engine::engine;
 use super::network::{Network, Tensor};
 use super::vocabulary::Vocabulary;
 use super::{Encoder, IdentityCrop, ModelError};
+use crate::io::{IoError, files};
 
 const IMAGE: (&str, &[u8]) = ("demo_image.onnx", include_bytes!("../../assets/models/demo_image.onnx"));
 const TEXT: (&str, &[u8]) = ("demo_text.onnx", include_bytes!("../../assets/models/demo_text.onnx"));
-const WORDS: (&str, &str) = ("demo_vocab.json", include_str!("../../assets/models/demo_vocab.json"));
+/// The word list, by which another encoder of this make is named too.
+pub(super) const WORDS: (&str, &str) = ("demo_vocab.json", include_str!("../../assets/models/demo_vocab.json"));
 
-/// The `demo` encoder. Its networks are prepared when they are first needed.
+/// Largest network of this make that is read, bytes.
+const MAX_BYTES: u64 = 64 << 20;
+
+/// The `demo` encoder, or another one that `tools/encoder` made. Its networks are prepared when they are first
+/// needed.
 pub(crate) struct DemoEncoder {
+    name: String,
     words: Vocabulary,
-    image: Option<Network>,
-    text: Option<Network>,
+    image: Half,
+    text: Half,
+}
+
+/// A network, and what it is made of.
+struct Half {
+    name: &'static str,
+    bytes: Cow<'static, [u8]>,
+    network: Option<Network>,
 }
 
 impl DemoEncoder {
+    /// The one that comes with the program.
     pub(crate) fn new() -> Result<Self, ModelError> {
-        Ok(Self { words: Vocabulary::parse(WORDS.1, WORDS.0)?, image: None, text: None })
+        let half = |(name, bytes)| Half { name, bytes: Cow::Borrowed(bytes), network: None };
+        let words = Vocabulary::parse(WORDS.1, WORDS.0)?;
+        Ok(Self { name: super::DEMO.into(), words, image: half(IMAGE), text: half(TEXT) })
+    }
+
+    /// The one whose word list is in the file `path`, its networks beside it.
+    pub(super) fn open(path: &Path) -> Result<Self, ModelError> {
+        let damaged = |path: &Path, e: IoError| ModelError::Vocabulary {
+            file: path.display().to_string(),
+            problem: e.to_string(),
+        };
+        let half = |name: &'static str| {
+            let file = path.with_file_name(name);
+            let bytes = files::read(&file, MAX_BYTES).map_err(|e| damaged(&file, e))?;
+            Ok::<_, ModelError>(Half { name, bytes: bytes.into(), network: None })
+        };
+        let name = path.display().to_string();
+        let words = Vocabulary::parse(&files::read_text(path).map_err(|e| damaged(path, e))?, &name)?;
+        Ok(Self { words, image: half(IMAGE.0)?, text: half(TEXT.0)?, name })
     }
 }
 
-/// The network in the slot, prepared if it is not yet.
-fn ready<'a>(slot: &'a mut Option<Network>, (name, bytes): (&str, &[u8])) -> Result<&'a mut Network, ModelError> {
-    if slot.is_none() {
-        *slot = Some(engine()?.load(bytes, name)?);
+impl Half {
+    /// The network, prepared if it is not yet.
+    fn ready(&mut self) -> Result<&mut Network, ModelError> {
+        if self.network.is_none() {
+            self.network = Some(engine()?.load(&self.bytes, self.name)?);
+        }
+        self.network.as_mut().ok_or_else(|| ModelError::Load {
+            model: self.name.into(),
+            engine: "built-in",
+            problem: "it is gone".into(),
+        })
     }
-    slot.as_mut().ok_or_else(|| ModelError::Load {
-        model: name.into(),
-        engine: "built-in",
-        problem: "it is gone".into(),
-    })
 }
 
 impl Encoder for DemoEncoder {
     fn name(&self) -> &str {
-        super::DEMO
+        &self.name
     }
 
     fn dimension(&self) -> usize {
@@ -55,11 +93,7 @@ impl Encoder for DemoEncoder {
     fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
         let tokens = self.words.encode(phrase)?;
         let tokens = Tensor::new(&[1, tokens.len()], tokens);
-        only(ready(&mut self.text, TEXT)?.unit_rows(
-            vec![("tokens", tokens.into())],
-            "embedding",
-            self.words.dimension,
-        )?)
+        only(self.text.ready()?.unit_rows(vec![("tokens", tokens.into())], "embedding", self.words.dimension)?)
     }
 
     fn unknown_words(&self, phrase: &str) -> Vec<String> {
@@ -79,11 +113,7 @@ impl DemoEncoder {
         let channel = |c: usize| tile.rgb.iter().map(move |p| p[c].clamp(0.0, 1.0));
         let planes: Vec<f32> = (0..3).flat_map(channel).collect();
         let pixels = Tensor::new(&[1, 3, side, side], planes);
-        only(ready(&mut self.image, IMAGE)?.unit_rows(
-            vec![("tile", pixels.into())],
-            "embedding",
-            self.words.dimension,
-        )?)
+        only(self.image.ready()?.unit_rows(vec![("tile", pixels.into())], "embedding", self.words.dimension)?)
     }
 }
 

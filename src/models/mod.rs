@@ -31,6 +31,8 @@ mod unpack;
 mod vocabulary;
 mod words;
 
+use std::path::Path;
+
 pub(crate) use catalog::ModelRole;
 pub use clip::ClipEncoder;
 pub(crate) use demo::DemoEncoder;
@@ -90,10 +92,12 @@ pub(crate) fn best_encoder(told: &mut dyn FnMut(String)) -> Result<Box<dyn Encod
     encoder(best.as_deref().unwrap_or(DEMO))
 }
 
-/// The encoder of this name: 'demo', a model of the catalog, or the path of a model's description.
+/// The encoder of this name: 'demo', a model of the catalog, or the path of a model's description; that of one made
+/// like 'demo' is its word list.
 pub fn encoder(name: &str) -> Result<Box<dyn Encoder>, ModelError> {
     match name {
         DEMO => Ok(Box::new(DemoEncoder::new()?)),
+        name if Path::new(name).ends_with(demo::WORDS.0) => Ok(Box::new(DemoEncoder::open(Path::new(name))?)),
         name => Ok(Box::new(ClipEncoder::open(&catalog::find(name, ModelRole::Encoder)?)?.called(name))),
     }
 }

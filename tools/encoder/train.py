@@ -5,6 +5,10 @@
 Each step takes some views; phrases of what they show, phrases with something changed, and phrases of
 other scenes are held against the features of things, of parts, and of parts deviated towards their
 things. What matches is worked out from the words, so "mug" matches every mug in the batch.
+
+An encoder that was trained on deviated features gains by deviation because it was made for it. The
+control (--without-deviation) sees features of things and parts as they are, as CLIP does; phrases such
+as "handle of the red mug" then stand against the handle's own feature.
 """
 
 import argparse
@@ -90,7 +94,7 @@ def rank_loss(scores, hit, skip, scale):
     return (loss * weight).sum() / rows.sum().clamp(min=1)
 
 
-def step_loss(image, text, scale, batch, rng):
+def step_loss(image, text, scale, batch, rng, deviation=True):
     tiles, ids, parent, phrases, tokens = batch
     x = torch.from_numpy(tiles).permute(0, 3, 1, 2).float() / 255
     f = image.small(augment(F.avg_pool2d(x, 2), rng))
@@ -98,13 +102,13 @@ def step_loss(image, text, scale, batch, rng):
     canonical = np.array([texts.tokens(c) for c in texts.CANONICAL])
     t = text(torch.from_numpy(np.concatenate([tokens, canonical])[:, :longest]))
     q, c = t[:-len(canonical)], t[-len(canonical):]
-    parts = np.flatnonzero(parent >= 0)
-    dev = model.deviated(f[parent[parts]], f[parts])
-    every = torch.cat([f, dev])
+    parts = np.flatnonzero((parent >= 0) & deviation)
+    every = torch.cat([f, model.deviated(f[parent[parts]], f[parts])]) if deviation else f
     m = data.matches(phrases, ids)
     hit = torch.from_numpy(np.concatenate([m, m[:, parts]], 1))
     compound = np.array([p.whole is not None for p in phrases])
-    raw_part = np.concatenate([parent >= 0, np.zeros(len(parts), bool)])
+    # Raw parts are no matter of such phrases where there are deviated ones.
+    raw_part = np.concatenate([(parent >= 0) & deviation, np.zeros(len(parts), bool)])
     skip = torch.from_numpy(compound[:, None] & raw_part[None])
     hit &= ~skip
     s = q @ every.T
@@ -125,11 +129,14 @@ def main():
     ap.add_argument("--tiles", nargs="+", required=True)
     ap.add_argument("--held", nargs="+", required=True)
     ap.add_argument("--minutes", type=float, default=20)
+    ap.add_argument("--steps", type=int, help="instead of minutes, so that two trainings can be compared")
+    ap.add_argument("--without-deviation", action="store_true", help="train the control")
     ap.add_argument("--views", type=int, default=7)
     ap.add_argument("--rate", type=float, default=2e-3)
     ap.add_argument("--least-px", type=int, default=40)
     ap.add_argument("--weight", type=float, default=.35, help="of being above or below the canonical phrases")
     ap.add_argument("--start")
+    ap.add_argument("--look-every", type=float, default=200, help="seconds between looks at a few held-out scenes")
     ap.add_argument("--threads", type=int, default=2)
     ap.add_argument("--seed", type=int, default=0)
     a = ap.parse_args()
@@ -145,12 +152,13 @@ def main():
     groups = [{"params": [*image.parameters(), *text.parameters()], "weight_decay": .02}, {"params": [scale], "weight_decay": 0}]
     optimiser = torch.optim.AdamW(groups, lr=a.rate)
     began, step, last = time.time(), 0, time.time()
-    while (share := (time.time() - began) / (60 * a.minutes)) < 1:
+    while (share := step / a.steps if a.steps else (time.time() - began) / (60 * a.minutes)) < 1:
         rate = a.rate * min(1, (step + 1) / 60) * max(.01, .5 + .5 * math.cos(math.pi * share))
         for g in optimiser.param_groups:
             g["lr"] = rate
         image.train(), text.train()
-        losses = step_loss(image, text, scale.exp().clamp(max=40), batches.draw(a.views), batches.rng)
+        losses = step_loss(image, text, scale.exp().clamp(max=40), batches.draw(a.views), batches.rng,
+                           not a.without_deviation)
         loss = losses[0] + a.weight * (1.5 * losses[1] + losses[2])
         optimiser.zero_grad()
         loss.backward()
@@ -160,7 +168,7 @@ def main():
         if step % 25 == 0:
             print(f"{step} {time.time() - began:.0f}s rank {losses[0]:.3f} found {losses[1]:.3f} absent {losses[2]:.3f} scale {scale.exp():.1f}",
                   flush=True)
-        if time.time() - last > 200:
+        if time.time() - last > a.look_every:
             last = time.time()
             torch.save({"image": image.state_dict(), "text": text.state_dict()}, a.out)
             print(evaluate.summary(evaluate.measure(image, text, held, most=8)), flush=True)

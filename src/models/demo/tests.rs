@@ -86,6 +86,30 @@ fn vectors_are_those_of_training() {
 }
 
 #[test]
+fn another_of_its_make_is_named_by_its_word_list() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let list = at(WORDS.0);
+    let path = list.to_str().unwrap();
+    std::fs::write(&list, WORDS.1).unwrap();
+    std::fs::write(at(IMAGE.0), IMAGE.1).unwrap();
+    let missing = crate::models::encoder(path).err().unwrap().to_string();
+    assert!(missing.contains(TEXT.0), "{missing}");
+    // Two words exchanged: it is this list that counts.
+    let swapped = WORDS.1.replace("\"mug\"", "\"_\"").replace("\"lamp\"", "\"mug\"").replace("\"_\"", "\"lamp\"");
+    assert_ne!(swapped, WORDS.1);
+    std::fs::write(&list, swapped).unwrap();
+    std::fs::write(at(TEXT.0), TEXT.1).unwrap();
+    let mut other = crate::models::encoder(path).unwrap();
+    assert_eq!(other.name(), path);
+    let mut own = DemoEncoder::new().unwrap();
+    assert_eq!(other.text("red lamp").unwrap(), own.text("red mug").unwrap());
+    assert_ne!(other.text("red mug").unwrap(), own.text("red mug").unwrap());
+    std::fs::write(&list, "{").unwrap();
+    assert!(matches!(crate::models::encoder(path).err().unwrap(), ModelError::Vocabulary { .. }));
+}
+
+#[test]
 fn tiles_are_cut_as_in_training() {
     let golden = golden();
     let (pixels, rest) = golden.cut_rgb.as_chunks::<3>();

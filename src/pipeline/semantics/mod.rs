@@ -12,6 +12,7 @@ pub mod answer;
 mod associate;
 pub(crate) mod build_map;
 pub mod by_embedding;
+pub(crate) mod by_similarity;
 pub(crate) mod carry;
 pub mod code_map;
 pub mod codes;

@@ -10,6 +10,8 @@ use super::votes::UNKNOWN;
 
 /// Identities that compete for one pixel at most; the least is dropped.
 const SLOTS: usize = 8;
+/// What a pixel's light belongs to: identities with their accumulated weights. Free slots weigh nothing.
+pub(crate) type PixelWeights = [(IdentityId, f32); SLOTS];
 
 /// Identities of a view's pixels, row-major.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -42,17 +44,10 @@ impl ViewMap {
         camera: &Camera,
         settings: &RenderSettings,
     ) -> Result<Self, RenderError> {
-        assert_eq!(of.len(), cloud.len(), "one identity per Gaussian");
-        let (width, height) = (camera.width_px as usize, camera.height_px as usize);
-        let strips = height.div_ceil(TILE_PX);
-        let strip = |y: usize| TILE_PX.min(height - y * TILE_PX) * width;
-        let mut rows: Vec<Row<'_>> = (0..strips)
-            .map(|ty| Row { of, width, top: ty * TILE_PX, slots: vec![[(NOBODY, 0.0); SLOTS]; strip(ty)] })
-            .collect();
-        renderer.contributions(cloud, camera, settings, &mut rows)?;
+        let (width_px, height_px) = (camera.width_px as usize, camera.height_px as usize);
         let objects: Vec<IdentityId> = (0..=identities.len() as IdentityId).map(|i| identities.object_of(i)).collect();
-        let mut map = Self { width_px: width, height_px: height, ..Self::default() };
-        for slots in rows.iter().flat_map(|r| &r.slots) {
+        let mut map = Self { width_px, height_px, ..Self::default() };
+        for slots in &weights(renderer, cloud, of, camera, settings)? {
             let (identity, share, alpha) = winner(slots, &objects);
             map.identity.push(identity);
             map.share.push(share);
@@ -70,9 +65,27 @@ impl ViewMap {
     }
 }
 
+/// The weights of a view's pixels, row-major, by the identities `of` the Gaussians of `cloud`.
+pub(crate) fn weights(
+    renderer: &mut Renderer,
+    cloud: &GaussianCloud,
+    of: &[IdentityId],
+    camera: &Camera,
+    settings: &RenderSettings,
+) -> Result<Vec<PixelWeights>, RenderError> {
+    assert_eq!(of.len(), cloud.len(), "one identity per Gaussian");
+    let (width, height) = (camera.width_px as usize, camera.height_px as usize);
+    let strip = |y: usize| TILE_PX.min(height - y * TILE_PX) * width;
+    let mut rows: Vec<Row<'_>> = (0..height.div_ceil(TILE_PX))
+        .map(|ty| Row { of, width, top: ty * TILE_PX, slots: vec![[(NOBODY, 0.0); SLOTS]; strip(ty)] })
+        .collect();
+    renderer.contributions(cloud, camera, settings, &mut rows)?;
+    Ok(rows.into_iter().flat_map(|r| r.slots).collect())
+}
+
 /// Winner of a pixel, the share of its object, and the pixel's alpha. An unknown Gaussian counts as
 /// an object of its own; where less than half of the light is blocked, nobody is there.
-fn winner(slots: &[(IdentityId, f32); SLOTS], objects: &[IdentityId]) -> (IdentityId, f32, f32) {
+fn winner(slots: &PixelWeights, objects: &[IdentityId]) -> (IdentityId, f32, f32) {
     let alpha: f32 = slots.iter().map(|s| s.1).sum();
     if alpha < 0.5 {
         return (NOBODY, 0.0, alpha);
@@ -99,7 +112,7 @@ struct Row<'a> {
     width: usize,
     /// First row of pixels.
     top: usize,
-    slots: Vec<[(IdentityId, f32); SLOTS]>,
+    slots: Vec<PixelWeights>,
 }
 
 impl ContributionSink<f32> for Row<'_> {

@@ -7,9 +7,11 @@
 mod by_hand;
 pub(crate) mod fastlgs_ex;
 pub(crate) mod langsplat;
+pub(crate) mod lerf_rule;
 pub(crate) mod masks;
 pub(crate) mod multi_class;
 pub(crate) mod part_recall;
+pub(crate) mod raw_features;
 pub(crate) mod recipes;
 pub(crate) mod selection_3d;
 pub(crate) mod spin_nerf;
@@ -65,11 +67,16 @@ pub(crate) struct Unit {
     pub(crate) hit: Option<bool>,
 }
 
-/// The labels of a view by name: regions of one name together. A piece is called "X of the Y".
+/// What labels without any name are of.
+const FOREGROUND: &str = "foreground";
+
+/// The labels of a view by name: regions of one name together. A piece is called "X of the Y". Where none has a
+/// name (SPIn-NeRF), all are the foreground.
 pub(crate) fn categories(labels: &[FoundMask]) -> Vec<Category> {
     let mut all: BTreeMap<String, Category> = BTreeMap::new();
+    let (unnamed, is_named) = (FOREGROUND.to_owned(), labels.iter().any(|l| l.name.is_some()));
     for label in labels {
-        let Some(name) = &label.name else { continue };
+        let Some(name) = label.name.as_ref().or((!is_named).then_some(&unnamed)) else { continue };
         let whole = label.parent.and_then(|p| labels[p].name.as_ref());
         let (level, name) = match whole {
             Some(whole) => (Level::Part, format!("{name} of the {whole}")),
@@ -108,6 +115,12 @@ mod tests {
         let all = categories(&[label("doll", None, 0, 9), label("eye", Some(0), 2, 3), label("eye", Some(0), 5, 7)]);
         let list: Vec<_> = all.iter().map(|c| (c.name.as_str(), c.mask.area(), c.boxes.len())).collect();
         assert_eq!(list, [("doll", 9, 1), ("eye of the doll", 3, 2)]);
+        let mut unnamed = [label("", None, 0, 4), label("", None, 6, 9)];
+        unnamed.iter_mut().for_each(|l| l.name = None);
+        let foreground = categories(&unnamed);
+        assert_eq!((foreground.len(), foreground[0].name.as_str(), foreground[0].mask.area()), (1, "foreground", 7));
+        unnamed[0].name = Some("cup".into());
+        assert_eq!(categories(&unnamed).len(), 1, "beside names, what has none is not asked for");
         let unit =
             |view: &str, iou| Unit { view: view.into(), query: String::new(), level: Level::Object, iou, hit: None };
         let (micro, by_view) = means(&[unit("a", 1.0), unit("a", 0.0), unit("b", 1.0)]);

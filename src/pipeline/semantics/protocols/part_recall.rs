@@ -102,7 +102,7 @@ pub(crate) fn row<E>(
 }
 
 /// The features of a scene of which only objects were extracted.
-fn objects_alone(language: &LanguageFeatures, identities: &Identities) -> LanguageFeatures {
+pub(crate) fn objects_alone(language: &LanguageFeatures, identities: &Identities) -> LanguageFeatures {
     let mut objects = language.clone();
     for ((_, identity), features) in identities.iter().zip(&mut objects.by_identity) {
         if identity.level == Level::Part {

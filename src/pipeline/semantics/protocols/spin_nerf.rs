@@ -16,13 +16,18 @@ pub(crate) struct Foreground {
 
 /// Compares the one category of a view with the answer to `query`; `None` if the view has no labels.
 pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>, query: &str) -> Option<Foreground> {
-    let first = view.categories.first()?;
-    let mut truth = Mask::empty(first.mask.width_px(), first.mask.height_px());
-    view.categories.iter().for_each(|c| truth.add(&c.mask));
     let answered = (scene.ask)(query);
     let mask = answered.map(|a| a.mask(view.exact, Some(view.blended), &scene.map.identities, 1));
     let mask = mask.unwrap_or_else(|| Mask::empty(view.exact.width_px, view.exact.height_px));
-    let (iou, accuracy) = score(&mask, &truth);
+    of_mask(&mask, view, query)
+}
+
+/// Compares a `mask` that something else found for the query.
+pub(crate) fn of_mask(mask: &Mask, view: &LabeledView<'_>, query: &str) -> Option<Foreground> {
+    let first = view.categories.first()?;
+    let mut truth = Mask::empty(first.mask.width_px(), first.mask.height_px());
+    view.categories.iter().for_each(|c| truth.add(&c.mask));
+    let (iou, accuracy) = score(mask, &truth);
     let unit = Unit { query: query.into(), ..first.unit(view.name, iou, None) };
     Some(Foreground { unit, accuracy })
 }

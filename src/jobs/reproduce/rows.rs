@@ -1,0 +1,352 @@
+//! The rows of a table that are measured: this program's way, the paper's, and baselines that our own pieces can
+//! stand for. All ask by embedding alone, whatever labels call things, except for the one that says otherwise.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::time::Instant;
+
+use serde::{Deserialize, Serialize};
+
+use super::printed::{ACCURACY, LOCALIZATION, MIOU, RECALL};
+use super::{PaperTable, ReproduceSettings};
+use crate::jobs::JobError;
+use crate::jobs::evaluate::PhotoComparison;
+use crate::jobs::evaluate_masks::Drawn;
+use crate::math::stats::quantile;
+use crate::models::{Encoder, ModelError};
+use crate::pipeline::semantics::answer::{QueryAnswer, by_name};
+use crate::pipeline::semantics::by_embedding::TextEmbeddings;
+use crate::pipeline::semantics::by_similarity::{ALIKE, rejoined};
+use crate::pipeline::semantics::code_map::CodeMap;
+use crate::pipeline::semantics::parse::ParsedQuery;
+use crate::pipeline::semantics::protocols::part_recall::{self, Components, objects_alone};
+use crate::pipeline::semantics::protocols::raw_features::RawFeatures;
+use crate::pipeline::semantics::protocols::{
+    AskedScene, LabeledView, Unit, fastlgs_ex, langsplat, lerf_rule, multi_class, spin_nerf,
+};
+use crate::pipeline::semantics::query_engine::ask_by_embedding;
+use crate::pipeline::semantics::recipe::{PartFeatures, Recipe, RelevancyScale, Strategy, Understanding};
+use crate::pipeline::semantics::timing::ms_since;
+use crate::pipeline::semantics::view_map::{ViewMap, weights};
+use crate::render::Renderer;
+use crate::scene::{LanguageFeatures, LevelFilter, SemanticMap};
+
+pub(super) const POOLED: &str = "running pooled IoU of FastLGS's evaluator, %";
+pub(super) const ARGMAX: &str = "mean IoU by arg-max over all classes, %";
+pub(super) const PART_IOU: &str = "mean IoU of parts, %";
+
+/// A row: by metric, the percentage of every query.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct RowResult {
+    pub(super) name: String,
+    pub(super) scores: BTreeMap<String, Vec<f64>>,
+}
+
+/// Milliseconds of a query, from its text to its mask in a view that is drawn: median, and that of 95 %.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(super) struct QueryTimes {
+    pub(super) whole_ms: [f64; 2],
+    /// The same without encoding the text.
+    pub(super) without_text_ms: [f64; 2],
+}
+
+#[derive(Default)]
+pub(super) struct Asked {
+    pub(super) rows: Vec<RowResult>,
+    pub(super) times: QueryTimes,
+    pub(super) unknown_phrases: Vec<String>,
+}
+
+/// How this program asks, and how the paper does: their recipes, by embedding alone, for objects that were found in
+/// this program's way.
+fn ways() -> [(&'static str, Recipe); 4] {
+    let paper = Recipe::paper();
+    let raw = Recipe { parts: PartFeatures::Raw, ..paper.clone() };
+    [
+        ("this program", ours()),
+        ("the paper's two steps", paper),
+        ("the paper's two steps, parts not deviated", raw.clone()),
+        (SINGLE_LEVEL, Recipe { strategy: Strategy::OneStep, ..raw }),
+    ]
+}
+
+fn ours() -> Recipe {
+    Recipe { understanding: Understanding::Embedding, ..Recipe::default() }
+}
+
+const SINGLE_LEVEL: &str = "single level without deviation";
+const BY_NAME: &str = "by name: labels in, labels out";
+
+/// The rows that a table's results have, from the `views` with labels.
+pub(super) fn measure(
+    settings: &ReproduceSettings,
+    comparison: &PhotoComparison,
+    map: &SemanticMap,
+    drawn: &[Drawn],
+    query: &str,
+) -> Result<Asked, JobError> {
+    let language = map
+        .language
+        .as_ref()
+        .ok_or_else(|| JobError::Protocol("the scene has no embeddings, although an encoder was given".into()))?;
+    let views: Vec<LabeledView<'_>> = drawn.iter().map(Drawn::labeled).collect();
+    let encoder = crate::models::encoder(&language.encoder)?;
+    let mut by = ByEmbedding { encoder, phrases: TextEmbeddings::default(), unknown: BTreeSet::new() };
+    let table = Table { which: settings.table, query, classes: classes(&views) };
+    let mut rows = Vec::new();
+    if settings.table == PaperTable::PartAblation {
+        for components in Components::ROWS {
+            let row = part_recall::row((components, &ours()), map, language, &views, |p| by.encoder.text(p))?;
+            let percent = |value: &dyn Fn(f64) -> f64| row.units.iter().map(|u| 100.0 * value(u.iou)).collect();
+            let recall = percent(&|iou| if iou >= part_recall::HIT_IOU { 1.0 } else { 0.0 });
+            let scores = BTreeMap::from([(RECALL.into(), recall), (PART_IOU.into(), percent(&|iou| iou))]);
+            rows.push(RowResult { name: components_name(components).into(), scores });
+        }
+    } else {
+        let objects = objects_alone(language, &map.identities);
+        for (name, recipe) in ways() {
+            let features = if name == SINGLE_LEVEL { &objects } else { language };
+            rows.push(table.row(name, map, &views, &mut |text| by.ask(map, (features, &recipe), text))?);
+        }
+        if let Some(joined) = rejoined(map, &comparison.cloud) {
+            rows.push(similarity_row(&table, comparison, &joined, &views, &mut by)?);
+        }
+        rows.extend(rule_rows(&table, comparison, (map, language), &views, &mut by)?);
+        if map.identities.iter().any(|(_, i)| !i.names.is_empty()) {
+            let mut ask = |text: &str| {
+                let phrase = ParsedQuery::parse(text);
+                Ok(phrase.map(|p| by_name(&map.identities, &p, LevelFilter::Auto, &Recipe::default())))
+            };
+            rows.push(table.row(BY_NAME, map, &views, &mut ask)?);
+        }
+    }
+    let times = times(&table, (map, language), &views, &mut by)?;
+    Ok(Asked { rows, times, unknown_phrases: by.unknown.into_iter().collect() })
+}
+
+fn components_name(c: Components) -> &'static str {
+    match c {
+        Components { joint: true, .. } => "ME + SD + part and whole at once (this program)",
+        Components { localization: true, .. } => "ME + SD + ML",
+        Components { deviation: true, .. } => "ME + SD",
+        Components { extraction: true, .. } => "ME",
+        _ => "none",
+    }
+}
+
+fn classes(views: &[LabeledView<'_>]) -> Vec<String> {
+    let all: BTreeSet<&String> = views.iter().flat_map(|v| v.categories.iter().map(|c| &c.name)).collect();
+    all.into_iter().cloned().collect()
+}
+
+/// Asks by embedding; phrases are encoded once.
+struct ByEmbedding {
+    encoder: Box<dyn Encoder>,
+    phrases: TextEmbeddings,
+    unknown: BTreeSet<String>,
+}
+
+impl ByEmbedding {
+    /// The answer; `None` where the encoder knows no word, which is noted.
+    fn ask(
+        &mut self,
+        map: &SemanticMap,
+        how: (&LanguageFeatures, &Recipe),
+        text: &str,
+    ) -> Result<Option<QueryAnswer>, ModelError> {
+        let encode = |p: &str| self.encoder.text(p);
+        match ask_by_embedding(&map.identities, how, text, &mut self.phrases, encode) {
+            Err(ModelError::NoKnownWord { .. }) => {
+                self.unknown.insert(text.to_owned());
+                Ok(None)
+            }
+            other => other,
+        }
+    }
+}
+
+/// Answers a phrase; `None` if nothing can be said.
+type Ask<'a> = &'a mut dyn FnMut(&str) -> Result<Option<QueryAnswer>, ModelError>;
+/// Relevancy of a view's pixels for a phrase, by the view's place.
+type Heat<'a> = &'a mut dyn FnMut(usize, &str) -> Result<Option<Vec<f32>>, ModelError>;
+
+struct Table<'a> {
+    which: PaperTable,
+    /// What is asked for where labels have no names.
+    query: &'a str,
+    classes: Vec<String>,
+}
+
+fn percent(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    values.into_iter().map(|v| 100.0 * v).collect()
+}
+
+impl Table<'_> {
+    /// What is asked for in a view.
+    fn phrases<'b>(&'b self, view: &'b LabeledView<'_>) -> Vec<&'b str> {
+        match self.which {
+            PaperTable::SpinNerf => vec![self.query],
+            _ => view.categories.iter().map(|c| c.name.as_str()).collect(),
+        }
+    }
+
+    fn row(
+        &self,
+        name: &str,
+        map: &SemanticMap,
+        views: &[LabeledView<'_>],
+        ask: Ask<'_>,
+    ) -> Result<RowResult, JobError> {
+        let mut failed = None;
+        let mut quiet = |text: &str| {
+            ask(text).unwrap_or_else(|e| {
+                failed.get_or_insert(e);
+                None
+            })
+        };
+        let scene = &mut AskedScene { map, ask: &mut quiet };
+        let scores = match self.which {
+            PaperTable::SpinNerf => {
+                let found: Vec<_> = views.iter().filter_map(|v| spin_nerf::compare(scene, v, self.query)).collect();
+                spin_scores(&found)
+            }
+            PaperTable::Ovs3d => {
+                let (own, winner): (Vec<_>, Vec<_>) =
+                    views.iter().map(|v| multi_class::compare(scene, v, &self.classes)).map(|[a, b]| (a, b)).unzip();
+                let ious = |units: Vec<Vec<Unit>>| percent(units.into_iter().flatten().map(|u| u.iou));
+                BTreeMap::from([(MIOU.to_owned(), ious(own)), (ARGMAX.to_owned(), ious(winner))])
+            }
+            PaperTable::LerfOvs | PaperTable::PartAblation => {
+                let units: Vec<_> = views.iter().flat_map(|v| langsplat::compare(scene, v)).collect();
+                let mut pool = fastlgs_ex::Pool::default();
+                let pooled = views.iter().flat_map(|v| fastlgs_ex::compare(scene, v, &mut pool)).map(|u| u.iou);
+                BTreeMap::from([
+                    (LOCALIZATION.to_owned(), percent(units.iter().map(|u| f64::from(u.hit == Some(true))))),
+                    (MIOU.to_owned(), percent(units.iter().map(|u| u.iou))),
+                    (POOLED.to_owned(), percent(pooled)),
+                ])
+            }
+        };
+        // An encoder that fails is no answer that misses.
+        failed.map_or(Ok(RowResult { name: name.into(), scores }), |e| Err(e.into()))
+    }
+
+    /// A row of masks that LERF's rule cuts out of relevancy.
+    fn ruled_row(&self, name: &str, views: &[LabeledView<'_>], heat: Heat<'_>) -> Result<RowResult, JobError> {
+        let (mut ious, mut hits, mut found) = (Vec::new(), Vec::new(), Vec::new());
+        for (k, view) in views.iter().enumerate() {
+            let width_px = view.exact.width_px;
+            for phrase in self.phrases(view) {
+                let relevancy = heat(k, phrase)?.unwrap_or_default();
+                let mask = match relevancy.is_empty() {
+                    true => crate::scene::Mask::empty(width_px, view.exact.height_px),
+                    false => lerf_rule::mask(&relevancy, width_px),
+                };
+                found.extend(spin_nerf::of_mask(&mask, view, phrase));
+                let Some(category) = view.categories.iter().find(|c| c.name == phrase) else { continue };
+                let at = lerf_rule::peak(&relevancy);
+                let hit = |at: usize| category.boxes.iter().any(|b| b.contains(at % width_px, at / width_px));
+                hits.push(f64::from(at.is_some_and(hit)));
+                ious.push(mask.iou(&category.mask));
+            }
+        }
+        let scores = match self.which {
+            PaperTable::SpinNerf => spin_scores(&found),
+            PaperTable::Ovs3d => BTreeMap::from([(MIOU.to_owned(), percent(ious))]),
+            _ => BTreeMap::from([(LOCALIZATION.to_owned(), percent(hits)), (MIOU.to_owned(), percent(ious))]),
+        };
+        Ok(RowResult { name: name.into(), scores })
+    }
+}
+
+fn spin_scores(found: &[spin_nerf::Foreground]) -> BTreeMap<String, Vec<f64>> {
+    let (ious, accuracies) = (found.iter().map(|f| f.unit.iou), found.iter().map(|f| f.accuracy));
+    BTreeMap::from([(MIOU.to_owned(), percent(ious)), (ACCURACY.to_owned(), percent(accuracies))])
+}
+
+/// Features that are matched by similarity instead of tracked identity.
+fn similarity_row(
+    table: &Table<'_>,
+    comparison: &PhotoComparison,
+    joined: &SemanticMap,
+    views: &[LabeledView<'_>],
+    by: &mut ByEmbedding,
+) -> Result<RowResult, JobError> {
+    let mut renderer = Renderer::new();
+    let PhotoComparison { cloud, settings, .. } = comparison;
+    let mut maps = Vec::with_capacity(views.len());
+    for view in views {
+        let exact =
+            ViewMap::render(&mut renderer, cloud, &joined.identity_of, &joined.identities, view.camera, settings)?;
+        let blended = CodeMap::render(&mut renderer, cloud, &joined.codes, joined.has_parts(), view.camera, settings)?;
+        maps.push((exact, blended));
+    }
+    let both = views.iter().zip(&maps);
+    let views: Vec<LabeledView<'_>> = both
+        .map(|(view, (exact, blended))| LabeledView {
+            name: view.name,
+            camera: view.camera,
+            exact,
+            blended,
+            categories: view.categories.clone(),
+        })
+        .collect();
+    let Some(features) = joined.language.as_ref() else {
+        return Err(JobError::Protocol("the scene has no embeddings".into()));
+    };
+    let name = format!("features mapped by similarity (cosine {ALIKE}) instead of identity");
+    let recipe = Recipe { strategy: Strategy::OneStep, parts: PartFeatures::Raw, ..Recipe::paper() };
+    table.row(&name, joined, &views, &mut |text| by.ask(joined, (features, &recipe), text))
+}
+
+/// Rows with LERF's rule for masks: on identities, and on raw features per Gaussian.
+fn rule_rows(
+    table: &Table<'_>,
+    comparison: &PhotoComparison,
+    (map, language): (&SemanticMap, &LanguageFeatures),
+    views: &[LabeledView<'_>],
+    by: &mut ByEmbedding,
+) -> Result<[RowResult; 2], JobError> {
+    // The rule scales relevancy itself.
+    let recipe = Recipe { scale: RelevancyScale::Raw, ..Recipe::paper() };
+    let ruled = table.ruled_row("the paper's two steps, LERF's mask rule", views, &mut |k, phrase| {
+        Ok(by.ask(map, (language, &recipe), phrase)?.map(|a| a.heat(views[k].exact)))
+    })?;
+    let PhotoComparison { cloud, settings, .. } = comparison;
+    let mut renderer = Renderer::new();
+    let of_view = |v: &LabeledView<'_>| weights(&mut renderer, cloud, &map.identity_of, v.camera, settings);
+    let pixels = views.iter().map(of_view).collect::<Result<Vec<_>, _>>()?;
+    let raw = RawFeatures::new(language);
+    let blended = table.ruled_row("raw features per Gaussian, LERF's mask rule", views, &mut |k, phrase| {
+        let Some(parsed) = ParsedQuery::parse(phrase) else { return Ok(None) };
+        // It learns the phrase, and notes what is unknown.
+        by.ask(map, (language, &recipe), phrase)?;
+        Ok(raw.relevancy(&pixels[k], &parsed.text, &by.phrases, &recipe))
+    })?;
+    Ok([ruled, blended])
+}
+
+/// Times of this program's queries, every phrase encoded anew.
+fn times(
+    table: &Table<'_>,
+    (map, language): (&SemanticMap, &LanguageFeatures),
+    views: &[LabeledView<'_>],
+    by: &mut ByEmbedding,
+) -> Result<QueryTimes, JobError> {
+    let (mut canonical, recipe) = (TextEmbeddings::default(), ours());
+    canonical.learn_canonical(&recipe, |p| by.encoder.text(p));
+    let (mut whole, mut without) = (Vec::new(), Vec::new());
+    for view in views {
+        for phrase in table.phrases(view) {
+            by.phrases = canonical.clone();
+            let start = Instant::now();
+            let answered = by.ask(map, (language, &recipe), phrase)?;
+            let Some(answered) = answered else { continue };
+            std::hint::black_box(answered.mask(view.exact, Some(view.blended), &map.identities, 1));
+            let ms = ms_since(start);
+            whole.push(ms);
+            without.push(ms - answered.stages.encode);
+        }
+    }
+    let of = |ms: &[f64]| if ms.is_empty() { [0.0; 2] } else { [0.5, 0.95].map(|q| quantile(ms, q)) };
+    Ok(QueryTimes { whole_ms: of(&whole), without_text_ms: of(&without) })
+}
