@@ -79,3 +79,41 @@ fn objects_and_parts_of_the_plush_doll() {
         assert!(objects >= 0.6 && parts >= 0.5, "{view}: objects {objects:.2}, parts {parts:.2}");
     }
 }
+
+fn run(arguments: &[&dyn AsRef<std::ffi::OsStr>]) -> Vec<u8> {
+    let out = std::process::Command::new(env!("CARGO_BIN_EXE_fmlgs"))
+        .args(arguments.iter().map(|a| a.as_ref()))
+        .output()
+        .expect("it runs");
+    assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+    out.stdout
+}
+
+/// Masks of seven photos that were drawn by hand, all of what they show, and the masks of one other photo.
+#[test]
+#[ignore = "trains on real photos for ten minutes"]
+fn the_masks_of_one_photo_of_the_plush_carry_to_seven_others() {
+    let (Some(photos), Some(seed)) = (data("plush"), data("plush_labels/seed")) else { return };
+    let folder = tempfile::tempdir().expect("folder");
+    let scene = folder.path().join("scene");
+    run(&[&"train", &photos, &"--out", &scene, &"--steps", &"2000", &"--max-side", &"504"]);
+    run(&[&"preprocess", &scene, &"--masks", &seed, &"--max-seeds", &"1", &"--encoder", &"none"]);
+    let drawn = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/plush_labels");
+    let mut of: [Vec<f64>; 2] = Default::default();
+    for file in std::fs::read_dir(drawn).expect("labels").map(|f| f.expect("a file").path()) {
+        if file.extension().is_none_or(|e| e != "json") {
+            continue;
+        }
+        // One folder each: of several photos only those that were held out would count.
+        let labels = tempfile::tempdir().expect("folder");
+        std::fs::copy(&file, labels.path().join(file.file_name().expect("a name"))).expect("copied");
+        let json = run(&[&"eval", &scene, &"--masks", &labels.path(), &"--json"]);
+        let json: serde_json::Value = serde_json::from_slice(&json).expect("JSON");
+        for unit in json["units"].as_array().expect("queries") {
+            of[usize::from(unit["level"] == "part")].push(unit["iou"].as_f64().expect("a number"));
+        }
+    }
+    let [objects, parts] = of.map(|ious| ious.iter().sum::<f64>() / ious.len() as f64);
+    println!("mean IoU: objects {objects:.3}, parts {parts:.3}");
+    assert!(objects >= 0.85 && parts >= 0.75, "{objects} {parts}");
+}

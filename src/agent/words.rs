@@ -1,6 +1,6 @@
 //! A request as words: tokens, numbers.
 
-pub(crate) use crate::pipeline::semantics::words::singular;
+pub(crate) use crate::pipeline::semantics::names::singular;
 
 /// Longest request that is looked at, in characters.
 pub(crate) const MAX_CHARS: usize = 600;

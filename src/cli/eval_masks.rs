@@ -9,7 +9,7 @@ use crate::jobs::evaluate::PhotoComparison;
 use crate::jobs::evaluate_masks::{self, Protocol, ProtocolSummary};
 use crate::pipeline::semantics::protocols::Unit;
 use crate::pipeline::semantics::protocols::part_recall::{HIT_IOU, Row};
-use crate::pipeline::semantics::protocols::recipes;
+use crate::pipeline::semantics::protocols::recipes::RecipeRow;
 use crate::pipeline::semantics::recipe::Recipe;
 
 /// Rows of the table at most; the worst come first.
@@ -92,7 +92,7 @@ fn summary(summary: &ProtocolSummary) -> String {
 }
 
 /// Recipes by what they find and what they rightly do not, as a table.
-fn recipes(rows: &[recipes::Row], [kinds, colors, parts]: [usize; 3]) -> Vec<Vec<String>> {
+fn recipes(rows: &[RecipeRow], [kinds, colors, parts]: [usize; 3]) -> Vec<Vec<String>> {
     let percent = |share: &f64| format!("{:.0}", 100.0 * share);
     let head = ["objects", "parts", "compounds"].map(|what| format!("{what} found %"));
     let right = [("kinds", kinds), ("colors", colors), ("parts", parts)];

@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::progress::Console;
 use super::{CliError, output};
-use crate::jobs::models::{self, Asked, ModelEntry, ModelList, ModelRole, ModelState, Source};
+use crate::jobs::models::{self, KnownCheck, ModelEntry, ModelList, ModelRole, ModelState, Source};
 
 /// List, fetch and check the neural networks
 ///
@@ -155,12 +155,12 @@ fn check(as_json: bool) -> Result<(), CliError> {
 /// Compares the files of a model with their checksums, and its answer with the published one.
 fn ask(id: &str, picture: Option<&Path>, as_json: bool) -> Result<(), CliError> {
     let answer = match models::ask_known(id, picture)? {
-        Asked::Answer(answer) => answer,
-        Asked::NothingKnown if as_json => return output::print_json(&json!({ "id": id, "known": null })),
-        Asked::NothingKnown => {
+        KnownCheck::Answer(answer) => answer,
+        KnownCheck::NothingKnown if as_json => return output::print_json(&json!({ "id": id, "known": null })),
+        KnownCheck::NothingKnown => {
             return output::print(&format!("{id}: its files are right; no answer of it is known to compare with"));
         }
-        Asked::NoPicture { address } => {
+        KnownCheck::NoPicture { address } => {
             return Err(CliError::failed(format!(
                 "{id}: its files are right, but the picture that the published answer is about is not here; \
                  give it with --picture ({address})"

@@ -34,9 +34,9 @@ pub(crate) struct RecipeArgs {
     relevancy: Option<RelevancyScale>,
     /// What pixels and Gaussians belong to an answer
     #[arg(long = "match", value_enum)]
-    masks: Option<MatchMode>,
+    matching: Option<MatchMode>,
     /// The same as '--match codes'
-    #[arg(long, conflicts_with = "masks")]
+    #[arg(long, conflicts_with = "matching")]
     blend: bool,
     /// Largest difference per channel of a match, in 255ths
     #[arg(long, value_parser = number::within(0.0..=255.0_f32))]
@@ -56,7 +56,7 @@ impl RecipeArgs {
             canonical: self.canonical.clone().unwrap_or(base.canonical),
             temperature: self.temperature.unwrap_or(base.temperature),
             scale: self.relevancy.unwrap_or(base.scale),
-            masks: if self.blend { MatchMode::Codes } else { self.masks.unwrap_or(base.masks) },
+            masks: if self.blend { MatchMode::Codes } else { self.matching.unwrap_or(base.masks) },
             tolerance: self.tolerance.map_or(base.tolerance, |t| t / 255.0),
             rejection: self.not_found.unwrap_or(base.rejection),
             preparation: base.preparation,

@@ -67,6 +67,9 @@ pub(crate) fn store(
     Ok(Some(scene.save_map(known, map, cloud)?))
 }
 
+/// Steps between Gaussians over which those behind the paint belong to it.
+const INHERITED_STEPS: f64 = 40.0;
+
 /// Gaussians that the painted pixels show more than the others do, and those behind them that hang
 /// together with them rather than with the others.
 fn painted(
@@ -82,7 +85,7 @@ fn painted(
     let mut votes = Votes::new(cloud.len());
     votes.add_view(&mut Renderer::new(), cloud, camera, settings, &labels)?;
     let mut assignments = votes.decide(&identities, 0.05);
-    extend(cloud, &mut assignments);
+    extend(cloud, &mut assignments, INHERITED_STEPS);
     Ok((0..cloud.len() as u32).filter(|&i| assignments[i as usize].identity == inside).collect())
 }
 

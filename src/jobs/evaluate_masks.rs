@@ -80,7 +80,7 @@ pub(crate) enum ProtocolSummary {
     Recipes {
         /// Questions for what is not there: other kinds, other colors, parts that a thing lacks.
         absent: [usize; 3],
-        rows: Vec<recipes::Row>,
+        rows: Vec<recipes::RecipeRow>,
     },
 }
 

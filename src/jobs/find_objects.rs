@@ -39,7 +39,6 @@ pub struct FindSettings {
     /// The encoder for open-vocabulary queries, or [`NO_ENCODER`].
     pub encoder: Option<String>,
     /// How Gaussians get their codes, how far parts are deviated, and what SAM 2 is prompted by.
-    #[serde(flatten)]
     pub preparation: Preparation,
     /// Steps of training codes.
     pub code_steps: u64,

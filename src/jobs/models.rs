@@ -103,7 +103,7 @@ pub fn check() -> Result<Vec<(String, Option<String>)>, JobError> {
 }
 
 /// What asking a model came to.
-pub(crate) enum Asked {
+pub(crate) enum KnownCheck {
     Answer(KnownResult),
     /// No answer of it was published.
     NothingKnown,
@@ -115,16 +115,16 @@ pub(crate) enum Asked {
 
 /// Compares the files of one model with their checksums, and what it answers with what was published, about `picture`
 /// instead of the one that was fetched with it.
-pub(crate) fn ask_known(id: &str, picture: Option<&Path>) -> Result<Asked, JobError> {
+pub(crate) fn ask_known(id: &str, picture: Option<&Path>) -> Result<KnownCheck, JobError> {
     let (entry, folder) = (catalog::entry(id)?, models::folder());
     entry.verify(&folder)?;
-    let Some(known) = &entry.known else { return Ok(Asked::NothingKnown) };
+    let Some(known) = &entry.known else { return Ok(KnownCheck::NothingKnown) };
     let path = picture.map_or_else(|| known.picture_in(&folder), Path::to_path_buf);
     if picture.is_none() && !path.is_file() {
-        return Ok(Asked::NoPicture { address: known.picture.clone() });
+        return Ok(KnownCheck::NoPicture { address: known.picture.clone() });
     }
     let pixels = crate::io::photo::open(&path)?;
-    Ok(Asked::Answer(known.ask(&entry.description_in(&folder), &pixels)?))
+    Ok(KnownCheck::Answer(known.ask(&entry.description_in(&folder), &pixels)?))
 }
 
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]

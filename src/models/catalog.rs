@@ -60,21 +60,21 @@ pub struct ModelEntry {
     /// The official file that it can be made of.
     #[serde(default)]
     pub checkpoint: Option<OfficialFile>,
+    /// The same by system, for what is a program: that of this one becomes `checkpoint`.
+    #[serde(default)]
+    pub(crate) archive: Vec<SystemArchive>,
+    /// How fast it is without a GPU.
+    #[serde(default)]
+    pub speed: String,
+    /// What it is known to answer with the official weights.
+    #[serde(default)]
+    pub(crate) known: Option<KnownAnswer>,
     /// Whether it is what to begin with, of those with its role.
     #[serde(default)]
     pub(crate) recommended: bool,
     /// How long a segmenter looks for everything in a photo.
     #[serde(default)]
     pub(crate) photo_seconds: Option<PhotoSeconds>,
-    /// The same by system, for what is a program: that of this one becomes `checkpoint`.
-    #[serde(default)]
-    archive: Vec<SystemArchive>,
-    /// How fast it is without a GPU.
-    #[serde(default)]
-    pub speed: String,
-    /// What it is known to answer with the official weights.
-    #[serde(default)]
-    pub known: Option<KnownAnswer>,
 }
 
 /// Seconds on two cores, measured.
@@ -90,7 +90,7 @@ pub(crate) struct PhotoSeconds {
 
 /// An archive with a program for one kind of machine.
 #[derive(Clone, Debug, Deserialize)]
-struct SystemArchive {
+pub(crate) struct SystemArchive {
     /// As Rust names it.
     system: String,
     architecture: String,

@@ -21,7 +21,7 @@ use super::{ModelError, folder, session_cache};
 use crate::scene::resource_log::{self, ResourceKind};
 
 /// The description of the library that was fetched.
-pub(super) const LIBRARY: &str = "onnxruntime.json";
+const LIBRARY: &str = "onnxruntime.json";
 
 const MODEL_USE: &str = "its first use";
 

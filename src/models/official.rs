@@ -41,12 +41,10 @@ fn mirror() -> Option<String> {
     std::env::var("FMLGS_MODELS_FROM").ok().filter(|url| !url.is_empty())
 }
 
-impl OfficialFile {
-    /// Where it is fetched from.
-    fn address(&self, mirror: Option<&str>) -> String {
-        let name = self.url.rsplit('/').next().unwrap_or_default();
-        mirror.map_or_else(|| self.url.clone(), |folder| format!("{}/{name}", folder.trim_end_matches('/')))
-    }
+/// Where an official file is fetched from.
+fn in_mirror(url: &str, mirror: Option<&str>) -> String {
+    let name = url.rsplit('/').next().unwrap_or_default();
+    mirror.map_or_else(|| url.to_owned(), |folder| format!("{}/{name}", folder.trim_end_matches('/')))
 }
 
 /// What a description says of the checkpoint that a model was made of.
@@ -89,9 +87,11 @@ impl ModelEntry {
         patience: Patience,
         progress: &mut dyn FnMut(&str, u64, Option<u64>) -> bool,
     ) -> Result<(), InstallError> {
+        let mirror = mirror();
         match (&self.checkpoint, from) {
             (Some(official), None) => {
-                self.fetch_checkpoint(official, folder, &official.address(mirror().as_deref()), patience, progress)?;
+                let address = in_mirror(&official.url, mirror.as_deref());
+                self.fetch_checkpoint(official, folder, &address, patience, progress)?;
             }
             (Some(official), Some(url)) if is_checkpoint(url) => {
                 self.fetch_checkpoint(official, folder, url, patience, progress)?;
@@ -100,11 +100,12 @@ impl ModelEntry {
         }
         if let (Some(known), None) = (&self.known, from) {
             let to = known.picture_in(folder);
-            let wanted =
-                FileToFetch { url: &known.picture, to: &to, bytes: None, most: fetch::MOST_UNPROMISED, sha256: None };
+            let url = in_mirror(&known.picture, mirror.as_deref());
+            let wanted = FileToFetch { url: &url, to: &to, bytes: None, most: fetch::MOST_UNPROMISED, sha256: None };
             if !to.is_file() {
                 // The model is as good without; who checks it is told that the picture is missing.
-                let _ = fetch::fetch(&wanted, patience, &mut |there, all| progress("picture", there, all));
+                let once = Patience { attempts: 1, ..patience };
+                let _ = fetch::fetch(&wanted, once, &mut |there, all| progress("picture", there, all));
             }
         }
         Ok(())
@@ -172,9 +173,9 @@ mod tests {
 
     #[test]
     fn a_mirror_has_the_file_under_its_own_name() {
-        let file = OfficialFile { url: "https://makers.example/a/b/net.pt".into(), megabytes: 1, sha256: None };
-        assert_eq!(file.address(None), file.url);
-        assert_eq!(file.address(Some("http://lab.example/nets/")), "http://lab.example/nets/net.pt");
+        let url = "https://makers.example/a/b/net.pt";
+        assert_eq!(in_mirror(url, None), url);
+        assert_eq!(in_mirror(url, Some("http://lab.example/nets/")), "http://lab.example/nets/net.pt");
     }
 
     /// Serves one file after another, whatever is asked for.

@@ -154,7 +154,7 @@ fn gaussians(
 
 fn objects(
     dataset: &Arc<Dataset>,
-    folder: &PathBuf,
+    folder: &Path,
     input: &SceneInput,
     settings: &ReproduceSettings,
     observer: &mut dyn Observer,
@@ -172,7 +172,7 @@ fn objects(
         network => with.segmenter = Some(network.into()),
     }
     let request = FindRequest {
-        folder: folder.clone(),
+        folder: folder.into(),
         cloud: Arc::clone(&scene.cloud),
         settings: scene.settings.clone(),
         dataset: Arc::clone(dataset),

@@ -169,11 +169,11 @@ fn unknown(views: &[ViewReport], photos: &[Photo], share: f64) -> Option<String>
     let many: Vec<&ViewReport> = views.iter().filter(|v| v.unknown > share).collect();
     let worst = many.iter().max_by(|a, b| a.unknown.total_cmp(&b.unknown))?;
     Some(format!(
-        "{} of {} photos have over {:.0} % unlabeled pixels (worst: {}, {:.0} %); Gaussians there inherit from \
-         connected ones",
+        "{} of {} photos have over {} unknown pixels (worst: {}, {:.0} %): no mask, and nothing that looks like what \
+         masks show; label one of them to name what is there",
         many.len(),
         photos.len(),
-        100.0 * share,
+        format_args!("{:.1} %", 100.0 * share),
         photos[worst.photo].name,
         100.0 * worst.unknown
     ))

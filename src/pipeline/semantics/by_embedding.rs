@@ -48,10 +48,8 @@ impl TextEmbeddings {
 
     fn try_to_learn<E>(&mut self, phrases: Vec<String>, mut encode: impl FnMut(&str) -> Result<Vec<f32>, E>) {
         for phrase in phrases {
-            if !self.0.contains_key(&phrase) {
-                let embedding = encode(&phrase).ok();
-                self.0.insert(phrase, embedding);
-            }
+            let embedding = |phrase: &String| encode(phrase).ok();
+            self.0.entry(phrase).or_insert_with_key(embedding);
         }
     }
 

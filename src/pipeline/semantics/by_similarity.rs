@@ -9,6 +9,9 @@ use crate::scene::{GaussianCloud, Identities, IdentityId, LanguageFeatures, Sema
 /// Cosine from which two features count as those of one thing.
 pub(crate) const ALIKE: f32 = 0.9;
 
+/// The mean look of what an identity is joined to, if it has any, and the looks of all that was joined.
+type Looks = (Option<Vec<f32>>, Vec<Vec<f32>>);
+
 /// The map with identities joined that look alike and are of one level, each by the mean of its raw features. They
 /// keep raw features only, and have no names. `None` without features.
 pub(crate) fn rejoined(map: &SemanticMap, cloud: &GaussianCloud) -> Option<SemanticMap> {
@@ -18,7 +21,7 @@ pub(crate) fn rejoined(map: &SemanticMap, cloud: &GaussianCloud) -> Option<Seman
         unit(&sum)
     };
     let mut joined = Identities::default();
-    let mut first: Vec<(Option<Vec<f32>>, Vec<Vec<f32>>)> = Vec::new();
+    let mut first: Vec<Looks> = Vec::new();
     let mut now: Vec<IdentityId> = vec![0];
     for ((_, identity), features) in map.identities.iter().zip(&language.by_identity) {
         let own = mean(features);

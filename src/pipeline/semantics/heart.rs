@@ -19,8 +19,9 @@ use super::parse::ParsedQuery;
 use super::protocols::part_recall::{self, Components};
 use super::protocols::recipes::Absent;
 use super::protocols::{AskedScene, Category, LabeledView, categories, masks};
-use super::recipe::{PAPERS_PHRASES, Recipe};
+use super::recipe::{PAPERS_PHRASES, Recipe, Rejection};
 use super::segmenter::{FileMasks, Segmenter};
+use super::tracker::TrackOptions;
 use super::view_map::ViewMap;
 use crate::io::{self, Opened, labels::Labels};
 use crate::math::stats::mean;
@@ -122,7 +123,10 @@ fn open(name: &str, seed: u64, folder: &Path) -> Scene {
 impl Scene {
     fn find(&mut self, lifting: Lifting, encoder: Option<&mut (dyn Encoder + 'static)>) -> SemanticMap {
         let tools = Tools { segmenter: &mut self.masks, follower: None, encoder };
-        let options = FindOptions { lifting, code_steps: CODE_STEPS, ..FindOptions::default() };
+        // Votes carry the masks of few photos on; codes are trained on those of all.
+        let max_seeds = if lifting == Lifting::Votes { TrackOptions::default().max_seeds } else { VIEWS };
+        let track = TrackOptions { max_seeds, ..TrackOptions::default() };
+        let options = FindOptions { track, lifting, code_steps: CODE_STEPS, ..FindOptions::default() };
         let found = find_objects(&self.cloud, &self.training, &self.settings, tools, &options, &mut Silent);
         found.expect("found").map
     }
@@ -149,12 +153,16 @@ impl Scene {
 fn by_names(scene: &Scene, map: &SemanticMap) -> [f64; 2] {
     let drawn = scene.drawn(map);
     let blended = CodeMap::default();
-    let mut ask = |text: &str| {
-        ParsedQuery::parse(text).map(|p| by_name(&map.identities, &p, LevelFilter::Auto, &Recipe::default()))
-    };
+    let mut ask =
+        |text: &str| ParsedQuery::parse(text).map(|p| by_name(&map.identities, &p, LevelFilter::Auto, &plain()));
     let mut asked = AskedScene { map, ask: &mut ask };
     let views = scene.views(&drawn, &blended);
     masks::by_level(&views.iter().flat_map(|v| masks::compare(&mut asked, v)).collect::<Vec<_>>())
+}
+
+/// Without the rules that reject more than the scores do: what is measured are scores.
+fn plain() -> Recipe {
+    Recipe { rejection: Rejection::Canonical, ..Recipe::default() }
 }
 
 /// Answers by looks alone; `None` where the encoder knows no word.
@@ -166,7 +174,7 @@ fn by_looks(
     text: &str,
 ) -> Option<QueryAnswer> {
     let phrase = ParsedQuery::parse(text)?;
-    let recipe = Recipe::default();
+    let recipe = plain();
     book.learn(&phrase, &recipe, |p| encoder.text(p)).ok()?;
     let language = Language { features, phrases: book };
     Some(by_embedding(&map.identities, &phrase, LevelFilter::Auto, &recipe, language))
@@ -247,7 +255,7 @@ fn figures(scene: &Scene, map: &SemanticMap, trained: &SemanticMap, encoder: &mu
     let is_found = |answered: QueryAnswer| !matches!(answered.answer, Answer::NotFound(_));
     let mut seen = |name: &String| by_looks(map, features, &mut book, encoder, name).map(is_found);
     let named = |name: &String| {
-        ParsedQuery::parse(name).map(|p| is_found(by_name(&map.identities, &p, LevelFilter::Auto, &Recipe::default())))
+        ParsedQuery::parse(name).map(|p| is_found(by_name(&map.identities, &p, LevelFilter::Auto, &plain())))
     };
     let found = |list: &Vec<String>, ask: &mut dyn FnMut(&String) -> Option<bool>| {
         share(&list.iter().map(|name| ask(name).expect("its words are known")).collect::<Vec<_>>())

@@ -7,6 +7,7 @@ use super::colors;
 use super::localize::{Hit, Scorer};
 use super::parse::{ParsedQuery, is_glue};
 use super::recipe::Rejection;
+pub(crate) use super::words::singular;
 use super::words::words;
 use crate::scene::{Identities, IdentityId};
 
@@ -121,7 +122,6 @@ fn similarity(phrase: &[String], name: &[String]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::pipeline::semantics::words::singular;
     use crate::scene::{Level, NOBODY};
 
     fn scene() -> Identities {

@@ -69,7 +69,7 @@ impl NetworkMasks {
         let open = Self::open(name)?;
         // The description holds the checksums of the graphs.
         let description = std::fs::read(&path).map_err(|e| ModelError::Metadata { path, problem: e.to_string() })?;
-        let asked = format!("{:?} {:?} {}", open.options, open.filters, open.tiles);
+        let asked = format!("{:?} {:?} {} {}", open.options, open.filters, open.tiles, open.tile_points);
         Ok(KeptMasks::new(Box::new(open), folder, &[&description, asked.as_bytes()]))
     }
 

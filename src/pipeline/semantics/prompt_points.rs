@@ -78,7 +78,7 @@ mod tests {
             assert!(found[..k].iter().all(|b| apart(a, b) > 3.0), "{found:?}");
         }
         // Two pieces both get one.
-        let (_, two) = points(80, 20, |x, _| x < 15 || x > 60);
+        let (_, two) = points(80, 20, |x, _| !(15..=60).contains(&x));
         assert!(two.iter().any(|p| p[0] < 15.0) && two.iter().any(|p| p[0] > 60.0), "{two:?}");
         assert_eq!(points(5, 5, |x, y| (x, y) == (3, 1)).1, [[3.5, 1.5]]);
         assert!(points(5, 5, |_, _| false).1.is_empty());

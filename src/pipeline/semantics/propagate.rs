@@ -17,13 +17,11 @@ use crate::scene::{GaussianCloud, NOBODY};
 const NEIGHBORS: usize = 8;
 /// How many usual distances between neighbors a full step in color is as far as.
 const COLOR_WEIGHT: f64 = 12.0;
-/// Path length, in usual distances between neighbors, beyond which nothing is inherited.
-const FARTHEST: f64 = 40.0;
 
 /// Every Gaussian without a vote inherits from the one with a vote that is nearest along the
-/// graph of neighbors, where a step is longer the more the colors differ. What is nobody's is
-/// inherited like the rest, and is what is left where nothing is near.
-pub(crate) fn extend(cloud: &GaussianCloud, assignments: &mut [Assignment]) {
+/// graph of neighbors, where a step is longer the more the colors differ, if that is not farther than `farthest` usual
+/// distances between neighbors. What is nobody's is inherited like the rest, and is what is left where nothing is near.
+pub(crate) fn extend(cloud: &GaussianCloud, assignments: &mut [Assignment], farthest: f64) {
     if assignments.iter().all(|b| b.identity != UNKNOWN) {
         return;
     }
@@ -66,7 +64,7 @@ pub(crate) fn extend(cloud: &GaussianCloud, assignments: &mut [Assignment]) {
         }
         for &(j, length) in &edges[i] {
             let far = distance[i] + length;
-            if far < distance[j] && far <= FARTHEST {
+            if far < distance[j] && far <= farthest {
                 distance[j] = far;
                 assignments[j] = Assignment { identity: assignments[i].identity, margin: 0.0 };
                 open.push(Reverse((far.to_bits(), j)));
@@ -96,7 +94,7 @@ mod tests {
         let mut b = vec![Assignment { identity: UNKNOWN, margin: 0.0 }; 30];
         b[0].identity = 1;
         b[29].identity = NOBODY;
-        extend(&cloud, &mut b);
+        extend(&cloud, &mut b, 40.0);
         assert!(b[..18].iter().all(|b| b.identity == 1), "{b:?}");
         assert!(b[18..].iter().all(|b| b.identity == NOBODY));
     }
@@ -109,21 +107,21 @@ mod tests {
         }
         let mut b = vec![Assignment { identity: UNKNOWN, margin: 0.0 }; 30];
         b[3] = Assignment { identity: 2, margin: 0.5 };
-        extend(&cloud, &mut b);
+        extend(&cloud, &mut b, 40.0);
         assert!(b[..15].iter().all(|b| b.identity == 2) && b[15..].iter().all(|b| b.identity == NOBODY));
         assert_eq!((b[3].margin, b[4].margin), (0.5, 0.0));
-        extend(&GaussianCloud::default(), &mut []);
+        extend(&GaussianCloud::default(), &mut [], 40.0);
     }
 
     #[test]
-    fn inheritance_ends_after_forty_steps_and_a_change_of_color_costs_some() {
+    fn inheritance_ends_after_so_many_steps_and_a_change_of_color_costs_some() {
         // One step a Gaussian; half of red more costs six.
         for (jump, reach) in [(0.0, 40), (0.5, 34)] {
             let mut cloud = row(60, 60);
             cloud.sh[5..].iter_mut().for_each(|c| c[0] += (jump / SH_C0) as f32);
             let mut b = vec![Assignment { identity: UNKNOWN, margin: 0.0 }; 60];
             b[0].identity = 3;
-            extend(&cloud, &mut b);
+            extend(&cloud, &mut b, 40.0);
             let reached = b.iter().filter(|b| b.identity == 3).count();
             // Half a step either way for rounding; the first one counts.
             assert!((reach..=reach + 1).contains(&reached), "{jump}: {reached}");

@@ -2,6 +2,8 @@
 //! the votes are drawn into the other views, and photos of which too much is unknown are segmented
 //! too, their masks linked to what is known. No network is needed.
 
+mod complete;
+
 use std::time::Instant;
 
 use super::associate::{Disagreement, Link, disagreements, link};
@@ -23,6 +25,11 @@ const LEAST_VOTES: f32 = 0.05;
 const DRIFT: f64 = 0.2;
 /// Pixels from which each of them says something.
 const DRIFT_PX: usize = 30;
+
+/// Steps between Gaussians over which what no photo shows (the inside of things) belongs to what is around it.
+const HIDDEN_STEPS: f64 = 4.0;
+/// Longer side of the views in which it is looked how well Gaussians are seen, px.
+const SEE_SIDE_PX: u32 = 256;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TrackOptions {
@@ -81,7 +88,7 @@ pub(crate) struct Tracked {
     pub(crate) assignments: Vec<Assignment>,
     /// The photos that were segmented, in order.
     pub(crate) seeds: Vec<usize>,
-    /// Every photo, before identities were extended to Gaussians that no photo voted for.
+    /// Every photo, with all that photos say and nothing that is only inherited.
     pub(crate) views: Vec<ViewReport>,
     /// Where masks and what was known disagreed, with the photo.
     pub(crate) disagreements: Vec<(usize, Disagreement)>,
@@ -121,6 +128,7 @@ pub(crate) fn track(
         segment_secs: 0.0,
     };
     let (start, mut follow_secs, mut encode_secs) = (Instant::now(), 0.0, 0.0);
+    t.see(observer)?;
     let mut seeds = vec![first];
     let mut tried = vec![false; photos.len()];
     let seeded = t.seed(first, segmenter, observer)?;
@@ -143,8 +151,10 @@ pub(crate) fn track(
             seeds.push(next);
         }
     };
+    t.complete(&views, observer)?;
+    let views = t.look(seeds.len() + 1, observer)?;
     let mut assignments = t.votes.decide(&t.identities, LEAST_VOTES);
-    extend(cloud, &mut assignments);
+    extend(cloud, &mut assignments, HIDDEN_STEPS);
     let carry_secs = start.elapsed().as_secs_f64() - t.segment_secs - encode_secs - follow_secs;
     let secs = vec![
         ("segment", t.segment_secs),
@@ -180,6 +190,19 @@ struct Tracker<'a> {
 }
 
 impl Tracker<'_> {
+    /// Looks how well each Gaussian is seen in every photo, before any votes.
+    fn see(&mut self, observer: &mut dyn Observer) -> Result<(), FindError> {
+        let mut ticker = Ticker::new("Looking what each photo shows", self.photos.len());
+        for (i, photo) in self.photos.iter().enumerate() {
+            let camera = photo.camera.limited_to(SEE_SIDE_PX);
+            self.votes
+                .see(&mut self.renderer, self.cloud, &camera, self.settings)
+                .map_err(|e| FindError::Render(photo.name.clone(), e))?;
+            ticker.tick(i + 1, observer)?;
+        }
+        Ok(())
+    }
+
     /// Segments a photo, links its masks to known identities, and lets them vote. The masks and whose
     /// they are; `None` if there was nothing in it.
     fn seed(

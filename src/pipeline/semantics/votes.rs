@@ -1,6 +1,7 @@
 //! Closed-form lifting: every Gaussian takes the weighted vote of the pixels it contributed to
 //! (weight = alpha x transmittance), which gives its identity at all levels in one pass.
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use crate::math::finite::{CHECKED, all_finite};
@@ -19,7 +20,12 @@ const KEPT: usize = 8;
 pub(crate) struct Votes {
     /// Per Gaussian: identity and weight in px, any order, each identity once.
     by_gaussian: Vec<Vec<(IdentityId, f32)>>,
+    /// Per Gaussian: the largest area that it shows in any view that was looked at.
+    best: Vec<f32>,
 }
+
+/// Share of its weight in the view that shows it best that a Gaussian must have in a view to be voted on there.
+const LEAST_SEEN: f32 = 0.1;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Assignment {
@@ -33,13 +39,46 @@ pub(crate) struct Assignment {
 impl Votes {
     /// No votes for `n` Gaussians.
     pub(crate) fn new(n: usize) -> Self {
-        Self { by_gaussian: vec![Vec::new(); n] }
+        Self { by_gaussian: vec![Vec::new(); n], best: vec![0.0; n] }
     }
 
     /// Weight of all votes for Gaussian `i`, px.
     #[cfg(test)]
     fn weight(&self, i: usize) -> f32 {
         self.by_gaussian[i].iter().map(|v| v.1).sum()
+    }
+
+    /// Takes note of how well each Gaussian is seen in a view: where it is seen much worse than elsewhere, it is
+    /// behind something, and what is there in the photo says nothing about it.
+    pub(crate) fn see(
+        &mut self,
+        renderer: &mut Renderer,
+        cloud: &GaussianCloud,
+        camera: &Camera,
+        settings: &RenderSettings,
+    ) -> Result<(), RenderError> {
+        let labels = vec![UNKNOWN; camera.width_px as usize * camera.height_px as usize];
+        let found = self.found(renderer, cloud, camera, settings, &labels)?;
+        let areas = areas(cloud, camera, &found);
+        self.best.iter_mut().zip(areas).for_each(|(best, area)| *best = best.max(area));
+        Ok(())
+    }
+
+    fn found(
+        &self,
+        renderer: &mut Renderer,
+        cloud: &GaussianCloud,
+        camera: &Camera,
+        settings: &RenderSettings,
+        labels: &[IdentityId],
+    ) -> Result<Vec<(u32, IdentityId, f32)>, RenderError> {
+        let (width, height) = (camera.width_px as usize, camera.height_px as usize);
+        assert_eq!(labels.len(), width * height, "one label per pixel");
+        let row = || Row { labels, width, gaussian: u32::MAX, sums: Vec::new(), found: Vec::new() };
+        let mut rows: Vec<Row<'_>> = (0..height.div_ceil(TILE_PX)).map(|_| row()).collect();
+        renderer.contributions(cloud, camera, settings, &mut rows)?;
+        rows.iter_mut().for_each(Row::finish);
+        Ok(rows.into_iter().flat_map(|r| r.found).collect())
     }
 
     /// Adds the votes of one view. `labels` holds the innermost identity of each pixel, row-major.
@@ -51,15 +90,12 @@ impl Votes {
         settings: &RenderSettings,
         labels: &[IdentityId],
     ) -> Result<(), RenderError> {
-        let (width, height) = (camera.width_px as usize, camera.height_px as usize);
-        assert_eq!(labels.len(), width * height, "one label per pixel");
-        let row = || Row { labels, width, gaussian: u32::MAX, sums: Vec::new(), found: Vec::new() };
-        let mut rows: Vec<Row<'_>> = (0..height.div_ceil(TILE_PX)).map(|_| row()).collect();
-        renderer.contributions(cloud, camera, settings, &mut rows)?;
-        for mut row in rows {
-            row.finish();
-            for (gaussian, identity, weight) in row.found {
-                add(&mut self.by_gaussian[gaussian as usize], identity, weight);
+        let found = self.found(renderer, cloud, camera, settings, labels)?;
+        let areas = areas(cloud, camera, &found);
+        for (gaussian, identity, weight) in found.into_iter().filter(|f| f.1 != UNKNOWN) {
+            let g = gaussian as usize;
+            if areas[g] >= LEAST_SEEN * self.best[g] {
+                add(&mut self.by_gaussian[g], identity, weight);
             }
         }
         if CHECKED {
@@ -75,6 +111,19 @@ impl Votes {
         let objects: Vec<IdentityId> = (0..=identities.len() as IdentityId).map(|i| identities.object_of(i)).collect();
         self.by_gaussian.par_iter().map(|votes| decide(votes, &objects, least)).collect()
     }
+}
+
+/// Weight of each Gaussian in a view as an area, so that near views and far ones compare: square units.
+fn areas(cloud: &GaussianCloud, camera: &Camera, found: &[(u32, IdentityId, f32)]) -> Vec<f32> {
+    let mut areas = vec![0.0; cloud.len()];
+    found.iter().for_each(|f| areas[f.0 as usize] += f.2);
+    let axis = camera.world_from_camera * DVec3::Z;
+    let focal = camera.focal_px.x * camera.focal_px.y;
+    for (area, p) in areas.iter_mut().zip(&cloud.positions).filter(|(a, _)| **a > 0.0) {
+        let depth = (cloud.origin + DVec3::from(p.map(f64::from)) - camera.center).dot(axis);
+        *area *= (depth * depth / focal) as f32;
+    }
+    areas
 }
 
 fn add(votes: &mut Vec<(IdentityId, f32)>, identity: IdentityId, weight: f32) {
@@ -134,7 +183,7 @@ impl ContributionSink<f32> for Row<'_> {
         }
         let end = (x + weights.len()).min(self.width);
         for (&label, &weight) in self.labels[y * self.width + x..y * self.width + end].iter().zip(weights) {
-            if weight > 0.0 && label != UNKNOWN {
+            if weight > 0.0 {
                 match self.sums.iter_mut().find(|s| s.0 == label) {
                     Some(s) => s.1 += weight,
                     None => self.sums.push((label, weight)),
@@ -146,8 +195,6 @@ impl ContributionSink<f32> for Row<'_> {
 
 #[cfg(test)]
 mod tests {
-    use glam::DVec3;
-
     use super::*;
     use crate::scene::Level;
 
@@ -159,6 +206,7 @@ mod tests {
         let (eye, ear) = (all.add(Level::Part, doll, vec![]), all.add(Level::Part, doll, vec![]));
         let votes = Votes {
             by_gaussian: vec![vec![(eye, 2.0), (ear, 3.0), (cat, 4.0)], vec![(NOBODY, 1.0)], vec![], vec![(cat, 0.01)]],
+            best: Vec::new(),
         };
         let b = votes.decide(&all, 0.05);
         assert_eq!(b[0].identity, ear);
@@ -191,6 +239,27 @@ mod tests {
     }
 
     #[test]
+    fn what_is_behind_something_in_a_photo_is_not_voted_on_there() {
+        // An opaque disc before a wall's Gaussian; from the side both are seen.
+        let mut cloud = GaussianCloud::isotropic(vec![[0.0, 0.0, 0.0], [0.0, 0.0, 2.0]], -1.0, 8.0);
+        cloud.log_scales = vec![[0.2; 3], [-1.5; 3]];
+        let from = |x: f64, z: f64| Camera::look_at(DVec3::new(x, 0.0, z), DVec3::Z, DVec3::NEG_Y, 0.9, 64, 48);
+        let [front, side] = [from(0.0, -4.0), from(6.0, 1.0)].map(|c| c.expect("valid"));
+        let (mut renderer, settings, all) = (Renderer::new(), RenderSettings::default(), Identities::objects(1));
+        let mut voted = |seen: bool| {
+            let mut votes = Votes::new(2);
+            if seen {
+                votes.see(&mut renderer, &cloud, &side, &settings).expect("drawn");
+            }
+            let labels = vec![1; 64 * 48];
+            votes.add_view(&mut renderer, &cloud, &front, &settings, &labels).expect("drawn");
+            votes.decide(&all, 1e-6).iter().map(|a| a.identity).collect::<Vec<_>>()
+        };
+        assert_eq!(voted(true), [1, UNKNOWN]);
+        assert_eq!(voted(false), [1, 1], "the control: some light gets through");
+    }
+
+    #[test]
     fn the_lightest_vote_of_many_gives_way() {
         let mut votes = Vec::new();
         (1..=KEPT as IdentityId).for_each(|id| add(&mut votes, id, id as f32));
@@ -202,7 +271,7 @@ mod tests {
         assert!(votes.iter().all(|v| v.0 != 51), "as light as the lightest");
         add(&mut votes, 52, 1.5);
         assert!(votes.contains(&(52, 1.5)) && votes.iter().all(|v| v.0 != 1) && votes.len() == KEPT);
-        let all = Votes { by_gaussian: vec![votes, vec![]] };
+        let all = Votes { by_gaussian: vec![votes, vec![]], best: Vec::new() };
         assert_eq!(all.weight(1), 0.0);
         assert_eq!(all.weight(0), 2.0 + 3.5 + 4.0 + 5.0 + 6.0 + 7.0 + 8.0 + 1.5);
     }
@@ -210,7 +279,8 @@ mod tests {
     #[test]
     fn votes_are_decided_by_weight_and_ties_by_number() {
         let all = Identities::objects(3);
-        let votes = Votes { by_gaussian: vec![vec![(3, 1.0), (2, 1.0), (1, 0.5)], vec![(2, 0.05)], vec![(1, 0.0)]] };
+        let by_gaussian = vec![vec![(3, 1.0), (2, 1.0), (1, 0.5)], vec![(2, 0.05)], vec![(1, 0.0)]];
+        let votes = Votes { by_gaussian, best: Vec::new() };
         let b = votes.decide(&all, 0.05);
         assert_eq!(
             (b[0], b[1].identity),
@@ -227,6 +297,7 @@ mod tests {
         row.add(8, 0, 0, &[1.0; 8]);
         row.finish();
         row.found.retain(|f| f.2 > 0.0);
-        assert_eq!(row.found, [(7, 2, 0.5), (7, 1, 0.25), (8, 1, 2.0), (8, 2, 1.0)]);
+        let all = [(7, 2, 0.5), (7, UNKNOWN, 0.5), (7, 1, 0.25), (8, 1, 2.0), (8, 2, 1.0), (8, UNKNOWN, 1.0)];
+        assert_eq!(row.found, all);
     }
 }

@@ -85,7 +85,7 @@ fn absent_parts(identities: &Identities) -> Vec<String> {
 
 /// A recipe, and what it comes to: shares of questions.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub(crate) struct Row {
+pub(crate) struct RecipeRow {
     pub(crate) title: String,
     pub(crate) recipe: Recipe,
     /// Answered with a mask of an IoU of a half or more: objects, parts, parts asked for as compounds ("mug handle").
@@ -126,7 +126,7 @@ pub(crate) fn row(
     engine: &mut QueryEngine,
     views: &[LabeledView<'_>],
     absent: &Absent,
-) -> Result<Row, ModelError> {
+) -> Result<RecipeRow, ModelError> {
     engine.answer_by(recipe.clone());
     let mut ms = Vec::new();
     let mut recall = [const { Vec::new() }; 3];
@@ -154,7 +154,7 @@ pub(crate) fn row(
         }
         *share = mean(&right);
     }
-    Ok(Row { title, recipe, recall: recall.map(|r| mean(&r)), rejected, mean_ms: mean(&ms) })
+    Ok(RecipeRow { title, recipe, recall: recall.map(|r| mean(&r)), rejected, mean_ms: mean(&ms) })
 }
 
 /// "handle of the mug" as "mug handle".

@@ -76,10 +76,8 @@ fn canonical(ui: &mut Ui, phrases: &mut CanonicalPhrases) {
     let mut typed = ui.data_mut(|d| d.get_temp::<String>(id)).unwrap_or_else(|| phrases.to_string());
     let field = ui.add(TextEdit::singleline(&mut typed).desired_width(180.0)).accessible_name("Canonical phrases");
     let field = field.on_hover_text("With commas between; 'paper' and 'lerf' are lists of their own");
-    if field.lost_focus() {
-        if let Ok(new) = typed.parse() {
-            *phrases = new;
-        }
+    if let (true, Ok(new)) = (field.lost_focus(), typed.parse()) {
+        *phrases = new;
     }
     if field.has_focus() {
         ui.data_mut(|d| d.insert_temp(id, typed));
