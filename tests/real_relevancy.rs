@@ -15,7 +15,7 @@ use fmlgs::pipeline::semantics::by_embedding::EmbeddingScorer;
 use fmlgs::pipeline::semantics::localize::{Answer, localize};
 use fmlgs::pipeline::semantics::parse::ParsedQuery;
 use fmlgs::pipeline::semantics::recipe::{Recipe, Rejection, Strategy};
-use fmlgs::pipeline::semantics::relevancy::{advantage, deviate, score};
+use fmlgs::pipeline::semantics::relevancy::{deviate, score};
 use fmlgs::scene::{Identities, IdentityId, LanguageFeatures, Level, LevelFilter, NOBODY, PART_WEIGHT, ViewFeatures};
 
 use teatime::{ABSENT, QUERIES, Scene, load, plain};
