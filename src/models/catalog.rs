@@ -17,7 +17,7 @@ const LIST: &str = include_str!("../../assets/models.toml");
 /// Name of the model that follows masks.
 pub(crate) const SAM2: &str = "sam2.1-tiny";
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum ModelRole {
     /// Compares pictures with phrases.

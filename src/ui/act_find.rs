@@ -4,20 +4,10 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::app::App;
-use super::find_dialog::Means;
+use super::find_dialog::{AwaitedModels, Means};
 use super::state::Tone;
 use crate::jobs::find_objects::FindRequest;
-use crate::worker::{Command, Event, JobId};
-
-/// A search that waits for downloads.
-pub(super) struct AwaitedModels {
-    /// The download under way.
-    job: JobId,
-    /// What comes after it.
-    then: Vec<String>,
-    /// The scene that is searched.
-    scene: u64,
-}
+use crate::worker::{Command, Event};
 
 impl App {
     /// Finds objects and parts with the labels that came with the photos; without, asks what is to look at them.

@@ -6,13 +6,12 @@ use std::sync::Arc;
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 
-use super::act_find::AwaitedModels;
 use super::camera::CameraPane;
 use super::chat::Chat;
 use super::dialogs::{self, Question};
 use super::dock::{DockContents, Place};
 use super::file_dialogs::FileDialogs;
-use super::find_dialog::FindDialog;
+use super::find_dialog::{AwaitedModels, FindDialog};
 use super::history::{EditStep, Editing};
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};

@@ -1,15 +1,17 @@
 //! The way to objects and parts where photos came without labels: what each means can and cannot do, what it costs,
 //! what has to be downloaded first. Whoever agrees need not come back: downloads are followed by the search.
 
-use egui::{RichText, ScrollArea, Ui};
+use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
 
 use super::state::AppState;
 use super::theme;
 use crate::jobs::find_objects::NO_ENCODER;
 use crate::jobs::find_objects::forecast::{self, LookTime};
 use crate::jobs::models::{ModelEntry, ModelList, ModelRole, ModelState};
+use crate::math::format::things;
 use crate::pipeline::semantics::build_map::REGIONS;
 use crate::ui::actions::{Action, Pane};
+use crate::worker::JobId;
 
 /// What is chosen so far.
 #[derive(Default)]
@@ -27,6 +29,16 @@ pub(crate) struct Means {
     pub(crate) encoder: String,
     /// Models to download first.
     pub(crate) missing: Vec<String>,
+}
+
+/// A search that waits for downloads.
+pub(super) struct AwaitedModels {
+    /// The download under way.
+    pub(super) job: JobId,
+    /// What comes after it.
+    pub(super) then: Vec<String>,
+    /// The scene that is searched.
+    pub(super) scene: u64,
 }
 
 impl FindDialog {
@@ -96,10 +108,8 @@ impl FindDialog {
         if choice(ui, means.segmenter == REGIONS, "Uniform color regions (built in)", text, &cost(None, own)) {
             self.segmenter = Some(REGIONS.into());
         }
-        for (entry, model) in known.of(ModelRole::Segmenter) {
-            if offered(ui, means.segmenter == entry.id, entry, model, LookTime::of(&entry.id, known)) {
-                self.segmenter = Some(entry.id.clone());
-            }
+        if let Some(id) = networks(ui, known, ModelRole::Segmenter, &means.segmenter) {
+            self.segmenter = Some(id);
         }
         ui.add_space(8.0);
         ui.label(RichText::new("What understands words").strong());
@@ -108,10 +118,8 @@ impl FindDialog {
         if choice(ui, means.encoder == NO_ENCODER, "Only names that you give", text, "") {
             self.encoder = Some(NO_ENCODER.into());
         }
-        for (entry, model) in known.of(ModelRole::Encoder) {
-            if offered(ui, means.encoder == entry.id, entry, model, None) {
-                self.encoder = Some(entry.id.clone());
-            }
+        if let Some(id) = networks(ui, known, ModelRole::Encoder, &means.encoder) {
+            self.encoder = Some(id);
         }
     }
 
@@ -146,6 +154,26 @@ impl FindDialog {
         })
         .inner
     }
+}
+
+/// The networks for one purpose: what is here, recommended or chosen, and all others folded away. The one that was clicked.
+fn networks(ui: &mut Ui, known: &ModelList, role: ModelRole, chosen: &str) -> Option<String> {
+    let (first, others): (Vec<_>, Vec<_>) =
+        known.of(role).partition(|(e, s)| s.is_usable() || e.recommended || e.id == chosen);
+    let mut clicked = None;
+    let mut list = |ui: &mut Ui, all: Vec<(&ModelEntry, &ModelState)>| {
+        for (entry, model) in all {
+            if offered(ui, chosen == entry.id, entry, model, LookTime::of(&entry.id, known)) {
+                clicked = Some(entry.id.clone());
+            }
+        }
+    };
+    list(ui, first);
+    if !others.is_empty() {
+        let title = things(others.len(), "other network");
+        CollapsingHeader::new(title).id_salt(("networks", role)).show(ui, |ui| list(ui, others));
+    }
+    clicked
 }
 
 /// A model of the list as a choice; whether it was clicked.

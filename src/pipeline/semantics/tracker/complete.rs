@@ -17,7 +17,7 @@ use super::super::votes::UNKNOWN;
 use super::{LEAST_VOTES, Tracker, ViewReport};
 use crate::io;
 use crate::math::grid::neighbors;
-use crate::pipeline::observer::{Observer, Ticker};
+use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::scene::IdentityId;
 
 /// Lab is divided into cells of this size: lightness, and both color axes.
@@ -42,22 +42,28 @@ impl Tracker<'_> {
         let of: Vec<IdentityId> = self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect();
         for (i, view) in order.iter().enumerate() {
             let photo = &self.photos[view.photo];
-            let pixels = io::photo::load(photo, SIDE_PX)?;
+            let pixels = match io::photo::load(photo, SIDE_PX) {
+                Ok(pixels) => pixels,
+                Err(e) => {
+                    observer.note(Severity::Warning, format!("Nothing is completed in a photo: {e}"));
+                    continue;
+                }
+            };
             let camera = photo.camera.limited_to(SIDE_PX);
             let ends = ends_of(self.cloud, self.settings, &camera);
             let terrain = Terrain::new(pixels.width_px as usize, &pixels.rgb, ends.as_deref(), &options);
             let map = self.map_of(view.photo, SIDE_PX, &of)?;
             colors.add(&terrain, &sure(&map, options.share));
-            terrains.push(terrain);
+            terrains.push((view.photo, terrain));
             ticker.tick(i + 1, observer)?;
         }
         colors.compare(options.unseen);
-        for (i, (view, terrain)) in order.iter().zip(&terrains).enumerate() {
-            let map = self.map(view.photo, SIDE_PX)?;
+        for (i, (photo, terrain)) in terrains.iter().enumerate() {
+            let map = self.map(*photo, SIDE_PX)?;
             let known = sure(&map, options.share);
             let mut labels = grow(terrain, &known, &colors, &options);
             labels.iter_mut().zip(&known).filter(|(_, k)| **k != UNKNOWN).for_each(|(l, _)| *l = UNKNOWN);
-            let photo = &self.photos[view.photo];
+            let photo = &self.photos[*photo];
             let camera = photo.camera.limited_to(SIDE_PX);
             self.votes
                 .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
