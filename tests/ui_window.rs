@@ -259,7 +259,8 @@ fn training_moves_the_plot_pauses_resumes_and_is_cancelled() {
     w.click("Start training");
     w.until("the plot", |a| a.state.history.steps.len() >= 5);
     assert!(w.shows("Pause") && w.shows("Held-out PSNR") && w.shows("Plot of PSNR"));
-    w.click("Loss");
+    w.harness.get_by_role_and_label(egui::accesskit::Role::Button, "Loss").click();
+    w.harness.run_steps(2);
     assert!(w.shows("Plot of the loss") && !w.shows("Plot of PSNR"), "one plot at a time");
     let before = w.app().viewport.picture().map(|p| p.ticket);
     w.until("a newer picture of the scene", |a| a.viewport.picture().map(|p| p.ticket) > before);

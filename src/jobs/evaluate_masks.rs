@@ -122,7 +122,7 @@ pub(crate) fn run(
     if let Some(folder) = &comparison.pictures {
         pictures(folder, comparison, map, &views)?;
     }
-    let list: Vec<LabeledView<'_>> = views.iter().map(Drawn::labeled).collect();
+    let list: Vec<LabeledView<'_>> = views.iter().map(DrawnView::labeled).collect();
     let (units, summary) = match protocol {
         Protocol::PartRecall => recall(map, recipe, &list)?,
         Protocol::Recipes => (Vec::new(), compare_recipes(map, recipe, &list)?),
@@ -230,7 +230,7 @@ fn compare_recipes(map: &SemanticMap, recipe: &Recipe, views: &[LabeledView<'_>]
 }
 
 /// A labeled photo and what is drawn of its view.
-pub(crate) struct Drawn {
+pub(crate) struct DrawnView {
     index: usize,
     name: String,
     pub(crate) camera: Camera,
@@ -240,7 +240,7 @@ pub(crate) struct Drawn {
     categories: Vec<Category>,
 }
 
-impl Drawn {
+impl DrawnView {
     pub(crate) fn labeled(&self) -> LabeledView<'_> {
         LabeledView {
             name: &self.name,
@@ -254,7 +254,11 @@ impl Drawn {
 
 /// The held-out photos with labels; else those that were trained on, as long as no mask of theirs was
 /// used.
-fn labeled(comparison: &PhotoComparison, map: &SemanticMap, labels: &mut FileMasks) -> Result<Vec<Drawn>, JobError> {
+fn labeled(
+    comparison: &PhotoComparison,
+    map: &SemanticMap,
+    labels: &mut FileMasks,
+) -> Result<Vec<DrawnView>, JobError> {
     let photos = &comparison.dataset.photos;
     let held: Vec<usize> = comparison.views.iter().copied().filter(|&i| labels.covers(&photos[i])).collect();
     let trained_on = held.is_empty();
@@ -270,7 +274,7 @@ pub(crate) fn draw(
     labels: &mut FileMasks,
     views: &[usize],
     trained_on: bool,
-) -> Result<Vec<Drawn>, JobError> {
+) -> Result<Vec<DrawnView>, JobError> {
     let PhotoComparison { cloud, settings, max_side_px, .. } = comparison;
     let photos = &comparison.dataset.photos;
     let mut renderer = Renderer::new();
@@ -281,12 +285,17 @@ pub(crate) fn draw(
         let exact = ViewMap::render(&mut renderer, cloud, &map.identity_of, &map.identities, &camera, settings)?;
         let blended = CodeMap::render(&mut renderer, cloud, &map.codes, map.has_parts(), &camera, settings)?;
         let categories = categories(&labels.segment(photo, *max_side_px, &mut Silent)?);
-        drawn.push(Drawn { index, name: photo.name.clone(), camera, trained_on, exact, blended, categories });
+        drawn.push(DrawnView { index, name: photo.name.clone(), camera, trained_on, exact, blended, categories });
     }
     Ok(drawn)
 }
 
-fn pictures(folder: &Path, comparison: &PhotoComparison, map: &SemanticMap, views: &[Drawn]) -> Result<(), JobError> {
+fn pictures(
+    folder: &Path,
+    comparison: &PhotoComparison,
+    map: &SemanticMap,
+    views: &[DrawnView],
+) -> Result<(), JobError> {
     export::make_folder(folder)?;
     for view in views {
         let pixels = io::photo::load(&comparison.dataset.photos[view.index], comparison.max_side_px)?;

@@ -10,7 +10,7 @@ use super::printed::{ACCURACY, LOCALIZATION, MIOU, RECALL};
 use super::{PaperTable, ReproduceSettings};
 use crate::jobs::JobError;
 use crate::jobs::evaluate::PhotoComparison;
-use crate::jobs::evaluate_masks::Drawn;
+use crate::jobs::evaluate_masks::DrawnView;
 use crate::math::stats::quantile;
 use crate::models::{Encoder, ModelError};
 use crate::pipeline::semantics::answer::{QueryAnswer, by_name};
@@ -81,14 +81,14 @@ pub(super) fn measure(
     settings: &ReproduceSettings,
     comparison: &PhotoComparison,
     map: &SemanticMap,
-    drawn: &[Drawn],
+    drawn: &[DrawnView],
     query: &str,
 ) -> Result<MeasuredRows, JobError> {
     let language = map
         .language
         .as_ref()
         .ok_or_else(|| JobError::Protocol("the scene has no embeddings, although an encoder was given".into()))?;
-    let views: Vec<LabeledView<'_>> = drawn.iter().map(Drawn::labeled).collect();
+    let views: Vec<LabeledView<'_>> = drawn.iter().map(DrawnView::labeled).collect();
     let encoder = crate::models::encoder(&language.encoder)?;
     let mut by = ByEmbedding { encoder, phrases: TextEmbeddings::default(), unknown: BTreeSet::new() };
     let table = Table { which: settings.table, query, classes: classes(&views) };

@@ -57,10 +57,7 @@ const FAMILIES: [Family; 4] = [
         checkpoint: "mobile.pt",
         template: "mobile_template.zip",
         description: "mobile.json",
-        alike: [
-            "image_encoder.layers.0.blocks.0.conv1.bn.running_mean",
-            "image_encoder.layers.0.blocks.0.conv1.bn.running_var",
-        ],
+        alike: ["image_encoder.layers.0.blocks.0.conv1.bn.weight", "image_encoder.layers.0.blocks.0.conv1.bn.bias"],
         square: "image_encoder.layers.1.blocks.0.attn.proj.weight",
         gone: "image_encoder.layers.2.blocks.0.attn.attention_biases",
     },

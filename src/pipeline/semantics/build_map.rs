@@ -320,14 +320,14 @@ mod tests {
         // The far photo shows the cat, too different in color to be taken for a piece of what is near.
         assert!((0.01..0.3).contains(&found.views[1].unknown) && found.views[0].unknown == 0.0);
         assert!(
-            notes.0.iter().any(|n| n.starts_with("1 of 2 photos have over 0 % unlabeled") && n.contains("far")),
+            notes.0.iter().any(|n| n.starts_with("1 of 2 photos have over 0.5 % unknown") && n.contains("far")),
             "{:?}",
             notes.0
         );
         let views = [0.2, 0.5].map(|unknown| ViewReport { photo: 0, unknown, seen: vec![] });
         let text = unknown(&views, &photos(), 0.1).expect("two");
         assert!(
-            text.starts_with("2 of 2 photos have over 10 % unlabeled") && text.contains("worst: near, 50 %"),
+            text.starts_with("2 of 2 photos have over 10.0 % unknown") && text.contains("worst: near, 50 %"),
             "{text}"
         );
         assert_eq!(unknown(&views, &photos(), 0.5), None, "as much is not more");
