@@ -76,7 +76,9 @@ impl FindDialog {
             };
             let photos = state.scene.as_ref().and_then(|s| s.dataset.as_ref()).map_or(0, |d| d.photos.len());
             let means = self.means(known);
-            ScrollArea::vertical().max_height((room.y - 230.0).max(120.0)).show(ui, |ui| {
+            // A dialog offers little height before it knows what is in it.
+            let list_pt = (room.y - 230.0).max(120.0);
+            ScrollArea::vertical().max_height(list_pt).min_scrolled_height(list_pt).show(ui, |ui| {
                 self.choices(ui, known, &means);
                 Self::engine(ui, known, actions);
             });
@@ -103,9 +105,8 @@ impl FindDialog {
     fn choices(&mut self, ui: &mut Ui, known: &ModelList, means: &Means) {
         ui.add_space(6.0);
         ui.label(RichText::new("What finds the masks of objects and parts").strong());
-        let own = LookTime::of(REGIONS, known);
         let text = "Rough: a thing of two colors becomes two, neighbors of one color become one.";
-        if choice(ui, means.segmenter == REGIONS, "Uniform color regions (built in)", text, &cost(None, own)) {
+        if choice(ui, means.segmenter == REGIONS, "Uniform color regions (built in)", text, "") {
             self.segmenter = Some(REGIONS.into());
         }
         if let Some(id) = networks(ui, known, ModelRole::Segmenter, &means.segmenter) {

@@ -4,10 +4,7 @@ use crate::jobs::models::{ModelEntry, ModelList};
 use crate::math::format;
 use crate::models::catalog;
 use crate::models::engine::engine;
-use crate::pipeline::semantics::build_map::REGIONS;
 
-/// Seconds that color regions take for a photo of 1,024 px on a core; measured.
-const REGIONS_SECS: f64 = 1.0;
 /// Cores on which the times of the list were measured, and those beyond which networks gain little.
 const MEASURED_CORES: usize = 2;
 const MOST_CORES: usize = 8;
@@ -19,11 +16,8 @@ pub(crate) struct LookTime {
 }
 
 impl LookTime {
-    /// That of [`REGIONS`], or of a model of the list if its time was measured.
+    /// That of a model of the list if its time was measured.
     pub(crate) fn of(segmenter: &str, known: &ModelList) -> Option<Self> {
-        if segmenter == REGIONS {
-            return Some(Self { secs: REGIONS_SECS });
-        }
         let entry = known.models.iter().map(|(e, _)| e).find(|e| e.id == segmenter)?;
         Self::estimated(entry, known.is_fast, known.cores)
     }
