@@ -22,6 +22,8 @@ pub fn are_listed_exported_and_compared(w: &mut Window, folder: &Path) {
     assert!(w.shows("1 of 2 questions answered") && w.app().state.phrases.rows.iter().all(|r| r.iou.is_none()));
     let table_mask = folder.join("masks/masks/this_view/the_table.png");
     w.ask(Action::Ask("table".into()));
+    // Beside the pane the view is small.
+    w.click("Unfold the answer");
     w.ask(Action::TrueMask(Some(table_mask)));
     w.harness.run_steps(4);
     assert!(w.shows("IoU 0.9") || w.shows("IoU 1.0"), "drawn twice, it is the same but for its edge");

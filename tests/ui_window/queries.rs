@@ -17,6 +17,12 @@ fn typed(w: &Window) -> String {
 fn asks(w: &mut Window, text: &str) {
     w.types(text);
     w.press(Key::Enter);
+    answered(w);
+}
+
+/// Waits for the encoder, which has a thread of its own.
+fn answered(w: &mut Window) {
+    w.until("an answer", |a| a.viewport.queries.all().last().is_none_or(|q| !q.pending));
 }
 
 #[test]
@@ -59,10 +65,12 @@ fn nothing_is_said_to_be_missing_while_it_is_typed() {
     w.types("ra");
     assert!(!w.shows("No match"), "it is being typed");
     w.harness.run_steps(20);
+    answered(&mut w);
     assert!(w.shows("No match"), "after a pause");
     w.types("f");
     assert!(!w.shows("No match"), "typed on");
     w.press(Key::Enter);
+    answered(&mut w);
     assert!(w.shows("No match"), "Enter ends it at once");
 }
 
