@@ -1,4 +1,4 @@
-//! How much memory the program may still take: one answer for every stage that plans by it.
+//! How much memory the program may still take, and on how many cores it runs: one answer for all who plan by it.
 
 use std::sync::OnceLock;
 
@@ -6,6 +6,11 @@ use sysinfo::{MemoryRefreshKind, ProcessRefreshKind, ProcessesToUpdate, System};
 
 /// What is assumed where the system does not say: what any machine can spare.
 const UNKNOWN: u64 = 2 << 30;
+
+/// Cores that the program may use; 1 if the system does not say.
+pub(crate) fn cores() -> usize {
+    std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}
 
 /// Bytes that one reader may use: half of the memory that is free when the program first asks.
 pub(crate) fn budget() -> u64 {

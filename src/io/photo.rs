@@ -54,14 +54,14 @@ const MOST_PX: u64 = 1 << 28;
 
 /// A picture as it is stored; what is transparent has its color all the same.
 pub(crate) fn open(path: &Path) -> Result<PhotoPixels, IoError> {
-    let picture = decode_rgba(&files::read(path, files::MAX_PICTURE_BYTES)?, MOST_PX, path)?;
+    let picture = decode_rgba(&read_whole(path)?, MOST_PX, path)?;
     let (width_px, height_px) = picture.dimensions();
     let rgb = picture.pixels().map(|p| [p[0], p[1], p[2]]).collect();
     Ok(PhotoPixels { width_px, height_px, rgb, coverage: None })
 }
 
-/// Decodes a picture that must be of `expected` size, as 8-bit RGB or RGBA.
-fn decode(path: &Path, expected: (u32, u32)) -> Result<Pixels, IoError> {
+/// The bytes of a picture file that is not cut off.
+fn read_whole(path: &Path) -> Result<Vec<u8>, IoError> {
     let bytes = files::read(path, files::MAX_PICTURE_BYTES)?;
     if is_cut_jpeg(&bytes) {
         return Err(IoError::Picture {
@@ -69,6 +69,12 @@ fn decode(path: &Path, expected: (u32, u32)) -> Result<Pixels, IoError> {
             reason: "the JPEG data has no end; the file is cut off".into(),
         });
     }
+    Ok(bytes)
+}
+
+/// Decodes a picture that must be of `expected` size, as 8-bit RGB or RGBA.
+fn decode(path: &Path, expected: (u32, u32)) -> Result<Pixels, IoError> {
+    let bytes = read_whole(path)?;
     let decoder = decoder(&bytes, path)?;
     let found = decoder.dimensions();
     if found != expected {

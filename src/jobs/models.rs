@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use super::JobError;
+use crate::io::memory;
 use crate::math::stats::median;
 use crate::models::catalog;
 pub(crate) use crate::models::catalog::{ModelEntry, ModelRole, ModelState, SAM2};
@@ -29,6 +30,11 @@ pub struct ModelList {
 }
 
 impl ModelList {
+    /// The model of this name.
+    pub(crate) fn get(&self, id: &str) -> Option<&(ModelEntry, ModelState)> {
+        self.models.iter().find(|(e, _)| e.id == id)
+    }
+
     /// The models for one purpose.
     pub(crate) fn of(&self, role: ModelRole) -> impl Iterator<Item = (&ModelEntry, &ModelState)> {
         self.models.iter().filter(move |(e, _)| e.role == role).map(|(e, s)| (e, s))
@@ -54,14 +60,13 @@ pub(crate) fn list() -> ModelList {
         Ok(engine) => (Some([engine.name(), engine.device()].map(str::to_owned)), engine.note().map(str::to_owned)),
         Err(e) => (None, Some(e.to_string())),
     };
-    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let folder = models::folder();
     let models = catalog::entries().unwrap_or_else(|e| {
         note = Some(e.to_string());
         Vec::new()
     });
     let models = models.into_iter().map(|e| (e.clone(), e.state(&folder))).collect();
-    ModelList { engine, is_fast, cores, note, folder, models }
+    ModelList { engine, is_fast, cores: memory::cores(), note, folder, models }
 }
 
 /// Where the files of a model come from.

@@ -9,8 +9,12 @@ use crate::scene::{Dataset, GaussianCloud, Machine, Overrides, SceneFacts, Scene
 /// Looks at memory, cores and the graphics adapter. Takes some milliseconds: not for the window's
 /// thread.
 pub(crate) fn machine() -> Machine {
-    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-    Machine { free_memory_bytes: memory::free(), max_gaussians: budget::gaussians(), cores, gpu: real_gpu() }
+    Machine {
+        free_memory_bytes: memory::free(),
+        max_gaussians: budget::gaussians(),
+        cores: memory::cores(),
+        gpu: real_gpu(),
+    }
 }
 
 /// Facts about photos and trained Gaussians; those come with the degree of the harmonics in their file.

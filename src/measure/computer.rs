@@ -1,6 +1,7 @@
 //! The machine that a report was measured on: times of different machines do not compare.
 
 use super::document::Computer;
+use crate::io::memory;
 use crate::render::real_gpu;
 
 pub(crate) fn look() -> Computer {
@@ -13,7 +14,7 @@ pub(crate) fn look() -> Computer {
     }
     Computer {
         processor: if processor.is_empty() { "unknown".into() } else { processor },
-        cores: std::thread::available_parallelism().map_or(1, std::num::NonZero::get),
+        cores: memory::cores(),
         memory_bytes,
         gpu: real_gpu(),
         system: format!("{} {}", std::env::consts::OS, std::env::consts::ARCH),

@@ -62,14 +62,11 @@ impl DemoEncoder {
 impl Half {
     /// The network, prepared if it is not yet.
     fn ready(&mut self) -> Result<&mut Network, ModelError> {
-        if self.network.is_none() {
-            self.network = Some(engine()?.load(&self.bytes, self.name)?);
-        }
-        self.network.as_mut().ok_or_else(|| ModelError::Load {
-            model: self.name.into(),
-            engine: "built-in",
-            problem: "it is gone".into(),
-        })
+        let loaded = match self.network.take() {
+            Some(network) => network,
+            None => engine()?.load(&self.bytes, self.name)?,
+        };
+        Ok(self.network.insert(loaded))
     }
 }
 
@@ -93,7 +90,8 @@ impl Encoder for DemoEncoder {
     fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
         let tokens = self.words.encode(phrase)?;
         let tokens = Tensor::new(&[1, tokens.len()], tokens);
-        only(self.text.ready()?.unit_rows(vec![("tokens", tokens.into())], "embedding", self.words.dimension)?)
+        let rows = self.text.ready()?.unit_rows(vec![("tokens", tokens.into())], "embedding", self.words.dimension)?;
+        self.only(rows)
     }
 
     fn unknown_words(&self, phrase: &str) -> Vec<String> {
@@ -113,12 +111,13 @@ impl DemoEncoder {
         let channel = |c: usize| tile.rgb.iter().map(move |p| p[c].clamp(0.0, 1.0));
         let planes: Vec<f32> = (0..3).flat_map(channel).collect();
         let pixels = Tensor::new(&[1, 3, side, side], planes);
-        only(self.image.ready()?.unit_rows(vec![("tile", pixels.into())], "embedding", self.words.dimension)?)
+        let rows = self.image.ready()?.unit_rows(vec![("tile", pixels.into())], "embedding", self.words.dimension)?;
+        self.only(rows)
     }
-}
 
-fn only(mut rows: Vec<Vec<f32>>) -> Result<Vec<f32>, ModelError> {
-    rows.pop().ok_or_else(|| ModelError::NoOutput { model: super::DEMO.into(), output: "embedding".into() })
+    fn only(&self, mut rows: Vec<Vec<f32>>) -> Result<Vec<f32>, ModelError> {
+        rows.pop().ok_or_else(|| ModelError::NoOutput { model: self.name.clone(), output: "embedding".into() })
+    }
 }
 
 #[cfg(test)]

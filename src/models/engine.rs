@@ -28,6 +28,8 @@ const MODEL_USE: &str = "its first use";
 pub(crate) struct Engine {
     environment: Environment,
     name: String,
+    /// Whether it is ONNX Runtime.
+    is_runtime: bool,
     device: Option<Device>,
     note: Option<String>,
 }
@@ -203,7 +205,7 @@ impl Engine {
                 device
             }
         };
-        Ok(Self { environment, name, device, note })
+        Ok(Self { environment, name, is_runtime, device, note })
     }
 
     pub(crate) fn name(&self) -> &str {
@@ -212,7 +214,7 @@ impl Engine {
 
     /// Whether it is ONNX Runtime.
     pub(crate) fn is_fast(&self) -> bool {
-        !self.name.starts_with("tract")
+        self.is_runtime
     }
 
     pub(crate) fn device(&self) -> &'static str {

@@ -6,7 +6,7 @@
 //! there are, and [`fetch`] brings them; `template` makes them of
 //! official checkpoints.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::io::data_folder::data_folder;
 
@@ -30,8 +30,6 @@ mod tile;
 mod unpack;
 mod vocabulary;
 mod words;
-
-use std::path::Path;
 
 pub(crate) use catalog::ModelRole;
 pub use clip::ClipEncoder;

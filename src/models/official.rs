@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::catalog::{InstallError, ModelEntry, ModelRole, OfficialFile};
-use super::fetch::{self, FileToFetch, Patience};
+use super::fetch::{self, FetchError, FileToFetch, Patience};
 use super::template::Template;
 use super::{ModelError, manifest, unpack};
 
@@ -103,9 +103,12 @@ impl ModelEntry {
             let url = in_mirror(&known.picture, mirror.as_deref());
             let wanted = FileToFetch { url: &url, to: &to, bytes: None, most: fetch::MOST_UNPROMISED, sha256: None };
             if !to.is_file() {
-                // The model is as good without; who checks it is told that the picture is missing.
                 let once = Patience { attempts: 1, ..patience };
-                let _ = fetch::fetch(&wanted, once, &mut |there, all| progress("picture", there, all));
+                // The model is as good without; who checks it is told that the picture is missing.
+                let got = fetch::fetch(&wanted, once, &mut |there, all| progress("picture", there, all));
+                if let Err(e @ FetchError::Cancelled { .. }) = got {
+                    return Err(e.into());
+                }
             }
         }
         Ok(())

@@ -114,14 +114,7 @@ impl<'a> Template<'a> {
         }
         let source = super::fetch::sha256(checkpoint).map_err(|e| failed(checkpoint, e))?;
         about.insert("checkpoint_sha256".into(), source.into());
-        let path = draft.join(description);
-        std::fs::write(&path, format!("{:#}\n", Value::Object(about))).map_err(|e| failed(&path, e))?;
-        files.push(description.to_owned());
-        for name in files {
-            let to = folder.join(&name);
-            std::fs::rename(draft.join(&name), &to).map_err(|e| failed(&to, e))?;
-        }
-        Ok(())
+        put_in_place(draft, folder, files, description, &Value::Object(about))
     }
 
     /// The folder of the checkpoint in which most of the tensors lie.
@@ -165,11 +158,29 @@ impl<'a> Template<'a> {
     }
 }
 
-fn failed(path: &Path, e: io::Error) -> ModelError {
+/// Moves files out of their `draft` folder and describes them; the description last: without it, they are not here.
+pub(super) fn put_in_place(
+    draft: &Path,
+    folder: &Path,
+    mut files: Vec<String>,
+    description: &str,
+    about: &Value,
+) -> Result<(), ModelError> {
+    let path = draft.join(description);
+    std::fs::write(&path, format!("{about:#}\n")).map_err(|e| failed(&path, e))?;
+    files.push(description.to_owned());
+    for name in files {
+        let to = folder.join(&name);
+        std::fs::rename(draft.join(&name), &to).map_err(|e| failed(&to, e))?;
+    }
+    Ok(())
+}
+
+pub(super) fn failed(path: &Path, e: io::Error) -> ModelError {
     ModelError::File(write_error(path, e))
 }
 
-fn hex(digest: &[u8]) -> String {
+pub(super) fn hex(digest: &[u8]) -> String {
     digest.iter().map(|b| format!("{b:02x}")).collect()
 }
 

@@ -6,11 +6,12 @@ use std::path::Path;
 
 use flate2::read::GzDecoder;
 use serde_json::json;
+use sha2::{Digest, Sha256};
 use tar::{Archive, EntryType};
 use zip::ZipArchive;
 
 use super::ModelError;
-use crate::io::error::write_error;
+use super::template::{failed, hex, put_in_place};
 use crate::io::temporary::temporary_folder;
 
 /// Largest library, bytes; those of the processor's releases have some 20 to 40 MB.
@@ -22,7 +23,6 @@ const MOST_UNPACKED: u64 = 4 << 30;
 /// nothing. Names inside the archive decide nothing but which entry it is.
 pub(super) fn library(archive: &Path, name: &str, folder: &Path, description: &str) -> Result<(), ModelError> {
     let refused = |problem: String| ModelError::Metadata { path: archive.into(), problem };
-    let failed = |path: &Path, e| ModelError::File(write_error(path, e));
     let mut file = crate::io::files::open(archive).map_err(|e| refused(e.to_string()))?;
     let bytes = found(&mut file, name).map_err(refused)?;
     std::fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
@@ -31,19 +31,12 @@ pub(super) fn library(archive: &Path, name: &str, folder: &Path, description: &s
     let path = draft.join(name);
     let written = File::create(&path).and_then(|mut out| out.write_all(&bytes).and_then(|()| out.sync_all()));
     written.map_err(|e| failed(&path, e))?;
-    let sha256 = |path: &Path| super::fetch::sha256(path).map_err(|e| failed(path, e));
     let about = json!({
-        "version": 1, "kind": "engine", "checkpoint_sha256": sha256(archive)?,
-        "graphs": { "library": { "file": name, "bytes": bytes.len(), "sha256": sha256(&path)? } },
+        "version": 1, "kind": "engine",
+        "checkpoint_sha256": super::fetch::sha256(archive).map_err(|e| failed(archive, e))?,
+        "graphs": { "library": { "file": name, "bytes": bytes.len(), "sha256": hex(&Sha256::digest(&bytes)) } },
     });
-    let path = draft.join(description);
-    std::fs::write(&path, format!("{about:#}\n")).map_err(|e| failed(&path, e))?;
-    // The description last: without it, the library is not here.
-    for name in [name, description] {
-        let to = folder.join(name);
-        std::fs::rename(draft.join(name), &to).map_err(|e| failed(&to, e))?;
-    }
-    Ok(())
+    put_in_place(draft, folder, vec![name.to_owned()], description, &about)
 }
 
 /// Whether a file in an archive is the library, which may have its version in its name.
@@ -62,7 +55,6 @@ fn found(file: &mut File, name: &str) -> Result<Vec<u8>, String> {
     let read = file.read_exact(&mut start).and_then(|()| file.seek(SeekFrom::Start(0)));
     let broken = |e: &dyn std::fmt::Display| format!("the archive is broken: {e}; the download may be incomplete");
     read.map_err(|e| broken(&e))?;
-    let large = |bytes: u64| format!("its library has {bytes} bytes, more than the {MOST} that are possible");
     match &start {
         [0x1f, 0x8b] => {
             // Whatever it says of itself, no more than this is unpacked.
@@ -72,7 +64,7 @@ fn found(file: &mut File, name: &str) -> Result<Vec<u8>, String> {
                 let path = entry.path().map_err(|e| broken(&e))?.into_owned();
                 if entry.header().entry_type() == EntryType::Regular && is_library(&path, name) {
                     let bytes = entry.size();
-                    return if bytes > MOST { Err(large(bytes)) } else { whole(entry, bytes) };
+                    return whole(entry, bytes);
                 }
             }
         }
@@ -83,7 +75,7 @@ fn found(file: &mut File, name: &str) -> Result<Vec<u8>, String> {
                 let path = entry.enclosed_name().unwrap_or_default();
                 if entry.is_file() && is_library(&path, name) {
                     let bytes = entry.size();
-                    return if bytes > MOST { Err(large(bytes)) } else { whole(entry, bytes) };
+                    return whole(entry, bytes);
                 }
             }
         }
@@ -94,6 +86,9 @@ fn found(file: &mut File, name: &str) -> Result<Vec<u8>, String> {
 
 /// All bytes of an entry that states so many.
 fn whole(entry: impl Read, stated: u64) -> Result<Vec<u8>, String> {
+    if stated > MOST {
+        return Err(format!("its library has {stated} bytes, more than the {MOST} that are possible"));
+    }
     let mut bytes = Vec::new();
     // One more shows an entry that is longer than it states.
     entry.take(stated + 1).read_to_end(&mut bytes).map_err(|e| format!("its library cannot be read: {e}"))?;

@@ -1,10 +1,12 @@
 //! Finding objects: asks with what where photos came without labels, downloads what that needs, and goes on by itself.
 
+use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::app::App;
 use super::find_dialog::{AwaitedModels, Means};
+use super::panes::models::Models;
 use super::state::Tone;
 use crate::jobs::find_objects::FindRequest;
 use crate::worker::{Command, Event};
@@ -16,26 +18,33 @@ impl App {
         if has_labels || !self.state.is_trained() {
             return self.find_objects_by(None);
         }
-        if self.submit(Command::ListModels).is_some() {
-            self.find_dialog.open();
-        }
+        // Files may have been put there by hand since they were listed.
+        self.models = Models::default();
+        self.find_dialog.open();
     }
 
-    /// Goes on with what was decided.
-    pub(super) fn find_with(&mut self, means: Means) {
-        let Means { segmenter, encoder, mut missing } = means;
+    /// Shows the dialog if it is open, and goes on with what is decided there.
+    pub(super) fn ask_for_means(&mut self, ctx: &egui::Context) {
+        if self.find_dialog.is_open() {
+            self.models.keep_listed(&self.state, &self.worker);
+        }
+        let max_seeds = self.layout.finding.max_seeds;
+        let means = self.find_dialog.show(ctx, &self.state, max_seeds, &mut self.actions);
+        means.into_iter().for_each(|means| self.find_with(means));
+    }
+
+    fn find_with(&mut self, means: Means) {
+        let Means { segmenter, encoder, missing } = means;
         (self.layout.finding.segmenter, self.layout.finding.encoder) = (Some(segmenter), Some(encoder));
-        if missing.is_empty() {
-            return self.find_objects_by(None);
-        }
-        let first = missing.remove(0);
-        self.await_model(first, missing);
+        self.find_after(missing);
     }
 
-    fn await_model(&mut self, id: String, then: Vec<String>) {
+    /// Finds objects once these models are here: downloads the first of them, or finds if there is none.
+    fn find_after(&mut self, mut missing: VecDeque<String>) {
+        let Some(id) = missing.pop_front() else { return self.find_objects_by(None) };
         let scene = self.state.scene_number;
         let job = self.submit(Command::InstallModel { id, brought: None });
-        self.awaited = job.map(|job| AwaitedModels { job, then, scene });
+        self.awaited = job.map(|job| AwaitedModels { job, then: missing, scene });
     }
 
     /// Takes note of what happens to the downloads that a search waits for.
@@ -47,16 +56,8 @@ impl App {
             return self.state.toast(Tone::Warning, text);
         }
         // Another scene was opened meanwhile: nobody asked about that one.
-        if awaited.scene != self.state.scene_number {
-            return;
-        }
-        let mut then = awaited.then;
-        match then.is_empty() {
-            true => self.find_objects_by(None),
-            false => {
-                let next = then.remove(0);
-                self.await_model(next, then);
-            }
+        if awaited.scene == self.state.scene_number {
+            self.find_after(awaited.then);
         }
     }
 

@@ -51,7 +51,7 @@ pub struct App {
     /// The list of phrases.
     pub phrases: PhrasesPane,
     pub(super) objects: ObjectsPane,
-    models: Models,
+    pub(super) models: Models,
     /// Error against run time.
     pub(crate) report: ReportPane,
     /// The camera's path and its player.
@@ -59,7 +59,7 @@ pub struct App {
     /// The conversation with the agent.
     pub(crate) chat: Chat,
     toasts: Toasts,
-    actions: Vec<Action>,
+    pub(super) actions: Vec<Action>,
     /// Window time of the last frame.
     last_frame: f64,
     /// Number of the scene that was looked at before anybody wanted to go anywhere.
@@ -154,11 +154,11 @@ impl App {
             self.actions.extend(next);
         }
         self.state.replan(&self.layout.plan, self.layout.config.limits());
+        self.state.stamp_log(resource_log::now_secs());
         for load in resource_log::since(self.traced) {
             self.traced += 1;
-            self.state.say(super::state::Tone::Info, load.text());
+            self.state.say_at(Some(load.at_secs), super::state::Tone::Info, load.text());
         }
-        self.state.stamp_log(resource_log::now_secs());
         // Once there are objects, they are what a user works with.
         let has_objects = self.state.semantics.is_some();
         let news = if has_objects { Pane::Objects } else { Pane::Training };
@@ -305,10 +305,7 @@ impl App {
         {
             self.give_up_and(question.action);
         }
-        let max_seeds = self.layout.finding.max_seeds;
-        if let Some(means) = self.find_dialog.show(ctx, &self.state, max_seeds, &mut self.actions) {
-            self.find_with(means);
-        }
+        self.ask_for_means(ctx);
         if let Some(photos) = &self.state.unposed
             && !unposed::show(ctx, photos, &mut self.actions)
         {

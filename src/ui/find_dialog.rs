@@ -1,6 +1,8 @@
 //! The way to objects and parts where photos came without labels: what each means can and cannot do, what it costs,
 //! what has to be downloaded first. Whoever agrees need not come back: downloads are followed by the search.
 
+use std::collections::VecDeque;
+
 use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
 
 use super::state::AppState;
@@ -28,7 +30,7 @@ pub(crate) struct Means {
     pub(crate) segmenter: String,
     pub(crate) encoder: String,
     /// Models to download first.
-    pub(crate) missing: Vec<String>,
+    pub(crate) missing: VecDeque<String>,
 }
 
 /// A search that waits for downloads.
@@ -36,7 +38,7 @@ pub(super) struct AwaitedModels {
     /// The download under way.
     pub(super) job: JobId,
     /// What comes after it.
-    pub(super) then: Vec<String>,
+    pub(super) then: VecDeque<String>,
     /// The scene that is searched.
     pub(super) scene: u64,
 }
@@ -97,7 +99,7 @@ impl FindDialog {
         let best = |role: ModelRole| known.best(role).map(|e| e.id.clone());
         let segmenter = self.segmenter.clone().or_else(|| best(ModelRole::Segmenter)).unwrap_or_else(|| REGIONS.into());
         let encoder = self.encoder.clone().or_else(|| best(ModelRole::Encoder)).unwrap_or_else(|| NO_ENCODER.into());
-        let is_missing = |id: &&String| known.models.iter().any(|(e, s)| e.id == **id && !s.is_usable());
+        let is_missing = |id: &&String| known.get(id).is_some_and(|(_, s)| !s.is_usable());
         let missing = [&segmenter, &encoder].into_iter().filter(is_missing).cloned().collect();
         Means { segmenter, encoder, missing }
     }
@@ -211,8 +213,8 @@ fn choice(ui: &mut Ui, chosen: bool, title: &str, means: &str, costs: &str) -> b
 
 /// What happens next: sizes, times, and what words will find.
 fn summary(ui: &mut Ui, known: &ModelList, means: &Means, most_photos: usize) {
-    let entry = |id: &String| known.models.iter().find(|(e, _)| e.id == *id).map(|(e, _)| e);
-    let megabytes: u64 = means.missing.iter().filter_map(entry).map(ModelEntry::download_megabytes).sum();
+    let missing = means.missing.iter().filter_map(|id| known.get(id));
+    let megabytes: u64 = missing.map(|(e, _)| e.download_megabytes()).sum();
     let mut parts = Vec::new();
     if megabytes > 0 {
         parts.push(format!("Download {megabytes} MB."));
@@ -221,7 +223,7 @@ fn summary(ui: &mut Ui, known: &ModelList, means: &Means, most_photos: usize) {
     ui.label(parts.join(" "));
     let warning = match means.encoder.as_str() {
         NO_ENCODER => Some("Words find nothing until you name things."),
-        id if entry(&id.to_owned()).is_some_and(|e| e.built_in) => {
+        id if known.get(id).is_some_and(|(e, _)| e.built_in) => {
             Some("The built-in encoder was trained on made-up scenes: on real photos words find next to nothing.")
         }
         _ => None,

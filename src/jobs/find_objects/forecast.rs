@@ -1,5 +1,6 @@
 //! How long looking for masks takes, said before it is begun.
 
+use crate::io::memory;
 use crate::jobs::models::{ModelEntry, ModelList};
 use crate::math::format;
 use crate::models::catalog;
@@ -18,15 +19,13 @@ pub(crate) struct LookTime {
 impl LookTime {
     /// That of a model of the list if its time was measured.
     pub(crate) fn of(segmenter: &str, known: &ModelList) -> Option<Self> {
-        let entry = known.models.iter().map(|(e, _)| e).find(|e| e.id == segmenter)?;
-        Self::estimated(entry, known.is_fast, known.cores)
+        Self::estimated(&known.get(segmenter)?.0, known.is_fast, known.cores)
     }
 
     /// The same for work that has no list at hand.
     pub(super) fn of_installed(segmenter: &str) -> Option<Self> {
         let entry = catalog::entry(segmenter).ok()?;
-        let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        Self::estimated(&entry, engine().ok()?.is_fast(), cores)
+        Self::estimated(&entry, engine().ok()?.is_fast(), memory::cores())
     }
 
     fn estimated(entry: &ModelEntry, is_fast: bool, cores: usize) -> Option<Self> {

@@ -96,9 +96,9 @@ pub(super) fn measure(
     if settings.table == PaperTable::PartAblation {
         for components in Components::ROWS {
             let row = part_recall::row((components, &ours()), map, language, &views, |p| by.encoder.text(p))?;
-            let percent = |value: &dyn Fn(f64) -> f64| row.units.iter().map(|u| 100.0 * value(u.iou)).collect();
-            let recall = percent(&|iou| if iou >= part_recall::HIT_IOU { 1.0 } else { 0.0 });
-            let scores = BTreeMap::from([(RECALL.into(), recall), (PART_IOU.into(), percent(&|iou| iou))]);
+            let recall = percent(row.units.iter().map(|u| f64::from(u.iou >= part_recall::HIT_IOU)));
+            let ious = percent(row.units.iter().map(|u| u.iou));
+            let scores = BTreeMap::from([(RECALL.into(), recall), (PART_IOU.into(), ious)]);
             rows.push(RowResult { name: components_name(components).into(), scores });
         }
     } else {
@@ -167,7 +167,7 @@ impl ByEmbedding {
 /// Answers a phrase; `None` if nothing can be said.
 type Ask<'a> = &'a mut dyn FnMut(&str) -> Result<Option<QueryAnswer>, ModelError>;
 /// Relevancy of a view's pixels for a phrase, by the view's place.
-type Heat<'a> = &'a mut dyn FnMut(usize, &str) -> Result<Option<Vec<f32>>, ModelError>;
+type Heat<'a> = &'a mut dyn FnMut(usize, &str) -> Result<Option<Vec<f32>>, JobError>;
 
 struct Table<'a> {
     which: PaperTable,
@@ -313,14 +313,23 @@ fn rule_rows(
     })?;
     let PhotoComparison { cloud, settings, .. } = comparison;
     let mut renderer = Renderer::new();
-    let of_view = |v: &LabeledView<'_>| weights(&mut renderer, cloud, &map.identity_of, v.camera, settings);
-    let pixels = views.iter().map(of_view).collect::<Result<Vec<_>, _>>()?;
     let raw = RawFeatures::new(language);
+    // Of one view at a time: weights of all would take gigabytes.
+    let mut kept = None;
     let blended = table.ruled_row("raw features per Gaussian, LERF's mask rule", views, &mut |k, phrase| {
         let Some(parsed) = ParsedQuery::parse(phrase) else { return Ok(None) };
-        // It learns the phrase, and notes what is unknown.
-        by.ask(map, (language, &recipe), phrase)?;
-        Ok(raw.relevancy(&pixels[k], &parsed.text, &by.phrases, &recipe))
+        match by.phrases.learn(&parsed, &recipe, |p| by.encoder.text(p)) {
+            // The row before has noted it.
+            Err(ModelError::NoKnownWord { .. }) => return Ok(None),
+            learned => learned?,
+        }
+        let pixels = match kept.take() {
+            Some((of, pixels)) if of == k => pixels,
+            _ => weights(&mut renderer, cloud, &map.identity_of, views[k].camera, settings)?,
+        };
+        let relevancy = raw.relevancy(&pixels, &parsed.text, &by.phrases, &recipe);
+        kept = Some((k, pixels));
+        Ok(relevancy)
     })?;
     Ok([ruled, blended])
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
 use super::layout::SceneInput;
 use super::rows::{self, QueryTimes, RowResult};
-use super::{LABELS, REGIONS, ReproduceSettings};
+use super::{LABELS, ReproduceSettings};
 use crate::io::labels::Labels;
 use crate::io::semantic_map;
 use crate::jobs::evaluate::PhotoComparison;
@@ -162,14 +162,12 @@ fn objects(
     let scene = open::scene(folder)?;
     let mut with = FindSettings { encoder: Some(settings.encoder.clone()), ..FindSettings::default() };
     let mut masks: Option<PathBuf> = None;
-    match settings.masks.as_str() {
-        LABELS => {
-            masks = Some(input.labels.clone());
-            // Else none might be left to compare with.
-            with.max_seeds = if settings.labeled_in_training { 1 } else { with.max_seeds };
-        }
-        REGIONS => with.segmenter = Some(REGIONS.into()),
-        network => with.segmenter = Some(network.into()),
+    if settings.masks == LABELS {
+        masks = Some(input.labels.clone());
+        // Else none might be left to compare with.
+        with.max_seeds = if settings.labeled_in_training { 1 } else { with.max_seeds };
+    } else {
+        with.segmenter = Some(settings.masks.clone());
     }
     let request = FindRequest {
         folder: folder.into(),

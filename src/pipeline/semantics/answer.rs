@@ -10,7 +10,8 @@ use super::localize::{Answer, Hit, Scorer, localize};
 use super::matching::{self, MatchMode};
 use super::names::{self, ByName};
 use super::parse::ParsedQuery;
-use super::recipe::{Recipe, Rejection, RelevancyScale, Strategy, Understanding};
+use super::recipe::{Recipe, RelevancyScale, Strategy, Understanding};
+use super::relevancy::{LERFS_SHARE, on_lerfs_scale};
 use super::timing::{StagesMs, ms_since};
 use super::view_map::ViewMap;
 use crate::scene::{Identities, IdentityId, LanguageFeatures, LevelFilter, Mask};
@@ -36,9 +37,6 @@ pub(crate) enum Certainty {
 
 /// Score from which, and margin by which, what looks like the query is likely meant.
 const LIKELY: (f32, f32) = (0.6, 0.05);
-
-/// Share of LERF's scale from which a pixel belongs to what was asked for.
-pub(crate) const LERFS_SHARE: f32 = 0.2;
 
 /// An answered query.
 #[derive(Clone, Debug, PartialEq)]
@@ -243,11 +241,10 @@ impl QueryAnswer {
 
     /// Score from which an identity is what was asked for.
     pub(crate) fn threshold(&self) -> f32 {
-        match (self.recipe.rejection, self.basis) {
-            (Rejection::Never, _) => 0.0,
-            (_, Basis::Names) => names::THRESHOLD,
-            (_, Basis::Embedding) => super::by_embedding::THRESHOLD,
-        }
+        self.recipe.rejection.threshold(match self.basis {
+            Basis::Names => names::THRESHOLD,
+            Basis::Embedding => super::by_embedding::THRESHOLD,
+        })
     }
 
     fn resolution(&self) -> f32 {
@@ -276,8 +273,7 @@ impl QueryAnswer {
     fn lerfs_scale(&self, seen: impl Iterator<Item = IdentityId>) -> Vec<f32> {
         let of = |id: IdentityId| self.relevancy.get(id as usize).copied().unwrap_or(0.0);
         let most = seen.map(of).fold(0.0, f32::max);
-        let scaled = |r: &f32| if most > 0.5 { ((r - 0.5) / (most - 0.5)).clamp(0.0, 1.0) } else { 0.0 };
-        self.relevancy.iter().map(scaled).collect()
+        self.relevancy.iter().map(|r| on_lerfs_scale(*r, most).clamp(0.0, 1.0)).collect()
     }
 
     /// Whether each identity is relevant enough on LERF's scale, among those that are `seen`.

@@ -161,7 +161,7 @@ impl Scorer for EmbeddingScorer<'_> {
     }
 
     fn threshold(&self) -> f32 {
-        if self.recipe.rejection == Rejection::Never { 0.0 } else { THRESHOLD }
+        self.recipe.rejection.threshold(THRESHOLD)
     }
 
     fn resolution(&self) -> f32 {

@@ -28,7 +28,7 @@ impl Scorer for ByName<'_> {
     }
 
     fn threshold(&self) -> f32 {
-        if self.rejection == Rejection::Never { 0.0 } else { THRESHOLD }
+        self.rejection.threshold(THRESHOLD)
     }
 
     fn rejects(&mut self, phrase: &ParsedQuery, hit: &Hit) -> bool {
@@ -98,17 +98,13 @@ fn not_in(phrase: &str, known: &HashSet<String>) -> Vec<String> {
 /// Names for a phrase that is being typed, best first.
 pub(crate) fn completions(identities: &Identities, typed: &str, most: usize) -> Vec<String> {
     let typed = typed.to_lowercase();
-    let mut found: Vec<String> = Vec::new();
     let named = identities.iter().filter(|(_, i)| !i.names.is_empty());
     let mut all: Vec<String> = named.map(|(id, _)| identities.full_name(id)).collect();
+    all.retain(|n| n.to_lowercase().contains(&typed));
     all.sort_by_key(|n| (!n.to_lowercase().starts_with(&typed), n.chars().count(), n.clone()));
-    for name in all {
-        if name.to_lowercase().contains(&typed) && !found.contains(&name) {
-            found.push(name);
-        }
-    }
-    found.truncate(most);
-    found
+    all.dedup();
+    all.truncate(most);
+    all
 }
 
 /// Harmonic mean of how much of the phrase is in the name and how much of the name in the phrase.

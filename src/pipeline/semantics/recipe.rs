@@ -1,9 +1,11 @@
 //! A recipe: every choice in which this program's way differs from the paper's. One type, which the window, the
 //! command line, the agent and all measurements pass on as it is.
 
+use std::collections::HashSet;
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
+use strum::VariantArray;
 
 use super::codes::TOLERANCE;
 use super::matching::MatchMode;
@@ -149,6 +151,13 @@ pub enum Rejection {
     Strict,
 }
 
+impl Rejection {
+    /// Score from which something may be the answer, where it usually is from `usual`.
+    pub(crate) fn threshold(self, usual: f32) -> f32 {
+        if self == Self::Never { 0.0 } else { usual }
+    }
+}
+
 /// The phrases that mean anything: what is asked for must be nearer than they are.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CanonicalPhrases(Vec<String>);
@@ -177,7 +186,8 @@ impl std::str::FromStr for CanonicalPhrases {
         let text = named.unwrap_or_else(|| text.to_lowercase());
         let mut phrases: Vec<String> =
             text.split(',').map(str::trim).filter(|p| !p.is_empty()).map(str::to_owned).collect();
-        phrases.dedup();
+        let mut seen = HashSet::new();
+        phrases.retain(|p| seen.insert(p.clone()));
         match phrases.len() {
             0 => Err("no phrase is given: write 'paper', 'lerf', or phrases with commas between".into()),
             n if n > 64 => Err(format!("{n} phrases exceed the limit of 64")),
@@ -280,7 +290,7 @@ impl Recipe {
 
     /// The name of this recipe; `None` if it is one of nobody's making but the user's.
     pub fn name(&self) -> Option<RecipeName> {
-        [RecipeName::Default, RecipeName::Paper].into_iter().find(|name| *self == name.recipe())
+        RecipeName::VARIANTS.iter().copied().find(|name| *self == name.recipe())
     }
 
     /// What of this recipe a scene was not prepared for: it answers otherwise than the recipe says.

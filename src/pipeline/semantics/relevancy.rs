@@ -10,9 +10,21 @@ use crate::math::vector::{dot, unit};
 /// How much nearer a feature is to the query than to the nearest of the `canonical` phrases. Above
 /// zero, it is what was asked for rather than anything.
 pub fn advantage(feature: &[f32], query: &[f32], canonical: &[Vec<f32>]) -> f32 {
-    let nearest = canonical.iter().map(|c| dot(feature, c)).fold(f32::NEG_INFINITY, f32::max);
-    let nearest = if nearest.is_finite() { nearest } else { 0.0 };
-    dot(feature, query) - nearest
+    dot(feature, query) - nearest(canonical.iter().map(|c| dot(feature, c)))
+}
+
+/// How near the nearest canonical phrase is; 0 without any.
+pub(crate) fn nearest(canonical: impl Iterator<Item = f32>) -> f32 {
+    let nearest = canonical.fold(f32::NEG_INFINITY, f32::max);
+    if nearest.is_finite() { nearest } else { 0.0 }
+}
+
+/// Share of LERF's scale from which a pixel belongs to what was asked for.
+pub(crate) const LERFS_SHARE: f32 = 0.2;
+
+/// Relevancy on LERF's scale: from one half (no more relevant than a canonical phrase) to the largest of the view.
+pub(crate) fn on_lerfs_scale(relevancy: f32, most: f32) -> f32 {
+    if most > 0.5 { (relevancy - 0.5) / (most - 0.5) } else { 0.0 }
 }
 
 /// The score of an advantage, 0 to 1.

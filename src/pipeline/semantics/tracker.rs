@@ -190,6 +190,11 @@ struct Tracker<'a> {
 }
 
 impl Tracker<'_> {
+    /// Whose each Gaussian is by the votes so far.
+    fn decided(&self) -> Vec<IdentityId> {
+        self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect()
+    }
+
     /// Looks how well each Gaussian is seen in every photo, before any votes.
     fn see(&mut self, observer: &mut dyn Observer) -> Result<(), FindError> {
         let mut ticker = Ticker::new("Looking what each photo shows", self.photos.len());
@@ -257,7 +262,7 @@ impl Tracker<'_> {
     ) -> Result<(), FindError> {
         let mut followed = follower.follow(self.photos, seed, (found, ids), self.options.prompt, observer)?;
         // What is known from the seed alone: it shall not be judged by what it is to judge.
-        let of: Vec<IdentityId> = self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect();
+        let of = self.decided();
         for photo in (0..self.photos.len()).filter(|photo| *photo != seed) {
             let labels = &mut followed[photo];
             if self.options.veto {
@@ -309,7 +314,7 @@ impl Tracker<'_> {
 
     /// What is known of a view by now.
     fn map(&mut self, photo: usize, max_side_px: u32) -> Result<ViewMap, FindError> {
-        let of: Vec<IdentityId> = self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect();
+        let of = self.decided();
         self.map_of(photo, max_side_px, &of)
     }
 
@@ -325,7 +330,7 @@ impl Tracker<'_> {
         observer.proceed()?;
         // To see how much is unknown, small pictures will do.
         let side = self.options.max_side_px.min(256);
-        let of: Vec<IdentityId> = self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect();
+        let of = self.decided();
         let mut views = Vec::with_capacity(self.photos.len());
         for photo in 0..self.photos.len() {
             let map = self.map_of(photo, side, &of)?;

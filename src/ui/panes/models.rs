@@ -5,7 +5,7 @@ use egui::{Button, RichText, Ui};
 use super::super::state::AppState;
 use super::super::theme;
 use crate::jobs::find_objects::FindSettings;
-use crate::jobs::models::{ModelEntry, ModelRole, ModelState, SAM2};
+use crate::jobs::models::{ModelEntry, ModelList, ModelRole, ModelState, SAM2};
 use crate::pipeline::semantics::build_map::{Carry, REGIONS};
 use crate::scene::Lifting;
 use crate::ui::actions::Action;
@@ -19,6 +19,15 @@ pub(crate) struct Models {
 }
 
 impl Models {
+    /// Asks for the list, and again whenever a model was installed.
+    pub(crate) fn keep_listed(&mut self, state: &AppState, worker: &Worker) {
+        let now = Some(state.models_installed);
+        // With a full queue the request comes again with the next redraw.
+        if self.asked != now && worker.submit(Command::ListModels).is_ok() {
+            self.asked = now;
+        }
+    }
+
     pub(crate) fn show(
         &mut self,
         ui: &mut Ui,
@@ -27,11 +36,7 @@ impl Models {
         worker: &Worker,
         actions: &mut Vec<Action>,
     ) {
-        let now = Some(state.models_installed);
-        // With a full queue the request comes again with the next redraw.
-        if self.asked != now && worker.submit(Command::ListModels).is_ok() {
-            self.asked = now;
-        }
+        self.keep_listed(state, worker);
         let Some(known) = &state.models else {
             ui.weak("Looking for models\u{2026}");
             return;
@@ -39,7 +44,7 @@ impl Models {
         for (entry, model) in &known.models {
             one(ui, entry, model, state.job.is_none(), actions);
         }
-        choose(ui, &known.models, finding);
+        choose(ui, known, finding);
         let engine = known.engine.as_ref().map_or_else(|| "none".to_owned(), |names| names.join(", "));
         ui.label(RichText::new(format!("Inference engine: {engine}")).small().color(theme::weak()));
         if let Some(note) = &known.note {
@@ -49,11 +54,10 @@ impl Models {
 }
 
 /// The models that find objects, of those that are here.
-fn choose(ui: &mut Ui, models: &[(ModelEntry, ModelState)], finding: &mut FindSettings) {
+fn choose(ui: &mut Ui, known: &ModelList, finding: &mut FindSettings) {
     let here = |role: ModelRole| {
-        let of_role =
-            models.iter().filter(move |(e, s)| e.role == role && matches!(s, ModelState::Here | ModelState::BuiltIn));
-        of_role.map(|(e, _)| (e.id.clone(), e.title.clone())).collect::<Vec<_>>()
+        let usable = known.of(role).filter(|(_, s)| s.is_usable());
+        usable.map(|(e, _)| (e.id.clone(), e.title.clone())).collect::<Vec<_>>()
     };
     ui.label(RichText::new("Finding objects").strong());
     let mut segmenters = vec![(REGIONS.to_owned(), "uniform color regions".to_owned())];

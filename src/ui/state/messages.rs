@@ -58,10 +58,15 @@ impl LogLine {
 impl AppState {
     /// Adds a line to the log.
     pub(crate) fn say(&mut self, tone: Tone, text: impl Into<String>) {
+        self.say_at(None, tone, text);
+    }
+
+    /// The same with the time at which it was, if that is known.
+    pub(crate) fn say_at(&mut self, at_secs: Option<f64>, tone: Tone, text: impl Into<String>) {
         if self.log.len() == MAX_LOG {
             self.log.pop_front();
         }
-        self.log.push_back(LogLine { at_secs: None, tone, text: text::line(&text.into()).into_owned() });
+        self.log.push_back(LogLine { at_secs, tone, text: text::line(&text.into()).into_owned() });
     }
 
     /// Says when lines of the log were written that have come since this was said last.

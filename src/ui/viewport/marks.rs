@@ -113,12 +113,14 @@ impl Viewport {
             let inside = places.iter().filter(|p| shown.contains(**p)).count();
             let size = self.queries.span_of(semantics, id).map(|span| span.map(|span| span * shown.size()));
             let painter = ui.painter_at(shown);
-            let why = self.visibility.why_not_drawn(&semantics.identities, id).unwrap_or("occluded");
             let name = text::elided(&names.full_name(&semantics.identities, id), 40);
             let at = match mark(inside as f32 / points.len() as f32, size) {
                 Mark::None => continue,
                 Mark::Arrow => arrow(&painter, shown, way(&eye, &points), color, &name),
-                Mark::Ghost => ghost(&painter, &hull(places), color, &format!("{name} ({why})")),
+                Mark::Ghost => {
+                    let why = self.visibility.why_not_drawn(&semantics.identities, id).unwrap_or("occluded");
+                    ghost(&painter, &hull(places), color, &format!("{name} ({why})"))
+                }
                 Mark::Ring => ring(&painter, middle(&places), color),
             };
             let button = ui.interact(at, ui.scope_id().with(("mark", id, self.queries.is_second())), Sense::click());

@@ -2,6 +2,7 @@
 
 use super::super::localize::Hit;
 use super::*;
+use crate::pipeline::semantics::recipe::Rejection;
 use crate::scene::{Level, NOBODY, ViewFeatures};
 
 fn scene() -> (Identities, LanguageFeatures) {

@@ -1,23 +1,14 @@
 //! LERF's rule for masks: relevancy is scaled from one half (no more relevant than a canonical phrase) to the
 //! largest of the view, and what is over a fifth of that belongs to the mask.
 
+use crate::pipeline::semantics::relevancy::{LERFS_SHARE, on_lerfs_scale};
 use crate::scene::Mask;
-
-/// Relevancy that scales to nothing.
-const LEAST: f32 = 0.5;
-/// Share of the scale that is cut off.
-const CUT: f32 = 0.2;
 
 /// The mask of a view's relevancy, row-major; empty where no pixel is more relevant than a canonical phrase.
 pub(crate) fn mask(relevancy: &[f32], width_px: usize) -> Mask {
     let height_px = relevancy.len() / width_px.max(1);
     let most = relevancy.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-    // Written so that no number is over what is none.
-    if most > LEAST {
-        Mask::from_fn(width_px, height_px, |i| (relevancy[i] - LEAST) / (most - LEAST) > CUT)
-    } else {
-        Mask::empty(width_px, height_px)
-    }
+    Mask::from_fn(width_px, height_px, |i| on_lerfs_scale(relevancy[i], most) > LERFS_SHARE)
 }
 
 /// Index of the most relevant pixel, the first of equal ones.

@@ -7,7 +7,7 @@
 use crate::math::vector::dot;
 use crate::pipeline::semantics::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::recipe::Recipe;
-use crate::pipeline::semantics::relevancy::score;
+use crate::pipeline::semantics::relevancy::{nearest, score};
 use crate::pipeline::semantics::view_map::PixelWeights;
 use crate::scene::LanguageFeatures;
 
@@ -48,7 +48,7 @@ impl RawFeatures {
             let known = || slots.iter().filter(|s| s.1 > 0.0 && (s.0 as usize) < self.of.len());
             let blended = |v: &[f32]| known().map(|s| s.1 * v[s.0 as usize]).sum::<f32>();
             let length = known().map(|s| s.1 * blended(&self.products[s.0 as usize])).sum::<f32>().sqrt();
-            let nearest = canonical.iter().map(|c| blended(c)).fold(f32::NEG_INFINITY, f32::max);
+            let nearest = nearest(canonical.iter().map(|c| blended(c)));
             if length > 1e-6 { score((blended(&query) - nearest) / length, recipe.temperature) } else { 0.0 }
         };
         Some(view.iter().map(pixel).collect())

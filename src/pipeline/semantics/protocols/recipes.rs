@@ -11,6 +11,7 @@ use crate::pipeline::semantics::localize::Answer;
 use crate::pipeline::semantics::protocols::part_recall::HIT_IOU;
 use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::recipe::{PartFeatures, Recipe, Rejection, Strategy, Understanding};
+use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::semantics::words::words;
 use crate::scene::{Identities, IdentityId, Level, LevelFilter, SemanticMap};
 
@@ -139,9 +140,9 @@ pub(crate) fn row(
                 let answered = engine.ask(map, &question, LevelFilter::Auto)?;
                 let encoded = answered.as_ref().map_or(0.0, |a| a.stages.encode);
                 let mask = answered.map(|a| a.mask(view.exact, Some(view.blended), &map.identities, 1));
-                ms.push(start.elapsed().as_secs_f64() * 1e3 - encoded);
+                ms.push(ms_since(start) - encoded);
                 let level = usize::from(category.level == Level::Part);
-                recall[level + k].push(f64::from(u8::from(mask.is_some_and(|m| m.iou(&category.mask) >= HIT_IOU))));
+                recall[level + k].push(f64::from(mask.is_some_and(|m| m.iou(&category.mask) >= HIT_IOU)));
             }
         }
     }

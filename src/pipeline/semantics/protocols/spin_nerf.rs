@@ -16,6 +16,8 @@ pub(crate) struct Foreground {
 
 /// Compares the one category of a view with the answer to `query`; `None` if the view has no labels.
 pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>, query: &str) -> Option<Foreground> {
+    // Nothing is asked for nothing.
+    view.categories.first()?;
     let answered = (scene.ask)(query);
     let mask = answered.map(|a| a.mask(view.exact, Some(view.blended), &scene.map.identities, 1));
     let mask = mask.unwrap_or_else(|| Mask::empty(view.exact.width_px, view.exact.height_px));

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::basins::{OUTSIDE, basins};
 use super::edges::{ImagePlanes, strength};
-use super::lab::lab;
+use super::lab::{lab, planes};
 use super::tree::{Border, Piece, Tree, grow};
 use crate::scene::Mask;
 
@@ -42,8 +42,6 @@ impl Default for RegionOptions {
     }
 }
 
-/// Weight of lightness beside the two color axes: shadows change it within a thing.
-const LIGHTNESS: f32 = 0.7;
 /// Edge strength that basins are told apart by, Lab steps.
 const BASIN_STEP: f32 = 0.3;
 /// Weight of the edge along the border in unlikeness; the rest is the difference of the means.
@@ -96,9 +94,7 @@ struct Mosaic {
 impl Mosaic {
     fn of(picture: &Picture<'_>) -> Self {
         let (n, width) = (picture.rgb.len(), picture.width.max(1));
-        let colors = lab(picture.rgb);
-        let weights = [LIGHTNESS, 1.0, 1.0];
-        let channels = [0, 1, 2].map(|c| colors.iter().map(|p| weights[c] * p[c]).collect::<Vec<f32>>());
+        let channels = planes(&lab(picture.rgb));
         let strength = strength(&ImagePlanes { width, channels: &channels });
         let domain: Vec<bool> = (0..n).map(|i| picture.coverage.is_none_or(|c| c[i] > 0)).collect();
         // Where a surface ends there is an edge, whatever the colors.

@@ -10,11 +10,11 @@ use std::collections::BinaryHeap;
 
 use super::super::error::FindError;
 use super::super::regions::edges::{ImagePlanes, strength};
-use super::super::regions::lab::lab;
+use super::super::regions::lab::{lab, planes};
 use super::super::regions::shape::ends_of;
 use super::super::view_map::ViewMap;
 use super::super::votes::UNKNOWN;
-use super::{LEAST_VOTES, Tracker, ViewReport};
+use super::{Tracker, ViewReport};
 use crate::io;
 use crate::math::grid::neighbors;
 use crate::pipeline::observer::{Observer, Severity, Ticker};
@@ -24,8 +24,6 @@ use crate::scene::IdentityId;
 const CELL: [f32; 3] = [8.0, 7.0, 7.0];
 /// Cells along each axis.
 const CELLS: [usize; 3] = [13, 36, 36];
-/// Weight of lightness in edges: shadows change it within a thing.
-const LIGHTNESS: f32 = 0.7;
 
 /// Longer side of the photos, px.
 const SIDE_PX: u32 = 320;
@@ -37,9 +35,9 @@ impl Tracker<'_> {
         let mut order: Vec<&ViewReport> = views.iter().filter(|v| v.unknown > 0.0).collect();
         order.sort_by(|a, b| a.unknown.total_cmp(&b.unknown).then(a.photo.cmp(&b.photo)));
         let mut ticker = Ticker::new("Completing identities in the photos", 2 * order.len());
-        let mut colors = ColorModels::new(self.identities.len());
+        let mut counts = ColorCounts::new(self.identities.len());
         let mut terrains = Vec::with_capacity(order.len());
-        let of: Vec<IdentityId> = self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect();
+        let of = self.decided();
         for (i, view) in order.iter().enumerate() {
             let photo = &self.photos[view.photo];
             let pixels = match io::photo::load(photo, SIDE_PX) {
@@ -53,11 +51,11 @@ impl Tracker<'_> {
             let ends = ends_of(self.cloud, self.settings, &camera);
             let terrain = Terrain::new(pixels.width_px as usize, &pixels.rgb, ends.as_deref(), &options);
             let map = self.map_of(view.photo, SIDE_PX, &of)?;
-            colors.add(&terrain, &sure(&map, options.share));
+            counts.add(&terrain, &sure(&map, options.share));
             terrains.push((view.photo, terrain));
             ticker.tick(i + 1, observer)?;
         }
-        colors.compare(options.unseen);
+        let colors = counts.compare(options.unseen);
         for (i, (photo, terrain)) in terrains.iter().enumerate() {
             let map = self.map(*photo, SIDE_PX)?;
             let known = sure(&map, options.share);
@@ -119,9 +117,7 @@ impl Terrain {
     /// Of sRGB pixels, and of how clearly surfaces end at them, 0 to 1.
     fn new(width: usize, rgb: &[[u8; 3]], ends: Option<&[f32]>, options: &GrowOptions) -> Self {
         let colors = lab(rgb);
-        let weights = [LIGHTNESS, 1.0, 1.0];
-        let channels = [0, 1, 2].map(|c| colors.iter().map(|p| weights[c] * p[c]).collect::<Vec<f32>>());
-        let strength = strength(&ImagePlanes { width, channels: &channels });
+        let strength = strength(&ImagePlanes { width, channels: &planes(&colors) });
         let end = |i: usize| ends.map_or(0.0, |e| e[i]);
         let wall = (0..rgb.len()).map(|i| options.edge * strength[i] + options.end * end(i)).collect();
         Self { width, cell: colors.iter().map(|c| cell(*c)).collect(), wall }
@@ -133,42 +129,41 @@ fn cell(lab: [f32; 3]) -> u32 {
     ((at(0, 0.0) * CELLS[1] + at(1, -126.0)) * CELLS[2] + at(2, -126.0)) as u32
 }
 
-/// The colors that identities are known to have.
-#[derive(Clone, Debug, Default)]
-struct ColorModels {
-    /// By identity, 0 = nobody: how often each cell was seen.
-    counts: Vec<Vec<f32>>,
-    /// The same, smoothed and as shares: what a color says for an identity, in nats against it.
-    against: Vec<Vec<f32>>,
-}
+/// How often each cell was seen, by identity, 0 = nobody.
+struct ColorCounts(Vec<Vec<f32>>);
 
-impl ColorModels {
+/// What each cell says against each identity, compared with all others and with things never seen, in nats.
+struct ColorModels(Vec<Vec<f32>>);
+
+impl ColorCounts {
     fn new(identities: usize) -> Self {
-        Self { counts: vec![vec![0.0; CELLS.iter().product()]; identities + 1], against: Vec::new() }
+        Self(vec![vec![0.0; CELLS.iter().product()]; identities + 1])
     }
 
     /// Takes in what is known of a view.
     fn add(&mut self, terrain: &Terrain, known: &[IdentityId]) {
         for (cell, id) in terrain.cell.iter().zip(known) {
-            if let Some(counts) = self.counts.get_mut(*id as usize) {
+            if let Some(counts) = self.0.get_mut(*id as usize) {
                 counts[*cell as usize] += 1.0;
             }
         }
     }
 
     /// Compares what was taken in; `unseen` is the share of colors that are of none.
-    fn compare(&mut self, unseen: f32) {
-        let shares: Vec<Vec<f32>> = self.counts.iter().map(|c| smooth_shares(c)).collect();
+    fn compare(self, unseen: f32) -> ColorModels {
+        let shares: Vec<Vec<f32>> = self.0.iter().map(|c| smooth_shares(c)).collect();
         let cells: usize = CELLS.iter().product();
         // What nobody has seen may have any color of those that things have: about one in thirty cells.
         let anything = unseen * 30.0 / cells as f32;
         let all: Vec<f32> = (0..cells).map(|k| anything + shares.iter().map(|s| s[k]).sum::<f32>()).collect();
         let nats = |s: &f32, all: &f32| -(s / all).max(1e-3).ln();
-        self.against = shares.iter().map(|s| s.iter().zip(&all).map(|(s, all)| nats(s, all)).collect()).collect();
+        ColorModels(shares.iter().map(|s| s.iter().zip(&all).map(|(s, all)| nats(s, all)).collect()).collect())
     }
+}
 
+impl ColorModels {
     fn against(&self, id: IdentityId, cell: u32) -> f32 {
-        self.against.get(id as usize).map_or(0.0, |a| a[cell as usize])
+        self.0.get(id as usize).map_or(0.0, |a| a[cell as usize])
     }
 }
 
@@ -242,9 +237,9 @@ mod tests {
         let known: Vec<IdentityId> = (0..W * 10).map(|i| known(i % W)).collect();
         let ends: Option<Vec<f32>> = end.map(|x| (0..W * 10).map(|i| f32::from(u8::from(i % W == x))).collect());
         let terrain = Terrain::new(W, &rgb, ends.as_deref(), &options);
-        let mut colors = ColorModels::new(2);
-        colors.add(&terrain, &known);
-        colors.compare(options.unseen);
+        let mut counts = ColorCounts::new(2);
+        counts.add(&terrain, &known);
+        let colors = counts.compare(options.unseen);
         grow(&terrain, &known, &colors, &options)[5 * W..6 * W].to_vec()
     }
 

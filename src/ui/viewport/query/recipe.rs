@@ -17,8 +17,7 @@ impl Queries {
 
     /// How they are answered in the first and the second view.
     pub(crate) fn recipes(&self) -> [Recipe; 2] {
-        let [side, other] = self.sides().map(|side| side.settings.recipe.clone());
-        if self.is_second { [other, side] } else { [side, other] }
+        self.in_order(|side| side.settings.recipe.clone())
     }
 
     /// Answers by these recipes in the first and the second view.

@@ -110,10 +110,15 @@ impl Queries {
         result
     }
 
+    /// Something of the first and of the second view.
+    pub(super) fn in_order<T>(&self, of: impl Fn(&QuerySide) -> T) -> [T; 2] {
+        let [side, other] = self.sides().map(of);
+        if self.is_second { [other, side] } else { [side, other] }
+    }
+
     /// The queries that are pinned in the first and the second view.
     pub(crate) fn pinned_texts(&self) -> [Vec<String>; 2] {
-        let [side, other] = self.sides().map(QuerySide::pinned_texts);
-        if self.is_second { [other, side] } else { [side, other] }
+        self.in_order(QuerySide::pinned_texts)
     }
 
     /// Paints anew and compares anew, in both views.
