@@ -1,8 +1,6 @@
 //! What the process asks of the system when it starts: threads, and an allocator that gives freed
 //! memory back, so that an idle window holds what it shows.
 
-use crate::io::memory;
-
 /// Most threads that share the work on a machine with fewer than half as many cores.
 const MOST_THREADS: usize = 64;
 
@@ -13,7 +11,7 @@ const LARGE_BYTES: i32 = 1 << 20;
 /// Starts the threads that share the work: as many as there are cores, or as `RAYON_NUM_THREADS` says
 /// within reason.
 pub(crate) fn start_threads() -> Result<(), String> {
-    let cores = memory::cores();
+    let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
     let wanted = std::env::var("RAYON_NUM_THREADS").ok().and_then(|v| v.trim().parse().ok()).filter(|n| *n > 0);
     let threads = wanted.unwrap_or(cores).min(MOST_THREADS.max(2 * cores));
     let started = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
