@@ -143,7 +143,8 @@ pub(crate) fn edit_text(request: &EditRequest, all: &Identities) -> String {
         EditRequest::Apply(Edit::Rename(id, name)) => format!("renamed {} to {}", all.name(*id), name.trim()),
         EditRequest::Apply(Edit::Merge(from, into)) => format!("merged {} into {}", all.name(*from), all.name(*into)),
         EditRequest::Apply(Edit::Split(id)) => format!("split {}", all.name(*id)),
-        EditRequest::Apply(Edit::AddPiece { of, name, .. }) | EditRequest::Paint { of, name, .. } => added(*of, name),
+        EditRequest::Apply(Edit::AddPiece { of, name, .. }) => added(*of, name),
+        EditRequest::Apply(Edit::Reshape { id, .. }) => format!("corrected {}", all.name(*id)),
         EditRequest::Restore(_) => "restored objects and parts".to_owned(),
     }
 }
