@@ -111,9 +111,9 @@ pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Resu
     let mut asked = Vec::new();
     for phrase in phrases {
         let reading = engine.read(&map.identities, phrase, *level).ok_or(JobError::EmptyQuery)?;
-        let answered = engine.answer(map, &reading.phrase, *level)?;
+        let answered = engine.answer(map, &reading, *level)?;
         let unknown = engine.unknown_words(&map.identities, &reading.phrase);
-        let ignored = answered.ignored_words(&map.identities, &reading.phrase, &unknown);
+        let ignored = answered.ignored_words(&map.identities, &reading, &unknown);
         asked.push((answered.certainty(&ignored), answered));
     }
     let mut colors = request.colors.clone();

@@ -50,10 +50,10 @@ fn every_phrase_is_asked_of_every_view() {
     assert_eq!(
         told,
         [
-            ("images/0.png", "shade of the lamp", "found", "certain", true),
+            ("images/0.png", "shade · lamp", "found", "certain", true),
             ("images/0.png", "mug", "found", "certain", true),
             ("images/0.png", "", "not found", "guess", false),
-            ("images/1.png", "shade of the lamp", "found", "certain", false),
+            ("images/1.png", "shade · lamp", "found", "certain", false),
             ("images/1.png", "mug", "found", "certain", false),
             ("images/1.png", "", "not found", "guess", false),
         ]

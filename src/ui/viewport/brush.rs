@@ -156,7 +156,7 @@ impl Brush {
             ui.set_width((rect.width() - 40.0).clamp(200.0, 430.0));
             let what = match self.purpose {
                 Purpose::Piece(NOBODY) => "a new object".to_owned(),
-                Purpose::Piece(of) => format!("a new part of the {}", identities.full_name(of)),
+                Purpose::Piece(of) => format!("a new part of \u{201c}{}\u{201d}", identities.full_name(of)),
                 Purpose::TrueMask => "the true mask of this view".to_owned(),
             };
             ui.label(format!("Paint {what}: drag to paint, click to select what has the same color."));
