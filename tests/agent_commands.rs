@@ -194,7 +194,7 @@ const HARD: [[&str; 2]; 12] = [
     ["what's this", "the (lower) part"],
     ["yes please", "please"],
     ["Set of Cups", "cup of the set"],
-    ["everything", "third one"],
+    ["nothing else", "third one"],
     ["doll's house", "eye · doll"],
     ["C++", "C# 2.0"],
 ];

@@ -1,12 +1,14 @@
 //! What a scene consists of: objects, their parts, and which Gaussian is whose.
 
+pub(crate) mod whole_names;
+
 use std::sync::{Arc, OnceLock};
 
 use serde::{Deserialize, Serialize};
 
+use self::whole_names::{WholeNames, key};
 use super::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
 use super::text;
-use super::whole_names::{WholeNames, key};
 
 /// Object or part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

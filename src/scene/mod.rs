@@ -19,7 +19,6 @@ pub mod resource_log;
 pub(crate) mod semantic_map;
 pub(crate) mod text;
 pub(crate) mod undo;
-pub(crate) mod whole_names;
 
 pub use bounds::Bounds;
 pub use camera::{Camera, CameraError};

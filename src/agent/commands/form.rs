@@ -10,6 +10,7 @@ use crate::agent::relation::Relation;
 use crate::agent::resolve::{NameWords, is_thing};
 use crate::agent::words::{Token, number};
 use crate::navigate::target::Side;
+use crate::scene::identity::whole_names::key;
 
 /// What stands in a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -199,7 +200,8 @@ impl FormRequest<'_> {
 
     /// Words as a phrase again: the name that they are, else as they were said.
     fn said(&self, words: &[&str]) -> String {
-        self.known.whole(words).map_or_else(|| quoted(words), str::to_owned)
+        let said = quoted(words);
+        self.known.whole(words).filter(|name| key(name) != key(&said)).map_or(said, str::to_owned)
     }
 
     /// Fills a slot with the words from `at` to `end`, if they can stand there.
@@ -216,7 +218,9 @@ impl FormRequest<'_> {
             FormSlot::Kind => {
                 slots.texts.push(self.said(words));
                 let words = if words[0] == "all" { &words[1..] } else { words };
-                is_thing(words, self.known, self.things != Things::Any)
+                // Beside whole names, a kind is no place at one of them.
+                let is_plain = self.things != Things::Whole || !words.iter().any(|w| language.is_no_name(w));
+                self.known.whole(words).is_some() || is_plain && is_thing(words, self.known, self.things != Things::Any)
             }
             FormSlot::Things => {
                 let parts: Vec<&[&str]> =
@@ -225,7 +229,7 @@ impl FormRequest<'_> {
                 slots.named += words.len();
                 slots.several = Some((slots.texts.len(), parts.iter().map(|p| self.said(p)).collect()));
                 slots.texts.push(text);
-                parts.iter().all(|p| self.is_thing(p) || many(p).is_some_and(|p| self.is_thing(p)))
+                !parts.is_empty() && parts.iter().all(|p| self.is_thing(p) || many(p).is_some_and(|p| self.is_thing(p)))
             }
             FormSlot::Name => {
                 let raw: Vec<&str> = self.tokens[at..end].iter().map(|t| t.raw.as_str()).collect();

@@ -138,19 +138,17 @@ pub(crate) fn is_command(text: &str, identities: &Identities) -> bool {
 
 /// A request as one command, or as several in a row.
 fn clauses(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
-    // A name may begin or end with what is courtesy elsewhere.
-    let all = if request.things == Things::Whole { one(request, is_first) } else { None };
-    let request = trimmed(request);
-    if let Some(tasks) = all.or_else(|| one(&request, is_first)) {
+    if let Some(tasks) = command(request, is_first) {
         return Some(tasks);
     }
+    let request = trimmed(request);
     // What a question asks is asked without its mark, too; "the lamp?" wants to know, "the lamp" to go there.
     if let Some(("?", rest)) = request.words.split_last().map(|(last, rest)| (*last, rest)) {
         return clauses(&part(&request, 0, rest.len()), is_first);
     }
     let parts = (1..request.words.len()).filter(|i| SEPARATORS.contains(&request.words[*i]));
     parts.take(MOST_TASKS).find_map(|i| {
-        let mut tasks = one(&trimmed(&part(&request, 0, i)), is_first)?;
+        let mut tasks = command(&part(&request, 0, i), is_first)?;
         tasks.extend(clauses(&part(&request, i + 1, request.words.len()), false)?);
         Some(tasks)
     })
@@ -183,8 +181,14 @@ fn opens(words: &[&str], phrase: &str) -> Option<usize> {
     (words.len() >= n && phrase.split(' ').eq(words[..n].iter().copied())).then_some(n)
 }
 
-/// One command: the first that fits; of those whose things are called by whole names, the one that has none, or that
-/// with the longest: "the handle from above" may be a name.
+/// One command, courtesy around it or not: a name may begin or end with what is courtesy elsewhere.
+fn command(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
+    let all = if request.things == Things::Whole { one(request, is_first) } else { None };
+    all.or_else(|| one(&trimmed(request), is_first))
+}
+
+/// One command: the first that fits; of those whose things are called by whole names, that with the longest, as "the
+/// handle from above" may be a name. A command that is about no thing stays what it is.
 fn one(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
     let mut fits = beginning_with(request.words.first()?).filter_map(|sequence| {
         // A name alone is a command only if it is one, and the first: "hide the lamp and the mug from above".
@@ -193,17 +197,13 @@ fn one(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
             return None;
         }
         let slots = request.fit(&sequence.items)?;
-        Some((slots.named, tasks(&sequence.command.id, slots)?))
+        let named = if slots.texts.is_empty() { usize::MAX } else { slots.named };
+        Some((named, tasks(&sequence.command.id, slots)?))
     });
     if request.things != Things::Whole {
         return Some(fits.next()?.1);
     }
-    // The first of those that are as long.
-    let longer = |best: (usize, _), next: (usize, _)| {
-        let is_better = best.0 > 0 && (next.0 == 0 || next.0 > best.0);
-        if is_better { next } else { best }
-    };
-    Some(fits.reduce(longer)?.1)
+    Some(fits.reduce(|first, next| if next.0 > first.0 && next.0 < usize::MAX { next } else { first })?.1)
 }
 
 /// The tasks of a command, one for each of several things.

@@ -2,6 +2,7 @@
 //! pronouns. What several things fit equally is said to be so, what nothing fits is not there; nothing is
 //! guessed. What no name says is asked of the scene's encoder, if it has one.
 
+mod called;
 mod embedded;
 mod noun;
 
@@ -17,7 +18,7 @@ use super::words::{alike, singular};
 use super::world::World;
 use crate::pipeline::semantics::reading::{mend, mended_text};
 use crate::pipeline::semantics::recipe::Understanding;
-use crate::scene::whole_names::BETWEEN;
+use crate::scene::identity::whole_names::BETWEEN;
 use crate::scene::{Bounds, IdentityId, Level, LevelFilter};
 
 /// What words come to.
@@ -193,23 +194,6 @@ impl Resolver<'_> {
                 Err(Lost::new(RefusalKind::Unclear, text, several.to_vec()))
             }
         }
-    }
-
-    /// Candidates by a name as a whole. All that have its words as [`Self::named`] has it fit, too.
-    fn called(&mut self, name: &str) -> Option<Set> {
-        if self.world.understanding() == Understanding::Embedding {
-            return None;
-        }
-        let all = self.world.identities();
-        let mut exact = all.called(name, self.level);
-        exact.retain(|id| self.world.facts(*id).is_some());
-        let words = name_words(name);
-        let is_own = |id: &IdentityId| all.get(*id).is_some_and(|i| i.names.iter().any(|n| name_words(n) == words));
-        let is_any_own = exact.first().map(|_| exact.iter().any(is_own))?;
-        let mut ids =
-            if is_any_own { self.named(&words).map_or_else(|_| Vec::new(), |set| set.ids) } else { Vec::new() };
-        ids.extend(exact.iter().copied().filter(|id| !ids.contains(id)).collect::<Vec<_>>());
-        Some(Set { ids, exact })
     }
 
     /// Candidates by the words of their names: all words are in the names of a thing and its wholes, the

@@ -6,7 +6,7 @@ use crate::agent::language::{CommandLanguage, Key, find};
 use crate::agent::relation::Relation;
 use crate::agent::words::{request_tokens, singular, tokens};
 use crate::scene::Identities;
-use crate::scene::whole_names::key;
+use crate::scene::identity::whole_names::key;
 
 /// A thing as a phrase has it.
 #[derive(Clone, Debug, PartialEq)]

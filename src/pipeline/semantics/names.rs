@@ -9,7 +9,7 @@ use super::parse::{ParsedQuery, is_glue};
 use super::recipe::Rejection;
 pub(crate) use super::words::singular;
 use super::words::words;
-use crate::scene::whole_names::key;
+use crate::scene::identity::whole_names::key;
 use crate::scene::{Identities, IdentityId};
 
 /// Score under which a name is not what was asked for.

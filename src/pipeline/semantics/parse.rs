@@ -1,6 +1,6 @@
 //! What a typed query asks for: a thing, or a piece of a thing.
 
-use crate::scene::whole_names::BETWEEN;
+use crate::scene::identity::whole_names::BETWEEN;
 
 /// Longest query that is looked at, in characters.
 pub(crate) const MAX_CHARS: usize = 300;

@@ -7,7 +7,7 @@ use super::parse::{MAX_CHARS, ParsedQuery, is_glue};
 use super::recipe::{Recipe, Understanding};
 use super::words::{singular, words, written};
 use crate::models;
-use crate::scene::whole_names::key;
+use crate::scene::identity::whole_names::key;
 use crate::scene::{Identities, IdentityId, LevelFilter};
 
 /// Words as they were typed, each with another one.

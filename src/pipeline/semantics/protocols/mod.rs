@@ -22,7 +22,7 @@ use super::answer::QueryAnswer;
 use super::code_map::CodeMap;
 use super::segmenter::FoundMask;
 use super::view_map::ViewMap;
-use crate::scene::whole_names::BETWEEN;
+use crate::scene::identity::whole_names::BETWEEN;
 use crate::scene::{Camera, Level, Mask, PixelBox, SemanticMap};
 
 pub(crate) struct AskedScene<'a> {

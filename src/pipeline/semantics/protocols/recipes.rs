@@ -13,7 +13,7 @@ use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::recipe::{PartFeatures, Recipe, Rejection, Strategy, Understanding};
 use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::semantics::words::words;
-use crate::scene::whole_names::BETWEEN;
+use crate::scene::identity::whole_names::BETWEEN;
 use crate::scene::{Identities, IdentityId, Level, LevelFilter, SemanticMap};
 
 /// Things that may be absent, and parts of them. Those whose words a scene knows are not asked for.
@@ -161,7 +161,8 @@ pub(crate) fn row(
 
 /// "handle · mug" as "mug handle".
 fn compound(category: &Category) -> Option<String> {
-    let (part, whole) = category.name.split_once(BETWEEN).filter(|_| category.level == Level::Part)?;
+    let mut line = category.name.split(BETWEEN).filter(|_| category.level == Level::Part);
+    let (part, whole) = (line.next()?, line.next()?);
     Some(format!("{whole} {part}"))
 }
 

@@ -2,7 +2,7 @@
 
 use std::collections::HashMap;
 
-use super::text;
+use super::super::text;
 use super::{Identities, IdentityId, LevelFilter};
 
 /// Between the names of a piece and of its wholes.
@@ -19,16 +19,21 @@ pub(crate) fn key(text: &str) -> String {
     let text = text::line(text).to_uppercase().to_lowercase();
     let text = text.replace(['\u{2018}', '\u{2019}', '`'], "'").replace('\u{b7}', BETWEEN);
     let text = text.split_whitespace().collect::<Vec<_>>().join(" ");
-    text.split(BETWEEN).map(bare).collect::<Vec<_>>().join(BETWEEN)
+    without_articles(&text).split(BETWEEN).map(bare).collect::<Vec<_>>().join(BETWEEN)
+}
+
+fn without_articles(mut name: &str) -> &str {
+    while let Some(rest) = ["the ", "a ", "an "].iter().find_map(|article| name.strip_prefix(article)) {
+        name = rest;
+    }
+    name
 }
 
 /// A name without articles in front and marks around.
 fn bare(name: &str) -> &str {
     let mut key = name;
     loop {
-        while let Some(named) = ["the ", "a ", "an "].iter().find_map(|article| key.strip_prefix(article)) {
-            key = named;
-        }
+        key = without_articles(key);
         match key.trim_matches(|c| c == ' ' || MARKS.contains(c)) {
             // What consists of marks is called by them.
             "" => return key,

@@ -73,9 +73,9 @@ fn the_same_names_are_told_apart_by_their_wholes_then_by_numbers() {
         assert!(called(&all, nobody).is_empty(), "{nobody}");
     }
     assert!(all.called("mug", LevelFilter::Part).is_empty() && all.called("dot", LevelFilter::Object).is_empty());
-    // Renamed, it is called otherwise, and the other one needs no number.
+    // Renamed, it is called otherwise, too.
     all.rename(mugs[1], "cup");
-    assert_eq!((all.full_name(mugs[0]), all.full_name(mugs[1])), ("mug".into(), "cup".into()));
+    assert_eq!((all.full_name(mugs[0]), all.full_name(mugs[1])), ("mug #1".into(), "cup".into()));
     assert_eq!(
         (called(&all, "cup"), called(&all, "The mug")),
         (vec![2], vec![1, 2]),
