@@ -1,6 +1,7 @@
 //! Phrases on a scene of two blobs, and what is written of them.
 
 use glam::DVec3;
+use serde_json::Value;
 
 use super::*;
 use crate::io::labels::rle::Rle;
