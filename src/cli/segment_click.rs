@@ -18,7 +18,7 @@ const SIDE_PX: u32 = 512;
 #[derive(Debug, clap::Args)]
 pub(crate) struct ClickArgs {
     /// Select what is at this place of the view instead of asking in words: x,y in px of the photo; may be given again
-    #[arg(long, value_parser = place, value_name = "X,Y")]
+    #[arg(long, value_parser = place, value_name = "X,Y", conflicts_with_all = ["text", "all", "rest"])]
     pub(crate) click: Vec<[f32; 2]>,
     /// What is at this place does not belong to it; may be given again
     #[arg(long, value_parser = place, value_name = "X,Y", requires = "click")]
@@ -42,9 +42,6 @@ fn place(text: &str) -> Result<[f32; 2], String> {
 
 /// Selects what is clicked on, keeps it if that is wanted, and writes it to `out`.
 pub(crate) fn run(scene: &Scene, args: &ClickArgs, out: Option<&PathBuf>, quiet: bool) -> Result<(), CliError> {
-    if out.is_none() && args.keep.is_none() {
-        return Err(CliError::failed("give --out to write what is selected, or --keep to name it"));
-    }
     let map = Arc::new(scene.semantics().unwrap_or_else(|_| select::empty_map(&scene.cloud)));
     let whole = match &args.part_of {
         Some(text) => query::identities(&map, text, LevelFilter::Auto, 1)?.first().copied().unwrap_or(NOBODY),

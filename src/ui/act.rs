@@ -115,6 +115,7 @@ impl App {
             | Action::ExportPly
             | Action::ExportTarget(_)
             | Action::ExportCrop
+            | Action::ExportAll
             | Action::Screenshot
             | Action::ChooseMasks
             | Action::AddModel(_)

@@ -145,6 +145,8 @@ actions! {
     TrainDemo: "Train the demo yourself",
         "Render posed photos of the tabletop and train on them. No download needed.";
     ExportPly: "Export Gaussians as .ply\u{2026}", "Write the Gaussians in the format that 3DGS viewers read.", "Ctrl+E";
+    ExportAll: "Export all objects and parts\u{2026}",
+        "Into a folder: a .ply each, and their masks in the photos as ISAT, COCO and id pictures.";
     Screenshot: "Save the view as .png\u{2026}", "Write the image in the viewport, without the drawn cameras.", "Ctrl+S";
     StartTraining: "Start training",
         "Fit Gaussians to the photos. Resumes from the last checkpoint if the settings are the same.", "Ctrl+T";

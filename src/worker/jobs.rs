@@ -12,8 +12,8 @@ use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
-    Folders, JobError, OpenedScene, Scene, demo, edit, export, find_objects, go_to, inspect, models, open, phrases,
-    plan, poses, recent, report, scale, select, thumbnails, train, video,
+    Folders, JobError, OpenedScene, Scene, demo, edit, export, export_all, find_objects, go_to, inspect, models, open,
+    phrases, plan, poses, recent, report, scale, select, thumbnails, train, video,
 };
 use crate::measure::{End, FILE, Report};
 use crate::pipeline::observer::{Observer, Severity};
@@ -160,6 +160,7 @@ impl Jobs for PipelineJobs {
                 Outcome::Explored(Arc::new(go_to::Explored::new(cloud, &cameras, up)))
             }
             Command::Video(request) => Outcome::Written(video::run(*request, observer)?.summary.path),
+            Command::ExportAll(request) => Outcome::Written(export_all::run(&request, observer)?.folder),
             Command::Phrases(request) => Outcome::Phrases(phrases::run(&request, observer)?, request.export),
             Command::Measure(request) => {
                 let done = report::run(&request, observer)?;

@@ -49,6 +49,8 @@ pub enum JobKind {
     Scale,
     /// Asks a list of phrases.
     Phrases,
+    /// Writes all objects and parts.
+    ExportAll,
     /// Looks into a pixel.
     Inspect,
 }
@@ -61,16 +63,20 @@ impl JobKind {
 
     /// Whether it waits where it is asked to.
     pub(crate) fn can_pause(self) -> bool {
-        matches!(self, Self::Train | Self::Objects | Self::Model | Self::Video | Self::Phrases)
+        matches!(self, Self::Train | Self::Objects | Self::Model | Self::Video | Self::Phrases | Self::ExportAll)
     }
 
     /// Which thread runs it.
     pub(crate) fn lane(self) -> WorkerThread {
         match self {
             Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects => WorkerThread::Long,
-            Self::DemoPhotos | Self::Poses | Self::Model | Self::Video | Self::Measure | Self::Phrases => {
-                WorkerThread::Long
-            }
+            Self::DemoPhotos
+            | Self::Poses
+            | Self::Model
+            | Self::Video
+            | Self::Measure
+            | Self::Phrases
+            | Self::ExportAll => WorkerThread::Long,
             Self::Beside
             | Self::Edit
             | Self::Select

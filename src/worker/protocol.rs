@@ -9,6 +9,7 @@ use super::failure::Failure;
 pub use super::kind::{JobKind, WorkerThread};
 use crate::io::unposed::Unposed;
 use crate::jobs::edit::EditRequest;
+use crate::jobs::export_all::ExportAllRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
 use crate::jobs::inspect::{InspectRequest, InspectedPixel};
 use crate::jobs::models::ModelList;
@@ -169,6 +170,8 @@ pub enum Command {
     },
     /// Ask a list of phrases of some views.
     Phrases(Box<PhrasesRequest>),
+    /// Write every object and part, and their masks.
+    ExportAll(Box<ExportAllRequest>),
     /// Draw every object and part alone, small.
     Thumbnails {
         /// The Gaussians.
@@ -208,6 +211,7 @@ impl Command {
             Self::Video(_) => JobKind::Video,
             Self::Measure(_) => JobKind::Measure,
             Self::Phrases(_) => JobKind::Phrases,
+            Self::ExportAll(_) => JobKind::ExportAll,
             Self::SetScale { .. } => JobKind::Scale,
             Self::ReadReport { .. } => JobKind::Report,
         }
@@ -244,6 +248,7 @@ impl Command {
             Self::Video(request) => format!("Rendering {}", name(&request.out)),
             Self::Measure(_) => "Benchmarking rendering".into(),
             Self::Phrases(_) => "Running the phrase list".into(),
+            Self::ExportAll(request) => format!("Writing {}", name(&request.folder)),
             Self::ReadReport { path, .. } => format!("Opening the report {}", name(path)),
         }
     }

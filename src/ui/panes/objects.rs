@@ -230,7 +230,7 @@ impl Tree<'_> {
                     for (other, identity) in all.iter().filter(|(other, i)| *other != id && Some(i.level) == level) {
                         // Parts of one whole first matter; others are told by their whole's name.
                         let same_whole = all.get(id).is_some_and(|i| i.parent == identity.parent);
-                        let text = if same_whole { all.name(other) } else { all.full_name(other) };
+                        let text = if same_whole { all.label(other) } else { all.full_name(other) };
                         if ui.button(text).clicked() {
                             actions.push(Action::Change(Edit::Merge(id, other)));
                             ui.close();

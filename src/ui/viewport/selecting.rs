@@ -15,6 +15,7 @@ use super::outline;
 use super::picking::Drawn;
 use crate::jobs::query::ViewMaps;
 use crate::jobs::select::{SelectFor, Selected, Stroke, kept_as};
+use crate::math::format;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::{Camera, Identities, Level, Mask, NOBODY, SemanticMap};
 use crate::ui::actions::Action;
@@ -135,11 +136,11 @@ impl SelectTool {
                     ui.label("Keep as");
                     let name = TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80);
                     ui.add(name.desired_width(130.0)).accessible_name("Name of what is selected");
-                    let text = if of == NOBODY { "an object".to_owned() } else { format!("part of {}", all.name(of)) };
+                    let text = if of == NOBODY { "an object".to_owned() } else { format!("part of {}", all.label(of)) };
                     ComboBox::from_id_salt("whole").selected_text(text).width(120.0).show_ui(ui, |ui| {
                         ui.selectable_value(&mut self.purpose, SelectFor::New(NOBODY), "an object");
                         for (id, _) in all.iter().filter(|(_, i)| i.level == Level::Object) {
-                            let text = format!("part of {}", all.name(id));
+                            let text = format!("part of {}", all.label(id));
                             ui.selectable_value(&mut self.purpose, SelectFor::New(id), text);
                         }
                     });
@@ -169,7 +170,9 @@ impl SelectTool {
                 ui.spinner();
                 "Looking at surfaces\u{2026}".to_owned()
             }
-            Some(s) if s.id != NOBODY => format!("{} Gaussians", crate::math::format::count(s.gaussians.len() as u64)),
+            Some(s) if s.id != NOBODY => {
+                format!("{} Gaussians, {:.0} ms", format::count(s.gaussians.len() as u64), s.ms)
+            }
             Some(_) => "Nothing is selected".to_owned(),
             None => String::new(),
         };
