@@ -4,7 +4,7 @@ use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable;
 use serde_json::json;
 
-use fmlgs::io::{semantic_map, trained};
+use fmlgs::io::{SceneFolder, semantic_map, trained};
 use fmlgs::scene::Findings;
 use fmlgs::ui::actions::{Action, Pane};
 use fmlgs::ui::app::App;
@@ -32,7 +32,9 @@ fn window(folder: &std::path::Path, with_findings: bool) -> Window {
     }))
     .expect("findings");
     map.findings = with_findings.then_some(findings);
-    trained::save(&out, &scene.info, &scene.cloud, Some(&map)).expect("saved");
+    let place = SceneFolder::hold(&out, "a test").expect("ours");
+    place.save(&scene.info, &scene.cloud, Some(&map)).expect("saved");
+    drop(place);
     let mut w = Window::new(Some(Action::Open(out)));
     w.until("a picture at rest", |a| a.viewport.picture().is_some_and(|p| p.full));
     w.harness.state_mut().layout.hidden.extend([Pane::Training, Pane::Plan, Pane::Models, Pane::Dataset]);
@@ -60,7 +62,7 @@ fn sort(w: &mut Window, key: &str) {
 fn a_doubt_leads_to_its_photo_and_the_list_is_sorted() {
     let folder = tempfile::tempdir().expect("folder");
     let mut w = window(folder.path(), true);
-    assert!(w.shows("; 2 doubts"), "the pane counts them");
+    assert!(w.shows("2 doubts where photos disagreed"), "the pane counts them");
     let here = |a: &App| (a.viewport.photo_index(), a.viewport.picking.selected());
     assert_eq!(here(w.app()).0, None);
     w.click("1 doubt about box 0");
@@ -71,7 +73,7 @@ fn a_doubt_leads_to_its_photo_and_the_list_is_sorted() {
     w.harness.get_by_label_contains("In gone.png").click();
     w.until("what it is about", |a| here(a) == (Some(2), Some(3)));
 
-    sort(&mut w, "by doubts");
+    w.click("2 doubts where photos disagreed");
     assert_eq!(rows(&w), ["box 2", "box 0", "box 1"]);
     sort(&mut w, "by photos");
     assert_eq!(rows(&w), ["box 0", "box 1", "box 2"]);
@@ -103,5 +105,6 @@ fn what_is_unknown_is_counted_at_rest_and_can_be_marked() {
     w.harness.run_steps(2);
     assert!(w.shows("% of this view is unknown"));
     w.click("Mark it\u{2026}");
-    assert!(w.shows("Paint a new object: drag to paint"));
+    w.harness.run_steps(5);
+    assert!(w.shows("Paint a new object"), "the brush");
 }

@@ -3,6 +3,7 @@
 
 use std::cmp::Ordering;
 
+use egui::containers::menu::MenuButton;
 use egui::{Button, ComboBox, RichText, Ui};
 use strum::{IntoStaticStr, VariantArray};
 
@@ -41,6 +42,11 @@ pub(super) struct Order {
 }
 
 impl Order {
+    /// What most doubts are about comes first.
+    pub(super) fn by_doubts() -> Self {
+        Self { key: SortKey::Doubts, reversed: false }
+    }
+
     /// The choice of it.
     pub(super) fn show(&mut self, ui: &mut Ui) {
         let turn = match self.reversed {
@@ -145,14 +151,15 @@ impl<'a> Facts<'a> {
             let lines = doubts.iter().take(most).map(|d| self.sentence(findings, d));
             lines.collect::<Vec<_>>().join("\n")
         };
+        ui.spacing_mut().button_padding.x = 4.0;
+        let sign = Button::new(sign).frame_when_inactive(false);
         if doubts.len() == 1 {
-            let sign = ui.add(Button::new(sign).frame_when_inactive(false)).on_hover_text(told(1));
-            if sign.accessible_name(name).clicked() {
+            if ui.add(sign).on_hover_text(told(1)).accessible_name(name).clicked() {
                 self.go(findings, first, id, actions);
             }
             return;
         }
-        let menu = ui.menu_button(sign, |ui| {
+        let (menu, _) = MenuButton::from_button(sign).ui(ui, |ui| {
             ui.set_max_width(340.0);
             egui::ScrollArea::vertical().max_height(300.0).show(ui, |ui| {
                 for doubt in &doubts {
@@ -163,7 +170,7 @@ impl<'a> Facts<'a> {
                 }
             });
         });
-        menu.response.on_hover_text(told(5)).accessible_name(name);
+        menu.on_hover_text(told(5)).accessible_name(name);
     }
 
     fn sentence(&self, findings: &Findings, doubt: &Doubt) -> String {

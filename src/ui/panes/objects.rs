@@ -65,9 +65,13 @@ impl ObjectsPane {
         let count = |level: Level| identities.iter().filter(|(_, i)| i.level == level).count();
         let from = if map.seeds.len() == 1 { "1 photo".to_owned() } else { format!("{} photos", map.seeds.len()) };
         let doubts = map.findings.as_ref().map_or(0, |f| f.doubts().len());
-        let doubts = if doubts > 0 { format!("; {}", things(doubts, "doubt")) } else { String::new() };
-        let (objects, parts) = (count(Level::Object), count(Level::Part));
-        ui.weak(format!("{objects} objects, {parts} parts, from the masks of {from}{doubts}"));
+        ui.weak(format!("{} objects, {} parts, from the masks of {from}", count(Level::Object), count(Level::Part)));
+        if doubts > 0 {
+            let link = ui.link(RichText::new(format!("{} where photos disagreed", things(doubts, "doubt"))));
+            if link.on_hover_text("Put what they are about first in the list").clicked() {
+                self.order = Order::by_doubts();
+            }
+        }
         if identities.iter().all(|(_, i)| i.names.is_empty()) {
             ui.weak("Regions of the photos, without names yet. Click one to see it, double-click to name it.");
         }
