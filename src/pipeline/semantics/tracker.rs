@@ -8,6 +8,7 @@ use std::time::Instant;
 
 use super::associate::{Link, disagreements, link};
 use super::error::FindError;
+use super::floaters::drop_floaters;
 use super::propagate::extend;
 use super::sam2_tracker::{LABEL_SIDE_PX, Sam2Tracker};
 use super::segmenter::{FoundMask, Segmenter};
@@ -178,6 +179,7 @@ pub(crate) fn track(
     let views = t.look(seeds.len() + 1, observer)?;
     let mut assignments = t.votes.decide(&t.identities, LEAST_VOTES);
     extend(cloud, &mut assignments, HIDDEN_STEPS);
+    drop_floaters(cloud, &t.identities, &mut assignments);
     let carry_secs = start.elapsed().as_secs_f64() - t.segment_secs - encode_secs - follow_secs;
     let secs = vec![
         ("segment", t.segment_secs),
