@@ -25,6 +25,7 @@ use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
+use crate::scene::findings::IdentityFacts;
 use crate::scene::{Limits, Overrides, PhotoPixels, SceneFacts, ScenePlan, SemanticMap, text};
 use crate::worker::{Event, Failure, JobId, JobKind, Outcome, Versioned, WorkerThread};
 
@@ -57,7 +58,8 @@ pub struct AppState {
     pub(crate) antialias: bool,
     /// Objects and parts of the Gaussians on screen.
     pub semantics: Option<Versioned<SemanticMap>>,
-    /// Gaussians of each of them by number, pieces included; and what they are called on screen.
+    /// What was noticed of each of them by number, pieces included; their Gaussians; and what they are called on screen.
+    pub(crate) facts: Vec<IdentityFacts>,
     pub(crate) sizes: Vec<usize>,
     pub(crate) labels: ScreenNames,
     pub phrases: PhraseTable,
@@ -346,7 +348,8 @@ impl AppState {
 
     /// Sets objects and parts, with what is counted of them.
     fn set_semantics(&mut self, map: Option<Arc<SemanticMap>>) {
-        self.sizes = map.as_ref().map_or_else(Vec::new, |m| m.sizes());
+        self.facts = map.as_ref().map_or_else(Vec::new, |m| m.facts());
+        self.sizes = self.facts.iter().map(|f| f.gaussians).collect();
         self.set_facts(self.plan.facts.clone().with_semantics(map.as_deref()));
         self.semantics = map.map(Versioned::new);
     }

@@ -7,7 +7,7 @@ use rstar::primitives::GeomWithData;
 
 use super::codes::{self, RADIUS};
 use crate::math::stats::median;
-use crate::scene::{GaussianCloud, Identities, IdentityId, Level, NOBODY, SemanticMap, ViewFeatures};
+use crate::scene::{Findings, GaussianCloud, Identities, IdentityId, Level, NOBODY, SemanticMap, ViewFeatures};
 
 /// A correction.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -93,6 +93,8 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
             for part in parts.iter().skip(1) {
                 add(&mut new, level, parent, String::new(), part);
             }
+            // Which photos show which of the pieces was not noticed.
+            new.findings.iter_mut().for_each(|f| f.forget_seen(*id));
         }
         Edit::AddPiece { of, name, gaussians } => {
             let inside = if *of == NOBODY { Vec::new() } else { all.descendants(known(*of)?) };
@@ -143,6 +145,7 @@ fn add(map: &mut SemanticMap, level: Level, parent: IdentityId, name: String, ga
     if let Some(language) = &mut map.language {
         language.by_identity.push(ViewFeatures::default());
     }
+    map.findings.iter_mut().for_each(Findings::add_identity);
     let codes = map.identities.codes(id);
     for &i in gaussians {
         (map.identity_of[i], map.codes[i]) = (id, codes);
@@ -190,6 +193,7 @@ fn merge(map: &mut SemanticMap, from: IdentityId, into: IdentityId) {
     if let Some(language) = &mut map.language {
         language.by_identity = features;
     }
+    map.findings.iter_mut().for_each(|f| f.renumber(&number, map.identities.len()));
     for (of, codes) in map.identity_of.iter_mut().zip(&mut map.codes) {
         let before = *of as usize;
         *of = number.get(before).copied().unwrap_or(NOBODY);
@@ -277,6 +281,7 @@ mod tests {
         let mut map = SemanticMap::from_identities(all, of, vec![1.0; n], vec![]);
         map.language =
             Some(LanguageFeatures { encoder: "t".into(), dimension: 1, by_identity: vec![ViewFeatures::default(); 4] });
+        map.findings = Some(Findings::new(vec![], vec![Default::default(); 4], vec![]));
         (map, cloud)
     }
 
@@ -287,6 +292,7 @@ mod tests {
         let codes: Vec<_> = map.identity_of.iter().map(|id| map.identities.codes(*id)).collect();
         assert_eq!(map.codes, codes);
         assert!(map.language.as_ref().is_some_and(|l| l.is_valid(&map.identities)));
+        assert!(map.findings.as_ref().is_some_and(|f| f.is_valid(&map.identities)), "they follow every edit");
     }
 
     #[test]

@@ -21,6 +21,7 @@ pub mod edit;
 pub(crate) mod embed;
 pub(crate) mod error;
 pub(crate) mod filters;
+mod floaters;
 #[cfg(test)]
 mod heart;
 pub(crate) mod kept_masks;
