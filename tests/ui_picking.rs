@@ -170,16 +170,22 @@ fn things_are_pointed_at_selected_isolated_and_hidden() {
     w.click(table, PointerButton::Primary, plain);
     assert_eq!(w.selected(), Some(TABLE));
     w.click(shade, PointerButton::Primary, plain);
-    assert_eq!(w.selected(), Some(LAMP), "its object first");
+    assert_eq!(w.selected(), Some(SHADE), "the part first");
     w.click(shade, PointerButton::Primary, plain);
-    assert_eq!(w.selected(), Some(SHADE), "then the part");
+    assert_eq!(w.selected(), Some(LAMP), "then its object");
+    w.click(shade, PointerButton::Primary, plain);
+    w.harness.key_press(Key::U);
+    w.harness.run_steps(3);
+    assert_eq!(w.selected(), Some(LAMP), "a key for it");
     w.click(lamp, PointerButton::Primary, plain);
     assert_eq!(w.selected(), Some(LAMP));
     w.click(table, PointerButton::Primary, plain);
     w.harness.event(Event::ModifiersChanged(Modifiers::ALT));
     w.click(shade, PointerButton::Primary, Modifiers::ALT);
     w.harness.event(Event::ModifiersChanged(plain));
-    assert_eq!(w.selected(), Some(SHADE), "Alt takes the part at once");
+    assert_eq!(w.selected(), Some(LAMP), "Alt takes the object at once");
+    w.click(table, PointerButton::Primary, plain);
+    w.click(shade, PointerButton::Primary, plain);
 
     // Keys are about what is selected.
     w.harness.key_press(Key::I);
@@ -199,11 +205,11 @@ fn things_are_pointed_at_selected_isolated_and_hidden() {
 
     // The menu of a right click is about what is under the cursor.
     w.click(shade, PointerButton::Secondary, plain);
-    assert_eq!(w.selected(), Some(LAMP));
+    assert_eq!(w.selected(), Some(SHADE));
     assert!(w.shows("Query this") && w.shows("Export as .ply"), "the menu");
     w.harness.get_by_label("Query this").click();
     w.harness.run_steps(4);
-    assert_eq!(w.app().viewport.queries.found(), [LAMP]);
+    assert_eq!(w.app().viewport.queries.found(), [SHADE]);
     assert!(!w.shows("Query this"), "a choice closes it");
 }
 

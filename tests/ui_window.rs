@@ -25,6 +25,8 @@ mod problems;
 mod queries;
 #[path = "ui_window/report.rs"]
 mod report;
+#[path = "ui_window/selecting.rs"]
+mod selecting;
 #[path = "ui_window/split.rs"]
 mod split;
 mod ui_common;

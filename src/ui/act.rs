@@ -130,7 +130,9 @@ impl App {
             | Action::ExportVideo
             | Action::SaveChat => self.choose(action),
             Action::IsolateSelected | Action::HideSelected | Action::GoToSelected => self.act_on_selected(&action, ctx),
-            Action::SelectNext | Action::SelectPrevious | Action::SelectInner => self.select_another(&action, ctx),
+            Action::SelectNext | Action::SelectPrevious | Action::SelectInner | Action::SelectOuter => {
+                self.select_another(&action, ctx)
+            }
             Action::FrameScene
             | Action::Crop
             | Action::SetCrop(_)

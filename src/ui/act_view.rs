@@ -75,6 +75,12 @@ impl App {
                 }
                 first
             }
+            (Action::SelectOuter, selected) => {
+                let Some(part) = selected.or_else(|| self.chosen_identity()) else {
+                    return self.state.toast(Tone::Info, "Nothing is selected: press N first.");
+                };
+                all.ancestors(part).nth(1).or(Some(part))
+            }
             (_, selected) => {
                 let parent = selected.and_then(|id| all.get(id)).map_or(NOBODY, |i| i.parent);
                 let list = listed(all, &self.state.sizes, parent);

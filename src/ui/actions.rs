@@ -192,6 +192,7 @@ actions! {
     SelectNext: "Select the next object", "In the order of the list; with a part selected, the part next to it.", "N";
     SelectPrevious: "Select the previous object", "In the order of the list; with a part selected, the part before it.", "P";
     SelectInner: "Select a part of the selection", "The first part of what is selected; N and P go through the others.", "O";
+    SelectOuter: "Select the whole of the selection", "What the selected part is a part of.", "U";
     IsolateSelected: "Isolate the selection",
         "Show only the selection, or everything again.", "I";
     HideSelected: "Hide the selection", "Do not show it in the view.", "H";

@@ -13,7 +13,7 @@ pub(crate) const GESTURES: [(&str, &str); 14] = [
     ("Right drag", "Pan"),
     ("Wheel", "Zoom toward the cursor"),
     ("Double click", "Set the pivot to what is under the cursor"),
-    ("Click", "Select the object; again, or with Alt, the part"),
+    ("Click", "Select the part; again, or with Alt, its object"),
     ("Right click", "Context menu"),
     ("Shift drag", "Erase, while painting"),
     ("Click in a view", "Work there, in a split view"),

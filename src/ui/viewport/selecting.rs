@@ -39,6 +39,8 @@ pub(crate) struct SelectTool {
     /// Places of the window that the stroke under way went through, and whether it takes away.
     line: Vec<Pos2>,
     line_takes_away: bool,
+    /// Whether that line waits to be taken in: it stays on screen.
+    is_drawn: bool,
     /// Strokes that wait for their turn; `None` takes the last one back.
     waiting: VecDeque<Option<Stroke>>,
     /// The stroke that is being taken in.
@@ -58,6 +60,7 @@ impl SelectTool {
             takes_away: false,
             line: Vec::new(),
             line_takes_away: false,
+            is_drawn: false,
             waiting: VecDeque::new(),
             running: None,
             selected: None,
@@ -73,6 +76,9 @@ impl SelectTool {
 
     /// Takes in what strokes select by now.
     pub(crate) fn take(&mut self, selected: Arc<Selected>) {
+        if self.is_drawn && self.waiting.is_empty() {
+            (self.is_drawn, self.line) = (false, Vec::new());
+        }
         self.preview = Some(Versioned::new(Arc::clone(&selected.preview)));
         self.selected = Some(selected);
     }
@@ -105,6 +111,9 @@ impl SelectTool {
         self.line.windows(2).for_each(|pair| {
             painter.line_segment([pair[0], pair[1]], line);
         });
+        if let Some(pos) = self.line.first() {
+            painter.circle_filled(*pos, self.radius_pt, ink);
+        }
         if let Some(pos) = ui.input(|i| i.pointer.hover_pos()).filter(|pos| shown.contains(*pos)) {
             let takes_away = self.takes_away != ui.input(|i| i.modifiers.shift);
             painter.circle_stroke(pos, self.radius_pt, Line::new(1.5, color(takes_away)));
@@ -129,7 +138,6 @@ impl SelectTool {
                 ui.selectable_value(&mut self.takes_away, false, "+ add");
                 ui.selectable_value(&mut self.takes_away, true, "\u{2212} remove");
                 ui.add(Slider::new(&mut self.radius_pt, 2.0..=30.0).show_value(false).text("width"));
-                self.status(ui);
             });
             if let SelectFor::New(of) = self.purpose {
                 ui.horizontal(|ui| {
@@ -157,6 +165,7 @@ impl SelectTool {
                 if ui.button("Cancel").clicked() {
                     actions.push(Action::Paint(None));
                 }
+                self.status(ui);
             });
         });
         if !keys::is_typing(ui.ctx()) && ui.input(|i| i.key_pressed(Key::Backspace)) {
@@ -199,6 +208,12 @@ impl SelectTool {
 }
 
 impl Viewport {
+    /// How many Gaussians clicks and strokes select, once all of them are taken in.
+    pub fn selection(&self) -> Option<usize> {
+        let tool = self.select.as_ref().filter(|tool| tool.running.is_none() && tool.waiting.is_empty())?;
+        tool.selected.as_ref().map(|s| s.gaussians.len())
+    }
+
     /// Takes clicks and drags as strokes.
     pub(super) fn use_select_tool(&mut self, response: &egui::Response, rect: Rect, state: &AppState) {
         let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
@@ -212,6 +227,7 @@ impl Viewport {
         }
         let Some(pos) = response.interact_pointer_pos() else { return };
         if response.drag_started_by(PointerButton::Primary) || response.clicked() {
+            tool.is_drawn = false;
             tool.line = response.ctx.input(|i| i.pointer.press_origin()).into_iter().collect();
             tool.line_takes_away = tool.takes_away != response.ctx.input(|i| i.modifiers.shift);
         }
@@ -219,13 +235,16 @@ impl Viewport {
         if is_dragged || response.clicked() {
             tool.line.push(pos);
         }
-        if (response.drag_stopped_by(PointerButton::Primary) || response.clicked()) && !tool.line.is_empty() {
+        if (response.drag_stopped_by(PointerButton::Primary) || response.clicked())
+            && !tool.line.is_empty()
+            && !tool.is_drawn
+        {
             let camera = picture.camera.limited_to(SIDE_PX);
             let pixels = tool.pixels(shown, &camera);
             if !pixels.is_empty() {
                 tool.waiting.push_back(Some(Stroke { camera, pixels, is_plus: !tool.line_takes_away }));
             }
-            tool.line.clear();
+            tool.is_drawn = true;
         }
     }
 }

@@ -153,3 +153,24 @@ fn walk(w: usize, h: usize, start: impl Fn(usize) -> bool, open: impl Fn(usize) 
     }
     way
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stroke_goes_through_the_middle_of_what_is_wrong() {
+        let (w, h) = (60, 40);
+        let bar = |i: usize| (10..50).contains(&(i % w)) && (15..25).contains(&(i / w));
+        let truth = Mask::from_fn(w, h, bar);
+        let (stroke, is_plus) = correction(&truth, &Mask::empty(w, h)).expect("everything is missing");
+        assert!(is_plus && stroke.overlap(&truth) == stroke.area());
+        let bounds = stroke.bounds().expect("a line");
+        assert!(bounds.x.end - bounds.x.start >= 15 && bounds.y.end - bounds.y.start <= 10, "{bounds:?}");
+        // Half of it is there, and something else that is larger than what is missing.
+        let now = Mask::from_fn(w, h, |i| bar(i) && i % w < 45 || i / w < 10);
+        let (stroke, is_plus) = correction(&truth, &now).expect("something is wrong");
+        assert!(!is_plus && stroke.bounds().expect("a line").y.end <= 10);
+        assert_eq!(correction(&truth, &truth), None);
+    }
+}

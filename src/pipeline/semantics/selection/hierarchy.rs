@@ -2,8 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use glam::DVec3;
-
 use super::marks::Marks;
 use super::surface::Surface;
 use crate::pipeline::observer::Observer;
@@ -22,8 +20,7 @@ const LEAF_STEP: f64 = 3.0;
 pub(crate) struct Hierarchy {
     /// The leaf of each Gaussian.
     leaf: Vec<u32>,
-    /// The middle of each leaf, in the cloud's own frame.
-    center: Vec<DVec3>,
+    leaves: usize,
     tree: Tree,
 }
 
@@ -35,18 +32,11 @@ impl Hierarchy {
         settings: &RenderSettings,
         observer: &mut dyn Observer,
     ) -> Result<Self, FindError> {
-        Ok(Self::of(&Surface::new(cloud, cameras, settings, observer)?, cloud))
+        Ok(Self::of(&Surface::new(cloud, cameras, settings, observer)?))
     }
 
-    fn of(surface: &Surface, cloud: &GaussianCloud) -> Self {
+    fn of(surface: &Surface) -> Self {
         let (leaf, count) = leaves(surface);
-        let mut center = vec![(DVec3::ZERO, 0.0); count];
-        for (leaf, p) in leaf.iter().zip(&cloud.positions) {
-            let (sum, n) = &mut center[*leaf as usize];
-            *sum += DVec3::from(p.map(f64::from));
-            *n += 1.0;
-        }
-        let center = center.into_iter().map(|(sum, n)| sum / n).collect();
         let mut pieces = vec![Piece { area: 0.0, sums: vec![0.0; 3] }; count];
         for (piece, leaf) in surface.pieces.iter().zip(&leaf) {
             let whole = &mut pieces[*leaf as usize];
@@ -62,7 +52,7 @@ impl Hierarchy {
         }
         let unit = pieces.iter().map(|p| p.area).sum::<f64>() / 1000.0;
         let tree = grow(pieces, borders, &move |a, b, border| unlike(a, b, border, true, unit));
-        Self { leaf, center, tree }
+        Self { leaf, leaves: count, tree }
     }
 
     /// The Gaussians that marks select, beginning with those `from` which there is to correct (indices).
@@ -73,13 +63,13 @@ impl Hierarchy {
     pub(crate) fn select(&self, marks: &Marks, from: &[usize]) -> Vec<bool> {
         let mut gaussians = vec![false; self.leaf.len()];
         from.iter().for_each(|&i| gaussians[i] = true);
-        let mut share = vec![[0_u32; 2]; self.center.len()];
+        let mut share = vec![[0_u32; 2]; self.leaves];
         for (leaf, is_in) in self.leaf.iter().zip(&gaussians) {
             share[*leaf as usize][usize::from(*is_in)] += 1;
         }
         let before: Vec<bool> = share.iter().map(|[out, own]| own > out).collect();
         let mut now = before.clone();
-        let mut marked = vec![[0.0_f64; 2]; self.center.len()];
+        let mut marked = vec![[0.0_f64; 2]; self.leaves];
         for (k, stroke) in marks.strokes.iter().enumerate() {
             let mut weights: BTreeMap<u32, f64> = BTreeMap::new();
             for (gaussian, weight) in &stroke.weights {
@@ -88,8 +78,7 @@ impl Hierarchy {
             let all: f64 = weights.values().sum();
             // Not to be followed is what costs.
             weights.iter().for_each(|(leaf, w)| marked[*leaf as usize][usize::from(!stroke.is_plus)] += MARK * w / all);
-            let size = self.size_of(&weights);
-            let change = if k == 0 && from.is_empty() { FIRST } else { CHANGE } / size;
+            let change = if k == 0 && from.is_empty() { FIRST } else { CHANGE } / stroke.size.max(f64::MIN_POSITIVE);
             now = self.cheapest(&marked, &now, change);
         }
         for (is_in, leaf) in gaussians.iter_mut().zip(&self.leaf) {
@@ -100,17 +89,6 @@ impl Hierarchy {
             }
         }
         gaussians
-    }
-
-    /// The square of a stroke's length, at least the area of what it shows.
-    fn size_of(&self, weights: &BTreeMap<u32, f64>) -> f64 {
-        let all: f64 = weights.values().sum();
-        let mean = weights.iter().map(|(l, w)| *w * self.center[*l as usize]).sum::<DVec3>() / all;
-        let spread =
-            weights.iter().map(|(l, w)| w * self.center[*l as usize].distance_squared(mean)).sum::<f64>() / all;
-        let area = weights.keys().map(|l| self.tree.nodes[*l as usize].area).sum::<f64>();
-        // A line of length l has a variance of l squared over 12.
-        (12.0 * spread).max(area).max(f64::MIN_POSITIVE)
     }
 
     /// The labels of the leaves that cost least: `marked` against each label, `change` by area that is not as `before`.
@@ -189,4 +167,135 @@ fn root(of: &mut [u32], mut i: u32) -> u32 {
         i = of[i as usize];
     }
     i
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::pipeline::observer::{Interrupted, Signal, Silent};
+    use crate::pipeline::semantics::selection::marks::Stroke;
+    use crate::render::Renderer;
+    use crate::scene::Mask;
+
+    const W: usize = 128;
+    const H: usize = 96;
+
+    /// A sheet of gray Gaussians with a red square of 12 x 12 in it, whose right half is darker. Whose each is:
+    /// 0, 1 and 2.
+    fn sheet() -> (GaussianCloud, Vec<usize>) {
+        let n = 32;
+        let of = |i: usize| match (i % n, i / n) {
+            (x, y) if (10..16).contains(&x) && (10..22).contains(&y) => 1,
+            (x, y) if (16..22).contains(&x) && (10..22).contains(&y) => 2,
+            _ => 0,
+        };
+        let color = [[0.0; 3], [1.6, -1.6, -1.6], [0.9, -1.7, -1.7]];
+        let place = |i: usize| [(i % n) as f32 * 0.05 - 0.8, (i / n) as f32 * 0.05 - 0.8, 0.0];
+        let whose: Vec<usize> = (0..n * n).map(of).collect();
+        let cloud = GaussianCloud {
+            sh: whose.iter().map(|w| color[*w]).collect(),
+            log_scales: vec![[-3.7, -3.7, -5.0]; n * n],
+            ..GaussianCloud::isotropic((0..n * n).map(place).collect(), -3.7, 4.0)
+        };
+        (cloud, whose)
+    }
+
+    fn cameras() -> Vec<Camera> {
+        let from = |x: f64, y: f64| {
+            Camera::look_at(DVec3::new(x, y, -2.2), DVec3::ZERO, DVec3::NEG_Y, 0.8, W as u32, H as u32).expect("valid")
+        };
+        vec![from(0.0, 0.0), from(0.5, 0.2), from(-0.4, -0.3)]
+    }
+
+    /// A dot around a place of the sheet in the first view.
+    fn dot(at: [f64; 2], is_plus: bool) -> Stroke {
+        let camera = cameras().remove(0);
+        let p = camera.project(DVec3::new(at[0], at[1], 0.0)).expect("in front");
+        let near = |i: usize| ((i % W) as f64 + 0.5 - p.x).hypot((i / W) as f64 + 0.5 - p.y) < 1.5;
+        Stroke { camera, pixels: Mask::from_fn(W, H, near), is_plus }
+    }
+
+    fn marks(cloud: &GaussianCloud, strokes: &[Stroke]) -> Marks {
+        let mut marks = Marks::default();
+        for stroke in strokes {
+            marks.add(&mut Renderer::new(), cloud, &RenderSettings::default(), stroke).expect("drawn");
+        }
+        marks
+    }
+
+    /// How many of each of the three are selected.
+    fn counts(selected: &[bool], whose: &[usize]) -> [usize; 3] {
+        [0, 1, 2].map(|k| selected.iter().zip(whose).filter(|(s, w)| **s && **w == k).count())
+    }
+
+    fn hierarchy(cloud: &GaussianCloud) -> Hierarchy {
+        Hierarchy::new(cloud, &cameras(), &RenderSettings::default(), &mut Silent).expect("made")
+    }
+
+    #[test]
+    fn a_click_takes_what_it_is_on_and_corrections_add_and_remove() {
+        let (cloud, whose) = sheet();
+        let tree = hierarchy(&cloud);
+        let [left, right, gray] = [[-0.15, 0.0], [0.15, 0.0], [-0.6, -0.6]];
+        let select = |strokes: &[Stroke], from: &[usize]| counts(&tree.select(&marks(&cloud, strokes), from), &whose);
+        let one = select(&[dot(left, true)], &[]);
+        assert!(one[1] >= 64 && one[0] <= 8 && one[2] <= 12, "{one:?}");
+        let both = select(&[dot(left, true), dot(right, true)], &[]);
+        assert!(both[1] >= 64 && both[2] >= 64 && both[0] <= 8, "{both:?}");
+        let back = select(&[dot(left, true), dot(right, true), dot(right, false)], &[]);
+        assert!(back[1] >= 60 && back[2] <= 12 && back[0] <= 8, "{back:?}");
+        // What there is to correct stays but for what is marked.
+        let from: Vec<usize> = (0..whose.len()).filter(|i| whose[*i] > 0).collect();
+        let without = select(&[dot(left, false)], &from);
+        assert!(without[1] <= 12 && without[2] >= 60 && without[0] == 0, "{without:?}");
+        // Controls: no mark, nothing; a mark elsewhere selects something else.
+        assert_eq!(select(&[], &[]), [0; 3]);
+        let other = select(&[dot(gray, true)], &[]);
+        assert!(other[0] >= 400 && other[1] + other[2] <= 12, "{other:?}");
+    }
+
+    #[test]
+    fn the_last_stroke_is_taken_back_and_selecting_twice_gives_the_same() {
+        let (cloud, whose) = sheet();
+        let tree = hierarchy(&cloud);
+        let mut all = marks(&cloud, &[dot([-0.15, 0.0], true), dot([0.15, 0.0], true)]);
+        let both = tree.select(&all, &[]);
+        assert_eq!(both, hierarchy(&cloud).select(&all, &[]));
+        all.remove_last();
+        let one = tree.select(&all, &[]);
+        assert_eq!(one, tree.select(&marks(&cloud, &[dot([-0.15, 0.0], true)]), &[]));
+        assert_ne!(counts(&one, &whose), counts(&both, &whose));
+        all.remove_last();
+        all.remove_last();
+        assert_eq!((all.len(), counts(&tree.select(&all, &[]), &whose)), (0, [0; 3]));
+    }
+
+    #[test]
+    fn extreme_clouds_and_a_stop() {
+        struct Stop;
+        impl Observer for Stop {
+            fn signal(&self) -> Signal {
+                Signal::Cancel
+            }
+        }
+        let settings = RenderSettings::default();
+        for n in [0, 1, 2] {
+            let cloud = GaussianCloud::isotropic(vec![[0.0; 3]; n], -2.0, 3.0);
+            for cameras in [cameras(), Vec::new()] {
+                let tree = Hierarchy::new(&cloud, &cameras, &settings, &mut Silent).expect("made");
+                let selected = tree.select(&marks(&cloud, &[dot([0.0, 0.0], true)]), &[]);
+                assert_eq!(selected.len(), n);
+            }
+        }
+        // All in one place, and one far off that no view shows.
+        let mut cloud = GaussianCloud::isotropic(vec![[0.0; 3]; 40], -2.0, 3.0);
+        cloud.positions[39] = [1e6, 0.0, 0.0];
+        let tree = Hierarchy::new(&cloud, &cameras(), &settings, &mut Silent).expect("made");
+        let selected = tree.select(&marks(&cloud, &[dot([0.0, 0.0], true)]), &[]);
+        assert!(selected[..39].iter().any(|s| *s) && !selected[39]);
+        let stopped = Hierarchy::new(&sheet().0, &cameras(), &settings, &mut Stop).expect_err("stopped");
+        assert!(Interrupted::is_cause_of(&stopped), "{stopped}");
+    }
 }

@@ -2,9 +2,17 @@
 
 use std::collections::BTreeMap;
 
+use glam::{DVec2, DVec3};
+
 use crate::math::lanes::Lane;
 use crate::render::{ContributionSink, RenderError, RenderSettings, Renderer, TILE_PX};
 use crate::scene::{Camera, GaussianCloud, Mask};
+
+/// A stroke is about something of so many times its own area, at least.
+const CLICK: f64 = 16.0;
+
+/// Pixels around a stroke that are drawn with it.
+const ROOM_PX: usize = 32;
 
 /// Share of a pixel's light, from its foremost contributor on, that is what one points at.
 const POINTED_AT: f32 = 0.6;
@@ -29,6 +37,8 @@ pub(crate) struct Marks {
 pub(super) struct Marked {
     pub(super) weights: BTreeMap<u32, f32>,
     pub(super) is_plus: bool,
+    /// The square of its length at the depth of what it shows, at least some times its area: square units.
+    pub(super) size: f64,
 }
 
 impl Marks {
@@ -50,9 +60,19 @@ impl Marks {
         settings: &RenderSettings,
         stroke: &Stroke,
     ) -> Result<(), RenderError> {
-        let camera = &stroke.camera;
-        let (width, height) = (camera.width_px as usize, camera.height_px as usize);
-        let row = || Row { pixels: &stroke.pixels, width, found: Vec::new() };
+        let Some(near) = stroke.pixels.bounds() else { return Ok(()) };
+        // What lies far from the stroke need not be drawn.
+        let from = [near.x.start, near.y.start].map(|v| v.saturating_sub(ROOM_PX));
+        let to = |end: usize, most: u32| (end + ROOM_PX).min(most as usize);
+        let (right, bottom) = (to(near.x.end, stroke.camera.width_px), to(near.y.end, stroke.camera.height_px));
+        let (width, height) = (right - from[0], bottom - from[1]);
+        let camera = &Camera {
+            width_px: width as u32,
+            height_px: height as u32,
+            principal_px: stroke.camera.principal_px - DVec2::new(from[0] as f64, from[1] as f64),
+            ..stroke.camera.clone()
+        };
+        let row = || Row { pixels: &stroke.pixels, from, width, found: Vec::new() };
         let mut rows: Vec<Row<'_>> = (0..height.div_ceil(TILE_PX)).map(|_| row()).collect();
         renderer.contributions(cloud, camera, settings, &mut rows)?;
         let mut by_pixel: BTreeMap<u32, Vec<(f32, u32)>> = BTreeMap::new();
@@ -72,14 +92,42 @@ impl Marks {
                 }
             }
         }
-        self.strokes.push(Marked { weights, is_plus: stroke.is_plus });
+        let size = size_px2(&stroke.pixels) * units_per_px(cloud, &stroke.camera, &weights).powi(2);
+        self.strokes.push(Marked { weights, is_plus: stroke.is_plus, size });
         Ok(())
     }
+}
+
+/// The square of a stroke's length, at least [`CLICK`] times its area, square px.
+fn size_px2(pixels: &Mask) -> f64 {
+    let at = |i: usize| DVec2::new((i % pixels.width_px()) as f64, (i / pixels.width_px()) as f64);
+    let area = pixels.area() as f64;
+    let mean = pixels.pixels().map(at).sum::<DVec2>() / area;
+    let variance = pixels.pixels().map(|i| at(i).distance_squared(mean)).sum::<f64>() / area;
+    // A line of length l has a variance of l squared over 12.
+    (12.0 * variance).max(CLICK * area)
+}
+
+/// How large a pixel is where half of the weight lies in front.
+fn units_per_px(cloud: &GaussianCloud, camera: &Camera, weights: &BTreeMap<u32, f32>) -> f64 {
+    let axis = camera.world_from_camera * DVec3::Z;
+    let depth = |i: &u32| (cloud.world_position(*i as usize) - camera.center).dot(axis);
+    let mut depths: Vec<(f64, f32)> = weights.iter().map(|(i, w)| (depth(i), *w)).collect();
+    depths.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let half = 0.5 * depths.iter().map(|d| d.1).sum::<f32>();
+    let mut sum = 0.0;
+    let reached = depths.iter().find(|(_, w)| {
+        sum += w;
+        sum >= half
+    });
+    reached.map_or(1.0, |(depth, _)| depth / (camera.focal_px.x * camera.focal_px.y).sqrt())
 }
 
 /// Collects who contributes to the marked pixels of one row of tiles.
 struct Row<'a> {
     pixels: &'a Mask,
+    /// The corner of what is drawn in the view.
+    from: [usize; 2],
     width: usize,
     found: Vec<(u32, u32, f32)>,
 }
@@ -87,7 +135,7 @@ struct Row<'a> {
 impl ContributionSink<f32> for Row<'_> {
     fn add(&mut self, gaussian: u32, x: usize, y: usize, weights: &Lane<f32>) {
         for (k, &weight) in weights.iter().enumerate().take(self.width - x).filter(|(_, w)| **w > 0.0) {
-            let pixel = y * self.width + x + k;
+            let pixel = (y + self.from[1]) * self.pixels.width_px() + x + k + self.from[0];
             if self.pixels.contains(pixel) {
                 self.found.push((pixel as u32, gaussian, weight));
             }

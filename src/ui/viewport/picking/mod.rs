@@ -1,7 +1,7 @@
 //! What is under the cursor and what is selected: outlined in the view, named beside the cursor.
 //!
-//! A click takes the object, a click on a selected object the part of it that is under the cursor, and so on
-//! inwards; with Alt the innermost at once.
+//! A click takes the part, or the object where it has none; a click on what is selected what it is a part of; with Alt
+//! the object at once.
 
 mod menu;
 
@@ -86,7 +86,7 @@ impl Picking {
             actions.push(Action::Select(self.hovered));
         }
         if response.secondary_clicked() {
-            // On what is selected the menu is about that, else about the object.
+            // On what is selected the menu is about that, else about what a click would select.
             let id = response.interact_pointer_pos().and_then(under);
             let within = |s: &IdentityId| id.is_some_and(|id| all.ancestors(id).any(|at| at == *s));
             self.menu = self.selected.filter(within).or_else(|| id.map(|id| picked(all, id, None, alt)));
@@ -159,16 +159,15 @@ fn innermost(map: &ViewMap, shown: Rect, pos: Pos2) -> Option<IdentityId> {
     map.identity.get(y * map.width_px + x).copied()
 }
 
-/// What a click on a pixel of `innermost` selects: the object, or, inside what is selected, one level deeper.
+/// What a click on a pixel of `innermost` selects: that, and on what is selected what it is a part of, up to the object
+/// and on from the part again; with Alt the object at once.
 fn picked(all: &Identities, innermost: IdentityId, selected: Option<IdentityId>, alt: bool) -> IdentityId {
-    let mut line: Vec<IdentityId> = all.ancestors(innermost).collect();
-    line.reverse();
-    let Some(selected) = selected.filter(|s| !alt && all.object_of(*s) == line[0]) else {
-        return if alt { innermost } else { line[0] };
-    };
-    // Beside what is selected, in the same object: as deep as that.
-    let depth = all.ancestors(selected).count() - usize::from(!line.contains(&selected));
-    line[depth.min(line.len() - 1)]
+    if alt {
+        return all.object_of(innermost);
+    }
+    let line: Vec<IdentityId> = all.ancestors(innermost).collect();
+    let at = selected.and_then(|s| line.iter().position(|id| *id == s));
+    at.map_or(innermost, |at| line[(at + 1) % line.len()])
 }
 
 /// A name beside the cursor, inside the view.
@@ -204,17 +203,17 @@ mod tests {
     }
 
     #[test]
-    fn clicks_go_inwards_and_stay_at_the_level_they_reached() {
+    fn clicks_take_the_part_and_go_outwards_on_what_is_selected() {
         let (all, [doll, table, face, eye, hand]) = doll();
-        assert_eq!(picked(&all, eye, None, false), doll);
-        assert_eq!(picked(&all, eye, Some(doll), false), face);
-        assert_eq!(picked(&all, eye, Some(face), false), eye);
-        assert_eq!(picked(&all, eye, Some(eye), false), eye, "there is nothing deeper");
-        assert_eq!(picked(&all, hand, Some(face), false), hand, "its neighbor, at the same level");
-        assert_eq!(picked(&all, hand, Some(eye), false), hand);
-        assert_eq!(picked(&all, doll, Some(doll), false), doll, "no part is there");
-        assert_eq!(picked(&all, eye, Some(table), false), doll, "another object is selected");
-        assert_eq!((picked(&all, eye, None, true), picked(&all, eye, Some(doll), true)), (eye, eye), "Alt");
+        assert_eq!(picked(&all, eye, None, false), eye);
+        assert_eq!(picked(&all, eye, Some(eye), false), face);
+        assert_eq!(picked(&all, eye, Some(face), false), doll);
+        assert_eq!(picked(&all, eye, Some(doll), false), eye, "and from the part again");
+        assert_eq!(picked(&all, hand, Some(face), false), hand, "its neighbor");
+        assert_eq!(picked(&all, face, Some(eye), false), face, "where no part of it is");
+        assert_eq!(picked(&all, table, Some(table), false), table, "nothing is around it");
+        assert_eq!(picked(&all, eye, Some(table), false), eye, "another object is selected");
+        assert_eq!((picked(&all, eye, None, true), picked(&all, eye, Some(doll), true)), (doll, doll), "Alt");
     }
 
     #[test]

@@ -1,0 +1,106 @@
+//! Selecting by clicks and strokes, naming what is selected, and correcting what was found.
+
+use egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect};
+use egui_kittest::kittest::Queryable;
+
+use fmlgs::ui::actions::Action;
+use fmlgs::ui::app::App;
+
+use super::Window;
+use super::edits::window;
+
+fn click(w: &mut Window, at: Pos2, modifiers: Modifiers) {
+    let button = |pressed| Event::PointerButton { pos: at, button: PointerButton::Primary, pressed, modifiers };
+    w.harness.event(Event::ModifiersChanged(modifiers));
+    w.harness.hover_at(at);
+    w.harness.step();
+    w.harness.event(button(true));
+    w.harness.step();
+    w.harness.event(button(false));
+    w.harness.event(Event::ModifiersChanged(Modifiers::NONE));
+    w.harness.run_steps(3);
+}
+
+fn view(w: &Window) -> Rect {
+    w.harness.get_by_label("Viewport").rect()
+}
+
+/// The middle of an identity's pixels in the window.
+fn middle_of(w: &Window, id: u32) -> Pos2 {
+    let app = w.app();
+    let maps = app.viewport.queries.maps().expect("maps");
+    let map = &maps.identities;
+    let at: Vec<(usize, usize)> = (0..map.identity.len())
+        .filter(|i| map.identity[*i] == id)
+        .map(|i| (i % map.width_px, i / map.width_px))
+        .collect();
+    let mean = |of: &dyn Fn(&(usize, usize)) -> usize| at.iter().map(of).sum::<usize>() as f32 / at.len() as f32 + 0.5;
+    let share = egui::vec2(mean(&|p| p.0) / map.width_px as f32, mean(&|p| p.1) / map.height_px as f32);
+    let rect = view(w);
+    rect.min + share * rect.size()
+}
+
+fn at_rest(a: &App) -> bool {
+    a.viewport.picture().is_some_and(|p| p.full) && a.viewport.queries.maps().is_some()
+}
+
+#[test]
+fn a_click_selects_and_a_name_is_kept_and_asked_for() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    w.harness.state_mut().layout.cameras = false;
+    w.ask(Action::Ask("box 0".into()));
+    w.until("maps", at_rest);
+    let before = w.app().state.semantics.as_ref().expect("objects").identities.len();
+    let box_1 = middle_of(&w, 2);
+    w.ask(Action::Paint(Some(0)));
+    assert!(w.shows("Select a new object: click on it"), "the tool says what to do");
+    w.until("a picture for it", |a| a.viewport.picture().is_some_and(|p| p.full));
+    click(&mut w, box_1, Modifiers::NONE);
+    w.until("an answer", |a| a.viewport.selection().is_some_and(|n| n > 0));
+    let selected = w.app().viewport.selection().expect("something");
+    // A second click, as not belonging to it, leaves less; taking it back leaves what was.
+    w.until("a picture at rest", at_rest);
+    let beside = view(&w).min + 0.04 * view(&w).size();
+    click(&mut w, beside, Modifiers::SHIFT);
+    w.harness.run_steps(30);
+    w.press(Key::Backspace);
+    w.until("the stroke is taken back", |a| a.viewport.selection() == Some(selected));
+    w.harness.get_by_label("Name of what is selected").click();
+    w.harness.run_steps(2);
+    w.types("crate");
+    w.harness.get_by_label("Keep").click();
+    w.until("it is kept", |a| a.state.semantics.as_ref().is_some_and(|m| m.identities.len() == before + 1));
+    let map = w.app().state.semantics.clone().expect("objects");
+    assert_eq!((map.identities.name(before as u32 + 1), map.sizes()[before + 1]), ("crate".into(), selected));
+    w.ask(Action::Ask("crate".into()));
+    w.until("found", |a| a.viewport.queries.found() == [before as u32 + 1]);
+    w.ask(Action::Undo);
+    w.until("undone", |a| a.state.semantics.as_ref().is_some_and(|m| m.identities.len() == before));
+}
+
+#[test]
+fn what_was_found_is_corrected_and_nothing_is_kept_by_cancel() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    w.harness.state_mut().layout.cameras = false;
+    w.ask(Action::Ask("box 0".into()));
+    w.until("maps", at_rest);
+    let sizes = w.app().state.semantics.as_ref().expect("objects").sizes();
+    let [box_0, box_1] = [1, 2].map(|id| middle_of(&w, id));
+    for keep in [false, true] {
+        w.ask(Action::Correct(1));
+        w.until("a picture for it", |a| a.viewport.picture().is_some_and(|p| p.full));
+        click(&mut w, box_1, Modifiers::NONE);
+        w.until("more", |a| a.viewport.selection().is_some_and(|n| n > sizes[1]));
+        assert!(!w.shows("Keep as"), "it has a name");
+        w.harness.get_by_label(if keep { "Keep" } else { "Cancel" }).click();
+        w.harness.run_steps(20);
+        let now = w.app().state.semantics.as_ref().expect("objects").sizes();
+        if !keep {
+            assert_eq!(now, sizes);
+        }
+    }
+    w.until("it is larger", |a| a.state.semantics.as_ref().is_some_and(|m| m.sizes()[1] > sizes[1]));
+    assert!(box_0 != box_1);
+}
