@@ -16,6 +16,7 @@ use fmlgs::agent::tool::{Target, ToolCall};
 use fmlgs::agent::transcript::What;
 use fmlgs::agent::{Planner, Policy, Refusal, Reply, Session, World};
 use fmlgs::navigate::target::Side;
+use fmlgs::scene::NOBODY;
 use serde::{Deserialize, Serialize};
 
 const WORDINGS: &str = include_str!("data/agent_commands.toml");
@@ -180,6 +181,85 @@ fn several_things_are_marked_together_and_the_next_request_marks_anew() {
     assert_eq!(room.log.last().map(String::as_str), Some("highlight green bottle, brown bottle"));
     say(&mut session, &mut room, "mark the lamp");
     assert_eq!(room.log.last().map(String::as_str), Some("highlight lamp"));
+}
+
+/// Names of things that are in nobody's room, each with one of a part.
+const HARD: [[&str; 2]; 12] = [
+    ["plush toy", "pink bow on the plush toy's hood"],
+    ["left of the lamp", "button a of b"],
+    ["mug from above", "handle nearest to the kettle"],
+    ["salt, oil and pepper", "all of them"],
+    ["Levi's 501", "20cm ruler"],
+    ["赤いコントローラーのボタン", "手柄"],
+    ["what's this", "the (lower) part"],
+    ["yes please", "please"],
+    ["Set of Cups", "cup of the set"],
+    ["nothing else", "third one"],
+    ["doll's house", "eye · doll"],
+    ["C++", "C# 2.0"],
+];
+
+#[test]
+fn things_are_called_by_their_names_as_a_whole() {
+    let mut room = Room::new();
+    let mut ids = Vec::new();
+    for [thing, part] in HARD {
+        let whole = room.put(NOBODY, thing);
+        ids.extend([(whole, thing), (room.put(whole, part), part)]);
+    }
+    let mut wrong = String::new();
+    for (id, name) in ids {
+        let full = room.identities().full_name(id);
+        for name in [name, &full, &name.to_uppercase()] {
+            for form in
+                ["show me {}", "look at the {}", "highlight {}", "how big is the {}", "hide {} and turn left", "the {}"]
+            {
+                let (mut session, mut room) = (session(), room.clone());
+                let request = form.replace("{}", name);
+                let reply = say(&mut session, &mut room, &request);
+                let calls = done(&session, &room);
+                let is_meant = |call: &String| call.contains(&format!("({full}"));
+                // What is a command as it stands, is one.
+                if !calls.first().is_some_and(is_meant) && !(form == "the {}" && calls.len() == 1) {
+                    let _ = writeln!(wrong, "'{request}': {calls:?}, {}", reply.text);
+                }
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong}");
+    // The control: what is nobody's name is no one's, and two of the same name are asked about and told apart.
+    let reply = say(&mut session(), &mut room, "show me the pink bow on the plush toy's foot");
+    assert!(reply.refused.is_some(), "{}", reply.text);
+    let twins = [room.put(NOBODY, "bow on the hat"), room.put(NOBODY, "bow on the hat")];
+    let mut session = session();
+    assert_eq!(say(&mut session, &mut room, "show me the bow on the hat").candidates, twins);
+    let second = room.identities().full_name(twins[1]);
+    say(&mut session, &mut room, &second);
+    assert_eq!(done(&session, &room), [format!("go_to(bow on the hat #{})", twins[1])]);
+}
+
+#[test]
+fn a_completion_that_is_taken_finds_what_it_names() {
+    let mut room = Room::new();
+    HARD.iter().for_each(|[thing, part]| {
+        let whole = room.put(NOBODY, thing);
+        room.put(whole, part);
+    });
+    for (begun, full) in [
+        ("show me the pink", "pink bow on the plush toy's hood · plush toy"),
+        ("show me pink bow on the plush toy's ho", "pink bow on the plush toy's hood · plush toy"),
+        ("hide the button a · bl", "button a · blue controller"),
+        ("highlight the levi", "Levi's 501"),
+        ("show me the 手", "手柄 · 赤いコントローラーのボタン"),
+    ] {
+        let offered = complete(begun, room.identities(), 12);
+        let text = offered.iter().find(|o| o.to_lowercase().ends_with(&full.to_lowercase()));
+        let text = text.unwrap_or_else(|| panic!("'{begun}': {offered:?}"));
+        let (mut session, mut room) = (session(), room.clone());
+        say(&mut session, &mut room, text);
+        let calls = done(&session, &room);
+        assert!(calls.len() == 1 && calls[0].contains(&format!("({full})")), "'{text}': {calls:?}");
+    }
 }
 
 #[test]

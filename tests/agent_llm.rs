@@ -105,12 +105,12 @@ fn a_good_model_is_heard_step_by_step() {
         text("Here is the handle, from half a metre farther back."),
     ];
     let t = talk(script, "Show me the handle of the kettle from the other side, then step back half a metre.");
-    assert_eq!(t.room.log, ["go_to handle of the kettle", "move back"]);
+    assert_eq!(t.room.log, ["go_to handle · kettle", "move back"]);
     assert_eq!((t.outcome(), t.reply.text.as_str()), ("done", "Here is the handle, from half a metre farther back."));
     // The model hears what came of its calls, and the scene as data.
     let seen = t.server.seen.lock().expect("log").clone();
     assert_eq!(seen.len(), 3);
-    assert!(seen[1].body.contains("Here is the handle of the kettle"), "{}", seen[1].body);
+    assert!(seen[1].body.contains("Here is the handle · kettle"), "{}", seen[1].body);
     let body = seen[0].json();
     assert_eq!(body["tools"].as_array().map(Vec::len), Some(fmlgs::agent::tool::NAMES.len()));
     let message = body["messages"][1]["content"].as_str().expect("a message");

@@ -86,6 +86,7 @@ fn every_stage_is_measured_and_resumed() {
     run(&["query", &scene, "--phrases", &at("none.txt")]).fails_with(1);
 
     recipes_are_passed_on_and_printed(&run, &scene, photos, &at("red.ply"));
+    everything_is_exported(&run, &scene, &at("everything"));
 
     let wanted = ["report", &scene, "--masks", photos, "--max-side", "64", "--steps", "20", "--train-steps", "20"];
     let rest = ["--views", "1", "--stages", "render,train,features,query,path", "--out", &out, "-q"];
@@ -146,6 +147,26 @@ fn every_stage_is_measured_and_resumed() {
     no_labels.fails_with(1);
     run(&["report", &scene, "--stages", "nonesuch"]).fails_with(2);
     run(&["report", "--defaults", &table, "--from", &at("nowhere")]).fails_with(1);
+}
+
+/// Every object and part comes out, and its masks are read back as what is seen.
+fn everything_is_exported(run: &dyn Fn(&[&str]) -> Done, scene: &str, out: &str) {
+    let told = run(&["segment", scene, "--all", "--out", out, "-q"]).ok().stdout;
+    assert!(told.contains("objects and parts as .ply") && told.contains("masks of "), "{told}");
+    for labels in ["isat", "ids"] {
+        let masks = format!("{out}/{labels}");
+        let scores = run(&["eval", scene, "--masks", &masks, "--json"]).ok().json();
+        assert!(scores["views"].as_u64() > Some(0) && scores["miou"].as_f64() > Some(0.9), "{labels}: {scores}");
+    }
+    // Again over itself, not over what is somebody's.
+    run(&["segment", scene, "--all", "--out", out, "--masks", "coco", "--photos", "none", "-q"]).ok();
+    assert_eq!(std::fs::read_dir(format!("{out}/isat")).unwrap().count(), 0, "of the export before");
+    std::fs::write(format!("{out}/coco.json"), "mine").unwrap();
+    run(&["segment", scene, "--all", "--out", out, "-q"]).fails_with(1);
+    run(&["segment", scene, "--all", "--out", scene]).fails_with(1);
+    run(&["segment", scene, "--out", out]).fails_with(2);
+    run(&["segment", scene, "box 1", "--all", "--out", out]).fails_with(2);
+    run(&["segment", scene, "box 1", "--masks", "coco", "--out", out]).fails_with(2);
 }
 
 /// Every front end answers by the recipe that it is given, and says which.

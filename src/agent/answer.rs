@@ -45,6 +45,10 @@ pub(crate) enum Choice {
 
 /// Which of the candidates a text means.
 pub(crate) fn choice(world: &mut dyn World, text: &str, candidates: &[IdentityId], dialog: &DialogState) -> Choice {
+    let called = world.identities().called(text, LevelFilter::Auto);
+    if let [only] = candidates.iter().filter(|id| called.contains(id)).collect::<Vec<_>>().as_slice() {
+        return Choice::One(**only);
+    }
     if confirmation(text) == Confirmation::No {
         return Choice::None;
     }

@@ -25,7 +25,7 @@ pub(crate) fn the(world: &dyn World, id: IdentityId) -> String {
 
 /// A list of names, at most `most` of them.
 pub(crate) fn names(world: &dyn World, ids: &[IdentityId], most: usize) -> String {
-    let mut list: Vec<String> = ids.iter().take(most).map(|id| world.identities().name(*id)).collect();
+    let mut list: Vec<String> = ids.iter().take(most).map(|id| world.identities().label(*id)).collect();
     if ids.len() > most {
         list.push(format!("{} more", ids.len() - most));
     }

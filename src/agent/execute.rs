@@ -141,14 +141,7 @@ fn find(world: &mut dyn World, target: &Target, level: LevelFilter, dialog: &Dia
 
 /// "the red controller or the blue controller".
 fn choices(world: &dyn World, candidates: &[IdentityId]) -> String {
-    let all = world.identities();
     let mut names: Vec<String> = candidates.iter().take(6).map(|id| the(world, *id)).collect();
-    // What has the same name is told apart by its number.
-    for i in 0..names.len() {
-        if candidates.iter().take(6).filter(|c| all.full_name(**c) == all.full_name(candidates[i])).count() > 1 {
-            names[i] += &format!(" (#{})", candidates[i]);
-        }
-    }
     if candidates.len() > 6 {
         names.push(format!("one of {} more", candidates.len() - 6));
     }

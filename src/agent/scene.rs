@@ -153,11 +153,8 @@ impl SceneWorld {
         self.parts.map.identities.full_name(id)
     }
 
-    /// The file that an identity is exported to: a name that every system takes.
     fn export_file(&self, id: IdentityId) -> PathBuf {
-        let safe = |c: char| if c.is_alphanumeric() { c } else { '-' };
-        let name: String = self.name(id).chars().take(60).map(safe).collect();
-        self.parts.exports.join(format!("{id}-{}.ply", name.trim_matches('-')))
+        self.parts.exports.join(export::identity_file(&self.parts.map.identities, id))
     }
 
     /// A turn or a straight way, without looking for one.

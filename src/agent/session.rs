@@ -13,7 +13,7 @@ use super::tool::ToolCall;
 use super::transcript::{Transcript, What};
 use super::words::MAX_CHARS;
 use super::world::World;
-use crate::scene::IdentityId;
+use crate::scene::{IdentityId, LevelFilter};
 
 /// Calls that one request may lead to.
 pub(crate) const MOST_CALLS: usize = 24;
@@ -111,7 +111,8 @@ impl Session {
     }
 
     fn answer(&mut self, world: &mut dyn World, text: &str, sink: &mut ProgressSink<'_>) -> Reply {
-        if !text.chars().any(char::is_alphanumeric) {
+        let is_name = !world.identities().called(text, LevelFilter::Auto).is_empty();
+        if !is_name && !text.chars().any(char::is_alphanumeric) {
             return self
                 .refuse(RefusalKind::Unclear, "Tell me what you would like to see, such as 'show me the lamp'.");
         }

@@ -31,6 +31,15 @@ pub(crate) fn tokens(text: &str) -> Vec<Token> {
     found
 }
 
+/// The words of a request, marks as commas except for a question's.
+pub(crate) fn request_tokens(request: &str) -> Vec<Token> {
+    let mut all = tokens(request);
+    for token in all.iter_mut().filter(|t| is_mark(&t.low) && t.low != "?") {
+        token.low = ",".into();
+    }
+    all
+}
+
 /// Marks at a word's end become tokens; a number and its unit are parted; 'quotes' are kept whole.
 fn split_word(word: &str, found: &mut Vec<Token>) {
     let body = word.trim_end_matches(|c: char| ",;.?!:…".contains(c));

@@ -4,9 +4,9 @@
 use super::camera_args::{Direction, Distance};
 use super::relation::{Extent, Viewpoint};
 use crate::navigate::target::Side;
-use crate::pipeline::semantics::answer::{QueryAnswer, by_name};
+use crate::pipeline::semantics::answer::{Basis, QueryAnswer};
 use crate::pipeline::semantics::localize::Answer;
-use crate::pipeline::semantics::reading::QueryReading;
+use crate::pipeline::semantics::query_engine::ask_by_name;
 use crate::pipeline::semantics::recipe::{Recipe, Understanding};
 use crate::pipeline::semantics::timing::StagesMs;
 use crate::scene::{Bounds, Identities, IdentityId, Level, LevelFilter};
@@ -127,14 +127,11 @@ pub trait World {
 /// Answers a query by names alone: a [`World::locate`] for scenes without an encoder.
 pub fn locate_by_names(identities: &Identities, query: &str, kind: LevelFilter) -> QueryAnswer {
     let recipe = Recipe::default();
-    match QueryReading::new(identities, query, kind, &recipe) {
-        Some(reading) => by_name(identities, &reading.phrase, kind, &recipe),
-        None => QueryAnswer {
-            answer: Answer::NotFound(Vec::new()),
-            basis: crate::pipeline::semantics::answer::Basis::Names,
-            relevancy: vec![0.0; identities.len() + 1],
-            stages: StagesMs::default(),
-            recipe,
-        },
-    }
+    ask_by_name(identities, query, kind, &recipe).unwrap_or_else(|| QueryAnswer {
+        answer: Answer::NotFound(Vec::new()),
+        basis: Basis::Names,
+        relevancy: vec![0.0; identities.len() + 1],
+        stages: StagesMs::default(),
+        recipe,
+    })
 }

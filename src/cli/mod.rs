@@ -29,6 +29,7 @@ mod render;
 mod report;
 mod reproduce;
 mod segment;
+mod segment_click;
 mod synth;
 mod train;
 mod view;
@@ -172,7 +173,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Eval(args) => eval::run(args, quiet),
         Command::Preprocess(args) => preprocess::run(args, quiet),
         Command::Query(args) => query::run(args),
-        Command::Segment(args) => segment::run(args),
+        Command::Segment(args) => segment::run(args, quiet),
         Command::Path(args) => path::run(args),
         Command::Agent(args) => agent::run(args),
         Command::Synth(args) => synth::run(args, quiet),

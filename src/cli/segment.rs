@@ -1,29 +1,51 @@
-//! `fmlgs segment`: the Gaussians of what is asked for.
+//! `fmlgs segment`: the Gaussians of what is asked for, or of everything, with its masks.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
+use super::progress::Console;
 use super::recipe::RecipeArgs;
-use super::{CliError, number, output};
-use crate::jobs::{export, open, query, segment};
-use crate::scene::LevelFilter;
+use super::segment_click::{self, ClickArgs};
+use super::{CliError, number, output, view};
+use crate::jobs::export_all::{self, ExportAllRequest, ExportedAll, MaskFormat};
+use crate::jobs::{Scene, export, open, query, render, segment};
+use crate::math::format::things;
+use crate::scene::{Camera, LevelFilter, SemanticMap};
 
-/// Write the Gaussians of an object or a part as a .ply
+/// Write the Gaussians of an object or a part as a .ply, or of all of them, with masks of the photos
 ///
 /// The same match as that of the mask, in space: by identities, or with --match codes by the codes of the
-/// Gaussians. Exit code 1 if nothing fits.
+/// Gaussians. Exit code 1 if nothing fits. With --all, a folder is written: a .ply for each object and part, and their
+/// masks in the photos as files that --masks of other commands, and other programs, read. A folder that holds
+/// anything but an earlier export, or something of it that was changed since, is refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs segment scene/ \"the kettle\" --out kettle.ply\n  \
     fmlgs segment scene/ \"lid of the kettle\" --out lid.ply\n  \
-    fmlgs segment scene/ \"the kettle\" --rest --out without_kettle.ply")]
+    fmlgs segment scene/ \"the kettle\" --rest --out without_kettle.ply\n  \
+    fmlgs segment scene/ --all --out everything/ --masks isat,coco --photos 0,12\n  \
+    fmlgs segment scene/ --click 320,200 --view 0003.png --keep \"kettle\"")]
 pub(crate) struct SegmentArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
     /// What to look for
-    text: String,
-    /// Write to this file
-    #[arg(long)]
-    out: PathBuf,
+    #[arg(required_unless_present_any = ["all", "click"])]
+    text: Option<String>,
+    /// Write every object and part, and their masks in the photos, into the folder --out
+    #[arg(long, conflicts_with_all = ["text", "rest", "top", "kind", "RecipeArgs"])]
+    all: bool,
+    /// Write to this file, or folder for --all
+    #[arg(long, required_unless_present = "keep")]
+    out: Option<PathBuf>,
+    /// Masks of --all, with commas between
+    #[arg(long, requires = "all", value_enum, value_delimiter = ',', default_values_t = MaskFormat::ALL)]
+    masks: Vec<MaskFormat>,
+    /// Photos whose masks --all writes: 'all', 'none', or some by index or name, with commas between
+    #[arg(long, requires = "all", default_value = "all")]
+    photos: String,
+    /// Shrink the masks of --all to at most this many px along their longer side [default: as the photos]
+    #[arg(long, requires = "all", value_parser = clap::value_parser!(u32).range(16..=16384))]
+    max_side: Option<u32>,
     /// Write everything else instead
     #[arg(long)]
     rest: bool,
@@ -34,18 +56,79 @@ pub(crate) struct SegmentArgs {
     #[arg(long, value_enum, default_value_t = LevelFilter::Auto)]
     kind: LevelFilter,
     #[command(flatten)]
+    clicks: ClickArgs,
+    #[command(flatten)]
     recipe: RecipeArgs,
 }
 
-pub(crate) fn run(args: SegmentArgs) -> Result<(), CliError> {
+pub(crate) fn run(args: SegmentArgs, quiet: bool) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
-    export::check(&args.out, &[".ply"], &scene.reads())?;
+    match (&args.text, &args.out) {
+        (Some(text), Some(out)) => one(&args, text, out, &scene),
+        (None, Some(out)) if args.all => {
+            export::check_folder(out, &scene.reads())?;
+            let map = scene.semantics()?;
+            all(&args, out, &scene, map, quiet)
+        }
+        (_, out) => {
+            out.iter().try_for_each(|out| export::check(out, &[".ply"], &scene.reads()))?;
+            segment_click::run(&scene, &args.clicks, out.as_ref(), quiet)
+        }
+    }
+}
+
+fn one(args: &SegmentArgs, text: &str, out: &Path, scene: &Scene) -> Result<(), CliError> {
+    export::check(out, &[".ply"], &scene.reads())?;
     let map = scene.semantics()?;
-    let answered = query::answered(&map, &args.text, args.kind, &args.recipe.recipe())?;
+    let answered = query::answered(&map, text, args.kind, &args.recipe.recipe())?;
     let kept = segment::select(&scene.cloud, &map, &answered, args.top, args.rest)?;
-    export::ply(&args.out, &kept)?;
+    export::ply(out, &kept)?;
     let names: Vec<String> = answered.chosen(args.top).iter().map(|id| map.identities.full_name(*id)).collect();
     let what = if args.rest { format!("all but {}", names.join(", ")) } else { names.join(", ") };
-    let written = format!("{what}: {} of {} Gaussians in {}", kept.len(), scene.cloud.len(), args.out.display());
+    let written = format!("{what}: {} of {} Gaussians in {}", kept.len(), scene.cloud.len(), out.display());
     output::print(&args.recipe.lines(&map).into_iter().chain([written]).collect::<Vec<_>>().join("\n"))
+}
+
+fn all(args: &SegmentArgs, out: &Path, scene: &Scene, map: SemanticMap, quiet: bool) -> Result<(), CliError> {
+    let request = ExportAllRequest {
+        cloud: Arc::clone(&scene.cloud),
+        map: Arc::new(map),
+        settings: scene.settings.clone(),
+        views: photos(args, scene)?,
+        masks: args.masks.clone(),
+        folder: out.into(),
+    };
+    let done = export_all::run(&request, &mut Console::new(quiet));
+    let kept = "what was written by then stays; the same command goes over it";
+    output::print(&told(&done.map_err(|e| CliError::of_work(e, kept))?, out))
+}
+
+fn told(done: &ExportedAll, folder: &Path) -> String {
+    let mut text = format!("{} objects and parts as .ply", done.written);
+    if done.left_out > 0 {
+        text += &format!(", {} without Gaussians left out", done.left_out);
+    }
+    text += &match done.photos {
+        0 => ", no masks".to_owned(),
+        n => format!(", masks of {}", things(n, "photo")),
+    };
+    format!("{text} in {}", folder.display())
+}
+
+/// The photos that are asked for, by name.
+fn photos(args: &SegmentArgs, scene: &Scene) -> Result<Vec<(String, Camera)>, CliError> {
+    let limited = |camera: &Camera| args.max_side.map_or_else(|| camera.clone(), |side| camera.limited_to(side));
+    let all = || scene.cameras.iter().map(|c| (c.name.clone(), limited(&c.camera)));
+    let views: Vec<(String, Camera)> = match args.photos.as_str() {
+        "all" => all().collect(),
+        "none" => Vec::new(),
+        list => {
+            let wanted = list.split(',').map(str::trim).filter(|name| !name.is_empty());
+            let cameras = wanted.map(|name| view::choose(Some(name), scene)).collect::<Result<Vec<_>, _>>()?;
+            let is_wanted = |(k, _): &(usize, (String, Camera))| cameras.contains(&scene.cameras[*k].camera);
+            all().enumerate().filter(is_wanted).map(|(_, view)| view).collect()
+        }
+    };
+    views.iter().try_for_each(|(_, c)| render::check_room(c.width_px, c.height_px))?;
+    Ok(views)
 }

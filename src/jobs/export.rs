@@ -11,7 +11,7 @@ use serde::Serialize;
 use super::JobError;
 use crate::io::{self, IoError, atomic, scene_files, splat_ply, trained};
 use crate::navigate::{CameraSpline, Pose, Speed};
-use crate::scene::{CameraPath, CropBox, GaussianCloud, PathKey, PhotoPixels};
+use crate::scene::{CameraPath, CropBox, GaussianCloud, Identities, IdentityId, PathKey, PhotoPixels};
 
 pub(crate) fn ply(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     make_parent(path)?;
@@ -78,6 +78,19 @@ pub(crate) fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result
     let poses = spline.map_or_else(Vec::new, |spline| spline.poses(path.fps, CameraPath::MAX_KEYS as f64));
     let frames: Vec<PathKey> = poses.iter().map(Pose::key).collect();
     io::camera_path::nerfstudio::write(file, path, &frames, (1280, (1280.0 / aspect.max(0.01)) as u32))
+}
+
+/// The name of a file for an identity's Gaussians, of its number and full name, that no other one has.
+pub(crate) fn identity_file(all: &Identities, id: IdentityId) -> String {
+    format!("{id}-{}.ply", identity_name(all, id))
+}
+
+/// A full name as every system takes it in a file's name.
+pub(crate) fn identity_name(all: &Identities, id: IdentityId) -> String {
+    let name = all.full_name(id);
+    let words: Vec<&str> = name.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).collect();
+    // Of four bytes each at most: systems take 255.
+    words.join("-").chars().take(60).collect()
 }
 
 pub(crate) fn make_parent(path: &Path) -> Result<(), IoError> {

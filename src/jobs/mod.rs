@@ -4,6 +4,7 @@
 //! and return a typed result or a [`JobError`]. Whoever calls them says the result in its own way.
 
 pub(crate) mod bench;
+mod coco;
 pub(crate) mod demo;
 pub(crate) mod demo_questions;
 pub(crate) mod demo_tour;
@@ -12,6 +13,7 @@ pub(crate) mod error;
 pub(crate) mod evaluate;
 pub(crate) mod evaluate_masks;
 pub(crate) mod export;
+pub(crate) mod export_all;
 pub mod find_objects;
 pub(crate) mod folders;
 pub(crate) mod go_to;
@@ -29,6 +31,7 @@ pub(crate) mod report;
 pub(crate) mod reproduce;
 pub(crate) mod scale;
 pub(crate) mod segment;
+pub mod select;
 pub(crate) mod sparse_cloud;
 pub(crate) mod synth;
 pub(crate) mod thumbnails;

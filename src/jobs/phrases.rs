@@ -8,12 +8,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use serde::Serialize;
-use serde_json::{Value, json};
+use serde_json::json;
 
 use self::colors::PhraseColors;
 use super::JobError;
+use super::coco::Coco;
 use super::query::{ViewMaps, write_mask};
-use crate::io::labels::{pictures, rle::Rle};
+use crate::io::labels::pictures;
 use crate::io::{atomic, files};
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::pipeline::semantics::answer::{Certainty, QueryAnswer};
@@ -111,9 +112,9 @@ pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Resu
     let mut asked = Vec::new();
     for phrase in phrases {
         let reading = engine.read(&map.identities, phrase, *level).ok_or(JobError::EmptyQuery)?;
-        let answered = engine.answer(map, &reading.phrase, *level)?;
+        let answered = engine.answer(map, &reading, *level)?;
         let unknown = engine.unknown_words(&map.identities, &reading.phrase);
-        let ignored = answered.ignored_words(&map.identities, &reading.phrase, &unknown);
+        let ignored = answered.ignored_words(&map.identities, &reading, &unknown);
         asked.push((answered.certainty(&ignored), answered));
     }
     let mut colors = request.colors.clone();
@@ -132,7 +133,7 @@ pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Resu
             let iou = truth(&request.truth, &place, &mask)?.map(|truth| mask.iou(&truth));
             if let Some(folder) = &request.export {
                 write_mask(&folder.join("masks").join(&place), &mask)?;
-                coco.mask(i, &mask, answered);
+                coco.mask(i + 1, &mask, Some(answered.answer.hits().first().map_or(0.0, |h| h.score)));
             }
             let phrase = (&*phrases[i], colors.of(&phrases[i]));
             rows.push(row(view, phrase, (*certainty, answered), map, &mask, iou));
@@ -142,7 +143,9 @@ pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Resu
     if let Some(folder) = &request.export {
         let csv = csv(&rows);
         atomic::write(&folder.join("phrases.csv"), |w| w.write_all(csv.as_bytes()))?;
-        let coco = coco.document(phrases, &colors);
+        // Colors as COCO's panoptic categories have them.
+        let category = |(i, phrase): (usize, &String)| json!({ "id": i + 1, "name": phrase, "supercategory": "", "color": colors.of(phrase) });
+        let coco = coco.document(phrases.iter().enumerate().map(category).collect());
         atomic::write(&folder.join("coco.json"), |w| Ok(serde_json::to_writer(w, &coco)?))?;
     }
     Ok(rows)
@@ -230,50 +233,6 @@ fn csv(rows: &[PhraseRow]) -> String {
         );
     }
     all
-}
-
-/// Masks as COCO has them: run lengths, column by column.
-#[derive(Default)]
-struct Coco {
-    images: Vec<Value>,
-    annotations: Vec<Value>,
-}
-
-impl Coco {
-    fn view(&mut self, name: &str, camera: &Camera) {
-        let id = self.images.len() + 1;
-        self.images.push(json!({
-            "id": id, "file_name": name, "width": camera.width_px, "height": camera.height_px
-        }));
-    }
-
-    /// The mask of phrase `i` in the newest view; nothing if it is empty.
-    fn mask(&mut self, i: usize, mask: &Mask, answered: &QueryAnswer) {
-        let Some(b) = mask.bounds() else { return };
-        self.annotations.push(json!({
-            "id": self.annotations.len() + 1,
-            "image_id": self.images.len(),
-            "category_id": i + 1,
-            "segmentation": Rle::of(mask),
-            "area": mask.area(),
-            "bbox": [b.x.start, b.y.start, b.x.len(), b.y.len()],
-            "iscrowd": 0,
-            "score": answered.answer.hits().first().map_or(0.0, |h| h.score),
-        }));
-    }
-
-    fn document(self, phrases: &[String], colors: &PhraseColors) -> Value {
-        // Colors as COCO's panoptic categories have them.
-        let category = |(i, phrase): (usize, &String)| {
-            let color = colors.of(phrase);
-            json!({ "id": i + 1, "name": phrase, "supercategory": "", "color": color })
-        };
-        json!({
-            "images": self.images,
-            "annotations": self.annotations,
-            "categories": phrases.iter().enumerate().map(category).collect::<Vec<_>>(),
-        })
-    }
 }
 
 /// A name as a file may have it: letters and digits in lower case, `_` between them; without the ending of a picture.

@@ -117,13 +117,13 @@ pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &QueryRequest<'_>) 
     let mut engine = QueryEngine::new(map.language.as_ref(), request.recipe.clone())?;
     let start = Instant::now();
     let reading = engine.read(&map.identities, request.text, request.level).ok_or(JobError::EmptyQuery)?;
-    let mut answered = engine.answer(map, &reading.phrase, request.level)?;
+    let mut answered = engine.answer(map, &reading, request.level)?;
     let matching_since = Instant::now();
     let mask = maps.of_answer(map, &answered, request.top);
     answered.stages.mask = ms_since(matching_since);
     let query_ms = ms_since(start);
     let unknown_words = engine.unknown_words(&map.identities, &reading.phrase);
-    let ignored_words = answered.ignored_words(&map.identities, &reading.phrase, &unknown_words);
+    let ignored_words = answered.ignored_words(&map.identities, &reading, &unknown_words);
     Ok(QueryResult { answered, reading, mask, unknown_words, unread: engine.unread(), ignored_words, query_ms, maps })
 }
 

@@ -1,7 +1,12 @@
 //! What a scene consists of: objects, their parts, and which Gaussian is whose.
 
+pub(crate) mod whole_names;
+
+use std::sync::{Arc, OnceLock};
+
 use serde::{Deserialize, Serialize};
 
+use self::whole_names::{WholeNames, key};
 use super::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
 use super::text;
 
@@ -64,6 +69,19 @@ pub struct Identity {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Identities {
     list: Vec<Identity>,
+    #[serde(skip)]
+    whole_names: Known,
+}
+
+/// Names, found out when they are first asked for.
+#[derive(Clone, Debug, Default)]
+struct Known(OnceLock<Arc<WholeNames>>);
+
+impl PartialEq for Known {
+    /// They follow from the list.
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 impl Identities {
@@ -80,6 +98,7 @@ impl Identities {
     pub fn add(&mut self, level: Level, parent: IdentityId, names: Vec<String>) -> IdentityId {
         let parent = if self.get(parent).is_some() { parent } else { NOBODY };
         let names = names.iter().map(|name| text::name(name)).collect();
+        self.whole_names = Known::default();
         self.list.push(Identity { level, parent, names, code: [0.5; 3] });
         self.list.len() as IdentityId
     }
@@ -101,6 +120,7 @@ impl Identities {
 
     /// The identity with this number, to change it.
     pub fn get_mut(&mut self, id: IdentityId) -> Option<&mut Identity> {
+        self.whole_names = Known::default();
         self.list.get_mut((id as usize).checked_sub(1)?)
     }
 
@@ -118,15 +138,31 @@ impl Identities {
         }
     }
 
-    /// The name to show: its first, or its number.
+    /// Its own name: the first, or its number.
     pub fn name(&self, id: IdentityId) -> String {
-        let named = self.get(id).and_then(|i| i.names.first()).cloned();
+        let named = self.get(id).and_then(|i| i.names.iter().find(|name| !key(name).is_empty())).cloned();
         named.unwrap_or_else(|| if id == NOBODY { "nothing".into() } else { format!("#{id}") })
     }
 
-    /// The name of an identity with those of its wholes: "button a of the red controller".
+    /// Its own name as it is shown, with its number where others are called the same: "mug #3".
+    pub(crate) fn label(&self, id: IdentityId) -> String {
+        let label = (id as usize).checked_sub(1).and_then(|i| self.whole_names().labels.get(i).cloned());
+        label.unwrap_or_else(|| self.name(id))
+    }
+
+    /// Its label with those of its wholes: "button a · red controller". Typed, it finds this identity and no other.
     pub fn full_name(&self, id: IdentityId) -> String {
-        self.ancestors(id).map(|i| self.name(i)).collect::<Vec<_>>().join(" of the ")
+        let full = (id as usize).checked_sub(1).and_then(|i| self.whole_names().full.get(i).cloned());
+        full.unwrap_or_default()
+    }
+
+    /// Who of these levels is called by a text as a whole: by a name, a label, or a full name.
+    pub fn called(&self, text: &str, level: LevelFilter) -> Vec<IdentityId> {
+        self.whole_names().called(text, self, level)
+    }
+
+    fn whole_names(&self) -> &WholeNames {
+        self.whole_names.0.get_or_init(|| Arc::new(WholeNames::new(self)))
     }
 
     /// An identity and what it is a piece of, inside out: itself first, its object last.
@@ -194,7 +230,7 @@ mod tests {
         let face = all.add(Level::Part, doll, vec![]);
         let eye = all.add(Level::Part, face, vec!["eye".into()]);
         assert!(!all.is_empty() && all.len() == 3);
-        assert_eq!(all.full_name(eye), "eye of the #2 of the red doll");
+        assert_eq!(all.full_name(eye), "eye · #2 · red doll");
         assert_eq!((all.children(NOBODY).count(), all.ancestors(NOBODY).count(), all.ancestors(9).count()), (0, 0, 0));
         // An object's own code and none of a part; a part's both.
         all.get_mut(doll).expect("there").code = [0.1; 3];

@@ -42,7 +42,7 @@ impl App {
         let scene = self.state.scene.as_ref().map_or_else(|| "scene".to_owned(), |s| s.name.clone());
         let name = match (&action, &self.state.semantics) {
             (Action::ExportCrop, _) => format!("{scene}-cropped"),
-            (Action::ExportTarget(id), Some(map)) => map.identities.full_name(*id).replace(['/', '\\', ' '], "-"),
+            (Action::ExportTarget(id), Some(map)) => export::identity_name(&map.identities, *id),
             _ => scene,
         };
         let folder = self.layout.folder.as_deref();
@@ -68,6 +68,7 @@ impl App {
                     self.submit(Command::Export { cloud: Arc::clone(cloud), path });
                 }
             }
+            Action::ExportAll => self.export_all(path),
             Action::ExportTarget(id) => {
                 if let (Some(cloud), Some(map)) = (self.viewport.cloud(), &self.state.semantics) {
                     let cloud = Arc::new(cloud.select(&map.members(id)));

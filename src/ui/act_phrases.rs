@@ -8,6 +8,7 @@ use super::app::App;
 use super::context::SceneContext;
 use super::state::Tone;
 use crate::jobs::export;
+use crate::jobs::export_all::{ExportAllRequest, MaskFormat};
 use crate::jobs::phrases::{self, PhrasesRequest, TrueMasks};
 use crate::jobs::query::write_mask;
 use crate::scene::{Camera, LevelFilter};
@@ -49,6 +50,18 @@ impl App {
             truth,
             export: to,
         })));
+    }
+
+    /// Writes every object and part into a folder, and their masks in the photos, if there are any.
+    pub(super) fn export_all(&mut self, folder: PathBuf) {
+        let Some(SceneContext { cloud, map: Some(map), settings, scene, .. }) = self.context() else {
+            return self.state.toast(Tone::Warning, "Find objects first: there is nothing to export yet.");
+        };
+        let photos = scene.dataset.iter().flat_map(|d| &d.photos);
+        let views = photos.map(|p| (p.name.clone(), p.camera.clone())).collect();
+        let masks = MaskFormat::ALL.to_vec();
+        let (cloud, map) = (Arc::clone(&cloud), Arc::clone(&map));
+        self.submit(Command::ExportAll(Box::new(ExportAllRequest { cloud, map, settings, views, masks, folder })));
     }
 
     /// Compares the newest answer with a true mask of the present view, or with none.

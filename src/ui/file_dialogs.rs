@@ -218,6 +218,7 @@ fn dialog(action: &Action, name: &str) -> Option<(String, Kind)> {
             let title = format!("Choose the checkpoint of {id}, or the description (.json) of its exported files");
             return Some((title, Kind::File("Networks", &["pt", "pth", "bin", "safetensors", "json"])));
         }
+        Action::ExportAll => ("Choose an empty folder for all objects and parts", Kind::Folder),
         Action::ExportPhrases => ("Choose a folder for the masks", Kind::Folder),
         Action::ChooseTrueMask => ("Choose the true mask of this view", Kind::File("Masks", &["png"])),
         Action::ChooseMasks => ("Choose the folder with the masks", Kind::Folder),

@@ -136,14 +136,15 @@ fn is_same(a: &Option<Arc<SemanticMap>>, b: &Option<Arc<SemanticMap>>) -> bool {
 pub(crate) fn edit_text(request: &EditRequest, all: &Identities) -> String {
     let added = |of: IdentityId, name: &str| match (name.trim(), of) {
         ("", NOBODY) => "added an object".to_owned(),
-        ("", of) => format!("added a part of {}", all.name(of)),
+        ("", of) => format!("added a part of {}", all.label(of)),
         (name, _) => format!("added {name}"),
     };
     match request {
-        EditRequest::Apply(Edit::Rename(id, name)) => format!("renamed {} to {}", all.name(*id), name.trim()),
-        EditRequest::Apply(Edit::Merge(from, into)) => format!("merged {} into {}", all.name(*from), all.name(*into)),
-        EditRequest::Apply(Edit::Split(id)) => format!("split {}", all.name(*id)),
-        EditRequest::Apply(Edit::AddPiece { of, name, .. }) | EditRequest::Paint { of, name, .. } => added(*of, name),
+        EditRequest::Apply(Edit::Rename(id, name)) => format!("renamed {} to {}", all.label(*id), name.trim()),
+        EditRequest::Apply(Edit::Merge(from, into)) => format!("merged {} into {}", all.label(*from), all.label(*into)),
+        EditRequest::Apply(Edit::Split(id)) => format!("split {}", all.label(*id)),
+        EditRequest::Apply(Edit::AddPiece { of, name, .. }) => added(*of, name),
+        EditRequest::Apply(Edit::Reshape { id, .. }) => format!("corrected {}", all.label(*id)),
         EditRequest::Restore(_) => "restored objects and parts".to_owned(),
     }
 }
@@ -332,9 +333,9 @@ mod tests {
             shown_text(&set(before), &set(now), &map.identities)
         };
         assert_eq!(text(&[], &[1, 2]), "hid lamp");
-        assert_eq!(text(&[], &[2]), "hid shade of the lamp");
+        assert_eq!(text(&[], &[2]), "hid shade · lamp");
         assert_eq!(text(&[1, 2, 3], &[3]), "showed lamp");
-        assert_eq!(text(&[], &[0, 1, 3]), "showed only shade of the lamp");
-        assert_eq!(text(&[2], &[3]), "hid table, showed shade of the lamp");
+        assert_eq!(text(&[], &[0, 1, 3]), "showed only shade · lamp");
+        assert_eq!(text(&[2], &[3]), "hid table, showed shade · lamp");
     }
 }

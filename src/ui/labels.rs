@@ -24,10 +24,10 @@ impl ScreenNames {
 
     /// "kettle", "pale blue region, 12 cm".
     pub(crate) fn name(&self, all: &Identities, id: IdentityId) -> String {
-        self.instead(all, id).map_or_else(|| all.name(id), str::to_owned)
+        self.instead(all, id).map_or_else(|| all.label(id), str::to_owned)
     }
 
-    /// "lid of the kettle", "pale blue region, 12 cm".
+    /// "lid · kettle", "pale blue region, 12 cm".
     pub(crate) fn full_name(&self, all: &Identities, id: IdentityId) -> String {
         self.instead(all, id).map_or_else(|| all.full_name(id), str::to_owned)
     }
@@ -88,12 +88,9 @@ mod tests {
         let part = all.add(Level::Part, region, vec![]);
         let labels = ScreenNames(vec![Some("red region, 2 cm".into()), None]);
         assert_eq!(labels.name(&all, region), "red region, 2 cm");
-        assert_eq!((labels.name(&all, part), labels.full_name(&all, part)), ("#2".into(), "#2 of the #1".into()));
+        assert_eq!((labels.name(&all, part), labels.full_name(&all, part)), ("#2".into(), "#2 · #1".into()));
         all.rename(region, "apple");
-        assert_eq!(
-            (labels.name(&all, region), labels.full_name(&all, part)),
-            ("apple".into(), "#2 of the apple".into())
-        );
+        assert_eq!((labels.name(&all, region), labels.full_name(&all, part)), ("apple".into(), "#2 · apple".into()));
         assert_eq!(labels.name(&all, NOBODY), "nothing");
     }
 }

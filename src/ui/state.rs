@@ -18,6 +18,7 @@ use crate::jobs::demo::QUESTION;
 use crate::jobs::go_to::{Approached, Explored};
 use crate::jobs::inspect::InspectedPixel;
 use crate::jobs::models::ModelList;
+use crate::jobs::select::Selected;
 use crate::jobs::thumbnails::ThumbnailSet;
 use crate::math::format;
 use crate::measure::Report;
@@ -70,6 +71,8 @@ pub struct AppState {
     pub(crate) visited: Option<Approached>,
     /// The pixel that was looked into last, until the window takes it.
     pub(crate) inspected: Option<Arc<InspectedPixel>>,
+    /// What clicks and strokes select, until the tool takes it.
+    pub(crate) selected: Option<Arc<Selected>>,
     /// Models and the engine that runs them, once they were listed.
     pub(crate) models: Option<Arc<ModelList>>,
     /// Models that were put in place so far.
@@ -321,6 +324,7 @@ impl AppState {
                 self.visited = Some(visited);
             }
             Outcome::Inspected(pixel) => self.inspected = Some(pixel),
+            Outcome::Selected(selected) => self.selected = Some(selected),
             Outcome::Explored(explored) => self.explored = Some(explored),
             Outcome::Report { path, report, second } => {
                 let shown = Some(ShownReport { path, report });

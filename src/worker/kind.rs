@@ -21,6 +21,8 @@ pub enum JobKind {
     Objects,
     /// Changes objects and parts.
     Edit,
+    /// Takes in a click or a stroke.
+    Select,
     /// Writes a file.
     Export,
     /// Loads a photo's pixels.
@@ -47,6 +49,8 @@ pub enum JobKind {
     Scale,
     /// Asks a list of phrases.
     Phrases,
+    /// Writes all objects and parts.
+    ExportAll,
     /// Looks into a pixel.
     Inspect,
 }
@@ -59,19 +63,27 @@ impl JobKind {
 
     /// Whether it waits where it is asked to.
     pub(crate) fn can_pause(self) -> bool {
-        matches!(self, Self::Train | Self::Objects | Self::Model | Self::Video | Self::Phrases)
+        matches!(self, Self::Train | Self::Objects | Self::Model | Self::Video | Self::Phrases | Self::ExportAll)
     }
 
     /// Which thread runs it.
     pub(crate) fn lane(self) -> WorkerThread {
         match self {
             Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects => WorkerThread::Long,
-            Self::DemoPhotos | Self::Poses | Self::Model | Self::Video | Self::Measure | Self::Phrases => {
-                WorkerThread::Long
-            }
-            Self::Beside | Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Thumbnails => {
-                WorkerThread::Short
-            }
+            Self::DemoPhotos
+            | Self::Poses
+            | Self::Model
+            | Self::Video
+            | Self::Measure
+            | Self::Phrases
+            | Self::ExportAll => WorkerThread::Long,
+            Self::Beside
+            | Self::Edit
+            | Self::Select
+            | Self::Export
+            | Self::Photo
+            | Self::Picture
+            | Self::Thumbnails => WorkerThread::Short,
             Self::Models | Self::Explore | Self::Approach | Self::Scale | Self::Report | Self::Inspect => {
                 WorkerThread::Short
             }

@@ -105,6 +105,14 @@ impl Room {
         r
     }
 
+    /// Adds a thing or a part on the table.
+    #[allow(dead_code, reason = "not every test furnishes the room")]
+    pub fn put(&mut self, whole: IdentityId, name: &str) -> IdentityId {
+        let id = self.add(whole, &[name], [0.2, 0.0, 0.8], [0.05; 3]);
+        [&mut self.hidden, &mut self.removed, &mut self.exported].into_iter().for_each(|of| of.push(false));
+        id
+    }
+
     fn name(&self, id: IdentityId) -> String {
         self.identities.full_name(id)
     }

@@ -35,7 +35,7 @@ const ALLOWED: [(&str, &str); 17] = [
     ("measure::table", "the text of reports"),
     ("measure::turned", "settings with a knob turned"),
     ("navigate::camera_spline::steps_of", "frames of so many seconds"),
-    ("pipeline::semantics::answer::by_name", "names are compared in a scene that was opened"),
+    ("pipeline::semantics::query_engine::ask_by_name", "names are compared in a scene that was opened"),
     ("pipeline::semantics::matching", "the Gaussians of an answer"),
     ("pipeline::semantics::names", "names are compared in a scene that was opened"),
     ("pipeline::semantics::reading", "words are compared with the names in a scene that was opened"),

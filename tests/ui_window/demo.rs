@@ -13,7 +13,7 @@ fn the_shipped_demo_opens_answered_and_recent_scenes_have_pictures() {
     let app = w.app();
     let map = app.state.semantics.as_ref().expect("objects");
     let found: Vec<String> = app.viewport.queries.found().iter().map(|id| map.identities.full_name(*id)).collect();
-    assert!(found.iter().all(|name| name.contains("button") && name.ends_with("of the red controller")), "{found:?}");
+    assert!(found.iter().all(|name| name.contains("button") && name.ends_with(" · red controller")), "{found:?}");
     assert!(app.state.scene.as_ref().is_some_and(|s| s.dataset.is_some()) && app.state.recent.is_empty());
 
     let splat = write_splat(data.path());

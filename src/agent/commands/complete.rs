@@ -1,9 +1,10 @@
 //! Completion while typing: how a text can go on, by the commands and by the names in the scene.
 
-use super::form::{FormItem, FormRequest, FormSlot, sequences};
-use super::{SEPARATORS, clauses, request_tokens};
+use super::form::{FormItem, FormRequest, FormSlot, Things, sequences};
+use super::{SEPARATORS, clauses};
 use crate::agent::language::CommandLanguage;
 use crate::agent::resolve::{NameWords, is_thing};
+use crate::agent::words::request_tokens;
 use crate::scene::Identities;
 
 /// The texts that `text` can become with its next words, at most `most`: names of things first, else in the order of
@@ -14,7 +15,7 @@ pub fn complete(text: &str, identities: &Identities, most: usize) -> Vec<String>
     let known = NameWords::new(identities);
     // Commands before the last one must be understood; courtesy is passed over.
     let starts = |at: usize| {
-        let before = FormRequest { tokens: &tokens[..at], words: &words[..at], known: &known, strict: true };
+        let before = FormRequest { tokens: &tokens[..at], words: &words[..at], known: &known, things: Things::Known };
         let opens = CommandLanguage::get().openers.contains(&words[..at].join(" "));
         at == 0 || opens || (SEPARATORS.contains(&words[at - 1]) && clauses(&before, true).is_some())
     };
@@ -64,12 +65,16 @@ impl Kept<'_> {
             (Some((FormItem::Slot(slot), items)), words) => {
                 let options = self.options(*slot);
                 let is_name = matches!(slot, FormSlot::Thing | FormSlot::Things);
-                let typed = words.join(" ");
+                let typed = words.join(" ").replace(" 's", "'s");
                 for option in &options {
-                    // "the left stick" after "the left".
-                    let rest = if typed.is_empty() { Some(option.as_str()) } else { option.strip_prefix(&typed) };
-                    let rest = rest.filter(|r| typed.is_empty() || r.starts_with(' ')).map(str::trim_start);
-                    rest.into_iter().for_each(|r| self.offer(r, is_name, next));
+                    // "the left stick" after "the left", or after "left".
+                    let articles = if is_name && !typed.is_empty() { &["the ", ""][..] } else { &[""] };
+                    let begun = articles.iter().map(|article| option.strip_prefix(article).unwrap_or(option));
+                    let rest = begun.filter_map(|option| match typed.as_str() {
+                        "" => Some(option),
+                        typed => rest_of(option, typed).filter(|r| r.starts_with(' ')).map(str::trim_start),
+                    });
+                    rest.for_each(|r| self.offer(r, is_name, next));
                 }
                 for end in 1..=words.len() {
                     let said = words[..end].join(" ");
@@ -92,11 +97,13 @@ impl Kept<'_> {
     }
 
     fn offer(&self, text: &str, is_name: bool, next: &mut Vec<(bool, String)>) {
-        if text != "?" && text.starts_with(self.begun) && text != self.begun && !next.iter().any(|(_, n)| n == text) {
+        let goes_on = rest_of(text, self.begun).is_some_and(|rest| !rest.is_empty());
+        if text != "?" && goes_on && !next.iter().any(|(_, n)| n == text) {
             next.push((is_name, text.to_owned()));
         }
     }
 
+    /// What may stand in a slot.
     fn options(&self, slot: FormSlot) -> Vec<String> {
         let language = CommandLanguage::get();
         let fixed = |words: &[&str]| words.iter().map(|w| (*w).to_owned()).collect();
@@ -119,4 +126,10 @@ impl Kept<'_> {
             FormSlot::Name => Vec::new(),
         }
     }
+}
+
+/// What follows `begun`, in whatever letter case, in a text.
+fn rest_of<'a>(text: &'a str, begun: &str) -> Option<&'a str> {
+    let end = text.char_indices().map(|(at, c)| at + c.len_utf8()).take(begun.chars().count()).last().unwrap_or(0);
+    (text[..end].to_lowercase() == begun).then_some(&text[end..])
 }

@@ -10,6 +10,7 @@ use crate::agent::relation::Relation;
 use crate::agent::resolve::{NameWords, is_thing};
 use crate::agent::words::{Token, number};
 use crate::navigate::target::Side;
+use crate::scene::identity::whole_names::key;
 
 /// What stands in a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,6 +52,8 @@ pub(super) struct Sequence {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Slots {
     pub(super) texts: Vec<String>,
+    /// Words of things.
+    pub(super) named: usize,
     /// Several things in place of the text with this number.
     pub(super) several: Option<(usize, Vec<String>)>,
     pub(super) name: Option<String>,
@@ -150,8 +153,18 @@ pub(super) struct FormRequest<'a> {
     pub(crate) tokens: &'a [Token],
     pub(crate) words: &'a [&'a str],
     pub(crate) known: &'a NameWords,
-    /// Whether things must be called by words that names in the scene have.
-    pub(crate) strict: bool,
+    pub(crate) things: Things,
+}
+
+/// How things may be called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Things {
+    /// By a name as a whole.
+    Whole,
+    /// By words that names in the scene have.
+    Known,
+    /// By any words.
+    Any,
 }
 
 impl FormRequest<'_> {
@@ -177,6 +190,20 @@ impl FormRequest<'_> {
         }
     }
 
+    fn is_thing(&self, words: &[&str]) -> bool {
+        match self.things {
+            Things::Whole => self.known.whole(words).is_some(),
+            Things::Known => is_thing(words, self.known, true),
+            Things::Any => is_thing(words, self.known, false),
+        }
+    }
+
+    /// Words as a phrase again: the name that they are, else as they were said.
+    fn said(&self, words: &[&str]) -> String {
+        let said = quoted(words);
+        self.known.whole(words).filter(|name| key(name) != key(&said)).map_or(said, str::to_owned)
+    }
+
     /// Fills a slot with the words from `at` to `end`, if they can stand there.
     fn take(&self, slot: FormSlot, at: usize, end: usize, slots: &mut Slots) -> bool {
         let words = &self.words[at..end];
@@ -184,22 +211,25 @@ impl FormRequest<'_> {
         let language = CommandLanguage::get();
         match slot {
             FormSlot::Thing => {
-                slots.texts.push(quoted(words));
-                is_thing(words, self.known, self.strict)
+                slots.named += words.len();
+                slots.texts.push(self.said(words));
+                self.is_thing(words)
             }
             FormSlot::Kind => {
-                slots.texts.push(quoted(words));
+                slots.texts.push(self.said(words));
                 let words = if words[0] == "all" { &words[1..] } else { words };
-                is_thing(words, self.known, self.strict)
+                // Beside whole names, a kind is no place at one of them.
+                let is_plain = self.things != Things::Whole || !words.iter().any(|w| language.is_no_name(w));
+                self.known.whole(words).is_some() || is_plain && is_thing(words, self.known, self.things != Things::Any)
             }
             FormSlot::Things => {
                 let parts: Vec<&[&str]> =
                     words.split(|w| matches!(*w, "," | "and")).filter(|p| !p.is_empty()).collect();
-                let whole = is_thing(words, self.known, self.strict);
-                let parts = if whole { vec![words] } else { parts };
-                slots.several = Some((slots.texts.len(), parts.iter().map(|p| quoted(p)).collect()));
+                let parts = if self.is_thing(words) { vec![words] } else { parts };
+                slots.named += words.len();
+                slots.several = Some((slots.texts.len(), parts.iter().map(|p| self.said(p)).collect()));
                 slots.texts.push(text);
-                parts.iter().all(|p| is_thing(many(p).unwrap_or(p), self.known, self.strict))
+                !parts.is_empty() && parts.iter().all(|p| self.is_thing(p) || many(p).is_some_and(|p| self.is_thing(p)))
             }
             FormSlot::Name => {
                 let raw: Vec<&str> = self.tokens[at..end].iter().map(|t| t.raw.as_str()).collect();
@@ -235,7 +265,6 @@ impl FormRequest<'_> {
     }
 }
 
-/// Words as a phrase again.
 fn quoted(words: &[&str]) -> String {
     words.join(" ").replace(" 's", "'s").replace('"', "")
 }

@@ -10,7 +10,7 @@ pub use complete::complete;
 
 use std::collections::VecDeque;
 
-use self::form::{FormItem, FormRequest, beginning_with, many, sequences};
+use self::form::{FormItem, FormRequest, Slots, Things, beginning_with, many, sequences};
 use self::task::{Task, task};
 use super::camera_args::{CLOSENESS, CLOSER, Direction, Distance, FARTHER, NORMAL};
 use super::describe::capital;
@@ -21,7 +21,7 @@ use super::planner::{Planner, PlannerContext, Step};
 use super::refusal::{Refusal, RefusalKind};
 use super::resolve::{NameWords, Resolved, is_thing, name_words, resolve, resolve_all, words_of};
 use super::tool::{Reference, Target, ToolCall};
-use super::words::{Token, alike, is_mark, tokens};
+use super::words::{Token, alike, request_tokens};
 use super::world::World;
 use crate::navigate::target::Side;
 use crate::scene::{Identities, LevelFilter};
@@ -118,22 +118,15 @@ impl Commands {
     }
 }
 
-/// The words of a request, marks as commas except for a question's.
-fn request_tokens(request: &str) -> Vec<Token> {
-    let mut all = tokens(request);
-    for token in all.iter_mut().filter(|t| is_mark(&t.low) && t.low != "?") {
-        token.low = ",".into();
-    }
-    all
-}
-
-/// The tasks that a request asks for; `None` unless all of it is understood. Things that the scene's
-/// names do not know are accepted where nothing else fits: it is said then that they are not there.
+/// The tasks that a request asks for; `None` unless all of it is understood. Things that are called by a name as a
+/// whole come first. Things that the scene's names do not know are accepted where nothing else fits: it is said
+/// then that they are not there.
 pub(crate) fn parse(request: &str, identities: &Identities) -> Option<Vec<Task>> {
     let (tokens, known) = (request_tokens(request), NameWords::new(identities));
     let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).collect();
-    let with = |strict| clauses(&FormRequest { tokens: &tokens, words: &words, known: &known, strict }, true);
-    with(true).or_else(|| with(false)).filter(|tasks| tasks.len() <= MOST_TASKS)
+    let with = |things| clauses(&FormRequest { tokens: &tokens, words: &words, known: &known, things }, true);
+    let mut readings = [Things::Whole, Things::Known, Things::Any].into_iter();
+    readings.find_map(with).filter(|tasks| tasks.len() <= MOST_TASKS)
 }
 
 /// Whether a text is a command and no mere name.
@@ -145,25 +138,24 @@ pub(crate) fn is_command(text: &str, identities: &Identities) -> bool {
 
 /// A request as one command, or as several in a row.
 fn clauses(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
-    let request = trimmed(request);
-    if let Some(tasks) = one(&request, is_first) {
+    if let Some(tasks) = command(request, is_first) {
         return Some(tasks);
     }
+    let request = trimmed(request);
     // What a question asks is asked without its mark, too; "the lamp?" wants to know, "the lamp" to go there.
     if let Some(("?", rest)) = request.words.split_last().map(|(last, rest)| (*last, rest)) {
         return clauses(&part(&request, 0, rest.len()), is_first);
     }
     let parts = (1..request.words.len()).filter(|i| SEPARATORS.contains(&request.words[*i]));
     parts.take(MOST_TASKS).find_map(|i| {
-        let mut tasks = one(&trimmed(&part(&request, 0, i)), is_first)?;
+        let mut tasks = command(&part(&request, 0, i), is_first)?;
         tasks.extend(clauses(&part(&request, i + 1, request.words.len()), false)?);
         Some(tasks)
     })
 }
 
 fn part<'a>(request: &FormRequest<'a>, from: usize, to: usize) -> FormRequest<'a> {
-    let FormRequest { tokens, words, known, strict } = *request;
-    FormRequest { tokens: &tokens[from..to], words: &words[from..to], known, strict }
+    FormRequest { tokens: &request.tokens[from..to], words: &request.words[from..to], ..*request }
 }
 
 /// Without separators and courtesy around it.
@@ -189,24 +181,41 @@ fn opens(words: &[&str], phrase: &str) -> Option<usize> {
     (words.len() >= n && phrase.split(' ').eq(words[..n].iter().copied())).then_some(n)
 }
 
-/// One command: the first that fits.
+/// One command, courtesy around it or not: a name may begin or end with what is courtesy elsewhere.
+fn command(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
+    let all = if request.things == Things::Whole { one(request, is_first) } else { None };
+    all.or_else(|| one(&trimmed(request), is_first))
+}
+
+/// One command: the first that fits; of those whose things are called by whole names, that with the longest, as "the
+/// handle from above" may be a name. A command that is about no thing stays what it is.
 fn one(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
-    beginning_with(request.words.first()?).find_map(|sequence| {
+    let mut fits = beginning_with(request.words.first()?).filter_map(|sequence| {
         // A name alone is a command only if it is one, and the first: "hide the lamp and the mug from above".
         let begins_with_word = matches!(sequence.items.first(), Some(FormItem::Word(_)));
-        if !(begins_with_word || request.strict && is_first) {
+        if !(begins_with_word || request.things != Things::Any && is_first) {
             return None;
         }
-        let mut slots = request.fit(&sequence.items)?;
-        let Some((place, several)) = slots.several.take() else {
-            return Some(vec![task(&sequence.command.id, &slots)?]);
-        };
-        let each = several.into_iter().map(|text| {
-            slots.texts[place] = text;
-            task(&sequence.command.id, &slots)
-        });
-        each.collect()
-    })
+        let slots = request.fit(&sequence.items)?;
+        let named = if slots.texts.is_empty() { usize::MAX } else { slots.named };
+        Some((named, tasks(&sequence.command.id, slots)?))
+    });
+    if request.things != Things::Whole {
+        return Some(fits.next()?.1);
+    }
+    Some(fits.reduce(|first, next| if next.0 > first.0 && next.0 < usize::MAX { next } else { first })?.1)
+}
+
+/// The tasks of a command, one for each of several things.
+fn tasks(command: &str, mut slots: Slots) -> Option<Vec<Task>> {
+    let Some((place, several)) = slots.several.take() else {
+        return Some(vec![task(command, &slots)?]);
+    };
+    let each = several.into_iter().map(|text| {
+        slots.texts[place] = text;
+        task(command, &slots)
+    });
+    each.collect()
 }
 
 /// The phrases of a task that mean things.
@@ -265,8 +274,8 @@ fn settled(tasks: Vec<Task>, context: &mut PlannerContext<'_>) -> Result<Vec<Tas
 /// What "all bottles", "both controllers" or "the bottles" mean; `None` if one thing is meant.
 fn all_of(phrase: &str, world: &mut dyn World, dialog: &DialogState) -> Result<Option<Vec<u32>>, Refusal> {
     let words: Vec<&str> = phrase.split(' ').collect();
-    let said = many(&words);
-    let Some(rest) = said else { return Ok(None) };
+    let is_name = !world.identities().called(phrase, LevelFilter::Auto).is_empty();
+    let Some(rest) = many(&words).filter(|_| !is_name) else { return Ok(None) };
     let ids = resolve_all(world, &rest.join(" "), LevelFilter::Auto, dialog)?;
     let is_both = words[0] == "both";
     if is_both && ids.len() != 2 {

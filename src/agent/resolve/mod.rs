@@ -2,6 +2,7 @@
 //! pronouns. What several things fit equally is said to be so, what nothing fits is not there; nothing is
 //! guessed. What no name says is asked of the scene's encoder, if it has one.
 
+mod called;
 mod embedded;
 mod noun;
 
@@ -17,6 +18,7 @@ use super::words::{alike, singular};
 use super::world::World;
 use crate::pipeline::semantics::reading::{mend, mended_text};
 use crate::pipeline::semantics::recipe::Understanding;
+use crate::scene::identity::whole_names::BETWEEN;
 use crate::scene::{Bounds, IdentityId, Level, LevelFilter};
 
 /// What words come to.
@@ -37,7 +39,10 @@ pub(crate) enum Resolved {
 /// Finds what `phrase` means.
 pub(crate) fn resolve(world: &mut dyn World, phrase: &str, level: LevelFilter, dialog: &DialogState) -> Resolved {
     // What is done to one thing is said of it by name, so a slip that was mended wrongly is seen.
-    let (phrase, mended) = mend(world.identities(), phrase);
+    let (phrase, mended) = match world.identities().called(phrase, level).as_slice() {
+        [] => mend(world.identities(), phrase),
+        _ => (phrase.to_owned(), Vec::new()),
+    };
     let mut resolver = Resolver { world, dialog, level, note: String::new() };
     match resolver.phrase(&phrase) {
         Ok(set) => match set.settled() {
@@ -104,8 +109,12 @@ struct Resolver<'a> {
 }
 
 impl Resolver<'_> {
-    /// Evaluates every reading: those that come to something must come to the same.
+    /// What is called so as a whole, else what the readings come to: those that come to something must come to the
+    /// same.
     fn phrase(&mut self, phrase: &str) -> Result<Set, Lost> {
+        if let Some(set) = self.called(phrase) {
+            return Ok(set);
+        }
         let words = words_of(phrase);
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
         let known = NameWords::new(self.world.identities());
@@ -142,6 +151,7 @@ impl Resolver<'_> {
                 format!("There is nothing with the number {id} here."),
                 Vec::new(),
             )),
+            Noun::Called(name) => self.called(name).map_or_else(|| self.named(&name_words(name)), Ok),
             Noun::Named(words) => self.named(words),
             Noun::Picked(pick, of) => self.picked(*pick, of),
             Noun::PieceOf(piece, whole) => self.pieces(piece, whole),
@@ -268,6 +278,7 @@ impl Resolver<'_> {
         let name = wholes.first().map(|id| all.full_name(*id)).unwrap_or_default();
         let said = match piece {
             Noun::Named(words) => words.join(" "),
+            Noun::Called(name) => name.clone(),
             _ => "such piece".into(),
         };
         let level = std::mem::replace(&mut self.level, LevelFilter::Auto);
@@ -282,15 +293,16 @@ impl Resolver<'_> {
         }
         let of = match whole {
             Noun::Named(words) if self.world.understanding() == Understanding::Embedding => words.join(" "),
+            Noun::Called(name) => name.clone(),
             _ => name.clone(),
         };
-        let meant = self.by_embedding(&format!("{said} of the {of}"), LevelFilter::Part)?.unwrap_or_default();
+        let meant = self.by_embedding(&[said.as_str(), &of].join(BETWEEN), LevelFilter::Part)?.unwrap_or_default();
         let meant: Vec<IdentityId> = meant.into_iter().filter(is_in).collect();
         if !meant.is_empty() {
             return Ok(Set::new(meant));
         }
         self.note.clear();
-        let names: Vec<String> = known.iter().take(12).map(|id| self.world.identities().name(*id)).collect();
+        let names: Vec<String> = known.iter().take(12).map(|id| self.world.identities().label(*id)).collect();
         let parts =
             if names.is_empty() { "no parts are known of it".into() } else { format!("its parts: {}", join(&names)) };
         Err(Lost::new(RefusalKind::Conflict, format!("The {name} has no '{said}' here; {parts}."), known))

@@ -1,15 +1,20 @@
 //! How a phrase names a thing: its readings, by words alone. Every word must have a place in one.
 
+use std::collections::{HashMap, HashSet};
+
 use crate::agent::language::{CommandLanguage, Key, find};
 use crate::agent::relation::Relation;
-use crate::agent::words::{singular, tokens};
+use crate::agent::words::{request_tokens, singular, tokens};
 use crate::scene::Identities;
+use crate::scene::identity::whole_names::key;
 
 /// A thing as a phrase has it.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Noun {
     Last,
     Number(u32),
+    /// By a name as a whole.
+    Called(String),
     /// By these words of its name, or a word for anything.
     Named(Vec<String>),
     /// One among others: "the largest ...".
@@ -46,6 +51,7 @@ const MOST_WORDS: usize = 24;
 pub(super) const ANYTHING: [&str; 4] = ["thing", "object", "item", "something"];
 /// Words for any part.
 pub(super) const PARTS: [&str; 2] = ["part", "piece"];
+
 /// The words that names in a scene are made of.
 pub(crate) fn name_words(name: &str) -> Vec<String> {
     let apart = name.split(|c: char| !(c.is_alphanumeric() || c == '#')).filter(|w| !w.is_empty() && *w != "s");
@@ -54,9 +60,11 @@ pub(crate) fn name_words(name: &str) -> Vec<String> {
 
 /// Words as the names in the scene have them.
 pub(crate) struct NameWords {
-    words: Vec<String>,
-    /// Whole names of more than one word: what they are made of means nothing else.
-    whole: Vec<Vec<String>>,
+    words: HashSet<String>,
+    /// Names as a whole, by their words in a request: what these are made of means nothing else.
+    whole: HashMap<String, String>,
+    /// The same of more than one word, in the singular.
+    singular: HashSet<Vec<String>>,
 }
 
 impl NameWords {
@@ -64,7 +72,16 @@ impl NameWords {
     pub(crate) fn new(identities: &Identities) -> Self {
         let names: Vec<Vec<String>> = identities.iter().flat_map(|(_, i)| &i.names).map(|n| name_words(n)).collect();
         let words = names.iter().flatten().cloned().collect();
-        Self { words, whole: names.into_iter().filter(|n| n.len() > 1).collect() }
+        let singular = names.into_iter().filter(|n| n.len() > 1).collect();
+        let mut whole = HashMap::new();
+        for (id, identity) in identities.iter() {
+            for name in [identities.full_name(id), identities.label(id)].iter().chain(&identity.names) {
+                whole.entry(spoken(name)).or_insert_with(|| name.clone());
+                whole.entry(spoken(&key(name))).or_insert_with(|| name.clone());
+            }
+        }
+        whole.remove("");
+        Self { words, whole, singular }
     }
 
     /// Whether a name has this word.
@@ -76,10 +93,27 @@ impl NameWords {
         self.words.iter().map(String::as_str)
     }
 
-    fn is_name(&self, words: &[&str]) -> bool {
-        let said: Vec<String> = words.iter().flat_map(|w| name_words(w)).collect();
-        self.whole.contains(&said)
+    /// The name that these words of a request are as a whole.
+    pub(crate) fn whole(&self, words: &[&str]) -> Option<&str> {
+        let words = match words {
+            ["the" | "a" | "an", rest @ ..] if !rest.is_empty() => rest,
+            all => all,
+        };
+        let said = words.join(" ");
+        let said = if said.contains('"') { spoken(&said.replace('"', " ")) } else { said };
+        self.whole.get(&said).map(String::as_str)
     }
+
+    fn is_name(&self, words: &[&str]) -> bool {
+        let said = || words.iter().flat_map(|w| name_words(w)).collect();
+        self.whole(words).is_some() || self.singular.contains::<Vec<String>>(&said())
+    }
+}
+
+/// The words of a name as a request has them, joined.
+fn spoken(name: &str) -> String {
+    let words = request_tokens(name).into_iter().map(|t| t.low).collect::<Vec<_>>();
+    words.join(" ")
 }
 
 /// The words of a phrase: quotes and marks around them are no part of it.
@@ -104,12 +138,14 @@ pub(super) fn readings(words: &[&str], known: &NameWords, strict: bool) -> Vec<N
     match words {
         _ if words.len() > MOST_WORDS => return found,
         [] => return found,
+        [_, _, ..] if let Some(name) = known.whole(words) => return vec![Noun::Called(name.to_owned())],
         ["it" | "this" | "that"] => return vec![Noun::Last],
         [number] if number.starts_with('#') => return number[1..].parse().map(Noun::Number).into_iter().collect(),
         ["its", piece @ ..] => {
             let pieces = readings(piece, known, strict);
             return pieces.into_iter().map(|p| Noun::PieceOf(Box::new(p), Box::new(Noun::Last))).collect();
         }
+        _ if let Some(name) = known.whole(words) => return vec![Noun::Called(name.to_owned())],
         _ if known.is_name(words) => return vec![named(words)],
         _ => {}
     }

@@ -6,9 +6,12 @@ use std::collections::{HashMap, HashSet};
 use std::path::Path;
 
 use serde::Deserialize;
+use serde_json::{Value, json};
 
+use super::polygons::polygons;
 use super::{Region, Sheet};
 use crate::io::{IoError, files};
+use crate::scene::identity::whole_names::BETWEEN;
 use crate::scene::{Level, Mask};
 
 const MAX_VERTICES: usize = 4_000_000;
@@ -79,6 +82,11 @@ pub(crate) fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError
                 _ => {
                     region.parent = at;
                     placed.insert(region.name.clone(), ordered.len());
+                    // "handle · mug" of the mug is its handle.
+                    let whole = parent.map(|parent| format!("{BETWEEN}{parent}"));
+                    if let Some(own) = whole.and_then(|whole| region.name.strip_suffix(&whole).map(str::to_owned)) {
+                        region.name = own;
+                    }
                     ordered.push(region);
                 }
             }
@@ -90,4 +98,30 @@ pub(crate) fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError
         }
     }
     Ok(ordered)
+}
+
+/// A label file of a photo that [`read`] reads as it was: regions with names of their own, wholes first.
+pub(crate) fn document(photo: &str, [width, height]: [usize; 2], regions: &[Region]) -> Value {
+    let mut objects = Vec::new();
+    for (i, region) in regions.iter().enumerate() {
+        for polygon in polygons(&region.mask) {
+            let side = |at: usize, of: fn(i32, i32) -> i32| polygon.iter().map(|v| v[at]).reduce(of).unwrap_or(0);
+            objects.push(json!({
+                "category": region.name,
+                "group": i + 1,
+                "layer": i + 1,
+                "segmentation": polygon,
+                "area": region.mask.area(),
+                "bbox": [side(0, i32::min), side(1, i32::min), side(0, i32::max), side(1, i32::max)],
+                "iscrowd": 0,
+                "note": "",
+                "level": region.level,
+                "parent": region.parent.map(|p| &regions[p].name),
+            }));
+        }
+    }
+    let info = json!({
+        "description": "ISAT", "folder": "", "name": photo, "width": width, "height": height, "depth": 3, "note": ""
+    });
+    json!({ "info": info, "objects": objects })
 }

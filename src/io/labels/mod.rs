@@ -18,6 +18,7 @@ pub(crate) mod isat;
 pub(crate) mod lerf_mask;
 pub(crate) mod masklets;
 pub(crate) mod pictures;
+mod polygons;
 pub(crate) mod rle;
 pub(crate) mod spin_nerf;
 pub(crate) mod synth_ids;
@@ -177,7 +178,7 @@ impl Sheet<'_> {
 }
 
 /// File name without folder and extension.
-fn stem(name: &str) -> String {
+pub(crate) fn stem(name: &str) -> String {
     let file = name.rsplit(['/', '\\']).next().unwrap_or(name);
     file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned()
 }

@@ -1,5 +1,6 @@
 //! The id maps that `fmlgs synth` writes.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -22,7 +23,7 @@ pub(crate) struct ListedIdentity {
     #[serde(deserialize_with = "text::read_name")]
     pub(crate) name: String,
     pub(crate) level: Level,
-    /// For a part, its object's id.
+    /// For a part, the id of its object or of the part that it is a piece of.
     #[serde(default)]
     pub(crate) parent: Option<u16>,
 }
@@ -33,6 +34,11 @@ pub struct SynthIds {
     list: Vec<ListedIdentity>,
 }
 
+/// Where the pictures of a level are.
+pub(crate) fn folder(level: Level) -> &'static str {
+    if level == Level::Object { "object_ids" } else { "part_ids" }
+}
+
 impl SynthIds {
     /// Reads the list in the folder `root`.
     pub fn open(root: &Path) -> Result<Self, IoError> {
@@ -41,8 +47,19 @@ impl SynthIds {
     }
 
     fn path(&self, level: Level, stem: &str) -> PathBuf {
-        let folder = if level == Level::Object { "object_ids" } else { "part_ids" };
-        self.root.join(folder).join(format!("{stem}.png"))
+        self.root.join(folder(level)).join(format!("{stem}.png"))
+    }
+
+    /// The ids of what is listed and of its pieces: a picture shows the innermost of a level.
+    fn with_pieces(&self, listed: &ListedIdentity) -> HashSet<u16> {
+        let mut ids = HashSet::from([listed.id]);
+        // As often as pieces are added: a list need not be in order.
+        while let Some(piece) = self.list.iter().find(|l| {
+            l.level == listed.level && !ids.contains(&l.id) && l.parent.is_some_and(|parent| ids.contains(&parent))
+        }) {
+            ids.insert(piece.id);
+        }
+        ids
     }
 
     pub(crate) fn has(&self, stem: &str) -> bool {
@@ -62,7 +79,8 @@ impl SynthIds {
             let (width, height, ids) = read_ids(&path, sheet, self.list.len())?;
             for listed in self.list.iter().filter(|l| l.level == level) {
                 let parent = listed.parent.and_then(|p| ids_of.iter().position(|id| *id == p));
-                let mask = Mask::from_fn(width, height, |i| ids[i] == listed.id);
+                let own = self.with_pieces(listed);
+                let mask = Mask::from_fn(width, height, |i| own.contains(&ids[i]));
                 regions.push(Region { name: listed.name.clone(), level: Some(level), parent, mask });
                 ids_of.push(listed.id);
             }

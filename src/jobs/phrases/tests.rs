@@ -1,6 +1,7 @@
 //! Phrases on a scene of two blobs, and what is written of them.
 
 use glam::DVec3;
+use serde_json::Value;
 
 use super::*;
 use crate::io::labels::rle::Rle;
@@ -50,10 +51,10 @@ fn every_phrase_is_asked_of_every_view() {
     assert_eq!(
         told,
         [
-            ("images/0.png", "shade of the lamp", "found", "certain", true),
+            ("images/0.png", "shade · lamp", "found", "certain", true),
             ("images/0.png", "mug", "found", "certain", true),
             ("images/0.png", "", "not found", "guess", false),
-            ("images/1.png", "shade of the lamp", "found", "certain", false),
+            ("images/1.png", "shade · lamp", "found", "certain", false),
             ("images/1.png", "mug", "found", "certain", false),
             ("images/1.png", "", "not found", "guess", false),
         ]

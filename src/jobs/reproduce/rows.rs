@@ -13,7 +13,7 @@ use crate::jobs::evaluate::PhotoComparison;
 use crate::jobs::evaluate_masks::DrawnView;
 use crate::math::stats::quantile;
 use crate::models::{Encoder, ModelError};
-use crate::pipeline::semantics::answer::{QueryAnswer, by_name};
+use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::by_similarity::{ALIKE, rejoined};
 use crate::pipeline::semantics::code_map::CodeMap;
@@ -23,7 +23,7 @@ use crate::pipeline::semantics::protocols::raw_features::RawFeatures;
 use crate::pipeline::semantics::protocols::{
     AskedScene, LabeledView, Unit, fastlgs_ex, langsplat, lerf_rule, multi_class, spin_nerf,
 };
-use crate::pipeline::semantics::query_engine::ask_by_embedding;
+use crate::pipeline::semantics::query_engine::{ask_by_embedding, ask_by_name};
 use crate::pipeline::semantics::recipe::{PartFeatures, Recipe, RelevancyScale, Strategy, Understanding};
 use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::semantics::view_map::{ViewMap, weights};
@@ -112,10 +112,8 @@ pub(super) fn measure(
         }
         rows.extend(rule_rows(&table, comparison, (map, language), &views, &mut by)?);
         if map.identities.iter().any(|(_, i)| !i.names.is_empty()) {
-            let mut ask = |text: &str| {
-                let phrase = ParsedQuery::parse(text);
-                Ok(phrase.map(|p| by_name(&map.identities, &p, LevelFilter::Auto, &Recipe::default())))
-            };
+            let recipe = Recipe::default();
+            let mut ask = |text: &str| Ok(ask_by_name(&map.identities, text, LevelFilter::Auto, &recipe));
             rows.push(table.row(BY_NAME, map, &views, &mut ask)?);
         }
     }

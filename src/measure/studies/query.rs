@@ -10,14 +10,13 @@ use crate::math::stats::mean;
 use crate::measure::sweep::failed;
 use crate::measure::{Rule, Stage, StageName, Study, StudyError, Trial};
 use crate::models::{Encoder, ModelError};
-use crate::pipeline::semantics::answer::{QueryAnswer, by_name};
+use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::matching::{self, MatchMode};
-use crate::pipeline::semantics::parse::ParsedQuery;
 use crate::pipeline::semantics::protocols::part_recall::HIT_IOU;
 use crate::pipeline::semantics::protocols::{AskedScene, Category, LabeledView, langsplat};
-use crate::pipeline::semantics::query_engine::ask_by_embedding;
+use crate::pipeline::semantics::query_engine::{ask_by_embedding, ask_by_name};
 use crate::pipeline::semantics::recipe::{PartFeatures, Recipe, Strategy, Understanding};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
@@ -224,7 +223,7 @@ fn ask(
 ) -> Result<Option<QueryAnswer>, StudyError> {
     let recipe = &variant.recipe;
     if recipe.understanding == Understanding::Names {
-        return Ok(ParsedQuery::parse(text).map(|phrase| by_name(&map.identities, &phrase, LevelFilter::Auto, recipe)));
+        return Ok(ask_by_name(&map.identities, text, LevelFilter::Auto, recipe));
     }
     match ask_by_embedding(&map.identities, (features, recipe), text, &mut phrases, |p| encoder.text(p)) {
         Err(ModelError::NoKnownWord { .. }) => Ok(None),

@@ -6,10 +6,11 @@ use rayon::prelude::*;
 
 use super::by_embedding::{EmbeddingScorer, TextEmbeddings};
 use super::code_map::CodeMap;
-use super::localize::{Answer, Hit, Scorer, localize};
+use super::localize::{Answer, Hit, Scorer, called, localize};
 use super::matching::{self, MatchMode};
 use super::names::{self, ByName};
 use super::parse::ParsedQuery;
+use super::reading::QueryReading;
 use super::recipe::{Recipe, RelevancyScale, Strategy, Understanding};
 use super::relevancy::{LERFS_SHARE, on_lerfs_scale};
 use super::timing::{StagesMs, ms_since};
@@ -64,20 +65,21 @@ pub(crate) struct Language<'a> {
 /// of them alone.
 pub(crate) fn answer(
     identities: &Identities,
-    phrase: &ParsedQuery,
+    reading: &QueryReading,
     level: LevelFilter,
     recipe: &Recipe,
     language: Option<Language<'_>>,
 ) -> QueryAnswer {
+    let phrase = &reading.phrase;
     let nothing = |a: &Answer| matches!(a, Answer::NotFound(_));
     let language = match (recipe.understanding, language) {
-        (Understanding::Names, _) | (Understanding::Both, None) => return by_name(identities, phrase, level, recipe),
+        (Understanding::Names, _) | (Understanding::Both, None) => return by_name(identities, reading, level, recipe),
         (Understanding::Embedding, None) => return unanswered(identities, recipe),
         (Understanding::Embedding, Some(language)) => return by_embedding(identities, phrase, level, recipe, language),
         (Understanding::Both, Some(language)) => language,
     };
-    let named = by_name(identities, phrase, level, recipe);
-    let known = names::unknown_words(identities, &phrase.text).is_empty();
+    let named = by_name(identities, reading, level, recipe);
+    let known = !reading.called.is_empty() || names::unknown_words(identities, &phrase.text).is_empty();
     if known && !nothing(&named.answer) {
         return named;
     }
@@ -125,9 +127,11 @@ impl<S: Scorer> Scorer for Timed<'_, S> {
     }
 }
 
-/// Localizes by `scorer`, then makes the relevancy of every identity by `relevancy`.
+/// Localizes by `scorer`, unless `whole` are called so as a whole, then makes the relevancy of every identity by
+/// `relevancy`.
 fn judged<S: Scorer>(
     (identities, phrase, level): (&Identities, &ParsedQuery, LevelFilter),
+    whole: &[IdentityId],
     (basis, recipe): (Basis, &Recipe),
     scorer: &mut S,
     relevancy: impl FnOnce(&Answer, &mut S) -> Vec<f32>,
@@ -139,7 +143,10 @@ fn judged<S: Scorer>(
         (Basis::Names, Strategy::Joint) => Strategy::WholeFirst,
         (_, strategy) => strategy,
     };
-    let answer = localize(identities, phrase, level, strategy, &mut timed);
+    let answer = match whole {
+        [] => localize(identities, phrase, level, strategy, &mut timed),
+        ids => called(identities, (ids, &phrase.text), level, &mut timed),
+    };
     let (scored_ms, localized_ms) = (timed.ms, ms_since(start));
     let relevancy = relevancy(&answer, scorer);
     let stages = StagesMs {
@@ -152,12 +159,12 @@ fn judged<S: Scorer>(
 
 pub(crate) fn by_name(
     identities: &Identities,
-    phrase: &ParsedQuery,
+    QueryReading { phrase, called, .. }: &QueryReading,
     level: LevelFilter,
     recipe: &Recipe,
 ) -> QueryAnswer {
     let mut scorer = ByName { identities, rejection: recipe.rejection };
-    judged((identities, phrase, level), (Basis::Names, recipe), &mut scorer, |answer, _| {
+    judged((identities, phrase, level), called, (Basis::Names, recipe), &mut scorer, |answer, _| {
         let alone = names::scores(identities, &phrase.target);
         let mut relevancy = vec![0.0; identities.len() + 1];
         for (id, identity) in identities.iter() {
@@ -180,7 +187,7 @@ pub(crate) fn by_embedding(
 ) -> QueryAnswer {
     let Language { features, phrases } = language;
     let mut scorer = EmbeddingScorer::new(identities, features, phrases, recipe);
-    judged((identities, phrase, level), (Basis::Embedding, recipe), &mut scorer, |_, scorer| {
+    judged((identities, phrase, level), &[], (Basis::Embedding, recipe), &mut scorer, |_, scorer| {
         let mut relevancy = vec![0.0];
         relevancy.extend(scorer.scores(&phrase.text, None));
         relevancy.resize(identities.len() + 1, 0.0);
@@ -206,11 +213,12 @@ impl QueryAnswer {
     pub(crate) fn ignored_words(
         &self,
         identities: &Identities,
-        phrase: &ParsedQuery,
+        QueryReading { phrase, called, .. }: &QueryReading,
         unknown: &[String],
     ) -> Vec<String> {
         match (&self.answer, self.basis) {
             (Answer::NotFound(_), _) => Vec::new(),
+            (_, Basis::Names) if !called.is_empty() => Vec::new(),
             (found, Basis::Names) => {
                 let first = found.hits().first();
                 first.map_or_else(Vec::new, |h| names::words_beside(identities, h.identity, &phrase.text))

@@ -9,7 +9,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use self::controls::{Harm, harmed};
-use super::answer::{Language, QueryAnswer, by_embedding, by_name};
+use super::answer::{Language, QueryAnswer, by_embedding};
 use super::build_map::{FindOptions, Tools, find_objects};
 use super::by_embedding::TextEmbeddings;
 use super::code_map::CodeMap;
@@ -19,6 +19,7 @@ use super::parse::ParsedQuery;
 use super::protocols::part_recall::{self, Components};
 use super::protocols::recipes::Absent;
 use super::protocols::{AskedScene, Category, LabeledView, categories, masks};
+use super::query_engine::ask_by_name;
 use super::recipe::{PAPERS_PHRASES, Recipe, Rejection};
 use super::segmenter::{FileMasks, Segmenter};
 use super::tracker::TrackOptions;
@@ -153,8 +154,7 @@ impl Scene {
 fn by_names(scene: &Scene, map: &SemanticMap) -> [f64; 2] {
     let drawn = scene.drawn(map);
     let blended = CodeMap::default();
-    let mut ask =
-        |text: &str| ParsedQuery::parse(text).map(|p| by_name(&map.identities, &p, LevelFilter::Auto, &plain()));
+    let mut ask = |text: &str| ask_by_name(&map.identities, text, LevelFilter::Auto, &plain());
     let mut asked = AskedScene { map, ask: &mut ask };
     let views = scene.views(&drawn, &blended);
     masks::by_level(&views.iter().flat_map(|v| masks::compare(&mut asked, v)).collect::<Vec<_>>())
@@ -254,9 +254,7 @@ fn figures(scene: &Scene, map: &SemanticMap, trained: &SemanticMap, encoder: &mu
     let not_there = [absent.kinds, absent.colors];
     let is_found = |answered: QueryAnswer| !matches!(answered.answer, Answer::NotFound(_));
     let mut seen = |name: &String| by_looks(map, features, &mut book, encoder, name).map(is_found);
-    let named = |name: &String| {
-        ParsedQuery::parse(name).map(|p| is_found(by_name(&map.identities, &p, LevelFilter::Auto, &plain())))
-    };
+    let named = |name: &String| ask_by_name(&map.identities, name, LevelFilter::Auto, &plain()).map(is_found);
     let found = |list: &Vec<String>, ask: &mut dyn FnMut(&String) -> Option<bool>| {
         share(&list.iter().map(|name| ask(name).expect("its words are known")).collect::<Vec<_>>())
     };

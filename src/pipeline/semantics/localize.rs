@@ -82,6 +82,21 @@ pub fn localize(
     }
 }
 
+/// What is meant where these are called so as a whole; the others only come near.
+pub(super) fn called(
+    identities: &Identities,
+    (ids, text): (&[IdentityId], &str),
+    level: LevelFilter,
+    scorer: &mut dyn Scorer,
+) -> Answer {
+    let below = 1.0 - 2.0 * scorer.resolution();
+    let mut scores = scorer.scores(text, None);
+    scores.iter_mut().for_each(|score| *score = score.min(below));
+    ids.iter().filter_map(|id| (*id as usize).checked_sub(1)).for_each(|i| scores[i] = 1.0);
+    let candidates = identities.iter().filter(|(_, i)| level.accepts(i.level)).map(|(id, _)| id);
+    judge(identities, best(candidates, &scores, TOP.max(ids.len())), scorer)
+}
+
 /// What is meant by scores alone.
 fn meant(
     identities: &Identities,
@@ -229,13 +244,17 @@ fn piece_of(identities: &Identities, piece: &str, whole: &str, scorer: &mut dyn 
 
 /// Candidates by falling score; equal ones by number. A score that is no number is none.
 fn rank(candidates: impl Iterator<Item = IdentityId>, scores: &[f32]) -> Vec<Hit> {
+    best(candidates, scores, TOP)
+}
+
+fn best(candidates: impl Iterator<Item = IdentityId>, scores: &[f32], most: usize) -> Vec<Hit> {
     let hit = |id: IdentityId| Hit { identity: id, score: scores[id as usize - 1], margin: 0.0 };
     let mut hits: Vec<Hit> = candidates.map(hit).filter(|h| !h.score.is_nan()).collect();
     hits.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.identity.cmp(&b.identity)));
     for i in 0..hits.len() {
         hits[i].margin = hits[i].score - hits.get(i + 1).map_or(0.0, |next| next.score);
     }
-    hits.truncate(TOP);
+    hits.truncate(most);
     hits
 }
 

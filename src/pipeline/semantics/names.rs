@@ -9,6 +9,7 @@ use super::parse::{ParsedQuery, is_glue};
 use super::recipe::Rejection;
 pub(crate) use super::words::singular;
 use super::words::words;
+use crate::scene::identity::whole_names::key;
 use crate::scene::{Identities, IdentityId};
 
 /// Score under which a name is not what was asked for.
@@ -95,16 +96,18 @@ fn not_in(phrase: &str, known: &HashSet<String>) -> Vec<String> {
     words(phrase).into_iter().filter(|w| !is_glue(w) && !known.contains(w)).collect()
 }
 
-/// Names for a phrase that is being typed, best first.
+/// Full names for a phrase that is being typed, by any name, best first.
 pub(crate) fn completions(identities: &Identities, typed: &str, most: usize) -> Vec<String> {
-    let typed = typed.to_lowercase();
-    let named = identities.iter().filter(|(_, i)| !i.names.is_empty());
-    let mut all: Vec<String> = named.map(|(id, _)| identities.full_name(id)).collect();
-    all.retain(|n| n.to_lowercase().contains(&typed));
-    all.sort_by_key(|n| (!n.to_lowercase().starts_with(&typed), n.chars().count(), n.clone()));
-    all.dedup();
-    all.truncate(most);
-    all
+    let typed = key(typed);
+    let mut all = Vec::new();
+    for (id, identity) in identities.iter().filter(|(_, i)| !i.names.is_empty()) {
+        let full = identities.full_name(id);
+        let keys = std::iter::once(&full).chain(&identity.names).map(|name| key(name));
+        let begins = keys.filter_map(|name| name.find(&typed)).map(|at| at > 0).min();
+        all.extend(begins.map(|begins| (begins, full.chars().count(), full)));
+    }
+    all.sort();
+    all.into_iter().map(|(.., full)| full).take(most).collect()
 }
 
 /// Harmonic mean of how much of the phrase is in the name and how much of the name in the phrase.
@@ -155,11 +158,9 @@ mod tests {
         let all = scene();
         assert_eq!(unknown_words(&all, "the green button of a zebra"), ["green", "zebra"]);
         assert!(unknown_words(&all, "red buttons").is_empty());
-        assert_eq!(
-            completions(&all, "con", 5),
-            ["red controller", "Blue_Controller", "button a of the red controller"]
-        );
-        assert_eq!(completions(&all, "button", 5), ["button a of the red controller"]);
+        assert_eq!(completions(&all, "con", 5), ["red controller", "Blue_Controller", "button a · red controller"]);
+        assert_eq!(completions(&all, "Button", 5), ["button a · red controller"]);
+        assert_eq!(completions(&all, "手", 5), ["Blue_Controller"], "by another name of it");
         assert!(completions(&all, "zebra", 5).is_empty());
     }
 

@@ -1,5 +1,7 @@
 //! What a typed query asks for: a thing, or a piece of a thing.
 
+use crate::scene::identity::whole_names::BETWEEN;
+
 /// Longest query that is looked at, in characters.
 pub(crate) const MAX_CHARS: usize = 300;
 
@@ -32,16 +34,23 @@ impl ParsedQuery {
     ///
     /// Understood are "X of the Y" (and "on", "from", and the like in some other languages), "Y's
     /// X", and `Y的X`, `YのX`. The last such word parts the query, so that "the eye of the face of
-    /// the doll" is about the doll's.
+    /// the doll" is about the doll's. "X · Y" is what full names look like.
     pub fn parse(query: &str) -> Option<Self> {
+        Self::partings(query).into_iter().next()
+    }
+
+    /// All ways to take a query apart, the best first; as one phrase if there is none.
+    pub(crate) fn partings(query: &str) -> Vec<Self> {
         let text: String = query.chars().take(MAX_CHARS).collect::<String>().to_lowercase();
         let text = text.replace(['\u{2019}', '\u{2018}', '`'], "'");
-        let words: Vec<&str> = text
-            .split(|c: char| c.is_whitespace() || c.is_control() || "\"?!,;:()[]{}".contains(c))
-            .map(|w| w.trim_end_matches('.'))
-            .filter(|w| !w.is_empty())
-            .collect();
-        let parted = words.iter().enumerate().rev().find_map(|(i, word)| {
+        if let Some((piece, whole)) = text.split_once(BETWEEN) {
+            let whole = whole.replace(BETWEEN, " of the ");
+            if let Some((target, whole)) = phrase(&split(piece)).zip(phrase(&split(&whole))) {
+                return vec![Self { text: format!("{target} of the {whole}"), target, whole: Some(whole) }];
+            }
+        }
+        let words = split(&text);
+        let parted = words.iter().enumerate().rev().filter_map(|(i, word)| {
             if PIECE_OF.contains(word) {
                 return both(&words, &words[..i], &words[i + 1..]);
             }
@@ -49,16 +58,22 @@ impl ParsedQuery {
             let whole: Vec<&str> = words[..i].iter().copied().chain([owner]).collect();
             both(&words, &words[i + 1..], &whole)
         });
-        if parted.is_some() {
+        let parted: Vec<Self> = parted.collect();
+        if !parted.is_empty() {
             return parted;
         }
-        let text = phrase(&words)?;
+        let Some(text) = phrase(&words) else { return Vec::new() };
         let unspaced = text.rsplit_once(WHOLE_S).filter(|(whole, piece)| !whole.is_empty() && !piece.is_empty());
         let (target, whole) = match unspaced {
             Some((whole, piece)) => (piece.to_owned(), Some(whole.to_owned())),
             None => (text.clone(), None),
         };
-        Some(Self { text, target, whole })
+        vec![Self { text, target, whole }]
+    }
+
+    /// All of a text as one phrase.
+    pub(crate) fn undivided(text: String) -> Self {
+        Self { target: text.clone(), text, whole: None }
     }
 
     /// What "X Y" is a piece of, if it is one: all but the last word of a query that does not say so by its grammar.
@@ -66,6 +81,12 @@ impl ParsedQuery {
         let (whole, _) = self.text.rsplit_once(' ')?;
         self.whole.is_none().then_some(whole)
     }
+}
+
+/// The words of a text, without marks.
+fn split(text: &str) -> Vec<&str> {
+    let apart = text.split(|c: char| c.is_whitespace() || c.is_control() || "\"?!,;:()[]{}".contains(c));
+    apart.map(|w| w.trim_end_matches('.')).filter(|w| !w.is_empty()).collect()
 }
 
 fn both(all: &[&str], piece: &[&str], whole: &[&str]) -> Option<ParsedQuery> {
@@ -101,6 +122,13 @@ mod tests {
         assert_eq!(parsed("赤いコントローラーのボタン"), both("ボタン", "赤いコントローラー"));
         assert_eq!(parsed("红色手柄的按钮"), both("按钮", "红色手柄"));
         assert_eq!(parsed("el botón del mando"), both("botón", "mando"));
+        assert_eq!(parsed("Bow on the hood · the doll's house"), both("bow on the hood", "doll's house"));
+        let face = ParsedQuery::parse("eye · face · doll").expect("words");
+        assert_eq!(
+            (face.text.as_str(), face.whole.as_deref()),
+            ("eye of the face of the doll", Some("face of the doll"))
+        );
+        assert_eq!(parsed("lamp ·"), Some(("lamp ·".into(), None)));
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use std::time::Instant;
 
-use super::answer::{Language, QueryAnswer, answer, by_embedding};
+use super::answer::{Language, QueryAnswer, answer, by_embedding, by_name};
 use super::by_embedding::TextEmbeddings;
 use super::names;
 use super::parse::ParsedQuery;
@@ -37,7 +37,7 @@ impl QueryEngine {
         level: LevelFilter,
     ) -> Result<Option<QueryAnswer>, ModelError> {
         let reading = self.read(&map.identities, text, level);
-        reading.map(|reading| self.answer(map, &reading.phrase, level)).transpose()
+        reading.map(|reading| self.answer(map, &reading, level)).transpose()
     }
 
     /// Answers by this recipe from now on, with the encoder that is there.
@@ -63,13 +63,13 @@ impl QueryEngine {
     pub(crate) fn answer(
         &mut self,
         map: &SemanticMap,
-        phrase: &ParsedQuery,
+        reading: &QueryReading,
         level: LevelFilter,
     ) -> Result<QueryAnswer, ModelError> {
         let start = Instant::now();
         let wanted = self.recipe.understanding != Understanding::Names;
         let known = match self.encoder.as_mut().filter(|_| wanted) {
-            Some(encoder) => match self.phrases.learn(phrase, &self.recipe, |p| encoder.text(p)) {
+            Some(encoder) => match self.phrases.learn(&reading.phrase, &self.recipe, |p| encoder.text(p)) {
                 Ok(()) => true,
                 // Words that nobody knows are no failure: names may know them.
                 Err(ModelError::NoKnownWord { .. }) => false,
@@ -78,7 +78,7 @@ impl QueryEngine {
             None => false,
         };
         let encode = ms_since(start);
-        let answered = answer_encoded(map, phrase, level, &self.recipe, known.then_some(&self.phrases));
+        let answered = answer_encoded(map, reading, level, &self.recipe, known.then_some(&self.phrases));
         Ok(QueryAnswer { stages: StagesMs { encode, ..answered.stages }, ..answered })
     }
 
@@ -92,13 +92,23 @@ impl QueryEngine {
 /// Answers a question whose phrases are among those that were encoded, or by names alone without them.
 pub(crate) fn answer_encoded(
     map: &SemanticMap,
-    phrase: &ParsedQuery,
+    reading: &QueryReading,
     level: LevelFilter,
     recipe: &Recipe,
     phrases: Option<&TextEmbeddings>,
 ) -> QueryAnswer {
     let language = map.language.as_ref().zip(phrases).map(|(features, phrases)| Language { features, phrases });
-    answer(&map.identities, phrase, level, recipe, language)
+    answer(&map.identities, reading, level, recipe, language)
+}
+
+/// Answers a question by names alone; `None` if there is nothing in it.
+pub(crate) fn ask_by_name(
+    identities: &Identities,
+    text: &str,
+    level: LevelFilter,
+    recipe: &Recipe,
+) -> Option<QueryAnswer> {
+    QueryReading::new(identities, text, level, recipe).map(|reading| by_name(identities, &reading, level, recipe))
 }
 
 /// Answers a question by these `features` alone, whatever identities are called; `None` if there is nothing in

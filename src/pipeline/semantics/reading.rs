@@ -1,5 +1,5 @@
-//! What a typed query means in a scene: slips are mended by the words of the scene's own names, and noun
-//! compounds ("kettle spout") are read as pieces of wholes where names say so.
+//! What a typed query means in a scene. A name as a whole comes first; else slips are mended by the words of the scene's
+//! own names, and noun compounds ("kettle spout") are read as pieces of wholes where names say so.
 
 use std::collections::BTreeMap;
 
@@ -7,6 +7,7 @@ use super::parse::{MAX_CHARS, ParsedQuery, is_glue};
 use super::recipe::{Recipe, Understanding};
 use super::words::{singular, words, written};
 use crate::models;
+use crate::scene::identity::whole_names::key;
 use crate::scene::{Identities, IdentityId, LevelFilter};
 
 /// Words as they were typed, each with another one.
@@ -16,6 +17,8 @@ pub(crate) type Pairs = Vec<(String, String)>;
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct QueryReading {
     pub(crate) phrase: ParsedQuery,
+    /// What is called so as a whole; none where the grammar has to say what is meant.
+    pub(crate) called: Vec<IdentityId>,
     /// Words that were taken for slips, each with the word that it was taken for.
     pub(crate) mended: Pairs,
     /// Words of their own that are near a word of the scene: what may have been meant if nothing fits.
@@ -35,14 +38,51 @@ impl QueryReading {
     pub(crate) fn new(identities: &Identities, query: &str, level: LevelFilter, recipe: &Recipe) -> Option<Self> {
         if recipe.understanding == Understanding::Embedding {
             // Names are not looked at.
-            return Some(Self { phrase: ParsedQuery::parse(query)?, mended: Vec::new(), near: Vec::new() });
+            let phrase = ParsedQuery::parse(query)?;
+            return Some(Self { phrase, called: Vec::new(), mended: Vec::new(), near: Vec::new() });
+        }
+        let called = identities.called(query, level);
+        if !called.is_empty() {
+            let text = ParsedQuery::parse(query).map_or_else(|| key(query), |p| p.text);
+            return Some(Self { phrase: ParsedQuery::undivided(text), called, mended: Vec::new(), near: Vec::new() });
         }
         let (text, mended, near) = mend_all(identities, query);
-        let parsed = ParsedQuery::parse(&text)?;
+        let partings = ParsedQuery::partings(&text);
+        let (at, called) = by_whole_names(identities, &text, &partings, level);
+        let parsed = partings.into_iter().nth(at)?;
         // A level that is asked for is not overruled.
-        let compound = if level == LevelFilter::Object { None } else { compound(identities, &parsed) };
-        Some(Self { phrase: compound.unwrap_or(parsed), mended, near })
+        let is_compound = called.is_empty() && level != LevelFilter::Object;
+        let compound = if is_compound { compound(identities, &parsed) } else { None };
+        Some(Self { phrase: compound.unwrap_or(parsed), called, mended, near })
     }
+}
+
+/// Which way to take a text apart is that by whole names, and what is called so: "lid of the doll's house" is about
+/// the doll's house, where there is one.
+fn by_whole_names(
+    identities: &Identities,
+    text: &str,
+    partings: &[ParsedQuery],
+    level: LevelFilter,
+) -> (usize, Vec<IdentityId>) {
+    let called = identities.called(text, level);
+    if !called.is_empty() || level == LevelFilter::Object {
+        return (0, called);
+    }
+    let mut of_whole = None;
+    for (at, parting) in partings.iter().enumerate() {
+        let whole = parting.whole.as_ref().map(|whole| identities.called(whole, LevelFilter::Auto)).unwrap_or_default();
+        if whole.is_empty() {
+            continue;
+        }
+        let is_piece = |id: &IdentityId| identities.ancestors(*id).skip(1).any(|i| whole.contains(&i));
+        let pieces: Vec<_> = identities.called(&parting.target, level).into_iter().filter(is_piece).collect();
+        if !pieces.is_empty() {
+            return (at, pieces);
+        }
+        of_whole = of_whole.or(Some(at));
+    }
+    (of_whole.unwrap_or(0), Vec::new())
 }
 
 /// The text, in lower case, with slips of the scene's own words mended, and which those were.
@@ -191,6 +231,9 @@ fn has_last(asked: &[Vec<String>], name: &[String]) -> bool {
 }
 
 #[cfg(test)]
+mod verbatim;
+
+#[cfg(test)]
 mod tests {
     use super::super::answer::by_name;
     use super::super::localize::Answer;
@@ -219,8 +262,8 @@ mod tests {
     }
 
     /// What a question comes to, in the words of the lists.
-    fn told(all: &Identities, phrase: &ParsedQuery) -> String {
-        let answered = by_name(all, phrase, LevelFilter::Auto, &Recipe::default());
+    fn told(all: &Identities, reading: &QueryReading) -> String {
+        let answered = by_name(all, reading, LevelFilter::Auto, &Recipe::default());
         let first = answered.answer.hits().first().map(|h| all.full_name(h.identity)).unwrap_or_default();
         match answered.answer {
             Answer::Found(_) => first,
@@ -233,6 +276,12 @@ mod tests {
         QueryReading::new(all, text, LevelFilter::Auto, &Recipe::default()).expect("words")
     }
 
+    /// A question as its grammar alone has it.
+    fn plain(text: &str) -> QueryReading {
+        let phrase = ParsedQuery::parse(text).expect("words");
+        QueryReading { phrase, called: vec![], mended: vec![], near: vec![] }
+    }
+
     #[test]
     fn compounds_are_pieces_of_wholes_and_nothing_else_changes() {
         let (all, table) = data();
@@ -240,18 +289,18 @@ mod tests {
         assert!(lists[0].len() >= 40);
         let mut wrong = Vec::new();
         for row in lists.iter().flatten() {
-            let found = told(&all, &read(&all, row[0]).phrase);
+            let found = told(&all, &read(&all, row[0]));
             if found != row[1] {
                 wrong.push(format!("{}: {found}, not {}", row[0], row[1]));
             }
         }
         assert!(wrong.is_empty(), "{}", wrong.join("\n"));
         for row in &lists[1] {
-            assert_eq!(read(&all, row[0]).phrase, ParsedQuery::parse(row[0]).expect("words"), "{}", row[0]);
+            assert_eq!(read(&all, row[0]).phrase.text, plain(row[0]).phrase.text, "{}", row[0]);
         }
         // Without the reading most are wrong, and an object that is asked for is no piece.
-        let plain = |row: &&Vec<&str>| told(&all, &ParsedQuery::parse(row[0]).expect("words")) == row[1];
-        assert!(lists[0].iter().filter(plain).count() * 4 < lists[0].len());
+        let is_plain = |row: &&Vec<&str>| told(&all, &plain(row[0])) == row[1];
+        assert!(lists[0].iter().filter(is_plain).count() * 4 < lists[0].len());
         let object = QueryReading::new(&all, "kettle spout", LevelFilter::Object, &Recipe::default()).expect("words");
         assert_eq!((object.phrase.target.as_str(), object.phrase.whole), ("kettle spout", None));
         // By embedding, names are not looked at: neither compounds nor slips are read by them.
@@ -269,11 +318,11 @@ mod tests {
             let said: Vec<String> = reading.mended.iter().map(|(a, b)| format!("{a}={b}")).collect();
             let mut wanted: Vec<&str> = row[2].split(' ').collect();
             wanted.sort_by_key(|w| row[0].find(w.split('=').next().unwrap_or_default()));
-            assert_eq!((said.join(" "), told(&all, &reading.phrase)), (wanted.join(" "), row[1].into()), "{}", row[0]);
+            assert_eq!((said.join(" "), told(&all, &reading)), (wanted.join(" "), row[1].into()), "{}", row[0]);
         }
         for row in &own {
             assert!(read(&all, row[0]).mended.is_empty(), "{}", row[0]);
-            assert_ne!(told(&all, &read(&all, row[0]).phrase), row[1], "{}", row[0]);
+            assert_ne!(told(&all, &read(&all, row[0])), row[1], "{}", row[0]);
         }
         assert_eq!(read(&all, "lamb").near, [("lamb".into(), "lamp".into())]);
         // The words of another scene are its own; names are never mended.

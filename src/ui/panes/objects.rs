@@ -81,7 +81,7 @@ impl ObjectsPane {
                 actions.push(Action::Isolate(None));
             }
             let new = Action::Paint(Some(NOBODY));
-            if ui.button("Paint an object\u{2026}").on_hover_text(new.tooltip()).clicked() {
+            if ui.button("Select an object\u{2026}").on_hover_text(new.tooltip()).clicked() {
                 actions.push(new);
             }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
@@ -257,7 +257,7 @@ impl Tree<'_> {
                     for (other, identity) in all.iter().filter(|(other, i)| *other != id && Some(i.level) == level) {
                         // Parts of one whole first matter; others are told by their whole's name.
                         let same_whole = all.get(id).is_some_and(|i| i.parent == identity.parent);
-                        let text = if same_whole { all.name(other) } else { all.full_name(other) };
+                        let text = if same_whole { all.label(other) } else { all.full_name(other) };
                         if ui.button(text).clicked() {
                             actions.push(Action::Change(Edit::Merge(id, other)));
                             ui.close();
@@ -267,7 +267,8 @@ impl Tree<'_> {
             });
             for (action, text) in [
                 (Action::Change(Edit::Split(id)), "Split"),
-                (Action::Paint(Some(id)), "Paint a new part\u{2026}"),
+                (Action::Correct(id), "Correct by clicks\u{2026}"),
+                (Action::Paint(Some(id)), "Select a new part\u{2026}"),
                 (Action::GoToTarget(id, Side::Best), "Go there"),
                 (Action::Isolate(Some(id)), "Isolate"),
                 (Action::ExportTarget(id), "Export as .ply\u{2026}"),
@@ -313,5 +314,10 @@ fn show_how_to_begin(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     let other = ui.add_enabled(idle, button("Choose masks\u{2026}")).on_disabled_hover_text(why);
     if other.on_hover_text(Action::ChooseMasks.tooltip()).clicked() {
         actions.push(Action::ChooseMasks);
+    }
+    let by_clicks = Action::Paint(Some(NOBODY));
+    let selects = ui.add_enabled(idle, button("Select by clicks\u{2026}")).on_disabled_hover_text(why);
+    if selects.on_hover_text(by_clicks.tooltip()).clicked() {
+        actions.push(by_clicks);
     }
 }

@@ -17,6 +17,10 @@ fn scene() -> (Identities, LanguageFeatures) {
     (all, LanguageFeatures { encoder: "test".into(), dimension: 3, by_identity: of })
 }
 
+fn read(all: &Identities, text: &str, recipe: &Recipe) -> QueryReading {
+    QueryReading::new(all, text, LevelFilter::Auto, recipe).expect("a phrase")
+}
+
 fn ask(text: &str, with_meaning: bool) -> QueryAnswer {
     ask_by(text, &Recipe::default(), with_meaning)
 }
@@ -34,7 +38,7 @@ fn ask_by(text: &str, recipe: &Recipe, with_meaning: bool) -> QueryAnswer {
     };
     phrases.learn(&phrase, recipe, encode).expect("encodes");
     let language = Language { features: &features, phrases: &phrases };
-    answer(&all, &phrase, LevelFilter::Auto, recipe, with_meaning.then_some(language))
+    answer(&all, &read(&all, text, recipe), LevelFilter::Auto, recipe, with_meaning.then_some(language))
 }
 
 #[test]
@@ -70,7 +74,7 @@ fn meaning_comes_first_where_a_word_is_unknown_and_names_where_it_finds_nothing(
         let recipe = Recipe::default();
         phrases.learn(&phrase, &recipe, encode).expect("encodes");
         let language = Language { features: &features, phrases: &phrases };
-        answer(&all, &phrase, LevelFilter::Auto, &recipe, Some(language))
+        answer(&all, &read(&all, text, &recipe), LevelFilter::Auto, &recipe, Some(language))
     };
     let a = ask("beige lamp", [1.0, 0.0, 0.0]);
     assert_eq!((a.basis, a.chosen(1)), (Basis::Embedding, vec![3]), "by name it would be the lamp");
@@ -85,9 +89,8 @@ fn meaning_comes_first_where_a_word_is_unknown_and_names_where_it_finds_nothing(
 fn an_answer_is_as_sure_as_it_rests_on_names() {
     let sure = |text: &str| {
         let (all, _) = scene();
-        let phrase = ParsedQuery::parse(text).expect("a phrase");
         let answered = ask(text, true);
-        let ignored = answered.ignored_words(&all, &phrase, &["beige".to_owned()]);
+        let ignored = answered.ignored_words(&all, &read(&all, text, &Recipe::default()), &["beige".to_owned()]);
         (answered.certainty(&ignored), ignored)
     };
     assert_eq!(sure("the lamp's shade"), (Certainty::Certain, vec![]));
@@ -150,7 +153,7 @@ fn the_recipe_says_what_is_asked_and_when_nothing_fits() {
         let encode = |p: &str| Ok::<_, ()>(if p == "cup" { vec![0.5134, 0.5, 0.5] } else { vec![0.5, 0.5, 0.5] });
         phrases.learn(&phrase, &recipe, encode).expect("encodes");
         let language = Language { features: &features, phrases: &phrases };
-        answer(&all, &phrase, LevelFilter::Auto, &recipe, Some(language)).chosen(1)
+        answer(&all, &read(&all, "cup", &recipe), LevelFilter::Auto, &recipe, Some(language)).chosen(1)
     };
     assert_eq!([Rejection::Never, Rejection::Canonical].map(hardly), [vec![3], vec![3]]);
     assert!(hardly(Rejection::Strict).is_empty());
@@ -173,7 +176,7 @@ fn what_has_another_color_is_not_found_by_embedding() {
         };
         phrases.learn(&phrase, &recipe, encode).expect("encodes");
         let language = Language { features: &features, phrases: &phrases };
-        answer(&all, &phrase, LevelFilter::Auto, &recipe, Some(language)).chosen(1)
+        answer(&all, &read(&all, text, &recipe), LevelFilter::Auto, &recipe, Some(language)).chosen(1)
     };
     assert_eq!(ask("red mug", Rejection::Strict), [3]);
     assert!(ask("blue mug", Rejection::Strict).is_empty());

@@ -6,9 +6,9 @@ use glam::DVec3;
 
 use super::part_recall::Components;
 use super::*;
-use crate::pipeline::semantics::answer::{Basis, by_name};
+use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::localize::{Answer, Hit};
-use crate::pipeline::semantics::parse::ParsedQuery;
+use crate::pipeline::semantics::query_engine::ask_by_name;
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::relevancy::deviate;
 use crate::pipeline::semantics::timing::StagesMs;
@@ -50,10 +50,7 @@ fn label(name: &str, level: Level, size: [usize; 2], inside: impl Fn(usize) -> b
 
 /// Asks a scene by the names of its identities.
 fn named(map: &SemanticMap) -> impl FnMut(&str) -> Option<QueryAnswer> + '_ {
-    |text| {
-        let phrase = ParsedQuery::parse(text)?;
-        Some(by_name(&map.identities, &phrase, LevelFilter::Auto, &Recipe::default()))
-    }
+    |text| ask_by_name(&map.identities, text, LevelFilter::Auto, &Recipe::default())
 }
 
 /// An answer whose relevancies are given, best identity first.

@@ -15,6 +15,7 @@ pub(crate) mod raw_features;
 pub(crate) mod recipes;
 pub(crate) mod selection_3d;
 pub(crate) mod spin_nerf;
+pub(crate) mod strokes;
 
 use std::collections::BTreeMap;
 
@@ -22,6 +23,7 @@ use super::answer::QueryAnswer;
 use super::code_map::CodeMap;
 use super::segmenter::FoundMask;
 use super::view_map::ViewMap;
+use crate::scene::identity::whole_names::BETWEEN;
 use crate::scene::{Camera, Level, Mask, PixelBox, SemanticMap};
 
 pub(crate) struct AskedScene<'a> {
@@ -41,7 +43,7 @@ pub(crate) struct LabeledView<'a> {
 /// All regions of one name in a view.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Category {
-    /// The name, as asked for: "button of the red controller".
+    /// The name, as asked for: "button · red controller".
     pub(crate) name: String,
     /// A part, if it is a piece of something that has a name.
     pub(crate) level: Level,
@@ -70,18 +72,18 @@ pub(crate) struct Unit {
 /// What labels without any name are of.
 const FOREGROUND: &str = "foreground";
 
-/// The labels of a view by name: regions of one name together. A piece is called "X of the Y". Where none has a
-/// name (SPIn-NeRF), all are the foreground.
+/// The labels of a view by name: regions of one name together. A piece is called "X · Y". Where none has a name
+/// (SPIn-NeRF), all are the foreground.
 pub(crate) fn categories(labels: &[FoundMask]) -> Vec<Category> {
     let mut all: BTreeMap<String, Category> = BTreeMap::new();
     let (unnamed, is_named) = (FOREGROUND.to_owned(), labels.iter().any(|l| l.name.is_some()));
     for label in labels {
         let Some(name) = label.name.as_ref().or((!is_named).then_some(&unnamed)) else { continue };
-        let whole = label.parent.and_then(|p| labels[p].name.as_ref());
-        let (level, name) = match whole {
-            Some(whole) => (Level::Part, format!("{name} of the {whole}")),
-            None => (Level::Object, name.clone()),
-        };
+        let wholes = std::iter::successors(label.parent, |p| labels[*p].parent).take(labels.len());
+        let line: Vec<&str> =
+            std::iter::once(name).chain(wholes.map_while(|p| labels[p].name.as_ref())).map(String::as_str).collect();
+        let level = if line.len() > 1 { Level::Part } else { Level::Object };
+        let name = line.join(BETWEEN);
         let empty = || Mask::empty(label.mask.width_px(), label.mask.height_px());
         let category =
             all.entry(name.clone()).or_insert_with(|| Category { name, level, mask: empty(), boxes: Vec::new() });
@@ -114,7 +116,7 @@ mod tests {
         };
         let all = categories(&[label("doll", None, 0, 9), label("eye", Some(0), 2, 3), label("eye", Some(0), 5, 7)]);
         let list: Vec<_> = all.iter().map(|c| (c.name.as_str(), c.mask.area(), c.boxes.len())).collect();
-        assert_eq!(list, [("doll", 9, 1), ("eye of the doll", 3, 2)]);
+        assert_eq!(list, [("doll", 9, 1), ("eye · doll", 3, 2)]);
         let mut unnamed = [label("", None, 0, 4), label("", None, 6, 9)];
         unnamed.iter_mut().for_each(|l| l.name = None);
         let foreground = categories(&unnamed);

@@ -13,6 +13,7 @@ use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::recipe::{PartFeatures, Recipe, Rejection, Strategy, Understanding};
 use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::semantics::words::words;
+use crate::scene::identity::whole_names::BETWEEN;
 use crate::scene::{Identities, IdentityId, Level, LevelFilter, SemanticMap};
 
 /// Things that may be absent, and parts of them. Those whose words a scene knows are not asked for.
@@ -158,9 +159,10 @@ pub(crate) fn row(
     Ok(RecipeRow { title, recipe, recall: recall.map(|r| mean(&r)), rejected, mean_ms: mean(&ms) })
 }
 
-/// "handle of the mug" as "mug handle".
+/// "handle · mug" as "mug handle".
 fn compound(category: &Category) -> Option<String> {
-    let (part, whole) = category.name.rsplit_once(" of the ").filter(|_| category.level == Level::Part)?;
+    let mut line = category.name.split(BETWEEN).filter(|_| category.level == Level::Part);
+    let (part, whole) = (line.next()?, line.next()?);
     Some(format!("{whole} {part}"))
 }
 
@@ -208,10 +210,10 @@ mod tests {
         let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 8, 1).expect("valid");
         let categories = vec![
             category("red mug", Level::Object, [1, 2]),
-            category("handle of the red mug", Level::Part, [2, 2]),
+            category("handle · red mug", Level::Part, [2, 2]),
             category("white lamp", Level::Object, [3, 4]),
             // Its label is wrong: the answer misses it.
-            category("shade of the white lamp", Level::Part, [1, 1]),
+            category("shade · white lamp", Level::Part, [1, 1]),
         ];
         let blended = CodeMap::default();
         let views = [LabeledView { name: "v", camera: &camera, exact: &exact, blended: &blended, categories }];
@@ -228,8 +230,9 @@ mod tests {
         };
         let strict = row_of(names(Strategy::Joint, Rejection::Strict));
         assert_eq!((strict.recall, strict.rejected), ([1.0, 0.5, 0.5], [1.0; 3]));
-        // In one step the whole has more of the words; without colors, half of the words are enough.
-        assert_eq!(row_of(names(Strategy::OneStep, Rejection::Strict)).recall, [1.0, 0.0, 0.0]);
+        // A full name is no matter of strategy. In one step the whole has more of a compound's words; without colors,
+        // half of the words are enough.
+        assert_eq!(row_of(names(Strategy::OneStep, Rejection::Strict)).recall, [1.0, 0.5, 0.0]);
         let canonical = row_of(names(Strategy::Joint, Rejection::Canonical));
         assert_eq!((canonical.recall, canonical.rejected[1]), ([1.0, 0.5, 0.5], 0.0));
         let titles: Vec<String> = compared(&Recipe::default()).into_iter().map(|r| r.0).collect();

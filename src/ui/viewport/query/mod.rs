@@ -242,11 +242,11 @@ impl Queries {
         let phrase = &reading.phrase;
         let encoded = self.embeddings.of(phrase);
         let OverlaySettings { kind, recipe, .. } = &self.side.settings;
-        let mut answered = answer_encoded(semantics, phrase, *kind, recipe, self.embeddings.phrases(phrase));
+        let mut answered = answer_encoded(semantics, &reading, *kind, recipe, self.embeddings.phrases(phrase));
         answered.stages.encode = encoded.map_or(0.0, |t| t.encode_ms);
         let to_encoder = encoded.map(|t| t.unknown.as_slice());
         let unknown = names::unknown_to_all(&semantics.identities, &phrase.text, to_encoder);
-        let ignored = answered.ignored_words(&semantics.identities, phrase, &unknown);
+        let ignored = answered.ignored_words(&semantics.identities, &reading, &unknown);
         let pending = semantics.language.is_some() && self.embeddings.is_pending(phrase);
         Some(Asked { text: text.to_owned(), answered, pending, chosen: None, reading, unknown, ignored })
     }

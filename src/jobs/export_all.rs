@@ -1,0 +1,122 @@
+//! Everything in a scene as files: the Gaussians of every object and part, and their masks in photos.
+
+mod folder;
+mod labels;
+#[cfg(test)]
+mod tests;
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use self::folder::ExportFolder;
+use self::labels::LabelWriter;
+use super::{JobError, export};
+use crate::io::splat_ply;
+use crate::pipeline::observer::{Observer, Ticker};
+use crate::pipeline::semantics::view_map::ViewMap;
+use crate::render::{RenderSettings, Renderer};
+use crate::scene::{Camera, GaussianCloud, SemanticMap};
+
+/// How masks are written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
+pub enum MaskFormat {
+    /// Polygons, a file for each photo
+    Isat,
+    /// Run lengths, one file
+    Coco,
+    /// 16-bit pictures of numbers, with a list of what they mean
+    Ids,
+}
+
+impl MaskFormat {
+    pub(crate) const ALL: [Self; 3] = [Self::Isat, Self::Coco, Self::Ids];
+}
+
+/// What is to be written, and where.
+#[derive(Clone, Debug)]
+pub struct ExportAllRequest {
+    pub(crate) cloud: Arc<GaussianCloud>,
+    pub(crate) map: Arc<SemanticMap>,
+    pub(crate) settings: RenderSettings,
+    /// Photos by name, of which masks are written.
+    pub(crate) views: Vec<(String, Camera)>,
+    pub(crate) masks: Vec<MaskFormat>,
+    pub(crate) folder: PathBuf,
+}
+
+/// What was written.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ExportedAll {
+    pub(crate) folder: PathBuf,
+    /// Objects and parts.
+    pub(crate) written: usize,
+    /// Those without Gaussians.
+    pub(crate) left_out: usize,
+    /// Photos with masks.
+    pub(crate) photos: usize,
+}
+
+/// Writes all of it.
+///
+/// # Errors
+/// If the folder holds anything but an earlier export as it was written, something cannot be drawn or written, or the
+/// observer asks to stop: what is written by then stays and is known as an export's.
+pub(crate) fn run(request: &ExportAllRequest, observer: &mut dyn Observer) -> Result<ExportedAll, JobError> {
+    if request.map.identities.is_empty() {
+        return Err(JobError::NoObjects(request.folder.clone()));
+    }
+    different_files(&request.views)?;
+    let mut folder = ExportFolder::open(&request.folder)?;
+    let done = write(request, &mut folder, observer);
+    folder.close(done.is_ok())?;
+    done
+}
+
+fn write(
+    request: &ExportAllRequest,
+    folder: &mut ExportFolder,
+    observer: &mut dyn Observer,
+) -> Result<ExportedAll, JobError> {
+    let ExportAllRequest { cloud, map, settings, views, masks, .. } = request;
+    let all = &map.identities;
+    let mut done = ExportedAll { folder: request.folder.clone(), ..ExportedAll::default() };
+    let mut ticker = Ticker::new("Writing Gaussians", all.len());
+    for (k, (id, _)) in all.iter().enumerate() {
+        ticker.tick(k, observer)?;
+        let members = map.members(id);
+        if members.is_empty() {
+            done.left_out += 1;
+            continue;
+        }
+        let place = format!("gaussians/{}", export::identity_file(all, id));
+        folder.write(&place, |path| splat_ply::write(path, &cloud.select(&members)))?;
+        done.written += 1;
+    }
+    ticker.tick(all.len(), observer)?;
+    let views = if masks.is_empty() { &[] } else { views.as_slice() };
+    let (mut renderer, mut labels) = (Renderer::new(), LabelWriter::new(all, masks)?);
+    let mut ticker = Ticker::new("Writing masks", views.len());
+    for (k, (name, camera)) in views.iter().enumerate() {
+        ticker.tick(k, observer)?;
+        let view = ViewMap::render(&mut renderer, cloud, &map.identity_of, all, camera, settings)?;
+        labels.view(name, camera, &view, folder)?;
+        done.photos += 1;
+    }
+    ticker.tick(views.len(), observer)?;
+    labels.finish(folder)?;
+    Ok(done)
+}
+
+/// Labels belong to photos by the stems of their names, which two photos may share.
+fn different_files(views: &[(String, Camera)]) -> Result<(), JobError> {
+    let mut known = BTreeMap::new();
+    for (name, _) in views {
+        // As systems compare names of files that do not tell letter cases apart.
+        if let Some(other) = known.insert(labels::stem(name).to_lowercase(), name) {
+            let text = format!("'{other}' and '{name}' would share the files of their masks: choose photos by --views");
+            return Err(JobError::Output(text));
+        }
+    }
+    Ok(())
+}

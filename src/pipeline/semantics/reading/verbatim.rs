@@ -1,0 +1,356 @@
+//! Every name in every scene, asked as it is written, finds its identity.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg32;
+
+use super::super::answer::{Language, answer};
+use super::super::by_embedding::TextEmbeddings;
+use super::super::localize::Answer;
+use super::*;
+use crate::io::gltf_mesh;
+use crate::pipeline::synth::demo_glb;
+use crate::pipeline::synth::levels::identities;
+use crate::pipeline::synth::options::Levels;
+use crate::scene::{LanguageFeatures, Level, NOBODY, ViewFeatures};
+
+/// Names that the grammar takes apart, or takes for something else.
+const HARD: [(&str, &[&str]); 16] = [
+    (
+        "plush doll",
+        &["pink bow on the plush doll's hood", "white fur end of the plush doll's twin tails", "hood", "fur"],
+    ),
+    ("doll's house", &["door of the doll's house", "eye of the needle", "left of the door", "on"]),
+    ("set of cups", &["handle of the set of cups", "cup of", "of the", "top of the top"]),
+    ("left of the lamp", &["button a of b", "button b of a", "b", "nearest to it"]),
+    ("lamp left of the left lamp", &["lamp", "left lamp", "lamp left", "it"]),
+    ("Levi's 501", &["501", "5.01", "No. 5", "20cm ruler", "#7"]),
+    ("赤いコントローラーのボタン", &["手柄", "红色手柄的按钮", "ボタン", "的"]),
+    ("Straße nach Süden", &["ÄPFEL", "ΟΔΟΣ", "İstanbul", "el botón del mando"]),
+    ("what's left?", &["a, b and c", "(part) lid", "\"quoted\" rim", "C++", "C"]),
+    ("the", &["a", "the a", "an", "?!", "-", "★"]),
+    ("salt and pepper", &["salt", "pepper", "all of them", "everything"]),
+    ("red", &["red red", "blue of the red", "red blue", "not red"]),
+    ("ketle", &["teh", "kettel", "kettle spout", "spout kettle"]),
+    ("thing", &["part", "object", "one", "other one"]),
+    ("eye · plush doll", &["eye · face · doll", "·", "hood · plush doll"]),
+    ("bows of the plush dolls hood", &["end of tails", "hood on bow", "hood of bow on plush"]),
+];
+
+/// The same words, twice; and a thing in whose name those of others are.
+fn hard() -> Identities {
+    let mut all = Identities::default();
+    for _ in 0..2 {
+        for (object, parts) in HARD {
+            let id = all.add(Level::Object, NOBODY, vec![object.into(), format!("another {object}")]);
+            parts.iter().for_each(|part| {
+                all.add(Level::Part, id, vec![(*part).into()]);
+            });
+        }
+        all.add(Level::Object, NOBODY, vec![]);
+    }
+    all
+}
+
+/// Objects and parts of a glTF file.
+fn of_meshes(bytes: &[u8], name: &str, path: Option<&Path>) -> Identities {
+    let scene = path.map_or_else(|| gltf_mesh::read_slice(bytes, name), gltf_mesh::read).expect("a scene");
+    let mut all = Identities::default();
+    for one in identities(&scene, Levels::Nodes, name).expect("objects").list {
+        all.add(one.level, one.parent.map_or(NOBODY, u32::from), vec![one.name]);
+    }
+    all
+}
+
+/// Categories of an ISAT file, wholes first; none if it is something else.
+fn of_labels(path: &Path) -> Option<Identities> {
+    let text = std::fs::read_to_string(path).expect("a text");
+    let file: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    let mut wholes = BTreeMap::new();
+    for polygon in file["objects"].as_array()? {
+        wholes.insert(polygon["category"].as_str()?.to_owned(), polygon["parent"].as_str().map(str::to_owned));
+    }
+    let (mut all, mut placed) = (Identities::default(), BTreeMap::new());
+    while placed.len() < wholes.len() {
+        let before = placed.len();
+        for (name, whole) in &wholes {
+            let of = whole.as_ref().map_or(Some(&NOBODY), |whole| placed.get(whole)).copied();
+            if let Some(of) = of.filter(|_| !placed.contains_key(name)) {
+                let level = if of == NOBODY { Level::Object } else { Level::Part };
+                placed.insert(name.clone(), all.add(level, of, vec![name.clone()]));
+            }
+        }
+        assert!(placed.len() > before, "{}: wholes that are not there", path.display());
+    }
+    Some(all)
+}
+
+fn files_in(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        match entry.path() {
+            path if path.is_dir() => files_in(&path, found),
+            path => found.push(path),
+        }
+    }
+}
+
+/// Every scene that tests can have, and what there is none of.
+fn scenes() -> (Vec<(String, Identities)>, Vec<&'static str>) {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let data = std::env::var_os("FMLGS_DATA").map(PathBuf::from);
+    let mut scenes = vec![("hard names".into(), hard()), ("demo".into(), of_meshes(demo_glb(), "demo", None))];
+    let mut missing = Vec::new();
+    let sources = [
+        ("rendered scenes", Some(here.join("assets/eval"))),
+        ("labels drawn here", Some(here.join("tests/data/plush_labels"))),
+        ("glTF models", data.as_ref().map(|data| data.join("gltf"))),
+        ("labels of the plush", data.as_ref().map(|data| data.join("plush_labels"))),
+        ("labels of lerf_ovs", data.as_ref().map(|data| data.join("formats/lerf_ovs_label_excerpt"))),
+        ("vocabularies", data.as_ref().map(|data| data.join("clip"))),
+    ];
+    for (what, folder) in sources {
+        let (mut files, before) = (Vec::new(), scenes.len());
+        folder.iter().for_each(|folder| files_in(folder, &mut files));
+        files.sort();
+        for path in files {
+            let name = path.file_name().expect("a file").to_string_lossy().into_owned();
+            let found = match path.extension().and_then(|e| e.to_str()) {
+                Some("glb" | "gltf") => Some(of_meshes(&[], &name, Some(&path))),
+                Some("json") if !what.starts_with("glTF") => of_labels(&path),
+                Some("txt") if name.ends_with("names.txt") => {
+                    let text = std::fs::read_to_string(&path).expect("a text");
+                    let mut all = Identities::default();
+                    text.lines().filter(|l| !l.trim().is_empty()).for_each(|l| {
+                        all.add(Level::Object, NOBODY, vec![l.to_owned()]);
+                    });
+                    Some(all)
+                }
+                _ => None,
+            };
+            scenes.extend(found.map(|all| (name, all)));
+        }
+        if scenes.len() == before {
+            missing.push(what);
+        }
+    }
+    (scenes, missing)
+}
+
+/// A scene's identities as questions meet them.
+struct Asked<'a> {
+    all: &'a Identities,
+    features: LanguageFeatures,
+    recipe: Recipe,
+}
+
+impl<'a> Asked<'a> {
+    /// To the encoder of `both`, everything looks like the last identity.
+    fn new(all: &'a Identities, understanding: Understanding) -> Self {
+        let of = |last: bool| if last { vec![1.0, 0.0] } else { vec![0.0, 1.0] };
+        let each = all
+            .iter()
+            .map(|(id, _)| of(id as usize == all.len()))
+            .map(|v| ViewFeatures { raw: vec![v.clone()], deviated: vec![v] });
+        let features = LanguageFeatures { encoder: "test".into(), dimension: 2, by_identity: each.collect() };
+        Self { all, features, recipe: Recipe { understanding, ..Recipe::default() } }
+    }
+
+    fn tell(&self, reading: &QueryReading) -> (Answer, Vec<IdentityId>) {
+        let mut phrases = TextEmbeddings::default();
+        let phrase = &reading.phrase;
+        let encode = |p: &str| Ok::<_, ()>(if *p == phrase.text { vec![1.0, 0.0] } else { vec![0.5, 0.5] });
+        phrases.learn(phrase, &self.recipe, encode).expect("encodes");
+        let language = Language { features: &self.features, phrases: &phrases };
+        let language = (self.recipe.understanding == Understanding::Both).then_some(language);
+        let answered = answer(self.all, reading, LevelFilter::Auto, &self.recipe, language);
+        let chosen = answered.chosen(1);
+        (answered.answer, chosen)
+    }
+
+    fn ask(&self, text: &str) -> (Answer, Vec<IdentityId>) {
+        self.tell(&QueryReading::new(self.all, text, LevelFilter::Auto, &self.recipe).expect("a question"))
+    }
+
+    /// Whether `id` is meant by one of its names: it is found, or a whole of it that is called the same.
+    fn is_meant(&self, id: IdentityId, name: &str, chosen: &[IdentityId]) -> bool {
+        chosen.contains(&id)
+            || self
+                .all
+                .ancestors(id)
+                .skip(1)
+                .any(|w| chosen.contains(&w) && self.all.called(name, LevelFilter::Auto).contains(&w))
+    }
+}
+
+/// A question in any letter case, with and without "the".
+fn said(name: &str) -> Vec<String> {
+    let cases = [name.to_owned(), name.to_uppercase(), name.to_lowercase(), format!(" {name}\t")];
+    let with = |article: &str| cases.iter().map(|c| format!("{article}{c}")).collect::<Vec<_>>();
+    ["", "the ", "THE  "].into_iter().flat_map(with).collect()
+}
+
+/// What is read by the grammar alone, as if no name were looked at as a whole.
+fn by_grammar(all: &Identities, text: &str) -> Option<QueryReading> {
+    let (text, mended, near) = mend_all(all, text);
+    let parsed = ParsedQuery::parse(&text)?;
+    Some(QueryReading { phrase: compound(all, &parsed).unwrap_or(parsed), called: vec![], mended, near })
+}
+
+/// Asks every name of a scene; what was not found, and the names that the grammar alone does not find.
+fn ask_all(scene: &str, all: &Identities) -> (usize, Vec<String>, Vec<String>) {
+    let (mut asked, mut wrong, mut by_grammar_wrong) = (0, Vec::new(), Vec::new());
+    for understanding in [Understanding::Names, Understanding::Both] {
+        let how = Asked::new(all, understanding);
+        // Every word of every name is compared: of long lists, some.
+        let is_long = all.len() >= 200;
+        for (id, identity) in
+            all.iter().filter(|(id, _)| understanding == Understanding::Names || !is_long || id % 50 == 0)
+        {
+            let is_full = !is_long || id % 50 == 0;
+            for name in identity.names.iter().filter(|_| understanding == Understanding::Names) {
+                let (_, chosen) = match by_grammar(all, name).filter(|_| is_full) {
+                    Some(reading) => how.tell(&reading),
+                    None => (Answer::NotFound(vec![]), vec![id; usize::from(!is_full)]),
+                };
+                if !how.is_meant(id, name, &chosen) {
+                    by_grammar_wrong.push(format!("{scene}: {name}"));
+                }
+            }
+            let full = all.full_name(id);
+            for text in identity.names.iter().chain([&full]).flat_map(|name| said(name)) {
+                asked += 1;
+                let called = all.called(&text, LevelFilter::Auto);
+                let is_exact = key(&text) == key(&full);
+                let (answer, chosen) = if is_full { how.ask(&text) } else { (Answer::Found(vec![]), called.clone()) };
+                let is_right = called.contains(&id) && how.is_meant(id, &text, &chosen);
+                let exactly =
+                    is_full && matches!(answer, Answer::Found(_)) && chosen == [id] || !is_full && chosen[0] == id;
+                if !is_right || is_exact && !exactly {
+                    wrong.push(format!("{scene}, {understanding:?}: {text:?} is {id} and finds {chosen:?}"));
+                }
+            }
+        }
+    }
+    (asked, wrong, by_grammar_wrong)
+}
+
+#[test]
+fn every_name_in_every_scene_asked_verbatim_finds_its_identity() {
+    let (scenes, missing) = scenes();
+    let (mut asked, mut names, mut wrong, mut by_grammar) = (0, 0, Vec::new(), Vec::new());
+    for (scene, all) in &scenes {
+        let (n, lost, before) = ask_all(scene, all);
+        println!("{scene}: {} identities, {} not found, {} by the grammar alone", all.len(), lost.len(), before.len());
+        names += all.iter().flat_map(|(_, i)| &i.names).count();
+        asked += n;
+        wrong.extend(lost);
+        by_grammar.extend(before);
+    }
+    println!("{names} names of {} scenes, {asked} questions; left out: {missing:?}", scenes.len());
+    println!("the grammar alone does not find {}:\n{}", by_grammar.len(), by_grammar.join("\n"));
+    assert!(wrong.is_empty(), "{} of {asked}:\n{}", wrong.len(), wrong[..wrong.len().min(40)].join("\n"));
+    // The control: without whole names, many are not found.
+    assert!(by_grammar.len() > 40 && by_grammar.iter().any(|n| n.ends_with("pink bow on the plush doll's hood")));
+}
+
+#[test]
+fn names_of_any_words_are_found_in_random_trees() {
+    const WORDS: [&str; 44] = [
+        "of",
+        "on",
+        "from",
+        "the",
+        "a",
+        "an",
+        "'s",
+        "s'",
+        "de",
+        "von",
+        "的",
+        "の",
+        "left",
+        "right",
+        "left of",
+        "in front of",
+        "nearest",
+        "it",
+        "all",
+        "and",
+        "not",
+        "?",
+        "(x)",
+        "\"q\"",
+        "·",
+        " · ",
+        "#3",
+        "#",
+        "2",
+        "手柄",
+        "button",
+        "lamp",
+        "red",
+        "doll's",
+        "eye",
+        "Ünï",
+        "ß",
+        "İ",
+        "ﬁ",
+        "C++",
+        "THE",
+        "  ",
+        "Σ",
+        "ketle",
+    ];
+    let mut rng = Pcg32::seed_from_u64(18);
+    for tree in 0..60 {
+        let mut all = Identities::default();
+        for _ in 0..rng.random_range(1..24) {
+            let whole = rng.random_range(0..=all.len() as u32);
+            let level = if whole == NOBODY { Level::Object } else { Level::Part };
+            let name = |rng: &mut Pcg32| {
+                let words: Vec<&str> =
+                    (0..rng.random_range(1..5)).map(|_| WORDS[rng.random_range(0..WORDS.len())]).collect();
+                words.join(if rng.random_range(0..4) == 0 { "" } else { " " })
+            };
+            let names = (0..rng.random_range(0..3)).map(|_| name(&mut rng)).collect();
+            all.add(level, whole, names);
+        }
+        let how = Asked::new(&all, Understanding::Both);
+        for (id, identity) in all.iter() {
+            let full = all.full_name(id);
+            assert_eq!(how.ask(&full).1, [id], "tree {tree}: {full:?} of {all:?}");
+            for name in identity.names.iter().filter(|name| !key(name).is_empty()) {
+                let chosen = how.ask(name).1;
+                assert!(
+                    how.is_meant(id, name, &chosen),
+                    "tree {tree}: {name:?} is {id} and finds {chosen:?} of {all:?}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn only_a_whole_name_is_one_and_pieces_of_whole_names_are_parted_there() {
+    let all = hard();
+    let read = |text: &str| QueryReading::new(&all, text, LevelFilter::Auto, &Recipe::default()).expect("words");
+    for other in
+        ["pink bow on the plush doll", "bow on the plush doll's hood", "set of cups handle", "the set of", "lid · hood"]
+    {
+        assert!(read(other).called.is_empty(), "{other}");
+    }
+    let handles = all.called("handle of the set of cups", LevelFilter::Auto);
+    assert_eq!((handles.len(), &read("the handle of the set of cups of the set of cups").called), (2, &handles));
+    let door = read("a door of the doll's house of the doll's house").called;
+    assert_eq!(door, all.called("door of the doll's house", LevelFilter::Auto));
+    // Where the whole is a name and the piece is none, the grammar parts there; slips are mended first.
+    let lid = read("lid of the doll's huose");
+    assert_eq!((lid.phrase.target.as_str(), lid.phrase.whole.as_deref()), ("lid", Some("doll's house")));
+    assert_eq!(read("pink bow on the plush doll's hodo").called, all.called(HARD[0].1[0], LevelFilter::Auto));
+    // Names are not looked at by embedding, and a level that is asked for is kept to.
+    let part = |level, recipe: &Recipe| QueryReading::new(&all, "hood", level, recipe).expect("words").called.len();
+    let counts = [part(LevelFilter::Part, &Recipe::default()), part(LevelFilter::Object, &Recipe::default())];
+    assert_eq!((counts, part(LevelFilter::Auto, &Recipe::paper())), ([2, 0], 0));
+}
