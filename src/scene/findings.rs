@@ -125,7 +125,7 @@ pub struct Findings {
 
 /// What is told of an identity, its pieces included.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct IdentityFacts {
+pub(crate) struct IdentityEvidence {
     pub(crate) gaussians: usize,
     /// Photos in which it is seen, if that is known.
     pub(crate) photos: Option<usize>,
@@ -194,9 +194,9 @@ impl Findings {
     }
 
     /// What is told of every identity, by number; nobody first. `sizes` are their Gaussians.
-    pub(crate) fn facts(findings: Option<&Self>, identities: &Identities, sizes: &[usize]) -> Vec<IdentityFacts> {
-        let of = |gaussians: &usize| IdentityFacts { gaussians: *gaussians, ..IdentityFacts::default() };
-        let mut facts: Vec<IdentityFacts> = sizes.iter().map(of).collect();
+    pub(crate) fn facts(findings: Option<&Self>, identities: &Identities, sizes: &[usize]) -> Vec<IdentityEvidence> {
+        let of = |gaussians: &usize| IdentityEvidence { gaussians: *gaussians, ..IdentityEvidence::default() };
+        let mut facts: Vec<IdentityEvidence> = sizes.iter().map(of).collect();
         let Some(findings) = findings else { return facts };
         let mut seen = vec![Seen::default(); facts.len()];
         for (id, own) in (1..).zip(&findings.seen) {

@@ -1,6 +1,6 @@
 //! Identities together with the Gaussians that belong to them.
 
-use super::findings::IdentityFacts;
+use super::findings::IdentityEvidence;
 use super::{ExtraProperty, Findings, GaussianCloud, Identities, IdentityId, LanguageFeatures, NOBODY, Preparation};
 
 /// Channels of a Gaussian's codes: those of its object, then those of its part.
@@ -109,7 +109,7 @@ impl SemanticMap {
     }
 
     /// What is told of every identity, by number; nobody first.
-    pub(crate) fn facts(&self) -> Vec<IdentityFacts> {
+    pub(crate) fn facts(&self) -> Vec<IdentityEvidence> {
         Findings::facts(self.findings.as_ref(), &self.identities, &self.sizes())
     }
 

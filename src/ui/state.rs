@@ -25,7 +25,7 @@ use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
-use crate::scene::findings::IdentityFacts;
+use crate::scene::findings::IdentityEvidence;
 use crate::scene::{Limits, Overrides, PhotoPixels, SceneFacts, ScenePlan, SemanticMap, text};
 use crate::worker::{Event, Failure, JobId, JobKind, Outcome, Versioned, WorkerThread};
 
@@ -59,7 +59,7 @@ pub struct AppState {
     /// Objects and parts of the Gaussians on screen.
     pub semantics: Option<Versioned<SemanticMap>>,
     /// What was noticed of each of them by number, pieces included; their Gaussians; and what they are called on screen.
-    pub(crate) facts: Vec<IdentityFacts>,
+    pub(crate) facts: Vec<IdentityEvidence>,
     pub(crate) sizes: Vec<usize>,
     pub(crate) labels: ScreenNames,
     pub phrases: PhraseTable,

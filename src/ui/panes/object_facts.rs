@@ -11,7 +11,7 @@ use super::super::labels::ScreenNames;
 use super::super::state::AppState;
 use super::super::theme;
 use crate::math::format::{self, NONE, things};
-use crate::scene::findings::{Doubt, Findings, IdentityFacts};
+use crate::scene::findings::{Doubt, Findings, IdentityEvidence};
 use crate::scene::{Dataset, Identities, IdentityId, SemanticMap, text};
 use crate::ui::actions::Action;
 
@@ -35,13 +35,13 @@ pub(super) enum SortKey {
 
 /// The order of the list.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Order {
+pub(super) struct ListOrder {
     pub(super) key: SortKey,
     /// The other way round: names from the end of the alphabet, numbers from the least.
     pub(super) reversed: bool,
 }
 
-impl Order {
+impl ListOrder {
     /// What most doubts are about comes first.
     pub(super) fn by_doubts() -> Self {
         Self { key: SortKey::Doubts, reversed: false }
@@ -74,30 +74,30 @@ impl Order {
 }
 
 /// What is told of the rows.
-pub(super) struct Facts<'a> {
+pub(super) struct RowFacts<'a> {
     identities: &'a Identities,
     names: &'a ScreenNames,
     /// By number.
-    facts: &'a [IdentityFacts],
+    facts: &'a [IdentityEvidence],
     findings: Option<&'a Findings>,
     dataset: Option<&'a Dataset>,
-    order: Order,
+    order: ListOrder,
 }
 
-impl<'a> Facts<'a> {
-    pub(super) fn new(state: &'a AppState, map: &'a SemanticMap, order: Order) -> Self {
+impl<'a> RowFacts<'a> {
+    pub(super) fn new(state: &'a AppState, map: &'a SemanticMap, order: ListOrder) -> Self {
         let dataset = state.scene.as_ref().and_then(|s| s.dataset.as_deref());
         let (identities, findings) = (&map.identities, map.findings.as_ref());
         Self { identities, names: &state.labels, facts: &state.facts, findings, dataset, order }
     }
 
-    fn of(&self, id: IdentityId) -> Option<&IdentityFacts> {
+    fn of(&self, id: IdentityId) -> Option<&IdentityEvidence> {
         self.facts.get(id as usize)
     }
 
     /// Puts identities in order; those that nothing is known of stay last.
     pub(super) fn sort(&self, ids: &mut [IdentityId]) {
-        let Order { key, reversed } = self.order;
+        let ListOrder { key, reversed } = self.order;
         let turned = |order: Ordering| if reversed { order.reverse() } else { order };
         let number = |id: IdentityId| -> Option<f64> {
             let fact = self.of(id)?;
@@ -189,7 +189,7 @@ impl<'a> Facts<'a> {
     }
 }
 
-fn sure(fact: &IdentityFacts) -> String {
+fn sure(fact: &IdentityEvidence) -> String {
     fact.confidence.map_or_else(|| NONE.into(), |c| format!("{:.0} %", 100.0 * c))
 }
 
@@ -204,7 +204,7 @@ mod tests {
         for name in ["mug", "Lamp", "apple"] {
             all.add(Level::Object, NOBODY, vec![name.into()]);
         }
-        let fact = |gaussians, photos, doubts: usize| IdentityFacts {
+        let fact = |gaussians, photos, doubts: usize| IdentityEvidence {
             gaussians,
             photos,
             confidence: photos.map(|n| 0.1 * n as f64),
@@ -213,8 +213,8 @@ mod tests {
         let facts = [fact(9, None, 0), fact(5, Some(3), 0), fact(7, None, 2), fact(6, Some(8), 1)];
         let (names, findings) = (ScreenNames::default(), Findings::default());
         let sorted = |key, reversed| {
-            let order = Order { key, reversed };
-            let rows = Facts {
+            let order = ListOrder { key, reversed };
+            let rows = RowFacts {
                 identities: &all,
                 names: &names,
                 facts: &facts,

@@ -10,7 +10,7 @@ use super::super::state::AppState;
 use super::super::text_field::select_all;
 use super::super::theme;
 use super::super::viewport::visible::Visibility;
-use super::object_facts::{Facts, Order};
+use super::object_facts::{ListOrder, RowFacts};
 use super::object_thumbnails::ObjectThumbnails;
 use crate::math::format::things;
 use crate::navigate::target::Side;
@@ -32,7 +32,7 @@ pub(crate) struct ObjectsPane {
     menu_of: Option<IdentityId>,
     /// What was selected when it was drawn last.
     selected: Option<IdentityId>,
-    order: Order,
+    order: ListOrder,
 }
 
 /// A name that is being typed in its row.
@@ -69,7 +69,7 @@ impl ObjectsPane {
         if doubts > 0 {
             let link = ui.link(RichText::new(format!("{} where photos disagreed", things(doubts, "doubt"))));
             if link.on_hover_text("Put what they are about first in the list").clicked() {
-                self.order = Order::by_doubts();
+                self.order = ListOrder::by_doubts();
             }
         }
         if identities.iter().all(|(_, i)| i.names.is_empty()) {
@@ -93,7 +93,7 @@ impl ObjectsPane {
         self.selected = selected;
         let (renaming, menu_of) = (&mut self.renaming, &mut self.menu_of);
         let (labels, sizes) = (&state.labels, &state.sizes);
-        let facts = Facts::new(state, map, self.order);
+        let facts = RowFacts::new(state, map, self.order);
         let mut tree = Tree {
             identities,
             labels,
@@ -118,7 +118,7 @@ struct Tree<'a> {
     labels: &'a ScreenNames,
     /// Gaussians by number.
     sizes: &'a [usize],
-    facts: Facts<'a>,
+    facts: RowFacts<'a>,
     object_thumbnails: &'a ObjectThumbnails,
     visibility: &'a Visibility,
     renaming: &'a mut Option<Renaming>,
@@ -187,7 +187,9 @@ impl Tree<'_> {
                 ui.set_min_width(COUNT_PT);
                 ui.label(number).on_hover_text(what);
             });
+            let padding = ui.spacing().button_padding.x;
             self.facts.doubts(ui, id, actions);
+            ui.spacing_mut().button_padding.x = padding;
             // Elsewhere the name has its room.
             if is_hovered || self.selected == Some(id) || *self.menu_of == Some(id) {
                 ui.spacing_mut().button_padding.x = 4.0;
