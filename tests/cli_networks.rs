@@ -38,6 +38,12 @@ fn networks_find_follow_and_look() {
     assert_eq!(cached(), 14, "every photo that was trained on is looked at once");
     assert_eq!(geometry["identities"].as_array().unwrap().len(), both["identities"].as_array().unwrap().len());
     assert!(geometry["disagreements"].as_array().unwrap().is_empty());
+    assert!(geometry["unknown"].as_f64().is_some_and(|share| (0.0..1.0).contains(&share)), "{}", geometry["unknown"]);
+    let identity = &geometry["identities"][0];
+    assert!(
+        identity["photos"].as_u64().is_some_and(|n| n > 0) && identity["confidence"].as_f64().is_some(),
+        "{identity}"
+    );
     // Random weights follow nothing: the Gaussians do not let themselves be led astray.
     let drifts = both["disagreements"].as_array().unwrap().iter().filter(|d| d["what"].get("drift").is_some()).count();
     println!("{drifts} drifts were left out");
@@ -65,6 +71,10 @@ fn networks_find_follow_and_look() {
     );
     assert!(drifts > 0 && off(&both) < off(&sam2_alone), "{} {}", off(&both), off(&sam2_alone));
     assert!(before.iter().all(|(time, file)| stamp(file) == *time));
+
+    // What is told is kept with the scene, and told again: here where SAM 2 alone leads astray.
+    let told = run(&["info", &scene, "--json"]).ok().json();
+    assert_eq!((&told["objects"], &told["unknown"]), (&sam2_alone["identities"], &sam2_alone["unknown"]));
 
     // Every photo's features are CLIP's; a phrase is beyond the reduced network's vocabulary, which is
     // told, and does not end the program.

@@ -180,8 +180,8 @@ fn edit_for_ever(scene: PathBuf) {
     for round in 0.. {
         let to = if round % 2 == 0 { &other } else { &map };
         let request = EditRequest::Restore(Arc::clone(to));
-        let (cloud, map, settings) = (Arc::clone(&cloud), Arc::clone(&map), opened.render.clone());
-        let edit = Job::EditObjects { cloud, map, settings, request, out: scene.clone() };
+        let (cloud, map) = (Arc::clone(&cloud), Arc::clone(&map));
+        let edit = Job::EditObjects { cloud, map, request, out: scene.clone() };
         assert!(matches!(outcome(edit), Outcome::Edited(_)));
     }
 }

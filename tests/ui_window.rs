@@ -5,6 +5,8 @@
 mod crop;
 #[path = "ui_window/demo.rs"]
 mod demo;
+#[path = "ui_window/doubts.rs"]
+mod doubts;
 #[path = "ui_window/edits.rs"]
 mod edits;
 #[path = "ui_window/hands.rs"]

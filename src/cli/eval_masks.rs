@@ -7,10 +7,13 @@ use serde_json::json;
 use super::{CliError, output};
 use crate::jobs::evaluate::PhotoComparison;
 use crate::jobs::evaluate_masks::{self, Protocol, ProtocolSummary};
+use crate::math::stats::mean;
 use crate::pipeline::semantics::protocols::Unit;
 use crate::pipeline::semantics::protocols::part_recall::{HIT_IOU, Row};
 use crate::pipeline::semantics::protocols::recipes::RecipeRow;
+use crate::pipeline::semantics::protocols::strokes::{STROKES, StrokeRow};
 use crate::pipeline::semantics::recipe::Recipe;
+use crate::scene::Level;
 
 /// Rows of the table at most; the worst come first.
 const ROWS: usize = 12;
@@ -60,7 +63,7 @@ pub(crate) fn run(
 
 /// Whether the mean over all queries says something.
 fn has_units(protocol: Protocol) -> bool {
-    !matches!(protocol, Protocol::PartRecall | Protocol::Recipes)
+    !matches!(protocol, Protocol::PartRecall | Protocol::Recipes | Protocol::Strokes)
 }
 
 /// What the protocol counts, in words.
@@ -84,11 +87,37 @@ fn summary(summary: &ProtocolSummary) -> String {
             let table = output::table(&ablation(rows));
             format!("recall at IoU {}, encoder '{encoder}'\n{table}", HIT_IOU)
         }
+        ProtocolSummary::Strokes { gaussians, prepare_secs, rows } => {
+            let table = output::table(&strokes(rows));
+            format!("{gaussians} Gaussians, made ready in {prepare_secs:.1} s\n{table}")
+        }
         ProtocolSummary::Recipes { absent, rows } => {
             let table = output::table(&recipes(rows, *absent));
             format!("found with IoU {HIT_IOU}; what is absent is rightly not found\n{table}")
         }
     }
+}
+
+/// Things by how well strokes select them, the worst first, and the means.
+fn strokes(rows: &[StrokeRow]) -> Vec<Vec<String>> {
+    let mut sorted: Vec<&StrokeRow> = rows.iter().collect();
+    sorted.sort_by(|a, b| a.iou[STROKES - 1].total_cmp(&b.iou[STROKES - 1]));
+    let head = ["", "level", "drawn in", "1 stroke", "2", "3", "ms"];
+    let mut table = vec![head.map(str::to_owned).to_vec()];
+    let row = |name: &str, level: &str, view: &str, of: &[&StrokeRow]| {
+        let after = |k: usize| mean(&of.iter().map(|r| r.iou[k]).collect::<Vec<_>>());
+        let ms: Vec<f64> = of.iter().flat_map(|r| r.ms).filter(|ms| *ms > 0.0).collect();
+        let mut row = [name, level, view].map(str::to_owned).to_vec();
+        row.extend((0..STROKES).map(|k| format!("{:.3}", after(k))).chain([format!("{:.0}", mean(&ms))]));
+        row
+    };
+    let level = |r: &StrokeRow| if r.level == Level::Object { "object" } else { "part" };
+    table.extend(sorted.iter().map(|r| row(&r.name, level(r), &r.drawn_in, &[*r])));
+    for (what, is) in [("objects", Level::Object), ("parts", Level::Part)] {
+        let of: Vec<&StrokeRow> = rows.iter().filter(|r| r.level == is).collect();
+        table.push(row(&format!("mean of {} {what}", of.len()), "", "", &of));
+    }
+    table
 }
 
 /// Recipes by what they find and what they rightly do not, as a table.

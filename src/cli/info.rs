@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use serde_json::{Value, json};
 
 use super::plan::PlanArgs;
+use super::preprocess::identities;
 use super::{CliError, output};
 use crate::io::scene_files::MAP_FILE;
 use crate::io::trained::CLOUD_FILE;
@@ -172,6 +173,8 @@ fn of_trained(s: &Scene, folder: &Path) -> (Facts, Option<SemanticMap>) {
     facts.json.insert("cameras".into(), json!(s.cameras));
     facts.json.insert("history".into(), json!(s.history));
     facts.json.insert("identities".into(), json!(known));
+    facts.json.insert("objects".into(), json!(map.as_ref().map(identities)));
+    facts.json.insert("unknown".into(), json!(map.as_ref().and_then(|m| m.findings.as_ref()?.unknown())));
     (facts, map)
 }
 

@@ -29,6 +29,7 @@ mod render;
 mod report;
 mod reproduce;
 mod segment;
+mod segment_click;
 mod synth;
 mod train;
 mod view;

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::plan::PlanArgs;
 use super::progress::Console;
@@ -11,10 +11,12 @@ use super::{CliError, number, output};
 use crate::jobs::find_objects::{self, FindRequest, FindSettings, FoundObjects};
 use crate::jobs::models::SAM2;
 use crate::jobs::{JobError, open, plan};
+use crate::math::format::things;
 use crate::pipeline::semantics::build_map::{CODE_STEPS, Carry, Found};
 use crate::pipeline::semantics::recipe::RecipeName;
 use crate::pipeline::semantics::tracker::TrackOptions;
-use crate::scene::{Level, Lifting, MaskPrompt, Preparation};
+use crate::scene::findings::Doubt;
+use crate::scene::{Findings, Identity, IdentityId, Level, Lifting, MaskPrompt, Preparation, SemanticMap};
 
 /// Find the objects and parts of a trained scene
 ///
@@ -135,33 +137,59 @@ pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
     };
     let done = find_objects::run(&request, scene.state.as_deref(), &mut observer);
     let FoundObjects { found, photos, secs, .. } = done.map_err(|e| CliError::of_work(e, "nothing was stored"))?;
-    let Found { map, views, disagreements, secs: stages } = found;
-    let count = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();
+    let Found { map, views, secs: stages } = found;
+    let unknown = map.findings.as_ref().and_then(Findings::unknown);
     if args.json {
-        let sizes = map.sizes();
-        let list = map.identities.iter().map(|(id, i)| {
-            json!({ "id": id, "level": i.level, "parent": i.parent, "names": i.names, "gaussians": sizes[id as usize] })
-        });
         return output::print_json(&json!({
             "scene": args.scene,
             "seeds": map.seeds,
             "secs": secs,
             "prepared": map.prepared,
             "stages": stages.iter().map(|(stage, secs)| json!({ "stage": stage, "secs": secs })).collect::<Vec<_>>(),
-            "identities": list.collect::<Vec<_>>(),
+            "identities": identities(&map),
+            "unknown": unknown,
             "views": views.iter().map(|v| json!({
                 "photo": photos[v.photo].name, "unknown": v.unknown, "seen": v.seen,
             })).collect::<Vec<_>>(),
-            "disagreements": disagreements.iter().map(|(photo, what)| json!({
-                "photo": photos[*photo].name, "what": what,
-            })).collect::<Vec<_>>(),
+            "disagreements": disagreements(&map),
         }));
     }
+    let count = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();
+    let doubts = map.findings.as_ref().map_or(0, |f| f.doubts().len());
     output::print(&format!(
-        "{} objects and {} parts from {} photos in {secs:.1} s; ask with 'fmlgs query {} \"...\"'",
-        count(Level::Object),
-        count(Level::Part),
-        map.seeds.len(),
+        "{} and {} from {} in {secs:.1} s, {:.1} % of the photos unknown, {}; ask with 'fmlgs query {} \"...\"'",
+        things(count(Level::Object), "object"),
+        things(count(Level::Part), "part"),
+        things(map.seeds.len(), "photo"),
+        100.0 * unknown.unwrap_or(0.0),
+        things(doubts, "doubt"),
         args.scene.display()
     ))
+}
+
+/// Objects and parts with what was noticed of each as they were found, for `preprocess` and `info`.
+pub(super) fn identities(map: &SemanticMap) -> Vec<Value> {
+    let (facts, found) = (map.facts(), disagreements(map));
+    let row = |(id, i): (IdentityId, &Identity)| {
+        let fact = &facts[id as usize];
+        json!({
+            "id": id,
+            "level": i.level,
+            "parent": i.parent,
+            "names": i.names,
+            "gaussians": fact.gaussians,
+            "photos": fact.photos,
+            "confidence": fact.confidence,
+            "doubts": fact.doubts.iter().map(|k| &found[*k]).collect::<Vec<_>>(),
+        })
+    };
+    map.identities.iter().map(row).collect()
+}
+
+/// Where photos disagreed, in the order in which that was noticed.
+fn disagreements(map: &SemanticMap) -> Vec<Value> {
+    let Some(found) = &map.findings else { return Vec::new() };
+    let text = |d: &Doubt| d.what.text(|id| map.identities.full_name(id));
+    let told = |d: &Doubt| json!({ "photo": found.photo(d), "what": d.what, "text": text(d) });
+    found.doubts().iter().map(told).collect()
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::progress::Console;
 use super::recipe::RecipeArgs;
+use super::segment_click::{self, ClickArgs};
 use super::{CliError, number, output, view};
 use crate::jobs::export_all::{self, ExportAllRequest, ExportedAll, MaskFormat};
 use crate::jobs::{Scene, export, open, query, render, segment};
@@ -22,19 +23,20 @@ use crate::scene::{Camera, LevelFilter, SemanticMap};
     fmlgs segment scene/ \"the kettle\" --out kettle.ply\n  \
     fmlgs segment scene/ \"lid of the kettle\" --out lid.ply\n  \
     fmlgs segment scene/ \"the kettle\" --rest --out without_kettle.ply\n  \
-    fmlgs segment scene/ --all --out everything/ --masks isat,coco --photos 0,12")]
+    fmlgs segment scene/ --all --out everything/ --masks isat,coco --photos 0,12\n  \
+    fmlgs segment scene/ --click 320,200 --view 0003.png --keep \"kettle\"")]
 pub(crate) struct SegmentArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
     /// What to look for
-    #[arg(required_unless_present = "all")]
+    #[arg(required_unless_present_any = ["all", "click"])]
     text: Option<String>,
     /// Write every object and part, and their masks in the photos, into the folder --out
     #[arg(long, conflicts_with_all = ["text", "rest", "top", "kind", "RecipeArgs"])]
     all: bool,
     /// Write to this file, or folder for --all
-    #[arg(long)]
-    out: PathBuf,
+    #[arg(long, required_unless_present = "keep")]
+    out: Option<PathBuf>,
     /// Masks of --all, with commas between
     #[arg(long, requires = "all", value_enum, value_delimiter = ',', default_values_t = MaskFormat::ALL)]
     masks: Vec<MaskFormat>,
@@ -54,45 +56,51 @@ pub(crate) struct SegmentArgs {
     #[arg(long, value_enum, default_value_t = LevelFilter::Auto)]
     kind: LevelFilter,
     #[command(flatten)]
+    clicks: ClickArgs,
+    #[command(flatten)]
     recipe: RecipeArgs,
 }
 
 pub(crate) fn run(args: SegmentArgs, quiet: bool) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
-    match &args.text {
-        Some(text) => one(&args, text, &scene),
-        None => {
-            export::check_folder(&args.out, &scene.reads())?;
+    match (&args.text, &args.out) {
+        (Some(text), Some(out)) => one(&args, text, out, &scene),
+        (None, Some(out)) if args.all => {
+            export::check_folder(out, &scene.reads())?;
             let map = scene.semantics()?;
-            all(&args, &scene, map, quiet)
+            all(&args, out, &scene, map, quiet)
+        }
+        (_, out) => {
+            out.iter().try_for_each(|out| export::check(out, &[".ply"], &scene.reads()))?;
+            segment_click::run(&scene, &args.clicks, out.as_ref(), quiet)
         }
     }
 }
 
-fn one(args: &SegmentArgs, text: &str, scene: &Scene) -> Result<(), CliError> {
-    export::check(&args.out, &[".ply"], &scene.reads())?;
+fn one(args: &SegmentArgs, text: &str, out: &Path, scene: &Scene) -> Result<(), CliError> {
+    export::check(out, &[".ply"], &scene.reads())?;
     let map = scene.semantics()?;
     let answered = query::answered(&map, text, args.kind, &args.recipe.recipe())?;
     let kept = segment::select(&scene.cloud, &map, &answered, args.top, args.rest)?;
-    export::ply(&args.out, &kept)?;
+    export::ply(out, &kept)?;
     let names: Vec<String> = answered.chosen(args.top).iter().map(|id| map.identities.full_name(*id)).collect();
     let what = if args.rest { format!("all but {}", names.join(", ")) } else { names.join(", ") };
-    let written = format!("{what}: {} of {} Gaussians in {}", kept.len(), scene.cloud.len(), args.out.display());
+    let written = format!("{what}: {} of {} Gaussians in {}", kept.len(), scene.cloud.len(), out.display());
     output::print(&args.recipe.lines(&map).into_iter().chain([written]).collect::<Vec<_>>().join("\n"))
 }
 
-fn all(args: &SegmentArgs, scene: &Scene, map: SemanticMap, quiet: bool) -> Result<(), CliError> {
+fn all(args: &SegmentArgs, out: &Path, scene: &Scene, map: SemanticMap, quiet: bool) -> Result<(), CliError> {
     let request = ExportAllRequest {
         cloud: Arc::clone(&scene.cloud),
         map: Arc::new(map),
         settings: scene.settings.clone(),
         views: photos(args, scene)?,
         masks: args.masks.clone(),
-        folder: args.out.clone(),
+        folder: out.into(),
     };
     let done = export_all::run(&request, &mut Console::new(quiet));
     let kept = "what was written by then stays; the same command goes over it";
-    output::print(&told(&done.map_err(|e| CliError::of_work(e, kept))?, &args.out))
+    output::print(&told(&done.map_err(|e| CliError::of_work(e, kept))?, out))
 }
 
 fn told(done: &ExportedAll, folder: &Path) -> String {

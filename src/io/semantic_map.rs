@@ -2,7 +2,7 @@
 //!
 //! | entry | what |
 //! |---|---|
-//! | metadata `fmlgs` | JSON: `version`, `seeds`, `encoder`, `prepared`, `identities` (`level`, `parent`, `names`, `code`) |
+//! | metadata `fmlgs` | JSON: `version`, `seeds`, `encoder`, `prepared`, `identities` (`level`, `parent`, `names`, `code`), `findings` |
 //! | tensor `codes` | `[identities, 3]` f32 |
 //! | tensor `parents` | `[identities]` u32, 0 = none; identities count from 1 |
 //! | tensor `views` | `[identities]` u32, views with language features, if an encoder has looked |
@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 
 use super::{IoError, files};
 use crate::scene::language::MAX_VIEWS;
-use crate::scene::{GaussianCloud, Identities, LanguageFeatures, Preparation, SemanticMap, ViewFeatures};
+use crate::scene::{Findings, GaussianCloud, Identities, LanguageFeatures, Preparation, SemanticMap, ViewFeatures};
 
 /// The file's name in a trained scene's folder.
 pub use super::scene_files::MAP_FILE as FILE;
@@ -42,6 +42,8 @@ struct Header {
     #[serde(default)]
     prepared: Option<Preparation>,
     identities: Identities,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    findings: Option<Findings>,
 }
 
 /// The bytes of a map that belongs to a scene's state; `path` is for errors.
@@ -54,6 +56,7 @@ pub fn encode(map: &SemanticMap, state: Option<&str>, path: &Path) -> Result<Vec
         encoder: language.map(|l| l.encoder.clone()),
         prepared: map.prepared,
         identities: map.identities.clone(),
+        findings: map.findings.clone(),
     };
     let broken = |e: &dyn std::fmt::Display| IoError::syntax(path, "semantic map", e.to_string());
     let text = serde_json::to_string(&header).map_err(|e| broken(&e))?;
@@ -100,7 +103,7 @@ pub fn load(folder: &Path, state: Option<&str>, cloud: &GaussianCloud) -> Result
         Some(encoder) => Some(features(&path, &bytes, encoder, &header.identities)?),
     };
     let map = SemanticMap::restore(header.identities, header.seeds, cloud).ok_or_else(torn)?;
-    Ok(Some(SemanticMap { language, prepared: header.prepared, ..map }))
+    Ok(Some(SemanticMap { language, prepared: header.prepared, findings: header.findings, ..map }))
 }
 
 /// Features of all identities, those of the views that are missing as zeros.
@@ -155,6 +158,9 @@ fn header(path: &Path, bytes: &[u8]) -> Result<Header, IoError> {
         Some((id, _)) => {
             Err(broken(format!("identity {id} has a parent that follows it, or a code that is not a number")))
         }
+        None if header.findings.as_ref().is_some_and(|f| !f.is_valid(&header.identities)) => Err(broken(
+            "its findings are of other identities or photos than are there; 'fmlgs preprocess' finds them again".into(),
+        )),
         None => Ok(header),
     }
 }

@@ -212,7 +212,8 @@ pub(crate) fn make(
     let last = crate::scene::Evaluation { step: outcome.steps, ..quality };
     info.history = History { steps: Vec::new(), evaluations: vec![last] };
     info.state = None;
-    map.seeds.iter_mut().for_each(|name| *name = as_jpeg(name));
+    let found_in = map.findings.iter_mut().flat_map(|f| &mut f.photos).map(|p| &mut p.name);
+    map.seeds.iter_mut().chain(found_in).for_each(|name| *name = as_jpeg(name));
     let mut stored = (*cloud).clone();
     map.store(&mut stored);
     let mut ply = Vec::new();

@@ -13,11 +13,12 @@ use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::protocols::{
     AskedScene, Category, LabeledView, Unit, categories, fastlgs_ex, langsplat, masks, means, multi_class, part_recall,
-    recipes, selection_3d, spin_nerf,
+    recipes, selection_3d, spin_nerf, strokes,
 };
 use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
+use crate::pipeline::semantics::selection::hierarchy::Hierarchy;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
 use crate::scene::{Camera, Identities, IdentityId, LevelFilter, NOBODY, SemanticMap};
@@ -43,6 +44,8 @@ pub(crate) enum Protocol {
     PartRecall,
     /// What is found and what is rightly not found, by names, embeddings and both, by each strategy and rule
     Recipes,
+    /// Things selected by strokes in the view that shows most of them, judged in all other views
+    Strokes,
 }
 
 /// What the [`Protocol`] of the same name counts besides the IoU of each query.
@@ -82,6 +85,13 @@ pub(crate) enum ProtocolSummary {
         absent: [usize; 3],
         rows: Vec<recipes::RecipeRow>,
     },
+    Strokes {
+        /// Gaussians of the scene.
+        gaussians: usize,
+        /// Seconds that looking at its surfaces and merging them took, once for all.
+        prepare_secs: f64,
+        rows: Vec<strokes::StrokeRow>,
+    },
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -111,6 +121,10 @@ pub(crate) fn run(
     query: Option<&str>,
     recipe: &Recipe,
 ) -> Result<MaskScores, JobError> {
+    if protocol == Protocol::Strokes {
+        let (views, summary) = by_strokes(comparison, FileMasks(Labels::open(labels)?))?;
+        return Ok(MaskScores { views, trained_on: 0, units: Vec::new(), summary, unmet: Vec::new() });
+    }
     let map = io::semantic_map::load(scene, comparison.state.as_deref(), &comparison.cloud)?;
     let map = &map.ok_or_else(|| JobError::NoObjects(scene.into()))?;
     let mut known = FileMasks(Labels::open(labels)?);
@@ -163,7 +177,7 @@ fn compare(
             let hits = units.iter().filter(|u| u.hit == Some(true)).count();
             ProtocolSummary::Langsplat { localization: hits as f64 / units.len().max(1) as f64 }
         }
-        Protocol::FastlgsEx | Protocol::PartRecall | Protocol::Recipes => {
+        Protocol::FastlgsEx | Protocol::PartRecall | Protocol::Recipes | Protocol::Strokes => {
             let mut pool = fastlgs_ex::Pool::default();
             views.iter().for_each(|v| units.extend(fastlgs_ex::compare(scene, v, &mut pool)));
             ProtocolSummary::FastlgsEx {}
@@ -197,6 +211,25 @@ fn compare(
         }
     };
     Ok((units, summary))
+}
+
+/// Selects what the held-out photos with labels show by strokes; how many they are.
+fn by_strokes(comparison: &PhotoComparison, mut labels: FileMasks) -> Result<(usize, ProtocolSummary), JobError> {
+    let PhotoComparison { cloud, settings, max_side_px, .. } = comparison;
+    let photos = &comparison.dataset.photos;
+    let mut views = Vec::new();
+    let held: Vec<_> = comparison.views.iter().map(|&i| &photos[i]).filter(|photo| labels.covers(photo)).collect();
+    for photo in held {
+        let categories = categories(&labels.segment(photo, *max_side_px, &mut Silent)?);
+        let (name, camera) = (photo.name.clone(), photo.camera.limited_to(*max_side_px));
+        views.push(strokes::LabeledPhoto { name, camera, categories });
+    }
+    let cameras: Vec<Camera> = photos.iter().map(|p| p.camera.clone()).collect();
+    let start = std::time::Instant::now();
+    let hierarchy = Hierarchy::new(cloud, &cameras, settings, &mut Silent)?;
+    let prepare_secs = start.elapsed().as_secs_f64();
+    let rows = strokes::rows(&hierarchy, cloud, settings, &views)?;
+    Ok((views.len(), ProtocolSummary::Strokes { gaussians: cloud.len(), prepare_secs, rows }))
 }
 
 fn recall(

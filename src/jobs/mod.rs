@@ -31,6 +31,7 @@ pub(crate) mod report;
 pub(crate) mod reproduce;
 pub(crate) mod scale;
 pub(crate) mod segment;
+pub mod select;
 pub(crate) mod sparse_cloud;
 pub(crate) mod synth;
 pub(crate) mod thumbnails;

@@ -15,8 +15,9 @@ use crate::pipeline::semantics::reading::QueryReading;
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
+use crate::pipeline::semantics::votes::UNKNOWN;
 use crate::render::{Features, RenderSettings, Renderer};
-use crate::scene::{Camera, GaussianCloud, IdentityId, LevelFilter, Mask, SemanticMap};
+use crate::scene::{Camera, GaussianCloud, IdentityId, LevelFilter, Mask, NOBODY, SemanticMap};
 
 /// What the pixels of a view belong to, drawn once for all questions.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -25,7 +26,13 @@ pub struct ViewMaps {
     pub identities: ViewMap,
     /// Blended codes, if they were wanted.
     pub(crate) codes: Option<CodeMap>,
+    /// Where those win of which nothing is known; to everything else these pixels are nobody's.
+    pub(crate) unknown: Mask,
 }
+
+/// Stands for Gaussians of which nothing is known while a view is drawn. No identity has this number, so they count
+/// together with what is nobody's, and masks are the same with them or without.
+const UNSEEN: IdentityId = UNKNOWN - 1;
 
 impl ViewMaps {
     /// Draws them; codes where they are `wanted`, those of parts too if `parts` are.
@@ -37,12 +44,22 @@ impl ViewMaps {
         wanted: bool,
         parts: bool,
     ) -> Result<Self, crate::render::RenderError> {
-        let identities = ViewMap::render(renderer, cloud, &map.identity_of, &map.identities, camera, settings)?;
+        let seen = |(i, id): (usize, &IdentityId)| if map.is_unknown(i) { UNSEEN } else { *id };
+        let of: Vec<IdentityId> = map.identity_of.iter().enumerate().map(seen).collect();
+        let mut identities = ViewMap::render(renderer, cloud, &of, &map.identities, camera, settings)?;
+        let drawn = &identities.identity;
+        let unknown = Mask::from_fn(identities.width_px, identities.height_px, |i| drawn[i] == UNSEEN);
+        unknown.pixels().for_each(|i| identities.identity[i] = NOBODY);
         let codes = match wanted {
             true => Some(CodeMap::render(renderer, cloud, &map.codes, parts, camera, settings)?),
             false => None,
         };
-        Ok(Self { identities, codes })
+        Ok(Self { identities, codes, unknown })
+    }
+
+    /// Share of the view of which nothing is known.
+    pub(crate) fn unknown_share(&self) -> f64 {
+        self.unknown.area() as f64 / self.identities.identity.len().max(1) as f64
     }
 
     /// The pixels of an identity; a match differs by at most `tolerance` per channel.
@@ -159,4 +176,34 @@ pub(crate) fn write_heat(
     export::make_parent(path)?;
     let size = [camera.width_px, camera.height_px];
     Ok(export::png(path, pixels.as_flattened(), size, ColorType::Rgb8)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Identities;
+    use glam::DVec3;
+
+    #[test]
+    fn what_nothing_is_known_of_is_nobodys_and_told_apart() {
+        // A row of four: an object's, one that masks give to nobody, one that nothing is known of, and a guess at the object.
+        let at = |x: f32| [x, 0.0, 0.0];
+        let cloud = GaussianCloud::isotropic(vec![at(-0.9), at(-0.3), at(0.3), at(0.9)], -2.0, 6.0);
+        let camera =
+            Camera::look_at(DVec3::new(0.0, 0.0, -4.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 96, 48).expect("valid");
+        let draw = |margin: [f32; 4]| {
+            let map =
+                SemanticMap::from_identities(Identities::objects(1), vec![1, NOBODY, NOBODY, 1], margin.into(), vec![]);
+            let settings = RenderSettings::default();
+            ViewMaps::draw(&mut Renderer::new(), (&cloud, &settings), &map, &camera, false, false).expect("drawn")
+        };
+        let maps = draw([1.0, 0.5, 0.0, 0.0]);
+        let px = |x: f64| camera.project(DVec3::new(x, 0.0, 0.0)).map(|p| 24 * 96 + p.x as usize).expect("in front");
+        let at = [-0.9, -0.3, 0.3, 0.9].map(|x| (maps.identities.identity[px(x)], maps.unknown.contains(px(x))));
+        assert_eq!(at, [(1, false), (NOBODY, false), (NOBODY, true), (1, false)]);
+        assert!((0.002..0.05).contains(&maps.unknown_share()), "{}", maps.unknown_share());
+        // The control: where something is known of all, none of it is told apart, and every pixel belongs to the same.
+        let known = draw([1.0; 4]);
+        assert!(known.unknown.is_empty() && known.identities == maps.identities && known.unknown_share() == 0.0);
+    }
 }

@@ -10,7 +10,7 @@ use crate::math::resize::nearest;
 const WORDS_PER_TASK: usize = 1024;
 
 /// A set of pixels of a picture, one bit each, row-major.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Mask {
     width_px: usize,
     height_px: usize,

@@ -1,6 +1,7 @@
 //! Identities together with the Gaussians that belong to them.
 
-use super::{ExtraProperty, GaussianCloud, Identities, IdentityId, LanguageFeatures, NOBODY, Preparation};
+use super::findings::IdentityFacts;
+use super::{ExtraProperty, Findings, GaussianCloud, Identities, IdentityId, LanguageFeatures, NOBODY, Preparation};
 
 /// Channels of a Gaussian's codes: those of its object, then those of its part.
 pub(crate) const CODE_CHANNELS: usize = 6;
@@ -27,7 +28,7 @@ pub struct SemanticMap {
     pub identities: Identities,
     /// The innermost identity of each Gaussian; `NOBODY` for none.
     pub identity_of: Vec<IdentityId>,
-    /// How clearly each Gaussian belongs there, 0 (a guess) to 1.
+    /// How clearly each Gaussian belongs there, 0 (a guess) to 1. Nobody's with 0 is unknown: see [`Self::is_unknown`].
     pub margin: Vec<f32>,
     /// Codes of each Gaussian, of its object and its part: those of its identity, or trained ones.
     pub codes: Vec<[f32; CODE_CHANNELS]>,
@@ -37,6 +38,8 @@ pub struct SemanticMap {
     pub seeds: Vec<String>,
     /// How it was prepared, if that is known.
     pub prepared: Option<Preparation>,
+    /// What was noticed as it was found, if that is known.
+    pub findings: Option<Findings>,
 }
 
 impl SemanticMap {
@@ -44,7 +47,7 @@ impl SemanticMap {
     pub fn from_identities(identities: Identities, of: Vec<IdentityId>, margin: Vec<f32>, seeds: Vec<String>) -> Self {
         let by_id: Vec<_> = (0..=identities.len() as IdentityId).map(|id| identities.codes(id)).collect();
         let codes = of.iter().map(|id| by_id.get(*id as usize).copied().unwrap_or(by_id[0])).collect();
-        Self { identities, identity_of: of, margin, codes, language: None, seeds, prepared: None }
+        Self { identities, identity_of: of, margin, codes, language: None, seeds, prepared: None, findings: None }
     }
 
     /// Writes identities, margins and codes into the cloud's extra properties.
@@ -86,7 +89,7 @@ impl SemanticMap {
     }
 
     /// The map of these Gaussians alone, as [`GaussianCloud::select`] has them. Without language
-    /// features: it is for drawing.
+    /// features and findings: it is for drawing.
     pub(crate) fn select(&self, gaussians: &[usize]) -> Self {
         Self {
             identities: self.identities.clone(),
@@ -96,7 +99,18 @@ impl SemanticMap {
             language: None,
             seeds: self.seeds.clone(),
             prepared: self.prepared,
+            findings: None,
         }
+    }
+
+    /// Whether nothing is known of a Gaussian: no mask and no photo says whose it is, nor that it is nobody's.
+    pub(crate) fn is_unknown(&self, i: usize) -> bool {
+        self.identity_of.get(i) == Some(&NOBODY) && self.margin.get(i) == Some(&0.0)
+    }
+
+    /// What is told of every identity, by number; nobody first.
+    pub(crate) fn facts(&self) -> Vec<IdentityFacts> {
+        Findings::facts(self.findings.as_ref(), &self.identities, &self.sizes())
     }
 
     /// Bytes of what is stored by Gaussian and by identity.

@@ -9,8 +9,8 @@ use super::context::SceneContext;
 use super::dialogs::Question;
 use super::history::EditStep;
 use super::state::Tone;
-use super::viewport::brush::Brush;
 use super::viewport::overrides::RenderOverrides;
+use super::viewport::selecting::SelectTool;
 use crate::agent::scene::{Effect, Parts};
 use crate::jobs::edit::EditRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached};
@@ -89,8 +89,8 @@ impl App {
             Action::Quit => ctx.send_viewport_cmd(egui::ViewportCommand::Close),
             Action::Change(edit) => self.edit(EditStep::Request(EditRequest::Apply(edit))),
             Action::AddPainted => {
-                if let Some(request) = self.viewport.brush.take().as_ref().and_then(Brush::request) {
-                    self.edit(EditStep::Request(request));
+                if let Some(edit) = self.viewport.select.take().as_ref().and_then(SelectTool::edit) {
+                    self.edit(EditStep::Request(EditRequest::Apply(edit)));
                 }
             }
             Action::Undo => self.edit(EditStep::Undo),
@@ -137,6 +137,7 @@ impl App {
             | Action::Inspect
             | Action::Select(_)
             | Action::Paint(_)
+            | Action::Correct(_)
             | Action::PaintTrueMask
             | Action::Isolate(_)
             | Action::Hide(_)

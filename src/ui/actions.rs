@@ -208,13 +208,16 @@ actions! {
             Edit::Merge(from, into) => format!("Merge #{from} into #{into}"),
             Edit::Split(id) => format!("Split #{id}"),
             Edit::AddPiece { name, .. } => format!("Add {name}"),
+            Edit::Reshape { id, .. } => format!("Correct the extent of #{id}"),
         }, "Correct the segmentation; can be undone.";
     Paint(of: Option<IdentityId>): match *of {
-            None => "Stop painting".into(),
-            Some(NOBODY) => "Paint a new object".to_owned(),
-            Some(id) => format!("Paint a new part of #{id}"),
-        }, "Drag over it or click on it in the view; its Gaussians become a new object or part.";
-    AddPainted: "Add painted selection", "Make the painted Gaussians a new object or part.";
+            None => "Stop selecting".into(),
+            Some(NOBODY) => "Select a new object".to_owned(),
+            Some(id) => format!("Select a new part of #{id}"),
+        }, "Click on it or draw a line through it, in any view; name it, and it can be asked for everywhere.";
+    Correct(id: IdentityId): format!("Correct #{id} by clicks"),
+        "Add what it lacks and remove what it has too much, by clicks and lines in any view.";
+    AddPainted: "Keep the selection", "Make what is selected an object or part, or the extent of the one that is corrected.";
     Rename: "Rename", "Type a new name for the selected object or part.", "F2";
     Undo: "Undo", "Undo the last change to objects, visibility or the camera path.", "Ctrl+Z";
     Redo: "Redo", "Redo the last undone change.", "Ctrl+Y";
@@ -288,7 +291,7 @@ impl Action {
     /// Every action that needs no further input, in the order of the palette.
     pub(crate) fn all() -> Vec<Self> {
         let mut all = Self::plain();
-        // Without a brush there is nothing to add.
+        // Without a tool in use there is nothing to keep.
         all.retain(|a| *a != Self::AddPainted);
         all.extend([Self::Isolate(None), Self::Paint(Some(NOBODY)), Self::SetCrop(None)]);
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));

@@ -174,6 +174,7 @@ impl App {
             self.effect(effect);
         }
         self.next_edit();
+        self.next_stroke();
         self.send_chat();
         self.play(ctx);
         self.first_page.update(ctx, &mut self.state, &self.viewport, &self.worker);

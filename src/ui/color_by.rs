@@ -29,4 +29,9 @@ impl ColorBy {
     pub(crate) fn text(self) -> &'static str {
         self.into()
     }
+
+    /// Whether it shows whose things are, and so what of that is not known.
+    pub(crate) fn tells_unknown(self) -> bool {
+        matches!(self, Self::Objects | Self::Parts)
+    }
 }

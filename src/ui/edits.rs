@@ -6,8 +6,11 @@ use super::app::App;
 use super::context::SceneContext;
 use super::history::{EditSnapshot, EditStep, Editing, ViewState, edit_text};
 use super::state::Tone;
+use super::viewport::selecting::SelectTool;
 use crate::jobs::edit::EditRequest;
+use crate::jobs::select::{SelectRequest, empty_map};
 use crate::pipeline::semantics::edit::Edit;
+use crate::scene::Identities;
 use crate::worker::{Command, JobId};
 
 impl App {
@@ -48,16 +51,36 @@ impl App {
         self.state.changes.before().is_some_and(like)
     }
 
+    /// Hands the next click or stroke of the selection on.
+    pub(super) fn next_stroke(&mut self) {
+        let Some(stroke) = self.viewport.select.as_mut().and_then(SelectTool::next) else { return };
+        let (Some(SceneContext { scene, cloud, map, settings, cameras, .. }), Some(tool)) =
+            (self.context(), &self.viewport.select)
+        else {
+            return;
+        };
+        let map = map.map_or_else(|| Arc::new(empty_map(&cloud)), |map| Arc::clone(&map));
+        let (purpose, before, home) = (tool.purpose.clone(), tool.selected.clone(), scene.home.clone());
+        let cloud = Arc::clone(&cloud);
+        let request = SelectRequest { cloud, settings, cameras, home, map, purpose, before, stroke };
+        let job = self.submit(Command::Select(Box::new(request)));
+        if let Some(tool) = &mut self.viewport.select {
+            tool.running = job;
+        }
+    }
+
     fn request(&mut self, request: EditRequest) {
-        let Some(map) = &self.state.semantics else { return };
-        let what = Some(edit_text(&request, &map.identities));
+        let none = Identities::default();
+        let all = self.state.semantics.as_ref().map_or(&none, |map| &map.identities);
+        let what = Some(edit_text(&request, all));
         self.editing = self.submit_edit(request).map(|job| Editing { job, what, redo: false });
     }
 
     fn submit_edit(&mut self, request: EditRequest) -> Option<JobId> {
-        let SceneContext { scene, cloud, map: Some(map), settings, .. } = self.context()? else { return None };
-        let (cloud, map, out) = (Arc::clone(&cloud), Arc::clone(&map), scene.out.clone());
-        self.submit(Command::EditObjects { cloud, map, settings, request, out })
+        let SceneContext { scene, cloud, map, .. } = self.context()?;
+        let map = map.map_or_else(|| Arc::new(empty_map(&cloud)), |map| Arc::clone(&map));
+        let (cloud, out) = (Arc::clone(&cloud), scene.out.clone());
+        self.submit(Command::EditObjects { cloud, map, request, out })
     }
 
     /// Takes in that an edit is over.

@@ -143,7 +143,8 @@ pub(crate) fn edit_text(request: &EditRequest, all: &Identities) -> String {
         EditRequest::Apply(Edit::Rename(id, name)) => format!("renamed {} to {}", all.label(*id), name.trim()),
         EditRequest::Apply(Edit::Merge(from, into)) => format!("merged {} into {}", all.label(*from), all.label(*into)),
         EditRequest::Apply(Edit::Split(id)) => format!("split {}", all.label(*id)),
-        EditRequest::Apply(Edit::AddPiece { of, name, .. }) | EditRequest::Paint { of, name, .. } => added(*of, name),
+        EditRequest::Apply(Edit::AddPiece { of, name, .. }) => added(*of, name),
+        EditRequest::Apply(Edit::Reshape { id, .. }) => format!("corrected {}", all.label(*id)),
         EditRequest::Restore(_) => "restored objects and parts".to_owned(),
     }
 }

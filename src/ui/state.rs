@@ -18,12 +18,14 @@ use crate::jobs::demo::QUESTION;
 use crate::jobs::go_to::{Approached, Explored};
 use crate::jobs::inspect::InspectedPixel;
 use crate::jobs::models::ModelList;
+use crate::jobs::select::Selected;
 use crate::jobs::thumbnails::ThumbnailSet;
 use crate::math::format;
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
+use crate::scene::findings::IdentityFacts;
 use crate::scene::{Limits, Overrides, PhotoPixels, SceneFacts, ScenePlan, SemanticMap, text};
 use crate::worker::{Event, Failure, JobId, JobKind, Outcome, Versioned, WorkerThread};
 
@@ -56,7 +58,8 @@ pub struct AppState {
     pub(crate) antialias: bool,
     /// Objects and parts of the Gaussians on screen.
     pub semantics: Option<Versioned<SemanticMap>>,
-    /// Gaussians of each of them by number, pieces included; and what they are called on screen.
+    /// What was noticed of each of them by number, pieces included; their Gaussians; and what they are called on screen.
+    pub(crate) facts: Vec<IdentityFacts>,
     pub(crate) sizes: Vec<usize>,
     pub(crate) labels: ScreenNames,
     pub phrases: PhraseTable,
@@ -68,6 +71,8 @@ pub struct AppState {
     pub(crate) visited: Option<Approached>,
     /// The pixel that was looked into last, until the window takes it.
     pub(crate) inspected: Option<Arc<InspectedPixel>>,
+    /// What clicks and strokes select, until the tool takes it.
+    pub(crate) selected: Option<Arc<Selected>>,
     /// Models and the engine that runs them, once they were listed.
     pub(crate) models: Option<Arc<ModelList>>,
     /// Models that were put in place so far.
@@ -319,6 +324,7 @@ impl AppState {
                 self.visited = Some(visited);
             }
             Outcome::Inspected(pixel) => self.inspected = Some(pixel),
+            Outcome::Selected(selected) => self.selected = Some(selected),
             Outcome::Explored(explored) => self.explored = Some(explored),
             Outcome::Report { path, report, second } => {
                 let shown = Some(ShownReport { path, report });
@@ -342,7 +348,8 @@ impl AppState {
 
     /// Sets objects and parts, with what is counted of them.
     fn set_semantics(&mut self, map: Option<Arc<SemanticMap>>) {
-        self.sizes = map.as_ref().map_or_else(Vec::new, |m| m.sizes());
+        self.facts = map.as_ref().map_or_else(Vec::new, |m| m.facts());
+        self.sizes = self.facts.iter().map(|f| f.gaussians).collect();
         self.set_facts(self.plan.facts.clone().with_semantics(map.as_deref()));
         self.semantics = map.map(Versioned::new);
     }

@@ -13,7 +13,7 @@ use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
     Folders, JobError, OpenedScene, Scene, demo, edit, export, export_all, find_objects, go_to, inspect, models, open,
-    phrases, plan, poses, recent, report, scale, thumbnails, train, video,
+    phrases, plan, poses, recent, report, scale, select, thumbnails, train, video,
 };
 use crate::measure::{End, FILE, Report};
 use crate::pipeline::observer::{Observer, Severity};
@@ -105,9 +105,9 @@ impl Jobs for PipelineJobs {
                 self.knows(&request.folder, Some(done.state));
                 Outcome::Objects(Arc::new(done.found.map))
             }
-            Command::EditObjects { cloud, map, settings, request, out } => {
+            Command::EditObjects { cloud, map, request, out } => {
                 let failed = |remedy| move |e: JobError| Stop::Failed(Failure::of(&e, remedy));
-                let new = match edit::apply(&cloud, &map, &settings, &request) {
+                let new = match edit::apply(&cloud, &map, &request) {
                     Err(JobError::Edit(why)) => return Ok(Outcome::Refused(why.to_string())),
                     done => done.map_err(failed("Nothing has changed."))?,
                 };
@@ -117,6 +117,10 @@ impl Jobs for PipelineJobs {
                 }
                 Outcome::Edited(new)
             }
+            Command::Select(request) => match select::run(&request, observer) {
+                Err(JobError::Edit(why)) => Outcome::Refused(why.to_string()),
+                done => Outcome::Selected(Arc::new(done?)),
+            },
             Command::SetScale { out, meters_per_unit } => {
                 let stored = scale::store(&out, self.known(&out).as_deref(), meters_per_unit)?;
                 Outcome::Scale(meters_per_unit, stored)

@@ -21,6 +21,8 @@ pub enum JobKind {
     Objects,
     /// Changes objects and parts.
     Edit,
+    /// Takes in a click or a stroke.
+    Select,
     /// Writes a file.
     Export,
     /// Loads a photo's pixels.
@@ -75,9 +77,13 @@ impl JobKind {
             | Self::Measure
             | Self::Phrases
             | Self::ExportAll => WorkerThread::Long,
-            Self::Beside | Self::Edit | Self::Export | Self::Photo | Self::Picture | Self::Thumbnails => {
-                WorkerThread::Short
-            }
+            Self::Beside
+            | Self::Edit
+            | Self::Select
+            | Self::Export
+            | Self::Photo
+            | Self::Picture
+            | Self::Thumbnails => WorkerThread::Short,
             Self::Models | Self::Explore | Self::Approach | Self::Scale | Self::Report | Self::Inspect => {
                 WorkerThread::Short
             }

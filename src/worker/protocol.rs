@@ -15,6 +15,7 @@ use crate::jobs::inspect::{InspectRequest, InspectedPixel};
 use crate::jobs::models::ModelList;
 use crate::jobs::phrases::{PhraseRow, PhrasesRequest};
 use crate::jobs::report::ReportRequest;
+use crate::jobs::select::{SelectRequest, Selected};
 use crate::jobs::thumbnails::ThumbnailSet;
 use crate::jobs::video::VideoRequest;
 use crate::jobs::{OpenedScene, find_objects};
@@ -88,13 +89,13 @@ pub enum Command {
         cloud: Arc<GaussianCloud>,
         /// Objects and parts as they are.
         map: Arc<SemanticMap>,
-        /// How the Gaussians are drawn.
-        settings: RenderSettings,
         /// The change.
         request: EditRequest,
         /// Folder of the trained scene.
         out: PathBuf,
     },
+    /// Find what clicks and strokes select.
+    Select(Box<SelectRequest>),
     /// Write Gaussians as a `.ply`.
     Export {
         /// The Gaussians.
@@ -197,6 +198,7 @@ impl Command {
             Self::Evaluate { .. } => JobKind::Evaluate,
             Self::FindObjects(_) => JobKind::Objects,
             Self::EditObjects { .. } => JobKind::Edit,
+            Self::Select(_) => JobKind::Select,
             Self::Export { .. } => JobKind::Export,
             Self::Photo { .. } => JobKind::Photo,
             Self::Picture { .. } | Self::KeepPicture { .. } | Self::RecentPictures(_) => JobKind::Picture,
@@ -229,6 +231,7 @@ impl Command {
             Self::Evaluate { dataset, .. } => format!("Evaluating {}", dataset.name),
             Self::FindObjects(request) => format!("Finding objects in {}", request.dataset.name),
             Self::EditObjects { .. } => "Editing objects".into(),
+            Self::Select(_) => "Selecting".into(),
             Self::SetScale { .. } => "Saving the scale".into(),
             Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
             Self::Photo { photo, .. } => format!("Loading {}", photo.name),
@@ -279,6 +282,8 @@ pub enum Outcome {
     Edited(Arc<SemanticMap>),
     /// The length of a unit in meters, and whether it was stored.
     Scale(f64, bool),
+    /// What clicks and strokes select by now.
+    Selected(Arc<Selected>),
     /// Such a change makes no sense, and why.
     Refused(String),
     /// A file was written.

@@ -3,6 +3,7 @@
 use super::segmenter::FoundMask;
 use super::view_map::ViewMap;
 use super::votes::UNKNOWN;
+use crate::scene::findings::Disagreement;
 use crate::scene::{Identities, IdentityId, Level, Mask, NOBODY};
 
 /// Share of an identity's visible pixels, and of a mask's known pixels, that must be the same.
@@ -80,20 +81,6 @@ pub(crate) fn link(found: &[FoundMask], known: Option<&ViewMap>, identities: &Id
         }
     }
     links
-}
-
-/// Where masks of a photo and what was known of its view disagree about who is who.
-#[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
-#[serde(rename_all = "snake_case")]
-pub(crate) enum Disagreement {
-    /// Two masks fit the identity; one of them became an identity of its own.
-    Split(IdentityId),
-    /// One mask covers several identities that were thought to be apart.
-    Merge(Vec<IdentityId>),
-    /// A mask is known to be the first, by its name, where the second was thought to be.
-    Switch(IdentityId, IdentityId),
-    /// Masks that were followed and Gaussians that were voted for put the identity in different places.
-    Drift(IdentityId),
 }
 
 /// The disagreements between masks that were linked and what was known before.

@@ -5,7 +5,6 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use super::associate::Disagreement;
 use super::codes;
 use super::embed::embed;
 use super::error::FindError;
@@ -68,8 +67,6 @@ pub(crate) struct Found {
     pub(crate) map: SemanticMap,
     /// What masks of the first photos explain of each photo.
     pub(crate) views: Vec<ViewReport>,
-    /// Photos whose masks disagreed with what was known before, and how.
-    pub(crate) disagreements: Vec<(usize, Disagreement)>,
     /// Seconds that each stage took, in order.
     pub(crate) secs: Vec<(&'static str, f64)>,
 }
@@ -124,8 +121,9 @@ pub(crate) fn find_objects(
     let margin = tracked.assignments.iter().map(|b| b.margin).collect();
     let seeds = tracked.seeds.iter().map(|&i| photos[i].name.clone()).collect();
     let mut map = SemanticMap::from_identities(identities, of, margin, seeds);
+    map.findings = Some(tracked.findings(photos));
     map.prepared = Some(Preparation { lifting: options.lifting, part_weight: options.part_weight, prompt });
-    let Tracked { views, disagreements, masks, mut secs, .. } = tracked;
+    let Tracked { views, masks, mut secs, .. } = tracked;
     let mut timed = |stage: &'static str, start: Instant| secs.push((stage, start.elapsed().as_secs_f64()));
     let start = Instant::now();
     if options.lifting != Lifting::Votes {
@@ -139,7 +137,7 @@ pub(crate) fn find_objects(
         map.language = Some(embed(cloud, &map, photos, settings, options.part_weight, encoder, observer)?);
         timed("look at identities", start);
     }
-    Ok(Found { map, views, disagreements, secs })
+    Ok(Found { map, views, secs })
 }
 
 /// Trains the codes of the Gaussians on the masks that were found and followed, never on what the votes make of them.
@@ -293,7 +291,10 @@ mod tests {
             let names = |name: &str| if named { vec![name.to_owned()] } else { vec![] };
             let expected = [(Of::Object, 0, names("doll")), (Of::Part, 1, names("eye")), (Of::Object, 0, names("cat"))];
             assert_eq!(list, expected);
-            assert!(found.disagreements.is_empty(), "{:?}", found.disagreements);
+            let findings = map.findings.as_ref().expect("noticed");
+            assert!(findings.is_valid(&map.identities) && findings.doubts().is_empty(), "{findings:?}");
+            let photos: Vec<_> = map.facts().iter().map(|f| f.photos).collect();
+            assert_eq!(photos, [None, Some(2), Some(2), Some(1)]);
             assert!(map.margin.iter().all(|m| *m > 0.0), "{:?}", map.margin);
             let codes: Vec<_> = map.identity_of.iter().map(|id| map.identities.codes(*id)).collect();
             assert_eq!(map.codes, codes);

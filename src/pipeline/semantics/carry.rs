@@ -32,6 +32,7 @@ pub(crate) fn carry(map: &SemanticMap, from: &GaussianCloud, to: &GaussianCloud)
         *codes = near.map_or(*codes, |i| map.codes[i]);
     }
     carried.language.clone_from(&map.language);
+    carried.findings.clone_from(&map.findings);
     let reached = nearest.iter().flatten().count();
     (carried, reached as f64 / to.len().max(1) as f64)
 }

@@ -7,7 +7,7 @@ use rstar::primitives::GeomWithData;
 
 use super::codes::{self, RADIUS};
 use crate::math::stats::median;
-use crate::scene::{GaussianCloud, Identities, IdentityId, Level, NOBODY, SemanticMap, ViewFeatures};
+use crate::scene::{Findings, GaussianCloud, Identities, IdentityId, Level, NOBODY, SemanticMap, ViewFeatures};
 
 /// A correction.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -19,12 +19,20 @@ pub enum Edit {
     /// What does not hang together becomes identities of its own; what does is cut in two.
     Split(IdentityId),
     /// These Gaussians, as far as they belong to the identity, become a new piece of it. Of nobody,
-    /// a new object.
+    /// a new object, whosever they were.
     AddPiece {
         /// Whose piece.
         of: IdentityId,
         /// What it is called; may be empty.
         name: String,
+        /// Indices of Gaussians.
+        gaussians: Vec<u32>,
+    },
+    /// The identity consists of these Gaussians: what it lacks becomes its own, what it has too much becomes its
+    /// whole's.
+    Reshape {
+        /// Which.
+        id: IdentityId,
         /// Indices of Gaussians.
         gaussians: Vec<u32>,
     },
@@ -44,11 +52,9 @@ pub enum EditError {
     TooSmall { name: String, own: usize },
     #[error("'{name}' consists of its parts: only {own} of its {all} Gaussians are its own; split one of the parts")]
     OfParts { name: String, own: usize, all: usize },
-    #[error("no Gaussian shows where you painted; paint over something that is visible")]
-    NoPaint,
-    #[error("what you painted belongs to other objects already; choose 'Paint a new part' in the menu of one of them")]
-    Taken,
-    #[error("what you painted is not a piece of '{0}'; paint inside it")]
+    #[error("nothing is selected; click on something that is visible")]
+    Nothing,
+    #[error("what you selected is not a piece of '{0}'; select inside it")]
     Outside(String),
 }
 
@@ -87,23 +93,47 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
             for part in parts.iter().skip(1) {
                 add(&mut new, level, parent, String::new(), part);
             }
+            // Which photos show which of the pieces was not noticed.
+            new.findings.iter_mut().for_each(|f| f.forget_seen(*id));
         }
         Edit::AddPiece { of, name, gaussians } => {
-            let inside = if *of == NOBODY { vec![true] } else { all.descendants(known(*of)?) };
-            let is_in = |i: &usize| map.identity_of.get(*i).is_some_and(|id| inside.get(*id as usize) == Some(&true));
+            let inside = if *of == NOBODY { Vec::new() } else { all.descendants(known(*of)?) };
+            let is = |id: &IdentityId| *of == NOBODY || inside.get(*id as usize) == Some(&true);
+            let is_in = |i: &usize| map.identity_of.get(*i).is_some_and(is);
             let own: Vec<usize> = gaussians.iter().map(|i| *i as usize).filter(is_in).collect();
             if own.is_empty() {
-                return Err(match *of {
-                    _ if gaussians.is_empty() => EditError::NoPaint,
-                    NOBODY => EditError::Taken,
-                    of => EditError::Outside(all.name(of)),
-                });
+                return Err(if gaussians.is_empty() { EditError::Nothing } else { EditError::Outside(all.name(*of)) });
             }
             let level = if *of == NOBODY { Level::Object } else { Level::Part };
             add(&mut new, level, *of, name.trim().to_owned(), &own);
         }
+        Edit::Reshape { id, gaussians } => {
+            if gaussians.is_empty() {
+                return Err(EditError::Nothing);
+            }
+            reshape(&mut new, known(*id)?, gaussians);
+        }
     }
     Ok(new)
+}
+
+fn reshape(map: &mut SemanticMap, id: IdentityId, gaussians: &[u32]) {
+    let inside = map.identities.descendants(id);
+    let whole = map.identities.get(id).map_or(NOBODY, |i| i.parent);
+    let mut listed = vec![false; map.identity_of.len()];
+    for &i in gaussians {
+        if let Some(listed) = listed.get_mut(i as usize) {
+            *listed = true;
+        }
+    }
+    for (i, is_listed) in listed.into_iter().enumerate() {
+        let has = inside.get(map.identity_of[i] as usize) == Some(&true);
+        // Its parts keep theirs.
+        if has != is_listed {
+            let now = if is_listed { id } else { whole };
+            (map.identity_of[i], map.codes[i]) = (now, map.identities.codes(now));
+        }
+    }
 }
 
 fn add(map: &mut SemanticMap, level: Level, parent: IdentityId, name: String, gaussians: &[usize]) {
@@ -115,6 +145,7 @@ fn add(map: &mut SemanticMap, level: Level, parent: IdentityId, name: String, ga
     if let Some(language) = &mut map.language {
         language.by_identity.push(ViewFeatures::default());
     }
+    map.findings.iter_mut().for_each(Findings::add_identity);
     let codes = map.identities.codes(id);
     for &i in gaussians {
         (map.identity_of[i], map.codes[i]) = (id, codes);
@@ -162,6 +193,7 @@ fn merge(map: &mut SemanticMap, from: IdentityId, into: IdentityId) {
     if let Some(language) = &mut map.language {
         language.by_identity = features;
     }
+    map.findings.iter_mut().for_each(|f| f.renumber(&number, map.identities.len()));
     for (of, codes) in map.identity_of.iter_mut().zip(&mut map.codes) {
         let before = *of as usize;
         *of = number.get(before).copied().unwrap_or(NOBODY);
@@ -249,6 +281,7 @@ mod tests {
         let mut map = SemanticMap::from_identities(all, of, vec![1.0; n], vec![]);
         map.language =
             Some(LanguageFeatures { encoder: "t".into(), dimension: 1, by_identity: vec![ViewFeatures::default(); 4] });
+        map.findings = Some(Findings::new(vec![], vec![Default::default(); 4], vec![]));
         (map, cloud)
     }
 
@@ -259,6 +292,7 @@ mod tests {
         let codes: Vec<_> = map.identity_of.iter().map(|id| map.identities.codes(*id)).collect();
         assert_eq!(map.codes, codes);
         assert!(map.language.as_ref().is_some_and(|l| l.is_valid(&map.identities)));
+        assert!(map.findings.as_ref().is_some_and(|f| f.is_valid(&map.identities)), "they follow every edit");
     }
 
     #[test]
@@ -321,8 +355,30 @@ mod tests {
         check(&new);
         assert_eq!((new.identities.name(5), new.sizes()[5]), ("foot".into(), 15));
         assert_eq!(add(1, 40..50), Err(EditError::Outside("red doll".into())));
-        assert_eq!(add(NOBODY, 0..5), Err(EditError::Taken), "all of it is somebody's");
-        assert_eq!(add(1, 0..0), Err(EditError::NoPaint));
+        assert_eq!(add(1, 0..0), Err(EditError::Nothing));
+        let new = add(NOBODY, 25..35).expect("an object may take what is somebody's");
+        check(&new);
+        assert_eq!((new.sizes()[5], new.sizes()[1], new.sizes()[3]), (10, 25, 25));
+    }
+
+    #[test]
+    fn a_reshaped_identity_consists_of_what_was_selected() {
+        let (map, cloud) = scene();
+        let reshape = |id, gaussians: &[std::ops::Range<u32>]| {
+            let gaussians = gaussians.iter().cloned().flatten().collect();
+            apply(&map, &cloud, &Edit::Reshape { id, gaussians })
+        };
+        // The red doll without its first five and with ten of the blue one's; its eye stays its eye.
+        let new = reshape(1, &[5..40]).expect("reshaped");
+        check(&new);
+        assert_eq!((new.sizes()[0], new.sizes()[1], new.sizes()[2], new.sizes()[3]), (5, 35, 10, 20));
+        assert!(new.identity_of[..5].iter().all(|id| *id == NOBODY) && new.identity_of[35] == 1);
+        // What a part loses stays with its whole.
+        let new = reshape(2, &[25..30]).expect("reshaped");
+        check(&new);
+        assert_eq!((new.sizes()[1], new.sizes()[2]), (30, 5));
+        assert_eq!(reshape(9, &[0..1]), Err(EditError::Unknown(9)));
+        assert_eq!(reshape(1, &[]), Err(EditError::Nothing));
     }
 
     #[test]

@@ -21,6 +21,7 @@ pub mod edit;
 pub(crate) mod embed;
 pub(crate) mod error;
 pub(crate) mod filters;
+mod floaters;
 #[cfg(test)]
 mod heart;
 pub(crate) mod kept_masks;
@@ -39,6 +40,7 @@ pub mod regions;
 pub mod relevancy;
 pub mod sam2_tracker;
 pub mod segmenter;
+pub(crate) mod selection;
 pub(crate) mod thumbnails;
 pub(crate) mod timing;
 pub(crate) mod tracker;

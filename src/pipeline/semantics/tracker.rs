@@ -6,8 +6,9 @@ mod complete;
 
 use std::time::Instant;
 
-use super::associate::{Disagreement, Link, disagreements, link};
+use super::associate::{Link, disagreements, link};
 use super::error::FindError;
+use super::floaters::drop_floaters;
 use super::propagate::extend;
 use super::sam2_tracker::{LABEL_SIDE_PX, Sam2Tracker};
 use super::segmenter::{FoundMask, Segmenter};
@@ -16,6 +17,7 @@ use super::view_map::ViewMap;
 use super::votes::{Assignment, UNKNOWN, Votes};
 use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::render::{RenderSettings, Renderer};
+use crate::scene::findings::{Disagreement, Doubt, Findings, PhotoFinding, Seen};
 use crate::scene::{GaussianCloud, Identities, IdentityId, MaskPrompt, NOBODY, Photo};
 
 /// Least weight of votes, in px of the photos voted on, that says something about a Gaussian.
@@ -98,6 +100,28 @@ pub(crate) struct Tracked {
     pub(crate) secs: Vec<(&'static str, f64)>,
 }
 
+impl Tracked {
+    /// What was noticed of identities and photos, to be kept with them.
+    pub(crate) fn findings(&self, photos: &[Photo]) -> Findings {
+        let mut seen = vec![Seen::default(); self.identities.len()];
+        for (k, view) in self.views.iter().enumerate() {
+            for s in &view.seen {
+                seen[s.identity as usize - 1].add(k, s.pixels as u64, s.confidence);
+            }
+        }
+        let place = |photo: usize| self.views.iter().position(|v| v.photo == photo);
+        let doubt = |(photo, what): &(usize, Disagreement)| {
+            place(*photo).map(|k| Doubt { photo: k as u32, what: what.clone() })
+        };
+        let name = |v: &ViewReport| PhotoFinding { name: photos[v.photo].name.clone(), unknown: v.unknown };
+        Findings::new(
+            self.views.iter().map(name).collect(),
+            seen,
+            self.disagreements.iter().filter_map(doubt).collect(),
+        )
+    }
+}
+
 /// Finds the identities of `cloud` in `photos`. With a `follower`, the first photo's masks are followed
 /// to the others and vote there too.
 pub(crate) fn track(
@@ -155,6 +179,7 @@ pub(crate) fn track(
     let views = t.look(seeds.len() + 1, observer)?;
     let mut assignments = t.votes.decide(&t.identities, LEAST_VOTES);
     extend(cloud, &mut assignments, HIDDEN_STEPS);
+    drop_floaters(cloud, &t.identities, &mut assignments);
     let carry_secs = start.elapsed().as_secs_f64() - t.segment_secs - encode_secs - follow_secs;
     let secs = vec![
         ("segment", t.segment_secs),
@@ -227,7 +252,7 @@ impl Tracker<'_> {
         let links = link(&found, known.as_ref(), &self.identities);
         if let Some(known) = &known {
             for what in disagreements(&found, &links, known, &self.identities) {
-                let told = self.told(&what);
+                let told = what.text(|id| self.identities.full_name(id));
                 observer.note(Severity::Warning, format!("{}: {told}", self.photos[photo].name));
                 self.disagreements.push((photo, what));
             }
@@ -293,23 +318,6 @@ impl Tracker<'_> {
             labels[(y * w + x) as usize]
         };
         self.masks.push(CodeView { labels: (0..cw * ch).map(at).collect(), camera });
-    }
-
-    fn told(&self, what: &Disagreement) -> String {
-        let name = |id: &IdentityId| self.identities.full_name(*id);
-        match what {
-            Disagreement::Split(of) => {
-                format!("{} appears in two pieces; one becomes a new identity", name(of))
-            }
-            Disagreement::Merge(all) => {
-                format!(
-                    "one mask covers {}; they are kept separate",
-                    all.iter().map(name).collect::<Vec<_>>().join(" and ")
-                )
-            }
-            Disagreement::Drift(id) => format!("{} was tracked to a wrong place and is ignored there", name(id)),
-            Disagreement::Switch(is, other) => format!("{} was found where {} was expected", name(is), name(other)),
-        }
     }
 
     /// What is known of a view by now.

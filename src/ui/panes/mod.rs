@@ -5,6 +5,7 @@ pub(crate) mod dataset;
 pub(crate) mod empty;
 pub(crate) mod log;
 pub(crate) mod models;
+mod object_facts;
 pub(crate) mod object_thumbnails;
 pub(crate) mod objects;
 pub mod phrases;

@@ -10,8 +10,9 @@ use super::super::state::AppState;
 use super::super::text_field::select_all;
 use super::super::theme;
 use super::super::viewport::visible::Visibility;
+use super::object_facts::{Facts, Order};
 use super::object_thumbnails::ObjectThumbnails;
-use crate::math::format::{self, things};
+use crate::math::format::things;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::{Identities, IdentityId, Level, NOBODY};
@@ -31,6 +32,7 @@ pub(crate) struct ObjectsPane {
     menu_of: Option<IdentityId>,
     /// What was selected when it was drawn last.
     selected: Option<IdentityId>,
+    order: Order,
 }
 
 /// A name that is being typed in its row.
@@ -62,7 +64,14 @@ impl ObjectsPane {
         let identities = &map.identities;
         let count = |level: Level| identities.iter().filter(|(_, i)| i.level == level).count();
         let from = if map.seeds.len() == 1 { "1 photo".to_owned() } else { format!("{} photos", map.seeds.len()) };
+        let doubts = map.findings.as_ref().map_or(0, |f| f.doubts().len());
         ui.weak(format!("{} objects, {} parts, from the masks of {from}", count(Level::Object), count(Level::Part)));
+        if doubts > 0 {
+            let link = ui.link(RichText::new(format!("{} where photos disagreed", things(doubts, "doubt"))));
+            if link.on_hover_text("Put what they are about first in the list").clicked() {
+                self.order = Order::by_doubts();
+            }
+        }
         if identities.iter().all(|(_, i)| i.names.is_empty()) {
             ui.weak("Regions of the photos, without names yet. Click one to see it, double-click to name it.");
         }
@@ -72,11 +81,11 @@ impl ObjectsPane {
                 actions.push(Action::Isolate(None));
             }
             let new = Action::Paint(Some(NOBODY));
-            if ui.button("Paint an object\u{2026}").on_hover_text(new.tooltip()).clicked() {
+            if ui.button("Select an object\u{2026}").on_hover_text(new.tooltip()).clicked() {
                 actions.push(new);
             }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                ui.label(RichText::new("Gaussians").small().color(theme::weak()));
+                self.order.show(ui);
             });
         });
         // The list follows what is selected in the view.
@@ -84,8 +93,19 @@ impl ObjectsPane {
         self.selected = selected;
         let (renaming, menu_of) = (&mut self.renaming, &mut self.menu_of);
         let (labels, sizes) = (&state.labels, &state.sizes);
-        let mut tree =
-            Tree { identities, labels, sizes, object_thumbnails, visibility, renaming, menu_of, selected, scroll_to };
+        let facts = Facts::new(state, map, self.order);
+        let mut tree = Tree {
+            identities,
+            labels,
+            sizes,
+            facts,
+            object_thumbnails,
+            visibility,
+            renaming,
+            menu_of,
+            selected,
+            scroll_to,
+        };
         let roots = identities.iter().filter(|(_, i)| i.parent == NOBODY).map(|(id, _)| id).collect();
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             tree.branches(ui, Id::unique("objects"), roots, actions);
@@ -98,6 +118,7 @@ struct Tree<'a> {
     labels: &'a ScreenNames,
     /// Gaussians by number.
     sizes: &'a [usize],
+    facts: Facts<'a>,
     object_thumbnails: &'a ObjectThumbnails,
     visibility: &'a Visibility,
     renaming: &'a mut Option<Renaming>,
@@ -110,7 +131,9 @@ struct Tree<'a> {
 impl Tree<'_> {
     /// One branch each, the tiny ones without names folded away.
     fn branches(&mut self, ui: &mut Ui, of: Id, ids: Vec<IdentityId>, actions: &mut Vec<Action>) {
-        let (shown, tiny) = labels::listed(self.identities, self.sizes, ids);
+        let (mut shown, mut tiny) = labels::listed(self.identities, self.sizes, ids);
+        self.facts.sort(&mut shown);
+        self.facts.sort(&mut tiny);
         shown.into_iter().for_each(|id| self.branch(ui, id, actions));
         if !tiny.is_empty() {
             let header = CollapsingHeader::new(things(tiny.len(), "tiny region")).id_salt(of.with("tiny"));
@@ -139,7 +162,7 @@ impl Tree<'_> {
         body.0.accessible_name(format!("Parts of {}", self.identities.full_name(id)));
     }
 
-    /// Tick, thumbnail, color and name from the left; Gaussians and menu from the right.
+    /// Tick, thumbnail, color and name from the left; a number, doubts and menu from the right.
     fn row(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
         ui.spacing_mut().item_spacing.x = 5.0;
         let row = Rect::from_min_size(ui.cursor().min, vec2(ui.available_width(), THUMBNAIL_PX));
@@ -156,14 +179,15 @@ impl Tree<'_> {
         let (rect, _) = ui.allocate_exact_size(vec2(11.0, 11.0), egui::Sense::hover());
         ui.painter().rect_filled(rect, 3.0, Color32::from_rgb(code[0], code[1], code[2]));
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            let size = format::count(self.sizes.get(id as usize).copied().unwrap_or(0) as u64);
-            let size = RichText::new(size).small().monospace().color(theme::weak());
+            let (number, what) = self.facts.number(id);
+            let number = RichText::new(number).small().monospace().color(theme::weak());
             // One column, however many digits.
             let column = vec2(COUNT_PT, ui.available_height());
             ui.allocate_ui_with_layout(column, Layout::right_to_left(Align::Center), |ui| {
                 ui.set_min_width(COUNT_PT);
-                ui.label(size).on_hover_text("Gaussians");
+                ui.label(number).on_hover_text(what);
             });
+            self.facts.doubts(ui, id, actions);
             // Elsewhere the name has its room.
             if is_hovered || self.selected == Some(id) || *self.menu_of == Some(id) {
                 ui.spacing_mut().button_padding.x = 4.0;
@@ -183,7 +207,10 @@ impl Tree<'_> {
         if self.scroll_to == Some(id) {
             name.scroll_to_me(Some(Align::Center));
         }
-        let name = name.on_hover_text("Select it and highlight it in the view; double-click to rename it");
+        let name = name.on_hover_ui(|ui| {
+            ui.label("Select it and highlight it in the view; double-click to rename it");
+            self.facts.line(id).into_iter().for_each(|line| drop(ui.weak(line)));
+        });
         if name.clicked() {
             actions.extend([Action::Select(Some(id)), Action::Ask(self.identities.full_name(id))]);
         }
@@ -240,7 +267,8 @@ impl Tree<'_> {
             });
             for (action, text) in [
                 (Action::Change(Edit::Split(id)), "Split"),
-                (Action::Paint(Some(id)), "Paint a new part\u{2026}"),
+                (Action::Correct(id), "Correct by clicks\u{2026}"),
+                (Action::Paint(Some(id)), "Select a new part\u{2026}"),
                 (Action::GoToTarget(id, Side::Best), "Go there"),
                 (Action::Isolate(Some(id)), "Isolate"),
                 (Action::ExportTarget(id), "Export as .ply\u{2026}"),
@@ -286,5 +314,10 @@ fn show_how_to_begin(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     let other = ui.add_enabled(idle, button("Choose masks\u{2026}")).on_disabled_hover_text(why);
     if other.on_hover_text(Action::ChooseMasks.tooltip()).clicked() {
         actions.push(Action::ChooseMasks);
+    }
+    let by_clicks = Action::Paint(Some(NOBODY));
+    let selects = ui.add_enabled(idle, button("Select by clicks\u{2026}")).on_disabled_hover_text(why);
+    if selects.on_hover_text(by_clicks.tooltip()).clicked() {
+        actions.push(by_clicks);
     }
 }

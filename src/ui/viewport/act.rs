@@ -2,12 +2,14 @@
 
 use glam::DVec3;
 
-use super::brush::{Brush, Purpose};
+use super::brush::Brush;
 use super::eye::Eye;
 use super::inspector::Inspector;
 use super::photo::PhotoView;
 use super::ruler::Ruler;
+use super::selecting::SelectTool;
 use super::{AppState, OpenedScene, Viewport};
+use crate::jobs::select::SelectFor;
 use crate::navigate::Pose;
 use crate::scene::{Bounds, CropBox};
 use crate::ui::actions::Action;
@@ -26,9 +28,11 @@ impl Viewport {
                 self.eye.frame(selected.as_ref().unwrap_or(&scene.home.bounds));
             }
             Action::Paint(of) => {
-                self.brush = of.filter(|_| state.semantics.is_some()).map(|of| Brush::new(Purpose::Piece(of)));
+                self.brush = None;
+                self.select = of.map(|of| SelectTool::new(SelectFor::New(of)));
             }
-            Action::PaintTrueMask => self.brush = all.map(|_| Brush::new(Purpose::TrueMask)),
+            Action::Correct(id) => self.select = all.map(|_| SelectTool::new(SelectFor::Extent(*id))),
+            Action::PaintTrueMask => (self.brush, self.select) = (all.map(|_| Brush::new()), None),
             Action::Select(id) => return self.picking.select(*id),
             Action::Isolate(only) => return all.map_or((), |all| self.visibility.isolate(all, *only)),
             Action::Hide(id) => return all.map_or((), |all| self.visibility.toggle(all, *id)),
@@ -53,7 +57,7 @@ impl Viewport {
     /// Which action ends the tool that is in use.
     pub(crate) fn tool(&self) -> Option<Action> {
         let tools = [
-            (self.brush.is_some(), Action::Paint(None)),
+            (self.brush.is_some() || self.select.is_some(), Action::Paint(None)),
             (self.ruler.is_some(), Action::Measure),
             (self.cropping, Action::Crop),
             (self.inspector.is_some(), Action::Inspect),

@@ -1,16 +1,13 @@
-//! Marking a new piece by hand: dragging paints, a click takes what has the same color around it.
+//! Painting the true mask of a view by hand: dragging paints, a click takes what has the same color around it.
 
 use std::sync::Arc;
 
-use egui::{Align2, Area, Color32, ColorImage, Id, Order, Rect, Slider, TextEdit, TextureHandle, TextureOptions, Ui};
+use egui::{Align2, Area, Color32, ColorImage, Id, Order, Rect, Slider, TextureHandle, TextureOptions, Ui};
 
-use super::super::state::AppState;
 use super::super::theme;
 use super::Viewport;
-use crate::jobs::edit::EditRequest;
 use crate::math::grid::neighbors;
-use crate::pipeline::semantics::view_map::ViewMap;
-use crate::scene::{Camera, Identities, IdentityId, Mask, NOBODY};
+use crate::scene::{Camera, Mask};
 use crate::ui::actions::Action;
 
 /// Largest difference of color, per channel, over which a click spreads.
@@ -19,19 +16,8 @@ const SAME_COLOR: u8 = 14;
 /// Color of the paint: nothing in a scene is likely to have it.
 const PAINT: [u8; 3] = [255, 60, 200];
 
-/// What the paint is for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Purpose {
-    /// A new piece of an identity; of no one, an object.
-    Piece(IdentityId),
-    /// What answers are compared with in this view.
-    TrueMask,
-}
-
 /// What is being marked.
 pub(crate) struct Brush {
-    pub(crate) purpose: Purpose,
-    name: String,
     radius_px: f32,
     /// The view that is painted on.
     camera: Option<Camera>,
@@ -42,9 +28,9 @@ pub(crate) struct Brush {
 
 impl Brush {
     /// An empty brush.
-    pub(crate) fn new(purpose: Purpose) -> Self {
+    pub(crate) fn new() -> Self {
         let mask = Mask::empty(0, 0);
-        Self { purpose, name: String::new(), radius_px: 12.0, camera: None, mask, changed: false, texture: None }
+        Self { radius_px: 12.0, camera: None, mask, changed: false, texture: None }
     }
 
     /// Starts over if the view has changed, with what is known of it already: paint lies on one view.
@@ -83,36 +69,19 @@ impl Brush {
         self.changed = true;
     }
 
-    /// Marks what hangs together with a pixel in color and belongs to the same whole, or erases it.
-    pub(crate) fn flood(
-        &mut self,
-        at: [usize; 2],
-        rgb: &[[u8; 3]],
-        (map, identities): (&ViewMap, &Identities),
-        erase: bool,
-    ) {
+    /// Marks what hangs together with a pixel in color, or erases it.
+    pub(crate) fn flood(&mut self, at: [usize; 2], rgb: &[[u8; 3]], erase: bool) {
         let (w, h) = (self.mask.width_px(), self.mask.height_px());
-        if rgb.len() != w * h || map.identity.len() != w * h || at[0] >= w || at[1] >= h {
+        if rgb.len() != w * h || at[0] >= w || at[1] >= h {
             return;
         }
-        let inside = match self.purpose {
-            Purpose::Piece(of) if of != NOBODY => Some(identities.descendants(of)),
-            _ => None,
-        };
-        let mine = |i: usize| match &inside {
-            Some(inside) => inside.get(map.identity[i] as usize) == Some(&true),
-            None => self.purpose == Purpose::TrueMask || map.identity[i] == NOBODY,
-        };
         let first = at[1] * w + at[0];
         let alike = |a: usize, b: usize| rgb[a].iter().zip(rgb[b]).all(|(a, b)| a.abs_diff(b) <= SAME_COLOR);
         let mut seen = Mask::empty(w, h);
         let mut open = vec![first];
         while let Some(i) = open.pop() {
             // Alike the neighbor it was reached from, and not too far from where it began.
-            if seen.contains(i)
-                || !mine(i)
-                || rgb[i].iter().zip(rgb[first]).any(|(a, b)| a.abs_diff(b) > 3 * SAME_COLOR)
-            {
+            if seen.contains(i) || rgb[i].iter().zip(rgb[first]).any(|(a, b)| a.abs_diff(b) > 3 * SAME_COLOR) {
                 continue;
             }
             seen.insert(i);
@@ -121,7 +90,7 @@ impl Brush {
         self.take(&seen, erase);
     }
 
-    /// The paint, over the frame in `rect`. A true mask not `plainly`: hits and misses are drawn instead.
+    /// The paint, over the frame in `rect`; not `plainly`, hits and misses are drawn instead.
     pub(crate) fn paint(&mut self, ui: &Ui, rect: Rect, plainly: bool) {
         if std::mem::take(&mut self.changed) {
             let size = [self.mask.width_px(), self.mask.height_px()];
@@ -138,9 +107,7 @@ impl Brush {
                 None => self.texture = Some(ui.ctx().load_texture("paint", image, TextureOptions::LINEAR)),
             }
         }
-        if let Some(texture) =
-            self.texture.as_ref().filter(|_| !self.mask.is_empty() && (plainly || self.purpose != Purpose::TrueMask))
-        {
+        if let Some(texture) = self.texture.as_ref().filter(|_| !self.mask.is_empty() && plainly) {
             let uv = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
             ui.painter().image(texture.id(), rect, uv, Color32::WHITE);
         }
@@ -149,43 +116,16 @@ impl Brush {
         }
     }
 
-    pub(crate) fn show(&mut self, ui: &Ui, rect: Rect, identities: &Identities, actions: &mut Vec<Action>) {
+    pub(crate) fn show(&mut self, ui: &Ui, rect: Rect, actions: &mut Vec<Action>) {
         let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(44.0));
         let area = Area::new(Id::unique("brush")).order(Order::Foreground).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
         theme::card(ui.ctx(), area.constrain_to(rect), |ui| {
             ui.set_width((rect.width() - 40.0).clamp(200.0, 430.0));
-            let what = match self.purpose {
-                Purpose::Piece(NOBODY) => "a new object".to_owned(),
-                Purpose::Piece(of) => format!("a new part of \u{201c}{}\u{201d}", identities.full_name(of)),
-                Purpose::TrueMask => "the true mask of this view".to_owned(),
-            };
-            ui.label(format!("Paint {what}: drag to paint, click to select what has the same color."));
+            ui.label("Paint the true mask of this view: drag to paint, click to select what has the same color.");
             ui.weak("Shift erases. Right-drag and wheel move the view; the paint belongs to this one.");
             ui.horizontal(|ui| {
-                if self.purpose == Purpose::TrueMask {
-                    ui.add(Slider::new(&mut self.radius_px, 2.0..=60.0).show_value(false).text("brush"));
-                    self.true_mask_buttons(ui, actions);
-                }
-            });
-            if self.purpose == Purpose::TrueMask {
-                return;
-            }
-            ui.horizontal(|ui| {
-                let name = TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80);
-                ui.add(name.desired_width(120.0)).accessible_name("Name of what is painted");
                 ui.add(Slider::new(&mut self.radius_px, 2.0..=60.0).show_value(false).text("brush"));
-            });
-            ui.horizontal(|ui| {
-                let ready = !self.mask.is_empty();
-                if ui.add_enabled(ready, theme::primary_button("Add")).clicked() {
-                    actions.push(Action::AddPainted);
-                }
-                if ui.button("Clear").clicked() {
-                    self.camera = None;
-                }
-                if ui.button("Cancel").clicked() {
-                    actions.push(Action::Paint(None));
-                }
+                self.true_mask_buttons(ui, actions);
             });
         });
     }
@@ -203,94 +143,73 @@ impl Brush {
             actions.push(Action::Paint(None));
         }
     }
-
-    /// The edit that adds what is marked; `None` if nothing is.
-    pub(crate) fn request(&self) -> Option<EditRequest> {
-        let Purpose::Piece(of) = self.purpose else { return None };
-        let camera = self.camera.clone().filter(|_| !self.mask.is_empty())?;
-        let (name, mask) = (self.name.trim().to_owned(), self.mask.clone());
-        Some(EditRequest::Paint { of, name, camera: Box::new(camera), mask })
-    }
 }
 
 impl Viewport {
     /// Paints where the pointer drags, floods where it clicks; erases with Shift.
-    pub(super) fn use_brush(&mut self, response: &egui::Response, rect: Rect, state: &AppState) {
+    pub(super) fn use_brush(&mut self, response: &egui::Response, rect: Rect) {
         let (Some(brush), Some(picture)) = (&mut self.brush, self.display.picture()) else { return };
         let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
         // Only a full frame has the pixels that the maps have, and one that is late is not what the eye sees.
         if !picture.full || picture.ticket != self.requests.ticket() {
             return;
         }
-        let is_true = brush.purpose == Purpose::TrueMask;
-        brush.on_view(&picture.camera, self.queries.truth().filter(|_| is_true).as_deref());
+        brush.on_view(&picture.camera, self.queries.truth().as_deref());
         let Some(pos) = response.interact_pointer_pos() else { return };
         let scale = picture.camera.width_px as f32 / shown.width();
         let at = [(pos.x - shown.left()) * scale, (pos.y - shown.top()) * scale];
         let erase = response.ctx.input(|i| i.modifiers.shift);
         if response.dragged_by(egui::PointerButton::Primary) {
             brush.dab(at, scale, erase);
-        } else if response.clicked()
-            && let (Some(maps), Some(semantics)) = (self.queries.maps(), &state.semantics)
-            && at.iter().all(|v| *v >= 0.0)
-        {
-            let known = (&maps.identities, &semantics.identities);
-            brush.flood([at[0] as usize, at[1] as usize], &picture.rgb, known, erase);
+        } else if response.clicked() && at.iter().all(|v| *v >= 0.0) {
+            brush.flood([at[0] as usize, at[1] as usize], &picture.rgb, erase);
         } else {
             return;
         }
-        if is_true {
-            let mask = Arc::new(brush.mask.clone());
-            let pose = self.pose();
-            self.queries.compare_with(Some((mask, pose)));
-        }
+        let mask = Arc::new(brush.mask.clone());
+        let pose = self.pose();
+        self.queries.compare_with(Some((mask, pose)));
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Level;
     use glam::DVec3;
 
     #[test]
-    fn a_click_takes_the_color_and_only_of_the_whole() {
+    fn a_click_takes_the_color_that_hangs_together() {
         let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 10, 10).expect("valid");
-        let mut all = Identities::default();
-        let doll = all.add(Level::Object, NOBODY, vec![]);
-        let identity = (0..100).map(|i| if i % 10 < 8 { doll } else { NOBODY }).collect();
-        let map = ViewMap::certain(10, identity);
-        let rgb: Vec<[u8; 3]> = (0..100).map(|i| if i % 10 >= 4 { [200, 0, 0] } else { [0, 0, 200] }).collect();
-        let mut brush = Brush::new(Purpose::Piece(doll));
+        // Red columns 4 to 7, and another one apart.
+        let red = |x: usize| (4..8).contains(&x) || x == 9;
+        let rgb: Vec<[u8; 3]> = (0..100).map(|i| if red(i % 10) { [200, 0, 0] } else { [0, 0, 200] }).collect();
+        let mut brush = Brush::new();
         brush.on_view(&camera, None);
-        assert!(brush.request().is_none());
-        brush.flood([5, 5], &rgb, (&map, &all), false);
+        brush.flood([5, 5], &rgb, false);
         assert_eq!(brush.mask.area(), 40, "columns 4 to 7");
         brush.dab([1.0, 1.0], 0.1, false);
         assert!(brush.mask.contains(11) && brush.mask.area() < 50);
-        assert!(matches!(brush.request(), Some(EditRequest::Paint { of, .. }) if of == doll));
         // Another view: the paint is gone.
         brush.on_view(&camera.resized(12, 12), None);
         assert!(brush.mask.is_empty());
     }
 
     #[test]
-    fn a_true_mask_is_erased_taken_up_again_and_no_piece() {
+    fn a_true_mask_is_erased_and_taken_up_again() {
         let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 10, 10).expect("valid");
-        let map = ViewMap::certain(10, vec![NOBODY; 100]);
         let rgb: Vec<[u8; 3]> = (0..100).map(|i| if i % 10 >= 4 { [200, 0, 0] } else { [0, 0, 200] }).collect();
-        let mut brush = Brush::new(Purpose::TrueMask);
+        let mut brush = Brush::new();
         brush.on_view(&camera, None);
-        brush.flood([5, 5], &rgb, (&map, &Identities::default()), false);
+        brush.flood([5, 5], &rgb, false);
         let before = brush.mask.area();
         brush.dab([7.0, 7.0], 0.1, true);
-        assert!(before == 60 && brush.mask.area() < before && brush.request().is_none());
+        assert!(before == 60 && brush.mask.area() < before);
         let known = brush.mask.clone();
         brush.on_view(&camera.resized(12, 12), None);
         assert!(brush.mask.is_empty());
         brush.on_view(&camera, Some(&known));
         assert_eq!(brush.mask, known, "back again");
-        brush.flood([5, 5], &rgb, (&map, &Identities::default()), true);
+        brush.flood([5, 5], &rgb, true);
         assert!(brush.mask.area() < known.area());
     }
 }

@@ -36,8 +36,8 @@ impl Viewport {
         }
         let delta = DVec2::new(f64::from(delta.x), f64::from(delta.y));
         if response.dragged_by(PointerButton::Primary) {
-            // The brush has this gesture while there is one.
-            if self.brush.is_some() {
+            // Whoever paints or selects has this gesture.
+            if self.brush.is_some() || self.select.is_some() {
                 return false;
             }
             self.eye.orbit(-delta.x * ORBIT_RAD, -delta.y * ORBIT_RAD);

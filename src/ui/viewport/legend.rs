@@ -1,9 +1,11 @@
 //! What the colors over the view mean, with the threshold and the opacity beside it.
 
-use egui::{Color32, FontId, Mesh, Rect, RichText, Sense, Slider, Ui, vec2};
+use egui::{Color32, FontId, Mesh, Rect, RichText, Sense, Slider, Stroke, Ui, vec2};
 
-use super::query::OverlaySettings;
+use super::query::{HATCH, OverlaySettings};
 use crate::math::colormap::Colormap;
+use crate::scene::NOBODY;
+use crate::ui::actions::Action;
 use crate::ui::color_by::ColorBy;
 use crate::ui::theme;
 
@@ -15,8 +17,15 @@ pub(super) fn is_needed(settings: &OverlaySettings, depth: Option<(f32, f32)>) -
     settings.color_by != ColorBy::Masks || depth.is_some()
 }
 
-/// The legend of the tint, or of the depths that the frame shows.
-pub(super) fn show(ui: &mut Ui, settings: &mut OverlaySettings, depth: Option<(f32, f32)>) {
+/// The legend of the tint, or of the depths that the frame shows. `unknown` is the share of the view of which nothing
+/// is known, once the eye rests.
+pub(super) fn show(
+    ui: &mut Ui,
+    settings: &mut OverlaySettings,
+    depth: Option<(f32, f32)>,
+    unknown: Option<f64>,
+    actions: &mut Vec<Action>,
+) {
     ui.vertical(|ui| {
         if let Some((near, far)) = depth {
             ui.label(RichText::new("Depth, units").small());
@@ -32,6 +41,9 @@ pub(super) fn show(ui: &mut Ui, settings: &mut OverlaySettings, depth: Option<(f
             ColorBy::Difference => "Where blended codes differ",
         };
         ui.label(RichText::new(meaning).small());
+        if settings.color_by.tells_unknown() {
+            show_unknown(ui, unknown, actions);
+        }
         if settings.color_by == ColorBy::Heat {
             bar(ui, settings.colormap, ["0", "1"].map(String::from));
             ui.add(Slider::new(&mut settings.threshold, 0.0..=1.0).fixed_decimals(2).text("threshold"))
@@ -39,6 +51,39 @@ pub(super) fn show(ui: &mut Ui, settings: &mut OverlaySettings, depth: Option<(f
         }
         ui.add(Slider::new(&mut settings.opacity, 0.0..=1.0).fixed_decimals(2).text("opacity"));
     });
+}
+
+/// How much is unknown, and what can be done about it.
+fn show_unknown(ui: &mut Ui, share: Option<f64>, actions: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        let (rect, _) = ui.allocate_exact_size(vec2(18.0, 11.0), Sense::hover());
+        hatch(ui, rect);
+        let text = match share {
+            None => "Unknown".to_owned(),
+            Some(share) if share > 0.0 && share < 0.005 => "Under 1 % of this view is unknown".to_owned(),
+            Some(share) => format!("{:.0} % of this view is unknown", 100.0 * share),
+        };
+        let why = "No mask and no photo says whose it is. Without a color: masks say that it is nobody's.";
+        ui.label(RichText::new(text).small()).on_hover_text(why);
+        let mark = Action::Paint(Some(NOBODY));
+        if share.is_some_and(|s| s > 0.0) && ui.small_button("Mark it\u{2026}").on_hover_text(mark.tooltip()).clicked()
+        {
+            actions.push(mark);
+        }
+    });
+}
+
+/// Stripes as they are drawn over the view.
+fn hatch(ui: &Ui, rect: Rect) {
+    let [light, dark] = HATCH.map(|[r, g, b]| Color32::from_rgb(r, g, b));
+    let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
+    painter.rect_filled(rect, 0.0, dark);
+    let mut x = rect.left() - rect.height();
+    while x < rect.right() {
+        let ends = [egui::pos2(x, rect.bottom()), egui::pos2(x + rect.height(), rect.top())];
+        painter.line_segment(ends, Stroke::new(2.5, light));
+        x += 7.0;
+    }
 }
 
 /// A color map between what its ends stand for.

@@ -20,6 +20,7 @@ pub(crate) mod query;
 mod request;
 mod route;
 mod ruler;
+pub(crate) mod selecting;
 mod split;
 pub(crate) mod visible;
 
@@ -39,6 +40,7 @@ use self::picking::Picking;
 use self::query::Queries;
 use self::request::Requests;
 use self::ruler::Ruler;
+use self::selecting::SelectTool;
 use self::split::Views;
 use self::visible::Visibility;
 use super::camera::CameraPane;
@@ -46,7 +48,7 @@ use super::layout::Layout;
 use super::state::{AppState, Tone};
 use crate::jobs::OpenedScene;
 use crate::navigate::Pose;
-use crate::scene::{Camera, GaussianCloud, PhotoPixels};
+use crate::scene::{Camera, GaussianCloud, Identities, PhotoPixels};
 use crate::ui::actions::Action;
 use crate::worker::view::{ViewLane, ViewPicture};
 use crate::worker::{CloudSnapshot, Repaint, Versioned, Worker};
@@ -81,8 +83,10 @@ pub struct Viewport {
     cropping: bool,
     /// What is being inspected.
     inspector: Option<Inspector>,
-    /// What is being marked by hand.
+    /// The true mask that is being painted.
     pub(crate) brush: Option<Brush>,
+    /// What is being selected by clicks and strokes.
+    pub(crate) select: Option<SelectTool>,
     /// Render settings in place of the scene's own.
     pub overrides: RenderOverrides,
     /// World point that the wheel zooms to, while the cursor stays.
@@ -112,6 +116,7 @@ impl Viewport {
             cropping: false,
             inspector: None,
             brush: None,
+            select: None,
             overrides: RenderOverrides::default(),
             zoom_anchor: None,
         })
@@ -154,7 +159,7 @@ impl Viewport {
             self.visibility = Visibility::default();
             self.picking = Picking::default();
             (self.ruler, self.cropping, self.inspector) = (None, false, None);
-            self.brush = None;
+            (self.brush, self.select) = (None, None);
             self.overrides = RenderOverrides::default();
             self.eye = Eye::home(&scene.home, None);
         }
@@ -164,6 +169,9 @@ impl Viewport {
             if state.training_job == Some(*job) {
                 self.set_cloud(Some(Arc::clone(cloud)));
             }
+        }
+        if let (Some(found), Some(tool)) = (state.selected.take(), &mut self.select) {
+            tool.take(found);
         }
         if let (Some(found), Some(inspector)) = (state.inspected.take(), &mut self.inspector) {
             inspector.take(found);
@@ -246,7 +254,8 @@ impl Viewport {
         self.take_frame(ui.ctx());
         let now = ui.input(|i| i.time);
         let under = views.under_pointer(ui);
-        self.use_brush(&response, under, state);
+        self.use_brush(&response, under);
+        self.use_select_tool(&response, under, state);
         if self.handle_input(ui, &response, under, &scene) {
             self.leave_photo();
             self.moved_at = now;
@@ -278,7 +287,7 @@ impl Viewport {
                 && !takes_clicks
                 && self.show_frusta(ui, rect, &scene, &response, layout, actions);
         }
-        let picks = self.brush.is_none() && !takes_clicks;
+        let picks = self.brush.is_none() && self.select.is_none() && !takes_clicks;
         if let Some(semantics) = state.semantics.as_ref().filter(|_| picks) {
             let is_other = state.beside.is_some() && under != views.first;
             let maps = self.queries.maps().map(|m| &***m).filter(|_| !on_camera && !is_other);
@@ -304,8 +313,11 @@ impl Viewport {
                 self.show_route(ui, rect, pane, state.explored.as_deref());
             }
             self.show_overlay(ui, rect, &scene, state, layout, actions);
-            if let (Some(brush), Some(_)) = (&mut self.brush, &state.semantics) {
+            if let Some(brush) = &mut self.brush {
                 brush.paint(ui, shown, !self.queries.compares());
+            }
+            if let Some(tool) = self.select.as_mut().filter(|_| !(second && state.beside.is_some())) {
+                tool.paint(ui, shown, self.queries.shown_maps());
             }
             if let (Some(semantics), Some(cloud)) = (&state.semantics, &self.cloud)
                 && !is_other
@@ -320,8 +332,12 @@ impl Viewport {
         self.queries.work_in(works_in);
         let worked_in = views.each().last().filter(|_| works_in).map_or(views.first, |(_, rect)| rect);
         self.show_ruler_card(ui, worked_in, scene.meters_per_unit(), actions);
-        if let (Some(brush), Some(semantics)) = (&mut self.brush, &state.semantics) {
-            brush.show(ui, worked_in, &semantics.identities, actions);
+        if let Some(brush) = &mut self.brush {
+            brush.show(ui, worked_in, actions);
+        }
+        if let Some(tool) = &mut self.select {
+            let none = Identities::default();
+            tool.show(ui, worked_in, state.semantics.as_ref().map_or(&none, |map| &map.identities), actions);
         }
     }
 

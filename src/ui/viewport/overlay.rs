@@ -50,7 +50,10 @@ impl Viewport {
         let beside = |p: &ViewPicture| p.second.as_ref().filter(|_| second).map(|other| other.depth_range);
         let depth = self.picture().and_then(|p| beside(p).unwrap_or(p.depth_range));
         if legend::is_needed(self.queries.settings(), depth) && rect.height() > LOW && !is_other {
-            card(ui, rect, legend, (Align2::RIGHT_BOTTOM, 0.0), |ui| legend::show(ui, self.queries.settings(), depth));
+            let unknown = self.queries.maps().map(|m| m.unknown_share());
+            card(ui, rect, legend, (Align2::RIGHT_BOTTOM, 0.0), |ui| {
+                legend::show(ui, self.queries.settings(), depth, unknown, actions);
+            });
         }
         if second {
             if let Some(beside) = &state.beside {

@@ -6,6 +6,7 @@ use egui::{Rect, Ui};
 
 use super::Viewport;
 use super::photo::PhotoView;
+use super::selecting::SelectTool;
 use super::visible::VisibleCloud;
 use crate::render::RenderSettings;
 use crate::scene::plan::When;
@@ -164,8 +165,9 @@ impl Viewport {
     pub(super) fn request(&mut self, ui: &Ui, shown: Rect, state: &AppState, layout: &Layout, now: f64) {
         let Some(cloud) = self.cloud.clone() else { return };
         let plan = &state.plan;
-        let VisibleCloud { cloud, semantics, .. } = self.visibility.apply(&cloud, state.semantics.as_ref());
-        let with_maps = plan.maps.now(self.queries.wanted() || self.picking.wanted() || self.brush.is_some());
+        let preview = self.select.as_ref().and_then(SelectTool::preview);
+        let VisibleCloud { cloud, semantics, .. } = self.visibility.apply(&cloud, preview.or(state.semantics.as_ref()));
+        let with_maps = plan.maps.now(self.queries.wanted() || self.picking.wanted()) || preview.is_some();
         let semantics = semantics.filter(|_| with_maps);
         let rests = now - self.moved_at - REST_SECS;
         if rests < 0.0 {
@@ -204,7 +206,8 @@ impl Viewport {
             budget,
             photo: self.photo.as_ref().and_then(PhotoView::pixels),
             codes: semantics.is_some() && self.queries.wants_codes(),
-            follow: budget == QualityBudget::Moving && (self.queries.tints() || self.picking.selected().is_some()),
+            follow: budget == QualityBudget::Moving
+                && (self.queries.tints() || self.picking.selected().is_some() || preview.is_some()),
             semantics,
             skip: SkipPasses::of(plan),
             timed: layout.times,

@@ -15,6 +15,7 @@ pub(crate) mod raw_features;
 pub(crate) mod recipes;
 pub(crate) mod selection_3d;
 pub(crate) mod spin_nerf;
+pub(crate) mod strokes;
 
 use std::collections::BTreeMap;
 

@@ -83,6 +83,16 @@ pub(crate) fn segment(picture: &Picture<'_>, options: &RegionOptions) -> Vec<Can
     kept.into_par_iter().map(candidate).collect()
 }
 
+/// How unlike two neighbors are, in steps of Lab color between pieces of area `unit`; with the `shape` of the scene or
+/// by their looks alone.
+pub(crate) fn unlike(a: &Piece, b: &Piece, border: &Border, shape: bool, unit: f64) -> f64 {
+    let apart = a.sums.iter().zip(&b.sums).map(|(p, q)| (p / a.area - q / b.area).powi(2)).sum::<f64>().sqrt();
+    let step = EDGE * border.strength / border.length + (1.0 - EDGE) * apart;
+    let ends = border.ends / border.length;
+    let step = if shape { step * (UNBROKEN + (1.0 - UNBROKEN) * ends) + END * ends } else { step };
+    step * (a.area.min(b.area) / unit).powf(SIZE_POWER)
+}
+
 struct Mosaic {
     size: (usize, usize),
     pieces: Vec<Piece>,
@@ -136,13 +146,7 @@ impl Mosaic {
         };
         let pieces: Vec<Piece> = leaves.iter().map(|&l| self.pieces[l as usize].clone()).collect();
         let unit = pieces.iter().map(|p| p.area).sum::<f64>() / 1000.0;
-        let unlike = move |a: &Piece, b: &Piece, border: &Border| {
-            let apart = a.sums.iter().zip(&b.sums).map(|(p, q)| (p / a.area - q / b.area).powi(2)).sum::<f64>().sqrt();
-            let step = EDGE * border.strength / border.length + (1.0 - EDGE) * apart;
-            let ends = border.ends / border.length;
-            let step = if shape { step * (UNBROKEN + (1.0 - UNBROKEN) * ends) + END * ends } else { step };
-            step * (a.area.min(b.area) / unit).powf(SIZE_POWER)
-        };
+        let unlike = move |a: &Piece, b: &Piece, border: &Border| unlike(a, b, border, shape, unit);
         grow(pieces, self.borders.iter().filter_map(inner).collect(), &unlike)
     }
 

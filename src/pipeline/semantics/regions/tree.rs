@@ -48,6 +48,7 @@ pub(crate) struct Node {
 }
 
 /// Leaves first, children before parents.
+#[derive(Debug)]
 pub(crate) struct Tree {
     pub(crate) nodes: Vec<Node>,
 }

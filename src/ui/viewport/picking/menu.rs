@@ -3,7 +3,7 @@
 use egui::{RichText, Ui};
 
 use crate::navigate::target::Side;
-use crate::scene::{Identities, IdentityId, text};
+use crate::scene::{Identities, IdentityId, NOBODY, text};
 use crate::ui::actions::Action;
 use crate::ui::labels::ScreenNames;
 
@@ -21,6 +21,7 @@ pub(super) fn show(
         }
     };
     let Some(id) = id.filter(|id| all.get(*id).is_some()) else {
+        row(ui, Action::Paint(Some(NOBODY)), "Select an object by clicks\u{2026}");
         row(ui, Action::FrameScene, "Frame the scene");
         row(ui, Action::ResetView, "Reset the view");
         row(ui, Action::Isolate(None), "Show all objects");
@@ -36,6 +37,7 @@ pub(super) fn show(
     row(ui, Action::Rename, "Rename");
     row(ui, Action::Isolate(None), "Show all objects");
     ui.separator();
-    row(ui, Action::Paint(Some(id)), "Paint a new part\u{2026}");
+    row(ui, Action::Correct(id), "Correct by clicks\u{2026}");
+    row(ui, Action::Paint(Some(id)), "Select a new part by clicks\u{2026}");
     row(ui, Action::ExportTarget(id), "Export as .ply\u{2026}");
 }

@@ -35,7 +35,7 @@ pub struct Picking {
 
 /// An outline on screen.
 #[derive(Default)]
-struct Drawn {
+pub(super) struct Drawn {
     /// View, objects and identity that it was drawn for.
     of: Option<(u64, u64, IdentityId)>,
     /// Where it lies in the view, px; `None` if it has no pixel there.
@@ -122,7 +122,7 @@ impl Picking {
 }
 
 impl Drawn {
-    fn paint(
+    pub(super) fn paint(
         &mut self,
         ui: &Ui,
         shown: Rect,

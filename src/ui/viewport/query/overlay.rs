@@ -19,6 +19,10 @@ const DIM: Color32 = Color32::from_black_alpha(165);
 /// Where blended codes differ.
 const DIFFERENT: [u8; 3] = [255, 60, 160];
 
+/// The stripes of what is unknown, and their width in px.
+pub(crate) const HATCH: [[u8; 3]; 2] = [[205; 3], [70; 3]];
+const HATCH_PX: usize = 6;
+
 /// What is drawn over the view.
 pub(crate) struct Layers<'a> {
     /// What the pixels belong to.
@@ -26,6 +30,8 @@ pub(crate) struct Layers<'a> {
     /// Their blended codes, where they are drawn.
     pub(crate) codes: Option<&'a CodeMap>,
     pub(crate) identities: &'a Identities,
+    /// Where nothing is known, if that is drawn.
+    pub(crate) unknown: Option<&'a Mask>,
     /// Masks of the answers, with their colors; later ones on top.
     pub(crate) masks: &'a [([u8; 3], Mask)],
     /// What stays bright while everything else is dimmed.
@@ -62,7 +68,7 @@ impl Layers<'_> {
                         ColorBy::Difference => {
                             codes.get(self.map.identity[i] as usize).and_then(|c| self.difference(i, c))
                         }
-                        _ => self.blended(i).or_else(own),
+                        _ => self.blended(i).or_else(own).or_else(|| self.hatch(i)),
                     };
                     tint.map_or(Color32::TRANSPARENT, |c| with_alpha(c, self.settings.opacity))
                 }
@@ -94,6 +100,13 @@ impl Layers<'_> {
         let blended = self.codes?.planes.iter().map(|plane| plane.get(i).copied().unwrap_or(f32::NAN));
         let far = blended.zip(own).any(|(b, o)| (b - o).abs() > self.settings.recipe.tolerance);
         far.then_some(DIFFERENT)
+    }
+
+    /// Color of a pixel of which nothing is known: stripes, so that it is seen to be no object.
+    fn hatch(&self, i: usize) -> Option<[u8; 3]> {
+        self.unknown.filter(|m| m.contains(i))?;
+        let across = (i % self.map.width_px + i / self.map.width_px) / HATCH_PX;
+        Some(HATCH[across % 2])
     }
 
     /// Color of what has this identity; `None` leaves the frame as it is.
@@ -172,6 +185,7 @@ mod tests {
         let layers = Layers {
             map: &map,
             codes: None,
+            unknown: None,
             identities: &identities,
             masks: &masks,
             lit: None,
@@ -198,6 +212,7 @@ mod tests {
         let mut layers = Layers {
             map: &map,
             codes: None,
+            unknown: None,
             identities: &identities,
             masks: &masks,
             lit: Some(&lit),
@@ -210,6 +225,31 @@ mod tests {
         assert_eq!(image.pixels.iter().filter(|p| **p == DIM).count(), 3, "not the halo");
         layers.lit = None;
         assert!(layers.paint().pixels.iter().all(|p| *p != DIM), "the control");
+    }
+
+    #[test]
+    fn what_is_unknown_is_hatched_and_what_is_nobodys_is_not() {
+        let (identities, map) = scene();
+        let unknown = Mask::from_fn(8, 3, |i| i % 8 == 0);
+        let settings = OverlaySettings { color_by: ColorBy::Objects, opacity: 1.0, ..OverlaySettings::default() };
+        let mut layers = Layers {
+            map: &map,
+            codes: None,
+            unknown: Some(&unknown),
+            identities: &identities,
+            masks: &[],
+            lit: None,
+            relevancy: &[],
+            features: &[],
+            settings,
+        };
+        let image = layers.paint();
+        let [r, g, b] = HATCH[0];
+        assert_eq!((image.pixels[0], image.pixels[1]), (Color32::from_rgb(r, g, b), Color32::TRANSPARENT));
+        let own = image.pixels[2];
+        layers.unknown = None;
+        let image = layers.paint();
+        assert_eq!((image.pixels[0], image.pixels[2]), (Color32::TRANSPARENT, own), "the control");
     }
 
     #[test]
@@ -236,6 +276,7 @@ mod tests {
         let layers = Layers {
             map: &map,
             codes: Some(&codes),
+            unknown: None,
             identities: &identities,
             masks: &[],
             lit: None,

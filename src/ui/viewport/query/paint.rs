@@ -98,6 +98,7 @@ impl Queries {
         let layers = overlay::Layers {
             map: &maps.identities,
             codes: maps.codes.as_ref(),
+            unknown: self.side.settings.color_by.tells_unknown().then_some(&maps.unknown),
             identities: &semantics.identities,
             masks: &masks,
             // Where nothing is found, there is no rest.

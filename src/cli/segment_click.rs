@@ -1,0 +1,102 @@
+//! `fmlgs segment --click`: Gaussians by places in a view instead of words, and a name for them.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::progress::Console;
+use super::{CliError, output, view};
+use crate::jobs::edit::{self, EditRequest};
+use crate::jobs::select::{self, SelectFor, SelectRequest, Selected, Stroke, kept_as};
+use crate::jobs::{Scene, export, query};
+use crate::scene::{LevelFilter, Mask, NOBODY};
+
+/// Radius of a click as a share of the view's width.
+const CLICK: f32 = 0.006;
+/// Longer side of the view that clicks are taken in, px.
+const SIDE_PX: u32 = 512;
+
+#[derive(Debug, clap::Args)]
+pub(crate) struct ClickArgs {
+    /// Select what is at this place of the view instead of asking in words: x,y in px of the photo; may be given again
+    #[arg(long, value_parser = place, value_name = "X,Y", conflicts_with_all = ["text", "all", "rest"])]
+    pub(crate) click: Vec<[f32; 2]>,
+    /// What is at this place does not belong to it; may be given again
+    #[arg(long, value_parser = place, value_name = "X,Y", requires = "click")]
+    click_out: Vec<[f32; 2]>,
+    /// The view that is clicked in: an index, a photo's name or a camera file [default: the scene's first view]
+    #[arg(long, requires = "click")]
+    view: Option<String>,
+    /// Keep what is selected in the scene, as an object of this name
+    #[arg(long, requires = "click")]
+    keep: Option<String>,
+    /// Keep it as a part of what this asks for
+    #[arg(long, requires = "keep", value_name = "TEXT")]
+    part_of: Option<String>,
+}
+
+fn place(text: &str) -> Result<[f32; 2], String> {
+    let number = |s: &str| s.trim().parse::<f32>().ok().filter(|v| v.is_finite() && *v >= 0.0);
+    let both = text.split_once(',').and_then(|(x, y)| Some([number(x)?, number(y)?]));
+    both.ok_or_else(|| "two numbers are needed, for example 320,200".to_owned())
+}
+
+/// Selects what is clicked on, keeps it if that is wanted, and writes it to `out`.
+pub(crate) fn run(scene: &Scene, args: &ClickArgs, out: Option<&PathBuf>, quiet: bool) -> Result<(), CliError> {
+    let map = Arc::new(scene.semantics().unwrap_or_else(|_| select::empty_map(&scene.cloud)));
+    let whole = match &args.part_of {
+        Some(text) => query::identities(&map, text, LevelFilter::Auto, 1)?.first().copied().unwrap_or(NOBODY),
+        None => NOBODY,
+    };
+    let purpose = SelectFor::New(whole);
+    let full = view::choose(args.view.as_deref(), scene)?;
+    let camera = full.limited_to(SIDE_PX);
+    let scale = camera.width_px as f32 / full.width_px as f32;
+    let mut console = Console::new(quiet);
+    let mut selected: Option<Arc<Selected>> = None;
+    let clicks = args.click.iter().map(|at| (at, true)).chain(args.click_out.iter().map(|at| (at, false)));
+    for (at, is_plus) in clicks {
+        if at[0] >= full.width_px as f32 || at[1] >= full.height_px as f32 {
+            let size = format!("{} x {} px", full.width_px, full.height_px);
+            return Err(CliError::failed(format!("{},{} lies outside the view, which has {size}", at[0], at[1])));
+        }
+        let (w, h) = (camera.width_px as usize, camera.height_px as usize);
+        let radius = (CLICK * w as f32).max(1.0);
+        let near = |i: usize| {
+            let [dx, dy] = [(i % w) as f32 + 0.5 - scale * at[0], (i / w) as f32 + 0.5 - scale * at[1]];
+            dx.hypot(dy) <= radius
+        };
+        let stroke = Stroke { camera: camera.clone(), pixels: Mask::from_fn(w, h, near), is_plus };
+        let request = SelectRequest {
+            cloud: Arc::clone(&scene.cloud),
+            settings: scene.settings.clone(),
+            cameras: scene.views(),
+            home: scene.home(),
+            map: Arc::clone(&map),
+            purpose: purpose.clone(),
+            before: selected,
+            stroke: Some(stroke),
+        };
+        selected = Some(Arc::new(select::run(&request, &mut console)?));
+    }
+    drop(console);
+    let selected = selected.filter(|s| !s.gaussians.is_empty());
+    let selected = selected.ok_or_else(|| CliError::failed("nothing is at the places that were clicked on"))?;
+    let mut lines = Vec::new();
+    let count = format!("{} of {} Gaussians", selected.gaussians.len(), scene.cloud.len());
+    if let Some(out) = out {
+        let kept: Vec<usize> = selected.gaussians.iter().map(|i| *i as usize).collect();
+        export::ply(out, &scene.cloud.select(&kept))?;
+        lines.push(format!("{count} in {}", out.display()));
+    }
+    if let Some(name) = &args.keep {
+        let folder = scene.folder.as_ref().ok_or_else(|| {
+            CliError::failed(format!("{} is a bare splat: names are kept in trained scenes", scene.path.display()))
+        })?;
+        let request = EditRequest::Apply(kept_as(&purpose, name.clone(), selected.gaussians.clone()));
+        let new = edit::apply(&scene.cloud, &map, &request)?;
+        edit::store(folder, scene.state.as_deref(), &new, &scene.cloud)?;
+        let id = new.identities.len() as crate::scene::IdentityId;
+        lines.push(format!("kept as '{}': {count}", new.identities.full_name(id)));
+    }
+    output::print(&lines.join("\n"))
+}

@@ -1,0 +1,130 @@
+//! Selecting by clicks and strokes: the Gaussians that are meant, and objects and parts as they would be with them.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use glam::DMat3;
+
+use super::JobError;
+use crate::pipeline::observer::Observer;
+use crate::pipeline::semantics::edit::{self, Edit};
+use crate::pipeline::semantics::selection::hierarchy::Hierarchy;
+use crate::pipeline::semantics::selection::marks::Marks;
+pub use crate::pipeline::semantics::selection::marks::Stroke;
+use crate::pipeline::semantics::timing::ms_since;
+use crate::render::{RenderSettings, Renderer};
+use crate::scene::{Camera, GaussianCloud, HomeView, Identities, IdentityId, NOBODY, SemanticMap};
+
+/// What the selection is to become.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum SelectFor {
+    /// A new part of this identity; of nobody, an object.
+    New(IdentityId),
+    /// The extent of this identity, which it begins with.
+    Extent(IdentityId),
+}
+
+/// A further stroke.
+#[derive(Clone, Debug)]
+pub struct SelectRequest {
+    pub(crate) cloud: Arc<GaussianCloud>,
+    pub(crate) settings: RenderSettings,
+    /// The photos' cameras, possibly none.
+    pub(crate) cameras: Vec<Camera>,
+    pub(crate) home: HomeView,
+    /// Objects and parts as they are.
+    pub(crate) map: Arc<SemanticMap>,
+    pub(crate) purpose: SelectFor,
+    /// What was made ready for these Gaussians before, and what was marked.
+    pub(crate) before: Option<Arc<Selected>>,
+    /// `None` takes the last one back.
+    pub(crate) stroke: Option<Stroke>,
+}
+
+/// What clicks and strokes select.
+#[derive(Clone, Debug)]
+pub struct Selected {
+    hierarchy: Arc<Hierarchy>,
+    marks: Marks,
+    /// Indices, rising.
+    pub(crate) gaussians: Vec<u32>,
+    /// Objects and parts as they would be with it, and which of them it would be; `NOBODY` if nothing is selected.
+    pub(crate) preview: Arc<SemanticMap>,
+    pub(crate) id: IdentityId,
+    /// Milliseconds from the stroke to the Gaussians, where everything was ready.
+    pub(crate) ms: f64,
+}
+
+impl Selected {
+    /// Strokes so far.
+    pub(crate) fn strokes(&self) -> usize {
+        self.marks.len()
+    }
+}
+
+/// Adds the stroke, or takes the last one back.
+pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Result<Selected, JobError> {
+    let SelectRequest { cloud, settings, map, purpose, before, stroke, .. } = request;
+    let hierarchy = match before {
+        Some(before) => Arc::clone(&before.hierarchy),
+        None => Arc::new(Hierarchy::new(cloud, &views(&request.cameras, &request.home), settings, observer)?),
+    };
+    let start = Instant::now();
+    let mut marks = before.as_ref().map(|b| b.marks.clone()).unwrap_or_default();
+    match stroke {
+        Some(stroke) => marks.add(&mut Renderer::new(), cloud, settings, stroke)?,
+        None => marks.remove_last(),
+    }
+    let from = match purpose {
+        SelectFor::Extent(id) => map.members(*id),
+        SelectFor::New(_) => Vec::new(),
+    };
+    let selected = hierarchy.select(&marks, &from);
+    let gaussians: Vec<u32> = (0..cloud.len() as u32).filter(|i| selected[*i as usize]).collect();
+    let ms = ms_since(start);
+    let (preview, id) = if gaussians.is_empty() {
+        (Arc::clone(map), NOBODY)
+    } else {
+        let preview = edit::apply(map, cloud, &kept_as(purpose, String::new(), gaussians.clone()))?;
+        let id = match purpose {
+            SelectFor::Extent(id) => *id,
+            SelectFor::New(_) => preview.identities.len() as IdentityId,
+        };
+        (Arc::new(preview), id)
+    };
+    Ok(Selected { hierarchy, marks, gaussians, preview, id, ms })
+}
+
+/// The edit that keeps what is selected.
+pub(crate) fn kept_as(purpose: &SelectFor, name: String, gaussians: Vec<u32>) -> Edit {
+    match purpose {
+        SelectFor::New(of) => Edit::AddPiece { of: *of, name, gaussians },
+        SelectFor::Extent(id) => Edit::Reshape { id: *id, gaussians },
+    }
+}
+
+/// Objects and parts of a scene in which none were found.
+pub(crate) fn empty_map(cloud: &GaussianCloud) -> SemanticMap {
+    let n = cloud.len();
+    SemanticMap::from_identities(Identities::default(), vec![NOBODY; n], vec![0.0; n], Vec::new())
+}
+
+/// Views from all around where there are no photos.
+const AROUND: u32 = 24;
+
+fn views(cameras: &[Camera], home: &HomeView) -> Vec<Camera> {
+    if !cameras.is_empty() {
+        return cameras.to_vec();
+    }
+    let first = HomeView::overview(&home.bounds, home.up, [640, 480]);
+    let middle = home.bounds.center();
+    let turned = |k: u32| {
+        let turn = DMat3::from_axis_angle(home.up, std::f64::consts::TAU * f64::from(k) / f64::from(AROUND));
+        Camera {
+            center: middle + turn * (first.center - middle),
+            world_from_camera: turn * first.world_from_camera,
+            ..first.clone()
+        }
+    };
+    (0..AROUND).map(turned).collect()
+}

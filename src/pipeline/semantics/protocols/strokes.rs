@@ -1,0 +1,155 @@
+//! `strokes`: somebody points at a thing in the view that shows most of it, corrects what is wrong there with a
+//! second and a third stroke, and is judged in all other views.
+
+use std::collections::{BTreeMap, VecDeque};
+
+use super::Category;
+use crate::math::grid::{neighbors, regions};
+use crate::pipeline::semantics::selection::hierarchy::Hierarchy;
+use crate::pipeline::semantics::selection::marks::{Marks, Stroke};
+use crate::pipeline::semantics::timing::ms_since;
+use crate::pipeline::semantics::view_map::ViewMap;
+use crate::render::{RenderError, RenderSettings, Renderer};
+use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Level, Mask};
+
+/// Strokes for each thing.
+pub(crate) const STROKES: usize = 3;
+/// Half of a stroke's width, px.
+const RADIUS_PX: usize = 3;
+/// Pixels of a thing from which it is asked for.
+const LEAST_PX: usize = 60;
+
+/// A photo and what it shows.
+pub(crate) struct LabeledPhoto {
+    pub(crate) name: String,
+    pub(crate) camera: Camera,
+    pub(crate) categories: Vec<Category>,
+}
+
+/// A thing and how well it was selected.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub(crate) struct StrokeRow {
+    pub(crate) name: String,
+    pub(crate) level: Level,
+    /// The view that was drawn in.
+    pub(crate) drawn_in: String,
+    /// Mean IoU in all other views after each stroke.
+    pub(crate) iou: [f64; STROKES],
+    /// Milliseconds from each stroke to the Gaussians.
+    pub(crate) ms: [f64; STROKES],
+}
+
+/// Selects every named thing of the views.
+pub(crate) fn rows(
+    hierarchy: &Hierarchy,
+    cloud: &GaussianCloud,
+    settings: &RenderSettings,
+    views: &[LabeledPhoto],
+) -> Result<Vec<StrokeRow>, RenderError> {
+    let mut things: BTreeMap<&str, Vec<(usize, &Category)>> = BTreeMap::new();
+    for (k, view) in views.iter().enumerate() {
+        let large = view.categories.iter().filter(|c| c.mask.area() >= LEAST_PX);
+        large.for_each(|c| things.entry(&c.name).or_default().push((k, c)));
+    }
+    let mut renderer = Renderer::new();
+    let mut rows = Vec::new();
+    for (name, seen) in things {
+        let Some(&(first, truth)) = seen.iter().max_by_key(|(_, c)| c.mask.area()).filter(|_| seen.len() > 1) else {
+            continue;
+        };
+        let mut draw = |selected: &[bool], k: usize| -> Result<Mask, RenderError> {
+            let all = Identities::objects(1);
+            let of: Vec<IdentityId> = selected.iter().map(|s| IdentityId::from(*s)).collect();
+            Ok(ViewMap::render(&mut renderer, cloud, &of, &all, &views[k].camera, settings)?.mask(&all, 1))
+        };
+        let (mut marks, mut selected) = (Marks::default(), vec![false; cloud.len()]);
+        let mut row = StrokeRow {
+            name: name.to_owned(),
+            level: truth.level,
+            drawn_in: views[first].name.clone(),
+            iou: [0.0; STROKES],
+            ms: [0.0; STROKES],
+        };
+        for k in 0..STROKES {
+            let now = draw(&selected, first)?;
+            if let Some((pixels, is_plus)) = correction(&truth.mask, &now) {
+                let start = std::time::Instant::now();
+                let stroke = Stroke { camera: views[first].camera.clone(), pixels, is_plus };
+                marks.add(&mut Renderer::new(), cloud, settings, &stroke)?;
+                selected = hierarchy.select(&marks, &[]);
+                row.ms[k] = ms_since(start);
+            }
+            let mut sum = 0.0;
+            for (view, truth) in seen.iter().filter(|(view, _)| *view != first) {
+                sum += draw(&selected, *view)?.iou(&truth.mask);
+            }
+            row.iou[k] = sum / (seen.len() - 1) as f64;
+        }
+        rows.push(row);
+    }
+    Ok(rows)
+}
+
+/// The stroke that somebody draws who sees `now` and means `truth`: through the largest region that is wrong.
+fn correction(truth: &Mask, now: &Mask) -> Option<(Mask, bool)> {
+    let largest = |a: &Mask, b: &Mask| {
+        let mut wrong = a.clone();
+        wrong.subtract(b);
+        let (w, n) = (wrong.width_px(), wrong.width_px() * wrong.height_px());
+        let (label, areas) = regions(w, n, |i| wrong.contains(i));
+        let (number, area) = (1..).zip(areas).max_by_key(|(_, area)| *area)?;
+        Some((Mask::from_fn(w, wrong.height_px(), |i| label[i] == number), area))
+    };
+    let (missing, extra) = (largest(truth, now), largest(now, truth));
+    let is_plus = missing.as_ref().map_or(0, |m| m.1) >= extra.as_ref().map_or(0, |e| e.1);
+    let (region, _) = if is_plus { missing? } else { extra? };
+    Some((stroke_through(&region), is_plus))
+}
+
+/// A stroke from the middle of a region to its far end, away from its borders.
+fn stroke_through(region: &Mask) -> Mask {
+    let (w, h) = (region.width_px(), region.height_px());
+    let depth = walk(w, h, |i| !region.contains(i) || is_rim(i, w, h), |_| true);
+    let depth: Vec<u32> = depth.into_iter().map(|(far, _)| far).collect();
+    let inside = |i: &usize| region.contains(*i);
+    let Some(middle) = (0..w * h).filter(inside).max_by_key(|&i| (depth[i], usize::MAX - i)) else {
+        return region.clone();
+    };
+    let deep = |i: usize| region.contains(i) && 2 * depth[i] >= depth[middle];
+    let way = walk(w, h, |i| i == middle, deep);
+    let end = (0..w * h).filter(|&i| deep(i) && way[i].0 != u32::MAX).max_by_key(|&i| (way[i].0, usize::MAX - i));
+    let mut stroke = Mask::empty(w, h);
+    let mut at = end.unwrap_or(middle);
+    loop {
+        let r = RADIUS_PX.min(depth[at].saturating_sub(1) as usize);
+        let (x, y) = (at % w, at / w);
+        for y in y.saturating_sub(r)..(y + r + 1).min(h) {
+            (x.saturating_sub(r)..(x + r + 1).min(w)).for_each(|x| stroke.insert(y * w + x));
+        }
+        if at == middle {
+            stroke.intersect(region);
+            return stroke;
+        }
+        at = way[at].1;
+    }
+}
+
+fn is_rim(i: usize, w: usize, h: usize) -> bool {
+    i % w == 0 || i % w + 1 == w || i / w == 0 || i / w + 1 == h
+}
+
+/// Steps from the nearest pixel that is a `start`, over pixels that are `open`, and the pixel before on that way.
+fn walk(w: usize, h: usize, start: impl Fn(usize) -> bool, open: impl Fn(usize) -> bool) -> Vec<(u32, usize)> {
+    let mut way = vec![(u32::MAX, usize::MAX); w * h];
+    let mut next: VecDeque<usize> = (0..w * h).filter(|&i| start(i)).collect();
+    next.iter().for_each(|&i| way[i] = (0, i));
+    while let Some(i) = next.pop_front() {
+        for j in neighbors(i, w, w * h).filter(|&j| open(j)) {
+            if way[j].0 == u32::MAX {
+                way[j] = (way[i].0 + 1, i);
+                next.push_back(j);
+            }
+        }
+    }
+    way
+}

@@ -1,0 +1,233 @@
+//! Gaussians as a surface: which lie side by side, what they look like, and how clearly the views of a scene show that
+//! something ends between them.
+
+use glam::{DVec2, DVec3};
+use rayon::prelude::*;
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
+
+use super::super::error::FindError;
+use super::super::regions::edges::{ImagePlanes, strength};
+use super::super::regions::lab::{lab, planes};
+use super::super::regions::shape::ends;
+use super::super::regions::tree::{Border, Piece};
+use crate::math::lanes::Lane;
+use crate::pipeline::observer::{Observer, Ticker};
+use crate::render::{ContributionSink, Features, RenderError, RenderSettings, Renderer, TILE_PX};
+use crate::scene::{Camera, GaussianCloud};
+
+/// Neighbors that each Gaussian looks for.
+const NEIGHBORS: usize = 10;
+/// Longer side of the views, px.
+const SIDE_PX: u32 = 448;
+/// Most views that are looked at.
+const MOST_VIEWS: usize = 32;
+/// Share of its area in the view that shows it best that a Gaussian must have in a view to be seen there.
+const LEAST_SEEN: f32 = 0.1;
+/// Opacity from which there is a surface.
+const SOLID: f32 = 0.3;
+
+/// A cloud's surface.
+pub(super) struct Surface {
+    /// Of each Gaussian: area, square units, and the sum of its color's planes over that.
+    pub(super) pieces: Vec<Piece>,
+    /// Neighbors, the smaller index first.
+    pub(super) edges: Vec<(u32, u32)>,
+    /// What lies between the two of each edge.
+    pub(super) borders: Vec<Border>,
+}
+
+/// A view as evidence.
+struct Look {
+    camera: Camera,
+    strength: Vec<f32>,
+    ends: Vec<f32>,
+    /// Square units that each Gaussian fills.
+    areas: Vec<f32>,
+}
+
+impl Surface {
+    /// Looks at the Gaussians through some of these cameras.
+    pub(super) fn new(
+        cloud: &GaussianCloud,
+        cameras: &[Camera],
+        settings: &RenderSettings,
+        observer: &mut dyn Observer,
+    ) -> Result<Self, FindError> {
+        let chosen: Vec<&Camera> = spread(cameras.len(), MOST_VIEWS).map(|i| &cameras[i]).collect();
+        let mut ticker = Ticker::new("Looking at surfaces", chosen.len() + 1);
+        let mut colors = vec![[0.0_f32; 4]; cloud.len()];
+        let mut looks = Vec::with_capacity(chosen.len());
+        let mut renderer = Renderer::new();
+        for (i, camera) in chosen.into_iter().enumerate() {
+            let look = look(&mut renderer, cloud, &camera.limited_to(SIDE_PX), settings, &mut colors);
+            looks.push(look.map_err(|e| FindError::Render((i + 1).to_string(), e))?);
+            ticker.tick(i + 1, observer)?;
+        }
+        let mut best = vec![0.0_f32; cloud.len()];
+        for look in &looks {
+            best.iter_mut().zip(&look.areas).for_each(|(b, a)| *b = b.max(*a));
+        }
+        let edges = neighbors(cloud);
+        let colors = own_colors(cloud, &colors);
+        let borders = edges.par_iter().map(|&edge| border(cloud, &looks, &best, &colors, edge)).collect();
+        let piece = |(color, area): (&[f32; 3], &f32)| {
+            let area = f64::from(area.max(f32::MIN_POSITIVE));
+            Piece { area, sums: color.iter().map(|c| f64::from(*c) * area).collect() }
+        };
+        let pieces = colors.iter().zip(&best).map(piece).collect();
+        Ok(Self { pieces, edges, borders })
+    }
+}
+
+/// At most `most` of `n` indices, evenly spread.
+fn spread(n: usize, most: usize) -> impl Iterator<Item = usize> {
+    let taken = n.min(most);
+    (0..taken).map(move |k| (2 * k + 1) * n / (2 * taken))
+}
+
+fn look(
+    renderer: &mut Renderer,
+    cloud: &GaussianCloud,
+    camera: &Camera,
+    settings: &RenderSettings,
+    colors: &mut [[f32; 4]],
+) -> Result<Look, RenderError> {
+    let frame = renderer.render(cloud, Features::NONE, camera, &RenderSettings { depth: true, ..settings.clone() })?;
+    let (width, height) = (frame.width_px, frame.height_px);
+    let channels = planes(&lab(&frame.to_rgb8()));
+    let depth = |(&d, &a): (&f32, &f32)| if a >= SOLID { d / a } else { 0.0 };
+    let depth: Vec<f32> = frame.depth.iter().zip(&frame.alpha).map(depth).collect();
+    let row = || Row { channels: &channels, width, gaussian: u32::MAX, sums: [0.0; 4], found: Vec::new() };
+    let mut rows: Vec<Row<'_>> = (0..height.div_ceil(TILE_PX)).map(|_| row()).collect();
+    renderer.contributions(cloud, camera, settings, &mut rows)?;
+    let mut areas = vec![0.0_f32; cloud.len()];
+    for row in &mut rows {
+        row.finish();
+        for (gaussian, sums) in &row.found {
+            let g = *gaussian as usize;
+            areas[g] += sums[0];
+            colors[g].iter_mut().zip(sums).for_each(|(c, s)| *c += s);
+        }
+    }
+    let axis = camera.world_from_camera * DVec3::Z;
+    let focal = camera.focal_px.x * camera.focal_px.y;
+    areas.par_iter_mut().enumerate().filter(|(_, a)| **a > 0.0).for_each(|(i, area)| {
+        let depth = (cloud.world_position(i) - camera.center).dot(axis);
+        *area *= (depth * depth / focal) as f32;
+    });
+    Ok(Look {
+        strength: strength(&ImagePlanes { width, channels: &channels }),
+        ends: ends(&depth, width, 0.5 * (camera.focal_px.x + camera.focal_px.y)),
+        camera: camera.clone(),
+        areas,
+    })
+}
+
+/// Collects weights and weighted colors of one row of tiles.
+struct Row<'a> {
+    channels: &'a [Vec<f32>; 3],
+    width: usize,
+    gaussian: u32,
+    sums: [f32; 4],
+    found: Vec<(u32, [f32; 4])>,
+}
+
+impl Row<'_> {
+    fn finish(&mut self) {
+        if self.sums[0] > 0.0 {
+            self.found.push((self.gaussian, self.sums));
+        }
+        self.sums = [0.0; 4];
+    }
+}
+
+impl ContributionSink<f32> for Row<'_> {
+    fn add(&mut self, gaussian: u32, x: usize, y: usize, weights: &Lane<f32>) {
+        if gaussian != self.gaussian {
+            self.finish();
+            self.gaussian = gaussian;
+        }
+        let first = y * self.width + x;
+        for (k, &weight) in weights.iter().enumerate().take(self.width - x).filter(|(_, w)| **w > 0.0) {
+            self.sums[0] += weight;
+            for (sum, channel) in self.sums[1..].iter_mut().zip(self.channels) {
+                *sum += weight * channel[first + k];
+            }
+        }
+    }
+}
+
+/// The color that each Gaussian has in the views; its own where none shows it.
+fn own_colors(cloud: &GaussianCloud, seen: &[[f32; 4]]) -> Vec<[f32; 3]> {
+    let stride = cloud.sh_stride();
+    let own = |i: usize| -> [u8; 3] {
+        std::array::from_fn(|c| {
+            let v = 0.5 + crate::math::sh::SH_C0 as f32 * cloud.sh[i * stride][c];
+            (255.0 * v.clamp(0.0, 1.0)) as u8
+        })
+    };
+    let dark = planes(&lab(&(0..cloud.len()).map(own).collect::<Vec<_>>()));
+    let color = |(i, s): (usize, &[f32; 4])| match s[0] > 1e-3 {
+        true => [s[1] / s[0], s[2] / s[0], s[3] / s[0]],
+        false => [dark[0][i], dark[1][i], dark[2][i]],
+    };
+    seen.iter().enumerate().map(color).collect()
+}
+
+/// The nearest neighbors of all Gaussians, each pair once.
+fn neighbors(cloud: &GaussianCloud) -> Vec<(u32, u32)> {
+    let points: Vec<GeomWithData<[f64; 3], u32>> =
+        cloud.positions.iter().zip(0..).map(|(p, i)| GeomWithData::new(p.map(f64::from), i)).collect();
+    let tree = RTree::bulk_load(points.clone());
+    let mut edges: Vec<(u32, u32)> = points
+        .par_iter()
+        .flat_map_iter(|p| {
+            let around = tree.nearest_neighbor_iter(*p.geom()).take(NEIGHBORS + 1).filter(|q| q.data != p.data);
+            around.map(|q| (q.data.min(p.data), q.data.max(p.data))).collect::<Vec<_>>()
+        })
+        .collect();
+    edges.par_sort_unstable();
+    edges.dedup();
+    edges
+}
+
+fn border(cloud: &GaussianCloud, looks: &[Look], best: &[f32], colors: &[[f32; 3]], (a, b): (u32, u32)) -> Border {
+    let (a, b) = (a as usize, b as usize);
+    let (mut seen, mut strength, mut ends) = (0.0, 0.0, 0.0);
+    for look in looks {
+        let sees = |i: usize| look.areas[i] > 0.0 && look.areas[i] >= LEAST_SEEN * best[i];
+        if !(sees(a) && sees(b)) {
+            continue;
+        }
+        let at = |i: usize| look.camera.project(cloud.world_position(i));
+        let (Some(from), Some(to)) = (at(a), at(b)) else { continue };
+        let [s, e] = look.strongest_between(from, to);
+        seen += 1.0;
+        strength += f64::from(s);
+        ends += f64::from(e);
+    }
+    if seen > 0.0 {
+        return Border { length: 1.0, strength: strength / seen, ends: ends / seen };
+    }
+    // No view shows both: they are as far apart as their colors.
+    let apart = colors[a].iter().zip(&colors[b]).map(|(p, q)| (p - q).powi(2)).sum::<f32>().sqrt();
+    Border { length: 1.0, strength: f64::from(apart), ends: 0.5 }
+}
+
+impl Look {
+    /// The strongest edge and the clearest end of a surface on the way between two places, px.
+    fn strongest_between(&self, from: DVec2, to: DVec2) -> [f32; 2] {
+        let (w, h) = (self.camera.width_px as usize, self.camera.height_px as usize);
+        let steps = (from.distance(to).ceil() as usize).clamp(1, 12);
+        let mut found = [0.0_f32; 2];
+        for k in 0..=steps {
+            let p = from.lerp(to, k as f64 / steps as f64);
+            let x = (p.x.max(0.0) as usize).min(w - 1);
+            let y = (p.y.max(0.0) as usize).min(h - 1);
+            let i = y * w + x;
+            found = [found[0].max(self.strength[i]), found[1].max(self.ends[i])];
+        }
+        found
+    }
+}

@@ -1,0 +1,304 @@
+//! What was noticed as objects and parts were found: which photos show each, how surely, where photos disagreed, and
+//! how much of each photo stayed unknown. Kept with the semantic map.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Identities, IdentityId, NOBODY, text};
+
+/// Most doubts that are kept: who has more needs other masks, not a longer list.
+const MOST_DOUBTS: usize = 1_000;
+
+/// Where masks of a photo and what was known of its view disagree about who is who.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub(crate) enum Disagreement {
+    /// Two masks fit the identity; one of them became an identity of its own.
+    Split(IdentityId),
+    /// One mask covers several identities that were thought to be apart.
+    Merge(Vec<IdentityId>),
+    /// A mask is known to be the first, by its name, where the second was thought to be.
+    Switch(IdentityId, IdentityId),
+    /// Masks that were followed and Gaussians that were voted for put the identity in different places.
+    Drift(IdentityId),
+}
+
+impl Disagreement {
+    /// The identities that it is about.
+    pub(crate) fn about(&self) -> Vec<IdentityId> {
+        match self {
+            Self::Split(id) | Self::Drift(id) => vec![*id],
+            Self::Switch(is, other) => vec![*is, *other],
+            Self::Merge(all) => all.clone(),
+        }
+    }
+
+    /// In words, with these names.
+    pub(crate) fn text(&self, name: impl Fn(IdentityId) -> String) -> String {
+        let name = |id: &IdentityId| name(*id);
+        match self {
+            Self::Split(of) => format!("{} appears in two pieces; one becomes a new identity", name(of)),
+            Self::Merge(all) => {
+                let all: Vec<String> = all.iter().map(name).collect();
+                format!("one mask covers {}; they are kept apart", all.join(" and "))
+            }
+            Self::Drift(id) => format!("{} was tracked to a wrong place and is ignored there", name(id)),
+            Self::Switch(is, other) => format!("{} was found where {} was expected", name(is), name(other)),
+        }
+    }
+
+    /// The same under new numbers; `None` where those that it told apart are one now.
+    fn renumbered(&self, number: &[IdentityId]) -> Option<Self> {
+        let new = |id: &IdentityId| number.get(*id as usize).copied().filter(|id| *id != NOBODY);
+        Some(match self {
+            Self::Split(id) => Self::Split(new(id)?),
+            Self::Drift(id) => Self::Drift(new(id)?),
+            Self::Switch(is, other) => match (new(is)?, new(other)?) {
+                (is, other) if is == other => return None,
+                (is, other) => Self::Switch(is, other),
+            },
+            Self::Merge(all) => {
+                let mut all: Vec<IdentityId> = all.iter().filter_map(new).collect();
+                all.sort_unstable();
+                all.dedup();
+                Self::Merge(Some(all).filter(|all| all.len() > 1)?)
+            }
+        })
+    }
+}
+
+/// A disagreement, and the photo in which it was seen.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Doubt {
+    /// Its place in [`Findings::photos`].
+    pub(crate) photo: u32,
+    pub(crate) what: Disagreement,
+}
+
+/// A photo that was looked at.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct PhotoFinding {
+    #[serde(deserialize_with = "text::read_name")]
+    pub(crate) name: String,
+    /// Share of its pixels of which nothing is known.
+    pub(crate) unknown: f64,
+}
+
+/// Where an identity is seen, its pieces apart.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Seen {
+    /// One bit for each of [`Findings::photos`], 32 to a number, the lowest first.
+    photos: Vec<u32>,
+    /// Pixels in the small views that were looked at.
+    pixels: u64,
+    /// Mean share of its object in them, 0 to 1.
+    confidence: f64,
+}
+
+impl Seen {
+    /// Takes in that it has so many pixels in a photo.
+    pub(crate) fn add(&mut self, photo: usize, pixels: u64, confidence: f64) {
+        let mut bits = vec![0; photo / 32 + 1];
+        bits[photo / 32] = 1 << (photo % 32);
+        self.join(&Self { photos: bits, pixels, confidence });
+    }
+
+    fn join(&mut self, other: &Self) {
+        if self.photos.len() < other.photos.len() {
+            self.photos.resize(other.photos.len(), 0);
+        }
+        self.photos.iter_mut().zip(&other.photos).for_each(|(bits, more)| *bits |= more);
+        let sum = self.confidence * self.pixels as f64 + other.confidence * other.pixels as f64;
+        self.pixels += other.pixels;
+        self.confidence = sum / self.pixels.max(1) as f64;
+    }
+}
+
+/// What was noticed as objects and parts were found.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Findings {
+    /// The photos that were looked at.
+    pub(crate) photos: Vec<PhotoFinding>,
+    /// Where each identity is seen, by number less one.
+    seen: Vec<Seen>,
+    doubts: Vec<Doubt>,
+}
+
+/// What is told of an identity, its pieces included.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct IdentityFacts {
+    pub(crate) gaussians: usize,
+    /// Photos in which it is seen, if that is known.
+    pub(crate) photos: Option<usize>,
+    /// Mean share of its object in its pixels, if that is known.
+    pub(crate) confidence: Option<f64>,
+    /// Places in [`Findings::doubts`].
+    pub(crate) doubts: Vec<usize>,
+}
+
+impl Findings {
+    pub(crate) fn new(photos: Vec<PhotoFinding>, seen: Vec<Seen>, mut doubts: Vec<Doubt>) -> Self {
+        doubts.truncate(MOST_DOUBTS);
+        Self { photos, seen, doubts }
+    }
+
+    pub(crate) fn doubts(&self) -> &[Doubt] {
+        &self.doubts
+    }
+
+    /// The photo of a doubt.
+    pub(crate) fn photo(&self, doubt: &Doubt) -> &str {
+        self.photos.get(doubt.photo as usize).map_or("", |p| &p.name)
+    }
+
+    /// Mean share of a photo of which nothing is known; `None` without photos.
+    pub(crate) fn unknown(&self) -> Option<f64> {
+        let sum: f64 = self.photos.iter().map(|p| p.unknown).sum();
+        (!self.photos.is_empty()).then(|| sum / self.photos.len() as f64)
+    }
+
+    /// Whether it speaks of nothing that is not there.
+    pub(crate) fn is_valid(&self, identities: &Identities) -> bool {
+        let share = |v: f64| (0.0..=1.0).contains(&v);
+        let is_there = |id: &IdentityId| identities.get(*id).is_some();
+        self.photos.iter().all(|p| share(p.unknown))
+            && self.seen.len() == identities.len()
+            && self.seen.iter().all(|s| share(s.confidence) && s.photos.len() <= self.photos.len().div_ceil(32))
+            && self.doubts.len() <= MOST_DOUBTS
+            && self.doubts.iter().all(|d| (d.photo as usize) < self.photos.len() && d.what.about().iter().all(is_there))
+    }
+
+    /// One more identity, of which nothing was noticed.
+    pub(crate) fn add_identity(&mut self) {
+        self.seen.push(Seen::default());
+    }
+
+    /// Where an identity is seen does not hold any more.
+    pub(crate) fn forget_seen(&mut self, id: IdentityId) {
+        if let Some(seen) = (id as usize).checked_sub(1).and_then(|i| self.seen.get_mut(i)) {
+            *seen = Seen::default();
+        }
+    }
+
+    /// Identities have new numbers, by the old ones from 0, and some are one now; `len` are left.
+    pub(crate) fn renumber(&mut self, number: &[IdentityId], len: usize) {
+        let mut seen = vec![Seen::default(); len];
+        for (old, new) in self.seen.iter().zip(number.iter().skip(1)) {
+            if let Some(seen) = (*new as usize).checked_sub(1).and_then(|i| seen.get_mut(i)) {
+                seen.join(old);
+            }
+        }
+        self.seen = seen;
+        let doubts = self.doubts.iter();
+        let renumbered = |d: &Doubt| Some(Doubt { photo: d.photo, what: d.what.renumbered(number)? });
+        self.doubts = doubts.filter_map(renumbered).collect();
+    }
+
+    /// What is told of every identity, by number; nobody first. `sizes` are their Gaussians.
+    pub(crate) fn facts(findings: Option<&Self>, identities: &Identities, sizes: &[usize]) -> Vec<IdentityFacts> {
+        let of = |gaussians: &usize| IdentityFacts { gaussians: *gaussians, ..IdentityFacts::default() };
+        let mut facts: Vec<IdentityFacts> = sizes.iter().map(of).collect();
+        let Some(findings) = findings else { return facts };
+        let mut seen = vec![Seen::default(); facts.len()];
+        for (id, own) in (1..).zip(&findings.seen) {
+            identities.ancestors(id).for_each(|at| seen[at as usize].join(own));
+        }
+        for (fact, seen) in facts.iter_mut().zip(&seen).filter(|(_, seen)| seen.pixels > 0) {
+            fact.photos = Some(seen.photos.iter().map(|bits| bits.count_ones() as usize).sum());
+            fact.confidence = Some(seen.confidence);
+        }
+        for (k, doubt) in findings.doubts.iter().enumerate() {
+            for id in doubt.what.about() {
+                for at in identities.ancestors(id) {
+                    let doubts = &mut facts[at as usize].doubts;
+                    // Of several of its pieces it is still one doubt.
+                    if doubts.last() != Some(&k) {
+                        doubts.push(k);
+                    }
+                }
+            }
+        }
+        facts
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Level;
+
+    /// A doll with an eye, a cat; two photos.
+    fn scene() -> (Identities, Findings) {
+        let mut all = Identities::default();
+        let doll = all.add(Level::Object, NOBODY, vec!["doll".into()]);
+        all.add(Level::Part, doll, vec!["eye".into()]);
+        all.add(Level::Object, NOBODY, vec!["cat".into()]);
+        let mut seen = vec![Seen::default(); 3];
+        seen[0].add(0, 30, 0.5);
+        seen[1].add(0, 10, 0.9);
+        seen[1].add(40, 10, 0.7);
+        let photo = |k: usize| PhotoFinding { name: format!("{k}.jpg"), unknown: if k == 0 { 0.41 } else { 0.0 } };
+        let doubts = vec![
+            Doubt { photo: 40, what: Disagreement::Merge(vec![2, 3]) },
+            Doubt { photo: 0, what: Disagreement::Switch(1, 3) },
+            Doubt { photo: 1, what: Disagreement::Split(3) },
+        ];
+        let found = Findings::new((0..41).map(photo).collect(), seen, doubts);
+        assert!(found.is_valid(&all) && (found.unknown().expect("photos") - 0.01).abs() < 1e-9);
+        (all, found)
+    }
+
+    #[test]
+    fn what_is_told_of_an_object_includes_its_pieces() {
+        let (all, found) = scene();
+        let facts = Findings::facts(Some(&found), &all, &[5, 7, 2, 1]);
+        let photos: Vec<_> = facts.iter().map(|f| f.photos).collect();
+        assert_eq!(photos, [None, Some(2), Some(2), None], "a photo counts once, and nothing is known of the cat");
+        let sure = facts[1].confidence.expect("seen");
+        assert!((sure - (30.0 * 0.5 + 10.0 * 0.9 + 10.0 * 0.7) / 50.0).abs() < 1e-9, "{sure}");
+        let doubts: Vec<_> = facts.iter().map(|f| f.doubts.clone()).collect();
+        assert_eq!(doubts, [vec![], vec![0, 1], vec![0], vec![0, 1, 2]]);
+        assert_eq!(facts[1].gaussians, 7);
+        let nothing = Findings::facts(None, &all, &[5, 7, 2, 1]);
+        assert!(nothing.iter().all(|f| f.photos.is_none() && f.doubts.is_empty()), "old scenes have none");
+        let told = found.doubts()[0].what.text(|id| all.full_name(id));
+        assert!(told.starts_with("one mask covers ") && told.contains("cat") && told.ends_with("kept apart"), "{told}");
+        assert_eq!(found.photo(&found.doubts()[0]), "40.jpg");
+    }
+
+    #[test]
+    fn what_still_holds_stays_when_numbers_change() {
+        let (all, mut found) = scene();
+        // The cat becomes the doll: what told them apart is settled, that there were two is not.
+        found.renumber(&[0, 1, 2, 1], 2);
+        let merged = [Disagreement::Merge(vec![1, 2]), Disagreement::Split(1)];
+        assert_eq!(found.doubts().iter().map(|d| d.what.clone()).collect::<Vec<_>>(), merged);
+        let mut left = Identities::default();
+        left.add(Level::Object, NOBODY, vec![]);
+        left.add(Level::Part, 1, vec![]);
+        assert!(found.is_valid(&left) && !found.is_valid(&all), "one identity less");
+        found.add_identity();
+        assert!(found.is_valid(&all));
+        found.forget_seen(2);
+        let facts = Findings::facts(Some(&found), &all, &[0; 4]);
+        assert_eq!([facts[1].photos, facts[2].photos, facts[3].photos], [Some(1), None, None]);
+    }
+
+    #[test]
+    fn what_speaks_of_nothing_that_is_there_is_refused() {
+        let (all, found) = scene();
+        for spoil in [
+            |f: &mut Findings| f.doubts[0].photo = 41,
+            |f: &mut Findings| f.doubts[0].what = Disagreement::Drift(4),
+            |f: &mut Findings| f.photos[0].unknown = f64::NAN,
+            |f: &mut Findings| f.seen[1].photos.push(1),
+            |f: &mut Findings| f.seen[1].confidence = 2.0,
+        ] {
+            let mut spoiled = found.clone();
+            spoil(&mut spoiled);
+            assert!(!spoiled.is_valid(&all));
+        }
+        let doubts = vec![Doubt { photo: 0, what: Disagreement::Split(1) }; MOST_DOUBTS + 5];
+        let many = Findings::new(found.photos.clone(), found.seen.clone(), doubts);
+        assert!(many.is_valid(&all) && many.doubts().len() == MOST_DOUBTS);
+    }
+}

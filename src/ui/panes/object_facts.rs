@@ -1,0 +1,238 @@
+//! What was noticed of objects and parts as they were found, in their list: its order, its numbers, and the doubts,
+//! each of which leads to its photo.
+
+use std::cmp::Ordering;
+
+use egui::containers::menu::MenuButton;
+use egui::{Button, ComboBox, RichText, Ui};
+use strum::{IntoStaticStr, VariantArray};
+
+use super::super::labels::ScreenNames;
+use super::super::state::AppState;
+use super::super::theme;
+use crate::math::format::{self, NONE, things};
+use crate::scene::findings::{Doubt, Findings, IdentityFacts};
+use crate::scene::{Dataset, Identities, IdentityId, SemanticMap, text};
+use crate::ui::actions::Action;
+
+/// What a list of objects and parts is sorted by.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, VariantArray, IntoStaticStr)]
+pub(super) enum SortKey {
+    #[default]
+    #[strum(serialize = "as found")]
+    Found,
+    #[strum(serialize = "by name")]
+    Name,
+    #[strum(serialize = "by Gaussians")]
+    Gaussians,
+    #[strum(serialize = "by photos")]
+    Photos,
+    #[strum(serialize = "by confidence")]
+    Confidence,
+    #[strum(serialize = "by doubts")]
+    Doubts,
+}
+
+/// The order of the list.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Order {
+    pub(super) key: SortKey,
+    /// The other way round: names from the end of the alphabet, numbers from the least.
+    pub(super) reversed: bool,
+}
+
+impl Order {
+    /// What most doubts are about comes first.
+    pub(super) fn by_doubts() -> Self {
+        Self { key: SortKey::Doubts, reversed: false }
+    }
+
+    /// The choice of it.
+    pub(super) fn show(&mut self, ui: &mut Ui) {
+        let turn = match self.reversed {
+            true => Button::new("\u{23f6}"),
+            false => Button::new("\u{23f7}"),
+        };
+        if self.key != SortKey::Found {
+            let turn = ui.add(turn.small()).on_hover_text("Reverse the order");
+            if turn.accessible_name("Reverse the order").clicked() {
+                self.reversed = !self.reversed;
+            }
+        }
+        let chosen: &str = self.key.into();
+        let list = ComboBox::from_id_salt("order").selected_text(RichText::new(chosen).small()).width(96.0);
+        let list = list.show_ui(ui, |ui| {
+            for &key in SortKey::VARIANTS {
+                let text: &str = key.into();
+                if ui.selectable_label(self.key == key, text).clicked() {
+                    *self = Self { key, reversed: false };
+                }
+            }
+        });
+        list.response.on_hover_text("Order of the list").accessible_name("Order of the list");
+    }
+}
+
+/// What is told of the rows.
+pub(super) struct Facts<'a> {
+    identities: &'a Identities,
+    names: &'a ScreenNames,
+    /// By number.
+    facts: &'a [IdentityFacts],
+    findings: Option<&'a Findings>,
+    dataset: Option<&'a Dataset>,
+    order: Order,
+}
+
+impl<'a> Facts<'a> {
+    pub(super) fn new(state: &'a AppState, map: &'a SemanticMap, order: Order) -> Self {
+        let dataset = state.scene.as_ref().and_then(|s| s.dataset.as_deref());
+        let (identities, findings) = (&map.identities, map.findings.as_ref());
+        Self { identities, names: &state.labels, facts: &state.facts, findings, dataset, order }
+    }
+
+    fn of(&self, id: IdentityId) -> Option<&IdentityFacts> {
+        self.facts.get(id as usize)
+    }
+
+    /// Puts identities in order; those that nothing is known of stay last.
+    pub(super) fn sort(&self, ids: &mut [IdentityId]) {
+        let Order { key, reversed } = self.order;
+        let turned = |order: Ordering| if reversed { order.reverse() } else { order };
+        let number = |id: IdentityId| -> Option<f64> {
+            let fact = self.of(id)?;
+            match key {
+                SortKey::Photos => fact.photos.map(|n| n as f64),
+                SortKey::Confidence => fact.confidence,
+                SortKey::Doubts => Some(fact.doubts.len() as f64),
+                _ => Some(fact.gaussians as f64),
+            }
+        };
+        match key {
+            SortKey::Found => {}
+            SortKey::Name => {
+                let name = |id: IdentityId| self.names.name(self.identities, id).to_lowercase();
+                ids.sort_by(|a, b| turned(name(*a).cmp(&name(*b))));
+            }
+            _ => ids.sort_by(|a, b| match (number(*a), number(*b)) {
+                (Some(a), Some(b)) => turned(b.total_cmp(&a)),
+                (a, b) => b.is_some().cmp(&a.is_some()),
+            }),
+        }
+    }
+
+    /// What stands at the end of a row, and what that is.
+    pub(super) fn number(&self, id: IdentityId) -> (String, &'static str) {
+        let Some(fact) = self.of(id) else { return (NONE.into(), "") };
+        let known = |n: Option<usize>| n.map_or_else(|| NONE.into(), |n| format::count(n as u64));
+        match self.order.key {
+            SortKey::Photos => (known(fact.photos), "Photos in which it is seen"),
+            SortKey::Confidence => (sure(fact), "Mean share of its pixels that is its own"),
+            SortKey::Doubts => (known(Some(fact.doubts.len())), "Photos that disagreed"),
+            _ => (known(Some(fact.gaussians)), "Gaussians"),
+        }
+    }
+
+    /// One line on where it is seen; `None` if that is not known.
+    pub(super) fn line(&self, id: IdentityId) -> Option<String> {
+        let fact = self.of(id)?;
+        let (seen, of) = (fact.photos?, self.findings?.photos.len());
+        Some(format!("Seen in {seen} of {}, {} of its pixels are its own.", things(of, "photo"), sure(fact)))
+    }
+
+    /// A sign on a row with doubts. A click on one goes to its photo and selects what it is about.
+    pub(super) fn doubts(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
+        let (Some(fact), Some(findings)) = (self.of(id), self.findings) else { return };
+        let doubts: Vec<&Doubt> = fact.doubts.iter().filter_map(|k| findings.doubts().get(*k)).collect();
+        let Some(first) = doubts.first() else { return };
+        let sign = RichText::new(things(doubts.len(), "doubt")).small().color(theme::warning());
+        let name = format!("{} about {}", things(doubts.len(), "doubt"), self.names.full_name(self.identities, id));
+        let told = |most: usize| {
+            let lines = doubts.iter().take(most).map(|d| self.sentence(findings, d));
+            lines.collect::<Vec<_>>().join("\n")
+        };
+        ui.spacing_mut().button_padding.x = 4.0;
+        let sign = Button::new(sign).frame_when_inactive(false);
+        if doubts.len() == 1 {
+            if ui.add(sign).on_hover_text(told(1)).accessible_name(name).clicked() {
+                self.go(findings, first, id, actions);
+            }
+            return;
+        }
+        let (menu, _) = MenuButton::from_button(sign).ui(ui, |ui| {
+            ui.set_max_width(340.0);
+            egui::ScrollArea::vertical().max_height(300.0).show(ui, |ui| {
+                for doubt in &doubts {
+                    if ui.add(Button::new(self.sentence(findings, doubt)).wrap()).clicked() {
+                        self.go(findings, doubt, id, actions);
+                        ui.close();
+                    }
+                }
+            });
+        });
+        menu.on_hover_text(told(5)).accessible_name(name);
+    }
+
+    fn sentence(&self, findings: &Findings, doubt: &Doubt) -> String {
+        let name = |id: IdentityId| self.names.full_name(self.identities, id);
+        let photo = text::elided(findings.photo(doubt).rsplit('/').next().unwrap_or_default(), 40);
+        format!("In {photo} {}.", doubt.what.text(name))
+    }
+
+    fn go(&self, findings: &Findings, doubt: &Doubt, row: IdentityId, actions: &mut Vec<Action>) {
+        let is_within = |id: &IdentityId| self.identities.ancestors(*id).any(|at| at == row);
+        let about = doubt.what.about().into_iter().find(is_within);
+        let photo = findings.photo(doubt);
+        let place = self.dataset.and_then(|d| d.photos.iter().position(|p| p.name == photo));
+        actions.extend(place.map(Action::GoToPhoto));
+        actions.push(Action::Select(about));
+    }
+}
+
+fn sure(fact: &IdentityFacts) -> String {
+    fact.confidence.map_or_else(|| NONE.into(), |c| format!("{:.0} %", 100.0 * c))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Level, NOBODY};
+
+    #[test]
+    fn rows_are_sorted_by_what_is_told_of_them_and_the_unknown_comes_last() {
+        let mut all = Identities::default();
+        for name in ["mug", "Lamp", "apple"] {
+            all.add(Level::Object, NOBODY, vec![name.into()]);
+        }
+        let fact = |gaussians, photos, doubts: usize| IdentityFacts {
+            gaussians,
+            photos,
+            confidence: photos.map(|n| 0.1 * n as f64),
+            doubts: (0..doubts).collect(),
+        };
+        let facts = [fact(9, None, 0), fact(5, Some(3), 0), fact(7, None, 2), fact(6, Some(8), 1)];
+        let (names, findings) = (ScreenNames::default(), Findings::default());
+        let sorted = |key, reversed| {
+            let order = Order { key, reversed };
+            let rows = Facts {
+                identities: &all,
+                names: &names,
+                facts: &facts,
+                findings: Some(&findings),
+                dataset: None,
+                order,
+            };
+            let mut ids = [1, 2, 3];
+            rows.sort(&mut ids);
+            (ids, rows.number(2).0)
+        };
+        assert_eq!(sorted(SortKey::Found, true), ([1, 2, 3], "7".into()));
+        assert_eq!(sorted(SortKey::Name, false).0, [3, 2, 1], "letters' case does not matter");
+        assert_eq!(sorted(SortKey::Name, true).0, [1, 2, 3]);
+        assert_eq!((sorted(SortKey::Gaussians, false).0, sorted(SortKey::Gaussians, true).0), ([2, 3, 1], [1, 3, 2]));
+        assert_eq!(sorted(SortKey::Photos, false), ([3, 1, 2], NONE.into()));
+        assert_eq!(sorted(SortKey::Photos, true).0, [1, 3, 2], "nothing is known of the lamp");
+        assert_eq!(sorted(SortKey::Confidence, true).0, [1, 3, 2]);
+        assert_eq!(sorted(SortKey::Doubts, false), ([2, 3, 1], "2".into()));
+    }
+}
