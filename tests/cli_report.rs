@@ -162,7 +162,7 @@ fn everything_is_exported(run: &dyn Fn(&[&str]) -> Done, scene: &str, out: &str)
     run(&["segment", scene, "--all", "--out", out, "--masks", "coco", "--photos", "none", "-q"]).ok();
     assert_eq!(std::fs::read_dir(format!("{out}/isat")).unwrap().count(), 0, "of the export before");
     std::fs::write(format!("{out}/coco.json"), "mine").unwrap();
-    run(&["segment", scene, "--all", "--out", out, "-q"]).fails_with(1);
+    run(&["segment", scene, "--all", "--out", out, "-q"]).fails_with(2);
     run(&["segment", scene, "--all", "--out", scene]).fails_with(1);
     run(&["segment", scene, "--out", out]).fails_with(2);
     run(&["segment", scene, "box 1", "--all", "--out", out]).fails_with(2);

@@ -105,6 +105,8 @@ pub(crate) fn polygons(mask: &Mask) -> Vec<Vec<[i32; 2]>> {
         let at = outlines.iter().position(|outline| is_around(outline, beside));
         at.into_iter().for_each(|at| cut(&mut found[at], &vertices(&hole)));
     }
+    // Where a piece is a pixel wide, both of its sides are one column.
+    found.iter_mut().for_each(Vec::dedup);
     found
 }
 

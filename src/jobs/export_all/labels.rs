@@ -1,16 +1,20 @@
 //! Masks of photos as label files, in the forms that [`Labels`](crate::io::labels::Labels) reads.
 
+use std::collections::HashMap;
+use std::path::Path;
+
 use image::ColorType;
 use serde_json::{Value, json};
 
 use super::MaskFormat;
 use super::folder::ExportFolder;
 use crate::io::labels::{Region, isat, synth_ids};
+use crate::io::{IoError, atomic};
 use crate::jobs::coco::Coco;
 use crate::jobs::{JobError, export};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::identity::whole_names::BETWEEN;
-use crate::scene::{Camera, Identities, IdentityId, Level, NOBODY};
+use crate::scene::{Camera, Identities, Identity, IdentityId, Level, NOBODY};
 
 pub(super) use crate::io::labels::stem;
 
@@ -66,7 +70,7 @@ impl<'a> LabelWriter<'a> {
         }
         if self.masks.contains(&MaskFormat::Isat) {
             let document = isat::document(name, [view.width_px, view.height_px], &regions);
-            folder.write(&format!("isat/{stem}.json"), |path| export::json(path, &document))?;
+            folder.write(&format!("isat/{stem}.json"), |path| compact(path, &document))?;
         }
         Ok(())
     }
@@ -105,23 +109,28 @@ impl<'a> LabelWriter<'a> {
             folder.write(&format!("ids/{}", synth_ids::LIST_FILE), |path| export::json(path, &list))?;
         }
         if self.masks.contains(&MaskFormat::Coco) {
-            let category = |(id, i, full): (IdentityId, &crate::scene::Identity, String)| {
+            let category = |(id, i, full): (IdentityId, &Identity, String)| {
                 let parent = Some(i.parent).filter(|id| *id != NOBODY);
                 json!({ "id": id, "name": full, "supercategory": i.level, "parent": parent })
             };
             let categories = ids().map(category).collect();
             let document = self.coco.document(categories);
-            folder.write("coco.json", |path| export::json(path, &document))?;
+            folder.write("coco.json", |path| compact(path, &document))?;
         }
         Ok(())
     }
+}
+
+/// Lists of thousands of numbers, not one a line.
+fn compact(path: &Path, value: &Value) -> Result<(), IoError> {
+    atomic::write(path, |w| Ok(serde_json::to_writer(w, value)?))
 }
 
 /// Labels where no other identity has them, else labels with those of their wholes.
 fn categories(all: &Identities) -> Vec<String> {
     let mut found: Vec<String> = Vec::with_capacity(all.len());
     let labels: Vec<String> = all.iter().map(|(id, _)| all.label(id)).collect();
-    let mut counts = std::collections::HashMap::new();
+    let mut counts = HashMap::new();
     labels.iter().for_each(|label| *counts.entry(label.as_str()).or_insert(0) += 1);
     for ((_, identity), label) in all.iter().zip(&labels) {
         let whole = (identity.parent as usize).checked_sub(1).map(|i| found[i].as_str());

@@ -206,9 +206,9 @@ fn ask_all(scene: &str, all: &Identities) -> (usize, Vec<String>, Vec<String>) {
         // Every word of every name is compared: of long lists, some.
         let is_long = all.len() >= 200;
         for (id, identity) in
-            all.iter().filter(|(id, _)| understanding == Understanding::Names || !is_long || id % 50 == 0)
+            all.iter().filter(|(id, _)| understanding == Understanding::Names || !is_long || id % 200 == 0)
         {
-            let is_full = !is_long || id % 50 == 0;
+            let is_full = !is_long || id % 200 == 0;
             for name in identity.names.iter().filter(|_| understanding == Understanding::Names) {
                 let (_, chosen) = match by_grammar(all, name).filter(|_| is_full) {
                     Some(reading) => how.tell(&reading),
