@@ -9,8 +9,8 @@ use super::JobError;
 use crate::pipeline::observer::Observer;
 use crate::pipeline::semantics::edit::{self, Edit};
 use crate::pipeline::semantics::selection::hierarchy::Hierarchy;
-use crate::pipeline::semantics::selection::marks::Marks;
 pub use crate::pipeline::semantics::selection::marks::Stroke;
+use crate::pipeline::semantics::selection::marks::StrokeMarks;
 use crate::pipeline::semantics::timing::ms_since;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, HomeView, Identities, IdentityId, NOBODY, SemanticMap};
@@ -45,7 +45,7 @@ pub struct SelectRequest {
 #[derive(Clone, Debug)]
 pub struct Selected {
     hierarchy: Arc<Hierarchy>,
-    marks: Marks,
+    marks: StrokeMarks,
     /// Indices, rising.
     pub(crate) gaussians: Vec<u32>,
     /// Objects and parts as they would be with it, and which of them it would be; `NOBODY` if nothing is selected.

@@ -12,7 +12,7 @@ use super::super::state::AppState;
 use super::super::{keys, theme};
 use super::Viewport;
 use super::outline;
-use super::picking::Drawn;
+use super::picking::DrawnOutline;
 use crate::jobs::query::ViewMaps;
 use crate::jobs::select::{SelectFor, Selected, Stroke, kept_as};
 use crate::math::format;
@@ -48,7 +48,7 @@ pub(crate) struct SelectTool {
     pub(crate) selected: Option<Arc<Selected>>,
     /// Objects and parts as they would be.
     preview: Option<Versioned<SemanticMap>>,
-    drawn: Drawn,
+    drawn: DrawnOutline,
 }
 
 impl SelectTool {
@@ -65,7 +65,7 @@ impl SelectTool {
             running: None,
             selected: None,
             preview: None,
-            drawn: Drawn::default(),
+            drawn: DrawnOutline::default(),
         }
     }
 

@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, VecDeque};
 use super::Category;
 use crate::math::grid::{neighbors, regions};
 use crate::pipeline::semantics::selection::hierarchy::Hierarchy;
-use crate::pipeline::semantics::selection::marks::{Marks, Stroke};
+use crate::pipeline::semantics::selection::marks::{Stroke, StrokeMarks};
 use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderError, RenderSettings, Renderer};
@@ -16,6 +16,8 @@ use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Level, Mask};
 pub(crate) const STROKES: usize = 3;
 /// Half of a stroke's width, px.
 const RADIUS_PX: usize = 3;
+/// Share of a thing that is wrong in one piece, from which somebody corrects it.
+const SEEN: f64 = 0.02;
 /// Pixels of a thing from which it is asked for.
 const LEAST_PX: usize = 60;
 
@@ -62,7 +64,7 @@ pub(crate) fn rows(
             let of: Vec<IdentityId> = selected.iter().map(|s| IdentityId::from(*s)).collect();
             Ok(ViewMap::render(&mut renderer, cloud, &of, &all, &views[k].camera, settings)?.mask(&all, 1))
         };
-        let (mut marks, mut selected) = (Marks::default(), vec![false; cloud.len()]);
+        let (mut marks, mut selected) = (StrokeMarks::default(), vec![false; cloud.len()]);
         let mut row = StrokeRow {
             name: name.to_owned(),
             level: truth.level,
@@ -102,7 +104,10 @@ fn correction(truth: &Mask, now: &Mask) -> Option<(Mask, bool)> {
     };
     let (missing, extra) = (largest(truth, now), largest(now, truth));
     let is_plus = missing.as_ref().map_or(0, |m| m.1) >= extra.as_ref().map_or(0, |e| e.1);
-    let (region, _) = if is_plus { missing? } else { extra? };
+    let (region, area) = if is_plus { missing? } else { extra? };
+    if (area as f64) < SEEN * truth.area() as f64 {
+        return None;
+    }
     Some((stroke_through(&region), is_plus))
 }
 

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::marks::Marks;
-use super::surface::Surface;
+use super::marks::StrokeMarks;
+use super::surface::SplatSurface;
 use crate::pipeline::observer::Observer;
 use crate::pipeline::semantics::error::FindError;
 use crate::pipeline::semantics::regions::segment::unlike;
@@ -32,10 +32,10 @@ impl Hierarchy {
         settings: &RenderSettings,
         observer: &mut dyn Observer,
     ) -> Result<Self, FindError> {
-        Ok(Self::of(&Surface::new(cloud, cameras, settings, observer)?))
+        Ok(Self::of(&SplatSurface::new(cloud, cameras, settings, observer)?))
     }
 
-    fn of(surface: &Surface) -> Self {
+    fn of(surface: &SplatSurface) -> Self {
         let (leaf, count) = leaves(surface);
         let mut pieces = vec![Piece { area: 0.0, sums: vec![0.0; 3] }; count];
         for (piece, leaf) in surface.pieces.iter().zip(&leaf) {
@@ -60,7 +60,7 @@ impl Hierarchy {
     /// Stroke by stroke, the labels of the tree's nodes that cost least: a mark that is not followed costs, and so does
     /// each node that is not what it is a piece of, the less the longer it stood alone while the tree grew. Area that
     /// changes costs by the square of the stroke's length, so that a stroke is about something of its own size.
-    pub(crate) fn select(&self, marks: &Marks, from: &[usize]) -> Vec<bool> {
+    pub(crate) fn select(&self, marks: &StrokeMarks, from: &[usize]) -> Vec<bool> {
         let mut gaussians = vec![false; self.leaf.len()];
         from.iter().for_each(|&i| gaussians[i] = true);
         let mut share = vec![[0_u32; 2]; self.leaves];
@@ -121,13 +121,13 @@ impl Hierarchy {
 }
 
 /// What it costs not to follow a stroke at all, in nodes that were cut off though nothing tells them apart.
-const MARK: f64 = 40.0;
+const MARK: f64 = 10.0;
 /// The same for area of the square of a stroke's length that the first stroke selects, and that a later one changes.
 const FIRST: f64 = 0.01;
 const CHANGE: f64 = 0.5;
 
 /// Gaussians that look the same, a few together: the leaf of each, and how many there are.
-fn leaves(surface: &Surface) -> (Vec<u32>, usize) {
+fn leaves(surface: &SplatSurface) -> (Vec<u32>, usize) {
     let mut order: Vec<(f64, usize)> = (surface.edges.iter().zip(&surface.borders).enumerate())
         .map(|(i, (&(a, b), border))| {
             let [a, b] = [a, b].map(|g| &surface.pieces[g as usize]);
@@ -217,8 +217,8 @@ mod tests {
         Stroke { camera, pixels: Mask::from_fn(W, H, near), is_plus }
     }
 
-    fn marks(cloud: &GaussianCloud, strokes: &[Stroke]) -> Marks {
-        let mut marks = Marks::default();
+    fn marks(cloud: &GaussianCloud, strokes: &[Stroke]) -> StrokeMarks {
+        let mut marks = StrokeMarks::default();
         for stroke in strokes {
             marks.add(&mut Renderer::new(), cloud, &RenderSettings::default(), stroke).expect("drawn");
         }

@@ -28,20 +28,20 @@ pub struct Stroke {
 
 /// What was marked.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Marks {
-    pub(super) strokes: Vec<Marked>,
+pub(crate) struct StrokeMarks {
+    pub(super) strokes: Vec<StrokeMark>,
 }
 
 /// The Gaussians that a stroke shows, and how much of each, px.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Marked {
+pub(super) struct StrokeMark {
     pub(super) weights: BTreeMap<u32, f32>,
     pub(super) is_plus: bool,
     /// The square of its length at the depth of what it shows, at least some times its area: square units.
     pub(super) size: f64,
 }
 
-impl Marks {
+impl StrokeMarks {
     /// Strokes so far.
     pub(crate) fn len(&self) -> usize {
         self.strokes.len()
@@ -93,7 +93,7 @@ impl Marks {
             }
         }
         let size = size_px2(&stroke.pixels) * units_per_px(cloud, &stroke.camera, &weights).powi(2);
-        self.strokes.push(Marked { weights, is_plus: stroke.is_plus, size });
+        self.strokes.push(StrokeMark { weights, is_plus: stroke.is_plus, size });
         Ok(())
     }
 }

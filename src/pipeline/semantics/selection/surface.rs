@@ -28,7 +28,7 @@ const LEAST_SEEN: f32 = 0.1;
 const SOLID: f32 = 0.3;
 
 /// A cloud's surface.
-pub(super) struct Surface {
+pub(super) struct SplatSurface {
     /// Of each Gaussian: area, square units, and the sum of its color's planes over that.
     pub(super) pieces: Vec<Piece>,
     /// Neighbors, the smaller index first.
@@ -46,7 +46,7 @@ struct Look {
     areas: Vec<f32>,
 }
 
-impl Surface {
+impl SplatSurface {
     /// Looks at the Gaussians through some of these cameras.
     pub(super) fn new(
         cloud: &GaussianCloud,

@@ -30,12 +30,12 @@ pub struct Picking {
     wanted: bool,
     /// What the open menu is about.
     menu: Option<IdentityId>,
-    outlines: [Drawn; 2],
+    outlines: [DrawnOutline; 2],
 }
 
 /// An outline on screen.
 #[derive(Default)]
-pub(super) struct Drawn {
+pub(super) struct DrawnOutline {
     /// View, objects and identity that it was drawn for.
     of: Option<(u64, u64, IdentityId)>,
     /// Where it lies in the view, px; `None` if it has no pixel there.
@@ -121,7 +121,7 @@ impl Picking {
     }
 }
 
-impl Drawn {
+impl DrawnOutline {
     pub(super) fn paint(
         &mut self,
         ui: &Ui,
