@@ -7,7 +7,7 @@ use super::progress::Console;
 use super::{CliError, output, view};
 use crate::jobs::edit::{self, EditRequest};
 use crate::jobs::select::{self, SelectFor, SelectRequest, Selected, Stroke, kept_as};
-use crate::jobs::{Scene, export, query};
+use crate::jobs::{JobError, Scene, export, query};
 use crate::scene::{LevelFilter, Mask, NOBODY};
 
 /// Radius of a click as a share of the view's width.
@@ -42,7 +42,10 @@ fn place(text: &str) -> Result<[f32; 2], String> {
 
 /// Selects what is clicked on, keeps it if that is wanted, and writes it to `out`.
 pub(crate) fn run(scene: &Scene, args: &ClickArgs, out: Option<&PathBuf>, quiet: bool) -> Result<(), CliError> {
-    let map = Arc::new(scene.semantics().unwrap_or_else(|_| select::empty_map(&scene.cloud)));
+    let map = Arc::new(match scene.semantics() {
+        Err(JobError::NoObjects(_)) => select::empty_map(&scene.cloud),
+        map => map?,
+    });
     let whole = match &args.part_of {
         Some(text) => query::identities(&map, text, LevelFilter::Auto, 1)?.first().copied().unwrap_or(NOBODY),
         None => NOBODY,

@@ -65,18 +65,20 @@ impl Selected {
 /// Adds the stroke, or takes the last one back.
 pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Result<Selected, JobError> {
     let SelectRequest { cloud, settings, map, purpose, before, stroke, .. } = request;
+    // Where training has changed the Gaussians meanwhile, it begins anew.
+    let before = before.as_ref().filter(|before| before.hierarchy.gaussians() == cloud.len());
     let hierarchy = match before {
         Some(before) => Arc::clone(&before.hierarchy),
         None => Arc::new(Hierarchy::new(cloud, &views(&request.cameras, &request.home), settings, observer)?),
     };
     let start = Instant::now();
-    let mut marks = before.as_ref().map(|b| b.marks.clone()).unwrap_or_default();
+    let mut marks = before.map(|b| b.marks.clone()).unwrap_or_default();
     match stroke {
         Some(stroke) => marks.add(&mut Renderer::new(), cloud, settings, stroke)?,
         None => marks.remove_last(),
     }
     let from = match purpose {
-        SelectFor::Extent(id) => map.members(*id),
+        SelectFor::Extent(id) => map.members(*id).into_iter().filter(|i| *i < cloud.len()).collect(),
         SelectFor::New(_) => Vec::new(),
     };
     let selected = hierarchy.select(&marks, &from);

@@ -55,6 +55,11 @@ impl Hierarchy {
         Self { leaf, leaves: count, tree }
     }
 
+    /// How many Gaussians it is of.
+    pub(crate) fn gaussians(&self) -> usize {
+        self.leaf.len()
+    }
+
     /// The Gaussians that marks select, beginning with those `from` which there is to correct (indices).
     ///
     /// Stroke by stroke, the labels of the tree's nodes that cost least: a mark that is not followed costs, and so does
