@@ -145,13 +145,15 @@ impl SelectTool {
                     let name = TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80);
                     ui.add(name.desired_width(130.0)).accessible_name("Name of what is selected");
                     let text = if of == NOBODY { "an object".to_owned() } else { format!("part of {}", all.label(of)) };
-                    ComboBox::from_id_salt("whole").selected_text(text).width(120.0).show_ui(ui, |ui| {
+                    let whole = ComboBox::from_id_salt("whole").selected_text(text).width(120.0);
+                    let whole = whole.show_ui(ui, |ui| {
                         ui.selectable_value(&mut self.purpose, SelectFor::New(NOBODY), "an object");
                         for (id, _) in all.iter().filter(|(_, i)| i.level == Level::Object) {
                             let text = format!("part of {}", all.label(id));
                             ui.selectable_value(&mut self.purpose, SelectFor::New(id), text);
                         }
                     });
+                    whole.response.accessible_name("What it becomes");
                 });
             }
             ui.horizontal(|ui| {
