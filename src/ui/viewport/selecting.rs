@@ -39,6 +39,8 @@ pub(crate) struct SelectTool {
     /// Places of the window that the stroke under way went through, and whether it takes away.
     line: Vec<Pos2>,
     line_takes_away: bool,
+    /// The view in which it was begun.
+    line_camera: Option<Camera>,
     /// Whether that line waits to be taken in: it stays on screen.
     is_drawn: bool,
     /// Strokes that wait for their turn; `None` takes the last one back.
@@ -60,6 +62,7 @@ impl SelectTool {
             takes_away: false,
             line: Vec::new(),
             line_takes_away: false,
+            line_camera: None,
             is_drawn: false,
             waiting: VecDeque::new(),
             running: None,
@@ -223,15 +226,13 @@ impl Viewport {
         if tool.running.is_some_and(|job| job <= state.short_jobs_done) {
             tool.running = None;
         }
-        // One that is late is not what the eye sees.
-        if picture.ticket != self.requests.ticket() {
-            return;
-        }
         let Some(pos) = response.interact_pointer_pos() else { return };
         if response.drag_started_by(PointerButton::Primary) || response.clicked() {
             tool.is_drawn = false;
             tool.line = response.ctx.input(|i| i.pointer.press_origin()).into_iter().collect();
             tool.line_takes_away = tool.takes_away != response.ctx.input(|i| i.modifiers.shift);
+            // What the eye sees there, though a newer picture may be on its way.
+            tool.line_camera = Some(picture.camera.limited_to(SIDE_PX));
         }
         let is_dragged = response.dragged_by(PointerButton::Primary);
         if is_dragged || response.clicked() {
@@ -240,8 +241,8 @@ impl Viewport {
         if (response.drag_stopped_by(PointerButton::Primary) || response.clicked())
             && !tool.line.is_empty()
             && !tool.is_drawn
+            && let Some(camera) = tool.line_camera.take()
         {
-            let camera = picture.camera.limited_to(SIDE_PX);
             let pixels = tool.pixels(shown, &camera);
             if !pixels.is_empty() {
                 tool.waiting.push_back(Some(Stroke { camera, pixels, is_plus: !tool.line_takes_away }));

@@ -37,6 +37,8 @@ pub(crate) struct StrokeMarks {
 pub(super) struct StrokeMark {
     pub(super) weights: BTreeMap<u32, f32>,
     pub(super) is_plus: bool,
+    /// Whether it is as long as it is wide.
+    pub(super) is_click: bool,
     /// The square of its length at the depth of what it shows, at least some times its area: square units.
     pub(super) size: f64,
 }
@@ -92,20 +94,22 @@ impl StrokeMarks {
                 }
             }
         }
-        let size = size_px2(&stroke.pixels) * units_per_px(cloud, &stroke.camera, &weights).powi(2);
-        self.strokes.push(StrokeMark { weights, is_plus: stroke.is_plus, size });
+        let (length2, area) = (length_px2(&stroke.pixels), stroke.pixels.area() as f64);
+        let is_click = length2 < 3.0 * area;
+        let size = length2.max(CLICK * area) * units_per_px(cloud, &stroke.camera, &weights).powi(2);
+        self.strokes.push(StrokeMark { weights, is_plus: stroke.is_plus, is_click, size });
         Ok(())
     }
 }
 
-/// The square of a stroke's length, at least [`CLICK`] times its area, square px.
-fn size_px2(pixels: &Mask) -> f64 {
+/// The square of a stroke's length, square px.
+fn length_px2(pixels: &Mask) -> f64 {
     let at = |i: usize| DVec2::new((i % pixels.width_px()) as f64, (i / pixels.width_px()) as f64);
     let area = pixels.area() as f64;
     let mean = pixels.pixels().map(at).sum::<DVec2>() / area;
     let variance = pixels.pixels().map(|i| at(i).distance_squared(mean)).sum::<f64>() / area;
     // A line of length l has a variance of l squared over 12.
-    (12.0 * variance).max(CLICK * area)
+    12.0 * variance
 }
 
 /// How large a pixel is where half of the weight lies in front.

@@ -18,6 +18,8 @@ use crate::scene::{Camera, GaussianCloud};
 
 /// Neighbors that each Gaussian looks for.
 const NEIGHBORS: usize = 10;
+/// How many times as far as the neighbors of either a neighbor may be.
+const FAR: f64 = 10.0;
 /// Longer side of the views, px.
 const SIDE_PX: u32 = 448;
 /// Most views that are looked at.
@@ -180,13 +182,16 @@ fn neighbors(cloud: &GaussianCloud) -> Vec<(u32, u32)> {
     let points: Vec<GeomWithData<[f64; 3], u32>> =
         cloud.positions.iter().zip(0..).map(|(p, i)| GeomWithData::new(p.map(f64::from), i)).collect();
     let tree = RTree::bulk_load(points.clone());
-    let mut edges: Vec<(u32, u32)> = points
-        .par_iter()
-        .flat_map_iter(|p| {
-            let around = tree.nearest_neighbor_iter(*p.geom()).take(NEIGHBORS + 1).filter(|q| q.data != p.data);
-            around.map(|q| (q.data.min(p.data), q.data.max(p.data))).collect::<Vec<_>>()
-        })
-        .collect();
+    let around = |p: &GeomWithData<[f64; 3], u32>| {
+        let nearest = tree.nearest_neighbor_iter_with_distance_2(*p.geom()).take(NEIGHBORS + 1);
+        nearest.map(|(q, far2)| (q.data, far2)).filter(|(q, _)| *q != p.data).collect::<Vec<_>>()
+    };
+    let around: Vec<Vec<(u32, f64)>> = points.par_iter().map(around).collect();
+    let reach: Vec<f64> = around.iter().map(|near| near.last().map_or(0.0, |(_, far2)| *far2)).collect();
+    let near = |(a, b, far2): &(u32, u32, f64)| *far2 <= FAR.powi(2) * reach[*a as usize].min(reach[*b as usize]);
+    let pairs =
+        (0..).zip(&around).flat_map(|(p, near)| near.iter().map(move |(q, far2)| (p.min(*q), p.max(*q), *far2)));
+    let mut edges: Vec<(u32, u32)> = pairs.filter(near).map(|(a, b, _)| (a, b)).collect();
     edges.par_sort_unstable();
     edges.dedup();
     edges
