@@ -1,5 +1,7 @@
 //! Masks of one photo, and where they come from.
 
+use std::cmp::Reverse;
+
 use super::error::FindError;
 use crate::io::labels::{Labels, Region};
 use crate::pipeline::observer::Observer;
@@ -25,6 +27,11 @@ pub trait Segmenter {
     /// Whether it can say anything about a photo.
     fn covers(&self, photo: &Photo) -> bool;
 
+    /// The photo to begin with, by index: the first that it can say something about.
+    fn first(&self, photos: &[Photo]) -> Option<usize> {
+        photos.iter().position(|p| self.covers(p))
+    }
+
     /// Masks of a photo, undistorted and scaled to at most `max_side_px`, wholes before pieces.
     /// Empty where it finds nothing.
     fn segment(
@@ -39,6 +46,11 @@ pub trait Segmenter {
 /// no other contains them, and as parts of the smallest that does where one does.
 pub(crate) struct FileMasks(pub(crate) Labels);
 
+/// Most photos whose labels are counted, their longer side meanwhile, and pixels from which a region counts then.
+const COUNTED: usize = 64;
+const COUNTED_SIDE_PX: u32 = 512;
+const COUNTED_PX: usize = 12;
+
 /// Share of a region that must lie in another for it to be a piece of that.
 const INSIDE: f64 = 0.9;
 
@@ -49,6 +61,18 @@ impl Segmenter for FileMasks {
 
     fn covers(&self, photo: &Photo) -> bool {
         self.0.has(photo)
+    }
+
+    /// The photo whose labels tell most things apart.
+    fn first(&self, photos: &[Photo]) -> Option<usize> {
+        let covered: Vec<usize> = (0..photos.len()).filter(|i| self.covers(&photos[*i])).collect();
+        let counted = covered.iter().copied().step_by(covered.len().div_ceil(COUNTED).max(1));
+        // Labels that cannot be read are told where they are used.
+        let regions = |i: &usize| {
+            let regions = self.0.of(&photos[*i], COUNTED_SIDE_PX).unwrap_or_default();
+            regions.iter().filter(|r| r.mask.area() >= COUNTED_PX).count()
+        };
+        counted.max_by_key(|i| (regions(i), Reverse(*i)))
     }
 
     fn segment(&mut self, photo: &Photo, max_side_px: u32, _: &mut dyn Observer) -> Result<Vec<FoundMask>, FindError> {

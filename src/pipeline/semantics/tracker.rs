@@ -35,7 +35,7 @@ const SEE_SIDE_PX: u32 = 256;
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TrackOptions {
-    /// Photo to begin with; `None` = the first that the segmenter can say something about.
+    /// Photo to begin with; `None` = the segmenter's choice.
     pub(crate) seed: Option<usize>,
     /// Longer side of the masks that vote, px.
     pub(crate) max_side_px: u32,
@@ -136,7 +136,7 @@ pub(crate) fn track(
     let usable = |i: &usize| segmenter.covers(&photos[*i]);
     let first = match options.seed {
         Some(seed) => Some(seed).filter(|s| *s < photos.len()).filter(usable),
-        None => (0..photos.len()).find(usable),
+        None => segmenter.first(photos),
     };
     let first = first.ok_or(FindError::NoSeed(segmenter.name().to_owned()))?;
     let mut t = Tracker {
