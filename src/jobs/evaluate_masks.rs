@@ -18,7 +18,7 @@ use crate::pipeline::semantics::protocols::{
 use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
-use crate::pipeline::semantics::selection::hierarchy::Hierarchy;
+use crate::pipeline::semantics::splat_tree::hierarchy::Hierarchy;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
 use crate::scene::{Camera, Identities, IdentityId, LevelFilter, NOBODY, SemanticMap};

@@ -40,7 +40,7 @@ pub mod regions;
 pub mod relevancy;
 pub mod sam2_tracker;
 pub mod segmenter;
-pub(crate) mod selection;
+pub(crate) mod splat_tree;
 pub(crate) mod thumbnails;
 pub(crate) mod timing;
 pub(crate) mod tracker;

@@ -12,6 +12,7 @@ use super::floaters::drop_floaters;
 use super::propagate::extend;
 use super::sam2_tracker::{LABEL_SIDE_PX, Sam2Tracker};
 use super::segmenter::{FoundMask, Segmenter};
+use super::splat_tree::hierarchy::Hierarchy;
 use super::train_codes::{CODE_SIDE_PX, CodeView};
 use super::view_map::ViewMap;
 use super::votes::{Assignment, UNKNOWN, Votes};
@@ -164,7 +165,8 @@ pub(crate) fn track(
         follow_secs = start.elapsed().as_secs_f64() - encode_secs;
     }
     let views = loop {
-        let views = t.look(seeds.len(), observer)?;
+        let of = t.decided();
+        let views = t.look(seeds.len(), &of, observer)?;
         let needy =
             views.iter().filter(|v| !tried[v.photo] && (options.keep_masks || v.unknown > options.reseed_share));
         let needy = needy.filter(|v| segmenter.covers(&photos[v.photo]));
@@ -175,9 +177,12 @@ pub(crate) fn track(
             seeds.push(next);
         }
     };
+    let said = t.votes.clone();
     t.complete(&views, observer)?;
-    let views = t.look(seeds.len() + 1, observer)?;
-    let mut assignments = t.votes.decide(&t.identities, LEAST_VOTES);
+    let cameras: Vec<_> = photos.iter().map(|p| p.camera.clone()).collect();
+    let tree = Hierarchy::new(cloud, &cameras, settings, observer)?;
+    let mut assignments = tree.label(&said, &t.votes, &t.identities, LEAST_VOTES);
+    let views = t.look(seeds.len() + 1, &identities_of(&assignments), observer)?;
     extend(cloud, &mut assignments, HIDDEN_STEPS);
     drop_floaters(cloud, &t.identities, &mut assignments);
     let carry_secs = start.elapsed().as_secs_f64() - t.segment_secs - encode_secs - follow_secs;
@@ -217,7 +222,7 @@ struct Tracker<'a> {
 impl Tracker<'_> {
     /// Whose each Gaussian is by the votes so far.
     fn decided(&self) -> Vec<IdentityId> {
-        self.votes.decide(&self.identities, LEAST_VOTES).iter().map(|b| b.identity).collect()
+        identities_of(&self.votes.decide(&self.identities, LEAST_VOTES))
     }
 
     /// Looks how well each Gaussian is seen in every photo, before any votes.
@@ -333,20 +338,29 @@ impl Tracker<'_> {
             .map_err(|e| FindError::Render(photo.name.clone(), e))
     }
 
-    fn look(&mut self, round: usize, observer: &mut dyn Observer) -> Result<Vec<ViewReport>, FindError> {
+    /// Who is seen in the photos, where this is whose each Gaussian is.
+    fn look(
+        &mut self,
+        round: usize,
+        of: &[IdentityId],
+        observer: &mut dyn Observer,
+    ) -> Result<Vec<ViewReport>, FindError> {
         let mut ticker = Ticker::new(format!("Propagating identities to all views, round {round}"), self.photos.len());
         observer.proceed()?;
         // To see how much is unknown, small pictures will do.
         let side = self.options.max_side_px.min(256);
-        let of = self.decided();
         let mut views = Vec::with_capacity(self.photos.len());
         for photo in 0..self.photos.len() {
-            let map = self.map_of(photo, side, &of)?;
+            let map = self.map_of(photo, side, of)?;
             views.push(report(photo, &map, self.identities.len()));
             ticker.tick(photo + 1, observer)?;
         }
         Ok(views)
     }
+}
+
+fn identities_of(assignments: &[Assignment]) -> Vec<IdentityId> {
+    assignments.iter().map(|a| a.identity).collect()
 }
 
 /// The identities that two label maps of one view put in different places: both show them, and they

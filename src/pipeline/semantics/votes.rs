@@ -42,6 +42,11 @@ impl Votes {
         Self { by_gaussian: vec![Vec::new(); n], best: vec![0.0; n] }
     }
 
+    /// Votes for Gaussian `i`: identity and weight, px.
+    pub(crate) fn of(&self, i: usize) -> &[(IdentityId, f32)] {
+        &self.by_gaussian[i]
+    }
+
     /// Weight of all votes for Gaussian `i`, px.
     #[cfg(test)]
     fn weight(&self, i: usize) -> f32 {

@@ -5,8 +5,8 @@ use std::collections::{BTreeMap, VecDeque};
 
 use super::Category;
 use crate::math::grid::{neighbors, regions};
-use crate::pipeline::semantics::selection::hierarchy::Hierarchy;
-use crate::pipeline::semantics::selection::marks::{Stroke, StrokeMarks};
+use crate::pipeline::semantics::splat_tree::hierarchy::Hierarchy;
+use crate::pipeline::semantics::splat_tree::marks::{Stroke, StrokeMarks};
 use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderError, RenderSettings, Renderer};

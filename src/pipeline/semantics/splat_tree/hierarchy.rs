@@ -7,7 +7,7 @@ use super::surface::SplatSurface;
 use crate::pipeline::observer::Observer;
 use crate::pipeline::semantics::error::FindError;
 use crate::pipeline::semantics::regions::segment::unlike;
-use crate::pipeline::semantics::regions::tree::{Border, Piece, Tree, grow};
+use crate::pipeline::semantics::regions::tree::{Border, Node, Piece, Tree, grow};
 use crate::render::RenderSettings;
 use crate::scene::{Camera, GaussianCloud};
 
@@ -19,9 +19,11 @@ const LEAF_STEP: f64 = 3.0;
 #[derive(Debug)]
 pub(crate) struct Hierarchy {
     /// The leaf of each Gaussian.
-    leaf: Vec<u32>,
-    leaves: usize,
-    tree: Tree,
+    pub(super) leaf: Vec<u32>,
+    pub(super) leaves: usize,
+    pub(super) tree: Tree,
+    /// Area of each Gaussian, square units.
+    pub(super) area: Vec<f64>,
 }
 
 impl Hierarchy {
@@ -52,7 +54,7 @@ impl Hierarchy {
         }
         let unit = pieces.iter().map(|p| p.area).sum::<f64>() / 1000.0;
         let tree = grow(pieces, borders, &move |a, b, border| unlike(a, b, border, true, unit));
-        Self { leaf, leaves: count, tree }
+        Self { leaf, leaves: count, tree, area: surface.pieces.iter().map(|p| p.area).collect() }
     }
 
     /// How many Gaussians it is of.
@@ -109,11 +111,16 @@ impl Hierarchy {
         gaussians
     }
 
+    /// What it costs a node not to be what it is a piece of.
+    pub(super) fn price(node: &Node) -> f64 {
+        ((node.birth + LEAF_STEP) / (node.death + LEAF_STEP)).powi(2)
+    }
+
     /// The labels of the leaves that cost least: `marked` against each label, `change` by area that goes out and that
     /// comes in.
     fn cheapest(&self, marked: &[[f64; 2]], before: &[bool], change: [f64; 2]) -> Vec<bool> {
         let nodes = &self.tree.nodes;
-        let alone: Vec<f64> = nodes.iter().map(|n| ((n.birth + LEAF_STEP) / (n.death + LEAF_STEP)).powi(2)).collect();
+        let alone: Vec<f64> = nodes.iter().map(Self::price).collect();
         let mut cost = vec![[0.0_f64; 2]; nodes.len()];
         for (i, node) in nodes.iter().enumerate() {
             let Some(children) = node.children else {
@@ -193,12 +200,12 @@ fn root(of: &mut [u32], mut i: u32) -> u32 {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use glam::DVec3;
 
     use super::*;
     use crate::pipeline::observer::{Interrupted, Signal, Silent};
-    use crate::pipeline::semantics::selection::marks::Stroke;
+    use crate::pipeline::semantics::splat_tree::marks::Stroke;
     use crate::render::Renderer;
     use crate::scene::Mask;
 
@@ -207,7 +214,7 @@ mod tests {
 
     /// A sheet of gray Gaussians with a square of 12 x 12 in it, red on the left, blue on the right. Whose each is:
     /// 0, 1 and 2.
-    fn sheet() -> (GaussianCloud, Vec<usize>) {
+    pub(in super::super) fn sheet() -> (GaussianCloud, Vec<usize>) {
         let n = 32;
         let of = |i: usize| match (i % n, i / n) {
             (x, y) if (10..16).contains(&x) && (10..22).contains(&y) => 1,
@@ -225,7 +232,7 @@ mod tests {
         (cloud, whose)
     }
 
-    fn cameras() -> Vec<Camera> {
+    pub(in super::super) fn cameras() -> Vec<Camera> {
         let from = |x: f64, y: f64| {
             Camera::look_at(DVec3::new(x, y, -2.2), DVec3::ZERO, DVec3::NEG_Y, 0.8, W as u32, H as u32).expect("valid")
         };
@@ -253,7 +260,7 @@ mod tests {
         [0, 1, 2].map(|k| selected.iter().zip(whose).filter(|(s, w)| **s && **w == k).count())
     }
 
-    fn hierarchy(cloud: &GaussianCloud) -> Hierarchy {
+    pub(in super::super) fn hierarchy(cloud: &GaussianCloud) -> Hierarchy {
         Hierarchy::new(cloud, &cameras(), &RenderSettings::default(), &mut Silent).expect("made")
     }
 
