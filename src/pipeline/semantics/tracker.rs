@@ -3,8 +3,11 @@
 //! too, their masks linked to what is known. No network is needed.
 
 mod complete;
+mod views;
 
 use std::time::Instant;
+
+pub(crate) use views::ViewReport;
 
 use super::associate::{Link, disagreements, link};
 use super::error::FindError;
@@ -65,24 +68,6 @@ impl Default for TrackOptions {
             prompt: MaskPrompt::Mask,
         }
     }
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
-pub(crate) struct Sighting {
-    /// Whose pixels.
-    pub(crate) identity: IdentityId,
-    pub(crate) pixels: usize,
-    /// Mean share of its object in them, 0 to 1.
-    pub(crate) confidence: f64,
-}
-
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
-pub(crate) struct ViewReport {
-    pub(crate) photo: usize,
-    /// Share of its pixels that only Gaussians without a vote cover.
-    pub(crate) unknown: f64,
-    /// Who is seen in it, innermost identities.
-    pub(crate) seen: Vec<Sighting>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
@@ -337,26 +322,6 @@ impl Tracker<'_> {
         ViewMap::render(&mut self.renderer, self.cloud, of, &self.identities, &camera, self.settings)
             .map_err(|e| FindError::Render(photo.name.clone(), e))
     }
-
-    /// Who is seen in the photos, where this is whose each Gaussian is.
-    fn look(
-        &mut self,
-        round: usize,
-        of: &[IdentityId],
-        observer: &mut dyn Observer,
-    ) -> Result<Vec<ViewReport>, FindError> {
-        let mut ticker = Ticker::new(format!("Propagating identities to all views, round {round}"), self.photos.len());
-        observer.proceed()?;
-        // To see how much is unknown, small pictures will do.
-        let side = self.options.max_side_px.min(256);
-        let mut views = Vec::with_capacity(self.photos.len());
-        for photo in 0..self.photos.len() {
-            let map = self.map_of(photo, side, of)?;
-            views.push(report(photo, &map, self.identities.len()));
-            ticker.tick(photo + 1, observer)?;
-        }
-        Ok(views)
-    }
 }
 
 fn identities_of(assignments: &[Assignment]) -> Vec<IdentityId> {
@@ -388,25 +353,6 @@ pub(crate) fn labels_of(found: &[FoundMask], ids: &[IdentityId], pixels: usize) 
         mask.mask.pixels().for_each(|i| labels[i] = *id);
     }
     labels
-}
-
-fn report(photo: usize, map: &ViewMap, identities: usize) -> ViewReport {
-    let mut sums = vec![(0, 0.0); identities + 1];
-    let mut unknown = 0;
-    for (&id, &share) in map.identity.iter().zip(&map.share) {
-        match sums.get_mut(id as usize) {
-            Some(sum) => *sum = (sum.0 + 1, sum.1 + f64::from(share)),
-            None => unknown += 1,
-        }
-    }
-    let seen = sums.iter().enumerate().skip(1).filter(|(_, s)| s.0 > 0);
-    ViewReport {
-        photo,
-        unknown: f64::from(unknown) / map.identity.len().max(1) as f64,
-        seen: seen
-            .map(|(id, s)| Sighting { identity: id as IdentityId, pixels: s.0, confidence: s.1 / s.0 as f64 })
-            .collect(),
-    }
 }
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! Labels, drift and reports of views.
 
+use super::views::{Sighting, report};
 use super::*;
 use crate::scene::{Level, Mask};
 

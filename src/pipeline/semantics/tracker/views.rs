@@ -1,0 +1,66 @@
+//! Who is seen in each photo, and how much of it is unknown.
+
+use super::super::error::FindError;
+use super::super::view_map::ViewMap;
+use super::Tracker;
+use crate::pipeline::observer::{Observer, Ticker};
+use crate::scene::IdentityId;
+
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub(crate) struct Sighting {
+    /// Whose pixels.
+    pub(crate) identity: IdentityId,
+    pub(crate) pixels: usize,
+    /// Mean share of its object in them, 0 to 1.
+    pub(crate) confidence: f64,
+}
+
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub(crate) struct ViewReport {
+    pub(crate) photo: usize,
+    /// Share of its pixels that only Gaussians without a vote cover.
+    pub(crate) unknown: f64,
+    /// Who is seen in it, innermost identities.
+    pub(crate) seen: Vec<Sighting>,
+}
+
+impl Tracker<'_> {
+    /// Who is seen in the photos, where this is whose each Gaussian is.
+    pub(super) fn look(
+        &mut self,
+        round: usize,
+        of: &[IdentityId],
+        observer: &mut dyn Observer,
+    ) -> Result<Vec<ViewReport>, FindError> {
+        let mut ticker = Ticker::new(format!("Propagating identities to all views, round {round}"), self.photos.len());
+        observer.proceed()?;
+        // To see how much is unknown, small pictures will do.
+        let side = self.options.max_side_px.min(256);
+        let mut views = Vec::with_capacity(self.photos.len());
+        for photo in 0..self.photos.len() {
+            let map = self.map_of(photo, side, of)?;
+            views.push(report(photo, &map, self.identities.len()));
+            ticker.tick(photo + 1, observer)?;
+        }
+        Ok(views)
+    }
+}
+
+pub(super) fn report(photo: usize, map: &ViewMap, identities: usize) -> ViewReport {
+    let mut sums = vec![(0, 0.0); identities + 1];
+    let mut unknown = 0;
+    for (&id, &share) in map.identity.iter().zip(&map.share) {
+        match sums.get_mut(id as usize) {
+            Some(sum) => *sum = (sum.0 + 1, sum.1 + f64::from(share)),
+            None => unknown += 1,
+        }
+    }
+    let seen = sums.iter().enumerate().skip(1).filter(|(_, s)| s.0 > 0);
+    ViewReport {
+        photo,
+        unknown: f64::from(unknown) / map.identity.len().max(1) as f64,
+        seen: seen
+            .map(|(id, s)| Sighting { identity: id as IdentityId, pixels: s.0, confidence: s.1 / s.0 as f64 })
+            .collect(),
+    }
+}
