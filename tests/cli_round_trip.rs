@@ -161,7 +161,8 @@ fn the_window_and_the_command_line_do_the_same() {
     let holdout_every = config.holdout_every;
     let masks = Some(photos.into());
     let folder = out.clone();
-    let request = FindRequest { folder, cloud, settings, dataset, holdout_every, masks, side_px: 64, with };
+    let request =
+        FindRequest { folder, cloud, settings, dataset, holdout_every, masks, side_px: 64, known: None, with };
     let command = Job::FindObjects(Box::new(request));
     let Outcome::Objects(found) = window(command) else { panic!("no objects") };
     let told = fmlgs(&["preprocess", &trained, "--masks", photos, "--encoder", "none"]).ok();

@@ -21,6 +21,7 @@ use crate::pipeline::train::TrainConfig;
     fmlgs bench splat.ply\n  \
     fmlgs bench --queries 100\n  \
     fmlgs bench --masks mobile-sam --photo photo.jpg\n  \
+    fmlgs bench --strokes 60 scene/ splat.ply\n  \
     fmlgs bench --plan scene/ splat.ply\n  \
     fmlgs bench splats/*.ply photos/ --size 640x480 --size 1280x720 --max-side 504 --gpu --json")]
 pub(crate) struct BenchArgs {
@@ -48,8 +49,11 @@ pub(crate) struct BenchArgs {
     /// That photo [default: one is made up]
     #[arg(long, value_name = "FILE", requires = "masks")]
     photo: Option<PathBuf>,
+    /// Time this many strokes that select Gaussians, three for each selection
+    #[arg(long, value_name = "COUNT", value_parser = number::within(1..=1_000_000_usize))]
+    strokes: Option<usize>,
     /// Compare each scene's plan with everything enabled, each in processes of its own
-    #[arg(long, conflicts_with_all = ["queries", "masks", "gpu", "size"])]
+    #[arg(long, conflicts_with_all = ["queries", "masks", "strokes", "gpu", "size"])]
     plan: bool,
     /// Processes for each of the two
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100), requires = "plan")]
@@ -80,6 +84,7 @@ pub(crate) fn run(args: BenchArgs, quiet: bool) -> Result<(), CliError> {
         gpu: args.gpu,
         queries: args.queries,
         masks: args.masks.map(|model| (model, args.photo)),
+        strokes: args.strokes,
     };
     let timings = bench::run(&request, &mut console).map_err(|e| CliError::of_work(e, "nothing was printed"))?;
     drop(console);

@@ -63,7 +63,7 @@ pub(crate) fn run(
 
 /// Whether the mean over all queries says something.
 fn has_units(protocol: Protocol) -> bool {
-    !matches!(protocol, Protocol::PartRecall | Protocol::Recipes | Protocol::Strokes)
+    !matches!(protocol, Protocol::PartRecall | Protocol::Recipes | Protocol::Strokes | Protocol::Corrections)
 }
 
 /// What the protocol counts, in words.
@@ -101,14 +101,14 @@ fn summary(summary: &ProtocolSummary) -> String {
 /// Things by how well strokes select them, the worst first, and the means.
 fn strokes(rows: &[StrokeRow]) -> Vec<Vec<String>> {
     let mut sorted: Vec<&StrokeRow> = rows.iter().collect();
-    sorted.sort_by(|a, b| a.iou[STROKES - 1].total_cmp(&b.iou[STROKES - 1]));
-    let head = ["", "level", "drawn in", "1 stroke", "2", "3", "ms"];
+    sorted.sort_by(|a, b| a.iou[STROKES].total_cmp(&b.iou[STROKES]));
+    let head = ["", "level", "drawn in", "before", "1 stroke", "2", "3", "ms"];
     let mut table = vec![head.map(str::to_owned).to_vec()];
     let row = |name: &str, level: &str, view: &str, of: &[&StrokeRow]| {
         let after = |k: usize| mean(&of.iter().map(|r| r.iou[k]).collect::<Vec<_>>());
         let ms: Vec<f64> = of.iter().flat_map(|r| r.ms).filter(|ms| *ms > 0.0).collect();
         let mut row = [name, level, view].map(str::to_owned).to_vec();
-        row.extend((0..STROKES).map(|k| format!("{:.3}", after(k))).chain([format!("{:.0}", mean(&ms))]));
+        row.extend((0..=STROKES).map(|k| format!("{:.3}", after(k))).chain([format!("{:.0}", mean(&ms))]));
         row
     };
     let level = |r: &StrokeRow| if r.level == Level::Object { "object" } else { "part" };

@@ -28,7 +28,8 @@ use crate::scene::{Findings, Identity, IdentityId, Level, Lifting, MaskPrompt, P
 #[command(after_help = "Examples:\n  \
     fmlgs preprocess scene/ --masks photos/               masks that came with the photos\n  \
     fmlgs preprocess scene/ --masks labels/ --max-seeds 1  one labeled photo is enough to begin\n  \
-    fmlgs preprocess scene/ --segmenter regions           no masks: regions of the photos, unnamed and rough")]
+    fmlgs preprocess scene/ --segmenter regions           no masks: regions of the photos, unnamed and rough\n  \
+    fmlgs preprocess scene/ --add DSC_12                  what this photo shows of the unknown; the rest stays")]
 pub(crate) struct PreprocessArgs {
     /// Trained scene
     scene: PathBuf,
@@ -62,6 +63,10 @@ pub(crate) struct PreprocessArgs {
     /// Photo to begin with, by name [default: the first with masks]
     #[arg(long)]
     seed: Option<String>,
+    /// Add what this photo, by name, shows of the unknown; objects and parts that are there stay as they are
+    #[arg(long, value_name = "PHOTO", conflicts_with_all = ["seed", "max_seeds", "unknown", "recipe", "tracker", "prompt",
+        "part_weight", "lifting", "code_steps", "encoder"])]
+    add: Option<String>,
     /// Most photos whose masks are used
     #[arg(long, default_value_t = TrackOptions::default().max_seeds, value_parser = number::within(1..=100_000_usize))]
     max_seeds: usize,
@@ -112,7 +117,7 @@ impl PreprocessArgs {
                 prompt: self.prompt.or(base.prompt).filter(|_| carry != Carry::Gaussians),
             },
             code_steps: self.code_steps,
-            seed: self.seed.clone(),
+            seed: self.add.clone().or_else(|| self.seed.clone()),
             max_seeds: self.max_seeds,
             unknown_share: self.unknown / 100.0,
         }
@@ -124,6 +129,7 @@ pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
     check_segmenter(&args)?;
     let scene = open::scene(&args.scene)?;
     let folder = scene.folder.clone().ok_or_else(|| JobError::NoScene(args.scene.clone()))?;
+    let known = args.add.as_ref().map(|_| scene.semantics()).transpose()?.map(Arc::new);
     let dataset = open::dataset(&scene.photos(args.photos.as_deref())?)?;
     let request = FindRequest {
         folder,
@@ -132,6 +138,7 @@ pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
         dataset: Arc::new(dataset),
         holdout_every: scene.config.holdout_every,
         masks: args.masks.clone(),
+        known,
         side_px: plan::of_scene(&scene, &args.plan.overrides()).object_side_px,
         with: args.settings(),
     };

@@ -2,23 +2,28 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::time::Instant;
 
+use super::select::{self, SelectFor, SelectRequest, Stroke};
 use super::{Folders, JobError, open, plan};
 use crate::io::{self, Opened};
 use crate::measure::StudyError;
+use crate::measure::bench::strokes::{StrokesTiming, stroke};
 use crate::measure::bench::{self, Timings, cpu, gpu, masks, query};
 use crate::measure::plan::{OpenScene, PlanCost, PlanVariant, SIZE, cost};
 use crate::models;
 use crate::pipeline::observer::{Interrupted, Observer, Severity, Silent};
 use crate::pipeline::semantics::network_segmenter::NetworkMasks;
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
-use crate::render::Device;
-use crate::scene::{Dataset, PhotoPixels};
+use crate::render::{Device, RenderSettings};
+use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, NOBODY, PhotoPixels};
 
 /// Objects and parts of the view that is asked.
 const QUERY_IDENTITIES: usize = 300;
 /// Its size in px.
 const QUERY_SIZE: [usize; 2] = [1_008, 567];
+/// Size of the view in which strokes are drawn.
+const STROKES_SIZE: [u32; 2] = [640, 480];
 /// Size of a made-up photo.
 const PHOTO_SIZE: [u32; 2] = [1_008, 756];
 
@@ -36,6 +41,8 @@ pub(crate) struct BenchRequest {
     pub(crate) queries: Option<usize>,
     /// Network whose masks of everything in a photo are timed, and the photo, else one is made up.
     pub(crate) masks: Option<(String, Option<PathBuf>)>,
+    /// So many strokes that select are timed in each scene.
+    pub(crate) strokes: Option<usize>,
 }
 
 /// Times stage by stage.
@@ -60,7 +67,7 @@ pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result
     }
     for path in &request.paths {
         let name = bench::label(path);
-        let cloud = match io::open(path)? {
+        let (cloud, cameras) = match io::open(path)? {
             Opened::Dataset(dataset) => {
                 let (config, views) = photos(&dataset, request.max_side_px, observer)?;
                 timings.train.push(cpu::train_steps(&dataset, &views, &config, repeats)?);
@@ -69,9 +76,14 @@ pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result
                 }
                 continue;
             }
-            Opened::Cloud(cloud) => Arc::new(cloud),
-            Opened::Trained(scene) => Arc::new(scene.cloud),
+            Opened::Cloud(cloud) => (Arc::new(cloud), Vec::new()),
+            Opened::Trained(scene) => {
+                (Arc::new(scene.cloud), scene.info.cameras.into_iter().map(|c| c.camera).collect())
+            }
         };
+        if let Some(count) = request.strokes {
+            timings.strokes.push(strokes(&name, &cloud, cameras, count, observer)?);
+        }
         for &size in &request.sizes {
             observer.proceed()?;
             observer.note(Severity::Info, format!("Drawing {name} at {} x {}", size[0], size[1]));
@@ -82,6 +94,42 @@ pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result
         }
     }
     Ok(timings)
+}
+
+/// Selects by strokes in the first view, three for each selection.
+fn strokes(
+    name: &str,
+    cloud: &Arc<GaussianCloud>,
+    cameras: Vec<Camera>,
+    count: usize,
+    observer: &mut dyn Observer,
+) -> Result<StrokesTiming, JobError> {
+    observer.note(Severity::Info, format!("Selecting in {name} by strokes"));
+    let home = HomeView::new(&cameras, Some(cloud));
+    let camera = home.camera(STROKES_SIZE).limited_to(STROKES_SIZE[0]);
+    let map = Arc::new(select::empty_map(cloud));
+    let (mut secs, mut before) = (Vec::with_capacity(count + 1), None);
+    for k in 0..=count {
+        observer.proceed()?;
+        let size = [camera.width_px as usize, camera.height_px as usize];
+        // The first one of each selection adds, one of those after it takes away.
+        let pixels = stroke(k, size);
+        let request = SelectRequest {
+            cloud: Arc::clone(cloud),
+            settings: RenderSettings::default(),
+            cameras: cameras.clone(),
+            home: home.clone(),
+            map: Arc::clone(&map),
+            purpose: SelectFor::New(NOBODY),
+            before,
+            stroke: Some(Stroke { camera: camera.clone(), pixels, is_plus: k % 3 != 2 }),
+        };
+        let start = Instant::now();
+        let selected = select::run(&request, observer)?;
+        secs.push(start.elapsed().as_secs_f64());
+        before = Some(Arc::new(if k % 3 == 2 { selected.begun_anew() } else { selected }));
+    }
+    Ok(StrokesTiming::new(name, cloud.len(), &secs))
 }
 
 /// A made-up photo of squares in many colors.

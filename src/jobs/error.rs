@@ -40,6 +40,8 @@ pub enum JobError {
     NothingHeldOut(PathBuf),
     #[error("no photo that was trained on is called '{0}'")]
     UnknownPhoto(String),
+    #[error("the photo '{0}' is held out to measure with, so nothing is learned from it; choose another one")]
+    HeldOut(String),
     #[error("{} has no objects yet", .0.display())]
     NoObjects(PathBuf),
     #[error("the query is empty; type an object's name")]

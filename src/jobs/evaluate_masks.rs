@@ -21,7 +21,7 @@ use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::splat_tree::hierarchy::Hierarchy;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
-use crate::scene::{Camera, Identities, IdentityId, LevelFilter, NOBODY, SemanticMap};
+use crate::scene::{Camera, Identities, IdentityId, LevelFilter, NOBODY, Photo, SemanticMap};
 
 /// How objects and parts are compared with labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -46,6 +46,8 @@ pub(crate) enum Protocol {
     Recipes,
     /// Things selected by strokes in the view that shows most of them, judged in all other views
     Strokes,
+    /// What is known of things, corrected by strokes in the views where most is wrong, judged in all of them
+    Corrections,
 }
 
 /// What the [`Protocol`] of the same name counts besides the IoU of each query.
@@ -122,11 +124,13 @@ pub(crate) fn run(
     recipe: &Recipe,
 ) -> Result<MaskScores, JobError> {
     if protocol == Protocol::Strokes {
-        let (views, summary) = by_strokes(comparison, FileMasks(Labels::open(labels)?))?;
-        return Ok(MaskScores { views, trained_on: 0, units: Vec::new(), summary, unmet: Vec::new() });
+        return by_strokes(comparison, FileMasks(Labels::open(labels)?), None);
     }
     let map = io::semantic_map::load(scene, comparison.state.as_deref(), &comparison.cloud)?;
     let map = &map.ok_or_else(|| JobError::NoObjects(scene.into()))?;
+    if protocol == Protocol::Corrections {
+        return by_strokes(comparison, FileMasks(Labels::open(labels)?), Some(map));
+    }
     let mut known = FileMasks(Labels::open(labels)?);
     let views = labeled(comparison, map, &mut known)?;
     if views.is_empty() {
@@ -177,7 +181,7 @@ fn compare(
             let hits = units.iter().filter(|u| u.hit == Some(true)).count();
             ProtocolSummary::Langsplat { localization: hits as f64 / units.len().max(1) as f64 }
         }
-        Protocol::FastlgsEx | Protocol::PartRecall | Protocol::Recipes | Protocol::Strokes => {
+        Protocol::FastlgsEx | Protocol::PartRecall | Protocol::Recipes | Protocol::Strokes | Protocol::Corrections => {
             let mut pool = fastlgs_ex::Pool::default();
             views.iter().for_each(|v| units.extend(fastlgs_ex::compare(scene, v, &mut pool)));
             ProtocolSummary::FastlgsEx {}
@@ -213,12 +217,17 @@ fn compare(
     Ok((units, summary))
 }
 
-/// Selects what the held-out photos with labels show by strokes; how many they are.
-fn by_strokes(comparison: &PhotoComparison, mut labels: FileMasks) -> Result<(usize, ProtocolSummary), JobError> {
+/// Selects what the held-out photos with labels show by strokes, or corrects what is `known` of it.
+fn by_strokes(
+    comparison: &PhotoComparison,
+    mut labels: FileMasks,
+    known: Option<&SemanticMap>,
+) -> Result<MaskScores, JobError> {
     let PhotoComparison { cloud, settings, max_side_px, .. } = comparison;
     let photos = &comparison.dataset.photos;
     let mut views = Vec::new();
-    let held: Vec<_> = comparison.views.iter().map(|&i| &photos[i]).filter(|photo| labels.covers(photo)).collect();
+    let free = |photo: &&Photo| labels.covers(photo) && !known.is_some_and(|map| map.seeds.contains(&photo.name));
+    let held: Vec<_> = comparison.views.iter().map(|&i| &photos[i]).filter(free).collect();
     for photo in held {
         let categories = categories(&labels.segment(photo, *max_side_px, &mut Silent)?);
         let (name, camera) = (photo.name.clone(), photo.camera.limited_to(*max_side_px));
@@ -228,8 +237,16 @@ fn by_strokes(comparison: &PhotoComparison, mut labels: FileMasks) -> Result<(us
     let start = std::time::Instant::now();
     let hierarchy = Hierarchy::new(cloud, &cameras, settings, &mut Silent)?;
     let prepare_secs = start.elapsed().as_secs_f64();
-    let rows = strokes::rows(&hierarchy, cloud, settings, &views)?;
-    Ok((views.len(), ProtocolSummary::Strokes { gaussians: cloud.len(), prepare_secs, rows }))
+    let members = known.map(|map| {
+        |name: &str| {
+            let id = map.identities.called(name, LevelFilter::Auto).first().copied();
+            id.map_or_else(Vec::new, |id| map.members(id))
+        }
+    });
+    let members = members.as_ref().map(|m| m as strokes::Known<'_>);
+    let rows = strokes::rows(&hierarchy, cloud, settings, &views, members)?;
+    let summary = ProtocolSummary::Strokes { gaussians: cloud.len(), prepare_secs, rows };
+    Ok(MaskScores { views: views.len(), trained_on: 0, units: Vec::new(), summary, unmet: Vec::new() })
 }
 
 fn recall(

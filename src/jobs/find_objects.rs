@@ -2,7 +2,7 @@
 
 pub(crate) mod forecast;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -21,7 +21,7 @@ use crate::pipeline::semantics::build_map::{
 use crate::pipeline::semantics::sam2_tracker::Sam2Tracker;
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::render::RenderSettings;
-use crate::scene::{Dataset, GaussianCloud, Photo, Preparation};
+use crate::scene::{Dataset, GaussianCloud, Photo, Preparation, SemanticMap};
 
 /// Name of the encoder that is none.
 pub(crate) const NO_ENCODER: &str = "none";
@@ -82,6 +82,8 @@ pub struct FindRequest {
     pub holdout_every: usize,
     /// Where masks are; `None` = they are found.
     pub masks: Option<PathBuf>,
+    /// Objects and parts that stay as they are: what the photo to begin with shows of the unknown is added.
+    pub known: Option<Arc<SemanticMap>>,
     /// Longer side of the pictures that are looked at, px.
     pub side_px: u32,
     /// How.
@@ -118,30 +120,49 @@ pub(crate) fn run(
     let held = evaluate::held_out(dataset, &cameras, None, request.holdout_every);
     let all = dataset.photos.iter().enumerate();
     let photos: Vec<Photo> = all.filter(|(i, _)| !held.contains(i)).map(|(_, p)| p.clone()).collect();
-    let unknown = |name: &String| JobError::UnknownPhoto(name.clone());
-    let place = |name: &String| photos.iter().position(|p| p.name.contains(name.as_str())).ok_or_else(|| unknown(name));
+    let place = |name: &String| {
+        if held.iter().any(|i| dataset.photos[*i].name == *name) {
+            return Err(JobError::HeldOut(name.clone()));
+        }
+        let exact = photos.iter().position(|p| p.name == *name);
+        let place = exact.or_else(|| photos.iter().position(|p| p.name.contains(name.as_str())));
+        place.ok_or_else(|| JobError::UnknownPhoto(name.clone()))
+    };
+    // What is added is prepared as the rest was.
+    let preparation = request.known.as_ref().and_then(|map| map.prepared).unwrap_or(with.preparation);
     let options = FindOptions {
         track: TrackOptions {
             seed: with.seed.as_ref().map(place).transpose()?,
-            max_seeds: with.max_seeds.max(1),
+            max_seeds: if request.known.is_some() { 1 } else { with.max_seeds.max(1) },
             reseed_share: with.unknown_share,
             veto: with.carry == Carry::Both,
             max_side_px: request.side_px,
-            prompt: with.preparation.prompt.unwrap_or_default(),
+            prompt: preparation.prompt.unwrap_or_default(),
+            known: request.known.clone(),
             ..TrackOptions::default()
         },
-        lifting: with.preparation.lifting,
+        lifting: preparation.lifting,
         code_steps: with.code_steps,
-        part_weight: with.preparation.part_weight,
+        part_weight: preparation.part_weight,
     };
     let mut warn = |text: String| observer.note(Severity::Warning, text);
-    let network = match (masks, with.segmenter.as_deref()) {
+    let network = match (masks.filter(|_| request.known.is_none()), with.segmenter.as_deref()) {
         (Some(_), _) | (None, Some(REGIONS)) => None,
         (None, Some(name)) => Some(name.to_owned()),
         (None, None) => catalog::usable(ModelRole::Segmenter, &mut warn)?.into_iter().next(),
     };
-    let mut segmenter = segmenter(masks, cloud, settings, network.as_deref(), folder.join("cache"))?;
-    let mut encoder = match with.encoder.as_deref() {
+    let open = |masks: Option<&Path>| segmenter(masks, cloud, settings, network.as_deref(), folder.join("cache"));
+    let mut segmenter = open(masks)?;
+    if let (Some(_), Some(seed)) = (&request.known, options.track.seed)
+        && !segmenter.covers(&photos[seed])
+    {
+        // Labels of other photos say nothing about this one.
+        segmenter = open(None)?;
+    }
+    // What is added is looked at by the encoder that has looked at the rest.
+    let looked = |map: &Arc<SemanticMap>| map.language.as_ref().map_or(NO_ENCODER.to_owned(), |l| l.encoder.clone());
+    let encoder = request.known.as_ref().map(looked).or_else(|| with.encoder.clone());
+    let mut encoder = match encoder.as_deref() {
         Some(NO_ENCODER) => None,
         Some(name) => Some(models::encoder(name)?),
         // Without an encoder, names alone are understood.
@@ -154,6 +175,7 @@ pub(crate) fn run(
         observer.note(Severity::Info, forecast::sentence(look, most));
     }
     let mut follower = match with.carry {
+        _ if request.known.is_some() => None,
         Carry::Gaussians => None,
         _ => Some(Sam2Tracker::open(&with.tracker, Some(folder.join("cache")))?),
     };

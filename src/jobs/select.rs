@@ -60,6 +60,11 @@ impl Selected {
     pub(crate) fn strokes(&self) -> usize {
         self.marks.len()
     }
+
+    /// Nothing selected, with all that was made ready.
+    pub(super) fn begun_anew(&self) -> Self {
+        Self { marks: StrokeMarks::default(), ..self.clone() }
+    }
 }
 
 /// Adds the stroke, or takes the last one back.

@@ -12,15 +12,15 @@ use super::{StageName, Study, StudyError};
 use crate::io::labels::Labels;
 use crate::models;
 use crate::pipeline::depth as true_depth;
-use crate::pipeline::observer::Silent;
+use crate::pipeline::observer::{Interrupted, Silent};
 use crate::pipeline::semantics::protocols::categories;
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::segmenter::{FileMasks, FoundMask, Segmenter};
-use crate::pipeline::semantics::tracker::labels_of;
+use crate::pipeline::semantics::tracker::{TrackOptions, Tracked, labels_of, track};
 use crate::pipeline::semantics::train_codes::CodeView;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
-use crate::scene::{Camera, Dataset, GaussianCloud, Identities, IdentityId, NOBODY, Photo, SemanticMap};
+use crate::scene::{Camera, Dataset, GaussianCloud, Identities, Identity, IdentityId, NOBODY, Photo, SemanticMap};
 
 #[derive(Clone, Debug)]
 pub struct StudyOptions {
@@ -246,8 +246,31 @@ impl Subject {
             ("identities", identities.len().to_string()),
         ]);
         let drawn = (&*self.cloud, &self.settings);
+        let photos: Vec<Photo> = training.iter().map(|&i| dataset.photos[i].clone()).collect();
+        let all = identities.clone();
+        let tracking: features::Tracking<'_> = Box::new(move |options, observer| {
+            let mut labels = self.labels()?;
+            let options = TrackOptions { max_side_px: self.options.max_side_px, ..options.clone() };
+            match track(drawn.0, &photos, drawn.1, &mut labels, None, &options, observer) {
+                Err(e) if Interrupted::is_cause_of(&e) => Ok(None),
+                tracked => Ok(Some(renumbered(&tracked.map_err(failed)?, &all))),
+            }
+        });
+        let views = (tracking, views);
         features::study(drawn, identities, views, &self.options.steps, self.options.repeats, input).map_err(failed)
     }
+}
+
+/// Whose each Gaussian is, by the numbers that identities of the same names have in `all`.
+fn renumbered(tracked: &Tracked, all: &Identities) -> Vec<IdentityId> {
+    let mut number = vec![NOBODY; tracked.identities.len() + 1];
+    for (id, identity) in tracked.identities.iter() {
+        let parent = number[identity.parent as usize];
+        let same = |i: &Identity| i.level == identity.level && i.parent == parent && i.names == identity.names;
+        number[id as usize] = all.iter().find(|(_, i)| same(i)).map_or(NOBODY, |(id, _)| id);
+    }
+    let of = tracked.assignments.iter().map(|a| number.get(a.identity as usize).copied());
+    of.map(|id| id.unwrap_or(NOBODY)).collect()
 }
 
 /// The labels of a photo that has some, its regions matched with known identities by their names.

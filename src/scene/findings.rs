@@ -167,6 +167,16 @@ impl Findings {
             && self.doubts.iter().all(|d| (d.photo as usize) < self.photos.len() && d.what.about().iter().all(is_there))
     }
 
+    /// Doubts of earlier findings about the same identities come before its own, as far as their photos are known.
+    pub(crate) fn keep_doubts(&mut self, before: &Self) {
+        let place = |d: &Doubt| self.photos.iter().position(|p| p.name == before.photo(d));
+        let kept = before.doubts.iter().filter_map(|d| Some(Doubt { photo: place(d)? as u32, what: d.what.clone() }));
+        let mut doubts: Vec<Doubt> = kept.collect();
+        doubts.append(&mut self.doubts);
+        doubts.truncate(MOST_DOUBTS);
+        self.doubts = doubts;
+    }
+
     /// One more identity, of which nothing was noticed.
     pub(crate) fn add_identity(&mut self) {
         self.seen.push(Seen::default());

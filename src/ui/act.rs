@@ -45,6 +45,7 @@ impl App {
             Action::InspectAt(at) => self.inspect(at),
             Action::Evaluate => self.evaluate(),
             Action::FindObjects => self.find_objects(),
+            Action::SegmentPhoto => self.segment_photo(),
             Action::FetchModel(id) => self.install_model(id, None),
             Action::TypeQuery => self.type_question(),
             Action::Ask(text) => {

@@ -4,12 +4,17 @@ use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use glam::DVec3;
+
 use super::app::App;
+use super::edits::sentence;
 use super::find_dialog::{AwaitedModels, Means};
+use super::history::Editing;
 use super::panes::models::Models;
 use super::state::Tone;
 use crate::jobs::find_objects::FindRequest;
-use crate::worker::{Command, Event};
+use crate::scene::{Camera, SemanticMap};
+use crate::worker::{Command, Event, JobId};
 
 impl App {
     /// Finds objects and parts with the labels that came with the photos; without, asks what is to look at them.
@@ -63,26 +68,77 @@ impl App {
 
     /// Finds objects and parts with these masks, those that came with the photos, or none.
     pub(super) fn find_objects_by(&mut self, masks: Option<PathBuf>) {
+        self.submit_search(masks, None);
+    }
+
+    /// Adds what the photo that is looked through, or else the nearest that was trained on, shows of the unknown.
+    pub(super) fn segment_photo(&mut self) {
+        let Some(known) = self.state.semantics.as_deref().cloned() else {
+            return self.state.toast(Tone::Warning, "Find objects first: what one more photo shows is added to them.");
+        };
+        let (scene, eye) = (self.state.scene.clone(), self.viewport.pose());
+        let Some(dataset) = scene.as_ref().and_then(|s| s.dataset.as_ref()) else {
+            return self.state.toast(Tone::Warning, "This scene has no photos.");
+        };
+        let trained_on = dataset.split(self.layout.config.holdout_every).0;
+        let size = scene.as_ref().map_or(1.0, |s| s.home.bounds.radius());
+        let away = |camera: &Camera| {
+            let turn = 1.0 - (camera.world_from_camera * DVec3::Z).dot(eye.world_from_camera * DVec3::Z);
+            camera.center.distance(eye.center) / size + turn
+        };
+        let nearest = || {
+            let away = |i: &usize| away(&dataset.photos[*i].camera);
+            trained_on.iter().copied().min_by(|a, b| away(a).total_cmp(&away(b)))
+        };
+        let Some(photo) = self.viewport.photo_index().or_else(nearest) else { return };
+        let name = dataset.photos[photo].name.clone();
+        let what = format!("segmented {name}");
+        let job = self.submit_search(None, Some((known, name)));
+        self.segmenting = job.map(|job| Editing { job, what: Some(what), redo: false });
+    }
+
+    /// Takes in that what a photo shows was added, as a change that can be undone.
+    pub(super) fn segmented(&mut self, segmenting: Editing) {
+        let count = |map: Option<&Arc<SemanticMap>>| map.map_or(0, |map| map.identities.len());
+        let before = self.state.changes.now().map_or(0, |now| count(now.map.as_ref()));
+        let new = count(self.state.semantics.as_deref()).saturating_sub(before);
+        if let Some(what) = self.state.changes.settle(&self.snapshot(), segmenting.what.as_deref()) {
+            let new = match new {
+                0 => "nothing new".to_owned(),
+                1 => "one new object or part".to_owned(),
+                n => format!("{n} new objects and parts"),
+            };
+            self.state.toast(Tone::Good, format!("{}: {new}", sentence(&what)));
+        }
+    }
+
+    /// Searches all photos, or the one of this name for what is not known yet.
+    fn submit_search(&mut self, masks: Option<PathBuf>, add: Option<(Arc<SemanticMap>, String)>) -> Option<JobId> {
         let scene = self.state.scene.clone();
         let Some((scene, dataset)) = scene.as_ref().and_then(|s| Some((s, s.dataset.clone()?))) else {
             self.state.toast(Tone::Warning, "Open a folder of posed photos first: masks refer to photos.");
-            return;
+            return None;
         };
+        let (known, seed) = add.unzip();
+        let mut with = self.layout.finding.clone();
+        with.seed = seed.or(with.seed);
         let masks = masks.or_else(|| scene.masks.clone());
         match self.viewport.cloud().cloned().filter(|_| self.state.is_trained()) {
-            Some(cloud) => {
-                self.submit(Command::FindObjects(Box::new(FindRequest {
-                    folder: scene.out.clone(),
-                    cloud: Arc::clone(&cloud),
-                    settings: self.state.render_settings(),
-                    dataset,
-                    holdout_every: self.layout.config.holdout_every,
-                    masks,
-                    side_px: self.state.plan.object_side_px,
-                    with: self.layout.finding.clone(),
-                })));
+            Some(cloud) => self.submit(Command::FindObjects(Box::new(FindRequest {
+                known,
+                folder: scene.out.clone(),
+                cloud: Arc::clone(&cloud),
+                settings: self.state.render_settings(),
+                dataset,
+                holdout_every: self.layout.config.holdout_every,
+                masks,
+                side_px: self.state.plan.object_side_px,
+                with,
+            }))),
+            None => {
+                self.state.toast(Tone::Warning, "Train first: objects are found among trained Gaussians.");
+                None
             }
-            None => self.state.toast(Tone::Warning, "Train first: objects are found among trained Gaussians."),
         }
     }
 }

@@ -69,6 +69,8 @@ pub struct App {
     /// Edits of objects and parts that wait for the one that is under way.
     pub(super) edits: VecDeque<EditStep>,
     pub(super) editing: Option<Editing>,
+    /// The search of one more photo that is under way.
+    pub(super) segmenting: Option<Editing>,
     /// Whether the view takes the whole window.
     pub(super) full_view: bool,
     /// Whether objects were known in the last frame.
@@ -120,6 +122,7 @@ impl App {
             traced: 0,
             edits: VecDeque::new(),
             editing: None,
+            segmenting: None,
             full_view: false,
             had_objects: false,
             actions: first.into_iter().collect(),
@@ -150,8 +153,10 @@ impl App {
     fn take_events(&mut self, ctx: &egui::Context) {
         while let Some(event) = self.worker.next_event() {
             self.hear(&event);
+            let segmented = self.segmenting.take_if(|s| event.is_end() && event.job() == s.job);
             let next = self.state.apply(event);
             self.actions.extend(next);
+            segmented.into_iter().for_each(|s| self.segmented(s));
         }
         self.state.replan(&self.layout.plan, self.layout.config.limits());
         self.state.stamp_log(resource_log::now_secs());

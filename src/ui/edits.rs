@@ -143,7 +143,7 @@ impl App {
         }
     }
 
-    fn snapshot(&self) -> EditSnapshot {
+    pub(super) fn snapshot(&self) -> EditSnapshot {
         let (layout, viewport) = (&self.layout, &self.viewport);
         let view = ViewState {
             hidden: viewport.visibility.hidden().clone(),
@@ -181,7 +181,7 @@ impl App {
 }
 
 /// What was done, as a sentence.
-fn sentence(what: &str) -> String {
+pub(super) fn sentence(what: &str) -> String {
     let mut letters = what.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }

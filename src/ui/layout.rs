@@ -85,7 +85,7 @@ pub struct Layout {
     /// What of the scene plan is wanted otherwise.
     pub(crate) plan: Overrides,
     /// Models that find objects.
-    pub(crate) finding: FindSettings,
+    pub finding: FindSettings,
     /// What plans for the agent.
     pub(crate) chat: ChatSettings,
     /// Files and folders opened lately.

@@ -103,7 +103,8 @@ impl Jobs for PipelineJobs {
                 let known = self.known(&request.folder);
                 let done = find_objects::run(&request, known.as_deref(), observer)?;
                 self.knows(&request.folder, Some(done.state));
-                Outcome::Objects(Arc::new(done.found.map))
+                let map = Arc::new(done.found.map);
+                if request.known.is_some() { Outcome::Edited(map) } else { Outcome::Objects(map) }
             }
             Command::EditObjects { cloud, map, request, out } => {
                 let failed = |remedy| move |e: JobError| Stop::Failed(Failure::of(&e, remedy));

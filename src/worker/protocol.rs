@@ -229,6 +229,9 @@ impl Command {
             Self::FindPoses(photos) => format!("Finding camera poses of {}", name(&photos.folder)),
             Self::Train { dataset, .. } => format!("Training {}", dataset.name),
             Self::Evaluate { dataset, .. } => format!("Evaluating {}", dataset.name),
+            Self::FindObjects(request) if request.known.is_some() => {
+                format!("Segmenting {}", request.with.seed.as_deref().unwrap_or("a photo"))
+            }
             Self::FindObjects(request) => format!("Finding objects in {}", request.dataset.name),
             Self::EditObjects { .. } => "Editing objects".into(),
             Self::Select(_) => "Selecting".into(),

@@ -152,9 +152,11 @@ fn what_cannot_be_done_says_the_true_reason_in_one_line() {
     w.ask(add(1, (0..196).collect()));
     w.until("a part", |a| a.state.semantics.as_ref().is_some_and(|m| m.identities.len() == 4));
     let warned = |a: &App, text: &str| a.state.log.iter().filter(|l| l.text.contains(text)).count() == 1;
+    let elsewhere = w.app().state.semantics.as_ref().and_then(|m| m.identity_of.iter().position(|id| *id == 3));
     for (action, reason) in [
         (Action::Change(Edit::Split(1)), "consists of its parts: only 0 of its"),
         (add(2, Vec::new()), "nothing is selected"),
+        (add(2, vec![elsewhere.expect("a Gaussian of a box") as u32]), "is not a piece of 'box 1'"),
         (Action::Change(Edit::Merge(4, 4)), "cannot become one"),
     ] {
         w.ask(action);
@@ -163,4 +165,25 @@ fn what_cannot_be_done_says_the_true_reason_in_one_line() {
     }
     undo(&mut w);
     w.until("no part", |a| a.state.semantics.as_ref().is_some_and(|m| m.identities.len() == 3));
+}
+
+#[test]
+fn one_more_photo_is_segmented_and_that_is_taken_back() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    let layout = &mut w.harness.state_mut().layout;
+    (layout.finding.max_seeds, layout.finding.encoder) = (1, Some("none".into()));
+    w.ask(Action::FindObjects);
+    w.until("objects", |a| said(a, "objects and parts found"));
+    w.ask(Action::Change(Edit::Rename(1, "crate".into())));
+    w.until("the name", |a| name(a, 1) == "crate");
+    w.ask(Action::SegmentPhoto);
+    w.until("one more photo", |a| said(a, "Segmented "));
+    assert!(said(w.app(), "no longer unknown"), "what came to be known is told");
+    assert_eq!(name(w.app(), 1), "crate", "what was done by hand stays");
+    w.ask(Action::Undo);
+    w.until("undone", |a| said(a, "Undone: segmented "));
+    assert_eq!(name(w.app(), 1), "crate");
+    w.ask(Action::Undo);
+    w.until("the old name", |a| name(a, 1) != "crate");
 }

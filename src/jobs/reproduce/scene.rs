@@ -176,6 +176,7 @@ fn objects(
         dataset: Arc::clone(dataset),
         holdout_every: 0,
         masks,
+        known: None,
         side_px: settings.train.max_side_px,
         with,
     };

@@ -5,6 +5,7 @@ pub(crate) mod cpu;
 pub mod gpu;
 pub(crate) mod masks;
 pub(crate) mod query;
+pub(crate) mod strokes;
 
 pub(crate) use cpu::{label, one_core_limit};
 
@@ -15,6 +16,7 @@ use self::cpu::{RenderTiming, StepTiming};
 use self::gpu::Timing;
 use self::masks::MasksTiming;
 use self::query::QueryTiming;
+use self::strokes::StrokesTiming;
 use super::table::{Rows, rows};
 use crate::math::Real;
 use crate::scene::{Bounds, Camera, GaussianCloud};
@@ -46,6 +48,8 @@ pub(crate) struct Timings {
     pub(crate) queries: Option<QueryTiming>,
     /// Masks of everything in a photo, if they were asked for.
     pub(crate) masks: Option<MasksTiming>,
+    /// Selecting by strokes, if it was asked for.
+    pub(crate) strokes: Vec<StrokesTiming>,
 }
 
 impl Timings {
@@ -77,6 +81,7 @@ impl Timings {
             });
             all.push((rows(&head, timed), String::new()));
         }
+        all.push((StrokesTiming::table(&self.strokes), String::new()));
         all.retain(|(rows, _)| rows.len() > 1);
         let limit = format!("one core at most: {:.2e} products per s", self.one_core_products_per_sec);
         all.extend(self.gpu.iter().map(|gpu| (Rows::new(), format!("GPU: {gpu}"))));

@@ -1,18 +1,21 @@
-//! Ways of giving Gaussians their identities, compared with each other: votes in one pass, from more or
-//! fewer photos, and codes trained by gradients, from scratch or from the votes.
+//! Ways of giving Gaussians their identities, compared with each other: the program's own, with more or fewer photos
+//! and without each of its steps; votes alone, in one pass; and codes trained by gradients, from scratch or from the
+//! votes.
 
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::{StudyInput, Variants, overlap};
 use crate::math::stats::mean;
 use crate::measure::sweep::failed;
-use crate::measure::{Rule, Stage, StageName, Study, Trial};
+use crate::measure::{Rule, Stage, StageName, Study, StudyError, Trial};
+use crate::pipeline::observer::Observer;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::codes::{self, TOLERANCE};
 use crate::pipeline::semantics::matching;
+use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::pipeline::semantics::train_codes::{CodeTraining, CodeView, decode, train_codes};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::pipeline::semantics::votes::{UNKNOWN, Votes};
@@ -21,6 +24,8 @@ use crate::scene::semantic_map::CODE_CHANNELS;
 use crate::scene::{GaussianCloud, Identities, IdentityId, Level, Mask, NOBODY};
 
 struct Variant {
+    /// How the program finds them; else votes alone.
+    track: Option<TrackOptions>,
     /// Views that vote; none vote for nothing.
     views: usize,
     /// Steps of gradients after that.
@@ -29,12 +34,16 @@ struct Variant {
     blend: bool,
 }
 
+/// Finds the identity of every Gaussian as the program does; `None` if it was stopped.
+pub(crate) type Tracking<'a> =
+    Box<dyn Fn(&TrackOptions, &mut dyn Observer) -> Result<Option<Vec<IdentityId>>, StudyError> + 'a>;
+
 /// The sweep of the features of the trained Gaussians `cloud`, whose labeled views `training` are learned from and
 /// `held_out` compared with. Gradients are given these numbers of `steps`.
 pub(crate) fn study<'a>(
     drawn: (&'a GaussianCloud, &'a RenderSettings),
     mut identities: Identities,
-    [training, held_out]: [Vec<CodeView>; 2],
+    (tracking, [training, held_out]): (Tracking<'a>, [Vec<CodeView>; 2]),
     steps: &[u64],
     repeats: u32,
     input: StudyInput,
@@ -55,9 +64,13 @@ pub(crate) fn study<'a>(
         let start = Instant::now();
         // Views spread over all of them, not the first ones.
         let voting = super::views::spread(&training, variant.views);
-        let mut of = match variant.views {
-            0 => vec![NOBODY; drawn.0.len()],
-            _ => vote(drawn, &identities, &voting).map_err(failed)?,
+        let mut of = match &variant.track {
+            Some(options) => match tracking(options, observer)? {
+                Some(of) => of,
+                None => return Ok(None),
+            },
+            None if variant.views == 0 => vec![NOBODY; drawn.0.len()],
+            None => vote(drawn, &identities, &voting).map_err(failed)?,
         };
         let by_id: Vec<_> = (0..=identities.len() as IdentityId).map(|id| identities.codes(id)).collect();
         let mut codes: Vec<[f32; CODE_CHANNELS]> = of.iter().map(|id| by_id[*id as usize]).collect();
@@ -112,12 +125,40 @@ fn score(
 }
 
 fn variants(views: usize, steps: &[u64]) -> Variants<Variant> {
-    let mut all = Variants::new(format!("votes of {views} views, exact"), Variant { views, steps: 0, blend: false });
+    let base = TrackOptions::default();
+    let tracked = |track: TrackOptions| Variant { track: Some(track), views: 0, steps: 0, blend: false };
+    let mut all = Variants::new(format!("the program's own, {} photos at most", base.max_seeds), tracked(base.clone()));
+    for max_seeds in [1, 2, 4] {
+        let knobs = [("max_seeds", json!(max_seeds))];
+        let setting = format!("{max_seeds} at most");
+        all.add("labeled photos", setting, &knobs, tracked(TrackOptions { max_seeds, ..base.clone() }));
+    }
+    // What each step is good for shows where little is known.
+    let one = TrackOptions { max_seeds: 1, ..base };
+    let mut with = |what: &str, (knob, value): (&str, Value), track: TrackOptions| {
+        let setting = if value == json!(false) { "without".to_owned() } else { value.to_string() };
+        all.add(&format!("one photo, {what}"), setting, &[("max_seeds", json!(1)), (knob, value)], tracked(track));
+    };
+    with("growth in photos", ("by_photos", json!(false)), TrackOptions { by_photos: false, ..one.clone() });
+    with("tree", ("by_tree", json!(false)), TrackOptions { by_tree: false, ..one.clone() });
+    let neither = TrackOptions { by_photos: false, by_tree: false, ..one.clone() };
+    with("both", ("spread", json!(false)), neither);
+    for share in [0.0, 0.03, 0.3] {
+        with("least area seen", ("least_seen", json!(share)), TrackOptions { least_seen: share, ..one.clone() });
+    }
+    for steps in [0.0, 40.0] {
+        with(
+            "steps to the hidden",
+            ("hidden_steps", json!(steps)),
+            TrackOptions { hidden_steps: steps, ..one.clone() },
+        );
+    }
     let mut add = |method: &str, setting: String, views: usize, steps: u64, blend: bool| {
         let read = if blend { "blend" } else { "exact" };
         let knobs = [("views", json!(views)), ("steps", json!(steps)), ("read", json!(read))];
-        all.add(method, setting, &knobs, Variant { views, steps, blend });
+        all.add(method, setting, &knobs, Variant { track: None, views, steps, blend });
     };
+    add("votes alone", format!("votes of {views} views, exact"), views, 0, false);
     let mut fewer = views / 2;
     while fewer > 0 {
         add("views used", format!("votes of {fewer} views, exact"), fewer, 0, false);

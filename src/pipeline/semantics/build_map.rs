@@ -5,6 +5,7 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
+use super::add_photo::{joined, told};
 use super::codes;
 use super::embed::embed;
 use super::error::FindError;
@@ -114,6 +115,17 @@ pub(crate) fn find_objects(
     if let Some(text) = unknown(&tracked.views, photos, options.track.reseed_share) {
         observer.note(Severity::Info, text);
     }
+    if let Some(known) = &options.track.known {
+        let mut map = joined(known, &tracked, photos);
+        observer.note(Severity::Info, told(known, &map));
+        let start = Instant::now();
+        if let Some(encoder) = encoder {
+            map.language = Some(embed(cloud, &map, photos, settings, options.part_weight, encoder, observer)?);
+        }
+        let Tracked { views, mut secs, .. } = tracked;
+        secs.push(("look at identities", start.elapsed().as_secs_f64()));
+        return Ok(Found { map, views, secs });
+    }
     let mut identities = tracked.identities.clone();
     let of: Vec<IdentityId> = tracked.assignments.iter().map(|b| b.identity).collect();
     let centers = codes::centers(cloud, &of, &identities);
@@ -180,6 +192,7 @@ fn unknown(views: &[ViewReport], photos: &[Photo], share: f64) -> Option<String>
 #[cfg(test)]
 mod tests {
     use std::path::PathBuf;
+    use std::sync::Arc;
 
     use glam::DVec3;
 
@@ -304,6 +317,44 @@ mod tests {
             let stages: Vec<&str> = found.secs.iter().map(|s| s.0).collect();
             assert_eq!(stages, ["segment", "encode frames", "follow masks", "carry by Gaussians", "train codes"]);
         }
+    }
+
+    #[test]
+    fn one_more_photo_adds_what_it_shows_of_the_unknown_and_nothing_that_is_known_changes() {
+        let mut known =
+            find(Told { named: true, covers: true }, (Lifting::Votes, 0), 1, &mut Silent).expect("found").map;
+        assert!((9..15).all(|i| known.is_unknown(i)));
+        // By hand: one Gaussian less of the eye, and another name of the doll.
+        (known.identity_of[7], known.codes[7]) = (1, known.identities.codes(1));
+        known.identities.rename(1, "puppet");
+        let known = Arc::new(known);
+        let add = |photo: usize| {
+            let mut told = Told { named: true, covers: true };
+            let tools = Tools { segmenter: &mut told, follower: None, encoder: None };
+            let track =
+                TrackOptions { known: Some(Arc::clone(&known)), seed: Some(photo), max_seeds: 1, ..Default::default() };
+            let options = FindOptions { track, ..FindOptions::default() };
+            find_objects(&cloud(), &photos(), &RenderSettings::default(), tools, &options, &mut Silent)
+                .expect("found")
+                .map
+        };
+        let map = add(1);
+        assert_eq!((&map.identity_of[..9], &map.identity_of[9..]), (&known.identity_of[..9], &[3; 6][..]));
+        assert_eq!((&map.codes[..9], &map.margin[..9]), (&known.codes[..9], &known.margin[..9]));
+        assert_eq!((map.identities.name(1), map.identities.name(3)), ("puppet".to_owned(), "cat".to_owned()));
+        assert_eq!((map.identities.len(), map.seeds.clone()), (3, vec!["near".to_owned(), "far".to_owned()]));
+        assert!(
+            map.margin[9..].iter().all(|m| *m > 0.0) && map.codes[9..].iter().all(|c| *c == map.identities.codes(3))
+        );
+        let findings = map.findings.as_ref().expect("noticed");
+        assert!(
+            findings.is_valid(&map.identities)
+                && findings.unknown() < known.findings.as_ref().expect("noticed").unknown()
+        );
+        // The control: a photo of what is known adds nothing.
+        let same = add(0);
+        assert_eq!((&same.identity_of, &same.margin, &same.codes), (&known.identity_of, &known.margin, &known.codes));
+        assert_eq!((&same.identities, &same.seeds), (&known.identities, &known.seeds));
     }
 
     #[test]

@@ -136,7 +136,14 @@ fn reshape(map: &mut SemanticMap, id: IdentityId, gaussians: &[u32]) {
     }
 }
 
-fn add(map: &mut SemanticMap, level: Level, parent: IdentityId, name: String, gaussians: &[usize]) {
+/// Adds an identity of these Gaussians, whosever they were; its number.
+pub(super) fn add(
+    map: &mut SemanticMap,
+    level: Level,
+    parent: IdentityId,
+    name: String,
+    gaussians: &[usize],
+) -> IdentityId {
     let code = free_code(&map.identities);
     let id = map.identities.add(level, parent, Some(name).filter(|n| !n.is_empty()).into_iter().collect());
     if let Some(identity) = map.identities.get_mut(id) {
@@ -150,6 +157,7 @@ fn add(map: &mut SemanticMap, level: Level, parent: IdentityId, name: String, ga
     for &i in gaussians {
         (map.identity_of[i], map.codes[i]) = (id, codes);
     }
+    id
 }
 
 /// The point of the code sphere that is farthest from all codes that are taken.

@@ -21,8 +21,8 @@ const COUNT_SIDE_PX: u32 = 256;
 /// Pixels of such a view that must show an identity for it to be looked at.
 const LEAST_PX: usize = 12;
 
-/// Lets `encoder` look at every identity of `map`, in up to [`MAX_VIEWS`] of the `photos`. Parts keep `part_weight` of
-/// their own embedding.
+/// Lets `encoder` look at every identity of `map` that it has not looked at, in up to [`MAX_VIEWS`] of the `photos`.
+/// Parts keep `part_weight` of their own embedding.
 pub(crate) fn embed(
     cloud: &GaussianCloud,
     map: &SemanticMap,
@@ -44,11 +44,14 @@ pub(crate) fn embed(
         ticker.tick(i + 1, observer)?;
     }
     let mut wanted: HashMap<usize, Vec<IdentityId>> = HashMap::new();
-    for (k, seen) in seen.iter_mut().enumerate() {
+    let (name, dimension) = (encoder.name().to_owned(), encoder.dimension());
+    let before = map.language.as_ref().filter(|l| l.encoder == name && l.dimension == dimension);
+    let mut of = before.map_or_else(Vec::new, |l| l.by_identity.clone());
+    of.resize(n, ViewFeatures::default());
+    for (k, seen) in seen.iter_mut().enumerate().filter(|(k, _)| of[*k].raw.is_empty()) {
         seen.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         seen.iter().take(MAX_VIEWS).for_each(|(_, photo)| wanted.entry(*photo).or_default().push(k as IdentityId + 1));
     }
-    let mut of = vec![ViewFeatures::default(); n];
     let mut order: Vec<usize> = wanted.keys().copied().collect();
     order.sort_unstable();
     for (done, photo) in order.iter().enumerate() {
@@ -71,7 +74,7 @@ pub(crate) fn embed(
         }
         ticker.tick(done + 1, observer)?;
     }
-    Ok(LanguageFeatures { encoder: encoder.name().into(), dimension: encoder.dimension(), by_identity: of })
+    Ok(LanguageFeatures { encoder: name, dimension, by_identity: of })
 }
 
 struct Looker<'a> {

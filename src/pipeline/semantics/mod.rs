@@ -8,6 +8,7 @@
 //! [`by_embedding`] score identities for it by name and by embedding, [`localize`] picks those that are
 //! meant, and [`answer`] puts it together, with the time of each of the [`timing`] stages.
 
+pub(crate) mod add_photo;
 pub mod answer;
 mod associate;
 pub(crate) mod build_map;
@@ -28,6 +29,7 @@ pub(crate) mod kept_masks;
 pub mod localize;
 pub mod matching;
 pub(crate) mod names;
+mod nearest;
 pub(crate) mod network_segmenter;
 pub mod parse;
 mod prompt_points;

@@ -4,10 +4,7 @@
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-use rayon::prelude::*;
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
-
+use super::nearest::nearest;
 use super::votes::{Assignment, UNKNOWN};
 use crate::math::sh::SH_C0;
 use crate::math::stats::median;
@@ -25,17 +22,9 @@ pub(crate) fn extend(cloud: &GaussianCloud, assignments: &mut [Assignment], fart
     if assignments.iter().all(|b| b.identity != UNKNOWN) {
         return;
     }
-    let points: Vec<GeomWithData<[f64; 3], usize>> =
-        cloud.positions.iter().enumerate().map(|(i, p)| GeomWithData::new(p.map(f64::from), i)).collect();
-    let tree = RTree::bulk_load(points.clone());
-    let near: Vec<Vec<(usize, f64)>> = points
-        .par_iter()
-        .map(|p| {
-            let around = tree.nearest_neighbor_iter_with_distance_2(*p.geom()).skip(1).take(NEIGHBORS);
-            around.map(|(q, d)| (q.data, d.sqrt())).collect()
-        })
-        .collect();
-    let spacing = median(&near.iter().filter_map(|n| n.first()).map(|n| n.1).filter(|d| *d > 0.0).collect::<Vec<_>>());
+    let near = nearest(cloud, NEIGHBORS);
+    let spacing =
+        median(&near.iter().filter_map(|n| n.first()).map(|n| n.1.sqrt()).filter(|d| *d > 0.0).collect::<Vec<_>>());
     let spacing = if spacing.is_finite() { spacing } else { 1.0 };
     let stride = cloud.sh_stride();
     let color = |i: usize| cloud.sh[i * stride].map(|c| f64::from(c) * SH_C0);
@@ -45,10 +34,10 @@ pub(crate) fn extend(cloud: &GaussianCloud, assignments: &mut [Assignment], fart
     };
 
     // Neighborship counts in both directions: lonely Gaussians know others that do not know them.
-    let mut edges: Vec<Vec<(usize, f64)>> = vec![Vec::new(); points.len()];
+    let mut edges: Vec<Vec<(usize, f64)>> = vec![Vec::new(); near.len()];
     for (i, neighbors) in near.iter().enumerate() {
-        for &(j, d) in neighbors {
-            let length = step(i, j, d);
+        for &(j, far2) in neighbors {
+            let length = step(i, j, far2.sqrt());
             edges[i].push((j, length));
             edges[j].push((i, length));
         }
@@ -57,7 +46,7 @@ pub(crate) fn extend(cloud: &GaussianCloud, assignments: &mut [Assignment], fart
         assignments.iter().map(|b| if b.identity == UNKNOWN { f64::INFINITY } else { 0.0 }).collect();
     // Non-negative floats order like their bits.
     let mut open: BinaryHeap<Reverse<(u64, usize)>> =
-        (0..points.len()).filter(|&i| distance[i] == 0.0).map(|i| Reverse((0, i))).collect();
+        (0..near.len()).filter(|&i| distance[i] == 0.0).map(|i| Reverse((0, i))).collect();
     while let Some(Reverse((bits, i))) = open.pop() {
         if f64::from_bits(bits) > distance[i] {
             continue;

@@ -1,10 +1,8 @@
 //! Masks of one photo, and where they come from.
 
-use std::cmp::Reverse;
-
 use super::error::FindError;
 use crate::io::labels::{Labels, Region};
-use crate::pipeline::observer::Observer;
+use crate::pipeline::observer::{Observer, Ticker};
 use crate::scene::{Level, Mask, Photo};
 
 /// A mask that a segmenter found in one photo.
@@ -28,8 +26,8 @@ pub trait Segmenter {
     fn covers(&self, photo: &Photo) -> bool;
 
     /// The photo to begin with, by index: the first that it can say something about.
-    fn first(&self, photos: &[Photo]) -> Option<usize> {
-        photos.iter().position(|p| self.covers(p))
+    fn first(&self, photos: &[Photo], _: &mut dyn Observer) -> Result<Option<usize>, FindError> {
+        Ok(photos.iter().position(|p| self.covers(p)))
     }
 
     /// Masks of a photo, undistorted and scaled to at most `max_side_px`, wholes before pieces.
@@ -46,10 +44,10 @@ pub trait Segmenter {
 /// no other contains them, and as parts of the smallest that does where one does.
 pub(crate) struct FileMasks(pub(crate) Labels);
 
-/// Most photos whose labels are counted, their longer side meanwhile, and pixels from which a region counts then.
+/// Most photos whose labels are counted, their longer side meanwhile, and pixels of a region that counts half then.
 const COUNTED: usize = 64;
 const COUNTED_SIDE_PX: u32 = 512;
-const COUNTED_PX: usize = 12;
+const HALF_PX: f64 = 50.0;
 
 /// Share of a region that must lie in another for it to be a piece of that.
 const INSIDE: f64 = 0.9;
@@ -63,16 +61,26 @@ impl Segmenter for FileMasks {
         self.0.has(photo)
     }
 
-    /// The photo whose labels tell most things apart.
-    fn first(&self, photos: &[Photo]) -> Option<usize> {
+    /// The photo whose labels tell most things apart, and show them well.
+    fn first(&self, photos: &[Photo], observer: &mut dyn Observer) -> Result<Option<usize>, FindError> {
         let covered: Vec<usize> = (0..photos.len()).filter(|i| self.covers(&photos[*i])).collect();
-        let counted = covered.iter().copied().step_by(covered.len().div_ceil(COUNTED).max(1));
-        // Labels that cannot be read are told where they are used.
-        let regions = |i: &usize| {
-            let regions = self.0.of(&photos[*i], COUNTED_SIDE_PX).unwrap_or_default();
-            regions.iter().filter(|r| r.mask.area() >= COUNTED_PX).count()
-        };
-        counted.max_by_key(|i| (regions(i), Reverse(*i)))
+        let counted: Vec<usize> = covered.iter().copied().step_by(covered.len().div_ceil(COUNTED).max(1)).collect();
+        if counted.len() < 2 {
+            return Ok(counted.first().copied());
+        }
+        let mut ticker = Ticker::new("Counting labels", counted.len());
+        let mut most: Option<(f64, usize)> = None;
+        for (k, &i) in counted.iter().enumerate() {
+            // Labels that cannot be read are told where they are used.
+            let regions = self.0.of(&photos[i], COUNTED_SIDE_PX).unwrap_or_default();
+            let area = |r: &Region| r.mask.area() as f64;
+            let sum: f64 = regions.iter().map(|r| area(r) / (area(r) + HALF_PX)).sum();
+            if most.is_none_or(|m| sum > m.0) {
+                most = Some((sum, i));
+            }
+            ticker.tick(k + 1, observer)?;
+        }
+        Ok(most.map(|m| m.1))
     }
 
     fn segment(&mut self, photo: &Photo, max_side_px: u32, _: &mut dyn Observer) -> Result<Vec<FoundMask>, FindError> {
@@ -116,7 +124,13 @@ fn found(regions: Vec<Region>) -> Vec<FoundMask> {
 
 #[cfg(test)]
 mod tests {
+    use std::path::PathBuf;
+
+    use glam::DVec3;
+
     use super::*;
+    use crate::pipeline::observer::Silent;
+    use crate::scene::Camera;
 
     fn region(name: &str, level: Option<Level>, x: std::ops::Range<usize>) -> Region {
         let mask = Mask::from_fn(20, 4, |i| x.contains(&(i % 20)));
@@ -133,6 +147,35 @@ mod tests {
             (Some("button"), Level::Part, Some(1)),
         ];
         assert_eq!(list, expected);
+    }
+
+    #[test]
+    fn the_photo_with_most_labels_is_the_first() {
+        let folder = tempfile::tempdir().expect("folder");
+        let square = |x: usize| [[x, 1], [x + 5, 1], [x + 5, 8], [x, 8]];
+        // Two crumbs are less than a thing; what cannot be read counts as nothing; of equals, the first.
+        for (name, boxes, crumbs) in [("a", 1, 2), ("c", 2, 0), ("d", 2, 0)] {
+            let object = |k: usize, place| serde_json::json!({ "category": format!("c{k}"), "segmentation": place });
+            let things = (0..boxes).map(|k| object(k, serde_json::json!(square(6 * k))));
+            let small = [[18, 1], [20, 1], [20, 3], [18, 3]];
+            let objects: Vec<_> = things.chain((0..crumbs).map(|k| object(9 + k, serde_json::json!(small)))).collect();
+            let file = serde_json::json!({
+                "info": { "name": format!("{name}.jpg"), "width": 20, "height": 10 }, "objects": objects
+            });
+            std::fs::write(folder.path().join(format!("{name}.json")), file.to_string()).expect("written");
+        }
+        let broken = serde_json::json!({
+            "info": { "name": "b.jpg", "width": 20, "height": 10 },
+            "objects": [{ "category": "c0", "segmentation": [["left", 0], [5, 5], [0, 5]] }]
+        });
+        std::fs::write(folder.path().join("b.json"), broken.to_string()).expect("written");
+        let camera = Camera::look_at(DVec3::NEG_Z, DVec3::ZERO, DVec3::NEG_Y, 0.8, 20, 10).expect("valid");
+        let photo = |name: &str| Photo::new(name, PathBuf::new(), camera.clone());
+        let photos = ["none.jpg", "a.jpg", "b.jpg", "c.jpg", "d.jpg"].map(photo);
+        let masks = FileMasks(Labels::open(folder.path()).expect("labels"));
+        assert_eq!(masks.first(&photos, &mut Silent).expect("counted"), Some(3));
+        assert_eq!(masks.first(&photos[..2], &mut Silent).expect("counted"), Some(1));
+        assert_eq!(masks.first(&photos[..1], &mut Silent).expect("counted"), None);
     }
 
     #[test]

@@ -1,10 +1,11 @@
 //! The same identity in every view, carried by the trained Gaussians: masks of a first photo vote,
 //! the votes are drawn into the other views, and photos of which too much is unknown are segmented
-//! too, their masks linked to what is known. No network is needed.
+//! too, their masks linked to what is known; the tree of what belongs together decides. No network is needed.
 
 mod complete;
 mod views;
 
+use std::sync::Arc;
 use std::time::Instant;
 
 pub(crate) use views::ViewReport;
@@ -18,11 +19,11 @@ use super::segmenter::{FoundMask, Segmenter};
 use super::splat_tree::hierarchy::Hierarchy;
 use super::train_codes::{CODE_SIDE_PX, CodeView};
 use super::view_map::ViewMap;
-use super::votes::{Assignment, UNKNOWN, Votes};
+use super::votes::{Assignment, LEAST_SEEN, UNKNOWN, Votes};
 use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::findings::{Disagreement, Doubt, Findings, PhotoFinding, Seen};
-use crate::scene::{GaussianCloud, Identities, IdentityId, MaskPrompt, NOBODY, Photo};
+use crate::scene::{GaussianCloud, Identities, IdentityId, MaskPrompt, NOBODY, Photo, SemanticMap};
 
 /// Least weight of votes, in px of the photos voted on, that says something about a Gaussian.
 const LEAST_VOTES: f32 = 0.05;
@@ -32,8 +33,9 @@ const DRIFT: f64 = 0.2;
 /// Pixels from which each of them says something.
 const DRIFT_PX: usize = 30;
 
-/// Steps between Gaussians over which what no photo shows (the inside of things) belongs to what is around it.
-const HIDDEN_STEPS: f64 = 4.0;
+/// Share of a mask that nothing is known of, from which it shows something new.
+const NEWS: f64 = 0.5;
+
 /// Longer side of the views in which it is looked how well Gaussians are seen, px.
 const SEE_SIDE_PX: u32 = 256;
 
@@ -54,6 +56,16 @@ pub(crate) struct TrackOptions {
     pub(crate) keep_masks: bool,
     /// What of a mask SAM 2 is given to follow.
     pub(crate) prompt: MaskPrompt,
+    /// Whether what masks say grows over the other photos, up to their edges.
+    pub(crate) by_photos: bool,
+    /// Whether Gaussians that look alike and lie side by side share what is said of some of them.
+    pub(crate) by_tree: bool,
+    /// Steps between Gaussians over which what no photo shows (the inside of things) belongs to what is around it.
+    pub(crate) hidden_steps: f64,
+    /// Share of its area in the photo that shows it best that a Gaussian shows where a photo says whose it is.
+    pub(crate) least_seen: f32,
+    /// What is known already and stays as it is: masks only tell of what is unknown.
+    pub(crate) known: Option<Arc<SemanticMap>>,
 }
 
 impl Default for TrackOptions {
@@ -66,6 +78,11 @@ impl Default for TrackOptions {
             veto: true,
             keep_masks: false,
             prompt: MaskPrompt::Mask,
+            by_photos: true,
+            by_tree: true,
+            hidden_steps: 4.0,
+            least_seen: LEAST_SEEN,
+            known: None,
         }
     }
 }
@@ -76,7 +93,7 @@ pub(crate) struct Tracked {
     pub(crate) assignments: Vec<Assignment>,
     /// The photos that were segmented, in order.
     pub(crate) seeds: Vec<usize>,
-    /// Every photo, with all that photos say and nothing that is only inherited.
+    /// Every photo, with all that is known but what hidden Gaussians inherit from those around them.
     pub(crate) views: Vec<ViewReport>,
     /// Where masks and what was known disagreed, with the photo.
     pub(crate) disagreements: Vec<(usize, Disagreement)>,
@@ -122,7 +139,7 @@ pub(crate) fn track(
     let usable = |i: &usize| segmenter.covers(&photos[*i]);
     let first = match options.seed {
         Some(seed) => Some(seed).filter(|s| *s < photos.len()).filter(usable),
-        None => segmenter.first(photos),
+        None => segmenter.first(photos, observer)?,
     };
     let first = first.ok_or(FindError::NoSeed(segmenter.name().to_owned()))?;
     let mut t = Tracker {
@@ -131,8 +148,11 @@ pub(crate) fn track(
         settings,
         options,
         renderer: Renderer::new(),
-        identities: Identities::default(),
-        votes: Votes::new(cloud.len()),
+        identities: options.known.as_ref().map_or_else(Identities::default, |map| map.identities.clone()),
+        votes: match &options.known {
+            Some(map) => Votes::known(map, options.least_seen),
+            None => Votes::with_least_seen(cloud.len(), options.least_seen),
+        },
         disagreements: Vec::new(),
         masks: Vec::new(),
         segment_secs: 0.0,
@@ -163,13 +183,24 @@ pub(crate) fn track(
         }
     };
     let said = t.votes.clone();
-    t.complete(&views, observer)?;
-    let cameras: Vec<_> = photos.iter().map(|p| p.camera.clone()).collect();
-    let tree = Hierarchy::new(cloud, &cameras, settings, observer)?;
-    let mut assignments = tree.label(&said, &t.votes, &t.identities, LEAST_VOTES);
+    if options.by_photos {
+        t.complete(&views, observer)?;
+    }
+    let mut assignments = if options.by_tree {
+        let cameras: Vec<_> = photos.iter().map(|p| p.camera.clone()).collect();
+        let tree = Hierarchy::new(cloud, &cameras, settings, observer)?;
+        tree.label(&said, &t.votes, &t.identities, LEAST_VOTES)
+    } else {
+        t.votes.decide(&t.identities, LEAST_VOTES)
+    };
     let views = t.look(seeds.len() + 1, &identities_of(&assignments), observer)?;
-    extend(cloud, &mut assignments, HIDDEN_STEPS);
+    extend(cloud, &mut assignments, options.hidden_steps);
     drop_floaters(cloud, &t.identities, &mut assignments);
+    if let Some(map) = &options.known {
+        for i in (0..cloud.len()).filter(|i| !map.is_unknown(*i)) {
+            assignments[i] = Assignment { identity: map.identity_of[i], margin: map.margin[i] };
+        }
+    }
     let carry_secs = start.elapsed().as_secs_f64() - t.segment_secs - encode_secs - follow_secs;
     let secs = vec![
         ("segment", t.segment_secs),
@@ -240,8 +271,15 @@ impl Tracker<'_> {
         }
         let known = if self.identities.is_empty() { None } else { Some(self.map(photo, self.options.max_side_px)?) };
         let links = link(&found, known.as_ref(), &self.identities);
+        let stays = known.as_ref().filter(|_| self.options.known.is_some());
+        // Of which masks nothing becomes, because what they show is known.
+        let is_old = |mask: &FoundMask| {
+            let new = |map: &ViewMap| mask.mask.pixels().filter(|i| map.identity[*i] == UNKNOWN).count();
+            stays.is_some_and(|map| (new(map) as f64) < NEWS * mask.mask.area() as f64)
+        };
         if let Some(known) = &known {
-            for what in disagreements(&found, &links, known, &self.identities) {
+            let told = disagreements(&found, &links, known, &self.identities);
+            for what in told.into_iter().filter(|d| stays.is_none() || !matches!(d, Disagreement::Split(_))) {
                 let told = what.text(|id| self.identities.full_name(id));
                 observer.note(Severity::Warning, format!("{}: {told}", self.photos[photo].name));
                 self.disagreements.push((photo, what));
@@ -252,13 +290,18 @@ impl Tracker<'_> {
             let parent = mask.parent.map_or(NOBODY, |p| ids[p]);
             ids.push(match link {
                 Link::Known(id) => *id,
+                _ if parent == UNKNOWN || is_old(mask) => UNKNOWN,
                 Link::New | Link::Split(_) => {
                     self.identities.add(mask.level, parent, mask.name.iter().cloned().collect())
                 }
             });
         }
         let camera = self.photos[photo].camera.limited_to(self.options.max_side_px);
-        let labels = labels_of(&found, &ids, camera.width_px as usize * camera.height_px as usize);
+        let mut labels = labels_of(&found, &ids, camera.width_px as usize * camera.height_px as usize);
+        if let Some(map) = stays {
+            let known = labels.iter_mut().zip(&map.identity).filter(|(_, known)| **known != UNKNOWN);
+            known.for_each(|(label, _)| *label = UNKNOWN);
+        }
         self.votes
             .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
             .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e))?;

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::math::finite::{CHECKED, all_finite};
 use crate::math::lanes::Lane;
 use crate::render::{ContributionSink, RenderError, RenderSettings, Renderer, TILE_PX};
-use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, NOBODY};
+use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, NOBODY, SemanticMap};
 
 /// A pixel about which nothing is known.
 pub(crate) const UNKNOWN: IdentityId = IdentityId::MAX;
@@ -22,10 +22,15 @@ pub(crate) struct Votes {
     by_gaussian: Vec<Vec<(IdentityId, f32)>>,
     /// Per Gaussian: the largest area that it shows in any view that was looked at.
     best: Vec<f32>,
+    /// Share of that which a Gaussian must show in a view to be voted on there.
+    least_seen: f32,
 }
 
-/// Share of its weight in the view that shows it best that a Gaussian must have in a view to be voted on there.
-const LEAST_SEEN: f32 = 0.1;
+/// Votes of a Gaussian of which is known whose it is, px.
+const KNOWN: f32 = 10.0;
+
+/// The same where nobody says otherwise.
+pub(crate) const LEAST_SEEN: f32 = 0.1;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Assignment {
@@ -39,7 +44,19 @@ pub(crate) struct Assignment {
 impl Votes {
     /// No votes for `n` Gaussians.
     pub(crate) fn new(n: usize) -> Self {
-        Self { by_gaussian: vec![Vec::new(); n], best: vec![0.0; n] }
+        Self::with_least_seen(n, LEAST_SEEN)
+    }
+
+    pub(crate) fn with_least_seen(n: usize, least_seen: f32) -> Self {
+        Self { by_gaussian: vec![Vec::new(); n], best: vec![0.0; n], least_seen }
+    }
+
+    /// One vote for whose each Gaussian is known to be.
+    pub(crate) fn known(map: &SemanticMap, least_seen: f32) -> Self {
+        let mut votes = Self::with_least_seen(map.identity_of.len(), least_seen);
+        let known = (0..map.identity_of.len()).filter(|i| !map.is_unknown(*i));
+        known.for_each(|i| votes.by_gaussian[i].push((map.identity_of[i], KNOWN)));
+        votes
     }
 
     /// Votes for Gaussian `i`: identity and weight, px.
@@ -48,8 +65,7 @@ impl Votes {
     }
 
     /// Weight of all votes for Gaussian `i`, px.
-    #[cfg(test)]
-    fn weight(&self, i: usize) -> f32 {
+    pub(crate) fn weight(&self, i: usize) -> f32 {
         self.by_gaussian[i].iter().map(|v| v.1).sum()
     }
 
@@ -99,7 +115,7 @@ impl Votes {
         let areas = areas(cloud, camera, &found);
         for (gaussian, identity, weight) in found.into_iter().filter(|f| f.1 != UNKNOWN) {
             let g = gaussian as usize;
-            if areas[g] >= LEAST_SEEN * self.best[g] {
+            if areas[g] >= self.least_seen * self.best[g] {
                 add(&mut self.by_gaussian[g], identity, weight);
             }
         }
@@ -211,7 +227,7 @@ mod tests {
         let (eye, ear) = (all.add(Level::Part, doll, vec![]), all.add(Level::Part, doll, vec![]));
         let votes = Votes {
             by_gaussian: vec![vec![(eye, 2.0), (ear, 3.0), (cat, 4.0)], vec![(NOBODY, 1.0)], vec![], vec![(cat, 0.01)]],
-            best: Vec::new(),
+            ..Votes::default()
         };
         let b = votes.decide(&all, 0.05);
         assert_eq!(b[0].identity, ear);
@@ -276,7 +292,7 @@ mod tests {
         assert!(votes.iter().all(|v| v.0 != 51), "as light as the lightest");
         add(&mut votes, 52, 1.5);
         assert!(votes.contains(&(52, 1.5)) && votes.iter().all(|v| v.0 != 1) && votes.len() == KEPT);
-        let all = Votes { by_gaussian: vec![votes, vec![]], best: Vec::new() };
+        let all = Votes { by_gaussian: vec![votes, vec![]], ..Votes::default() };
         assert_eq!(all.weight(1), 0.0);
         assert_eq!(all.weight(0), 2.0 + 3.5 + 4.0 + 5.0 + 6.0 + 7.0 + 8.0 + 1.5);
     }
@@ -285,7 +301,7 @@ mod tests {
     fn votes_are_decided_by_weight_and_ties_by_number() {
         let all = Identities::objects(3);
         let by_gaussian = vec![vec![(3, 1.0), (2, 1.0), (1, 0.5)], vec![(2, 0.05)], vec![(1, 0.0)]];
-        let votes = Votes { by_gaussian, best: Vec::new() };
+        let votes = Votes { by_gaussian, ..Votes::default() };
         let b = votes.decide(&all, 0.05);
         assert_eq!(
             (b[0], b[1].identity),

@@ -18,12 +18,13 @@ pub(super) fn is_needed(settings: &OverlaySettings, depth: Option<(f32, f32)>) -
 }
 
 /// The legend of the tint, or of the depths that the frame shows. `unknown` is the share of the view of which nothing
-/// is known, once the eye rests.
+/// is known, once the eye rests; `photo` what can be done about it with one.
 pub(super) fn show(
     ui: &mut Ui,
     settings: &mut OverlaySettings,
     depth: Option<(f32, f32)>,
     unknown: Option<f64>,
+    photo: Option<&str>,
     actions: &mut Vec<Action>,
 ) {
     ui.vertical(|ui| {
@@ -42,7 +43,7 @@ pub(super) fn show(
         };
         ui.label(RichText::new(meaning).small());
         if settings.color_by.tells_unknown() {
-            show_unknown(ui, unknown, actions);
+            show_unknown(ui, unknown, photo, actions);
         }
         if settings.color_by == ColorBy::Heat {
             bar(ui, settings.colormap, ["0", "1"].map(String::from));
@@ -54,7 +55,7 @@ pub(super) fn show(
 }
 
 /// How much is unknown, and what can be done about it.
-fn show_unknown(ui: &mut Ui, share: Option<f64>, actions: &mut Vec<Action>) {
+fn show_unknown(ui: &mut Ui, share: Option<f64>, photo: Option<&str>, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         let (rect, _) = ui.allocate_exact_size(vec2(18.0, 11.0), Sense::hover());
         hatch(ui, rect);
@@ -65,12 +66,18 @@ fn show_unknown(ui: &mut Ui, share: Option<f64>, actions: &mut Vec<Action>) {
         };
         let why = "No mask and no photo says whose it is. Without a color: masks say that it is nobody's.";
         ui.label(RichText::new(text).small()).on_hover_text(why);
-        let mark = Action::Paint(Some(NOBODY));
-        if share.is_some_and(|s| s > 0.0) && ui.small_button("Mark it\u{2026}").on_hover_text(mark.tooltip()).clicked()
-        {
-            actions.push(mark);
-        }
     });
+    if share.is_some_and(|s| s > 0.0) {
+        ui.horizontal(|ui| {
+            let (mark, segment) = (Action::Paint(Some(NOBODY)), Action::SegmentPhoto);
+            let segment = photo.map(|text| (text, segment));
+            for (text, action) in [("Mark it\u{2026}", mark)].into_iter().chain(segment) {
+                if ui.small_button(text).on_hover_text(action.tooltip()).clicked() {
+                    actions.push(action);
+                }
+            }
+        });
+    }
 }
 
 /// Stripes as they are drawn over the view.

@@ -51,8 +51,10 @@ impl Viewport {
         let depth = self.picture().and_then(|p| beside(p).unwrap_or(p.depth_range));
         if legend::is_needed(self.queries.settings(), depth) && rect.height() > LOW && !is_other {
             let unknown = self.queries.maps().map(|m| m.unknown_share());
+            let has_photos = state.scene.as_ref().is_some_and(|s| s.dataset.is_some()) && state.is_trained();
+            let segment = if self.photo.is_some() { "Segment this photo" } else { "Segment the nearest photo" };
             card(ui, rect, legend, (Align2::RIGHT_BOTTOM, 0.0), |ui| {
-                legend::show(ui, self.queries.settings(), depth, unknown, actions);
+                legend::show(ui, self.queries.settings(), depth, unknown, has_photos.then_some(segment), actions);
             });
         }
         if second {

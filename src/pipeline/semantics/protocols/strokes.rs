@@ -1,5 +1,6 @@
 //! `strokes`: somebody points at a thing in the view that shows most of it, corrects what is wrong there with a
-//! second and a third stroke, and is judged in all other views.
+//! second and a third stroke, and is judged in all other views. `corrections`: somebody corrects what the scene knows of
+//! a thing by three strokes, each in the view where most is wrong then, and is judged in all views.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -33,20 +34,26 @@ pub(crate) struct LabeledPhoto {
 pub(crate) struct StrokeRow {
     pub(crate) name: String,
     pub(crate) level: Level,
-    /// The view that was drawn in.
+    /// The view that was drawn in first.
     pub(crate) drawn_in: String,
-    /// Mean IoU in all other views after each stroke.
-    pub(crate) iou: [f64; STROKES],
+    /// How many it is judged in.
+    pub(crate) views: usize,
+    /// Mean IoU in them, before any stroke and after each.
+    pub(crate) iou: [f64; STROKES + 1],
     /// Milliseconds from each stroke to the Gaussians.
     pub(crate) ms: [f64; STROKES],
 }
 
-/// Selects every named thing of the views.
+/// The Gaussians that are known to be what is called so.
+pub(crate) type Known<'a> = &'a dyn Fn(&str) -> Vec<usize>;
+
+/// Selects every named thing of the views. Where it is asked for what is `known` of a name, that is corrected.
 pub(crate) fn rows(
     hierarchy: &Hierarchy,
     cloud: &GaussianCloud,
     settings: &RenderSettings,
     views: &[LabeledPhoto],
+    known: Option<Known<'_>>,
 ) -> Result<Vec<StrokeRow>, RenderError> {
     let mut things: BTreeMap<&str, Vec<(usize, &Category)>> = BTreeMap::new();
     for (k, view) in views.iter().enumerate() {
@@ -55,39 +62,46 @@ pub(crate) fn rows(
     }
     let mut renderer = Renderer::new();
     let mut rows = Vec::new();
-    for (name, seen) in things {
-        let Some(&(first, truth)) = seen.iter().max_by_key(|(_, c)| c.mask.area()).filter(|_| seen.len() > 1) else {
-            continue;
-        };
+    for (name, seen) in things.into_iter().filter(|(_, seen)| seen.len() > 1) {
         let mut draw = |selected: &[bool], k: usize| -> Result<Mask, RenderError> {
             let all = Identities::objects(1);
             let of: Vec<IdentityId> = selected.iter().map(|s| IdentityId::from(*s)).collect();
             Ok(ViewMap::render(&mut renderer, cloud, &of, &all, &views[k].camera, settings)?.mask(&all, 1))
         };
+        let from = known.map_or_else(Vec::new, |known| known(name));
         let (mut marks, mut selected) = (StrokeMarks::default(), vec![false; cloud.len()]);
-        let mut row = StrokeRow {
-            name: name.to_owned(),
-            level: truth.level,
-            drawn_in: views[first].name.clone(),
-            iou: [0.0; STROKES],
-            ms: [0.0; STROKES],
-        };
-        for k in 0..STROKES {
-            let now = draw(&selected, first)?;
-            if let Some((pixels, is_plus)) = correction(&truth.mask, &now) {
-                let start = std::time::Instant::now();
-                let stroke = Stroke { camera: views[first].camera.clone(), pixels, is_plus };
-                marks.add(&mut Renderer::new(), cloud, settings, &stroke)?;
-                selected = hierarchy.select(&marks, &[]);
-                row.ms[k] = ms_since(start);
-            }
-            let mut sum = 0.0;
-            for (view, truth) in seen.iter().filter(|(view, _)| *view != first) {
-                sum += draw(&selected, *view)?.iou(&truth.mask);
-            }
-            row.iou[k] = sum / (seen.len() - 1) as f64;
+        from.iter().for_each(|&i| selected[i] = true);
+        let mut row: Option<StrokeRow> = None;
+        for k in 0..=STROKES {
+            let drawn: Vec<Mask> = seen.iter().map(|(view, _)| draw(&selected, *view)).collect::<Result<_, _>>()?;
+            let wrong = |at: usize| {
+                let (now, truth) = (&drawn[at], &seen[at].1.mask);
+                now.area() + truth.area() - 2 * now.overlap(truth)
+            };
+            let worst = (0..seen.len()).rev().max_by_key(|at| wrong(*at)).unwrap_or(0);
+            let row = row.get_or_insert_with(|| StrokeRow {
+                name: name.to_owned(),
+                level: seen[0].1.level,
+                drawn_in: views[seen[worst].0].name.clone(),
+                views: seen.len() - usize::from(known.is_none()),
+                iou: [0.0; STROKES + 1],
+                ms: [0.0; STROKES],
+            });
+            // A selection is corrected where it was begun.
+            let begun = seen.iter().position(|(view, _)| views[*view].name == row.drawn_in).unwrap_or(0);
+            let at = if known.is_none() { begun } else { worst };
+            let judged = (0..seen.len()).filter(|i| known.is_some() || *i != begun);
+            row.iou[k] = judged.map(|i| drawn[i].iou(&seen[i].1.mask)).sum::<f64>() / row.views as f64;
+            let (view, truth) = seen[at];
+            let stroke = correction(&truth.mask, &drawn[at]).filter(|_| k < STROKES);
+            let Some((pixels, is_plus)) = stroke else { continue };
+            let start = std::time::Instant::now();
+            let stroke = Stroke { camera: views[view].camera.clone(), pixels, is_plus };
+            marks.add(&mut Renderer::new(), cloud, settings, &stroke)?;
+            selected = hierarchy.select(&marks, &from);
+            row.ms[k] = ms_since(start);
         }
-        rows.push(row);
+        rows.extend(row);
     }
     Ok(rows)
 }

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::marks::StrokeMarks;
+use super::marks::{StrokeMark, StrokeMarks};
 use super::surface::SplatSurface;
 use crate::pipeline::observer::Observer;
 use crate::pipeline::semantics::error::FindError;
@@ -77,6 +77,19 @@ impl Hierarchy {
         }
         let before: Vec<bool> = share.iter().map(|[out, own]| own > out).collect();
         let mut now = before.clone();
+        let mut alone: Vec<f64> = self.tree.nodes.iter().map(Self::price).collect();
+        if !from.is_empty() {
+            // What there is to correct ends where it ends: that costs nothing, and nothing is won by smoothing it.
+            let fixed =
+                |leaf: usize| [before[leaf], !before[leaf]].map(|other| if other { f64::INFINITY } else { 0.0 });
+            let own = self.cheapest(&fixed, &alone);
+            for (i, node) in self.tree.nodes.iter().enumerate() {
+                let whole = node.parent.is_some_and(|p| own[p as usize]);
+                if own[i] != whole {
+                    alone[i] = 0.0;
+                }
+            }
+        }
         let mut marked = vec![[0.0_f64; 2]; self.leaves];
         for (k, stroke) in marks.strokes.iter().enumerate() {
             let mut weights: BTreeMap<u32, f64> = BTreeMap::new();
@@ -92,14 +105,21 @@ impl Hierarchy {
                 // Where two say the opposite, the later one counts.
                 *follows = 0.0;
             }
-            let mut change = if k == 0 && from.is_empty() { [FIRST; 2] } else { [CHANGE; 2] };
-            let asked = &mut change[usize::from(stroke.is_plus)];
-            *asked = asked.min(match (stroke.is_plus, stroke.is_click) {
-                (false, _) => REMOVE,
-                (true, true) => ADD_BY_CLICK,
-                (true, false) => *asked,
-            });
-            now = self.cheapest(&marked, &now, change.map(|c| c / stroke.size.max(f64::MIN_POSITIVE)));
+            let change = match stroke {
+                StrokeMark { is_click, .. } if !from.is_empty() => [if *is_click { KNOWN_BY_CLICK } else { KNOWN }; 2],
+                _ if k == 0 => [FIRST; 2],
+                StrokeMark { is_plus: false, .. } => [REMOVE, CHANGE],
+                StrokeMark { is_click: true, .. } => [CHANGE, ADD_BY_CLICK],
+                _ => [CHANGE; 2],
+            };
+            let change = change.map(|c| c / stroke.size.max(f64::MIN_POSITIVE));
+            let cost = |leaf: usize| {
+                let (mut cost, other) = (marked[leaf], usize::from(!now[leaf]));
+                cost[other] += change[other] * self.tree.nodes[leaf].area;
+                cost
+            };
+            let nodes = self.cheapest(&cost, &alone);
+            now = nodes[..self.leaves].to_vec();
         }
         for (is_in, leaf) in gaussians.iter_mut().zip(&self.leaf) {
             let leaf = *leaf as usize;
@@ -116,17 +136,14 @@ impl Hierarchy {
         ((node.birth + LEAF_STEP) / (node.death + LEAF_STEP)).powi(2)
     }
 
-    /// The labels of the leaves that cost least: `marked` against each label, `change` by area that goes out and that
-    /// comes in.
-    fn cheapest(&self, marked: &[[f64; 2]], before: &[bool], change: [f64; 2]) -> Vec<bool> {
+    /// The labels of all nodes that cost least: `leaf` says what being out and being in costs a leaf, `alone` what it
+    /// costs each node not to be what it is a piece of.
+    fn cheapest(&self, leaf: &dyn Fn(usize) -> [f64; 2], alone: &[f64]) -> Vec<bool> {
         let nodes = &self.tree.nodes;
-        let alone: Vec<f64> = nodes.iter().map(Self::price).collect();
         let mut cost = vec![[0.0_f64; 2]; nodes.len()];
         for (i, node) in nodes.iter().enumerate() {
             let Some(children) = node.children else {
-                cost[i] = marked[i];
-                let other = usize::from(!before[i]);
-                cost[i][other] += change[other] * node.area;
+                cost[i] = leaf(i);
                 continue;
             };
             for child in children.map(|c| c as usize) {
@@ -142,7 +159,6 @@ impl Hierarchy {
             of[usize::from(!of_selected)] += alone[i];
             selected[i] = of[1] < of[0];
         }
-        selected.truncate(before.len());
         selected
     }
 }
@@ -155,6 +171,9 @@ const CHANGE: f64 = 0.5;
 /// That a minus takes away, and that a click adds.
 const REMOVE: f64 = 0.05;
 const ADD_BY_CLICK: f64 = 0.1;
+/// That a line and a click change of what is known.
+const KNOWN: f64 = 16.0;
+const KNOWN_BY_CLICK: f64 = 0.1;
 
 /// Gaussians that look the same, a few together: the leaf of each, and how many there are.
 fn leaves(surface: &SplatSurface) -> (Vec<u32>, usize) {
@@ -285,6 +304,37 @@ pub(super) mod tests {
         // Controls: no mark, nothing; a mark elsewhere selects something else.
         assert_eq!(select(&[], &[]), [0; 3]);
         assert!(other[0] >= 400 && other[1] + other[2] <= 8, "{other:?}");
+    }
+
+    #[test]
+    fn what_is_known_keeps_its_borders_and_a_line_corrects_what_it_covers() {
+        let (cloud, whose) = sheet();
+        let tree = hierarchy(&cloud);
+        // Known is something that ends where nothing can be seen: the upper gray, and all of the blue.
+        let from: Vec<usize> = (0..whose.len()).filter(|i| whose[*i] == 2 || whose[*i] == 0 && i / 32 < 9).collect();
+        let line = |from: [f64; 2], to: [f64; 2], is_plus: bool| {
+            let place = |t: f64| [0, 1].map(|c| from[c] + t * (to[c] - from[c]));
+            let dots = (0..=20).map(|k| dot(place(f64::from(k) / 20.0), is_plus));
+            let all = dots.reduce(|mut a, b| {
+                a.pixels.add(&b.pixels);
+                a
+            });
+            all.expect("dots")
+        };
+        let select = |stroke: &Stroke| tree.select(&marks(&cloud, std::slice::from_ref(stroke)), &from);
+        let without_blue = select(&line([0.15, -0.2], [0.15, 0.2], false));
+        let [gray, red, blue] = counts(&without_blue, &whose);
+        assert!(gray == 288 && red == 0 && (40..64).contains(&blue), "{gray} {red} {blue}");
+        let with_red = select(&line([-0.15, -0.2], [-0.15, 0.2], true));
+        let [gray, red, blue] = counts(&with_red, &whose);
+        assert!((280..300).contains(&gray) && (8..40).contains(&red) && blue >= 64, "{gray} {red} {blue}");
+        // In the middle of what looks the same, hardly more than the line itself.
+        let lower = select(&line([-0.6, 0.6], [0.0, 0.6], true));
+        let more = counts(&lower, &whose)[0] - 288;
+        assert!((8..120).contains(&more), "{more} of the lower gray");
+        // The control: from nothing, the same line takes all that looks the same.
+        let alone = tree.select(&marks(&cloud, &[line([-0.6, 0.6], [0.0, 0.6], true)]), &[]);
+        assert!(counts(&alone, &whose)[0] > 400);
     }
 
     #[test]

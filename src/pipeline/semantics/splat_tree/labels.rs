@@ -4,6 +4,8 @@
 //! costs a node the less the longer it stood alone while the tree grew (the price that selections pay, too), and not to
 //! be what was voted costs a leaf. The cheapest labels of all nodes are found exactly, from the leaves up and back.
 
+use std::collections::BTreeMap;
+
 use super::hierarchy::Hierarchy;
 use crate::pipeline::semantics::votes::{Assignment, UNKNOWN, Votes};
 use crate::scene::{Identities, IdentityId};
@@ -20,7 +22,7 @@ const INHERITED: f32 = 0.1;
 /// Votes for the Gaussians of a leaf.
 #[derive(Clone, Debug, Default)]
 struct LeafVotes {
-    by_identity: Vec<(IdentityId, f64)>,
+    by_identity: BTreeMap<IdentityId, f64>,
     /// Area of the Gaussians that they are for, square units.
     area: f64,
 }
@@ -35,9 +37,8 @@ struct Costs {
 impl Costs {
     /// Of a leaf's votes: `all` is the price of what has none.
     fn new(votes: &LeafVotes, all: f64) -> Self {
-        let total: f64 = votes.by_identity.iter().map(|v| v.1).sum();
-        let mut of: Vec<_> = votes.by_identity.iter().map(|v| (v.0, all * (1.0 - v.1 / total))).collect();
-        of.sort_by_key(|v| v.0);
+        let total: f64 = votes.by_identity.values().sum();
+        let of = votes.by_identity.iter().map(|(id, weight)| (*id, all * (1.0 - weight / total))).collect();
         Self { of, rest: all }
     }
 
@@ -111,17 +112,13 @@ impl Hierarchy {
     fn votes_of_leaves(&self, votes: &Votes, least: f32) -> Vec<LeafVotes> {
         let mut sums = vec![LeafVotes::default(); self.leaves];
         for (g, leaf) in self.leaf.iter().enumerate() {
-            let of = votes.of(g);
-            if of.iter().map(|v| v.1).sum::<f32>() < least {
+            if votes.weight(g) < least {
                 continue;
             }
             let sum = &mut sums[*leaf as usize];
             sum.area += self.area[g];
-            for &(id, weight) in of {
-                match sum.by_identity.iter_mut().find(|s| s.0 == id) {
-                    Some(s) => s.1 += f64::from(weight),
-                    None => sum.by_identity.push((id, f64::from(weight))),
-                }
+            for &(id, weight) in votes.of(g) {
+                *sum.by_identity.entry(id).or_default() += f64::from(weight);
             }
         }
         sums
@@ -165,7 +162,7 @@ mod tests {
         let (tree, all) = (hierarchy(&cloud), Identities::objects(2));
         let said = votes(&cloud, &[([-0.15, 0.0], 1), ([0.15, 0.0], 2), ([-0.6, -0.6], NOBODY)]);
         let labels = tree.label(&said, &said, &all, 0.05);
-        let voted = |i: &usize| said.of(*i).iter().map(|v| v.1).sum::<f32>() >= 0.05;
+        let voted = |i: &usize| said.weight(*i) >= 0.05;
         let told = (0..whose.len()).filter(voted).count();
         assert!((20..200).contains(&told), "a few of the 1,024: {told}");
         let found = table(&labels, &whose);
@@ -214,7 +211,7 @@ mod tests {
         assert_eq!(a.below(0.5), Costs { of: vec![(1, 0.2)], rest: 0.7 });
         assert_eq!((a.of(4), a.of(3), a.least()), (0.9, 2.0, (1, 0.2)));
         assert_eq!(Costs::default().least(), (UNKNOWN, 0.0));
-        let votes = LeafVotes { by_identity: vec![(7, 1.0), (2, 3.0)], area: 1.0 };
+        let votes = LeafVotes { by_identity: [(7, 1.0), (2, 3.0)].into(), area: 1.0 };
         assert_eq!(Costs::new(&votes, 4.0), Costs { of: vec![(2, 1.0), (7, 3.0)], rest: 4.0 });
     }
 }

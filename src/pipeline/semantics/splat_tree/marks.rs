@@ -11,6 +11,9 @@ use crate::scene::{Camera, GaussianCloud, Mask};
 /// A stroke is about something of so many times its own area, at least.
 const CLICK: f64 = 16.0;
 
+/// The square of a line's length, in areas of it, at least; what is shorter is a click.
+const LINE: f64 = 3.0;
+
 /// Pixels around a stroke that are drawn with it.
 const ROOM_PX: usize = 32;
 
@@ -37,7 +40,7 @@ pub(crate) struct StrokeMarks {
 pub(super) struct StrokeMark {
     pub(super) weights: BTreeMap<u32, f32>,
     pub(super) is_plus: bool,
-    /// Whether it is as long as it is wide.
+    /// Whether it is hardly longer than wide.
     pub(super) is_click: bool,
     /// The square of its length at the depth of what it shows, at least some times its area: square units.
     pub(super) size: f64,
@@ -95,7 +98,7 @@ impl StrokeMarks {
             }
         }
         let (length2, area) = (length_px2(&stroke.pixels), stroke.pixels.area() as f64);
-        let is_click = length2 < 3.0 * area;
+        let is_click = length2 < LINE * area;
         let size = length2.max(CLICK * area) * units_per_px(cloud, &stroke.camera, &weights).powi(2);
         self.strokes.push(StrokeMark { weights, is_plus: stroke.is_plus, is_click, size });
         Ok(())

@@ -3,10 +3,9 @@
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
-use rstar::RTree;
-use rstar::primitives::GeomWithData;
 
 use super::super::error::FindError;
+use super::super::nearest::nearest;
 use super::super::regions::edges::{ImagePlanes, strength};
 use super::super::regions::lab::{lab, planes};
 use super::super::regions::shape::ends;
@@ -179,19 +178,11 @@ fn own_colors(cloud: &GaussianCloud, seen: &[[f32; 4]]) -> Vec<[f32; 3]> {
 
 /// The nearest neighbors of all Gaussians, each pair once.
 fn neighbors(cloud: &GaussianCloud) -> Vec<(u32, u32)> {
-    let points: Vec<GeomWithData<[f64; 3], u32>> =
-        cloud.positions.iter().zip(0..).map(|(p, i)| GeomWithData::new(p.map(f64::from), i)).collect();
-    let tree = RTree::bulk_load(points.clone());
-    let around = |p: &GeomWithData<[f64; 3], u32>| {
-        let nearest = tree.nearest_neighbor_iter_with_distance_2(*p.geom()).take(NEIGHBORS + 1);
-        nearest.map(|(q, far2)| (q.data, far2)).filter(|(q, _)| *q != p.data).collect::<Vec<_>>()
-    };
-    let around: Vec<Vec<(u32, f64)>> = points.par_iter().map(around).collect();
+    let around = nearest(cloud, NEIGHBORS);
     let reach: Vec<f64> = around.iter().map(|near| near.last().map_or(0.0, |(_, far2)| *far2)).collect();
-    let near = |(a, b, far2): &(u32, u32, f64)| *far2 <= FAR.powi(2) * reach[*a as usize].min(reach[*b as usize]);
-    let pairs =
-        (0..).zip(&around).flat_map(|(p, near)| near.iter().map(move |(q, far2)| (p.min(*q), p.max(*q), *far2)));
-    let mut edges: Vec<(u32, u32)> = pairs.filter(near).map(|(a, b, _)| (a, b)).collect();
+    let near = |(a, b, far2): &(usize, usize, f64)| *far2 <= FAR.powi(2) * reach[*a].min(reach[*b]);
+    let pairs = around.iter().enumerate().flat_map(|(p, near)| near.iter().map(move |&(q, far2)| (p, q, far2)));
+    let mut edges: Vec<(u32, u32)> = pairs.filter(near).map(|(p, q, _)| (p.min(q) as u32, p.max(q) as u32)).collect();
     edges.par_sort_unstable();
     edges.dedup();
     edges

@@ -46,9 +46,7 @@ pub(crate) fn offer(stage: &Stage, point: &Point, now: &Now<'_>) -> Offer {
     let result = match stage.name {
         StageName::Train => training(stage, point, now),
         StageName::Render => drawing(stage, point, now),
-        StageName::Features => {
-            Err("The window finds objects by the votes of all photos; this compares alternatives.".into())
-        }
+        StageName::Features => Err("Objects are found by the default; this compares alternatives.".into()),
         _ => Err("The window has no such setting.".into()),
     };
     match result {

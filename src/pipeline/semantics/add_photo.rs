@@ -1,0 +1,59 @@
+//! What one more photo shows, added to objects and parts that are known: nothing that is known changes.
+
+use super::edit::add;
+use super::tracker::Tracked;
+use super::votes::UNKNOWN;
+use crate::scene::{IdentityId, NOBODY, Photo, SemanticMap};
+
+/// Gaussians of which a new object or part consists at least.
+const LEAST: usize = 4;
+
+/// The map that is `known` with what was `tracked` beginning with it.
+pub(crate) fn joined(known: &SemanticMap, tracked: &Tracked, photos: &[Photo]) -> SemanticMap {
+    let mut map = known.clone();
+    let all = &tracked.identities;
+    let old = known.identities.len() as IdentityId;
+    let mut own: Vec<Vec<usize>> = vec![Vec::new(); all.len() + 1];
+    for (i, assignment) in
+        tracked.assignments.iter().enumerate().filter(|(i, a)| known.is_unknown(*i) && a.identity != UNKNOWN)
+    {
+        own[assignment.identity as usize].push(i);
+    }
+    // New ones by their numbers in the map; wholes come before their pieces.
+    let mut number: Vec<IdentityId> = (0..=old).collect();
+    for (id, identity) in all.iter().skip(old as usize) {
+        let inside = all.descendants(id);
+        let size: usize = own.iter().zip(&inside).filter(|(_, is_in)| **is_in).map(|(own, _)| own.len()).sum();
+        let whole = number[identity.parent as usize];
+        let is_one = size >= LEAST && (identity.parent == NOBODY || whole != NOBODY);
+        let name = identity.names.first().cloned().unwrap_or_default();
+        number.push(if is_one { add(&mut map, identity.level, whole, name, &[]) } else { NOBODY });
+    }
+    for (id, gaussians) in own.iter().enumerate() {
+        let now = number[id];
+        if now == NOBODY && id != NOBODY as usize {
+            continue;
+        }
+        let codes = map.identities.codes(now);
+        for &i in gaussians {
+            (map.identity_of[i], map.codes[i], map.margin[i]) = (now, codes, tracked.assignments[i].margin);
+        }
+    }
+    let seeds = tracked.seeds.iter().map(|&i| photos[i].name.clone()).filter(|name| !known.seeds.contains(name));
+    map.seeds.extend(seeds);
+    let mut findings = tracked.findings(photos);
+    findings.renumber(&number, map.identities.len());
+    if let Some(before) = &known.findings {
+        findings.keep_doubts(before);
+    }
+    map.findings = Some(findings);
+    map
+}
+
+/// In words, what came to a map.
+pub(crate) fn told(known: &SemanticMap, map: &SemanticMap) -> String {
+    let new = map.identities.len() - known.identities.len();
+    let now_known = (0..map.identity_of.len()).filter(|i| known.is_unknown(*i) && !map.is_unknown(*i)).count();
+    let unknown = (0..map.identity_of.len()).filter(|i| map.is_unknown(*i)).count();
+    format!("{new} new objects and parts; {now_known} Gaussians are no longer unknown, {unknown} still are")
+}
