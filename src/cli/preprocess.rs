@@ -29,7 +29,7 @@ use crate::scene::{Findings, Identity, IdentityId, Level, Lifting, MaskPrompt, P
     fmlgs preprocess scene/ --masks photos/               masks that came with the photos\n  \
     fmlgs preprocess scene/ --masks labels/ --max-seeds 1  one labeled photo is enough to begin\n  \
     fmlgs preprocess scene/ --segmenter regions           no masks: regions of the photos, unnamed and rough\n  \
-    fmlgs preprocess scene/ --add DSC_12                  what this photo shows of the unknown; the rest stays")]
+    fmlgs preprocess scene/ --add DSC_12                  what this photo shows that is nobody's yet")]
 pub(crate) struct PreprocessArgs {
     /// Trained scene
     scene: PathBuf,
@@ -63,7 +63,7 @@ pub(crate) struct PreprocessArgs {
     /// Photo to begin with, by name [default: the first with masks]
     #[arg(long)]
     seed: Option<String>,
-    /// Add what this photo, by name, shows of the unknown; objects and parts that are there stay as they are
+    /// Add what this photo, by name, shows that is nobody's yet; objects and parts that are there stay as they are
     #[arg(long, value_name = "PHOTO", conflicts_with_all = ["seed", "max_seeds", "unknown", "recipe", "tracker", "prompt",
         "part_weight", "lifting", "code_steps", "encoder"])]
     add: Option<String>,

@@ -82,7 +82,7 @@ pub struct FindRequest {
     pub holdout_every: usize,
     /// Where masks are; `None` = they are found.
     pub masks: Option<PathBuf>,
-    /// Objects and parts that stay as they are: what the photo to begin with shows of the unknown is added.
+    /// Objects and parts that stay as they are: what the photo to begin with shows that is nobody's is added.
     pub known: Option<Arc<SemanticMap>>,
     /// Longer side of the pictures that are looked at, px.
     pub side_px: u32,

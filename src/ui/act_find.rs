@@ -71,7 +71,7 @@ impl App {
         self.submit_search(masks, None);
     }
 
-    /// Adds what the photo that is looked through, or else the nearest that was trained on, shows of the unknown.
+    /// Adds what the photo that is looked through, or else the nearest that was trained on, shows that is nobody's.
     pub(super) fn segment_photo(&mut self) {
         let Some(known) = self.state.semantics.as_deref().cloned() else {
             return self.state.toast(Tone::Warning, "Find objects first: what one more photo shows is added to them.");

@@ -158,7 +158,7 @@ actions! {
     FindObjects: "Find objects and parts",
         "From the labels that came with the photos, or else from what networks or colors tell.";
     SegmentPhoto: "Segment this photo",
-        "Find what this photo, or else the nearest one, shows of the unknown. What is known stays; can be undone.";
+        "Find what this photo, or else the nearest one, shows that is nobody's yet. Objects and parts stay; can be undone.";
     ChooseMasks: "Find objects with other masks\u{2026}",
         "Id maps of fmlgs synth, ISAT files, folders of SPIn-NeRF, 3D-OVS or LERF-Mask; one labeled photo is enough.";
     FetchModel(id: String): format!("Download the model {id}"), "Download it, verify it, and use it from then on.";

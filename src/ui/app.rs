@@ -154,8 +154,7 @@ impl App {
         while let Some(event) = self.worker.next_event() {
             self.hear(&event);
             let segmented = self.segmenting.take_if(|s| event.is_end() && event.job() == s.job);
-            let next = self.state.apply(event);
-            self.actions.extend(next);
+            self.actions.extend(self.state.apply(event));
             segmented.into_iter().for_each(|s| self.segmented(s));
         }
         self.state.replan(&self.layout.plan, self.layout.config.limits());

@@ -179,7 +179,7 @@ fn one_more_photo_is_segmented_and_that_is_taken_back() {
     w.until("the name", |a| name(a, 1) == "crate");
     w.ask(Action::SegmentPhoto);
     w.until("one more photo", |a| said(a, "Segmented "));
-    assert!(said(w.app(), "no longer unknown"), "what came to be known is told");
+    assert!(said(w.app(), "were nobody's before"), "what came to be known is told");
     assert_eq!(name(w.app(), 1), "crate", "what was done by hand stays");
     w.ask(Action::Undo);
     w.until("undone", |a| said(a, "Undone: segmented "));

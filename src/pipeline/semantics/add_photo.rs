@@ -1,4 +1,4 @@
-//! What one more photo shows, added to objects and parts that are known: nothing that is known changes.
+//! What one more photo shows, added to objects and parts that are known: what is somebody's stays.
 
 use super::edit::add;
 use super::tracker::Tracked;
@@ -14,9 +14,8 @@ pub(crate) fn joined(known: &SemanticMap, tracked: &Tracked, photos: &[Photo]) -
     let all = &tracked.identities;
     let old = known.identities.len() as IdentityId;
     let mut own: Vec<Vec<usize>> = vec![Vec::new(); all.len() + 1];
-    for (i, assignment) in
-        tracked.assignments.iter().enumerate().filter(|(i, a)| known.is_unknown(*i) && a.identity != UNKNOWN)
-    {
+    let free = tracked.assignments.iter().enumerate().filter(|(i, _)| known.identity_of[*i] == NOBODY);
+    for (i, assignment) in free.filter(|(_, a)| a.identity != UNKNOWN) {
         own[assignment.identity as usize].push(i);
     }
     // New ones by their numbers in the map; wholes come before their pieces.
@@ -53,7 +52,8 @@ pub(crate) fn joined(known: &SemanticMap, tracked: &Tracked, photos: &[Photo]) -
 /// In words, what came to a map.
 pub(crate) fn told(known: &SemanticMap, map: &SemanticMap) -> String {
     let new = map.identities.len() - known.identities.len();
-    let now_known = (0..map.identity_of.len()).filter(|i| known.is_unknown(*i) && !map.is_unknown(*i)).count();
-    let unknown = (0..map.identity_of.len()).filter(|i| map.is_unknown(*i)).count();
-    format!("{new} new objects and parts; {now_known} Gaussians are no longer unknown, {unknown} still are")
+    let count = |is: &dyn Fn(usize) -> bool| (0..map.identity_of.len()).filter(|i| is(*i)).count();
+    let taken = count(&|i| known.identity_of[i] == NOBODY && map.identity_of[i] != NOBODY);
+    let unknown = count(&|i| map.is_unknown(i));
+    format!("{new} new objects and parts; {taken} Gaussians were nobody's before, {unknown} are unknown")
 }

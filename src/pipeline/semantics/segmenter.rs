@@ -44,9 +44,11 @@ pub trait Segmenter {
 /// no other contains them, and as parts of the smallest that does where one does.
 pub(crate) struct FileMasks(pub(crate) Labels);
 
-/// Most photos whose labels are counted, their longer side meanwhile, and pixels of a region that counts half then.
+/// Most photos whose labels are counted, their longer side meanwhile, pixels from which a region counts then, and with
+/// which it is shown half as well as can be.
 const COUNTED: usize = 64;
 const COUNTED_SIDE_PX: u32 = 512;
+const COUNTED_PX: usize = 12;
 const HALF_PX: f64 = 50.0;
 
 /// Share of a region that must lie in another for it to be a piece of that.
@@ -61,7 +63,7 @@ impl Segmenter for FileMasks {
         self.0.has(photo)
     }
 
-    /// The photo whose labels tell most things apart, and show them well.
+    /// The photo whose labels tell most things apart; of equals, the one that shows them best.
     fn first(&self, photos: &[Photo], observer: &mut dyn Observer) -> Result<Option<usize>, FindError> {
         let covered: Vec<usize> = (0..photos.len()).filter(|i| self.covers(&photos[*i])).collect();
         let counted: Vec<usize> = covered.iter().copied().step_by(covered.len().div_ceil(COUNTED).max(1)).collect();
@@ -69,14 +71,15 @@ impl Segmenter for FileMasks {
             return Ok(counted.first().copied());
         }
         let mut ticker = Ticker::new("Counting labels", counted.len());
-        let mut most: Option<(f64, usize)> = None;
+        let mut most: Option<((usize, f64), usize)> = None;
         for (k, &i) in counted.iter().enumerate() {
             // Labels that cannot be read are told where they are used.
             let regions = self.0.of(&photos[i], COUNTED_SIDE_PX).unwrap_or_default();
             let area = |r: &Region| r.mask.area() as f64;
-            let sum: f64 = regions.iter().map(|r| area(r) / (area(r) + HALF_PX)).sum();
-            if most.is_none_or(|m| sum > m.0) {
-                most = Some((sum, i));
+            let count = regions.iter().filter(|r| r.mask.area() >= COUNTED_PX).count();
+            let shown = (count, regions.iter().map(|r| area(r) / (area(r) + HALF_PX)).sum());
+            if most.is_none_or(|m| shown > m.0) {
+                most = Some((shown, i));
             }
             ticker.tick(k + 1, observer)?;
         }

@@ -3,11 +3,12 @@
 //! too, their masks linked to what is known; the tree of what belongs together decides. No network is needed.
 
 mod complete;
+mod options;
 mod views;
 
-use std::sync::Arc;
 use std::time::Instant;
 
+pub(crate) use options::TrackOptions;
 pub(crate) use views::ViewReport;
 
 use super::associate::{Link, disagreements, link};
@@ -19,11 +20,11 @@ use super::segmenter::{FoundMask, Segmenter};
 use super::splat_tree::hierarchy::Hierarchy;
 use super::train_codes::{CODE_SIDE_PX, CodeView};
 use super::view_map::ViewMap;
-use super::votes::{Assignment, LEAST_SEEN, UNKNOWN, Votes};
+use super::votes::{Assignment, UNKNOWN, Votes};
 use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::findings::{Disagreement, Doubt, Findings, PhotoFinding, Seen};
-use crate::scene::{GaussianCloud, Identities, IdentityId, MaskPrompt, NOBODY, Photo, SemanticMap};
+use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY, Photo};
 
 /// Least weight of votes, in px of the photos voted on, that says something about a Gaussian.
 const LEAST_VOTES: f32 = 0.05;
@@ -33,59 +34,11 @@ const DRIFT: f64 = 0.2;
 /// Pixels from which each of them says something.
 const DRIFT_PX: usize = 30;
 
-/// Share of a mask that nothing is known of, from which it shows something new.
+/// Share of a mask that is nobody's yet, from which it shows something new.
 const NEWS: f64 = 0.5;
 
 /// Longer side of the views in which it is looked how well Gaussians are seen, px.
 const SEE_SIDE_PX: u32 = 256;
-
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct TrackOptions {
-    /// Photo to begin with; `None` = the segmenter's choice.
-    pub(crate) seed: Option<usize>,
-    /// Longer side of the masks that vote, px.
-    pub(crate) max_side_px: u32,
-    /// Share of a view that may stay unknown before it is segmented too.
-    pub(crate) reseed_share: f64,
-    /// Most photos that are segmented.
-    pub(crate) max_seeds: usize,
-    /// Whether a mask that was followed counts only where the Gaussians do not contradict it.
-    pub(crate) veto: bool,
-    /// Whether all photos that have masks are segmented, up to `max_seeds`, be they explained or not: codes are to be
-    /// trained on them.
-    pub(crate) keep_masks: bool,
-    /// What of a mask SAM 2 is given to follow.
-    pub(crate) prompt: MaskPrompt,
-    /// Whether what masks say grows over the other photos, up to their edges.
-    pub(crate) by_photos: bool,
-    /// Whether Gaussians that look alike and lie side by side share what is said of some of them.
-    pub(crate) by_tree: bool,
-    /// Steps between Gaussians over which what no photo shows (the inside of things) belongs to what is around it.
-    pub(crate) hidden_steps: f64,
-    /// Share of its area in the photo that shows it best that a Gaussian shows where a photo says whose it is.
-    pub(crate) least_seen: f32,
-    /// What is known already and stays as it is: masks only tell of what is unknown.
-    pub(crate) known: Option<Arc<SemanticMap>>,
-}
-
-impl Default for TrackOptions {
-    fn default() -> Self {
-        Self {
-            seed: None,
-            max_side_px: 1_024,
-            reseed_share: 0.005,
-            max_seeds: 12,
-            veto: true,
-            keep_masks: false,
-            prompt: MaskPrompt::Mask,
-            by_photos: true,
-            by_tree: true,
-            hidden_steps: 4.0,
-            least_seen: LEAST_SEEN,
-            known: None,
-        }
-    }
-}
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Tracked {
@@ -197,8 +150,12 @@ pub(crate) fn track(
     extend(cloud, &mut assignments, options.hidden_steps);
     drop_floaters(cloud, &t.identities, &mut assignments);
     if let Some(map) = &options.known {
-        for i in (0..cloud.len()).filter(|i| !map.is_unknown(*i)) {
-            assignments[i] = Assignment { identity: map.identity_of[i], margin: map.margin[i] };
+        for (i, now) in assignments.iter_mut().enumerate() {
+            // What is nobody's may become something new, what is unknown anything: one more photo tells of things.
+            let is_new = now.identity != UNKNOWN && now.identity as usize > map.identities.len();
+            if map.identity_of[i] != NOBODY || now.identity == NOBODY || !map.is_unknown(i) && !is_new {
+                *now = Assignment { identity: map.identity_of[i], margin: map.margin[i] };
+            }
         }
     }
     let carry_secs = start.elapsed().as_secs_f64() - t.segment_secs - encode_secs - follow_secs;
@@ -273,8 +230,9 @@ impl Tracker<'_> {
         let links = link(&found, known.as_ref(), &self.identities);
         let stays = known.as_ref().filter(|_| self.options.known.is_some());
         // Of which masks nothing becomes, because what they show is known.
+        let is_free = |id: IdentityId| id == UNKNOWN || id == NOBODY;
         let is_old = |mask: &FoundMask| {
-            let new = |map: &ViewMap| mask.mask.pixels().filter(|i| map.identity[*i] == UNKNOWN).count();
+            let new = |map: &ViewMap| mask.mask.pixels().filter(|i| is_free(map.identity[*i])).count();
             stays.is_some_and(|map| (new(map) as f64) < NEWS * mask.mask.area() as f64)
         };
         if let Some(known) = &known {
@@ -299,7 +257,7 @@ impl Tracker<'_> {
         let camera = self.photos[photo].camera.limited_to(self.options.max_side_px);
         let mut labels = labels_of(&found, &ids, camera.width_px as usize * camera.height_px as usize);
         if let Some(map) = stays {
-            let known = labels.iter_mut().zip(&map.identity).filter(|(_, known)| **known != UNKNOWN);
+            let known = labels.iter_mut().zip(&map.identity).filter(|(_, known)| !is_free(**known));
             known.for_each(|(label, _)| *label = UNKNOWN);
         }
         self.votes

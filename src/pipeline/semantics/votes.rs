@@ -26,8 +26,9 @@ pub(crate) struct Votes {
     least_seen: f32,
 }
 
-/// Votes of a Gaussian of which is known whose it is, px.
+/// Votes of a Gaussian of which is known whose it is, and that it is nobody's, px: any mask says more than that.
 const KNOWN: f32 = 10.0;
+const KNOWN_NOBODY: f32 = 0.1;
 
 /// The same where nobody says otherwise.
 pub(crate) const LEAST_SEEN: f32 = 0.1;
@@ -55,7 +56,8 @@ impl Votes {
     pub(crate) fn known(map: &SemanticMap, least_seen: f32) -> Self {
         let mut votes = Self::with_least_seen(map.identity_of.len(), least_seen);
         let known = (0..map.identity_of.len()).filter(|i| !map.is_unknown(*i));
-        known.for_each(|i| votes.by_gaussian[i].push((map.identity_of[i], KNOWN)));
+        let weight = |id: IdentityId| if id == NOBODY { KNOWN_NOBODY } else { KNOWN };
+        known.for_each(|i| votes.by_gaussian[i].push((map.identity_of[i], weight(map.identity_of[i]))));
         votes
     }
 

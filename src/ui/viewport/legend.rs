@@ -67,11 +67,11 @@ fn show_unknown(ui: &mut Ui, share: Option<f64>, photo: Option<&str>, actions: &
         let why = "No mask and no photo says whose it is. Without a color: masks say that it is nobody's.";
         ui.label(RichText::new(text).small()).on_hover_text(why);
     });
-    if share.is_some_and(|s| s > 0.0) {
+    let mark = share.filter(|s| *s > 0.0).map(|_| ("Mark it\u{2026}", Action::Paint(Some(NOBODY))));
+    let segment = photo.map(|text| (text, Action::SegmentPhoto));
+    if mark.is_some() || segment.is_some() {
         ui.horizontal(|ui| {
-            let (mark, segment) = (Action::Paint(Some(NOBODY)), Action::SegmentPhoto);
-            let segment = photo.map(|text| (text, segment));
-            for (text, action) in [("Mark it\u{2026}", mark)].into_iter().chain(segment) {
+            for (text, action) in mark.into_iter().chain(segment) {
                 if ui.small_button(text).on_hover_text(action.tooltip()).clicked() {
                     actions.push(action);
                 }
