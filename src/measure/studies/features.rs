@@ -144,7 +144,8 @@ fn variants(views: usize, steps: &[u64]) -> Variants<Variant> {
     let neither = TrackOptions { by_photos: false, by_tree: false, ..one.clone() };
     with("both", ("spread", json!(false)), neither);
     for share in [0.0, 0.03, 0.3] {
-        with("least area seen", ("least_seen", json!(share)), TrackOptions { least_seen: share, ..one.clone() });
+        let one = TrackOptions { least_seen: share as f32, ..one.clone() };
+        with("least area seen", ("least_seen", json!(share)), one);
     }
     for steps in [0.0, 40.0] {
         with(
