@@ -2,7 +2,7 @@
 
 pub(crate) mod forecast;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use self::forecast::LookTime;
 use super::{JobError, evaluate};
+use crate::io::labels::Labels;
 use crate::io::trained::{self, CLOUD_FILE};
 use crate::io::{IoError, SceneFolder, splat_ply};
 use crate::models;
@@ -145,20 +146,21 @@ pub(crate) fn run(
         code_steps: with.code_steps,
         part_weight: preparation.part_weight,
     };
+    let masks = match (masks, &request.known, options.track.seed) {
+        (Some(path), Some(_), Some(seed)) if !Labels::open(path)?.has(&photos[seed]) => {
+            let text = format!("{} has no labels of {}: it is segmented instead", path.display(), photos[seed].name);
+            observer.note(Severity::Info, text);
+            None
+        }
+        (masks, ..) => masks,
+    };
     let mut warn = |text: String| observer.note(Severity::Warning, text);
-    let network = match (masks.filter(|_| request.known.is_none()), with.segmenter.as_deref()) {
+    let network = match (masks, with.segmenter.as_deref()) {
         (Some(_), _) | (None, Some(REGIONS)) => None,
         (None, Some(name)) => Some(name.to_owned()),
         (None, None) => catalog::usable(ModelRole::Segmenter, &mut warn)?.into_iter().next(),
     };
-    let open = |masks: Option<&Path>| segmenter(masks, cloud, settings, network.as_deref(), folder.join("cache"));
-    let mut segmenter = open(masks)?;
-    if let (Some(_), Some(seed)) = (&request.known, options.track.seed)
-        && !segmenter.covers(&photos[seed])
-    {
-        // Labels of other photos say nothing about this one.
-        segmenter = open(None)?;
-    }
+    let mut segmenter = segmenter(masks, cloud, settings, network.as_deref(), folder.join("cache"))?;
     // What is added is looked at by the encoder that has looked at the rest.
     let looked = |map: &Arc<SemanticMap>| map.language.as_ref().map_or(NO_ENCODER.to_owned(), |l| l.encoder.clone());
     let encoder = request.known.as_ref().map(looked).or_else(|| with.encoder.clone());

@@ -76,6 +76,10 @@ impl App {
         let Some(known) = self.state.semantics.as_deref().cloned() else {
             return self.state.toast(Tone::Warning, "Find objects first: what one more photo shows is added to them.");
         };
+        if self.editing.is_some() || !self.edits.is_empty() {
+            // It would begin with what was before the change.
+            return self.state.toast(Tone::Warning, "Objects are being changed; segment the photo once that is done.");
+        }
         let (scene, eye) = (self.state.scene.clone(), self.viewport.pose());
         let Some(dataset) = scene.as_ref().and_then(|s| s.dataset.as_ref()) else {
             return self.state.toast(Tone::Warning, "This scene has no photos.");

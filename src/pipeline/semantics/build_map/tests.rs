@@ -46,6 +46,15 @@ fn photos() -> Vec<Photo> {
     vec![photo("near", -0.75, 1.6), photo("far", 0.0, 3.2)]
 }
 
+/// Keeps what it is told.
+struct Notes(Vec<String>);
+
+impl Observer for Notes {
+    fn note(&mut self, _: Severity, text: String) {
+        self.0.push(text);
+    }
+}
+
 /// Knows the truth, and says it with names or without.
 struct Told {
     named: bool,
@@ -159,12 +168,6 @@ fn one_more_photo_adds_what_it_shows_of_the_unknown_and_nothing_that_is_known_ch
 
 #[test]
 fn what_no_mask_reached_is_nobodys_and_told() {
-    struct Notes(Vec<String>);
-    impl Observer for Notes {
-        fn note(&mut self, _: Severity, text: String) {
-            self.0.push(text);
-        }
-    }
     let mut notes = Notes(vec![]);
     let found = find(Told { named: true, covers: true }, (Lifting::Votes, 0), 1, &mut notes).expect("found");
     assert_eq!(found.map.identities.len(), 2);
@@ -198,12 +201,6 @@ fn every_way_of_lifting_ends_at_the_same_identities() {
 
 #[test]
 fn codes_are_trained_on_masks_and_never_on_what_votes_make_of_them() {
-    struct Notes(Vec<String>);
-    impl Observer for Notes {
-        fn note(&mut self, _: Severity, text: String) {
-            self.0.push(text);
-        }
-    }
     for (max_seeds, masks) in [(1, "1 of 2"), (12, "2 of 2")] {
         let mut notes = Notes(vec![]);
         let told = Told { named: true, covers: true };
