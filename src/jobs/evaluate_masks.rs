@@ -245,6 +245,10 @@ fn by_strokes(
     });
     let members = members.as_ref().map(|m| m as strokes::Known<'_>);
     let rows = strokes::rows(&hierarchy, cloud, settings, &views, members)?;
+    if rows.is_empty() {
+        let text = "the labels name nothing that is large enough in two of the photos; give those of more photos";
+        return Err(JobError::Protocol(text.into()));
+    }
     let summary = ProtocolSummary::Strokes { gaussians: cloud.len(), prepare_secs, rows };
     Ok(MaskScores { views: views.len(), trained_on: 0, units: Vec::new(), summary, unmet: Vec::new() })
 }

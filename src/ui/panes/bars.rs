@@ -153,7 +153,7 @@ fn entry(ui: &mut Ui, enabled: bool, on: Option<bool>, text: &str, action: Actio
     let button = Button::new(text).shortcut_text(keys::label(ui.ctx(), &action));
     let shown = ui.add_enabled(enabled, button).on_hover_text(action.tooltip());
     if on == Some(true) {
-        let at = shown.rect.left_center() + vec2(15.0, 0.0);
+        let at = shown.rect.left_center() + vec2(12.0, 0.0);
         let check = [vec2(-4.5, 0.0), vec2(-1.5, 3.5), vec2(4.5, -4.0)].map(|v| at + v);
         ui.painter().line(check.to_vec(), Stroke::new(1.8, theme::accent()));
     }

@@ -117,7 +117,7 @@ impl Brush {
     }
 
     pub(crate) fn show(&mut self, ui: &Ui, rect: Rect, actions: &mut Vec<Action>) {
-        let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(44.0));
+        let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(52.0));
         let area = Area::new(Id::unique("brush")).order(Order::Foreground).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
         theme::card(ui.ctx(), area.constrain_to(rect), |ui| {
             ui.set_width((rect.width() - 40.0).clamp(200.0, 430.0));

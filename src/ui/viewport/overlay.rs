@@ -18,6 +18,9 @@ use crate::worker::view::ViewPicture;
 /// Views that are less wide than this have menus in place of buttons, points.
 const NARROW: f32 = 480.0;
 
+/// In views that are less wide than this the legend stands above the facts, points.
+const NARROW_BESIDE_FACTS: f32 = 760.0;
+
 /// In views that are lower than this are few cards, points.
 const LOW: f32 = 330.0;
 
@@ -53,7 +56,9 @@ impl Viewport {
             let unknown = self.queries.maps().map(|m| m.unknown_share());
             let has_photos = state.scene.as_ref().is_some_and(|s| s.dataset.is_some()) && state.is_trained();
             let segment = if self.photo.is_some() { "Segment this photo" } else { "Segment the nearest photo" };
-            card(ui, rect, legend, (Align2::RIGHT_BOTTOM, 0.0), |ui| {
+            // Above the facts where there is no room beside them.
+            let up = if rect.width() < NARROW_BESIDE_FACTS { -46.0 } else { 0.0 };
+            card(ui, rect, legend, (Align2::RIGHT_BOTTOM, up), |ui| {
                 legend::show(ui, self.queries.settings(), depth, unknown, has_photos.then_some(segment), actions);
             });
         }

@@ -125,7 +125,7 @@ impl SelectTool {
 
     /// The card of the tool.
     pub(super) fn show(&mut self, ui: &Ui, rect: Rect, all: &Identities, actions: &mut Vec<Action>) {
-        let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(44.0));
+        let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(52.0));
         let area =
             Area::new(Id::unique("selecting")).order(Order::Foreground).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
         theme::card(ui.ctx(), area.constrain_to(rect), |ui| {
