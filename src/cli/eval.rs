@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::progress::Console;
 use super::recipe::RecipeArgs;
-use super::{CliError, eval_depth, eval_masks, number, output};
+use super::{CliError, eval_depth, eval_masks, eval_removal, number, output};
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::evaluate_masks::Protocol;
 use crate::jobs::{export, open};
@@ -21,6 +21,7 @@ use crate::jobs::{export, open};
     fmlgs eval scene/\n  \
     fmlgs eval scene/ --pictures compare/       photo | render | difference x 4, one PNG per view\n  \
     fmlgs eval scene/ --depth                   depth, on photos made by 'fmlgs synth'\n  \
+    fmlgs eval scene/ --removal behind/         what 'fmlgs remove' uncovers and invents\n  \
     fmlgs eval scene/ --masks photos/           objects and parts against labels\n  \
     fmlgs eval scene/ --masks photos/ --protocol part-recall\n  \
     fmlgs eval splat.ply --photos photos/ --max-side 1600 --json")]
@@ -55,6 +56,10 @@ pub(crate) struct EvalArgs {
     /// Compare depth instead, with the true depths that came with synthetic photos
     #[arg(long, conflicts_with = "masks")]
     depth: bool,
+    /// Remove things instead and compare with what is really behind them: a folder of 'fmlgs synth --without', or one
+    /// that holds several
+    #[arg(long, conflicts_with_all = ["masks", "depth"])]
+    removal: Option<PathBuf>,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -86,6 +91,9 @@ pub(crate) fn run(args: EvalArgs, quiet: bool) -> Result<(), CliError> {
         return eval_masks::run(&args.scene, labels, how, &comparison, args.json);
     }
     let mut console = Console::new(quiet);
+    if let Some(truth) = &args.removal {
+        return eval_removal::run(&open::scene(&args.scene)?, truth, &comparison, args.json, &mut console);
+    }
     if args.depth {
         return eval_depth::run(&args.scene, &comparison, args.json, &mut console);
     }

@@ -12,6 +12,7 @@ mod error;
 mod eval;
 mod eval_depth;
 mod eval_masks;
+mod eval_removal;
 mod export;
 mod info;
 mod interrupt;
@@ -25,6 +26,7 @@ mod process;
 mod progress;
 mod query;
 mod recipe;
+mod remove;
 mod render;
 mod report;
 mod reproduce;
@@ -65,6 +67,7 @@ Examples:
   fmlgs render scene/ --camera 12 --out view.png
   fmlgs preprocess scene/ --masks photos/   find objects and parts
   fmlgs query scene/ \"the lid of the kettle\" --mask lid.png
+  fmlgs remove scene/ \"the kettle\" --out without_kettle/
   fmlgs path scene/ --to \"the lid of the kettle\" --out path.json
   fmlgs render scene/ --path path.json --out video.mp4
   fmlgs agent scene/ \"what is on the table?\"
@@ -104,6 +107,7 @@ enum Command {
     Query(query::QueryArgs),
     Models(models::ModelsArgs),
     Segment(segment::SegmentArgs),
+    Remove(remove::RemoveArgs),
     Path(path::PathArgs),
     Agent(agent::AgentArgs),
     Synth(synth::SynthArgs),
@@ -174,6 +178,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Preprocess(args) => preprocess::run(args, quiet),
         Command::Query(args) => query::run(args),
         Command::Segment(args) => segment::run(args, quiet),
+        Command::Remove(args) => remove::run(args, quiet),
         Command::Path(args) => path::run(args),
         Command::Agent(args) => agent::run(args),
         Command::Synth(args) => synth::run(args, quiet),

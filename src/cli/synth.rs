@@ -16,7 +16,8 @@ use crate::jobs::synth::{self, Levels, Rig, SynthOptions, SynthReport};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs synth table.glb --out photos/\n  \
-    fmlgs synth table.glb --views 200 --held-out 25 --size 1280x960 --rig survey --out photos/")]
+    fmlgs synth table.glb --views 200 --held-out 25 --size 1280x960 --rig survey --out photos/\n  \
+    fmlgs synth table.glb --without \"teddy bear\" --out behind-the-bear/")]
 pub(crate) struct SynthArgs {
     /// The scene: .glb or .gltf with named nodes
     scene: PathBuf,
@@ -50,6 +51,13 @@ pub(crate) struct SynthArgs {
     /// Seed of every random choice
     #[arg(long, default_value_t = SynthOptions::default().seed)]
     seed: u64,
+    /// Leave out an object or part once the cameras are placed, and render the held-out views only: what is
+    /// really behind it, to judge its removal by
+    #[arg(long, value_name = "NAME")]
+    without: Option<String>,
+    /// What is left out still casts its shadow
+    #[arg(long, requires = "without")]
+    keep_shadows: bool,
     /// Print one JSON document at the end
     #[arg(long)]
     json: bool,
@@ -70,6 +78,8 @@ impl SynthArgs {
             levels: self.levels,
             points: self.points,
             seed: self.seed,
+            without: self.without.clone(),
+            keep_shadows: self.keep_shadows,
             ..base
         };
         options.validate().map_err(|error| CliError::Usage(error.to_string()))?;

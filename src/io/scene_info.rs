@@ -52,6 +52,13 @@ pub struct DatasetReference {
     pub(crate) format: String,
 }
 
+impl DatasetReference {
+    /// The same dataset, which lies at `path`, for a scene in `folder`.
+    pub(crate) fn moved(&self, path: &Path, folder: &Path) -> Self {
+        Self { path: relative_to(path, folder), format: self.format.clone() }
+    }
+}
+
 /// The camera of a photo.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SceneCamera {

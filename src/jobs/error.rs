@@ -11,6 +11,7 @@ use crate::models::catalog::InstallError;
 use crate::models::fetch::FetchError;
 use crate::pipeline::depth::DepthError;
 use crate::pipeline::observer::Interrupted;
+use crate::pipeline::removal::RemovalError;
 use crate::pipeline::semantics::edit::EditError;
 use crate::pipeline::semantics::error::FindError;
 use crate::pipeline::synth::SynthError;
@@ -94,6 +95,8 @@ pub enum JobError {
     Install(#[from] InstallError),
     #[error(transparent)]
     Render(#[from] RenderError),
+    #[error(transparent)]
+    Remove(#[from] RemovalError),
     #[error(transparent)]
     Depth(#[from] DepthError),
     #[error(transparent)]

@@ -90,7 +90,7 @@ impl PhotoComparison {
         Ok(Self { cloud, settings, dataset, views, max_side_px, borders, pictures, state: None })
     }
 
-    fn view(&self, index: usize) -> Result<TrainView, JobError> {
+    pub(crate) fn view(&self, index: usize) -> Result<TrainView, JobError> {
         let photo = &self.dataset.photos[index];
         let pixels = match &self.borders {
             Some(borders) => borders.load(photo)?,

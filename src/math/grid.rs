@@ -1,5 +1,7 @@
 //! Pixels of a picture by index, row-major.
 
+use std::collections::VecDeque;
+
 /// The pixels left, right, above and below pixel `i`, of a picture of `n` pixels that is `width` wide.
 pub(crate) fn neighbors(i: usize, width: usize, n: usize) -> impl Iterator<Item = usize> {
     let x = i % width;
@@ -42,6 +44,41 @@ pub(crate) fn regions(width: usize, n: usize, is: impl Fn(usize) -> bool) -> (Ve
     (label, areas)
 }
 
+/// What is nearest to each pixel of what is `known` at some, by steps to neighbors through pixels that are `open`; where
+/// several are as near, the first. `None` where nothing can be reached.
+pub(crate) fn spread<T: Copy>(
+    width: usize,
+    n: usize,
+    known: impl IntoIterator<Item = (usize, T)>,
+    open: impl Fn(usize) -> bool,
+) -> Vec<Option<T>> {
+    let mut of = vec![None; n];
+    let mut front = VecDeque::new();
+    for (i, value) in known {
+        if of[i].is_none() {
+            of[i] = Some(value);
+            front.push_back(i);
+        }
+    }
+    while let Some(i) = front.pop_front() {
+        for j in neighbors(i, width, n) {
+            if of[j].is_none() && open(j) {
+                of[j] = of[i];
+                front.push_back(j);
+            }
+        }
+    }
+    of
+}
+
+/// The pixels for which `is` holds, and those that are at most `steps` neighbors away from one.
+pub(crate) fn grown(width: usize, mut is: Vec<bool>, steps: usize) -> Vec<bool> {
+    for _ in 0..steps {
+        is = (0..is.len()).map(|i| is[i] || neighbors(i, width, is.len()).any(|j| is[j])).collect();
+    }
+    is
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -74,5 +111,24 @@ mod tests {
         // One column: left and right are nothing, above and below are near.
         assert_eq!(regions(1, 4, |i| i != 1), (vec![1, 0, 2, 2], vec![1, 2]));
         assert_eq!(neighbors(1, 1, 3).collect::<Vec<_>>(), [0, 2]);
+    }
+
+    #[test]
+    fn the_nearest_spreads_around_what_is_closed() {
+        // a # .
+        // . # b
+        // . . .
+        let of = spread(3, 9, [(0, 'a'), (5, 'b')], |i| i != 1 && i != 4);
+        let text: String = of.iter().map(|v| v.unwrap_or('#')).collect();
+        assert_eq!(text, "a#ba#babb");
+        assert_eq!(spread(2, 4, [(0, 1)], |_| false), [Some(1), None, None, None]);
+    }
+
+    #[test]
+    fn growing_takes_in_neighbors_step_by_step() {
+        let one = |i: usize| (0..9).map(|k| k == i).collect::<Vec<_>>();
+        let count = |v: Vec<bool>| v.iter().filter(|b| **b).count();
+        assert_eq!([0, 1, 2].map(|steps| count(grown(3, one(4), steps))), [1, 5, 9]);
+        assert_eq!(grown(3, one(0), 1), [true, true, false, true, false, false, false, false, false]);
     }
 }

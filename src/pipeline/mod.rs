@@ -5,6 +5,7 @@ pub(crate) mod depth;
 pub(crate) mod evaluate;
 pub(crate) mod metrics;
 pub mod observer;
+pub(crate) mod removal;
 pub mod semantics;
 pub mod synth;
 pub mod train;

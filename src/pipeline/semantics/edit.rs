@@ -170,24 +170,42 @@ fn free_code(identities: &Identities) -> [f32; 3] {
 
 /// `from` becomes `into`. Numbers change, because there is one identity less.
 fn merge(map: &mut SemanticMap, from: IdentityId, into: IdentityId) {
+    renumber(map, |id| id == from, Some((from, into)));
+}
+
+/// The map without these identities and their pieces, whose Gaussians are nobody's then; and the new number of each.
+pub(crate) fn forget(map: &SemanticMap, ids: &[IdentityId]) -> (SemanticMap, Vec<IdentityId>) {
+    let inside: Vec<Vec<bool>> = ids.iter().map(|id| map.identities.descendants(*id)).collect();
+    let mut new = map.clone();
+    let number = renumber(&mut new, |id| inside.iter().any(|all| all.get(id as usize) == Some(&true)), None);
+    (new, number)
+}
+
+/// Leaves out the identities that are `gone`; where one became another (`merged`: from, into), its pieces and Gaussians
+/// are that one's. Returns the new number of each.
+fn renumber(
+    map: &mut SemanticMap,
+    gone: impl Fn(IdentityId) -> bool,
+    merged: Option<(IdentityId, IdentityId)>,
+) -> Vec<IdentityId> {
     let old = std::mem::take(&mut map.identities);
     let codes_before: Vec<_> = (0..=old.len() as IdentityId).map(|id| old.codes(id)).collect();
     // Wholes before pieces, whatever the numbers were.
     let parent_of = |id: IdentityId| -> IdentityId {
         let parent = old.get(id).map_or(NOBODY, |i| i.parent);
-        if parent == from { into } else { parent }
+        merged.filter(|(from, _)| *from == parent).map_or(parent, |(_, into)| into)
     };
     let depth = |id: IdentityId| {
         std::iter::successors(Some(id), |&i| Some(parent_of(i)).filter(|p| *p != NOBODY)).take(old.len()).count()
     };
-    let mut order: Vec<IdentityId> = old.iter().map(|(id, _)| id).filter(|id| *id != from).collect();
+    let mut order: Vec<IdentityId> = old.iter().map(|(id, _)| id).filter(|id| !gone(*id)).collect();
     order.sort_by_key(|id| (depth(*id), *id));
     let mut number = vec![NOBODY; old.len() + 1];
     let mut features = Vec::new();
     for &id in &order {
         let Some(identity) = old.get(id) else { continue };
         let mut names = identity.names.clone();
-        if id == into {
+        if let Some((from, _)) = merged.filter(|(_, into)| *into == id) {
             let others = old.get(from).map(|i| i.names.clone()).unwrap_or_default();
             names.extend(others.into_iter().filter(|n| !identity.names.contains(n)));
         }
@@ -197,7 +215,9 @@ fn merge(map: &mut SemanticMap, from: IdentityId, into: IdentityId) {
         }
         features.extend(map.language.as_ref().map(|l| l.by_identity.get(id as usize - 1).cloned().unwrap_or_default()));
     }
-    number[from as usize] = number[into as usize];
+    if let Some((from, into)) = merged {
+        number[from as usize] = number[into as usize];
+    }
     if let Some(language) = &mut map.language {
         language.by_identity = features;
     }
@@ -211,6 +231,7 @@ fn merge(map: &mut SemanticMap, from: IdentityId, into: IdentityId) {
             *codes = now;
         }
     }
+    number
 }
 
 /// Gaussians of a component that count; smaller ones stay with the largest.

@@ -43,6 +43,7 @@ use rayon::prelude::*;
 
 pub use demo::demo_glb;
 pub(crate) use levels::TrueIdentity;
+pub(crate) use write::SETTINGS;
 pub use options::{Levels, Rig, SynthOptions};
 
 use crate::io::IoError;
@@ -69,6 +70,8 @@ pub enum SynthError {
     TooManyTriangles { count: usize, limit: usize },
     #[error(transparent)]
     NoRoom(#[from] memory::NoRoom),
+    #[error("nothing in the scene is called '{name}'; it has {known}")]
+    Unknown { name: String, known: String },
     #[error("the scene has more than 65535 objects and parts; name fewer nodes")]
     TooManyIdentities,
     #[error("{path}: {source}; is there space, and may the folder be written to?", path = path.display())]
@@ -139,9 +142,13 @@ fn render_scene(
     }
     Ticker::new("Building the scene", options.views).report(0, observer);
     let mut identities = levels::identities(scene, options.levels, name)?;
-    let stage = stage(scene, &identities)?;
+    let mut stage = stage(scene, &identities)?;
     let cameras = rig::cameras(&stage.surface, &stage.tracer, options);
     let test = held_out(options);
+    if let Some(name) = &options.without {
+        stage.take_away(called(&identities.list, name)?, options.keep_shadows);
+    }
+    let views: Vec<usize> = (0..cameras.len()).filter(|&i| options.without.is_none() || test[i]).collect();
     let writer = write::Writer::new(out, cameras.len())?;
     let per_view = options.points.div_ceil((options.views - options.held_out).max(1));
     let mut cloud = Vec::new();
@@ -151,13 +158,13 @@ fn render_scene(
     let what = format!("a photo of {} x {} px", options.width_px, options.height_px);
     memory::room(what, photo_bytes, "make photos smaller with --size")?;
     let batch = (2 * rayon::current_num_threads()).min((memory::free() / photo_bytes) as usize).max(1);
-    let mut ticker = Ticker::new("Rendering photos", cameras.len());
+    let mut ticker = Ticker::new("Rendering photos", views.len());
     observer.proceed()?;
-    for first in (0..cameras.len()).step_by(batch) {
-        let last = (first + batch).min(cameras.len());
-        let results: Vec<_> = (first..last)
-            .into_par_iter()
-            .map(|i| {
+    for first in (0..views.len()).step_by(batch) {
+        let last = (first + batch).min(views.len());
+        let results: Vec<_> = views[first..last]
+            .par_iter()
+            .map(|&i| {
                 let camera = &cameras[i];
                 let view = stage.render(camera, i, options);
                 let points = if test[i] { Vec::new() } else { points::sample(&view, camera, i, per_view, options) };
@@ -177,11 +184,11 @@ fn render_scene(
     }
     cloud.truncate(options.points);
     let points = cloud.len();
-    writer.finish(name, fingerprint, options, &cameras, &test, &identities.list, &cloud)?;
-    let held = test.iter().filter(|t| **t).count();
+    writer.finish(name, fingerprint, options, (&cameras, &views, &test), &identities.list, &cloud)?;
+    let held = views.iter().filter(|&&i| test[i]).count();
     Ok(SynthReport {
         out: out.to_owned(),
-        train_views: cameras.len() - held,
+        train_views: views.len() - held,
         held_out_views: held,
         identities: identities.list,
         points,
@@ -197,7 +204,16 @@ fn stage(scene: &MeshScene, identities: &levels::TrueIdentities) -> Result<view:
     let tracer = trace::Tracer::new(&surface);
     let materials = material::Materials::of(scene);
     let light = light::Light::new(&surface, &materials);
-    Ok(view::SynthScene { surface, tracer, materials, light })
+    Ok(view::SynthScene { surface, tracer, seen: None, materials, light })
+}
+
+/// The id of what is called so, by name or by path.
+fn called(all: &[TrueIdentity], name: &str) -> Result<u16, SynthError> {
+    let found = all.iter().find(|i| i.path == name).or_else(|| all.iter().find(|i| i.name == name));
+    found.map(|i| i.id).ok_or_else(|| {
+        let known: Vec<_> = all.iter().map(|i| format!("'{}'", i.name)).collect();
+        SynthError::Unknown { name: name.into(), known: known.join(", ") }
+    })
 }
 
 /// Which photos are held out: one at random from each of as many equal stretches of the list.

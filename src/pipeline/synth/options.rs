@@ -65,6 +65,13 @@ pub struct SynthOptions {
     pub point_noise_px: f64,
     /// Seed of every random choice.
     pub seed: u64,
+    /// An object or part, by its name or path, that is left out once the cameras are placed: what is behind it is
+    /// the truth about removing it. Only the held-out views are rendered then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub without: Option<String>,
+    /// What is left out still shades the rest.
+    #[serde(default)]
+    pub keep_shadows: bool,
 }
 
 impl Default for SynthOptions {
@@ -85,6 +92,8 @@ impl Default for SynthOptions {
             points: 20_000,
             point_noise_px: 0.7,
             seed: 0,
+            without: None,
+            keep_shadows: false,
         }
     }
 }
@@ -92,6 +101,9 @@ impl Default for SynthOptions {
 impl SynthOptions {
     pub(crate) fn validate(&self) -> Result<(), SynthError> {
         let bad = |what: &str| Err(SynthError::Options(what.into()));
+        if self.without.is_some() && self.held_out == 0 {
+            return bad("only held-out views are rendered without a thing: hold some out");
+        }
         let side = 1..=Camera::MAX_SIDE_PX;
         if !(1..=100_000).contains(&self.views) {
             return bad("views must be 1 to 100000");

@@ -10,7 +10,7 @@ use obvhs::bvh2::builder::build_bvh2;
 use obvhs::ray::{Ray, RayHit};
 use obvhs::rt_triangle::RtTriangle;
 
-use super::surface::Surface;
+use super::surface::{Surface, Triangle};
 
 /// How far triangles and boxes reach beyond their edges, in the frame's units: more than the rounding
 /// errors of a ray across the scene, far less than a pixel.
@@ -40,14 +40,20 @@ pub(crate) struct Tracer {
 
 impl Tracer {
     pub(crate) fn new(surface: &Surface) -> Self {
-        let boxes: Vec<Aabb> = surface
-            .triangles
+        Self::of(surface, |_| true)
+    }
+
+    /// Over those triangles for which `is_there` holds.
+    pub(crate) fn of(surface: &Surface, is_there: impl Fn(&Triangle) -> bool) -> Self {
+        let there: Vec<u32> =
+            (0..surface.triangles.len()).filter(|&i| is_there(&surface.triangles[i])).map(|i| i as u32).collect();
+        let boxes: Vec<Aabb> = there
             .iter()
-            .map(|t| surface.corners(t))
+            .map(|&i| surface.corners(&surface.triangles[i as usize]))
             .map(|[a, b, c]| Aabb { min: a.min(b).min(c) - REACH, max: a.max(b).max(c) + REACH })
             .collect();
         let bvh = build_bvh2(&boxes, BvhBuildParams::medium_build(), &mut Duration::default());
-        let original = bvh.primitive_indices.clone();
+        let original: Vec<u32> = bvh.primitive_indices.iter().map(|&i| there[i as usize]).collect();
         let triangle = |&i: &u32| {
             let [a, b, c] = surface.corners(&surface.triangles[i as usize]);
             let triangle = RtTriangle::new(a, b, c);

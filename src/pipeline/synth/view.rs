@@ -35,6 +35,8 @@ pub(crate) struct SynthView {
 pub struct SynthScene {
     pub(crate) surface: Surface,
     pub(crate) tracer: Tracer,
+    /// What is seen, where that is less than what casts shadows.
+    pub(crate) seen: Option<Tracer>,
     pub(crate) materials: Materials,
     pub(crate) light: Light,
 }
@@ -51,6 +53,17 @@ impl SynthScene {
             depth: pixels().map(|p| p.depth).collect(),
             object: pixels().map(|p| p.object).collect(),
             part: pixels().map(|p| p.part).collect(),
+        }
+    }
+
+    /// Takes away an object or part. With `keep_shadows` it still shades what is left, as it does where somebody
+    /// removes it from a scene that was photographed with it.
+    pub(crate) fn take_away(&mut self, id: u16, keep_shadows: bool) {
+        let rest = Tracer::of(&self.surface, |t| t.ids.object != id && t.ids.part != id);
+        if keep_shadows {
+            self.seen = Some(rest);
+        } else {
+            self.tracer = rest;
         }
     }
 
@@ -97,7 +110,8 @@ impl SynthScene {
     fn sample(&self, origin: Vec3A, direction: Vec3A, step: f32, background: Vec3A, specular: f32) -> Sample {
         let (mut out, mut left, mut t_min) = (Sample::default(), 1.0_f32, 0.0_f32);
         for _ in 0..MAX_LAYERS {
-            let Some(hit) = self.tracer.nearest(origin, direction, t_min) else { break };
+            let tracer = self.seen.as_ref().unwrap_or(&self.tracer);
+            let Some(hit) = tracer.nearest(origin, direction, t_min) else { break };
             let (color, alpha) = self.shade(&hit, direction, step, specular);
             out.color += color * (alpha * left);
             left *= 1.0 - alpha;

@@ -74,14 +74,13 @@ impl Writer {
         })
     }
 
-    #[expect(clippy::too_many_arguments, reason = "one call, each argument a file's content")]
+    /// Writes the other files. `views` are all cameras, which of them there are photos of, and which are held out.
     pub(crate) fn finish(
         &self,
         scene: &str,
         fingerprint: Option<u64>,
         options: &SynthOptions,
-        cameras: &[Camera],
-        test: &[bool],
+        views: (&[Camera], &[usize], &[bool]),
         identities: &[TrueIdentity],
         points: &[SparsePoint],
     ) -> Result<(), SynthError> {
@@ -91,17 +90,19 @@ impl Writer {
             self.file("points3D.ply", |f| ply(f, points))?;
         }
         self.json(SETTINGS, &json!({ "version": 1, "scene": fingerprint, "options": options }))?;
-        self.json(TRANSFORMS, &self.transforms(options, cameras, test, !points.is_empty()))
+        self.json(TRANSFORMS, &self.transforms(options, views, !points.is_empty()))
     }
 
-    fn transforms(&self, options: &SynthOptions, cameras: &[Camera], test: &[bool], ply: bool) -> serde_json::Value {
+    fn transforms(
+        &self,
+        options: &SynthOptions,
+        (cameras, views, test): (&[Camera], &[usize], &[bool]),
+        ply: bool,
+    ) -> serde_json::Value {
         let name = |i: usize| format!("images/{}.png", self.stem(i));
-        let frames: Vec<_> = cameras
-            .iter()
-            .enumerate()
-            .map(|(i, c)| json!({ "file_path": name(i), "transform_matrix": opengl_pose(c) }))
-            .collect();
-        let listed = |held: bool| (0..cameras.len()).filter(|&i| test[i] == held).map(name).collect::<Vec<_>>();
+        let frame = |&i: &usize| json!({ "file_path": name(i), "transform_matrix": opengl_pose(&cameras[i]) });
+        let frames: Vec<_> = views.iter().map(frame).collect();
+        let listed = |held: bool| views.iter().copied().filter(|&i| test[i] == held).map(name).collect::<Vec<_>>();
         // All photos of a run share one lens.
         let c = &cameras[0];
         let mut out = json!({

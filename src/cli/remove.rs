@@ -1,0 +1,101 @@
+//! `fmlgs remove`: things are taken out of a scene, and the surfaces that they hid are closed.
+
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use super::progress::Console;
+use super::{CliError, number, output};
+use crate::jobs::remove::{self, Paint, RemovalOptions, RemovalReport};
+use crate::jobs::{open, query};
+use crate::math::format;
+use crate::scene::LevelFilter;
+
+/// Take an object or a part out of a scene and close the surface that it hid
+///
+/// What was behind it and was seen in other photos is there already; what no photo saw is invented: the plane of the
+/// surface goes on below it, painted from what is seen around. Shadows and reflections of it stay. The scene is left as
+/// it is; the result is a scene of its own, in which what is invented has the property 'fmlgs_invented'.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    fmlgs remove scene/ \"the teddy bear\" --out without_bear/\n  \
+    fmlgs remove scene/ \"the teddy bear\" --seed 2 --out another_fill/\n  \
+    fmlgs remove scene/ \"lid of the kettle\" --fill none --out open_kettle/")]
+pub(crate) struct RemoveArgs {
+    /// Trained scene with objects and parts ('fmlgs preprocess')
+    scene: PathBuf,
+    /// What to remove
+    text: String,
+    /// Folder for the new scene
+    #[arg(long)]
+    out: PathBuf,
+    /// How hidden surfaces are closed
+    #[arg(long, value_enum, default_value_t = Fill::Plane)]
+    fill: Fill,
+    /// What a closed surface is painted with
+    #[arg(long, value_enum, default_value_t = Paint::Patches)]
+    paint: Paint,
+    /// Remove exactly what is known to belong to it, without the unsure fringes within it
+    #[arg(long)]
+    tight: bool,
+    /// Another number gives another fill
+    #[arg(long, default_value_t = 0)]
+    seed: u64,
+    /// Things that are removed at most, where several are meant
+    #[arg(long, default_value_t = 1, value_parser = number::within(1..=1_000_usize))]
+    top: usize,
+    /// Whether an object or a part is meant
+    #[arg(long, value_enum, default_value_t = LevelFilter::Auto)]
+    kind: LevelFilter,
+    /// Print one JSON document
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum Fill {
+    /// Planes beside it go on where it hid them
+    Plane,
+    /// They stay open
+    None,
+}
+
+pub(crate) fn run(args: RemoveArgs, quiet: bool) -> Result<(), CliError> {
+    let scene = open::scene(&args.scene)?;
+    let map = scene.semantics()?;
+    remove::check(&args.out)?;
+    let ids = query::identities(&map, &args.text, args.kind, args.top)?;
+    let names: Vec<String> = ids.iter().map(|id| map.identities.full_name(*id)).collect();
+    let paint = (args.fill == Fill::Plane).then_some(args.paint);
+    let options = RemovalOptions { ids, halo: !args.tight, paint, seed: args.seed };
+    let done = remove::run(&scene, &map, &options, &mut Console::new(quiet))
+        .map_err(|e| CliError::of_work(e, "nothing was written"))?;
+    remove::store(&scene, &done, &args.out)?;
+    if args.json {
+        return output::print_json(&json!({
+            "scene": args.out, "names": names, "gaussians": done.cloud.len(), "report": done.report,
+        }));
+    }
+    output::print(&format!("{}\n{}: {}", told(&names, &done.report), args.out.display(), format::things(done.cloud.len(), "Gaussian")))
+}
+
+fn told(names: &[String], report: &RemovalReport) -> String {
+    let count = |n: usize| format::count(n as u64);
+    let mut text = format!("{}: {} Gaussians removed", names.join(", "), count(report.removed));
+    if report.fringes + report.unseen > 0 {
+        text += &format!(", and {} of its fringes and {} that no photo saw", count(report.fringes), count(report.unseen));
+    }
+    for surface in &report.surfaces {
+        text += &format!("\na surface closed with {} Gaussians", count(surface.gaussians));
+        if surface.roughness > ROUGH {
+            text += ", which is a guess: what is seen of it is not flat";
+        }
+    }
+    if report.surfaces.is_empty() {
+        text += "\nit hid nothing that no photo saw, or nothing flat; nothing was invented";
+    }
+    text + &format!("\n{}", report.secs.iter().map(|(s, t)| format!("{s} {}", format::seconds(*t))).collect::<Vec<_>>().join(", "))
+}
+
+/// Unevenness of a surface, as a share of the hole in it, from which its fill is a guess.
+const ROUGH: f64 = 0.1;

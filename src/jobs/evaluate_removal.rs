@@ -1,0 +1,201 @@
+//! Removing things from a scene of synthetic photos, against what is really behind them.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use super::evaluate::PhotoComparison;
+use super::remove::{self, Paint, RemovalOptions, Reduced};
+use super::{JobError, Scene, export, query};
+use crate::io::files;
+use crate::pipeline::depth::{self, TrueDepth};
+use crate::pipeline::metrics::planes;
+use crate::pipeline::observer::{Observer, Ticker};
+use crate::pipeline::removal::score::{Region, RegionScore, Tally, regions};
+use crate::pipeline::synth::{SETTINGS, SynthOptions};
+use crate::render::{Features, RenderSettings, Renderer};
+use crate::scene::{Camera, LevelFilter, PhotoPixels, SemanticMap};
+
+/// The ways that are compared: nothing is filled, and each way to paint.
+const WAYS: [Option<Paint>; 4] = [None, Some(Paint::Nearest), Some(Paint::Smooth), Some(Paint::Patches)];
+
+/// A thing that was removed in one way.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct RemovalRow {
+    pub(crate) name: String,
+    /// How it was filled; `None` = not at all.
+    pub(crate) paint: Option<Paint>,
+    pub(crate) uncovered: Option<RegionScore>,
+    pub(crate) invented: Option<RegionScore>,
+    /// Everything else, against the photos with the thing: before it was removed and after.
+    pub(crate) outside: [Option<RegionScore>; 2],
+    pub(crate) gaussians_removed: usize,
+    pub(crate) gaussians_invented: usize,
+    pub(crate) secs: f64,
+    /// Whether its name still finds something.
+    pub(crate) found_again: bool,
+}
+
+/// What is true in one view.
+struct TrueView {
+    camera: Camera,
+    regions: Vec<Region>,
+    with: [Vec<f64>; 3],
+    without: [Vec<f64>; 3],
+    depth: TrueDepth,
+    index: usize,
+}
+
+#[derive(Deserialize)]
+struct Settings {
+    options: SynthOptions,
+}
+
+/// Removes each thing of which `truth` has views without it, in every way.
+pub(crate) fn run(
+    scene: &Scene,
+    truth: &Path,
+    comparison: &PhotoComparison,
+    observer: &mut dyn Observer,
+) -> Result<Vec<RemovalRow>, JobError> {
+    let map = scene.semantics()?;
+    let photos = photos(comparison)?;
+    let mut rows = Vec::new();
+    for folder in folders(truth)? {
+        let (name, views) = views(comparison, &folder, &photos)?;
+        for paint in WAYS {
+            rows.push(one(scene, &map, (&name, paint), &views, comparison, observer)?);
+        }
+    }
+    Ok(rows)
+}
+
+/// The folder itself, or those in it, that have views without a thing.
+fn folders(truth: &Path) -> Result<Vec<PathBuf>, JobError> {
+    let is_one = |path: &Path| path.join(SETTINGS).is_file();
+    if is_one(truth) {
+        return Ok(vec![truth.into()]);
+    }
+    let mut all: Vec<PathBuf> =
+        std::fs::read_dir(truth).into_iter().flatten().flatten().map(|e| e.path()).filter(|p| is_one(p)).collect();
+    all.sort();
+    if all.is_empty() {
+        let text = format!("{}: neither it nor a folder in it was made by 'fmlgs synth --without'", truth.display());
+        return Err(JobError::Protocol(text));
+    }
+    Ok(all)
+}
+
+/// The cameras of the photos that were trained on, and their true depths.
+fn photos(comparison: &PhotoComparison) -> Result<Vec<(Camera, TrueDepth)>, JobError> {
+    let dataset = &comparison.dataset;
+    let trained = (0..dataset.photos.len()).filter(|i| !comparison.views.contains(i));
+    let one = |i: usize| {
+        let photo = &dataset.photos[i];
+        let camera = photo.camera.limited_to(comparison.max_side_px);
+        let depth = depth::of_photo(&dataset.root, photo)?;
+        Ok((camera.clone(), depth.resampled(camera.width_px as usize, camera.height_px as usize)))
+    };
+    trained.map(one).collect()
+}
+
+/// The thing's name and the views in which it was.
+fn views(
+    comparison: &PhotoComparison,
+    folder: &Path,
+    photos: &[(Camera, TrueDepth)],
+) -> Result<(String, Vec<TrueView>), JobError> {
+    let wrong = |what: &str| JobError::Protocol(format!("{}: {what}", folder.display()));
+    let path = folder.join(SETTINGS);
+    let settings: Settings = serde_json::from_slice(&files::read(&path, files::MAX_TEXT_BYTES)?)
+        .map_err(|e| files::json_error(&path, &e))?;
+    let name = settings.options.without.ok_or_else(|| wrong("nothing was left out of these photos"))?;
+    let mut views = Vec::new();
+    for &index in &comparison.views {
+        let photo = &comparison.dataset.photos[index];
+        let mut bare = photo.clone();
+        bare.path = folder.join(&photo.name);
+        if !bare.path.is_file() {
+            return Err(wrong("the photos are not the held-out ones of the scene"));
+        }
+        let with = comparison.view(index)?;
+        let pixels = crate::io::photo::load(&bare, comparison.max_side_px)?;
+        let size = [with.camera.width_px as usize, with.camera.height_px as usize];
+        let depths = [&comparison.dataset.root, folder].map(|root: &Path| depth::of_photo(root, photo));
+        let [before, depth] = depths.map(|d| Ok::<_, JobError>(d?.resampled(size[0], size[1])));
+        let (before, depth) = (before?, depth?);
+        let regions = regions(&with.camera, (&before, &depth), photos);
+        if regions.iter().any(|r| *r != Region::Outside) {
+            let (with_planes, without) = (planes(&with.pixels), planes(&pixels));
+            views.push(TrueView { camera: with.camera, regions, with: with_planes, without, depth, index });
+        }
+    }
+    if views.is_empty() {
+        return Err(wrong("no view shows it"));
+    }
+    Ok((name, views))
+}
+
+fn one(
+    scene: &Scene,
+    map: &SemanticMap,
+    (name, paint): (&str, Option<Paint>),
+    views: &[TrueView],
+    comparison: &PhotoComparison,
+    observer: &mut dyn Observer,
+) -> Result<RemovalRow, JobError> {
+    let ids = query::identities(map, name, LevelFilter::Auto, 1)?;
+    let start = std::time::Instant::now();
+    let options = RemovalOptions { ids, halo: true, paint, seed: 0 };
+    let Reduced { cloud, map: left, report } = remove::run(scene, map, &options, observer)?;
+    let secs = start.elapsed().as_secs_f64();
+    let found_again = match query::identities(&left, name, LevelFilter::Auto, 1) {
+        Err(JobError::NoMatch(_)) => false,
+        found => !found?.is_empty(),
+    };
+    let mut renderer = Renderer::new();
+    let settings = RenderSettings { depth: true, ..scene.settings.clone() };
+    let [mut uncovered, mut invented, mut before, mut after] = [(); 4].map(|()| Tally::default());
+    let mut ticker = Ticker::new(format!("Comparing without {name}"), views.len());
+    for (k, view) in views.iter().enumerate() {
+        ticker.tick(k, observer)?;
+        let was = renderer.render(&scene.cloud, Features::NONE, &view.camera, &settings)?;
+        let is = renderer.render(&cloud, Features::NONE, &view.camera, &settings)?;
+        uncovered.add(&is, &view.without, Some(&view.depth), &view.regions, Region::Uncovered);
+        invented.add(&is, &view.without, Some(&view.depth), &view.regions, Region::Invented);
+        before.add(&was, &view.with, None, &view.regions, Region::Outside);
+        after.add(&is, &view.with, None, &view.regions, Region::Outside);
+        if let (Some(folder), true) = (&comparison.pictures, paint != Some(Paint::Nearest)) {
+            let way = paint.map_or("none".into(), |p| format!("{p:?}").to_lowercase());
+            let file = format!("{}_{way}_{:03}.png", name.replace(|c: char| !c.is_alphanumeric(), "-"), view.index);
+            picture(&folder.join(file), view, [&was.to_rgb8(), &is.to_rgb8()])?;
+        }
+    }
+    Ok(RemovalRow {
+        name: name.into(),
+        paint,
+        uncovered: uncovered.score(),
+        invented: invented.score(),
+        outside: [before.score(), after.score()],
+        gaussians_removed: report.removed + report.fringes + report.unseen,
+        gaussians_invented: report.invented(),
+        secs,
+        found_again,
+    })
+}
+
+/// Before, after, the truth without the thing, and the regions: uncovered blue, invented red.
+fn picture(path: &Path, view: &TrueView, drawn: [&[[u8; 3]]; 2]) -> Result<(), JobError> {
+    let (w, h) = (view.camera.width_px as usize, view.camera.height_px as usize);
+    let truth: Vec<[u8; 3]> = (0..w * h).map(|i| std::array::from_fn(|c| (255.0 * view.without[c][i]) as u8)).collect();
+    let tint = |i: usize| match view.regions[i] {
+        Region::Outside | Region::Rim => truth[i].map(|c| c / 2 + 100),
+        Region::Uncovered => [40, 110, 230],
+        Region::Invented => [230, 60, 40],
+    };
+    let regions: Vec<[u8; 3]> = (0..w * h).map(tint).collect();
+    let rows = (0..h).flat_map(|y| [drawn[0], drawn[1], &truth, &regions].map(|p| &p[y * w..(y + 1) * w]));
+    let rgb = rows.flatten().copied().collect();
+    export::make_parent(path)?;
+    Ok(export::picture(path, &PhotoPixels { width_px: 4 * w as u32, height_px: h as u32, rgb, coverage: None })?)
+}

@@ -1,0 +1,123 @@
+//! A removal against the truth: where a thing was in a view, what it uncovered and what was invented there.
+
+use serde::Serialize;
+
+use crate::math::grid;
+use crate::math::stats::{mean, psnr_of};
+use crate::pipeline::depth::TrueDepth;
+use crate::render::{Frame, ssim};
+use crate::scene::Camera;
+
+/// Depths that differ by less than this share are those of one surface.
+const SAME_DEPTH: f32 = 0.01;
+
+/// A pixel of a view from which a thing was removed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Region {
+    /// The thing was not there.
+    Outside,
+    /// Beside it: the photo shows a little of both.
+    Rim,
+    /// What was behind it is in another photo.
+    Uncovered,
+    /// It is in none.
+    Invented,
+}
+
+/// Where the thing was in the view of `camera`, by true depths with it and without, and what of that the `photos` with
+/// it show. Depths have the cameras' sizes.
+pub(crate) fn regions(
+    camera: &Camera,
+    (with, without): (&TrueDepth, &TrueDepth),
+    photos: &[(Camera, TrueDepth)],
+) -> Vec<Region> {
+    const RIM_PX: usize = 2;
+    let differ = |a: f32, b: f32| (a - b).abs() > SAME_DEPTH * a.max(b);
+    let one = |i: usize| {
+        let (before, behind) = (with.values[i], without.values[i]);
+        if !differ(before, behind) {
+            return Region::Outside;
+        }
+        let at = glam::DVec2::new((i % with.width) as f64 + 0.5, (i / with.width) as f64 + 0.5);
+        // Nothing at all behind it is known to be nothing.
+        let point = camera.center + camera.ray(at) * f64::from(behind);
+        let shows = |(photo, depth): &(Camera, TrueDepth)| {
+            let Some(p) = photo.project(point) else { return false };
+            let inside = p.x >= 0.0 && p.y >= 0.0 && p.x < depth.width as f64 && p.y < depth.height as f64;
+            inside && {
+                let there = depth.values[p.y as usize * depth.width + p.x as usize];
+                !differ(there, photo.camera_from_world(point).z as f32)
+            }
+        };
+        if behind == 0.0 || photos.iter().any(shows) { Region::Uncovered } else { Region::Invented }
+    };
+    let mut all: Vec<Region> = (0..with.values.len()).map(one).collect();
+    let inside = all.iter().map(|r| *r != Region::Outside).collect();
+    let beside = grid::grown(with.width, inside, RIM_PX);
+    all.iter_mut().zip(beside).filter(|(r, is)| **r == Region::Outside && *is).for_each(|(r, _)| *r = Region::Rim);
+    all
+}
+
+/// Pixels of one region over all views.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tally {
+    pixels: usize,
+    squares: f64,
+    /// SSIM of each view where only the region may differ, as that of the region, and its pixels.
+    ssim: Vec<(f64, usize)>,
+    /// Relative errors of depth; 1 where there is none.
+    depth: Vec<f64>,
+}
+
+/// What a [`Tally`] says.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub(crate) struct RegionScore {
+    pub(crate) pixels: usize,
+    /// dB.
+    pub(crate) psnr: f64,
+    pub(crate) ssim: f64,
+    /// Mean error of depth as a share of it.
+    pub(crate) depth: f64,
+}
+
+impl Tally {
+    /// Adds what a frame has where `regions` are `which`, against planes of the truth.
+    pub(crate) fn add(
+        &mut self,
+        frame: &Frame<f32>,
+        truth: &[Vec<f64>; 3],
+        depth: Option<&TrueDepth>,
+        regions: &[Region],
+        which: Region,
+    ) {
+        let inside: Vec<usize> = (0..regions.len()).filter(|i| regions[*i] == which).collect();
+        if inside.is_empty() {
+            return;
+        }
+        let mut drawn = truth.clone();
+        for c in 0..3 {
+            for &i in &inside {
+                drawn[c][i] = f64::from(frame.color[c][i].clamp(0.0, 1.0));
+                self.squares += (drawn[c][i] - truth[c][i]).powi(2) / 3.0;
+            }
+        }
+        self.pixels += inside.len();
+        // Elsewhere nothing differs, so all that the mean lacks is the region's.
+        let lacks = (1.0 - ssim(&drawn, truth, frame.width_px)) * regions.len() as f64 / inside.len() as f64;
+        self.ssim.push((1.0 - lacks, inside.len()));
+        for (i, want) in inside.iter().filter_map(|&i| Some((i, depth?.values[i]))).filter(|(_, want)| *want > 0.0) {
+            let have = frame.median_depth[i];
+            self.depth.push(if have > 0.0 { f64::from((have - want).abs() / want) } else { 1.0 });
+        }
+    }
+
+    /// `None` where no view has the region.
+    pub(crate) fn score(&self) -> Option<RegionScore> {
+        (self.pixels > 0).then(|| RegionScore {
+            pixels: self.pixels,
+            psnr: psnr_of(self.squares / self.pixels as f64),
+            ssim: self.ssim.iter().map(|(s, n)| s * *n as f64).sum::<f64>() / self.pixels as f64,
+            depth: mean(&self.depth),
+        })
+    }
+}

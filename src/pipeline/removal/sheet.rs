@@ -1,0 +1,206 @@
+//! A piece of a plane in texels, each of which asks the photos whether it is seen, hidden or empty space.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::paint::{self, Paint};
+use super::plane::Plane;
+use super::select::Ball;
+use super::views::{SeenView, TOUCHED};
+use crate::math::grid;
+use crate::math::stats::median;
+
+/// Texels along a side: of the first look, and of a sheet at most.
+const FIRST: usize = 96;
+const MOST: usize = 400;
+/// What is seen around a hole, to be painted from, as a share of its larger side.
+const MARGIN: f64 = 0.75;
+/// Views that look along the surface say little: least cosine.
+const LEAST_COSINE: f64 = 0.1;
+/// Photos that must agree that a texel is seen, or that they look through it.
+const AGREE: u32 = 2;
+/// Holes below this many texels, or this share of the largest, are noise.
+const SPECK: (usize, f64) = (12, 0.02);
+/// Texels around a hole whose color the thing's rim may have touched: they are painted, too.
+const RIM: usize = 2;
+
+/// What the photos say of a texel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Texel {
+    /// Nothing, or that something else is in front of it.
+    Unknown,
+    /// It is surface.
+    Seen,
+    /// They look through it.
+    Free,
+    /// The thing was in front of it in all of them.
+    Hidden,
+}
+
+/// Texels row by row.
+pub(super) struct Sheet<'a> {
+    plane: &'a Plane,
+    /// Place of the first texel's corner along the plane.
+    corner: [f64; 2],
+    /// Side of a texel, scene units.
+    pub(super) step: f64,
+    pub(super) size: [usize; 2],
+    pub(super) state: Vec<Texel>,
+    /// Of what is seen; after painting, of what is hidden as well.
+    pub(super) color: Vec<[f32; 3]>,
+    /// Hidden texels that have none but hidden ones around them.
+    deep: Vec<bool>,
+}
+
+impl<'a> Sheet<'a> {
+    /// The part of a plane that the thing in `ball` hid from all views, with what is seen around it; `None` if it hid
+    /// nothing. `reach` radii around the thing are looked at.
+    pub(super) fn find(plane: &'a Plane, ball: &Ball, seen: &[SeenView], reach: f64) -> Option<Self> {
+        let middle = ball.center - plane.origin;
+        let middle = [middle.dot(plane.u), middle.dot(plane.v)];
+        let side = 2.0 * reach * ball.radius;
+        let step = side / FIRST as f64;
+        let first = Self::looked_at(plane, middle.map(|m| m - 0.5 * side), step, [FIRST; 2], seen);
+        let mut hidden: Vec<[usize; 2]> = Vec::new();
+        (0..first.state.len()).filter(|i| first.state[*i] == Texel::Hidden).for_each(|i| hidden.push([i % FIRST, i / FIRST]));
+        let ends = |axis: usize| {
+            let all = hidden.iter().map(|t| t[axis]);
+            Some((all.clone().min()?, all.max()? + 1))
+        };
+        let (x, y) = (ends(0)?, ends(1)?);
+        let larger = (x.1 - x.0).max(y.1 - y.0) as f64 * step;
+        let pad = MARGIN * larger + step;
+        let corner = [x.0, y.0].map(|t| t as f64 * step - pad);
+        let corner = [corner[0] + first.corner[0], corner[1] + first.corner[1]];
+        let extent = [x, y].map(|(from, to)| (to - from) as f64 * step + 2.0 * pad);
+        let fine = pixel_size(plane, ball, seen).max(extent[0].max(extent[1]) / MOST as f64);
+        let size = extent.map(|e| (e / fine).ceil().max(1.0) as usize);
+        let sheet = Self::looked_at(plane, corner, fine, size, seen);
+        sheet.state.contains(&Texel::Hidden).then_some(sheet)
+    }
+
+    fn looked_at(plane: &'a Plane, corner: [f64; 2], step: f64, size: [usize; 2], seen: &[SeenView]) -> Self {
+        let n = size[0] * size[1];
+        let mut sheet = Self { plane, corner, step, size, state: Vec::new(), color: Vec::new(), deep: Vec::new() };
+        let agree = AGREE.min(seen.len() as u32);
+        (sheet.state, sheet.color) = (0..n).into_par_iter().map(|i| asked(plane, sheet.center(i), seen, agree)).unzip();
+        sheet.clean();
+        sheet
+    }
+
+    /// Opens what is hidden but nearer to empty space than to surface, as behind an edge; what has more empty space than
+    /// surface around it, as below a table that is removed, whose own surface it is; and specks.
+    fn clean(&mut self) {
+        let (width, n) = (self.size[0], self.state.len());
+        let known = (0..n).filter_map(|i| match self.state[i] {
+            Texel::Seen => Some((i, true)),
+            Texel::Free => Some((i, false)),
+            _ => None,
+        });
+        let surface = grid::spread(width, n, known, |_| true);
+        let (label, areas) =
+            grid::regions(width, n, |i| self.state[i] == Texel::Hidden && surface[i] == Some(true));
+        let largest = areas.iter().copied().max().unwrap_or(0);
+        let least = ((SPECK.1 * largest as f64) as usize).max(SPECK.0);
+        // Texels of surface and of empty space at the border of each.
+        let mut border = vec![[0_usize; 2]; areas.len() + 1];
+        for i in (0..n).filter(|i| matches!(self.state[*i], Texel::Seen | Texel::Free)) {
+            for of in grid::neighbors(i, width, n).map(|j| label[j] as usize).filter(|of| *of > 0) {
+                border[of][usize::from(self.state[i] == Texel::Free)] += 1;
+            }
+        }
+        let is_open = |of: usize| of == 0 || areas[of - 1] < least || border[of][0] <= border[of][1];
+        for i in 0..n {
+            if self.state[i] == Texel::Hidden && is_open(label[i] as usize) {
+                self.state[i] = Texel::Unknown;
+            }
+        }
+        let open = self.state.iter().map(|s| *s != Texel::Hidden).collect();
+        self.deep = grid::grown(width, open, RIM).iter().map(|open| !open).collect();
+    }
+
+    /// The middle of texel `i` in the world.
+    pub(super) fn center(&self, i: usize) -> DVec3 {
+        let at = |axis: usize, t: usize| self.corner[axis] + (t as f64 + 0.5) * self.step;
+        self.plane.origin + self.plane.u * at(0, i % self.size[0]) + self.plane.v * at(1, i / self.size[0])
+    }
+
+    /// The texel below or above a point.
+    pub(super) fn texel(&self, p: DVec3) -> Option<usize> {
+        let d = p - self.plane.origin;
+        let x = ((d.dot(self.plane.u) - self.corner[0]) / self.step).floor();
+        let y = ((d.dot(self.plane.v) - self.corner[1]) / self.step).floor();
+        let inside = x >= 0.0 && y >= 0.0 && x < self.size[0] as f64 && y < self.size[1] as f64;
+        inside.then(|| y as usize * self.size[0] + x as usize)
+    }
+
+    /// Whether a texel and all around it are hidden.
+    pub(super) fn is_deep(&self, texel: Option<usize>) -> bool {
+        texel.is_some_and(|t| self.deep[t])
+    }
+
+    /// The texels that become Gaussians: what is hidden, and a seam around it.
+    pub(super) fn hole(&self) -> impl Iterator<Item = usize> + '_ {
+        let hidden = self.state.iter().map(|s| *s == Texel::Hidden).collect();
+        let grown = grid::grown(self.size[0], hidden, 1);
+        (0..grown.len()).filter(move |&i| grown[i] && matches!(self.state[i], Texel::Hidden | Texel::Seen))
+    }
+
+    /// Gives what is hidden a color.
+    pub(super) fn paint(&mut self, how: Paint, seed: u64) {
+        let hidden = self.state.iter().map(|s| *s == Texel::Hidden).collect();
+        let hole = grid::grown(self.size[0], hidden, RIM);
+        let known: Vec<bool> = (0..hole.len()).map(|i| self.state[i] == Texel::Seen && !hole[i]).collect();
+        paint::fill(&mut self.color, self.size, &known, &hole, how, seed);
+    }
+}
+
+/// Side of a photo's pixel on the plane, scene units, median over the views.
+fn pixel_size(plane: &Plane, ball: &Ball, seen: &[SeenView]) -> f64 {
+    let foot = ball.center - plane.normal * plane.height(ball.center);
+    let sizes: Vec<f64> = seen
+        .iter()
+        .map(|v| v.camera.camera_from_world(foot).z / v.camera.focal_px.max_element())
+        .filter(|size| *size > 0.0)
+        .collect();
+    if sizes.is_empty() { ball.radius / 64.0 } else { median(&sizes) }
+}
+
+/// What the views say of a point of the plane, and its color.
+fn asked(plane: &Plane, point: DVec3, seen: &[SeenView], agree: u32) -> (Texel, [f32; 3]) {
+    let (mut shown, mut free, mut exposed) = (0, 0, false);
+    let (mut color, mut total) = ([0.0_f64; 3], 0.0);
+    for view in seen {
+        let Some(i) = view.pixel(point) else { continue };
+        let from = view.camera.center - point;
+        let cosine = from.dot(plane.normal) / from.length();
+        if !(cosine.abs() >= LEAST_COSINE) {
+            continue;
+        }
+        // On the side of the eye.
+        let height = |depth: f32| plane.height(view.point(i, depth)) * cosine.signum();
+        let covered = view.thing[i] >= TOUCHED;
+        let depth = if covered { view.after[i] } else { view.before[i] };
+        let behind = depth == 0.0 || height(depth) < -plane.tolerance;
+        let on_it = !behind && height(depth) <= plane.tolerance;
+        match covered {
+            true => exposed |= behind || on_it,
+            false if behind => free += 1,
+            false if on_it => {
+                shown += 1;
+                let weight = cosine.powi(4);
+                total += weight;
+                (0..3).for_each(|c| color[c] += weight * f64::from(view.rgb[c][i]));
+            }
+            false => {}
+        }
+    }
+    let rgb = color.map(|c| if total > 0.0 { (c / total) as f32 } else { 0.0 });
+    let state = match () {
+        () if shown >= agree && shown >= free => Texel::Seen,
+        () if free >= agree => Texel::Free,
+        () if exposed => Texel::Hidden,
+        () => Texel::Unknown,
+    };
+    (state, rgb)
+}

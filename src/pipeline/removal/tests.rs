@@ -1,0 +1,147 @@
+use glam::{DVec2, DVec3};
+
+use super::*;
+use crate::pipeline::observer::Silent;
+use crate::render::{Features, Renderer};
+use crate::scene::{Identities, Level, NOBODY};
+
+const TABLE: IdentityId = 1;
+const BOX: IdentityId = 2;
+
+/// A table of 4 x 4 units at height 0 whose color rises along x, and a dark box of 0.8 units on it, below which there
+/// is nothing: no photo saw that. Without the box the table is whole.
+fn scene(is_bare: bool) -> (GaussianCloud, SemanticMap, Vec<Camera>) {
+    let spacing = 0.04;
+    let (mut places, mut colors, mut of) = (Vec::new(), Vec::new(), Vec::new());
+    let steps = |from: f64, to: f64| (0..((to - from) / spacing) as usize).map(move |k| from + (k as f64 + 0.5) * spacing);
+    for (x, z) in steps(-2.0, 2.0).flat_map(|x| steps(-2.0, 2.0).map(move |z| (x, z))) {
+        if is_bare || x.abs() > 0.4 || z.abs() > 0.4 {
+            places.push([x, 0.0, z]);
+            colors.push([0.5 + 0.15 * x, 0.6, 0.4]);
+            of.push(TABLE);
+        }
+    }
+    for (a, b) in steps(-0.4, if is_bare { -0.4 } else { 0.4 }).flat_map(|a| steps(-0.4, 0.4).map(move |b| (a, b))) {
+        let h = b + 0.4;
+        for place in [[a, 0.8, b], [a, h, 0.4], [a, h, -0.4], [0.4, h, a], [-0.4, h, a]] {
+            places.push(place);
+            colors.push([0.1, 0.1, 0.4]);
+            of.push(BOX);
+        }
+    }
+    let positions = places.iter().map(|p| p.map(|v| v as f32)).collect();
+    let mut cloud = GaussianCloud::isotropic(positions, (0.6 * spacing as f32).ln(), 3.0);
+    cloud.sh = colors.iter().map(|c| c.map(|c| ((c - 0.5) / SH_C0) as f32)).collect();
+    let mut identities = Identities::default();
+    identities.add(Level::Object, NOBODY, vec!["table".into()]);
+    identities.add(Level::Object, NOBODY, vec!["box".into()]);
+    let margin = vec![1.0; of.len()];
+    (cloud, SemanticMap::from_identities(identities, of, margin, vec![]), cameras(16, 0.0))
+}
+
+fn cameras(n: usize, shift: f64) -> Vec<Camera> {
+    let at = |k: usize| {
+        let angle = (k as f64 + shift) / n as f64 * std::f64::consts::TAU;
+        let eye = DVec3::new(3.0 * angle.cos(), 2.0 + 0.5 * (k % 3) as f64, 3.0 * angle.sin());
+        Camera::look_at(eye, DVec3::new(0.0, 0.2, 0.0), DVec3::Y, 0.7, 160, 120).expect("a camera")
+    };
+    (0..n).map(at).collect()
+}
+
+fn options(paint: Option<Paint>) -> RemovalOptions {
+    RemovalOptions { ids: vec![BOX], halo: true, paint, seed: 3 }
+}
+
+fn removed(paint: Option<Paint>) -> (SemanticMap, Removed) {
+    let (cloud, map, photos) = scene(false);
+    let done = remove(&cloud, &map, &photos, &RenderSettings::default(), &options(paint), &mut Silent).expect("removed");
+    (map, done)
+}
+
+/// Mean difference of color and depth from the bare table where the box stood on it, in views between the photos.
+fn off(cloud: &GaussianCloud) -> (f64, f64) {
+    let settings = RenderSettings { depth: true, ..RenderSettings::default() };
+    let (mut color, mut depth, mut n) = (0.0, 0.0, 0.0);
+    let table = scene(true).0;
+    for camera in cameras(16, 0.5).iter().step_by(4) {
+        let draw = |cloud| Renderer::new().render(cloud, Features::NONE, camera, &settings).expect("a frame");
+        let (frame, truth) = (draw(cloud), draw(&table));
+        for (x, z) in (-7..=7).flat_map(|x| (-7..=7).map(move |z| (f64::from(x) * 0.05, f64::from(z) * 0.05))) {
+            let point = DVec3::new(x, 0.0, z);
+            let DVec2 { x: px, y: py } = camera.project(point).expect("in front");
+            let i = py as usize * frame.width_px + px as usize;
+            color += (0..3).map(|c| f64::from((frame.color[c][i] - truth.color[c][i]).abs())).sum::<f64>() / 3.0;
+            let far = f64::from(truth.median_depth[i]);
+            depth += (f64::from(frame.median_depth[i]) - far).abs() / far;
+            n += 1.0;
+        }
+    }
+    (color / n, depth / n)
+}
+
+#[test]
+fn what_a_box_hid_of_a_table_is_closed_with_its_color_and_depth() {
+    let (_, open) = removed(None);
+    let (color, depth) = off(&open.cloud);
+    assert!(color > 0.2 && depth > 0.5, "there is no hole: {color} {depth}");
+    for (paint, most) in [(Paint::Patches, 0.03), (Paint::Smooth, 0.03), (Paint::Nearest, 0.08)] {
+        let (_, done) = removed(Some(paint));
+        let (color, depth) = off(&done.cloud);
+        assert!(color < most && depth < 0.01, "{paint:?}: {color} {depth}");
+        let new = done.cloud.len() - done.kept.len();
+        assert_eq!((new, done.report.surfaces.len()), (done.report.invented(), 1));
+        // Below the box and nowhere else, and the table's.
+        for i in done.kept.len()..done.cloud.len() {
+            let at = done.cloud.world_position(i);
+            assert!(at.x.abs() < 0.55 && at.z.abs() < 0.55 && at.y.abs() < 0.05, "{at}");
+        }
+        let count = |id| done.identity_of.iter().filter(|of| **of == id).count();
+        assert_eq!((count(NOBODY), count(BOX)), (0, 0), "of {}", done.cloud.len());
+        let flags = &done.cloud.extras.iter().find(|e| e.name == INVENTED).expect("flags").values;
+        assert_eq!(flags.iter().filter(|v| **v == 1.0).count(), new);
+        done.cloud.validate().expect("a valid cloud");
+    }
+}
+
+#[test]
+fn a_box_in_the_air_hides_nothing() {
+    let (mut cloud, map, photos) = scene(false);
+    // With a table below it that is whole.
+    for (i, p) in cloud.positions.iter_mut().enumerate() {
+        if map.identity_of[i] == BOX {
+            p[1] += 1.0;
+        }
+    }
+    let whole: Vec<usize> = (0..cloud.len()).filter(|i| map.identity_of[*i] == BOX).collect();
+    let mut floor = cloud.select(&whole[..whole.len() / 5]);
+    let mut at = (0..20).flat_map(|x| (0..20).map(move |z| [-0.38 + 0.04 * x as f32, 0.0, -0.38 + 0.04 * z as f32]));
+    floor.positions.iter_mut().for_each(|p| *p = at.next().expect("as many"));
+    let mut of = map.identity_of.clone();
+    of.extend(vec![TABLE; floor.len()]);
+    cloud.append(floor);
+    let map = SemanticMap::from_identities(map.identities, of.clone(), vec![1.0; of.len()], vec![]);
+    let done = remove(&cloud, &map, &photos, &RenderSettings::default(), &options(Some(Paint::Patches)), &mut Silent);
+    assert_eq!(done.expect("removed").report.surfaces, []);
+}
+
+#[test]
+fn what_makes_no_sense_is_refused_by_name() {
+    let (cloud, map, photos) = scene(false);
+    let settings = RenderSettings::default();
+    let run = |map: &SemanticMap, photos: &[Camera], ids: Vec<IdentityId>, paint: Option<Paint>| {
+        let options = RemovalOptions { ids, ..options(paint) };
+        remove(&cloud, map, photos, &settings, &options, &mut Silent).map(|_| ())
+    };
+    let patches = Some(Paint::Patches);
+    assert!(matches!(run(&map, &[], vec![BOX], patches), Err(RemovalError::Unseen(name)) if name == "box"));
+    assert!(run(&map, &[], vec![BOX], None).is_ok());
+    assert!(matches!(run(&map, &photos, vec![BOX, TABLE], None), Err(RemovalError::Everything(_))));
+    let nobody = SemanticMap { identity_of: vec![TABLE; cloud.len()], ..map.clone() };
+    assert!(matches!(run(&nobody, &photos, vec![BOX], patches), Err(RemovalError::Nothing(name)) if name == "box"));
+}
+
+#[test]
+fn the_same_seed_gives_the_same_fill() {
+    let (a, b) = (removed(Some(Paint::Patches)).1, removed(Some(Paint::Patches)).1);
+    assert_eq!(a.cloud, b.cloud);
+}
