@@ -6,7 +6,7 @@ use serde_json::json;
 
 use super::progress::Console;
 use super::{CliError, number, output};
-use crate::jobs::remove::{self, Paint, RemovalOptions, RemovalReport};
+use crate::jobs::remove::{self, Paint, RemovalOptions};
 use crate::jobs::{open, query};
 use crate::math::format;
 use crate::scene::LevelFilter;
@@ -76,26 +76,6 @@ pub(crate) fn run(args: RemoveArgs, quiet: bool) -> Result<(), CliError> {
             "scene": args.out, "names": names, "gaussians": done.cloud.len(), "report": done.report,
         }));
     }
-    output::print(&format!("{}\n{}: {}", told(&names, &done.report), args.out.display(), format::things(done.cloud.len(), "Gaussian")))
+    let told = remove::told(&names.join(", "), &done.report);
+    output::print(&format!("{told}\n{}: {}", args.out.display(), format::things(done.cloud.len(), "Gaussian")))
 }
-
-fn told(names: &[String], report: &RemovalReport) -> String {
-    let count = |n: usize| format::count(n as u64);
-    let mut text = format!("{}: {} Gaussians removed", names.join(", "), count(report.removed));
-    if report.fringes + report.unseen > 0 {
-        text += &format!(", and {} of its fringes and {} that no photo saw", count(report.fringes), count(report.unseen));
-    }
-    for surface in &report.surfaces {
-        text += &format!("\na surface closed with {} Gaussians", count(surface.gaussians));
-        if surface.roughness > ROUGH {
-            text += ", which is a guess: what is seen of it is not flat";
-        }
-    }
-    if report.surfaces.is_empty() {
-        text += "\nit hid nothing that no photo saw, or nothing flat; nothing was invented";
-    }
-    text + &format!("\n{}", report.secs.iter().map(|(s, t)| format!("{s} {}", format::seconds(*t))).collect::<Vec<_>>().join(", "))
-}
-
-/// Unevenness of a surface, as a share of the hole in it, from which its fill is a guess.
-const ROUGH: f64 = 0.1;

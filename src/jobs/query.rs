@@ -7,6 +7,7 @@ use image::ColorType;
 
 use super::{JobError, Scene, export};
 use crate::math::colormap::Colormap;
+use crate::pipeline::removal::INVENTED;
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::matching::{self, MatchMode};
@@ -28,6 +29,8 @@ pub struct ViewMaps {
     pub(crate) codes: Option<CodeMap>,
     /// Where those win of which nothing is known; to everything else these pixels are nobody's.
     pub(crate) unknown: Mask,
+    /// Where those win that were invented to close a surface; empty where there are none.
+    pub(crate) invented: Mask,
 }
 
 /// Stands for Gaussians of which nothing is known while a view is drawn. No identity has this number, so they count
@@ -54,7 +57,13 @@ impl ViewMaps {
             true => Some(CodeMap::render(renderer, cloud, &map.codes, parts, camera, settings)?),
             false => None,
         };
-        Ok(Self { identities, codes, unknown })
+        let invented = invented(renderer, (cloud, settings), camera)?;
+        Ok(Self { identities, codes, unknown, invented })
+    }
+
+    /// Share of the view that no photo has seen.
+    pub(crate) fn invented_share(&self) -> f64 {
+        self.invented.area() as f64 / self.identities.identity.len().max(1) as f64
     }
 
     /// Share of the view of which nothing is known.
@@ -71,6 +80,21 @@ impl ViewMaps {
     pub(crate) fn of_answer(&self, map: &SemanticMap, answered: &QueryAnswer, top: usize) -> Mask {
         answered.mask(&self.identities, self.codes.as_ref(), &map.identities, top)
     }
+}
+
+/// The pixels that invented Gaussians have most of.
+fn invented(
+    renderer: &mut Renderer,
+    (cloud, settings): (&GaussianCloud, &RenderSettings),
+    camera: &Camera,
+) -> Result<Mask, crate::render::RenderError> {
+    let Some(flags) = cloud.extras.iter().find(|e| e.name == INVENTED && e.values.contains(&1.0)) else {
+        return Ok(Mask::empty(0, 0));
+    };
+    let features = Features { channels: 1, values: &flags.values };
+    let bare = RenderSettings { sh_degree: 0, depth: false, ..settings.clone() };
+    let frame = renderer.render(cloud, features, camera, &bare)?;
+    Ok(Mask::from_fn(frame.width_px, frame.height_px, |i| frame.features[0][i] >= 0.5))
 }
 
 /// What the pixels of a view belong to.

@@ -1,11 +1,12 @@
 //! Taking things out of a scene, for good, into a scene of its own.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{JobError, Scene};
+use super::{JobError, Scene, open};
 use crate::io::trained;
 use crate::io::{IoError, SceneFolder};
+use crate::math::format;
 use crate::pipeline::observer::Observer;
 use crate::pipeline::removal;
 pub(crate) use crate::pipeline::removal::{Paint, RemovalOptions, RemovalReport};
@@ -40,6 +41,68 @@ pub(crate) fn run(
     }
     Ok(Reduced { cloud: done.cloud.into(), map: new.into(), report: done.report })
 }
+
+/// What the window and the agent ask for: the result goes into a folder beside the scene's.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RemoveRequest {
+    /// Folder of the scene.
+    pub(crate) folder: PathBuf,
+    pub(crate) options: RemovalOptions,
+}
+
+/// A scene that was stored without some things.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RemovedScene {
+    /// Where it lies.
+    pub(crate) folder: PathBuf,
+    /// What is not in it.
+    pub(crate) name: String,
+    pub(crate) request: RemoveRequest,
+    pub(crate) report: RemovalReport,
+}
+
+/// Takes things out of the scene in a folder and stores the result beside it.
+pub(crate) fn beside(request: &RemoveRequest, observer: &mut dyn Observer) -> Result<RemovedScene, JobError> {
+    let scene = open::scene(&request.folder)?;
+    let map = scene.semantics()?;
+    let names: Vec<String> = request.options.ids.iter().map(|id| map.identities.full_name(*id)).collect();
+    let done = run(&scene, &map, &request.options, observer)?;
+    let name = names.join(", ");
+    let folder = free_folder(&request.folder, &name);
+    store(&scene, &done, &folder)?;
+    Ok(RemovedScene { folder, name, request: request.clone(), report: done.report })
+}
+
+/// `desk-without-grey-bottle` beside `desk`, with a number if there is one already.
+fn free_folder(scene: &Path, name: &str) -> PathBuf {
+    let words: Vec<&str> = name.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).collect();
+    let stem = scene.file_name().map_or_else(|| "scene".into(), |n| n.to_string_lossy());
+    let what: String = words.join("-").chars().take(40).collect();
+    let place = |number: usize| match number {
+        1 => scene.with_file_name(format!("{stem}-without-{what}")),
+        n => scene.with_file_name(format!("{stem}-without-{what}-{n}")),
+    };
+    (1..).map(place).find(|folder| !folder.exists()).unwrap_or_default()
+}
+
+/// In words: what was done.
+pub(crate) fn told(name: &str, report: &RemovalReport) -> String {
+    let count = |n: usize| format::things(n, "Gaussian");
+    let mut text = format!("{name}: {} removed", count(report.removed + report.fringes + report.unseen));
+    match report.surfaces.iter().map(|s| s.roughness).reduce(f64::max) {
+        None => text += ", nothing had to be invented",
+        Some(rough) => {
+            text += &format!(", {} invented on {}", report.invented(), format::things(report.surfaces.len(), "surface"));
+            if rough > ROUGH {
+                text += " (a guess: what is seen around is not flat)";
+            }
+        }
+    }
+    text
+}
+
+/// Unevenness of a surface, as a share of the hole in it, from which its fill is a guess.
+const ROUGH: f64 = 0.1;
 
 /// How sure it is whose invented Gaussians are.
 const GUESSED: f32 = 0.5;

@@ -46,6 +46,8 @@ impl App {
             Action::Evaluate => self.evaluate(),
             Action::FindObjects => self.find_objects(),
             Action::SegmentPhoto => self.segment_photo(),
+            Action::Remove(id) => self.remove(id),
+            Action::AnotherFill(halo) => self.fill_anew(halo),
             Action::FetchModel(id) => self.install_model(id, None),
             Action::TypeQuery => self.type_question(),
             Action::Ask(text) => {

@@ -9,6 +9,7 @@ mod act_file;
 mod act_find;
 mod act_look;
 mod act_phrases;
+mod act_remove;
 mod act_report;
 mod act_view;
 mod act_window;

@@ -17,6 +17,7 @@ use crate::jobs::OpenedScene;
 use crate::jobs::demo::QUESTION;
 use crate::jobs::go_to::{Approached, Explored};
 use crate::jobs::inspect::InspectedPixel;
+use crate::jobs::remove::{self, RemovedScene};
 use crate::jobs::models::ModelList;
 use crate::jobs::select::Selected;
 use crate::jobs::thumbnails::ThumbnailSet;
@@ -50,6 +51,8 @@ pub struct AppState {
     pub scene: Option<Arc<OpenedScene>>,
     /// What is seen of another one, in the second view.
     pub beside: Option<Beside>,
+    /// The scene without a thing that was made last.
+    pub(crate) removed: Option<RemovedScene>,
     /// Counts the scenes shown so far; changes when `scene` does.
     pub(crate) scene_number: u64,
     /// What is left out for the scene, and why.
@@ -279,6 +282,12 @@ impl AppState {
                     self.toast(Tone::Warning, "There is nothing to compare with: it has no Gaussians.");
                 }
             }
+            Outcome::Removed(removed) => {
+                self.toast(Tone::Good, remove::told(&removed.name, &removed.report));
+                self.say(Tone::Info, format!("Saved to {}", removed.folder.display()));
+                next.push(Action::OpenBeside(Some(removed.folder.clone())));
+                self.removed = Some(*removed);
+            }
             Outcome::Trained { evaluations, out, semantics, facts } => {
                 let carried = semantics.is_some();
                 if self.training_job == Some(job) {
@@ -370,7 +379,7 @@ impl AppState {
             self.remember(scene.path.clone());
         }
         self.scene_number += 1;
-        self.beside = None;
+        (self.beside, self.removed) = (None, None);
         self.set_facts(scene.facts.clone());
         self.antialias = scene.render.antialias;
         self.set_semantics(scene.semantics.clone());

@@ -13,7 +13,7 @@ use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
     Folders, JobError, OpenedScene, Scene, demo, edit, export, export_all, find_objects, go_to, inspect, models, open,
-    phrases, plan, poses, recent, report, scale, select, thumbnails, train, video,
+    phrases, plan, poses, recent, remove, report, scale, select, thumbnails, train, video,
 };
 use crate::measure::{End, FILE, Report};
 use crate::pipeline::observer::{Observer, Severity};
@@ -106,6 +106,7 @@ impl Jobs for PipelineJobs {
                 let map = Arc::new(done.found.map);
                 if request.known.is_some() { Outcome::Edited(map) } else { Outcome::Objects(map) }
             }
+            Command::Remove(request) => Outcome::Removed(Box::new(remove::beside(&request, observer)?)),
             Command::EditObjects { cloud, map, request, out } => {
                 let failed = |remedy| move |e: JobError| Stop::Failed(Failure::of(&e, remedy));
                 let new = match edit::apply(&cloud, &map, &request) {

@@ -19,6 +19,8 @@ pub enum JobKind {
     Evaluate,
     /// Finds objects and parts.
     Objects,
+    /// Takes things out of a scene.
+    Remove,
     /// Changes objects and parts.
     Edit,
     /// Takes in a click or a stroke.
@@ -63,7 +65,7 @@ impl JobKind {
 
     /// Whether it waits where it is asked to.
     pub(crate) fn can_pause(self) -> bool {
-        matches!(self, Self::Train | Self::Objects | Self::Model | Self::Video | Self::Phrases | Self::ExportAll)
+        matches!(self, Self::Train | Self::Objects | Self::Remove | Self::Model | Self::Video | Self::Phrases | Self::ExportAll)
     }
 
     /// Which thread runs it.
@@ -72,6 +74,7 @@ impl JobKind {
             Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects => WorkerThread::Long,
             Self::DemoPhotos
             | Self::Poses
+            | Self::Remove
             | Self::Model
             | Self::Video
             | Self::Measure

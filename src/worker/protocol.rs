@@ -14,6 +14,7 @@ use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
 use crate::jobs::inspect::{InspectRequest, InspectedPixel};
 use crate::jobs::models::ModelList;
 use crate::jobs::phrases::{PhraseRow, PhrasesRequest};
+use crate::jobs::remove::{RemoveRequest, RemovedScene};
 use crate::jobs::report::ReportRequest;
 use crate::jobs::select::{SelectRequest, Selected};
 use crate::jobs::thumbnails::ThumbnailSet;
@@ -83,6 +84,8 @@ pub enum Command {
     },
     /// Find the objects and parts of a trained scene, and store them with it.
     FindObjects(Box<find_objects::FindRequest>),
+    /// Take things out of a scene, into one of its own.
+    Remove(Box<RemoveRequest>),
     /// Change the objects and parts of a scene, and store them with it.
     EditObjects {
         /// The Gaussians.
@@ -197,6 +200,7 @@ impl Command {
             Self::Train { .. } => JobKind::Train,
             Self::Evaluate { .. } => JobKind::Evaluate,
             Self::FindObjects(_) => JobKind::Objects,
+            Self::Remove(_) => JobKind::Remove,
             Self::EditObjects { .. } => JobKind::Edit,
             Self::Select(_) => JobKind::Select,
             Self::Export { .. } => JobKind::Export,
@@ -233,6 +237,7 @@ impl Command {
                 format!("Segmenting {}", request.with.seed.as_deref().unwrap_or("a photo"))
             }
             Self::FindObjects(request) => format!("Finding objects in {}", request.dataset.name),
+            Self::Remove(_) => "Removing".into(),
             Self::EditObjects { .. } => "Editing objects".into(),
             Self::Select(_) => "Selecting".into(),
             Self::SetScale { .. } => "Saving the scale".into(),
@@ -281,6 +286,8 @@ pub enum Outcome {
     Evaluated(Evaluation),
     /// Objects and parts were found.
     Objects(Arc<SemanticMap>),
+    /// A scene was made without some things.
+    Removed(Box<RemovedScene>),
     /// Objects and parts were changed.
     Edited(Arc<SemanticMap>),
     /// The length of a unit in meters, and whether it was stored.

@@ -2,13 +2,14 @@
 
 use glam::DVec3;
 
+use crate::math::lanes::Lane;
 use crate::math::stats::quantile;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::render::{ContributionSink, RenderSettings, Renderer, TILE_PX};
 use crate::scene::{Camera, GaussianCloud, IdentityId, NOBODY, SemanticMap};
 
 use super::RemovalError;
-use crate::math::lanes::Lane;
+use super::views::TOUCHED;
 
 /// Share of a pixel from which a Gaussian is seen there.
 const SEEN: f32 = 0.05;
@@ -84,8 +85,8 @@ pub(super) fn add_fringes(cloud: &GaussianCloud, map: &SemanticMap, gone: &mut [
     found.len()
 }
 
-/// Adds Gaussians that no photo has seen and that are in sight once the others are gone: nothing says what they should
-/// look like. How many those are.
+/// Adds Gaussians that no photo has seen and that are in sight where the thing was once it is gone: nothing says what
+/// they should look like. How many those are.
 pub(super) fn add_unseen(
     cloud: &GaussianCloud,
     gone: &mut [bool],
@@ -93,37 +94,81 @@ pub(super) fn add_unseen(
     settings: &RenderSettings,
     observer: &mut dyn Observer,
 ) -> Result<usize, RemovalError> {
-    let mut renderer = Renderer::new();
-    let mut ticker = Ticker::new("Looking for what no photo has seen", 2 * cameras.len());
-    let mut largest = |cloud: &GaussianCloud, from: usize, observer: &mut dyn Observer| {
-        let mut weight = vec![0.0_f32; cloud.len()];
-        for (k, camera) in cameras.iter().enumerate() {
-            ticker.tick(from + k, observer)?;
-            let camera = camera.limited_to(SIDE_PX);
-            let mut rows: Vec<Largest> = (0..camera.height_px.div_ceil(TILE_PX as u32)).map(|_| Largest::default()).collect();
-            renderer.contributions(cloud, &camera, settings, &mut rows)?;
-            rows.iter().flat_map(|r| &r.0).for_each(|(i, w)| weight[*i as usize] = weight[*i as usize].max(*w));
-        }
-        Ok::<_, RemovalError>(weight)
-    };
-    let before = largest(cloud, 0, observer)?;
     let kept: Vec<usize> = (0..cloud.len()).filter(|&i| !gone[i]).collect();
-    let after = largest(&cloud.select(&kept), cameras.len(), observer)?;
-    let found: Vec<usize> = kept.into_iter().zip(after).filter(|(i, w)| before[*i] < SEEN && *w >= SEEN).map(|f| f.0).collect();
+    let rest = cloud.select(&kept);
+    let mut renderer = Renderer::new();
+    let mut ticker = Ticker::new("Looking for what no photo has seen", cameras.len());
+    let (mut before, mut after) = (vec![0.0_f32; cloud.len()], vec![0.0_f32; kept.len()]);
+    for (k, camera) in cameras.iter().enumerate() {
+        ticker.tick(k, observer)?;
+        let camera = camera.limited_to(SIDE_PX);
+        let width = camera.width_px as usize;
+        let mut rows: Vec<Row<'_>> =
+            (0..camera.height_px.div_ceil(TILE_PX as u32)).map(|_| Row::of(Look::At { gone, width })).collect();
+        renderer.contributions(cloud, &camera, settings, &mut rows)?;
+        rows.iter().for_each(|row| row.largest_into(&mut before));
+        let thing: Vec<Vec<f32>> = rows.into_iter().map(|row| row.thing).collect();
+        let mut rows: Vec<Row<'_>> = thing.iter().map(|thing| Row::of(Look::Behind { thing, width })).collect();
+        renderer.contributions(&rest, &camera, settings, &mut rows)?;
+        rows.iter().for_each(|row| row.largest_into(&mut after));
+    }
+    let unseen = |(i, weight): &(usize, f32)| before[*i] < SEEN && *weight >= SEEN;
+    let found: Vec<usize> = kept.into_iter().zip(after).filter(unseen).map(|f| f.0).collect();
     found.iter().for_each(|i| gone[*i] = true);
     Ok(found.len())
 }
 
-/// The largest share of a pixel that each Gaussian has in a row of tiles; one may stand there several times.
-#[derive(Default)]
-struct Largest(Vec<(u32, f32)>);
+/// Where weights are counted.
+enum Look<'a> {
+    /// Everywhere; how much of each pixel is `gone` is noted.
+    At { gone: &'a [bool], width: usize },
+    /// Where the thing had a share of the pixel.
+    Behind { thing: &'a [f32], width: usize },
+}
 
-impl ContributionSink<f32> for Largest {
-    fn add(&mut self, gaussian: u32, _: usize, _: usize, weights: &Lane<f32>) {
-        let largest = weights.iter().fold(0.0_f32, |a, b| a.max(*b));
-        match self.0.last_mut().filter(|last| last.0 == gaussian) {
+/// A row of tiles.
+struct Row<'a> {
+    look: Look<'a>,
+    /// The largest share of a pixel of each Gaussian; one may stand there several times.
+    largest: Vec<(u32, f32)>,
+    /// The thing's share of each pixel.
+    thing: Vec<f32>,
+}
+
+impl<'a> Row<'a> {
+    fn of(look: Look<'a>) -> Self {
+        let pixels = if let Look::At { width, .. } = look { width * TILE_PX } else { 0 };
+        Self { look, largest: Vec::new(), thing: vec![0.0; pixels] }
+    }
+
+    fn largest_into(&self, all: &mut [f32]) {
+        self.largest.iter().for_each(|(i, w)| all[*i as usize] = all[*i as usize].max(*w));
+    }
+}
+
+impl ContributionSink<f32> for Row<'_> {
+    fn add(&mut self, gaussian: u32, x: usize, y: usize, weights: &Lane<f32>) {
+        let mut largest = 0.0_f32;
+        match self.look {
+            Look::At { gone, width } => {
+                largest = weights.iter().fold(largest, |a, b| a.max(*b));
+                if gone[gaussian as usize] {
+                    let from = y % TILE_PX * width + x;
+                    let inside = width.saturating_sub(x).min(weights.len());
+                    self.thing[from..from + inside].iter_mut().zip(weights).for_each(|(sum, w)| *sum += w);
+                }
+            }
+            Look::Behind { thing, width } => {
+                let from = y % TILE_PX * width + x;
+                for (share, weight) in thing[from.min(thing.len())..].iter().zip(weights).take(width.saturating_sub(x)) {
+                    largest = if *share >= TOUCHED { largest.max(*weight) } else { largest };
+                }
+            }
+        }
+        match self.largest.last_mut().filter(|last| last.0 == gaussian) {
             Some(last) => last.1 = last.1.max(largest),
-            None => self.0.push((gaussian, largest)),
+            None if largest > 0.0 => self.largest.push((gaussian, largest)),
+            None => {}
         }
     }
 }

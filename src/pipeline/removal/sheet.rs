@@ -104,9 +104,9 @@ impl<'a> Sheet<'a> {
         let least = ((SPECK.1 * largest as f64) as usize).max(SPECK.0);
         // Texels of surface and of empty space at the border of each.
         let mut border = vec![[0_usize; 2]; areas.len() + 1];
-        for i in (0..n).filter(|i| matches!(self.state[*i], Texel::Seen | Texel::Free)) {
+        for i in (0..n).filter(|i| self.state[*i] == Texel::Seen || surface[*i] == Some(false)) {
             for of in grid::neighbors(i, width, n).map(|j| label[j] as usize).filter(|of| *of > 0) {
-                border[of][usize::from(self.state[i] == Texel::Free)] += 1;
+                border[of][usize::from(surface[i] == Some(false))] += 1;
             }
         }
         let is_open = |of: usize| of == 0 || areas[of - 1] < least || border[of][0] <= border[of][1];

@@ -2,7 +2,7 @@
 
 use egui::{Color32, FontId, Mesh, Rect, RichText, Sense, Slider, Stroke, Ui, vec2};
 
-use super::query::{HATCH, OverlaySettings};
+use super::query::{HATCH, INVENTED, OverlaySettings};
 use crate::math::colormap::Colormap;
 use crate::scene::NOBODY;
 use crate::ui::actions::Action;
@@ -17,13 +17,13 @@ pub(super) fn is_needed(settings: &OverlaySettings, depth: Option<(f32, f32)>) -
     settings.color_by != ColorBy::Masks || depth.is_some()
 }
 
-/// The legend of the tint, or of the depths that the frame shows. `unknown` is the share of the view of which nothing
-/// is known, once the eye rests; `photo` what can be done about it with one.
+/// The legend of the tint, or of the depths that the frame shows. `shares` are those of the view of
+/// which nothing is known and that was invented, once the eye rests; `photo` what can be done about it with one.
 pub(super) fn show(
     ui: &mut Ui,
     settings: &mut OverlaySettings,
     depth: Option<(f32, f32)>,
-    unknown: Option<f64>,
+    shares: Option<[f64; 2]>,
     photo: Option<&str>,
     actions: &mut Vec<Action>,
 ) {
@@ -43,7 +43,10 @@ pub(super) fn show(
         };
         ui.label(RichText::new(meaning).small());
         if settings.color_by.tells_unknown() {
-            show_unknown(ui, unknown, photo, actions);
+            show_unknown(ui, shares.map(|s| s[0]), photo, actions);
+            if let Some([_, invented]) = shares.filter(|s| s[1] > 0.0) {
+                show_invented(ui, invented);
+            }
         }
         if settings.color_by == ColorBy::Heat {
             bar(ui, settings.colormap, ["0", "1"].map(String::from));
@@ -58,7 +61,7 @@ pub(super) fn show(
 fn show_unknown(ui: &mut Ui, share: Option<f64>, photo: Option<&str>, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         let (rect, _) = ui.allocate_exact_size(vec2(18.0, 11.0), Sense::hover());
-        hatch(ui, rect);
+        hatch(ui, rect, HATCH, false);
         let text = match share {
             None => "Unknown".to_owned(),
             Some(share) if share > 0.0 && share < 0.005 => "Under 1 % of this view is unknown".to_owned(),
@@ -80,14 +83,29 @@ fn show_unknown(ui: &mut Ui, share: Option<f64>, photo: Option<&str>, actions: &
     }
 }
 
-/// Stripes as they are drawn over the view.
-fn hatch(ui: &Ui, rect: Rect) {
-    let [light, dark] = HATCH.map(|[r, g, b]| Color32::from_rgb(r, g, b));
+/// How much was made up where something was removed.
+fn show_invented(ui: &mut Ui, share: f64) {
+    ui.horizontal(|ui| {
+        let (rect, _) = ui.allocate_exact_size(vec2(18.0, 11.0), Sense::hover());
+        hatch(ui, rect, [INVENTED, [110; 3]], true);
+        let text = match share {
+            share if share < 0.005 => "Under 1 % of this view is invented".to_owned(),
+            share => format!("{:.0} % of this view is invented", 100.0 * share),
+        };
+        let why = "Something was removed here that no photo shows the back of: painted from what is around.";
+        ui.label(RichText::new(text).small()).on_hover_text(why);
+    });
+}
+
+/// Stripes as they are drawn over the view; `falling` to the right or rising.
+fn hatch(ui: &Ui, rect: Rect, colors: [[u8; 3]; 2], falling: bool) {
+    let [light, dark] = colors.map(|[r, g, b]| Color32::from_rgb(r, g, b));
     let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
     painter.rect_filled(rect, 0.0, dark);
     let mut x = rect.left() - rect.height();
+    let [low, high] = if falling { [rect.top(), rect.bottom()] } else { [rect.bottom(), rect.top()] };
     while x < rect.right() {
-        let ends = [egui::pos2(x, rect.bottom()), egui::pos2(x + rect.height(), rect.top())];
+        let ends = [egui::pos2(x, low), egui::pos2(x + rect.height(), high)];
         painter.line_segment(ends, Stroke::new(2.5, light));
         x += 7.0;
     }

@@ -3,6 +3,7 @@
 use egui::{Align2, Area, ComboBox, Id, Order, Rect, RichText, Ui, Vec2, vec2};
 use strum::VariantArray;
 
+use super::super::beside::Beside;
 use super::super::layout::Layout;
 use super::super::state::AppState;
 use super::super::{keys, theme};
@@ -53,18 +54,18 @@ impl Viewport {
         let beside = |p: &ViewPicture| p.second.as_ref().filter(|_| second).map(|other| other.depth_range);
         let depth = self.picture().and_then(|p| beside(p).unwrap_or(p.depth_range));
         if legend::is_needed(self.queries.settings(), depth) && rect.height() > LOW && !is_other {
-            let unknown = self.queries.maps().map(|m| m.unknown_share());
+            let shares = self.queries.maps().map(|m| [m.unknown_share(), m.invented_share()]);
             let has_photos = state.scene.as_ref().is_some_and(|s| s.dataset.is_some()) && state.is_trained();
             let segment = if self.photo.is_some() { "Segment this photo" } else { "Segment the nearest photo" };
             // Above the facts where there is no room beside them.
             let up = if rect.width() < NARROW_BESIDE_FACTS { -46.0 } else { 0.0 };
             card(ui, rect, legend, (Align2::RIGHT_BOTTOM, up), |ui| {
-                legend::show(ui, self.queries.settings(), depth, unknown, has_photos.then_some(segment), actions);
+                legend::show(ui, self.queries.settings(), depth, shares, has_photos.then_some(segment), actions);
             });
         }
         if second {
             if let Some(beside) = &state.beside {
-                card(ui, rect, "beside", (Align2::RIGHT_TOP, 0.0), |ui| self.beside_bar(ui, &beside.name, actions));
+                card(ui, rect, "beside", (Align2::RIGHT_TOP, 0.0), |ui| self.beside_bar(ui, beside, state, actions));
             }
             return;
         }
@@ -118,8 +119,24 @@ impl Viewport {
     }
 
     /// Which scene is seen in the second view, and how well.
-    fn beside_bar(&self, ui: &mut Ui, name: &str, actions: &mut Vec<Action>) {
-        ui.label(RichText::new(text::elided(name, 40)).strong()).on_hover_text(name);
+    fn beside_bar(&self, ui: &mut Ui, beside: &Beside, state: &AppState, actions: &mut Vec<Action>) {
+        let removed = state.removed.as_ref().filter(|r| r.folder == beside.path);
+        let name = removed.map_or_else(|| beside.name.clone(), |r| format!("without {}", r.name));
+        let place = format!("{name}\n{}", beside.path.display());
+        ui.label(RichText::new(text::elided(&name, 40)).strong()).on_hover_text(text::lines(&place));
+        if let Some(removed) = removed {
+            let open = ui.button("Open").on_hover_text("Go on with this scene. The other one stays where it is.");
+            if open.clicked() {
+                actions.push(Action::Open(removed.folder.clone()));
+            }
+            let mut halo = removed.request.options.halo;
+            let tip = "Unsure Gaussians within it are removed, too. Another choice makes another scene.";
+            let changed = ui.checkbox(&mut halo, "fringes").on_hover_text(tip).changed();
+            let again = Action::AnotherFill(halo);
+            if ui.button(again.text()).on_hover_text(again.tooltip()).clicked() || changed {
+                actions.push(again);
+            }
+        }
         if let Some(psnr) = self.picture().and_then(|p| p.second.as_ref()?.psnr) {
             ui.colored_label(theme::accent(), format!("preview {}", format::decibel(psnr)));
         }

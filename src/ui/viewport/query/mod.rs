@@ -23,7 +23,7 @@ use std::collections::BTreeMap;
 use egui::{Color32, Vec2, vec2};
 
 use self::embeddings::Embeddings;
-pub(crate) use self::overlay::HATCH;
+pub(crate) use self::overlay::{HATCH, INVENTED};
 pub(crate) use self::settings::OverlaySettings;
 use self::side::{Areas, QuerySide};
 use crate::jobs::phrases::colors::PhraseColors;

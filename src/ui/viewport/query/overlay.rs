@@ -22,6 +22,8 @@ const DIFFERENT: [u8; 3] = [255, 60, 160];
 /// The stripes of what is unknown, and their width in px.
 pub(crate) const HATCH: [[u8; 3]; 2] = [[205; 3], [70; 3]];
 const HATCH_PX: usize = 6;
+/// The stripes of what was invented.
+pub(crate) const INVENTED: [u8; 3] = [255, 236, 150];
 
 /// What is drawn over the view.
 pub(crate) struct Layers<'a> {
@@ -32,6 +34,8 @@ pub(crate) struct Layers<'a> {
     pub(crate) identities: &'a Identities,
     /// Where nothing is known, if that is drawn.
     pub(crate) unknown: Option<&'a Mask>,
+    /// Where the scene was invented, if that is drawn.
+    pub(crate) invented: Option<&'a Mask>,
     /// Masks of the answers, with their colors; later ones on top.
     pub(crate) masks: &'a [([u8; 3], Mask)],
     /// What stays bright while everything else is dimmed.
@@ -68,7 +72,7 @@ impl Layers<'_> {
                         ColorBy::Difference => {
                             codes.get(self.map.identity[i] as usize).and_then(|c| self.difference(i, c))
                         }
-                        _ => self.blended(i).or_else(own).or_else(|| self.hatch(i)),
+                        _ => self.striped(i).or_else(|| self.blended(i)).or_else(own).or_else(|| self.hatch(i)),
                     };
                     tint.map_or(Color32::TRANSPARENT, |c| with_alpha(c, self.settings.opacity))
                 }
@@ -107,6 +111,13 @@ impl Layers<'_> {
         self.unknown.filter(|m| m.contains(i))?;
         let across = (i % self.map.width_px + i / self.map.width_px) / HATCH_PX;
         Some(HATCH[across % 2])
+    }
+
+    /// Stripes over what was invented, across those of what is unknown; its own color is between them.
+    fn striped(&self, i: usize) -> Option<[u8; 3]> {
+        self.invented.filter(|m| m.contains(i))?;
+        let across = (self.map.width_px + i / self.map.width_px - i % self.map.width_px) / HATCH_PX;
+        across.is_multiple_of(2).then_some(INVENTED)
     }
 
     /// Color of what has this identity; `None` leaves the frame as it is.
@@ -186,6 +197,7 @@ mod tests {
             map: &map,
             codes: None,
             unknown: None,
+            invented: None,
             identities: &identities,
             masks: &masks,
             lit: None,
@@ -213,6 +225,7 @@ mod tests {
             map: &map,
             codes: None,
             unknown: None,
+            invented: None,
             identities: &identities,
             masks: &masks,
             lit: Some(&lit),
@@ -236,6 +249,7 @@ mod tests {
             map: &map,
             codes: None,
             unknown: Some(&unknown),
+            invented: None,
             identities: &identities,
             masks: &[],
             lit: None,
@@ -277,6 +291,7 @@ mod tests {
             map: &map,
             codes: Some(&codes),
             unknown: None,
+            invented: None,
             identities: &identities,
             masks: &[],
             lit: None,

@@ -1,0 +1,32 @@
+//! Removing things: the result is a scene of its own, seen beside this one, which stays as it is.
+
+use super::app::App;
+use super::state::Tone;
+use crate::jobs::remove::{Paint, RemovalOptions, RemoveRequest};
+use crate::scene::IdentityId;
+use crate::worker::Command;
+
+impl App {
+    /// Makes a scene without the identity.
+    pub(super) fn remove(&mut self, id: IdentityId) {
+        let options = RemovalOptions { ids: vec![id], halo: true, paint: Some(Paint::default()), seed: 0 };
+        self.submit_removal(options);
+    }
+
+    /// Makes another scene without what was removed last: closed otherwise, with its fringes (`halo`) or without.
+    pub(super) fn fill_anew(&mut self, halo: bool) {
+        let Some(last) = &self.state.removed else { return };
+        let RemovalOptions { seed, .. } = last.request.options;
+        self.submit_removal(RemovalOptions { halo, seed: seed + 1, ..last.request.options.clone() });
+    }
+
+    fn submit_removal(&mut self, options: RemovalOptions) {
+        if self.editing.is_some() || !self.edits.is_empty() {
+            return self.state.toast(Tone::Warning, "Objects are being changed; remove it once that is done.");
+        }
+        let Some(folder) = self.state.scene.as_ref().filter(|_| self.state.is_trained()).map(|s| s.out.clone()) else {
+            return self.state.toast(Tone::Warning, "Only from a trained scene can something be removed.");
+        };
+        self.submit(Command::Remove(Box::new(RemoveRequest { folder, options })));
+    }
+}
