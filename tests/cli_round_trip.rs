@@ -169,3 +169,70 @@ fn the_window_and_the_command_line_do_the_same() {
     let stored = jobs::open::scene(&out).unwrap().semantics().unwrap();
     assert_eq!((&stored.identity_of, &stored.seeds), (&found.identity_of, &found.seeds), "{}", told.stderr);
 }
+
+#[test]
+fn what_is_removed_is_gone_in_a_new_scene_and_the_old_one_stays() {
+    let folder = folder();
+    first_version(folder.path());
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (scene, out) = (at("scene"), at("less"));
+    let read = |path: &str| ["point_cloud.ply", "scene.json"].map(|f| std::fs::read(Path::new(path).join(f)).unwrap());
+    let before = read(&scene);
+
+    let done = fmlgs(&["remove", &scene, "box 1", "--out", &out, "--json"]).ok().json();
+    assert_eq!((&done["names"][0], &done["report"]["removed"]), (&"box 1".into(), &38.into()));
+    let info = fmlgs(&["info", &out, "--json"]).ok().json();
+    assert_eq!((&info["kind"], &info["gaussians"], &info["identities"]), (&"trained".into(), &158.into(), &2.into()));
+    assert!(fmlgs(&["query", &out, "box 1"]).fails_with(1).stderr.contains("box 1"));
+    fmlgs(&["query", &out, "box 2"]).ok();
+    assert_eq!(read(&scene), before, "the scene itself is touched");
+
+    // Again, onto itself and of what is not there: nothing is written over.
+    let written = read(&out);
+    assert!(
+        fmlgs(&["remove", &scene, "box 2", "--out", &out]).fails_with(1).stderr.contains("holds something already")
+    );
+    fmlgs(&["remove", &scene, "box 2", "--out", &scene]).fails_with(1);
+    fmlgs(&["remove", &scene, "giraffe", "--out", &at("none")]).fails_with(1);
+    assert_eq!((read(&scene), read(&out), Path::new(&at("none")).exists()), (before, written, false));
+
+    // The agent asks first, and chooses a folder itself.
+    let agent = fmlgs(&["agent", &scene, "remove box 2", "yes"]).ok().stdout;
+    assert!(agent.contains("(yes or no)") && agent.contains("scene-without-box-2"), "{agent}");
+    fmlgs(&["query", &at("scene-without-box-2"), "box 2"]).fails_with(1);
+}
+
+#[test]
+fn what_is_behind_a_thing_is_rendered_without_it_from_the_same_cameras() {
+    let folder = folder();
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let glb = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/eval/desk.glb");
+    let synth = |out: &str, more: &[&str]| {
+        let all = ["synth", glb, "--out", out, "--views", "6", "--held-out", "2", "--size", "48x36", "--points", "0"];
+        fmlgs(&[&all[..], more].concat())
+    };
+    synth(&at("with"), &[]).ok();
+    synth(&at("without"), &["--without", "green lamp"]).ok();
+    synth(&at("shadow"), &["--without", "green lamp", "--keep-shadows"]).ok();
+    assert!(synth(&at("x"), &["--without", "giraffe"]).fails_with(1).stderr.contains("'green lamp'"));
+    let pictures = |of: &str| {
+        let mut all: Vec<_> = std::fs::read_dir(at(of) + "/images").unwrap().map(|e| e.unwrap().path()).collect();
+        all.sort();
+        all
+    };
+    let (with, without, shadow) = (pictures("with"), pictures("without"), pictures("shadow"));
+    assert_eq!((with.len(), without.len(), shadow.len()), (6, 2, 2));
+    let open = |path: &Path| image::open(path).unwrap().to_rgb8().into_raw();
+    let mut darker = 0;
+    for (bare, shaded) in without.iter().zip(&shadow) {
+        let name = bare.file_name().unwrap();
+        let thing = with.iter().find(|p| p.file_name() == Some(name)).unwrap();
+        let [thing, bare, shaded] = [thing, bare, shaded].map(|p| open(p));
+        assert_ne!(thing, bare);
+        darker += bare.iter().zip(&shaded).filter(|(a, b)| a > b).count();
+        // Most of the picture is the same: the cameras are.
+        let same = thing.iter().zip(&shaded).filter(|(a, b)| a == b).count();
+        assert!(same * 2 > thing.len(), "{same} of {}", thing.len());
+    }
+    assert!(darker > 0, "no shadow");
+}

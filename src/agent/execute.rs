@@ -184,7 +184,7 @@ fn question(world: &dyn World, call: &ToolCall, policy: &Policy, id: Option<Iden
         }
         (Permission::ConfirmOverwrite | Permission::Free | Permission::Never, _) => None,
         (Permission::Confirm, ToolCall::Remove { .. }) => {
-            Some(format!("I can only hide {it}: it stays in the scene's files. Continue? (yes or no)"))
+            Some(format!("Remove {it}, into a scene of its own beside this one, which stays as it is? (yes or no)"))
         }
         (Permission::Confirm, ToolCall::Rename { name, .. }) => Some(format!("Rename {it} to '{name}'? (yes or no)")),
         (Permission::Confirm, ToolCall::AskUser { .. }) => None,
@@ -311,7 +311,7 @@ fn act(
         }
         ToolCall::Remove { .. } => {
             world.remove(id).map_err(failed)?;
-            format!("{} is hidden; it stays in the scene's files. 'undo' brings it back.", capital(&it))
+            format!("{} is removed in a scene of its own beside this one, which stays as it is.", capital(&it))
         }
         ToolCall::Rename { name, .. } => {
             world.rename(id, name).map_err(failed)?;

@@ -335,8 +335,11 @@ impl World for SceneWorld {
     }
 
     fn remove(&mut self, id: IdentityId) -> Result<(), WorldError> {
-        // Files stay as they are: what is left out of the picture is left out of exports too.
-        self.set_hidden(id, true)
+        if self.parts.folder.is_none() {
+            return Err(WorldError("only from a trained scene can something be removed; hide it instead".into()));
+        }
+        (self.emit)(Effect::Remove(id));
+        Ok(())
     }
 
     fn rename(&mut self, id: IdentityId, name: &str) -> Result<(), WorldError> {

@@ -34,6 +34,7 @@ fn renamed() -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
         up: DVec3::Z,
         meters: None,
         exports: PathBuf::new(),
+        folder: None,
         recipe: Default::default(),
         explored: None,
     };

@@ -23,6 +23,8 @@ pub struct Parts {
     /// Length of a unit in meters, if that is known.
     pub meters: Option<f64>,
     pub exports: PathBuf,
+    /// Folder of the trained scene, if it is one.
+    pub folder: Option<PathBuf>,
     /// How questions are answered.
     pub recipe: Recipe,
     /// What is known of moving about, if the scene was looked at before.

@@ -107,8 +107,7 @@ pub trait World {
     /// Draws everything again.
     fn show_all(&mut self) -> Result<(), WorldError>;
 
-    /// Leaves an identity out for the user who wants it gone, so that [`Self::undo`] can bring it back. What is
-    /// said of it is that it is hidden: files keep it.
+    /// Makes a scene of its own without an identity, what it hid closed; this one stays as it is.
     fn remove(&mut self, id: IdentityId) -> Result<(), WorldError>;
 
     /// Gives an identity another first name.

@@ -13,8 +13,11 @@ use crate::agent::llm::settings::{LlmSettings, RequestPatience};
 use crate::agent::llm::{Llm, SENT, discover};
 use crate::agent::scene::{Effect, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Session};
+use crate::jobs::remove::{self, Paint, RemovalOptions, RemoveRequest};
 use crate::jobs::{export, open, render};
 use crate::navigate::Pose;
+use crate::pipeline::observer::Silent;
+use crate::scene::IdentityId;
 
 const EXAMPLES: &str = "Examples:\n  \
     fmlgs agent scene/ \"show me the handle of the kettle from the other side\" \"step back half a meter\"\n  \
@@ -159,15 +162,20 @@ pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
         map: Arc::new(map),
         meters: args.meters.or(scene.metres_per_unit),
         exports: folder.join("exports"),
+        folder: scene.folder.clone(),
         recipe: args.recipe.recipe(),
         explored: None,
     };
     let effects: Arc<Mutex<Vec<String>>> = Arc::default();
     let emit = {
         let effects = Arc::clone(&effects);
+        let folder = scene.folder;
         Box::new(move |effect: Effect| {
             let mut effects = effects.lock().unwrap_or_else(PoisonError::into_inner);
-            effects.extend(line(&effect));
+            effects.extend(match &effect {
+                Effect::Remove(id) => folder.as_ref().map(|folder| removed(folder, *id)),
+                other => line(other),
+            });
         })
     };
     let (cloud, settings) = (Arc::clone(&parts.cloud), parts.settings.clone());
@@ -291,6 +299,15 @@ impl Talk {
     }
 }
 
+/// Makes the scene in `folder` anew without an identity, and says where.
+fn removed(folder: &Path, id: IdentityId) -> String {
+    let options = RemovalOptions { ids: vec![id], halo: true, paint: Some(Paint::default()), seed: 0 };
+    match remove::beside(&RemoveRequest { folder: folder.into(), options }, &mut Silent) {
+        Ok(done) => format!("{}: {}", done.folder.display(), remove::told(&done.name, &done.report)),
+        Err(e) => format!("failed: {e}"),
+    }
+}
+
 /// An effect for display; `None` where there is nothing to say.
 fn line(effect: &Effect) -> Option<String> {
     match effect {
@@ -302,7 +319,7 @@ fn line(effect: &Effect) -> Option<String> {
         Effect::Undo => None,
         Effect::Hidden(ids) | Effect::HiddenUndone(ids) => Some(format!("hides {} of them", ids.len())),
         Effect::Renamed(id, name) | Effect::RenameUndone(id, name) => Some(format!("calls #{id} {name}")),
-        Effect::Explored(_) => None,
+        Effect::Explored(_) | Effect::Remove(_) => None,
     }
 }
 

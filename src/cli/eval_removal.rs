@@ -24,8 +24,21 @@ pub(crate) fn run(
         return output::print_json(&json!({ "scene": scene.path, "rows": rows }));
     }
     let head = [
-        "without", "fill", "uncovered px", "dB", "SSIM", "depth %", "invented px", "dB", "SSIM", "depth %",
-        "outside dB", "change", "Gaussians", "s", "found again",
+        "without",
+        "fill",
+        "uncovered px",
+        "dB",
+        "SSIM",
+        "depth %",
+        "invented px",
+        "dB",
+        "SSIM",
+        "depth %",
+        "outside dB",
+        "change",
+        "Gaussians",
+        "s",
+        "found again",
     ];
     let mut table = vec![head.map(str::to_owned).to_vec()];
     table.extend(rows.iter().map(row));
@@ -35,7 +48,12 @@ pub(crate) fn run(
 fn row(r: &RemovalRow) -> Vec<String> {
     let region = |score: &Option<RegionScore>| match score {
         None => [NONE; 4].map(str::to_owned),
-        Some(s) => [s.pixels.to_string(), format!("{:.2}", s.psnr), format!("{:.4}", s.ssim), format!("{:.2}", 100.0 * s.depth)],
+        Some(s) => [
+            s.pixels.to_string(),
+            format!("{:.2}", s.psnr),
+            format!("{:.4}", s.ssim),
+            format!("{:.2}", 100.0 * s.depth),
+        ],
     };
     let [before, after] = &r.outside;
     let outside = before.as_ref().zip(after.as_ref()).map(|(b, a)| (a.psnr, a.psnr - b.psnr));

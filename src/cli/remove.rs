@@ -70,12 +70,13 @@ pub(crate) fn run(args: RemoveArgs, quiet: bool) -> Result<(), CliError> {
     let options = RemovalOptions { ids, halo: !args.tight, paint, seed: args.seed };
     let done = remove::run(&scene, &map, &options, &mut Console::new(quiet))
         .map_err(|e| CliError::of_work(e, "nothing was written"))?;
-    remove::store(&scene, &done, &args.out)?;
+    let name = names.join(", ");
+    remove::store(&scene, &name, &done, &args.out)?;
     if args.json {
         return output::print_json(&json!({
             "scene": args.out, "names": names, "gaussians": done.cloud.len(), "report": done.report,
         }));
     }
-    let told = remove::told(&names.join(", "), &done.report);
+    let told = remove::told(&name, &done.report);
     output::print(&format!("{told}\n{}: {}", args.out.display(), format::things(done.cloud.len(), "Gaussian")))
 }

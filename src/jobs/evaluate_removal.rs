@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::evaluate::PhotoComparison;
-use super::remove::{self, Paint, RemovalOptions, Reduced};
+use super::remove::{self, Paint, Reduced, RemovalOptions};
 use super::{JobError, Scene, export, query};
 use crate::io::files;
 use crate::pipeline::depth::{self, TrueDepth};

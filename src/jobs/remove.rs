@@ -69,7 +69,7 @@ pub(crate) fn beside(request: &RemoveRequest, observer: &mut dyn Observer) -> Re
     let done = run(&scene, &map, &request.options, observer)?;
     let name = names.join(", ");
     let folder = free_folder(&request.folder, &name);
-    store(&scene, &done, &folder)?;
+    store(&scene, &name, &done, &folder)?;
     Ok(RemovedScene { folder, name, request: request.clone(), report: done.report })
 }
 
@@ -92,7 +92,8 @@ pub(crate) fn told(name: &str, report: &RemovalReport) -> String {
     match report.surfaces.iter().map(|s| s.roughness).reduce(f64::max) {
         None => text += ", nothing had to be invented",
         Some(rough) => {
-            text += &format!(", {} invented on {}", report.invented(), format::things(report.surfaces.len(), "surface"));
+            text +=
+                &format!(", {} invented on {}", report.invented(), format::things(report.surfaces.len(), "surface"));
             if rough > ROUGH {
                 text += " (a guess: what is seen around is not flat)";
             }
@@ -117,12 +118,15 @@ pub(crate) fn check(out: &Path) -> Result<(), JobError> {
     Ok(())
 }
 
-/// Stores the result as a scene in the folder `out`, beside which that in `from` stays as it is.
-pub(crate) fn store(from: &Scene, reduced: &Reduced, out: &Path) -> Result<(), JobError> {
+/// Stores the result, which is without `name`, as a scene in the folder `out`, beside which that in `from` stays as it is.
+pub(crate) fn store(from: &Scene, name: &str, reduced: &Reduced, out: &Path) -> Result<(), JobError> {
     let Some(folder) = &from.folder else { return Err(JobError::NoScene(from.path.clone())) };
     check(out)?;
     let held = SceneFolder::hold(out, "storing a scene")?;
     let mut info = trained::load_info(folder)?;
+    info.name = format!("{} without {name}", info.name);
+    // What was measured was measured with it.
+    info.history.evaluations.clear();
     if let (Some(dataset), Some(path)) = (&mut info.dataset, &from.dataset_path) {
         *dataset = dataset.moved(path, out);
     }

@@ -30,7 +30,7 @@ use crate::math::grid;
 use crate::math::sh::SH_C0;
 use crate::pipeline::observer::{Interrupted, Observer, Ticker};
 use crate::render::{RenderError, RenderSettings};
-use crate::scene::{Camera, ExtraProperty, GaussianCloud, IdentityId, SemanticMap};
+use crate::scene::{Camera, ExtraProperty, GaussianCloud, IdentityId, NOBODY, SemanticMap};
 
 /// The extra property of Gaussians that were invented: 1, else 0.
 pub(crate) const INVENTED: &str = "fmlgs_invented";
@@ -138,8 +138,9 @@ pub(crate) fn remove(
         return Err(RemovalError::Nothing(name()));
     }
     let ball = select::Ball::of(cloud, &thing);
+    let extent = select::Extent::of(cloud, &thing);
     let mut gone = thing;
-    let fringes = if options.halo { select::add_fringes(cloud, map, &mut gone) } else { 0 };
+    let fringes = if options.halo { select::add_fringes(cloud, map, (&ball, &extent), &mut gone) } else { 0 };
     clock.stop("select");
     let mut report = RemovalReport { removed, fringes, unseen: 0, surfaces: Vec::new(), secs: Vec::new() };
     let mut new = Vec::new();
@@ -148,14 +149,27 @@ pub(crate) fn remove(
         if cameras.is_empty() && options.paint.is_some() {
             return Err(RemovalError::Unseen(name()));
         }
-        report.unseen = select::add_unseen(cloud, &mut gone, &cameras, settings, observer)?;
+        let mut unseen = select::unseen(cloud, &gone, None, &cameras, settings, observer)?;
+        // What is inside it would be taken for what is behind it.
+        let inside: Vec<usize> = unseen.extract_if(.., |i| extent.contains(cloud.world_position(*i))).collect();
+        inside.iter().for_each(|i| gone[*i] = true);
+        report.unseen = inside.len();
         clock.stop("unseen");
         if let Some(paint) = options.paint {
             let seen = views::look(cloud, &gone, &cameras, settings, observer)?;
             clock.stop("look");
-            let work = Closing { cloud, map, ball, seen: &seen, paint, seed: options.seed };
+            let work = Closing { cloud, map, ball, extent: &extent, seen: &seen, paint, seed: options.seed };
             new = work.run(&mut gone, &mut report, observer)?;
             clock.stop("close");
+        }
+        if !unseen.is_empty() {
+            // Closed surfaces may hide the rest of it as well.
+            let kept: Vec<usize> = (0..cloud.len()).filter(|&i| !gone[i]).collect();
+            let now = with_new(cloud, &kept, &new);
+            unseen = select::unseen(cloud, &gone, Some(&now), &cameras, settings, observer)?;
+            unseen.iter().for_each(|i| gone[*i] = true);
+            report.unseen += unseen.len();
+            clock.stop("unseen again");
         }
     }
     let kept: Vec<usize> = (0..cloud.len()).filter(|&i| !gone[i]).collect();
@@ -205,6 +219,7 @@ struct Closing<'a> {
     cloud: &'a GaussianCloud,
     map: &'a SemanticMap,
     ball: select::Ball,
+    extent: &'a select::Extent,
     seen: &'a [SeenView],
     paint: Paint,
     seed: u64,
@@ -235,9 +250,8 @@ impl Closing<'_> {
                 roughness: plane.residual / area.sqrt(),
             });
             let owners = self.owners(&sheet, plane, gone);
-            // What little lies there is seen by nobody, and would shine through.
-            for i in (0..self.cloud.len()).filter(|i| !gone[*i]).collect::<Vec<_>>() {
-                gone[i] = self.lies_on(plane, i) && sheet.is_deep(sheet.texel(self.cloud.world_position(i)));
+            for i in 0..self.cloud.len() {
+                gone[i] = gone[i] || self.is_left_over(i, plane, &sheet, &owners);
             }
             let rotation = DQuat::from_mat3(&DMat3::from_cols(plane.u, plane.v, plane.normal));
             new.extend(sheet.hole().map(|i| Invented {
@@ -255,6 +269,23 @@ impl Closing<'_> {
     fn lies_on(&self, plane: &Plane, i: usize) -> bool {
         let thickness = self.cloud.log_scales[i].iter().fold(f32::INFINITY, |a, b| a.min(*b)).exp();
         plane.height(self.cloud.world_position(i)).abs() <= plane.tolerance + f64::from(thickness)
+    }
+
+    /// Whether a Gaussian is of the thing for where it is: on the hidden part of the surface, where nobody has seen it and
+    /// it would shine through, or between that and the thing's own surface, unless it is known to be of another object
+    /// than the surface, such as an apple in a bowl.
+    fn is_left_over(&self, i: usize, plane: &Plane, sheet: &Sheet<'_>, owners: &[IdentityId]) -> bool {
+        let at = self.cloud.world_position(i);
+        let Some(texel) = sheet.texel(at).filter(|t| sheet.state[*t] == Texel::Hidden) else { return false };
+        if self.lies_on(plane, i) {
+            let largest = self.cloud.log_scales[i].iter().fold(f32::NEG_INFINITY, |a, b| a.max(*b)).exp();
+            // A large one at the border closes what is beside it.
+            return sheet.is_deep(texel) || f64::from(largest) < sheet.step;
+        }
+        let object = |id: IdentityId| self.map.identities.object_of(id);
+        let of = object(self.map.identity_of[i]);
+        let above = plane.height(at) > 0.0 && self.extent.contains(at);
+        above && (of == NOBODY || of == object(owners[texel]))
     }
 
     /// Whose each texel is: of the nearest Gaussian that lies on the surface.

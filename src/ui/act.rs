@@ -300,6 +300,7 @@ impl App {
                 up,
                 meters: scene.meters_per_unit(),
                 exports: scene.out.join("exports"),
+                folder: self.state.is_trained().then(|| scene.out.clone()),
                 recipe: self.viewport.queries.recipe().clone(),
                 explored,
             },
@@ -328,6 +329,7 @@ impl App {
                 }
             }
             Effect::Hidden(ids) => self.viewport.visibility.set_hidden(ids),
+            Effect::Remove(id) => self.remove(id),
             Effect::Undo => self.edit(EditStep::Undo),
             Effect::HiddenUndone(ids) => self.edit(EditStep::UndoHidden(ids)),
             Effect::Renamed(id, name) => self.edit(EditStep::Request(EditRequest::Apply(Edit::Rename(id, name)))),

@@ -204,7 +204,7 @@ actions! {
     Hide(id: IdentityId): format!("Hide or show #{id}"), "Hide it in the view, or show it again.";
     ExportTarget(id: IdentityId): format!("Export #{id} as .ply\u{2026}"),
         "Write its Gaussians in the format that 3DGS viewers read.";
-    Remove(id: IdentityId): format!("Remove #{id} and fill\u{2026}"),
+    Remove(id: IdentityId): format!("Remove #{id} and fill"),
         "Take it out, into a scene of its own that is shown beside this one: what it hid is closed from what is around.";
     AnotherFill(halo: bool): "Another fill",
         "Remove it again, with another choice of what hides below it; the scene made before stays.";

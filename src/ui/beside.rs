@@ -12,7 +12,7 @@ use crate::worker::Versioned;
 pub struct Beside {
     pub name: String,
     /// Where it lies.
-    pub(crate) path: PathBuf,
+    pub path: PathBuf,
     pub(crate) cloud: Versioned<GaussianCloud>,
     /// How it is drawn: as it was trained.
     pub(crate) settings: RenderSettings,

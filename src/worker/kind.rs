@@ -65,7 +65,10 @@ impl JobKind {
 
     /// Whether it waits where it is asked to.
     pub(crate) fn can_pause(self) -> bool {
-        matches!(self, Self::Train | Self::Objects | Self::Remove | Self::Model | Self::Video | Self::Phrases | Self::ExportAll)
+        matches!(
+            self,
+            Self::Train | Self::Objects | Self::Remove | Self::Model | Self::Video | Self::Phrases | Self::ExportAll
+        )
     }
 
     /// Which thread runs it.

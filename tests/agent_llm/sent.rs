@@ -41,6 +41,7 @@ fn kettle(exports: &Path) -> SceneWorld {
         up: DVec3::NEG_Y,
         meters: Some(1.0),
         exports: exports.into(),
+        folder: None,
         recipe: Default::default(),
         explored: None,
     };

@@ -130,7 +130,10 @@ impl Picture {
         let four = |i: usize| {
             let (x, y) = (2 * (i % size[0]), 2 * (i / size[0]));
             let inside = move |(x, y): &(usize, usize)| *x < self.size[0] && *y < self.size[1];
-            [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)].into_iter().filter(inside).map(|(x, y)| y * self.size[0] + x)
+            [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)]
+                .into_iter()
+                .filter(inside)
+                .map(|(x, y)| y * self.size[0] + x)
         };
         let n = size[0] * size[1];
         let mean = |i: usize| {
@@ -156,9 +159,8 @@ impl Picture {
     fn patch(&self, i: usize) -> Option<impl Iterator<Item = usize> + '_> {
         let (x, y) = (i % self.size[0], i / self.size[0]);
         let inside = |at: usize, end: usize| at >= HALF && at + HALF < end;
-        (inside(x, self.size[0]) && inside(y, self.size[1])).then(|| {
-            (y - HALF..=y + HALF).flat_map(move |y| (x - HALF..=x + HALF).map(move |x| y * self.size[0] + x))
-        })
+        (inside(x, self.size[0]) && inside(y, self.size[1]))
+            .then(|| (y - HALF..=y + HALF).flat_map(move |y| (x - HALF..=x + HALF).map(move |x| y * self.size[0] + x)))
     }
 
     /// Mean squared difference of two patches, over what is known or painted; given up above `limit`.
@@ -275,8 +277,7 @@ mod tests {
         let hole: Vec<bool> =
             (0..truth.len()).map(|i| (32..48).contains(&(i % SIZE[0])) && (24..40).contains(&(i / SIZE[0]))).collect();
         let known: Vec<bool> = hole.iter().map(|h| !h).collect();
-        let mut painted: Vec<[f32; 3]> =
-            truth.iter().zip(&hole).map(|(c, h)| if *h { [9.0; 3] } else { *c }).collect();
+        let mut painted: Vec<[f32; 3]> = truth.iter().zip(&hole).map(|(c, h)| if *h { [9.0; 3] } else { *c }).collect();
         fill(&mut painted, SIZE, &known, &hole, how, 1);
         let inside = || (0..truth.len()).filter(|i| hole[*i]);
         assert!((0..truth.len()).all(|i| hole[i] || painted[i] == truth[i]), "what is known is touched");

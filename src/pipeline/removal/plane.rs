@@ -119,7 +119,10 @@ mod tests {
         assert!(wall.normal.dot(DVec3::Z) > 0.9999 && wall.height(DVec3::new(0.0, 1.0, -1.5)).abs() < 0.003);
         assert!(floor.residual < 0.01, "{}", floor.residual);
         assert!((floor.u.cross(floor.v) - floor.normal).length() < 1e-9);
-        assert!(found.get(2).is_none_or(|p| p.residual > 2.0 * floor.residual), "a plane through stray points is as good");
+        assert!(
+            found.get(2).is_none_or(|p| p.residual > 2.0 * floor.residual),
+            "a plane through stray points is as good"
+        );
     }
 
     #[test]

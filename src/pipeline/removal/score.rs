@@ -8,8 +8,10 @@ use crate::pipeline::depth::TrueDepth;
 use crate::render::{Frame, ssim};
 use crate::scene::Camera;
 
-/// Depths that differ by less than this share are those of one surface.
-const SAME_DEPTH: f32 = 0.01;
+/// Depths along one ray that differ by more than this share are those of two surfaces: rays are cast exactly.
+const SAME_RAY: f32 = 1e-4;
+/// The same along two rays that meet a surface within a pixel of each other.
+const SAME_DEPTH: f32 = 0.005;
 
 /// A pixel of a view from which a thing was removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,10 +34,10 @@ pub(crate) fn regions(
     photos: &[(Camera, TrueDepth)],
 ) -> Vec<Region> {
     const RIM_PX: usize = 2;
-    let differ = |a: f32, b: f32| (a - b).abs() > SAME_DEPTH * a.max(b);
+    let differ = |a: f32, b: f32, share: f32| (a - b).abs() > share * a.max(b);
     let one = |i: usize| {
         let (before, behind) = (with.values[i], without.values[i]);
-        if !differ(before, behind) {
+        if !differ(before, behind, SAME_RAY) {
             return Region::Outside;
         }
         let at = glam::DVec2::new((i % with.width) as f64 + 0.5, (i / with.width) as f64 + 0.5);
@@ -46,7 +48,7 @@ pub(crate) fn regions(
             let inside = p.x >= 0.0 && p.y >= 0.0 && p.x < depth.width as f64 && p.y < depth.height as f64;
             inside && {
                 let there = depth.values[p.y as usize * depth.width + p.x as usize];
-                !differ(there, photo.camera_from_world(point).z as f32)
+                !differ(there, photo.camera_from_world(point).z as f32, SAME_DEPTH)
             }
         };
         if behind == 0.0 || photos.iter().any(shows) { Region::Uncovered } else { Region::Invented }

@@ -1,5 +1,7 @@
 //! Which Gaussians go: those of the thing, its fringes, and what nobody ever saw and would be in sight then.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 
 use crate::math::lanes::Lane;
@@ -45,6 +47,8 @@ impl Ball {
     }
 }
 
+/// How much farther a thing may reach than what is known of it, as a share.
+const MORE: f64 = 0.15;
 /// Directions along which the extent of a thing is measured: the axes, and the diagonals of faces and of the box.
 const DIRECTIONS: [[f64; 3]; 13] = [
     [1.0, 0.0, 0.0],
@@ -62,43 +66,70 @@ const DIRECTIONS: [[f64; 3]; 13] = [
     [1.0, -1.0, -1.0],
 ];
 
-/// Adds what lies within the thing and is nobody's for sure, or nobody's at all; how many those are. Within is what lies
-/// between the thing's ends along all of [`DIRECTIONS`], outliers by their quartiles left out.
-pub(super) fn add_fringes(cloud: &GaussianCloud, map: &SemanticMap, gone: &mut [bool]) -> usize {
-    let extents = DIRECTIONS.map(|d| {
-        let along = DVec3::from(d);
-        let mut at: Vec<f64> =
-            (0..cloud.len()).filter(|i| gone[*i]).map(|i| cloud.world_position(i).dot(along)).collect();
-        at.sort_by(f64::total_cmp);
-        let (low, high) = (quantile(&at, 0.25), quantile(&at, 0.75));
-        let reach = high - low;
-        let within = |v: &&f64| **v >= low - reach && **v <= high + reach;
-        let first = at.iter().find(within).copied().unwrap_or(low);
-        let last = at.iter().rfind(within).copied().unwrap_or(high);
-        (along, first, last)
-    });
-    let is_within = |p: DVec3| extents.iter().all(|(along, first, last)| (*first..=*last).contains(&p.dot(*along)));
+/// The space that a thing takes: between its ends along all of [`DIRECTIONS`], outliers by their quartiles left out, and
+/// a little more.
+pub(super) struct Extent([(DVec3, f64, f64); 13]);
+
+impl Extent {
+    pub(super) fn of(cloud: &GaussianCloud, inside: &[bool]) -> Self {
+        Self(DIRECTIONS.map(|d| {
+            let along = DVec3::from(d);
+            let mut at: Vec<f64> =
+                (0..cloud.len()).filter(|i| inside[*i]).map(|i| cloud.world_position(i).dot(along)).collect();
+            at.sort_by(f64::total_cmp);
+            let (low, high) = (quantile(&at, 0.25), quantile(&at, 0.75));
+            let reach = high - low;
+            let within = |v: &&f64| **v >= low - reach && **v <= high + reach;
+            let first = at.iter().find(within).copied().unwrap_or(low);
+            let last = at.iter().rfind(within).copied().unwrap_or(high);
+            let more = MORE * (last - first);
+            (along, first - more, last + more)
+        }))
+    }
+
+    pub(super) fn contains(&self, p: DVec3) -> bool {
+        self.0.iter().all(|(along, first, last)| (*first..=*last).contains(&p.dot(*along)))
+    }
+}
+
+/// Adds what lies within the thing and is nobody's for sure or nobody's at all, and what is near and said to be of an
+/// object that is elsewhere; how many those are.
+pub(super) fn add_fringes(
+    cloud: &GaussianCloud,
+    map: &SemanticMap,
+    (ball, extent): (&Ball, &Extent),
+    gone: &mut [bool],
+) -> usize {
     let unsure = |i: usize| map.margin[i] < UNSURE && (map.identity_of[i] == NOBODY || map.margin[i] < 0.5 * UNSURE);
-    let found: Vec<usize> =
-        (0..cloud.len()).filter(|&i| !gone[i] && unsure(i) && is_within(cloud.world_position(i))).collect();
+    let near = |i: &usize| !gone[*i] && cloud.world_position(*i).distance(ball.center) < (1.0 + MORE) * ball.radius;
+    let near: Vec<usize> = (0..cloud.len()).filter(near).collect();
+    let mut own: HashMap<IdentityId, Extent> = HashMap::new();
+    let mut astray = |i: usize| {
+        let object = map.identities.object_of(map.identity_of[i]);
+        let of = || Extent::of(cloud, &members(map, &[object]));
+        object != NOBODY && !own.entry(object).or_insert_with(of).contains(cloud.world_position(i))
+    };
+    let within = |i: usize| extent.contains(cloud.world_position(i));
+    let found: Vec<usize> = near.into_iter().filter(|&i| unsure(i) && within(i) || astray(i)).collect();
     found.iter().for_each(|i| gone[*i] = true);
     found.len()
 }
 
-/// Adds Gaussians that no photo has seen and that are in sight where the thing was once it is gone: nothing says what
-/// they should look like. How many those are.
-pub(super) fn add_unseen(
+/// Gaussians that no photo has seen and that are in sight where the thing was once it is `gone` and the `new` ones are
+/// there: nothing says what they should look like.
+pub(super) fn unseen(
     cloud: &GaussianCloud,
-    gone: &mut [bool],
+    gone: &[bool],
+    new: Option<&GaussianCloud>,
     cameras: &[Camera],
     settings: &RenderSettings,
     observer: &mut dyn Observer,
-) -> Result<usize, RemovalError> {
+) -> Result<Vec<usize>, RemovalError> {
     let kept: Vec<usize> = (0..cloud.len()).filter(|&i| !gone[i]).collect();
-    let rest = cloud.select(&kept);
+    let rest = new.cloned().unwrap_or_else(|| cloud.select(&kept));
     let mut renderer = Renderer::new();
     let mut ticker = Ticker::new("Looking for what no photo has seen", cameras.len());
-    let (mut before, mut after) = (vec![0.0_f32; cloud.len()], vec![0.0_f32; kept.len()]);
+    let (mut before, mut after) = (vec![0.0_f32; cloud.len()], vec![0.0_f32; rest.len()]);
     for (k, camera) in cameras.iter().enumerate() {
         ticker.tick(k, observer)?;
         let camera = camera.limited_to(SIDE_PX);
@@ -113,9 +144,7 @@ pub(super) fn add_unseen(
         rows.iter().for_each(|row| row.largest_into(&mut after));
     }
     let unseen = |(i, weight): &(usize, f32)| before[*i] < SEEN && *weight >= SEEN;
-    let found: Vec<usize> = kept.into_iter().zip(after).filter(unseen).map(|f| f.0).collect();
-    found.iter().for_each(|i| gone[*i] = true);
-    Ok(found.len())
+    Ok(kept.into_iter().zip(after).filter(unseen).map(|f| f.0).collect())
 }
 
 /// Where weights are counted.
@@ -160,7 +189,8 @@ impl ContributionSink<f32> for Row<'_> {
             }
             Look::Behind { thing, width } => {
                 let from = y % TILE_PX * width + x;
-                for (share, weight) in thing[from.min(thing.len())..].iter().zip(weights).take(width.saturating_sub(x)) {
+                for (share, weight) in thing[from.min(thing.len())..].iter().zip(weights).take(width.saturating_sub(x))
+                {
                     largest = if *share >= TOUCHED { largest.max(*weight) } else { largest };
                 }
             }

@@ -62,7 +62,9 @@ impl<'a> Sheet<'a> {
         let step = side / FIRST as f64;
         let first = Self::looked_at(plane, middle.map(|m| m - 0.5 * side), step, [FIRST; 2], seen);
         let mut hidden: Vec<[usize; 2]> = Vec::new();
-        (0..first.state.len()).filter(|i| first.state[*i] == Texel::Hidden).for_each(|i| hidden.push([i % FIRST, i / FIRST]));
+        (0..first.state.len())
+            .filter(|i| first.state[*i] == Texel::Hidden)
+            .for_each(|i| hidden.push([i % FIRST, i / FIRST]));
         let ends = |axis: usize| {
             let all = hidden.iter().map(|t| t[axis]);
             Some((all.clone().min()?, all.max()? + 1))
@@ -98,8 +100,7 @@ impl<'a> Sheet<'a> {
             _ => None,
         });
         let surface = grid::spread(width, n, known, |_| true);
-        let (label, areas) =
-            grid::regions(width, n, |i| self.state[i] == Texel::Hidden && surface[i] == Some(true));
+        let (label, areas) = grid::regions(width, n, |i| self.state[i] == Texel::Hidden && surface[i] == Some(true));
         let largest = areas.iter().copied().max().unwrap_or(0);
         let least = ((SPECK.1 * largest as f64) as usize).max(SPECK.0);
         // Texels of surface and of empty space at the border of each.
@@ -135,8 +136,8 @@ impl<'a> Sheet<'a> {
     }
 
     /// Whether a texel and all around it are hidden.
-    pub(super) fn is_deep(&self, texel: Option<usize>) -> bool {
-        texel.is_some_and(|t| self.deep[t])
+    pub(super) fn is_deep(&self, texel: usize) -> bool {
+        self.deep[texel]
     }
 
     /// The texels that become Gaussians: what is hidden, and a seam around it.

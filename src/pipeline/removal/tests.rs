@@ -13,7 +13,8 @@ const BOX: IdentityId = 2;
 fn scene(is_bare: bool) -> (GaussianCloud, SemanticMap, Vec<Camera>) {
     let spacing = 0.04;
     let (mut places, mut colors, mut of) = (Vec::new(), Vec::new(), Vec::new());
-    let steps = |from: f64, to: f64| (0..((to - from) / spacing) as usize).map(move |k| from + (k as f64 + 0.5) * spacing);
+    let steps =
+        |from: f64, to: f64| (0..((to - from) / spacing) as usize).map(move |k| from + (k as f64 + 0.5) * spacing);
     for (x, z) in steps(-2.0, 2.0).flat_map(|x| steps(-2.0, 2.0).map(move |z| (x, z))) {
         if is_bare || x.abs() > 0.4 || z.abs() > 0.4 {
             places.push([x, 0.0, z]);
@@ -54,7 +55,8 @@ fn options(paint: Option<Paint>) -> RemovalOptions {
 
 fn removed(paint: Option<Paint>) -> (SemanticMap, Removed) {
     let (cloud, map, photos) = scene(false);
-    let done = remove(&cloud, &map, &photos, &RenderSettings::default(), &options(paint), &mut Silent).expect("removed");
+    let done =
+        remove(&cloud, &map, &photos, &RenderSettings::default(), &options(paint), &mut Silent).expect("removed");
     (map, done)
 }
 

@@ -36,7 +36,8 @@ impl SeenView {
     pub(super) fn pixel(&self, point: DVec3) -> Option<usize> {
         let DVec2 { x, y } = self.camera.project(point)?;
         let (w, h) = (f64::from(self.camera.width_px), f64::from(self.camera.height_px));
-        ((0.0..w).contains(&x) && (0.0..h).contains(&y)).then(|| y as usize * self.camera.width_px as usize + x as usize)
+        ((0.0..w).contains(&x) && (0.0..h).contains(&y))
+            .then(|| y as usize * self.camera.width_px as usize + x as usize)
     }
 
     /// The point at this depth behind a pixel.

@@ -45,10 +45,16 @@ impl Scorer for ByName<'_> {
     }
 }
 
-/// Whether names say that none of `ids` is meant: another color, or nothing in common but a color.
+/// Whether names say that none of `ids` is meant: another color or number, or nothing in common but a color.
 fn is_another(identities: &Identities, phrase: &str, ids: impl Iterator<Item = IdentityId>) -> bool {
     let (asked, kind) = (colors::said(phrase), colors::without(phrase));
+    let numbers = |text: &str| words(text).into_iter().filter(|w| w.bytes().all(|b| b.is_ascii_digit())).collect();
+    let asked_number: Vec<String> = numbers(phrase);
     let fits = |name: &String| {
+        let has_number: Vec<String> = numbers(name);
+        if !asked_number.is_empty() && !has_number.is_empty() && !asked_number.iter().any(|n| has_number.contains(n)) {
+            return false;
+        }
         let has = colors::said(name);
         let same = asked.is_empty() || has.is_empty() || asked.iter().any(|c| has.contains(c));
         same && (asked.is_empty() || words(name).iter().any(|w| kind.contains(w)))
@@ -130,6 +136,18 @@ mod tests {
         all.add(Level::Part, red, vec!["button a".into()]);
         all.add(Level::Object, NOBODY, vec![]);
         all
+    }
+
+    #[test]
+    fn another_number_is_another_thing() {
+        let mut all = Identities::default();
+        let ids: Vec<IdentityId> =
+            ["box 0", "box 2", "lamp"].map(|n| all.add(Level::Object, NOBODY, vec![n.into()])).into();
+        let another =
+            |phrase: &str| ids.iter().map(|id| is_another(&all, phrase, [*id].into_iter())).collect::<Vec<_>>();
+        assert_eq!(another("box 1"), [true, true, false]);
+        assert_eq!(another("box 2"), [true, false, false]);
+        assert_eq!(another("box"), [false; 3]);
     }
 
     #[test]

@@ -43,8 +43,8 @@ use rayon::prelude::*;
 
 pub use demo::demo_glb;
 pub(crate) use levels::TrueIdentity;
-pub(crate) use write::SETTINGS;
 pub use options::{Levels, Rig, SynthOptions};
+pub(crate) use write::SETTINGS;
 
 use crate::io::IoError;
 use crate::io::gltf_mesh::{self, MeshScene};

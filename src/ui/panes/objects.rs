@@ -273,7 +273,7 @@ impl Tree<'_> {
                 (Action::Paint(Some(id)), "Select a new part\u{2026}"),
                 (Action::GoToTarget(id, Side::Best), "Go there"),
                 (Action::Isolate(Some(id)), "Isolate"),
-                (Action::Remove(id), "Remove and fill\u{2026}"),
+                (Action::Remove(id), "Remove and fill"),
                 (Action::ExportTarget(id), "Export as .ply\u{2026}"),
             ] {
                 if ui.button(text).on_hover_text(action.tooltip()).clicked() {

@@ -34,11 +34,10 @@ pub(super) fn show(
     row(ui, Action::Rename, "Rename\u{2026}");
     row(ui, Action::Isolate(Some(id)), "Isolate");
     row(ui, Action::Hide(id), "Hide");
-    row(ui, Action::Rename, "Rename");
     row(ui, Action::Isolate(None), "Show all objects");
     ui.separator();
     row(ui, Action::Correct(id), "Correct by clicks\u{2026}");
     row(ui, Action::Paint(Some(id)), "Select a new part by clicks\u{2026}");
-    row(ui, Action::Remove(id), "Remove and fill\u{2026}");
+    row(ui, Action::Remove(id), "Remove and fill");
     row(ui, Action::ExportTarget(id), "Export as .ply\u{2026}");
 }

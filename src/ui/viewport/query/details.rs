@@ -109,7 +109,7 @@ fn show_target(ui: &mut Ui, target: IdentityId, facts: &Facts, state: &AppState,
         for (action, text) in [
             (Action::Isolate(Some(target)), "Isolate"),
             (Action::Hide(target), "Hide"),
-            (Action::Remove(target), "Remove and fill\u{2026}"),
+            (Action::Remove(target), "Remove and fill"),
             (Action::ExportTarget(target), "Export as .ply\u{2026}"),
         ] {
             if ui.small_button(text).on_hover_text(action.tooltip()).clicked() {

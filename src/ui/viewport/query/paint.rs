@@ -99,7 +99,8 @@ impl Queries {
             map: &maps.identities,
             codes: maps.codes.as_ref(),
             unknown: self.side.settings.color_by.tells_unknown().then_some(&maps.unknown),
-            invented: (self.side.settings.color_by.tells_unknown() && !maps.invented.is_empty()).then_some(&maps.invented),
+            invented: (self.side.settings.color_by.tells_unknown() && !maps.invented.is_empty())
+                .then_some(&maps.invented),
             identities: &semantics.identities,
             masks: &masks,
             // Where nothing is found, there is no rest.

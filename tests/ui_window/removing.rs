@@ -1,0 +1,46 @@
+//! Removing a thing: the scene without it appears beside, can be made anew and gone on with; the first one stays.
+
+use egui::accesskit::Role;
+use egui_kittest::kittest::Queryable;
+
+use fmlgs::ui::actions::Action;
+
+use super::edits::{boxes, window};
+
+#[test]
+fn a_scene_without_a_box_is_seen_beside_and_opened() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    let before = std::fs::read(folder.path().join("scene/point_cloud.ply")).expect("the scene");
+    w.ask(Action::Remove(2));
+    w.until("the scene without it", |a| a.state.beside.is_some());
+    w.until("both views", |a| a.viewport.picture().is_some_and(|p| p.second.is_some()));
+    assert!(w.shows("without box 1") && w.app().layout.split_view);
+    let made = folder.path().join("scene-without-box-1");
+    assert!(made.join("scene.json").is_file());
+
+    // Another fill is another scene; none replaces one that is there.
+    w.click("Another fill");
+    let again = folder.path().join("scene-without-box-1-2");
+    w.until("another one", |_| again.join("scene.json").is_file());
+    w.until("it is shown", |a| a.state.beside.as_ref().is_some_and(|b| b.path == again));
+    w.harness.run_steps(2);
+
+    w.harness.get_by_role_and_label(Role::Button, "Open").click();
+    w.until("two boxes", |a| a.state.semantics.as_ref().is_some_and(|m| m.identities.len() == 2));
+    assert!(w.app().state.beside.is_none());
+    assert_eq!(std::fs::read(folder.path().join("scene/point_cloud.ply")).expect("the scene"), before);
+    // What is shown now is the second one, from which more can be removed.
+    w.ask(Action::Remove(1));
+    w.until("less again", |_| folder.path().join("scene-without-box-1-2-without-box-0/scene.json").is_file());
+}
+
+#[test]
+fn photos_alone_have_nothing_to_remove() {
+    let folder = tempfile::tempdir().expect("folder");
+    boxes(folder.path());
+    let mut w = super::Window::new(Some(Action::Open(folder.path().join("photos"))));
+    w.until("the photos", |a| a.state.scene.is_some());
+    w.ask(Action::Remove(1));
+    assert!(w.app().state.log.iter().any(|line| line.text.contains("Only from a trained scene")));
+}
