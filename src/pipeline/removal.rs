@@ -7,7 +7,8 @@
 //! photos ([`sheet`]); hidden texels are painted from those that are seen ([`paint`]) and become flat Gaussians of
 //! their own. The picture is painted on the surface, not in a view, so all views agree.
 //!
-//! Shadows and reflections of the thing on what stays are part of what the photos show, and stay.
+//! Shadows and reflections of the thing on what stays are part of what the photos show, and stay, but for what touches
+//! it.
 
 mod paint;
 mod plane;
@@ -51,7 +52,7 @@ const OPACITY_LOGIT: f32 = 2.944;
 pub(crate) struct RemovalOptions {
     /// Objects and parts.
     pub(crate) ids: Vec<IdentityId>,
-    /// Whether what is nobody's for sure goes too where it lies within the thing: its fringes.
+    /// Whether its fringes go too: what is nobody's for sure within it, its foot on the surface and the shadow there.
     pub(crate) halo: bool,
     /// How hidden surfaces are painted; `None` = they stay open.
     pub(crate) paint: Option<Paint>,
@@ -158,7 +159,16 @@ pub(crate) fn remove(
         if let Some(paint) = options.paint {
             let seen = views::look(cloud, &gone, &cameras, settings, observer)?;
             clock.stop("look");
-            let work = Closing { cloud, map, ball, extent: &extent, seen: &seen, paint, seed: options.seed };
+            let work = Closing {
+                cloud,
+                map,
+                ball,
+                extent: &extent,
+                seen: &seen,
+                paint,
+                halo: options.halo,
+                seed: options.seed,
+            };
             new = work.run(&mut gone, &mut report, observer)?;
             clock.stop("close");
         }
@@ -222,6 +232,7 @@ struct Closing<'a> {
     extent: &'a select::Extent,
     seen: &'a [SeenView],
     paint: Paint,
+    halo: bool,
     seed: u64,
 }
 
@@ -240,6 +251,9 @@ impl Closing<'_> {
         for (k, plane) in planes.iter().enumerate() {
             ticker.tick(k, observer)?;
             let Some(mut sheet) = Sheet::find(plane, &self.ball, self.seen, REACH) else { continue };
+            if self.halo {
+                sheet.add_foot();
+            }
             sheet.paint(self.paint, self.seed);
             let hole = sheet.hole().count();
             let area = hole as f64 * sheet.step * sheet.step;

@@ -38,15 +38,12 @@ const RELAX: f32 = 1.9;
 /// Paints the texels of `hole`, of a sheet of this size, from the `known` ones.
 pub(super) fn fill(color: &mut [[f32; 3]], size: [usize; 2], known: &[bool], hole: &[bool], how: Paint, seed: u64) {
     let n = color.len();
-    let nearest = || spread(size[0], n, (0..n).filter(|i| known[*i]).map(|i| (i, color[i])), |_| true);
-    let nearest: Vec<[f32; 3]> = nearest().into_iter().map(|c| c.unwrap_or([0.5; 3])).collect();
     let holes: Vec<usize> = (0..n).filter(|i| hole[*i]).collect();
     if how == Paint::Nearest {
+        let nearest = nearest(color, size, known);
         return holes.into_iter().for_each(|i| color[i] = nearest[i]);
     }
-    let mut smooth = blurred(color, size, known);
-    holes.iter().for_each(|&i| smooth[i] = nearest[i]);
-    film(&mut smooth, size, known, &holes);
+    let smooth = smooth(color, size, known, hole);
     if how == Paint::Smooth {
         return holes.into_iter().for_each(|i| color[i] = smooth[i]);
     }
@@ -54,6 +51,22 @@ pub(super) fn fill(color: &mut [[f32; 3]], size: [usize; 2], known: &[bool], hol
     let picture = Picture { size, color: texture, known: known.to_vec(), hole: hole.to_vec() };
     let texture = picture.painted(&mut Pcg32::seed_from_u64(seed));
     holes.into_iter().for_each(|i| color[i] = std::array::from_fn(|c| smooth[i][c] + texture[i][c]));
+}
+
+/// The color of the nearest known texel for each.
+fn nearest(color: &[[f32; 3]], size: [usize; 2], known: &[bool]) -> Vec<[f32; 3]> {
+    let n = color.len();
+    let found = spread(size[0], n, (0..n).filter(|i| known[*i]).map(|i| (i, color[i])), |_| true);
+    found.into_iter().map(|c| c.unwrap_or([0.5; 3])).collect()
+}
+
+/// What is smooth of a surface: means of what is known around each texel, and a film between them in the hole.
+pub(super) fn smooth(color: &[[f32; 3]], size: [usize; 2], known: &[bool], hole: &[bool]) -> Vec<[f32; 3]> {
+    let (mut smooth, nearest) = (blurred(color, size, known), nearest(color, size, known));
+    let holes: Vec<usize> = (0..color.len()).filter(|i| hole[*i]).collect();
+    holes.iter().for_each(|&i| smooth[i] = nearest[i]);
+    film(&mut smooth, size, known, &holes);
+    smooth
 }
 
 /// Means over the known texels around each.

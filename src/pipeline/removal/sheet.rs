@@ -24,6 +24,12 @@ const SPECK: (usize, f64) = (12, 0.02);
 /// Texels around a hole whose color the thing's rim may have touched: they are painted, too.
 const RIM: usize = 2;
 
+/// How far around a hole the thing's foot and the shadow at it may reach, as a share of the hole's diameter.
+const FOOT: f64 = 0.25;
+/// What lies there and differs from the surface by more than this, and by more than so many times what the surface
+/// differs from itself, is not surface.
+const DIFFERENT: (f32, f32) = (0.03, 4.0);
+
 /// What the photos say of a texel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Texel {
@@ -115,6 +121,37 @@ impl<'a> Sheet<'a> {
             if self.state[i] == Texel::Hidden && is_open(label[i] as usize) {
                 self.state[i] = Texel::Unknown;
             }
+        }
+        let open = self.state.iter().map(|s| *s != Texel::Hidden).collect();
+        self.deep = grid::grown(width, open, RIM).iter().map(|open| !open).collect();
+    }
+
+    /// Takes the thing's foot and the shadow at it, which are seen, for hidden: what is beside a hole and has another
+    /// color than the surface has farther away.
+    pub(super) fn add_foot(&mut self) {
+        let (width, n) = (self.size[0], self.state.len());
+        let hidden: Vec<bool> = self.state.iter().map(|s| *s == Texel::Hidden).collect();
+        let steps = (FOOT * (hidden.iter().filter(|h| **h).count() as f64).sqrt()).ceil() as usize;
+        let beside = grid::grown(width, hidden.clone(), steps);
+        let known: Vec<bool> = (0..n).map(|i| self.state[i] == Texel::Seen && !beside[i]).collect();
+        let expected = paint::smooth(&self.color, self.size, &known, &beside);
+        let off = |i: usize| (0..3).map(|c| (self.color[i][c] - expected[i][c]).abs()).fold(0.0, f32::max);
+        let usual: Vec<f64> = (0..n).filter(|i| known[*i]).map(|i| f64::from(off(i))).collect();
+        if usual.is_empty() {
+            return;
+        }
+        let limit = DIFFERENT.0.max(DIFFERENT.1 * median(&usual) as f32);
+        // What stands low on the surface there hides it, too.
+        let is_foot = |i: usize| match self.state[i] {
+            Texel::Seen => beside[i] && off(i) > limit,
+            Texel::Unknown => beside[i],
+            _ => false,
+        };
+        // From the hole outward: what differs farther away is something else.
+        let from = (0..n).filter(|i| hidden[*i]).map(|i| (i, ()));
+        let reached = grid::spread(width, n, from, is_foot);
+        for i in (0..n).filter(|i| reached[*i].is_some()) {
+            self.state[i] = Texel::Hidden;
         }
         let open = self.state.iter().map(|s| *s != Texel::Hidden).collect();
         self.deep = grid::grown(width, open, RIM).iter().map(|open| !open).collect();
