@@ -47,6 +47,8 @@ impl Ball {
     }
 }
 
+/// A Gaussian that is so many radii away from its object is not of it.
+const STRAY: f64 = 1.5;
 /// How much farther a thing may reach than what is known of it, as a share.
 const MORE: f64 = 0.15;
 /// Directions along which the extent of a thing is measured: the axes, and the diagonals of faces and of the box.
@@ -103,11 +105,12 @@ pub(super) fn add_fringes(
     let unsure = |i: usize| map.margin[i] < UNSURE && (map.identity_of[i] == NOBODY || map.margin[i] < 0.5 * UNSURE);
     let near = |i: &usize| !gone[*i] && cloud.world_position(*i).distance(ball.center) < (1.0 + MORE) * ball.radius;
     let near: Vec<usize> = (0..cloud.len()).filter(near).collect();
-    let mut own: HashMap<IdentityId, Extent> = HashMap::new();
+    let mut own: HashMap<IdentityId, Ball> = HashMap::new();
     let mut astray = |i: usize| {
         let object = map.identities.object_of(map.identity_of[i]);
-        let of = || Extent::of(cloud, &members(map, &[object]));
-        object != NOBODY && !own.entry(object).or_insert_with(of).contains(cloud.world_position(i))
+        let of = || Ball::of(cloud, &members(map, &[object]));
+        let far = |of: &Ball| cloud.world_position(i).distance(of.center) > STRAY * of.radius;
+        object != NOBODY && far(own.entry(object).or_insert_with(of))
     };
     let within = |i: usize| extent.contains(cloud.world_position(i));
     let found: Vec<usize> = near.into_iter().filter(|&i| unsure(i) && within(i) || astray(i)).collect();
