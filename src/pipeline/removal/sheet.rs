@@ -116,7 +116,10 @@ impl<'a> Sheet<'a> {
                 border[of][usize::from(surface[i] == Some(false))] += 1;
             }
         }
-        let is_open = |of: usize| of == 0 || areas[of - 1] < least || border[of][0] <= border[of][1];
+        let count = |state: Texel| self.state.iter().filter(|s| **s == state).count();
+        // More is hidden than seen: below a table that is removed there are feet of what stood on it, and no surface.
+        let is_none = count(Texel::Hidden) > count(Texel::Seen);
+        let is_open = |of: usize| is_none || of == 0 || areas[of - 1] < least || border[of][0] <= border[of][1];
         for i in 0..n {
             if self.state[i] == Texel::Hidden && is_open(label[i] as usize) {
                 self.state[i] = Texel::Unknown;

@@ -147,3 +147,12 @@ fn the_same_seed_gives_the_same_fill() {
     let (a, b) = (removed(Some(Paint::Patches)).1, removed(Some(Paint::Patches)).1);
     assert_eq!(a.cloud, b.cloud);
 }
+
+#[test]
+fn a_table_that_is_removed_leaves_what_stood_on_it_and_no_surface() {
+    let (cloud, map, photos) = scene(false);
+    let options = RemovalOptions { ids: vec![TABLE], ..options(Some(Paint::Patches)) };
+    let done = remove(&cloud, &map, &photos, &RenderSettings::default(), &options, &mut Silent).expect("removed");
+    assert_eq!(done.report.surfaces, []);
+    assert_eq!(done.kept.len(), map.members(BOX).len());
+}
