@@ -180,7 +180,9 @@ fn what_is_removed_is_gone_in_a_new_scene_and_the_old_one_stays() {
     let before = read(&scene);
 
     let done = fmlgs(&["remove", &scene, "box 1", "--out", &out, "--json"]).ok().json();
-    assert_eq!((&done["names"][0], &done["report"]["removed"]), (&"box 1".into(), &38.into()));
+    let count = |what: &str| done["report"][what].as_u64().unwrap();
+    assert_eq!(done["names"][0], "box 1");
+    assert_eq!(count("removed") + count("fringes") + count("unseen"), 38);
     let info = fmlgs(&["info", &out, "--json"]).ok().json();
     assert_eq!((&info["kind"], &info["gaussians"], &info["identities"]), (&"trained".into(), &158.into(), &2.into()));
     assert!(fmlgs(&["query", &out, "box 1"]).fails_with(1).stderr.contains("box 1"));

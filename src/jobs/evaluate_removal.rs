@@ -11,7 +11,7 @@ use crate::io::files;
 use crate::pipeline::depth::{self, TrueDepth};
 use crate::pipeline::metrics::planes;
 use crate::pipeline::observer::{Observer, Ticker};
-use crate::pipeline::removal::score::{Region, RegionScore, Tally, regions};
+use crate::pipeline::removal::score::{RegionScore, RemovalRegion, Tally, regions};
 use crate::pipeline::synth::{SETTINGS, SynthOptions};
 use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, LevelFilter, PhotoPixels, SemanticMap};
@@ -39,7 +39,7 @@ pub(crate) struct RemovalRow {
 /// What is true in one view.
 struct TrueView {
     camera: Camera,
-    regions: Vec<Region>,
+    regions: Vec<RemovalRegion>,
     with: [Vec<f64>; 3],
     without: [Vec<f64>; 3],
     depth: TrueDepth,
@@ -125,7 +125,7 @@ fn views(
         let [before, depth] = depths.map(|d| Ok::<_, JobError>(d?.resampled(size[0], size[1])));
         let (before, depth) = (before?, depth?);
         let regions = regions(&with.camera, (&before, &depth), photos);
-        if regions.iter().any(|r| *r != Region::Outside) {
+        if regions.iter().any(|r| *r != RemovalRegion::Outside) {
             let (with_planes, without) = (planes(&with.pixels), planes(&pixels));
             views.push(TrueView { camera: with.camera, regions, with: with_planes, without, depth, index });
         }
@@ -161,10 +161,10 @@ fn one(
         ticker.tick(k, observer)?;
         let was = renderer.render(&scene.cloud, Features::NONE, &view.camera, &settings)?;
         let is = renderer.render(&cloud, Features::NONE, &view.camera, &settings)?;
-        uncovered.add(&is, &view.without, Some(&view.depth), &view.regions, Region::Uncovered);
-        invented.add(&is, &view.without, Some(&view.depth), &view.regions, Region::Invented);
-        before.add(&was, &view.with, None, &view.regions, Region::Outside);
-        after.add(&is, &view.with, None, &view.regions, Region::Outside);
+        uncovered.add(&is, &view.without, Some(&view.depth), &view.regions, RemovalRegion::Uncovered);
+        invented.add(&is, &view.without, Some(&view.depth), &view.regions, RemovalRegion::Invented);
+        before.add(&was, &view.with, None, &view.regions, RemovalRegion::Outside);
+        after.add(&is, &view.with, None, &view.regions, RemovalRegion::Outside);
         if let (Some(folder), true) = (&comparison.pictures, paint != Some(Paint::Nearest)) {
             let way = paint.map_or("none".into(), |p| format!("{p:?}").to_lowercase());
             let file = format!("{}_{way}_{:03}.png", name.replace(|c: char| !c.is_alphanumeric(), "-"), view.index);
@@ -189,9 +189,9 @@ fn picture(path: &Path, view: &TrueView, drawn: [&[[u8; 3]]; 2]) -> Result<(), J
     let (w, h) = (view.camera.width_px as usize, view.camera.height_px as usize);
     let truth: Vec<[u8; 3]> = (0..w * h).map(|i| std::array::from_fn(|c| (255.0 * view.without[c][i]) as u8)).collect();
     let tint = |i: usize| match view.regions[i] {
-        Region::Outside | Region::Rim => truth[i].map(|c| c / 2 + 100),
-        Region::Uncovered => [40, 110, 230],
-        Region::Invented => [230, 60, 40],
+        RemovalRegion::Outside | RemovalRegion::Rim => truth[i].map(|c| c / 2 + 100),
+        RemovalRegion::Uncovered => [40, 110, 230],
+        RemovalRegion::Invented => [230, 60, 40],
     };
     let regions: Vec<[u8; 3]> = (0..w * h).map(tint).collect();
     let rows = (0..h).flat_map(|y| [drawn[0], drawn[1], &truth, &regions].map(|p| &p[y * w..(y + 1) * w]));

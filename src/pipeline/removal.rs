@@ -10,6 +10,7 @@
 //! Shadows and reflections of the thing on what stays are part of what the photos show, and stay, but for what touches
 //! it.
 
+mod extent;
 mod paint;
 mod plane;
 pub(crate) mod score;
@@ -25,7 +26,7 @@ use serde::Serialize;
 pub(crate) use paint::Paint;
 
 use self::plane::Plane;
-use self::sheet::{Sheet, Texel};
+use self::sheet::{SurfaceSheet, Texel};
 use self::views::SeenView;
 use crate::math::grid;
 use crate::math::sh::SH_C0;
@@ -138,8 +139,8 @@ pub(crate) fn remove(
     if removed == 0 {
         return Err(RemovalError::Nothing(name()));
     }
-    let ball = select::Ball::of(cloud, &thing);
-    let extent = select::Extent::of(cloud, &thing);
+    let ball = extent::Ball::of(cloud, &thing);
+    let extent = extent::ThingExtent::of(cloud, &thing);
     let mut gone = thing;
     let fringes = if options.halo { select::add_fringes(cloud, map, (&ball, &extent), &mut gone) } else { 0 };
     clock.stop("select");
@@ -228,8 +229,8 @@ fn with_new(cloud: &GaussianCloud, kept: &[usize], new: &[Invented]) -> Gaussian
 struct Closing<'a> {
     cloud: &'a GaussianCloud,
     map: &'a SemanticMap,
-    ball: select::Ball,
-    extent: &'a select::Extent,
+    ball: extent::Ball,
+    extent: &'a extent::ThingExtent,
     seen: &'a [SeenView],
     paint: Paint,
     halo: bool,
@@ -250,7 +251,7 @@ impl Closing<'_> {
         let mut new = Vec::new();
         for (k, plane) in planes.iter().enumerate() {
             ticker.tick(k, observer)?;
-            let Some(mut sheet) = Sheet::find(plane, &self.ball, self.seen, REACH) else { continue };
+            let Some(mut sheet) = SurfaceSheet::find(plane, &self.ball, self.seen, REACH) else { continue };
             if self.halo {
                 sheet.add_foot();
             }
@@ -288,7 +289,7 @@ impl Closing<'_> {
     /// Whether a Gaussian is of the thing for where it is: on the hidden part of the surface, where nobody has seen it and
     /// it would shine through, or between that and the thing's own surface, unless it is known to be of another object
     /// than the surface, such as an apple in a bowl.
-    fn is_left_over(&self, i: usize, plane: &Plane, sheet: &Sheet<'_>, owners: &[IdentityId]) -> bool {
+    fn is_left_over(&self, i: usize, plane: &Plane, sheet: &SurfaceSheet<'_>, owners: &[IdentityId]) -> bool {
         let at = self.cloud.world_position(i);
         let Some(texel) = sheet.texel(at).filter(|t| sheet.state[*t] == Texel::Hidden) else { return false };
         if self.lies_on(plane, i) {
@@ -303,7 +304,7 @@ impl Closing<'_> {
     }
 
     /// Whose each texel is: of the nearest Gaussian that lies on the surface.
-    fn owners(&self, sheet: &Sheet, plane: &Plane, gone: &[bool]) -> Vec<IdentityId> {
+    fn owners(&self, sheet: &SurfaceSheet, plane: &Plane, gone: &[bool]) -> Vec<IdentityId> {
         let on_it = (0..self.cloud.len()).filter(|i| !gone[*i]).filter_map(|i| {
             let texel = sheet.texel(self.cloud.world_position(i)).filter(|t| sheet.state[*t] == Texel::Seen)?;
             self.lies_on(plane, i).then_some((texel, self.map.identity_of[i]))

@@ -18,7 +18,7 @@ use crate::jobs::demo::QUESTION;
 use crate::jobs::go_to::{Approached, Explored};
 use crate::jobs::inspect::InspectedPixel;
 use crate::jobs::models::ModelList;
-use crate::jobs::remove::{self, RemovedScene};
+use crate::jobs::remove::RemovedScene;
 use crate::jobs::select::Selected;
 use crate::jobs::thumbnails::ThumbnailSet;
 use crate::math::format;
@@ -282,12 +282,7 @@ impl AppState {
                     self.toast(Tone::Warning, "There is nothing to compare with: it has no Gaussians.");
                 }
             }
-            Outcome::Removed(removed) => {
-                self.toast(Tone::Good, remove::told(&removed.name, &removed.report));
-                self.say(Tone::Info, format!("Saved to {}", removed.folder.display()));
-                next.push(Action::OpenBeside(Some(removed.folder.clone())));
-                self.removed = Some(*removed);
-            }
+            Outcome::Removed(removed) => next.push(self.take_removed(*removed)),
             Outcome::Trained { evaluations, out, semantics, facts } => {
                 let carried = semantics.is_some();
                 if self.training_job == Some(job) {
@@ -373,13 +368,12 @@ impl AppState {
         self.previous = TrainHistory::default();
         let reached = self.history.steps.last().map(|s| s.step);
         self.resumable = scene.resumable.clone().zip(reached);
-        (self.explored, self.visited) = (None, None);
         self.photos.clear();
         if !is_demo {
             self.remember(scene.path.clone());
         }
         self.scene_number += 1;
-        (self.beside, self.removed) = (None, None);
+        (self.explored, self.visited, self.beside, self.removed) = (None, None, None, None);
         self.set_facts(scene.facts.clone());
         self.antialias = scene.render.antialias;
         self.set_semantics(scene.semantics.clone());

@@ -15,7 +15,7 @@ const SAME_DEPTH: f32 = 0.005;
 
 /// A pixel of a view from which a thing was removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Region {
+pub(crate) enum RemovalRegion {
     /// The thing was not there.
     Outside,
     /// Beside it: the photo shows a little of both.
@@ -32,13 +32,13 @@ pub(crate) fn regions(
     camera: &Camera,
     (with, without): (&TrueDepth, &TrueDepth),
     photos: &[(Camera, TrueDepth)],
-) -> Vec<Region> {
+) -> Vec<RemovalRegion> {
     const RIM_PX: usize = 2;
     let differ = |a: f32, b: f32, share: f32| (a - b).abs() > share * a.max(b);
     let one = |i: usize| {
         let (before, behind) = (with.values[i], without.values[i]);
         if !differ(before, behind, SAME_RAY) {
-            return Region::Outside;
+            return RemovalRegion::Outside;
         }
         let at = glam::DVec2::new((i % with.width) as f64 + 0.5, (i / with.width) as f64 + 0.5);
         // Nothing at all behind it is known to be nothing.
@@ -51,12 +51,15 @@ pub(crate) fn regions(
                 !differ(there, photo.camera_from_world(point).z as f32, SAME_DEPTH)
             }
         };
-        if behind == 0.0 || photos.iter().any(shows) { Region::Uncovered } else { Region::Invented }
+        if behind == 0.0 || photos.iter().any(shows) { RemovalRegion::Uncovered } else { RemovalRegion::Invented }
     };
-    let mut all: Vec<Region> = (0..with.values.len()).map(one).collect();
-    let inside = all.iter().map(|r| *r != Region::Outside).collect();
+    let mut all: Vec<RemovalRegion> = (0..with.values.len()).map(one).collect();
+    let inside = all.iter().map(|r| *r != RemovalRegion::Outside).collect();
     let beside = grid::grown(with.width, inside, RIM_PX);
-    all.iter_mut().zip(beside).filter(|(r, is)| **r == Region::Outside && *is).for_each(|(r, _)| *r = Region::Rim);
+    all.iter_mut()
+        .zip(beside)
+        .filter(|(r, is)| **r == RemovalRegion::Outside && *is)
+        .for_each(|(r, _)| *r = RemovalRegion::Rim);
     all
 }
 
@@ -89,8 +92,8 @@ impl Tally {
         frame: &Frame<f32>,
         truth: &[Vec<f64>; 3],
         depth: Option<&TrueDepth>,
-        regions: &[Region],
-        which: Region,
+        regions: &[RemovalRegion],
+        which: RemovalRegion,
     ) {
         let inside: Vec<usize> = (0..regions.len()).filter(|i| regions[*i] == which).collect();
         if inside.is_empty() {

@@ -2,21 +2,21 @@
 
 use std::collections::HashMap;
 
-use glam::DVec3;
-
 use crate::math::lanes::Lane;
-use crate::math::stats::quantile;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::render::{ContributionSink, RenderSettings, Renderer, TILE_PX};
 use crate::scene::{Camera, GaussianCloud, IdentityId, NOBODY, SemanticMap};
 
 use super::RemovalError;
+use super::extent::{Ball, MORE, ThingExtent};
 use super::views::TOUCHED;
 
 /// Share of a pixel from which a Gaussian is seen there.
 const SEEN: f32 = 0.05;
 /// Side at which that is looked at, px.
 const SIDE_PX: u32 = 320;
+/// A Gaussian that is so many radii away from its object is not of it.
+const STRAY: f64 = 1.5;
 /// Identities that are less sure than this may be those of a neighbor.
 const UNSURE: f32 = 0.3;
 
@@ -27,79 +27,12 @@ pub(super) fn members(map: &SemanticMap, ids: &[IdentityId]) -> Vec<bool> {
     inside
 }
 
-/// Where a thing is, a few stray Gaussians left out.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Ball {
-    pub(super) center: DVec3,
-    pub(super) radius: f64,
-}
-
-impl Ball {
-    pub(super) fn of(cloud: &GaussianCloud, inside: &[bool]) -> Self {
-        let at: Vec<DVec3> = (0..cloud.len()).filter(|i| inside[*i]).map(|i| cloud.world_position(i)).collect();
-        let middle = |axis: usize| {
-            let all: Vec<f64> = at.iter().map(|p| p[axis]).collect();
-            0.5 * (quantile(&all, 0.02) + quantile(&all, 0.98))
-        };
-        let center = DVec3::new(middle(0), middle(1), middle(2));
-        let far: Vec<f64> = at.iter().map(|p| p.distance(center)).collect();
-        Self { center, radius: quantile(&far, 0.98).max(f64::MIN_POSITIVE) }
-    }
-}
-
-/// A Gaussian that is so many radii away from its object is not of it.
-const STRAY: f64 = 1.5;
-/// How much farther a thing may reach than what is known of it, as a share.
-const MORE: f64 = 0.15;
-/// Directions along which the extent of a thing is measured: the axes, and the diagonals of faces and of the box.
-const DIRECTIONS: [[f64; 3]; 13] = [
-    [1.0, 0.0, 0.0],
-    [0.0, 1.0, 0.0],
-    [0.0, 0.0, 1.0],
-    [1.0, 1.0, 0.0],
-    [1.0, -1.0, 0.0],
-    [1.0, 0.0, 1.0],
-    [1.0, 0.0, -1.0],
-    [0.0, 1.0, 1.0],
-    [0.0, 1.0, -1.0],
-    [1.0, 1.0, 1.0],
-    [1.0, 1.0, -1.0],
-    [1.0, -1.0, 1.0],
-    [1.0, -1.0, -1.0],
-];
-
-/// The space that a thing takes: between its ends along all of [`DIRECTIONS`], outliers by their quartiles left out, and
-/// a little more.
-pub(super) struct Extent([(DVec3, f64, f64); 13]);
-
-impl Extent {
-    pub(super) fn of(cloud: &GaussianCloud, inside: &[bool]) -> Self {
-        Self(DIRECTIONS.map(|d| {
-            let along = DVec3::from(d);
-            let mut at: Vec<f64> =
-                (0..cloud.len()).filter(|i| inside[*i]).map(|i| cloud.world_position(i).dot(along)).collect();
-            at.sort_by(f64::total_cmp);
-            let (low, high) = (quantile(&at, 0.25), quantile(&at, 0.75));
-            let reach = high - low;
-            let within = |v: &&f64| **v >= low - reach && **v <= high + reach;
-            let first = at.iter().find(within).copied().unwrap_or(low);
-            let last = at.iter().rfind(within).copied().unwrap_or(high);
-            let more = MORE * (last - first);
-            (along, first - more, last + more)
-        }))
-    }
-
-    pub(super) fn contains(&self, p: DVec3) -> bool {
-        self.0.iter().all(|(along, first, last)| (*first..=*last).contains(&p.dot(*along)))
-    }
-}
-
 /// Adds what lies within the thing and is nobody's for sure or nobody's at all, and what is near and said to be of an
 /// object that is elsewhere; how many those are.
 pub(super) fn add_fringes(
     cloud: &GaussianCloud,
     map: &SemanticMap,
-    (ball, extent): (&Ball, &Extent),
+    (ball, extent): (&Ball, &ThingExtent),
     gone: &mut [bool],
 ) -> usize {
     let unsure = |i: usize| map.margin[i] < UNSURE && (map.identity_of[i] == NOBODY || map.margin[i] < 0.5 * UNSURE);

@@ -3,9 +3,9 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
+use super::extent::Ball;
 use super::paint::{self, Paint};
 use super::plane::Plane;
-use super::select::Ball;
 use super::views::{SeenView, TOUCHED};
 use crate::math::grid;
 use crate::math::stats::median;
@@ -44,7 +44,7 @@ pub(super) enum Texel {
 }
 
 /// Texels row by row.
-pub(super) struct Sheet<'a> {
+pub(super) struct SurfaceSheet<'a> {
     plane: &'a Plane,
     /// Place of the first texel's corner along the plane.
     corner: [f64; 2],
@@ -58,7 +58,7 @@ pub(super) struct Sheet<'a> {
     deep: Vec<bool>,
 }
 
-impl<'a> Sheet<'a> {
+impl<'a> SurfaceSheet<'a> {
     /// The part of a plane that the thing in `ball` hid from all views, with what is seen around it; `None` if it hid
     /// nothing. `reach` radii around the thing are looked at.
     pub(super) fn find(plane: &'a Plane, ball: &Ball, seen: &[SeenView], reach: f64) -> Option<Self> {

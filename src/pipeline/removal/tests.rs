@@ -1,3 +1,5 @@
+//! A box that stands on a table, removed.
+
 use glam::{DVec2, DVec3};
 
 use super::*;

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 
 use super::RemovalError;
-use super::select::Ball;
+use super::extent::Ball;
 use crate::math::grid;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::render::{Features, RenderSettings, Renderer};

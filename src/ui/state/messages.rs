@@ -1,7 +1,9 @@
 //! What the window says to the user: lines of the log, messages that go away, errors, and problems over the view.
 
 use super::AppState;
+use crate::jobs::remove::{self, RemovedScene};
 use crate::scene::text;
+use crate::ui::actions::Action;
 use crate::worker::{Failure, JobId};
 
 /// Lines kept in the log.
@@ -88,6 +90,15 @@ impl AppState {
         self.say(tone, text.clone());
         self.toasts.push(Toast { id: self.next_toast, tone, text });
         self.next_toast += 1;
+    }
+
+    /// Takes in a scene without a thing, which is to be seen beside the one that it was made of.
+    pub(super) fn take_removed(&mut self, removed: RemovedScene) -> Action {
+        self.toast(Tone::Good, remove::told(&removed.name, &removed.report));
+        self.say(Tone::Info, format!("Saved to {}", removed.folder.display()));
+        let show = Action::OpenBeside(Some(removed.folder.clone()));
+        self.removed = Some(removed);
+        show
     }
 
     /// Shows an error until it is dismissed, and logs it.
