@@ -13,7 +13,7 @@ use crate::agent::llm::settings::{LlmSettings, RequestPatience};
 use crate::agent::llm::{Llm, SENT, discover};
 use crate::agent::scene::{Effect, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Session};
-use crate::jobs::remove::{self, Paint, RemovalOptions, RemoveRequest};
+use crate::jobs::remove::{self, RemovalOptions, RemoveRequest};
 use crate::jobs::{export, open, render};
 use crate::navigate::Pose;
 use crate::pipeline::observer::Silent;
@@ -301,8 +301,8 @@ impl Talk {
 
 /// Makes the scene in `folder` anew without an identity, and says where.
 fn removed(folder: &Path, id: IdentityId) -> String {
-    let options = RemovalOptions { ids: vec![id], halo: true, paint: Some(Paint::default()), seed: 0 };
-    match remove::beside(&RemoveRequest { folder: folder.into(), options }, &mut Silent) {
+    let request = RemoveRequest { folder: folder.into(), options: RemovalOptions::of(id) };
+    match remove::beside(&request, &mut Silent) {
         Ok(done) => format!("{}: {}", done.folder.display(), remove::told(&done.name, &done.report)),
         Err(e) => format!("failed: {e}"),
     }

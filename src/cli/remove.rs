@@ -66,11 +66,11 @@ pub(crate) fn run(args: RemoveArgs, quiet: bool) -> Result<(), CliError> {
     remove::check(&args.out)?;
     let ids = query::identities(&map, &args.text, args.kind, args.top)?;
     let names: Vec<String> = ids.iter().map(|id| map.identities.full_name(*id)).collect();
+    let name = names.join(", ");
     let paint = (args.fill == Fill::Plane).then_some(args.paint);
     let options = RemovalOptions { ids, halo: !args.tight, paint, seed: args.seed };
     let done = remove::run(&scene, &map, &options, &mut Console::new(quiet))
         .map_err(|e| CliError::of_work(e, "nothing was written"))?;
-    let name = names.join(", ");
     remove::store(&scene, &name, &done, &args.out)?;
     if args.json {
         return output::print_json(&json!({

@@ -133,6 +133,12 @@ pub(crate) fn photo_name(name: &str, source: &Path) -> Result<(), IoError> {
     }
 }
 
+/// Whether a folder holds anything but hidden files: locks, and what a process that was killed left.
+pub(crate) fn holds_something(folder: &Path) -> bool {
+    let hidden = |e: &fs::DirEntry| e.file_name().to_string_lossy().starts_with('.');
+    fs::read_dir(folder).is_ok_and(|all| all.flatten().any(|e| !hidden(&e)))
+}
+
 /// The name of a folder for display, also where its path ends in `.` or `..`.
 pub(crate) fn folder_name(folder: &Path) -> String {
     let real = fs::canonicalize(folder).unwrap_or_else(|_| folder.into());

@@ -106,9 +106,7 @@ fn views(
     photos: &[(Camera, TrueDepth)],
 ) -> Result<(String, Vec<TrueView>), JobError> {
     let wrong = |what: &str| JobError::Protocol(format!("{}: {what}", folder.display()));
-    let path = folder.join(SETTINGS);
-    let settings: Settings = serde_json::from_slice(&files::read(&path, files::MAX_TEXT_BYTES)?)
-        .map_err(|e| files::json_error(&path, &e))?;
+    let settings: Settings = files::read_json(&folder.join(SETTINGS))?;
     let name = settings.options.without.ok_or_else(|| wrong("nothing was left out of these photos"))?;
     let mut views = Vec::new();
     for &index in &comparison.views {
@@ -177,7 +175,7 @@ fn one(
         uncovered: uncovered.score(),
         invented: invented.score(),
         outside: [before.score(), after.score()],
-        gaussians_removed: report.removed + report.fringes + report.unseen,
+        gaussians_removed: report.taken(),
         gaussians_invented: report.invented(),
         secs,
         found_again,

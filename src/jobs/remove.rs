@@ -3,9 +3,8 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{JobError, Scene, open};
-use crate::io::trained;
-use crate::io::{IoError, SceneFolder};
+use super::{JobError, Scene, export, open};
+use crate::io::{IoError, SceneFolder, files, trained};
 use crate::math::format;
 use crate::pipeline::observer::Observer;
 use crate::pipeline::removal;
@@ -65,19 +64,18 @@ pub struct RemovedScene {
 pub(crate) fn beside(request: &RemoveRequest, observer: &mut dyn Observer) -> Result<RemovedScene, JobError> {
     let scene = open::scene(&request.folder)?;
     let map = scene.semantics()?;
-    let names: Vec<String> = request.options.ids.iter().map(|id| map.identities.full_name(*id)).collect();
+    let ids = &request.options.ids;
+    let name = removal::names(&map, ids);
     let done = run(&scene, &map, &request.options, observer)?;
-    let name = names.join(", ");
-    let folder = free_folder(&request.folder, &name);
+    let words: Vec<String> = ids.iter().map(|id| export::identity_name(&map.identities, *id)).collect();
+    let folder = free_folder(&request.folder, &words.join("-"));
     store(&scene, &name, &done, &folder)?;
     Ok(RemovedScene { folder, name, request: request.clone(), report: done.report })
 }
 
 /// `desk-without-grey-bottle` beside `desk`, with a number if there is one already.
-fn free_folder(scene: &Path, name: &str) -> PathBuf {
-    let words: Vec<&str> = name.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).collect();
+fn free_folder(scene: &Path, what: &str) -> PathBuf {
     let stem = scene.file_name().map_or_else(|| "scene".into(), |n| n.to_string_lossy());
-    let what: String = words.join("-").chars().take(40).collect();
     let place = |number: usize| match number {
         1 => scene.with_file_name(format!("{stem}-without-{what}")),
         n => scene.with_file_name(format!("{stem}-without-{what}-{n}")),
@@ -88,7 +86,7 @@ fn free_folder(scene: &Path, name: &str) -> PathBuf {
 /// In words: what was done.
 pub(crate) fn told(name: &str, report: &RemovalReport) -> String {
     let count = |n: usize| format::things(n, "Gaussian");
-    let mut text = format!("{name}: {} removed", count(report.removed + report.fringes + report.unseen));
+    let mut text = format!("{name}: {} removed", count(report.taken()));
     match report.surfaces.iter().map(|s| s.roughness).reduce(f64::max) {
         None => text += ", nothing had to be invented",
         Some(rough) => {
@@ -110,8 +108,7 @@ const GUESSED: f32 = 0.5;
 
 /// Refuses a folder for the result that holds anything.
 pub(crate) fn check(out: &Path) -> Result<(), JobError> {
-    let holds_something = std::fs::read_dir(out).is_ok_and(|mut all| all.next().is_some());
-    if holds_something || out.is_file() {
+    if files::holds_something(out) || out.is_file() {
         let what = "holds something already; the scene that is made goes into a new folder";
         return Err(IoError::Occupied { folder: out.into(), what }.into());
     }
@@ -121,8 +118,9 @@ pub(crate) fn check(out: &Path) -> Result<(), JobError> {
 /// Stores the result, which is without `name`, as a scene in the folder `out`, beside which that in `from` stays as it is.
 pub(crate) fn store(from: &Scene, name: &str, reduced: &Reduced, out: &Path) -> Result<(), JobError> {
     let Some(folder) = &from.folder else { return Err(JobError::NoScene(from.path.clone())) };
-    check(out)?;
     let held = SceneFolder::hold(out, "storing a scene")?;
+    // Somebody may have made one there since it was looked at.
+    check(out)?;
     let mut info = trained::load_info(folder)?;
     info.name = format!("{} without {name}", info.name);
     // What was measured was measured with it.

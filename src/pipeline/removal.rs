@@ -61,6 +61,13 @@ pub(crate) struct RemovalOptions {
     pub(crate) seed: u64,
 }
 
+impl RemovalOptions {
+    /// One identity with its fringes, painted as usual.
+    pub(crate) fn of(id: IdentityId) -> Self {
+        Self { ids: vec![id], halo: true, paint: Some(Paint::default()), seed: 0 }
+    }
+}
+
 /// A surface that was closed.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct ClosedSurface {
@@ -75,7 +82,7 @@ pub(crate) struct ClosedSurface {
 }
 
 /// What was done.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct RemovalReport {
     /// Gaussians of the thing.
     pub(crate) removed: usize,
@@ -83,12 +90,19 @@ pub(crate) struct RemovalReport {
     pub(crate) fringes: usize,
     /// Gaussians that no photo has seen and that would be in sight now.
     pub(crate) unseen: usize,
+    /// Gaussians that were of the thing for where they are: on the closed surfaces, and between them and the thing.
+    pub(crate) left_over: usize,
     pub(crate) surfaces: Vec<ClosedSurface>,
     /// Seconds of each stage, in their order.
     pub(crate) secs: Vec<(String, f64)>,
 }
 
 impl RemovalReport {
+    /// Gaussians that are not there any more.
+    pub(crate) fn taken(&self) -> usize {
+        self.removed + self.fringes + self.unseen + self.left_over
+    }
+
     /// New Gaussians.
     pub(crate) fn invented(&self) -> usize {
         self.surfaces.iter().map(|s| s.gaussians).sum()
@@ -123,6 +137,11 @@ pub enum RemovalError {
     Interrupted(#[from] Interrupted),
 }
 
+/// The full names of identities, one after the other.
+pub(crate) fn names(map: &SemanticMap, ids: &[IdentityId]) -> String {
+    ids.iter().map(|id| map.identities.full_name(*id)).collect::<Vec<_>>().join(", ")
+}
+
 /// Takes `options.ids` out of the scene that `photos` were taken of.
 pub(crate) fn remove(
     cloud: &GaussianCloud,
@@ -132,7 +151,7 @@ pub(crate) fn remove(
     options: &RemovalOptions,
     observer: &mut dyn Observer,
 ) -> Result<Removed, RemovalError> {
-    let name = || options.ids.iter().map(|id| map.identities.full_name(*id)).collect::<Vec<_>>().join(", ");
+    let name = || names(map, &options.ids);
     let mut clock = Clock::default();
     let thing = select::members(map, &options.ids);
     let removed = thing.iter().filter(|is| **is).count();
@@ -144,7 +163,7 @@ pub(crate) fn remove(
     let mut gone = thing;
     let fringes = if options.halo { select::add_fringes(cloud, map, (&ball, &extent), &mut gone) } else { 0 };
     clock.stop("select");
-    let mut report = RemovalReport { removed, fringes, unseen: 0, surfaces: Vec::new(), secs: Vec::new() };
+    let mut report = RemovalReport { removed, fringes, ..RemovalReport::default() };
     let mut new = Vec::new();
     if options.paint.is_some() || !photos.is_empty() {
         let cameras = views::choose(photos, &ball);
@@ -265,8 +284,11 @@ impl Closing<'_> {
                 roughness: plane.residual / area.sqrt(),
             });
             let owners = self.owners(&sheet, plane, gone);
-            for i in 0..self.cloud.len() {
-                gone[i] = gone[i] || self.is_left_over(i, plane, &sheet, &owners);
+            for (i, gone) in gone.iter_mut().enumerate() {
+                if !*gone && self.is_left_over(i, plane, &sheet, &owners) {
+                    *gone = true;
+                    report.left_over += 1;
+                }
             }
             let rotation = DQuat::from_mat3(&DMat3::from_cols(plane.u, plane.v, plane.normal));
             new.extend(sheet.hole().map(|i| Invented {

@@ -2,15 +2,14 @@
 
 use super::app::App;
 use super::state::Tone;
-use crate::jobs::remove::{Paint, RemovalOptions, RemoveRequest};
+use crate::jobs::remove::{RemovalOptions, RemoveRequest};
 use crate::scene::IdentityId;
 use crate::worker::Command;
 
 impl App {
     /// Makes a scene without the identity.
     pub(super) fn remove(&mut self, id: IdentityId) {
-        let options = RemovalOptions { ids: vec![id], halo: true, paint: Some(Paint::default()), seed: 0 };
-        self.submit_removal(options);
+        self.submit_removal(RemovalOptions::of(id));
     }
 
     /// Makes another scene without what was removed last: closed otherwise, with its fringes (`halo`) or without.

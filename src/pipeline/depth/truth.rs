@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::io::{IoError, npy};
-use crate::math::grid::neighbors;
+use crate::math::grid::{grown, neighbors};
 use crate::math::resize::between;
 
 /// Neighboring depths whose ratio is larger belong to different surfaces.
@@ -56,11 +56,7 @@ impl TrueDepth {
         let jump = |a: f32, b: f32| a.max(b) > a.min(b) * EDGE_JUMP;
         let beside = |i: usize| neighbors(i, self.width, n).any(|j| jump(self.values[i], self.values[j]));
         // Both pixels at a jump are 1 px from it or nearer.
-        let mut edge: Vec<bool> = (0..n).map(beside).collect();
-        for _ in 1..EDGE_PX {
-            edge = (0..n).map(|i| edge[i] || neighbors(i, self.width, n).any(|j| edge[j])).collect();
-        }
-        edge
+        grown(self.width, (0..n).map(beside).collect(), EDGE_PX - 1)
     }
 }
 

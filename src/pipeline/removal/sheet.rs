@@ -67,12 +67,9 @@ impl<'a> SurfaceSheet<'a> {
         let side = 2.0 * reach * ball.radius;
         let step = side / FIRST as f64;
         let first = Self::looked_at(plane, middle.map(|m| m - 0.5 * side), step, [FIRST; 2], seen);
-        let mut hidden: Vec<[usize; 2]> = Vec::new();
-        (0..first.state.len())
-            .filter(|i| first.state[*i] == Texel::Hidden)
-            .for_each(|i| hidden.push([i % FIRST, i / FIRST]));
+        let hidden = || (0..first.state.len()).filter(|i| first.state[*i] == Texel::Hidden);
         let ends = |axis: usize| {
-            let all = hidden.iter().map(|t| t[axis]);
+            let all = hidden().map(|i| [i % FIRST, i / FIRST][axis]);
             Some((all.clone().min()?, all.max()? + 1))
         };
         let (x, y) = (ends(0)?, ends(1)?);
@@ -125,15 +122,23 @@ impl<'a> SurfaceSheet<'a> {
                 self.state[i] = Texel::Unknown;
             }
         }
+        self.find_deep();
+    }
+
+    fn hidden(&self) -> Vec<bool> {
+        self.state.iter().map(|s| *s == Texel::Hidden).collect()
+    }
+
+    fn find_deep(&mut self) {
         let open = self.state.iter().map(|s| *s != Texel::Hidden).collect();
-        self.deep = grid::grown(width, open, RIM).iter().map(|open| !open).collect();
+        self.deep = grid::grown(self.size[0], open, RIM).iter().map(|open| !open).collect();
     }
 
     /// Takes the thing's foot and the shadow at it, which are seen, for hidden: what is beside a hole and has another
     /// color than the surface has farther away.
     pub(super) fn add_foot(&mut self) {
         let (width, n) = (self.size[0], self.state.len());
-        let hidden: Vec<bool> = self.state.iter().map(|s| *s == Texel::Hidden).collect();
+        let hidden = self.hidden();
         let steps = (FOOT * (hidden.iter().filter(|h| **h).count() as f64).sqrt()).ceil() as usize;
         let beside = grid::grown(width, hidden.clone(), steps);
         let known: Vec<bool> = (0..n).map(|i| self.state[i] == Texel::Seen && !beside[i]).collect();
@@ -156,8 +161,7 @@ impl<'a> SurfaceSheet<'a> {
         for i in (0..n).filter(|i| reached[*i].is_some()) {
             self.state[i] = Texel::Hidden;
         }
-        let open = self.state.iter().map(|s| *s != Texel::Hidden).collect();
-        self.deep = grid::grown(width, open, RIM).iter().map(|open| !open).collect();
+        self.find_deep();
     }
 
     /// The middle of texel `i` in the world.
@@ -182,15 +186,13 @@ impl<'a> SurfaceSheet<'a> {
 
     /// The texels that become Gaussians: what is hidden, and a seam around it.
     pub(super) fn hole(&self) -> impl Iterator<Item = usize> + '_ {
-        let hidden = self.state.iter().map(|s| *s == Texel::Hidden).collect();
-        let grown = grid::grown(self.size[0], hidden, 1);
+        let grown = grid::grown(self.size[0], self.hidden(), 1);
         (0..grown.len()).filter(move |&i| grown[i] && matches!(self.state[i], Texel::Hidden | Texel::Seen))
     }
 
     /// Gives what is hidden a color.
     pub(super) fn paint(&mut self, how: Paint, seed: u64) {
-        let hidden = self.state.iter().map(|s| *s == Texel::Hidden).collect();
-        let hole = grid::grown(self.size[0], hidden, RIM);
+        let hole = grid::grown(self.size[0], self.hidden(), RIM);
         let known: Vec<bool> = (0..hole.len()).map(|i| self.state[i] == Texel::Seen && !hole[i]).collect();
         paint::fill(&mut self.color, self.size, &known, &hole, how, seed);
     }

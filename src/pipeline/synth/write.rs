@@ -13,7 +13,7 @@ use super::options::SynthOptions;
 use super::view::SynthView;
 use super::{SynthError, opengl_pose};
 use crate::io::folder_lock::FolderLock;
-use crate::io::{IoError, atomic};
+use crate::io::{IoError, atomic, files};
 use crate::scene::{Camera, SparsePoint};
 
 /// The file whose presence makes the folder a data set; written last.
@@ -33,9 +33,7 @@ impl Writer {
     pub(crate) fn new(out: &Path, views: usize) -> Result<Self, SynthError> {
         fs::create_dir_all(out).map_err(|source| SynthError::Write { path: out.into(), source })?;
         let lock = FolderLock::take(out, "making photos")?;
-        let hidden = |e: &fs::DirEntry| e.file_name().to_string_lossy().starts_with('.');
-        let holds_something = fs::read_dir(out).is_ok_and(|all| all.flatten().any(|e| !hidden(&e)));
-        if holds_something && !out.join(SETTINGS).is_file() {
+        if files::holds_something(out) && !out.join(SETTINGS).is_file() {
             let what = "holds something that 'fmlgs synth' has not written, which would be replaced";
             return Err(IoError::Occupied { folder: out.into(), what }.into());
         }
