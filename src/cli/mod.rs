@@ -7,7 +7,9 @@
 mod agent;
 mod bench;
 mod check_stability;
+mod clean;
 mod demo;
+mod edit;
 mod error;
 mod eval;
 mod eval_depth;
@@ -108,6 +110,8 @@ enum Command {
     Models(models::ModelsArgs),
     Segment(segment::SegmentArgs),
     Remove(remove::RemoveArgs),
+    Clean(clean::CleanArgs),
+    Edit(edit::EditArgs),
     Path(path::PathArgs),
     Agent(agent::AgentArgs),
     Synth(synth::SynthArgs),
@@ -179,6 +183,8 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Query(args) => query::run(args),
         Command::Segment(args) => segment::run(args, quiet),
         Command::Remove(args) => remove::run(args, quiet),
+        Command::Clean(args) => clean::run(args, quiet),
+        Command::Edit(args) => edit::run(args),
         Command::Path(args) => path::run(args),
         Command::Agent(args) => agent::run(args),
         Command::Synth(args) => synth::run(args, quiet),

@@ -7,7 +7,7 @@ use serde_json::json;
 use super::progress::Console;
 use super::{CliError, number, output};
 use crate::jobs::remove::{self, Paint, RemovalOptions};
-use crate::jobs::{open, query};
+use crate::jobs::{derived, open, query};
 use crate::math::format;
 use crate::scene::LevelFilter;
 
@@ -63,7 +63,7 @@ enum Fill {
 pub(crate) fn run(args: RemoveArgs, quiet: bool) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
     let map = scene.semantics()?;
-    remove::check(&args.out)?;
+    derived::check(&args.out)?;
     let ids = query::identities(&map, &args.text, args.kind, args.top)?;
     let names: Vec<String> = ids.iter().map(|id| map.identities.full_name(*id)).collect();
     let name = names.join(", ");

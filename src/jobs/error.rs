@@ -9,11 +9,13 @@ use crate::measure::{BeginError, ReportError, StudyError};
 use crate::models::ModelError;
 use crate::models::catalog::InstallError;
 use crate::models::fetch::FetchError;
+use crate::pipeline::cleaning::{CleanError, RuleError};
 use crate::pipeline::depth::DepthError;
 use crate::pipeline::observer::Interrupted;
 use crate::pipeline::removal::RemovalError;
 use crate::pipeline::semantics::edit::EditError;
 use crate::pipeline::semantics::error::FindError;
+use crate::pipeline::splat_edit::SplatEditError;
 use crate::pipeline::synth::SynthError;
 use crate::pipeline::train::TrainError;
 use crate::pipeline::train::config::UnreadableConfig;
@@ -97,6 +99,12 @@ pub enum JobError {
     Render(#[from] RenderError),
     #[error(transparent)]
     Remove(#[from] RemovalError),
+    #[error(transparent)]
+    SplatEdit(#[from] SplatEditError),
+    #[error(transparent)]
+    Clean(#[from] CleanError),
+    #[error(transparent)]
+    CleanRule(#[from] RuleError),
     #[error(transparent)]
     Depth(#[from] DepthError),
     #[error(transparent)]

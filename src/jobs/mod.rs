@@ -4,10 +4,12 @@
 //! and return a typed result or a [`JobError`]. Whoever calls them says the result in its own way.
 
 pub(crate) mod bench;
+pub(crate) mod clean;
 mod coco;
 pub(crate) mod demo;
 pub(crate) mod demo_questions;
 pub(crate) mod demo_tour;
+pub(crate) mod derived;
 pub mod edit;
 pub(crate) mod error;
 pub(crate) mod evaluate;
@@ -26,6 +28,7 @@ pub(crate) mod plan;
 pub(crate) mod poses;
 pub(crate) mod presets;
 pub(crate) mod query;
+pub(crate) mod rearrange;
 pub(crate) mod recent;
 pub(crate) mod remove;
 pub(crate) mod render;

@@ -3,8 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{JobError, Scene, export, open};
-use crate::io::{IoError, SceneFolder, files, trained};
+use super::{JobError, Scene, derived, export, open};
 use crate::math::format;
 use crate::pipeline::observer::Observer;
 use crate::pipeline::removal;
@@ -68,19 +67,9 @@ pub(crate) fn beside(request: &RemoveRequest, observer: &mut dyn Observer) -> Re
     let name = removal::names(&map, ids);
     let done = run(&scene, &map, &request.options, observer)?;
     let words: Vec<String> = ids.iter().map(|id| export::identity_name(&map.identities, *id)).collect();
-    let folder = free_folder(&request.folder, &words.join("-"));
+    let folder = derived::free_folder(&request.folder, &format!("without-{}", words.join("-")));
     store(&scene, &name, &done, &folder)?;
     Ok(RemovedScene { folder, name, request: request.clone(), report: done.report })
-}
-
-/// `desk-without-grey-bottle` beside `desk`, with a number if there is one already.
-fn free_folder(scene: &Path, what: &str) -> PathBuf {
-    let stem = scene.file_name().map_or_else(|| "scene".into(), |n| n.to_string_lossy());
-    let place = |number: usize| match number {
-        1 => scene.with_file_name(format!("{stem}-without-{what}")),
-        n => scene.with_file_name(format!("{stem}-without-{what}-{n}")),
-    };
-    (1..).map(place).find(|folder| !folder.exists()).unwrap_or_default()
 }
 
 /// In words: what was done.
@@ -106,28 +95,11 @@ const ROUGH: f64 = 0.1;
 /// How sure it is whose invented Gaussians are.
 const GUESSED: f32 = 0.5;
 
-/// Refuses a folder for the result that holds anything.
-pub(crate) fn check(out: &Path) -> Result<(), JobError> {
-    if files::holds_something(out) || out.is_file() {
-        let what = "holds something already; the scene that is made goes into a new folder";
-        return Err(IoError::Occupied { folder: out.into(), what }.into());
-    }
-    Ok(())
-}
-
 /// Stores the result, which is without `name`, as a scene in the folder `out`, beside which that in `from` stays as it is.
 pub(crate) fn store(from: &Scene, name: &str, reduced: &Reduced, out: &Path) -> Result<(), JobError> {
-    let Some(folder) = &from.folder else { return Err(JobError::NoScene(from.path.clone())) };
-    let held = SceneFolder::hold(out, "storing a scene")?;
-    // Somebody may have made one there since it was looked at.
-    check(out)?;
-    let mut info = trained::load_info(folder)?;
-    info.name = format!("{} without {name}", info.name);
-    // What was measured was measured with it.
-    info.history.evaluations.clear();
-    if let (Some(dataset), Some(path)) = (&mut info.dataset, &from.dataset_path) {
-        *dataset = dataset.moved(path, out);
+    if from.folder.is_none() {
+        return Err(JobError::NoScene(from.path.clone()));
     }
-    held.save(&info, &reduced.cloud, Some(&reduced.map))?;
+    derived::store(from, format!("{} without {name}", from.name), &reduced.cloud, Some(&reduced.map), out)?;
     Ok(())
 }

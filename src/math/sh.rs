@@ -1,5 +1,7 @@
 //! Real spherical harmonics up to degree 3, in the order and sign of the 3DGS `.ply` files.
 
+use glam::{DMat3, DVec3};
+
 use super::Real;
 
 /// Number of coefficients per channel of degree `degree`: `(degree + 1)²`.
@@ -98,6 +100,31 @@ pub(crate) fn basis_gradient<R: Real>(degree: u8, [x, y, z]: [R; 3]) -> [[R; 3];
     g
 }
 
+/// How coefficients turn with what they belong to: `c'[m] = sum_n matrix[m][n] c[n]` is the function of before, seen
+/// along directions that `turn` (world_from_before) has turned. Bands do not mix.
+pub(crate) fn rotation(turn: &DMat3) -> [[f64; 16]; 16] {
+    // Gauss-Legendre along z and equal steps around it: exact for products of two harmonics up to degree 3.
+    const NODES: [(f64, f64); 4] = [
+        (-0.861_136_311_594_052_6, 0.347_854_845_137_453_8),
+        (-0.339_981_043_584_856_3, 0.652_145_154_862_546_1),
+        (0.339_981_043_584_856_3, 0.652_145_154_862_546_1),
+        (0.861_136_311_594_052_6, 0.347_854_845_137_453_8),
+    ];
+    const AROUND: usize = 7;
+    let before_from_world = turn.transpose();
+    let mut matrix = [[0.0; 16]; 16];
+    for ((z, weight), k) in NODES.into_iter().flat_map(|node| (0..AROUND).map(move |k| (node, k))) {
+        let step = std::f64::consts::TAU / AROUND as f64;
+        let (sin, cos) = (k as f64 * step).sin_cos();
+        let direction = DVec3::new((1.0 - z * z).sqrt() * cos, (1.0 - z * z).sqrt() * sin, z);
+        let (now, before) = (basis(3, direction.to_array()), basis(3, (before_from_world * direction).to_array()));
+        for (row, now) in matrix.iter_mut().zip(now) {
+            row.iter_mut().zip(before).for_each(|(entry, before)| *entry += weight * step * now * before);
+        }
+    }
+    matrix
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -141,5 +168,21 @@ mod tests {
                 assert!((e - want).abs() < 1e-3, "{j} {k} {e}");
             }
         }
+    }
+
+    #[test]
+    fn turned_coefficients_are_those_of_the_turned_function() {
+        let turn = DMat3::from_quat(glam::DQuat::from_scaled_axis(DVec3::new(0.7, -1.1, 2.0)));
+        let matrix = rotation(&turn);
+        let c: Vec<f64> = (0..16).map(|k| ((k * k + 3) as f64).sin()).collect();
+        let turned: Vec<f64> = matrix.iter().map(|row| row.iter().zip(&c).map(|(m, c)| m * c).sum()).collect();
+        let value = |c: &[f64], d: DVec3| basis(3, d.to_array()).iter().zip(c).map(|(b, c)| b * c).sum::<f64>();
+        for before in [DVec3::X, DVec3::new(0.36, -0.48, 0.8), DVec3::new(-0.6, 0.0, -0.8)] {
+            assert!((value(&turned, turn * before) - value(&c, before)).abs() < 1e-12);
+        }
+        assert!((value(&c, turn * DVec3::X) - value(&c, DVec3::X)).abs() > 0.1, "it matters");
+        let mixes = |m: usize, n: usize| (m as f64).sqrt() as usize != (n as f64).sqrt() as usize;
+        let mixed = (0..16).flat_map(|m| (0..16).map(move |n| (m, n))).filter(|(m, n)| mixes(*m, *n));
+        assert!(mixed.into_iter().all(|(m, n)| matrix[m][n].abs() < 1e-12));
     }
 }

@@ -137,7 +137,7 @@ fn reshape(map: &mut SemanticMap, id: IdentityId, gaussians: &[u32]) {
 }
 
 /// Adds an identity of these Gaussians, whosever they were; its number.
-pub(super) fn add(
+pub(crate) fn add(
     map: &mut SemanticMap,
     level: Level,
     parent: IdentityId,

@@ -1,0 +1,119 @@
+//! `fmlgs edit`: objects and parts are moved, duplicated and recolored.
+
+use std::path::PathBuf;
+
+use glam::{DQuat, DVec3};
+
+use super::{CliError, output};
+use crate::jobs::rearrange::{self, Placement, SplatEdit};
+use crate::jobs::{JobError, derived, open, query};
+use crate::math::format;
+use crate::scene::LevelFilter;
+
+/// Move, turn, scale, duplicate or recolor an object or a part
+///
+/// It turns and scales about its own middle. The scene is left as it is; the result is a scene of its own, or a .ply.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    fmlgs edit scene/ \"the mug\" --move 0.5,0,0 --turn 90 --out moved/\n  \
+    fmlgs edit scene/ \"the mug\" --duplicate --move 0,0,1 --scale 0.5 --out two_mugs/\n  \
+    fmlgs edit scene/ \"handle of the mug\" --color #c02020 --out red_handle.ply")]
+#[command(group = clap::ArgGroup::new("what").required(true).multiple(true))]
+pub(crate) struct EditArgs {
+    /// Trained scene with objects and parts ('fmlgs preprocess')
+    scene: PathBuf,
+    /// What to edit
+    text: String,
+    /// Folder for the new scene, or a .ply
+    #[arg(long)]
+    out: PathBuf,
+    /// Shift it, scene units
+    #[arg(long = "move", value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true, group = "what")]
+    shift: Option<DVec3>,
+    /// Turn it about the axis, counterclockwise where that points at you
+    #[arg(long, value_name = "DEGREES", allow_hyphen_values = true, group = "what")]
+    turn: Option<f64>,
+    /// Axis that it turns about [default: up]
+    #[arg(long, value_name = "X,Y,Z", value_parser = direction, allow_hyphen_values = true, requires = "turn")]
+    axis: Option<DVec3>,
+    /// Make it this many times as large
+    #[arg(long, group = "what")]
+    scale: Option<f64>,
+    /// Leave it where it is and put another one there
+    #[arg(long, group = "what")]
+    duplicate: bool,
+    /// Give it another color; its shades stay
+    #[arg(long, value_name = "#RRGGBB", value_parser = color, group = "what")]
+    color: Option<[f32; 3]>,
+    /// Whether an object or a part is meant
+    #[arg(long, value_enum, default_value_t = LevelFilter::Auto)]
+    kind: LevelFilter,
+}
+
+/// Three numbers.
+fn vector(text: &str) -> Result<DVec3, String> {
+    let numbers: Result<Vec<f64>, _> = text.split(',').map(|v| v.trim().parse()).collect();
+    match numbers.as_deref() {
+        Ok(&[x, y, z]) if [x, y, z].iter().all(|v| v.is_finite()) => Ok(DVec3::new(x, y, z)),
+        _ => Err("three numbers are needed: X,Y,Z".into()),
+    }
+}
+
+fn direction(text: &str) -> Result<DVec3, String> {
+    vector(text)?.try_normalize().ok_or_else(|| "it has no length".into())
+}
+
+/// Red, green and blue, 0 to 1.
+fn color(text: &str) -> Result<[f32; 3], String> {
+    let digits = text.strip_prefix('#').unwrap_or(text);
+    let value = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6);
+    let value = value.ok_or("six hexadecimal digits are needed: #RRGGBB")?;
+    Ok([16, 8, 0].map(|shift| (value >> shift & 0xff) as f32 / 255.0))
+}
+
+pub(crate) fn run(args: EditArgs) -> Result<(), CliError> {
+    let mut scene = open::scene(&args.scene)?;
+    let map = scene.semantics()?;
+    derived::check_place(&scene, &args.out)?;
+    let ids = query::identities(&map, &args.text, args.kind, 1)?;
+    let Some(&id) = ids.first() else { return Err(JobError::NoMatch(args.text).into()) };
+    let axis = args.axis.unwrap_or_else(|| scene.home().up);
+    let to = Placement {
+        shift: args.shift.unwrap_or_default(),
+        turn: DQuat::from_axis_angle(axis, args.turn.unwrap_or_default().to_radians()),
+        scale: args.scale.unwrap_or(1.0),
+    };
+    let (mut map, mut id) = (Some(map), id);
+    let mut edits = Vec::new();
+    if args.duplicate {
+        edits.push(SplatEdit::Duplicate(id, to));
+        // The next one added is the whole copy.
+        id = map.as_ref().map_or(id, |map| map.identities.len() as u32 + 1);
+    } else if to != Placement::default() {
+        edits.push(SplatEdit::Move(id, to));
+    }
+    edits.extend(args.color.map(|color| SplatEdit::Recolor(id, color)));
+    for edit in &edits {
+        let (cloud, new) = rearrange::apply(&scene.cloud, map.as_ref(), edit)?;
+        (scene.cloud, map) = (cloud.into(), new);
+    }
+    derived::write(&scene, "edited", &scene.cloud, map.as_ref(), &args.out)?;
+    let name = map.as_ref().map_or_else(String::new, |map| map.identities.full_name(id));
+    let what = if args.duplicate { format!("{name} added") } else { format!("{name} edited") };
+    output::print(&format!("{}: {what}, {}", args.out.display(), format::things(scene.cloud.len(), "Gaussian")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vectors_and_colors_are_read() {
+        assert_eq!(vector("-1, 0.5,2e1"), Ok(DVec3::new(-1.0, 0.5, 20.0)));
+        assert!(["", "1,2", "1,2,3,4", "a,b,c", "nan,0,0", "inf,0,0"].iter().all(|bad| vector(bad).is_err()));
+        assert!((direction("0,3,4").expect("one").length() - 1.0).abs() < 1e-12 && direction("0,0,0").is_err());
+        assert_eq!(color("#ff0080"), Ok([1.0, 0.0, 128.0 / 255.0]));
+        assert_eq!(color("00ff00"), Ok([0.0, 1.0, 0.0]));
+        assert!(["", "#fff", "#gg0000", "#1234567", "red"].iter().all(|bad| color(bad).is_err()));
+    }
+}

@@ -1,0 +1,56 @@
+//! Cleaning a scene: what is measured of its Gaussians, and the scene without those that were chosen.
+
+use std::path::Path;
+
+use super::{JobError, Scene, derived, open, rearrange};
+use crate::pipeline::cleaning::{self, CleanView};
+pub(crate) use crate::pipeline::cleaning::{CleanRule, CloudMeasures};
+use crate::pipeline::observer::{Observer, Severity};
+use crate::pipeline::splat_edit::SplatEdit;
+use crate::scene::Dataset;
+
+/// Measures the Gaussians of `scene`, by the photos that it was trained on where they are at hand; `photos` says where
+/// they are if that is somewhere else than the scene says.
+pub(crate) fn measure(
+    scene: &Scene,
+    photos: Option<&Path>,
+    observer: &mut dyn Observer,
+) -> Result<CloudMeasures, JobError> {
+    let dataset = match (photos, &scene.dataset_path) {
+        (Some(path), _) => Some(open::dataset(path)?),
+        (None, Some(path)) => match open::dataset(path) {
+            Ok(dataset) => Some(dataset),
+            Err(e) => {
+                observer.note(Severity::Warning, format!("the photos are left out: {e}"));
+                None
+            }
+        },
+        (None, None) => None,
+    };
+    let views = views(scene, dataset.as_ref());
+    Ok(cleaning::measure(&scene.cloud, &views, &scene.settings, observer)?)
+}
+
+/// The photos that the scene was trained on, without those that are held out to measure with.
+fn views(scene: &Scene, dataset: Option<&Dataset>) -> Vec<CleanView> {
+    let photo = |name: &str| dataset.and_then(|d| d.photos.iter().find(|p| p.name == name)).cloned();
+    let trained = scene.cameras.iter().filter(|c| !c.held_out);
+    trained.map(|c| CleanView { camera: c.camera.clone(), photo: photo(&c.name) }).collect()
+}
+
+/// Gaussians that any of the rules means.
+pub(crate) fn choose(rules: &[CleanRule], of: &CloudMeasures) -> Result<Vec<bool>, JobError> {
+    let mut gone: Vec<bool> = Vec::new();
+    for rule in rules {
+        let chosen = rule.choose(of)?;
+        gone = if gone.is_empty() { chosen } else { gone.iter().zip(&chosen).map(|(a, b)| a | b).collect() };
+    }
+    Ok(gone)
+}
+
+/// Writes `scene` without what is `gone` to `out`, as [`derived::write`] does. How many Gaussians are left.
+pub(crate) fn store(scene: &Scene, gone: Vec<bool>, out: &Path) -> Result<usize, JobError> {
+    let (cloud, map) = rearrange::applied(scene, &SplatEdit::Delete(gone))?;
+    derived::write(scene, "cleaned", &cloud, map.as_ref(), out)?;
+    Ok(cloud.len())
+}

@@ -1,0 +1,80 @@
+//! A scene that is made of another: it goes into a folder of its own, and the other one stays as it is.
+
+use std::path::{Path, PathBuf};
+
+use super::{JobError, Scene, export};
+use crate::io::trained::{self, SceneInfo};
+use crate::io::{IoError, SceneFolder, files};
+use crate::scene::{GaussianCloud, SemanticMap};
+
+/// Refuses a place for the result that is taken or not fit for it: a file of splats where it is called so, else a folder.
+pub(crate) fn check_place(scene: &Scene, out: &Path) -> Result<(), JobError> {
+    if is_file(out) { export::check(out, &[FILE], &scene.reads()) } else { check(out) }
+}
+
+/// Writes Gaussians that were made of `from`, and their objects and parts, to `out`: a file of splats where it is called
+/// so, else a scene of its own.
+pub(crate) fn write(
+    from: &Scene,
+    how: &str,
+    cloud: &GaussianCloud,
+    map: Option<&SemanticMap>,
+    out: &Path,
+) -> Result<(), JobError> {
+    if is_file(out) {
+        return Ok(export::ply(out, cloud)?);
+    }
+    store(from, format!("{} {how}", from.name), cloud, map, out)?;
+    Ok(())
+}
+
+/// How a file of splats ends.
+const FILE: &str = ".ply";
+
+fn is_file(out: &Path) -> bool {
+    out.to_string_lossy().to_lowercase().ends_with(FILE)
+}
+
+/// Refuses a folder for the result that holds anything.
+pub(crate) fn check(out: &Path) -> Result<(), JobError> {
+    if files::holds_something(out) || out.is_file() {
+        let what = "holds something already; the scene that is made goes into a new folder";
+        return Err(IoError::Occupied { folder: out.into(), what }.into());
+    }
+    Ok(())
+}
+
+/// `desk-cleaned` beside `desk` for `how` "cleaned", with a number if there is one already.
+pub(crate) fn free_folder(scene: &Path, how: &str) -> PathBuf {
+    let stem = scene.file_stem().map_or_else(|| "scene".into(), |n| n.to_string_lossy());
+    let place = |number: usize| match number {
+        1 => scene.with_file_name(format!("{stem}-{how}")),
+        n => scene.with_file_name(format!("{stem}-{how}-{n}")),
+    };
+    (1..).map(place).find(|folder| !folder.exists()).unwrap_or_default()
+}
+
+/// Stores Gaussians that were made of `from`, and their objects and parts, as the scene `name` in the folder `out`.
+/// Returns the id of its state.
+pub(crate) fn store(
+    from: &Scene,
+    name: String,
+    cloud: &GaussianCloud,
+    map: Option<&SemanticMap>,
+    out: &Path,
+) -> Result<String, JobError> {
+    let held = SceneFolder::hold(out, "storing a scene")?;
+    // Somebody may have made one there since it was looked at.
+    check(out)?;
+    let mut info = match &from.folder {
+        Some(folder) => trained::load_info(folder)?,
+        None => SceneInfo::default(),
+    };
+    info.name = name;
+    // What was measured was measured before.
+    info.history.evaluations.clear();
+    if let (Some(dataset), Some(path)) = (&mut info.dataset, &from.dataset_path) {
+        *dataset = dataset.moved(path, out);
+    }
+    Ok(held.save(&info, cloud, map)?)
+}

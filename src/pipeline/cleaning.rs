@@ -1,0 +1,180 @@
+//! Cleaning: what can be measured of each Gaussian that tells floaters, needles and haze from what photos support.
+//!
+//! Nothing is deleted here: measures become choices ([`CleanRule`]), which somebody looks at before they are carried out.
+
+mod floaters;
+mod pieces;
+mod rules;
+mod support;
+
+use rayon::prelude::*;
+use rstar::RTree;
+use rstar::primitives::GeomWithData;
+
+pub(crate) use self::rules::{CleanRule, RuleError};
+use crate::io::{self, IoError};
+use crate::math::Real;
+use crate::math::stats::median;
+use crate::pipeline::observer::{Interrupted, Observer, Ticker};
+use crate::render::{RenderError, RenderSettings};
+use crate::scene::{Bounds, Camera, GaussianCloud, Photo, PhotoPixels};
+
+/// Neighbors of each Gaussian that are looked at.
+const NEIGHBORS: usize = 8;
+/// The one whose distance tells how lonely a Gaussian is.
+const LONELY: usize = 4;
+/// Gaussians whose neighbors are looked for between two reports.
+const BLOCK: usize = 1 << 14;
+/// Side of the pictures in which support is looked for, px.
+const SIDE_PX: u32 = 320;
+
+/// What can be measured of a Gaussian.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::VariantArray, strum::IntoStaticStr, strum::EnumString)]
+#[strum(serialize_all = "lowercase")]
+pub enum SplatMeasure {
+    /// Largest standard deviation, scene units.
+    Size,
+    /// Largest standard deviation over the second: 1 is a disc or a ball, more a needle.
+    Elongation,
+    /// 0 to 1.
+    Opacity,
+    /// Distance of its fourth neighbor, 1 being usual in the scene.
+    Spacing,
+    /// Gaussians of the piece that it hangs together with.
+    Piece,
+    /// Largest share of a pixel that it has in any photo.
+    Weight,
+    /// Photos that show it.
+    Photos,
+    /// Root mean square difference of its color from the photos where they show it, 0 to 1.
+    Error,
+}
+
+impl SplatMeasure {
+    /// Its word on the command line and on screen.
+    pub(crate) fn word(self) -> &'static str {
+        self.into()
+    }
+
+    /// What it is.
+    pub(crate) fn meaning(self) -> &'static str {
+        match self {
+            Self::Size => "largest standard deviation, in scene units",
+            Self::Elongation => "largest standard deviation over the second: needles have much",
+            Self::Opacity => "opacity, 0 to 1",
+            Self::Spacing => "distance of the fourth neighbor; 1 is usual in this scene",
+            Self::Piece => "Gaussians that it hangs together with",
+            Self::Weight => "largest share of a pixel in any photo, 0 to 1",
+            Self::Photos => "photos that show it",
+            Self::Error => "difference of its color from the photos, root mean square, 0 to 1",
+        }
+    }
+}
+
+/// A photo that may speak for Gaussians.
+#[derive(Clone, Debug)]
+pub(crate) struct CleanView {
+    pub(crate) camera: Camera,
+    /// The photo itself, where it is at hand.
+    pub(crate) photo: Option<Photo>,
+}
+
+impl CleanView {
+    /// The camera of a small picture, and the photo as that.
+    fn small(&self) -> Result<(Camera, Option<PhotoPixels>), CleanError> {
+        let Some(photo) = &self.photo else { return Ok((self.camera.limited_to(SIDE_PX), None)) };
+        let pixels = io::photo::load(photo, SIDE_PX)?;
+        Ok((photo.camera.resized(pixels.width_px, pixels.height_px), Some(pixels)))
+    }
+}
+
+/// Why a scene cannot be measured.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
+pub enum CleanError {
+    #[error(transparent)]
+    Io(#[from] IoError),
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    #[error(transparent)]
+    Interrupted(#[from] Interrupted),
+}
+
+/// What was measured of a cloud, Gaussian by Gaussian.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct CloudMeasures {
+    values: Vec<(SplatMeasure, Vec<f32>)>,
+    /// Whether each Gaussian is part of a floater.
+    floaters: Vec<bool>,
+    /// Half the diagonal of the scene without its strays, scene units.
+    radius: f64,
+}
+
+impl CloudMeasures {
+    /// The values of a measure, `[n]`; `None` without the photos that it needs.
+    pub(crate) fn get(&self, measure: SplatMeasure) -> Option<&[f32]> {
+        self.values.iter().find(|(of, _)| *of == measure).map(|(_, values)| values.as_slice())
+    }
+}
+
+/// Measures all Gaussians; `views` are the photos that the scene was trained on, as far as they are known.
+///
+/// # Errors
+/// If a photo cannot be read or drawn, or the observer ends it.
+pub(crate) fn measure(
+    cloud: &GaussianCloud,
+    views: &[CleanView],
+    settings: &RenderSettings,
+    observer: &mut dyn Observer,
+) -> Result<CloudMeasures, CleanError> {
+    let radius = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i))).map_or(0.0, |b| b.radius());
+    let neighbors = neighbors(cloud, observer)?;
+    let sd = |i: usize| {
+        let mut sd = cloud.log_scales[i].map(f32::exp);
+        sd.sort_by(|a, b| b.total_cmp(a));
+        sd
+    };
+    let each = |f: &(dyn Fn(usize) -> f32 + Sync)| (0..cloud.len()).into_par_iter().map(f).collect::<Vec<f32>>();
+    let sizes = each(&|i| sd(i)[0]);
+    let pieces = pieces::pieces(&neighbors, &sizes);
+    let far = each(&|i| neighbors[i].get(LONELY - 1).map_or(f32::INFINITY, |n| n.1));
+    let usual = median(&far.iter().filter(|d| d.is_finite()).map(|d| f64::from(*d)).collect::<Vec<_>>());
+    let usual = if usual > 0.0 { usual as f32 } else { 1.0 };
+    let largest = f32::MAX;
+    let mut values = vec![
+        (SplatMeasure::Elongation, each(&|i| (sd(i)[0] / sd(i)[1].max(f32::MIN_POSITIVE)).min(largest))),
+        (SplatMeasure::Opacity, each(&|i| cloud.opacity_logits[i].sigmoid())),
+        (SplatMeasure::Spacing, each(&|i| (far[i] / usual).min(largest))),
+        (SplatMeasure::Piece, each(&|i| pieces.size(i) as f32)),
+        (SplatMeasure::Size, sizes),
+    ];
+    if !views.is_empty() {
+        let support = support::look(cloud, views, settings, observer)?;
+        values.extend([(SplatMeasure::Weight, support.largest), (SplatMeasure::Photos, support.photos)]);
+        values.extend(support.error.map(|error| (SplatMeasure::Error, error)));
+    }
+    let photos = values.iter().find(|(of, _)| *of == SplatMeasure::Photos).map(|(_, photos)| photos.as_slice());
+    let floaters = floaters::find(cloud, &pieces, photos, views, settings, observer)?;
+    Ok(CloudMeasures { values, floaters, radius })
+}
+
+/// The nearest neighbors of each Gaussian with their distances, the nearest first.
+fn neighbors(cloud: &GaussianCloud, observer: &mut dyn Observer) -> Result<Vec<Vec<(u32, f32)>>, Interrupted> {
+    let place = |i: usize| cloud.positions[i].map(f64::from);
+    let tree = RTree::bulk_load((0..cloud.len()).map(|i| GeomWithData::new(place(i), i as u32)).collect());
+    let of = |i: usize| {
+        let near = tree.nearest_neighbor_iter_with_distance_2(place(i)).filter(|(n, _)| n.data != i as u32);
+        near.take(NEIGHBORS).map(|(n, d)| (n.data, d.sqrt() as f32)).collect()
+    };
+    let mut ticker = Ticker::new("Looking for neighbors", cloud.len());
+    let mut all = Vec::with_capacity(cloud.len());
+    for from in (0..cloud.len()).step_by(BLOCK) {
+        ticker.tick(from, observer)?;
+        let to = (from + BLOCK).min(cloud.len());
+        all.par_extend((from..to).into_par_iter().map(of));
+    }
+    Ok(all)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,116 @@
+//! What is to be cleaned away, as it is typed and as it is carried out.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::{CloudMeasures, SplatMeasure};
+
+/// Opacity below which a Gaussian is hardly ever drawn.
+const FAINT: f32 = 0.005;
+/// Elongation from which a Gaussian is a needle.
+const NEEDLE: f32 = 30.0;
+/// Share of the scene's radius from which a Gaussian is oversized.
+const OVERSIZED: f64 = 0.5;
+/// Share of a pixel that what is supported has in some photo.
+const SUPPORTED: f32 = 0.01;
+
+/// Which Gaussians are meant.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum CleanRule {
+    /// Small pieces that hang in the air and that the photos do without.
+    Floaters,
+    /// Those that are as good as transparent.
+    Faint,
+    /// Those that are long and thin.
+    Needles,
+    /// Those that are large beside the scene.
+    Oversized,
+    /// Those that no photo shows.
+    Unsupported,
+    /// Those whose measure is less.
+    Below(SplatMeasure, f32),
+    /// Those whose measure is more.
+    Above(SplatMeasure, f32),
+    /// Those whose measure lies between the two, both included.
+    Range(SplatMeasure, f32, f32),
+}
+
+/// What is wrong with a rule.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum RuleError {
+    /// It is none.
+    #[error(
+        "'{0}' is no rule: floaters, faint, needles, oversized, unsupported, or a measure with a limit such as 'size>0.5' or 'photos<2'"
+    )]
+    Unknown(String),
+    /// Nothing is known of its measure.
+    #[error("{0} is not known of this scene: its photos are not there")]
+    NoPhotos(&'static str),
+}
+
+impl CleanRule {
+    /// The rules that need no number.
+    pub(crate) const NAMED: [Self; 5] =
+        [Self::Floaters, Self::Faint, Self::Needles, Self::Oversized, Self::Unsupported];
+
+    /// What it means, for the user.
+    pub(crate) fn meaning(&self) -> &'static str {
+        match self {
+            Self::Floaters => "small pieces in the air that the photos do without",
+            Self::Faint => "opacity under 0.005",
+            Self::Needles => "over 30 times as long as wide",
+            Self::Oversized => "larger than half the scene's radius",
+            Self::Unsupported => "under 1 % of every pixel of every photo",
+            Self::Below(measure, _) | Self::Above(measure, _) | Self::Range(measure, ..) => measure.meaning(),
+        }
+    }
+
+    /// Whether each Gaussian is meant, `[n]`.
+    pub(crate) fn choose(&self, of: &CloudMeasures) -> Result<Vec<bool>, RuleError> {
+        let (measure, is): (_, &dyn Fn(f32) -> bool) = match *self {
+            Self::Floaters => return Ok(of.floaters.clone()),
+            Self::Faint => (SplatMeasure::Opacity, &|v| v < FAINT),
+            Self::Needles => (SplatMeasure::Elongation, &|v| v > NEEDLE),
+            Self::Oversized => (SplatMeasure::Size, &|v| f64::from(v) > OVERSIZED * of.radius),
+            Self::Unsupported => (SplatMeasure::Weight, &|v| v < SUPPORTED),
+            Self::Below(measure, limit) => (measure, &move |v| v < limit),
+            Self::Above(measure, limit) => (measure, &move |v| v > limit),
+            Self::Range(measure, from, to) => (measure, &move |v| (from..=to).contains(&v)),
+        };
+        let values = of.get(measure).ok_or(RuleError::NoPhotos(measure.word()))?;
+        Ok(values.iter().map(|v| is(*v)).collect())
+    }
+}
+
+impl fmt::Display for CleanRule {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Floaters => f.write_str("floaters"),
+            Self::Faint => f.write_str("faint"),
+            Self::Needles => f.write_str("needles"),
+            Self::Oversized => f.write_str("oversized"),
+            Self::Unsupported => f.write_str("unsupported"),
+            Self::Below(measure, limit) => write!(f, "{}<{limit}", measure.word()),
+            Self::Above(measure, limit) => write!(f, "{}>{limit}", measure.word()),
+            Self::Range(measure, from, to) => write!(f, "{from}<{}<{to}", measure.word()),
+        }
+    }
+}
+
+impl FromStr for CleanRule {
+    type Err = RuleError;
+
+    fn from_str(text: &str) -> Result<Self, RuleError> {
+        let text = text.trim();
+        if let Some(named) = Self::NAMED.into_iter().find(|rule| rule.to_string() == text) {
+            return Ok(named);
+        }
+        let parsed = || {
+            let (word, limit) = text.split_once(['<', '>'])?;
+            let measure = SplatMeasure::from_str(word.trim()).ok()?;
+            let limit: f32 = limit.trim().parse().ok().filter(|v: &f32| v.is_finite())?;
+            Some(if text.contains('>') { Self::Above(measure, limit) } else { Self::Below(measure, limit) })
+        };
+        parsed().ok_or_else(|| RuleError::Unknown(text.into()))
+    }
+}

@@ -1,0 +1,209 @@
+//! Edits of Gaussians: objects and parts are moved, duplicated and recolored, chosen Gaussians deleted.
+//!
+//! An edit makes new Gaussians; the old ones stay as they are, so that it can be undone.
+
+use glam::{DMat3, DQuat, DVec3};
+
+use crate::math::sh::{self, SH_C0};
+use crate::math::{Real, rotation};
+use crate::pipeline::semantics::edit;
+use crate::scene::{Bounds, GaussianCloud, IdentityId, NOBODY, SemanticMap};
+
+/// Brightness of red, green and blue in a color as displayed (ITU-R BT.709).
+const BRIGHTNESS: [f64; 3] = [0.2126, 0.7152, 0.0722];
+/// Brightness that a thing has at least when it gets another color: shades of black are noise.
+const DARKEST: f64 = 0.1;
+
+/// A change of Gaussians.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SplatEdit {
+    /// Leaves out the Gaussians that are `true`.
+    Delete(Vec<bool>),
+    /// Puts an object or a part elsewhere.
+    Move(IdentityId, Placement),
+    /// Puts another one like it elsewhere.
+    Duplicate(IdentityId, Placement),
+    /// Gives an object or a part another color (red, green, blue, 0 to 1, as displayed); its shades stay.
+    Recolor(IdentityId, [f32; 3]),
+}
+
+/// Where something is put: turned and scaled about its own middle, then shifted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placement {
+    /// Scene units.
+    pub(crate) shift: DVec3,
+    pub(crate) turn: DQuat,
+    pub(crate) scale: f64,
+}
+
+impl Default for Placement {
+    fn default() -> Self {
+        Self { shift: DVec3::ZERO, turn: DQuat::IDENTITY, scale: 1.0 }
+    }
+}
+
+/// Why an edit cannot be made.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
+pub enum SplatEditError {
+    #[error("the scene has no objects and parts that could be edited")]
+    NoObjects,
+    #[error("there is no object or part number {0}")]
+    Unknown(IdentityId),
+    #[error("'{0}' has no Gaussians")]
+    Empty(String),
+    #[error("nothing would be left of the scene")]
+    NothingLeft,
+    #[error("a scale must be more than 0, and all numbers finite")]
+    Placement,
+    #[error("'{0}' would be too far away or too large for the numbers that a scene is stored in")]
+    OutOfRange(String),
+}
+
+type Result<T> = std::result::Result<T, SplatEditError>;
+
+/// The Gaussians and their objects and parts after an edit.
+///
+/// # Errors
+/// If it makes no sense; nothing has changed then.
+pub(crate) fn apply(
+    cloud: &GaussianCloud,
+    map: Option<&SemanticMap>,
+    edit: &SplatEdit,
+) -> Result<(GaussianCloud, Option<SemanticMap>)> {
+    match edit {
+        SplatEdit::Delete(gone) => delete(cloud, map, gone),
+        SplatEdit::Move(id, to) => {
+            let (map, thing) = thing(map, *id)?;
+            let mut new = cloud.clone();
+            place(&mut new, &thing, to, map, *id)?;
+            Ok((new, Some(map.clone())))
+        }
+        SplatEdit::Duplicate(id, to) => {
+            let (map, thing) = thing(map, *id)?;
+            let all: Vec<usize> = (0..cloud.len()).chain(thing.iter().copied()).collect();
+            let mut new = cloud.select(&all);
+            let copies: Vec<usize> = (cloud.len()..all.len()).collect();
+            place(&mut new, &copies, to, map, *id)?;
+            Ok((new, Some(doubled(map, &all, *id))))
+        }
+        SplatEdit::Recolor(id, color) => {
+            let (map, thing) = thing(map, *id)?;
+            let mut new = cloud.clone();
+            recolor(&mut new, &thing, color.map(f64::from));
+            Ok((new, Some(map.clone())))
+        }
+    }
+}
+
+/// The Gaussians of an identity, of which there are some.
+fn thing(map: Option<&SemanticMap>, id: IdentityId) -> Result<(&SemanticMap, Vec<usize>)> {
+    let map = map.ok_or(SplatEditError::NoObjects)?;
+    if map.identities.get(id).is_none() {
+        return Err(SplatEditError::Unknown(id));
+    }
+    let thing = map.members(id);
+    if thing.is_empty() { Err(SplatEditError::Empty(map.identities.full_name(id))) } else { Ok((map, thing)) }
+}
+
+fn delete(
+    cloud: &GaussianCloud,
+    map: Option<&SemanticMap>,
+    gone: &[bool],
+) -> Result<(GaussianCloud, Option<SemanticMap>)> {
+    let kept: Vec<usize> = (0..cloud.len()).filter(|&i| gone.get(i) != Some(&true)).collect();
+    if kept.is_empty() {
+        return Err(SplatEditError::NothingLeft);
+    }
+    Ok((cloud.select(&kept), map.map(|map| selected(map, &kept))))
+}
+
+/// The map of these Gaussians, with all that is known of its identities.
+fn selected(map: &SemanticMap, gaussians: &[usize]) -> SemanticMap {
+    SemanticMap { language: map.language.clone(), findings: map.findings.clone(), ..map.select(gaussians) }
+}
+
+/// What a thing turns about: the middle of it, without its stray Gaussians.
+pub(crate) fn middle(cloud: &GaussianCloud, thing: &[usize]) -> DVec3 {
+    Bounds::robust(thing.iter().map(|&i| cloud.world_position(i))).map_or(DVec3::ZERO, |b| b.center())
+}
+
+fn place(cloud: &mut GaussianCloud, thing: &[usize], to: &Placement, map: &SemanticMap, id: IdentityId) -> Result<()> {
+    let turn = rotation::unit_quaternion([to.turn.w, to.turn.x, to.turn.y, to.turn.z]);
+    let Some([w, x, y, z]) = turn.filter(|_| to.scale > 0.0 && to.scale.is_finite() && to.shift.is_finite()) else {
+        return Err(SplatEditError::Placement);
+    };
+    let turn = DQuat::from_xyzw(x, y, z, w);
+    let (about, origin, stride) = (middle(cloud, thing), cloud.origin, cloud.sh_stride());
+    let harmonics = sh::rotation(&DMat3::from_quat(turn));
+    for &i in thing {
+        let p = about + to.scale * (turn * (cloud.world_position(i) - about)) + to.shift;
+        cloud.positions[i] = (p - origin).as_vec3().to_array();
+        cloud.log_scales[i] = cloud.log_scales[i].map(|s| (f64::from(s) + to.scale.ln()) as f32);
+        if turn != DQuat::IDENTITY {
+            // Those that are no rotation are drawn as nothing, wherever they are.
+            if let Some([w, x, y, z]) = rotation::unit_quaternion(cloud.quaternions[i].map(f64::from)) {
+                let q = turn * DQuat::from_xyzw(x, y, z, w);
+                cloud.quaternions[i] = [q.w, q.x, q.y, q.z].map(|v| v as f32);
+            }
+            let own = &mut cloud.sh[i * stride..(i + 1) * stride];
+            let before: Vec<[f64; 3]> = own.iter().map(|c| c.map(f64::from)).collect();
+            for (row, coefficient) in harmonics.iter().zip(own.iter_mut()).skip(1) {
+                *coefficient = [0, 1, 2].map(|c| row.iter().zip(&before).map(|(m, b)| m * b[c]).sum::<f64>() as f32);
+            }
+        }
+    }
+    let is_good = |i: &usize| cloud.positions[*i].iter().chain(&cloud.log_scales[*i]).all(|v| v.is_finite());
+    if thing.iter().all(is_good) { Ok(()) } else { Err(SplatEditError::OutOfRange(map.identities.full_name(id))) }
+}
+
+/// The map of the Gaussians `all`, of which those that stand there again are of a second thing like `id`.
+fn doubled(map: &SemanticMap, all: &[usize], id: IdentityId) -> SemanticMap {
+    let mut new = selected(map, all);
+    let inside = map.identities.descendants(id);
+    let first_copy = map.identity_of.len();
+    let mut number: Vec<IdentityId> = (0..=map.identities.len() as IdentityId).collect();
+    // Wholes have smaller numbers than their pieces.
+    for old in (1..=map.identities.len() as IdentityId).filter(|i| inside[*i as usize]) {
+        let Some(identity) = map.identities.get(old) else { continue };
+        let parent = if old == id { identity.parent } else { number[identity.parent as usize] };
+        let name = identity.names.first().cloned().unwrap_or_default();
+        let own: Vec<usize> = (first_copy..all.len()).filter(|&k| map.identity_of[all[k]] == old).collect();
+        let added = edit::add(&mut new, identity.level, parent, name, &own);
+        number[old as usize] = added;
+        if let Some(copy) = new.identities.get_mut(added) {
+            copy.names = identity.names.clone();
+        }
+        if let Some(language) = &mut new.language
+            && let Some(seen) = language.by_identity.get(old as usize - 1).cloned()
+            && let Some(copy) = language.by_identity.get_mut(added as usize - 1)
+        {
+            *copy = seen;
+        }
+    }
+    debug_assert!(number[id as usize] != NOBODY);
+    new
+}
+
+/// Multiplies a thing's shades of gray by a color, in which its mean brightness becomes that color.
+fn recolor(cloud: &mut GaussianCloud, thing: &[usize], color: [f64; 3]) {
+    let stride = cloud.sh_stride();
+    let brightness = |rgb: [f64; 3]| BRIGHTNESS.iter().zip(rgb).map(|(b, v)| b * v).sum::<f64>();
+    let shown = |c: [f32; 3]| c.map(|v| 0.5 + SH_C0 * f64::from(v));
+    let (sum, weight) = thing.iter().fold((0.0, 0.0), |(sum, weight), &i| {
+        let [a, b, c] = cloud.log_scales[i].map(|s| f64::from(s).exp());
+        // The two larger extents are what is seen of it.
+        let w = f64::from(cloud.opacity_logits[i].sigmoid()) * (a * b).max(b * c).max(a * c);
+        (sum + w * brightness(shown(cloud.sh[i * stride])).clamp(0.0, 1.0), weight + w)
+    });
+    let mean = if weight > 0.0 { (sum / weight).max(DARKEST) } else { DARKEST };
+    let tinted = |gray: f64| color.map(|c| c * gray / mean);
+    for &i in thing {
+        let own = &mut cloud.sh[i * stride..(i + 1) * stride];
+        own[0] = tinted(brightness(shown(own[0]))).map(|v| ((v - 0.5) / SH_C0) as f32);
+        own[1..].iter_mut().for_each(|c| *c = tinted(brightness(c.map(f64::from))).map(|v| v as f32));
+    }
+}
+
+#[cfg(test)]
+mod tests;
