@@ -136,25 +136,28 @@ pub(crate) fn measure(
     };
     let each = |f: &(dyn Fn(usize) -> f32 + Sync)| (0..cloud.len()).into_par_iter().map(f).collect::<Vec<f32>>();
     let sizes = each(&|i| sd(i)[0]);
-    let pieces = pieces::pieces(&neighbors, &sizes);
+    let pieces = pieces::pieces(&neighbors, &sizes, |_| true);
     let far = each(&|i| neighbors[i].get(LONELY - 1).map_or(f32::INFINITY, |n| n.1));
     let usual = median(&far.iter().filter(|d| d.is_finite()).map(|d| f64::from(*d)).collect::<Vec<_>>());
     let usual = if usual > 0.0 { usual as f32 } else { 1.0 };
     let largest = f32::MAX;
+    let support = match views {
+        [] => None,
+        views => Some(support::look(cloud, views, settings, observer)?),
+    };
+    let shape = floaters::Shape { neighbors: &neighbors, sizes: &sizes, pieces: &pieces };
+    let floaters = floaters::find(cloud, &shape, support.as_ref(), views, settings, observer)?;
     let mut values = vec![
         (SplatMeasure::Elongation, each(&|i| (sd(i)[0] / sd(i)[1].max(f32::MIN_POSITIVE)).min(largest))),
         (SplatMeasure::Opacity, each(&|i| cloud.opacity_logits[i].sigmoid())),
         (SplatMeasure::Spacing, each(&|i| (far[i] / usual).min(largest))),
         (SplatMeasure::Piece, each(&|i| pieces.size(i) as f32)),
-        (SplatMeasure::Size, sizes),
     ];
-    if !views.is_empty() {
-        let support = support::look(cloud, views, settings, observer)?;
+    if let Some(support) = support {
         values.extend([(SplatMeasure::Weight, support.largest), (SplatMeasure::Photos, support.photos)]);
         values.extend(support.error.map(|error| (SplatMeasure::Error, error)));
     }
-    let photos = values.iter().find(|(of, _)| *of == SplatMeasure::Photos).map(|(_, photos)| photos.as_slice());
-    let floaters = floaters::find(cloud, &pieces, photos, views, settings, observer)?;
+    values.push((SplatMeasure::Size, sizes));
     Ok(CloudMeasures { values, floaters, radius })
 }
 

@@ -1,57 +1,89 @@
-//! Floaters: small pieces that hang in the air apart and that the photos do without.
+//! Floaters: what hangs in the air and the photos do without.
+//!
+//! Two sorts of groups are suspected: small pieces apart from all else, and Gaussians that hang together and whose color
+//! is not that of the photos. All are taken away at once, the photos are drawn with and without, and each group is
+//! judged by its pixels. Those that are missed come back, and the rest is judged again without them.
 
-use super::pieces::Pieces;
-use super::support::color;
+use super::pieces::{Pieces, pieces};
+use super::support::{PhotoSupport, color};
 use super::{CleanError, CleanView};
 use crate::math::lanes::Lane;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::render::{ContributionSink, Features, RenderSettings, Renderer, TILE_PX};
-use crate::scene::GaussianCloud;
+use crate::scene::{GaussianCloud, PhotoPixels};
 
 /// A piece of fewer Gaussians is small, and one of fewer than this share of the cloud.
 const SMALL: u32 = 30;
 const SMALL_SHARE: f64 = 1.0 / 2000.0;
 /// Photos that must show a piece before they can speak for it: what one alone shows may be anywhere.
 const WITNESSES: f32 = 3.0;
-/// Growth of the mean squared error of its pixels from which photos miss a piece: a color step of 2 %.
-const MISSED: f64 = 0.0004;
+/// Difference of a color from the photos from which a Gaussian is suspected wherever it is.
+const SUSPECT: f32 = 0.2;
+/// Change of the mean squared error of its pixels from which photos miss a group, or are better off without it: a color
+/// step of 2 %.
+const NOTICED: f64 = 0.0004;
+const ROUNDS: usize = 2;
 
-/// Whether each Gaussian is of a floater; `photos` says how many show it, if that is known.
+/// What lies where.
+pub(super) struct Shape<'a> {
+    pub(super) neighbors: &'a [Vec<(u32, f32)>],
+    /// Largest standard deviations.
+    pub(super) sizes: &'a [f32],
+    pub(super) pieces: &'a Pieces,
+}
+
+/// Whether each Gaussian is of a floater.
 pub(super) fn find(
     cloud: &GaussianCloud,
-    pieces: &Pieces,
-    photos: Option<&[f32]>,
+    shape: &Shape<'_>,
+    support: Option<&PhotoSupport>,
     views: &[CleanView],
     settings: &RenderSettings,
     observer: &mut dyn Observer,
 ) -> Result<Vec<bool>, CleanError> {
     let n = cloud.len();
-    let small = SMALL.max((n as f64 * SMALL_SHARE) as u32);
-    let mut floating: Vec<bool> = (0..n).map(|i| pieces.size(i) < small.min(n.div_ceil(2) as u32)).collect();
-    if let Some(photos) = photos
-        && floating.contains(&true)
-    {
-        let mut witnesses = vec![0.0_f32; n];
-        (0..n).for_each(|i| witnesses[pieces.of(i) as usize] = witnesses[pieces.of(i) as usize].max(photos[i]));
-        let missed = missed(cloud, pieces, &floating, views, settings, observer)?;
+    let least = SMALL.max((n as f64 * SMALL_SHARE) as u32).min(n.div_ceil(2) as u32);
+    let apart = |i: usize| shape.pieces.size(i) < least;
+    let mut floating: Vec<bool> = (0..n).map(apart).collect();
+    let Some(PhotoSupport { photos, error: Some(error), .. }) = support else {
+        // Cameras alone say what is seen by few.
+        let seen = |i: usize| support.is_some_and(|s| s.photos[i] >= WITNESSES);
+        let mut kept = vec![false; n];
+        (0..n).filter(|i| seen(*i)).for_each(|i| kept[shape.pieces.of(i) as usize] = true);
+        (0..n).for_each(|i| floating[i] &= !kept[shape.pieces.of(i) as usize]);
+        return Ok(floating);
+    };
+    let odd = |i: usize| !apart(i) && error[i] > SUSPECT && photos[i] >= WITNESSES;
+    let odd_pieces = pieces(shape.neighbors, shape.sizes, odd);
+    (0..n).for_each(|i| floating[i] |= odd(i));
+    // Groups carry the number of one of their own.
+    let group: Vec<usize> =
+        (0..n).map(|i| if odd(i) { odd_pieces.of(i) } else { shape.pieces.of(i) } as usize).collect();
+    let mut witnesses = vec![0.0_f32; n];
+    (0..n).for_each(|i| witnesses[group[i]] = witnesses[group[i]].max(photos[i]));
+    for _ in 0..ROUNDS {
+        if !floating.contains(&true) {
+            break;
+        }
+        let growth = growth(cloud, (&floating, &group), views, settings, observer)?;
         for i in 0..n {
-            let piece = pieces.of(i) as usize;
-            floating[i] = floating[i] && (witnesses[piece] < WITNESSES || !missed[piece]);
+            let of = group[i];
+            let stays = if odd(i) { growth[of] > -NOTICED } else { growth[of] > NOTICED };
+            floating[i] &= !stays || witnesses[of] < WITNESSES;
         }
     }
     Ok(floating)
 }
 
-/// Whether the photos become worse without each piece that is `floating`, all of them being gone; nothing is missed
-/// that no photo at hand shows.
-fn missed(
+/// How much the mean squared error of the photos grows where each group is `floating`, when all of that is gone; 0 for
+/// what no photo shows.
+fn growth(
     cloud: &GaussianCloud,
-    pieces: &Pieces,
-    floating: &[bool],
+    (floating, group): (&[bool], &[usize]),
     views: &[CleanView],
     settings: &RenderSettings,
     observer: &mut dyn Observer,
-) -> Result<Vec<bool>, CleanError> {
+) -> Result<Vec<f64>, CleanError> {
     let rest: Vec<usize> = (0..cloud.len()).filter(|&i| !floating[i]).collect();
     let rest = cloud.select(&rest);
     let (mut weight, mut worse) = (vec![0.0_f64; cloud.len()], vec![0.0_f64; cloud.len()]);
@@ -62,11 +94,7 @@ fn missed(
         let (camera, Some(photo)) = view.small()? else { continue };
         let mut errors = |cloud: &GaussianCloud| -> Result<Vec<f32>, CleanError> {
             let frame = renderer.render(cloud, Features::NONE, &camera, settings)?;
-            let error = |i: usize| {
-                let there = color(&photo, i)?;
-                Some((0..3).map(|c| (frame.color[c][i].clamp(0.0, 1.0) - there[c]).powi(2)).sum::<f32>() / 3.0)
-            };
-            Ok((0..photo.rgb.len()).map(|i| error(i).unwrap_or(0.0)).collect())
+            Ok((0..photo.rgb.len()).map(|i| squared_error(&frame.color, &photo, i)).collect())
         };
         let (with, without) = (errors(cloud)?, errors(&rest)?);
         let growth: Vec<f32> = without.iter().zip(&with).map(|(a, b)| a - b).collect();
@@ -75,12 +103,17 @@ fn missed(
             .collect();
         renderer.contributions(cloud, &camera, settings, &mut rows)?;
         for (i, w, g) in rows.into_iter().flat_map(|row| row.sums) {
-            let piece = pieces.of(i as usize) as usize;
-            weight[piece] += f64::from(w);
-            worse[piece] += f64::from(g);
+            weight[group[i as usize]] += f64::from(w);
+            worse[group[i as usize]] += f64::from(g);
         }
     }
-    Ok(weight.iter().zip(&worse).map(|(w, g)| *g > MISSED * w && *w > 0.0).collect())
+    Ok(weight.iter().zip(&worse).map(|(w, g)| if *w > 0.0 { g / w } else { 0.0 }).collect())
+}
+
+/// Mean over the channels; 0 where the photo shows nothing.
+fn squared_error(drawn: &[Vec<f32>; 3], photo: &PhotoPixels, i: usize) -> f32 {
+    let Some(there) = color(photo, i) else { return 0.0 };
+    (0..3).map(|c| (drawn[c][i].clamp(0.0, 1.0) - there[c]).powi(2)).sum::<f32>() / 3.0
 }
 
 struct Row<'a> {

@@ -22,12 +22,13 @@ impl Pieces {
     }
 }
 
-/// Joins what one of both reaches; `sizes` are standard deviations.
-pub(super) fn pieces(neighbors: &[Vec<(u32, f32)>], sizes: &[f32]) -> Pieces {
+/// Joins neighbors of which one reaches the other, as far as both are `among` those that count; `sizes` are standard
+/// deviations.
+pub(super) fn pieces(neighbors: &[Vec<(u32, f32)>], sizes: &[f32], among: impl Fn(usize) -> bool) -> Pieces {
     let mut parent: Vec<u32> = (0..neighbors.len() as u32).collect();
     for (i, near) in neighbors.iter().enumerate() {
         for &(j, distance) in near {
-            if distance <= REACH * sizes[i].max(sizes[j as usize]) {
+            if distance <= REACH * sizes[i].max(sizes[j as usize]) && among(i) && among(j as usize) {
                 let (a, b) = (root(&mut parent, i as u32), root(&mut parent, j));
                 parent[a.max(b) as usize] = a.min(b);
             }
