@@ -93,11 +93,21 @@ impl SceneFolder {
         map: &SemanticMap,
         cloud: &GaussianCloud,
     ) -> Result<String, IoError> {
+        self.save_edited(known, Some(map), cloud)
+    }
+
+    /// As [`Self::save_map`] for other Gaussians, with their map if they have one.
+    pub(crate) fn save_edited(
+        &self,
+        known: Option<&str>,
+        map: Option<&SemanticMap>,
+        cloud: &GaussianCloud,
+    ) -> Result<String, IoError> {
         let info = load_info(self.path())?;
         if splat_ply::state(&self.path().join(CLOUD_FILE))?.as_deref() != known {
             return Err(IoError::Changed { folder: self.path().into() });
         }
-        self.save(&info, cloud, Some(map))
+        self.save(&info, cloud, map)
     }
 
     /// As [`Self::save_map`], but what was there before is kept (see [`Self::keep_earlier`]): where, and the

@@ -1,13 +1,14 @@
 //! Cleaning a scene: what is measured of its Gaussians, and the scene without those that were chosen.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use super::{JobError, Scene, derived, open, rearrange};
 use crate::pipeline::cleaning::{self, CleanView};
-pub(crate) use crate::pipeline::cleaning::{CleanRule, CloudMeasures};
+pub(crate) use crate::pipeline::cleaning::{CleanRule, CloudMeasures, SplatMeasure};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::splat_edit::SplatEdit;
-use crate::scene::Dataset;
+use crate::scene::{Dataset, GaussianCloud};
 
 /// Measures the Gaussians of `scene`, by the photos that it was trained on where they are at hand; `photos` says where
 /// they are if that is somewhere else than the scene says.
@@ -29,6 +30,29 @@ pub(crate) fn measure(
     };
     let views = views(scene, dataset.as_ref());
     Ok(cleaning::measure(&scene.cloud, &views, &scene.settings, observer)?)
+}
+
+/// What the window asks for.
+#[derive(Clone, Debug)]
+pub struct MeasureRequest {
+    /// Where the scene lies.
+    pub(crate) path: PathBuf,
+    /// Its Gaussians as they are now.
+    pub(crate) cloud: Arc<GaussianCloud>,
+}
+
+/// Gaussians and what was measured of them.
+#[derive(Clone, Debug)]
+pub struct MeasuredCloud {
+    pub(crate) cloud: Arc<GaussianCloud>,
+    pub(crate) measures: CloudMeasures,
+}
+
+/// Measures the Gaussians on screen.
+pub(crate) fn measured(request: MeasureRequest, observer: &mut dyn Observer) -> Result<MeasuredCloud, JobError> {
+    let MeasureRequest { path, cloud } = request;
+    let scene = Scene { cloud: Arc::clone(&cloud), ..open::scene(&path)? };
+    Ok(MeasuredCloud { cloud, measures: measure(&scene, None, observer)? })
 }
 
 /// The photos that the scene was trained on, without those that are held out to measure with.

@@ -46,7 +46,8 @@ pub(crate) fn check(out: &Path) -> Result<(), JobError> {
 
 /// `desk-cleaned` beside `desk` for `how` "cleaned", with a number if there is one already.
 pub(crate) fn free_folder(scene: &Path, how: &str) -> PathBuf {
-    let stem = scene.file_stem().map_or_else(|| "scene".into(), |n| n.to_string_lossy());
+    let name = if scene.is_dir() { scene.file_name() } else { scene.file_stem() };
+    let stem = name.map_or_else(|| "scene".into(), |n| n.to_string_lossy());
     let place = |number: usize| match number {
         1 => scene.with_file_name(format!("{stem}-{how}")),
         n => scene.with_file_name(format!("{stem}-{how}-{n}")),

@@ -174,9 +174,16 @@ pub struct OpenedScene {
     pub(crate) resumable: Option<TrainConfig>,
     pub(crate) reports: Vec<PathBuf>,
     pub(crate) report_out: PathBuf,
+    /// Whether edits of Gaussians have made it, and are stored in it.
+    pub(crate) is_edited: bool,
 }
 
 impl OpenedScene {
+    /// Where its Gaussians are stored: the folder of a trained scene, or a file.
+    pub(crate) fn stored(&self) -> &Path {
+        if trained::is_scene(&self.out) { &self.out } else { &self.path }
+    }
+
     /// Length of a unit in meters, if it is known of the scene or of its photos.
     pub(crate) fn meters_per_unit(&self) -> Option<f64> {
         self.metres_per_unit.or_else(|| self.dataset.as_ref().and_then(|d| d.metres_per_unit))

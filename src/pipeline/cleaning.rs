@@ -56,6 +56,11 @@ impl SplatMeasure {
         self.into()
     }
 
+    /// Whether its values differ by factors.
+    pub(crate) fn is_logarithmic(self) -> bool {
+        matches!(self, Self::Size | Self::Elongation | Self::Spacing | Self::Piece)
+    }
+
     /// What it is.
     pub(crate) fn meaning(self) -> &'static str {
         match self {
@@ -111,6 +116,15 @@ pub(crate) struct CloudMeasures {
 }
 
 impl CloudMeasures {
+    /// Those of the Gaussians that are not `gone`, as they were measured with them.
+    pub(crate) fn without(&self, gone: &[bool]) -> Self {
+        fn left<T: Copy>(of: &[T], gone: &[bool]) -> Vec<T> {
+            of.iter().zip(gone).filter(|(_, gone)| !**gone).map(|(v, _)| *v).collect()
+        }
+        let values = self.values.iter().map(|(measure, values)| (*measure, left(values, gone))).collect();
+        Self { values, floaters: left(&self.floaters, gone), radius: self.radius }
+    }
+
     /// The values of a measure, `[n]`; `None` without the photos that it needs.
     pub(crate) fn get(&self, measure: SplatMeasure) -> Option<&[f32]> {
         self.values.iter().find(|(of, _)| *of == measure).map(|(_, values)| values.as_slice())

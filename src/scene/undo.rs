@@ -26,6 +26,13 @@ impl<T> UndoHistory<T> {
         }
     }
 
+    /// Keeps past states, the newest first, as long as `keep` says so.
+    pub(crate) fn keep_newest_while(&mut self, keep: impl FnMut(&T) -> bool) {
+        let mut keep = keep;
+        let kept = self.past.iter().rev().take_while(|state| keep(state)).count();
+        self.past.drain(..self.past.len() - kept);
+    }
+
     pub(crate) fn last(&self) -> Option<&T> {
         self.past.last()
     }

@@ -47,6 +47,8 @@ impl App {
             Action::FindObjects => self.find_objects(),
             Action::SegmentPhoto => self.segment_photo(),
             Action::Remove(id) => self.remove(id),
+            Action::MeasureSplats => self.measure_splats(),
+            Action::DeleteChosen => self.delete_chosen(),
             Action::AnotherFill(halo) => self.fill_anew(halo),
             Action::FetchModel(id) => self.install_model(id, None),
             Action::TypeQuery => self.type_question(),

@@ -41,6 +41,8 @@ pub enum Pane {
     /// The camera's path.
     #[strum(serialize = "Camera path")]
     Camera,
+    /// Floaters and the like, found and deleted.
+    Clean,
     /// Error against run time.
     Report,
     /// Messages.
@@ -208,6 +210,10 @@ actions! {
         "Take it out, into a scene of its own that is shown beside this one: what it hid is closed from what is around.";
     AnotherFill(halo: bool): "Another fill",
         "Remove it again, with another choice of what hides below it; the scene made before stays.";
+    MeasureSplats: "Measure Gaussians",
+        "Size, shape, opacity and neighbors of each, and what the photos show of it: finds floaters and the like.";
+    DeleteChosen: "Delete the chosen Gaussians",
+        "Delete what is chosen in the Clean pane; can be undone, and the scene that was opened stays as it is.";
     ExportCrop: "Export what the crop box keeps\u{2026}",
         "Write the Gaussians whose centers it keeps, hidden ones too, in the format that 3DGS viewers read.";
     Change(edit: Edit): match edit {
@@ -299,7 +305,7 @@ impl Action {
     pub(crate) fn all() -> Vec<Self> {
         let mut all = Self::plain();
         // Without a tool in use there is nothing to keep.
-        all.retain(|a| *a != Self::AddPainted);
+        all.retain(|a| !matches!(a, Self::AddPainted | Self::DeleteChosen));
         all.extend([Self::Isolate(None), Self::Paint(Some(NOBODY)), Self::SetCrop(None)]);
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::ShowPane(*pane)));

@@ -16,8 +16,9 @@ use super::history::{EditStep, Editing};
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
 use super::panes::{
-    bars, dataset::PhotoThumbnails, empty::FirstPage, log, models::Models, object_thumbnails::ObjectThumbnails,
-    objects::ObjectsPane, phrases::PhrasesPane, plan, problems, report::ReportPane, training, unposed,
+    bars, clean::CleanPane, dataset::PhotoThumbnails, empty::FirstPage, log, models::Models,
+    object_thumbnails::ObjectThumbnails, objects::ObjectsPane, phrases::PhrasesPane, plan, problems,
+    report::ReportPane, training, unposed,
 };
 use super::state::AppState;
 use super::toasts::Toasts;
@@ -52,6 +53,7 @@ pub struct App {
     pub phrases: PhrasesPane,
     pub(super) objects: ObjectsPane,
     pub(super) models: Models,
+    pub(super) clean: CleanPane,
     /// Error against run time.
     pub(crate) report: ReportPane,
     /// The camera's path and its player.
@@ -113,6 +115,7 @@ impl App {
             phrases: PhrasesPane::default(),
             objects: ObjectsPane::default(),
             models: Models::default(),
+            clean: CleanPane::default(),
             report: ReportPane::default(),
             camera: CameraPane::default(),
             chat: Chat::default(),
@@ -171,6 +174,9 @@ impl App {
         }
         self.explore();
         self.viewport.update(&mut self.state, &self.worker);
+        let cloud = self.viewport.cloud().map(|cloud| &**cloud);
+        let chosen = self.clean.update(&mut self.state, cloud, self.layout.shows(Pane::Clean));
+        self.viewport.visibility.set_chosen(chosen);
         self.camera.on_scene(self.state.scene_number);
         self.visited();
         for effect in self.chat.news() {
@@ -284,6 +290,7 @@ impl App {
                 let comparing = viewport.queries.truth().is_some();
                 self.phrases.show(ui, state, comparing, actions);
             }
+            Pane::Clean => self.clean.show(ui, state, actions),
             Pane::Camera => {
                 let eye = viewport.pose();
                 if let Some(pose) = self.camera.show(ui, state, &eye, actions) {
@@ -297,7 +304,7 @@ impl App {
 
     fn over_everything(&mut self, ctx: &egui::Context) {
         if ctx.input(|i| !i.raw.hovered_files.is_empty()) {
-            drop_hint(ctx);
+            dialogs::drop_hint(ctx);
         }
         if let Some(action) = self.palette.show(ctx, &self.layout) {
             self.actions.push(action);
@@ -347,7 +354,7 @@ impl DockContents for App {
         let Place::Pane(pane) = place else { return self.show_view(ui) };
         Frame::new().fill(theme::panel()).inner_margin(Margin::same(12)).show(ui, |ui| {
             ui.set_min_size(ui.available_size());
-            if matches!(pane, Pane::Training | Pane::Query | Pane::Plan | Pane::Models) {
+            if matches!(pane, Pane::Training | Pane::Query | Pane::Plan | Pane::Models | Pane::Clean) {
                 ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| self.show_pane(ui, pane));
             } else {
                 self.show_pane(ui, pane);
@@ -388,13 +395,4 @@ impl eframe::App for App {
     fn clear_color(&self, _visuals: &egui::Visuals) -> [f32; 4] {
         theme::canvas().to_normalized_gamma_f32()
     }
-}
-
-fn drop_hint(ctx: &egui::Context) {
-    let painter = ctx.layer_painter(egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("drop")));
-    let rect = ctx.content_rect();
-    painter.rect_filled(rect, 0.0, egui::Color32::from_black_alpha(170));
-    painter.rect_stroke(rect.shrink(24.0), 12.0, egui::Stroke::new(2.0, theme::accent()), egui::StrokeKind::Inside);
-    let font = egui::FontId::proportional(24.0);
-    painter.text(rect.center(), egui::Align2::CENTER_CENTER, "Drop to open", font, theme::text());
 }

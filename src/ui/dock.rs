@@ -68,7 +68,7 @@ fn wide() -> Tree<Place> {
     let mut tiles = Tiles::default();
     let photos = tabs(&mut tiles, &[Pane::Dataset]);
     let middle = middle(&mut tiles);
-    let work = tabs(&mut tiles, &[Pane::Training, Pane::Objects, Pane::Models, Pane::Plan]);
+    let work = tabs(&mut tiles, &[Pane::Training, Pane::Objects, Pane::Models, Pane::Plan, Pane::Clean]);
     let talk = tabs(&mut tiles, &[Pane::Chat, Pane::Query]);
     let right = tiles.insert_vertical_tile(vec![work, talk]);
     share(&mut tiles, right, work, 1.9);
@@ -82,7 +82,8 @@ fn wide() -> Tree<Place> {
 fn narrow() -> Tree<Place> {
     let mut tiles = Tiles::default();
     let middle = middle(&mut tiles);
-    let panes = [Pane::Training, Pane::Objects, Pane::Chat, Pane::Query, Pane::Dataset, Pane::Models, Pane::Plan];
+    let panes =
+        [Pane::Training, Pane::Objects, Pane::Chat, Pane::Query, Pane::Dataset, Pane::Models, Pane::Plan, Pane::Clean];
     let right = tabs(&mut tiles, &panes);
     let root = tiles.insert_horizontal_tile(vec![middle, right]);
     share(&mut tiles, root, right, 310.0);

@@ -4,10 +4,11 @@ use std::sync::Arc;
 
 use super::app::App;
 use super::context::SceneContext;
-use super::history::{EditSnapshot, EditStep, Editing, ViewState, edit_text};
+use super::history::{EditSnapshot, EditStep, Editing, ViewState, edit_text, splat_edit_text};
 use super::state::Tone;
 use super::viewport::selecting::SelectTool;
 use crate::jobs::edit::EditRequest;
+use crate::jobs::rearrange::{RearrangeRequest, SplatChange, SplatEdit};
 use crate::jobs::select::{SelectRequest, empty_map};
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::Identities;
@@ -35,6 +36,7 @@ impl App {
             self.settle(true);
             match step {
                 EditStep::Request(request) => self.request(request),
+                EditStep::Rearrange(edit) => self.rearrange(edit),
                 EditStep::Undo => self.go_in_history(false),
                 EditStep::Redo => self.go_in_history(true),
                 // Where the user has done something since, what the agent did is undone alone.
@@ -83,6 +85,27 @@ impl App {
         self.submit(Command::EditObjects { cloud, map, request, out })
     }
 
+    /// Changes Gaussians.
+    fn rearrange(&mut self, edit: SplatEdit) {
+        let none = Identities::default();
+        let all = self.state.semantics.as_ref().map_or(&none, |map| &map.identities);
+        let what = Some(splat_edit_text(&edit, all));
+        let job = self.submit_rearrangement(SplatChange::Apply(edit));
+        self.editing = job.map(|job| Editing { job, what, redo: false });
+    }
+
+    fn submit_rearrangement(&mut self, change: SplatChange) -> Option<JobId> {
+        if !self.state.is_trained() {
+            self.state.toast(Tone::Warning, "Only trained Gaussians can be edited.");
+            return None;
+        }
+        let SceneContext { scene, cloud, map, cameras, .. } = self.context()?;
+        let (cloud, map) = (Arc::clone(&cloud), map.map(|map| Arc::clone(&map)));
+        let (facts, path, is_edited) = (self.state.plan.facts.clone(), scene.stored().to_path_buf(), scene.is_edited);
+        let request = RearrangeRequest { path, is_edited, cloud, map, change, facts, cameras };
+        self.submit(Command::Rearrange(Box::new(request)))
+    }
+
     /// Takes in that an edit is over.
     fn edited(&mut self, editing: Editing) {
         if self.state.changes.now().is_none_or(|now| now.scene != self.state.scene_number) {
@@ -91,7 +114,7 @@ impl App {
         let map = self.state.semantics.as_deref().cloned();
         let Some(what) = editing.what else {
             // One that could not be stored leaves all as it was.
-            if !self.state.changes.has_map(&map)
+            if !self.state.changes.has(&self.snapshot())
                 && let Some((_, back)) = self.state.changes.go(!editing.redo)
             {
                 self.show_state(back.view);
@@ -116,9 +139,16 @@ impl App {
             self.state.toast(Tone::Info, if redo { "Nothing to redo." } else { "Nothing to undo." });
             return;
         };
-        let map = self.state.semantics.as_deref().cloned();
-        if let Some(other) = to.map.filter(|_| !self.state.changes.has_map(&map)) {
-            let Some(job) = self.submit_edit(EditRequest::Restore(other)) else {
+        if !self.state.changes.has(&self.snapshot()) {
+            let now = self.viewport.cloud().map(|cloud| Arc::clone(cloud));
+            let job = match (to.cloud, to.map) {
+                (Some(cloud), map) if now.is_none_or(|now| !Arc::ptr_eq(&now, &cloud)) => {
+                    self.submit_rearrangement(SplatChange::Restore(cloud, map))
+                }
+                (_, Some(map)) => self.submit_edit(EditRequest::Restore(map)),
+                (_, None) => None,
+            };
+            let Some(job) = job else {
                 self.state.changes.go(!redo);
                 return;
             };
@@ -157,7 +187,8 @@ impl App {
             recipes: viewport.queries.recipes(),
         };
         let map = self.state.semantics.as_deref().cloned();
-        EditSnapshot { scene: self.state.scene_number, map, view }
+        let cloud = viewport.cloud().filter(|_| self.state.is_trained()).map(|cloud| Arc::clone(cloud));
+        EditSnapshot { scene: self.state.scene_number, map, cloud, view }
     }
 
     /// Takes into the history what was done since, unless objects and parts are about to change. The path and

@@ -8,11 +8,16 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use crate::jobs::edit::EditRequest;
+use crate::jobs::rearrange::SplatEdit;
+use crate::math::format::things;
 use crate::pipeline::semantics::edit::Edit;
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::scene::undo::UndoHistory;
-use crate::scene::{CameraPath, CropBox, Identities, IdentityId, NOBODY, SemanticMap};
+use crate::scene::{CameraPath, CropBox, GaussianCloud, Identities, IdentityId, NOBODY, SemanticMap};
 use crate::worker::{JobId, ViewMode};
+
+/// Bytes of Gaussians that are kept to go back to.
+const MOST_BYTES: u64 = 1 << 30;
 
 /// What can be changed back beside objects and parts.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +43,8 @@ pub(crate) struct EditSnapshot {
     /// Counts scenes: what was done to another is forgotten.
     pub(crate) scene: u64,
     pub(crate) map: Option<Arc<SemanticMap>>,
+    /// The Gaussians, where they are a result.
+    pub(crate) cloud: Option<Arc<GaussianCloud>>,
     pub(crate) view: ViewState,
 }
 
@@ -56,6 +63,11 @@ pub(crate) struct ChangeHistory {
 }
 
 impl EditSnapshot {
+    /// Whether the other has other objects and parts, or other Gaussians.
+    fn is_edited(&self, other: &Self) -> bool {
+        !is_same(&self.map, &other.map) || !is_same(&self.cloud, &other.cloud)
+    }
+
     /// Whether an identity has this name.
     pub(crate) fn is_called(&self, id: IdentityId, name: &str) -> bool {
         let identity = self.map.as_ref().and_then(|map| map.identities.get(id));
@@ -69,16 +81,16 @@ impl ChangeHistory {
         self.now.as_ref()
     }
 
-    /// Whether it knows these objects and parts.
-    pub(crate) fn has_map(&self, map: &Option<Arc<SemanticMap>>) -> bool {
-        self.now.as_ref().is_some_and(|now| is_same(&now.map, map))
+    /// Whether these objects and parts, and these Gaussians, are those that it knows.
+    pub(crate) fn has(&self, other: &EditSnapshot) -> bool {
+        self.now.as_ref().is_some_and(|now| !now.is_edited(other))
     }
 
-    /// Takes in how it is now. A change of objects and parts is called what `edit` says; without it they are others
+    /// Takes in how it is now. A change of objects, parts and Gaussians is called what `edit` says; without it they are others
     /// than before, and what was done is forgotten. What has changed, in words.
     pub(crate) fn settle(&mut self, now: &EditSnapshot, edit: Option<&str>) -> Option<String> {
         let before = self.now.as_ref().filter(|before| before.scene == now.scene);
-        let is_edited = before.is_some_and(|before| !is_same(&before.map, &now.map));
+        let is_edited = before.is_some_and(|before| before.is_edited(now));
         let Some(before) = before.filter(|_| !is_edited || edit.is_some()) else {
             *self = Self { now: Some(now.clone()), ..Self::default() };
             return None;
@@ -92,8 +104,21 @@ impl ChangeHistory {
         };
         if let Some(other) = self.now.replace(now.clone()) {
             self.changes.record(Change { what: what.clone(), other });
+            self.forget_the_farthest();
         }
         Some(what)
+    }
+
+    /// Forgets the oldest changes where the Gaussians before and after them would take too much memory.
+    fn forget_the_farthest(&mut self) {
+        let (mut last, mut bytes) = (self.now.as_ref().and_then(|now| now.cloud.clone()), 0);
+        self.changes.keep_newest_while(|change| {
+            if !is_same(&change.other.cloud, &last) {
+                last.clone_from(&change.other.cloud);
+                bytes += last.as_ref().map_or(0, |cloud| cloud.bytes());
+            }
+            bytes <= MOST_BYTES
+        });
     }
 
     /// What undoing takes back.
@@ -125,7 +150,7 @@ impl ChangeHistory {
     }
 }
 
-fn is_same(a: &Option<Arc<SemanticMap>>, b: &Option<Arc<SemanticMap>>) -> bool {
+fn is_same<T>(a: &Option<Arc<T>>, b: &Option<Arc<T>>) -> bool {
     match (a, b) {
         (Some(a), Some(b)) => Arc::ptr_eq(a, b),
         (a, b) => a.is_none() && b.is_none(),
@@ -146,6 +171,16 @@ pub(crate) fn edit_text(request: &EditRequest, all: &Identities) -> String {
         EditRequest::Apply(Edit::AddPiece { of, name, .. }) => added(*of, name),
         EditRequest::Apply(Edit::Reshape { id, .. }) => format!("corrected {}", all.label(*id)),
         EditRequest::Restore(_) => "restored objects and parts".to_owned(),
+    }
+}
+
+/// What an edit of Gaussians does, in words.
+pub(crate) fn splat_edit_text(edit: &SplatEdit, all: &Identities) -> String {
+    match edit {
+        SplatEdit::Delete(gone) => format!("deleted {}", things(gone.iter().filter(|g| **g).count(), "Gaussian")),
+        SplatEdit::Move(id, _) => format!("moved {}", all.label(*id)),
+        SplatEdit::Duplicate(id, _) => format!("duplicated {}", all.label(*id)),
+        SplatEdit::Recolor(id, _) => format!("recolored {}", all.label(*id)),
     }
 }
 
@@ -223,6 +258,7 @@ fn shown_text(before: &BTreeSet<IdentityId>, now: &BTreeSet<IdentityId>, all: &I
 /// A step that waits for those before it.
 pub(super) enum EditStep {
     Request(EditRequest),
+    Rearrange(SplatEdit),
     Undo,
     Redo,
     /// The agent took a rename back, after which the identity is called this again.
@@ -268,7 +304,7 @@ mod tests {
             pinned: Default::default(),
             recipes: Default::default(),
         };
-        let now = EditSnapshot { scene: 1, map: Some(lamp()), view };
+        let now = EditSnapshot { scene: 1, map: Some(lamp()), cloud: None, view };
         let mut history = ChangeHistory::default();
         assert_eq!(history.settle(&now, None), None);
         (history, now)

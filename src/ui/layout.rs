@@ -97,7 +97,7 @@ pub struct Layout {
 impl Default for Layout {
     fn default() -> Self {
         Self {
-            hidden: vec![Pane::Log, Pane::Camera, Pane::Report, Pane::Query, Pane::Phrases],
+            hidden: vec![Pane::Log, Pane::Camera, Pane::Report, Pane::Query, Pane::Phrases, Pane::Clean],
             dock: Dock::default(),
             theme: ThemePreference::Dark,
             zoom: 1.0,

@@ -5,6 +5,7 @@
 //! changes the view or becomes a job. Nothing here computes for longer than a redraw may take.
 
 mod act;
+mod act_clean;
 mod act_file;
 mod act_find;
 mod act_look;

@@ -14,6 +14,7 @@ use super::labels::{PhraseTable, ScreenNames};
 pub(crate) use super::train_history::TrainHistory;
 use crate::io::unposed::Unposed;
 use crate::jobs::OpenedScene;
+use crate::jobs::clean::MeasuredCloud;
 use crate::jobs::demo::QUESTION;
 use crate::jobs::go_to::{Approached, Explored};
 use crate::jobs::inspect::InspectedPixel;
@@ -27,9 +28,10 @@ use crate::pipeline::observer::{Evaluation, Progress, Severity};
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::findings::IdentityEvidence;
-use crate::scene::{Limits, Overrides, PhotoPixels, SceneFacts, ScenePlan, SemanticMap, text};
-use crate::worker::{Event, Failure, JobId, JobKind, Outcome, Versioned, WorkerThread};
+use crate::scene::{GaussianCloud, Limits, Overrides, PhotoPixels, SceneFacts, ScenePlan, SemanticMap, text};
+use crate::worker::{Event, JobId, JobKind, Outcome, Versioned, WorkerThread};
 
+mod edited;
 mod messages;
 mod running;
 
@@ -74,6 +76,9 @@ pub struct AppState {
     pub(crate) visited: Option<Approached>,
     /// The pixel that was looked into last, until the window takes it.
     pub(crate) inspected: Option<Arc<InspectedPixel>>,
+    /// Gaussians that were edited, until the view takes them; what was measured of some, until the pane does.
+    pub(crate) rearranged: Option<Arc<GaussianCloud>>,
+    pub(crate) splats_measured: Option<Arc<MeasuredCloud>>,
     /// What clicks and strokes select, until the tool takes it.
     pub(crate) selected: Option<Arc<Selected>>,
     /// Models and the engine that runs them, once they were listed.
@@ -283,6 +288,8 @@ impl AppState {
                 }
             }
             Outcome::Removed(removed) => next.push(self.take_removed(*removed)),
+            Outcome::Rearranged(done) => self.take_rearranged(*done),
+            Outcome::SplatsMeasured(measured) => self.splats_measured = Some(measured),
             Outcome::Trained { evaluations, out, semantics, facts } => {
                 let carried = semantics.is_some();
                 if self.training_job == Some(job) {
@@ -379,20 +386,6 @@ impl AppState {
         self.set_semantics(scene.semantics.clone());
         (self.labels, self.phrases) = Default::default();
         self.scene = Some(Arc::new(scene));
-    }
-
-    fn failed(&mut self, job: JobId, failure: Failure) {
-        let doing = match self.end_short(job) {
-            // A photo that cannot be read is no reason to stop a user.
-            Some((JobKind::Photo, title)) => {
-                self.toast(Tone::Warning, format!("{title}: {}", failure.message));
-                self.failed_photos.push(job);
-                return;
-            }
-            Some((_, title)) => title,
-            None => self.end(job).map_or_else(|| "Working".to_owned(), |j| j.title),
-        };
-        self.fail(doing, failure);
     }
 }
 

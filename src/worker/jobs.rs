@@ -12,8 +12,8 @@ use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
-    Folders, JobError, OpenedScene, Scene, demo, edit, export, export_all, find_objects, go_to, inspect, models, open,
-    phrases, plan, poses, recent, remove, report, scale, select, thumbnails, train, video,
+    Folders, JobError, OpenedScene, Scene, clean, demo, edit, export, export_all, find_objects, go_to, inspect, models,
+    open, phrases, plan, poses, rearrange, recent, remove, report, scale, select, thumbnails, train, video,
 };
 use crate::measure::{End, FILE, Report};
 use crate::pipeline::observer::{Observer, Severity};
@@ -119,6 +119,15 @@ impl Jobs for PipelineJobs {
                 }
                 Outcome::Edited(new)
             }
+            Command::Rearrange(request) => match rearrange::run(&request, self.known(&request.path).as_deref()) {
+                Err(JobError::SplatEdit(why)) => Outcome::Refused(why.to_string()),
+                Err(e) => return Err(Stop::Failed(Failure::of(&e, "Nothing has changed."))),
+                Ok(done) => {
+                    self.knows(&done.folder, Some(done.state.clone()));
+                    Outcome::Rearranged(Box::new(done))
+                }
+            },
+            Command::MeasureSplats(request) => Outcome::SplatsMeasured(Arc::new(clean::measured(*request, observer)?)),
             Command::Select(request) => match select::run(&request, observer) {
                 Err(JobError::Edit(why)) => Outcome::Refused(why.to_string()),
                 done => Outcome::Selected(Arc::new(done?)),

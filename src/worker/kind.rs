@@ -21,7 +21,9 @@ pub enum JobKind {
     Objects,
     /// Takes things out of a scene.
     Remove,
-    /// Changes objects and parts.
+    /// Measures Gaussians, to clean them.
+    Clean,
+    /// Changes objects and parts, or Gaussians.
     Edit,
     /// Takes in a click or a stroke.
     Select,
@@ -67,7 +69,14 @@ impl JobKind {
     pub(crate) fn can_pause(self) -> bool {
         matches!(
             self,
-            Self::Train | Self::Objects | Self::Remove | Self::Model | Self::Video | Self::Phrases | Self::ExportAll
+            Self::Train
+                | Self::Objects
+                | Self::Remove
+                | Self::Clean
+                | Self::Model
+                | Self::Video
+                | Self::Phrases
+                | Self::ExportAll
         )
     }
 
@@ -78,6 +87,7 @@ impl JobKind {
             Self::DemoPhotos
             | Self::Poses
             | Self::Remove
+            | Self::Clean
             | Self::Model
             | Self::Video
             | Self::Measure

@@ -8,12 +8,14 @@ use glam::DVec3;
 use super::failure::Failure;
 pub use super::kind::{JobKind, WorkerThread};
 use crate::io::unposed::Unposed;
+use crate::jobs::clean::{MeasureRequest, MeasuredCloud};
 use crate::jobs::edit::EditRequest;
 use crate::jobs::export_all::ExportAllRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
 use crate::jobs::inspect::{InspectRequest, InspectedPixel};
 use crate::jobs::models::ModelList;
 use crate::jobs::phrases::{PhraseRow, PhrasesRequest};
+use crate::jobs::rearrange::{RearrangeRequest, RearrangedScene};
 use crate::jobs::remove::{RemoveRequest, RemovedScene};
 use crate::jobs::report::ReportRequest;
 use crate::jobs::select::{SelectRequest, Selected};
@@ -29,19 +31,6 @@ use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Photo, PhotoPixels,
 /// Names one job of one worker.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct JobId(pub(crate) u64);
-
-/// What the window does first.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Start {
-    /// Opens the trained demo.
-    Demo,
-    /// Opens this scene.
-    Scene(PathBuf),
-    /// Shows this report.
-    Report(PathBuf),
-    /// Compares it with this one.
-    SecondReport(PathBuf),
-}
 
 /// What a job is to do.
 #[derive(Clone, Debug)]
@@ -97,6 +86,10 @@ pub enum Command {
         /// Folder of the trained scene.
         out: PathBuf,
     },
+    /// Change the Gaussians of a scene, and store them.
+    Rearrange(Box<RearrangeRequest>),
+    /// Measure Gaussians, to clean them.
+    MeasureSplats(Box<MeasureRequest>),
     /// Find what clicks and strokes select.
     Select(Box<SelectRequest>),
     /// Write Gaussians as a `.ply`.
@@ -202,6 +195,8 @@ impl Command {
             Self::FindObjects(_) => JobKind::Objects,
             Self::Remove(_) => JobKind::Remove,
             Self::EditObjects { .. } => JobKind::Edit,
+            Self::Rearrange(_) => JobKind::Edit,
+            Self::MeasureSplats(_) => JobKind::Clean,
             Self::Select(_) => JobKind::Select,
             Self::Export { .. } => JobKind::Export,
             Self::Photo { .. } => JobKind::Photo,
@@ -239,6 +234,8 @@ impl Command {
             Self::FindObjects(request) => format!("Finding objects in {}", request.dataset.name),
             Self::Remove(_) => "Removing".into(),
             Self::EditObjects { .. } => "Editing objects".into(),
+            Self::Rearrange(_) => "Editing Gaussians".into(),
+            Self::MeasureSplats(_) => "Measuring Gaussians".into(),
             Self::Select(_) => "Selecting".into(),
             Self::SetScale { .. } => "Saving the scale".into(),
             Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
@@ -290,6 +287,10 @@ pub enum Outcome {
     Removed(Box<RemovedScene>),
     /// Objects and parts were changed.
     Edited(Arc<SemanticMap>),
+    /// Gaussians were changed.
+    Rearranged(Box<RearrangedScene>),
+    /// Gaussians were measured.
+    SplatsMeasured(Arc<MeasuredCloud>),
     /// The length of a unit in meters, and whether it was stored.
     Scale(f64, bool),
     /// What clicks and strokes select by now.

@@ -4,6 +4,8 @@
 //! is not that of the photos. All are taken away at once, the photos are drawn with and without, and each group is
 //! judged by its pixels. Those that are missed come back, and the rest is judged again without them.
 
+use std::collections::HashMap;
+
 use super::pieces::{Pieces, pieces};
 use super::support::{PhotoSupport, color};
 use super::{CleanError, CleanView};
@@ -22,7 +24,10 @@ const SUSPECT: f32 = 0.2;
 /// Change of the mean squared error of its pixels from which photos miss a group, or are better off without it: a color
 /// step of 2 %.
 const NOTICED: f64 = 0.0004;
-const ROUNDS: usize = 2;
+/// Share of the photos that show a group on a surface which must be better off without it.
+const AGREED: f64 = 0.8;
+/// Rounds at most; the last ones hardly bring anything back.
+const ROUNDS: usize = 6;
 
 /// What lies where.
 pub(super) struct Shape<'a> {
@@ -65,28 +70,52 @@ pub(super) fn find(
         if !floating.contains(&true) {
             break;
         }
-        let growth = growth(cloud, (&floating, &group), views, settings, observer)?;
+        let verdicts = judge(cloud, (&floating, &group), views, settings, observer)?;
+        let before = floating.clone();
         for i in 0..n {
-            let of = group[i];
-            let stays = if odd(i) { growth[of] > -NOTICED } else { growth[of] > NOTICED };
-            floating[i] &= !stays || witnesses[of] < WITNESSES;
+            let verdict = &verdicts[group[i]];
+            let stays = if odd(i) { !verdict.is_better_without() } else { verdict.is_missed() };
+            floating[i] &= !stays || witnesses[group[i]] < WITNESSES;
+        }
+        if floating == before {
+            break;
         }
     }
     Ok(floating)
 }
 
-/// How much the mean squared error of the photos grows where each group is `floating`, when all of that is gone; 0 for
-/// what no photo shows.
-fn growth(
+/// What photos say of a group.
+#[derive(Clone, Copy, Default)]
+struct Verdict {
+    /// Shares of pixels, and growth of their squared errors when what floats is gone.
+    weight: f64,
+    growth: f64,
+    /// Photos that show it, and those that are better off without it.
+    photos: f64,
+    better: f64,
+}
+
+impl Verdict {
+    fn is_missed(&self) -> bool {
+        self.growth > NOTICED * self.weight
+    }
+
+    fn is_better_without(&self) -> bool {
+        self.growth < -NOTICED * self.weight && self.better >= AGREED * self.photos
+    }
+}
+
+/// What photos say of each group of what is `floating`, when all of that is gone.
+fn judge(
     cloud: &GaussianCloud,
     (floating, group): (&[bool], &[usize]),
     views: &[CleanView],
     settings: &RenderSettings,
     observer: &mut dyn Observer,
-) -> Result<Vec<f64>, CleanError> {
+) -> Result<Vec<Verdict>, CleanError> {
     let rest: Vec<usize> = (0..cloud.len()).filter(|&i| !floating[i]).collect();
     let rest = cloud.select(&rest);
-    let (mut weight, mut worse) = (vec![0.0_f64; cloud.len()], vec![0.0_f64; cloud.len()]);
+    let mut verdicts = vec![Verdict::default(); cloud.len()];
     let mut renderer = Renderer::new();
     let mut ticker = Ticker::new("Comparing with the photos", views.len());
     for (k, view) in views.iter().enumerate() {
@@ -102,12 +131,20 @@ fn growth(
             .map(|_| Row { growth: &growth, width: camera.width_px as usize, floating, sums: Vec::new() })
             .collect();
         renderer.contributions(cloud, &camera, settings, &mut rows)?;
+        let mut here: HashMap<usize, (f64, f64)> = HashMap::new();
         for (i, w, g) in rows.into_iter().flat_map(|row| row.sums) {
-            weight[group[i as usize]] += f64::from(w);
-            worse[group[i as usize]] += f64::from(g);
+            let sums = here.entry(group[i as usize]).or_default();
+            *sums = (sums.0 + f64::from(w), sums.1 + f64::from(g));
+        }
+        for (of, (weight, growth)) in here {
+            let verdict = &mut verdicts[of];
+            verdict.weight += weight;
+            verdict.growth += growth;
+            verdict.photos += 1.0;
+            verdict.better += f64::from(growth < 0.0);
         }
     }
-    Ok(weight.iter().zip(&worse).map(|(w, g)| if *w > 0.0 { g / w } else { 0.0 }).collect())
+    Ok(verdicts)
 }
 
 /// Mean over the channels; 0 where the photo shows nothing.

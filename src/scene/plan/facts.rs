@@ -107,6 +107,12 @@ impl SceneFacts {
         self
     }
 
+    /// The same scene with other Gaussians.
+    pub(crate) fn with_edited(self, cloud: &GaussianCloud, cameras: &[Camera]) -> Self {
+        let sh_stored = self.cloud.as_ref().map_or(cloud.sh_degree, |c| c.sh_stored);
+        self.with_cloud(cloud, sh_stored, cameras)
+    }
+
     /// With these objects and parts.
     pub fn with_semantics(mut self, map: Option<&SemanticMap>) -> Self {
         self.semantics = map.map(SemanticFacts::of);

@@ -1,8 +1,10 @@
 //! One file per part of the window.
 
 pub(crate) mod bars;
+pub(crate) mod clean;
 pub(crate) mod dataset;
 pub(crate) mod empty;
+mod histogram;
 pub(crate) mod log;
 pub(crate) mod models;
 mod object_facts;

@@ -4,7 +4,7 @@ use super::AppState;
 use crate::jobs::remove::{self, RemovedScene};
 use crate::scene::text;
 use crate::ui::actions::Action;
-use crate::worker::{Failure, JobId};
+use crate::worker::{Failure, JobId, JobKind};
 
 /// Lines kept in the log.
 const MAX_LOG: usize = 1_000;
@@ -99,6 +99,21 @@ impl AppState {
         let show = Action::OpenBeside(Some(removed.folder.clone()));
         self.removed = Some(removed);
         show
+    }
+
+    /// Takes in that a job could not go on.
+    pub(super) fn failed(&mut self, job: JobId, failure: Failure) {
+        let doing = match self.end_short(job) {
+            // A photo that cannot be read is no reason to stop a user.
+            Some((JobKind::Photo, title)) => {
+                self.toast(Tone::Warning, format!("{title}: {}", failure.message));
+                self.failed_photos.push(job);
+                return;
+            }
+            Some((_, title)) => title,
+            None => self.end(job).map_or_else(|| "Working".to_owned(), |j| j.title),
+        };
+        self.fail(doing, failure);
     }
 
     /// Shows an error until it is dismissed, and logs it.

@@ -2,6 +2,7 @@
 
 mod act;
 pub(crate) mod brush;
+pub(crate) mod chosen;
 mod crop;
 mod display;
 pub mod eye;
@@ -169,6 +170,9 @@ impl Viewport {
             if state.training_job == Some(*job) {
                 self.set_cloud(Some(Arc::clone(cloud)));
             }
+        }
+        if let Some(cloud) = state.rearranged.take() {
+            self.set_cloud(Some(cloud));
         }
         if let (Some(found), Some(tool)) = (state.selected.take(), &mut self.select) {
             tool.take(found);

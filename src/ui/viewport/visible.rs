@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
+use super::chosen::ChosenSplats;
 use crate::scene::{CropBox, GaussianCloud, Identities, IdentityId, NOBODY, SemanticMap};
 use crate::worker::Versioned;
 
@@ -13,6 +14,8 @@ pub(crate) struct Visibility {
     hidden: BTreeSet<IdentityId>,
     /// What of the rest is kept.
     crop: Option<CropBox>,
+    /// What is chosen to be deleted.
+    chosen: Option<Arc<ChosenSplats>>,
     /// The Gaussians that are left, with the generations of what they were made from.
     left: Option<((u64, Option<u64>), VisibleCloud)>,
 }
@@ -63,6 +66,13 @@ impl Visibility {
     pub(crate) fn set_crop(&mut self, crop: Option<CropBox>) {
         if self.crop != crop {
             (self.crop, self.left) = (crop, None);
+        }
+    }
+
+    /// Shows what is chosen to be deleted.
+    pub(crate) fn set_chosen(&mut self, chosen: Option<Arc<ChosenSplats>>) {
+        if self.chosen != chosen {
+            (self.chosen, self.left) = (chosen, None);
         }
     }
 
@@ -120,7 +130,9 @@ impl Visibility {
     ) -> VisibleCloud {
         let all = || VisibleCloud { cloud: cloud.clone(), semantics: semantics.cloned(), numbers: None };
         let fits = semantics.is_none_or(|map| map.identity_of.len() == cloud.len());
-        if !fits || self.crop.is_none() && (self.hidden.is_empty() || semantics.is_none()) {
+        let chosen = self.chosen.as_deref().filter(|chosen| chosen.of.len() == cloud.len());
+        let all_drawn = self.crop.is_none() && chosen.is_none() && (self.hidden.is_empty() || semantics.is_none());
+        if !fits || all_drawn {
             self.left = None;
             return all();
         }
@@ -131,10 +143,13 @@ impl Visibility {
         let drawn = |i: &usize| {
             semantics.is_none_or(|map| !self.hidden.contains(&map.identity_of[*i]))
                 && self.crop.is_none_or(|crop| crop.keeps(cloud.world_position(*i)))
+                && chosen.is_none_or(|chosen| chosen.draws(*i))
         };
         let kept: Vec<usize> = (0..cloud.len()).filter(drawn).collect();
+        let mut left = cloud.select(&kept);
+        chosen.into_iter().for_each(|chosen| chosen.mark(&mut left, &kept));
         let visible = VisibleCloud {
-            cloud: Versioned::new(Arc::new(cloud.select(&kept))),
+            cloud: Versioned::new(Arc::new(left)),
             semantics: semantics.map(|map| Versioned::new(Arc::new(map.select(&kept)))),
             numbers: Some(Arc::new(kept)),
         };

@@ -1,0 +1,16 @@
+//! What the program was started with.
+
+use std::path::PathBuf;
+
+/// What the window does first.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Start {
+    /// Opens the trained demo.
+    Demo,
+    /// Opens this scene.
+    Scene(PathBuf),
+    /// Shows this report.
+    Report(PathBuf),
+    /// Compares it with this one.
+    SecondReport(PathBuf),
+}
