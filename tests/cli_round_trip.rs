@@ -182,7 +182,7 @@ fn what_is_removed_is_gone_in_a_new_scene_and_the_old_one_stays() {
     let done = fmlgs(&["remove", &scene, "box 1", "--out", &out, "--json"]).ok().json();
     let count = |what: &str| done["report"][what].as_u64().unwrap();
     assert_eq!((&done["names"][0], count("removed")), (&"box 1".into(), 36));
-    let left = 196 - count("removed") - count("fringes") - count("unseen");
+    let left = 196 - count("removed") - count("fringes") - count("unseen") - count("left_over");
     let info = fmlgs(&["info", &out, "--json"]).ok().json();
     assert_eq!((&info["kind"], &info["gaussians"], &info["identities"]), (&"trained".into(), &left.into(), &2.into()));
     assert!(fmlgs(&["query", &out, "box 1"]).fails_with(1).stderr.contains("box 1"));
@@ -202,6 +202,48 @@ fn what_is_removed_is_gone_in_a_new_scene_and_the_old_one_stays() {
     let agent = fmlgs(&["agent", &scene, "remove box 2", "yes"]).ok().stdout;
     assert!(agent.contains("(yes or no)") && agent.contains("scene-without-box-2"), "{agent}");
     fmlgs(&["query", &at("scene-without-box-2"), "box 2"]).fails_with(1);
+}
+
+#[test]
+fn cleaned_and_edited_scenes_are_new_ones_and_the_old_one_stays() {
+    let folder = folder();
+    first_version(folder.path());
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let scene = at("scene");
+    let before = std::fs::read(Path::new(&scene).join("point_cloud.ply")).unwrap();
+    let gaussians = |path: &str| fmlgs(&["info", path, "--json"]).ok().json()["gaussians"].as_u64().unwrap();
+
+    // Counting writes nothing; what is written is without what was counted.
+    let counted = fmlgs(&["clean", &scene, "--json"]).ok().json();
+    assert_eq!((&counted["gaussians"], counted["rules"].as_array().unwrap().len()), (&196.into(), 5));
+    assert!(fmlgs(&["clean", &scene]).ok().stdout.contains("Nothing was written"));
+    let done = fmlgs(&["clean", &scene, "opacity<0.1", "size>0.5", "--out", &at("cleaned"), "--json"]).ok().json();
+    let chosen = done["chosen"].as_u64().unwrap();
+    assert!((1..196).contains(&chosen) && done["left"] == 196 - chosen, "{done}");
+    assert_eq!(gaussians(&at("cleaned")), 196 - chosen);
+    fmlgs(&["query", &at("cleaned"), "box 1"]).ok();
+    fmlgs(&["clean", &scene, "opacity<0.1", "--out", &at("cleaned.ply")]).ok();
+    assert!(gaussians(&at("cleaned.ply")) < 196);
+    for (rules, out) in [("dust", "x"), ("opacity<2", "x"), ("faint", "scene"), ("faint", "cleaned")] {
+        let code = if rules == "dust" { 2 } else { 1 };
+        fmlgs(&["clean", &scene, rules, "--out", &at(out)]).fails_with(code);
+    }
+    // A bare splat has no photos, and so no weights in them.
+    fmlgs(&["clean", &at("cleaned.ply")]).ok();
+    assert!(fmlgs(&["clean", &at("cleaned.ply"), "photos<2"]).fails_with(1).stderr.contains("photos is not known"));
+
+    let edit = |more: &[&str]| fmlgs(&[&["edit", &scene, "box 1"], more].concat());
+    edit(&["--move", "0.5,0,-1", "--turn", "30", "--color", "#c02020", "--out", &at("moved")]).ok();
+    assert_eq!(gaussians(&at("moved")), 196);
+    fmlgs(&["query", &at("moved"), "box 1"]).ok();
+    edit(&["--duplicate", "--move", "1,0,0", "--scale", "0.5", "--out", &at("two")]).ok();
+    assert_eq!(gaussians(&at("two")), 196 + 36);
+    assert_eq!(fmlgs(&["info", &at("two"), "--json"]).ok().json()["identities"], 4);
+    edit(&["--out", &at("nothing")]).fails_with(2);
+    edit(&["--scale", "0", "--out", &at("nothing")]).fails_with(1);
+    edit(&["--scale", "2", "--out", &scene]).fails_with(1);
+    assert!(!Path::new(&at("nothing")).exists());
+    assert_eq!(std::fs::read(Path::new(&scene).join("point_cloud.ply")).unwrap(), before);
 }
 
 #[test]

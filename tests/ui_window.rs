@@ -23,6 +23,8 @@ mod phrases;
 mod problems;
 #[path = "ui_window/queries.rs"]
 mod queries;
+#[path = "ui_window/rearranging.rs"]
+mod rearranging;
 #[path = "ui_window/removing.rs"]
 mod removing;
 #[path = "ui_window/report.rs"]

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use glam::{DQuat, DVec3};
 
 use super::{CliError, output};
-use crate::jobs::rearrange::{self, Placement, SplatEdit};
+use crate::jobs::rearrange::{self, Arrangement, Placement, SplatEdit};
 use crate::jobs::{JobError, derived, open, query};
 use crate::math::format;
 use crate::scene::LevelFilter;
@@ -72,7 +72,7 @@ fn color(text: &str) -> Result<[f32; 3], String> {
 }
 
 pub(crate) fn run(args: EditArgs) -> Result<(), CliError> {
-    let mut scene = open::scene(&args.scene)?;
+    let scene = open::scene(&args.scene)?;
     let map = scene.semantics()?;
     derived::check_place(&scene, &args.out)?;
     let ids = query::identities(&map, &args.text, args.kind, 1)?;
@@ -83,24 +83,12 @@ pub(crate) fn run(args: EditArgs) -> Result<(), CliError> {
         turn: DQuat::from_axis_angle(axis, args.turn.unwrap_or_default().to_radians()),
         scale: args.scale.unwrap_or(1.0),
     };
-    let (mut map, mut id) = (Some(map), id);
-    let mut edits = Vec::new();
-    if args.duplicate {
-        edits.push(SplatEdit::Duplicate(id, to));
-        // The next one added is the whole copy.
-        id = map.as_ref().map_or(id, |map| map.identities.len() as u32 + 1);
-    } else if to != Placement::default() {
-        edits.push(SplatEdit::Move(id, to));
-    }
-    edits.extend(args.color.map(|color| SplatEdit::Recolor(id, color)));
-    for edit in &edits {
-        let (cloud, new) = rearrange::apply(&scene.cloud, map.as_ref(), edit)?;
-        (scene.cloud, map) = (cloud.into(), new);
-    }
-    derived::write(&scene, "edited", &scene.cloud, map.as_ref(), &args.out)?;
-    let name = map.as_ref().map_or_else(String::new, |map| map.identities.full_name(id));
-    let what = if args.duplicate { format!("{name} added") } else { format!("{name} edited") };
-    output::print(&format!("{}: {what}, {}", args.out.display(), format::things(scene.cloud.len(), "Gaussian")))
+    let edit = SplatEdit::Arrange(Arrangement { id, duplicate: args.duplicate, to, color: args.color });
+    let (cloud, new) = rearrange::apply(&scene.cloud, Some(&map), &edit)?;
+    derived::write(&scene, "edited", &cloud, new.as_ref(), &args.out)?;
+    let what = if args.duplicate { "duplicated" } else { "edited" };
+    let (out, name, size) = (args.out.display(), map.identities.full_name(id), format::things(cloud.len(), "Gaussian"));
+    output::print(&format!("{out}: {name} {what}, {size}"))
 }
 
 #[cfg(test)]

@@ -14,6 +14,7 @@ use rstar::primitives::GeomWithData;
 pub(crate) use self::rules::{CleanRule, RuleError};
 use crate::io::{self, IoError};
 use crate::math::Real;
+use crate::math::sh::SH_C0;
 use crate::math::stats::median;
 use crate::pipeline::observer::{Interrupted, Observer, Ticker};
 use crate::render::{RenderError, RenderSettings};
@@ -21,6 +22,8 @@ use crate::scene::{Bounds, Camera, GaussianCloud, Photo, PhotoPixels};
 
 /// Neighbors of each Gaussian that are looked at.
 const NEIGHBORS: usize = 8;
+/// Stands where a Gaussian has fewer.
+const NONE: u32 = u32::MAX;
 /// The one whose distance tells how lonely a Gaussian is.
 const LONELY: usize = 4;
 /// Gaussians whose neighbors are looked for between two reports.
@@ -111,6 +114,10 @@ pub(crate) struct CloudMeasures {
     values: Vec<(SplatMeasure, Vec<f32>)>,
     /// Whether each Gaussian is part of a floater.
     floaters: Vec<bool>,
+    /// Colors without what depends on the direction, 0 to 1 as displayed.
+    colors: Vec<[f32; 3]>,
+    /// Nearest neighbors; `NONE` where there are fewer.
+    near: Vec<[u32; NEIGHBORS]>,
     /// Half the diagonal of the scene without its strays, scene units.
     radius: f64,
 }
@@ -122,7 +129,31 @@ impl CloudMeasures {
             of.iter().zip(gone).filter(|(_, gone)| !**gone).map(|(v, _)| *v).collect()
         }
         let values = self.values.iter().map(|(measure, values)| (*measure, left(values, gone))).collect();
-        Self { values, floaters: left(&self.floaters, gone), radius: self.radius }
+        let mut number = Vec::with_capacity(gone.len());
+        let mut next = 0;
+        for gone in gone {
+            number.push(if *gone { NONE } else { next });
+            next += u32::from(!gone);
+        }
+        let renumbered = |near: [u32; NEIGHBORS]| near.map(|j| number.get(j as usize).copied().unwrap_or(NONE));
+        let near = left(&self.near, gone).into_iter().map(renumbered).collect();
+        let (floaters, colors) = (left(&self.floaters, gone), left(&self.colors, gone));
+        Self { values, floaters, colors, near, radius: self.radius }
+    }
+
+    /// A choice with all neighbors of what is chosen.
+    pub(crate) fn grown(&self, chosen: &[bool]) -> Vec<bool> {
+        let mut grown = chosen.to_vec();
+        for near in self.near.iter().zip(chosen).filter(|(_, chosen)| **chosen).map(|(near, _)| near) {
+            near.iter().filter(|j| **j != NONE).for_each(|j| grown[*j as usize] = true);
+        }
+        grown
+    }
+
+    /// A choice without what has a neighbor that is not chosen.
+    pub(crate) fn shrunk(&self, chosen: &[bool]) -> Vec<bool> {
+        let is_inner = |near: &[u32; NEIGHBORS]| near.iter().all(|j| *j == NONE || chosen[*j as usize]);
+        self.near.iter().zip(chosen).map(|(near, chosen)| *chosen && is_inner(near)).collect()
     }
 
     /// The values of a measure, `[n]`; `None` without the photos that it needs.
@@ -172,7 +203,15 @@ pub(crate) fn measure(
         values.extend(support.error.map(|error| (SplatMeasure::Error, error)));
     }
     values.push((SplatMeasure::Size, sizes));
-    Ok(CloudMeasures { values, floaters, radius })
+    let first = |of: &Vec<(u32, f32)>| std::array::from_fn(|k| of.get(k).map_or(NONE, |n| n.0));
+    let near = neighbors.iter().map(first).collect();
+    Ok(CloudMeasures { values, floaters, colors: colors(cloud), near, radius })
+}
+
+/// Colors without what depends on the direction, 0 to 1 as displayed.
+fn colors(cloud: &GaussianCloud) -> Vec<[f32; 3]> {
+    let shown = |v: f32| (0.5 + SH_C0 as f32 * v).clamp(0.0, 1.0);
+    (0..cloud.len()).map(|i| cloud.sh[i * cloud.sh_stride()].map(shown)).collect()
 }
 
 /// The nearest neighbors of each Gaussian with their distances, the nearest first.

@@ -19,12 +19,26 @@ const DARKEST: f64 = 0.1;
 pub enum SplatEdit {
     /// Leaves out the Gaussians that are `true`.
     Delete(Vec<bool>),
-    /// Puts an object or a part elsewhere.
-    Move(IdentityId, Placement),
-    /// Puts another one like it elsewhere.
-    Duplicate(IdentityId, Placement),
-    /// Gives an object or a part another color (red, green, blue, 0 to 1, as displayed); its shades stay.
-    Recolor(IdentityId, [f32; 3]),
+    /// Changes an object or a part.
+    Arrange(Arrangement),
+}
+
+/// What becomes of an object or a part.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arrangement {
+    pub(crate) id: IdentityId,
+    /// Whether it stays as it is and all this is done to another one like it.
+    pub(crate) duplicate: bool,
+    pub(crate) to: Placement,
+    /// Another color (red, green, blue, 0 to 1, as displayed), in which its shades stay.
+    pub(crate) color: Option<[f32; 3]>,
+}
+
+impl Arrangement {
+    /// The one that changes nothing.
+    pub(crate) fn of(id: IdentityId) -> Self {
+        Self { id, duplicate: false, to: Placement::default(), color: None }
+    }
 }
 
 /// Where something is put: turned and scaled about its own middle, then shifted.
@@ -73,25 +87,21 @@ pub(crate) fn apply(
 ) -> Result<(GaussianCloud, Option<SemanticMap>)> {
     match edit {
         SplatEdit::Delete(gone) => delete(cloud, map, gone),
-        SplatEdit::Move(id, to) => {
-            let (map, thing) = thing(map, *id)?;
-            let mut new = cloud.clone();
-            place(&mut new, &thing, to, map, *id)?;
-            Ok((new, Some(map.clone())))
-        }
-        SplatEdit::Duplicate(id, to) => {
-            let (map, thing) = thing(map, *id)?;
-            let all: Vec<usize> = (0..cloud.len()).chain(thing.iter().copied()).collect();
-            let mut new = cloud.select(&all);
-            let copies: Vec<usize> = (cloud.len()..all.len()).collect();
-            place(&mut new, &copies, to, map, *id)?;
-            Ok((new, Some(doubled(map, &all, *id))))
-        }
-        SplatEdit::Recolor(id, color) => {
-            let (map, thing) = thing(map, *id)?;
-            let mut new = cloud.clone();
-            recolor(&mut new, &thing, color.map(f64::from));
-            Ok((new, Some(map.clone())))
+        SplatEdit::Arrange(Arrangement { id, duplicate, to, color }) => {
+            let (map, mut thing) = thing(map, *id)?;
+            let (mut cloud, mut map) = (cloud.clone(), map.clone());
+            if *duplicate {
+                let all: Vec<usize> = (0..cloud.len()).chain(thing).collect();
+                thing = (cloud.len()..all.len()).collect();
+                (cloud, map) = (cloud.select(&all), doubled(&map, &all, *id));
+            }
+            if *to != Placement::default() {
+                place(&mut cloud, &thing, to, &map, *id)?;
+            }
+            if let Some(color) = color {
+                recolor(&mut cloud, &thing, color.map(f64::from));
+            }
+            Ok((cloud, Some(map)))
         }
     }
 }

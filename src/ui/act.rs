@@ -47,6 +47,7 @@ impl App {
             Action::FindObjects => self.find_objects(),
             Action::SegmentPhoto => self.segment_photo(),
             Action::Remove(id) => self.remove(id),
+            Action::KeepArranged => self.keep_arranged(),
             Action::MeasureSplats => self.measure_splats(),
             Action::DeleteChosen => self.delete_chosen(),
             Action::AnotherFill(halo) => self.fill_anew(halo),
@@ -145,6 +146,7 @@ impl App {
             | Action::Select(_)
             | Action::Paint(_)
             | Action::Correct(_)
+            | Action::Arrange(_)
             | Action::PaintTrueMask
             | Action::Isolate(_)
             | Action::Hide(_)

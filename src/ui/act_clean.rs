@@ -1,4 +1,4 @@
-//! Cleaning: Gaussians are measured, and those that are chosen are deleted.
+//! Edits of Gaussians: they are measured and deleted, objects and parts arranged.
 
 use std::sync::Arc;
 
@@ -20,6 +20,13 @@ impl App {
         self.layout.show(Pane::Clean);
         let path = scene.stored().to_path_buf();
         self.submit(Command::MeasureSplats(Box::new(MeasureRequest { path, cloud: Arc::clone(&cloud) })));
+    }
+
+    /// Carries out what the view shows of a thing that is being arranged.
+    pub(super) fn keep_arranged(&mut self) {
+        if let Some(tool) = self.viewport.arrange.take() {
+            self.edit(EditStep::Rearrange(SplatEdit::Arrange(tool.arrangement())));
+        }
     }
 
     /// Deletes what is chosen.

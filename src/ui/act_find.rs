@@ -7,9 +7,9 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::app::App;
-use super::edits::sentence;
 use super::find_dialog::{AwaitedModels, Means};
 use super::history::Editing;
+use super::labels::sentence;
 use super::panes::models::Models;
 use super::state::Tone;
 use crate::jobs::find_objects::FindRequest;

@@ -210,6 +210,9 @@ actions! {
         "Take it out, into a scene of its own that is shown beside this one: what it hid is closed from what is around.";
     AnotherFill(halo: bool): "Another fill",
         "Remove it again, with another choice of what hides below it; the scene made before stays.";
+    Arrange(id: IdentityId): format!("Move, turn or recolor #{id}"),
+        "Drag it along the axes, turn, scale, duplicate or recolor it; can be undone.";
+    KeepArranged: "Keep the arrangement", "Carry out what the view shows of a moved, duplicated or recolored thing.";
     MeasureSplats: "Measure Gaussians",
         "Size, shape, opacity and neighbors of each, and what the photos show of it: finds floaters and the like.";
     DeleteChosen: "Delete the chosen Gaussians",
@@ -305,7 +308,7 @@ impl Action {
     pub(crate) fn all() -> Vec<Self> {
         let mut all = Self::plain();
         // Without a tool in use there is nothing to keep.
-        all.retain(|a| !matches!(a, Self::AddPainted | Self::DeleteChosen));
+        all.retain(|a| !matches!(a, Self::AddPainted | Self::KeepArranged | Self::DeleteChosen));
         all.extend([Self::Isolate(None), Self::Paint(Some(NOBODY)), Self::SetCrop(None)]);
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::ShowPane(*pane)));

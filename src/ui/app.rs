@@ -290,7 +290,7 @@ impl App {
                 let comparing = viewport.queries.truth().is_some();
                 self.phrases.show(ui, state, comparing, actions);
             }
-            Pane::Clean => self.clean.show(ui, state, actions),
+            Pane::Clean => self.clean.show(ui, state, viewport, actions),
             Pane::Camera => {
                 let eye = viewport.pose();
                 if let Some(pose) = self.camera.show(ui, state, &eye, actions) {

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use super::app::App;
 use super::context::SceneContext;
 use super::history::{EditSnapshot, EditStep, Editing, ViewState, edit_text, splat_edit_text};
+use super::labels::sentence;
 use super::state::Tone;
 use super::viewport::selecting::SelectTool;
 use crate::jobs::edit::EditRequest;
@@ -209,10 +210,4 @@ impl App {
             false => self.state.say(Tone::Info, sentence(&what)),
         }
     }
-}
-
-/// What was done, as a sentence.
-pub(super) fn sentence(what: &str) -> String {
-    let mut letters = what.chars();
-    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }

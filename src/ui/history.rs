@@ -8,7 +8,7 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use crate::jobs::edit::EditRequest;
-use crate::jobs::rearrange::SplatEdit;
+use crate::jobs::rearrange::{Placement, SplatEdit};
 use crate::math::format::things;
 use crate::pipeline::semantics::edit::Edit;
 use crate::pipeline::semantics::recipe::Recipe;
@@ -178,9 +178,14 @@ pub(crate) fn edit_text(request: &EditRequest, all: &Identities) -> String {
 pub(crate) fn splat_edit_text(edit: &SplatEdit, all: &Identities) -> String {
     match edit {
         SplatEdit::Delete(gone) => format!("deleted {}", things(gone.iter().filter(|g| **g).count(), "Gaussian")),
-        SplatEdit::Move(id, _) => format!("moved {}", all.label(*id)),
-        SplatEdit::Duplicate(id, _) => format!("duplicated {}", all.label(*id)),
-        SplatEdit::Recolor(id, _) => format!("recolored {}", all.label(*id)),
+        SplatEdit::Arrange(to) => {
+            let what = match to {
+                _ if to.duplicate => "duplicated",
+                _ if to.to == Placement::default() => "recolored",
+                _ => "moved",
+            };
+            format!("{what} {}", all.label(to.id))
+        }
     }
 }
 

@@ -64,6 +64,12 @@ pub(crate) fn listed(all: &Identities, sizes: &[usize], ids: Vec<IdentityId>) ->
     (named, tiny)
 }
 
+/// With a capital letter.
+pub(super) fn sentence(what: &str) -> String {
+    let mut letters = what.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

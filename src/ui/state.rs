@@ -289,7 +289,10 @@ impl AppState {
             }
             Outcome::Removed(removed) => next.push(self.take_removed(*removed)),
             Outcome::Rearranged(done) => self.take_rearranged(*done),
-            Outcome::SplatsMeasured(measured) => self.splats_measured = Some(measured),
+            Outcome::SplatsMeasured(measured) => {
+                self.say(Tone::Info, format!("{} measured", format::things(measured.cloud.len(), "Gaussian")));
+                self.splats_measured = Some(measured);
+            }
             Outcome::Trained { evaluations, out, semantics, facts } => {
                 let carried = semantics.is_some();
                 if self.training_job == Some(job) {

@@ -21,9 +21,10 @@ const SMALL_SHARE: f64 = 1.0 / 2000.0;
 const WITNESSES: f32 = 3.0;
 /// Difference of a color from the photos from which a Gaussian is suspected wherever it is.
 const SUSPECT: f32 = 0.2;
-/// Change of the mean squared error of its pixels from which photos miss a group, or are better off without it: a color
-/// step of 2 %.
+/// Growth of the mean squared error of its pixels from which photos miss a piece: a color step of 2 %.
 const NOTICED: f64 = 0.0004;
+/// Decrease from which they are better off without something on a surface: a color step of 10 %.
+const CLEARLY: f64 = 0.01;
 /// Share of the photos that show a group on a surface which must be better off without it.
 const AGREED: f64 = 0.8;
 /// Rounds at most; the last ones hardly bring anything back.
@@ -58,30 +59,59 @@ pub(super) fn find(
         (0..n).for_each(|i| floating[i] &= !kept[shape.pieces.of(i) as usize]);
         return Ok(floating);
     };
-    let odd = |i: usize| !apart(i) && error[i] > SUSPECT && photos[i] >= WITNESSES;
+    let mut looking = Looking { cloud, views, settings, photos, observer };
+    let of: Vec<usize> = (0..n).map(|i| shape.pieces.of(i) as usize).collect();
+    looking.keep(&vec![false; n], &mut floating, &of, |verdict| !verdict.is_missed())?;
+    // What hangs in the air would be blamed on the surface behind it, so that is gone before surfaces are looked at.
+    let gone = floating;
+    let odd = |i: usize| !gone[i] && !apart(i) && error[i] > SUSPECT && photos[i] >= WITNESSES;
     let odd_pieces = pieces(shape.neighbors, shape.sizes, odd);
-    (0..n).for_each(|i| floating[i] |= odd(i));
-    // Groups carry the number of one of their own.
-    let group: Vec<usize> =
-        (0..n).map(|i| if odd(i) { odd_pieces.of(i) } else { shape.pieces.of(i) } as usize).collect();
-    let mut witnesses = vec![0.0_f32; n];
-    (0..n).for_each(|i| witnesses[group[i]] = witnesses[group[i]].max(photos[i]));
-    for _ in 0..ROUNDS {
-        if !floating.contains(&true) {
-            break;
+    let of: Vec<usize> = (0..n).map(|i| odd_pieces.of(i) as usize).collect();
+    let mut on_surfaces: Vec<bool> = (0..n).map(odd).collect();
+    looking.keep(&gone, &mut on_surfaces, &of, Verdict::is_better_without)?;
+    Ok(gone.iter().zip(&on_surfaces).map(|(a, b)| a | b).collect())
+}
+
+/// What is looked at, and what through.
+struct Looking<'a> {
+    cloud: &'a GaussianCloud,
+    views: &'a [CleanView],
+    settings: &'a RenderSettings,
+    /// Photos that show each Gaussian.
+    photos: &'a [f32],
+    observer: &'a mut dyn Observer,
+}
+
+impl Looking<'_> {
+    /// Keeps of what is `floating` the groups that `floats` says so of, and those that too few photos show, until all of
+    /// them are judged without each other; `gone` is not there at all.
+    fn keep(
+        &mut self,
+        gone: &[bool],
+        floating: &mut [bool],
+        group: &[usize],
+        floats: impl Fn(&Verdict) -> bool,
+    ) -> Result<(), CleanError> {
+        let mut witnesses = vec![0.0_f32; group.len()];
+        for (of, photos) in group.iter().zip(self.photos) {
+            witnesses[*of] = witnesses[*of].max(*photos);
         }
-        let verdicts = judge(cloud, (&floating, &group), views, settings, observer)?;
-        let before = floating.clone();
-        for i in 0..n {
-            let verdict = &verdicts[group[i]];
-            let stays = if odd(i) { !verdict.is_better_without() } else { verdict.is_missed() };
-            floating[i] &= !stays || witnesses[group[i]] < WITNESSES;
+        for _ in 0..ROUNDS {
+            if !floating.contains(&true) {
+                break;
+            }
+            let verdicts = self.judge(gone, floating, group)?;
+            let mut is_changed = false;
+            for (floating, of) in floating.iter_mut().zip(group) {
+                let stays = *floating && !floats(&verdicts[*of]) && witnesses[*of] >= WITNESSES;
+                (*floating, is_changed) = (*floating && !stays, is_changed || stays);
+            }
+            if !is_changed {
+                break;
+            }
         }
-        if floating == before {
-            break;
-        }
+        Ok(())
     }
-    Ok(floating)
 }
 
 /// What photos say of a group.
@@ -101,50 +131,53 @@ impl Verdict {
     }
 
     fn is_better_without(&self) -> bool {
-        self.growth < -NOTICED * self.weight && self.better >= AGREED * self.photos
+        self.growth < -CLEARLY * self.weight && self.better >= AGREED * self.photos
     }
 }
 
-/// What photos say of each group of what is `floating`, when all of that is gone.
-fn judge(
-    cloud: &GaussianCloud,
-    (floating, group): (&[bool], &[usize]),
-    views: &[CleanView],
-    settings: &RenderSettings,
-    observer: &mut dyn Observer,
-) -> Result<Vec<Verdict>, CleanError> {
-    let rest: Vec<usize> = (0..cloud.len()).filter(|&i| !floating[i]).collect();
-    let rest = cloud.select(&rest);
-    let mut verdicts = vec![Verdict::default(); cloud.len()];
-    let mut renderer = Renderer::new();
-    let mut ticker = Ticker::new("Comparing with the photos", views.len());
-    for (k, view) in views.iter().enumerate() {
-        ticker.tick(k, observer)?;
-        let (camera, Some(photo)) = view.small()? else { continue };
-        let mut errors = |cloud: &GaussianCloud| -> Result<Vec<f32>, CleanError> {
-            let frame = renderer.render(cloud, Features::NONE, &camera, settings)?;
-            Ok((0..photo.rgb.len()).map(|i| squared_error(&frame.color, &photo, i)).collect())
-        };
-        let (with, without) = (errors(cloud)?, errors(&rest)?);
-        let growth: Vec<f32> = without.iter().zip(&with).map(|(a, b)| a - b).collect();
-        let mut rows: Vec<Row<'_>> = (0..camera.height_px.div_ceil(TILE_PX as u32))
-            .map(|_| Row { growth: &growth, width: camera.width_px as usize, floating, sums: Vec::new() })
-            .collect();
-        renderer.contributions(cloud, &camera, settings, &mut rows)?;
-        let mut here: HashMap<usize, (f64, f64)> = HashMap::new();
-        for (i, w, g) in rows.into_iter().flat_map(|row| row.sums) {
-            let sums = here.entry(group[i as usize]).or_default();
-            *sums = (sums.0 + f64::from(w), sums.1 + f64::from(g));
+impl Looking<'_> {
+    /// What photos say of each group of what is `floating`, when all of that is gone.
+    fn judge(&mut self, gone: &[bool], floating: &[bool], group: &[usize]) -> Result<Vec<Verdict>, CleanError> {
+        let there: Vec<usize> = (0..gone.len()).filter(|&i| !gone[i]).collect();
+        let rest: Vec<usize> = there.iter().copied().filter(|&i| !floating[i]).collect();
+        let (there, rest) = ((self.cloud.select(&there), there), self.cloud.select(&rest));
+        let is_judged: Vec<bool> = there.1.iter().map(|&i| floating[i]).collect();
+        let mut verdicts = vec![Verdict::default(); gone.len()];
+        let mut renderer = Renderer::new();
+        let mut ticker = Ticker::new("Comparing with the photos", self.views.len());
+        for (k, view) in self.views.iter().enumerate() {
+            ticker.tick(k, self.observer)?;
+            let (camera, Some(photo)) = view.small()? else { continue };
+            let mut errors = |cloud: &GaussianCloud| -> Result<Vec<f32>, CleanError> {
+                let frame = renderer.render(cloud, Features::NONE, &camera, self.settings)?;
+                Ok((0..photo.rgb.len()).map(|i| squared_error(&frame.color, &photo, i)).collect())
+            };
+            let (with, without) = (errors(&there.0)?, errors(&rest)?);
+            let growth: Vec<f32> = without.iter().zip(&with).map(|(a, b)| a - b).collect();
+            let mut rows: Vec<Row<'_>> = (0..camera.height_px.div_ceil(TILE_PX as u32))
+                .map(|_| Row {
+                    growth: &growth,
+                    width: camera.width_px as usize,
+                    floating: &is_judged,
+                    sums: Vec::new(),
+                })
+                .collect();
+            renderer.contributions(&there.0, &camera, self.settings, &mut rows)?;
+            let mut here: HashMap<usize, (f64, f64)> = HashMap::new();
+            for (i, w, g) in rows.into_iter().flat_map(|row| row.sums) {
+                let sums = here.entry(group[there.1[i as usize]]).or_default();
+                *sums = (sums.0 + f64::from(w), sums.1 + f64::from(g));
+            }
+            for (of, (weight, growth)) in here {
+                let verdict = &mut verdicts[of];
+                verdict.weight += weight;
+                verdict.growth += growth;
+                verdict.photos += 1.0;
+                verdict.better += f64::from(growth < 0.0);
+            }
         }
-        for (of, (weight, growth)) in here {
-            let verdict = &mut verdicts[of];
-            verdict.weight += weight;
-            verdict.growth += growth;
-            verdict.photos += 1.0;
-            verdict.better += f64::from(growth < 0.0);
-        }
+        Ok(verdicts)
     }
-    Ok(verdicts)
 }
 
 /// Mean over the channels; 0 where the photo shows nothing.

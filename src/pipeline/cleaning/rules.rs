@@ -11,6 +11,8 @@ const FAINT: f32 = 0.005;
 const NEEDLE: f32 = 30.0;
 /// Share of the scene's radius from which a Gaussian is oversized.
 const OVERSIZED: f64 = 0.5;
+/// Distance in red, green and blue, each 0 to 1, within which a color is near.
+const NEAR_COLOR: f32 = 0.12;
 /// Share of a pixel that what is supported has in some photo.
 const SUPPORTED: f32 = 0.01;
 
@@ -27,6 +29,8 @@ pub(crate) enum CleanRule {
     Oversized,
     /// Those that no photo shows.
     Unsupported,
+    /// Those of this color or one that is near.
+    Color([u8; 3]),
     /// Those whose measure is less.
     Below(SplatMeasure, f32),
     /// Those whose measure is more.
@@ -40,7 +44,7 @@ pub(crate) enum CleanRule {
 pub enum RuleError {
     /// It is none.
     #[error(
-        "'{0}' is no rule: floaters, faint, needles, oversized, unsupported, or a measure with a limit such as 'size>0.5' or 'photos<2'"
+        "'{0}' is no rule: floaters, faint, needles, oversized, unsupported, a color such as 'color=#3050c0', or a measure with a limit such as 'size>0.5' or 'photos<2'"
     )]
     Unknown(String),
     /// Nothing is known of its measure.
@@ -61,6 +65,7 @@ impl CleanRule {
             Self::Needles => "over 30 times as long as wide",
             Self::Oversized => "larger than half the scene's radius",
             Self::Unsupported => "under 1 % of every pixel of every photo",
+            Self::Color(_) => "this color, or one that is near",
             Self::Below(measure, _) | Self::Above(measure, _) | Self::Range(measure, ..) => measure.meaning(),
         }
     }
@@ -69,6 +74,11 @@ impl CleanRule {
     pub(crate) fn choose(&self, of: &CloudMeasures) -> Result<Vec<bool>, RuleError> {
         let (measure, is): (_, &dyn Fn(f32) -> bool) = match *self {
             Self::Floaters => return Ok(of.floaters.clone()),
+            Self::Color(color) => {
+                let color = color.map(|v| f32::from(v) / 255.0);
+                let distance = |c: &[f32; 3]| (0..3).map(|k| (c[k] - color[k]).powi(2)).sum::<f32>().sqrt();
+                return Ok(of.colors.iter().map(|c| distance(c) < NEAR_COLOR).collect());
+            }
             Self::Faint => (SplatMeasure::Opacity, &|v| v < FAINT),
             Self::Needles => (SplatMeasure::Elongation, &|v| v > NEEDLE),
             Self::Oversized => (SplatMeasure::Size, &|v| f64::from(v) > OVERSIZED * of.radius),
@@ -90,6 +100,7 @@ impl fmt::Display for CleanRule {
             Self::Needles => f.write_str("needles"),
             Self::Oversized => f.write_str("oversized"),
             Self::Unsupported => f.write_str("unsupported"),
+            Self::Color([r, g, b]) => write!(f, "color=#{r:02x}{g:02x}{b:02x}"),
             Self::Below(measure, limit) => write!(f, "{}<{limit}", measure.word()),
             Self::Above(measure, limit) => write!(f, "{}>{limit}", measure.word()),
             Self::Range(measure, from, to) => write!(f, "{from}<{}<{to}", measure.word()),
@@ -104,6 +115,11 @@ impl FromStr for CleanRule {
         let text = text.trim();
         if let Some(named) = Self::NAMED.into_iter().find(|rule| rule.to_string() == text) {
             return Ok(named);
+        }
+        if let Some(digits) = text.strip_prefix("color=#").filter(|d| d.len() == 6)
+            && let Ok(value) = u32::from_str_radix(digits, 16)
+        {
+            return Ok(Self::Color([16, 8, 0].map(|shift| (value >> shift & 0xff) as u8)));
         }
         let parsed = || {
             let (word, limit) = text.split_once(['<', '>'])?;

@@ -2,7 +2,6 @@
 
 use super::{CleanError, CleanView};
 use crate::math::lanes::Lane;
-use crate::math::sh::SH_C0;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::render::{ContributionSink, RenderSettings, Renderer, TILE_PX};
 use crate::scene::{GaussianCloud, PhotoPixels};
@@ -27,8 +26,7 @@ pub(super) fn look(
     observer: &mut dyn Observer,
 ) -> Result<PhotoSupport, CleanError> {
     let n = cloud.len();
-    let stride = cloud.sh_stride();
-    let colors: Vec<[f32; 3]> = (0..n).map(|i| cloud.sh[i * stride].map(|v| 0.5 + SH_C0 as f32 * v)).collect();
+    let colors = super::colors(cloud);
     let (mut largest, mut photos) = (vec![0.0_f32; n], vec![0.0_f32; n]);
     let (mut weight, mut difference) = (vec![0.0_f64; n], vec![0.0_f64; n]);
     let mut renderer = Renderer::new();
@@ -81,7 +79,7 @@ impl ContributionSink<f32> for Row<'_> {
             let Some(there) = self.photo.and_then(|photo| color(photo, y * self.width + x + k)) else { continue };
             let own = self.colors[gaussian as usize];
             new.weight += w;
-            new.difference += w * (0..3).map(|c| (own[c].clamp(0.0, 1.0) - there[c]).powi(2)).sum::<f32>() / 3.0;
+            new.difference += w * (0..3).map(|c| (own[c] - there[c]).powi(2)).sum::<f32>() / 3.0;
         }
         match self.seen.last_mut().filter(|last| last.gaussian == gaussian) {
             Some(last) => {

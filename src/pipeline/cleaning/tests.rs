@@ -111,6 +111,17 @@ fn measures_are_those_of_each_gaussian() {
     assert!(chosen("oversized", &of).contains(&(first + 2)));
     assert!(chosen("unsupported", &of).contains(&(first + 3)));
     assert!(!chosen("unsupported", &of).contains(&INNER));
+    assert_eq!(chosen("color=#e61a1a", &of), (WALL..WALL + RING).collect::<Vec<_>>(), "the ring is red");
+    // Grown, a Gaussian takes its neighbors along; shrunk, it is alone again; what is deleted is no neighbor.
+    let only = |i: usize| (0..cloud.len()).map(|k| k == i).collect::<Vec<bool>>();
+    let grown = of.grown(&only(INNER));
+    let count = |of: &[bool]| of.iter().filter(|c| **c).count();
+    assert!(count(&grown) == 9 && grown[INNER - 1] && grown[INNER + 60] && grown[INNER - 61]);
+    assert_eq!((of.shrunk(&grown), count(&of.shrunk(&only(INNER)))), (only(INNER), 0));
+    let left = of.without(&only(INNER - 1));
+    let again = left.grown(&only(INNER - 1)[..cloud.len() - 1]);
+    assert_eq!(count(&again), 8, "one neighbor is gone");
+    assert_eq!(left.get(SplatMeasure::Size).map(<[f32]>::len), Some(cloud.len() - 1));
     // Nothing, and one alone.
     for n in [0, 1] {
         let few = cloud.select(&(0..n).collect::<Vec<_>>());
@@ -122,11 +133,34 @@ fn measures_are_those_of_each_gaussian() {
 
 #[test]
 fn rules_are_read_as_they_are_written() {
-    for text in ["floaters", "faint", "needles", "oversized", "unsupported", "size>0.5", "photos<2", "error>0.25"] {
+    for text in [
+        "floaters",
+        "faint",
+        "needles",
+        "oversized",
+        "unsupported",
+        "color=#3050c0",
+        "size>0.5",
+        "photos<2",
+        "error>0.25",
+    ] {
         assert_eq!(text.parse::<CleanRule>().expect("a rule").to_string(), text);
     }
     assert_eq!(" size > 0.5 ".parse(), Ok(CleanRule::Above(SplatMeasure::Size, 0.5)));
-    for text in ["", "dust", "size", "size>", "size>big", "size>nan", "size>inf", ">1", "height>2", "size>1<2"] {
+    for text in [
+        "",
+        "dust",
+        "size",
+        "size>",
+        "size>big",
+        "size>nan",
+        "size>inf",
+        ">1",
+        "height>2",
+        "size>1<2",
+        "color=#12",
+        "color=#gg0000",
+    ] {
         assert_eq!(text.parse::<CleanRule>(), Err(RuleError::Unknown(text.into())));
     }
 }

@@ -50,6 +50,18 @@ fn done(edit: SplatEdit) -> (GaussianCloud, SemanticMap) {
     (cloud, map.expect("a map"))
 }
 
+fn moved(id: IdentityId, to: Placement) -> SplatEdit {
+    SplatEdit::Arrange(Arrangement { to, ..Arrangement::of(id) })
+}
+
+fn doubled(id: IdentityId, to: Placement) -> SplatEdit {
+    SplatEdit::Arrange(Arrangement { to, duplicate: true, ..Arrangement::of(id) })
+}
+
+fn recolored(id: IdentityId, color: [f32; 3]) -> SplatEdit {
+    SplatEdit::Arrange(Arrangement { color: Some(color), ..Arrangement::of(id) })
+}
+
 fn placement() -> Placement {
     Placement {
         shift: DVec3::new(0.4, -0.2, 1.0),
@@ -70,13 +82,13 @@ fn what_is_moved_looks_as_it_did_from_where_the_camera_moves_with_it() {
     let (before, map) = scene();
     let thing = map.members(MUG);
     let to = placement();
-    let (after, new) = done(SplatEdit::Move(MUG, to));
+    let (after, new) = done(moved(MUG, to));
     assert_eq!(new, map, "whose they are has not changed");
     let about = middle(&before, &thing);
-    let moved = |p: DVec3| about + to.scale * (to.turn * (p - about)) + to.shift;
+    let there = |p: DVec3| about + to.scale * (to.turn * (p - about)) + to.shift;
     let eye = about + DVec3::new(0.5, 1.0, 3.0);
     let look = |eye: DVec3, at: DVec3, up: DVec3| Camera::look_at(eye, at, up, 0.7, 64, 48).expect("a camera");
-    let (first, second) = (look(eye, about, DVec3::Y), look(moved(eye), moved(about), to.turn * DVec3::Y));
+    let (first, second) = (look(eye, about, DVec3::Y), look(there(eye), there(about), to.turn * DVec3::Y));
     let (a, b) = (drawn(&before, &thing, &first), drawn(&after, &thing, &second));
     let worst = crate::math::stats::worst_difference(&a, &b);
     assert!(worst < 2e-3, "{worst}");
@@ -89,7 +101,7 @@ fn what_is_moved_looks_as_it_did_from_where_the_camera_moves_with_it() {
         assert_eq!((after.positions[i], after.quaternions[i]), (before.positions[i], before.quaternions[i]));
     }
     // A part alone.
-    let (after, _) = done(SplatEdit::Move(HANDLE, to));
+    let (after, _) = done(moved(HANDLE, to));
     let changed: Vec<usize> = (0..100).filter(|&i| after.positions[i] != before.positions[i]).collect();
     assert_eq!(changed, map.members(HANDLE));
 }
@@ -97,7 +109,7 @@ fn what_is_moved_looks_as_it_did_from_where_the_camera_moves_with_it() {
 #[test]
 fn a_duplicate_is_another_with_parts_of_its_own() {
     let (before, map) = scene();
-    let (after, new) = done(SplatEdit::Duplicate(MUG, Placement { shift: DVec3::X, ..Placement::default() }));
+    let (after, new) = done(doubled(MUG, Placement { shift: DVec3::X, ..Placement::default() }));
     assert_eq!((after.len(), new.identities.len(), new.identity_of.len()), (160, 5, 160));
     assert!(after.select(&(0..100).collect::<Vec<_>>()) == before, "the first is as it was");
     let (copy, handle) = (4, 5);
@@ -118,7 +130,7 @@ fn a_duplicate_is_another_with_parts_of_its_own() {
     let gap = after.world_position(100) - before.world_position(0);
     assert!((gap - DVec3::X).length() < 1e-6);
     // Another handle of the same mug.
-    let (_, new) = done(SplatEdit::Duplicate(HANDLE, Placement::default()));
+    let (_, new) = done(doubled(HANDLE, Placement::default()));
     assert_eq!(new.identities.get(4).expect("there").parent, MUG);
     assert_eq!((new.members(MUG).len(), map.members(MUG).len()), (80, 60));
 }
@@ -126,7 +138,7 @@ fn a_duplicate_is_another_with_parts_of_its_own() {
 #[test]
 fn another_color_keeps_the_shades() {
     let (before, map) = scene();
-    let (after, new) = done(SplatEdit::Recolor(MUG, [0.8, 0.2, 0.1]));
+    let (after, new) = done(recolored(MUG, [0.8, 0.2, 0.1]));
     assert_eq!(new, map);
     let shown = |cloud: &GaussianCloud, i: usize| cloud.sh[16 * i].map(|v| 0.5 + SH_C0 * f64::from(v));
     for i in map.members(MUG) {
@@ -140,7 +152,7 @@ fn another_color_keeps_the_shades() {
     assert!(map.members(TABLE).iter().all(|&i| shown(&after, i) == shown(&before, i)));
     let mut black = before;
     map.members(MUG).into_iter().for_each(|i| black.sh[16 * i..16 * (i + 1)].fill([-0.5 / SH_C0 as f32; 3]));
-    let (after, _) = apply(&black, Some(&map), &SplatEdit::Recolor(MUG, [1.0; 3])).expect("edited");
+    let (after, _) = apply(&black, Some(&map), &recolored(MUG, [1.0; 3])).expect("edited");
     after.validate().expect("finite");
 }
 
@@ -148,8 +160,8 @@ fn another_color_keeps_the_shades() {
 fn what_makes_no_sense_is_refused() {
     let (cloud, map) = scene();
     let refused = |map: Option<&SemanticMap>, edit| apply(&cloud, map, &edit).expect_err("refused");
-    assert_eq!(refused(Some(&map), SplatEdit::Move(9, placement())), SplatEditError::Unknown(9));
-    assert_eq!(refused(None, SplatEdit::Recolor(MUG, [0.0; 3])), SplatEditError::NoObjects);
+    assert_eq!(refused(Some(&map), moved(9, placement())), SplatEditError::Unknown(9));
+    assert_eq!(refused(None, recolored(MUG, [0.0; 3])), SplatEditError::NoObjects);
     assert_eq!(refused(Some(&map), SplatEdit::Delete(vec![true; 100])), SplatEditError::NothingLeft);
     for wrong in [
         Placement { scale: 0.0, ..Placement::default() },
@@ -157,13 +169,13 @@ fn what_makes_no_sense_is_refused() {
         Placement { shift: DVec3::INFINITY, ..Placement::default() },
         Placement { turn: DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), ..Placement::default() },
     ] {
-        assert_eq!(refused(Some(&map), SplatEdit::Move(MUG, wrong)), SplatEditError::Placement);
+        assert_eq!(refused(Some(&map), moved(MUG, wrong)), SplatEditError::Placement);
     }
     let far = Placement { shift: DVec3::splat(1e300), ..Placement::default() };
-    assert_eq!(refused(Some(&map), SplatEdit::Move(MUG, far)), SplatEditError::OutOfRange("mug".into()));
+    assert_eq!(refused(Some(&map), moved(MUG, far)), SplatEditError::OutOfRange("mug".into()));
     let mut bare = map.clone();
     bare.identity_of.fill(TABLE);
-    assert_eq!(refused(Some(&bare), SplatEdit::Move(MUG, placement())), SplatEditError::Empty("mug".into()));
+    assert_eq!(refused(Some(&bare), moved(MUG, placement())), SplatEditError::Empty("mug".into()));
 }
 
 #[test]
@@ -183,9 +195,9 @@ fn a_hundred_edits_undone_and_redone_in_random_order_end_where_they_began() {
                 let id = *ids.choose(&mut rng).expect("some");
                 let edit = match rng.random_range(0..4) {
                     0 => SplatEdit::Delete((0..now.0.len()).map(|_| rng.random_bool(0.01)).collect()),
-                    1 => SplatEdit::Move(id, placement()),
-                    2 if now.0.len() < 500 => SplatEdit::Duplicate(id, placement()),
-                    _ => SplatEdit::Recolor(id, [rng.random(), 0.3, 0.9]),
+                    1 => moved(id, placement()),
+                    2 if now.0.len() < 500 => doubled(id, placement()),
+                    _ => recolored(id, [rng.random(), 0.3, 0.9]),
                 };
                 let Ok(new) = apply(&now.0, now.1.as_ref(), &edit) else { continue };
                 history.record(std::mem::replace(&mut now, new));

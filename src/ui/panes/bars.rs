@@ -109,6 +109,7 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
             for action in [Action::Measure, Action::Crop, Action::Inspect] {
                 item(ui, has_scene, None, action, actions);
             }
+            item(ui, state.is_trained() && state.job.is_none(), None, Action::MeasureSplats, actions);
         });
         ui.menu_button("Train", |ui| {
             ui.set_min_width(260.0);

@@ -6,31 +6,48 @@ use std::sync::Arc;
 use egui::{Button, Checkbox, ComboBox, DragValue, RichText, Ui};
 use strum::VariantArray;
 
+use super::super::labels::sentence;
 use super::super::state::AppState;
 use super::super::theme;
+use super::super::viewport::Viewport;
 use super::super::viewport::chosen::ChosenSplats;
 use super::histogram::Histogram;
 use crate::jobs::clean::{self, CleanRule, CloudMeasures, MeasuredCloud, SplatMeasure};
 use crate::math::format;
-use crate::scene::GaussianCloud;
+use crate::scene::{CropBox, GaussianCloud, IdentityId};
 use crate::ui::actions::Action;
 use crate::worker::JobKind;
+
+/// Color that one begins with.
+const FIRST_COLOR: [u8; 3] = [128; 3];
 
 /// The pane.
 #[derive(Default)]
 pub(crate) struct CleanPane {
     measured: Option<Arc<MeasuredCloud>>,
-    /// How many each rule means, and whether it is chosen.
-    rules: Vec<(CleanRule, usize, bool)>,
-    /// The measure whose values are shown, and the range of them that is chosen.
-    measure: Option<SplatMeasure>,
+    /// Rules without numbers, and how many Gaussians each means.
+    counts: Vec<(CleanRule, usize)>,
     histogram: Histogram,
-    range: Option<[f32; 2]>,
-    /// Whether what is chosen is left out of the view; else it is marked.
-    hide: bool,
+    choice: SplatChoice,
     chosen: Option<Arc<ChosenSplats>>,
     /// What was deleted last, until the Gaussians without it are on screen.
     deleted: Option<Arc<ChosenSplats>>,
+}
+
+/// What is chosen, and how that is shown.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct SplatChoice {
+    rules: Vec<CleanRule>,
+    /// The measure whose values are shown, and the range of them that is chosen.
+    measure: Option<SplatMeasure>,
+    range: Option<[f32; 2]>,
+    /// A color, whose Gaussians are chosen.
+    color: Option<[u8; 3]>,
+    /// The crop box, if what it leaves out is chosen; the selected object or part, if that is.
+    crop: Option<CropBox>,
+    object: Option<IdentityId>,
+    /// Whether what is chosen is left out of the view; else it is marked.
+    hide: bool,
 }
 
 impl CleanPane {
@@ -48,7 +65,7 @@ impl CleanPane {
         if let (Some(measured), Some(cloud)) = (self.measured.take_if(|m| !is_of(m)), cloud) {
             // What is left of them is known; pieces and distances are as they were.
             let deleted = self.deleted.take().filter(|d| d.of.len() - d.count == cloud.len());
-            (self.chosen, self.rules, self.measure) = (None, Vec::new(), None);
+            (self.chosen, self.choice) = (None, SplatChoice::default());
             if let Some(deleted) = deleted {
                 let measures = measured.measures.without(&deleted.of);
                 self.take(Arc::new(MeasuredCloud { cloud: Arc::clone(cloud), measures }));
@@ -66,114 +83,159 @@ impl CleanPane {
     fn take(&mut self, measured: Arc<MeasuredCloud>) {
         let count = |rule: CleanRule| {
             let chosen = rule.choose(&measured.measures).ok()?;
-            Some((rule, chosen.iter().filter(|c| **c).count(), false))
+            Some((rule, chosen.iter().filter(|c| **c).count()))
         };
-        self.rules = CleanRule::NAMED.into_iter().filter_map(count).collect();
-        (self.measured, self.measure, self.range, self.chosen) = (Some(measured), None, None, None);
+        self.counts = CleanRule::NAMED.into_iter().filter_map(count).collect();
+        (self.measured, self.choice, self.chosen) = (Some(measured), SplatChoice::default(), None);
     }
 
     /// Draws the pane.
-    pub(crate) fn show(&mut self, ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+    pub(crate) fn show(&mut self, ui: &mut Ui, state: &AppState, view: &Viewport, actions: &mut Vec<Action>) {
         if !state.is_trained() {
             ui.weak("Trained Gaussians can be cleaned: open a trained scene or a splat, or train one.");
             return;
         }
-        let running = state.job.as_ref().is_some_and(|j| j.kind == JobKind::Clean);
-        let Some(measured) = self.measured.clone() else {
-            ui.label("Floaters, needles and haze are found by what the photos show of each Gaussian.");
-            ui.add_space(6.0);
-            let button = theme::primary_button(if running { "Measuring\u{2026}" } else { "Measure Gaussians" });
-            if ui.add_enabled(state.job.is_none(), button).on_hover_text(Action::MeasureSplats.tooltip()).clicked() {
-                actions.push(Action::MeasureSplats);
-            }
-            return;
-        };
-        let before = (self.rules.clone(), self.range, self.measure, self.hide);
+        let Some(measured) = self.measured.clone() else { return offer(ui, state, actions) };
+        let before = self.choice.clone();
         theme::section(ui, "Suspects");
-        for (rule, count, chosen) in &mut self.rules {
-            ui.horizontal(|ui| {
-                let (name, enabled) = (title(rule), *count > 0);
-                ui.add_enabled(enabled, Checkbox::new(chosen, name)).on_hover_text(rule.meaning());
-                ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                    ui.label(RichText::new(format::count(*count as u64)).color(theme::weak()));
-                });
-            });
+        for (rule, count) in &self.counts {
+            self.choice.show_rule(ui, *rule, *count);
         }
         if measured.measures.get(SplatMeasure::Weight).is_none() {
             ui.weak("The photos are not known, so nothing is known of what they show.");
         }
         theme::section(ui, "By a measure");
         self.show_measure(ui, &measured.measures);
+        theme::section(ui, "By color and place");
+        self.choice.show_places(ui, view.picking.selected(), view.visibility.crop());
         theme::section(ui, "Chosen");
-        if before != (self.rules.clone(), self.range, self.measure, self.hide) {
-            self.choose(&measured);
-        }
         let (count, all) = (self.chosen.as_ref().map_or(0, |c| c.count), measured.cloud.len());
         let share = format::number(100.0 * count as f64 / all.max(1) as f64);
         ui.label(format!("{} of {} Gaussians ({share} %)", format::count(count as u64), format::count(all as u64)));
         ui.horizontal(|ui| {
-            ui.radio_value(&mut self.hide, false, "Mark").on_hover_text("Show them in magenta.");
-            ui.radio_value(&mut self.hide, true, "Hide").on_hover_text("Show the scene without them.");
+            ui.radio_value(&mut self.choice.hide, false, "Mark").on_hover_text("Show them in magenta.");
+            ui.radio_value(&mut self.choice.hide, true, "Hide").on_hover_text("Show the scene without them.");
+            let mut other = |ui: &mut Ui, text: &str, tip: &str, change: fn(&CloudMeasures, &[bool]) -> Vec<bool>| {
+                let button = ui.add_enabled(count > 0, Button::new(text)).on_hover_text(tip);
+                if let Some(chosen) = self.chosen.as_mut().filter(|_| button.clicked()) {
+                    *chosen = Arc::new(ChosenSplats::new(change(&measured.measures, &chosen.of), self.choice.hide));
+                }
+            };
+            other(ui, "Grow", "Choose the neighbors of what is chosen, too.", CloudMeasures::grown);
+            other(ui, "Shrink", "Leave out what has a neighbor that is not chosen.", CloudMeasures::shrunk);
         });
-        if before.3 != self.hide {
-            self.choose(&measured);
-        }
         ui.horizontal(|ui| {
             let delete = Action::DeleteChosen;
-            let is_some = count > 0 && count < all;
-            let button = ui.add_enabled(is_some, theme::primary_button("Delete"));
+            let button = ui.add_enabled(count > 0 && count < all, theme::primary_button("Delete"));
             if button.on_hover_text(delete.tooltip()).clicked() {
                 actions.push(delete);
             }
             if ui.add_enabled(count > 0, Button::new("Choose none")).clicked() {
-                self.rules.iter_mut().for_each(|r| r.2 = false);
-                (self.range, self.chosen) = (None, None);
+                let SplatChoice { measure, hide, .. } = self.choice;
+                (self.choice, self.chosen) = (SplatChoice { measure, hide, ..SplatChoice::default() }, None);
             }
         });
+        if before != self.choice {
+            let of = self.choice.of(&measured, state);
+            self.chosen = of.map(|of| Arc::new(ChosenSplats::new(of, self.choice.hide)));
+        }
     }
 
     fn show_measure(&mut self, ui: &mut Ui, of: &CloudMeasures) {
-        let chosen = self.measure.map_or("none", SplatMeasure::word);
-        ComboBox::from_id_salt("measure").selected_text(chosen).show_ui(ui, |ui| {
+        let Self { choice, histogram, .. } = self;
+        let shown = choice.measure.map_or("none", SplatMeasure::word);
+        let list = ComboBox::from_id_salt("measure").selected_text(shown).show_ui(ui, |ui| {
             for &measure in SplatMeasure::VARIANTS {
                 let Some(values) = of.get(measure) else { continue };
-                let row = ui.selectable_label(self.measure == Some(measure), measure.word());
+                let row = ui.selectable_label(choice.measure == Some(measure), measure.word());
                 if row.on_hover_text(measure.meaning()).clicked() {
-                    (self.measure, self.range) = (Some(measure), None);
-                    self.histogram = Histogram::new(values, measure.is_logarithmic());
+                    (choice.measure, choice.range) = (Some(measure), None);
+                    *histogram = Histogram::new(values, measure.is_logarithmic());
                 }
             }
         });
-        let Some(measure) = self.measure else {
+        list.response.accessible_name("Measure shown");
+        let Some(measure) = choice.measure else {
             ui.weak("Choose a measure, and drag over its histogram.");
             return;
         };
-        ui.weak(measure.meaning());
-        self.histogram.show(ui, &mut self.range);
+        ui.weak(sentence(measure.meaning()) + ".");
+        histogram.show(ui, &mut choice.range);
         ui.horizontal(|ui| {
-            let mut ends = self.range.unwrap_or(self.histogram.ends());
+            let mut ends = choice.range.unwrap_or(histogram.ends());
             let before = ends;
-            let speed = (self.histogram.ends()[1] - self.histogram.ends()[0]).abs() / 500.0;
+            let speed = (histogram.ends()[1] - histogram.ends()[0]).abs() / 500.0;
             for (end, name) in ends.iter_mut().zip(["From", "To"]) {
                 ui.label(name);
                 ui.add(DragValue::new(end).speed(speed).max_decimals(4)).accessible_name(name);
             }
             if ends != before && ends.iter().all(|v| v.is_finite()) {
-                self.range = Some([ends[0].min(ends[1]), ends[0].max(ends[1])]);
+                choice.range = Some([ends[0].min(ends[1]), ends[0].max(ends[1])]);
             }
         });
     }
+}
 
-    /// Chooses what rules and range mean.
-    fn choose(&mut self, measured: &MeasuredCloud) {
-        let mut rules: Vec<CleanRule> = self.rules.iter().filter(|r| r.2).map(|r| r.0).collect();
+impl SplatChoice {
+    fn show_rule(&mut self, ui: &mut Ui, rule: CleanRule, count: usize) {
+        ui.horizontal(|ui| {
+            let mut on = self.rules.contains(&rule);
+            let row = ui.add_enabled(count > 0, Checkbox::new(&mut on, sentence(&rule.to_string())));
+            if row.on_hover_text(sentence(rule.meaning()) + ".").changed() {
+                self.rules.retain(|other| *other != rule);
+                self.rules.extend(on.then_some(rule));
+            }
+            ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                ui.label(RichText::new(format::count(count as u64)).color(theme::weak()));
+            });
+        });
+    }
+
+    fn show_places(&mut self, ui: &mut Ui, selected: Option<IdentityId>, crop: Option<CropBox>) {
+        ui.horizontal(|ui| {
+            let mut on = self.color.is_some();
+            if ui.checkbox(&mut on, "A color").on_hover_text("Gaussians of this color, or one that is near.").changed()
+            {
+                self.color = on.then_some(FIRST_COLOR);
+            }
+            if let Some(color) = &mut self.color {
+                ui.color_edit_button_srgb(color);
+            }
+        });
+        let mut on = self.crop.is_some();
+        let row = ui.add_enabled(crop.is_some(), Checkbox::new(&mut on, "Outside the crop box"));
+        row.on_hover_text("What the crop box leaves out (B shows it).");
+        self.crop = crop.filter(|_| on);
+        let mut on = self.object.is_some();
+        let row = ui.add_enabled(selected.is_some(), Checkbox::new(&mut on, "The selected object or part"));
+        row.on_hover_text("Click one in the view, or mark one by clicks and lines first.");
+        self.object = selected.filter(|_| on);
+    }
+
+    /// Whether each Gaussian is chosen; `None` if nothing is.
+    fn of(&self, measured: &MeasuredCloud, state: &AppState) -> Option<Vec<bool>> {
+        let mut rules = self.rules.clone();
         rules.extend(self.measure.zip(self.range).map(|(m, [from, to])| CleanRule::Range(m, from, to)));
-        let chosen = clean::choose(&rules, &measured.measures).ok().filter(|c| !c.is_empty());
-        self.chosen = chosen.map(|of| Arc::new(ChosenSplats::new(of, self.hide)));
+        rules.extend(self.color.map(CleanRule::Color));
+        let mut of = clean::choose(&rules, &measured.measures).ok()?;
+        of.resize(measured.cloud.len(), false);
+        if let Some(crop) = self.crop {
+            (0..of.len()).for_each(|i| of[i] |= !crop.keeps(measured.cloud.world_position(i)));
+        }
+        if let (Some(id), Some(map)) = (self.object, &state.semantics) {
+            map.members(id).into_iter().for_each(|i| of.get_mut(i).into_iter().for_each(|of| *of = true));
+        }
+        of.contains(&true).then_some(of)
     }
 }
 
-/// A rule as a user sees it.
-fn title(rule: &CleanRule) -> String {
-    super::super::edits::sentence(&rule.to_string())
+/// Before anything is measured.
+fn offer(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+    let running = state.job.as_ref().is_some_and(|j| j.kind == JobKind::Clean);
+    ui.label("Floaters, needles and haze are found by what the photos show of each Gaussian.");
+    ui.add_space(6.0);
+    let button = theme::primary_button(if running { "Measuring\u{2026}" } else { "Measure Gaussians" });
+    if ui.add_enabled(state.job.is_none(), button).on_hover_text(Action::MeasureSplats.tooltip()).clicked() {
+        actions.push(Action::MeasureSplats);
+    }
 }

@@ -273,6 +273,7 @@ impl Tree<'_> {
                 (Action::Paint(Some(id)), "Select a new part\u{2026}"),
                 (Action::GoToTarget(id, Side::Best), "Go there"),
                 (Action::Isolate(Some(id)), "Isolate"),
+                (Action::Arrange(id), "Move, turn or recolor\u{2026}"),
                 (Action::Remove(id), "Remove and fill"),
                 (Action::ExportTarget(id), "Export as .ply\u{2026}"),
             ] {

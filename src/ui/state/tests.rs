@@ -4,6 +4,7 @@ use super::*;
 use crate::pipeline::observer::StepMetrics;
 use crate::scene::Dataset;
 use crate::ui::train_history::MAX_STEPS;
+use crate::worker::Failure;
 
 const JOB: JobId = JobId(7);
 

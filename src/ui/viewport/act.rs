@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::arranging::ArrangeTool;
 use super::brush::Brush;
 use super::eye::Eye;
 use super::inspector::Inspector;
@@ -28,8 +29,17 @@ impl Viewport {
                 self.eye.frame(selected.as_ref().unwrap_or(&scene.home.bounds));
             }
             Action::Paint(of) => {
-                self.brush = None;
+                (self.brush, self.arrange) = (None, None);
                 self.select = of.map(|of| SelectTool::new(SelectFor::New(of)));
+            }
+            Action::Arrange(id) => {
+                (self.brush, self.select) = (None, None);
+                let up = self.up(&scene);
+                self.arrange = self
+                    .cloud
+                    .as_ref()
+                    .zip(state.semantics.as_ref().filter(|_| state.is_trained()))
+                    .map(|(cloud, map)| ArrangeTool::new(*id, cloud, map, up));
             }
             Action::Correct(id) => self.select = all.map(|_| SelectTool::new(SelectFor::Extent(*id))),
             Action::PaintTrueMask => (self.brush, self.select) = (all.map(|_| Brush::new()), None),
@@ -57,7 +67,7 @@ impl Viewport {
     /// Which action ends the tool that is in use.
     pub(crate) fn tool(&self) -> Option<Action> {
         let tools = [
-            (self.brush.is_some() || self.select.is_some(), Action::Paint(None)),
+            (self.brush.is_some() || self.select.is_some() || self.arrange.is_some(), Action::Paint(None)),
             (self.ruler.is_some(), Action::Measure),
             (self.cropping, Action::Crop),
             (self.inspector.is_some(), Action::Inspect),

@@ -143,7 +143,7 @@ fn drag_face(ui: &Ui, shown: Rect, eye: &Camera, crop: &mut CropBox, axis: usize
 }
 
 /// Where a point is in the view, and how far it goes there by one unit along an axis.
-fn on_screen(eye: &Camera, shown: Rect, p: DVec3, axis: usize) -> Option<(Pos2, Vec2)> {
+pub(super) fn on_screen(eye: &Camera, shown: Rect, p: DVec3, axis: usize) -> Option<(Pos2, Vec2)> {
     let step = 1e-3 * (p - eye.center).length();
     let mut beside = p;
     beside[axis] += step;
@@ -154,7 +154,7 @@ fn on_screen(eye: &Camera, shown: Rect, p: DVec3, axis: usize) -> Option<(Pos2, 
 }
 
 /// How far a face goes along its axis when the cursor moves so in the view, `along` being what one unit is there.
-fn travel(drag: Vec2, along: Vec2) -> f64 {
+pub(super) fn travel(drag: Vec2, along: Vec2) -> f64 {
     // An axis that points at the eye would carry it away.
     let length_sq = along.length_sq();
     if length_sq < 1.0 { 0.0 } else { f64::from(drag.dot(along) / length_sq) }

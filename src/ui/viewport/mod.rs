@@ -1,6 +1,7 @@
 //! The viewport: shows what the drawing lane rendered, and moves the eye.
 
 mod act;
+pub(crate) mod arranging;
 pub(crate) mod brush;
 pub(crate) mod chosen;
 mod crop;
@@ -30,6 +31,7 @@ use std::sync::Arc;
 use egui::{Rect, Sense, Ui};
 use glam::{DVec2, DVec3};
 
+use self::arranging::ArrangeTool;
 use self::brush::Brush;
 use self::display::Display;
 use self::eye::Eye;
@@ -88,6 +90,8 @@ pub struct Viewport {
     pub(crate) brush: Option<Brush>,
     /// What is being selected by clicks and strokes.
     pub(crate) select: Option<SelectTool>,
+    /// What is being moved.
+    pub(crate) arrange: Option<ArrangeTool>,
     /// Render settings in place of the scene's own.
     pub overrides: RenderOverrides,
     /// World point that the wheel zooms to, while the cursor stays.
@@ -118,6 +122,7 @@ impl Viewport {
             inspector: None,
             brush: None,
             select: None,
+            arrange: None,
             overrides: RenderOverrides::default(),
             zoom_anchor: None,
         })
@@ -160,7 +165,7 @@ impl Viewport {
             self.visibility = Visibility::default();
             self.picking = Picking::default();
             (self.ruler, self.cropping, self.inspector) = (None, false, None);
-            (self.brush, self.select) = (None, None);
+            (self.brush, self.select, self.arrange) = (None, None, None);
             self.overrides = RenderOverrides::default();
             self.eye = Eye::home(&scene.home, None);
         }
@@ -298,6 +303,7 @@ impl Viewport {
             self.picking.update(&response, shown_in(under), (semantics, &state.labels), maps, actions);
         }
         self.show_crop(ui, shown, state, actions);
+        self.show_arranging(ui, shown, state, actions);
         self.show_inspector(ui, &response, shown, state, actions);
         for (second, rect) in views.each() {
             self.queries.work_in(second);

@@ -166,7 +166,9 @@ impl Viewport {
         let Some(cloud) = self.cloud.clone() else { return };
         let plan = &state.plan;
         let preview = self.select.as_ref().and_then(SelectTool::preview);
-        let VisibleCloud { cloud, semantics, .. } = self.visibility.apply(&cloud, preview.or(state.semantics.as_ref()));
+        let arranged = self.arrange.as_mut().and_then(|tool| tool.preview(&cloud, state.semantics.as_ref()));
+        let (cloud, map) = arranged.unwrap_or_else(|| (cloud, state.semantics.clone()));
+        let VisibleCloud { cloud, semantics, .. } = self.visibility.apply(&cloud, preview.or(map.as_ref()));
         let with_maps = plan.maps.now(self.queries.wanted() || self.picking.wanted()) || preview.is_some();
         let semantics = semantics.filter(|_| with_maps);
         let rests = now - self.moved_at - REST_SECS;

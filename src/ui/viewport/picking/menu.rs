@@ -38,6 +38,7 @@ pub(super) fn show(
     ui.separator();
     row(ui, Action::Correct(id), "Correct by clicks\u{2026}");
     row(ui, Action::Paint(Some(id)), "Select a new part by clicks\u{2026}");
+    row(ui, Action::Arrange(id), "Move, turn or recolor\u{2026}");
     row(ui, Action::Remove(id), "Remove and fill");
     row(ui, Action::ExportTarget(id), "Export as .ply\u{2026}");
 }

@@ -1,0 +1,191 @@
+//! Moving, turning, scaling, duplicating and recoloring an object or a part: arrows in the view, numbers, a preview.
+
+use std::sync::Arc;
+
+use egui::{Align2, Area, Color32, DragValue, Id, Order, Rect, Sense, Stroke, Ui, Vec2};
+use glam::{DQuat, DVec3};
+
+use super::super::theme;
+use super::Viewport;
+use super::crop::{on_screen, travel};
+use crate::jobs::rearrange::{Arrangement, SplatEdit, apply};
+use crate::scene::{Bounds, Camera, GaussianCloud, Identities, SemanticMap};
+use crate::ui::actions::Action;
+use crate::ui::state::AppState;
+use crate::worker::Versioned;
+
+/// Length of the arrows, points.
+const ARROW: f32 = 80.0;
+const HANDLE: f32 = 7.0;
+const AXES: [Color32; 3] =
+    [Color32::from_rgb(0xf0, 0x5a, 0x4b), Color32::from_rgb(0x5f, 0xc8, 0x4f), Color32::from_rgb(0x4d, 0x9d, 0xf5)];
+/// Color that one begins with.
+const FIRST_COLOR: [f32; 3] = [0.8, 0.2, 0.15];
+
+/// What is being arranged.
+pub(crate) struct ArrangeTool {
+    arrangement: Arrangement,
+    /// Turn about the up direction, degrees.
+    degrees: f64,
+    up: DVec3,
+    /// Middle and half the diagonal of the thing before.
+    middle: DVec3,
+    radius: f64,
+    /// What is shown, and of which Gaussians and objects it was made.
+    shown: Option<Arranged>,
+}
+
+struct Arranged {
+    of: (u64, u64, Arrangement),
+    cloud: Versioned<GaussianCloud>,
+    map: Option<Versioned<SemanticMap>>,
+}
+
+impl ArrangeTool {
+    pub(super) fn new(id: u32, cloud: &GaussianCloud, map: &SemanticMap, up: DVec3) -> Self {
+        let places = map.members(id).into_iter().filter(|i| *i < cloud.len()).map(|i| cloud.world_position(i));
+        let bounds = Bounds::robust(places);
+        let (middle, radius) = bounds.map_or((DVec3::ZERO, 1.0), |b| (b.center(), b.radius()));
+        Self { arrangement: Arrangement::of(id), degrees: 0.0, up, middle, radius, shown: None }
+    }
+
+    /// What is to become of it.
+    pub(crate) fn arrangement(&self) -> Arrangement {
+        self.arrangement
+    }
+
+    fn is_something(&self) -> bool {
+        self.arrangement != Arrangement::of(self.arrangement.id)
+    }
+
+    /// The Gaussians as they would be, and what they belong to; `None` while nothing is changed.
+    pub(super) fn preview(
+        &mut self,
+        cloud: &Versioned<GaussianCloud>,
+        map: Option<&Versioned<SemanticMap>>,
+    ) -> Option<(Versioned<GaussianCloud>, Option<Versioned<SemanticMap>>)> {
+        if !self.is_something() {
+            return None;
+        }
+        let map = map?;
+        let of = (cloud.generation(), map.generation(), self.arrangement);
+        if self.shown.as_ref().is_none_or(|shown| shown.of != of) {
+            let (new, new_map) = apply(cloud, Some(map), &SplatEdit::Arrange(self.arrangement)).ok()?;
+            let (cloud, map) = (Versioned::new(Arc::new(new)), new_map.map(|map| Versioned::new(Arc::new(map))));
+            self.shown = Some(Arranged { of, cloud, map });
+        }
+        self.shown.as_ref().map(|shown| (shown.cloud.clone(), shown.map.clone()))
+    }
+
+    /// Arrows by which it is dragged along the axes.
+    fn show_arrows(&mut self, ui: &Ui, shown: Rect, eye: &Camera) {
+        let painter = ui.painter_at(shown);
+        for (axis, color) in AXES.into_iter().enumerate() {
+            let middle = self.middle + self.arrangement.to.shift;
+            let Some((at, along)) = on_screen(eye, shown, middle, axis) else { continue };
+            // An axis that points at the eye has no arrow.
+            if along.length() * (self.radius as f32) < 4.0 {
+                continue;
+            }
+            let tip = at + along.normalized() * ARROW;
+            let id = Id::unique("arrange arrow").with(axis);
+            let handle = ui.interact(Rect::from_center_size(tip, Vec2::splat(3.0 * HANDLE)), id, Sense::DRAG);
+            if handle.dragged() {
+                self.arrangement.to.shift[axis] += travel(handle.drag_delta(), along);
+            }
+            let width = if handle.hovered() || handle.dragged() { 4.0 } else { 2.5 };
+            painter.line_segment([at, tip], Stroke::new(width + 2.0, Color32::from_black_alpha(120)));
+            painter.line_segment([at, tip], Stroke::new(width, color));
+            painter.circle(tip, HANDLE, color, Stroke::new(1.5, Color32::from_black_alpha(200)));
+            handle.on_hover_text(format!("Drag along {}", ["x", "y", "z"][axis]));
+        }
+    }
+
+    /// The card of the tool.
+    fn show_card(&mut self, ui: &Ui, rect: Rect, all: &Identities, actions: &mut Vec<Action>) {
+        let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(52.0));
+        let area = Area::new(Id::unique("arranging")).order(Order::Foreground).pivot(Align2::CENTER_BOTTOM);
+        theme::card(ui.ctx(), area.fixed_pos(at).constrain_to(rect), |ui| {
+            ui.label(format!("Arrange {}: drag its arrows, or type.", all.full_name(self.arrangement.id)));
+            ui.horizontal(|ui| {
+                ui.label("Move");
+                for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+                    let field = DragValue::new(&mut self.arrangement.to.shift[axis]).speed(self.radius / 100.0);
+                    let field = ui.add(field.max_decimals(4).prefix(format!("{name} ")));
+                    field.accessible_name(format!("Move along {name}"));
+                }
+            });
+            ui.horizontal(|ui| {
+                ui.label("Turn");
+                let turn = DragValue::new(&mut self.degrees).speed(1.0).suffix("\u{b0}").max_decimals(1);
+                if ui.add(turn).on_hover_text("About the up direction.").accessible_name("Turn").changed() {
+                    self.arrangement.to.turn = DQuat::from_axis_angle(self.up, self.degrees.to_radians());
+                }
+                ui.label("Scale");
+                let scale = DragValue::new(&mut self.arrangement.to.scale).speed(0.01).range(0.01..=100.0);
+                ui.add(scale.max_decimals(3)).accessible_name("Scale");
+                let mut has_color = self.arrangement.color.is_some();
+                if ui.checkbox(&mut has_color, "Color").on_hover_text("Another color; its shades stay.").changed() {
+                    self.arrangement.color = has_color.then_some(FIRST_COLOR);
+                }
+                if let Some(color) = &mut self.arrangement.color {
+                    ui.color_edit_button_rgb(color);
+                }
+            });
+            ui.checkbox(&mut self.arrangement.duplicate, "Leave it where it is, and do this to another one like it");
+            ui.horizontal(|ui| {
+                let keep = Action::KeepArranged;
+                let button = ui.add_enabled(self.is_something(), theme::primary_button("Apply"));
+                if button.on_hover_text(keep.tooltip()).clicked() {
+                    actions.push(keep);
+                }
+                if ui.add_enabled(self.is_something(), egui::Button::new("Reset")).clicked() {
+                    (self.arrangement, self.degrees) = (Arrangement::of(self.arrangement.id), 0.0);
+                }
+                if ui.button("Cancel").clicked() {
+                    actions.push(Action::Paint(None));
+                }
+            });
+        });
+    }
+}
+
+impl Viewport {
+    /// Draws the tool and takes what is done to it.
+    pub(super) fn show_arranging(&mut self, ui: &Ui, shown: Rect, state: &AppState, actions: &mut Vec<Action>) {
+        let eye = self.overlay_camera(shown);
+        let Some(tool) = &mut self.arrange else { return };
+        let before = tool.arrangement;
+        tool.show_arrows(ui, shown, &eye);
+        let none = Identities::default();
+        tool.show_card(ui, shown, state.semantics.as_ref().map_or(&none, |map| &map.identities), actions);
+        if tool.arrangement != before {
+            ui.ctx().request_repaint();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jobs::rearrange::Placement;
+    use crate::scene::{Level, NOBODY};
+
+    #[test]
+    fn the_preview_is_what_is_kept_and_nothing_is_shown_before_a_change() {
+        let cloud = GaussianCloud::isotropic((0..6).map(|i| [i as f32, 0.0, 0.0]).collect(), -3.0, 2.0);
+        let mut all = Identities::default();
+        all.add(Level::Object, NOBODY, vec!["mug".into()]);
+        let map = SemanticMap::from_identities(all, vec![1, 1, 1, 0, 0, 0], vec![1.0; 6], vec![]);
+        let mut tool = ArrangeTool::new(1, &cloud, &map, DVec3::Y);
+        let (cloud, map) = (Versioned::new(Arc::new(cloud)), Versioned::new(Arc::new(map)));
+        assert!(tool.preview(&cloud, Some(&map)).is_none());
+        tool.arrangement.to = Placement { shift: DVec3::new(0.0, 2.0, 0.0), ..Placement::default() };
+        let (shown, _) = tool.preview(&cloud, Some(&map)).expect("changed");
+        assert_eq!(shown.positions[1], [1.0, 2.0, 0.0]);
+        let (again, _) = tool.preview(&cloud, Some(&map)).expect("changed");
+        assert_eq!(again.generation(), shown.generation(), "made once");
+        let (kept, _) = apply(&cloud, Some(&map), &SplatEdit::Arrange(tool.arrangement())).expect("kept");
+        assert!(kept == **shown);
+    }
+}
