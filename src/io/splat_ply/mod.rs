@@ -20,6 +20,7 @@ use crate::scene::GaussianCloud;
 
 pub use read::parse;
 pub(crate) use stream::state;
+pub(crate) use write::may_be_extra;
 pub use write::{check, encode, write};
 
 /// Properties that carry Gaussians, besides `f_rest_*`.

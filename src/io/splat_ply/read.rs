@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::{ORIGIN, is_standard};
 use crate::io::ply::{Column, Ply, Scalar, Table};
-use crate::io::{IoError, compressed_ply};
+use crate::io::{IoError, compressed_ply, render_mode};
 use crate::math::sh::coefficients;
 use crate::scene::{ExtraProperty, GaussianCloud};
 
@@ -49,6 +49,7 @@ impl Reading<'_> {
             opacity_logits: self.values(self.columns(["opacity"])?)?.into_iter().map(|[v]| v).collect(),
             sh_degree: degree,
             sh: self.harmonics(degree, dc, &rest)?,
+            render_mode: render_mode::of_comments(&self.ply.comments),
             extras: self.extras(),
         })
     }

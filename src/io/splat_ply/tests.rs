@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 use super::*;
 use crate::io::IoError;
 use crate::math::sh::coefficients;
-use crate::scene::{CloudError, ExtraProperty, GaussianCloud};
+use crate::scene::{CloudError, ExtraProperty, GaussianCloud, SplatRenderMode};
 
 fn random_cloud(n: usize, sh_degree: u8, origin: DVec3) -> GaussianCloud {
     let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(7);
@@ -21,6 +21,7 @@ fn random_cloud(n: usize, sh_degree: u8, origin: DVec3) -> GaussianCloud {
         opacity_logits: (0..n).map(|_| v()).collect(),
         sh_degree,
         sh: (0..n * coefficients(sh_degree)).map(|_| [v(), v(), v()]).collect(),
+        render_mode: SplatRenderMode::Mip,
         extras: vec![ExtraProperty { name: "confidence".into(), values: (0..n).map(|_| v()).collect() }],
     }
 }
