@@ -39,6 +39,7 @@ mod scene_info;
 pub mod semantic_map;
 pub mod sog;
 pub mod splat;
+pub(crate) mod splat_format;
 pub mod splat_ply;
 pub mod spz;
 pub(crate) mod temporary;

@@ -47,6 +47,16 @@ pub(super) struct Rest {
     pub(crate) labels_file: String,
 }
 
+impl Meta {
+    /// The pictures, in the order in which they are decoded; the palette of harmonics comes last.
+    pub(crate) fn files(&self) -> Vec<String> {
+        let [low, high] = &self.means_files;
+        let rest = self.rest.iter().flat_map(|rest| [&rest.labels_file, &rest.centroids_file]);
+        let all = [low, high, &self.scales_file, &self.quats_file, &self.sh0_file].into_iter().chain(rest);
+        all.cloned().collect()
+    }
+}
+
 #[derive(Deserialize)]
 struct File {
     version: Option<u64>,

@@ -12,7 +12,7 @@ mod meta;
 mod palette;
 
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::atomic::{Draft, Told};
 use super::error::write_error;
@@ -75,6 +75,14 @@ pub(super) fn write_folder(meta_file: &Path, cloud: &GaussianCloud, told: &mut T
     let all = encode::files(cloud, told).map_err(|cause| write_error(meta_file, cause))?;
     let drafts = all.iter().map(write).collect::<Result<Vec<_>, IoError>>()?;
     drafts.into_iter().try_for_each(|draft| draft.commit().map(drop))
+}
+
+/// The files of an unbundled SOG, as far as they can be told.
+pub(super) fn files_of(meta_file: &Path) -> Vec<PathBuf> {
+    let meta = files::read(meta_file, files::MAX_TEXT_BYTES).and_then(|bytes| meta::parse(&bytes, meta_file));
+    let names = meta.map(|meta| meta.files()).unwrap_or_default();
+    let folder = files::folder_of(meta_file);
+    names.iter().map(|name| folder.join(name)).chain([meta_file.to_path_buf()]).collect()
 }
 
 fn missing(path: &Path, entry: &str) -> IoError {

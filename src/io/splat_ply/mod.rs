@@ -20,8 +20,8 @@ use crate::scene::GaussianCloud;
 
 pub use read::parse;
 pub(crate) use stream::state;
-pub(crate) use write::may_be_extra;
 pub use write::{check, encode, write};
+pub(crate) use write::{encode_told, may_be_extra};
 
 /// Properties that carry Gaussians, besides `f_rest_*`.
 const STANDARD: [&str; 20] = [

@@ -7,7 +7,8 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::{ORIGIN, STATE, is_standard};
-use crate::io::{IoError, atomic, render_mode};
+use crate::io::atomic::{self, Told};
+use crate::io::{IoError, render_mode};
 use crate::scene::GaussianCloud;
 
 /// Gaussians per block handed to the file.
@@ -39,6 +40,17 @@ pub(crate) fn may_be_extra(name: &str) -> bool {
 
 /// The bytes of a splat `.ply` of a valid cloud, with the id of the scene's state that it belongs to.
 pub fn encode(out: &mut dyn Write, cloud: &GaussianCloud, state: Option<&str>) -> io::Result<()> {
+    encode_told(out, cloud, state, &mut |_| Ok(()))
+}
+
+/// [`encode`] that tells how far it is.
+pub(crate) fn encode_told(
+    out: &mut dyn Write,
+    cloud: &GaussianCloud,
+    state: Option<&str>,
+    told: &mut Told<'_>,
+) -> io::Result<()> {
+    told(0)?;
     let shifted = cloud.origin != DVec3::ZERO;
     out.write_all(header(cloud, shifted, state).as_bytes())?;
     let stride = cloud.sh_stride();
@@ -64,6 +76,7 @@ pub fn encode(out: &mut dyn Write, cloud: &GaussianCloud, state: Option<&str>) -
         if (i + 1) % BLOCK == 0 {
             out.write_all(&block)?;
             block.clear();
+            told(i)?;
         }
     }
     out.write_all(&block)
