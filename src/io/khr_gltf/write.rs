@@ -16,12 +16,15 @@ const BLOCK: usize = 4096;
 /// Component type of floats.
 const FLOAT: u32 = 5126;
 
+/// Adds the bytes of a Gaussian's numbers.
+type Put<'a> = Box<dyn Fn(usize, &mut Vec<u8>) + 'a>;
+
 /// One number, or several, of each Gaussian.
 struct Attribute<'a> {
     name: String,
     kind: &'static str,
     components: usize,
-    put: Box<dyn Fn(usize, &mut Vec<u8>) + 'a>,
+    put: Put<'a>,
 }
 
 /// Writes the bytes of a `.glb` of a valid cloud that is not empty.

@@ -103,6 +103,16 @@ fn non_finite_values_name_vertex_and_property() {
 }
 
 #[test]
+fn infinite_opacities_become_large_ones() {
+    let mut c = random_cloud(3, 0, DVec3::ZERO);
+    [c.opacity_logits[0], c.opacity_logits[1]] = [f32::INFINITY, f32::NEG_INFINITY];
+    let read = parsed(&bytes(&c)).expect("read").opacity_logits;
+    assert!(read[0] > 13.0 && read[0].is_finite() && read[1] == -read[0] && read[2] == c.opacity_logits[2], "{read:?}");
+    c.opacity_logits[0] = f32::NAN;
+    assert!(matches!(parsed(&bytes(&c)), Err(IoError::NotFinite { index: 0, .. })));
+}
+
+#[test]
 fn wrong_numbers_of_coefficients_are_refused() {
     let good = String::from_utf8_lossy(&bytes(&random_cloud(0, 1, DVec3::ZERO))).into_owned();
     assert_eq!(parsed(good.as_bytes()).expect("empty").len(), 0);
