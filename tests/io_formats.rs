@@ -55,7 +55,7 @@ fn what_other_programs_wrote_is_what_they_were_given() {
     let bytes = [3e-3, 3e-3, 1e-4, 5e-3, 0.02];
     for (name, degree, mode, most) in [
         ("few.compressed.ply", 2, SplatRenderMode::Mip, bytes),
-        ("few.sog", 2, SplatRenderMode::Mip, bytes),
+        ("few.sog", 2, SplatRenderMode::Mip, [3e-4, 0.02, 1e-4, 5e-3, 0.02]),
         ("few_v3.spz", 2, SplatRenderMode::Mip, [3e-4, 0.04, 1e-4, 5e-3, 0.02]),
         ("few_v4.spz", 2, SplatRenderMode::Mip, [3e-4, 0.04, 1e-4, 5e-3, 0.02]),
         ("few.splat", 0, SplatRenderMode::Plain, [1e-6, 1e-5, 1e-3, 5e-3, 0.02]),

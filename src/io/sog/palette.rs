@@ -3,7 +3,7 @@
 use std::collections::BinaryHeap;
 
 /// What stands for a list of vectors of `dimensions` numbers each.
-pub(super) struct Palette {
+pub(super) struct VectorPalette {
     /// Its entries, one after another.
     pub(super) entries: Vec<f32>,
     /// Which entry stands for each of the vectors.
@@ -21,7 +21,7 @@ struct Group {
 
 /// A palette of at most `most` entries, up to 65,536: the group that is farthest from its mean is halved there, along
 /// the axis along which it is widest, until there are as many groups as that. Nothing is random.
-pub(super) fn palette(vectors: &[f32], dimensions: usize, most: usize) -> Palette {
+pub(super) fn palette(vectors: &[f32], dimensions: usize, most: usize) -> VectorPalette {
     let n = vectors.len() / dimensions;
     let mut order: Vec<u32> = (0..n as u32).collect();
     let value = |i: u32, axis: usize| f64::from(vectors[i as usize * dimensions + axis]);
@@ -59,7 +59,7 @@ pub(super) fn palette(vectors: &[f32], dimensions: usize, most: usize) -> Palett
     for (label, group) in groups.iter().enumerate() {
         order[group.start..group.end].iter().for_each(|i| labels[*i as usize] = label as u16);
     }
-    Palette { entries: groups.iter().flat_map(|g| g.mean.iter().map(|v| *v as f32)).collect(), labels }
+    VectorPalette { entries: groups.iter().flat_map(|g| g.mean.iter().map(|v| *v as f32)).collect(), labels }
 }
 
 /// Puts those that are `first` to the front, and counts them.

@@ -107,7 +107,14 @@ fn infinite_opacities_become_large_ones() {
     let mut c = random_cloud(3, 0, DVec3::ZERO);
     [c.opacity_logits[0], c.opacity_logits[1]] = [f32::INFINITY, f32::NEG_INFINITY];
     let read = parsed(&bytes(&c)).expect("read").opacity_logits;
-    assert!(read[0] > 13.0 && read[0].is_finite() && read[1] < -13.0 && read[1].is_finite() && read[2] == c.opacity_logits[2], "{read:?}");
+    assert!(
+        read[0] > 13.0
+            && read[0].is_finite()
+            && read[1] < -13.0
+            && read[1].is_finite()
+            && read[2] == c.opacity_logits[2],
+        "{read:?}"
+    );
     c.opacity_logits[0] = f32::NAN;
     assert!(matches!(parsed(&bytes(&c)), Err(IoError::NotFinite { index: 0, .. })));
 }
