@@ -158,6 +158,11 @@ fn everything_is_exported(run: &dyn Fn(&[&str]) -> Done, scene: &str, out: &str)
         let scores = run(&["eval", scene, "--masks", &masks, "--json"]).ok().json();
         assert!(scores["views"].as_u64() > Some(0) && scores["miou"].as_f64() > Some(0.9), "{labels}: {scores}");
     }
+    let packed =
+        ["segment", scene, "--all", "--out", &format!("{out}_spz"), "--format", "spz", "--photos", "none", "-q"];
+    assert!(run(&packed).ok().stdout.contains("objects and parts as .spz"));
+    let files = std::fs::read_dir(format!("{out}_spz/gaussians")).unwrap();
+    assert!(files.map(|f| f.unwrap().file_name()).all(|name| name.to_string_lossy().ends_with(".spz")));
     // Again over itself, not over what is somebody's.
     run(&["segment", scene, "--all", "--out", out, "--masks", "coco", "--photos", "none", "-q"]).ok();
     assert_eq!(std::fs::read_dir(format!("{out}/isat")).unwrap().count(), 0, "of the export before");

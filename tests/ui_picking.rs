@@ -206,7 +206,7 @@ fn things_are_pointed_at_selected_isolated_and_hidden() {
     // The menu of a right click is about what is under the cursor.
     w.click(shade, PointerButton::Secondary, plain);
     assert_eq!(w.selected(), Some(SHADE));
-    assert!(w.shows("Query this") && w.shows("Export as .ply"), "the menu");
+    assert!(w.shows("Query this") && w.shows("Export Gaussians"), "the menu");
     w.harness.get_by_label("Query this").click();
     w.harness.run_steps(4);
     assert_eq!(w.app().viewport.queries.found(), [SHADE]);

@@ -154,7 +154,7 @@ impl SceneWorld {
     }
 
     fn export_file(&self, id: IdentityId) -> PathBuf {
-        self.parts.exports.join(export::identity_file(&self.parts.map.identities, id))
+        self.parts.exports.join(export::identity_file(&self.parts.map.identities, id, ".ply"))
     }
 
     /// A turn or a straight way, without looking for one.

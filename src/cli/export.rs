@@ -1,31 +1,37 @@
-//! `fmlgs export`: Gaussians as a `.ply` that other splat viewers open.
+//! `fmlgs export`: Gaussians as a file that other splat viewers open.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::progress::Console;
 use super::{CliError, output};
-use crate::jobs::{export, open};
-use crate::math::format;
-use crate::scene::{Bounds, CropBox};
+use crate::jobs::export_splat::{self, ExportedSplat, LossViews};
+use crate::jobs::{Scene, export, open};
+use crate::scene::{Bounds, CropBox, GaussianCloud};
 
-/// Write the Gaussians of a scene as a .ply for other splat viewers
+/// Write the Gaussians of a scene for other splat viewers
 ///
-/// The layout is that of the original 3D Gaussian Splatting. Reads whatever 'fmlgs info' recognizes
-/// as Gaussians, compressed formats too; properties that the program does not know are kept.
+/// The ending of --out chooses the format: .ply (3D Gaussian Splatting's own, without loss), .compressed.ply, .spz,
+/// .sog, meta.json (a SOG as files in a folder), .splat, .glb or .gltf (KHR_gaussian_splatting). Reads whatever 'fmlgs
+/// info' recognizes as Gaussians, .ksplat too. What was written is read back, and both are drawn from a few cameras:
+/// PSNR between the pictures says what was lost.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs export scene/ --out scene.ply\n  \
-    fmlgs export big.compressed.ply --out big.ply\n  \
-    fmlgs export scene.ply --out flat.ply --sh-degree 0      smaller, same color from everywhere\n  \
+    fmlgs export scene/ --out scene.sog                        a tenth of the size\n  \
+    fmlgs export big.compressed.ply --out big.glb\n  \
+    fmlgs export scene.ply --out flat.ply --sh-degree 0        smaller, same color from everywhere\n  \
     fmlgs export scene/ --out mug.ply --crop -1,-1,0,1,1,2     what is in a box, scene units")]
 pub(crate) struct ExportArgs {
     /// Trained scene or splat file
     scene: PathBuf,
-    /// The .ply to write
+    /// File to write, in the format of its ending
     #[arg(long)]
     out: PathBuf,
+    #[command(flatten)]
+    measure: MeasureArgs,
     /// Leave out spherical harmonics above this degree
     #[arg(long, value_parser = clap::value_parser!(u8).range(0..=3))]
     sh_degree: Option<u8>,
@@ -35,6 +41,32 @@ pub(crate) struct ExportArgs {
     /// Write what is outside of the box instead
     #[arg(long, requires = "crop")]
     outside: bool,
+    /// Print one JSON document
+    #[arg(long)]
+    json: bool,
+}
+
+/// Whether what was written is measured.
+#[derive(Debug, clap::Args)]
+pub(crate) struct MeasureArgs {
+    /// Do not draw what was written to measure what was lost
+    #[arg(long)]
+    no_measure: bool,
+}
+
+impl MeasureArgs {
+    /// Writes Gaussians of a scene and says what came of it.
+    pub(crate) fn write(
+        &self,
+        cloud: GaussianCloud,
+        out: &Path,
+        scene: &Scene,
+        quiet: bool,
+    ) -> Result<ExportedSplat, CliError> {
+        let views = (!self.no_measure).then(|| LossViews::of(scene));
+        let done = export_splat::run(&Arc::new(cloud), out, views.as_ref(), &mut Console::new(quiet));
+        done.map_err(|e| CliError::of_work(e, "what was there before is unchanged"))
+    }
 }
 
 /// Two corners of a box, the smaller numbers first.
@@ -51,21 +83,22 @@ fn parse_box(text: &str) -> Result<Bounds, String> {
     }
 }
 
-pub(crate) fn run(args: ExportArgs) -> Result<(), CliError> {
+pub(crate) fn run(args: ExportArgs, quiet: bool) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
-    export::check(&args.out, &[".ply"], &scene.reads())?;
+    export_splat::check(&args.out, &scene.reads())?;
     let cloud = match args.crop {
-        Some(bounds) => export::cropped(&scene.cloud, &CropBox { bounds, outside: args.outside })?.into(),
-        None => scene.cloud,
+        Some(bounds) => export::cropped(&scene.cloud, &CropBox { bounds, outside: args.outside })?,
+        None => (*scene.cloud).clone(),
     };
     let cloud = match args.sh_degree {
-        Some(degree) => Arc::unwrap_or_clone(cloud).up_to_degree(degree).into(),
+        Some(degree) => cloud.up_to_degree(degree),
         None => cloud,
     };
-    export::ply(&args.out, &cloud)?;
-    let bytes = std::fs::metadata(&args.out).map_or(0, |m| m.len());
-    let size = format::bytes(bytes);
-    output::print(&format!("{}: {} Gaussians, SH degree {}, {size}", args.out.display(), cloud.len(), cloud.sh_degree))
+    let done = args.measure.write(cloud, &args.out, &scene, quiet)?;
+    match args.json {
+        true => output::print_json(&done),
+        false => output::print(&done.lines().join("\n")),
+    }
 }
 
 #[cfg(test)]

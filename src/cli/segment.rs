@@ -3,27 +3,31 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::export::MeasureArgs;
 use super::progress::Console;
 use super::recipe::RecipeArgs;
 use super::segment_click::{self, ClickArgs};
 use super::{CliError, number, output, view};
+use crate::io::splat_format::SplatFormat;
 use crate::jobs::export_all::{self, ExportAllRequest, ExportedAll, MaskFormat};
-use crate::jobs::{Scene, export, open, query, render, segment};
+use crate::jobs::{Scene, export, export_splat, open, query, render, segment};
 use crate::math::format::things;
 use crate::scene::{Camera, LevelFilter, SemanticMap};
 
-/// Write the Gaussians of an object or a part as a .ply, or of all of them, with masks of the photos
+/// Write the Gaussians of an object or a part, or of all of them, with masks of the photos
 ///
 /// The same match as that of the mask, in space: by identities, or with --match codes by the codes of the
-/// Gaussians. Exit code 1 if nothing fits. With --all, a folder is written: a .ply for each object and part, and their
-/// masks in the photos as files that --masks of other commands, and other programs, read. A folder that holds
+/// Gaussians. The ending of --out chooses the format, as for 'fmlgs export'. Exit code 1 if nothing fits. With --all, a
+/// folder is written: a file for each object and part, and their masks in the photos as files that --masks of other commands, and other programs, read. A folder that holds
 /// anything but an earlier export, or something of it that was changed since, is refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs segment scene/ \"the kettle\" --out kettle.ply\n  \
     fmlgs segment scene/ \"lid of the kettle\" --out lid.ply\n  \
     fmlgs segment scene/ \"the kettle\" --rest --out without_kettle.ply\n  \
+    fmlgs segment scene/ \"the kettle\" --out kettle.spz\n  \
     fmlgs segment scene/ --all --out everything/ --masks isat,coco --photos 0,12\n  \
+    fmlgs segment scene/ --all --out everything/ --format sog --photos none\n  \
     fmlgs segment scene/ --click 320,200 --view 0003.png --keep \"kettle\"")]
 pub(crate) struct SegmentArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
@@ -37,6 +41,9 @@ pub(crate) struct SegmentArgs {
     /// Write to this file, or folder for --all
     #[arg(long, required_unless_present = "keep")]
     out: Option<PathBuf>,
+    /// Format of the files of --all
+    #[arg(long, requires = "all", value_enum, default_value = "ply")]
+    format: SplatFormat,
     /// Masks of --all, with commas between
     #[arg(long, requires = "all", value_enum, value_delimiter = ',', default_values_t = MaskFormat::ALL)]
     masks: Vec<MaskFormat>,
@@ -56,6 +63,8 @@ pub(crate) struct SegmentArgs {
     #[arg(long, value_enum, default_value_t = LevelFilter::Auto)]
     kind: LevelFilter,
     #[command(flatten)]
+    measure: MeasureArgs,
+    #[command(flatten)]
     clicks: ClickArgs,
     #[command(flatten)]
     recipe: RecipeArgs,
@@ -64,29 +73,32 @@ pub(crate) struct SegmentArgs {
 pub(crate) fn run(args: SegmentArgs, quiet: bool) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
     match (&args.text, &args.out) {
-        (Some(text), Some(out)) => one(&args, text, out, &scene),
+        (Some(text), Some(out)) => one(&args, text, out, &scene, quiet),
         (None, Some(out)) if args.all => {
             export::check_folder(out, &scene.reads())?;
             let map = scene.semantics()?;
             all(&args, out, &scene, map, quiet)
         }
         (_, out) => {
-            out.iter().try_for_each(|out| export::check(out, &[".ply"], &scene.reads()))?;
-            segment_click::run(&scene, &args.clicks, out.as_ref(), quiet)
+            out.iter().try_for_each(|out| export_splat::check(out, &scene.reads()).map(drop))?;
+            segment_click::run(&scene, &args.clicks, &args.measure, out.as_ref(), quiet)
         }
     }
 }
 
-fn one(args: &SegmentArgs, text: &str, out: &Path, scene: &Scene) -> Result<(), CliError> {
-    export::check(out, &[".ply"], &scene.reads())?;
+fn one(args: &SegmentArgs, text: &str, out: &Path, scene: &Scene, quiet: bool) -> Result<(), CliError> {
+    export_splat::check(out, &scene.reads())?;
     let map = scene.semantics()?;
     let answered = query::answered(&map, text, args.kind, &args.recipe.recipe())?;
     let kept = segment::select(&scene.cloud, &map, &answered, args.top, args.rest)?;
-    export::ply(out, &kept)?;
+    let count = kept.len();
+    let done = args.measure.write(kept, out, scene, quiet)?;
     let names: Vec<String> = answered.chosen(args.top).iter().map(|id| map.identities.full_name(*id)).collect();
     let what = if args.rest { format!("all but {}", names.join(", ")) } else { names.join(", ") };
-    let written = format!("{what}: {} of {} Gaussians in {}", kept.len(), scene.cloud.len(), out.display());
-    output::print(&args.recipe.lines(&map).into_iter().chain([written]).collect::<Vec<_>>().join("\n"))
+    let written = format!("{what}: {count} of {} Gaussians", scene.cloud.len());
+    output::print(
+        &args.recipe.lines(&map).into_iter().chain([written]).chain(done.lines()).collect::<Vec<_>>().join("\n"),
+    )
 }
 
 fn all(args: &SegmentArgs, out: &Path, scene: &Scene, map: SemanticMap, quiet: bool) -> Result<(), CliError> {
@@ -95,16 +107,17 @@ fn all(args: &SegmentArgs, out: &Path, scene: &Scene, map: SemanticMap, quiet: b
         map: Arc::new(map),
         settings: scene.settings.clone(),
         views: photos(args, scene)?,
+        format: args.format,
         masks: args.masks.clone(),
         folder: out.into(),
     };
     let done = export_all::run(&request, &mut Console::new(quiet));
     let kept = "what was written by then stays; the same command goes over it";
-    output::print(&told(&done.map_err(|e| CliError::of_work(e, kept))?, out))
+    output::print(&told(&done.map_err(|e| CliError::of_work(e, kept))?, args.format, out))
 }
 
-fn told(done: &ExportedAll, folder: &Path) -> String {
-    let mut text = format!("{} objects and parts as .ply", done.written);
+fn told(done: &ExportedAll, format: SplatFormat, folder: &Path) -> String {
+    let mut text = format!("{} objects and parts as {}", done.written, format.ending());
     if done.left_out > 0 {
         text += &format!(", {} without Gaussians left out", done.left_out);
     }

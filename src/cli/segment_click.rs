@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::export::MeasureArgs;
 use super::progress::Console;
 use super::{CliError, output, view};
 use crate::jobs::edit::{self, EditRequest};
 use crate::jobs::select::{self, SelectFor, SelectRequest, Selected, Stroke, kept_as};
-use crate::jobs::{JobError, Scene, export, query};
+use crate::jobs::{JobError, Scene, query};
 use crate::scene::{LevelFilter, Mask, NOBODY};
 
 /// Radius of a click as a share of the view's width.
@@ -41,7 +42,13 @@ fn place(text: &str) -> Result<[f32; 2], String> {
 }
 
 /// Selects what is clicked on, keeps it if that is wanted, and writes it to `out`.
-pub(crate) fn run(scene: &Scene, args: &ClickArgs, out: Option<&PathBuf>, quiet: bool) -> Result<(), CliError> {
+pub(crate) fn run(
+    scene: &Scene,
+    args: &ClickArgs,
+    measure: &MeasureArgs,
+    out: Option<&PathBuf>,
+    quiet: bool,
+) -> Result<(), CliError> {
     let map = Arc::new(match scene.semantics() {
         Err(JobError::NoObjects(_)) => select::empty_map(&scene.cloud),
         map => map?,
@@ -88,8 +95,8 @@ pub(crate) fn run(scene: &Scene, args: &ClickArgs, out: Option<&PathBuf>, quiet:
     let count = format!("{} of {} Gaussians", selected.gaussians.len(), scene.cloud.len());
     if let Some(out) = out {
         let kept: Vec<usize> = selected.gaussians.iter().map(|i| *i as usize).collect();
-        export::ply(out, &scene.cloud.select(&kept))?;
-        lines.push(format!("{count} in {}", out.display()));
+        lines.push(count.clone());
+        lines.extend(measure.write(scene.cloud.select(&kept), out, scene, quiet)?.lines());
     }
     if let Some(name) = &args.keep {
         let folder = scene.folder.as_ref().ok_or_else(|| {

@@ -12,6 +12,9 @@ use super::files::{folder_of, sync_folder};
 use super::scene_files::refuse_scene_file;
 use super::temporary::temporary_file;
 
+/// Hears how many of the Gaussians are written; an error ends the writing.
+pub(crate) type Told<'a> = dyn FnMut(usize) -> io::Result<()> + 'a;
+
 /// Replaces `path` by what `fill` writes: a temporary file in the same folder is filled, synced
 /// and renamed over it, and the folder is synced. On any failure the temporary file is removed
 /// and what was at `path` before stays as it was. Links are followed; what is no regular file (a

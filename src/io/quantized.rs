@@ -1,7 +1,11 @@
-//! What the quantized splat formats share: fixed-point numbers, opacities, quaternions without
-//! their largest component.
+//! What the quantized splat formats share, in both directions: fixed-point numbers, colors, opacities,
+//! scales, quaternions without their largest component.
 
 use std::f32::consts::SQRT_2;
+
+use crate::math::Real;
+use crate::math::rotation;
+use crate::math::sh::SH_C0;
 
 /// Opacities nearer to 0 or 1 than this are moved here: their logit would be infinite.
 const OPACITY_MARGIN: f32 = 1e-6;
@@ -10,6 +14,41 @@ const OPACITY_MARGIN: f32 = 1e-6;
 pub(super) fn unorm(value: u32, bits: u32) -> f32 {
     let mask = (1_u32 << bits) - 1;
     (value & mask) as f32 / mask as f32
+}
+
+/// 0 to 1 as a number of so many `bits`, the nearest one; what lies outside becomes the end.
+pub(super) fn to_unorm(value: f32, bits: u32) -> u32 {
+    let most = (1_u32 << bits) - 1;
+    // A float that is no number becomes 0.
+    ((value * most as f32 + 0.5) as u32).min(most)
+}
+
+/// 0 to 1 as a byte.
+pub(super) fn to_byte(value: f32) -> u8 {
+    to_unorm(value, 8) as u8
+}
+
+/// The color that a constant harmonic gives, 0 to 1 for what a screen can show.
+pub(super) fn color(dc: f32) -> f32 {
+    0.5 + SH_C0 as f32 * dc
+}
+
+/// The constant harmonic of a color.
+pub(super) fn constant(color: f32) -> f32 {
+    (color - 0.5) / SH_C0 as f32
+}
+
+/// Standard deviations under this are raised to it: their logarithm would be infinite.
+const SMALLEST_SCALE: f32 = 1e-12;
+
+/// The logarithm of a standard deviation; NaN stays NaN, to be refused.
+pub(super) fn log_scale(scale: f32) -> f32 {
+    if scale < SMALLEST_SCALE { SMALLEST_SCALE.ln() } else { scale.ln() }
+}
+
+/// The opacity of a logit as a byte.
+pub(super) fn opacity_byte(logit: f32) -> u8 {
+    to_byte(logit.sigmoid())
 }
 
 pub(super) fn logit(opacity: f32) -> f32 {
@@ -30,6 +69,21 @@ pub(super) fn unit_quaternion(largest: usize, rest: [f32; 3]) -> [f32; 4] {
     }
 }
 
+/// A quaternion at unit length; one that has no direction turns nothing.
+pub(super) fn unit(q: [f32; 4]) -> [f32; 4] {
+    rotation::unit_quaternion(q).unwrap_or([1.0, 0.0, 0.0, 0.0])
+}
+
+/// What [`unit_quaternion`] takes for the rotation of `q`: the place of its largest component, and the others.
+pub(super) fn without_largest(q: [f32; 4]) -> (usize, [f32; 3]) {
+    let q = unit(q);
+    let largest = (1..4).fold(0, |best, k| if q[k].abs() > q[best].abs() { k } else { best });
+    // Both signs are the same rotation; the largest is positive in all formats.
+    let rest = |k: usize| q[k].copysign(q[k] * q[largest]) / SQRT_2 + 0.5;
+    let [a, b, c] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]][largest];
+    (largest, [rest(a), rest(b), rest(c)])
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -48,6 +102,26 @@ mod tests {
         }
         // Components that are too long together do not make it NaN.
         assert!(unit_quaternion(0, [1.0; 3]).iter().all(|c| c.is_finite()));
+    }
+
+    #[test]
+    fn quaternions_lose_their_largest_component_and_their_length_alone() {
+        for q in [[0.1_f32, -0.5, 0.7, 0.5], [-9.0, 1.0, 2.0, -3.0], [0.0, 0.0, -1e-30, 0.0], [1.0; 4], [0.0; 4]] {
+            let (largest, rest) = without_largest(q);
+            let (u, back) = (unit(q), unit_quaternion(largest, rest));
+            let dot: f32 = u.iter().zip(back).map(|(a, b)| a * b).sum();
+            assert!(dot.abs() > 1.0 - 1e-6, "{q:?} {back:?}");
+            assert!(back[largest] >= 0.5 && rest.iter().all(|t| (0.0..=1.0).contains(t)), "{rest:?}");
+        }
+    }
+
+    #[test]
+    fn numbers_are_rounded_and_kept_within_their_bits() {
+        assert_eq!([-1.0, 0.0, 0.5, 1.0, 7.0, f32::NAN].map(to_byte), [0, 0, 128, 255, 255, 0]);
+        assert_eq!((to_unorm(1.0, 11), to_unorm(0.25, 10)), (2047, 256));
+        assert!((0..=255).all(|b| to_byte(unorm(b, 8)) == b as u8 && opacity_byte(logit(unorm(b, 8))) == b as u8));
+        assert!((constant(color(0.7)) - 0.7).abs() < 1e-6);
+        assert!(log_scale(0.0).is_finite() && (log_scale(2.0) - 2.0_f32.ln()).abs() < 1e-6);
     }
 
     #[test]

@@ -302,7 +302,6 @@ fn rounded(cloud: &GaussianCloud) -> GaussianCloud {
         q.map(|v| turn(sign * v / length))
     };
     GaussianCloud {
-        origin: glam::DVec3::ZERO,
         positions: positions.collect(),
         log_scales: cloud.log_scales.iter().map(|s| s.map(size)).collect(),
         quaternions: cloud.quaternions.iter().map(unit).collect(),
@@ -314,7 +313,7 @@ fn rounded(cloud: &GaussianCloud) -> GaussianCloud {
             .enumerate()
             .map(|(i, c)| c.map(|v| if i % stride == 0 { color(v) } else { tint(v) }))
             .collect(),
-        extras: Vec::new(),
+        ..GaussianCloud::default()
     }
 }
 

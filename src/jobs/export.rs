@@ -81,8 +81,8 @@ pub(crate) fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result
 }
 
 /// The name of a file for an identity's Gaussians, of its number and full name, that no other one has.
-pub(crate) fn identity_file(all: &Identities, id: IdentityId) -> String {
-    format!("{id}-{}.ply", identity_name(all, id))
+pub(crate) fn identity_file(all: &Identities, id: IdentityId, ending: &str) -> String {
+    format!("{id}-{}{ending}", identity_name(all, id))
 }
 
 /// A full name as every system takes it in a file's name.

@@ -12,7 +12,7 @@ use std::sync::Arc;
 use self::folder::ExportFolder;
 use self::labels::LabelWriter;
 use super::{JobError, export};
-use crate::io::splat_ply;
+use crate::io::splat_format::SplatFormat;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
@@ -41,6 +41,8 @@ pub struct ExportAllRequest {
     pub(crate) settings: RenderSettings,
     /// Photos by name, of which masks are written.
     pub(crate) views: Vec<(String, Camera)>,
+    /// Of the files with Gaussians.
+    pub(crate) format: SplatFormat,
     pub(crate) masks: Vec<MaskFormat>,
     pub(crate) folder: PathBuf,
 }
@@ -78,7 +80,7 @@ fn write(
     folder: &mut ExportFolder,
     observer: &mut dyn Observer,
 ) -> Result<ExportedAll, JobError> {
-    let ExportAllRequest { cloud, map, settings, views, masks, .. } = request;
+    let ExportAllRequest { cloud, map, settings, views, format, masks, .. } = request;
     let all = &map.identities;
     let mut done = ExportedAll { folder: request.folder.clone(), ..ExportedAll::default() };
     let mut ticker = Ticker::new("Writing Gaussians", all.len());
@@ -89,8 +91,8 @@ fn write(
             done.left_out += 1;
             continue;
         }
-        let place = format!("gaussians/{}", export::identity_file(all, id));
-        folder.write(&place, |path| splat_ply::write(path, &cloud.select(&members)))?;
+        let place = format!("gaussians/{}", export::identity_file(all, id, format.ending()));
+        folder.write(&place, |path| format.write(path, &cloud.select(&members), &mut |_| Ok(())))?;
         done.written += 1;
     }
     ticker.tick(all.len(), observer)?;

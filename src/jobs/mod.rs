@@ -17,6 +17,7 @@ pub(crate) mod evaluate_masks;
 pub(crate) mod evaluate_removal;
 pub(crate) mod export;
 pub(crate) mod export_all;
+pub(crate) mod export_splat;
 pub mod find_objects;
 pub(crate) mod folders;
 pub(crate) mod go_to;

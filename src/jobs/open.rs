@@ -74,13 +74,16 @@ impl Scene {
 
     fn bare(path: &Path, cloud: GaussianCloud) -> Self {
         let name = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let settings = RenderSettings::of_mode(cloud.render_mode);
         let (cloud, sh_stored) = compact(cloud);
-        Self { path: path.into(), name, cloud, sh_stored, ..Self::default() }
+        Self { path: path.into(), name, cloud, sh_stored, settings, ..Self::default() }
     }
 
     fn trained(path: &Path, scene: TrainedScene, config: TrainConfig) -> Self {
         let dataset_path = scene.dataset_path();
-        let TrainedScene { folder, info, cloud, state } = scene;
+        let TrainedScene { folder, info, mut cloud, state } = scene;
+        // Its files of earlier versions do not say it.
+        cloud.render_mode = config.render_mode();
         let (cloud, sh_stored) = compact(cloud);
         Self {
             path: path.into(),

@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::math::Real;
 use crate::math::finite::NotFinite;
-use crate::scene::CameraError;
+use crate::scene::{CameraError, SplatRenderMode};
 
 /// Side of a tile in px, on every backend.
 pub const TILE_PX: usize = 16;
@@ -117,6 +117,14 @@ impl Default for RenderSettings {
             cutoffs: Cutoffs::default(),
             keep_order: false,
         }
+    }
+}
+
+impl RenderSettings {
+    /// How Gaussians of this mode are drawn.
+    pub(crate) fn of_mode(mode: SplatRenderMode) -> Self {
+        let (antialias, surfels) = (mode == SplatRenderMode::Mip, mode == SplatRenderMode::Surfels);
+        Self { antialias, surfels, ..Self::default() }
     }
 }
 

@@ -23,8 +23,22 @@ pub struct GaussianCloud<R = f32> {
     pub sh_degree: u8,
     /// RGB coefficients, `[n * (sh_degree + 1)²]`, those of one Gaussian together.
     pub sh: Vec<[R; 3]>,
-    /// Per-Gaussian properties that the program does not interpret but keeps from a `.ply`.
+    /// How they were trained, and so are to be drawn.
+    pub render_mode: SplatRenderMode,
+    /// Per-Gaussian properties that the program does not interpret but keeps from a file.
     pub extras: Vec<ExtraProperty>,
+}
+
+/// How Gaussians are to be drawn: as those were that they were trained as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SplatRenderMode {
+    /// As 3D Gaussian Splatting does.
+    #[default]
+    Plain,
+    /// With the 2-D filter of Mip-Splatting.
+    Mip,
+    /// As disks: 2D Gaussian Splatting, which ignores the third scale.
+    Surfels,
 }
 
 /// A named per-Gaussian scalar that came with a file.
@@ -174,6 +188,35 @@ impl<R: Real> GaussianCloud<R> {
         }
     }
 
+    /// One cloud of all parts, around the origin of the first, with the highest degree among them and the extra
+    /// properties that all have.
+    pub(crate) fn joined(parts: Vec<Self>) -> Self {
+        let sh_degree = parts.iter().map(|p| p.sh_degree).max().unwrap_or(0);
+        let stride = sh::coefficients(sh_degree);
+        let mut all: Option<Self> = None;
+        for mut part in parts {
+            if part.sh_degree < sh_degree {
+                let pad = |sh: &[[R; 3]]| {
+                    let zeros = vec![[R::ZERO; 3]; stride - sh.len()];
+                    [sh, &zeros].concat()
+                };
+                part.sh = part.sh.chunks_exact(part.sh_stride()).flat_map(pad).collect();
+                part.sh_degree = sh_degree;
+            }
+            let Some(all) = &mut all else {
+                all = Some(part);
+                continue;
+            };
+            let shift = (part.origin - all.origin).to_array();
+            part.positions.iter_mut().for_each(|p| *p = [0, 1, 2].map(|k| R::of(p[k].f64() + shift[k])));
+            all.extras.retain(|e| part.extras.iter().any(|other| other.name == e.name));
+            part.extras =
+                all.extras.iter().filter_map(|e| part.extras.iter().find(|p| p.name == e.name).cloned()).collect();
+            all.append(part);
+        }
+        all.unwrap_or_default()
+    }
+
     /// The same cloud with room for `n` Gaussians in all, so that more can be added in place.
     pub(crate) fn with_room(mut self, n: usize) -> Self {
         let more = n.saturating_sub(self.len());
@@ -211,6 +254,7 @@ impl<R: Real> GaussianCloud<R> {
             opacity_logits: self.opacity_logits.iter().map(|x| S::of(x.f64())).collect(),
             sh_degree: self.sh_degree,
             sh: three(&self.sh),
+            render_mode: self.render_mode,
             extras: self.extras.clone(),
         }
     }
@@ -226,6 +270,7 @@ impl<R: Real> GaussianCloud<R> {
             opacity_logits: indices.iter().map(|&i| self.opacity_logits[i]).collect(),
             sh_degree: self.sh_degree,
             sh: indices.iter().flat_map(|&i| self.sh[i * stride..(i + 1) * stride].iter().copied()).collect(),
+            render_mode: self.render_mode,
             extras: self
                 .extras
                 .iter()

@@ -56,6 +56,17 @@ impl HomeView {
         self.camera.clone().unwrap_or_else(|| Self::overview(&self.bounds, self.up, size_px))
     }
 
+    /// So many cameras that show all of its bounds from all sides, the first as [`Self::overview`] does.
+    pub(crate) fn around(&self, size_px: [u32; 2], count: usize) -> Vec<Camera> {
+        let (first, middle) = (Self::overview(&self.bounds, self.up, size_px), self.bounds.center());
+        let turned = |k: usize| {
+            let turn = DMat3::from_axis_angle(self.up, std::f64::consts::TAU * k as f64 / count as f64);
+            let center = middle + turn * (first.center - middle);
+            Camera { center, world_from_camera: turn * first.world_from_camera, ..first.clone() }
+        };
+        (0..count).map(turned).collect()
+    }
+
     /// A camera that shows all of `bounds` from obliquely above, from where a splat's front usually is: x
     /// right, z away.
     pub(crate) fn overview(bounds: &Bounds, up: DVec3, [width_px, height_px]: [u32; 2]) -> Camera {
@@ -97,6 +108,19 @@ mod tests {
             assert!(seen(p).cmpge(DVec2::ZERO).all() && seen(p).cmple(DVec2::new(640.0, 480.0)).all(), "{p}");
         }
         assert_eq!(HomeView::new(&[], None).bounds, HomeView::default().bounds);
+    }
+
+    #[test]
+    fn cameras_go_around_what_is_framed() {
+        let bounds = Bounds { min: DVec3::splat(5.0), max: DVec3::splat(7.0) };
+        let view = HomeView { bounds, up: DVec3::NEG_Y, camera: None };
+        let all = view.around([64, 48], 4);
+        assert_eq!((all.len(), &all[0]), (4, &HomeView::overview(&bounds, view.up, [64, 48])));
+        for (k, camera) in all.iter().enumerate() {
+            let middle = camera.project(DVec3::splat(6.0)).expect("in front");
+            assert!((middle - DVec2::new(32.0, 24.0)).length() < 1e-6 && camera.validate().is_ok());
+            assert!((camera.center.y - all[0].center.y).abs() < 1e-9 && (k == 0 || camera.center != all[0].center));
+        }
     }
 
     #[test]

@@ -24,7 +24,7 @@ pub(crate) mod undo;
 pub use bounds::Bounds;
 pub use camera::{Camera, CameraError};
 pub(crate) use camera_path::{CameraPath, PathError, PathKey};
-pub use cloud::{CloudError, ExtraProperty, Gaussian, GaussianCloud};
+pub use cloud::{CloudError, ExtraProperty, Gaussian, GaussianCloud, SplatRenderMode};
 pub use crop::CropBox;
 pub use dataset::{Dataset, SparsePoint};
 pub use findings::Findings;

@@ -7,6 +7,7 @@ use super::actions::Pane;
 use super::app::App;
 use super::context::SceneContext;
 use super::state::Tone;
+use crate::io::splat_format::SplatFormat;
 use crate::jobs::export;
 use crate::jobs::export_all::{ExportAllRequest, MaskFormat};
 use crate::jobs::phrases::{self, PhrasesRequest, TrueMasks};
@@ -61,7 +62,9 @@ impl App {
         let views = photos.map(|p| (p.name.clone(), p.camera.clone())).collect();
         let masks = MaskFormat::ALL.to_vec();
         let (cloud, map) = (Arc::clone(&cloud), Arc::clone(&map));
-        self.submit(Command::ExportAll(Box::new(ExportAllRequest { cloud, map, settings, views, masks, folder })));
+        let format = SplatFormat::Ply;
+        let request = ExportAllRequest { cloud, map, settings, views, format, masks, folder };
+        self.submit(Command::ExportAll(Box::new(request)));
     }
 
     /// Compares the newest answer with a true mask of the present view, or with none.

@@ -146,7 +146,7 @@ actions! {
     OpenDemo: "Open the demo", "A trained tabletop with objects and parts, ready for queries. No download needed.";
     TrainDemo: "Train the demo yourself",
         "Render posed photos of the tabletop and train on them. No download needed.";
-    ExportPly: "Export Gaussians as .ply\u{2026}", "Write the Gaussians in the format that 3DGS viewers read.", "Ctrl+E";
+    ExportPly: "Export Gaussians\u{2026}", "Write the Gaussians as .ply, .spz, .sog, .glb or others that viewers read.", "Ctrl+E";
     ExportAll: "Export all objects and parts\u{2026}",
         "Into a folder: a .ply each, and their masks in the photos as ISAT, COCO and id pictures.";
     Screenshot: "Save the view as .png\u{2026}", "Write the image in the viewport, without the drawn cameras.", "Ctrl+S";
@@ -204,7 +204,7 @@ actions! {
     Isolate(only: Option<IdentityId>): only.map_or_else(|| "Show all objects".into(), |id| format!("Show only #{id}")),
         "Show everything that was hidden.";
     Hide(id: IdentityId): format!("Hide or show #{id}"), "Hide it in the view, or show it again.";
-    ExportTarget(id: IdentityId): format!("Export #{id} as .ply\u{2026}"),
+    ExportTarget(id: IdentityId): format!("Export #{id}\u{2026}"),
         "Write its Gaussians in the format that 3DGS viewers read.";
     Remove(id: IdentityId): format!("Remove #{id} and fill"),
         "Take it out, into a scene of its own that is shown beside this one: what it hid is closed from what is around.";

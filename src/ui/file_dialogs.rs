@@ -11,10 +11,14 @@ use rfd::{AsyncFileDialog, FileHandle};
 
 use super::actions::Action;
 use super::dialogs::show_question;
+use crate::io::splat_format::SplatFormat;
 use crate::worker::Repaint;
 
 /// Nobody closes a dialog this soon: the system has none.
 const NO_DIALOG: Duration = Duration::from_millis(500);
+
+/// Endings of scenes.
+const SCENES: [&str; 9] = ["ply", "splat", "ksplat", "spz", "sog", "gltf", "glb", "json", "toml"];
 
 /// What is to be chosen.
 #[derive(Clone, Debug, PartialEq)]
@@ -213,7 +217,7 @@ fn dialog(action: &Action, name: &str) -> Option<(String, Kind)> {
     let save = |ending: &str| Kind::Save(format!("{name}{ending}"));
     let (title, kind) = match action {
         Action::OpenFolder => ("Open a folder of photos or a trained scene", Kind::Folder),
-        Action::OpenFile => ("Open a scene", Kind::File("Scenes", &["ply", "sog", "gltf", "glb", "json", "toml"])),
+        Action::OpenFile => ("Open a scene", Kind::File("Scenes", &SCENES)),
         Action::AddModel(id) => {
             let title = format!("Choose the checkpoint of {id}, or the description (.json) of its exported files");
             return Some((title, Kind::File("Networks", &["pt", "pth", "bin", "safetensors", "json"])));
@@ -222,7 +226,10 @@ fn dialog(action: &Action, name: &str) -> Option<(String, Kind)> {
         Action::ExportPhrases => ("Choose a folder for the masks", Kind::Folder),
         Action::ChooseTrueMask => ("Choose the true mask of this view", Kind::File("Masks", &["png"])),
         Action::ChooseMasks => ("Choose the folder with the masks", Kind::Folder),
-        Action::ExportPly | Action::ExportTarget(_) | Action::ExportCrop => ("Export Gaussians", save(".ply")),
+        Action::ExportPly | Action::ExportTarget(_) | Action::ExportCrop => {
+            let title = format!("Export Gaussians: the ending chooses among {}", SplatFormat::endings());
+            return Some((title, save(".ply")));
+        }
         Action::OpenPath => ("Open a camera path", Kind::File("Camera paths", &["json"])),
         Action::ChooseBeside => ("Open the folder of another scene", Kind::Folder),
         Action::ChooseReport | Action::ChooseSecondReport => ("Open a report", Kind::File("Reports", &["json"])),

@@ -9,6 +9,7 @@ use super::protocol::{Command, Outcome};
 use super::thread::Jobs;
 use crate::io::{self, OpenError, trained};
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
+use crate::jobs::export_splat::{self, LossViews};
 use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
@@ -137,7 +138,8 @@ impl Jobs for PipelineJobs {
                 Outcome::Scale(meters_per_unit, stored)
             }
             Command::Export { cloud, path } => {
-                export::ply(&path, &cloud)?;
+                let done = export_splat::run(&cloud, &path, Some(&LossViews::of_cloud(&cloud)), observer)?;
+                done.lines().into_iter().skip(1).for_each(|line| observer.note(Severity::Info, line));
                 Outcome::Written(path)
             }
             Command::Photo { index, photo, max_side_px } => {

@@ -92,7 +92,7 @@ pub enum Command {
     MeasureSplats(Box<MeasureRequest>),
     /// Find what clicks and strokes select.
     Select(Box<SelectRequest>),
-    /// Write Gaussians as a `.ply`.
+    /// Write Gaussians in the format of the file's ending, and measure what that lost.
     Export {
         /// The Gaussians.
         cloud: Arc<GaussianCloud>,

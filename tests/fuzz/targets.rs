@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 use std::fs;
+use std::io::Write;
 use std::path::Path;
 
 use fmlgs::io::{self, IoError};
@@ -131,6 +132,11 @@ pub fn all() -> Vec<Target> {
             valid(io::sog::read_folder(&folder.join("meta.json")))
         })
         .slow(4),
+        Target::new("splat", Door::Any, |b| valid(io::splat::parse(b, Path::new(P)))),
+        Target::new("ksplat", Door::Starts(&[0]), |b| valid(io::ksplat::parse(b, Path::new(P)))),
+        Target::new("spz", Door::Any, |b| valid(io::spz::parse(b, Path::new(P)))).slow(2),
+        // What gzip protects by its checksum.
+        Target::new("spz_unpacked", Door::Starts(b"NGSP"), |b| valid(io::spz::parse(&gzip(b), Path::new(P)))),
         Target::new("khr_gltf", Door::StartsOrJson(b"glTF"), |b| valid(io::khr_gltf::parse(b, Path::new(P)))),
         Target::new("colmap_cameras", Door::Any, |b| io::colmap::check_cameras(b, Path::new(P))),
         Target::new("colmap_images", Door::Any, |b| io::colmap::check_images(b, Path::new(P))),
@@ -175,6 +181,12 @@ pub fn all() -> Vec<Target> {
     ];
     all.extend(super::targets_more::all());
     all
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    out.write_all(bytes).expect("pack");
+    out.finish().expect("packed")
 }
 
 /// Photos that are read have cameras that can be.

@@ -86,4 +86,10 @@ impl<'a> Gltf<'a> {
         let (rows, _) = values.data.as_chunks::<N>();
         Ok(AttributeValues { rows: rows.to_vec(), signed_integer: values.signed_integer })
     }
+
+    /// The values of accessor `index` if each is one number.
+    pub(crate) fn scalars(&self, index: usize) -> Result<Option<Vec<f32>>, IoError> {
+        let values = self.file.values(index, "a splat primitive")?;
+        Ok((values.width == 1).then_some(values.data))
+    }
 }

@@ -7,19 +7,23 @@
 
 mod container;
 mod primitive;
+mod write;
 
 use std::path::Path;
 
 pub(crate) use container::is_gltf;
+pub(super) use write::{encode_binary, encode_text};
 
 use super::gltf_mesh::resource::split_container;
 use super::{IoError, files};
-use crate::math::sh::coefficients;
 use crate::scene::GaussianCloud;
 use container::Gltf;
 
 /// Name of the extension, and prefix of its attributes.
 const EXTENSION: &str = "KHR_gaussian_splatting";
+/// Prefix of attributes that the format leaves to applications.
+const EXTRA: &str = "_";
+
 /// Reads every splat of a glTF file's scene.
 pub(crate) fn read(path: &Path) -> Result<GaussianCloud, IoError> {
     parse(&files::read(path, u64::MAX)?, path)
@@ -45,27 +49,9 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
             remedy: "turn the meshes into posed photos first: fmlgs synth",
         });
     }
-    let cloud = joined(parts);
+    let cloud = GaussianCloud::joined(parts);
     cloud.validate().map_err(|cause| IoError::Cloud { path: path.into(), cause })?;
     Ok(cloud)
-}
-
-/// One cloud of all parts, with the highest degree among them.
-fn joined(parts: Vec<GaussianCloud>) -> GaussianCloud {
-    let sh_degree = parts.iter().map(|p| p.sh_degree).max().unwrap_or(0);
-    let stride = coefficients(sh_degree);
-    let mut all = GaussianCloud { sh_degree, ..GaussianCloud::default() };
-    for part in parts {
-        for sh in part.sh.chunks_exact(part.sh_stride()) {
-            all.sh.extend_from_slice(sh);
-            all.sh.resize(all.sh.len() + stride - sh.len(), [0.0; 3]);
-        }
-        all.positions.extend(part.positions);
-        all.log_scales.extend(part.log_scales);
-        all.quaternions.extend(part.quaternions);
-        all.opacity_logits.extend(part.opacity_logits);
-    }
-    all
 }
 
 #[cfg(test)]

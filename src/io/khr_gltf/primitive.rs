@@ -2,17 +2,14 @@
 
 use glam::{DMat3, DMat4, DQuat, DVec3};
 
-use super::EXTENSION;
 use super::container::{Gltf, SplatPrimitive};
-use crate::io::IoError;
-use crate::io::quantized::logit;
+use super::{EXTENSION, EXTRA};
+use crate::io::quantized::{log_scale, logit};
+use crate::io::{IoError, splat_ply};
 use crate::math::rotation::{nearest_rotation, rotation_error};
 use crate::math::sh::{SH_C0, coefficients};
 use crate::math::srgb;
-use crate::scene::GaussianCloud;
-
-/// Standard deviations under this are raised to it: their logarithm would be infinite.
-const SMALLEST_SCALE: f32 = 1e-12;
+use crate::scene::{ExtraProperty, GaussianCloud};
 
 pub(super) fn cloud(
     gltf: &Gltf<'_>,
@@ -59,7 +56,7 @@ pub(super) fn cloud(
         sh.chunks_exact_mut(stride).for_each(to_display);
     }
     let logarithms = scales.signed_integer || scales.rows.iter().flatten().any(|s| *s < 0.0);
-    let log_scale = |s: f32| if logarithms { s } else { s.max(SMALLEST_SCALE).ln() };
+    let log_scale = |s: f32| if logarithms { s } else { log_scale(s) };
     let (turn, scale) = similarity(gltf, world)?;
     if degree > 0 && turn.is_some() {
         return Err(
@@ -74,16 +71,30 @@ pub(super) fn cloud(
             [q.w, q.x, q.y, q.z].map(|v| v as f32)
         }
     };
-    let place = |p: &[f32; 3]| world.transform_point3(DVec3::from_array(p.map(f64::from))).as_vec3().to_array();
+    let place = |p: &[f32; 3]| world.transform_vector3(DVec3::from_array(p.map(f64::from))).as_vec3().to_array();
     Ok(GaussianCloud {
+        origin: world.w_axis.truncate(),
         positions: positions.iter().map(place).collect(),
         log_scales: scales.rows.iter().map(|s| s.map(|s| log_scale(s) + grown)).collect(),
         quaternions: rotations.into_iter().map(turned).collect(),
         opacity_logits: opacities.into_iter().map(|[o]| logit(o)).collect(),
         sh_degree: degree,
         sh,
+        extras: extras(gltf, primitive, n)?,
         ..GaussianCloud::default()
     })
+}
+
+/// Numbers of applications, one of each Gaussian.
+fn extras(gltf: &Gltf<'_>, primitive: &SplatPrimitive, n: usize) -> Result<Vec<ExtraProperty>, IoError> {
+    let mut extras = Vec::new();
+    for (name, at) in &primitive.attributes {
+        let Some(name) = name.strip_prefix(EXTRA).filter(|name| splat_ply::may_be_extra(name)) else { continue };
+        let Some(values) = gltf.scalars(*at)? else { continue };
+        equal(gltf, n, values.len())?;
+        extras.push(ExtraProperty { name: name.to_owned(), values });
+    }
+    Ok(extras)
 }
 
 fn equal(gltf: &Gltf<'_>, n: usize, count: usize) -> Result<(), IoError> {

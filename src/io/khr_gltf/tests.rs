@@ -3,7 +3,9 @@
 use serde_json::{Value, json};
 
 use super::*;
+use crate::io::test_clouds;
 use crate::math::sh::SH_C0;
+use crate::scene::ExtraProperty;
 
 /// One Gaussian of degree 0 with float attributes, in one embedded buffer.
 fn gltf() -> Value {
@@ -64,7 +66,8 @@ fn nodes_move_turn_and_scale() {
     ]);
     let c = read_json(&g).expect("read");
     // (1, 2, 3) doubled is (2, 4, 6); a quarter turn about z makes it (-4, 2, 6).
-    assert!(c.positions[0].iter().zip([6.0, 2.0, 6.0]).all(|(a, b)| near(*a, b)), "{:?}", c.positions);
+    let place = c.world_position(0).as_vec3().to_array();
+    assert!(place.iter().zip([6.0, 2.0, 6.0]).all(|(a, b)| near(*a, b)), "{place:?}");
     assert!(near(c.log_scales[0][1], 2.0_f32.ln()));
     assert!(near(c.quaternions[0][0], half as f32) && near(c.quaternions[0][3], half as f32));
     g["nodes"][1]["scale"] = json!([2, 1, 2]);
@@ -116,4 +119,40 @@ fn hostile_files_are_named() {
     assert!(matches!(&kernel, IoError::Unsupported { what, .. } if what.contains("box")), "{kernel}");
     let none = with(|g| g["meshes"][0]["primitives"][0]["extensions"] = json!({}));
     assert!(matches!(&none, IoError::Unsupported { remedy, .. } if remedy.contains("synth")), "{none}");
+}
+
+#[test]
+fn what_is_written_comes_back_with_its_origin_and_its_extras() {
+    for degree in 0..=3 {
+        let extra = |name: &str, from: f32| ExtraProperty {
+            name: name.into(),
+            values: (0..5_000).map(|i| from + i as f32).collect(),
+        };
+        let cloud = GaussianCloud {
+            origin: glam::DVec3::new(1e6 + 0.1, -3.5, 0.0),
+            extras: vec![extra("confidence", 0.5), extra("fmlgs_identity", 0.0)],
+            ..test_clouds::random(5_000, degree)
+        };
+        let (mut binary, mut text) = (Vec::new(), Vec::new());
+        encode_binary(&mut binary, &cloud, &mut |_| Ok(())).expect("glb");
+        encode_text(&mut text, &cloud, &mut |_| Ok(())).expect("gltf");
+        let back = [&binary, &text].map(|bytes| parse(bytes, Path::new("a.glb")).expect("valid"));
+        test_clouds::assert_near(&back[0], &cloud, [1e-6, 2e-6, 1e-6, 1e-6, 0.0]);
+        assert_eq!(back[0].extras, cloud.extras);
+        assert!(back[0] == back[1], "the text holds the same");
+        let u32_at =
+            |at: usize| u32::from_le_bytes([binary[at], binary[at + 1], binary[at + 2], binary[at + 3]]) as usize;
+        assert_eq!((u32_at(8), (20 + u32_at(12)) % 4), (binary.len(), 0));
+    }
+}
+
+#[test]
+fn attributes_that_are_no_numbers_or_have_taken_names_are_left_out() {
+    let mut g = gltf();
+    let attributes = g["meshes"][0]["primitives"][0]["attributes"].as_object_mut().expect("object");
+    for (name, accessor) in [("_mine", 3), ("_x", 3), ("_vector", 0), ("_two words", 3)] {
+        attributes.insert(name.into(), json!(accessor));
+    }
+    let c = read_json(&g).expect("read");
+    assert_eq!(c.extras, [ExtraProperty { name: "mine".into(), values: vec![0.75] }]);
 }

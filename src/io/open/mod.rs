@@ -4,7 +4,9 @@ use std::fs;
 use std::path::Path;
 
 use super::trained::{self, TrainedScene};
-use super::{IoError, OpenError, colmap, files, khr_gltf, llff, sog, splat_ply, transforms, unposed};
+use super::{
+    IoError, OpenError, colmap, files, khr_gltf, ksplat, llff, sog, splat, splat_ply, spz, transforms, unposed,
+};
 use crate::scene::{Dataset, GaussianCloud};
 
 /// What a path turned out to be.
@@ -64,7 +66,7 @@ struct Layout {
 }
 
 /// What is looked for in a file.
-const FILES: &str = "splats (.ply, .compressed.ply, .sog, SOG's meta.json, .gltf or .glb with KHR_gaussian_splatting), transforms.json, scene.json, poses_bounds.npy";
+const FILES: &str = "splats (.ply, .compressed.ply, .splat, .ksplat, .spz, .sog, SOG's meta.json, .gltf or .glb with KHR_gaussian_splatting), transforms.json, scene.json, poses_bounds.npy";
 
 /// Bytes that tell file formats apart.
 const MAGIC_BYTES: u64 = 4;
@@ -116,6 +118,10 @@ fn open_file(path: &Path) -> Result<Opened> {
         [b'p', b'l', b'y', b'\n' | b'\r'] => Ok(Opened::Cloud(splat_ply::read(path)?)),
         start if khr_gltf::is_gltf(start, &name) => Ok(Opened::Cloud(khr_gltf::read(path)?)),
         b"PK\x03\x04" => Ok(Opened::Cloud(sog::read_archive(path)?)),
+        start if spz::is_spz(start) => Ok(Opened::Cloud(spz::read(path)?)),
+        // These two begin with anything.
+        [_, ..] if name.ends_with(".splat") => Ok(Opened::Cloud(splat::read(path)?)),
+        [_, ..] if name.ends_with(".ksplat") => Ok(Opened::Cloud(ksplat::read(path)?)),
         start => Err(OpenError::Unrecognized {
             path: path.into(),
             looked_for: FILES.into(),
@@ -132,6 +138,7 @@ fn in_words(name: &str, start: &[u8]) -> &'static str {
         [] => "an empty file",
         _ if is_called(".ply") => "a file called .ply without PLY header",
         _ if is_called(".sog") => "a file called .sog that is no zip archive",
+        _ if is_called(".spz") => "a file called .spz that is neither packed by gzip nor of version 4",
         _ if start.iter().all(is_text) => "a text file of another kind",
         _ => "a file of another kind",
     }

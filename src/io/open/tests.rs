@@ -30,6 +30,8 @@ fn what_is_not_recognized_says_what_was_looked_for_and_found() {
     for (name, bytes, found) in [
         ("a.ply", "element", "without PLY header"),
         ("a.sog", "none", "no zip archive"),
+        ("a.spz", "none", "neither packed"),
+        ("a.splat", "", "an empty file"),
         ("a.ply", "", "an empty file"),
         ("a.bin", "\u{1}\u{2}", "a file of another kind"),
     ] {

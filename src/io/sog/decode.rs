@@ -5,17 +5,14 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::meta::{Meta, Opacity, Rest};
+use super::{FIRST_TAG, PALETTE_ROW};
 use crate::io::quantized::{logit, unit_quaternion};
 use crate::io::{IoError, photo};
 use crate::math::sh::coefficients;
 use crate::scene::GaussianCloud;
 
-/// Palette entries in a row of the palette's picture.
-const PALETTE_ROW: usize = 64;
 /// Labels have 16 bits.
 const MAX_PALETTE: usize = 1 << 16;
-/// Value of the alpha channel that says that `w` is the largest component of a quaternion.
-const FIRST_TAG: u8 = 252;
 /// Pixels that a picture may have beyond one per Gaussian, for rows that are not full.
 const MARGIN_PX: u64 = 1 << 16;
 
@@ -68,6 +65,7 @@ pub(super) fn cloud(
         opacity_logits: sh0.pixels.par_iter().map(|p| opacity(&meta.opacity, p[3])).collect(),
         sh_degree,
         sh,
+        render_mode: meta.render_mode,
         ..GaussianCloud::default()
     };
     // Bounds and codebooks are finite, but a position's exponential may not be.

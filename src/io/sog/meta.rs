@@ -4,7 +4,9 @@ use std::path::Path;
 
 use serde::Deserialize;
 
+use crate::io::render_mode::of_sog_model;
 use crate::io::{IoError, files};
+use crate::scene::SplatRenderMode;
 
 /// What a file says, checked: every number is finite, every list has its length.
 pub(super) struct Meta {
@@ -22,6 +24,7 @@ pub(super) struct Meta {
     pub(crate) opacity: Opacity,
     pub(crate) sh0_file: String,
     pub(crate) rest: Option<Rest>,
+    pub(crate) render_mode: SplatRenderMode,
 }
 
 /// What the 256 values of a byte stand for, by channel.
@@ -44,10 +47,21 @@ pub(super) struct Rest {
     pub(crate) labels_file: String,
 }
 
+impl Meta {
+    /// The pictures, in the order in which they are decoded; the palette of harmonics comes last.
+    pub(crate) fn files(&self) -> Vec<String> {
+        let [low, high] = &self.means_files;
+        let rest = self.rest.iter().flat_map(|rest| [&rest.labels_file, &rest.centroids_file]);
+        let all = [low, high, &self.scales_file, &self.quats_file, &self.sh0_file].into_iter().chain(rest);
+        all.cloned().collect()
+    }
+}
+
 #[derive(Deserialize)]
 struct File {
     version: Option<u64>,
     count: Option<u64>,
+    model: Option<String>,
     means: Part,
     scales: Part,
     quats: Part,
@@ -126,7 +140,9 @@ fn convert(file: File, codebooks: bool) -> Result<Meta, Flaw> {
             })
         }
     };
-    Ok(Meta { count, means, means_files: [low, high], scales, scales_file, quats_file, sh0, opacity, sh0_file, rest })
+    let render_mode = file.model.as_deref().map(of_sog_model).unwrap_or_default();
+    let means_files = [low, high];
+    Ok(Meta { count, means, means_files, scales, scales_file, quats_file, sh0, opacity, sh0_file, rest, render_mode })
 }
 
 fn flaw(part: &'static str, reason: &str) -> Flaw {

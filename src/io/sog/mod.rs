@@ -1,5 +1,5 @@
 //! SOG: splats quantized into WebP pictures beside a `meta.json`, in a folder or in one `.sog`
-//! archive (PlayCanvas). Versions 1 and 2.
+//! archive (PlayCanvas). Versions 1 and 2 are read, version 2 is written.
 //!
 //! Pixel `i` of each picture belongs to Gaussian `i`. Positions have 16 bits an axis, in two
 //! pictures, on a logarithmic scale; version 2 looks scales and colors up in codebooks where
@@ -7,15 +7,25 @@
 
 mod archive;
 mod decode;
+mod encode;
 mod meta;
+mod palette;
 
-use std::path::Path;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
 
-use super::{IoError, files};
+use super::atomic::{Draft, Told};
+use super::error::write_error;
+use super::{IoError, bundle, files};
 use crate::scene::GaussianCloud;
 
 /// The file that makes a folder a SOG scene.
 pub(crate) const META_FILE: &str = "meta.json";
+
+/// Palette entries in a row of the palette's picture.
+const PALETTE_ROW: usize = 64;
+/// Value of the alpha channel that says that `w` is the largest component of a quaternion.
+const FIRST_TAG: u8 = 252;
 
 /// Reads an unbundled SOG by its `meta.json`.
 pub fn read_folder(meta_file: &Path) -> Result<GaussianCloud, IoError> {
@@ -40,6 +50,39 @@ pub fn parse_archive(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError
     let mut archive = archive::Archive::open(bytes, path)?;
     let meta = meta::parse(&archive.read(META_FILE)?, path)?;
     decode::cloud(&meta, |name| archive.read(name), path)
+}
+
+/// Writes the bytes of a bundled SOG of a valid cloud that is not empty.
+pub(super) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
+    out.write_all(&bundle::pack(&encode::files(cloud, told)?)?)
+}
+
+/// Writes an unbundled SOG: its pictures first, then `meta_file`, without which they are nothing.
+///
+/// # Errors
+/// If something is at `meta_file` already: all files could not be replaced at once.
+pub(super) fn write_folder(meta_file: &Path, cloud: &GaussianCloud, told: &mut Told<'_>) -> Result<(), IoError> {
+    let folder = files::folder_of(meta_file);
+    if meta_file.exists() {
+        return Err(IoError::Occupied { folder: folder.into(), what: "holds a meta.json already" });
+    }
+    let write = |(name, bytes): &(String, Vec<u8>)| {
+        let path = folder.join(name);
+        let mut draft = Draft::create(&path)?;
+        draft.write_all(bytes).map_err(|cause| write_error(&path, cause))?;
+        Ok(draft)
+    };
+    let all = encode::files(cloud, told).map_err(|cause| write_error(meta_file, cause))?;
+    let drafts = all.iter().map(write).collect::<Result<Vec<_>, IoError>>()?;
+    drafts.into_iter().try_for_each(|draft| draft.commit().map(drop))
+}
+
+/// The files of an unbundled SOG, as far as they can be told.
+pub(super) fn files_of(meta_file: &Path) -> Vec<PathBuf> {
+    let meta = files::read(meta_file, files::MAX_TEXT_BYTES).and_then(|bytes| meta::parse(&bytes, meta_file));
+    let names = meta.map(|meta| meta.files()).unwrap_or_default();
+    let folder = files::folder_of(meta_file);
+    names.iter().map(|name| folder.join(name)).chain([meta_file.to_path_buf()]).collect()
 }
 
 fn missing(path: &Path, entry: &str) -> IoError {

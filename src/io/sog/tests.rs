@@ -2,14 +2,15 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{Cursor, Write};
+use std::io::Cursor;
 
 use image::{ImageFormat, Rgba, RgbaImage};
 use serde_json::{Value, json};
 use zip::write::SimpleFileOptions;
 
 use super::*;
-use crate::scene::CloudError;
+use crate::io::test_clouds;
+use crate::scene::{CloudError, SplatRenderMode};
 
 fn webp(w: u32, h: u32, pixels: &[[u8; 4]]) -> Vec<u8> {
     let at = |x, y| Rgba(pixels.get((y * w + x) as usize).copied().unwrap_or([0, 0, 0, 255]));
@@ -183,4 +184,40 @@ fn archive_bombs_are_refused() {
     zip.start_file("notes.txt", SimpleFileOptions::default()).expect("start");
     let other = zip.finish().expect("finish").into_inner();
     assert!(matches!(parse_archive(&other, path), Err(IoError::Syntax { place, .. }) if place.contains("meta.json")));
+}
+
+fn written(cloud: &GaussianCloud) -> Vec<u8> {
+    let mut out = Vec::new();
+    encode(&mut out, cloud, &mut |_| Ok(())).expect("encode");
+    out
+}
+
+#[test]
+fn what_is_written_comes_back_as_near_as_its_palettes_are() {
+    for degree in 0..=3 {
+        let mode = SplatRenderMode::Mip;
+        let cloud = GaussianCloud { render_mode: mode, ..test_clouds::random(1500, degree) };
+        let back = parse_archive(&written(&cloud), Path::new("a.sog")).expect("valid");
+        // Harmonics are noise here, of which 1024 entries stand for 1500.
+        test_clouds::assert_near(&back, &test_clouds::in_order(&cloud), [1e-4, 0.02, 1e-4, 0.002, 0.5]);
+    }
+    for n in [1, 2, 5, 17] {
+        let cloud = test_clouds::random(n, 1);
+        let back = parse_archive(&written(&cloud), Path::new("a.sog")).expect("valid");
+        test_clouds::assert_near(&back, &test_clouds::in_order(&cloud), [1e-4, 1e-5, 1e-4, 0.002, 0.5]);
+    }
+}
+
+#[test]
+fn a_folder_holds_what_an_archive_does_and_is_not_written_over() {
+    let folder = tempfile::tempdir().expect("folder");
+    let meta = folder.path().join(META_FILE);
+    let cloud = test_clouds::random(300, 2);
+    let failed = |_: usize| Err(io::Error::other("enough"));
+    write_folder(&meta, &cloud, &mut { failed }).expect_err("stopped");
+    assert_eq!(fs::read_dir(folder.path()).expect("list").count(), 0, "nothing is left");
+    write_folder(&meta, &cloud, &mut |_| Ok(())).expect("written");
+    let archive = parse_archive(&written(&cloud), Path::new("a.sog")).expect("valid");
+    assert!(read_folder(&meta).expect("valid") == archive);
+    assert!(matches!(write_folder(&meta, &cloud, &mut |_| Ok(())), Err(IoError::Occupied { .. })));
 }

@@ -21,6 +21,7 @@ use crate::scene::GaussianCloud;
 pub use read::parse;
 pub(crate) use stream::state;
 pub use write::{check, encode, write};
+pub(crate) use write::{encode_told, may_be_extra};
 
 /// Properties that carry Gaussians, besides `f_rest_*`.
 const STANDARD: [&str; 20] = [

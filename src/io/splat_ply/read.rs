@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use super::{ORIGIN, is_standard};
 use crate::io::ply::{Column, Ply, Scalar, Table};
-use crate::io::{IoError, compressed_ply};
+use crate::io::quantized::logit;
+use crate::io::{IoError, compressed_ply, render_mode};
 use crate::math::sh::coefficients;
 use crate::scene::{ExtraProperty, GaussianCloud};
 
@@ -46,9 +47,10 @@ impl Reading<'_> {
             positions,
             log_scales: self.values(self.columns(["scale_0", "scale_1", "scale_2"])?)?,
             quaternions: self.values(self.columns(["rot_0", "rot_1", "rot_2", "rot_3"])?)?,
-            opacity_logits: self.values(self.columns(["opacity"])?)?.into_iter().map(|[v]| v).collect(),
+            opacity_logits: self.opacities()?,
             sh_degree: degree,
             sh: self.harmonics(degree, dc, &rest)?,
+            render_mode: render_mode::of_comments(&self.ply.comments),
             extras: self.extras(),
         })
     }
@@ -68,6 +70,16 @@ impl Reading<'_> {
             (0..self.table.rows).into_par_iter().map(|i| columns.map(|c| c.f32(row(i)))).collect();
         self.check(&values, |k| &columns[k].name)?;
         Ok(values)
+    }
+
+    /// Logits; infinite ones, which other programs make of opacities of 0 and 1, become large ones.
+    fn opacities(&self) -> Result<Vec<f32>, IoError> {
+        let [column] = self.columns(["opacity"])?;
+        let finite = |v: f32| if v.is_infinite() { logit(f32::from(v > 0.0)) } else { v };
+        let all: Vec<[f32; 1]> =
+            (0..self.table.rows).into_par_iter().map(|i| [finite(column.f32(self.table.row(i)))]).collect();
+        self.check(&all, |_| &column.name)?;
+        Ok(all.into_flattened())
     }
 
     fn check<'n, const N: usize>(&self, values: &[[f32; N]], name: impl Fn(usize) -> &'n str) -> Result<(), IoError> {

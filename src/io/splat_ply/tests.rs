@@ -8,7 +8,7 @@ use rand::{RngExt, SeedableRng};
 use super::*;
 use crate::io::IoError;
 use crate::math::sh::coefficients;
-use crate::scene::{CloudError, ExtraProperty, GaussianCloud};
+use crate::scene::{CloudError, ExtraProperty, GaussianCloud, SplatRenderMode};
 
 fn random_cloud(n: usize, sh_degree: u8, origin: DVec3) -> GaussianCloud {
     let mut rng = rand_pcg::Pcg64Mcg::seed_from_u64(7);
@@ -21,6 +21,7 @@ fn random_cloud(n: usize, sh_degree: u8, origin: DVec3) -> GaussianCloud {
         opacity_logits: (0..n).map(|_| v()).collect(),
         sh_degree,
         sh: (0..n * coefficients(sh_degree)).map(|_| [v(), v(), v()]).collect(),
+        render_mode: SplatRenderMode::Mip,
         extras: vec![ExtraProperty { name: "confidence".into(), values: (0..n).map(|_| v()).collect() }],
     }
 }
@@ -99,6 +100,23 @@ fn non_finite_values_name_vertex_and_property() {
     let e = write(&folder.path().join("a.ply"), &c).expect_err("infinite");
     assert!(matches!(e, IoError::Cloud { cause: CloudError::NotFinite { index: 7, .. }, .. }));
     assert!(write(&folder.path().join("a.ply"), &good).is_ok());
+}
+
+#[test]
+fn infinite_opacities_become_large_ones() {
+    let mut c = random_cloud(3, 0, DVec3::ZERO);
+    [c.opacity_logits[0], c.opacity_logits[1]] = [f32::INFINITY, f32::NEG_INFINITY];
+    let read = parsed(&bytes(&c)).expect("read").opacity_logits;
+    assert!(
+        read[0] > 13.0
+            && read[0].is_finite()
+            && read[1] < -13.0
+            && read[1].is_finite()
+            && read[2] == c.opacity_logits[2],
+        "{read:?}"
+    );
+    c.opacity_logits[0] = f32::NAN;
+    assert!(matches!(parsed(&bytes(&c)), Err(IoError::NotFinite { index: 0, .. })));
 }
 
 #[test]

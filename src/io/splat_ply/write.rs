@@ -7,7 +7,8 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::{ORIGIN, STATE, is_standard};
-use crate::io::{IoError, atomic};
+use crate::io::atomic::{self, Told};
+use crate::io::{IoError, render_mode};
 use crate::scene::GaussianCloud;
 
 /// Gaussians per block handed to the file.
@@ -22,7 +23,7 @@ pub fn write(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
 /// Refuses a cloud that a `.ply` cannot hold; `path` is for the error.
 pub fn check(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     cloud.validate().map_err(|cause| IoError::Cloud { path: path.into(), cause })?;
-    if let Some(e) = cloud.extras.iter().find(|e| is_standard(&e.name) || !is_word(&e.name)) {
+    if let Some(e) = cloud.extras.iter().find(|e| !may_be_extra(&e.name)) {
         return Err(IoError::syntax(
             path,
             format!("extra property '{}'", e.name),
@@ -32,13 +33,24 @@ pub fn check(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     Ok(())
 }
 
-/// A name that a PLY header can hold.
-fn is_word(name: &str) -> bool {
-    !name.is_empty() && name.bytes().all(|b| b.is_ascii_graphic())
+/// Whether an extra property may have this name: one that a PLY header can hold and that is not taken.
+pub(crate) fn may_be_extra(name: &str) -> bool {
+    !name.is_empty() && name.bytes().all(|b| b.is_ascii_graphic()) && !is_standard(name)
 }
 
 /// The bytes of a splat `.ply` of a valid cloud, with the id of the scene's state that it belongs to.
 pub fn encode(out: &mut dyn Write, cloud: &GaussianCloud, state: Option<&str>) -> io::Result<()> {
+    encode_told(out, cloud, state, &mut |_| Ok(()))
+}
+
+/// [`encode`] that tells how far it is.
+pub(crate) fn encode_told(
+    out: &mut dyn Write,
+    cloud: &GaussianCloud,
+    state: Option<&str>,
+    told: &mut Told<'_>,
+) -> io::Result<()> {
+    told(0)?;
     let shifted = cloud.origin != DVec3::ZERO;
     out.write_all(header(cloud, shifted, state).as_bytes())?;
     let stride = cloud.sh_stride();
@@ -64,6 +76,7 @@ pub fn encode(out: &mut dyn Write, cloud: &GaussianCloud, state: Option<&str>) -
         if (i + 1) % BLOCK == 0 {
             out.write_all(&block)?;
             block.clear();
+            told(i)?;
         }
     }
     out.write_all(&block)
@@ -77,6 +90,9 @@ fn header(cloud: &GaussianCloud, shifted: bool, state: Option<&str>) -> String {
     }
     if let Some(state) = state {
         let _ = writeln!(text, "comment {STATE}{state}");
+    }
+    if let Some(mode) = render_mode::comment(cloud.render_mode) {
+        let _ = writeln!(text, "comment {mode}");
     }
     let _ = writeln!(text, "element vertex {}", cloud.len());
     let mut property = |name: &str| {

@@ -10,6 +10,7 @@ use super::folder::LIST;
 use super::*;
 use crate::io::labels::Labels;
 use crate::io::labels::rle::Rle;
+use crate::io::splat_format::SplatFormat;
 use crate::pipeline::observer::{Signal, Silent};
 use crate::scene::{Identities, IdentityId, Level, Mask, NOBODY, Photo};
 
@@ -65,6 +66,7 @@ fn request(folder: &Path, masks: &[MaskFormat]) -> ExportAllRequest {
         map: Arc::new(map),
         settings: RenderSettings::default(),
         views: vec![("images/a b.jpg".into(), eye(0.0)), ("images/0002.png".into(), eye(0.4))],
+        format: SplatFormat::Ply,
         masks: masks.to_vec(),
         folder: folder.to_owned(),
     }

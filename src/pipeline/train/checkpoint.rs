@@ -182,7 +182,7 @@ impl Floats<'_> {
             opacity_logits: self.take(n),
             sh_degree,
             sh: self.arrays(n * coefficients(sh_degree)),
-            extras: Vec::new(),
+            ..GaussianCloud::default()
         }
     }
 }

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::io::trained::SCENE_FILE;
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::render::{BackendChoice, RenderSettings};
-use crate::scene::Limits;
+use crate::scene::{Limits, SplatRenderMode};
 
 /// Weight of the normals' term where surfels are trained (2DGS's).
 const SURFEL_NORMALS: f64 = 0.05;
@@ -138,6 +138,15 @@ impl TrainConfig {
             antialias: self.antialias,
             surfels: self.surfels,
             ..RenderSettings::default()
+        }
+    }
+
+    /// What is told of it in files for other programs.
+    pub(crate) fn render_mode(&self) -> SplatRenderMode {
+        match (self.surfels, self.antialias) {
+            (true, _) => SplatRenderMode::Surfels,
+            (false, true) => SplatRenderMode::Mip,
+            (false, false) => SplatRenderMode::Plain,
         }
     }
 }

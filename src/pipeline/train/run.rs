@@ -128,7 +128,7 @@ impl<'a> Job<'a> {
         let background = dataset.background.unwrap_or([0.0; 3]);
         let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
         let (mut secs, mut history) = (0.0, History::default());
-        let trainer = match saved {
+        let mut trainer = match saved {
             Some(s) => {
                 let mut t = Trainer::new(s.cloud, config, background, extent, s.header.rng);
                 t.moments = s.moments;
@@ -153,6 +153,7 @@ impl<'a> Job<'a> {
                 t
             }
         };
+        trainer.cloud.render_mode = config.render_mode();
         let mut info = SceneInfo::of(dataset, held, scene.as_ref().map_or(Path::new("."), SceneFolder::path));
         info.config = serde_json::to_value(config).unwrap_or_default();
         let photos = views.iter().map(|v| v.name.clone()).collect();

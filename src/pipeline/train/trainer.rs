@@ -107,7 +107,7 @@ impl Trainer {
     /// Brings the cloud up to date, where a GPU has it.
     pub(crate) fn fetch_cloud(&mut self) -> Result<(), GpuError> {
         if let Some(device) = &self.device {
-            self.cloud = device.cloud()?;
+            self.cloud = GaussianCloud { render_mode: self.cloud.render_mode, ..device.cloud()? };
         }
         Ok(())
     }
@@ -264,6 +264,6 @@ fn zeros_like(cloud: &GaussianCloud) -> GaussianCloud {
         opacity_logits: vec![0.0; cloud.len()],
         sh_degree: cloud.sh_degree,
         sh: vec![[0.0; 3]; cloud.sh.len()],
-        extras: Vec::new(),
+        ..GaussianCloud::default()
     }
 }

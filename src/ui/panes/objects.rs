@@ -275,7 +275,7 @@ impl Tree<'_> {
                 (Action::Isolate(Some(id)), "Isolate"),
                 (Action::Arrange(id), "Move, turn or recolor\u{2026}"),
                 (Action::Remove(id), "Remove and fill"),
-                (Action::ExportTarget(id), "Export as .ply\u{2026}"),
+                (Action::ExportTarget(id), "Export Gaussians\u{2026}"),
             ] {
                 if ui.button(text).on_hover_text(action.tooltip()).clicked() {
                     actions.push(action);

@@ -40,5 +40,5 @@ pub(super) fn show(
     row(ui, Action::Paint(Some(id)), "Select a new part by clicks\u{2026}");
     row(ui, Action::Arrange(id), "Move, turn or recolor\u{2026}");
     row(ui, Action::Remove(id), "Remove and fill");
-    row(ui, Action::ExportTarget(id), "Export as .ply\u{2026}");
+    row(ui, Action::ExportTarget(id), "Export Gaussians\u{2026}");
 }

@@ -110,7 +110,7 @@ fn show_target(ui: &mut Ui, target: IdentityId, facts: &Facts, state: &AppState,
             (Action::Isolate(Some(target)), "Isolate"),
             (Action::Hide(target), "Hide"),
             (Action::Remove(target), "Remove and fill"),
-            (Action::ExportTarget(target), "Export as .ply\u{2026}"),
+            (Action::ExportTarget(target), "Export Gaussians\u{2026}"),
         ] {
             if ui.small_button(text).on_hover_text(action.tooltip()).clicked() {
                 actions.push(action);

@@ -1,0 +1,174 @@
+//! The formats that Gaussians are written in, each by its ending, and what each of them cannot hold.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use glam::DVec3;
+use strum::VariantArray;
+
+use super::atomic::{self, Told};
+use super::{IoError, compressed_ply, khr_gltf, sog, splat, splat_ply, spz};
+use crate::scene::{Bounds, GaussianCloud, SplatRenderMode};
+
+/// A format for Gaussians.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, strum::VariantArray)]
+pub enum SplatFormat {
+    /// Any splat viewer's, without loss
+    Ply,
+    /// A quarter of a .ply, of PlayCanvas and SuperSplat
+    #[value(name = "compressed.ply")]
+    CompressedPly,
+    /// Niantic's, a tenth of a .ply
+    Spz,
+    /// PlayCanvas's, a tenth of a .ply
+    Sog,
+    /// SOG's pictures in a folder
+    #[value(skip)]
+    SogFolder,
+    /// The first viewers' on the web, one color from everywhere
+    Splat,
+    /// glTF with KHR_gaussian_splatting
+    Glb,
+    /// The same as text
+    Gltf,
+}
+
+impl SplatFormat {
+    /// The format that a file's name asks for; of `.json` files, a SOG's `meta.json` alone.
+    pub(crate) fn of(path: &Path) -> Option<Self> {
+        let name = path.file_name()?.to_string_lossy().to_lowercase();
+        let fits = |format: &Self| match format {
+            Self::SogFolder => name == sog::META_FILE,
+            _ => name.ends_with(format.ending()),
+        };
+        // The longest ending counts: a compressed .ply ends in .ply too.
+        Self::VARIANTS.iter().filter(|format| fits(format)).max_by_key(|format| format.ending().len()).copied()
+    }
+
+    /// How its files end, or what they are called.
+    pub(crate) fn ending(self) -> &'static str {
+        match self {
+            Self::Ply => ".ply",
+            Self::CompressedPly => ".compressed.ply",
+            Self::Spz => ".spz",
+            Self::Sog => ".sog",
+            Self::SogFolder => sog::META_FILE,
+            Self::Splat => ".splat",
+            Self::Glb => ".glb",
+            Self::Gltf => ".gltf",
+        }
+    }
+
+    /// All endings, for display.
+    pub(crate) fn endings() -> String {
+        Self::VARIANTS.iter().map(|format| format.ending()).collect::<Vec<_>>().join(", ")
+    }
+
+    /// What is rounded in it, in a few words; nothing where all numbers are floats.
+    pub(crate) fn rounding(self) -> Option<&'static str> {
+        match self {
+            Self::Ply | Self::Glb | Self::Gltf => None,
+            Self::CompressedPly => Some("positions and scales in 11 bits of each chunk of 256, colors in 8"),
+            Self::Spz => Some("positions in 24 bits, scales in steps of 1/16, colors in 8 bits, harmonics in 4 or 5"),
+            Self::Sog | Self::SogFolder => {
+                Some("positions in 16 bits, scales and colors of 256 values, harmonics of a palette")
+            }
+            Self::Splat => Some("rotations and colors in 8 bits"),
+        }
+    }
+
+    /// What of this cloud is left out or does not fit, each in a few words.
+    pub(crate) fn left_out(self, cloud: &GaussianCloud) -> Vec<String> {
+        let mut all = Vec::new();
+        let floats = self.rounding().is_none();
+        if self == Self::Splat && cloud.sh_degree > 0 {
+            all.push("how colors change with the direction".to_owned());
+        }
+        if !floats && !cloud.extras.is_empty() {
+            let names: Vec<&str> = cloud.extras.iter().map(|e| e.name.as_str()).collect();
+            all.push(format!("the properties {}", names.join(", ")));
+        }
+        let mode = match (self, cloud.render_mode) {
+            (_, SplatRenderMode::Plain) | (Self::Ply | Self::CompressedPly | Self::Sog | Self::SogFolder, _) => None,
+            (Self::Spz, SplatRenderMode::Mip) => None,
+            (_, SplatRenderMode::Mip) => Some("that they are drawn with the filter of Mip-Splatting"),
+            (_, SplatRenderMode::Surfels) => Some("that they are drawn as surfels"),
+        };
+        all.extend(mode.map(str::to_owned));
+        if !floats && let Some(step) = coarseness(cloud) {
+            all.push(format!("places between steps of {step} units, as the scene is far from zero"));
+        }
+        all
+    }
+
+    /// Bytes of the file, or of all files of a folder, that was written at `path`; 0 if it is gone.
+    pub(crate) fn bytes(self, path: &Path) -> u64 {
+        let bytes = |path: &Path| std::fs::metadata(path).map_or(0, |m| m.len());
+        match self {
+            Self::SogFolder => sog::files_of(path).iter().map(|file| bytes(file)).sum(),
+            _ => bytes(path),
+        }
+    }
+
+    /// Writes the cloud, replacing the file at once or not at all. `told` hears how far it is.
+    ///
+    /// # Errors
+    /// If the cloud is not valid, the format cannot hold it, `told` asks to stop or the file cannot be written.
+    pub(crate) fn write(self, path: &Path, cloud: &GaussianCloud, told: &mut Told<'_>) -> Result<(), IoError> {
+        if self == Self::Ply {
+            splat_ply::check(path, cloud)?;
+        } else {
+            cloud.validate().map_err(|cause| IoError::Cloud { path: path.into(), cause })?;
+            if cloud.is_empty() {
+                let remedy = "a .ply can be empty";
+                return Err(IoError::Unsupported { path: path.into(), what: "no Gaussians at all".into(), remedy });
+            }
+        }
+        match self {
+            Self::SogFolder => sog::write_folder(path, cloud, told),
+            _ => atomic::write(path, |w| self.encode(w, cloud, told)),
+        }
+    }
+
+    fn encode(self, out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
+        match self {
+            Self::Ply => splat_ply::encode_told(out, cloud, None, told),
+            Self::CompressedPly => compressed_ply::encode(out, cloud, told),
+            Self::Spz => spz::encode(out, cloud, told),
+            Self::Sog | Self::SogFolder => sog::encode(out, cloud, told),
+            Self::Splat => splat::encode(out, cloud, told),
+            Self::Glb => khr_gltf::encode_binary(out, cloud, told),
+            Self::Gltf => khr_gltf::encode_text(out, cloud, told),
+        }
+    }
+}
+
+/// How far the cloud's places are rounded in single precision, in units, where that is over a hundred-thousandth of
+/// its size.
+fn coarseness(cloud: &GaussianCloud) -> Option<f32> {
+    let far = cloud.origin.abs().max_element() as f32;
+    let step = far.next_up() - far;
+    let places = cloud.positions.iter().map(|p| DVec3::from_array(p.map(f64::from)));
+    let radius = Bounds::robust(places)?.radius();
+    (f64::from(step) > 1e-5 * radius && far > 0.0).then_some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_ask_for_formats() {
+        let of = |name: &str| SplatFormat::of(Path::new(name));
+        for (name, format) in [
+            ("a.ply", SplatFormat::Ply),
+            ("b/A.Compressed.PLY", SplatFormat::CompressedPly),
+            ("meta.json", SplatFormat::SogFolder),
+            ("a.gltf", SplatFormat::Gltf),
+            ("a.spz", SplatFormat::Spz),
+        ] {
+            assert_eq!(of(name), Some(format), "{name}");
+        }
+        assert!(["a.json", "ply", "ameta.json", "a.ksplat", ""].iter().all(|name| of(name).is_none()));
+    }
+}

@@ -1,0 +1,39 @@
+//! SPZ, Niantic's packed splats: versions 1 to 4 are read, version 3 is written, which all readers of today know.
+//!
+//! A header, then one column after another: positions (24-bit fixed point), opacities, colors, log-scales, rotations
+//! and harmonics, mostly bytes. Up to version 3 all of it is one gzip stream; in version 4 the header is plain and
+//! each column a Zstandard stream of its own. The axes are kept as they are, as other converters do between `.ply`
+//! and SPZ, though the format names axes of its own (right, up, back).
+
+mod read;
+mod write;
+
+use crate::math::sh::coefficients;
+
+pub use read::parse;
+pub(crate) use read::{is_spz, read};
+pub(super) use write::encode;
+
+/// How the header starts.
+const MAGIC: &[u8; 4] = b"NGSP";
+/// Of the flags: drawn with the filter of Mip-Splatting.
+const ANTIALIASED: u8 = 1;
+/// Log-scales are bytes of this step, from this one on.
+const SCALE_STEP: f32 = 1.0 / 16.0;
+const SCALE_FIRST: f32 = -10.0;
+/// Constant harmonics times this are colors around 0.5.
+const COLOR_SCALE: f32 = 0.15;
+/// The byte of a harmonic that is 0, and the steps to 1.
+const HARMONIC_MIDDLE: f32 = 128.0;
+/// What the 9 bits of a quaternion's component reach at 1/√2.
+const COMPONENT_MOST: f32 = 511.0;
+
+/// Bytes a Gaussian in each column, in the order of the file.
+fn columns(version: u32, degree: u8) -> [usize; 6] {
+    let position = if version == 1 { 6 } else { 9 };
+    let rotation = if version < 3 { 3 } else { 4 };
+    [position, 1, 3, 3, rotation, 3 * (coefficients(degree) - 1)]
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,83 @@
+//! Writing SPZ, version 3.
+
+use std::io::{self, Write};
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+
+use super::{ANTIALIASED, COLOR_SCALE, COMPONENT_MOST, HARMONIC_MIDDLE, MAGIC, SCALE_FIRST, SCALE_STEP, columns};
+use crate::io::atomic::Told;
+use crate::io::quantized::{opacity_byte, to_byte, without_largest};
+use crate::scene::{GaussianCloud, SplatRenderMode};
+
+const VERSION: u32 = 3;
+/// Largest coordinate in steps: 24 bits with a sign.
+const MOST_STEPS: f64 = 8_388_607.0;
+/// Most bits behind the point: the format has 24 in all.
+const MOST_FRACTION: u8 = 23;
+/// Gaussians between two reports.
+const BLOCK: usize = 4096;
+/// Steps of harmonics of the first band, and of those above: as the reference packs them.
+const HARMONIC_STEPS: [i32; 2] = [8, 16];
+
+/// Writes the bytes of an SPZ file of a valid cloud, in its order.
+///
+/// # Errors
+/// If it reaches farther from zero than 24 bits do, or cannot be written.
+pub(in crate::io) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
+    let fraction = fraction(cloud)?;
+    let steps = f64::from(fraction).exp2();
+    let stride = cloud.sh_stride();
+    let mut all = columns(VERSION, cloud.sh_degree).map(|bytes| Vec::with_capacity(bytes * cloud.len()));
+    for i in 0..cloud.len() {
+        if i % BLOCK == 0 {
+            told(i)?;
+        }
+        let [positions, opacities, colors, scales, rotations, harmonics] = &mut all;
+        for v in (cloud.world_position(i) * steps).round().to_array() {
+            positions.extend_from_slice(&(v as i32).to_le_bytes()[..3]);
+        }
+        opacities.push(opacity_byte(cloud.opacity_logits[i]));
+        let sh = &cloud.sh[i * stride..(i + 1) * stride];
+        colors.extend(sh[0].map(|dc| to_byte(dc * COLOR_SCALE + 0.5)));
+        scales.extend(cloud.log_scales[i].map(|s| ((s - SCALE_FIRST) / SCALE_STEP).round() as u8));
+        rotations.extend(smallest_three(cloud.quaternions[i]).to_le_bytes());
+        for (k, rgb) in sh.iter().enumerate().skip(1) {
+            harmonics.extend(rgb.map(|v| harmonic(v, HARMONIC_STEPS[usize::from(k > 3)])));
+        }
+    }
+    let flags = if cloud.render_mode == SplatRenderMode::Mip { ANTIALIASED } else { 0 };
+    let count = u32::try_from(cloud.len()).map_err(io::Error::other)?;
+    let mut gzip = GzEncoder::new(out, Compression::default());
+    gzip.write_all(MAGIC)?;
+    gzip.write_all(&VERSION.to_le_bytes())?;
+    gzip.write_all(&count.to_le_bytes())?;
+    gzip.write_all(&[cloud.sh_degree, fraction, flags, 0])?;
+    all.iter().try_for_each(|column| gzip.write_all(column))?;
+    gzip.finish().map(drop)
+}
+
+/// The most bits behind the point with which every coordinate fits.
+fn fraction(cloud: &GaussianCloud) -> io::Result<u8> {
+    let farthest = (0..cloud.len()).map(|i| cloud.world_position(i).abs().max_element()).fold(0.0, f64::max);
+    let fits = |bits: &u8| farthest * f64::from(*bits).exp2() <= MOST_STEPS;
+    (0..=MOST_FRACTION).rev().find(fits).ok_or_else(|| {
+        let text = format!("SPZ holds coordinates up to {MOST_STEPS}, the scene reaches {farthest:.0}: use .ply");
+        io::Error::new(io::ErrorKind::InvalidInput, text)
+    })
+}
+
+fn smallest_three([w, x, y, z]: [f32; 4]) -> u32 {
+    let (largest, rest) = without_largest([x, y, z, w]);
+    let part = |t: f32| {
+        let v = (2.0 * t - 1.0) * COMPONENT_MOST;
+        (v.abs().round() as u32).min(COMPONENT_MOST as u32) | if v < 0.0 { 512 } else { 0 }
+    };
+    rest.into_iter().fold(largest as u32, |packed, t| packed << 10 | part(t))
+}
+
+/// A harmonic in steps of so many of its byte, one of which is 0.
+fn harmonic(value: f32, steps: i32) -> u8 {
+    let byte = (value * HARMONIC_MIDDLE).round() as i32 + HARMONIC_MIDDLE as i32;
+    (byte.saturating_add(steps / 2).div_euclid(steps) * steps).clamp(0, 255) as u8
+}
