@@ -1,22 +1,27 @@
-//! `fmlgs export`: Gaussians as a `.ply` that other splat viewers open.
+//! `fmlgs export`: Gaussians as a `.ply` that other splat viewers open, and a scene as a page to show.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use glam::DVec3;
 
+use super::progress::Console;
 use super::{CliError, output};
-use crate::jobs::{export, open};
+use crate::jobs::page::{self, PageRequest};
+use crate::jobs::{Scene, export, open};
 use crate::math::format;
 use crate::scene::{Bounds, CropBox};
 
-/// Write the Gaussians of a scene as a .ply for other splat viewers
+/// Write the Gaussians of a scene as a .ply for other splat viewers, or the scene as a page to show
 ///
-/// The layout is that of the original 3D Gaussian Splatting. Reads whatever 'fmlgs info' recognizes
-/// as Gaussians, compressed formats too; properties that the program does not know are kept.
+/// The .ply has the layout of the original 3D Gaussian Splatting. Reads whatever 'fmlgs info' recognizes
+/// as Gaussians, compressed formats too; properties that the program does not know are kept. The page is one
+/// .html that opens in any browser without a server, with the objects' names to click and camera paths: those given
+/// and those that lie in the scene's folder.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs export scene/ --out scene.ply\n  \
+    fmlgs export scene/ --html page.html --title \"The workshop\"\n  \
     fmlgs export big.compressed.ply --out big.ply\n  \
     fmlgs export scene.ply --out flat.ply --sh-degree 0      smaller, same color from everywhere\n  \
     fmlgs export scene/ --out mug.ply --crop -1,-1,0,1,1,2     what is in a box, scene units")]
@@ -24,8 +29,17 @@ pub(crate) struct ExportArgs {
     /// Trained scene or splat file
     scene: PathBuf,
     /// The .ply to write
+    #[arg(long, required_unless_present = "html")]
+    out: Option<PathBuf>,
+    /// The page (.html) to write
     #[arg(long)]
-    out: PathBuf,
+    html: Option<PathBuf>,
+    /// The page's title [default: the scene's name]
+    #[arg(long, requires = "html")]
+    title: Option<String>,
+    /// Camera path for the page to play; may be given several times
+    #[arg(long, value_name = "FILE", requires = "html")]
+    path: Vec<PathBuf>,
     /// Leave out spherical harmonics above this degree
     #[arg(long, value_parser = clap::value_parser!(u8).range(0..=3))]
     sh_degree: Option<u8>,
@@ -51,21 +65,64 @@ fn parse_box(text: &str) -> Result<Bounds, String> {
     }
 }
 
-pub(crate) fn run(args: ExportArgs) -> Result<(), CliError> {
-    let scene = open::scene(&args.scene)?;
-    export::check(&args.out, &[".ply"], &scene.reads())?;
-    let cloud = match args.crop {
-        Some(bounds) => export::cropped(&scene.cloud, &CropBox { bounds, outside: args.outside })?.into(),
-        None => scene.cloud,
+pub(crate) fn run(args: ExportArgs, quiet: bool) -> Result<(), CliError> {
+    let mut scene = open::scene(&args.scene)?;
+    let reads: Vec<&Path> = scene.reads().into_iter().chain(args.path.iter().map(PathBuf::as_path)).collect();
+    if let Some(out) = &args.out {
+        export::check(out, &[".ply"], &reads)?;
+    }
+    if let Some(html) = &args.html {
+        export::check(html, &page::ENDINGS, &reads)?;
+    }
+    if let Some(degree) = args.sh_degree {
+        scene.cloud = Arc::new(Arc::unwrap_or_clone(scene.cloud).up_to_degree(degree));
+    }
+    let crop = args.crop.map(|bounds| CropBox { bounds, outside: args.outside });
+    if let Some(out) = &args.out {
+        ply(out, &scene, crop.as_ref())?;
+    }
+    match &args.html {
+        Some(html) => write_page(html, &scene, crop.as_ref(), &args, quiet),
+        None => Ok(()),
+    }
+}
+
+fn ply(out: &Path, scene: &Scene, crop: Option<&CropBox>) -> Result<(), CliError> {
+    let cloud = match crop {
+        Some(crop) => export::cropped(&scene.cloud, crop)?.into(),
+        None => Arc::clone(&scene.cloud),
     };
-    let cloud = match args.sh_degree {
-        Some(degree) => Arc::unwrap_or_clone(cloud).up_to_degree(degree).into(),
-        None => cloud,
-    };
-    export::ply(&args.out, &cloud)?;
-    let bytes = std::fs::metadata(&args.out).map_or(0, |m| m.len());
+    export::ply(out, &cloud)?;
+    let bytes = std::fs::metadata(out).map_or(0, |m| m.len());
     let size = format::bytes(bytes);
-    output::print(&format!("{}: {} Gaussians, SH degree {}, {size}", args.out.display(), cloud.len(), cloud.sh_degree))
+    output::print(&format!("{}: {} Gaussians, SH degree {}, {size}", out.display(), cloud.len(), cloud.sh_degree))
+}
+
+fn write_page(
+    html: &Path,
+    scene: &Scene,
+    crop: Option<&CropBox>,
+    args: &ExportArgs,
+    quiet: bool,
+) -> Result<(), CliError> {
+    let given = args.path.iter().map(|file| page::named_path(file)).collect::<Result<Vec<_>, _>>()?;
+    let mut request = PageRequest::of_scene(scene, html)?;
+    // A path that is given and lies in the scene's folder is one.
+    request.paths.retain(|(_, path)| given.iter().all(|(_, other)| other != path));
+    request.paths.splice(0..0, given);
+    if let Some(title) = &args.title {
+        request.title.clone_from(title);
+    }
+    if let Some(crop) = crop {
+        request.crop(crop);
+    }
+    let (gaussians, identities) = (request.cloud.len(), request.map.as_ref().map_or(0, |map| map.identities.len()));
+    let bytes = page::run(&request, &mut Console::new(quiet)).map_err(|e| CliError::of_work(e, "nothing is written"))?;
+    let (paths, size) = (format::things(request.paths.len(), "camera path"), format::bytes(bytes));
+    output::print(&format!(
+        "{}: {gaussians} Gaussians, {identities} objects and parts, {paths}, {size}",
+        html.display()
+    ))
 }
 
 #[cfg(test)]

@@ -184,7 +184,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Synth(args) => synth::run(args, quiet),
         Command::Demo(args) if args.headless || args.make.is_some() => demo::run(args, quiet),
         Command::Demo(_) => window(vec![Start::Demo], overrides, open_window),
-        Command::Export(args) => export::run(args),
+        Command::Export(args) => export::run(args, quiet),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Report(args) => report::run(args, quiet),
         Command::Reproduce(args) => reproduce::run(args, quiet),

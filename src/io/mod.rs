@@ -23,6 +23,7 @@ pub mod llff;
 pub(crate) mod memory;
 pub mod npy;
 mod open;
+pub(crate) mod page;
 pub mod photo;
 mod photo_list;
 mod ply;

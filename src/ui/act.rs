@@ -119,6 +119,7 @@ impl App {
             | Action::ExportTarget(_)
             | Action::ExportCrop
             | Action::ExportAll
+            | Action::ExportPage
             | Action::Screenshot
             | Action::ChooseMasks
             | Action::AddModel(_)

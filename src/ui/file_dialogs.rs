@@ -223,6 +223,7 @@ fn dialog(action: &Action, name: &str) -> Option<(String, Kind)> {
         Action::ChooseTrueMask => ("Choose the true mask of this view", Kind::File("Masks", &["png"])),
         Action::ChooseMasks => ("Choose the folder with the masks", Kind::Folder),
         Action::ExportPly | Action::ExportTarget(_) | Action::ExportCrop => ("Export Gaussians", save(".ply")),
+        Action::ExportPage => ("Export page", save(".html")),
         Action::OpenPath => ("Open a camera path", Kind::File("Camera paths", &["json"])),
         Action::ChooseBeside => ("Open the folder of another scene", Kind::Folder),
         Action::ChooseReport | Action::ChooseSecondReport => ("Open a report", Kind::File("Reports", &["json"])),

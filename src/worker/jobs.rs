@@ -13,6 +13,7 @@ use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
     Folders, JobError, OpenedScene, Scene, demo, edit, export, export_all, find_objects, go_to, inspect, models, open,
+    page,
     phrases, plan, poses, recent, remove, report, scale, select, thumbnails, train, video,
 };
 use crate::measure::{End, FILE, Report};
@@ -163,6 +164,10 @@ impl Jobs for PipelineJobs {
             }
             Command::Video(request) => Outcome::Written(video::run(*request, observer)?.summary.path),
             Command::ExportAll(request) => Outcome::Written(export_all::run(&request, observer)?.folder),
+            Command::ExportPage(request) => {
+                page::run(&request, observer)?;
+                Outcome::Written(request.out)
+            }
             Command::Phrases(request) => Outcome::Phrases(phrases::run(&request, observer)?, request.export),
             Command::Measure(request) => {
                 let done = report::run(&request, observer)?;

@@ -53,6 +53,8 @@ pub enum JobKind {
     Phrases,
     /// Writes all objects and parts.
     ExportAll,
+    /// Writes a page to show.
+    ExportPage,
     /// Looks into a pixel.
     Inspect,
 }
@@ -67,7 +69,14 @@ impl JobKind {
     pub(crate) fn can_pause(self) -> bool {
         matches!(
             self,
-            Self::Train | Self::Objects | Self::Remove | Self::Model | Self::Video | Self::Phrases | Self::ExportAll
+            Self::Train
+                | Self::Objects
+                | Self::Remove
+                | Self::Model
+                | Self::Video
+                | Self::Phrases
+                | Self::ExportAll
+                | Self::ExportPage
         )
     }
 
@@ -82,7 +91,8 @@ impl JobKind {
             | Self::Video
             | Self::Measure
             | Self::Phrases
-            | Self::ExportAll => WorkerThread::Long,
+            | Self::ExportAll
+            | Self::ExportPage => WorkerThread::Long,
             Self::Beside
             | Self::Edit
             | Self::Select
