@@ -38,6 +38,10 @@ function drawing(canvas, gaussians, identity, count, background, antialias, told
     const app = new pc.AppBase(canvas);
     app.init(options);
     app.autoRender = false;
+    // The engine loses Gaussians whose outline in the picture is exactly upright: their long axis has no length there.
+    const chunks = pc.ShaderChunks.get(device, pc.SHADERLANGUAGE_GLSL);
+    const axes = 'vec2(offDiagonal, lambda1 - diagonal1)';
+    chunks.set('gsplatCornerVS', chunks.get('gsplatCornerVS').replace(axes, `(${axes} + vec2(1e-8, 0.0))`));
     app.scene.gsplat.dataFormat = pc.GSPLATDATA_LARGE;
     // As the program draws: no Gaussian is too small, and colors follow the camera at once.
     app.scene.gsplat.minPixelSize = 0;

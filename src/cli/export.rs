@@ -116,13 +116,10 @@ fn write_page(
     if let Some(crop) = crop {
         request.crop(crop);
     }
-    let (gaussians, identities) = (request.cloud.len(), request.map.as_ref().map_or(0, |map| map.identities.len()));
-    let bytes = page::run(&request, &mut Console::new(quiet)).map_err(|e| CliError::of_work(e, "nothing is written"))?;
+    let bytes =
+        page::run(&request, &mut Console::new(quiet)).map_err(|e| CliError::of_work(e, "nothing is written"))?;
     let (paths, size) = (format::things(request.paths.len(), "camera path"), format::bytes(bytes));
-    output::print(&format!(
-        "{}: {gaussians} Gaussians, {identities} objects and parts, {paths}, {size}",
-        html.display()
-    ))
+    output::print(&format!("{}: {}, {paths}, {size}", html.display(), request.facts()))
 }
 
 #[cfg(test)]

@@ -67,6 +67,19 @@ impl PageRequest {
         })
     }
 
+    /// A line about what is on the page.
+    pub(crate) fn facts(&self) -> String {
+        let mut facts = things(self.cloud.len(), "Gaussian");
+        if let Some(all) = self.map.as_ref().map(|map| &map.identities).filter(|all| !all.is_empty()) {
+            let objects = all.iter().filter(|(_, i)| i.parent == NOBODY).count();
+            facts += &format!(" · {}", things(objects, "object"));
+            if objects < all.len() {
+                facts += &format!(" · {}", things(all.len() - objects, "part"));
+            }
+        }
+        facts
+    }
+
     /// Keeps only the Gaussians of a crop box.
     pub(crate) fn crop(&mut self, crop: &CropBox) {
         let kept: Vec<usize> = (0..self.cloud.len()).filter(|&i| crop.keeps(self.cloud.world_position(i))).collect();
@@ -123,7 +136,7 @@ fn page(request: &PageRequest, observer: &mut dyn Observer) -> Result<Page, JobE
     let identity_of = map.as_ref().map_or_else(|| vec![NOBODY; cloud.len()], |map| map.identity_of.clone());
     Ok(Page {
         title: text::name(title),
-        facts: facts(cloud.len(), map.as_deref()),
+        facts: request.facts(),
         date: format::date(SystemTime::now()),
         gaussians: packed::encode(cloud, &order, radius, settings.antialias),
         identities: packed::identities(&identity_of, &order),
@@ -144,18 +157,6 @@ fn page(request: &PageRequest, observer: &mut dyn Observer) -> Result<Page, JobE
             paths: paths.iter().filter_map(|(name, path)| frames(name, path, cloud.origin)).collect(),
         },
     })
-}
-
-fn facts(gaussians: usize, map: Option<&SemanticMap>) -> String {
-    let mut facts = things(gaussians, "Gaussian");
-    if let Some(all) = map.map(|map| &map.identities).filter(|all| !all.is_empty()) {
-        let objects = all.iter().filter(|(_, i)| i.parent == NOBODY).count();
-        facts += &format!(" · {}", things(objects, "object"));
-        if objects < all.len() {
-            facts += &format!(" · {}", things(all.len() - objects, "part"));
-        }
-    }
-    facts
 }
 
 /// A path's poses at even times, if it has any.

@@ -29,11 +29,7 @@ impl App {
     pub(super) fn choose(&mut self, action: Action) {
         let writes = matches!(
             action,
-            Action::ExportPly
-                | Action::ExportTarget(_)
-                | Action::ExportCrop
-                | Action::ExportPage
-                | Action::Screenshot
+            Action::ExportPly | Action::ExportTarget(_) | Action::ExportCrop | Action::ExportPage | Action::Screenshot
         );
         if writes && self.viewport.picture().is_none() {
             self.state.toast(Tone::Warning, "Nothing to save yet: open a scene first.");

@@ -13,8 +13,7 @@ use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
     Folders, JobError, OpenedScene, Scene, demo, edit, export, export_all, find_objects, go_to, inspect, models, open,
-    page,
-    phrases, plan, poses, recent, remove, report, scale, select, thumbnails, train, video,
+    page, phrases, plan, poses, recent, remove, report, scale, select, thumbnails, train, video,
 };
 use crate::measure::{End, FILE, Report};
 use crate::pipeline::observer::{Observer, Severity};

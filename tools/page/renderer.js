@@ -12,6 +12,8 @@ export {
     GSplatResource,
     PIXELFORMAT_R32U,
     PIXELFORMAT_RGBA8,
+    SHADERLANGUAGE_GLSL,
+    ShaderChunks,
     TONEMAP_NONE,
     Texture,
     WebglGraphicsDevice,

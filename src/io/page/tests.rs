@@ -70,7 +70,8 @@ fn foreign_text_stays_text() {
     let hostile = "</script><img src=x onerror=alert(1)>{{renderer}}<!--";
     let html = page(hostile, hostile).html().expect("made");
     let plain = page("a", "b").html().expect("made");
-    let tags = |html: &str| (html.matches("<script").count(), html.matches("<img").count(), html.matches("<!--").count());
+    let tags =
+        |html: &str| (html.matches("<script").count(), html.matches("<img").count(), html.matches("<!--").count());
     assert_eq!(tags(&html), tags(&plain), "no tag more");
     let scene: serde_json::Value = serde_json::from_str(element(&html, "scene")).expect("JSON");
     assert_eq!(scene["identities"][0]["name"], hostile, "and nothing is lost");

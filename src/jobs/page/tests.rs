@@ -20,11 +20,10 @@ fn request(out: &Path) -> PageRequest {
         positions.push([x + (i % 5) as f32 * 0.02, (i % 4) as f32 * 0.03, (i % 3) as f32 * 0.05]);
         of.push(id);
     }
-    let mut cloud = GaussianCloud { origin: DVec3::new(1e6, 0.0, 0.0), ..GaussianCloud::isotropic(positions, -2.5, 3.0) };
+    let mut cloud =
+        GaussianCloud { origin: DVec3::new(1e6, 0.0, 0.0), ..GaussianCloud::isotropic(positions, -2.5, 3.0) };
     cloud.sh = (0..60).map(|i| [i as f32 / 60.0, 0.5, -0.5]).collect();
-    let at = |eye: DVec3| {
-        Camera::look_at(cloud.origin + eye, cloud.origin, -DVec3::Y, 0.8, 64, 48).expect("valid")
-    };
+    let at = |eye: DVec3| Camera::look_at(cloud.origin + eye, cloud.origin, -DVec3::Y, 0.8, 64, 48).expect("valid");
     let cameras = vec![at(DVec3::new(0.0, -0.5, -6.0)), at(DVec3::new(0.2, -0.5, 6.0))];
     let map = SemanticMap::from_identities(all, of, vec![1.0; 60], Vec::new());
     let key = |x: f64| PathKey::of_pose(cloud.origin + DVec3::new(x, 0.0, -5.0), DMat3::IDENTITY, 0.9);
