@@ -6,6 +6,10 @@ const PLAIN = 85;
 const DIMMED = 170;
 const TINTED = 255;
 
+// Shares of the picture's sides that are drawn, and how long a picture may take before there are fewer, or more.
+const DETAIL = [1, 0.7, 0.5, 0.35, 0.25];
+const [SLOW_MS, FAST_MS] = [70, 28];
+
 // Runs for each Gaussian when it is copied into the engine's buffer, whenever a tint changes.
 const TINTING = `
 uniform sampler2D tints;
@@ -38,10 +42,13 @@ function drawing(canvas, gaussians, identity, count, background, antialias, told
     const app = new pc.AppBase(canvas);
     app.init(options);
     app.autoRender = false;
-    // The engine loses Gaussians whose outline in the picture is exactly upright: their long axis has no length there.
     const chunks = pc.ShaderChunks.get(device, pc.SHADERLANGUAGE_GLSL);
+    const change = (name, from, to) => chunks.set(name, chunks.get(name).replace(from, to));
+    // The engine loses Gaussians whose outline in the picture is exactly upright: their long axis has no length there.
     const axes = 'vec2(offDiagonal, lambda1 - diagonal1)';
-    chunks.set('gsplatCornerVS', chunks.get('gsplatCornerVS').replace(axes, `(${axes} + vec2(1e-8, 0.0))`));
+    change('gsplatCornerVS', axes, `(${axes} + vec2(1e-8, 0.0))`);
+    // It lets them fade to nothing at their cut; the program draws them as they were trained.
+    change('gsplatPS', '(exp(x * -4.0) - EXP4) * INV_EXP4', 'exp(x * -4.0)');
     app.scene.gsplat.dataFormat = pc.GSPLATDATA_LARGE;
     // As the program draws: no Gaussian is too small, and colors follow the camera at once.
     app.scene.gsplat.minPixelSize = 0;
@@ -87,9 +94,25 @@ function drawing(canvas, gaussians, identity, count, background, antialias, told
         const views = app.renderer.gsplatDirector?.camerasMap.get(camera.camera.camera);
         return [...(views?.layersMap.values() ?? [])].map((view) => view.gsplatManager).find(Boolean);
     };
+    // While the camera moves, pictures that take long have fewer pixels.
+    let [level, moved, last, full] = [0, false, 0, [1, 1]];
+    const fit = (to) => {
+        level = Math.max(0, Math.min(DETAIL.length - 1, to));
+        device.setResolution(...full.map((side) => Math.max(1, Math.round(side * DETAIL[level]))));
+    };
     app.on('update', () => {
         const manager = sorter();
         const sorting = !manager || manager.cpuSorter?.jobsInFlight > 0 || manager.hasPendingSort;
+        const now = performance.now();
+        if (moved) {
+            const took = now - last;
+            if (took > SLOW_MS && took < 2000) fit(level + 1);
+            else if (took < FAST_MS && level > 0) fit(level - 1);
+        } else if (due === 0 && !sorting && level > 0) {
+            fit(0);
+            due = 2;
+        }
+        [moved, last] = [false, now];
         if (due === 0 && !sorting && sorted !== shown) {
             // The order of the last pose: what was asked for while another was sorted is left out by the engine.
             sorted = shown;
@@ -125,10 +148,12 @@ function drawing(canvas, gaussians, identity, count, background, antialias, told
             camera.setRotation(...multiply(pose.rotation, [1, 0, 0, 0]));
             camera.camera.fov = pose.fov * 180 / Math.PI;
             shown = JSON.stringify(pose);
+            moved = true;
             drawn.draw();
         },
         resize(width, height) {
-            device.setResolution(width, height);
+            full = [width, height];
+            fit(level);
             drawn.draw();
         },
         start() { app.start(); },
