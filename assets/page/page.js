@@ -122,7 +122,7 @@ async function start() {
         flyTo(id);
     }, hide);
     const words = document.getElementById('words');
-    words.disabled = scene.identities.length === 0;
+    document.getElementById('search').hidden = scene.identities.length === 0;
     words.oninput = () => list.search(words.value);
     words.onkeydown = (e) => {
         const first = e.key === 'Enter' && document.querySelector('#list li:not([hidden]) .name');
@@ -192,7 +192,11 @@ async function start() {
 
     // Keys
     const help = document.getElementById('help');
-    document.getElementById('keys').onclick = () => help.showModal();
+    const explain = () => {
+        help.showModal();
+        help.scrollTop = 0;
+    };
+    document.getElementById('keys').onclick = explain;
     document.getElementById('home').onclick = reset;
     document.getElementById('chosen-clear').onclick = () => select(0);
     /** The camera as a file of the program has it. */
@@ -207,7 +211,7 @@ async function start() {
     const actions = {
         ' ': () => player.toggle(),
         '/': () => words.focus(),
-        '?': () => help.showModal(),
+        '?': explain,
         Escape: () => (document.body.classList.contains('alone') ? document.body.classList.remove('alone') : select(0)),
         c: () => navigator.clipboard?.writeText(JSON.stringify(cameraFile())),
         f: () => (state.selected ? flyTo(state.selected) : reset()),
