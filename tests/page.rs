@@ -177,6 +177,25 @@ fn the_page_shows_selects_and_plays_what_the_program_draws() {
     assert!(right > IOU.0 && wrong < IOU.1, "IoU {right}, another object {wrong}");
     browser.key("p");
 
+    // The search leaves what has a word that begins so, under what it is a part of.
+    let found = "const words = document.getElementById('words'); words.value = 'ear'; words.oninput(); \
+        const rows = [...document.querySelectorAll('#list .name')].filter((row) => row.offsetParent); \
+        words.value = ''; words.oninput(); return rows.map((row) => row.title);";
+    let ears = ["teddy bear", "left ear · teddy bear", "right ear · teddy bear"];
+    assert_eq!(browser.run(found), json!(ears));
+
+    // What is hidden is not drawn, and is shown again.
+    browser.key("h");
+    browser.key("p");
+    let without = iou(&shown.alone(), &shown.mask("teddy bear"));
+    println!("hidden: IoU {without:.3}");
+    assert!(without < IOU.1, "IoU {without}");
+    browser.key("h");
+    let again = psnr(&shown.alone(), &picture);
+    println!("shown again: {again:.2} dB");
+    assert!(again > PSNR_DB.0, "{again} dB");
+    browser.key("p");
+
     // The camera path ends at its last key.
     browser.key(ESCAPE);
     browser.click("#play");

@@ -2,8 +2,9 @@
 
 /** Bytes of the element `id`: base64 of gzip. */
 async function unpack(id) {
-    const text = document.getElementById(id).textContent;
-    const packed = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+    const text = atob(document.getElementById(id).textContent);
+    const packed = new Uint8Array(text.length);
+    for (let i = 0; i < text.length; i++) packed[i] = text.charCodeAt(i);
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream('gzip'));
     return new Uint8Array(await new Response(stream).arrayBuffer());
 }

@@ -42,13 +42,13 @@ async function start() {
 
     // Views
     const size = () => [canvas.clientWidth, canvas.clientHeight];
-    function home() {
+    /** The field of view that shows as much of the width in a narrower picture. */
+    function fitted(fov) {
         const [width, height] = size();
-        // A narrower picture shows all of the width.
         const wider = Math.max(1, scene.view.aspect / (width / height || 1));
-        const fov = Math.min(2.6, 2 * Math.atan(Math.tan(scene.view.fov / 2) * wider));
-        return { center: scene.view.center, rotation: scene.view.rotation, fov };
+        return Math.min(2.6, 2 * Math.atan(Math.tan(fov / 2) * wider));
     }
+    const home = () => ({ center: scene.view.center, rotation: scene.view.rotation, fov: fitted(scene.view.fov) });
     function show(pose) {
         camera.pose = pose;
         drawn?.look(pose);
@@ -184,10 +184,10 @@ async function start() {
         select(inner || object);
     });
 
-    const paths = [...scene.paths, aroundPath(home(), scene.distance, scene.up, 20)];
+    const paths = [...scene.paths, aroundPath(scene.view, scene.distance, scene.up, 20)];
     player = playing(paths, (pose) => {
         camera.distance = Math.max(camera.nearest, dot(add(scene.focus, pose.center, -1), turned([0, 0, 1], pose.rotation)));
-        jump(pose);
+        jump({ ...pose, fov: fitted(pose.fov) });
     });
 
     // Keys

@@ -1,8 +1,9 @@
 // What lies under a pixel: the Gaussians along its ray, from the front.
 
 /**
- * The identity that covers most of the pixel, and how far it is: `{ id, depth }`, or null where mostly nothing is.
- * `x` and `y` in pixels of a picture `height` pixels high, from its middle; `hidden(i)` says what is not drawn.
+ * What covers a pixel: `share` of its light by identity, wholes and pieces alike, `depth` and `point` of the surface; null
+ * where mostly nothing is. `x` and `y` in pixels of a picture `height` pixels high, from its middle; `hidden(i)` says what
+ * is not drawn, `whole(id)` lists an identity and what it is a piece of.
  */
 function pick(gaussians, identity, pose, x, y, height, hidden, whole) {
     const focal = 0.5 * height / Math.tan(0.5 * pose.fov);
