@@ -66,6 +66,14 @@ fn synth_train_eval_render_export() {
     fmlgs(&["export", &at("scene"), "--out", &at("out.ply")]).ok();
     let info = fmlgs(&["info", &at("out.ply"), "--json"]).ok().json();
     assert_eq!(info["gaussians"], long["gaussians"]);
+    let told = fmlgs(&["export", &at("scene"), "--html", &at("page.html"), "--out", &at("out.ply")]).ok().stdout;
+    assert!(
+        told.contains("out.ply: ") && told.contains("page.html: ") && Path::new(&at("page.html")).exists(),
+        "{told}"
+    );
+    fmlgs(&["export", &at("scene")]).fails_with(2);
+    let refused = fmlgs(&["export", &at("out.ply"), "--html", &at("out.ply")]).fails_with(2).stderr;
+    assert!(refused.contains("must end in .html or .htm"), "{refused}");
     let info = fmlgs(&["info", &at("scene"), "--json"]).ok().json();
     assert_eq!((&info["kind"], &info["gaussians"]), (&"trained".into(), &long["gaussians"]));
 

@@ -51,6 +51,9 @@ if [ "$mode" = test ]; then
     need fonts-droid-fallback has_chinese_font
     # A virtual display for the test that opens a real window.
     need xvfb has_command Xvfb
+    # A browser, and what drives it, for the test of exported pages.
+    need chromium has_command chromium
+    need chromium-driver has_command chromedriver
 fi
 
 # The library of ONNX Runtime, which the built-in engine is held against: out of its wheel, where there is

@@ -27,7 +27,7 @@ pub(crate) struct CleanArgs {
     scene: PathBuf,
     /// What is left out: Gaussians that any of these rules means [default: floaters faint]
     rules: Vec<CleanRule>,
-    /// Folder for the new scene, or a .ply
+    /// Folder for the new scene, or a file of splats (.ply, .sog, .spz, ...)
     #[arg(long)]
     out: Option<PathBuf>,
     /// Where the scene's photos are, if not where it says
@@ -58,7 +58,8 @@ pub(crate) fn run(args: CleanArgs, quiet: bool) -> Result<(), CliError> {
     }
     let gone = clean::choose(&rules, &measures)?;
     let chosen = count(&gone);
-    let left = args.out.as_deref().map(|out| clean::store(&scene, gone, out)).transpose()?;
+    let store = |out| clean::store(&scene, gone, out, &mut Console::new(quiet));
+    let left = args.out.as_deref().map(store).transpose()?;
     if args.json {
         let rules: Vec<_> = counts.iter().map(|(r, n)| json!({ "rule": r.to_string(), "gaussians": n })).collect();
         return output::print_json(&json!({

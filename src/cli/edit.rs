@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use glam::{DQuat, DVec3};
 
+use super::progress::Console;
 use super::{CliError, output};
 use crate::jobs::rearrange::{self, Arrangement, Placement, SplatEdit};
 use crate::jobs::{JobError, derived, open, query};
@@ -24,7 +25,7 @@ pub(crate) struct EditArgs {
     scene: PathBuf,
     /// What to edit
     text: String,
-    /// Folder for the new scene, or a .ply
+    /// Folder for the new scene, or a file of splats (.ply, .sog, .spz, ...)
     #[arg(long)]
     out: PathBuf,
     /// Shift it, scene units
@@ -71,7 +72,7 @@ fn color(text: &str) -> Result<[f32; 3], String> {
     Ok([16, 8, 0].map(|shift| (value >> shift & 0xff) as f32 / 255.0))
 }
 
-pub(crate) fn run(args: EditArgs) -> Result<(), CliError> {
+pub(crate) fn run(args: EditArgs, quiet: bool) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
     let map = scene.semantics()?;
     derived::check_place(&scene, &args.out)?;
@@ -85,7 +86,7 @@ pub(crate) fn run(args: EditArgs) -> Result<(), CliError> {
     };
     let edit = SplatEdit::Arrange(Arrangement { id, duplicate: args.duplicate, to, color: args.color });
     let (cloud, new) = rearrange::apply(&scene.cloud, Some(&map), &edit)?;
-    derived::write(&scene, "edited", &cloud, new.as_ref(), &args.out)?;
+    derived::write(&scene, "edited", &cloud, new.as_ref(), &args.out, &mut Console::new(quiet))?;
     let what = if args.duplicate { "duplicated" } else { "edited" };
     let (out, name, size) = (args.out.display(), map.identities.full_name(id), format::things(cloud.len(), "Gaussian"));
     output::print(&format!("{out}: {name} {what}, {size}"))

@@ -1,4 +1,4 @@
-//! `fmlgs export`: Gaussians as a file that other splat viewers open.
+//! `fmlgs export`: Gaussians as a file that other splat viewers open, and a scene as a page to show.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -8,19 +8,23 @@ use glam::DVec3;
 use super::progress::Console;
 use super::{CliError, output};
 use crate::jobs::export_splat::{self, ExportedSplat, LossViews};
+use crate::jobs::page::{self, PageRequest};
 use crate::jobs::{Scene, export, open};
+use crate::math::format;
 use crate::scene::{Bounds, CropBox, GaussianCloud};
 
-/// Write the Gaussians of a scene for other splat viewers
+/// Write the Gaussians of a scene for other splat viewers, or the scene as a page to show
 ///
 /// The ending of --out chooses the format: .ply (3D Gaussian Splatting's own, without loss), .compressed.ply, .spz,
 /// .sog, meta.json (a SOG as files in a folder), .splat, .glb or .gltf (KHR_gaussian_splatting). Reads whatever 'fmlgs
 /// info' recognizes as Gaussians, .ksplat too. What was written is read back, and both are drawn from a few cameras:
-/// PSNR between the pictures says what was lost.
+/// PSNR between the pictures says what was lost. The page is one .html that opens in any browser without a server, with
+/// the objects' names to click and camera paths: those given and those that lie in the scene's folder.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs export scene/ --out scene.ply\n  \
     fmlgs export scene/ --out scene.sog                        a tenth of the size\n  \
+    fmlgs export scene/ --html page.html --title \"The workshop\"\n  \
     fmlgs export big.compressed.ply --out big.glb\n  \
     fmlgs export scene.ply --out flat.ply --sh-degree 0        smaller, same color from everywhere\n  \
     fmlgs export scene/ --out mug.ply --crop -1,-1,0,1,1,2     what is in a box, scene units")]
@@ -28,10 +32,19 @@ pub(crate) struct ExportArgs {
     /// Trained scene or splat file
     scene: PathBuf,
     /// File to write, in the format of its ending
-    #[arg(long)]
-    out: PathBuf,
+    #[arg(long, required_unless_present = "html")]
+    out: Option<PathBuf>,
     #[command(flatten)]
     measure: MeasureArgs,
+    /// The page (.html) to write
+    #[arg(long)]
+    html: Option<PathBuf>,
+    /// The page's title [default: the scene's name]
+    #[arg(long, requires = "html")]
+    title: Option<String>,
+    /// Camera path for the page to play; may be given several times
+    #[arg(long, value_name = "FILE", requires = "html")]
+    path: Vec<PathBuf>,
     /// Leave out spherical harmonics above this degree
     #[arg(long, value_parser = clap::value_parser!(u8).range(0..=3))]
     sh_degree: Option<u8>,
@@ -41,8 +54,8 @@ pub(crate) struct ExportArgs {
     /// Write what is outside of the box instead
     #[arg(long, requires = "crop")]
     outside: bool,
-    /// Print one JSON document
-    #[arg(long)]
+    /// Print one JSON document of what --out wrote
+    #[arg(long, requires = "out", conflicts_with = "html")]
     json: bool,
 }
 
@@ -84,21 +97,57 @@ fn parse_box(text: &str) -> Result<Bounds, String> {
 }
 
 pub(crate) fn run(args: ExportArgs, quiet: bool) -> Result<(), CliError> {
-    let scene = open::scene(&args.scene)?;
-    export_splat::check(&args.out, &scene.reads())?;
-    let cloud = match args.crop {
-        Some(bounds) => export::cropped(&scene.cloud, &CropBox { bounds, outside: args.outside })?,
-        None => (*scene.cloud).clone(),
-    };
-    let cloud = match args.sh_degree {
-        Some(degree) => cloud.up_to_degree(degree),
-        None => cloud,
-    };
-    let done = args.measure.write(cloud, &args.out, &scene, quiet)?;
-    match args.json {
-        true => output::print_json(&done),
-        false => output::print(&done.lines().join("\n")),
+    let mut scene = open::scene(&args.scene)?;
+    let reads: Vec<&Path> = scene.reads().into_iter().chain(args.path.iter().map(PathBuf::as_path)).collect();
+    if let Some(out) = &args.out {
+        export_splat::check(out, &reads)?;
     }
+    if let Some(html) = &args.html {
+        export::check(html, &page::ENDINGS, &reads)?;
+    }
+    if let Some(degree) = args.sh_degree {
+        scene.cloud = Arc::new(Arc::unwrap_or_clone(scene.cloud).up_to_degree(degree));
+    }
+    let crop = args.crop.map(|bounds| CropBox { bounds, outside: args.outside });
+    if let Some(out) = &args.out {
+        let cloud = match &crop {
+            Some(crop) => export::cropped(&scene.cloud, crop)?,
+            None => (*scene.cloud).clone(),
+        };
+        let done = args.measure.write(cloud, out, &scene, quiet)?;
+        match args.json {
+            true => output::print_json(&done)?,
+            false => output::print(&done.lines().join("\n"))?,
+        }
+    }
+    match &args.html {
+        Some(html) => write_page(html, &scene, crop.as_ref(), &args, quiet),
+        None => Ok(()),
+    }
+}
+
+fn write_page(
+    html: &Path,
+    scene: &Scene,
+    crop: Option<&CropBox>,
+    args: &ExportArgs,
+    quiet: bool,
+) -> Result<(), CliError> {
+    let given = args.path.iter().map(|file| page::named_path(file)).collect::<Result<Vec<_>, _>>()?;
+    let mut request = PageRequest::of_scene(scene, html)?;
+    // A path that is given and lies in the scene's folder is one.
+    request.paths.retain(|(_, path)| given.iter().all(|(_, other)| other != path));
+    request.paths.splice(0..0, given);
+    if let Some(title) = &args.title {
+        request.title.clone_from(title);
+    }
+    if let Some(crop) = crop {
+        request.crop(crop);
+    }
+    let bytes =
+        page::run(&request, &mut Console::new(quiet)).map_err(|e| CliError::of_work(e, "nothing is written"))?;
+    let (paths, size) = (format::things(request.paths.len(), "camera path"), format::bytes(bytes));
+    output::print(&format!("{}: {}, {paths}, {size}", html.display(), request.facts()))
 }
 
 #[cfg(test)]

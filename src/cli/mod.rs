@@ -184,7 +184,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Segment(args) => segment::run(args, quiet),
         Command::Remove(args) => remove::run(args, quiet),
         Command::Clean(args) => clean::run(args, quiet),
-        Command::Edit(args) => edit::run(args),
+        Command::Edit(args) => edit::run(args, quiet),
         Command::Path(args) => path::run(args),
         Command::Agent(args) => agent::run(args),
         Command::Synth(args) => synth::run(args, quiet),

@@ -25,6 +25,7 @@ pub(crate) mod memory;
 mod morton;
 pub mod npy;
 mod open;
+pub(crate) mod page;
 pub mod photo;
 mod photo_list;
 mod ply;

@@ -73,8 +73,13 @@ pub(crate) fn choose(rules: &[CleanRule], of: &CloudMeasures) -> Result<Vec<bool
 }
 
 /// Writes `scene` without what is `gone` to `out`, as [`derived::write`] does. How many Gaussians are left.
-pub(crate) fn store(scene: &Scene, gone: Vec<bool>, out: &Path) -> Result<usize, JobError> {
+pub(crate) fn store(
+    scene: &Scene,
+    gone: Vec<bool>,
+    out: &Path,
+    observer: &mut dyn Observer,
+) -> Result<usize, JobError> {
     let (cloud, map) = rearrange::applied(scene, &SplatEdit::Delete(gone))?;
-    derived::write(scene, "cleaned", &cloud, map.as_ref(), out)?;
+    derived::write(scene, "cleaned", &cloud, map.as_ref(), out, observer)?;
     Ok(cloud.len())
 }

@@ -2,14 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-use super::{JobError, Scene, export};
+use super::{JobError, Scene, export, export_splat};
+use crate::io::splat_format::SplatFormat;
 use crate::io::trained::{self, SceneInfo};
 use crate::io::{IoError, SceneFolder, files};
+use crate::pipeline::observer::Observer;
 use crate::scene::{GaussianCloud, SemanticMap};
 
 /// Refuses a place for the result that is taken or not fit for it: a file of splats where it is called so, else a folder.
 pub(crate) fn check_place(scene: &Scene, out: &Path) -> Result<(), JobError> {
-    if is_file(out) { export::check(out, &[FILE], &scene.reads()) } else { check(out) }
+    match SplatFormat::of(out) {
+        Some(_) => export_splat::check(out, &scene.reads()).map(|_| ()),
+        None => check(out),
+    }
 }
 
 /// Writes Gaussians that were made of `from`, and their objects and parts, to `out`: a file of splats where it is called
@@ -20,19 +25,14 @@ pub(crate) fn write(
     cloud: &GaussianCloud,
     map: Option<&SemanticMap>,
     out: &Path,
+    observer: &mut dyn Observer,
 ) -> Result<(), JobError> {
-    if is_file(out) {
-        return Ok(export::ply(out, cloud)?);
+    if let Some(format) = SplatFormat::of(out) {
+        export::make_parent(out)?;
+        return export_splat::write(cloud, format, out, observer);
     }
     store(from, format!("{} {how}", from.name), cloud, map, out)?;
     Ok(())
-}
-
-/// How a file of splats ends.
-const FILE: &str = ".ply";
-
-fn is_file(out: &Path) -> bool {
-    out.to_string_lossy().to_lowercase().ends_with(FILE)
 }
 
 /// Refuses a folder for the result that holds anything.

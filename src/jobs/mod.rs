@@ -24,6 +24,7 @@ pub(crate) mod go_to;
 pub(crate) mod inspect;
 pub(crate) mod models;
 pub mod open;
+pub(crate) mod page;
 pub mod phrases;
 pub(crate) mod plan;
 pub(crate) mod poses;

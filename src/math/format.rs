@@ -1,5 +1,7 @@
 //! Numbers as the user reads them: one form per quantity, in the window, on the command line and in reports.
 
+use std::time::SystemTime;
+
 /// What stands where there is no number.
 pub(crate) const NONE: &str = "–";
 
@@ -149,6 +151,18 @@ pub(crate) fn share(v: f64) -> String {
     }
 }
 
+/// The day of a moment in Greenwich: "2026-02-28". Howard Hinnant's days-to-civil: years that begin in March.
+pub(crate) fn date(time: SystemTime) -> String {
+    let days = time.duration_since(SystemTime::UNIX_EPOCH).map_or(0, |d| d.as_secs() / 86_400) + 719_468;
+    let (era, day) = (days / 146_097, days % 146_097);
+    let year = (day - day / 1_460 + day / 36_524 - day / 146_096) / 365;
+    let of_year = day - (365 * year + year / 4 - year / 100);
+    let month = (5 * of_year + 2) / 153;
+    let day = of_year - (153 * month + 2) / 5 + 1;
+    let (year, month) = if month < 10 { (year, month + 3) } else { (year + 1, month - 9) };
+    format!("{:04}-{month:02}-{day:02}", 400 * era + year)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -165,6 +179,15 @@ mod tests {
     fn guesses_are_round() {
         let guesses = [3.0, 84.0, 880.0, 5_500.0, 9_000.0, f64::NAN].map(about);
         assert_eq!(guesses, ["10 s", "90 s", "about 15 min", "about 1.5 h", "about 2.5 h", "–"]);
+    }
+
+    #[test]
+    fn days_are_those_of_the_calendar() {
+        let day = |days: u64| date(SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(days * 86_400 + 86_399));
+        let days = [0, 58, 59, 11_016, 11_017, 20_454, 20_819].map(day);
+        let expected =
+            ["1970-01-01", "1970-02-28", "1970-03-01", "2000-02-29", "2000-03-01", "2026-01-01", "2027-01-01"];
+        assert_eq!(days, expected);
     }
 
     #[test]

@@ -122,6 +122,7 @@ impl App {
             | Action::ExportTarget(_)
             | Action::ExportCrop
             | Action::ExportAll
+            | Action::ExportPage
             | Action::Screenshot
             | Action::ChooseMasks
             | Action::AddModel(_)

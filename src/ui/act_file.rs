@@ -8,8 +8,9 @@ use super::app::App;
 use super::camera;
 use super::context::SceneContext;
 use super::state::Tone;
+use crate::jobs::page::PageRequest;
 use crate::jobs::video::VideoRequest;
-use crate::jobs::{export, presets};
+use crate::jobs::{export, page, presets};
 use crate::render::BackendChoice;
 use crate::worker::{Command, Failure};
 
@@ -26,8 +27,10 @@ impl App {
     }
 
     pub(super) fn choose(&mut self, action: Action) {
-        let writes =
-            matches!(action, Action::ExportPly | Action::ExportTarget(_) | Action::ExportCrop | Action::Screenshot);
+        let writes = matches!(
+            action,
+            Action::ExportPly | Action::ExportTarget(_) | Action::ExportCrop | Action::ExportPage | Action::Screenshot
+        );
         if writes && self.viewport.picture().is_none() {
             self.state.toast(Tone::Warning, "Nothing to save yet: open a scene first.");
             return;
@@ -69,6 +72,7 @@ impl App {
                 }
             }
             Action::ExportAll => self.export_all(path),
+            Action::ExportPage => self.export_page(path),
             Action::ExportTarget(id) => {
                 if let (Some(cloud), Some(map)) = (self.viewport.cloud(), &self.state.semantics) {
                     let cloud = Arc::new(cloud.select(&map.members(id)));
@@ -111,6 +115,29 @@ impl App {
             }
             _ => {}
         }
+    }
+
+    /// Writes the scene as a page, with the camera path of the pane and those in its folder.
+    fn export_page(&mut self, out: PathBuf) {
+        let Some(SceneContext { scene, cloud, map, settings, cameras, .. }) = self.context() else { return };
+        if let Err(e) = export::check(&out, &page::ENDINGS, &[&scene.path]) {
+            return self.state.fail("Exporting the page", Failure::of(&e, ""));
+        }
+        let mut paths = page::paths_in(&scene.out);
+        let own = &self.camera.path;
+        if !own.keys.is_empty() && paths.iter().all(|(_, path)| path != own) {
+            paths.insert(0, ("Camera path".to_owned(), own.clone()));
+        }
+        self.submit(Command::ExportPage(Box::new(PageRequest {
+            title: scene.name.clone(),
+            cloud: Arc::clone(&cloud),
+            map: map.as_deref().map(Arc::clone),
+            cameras,
+            home: scene.home.clone(),
+            settings,
+            paths,
+            out,
+        })));
     }
 
     /// Exports a video of what is played.

@@ -149,6 +149,8 @@ actions! {
     ExportPly: "Export Gaussians\u{2026}", "Write the Gaussians as .ply, .spz, .sog, .glb or others that viewers read.", "Ctrl+E";
     ExportAll: "Export all objects and parts\u{2026}",
         "Into a folder: a .ply each, and their masks in the photos as ISAT, COCO and id pictures.";
+    ExportPage: "Export page\u{2026}",
+        "One .html that opens in any browser without a server: to orbit, with names to click and camera paths.";
     Screenshot: "Save the view as .png\u{2026}", "Write the image in the viewport, without the drawn cameras.", "Ctrl+S";
     StartTraining: "Start training",
         "Fit Gaussians to the photos. Resumes from the last checkpoint if the settings are the same.", "Ctrl+T";

@@ -230,6 +230,7 @@ fn dialog(action: &Action, name: &str) -> Option<(String, Kind)> {
             let title = format!("Export Gaussians: the ending chooses among {}", SplatFormat::endings());
             return Some((title, save(".ply")));
         }
+        Action::ExportPage => ("Export page", save(".html")),
         Action::OpenPath => ("Open a camera path", Kind::File("Camera paths", &["json"])),
         Action::ChooseBeside => ("Open the folder of another scene", Kind::Folder),
         Action::ChooseReport | Action::ChooseSecondReport => ("Open a report", Kind::File("Reports", &["json"])),

@@ -14,7 +14,7 @@ use crate::jobs::models::Source;
 use crate::jobs::train::Trained;
 use crate::jobs::{
     Folders, JobError, OpenedScene, Scene, clean, demo, edit, export, export_all, find_objects, go_to, inspect, models,
-    open, phrases, plan, poses, rearrange, recent, remove, report, scale, select, thumbnails, train, video,
+    open, page, phrases, plan, poses, rearrange, recent, remove, report, scale, select, thumbnails, train, video,
 };
 use crate::measure::{End, FILE, Report};
 use crate::pipeline::observer::{Observer, Severity};
@@ -174,6 +174,10 @@ impl Jobs for PipelineJobs {
             }
             Command::Video(request) => Outcome::Written(video::run(*request, observer)?.summary.path),
             Command::ExportAll(request) => Outcome::Written(export_all::run(&request, observer)?.folder),
+            Command::ExportPage(request) => {
+                page::run(&request, observer)?;
+                Outcome::Written(request.out)
+            }
             Command::Phrases(request) => Outcome::Phrases(phrases::run(&request, observer)?, request.export),
             Command::Measure(request) => {
                 let done = report::run(&request, observer)?;

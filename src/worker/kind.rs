@@ -55,6 +55,8 @@ pub enum JobKind {
     Phrases,
     /// Writes all objects and parts.
     ExportAll,
+    /// Writes a page to show.
+    ExportPage,
     /// Looks into a pixel.
     Inspect,
 }
@@ -77,6 +79,7 @@ impl JobKind {
                 | Self::Video
                 | Self::Phrases
                 | Self::ExportAll
+                | Self::ExportPage
         )
     }
 
@@ -92,7 +95,8 @@ impl JobKind {
             | Self::Video
             | Self::Measure
             | Self::Phrases
-            | Self::ExportAll => WorkerThread::Long,
+            | Self::ExportAll
+            | Self::ExportPage => WorkerThread::Long,
             Self::Beside
             | Self::Edit
             | Self::Select

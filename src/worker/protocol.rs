@@ -14,6 +14,7 @@ use crate::jobs::export_all::ExportAllRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached, Explored};
 use crate::jobs::inspect::{InspectRequest, InspectedPixel};
 use crate::jobs::models::ModelList;
+use crate::jobs::page::PageRequest;
 use crate::jobs::phrases::{PhraseRow, PhrasesRequest};
 use crate::jobs::rearrange::{RearrangeRequest, RearrangedScene};
 use crate::jobs::remove::{RemoveRequest, RemovedScene};
@@ -168,6 +169,8 @@ pub enum Command {
     Phrases(Box<PhrasesRequest>),
     /// Write every object and part, and their masks.
     ExportAll(Box<ExportAllRequest>),
+    /// Write the scene as a page to show.
+    ExportPage(Box<PageRequest>),
     /// Draw every object and part alone, small.
     Thumbnails {
         /// The Gaussians.
@@ -211,6 +214,7 @@ impl Command {
             Self::Measure(_) => JobKind::Measure,
             Self::Phrases(_) => JobKind::Phrases,
             Self::ExportAll(_) => JobKind::ExportAll,
+            Self::ExportPage(_) => JobKind::ExportPage,
             Self::SetScale { .. } => JobKind::Scale,
             Self::ReadReport { .. } => JobKind::Report,
         }
@@ -254,6 +258,7 @@ impl Command {
             Self::Measure(_) => "Benchmarking rendering".into(),
             Self::Phrases(_) => "Running the phrase list".into(),
             Self::ExportAll(request) => format!("Writing {}", name(&request.folder)),
+            Self::ExportPage(request) => format!("Writing {}", name(&request.out)),
             Self::ReadReport { path, .. } => format!("Opening the report {}", name(path)),
         }
     }

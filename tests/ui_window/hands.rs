@@ -180,6 +180,21 @@ fn without_a_dialog_of_the_system_files_are_chosen_in_the_window() {
 }
 
 #[test]
+fn a_page_is_exported_where_the_dialog_says() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = Window::new(Some(Action::Open(write_splat(folder.path()))));
+    w.until("a picture", |a| a.viewport.picture().is_some_and(|p| p.full));
+    w.harness.state_mut().layout.folder = Some(folder.path().to_path_buf());
+    w.ask(Action::ExportPage);
+    w.until("a dialog", |a| a.chooses_file());
+    assert!(w.shows("Export page"));
+    w.click("Save");
+    w.until("it is written", |a| a.state.log.iter().any(|l| l.text.starts_with("Saved to ")));
+    let page = std::fs::read_to_string(folder.path().join("dots.html")).expect("there");
+    assert!(page.starts_with("<!DOCTYPE html>") && page.contains("<title>dots</title>"));
+}
+
+#[test]
 fn the_palette_and_the_shortcut_sheet_list_the_actions() {
     let mut w = Window::new(None);
     w.ask(Action::Palette);

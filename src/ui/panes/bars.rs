@@ -43,6 +43,7 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
             item(ui, has_scene, None, Action::ExportPly, actions);
             item(ui, has_scene, None, Action::ExportCrop, actions);
             item(ui, state.semantics.is_some(), None, Action::ExportAll, actions);
+            item(ui, has_scene, None, Action::ExportPage, actions);
             item(ui, has_scene, None, Action::Screenshot, actions);
             ui.separator();
             item(ui, true, None, Action::Quit, actions);

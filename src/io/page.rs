@@ -1,0 +1,174 @@
+//! A scene as one HTML page that opens in any browser without a server and asks for nothing outside of itself.
+//!
+//! `assets/page` has its text, style and scripts; the renderer is the PlayCanvas engine, made into one file by
+//! `tools/page`. What is foreign (names, titles) enters as escaped text or as JSON that no tag can end, and scripts run
+//! by their checksums alone.
+
+pub(crate) mod packed;
+
+use std::io::Write;
+use std::path::Path;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use htmlize::escape_all_quotes;
+use serde::Serialize;
+use sha2::{Digest, Sha256};
+
+use super::{IoError, atomic};
+use crate::scene::IdentityId;
+
+const TEMPLATE: &str = include_str!("../../assets/page/page.html");
+const STYLE: &str = include_str!("../../assets/page/page.css");
+const RENDERER: &[u8] = include_bytes!("../../assets/page/renderer.js");
+const LICENSE: &str = include_str!("../../assets/page/renderer.LICENSE.txt");
+/// In this order they are one script.
+const SCRIPTS: [&str; 8] = [
+    include_str!("../../assets/page/decode.js"),
+    include_str!("../../assets/page/pose.js"),
+    include_str!("../../assets/page/draw.js"),
+    include_str!("../../assets/page/pick.js"),
+    include_str!("../../assets/page/orbit.js"),
+    include_str!("../../assets/page/list.js"),
+    include_str!("../../assets/page/flight.js"),
+    include_str!("../../assets/page/page.js"),
+];
+
+/// An object or part on a page. Places are relative to the page's origin.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct PageIdentity {
+    pub(crate) id: IdentityId,
+    /// What it is a piece of; 0 for objects.
+    pub(crate) parent: IdentityId,
+    /// As it is called among the pieces of its whole, and with its wholes.
+    pub(crate) name: String,
+    pub(crate) full: String,
+    /// Gaussians, its pieces included.
+    pub(crate) count: usize,
+    /// RGB.
+    pub(crate) color: [u8; 3],
+    pub(crate) center: [f64; 3],
+    pub(crate) radius: f64,
+    /// Unit vector of the direction in which it is seen best, where photos tell.
+    pub(crate) from: Option<[f64; 3]>,
+}
+
+/// A camera on a page.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct PageView {
+    pub(crate) center: [f64; 3],
+    /// Rotation as `[x, y, z, w]`: its axes are right, down and forward.
+    pub(crate) rotation: [f64; 4],
+    /// Vertical field of view, radians.
+    pub(crate) fov: f64,
+    /// Width by height.
+    pub(crate) aspect: f64,
+}
+
+/// A camera path on a page.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct PagePath {
+    pub(crate) name: String,
+    pub(crate) seconds: f64,
+    /// Poses at even times: center, rotation `[x, y, z, w]` and vertical field of view in radians, 8 numbers each.
+    pub(crate) frames: Vec<f32>,
+}
+
+/// What the scripts of a page read as JSON.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct PageScene {
+    /// Wholes come before their pieces.
+    pub(crate) identities: Vec<PageIdentity>,
+    /// World position of the page's origin, scene units.
+    pub(crate) origin: [f64; 3],
+    pub(crate) view: PageView,
+    /// Unit vector.
+    pub(crate) up: [f64; 3],
+    /// What the view orbits around, and how far away that is.
+    pub(crate) focus: [f64; 3],
+    pub(crate) distance: f64,
+    /// Color behind the Gaussians, 0 to 1.
+    pub(crate) background: [f32; 3],
+    /// Whether Mip-Splatting's filter is on.
+    pub(crate) antialias: bool,
+    pub(crate) paths: Vec<PagePath>,
+}
+
+/// All that a page consists of besides its scripts.
+#[derive(Clone, Debug)]
+pub(crate) struct Page {
+    pub(crate) title: String,
+    /// A line about the scene.
+    pub(crate) facts: String,
+    /// Year, month and day.
+    pub(crate) date: String,
+    pub(crate) scene: PageScene,
+    /// As [`packed::encode`] writes them.
+    pub(crate) gaussians: Vec<u8>,
+    /// As [`packed::identities`] writes them.
+    pub(crate) identities: Vec<u8>,
+}
+
+impl Page {
+    /// Writes it, whole or not at all.
+    ///
+    /// # Errors
+    /// [`IoError::Write`].
+    pub(crate) fn write(&self, path: &Path) -> Result<(), IoError> {
+        atomic::write(path, |out| out.write_all(self.html()?.as_bytes()))
+    }
+
+    /// Its text.
+    pub(crate) fn html(&self) -> std::io::Result<String> {
+        let script = format!("(() => {{\n'use strict';\n{}}})();\n", SCRIPTS.join("\n"));
+        let fields = [
+            ("policy", policy(&script)),
+            ("version", env!("CARGO_PKG_VERSION").to_owned()),
+            ("title", escape_all_quotes(&self.title).into_owned()),
+            ("facts", escape_all_quotes(&self.facts).into_owned()),
+            ("date", escape_all_quotes(&self.date).into_owned()),
+            ("style", STYLE.to_owned()),
+            ("license", escape_all_quotes(LICENSE).into_owned()),
+            // Without `<` nothing in it can end the element.
+            ("scene", serde_json::to_string(&self.scene)?.replace('<', "\\u003c")),
+            ("gaussians", packed_text(&self.gaussians)?),
+            ("identities", packed_text(&self.identities)?),
+            ("renderer", packed_text(RENDERER)?),
+            ("script", script),
+        ];
+        Ok(filled(TEMPLATE, &fields))
+    }
+}
+
+/// What the browser is to allow: the page's own script and style, what they make, and no connection.
+fn policy(script: &str) -> String {
+    let sum = |text: &str| format!("'sha256-{}'", base64::encode(Sha256::digest(text.as_bytes())));
+    format!(
+        "default-src 'none'; script-src {} blob:; worker-src blob:; style-src {}; img-src data:; base-uri 'none'; \
+         form-action 'none'",
+        sum(script),
+        sum(STYLE)
+    )
+}
+
+/// Bytes as base64 of gzip.
+fn packed_text(bytes: &[u8]) -> std::io::Result<String> {
+    let mut gzip = GzEncoder::new(Vec::new(), Compression::best());
+    gzip.write_all(bytes)?;
+    Ok(base64::encode(gzip.finish()?))
+}
+
+/// `template` with each `{{name}}` replaced; what is put in is not searched again.
+fn filled(template: &str, fields: &[(&str, String)]) -> String {
+    let mut pieces = template.split("{{");
+    let mut out = pieces.next().unwrap_or_default().to_owned();
+    for piece in pieces {
+        let (name, after) = piece.split_once("}}").unwrap_or((piece, ""));
+        out.extend(fields.iter().find(|(n, _)| *n == name).map(|(_, text)| text.as_str()));
+        out.push_str(after);
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests;
