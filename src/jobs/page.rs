@@ -132,13 +132,12 @@ fn page(request: &PageRequest, observer: &mut dyn Observer) -> Result<Page, JobE
     // A camera that looks away from the scene's middle turns about a point before it.
     let distance = if around > 0.0 { around } else { home.bounds.radius() };
     let order = packed::order(cloud);
-    let radius = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i))).map_or(1.0, |b| b.radius());
     let identity_of = map.as_ref().map_or_else(|| vec![NOBODY; cloud.len()], |map| map.identity_of.clone());
     Ok(Page {
         title: text::name(title),
         facts: request.facts(),
         date: format::date(SystemTime::now()),
-        gaussians: packed::encode(cloud, &order, radius, settings.antialias),
+        gaussians: packed::encode(cloud, &order, settings.antialias).map_err(|e| JobError::Output(e.to_string()))?,
         identities: packed::identities(&identity_of, &order),
         scene: PageScene {
             identities,

@@ -215,7 +215,7 @@ actions! {
     Arrange(id: IdentityId): format!("Move, turn or recolor #{id}"),
         "Drag it along the axes, turn, scale, duplicate or recolor it; can be undone.";
     KeepArranged: "Keep the arrangement", "Carry out what the view shows of a moved, duplicated or recolored thing.";
-    MeasureSplats: "Measure Gaussians",
+    MeasureSplats: "Clean: measure Gaussians",
         "Size, shape, opacity and neighbors of each, and what the photos show of it: finds floaters and the like.";
     DeleteChosen: "Delete the chosen Gaussians",
         "Delete what is chosen in the Clean pane; can be undone, and the scene that was opened stays as it is.";

@@ -68,7 +68,7 @@ fn wide() -> Tree<Place> {
     let mut tiles = Tiles::default();
     let photos = tabs(&mut tiles, &[Pane::Dataset]);
     let middle = middle(&mut tiles);
-    let work = tabs(&mut tiles, &[Pane::Training, Pane::Objects, Pane::Models, Pane::Plan, Pane::Clean]);
+    let work = tabs(&mut tiles, &[Pane::Training, Pane::Objects, Pane::Clean, Pane::Models, Pane::Plan]);
     let talk = tabs(&mut tiles, &[Pane::Chat, Pane::Query]);
     let right = tiles.insert_vertical_tile(vec![work, talk]);
     share(&mut tiles, right, work, 1.9);

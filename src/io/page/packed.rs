@@ -1,55 +1,30 @@
-//! Gaussians as few bytes: the layout of the format SPZ, version 3, in the order of a Morton curve.
-//!
-//! Niantic's format (github.com/nianticlabs/spz): a head of 16 bytes, then all centers (24-bit fixed point), opacities
-//! (8 bits), colors (8 bits), scales (steps of 1/16 of the logarithm), rotations (the smallest three of four numbers,
-//! 10 bits each) and harmonics (8 bits), axes x right, y up, z backward. Compressed by gzip it is a file of that format.
+//! Gaussians as few bytes: a file of the format SPZ before compression, in the order of a Morton curve.
 
-use crate::scene::GaussianCloud;
+use std::io;
 
-const MAGIC: u32 = 0x5053_474e;
-const VERSION: u32 = 3;
-/// A flag: opacities are meant for Mip-Splatting's filter.
-const ANTIALIASED: u8 = 1;
-/// Steps of the centers in the radius of a scene, as a power of two.
-const STEPS_LOG2: i32 = 16;
-/// Bits of a center's magnitude.
-const CENTER_BITS: i32 = 23;
-/// What colors and scales are mapped by.
-const COLOR_SCALE: f32 = 0.15;
-/// Harmonics of the first band and of higher ones are rounded to so many of 256 steps, which gzip makes use of.
-const BAND_STEPS: [f32; 2] = [4.0, 8.0];
+use glam::DVec3;
+
+use crate::io::spz;
+use crate::scene::{GaussianCloud, SplatRenderMode};
+
 /// Signs that half a turn about x gives to the harmonics above the first, degree 1 to 3.
 const TURNED: [f32; 15] = [-1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0];
 
-/// The cloud's Gaussians as SPZ before compression, centers relative to its origin; `order` has the place in the cloud
-/// of each that is written, `radius` is that of the scene in its own units.
-pub(crate) fn encode(cloud: &GaussianCloud, order: &[usize], radius: f64, antialias: bool) -> Vec<u8> {
-    let bits = fraction_bits(cloud, radius);
-    let mut out = Vec::with_capacity(16 + order.len() * (20 + 3 * (cloud.sh_stride() - 1)));
-    out.extend(MAGIC.to_le_bytes());
-    out.extend(VERSION.to_le_bytes());
-    out.extend((order.len() as u32).to_le_bytes());
-    out.extend([cloud.sh_degree, bits as u8, if antialias { ANTIALIASED } else { 0 }, 0]);
-    let most = f64::from((1 << CENTER_BITS) - 1);
-    for &i in order {
-        let [x, y, z] = cloud.positions[i].map(f64::from);
-        for v in [x, -y, -z] {
-            let fixed = (v * 2_f64.powi(bits)).round().clamp(-most, most) as i32;
-            out.extend(&fixed.to_le_bytes()[..3]);
-        }
+/// The cloud's Gaussians with the axes of browsers (x right, y up, z backward), centers relative to its origin; `order`
+/// has the place in the cloud of each that is written.
+///
+/// # Errors
+/// If it reaches farther than the format does.
+pub(crate) fn encode(cloud: &GaussianCloud, order: &[usize], antialias: bool) -> io::Result<Vec<u8>> {
+    let render_mode = if antialias { SplatRenderMode::Mip } else { SplatRenderMode::default() };
+    let mut turned = GaussianCloud { origin: DVec3::ZERO, render_mode, ..cloud.select(order) };
+    let stride = turned.sh_stride();
+    turned.positions.iter_mut().for_each(|[_, y, z]| (*y, *z) = (-*y, -*z));
+    turned.quaternions.iter_mut().for_each(|[_, _, y, z]| (*y, *z) = (-*y, -*z));
+    for own in turned.sh.chunks_mut(stride) {
+        own[1..].iter_mut().zip(TURNED).for_each(|(rgb, sign)| rgb.iter_mut().for_each(|v| *v *= sign));
     }
-    out.extend(order.iter().map(|&i| byte(255.0 / (1.0 + (-cloud.opacity_logits[i]).exp()))));
-    let stride = cloud.sh_stride();
-    out.extend(order.iter().flat_map(|&i| cloud.sh[i * stride].map(|v| byte((v * COLOR_SCALE + 0.5) * 255.0))));
-    out.extend(order.iter().flat_map(|&i| cloud.log_scales[i].map(|v| byte((v + 10.0) * 16.0))));
-    out.extend(order.iter().flat_map(|&i| smallest_three(cloud.quaternions[i]).to_le_bytes()));
-    for &i in order {
-        for (k, rgb) in cloud.sh[i * stride + 1..(i + 1) * stride].iter().enumerate() {
-            let step = BAND_STEPS[usize::from(k >= 3)];
-            out.extend(rgb.map(|v| byte((v * TURNED[k] * 128.0 / step).round() * step + 128.0)));
-        }
-    }
-    out
+    spz::unpacked(&turned, &mut |_| Ok(()))
 }
 
 /// Places in the cloud along a Morton curve: neighbors in space come together, which gzip makes use of.
@@ -73,33 +48,6 @@ pub(crate) fn identities(of: &[u32], order: &[usize]) -> Vec<u8> {
     (0..3).flat_map(plane).collect()
 }
 
-/// How fine centers are: [`STEPS_LOG2`] to the scene's radius, and coarser where the farthest one would not fit.
-fn fraction_bits(cloud: &GaussianCloud, radius: f64) -> i32 {
-    let log2 = |v: f64| v.max(1e-30).log2().ceil() as i32;
-    let farthest = cloud.positions.iter().flatten().fold(0.0_f32, |most, v| most.max(v.abs()));
-    (STEPS_LOG2 - log2(radius)).min(CENTER_BITS - 1 - log2(f64::from(farthest))).clamp(0, 30)
-}
-
-fn byte(v: f32) -> u8 {
-    // Casts keep to the range.
-    v.round() as u8
-}
-
-/// A rotation `[w, x, y, z]`: the place of its largest part among x, y, z, w in two bits, then sign and 9 bits of each
-/// of the others. Half a turn about x changes the signs of y and z.
-fn smallest_three([w, x, y, z]: [f32; 4]) -> u32 {
-    let turned = [x, -y, -z, w];
-    let length = turned.iter().map(|v| v * v).sum::<f32>().sqrt();
-    let unit = if length > 0.0 { turned.map(|v| v / length) } else { [0.0, 0.0, 0.0, 1.0] };
-    let largest = (1..4).fold(0, |best, k| if unit[k].abs() > unit[best].abs() { k } else { best });
-    let others = (0..4).filter(|k| *k != largest);
-    others.fold(largest as u32, |word, k| {
-        let negative = (unit[k] < 0.0) != (unit[largest] < 0.0);
-        let magnitude = (511.0 * unit[k].abs() * std::f32::consts::SQRT_2).round().min(511.0) as u32;
-        word << 10 | u32::from(negative) << 9 | magnitude
-    })
-}
-
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
@@ -107,7 +55,7 @@ pub(crate) mod tests {
     /// What a page's script reads: the cloud again, in the axes of the scene, centers relative to the origin.
     pub(crate) fn decode(bytes: &[u8]) -> GaussianCloud {
         let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
-        assert_eq!((word(0), word(4)), (MAGIC, VERSION));
+        assert_eq!((&bytes[..4], word(4)), (&b"NGSP"[..], 3));
         let (n, sh_degree, bits) = (word(8) as usize, bytes[12], i32::from(bytes[13]));
         let stride = crate::math::sh::coefficients(sh_degree);
         let mut rest = &bytes[16..];
@@ -128,7 +76,7 @@ pub(crate) mod tests {
             cloud.opacity_logits.push((alpha / (1.0 - alpha)).ln());
             let of = |all: &[u8], f: &dyn Fn(u8) -> f32| std::array::from_fn(|a| f(all[3 * i + a]));
             cloud.log_scales.push(of(scales, &|v| f32::from(v) / 16.0 - 10.0));
-            cloud.sh.push(of(colors, &|v| (f32::from(v) / 255.0 - 0.5) / COLOR_SCALE));
+            cloud.sh.push(of(colors, &|v| (f32::from(v) / 255.0 - 0.5) / 0.15));
             for k in 0..stride - 1 {
                 let at = 3 * (i * (stride - 1) + k);
                 cloud.sh.push(std::array::from_fn(|a| TURNED[k] * (f32::from(bands[at + a]) - 128.0) / 128.0));
@@ -170,7 +118,7 @@ pub(crate) mod tests {
             let cloud = random(500, degree);
             let order = order(&cloud);
             assert!(order.iter().copied().ne(0..500), "the curve has an order of its own");
-            let back = decode(&encode(&cloud, &order, 3.0, false));
+            let back = decode(&encode(&cloud, &order, false).expect("packed"));
             let cloud = cloud.select(&order);
             let near = |a: &[[f32; 3]], b: &[[f32; 3]], most: f32| {
                 assert_eq!(a.len(), b.len());
@@ -183,9 +131,9 @@ pub(crate) mod tests {
             let bands = |c: &GaussianCloud, of: std::ops::Range<usize>| -> Vec<[f32; 3]> {
                 c.sh.chunks(stride).flat_map(|all| all[of.start..of.end.min(stride)].to_vec()).collect()
             };
-            near(&bands(&cloud, 0..1), &bands(&back, 0..1), 0.5 / 255.0 / COLOR_SCALE);
-            near(&bands(&cloud, 1..4.min(stride)), &bands(&back, 1..4.min(stride)), 2.0 / 128.0);
-            near(&bands(&cloud, 4.min(stride)..stride), &bands(&back, 4.min(stride)..stride), 4.0 / 128.0);
+            near(&bands(&cloud, 0..1), &bands(&back, 0..1), 0.5 / 255.0 / 0.15);
+            near(&bands(&cloud, 1..4.min(stride)), &bands(&back, 1..4.min(stride)), 4.5 / 128.0);
+            near(&bands(&cloud, 4.min(stride)..stride), &bands(&back, 4.min(stride)..stride), 8.5 / 128.0);
             let alpha = |v: f32| 1.0 / (1.0 + (-v).exp());
             for i in 0..500 {
                 assert!((alpha(cloud.opacity_logits[i]) - alpha(back.opacity_logits[i])).abs() < 0.51 / 255.0);
@@ -202,12 +150,12 @@ pub(crate) mod tests {
         let mut cloud = random(10, 0);
         cloud.positions[3] = [-4.0e5, 0.0, 2.0];
         let order: Vec<usize> = (0..10).collect();
-        let back = decode(&encode(&cloud, &order, 3.0, false));
+        let back = decode(&encode(&cloud, &order, false).expect("packed"));
         assert_eq!(back.positions[3][0], -4.0e5);
         assert!((back.positions[3][2] - 2.0).abs() < 0.1);
-        let tiny = decode(&encode(&random(10, 0), &order, 1e-3, true));
+        let tiny = decode(&encode(&random(10, 0), &order, true).expect("packed"));
         assert!((tiny.positions[0][0] - random(10, 0).positions[0][0]).abs() < 1e-6);
-        assert!(decode(&encode(&GaussianCloud::default(), &[], 1.0, false)).is_empty());
+        assert!(decode(&encode(&GaussianCloud::default(), &[], false).expect("packed")).is_empty());
     }
 
     #[test]

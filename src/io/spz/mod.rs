@@ -12,7 +12,7 @@ use crate::math::sh::coefficients;
 
 pub use read::parse;
 pub(crate) use read::{is_spz, read};
-pub(super) use write::encode;
+pub(super) use write::{encode, unpacked};
 
 /// How the header starts.
 const MAGIC: &[u8; 4] = b"NGSP";

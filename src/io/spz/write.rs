@@ -25,6 +25,13 @@ const HARMONIC_STEPS: [i32; 2] = [8, 16];
 /// # Errors
 /// If it reaches farther from zero than 24 bits do, or cannot be written.
 pub(in crate::io) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
+    let mut gzip = GzEncoder::new(out, Compression::default());
+    gzip.write_all(&unpacked(cloud, told)?)?;
+    gzip.finish().map(drop)
+}
+
+/// What such a file holds before compression.
+pub(in crate::io) fn unpacked(cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<Vec<u8>> {
     let fraction = fraction(cloud)?;
     let steps = f64::from(fraction).exp2();
     let stride = cloud.sh_stride();
@@ -48,13 +55,8 @@ pub(in crate::io) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &m
     }
     let flags = if cloud.render_mode == SplatRenderMode::Mip { ANTIALIASED } else { 0 };
     let count = u32::try_from(cloud.len()).map_err(io::Error::other)?;
-    let mut gzip = GzEncoder::new(out, Compression::default());
-    gzip.write_all(MAGIC)?;
-    gzip.write_all(&VERSION.to_le_bytes())?;
-    gzip.write_all(&count.to_le_bytes())?;
-    gzip.write_all(&[cloud.sh_degree, fraction, flags, 0])?;
-    all.iter().try_for_each(|column| gzip.write_all(column))?;
-    gzip.finish().map(drop)
+    let head = [*MAGIC, VERSION.to_le_bytes(), count.to_le_bytes(), [cloud.sh_degree, fraction, flags, 0]];
+    Ok(head.into_iter().flatten().chain(all.into_iter().flatten()).collect())
 }
 
 /// The most bits behind the point with which every coordinate fits.

@@ -97,6 +97,7 @@ impl CleanPane {
         }
         let Some(measured) = self.measured.clone() else { return offer(ui, state, actions) };
         let before = self.choice.clone();
+        self.show_chosen(ui, &measured, actions);
         theme::section(ui, "Suspects");
         for (rule, count) in &self.counts {
             self.choice.show_rule(ui, *rule, *count);
@@ -108,6 +109,13 @@ impl CleanPane {
         self.show_measure(ui, &measured.measures);
         theme::section(ui, "By color and place");
         self.choice.show_places(ui, view.picking.selected(), view.visibility.crop());
+        if before != self.choice {
+            let of = self.choice.of(&measured, state);
+            self.chosen = of.map(|of| Arc::new(ChosenSplats::new(of, self.choice.hide)));
+        }
+    }
+
+    fn show_chosen(&mut self, ui: &mut Ui, measured: &MeasuredCloud, actions: &mut Vec<Action>) {
         theme::section(ui, "Chosen");
         let (count, all) = (self.chosen.as_ref().map_or(0, |c| c.count), measured.cloud.len());
         let share = format::number(100.0 * count as f64 / all.max(1) as f64);
@@ -135,10 +143,6 @@ impl CleanPane {
                 (self.choice, self.chosen) = (SplatChoice { measure, hide, ..SplatChoice::default() }, None);
             }
         });
-        if before != self.choice {
-            let of = self.choice.of(&measured, state);
-            self.chosen = of.map(|of| Arc::new(ChosenSplats::new(of, self.choice.hide)));
-        }
     }
 
     fn show_measure(&mut self, ui: &mut Ui, of: &CloudMeasures) {
@@ -186,6 +190,8 @@ impl SplatChoice {
                 self.rules.extend(on.then_some(rule));
             }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
+                // Room for the bar that scrolls.
+                ui.add_space(8.0);
                 ui.label(RichText::new(format::count(count as u64)).color(theme::weak()));
             });
         });

@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use egui::{Align2, Area, Color32, DragValue, Id, Order, Rect, Sense, Stroke, Ui, Vec2};
+use egui::{Align2, Area, Color32, DragValue, Id, Order, Rect, Sense, Stroke, Ui, Vec2, vec2};
 use glam::{DQuat, DVec3};
 
 use super::super::theme;
 use super::Viewport;
 use super::crop::{on_screen, travel};
 use crate::jobs::rearrange::{Arrangement, SplatEdit, apply};
-use crate::scene::{Bounds, Camera, GaussianCloud, Identities, SemanticMap};
+use crate::scene::{Bounds, Camera, GaussianCloud, Identities, NOBODY, SemanticMap};
 use crate::ui::actions::Action;
 use crate::ui::state::AppState;
 use crate::worker::Versioned;
@@ -103,8 +103,9 @@ impl ArrangeTool {
 
     /// The card of the tool.
     fn show_card(&mut self, ui: &Ui, rect: Rect, all: &Identities, actions: &mut Vec<Action>) {
-        let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(52.0));
-        let area = Area::new(Id::unique("arranging")).order(Order::Foreground).pivot(Align2::CENTER_BOTTOM);
+        // Above the facts about the frame.
+        let at = Align2::LEFT_BOTTOM.pos_in_rect(&rect.shrink(12.0)) - vec2(0.0, 40.0);
+        let area = Area::new(Id::unique("arranging")).order(Order::Foreground).pivot(Align2::LEFT_BOTTOM);
         theme::card(ui.ctx(), area.fixed_pos(at).constrain_to(rect), |ui| {
             ui.label(format!("Arrange {}: drag its arrows, or type.", all.full_name(self.arrangement.id)));
             ui.horizontal(|ui| {
@@ -129,7 +130,10 @@ impl ArrangeTool {
                     self.arrangement.color = has_color.then_some(FIRST_COLOR);
                 }
                 if let Some(color) = &mut self.arrangement.color {
-                    ui.color_edit_button_rgb(color);
+                    let mut shown = color.map(|v| (255.0 * v).round() as u8);
+                    if ui.color_edit_button_srgb(&mut shown).changed() {
+                        *color = shown.map(|v| f32::from(v) / 255.0);
+                    }
                 }
             });
             ui.checkbox(&mut self.arrangement.duplicate, "Leave it where it is, and do this to another one like it");
@@ -141,6 +145,10 @@ impl ArrangeTool {
                 }
                 if ui.add_enabled(self.is_something(), egui::Button::new("Reset")).clicked() {
                     (self.arrangement, self.degrees) = (Arrangement::of(self.arrangement.id), 0.0);
+                }
+                let whole = all.get(self.arrangement.id).map_or(NOBODY, |i| i.parent);
+                if whole != NOBODY && ui.button("All of it").on_hover_text(all.full_name(whole)).clicked() {
+                    actions.push(Action::Arrange(whole));
                 }
                 if ui.button("Cancel").clicked() {
                     actions.push(Action::Paint(None));
@@ -169,7 +177,7 @@ impl Viewport {
 mod tests {
     use super::*;
     use crate::jobs::rearrange::Placement;
-    use crate::scene::{Level, NOBODY};
+    use crate::scene::Level;
 
     #[test]
     fn the_preview_is_what_is_kept_and_nothing_is_shown_before_a_change() {

@@ -6,7 +6,7 @@ use crate::scene::GaussianCloud;
 /// Magenta, which little in photos is.
 const MARK: [f64; 3] = [1.0, 0.0, 0.8];
 /// Opacity that marked Gaussians have at least, before the sigmoid, so that faint ones are seen.
-const LEAST_OPACITY: f32 = -1.0;
+const LEAST_OPACITY: f32 = -2.5;
 
 /// A choice of Gaussians.
 #[derive(Clone, Debug, PartialEq)]
