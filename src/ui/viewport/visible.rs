@@ -119,7 +119,9 @@ impl Visibility {
 
     /// How many Gaussians are drawn, if not all.
     pub(crate) fn count(&self) -> Option<usize> {
-        self.left.as_ref().map(|(_, visible)| visible.cloud.len())
+        let marks_only = self.chosen.is_some() && self.crop.is_none() && self.hidden.is_empty();
+        let left = self.left.as_ref().filter(|_| !marks_only || self.chosen.as_ref().is_some_and(|c| c.hide));
+        left.map(|(_, visible)| visible.cloud.len())
     }
 
     /// The Gaussians to draw and what they belong to.
