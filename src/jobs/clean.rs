@@ -80,6 +80,7 @@ pub(crate) fn store(
     observer: &mut dyn Observer,
 ) -> Result<usize, JobError> {
     let (cloud, map) = rearrange::applied(scene, &SplatEdit::Delete(gone))?;
+    let cloud = Arc::new(cloud);
     derived::write(scene, "cleaned", &cloud, map.as_ref(), out, observer)?;
     Ok(cloud.len())
 }

@@ -1,12 +1,13 @@
 //! A scene that is made of another: it goes into a folder of its own, and the other one stays as it is.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
-use super::{JobError, Scene, export, export_splat};
+use super::{JobError, Scene, export_splat};
 use crate::io::splat_format::SplatFormat;
 use crate::io::trained::{self, SceneInfo};
 use crate::io::{IoError, SceneFolder, files};
-use crate::pipeline::observer::Observer;
+use crate::pipeline::observer::{Observer, Severity};
 use crate::scene::{GaussianCloud, SemanticMap};
 
 /// Refuses a place for the result that is taken or not fit for it: a file of splats where it is called so, else a folder.
@@ -22,14 +23,15 @@ pub(crate) fn check_place(scene: &Scene, out: &Path) -> Result<(), JobError> {
 pub(crate) fn write(
     from: &Scene,
     how: &str,
-    cloud: &GaussianCloud,
+    cloud: &Arc<GaussianCloud>,
     map: Option<&SemanticMap>,
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<(), JobError> {
-    if let Some(format) = SplatFormat::of(out) {
-        export::make_parent(out)?;
-        return export_splat::write(cloud, format, out, observer);
+    if SplatFormat::of(out).is_some() {
+        let done = export_splat::run(cloud, out, None, observer)?;
+        done.lines().into_iter().skip(1).for_each(|line| observer.note(Severity::Info, line));
+        return Ok(());
     }
     store(from, format!("{} {how}", from.name), cloud, map, out)?;
     Ok(())
