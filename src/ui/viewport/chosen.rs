@@ -9,7 +9,7 @@ const MARK: [f64; 3] = [1.0, 0.0, 0.8];
 const LEAST_OPACITY: f32 = -2.5;
 
 /// A choice of Gaussians.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ChosenSplats {
     /// Whether each is chosen.
     pub(crate) of: Vec<bool>,
