@@ -9,12 +9,12 @@ use super::progress::Console;
 use super::{CliError, output};
 use crate::jobs::rearrange::{self, Arrangement, Placement, SplatEdit};
 use crate::jobs::{JobError, derived, open, query};
-use crate::math::format;
+use crate::math::{format, srgb};
 use crate::scene::LevelFilter;
 
 /// Move, turn, scale, duplicate or recolor an object or a part
 ///
-/// It turns and scales about its own middle. The scene is left as it is; the result is a scene of its own, or a .ply.
+/// It turns and scales about its own middle. The scene is left as it is; the result is a scene of its own, or a file of splats.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs edit scene/ \"the mug\" --move 0.5,0,0 --turn 90 --out moved/\n  \
@@ -67,10 +67,8 @@ fn direction(text: &str) -> Result<DVec3, String> {
 
 /// Red, green and blue, 0 to 1.
 fn color(text: &str) -> Result<[f32; 3], String> {
-    let digits = text.strip_prefix('#').unwrap_or(text);
-    let value = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6);
-    let value = value.ok_or("six hexadecimal digits are needed: #RRGGBB")?;
-    Ok([16, 8, 0].map(|shift| (value >> shift & 0xff) as f32 / 255.0))
+    let color = srgb::from_hex(text.strip_prefix('#').unwrap_or(text));
+    Ok(color.ok_or("six hexadecimal digits are needed: #RRGGBB")?.map(|v| f32::from(v) / 255.0))
 }
 
 pub(crate) fn run(args: EditArgs, quiet: bool) -> Result<(), CliError> {

@@ -11,7 +11,7 @@ use super::{CliError, output};
 use crate::io::scene_files::MAP_FILE;
 use crate::io::trained::CLOUD_FILE;
 use crate::jobs::open::{self, Contents};
-use crate::jobs::{JobError, Scene, plan};
+use crate::jobs::{Scene, plan};
 use crate::pipeline::train::TrainConfig;
 use crate::scene::{Bounds, Dataset, ScenePlan, SemanticMap};
 
@@ -150,10 +150,7 @@ fn of_trained(s: &Scene, folder: &Path) -> (Facts, Option<SemanticMap>) {
             format!("{:.2} dB, SSIM {:.3} after step {}, {:.0} s", e.psnr, e.ssim, e.step, e.secs),
         ));
     }
-    let map = match s.semantics() {
-        Err(JobError::NoObjects(_)) => Ok(None),
-        map => map.map(Some),
-    };
+    let map = s.known_semantics();
     let of_others = matches!(map, Ok(None)) && folder.join(MAP_FILE).exists();
     let warning = match &map {
         Err(e) => Some(format!("its objects cannot be read ('fmlgs preprocess' finds them again): {e}")),

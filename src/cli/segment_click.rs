@@ -8,7 +8,7 @@ use super::progress::Console;
 use super::{CliError, output, view};
 use crate::jobs::edit::{self, EditRequest};
 use crate::jobs::select::{self, SelectFor, SelectRequest, Selected, Stroke, kept_as};
-use crate::jobs::{JobError, Scene, query};
+use crate::jobs::{Scene, query};
 use crate::scene::{LevelFilter, Mask, NOBODY};
 
 /// Radius of a click as a share of the view's width.
@@ -49,10 +49,7 @@ pub(crate) fn run(
     out: Option<&PathBuf>,
     quiet: bool,
 ) -> Result<(), CliError> {
-    let map = Arc::new(match scene.semantics() {
-        Err(JobError::NoObjects(_)) => select::empty_map(&scene.cloud),
-        map => map?,
-    });
+    let map = Arc::new(scene.known_semantics()?.unwrap_or_else(|| select::empty_map(&scene.cloud)));
     let whole = match &args.part_of {
         Some(text) => query::identities(&map, text, LevelFilter::Auto, 1)?.first().copied().unwrap_or(NOBODY),
         None => NOBODY,

@@ -9,7 +9,7 @@ use crate::scene::GaussianCloud;
 const BITS: u32 = 21;
 
 /// Indices of the Gaussians along a Z-order curve through their bounds, the same for the same cloud.
-pub(super) fn order(cloud: &GaussianCloud) -> Vec<usize> {
+pub(crate) fn order(cloud: &GaussianCloud) -> Vec<usize> {
     let ends = |end: fn(f32, f32) -> f32, from: f32| {
         cloud.positions.iter().fold([from; 3], |a, p| [0, 1, 2].map(|k| end(a[k], p[k])))
     };

@@ -7,7 +7,9 @@ use super::{JobError, Scene, export_splat};
 use crate::io::splat_format::SplatFormat;
 use crate::io::trained::{self, SceneInfo};
 use crate::io::{IoError, SceneFolder, files};
-use crate::pipeline::observer::{Observer, Severity};
+use crate::pipeline::observer::Observer;
+use crate::pipeline::train::TrainConfig;
+use crate::render::RenderSettings;
 use crate::scene::{GaussianCloud, SemanticMap};
 
 /// Refuses a place for the result that is taken or not fit for it: a file of splats where it is called so, else a folder.
@@ -29,8 +31,7 @@ pub(crate) fn write(
     observer: &mut dyn Observer,
 ) -> Result<(), JobError> {
     if SplatFormat::of(out).is_some() {
-        let done = export_splat::run(cloud, out, None, observer)?;
-        done.lines().into_iter().skip(1).for_each(|line| observer.note(Severity::Info, line));
+        export_splat::run(cloud, out, None, observer)?.tell_loss(observer);
         return Ok(());
     }
     store(from, format!("{} {how}", from.name), cloud, map, out)?;
@@ -57,6 +58,13 @@ pub(crate) fn free_folder(scene: &Path, how: &str) -> PathBuf {
     (1..).map(place).find(|folder| !folder.exists()).unwrap_or_default()
 }
 
+/// The settings of a training whose result is drawn as `from` is.
+fn drawn_as(from: &Scene) -> Result<serde_json::Value, JobError> {
+    let RenderSettings { antialias, surfels, .. } = from.settings;
+    let config = TrainConfig { antialias, surfels, ..from.config.clone() };
+    serde_json::to_value(config).map_err(|e| JobError::Output(e.to_string()))
+}
+
 /// Stores Gaussians that were made of `from`, and their objects and parts, as the scene `name` in the folder `out`.
 /// Returns the id of its state.
 pub(crate) fn store(
@@ -71,7 +79,8 @@ pub(crate) fn store(
     check(out)?;
     let mut info = match &from.folder {
         Some(folder) => trained::load_info(folder)?,
-        None => SceneInfo::default(),
+        // How a file of splats is drawn is said in its scene's settings from now on.
+        None => SceneInfo { config: drawn_as(from)?, ..SceneInfo::default() },
     };
     info.name = name;
     // What was measured was measured before.
@@ -80,4 +89,27 @@ pub(crate) fn store(
         *dataset = dataset.moved(path, out);
     }
     Ok(held.save(&info, cloud, map)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::splat_ply;
+    use crate::jobs::open;
+    use crate::scene::SplatRenderMode;
+
+    #[test]
+    fn a_scene_made_of_a_file_is_drawn_as_the_file_is() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for mode in [SplatRenderMode::Plain, SplatRenderMode::Mip, SplatRenderMode::Surfels] {
+            let (file, out) = (folder.path().join("a.ply"), folder.path().join(format!("{mode:?}")));
+            let cloud = GaussianCloud::isotropic(vec![[0.0; 3]; 3], -3.0, 1.0);
+            splat_ply::write(&file, &GaussianCloud { render_mode: mode, ..cloud }).expect("written");
+            let from = open::scene(&file).expect("opened");
+            store(&from, "a".into(), &from.cloud, None, &out).expect("stored");
+            let made = open::scene(&out).expect("opened");
+            assert_eq!((made.settings, made.cloud.render_mode), (from.settings, mode));
+            assert!(store(&from, "a".into(), &from.cloud, None, &out).is_err(), "nothing is written over");
+        }
+    }
 }

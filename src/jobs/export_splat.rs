@@ -12,7 +12,7 @@ use crate::io::{self, Opened, atomic};
 use crate::math::format;
 use crate::math::stats::psnr_of;
 use crate::measure::studies::views::spread;
-use crate::pipeline::observer::{Observer, Ticker};
+use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, HomeView};
 
@@ -79,6 +79,13 @@ impl ExportedSplat {
         }
         lines.extend(drawn.map(|drawn| drawn.line()));
         lines
+    }
+}
+
+impl ExportedSplat {
+    /// Tells what the format rounds and leaves out, and what that lost.
+    pub(crate) fn tell_loss(&self, observer: &mut dyn Observer) {
+        self.lines().into_iter().skip(1).for_each(|line| observer.note(Severity::Info, line));
     }
 }
 

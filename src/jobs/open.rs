@@ -66,6 +66,14 @@ impl Scene {
         map.ok_or_else(|| JobError::NoObjects(self.path.clone()))
     }
 
+    /// Its objects and parts, if they were found.
+    pub(crate) fn known_semantics(&self) -> Result<Option<SemanticMap>, JobError> {
+        match self.semantics() {
+            Err(JobError::NoObjects(_)) => Ok(None),
+            map => map.map(Some),
+        }
+    }
+
     /// Where its photos are, unless they are somewhere else.
     pub(crate) fn photos(&self, elsewhere: Option<&Path>) -> Result<PathBuf, JobError> {
         let known = elsewhere.map(Path::to_path_buf).or_else(|| self.dataset_path.clone());
@@ -252,13 +260,12 @@ pub(crate) fn open(
 
 /// The objects and parts stored with a trained scene; broken ones are told and left out.
 pub(crate) fn known_objects(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<SemanticMap>> {
-    match scene.semantics() {
-        Ok(map) => {
+    match scene.known_semantics() {
+        Ok(map) => map.map(|map| {
             let what = format!("{} objects and parts", map.identities.len());
             resource_log::record(ResourceKind::Objects, what, "the scene was opened", map.bytes());
-            Some(Arc::new(map))
-        }
-        Err(JobError::NoObjects(_)) => None,
+            Arc::new(map)
+        }),
         Err(e) => {
             observer.note(
                 Severity::Warning,

@@ -51,10 +51,7 @@ impl PageRequest {
     /// # Errors
     /// If its objects and parts cannot be read.
     pub(crate) fn of_scene(scene: &Scene, out: &Path) -> Result<Self, JobError> {
-        let map = match scene.semantics() {
-            Err(JobError::NoObjects(_)) => None,
-            found => Some(Arc::new(found?)),
-        };
+        let map = scene.known_semantics()?.map(Arc::new);
         Ok(Self {
             title: scene.name.clone(),
             cloud: Arc::clone(&scene.cloud),
@@ -82,7 +79,7 @@ impl PageRequest {
 
     /// Keeps only the Gaussians of a crop box.
     pub(crate) fn crop(&mut self, crop: &CropBox) {
-        let kept: Vec<usize> = (0..self.cloud.len()).filter(|&i| crop.keeps(self.cloud.world_position(i))).collect();
+        let kept = crop.kept(&self.cloud);
         self.cloud = Arc::new(self.cloud.select(&kept));
         self.map = self.map.take().map(|map| Arc::new(map.select(&kept)));
     }

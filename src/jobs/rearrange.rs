@@ -1,6 +1,6 @@
 //! Moving, duplicating and recoloring objects and parts, and deleting Gaussians.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use super::{JobError, Scene, derived, open};
@@ -10,11 +10,7 @@ use crate::scene::{Camera, GaussianCloud, SceneFacts, SemanticMap};
 
 /// The Gaussians of `scene` and its objects and parts, if it has any, after an edit.
 pub(crate) fn applied(scene: &Scene, edit: &SplatEdit) -> Result<(GaussianCloud, Option<SemanticMap>), JobError> {
-    let map = match scene.semantics() {
-        Err(JobError::NoObjects(_)) => None,
-        map => Some(map?),
-    };
-    Ok(apply(&scene.cloud, map.as_ref(), edit)?)
+    Ok(apply(&scene.cloud, scene.known_semantics()?.as_ref(), edit)?)
 }
 
 /// What is to be changed.
@@ -30,8 +26,9 @@ pub enum SplatChange {
 /// which it is stored with all that follow.
 #[derive(Clone, Debug)]
 pub struct RearrangeRequest {
-    /// Where the scene on screen lies.
+    /// Where the scene on screen lies, and what it is called.
     pub(crate) path: PathBuf,
+    pub(crate) name: String,
     /// Whether that is one that an edit has made.
     pub(crate) is_edited: bool,
     pub(crate) cloud: Arc<GaussianCloud>,
@@ -68,25 +65,17 @@ pub(crate) fn run(request: &RearrangeRequest, known: Option<&str>) -> Result<Rea
         }
     };
     let (folder, name, state) = match request.is_edited {
-        true => store_again(path, known, &cloud, map.as_deref())?,
+        true => {
+            let held = SceneFolder::hold(path, "storing an edit")?;
+            (path.clone(), request.name.clone(), held.save_edited(known, map.as_deref(), &cloud)?)
+        }
         false => {
             let (scene, folder) = (open::scene(path)?, derived::free_folder(path, "edited"));
-            let name = format!("{} edited", scene.name);
+            let name = format!("{} edited", request.name);
             let state = derived::store(&scene, name.clone(), &cloud, map.as_deref(), &folder)?;
             (folder, name, state)
         }
     };
     let facts = request.facts.clone().with_edited(&cloud, &request.cameras);
     Ok(RearrangedScene { cloud, map, folder, name, state, facts })
-}
-
-fn store_again(
-    folder: &Path,
-    known: Option<&str>,
-    cloud: &GaussianCloud,
-    map: Option<&SemanticMap>,
-) -> Result<(PathBuf, String, String), JobError> {
-    let held = SceneFolder::hold(folder, "storing an edit")?;
-    let state = held.save_edited(known, map, cloud)?;
-    Ok((folder.into(), crate::io::trained::load_info(folder)?.name, state))
 }

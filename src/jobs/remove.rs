@@ -29,8 +29,7 @@ pub(crate) fn run(
     let photos: Vec<Camera> = scene.cameras.iter().filter(|c| !c.held_out).map(|c| c.camera.clone()).collect();
     let done = removal::remove(&scene.cloud, map, &photos, &scene.settings, options, observer)?;
     let (rest, number) = edit::forget(map, &options.ids);
-    let mut new = rest.select(&done.kept);
-    (new.language, new.findings) = (rest.language, rest.findings);
+    let mut new = rest.select_fully(&done.kept);
     for id in done.identity_of.iter().skip(done.kept.len()).map(|id| number[*id as usize]) {
         new.identity_of.push(id);
         // Whose it is was guessed, as all of it was.

@@ -69,10 +69,7 @@ pub(crate) fn run(request: &ReportRequest, observer: &mut dyn Observer) -> Resul
 pub(crate) fn subject(path: &Path, options: StudyOptions) -> Result<Subject, JobError> {
     let scene = open::scene(path)?;
     let dataset = scene.dataset_path.as_ref().filter(|p| p.exists()).map(|p| open::dataset(p)).transpose()?;
-    let map = match scene.semantics() {
-        Err(JobError::NoObjects(_)) => None,
-        map => Some(map?),
-    };
+    let map = scene.known_semantics()?;
     Ok(Subject {
         name: path.display().to_string(),
         cloud: scene.cloud,

@@ -1,6 +1,7 @@
 //! Plain mathematics with no knowledge of scenes: everything here is pure and total.
 
 pub(crate) mod colormap;
+pub(crate) mod disjoint;
 mod fast_exp;
 pub(crate) mod finite;
 pub(crate) mod format;

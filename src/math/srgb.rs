@@ -10,6 +10,12 @@ pub(crate) fn byte(linear: f32) -> u8 {
     (encode(linear.clamp(0.0, 1.0)).0 * 255.0 + 0.5) as u8
 }
 
+/// The bytes of a color written in six hexadecimal digits.
+pub(crate) fn from_hex(digits: &str) -> Option<[u8; 3]> {
+    let value = u32::from_str_radix(digits, 16).ok().filter(|_| digits.len() == 6 && !digits.starts_with('+'))?;
+    Some([16, 8, 0].map(|shift| (value >> shift & 0xff) as u8))
+}
+
 /// sRGB value of linear light, and its slope there.
 pub fn encode(linear: f32) -> (f32, f32) {
     if linear <= 0.003_130_8 {

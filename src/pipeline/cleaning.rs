@@ -87,13 +87,24 @@ pub(crate) struct CleanView {
     pub(crate) photo: Option<Photo>,
 }
 
-impl CleanView {
-    /// The camera of a small picture, and the photo as that.
-    fn small(&self) -> Result<(Camera, Option<PhotoPixels>), CleanError> {
-        let Some(photo) = &self.photo else { return Ok((self.camera.limited_to(SIDE_PX), None)) };
-        let pixels = io::photo::load(photo, SIDE_PX)?;
-        Ok((photo.camera.resized(pixels.width_px, pixels.height_px), Some(pixels)))
+/// The camera of a small picture, and the photo as that where it is at hand.
+type SmallView = (Camera, Option<PhotoPixels>);
+
+/// Loads every photo, once: each is looked at several times.
+fn small(views: &[CleanView], observer: &mut dyn Observer) -> Result<Vec<SmallView>, CleanError> {
+    let mut ticker = Ticker::new("Loading photos", views.len());
+    let mut all = Vec::new();
+    for (k, view) in views.iter().enumerate() {
+        ticker.tick(k, observer)?;
+        all.push(match &view.photo {
+            None => (view.camera.limited_to(SIDE_PX), None),
+            Some(photo) => {
+                let pixels = io::photo::load(photo, SIDE_PX)?;
+                (photo.camera.resized(pixels.width_px, pixels.height_px), Some(pixels))
+            }
+        });
     }
+    Ok(all)
 }
 
 /// Why a scene cannot be measured.
@@ -186,12 +197,13 @@ pub(crate) fn measure(
     let usual = median(&far.iter().filter(|d| d.is_finite()).map(|d| f64::from(*d)).collect::<Vec<_>>());
     let usual = if usual > 0.0 { usual as f32 } else { 1.0 };
     let largest = f32::MAX;
-    let support = match views {
+    let views = small(views, observer)?;
+    let support = match views.as_slice() {
         [] => None,
         views => Some(support::look(cloud, views, settings, observer)?),
     };
     let shape = floaters::Shape { neighbors: &neighbors, sizes: &sizes, pieces: &pieces };
-    let floaters = floaters::find(cloud, &shape, support.as_ref(), views, settings, observer)?;
+    let floaters = floaters::find(cloud, &shape, support.as_ref(), &views, settings, observer)?;
     let mut values = vec![
         (SplatMeasure::Elongation, each(&|i| (sd(i)[0] / sd(i)[1].max(f32::MIN_POSITIVE)).min(largest))),
         (SplatMeasure::Opacity, each(&|i| cloud.opacity_logits[i].sigmoid())),

@@ -125,12 +125,7 @@ fn delete(
     if kept.is_empty() {
         return Err(SplatEditError::NothingLeft);
     }
-    Ok((cloud.select(&kept), map.map(|map| selected(map, &kept))))
-}
-
-/// The map of these Gaussians, with all that is known of its identities.
-fn selected(map: &SemanticMap, gaussians: &[usize]) -> SemanticMap {
-    SemanticMap { language: map.language.clone(), findings: map.findings.clone(), ..map.select(gaussians) }
+    Ok((cloud.select(&kept), map.map(|map| map.select_fully(&kept))))
 }
 
 /// What a thing turns about: the middle of it, without its stray Gaussians.
@@ -169,7 +164,7 @@ fn place(cloud: &mut GaussianCloud, thing: &[usize], to: &Placement, map: &Seman
 
 /// The map of the Gaussians `all`, of which those that stand there again are of a second thing like `id`.
 fn doubled(map: &SemanticMap, all: &[usize], id: IdentityId) -> SemanticMap {
-    let mut new = selected(map, all);
+    let mut new = map.select_fully(all);
     let inside = map.identities.descendants(id);
     let first_copy = map.identity_of.len();
     let mut number: Vec<IdentityId> = (0..=map.identities.len() as IdentityId).collect();

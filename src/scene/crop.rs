@@ -20,10 +20,14 @@ impl CropBox {
         inside != self.outside
     }
 
+    /// The numbers of the Gaussians that are kept.
+    pub(crate) fn kept(&self, cloud: &GaussianCloud) -> Vec<usize> {
+        (0..cloud.len()).filter(|&i| self.keeps(cloud.world_position(i))).collect()
+    }
+
     /// The Gaussians that are kept.
     pub fn crop(&self, cloud: &GaussianCloud) -> GaussianCloud {
-        let kept: Vec<usize> = (0..cloud.len()).filter(|&i| self.keeps(cloud.world_position(i))).collect();
-        cloud.select(&kept)
+        cloud.select(&self.kept(cloud))
     }
 
     /// Puts one face, the higher one of its axis or the lower, elsewhere; never beyond the one opposite.

@@ -103,6 +103,11 @@ impl SemanticMap {
         }
     }
 
+    /// The same with all that is known of its identities.
+    pub(crate) fn select_fully(&self, gaussians: &[usize]) -> Self {
+        Self { language: self.language.clone(), findings: self.findings.clone(), ..self.select(gaussians) }
+    }
+
     /// Whether nothing is known of a Gaussian: no mask and no photo says whose it is, nor that it is nobody's.
     pub(crate) fn is_unknown(&self, i: usize) -> bool {
         self.identity_of.get(i) == Some(&NOBODY) && self.margin.get(i) == Some(&0.0)

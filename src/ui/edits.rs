@@ -103,7 +103,8 @@ impl App {
         let SceneContext { scene, cloud, map, cameras, .. } = self.context()?;
         let (cloud, map) = (Arc::clone(&cloud), map.map(|map| Arc::clone(&map)));
         let (facts, path, is_edited) = (self.state.plan.facts.clone(), scene.stored().to_path_buf(), scene.is_edited);
-        let request = RearrangeRequest { path, is_edited, cloud, map, change, facts, cameras };
+        let request =
+            RearrangeRequest { path, name: scene.name.clone(), is_edited, cloud, map, change, facts, cameras };
         self.submit(Command::Rearrange(Box::new(request)))
     }
 

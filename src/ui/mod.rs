@@ -5,13 +5,13 @@
 //! changes the view or becomes a job. Nothing here computes for longer than a redraw may take.
 
 mod act;
-mod act_clean;
 mod act_file;
 mod act_find;
 mod act_look;
 mod act_phrases;
 mod act_remove;
 mod act_report;
+mod act_splats;
 mod act_view;
 mod act_window;
 pub mod actions;

@@ -138,8 +138,8 @@ impl Jobs for PipelineJobs {
                 Outcome::Scale(meters_per_unit, stored)
             }
             Command::Export { cloud, path } => {
-                let done = export_splat::run(&cloud, &path, Some(&LossViews::of_cloud(&cloud)), observer)?;
-                done.lines().into_iter().skip(1).for_each(|line| observer.note(Severity::Info, line));
+                let views = LossViews::of_cloud(&cloud);
+                export_splat::run(&cloud, &path, Some(&views), observer)?.tell_loss(observer);
                 Outcome::Written(path)
             }
             Command::Photo { index, photo, max_side_px } => {

@@ -4,6 +4,7 @@ use std::io;
 
 use glam::DVec3;
 
+pub(crate) use crate::io::morton::order;
 use crate::io::spz;
 use crate::scene::{GaussianCloud, SplatRenderMode};
 
@@ -25,21 +26,6 @@ pub(crate) fn encode(cloud: &GaussianCloud, order: &[usize], antialias: bool) ->
         own[1..].iter_mut().zip(TURNED).for_each(|(rgb, sign)| rgb.iter_mut().for_each(|v| *v *= sign));
     }
     spz::unpacked(&turned, &mut |_| Ok(()))
-}
-
-/// Places in the cloud along a Morton curve: neighbors in space come together, which gzip makes use of.
-pub(crate) fn order(cloud: &GaussianCloud) -> Vec<usize> {
-    let mut min = [f32::INFINITY; 3];
-    let mut size = f32::MIN_POSITIVE;
-    cloud.positions.iter().for_each(|p| (0..3).for_each(|a| min[a] = min[a].min(p[a])));
-    cloud.positions.iter().for_each(|p| (0..3).for_each(|a| size = size.max(p[a] - min[a])));
-    let key = |i: usize| {
-        let cell: [u64; 3] = std::array::from_fn(|a| ((cloud.positions[i][a] - min[a]) / size * 65_535.0) as u64);
-        (0..16).rev().fold(0_u64, |key, b| (0..3).fold(key, |key, a| key << 1 | (cell[a] >> b & 1)))
-    };
-    let mut order: Vec<usize> = (0..cloud.len()).collect();
-    order.sort_by_cached_key(|&i| key(i));
-    order
 }
 
 /// Numbers below 2^24 in `order`, all low bytes first, then the next ones, then the highest.

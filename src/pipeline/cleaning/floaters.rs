@@ -8,7 +8,7 @@ use std::collections::HashMap;
 
 use super::pieces::{Pieces, pieces};
 use super::support::{PhotoSupport, color};
-use super::{CleanError, CleanView};
+use super::{CleanError, SmallView};
 use crate::math::lanes::Lane;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::render::{ContributionSink, Features, RenderSettings, Renderer, TILE_PX};
@@ -43,7 +43,7 @@ pub(super) fn find(
     cloud: &GaussianCloud,
     shape: &Shape<'_>,
     support: Option<&PhotoSupport>,
-    views: &[CleanView],
+    views: &[SmallView],
     settings: &RenderSettings,
     observer: &mut dyn Observer,
 ) -> Result<Vec<bool>, CleanError> {
@@ -75,7 +75,7 @@ pub(super) fn find(
 /// What is looked at, and what through.
 struct Looking<'a> {
     cloud: &'a GaussianCloud,
-    views: &'a [CleanView],
+    views: &'a [SmallView],
     settings: &'a RenderSettings,
     /// Photos that show each Gaussian.
     photos: &'a [f32],
@@ -147,10 +147,10 @@ impl Looking<'_> {
         let mut ticker = Ticker::new("Comparing with the photos", self.views.len());
         for (k, view) in self.views.iter().enumerate() {
             ticker.tick(k, self.observer)?;
-            let (camera, Some(photo)) = view.small()? else { continue };
+            let (camera, Some(photo)) = view else { continue };
             let mut errors = |cloud: &GaussianCloud| -> Result<Vec<f32>, CleanError> {
-                let frame = renderer.render(cloud, Features::NONE, &camera, self.settings)?;
-                Ok((0..photo.rgb.len()).map(|i| squared_error(&frame.color, &photo, i)).collect())
+                let frame = renderer.render(cloud, Features::NONE, camera, self.settings)?;
+                Ok((0..photo.rgb.len()).map(|i| squared_error(&frame.color, photo, i)).collect())
             };
             let (with, without) = (errors(&there.0)?, errors(&rest)?);
             let growth: Vec<f32> = without.iter().zip(&with).map(|(a, b)| a - b).collect();
@@ -162,7 +162,7 @@ impl Looking<'_> {
                     sums: Vec::new(),
                 })
                 .collect();
-            renderer.contributions(&there.0, &camera, self.settings, &mut rows)?;
+            renderer.contributions(&there.0, camera, self.settings, &mut rows)?;
             let mut here: HashMap<usize, (f64, f64)> = HashMap::new();
             for (i, w, g) in rows.into_iter().flat_map(|row| row.sums) {
                 let sums = here.entry(group[there.1[i as usize]]).or_default();

@@ -1,5 +1,7 @@
 //! What hangs together: Gaussians that reach their neighbors.
 
+use crate::math::disjoint::root;
+
 /// Standard deviations that a Gaussian reaches.
 const REACH: f32 = 3.0;
 
@@ -38,13 +40,4 @@ pub(super) fn pieces(neighbors: &[Vec<(u32, f32)>], sizes: &[f32], among: impl F
     let mut sizes = vec![0; of.len()];
     of.iter().for_each(|piece| sizes[*piece as usize] += 1);
     Pieces { of, sizes }
-}
-
-fn root(parent: &mut [u32], mut i: u32) -> u32 {
-    while parent[i as usize] != i {
-        // Shorter for whoever comes next.
-        parent[i as usize] = parent[parent[i as usize] as usize];
-        i = parent[i as usize];
-    }
-    i
 }

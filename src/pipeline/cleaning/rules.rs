@@ -4,6 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::{CloudMeasures, SplatMeasure};
+use crate::math::srgb;
 
 /// Opacity below which a Gaussian is hardly ever drawn.
 const FAINT: f32 = 0.005;
@@ -116,10 +117,8 @@ impl FromStr for CleanRule {
         if let Some(named) = Self::NAMED.into_iter().find(|rule| rule.to_string() == text) {
             return Ok(named);
         }
-        if let Some(digits) = text.strip_prefix("color=#").filter(|d| d.len() == 6)
-            && let Ok(value) = u32::from_str_radix(digits, 16)
-        {
-            return Ok(Self::Color([16, 8, 0].map(|shift| (value >> shift & 0xff) as u8)));
+        if let Some(color) = text.strip_prefix("color=#").and_then(srgb::from_hex) {
+            return Ok(Self::Color(color));
         }
         let parsed = || {
             let (word, limit) = text.split_once(['<', '>'])?;

@@ -1,6 +1,6 @@
 //! What photos show of each Gaussian, and how well its color fits them.
 
-use super::{CleanError, CleanView};
+use super::{CleanError, SmallView};
 use crate::math::lanes::Lane;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::render::{ContributionSink, RenderSettings, Renderer, TILE_PX};
@@ -21,7 +21,7 @@ pub(super) struct PhotoSupport {
 
 pub(super) fn look(
     cloud: &GaussianCloud,
-    views: &[CleanView],
+    views: &[SmallView],
     settings: &RenderSettings,
     observer: &mut dyn Observer,
 ) -> Result<PhotoSupport, CleanError> {
@@ -31,13 +31,12 @@ pub(super) fn look(
     let (mut weight, mut difference) = (vec![0.0_f64; n], vec![0.0_f64; n]);
     let mut renderer = Renderer::new();
     let mut ticker = Ticker::new("Looking for support in photos", views.len());
-    for (k, view) in views.iter().enumerate() {
+    for (k, (camera, photo)) in views.iter().enumerate() {
         ticker.tick(k, observer)?;
-        let (camera, photo) = view.small()?;
         let mut rows: Vec<Row<'_>> = (0..camera.height_px.div_ceil(TILE_PX as u32))
             .map(|_| Row { photo: photo.as_ref(), width: camera.width_px as usize, colors: &colors, seen: Vec::new() })
             .collect();
-        renderer.contributions(cloud, &camera, settings, &mut rows)?;
+        renderer.contributions(cloud, camera, settings, &mut rows)?;
         let mut here = vec![0.0_f32; n];
         for Seen { gaussian, largest, weight: w, difference: d } in rows.iter().flat_map(|row| &row.seen) {
             let i = *gaussian as usize;
@@ -50,7 +49,7 @@ pub(super) fn look(
             photos[i] += f32::from(here >= SHOWN);
         }
     }
-    let has_photos = views.iter().any(|view| view.photo.is_some());
+    let has_photos = views.iter().any(|(_, photo)| photo.is_some());
     let rms = |(w, d): (&f64, &f64)| if *w > 0.0 { (d / w).sqrt() as f32 } else { 0.0 };
     Ok(PhotoSupport { largest, photos, error: has_photos.then(|| weight.iter().zip(&difference).map(rms).collect()) })
 }

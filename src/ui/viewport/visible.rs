@@ -119,9 +119,9 @@ impl Visibility {
 
     /// How many Gaussians are drawn, if not all.
     pub(crate) fn count(&self) -> Option<usize> {
-        let marks_only = self.chosen.is_some() && self.crop.is_none() && self.hidden.is_empty();
-        let left = self.left.as_ref().filter(|_| !marks_only || self.chosen.as_ref().is_some_and(|c| c.hide));
-        left.map(|(_, visible)| visible.cloud.len())
+        let hides = self.chosen.as_ref().is_none_or(|chosen| chosen.hide);
+        let leaves_out = hides || self.crop.is_some() || !self.hidden.is_empty();
+        self.left.as_ref().filter(|_| leaves_out).map(|(_, visible)| visible.cloud.len())
     }
 
     /// The Gaussians to draw and what they belong to.

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use super::marks::{StrokeMark, StrokeMarks};
 use super::surface::SplatSurface;
+use crate::math::disjoint::root;
 use crate::pipeline::observer::Observer;
 use crate::pipeline::semantics::error::FindError;
 use crate::pipeline::semantics::regions::segment::unlike;
@@ -208,14 +209,6 @@ fn leaves(surface: &SplatSurface) -> (Vec<u32>, usize) {
     });
     let leaf: Vec<u32> = leaf.collect();
     (leaf, count as usize)
-}
-
-fn root(of: &mut [u32], mut i: u32) -> u32 {
-    while of[i as usize] != i {
-        of[i as usize] = of[of[i as usize] as usize];
-        i = of[i as usize];
-    }
-    i
 }
 
 #[cfg(test)]

@@ -1,0 +1,23 @@
+//! Disjoint sets: numbers that are joined step by step.
+
+/// The number that stands for the set of `i`; each number names another one of its set, in the end that one itself.
+pub(crate) fn root(of: &mut [u32], mut i: u32) -> u32 {
+    while of[i as usize] != i {
+        // Shorter for whoever comes next.
+        of[i as usize] = of[of[i as usize] as usize];
+        i = of[i as usize];
+    }
+    i
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ways_end_at_what_stands_for_all_and_become_shorter() {
+        let mut of = vec![0, 0, 1, 2, 4];
+        assert_eq!((root(&mut of, 3), root(&mut of, 4), root(&mut of, 0)), (0, 4, 0));
+        assert_eq!(of[3], 1);
+    }
+}
