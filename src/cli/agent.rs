@@ -301,7 +301,7 @@ impl Talk {
 
 /// Makes the scene in `folder` anew without an identity, and says where.
 fn removed(folder: &Path, id: IdentityId) -> String {
-    let request = RemoveRequest { folder: folder.into(), options: RemovalOptions::of(id) };
+    let request = RemoveRequest { folder: folder.into(), options: RemovalOptions::of(id), retrain: false };
     match remove::beside(&request, &mut Silent) {
         Ok(done) => format!("{}: {}", done.folder.display(), remove::told(&done.name, &done.report)),
         Err(e) => format!("failed: {e}"),

@@ -34,8 +34,11 @@ pub(crate) fn run(
         "dB",
         "SSIM",
         "depth %",
+        "shaded dB",
+        "change",
         "outside dB",
         "change",
+        "flat %",
         "Gaussians",
         "s",
         "found again",
@@ -55,15 +58,16 @@ fn row(r: &RemovalRow) -> Vec<String> {
             format!("{:.2}", 100.0 * s.depth),
         ],
     };
-    let [before, after] = &r.outside;
-    let outside = before.as_ref().zip(after.as_ref()).map(|(b, a)| (a.psnr, a.psnr - b.psnr));
     let mut cells = vec![r.name.clone(), r.paint.map_or("none".into(), |p| format!("{p:?}").to_lowercase())];
     cells.extend(region(&r.uncovered));
     cells.extend(region(&r.invented));
-    cells.extend(match outside {
-        Some((psnr, change)) => [format!("{psnr:.2}"), format!("{change:+.3}")],
-        None => [NONE; 2].map(str::to_owned),
-    });
+    for [before, after] in [&r.shaded, &r.outside] {
+        cells.extend(match before.as_ref().zip(after.as_ref()) {
+            Some((b, a)) => [format!("{:.2}", a.psnr), format!("{:+.3}", a.psnr - b.psnr)],
+            None => [NONE; 2].map(str::to_owned),
+        });
+    }
+    cells.push(format!("{:.0}", 100.0 * r.flat));
     cells.push(format!("-{} +{}", r.gaussians_removed, r.gaussians_invented));
     cells.extend([format!("{:.1}", r.secs), if r.found_again { "yes" } else { "no" }.to_owned()]);
     cells

@@ -44,7 +44,7 @@ enum Command {
     Add {
         /// Its name
         id: String,
-        /// The checkpoint (.pt, .pth, .bin, .safetensors), or the folder
+        /// The checkpoint (.pt, .pth, .bin, .safetensors, .onnx), or the folder
         #[arg(value_name = "FILE")]
         brought: PathBuf,
     },
@@ -103,6 +103,7 @@ fn list(as_json: bool) -> Result<(), CliError> {
         let role = match e.role {
             ModelRole::Encoder => "looks",
             ModelRole::Segmenter => "masks",
+            ModelRole::Inpainter => "paints",
             ModelRole::Engine => "runs",
         };
         rows.push(vec![e.id.clone(), role.into(), state, size, e.license.clone()]);

@@ -7,19 +7,20 @@ use serde_json::json;
 use super::progress::Console;
 use super::{CliError, number, output};
 use crate::jobs::remove::{self, Paint, RemovalOptions};
-use crate::jobs::{derived, open, query};
+use crate::jobs::{derived, open, photos_without, query};
 use crate::math::format;
 use crate::scene::LevelFilter;
 
 /// Take an object or a part out of a scene and close the surface that it hid
 ///
 /// What was behind it and was seen in other photos is there already; what no photo saw is invented: the plane of the
-/// surface goes on below it, painted from what is seen around. Shadows and reflections of it stay. The scene is left as
-/// it is; the result is a scene of its own, in which what is invented has the property 'fmlgs_invented'.
+/// surface goes on below it, painted from what is seen around. Its shadow on flat surfaces goes with it; reflections
+/// stay. The scene is left as it is; the result is a scene of its own, in which what is invented has the property 'fmlgs_invented'.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs remove scene/ \"the teddy bear\" --out without_bear/\n  \
     fmlgs remove scene/ \"the teddy bear\" --seed 2 --out another_fill/\n  \
+    fmlgs remove scene/ \"the teddy bear\" --fill photos --out trained_without_bear/\n  \
     fmlgs remove scene/ \"lid of the kettle\" --fill none --out open_kettle/")]
 pub(crate) struct RemoveArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
@@ -38,6 +39,9 @@ pub(crate) struct RemoveArgs {
     /// Remove exactly what is known to belong to it, without the unsure fringes within it
     #[arg(long)]
     tight: bool,
+    /// Leave its shadow on flat surfaces
+    #[arg(long)]
+    keep_shadow: bool,
     /// Another number gives another fill
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -56,6 +60,11 @@ pub(crate) struct RemoveArgs {
 enum Fill {
     /// Planes beside it go on where it hid them
     Plane,
+    /// The same, painted by the network LaMa ('fmlgs models fetch lama')
+    Lama,
+    /// Planes, and then the scene is trained anew on its photos, which have that in them instead; takes as long as it
+    /// took, and goes on where it was stopped
+    Photos,
     /// They stay open
     None,
 }
@@ -63,15 +72,31 @@ enum Fill {
 pub(crate) fn run(args: RemoveArgs, quiet: bool) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
     let map = scene.semantics()?;
-    derived::check(&args.out)?;
     let ids = query::identities(&map, &args.text, args.kind, args.top)?;
     let names: Vec<String> = ids.iter().map(|id| map.identities.full_name(*id)).collect();
     let name = names.join(", ");
-    let paint = (args.fill == Fill::Plane).then_some(args.paint);
-    let options = RemovalOptions { ids, halo: !args.tight, paint, seed: args.seed };
-    let done = remove::run(&scene, &map, &options, &mut Console::new(quiet))
-        .map_err(|e| CliError::of_work(e, "nothing was written"))?;
-    remove::store(&scene, &name, &done, &args.out)?;
+    match args.fill {
+        Fill::Photos => photos_without::check(&scene, &name, &args.out)?,
+        _ => derived::check(&args.out)?,
+    }
+    let paint = match args.fill {
+        Fill::Plane | Fill::Photos => Some(args.paint),
+        Fill::Lama => Some(Paint::Lama),
+        Fill::None => None,
+    };
+    let options = RemovalOptions { ids, halo: !args.tight, lift_shadow: !args.keep_shadow, paint, seed: args.seed };
+    let console = &mut Console::new(quiet);
+    let done = remove::run(&scene, &map, &options, console).map_err(|e| CliError::of_work(e, "nothing was written"))?;
+    if args.fill == Fill::Photos {
+        let finished = photos_without::retrain(&scene, &map, (&options, &name), &done, &args.out, console)
+            .map_err(|e| CliError::of_work(e, "what is done is kept"))?;
+        if !finished {
+            let kept = "the photos and the training so far are kept; do the same again to go on";
+            return Err(CliError::Cancelled(kept.into()));
+        }
+    } else {
+        remove::store(&scene, &name, &done, &args.out)?;
+    }
     if args.json {
         return output::print_json(&json!({
             "scene": args.out, "names": names, "gaussians": done.cloud.len(), "report": done.report,

@@ -1,12 +1,13 @@
 //! Sparse points as `.ply`: `x y z` and, where present, `red green blue`.
 
+use std::io::Write;
 use std::path::Path;
 
 use glam::DVec3;
 use rayon::prelude::*;
 
 use super::ply::{Ply, Scalar, Table};
-use super::{IoError, files, photo_list};
+use super::{IoError, atomic, files, photo_list};
 use crate::scene::{Camera, SparsePoint};
 
 /// Color of points that have none.
@@ -37,6 +38,22 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Vec<SparsePoint>, IoError> {
         .collect();
     first_bad(&points, &table, path)?;
     Ok(points)
+}
+
+/// Writes a binary `.ply` of colored points.
+pub(crate) fn write(path: &Path, points: &[SparsePoint]) -> Result<(), IoError> {
+    atomic::write(path, |f: &mut dyn Write| {
+        writeln!(f, "ply\nformat binary_little_endian 1.0\nelement vertex {}", points.len())?;
+        writeln!(f, "property float x\nproperty float y\nproperty float z")?;
+        writeln!(f, "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header")?;
+        for p in points {
+            for c in p.position.to_array() {
+                f.write_all(&(c as f32).to_le_bytes())?;
+            }
+            f.write_all(&p.rgb)?;
+        }
+        Ok(())
+    })
 }
 
 /// A color channel as 8 bits: floating-point colors are 0 to 1, 16-bit ones fill their range.

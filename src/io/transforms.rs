@@ -101,6 +101,13 @@ pub fn read(file: &Path) -> Result<Dataset, IoError> {
     })
 }
 
+/// nerfstudio's camera: 4x4 rows of world_from_camera with x right, y up, z back.
+pub(crate) fn opengl_pose(camera: &Camera) -> [[f64; 4]; 4] {
+    let m = camera.world_from_camera;
+    let (x, y, z, c) = (m.x_axis, -m.y_axis, -m.z_axis, camera.center);
+    [[x.x, y.x, z.x, c.x], [x.y, y.y, z.y, c.y], [x.z, y.z, z.z, c.z], [0.0, 0.0, 0.0, 1.0]]
+}
+
 /// Reads a Blender dataset: photos of `transforms_train.json` to train on, those of
 /// `transforms_test.json` (or else of `transforms_val.json`) marked as test.
 pub fn read_blender(root: &Path) -> Result<Dataset, IoError> {

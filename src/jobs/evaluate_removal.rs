@@ -8,16 +8,19 @@ use super::evaluate::PhotoComparison;
 use super::remove::{self, Paint, Reduced, RemovalOptions};
 use super::{JobError, Scene, export, query};
 use crate::io::files;
+use crate::models::catalog::{self, ModelRole};
+use crate::models::lama::LAMA;
 use crate::pipeline::depth::{self, TrueDepth};
 use crate::pipeline::metrics::planes;
 use crate::pipeline::observer::{Observer, Ticker};
-use crate::pipeline::removal::score::{RegionScore, RemovalRegion, Tally, regions};
+use crate::pipeline::removal::score::{RegionScore, RemovalRegion, Tally, flat_share, mark_shaded, regions};
 use crate::pipeline::synth::{SETTINGS, SynthOptions};
 use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, LevelFilter, PhotoPixels, SemanticMap};
 
-/// The ways that are compared: nothing is filled, and each way to paint.
-const WAYS: [Option<Paint>; 4] = [None, Some(Paint::Nearest), Some(Paint::Smooth), Some(Paint::Patches)];
+/// The ways that are compared: nothing is filled, and each way to paint; LaMa, too, where it is there.
+const WAYS: [Option<Paint>; 5] =
+    [None, Some(Paint::Nearest), Some(Paint::Telea), Some(Paint::Smooth), Some(Paint::Patches)];
 
 /// A thing that was removed in one way.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -27,8 +30,12 @@ pub(crate) struct RemovalRow {
     pub(crate) paint: Option<Paint>,
     pub(crate) uncovered: Option<RegionScore>,
     pub(crate) invented: Option<RegionScore>,
-    /// Everything else, against the photos with the thing: before it was removed and after.
+    /// What its shadow and its light lay on, against the photos without it: before it was removed and after.
+    pub(crate) shaded: [Option<RegionScore>; 2],
+    /// Everything else: before and after.
     pub(crate) outside: [Option<RegionScore>; 2],
+    /// The share of what is behind it that is flat.
+    pub(crate) flat: f64,
     pub(crate) gaussians_removed: usize,
     pub(crate) gaussians_invented: usize,
     pub(crate) secs: f64,
@@ -42,7 +49,9 @@ struct TrueView {
     regions: Vec<RemovalRegion>,
     with: [Vec<f64>; 3],
     without: [Vec<f64>; 3],
+    /// Without it; and with it.
     depth: TrueDepth,
+    before: TrueDepth,
     index: usize,
 }
 
@@ -60,10 +69,11 @@ pub(crate) fn run(
 ) -> Result<Vec<RemovalRow>, JobError> {
     let map = scene.semantics()?;
     let photos = photos(comparison)?;
+    let has_lama = catalog::find(LAMA, ModelRole::Inpainter).is_ok();
     let mut rows = Vec::new();
     for folder in folders(truth)? {
         let (name, views) = views(comparison, &folder, &photos)?;
-        for paint in WAYS {
+        for paint in WAYS.into_iter().chain(has_lama.then_some(Some(Paint::Lama))) {
             rows.push(one(scene, &map, (&name, paint), &views, comparison, observer)?);
         }
     }
@@ -122,10 +132,11 @@ fn views(
         let depths = [&comparison.dataset.root, folder].map(|root: &Path| depth::of_photo(root, photo));
         let [before, depth] = depths.map(|d| Ok::<_, JobError>(d?.resampled(size[0], size[1])));
         let (before, depth) = (before?, depth?);
-        let regions = regions(&with.camera, (&before, &depth), photos);
+        let mut regions = regions(&with.camera, (&before, &depth), photos);
         if regions.iter().any(|r| *r != RemovalRegion::Outside) {
             let (with_planes, without) = (planes(&with.pixels), planes(&pixels));
-            views.push(TrueView { camera: with.camera, regions, with: with_planes, without, depth, index });
+            mark_shaded(&mut regions, &with_planes, &without);
+            views.push(TrueView { camera: with.camera, regions, with: with_planes, without, depth, before, index });
         }
     }
     if views.is_empty() {
@@ -144,7 +155,7 @@ fn one(
 ) -> Result<RemovalRow, JobError> {
     let ids = query::identities(map, name, LevelFilter::Auto, 1)?;
     let start = std::time::Instant::now();
-    let options = RemovalOptions { ids, halo: true, paint, seed: 0 };
+    let options = RemovalOptions { ids, halo: true, lift_shadow: true, paint, seed: 0 };
     let Reduced { cloud, map: left, report } = remove::run(scene, map, &options, observer)?;
     let secs = start.elapsed().as_secs_f64();
     let found_again = match query::identities(&left, name, LevelFilter::Auto, 1) {
@@ -154,6 +165,7 @@ fn one(
     let mut renderer = Renderer::new();
     let settings = RenderSettings { depth: true, ..scene.settings.clone() };
     let [mut uncovered, mut invented, mut before, mut after] = [(); 4].map(|()| Tally::default());
+    let mut shaded = [(); 2].map(|()| Tally::default());
     let mut ticker = Ticker::new(format!("Comparing without {name}"), views.len());
     for (k, view) in views.iter().enumerate() {
         ticker.tick(k, observer)?;
@@ -161,6 +173,8 @@ fn one(
         let is = renderer.render(&cloud, Features::NONE, &view.camera, &settings)?;
         uncovered.add(&is, &view.without, Some(&view.depth), &view.regions, RemovalRegion::Uncovered);
         invented.add(&is, &view.without, Some(&view.depth), &view.regions, RemovalRegion::Invented);
+        shaded[0].add(&was, &view.without, None, &view.regions, RemovalRegion::Shaded);
+        shaded[1].add(&is, &view.without, None, &view.regions, RemovalRegion::Shaded);
         before.add(&was, &view.with, None, &view.regions, RemovalRegion::Outside);
         after.add(&is, &view.with, None, &view.regions, RemovalRegion::Outside);
         if let (Some(folder), true) = (&comparison.pictures, paint != Some(Paint::Nearest)) {
@@ -174,7 +188,9 @@ fn one(
         paint,
         uncovered: uncovered.score(),
         invented: invented.score(),
+        shaded: shaded.each_ref().map(Tally::score),
         outside: [before.score(), after.score()],
+        flat: flat_share(views.iter().map(|v| (&v.camera, v.regions.as_slice(), &v.before, &v.depth))),
         gaussians_removed: report.taken(),
         gaussians_invented: report.invented(),
         secs,
@@ -182,12 +198,13 @@ fn one(
     })
 }
 
-/// Before, after, the truth without the thing, and the regions: uncovered blue, invented red.
+/// Before, after, the truth without the thing, and the regions: uncovered blue, invented red, shaded green.
 fn picture(path: &Path, view: &TrueView, drawn: [&[[u8; 3]]; 2]) -> Result<(), JobError> {
     let (w, h) = (view.camera.width_px as usize, view.camera.height_px as usize);
     let truth: Vec<[u8; 3]> = (0..w * h).map(|i| std::array::from_fn(|c| (255.0 * view.without[c][i]) as u8)).collect();
     let tint = |i: usize| match view.regions[i] {
         RemovalRegion::Outside | RemovalRegion::Rim => truth[i].map(|c| c / 2 + 100),
+        RemovalRegion::Shaded => [truth[i][0], truth[i][1] / 2 + 100, truth[i][2] / 2],
         RemovalRegion::Uncovered => [40, 110, 230],
         RemovalRegion::Invented => [230, 60, 40],
     };

@@ -25,6 +25,7 @@ pub(crate) mod inspect;
 pub(crate) mod models;
 pub mod open;
 pub(crate) mod page;
+pub(crate) mod photos_without;
 pub mod phrases;
 pub(crate) mod plan;
 pub(crate) mod poses;

@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use super::{JobError, Scene, derived, export, open};
+use super::{JobError, Scene, derived, export, open, photos_without};
 use crate::math::format;
-use crate::pipeline::observer::Observer;
+use crate::models::catalog::{self, ModelRole};
+use crate::models::lama::{LAMA, Lama};
+use crate::pipeline::observer::{Interrupted, Observer};
 use crate::pipeline::removal;
 pub(crate) use crate::pipeline::removal::{Paint, RemovalOptions, RemovalReport};
 use crate::pipeline::semantics::edit;
@@ -27,7 +29,12 @@ pub(crate) fn run(
     observer: &mut dyn Observer,
 ) -> Result<Reduced, JobError> {
     let photos: Vec<Camera> = scene.cameras.iter().filter(|c| !c.held_out).map(|c| c.camera.clone()).collect();
-    let done = removal::remove(&scene.cloud, map, &photos, &scene.settings, options, observer)?;
+    let mut network = match options.paint {
+        Some(Paint::Lama) => Some(Lama::open(&catalog::find(LAMA, ModelRole::Inpainter)?)?),
+        _ => None,
+    };
+    let network = network.as_mut();
+    let done = removal::remove(&scene.cloud, map, &photos, &scene.settings, options, network, observer)?;
     let (rest, number) = edit::forget(map, &options.ids);
     let mut new = rest.select_fully(&done.kept);
     for id in done.identity_of.iter().skip(done.kept.len()).map(|id| number[*id as usize]) {
@@ -45,6 +52,8 @@ pub struct RemoveRequest {
     /// Folder of the scene.
     pub(crate) folder: PathBuf,
     pub(crate) options: RemovalOptions,
+    /// Whether the scene is trained anew on its photos without the thing, which takes as long as it took.
+    pub(crate) retrain: bool,
 }
 
 /// A scene that was stored without some things.
@@ -66,8 +75,13 @@ pub(crate) fn beside(request: &RemoveRequest, observer: &mut dyn Observer) -> Re
     let name = removal::names(&map, ids);
     let done = run(&scene, &map, &request.options, observer)?;
     let words: Vec<String> = ids.iter().map(|id| export::identity_name(&map.identities, *id)).collect();
-    let folder = derived::free_folder(&request.folder, &format!("without-{}", words.join("-")));
-    store(&scene, &name, &done, &folder)?;
+    let again = if request.retrain { "-retrained" } else { "" };
+    let folder = derived::free_folder(&request.folder, &format!("without-{}{again}", words.join("-")));
+    if !request.retrain {
+        store(&scene, &name, &done, &folder)?;
+    } else if !photos_without::retrain(&scene, &map, (&request.options, &name), &done, &folder, observer)? {
+        return Err(Interrupted.into());
+    }
     Ok(RemovedScene { folder, name, request: request.clone(), report: done.report })
 }
 
@@ -80,6 +94,9 @@ pub(crate) fn told(name: &str, report: &RemovalReport) -> String {
         Some(rough) => {
             text +=
                 &format!(", {} invented on {}", report.invented(), format::things(report.surfaces.len(), "surface"));
+            if report.brightened > 0 {
+                text += ", its shadow lifted";
+            }
             if rough > ROUGH {
                 text += " (a guess: what is seen around is not flat)";
             }

@@ -23,6 +23,8 @@ pub(crate) enum ModelRole {
     /// Compares pictures with phrases.
     Encoder,
     Segmenter,
+    /// Paints what is missing of a picture.
+    Inpainter,
     /// Runs networks.
     Engine,
 }

@@ -18,6 +18,7 @@ pub(crate) mod engine;
 mod error;
 pub mod fetch;
 mod known;
+pub(crate) mod lama;
 pub mod manifest;
 pub mod network;
 mod official;

@@ -10,7 +10,7 @@ use super::template::Template;
 use super::{ModelError, manifest, unpack};
 
 /// Endings of checkpoints, and of archives with programs.
-const ENDINGS: [&str; 6] = [".pt", ".pth", ".bin", ".safetensors", ".tgz", ".zip"];
+const ENDINGS: [&str; 7] = [".pt", ".pth", ".bin", ".safetensors", ".onnx", ".tgz", ".zip"];
 
 /// The template of a model, where there is one.
 fn template(id: &str) -> Option<&'static [u8]> {
@@ -68,6 +68,11 @@ impl ModelEntry {
         if self.role == ModelRole::Engine {
             let library = self.file.first().map_or("", |f| &f.name);
             unpack::library(checkpoint, library, folder, &self.description)?;
+            return self.verify(folder);
+        }
+        if self.role == ModelRole::Inpainter {
+            let graph = self.file.first().map_or("", |f| &f.name);
+            unpack::graph(checkpoint, graph, folder, &self.description)?;
             return self.verify(folder);
         }
         let template = template(&self.id);
@@ -233,7 +238,7 @@ mod tests {
     fn every_listed_checkpoint_has_its_template() {
         let all = crate::models::catalog::entries().expect("the list");
         let mut made = 0;
-        for entry in all.into_iter().filter(|e| e.role != ModelRole::Engine) {
+        for entry in all.into_iter().filter(|e| !matches!(e.role, ModelRole::Engine | ModelRole::Inpainter)) {
             let bytes = template(&entry.id);
             assert_eq!(bytes.is_some(), entry.checkpoint.is_some(), "{}", entry.id);
             let Some(bytes) = bytes else { continue };

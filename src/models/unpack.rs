@@ -1,4 +1,4 @@
-//! The library of ONNX Runtime, out of the archive that its makers release for a system.
+//! What is used as its makers publish it: the library of ONNX Runtime, out of their archive, and graphs.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
@@ -10,8 +10,9 @@ use sha2::{Digest, Sha256};
 use tar::{Archive, EntryType};
 use zip::ZipArchive;
 
-use super::ModelError;
+use super::engine::engine;
 use super::template::{failed, hex, put_in_place};
+use super::{ModelError, lama};
 use crate::io::temporary::temporary_folder;
 
 /// Largest library, bytes; those of the processor's releases have some 20 to 40 MB.
@@ -37,6 +38,17 @@ pub(super) fn library(archive: &Path, name: &str, folder: &Path, description: &s
         "graphs": { "library": { "file": name, "bytes": bytes.len(), "sha256": hex(&Sha256::digest(&bytes)) } },
     });
     put_in_place(draft, folder, vec![name.to_owned()], description, &about)
+}
+
+/// Takes over a graph that is ready, as the file `name` in `folder`, and describes it. Both are there then, or nothing.
+pub(super) fn graph(graph: &Path, name: &str, folder: &Path, description: &str) -> Result<(), ModelError> {
+    engine()?.load_file(graph)?;
+    std::fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
+    let held = temporary_folder(folder, description).map_err(|e| failed(folder, e))?;
+    let draft = held.folder.path();
+    let bytes = std::fs::copy(graph, draft.join(name)).map_err(|e| failed(graph, e))?;
+    let sha256 = super::fetch::sha256(&draft.join(name)).map_err(|e| failed(graph, e))?;
+    put_in_place(draft, folder, vec![name.to_owned()], description, &lama::description(name, bytes, &sha256))
 }
 
 /// Whether a file in an archive is the library, which may have its version in its name.

@@ -50,7 +50,7 @@ impl App {
             Action::KeepArranged => self.keep_arranged(),
             Action::MeasureSplats => self.measure_splats(),
             Action::DeleteChosen => self.delete_chosen(),
-            Action::AnotherFill(halo) => self.fill_anew(halo),
+            Action::AnotherFill(request) => self.submit_removal(request.options, request.retrain),
             Action::FetchModel(id) => self.install_model(id, None),
             Action::TypeQuery => self.type_question(),
             Action::Ask(text) => {

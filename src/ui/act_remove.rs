@@ -9,23 +9,17 @@ use crate::worker::Command;
 impl App {
     /// Makes a scene without the identity.
     pub(super) fn remove(&mut self, id: IdentityId) {
-        self.submit_removal(RemovalOptions::of(id));
+        self.submit_removal(RemovalOptions::of(id), false);
     }
 
-    /// Makes another scene without what was removed last: closed otherwise, with its fringes (`halo`) or without.
-    pub(super) fn fill_anew(&mut self, halo: bool) {
-        let Some(last) = &self.state.removed else { return };
-        let RemovalOptions { seed, .. } = last.request.options;
-        self.submit_removal(RemovalOptions { halo, seed: seed + 1, ..last.request.options.clone() });
-    }
-
-    fn submit_removal(&mut self, options: RemovalOptions) {
+    /// Makes a scene without what `options` say, trained anew if wanted.
+    pub(super) fn submit_removal(&mut self, options: RemovalOptions, retrain: bool) {
         if self.editing.is_some() || !self.edits.is_empty() {
             return self.state.toast(Tone::Warning, "Objects are being changed; remove it once that is done.");
         }
         let Some(folder) = self.state.scene.as_ref().filter(|_| self.state.is_trained()).map(|s| s.out.clone()) else {
             return self.state.toast(Tone::Warning, "Only from a trained scene can something be removed.");
         };
-        self.submit(Command::Remove(Box::new(RemoveRequest { folder, options })));
+        self.submit(Command::Remove(Box::new(RemoveRequest { folder, options, retrain })));
     }
 }

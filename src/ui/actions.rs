@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
 use crate::io::unposed::Unposed;
+use crate::jobs::remove::RemoveRequest;
 use crate::measure::{Knobs, StageName};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
@@ -210,7 +211,7 @@ actions! {
         "Write its Gaussians in the format that 3DGS viewers read.";
     Remove(id: IdentityId): format!("Remove #{id} and fill"),
         "Take it out, into a scene of its own that is shown beside this one: what it hid is closed from what is around.";
-    AnotherFill(halo: bool): "Another fill",
+    AnotherFill(request: Box<RemoveRequest>): "Another fill",
         "Remove it again, with another choice of what hides below it; the scene made before stays.";
     Arrange(id: IdentityId): format!("Move, turn or recolor #{id}"),
         "Drag it along the axes, turn, scale, duplicate or recolor it; can be undone.";

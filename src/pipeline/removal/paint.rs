@@ -4,6 +4,8 @@
 //! slanting light needs, and what is left, the texture, is put together of patches that are seen elsewhere
 //! (PatchMatch: Barnes et al. 2009; voting over scales: Wexler et al. 2007).
 
+mod telea;
+
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
 use serde::{Deserialize, Serialize};
@@ -21,6 +23,11 @@ pub(crate) enum Paint {
     Smooth,
     /// Every texel like the nearest that is seen.
     Nearest,
+    /// Fast marching, as image editors do.
+    Telea,
+    /// A network.
+    #[value(skip)]
+    Lama,
 }
 
 /// Half of a patch's side, texels.
@@ -35,10 +42,13 @@ const SMALLEST: usize = 24;
 /// Over-relaxation of the film.
 const RELAX: f32 = 1.9;
 
-/// Paints the texels of `hole`, of a sheet of this size, from the `known` ones.
+/// Paints the texels of `hole`, of a sheet of this size, from the `known` ones; not by a network.
 pub(super) fn fill(color: &mut [[f32; 3]], size: [usize; 2], known: &[bool], hole: &[bool], how: Paint, seed: u64) {
     let n = color.len();
     let holes: Vec<usize> = (0..n).filter(|i| hole[*i]).collect();
+    if how == Paint::Telea {
+        return telea::fill(color, size, known, hole);
+    }
     if how == Paint::Nearest {
         let nearest = nearest(color, size, known);
         return holes.into_iter().for_each(|i| color[i] = nearest[i]);
@@ -302,6 +312,7 @@ mod tests {
         let slope = |x: usize, y: usize| [0.2 + 0.006 * x as f32 + 0.002 * y as f32; 3];
         assert!(error(slope, Paint::Smooth) < 0.01, "{}", error(slope, Paint::Smooth));
         assert!(error(slope, Paint::Patches) < 0.012, "{}", error(slope, Paint::Patches));
+        assert!(error(slope, Paint::Telea) < 0.02, "{}", error(slope, Paint::Telea));
         assert!(error(slope, Paint::Nearest) > 2.0 * error(slope, Paint::Smooth), "{}", error(slope, Paint::Nearest));
     }
 
@@ -314,12 +325,14 @@ mod tests {
         };
         let (patches, smooth) = (error(tiles, Paint::Patches), error(tiles, Paint::Smooth));
         assert!(patches < 0.05 && smooth > 0.1, "{patches} {smooth}");
+        assert!(error(tiles, Paint::Telea) > 2.0 * patches, "{}", error(tiles, Paint::Telea));
     }
 
     #[test]
     fn nothing_known_and_everything_known_are_no_trouble() {
         let mut color = vec![[0.3; 3]; 9];
         fill(&mut color, [3, 3], &[false; 9], &[true; 9], Paint::Patches, 0);
+        fill(&mut color, [3, 3], &[false; 9], &[true; 9], Paint::Telea, 0);
         assert!(color.iter().flatten().all(|c| c.is_finite()));
         let before = color.clone();
         fill(&mut color, [3, 3], &[true; 9], &[false; 9], Paint::Patches, 0);

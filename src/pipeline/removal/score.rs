@@ -1,9 +1,11 @@
 //! A removal against the truth: where a thing was in a view, what it uncovered and what was invented there.
 
+use glam::DVec3;
 use serde::Serialize;
 
+use super::plane::planes;
 use crate::math::grid;
-use crate::math::stats::{mean, psnr_of};
+use crate::math::stats::{mean, psnr_of, quantile};
 use crate::pipeline::depth::TrueDepth;
 use crate::render::{Frame, ssim};
 use crate::scene::Camera;
@@ -18,12 +20,57 @@ const SAME_DEPTH: f32 = 0.005;
 pub(crate) enum RemovalRegion {
     /// The thing was not there.
     Outside,
+    /// Nor there, but its shadow or its light was.
+    Shaded,
     /// Beside it: the photo shows a little of both.
     Rim,
     /// What was behind it is in another photo.
     Uncovered,
     /// It is in none.
     Invented,
+}
+
+/// Difference of a color from which a thing's shadow or light is seen there.
+const SHADE: f64 = 3.0 / 255.0;
+/// Flat surfaces that are looked for behind a thing, and points that are looked at.
+const FLAT: usize = 3;
+const POINTS: usize = 4_000;
+
+/// Marks where colors with a thing and without differ though it was not there.
+pub(crate) fn mark_shaded(regions: &mut [RemovalRegion], with: &[Vec<f64>; 3], without: &[Vec<f64>; 3]) {
+    for (i, region) in regions.iter_mut().enumerate().filter(|(_, r)| **r == RemovalRegion::Outside) {
+        if (0..3).any(|c| (with[c][i] - without[c][i]).abs() > SHADE) {
+            *region = RemovalRegion::Shaded;
+        }
+    }
+}
+
+/// The share of what is behind a thing in these views that lies on flat surfaces: cameras, regions, true depths with it
+/// and without.
+pub(crate) fn flat_share<'a>(
+    views: impl Iterator<Item = (&'a Camera, &'a [RemovalRegion], &'a TrueDepth, &'a TrueDepth)>,
+) -> f64 {
+    let (mut thing, mut behind, mut toward) = (Vec::new(), Vec::new(), DVec3::ZERO);
+    for (camera, regions, with, without) in views {
+        toward = camera.center;
+        for (i, _) in
+            regions.iter().enumerate().filter(|(_, r)| matches!(r, RemovalRegion::Uncovered | RemovalRegion::Invented))
+        {
+            let at = glam::DVec2::new((i % with.width) as f64 + 0.5, (i / with.width) as f64 + 0.5);
+            let point = |depth: f32| camera.center + camera.ray(at) * f64::from(depth);
+            thing.push(point(with.values[i]));
+            if without.values[i] > 0.0 {
+                behind.push(point(without.values[i]));
+            }
+        }
+    }
+    let middle = thing.iter().sum::<DVec3>() / thing.len().max(1) as f64;
+    let far: Vec<f64> = thing.iter().map(|p| p.distance(middle)).collect();
+    let step = behind.len().div_ceil(POINTS).max(1);
+    let points: Vec<DVec3> = behind.into_iter().step_by(step).collect();
+    let found = planes(&points, toward, quantile(&far, 0.98), FLAT, 0);
+    let on_one = points.iter().filter(|p| found.iter().any(|plane| plane.height(**p).abs() <= plane.tolerance)).count();
+    on_one as f64 / points.len().max(1) as f64
 }
 
 /// Where the thing was in the view of `camera`, by true depths with it and without, and what of that the `photos` with

@@ -6,9 +6,12 @@ use rayon::prelude::*;
 use super::extent::Ball;
 use super::paint::{self, Paint};
 use super::plane::Plane;
+use super::shade::brighter;
 use super::views::{SeenView, TOUCHED};
 use crate::math::grid;
 use crate::math::stats::median;
+use crate::models::ModelError;
+use crate::models::lama::Lama;
 
 /// Texels along a side: of the first look, and of a sheet at most.
 const FIRST: usize = 96;
@@ -59,14 +62,19 @@ pub(super) struct SurfaceSheet<'a> {
 }
 
 impl<'a> SurfaceSheet<'a> {
+    /// The plane as far as `reach` radii around the thing, in coarse texels.
+    pub(super) fn around(plane: &'a Plane, ball: &Ball, seen: &[SeenView], reach: f64) -> Self {
+        let middle = ball.center - plane.origin;
+        let side = 2.0 * reach * ball.radius;
+        let corner = [plane.u, plane.v].map(|along| middle.dot(along) - 0.5 * side);
+        Self::looked_at(plane, corner, side / FIRST as f64, [FIRST; 2], seen)
+    }
+
     /// The part of a plane that the thing in `ball` hid from all views, with what is seen around it; `None` if it hid
     /// nothing. `reach` radii around the thing are looked at.
     pub(super) fn find(plane: &'a Plane, ball: &Ball, seen: &[SeenView], reach: f64) -> Option<Self> {
-        let middle = ball.center - plane.origin;
-        let middle = [middle.dot(plane.u), middle.dot(plane.v)];
-        let side = 2.0 * reach * ball.radius;
-        let step = side / FIRST as f64;
-        let first = Self::looked_at(plane, middle.map(|m| m - 0.5 * side), step, [FIRST; 2], seen);
+        let first = Self::around(plane, ball, seen, reach);
+        let step = first.step;
         let hidden = || (0..first.state.len()).filter(|i| first.state[*i] == Texel::Hidden);
         let ends = |axis: usize| {
             let all = hidden().map(|i| [i % FIRST, i / FIRST][axis]);
@@ -170,11 +178,37 @@ impl<'a> SurfaceSheet<'a> {
         self.plane.origin + self.plane.u * at(0, i % self.size[0]) + self.plane.v * at(1, i / self.size[0])
     }
 
+    /// Where a point is along the sheet, in texels.
+    pub(super) fn place(&self, p: DVec3) -> [f64; 2] {
+        let d = p - self.plane.origin;
+        [(d.dot(self.plane.u) - self.corner[0]) / self.step, (d.dot(self.plane.v) - self.corner[1]) / self.step]
+    }
+
+    /// What the four texels around a point have, mixed; `None` beyond the sheet.
+    pub(super) fn sample(&self, p: DVec3, of: impl Fn(usize) -> [f32; 3]) -> Option<[f32; 3]> {
+        self.texel(p)?;
+        let [x, y] = self.place(p).map(|t| t - 0.5);
+        let mut sum = [0.0; 3];
+        for (dx, dy) in [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)] {
+            let (tx, ty) = (x.floor() + dx, y.floor() + dy);
+            let weight = (1.0 - (x - tx).abs()) * (1.0 - (y - ty).abs());
+            let [tx, ty] = [(tx, self.size[0]), (ty, self.size[1])].map(|(t, n)| t.clamp(0.0, n as f64 - 1.0) as usize);
+            let value = of(ty * self.size[0] + tx);
+            (0..3).for_each(|c| sum[c] += weight as f32 * value[c]);
+        }
+        Some(sum)
+    }
+
+    /// Makes what is seen brighter.
+    pub(super) fn brighten(&mut self, gain: impl Fn(DVec3) -> [f32; 3]) {
+        for i in (0..self.state.len()).filter(|i| self.state[*i] == Texel::Seen).collect::<Vec<_>>() {
+            self.color[i] = brighter(self.color[i], gain(self.center(i)));
+        }
+    }
+
     /// The texel below or above a point.
     pub(super) fn texel(&self, p: DVec3) -> Option<usize> {
-        let d = p - self.plane.origin;
-        let x = ((d.dot(self.plane.u) - self.corner[0]) / self.step).floor();
-        let y = ((d.dot(self.plane.v) - self.corner[1]) / self.step).floor();
+        let [x, y] = self.place(p).map(f64::floor);
         let inside = x >= 0.0 && y >= 0.0 && x < self.size[0] as f64 && y < self.size[1] as f64;
         inside.then(|| y as usize * self.size[0] + x as usize)
     }
@@ -190,11 +224,17 @@ impl<'a> SurfaceSheet<'a> {
         (0..grown.len()).filter(move |&i| grown[i] && matches!(self.state[i], Texel::Hidden | Texel::Seen))
     }
 
-    /// Gives what is hidden a color.
-    pub(super) fn paint(&mut self, how: Paint, seed: u64) {
+    /// Gives what is hidden a color; by the network, if there is one.
+    pub(super) fn paint(&mut self, how: Paint, seed: u64, network: Option<&mut Lama>) -> Result<(), ModelError> {
         let hole = grid::grown(self.size[0], self.hidden(), RIM);
         let known: Vec<bool> = (0..hole.len()).map(|i| self.state[i] == Texel::Seen && !hole[i]).collect();
-        paint::fill(&mut self.color, self.size, &known, &hole, how, seed);
+        let Some(network) = network else {
+            paint::fill(&mut self.color, self.size, &known, &hole, how, seed);
+            return Ok(());
+        };
+        let painted = network.paint(&self.color, self.size, &known)?;
+        (0..hole.len()).filter(|i| hole[*i]).for_each(|i| self.color[i] = painted[i]);
+        Ok(())
     }
 }
 

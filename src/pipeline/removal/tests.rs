@@ -3,6 +3,8 @@
 use glam::{DVec2, DVec3};
 
 use super::*;
+use crate::math::sh::SH_C0;
+use crate::math::srgb;
 use crate::pipeline::observer::Silent;
 use crate::render::{Features, Renderer};
 use crate::scene::{Identities, Level, NOBODY};
@@ -52,13 +54,13 @@ fn cameras(n: usize, shift: f64) -> Vec<Camera> {
 }
 
 fn options(paint: Option<Paint>) -> RemovalOptions {
-    RemovalOptions { ids: vec![BOX], halo: true, paint, seed: 3 }
+    RemovalOptions { ids: vec![BOX], halo: true, lift_shadow: true, paint, seed: 3 }
 }
 
 fn removed(paint: Option<Paint>) -> (SemanticMap, Removed) {
     let (cloud, map, photos) = scene(false);
     let done =
-        remove(&cloud, &map, &photos, &RenderSettings::default(), &options(paint), &mut Silent).expect("removed");
+        remove(&cloud, &map, &photos, &RenderSettings::default(), &options(paint), None, &mut Silent).expect("removed");
     (map, done)
 }
 
@@ -88,7 +90,7 @@ fn what_a_box_hid_of_a_table_is_closed_with_its_color_and_depth() {
     let (_, open) = removed(None);
     let (color, depth) = off(&open.cloud);
     assert!(color > 0.2 && depth > 0.5, "there is no hole: {color} {depth}");
-    for (paint, most) in [(Paint::Patches, 0.03), (Paint::Smooth, 0.03), (Paint::Nearest, 0.08)] {
+    for (paint, most) in [(Paint::Patches, 0.03), (Paint::Smooth, 0.03), (Paint::Telea, 0.05), (Paint::Nearest, 0.08)] {
         let (_, done) = removed(Some(paint));
         let (color, depth) = off(&done.cloud);
         assert!(color < most && depth < 0.01, "{paint:?}: {color} {depth}");
@@ -124,7 +126,8 @@ fn a_box_in_the_air_hides_nothing() {
     of.extend(vec![TABLE; floor.len()]);
     cloud.append(floor);
     let map = SemanticMap::from_identities(map.identities, of.clone(), vec![1.0; of.len()], vec![]);
-    let done = remove(&cloud, &map, &photos, &RenderSettings::default(), &options(Some(Paint::Patches)), &mut Silent);
+    let done =
+        remove(&cloud, &map, &photos, &RenderSettings::default(), &options(Some(Paint::Patches)), None, &mut Silent);
     assert_eq!(done.expect("removed").report.surfaces, []);
 }
 
@@ -134,7 +137,7 @@ fn what_makes_no_sense_is_refused_by_name() {
     let settings = RenderSettings::default();
     let run = |map: &SemanticMap, photos: &[Camera], ids: Vec<IdentityId>, paint: Option<Paint>| {
         let options = RemovalOptions { ids, ..options(paint) };
-        remove(&cloud, map, photos, &settings, &options, &mut Silent).map(|_| ())
+        remove(&cloud, map, photos, &settings, &options, None, &mut Silent).map(|_| ())
     };
     let patches = Some(Paint::Patches);
     assert!(matches!(run(&map, &[], vec![BOX], patches), Err(RemovalError::Unseen(name)) if name == "box"));
@@ -154,7 +157,55 @@ fn the_same_seed_gives_the_same_fill() {
 fn a_table_that_is_removed_leaves_what_stood_on_it_and_no_surface() {
     let (cloud, map, photos) = scene(false);
     let options = RemovalOptions { ids: vec![TABLE], ..options(Some(Paint::Patches)) };
-    let done = remove(&cloud, &map, &photos, &RenderSettings::default(), &options, &mut Silent).expect("removed");
+    let done = remove(&cloud, &map, &photos, &RenderSettings::default(), &options, None, &mut Silent).expect("removed");
     assert_eq!(done.report.surfaces, []);
     assert_eq!(done.kept.len(), map.members(BOX).len());
+}
+
+const STAIN: DVec3 = DVec3::new(-1.2, 0.0, 0.9);
+
+/// Darkens the table where the box is between it and the sun, and in a round stain.
+fn shaded(mut cloud: GaussianCloud, map: &SemanticMap) -> GaussianCloud {
+    let sun = DVec3::new(0.5, 0.8, 0.3).normalize();
+    for i in map.members(TABLE) {
+        let at = cloud.world_position(i);
+        let in_box = |t: f64| (at + sun * t).abs().cmple(DVec3::new(0.4, 0.8, 0.4)).all();
+        if at.distance(STAIN) < 0.25 || (1..200).any(|k| in_box(0.01 * f64::from(k))) {
+            cloud.sh[i] = cloud.sh[i].map(|v| {
+                let dark = srgb::encode(0.5 * srgb::linear(0.5 + SH_C0 as f32 * v)).0;
+                (dark - 0.5) / SH_C0 as f32
+            });
+        }
+    }
+    cloud
+}
+
+/// The largest and the mean change of the table's own colors against those without a shadow, in the shadow (or, with
+/// `stain`, in the stain).
+fn darker(lift_shadow: bool, stain: bool) -> (f32, usize) {
+    let (bright, map, photos) = scene(false);
+    let cloud = shaded(bright.clone(), &map);
+    let options = RemovalOptions { lift_shadow, ..options(Some(Paint::Patches)) };
+    let done = remove(&cloud, &map, &photos, &RenderSettings::default(), &options, None, &mut Silent).expect("removed");
+    let of_it = |i: &usize| cloud.sh[*i] != bright.sh[*i] && (cloud.world_position(*i).distance(STAIN) < 0.25) == stain;
+    let kept = done.kept.iter().enumerate().filter(|(_, i)| of_it(i) && map.identity_of[**i] == TABLE);
+    let off: Vec<f32> = kept.map(|(k, i)| (bright.sh[*i][1] - done.cloud.sh[k][1]) * SH_C0 as f32).collect();
+    (off.iter().sum::<f32>() / off.len() as f32, done.report.brightened)
+}
+
+#[test]
+fn the_shadow_of_a_thing_goes_with_it_and_a_stain_stays() {
+    let (kept, brightened) = darker(false, false);
+    assert!(kept > 0.1 && brightened == 0, "there is no shadow: {kept}, {brightened}");
+    let (lifted, brightened) = darker(true, false);
+    assert!(lifted.abs() < 0.25 * kept && brightened > 100, "{lifted} of {kept} is left, {brightened}");
+    assert!(darker(true, true).0 > 0.8 * darker(false, true).0, "the stain is gone");
+}
+
+#[test]
+fn what_is_no_shadow_of_the_thing_is_not_lifted() {
+    let (cloud, map, photos) = scene(false);
+    let bare =
+        remove(&cloud, &map, &photos, &RenderSettings::default(), &options(Some(Paint::Smooth)), None, &mut Silent);
+    assert_eq!(bare.expect("removed").report.brightened, 0);
 }

@@ -2,6 +2,7 @@
 //!
 //! For a training that goes on: its Gaussians have moved a little, some are gone, some are new.
 
+use glam::DVec3;
 use rayon::prelude::*;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
@@ -15,15 +16,8 @@ const REACH: f64 = 2.0;
 /// The map of `from` for the Gaussians `to`, each of which takes identity and codes of the nearest one
 /// that reaches it, and the share of `to` that one does.
 pub(crate) fn carry(map: &SemanticMap, from: &GaussianCloud, to: &GaussianCloud) -> (SemanticMap, f64) {
-    let points = (0..from.len()).map(|i| GeomWithData::new(from.world_position(i).to_array(), i)).collect();
-    let tree = RTree::bulk_load(points);
-    let nearest = |i: usize| -> Option<usize> {
-        let at = to.world_position(i).to_array();
-        let (near, distance_2) = tree.nearest_neighbor_iter_with_distance_2(at).next()?;
-        let longest = from.log_scales[near.data].iter().fold(f32::NEG_INFINITY, |m, s| m.max(*s));
-        (distance_2.sqrt() <= REACH * f64::from(longest).exp()).then_some(near.data)
-    };
-    let nearest: Vec<Option<usize>> = (0..to.len()).into_par_iter().map(nearest).collect();
+    let to: Vec<DVec3> = (0..to.len()).map(|i| to.world_position(i)).collect();
+    let nearest = nearest(from, &to);
     let of = nearest.iter().map(|n| n.map_or(NOBODY, |i| map.identity_of[i])).collect();
     let margin = nearest.iter().map(|n| n.map_or(0.0, |i| map.margin[i])).collect();
     let mut carried = SemanticMap::from_identities(map.identities.clone(), of, margin, map.seeds.clone());
@@ -37,11 +31,22 @@ pub(crate) fn carry(map: &SemanticMap, from: &GaussianCloud, to: &GaussianCloud)
     (carried, reached as f64 / to.len().max(1) as f64)
 }
 
+/// For each point, the Gaussian that is nearest, if it reaches so far.
+pub(crate) fn nearest(from: &GaussianCloud, points: &[DVec3]) -> Vec<Option<usize>> {
+    let all = (0..from.len()).map(|i| GeomWithData::new(from.world_position(i).to_array(), i)).collect();
+    let tree = RTree::bulk_load(all);
+    let one = |at: &DVec3| -> Option<usize> {
+        let (near, distance_2) = tree.nearest_neighbor_iter_with_distance_2(at.to_array()).next()?;
+        let longest = from.log_scales[near.data].iter().fold(f32::NEG_INFINITY, |m, s| m.max(*s));
+        (distance_2.sqrt() <= REACH * f64::from(longest).exp()).then_some(near.data)
+    };
+    points.par_iter().map(one).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::scene::{Identities, Level};
-    use glam::DVec3;
 
     fn cloud(xs: &[f32], origin: DVec3) -> GaussianCloud {
         GaussianCloud {

@@ -227,10 +227,3 @@ fn held_out(options: &SynthOptions) -> Vec<bool> {
     }
     test
 }
-
-/// nerfstudio's camera: 4x4 rows of world_from_camera with x right, y up, z back.
-fn opengl_pose(camera: &Camera) -> [[f64; 4]; 4] {
-    let m = camera.world_from_camera;
-    let (x, y, z, c) = (m.x_axis, -m.y_axis, -m.z_axis, camera.center);
-    [[x.x, y.x, z.x, c.x], [x.y, y.y, z.y, c.y], [x.z, y.z, z.z, c.z], [0.0, 0.0, 0.0, 1.0]]
-}

@@ -8,12 +8,13 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 use npyz::WriterBuilder;
 use serde_json::json;
 
+use super::SynthError;
 use super::levels::TrueIdentity;
 use super::options::SynthOptions;
 use super::view::SynthView;
-use super::{SynthError, opengl_pose};
 use crate::io::folder_lock::FolderLock;
-use crate::io::{IoError, atomic, files};
+use crate::io::transforms::opengl_pose;
+use crate::io::{IoError, atomic, files, points_ply};
 use crate::scene::{Camera, SparsePoint};
 
 /// The file whose presence makes the folder a data set; written last.
@@ -85,7 +86,7 @@ impl Writer {
         let identities = json!({ "version": 1, "scene": scene, "identities": identities });
         self.json("identities.json", &identities)?;
         if !points.is_empty() {
-            self.file("points3D.ply", |f| ply(f, points))?;
+            points_ply::write(&self.out.join("points3D.ply"), points)?;
         }
         self.json(SETTINGS, &json!({ "version": 1, "scene": fingerprint, "options": options }))?;
         self.json(TRANSFORMS, &self.transforms(options, views, !points.is_empty()))
@@ -146,18 +147,4 @@ impl Writer {
 
 fn png(f: &mut BufWriter<File>, bytes: &[u8], w: u32, h: u32, color: ExtendedColorType) -> std::io::Result<()> {
     PngEncoder::new(f).write_image(bytes, w, h, color).map_err(std::io::Error::other)
-}
-
-/// Binary PLY of colored points.
-fn ply(f: &mut BufWriter<File>, points: &[SparsePoint]) -> std::io::Result<()> {
-    writeln!(f, "ply\nformat binary_little_endian 1.0\nelement vertex {}", points.len())?;
-    writeln!(f, "property float x\nproperty float y\nproperty float z")?;
-    writeln!(f, "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header")?;
-    for p in points {
-        for c in p.position.to_array() {
-            f.write_all(&(c as f32).to_le_bytes())?;
-        }
-        f.write_all(&p.rgb)?;
-    }
-    Ok(())
 }

@@ -9,7 +9,9 @@ use super::super::state::AppState;
 use super::super::{keys, theme};
 use super::{Viewport, legend};
 use crate::jobs::OpenedScene;
+use crate::jobs::remove::{Paint, RemovalOptions, RemoveRequest};
 use crate::math::format;
+use crate::models::lama::LAMA;
 use crate::scene::text;
 use crate::ui::actions::Action;
 use crate::ui::color_by::ColorBy;
@@ -129,13 +131,7 @@ impl Viewport {
             if open.clicked() {
                 actions.push(Action::Open(removed.folder.clone()));
             }
-            let mut halo = removed.request.options.halo;
-            let tip = "Unsure Gaussians within it are removed, too. Another choice makes another scene.";
-            let changed = ui.checkbox(&mut halo, "fringes").on_hover_text(tip).changed();
-            let again = Action::AnotherFill(halo);
-            if ui.button(again.text()).on_hover_text(again.tooltip()).clicked() || changed {
-                actions.push(again);
-            }
+            self.other_fills(ui, &removed.request, state, actions);
         }
         if let Some(psnr) = self.picture().and_then(|p| p.second.as_ref()?.psnr) {
             ui.colored_label(theme::accent(), format!("preview {}", format::decibel(psnr)));
@@ -143,6 +139,47 @@ impl Viewport {
         let close = ui.button("\u{d7}").on_hover_text(Action::OpenBeside(None).text());
         if close.accessible_name(Action::OpenBeside(None).text()).clicked() {
             actions.push(Action::OpenBeside(None));
+        }
+    }
+
+    /// Removing a thing anew: each choice makes another scene.
+    fn other_fills(&self, ui: &mut Ui, last: &RemoveRequest, state: &AppState, actions: &mut Vec<Action>) {
+        let options = RemovalOptions { seed: last.options.seed + 1, ..last.options.clone() };
+        let mut next = RemoveRequest { options, retrain: false, ..last.clone() };
+        let again = Action::AnotherFill(Box::new(next.clone()));
+        if ui.button(again.text()).on_hover_text(again.tooltip()).clicked() {
+            actions.push(again);
+        }
+        let changed = ui.menu_button("Options", |ui| {
+            let options = &mut next.options;
+            let mut changed = ui
+                .checkbox(&mut options.halo, "With its fringes")
+                .on_hover_text("Unsure Gaussians within it are removed, too.")
+                .changed();
+            let tip = "The shadow that it casts on flat surfaces goes with it.";
+            changed |= ui.checkbox(&mut options.lift_shadow, "With its shadow").on_hover_text(tip).changed();
+            if state.models.as_ref().and_then(|m| m.get(LAMA)).is_some_and(|(_, s)| s.is_usable()) {
+                let mut by_network = options.paint == Some(Paint::Lama);
+                let tip = "The network paints the surfaces that it hid.";
+                if ui.checkbox(&mut by_network, "Painted by LaMa").on_hover_text(tip).changed() {
+                    options.paint = Some(if by_network { Paint::Lama } else { Paint::default() });
+                    changed = true;
+                }
+            }
+            ui.separator();
+            let tip = "Trains the scene anew on its photos, in which it is replaced by what is behind it. Takes as long as \
+                       the scene's training took.";
+            if ui.button("Train anew without it").on_hover_text(tip).clicked() {
+                next.retrain = true;
+                changed = true;
+            }
+            if changed {
+                ui.close();
+            }
+            changed
+        });
+        if changed.inner == Some(true) {
+            actions.push(Action::AnotherFill(Box::new(next)));
         }
     }
 

@@ -1,0 +1,163 @@
+//! The photos of a scene without a thing, and a scene that is trained anew on them.
+//!
+//! Where the thing was, a photo shows what the scene has there now, which is the same from all sides; where only its shadow
+//! was, it becomes as much brighter as the scene did; elsewhere it stays as it is.
+
+use std::collections::HashSet;
+use std::path::Path;
+
+use glam::DVec3;
+use serde_json::json;
+
+use super::remove::{Reduced, RemovalOptions};
+use super::{JobError, Scene, export, open, train};
+use crate::io::transforms::opengl_pose;
+use crate::io::{self, IoError, SceneFolder, atomic, files, points_ply, trained};
+use crate::math::grid;
+use crate::math::sh::SH_C0;
+use crate::pipeline::observer::{Observer, Ticker};
+use crate::pipeline::removal::INVENTED;
+use crate::pipeline::semantics::carry::{carry, nearest};
+use crate::render::{Features, Renderer};
+use crate::scene::{Camera, Dataset, ExtraProperty, GaussianCloud, PhotoPixels, SemanticMap, SparsePoint};
+
+/// The folder of the photos in that of the scene, and what marks them as complete.
+const PHOTOS: &str = "photos";
+const TRANSFORMS: &str = "transforms.json";
+/// What the photos lack, for who goes on.
+const MARK: &str = "without.json";
+/// Share of a pixel from which the thing covers it, and what is replaced around that, px.
+const TOUCHED: f32 = 0.02;
+const RIM_PX: usize = 3;
+
+/// Trains the scene `from` anew on its photos without a thing, into `out`. What was stopped there goes on. `false` if the
+/// observer stopped it.
+pub(crate) fn retrain(
+    from: &Scene,
+    map: &SemanticMap,
+    (options, name): (&RemovalOptions, &str),
+    reduced: &Reduced,
+    out: &Path,
+    observer: &mut dyn Observer,
+) -> Result<bool, JobError> {
+    let photos = out.join(PHOTOS);
+    if !photos.join(TRANSFORMS).is_file() {
+        write(from, map, (options, name), reduced, &photos, observer)?;
+    }
+    let mut dataset = open::dataset(&photos)?;
+    dataset.name = format!("{} without {name}", from.name);
+    let done = train::run(&dataset, &from.config, [out.to_owned()], observer)?;
+    if !done.is_finished() {
+        return Ok(false);
+    }
+    let scene = trained::load(out)?;
+    let (carried, _) = carry(&reduced.map, &reduced.cloud, &scene.cloud);
+    let mut cloud = scene.cloud;
+    mark_invented(&mut cloud, &reduced.cloud);
+    SceneFolder::hold(out, "storing its objects")?.save(&scene.info, &cloud, Some(&carried))?;
+    Ok(true)
+}
+
+/// Refuses a folder that holds something else than what [`retrain`] has begun there.
+pub(crate) fn check(from: &Scene, name: &str, out: &Path) -> Result<(), JobError> {
+    let begun = files::read_json::<serde_json::Value>(&out.join(PHOTOS).join(MARK)).ok();
+    match begun {
+        Some(mark) if mark == self::mark(from, name) => Ok(()),
+        _ => super::derived::check(out),
+    }
+}
+
+fn mark(from: &Scene, name: &str) -> serde_json::Value {
+    json!({ "version": 1, "scene": from.path, "state": from.state, "without": name })
+}
+
+/// Gaussians near those that were invented are invented.
+fn mark_invented(cloud: &mut GaussianCloud, reduced: &GaussianCloud) {
+    let Some(flags) = reduced.extras.iter().find(|e| e.name == INVENTED) else { return };
+    let places: Vec<DVec3> = (0..cloud.len()).map(|i| cloud.world_position(i)).collect();
+    let values = nearest(reduced, &places).into_iter().map(|n| n.map_or(0.0, |i| flags.values[i])).collect();
+    cloud.extras.retain(|e| e.name != INVENTED);
+    cloud.extras.push(ExtraProperty { name: INVENTED.into(), values });
+}
+
+/// Writes the photos as a data set of its own, in the size that was trained on.
+fn write(
+    from: &Scene,
+    map: &SemanticMap,
+    (options, name): (&RemovalOptions, &str),
+    reduced: &Reduced,
+    out: &Path,
+    observer: &mut dyn Observer,
+) -> Result<(), JobError> {
+    let dataset = open::dataset(&from.photos(None)?)?;
+    export::make_parent(&out.join("images").join("0"))?;
+    let json = |file: &str, value: &serde_json::Value| {
+        atomic::write(&out.join(file), |w| serde_json::to_writer_pretty(w, value).map_err(Into::into))
+    };
+    json(MARK, &mark(from, name))?;
+    let thing: HashSet<usize> = options.ids.iter().flat_map(|id| map.members(*id)).collect();
+    let share: Vec<f32> = (0..from.cloud.len()).map(|i| f32::from(u8::from(thing.contains(&i)))).collect();
+    let (_, held) = dataset.split(from.config.holdout_every);
+    let (mut frames, mut test) = (Vec::new(), Vec::new());
+    let mut ticker = Ticker::new("Photos without it", dataset.photos.len());
+    let mut renderer = Renderer::new();
+    for (k, photo) in dataset.photos.iter().enumerate() {
+        ticker.tick(k, observer)?;
+        let pixels = io::photo::load(photo, from.config.max_side_px)?;
+        let camera = photo.camera.resized(pixels.width_px, pixels.height_px);
+        let features = Features { channels: 1, values: &share };
+        let was = renderer.render(&from.cloud, features, &camera, &from.settings)?;
+        let is = renderer.render(&reduced.cloud, Features::NONE, &camera, &from.settings)?;
+        let covered = was.features[0].iter().map(|s| *s >= TOUCHED).collect();
+        let covered = grid::grown(pixels.width_px as usize, covered, RIM_PX);
+        let rgb: Vec<[u8; 3]> = (0..pixels.len())
+            .map(|i| {
+                let change = |c: usize| f32::from(pixels.rgb[i][c]) / 255.0 + is.color[c][i] - was.color[c][i];
+                let new = |c: usize| if covered[i] { is.color[c][i] } else { change(c) };
+                [0, 1, 2].map(|c| (new(c).clamp(0.0, 1.0) * 255.0 + 0.5) as u8)
+            })
+            .collect();
+        let stem = Path::new(&photo.name).file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
+        let file = format!("images/{k:04}_{stem}.png");
+        store(&out.join(&file), PhotoPixels { rgb, ..pixels })?;
+        if held.contains(&k) {
+            test.push(file.clone());
+        }
+        frames.push(frame(&camera, &file));
+    }
+    points_ply::write(&out.join("points3D.ply"), &points(&dataset, from, &thing, reduced))?;
+    let about = json!({
+        "camera_model": "PINHOLE", "ply_file_path": "points3D.ply", "test_filenames": test, "frames": frames,
+        "fmlgs": { "background": dataset.background, "metres_per_unit": dataset.metres_per_unit },
+    });
+    // Last: with it, the photos are complete.
+    Ok(json(TRANSFORMS, &about)?)
+}
+
+fn frame(camera: &Camera, file: &str) -> serde_json::Value {
+    json!({
+        "file_path": file, "w": camera.width_px, "h": camera.height_px, "fl_x": camera.focal_px.x, "fl_y": camera.focal_px.y,
+        "cx": camera.principal_px.x, "cy": camera.principal_px.y, "transform_matrix": opengl_pose(camera),
+    })
+}
+
+/// What counts for nothing is transparent.
+fn store(path: &Path, pixels: PhotoPixels) -> Result<(), IoError> {
+    let Some(coverage) = &pixels.coverage else { return export::picture(path, &pixels) };
+    let samples: Vec<u8> = pixels.rgb.iter().zip(coverage).flat_map(|(c, a)| [c[0], c[1], c[2], *a]).collect();
+    export::png(path, &samples, [pixels.width_px, pixels.height_px], image::ColorType::Rgba8)
+}
+
+/// The sparse points that are not of the thing, and what was invented.
+fn points(dataset: &Dataset, from: &Scene, thing: &HashSet<usize>, reduced: &Reduced) -> Vec<SparsePoint> {
+    let places: Vec<DVec3> = dataset.points.iter().map(|p| p.position).collect();
+    let near = nearest(&from.cloud, &places);
+    let stays = dataset.points.iter().zip(near).filter(|(_, n)| n.is_none_or(|i| !thing.contains(&i)));
+    let cloud = &reduced.cloud;
+    let flags = cloud.extras.iter().find(|e| e.name == INVENTED).map_or(&[][..], |e| &e.values);
+    let invented = (0..flags.len()).filter(|i| flags[*i] > 0.0).map(|i| SparsePoint {
+        position: cloud.world_position(i),
+        rgb: cloud.sh[i * cloud.sh_stride()].map(|v| ((0.5 + SH_C0 as f32 * v).clamp(0.0, 1.0) * 255.0) as u8),
+    });
+    stays.map(|(p, _)| *p).chain(invented).collect()
+}

@@ -1,0 +1,151 @@
+//! Finding the surfaces near a thing, lifting its shadow off them, and closing what it hid of them.
+
+use std::collections::HashMap;
+
+use glam::{DMat3, DQuat, DVec3};
+
+use super::extent::{Ball, ThingExtent};
+use super::plane::{self, Plane};
+use super::rebuild::{Invented, SPREAD};
+use super::shade::{Brightening, Occluder};
+use super::sheet::{SurfaceSheet, Texel};
+use super::views::{self, SeenView};
+use super::{ClosedSurface, Paint, RemovalError, RemovalOptions, RemovalReport};
+use crate::math::grid;
+use crate::models::lama::Lama;
+use crate::pipeline::observer::{Observer, Ticker};
+use crate::scene::{GaussianCloud, IdentityId, NOBODY, SemanticMap};
+
+/// Surfaces that are closed at most.
+const PLANES: usize = 4;
+/// How far around a thing surfaces are looked for, in its radii.
+const REACH: f64 = 3.0;
+/// How far away things are that stand in the way of light, in its radii.
+const SHADING_REACH: f64 = 6.0;
+/// Radius of what blocks light, in standard deviations.
+const FOOTPRINT: f64 = 1.5;
+
+/// What the surfaces are found and closed by.
+pub(super) struct Closing<'a> {
+    pub(super) cloud: &'a GaussianCloud,
+    pub(super) map: &'a SemanticMap,
+    pub(super) ball: Ball,
+    pub(super) extent: &'a ThingExtent,
+    pub(super) seen: &'a [SeenView],
+    pub(super) paint: Paint,
+    pub(super) options: &'a RemovalOptions,
+}
+
+impl Closing<'_> {
+    pub(super) fn run(
+        &self,
+        gone: &mut [bool],
+        gains: &mut [[f32; 3]],
+        report: &mut RemovalReport,
+        mut network: Option<&mut Lama>,
+        observer: &mut dyn Observer,
+    ) -> Result<Vec<Invented>, RemovalError> {
+        let points = views::around(self.seen, &self.ball, REACH);
+        let toward = self.seen.iter().map(|v| v.camera.center).sum::<DVec3>() / self.seen.len() as f64;
+        let planes = plane::planes(&points, toward, self.ball.radius, PLANES, self.options.seed);
+        let mut ticker = Ticker::new("Closing surfaces", planes.len());
+        let mut new = Vec::new();
+        for (k, plane) in planes.iter().enumerate() {
+            ticker.tick(k, observer)?;
+            let wide = SurfaceSheet::around(plane, &self.ball, self.seen, REACH);
+            let brightening = if self.options.lift_shadow { self.brightening(&wide, plane, gone) } else { None };
+            if let Some(brightening) = &brightening {
+                for i in (0..gone.len()).filter(|&i| !gone[i] && gains[i] == [1.0; 3] && self.lies_on(plane, i)) {
+                    gains[i] = brightening.at(self.cloud.world_position(i));
+                }
+            }
+            let Some(mut sheet) = SurfaceSheet::find(plane, &self.ball, self.seen, REACH) else { continue };
+            if let Some(brightening) = &brightening {
+                sheet.brighten(|point| brightening.at(point));
+            }
+            if self.options.halo {
+                sheet.add_foot();
+            }
+            sheet.paint(self.paint, self.options.seed, network.as_deref_mut())?;
+            let hole = sheet.hole().count();
+            let area = hole as f64 * sheet.step * sheet.step;
+            report.surfaces.push(ClosedSurface {
+                gaussians: hole,
+                area,
+                unevenness: plane.residual,
+                roughness: plane.residual / area.sqrt(),
+            });
+            let owners = self.owners(&sheet, plane, gone);
+            for (i, gone) in gone.iter_mut().enumerate() {
+                if !*gone && self.is_left_over(i, plane, &sheet, &owners) {
+                    *gone = true;
+                    report.left_over += 1;
+                }
+            }
+            let rotation = DQuat::from_mat3(&DMat3::from_cols(plane.u, plane.v, plane.normal));
+            new.extend(sheet.hole().map(|i| Invented {
+                position: sheet.center(i),
+                rotation,
+                scale: sheet.step * SPREAD,
+                rgb: sheet.color[i],
+                identity: owners[i],
+            }));
+        }
+        Ok(new)
+    }
+
+    /// How much brighter a surface is without the thing's shadow, if that is seen on it.
+    fn brightening<'s>(&self, wide: &'s SurfaceSheet<'s>, plane: &Plane, gone: &[bool]) -> Option<Brightening<'s>> {
+        let cloud = self.cloud;
+        let is_near = |at: DVec3| at.distance(self.ball.center) < SHADING_REACH * self.ball.radius;
+        let occluder = |i: usize| {
+            let at = cloud.world_position(i);
+            let opaque = cloud.opacity_logits[i] > 0.0 && is_near(at) && plane.height(at) > plane.tolerance;
+            let mut sd = cloud.log_scales[i].map(|s| f64::from(s.exp()));
+            sd.sort_by(f64::total_cmp);
+            opaque.then_some(Occluder { at, radius: FOOTPRINT * sd[1], is_thing: gone[i] })
+        };
+        let occluders: Vec<Occluder> = (0..cloud.len()).filter_map(occluder).collect();
+        let owners = self.owners(wide, plane, gone);
+        let object = |i: usize| self.map.identities.object_of(owners[i]);
+        let mut count: HashMap<IdentityId, usize> = HashMap::new();
+        (0..owners.len())
+            .filter(|i| wide.state[*i] == Texel::Seen)
+            .for_each(|i| *count.entry(object(i)).or_default() += 1);
+        let most = count.into_iter().max_by_key(|(id, n)| (*n, *id))?.0;
+        Brightening::find(plane, wide, |i| object(i) == most, &occluders)
+    }
+
+    /// Whether a Gaussian is a piece of a surface, which is seen where its near side is.
+    fn lies_on(&self, plane: &Plane, i: usize) -> bool {
+        let thickness = self.cloud.log_scales[i].iter().fold(f32::INFINITY, |a, b| a.min(*b)).exp();
+        plane.height(self.cloud.world_position(i)).abs() <= plane.tolerance + f64::from(thickness)
+    }
+
+    /// Whether a Gaussian is of the thing for where it is: on the hidden part of the surface, where nobody has seen it and
+    /// it would shine through, or between that and the thing's own surface, unless it is known to be of another object
+    /// than the surface, such as an apple in a bowl.
+    fn is_left_over(&self, i: usize, plane: &Plane, sheet: &SurfaceSheet<'_>, owners: &[IdentityId]) -> bool {
+        let at = self.cloud.world_position(i);
+        let Some(texel) = sheet.texel(at).filter(|t| sheet.state[*t] == Texel::Hidden) else { return false };
+        if self.lies_on(plane, i) {
+            let largest = self.cloud.log_scales[i].iter().fold(f32::NEG_INFINITY, |a, b| a.max(*b)).exp();
+            // A large one at the border closes what is beside it.
+            return sheet.is_deep(texel) || f64::from(largest) < sheet.step;
+        }
+        let object = |id: IdentityId| self.map.identities.object_of(id);
+        let of = object(self.map.identity_of[i]);
+        let above = plane.height(at) > 0.0 && self.extent.contains(at);
+        above && (of == NOBODY || of == object(owners[texel]))
+    }
+
+    /// Whose each texel is: of the nearest Gaussian that lies on the surface.
+    fn owners(&self, sheet: &SurfaceSheet, plane: &Plane, gone: &[bool]) -> Vec<IdentityId> {
+        let on_it = (0..self.cloud.len()).filter(|i| !gone[*i]).filter_map(|i| {
+            let texel = sheet.texel(self.cloud.world_position(i)).filter(|t| sheet.state[*t] == Texel::Seen)?;
+            self.lies_on(plane, i).then_some((texel, self.map.identity_of[i]))
+        });
+        let found = grid::spread(sheet.size[0], sheet.state.len(), on_it, |_| true);
+        found.into_iter().map(|owner| owner.unwrap_or_default()).collect()
+    }
+}

@@ -1,0 +1,61 @@
+//! The Gaussians that stay, some of them brighter, and new ones.
+
+use glam::{DQuat, DVec3};
+
+use super::shade::brighter;
+use crate::math::sh::SH_C0;
+use crate::scene::{ExtraProperty, GaussianCloud, IdentityId};
+
+/// The extra property of Gaussians that were invented: 1, else 0.
+pub(crate) const INVENTED: &str = "fmlgs_invented";
+
+/// Standard deviation of a new Gaussian along the surface, in texels: neighbors overlap to an even cover.
+pub(super) const SPREAD: f64 = 0.6;
+/// The same across the surface.
+const THICKNESS: f64 = 0.1;
+/// Opacity of 0.95, before the sigmoid.
+const OPACITY_LOGIT: f32 = 2.944;
+
+/// A Gaussian that closes a piece of a surface.
+pub(super) struct Invented {
+    pub(super) position: DVec3,
+    pub(super) rotation: DQuat,
+    /// Standard deviation along the surface, scene units.
+    pub(super) scale: f64,
+    pub(super) rgb: [f32; 3],
+    pub(super) identity: IdentityId,
+}
+
+/// The Gaussians at `kept`, and new ones.
+pub(super) fn with_new(cloud: &GaussianCloud, kept: &[usize], new: &[Invented]) -> GaussianCloud {
+    let mut all = cloud.select(kept);
+    if !all.extras.iter().any(|e| e.name == INVENTED) {
+        all.extras.push(ExtraProperty { name: INVENTED.into(), values: vec![0.0; kept.len()] });
+    }
+    let stride = all.sh_stride();
+    for one in new {
+        all.positions.push((one.position - all.origin).as_vec3().to_array());
+        let along = one.scale.ln() as f32;
+        all.log_scales.push([along, along, (one.scale * THICKNESS / SPREAD).ln() as f32]);
+        all.quaternions.push([one.rotation.w, one.rotation.x, one.rotation.y, one.rotation.z].map(|v| v as f32));
+        all.opacity_logits.push(OPACITY_LOGIT);
+        all.sh.push(one.rgb.map(|c| ((f64::from(c) - 0.5) / SH_C0) as f32));
+        all.sh.extend(std::iter::repeat_n([0.0; 3], stride - 1));
+    }
+    for extra in &mut all.extras {
+        let value = if extra.name == INVENTED { 1.0 } else { 0.0 };
+        extra.values.resize(kept.len() + new.len(), value);
+    }
+    all
+}
+
+/// Makes Gaussian `i` brighter from everywhere.
+pub(super) fn brighten(cloud: &mut GaussianCloud, i: usize, gain: [f32; 3]) {
+    let stride = cloud.sh_stride();
+    let all = &mut cloud.sh[i * stride..(i + 1) * stride];
+    let shown = all[0].map(|v| 0.5 + SH_C0 as f32 * v);
+    let new = brighter(shown, gain);
+    let ratio: [f32; 3] = std::array::from_fn(|c| if shown[c] > 1e-3 { new[c] / shown[c] } else { 1.0 });
+    all[0] = new.map(|v| (v - 0.5) / SH_C0 as f32);
+    all[1..].iter_mut().for_each(|sh| (0..3).for_each(|c| sh[c] *= ratio[c]));
+}

@@ -1,0 +1,226 @@
+//! The shadow that a thing casts on a flat surface, and how bright the surface is without it.
+//!
+//! What a matt surface of one color shows is its light less what stands in the way of it. What stands in the way along a
+//! direction is known, for it is made of Gaussians; how much light comes along each is found from the brightness of
+//! the surface around ([`light`]), first from everywhere, then ever finer about where most comes from. So the shadow of
+//! the thing is told from those of others, and from stains. What cannot be explained by its shadow stays.
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::light;
+use super::plane::Plane;
+use super::sheet::{SurfaceSheet, Texel};
+use crate::math::srgb;
+
+/// Directions of the first round, over the half of all that a surface sees.
+const DIRECTIONS: usize = 64;
+/// Least cosine to the normal: shadows of grazing light are long and faint.
+const LEAST_COSINE: f64 = 0.2;
+/// Rounds in which directions with much light are divided, and the share of the light that is much.
+const FINER_ROUNDS: usize = 3;
+const MUCH: f64 = 0.06;
+/// Texels of the surface that are needed.
+const LEAST_TEXELS: usize = 200;
+/// Share of light from which a texel is in the thing's shadow.
+const SHADED: f64 = 0.03;
+/// The shadow is believed if with it less than this share of the squared differences in it is left.
+const EXPLAINED: f64 = 0.7;
+/// How much brighter a surface may become at most.
+const MOST: f32 = 6.0;
+
+/// Something opaque over the surface.
+pub(super) struct Occluder {
+    pub(super) at: DVec3,
+    pub(super) radius: f64,
+    /// Whether it is of the thing.
+    pub(super) is_thing: bool,
+}
+
+/// Bits of what stands in the way.
+const OTHERS: u8 = 1;
+const THING: u8 = 2;
+
+/// By how much each texel of a sheet is brighter without a thing, in linear light.
+pub(super) struct Brightening<'a> {
+    sheet: &'a SurfaceSheet<'a>,
+    gain: Vec<[f32; 3]>,
+}
+
+impl<'a> Brightening<'a> {
+    /// `None` where no shadow is found. `same` = texels that are of one material.
+    pub(super) fn find(
+        plane: &Plane,
+        sheet: &'a SurfaceSheet<'a>,
+        same: impl Fn(usize) -> bool,
+        occluders: &[Occluder],
+    ) -> Option<Self> {
+        let rows: Vec<usize> = (0..sheet.state.len()).filter(|&i| sheet.state[i] == Texel::Seen && same(i)).collect();
+        if rows.len() < LEAST_TEXELS || !occluders.iter().any(|o| o.is_thing) {
+            return None;
+        }
+        let channel =
+            |c: usize| -> Vec<f32> { rows.iter().map(|&i| srgb::linear(sheet.color[i][c].max(0.0))).collect() };
+        let channels = [0, 1, 2].map(channel);
+        let values: Vec<f32> = (0..rows.len()).map(|k| channels.iter().map(|c| c[k]).sum::<f32>() / 3.0).collect();
+        let shadows = |directions: &[DVec3]| -> Vec<Shadow> {
+            directions.par_iter().map(|d| Shadow { toward: *d, bits: blocked(plane, sheet, *d, occluders) }).collect()
+        };
+        let columns = |shadows: &[Shadow], which: u8| -> Vec<Vec<f32>> {
+            let size = sheet.size.map(|s| s.max(1) as f32);
+            let base = [
+                rows.iter().map(|_| 1.0).collect(),
+                rows.iter().map(|i| (i % sheet.size[0]) as f32 / size[0] - 0.5).collect(),
+                rows.iter().map(|i| (i / sheet.size[0]) as f32 / size[1] - 0.5).collect(),
+            ];
+            let shade = |s: &Shadow| rows.iter().map(|&i| if s.bits[i] & which == 0 { 0.0 } else { -1.0 }).collect();
+            base.into_iter().chain(shadows.iter().map(shade)).collect()
+        };
+        let mut about = shadows(&hemisphere(plane));
+        let mut spacing = (std::f64::consts::TAU * (1.0 - LEAST_COSINE) / DIRECTIONS as f64).sqrt();
+        let mut counts = Vec::new();
+        for round in 0..=FINER_ROUNDS {
+            let (weights, rows) = light::fit(&columns(&about, THING | OTHERS), &values);
+            counts = rows;
+            let weights = &weights[light::FREE..];
+            let total: f64 = weights.iter().sum();
+            let mut kept: Vec<(Shadow, f64)> =
+                about.into_iter().zip(weights.iter().copied()).filter(|(_, w)| *w > 1e-3 * total).collect();
+            if round == FINER_ROUNDS {
+                about = kept.into_iter().map(|k| k.0).collect();
+                break;
+            }
+            kept.sort_by(|a, b| b.1.total_cmp(&a.1));
+            spacing *= 0.5;
+            let finer: Vec<DVec3> = kept
+                .iter()
+                .filter(|(_, w)| *w > MUCH * total)
+                .flat_map(|(s, _)| around(s.toward, spacing))
+                .filter(|d| d.dot(plane.normal) >= LEAST_COSINE)
+                .collect();
+            about = kept.into_iter().map(|k| k.0).collect();
+            about.extend(shadows(&finer));
+        }
+        let all = columns(&about, THING | OTHERS);
+        let sheet_rows = |weights: &[f64], which: u8| -> Vec<f64> {
+            let at = |i: usize| {
+                let [x, y] = [i % sheet.size[0], i / sheet.size[0]];
+                let size = sheet.size.map(|s| s.max(1) as f64);
+                let base =
+                    weights[0] + weights[1] * (x as f64 / size[0] - 0.5) + weights[2] * (y as f64 / size[1] - 0.5);
+                let less = |(s, w): (&Shadow, &f64)| if s.bits[i] & which == 0 { 0.0 } else { *w };
+                base - about.iter().zip(&weights[light::FREE..]).map(less).sum::<f64>()
+            };
+            (0..sheet.state.len()).map(at).collect()
+        };
+        // Does the thing's shadow explain what is darker in it?
+        let weights = light::solve(&all, &values, &counts);
+        let (with, without) = (sheet_rows(&weights, THING | OTHERS), sheet_rows(&weights, OTHERS));
+        let others = columns(&about, OTHERS);
+        let left = [
+            light::residuals(&all, &values, &weights),
+            light::residuals(&others, &values, &light::solve(&others, &values, &counts)),
+        ];
+        let in_shadow = |k: &usize| without[rows[*k]] - with[rows[*k]] > SHADED * without[rows[*k]].abs();
+        let sum = |off: &[f64]| -> f64 { (0..rows.len()).filter(in_shadow).map(|k| counts[k] * off[k] * off[k]).sum() };
+        let [full, bare] = left.map(|off| sum(&off));
+        if !(bare > 0.0 && full < EXPLAINED * bare) {
+            return None;
+        }
+        let gains = channels.map(|values| {
+            let weights = light::solve(&all, &values, &counts);
+            let floor = 0.05 * weights[0].max(1e-6);
+            let (with, without) = (sheet_rows(&weights, THING | OTHERS), sheet_rows(&weights, OTHERS));
+            with.iter().zip(without).map(|(w, o)| ((o.max(floor) / w.max(floor)) as f32).clamp(1.0, MOST)).collect()
+        });
+        let gains: [Vec<f32>; 3] = gains.map(|gain| blurred(gain, sheet.size));
+        Some(Self { sheet, gain: (0..sheet.state.len()).map(|i| [0, 1, 2].map(|c| gains[c][i])).collect() })
+    }
+
+    /// How much brighter the surface is at a point; 1 beyond the sheet.
+    pub(super) fn at(&self, point: DVec3) -> [f32; 3] {
+        self.sheet.sample(point, |i| self.gain[i]).unwrap_or([1.0; 3])
+    }
+}
+
+/// A color in sRGB that is so much brighter.
+pub(super) fn brighter(rgb: [f32; 3], gain: [f32; 3]) -> [f32; 3] {
+    let one = |c: usize| {
+        if gain[c] == 1.0 { rgb[c] } else { srgb::encode(srgb::linear(rgb[c].max(0.0)) * gain[c]).0.min(1.0) }
+    };
+    [0, 1, 2].map(one)
+}
+
+/// What stands in the way of light from one direction, for each texel.
+struct Shadow {
+    toward: DVec3,
+    bits: Vec<u8>,
+}
+
+fn blocked(plane: &Plane, sheet: &SurfaceSheet<'_>, toward: DVec3, occluders: &[Occluder]) -> Vec<u8> {
+    let mut bits = vec![0; sheet.state.len()];
+    let [width, height] = sheet.size.map(|s| s as f64);
+    for o in occluders {
+        let foot = o.at - toward * (plane.height(o.at) / toward.dot(plane.normal));
+        let [x, y] = sheet.place(foot);
+        let reach = o.radius / sheet.step;
+        if !(x > -reach && y > -reach && x < width + reach && y < height + reach) {
+            continue;
+        }
+        let bit = if o.is_thing { THING } else { OTHERS };
+        let ends = |at: f64, most: f64| {
+            let first = (at - reach - 0.5).ceil().clamp(0.0, most) as usize;
+            (first, (at + reach - 0.5).floor().clamp(-1.0, most - 1.0) as i64)
+        };
+        let ((x0, x1), (y0, y1)) = (ends(x, width), ends(y, height));
+        for ty in y0 as i64..=y1 {
+            for tx in x0 as i64..=x1 {
+                let (dx, dy) = (tx as f64 + 0.5 - x, ty as f64 + 0.5 - y);
+                if dx * dx + dy * dy <= reach * reach {
+                    bits[ty as usize * sheet.size[0] + tx as usize] |= bit;
+                }
+            }
+        }
+        // Smaller than a texel, it is in one all the same.
+        if (0.0..width).contains(&x) && (0.0..height).contains(&y) {
+            bits[y as usize * sheet.size[0] + x as usize] |= bit;
+        }
+    }
+    bits
+}
+
+/// Directions spread evenly over the half that the surface sees.
+fn hemisphere(plane: &Plane) -> Vec<DVec3> {
+    let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
+    let one = |k: usize| {
+        let z = 1.0 - (1.0 - LEAST_COSINE) * (k as f64 + 0.5) / DIRECTIONS as f64;
+        let (sin, cos) = (golden * k as f64).sin_cos();
+        let r = (1.0 - z * z).sqrt();
+        plane.u * (r * cos) + plane.v * (r * sin) + plane.normal * z
+    };
+    (0..DIRECTIONS).map(one).collect()
+}
+
+/// Six directions at an angle about one.
+fn around(toward: DVec3, angle: f64) -> impl Iterator<Item = DVec3> {
+    let (a, b) = toward.any_orthonormal_pair();
+    (0..6).map(move |k| {
+        let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / 6.0).sin_cos();
+        (toward + (a * cos + b * sin) * angle.tan()).normalize()
+    })
+}
+
+/// The mean with the neighbors, twice: shadows have soft edges.
+fn blurred(values: Vec<f32>, size: [usize; 2]) -> Vec<f32> {
+    let [width, height] = size;
+    let pass = |values: &[f32], stride: usize, length: usize, at: fn(usize, usize) -> usize| -> Vec<f32> {
+        let one = |i: usize| {
+            let at = at(i, width);
+            let (a, b) = (if at > 0 { i - stride } else { i }, if at + 1 < length { i + stride } else { i });
+            0.25 * values[a] + 0.5 * values[i] + 0.25 * values[b]
+        };
+        (0..values.len()).map(one).collect()
+    };
+    let along = pass(&values, 1, width, |i, w| i % w);
+    pass(&along, width, height, |i, w| i / w)
+}
