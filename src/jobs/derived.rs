@@ -108,7 +108,7 @@ mod tests {
             let from = open::scene(&file).expect("opened");
             store(&from, "a".into(), &from.cloud, None, &out).expect("stored");
             let made = open::scene(&out).expect("opened");
-            assert_eq!((made.settings, made.cloud.render_mode), (from.settings, mode));
+            assert_eq!((&made.settings, made.cloud.render_mode), (&from.settings, mode));
             assert!(store(&from, "a".into(), &from.cloud, None, &out).is_err(), "nothing is written over");
         }
     }

@@ -55,8 +55,10 @@ impl Closing<'_> {
             let wide = SurfaceSheet::around(plane, &self.ball, self.seen, REACH);
             let brightening = if self.options.lift_shadow { self.brightening(&wide, plane, gone) } else { None };
             if let Some(brightening) = &brightening {
-                for i in (0..gone.len()).filter(|&i| !gone[i] && gains[i] == [1.0; 3] && self.lies_on(plane, i)) {
-                    gains[i] = brightening.at(self.cloud.world_position(i));
+                for (i, gain) in gains.iter_mut().enumerate() {
+                    if !gone[i] && *gain == [1.0; 3] && self.lies_on(plane, i) {
+                        *gain = brightening.at(self.cloud.world_position(i));
+                    }
                 }
             }
             let Some(mut sheet) = SurfaceSheet::find(plane, &self.ball, self.seen, REACH) else { continue };

@@ -50,7 +50,6 @@ use crate::io::IoError;
 use crate::io::gltf_mesh::{self, MeshScene};
 use crate::io::memory;
 use crate::pipeline::observer::{self, Interrupted, Observer, Ticker};
-use crate::scene::Camera;
 
 /// Bytes that a pixel of a photo takes while it is rendered and written: color, depth and ids, and
 /// their copies in files' formats.

@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 use super::*;
 use crate::io::gltf_mesh::tests::{cubes, glb, real_scenes};
 use crate::pipeline::observer::{Signal, Silent};
+use crate::scene::Camera;
 use crate::scene::Level;
 
 /// Two cubes: a small one in front of a larger one, as two objects.
