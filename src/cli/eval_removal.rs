@@ -58,7 +58,8 @@ fn row(r: &RemovalRow) -> Vec<String> {
             format!("{:.2}", 100.0 * s.depth),
         ],
     };
-    let mut cells = vec![r.name.clone(), r.paint.map_or("none".into(), |p| format!("{p:?}").to_lowercase())];
+    let way = r.paint.map_or("none".into(), |p| format!("{p:?}").to_lowercase());
+    let mut cells = vec![r.name.clone(), if r.lift_shadow { way + ", lifted" } else { way }];
     cells.extend(region(&r.uncovered));
     cells.extend(region(&r.invented));
     for [before, after] in [&r.shaded, &r.outside] {

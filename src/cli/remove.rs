@@ -14,8 +14,8 @@ use crate::scene::LevelFilter;
 /// Take an object or a part out of a scene and close the surface that it hid
 ///
 /// What was behind it and was seen in other photos is there already; what no photo saw is invented: the plane of the
-/// surface goes on below it, painted from what is seen around. Its shadow on flat surfaces goes with it; reflections
-/// stay. The scene is left as it is; the result is a scene of its own, in which what is invented has the property 'fmlgs_invented'.
+/// surface goes on below it, painted from what is seen around. Shadows and reflections of it stay (--lift-shadow
+/// tries to lift the shadow). The scene is left as it is; the result is a scene of its own, in which what is invented has the property 'fmlgs_invented'.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs remove scene/ \"the teddy bear\" --out without_bear/\n  \
@@ -39,9 +39,9 @@ pub(crate) struct RemoveArgs {
     /// Remove exactly what is known to belong to it, without the unsure fringes within it
     #[arg(long)]
     tight: bool,
-    /// Leave its shadow on flat surfaces
+    /// Lift its shadow off flat surfaces, as far as what stands in the way of the light explains it
     #[arg(long)]
-    keep_shadow: bool,
+    lift_shadow: bool,
     /// Another number gives another fill
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -84,7 +84,7 @@ pub(crate) fn run(args: RemoveArgs, quiet: bool) -> Result<(), CliError> {
         Fill::Lama => Some(Paint::Lama),
         Fill::None => None,
     };
-    let options = RemovalOptions { ids, halo: !args.tight, lift_shadow: !args.keep_shadow, paint, seed: args.seed };
+    let options = RemovalOptions { ids, halo: !args.tight, lift_shadow: args.lift_shadow, paint, seed: args.seed };
     let console = &mut Console::new(quiet);
     let done = remove::run(&scene, &map, &options, console).map_err(|e| CliError::of_work(e, "nothing was written"))?;
     if args.fill == Fill::Photos {

@@ -18,7 +18,8 @@ use crate::pipeline::synth::{SETTINGS, SynthOptions};
 use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, LevelFilter, PhotoPixels, SemanticMap};
 
-/// The ways that are compared: nothing is filled, and each way to paint; LaMa, too, where it is there.
+/// The ways that are compared: nothing is filled, and each way to paint; LaMa, too, where it is there, and the
+/// usual one with the shadow lifted.
 const WAYS: [Option<Paint>; 5] =
     [None, Some(Paint::Nearest), Some(Paint::Telea), Some(Paint::Smooth), Some(Paint::Patches)];
 
@@ -28,6 +29,8 @@ pub(crate) struct RemovalRow {
     pub(crate) name: String,
     /// How it was filled; `None` = not at all.
     pub(crate) paint: Option<Paint>,
+    /// Whether its shadow was lifted.
+    pub(crate) lift_shadow: bool,
     pub(crate) uncovered: Option<RegionScore>,
     pub(crate) invented: Option<RegionScore>,
     /// What its shadow and its light lay on, against the photos without it: before it was removed and after.
@@ -73,8 +76,9 @@ pub(crate) fn run(
     let mut rows = Vec::new();
     for folder in folders(truth)? {
         let (name, views) = views(comparison, &folder, &photos)?;
-        for paint in WAYS.into_iter().chain(has_lama.then_some(Some(Paint::Lama))) {
-            rows.push(one(scene, &map, (&name, paint), &views, comparison, observer)?);
+        let ways = WAYS.into_iter().chain(has_lama.then_some(Some(Paint::Lama))).map(|paint| (paint, false));
+        for (paint, lift_shadow) in ways.chain([(Some(Paint::default()), true)]) {
+            rows.push(one(scene, &map, (&name, paint, lift_shadow), &views, comparison, observer)?);
         }
     }
     Ok(rows)
@@ -148,14 +152,14 @@ fn views(
 fn one(
     scene: &Scene,
     map: &SemanticMap,
-    (name, paint): (&str, Option<Paint>),
+    (name, paint, lift_shadow): (&str, Option<Paint>, bool),
     views: &[TrueView],
     comparison: &PhotoComparison,
     observer: &mut dyn Observer,
 ) -> Result<RemovalRow, JobError> {
     let ids = query::identities(map, name, LevelFilter::Auto, 1)?;
     let start = std::time::Instant::now();
-    let options = RemovalOptions { ids, halo: true, lift_shadow: true, paint, seed: 0 };
+    let options = RemovalOptions { ids, halo: true, lift_shadow, paint, seed: 0 };
     let Reduced { cloud, map: left, report } = remove::run(scene, map, &options, observer)?;
     let secs = start.elapsed().as_secs_f64();
     let found_again = match query::identities(&left, name, LevelFilter::Auto, 1) {
@@ -179,6 +183,7 @@ fn one(
         after.add(&is, &view.with, None, &view.regions, RemovalRegion::Outside);
         if let (Some(folder), true) = (&comparison.pictures, paint != Some(Paint::Nearest)) {
             let way = paint.map_or("none".into(), |p| format!("{p:?}").to_lowercase());
+            let way = if lift_shadow { way + "_lifted" } else { way };
             let file = format!("{}_{way}_{:03}.png", name.replace(|c: char| !c.is_alphanumeric(), "-"), view.index);
             picture(&folder.join(file), view, [&was.to_rgb8(), &is.to_rgb8()])?;
         }
@@ -186,6 +191,7 @@ fn one(
     Ok(RemovalRow {
         name: name.into(),
         paint,
+        lift_shadow,
         uncovered: uncovered.score(),
         invented: invented.score(),
         shaded: shaded.each_ref().map(Tally::score),

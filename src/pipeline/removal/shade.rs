@@ -26,8 +26,10 @@ const LEAST_TEXELS: usize = 200;
 const SHADED: f64 = 0.03;
 /// The shadow is believed if with it less than this share of the squared differences in it is left.
 const EXPLAINED: f64 = 0.7;
-/// How much brighter a surface may become at most.
+/// How much brighter a surface may become at most, what is too little to be seen, and texels that a shadow has.
 const MOST: f32 = 6.0;
+const LEAST_GAIN: f32 = 1.03;
+const LEAST_SHADED: usize = 12;
 
 /// Something opaque over the surface.
 pub(super) struct Occluder {
@@ -67,14 +69,9 @@ impl<'a> Brightening<'a> {
             directions.par_iter().map(|d| Shadow { toward: *d, bits: blocked(plane, sheet, *d, occluders) }).collect()
         };
         let columns = |shadows: &[Shadow], which: u8| -> Vec<Vec<f32>> {
-            let size = sheet.size.map(|s| s.max(1) as f32);
-            let base = [
-                rows.iter().map(|_| 1.0).collect(),
-                rows.iter().map(|i| (i % sheet.size[0]) as f32 / size[0] - 0.5).collect(),
-                rows.iter().map(|i| (i / sheet.size[0]) as f32 / size[1] - 0.5).collect(),
-            ];
+            let base = (0..light::FREE).map(|k| rows.iter().map(|&i| base(sheet, i)[k] as f32).collect());
             let shade = |s: &Shadow| rows.iter().map(|&i| if s.bits[i] & which == 0 { 0.0 } else { -1.0 }).collect();
-            base.into_iter().chain(shadows.iter().map(shade)).collect()
+            base.chain(shadows.iter().map(shade)).collect()
         };
         let mut about = shadows(&hemisphere(plane));
         let mut spacing = (std::f64::consts::TAU * (1.0 - LEAST_COSINE) / DIRECTIONS as f64).sqrt();
@@ -104,10 +101,7 @@ impl<'a> Brightening<'a> {
         let all = columns(&about, THING | OTHERS);
         let sheet_rows = |weights: &[f64], which: u8| -> Vec<f64> {
             let at = |i: usize| {
-                let [x, y] = [i % sheet.size[0], i / sheet.size[0]];
-                let size = sheet.size.map(|s| s.max(1) as f64);
-                let base =
-                    weights[0] + weights[1] * (x as f64 / size[0] - 0.5) + weights[2] * (y as f64 / size[1] - 0.5);
+                let base: f64 = base(sheet, i).iter().zip(weights).map(|(b, w)| b * w).sum();
                 let less = |(s, w): (&Shadow, &f64)| if s.bits[i] & which == 0 { 0.0 } else { *w };
                 base - about.iter().zip(&weights[light::FREE..]).map(less).sum::<f64>()
             };
@@ -134,7 +128,10 @@ impl<'a> Brightening<'a> {
             with.iter().zip(without).map(|(w, o)| ((o.max(floor) / w.max(floor)) as f32).clamp(1.0, MOST)).collect()
         });
         let gains: [Vec<f32>; 3] = gains.map(|gain| blurred(gain, sheet.size));
-        Some(Self { sheet, gain: (0..sheet.state.len()).map(|i| [0, 1, 2].map(|c| gains[c][i])).collect() })
+        let gain = |i: usize| Some([0, 1, 2].map(|c| gains[c][i])).filter(|g| g.iter().any(|g| *g >= LEAST_GAIN));
+        let gain: Vec<[f32; 3]> = (0..sheet.state.len()).map(|i| gain(i).unwrap_or([1.0; 3])).collect();
+        // So few are noise.
+        (gain.iter().filter(|g| **g != [1.0; 3]).count() >= LEAST_SHADED).then_some(Self { sheet, gain })
     }
 
     /// How much brighter the surface is at a point; 1 beyond the sheet.
@@ -149,6 +146,13 @@ pub(super) fn brighter(rgb: [f32; 3], gain: [f32; 3]) -> [f32; 3] {
         if gain[c] == 1.0 { rgb[c] } else { srgb::encode(srgb::linear(rgb[c].max(0.0)) * gain[c]).0.min(1.0) }
     };
     [0, 1, 2].map(one)
+}
+
+/// What the brightness of an evenly lit surface is made of: as much everywhere, and changes along it.
+fn base(sheet: &SurfaceSheet<'_>, i: usize) -> [f64; light::FREE] {
+    let part = |at: usize, length: usize| at as f64 / length.max(1) as f64 - 0.5;
+    let (x, y) = (part(i % sheet.size[0], sheet.size[0]), part(i / sheet.size[0], sheet.size[1]));
+    [1.0, x, y, x * x, x * y, y * y]
 }
 
 /// What stands in the way of light from one direction, for each texel.
@@ -206,7 +210,7 @@ fn around(toward: DVec3, angle: f64) -> impl Iterator<Item = DVec3> {
     let (a, b) = toward.any_orthonormal_pair();
     (0..6).map(move |k| {
         let (sin, cos) = (f64::from(k) * std::f64::consts::TAU / 6.0).sin_cos();
-        (toward + (a * cos + b * sin) * angle.tan()).normalize()
+        (toward + (a * cos + b * sin) * angle.tan()).normalize_or(toward)
     })
 }
 

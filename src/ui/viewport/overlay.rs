@@ -156,7 +156,7 @@ impl Viewport {
                 .checkbox(&mut options.halo, "With its fringes")
                 .on_hover_text("Unsure Gaussians within it are removed, too.")
                 .changed();
-            let tip = "The shadow that it casts on flat surfaces goes with it.";
+            let tip = "The shadow that it casts on flat surfaces is lifted, as far as what blocks the light explains it.";
             changed |= ui.checkbox(&mut options.lift_shadow, "With its shadow").on_hover_text(tip).changed();
             if state.models.as_ref().and_then(|m| m.get(LAMA)).is_some_and(|(_, s)| s.is_usable()) {
                 let mut by_network = options.paint == Some(Paint::Lama);
