@@ -88,8 +88,9 @@ pub(crate) fn run(args: RemoveArgs, quiet: bool) -> Result<(), CliError> {
     let console = &mut Console::new(quiet);
     let done = remove::run(&scene, &map, &options, console).map_err(|e| CliError::of_work(e, "nothing was written"))?;
     if args.fill == Fill::Photos {
-        let finished = photos_without::retrain(&scene, &map, (&options, &name), &done, &args.out, console)
-            .map_err(|e| CliError::of_work(e, "what is done is kept"))?;
+        let finished =
+            photos_without::retrain(&scene, &map, (&options, &name), (&done.cloud, &done.map), &args.out, console)
+                .map_err(|e| CliError::of_work(e, "what is done is kept"))?;
         if !finished {
             let kept = "the photos and the training so far are kept; do the same again to go on";
             return Err(CliError::Cancelled(kept.into()));

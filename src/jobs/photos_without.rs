@@ -9,14 +9,13 @@ use std::path::Path;
 use glam::DVec3;
 use serde_json::json;
 
-use super::remove::{Reduced, RemovalOptions};
 use super::{JobError, Scene, export, open, train};
 use crate::io::transforms::opengl_pose;
 use crate::io::{self, IoError, SceneFolder, atomic, files, points_ply, trained};
 use crate::math::grid;
 use crate::math::sh::SH_C0;
 use crate::pipeline::observer::{Observer, Ticker};
-use crate::pipeline::removal::INVENTED;
+use crate::pipeline::removal::{INVENTED, RemovalOptions};
 use crate::pipeline::semantics::carry::{carry, nearest};
 use crate::render::{Features, Renderer};
 use crate::scene::{Camera, Dataset, ExtraProperty, GaussianCloud, PhotoPixels, SemanticMap, SparsePoint};
@@ -36,13 +35,13 @@ pub(crate) fn retrain(
     from: &Scene,
     map: &SemanticMap,
     (options, name): (&RemovalOptions, &str),
-    reduced: &Reduced,
+    reduced: (&GaussianCloud, &SemanticMap),
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<bool, JobError> {
     let photos = out.join(PHOTOS);
     if !photos.join(TRANSFORMS).is_file() {
-        write(from, map, (options, name), reduced, &photos, observer)?;
+        write(from, map, (options, name), reduced.0, &photos, observer)?;
     }
     let mut dataset = open::dataset(&photos)?;
     dataset.name = format!("{} without {name}", from.name);
@@ -51,9 +50,9 @@ pub(crate) fn retrain(
         return Ok(false);
     }
     let scene = trained::load(out)?;
-    let (carried, _) = carry(&reduced.map, &reduced.cloud, &scene.cloud);
+    let (carried, _) = carry(reduced.1, reduced.0, &scene.cloud);
     let mut cloud = scene.cloud;
-    mark_invented(&mut cloud, &reduced.cloud);
+    mark_invented(&mut cloud, reduced.0);
     SceneFolder::hold(out, "storing its objects")?.save(&scene.info, &cloud, Some(&carried))?;
     Ok(true)
 }
@@ -85,7 +84,7 @@ fn write(
     from: &Scene,
     map: &SemanticMap,
     (options, name): (&RemovalOptions, &str),
-    reduced: &Reduced,
+    reduced: &GaussianCloud,
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<(), JobError> {
@@ -107,7 +106,7 @@ fn write(
         let camera = photo.camera.resized(pixels.width_px, pixels.height_px);
         let features = Features { channels: 1, values: &share };
         let was = renderer.render(&from.cloud, features, &camera, &from.settings)?;
-        let is = renderer.render(&reduced.cloud, Features::NONE, &camera, &from.settings)?;
+        let is = renderer.render(reduced, Features::NONE, &camera, &from.settings)?;
         let covered = was.features[0].iter().map(|s| *s >= TOUCHED).collect();
         let covered = grid::grown(pixels.width_px as usize, covered, RIM_PX);
         let rgb: Vec<[u8; 3]> = (0..pixels.len())
@@ -149,11 +148,10 @@ fn store(path: &Path, pixels: PhotoPixels) -> Result<(), IoError> {
 }
 
 /// The sparse points that are not of the thing, and what was invented.
-fn points(dataset: &Dataset, from: &Scene, thing: &HashSet<usize>, reduced: &Reduced) -> Vec<SparsePoint> {
+fn points(dataset: &Dataset, from: &Scene, thing: &HashSet<usize>, cloud: &GaussianCloud) -> Vec<SparsePoint> {
     let places: Vec<DVec3> = dataset.points.iter().map(|p| p.position).collect();
     let near = nearest(&from.cloud, &places);
     let stays = dataset.points.iter().zip(near).filter(|(_, n)| n.is_none_or(|i| !thing.contains(&i)));
-    let cloud = &reduced.cloud;
     let flags = cloud.extras.iter().find(|e| e.name == INVENTED).map_or(&[][..], |e| &e.values);
     let invented = (0..flags.len()).filter(|i| flags[*i] > 0.0).map(|i| SparsePoint {
         position: cloud.world_position(i),

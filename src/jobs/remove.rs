@@ -79,7 +79,14 @@ pub(crate) fn beside(request: &RemoveRequest, observer: &mut dyn Observer) -> Re
     let folder = derived::free_folder(&request.folder, &format!("without-{}{again}", words.join("-")));
     if !request.retrain {
         store(&scene, &name, &done, &folder)?;
-    } else if !photos_without::retrain(&scene, &map, (&request.options, &name), &done, &folder, observer)? {
+    } else if !photos_without::retrain(
+        &scene,
+        &map,
+        (&request.options, &name),
+        (&done.cloud, &done.map),
+        &folder,
+        observer,
+    )? {
         return Err(Interrupted.into());
     }
     Ok(RemovedScene { folder, name, request: request.clone(), report: done.report })

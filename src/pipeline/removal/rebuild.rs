@@ -2,8 +2,8 @@
 
 use glam::{DQuat, DVec3};
 
-use super::shade::brighter;
 use crate::math::sh::SH_C0;
+use crate::math::srgb::brighter;
 use crate::scene::{ExtraProperty, GaussianCloud, IdentityId};
 
 /// The extra property of Gaussians that were invented: 1, else 0.

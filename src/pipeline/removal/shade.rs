@@ -140,14 +140,6 @@ impl<'a> Brightening<'a> {
     }
 }
 
-/// A color in sRGB that is so much brighter.
-pub(super) fn brighter(rgb: [f32; 3], gain: [f32; 3]) -> [f32; 3] {
-    let one = |c: usize| {
-        if gain[c] == 1.0 { rgb[c] } else { srgb::encode(srgb::linear(rgb[c].max(0.0)) * gain[c]).0.min(1.0) }
-    };
-    [0, 1, 2].map(one)
-}
-
 /// What the brightness of an evenly lit surface is made of: as much everywhere, and changes along it.
 fn base(sheet: &SurfaceSheet<'_>, i: usize) -> [f64; light::FREE] {
     let part = |at: usize, length: usize| at as f64 / length.max(1) as f64 - 0.5;
