@@ -10,6 +10,7 @@ use crate::models::catalog;
 pub(crate) use crate::models::catalog::{ModelEntry, ModelRole, ModelState, SAM2};
 use crate::models::engine::engine;
 use crate::models::fetch::Patience;
+use crate::models::official::WEIGHTS;
 use crate::models::{self, IdentityCrop, KnownResult, ModelError};
 use crate::pipeline::observer::{Observer, Ticker};
 
@@ -78,6 +79,9 @@ pub(crate) enum Source<'a> {
     Brought(&'a Path),
 }
 
+/// What is done with a checkpoint once it is here.
+const WRITING: &str = "Writing the weights";
+
 /// Puts the model called `id` in place.
 pub(crate) fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer) -> Result<ModelEntry, JobError> {
     let (folder, mut ticker) = (models::folder(), Ticker::new("", 0));
@@ -87,13 +91,17 @@ pub(crate) fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer)
             entry.add(&folder, file.parent().unwrap_or(file))?;
         }
         Source::Brought(file) if file.is_file() => entry.add_checkpoint(&folder, file, &mut |done, all| {
-            ticker.enter(format!("Writing the weights of {id}"), all);
+            ticker.enter(WRITING, 0, all);
             ticker.tick(done as usize, observer).is_ok()
         })?,
         Source::Brought(brought) => entry.add(&folder, brought)?,
-        Source::Fetch(from) => entry.fetch(&folder, from, Patience::default(), &mut |name, there, all| {
-            ticker.enter(format!("Downloading {name} (kB)"), all.unwrap_or(there) / 1000);
-            ticker.tick((there / 1000) as usize, observer).is_ok()
+        Source::Fetch(from) => entry.fetch(&folder, from, Patience::default(), &mut |what, there, all| {
+            let (stage, unit) = match what {
+                WEIGHTS => (WRITING.to_owned(), 1),
+                name => (format!("Downloading {name} (MB)"), 1_000_000),
+            };
+            ticker.enter(&stage, there / unit, all.unwrap_or(there) / unit);
+            ticker.tick((there / unit) as usize, observer).is_ok()
         })?,
     }
     Ok(entry)

@@ -21,7 +21,7 @@ mod known;
 pub(crate) mod lama;
 pub mod manifest;
 pub mod network;
-mod official;
+pub(crate) mod official;
 pub mod preprocess;
 pub mod sam;
 pub mod sam2;

@@ -9,6 +9,9 @@ use super::fetch::{self, FetchError, FileToFetch, Patience};
 use super::template::Template;
 use super::{ModelError, manifest, unpack};
 
+/// What `progress` is told instead of a file while the weights of a checkpoint are written.
+pub(crate) const WEIGHTS: &str = "weights";
+
 /// Endings of checkpoints, and of archives with programs.
 const ENDINGS: [&str; 7] = [".pt", ".pth", ".bin", ".safetensors", ".onnx", ".tgz", ".zip"];
 
@@ -84,7 +87,8 @@ impl ModelEntry {
 
     /// Fetches it into `folder` and checks it: its files, or, of a model that can be made of its official checkpoint,
     /// that. `from` is the address of a folder of such files or of such a checkpoint, instead of the listed one.
-    /// `progress` is told the file, its bytes that are there and those that there will be, and says whether to go on.
+    /// `progress` is told the file, its bytes that are there and those that there will be, and says whether to go on;
+    /// of a checkpoint that is here, [`WEIGHTS`], those that are written and all of them.
     pub fn fetch(
         &self,
         folder: &Path,
@@ -140,11 +144,16 @@ impl ModelEntry {
         let sha256 = official.sha256.clone().or_else(|| origin?.checkpoint_sha256);
         let most = official.megabytes * 1_100_000;
         let wanted = FileToFetch { url, to: &to, bytes: None, most, sha256: sha256.as_deref() };
-        if sha256.as_deref().is_none_or(|sha256| fetch::check(&to, sha256).is_err()) {
-            fetch::fetch(&wanted, patience, &mut |there, all| progress(&name, there, all))?;
+        // It has its name only once it is whole.
+        if !sha256.as_deref().map_or(to.is_file(), |sha256| fetch::check(&to, sha256).is_ok()) {
+            // About as large as listed, as long as no server says more.
+            let mut bytes = official.megabytes * 1_000_000;
+            fetch::fetch(&wanted, patience, &mut |there, all| {
+                bytes = all.unwrap_or(bytes).max(there);
+                progress(&name, there, Some(bytes))
+            })?;
         }
-        let bytes = std::fs::metadata(&to).map_or(0, |m| m.len());
-        let made = self.add_checkpoint(folder, &to, &mut |_, _| progress(&name, bytes, Some(bytes)));
+        let made = self.add_checkpoint(folder, &to, &mut |done, all| progress(WEIGHTS, done, Some(all)));
         // Whoever stops it does not want to fetch it again.
         if !matches!(made, Err(InstallError::Model(ModelError::Cancelled))) {
             // One that stays is in nobody's way.

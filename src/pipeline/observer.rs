@@ -75,10 +75,10 @@ impl Ticker {
         Self { stage: stage.into(), total, start: Instant::now(), before_secs: secs, marks }
     }
 
-    /// Goes on with `stage`: its clock starts if it is another than before.
-    pub(crate) fn enter(&mut self, stage: String, total: u64) {
+    /// Goes on with `stage`: its clock starts if it is another than before, and what is `done` by then took no time.
+    pub(crate) fn enter(&mut self, stage: &str, done: u64, total: u64) {
         if self.stage != stage {
-            *self = Self::new(stage, 0);
+            *self = Self::resumed(stage, total, done, 0.0);
         }
         self.total = total;
     }

@@ -56,8 +56,8 @@ impl App {
     pub(super) fn hear(&mut self, event: &Event) {
         let Some(awaited) = self.awaited.take_if(|a| event.is_end() && event.job() == a.job) else { return };
         if !matches!(event, Event::Finished(..)) {
-            let text = "Objects are not looked for: a model is missing. What was downloaded is kept; find objects again \
-                        to go on.";
+            let text = "Objects are not looked for: a model is missing. A download that was cut off goes on where it \
+                        ended: find objects again.";
             return self.state.toast(Tone::Warning, text);
         }
         // Another scene was opened meanwhile: nobody asked about that one.

@@ -16,6 +16,9 @@ use crate::worker::view::ViewPicture;
 /// Before the names of a menu that has switches.
 const INDENT: &str = "     ";
 
+/// Width of the button that pauses and resumes, pt.
+const PAUSE_PT: f32 = 62.0;
+
 /// Draws the bar at the top; `second` is whether the second view is worked in.
 pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bool, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
@@ -176,19 +179,14 @@ pub(crate) fn status(
         match &state.job {
             Some(job) => {
                 dot(ui, if job.paused { theme::warning() } else { theme::accent() });
+                // Once is enough: the pane and the first page have their own.
+                if state.scene.is_some() && !(state.is_training() && layout.shows(Pane::Training)) {
+                    job_buttons(ui, job, actions);
+                }
                 let title = if job.paused { format!("{} (paused)", job.title) } else { job.title.clone() };
                 ui.label(RichText::new(title).strong());
-                // Once is enough: the pane and the first page have their own.
                 if let Some(p) = job.progress.as_ref().filter(|_| state.scene.is_some()) {
                     progress(ui, p, job);
-                }
-                let elsewhere = state.scene.is_none() || state.is_training() && layout.shows(Pane::Training);
-                let pause = if job.paused { "Resume" } else { "Pause" };
-                if !elsewhere && job.kind.can_pause() && ui.small_button(pause).on_hover_text("T").clicked() {
-                    actions.push(Action::PauseJob);
-                }
-                if !elsewhere && ui.small_button("Cancel").on_hover_text("Esc").clicked() {
-                    actions.push(Action::Cancel);
                 }
             }
             None => {
@@ -211,6 +209,19 @@ pub(crate) fn status(
             }
         });
     });
+}
+
+/// Before all texts, which change: neither button ever comes to be where the other was.
+fn job_buttons(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
+    if job.kind.can_pause() {
+        let pause = Button::new(if job.paused { "Resume" } else { "Pause" }).small();
+        if ui.add(pause.min_size(vec2(PAUSE_PT, 0.0))).on_hover_text("T").clicked() {
+            actions.push(Action::PauseJob);
+        }
+    }
+    if ui.small_button("Cancel").on_hover_text("Esc").clicked() {
+        actions.push(Action::Cancel);
+    }
 }
 
 /// A small disc: something runs.

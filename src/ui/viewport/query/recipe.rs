@@ -1,6 +1,7 @@
 //! The recipe of a view's queries: this program's way, the paper's, or single choices of either.
 
-use egui::{ComboBox, TextEdit, Ui};
+use egui::containers::menu::{MenuButton, MenuConfig};
+use egui::{PopupCloseBehavior, TextEdit, Ui};
 use strum::VariantArray;
 
 use super::Queries;
@@ -45,10 +46,15 @@ pub(super) fn show(ui: &mut Ui, recipe: &mut Recipe) {
                 *recipe = other.recipe();
             }
         }
+        // A menu closes at the first click into it, unless it is told to stay for several choices.
+        let stays = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
+        let menu = MenuButton::new("Choices\u{2026}").config(stays);
+        let (button, _) = menu.ui(ui, |ui| choices(ui, recipe));
+        button.on_hover_text(recipe.to_string());
+        // Last, so that the menu is the same one, and stays open, once this appears.
         if name.is_none() {
             ui.weak("own");
         }
-        ui.menu_button("Choices\u{2026}", |ui| choices(ui, recipe)).response.on_hover_text(recipe.to_string());
     });
     ui.end_row();
 }
@@ -88,11 +94,11 @@ fn canonical(ui: &mut Ui, phrases: &mut CanonicalPhrases) {
 
 fn one_of<T: Copy + PartialEq + ToString>(ui: &mut Ui, what: &str, all: &[T], chosen: &mut T) {
     ui.weak(what);
-    let combo = ComboBox::from_id_salt(what).selected_text(chosen.to_string()).width(110.0).show_ui(ui, |ui| {
+    // No list that opens: a click into it would be one outside of the menu.
+    ui.horizontal(|ui| {
         for value in all {
             ui.selectable_value(chosen, *value, value.to_string());
         }
     });
-    combo.response.accessible_name(what);
     ui.end_row();
 }
