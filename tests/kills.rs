@@ -153,6 +153,51 @@ fn objects_being_found() {
     assert_tidy(folder.path());
 }
 
+#[test]
+fn a_scene_trained_anew_without_a_thing() {
+    let folder = folder();
+    let photos = tiny_dataset(folder.path());
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (photos, scene) = (photos.to_str().unwrap(), at("scene"));
+    fmlgs(&train(photos, &scene, "40")).ok();
+    fmlgs(&["preprocess", &scene, "--masks", photos, "--encoder", "none", "-q"]).ok();
+    let remove = |out: &str, seed: u64| {
+        command(&["remove", &scene, "box 1", "--fill", "photos", "--out", out, "--seed", &seed.to_string(), "-q"])
+    };
+    let state = |out: &str| {
+        let loaded = trained::load(Path::new(out)).unwrap();
+        (loaded.cloud, map_of(Path::new(out)).identity_of)
+    };
+    let (whole, killed) = (at("whole"), at("killed"));
+    let longest = time(&mut remove(&whole, 0));
+    let done = state(&whole);
+    fmlgs(&["query", &whole, "box 1"]).fails_with(1);
+    fmlgs(&["query", &whole, "box 2"]).ok();
+    // It trained on photos of its own, in which other things are as they were and the box is not.
+    let eval = |scene: &str, photos: &str| {
+        let all = ["eval", scene, "--photos", photos, "--holdout-every", "0", "--json"];
+        fmlgs(&all).ok().json()["psnr"].as_f64().unwrap()
+    };
+    let own = at("whole/photos");
+    let scores = [[&whole, &scene].map(|s| eval(s, &own)), [&whole, &scene].map(|s| eval(s, photos))];
+    assert!(scores[0][0] > scores[0][1] + 1.0 && scores[1][1] > scores[1][0] + 1.0, "{scores:?}");
+
+    // Again nothing changes; another wish is refused, and so is the scene itself.
+    Done::from(remove(&whole, 0).output().unwrap()).ok();
+    assert_eq!(state(&whole), done);
+    Done::from(remove(&whole, 1).output().unwrap()).fails_with(1);
+    Done::from(remove(&scene, 0).output().unwrap()).fails_with(1);
+    assert_eq!(state(&whole), done);
+
+    kill_often("remove --fill photos", longest.mul_f64(0.5), &mut |_| remove(&killed, 0), &mut || {
+        let out = Path::new(&killed);
+        assert!(!trained::is_scene(out) || trained::load(out).is_ok());
+    });
+    Done::from(remove(&killed, 0).output().unwrap()).ok();
+    assert!(state(&killed) == done, "what was killed became another scene");
+    assert_tidy(folder.path());
+}
+
 /// Names the scene that [`edits`], in a process of its own, is to edit until it is killed.
 const EDITED: &str = "FMLGS_EDITED_SCENE";
 

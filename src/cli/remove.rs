@@ -15,7 +15,8 @@ use crate::scene::LevelFilter;
 ///
 /// What was behind it and was seen in other photos is there already; what no photo saw is invented: the plane of the
 /// surface goes on below it, painted from what is seen around. Shadows and reflections of it stay (--lift-shadow
-/// tries to lift the shadow). The scene is left as it is; the result is a scene of its own, in which what is invented has the property 'fmlgs_invented'.
+/// tries to lift the shadow). The scene is left as it is; the result is a scene of its own, in which what is invented has
+/// the property 'fmlgs_invented'.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs remove scene/ \"the teddy bear\" --out without_bear/\n  \
@@ -75,16 +76,16 @@ pub(crate) fn run(args: RemoveArgs, quiet: bool) -> Result<(), CliError> {
     let ids = query::identities(&map, &args.text, args.kind, args.top)?;
     let names: Vec<String> = ids.iter().map(|id| map.identities.full_name(*id)).collect();
     let name = names.join(", ");
-    match args.fill {
-        Fill::Photos => photos_without::check(&scene, &name, &args.out)?,
-        _ => derived::check(&args.out)?,
-    }
     let paint = match args.fill {
         Fill::Plane | Fill::Photos => Some(args.paint),
         Fill::Lama => Some(Paint::Lama),
         Fill::None => None,
     };
     let options = RemovalOptions { ids, halo: !args.tight, lift_shadow: args.lift_shadow, paint, seed: args.seed };
+    match args.fill {
+        Fill::Photos => photos_without::check(&scene, (&options, &name), &args.out)?,
+        _ => derived::check(&args.out)?,
+    }
     let console = &mut Console::new(quiet);
     let done = remove::run(&scene, &map, &options, console).map_err(|e| CliError::of_work(e, "nothing was written"))?;
     if args.fill == Fill::Photos {

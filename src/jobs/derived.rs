@@ -49,13 +49,18 @@ pub(crate) fn check(out: &Path) -> Result<(), JobError> {
 
 /// `desk-cleaned` beside `desk` for `how` "cleaned", with a number if there is one already.
 pub(crate) fn free_folder(scene: &Path, how: &str) -> PathBuf {
+    folder_beside(scene, how, |_| false)
+}
+
+/// The same, or the first one that may be gone on with.
+pub(crate) fn folder_beside(scene: &Path, how: &str, goes_on: impl Fn(&Path) -> bool) -> PathBuf {
     let name = if scene.is_dir() { scene.file_name() } else { scene.file_stem() };
     let stem = name.map_or_else(|| "scene".into(), |n| n.to_string_lossy());
     let place = |number: usize| match number {
         1 => scene.with_file_name(format!("{stem}-{how}")),
         n => scene.with_file_name(format!("{stem}-{how}-{n}")),
     };
-    (1..).map(place).find(|folder| !folder.exists()).unwrap_or_default()
+    (1..).map(place).find(|folder| !folder.exists() || goes_on(folder)).unwrap_or_default()
 }
 
 /// The settings of a training whose result is drawn as `from` is.

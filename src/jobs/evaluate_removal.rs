@@ -15,7 +15,7 @@ use crate::pipeline::metrics::planes;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::pipeline::removal::score::{RegionScore, RemovalRegion, Tally, flat_share, mark_shaded, regions};
 use crate::pipeline::synth::{SETTINGS, SynthOptions};
-use crate::render::{Features, RenderSettings, Renderer};
+use crate::render::{Features, Frame, RenderSettings, Renderer};
 use crate::scene::{Camera, LevelFilter, PhotoPixels, SemanticMap};
 
 /// The ways that are compared: nothing is filled, and each way to paint; LaMa, too, where it is there, and the
@@ -55,6 +55,8 @@ struct TrueView {
     /// Without it; and with it.
     depth: TrueDepth,
     before: TrueDepth,
+    /// The scene with it.
+    was: Frame<f32>,
     index: usize,
 }
 
@@ -75,7 +77,7 @@ pub(crate) fn run(
     let has_lama = catalog::find(LAMA, ModelRole::Inpainter).is_ok();
     let mut rows = Vec::new();
     for folder in folders(truth)? {
-        let (name, views) = views(comparison, &folder, &photos)?;
+        let (name, views) = views(scene, comparison, &folder, &photos)?;
         let ways = WAYS.into_iter().chain(has_lama.then_some(Some(Paint::Lama))).map(|paint| (paint, false));
         for (paint, lift_shadow) in ways.chain([(Some(Paint::default()), true)]) {
             rows.push(one(scene, &map, (&name, paint, lift_shadow), &views, comparison, observer)?);
@@ -115,6 +117,7 @@ fn photos(comparison: &PhotoComparison) -> Result<Vec<(Camera, TrueDepth)>, JobE
 
 /// The thing's name and the views in which it was.
 fn views(
+    scene: &Scene,
     comparison: &PhotoComparison,
     folder: &Path,
     photos: &[(Camera, TrueDepth)],
@@ -123,6 +126,7 @@ fn views(
     let settings: Settings = files::read_json(&folder.join(SETTINGS))?;
     let name = settings.options.without.ok_or_else(|| wrong("nothing was left out of these photos"))?;
     let mut views = Vec::new();
+    let mut renderer = Renderer::new();
     for &index in &comparison.views {
         let photo = &comparison.dataset.photos[index];
         let mut bare = photo.clone();
@@ -140,7 +144,17 @@ fn views(
         if regions.iter().any(|r| *r != RemovalRegion::Outside) {
             let (with_planes, without) = (planes(&with.pixels), planes(&pixels));
             mark_shaded(&mut regions, &with_planes, &without);
-            views.push(TrueView { camera: with.camera, regions, with: with_planes, without, depth, before, index });
+            let was = renderer.render(&scene.cloud, Features::NONE, &with.camera, &scene.settings)?;
+            views.push(TrueView {
+                camera: with.camera,
+                regions,
+                with: with_planes,
+                without,
+                depth,
+                before,
+                was,
+                index,
+            });
         }
     }
     if views.is_empty() {
@@ -173,13 +187,13 @@ fn one(
     let mut ticker = Ticker::new(format!("Comparing without {name}"), views.len());
     for (k, view) in views.iter().enumerate() {
         ticker.tick(k, observer)?;
-        let was = renderer.render(&scene.cloud, Features::NONE, &view.camera, &settings)?;
+        let was = &view.was;
         let is = renderer.render(&cloud, Features::NONE, &view.camera, &settings)?;
         uncovered.add(&is, &view.without, Some(&view.depth), &view.regions, RemovalRegion::Uncovered);
         invented.add(&is, &view.without, Some(&view.depth), &view.regions, RemovalRegion::Invented);
-        shaded[0].add(&was, &view.without, None, &view.regions, RemovalRegion::Shaded);
+        shaded[0].add(was, &view.without, None, &view.regions, RemovalRegion::Shaded);
         shaded[1].add(&is, &view.without, None, &view.regions, RemovalRegion::Shaded);
-        before.add(&was, &view.with, None, &view.regions, RemovalRegion::Outside);
+        before.add(was, &view.with, None, &view.regions, RemovalRegion::Outside);
         after.add(&is, &view.with, None, &view.regions, RemovalRegion::Outside);
         if let (Some(folder), true) = (&comparison.pictures, paint != Some(Paint::Nearest)) {
             let way = paint.map_or("none".into(), |p| format!("{p:?}").to_lowercase());

@@ -3,7 +3,6 @@
 //! Where the thing was, a photo shows what the scene has there now, which is the same from all sides; where only its shadow
 //! was, it becomes as much brighter as the scene did; elsewhere it stays as it is.
 
-use std::collections::HashSet;
 use std::path::Path;
 
 use glam::DVec3;
@@ -15,8 +14,8 @@ use crate::io::{self, IoError, SceneFolder, atomic, files, points_ply, trained};
 use crate::math::grid;
 use crate::math::sh::SH_C0;
 use crate::pipeline::observer::{Observer, Ticker};
-use crate::pipeline::removal::{INVENTED, RemovalOptions};
-use crate::pipeline::semantics::carry::{carry, nearest};
+use crate::pipeline::removal::{INVENTED, RemovalOptions, invented_flags, members};
+use crate::pipeline::semantics::carry::{carry_by, nearest};
 use crate::render::{Features, Renderer};
 use crate::scene::{Camera, Dataset, ExtraProperty, GaussianCloud, PhotoPixels, SemanticMap, SparsePoint};
 
@@ -50,33 +49,31 @@ pub(crate) fn retrain(
         return Ok(false);
     }
     let scene = trained::load(out)?;
-    let (carried, _) = carry(reduced.1, reduced.0, &scene.cloud);
     let mut cloud = scene.cloud;
-    mark_invented(&mut cloud, reduced.0);
+    let places: Vec<DVec3> = (0..cloud.len()).map(|i| cloud.world_position(i)).collect();
+    let near = nearest(reduced.0, &places);
+    let (carried, _) = carry_by(reduced.1, &near);
+    if let Some(flags) = invented_flags(reduced.0) {
+        cloud.extras.retain(|e| e.name != INVENTED);
+        let values = near.into_iter().map(|n| n.map_or(0.0, |i| flags[i])).collect();
+        cloud.extras.push(ExtraProperty { name: INVENTED.into(), values });
+    }
     SceneFolder::hold(out, "storing its objects")?.save(&scene.info, &cloud, Some(&carried))?;
     Ok(true)
 }
 
 /// Refuses a folder that holds something else than what [`retrain`] has begun there.
-pub(crate) fn check(from: &Scene, name: &str, out: &Path) -> Result<(), JobError> {
-    let begun = files::read_json::<serde_json::Value>(&out.join(PHOTOS).join(MARK)).ok();
-    match begun {
-        Some(mark) if mark == self::mark(from, name) => Ok(()),
-        _ => super::derived::check(out),
-    }
+pub(crate) fn check(from: &Scene, without: (&RemovalOptions, &str), out: &Path) -> Result<(), JobError> {
+    if is_begun(from, without, out) { Ok(()) } else { super::derived::check(out) }
 }
 
-fn mark(from: &Scene, name: &str) -> serde_json::Value {
-    json!({ "version": 1, "scene": from.path, "state": from.state, "without": name })
+/// Whether [`retrain`] has begun exactly this in a folder.
+pub(crate) fn is_begun(from: &Scene, without: (&RemovalOptions, &str), out: &Path) -> bool {
+    files::read_json::<serde_json::Value>(&out.join(PHOTOS).join(MARK)).is_ok_and(|m| m == mark(from, without))
 }
 
-/// Gaussians near those that were invented are invented.
-fn mark_invented(cloud: &mut GaussianCloud, reduced: &GaussianCloud) {
-    let Some(flags) = reduced.extras.iter().find(|e| e.name == INVENTED) else { return };
-    let places: Vec<DVec3> = (0..cloud.len()).map(|i| cloud.world_position(i)).collect();
-    let values = nearest(reduced, &places).into_iter().map(|n| n.map_or(0.0, |i| flags.values[i])).collect();
-    cloud.extras.retain(|e| e.name != INVENTED);
-    cloud.extras.push(ExtraProperty { name: INVENTED.into(), values });
+fn mark(from: &Scene, (options, name): (&RemovalOptions, &str)) -> serde_json::Value {
+    json!({ "version": 2, "scene": from.path, "state": from.state, "without": name, "options": options })
 }
 
 /// Writes the photos as a data set of its own, in the size that was trained on.
@@ -93,9 +90,9 @@ fn write(
     let json = |file: &str, value: &serde_json::Value| {
         atomic::write(&out.join(file), |w| serde_json::to_writer_pretty(w, value).map_err(Into::into))
     };
-    json(MARK, &mark(from, name))?;
-    let thing: HashSet<usize> = options.ids.iter().flat_map(|id| map.members(*id)).collect();
-    let share: Vec<f32> = (0..from.cloud.len()).map(|i| f32::from(u8::from(thing.contains(&i)))).collect();
+    json(MARK, &mark(from, (options, name)))?;
+    let thing = members(map, &options.ids);
+    let share: Vec<f32> = thing.iter().map(|is| f32::from(u8::from(*is))).collect();
     let (_, held) = dataset.split(from.config.holdout_every);
     let (mut frames, mut test) = (Vec::new(), Vec::new());
     let mut ticker = Ticker::new("Photos without it", dataset.photos.len());
@@ -148,11 +145,11 @@ fn store(path: &Path, pixels: PhotoPixels) -> Result<(), IoError> {
 }
 
 /// The sparse points that are not of the thing, and what was invented.
-fn points(dataset: &Dataset, from: &Scene, thing: &HashSet<usize>, cloud: &GaussianCloud) -> Vec<SparsePoint> {
+fn points(dataset: &Dataset, from: &Scene, thing: &[bool], cloud: &GaussianCloud) -> Vec<SparsePoint> {
     let places: Vec<DVec3> = dataset.points.iter().map(|p| p.position).collect();
     let near = nearest(&from.cloud, &places);
-    let stays = dataset.points.iter().zip(near).filter(|(_, n)| n.is_none_or(|i| !thing.contains(&i)));
-    let flags = cloud.extras.iter().find(|e| e.name == INVENTED).map_or(&[][..], |e| &e.values);
+    let stays = dataset.points.iter().zip(near).filter(|(_, n)| n.is_none_or(|i| !thing[i]));
+    let flags = invented_flags(cloud).unwrap_or_default();
     let invented = (0..flags.len()).filter(|i| flags[*i] > 0.0).map(|i| SparsePoint {
         position: cloud.world_position(i),
         rgb: cloud.sh[i * cloud.sh_stride()].map(|v| ((0.5 + SH_C0 as f32 * v).clamp(0.0, 1.0) * 255.0) as u8),

@@ -7,7 +7,7 @@ use image::ColorType;
 
 use super::{JobError, Scene, export};
 use crate::math::colormap::Colormap;
-use crate::pipeline::removal::INVENTED;
+use crate::pipeline::removal::invented_flags;
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::matching::{self, MatchMode};
@@ -88,10 +88,8 @@ fn invented(
     (cloud, settings): (&GaussianCloud, &RenderSettings),
     camera: &Camera,
 ) -> Result<Mask, crate::render::RenderError> {
-    let Some(flags) = cloud.extras.iter().find(|e| e.name == INVENTED && e.values.contains(&1.0)) else {
-        return Ok(Mask::empty(0, 0));
-    };
-    let features = Features { channels: 1, values: &flags.values };
+    let Some(flags) = invented_flags(cloud) else { return Ok(Mask::empty(0, 0)) };
+    let features = Features { channels: 1, values: flags };
     let bare = RenderSettings { sh_degree: 0, depth: false, ..settings.clone() };
     let frame = renderer.render(cloud, features, camera, &bare)?;
     Ok(Mask::from_fn(frame.width_px, frame.height_px, |i| frame.features[0][i] >= 0.5))

@@ -75,20 +75,20 @@ pub(crate) fn beside(request: &RemoveRequest, observer: &mut dyn Observer) -> Re
     let name = removal::names(&map, ids);
     let done = run(&scene, &map, &request.options, observer)?;
     let words: Vec<String> = ids.iter().map(|id| export::identity_name(&map.identities, *id)).collect();
-    let again = if request.retrain { "-retrained" } else { "" };
-    let folder = derived::free_folder(&request.folder, &format!("without-{}{again}", words.join("-")));
-    if !request.retrain {
+    let how = format!("without-{}", words.join("-"));
+    let folder = if request.retrain {
+        let without = (&request.options, name.as_str());
+        let begun = |folder: &Path| photos_without::is_begun(&scene, without, folder);
+        let folder = derived::folder_beside(&request.folder, &format!("{how}-retrained"), begun);
+        if !photos_without::retrain(&scene, &map, without, (&done.cloud, &done.map), &folder, observer)? {
+            return Err(Interrupted.into());
+        }
+        folder
+    } else {
+        let folder = derived::free_folder(&request.folder, &how);
         store(&scene, &name, &done, &folder)?;
-    } else if !photos_without::retrain(
-        &scene,
-        &map,
-        (&request.options, &name),
-        (&done.cloud, &done.map),
-        &folder,
-        observer,
-    )? {
-        return Err(Interrupted.into());
-    }
+        folder
+    };
     Ok(RemovedScene { folder, name, request: request.clone(), report: done.report })
 }
 

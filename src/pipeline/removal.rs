@@ -27,7 +27,8 @@ mod views;
 use serde::Serialize;
 
 pub(crate) use paint::Paint;
-pub(crate) use rebuild::INVENTED;
+pub(crate) use rebuild::{INVENTED, invented_flags};
+pub(crate) use select::members;
 
 use self::close::Closing;
 use self::rebuild::{brighten, with_new};
@@ -38,7 +39,7 @@ use crate::render::{RenderError, RenderSettings};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
 /// What is to be removed, and how.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct RemovalOptions {
     /// Objects and parts.
     pub(crate) ids: Vec<IdentityId>,

@@ -50,7 +50,7 @@ impl App {
             Action::KeepArranged => self.keep_arranged(),
             Action::MeasureSplats => self.measure_splats(),
             Action::DeleteChosen => self.delete_chosen(),
-            Action::AnotherFill(request) => self.submit_removal(request.options, request.retrain),
+            Action::AnotherFill(request) => self.submit_removal(*request),
             Action::FetchModel(id) => self.install_model(id, None),
             Action::TypeQuery => self.type_question(),
             Action::Ask(text) => {

@@ -9,17 +9,22 @@ use crate::worker::Command;
 impl App {
     /// Makes a scene without the identity.
     pub(super) fn remove(&mut self, id: IdentityId) {
-        self.submit_removal(RemovalOptions::of(id), false);
-    }
-
-    /// Makes a scene without what `options` say, trained anew if wanted.
-    pub(super) fn submit_removal(&mut self, options: RemovalOptions, retrain: bool) {
-        if self.editing.is_some() || !self.edits.is_empty() {
-            return self.state.toast(Tone::Warning, "Objects are being changed; remove it once that is done.");
-        }
         let Some(folder) = self.state.scene.as_ref().filter(|_| self.state.is_trained()).map(|s| s.out.clone()) else {
             return self.state.toast(Tone::Warning, "Only from a trained scene can something be removed.");
         };
-        self.submit(Command::Remove(Box::new(RemoveRequest { folder, options, retrain })));
+        self.submit_removal(RemoveRequest { folder, options: RemovalOptions::of(id), retrain: false });
+    }
+
+    /// Makes a scene without what the request says, from the one that is open.
+    pub(super) fn submit_removal(&mut self, request: RemoveRequest) {
+        if self.editing.is_some() || !self.edits.is_empty() {
+            return self.state.toast(Tone::Warning, "Objects are being changed; remove it once that is done.");
+        }
+        if self.state.scene.as_ref().is_none_or(|s| s.out != request.folder) {
+            return self
+                .state
+                .toast(Tone::Warning, "Another scene is open now; open that one first to remove from it.");
+        }
+        self.submit(Command::Remove(Box::new(request)));
     }
 }

@@ -61,7 +61,7 @@ impl Closing<'_> {
                     }
                 }
             }
-            let Some(mut sheet) = SurfaceSheet::find(plane, &self.ball, self.seen, REACH) else { continue };
+            let Some(mut sheet) = wide.hidden_part(&self.ball, self.seen) else { continue };
             if let Some(brightening) = &brightening {
                 sheet.brighten(|point| brightening.at(point));
             }

@@ -9,6 +9,12 @@ use crate::scene::{ExtraProperty, GaussianCloud, IdentityId};
 /// The extra property of Gaussians that were invented: 1, else 0.
 pub(crate) const INVENTED: &str = "fmlgs_invented";
 
+/// Which Gaussians were invented: 1, else 0; `None` if none was.
+pub(crate) fn invented_flags(cloud: &GaussianCloud) -> Option<&[f32]> {
+    let flags = cloud.extras.iter().find(|e| e.name == INVENTED)?;
+    flags.values.contains(&1.0).then_some(&flags.values)
+}
+
 /// Standard deviation of a new Gaussian along the surface, in texels: neighbors overlap to an even cover.
 pub(super) const SPREAD: f64 = 0.6;
 /// The same across the surface.

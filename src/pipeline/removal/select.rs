@@ -21,7 +21,7 @@ const STRAY: f64 = 1.5;
 const UNSURE: f32 = 0.3;
 
 /// The Gaussians of these identities and their pieces.
-pub(super) fn members(map: &SemanticMap, ids: &[IdentityId]) -> Vec<bool> {
+pub(crate) fn members(map: &SemanticMap, ids: &[IdentityId]) -> Vec<bool> {
     let mut inside = vec![false; map.identity_of.len()];
     ids.iter().flat_map(|id| map.members(*id)).for_each(|i| inside[i] = true);
     inside

@@ -65,69 +65,19 @@ impl<'a> Brightening<'a> {
             |c: usize| -> Vec<f32> { rows.iter().map(|&i| srgb::linear(sheet.color[i][c].max(0.0))).collect() };
         let channels = [0, 1, 2].map(channel);
         let values: Vec<f32> = (0..rows.len()).map(|k| channels.iter().map(|c| c[k]).sum::<f32>() / 3.0).collect();
-        let shadows = |directions: &[DVec3]| -> Vec<Shadow> {
-            directions.par_iter().map(|d| Shadow { toward: *d, bits: blocked(plane, sheet, *d, occluders) }).collect()
-        };
-        let columns = |shadows: &[Shadow], which: u8| -> Vec<Vec<f32>> {
-            let base = (0..light::FREE).map(|k| rows.iter().map(|&i| base(sheet, i)[k] as f32).collect());
-            let shade = |s: &Shadow| rows.iter().map(|&i| if s.bits[i] & which == 0 { 0.0 } else { -1.0 }).collect();
-            base.chain(shadows.iter().map(shade)).collect()
-        };
-        let mut about = shadows(&hemisphere(plane));
-        let mut spacing = (std::f64::consts::TAU * (1.0 - LEAST_COSINE) / DIRECTIONS as f64).sqrt();
-        let mut counts = Vec::new();
-        for round in 0..=FINER_ROUNDS {
-            let (weights, rows) = light::fit(&columns(&about, THING | OTHERS), &values);
-            counts = rows;
-            let weights = &weights[light::FREE..];
-            let total: f64 = weights.iter().sum();
-            let mut kept: Vec<(Shadow, f64)> =
-                about.into_iter().zip(weights.iter().copied()).filter(|(_, w)| *w > 1e-3 * total).collect();
-            if round == FINER_ROUNDS {
-                about = kept.into_iter().map(|k| k.0).collect();
-                break;
-            }
-            kept.sort_by(|a, b| b.1.total_cmp(&a.1));
-            spacing *= 0.5;
-            let finer: Vec<DVec3> = kept
-                .iter()
-                .filter(|(_, w)| *w > MUCH * total)
-                .flat_map(|(s, _)| around(s.toward, spacing))
-                .filter(|d| d.dot(plane.normal) >= LEAST_COSINE)
-                .collect();
-            about = kept.into_iter().map(|k| k.0).collect();
-            about.extend(shadows(&finer));
-        }
-        let all = columns(&about, THING | OTHERS);
-        let sheet_rows = |weights: &[f64], which: u8| -> Vec<f64> {
-            let at = |i: usize| {
-                let base: f64 = base(sheet, i).iter().zip(weights).map(|(b, w)| b * w).sum();
-                let less = |(s, w): (&Shadow, &f64)| if s.bits[i] & which == 0 { 0.0 } else { *w };
-                base - about.iter().zip(&weights[light::FREE..]).map(less).sum::<f64>()
-            };
-            (0..sheet.state.len()).map(at).collect()
-        };
-        // Does the thing's shadow explain what is darker in it?
-        let weights = light::solve(&all, &values, &counts);
-        let (with, without) = (sheet_rows(&weights, THING | OTHERS), sheet_rows(&weights, OTHERS));
-        let others = columns(&about, OTHERS);
-        let left = [
-            light::residuals(&all, &values, &weights),
-            light::residuals(&others, &values, &light::solve(&others, &values, &counts)),
-        ];
-        let in_shadow = |k: &usize| without[rows[*k]] - with[rows[*k]] > SHADED * without[rows[*k]].abs();
-        let sum = |off: &[f64]| -> f64 { (0..rows.len()).filter(in_shadow).map(|k| counts[k] * off[k] * off[k]).sum() };
-        let [full, bare] = left.map(|off| sum(&off));
-        if !(bare > 0.0 && full < EXPLAINED * bare) {
+        let lit = LitSurface { plane, sheet, occluders, rows };
+        let (about, counts) = lit.directions(&values);
+        if !lit.is_explained(&about, &values, &counts) {
             return None;
         }
-        let gains = channels.map(|values| {
+        let all = lit.columns(&about, THING | OTHERS);
+        let gains: [Vec<f32>; 3] = channels.map(|values| {
             let weights = light::solve(&all, &values, &counts);
             let floor = 0.05 * weights[0].max(1e-6);
-            let (with, without) = (sheet_rows(&weights, THING | OTHERS), sheet_rows(&weights, OTHERS));
-            with.iter().zip(without).map(|(w, o)| ((o.max(floor) / w.max(floor)) as f32).clamp(1.0, MOST)).collect()
+            let [with, without] = [THING | OTHERS, OTHERS].map(|which| lit.brightness(&about, &weights, which));
+            let gain = |(w, o): (f64, f64)| ((o.max(floor) / w.max(floor)) as f32).clamp(1.0, MOST);
+            blurred(with.into_iter().zip(without).map(gain).collect(), sheet.size)
         });
-        let gains: [Vec<f32>; 3] = gains.map(|gain| blurred(gain, sheet.size));
         let gain = |i: usize| Some([0, 1, 2].map(|c| gains[c][i])).filter(|g| g.iter().any(|g| *g >= LEAST_GAIN));
         let gain: Vec<[f32; 3]> = (0..sheet.state.len()).map(|i| gain(i).unwrap_or([1.0; 3])).collect();
         // So few are noise.
@@ -137,6 +87,81 @@ impl<'a> Brightening<'a> {
     /// How much brighter the surface is at a point; 1 beyond the sheet.
     pub(super) fn at(&self, point: DVec3) -> [f32; 3] {
         self.sheet.sample(point, |i| self.gain[i]).unwrap_or([1.0; 3])
+    }
+}
+
+/// A surface of one material, and what stands in the way of its light.
+struct LitSurface<'a> {
+    plane: &'a Plane,
+    sheet: &'a SurfaceSheet<'a>,
+    occluders: &'a [Occluder],
+    /// Its texels that are fitted to.
+    rows: Vec<usize>,
+}
+
+impl LitSurface<'_> {
+    /// The directions along which light comes, and how much each row counts.
+    fn directions(&self, values: &[f32]) -> (Vec<Shadow>, Vec<f64>) {
+        let mut about = self.shadows(&hemisphere(self.plane));
+        let mut spacing = (std::f64::consts::TAU * (1.0 - LEAST_COSINE) / DIRECTIONS as f64).sqrt();
+        let mut counts = Vec::new();
+        for round in 0..=FINER_ROUNDS {
+            let (weights, rows) = light::fit(&self.columns(&about, THING | OTHERS), values);
+            counts = rows;
+            let weights = &weights[light::FREE..];
+            let total: f64 = weights.iter().sum();
+            let mut kept: Vec<(Shadow, f64)> =
+                about.into_iter().zip(weights.iter().copied()).filter(|(_, w)| *w > 1e-3 * total).collect();
+            kept.sort_by(|a, b| b.1.total_cmp(&a.1));
+            let much = kept.iter().filter(|(_, w)| *w > MUCH * total).map(|(s, _)| s.toward);
+            spacing *= 0.5;
+            let finer: Vec<DVec3> =
+                much.flat_map(|d| around(d, spacing)).filter(|d| d.dot(self.plane.normal) >= LEAST_COSINE).collect();
+            about = kept.into_iter().map(|k| k.0).collect();
+            if round < FINER_ROUNDS {
+                about.extend(self.shadows(&finer));
+            }
+        }
+        (about, counts)
+    }
+
+    fn shadows(&self, directions: &[DVec3]) -> Vec<Shadow> {
+        let one = |d: &DVec3| Shadow { toward: *d, bits: blocked(self.plane, self.sheet, *d, self.occluders) };
+        directions.par_iter().map(one).collect()
+    }
+
+    /// What the brightness of the rows is made of, if `which` stand in the way.
+    fn columns(&self, shadows: &[Shadow], which: u8) -> Vec<Vec<f32>> {
+        let rows = &self.rows;
+        let base = (0..light::FREE).map(|k| rows.iter().map(|&i| base(self.sheet, i)[k] as f32).collect());
+        let shade = |s: &Shadow| rows.iter().map(|&i| if s.bits[i] & which == 0 { 0.0 } else { -1.0 }).collect();
+        base.chain(shadows.iter().map(shade)).collect()
+    }
+
+    /// The brightness of each texel, if `which` stand in the way.
+    fn brightness(&self, about: &[Shadow], weights: &[f64], which: u8) -> Vec<f64> {
+        let at = |i: usize| {
+            let base: f64 = base(self.sheet, i).iter().zip(weights).map(|(b, w)| b * w).sum();
+            let less = |(s, w): (&Shadow, &f64)| if s.bits[i] & which == 0 { 0.0 } else { *w };
+            base - about.iter().zip(&weights[light::FREE..]).map(less).sum::<f64>()
+        };
+        (0..self.sheet.state.len()).map(at).collect()
+    }
+
+    /// Whether the thing's shadow explains what is darker in it.
+    fn is_explained(&self, about: &[Shadow], values: &[f32], counts: &[f64]) -> bool {
+        let [all, others] = [THING | OTHERS, OTHERS].map(|which| self.columns(about, which));
+        let weights = light::solve(&all, values, counts);
+        let [with, without] = [THING | OTHERS, OTHERS].map(|which| self.brightness(about, &weights, which));
+        let in_shadow = |k: &usize| {
+            let i = self.rows[*k];
+            without[i] - with[i] > SHADED * without[i].abs()
+        };
+        let left =
+            |off: Vec<f64>| -> f64 { (0..off.len()).filter(in_shadow).map(|k| counts[k] * off[k] * off[k]).sum() };
+        let full = left(light::residuals(&all, values, &weights));
+        let bare = left(light::residuals(&others, values, &light::solve(&others, values, counts)));
+        bare > 0.0 && full < EXPLAINED * bare
     }
 }
 

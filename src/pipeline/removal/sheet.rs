@@ -70,21 +70,20 @@ impl<'a> SurfaceSheet<'a> {
         Self::looked_at(plane, corner, side / FIRST as f64, [FIRST; 2], seen)
     }
 
-    /// The part of a plane that the thing in `ball` hid from all views, with what is seen around it; `None` if it hid
-    /// nothing. `reach` radii around the thing are looked at.
-    pub(super) fn find(plane: &'a Plane, ball: &Ball, seen: &[SeenView], reach: f64) -> Option<Self> {
-        let first = Self::around(plane, ball, seen, reach);
-        let step = first.step;
-        let hidden = || (0..first.state.len()).filter(|i| first.state[*i] == Texel::Hidden);
+    /// The part of this sheet that the thing in `ball` hid from all views, in fine texels, with what is seen around it;
+    /// `None` if it hid nothing.
+    pub(super) fn hidden_part(&self, ball: &Ball, seen: &[SeenView]) -> Option<Self> {
+        let (plane, step) = (self.plane, self.step);
+        let hidden = || (0..self.state.len()).filter(|i| self.state[*i] == Texel::Hidden);
         let ends = |axis: usize| {
-            let all = hidden().map(|i| [i % FIRST, i / FIRST][axis]);
+            let all = hidden().map(|i| [i % self.size[0], i / self.size[0]][axis]);
             Some((all.clone().min()?, all.max()? + 1))
         };
         let (x, y) = (ends(0)?, ends(1)?);
         let larger = (x.1 - x.0).max(y.1 - y.0) as f64 * step;
         let pad = MARGIN * larger + step;
         let corner = [x.0, y.0].map(|t| t as f64 * step - pad);
-        let corner = [corner[0] + first.corner[0], corner[1] + first.corner[1]];
+        let corner = [corner[0] + self.corner[0], corner[1] + self.corner[1]];
         let extent = [x, y].map(|(from, to)| (to - from) as f64 * step + 2.0 * pad);
         let fine = pixel_size(plane, ball, seen).max(extent[0].max(extent[1]) / MOST as f64);
         let size = extent.map(|e| (e / fine).ceil().max(1.0) as usize);

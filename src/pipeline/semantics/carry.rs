@@ -17,18 +17,22 @@ const REACH: f64 = 2.0;
 /// that reaches it, and the share of `to` that one does.
 pub(crate) fn carry(map: &SemanticMap, from: &GaussianCloud, to: &GaussianCloud) -> (SemanticMap, f64) {
     let to: Vec<DVec3> = (0..to.len()).map(|i| to.world_position(i)).collect();
-    let nearest = nearest(from, &to);
+    carry_by(map, &nearest(from, &to))
+}
+
+/// The same, where the nearest ones are known.
+pub(crate) fn carry_by(map: &SemanticMap, nearest: &[Option<usize>]) -> (SemanticMap, f64) {
     let of = nearest.iter().map(|n| n.map_or(NOBODY, |i| map.identity_of[i])).collect();
     let margin = nearest.iter().map(|n| n.map_or(0.0, |i| map.margin[i])).collect();
     let mut carried = SemanticMap::from_identities(map.identities.clone(), of, margin, map.seeds.clone());
     // Codes may have been trained, so that they are not those of the identities.
-    for (codes, near) in carried.codes.iter_mut().zip(&nearest) {
+    for (codes, near) in carried.codes.iter_mut().zip(nearest) {
         *codes = near.map_or(*codes, |i| map.codes[i]);
     }
     carried.language.clone_from(&map.language);
     carried.findings.clone_from(&map.findings);
     let reached = nearest.iter().flatten().count();
-    (carried, reached as f64 / to.len().max(1) as f64)
+    (carried, reached as f64 / nearest.len().max(1) as f64)
 }
 
 /// For each point, the Gaussian that is nearest, if it reaches so far.

@@ -170,7 +170,8 @@ impl Viewport {
             let tip = "Trains the scene anew on its photos, in which it is replaced by what is behind it. Takes as long as \
                        the scene's training took.";
             if ui.button("Train anew without it").on_hover_text(tip).clicked() {
-                next.retrain = true;
+                // As it is shown.
+                next = RemoveRequest { retrain: true, ..last.clone() };
                 changed = true;
             }
             if changed {
