@@ -24,7 +24,8 @@ const MUCH: f64 = 0.06;
 const LEAST_TEXELS: usize = 200;
 /// Share of light from which a texel is in the thing's shadow.
 const SHADED: f64 = 0.03;
-/// The shadow is believed if with it less than this share of the squared differences in it is left.
+/// The shadow is believed if with it less than this share of the squared differences in it, beyond what is usual beside
+/// it, is left.
 const EXPLAINED: f64 = 0.7;
 /// How much brighter a surface may become at most, what is too little to be seen, and texels that a shadow has.
 const MOST: f32 = 6.0;
@@ -157,10 +158,21 @@ impl LitSurface<'_> {
             let i = self.rows[*k];
             without[i] - with[i] > SHADED * without[i].abs()
         };
-        let left =
-            |off: Vec<f64>| -> f64 { (0..off.len()).filter(in_shadow).map(|k| counts[k] * off[k] * off[k]).sum() };
-        let full = left(light::residuals(&all, values, &weights));
-        let bare = left(light::residuals(&others, values, &light::solve(&others, values, counts)));
+        let inside: Vec<bool> = (0..self.rows.len()).map(|k| in_shadow(&k)).collect();
+        // Summed squares where `is` the shadow, and what they count.
+        let squares = |off: &[f64], is: bool| -> (f64, f64) {
+            let of = (0..off.len()).filter(|k| inside[*k] == is);
+            of.fold((0.0, 0.0), |(sum, n), k| (sum + counts[k] * off[k] * off[k], n + counts[k]))
+        };
+        let with = light::residuals(&all, values, &weights);
+        // Grain is there with a shadow and without.
+        let (beside, of) = squares(&with, false);
+        let left = |off: &[f64]| -> f64 {
+            let (sum, n) = squares(off, true);
+            (sum - n * beside / of.max(1.0)).max(0.0)
+        };
+        let full = left(&with);
+        let bare = left(&light::residuals(&others, values, &light::solve(&others, values, counts)));
         bare > 0.0 && full < EXPLAINED * bare
     }
 }
