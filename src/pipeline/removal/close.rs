@@ -6,7 +6,7 @@ use glam::{DMat3, DQuat, DVec3};
 
 use super::extent::{Ball, ThingExtent};
 use super::plane::{self, Plane};
-use super::rebuild::{Invented, SPREAD};
+use super::rebuild::{Invented, SPREAD, shown};
 use super::shade::{Brightening, Occluder};
 use super::sheet::{SurfaceSheet, Texel};
 use super::views::{self, SeenView};
@@ -57,13 +57,13 @@ impl Closing<'_> {
             if let Some(brightening) = &brightening {
                 for (i, gain) in gains.iter_mut().enumerate() {
                     if !gone[i] && *gain == [1.0; 3] && self.lies_on(plane, i) {
-                        *gain = brightening.at(self.cloud.world_position(i));
+                        *gain = brightening.at(self.cloud.world_position(i), shown(self.cloud, i));
                     }
                 }
             }
             let Some(mut sheet) = wide.hidden_part(&self.ball, self.seen) else { continue };
             if let Some(brightening) = &brightening {
-                sheet.brighten(|point| brightening.at(point));
+                sheet.brighten(|point, rgb| brightening.at(point, rgb));
             }
             if self.options.halo {
                 sheet.add_foot();

@@ -55,11 +55,15 @@ pub(super) fn with_new(cloud: &GaussianCloud, kept: &[usize], new: &[Invented]) 
     all
 }
 
+/// The color of Gaussian `i`, mean over all directions.
+pub(super) fn shown(cloud: &GaussianCloud, i: usize) -> [f32; 3] {
+    cloud.sh[i * cloud.sh_stride()].map(|v| 0.5 + SH_C0 as f32 * v)
+}
+
 /// Makes Gaussian `i` brighter from everywhere.
 pub(super) fn brighten(cloud: &mut GaussianCloud, i: usize, gain: [f32; 3]) {
-    let stride = cloud.sh_stride();
+    let (stride, shown) = (cloud.sh_stride(), shown(cloud, i));
     let all = &mut cloud.sh[i * stride..(i + 1) * stride];
-    let shown = all[0].map(|v| 0.5 + SH_C0 as f32 * v);
     let new = brighter(shown, gain);
     let ratio: [f32; 3] = std::array::from_fn(|c| if shown[c] > 1e-3 { new[c] / shown[c] } else { 1.0 });
     all[0] = new.map(|v| (v - 0.5) / SH_C0 as f32);

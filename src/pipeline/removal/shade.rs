@@ -12,6 +12,7 @@ use super::light;
 use super::plane::Plane;
 use super::sheet::{SurfaceSheet, Texel};
 use crate::math::srgb;
+use crate::math::stats::quantile;
 
 /// Directions of the first round, over the half of all that a surface sees.
 const DIRECTIONS: usize = 64;
@@ -31,6 +32,11 @@ const EXPLAINED: f64 = 0.7;
 const MOST: f32 = 6.0;
 const LEAST_GAIN: f32 = 1.03;
 const LEAST_SHADED: usize = 12;
+/// What counts as the brightest of a surface: this quantile of what it shows as a share of what was fitted, at most the
+/// second number.
+const BRIGHTEST: (f64, f64) = (0.95, 2.0);
+/// Linear light that counts as black.
+const DARK: f32 = 1e-4;
 
 /// Something opaque over the surface.
 pub(super) struct Occluder {
@@ -48,6 +54,8 @@ const THING: u8 = 2;
 pub(super) struct Brightening<'a> {
     sheet: &'a SurfaceSheet<'a>,
     gain: Vec<[f32; 3]>,
+    /// Linear light of the brightest that the surface shows without the shadow: what is brighter is something else.
+    bound: Vec<[f32; 3]>,
 }
 
 impl<'a> Brightening<'a> {
@@ -72,22 +80,33 @@ impl<'a> Brightening<'a> {
             return None;
         }
         let all = lit.columns(&about, THING | OTHERS);
-        let gains: [Vec<f32>; 3] = channels.map(|values| {
+        let found: [(Vec<f32>, Vec<f32>); 3] = channels.map(|values| {
             let weights = light::solve(&all, &values, &counts);
             let floor = 0.05 * weights[0].max(1e-6);
-            let [with, without] = [THING | OTHERS, OTHERS].map(|which| lit.brightness(&about, &weights, which));
-            let gain = |(w, o): (f64, f64)| ((o.max(floor) / w.max(floor)) as f32).clamp(1.0, MOST);
-            blurred(with.into_iter().zip(without).map(gain).collect(), sheet.size)
+            let [with, without] =
+                [THING | OTHERS, OTHERS].map(|which| lit.brightness(&about, &weights, which)).map(|all| {
+                    let above = |v: f64| v.max(floor);
+                    all.into_iter().map(above).collect::<Vec<f64>>()
+                });
+            let of_fit: Vec<f64> = lit.rows.iter().zip(&values).map(|(i, v)| f64::from(*v) / with[*i]).collect();
+            let brightest = quantile(&of_fit, BRIGHTEST.0).clamp(1.0, BRIGHTEST.1);
+            let gain = with.iter().zip(&without).map(|(w, o)| ((o / w) as f32).clamp(1.0, MOST)).collect();
+            (blurred(gain, sheet.size), without.iter().map(|o| (o * brightest) as f32).collect())
         });
-        let gain = |i: usize| Some([0, 1, 2].map(|c| gains[c][i])).filter(|g| g.iter().any(|g| *g >= LEAST_GAIN));
-        let gain: Vec<[f32; 3]> = (0..sheet.state.len()).map(|i| gain(i).unwrap_or([1.0; 3])).collect();
+        let n = sheet.state.len();
+        let gain = |i: usize| Some([0, 1, 2].map(|c| found[c].0[i])).filter(|g| g.iter().any(|g| *g >= LEAST_GAIN));
+        let gain: Vec<[f32; 3]> = (0..n).map(|i| gain(i).unwrap_or([1.0; 3])).collect();
+        let bound = (0..n).map(|i| [0, 1, 2].map(|c| found[c].1[i])).collect();
         // So few are noise.
-        (gain.iter().filter(|g| **g != [1.0; 3]).count() >= LEAST_SHADED).then_some(Self { sheet, gain })
+        (gain.iter().filter(|g| **g != [1.0; 3]).count() >= LEAST_SHADED).then_some(Self { sheet, gain, bound })
     }
 
-    /// How much brighter the surface is at a point; 1 beyond the sheet.
-    pub(super) fn at(&self, point: DVec3) -> [f32; 3] {
-        self.sheet.sample(point, |i| self.gain[i]).unwrap_or([1.0; 3])
+    /// How much brighter what has this color is at a point of the surface; 1 beyond the sheet.
+    pub(super) fn at(&self, point: DVec3, rgb: [f32; 3]) -> [f32; 3] {
+        let sample = |of: &[[f32; 3]]| self.sheet.sample(point, |i| of[i]);
+        let (Some(gain), Some(bound)) = (sample(&self.gain), sample(&self.bound)) else { return [1.0; 3] };
+        let most = |c: usize| (bound[c] / srgb::linear(rgb[c].max(0.0)).max(DARK)).max(1.0);
+        [0, 1, 2].map(|c| gain[c].min(most(c)))
     }
 }
 

@@ -199,9 +199,9 @@ impl<'a> SurfaceSheet<'a> {
     }
 
     /// Makes what is seen brighter.
-    pub(super) fn brighten(&mut self, gain: impl Fn(DVec3) -> [f32; 3]) {
+    pub(super) fn brighten(&mut self, gain: impl Fn(DVec3, [f32; 3]) -> [f32; 3]) {
         for i in (0..self.state.len()).filter(|i| self.state[*i] == Texel::Seen).collect::<Vec<_>>() {
-            self.color[i] = brighter(self.color[i], gain(self.center(i)));
+            self.color[i] = brighter(self.color[i], gain(self.center(i), self.color[i]));
         }
     }
 
