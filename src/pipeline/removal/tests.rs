@@ -209,3 +209,17 @@ fn what_is_no_shadow_of_the_thing_is_not_lifted() {
     let bare = remove(&cloud, &map, &photos, &RenderSettings::default(), &options, None, &mut Silent);
     assert_eq!(bare.expect("removed").report.brightened, 0);
 }
+
+#[test]
+fn what_is_brighter_than_the_surface_is_not_made_brighter() {
+    let (bright, map, photos) = scene(false);
+    let mut cloud = shaded(bright.clone(), &map);
+    let shade: Vec<usize> = map.members(TABLE).into_iter().filter(|i| cloud.sh[*i] != bright.sh[*i]).collect();
+    let rest: Vec<usize> = shade.into_iter().step_by(40).collect();
+    rest.iter().for_each(|i| cloud.sh[*i] = [1.7; 3]);
+    let options = RemovalOptions { lift_shadow: true, ..options(Some(Paint::Patches)) };
+    let done = remove(&cloud, &map, &photos, &RenderSettings::default(), &options, None, &mut Silent).expect("removed");
+    let kept: Vec<usize> = (0..done.kept.len()).filter(|k| rest.contains(&done.kept[*k])).collect();
+    assert!(kept.len() > 3 && done.report.brightened > 100, "{} {}", kept.len(), done.report.brightened);
+    assert!(kept.iter().all(|k| done.cloud.sh[*k] == [1.7; 3]), "they are brighter");
+}
