@@ -14,9 +14,9 @@ use crate::scene::LevelFilter;
 /// Take an object or a part out of a scene and close the surface that it hid
 ///
 /// What was behind it and was seen in other photos is there already; what no photo saw is invented: the plane of the
-/// surface goes on below it, painted from what is seen around. Shadows and reflections of it stay (--lift-shadow
-/// tries to lift the shadow). The scene is left as it is; the result is a scene of its own, in which what is invented has
-/// the property 'fmlgs_invented'.
+/// surface goes on below it, painted from what is seen around. Its shadow on flat surfaces goes, as far as what stands
+/// in the way of the light explains it; reflections stay. The scene is left as it is; the result is a scene of its own,
+/// in which what is invented has the property 'fmlgs_invented'.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs remove scene/ \"the teddy bear\" --out without_bear/\n  \
@@ -40,9 +40,9 @@ pub(crate) struct RemoveArgs {
     /// Remove exactly what is known to belong to it, without the unsure fringes within it
     #[arg(long)]
     tight: bool,
-    /// Lift its shadow off flat surfaces, as far as what stands in the way of the light explains it
+    /// Leave its shadow where it is
     #[arg(long)]
-    lift_shadow: bool,
+    keep_shadow: bool,
     /// Another number gives another fill
     #[arg(long, default_value_t = 0)]
     seed: u64,
@@ -81,7 +81,7 @@ pub(crate) fn run(args: RemoveArgs, quiet: bool) -> Result<(), CliError> {
         Fill::Lama => Some(Paint::Lama),
         Fill::None => None,
     };
-    let options = RemovalOptions { ids, halo: !args.tight, lift_shadow: args.lift_shadow, paint, seed: args.seed };
+    let options = RemovalOptions { ids, halo: !args.tight, lift_shadow: !args.keep_shadow, paint, seed: args.seed };
     match args.fill {
         Fill::Photos => photos_without::check(&scene, (&options, &name), &args.out)?,
         _ => derived::check(&args.out)?,

@@ -7,7 +7,7 @@
 //! photos ([`sheet`]); hidden texels are painted from those that are seen ([`paint`]) and become flat Gaussians of
 //! their own. The picture is painted on the surface, not in a view, so all views agree.
 //!
-//! The shadow of the thing on a flat surface may be lifted, as far as what blocks the light explains it ([`shade`]). Other
+//! The shadow of the thing on a flat surface is lifted, as far as what blocks the light explains it ([`shade`]). Other
 //! shadows of it, reflections, and light that it throws back are part of what the photos show, and stay.
 
 mod close;
@@ -54,9 +54,9 @@ pub(crate) struct RemovalOptions {
 }
 
 impl RemovalOptions {
-    /// One identity with its fringes, painted as usual.
+    /// One identity with its fringes and its shadow, painted as usual.
     pub(crate) fn of(id: IdentityId) -> Self {
-        Self { ids: vec![id], halo: true, lift_shadow: false, paint: Some(Paint::default()), seed: 0 }
+        Self { ids: vec![id], halo: true, lift_shadow: true, paint: Some(Paint::default()), seed: 0 }
     }
 }
 
