@@ -8,7 +8,7 @@ use super::drawing::{camera, one};
 use super::{Case, Finding};
 use crate::io::SceneFolder;
 use crate::pipeline::train::checkpoint::{self, Header};
-use crate::pipeline::train::density;
+use crate::pipeline::train::density::{self, DensityRound};
 use crate::pipeline::train::trainer::Trainer;
 use crate::pipeline::train::{TrainConfig, TrainView};
 use crate::render::cpu::CpuRenderer;
@@ -235,7 +235,7 @@ pub(crate) fn cases() -> Vec<Case> {
             t.step = STEPS;
             improved(faulty, t, blob())
         }),
-        training("density control splits what is as large as numbers get", |faulty| {
+        training("density control divides what is as large as numbers get", |faulty| {
             let mut cloud = start();
             cloud.log_scales[0] = [88.7; 3];
             cloud.log_scales[1] = [f32::MAX; 3];
@@ -244,9 +244,10 @@ pub(crate) fn cases() -> Vec<Case> {
             t.stats.gradient.fill(1.0);
             t.stats.gradient[1] = if faulty { 0.0 } else { 1.0 };
             let mut rng = Pcg64Mcg::seed_from_u64(1);
-            let done = density::control(&mut t.cloud, &mut t.moments, &t.stats, 1.0, 100, false, &mut rng);
+            let round = DensityRound { extent: 1.0, budget: 100, rounds: 1, prune_large: false };
+            let done = density::control(&mut t.cloud, &mut t.moments, &t.stats, &round, &mut rng);
             let valid = t.cloud.validate();
-            Finding::is(format!("{} split, {:?}", done.split, valid), valid.is_ok() && done.split == 24)
+            Finding::is(format!("{} divided, {valid:?}", done.divided), valid.is_ok() && done.divided == 24)
         }),
         training("SSIM of constant images", |faulty| {
             let plane = |v: f64| vec![vec![v; 32 * 24]; 3];

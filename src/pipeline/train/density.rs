@@ -1,4 +1,9 @@
-//! Adaptive density control: where Gaussians are added, split and removed (3DGS section 5.2).
+//! Adaptive density control: where Gaussians are added and removed.
+//!
+//! Until control ends, the number of Gaussians grows by equal shares to the budget; those that moved most on screen since
+//! the last round, summed over all pictures, are divided (3DGS takes the mean over pictures and everything above a
+//! threshold, and is through with its budget early). Each is replaced by two that together look like it (3DGS-MCMC,
+//! arXiv 2404.09591, equation 9), apart by a sample of it, so that nothing flares up when it is divided.
 
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
@@ -7,10 +12,8 @@ use crate::math::Real;
 pub use crate::render::DensityStats;
 use crate::scene::GaussianCloud;
 
-/// Mean screen gradient (loss per half picture side) above which a region is under-reconstructed.
-const GROW_GRADIENT: f32 = 2e-4;
-/// Share of the scene's extent above which a Gaussian is split rather than cloned.
-const SPLIT_EXTENT: f64 = 0.01;
+/// Mean screen gradient (loss per half picture side) under which a region is reconstructed well enough.
+const LEAST_GRADIENT: f32 = 2e-5;
 /// Share of the scene's extent above which a Gaussian is removed, after the first opacity reset.
 const PRUNE_EXTENT: f64 = 0.3;
 /// Share of the picture's longer side above which a splat is removed, after the first reset.
@@ -19,74 +22,72 @@ const PRUNE_SCREEN: f32 = 0.3;
 const PRUNE_OPACITY: f32 = 0.005;
 /// Opacities are lowered to this by a reset.
 const RESET_OPACITY: f64 = 0.01;
-/// Split Gaussians shrink by this.
-const SPLIT_SHRINK: f32 = 1.6;
+/// Halves are apart by a sample of what they replace, times this.
+const APART: f32 = 0.5;
+/// What is more opaque is divided as if it were this opaque.
+const MOST_OPAQUE: f32 = 0.999;
+
+/// What a round of density control may do.
+#[derive(Clone, Copy, Debug)]
+pub struct DensityRound {
+    /// Size of the scene, as in `Dataset::camera_extent`.
+    pub extent: f64,
+    /// Most Gaussians when control ends.
+    pub budget: usize,
+    /// Rounds until then, this one included.
+    pub rounds: u64,
+    /// Whether Gaussians that are too large are removed.
+    pub prune_large: bool,
+}
 
 /// What a round of density control did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DensityReport {
-    pub(crate) cloned: usize,
-    /// Large Gaussians replaced by two.
-    pub(crate) split: usize,
+    /// Gaussians replaced by two.
+    pub(crate) divided: usize,
     pub(crate) pruned: usize,
-    /// Growth left out for lack of budget.
-    pub(crate) refused: usize,
 }
 
-/// Runs density control on the cloud and its optimizer moments. `extent` as in
-/// `Dataset::camera_extent`; `budget` is the most Gaussians allowed; large ones are removed only
-/// if `prune_large`.
+/// Runs density control on the cloud and its optimizer moments.
 pub fn control(
     cloud: &mut GaussianCloud,
     moments: &mut [GaussianCloud; 2],
     stats: &DensityStats,
-    extent: f64,
-    budget: usize,
-    prune_large: bool,
+    round: &DensityRound,
     rng: &mut Pcg64Mcg,
 ) -> DensityReport {
     let n = cloud.len();
-    let widest = |c: &GaussianCloud, i: usize| c.log_scales[i].iter().fold(f32::NEG_INFINITY, |m, &s| m.max(s)).exp();
-    let mean_gradient = |i: usize| stats.gradient[i] / stats.seen[i].max(1) as f32;
-    let mut growing: Vec<usize> = (0..n).filter(|&i| mean_gradient(i) > GROW_GRADIENT).collect();
-    let room = budget.saturating_sub(n);
-    let refused = growing.len().saturating_sub(room);
-    if refused > 0 {
-        growing.sort_by(|&a, &b| mean_gradient(b).total_cmp(&mean_gradient(a)).then(a.cmp(&b)));
-        growing.truncate(room);
-        growing.sort_unstable();
+    let stays: Vec<bool> = (0..n).map(|i| !is_superfluous(cloud, stats, round, i)).collect();
+    let left = stays.iter().filter(|s| **s).count();
+    let room = round.budget.saturating_sub(left).div_ceil(round.rounds.max(1) as usize);
+    let needs = |i: usize| stats.gradient[i] >= LEAST_GRADIENT * stats.seen[i].max(1) as f32;
+    let mut dividing: Vec<usize> = (0..n).filter(|&i| stays[i] && needs(i)).collect();
+    if dividing.len() > room {
+        dividing.sort_by(|&a, &b| stats.gradient[b].total_cmp(&stats.gradient[a]).then(a.cmp(&b)));
+        dividing.truncate(room);
+        dividing.sort_unstable();
     }
-    let (split, clone): (Vec<usize>, Vec<usize>) =
-        growing.into_iter().partition(|&i| f64::from(widest(cloud, i)) > SPLIT_EXTENT * extent);
-
-    let mut keep = vec![true; n];
-    for &i in &split {
-        keep[i] = false;
-    }
-    let mut pruned = 0;
-    for i in 0..n {
-        let faint = cloud.opacity_logits[i].sigmoid() < PRUNE_OPACITY;
-        let large =
-            prune_large && (f64::from(widest(cloud, i)) > PRUNE_EXTENT * extent || stats.radius[i] > PRUNE_SCREEN);
-        if keep[i] && (faint || large) {
-            keep[i] = false;
-            pruned += 1;
-        }
-    }
-    let survivors = (0..n).filter(|&i| keep[i]);
-    let cloned = clone.iter().filter(|&&i| keep[i]).count();
-    let halves = split.iter().flat_map(|&i| [i, i]);
-    let source: Vec<usize> = survivors.chain(clone.iter().copied().filter(|&i| keep[i])).chain(halves).collect();
-    let old = source.len() - cloned - 2 * split.len();
+    let mut keep = stays;
+    dividing.iter().for_each(|&i| keep[i] = false);
+    let halves = dividing.iter().flat_map(|&i| [i, i]);
+    let source: Vec<usize> = (0..n).filter(|&i| keep[i]).chain(halves).collect();
+    let old = source.len() - 2 * dividing.len();
     *cloud = cloud.select(&source);
     for m in moments.iter_mut() {
         *m = m.select(&source);
         forget(m, old);
     }
-    for i in source.len() - 2 * split.len()..source.len() {
-        scatter(cloud, i, rng);
+    for i in old..source.len() {
+        make_half(cloud, i, rng);
     }
-    DensityReport { cloned, split: split.len(), pruned, refused }
+    DensityReport { divided: dividing.len(), pruned: n - left }
+}
+
+/// Whether Gaussian `i` is too faint, or too large where that counts.
+fn is_superfluous(cloud: &GaussianCloud, stats: &DensityStats, round: &DensityRound, i: usize) -> bool {
+    let widest = cloud.log_scales[i].iter().fold(f32::NEG_INFINITY, |m, &s| m.max(s)).exp();
+    let large = || f64::from(widest) > PRUNE_EXTENT * round.extent || stats.radius[i] > PRUNE_SCREEN;
+    cloud.opacity_logits[i].sigmoid() < PRUNE_OPACITY || round.prune_large && large()
 }
 
 /// Zeroes moments from Gaussian `from` on.
@@ -99,10 +100,16 @@ fn forget(m: &mut GaussianCloud, from: usize) {
     m.sh[from * stride..].fill([0.0; 3]);
 }
 
-/// Moves a half of a split Gaussian to a sample of it and shrinks it.
-fn scatter(cloud: &mut GaussianCloud, i: usize, rng: &mut Pcg64Mcg) {
+/// Makes one of two out of a Gaussian that they replace.
+fn make_half(cloud: &mut GaussianCloud, i: usize, rng: &mut Pcg64Mcg) {
+    let opacity = cloud.opacity_logits[i].sigmoid().min(MOST_OPAQUE);
+    let through_one = (1.0 - opacity).sqrt();
+    let half = opacity / (1.0 + through_one);
+    let local = cloud.log_scales[i].map(|s| APART * s.exp() * gaussian(rng));
+    cloud.opacity_logits[i] = (half / through_one).ln();
+    let shrink = (opacity / (half * (2.0 - half * std::f32::consts::FRAC_1_SQRT_2))).ln();
+    cloud.log_scales[i].iter_mut().for_each(|s| *s += shrink);
     let Some(rotation) = crate::math::rotation::matrix_from_quaternion(cloud.quaternions[i]) else { return };
-    let local = cloud.log_scales[i].map(|s| s.exp() * gaussian(rng));
     let mut place = cloud.positions[i];
     for (p, row) in place.iter_mut().zip(rotation) {
         *p += row[0] * local[0] + row[1] * local[1] + row[2] * local[2];
@@ -110,9 +117,6 @@ fn scatter(cloud: &mut GaussianCloud, i: usize, rng: &mut Pcg64Mcg) {
     // One so large that a sample of it is nowhere stays where it is.
     if place.iter().all(|p| p.is_finite()) {
         cloud.positions[i] = place;
-    }
-    for s in &mut cloud.log_scales[i] {
-        *s -= SPLIT_SHRINK.ln();
     }
 }
 
@@ -140,6 +144,8 @@ mod tests {
 
     use super::*;
 
+    const ROUND: DensityRound = DensityRound { extent: 1.0, budget: 100, rounds: 1, prune_large: false };
+
     fn setup(n: usize) -> (GaussianCloud, [GaussianCloud; 2], DensityStats, Pcg64Mcg) {
         let cloud = GaussianCloud {
             sh: vec![[1.0; 3]; n],
@@ -150,39 +156,71 @@ mod tests {
     }
 
     #[test]
-    fn small_ones_are_cloned_large_ones_split_faint_ones_removed() {
+    fn what_moves_is_divided_and_what_is_faint_removed() {
         let (mut cloud, mut moments, mut stats, mut rng) = setup(4);
-        stats.gradient = vec![1.0, 1.0, 0.0, 0.0];
-        cloud.log_scales[1] = [0.0; 3];
+        stats.gradient = vec![1.0, 0.0, 1.0, 0.0];
         cloud.opacity_logits[2] = -20.0;
-        let report = control(&mut cloud, &mut moments, &stats, 1.0, 100, false, &mut rng);
-        assert_eq!(report, DensityReport { cloned: 1, split: 1, pruned: 1, refused: 0 });
-        // 0 and 3 survive, 0 is cloned, 1 becomes two.
-        assert_eq!(cloud.len(), 5);
+        let report = control(&mut cloud, &mut moments, &stats, &ROUND, &mut rng);
+        assert_eq!(report, DensityReport { divided: 1, pruned: 1 });
+        // 1 and 3 stay, 0 becomes two.
+        assert_eq!(cloud.len(), 4);
         cloud.validate().expect("valid");
-        assert_eq!(cloud.positions[2], [0.0; 3]);
-        assert!((cloud.log_scales[4][0] + SPLIT_SHRINK.ln()).abs() < 1e-6);
-        assert_ne!(cloud.positions[3], cloud.positions[4]);
+        assert_eq!([cloud.positions[0], cloud.positions[1]], [[1.0, 0.0, 0.0], [3.0, 0.0, 0.0]]);
+        assert_ne!(cloud.positions[2], cloud.positions[3]);
         assert_eq!(moments[0].positions[1], [3.0, 0.0, 0.0]);
         assert!(moments[1].sh[2..].iter().all(|v| *v == [0.0; 3]));
     }
 
+    /// Both halves at one place let through what the one let through, and weigh as much in the mean.
     #[test]
-    fn the_budget_takes_the_neediest() {
+    fn two_halves_look_like_the_one() {
+        for opacity in [0.004_f64, 0.3, 0.9, 0.998] {
+            let (mut cloud, _, _, mut rng) = setup(1);
+            cloud.opacity_logits[0] = (opacity / (1.0 - opacity)).ln() as f32;
+            make_half(&mut cloud, 0, &mut rng);
+            let half = f64::from(cloud.opacity_logits[0].sigmoid());
+            assert!(((1.0 - half).powi(2) - (1.0 - opacity)).abs() < 1e-5, "{opacity}: {half}");
+            // Summed along a line through the center: of one Gaussian, and of two over each other.
+            let line = |alpha: &dyn Fn(f64) -> f64| (-8_000..=8_000).map(|x| alpha(f64::from(x) * 1e-3)).sum::<f64>();
+            let width = f64::from(cloud.log_scales[0][0] + 9.0).exp();
+            let one = line(&|x| opacity * (-0.5 * x * x).exp());
+            let each = |x: f64| half * (-0.5 * (x / width).powi(2)).exp();
+            let two = line(&|x| 1.0 - (1.0 - each(x)).powi(2));
+            assert!((two / one - 1.0).abs() < 1e-3, "{opacity}: {two} for {one}");
+        }
+    }
+
+    #[test]
+    fn growth_is_spread_over_the_rounds_and_goes_to_the_neediest() {
         let (mut cloud, mut moments, mut stats, mut rng) = setup(10);
         stats.gradient = (0..10).map(|i| i as f32).collect();
-        let report = control(&mut cloud, &mut moments, &stats, 1.0, 12, false, &mut rng);
-        assert_eq!((report.cloned, report.refused), (2, 7));
-        assert_eq!(cloud.positions[10][0], 8.0);
-        assert_eq!(cloud.positions[11][0], 9.0);
+        let round = DensityRound { budget: 16, rounds: 3, ..ROUND };
+        assert_eq!(control(&mut cloud, &mut moments, &stats, &round, &mut rng).divided, 2);
+        assert_eq!((cloud.len(), cloud.positions[7]), (12, [7.0, 0.0, 0.0]));
+        // A sum counts, not a mean: one that few pictures show is less needy than one that many show.
+        let (mut cloud, mut moments, mut stats, mut rng) = setup(2);
+        (stats.gradient, stats.seen) = (vec![2.0, 3.0], vec![1, 10]);
+        control(&mut cloud, &mut moments, &stats, &DensityRound { budget: 3, ..ROUND }, &mut rng);
+        assert_eq!(cloud.positions[0], [0.0; 3]);
+    }
+
+    #[test]
+    fn what_is_good_is_left_alone_and_a_full_budget_only_shrinks() {
+        let (mut cloud, mut moments, mut stats, mut rng) = setup(3);
+        stats.gradient = vec![LEAST_GRADIENT * 0.9; 3];
+        assert_eq!(control(&mut cloud, &mut moments, &stats, &ROUND, &mut rng), DensityReport::default());
+        stats.gradient = vec![1.0; 3];
+        let full = DensityRound { budget: 2, ..ROUND };
+        assert_eq!(control(&mut cloud, &mut moments, &stats, &full, &mut rng).divided, 0);
     }
 
     #[test]
     fn large_ones_go_only_when_asked() {
         let (mut cloud, mut moments, stats, mut rng) = setup(3);
         cloud.log_scales[1] = [2.0; 3];
-        assert_eq!(control(&mut cloud, &mut moments, &stats, 1.0, 9, false, &mut rng).pruned, 0);
-        assert_eq!(control(&mut cloud, &mut moments, &stats, 1.0, 9, true, &mut rng).pruned, 1);
+        assert_eq!(control(&mut cloud, &mut moments, &stats, &ROUND, &mut rng).pruned, 0);
+        let asked = DensityRound { prune_large: true, ..ROUND };
+        assert_eq!(control(&mut cloud, &mut moments, &stats, &asked, &mut rng).pruned, 1);
     }
 
     #[test]

@@ -108,8 +108,6 @@ struct Job<'a> {
     recent: VecDeque<f64>,
     /// Gradients cut since that was last told.
     outliers: u64,
-    /// Whether it was told that the budget is reached.
-    full: bool,
     /// Whether the last checkpoint could not be saved.
     unsaved: bool,
 }
@@ -175,7 +173,6 @@ impl<'a> Job<'a> {
             rollbacks: 0,
             recent: VecDeque::new(),
             outliers: 0,
-            full: false,
             unsaved: false,
         }
     }
@@ -269,11 +266,7 @@ impl<'a> Job<'a> {
                 return Ok(results);
             }
         }
-        if let Some(report) = self.trainer.control_density().map_err(|e| self.failed(e))? {
-            if report.refused > 0 && !self.full {
-                self.full = true;
-                observer.note(Severity::Info, format!("The budget of {} Gaussians is reached", self.trainer.budget));
-            }
+        if self.trainer.control_density().map_err(|e| self.failed(e))?.is_some() {
             self.recent.clear();
         }
         if self.trainer.step % SAFE_STEPS == 0 {

@@ -56,7 +56,7 @@ impl Schedule {
             quaternion: rate(1e-3),
             opacity_logit: rate(5e-2),
             sh_constant: rate(2.5e-3),
-            sh_rest: rate(2.5e-3 / 20.0),
+            sh_rest: rate(2.5e-3 / 8.0),
         }
     }
 
@@ -68,6 +68,11 @@ impl Schedule {
     /// Whether Gaussians are added and removed after `done` steps.
     pub(crate) fn densifies(&self, done: u64) -> bool {
         done >= self.densify_from && done <= self.densify_until && done % self.densify_interval == 0
+    }
+
+    /// Rounds of density control that are left after `done` steps, with the one then.
+    pub(crate) fn rounds_left(&self, done: u64) -> u64 {
+        self.densify_until.saturating_sub(done) / self.densify_interval + 1
     }
 
     /// Whether Gaussians that are too large may be removed after `done` steps: after the first
@@ -112,6 +117,8 @@ mod tests {
             assert_eq!(s.sh_degree(steps), 3, "{steps}");
             let rounds = (1..=steps).filter(|&d| s.densifies(d)).count();
             assert!(rounds >= 4, "{steps}: {rounds}");
+            let at = (1..=steps).filter(|&d| s.densifies(d));
+            assert!(at.zip((1..=rounds as u64).rev()).all(|(d, left)| s.rounds_left(d) == left));
             assert!((1..=steps).rev().take(steps as usize / 3).all(|d| !s.densifies(d) && !s.resets(d)));
         }
     }

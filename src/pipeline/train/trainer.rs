@@ -4,7 +4,7 @@
 use rand::seq::SliceRandom;
 use rand_pcg::Pcg64Mcg;
 
-use super::density::{self, DensityReport, DensityStats};
+use super::density::{self, DensityReport, DensityRound, DensityStats};
 use super::device::{DeviceRun, LAMBDA, StepResult};
 use super::geometry::GeometryLoss;
 use super::optimizer::{StepStats, Update};
@@ -175,16 +175,14 @@ impl Trainer {
         self.fetch()?;
         let mut report = None;
         if densifies {
-            let large = self.schedule.prunes_large(self.step);
-            report = Some(density::control(
-                &mut self.cloud,
-                &mut self.moments,
-                &self.stats,
-                self.extent,
-                self.budget,
-                large,
-                &mut self.rng,
-            ));
+            let round = DensityRound {
+                extent: self.extent,
+                budget: self.budget,
+                rounds: self.schedule.rounds_left(self.step),
+                prune_large: self.schedule.prunes_large(self.step),
+            };
+            let (cloud, moments) = (&mut self.cloud, &mut self.moments);
+            report = Some(density::control(cloud, moments, &self.stats, &round, &mut self.rng));
             self.stats = DensityStats::new(self.cloud.len());
         }
         if resets {
