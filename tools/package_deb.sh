@@ -50,7 +50,7 @@ tools/third_party.py "$documents/THIRD_PARTY.md" >/dev/null
 {
     echo "fmlgs ($version) unstable; urgency=medium"
     printf '\n  * CHANGELOG.md tells what is new.\n\n'
-    echo " -- The FMLGS authors <fmlgs@users.noreply.github.com>  $(LC_ALL=C date -u -R -d "@$SOURCE_DATE_EPOCH")"
+    echo " -- The FMLGS contributors <fmlgs@users.noreply.github.com>  $(LC_ALL=C date -u -R -d "@$SOURCE_DATE_EPOCH")"
 } >"$documents/changelog"
 install -m 644 CHANGELOG.md "$documents/CHANGELOG.md"
 gzip -9n "$documents/changelog" "$documents/CHANGELOG.md" "$documents/THIRD_PARTY.md"

@@ -162,6 +162,12 @@ class HostileTest(unittest.TestCase):
 
     def test_photos_outside_of_their_folder_are_not_named(self) -> None:
         value = json.loads(self.good["scene.json"])
+        photos = self.scene.parent / "photos"
+        photos.mkdir()
+        (photos / "a.png").touch()
+        value["cameras"][0]["name"] = "a.png"
+        (self.scene / "scene.json").write_text(json.dumps(value))
+        self.assertEqual(fmlgs.open_scene(self.scene).photos[0].path, (photos / "a.png").resolve(), "the control")
         for name in ("../scene/scene.json", "/etc/passwd", "a\0b"):
             value["cameras"][0]["name"] = name
             (self.scene / "scene.json").write_text(json.dumps(value))

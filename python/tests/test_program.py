@@ -67,7 +67,10 @@ class ProgramTest(unittest.TestCase):
             process = subprocess.Popen(
                 [sys.executable, "-c", script], start_new_session=True, stderr=subprocess.PIPE, text=True
             )
-            time.sleep(6)
+            until = time.monotonic() + 60
+            while not scene.exists() and process.poll() is None and time.monotonic() < until:
+                time.sleep(0.1)
+            time.sleep(2)
             os.killpg(process.pid, signal.SIGINT)
             _, stderr = process.communicate(timeout=120)
             self.assertIn("KeyboardInterrupt", stderr)

@@ -110,7 +110,7 @@ def read_camera(fields: Fields) -> Camera:
 
 def read_photos(scene: Fields, dataset: Path | None) -> tuple[Photo, ...]:
     """The photos that `scene.json` lists; `dataset` is the folder or file that they come from."""
-    root = dataset if dataset is None or dataset.is_dir() else dataset.parent
+    root = dataset.parent if dataset is not None and dataset.is_file() else dataset
     photos = []
     for fields in scene.objects("cameras"):
         name = fields.text("name")

@@ -30,7 +30,7 @@ def read_json(path: Path) -> dict[str, Any]:
     with file:
         if size > MAX_JSON_BYTES:
             raise FileError(path, f"{size:,} bytes; at most {MAX_JSON_BYTES:,} are read")
-        return parse_json(path, file.read(MAX_JSON_BYTES), "")
+        return parse_json(path, file.read(size), "")
 
 
 def parse_json(path: Path, text: bytes | str, place: str) -> dict[str, Any]:

@@ -79,7 +79,7 @@ def read_semantic_map(path: Path) -> SemanticMap:
     with file:
         if size > _MAX_BYTES:
             raise FileError(path, f"{size:,} bytes; at most {_MAX_BYTES:,} are read")
-        data = file.read(_MAX_BYTES)
+        data = file.read(size)
     length = int.from_bytes(data[:8], "little")
     if len(data) < 8 or not 2 <= length <= min(_MAX_HEADER_BYTES, len(data) - 8):
         raise FileError(path, f"header: it cannot be {length:,} bytes long in a file of {len(data):,}")

@@ -72,18 +72,18 @@ def _header(path: Path, file: BinaryIO) -> _Header:
         number += 1
         line = file.readline(_MAX_HEADER_BYTES - used)
         used += len(line)
+        if number == 1 and line.split() != [b"ply"]:
+            raise bad("a PLY file starts with the line 'ply'")
         if not line.endswith(b"\n"):
-            raise bad("a PLY file starts with the line 'ply'" if number == 1 else "the header has no end")
+            raise bad("the header has no end")
         try:
             text = line.decode().strip()
         except UnicodeDecodeError:
             raise bad("not text") from None
         words = text.split()
-        if number == 1:
-            if words != ["ply"]:
-                raise bad("a PLY file starts with the line 'ply'")
-            continue
         match words:
+            case ["ply"] if number == 1:
+                pass
             case ["end_header"]:
                 break
             case ["comment" | "obj_info", *_]:
