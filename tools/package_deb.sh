@@ -25,7 +25,7 @@ root=$work/root
 share=$root/usr/share
 
 install -D -m 755 "$program" "$root/usr/bin/fmlgs"
-strip --strip-all "$root/usr/bin/fmlgs"
+strip --strip-all --remove-section=.comment "$root/usr/bin/fmlgs"
 "$program" generate "$work/made"
 install -D -m 644 -t "$share/man/man1" "$work"/made/man/*.1
 gzip -9n "$share"/man/man1/*.1

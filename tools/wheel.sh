@@ -14,6 +14,7 @@ python=${PYTHON:-python3}
 }
 out=out/wheels
 mkdir -p "$out"
+rm -f "$out"/fmlgs-*.whl
 make_wheel() { "$python" -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir "$out" ./python; }
 
 make_wheel

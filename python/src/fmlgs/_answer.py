@@ -24,7 +24,7 @@ class Hit:
 
     #: Its number.
     identity: int
-    #: Its full name, such as ``"lid of the kettle"``.
+    #: Its full name, its object after it: ``"lid · kettle"``.
     name: str
     #: How well it fits, 0 to 1.
     score: float

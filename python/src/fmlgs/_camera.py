@@ -85,7 +85,7 @@ class Photo:
         from PIL import Image
 
         with Image.open(self.path) as image:
-            return np.asarray(image.convert("RGB"), np.uint8)
+            return np.array(image.convert("RGB"), np.uint8)
 
 
 def read_camera(fields: Fields) -> Camera:
