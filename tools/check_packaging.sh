@@ -28,7 +28,7 @@ if has appstreamcli; then
 fi
 if has shellcheck; then
     shellcheck --shell=bash --severity=error .ci/run tools/*.sh
-    shellcheck tools/{check_packaging,dist,package_deb,package_macos,package_windows,release,site,version,wheel}.sh
+    shellcheck --shell=bash --severity=warning --external-sources tools/{check_packaging,dist,package_deb,package_macos,package_windows,release,site,version,wheel}.sh
 fi
 if has actionlint; then actionlint; fi
 if has cffconvert; then cffconvert --validate; fi
