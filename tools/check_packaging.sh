@@ -30,6 +30,7 @@ if has shellcheck; then
     shellcheck --shell=bash --severity=error .ci/run tools/*.sh
     shellcheck --shell=bash --severity=warning --external-sources tools/{check_packaging,dist,package_deb,package_macos,package_windows,release,site,version,wheel}.sh
 fi
+if has mypy; then (cd python && mypy); fi
 if has actionlint; then actionlint; fi
 if has cffconvert; then cffconvert --validate; fi
 if has cargo-deny; then cargo deny check licenses bans sources; fi

@@ -32,6 +32,7 @@ class ProgramTest(unittest.TestCase):
             fmlgs.run("info x")
         self.assertIn("0.", fmlgs.run(["--version"]))
 
+    @unittest.skipUnless(os.name == "posix", "links need rights elsewhere")
     def test_the_program_is_found_in_order(self) -> None:
         named = fmlgs.find_program()
         with tempfile.TemporaryDirectory() as folder:
@@ -50,6 +51,7 @@ class ProgramTest(unittest.TestCase):
                     os.environ["FMLGS_BINARY"] = wrong
                     self.assertRaisesRegex(fmlgs.ProgramNotFound, "no program", fmlgs.find_program)
 
+    @unittest.skipUnless(os.name == "posix", "a script of the shell")
     def test_a_program_that_writes_no_json(self) -> None:
         with tempfile.TemporaryDirectory() as folder:
             other = Path(folder, "fmlgs")

@@ -26,6 +26,8 @@ _TYPES = {
     **dict.fromkeys(("double", "float64"), "f8"),
 }
 _ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
+#: Of an opacity of 0.999999.
+_MOST_LOGIT = 13.8155
 _RESIDUALS = ("x_residual", "y_residual", "z_residual")
 _REMEDY = "'fmlgs export' makes one of any splat that the program opens"
 
@@ -125,20 +127,19 @@ def _gaussians(path: Path, rows: npt.NDArray[np.void], comments: tuple[str, ...]
             if name not in known:
                 raise FileError(path, f"vertices without the property '{name}' (points or a mesh, not Gaussians)")
             used.add(name)
-            with np.errstate(over="ignore"):
+            with np.errstate(over="ignore", invalid="ignore"):
                 out[:, k] = rows[name]
-            finite = np.isfinite(out[:, k])
             # Other programs make infinite opacities of 0 and 1.
             if name == "opacity":
-                out[:, k] = np.where(np.isinf(out[:, k]), np.sign(out[:, k]) * np.log(999_999.0), out[:, k])
-                finite = ~np.isnan(out[:, k])
+                out[:, k] = np.nan_to_num(out[:, k], nan=np.nan, posinf=_MOST_LOGIT, neginf=-_MOST_LOGIT)
+            finite = np.isfinite(out[:, k])
             if not finite.all():
                 raise FileError(path, f"vertex {int(np.argmin(finite))}: '{name}' is not a finite number")
         return out
 
     positions = np.asarray(columns(["x", "y", "z"], np.float64), np.float64)
     if known.issuperset(_RESIDUALS):
-        positions += np.asarray(columns(list(_RESIDUALS), np.float64), np.float64)
+        positions += np.asarray(columns(list(_RESIDUALS), np.float32), np.float32)
     harmonics = np.asarray(columns(["f_dc_0", "f_dc_1", "f_dc_2"], np.float32), np.float32)[:, None, :]
     rest = sum(name.startswith("f_rest_") for name in known)
     if rest not in (0, 9, 24, 45):
