@@ -15,6 +15,7 @@ libraries=$(PATH="$PATH:/sbin:/usr/sbin" ldconfig -p 2>/dev/null || true)
 has_library() { [[ "$libraries" == *"$1"* ]]; }
 has_command() { command -v "$1" >/dev/null 2>&1; }
 has_chinese_font() { [ -e /usr/share/fonts/truetype/droid/DroidSansFallbackFull.ttf ] || [ -n "$(fc-list :lang=zh file 2>/dev/null)" ]; }
+has_numpy() { python3 -c 'import numpy' 2>/dev/null || /usr/bin/python3 -c 'import numpy' 2>/dev/null; }
 has_vulkan_driver() { compgen -G '/usr/share/vulkan/icd.d/*.json' >/dev/null || compgen -G '/etc/vulkan/icd.d/*.json' >/dev/null; }
 
 # need PACKAGE CHECK ARGUMENT...: remembers PACKAGE if the check fails.
@@ -51,6 +52,8 @@ if [ "$mode" = test ]; then
     need fonts-droid-fallback has_chinese_font
     # A virtual display for the test that opens a real window.
     need xvfb has_command Xvfb
+    # For the tests of the Python package.
+    need python3-numpy has_numpy
     # A browser, and what drives it, for the test of exported pages.
     need chromium has_command chromium
     need chromium-driver has_command chromedriver
@@ -78,6 +81,8 @@ if [ "$mode" = test ]; then
     fetch_onnxruntime
 fi
 
+# Other systems bring all of it themselves, the compiler with Xcode or Visual Studio.
+[ "$(uname -s)" = Linux ] || exit 0
 [ ${#missing[@]} -gt 0 ] || exit 0
 
 if ! has_command apt-get; then

@@ -16,6 +16,7 @@ mod eval_depth;
 mod eval_masks;
 mod eval_removal;
 mod export;
+mod generate;
 mod info;
 mod interrupt;
 mod models;
@@ -41,7 +42,7 @@ mod view;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 pub(crate) use error::CliError;
 
@@ -121,15 +122,18 @@ enum Command {
     Report(report::ReportArgs),
     Reproduce(reproduce::ReproduceArgs),
     CheckStability(check_stability::CheckStabilityArgs),
+    #[command(hide = true)]
+    Generate(generate::GenerateArgs),
 }
 
 /// Opens the window with what is wanted of plans, does these things first, and returns when the window is closed.
 pub(crate) type OpenWindow = fn(Vec<Start>, Vec<PlanOverride>) -> Result<(), Box<dyn std::error::Error>>;
 
-/// Runs the command line of this process and returns its exit code. `open_window` stands above this
-/// module, so the caller hands it in.
-pub fn main(open_window: OpenWindow) -> ExitCode {
-    let cli = match Cli::try_parse() {
+/// Runs the command line of this process and returns its exit code. `version` is what `--version` says; `open_window`
+/// stands above this module, so the caller hands it in.
+pub fn main(version: &'static str, open_window: OpenWindow) -> ExitCode {
+    let parsed = Cli::command().version(version).try_get_matches();
+    let cli = match parsed.and_then(|matches| Cli::from_arg_matches(&matches)) {
         Ok(cli) => cli,
         Err(error) => {
             // Help and version are "errors" for clap, with exit code 0. A closed pipe is no failure.
@@ -195,6 +199,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Report(args) => report::run(args, quiet),
         Command::Reproduce(args) => reproduce::run(args, quiet),
         Command::CheckStability(args) => check_stability::run(args),
+        Command::Generate(args) => generate::run(&args, Cli::command()),
     }
 }
 
@@ -227,7 +232,6 @@ fn window(first: Vec<Start>, overrides: Vec<PlanOverride>, open_window: OpenWind
 #[cfg(test)]
 mod tests {
     use super::*;
-    use clap::CommandFactory;
 
     #[test]
     fn arguments_are_consistent() {

@@ -57,8 +57,8 @@ pub(crate) fn png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorTy
     })
 }
 
-/// Writes rows of `f32` values as a NumPy array of shape `[height, width]`.
-pub(crate) fn npy(path: &Path, values: &[f32], size_px: [u32; 2]) -> Result<(), IoError> {
+/// Writes rows of values as a NumPy array of shape `[height, width]`.
+pub(crate) fn npy<T: npyz::AutoSerialize + Copy>(path: &Path, values: &[T], size_px: [u32; 2]) -> Result<(), IoError> {
     atomic::write(path, |w: &mut dyn Write| {
         let shape = [u64::from(size_px[1]), u64::from(size_px[0])];
         let mut array = npyz::WriteOptions::new().default_dtype().shape(&shape).writer(w).begin_nd()?;

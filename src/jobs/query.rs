@@ -173,21 +173,37 @@ pub(crate) fn answered(
     answered.filter(|a| !a.chosen(1).is_empty()).ok_or_else(|| JobError::NoMatch(text.to_owned()))
 }
 
-/// Writes the mask, white on black.
-pub(crate) fn write_mask(path: &Path, mask: &Mask) -> Result<(), JobError> {
-    let (width, height) = (mask.width_px(), mask.height_px());
-    let pixels: Vec<u8> = (0..width * height).map(|i| if mask.contains(i) { 255 } else { 0 }).collect();
-    export::make_parent(path)?;
-    Ok(export::png(path, &pixels, [width as u32, height as u32], ColorType::L8)?)
+/// Endings of what [`write_mask`] and [`write_heat`] write.
+pub(crate) const MAP_ENDINGS: [&str; 2] = [".png", ".npy"];
+
+fn is_array(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("npy"))
 }
 
-/// Writes the relevancy of every pixel over the picture in gray.
+/// Writes the mask: white on black, or as an array of booleans.
+pub(crate) fn write_mask(path: &Path, mask: &Mask) -> Result<(), JobError> {
+    let size = [mask.width_px() as u32, mask.height_px() as u32];
+    let inside = (0..mask.width_px() * mask.height_px()).map(|i| mask.contains(i));
+    export::make_parent(path)?;
+    if is_array(path) {
+        return Ok(export::npy(path, &inside.collect::<Vec<bool>>(), size)?);
+    }
+    let pixels: Vec<u8> = inside.map(|inside| if inside { 255 } else { 0 }).collect();
+    Ok(export::png(path, &pixels, size, ColorType::L8)?)
+}
+
+/// Writes the relevancy of every pixel: over the picture in gray, or as an array of numbers.
 pub(crate) fn write_heat(
     path: &Path,
     (cloud, settings): (&GaussianCloud, &RenderSettings),
     camera: &Camera,
     relevancy: &[f32],
 ) -> Result<(), JobError> {
+    let size = [camera.width_px, camera.height_px];
+    export::make_parent(path)?;
+    if is_array(path) {
+        return Ok(export::npy(path, relevancy, size)?);
+    }
     let frame = Renderer::new().render(cloud, Features::NONE, camera, settings)?;
     let mixed = frame.to_rgb8().into_iter().zip(relevancy).map(|(rgb, &relevancy)| {
         let heat = Colormap::Turbo.color(relevancy);
@@ -195,8 +211,6 @@ pub(crate) fn write_heat(
         std::array::from_fn::<u8, 3, _>(|c| ((u32::from(heat[c]) * 6 + gray * 4) / 10) as u8)
     });
     let pixels: Vec<[u8; 3]> = mixed.collect();
-    export::make_parent(path)?;
-    let size = [camera.width_px, camera.height_px];
     Ok(export::png(path, pixels.as_flattened(), size, ColorType::Rgb8)?)
 }
 

@@ -59,6 +59,7 @@ pub fn run(first: Vec<Start>, overrides: Vec<PlanOverride>) -> eframe::Result {
     let viewport = egui::ViewportBuilder::default()
         .with_title("FMLGS")
         .with_app_id("fmlgs")
+        .with_icon(icon())
         .with_inner_size([1480.0, 920.0])
         .with_min_inner_size([640.0, 480.0])
         .with_drag_and_drop(true);
@@ -72,6 +73,12 @@ pub fn run(first: Vec<Start>, overrides: Vec<PlanOverride>) -> eframe::Result {
         }
     }
     open(viewport, eframe::Renderer::Wgpu, first, overrides)
+}
+
+/// The window's icon, and that of the application on macOS.
+fn icon() -> egui::IconData {
+    let png = include_bytes!("../../assets/icon/fmlgs-128.png");
+    eframe::icon_data::from_png_bytes(png).unwrap_or_default()
 }
 
 fn open(

@@ -59,10 +59,10 @@ pub(crate) struct QueryArgs {
     /// Answers whose pixels go into the mask at most
     #[arg(long, default_value_t = 1, value_parser = number::within(1..=100_000_usize))]
     top: usize,
-    /// Write the mask of the answer: white on black
+    /// Write the mask of the answer: .png, white on black, or .npy of booleans
     #[arg(long)]
     mask: Option<PathBuf>,
-    /// Write the relevancy of every pixel over the image
+    /// Write the relevancy of every pixel: .png over the image, or .npy of numbers from 0 to 1
     #[arg(long)]
     heat: Option<PathBuf>,
     /// Print one JSON document
@@ -75,7 +75,7 @@ pub(crate) struct QueryArgs {
 pub(crate) fn run(args: QueryArgs) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
     for out in args.mask.iter().chain(&args.heat) {
-        export::check(out, &[".png"], &scene.reads())?;
+        export::check(out, &query::MAP_ENDINGS, &scene.reads())?;
     }
     let map = scene.semantics()?;
     if let Some(list) = &args.phrases {

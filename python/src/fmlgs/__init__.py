@@ -1,0 +1,49 @@
+"""Scenes of FMLGS as NumPy arrays, and its commands.
+
+A scene is a folder that the program ``fmlgs`` has written: 3D Gaussians trained from photos, the
+photos' cameras, and the objects and parts that were found. Reading it needs NumPy alone; asking
+questions and running commands needs the program (see :func:`find_program`).
+
+    >>> import fmlgs
+    >>> scene = fmlgs.open_scene("scene/")
+    >>> scene.gaussians.positions.shape
+    (59981, 3)
+    >>> answer = scene.query("the lid of the kettle", camera=3)
+    >>> answer.mask.shape
+    (300, 400)
+
+Conventions: cameras look along +z with x right and y down; pixel centers are at half integers;
+lengths are in scene units; arrays of a picture are ``[height, width]``.
+"""
+
+from ._answer import Answer, Hit
+from ._camera import Camera, Photo
+from ._errors import CommandError, FileError, FmlgsError, ProgramNotFound
+from ._gaussians import Gaussians
+from ._identities import NOBODY, Features, Identity
+from ._ply import read_ply
+from ._program import find_program, run, run_json
+from ._scene import Scene, open_scene
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "NOBODY",
+    "Answer",
+    "Camera",
+    "CommandError",
+    "Features",
+    "FileError",
+    "FmlgsError",
+    "Gaussians",
+    "Hit",
+    "Identity",
+    "Photo",
+    "ProgramNotFound",
+    "Scene",
+    "find_program",
+    "open_scene",
+    "read_ply",
+    "run",
+    "run_json",
+]
