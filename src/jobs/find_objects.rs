@@ -9,7 +9,8 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 
 use self::forecast::LookTime;
-use super::{JobError, evaluate};
+use super::JobError;
+use super::held_out::held_out;
 use crate::io::labels::Labels;
 use crate::io::trained::{self, CLOUD_FILE};
 use crate::io::{IoError, SceneFolder, splat_ply};
@@ -118,7 +119,7 @@ pub(crate) fn run(
         return Err(IoError::Changed { folder: folder.into() }.into());
     }
     let cameras = trained::load_info(folder)?.cameras;
-    let held = evaluate::held_out(dataset, &cameras, None, request.holdout_every);
+    let held = held_out(dataset, &cameras, None, request.holdout_every);
     let all = dataset.photos.iter().enumerate();
     let photos: Vec<Photo> = all.filter(|(i, _)| !held.contains(i)).map(|(_, p)| p.clone()).collect();
     let place = |name: &String| {

@@ -1,5 +1,6 @@
 //! Putting networks in place, and checking those that are there.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -28,12 +29,20 @@ pub struct ModelList {
     /// Where they lie.
     pub(crate) folder: PathBuf,
     pub(crate) models: Vec<(ModelEntry, ModelState)>,
+    /// Downloads that were cut off: what has arrived, MB.
+    pub(crate) arrived: BTreeMap<String, u64>,
 }
 
 impl ModelList {
     /// The model of this name.
     pub(crate) fn get(&self, id: &str) -> Option<&(ModelEntry, ModelState)> {
         self.models.iter().find(|(e, _)| e.id == id)
+    }
+
+    /// About how much is still to be fetched for it, and how much has arrived already, MB.
+    pub(crate) fn to_load(&self, entry: &ModelEntry) -> [u64; 2] {
+        let arrived = self.arrived.get(&entry.id).copied().unwrap_or(0);
+        [entry.download_megabytes().saturating_sub(arrived), arrived]
     }
 
     /// The models for one purpose.
@@ -66,8 +75,9 @@ pub(crate) fn list() -> ModelList {
         note = Some(e.to_string());
         Vec::new()
     });
+    let arrived = models.iter().map(|e| (e.id.clone(), e.arrived_megabytes(&folder))).collect();
     let models = models.into_iter().map(|e| (e.clone(), e.state(&folder))).collect();
-    ModelList { engine, is_fast, cores: memory::cores(), note, folder, models }
+    ModelList { engine, is_fast, cores: memory::cores(), note, folder, models, arrived }
 }
 
 /// Where the files of a model come from.

@@ -7,11 +7,12 @@ use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
 
 use super::state::AppState;
 use super::theme;
-use crate::jobs::find_objects::NO_ENCODER;
 use crate::jobs::find_objects::forecast::{self, LookTime};
+use crate::jobs::find_objects::{FindSettings, NO_ENCODER};
 use crate::jobs::models::{ModelEntry, ModelList, ModelRole, ModelState};
 use crate::math::format::things;
-use crate::pipeline::semantics::build_map::REGIONS;
+use crate::pipeline::semantics::build_map::{Carry, REGIONS};
+use crate::scene::Preparation;
 use crate::ui::actions::{Action, Pane};
 use crate::worker::JobId;
 
@@ -22,6 +23,8 @@ pub(crate) struct FindDialog {
     /// Nothing = not chosen by a user: the best that is here.
     segmenter: Option<String>,
     encoder: Option<String>,
+    /// What the recipe on screen said last of how objects are to be found.
+    recipe: Preparation,
 }
 
 /// What a user decided to look for objects with.
@@ -50,6 +53,19 @@ impl FindDialog {
 
     pub(crate) fn is_open(&self) -> bool {
         self.open
+    }
+
+    /// Lets the next search follow what the recipe on screen says of it, once that has changed.
+    pub(crate) fn follow_recipe(&mut self, recipe: Preparation, finding: &mut FindSettings) {
+        if std::mem::replace(&mut self.recipe, recipe) == recipe {
+            return;
+        }
+        finding.preparation = recipe;
+        finding.carry = match (recipe.prompt, finding.carry) {
+            (None, _) => Carry::Gaussians,
+            (Some(_), Carry::Gaussians) => Carry::Sam2,
+            (Some(_), chosen) => chosen,
+        };
     }
 
     /// Shows it if it is open; what was decided, once that is.
@@ -166,7 +182,7 @@ fn networks(ui: &mut Ui, known: &ModelList, role: ModelRole, chosen: &str) -> Op
     let mut clicked = None;
     let mut list = |ui: &mut Ui, all: Vec<(&ModelEntry, &ModelState)>| {
         for (entry, model) in all {
-            if offered(ui, chosen == entry.id, entry, model, LookTime::of(&entry.id, known)) {
+            if offered(ui, chosen == entry.id, (entry, model), known) {
                 clicked = Some(entry.id.clone());
             }
         }
@@ -180,14 +196,13 @@ fn networks(ui: &mut Ui, known: &ModelList, role: ModelRole, chosen: &str) -> Op
 }
 
 /// A model of the list as a choice; whether it was clicked.
-fn offered(ui: &mut Ui, chosen: bool, entry: &ModelEntry, model: &ModelState, look: Option<LookTime>) -> bool {
-    let to_load = (!model.is_usable()).then(|| {
-        if entry.is_hosted() {
-            format!("download of {} MB, {}", entry.download_megabytes(), entry.license)
-        } else {
-            format!("not hosted anywhere; {} MB, {}", entry.megabytes(), entry.license)
-        }
+fn offered(ui: &mut Ui, chosen: bool, (entry, model): (&ModelEntry, &ModelState), known: &ModelList) -> bool {
+    let to_load = (!model.is_usable()).then(|| match known.to_load(entry) {
+        _ if !entry.is_hosted() => format!("not hosted anywhere; {} MB, {}", entry.megabytes(), entry.license),
+        [all, 0] => format!("download of {all} MB, {}", entry.license),
+        [left, arrived] => format!("download of {left} MB more, {arrived} MB are here already, {}", entry.license),
     });
+    let look = LookTime::of(&entry.id, known);
     ui.add_enabled_ui(model.is_usable() || entry.is_hosted(), |ui| {
         choice(ui, chosen, &entry.title, &entry.adds, &cost(to_load, look))
     })
@@ -214,7 +229,7 @@ fn choice(ui: &mut Ui, chosen: bool, title: &str, means: &str, costs: &str) -> b
 /// What happens next: sizes, times, and what words will find.
 fn summary(ui: &mut Ui, known: &ModelList, means: &Means, most_photos: usize) {
     let missing = means.missing.iter().filter_map(|id| known.get(id));
-    let megabytes: u64 = missing.map(|(e, _)| e.download_megabytes()).sum();
+    let megabytes: u64 = missing.map(|(e, _)| known.to_load(e)[0]).sum();
     let mut parts = Vec::new();
     if megabytes > 0 {
         parts.push(format!("Download {megabytes} MB."));

@@ -32,7 +32,7 @@ impl Tracker<'_> {
         of: &[IdentityId],
         observer: &mut dyn Observer,
     ) -> Result<Vec<ViewReport>, FindError> {
-        let mut ticker = Ticker::new(format!("Propagating identities to all views, round {round}"), self.photos.len());
+        let mut ticker = Ticker::new(format!("Looking what is still unknown, round {round}"), self.photos.len());
         observer.proceed()?;
         // To see how much is unknown, small pictures will do.
         let side = self.options.max_side_px.min(256);
