@@ -9,7 +9,7 @@ use crate::io::memory;
 use crate::math::stats::median;
 use crate::models::catalog;
 pub(crate) use crate::models::catalog::{ModelEntry, ModelRole, ModelState, SAM2};
-use crate::models::engine::engine;
+use crate::models::engine;
 use crate::models::fetch::Patience;
 use crate::models::official::WEIGHTS;
 use crate::models::{self, IdentityCrop, KnownResult, ModelError};
@@ -20,8 +20,9 @@ use crate::pipeline::observer::{Observer, Ticker};
 pub struct ModelList {
     /// What runs them, and on what; `None` if that cannot be used.
     pub(crate) engine: Option<[String; 2]>,
-    /// Whether that is the fast one.
+    /// Whether that is the fast one, and whether it stays until the program ends.
     pub(crate) is_fast: bool,
+    pub(crate) is_settled: bool,
     /// Cores of this machine.
     pub(crate) cores: usize,
     /// What is wrong with it, or could be better.
@@ -64,10 +65,10 @@ impl ModelList {
 
 /// Lists the models, installed or not: reads and verifies files.
 pub(crate) fn list() -> ModelList {
-    let found = engine();
-    let is_fast = found.as_ref().is_ok_and(|e| e.is_fast());
+    let found = engine::facts();
+    let [is_fast, is_settled] = found.as_ref().map_or([false, true], |e| [e.is_fast, e.is_settled]);
     let (engine, mut note) = match found {
-        Ok(engine) => (Some([engine.name(), engine.device()].map(str::to_owned)), engine.note().map(str::to_owned)),
+        Ok(engine) => (Some([engine.name, engine.device.to_owned()]), engine.note),
         Err(e) => (None, Some(e.to_string())),
     };
     let folder = models::folder();
@@ -77,7 +78,7 @@ pub(crate) fn list() -> ModelList {
     });
     let arrived = models.iter().map(|e| (e.id.clone(), e.arrived_megabytes(&folder))).collect();
     let models = models.into_iter().map(|e| (e.clone(), e.state(&folder))).collect();
-    ModelList { engine, is_fast, cores: memory::cores(), note, folder, models, arrived }
+    ModelList { engine, is_fast, is_settled, cores: memory::cores(), note, folder, models, arrived }
 }
 
 /// Where the files of a model come from.

@@ -10,21 +10,21 @@ use crate::models::engine::engine;
 const MEASURED_CORES: usize = 2;
 const MOST_CORES: usize = 8;
 
-/// How long a segmenter looks at one photo here, estimated from times measured elsewhere.
+/// How long a segmenter looks at one photo here, or an encoder at one picture of an object, estimated from times measured elsewhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LookTime {
     secs: f64,
 }
 
 impl LookTime {
-    /// That of a model of the list if its time was measured.
-    pub(crate) fn of(segmenter: &str, known: &ModelList) -> Option<Self> {
-        Self::estimated(&known.get(segmenter)?.0, known.is_fast, known.cores)
+    /// That of a model of the list if its time was measured, by the engine that is here or by the fast one.
+    pub(crate) fn of(model: &str, known: &ModelList, is_fast: bool) -> Option<Self> {
+        Self::estimated(&known.get(model)?.0, is_fast, known.cores)
     }
 
     /// The same for work that has no list at hand.
-    pub(super) fn of_installed(segmenter: &str) -> Option<Self> {
-        let entry = catalog::entry(segmenter).ok()?;
+    pub(super) fn of_installed(model: &str) -> Option<Self> {
+        let entry = catalog::entry(model).ok()?;
         Self::estimated(&entry, engine().ok()?.is_fast(), memory::cores())
     }
 
@@ -34,8 +34,10 @@ impl LookTime {
         Some(Self { secs: secs * MEASURED_CORES as f64 / cores.clamp(1, MOST_CORES) as f64 })
     }
 
-    pub(crate) fn text(self) -> String {
-        format!("{} a photo here, by estimate", format::about(self.secs))
+    /// For one `what`: a photo, a picture of an object.
+    pub(crate) fn text(self, what: &str) -> String {
+        let time = if self.secs < 5.0 { format::seconds(self.secs) } else { format::about(self.secs) };
+        format!("{time} {what} here, by estimate")
     }
 }
 

@@ -1,13 +1,15 @@
 //! Language features of identities: an encoder looks at each in the photos that show it best.
 
 use std::collections::{BTreeSet, HashMap};
+use std::time::Instant;
 
 use super::error::FindError;
 use super::relevancy::deviate;
 use super::view_map::ViewMap;
 use crate::io;
 use crate::models::{Encoder, IdentityCrop, ModelError};
-use crate::pipeline::observer::{Observer, Ticker};
+use crate::math::format::{self, things};
+use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::language::MAX_VIEWS;
 use crate::scene::{
@@ -66,7 +68,7 @@ pub(crate) fn embed(
         wanted[photo].iter().flat_map(|id| [Some(*id), whole_of(*id)]).flatten().collect()
     };
     let mut ticker = Ticker::new("Embedding objects and parts", order.iter().map(|photo| shown(photo).len()).sum());
-    let mut done = 0;
+    let (mut done, mut told, start) = (0, false, Instant::now());
     for photo in &order {
         let pixels = io::photo::load(&photos[*photo], MAX_SIDE_PX)?;
         let view = looker.draw(&photos[*photo], MAX_SIDE_PX)?;
@@ -76,6 +78,14 @@ pub(crate) fn embed(
             eye.look(ids, encoder)?;
             done += ids.len();
             ticker.tick(done, observer)?;
+            // The first tiles prepare the network; those after them tell what all will take.
+            let secs = start.elapsed().as_secs_f64() * ticker.total as f64 / done as f64;
+            if !told && done > TILES_AT_ONCE {
+                told = true;
+                let all = things(ticker.total as usize, "picture");
+                let text = format!("{name} looks at {all} of objects and parts: {}", format::about(secs));
+                observer.note(Severity::Info, text);
+            }
         }
         for &id in &wanted[photo] {
             let Some(raw) = eye.seen(id) else { continue };

@@ -123,19 +123,21 @@ pub(crate) fn track(
         encode_secs = follower.encode_secs;
         follow_secs = start.elapsed().as_secs_f64() - encode_secs;
     }
-    let views = loop {
-        let of = t.decided();
-        let views = t.look(seeds.len(), &of, observer)?;
-        let needy =
-            views.iter().filter(|v| !tried[v.photo] && (options.keep_masks || v.unknown > options.reseed_share));
-        let needy = needy.filter(|v| segmenter.covers(&photos[v.photo]));
-        let next = needy.max_by(|a, b| a.unknown.total_cmp(&b.unknown)).map(|v| v.photo);
-        let Some(next) = next.filter(|_| seeds.len() < options.max_seeds) else { break views };
+    let mut views = t.look(&t.decided(), observer)?;
+    while seeds.len() < options.max_seeds {
+        let is_open = |v: &ViewReport| {
+            let is_needy = options.keep_masks || v.unknown > options.reseed_share;
+            !tried[v.photo] && is_needy && segmenter.covers(&photos[v.photo])
+        };
+        let Some(next) = t.most_unknown(&mut views, is_open, observer)? else { break };
         tried[next] = true;
         if t.seed(next, segmenter, observer)?.is_some() {
             seeds.push(next);
         }
-    };
+    }
+    if seeds.len() > 1 {
+        views = t.look(&t.decided(), observer)?;
+    }
     let said = t.votes.clone();
     if options.by_photos {
         t.complete(&views, observer)?;
@@ -148,7 +150,7 @@ pub(crate) fn track(
     } else {
         t.votes.decide(&t.identities, LEAST_VOTES)
     };
-    let views = t.look(seeds.len() + 1, &identities_of(&assignments), observer)?;
+    let views = t.look(&identities_of(&assignments), observer)?;
     extend(cloud, &mut assignments, options.hidden_steps);
     drop_floaters(cloud, &t.identities, &mut assignments);
     if let Some(map) = &options.known {

@@ -58,6 +58,7 @@ impl Jobs for Told {
                 Outcome::Models(Arc::new(ModelList {
                     engine: None,
                     is_fast: true,
+                    is_settled: true,
                     cores: 2,
                     note: None,
                     folder: "models".into(),
