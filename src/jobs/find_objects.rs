@@ -199,6 +199,10 @@ pub(crate) fn run(
         let most = photos.len().min(options.track.max_seeds);
         observer.note(Severity::Info, forecast::sentence(look, most));
     }
+    if with.carry != Carry::Gaussians && request.known.is_none() {
+        let text = forecast::tracking(&with.tracker, photos.len());
+        text.into_iter().for_each(|text| observer.note(Severity::Info, text));
+    }
     let mut follower = match with.carry {
         _ if request.known.is_some() => None,
         Carry::Gaussians => None,

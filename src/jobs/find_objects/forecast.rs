@@ -2,7 +2,7 @@
 
 use crate::io::memory;
 use crate::jobs::models::{ModelEntry, ModelList};
-use crate::math::format;
+use crate::math::format::{self, things};
 use crate::models::catalog;
 use crate::models::engine::engine;
 
@@ -31,7 +31,7 @@ impl LookTime {
     fn estimated(entry: &ModelEntry, is_fast: bool, cores: usize) -> Option<Self> {
         let measured = entry.photo_seconds?;
         let secs = if is_fast { measured.onnx_runtime } else { measured.built_in? };
-        Some(Self { secs: secs * MEASURED_CORES as f64 / cores.clamp(1, MOST_CORES) as f64 })
+        Some(Self { secs: on_cores(secs, cores) })
     }
 
     /// For one `what`: a photo, a picture of an object.
@@ -39,6 +39,24 @@ impl LookTime {
         let time = if self.secs < 5.0 { format::seconds(self.secs) } else { format::about(self.secs) };
         format!("{time} {what} here, by estimate")
     }
+}
+
+/// How long following masks through so many photos takes with a network of this name, if that was measured.
+pub(super) fn tracking(tracker: &str, photos: usize) -> Option<String> {
+    let entry = catalog::entry(tracker).ok()?;
+    let seconds = entry.track_seconds.filter(|_| engine().is_ok_and(|e| e.is_fast()))?;
+    let [look, follow] = seconds.map(|s| format::about(on_cores(s, memory::cores()) * photos as f64));
+    Some(format!(
+        "{} looks at {} first ({look}), then follows each mask through them ({follow} a mask), by estimate. What is done \
+         is kept if you stop it.",
+        entry.title,
+        things(photos, "photo")
+    ))
+}
+
+/// What took so many seconds where times are measured takes with other cores.
+fn on_cores(secs: f64, cores: usize) -> f64 {
+    secs * MEASURED_CORES as f64 / cores.clamp(1, MOST_CORES) as f64
 }
 
 /// How long finding takes where up to `most_photos` are looked at.
