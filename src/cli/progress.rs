@@ -81,7 +81,11 @@ impl Observer for Console {
         if self.last_line.elapsed() >= LINE_INTERVAL {
             self.last_line = Instant::now();
             let (done, total) = (HumanCount(progress.done), HumanCount(progress.total));
-            let counted = if progress.total > 0 { format!("{done}/{total} {}", rate_and_times(&progress)) } else { String::new() };
+            let counted = if progress.total > 0 {
+                format!("{done}/{total} {}", rate_and_times(&progress))
+            } else {
+                String::new()
+            };
             output::note(format!("{} {counted} {}", progress.stage, self.metrics).trim_end());
         }
     }

@@ -157,7 +157,8 @@ impl FindDialog {
         let Some(entry) = missing_engine(known) else { return };
         ui.add_space(8.0);
         ui.label(RichText::new("What runs them").strong());
-        let (mut is_wanted, is_needed) = (means.missing.contains(&entry.id), self.without_engine || !means.missing.is_empty());
+        let (mut is_wanted, is_needed) =
+            (means.missing.contains(&entry.id), self.without_engine || !means.missing.is_empty());
         if ui.add_enabled(is_needed, egui::Checkbox::new(&mut is_wanted, &entry.title)).changed() {
             self.without_engine = !is_wanted;
         }
@@ -192,12 +193,7 @@ impl FindDialog {
 }
 
 /// The networks for one purpose: what is here, recommended or chosen, and all others folded away. The one that was clicked.
-fn networks(
-    ui: &mut Ui,
-    (known, is_fast): (&ModelList, bool),
-    role: ModelRole,
-    chosen: &str,
-) -> Option<String> {
+fn networks(ui: &mut Ui, (known, is_fast): (&ModelList, bool), role: ModelRole, chosen: &str) -> Option<String> {
     let (first, others): (Vec<_>, Vec<_>) =
         known.of(role).partition(|(e, s)| s.is_usable() || e.recommended || e.id == chosen);
     let mut clicked = None;

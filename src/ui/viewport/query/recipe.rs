@@ -83,9 +83,11 @@ fn choices(ui: &mut Ui, recipe: &mut Recipe) {
         ui.end_row();
         ui.weak("Masks carried by");
         ui.horizontal(|ui| {
-            for (prompt, text) in
-                [(None, "Gaussians"), (Some(MaskPrompt::Mask), "SAM 2, by mask"), (Some(MaskPrompt::Points), "by points")]
-            {
+            for (prompt, text) in [
+                (None, "Gaussians"),
+                (Some(MaskPrompt::Mask), "SAM 2, by mask"),
+                (Some(MaskPrompt::Points), "by points"),
+            ] {
                 ui.selectable_value(&mut prepared.prompt, prompt, text);
             }
         });
