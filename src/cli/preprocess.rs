@@ -16,7 +16,7 @@ use crate::pipeline::semantics::build_map::{CODE_STEPS, Carry, Found};
 use crate::pipeline::semantics::recipe::RecipeName;
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::scene::findings::Doubt;
-use crate::scene::{Findings, Identity, IdentityId, Level, Lifting, MaskPrompt, Preparation, SemanticMap};
+use crate::scene::{Findings, Identity, IdentityId, Lifting, MaskPrompt, Preparation, SemanticMap};
 
 /// Find the objects and parts of a trained scene
 ///
@@ -161,12 +161,10 @@ pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
             "disagreements": disagreements(&map),
         }));
     }
-    let count = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();
     let doubts = map.findings.as_ref().map_or(0, |f| f.doubts().len());
     output::print(&format!(
-        "{} and {} from {} in {secs:.1} s, {:.1} % of the photos unknown, {}; ask with 'fmlgs query {} \"...\"'",
-        things(count(Level::Object), "object"),
-        things(count(Level::Part), "part"),
+        "{} from {} in {secs:.1} s, {:.1} % of the photos unknown, {}; ask with 'fmlgs query {} \"...\"'",
+        map.identities.counted(),
         things(map.seeds.len(), "photo"),
         100.0 * unknown.unwrap_or(0.0),
         things(doubts, "doubt"),

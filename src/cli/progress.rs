@@ -37,15 +37,16 @@ impl Console {
         }
     }
 
-    /// The bar of `stage`, a new one if the stage has changed.
-    fn bar(&mut self, stage: &str) -> &ProgressBar {
+    /// The bar of `stage`, a new one if the stage has changed; without numbers if nothing counts its steps.
+    fn bar(&mut self, stage: &str, counts: bool) -> &ProgressBar {
         if self.bar.as_ref().is_none_or(|(current, _)| current != stage) {
             if let Some((_, old)) = self.bar.take() {
                 old.finish_and_clear();
             }
             self.metrics.clear();
             let bar = ProgressBar::new(0);
-            let style = ProgressStyle::with_template("{prefix} [{bar:28}] {human_pos}/{human_len} {msg}");
+            let counted = if counts { " [{bar:28}] {human_pos}/{human_len}" } else { "\u{2026}" };
+            let style = ProgressStyle::with_template(&format!("{{prefix}}{counted} {{msg}}"));
             if let Ok(style) = style {
                 bar.set_style(style.progress_chars("=> "));
             }
@@ -67,11 +68,12 @@ impl Observer for Console {
         }
         if self.terminal {
             let message = format!("{} {}", rate_and_times(&progress), self.metrics);
-            let bar = self.bar(&progress.stage);
+            let counts = progress.total > 0;
+            let bar = self.bar(&progress.stage, counts);
             bar.set_length(progress.total);
             bar.set_position(progress.done);
             bar.set_message(message);
-            if progress.done >= progress.total {
+            if counts && progress.done >= progress.total {
                 bar.finish_and_clear();
             }
             return;
@@ -79,8 +81,12 @@ impl Observer for Console {
         if self.last_line.elapsed() >= LINE_INTERVAL {
             self.last_line = Instant::now();
             let (done, total) = (HumanCount(progress.done), HumanCount(progress.total));
-            let times = rate_and_times(&progress);
-            output::note(&format!("{} {done}/{total} {times} {}", progress.stage, self.metrics));
+            let counted = if progress.total > 0 {
+                format!("{done}/{total} {}", rate_and_times(&progress))
+            } else {
+                String::new()
+            };
+            output::note(format!("{} {counted} {}", progress.stage, self.metrics).trim_end());
         }
     }
 

@@ -101,7 +101,7 @@ pub(crate) fn find_and_ask(
     if let Some(kept) = kept {
         observer.note(Severity::Info, format!("The previous objects and parts are kept in {}", kept.display()));
     }
-    observer.note(Severity::Info, format!("{} objects and parts found", map.identities.len()));
+    observer.note(Severity::Info, format!("{} found", map.identities.counted()));
     Ok(DemoQueries { find_secs, ..ask(&map, photos, job, Some(pictures))? })
 }
 

@@ -5,9 +5,9 @@ use std::sync::Arc;
 
 use image::ColorType;
 
+use super::held_out::held_out;
 use super::{JobError, Scene, export, open};
 use crate::io;
-use crate::io::trained::SceneCamera;
 use crate::math::stats::{mean, median};
 use crate::pipeline::depth::{self, DepthCounter, DepthScores};
 use crate::pipeline::evaluate::evaluate;
@@ -19,22 +19,6 @@ use crate::scene::{Dataset, GaussianCloud};
 
 /// The difference picture shows errors this many times larger.
 const DIFFERENCE_GAIN: i32 = 4;
-
-/// The photos of `dataset` that a scene with these `cameras` was not trained on, or every `every`-th if that is
-/// given. By name, where the scene says which: the dataset may have gained or lost photos since, and settings
-/// may have changed; by `default_every` where it does not.
-pub(crate) fn held_out(
-    dataset: &Dataset,
-    cameras: &[SceneCamera],
-    every: Option<usize>,
-    default_every: usize,
-) -> Vec<usize> {
-    if every.is_some() || cameras.is_empty() {
-        return dataset.split(every.unwrap_or(default_every)).1;
-    }
-    let held = |name: &str| cameras.iter().any(|c| c.held_out && c.name == name);
-    (0..dataset.photos.len()).filter(|&i| held(&dataset.photos[i].name)).collect()
-}
 
 /// What is compared; what is not given is as in training.
 #[derive(Clone, Debug, Default)]
@@ -189,29 +173,10 @@ fn side_by_side(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Camera, Photo};
-    use glam::DVec3;
 
     #[test]
     fn picture_names_are_safe() {
         assert_eq!(picture_name(7, "images/../a b.JPG"), "007_images____a_b.png");
         assert_eq!(picture_name(1234, "x"), "1234_x.png");
-    }
-
-    #[test]
-    fn a_scene_says_by_name_which_photos_it_has_not_seen() {
-        let photo = |name: &str| {
-            Photo::new(
-                name,
-                PathBuf::new(),
-                Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid"),
-            )
-        };
-        let trained_on = Dataset { photos: ["a", "b", "c", "d"].map(photo).to_vec(), ..Dataset::default() };
-        let cameras = open::cameras(&trained_on, 2);
-        let now = Dataset { photos: ["b", "c", "d", "e"].map(photo).to_vec(), ..Dataset::default() };
-        assert_eq!(held_out(&now, &cameras, None, 2), [1], "a is gone, b and d were trained on, e is new");
-        assert_eq!(held_out(&now, &cameras, Some(2), 9), [0, 2], "somebody wants otherwise");
-        assert_eq!(held_out(&now, &[], None, 2), [0, 2], "a splat says nothing");
     }
 }

@@ -7,9 +7,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
+use strum::VariantArray;
 
 use self::forecast::LookTime;
-use super::{JobError, evaluate};
+use super::JobError;
+use super::held_out::held_out;
 use crate::io::labels::Labels;
 use crate::io::trained::{self, CLOUD_FILE};
 use crate::io::{IoError, SceneFolder, splat_ply};
@@ -19,6 +21,7 @@ use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::build_map::{
     CODE_STEPS, Carry, FindOptions, Found, REGIONS, Tools, find_objects, segmenter,
 };
+use crate::pipeline::semantics::recipe::RecipeName;
 use crate::pipeline::semantics::sam2_tracker::Sam2Tracker;
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::render::RenderSettings;
@@ -101,6 +104,24 @@ pub(crate) struct FoundObjects {
     pub(crate) secs: f64,
 }
 
+/// How objects are looked for: the recipe's name, if it is one, and its choices.
+fn told(with: &FindSettings, preparation: Preparation, masks: &str, encoder: Option<&str>) -> String {
+    let Preparation { lifting, part_weight, prompt } = preparation;
+    let named = |name: &&RecipeName| name.recipe().preparation == preparation;
+    let name = RecipeName::VARIANTS.iter().find(named).map_or_else(|| "own".to_owned(), RecipeName::to_string);
+    let prompt = prompt.unwrap_or_default();
+    let carried = match with.carry {
+        Carry::Gaussians => "the Gaussians".to_owned(),
+        Carry::Sam2 => format!("{} (prompted by {prompt}) and the Gaussians", with.tracker),
+        Carry::Both => format!("{} (prompted by {prompt}) and the Gaussians, each correcting the other", with.tracker),
+    };
+    format!(
+        "recipe {name}: masks by {masks}, carried to the other photos by {carried}, lifting {lifting}, embeddings by {} \
+         (part weight {part_weight})",
+        encoder.unwrap_or("no encoder")
+    )
+}
+
 /// Finds objects and parts of the scene in the state `known`, and stores them. Held-out photos are never used.
 pub(crate) fn run(
     request: &FindRequest,
@@ -118,7 +139,7 @@ pub(crate) fn run(
         return Err(IoError::Changed { folder: folder.into() }.into());
     }
     let cameras = trained::load_info(folder)?.cameras;
-    let held = evaluate::held_out(dataset, &cameras, None, request.holdout_every);
+    let held = held_out(dataset, &cameras, None, request.holdout_every);
     let all = dataset.photos.iter().enumerate();
     let photos: Vec<Photo> = all.filter(|(i, _)| !held.contains(i)).map(|(_, p)| p.clone()).collect();
     let place = |name: &String| {
@@ -172,9 +193,15 @@ pub(crate) fn run(
             .inspect_err(|e| warn(format!("Objects are found without embeddings: {e}")))
             .ok(),
     };
+    let by = network.as_deref().or(masks.map(|_| "files")).unwrap_or(REGIONS);
+    observer.note(Severity::Info, told(with, preparation, by, encoder.as_ref().map(|e| e.name())));
     if let Some(look) = network.as_deref().and_then(LookTime::of_installed) {
         let most = photos.len().min(options.track.max_seeds);
         observer.note(Severity::Info, forecast::sentence(look, most));
+    }
+    if with.carry != Carry::Gaussians && request.known.is_none() {
+        let text = forecast::tracking(&with.tracker, photos.len());
+        text.into_iter().for_each(|text| observer.note(Severity::Info, text));
     }
     let mut follower = match with.carry {
         _ if request.known.is_some() => None,

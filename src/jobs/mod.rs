@@ -21,6 +21,7 @@ pub(crate) mod export_splat;
 pub mod find_objects;
 pub(crate) mod folders;
 pub(crate) mod go_to;
+pub(crate) mod held_out;
 pub(crate) mod inspect;
 pub(crate) mod models;
 pub mod open;

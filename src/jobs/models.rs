@@ -1,5 +1,6 @@
 //! Putting networks in place, and checking those that are there.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -8,7 +9,7 @@ use crate::io::memory;
 use crate::math::stats::median;
 use crate::models::catalog;
 pub(crate) use crate::models::catalog::{ModelEntry, ModelRole, ModelState, SAM2};
-use crate::models::engine::engine;
+use crate::models::engine;
 use crate::models::fetch::Patience;
 use crate::models::official::WEIGHTS;
 use crate::models::{self, IdentityCrop, KnownResult, ModelError};
@@ -19,8 +20,9 @@ use crate::pipeline::observer::{Observer, Ticker};
 pub struct ModelList {
     /// What runs them, and on what; `None` if that cannot be used.
     pub(crate) engine: Option<[String; 2]>,
-    /// Whether that is the fast one.
+    /// Whether that is the fast one, and whether it stays until the program ends.
     pub(crate) is_fast: bool,
+    pub(crate) is_settled: bool,
     /// Cores of this machine.
     pub(crate) cores: usize,
     /// What is wrong with it, or could be better.
@@ -28,12 +30,20 @@ pub struct ModelList {
     /// Where they lie.
     pub(crate) folder: PathBuf,
     pub(crate) models: Vec<(ModelEntry, ModelState)>,
+    /// Downloads that were cut off: what has arrived, MB.
+    pub(crate) arrived: BTreeMap<String, u64>,
 }
 
 impl ModelList {
     /// The model of this name.
     pub(crate) fn get(&self, id: &str) -> Option<&(ModelEntry, ModelState)> {
         self.models.iter().find(|(e, _)| e.id == id)
+    }
+
+    /// About how much is still to be fetched for it, and how much has arrived already, MB.
+    pub(crate) fn to_load(&self, entry: &ModelEntry) -> [u64; 2] {
+        let arrived = self.arrived.get(&entry.id).copied().unwrap_or(0);
+        [entry.download_megabytes().saturating_sub(arrived), arrived]
     }
 
     /// The models for one purpose.
@@ -55,10 +65,10 @@ impl ModelList {
 
 /// Lists the models, installed or not: reads and verifies files.
 pub(crate) fn list() -> ModelList {
-    let found = engine();
-    let is_fast = found.as_ref().is_ok_and(|e| e.is_fast());
+    let found = engine::facts();
+    let [is_fast, is_settled] = found.as_ref().map_or([false, true], |e| [e.is_fast, e.is_settled]);
     let (engine, mut note) = match found {
-        Ok(engine) => (Some([engine.name(), engine.device()].map(str::to_owned)), engine.note().map(str::to_owned)),
+        Ok(engine) => (Some([engine.name, engine.device.to_owned()]), engine.note),
         Err(e) => (None, Some(e.to_string())),
     };
     let folder = models::folder();
@@ -66,8 +76,9 @@ pub(crate) fn list() -> ModelList {
         note = Some(e.to_string());
         Vec::new()
     });
+    let arrived = models.iter().map(|e| (e.id.clone(), e.arrived_megabytes(&folder))).collect();
     let models = models.into_iter().map(|e| (e.clone(), e.state(&folder))).collect();
-    ModelList { engine, is_fast, cores: memory::cores(), note, folder, models }
+    ModelList { engine, is_fast, is_settled, cores: memory::cores(), note, folder, models, arrived }
 }
 
 /// Where the files of a model come from.

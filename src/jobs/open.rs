@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::held_out::held_out;
 use super::sparse_cloud::sparse_cloud;
 use super::{Folders, JobError, plan};
 use crate::io::labels::Labels;
@@ -161,6 +162,8 @@ pub struct OpenedScene {
     pub name: String,
     /// Posed photos, if it has any.
     pub dataset: Option<Arc<Dataset>>,
+    /// Those of them that its Gaussians were not trained on, if that is known.
+    pub(crate) known_held_out: Option<Vec<usize>>,
     /// What to draw: trained Gaussians, or the sparse points as small ones.
     pub cloud: Option<Arc<GaussianCloud>>,
     /// Whether `cloud` is a result, not just sparse points.
@@ -200,7 +203,15 @@ impl OpenedScene {
         self.metres_per_unit.or_else(|| self.dataset.as_ref().and_then(|d| d.metres_per_unit))
     }
 
+    /// The photos that its Gaussians were not trained on, by index; where nobody knows, every `every`-th.
+    pub(crate) fn held_out(&self, every: usize) -> Vec<usize> {
+        let split = || self.dataset.as_ref().map(|d| d.split(every).1);
+        self.known_held_out.clone().or_else(split).unwrap_or_default()
+    }
+
     fn of(scene: Scene, dataset: Option<Arc<Dataset>>, observer: &mut dyn Observer) -> Self {
+        let without = |d: &Arc<Dataset>| held_out(d, &scene.cameras, None, scene.config.holdout_every);
+        let known_held_out = dataset.as_ref().filter(|_| !scene.cameras.is_empty()).map(without);
         let home = match &dataset {
             Some(dataset) if scene.cameras.is_empty() => HomeView::new(&dataset.cameras(), Some(&scene.cloud)),
             _ => scene.home(),
@@ -211,6 +222,7 @@ impl OpenedScene {
             path: scene.path,
             name: scene.name,
             dataset,
+            known_held_out,
             cloud: Some(scene.cloud),
             trained: true,
             semantics,
@@ -262,7 +274,7 @@ pub(crate) fn open(
 pub(crate) fn known_objects(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<SemanticMap>> {
     match scene.known_semantics() {
         Ok(map) => map.map(|map| {
-            let what = format!("{} objects and parts", map.identities.len());
+            let what = map.identities.counted();
             resource_log::record(ResourceKind::Objects, what, "the scene was opened", map.bytes());
             Arc::new(map)
         }),

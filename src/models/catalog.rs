@@ -74,9 +74,10 @@ pub struct ModelEntry {
     /// Whether it is what to begin with, of those with its role.
     #[serde(default)]
     pub(crate) recommended: bool,
-    /// How long a segmenter looks for everything in a photo.
-    #[serde(default)]
+    /// How long a segmenter looks for everything in a photo, an encoder at one picture of an object.
     pub(crate) photo_seconds: Option<PhotoSeconds>,
+    /// How long one that follows masks looks at a frame with ONNX Runtime, and follows one mask into it.
+    pub(crate) track_seconds: Option<[f64; 2]>,
 }
 
 /// Seconds on two cores, measured.

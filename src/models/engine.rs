@@ -85,6 +85,35 @@ impl Device {
 
 static CHOSEN: OnceLock<Result<Engine, (String, String)>> = OnceLock::new();
 
+/// Name of the engine that is built in.
+const BUILT_IN: &str = "tract (built in)";
+
+/// What runs networks, or would if one were used now.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct EngineFacts {
+    pub(crate) name: String,
+    /// What it computes on.
+    pub(crate) device: &'static str,
+    /// What was asked for but is not so.
+    pub(crate) note: Option<String>,
+    /// Whether it is ONNX Runtime.
+    pub(crate) is_fast: bool,
+    /// Whether a network was used already, so that it stays until the program ends.
+    pub(crate) is_settled: bool,
+}
+
+/// Looks at it without choosing the built-in one: a library that is fetched before the first use of a network is used.
+pub(crate) fn facts() -> Result<EngineFacts, ModelError> {
+    if CHOSEN.get().is_none() && library().is_none() {
+        let name = BUILT_IN.to_owned();
+        return Ok(EngineFacts { name, device: "processor", note: None, is_fast: false, is_settled: false });
+    }
+    let engine = engine()?;
+    let note = engine.note().map(str::to_owned);
+    let (name, device) = (engine.name().to_owned(), engine.device());
+    Ok(EngineFacts { name, device, note, is_fast: engine.is_fast(), is_settled: true })
+}
+
 /// The engine of this process; the first call chooses it.
 pub(crate) fn engine() -> Result<&'static Engine, ModelError> {
     let chosen = CHOSEN.get_or_init(|| Engine::choose(library()));
@@ -187,7 +216,7 @@ impl Engine {
                     ));
                 }
                 ort::set_api(ort_tract::api());
-                (ort::init(), "tract (built in)".to_owned(), false)
+                (ort::init(), BUILT_IN.to_owned(), false)
             }
         };
         let environment = builder.build().map_err(|e| (name.clone(), e.to_string()))?;

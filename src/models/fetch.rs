@@ -155,7 +155,7 @@ pub fn sha256(path: &Path) -> io::Result<String> {
 }
 
 /// What has arrived so far, beside the file that it will become.
-struct Part {
+pub(super) struct Part {
     path: PathBuf,
     /// Holds the tag that the server gave this version of the file.
     tag: PathBuf,
@@ -164,7 +164,7 @@ struct Part {
 }
 
 impl Part {
-    fn of(wanted: &FileToFetch<'_>) -> Self {
+    pub(super) fn of(wanted: &FileToFetch<'_>) -> Self {
         let beside = |ending: &str| {
             let mut name = wanted.to.as_os_str().to_owned();
             name.push(ending);
@@ -174,7 +174,7 @@ impl Part {
     }
 
     /// Bytes that can be gone on from, and the tag of their version.
-    fn there(&self) -> (u64, Option<String>) {
+    pub(super) fn there(&self) -> (u64, Option<String>) {
         let tag = fs::read_to_string(&self.tag).ok().filter(|t| !t.is_empty());
         let bytes = fs::metadata(&self.path).map_or(0, |m| m.len());
         if tag.is_some() || self.is_checked { (bytes, tag) } else { (0, None) }

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::catalog::{InstallError, ModelEntry, ModelRole, OfficialFile};
-use super::fetch::{self, FetchError, FileToFetch, Patience};
+use super::fetch::{self, FetchError, FileToFetch, Part, Patience};
 use super::template::Template;
 use super::{ModelError, manifest, unpack};
 
@@ -123,6 +123,29 @@ impl ModelEntry {
         Ok(())
     }
 
+    /// About how much of its download is here already, because it was cut off, MB.
+    pub(crate) fn arrived_megabytes(&self, folder: &Path) -> u64 {
+        let Some(official) = &self.checkpoint else { return 0 };
+        let to = folder.join(self.checkpoint_name());
+        let sha256 = self.checkpoint_sha256(official, folder);
+        let wanted = FileToFetch { url: "", to: &to, bytes: None, most: 0, sha256: sha256.as_deref() };
+        let whole = std::fs::metadata(&to).map_or(0, |m| m.len());
+        whole.max(Part::of(&wanted).there().0) / 1_000_000
+    }
+
+    fn checkpoint_name(&self) -> String {
+        format!("{}.checkpoint", self.id)
+    }
+
+    /// What its checkpoint must be: without a published checksum, the first file that was taken is the right one from
+    /// then on.
+    fn checkpoint_sha256(&self, official: &OfficialFile, folder: &Path) -> Option<String> {
+        let description = self.description_in(folder);
+        let kind = manifest::kind(&description).ok();
+        let origin = kind.and_then(|kind| manifest::read::<Origin>(&description, &kind).ok());
+        official.sha256.clone().or_else(|| origin?.checkpoint_sha256)
+    }
+
     /// Fetches its checkpoint, makes it of that, and removes the checkpoint.
     fn fetch_checkpoint(
         &self,
@@ -135,13 +158,8 @@ impl ModelEntry {
         if self.verify(folder).is_ok() {
             return Ok(());
         }
-        let name = format!("{}.checkpoint", self.id);
-        let to = folder.join(&name);
-        // Without a published checksum, the first file that was taken is the right one from then on.
-        let description = self.description_in(folder);
-        let kind = manifest::kind(&description).ok();
-        let origin = kind.and_then(|kind| manifest::read::<Origin>(&description, &kind).ok());
-        let sha256 = official.sha256.clone().or_else(|| origin?.checkpoint_sha256);
+        let (name, to) = (self.checkpoint_name(), folder.join(self.checkpoint_name()));
+        let sha256 = self.checkpoint_sha256(official, folder);
         let most = official.megabytes * 1_100_000;
         let wanted = FileToFetch { url, to: &to, bytes: None, most, sha256: sha256.as_deref() };
         // It has its name only once it is whole.

@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
 
+use crate::math::format;
 use crate::scene::GaussianCloud;
 pub use crate::scene::{Evaluation, StepMetrics, ViewScore};
 
@@ -28,7 +29,7 @@ pub struct Progress {
     pub stage: String,
     /// Units done so far.
     pub done: u64,
-    /// Units in all.
+    /// Units in all; 0 where they are not counted.
     pub total: u64,
     /// Seconds of work so far, pauses left out, earlier runs of a resumed job included.
     pub elapsed_secs: f64,
@@ -115,10 +116,20 @@ impl Ticker {
     }
 }
 
+/// Says that a `stage` has begun whose steps are not counted, and waits out a pause.
+pub(crate) fn begin(stage: impl Into<String>, observer: &mut dyn Observer) -> Result<(), Interrupted> {
+    Ticker::new(stage, 0).tick(0, observer)
+}
+
 impl Progress {
-    /// Seconds to go at the present rate; `None` if not known.
+    /// How far it is, "3 of 84"; `None` where its steps are not counted.
+    pub(crate) fn counted(&self) -> Option<String> {
+        (self.total > 0).then(|| format!("{} of {}", format::count(self.done), format::count(self.total)))
+    }
+
+    /// Seconds to go at the present rate; `None` if not known, and where all is done.
     pub(crate) fn eta_secs(&self) -> Option<f64> {
-        (self.rate > 0.0).then(|| self.total.saturating_sub(self.done) as f64 / self.rate)
+        (self.rate > 0.0 && self.done < self.total).then(|| self.total.saturating_sub(self.done) as f64 / self.rate)
     }
 }
 

@@ -1,9 +1,12 @@
 //! What was noticed as objects and parts were found: which photos show each, how surely, where photos disagreed, and
 //! how much of each photo stayed unknown. Kept with the semantic map.
 
+use std::collections::BTreeSet;
+
 use serde::{Deserialize, Serialize};
 
 use super::{Identities, IdentityId, NOBODY, text};
+use crate::math::format::things;
 
 /// Most doubts that are kept: who has more needs other masks, not a longer list.
 const MOST_DOUBTS: usize = 1_000;
@@ -44,6 +47,33 @@ impl Disagreement {
             Self::Drift(id) => format!("{} was tracked to a wrong place and is ignored there", name(id)),
             Self::Switch(is, other) => format!("{} was found where {} was expected", name(is), name(other)),
         }
+    }
+
+    /// A sentence for each kind among those of some photos: the first of them, and how many more there are.
+    pub(crate) fn told(
+        all: &[(usize, Self)],
+        photo: impl Fn(usize) -> String,
+        name: impl Fn(IdentityId) -> String,
+    ) -> Vec<String> {
+        let mut kinds: Vec<Vec<&(usize, Self)>> = Vec::new();
+        for doubt in all {
+            let kind = std::mem::discriminant(&doubt.1);
+            match kinds.iter_mut().find(|k| std::mem::discriminant(&k[0].1) == kind) {
+                Some(same) => same.push(doubt),
+                None => kinds.push(vec![doubt]),
+            }
+        }
+        let sentence = |same: Vec<&(usize, Self)>| {
+            let first = format!("{}: {}", photo(same[0].0), same[0].1.text(&name));
+            match same.len() - 1 {
+                0 => first,
+                more => {
+                    let photos: BTreeSet<usize> = same.iter().map(|d| d.0).collect();
+                    format!("{first} ({more} more like this, in {} in all)", things(photos.len(), "photo"))
+                }
+            }
+        };
+        kinds.into_iter().map(sentence).collect()
     }
 
     /// The same under new numbers; `None` where those that it told apart are one now.
@@ -273,6 +303,20 @@ mod tests {
         let told = found.doubts()[0].what.text(|id| all.full_name(id));
         assert!(told.starts_with("one mask covers ") && told.contains("cat") && told.ends_with("kept apart"), "{told}");
         assert_eq!(found.photo(&found.doubts()[0]), "40.jpg");
+    }
+
+    #[test]
+    fn doubts_of_one_kind_are_told_in_one_sentence() {
+        let merge = |photo: usize| (photo, Disagreement::Merge(vec![1, 3]));
+        let all = [merge(4), (2, Disagreement::Drift(2)), merge(4), merge(7)];
+        let told = Disagreement::told(&all, |photo| format!("{photo}.jpg"), |id| id.to_string());
+        assert_eq!(
+            told,
+            [
+                "4.jpg: one mask covers 1 and 3; they are kept apart (2 more like this, in 2 photos in all)",
+                "2.jpg: 2 was tracked to a wrong place and is ignored there",
+            ]
+        );
     }
 
     #[test]

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use self::whole_names::{WholeNames, key};
 use super::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
 use super::text;
+use crate::math::format::things;
 
 /// Object or part.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -106,6 +107,12 @@ impl Identities {
     /// How many there are.
     pub fn len(&self) -> usize {
         self.list.len()
+    }
+
+    /// How many of each level there are: "3 objects and 1 part".
+    pub(crate) fn counted(&self) -> String {
+        let count = |level: Level, what: &str| things(self.list.iter().filter(|i| i.level == level).count(), what);
+        format!("{} and {}", count(Level::Object, "object"), count(Level::Part, "part"))
     }
 
     /// Whether there are none.

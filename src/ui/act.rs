@@ -37,8 +37,9 @@ impl App {
                 }
             }
             Action::Cancel => {
-                if let Some(job) = &self.state.job {
+                if let Some(job) = &mut self.state.job {
                     self.worker.cancel(job.id);
+                    job.canceling = true;
                 }
             }
             Action::Dismiss => self.dismiss(ctx),
@@ -180,8 +181,9 @@ impl App {
 
     /// Cancels what runs and does the action next.
     pub(super) fn give_up_and(&mut self, action: Action) {
-        if let Some(job) = &self.state.job {
+        if let Some(job) = &mut self.state.job {
             self.worker.cancel(job.id);
+            job.canceling = true;
         }
         self.open(action);
     }

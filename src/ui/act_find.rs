@@ -1,6 +1,6 @@
 //! Finding objects: asks with what where photos came without labels, downloads what that needs, and goes on by itself.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeSet, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -30,6 +30,8 @@ impl App {
 
     /// Shows the dialog if it is open, and goes on with what is decided there.
     pub(super) fn ask_for_means(&mut self, ctx: &egui::Context) {
+        let recipe = self.viewport.queries.recipe().preparation;
+        self.find_dialog.follow_recipe(recipe, &mut self.layout.finding);
         if self.find_dialog.is_open() {
             self.models.keep_listed(&self.state, &self.worker);
         }
@@ -84,7 +86,9 @@ impl App {
         let Some(dataset) = scene.as_ref().and_then(|s| s.dataset.as_ref()) else {
             return self.state.toast(Tone::Warning, "This scene has no photos.");
         };
-        let trained_on = dataset.split(self.layout.config.holdout_every).0;
+        let held: BTreeSet<usize> =
+            scene.as_ref().map(|s| s.held_out(self.layout.config.holdout_every)).into_iter().flatten().collect();
+        let trained_on = (0..dataset.photos.len()).filter(|i| !held.contains(i));
         let size = scene.as_ref().map_or(1.0, |s| s.home.bounds.radius());
         let away = |camera: &Camera| {
             let turn = 1.0 - (camera.world_from_camera * DVec3::Z).dot(eye.world_from_camera * DVec3::Z);
@@ -92,7 +96,7 @@ impl App {
         };
         let nearest = || {
             let away = |i: &usize| away(&dataset.photos[*i].camera);
-            trained_on.iter().copied().min_by(|a, b| away(a).total_cmp(&away(b)))
+            trained_on.min_by(|a, b| away(a).total_cmp(&away(b)))
         };
         let Some(photo) = self.viewport.photo_index().or_else(nearest) else { return };
         let name = dataset.photos[photo].name.clone();

@@ -7,11 +7,12 @@ use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
 
 use super::state::AppState;
 use super::theme;
-use crate::jobs::find_objects::NO_ENCODER;
 use crate::jobs::find_objects::forecast::{self, LookTime};
+use crate::jobs::find_objects::{FindSettings, NO_ENCODER};
 use crate::jobs::models::{ModelEntry, ModelList, ModelRole, ModelState};
 use crate::math::format::things;
-use crate::pipeline::semantics::build_map::REGIONS;
+use crate::pipeline::semantics::build_map::{Carry, REGIONS};
+use crate::scene::Preparation;
 use crate::ui::actions::{Action, Pane};
 use crate::worker::JobId;
 
@@ -22,6 +23,10 @@ pub(crate) struct FindDialog {
     /// Nothing = not chosen by a user: the best that is here.
     segmenter: Option<String>,
     encoder: Option<String>,
+    /// Whether the fast engine is left out where it is missing.
+    without_engine: bool,
+    /// What the recipe on screen said last of how objects are to be found.
+    recipe: Preparation,
 }
 
 /// What a user decided to look for objects with.
@@ -50,6 +55,19 @@ impl FindDialog {
 
     pub(crate) fn is_open(&self) -> bool {
         self.open
+    }
+
+    /// Lets the next search follow what the recipe on screen says of it, once that has changed.
+    pub(crate) fn follow_recipe(&mut self, recipe: Preparation, finding: &mut FindSettings) {
+        if std::mem::replace(&mut self.recipe, recipe) == recipe {
+            return;
+        }
+        finding.preparation = recipe;
+        finding.carry = match (recipe.prompt, finding.carry) {
+            (None, _) => Carry::Gaussians,
+            (Some(_), Carry::Gaussians) => Carry::Sam2,
+            (Some(_), chosen) => chosen,
+        };
     }
 
     /// Shows it if it is open; what was decided, once that is.
@@ -82,10 +100,10 @@ impl FindDialog {
             let list_pt = (room.y - 230.0).max(120.0);
             ScrollArea::vertical().max_height(list_pt).min_scrolled_height(list_pt).show(ui, |ui| {
                 self.choices(ui, known, &means);
-                Self::engine(ui, known, actions);
+                self.engine(ui, known, &means);
             });
             ui.add_space(6.0);
-            summary(ui, known, &means, photos.min(max_seeds));
+            summary(ui, known, &means, photos.min(max_seeds), self.is_fast(known));
             self.buttons(ui, Some(means), actions)
         });
         if response.should_close() {
@@ -100,8 +118,16 @@ impl FindDialog {
         let segmenter = self.segmenter.clone().or_else(|| best(ModelRole::Segmenter)).unwrap_or_else(|| REGIONS.into());
         let encoder = self.encoder.clone().or_else(|| best(ModelRole::Encoder)).unwrap_or_else(|| NO_ENCODER.into());
         let is_missing = |id: &&String| known.get(id).is_some_and(|(_, s)| !s.is_usable());
-        let missing = [&segmenter, &encoder].into_iter().filter(is_missing).cloned().collect();
+        let networks = [&segmenter, &encoder];
+        let needs_engine = networks.iter().any(|id| known.get(id).is_some_and(|(e, _)| !e.built_in));
+        let engine = missing_engine(known).filter(|_| needs_engine && !self.without_engine).map(|e| &e.id);
+        let missing = engine.into_iter().chain(networks.into_iter().filter(is_missing)).cloned().collect();
         Means { segmenter, encoder, missing }
+    }
+
+    /// Whether the fast engine will run the networks.
+    fn is_fast(&self, known: &ModelList) -> bool {
+        known.is_fast || !known.is_settled && !self.without_engine && missing_engine(known).is_some()
     }
 
     fn choices(&mut self, ui: &mut Ui, known: &ModelList, means: &Means) {
@@ -111,7 +137,7 @@ impl FindDialog {
         if choice(ui, means.segmenter == REGIONS, "Uniform color regions (built in)", text, "") {
             self.segmenter = Some(REGIONS.into());
         }
-        if let Some(id) = networks(ui, known, ModelRole::Segmenter, &means.segmenter) {
+        if let Some(id) = networks(ui, (known, self.is_fast(known)), ModelRole::Segmenter, &means.segmenter) {
             self.segmenter = Some(id);
         }
         ui.add_space(8.0);
@@ -121,22 +147,29 @@ impl FindDialog {
         if choice(ui, means.encoder == NO_ENCODER, "Only names that you give", text, "") {
             self.encoder = Some(NO_ENCODER.into());
         }
-        if let Some(id) = networks(ui, known, ModelRole::Encoder, &means.encoder) {
+        if let Some(id) = networks(ui, (known, self.is_fast(known)), ModelRole::Encoder, &means.encoder) {
             self.encoder = Some(id);
         }
     }
 
     /// Offers the fast engine where it is not there.
-    fn engine(ui: &mut Ui, known: &ModelList, actions: &mut Vec<Action>) {
-        let fast = known.of(ModelRole::Engine).find(|(e, s)| !known.is_fast && !s.is_usable() && e.is_hosted());
-        let Some((entry, _)) = fast else { return };
+    fn engine(&mut self, ui: &mut Ui, known: &ModelList, means: &Means) {
+        let Some(entry) = missing_engine(known) else { return };
         ui.add_space(8.0);
         ui.label(RichText::new("What runs them").strong());
-        ui.label(RichText::new(&entry.adds).small().color(theme::weak()));
-        let text = format!("Download {} ({} MB, {})", entry.title, entry.download_megabytes(), entry.license);
-        if ui.small_button(text).clicked() {
-            actions.push(Action::FetchModel(entry.id.clone()));
+        let (mut is_wanted, is_needed) =
+            (means.missing.contains(&entry.id), self.without_engine || !means.missing.is_empty());
+        if ui.add_enabled(is_needed, egui::Checkbox::new(&mut is_wanted, &entry.title)).changed() {
+            self.without_engine = !is_wanted;
         }
+        ui.indent("engine", |ui| {
+            ui.label(RichText::new(&entry.adds).small().color(theme::weak()));
+            ui.label(RichText::new(download(known, entry)).small().color(theme::text()));
+            if known.is_settled {
+                let text = "A network was used already, so it is used from the next start of this program on.";
+                ui.label(RichText::new(text).small().color(theme::warning()));
+            }
+        });
     }
 
     fn buttons(&mut self, ui: &mut Ui, means: Option<Means>, actions: &mut Vec<Action>) -> Option<Means> {
@@ -160,13 +193,13 @@ impl FindDialog {
 }
 
 /// The networks for one purpose: what is here, recommended or chosen, and all others folded away. The one that was clicked.
-fn networks(ui: &mut Ui, known: &ModelList, role: ModelRole, chosen: &str) -> Option<String> {
+fn networks(ui: &mut Ui, (known, is_fast): (&ModelList, bool), role: ModelRole, chosen: &str) -> Option<String> {
     let (first, others): (Vec<_>, Vec<_>) =
         known.of(role).partition(|(e, s)| s.is_usable() || e.recommended || e.id == chosen);
     let mut clicked = None;
     let mut list = |ui: &mut Ui, all: Vec<(&ModelEntry, &ModelState)>| {
         for (entry, model) in all {
-            if offered(ui, chosen == entry.id, entry, model, LookTime::of(&entry.id, known)) {
+            if offered(ui, chosen == entry.id, (entry, model), (known, is_fast)) {
                 clicked = Some(entry.id.clone());
             }
         }
@@ -180,23 +213,35 @@ fn networks(ui: &mut Ui, known: &ModelList, role: ModelRole, chosen: &str) -> Op
 }
 
 /// A model of the list as a choice; whether it was clicked.
-fn offered(ui: &mut Ui, chosen: bool, entry: &ModelEntry, model: &ModelState, look: Option<LookTime>) -> bool {
-    let to_load = (!model.is_usable()).then(|| {
-        if entry.is_hosted() {
-            format!("download of {} MB, {}", entry.download_megabytes(), entry.license)
-        } else {
-            format!("not hosted anywhere; {} MB, {}", entry.megabytes(), entry.license)
-        }
-    });
+fn offered(
+    ui: &mut Ui,
+    chosen: bool,
+    (entry, model): (&ModelEntry, &ModelState),
+    (known, is_fast): (&ModelList, bool),
+) -> bool {
+    let to_load = (!model.is_usable()).then(|| download(known, entry));
+    let what = if entry.role == ModelRole::Encoder { "a picture of an object" } else { "a photo" };
+    let look = LookTime::of(&entry.id, known, is_fast).map(|look| look.text(what));
     ui.add_enabled_ui(model.is_usable() || entry.is_hosted(), |ui| {
-        choice(ui, chosen, &entry.title, &entry.adds, &cost(to_load, look))
+        let costs: Vec<String> = [to_load, look].into_iter().flatten().collect();
+        choice(ui, chosen, &entry.title, &entry.adds, &costs.join("  \u{b7}  "))
     })
     .inner
 }
 
-fn cost(to_load: Option<String>, look: Option<LookTime>) -> String {
-    let time = look.map(|l| l.text());
-    [to_load, time].into_iter().flatten().collect::<Vec<_>>().join("  ·  ")
+/// What is to be loaded of a model, and on which terms.
+fn download(known: &ModelList, entry: &ModelEntry) -> String {
+    match known.to_load(entry) {
+        _ if !entry.is_hosted() => format!("not hosted anywhere; {} MB, {}", entry.megabytes(), entry.license),
+        [all, 0] => format!("download of {all} MB, {}", entry.license),
+        [left, arrived] => format!("download of {left} MB more, {arrived} MB are here already, {}", entry.license),
+    }
+}
+
+/// The fast engine, where it could be had and is not here.
+fn missing_engine(known: &ModelList) -> Option<&ModelEntry> {
+    let fast = known.of(ModelRole::Engine).find(|(e, s)| !known.is_fast && !s.is_usable() && e.is_hosted());
+    fast.map(|(entry, _)| entry)
 }
 
 /// A radio button with what it means below it; whether it was clicked.
@@ -212,14 +257,14 @@ fn choice(ui: &mut Ui, chosen: bool, title: &str, means: &str, costs: &str) -> b
 }
 
 /// What happens next: sizes, times, and what words will find.
-fn summary(ui: &mut Ui, known: &ModelList, means: &Means, most_photos: usize) {
+fn summary(ui: &mut Ui, known: &ModelList, means: &Means, most_photos: usize, is_fast: bool) {
     let missing = means.missing.iter().filter_map(|id| known.get(id));
-    let megabytes: u64 = missing.map(|(e, _)| e.download_megabytes()).sum();
+    let megabytes: u64 = missing.map(|(e, _)| known.to_load(e)[0]).sum();
     let mut parts = Vec::new();
     if megabytes > 0 {
         parts.push(format!("Download {megabytes} MB."));
     }
-    parts.extend(LookTime::of(&means.segmenter, known).map(|look| forecast::sentence(look, most_photos)));
+    parts.extend(LookTime::of(&means.segmenter, known, is_fast).map(|look| forecast::sentence(look, most_photos)));
     ui.label(parts.join(" "));
     let warning = match means.encoder.as_str() {
         NO_ENCODER => Some("Words find nothing until you name things."),

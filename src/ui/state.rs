@@ -300,7 +300,8 @@ impl AppState {
                     self.set_facts(*facts);
                     self.set_semantics(semantics);
                     // Other settings are another training, in a folder of its own.
-                    self.scene = self.scene.take().map(|s| Arc::new(OpenedScene { out: out.clone(), ..(*s).clone() }));
+                    let in_out = |s: &OpenedScene| OpenedScene { out: out.clone(), known_held_out: None, ..s.clone() };
+                    self.scene = self.scene.take().map(|s| Arc::new(in_out(&s)));
                 }
                 let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));
                 self.say(Tone::Info, format!("Saved to {}", out.display()));
@@ -317,7 +318,7 @@ impl AppState {
                 self.history.evaluations.push(e);
             }
             Outcome::Objects(map) => {
-                self.toast(Tone::Good, format!("{} objects and parts found", map.identities.len()));
+                self.toast(Tone::Good, format!("{} found", map.identities.counted()));
                 self.set_semantics(Some(map));
             }
             Outcome::Edited(map) => self.set_semantics(Some(map)),

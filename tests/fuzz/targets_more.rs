@@ -11,8 +11,8 @@ use fmlgs::measure::{self, Report};
 use fmlgs::models::sam::Sam;
 use fmlgs::models::sam2::Sam2;
 use fmlgs::models::{ClipEncoder, ModelError, manifest};
+use fmlgs::pipeline::semantics::kept_frames;
 use fmlgs::pipeline::semantics::parse::ParsedQuery;
-use fmlgs::pipeline::semantics::sam2_tracker;
 use fmlgs::pipeline::train::checkpoint;
 
 use super::seeds_more as seeds;
@@ -91,7 +91,7 @@ pub fn all() -> Vec<Target> {
             |_| {},
             |f| checkpoint::load(&f.join(checkpoint::FILE)),
         ),
-        Target::new("followed_frame", Door::Any, |b| sam2_tracker::parse(b).ok_or("damaged")),
+        Target::new("followed_frame", Door::Any, |b| kept_frames::parse(b).ok_or("damaged")),
     ]
 }
 

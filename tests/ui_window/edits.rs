@@ -174,7 +174,7 @@ fn one_more_photo_is_segmented_and_that_is_taken_back() {
     let layout = &mut w.harness.state_mut().layout;
     (layout.finding.max_seeds, layout.finding.encoder) = (1, Some("none".into()));
     w.ask(Action::FindObjects);
-    w.until("objects", |a| said(a, "objects and parts found"));
+    w.until("objects", |a| said(a, " found"));
     w.ask(Action::Change(Edit::Rename(1, "crate".into())));
     w.until("the name", |a| name(a, 1) == "crate");
     w.ask(Action::SegmentPhoto);

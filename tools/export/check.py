@@ -196,20 +196,49 @@ def check_video(folder, report):
             check_conditioned(tracker, report, tensors, track)
 
 
+# Largest difference of the embeddings after memory attention, as of everything in a track. Memories are kept in bfloat16:
+# a number that lies at the border of two of its values falls to either side by the last bits of float32, which differ
+# between two programs that are both right, and every later frame builds on it. No such flip happens by frame 4 (the
+# difference is 7e-6 there), few by frame 8 (1.3e-3). At frame 11 flips alone make up to 5e-3, as `flips` measures with the
+# graphs themselves, so the bar there is what it measures, and the mean is held to 1e-3.
+CONDITIONED = 2e-3
+
+
 def check_conditioned(tracker, report, tensors, track):
     """Embeddings after memory attention, in the middle of a track."""
-    seen = {}
+    def embeddings(change=None):
+        seen = {}
 
-    def watch(_, o, frame, embeddings):
-        seen.setdefault(frame, []).append(embeddings[0])
-        return embeddings
-    run_track(tracker, {**track, "passes": {"forward": None}}, tensors, watch)
+        def watch(t, o, frame, embeddings):
+            changed = change(t, o, frame, embeddings) if change else embeddings
+            seen.setdefault(frame, []).append(changed[0])
+            return changed
+        run_track(tracker, {**track, "passes": {"forward": None}}, tensors, watch)
+        return {frame: np.stack(found) for frame, found in seen.items()}
+    mine, wrong = embeddings(), embeddings(flipped)
     for frame in (4, 8, 11):
-        got, expected = np.stack(seen[frame]).astype(float), tensors[f"first.conditioned{frame}"]
-        # Memories are kept in 16 bits: where one falls on the other side of a rounding, a few numbers move by some
-        # thousandths. The mean tells, as for memories themselves.
-        error = float(np.abs(got - expected).mean() / np.abs(expected).mean())
-        report.holds(f"track first: embeddings after memory attention, frame {frame}", error, error < 1e-3, "mean error")
+        got, expected = mine[frame], tensors[f"first.conditioned{frame}"]
+        what = f"track first: embeddings after memory attention, frame {frame}"
+        error, bar = relative_error(got, expected), CONDITIONED if frame < 11 else flips(embeddings, mine, frame)
+        report.holds(f"{what}, largest (of {bar:.3g})", error, error < bar)
+        control = relative_error(wrong[frame], expected)
+        report.holds("  control, every memory upside down and mirrored", control, control > 10 * bar)
+        mean = float(np.abs(got.astype(float) - expected).mean() / np.abs(expected).mean())
+        report.holds(f"{what}, mean", mean, mean < 1e-3, "mean error")
+
+
+def flips(embeddings, mine, frame):
+    """The largest difference that roundings make which fall to the other side: memories are moved by 1e-5 of themselves, as
+    much as two right programs differ, before they are rounded; the largest of four tries."""
+    kept, largest = tracking.to_bfloat16, 0.0
+    try:
+        for seed in range(4):
+            rng = np.random.default_rng(seed)
+            tracking.to_bfloat16 = lambda v: kept(v * (1 + rng.uniform(-1e-5, 1e-5, v.shape).astype(np.float32)))
+            largest = max(largest, relative_error(embeddings()[frame], mine[frame]))
+    finally:
+        tracking.to_bfloat16 = kept
+    return largest
 
 
 def check_automatic(folder, report):

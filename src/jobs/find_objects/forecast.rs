@@ -2,7 +2,7 @@
 
 use crate::io::memory;
 use crate::jobs::models::{ModelEntry, ModelList};
-use crate::math::format;
+use crate::math::format::{self, things};
 use crate::models::catalog;
 use crate::models::engine::engine;
 
@@ -10,33 +10,53 @@ use crate::models::engine::engine;
 const MEASURED_CORES: usize = 2;
 const MOST_CORES: usize = 8;
 
-/// How long a segmenter looks at one photo here, estimated from times measured elsewhere.
+/// How long a segmenter looks at one photo here, or an encoder at one picture of an object, estimated from times measured elsewhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LookTime {
     secs: f64,
 }
 
 impl LookTime {
-    /// That of a model of the list if its time was measured.
-    pub(crate) fn of(segmenter: &str, known: &ModelList) -> Option<Self> {
-        Self::estimated(&known.get(segmenter)?.0, known.is_fast, known.cores)
+    /// That of a model of the list if its time was measured, by the engine that is here or by the fast one.
+    pub(crate) fn of(model: &str, known: &ModelList, is_fast: bool) -> Option<Self> {
+        Self::estimated(&known.get(model)?.0, is_fast, known.cores)
     }
 
     /// The same for work that has no list at hand.
-    pub(super) fn of_installed(segmenter: &str) -> Option<Self> {
-        let entry = catalog::entry(segmenter).ok()?;
+    pub(super) fn of_installed(model: &str) -> Option<Self> {
+        let entry = catalog::entry(model).ok()?;
         Self::estimated(&entry, engine().ok()?.is_fast(), memory::cores())
     }
 
     fn estimated(entry: &ModelEntry, is_fast: bool, cores: usize) -> Option<Self> {
         let measured = entry.photo_seconds?;
         let secs = if is_fast { measured.onnx_runtime } else { measured.built_in? };
-        Some(Self { secs: secs * MEASURED_CORES as f64 / cores.clamp(1, MOST_CORES) as f64 })
+        Some(Self { secs: on_cores(secs, cores) })
     }
 
-    pub(crate) fn text(self) -> String {
-        format!("{} a photo here, by estimate", format::about(self.secs))
+    /// For one `what`: a photo, a picture of an object.
+    pub(crate) fn text(self, what: &str) -> String {
+        let time = if self.secs < 5.0 { format::seconds(self.secs) } else { format::about(self.secs) };
+        format!("{time} {what} here, by estimate")
     }
+}
+
+/// How long following masks through so many photos takes with a network of this name, if that was measured.
+pub(super) fn tracking(tracker: &str, photos: usize) -> Option<String> {
+    let entry = catalog::entry(tracker).ok()?;
+    let seconds = entry.track_seconds.filter(|_| engine().is_ok_and(|e| e.is_fast()))?;
+    let [look, follow] = seconds.map(|s| format::about(on_cores(s, memory::cores()) * photos as f64));
+    Some(format!(
+        "{} looks at {} first ({look}), then follows each mask through them ({follow} a mask), by estimate. What is done \
+         is kept if you stop it.",
+        entry.title,
+        things(photos, "photo")
+    ))
+}
+
+/// What took so many seconds where times are measured takes with other cores.
+fn on_cores(secs: f64, cores: usize) -> f64 {
+    secs * MEASURED_CORES as f64 / cores.clamp(1, MOST_CORES) as f64
 }
 
 /// How long finding takes where up to `most_photos` are looked at.

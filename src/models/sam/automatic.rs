@@ -113,14 +113,17 @@ pub fn everything(
     let mut collector = MaskCollector { size, side, fit, options, found: Vec::new() };
     for (done, (crop, layer)) in boxes.iter().enumerate() {
         let (w, h) = (crop[2] - crop[0], crop[3] - crop[1]);
+        let share = |of_crop: f64| (done as f64 + of_crop) / boxes.len() as f64;
+        if !go_on(share(0.0)) {
+            break;
+        }
         network.look(&cut(picture, crop))?;
         let per_side = (options.points_per_side / options.crop_point_divisor.max(1).pow(*layer)).max(1);
         let points = grid(per_side);
         let scale = in_square(network, [w, h]);
         let mut of_crop = Vec::new();
         for (k, batch) in points.chunks(options.batch.max(1)).enumerate() {
-            let share = (done as f64 + (k * options.batch) as f64 / points.len() as f64) / boxes.len() as f64;
-            if !go_on(share) {
+            if !go_on(share((k * options.batch) as f64 / points.len() as f64)) {
                 return Ok(collector.finish(boxes.len() > 1));
             }
             // The point, and the empty one that marks the absence of a box.

@@ -4,6 +4,7 @@
 //! [`Sam2`] holds the five networks; [`track`] is the memory: which earlier frames an object is
 //! compared with, forward and backward.
 
+pub mod sequence;
 pub mod track;
 
 use std::path::{Path, PathBuf};

@@ -3,15 +3,13 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use super::sequence::{Afresh, FrameSource, History, ObjectId, Output, TrackStep};
 use super::{Decoded, EncodedFrame, Sam2};
 use crate::math::grid::regions;
 use crate::math::resize::{Filter, resize};
 use crate::models::ModelError;
 use crate::models::network::Tensor;
-use crate::scene::{Mask, PhotoPixels};
-
-/// The caller's number of an object.
-pub type ObjectId = u32;
+use crate::scene::Mask;
 
 /// What marks an object in a frame.
 #[derive(Clone, Debug, PartialEq)]
@@ -27,19 +25,6 @@ pub enum Prompt {
     Mask(Mask),
 }
 
-/// An object in a frame.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Output {
-    /// Low-resolution logits, `[1, 1, S/4, S/4]`; the object is where they are positive.
-    pub logits: Tensor,
-    /// What points to it, `[1, C]`.
-    pub pointer: Tensor,
-    /// Logit of it being there at all.
-    pub score: f32,
-    /// What is remembered of it.
-    pub memory: Option<Tensor>,
-}
-
 /// What is known of one object, by frame.
 #[derive(Clone, Debug, Default)]
 struct Known {
@@ -51,41 +36,6 @@ struct Known {
     passed: BTreeMap<usize, bool>,
     /// Prompted frames that a pass had gone over before.
     corrections: BTreeSet<usize>,
-}
-
-/// The frames of a sequence, as the encoder sees them: all in memory, or from a cache on disk.
-pub trait FrameSource {
-    /// How many there are.
-    fn len(&self) -> usize;
-
-    /// Whether there are none.
-    fn is_empty(&self) -> bool {
-        self.len() == 0
-    }
-
-    /// One of them.
-    fn get(&mut self, model: &mut Sam2, index: usize) -> Result<EncodedFrame, ModelError>;
-}
-
-/// Frames that are kept in memory.
-#[derive(Clone, Debug, Default)]
-pub struct InMemory(pub Vec<EncodedFrame>);
-
-impl InMemory {
-    /// Looks at all pictures.
-    pub fn of(model: &mut Sam2, pictures: &[PhotoPixels]) -> Result<Self, ModelError> {
-        pictures.iter().map(|p| model.encode(p)).collect::<Result<_, _>>().map(Self)
-    }
-}
-
-impl FrameSource for InMemory {
-    fn len(&self) -> usize {
-        self.0.len()
-    }
-
-    fn get(&mut self, _: &mut Sam2, index: usize) -> Result<EncodedFrame, ModelError> {
-        self.0.get(index).cloned().ok_or(ModelError::NoPicture)
-    }
 }
 
 /// A sequence and the objects in it.
@@ -312,6 +262,16 @@ impl<'a> Track<'a> {
     pub fn run(
         &mut self,
         backward: bool,
+        seen: impl FnMut(usize, &BTreeMap<ObjectId, Output>) -> bool,
+    ) -> Result<(), ModelError> {
+        self.resume(backward, &mut Afresh, seen)
+    }
+
+    /// The same with what was followed before it was stopped.
+    pub fn resume(
+        &mut self,
+        backward: bool,
+        history: &mut dyn History,
         mut seen: impl FnMut(usize, &BTreeMap<ObjectId, Output>) -> bool,
     ) -> Result<(), ModelError> {
         self.settle()?;
@@ -323,13 +283,12 @@ impl<'a> Track<'a> {
             true => Vec::new(),
         };
         for frame in order {
-            let image = self.frames.get(self.model, frame)?;
             let ids: Vec<ObjectId> = self.objects.keys().copied().collect();
             let mut found = BTreeMap::new();
             for id in ids {
                 let out = match self.objects[&id].prompted.get(&frame) {
                     Some(out) => out.clone(),
-                    None => self.follow(&image, id, frame, backward)?,
+                    None => self.follow(TrackStep { object: id, frame, backward }, history)?,
                 };
                 self.objects.entry(id).or_default().passed.insert(frame, backward);
                 found.insert(id, out);
@@ -341,19 +300,21 @@ impl<'a> Track<'a> {
         Ok(())
     }
 
-    fn follow(
-        &mut self,
-        image: &EncodedFrame,
-        id: ObjectId,
-        frame: usize,
-        backward: bool,
-    ) -> Result<Output, ModelError> {
-        let embeddings = self.recall(image, id, frame, backward)?;
-        let three = self.may_be_three(false, 0);
-        let mut out = self.decode(image, &embeddings, &[], None, three)?;
-        out.memory = Some(self.model.remember(image, &out.logits, out.score, false)?);
-        self.fill(&mut out.logits);
-        self.objects.entry(id).or_default().followed.insert(frame, out.clone());
+    fn follow(&mut self, step: TrackStep, history: &mut dyn History) -> Result<Output, ModelError> {
+        let out = match history.earlier(step) {
+            Some(out) => out,
+            None => {
+                let image = self.frames.get(self.model, step.frame)?;
+                let embeddings = self.recall(&image, step.object, step.frame, step.backward)?;
+                let three = self.may_be_three(false, 0);
+                let mut out = self.decode(&image, &embeddings, &[], None, three)?;
+                out.memory = Some(self.model.remember(&image, &out.logits, out.score, false)?);
+                self.fill(&mut out.logits);
+                history.keep(step, &out);
+                out
+            }
+        };
+        self.objects.entry(step.object).or_default().followed.insert(step.frame, out.clone());
         Ok(out)
     }
 }

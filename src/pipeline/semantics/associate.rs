@@ -4,7 +4,7 @@ use super::segmenter::FoundMask;
 use super::view_map::ViewMap;
 use super::votes::UNKNOWN;
 use crate::scene::findings::Disagreement;
-use crate::scene::{Identities, IdentityId, Level, Mask, NOBODY};
+use crate::scene::{Identities, IdentityId, Level, NOBODY};
 
 /// Share of an identity's visible pixels, and of a mask's known pixels, that must be the same.
 const SAME: f64 = 0.5;
@@ -19,20 +19,40 @@ pub(crate) enum Link {
     Split(IdentityId),
 }
 
+/// Pixels of a view, or of a piece of it, by what they belong to.
+struct PixelCounts {
+    /// Those of each identity and its pieces, by number.
+    of: Vec<usize>,
+    /// Those of which something is known.
+    known: usize,
+}
+
+impl PixelCounts {
+    fn new(map: &ViewMap, identities: &Identities, pixels: impl Iterator<Item = usize>) -> Self {
+        let (mut of, mut known) = (vec![0; identities.len() + 1], 0);
+        for id in pixels.map(|i| map.identity[i]).filter(|id| *id != UNKNOWN) {
+            known += 1;
+            of.get_mut(id as usize).into_iter().for_each(|count| *count += 1);
+        }
+        // A whole's number is smaller than its pieces'.
+        for (id, identity) in (1..of.len()).rev().filter_map(|id| Some((id, identities.get(id as IdentityId)?))) {
+            if identity.parent != NOBODY {
+                of[identity.parent as usize] += of[id];
+            }
+        }
+        Self { of, known }
+    }
+}
+
 /// Compares the masks of a photo with what is `known` of its view. A part can only be a piece of
 /// what its whole is. A mask with the name of an identity of the same whole is that identity, however
 /// little of it has been seen; others must overlap with theirs.
 pub(crate) fn link(found: &[FoundMask], known: Option<&ViewMap>, identities: &Identities) -> Vec<Link> {
     let Some(map) = known else { return vec![Link::New; found.len()] };
-    let (w, h) = (map.width_px, map.height_px);
-    let anything = Mask::from_fn(w, h, |i| map.identity[i] != UNKNOWN);
-    let visible: Vec<Option<Mask>> =
-        identities.iter().map(|(id, _)| Some(map.mask(identities, id)).filter(|m| !m.is_empty())).collect();
-    let fit = |mask: &Mask, id: IdentityId| -> Option<f64> {
-        let seen = visible[id as usize - 1].as_ref()?;
-        let overlap = mask.overlap(seen);
-        let (of_seen, of_known) =
-            (overlap as f64 / seen.area() as f64, overlap as f64 / mask.overlap(&anything).max(1) as f64);
+    let visible = PixelCounts::new(map, identities, 0..map.identity.len());
+    let fit = |inside: &PixelCounts, id: IdentityId| -> Option<f64> {
+        let [overlap, seen] = [inside, &visible].map(|counts| counts.of[id as usize]);
+        let (of_seen, of_known) = (overlap as f64 / seen as f64, overlap as f64 / inside.known.max(1) as f64);
         (overlap >= LEAST_PX && of_seen >= SAME && of_known >= SAME).then_some(of_seen * of_known)
     };
     let mut links: Vec<Link> = Vec::with_capacity(found.len());
@@ -61,7 +81,8 @@ pub(crate) fn link(found: &[FoundMask], known: Option<&ViewMap>, identities: &Id
         // Who has another name is somebody else.
         let nameless = |id: &IdentityId| mask.name.is_none() || identities.get(*id).is_some_and(|i| i.names.is_empty());
         let fits = candidates.into_iter().filter(nameless);
-        let fits = fits.filter_map(|id| Some((id, fit(&mask.mask, id)?)));
+        let inside = PixelCounts::new(map, identities, mask.mask.pixels());
+        let fits = fits.filter_map(|id| Some((id, fit(&inside, id)?)));
         let best = fits.max_by(|a, b| a.1.total_cmp(&b.1));
         let Some((id, score)) = best else {
             links.push(Link::New);
@@ -93,15 +114,16 @@ pub(crate) fn disagreements(
     let mut list = Vec::new();
     // What has a mask of its own in this photo is told apart, wherever it was thought to be.
     let has_mask = |id: IdentityId| links.contains(&Link::Known(id));
+    let visible = PixelCounts::new(known, identities, 0..known.identity.len());
     for (mask, link) in found.iter().zip(links) {
         if let Link::Split(of) = link {
             list.push(Disagreement::Split(*of));
         }
         let peers = identities.iter().filter(|(_, i)| i.level == mask.level);
+        let within = PixelCounts::new(known, identities, mask.mask.pixels());
         let inside = |id: IdentityId| {
-            let seen = known.mask(identities, id);
-            let overlap = mask.mask.overlap(&seen);
-            overlap >= LEAST_PX && overlap as f64 >= SAME * seen.area() as f64
+            let [overlap, seen] = [&within, &visible].map(|counts| counts.of[id as usize]);
+            overlap >= LEAST_PX && overlap as f64 >= SAME * seen as f64
         };
         let covered: Vec<IdentityId> = peers.map(|(id, _)| id).filter(|id| inside(*id)).collect();
         // A part of a part is no peer of its whole.
@@ -123,6 +145,7 @@ pub(crate) fn disagreements(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Mask;
 
     fn mask(from: usize, to: usize) -> Mask {
         Mask::from_fn(100, 1, |i| (from..to).contains(&i))
@@ -130,6 +153,22 @@ mod tests {
 
     fn found(level: Level, parent: Option<usize>, mask: Mask) -> FoundMask {
         FoundMask { level, parent, name: None, mask }
+    }
+
+    #[test]
+    fn a_whole_counts_the_pixels_of_its_pieces_and_the_unknown_count_for_nobody() {
+        let mut all = Identities::default();
+        let pot = all.add(Level::Object, NOBODY, vec![]);
+        let lid = all.add(Level::Part, pot, vec![]);
+        all.add(Level::Part, lid, vec![]);
+        let map = ViewMap::certain(10, vec![0, 1, 2, 2, 3, 3, 3, UNKNOWN, UNKNOWN, 9]);
+        let counts = PixelCounts::new(&map, &all, 0..10);
+        assert_eq!((&counts.of[1..], counts.known), (&[6, 5, 3][..], 8));
+        let inside = PixelCounts::new(&map, &all, [3, 4, 7].into_iter());
+        assert_eq!((&inside.of[1..], inside.known), (&[2, 2, 1][..], 2));
+        for id in 1..=3 {
+            assert_eq!(counts.of[id as usize], map.mask(&all, id).area(), "as the mask of {id} has it");
+        }
     }
 
     #[test]

@@ -1,13 +1,15 @@
 //! Language features of identities: an encoder looks at each in the photos that show it best.
 
 use std::collections::{BTreeSet, HashMap};
+use std::time::Instant;
 
 use super::error::FindError;
 use super::relevancy::deviate;
 use super::view_map::ViewMap;
 use crate::io;
+use crate::math::format::{self, things};
 use crate::models::{Encoder, IdentityCrop, ModelError};
-use crate::pipeline::observer::{Observer, Ticker};
+use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::language::MAX_VIEWS;
 use crate::scene::{
@@ -18,6 +20,8 @@ use crate::scene::{
 const MAX_SIDE_PX: u32 = 1_024;
 /// Longer side of the views in which visibility is counted, px.
 const COUNT_SIDE_PX: u32 = 256;
+/// Tiles that are looked at between two looks at whether to go on.
+const TILES_AT_ONCE: usize = 8;
 /// Pixels of such a view that must show an identity for it to be looked at.
 const LEAST_PX: usize = 12;
 
@@ -54,16 +58,35 @@ pub(crate) fn embed(
     }
     let mut order: Vec<usize> = wanted.keys().copied().collect();
     order.sort_unstable();
-    for (done, photo) in order.iter().enumerate() {
+    let whole_of = |id: IdentityId| {
+        let whole = map.identities.object_of(id);
+        let is_part = map.identities.get(id).is_some_and(|i| i.level == Level::Part);
+        Some(whole).filter(|whole| is_part && *whole != id)
+    };
+    // Parts are compared with what their whole looks like in the same photo.
+    let shown = |photo: &usize| -> BTreeSet<IdentityId> {
+        wanted[photo].iter().flat_map(|id| [Some(*id), whole_of(*id)]).flatten().collect()
+    };
+    let mut ticker = Ticker::new("Embedding objects and parts", order.iter().map(|photo| shown(photo).len()).sum());
+    let (mut done, mut told, start) = (0, false, Instant::now());
+    for photo in &order {
         let pixels = io::photo::load(&photos[*photo], MAX_SIDE_PX)?;
         let view = looker.draw(&photos[*photo], MAX_SIDE_PX)?;
         let mut eye = Eye { rgb: to_float(&pixels), view, identities: &map.identities, looked: HashMap::new() };
-        let whole_of = |id: IdentityId| {
-            let whole = map.identities.object_of(id);
-            let is_part = map.identities.get(id).is_some_and(|i| i.level == Level::Part);
-            Some(whole).filter(|whole| is_part && *whole != id)
-        };
-        eye.look(wanted[photo].iter().flat_map(|id| [Some(*id), whole_of(*id)]).flatten(), encoder)?;
+        let shown: Vec<IdentityId> = shown(photo).into_iter().collect();
+        for ids in shown.chunks(TILES_AT_ONCE) {
+            eye.look(ids, encoder)?;
+            done += ids.len();
+            ticker.tick(done, observer)?;
+            // The first tiles prepare the network; those after them tell what all will take.
+            let secs = start.elapsed().as_secs_f64() * ticker.total as f64 / done as f64;
+            if !told && done > TILES_AT_ONCE {
+                told = true;
+                let all = things(ticker.total as usize, "picture");
+                let text = format!("{name} looks at {all} of objects and parts: {}", format::about(secs));
+                observer.note(Severity::Info, text);
+            }
+        }
         for &id in &wanted[photo] {
             let Some(raw) = eye.seen(id) else { continue };
             let whole = whole_of(id).and_then(|whole| eye.seen(whole));
@@ -72,7 +95,6 @@ pub(crate) fn embed(
             features.raw.push(raw);
             features.deviated.push(deviated);
         }
-        ticker.tick(done + 1, observer)?;
     }
     Ok(LanguageFeatures { encoder: name, dimension, by_identity: of })
 }
@@ -102,15 +124,14 @@ struct Eye<'a> {
 }
 
 impl Eye<'_> {
-    fn look(&mut self, ids: impl Iterator<Item = IdentityId>, encoder: &mut dyn Encoder) -> Result<(), ModelError> {
-        let ids: BTreeSet<IdentityId> = ids.collect();
+    fn look(&mut self, ids: &[IdentityId], encoder: &mut dyn Encoder) -> Result<(), ModelError> {
         let tile = |id: &IdentityId| {
             let mask: Mask = self.view.mask(self.identities, *id);
             let own_side = mask.bounds().map_or(0, |b| b.x.len().max(b.y.len()));
             Some((*id, IdentityCrop::cut(&self.rgb, &mask, encoder.tile_side_px().unwrap_or(own_side))?))
         };
         let (ids, tiles): (Vec<IdentityId>, Vec<IdentityCrop>) = ids.iter().filter_map(tile).unzip();
-        self.looked = ids.into_iter().zip(encoder.images(&tiles)?).collect();
+        self.looked.extend(ids.into_iter().zip(encoder.images(&tiles)?));
         Ok(())
     }
 

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::error::FindError;
-use super::sam2_tracker::kept_name;
+use super::kept_frames::{kept_name, written};
 use super::segmenter::{FoundMask, Segmenter};
 use crate::io::labels::rle::Rle;
 use crate::io::{atomic, files};
@@ -45,9 +45,8 @@ impl KeptMasks {
     }
 
     fn file(&self, photo: &Photo, max_side_px: u32) -> PathBuf {
-        let written = std::fs::metadata(&photo.path).and_then(|m| m.modified()).ok();
         let asked = format!("{} {max_side_px}", self.digest);
-        self.folder.join(kept_name((self.inner.name(), &asked), photo, written)).with_extension("masks.json")
+        self.folder.join(kept_name((self.inner.name(), &asked), photo, written(photo))).with_extension("masks.json")
     }
 }
 

@@ -25,7 +25,9 @@ pub(crate) mod filters;
 mod floaters;
 #[cfg(test)]
 mod heart;
+pub mod kept_frames;
 pub(crate) mod kept_masks;
+mod kept_track;
 pub mod localize;
 pub mod matching;
 pub(crate) mod names;
@@ -40,7 +42,7 @@ pub(crate) mod reading;
 pub mod recipe;
 pub mod regions;
 pub mod relevancy;
-pub mod sam2_tracker;
+pub(crate) mod sam2_tracker;
 pub mod segmenter;
 pub(crate) mod splat_tree;
 pub(crate) mod thumbnails;

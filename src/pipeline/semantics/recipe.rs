@@ -152,6 +152,15 @@ pub enum Rejection {
 }
 
 impl Rejection {
+    /// In words: "something is always found".
+    pub(crate) fn told(self) -> &'static str {
+        match self {
+            Self::Never => "something is always found",
+            Self::Canonical => "not found if a canonical phrase is nearer",
+            Self::Strict => "not found if a canonical phrase is nearer, by a margin, or the color is another",
+        }
+    }
+
     /// Score from which something may be the answer, where it usually is from `usual`.
     pub(crate) fn threshold(self, usual: f32) -> f32 {
         if self == Self::Never { 0.0 } else { usual }
@@ -337,7 +346,7 @@ impl fmt::Display for Recipe {
         write!(
             f,
             "recipe {name}: by {}, strategy {}, deviation {} (part weight {part_weight}), canonical phrases {}, \
-             temperature {}, relevancy {}, match {} within {:.0}/255, not found {}, lifting {lifting}",
+             temperature {}, relevancy {}, match {} within {:.0}/255, {}, lifting {lifting}",
             self.understanding,
             self.strategy,
             self.parts,
@@ -346,7 +355,7 @@ impl fmt::Display for Recipe {
             self.scale,
             self.masks,
             255.0 * self.tolerance,
-            self.rejection,
+            self.rejection.told(),
         )?;
         prompt.map_or(Ok(()), |prompt| write!(f, ", SAM 2 prompted by {prompt}"))
     }

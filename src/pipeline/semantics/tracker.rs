@@ -21,7 +21,8 @@ use super::splat_tree::hierarchy::Hierarchy;
 use super::train_codes::{CODE_SIDE_PX, CodeView};
 use super::view_map::ViewMap;
 use super::votes::{Assignment, UNKNOWN, Votes};
-use crate::pipeline::observer::{Observer, Severity, Ticker};
+use crate::math::format::things;
+use crate::pipeline::observer::{Observer, Severity, Ticker, begin};
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::findings::{Disagreement, Doubt, Findings, PhotoFinding, Seen};
 use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY, Photo};
@@ -122,31 +123,34 @@ pub(crate) fn track(
         encode_secs = follower.encode_secs;
         follow_secs = start.elapsed().as_secs_f64() - encode_secs;
     }
-    let views = loop {
-        let of = t.decided();
-        let views = t.look(seeds.len(), &of, observer)?;
-        let needy =
-            views.iter().filter(|v| !tried[v.photo] && (options.keep_masks || v.unknown > options.reseed_share));
-        let needy = needy.filter(|v| segmenter.covers(&photos[v.photo]));
-        let next = needy.max_by(|a, b| a.unknown.total_cmp(&b.unknown)).map(|v| v.photo);
-        let Some(next) = next.filter(|_| seeds.len() < options.max_seeds) else { break views };
+    let mut views = t.look(&t.decided(), observer)?;
+    while seeds.len() < options.max_seeds {
+        let is_open = |v: &ViewReport| {
+            let is_needy = options.keep_masks || v.unknown > options.reseed_share;
+            !tried[v.photo] && is_needy && segmenter.covers(&photos[v.photo])
+        };
+        let Some(next) = t.most_unknown(&mut views, is_open, observer)? else { break };
         tried[next] = true;
         if t.seed(next, segmenter, observer)?.is_some() {
             seeds.push(next);
         }
-    };
+    }
+    if seeds.len() > 1 {
+        views = t.look(&t.decided(), observer)?;
+    }
     let said = t.votes.clone();
     if options.by_photos {
         t.complete(&views, observer)?;
     }
     let mut assignments = if options.by_tree {
+        begin("Grouping Gaussians", observer)?;
         let cameras: Vec<_> = photos.iter().map(|p| p.camera.clone()).collect();
         let tree = Hierarchy::new(cloud, &cameras, settings, observer)?;
         tree.label(&said, &t.votes, &t.identities, LEAST_VOTES)
     } else {
         t.votes.decide(&t.identities, LEAST_VOTES)
     };
-    let views = t.look(seeds.len() + 1, &identities_of(&assignments), observer)?;
+    let views = t.look(&identities_of(&assignments), observer)?;
     extend(cloud, &mut assignments, options.hidden_steps);
     drop_floaters(cloud, &t.identities, &mut assignments);
     if let Some(map) = &options.known {
@@ -158,6 +162,8 @@ pub(crate) fn track(
             }
         }
     }
+    let told = Disagreement::told(&t.disagreements, |i| photos[i].name.clone(), |id| t.identities.full_name(id));
+    told.into_iter().for_each(|text| observer.note(Severity::Warning, text));
     let carry_secs = start.elapsed().as_secs_f64() - t.segment_secs - encode_secs - follow_secs;
     let secs = vec![
         ("segment", t.segment_secs),
@@ -220,12 +226,15 @@ impl Tracker<'_> {
         observer: &mut dyn Observer,
     ) -> Result<Option<Seeded>, FindError> {
         let start = Instant::now();
+        let name = &self.photos[photo].name;
+        begin(format!("Finding masks in {name}"), observer)?;
         let found = segmenter.segment(&self.photos[photo], self.options.max_side_px, observer);
         self.segment_secs += start.elapsed().as_secs_f64();
         let found = found?;
         if found.is_empty() {
             return Ok(None);
         }
+        begin(format!("Comparing the {} of {name} with what is known", things(found.len(), "mask")), observer)?;
         let known = if self.identities.is_empty() { None } else { Some(self.map(photo, self.options.max_side_px)?) };
         let links = link(&found, known.as_ref(), &self.identities);
         let stays = known.as_ref().filter(|_| self.options.known.is_some());
@@ -238,8 +247,6 @@ impl Tracker<'_> {
         if let Some(known) = &known {
             let told = disagreements(&found, &links, known, &self.identities);
             for what in told.into_iter().filter(|d| stays.is_none() || !matches!(d, Disagreement::Split(_))) {
-                let told = what.text(|id| self.identities.full_name(id));
-                observer.note(Severity::Warning, format!("{}: {told}", self.photos[photo].name));
                 self.disagreements.push((photo, what));
             }
         }

@@ -8,12 +8,16 @@ use egui_kittest::kittest::Queryable;
 
 use super::*;
 use crate::jobs::OpenedScene;
+use crate::jobs::find_objects::FindSettings;
 use crate::jobs::models::{ModelList, ModelState};
 use crate::models::catalog;
 use crate::navigate::testing::cloud_of_wall;
 use crate::pipeline::observer::Observer;
-use crate::scene::{Dataset, SemanticMap};
+use crate::pipeline::semantics::build_map::Carry;
+use crate::pipeline::semantics::recipe::Recipe;
+use crate::scene::{Dataset, Preparation, SemanticMap};
 use crate::ui::actions::Action;
+use crate::ui::find_dialog::FindDialog;
 use crate::worker::Outcome;
 use crate::worker::{Command, Jobs};
 use crate::worker::{Failure, Stop};
@@ -54,10 +58,12 @@ impl Jobs for Told {
                 Outcome::Models(Arc::new(ModelList {
                     engine: None,
                     is_fast: true,
+                    is_settled: true,
                     cores: 2,
                     note: None,
                     folder: "models".into(),
                     models,
+                    arrived: [("clip-vit-b16".to_owned(), 200)].into(),
                 }))
             }
             Command::InstallModel { id, .. } => {
@@ -120,6 +126,29 @@ fn what_is_missing_is_downloaded_one_after_the_other_and_then_the_search_begins(
     assert_eq!(said.len(), 3, "{said:?}");
     let [first, second] = [0, 1].map(|i| said[i].strip_prefix("download ").expect("a download"));
     assert_eq!(said[2], format!("find by {first} and {second}"), "with what was proposed and nothing else");
+}
+
+#[test]
+fn what_has_arrived_of_a_download_is_said_and_need_not_come_again() {
+    let harness = asked(Told::default());
+    assert!(harness.query_by_label_contains("399 MB more, 200 MB are here already").is_some());
+    assert!(harness.query_by_label_contains("Download 440 MB.").is_some(), "with MobileSAM's 41");
+}
+
+#[test]
+fn the_next_search_follows_the_recipe_on_screen_once_that_is_changed() {
+    let (mut dialog, mut finding) = (FindDialog::default(), FindSettings::default());
+    finding.preparation.part_weight = 0.4;
+    dialog.follow_recipe(Preparation::default(), &mut finding);
+    assert_eq!(finding.preparation.part_weight, 0.4, "nobody has changed the recipe");
+    let paper = Recipe::paper().preparation;
+    dialog.follow_recipe(paper, &mut finding);
+    assert_eq!((finding.preparation, finding.carry), (paper, Carry::Sam2));
+    finding.carry = Carry::Both;
+    dialog.follow_recipe(Preparation { part_weight: 0.5, ..paper }, &mut finding);
+    assert_eq!((finding.preparation.part_weight, finding.carry), (0.5, Carry::Both));
+    dialog.follow_recipe(Preparation::default(), &mut finding);
+    assert_eq!((finding.preparation, finding.carry), (Preparation::default(), Carry::Gaussians));
 }
 
 #[test]

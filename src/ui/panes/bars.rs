@@ -180,12 +180,11 @@ pub(crate) fn status(
             Some(job) => {
                 dot(ui, if job.paused { theme::warning() } else { theme::accent() });
                 // Once is enough: the pane and the first page have their own.
-                if state.scene.is_some() && !(state.is_training() && layout.shows(Pane::Training)) {
+                if !job.canceling && state.scene.is_some() && !(state.is_training() && layout.shows(Pane::Training)) {
                     job_buttons(ui, job, actions);
                 }
-                let title = if job.paused { format!("{} (paused)", job.title) } else { job.title.clone() };
-                ui.label(RichText::new(title).strong());
-                if let Some(p) = job.progress.as_ref().filter(|_| state.scene.is_some()) {
+                ui.label(RichText::new(job.text()).strong());
+                if let Some(p) = job.progress.as_ref().filter(|_| state.scene.is_some() && !job.canceling) {
                     progress(ui, p, job);
                 }
             }
@@ -231,13 +230,16 @@ fn dot(ui: &mut Ui, color: egui::Color32) {
 }
 
 fn progress(ui: &mut Ui, p: &Progress, job: &RunningJob) {
-    let paused = job.paused;
+    let Some(counted) = p.counted() else {
+        if !job.paused {
+            ui.add(egui::Spinner::new().size(12.0));
+        }
+        ui.label(RichText::new(format!("{}\u{2026}", p.stage)).color(theme::weak()));
+        return;
+    };
     let fraction = p.done as f32 / p.total.max(1) as f32;
-    let fill = if paused { theme::warning() } else { theme::accent() };
+    let fill = if job.paused { theme::warning() } else { theme::accent() };
     ui.add(egui::ProgressBar::new(fraction).desired_width(140.0).desired_height(6.0).fill(fill));
-    let mut parts = vec![format!("{} of {}", format::count(p.done), format::count(p.total))];
-    if let Some(secs) = job.left_secs.filter(|_| !paused) {
-        parts.push(format!("{} left", format::about(secs)));
-    }
-    ui.label(RichText::new(format!("{}  {}", p.stage, parts.join("  ·  "))).color(theme::weak()));
+    let left = job.left_secs.filter(|_| !job.paused).map(|secs| format!("  ·  {} left", format::about(secs)));
+    ui.label(RichText::new(format!("{}  {counted}{}", p.stage, left.unwrap_or_default())).color(theme::weak()));
 }

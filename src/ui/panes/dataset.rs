@@ -88,13 +88,12 @@ impl PhotoThumbnails {
         worker: &Worker,
         actions: &mut Vec<Action>,
     ) {
-        let Some(dataset) = state.scene.as_ref().and_then(|s| s.dataset.as_ref()) else {
+        let Some((scene, dataset)) = state.scene.as_ref().and_then(|s| Some((s, s.dataset.as_ref()?))) else {
             ui.weak("This scene has no photos.");
             return;
         };
-        let (train, test) = dataset.split(layout.config.holdout_every);
-        facts(ui, dataset, train.len(), test.len());
-        let test: BTreeSet<usize> = test.into_iter().collect();
+        let test: BTreeSet<usize> = scene.held_out(layout.config.holdout_every).into_iter().collect();
+        facts(ui, dataset, dataset.photos.len() - test.len(), test.len());
         let scores: HashMap<&str, f64> = state
             .history
             .evaluations

@@ -198,16 +198,16 @@ fn busy(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
     ui.vertical_centered(|ui| {
         ui.add_space((ui.available_height() * 0.4).max(20.0));
         ui.set_max_width(380.0);
-        ui.label(RichText::new(&job.title).size(20.0));
+        ui.label(RichText::new(job.text()).size(20.0));
         ui.add_space(10.0);
         // The page has the color that a bar's track has elsewhere.
         ui.visuals_mut().extreme_bg_color = theme::surface();
-        match &job.progress {
-            Some(p) => {
+        match job.progress.as_ref().and_then(|p| Some((p, p.counted()?))) {
+            Some((p, counted)) => {
                 let fraction = p.done as f32 / p.total.max(1) as f32;
                 ui.add(ProgressBar::new(fraction).desired_height(8.0).fill(theme::accent()));
                 let left = job.left_secs.map_or_else(String::new, |s| format!("  ·  {} left", format::about(s)));
-                let text = format!("{}  {} of {}{left}", p.stage, format::count(p.done), format::count(p.total));
+                let text = format!("{}  {counted}{left}", p.stage);
                 ui.label(RichText::new(text).color(theme::weak()));
             }
             None => {

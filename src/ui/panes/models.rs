@@ -7,7 +7,7 @@ use super::super::theme;
 use crate::jobs::find_objects::FindSettings;
 use crate::jobs::models::{ModelEntry, ModelList, ModelRole, ModelState, SAM2};
 use crate::pipeline::semantics::build_map::{Carry, REGIONS};
-use crate::scene::Lifting;
+use crate::scene::{Lifting, MaskPrompt};
 use crate::ui::actions::Action;
 use crate::worker::{Command, Worker};
 
@@ -100,6 +100,21 @@ fn choose(ui: &mut Ui, known: &ModelList, finding: &mut FindSettings) {
         });
         combo.response.accessible_name("Codes");
         ui.end_row();
+        let prepared = &mut finding.preparation;
+        ui.weak("SAM 2 prompt");
+        ui.add_enabled_ui(finding.carry != Carry::Gaussians, |ui| {
+            ui.horizontal(|ui| {
+                let prompt = prepared.prompt.get_or_insert_default();
+                ui.selectable_value(prompt, MaskPrompt::Mask, "mask");
+                ui.selectable_value(prompt, MaskPrompt::Points, "points drawn from it");
+            });
+        });
+        ui.end_row();
+        ui.weak("Part weight w");
+        ui.add(egui::DragValue::new(&mut prepared.part_weight).range(0.0..=1.0).speed(0.01))
+            .accessible_name("Part weight")
+            .on_hover_text("Share of its own embedding that a part keeps in semantic deviation.");
+        ui.end_row();
         ui.weak("Photos");
         ui.add(egui::DragValue::new(&mut finding.max_seeds).range(1..=100_000).suffix(" max."))
             .accessible_name("Photos with masks")
@@ -115,14 +130,15 @@ fn one_of(ui: &mut Ui, id: &str, chosen: &mut Option<String>, models: &[(String,
     let title =
         |id: &str| models.iter().find(|(m, _)| m == id).map_or_else(|| format!("{id} (missing)"), |m| m.1.clone());
     let text = chosen.as_deref().map_or_else(|| BEST.to_owned(), title);
-    let combo = egui::ComboBox::from_id_salt(id).selected_text(text).width(180.0);
+    // A long title is cut, not the pane widened.
+    let combo = egui::ComboBox::from_id_salt(id).selected_text(&text).width(180.0).truncate();
     let shown = combo.show_ui(ui, |ui| {
         ui.selectable_value(chosen, None, BEST);
         for (id, title) in models {
             ui.selectable_value(chosen, Some(id.clone()), title);
         }
     });
-    shown.response
+    shown.response.on_hover_text(text)
 }
 
 fn one(ui: &mut Ui, entry: &ModelEntry, model: &ModelState, idle: bool, actions: &mut Vec<Action>) {

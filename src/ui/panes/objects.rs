@@ -15,7 +15,7 @@ use super::object_thumbnails::ObjectThumbnails;
 use crate::math::format::things;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
-use crate::scene::{Identities, IdentityId, Level, NOBODY};
+use crate::scene::{Identities, IdentityId, NOBODY};
 use crate::ui::actions::Action;
 
 /// Side of a thumbnail, points.
@@ -62,10 +62,8 @@ impl ObjectsPane {
             return show_how_to_begin(ui, state, actions);
         };
         let identities = &map.identities;
-        let count = |level: Level| identities.iter().filter(|(_, i)| i.level == level).count();
-        let from = if map.seeds.len() == 1 { "1 photo".to_owned() } else { format!("{} photos", map.seeds.len()) };
         let doubts = map.findings.as_ref().map_or(0, |f| f.doubts().len());
-        ui.weak(format!("{} objects, {} parts, from the masks of {from}", count(Level::Object), count(Level::Part)));
+        ui.weak(format!("{}, from the masks of {}", identities.counted(), things(map.seeds.len(), "photo")));
         if doubts > 0 {
             let link = ui.link(RichText::new(format!("{} where photos disagreed", things(doubts, "doubt"))));
             if link.on_hover_text("Put what they are about first in the list").clicked() {

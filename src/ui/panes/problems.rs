@@ -15,7 +15,7 @@ pub(crate) fn show(ui: &mut Ui, state: &mut AppState) {
     }
     let bar =
         Frame::new().fill(theme::panel().lerp_to_gamma(theme::warning(), 0.16)).inner_margin(Margin::symmetric(10, 6));
-    let mut dismissed = None;
+    let (mut dismissed, mut all) = (None, false);
     Panel::top("problems").frame(bar).show(ui, |ui| {
         for (i, (_, text)) in state.problems.iter().enumerate().take(MOST) {
             ui.horizontal(|ui| {
@@ -31,10 +31,16 @@ pub(crate) fn show(ui: &mut Ui, state: &mut AppState) {
         }
         let more = state.problems.len().saturating_sub(MOST);
         if more > 0 {
-            ui.label(RichText::new(format!("{more} more in the log")).small().color(theme::weak()));
+            ui.horizontal(|ui| {
+                ui.label(RichText::new(format!("{more} more in the log")).small().color(theme::weak()));
+                all = ui.add(Button::new("Dismiss all").small()).clicked();
+            });
         }
     });
     if let Some(i) = dismissed {
         state.problems.remove(i);
+    }
+    if all {
+        state.problems.clear();
     }
 }

@@ -17,11 +17,22 @@ pub struct RunningJob {
     pub(crate) left_secs: Option<f64>,
     /// Whether it waits.
     pub paused: bool,
+    /// Whether it was asked to end, and has not yet.
+    pub canceling: bool,
 }
 
 impl RunningJob {
     pub(super) fn begun(id: JobId, kind: JobKind, title: String) -> Self {
-        Self { id, kind, title, progress: None, left_secs: None, paused: false }
+        Self { id, kind, title, progress: None, left_secs: None, paused: false, canceling: false }
+    }
+
+    /// What it is called, and whether it waits or is about to end.
+    pub(crate) fn text(&self) -> String {
+        match (self.canceling, self.paused) {
+            (true, _) => format!("{}: canceling\u{2026}", self.title),
+            (_, true) => format!("{} (paused)", self.title),
+            _ => self.title.clone(),
+        }
     }
 
     pub(super) fn goes_on(&mut self, progress: Progress) {
@@ -32,6 +43,8 @@ impl RunningJob {
                 let expected = left - step;
                 Some((expected + (now - expected) * (1.0 - (-step.max(0.0) / FORECAST_SECS).exp())).max(0.0))
             }
+            // All is done of what is counted, or nothing is counted.
+            _ if progress.done >= progress.total => None,
             (now, before) => now.or(before.map(|(_, left)| left)),
         };
     }
@@ -61,5 +74,7 @@ mod tests {
         assert!((job.left_secs.expect("known") - 2_790.0).abs() < 60.0, "{:?}", job.left_secs);
         job.goes_on(Progress { stage: "Saving".into(), ..at(0, 0.5, 100.0) });
         assert_eq!(job.left_secs, Some(30.0), "another stage begins anew");
+        job.goes_on(Progress { stage: "Saving".into(), ..at(3_000, 30.5, 100.0) });
+        assert_eq!(job.left_secs, None, "what is done leaves nothing");
     }
 }

@@ -30,7 +30,7 @@ impl Viewport {
         let eye = self.overlay_camera(rect);
         let size = 0.09 * scene.home.bounds.radius();
         let held_out: std::collections::HashSet<usize> =
-            dataset.split(layout.config.holdout_every).1.into_iter().collect();
+            scene.held_out(layout.config.holdout_every).into_iter().collect();
         let cursor = response.hover_pos().filter(|pos| rect.contains(*pos));
         let place = |p: DVec2| rect.min + egui::vec2(p.x as f32, p.y as f32);
         let nearest = cursor.and_then(|cursor| {

@@ -115,7 +115,7 @@ pub(crate) fn compared(base: &Recipe) -> Vec<(String, Recipe)> {
     }
     for rejection in [Rejection::Never, Rejection::Canonical, Rejection::Strict] {
         for (title, recipe) in [("default", Recipe::default()), ("paper", Recipe::paper())] {
-            all.push((format!("recipe {title}, not found {rejection}"), Recipe { rejection, ..recipe }));
+            all.push((format!("recipe {title}, rejects {rejection}"), Recipe { rejection, ..recipe }));
         }
     }
     all

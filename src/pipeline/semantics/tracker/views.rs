@@ -3,7 +3,7 @@
 use super::super::error::FindError;
 use super::super::view_map::ViewMap;
 use super::Tracker;
-use crate::pipeline::observer::{Observer, Ticker};
+use crate::pipeline::observer::{Observer, Ticker, begin};
 use crate::scene::IdentityId;
 
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -28,21 +28,45 @@ impl Tracker<'_> {
     /// Who is seen in the photos, where this is whose each Gaussian is.
     pub(super) fn look(
         &mut self,
-        round: usize,
         of: &[IdentityId],
         observer: &mut dyn Observer,
     ) -> Result<Vec<ViewReport>, FindError> {
-        let mut ticker = Ticker::new(format!("Propagating identities to all views, round {round}"), self.photos.len());
+        let mut ticker = Ticker::new("Looking what is known in each photo", self.photos.len());
         observer.proceed()?;
-        // To see how much is unknown, small pictures will do.
-        let side = self.options.max_side_px.min(256);
         let mut views = Vec::with_capacity(self.photos.len());
         for photo in 0..self.photos.len() {
-            let map = self.map_of(photo, side, of)?;
-            views.push(report(photo, &map, self.identities.len()));
+            views.push(self.look_at(photo, of)?);
             ticker.tick(photo + 1, observer)?;
         }
         Ok(views)
+    }
+
+    fn look_at(&mut self, photo: usize, of: &[IdentityId]) -> Result<ViewReport, FindError> {
+        // To see how much is unknown, small pictures will do.
+        let map = self.map_of(photo, self.options.max_side_px.min(256), of)?;
+        Ok(report(photo, &map, self.identities.len()))
+    }
+
+    /// Of the views that are open, the photo of which most is unknown by now. Masks make things known, hardly ever
+    /// unknown, so a view that was known better before than another one is now need not be looked at again.
+    pub(super) fn most_unknown(
+        &mut self,
+        views: &mut [ViewReport],
+        is_open: impl Fn(&ViewReport) -> bool,
+        observer: &mut dyn Observer,
+    ) -> Result<Option<usize>, FindError> {
+        let of = self.decided();
+        let mut fresh = vec![false; views.len()];
+        loop {
+            let open = views.iter().enumerate().filter(|(_, v)| is_open(v));
+            let Some((i, _)) = open.max_by(|a, b| a.1.unknown.total_cmp(&b.1.unknown)) else { return Ok(None) };
+            if fresh[i] {
+                return Ok(Some(views[i].photo));
+            }
+            begin("Looking where most is still unknown", observer)?;
+            views[i] = self.look_at(views[i].photo, &of)?;
+            fresh[i] = true;
+        }
     }
 }
 

@@ -8,7 +8,7 @@ use super::Queries;
 use crate::pipeline::semantics::recipe::{
     CanonicalPhrases, PartFeatures, Recipe, RecipeName, Rejection, RelevancyScale, Strategy, Understanding,
 };
-use crate::scene::SemanticMap;
+use crate::scene::{Lifting, MaskPrompt, SemanticMap};
 
 impl Queries {
     /// How queries are answered in the view that is worked in.
@@ -71,6 +71,27 @@ fn choices(ui: &mut Ui, recipe: &mut Recipe) {
             .accessible_name("Temperature");
         ui.end_row();
         canonical(ui, &mut recipe.canonical);
+        ui.weak("When objects are found");
+        ui.weak("(for the next search)");
+        ui.end_row();
+        let prepared = &mut recipe.preparation;
+        one_of(ui, "Codes", Lifting::VARIANTS, &mut prepared.lifting);
+        ui.weak("Part weight w");
+        ui.add(egui::DragValue::new(&mut prepared.part_weight).range(0.0..=1.0).speed(0.01))
+            .accessible_name("Part weight w")
+            .on_hover_text("Share of its own embedding that a part keeps in semantic deviation");
+        ui.end_row();
+        ui.weak("Masks carried by");
+        ui.horizontal(|ui| {
+            for (prompt, text) in [
+                (None, "Gaussians"),
+                (Some(MaskPrompt::Mask), "SAM 2, by mask"),
+                (Some(MaskPrompt::Points), "by points"),
+            ] {
+                ui.selectable_value(&mut prepared.prompt, prompt, text);
+            }
+        });
+        ui.end_row();
     });
 }
 

@@ -1,0 +1,53 @@
+//! Which photos a scene was not trained on.
+
+use crate::io::trained::SceneCamera;
+use crate::scene::Dataset;
+
+/// The photos of `dataset` that a scene with these `cameras` was not trained on, or every `every`-th if that is
+/// given. By name, where the scene says which: the dataset may have gained or lost photos since, and settings
+/// may have changed; by `default_every` where it does not.
+pub(crate) fn held_out(
+    dataset: &Dataset,
+    cameras: &[SceneCamera],
+    every: Option<usize>,
+    default_every: usize,
+) -> Vec<usize> {
+    if every.is_some() || cameras.is_empty() {
+        return dataset.split(every.unwrap_or(default_every)).1;
+    }
+    let held = |name: &str| cameras.iter().any(|c| c.held_out && c.name == name);
+    (0..dataset.photos.len()).filter(|&i| held(&dataset.photos[i].name)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::PathBuf;
+
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::{Camera, Photo};
+
+    #[test]
+    fn a_scene_says_by_name_which_photos_it_has_not_seen() {
+        let photo = |name: &str| {
+            Photo::new(
+                name,
+                PathBuf::new(),
+                Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid"),
+            )
+        };
+        let trained_on = Dataset { photos: ["a", "b", "c", "d"].map(photo).to_vec(), ..Dataset::default() };
+        let held = [0, 2];
+        let seen = |(i, p): (usize, &Photo)| SceneCamera {
+            name: p.name.clone(),
+            camera: p.camera.clone(),
+            held_out: held.contains(&i),
+        };
+        let cameras: Vec<SceneCamera> = trained_on.photos.iter().enumerate().map(seen).collect();
+        let now = Dataset { photos: ["b", "c", "d", "e"].map(photo).to_vec(), ..Dataset::default() };
+        assert_eq!(held_out(&now, &cameras, None, 2), [1], "a is gone, b and d were trained on, e is new");
+        assert_eq!(held_out(&now, &cameras, Some(2), 9), [0, 2], "somebody wants otherwise");
+        assert_eq!(held_out(&now, &[], None, 2), [0, 2], "a splat says nothing");
+    }
+}
