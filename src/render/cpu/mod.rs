@@ -21,11 +21,14 @@ pub(crate) mod surfel;
 pub(crate) mod validate;
 pub(crate) mod walk;
 
+use std::sync::Arc;
+
 use self::contributions::ContributionSink;
 use self::project_backward::GaussianGradient;
 use self::rasterizer::CpuRasterizer;
 use self::splat::Splats;
 use self::surfel::Surfels;
+use super::lod::Cut;
 use super::{CloudGradient, Features, Frame, FrameGradient, MAX_CHANNELS, RenderError, RenderSettings};
 use crate::math::Real;
 use crate::math::finite::{NotFinite, all_finite};
@@ -79,6 +82,11 @@ impl<R: Real> CpuRenderer<R> {
         Self::default()
     }
 
+    /// Draws only this of clouds that it fits, from now on; `None` draws all. No gradients go back through a cut.
+    pub(crate) fn limit_to(&mut self, cut: Option<Arc<Cut<R>>>) {
+        self.splats.cut = cut;
+    }
+
     /// Bytes of working memory that it keeps for the next frame.
     pub(crate) fn working_bytes(&self) -> usize {
         self.splats.working_bytes() + self.surfels.as_ref().map_or(0, |s| s.working_bytes())
@@ -112,7 +120,10 @@ impl<R: Real> CpuRenderer<R> {
         }
         if settings.surfels {
             let settings = RenderSettings { keep_order: false, ..settings.clone() };
-            return Ok(self.surfels.get_or_insert_default().render(cloud, features, camera, &settings)?);
+            let cut = self.splats.cut.clone();
+            let surfels = self.surfels.get_or_insert_default();
+            surfels.cut = cut;
+            return Ok(surfels.render(cloud, features, camera, &settings)?);
         }
         self.surfels = None;
         Ok(self.splats.render(cloud, features, camera, settings)?)

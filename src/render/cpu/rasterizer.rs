@@ -1,5 +1,6 @@
 //! Forward and backward pass of one kind of primitive, with the buffers between the stages.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -15,6 +16,7 @@ use super::walk::{Primitive, TileRow, Values};
 use super::{RenderStats, validate};
 use crate::math::finite::{CHECKED, NotFinite};
 use crate::math::{Real, sh};
+use crate::render::lod::Cut;
 use crate::render::{Features, Frame, FrameGradient, MAX_CHANNELS, RenderSettings, TILE_PX};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
@@ -32,6 +34,8 @@ pub(crate) struct CpuRasterizer<R, P> {
     /// Sums of the backward pass, for each tile entry.
     pub(crate) records: Vec<R>,
     frame: Option<FrameInfo<R, P>>,
+    /// What is drawn of clouds that it fits, instead of all of them.
+    pub(crate) cut: Option<Arc<Cut<R>>>,
     /// What the last frame cost.
     pub(crate) stats: RenderStats,
 }
@@ -81,7 +85,7 @@ struct FrameInfo<R, P> {
 impl<R: Real, P> Default for CpuRasterizer<R, P> {
     fn default() -> Self {
         let (lists, pixels) = (Lists::default(), Pixels::default());
-        Self { lists, pixels, splat_of: Vec::new(), records: Vec::new(), frame: None, stats: RenderStats::default() }
+        Self { lists, pixels, splat_of: Vec::new(), records: Vec::new(), frame: None, cut: None, stats: RenderStats::default() }
     }
 }
 
@@ -124,20 +128,23 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
         settings: &RenderSettings,
     ) -> Result<(FrameInfo<R, P>, [f64; 3]), NotFinite> {
         self.frame = None;
+        let cut = self.cut.as_deref().filter(|cut| cut.fits(cloud));
         let extra = features.channels;
         let channels = P::padded(P::channels(extra, settings.depth));
         let view = CameraView::new(camera, cloud.origin, settings.near);
         let Lists { parts, ordered, tiles } = &mut self.lists;
         let mut clock = Instant::now();
         let primitive = P::new(&view, settings);
-        project(parts, DrawInput { cloud, features, settings }, &view, primitive, channels);
+        project(parts, DrawInput { cloud, features, settings, cut }, &view, primitive, channels);
         let project = lap(&mut clock);
-        sort::sort(ordered, parts, P::SHAPE + channels, settings.keep_order);
+        // Nodes that stand for the same Gaussian cannot be told apart from picture to picture.
+        let keep_order = settings.keep_order && cut.is_none();
+        sort::sort(ordered, parts, P::SHAPE + channels, keep_order);
         let sort = lap(&mut clock);
         bin::bin(tiles, &ordered.splats, view.size);
         if CHECKED {
             validate::projected(parts)?;
-            validate::ordered(ordered, !settings.keep_order)?;
+            validate::ordered(ordered, !keep_order)?;
             validate::binned(tiles, ordered.splats.len())?;
         }
         let settings = settings.clone();
@@ -345,7 +352,7 @@ pub(crate) fn project<R: Real, P: Primitive<R>>(
     primitive: P,
     channels: usize,
 ) {
-    let n = scene.cloud.len();
+    let n = scene.len();
     parts.resize_with(n.div_ceil(CHUNK), Chunk::default);
     parts.par_iter_mut().enumerate().for_each(|(c, part)| {
         part.splats.clear();
@@ -364,9 +371,10 @@ fn project_chunk<R: Real, P: Primitive<R>>(
     channels: usize,
     range: std::ops::Range<usize>,
 ) {
-    let DrawInput { cloud, features, settings } = scene;
-    let degree = settings.sh_degree.min(cloud.sh_degree);
-    for i in range {
+    let DrawInput { features, settings, .. } = scene;
+    for k in range {
+        let (cloud, i, stands_for) = scene.of(k);
+        let degree = settings.sh_degree.min(cloud.sh_degree);
         // Cheap tests first: most Gaussians of a scene are outside the picture.
         let relative = view.relative(cloud.positions[i]);
         if !(dot(view.rows[2], relative) > view.near) {
@@ -385,12 +393,13 @@ fn project_chunk<R: Real, P: Primitive<R>>(
                 continue;
             }
         };
-        splat.gaussian = i as u32;
+        splat.gaussian = stands_for;
         let basis = sh::basis(degree, direction(relative));
         let first = part.values.len();
         part.values.extend_from_slice(shape.as_ref());
         part.values.extend_from_slice(&color(gaussian.sh, &basis, degree));
-        part.values.extend_from_slice(&features.values[i * features.channels..(i + 1) * features.channels]);
+        let own = stands_for as usize * features.channels;
+        part.values.extend_from_slice(&features.values[own..own + features.channels]);
         if settings.depth {
             part.values.extend_from_slice(depth.as_ref());
         }
