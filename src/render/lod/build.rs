@@ -18,6 +18,12 @@ const TOGETHER: f64 = 0.01;
 /// Nodes that are made at once.
 const AT_ONCE: usize = 1 << 14;
 
+/// Standard deviation of colors at which a node counts with its true size; of one color it counts as a third of that,
+/// as nobody sees what it is made of.
+const CONTRAST: f64 = 0.1;
+const FLAT: f64 = 0.1;
+const COLORFUL: f64 = 3.0;
+
 /// Something that is beneath nothing yet: its place on the curve and its number.
 type Item = (u64, u32);
 
@@ -28,14 +34,14 @@ impl<R: Real> LodTree<R> {
         let merged = GaussianCloud { origin: cloud.origin, sh_degree: degree, ..GaussianCloud::default() };
         let mut tree = Self { leaves: cloud.len(), merged, ..Self::default() };
         let mut items = along_the_curve(cloud);
-        let mut weights = Vec::new();
+        let mut known = Vec::new();
         for shift in first_shift(&items)..=3 * BITS {
             if !proceed() {
                 return None;
             }
             let (groups, rest) = grouped(&items, shift, tree.leaves + tree.nodes.len());
             // Bounded, as what is merged takes more memory than what comes out.
-            groups.chunks(AT_ONCE).for_each(|groups| tree.add(cloud, &mut weights, &items, groups));
+            groups.chunks(AT_ONCE).for_each(|groups| tree.add(cloud, &mut known, &items, groups));
             items = rest;
         }
         tree.roots = items.into_iter().map(|(_, number)| number).collect();
@@ -46,15 +52,17 @@ impl<R: Real> LodTree<R> {
     fn add(
         &mut self,
         cloud: &GaussianCloud<R>,
-        weights: &mut Vec<f64>,
+        weighed: &mut Vec<(f64, f64)>,
         items: &[Item],
         groups: &[std::ops::Range<usize>],
     ) {
         let known = &*self;
         let of = |number: u32| match (number as usize).checked_sub(known.leaves) {
             None => Part::of(cloud, number as usize),
-            Some(node) => Part::of(&known.merged, node)
-                .map(|part| Part { weight: weights[node], reach: f64::from(known.nodes[node].reach), ..part }),
+            Some(node) => {
+                let ((weight, contrast), reach) = (weighed[node], f64::from(known.nodes[node].reach));
+                Part::of(&known.merged, node).map(|part| Part { weight, reach, contrast, ..part })
+            }
         };
         let made = |group: &std::ops::Range<usize>| {
             let beneath = &items[group.clone()];
@@ -66,7 +74,8 @@ impl<R: Real> LodTree<R> {
         let made: Vec<_> = groups.par_iter().map(made).collect();
         for ((merged, color, heaviest), group) in made.into_iter().zip(groups) {
             let Merged { part, log_scale, quaternion, opacity_logit, .. } = merged;
-            let (size, reach) = (log_scale.x.exp() as f32, part.reach.min(f64::from(f32::MAX)) as f32);
+            let size = (log_scale.x.exp() * roughness(part.contrast)) as f32;
+            let reach = part.reach.min(f64::from(f32::MAX)) as f32;
             let (first, count) = (self.children.len() as u32, group.len() as u32);
             self.nodes.push(Node { size, reach, first, count, heaviest });
             self.children.extend(items[group.clone()].iter().map(|item| item.1));
@@ -75,7 +84,7 @@ impl<R: Real> LodTree<R> {
             self.merged.quaternions.push(quaternion.map(R::of));
             self.merged.opacity_logits.push(R::of(opacity_logit));
             self.merged.sh.extend(&color[..self.merged.sh_stride()]);
-            weights.push(part.weight);
+            weighed.push((part.weight, part.contrast));
         }
     }
 
@@ -99,6 +108,11 @@ impl<R: Real> LodTree<R> {
         }
         sum.map(|c| c.map(R::of))
     }
+}
+
+/// By how much larger a node counts for the colors within it.
+fn roughness(contrast: f64) -> f64 {
+    (FLAT + contrast.sqrt() / CONTRAST).clamp(FLAT, COLORFUL).sqrt()
 }
 
 /// All Gaussians along the Z-order curve, in voxels that are cubes.

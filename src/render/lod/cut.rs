@@ -10,7 +10,7 @@ use crate::math::Real;
 use crate::scene::Camera;
 
 /// Standard deviation in px under which nothing is gained by drawing finer Gaussians: the low-pass filter's is larger.
-const FINEST_PX: f64 = 0.2;
+pub(super) const FINEST_PX: f64 = 0.2;
 /// Nothing is drawn coarser than this, however many Gaussians that takes.
 const COARSEST_PX: f64 = 64.0;
 /// A cut that reaches this share of its budget is fine enough.

@@ -3,6 +3,7 @@
 use glam::{DMat3, DQuat, DVec3};
 
 use crate::math::rotation::matrix_from_quaternion;
+use crate::math::sh::SH_C0;
 use crate::math::{Real, eigen};
 use crate::scene::GaussianCloud;
 
@@ -13,6 +14,10 @@ const LOG_SCALES: [f64; 2] = [-60.0, 60.0];
 /// Opacities that logits of single precision hold.
 const OPACITIES: [f64; 2] = [1e-6, 1.0 - 1e-6];
 
+/// By how much the area of what is merged grows at most, where it was covered more than once: at its edges a Gaussian
+/// lets light through that the many did not.
+const WIDEST: f64 = 1.7;
+
 /// What is merged.
 #[derive(Clone, Copy)]
 pub(super) struct Part {
@@ -22,15 +27,18 @@ pub(super) struct Part {
     pub(super) weight: f64,
     /// How far from the mean it can be seen.
     pub(super) reach: f64,
+    /// Its color without what depends on the direction, as it is shown.
+    pub(super) color: DVec3,
+    /// Variance of such colors within it, mean over the channels.
+    pub(super) contrast: f64,
 }
 
 /// How large a Gaussian looks from a direction nobody knows: for a disk its area, for a ball nearly twice that.
 fn area(covariance: &DMat3) -> f64 {
-    let (trace, square) = (DVec3::new(covariance.x_axis.x, covariance.y_axis.y, covariance.z_axis.z), *covariance);
-    let sum = trace.element_sum();
-    let squares: f64 = square.to_cols_array().iter().map(|v| v * v).sum();
+    let trace = covariance.x_axis.x + covariance.y_axis.y + covariance.z_axis.z;
+    let squares: f64 = covariance.to_cols_array().iter().map(|v| v * v).sum();
     // The sum of the products of two eigenvalues each.
-    (0.5 * (sum * sum - squares)).max(0.0).sqrt()
+    (0.5 * (trace * trace - squares)).max(0.0).sqrt()
 }
 
 impl Part {
@@ -43,7 +51,9 @@ impl Part {
         let half = turn * DMat3::from_diagonal(scale);
         let covariance = half * half.transpose();
         let weight = cloud.opacity_logits[i].f64().sigmoid() * area(&covariance);
-        let part = Self { mean, covariance, weight, reach: VISIBLE * scale.max_element() };
+        let color = DVec3::from_array(cloud.gaussian(i).sh[0].map(Real::f64)) * SH_C0;
+        let reach = VISIBLE * scale.max_element();
+        let part = Self { mean, covariance, weight, reach, color, contrast: 0.0 };
         (mean.is_finite() && covariance.is_finite() && weight.is_finite()).then_some(part)
     }
 }
@@ -71,16 +81,20 @@ pub(super) fn merge(parts: &[Option<Part>]) -> Merged {
     let mean: DVec3 = each().map(|(p, share)| p.mean * share).sum();
     let outer = |d: DVec3| DMat3::from_cols(d * d.x, d * d.y, d * d.z);
     let covariance = each().fold(DMat3::ZERO, |sum, (p, share)| sum + (p.covariance + outer(p.mean - mean)) * share);
+    let cover = total / area(&covariance);
+    let covariance = covariance * cover.clamp(1.0, WIDEST);
     let (values, axes) = eigen::axes(&covariance);
     let [least, most] = LOG_SCALES;
     let log_scale = values.map(|v| (0.5 * v.max(f64::MIN_POSITIVE).ln()).clamp(least, most));
     let [thin, opaque] = OPACITIES;
-    let opacity = (total / area(&covariance)).clamp(thin, opaque);
+    let opacity = cover.clamp(thin, opaque);
     let opacity = if opacity.is_nan() { thin } else { opacity };
     let turn = DQuat::from_mat3(&axes);
     let reach = each().fold(VISIBLE * values.x.max(0.0).sqrt(), |m, (p, _)| m.max(p.mean.distance(mean) + p.reach));
+    let color: DVec3 = each().map(|(p, share)| p.color * share).sum();
+    let contrast = each().map(|(p, share)| (p.contrast + (p.color - color).length_squared() / 3.0) * share).sum();
     Merged {
-        part: Part { mean, covariance, weight: total, reach },
+        part: Part { mean, covariance, weight: total, reach, color, contrast },
         log_scale,
         quaternion: [turn.w, turn.x, turn.y, turn.z],
         opacity_logit: (opacity / (1.0 - opacity)).ln(),

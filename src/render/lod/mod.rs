@@ -8,11 +8,14 @@
 mod build;
 mod cut;
 mod merge;
+mod pace;
 mod sample;
 #[cfg(test)]
 mod tests;
 
 use std::sync::Arc;
+
+pub(crate) use self::pace::Pace;
 
 use crate::math::Real;
 use crate::scene::GaussianCloud;
@@ -34,7 +37,7 @@ pub(crate) struct LodTree<R = f32> {
 /// What a cut asks of a node.
 #[derive(Clone, Copy, Debug)]
 struct Node {
-    /// Standard deviation of its Gaussian along the longest axis, scene units.
+    /// Standard deviation of its Gaussian along the longest axis, scene units, more for many colors and less for one.
     size: f32,
     /// No Gaussian beneath it can be seen farther from its center.
     reach: f32,
