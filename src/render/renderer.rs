@@ -54,7 +54,7 @@ pub enum DrawError {
     Gpu(#[from] GpuError),
 }
 
-/// Stages of a picture on the CPU, in their order.
+/// Stages of a picture on the CPU, as they are timed.
 const STAGES: [&str; 4] = ["project", "sort", "bin", "blend"];
 
 /// Seconds of a picture: the part that every Gaussian has at any size, and that of the pixels.

@@ -1,7 +1,7 @@
 //! The CPU renderer: at `f64` the oracle that every kernel and gradient is compared with, at `f32`
 //! (tile-parallel, eight pixels a register) the fast path where there is no GPU.
 //!
-//! Stages, one file each: [`project`], [`sort`], [`bin`], [`blend`]; backward: [`blend_backward`],
+//! Stages, one file each: [`project`], [`bin`], [`sort`], [`blend`]; backward: [`blend_backward`],
 //! [`mod@project_backward`]; [`walk`] is the way through a tile that they share. What is drawn is a
 //! [`walk::Primitive`]: [`splat`] or [`surfel`]. Results do not depend on the number of threads.
 
@@ -13,6 +13,7 @@ pub(crate) mod contributions;
 pub mod normals;
 pub mod project;
 pub(crate) mod project_backward;
+mod project_chunk;
 pub(crate) mod rasterizer;
 pub(crate) mod sort;
 pub(crate) mod splat;
@@ -94,7 +95,7 @@ impl<R: Real> CpuRenderer<R> {
 
     /// The Gaussians of the last frame, front to back, and their depths.
     pub fn drawn(&self) -> impl Iterator<Item = (usize, R)> {
-        last!(self, r => r.splats()).iter().map(|s| (s.gaussian as usize, s.depth))
+        last!(self, r => r.splats()).into_iter().map(|s| (s.gaussian as usize, s.depth))
     }
 
     /// What the last frame cost.

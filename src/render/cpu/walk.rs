@@ -3,11 +3,10 @@
 //!
 //! Pixels are taken in lanes of eight; lane group `g` of row `row` of a tile is its slot `g * TILE_PX + row`.
 
-use std::sync::atomic::Ordering::Relaxed;
-
 use super::bin::Tiles;
-use super::project::{CameraView, Projected, Splat};
+use super::project::{CameraView, Chunk, Projected, Splat};
 use super::project_backward::GaussianGradient;
+use super::sort::part_of;
 use crate::math::Real;
 use crate::math::lanes::{LANES, Lane, LaneOp, Lanes};
 use crate::render::{Frame, FrameGradient, RenderSettings, TILE_PX};
@@ -237,9 +236,7 @@ pub(crate) fn ramp<R: Real, L: Lanes<R>>(l: L) -> L::V {
 /// A row of tiles of a frame.
 pub(crate) struct TileRow<'a, R, P> {
     pub(crate) primitive: P,
-    pub(crate) splats: &'a [Splat<R>],
-    /// Shape and channels of each.
-    pub(crate) values: &'a [R],
+    pub(crate) parts: &'a [Chunk<R>],
     pub(crate) tiles: &'a Tiles,
     /// Picture size in px.
     pub(crate) size: [usize; 2],
@@ -275,7 +272,7 @@ pub(crate) trait Sink<R: Real, P: Primitive<R>, L: Lanes<R>> {
     /// What is needed of one splat.
     type Own;
     /// The splat `id`, at this place of the tile's list, counted from 1.
-    fn own(&self, l: L, id: usize, place: usize) -> Self::Own;
+    fn own(&self, l: L, id: u32, place: usize) -> Self::Own;
     /// Weight of the splat in the pixels of a slot, and their transmittance before and after it.
     fn add(&mut self, l: L, slot: usize, own: &Self::Own, hit: &P::Hit<L>, light: [L::V; 3]);
 }
@@ -293,11 +290,18 @@ impl<R: Real, P: Primitive<R>> TileRow<'_, R, P> {
         }
     }
 
-    /// The shape and the channels of splat `id`.
+    /// The splat at `place`.
     #[inline(always)]
-    pub(crate) fn values_of<const C: usize>(&self, id: usize) -> (&[R], &[R]) {
-        let stride = P::SHAPE + C;
-        self.values[id * stride..][..stride].split_at(P::SHAPE)
+    pub(crate) fn splat(&self, place: u32) -> &Splat<R> {
+        let (part, i) = part_of(place);
+        &self.parts[part].splats[i]
+    }
+
+    /// Its shape and its channels.
+    #[inline(always)]
+    pub(crate) fn values_of<const C: usize>(&self, place: u32) -> (&[R], &[R]) {
+        let (stride, (part, i)) = (P::SHAPE + C, part_of(place));
+        self.parts[part].values[i * stride..][..stride].split_at(P::SHAPE)
     }
 
     /// Walks over a tile front to back, until every pixel is closed. Returns the transmittance that is left and
@@ -322,9 +326,9 @@ impl<R: Real, P: Primitive<R>> TileRow<'_, R, P> {
         let all = slots_of_rows(tile.size[1]);
         let mut alive = all;
         let mut groups = 0_u64;
-        for (k, entry) in self.tiles.entries[tile.entries.clone()].iter().enumerate() {
-            let id = entry.load(Relaxed) as usize;
-            let s = &self.splats[id];
+        for (k, entry) in tile.entries.clone().enumerate() {
+            let id = self.tiles.splat(entry);
+            let s = self.splat(id);
             let reach = Reach::new(l, s, tile.corner, ramp);
             let mut slots = reach.slots & alive;
             if slots == 0 {

@@ -15,7 +15,7 @@ mod tests;
 
 use std::sync::Arc;
 
-pub(crate) use self::pace::Pace;
+pub(crate) use self::pace::{MOVING_SECS, Pace};
 
 use crate::math::Real;
 use crate::scene::GaussianCloud;

@@ -11,6 +11,10 @@ const FIRST: usize = 60_000;
 const FEWEST: usize = 15_000;
 /// So many are enough for any picture.
 const MOST: usize = 4_000_000;
+/// Seconds that a moving picture may take: thirty a second.
+pub(crate) const MOVING_SECS: f64 = 0.030;
+/// Share of the size of pictures of which something is left out: for the time of all pixels, more Gaussians show more.
+const SCALE: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// By how much a single picture changes the number at most, and the share of the time that is aimed at, as the next
 /// picture may take longer.
 const STEP: f64 = 1.3;
@@ -36,13 +40,23 @@ impl Pace {
     /// What is drawn of a view.
     pub(crate) fn cut(&mut self, tree: &Arc<LodTree>, camera: &Camera, near: f64) -> Cut {
         let cut = Cut::of_budget(tree, camera, near, self.most, &mut self.grain_px);
-        self.full = self.grain_px > FINEST_PX;
+        // Not back and forth where there is just about time for all.
+        self.full = self.grain_px > if self.full { FINEST_PX } else { 2.0 * FINEST_PX };
         cut
     }
 
     /// Whether there are Gaussians that would be seen and for which there is no time.
     pub(crate) fn leaves_out(&self) -> bool {
         self.full
+    }
+
+    /// The camera with pictures of the size that shows most.
+    pub(crate) fn camera(&self, camera: &Camera) -> Camera {
+        if !self.leaves_out() {
+            return camera.clone();
+        }
+        let side = |s: u32| ((f64::from(s) * SCALE).round() as u32).max(1);
+        camera.resized(side(camera.width_px), side(camera.height_px))
     }
 
     /// Takes in how long the last cut took, of the time that there was.

@@ -114,6 +114,11 @@ impl SceneFacts {
         self.with_cloud(cloud, sh_stored, cameras)
     }
 
+    /// Whether there are more Gaussians than a CPU, if one draws, can draw in time.
+    pub(crate) fn is_large(&self) -> bool {
+        self.machine.gpu.is_none() && self.cloud.as_ref().is_some_and(|c| c.gaussians >= LARGE)
+    }
+
     /// With these objects and parts.
     pub fn with_semantics(mut self, map: Option<&SemanticMap>) -> Self {
         self.semantics = map.map(SemanticFacts::of);
@@ -154,6 +159,9 @@ impl SemanticFacts {
         Self { objects: of(Level::Object), parts: of(Level::Part), encoder, numbers }
     }
 }
+
+/// Gaussians from which on a moving picture of all of them is too slow (docs/measured.md, "Large scenes").
+pub(crate) const LARGE: usize = 100_000;
 
 /// Half a step of an 8-bit picture: smaller changes cannot be seen.
 pub const NOISE_FLOOR: f64 = 0.5 / 255.0;
