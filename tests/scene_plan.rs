@@ -21,8 +21,8 @@ use fmlgs::scene::resource_log::{self, ResourceKind};
 use fmlgs::scene::{
     Camera, GaussianCloud, Identities, Level, Limits, Machine, NOBODY, Overrides, SceneFacts, ScenePlan, SemanticMap,
 };
-use fmlgs::worker::{Versioned, ViewMode};
 use fmlgs::worker::view::{QualityBudget, SkipPasses, ViewLane, ViewRequest};
+use fmlgs::worker::{Versioned, ViewMode};
 
 const LIMITS: Limits = Limits { train_side_px: 512, object_side_px: 1_024, sh_degree: 3, holdout_every: 8 };
 

@@ -13,9 +13,7 @@ pub(crate) fn order(cloud: &GaussianCloud) -> Vec<usize> {
     };
     let (min, max) = (ends(f32::min, f32::INFINITY), ends(f32::max, f32::NEG_INFINITY));
     let step = [0, 1, 2].map(|k| f64::from((1 << BITS) - 1) / (f64::from(max[k]) - f64::from(min[k])).max(1e-30));
-    let code = |p: &[f32; 3]| {
-        interleave([0, 1, 2].map(|k| ((f64::from(p[k]) - f64::from(min[k])) * step[k]) as u64))
-    };
+    let code = |p: &[f32; 3]| interleave([0, 1, 2].map(|k| ((f64::from(p[k]) - f64::from(min[k])) * step[k]) as u64));
     let mut all: Vec<(u64, usize)> = cloud.positions.par_iter().map(code).zip(0..cloud.len()).collect();
     all.par_sort_unstable();
     all.into_iter().map(|(_, i)| i).collect()

@@ -9,6 +9,7 @@ pub(crate) mod format;
 pub(crate) mod grid;
 pub(crate) mod lanes;
 pub(crate) mod morton;
+pub(crate) mod prefetch;
 pub(crate) mod real;
 pub mod resize;
 pub mod rotation;

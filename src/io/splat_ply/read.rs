@@ -84,7 +84,10 @@ impl Reading<'_> {
     }
 
     fn check<'n, const N: usize>(&self, values: &[[f32; N]], name: impl Fn(usize) -> &'n str) -> Result<(), IoError> {
-        let Some(index) = values.par_iter().position_first(|v| v.iter().any(|x| !x.is_finite())) else { return Ok(()) };
+        if all_finite(values) {
+            return Ok(());
+        }
+        let index = values.iter().position(|v| v.iter().any(|x| !x.is_finite())).unwrap_or(0);
         let k = values[index].iter().position(|x| !x.is_finite()).unwrap_or(0);
         Err(self.not_finite(index, name(k)))
     }
@@ -155,7 +158,8 @@ impl Reading<'_> {
             }
         }));
         let sh = &to[before..];
-        if let Some(at) = sh.par_iter().position_first(|v| v.iter().any(|x| !x.is_finite())) {
+        if !all_finite(sh) {
+            let at = sh.iter().position(|v| v.iter().any(|x| !x.is_finite())).unwrap_or(0);
             let channel = sh[at].iter().position(|x| !x.is_finite()).unwrap_or(0);
             let name = match at % stride {
                 0 => &dc[channel].name,
@@ -174,4 +178,10 @@ impl Reading<'_> {
             to[k].values.par_extend((0..self.table.rows).into_par_iter().map(|i| column.f32(self.table.row(i))));
         }
     }
+}
+
+/// Whether all numbers are. Without a way out early, so that it is fast where they are.
+fn all_finite<const N: usize>(values: &[[f32; N]]) -> bool {
+    let finite = |part: &[[f32; N]]| part.as_flattened().iter().fold(true, |all, x| all & x.is_finite());
+    values.par_chunks(1 << 12).all(finite)
 }

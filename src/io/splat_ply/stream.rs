@@ -13,7 +13,7 @@ use crate::scene::GaussianCloud;
 /// Bytes in which the header must end.
 const HEADER_BYTES: u64 = 64 << 10;
 /// Bytes of rows that are in memory at once.
-const BLOCK_BYTES: usize = 2 << 20;
+const BLOCK_BYTES: usize = 16 << 20;
 
 /// The id of the scene's state that a `.ply` belongs to, if it says.
 pub(crate) fn state(path: &Path) -> Result<Option<String>, IoError> {

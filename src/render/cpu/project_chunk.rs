@@ -6,6 +6,9 @@ use super::project::{CHUNK, CameraView, Chunk, DrawInput, Projected, color, dire
 use super::walk::Primitive;
 use crate::math::{Real, sh};
 
+/// Gaussians of a cut between fetching one and needing it.
+const AHEAD: usize = 8;
+
 /// Projects the whole cloud, in parts of [`CHUNK`] Gaussians: `P::SHAPE + channels` values per splat, the channels
 /// being color, extra channels, what depth needs, padding zeros.
 pub(crate) fn project<R: Real, P: Primitive<R>>(
@@ -36,6 +39,9 @@ fn project_chunk<R: Real, P: Primitive<R>>(
 ) {
     let DrawInput { features, settings, .. } = scene;
     for k in range {
+        if let Some(cut) = scene.cut {
+            cut.fetch(scene.cloud, k + AHEAD);
+        }
         let (cloud, i, stands_for) = scene.of(k);
         let degree = settings.sh_degree.min(cloud.sh_degree);
         // Cheap tests first: most Gaussians of a scene are outside the picture.

@@ -10,13 +10,13 @@ use super::blend::{BlendRow, RowOut};
 use super::blend_backward::{BlendRowBackward, RowIn};
 use super::contributions::{ContributionRow, ContributionSink};
 use super::project::{CHUNK, CameraView, Chunk, DrawInput, Splat};
-use super::project_chunk::project;
 use super::project_backward::GaussianGradient;
+use super::project_chunk::project;
 use super::sort::{self, KeptOrder};
 use super::walk::{Primitive, TileRow, Values};
 use super::{RenderStats, validate};
-use crate::math::finite::{CHECKED, NotFinite};
 use crate::math::Real;
+use crate::math::finite::{CHECKED, NotFinite};
 use crate::render::lod::Cut;
 use crate::render::{Features, Frame, FrameGradient, MAX_CHANNELS, RenderSettings, TILE_PX};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
@@ -86,7 +86,15 @@ struct FrameInfo<R, P> {
 impl<R: Real, P> Default for CpuRasterizer<R, P> {
     fn default() -> Self {
         let (lists, pixels) = (Lists::default(), Pixels::default());
-        Self { lists, pixels, splat_of: Vec::new(), records: Vec::new(), frame: None, cut: None, stats: RenderStats::default() }
+        Self {
+            lists,
+            pixels,
+            splat_of: Vec::new(),
+            records: Vec::new(),
+            frame: None,
+            cut: None,
+            stats: RenderStats::default(),
+        }
     }
 }
 
@@ -291,7 +299,14 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
         let info = self.frame.as_ref()?;
         let (s, record) = self.record(i, info.stride())?;
         let (part, at) = sort::part_of(s);
-        P::project_backward(gaussian, &self.lists.parts[part].splats[at], &info.view, &info.settings, &record, info.extra)
+        P::project_backward(
+            gaussian,
+            &self.lists.parts[part].splats[at],
+            &info.view,
+            &info.settings,
+            &record,
+            info.extra,
+        )
     }
 
     /// Gradient with respect to the extra channels of Gaussian `i`, after [`Self::backward_tiles`].

@@ -9,6 +9,7 @@ use super::project_backward::GaussianGradient;
 use super::sort::part_of;
 use crate::math::Real;
 use crate::math::lanes::{LANES, Lane, LaneOp, Lanes};
+use crate::math::prefetch::prefetch;
 use crate::render::{Frame, FrameGradient, RenderSettings, TILE_PX};
 use crate::scene::Gaussian;
 
@@ -18,6 +19,8 @@ pub(crate) const GROUPS: usize = TILE_PX / LANES;
 pub(crate) const SLOTS: usize = TILE_PX * GROUPS;
 /// Splats between two looks at which pixels are still open.
 const CLOSED_CHECK: usize = 16;
+/// Splats between fetching one and needing it.
+const AHEAD: usize = 6;
 
 /// A few values of one kind.
 pub(crate) trait Values<V: Copy>: Copy + AsRef<[V]> + AsMut<[V]> {
@@ -304,6 +307,16 @@ impl<R: Real, P: Primitive<R>> TileRow<'_, R, P> {
         self.parts[part].values[i * stride..][..stride].split_at(P::SHAPE)
     }
 
+    /// Has what splat `id` needs fetched.
+    #[inline(always)]
+    fn fetch<const C: usize>(&self, id: u32) {
+        let s = self.splat(id);
+        // It may lie in two lines of the cache.
+        prefetch(&s.mean);
+        prefetch(&s.gaussian);
+        prefetch(&self.values_of::<C>(id).1[0]);
+    }
+
     /// Walks over a tile front to back, until every pixel is closed. Returns the transmittance that is left and
     /// the number of lane groups evaluated.
     #[inline(always)]
@@ -327,6 +340,9 @@ impl<R: Real, P: Primitive<R>> TileRow<'_, R, P> {
         let mut alive = all;
         let mut groups = 0_u64;
         for (k, entry) in tile.entries.clone().enumerate() {
+            if entry + AHEAD < tile.entries.end {
+                self.fetch::<C>(self.tiles.splat(entry + AHEAD));
+            }
             let id = self.tiles.splat(entry);
             let s = self.splat(id);
             let reach = Reach::new(l, s, tile.corner, ramp);

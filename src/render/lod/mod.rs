@@ -18,6 +18,7 @@ use std::sync::Arc;
 pub(crate) use self::pace::{MOVING_SECS, Pace};
 
 use crate::math::Real;
+use crate::math::prefetch::prefetch;
 use crate::scene::GaussianCloud;
 
 /// Levels of detail of one cloud.
@@ -80,6 +81,27 @@ impl<R: Real> Cut<R> {
     /// Whether it is one of `cloud`.
     pub(crate) fn fits(&self, cloud: &GaussianCloud<R>) -> bool {
         self.tree.leaves == cloud.len()
+    }
+
+    /// Has what `of(cloud, k)` leads to fetched, if there is such a one.
+    #[inline(always)]
+    pub(crate) fn fetch(&self, cloud: &GaussianCloud<R>, k: usize) {
+        let Some(&number) = self.list.get(k) else { return };
+        let (cloud, i) = match (number as usize).checked_sub(self.tree.leaves) {
+            None => (cloud, number as usize),
+            Some(node) => {
+                prefetch(&self.tree.nodes[node]);
+                (&self.tree.merged, node)
+            }
+        };
+        prefetch(&cloud.positions[i]);
+        prefetch(&cloud.log_scales[i]);
+        prefetch(&cloud.quaternions[i]);
+        prefetch(&cloud.opacity_logits[i]);
+        // Of the colors two lines of the cache, which is all of a node's.
+        let sh = cloud.gaussian(i).sh;
+        prefetch(&sh[0]);
+        prefetch(&sh[sh.len() - 1]);
     }
 
     /// The cloud and the place of its Gaussian `k`, and the number in `cloud` that it stands for.

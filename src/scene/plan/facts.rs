@@ -199,8 +199,7 @@ fn band_bounds<R: Real>(cloud: &GaussianCloud<R>) -> [f64; 4] {
         energies
     };
     let larger = |a: [f64; 4], b: [f64; 4]| [0, 1, 2, 3].map(|k| a[k].max(b[k]));
-    let energies =
-        cloud.sh.par_chunks_exact(cloud.sh_stride().max(1)).map(of).reduce(|| [0.0; 4], larger);
+    let energies = cloud.sh.par_chunks_exact(cloud.sh_stride().max(1)).map(of).reduce(|| [0.0; 4], larger);
     let reach = |degree: usize| ((2 * degree + 1) as f64 / (4.0 * std::f64::consts::PI)).sqrt();
     [0, 1, 2, 3].map(|degree| energies[degree].sqrt() * reach(degree))
 }
