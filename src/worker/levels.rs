@@ -51,24 +51,36 @@ impl Levels {
             self.build();
             return false;
         }
-        let rough = (cloud.len() >= ROUGH_FROM).then(|| Arc::new(LodTree::sample(cloud, ROUGH)));
-        let is_rough = rough.is_some();
         self.now = Some(Seen {
             generation: cloud.generation(),
             since: Instant::now(),
             cloud: Arc::downgrade(cloud),
             tree: Arc::default(),
-            rough,
+            rough: None,
             begun: false,
             stop: Arc::default(),
         });
-        is_rough
+        cloud.len() >= ROUGH_FROM
     }
 
-    /// What there is of the Gaussians that were seen last.
-    pub(super) fn tree(&self) -> Option<Tree> {
-        let now = self.now.as_ref()?;
-        now.tree.get().or(now.rough.as_ref()).cloned()
+    /// Looks at nothing any more.
+    pub(super) fn forget(&mut self) {
+        self.now = None;
+    }
+
+    /// The tree of the Gaussians that were seen last, if it is built. Of very many it is a `rough` one until then, where
+    /// that will do.
+    pub(super) fn tree(&mut self, rough: bool) -> Option<Tree> {
+        let now = self.now.as_mut()?;
+        if let Some(tree) = now.tree.get() {
+            now.rough = None;
+            return Some(Arc::clone(tree));
+        }
+        if rough && now.rough.is_none() {
+            let cloud = now.cloud.upgrade().filter(|cloud| cloud.len() >= ROUGH_FROM);
+            now.rough = cloud.map(|cloud| Arc::new(LodTree::sample(&cloud, ROUGH)));
+        }
+        now.rough.clone().filter(|_| rough)
     }
 
     /// Begins to build the tree, if the Gaussians have stayed.
@@ -107,16 +119,16 @@ mod tests {
         let (mut levels, first) = (Levels::default(), cloud(2_000));
         assert!(!levels.see(&first), "few enough to be drawn at once");
         levels.see(&first);
-        assert!(levels.tree().is_none() && !levels.now.as_ref().is_some_and(|n| n.begun), "not yet");
+        assert!(levels.tree(true).is_none() && !levels.now.as_ref().is_some_and(|n| n.begun), "not yet");
         levels.now.as_mut().expect("seen").since -= STAY;
         levels.see(&first);
         let start = Instant::now();
-        while levels.tree().is_none() {
+        while levels.tree(true).is_none() {
             assert!(start.elapsed() < Duration::from_secs(60));
             std::thread::sleep(Duration::from_millis(2));
         }
         levels.see(&cloud(2_000));
-        assert!(levels.tree().is_none(), "others have none yet");
+        assert!(levels.tree(true).is_none(), "others have none yet");
     }
 
     #[test]
@@ -124,6 +136,9 @@ mod tests {
         let (mut levels, many) = (Levels::default(), cloud(ROUGH_FROM));
         assert!(levels.see(&many));
         assert!(!levels.see(&many), "once");
-        assert!(levels.tree().is_some_and(|tree| tree.nodes() <= ROUGH));
+        assert!(levels.tree(false).is_none(), "where it will not do");
+        assert!(levels.tree(true).is_some_and(|tree| tree.nodes() <= ROUGH));
+        levels.forget();
+        assert!(levels.tree(true).is_none());
     }
 }

@@ -75,13 +75,19 @@ impl ViewRenderer {
 
     /// Whether levels of detail are for these Gaussians, and they are new and very many.
     fn sees(&mut self, request: &ViewRequest) -> bool {
-        !request.skip.levels && !self.renderer.is_gpu() && self.levels.see(&request.cloud)
+        if request.skip.levels || self.renderer.is_gpu() {
+            self.levels.forget();
+            return false;
+        }
+        self.levels.see(&request.cloud)
     }
 
     /// Levels of detail to draw a request by: none at rest, when all is drawn.
-    fn tree(&self, request: &ViewRequest) -> Option<Arc<LodTree>> {
-        let wanted = request.budget != QualityBudget::Full && !request.skip.levels && !self.renderer.is_gpu();
-        self.levels.tree().filter(|_| wanted)
+    fn tree(&mut self, request: &ViewRequest) -> Option<Arc<LodTree>> {
+        match request.budget {
+            QualityBudget::Full => None,
+            budget => self.levels.tree(budget == QualityBudget::Moving),
+        }
     }
 
     fn draw_seen(&mut self, request: &ViewRequest) -> ViewResult {

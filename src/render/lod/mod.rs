@@ -57,6 +57,7 @@ pub(crate) struct Cut<R = f32> {
 }
 
 impl<R: Real> LodTree<R> {
+    #[cfg(test)]
     pub(crate) fn nodes(&self) -> usize {
         self.nodes.len()
     }

@@ -115,8 +115,8 @@ impl SceneFacts {
     }
 
     /// Whether there are more Gaussians than a CPU, if one draws, can draw in time.
-    pub(crate) fn is_large(&self) -> bool {
-        self.machine.gpu.is_none() && self.cloud.as_ref().is_some_and(|c| c.gaussians >= LARGE)
+    pub(crate) fn is_large(&self, on_cpu: bool) -> bool {
+        (on_cpu || self.machine.gpu.is_none()) && self.cloud.as_ref().is_some_and(|c| c.gaussians >= LARGE)
     }
 
     /// With these objects and parts.

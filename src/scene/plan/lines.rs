@@ -154,11 +154,11 @@ fn color(plan: &ScenePlan) -> Option<Said> {
 fn levels(plan: &ScenePlan) -> Option<Said> {
     let gaussians = plan.facts.cloud.as_ref()?.gaussians;
     let memory = bytes((gaussians * LEVEL_BYTES) as u64);
-    if plan.facts.is_large() {
+    if plan.facts.is_large(plan.on_cpu) {
         let reason = format!("{} Gaussians cannot be drawn in time; at rest all are", count(gaussians as u64));
         return only("while the camera moves", reason, "");
     }
-    let reason = match &plan.facts.machine.gpu {
+    let reason = match plan.facts.machine.gpu.as_ref().filter(|_| !plan.on_cpu) {
         Some(_) => "A GPU draws all of them in time".to_owned(),
         None => format!("All {} Gaussians are drawn in time", count(gaussians as u64)),
     };

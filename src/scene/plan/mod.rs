@@ -129,7 +129,7 @@ impl ScenePlan {
             on_cpu: wants(Item::Backend),
             redraw: when(true, Item::Redraw),
             buffers: when(true, Item::Buffers),
-            levels: facts.is_large() || wants(Item::Levels),
+            levels: facts.is_large(wants(Item::Backend)) || wants(Item::Levels),
             overrides: overrides.clone(),
             facts,
             lines: Vec::new(),
