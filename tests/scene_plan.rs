@@ -21,8 +21,8 @@ use fmlgs::scene::resource_log::{self, ResourceKind};
 use fmlgs::scene::{
     Camera, GaussianCloud, Identities, Level, Limits, Machine, NOBODY, Overrides, SceneFacts, ScenePlan, SemanticMap,
 };
-use fmlgs::worker::ViewMode;
 use fmlgs::worker::view::{QualityBudget, SkipPasses, ViewLane, ViewRequest};
+use fmlgs::worker::{Versioned, ViewMode};
 
 const LIMITS: Limits = Limits { train_side_px: 512, object_side_px: 1_024, sh_degree: 3, holdout_every: 8 };
 
@@ -159,7 +159,7 @@ fn looked_at(cloud: &GaussianCloud, map: Option<&SemanticMap>, plan: &ScenePlan,
     let lane = ViewLane::start(Arc::new(|| {})).expect("a thread");
     let semantics = map.filter(|_| plan.maps.now(false)).map(|m| Arc::new(m.clone()));
     lane.request(ViewRequest {
-        cloud: Arc::new(cloud.clone()),
+        cloud: Versioned::new(Arc::new(cloud.clone())),
         camera: camera(160),
         mode: ViewMode::Rgb,
         second: None,

@@ -22,6 +22,7 @@ use crate::pipeline::train::TrainConfig;
     fmlgs bench --queries 100\n  \
     fmlgs bench --masks mobile-sam --photo photo.jpg\n  \
     fmlgs bench --strokes 60 scene/ splat.ply\n  \
+    fmlgs bench --moving splat.ply\n  \
     fmlgs bench --plan scene/ splat.ply\n  \
     fmlgs bench splats/*.ply photos/ --size 640x480 --size 1280x720 --max-side 504 --gpu --json")]
 pub(crate) struct BenchArgs {
@@ -52,6 +53,9 @@ pub(crate) struct BenchArgs {
     /// Time this many strokes that select Gaussians, three for each selection
     #[arg(long, value_name = "COUNT", value_parser = number::within(1..=1_000_000_usize))]
     strokes: Option<usize>,
+    /// Time moving by levels of detail, at 1008 x 567 px, and compare its pictures with those of all Gaussians
+    #[arg(long, conflicts_with_all = ["gpu", "size"])]
+    moving: bool,
     /// Compare each scene's plan with everything enabled, each in processes of its own
     #[arg(long, conflicts_with_all = ["queries", "masks", "strokes", "gpu", "size"])]
     plan: bool,
@@ -85,6 +89,7 @@ pub(crate) fn run(args: BenchArgs, quiet: bool) -> Result<(), CliError> {
         queries: args.queries,
         masks: args.masks.map(|model| (model, args.photo)),
         strokes: args.strokes,
+        moving: args.moving,
     };
     let timings = bench::run(&request, &mut console).map_err(|e| CliError::of_work(e, "nothing was printed"))?;
     drop(console);

@@ -8,7 +8,7 @@ use crate::scene::plan::PlanOverride;
 pub(crate) struct PlanArgs {
     /// Decide otherwise than the scene plan; may be given several times. Items: color=full,
     /// feature-maps=always, parts=on, thumbnails=eager, encoder=eager, navigation=eager, depth=always,
-    /// photos=full, objects=full, backend=cpu, redraw=always, buffers=keep; =auto resets one
+    /// photos=full, objects=full, backend=cpu, redraw=always, buffers=keep, levels=always; =auto resets one
     #[arg(long = "plan", value_name = "ITEM=VALUE")]
     pub(crate) overrides: Vec<PlanOverride>,
 }

@@ -9,7 +9,7 @@ use super::{Folders, JobError, open, plan};
 use crate::io::{self, Opened};
 use crate::measure::StudyError;
 use crate::measure::bench::strokes::{StrokesTiming, stroke};
-use crate::measure::bench::{self, Timings, cpu, gpu, masks, query};
+use crate::measure::bench::{self, Timings, cpu, gpu, masks, moving, query};
 use crate::measure::plan::{OpenScene, PlanCost, PlanVariant, SIZE, cost};
 use crate::models;
 use crate::pipeline::observer::{Interrupted, Observer, Severity, Silent};
@@ -24,6 +24,8 @@ const QUERY_IDENTITIES: usize = 300;
 const QUERY_SIZE: [usize; 2] = [1_008, 567];
 /// Size of the view in which strokes are drawn.
 const STROKES_SIZE: [u32; 2] = [640, 480];
+/// Size of the views in which one moves.
+const MOVING_SIZE: [u32; 2] = [1_008, 567];
 /// Size of a made-up photo.
 const PHOTO_SIZE: [u32; 2] = [1_008, 756];
 
@@ -43,6 +45,8 @@ pub(crate) struct BenchRequest {
     pub(crate) masks: Option<(String, Option<PathBuf>)>,
     /// So many strokes that select are timed in each scene.
     pub(crate) strokes: Option<usize>,
+    /// Whether moving by levels of detail is timed in each cloud.
+    pub(crate) moving: bool,
 }
 
 /// Times stage by stage.
@@ -83,6 +87,12 @@ pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result
         };
         if let Some(count) = request.strokes {
             timings.strokes.push(strokes(&name, &cloud, cameras, count, observer)?);
+        }
+        if request.moving {
+            observer.note(Severity::Info, format!("Moving in {name}"));
+            timings.moving.push(moving::time(&name, &cloud, MOVING_SIZE, repeats)?);
+            observer.proceed()?;
+            continue;
         }
         for &size in &request.sizes {
             observer.proceed()?;

@@ -2,11 +2,14 @@
 
 pub(crate) mod colormap;
 pub(crate) mod disjoint;
+pub(crate) mod eigen;
 mod fast_exp;
 pub(crate) mod finite;
 pub(crate) mod format;
 pub(crate) mod grid;
 pub(crate) mod lanes;
+pub(crate) mod morton;
+pub(crate) mod prefetch;
 pub(crate) mod real;
 pub mod resize;
 pub mod rotation;

@@ -10,6 +10,7 @@
 
 pub mod cpu;
 pub mod gpu;
+pub(crate) mod lod;
 mod renderer;
 
 pub(crate) use cpu::adam::{AdamStep, Rates};

@@ -5,6 +5,7 @@ use std::sync::{Arc, Weak};
 use serde::{Deserialize, Serialize};
 
 use super::gpu::{self, Device, GpuError};
+use super::lod::Cut;
 use super::{ContributionSink, Features, Frame, RenderError, RenderSettings, RenderStats, StageTimes, cpu};
 use crate::scene::{Camera, GaussianCloud};
 
@@ -53,7 +54,7 @@ pub enum DrawError {
     Gpu(#[from] GpuError),
 }
 
-/// Stages of a picture on the CPU, in their order.
+/// Stages of a picture on the CPU, as they are timed.
 const STAGES: [&str; 4] = ["project", "sort", "bin", "blend"];
 
 /// Seconds of a picture: the part that every Gaussian has at any size, and that of the pixels.
@@ -165,6 +166,11 @@ impl Renderer {
         sinks: &mut [S],
     ) -> Result<(), RenderError> {
         self.cpu.contributions(cloud, camera, settings, sinks)
+    }
+
+    /// Draws only this of clouds that it fits, from now on, where the CPU draws; `None` draws all.
+    pub(crate) fn limit_to(&mut self, cut: Option<Arc<Cut>>) {
+        self.cpu.limit_to(cut);
     }
 
     /// What the last frame of [`Self::render`] cost.

@@ -27,14 +27,16 @@ impl Bounds {
         if points.is_empty() {
             return None;
         }
-        let (mut min, mut max) = (DVec3::ZERO, DVec3::ZERO);
-        for axis in 0..3 {
+        let last = points.len() - 1;
+        let (lo, hi) = ((last as f64 * 0.02) as usize, (last as f64 * 0.98).ceil() as usize);
+        let ends = |axis: usize| {
             let mut v: Vec<f64> = points.iter().map(|p| p[axis]).collect();
-            let last = v.len() - 1;
-            let (lo, hi) = ((last as f64 * 0.02) as usize, (last as f64 * 0.98).ceil() as usize);
-            min[axis] = *v.select_nth_unstable_by(lo, f64::total_cmp).1;
-            max[axis] = *v.select_nth_unstable_by(hi, f64::total_cmp).1;
-        }
+            let min = *v.select_nth_unstable_by(lo, f64::total_cmp).1;
+            // What is before it is smaller.
+            [min, *v[lo..].select_nth_unstable_by(hi - lo, f64::total_cmp).1]
+        };
+        let (x, (y, z)) = rayon::join(|| ends(0), || rayon::join(|| ends(1), || ends(2)));
+        let [min, max] = [0, 1].map(|end| DVec3::new(x[end], y[end], z[end]));
         Some(Self { min, max })
     }
 

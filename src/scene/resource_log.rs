@@ -12,6 +12,7 @@ use crate::math::format::bytes;
 #[allow(missing_docs, reason = "each name says what it is")]
 pub enum ResourceKind {
     Gaussians,
+    Levels,
     Objects,
     Maps,
     Thumbnails,

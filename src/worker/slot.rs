@@ -58,7 +58,7 @@ pub struct Versioned<T> {
 
 impl<T> Versioned<T> {
     /// A value that is new.
-    pub(crate) fn new(value: Arc<T>) -> Self {
+    pub fn new(value: Arc<T>) -> Self {
         Self { generation: NEXT.fetch_add(1, Ordering::Relaxed), value }
     }
 

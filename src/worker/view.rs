@@ -6,19 +6,19 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::Slot;
 use super::failure::Failure;
 use super::observer::Repaint;
 use super::thread::panic_failure;
 use super::view_renderer::ViewRenderer;
 pub use super::view_request::{QualityBudget, SecondPicture, SkipPasses, ViewPicture, ViewRequest, ViewResult};
+use super::{Slot, levels};
 use crate::jobs::query::ViewMaps;
 use crate::render::{RenderError, Renderer};
 use crate::scene::Camera;
 use crate::scene::resource_log::{self, ResourceKind};
 
 /// How long the eye rests before working memory is given back.
-const REST: Duration = Duration::from_secs(2);
+const REST: Duration = levels::STAY;
 
 /// What the pixels of a view belong to.
 #[derive(Clone, Debug)]
@@ -54,23 +54,31 @@ impl ViewLane {
         let (mut mapper, mut mapped_before) = (Renderer::new(), false);
         let work = move || {
             let mut renderer: Option<ViewRenderer> = None;
-            let mut patience = None;
+            let (mut patience, mut gives_back) = (None, false);
             loop {
                 let request = match next(&box_, patience.take()) {
                     Waited::Request(request) => request,
                     Waited::InVain => {
-                        renderer.iter_mut().for_each(|p| p.renderer.rest());
-                        mapper = Renderer::new();
+                        renderer.iter_mut().for_each(|p| p.levels.build());
+                        if gives_back {
+                            renderer.iter_mut().for_each(|p| p.renderer.rest());
+                            mapper = Renderer::new();
+                        }
                         continue;
                     }
                     Waited::Closed => return,
                 };
-                patience = request.skip.buffers.then_some(REST);
+                gives_back = request.skip.buffers;
+                patience = (gives_back || !request.skip.levels).then_some(REST);
                 // Looking for a GPU takes a moment; here no one waits for it.
                 let renderer = match renderer.take().filter(|p| p.without_gpu == request.skip.gpu) {
                     Some(known) => renderer.insert(known),
                     None => renderer.insert(ViewRenderer::without_gpu(request.skip.gpu)),
                 };
+                if let Some(rough) = renderer.rough(&request) {
+                    out.publish(rough);
+                    repaint();
+                }
                 let drawn = renderer.draw(&request);
                 let (exact, start) = (request.budget == QualityBudget::Full, Instant::now());
                 let camera = match &drawn {
@@ -82,6 +90,7 @@ impl ViewLane {
                         request.camera.clone()
                     }
                 };
+                mapper.limit_to(renderer.cut());
                 // At rest it comes second, and only if no one waits for a frame.
                 if (!exact || lock(&box_.0).request.is_none())
                     && let Some(maps) = maps_of(&mut mapper, &request, &camera)
@@ -202,6 +211,7 @@ mod tests {
     use crate::render::RenderSettings;
     use crate::scene::{GaussianCloud, SemanticMap};
     use crate::scene::{Identities, Level, NOBODY};
+    use crate::worker::Versioned;
     use crate::worker::view_modes::ViewMode;
     use glam::DVec3;
 
@@ -214,7 +224,7 @@ mod tests {
         let lane = ViewLane::start(Arc::new(|| {})).expect("a thread");
         let mapped = |ticket: u64, map: &SemanticMap| {
             lane.request(ViewRequest {
-                cloud: Arc::new(cloud.clone()),
+                cloud: Versioned::new(Arc::new(cloud.clone())),
                 camera: Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 32, 24)
                     .expect("valid"),
                 mode: ViewMode::Rgb,
@@ -226,7 +236,7 @@ mod tests {
                 semantics: Some(Arc::new(map.clone())),
                 follow: false,
                 codes: true,
-                skip: SkipPasses { depth: false, parts: false, gpu: true, buffers: false },
+                skip: SkipPasses { depth: false, parts: false, gpu: true, buffers: false, levels: true },
                 timed: false,
                 ticket,
             });

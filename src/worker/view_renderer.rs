@@ -5,9 +5,11 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::failure::Failure;
+use super::levels::Levels;
 use super::thread::panic_failure;
 use super::view_modes::{self, ViewMode};
 use super::view_request::{QualityBudget, SecondPicture, ViewPicture, ViewRequest, ViewResult};
+use crate::render::lod::{Cut, LodTree};
 use crate::render::{self, BackendChoice, Frame, RenderSettings, Renderer};
 use crate::scene::Camera;
 
@@ -25,6 +27,9 @@ pub(super) struct ViewRenderer {
     beside: Option<Box<Self>>,
     /// What frames cost lately; `None` before the first.
     cost: Option<Speed>,
+    pub(super) levels: Levels,
+    /// What was drawn of the last frame's Gaussians, if not all.
+    cut: Option<Arc<Cut>>,
 }
 
 /// What a frame costs: the part that every Gaussian has at any size, and that of each pixel.
@@ -40,7 +45,7 @@ impl ViewRenderer {
         let choice = if without_gpu { BackendChoice::Cpu } else { BackendChoice::Auto };
         let mut instead_of_gpu = None;
         let renderer = Renderer::choose(choice, |why| instead_of_gpu = Some(why)).unwrap_or_default();
-        Self { renderer, without_gpu, instead_of_gpu, beside: None, cost: None }
+        Self { renderer, without_gpu, instead_of_gpu, beside: None, cost: None, levels: Levels::default(), cut: None }
     }
 
     /// Goes on with the CPU: a GPU has failed, or buffers may be in any state.
@@ -52,9 +57,46 @@ impl ViewRenderer {
     }
 
     pub(super) fn draw(&mut self, request: &ViewRequest) -> ViewResult {
+        let _ = self.sees(request);
+        self.draw_seen(request)
+    }
+
+    /// A rough picture of Gaussians that are so many that one of all of them takes long.
+    pub(super) fn rough(&mut self, request: &ViewRequest) -> Option<ViewResult> {
+        let first = self.sees(request) && request.budget == QualityBudget::Full;
+        let request = ViewRequest { budget: QualityBudget::Moving, follow: false, ..request.clone() };
+        first.then(|| self.draw_seen(&request))
+    }
+
+    /// What was drawn of the Gaussians of the last frame, if not all.
+    pub(super) fn cut(&self) -> Option<Arc<Cut>> {
+        self.cut.clone()
+    }
+
+    /// Whether levels of detail are for these Gaussians, and they are new and very many.
+    fn sees(&mut self, request: &ViewRequest) -> bool {
+        if request.skip.levels || self.renderer.is_gpu() {
+            self.levels.forget();
+            return false;
+        }
+        self.levels.see(&request.cloud)
+    }
+
+    /// Levels of detail to draw a request by: none at rest, when all is drawn.
+    fn tree(&mut self, request: &ViewRequest) -> Option<Arc<LodTree>> {
+        match request.budget {
+            QualityBudget::Full => None,
+            budget => self.levels.tree(budget == QualityBudget::Moving),
+        }
+    }
+
+    fn draw_seen(&mut self, request: &ViewRequest) -> ViewResult {
         let shares = 1 + u8::from(request.follow) + u8::from(request.beside.is_some());
-        let camera = self.fitting_camera(&request.camera, request.budget, shares);
-        let drawn = self.draw_at(request, camera.clone())?;
+        let camera = match self.tree(request).filter(|_| self.levels.pace.leaves_out()) {
+            Some(_) => self.levels.pace.camera(&request.camera),
+            None => self.fitting_camera(&request.camera, request.budget, shares),
+        };
+        let drawn = self.draw_at(request, camera.clone(), shares)?;
         let Some((cloud, settings)) = request.beside.clone() else {
             self.beside = None;
             return Ok(Arc::new(drawn));
@@ -62,15 +104,21 @@ impl ViewRenderer {
         let mode = request.second.unwrap_or(request.mode);
         let other = ViewRequest { cloud, settings, mode, second: None, ..request.clone() };
         let painter = self.beside.get_or_insert_with(|| Box::new(Self::without_gpu(self.without_gpu)));
-        let ViewPicture { rgb, depth_range, psnr, .. } = painter.draw_at(&other, camera)?;
+        let _ = painter.sees(&other);
+        let ViewPicture { rgb, depth_range, psnr, .. } = painter.draw_at(&other, camera, shares)?;
         Ok(Arc::new(ViewPicture { second: Some(SecondPicture { rgb, depth_range, psnr }), ..drawn }))
     }
 
-    fn draw_at(&mut self, request: &ViewRequest, camera: Camera) -> Result<ViewPicture, Failure> {
-        let full = camera == request.camera;
+    fn draw_at(&mut self, request: &ViewRequest, camera: Camera, shares: u8) -> Result<ViewPicture, Failure> {
+        let budget = request.budget.secs().map(|secs| secs / f64::from(shares));
+        let start = Instant::now();
+        let near = request.settings.near;
+        let tree = self.tree(request);
+        self.cut = tree.map(|tree| Arc::new(self.levels.pace.cut(&tree, &camera, near)));
+        self.renderer.limit_to(self.cut.clone());
+        let full = camera == request.camera && self.cut.is_none();
         // Without times there is still a frame.
         let _ = self.renderer.time_stages(request.timed);
-        let start = Instant::now();
         let frame = match self.try_render(request, &camera) {
             // A GPU that fails (lost, out of memory) leaves the CPU to draw from then on.
             Err(failure) if self.renderer.is_gpu() => {
@@ -80,7 +128,12 @@ impl ViewRenderer {
             result => result?,
         };
         let secs = start.elapsed().as_secs_f64();
-        self.learn(secs, f64::from(camera.width_px * camera.height_px));
+        if let (Some(_), Some(budget)) = (&self.cut, budget) {
+            self.levels.pace.learn(secs, budget);
+        }
+        if self.cut.is_none() || !self.levels.pace.leaves_out() {
+            self.learn(secs, f64::from(camera.width_px * camera.height_px));
+        }
         let stages = self.renderer.stage_times();
         let start = Instant::now();
         let paint = |mode| view_modes::paint(&frame, mode, request.photo.as_deref());
@@ -171,6 +224,8 @@ mod tests {
             instead_of_gpu: None,
             beside: None,
             cost: Some(Speed { fixed_secs, secs_per_px }),
+            levels: Levels::default(),
+            cut: None,
         };
         let slow = of(0.0, 1e-6);
         let moving = slow.fitting_camera(&camera, QualityBudget::Moving, 1);

@@ -2,8 +2,10 @@
 
 use std::sync::Arc;
 
+use super::Versioned;
 use super::failure::Failure;
 use super::view_modes::ViewMode;
+use crate::render::lod::MOVING_SECS;
 use crate::render::{RenderSettings, Renderer, StageTimes};
 use crate::scene::plan::When;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
@@ -12,7 +14,7 @@ use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
 #[derive(Clone, Debug)]
 pub struct ViewRequest {
     /// The Gaussians.
-    pub cloud: Arc<GaussianCloud>,
+    pub cloud: Versioned<GaussianCloud>,
     /// From where, at full resolution.
     pub camera: Camera,
     /// What of it.
@@ -20,7 +22,7 @@ pub struct ViewRequest {
     /// What of it beside that, in a second view.
     pub second: Option<ViewMode>,
     /// Whose Gaussians the second view shows, if they are others, and how they are drawn.
-    pub beside: Option<(Arc<GaussianCloud>, RenderSettings)>,
+    pub beside: Option<(Versioned<GaussianCloud>, RenderSettings)>,
     /// How: degree of the colors, background, filter. Depth is drawn where it is needed.
     pub settings: RenderSettings,
     /// How long it may take.
@@ -50,6 +52,8 @@ pub struct SkipPasses {
     pub(crate) gpu: bool,
     /// Working memory, while the eye rests.
     pub(crate) buffers: bool,
+    /// Levels of detail.
+    pub(crate) levels: bool,
 }
 
 impl SkipPasses {
@@ -60,6 +64,7 @@ impl SkipPasses {
             parts: !plan.parts,
             gpu: plan.on_cpu,
             buffers: plan.buffers != When::Always,
+            levels: !plan.levels,
         }
     }
 }
@@ -79,7 +84,7 @@ impl QualityBudget {
     /// Seconds a frame should take at most; `None` = as long as it takes.
     pub(super) fn secs(self) -> Option<f64> {
         match self {
-            Self::Moving => Some(0.030),
+            Self::Moving => Some(MOVING_SECS),
             Self::Shared => Some(0.120),
             Self::Full => None,
         }
@@ -101,7 +106,7 @@ pub struct SecondPicture {
 pub struct ViewPicture {
     /// The request's.
     pub ticket: u64,
-    /// Whether this is the request's full resolution.
+    /// Whether this is the request's full resolution, with all Gaussians.
     pub full: bool,
     /// The camera at the size that was drawn.
     pub camera: Camera,

@@ -21,7 +21,10 @@ impl Column {
 
     #[inline]
     pub(crate) fn f32(&self, row: &[u8]) -> f32 {
-        self.f64(row) as f32
+        match (self.scalar, row[self.offset..].first_chunk()) {
+            (Scalar::F32, Some(bytes)) => f32::from_le_bytes(*bytes),
+            _ => self.f64(row) as f32,
+        }
     }
 
     /// The value in `row` of an integer column that fits 32 bits.

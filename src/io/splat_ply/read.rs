@@ -39,20 +39,23 @@ impl Reading<'_> {
     }
 
     pub(crate) fn cloud(&self) -> Result<GaussianCloud, IoError> {
+        let mut cloud = GaussianCloud::default();
+        self.append_to(&mut cloud)?;
+        Ok(cloud)
+    }
+
+    /// Adds the Gaussians of these rows to those of the rows before them.
+    pub(crate) fn append_to(&self, cloud: &mut GaussianCloud) -> Result<(), IoError> {
         let dc = self.columns(["f_dc_0", "f_dc_1", "f_dc_2"])?;
         let (degree, rest) = self.rest_columns()?;
-        let (origin, positions) = self.positions()?;
-        Ok(GaussianCloud {
-            origin,
-            positions,
-            log_scales: self.values(self.columns(["scale_0", "scale_1", "scale_2"])?)?,
-            quaternions: self.values(self.columns(["rot_0", "rot_1", "rot_2", "rot_3"])?)?,
-            opacity_logits: self.opacities()?,
-            sh_degree: degree,
-            sh: self.harmonics(degree, dc, &rest)?,
-            render_mode: render_mode::of_comments(&self.ply.comments),
-            extras: self.extras(),
-        })
+        (cloud.sh_degree, cloud.render_mode) = (degree, render_mode::of_comments(&self.ply.comments));
+        cloud.origin = self.positions(&mut cloud.positions)?;
+        self.values(self.columns(["scale_0", "scale_1", "scale_2"])?, &mut cloud.log_scales)?;
+        self.values(self.columns(["rot_0", "rot_1", "rot_2", "rot_3"])?, &mut cloud.quaternions)?;
+        self.opacities(&mut cloud.opacity_logits)?;
+        self.harmonics(degree, dc, &rest, &mut cloud.sh)?;
+        self.extras(&mut cloud.extras);
+        Ok(())
     }
 
     fn columns<const N: usize>(&self, names: [&'static str; N]) -> Result<[&Column; N], IoError> {
@@ -63,27 +66,28 @@ impl Reading<'_> {
         })
     }
 
-    /// One array from `N` columns, every value checked.
-    fn values<const N: usize>(&self, columns: [&Column; N]) -> Result<Vec<[f32; N]>, IoError> {
+    /// Adds what `N` columns hold, every value checked.
+    fn values<const N: usize>(&self, columns: [&Column; N], to: &mut Vec<[f32; N]>) -> Result<(), IoError> {
+        let before = to.len();
         let row = |i: usize| self.table.row(i);
-        let values: Vec<[f32; N]> =
-            (0..self.table.rows).into_par_iter().map(|i| columns.map(|c| c.f32(row(i)))).collect();
-        self.check(&values, |k| &columns[k].name)?;
-        Ok(values)
+        to.par_extend((0..self.table.rows).into_par_iter().map(|i| columns.map(|c| c.f32(row(i)))));
+        self.check(&to[before..], |k| &columns[k].name)
     }
 
     /// Logits; infinite ones, which other programs make of opacities of 0 and 1, become large ones.
-    fn opacities(&self) -> Result<Vec<f32>, IoError> {
+    fn opacities(&self, to: &mut Vec<f32>) -> Result<(), IoError> {
+        let before = to.len();
         let [column] = self.columns(["opacity"])?;
         let finite = |v: f32| if v.is_infinite() { logit(f32::from(v > 0.0)) } else { v };
-        let all: Vec<[f32; 1]> =
-            (0..self.table.rows).into_par_iter().map(|i| [finite(column.f32(self.table.row(i)))]).collect();
-        self.check(&all, |_| &column.name)?;
-        Ok(all.into_flattened())
+        to.par_extend((0..self.table.rows).into_par_iter().map(|i| finite(column.f32(self.table.row(i)))));
+        self.check(to[before..].as_chunks::<1>().0, |_| &column.name)
     }
 
     fn check<'n, const N: usize>(&self, values: &[[f32; N]], name: impl Fn(usize) -> &'n str) -> Result<(), IoError> {
-        let Some(index) = values.par_iter().position_first(|v| v.iter().any(|x| !x.is_finite())) else { return Ok(()) };
+        if all_finite(values) {
+            return Ok(());
+        }
+        let index = values.iter().position(|v| v.iter().any(|x| !x.is_finite())).unwrap_or(0);
         let k = values[index].iter().position(|x| !x.is_finite()).unwrap_or(0);
         Err(self.not_finite(index, name(k)))
     }
@@ -95,13 +99,14 @@ impl Reading<'_> {
 
     /// Positions relative to an origin: the one that the file states, the middle of the scene
     /// where the file stores doubles, else zero (single precision loses nothing there).
-    fn positions(&self) -> Result<(DVec3, Vec<[f32; 3]>), IoError> {
+    fn positions(&self, to: &mut Vec<[f32; 3]>) -> Result<DVec3, IoError> {
         let xyz = self.columns(["x", "y", "z"])?;
         let residual = self.table.all(["x_residual", "y_residual", "z_residual"]).ok();
         let doubles = xyz.iter().any(|c| c.scalar == Scalar::F64);
         let stated = self.stated_origin()?;
         if !doubles && (residual.is_none() || stated.is_none()) {
-            return Ok((DVec3::ZERO, self.values(xyz)?));
+            self.values(xyz, to)?;
+            return Ok(DVec3::ZERO);
         }
         let world: Vec<DVec3> = (0..self.table.rows)
             .into_par_iter()
@@ -113,9 +118,10 @@ impl Reading<'_> {
             .collect();
         let origin = stated
             .unwrap_or_else(|| crate::scene::Bounds::of(world.iter().copied()).map_or(DVec3::ZERO, |b| b.center()));
-        let positions: Vec<[f32; 3]> = world.par_iter().map(|p| (*p - origin).as_vec3().to_array()).collect();
-        self.check(&positions, |k| &xyz[k].name)?;
-        Ok((origin, positions))
+        let before = to.len();
+        to.par_extend(world.par_iter().map(|p| (*p - origin).as_vec3().to_array()));
+        self.check(&to[before..], |k| &xyz[k].name)?;
+        Ok(origin)
     }
 
     fn stated_origin(&self) -> Result<Option<DVec3>, IoError> {
@@ -140,18 +146,20 @@ impl Reading<'_> {
         }
     }
 
-    fn harmonics(&self, degree: u8, dc: [&Column; 3], rest: &[&Column]) -> Result<Vec<[f32; 3]>, IoError> {
+    fn harmonics(&self, degree: u8, dc: [&Column; 3], rest: &[&Column], to: &mut Vec<[f32; 3]>) -> Result<(), IoError> {
         let stride = coefficients(degree);
         let per_channel = stride - 1;
-        let mut sh = vec![[0.0_f32; 3]; self.table.rows * stride];
-        sh.par_chunks_exact_mut(stride).enumerate().for_each(|(i, out)| {
-            let row = self.table.row(i);
-            out[0] = dc.map(|c| c.f32(row));
-            for (k, rgb) in out[1..].iter_mut().enumerate() {
-                *rgb = [0, 1, 2].map(|channel| rest[channel * per_channel + k].f32(row));
+        let before = to.len();
+        to.par_extend((0..self.table.rows * stride).into_par_iter().map(|at| {
+            let row = self.table.row(at / stride);
+            match at % stride {
+                0 => dc.map(|c| c.f32(row)),
+                k => [0, 1, 2].map(|channel| rest[channel * per_channel + k - 1].f32(row)),
             }
-        });
-        if let Some(at) = sh.par_iter().position_first(|v| v.iter().any(|x| !x.is_finite())) {
+        }));
+        let sh = &to[before..];
+        if !all_finite(sh) {
+            let at = sh.iter().position(|v| v.iter().any(|x| !x.is_finite())).unwrap_or(0);
             let channel = sh[at].iter().position(|x| !x.is_finite()).unwrap_or(0);
             let name = match at % stride {
                 0 => &dc[channel].name,
@@ -159,16 +167,21 @@ impl Reading<'_> {
             };
             return Err(self.not_finite(at / stride, name));
         }
-        Ok(sh)
+        Ok(())
     }
 
-    fn extras(&self) -> Vec<ExtraProperty> {
-        let others = self.table.columns.iter().filter(|c| !is_standard(&c.name));
-        others
-            .map(|c| ExtraProperty {
-                name: c.name.clone(),
-                values: (0..self.table.rows).into_par_iter().map(|i| c.f32(self.table.row(i))).collect(),
-            })
-            .collect()
+    fn extras(&self, to: &mut Vec<ExtraProperty>) {
+        for (k, column) in self.table.columns.iter().filter(|c| !is_standard(&c.name)).enumerate() {
+            if to.len() == k {
+                to.push(ExtraProperty { name: column.name.clone(), values: Vec::new() });
+            }
+            to[k].values.par_extend((0..self.table.rows).into_par_iter().map(|i| column.f32(self.table.row(i))));
+        }
     }
+}
+
+/// Whether all numbers are. Without a way out early, so that it is fast where they are.
+fn all_finite<const N: usize>(values: &[[f32; N]]) -> bool {
+    let finite = |part: &[[f32; N]]| part.as_flattened().iter().fold(true, |all, x| all & x.is_finite());
+    values.par_chunks(1 << 12).all(finite)
 }

@@ -13,7 +13,7 @@ use crate::scene::GaussianCloud;
 /// Bytes in which the header must end.
 const HEADER_BYTES: u64 = 64 << 10;
 /// Bytes of rows that are in memory at once.
-const BLOCK_BYTES: usize = 512 << 10;
+const BLOCK_BYTES: usize = 16 << 20;
 
 /// The id of the scene's state that a `.ply` belongs to, if it says.
 pub(crate) fn state(path: &Path) -> Result<Option<String>, IoError> {
@@ -36,8 +36,7 @@ pub(crate) fn read(path: &Path) -> Result<Option<GaussianCloud>, IoError> {
     let header = start.len() - ply.body_len();
     let end = rows.checked_mul(stride).and_then(|n| n.checked_add(header));
     let fits = end.is_some_and(|end| end as u64 <= bytes) && bytes <= memory::budget();
-    let table = |data: Cow<'static, [u8]>, rows| Table { rows, stride, columns: columns.clone(), data };
-    let empty = table(Cow::default(), 0);
+    let empty = Table { rows: 0, stride, columns: columns.clone(), data: Cow::default() };
     let plain = Reading { ply: &ply, table: &empty, first: 0 }.has_one_origin();
     if ply.encoding != Encoding::LittleEndian || ply.element("chunk").is_some() || !fits || !plain {
         return Ok(None);
@@ -45,14 +44,16 @@ pub(crate) fn read(path: &Path) -> Result<Option<GaussianCloud>, IoError> {
     file.seek(SeekFrom::Start(header as u64)).map_err(failed)?;
     let mut cloud: Option<GaussianCloud> = None;
     let in_block = (BLOCK_BYTES / stride).max(1);
+    let mut block = vec![0; in_block.min(rows) * stride];
     for first in (0..rows).step_by(in_block) {
         let n = in_block.min(rows - first);
-        let mut block = vec![0; n * stride];
-        file.read_exact(&mut block).map_err(failed)?;
-        let part = Reading { ply: &ply, table: &table(Cow::Owned(block), n), first }.cloud()?;
+        let block = &mut block[..n * stride];
+        file.read_exact(block).map_err(failed)?;
+        let part = Table { rows: n, stride, columns: columns.clone(), data: Cow::Borrowed(block) };
+        let reading = Reading { ply: &ply, table: &part, first };
         match &mut cloud {
-            Some(cloud) => cloud.append(part),
-            None => cloud = Some(part.with_room(rows)),
+            Some(cloud) => reading.append_to(cloud)?,
+            None => cloud = Some(reading.cloud()?.with_room(rows)),
         }
     }
     Ok(cloud)

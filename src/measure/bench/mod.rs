@@ -4,6 +4,7 @@
 pub(crate) mod cpu;
 pub mod gpu;
 pub(crate) mod masks;
+pub(crate) mod moving;
 pub(crate) mod query;
 pub(crate) mod strokes;
 
@@ -15,6 +16,7 @@ use serde::Serialize;
 use self::cpu::{RenderTiming, StepTiming};
 use self::gpu::Timing;
 use self::masks::MasksTiming;
+use self::moving::MovingTiming;
 use self::query::QueryTiming;
 use self::strokes::StrokesTiming;
 use super::table::{Rows, rows};
@@ -50,6 +52,8 @@ pub(crate) struct Timings {
     pub(crate) masks: Option<MasksTiming>,
     /// Selecting by strokes, if it was asked for.
     pub(crate) strokes: Vec<StrokesTiming>,
+    /// Moving among many Gaussians, if it was asked for.
+    pub(crate) moving: Vec<MovingTiming>,
 }
 
 impl Timings {
@@ -82,6 +86,7 @@ impl Timings {
             all.push((rows(&head, timed), String::new()));
         }
         all.push((StrokesTiming::table(&self.strokes), String::new()));
+        all.push((MovingTiming::table(&self.moving), String::new()));
         all.retain(|(rows, _)| rows.len() > 1);
         let limit = format!("one core at most: {:.2e} products per s", self.one_core_products_per_sec);
         all.extend(self.gpu.iter().map(|gpu| (Rows::new(), format!("GPU: {gpu}"))));

@@ -1,10 +1,11 @@
 //! Tile binning: which splats reach which tile, each tile's list in depth order.
 
-use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use rayon::prelude::*;
 
-use super::project::Splat;
+use super::project::{Chunk, Splat};
+use super::sort::{self, KeptOrder};
 use crate::math::Real;
 use crate::render::TILE_PX;
 
@@ -15,13 +16,13 @@ pub(crate) struct Tiles {
     pub(crate) grid: [usize; 2],
     /// Tile `t` owns `entries[first[t]..first[t + 1]]`.
     pub(crate) first: Vec<u32>,
-    /// Splats of all tiles, tile after tile, each tile's front to back. Written once from several
-    /// threads to disjoint places, hence atomics (relaxed ones cost nothing).
-    pub(crate) entries: Vec<AtomicU32>,
-    /// Splat `s` has its places in `entries` at `places[span[s].0..span[s].1]`.
-    pub(crate) span: Vec<(u32, u32)>,
+    /// Splats of all tiles, tile after tile, each tile's front to back: keys of [`sort::key`]. Written once from
+    /// several threads to disjoint places, hence atomics (relaxed ones cost nothing).
+    pub(crate) entries: Vec<AtomicU64>,
+    /// The splat at place `p` has its entries in `ways_back[span[p]..span[p + 1]]`.
+    pub(crate) span: Vec<u32>,
     /// Places in `entries`, splat after splat.
-    pub(crate) places: Vec<u32>,
+    pub(crate) ways_back: Vec<u32>,
 }
 
 /// Inclusive tile rectangle `[x0, y0, x1, y1]` of the tiles with a pixel center inside the splat's
@@ -100,15 +101,16 @@ struct Share {
     counts: Vec<u32>,
 }
 
-/// Finds the tiles of these splats.
+/// Finds the tiles of the splats of these parts.
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
-fn share_of<R: Real>(splats: &[Splat<R>], size: [usize; 2], grid: [usize; 2]) -> Share {
+fn share_of<R: Real>(parts: &[Chunk<R>], size: [usize; 2], grid: [usize; 2]) -> Share {
+    let splats: usize = parts.iter().map(|p| p.splats.len()).sum();
     let mut s = Share {
-        tiles: Vec::with_capacity(splats.len() * 4),
-        lengths: Vec::with_capacity(splats.len()),
+        tiles: Vec::with_capacity(splats * 2),
+        lengths: Vec::with_capacity(splats),
         counts: vec![0; grid[0] * grid[1]],
     };
-    for splat in splats {
+    for splat in parts.iter().flat_map(|p| &p.splats) {
         let before = s.tiles.len();
         let (list, counts) = (&mut s.tiles, &mut s.counts);
         each_tile(splat, size, grid[0], |t| {
@@ -120,14 +122,15 @@ fn share_of<R: Real>(splats: &[Splat<R>], size: [usize; 2], grid: [usize; 2]) ->
     s
 }
 
-/// Builds the lists of splats that are ordered front to back.
-pub(crate) fn bin<R: Real>(out: &mut Tiles, splats: &[Splat<R>], size: [usize; 2]) {
+/// Builds the lists of all splats, in the cloud's order; with their depths, or the order that is `kept`, to be sorted
+/// by.
+pub(crate) fn bin<R: Real>(out: &mut Tiles, parts: &[Chunk<R>], kept: Option<&KeptOrder>, size: [usize; 2]) {
     let grid = [size[0].div_ceil(TILE_PX), size[1].div_ceil(TILE_PX)];
     let tiles = grid[0] * grid[1];
     // A fixed number of shares: the lists do not depend on the number of threads anyway, but the
     // counters of a share cost `tiles` words each.
-    let share = splats.len().div_ceil(2 * rayon::current_num_threads()).max(1_024);
-    let mut shares: Vec<Share> = splats.par_chunks(share).map(|splats| share_of(splats, size, grid)).collect();
+    let share = parts.len().div_ceil(2 * rayon::current_num_threads()).max(1);
+    let mut shares: Vec<Share> = parts.par_chunks(share).map(|parts| share_of(parts, size, grid)).collect();
 
     // Counts become first places: tile-major, and within a tile share after share.
     out.grid = grid;
@@ -142,33 +145,52 @@ pub(crate) fn bin<R: Real>(out: &mut Tiles, splats: &[Splat<R>], size: [usize; 2
     }
     out.first.push(at);
 
-    out.span.clear();
-    let mut entry = 0;
-    for &length in shares.iter().flat_map(|s| &s.lengths) {
-        out.span.push((entry, entry + length));
-        entry += length;
-    }
-
-    out.entries.resize_with(at as usize, AtomicU32::default);
-    out.places.resize(at as usize, 0);
-    let mut rest = out.places.as_mut_slice();
-    let mut slices = Vec::with_capacity(shares.len());
-    for s in &shares {
-        let (head, tail) = rest.split_at_mut(s.tiles.len());
-        slices.push(head);
-        rest = tail;
-    }
+    out.entries.resize_with(at as usize, AtomicU64::default);
     let entries = &out.entries;
-    shares.par_iter_mut().zip(slices).enumerate().for_each(|(k, (s, places))| {
-        let mut e = 0;
-        for (i, &length) in s.lengths.iter().enumerate() {
-            for _ in 0..length {
-                let next = &mut s.counts[s.tiles[e] as usize];
-                entries[*next as usize].store((k * share + i) as u32, Relaxed);
-                places[e] = *next;
-                *next += 1;
-                e += 1;
+    shares.par_iter_mut().zip(parts.par_chunks(share)).enumerate().for_each(|(k, (s, parts))| {
+        let (mut tiles, mut lengths) = (s.tiles.iter(), s.lengths.iter());
+        for (p, part) in parts.iter().enumerate() {
+            for (i, (splat, &length)) in part.splats.iter().zip(&mut lengths).enumerate() {
+                let order = kept.map_or_else(|| sort::by_depth(splat), |kept| kept.order(splat));
+                let key = sort::key(order, sort::place(k * share + p, i));
+                for &tile in tiles.by_ref().take(length as usize) {
+                    let next = &mut s.counts[tile as usize];
+                    entries[*next as usize].store(key, Relaxed);
+                    *next += 1;
+                }
             }
         }
     });
+}
+
+impl Tiles {
+    /// The place of the splat of entry `k`.
+    #[inline(always)]
+    pub(crate) fn splat(&self, k: usize) -> u32 {
+        self.entries[k].load(Relaxed) as u32
+    }
+
+    /// Finds the way back from splats, whose places are under `places`, to their entries.
+    pub(crate) fn find_ways_back(&mut self, places: usize) {
+        self.span.clear();
+        self.span.resize(places + 2, 0);
+        for k in 0..self.entries.len() {
+            let place = self.splat(k) as usize;
+            self.span[place + 2] += 1;
+        }
+        (1..places + 2).for_each(|p| self.span[p] += self.span[p - 1]);
+        self.ways_back.resize(self.entries.len(), 0);
+        for k in 0..self.entries.len() {
+            // What becomes the end of this splat's, once all are there.
+            let next = &mut self.span[self.entries[k].load(Relaxed) as u32 as usize + 1];
+            self.ways_back[*next as usize] = k as u32;
+            *next += 1;
+        }
+    }
+
+    /// Entries of the splat at `place`, tile after tile.
+    #[inline(always)]
+    pub(crate) fn ways_back(&self, place: u32) -> &[u32] {
+        &self.ways_back[self.span[place as usize] as usize..self.span[place as usize + 1] as usize]
+    }
 }

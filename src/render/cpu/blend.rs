@@ -50,7 +50,7 @@ impl<R: Real, P: Primitive<R>, L: Lanes<R>, const C: usize, const EXTRA: bool> S
     type Own = ([L::V; C], L::V);
 
     #[inline(always)]
-    fn own(&self, l: L, id: usize, place: usize) -> Self::Own {
+    fn own(&self, l: L, id: u32, place: usize) -> Self::Own {
         let (_, channels) = self.row.values_of::<C>(id);
         (std::array::from_fn(|c| l.splat(channels[c])), l.splat(R::of(place as f64)))
     }

@@ -3,8 +3,6 @@
 //! Per tile entry the pass leaves the primitive's sums over the tile's pixels, from which everything about its
 //! shape follows, then `dL/dvalue` per channel.
 
-use std::sync::atomic::Ordering::Relaxed;
-
 use super::walk::{Primitive, Reach, RowPass, SLOTS, TileRow, Values, ramp, slots_of_rows};
 use crate::math::Real;
 use crate::math::lanes::{LANES, Lanes};
@@ -93,8 +91,8 @@ impl<R: Real, P: Primitive<R>> BlendRowBackward<'_, '_, R, P> {
         let capped = l.splat(R::of(ALPHA_MAX));
         let (ramp, all) = (ramp(l), slots_of_rows(tile.size[1]));
         for k in (0..deepest).rev() {
-            let id = row.tiles.entries[tile.entries.start + k].load(Relaxed) as usize;
-            let s = &row.splats[id];
+            let id = row.tiles.splat(tile.entries.start + k);
+            let s = row.splat(id);
             let reach = Reach::new(l, s, tile.corner, ramp);
             let mut slots = reach.slots & all;
             let (shape, channels) = row.values_of::<C>(id);

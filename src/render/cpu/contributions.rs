@@ -42,8 +42,8 @@ impl<R: Real, P: Primitive<R>, L: Lanes<R>, S: ContributionSink<R>> Sink<R, P, L
     type Own = u32;
 
     #[inline(always)]
-    fn own(&self, _: L, id: usize, _: usize) -> u32 {
-        self.row.splats[id].gaussian
+    fn own(&self, _: L, id: u32, _: usize) -> u32 {
+        self.row.splat(id).gaussian
     }
 
     #[inline(always)]

@@ -1,7 +1,7 @@
 //! The CPU renderer: at `f64` the oracle that every kernel and gradient is compared with, at `f32`
 //! (tile-parallel, eight pixels a register) the fast path where there is no GPU.
 //!
-//! Stages, one file each: [`project`], [`sort`], [`bin`], [`blend`]; backward: [`blend_backward`],
+//! Stages, one file each: [`project`], [`bin`], [`sort`], [`blend`]; backward: [`blend_backward`],
 //! [`mod@project_backward`]; [`walk`] is the way through a tile that they share. What is drawn is a
 //! [`walk::Primitive`]: [`splat`] or [`surfel`]. Results do not depend on the number of threads.
 
@@ -13,6 +13,7 @@ pub(crate) mod contributions;
 pub mod normals;
 pub mod project;
 pub(crate) mod project_backward;
+mod project_chunk;
 pub(crate) mod rasterizer;
 pub(crate) mod sort;
 pub(crate) mod splat;
@@ -21,11 +22,14 @@ pub(crate) mod surfel;
 pub(crate) mod validate;
 pub(crate) mod walk;
 
+use std::sync::Arc;
+
 use self::contributions::ContributionSink;
 use self::project_backward::GaussianGradient;
 use self::rasterizer::CpuRasterizer;
 use self::splat::Splats;
 use self::surfel::Surfels;
+use super::lod::Cut;
 use super::{CloudGradient, Features, Frame, FrameGradient, MAX_CHANNELS, RenderError, RenderSettings};
 use crate::math::Real;
 use crate::math::finite::{NotFinite, all_finite};
@@ -79,6 +83,11 @@ impl<R: Real> CpuRenderer<R> {
         Self::default()
     }
 
+    /// Draws only this of clouds that it fits, from now on; `None` draws all. No gradients go back through a cut.
+    pub(crate) fn limit_to(&mut self, cut: Option<Arc<Cut<R>>>) {
+        self.splats.cut = cut;
+    }
+
     /// Bytes of working memory that it keeps for the next frame.
     pub(crate) fn working_bytes(&self) -> usize {
         self.splats.working_bytes() + self.surfels.as_ref().map_or(0, |s| s.working_bytes())
@@ -86,7 +95,7 @@ impl<R: Real> CpuRenderer<R> {
 
     /// The Gaussians of the last frame, front to back, and their depths.
     pub fn drawn(&self) -> impl Iterator<Item = (usize, R)> {
-        last!(self, r => r.splats()).iter().map(|s| (s.gaussian as usize, s.depth))
+        last!(self, r => r.splats()).into_iter().map(|s| (s.gaussian as usize, s.depth))
     }
 
     /// What the last frame cost.
@@ -112,7 +121,10 @@ impl<R: Real> CpuRenderer<R> {
         }
         if settings.surfels {
             let settings = RenderSettings { keep_order: false, ..settings.clone() };
-            return Ok(self.surfels.get_or_insert_default().render(cloud, features, camera, &settings)?);
+            let cut = self.splats.cut.clone();
+            let surfels = self.surfels.get_or_insert_default();
+            surfels.cut = cut;
+            return Ok(surfels.render(cloud, features, camera, &settings)?);
         }
         self.surfels = None;
         Ok(self.splats.render(cloud, features, camera, settings)?)

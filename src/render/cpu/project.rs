@@ -1,6 +1,7 @@
 //! Projection: Gaussians to splats (mean, conic, reach, color) in the picture of one camera.
 
 use crate::math::{Real, rotation, sh};
+use crate::render::lod::Cut;
 use crate::render::{BLUR_PX2, COLOR_MAX, Features, RenderSettings, TANGENT_CLAMP};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
@@ -219,6 +220,21 @@ pub(crate) struct DrawInput<'a, R> {
     pub(crate) cloud: &'a GaussianCloud<R>,
     pub(crate) features: Features<'a, R>,
     pub(crate) settings: &'a RenderSettings,
+    /// What is drawn instead of all of it.
+    pub(crate) cut: Option<&'a Cut<R>>,
+}
+
+impl<'a, R: Real> DrawInput<'a, R> {
+    /// How many Gaussians are to be drawn.
+    pub(crate) fn len(&self) -> usize {
+        self.cut.map_or(self.cloud.len(), Cut::len)
+    }
+
+    /// The `k`-th of them: the cloud that it is in, its place there, and the Gaussian of `cloud` that it stands for.
+    #[inline(always)]
+    pub(crate) fn of(&self, k: usize) -> (&'a GaussianCloud<R>, usize, u32) {
+        self.cut.map_or((self.cloud, k, k as u32), |cut| cut.of(self.cloud, k))
+    }
 }
 
 /// What becomes of a Gaussian in front of the near plane.

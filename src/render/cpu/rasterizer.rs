@@ -1,5 +1,6 @@
 //! Forward and backward pass of one kind of primitive, with the buffers between the stages.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use rayon::prelude::*;
@@ -8,13 +9,15 @@ use super::bin::{self, Tiles};
 use super::blend::{BlendRow, RowOut};
 use super::blend_backward::{BlendRowBackward, RowIn};
 use super::contributions::{ContributionRow, ContributionSink};
-use super::project::{CHUNK, CameraView, Chunk, DrawInput, Projected, Splat, color, direction, dot};
+use super::project::{CHUNK, CameraView, Chunk, DrawInput, Splat};
 use super::project_backward::GaussianGradient;
-use super::sort::{self, Ordered};
+use super::project_chunk::project;
+use super::sort::{self, KeptOrder};
 use super::walk::{Primitive, TileRow, Values};
 use super::{RenderStats, validate};
+use crate::math::Real;
 use crate::math::finite::{CHECKED, NotFinite};
-use crate::math::{Real, sh};
+use crate::render::lod::Cut;
 use crate::render::{Features, Frame, FrameGradient, MAX_CHANNELS, RenderSettings, TILE_PX};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
@@ -32,15 +35,18 @@ pub(crate) struct CpuRasterizer<R, P> {
     /// Sums of the backward pass, for each tile entry.
     pub(crate) records: Vec<R>,
     frame: Option<FrameInfo<R, P>>,
+    /// What is drawn of clouds that it fits, instead of all of them.
+    pub(crate) cut: Option<Arc<Cut<R>>>,
     /// What the last frame cost.
     pub(crate) stats: RenderStats,
 }
 
-/// The splats of a frame, front to back and by tile.
+/// The splats of a frame, and by tile.
 #[derive(Debug, Default)]
 struct Lists<R> {
     parts: Vec<Chunk<R>>,
-    ordered: Ordered<R>,
+    /// The order that the last frame kept, if it kept one.
+    kept: Option<KeptOrder>,
     tiles: Tiles,
 }
 
@@ -49,8 +55,7 @@ impl<R: Real> Lists<R> {
     fn row<P: Primitive<R>>(&self, info: &FrameInfo<R, P>, ty: usize) -> TileRow<'_, R, P> {
         TileRow {
             primitive: info.primitive,
-            splats: &self.ordered.splats,
-            values: &self.ordered.values,
+            parts: &self.parts,
             tiles: &self.tiles,
             size: info.view.size,
             ty,
@@ -81,7 +86,15 @@ struct FrameInfo<R, P> {
 impl<R: Real, P> Default for CpuRasterizer<R, P> {
     fn default() -> Self {
         let (lists, pixels) = (Lists::default(), Pixels::default());
-        Self { lists, pixels, splat_of: Vec::new(), records: Vec::new(), frame: None, stats: RenderStats::default() }
+        Self {
+            lists,
+            pixels,
+            splat_of: Vec::new(),
+            records: Vec::new(),
+            frame: None,
+            cut: None,
+            stats: RenderStats::default(),
+        }
     }
 }
 
@@ -102,17 +115,19 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
         fn of<T>(v: &Vec<T>) -> usize {
             v.capacity() * size_of::<T>()
         }
-        let Lists { parts, ordered, tiles } = &self.lists;
+        let Lists { parts, tiles, .. } = &self.lists;
         let Pixels { transmittance, last, kept } = &self.pixels;
         let parts: usize = parts.iter().map(|p| of(&p.splats) + of(&p.values)).sum();
-        let tiles = of(&tiles.first) + of(&tiles.entries) + of(&tiles.span) + of(&tiles.places);
+        let tiles = of(&tiles.first) + of(&tiles.entries) + of(&tiles.span) + of(&tiles.ways_back);
         let planes = of(transmittance) + of(last) + kept.iter().map(of).sum::<usize>();
-        parts + of(&ordered.splats) + of(&ordered.values) + tiles + planes + of(&self.splat_of) + of(&self.records)
+        parts + tiles + planes + of(&self.splat_of) + of(&self.records)
     }
 
     /// The splats of the last frame, front to back.
-    pub(crate) fn splats(&self) -> &[Splat<R>] {
-        &self.lists.ordered.splats
+    pub(crate) fn splats(&self) -> Vec<&Splat<R>> {
+        let mut all: Vec<&Splat<R>> = self.lists.parts.iter().flat_map(|p| &p.splats).collect();
+        all.sort_by_key(|s| sort::by_depth(s));
+        all
     }
 
     /// Projects, sorts and bins; returns what the later stages must know, and the seconds of each.
@@ -124,25 +139,29 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
         settings: &RenderSettings,
     ) -> Result<(FrameInfo<R, P>, [f64; 3]), NotFinite> {
         self.frame = None;
+        let cut = self.cut.as_deref().filter(|cut| cut.fits(cloud));
         let extra = features.channels;
         let channels = P::padded(P::channels(extra, settings.depth));
         let view = CameraView::new(camera, cloud.origin, settings.near);
-        let Lists { parts, ordered, tiles } = &mut self.lists;
+        let Lists { parts, kept, tiles } = &mut self.lists;
         let mut clock = Instant::now();
+        // Nodes that stand for the same Gaussian cannot be told apart from picture to picture.
+        let keeps = settings.keep_order && cut.is_none();
+        *kept = keeps.then(|| KeptOrder::of(parts, kept.as_ref()));
         let primitive = P::new(&view, settings);
-        project(parts, DrawInput { cloud, features, settings }, &view, primitive, channels);
+        project(parts, DrawInput { cloud, features, settings, cut }, &view, primitive, channels);
         let project = lap(&mut clock);
-        sort::sort(ordered, parts, P::SHAPE + channels, settings.keep_order);
-        let sort = lap(&mut clock);
-        bin::bin(tiles, &ordered.splats, view.size);
+        bin::bin(tiles, parts, kept.as_ref(), view.size);
+        let bin = lap(&mut clock);
+        sort::sort(tiles);
         if CHECKED {
             validate::projected(parts)?;
-            validate::ordered(ordered, !settings.keep_order)?;
-            validate::binned(tiles, ordered.splats.len())?;
+            validate::binned(tiles, parts)?;
+            validate::sorted(tiles)?;
         }
         let settings = settings.clone();
         let info = FrameInfo { primitive, view, settings, gaussians: cloud.len(), extra, channels };
-        Ok((info, [project, sort, lap(&mut clock)]))
+        Ok((info, [project, lap(&mut clock), bin]))
     }
 
     /// Draws `cloud` as `camera` sees it. Camera and lengths have been checked.
@@ -164,7 +183,7 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
             validate::drawn(&frame)?;
         }
         self.stats = RenderStats {
-            visible: self.lists.ordered.splats.len(),
+            visible: self.lists.parts.iter().map(|p| p.splats.len()).sum(),
             degenerate: self.lists.parts.iter().map(|p| p.degenerate).sum(),
             products,
             stage_secs: [project, sort, bin, lap(&mut clock)],
@@ -215,11 +234,15 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
     /// Backward pass over the tiles of the last frame; does nothing before the first.
     pub(crate) fn backward_tiles(&mut self, gradient: &FrameGradient<R>) {
         let Some(info) = &self.frame else { return };
-        let (clock, lists) = (Instant::now(), &self.lists);
+        let clock = Instant::now();
+        self.lists.tiles.find_ways_back(self.lists.parts.len() * CHUNK);
+        let lists = &self.lists;
         self.splat_of.clear();
         self.splat_of.resize(info.gaussians, NONE);
-        for (s, splat) in lists.ordered.splats.iter().enumerate() {
-            self.splat_of[splat.gaussian as usize] = s as u32;
+        for (p, part) in lists.parts.iter().enumerate() {
+            for (i, splat) in part.splats.iter().enumerate() {
+                self.splat_of[splat.gaussian as usize] = sort::place(p, i);
+            }
         }
         let Pixels { transmittance, last, kept } = &self.pixels;
         let (tiles, pixels, depth) = (&lists.tiles, transmittance.len(), info.settings.depth);
@@ -254,21 +277,19 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
 
     /// The splat of Gaussian `i` and the sum of its tile records, or `None` if it was not drawn.
     #[inline(always)]
-    fn record(&self, i: usize, stride: usize) -> Option<(usize, [R; MOST])> {
+    fn record(&self, i: usize, stride: usize) -> Option<(u32, [R; MOST])> {
         let s = *self.splat_of.get(i)?;
         if s == NONE {
             return None;
         }
-        let tiles = &self.lists.tiles;
-        let (from, to) = tiles.span[s as usize];
         let mut sum = [R::ZERO; MOST];
-        for &place in &tiles.places[from as usize..to as usize] {
-            let at = place as usize * stride;
+        for &entry in self.lists.tiles.ways_back(s) {
+            let at = entry as usize * stride;
             for (total, v) in sum.iter_mut().zip(&self.records[at..at + stride]) {
                 *total += *v;
             }
         }
-        Some((s as usize, sum))
+        Some((s, sum))
     }
 
     /// Gradient of Gaussian `i`, whose parameters are still those that were drawn, after
@@ -277,7 +298,15 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
     pub(crate) fn gaussian_gradient(&self, gaussian: &Gaussian<'_, R>, i: usize) -> Option<GaussianGradient<R>> {
         let info = self.frame.as_ref()?;
         let (s, record) = self.record(i, info.stride())?;
-        P::project_backward(gaussian, &self.lists.ordered.splats[s], &info.view, &info.settings, &record, info.extra)
+        let (part, at) = sort::part_of(s);
+        P::project_backward(
+            gaussian,
+            &self.lists.parts[part].splats[at],
+            &info.view,
+            &info.settings,
+            &record,
+            info.extra,
+        )
     }
 
     /// Gradient with respect to the extra channels of Gaussian `i`, after [`Self::backward_tiles`].
@@ -334,67 +363,4 @@ fn finish<R: Real>(frame: &mut Frame<R>, transmittance: &[R], background: [f32; 
         }
     }
     frame.alpha.iter_mut().zip(transmittance).for_each(|(a, t)| *a = R::ONE - *t);
-}
-
-/// Projects the whole cloud, in parts of [`CHUNK`] Gaussians: `P::SHAPE + channels` values per splat, the channels
-/// being color, extra channels, what depth needs, padding zeros.
-pub(crate) fn project<R: Real, P: Primitive<R>>(
-    parts: &mut Vec<Chunk<R>>,
-    scene: DrawInput<'_, R>,
-    view: &CameraView<R>,
-    primitive: P,
-    channels: usize,
-) {
-    let n = scene.cloud.len();
-    parts.resize_with(n.div_ceil(CHUNK), Chunk::default);
-    parts.par_iter_mut().enumerate().for_each(|(c, part)| {
-        part.splats.clear();
-        part.values.clear();
-        part.degenerate = 0;
-        project_chunk(part, scene, view, primitive, channels, c * CHUNK..((c + 1) * CHUNK).min(n));
-    });
-}
-
-#[multiversion::multiversion(targets("x86_64+avx2+fma"))]
-fn project_chunk<R: Real, P: Primitive<R>>(
-    part: &mut Chunk<R>,
-    scene: DrawInput<'_, R>,
-    view: &CameraView<R>,
-    primitive: P,
-    channels: usize,
-    range: std::ops::Range<usize>,
-) {
-    let DrawInput { cloud, features, settings } = scene;
-    let degree = settings.sh_degree.min(cloud.sh_degree);
-    for i in range {
-        // Cheap tests first: most Gaussians of a scene are outside the picture.
-        let relative = view.relative(cloud.positions[i]);
-        if !(dot(view.rows[2], relative) > view.near) {
-            continue;
-        }
-        let opacity = cloud.opacity_logits[i].sigmoid();
-        if opacity < primitive.alpha_min() {
-            continue;
-        }
-        let gaussian = cloud.gaussian(i);
-        let (mut splat, shape, depth) = match primitive.project(&gaussian, opacity, view, settings) {
-            Projected::Splat(splat, shape, depth) => (splat, shape, depth),
-            Projected::Outside => continue,
-            Projected::Degenerate => {
-                part.degenerate += 1;
-                continue;
-            }
-        };
-        splat.gaussian = i as u32;
-        let basis = sh::basis(degree, direction(relative));
-        let first = part.values.len();
-        part.values.extend_from_slice(shape.as_ref());
-        part.values.extend_from_slice(&color(gaussian.sh, &basis, degree));
-        part.values.extend_from_slice(&features.values[i * features.channels..(i + 1) * features.channels]);
-        if settings.depth {
-            part.values.extend_from_slice(depth.as_ref());
-        }
-        part.values.resize(first + shape.as_ref().len() + channels, R::ZERO);
-        part.splats.push(splat);
-    }
 }

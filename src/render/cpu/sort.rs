@@ -1,77 +1,71 @@
-//! Front-to-back order of the splats.
+//! Front-to-back order of the splats: within each tile, which is all that compositing asks for. Splats stay where the
+//! projection left them, so those of a tile lie as near one another as their Gaussians do in the cloud.
+
+use std::sync::atomic::Ordering::Relaxed;
 
 use rayon::prelude::*;
 
+use super::bin::Tiles;
 use super::project::{CHUNK, Chunk, Splat};
 use crate::math::Real;
 
-/// The splats of one frame, front to back.
+/// The order of splats that were not in the frame before.
+const LAST: u32 = u32::MAX;
+
+/// Where a splat is among the parts, as one number.
+pub(crate) fn place(part: usize, i: usize) -> u32 {
+    (part * CHUNK + i) as u32
+}
+
+/// The part of a place and the number in there.
+#[inline(always)]
+pub(crate) fn part_of(place: u32) -> (usize, usize) {
+    (place as usize / CHUNK, place as usize % CHUNK)
+}
+
+/// What entries are sorted by: order first, equal ones as in the cloud. Unique, so that an unstable sort is
+/// deterministic.
+#[inline(always)]
+pub(crate) fn key(order: u32, place: u32) -> u64 {
+    u64::from(order) << 32 | u64::from(place)
+}
+
+/// Depths are positive, so their bit patterns order like the numbers.
+#[inline(always)]
+pub(crate) fn by_depth<R: Real>(splat: &Splat<R>) -> u32 {
+    splat.depth.f32().to_bits()
+}
+
+/// An order of Gaussians that is kept from frame to frame.
 #[derive(Debug, Default)]
-pub(crate) struct Ordered<R> {
-    /// By ascending depth; equal depths in the cloud's order.
-    pub(crate) splats: Vec<Splat<R>>,
-    /// Their values, as in [`Chunk::values`].
-    pub(crate) values: Vec<R>,
-    keys: Vec<u64>,
-}
+pub(crate) struct KeptOrder(Vec<u32>);
 
-/// Brings the splats of all parts into order. Everything after this reads them nearly from front
-/// to back, instead of jumping through the cloud. With `keep`, the order is that of the frame before;
-/// splats that were not in it come last.
-pub(crate) fn sort<R: Real>(out: &mut Ordered<R>, parts: &[Chunk<R>], channels: usize, keep: bool) {
-    if keep {
-        keep_order(out, parts);
-    } else {
-        by_depth(out, parts);
-    }
-    gather(out, parts, channels);
-}
-
-/// Place of a splat among the parts: the low half of its key.
-fn place(part: usize, i: usize) -> u64 {
-    (part * CHUNK + i) as u64
-}
-
-fn by_depth<R: Real>(out: &mut Ordered<R>, parts: &[Chunk<R>]) {
-    // Depths are positive, so their bit patterns order like the numbers. The low half of a key is
-    // the splat's part and its place in there, which makes keys unique and an unstable sort
-    // deterministic.
-    out.keys.clear();
-    out.keys.par_extend(parts.par_iter().enumerate().flat_map_iter(|(p, part)| {
-        let key = move |(i, s): (usize, &Splat<R>)| (u64::from(s.depth.f32().to_bits()) << 32) | place(p, i);
-        part.splats.iter().enumerate().map(key)
-    }));
-    out.keys.par_sort_unstable();
-}
-
-fn keep_order<R: Real>(out: &mut Ordered<R>, parts: &[Chunk<R>]) {
-    const GONE: u32 = u32::MAX;
-    let largest = parts.iter().flat_map(|p| &p.splats).chain(&out.splats).map(|s| s.gaussian as usize + 1).max();
-    let mut now = vec![GONE; largest.unwrap_or(0)];
-    for (p, part) in parts.iter().enumerate() {
-        for (i, s) in part.splats.iter().enumerate() {
-            now[s.gaussian as usize] = place(p, i) as u32;
+impl KeptOrder {
+    /// That of the last frame's splats, which may have kept one, too.
+    pub(crate) fn of<R: Real>(parts: &[Chunk<R>], before: Option<&Self>) -> Self {
+        let splats = || parts.iter().flat_map(|p| &p.splats);
+        let most = splats().map(|s| s.gaussian as usize + 1).max().unwrap_or(0);
+        let mut now = vec![LAST; most];
+        for s in splats() {
+            now[s.gaussian as usize] = before.map_or_else(|| by_depth(s), |kept| kept.order(s));
         }
+        Self(now)
     }
-    out.keys.clear();
-    for s in &out.splats {
-        let at = std::mem::replace(&mut now[s.gaussian as usize], GONE);
-        out.keys.extend((at != GONE).then_some(u64::from(at)));
+
+    /// Splats that are new come last.
+    pub(crate) fn order<R>(&self, splat: &Splat<R>) -> u32 {
+        self.0.get(splat.gaussian as usize).copied().unwrap_or(LAST)
     }
-    out.keys.extend(now.iter().filter(|at| **at != GONE).map(|at| u64::from(*at)));
 }
 
-/// Copies the splats in the order of the keys.
-fn gather<R: Real>(out: &mut Ordered<R>, parts: &[Chunk<R>], channels: usize) {
-    let n = out.keys.len();
-    out.splats.resize(n, Splat::default());
-    out.values.resize(n * channels, R::ZERO);
-    let blocks = out.splats.par_chunks_mut(CHUNK).zip(out.values.par_chunks_mut(CHUNK * channels));
-    blocks.zip(out.keys.par_chunks(CHUNK)).for_each(|((splats, values), keys)| {
-        for ((splat, value), &key) in splats.iter_mut().zip(values.chunks_exact_mut(channels)).zip(keys) {
-            let (part, i) = (&parts[key as u32 as usize / CHUNK], key as u32 as usize % CHUNK);
-            *splat = part.splats[i];
-            value.copy_from_slice(&part.values[i * channels..(i + 1) * channels]);
-        }
-    });
+/// Brings each tile's entries into order.
+pub(crate) fn sort(tiles: &mut Tiles) {
+    let mut rest = tiles.entries.as_mut_slice();
+    let mut lists = Vec::with_capacity(tiles.first.len());
+    for ends in tiles.first.windows(2) {
+        let (own, others) = rest.split_at_mut((ends[1] - ends[0]) as usize);
+        lists.push(own);
+        rest = others;
+    }
+    lists.into_par_iter().for_each(|list| list.sort_unstable_by_key(|entry| entry.load(Relaxed)));
 }

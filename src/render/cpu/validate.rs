@@ -5,7 +5,7 @@ use std::sync::atomic::Ordering::Relaxed;
 
 use super::bin::Tiles;
 use super::project::{Chunk, Splat};
-use super::sort::Ordered;
+use super::sort;
 use crate::math::Real;
 use crate::math::finite::{NotFinite, all_finite};
 use crate::render::Frame;
@@ -27,24 +27,26 @@ pub(crate) fn projected<R: Real>(parts: &[Chunk<R>]) -> Result<(), NotFinite> {
     parts.iter().try_for_each(|p| splats("projection", &p.splats, &p.values))
 }
 
-/// After sorting: as before, and depths do not fall where they were sorted `by_depth`.
-pub(crate) fn ordered<R: Real>(ordered: &Ordered<R>, by_depth: bool) -> Result<(), NotFinite> {
-    splats("sorting", &ordered.splats, &ordered.values)?;
-    if !by_depth {
-        return Ok(());
-    }
-    let fall = ordered.splats.windows(2).position(|w| w[1].depth.f32() < w[0].depth.f32());
-    fall.map_or(Ok(()), |index| Err(NotFinite { stage: "sorting", field: "the order after splat", index }))
-}
-
 /// After binning: every entry names a splat, and lists follow on each other.
-pub(crate) fn binned(tiles: &Tiles, splats: usize) -> Result<(), NotFinite> {
+pub(crate) fn binned<R>(tiles: &Tiles, parts: &[Chunk<R>]) -> Result<(), NotFinite> {
     let broken = |field, index| Err(NotFinite { stage: "binning", field, index });
-    if let Some(i) = tiles.entries.iter().position(|e| e.load(Relaxed) as usize >= splats) {
+    let is_there = |k: usize| {
+        let (part, i) = sort::part_of(tiles.splat(k));
+        parts.get(part).is_some_and(|p| i < p.splats.len())
+    };
+    if let Some(i) = (0..tiles.entries.len()).position(|k| !is_there(k)) {
         return broken("the splat of entry", i);
     }
     let fall = tiles.first.windows(2).position(|w| w[1] < w[0]);
     fall.map_or(Ok(()), |i| broken("the end of tile", i))
+}
+
+/// After sorting: no entry of a tile comes before one that it is to follow.
+pub(crate) fn sorted(tiles: &Tiles) -> Result<(), NotFinite> {
+    let list = |ends: &[u32]| &tiles.entries[ends[0] as usize..ends[1] as usize];
+    let falls = |ends: &[u32]| list(ends).windows(2).any(|w| w[1].load(Relaxed) < w[0].load(Relaxed));
+    let fall = tiles.first.windows(2).position(falls);
+    fall.map_or(Ok(()), |index| Err(NotFinite { stage: "sorting", field: "the order in tile", index }))
 }
 
 pub(crate) fn drawn<R: Real>(frame: &Frame<R>) -> Result<(), NotFinite> {
@@ -126,17 +128,17 @@ mod tests {
 
     #[test]
     fn wrong_orders_and_lists_are_seen() {
-        let of = |depths: [f64; 2]| {
-            let mut frame = Ordered::default();
-            frame.splats = depths.map(splat).to_vec();
-            frame
+        let tiles = |depths: [f32; 2], places: [u32; 2]| {
+            let key = |k: usize| sort::key(depths[k].to_bits(), places[k]).into();
+            Tiles { first: vec![0, 2], entries: vec![key(0), key(1)], ..Tiles::default() }
         };
-        assert_eq!(ordered(&of([1.0, 2.0]), true), Ok(()));
-        assert!(ordered(&of([2.0, 1.0]), true).is_err() && ordered(&of([2.0, f64::NAN]), true).is_err());
-        assert_eq!(ordered(&of([2.0, 1.0]), false), Ok(()), "an order that was kept");
-        let tiles = Tiles { first: vec![0, 2], entries: vec![0.into(), 3.into()], ..Tiles::default() };
-        assert_eq!(binned(&tiles, 4), Ok(()));
-        assert_eq!(binned(&tiles, 3), Err(NotFinite { stage: "binning", field: "the splat of entry", index: 1 }));
+        assert_eq!(sorted(&tiles([1.0, 2.0], [7, 3])), Ok(()));
+        assert_eq!(sorted(&tiles([1.0, 1.0], [3, 7])), Ok(()), "equal depths as in the cloud");
+        assert!(sorted(&tiles([2.0, 1.0], [3, 7])).is_err() && sorted(&tiles([1.0, 1.0], [7, 3])).is_err());
+        let two = [Chunk { splats: vec![splat(1.0), splat(2.0)], values: vec![0.5; 6], degenerate: 0 }];
+        assert_eq!(binned(&tiles([1.0, 2.0], [0, 1]), &two), Ok(()));
+        let broken = Err(NotFinite { stage: "binning", field: "the splat of entry", index: 1 });
+        assert_eq!(binned(&tiles([1.0, 2.0], [0, 2]), &two), broken);
     }
 
     #[test]

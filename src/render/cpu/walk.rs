@@ -3,13 +3,13 @@
 //!
 //! Pixels are taken in lanes of eight; lane group `g` of row `row` of a tile is its slot `g * TILE_PX + row`.
 
-use std::sync::atomic::Ordering::Relaxed;
-
 use super::bin::Tiles;
-use super::project::{CameraView, Projected, Splat};
+use super::project::{CameraView, Chunk, Projected, Splat};
 use super::project_backward::GaussianGradient;
+use super::sort::part_of;
 use crate::math::Real;
 use crate::math::lanes::{LANES, Lane, LaneOp, Lanes};
+use crate::math::prefetch::prefetch;
 use crate::render::{Frame, FrameGradient, RenderSettings, TILE_PX};
 use crate::scene::Gaussian;
 
@@ -19,6 +19,8 @@ pub(crate) const GROUPS: usize = TILE_PX / LANES;
 pub(crate) const SLOTS: usize = TILE_PX * GROUPS;
 /// Splats between two looks at which pixels are still open.
 const CLOSED_CHECK: usize = 16;
+/// Splats between fetching one and needing it.
+const AHEAD: usize = 6;
 
 /// A few values of one kind.
 pub(crate) trait Values<V: Copy>: Copy + AsRef<[V]> + AsMut<[V]> {
@@ -237,9 +239,7 @@ pub(crate) fn ramp<R: Real, L: Lanes<R>>(l: L) -> L::V {
 /// A row of tiles of a frame.
 pub(crate) struct TileRow<'a, R, P> {
     pub(crate) primitive: P,
-    pub(crate) splats: &'a [Splat<R>],
-    /// Shape and channels of each.
-    pub(crate) values: &'a [R],
+    pub(crate) parts: &'a [Chunk<R>],
     pub(crate) tiles: &'a Tiles,
     /// Picture size in px.
     pub(crate) size: [usize; 2],
@@ -275,7 +275,7 @@ pub(crate) trait Sink<R: Real, P: Primitive<R>, L: Lanes<R>> {
     /// What is needed of one splat.
     type Own;
     /// The splat `id`, at this place of the tile's list, counted from 1.
-    fn own(&self, l: L, id: usize, place: usize) -> Self::Own;
+    fn own(&self, l: L, id: u32, place: usize) -> Self::Own;
     /// Weight of the splat in the pixels of a slot, and their transmittance before and after it.
     fn add(&mut self, l: L, slot: usize, own: &Self::Own, hit: &P::Hit<L>, light: [L::V; 3]);
 }
@@ -293,11 +293,28 @@ impl<R: Real, P: Primitive<R>> TileRow<'_, R, P> {
         }
     }
 
-    /// The shape and the channels of splat `id`.
+    /// The splat at `place`.
     #[inline(always)]
-    pub(crate) fn values_of<const C: usize>(&self, id: usize) -> (&[R], &[R]) {
-        let stride = P::SHAPE + C;
-        self.values[id * stride..][..stride].split_at(P::SHAPE)
+    pub(crate) fn splat(&self, place: u32) -> &Splat<R> {
+        let (part, i) = part_of(place);
+        &self.parts[part].splats[i]
+    }
+
+    /// Its shape and its channels.
+    #[inline(always)]
+    pub(crate) fn values_of<const C: usize>(&self, place: u32) -> (&[R], &[R]) {
+        let (stride, (part, i)) = (P::SHAPE + C, part_of(place));
+        self.parts[part].values[i * stride..][..stride].split_at(P::SHAPE)
+    }
+
+    /// Has what splat `id` needs fetched.
+    #[inline(always)]
+    fn fetch<const C: usize>(&self, id: u32) {
+        let s = self.splat(id);
+        // It may lie in two lines of the cache.
+        prefetch(&s.mean);
+        prefetch(&s.gaussian);
+        prefetch(&self.values_of::<C>(id).1[0]);
     }
 
     /// Walks over a tile front to back, until every pixel is closed. Returns the transmittance that is left and
@@ -322,9 +339,12 @@ impl<R: Real, P: Primitive<R>> TileRow<'_, R, P> {
         let all = slots_of_rows(tile.size[1]);
         let mut alive = all;
         let mut groups = 0_u64;
-        for (k, entry) in self.tiles.entries[tile.entries.clone()].iter().enumerate() {
-            let id = entry.load(Relaxed) as usize;
-            let s = &self.splats[id];
+        for (k, entry) in tile.entries.clone().enumerate() {
+            if entry + AHEAD < tile.entries.end {
+                self.fetch::<C>(self.tiles.splat(entry + AHEAD));
+            }
+            let id = self.tiles.splat(entry);
+            let s = self.splat(id);
             let reach = Reach::new(l, s, tile.corner, ramp);
             let mut slots = reach.slots & alive;
             if slots == 0 {

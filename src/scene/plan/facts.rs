@@ -1,6 +1,7 @@
 //! What a plan is computed from: facts about a scene's data and the machine, gathered once.
 
 use glam::{DMat3, DVec3};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use crate::math::rotation::matrix_from_quaternion;
@@ -113,6 +114,11 @@ impl SceneFacts {
         self.with_cloud(cloud, sh_stored, cameras)
     }
 
+    /// Whether there are more Gaussians than a CPU, if one draws, can draw in time.
+    pub(crate) fn is_large(&self, on_cpu: bool) -> bool {
+        (on_cpu || self.machine.gpu.is_none()) && self.cloud.as_ref().is_some_and(|c| c.gaussians >= LARGE)
+    }
+
     /// With these objects and parts.
     pub fn with_semantics(mut self, map: Option<&SemanticMap>) -> Self {
         self.semantics = map.map(SemanticFacts::of);
@@ -154,6 +160,9 @@ impl SemanticFacts {
     }
 }
 
+/// Gaussians from which on a moving picture of all of them is too slow (docs/measured.md, "Large scenes").
+pub(crate) const LARGE: usize = 100_000;
+
 /// Half a step of an 8-bit picture: smaller changes cannot be seen.
 pub const NOISE_FLOOR: f64 = 0.5 / 255.0;
 
@@ -180,19 +189,19 @@ pub fn used_degree<R: Real>(cloud: &GaussianCloud<R>) -> u8 {
 
 /// What each band can change at most, by degree.
 fn band_bounds<R: Real>(cloud: &GaussianCloud<R>) -> [f64; 4] {
-    let mut bound = [0.0_f64; 4];
-    for gaussian in cloud.sh.chunks_exact(cloud.sh_stride().max(1)) {
+    let of = |gaussian: &[[R; 3]]| {
+        let mut energies = [0.0_f64; 4];
         for degree in 1..=cloud.sh_degree {
             let band = &gaussian[sh::coefficients(degree - 1)..sh::coefficients(degree)];
-            let reach = (f64::from(2 * degree + 1) / (4.0 * std::f64::consts::PI)).sqrt();
-            for channel in 0..3 {
-                let energy: f64 = band.iter().map(|c| c[channel].f64().powi(2)).sum();
-                let b = &mut bound[usize::from(degree)];
-                *b = b.max(energy.sqrt() * reach);
-            }
+            let energy = |channel: usize| band.iter().map(|c| c[channel].f64().powi(2)).sum::<f64>();
+            energies[usize::from(degree)] = (0..3).map(energy).fold(0.0, f64::max);
         }
-    }
-    bound
+        energies
+    };
+    let larger = |a: [f64; 4], b: [f64; 4]| [0, 1, 2, 3].map(|k| a[k].max(b[k]));
+    let energies = cloud.sh.par_chunks_exact(cloud.sh_stride().max(1)).map(of).reduce(|| [0.0; 4], larger);
+    let reach = |degree: usize| ((2 * degree + 1) as f64 / (4.0 * std::f64::consts::PI)).sqrt();
+    [0, 1, 2, 3].map(|degree| energies[degree].sqrt() * reach(degree))
 }
 
 /// Cameras and Gaussians that are looked at to tell what is resolved.

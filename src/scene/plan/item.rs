@@ -77,6 +77,9 @@ pub enum Item {
     /// How long the renderer keeps its working memory.
     #[strum(props(subject = "Render buffers", instead = "keep"))]
     Buffers,
+    /// Whether levels of detail are built, to move by.
+    #[strum(props(subject = "Levels of detail", instead = "always"))]
+    Levels,
 }
 
 /// The only word besides an item's alternative.

@@ -10,6 +10,9 @@ use crate::scene::semantic_map::CODE_CHANNELS;
 /// Bytes that a pixel of a view's map of identities takes.
 const MAP_BYTES_PER_PX: u64 = 12;
 
+/// Bytes of a tree for each of its Gaussians, about.
+const LEVEL_BYTES: usize = 40;
+
 /// The lines of a plan, in the order of the items; those that say nothing about a scene are not there.
 pub(crate) fn of(plan: &ScenePlan) -> Vec<PlanLine> {
     Item::VARIANTS.iter().filter_map(|&item| line(item, plan)).collect()
@@ -117,6 +120,7 @@ fn row(item: Item, plan: &ScenePlan) -> Option<Said> {
             let saving = "working memory by Gaussians, tiles and pixels";
             or("freed at rest", "Nothing is rendered while the camera rests", saving)
         }
+        (Item::Levels, _) => levels(plan),
         (Item::Parts | Item::Thumbnails | Item::Precision, _) => None,
     }
 }
@@ -145,6 +149,20 @@ fn color(plan: &ScenePlan) -> Option<Said> {
             or(choice, reason, format!("{} read for every frame", saved(sh_used)))
         }
     }
+}
+
+fn levels(plan: &ScenePlan) -> Option<Said> {
+    let gaussians = plan.facts.cloud.as_ref()?.gaussians;
+    let memory = bytes((gaussians * LEVEL_BYTES) as u64);
+    if plan.facts.is_large(plan.on_cpu) {
+        let reason = format!("{} Gaussians cannot be drawn in time; at rest all are", count(gaussians as u64));
+        return only("while the camera moves", reason, "");
+    }
+    let reason = match plan.facts.machine.gpu.as_ref().filter(|_| !plan.on_cpu) {
+        Some(_) => "A GPU draws all of them in time".to_owned(),
+        None => format!("All {} Gaussians are drawn in time", count(gaussians as u64)),
+    };
+    or("off", reason, format!("{memory} of memory, building a tree"))
 }
 
 fn training_size(plan: &ScenePlan) -> Option<Said> {

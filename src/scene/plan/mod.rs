@@ -87,6 +87,8 @@ pub struct ScenePlan {
     /// When the window is drawn: as something changes, or all the time.
     pub(crate) redraw: When,
     pub(crate) buffers: When,
+    /// Whether levels of detail are built to move by.
+    pub(crate) levels: bool,
     pub(crate) lines: Vec<PlanLine>,
 }
 
@@ -127,6 +129,7 @@ impl ScenePlan {
             on_cpu: wants(Item::Backend),
             redraw: when(true, Item::Redraw),
             buffers: when(true, Item::Buffers),
+            levels: facts.is_large(wants(Item::Backend)) || wants(Item::Levels),
             overrides: overrides.clone(),
             facts,
             lines: Vec::new(),

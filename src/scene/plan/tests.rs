@@ -201,3 +201,23 @@ fn lines_say_what_is_left_out_and_how_much_that_is() {
         [[false, false], [false, true], [true, true]]
     );
 }
+
+#[test]
+fn levels_of_detail_are_for_more_gaussians_than_a_cpu_draws_in_time() {
+    let of = |gaussians: usize, gpu: bool, overrides: &str| {
+        let machine = Machine { gpu: gpu.then(|| "a GPU".into()), ..Machine::default() };
+        let cloud = CloudFacts { gaussians, ..CloudFacts::default() };
+        let facts = SceneFacts { cloud: Some(cloud), machine, limits: limits(), ..SceneFacts::default() };
+        let overrides = overrides.split_whitespace().map(|o| o.parse().expect("an override")).collect();
+        let plan = ScenePlan::new(facts, &overrides);
+        let line = plan.line(Item::Levels).expect("a line").clone();
+        (plan.levels, line)
+    };
+    let (levels, line) = of(99_999, false, "");
+    assert!(!levels && line.choice == "off" && line.saving.contains("4 MB"), "{line:?}");
+    let (levels, line) = of(100_000, false, "");
+    assert!(levels && line.choice == "while the camera moves" && line.alternative.is_none(), "{line:?}");
+    assert!(!of(100_000, true, "").0, "a GPU draws them");
+    assert!(of(100_000, true, "backend=cpu").0, "but not where it is not to be used");
+    assert!(of(10, false, "levels=always").0);
+}

@@ -133,14 +133,14 @@ impl Requests {
         };
         self.last = Some(key);
         self.ticket += 1;
-        let (cloud, semantics) = (Arc::clone(&cloud), semantics.as_deref().cloned());
+        let semantics = semantics.as_deref().cloned();
         let ticket = self.ticket;
         let request = ViewRequest {
             cloud,
             camera,
             mode,
             second,
-            beside: beside.map(|(cloud, settings)| (Arc::clone(&cloud), settings)),
+            beside,
             settings,
             budget,
             photo,
@@ -246,7 +246,7 @@ mod tests {
                 semantics: None,
                 codes: false,
                 follow: false,
-                skip: SkipPasses { depth: true, parts: true, gpu: true, buffers: true },
+                skip: SkipPasses { depth: true, parts: true, gpu: true, buffers: true, levels: true },
                 timed: false,
             };
             change(&mut wanted);
