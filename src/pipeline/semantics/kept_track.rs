@@ -151,7 +151,7 @@ mod tests {
         }
         drop(kept);
         let bytes = fs::read(part(&file)).expect("kept");
-        for (cut, whole) in [(bytes.len(), 4), (bytes.len() - 1, 3), (bytes.len() / 2, 2), (HEAD, 0), (0, 0)] {
+        for (cut, whole) in [(bytes.len(), 4), (bytes.len() - 1, 3), (bytes.len() / 2, 1), (HEAD, 0), (0, 0)] {
             fs::write(part(&file), &bytes[..cut]).expect("cut off");
             let mut kept = KeptTrack::open(Some(&file));
             let again: Vec<Output> = (0..4).map_while(|k| kept.earlier(at(k, false))).collect();

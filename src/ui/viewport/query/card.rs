@@ -190,7 +190,11 @@ impl Queries {
             }
             None => {
                 let mut known = names::completions(&semantics.identities, "", usize::MAX);
-                ui.weak(format!("{}, e.g.", format::things(known.len(), "name")));
+                if known.is_empty() {
+                    ui.weak("Nothing here has a name yet; Details lists what comes nearest.");
+                } else {
+                    ui.weak(format!("{}, e.g.", format::things(known.len(), "name")));
+                }
                 known.truncate(NAMED);
                 self.show_names(ui, &known, semantics);
             }
