@@ -1,4 +1,4 @@
-//! DetailLevels of detail of the Gaussians on screen, built in the background once these are seen to stay.
+//! Levels of detail of the Gaussians on screen, built in the background once these are seen to stay.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock, Weak};
@@ -18,7 +18,7 @@ const ROUGH: usize = 150_000;
 
 type Tree = Arc<LodTree>;
 
-/// DetailLevels of detail of the Gaussians that are drawn, which may change at any time.
+/// Levels of detail of the Gaussians that are drawn, which may change at any time.
 #[derive(Default)]
 pub(super) struct DetailLevels {
     /// How many Gaussians there is time for.

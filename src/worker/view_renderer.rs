@@ -90,7 +90,7 @@ impl ViewRenderer {
         self.levels.see(&request.cloud)
     }
 
-    /// DetailLevels of detail to draw a request by: none at rest, when all is drawn.
+    /// Levels of detail to draw a request by: none at rest, when all is drawn.
     fn tree(&mut self, request: &ViewRequest) -> Option<Arc<LodTree>> {
         match request.budget {
             QualityBudget::Full => None,
