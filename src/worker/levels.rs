@@ -20,7 +20,7 @@ type Tree = Arc<LodTree>;
 
 /// Levels of detail of the Gaussians that are drawn, which may change at any time.
 #[derive(Default)]
-pub(super) struct Levels {
+pub(super) struct DetailLevels {
     /// How many Gaussians there is time for.
     pub(super) pace: Pace,
     now: Option<Seen>,
@@ -44,7 +44,7 @@ impl Drop for Seen {
     }
 }
 
-impl Levels {
+impl DetailLevels {
     /// Looks at these Gaussians; says whether they are so many and so new that a rough picture comes first.
     pub(super) fn see(&mut self, cloud: &Versioned<GaussianCloud>) -> bool {
         if self.now.as_ref().is_some_and(|now| now.generation == cloud.generation()) {
@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn a_tree_is_built_of_what_stays_and_of_nothing_else() {
-        let (mut levels, first) = (Levels::default(), cloud(2_000));
+        let (mut levels, first) = (DetailLevels::default(), cloud(2_000));
         assert!(!levels.see(&first), "few enough to be drawn at once");
         levels.see(&first);
         assert!(levels.tree(true).is_none() && !levels.now.as_ref().is_some_and(|n| n.begun), "not yet");
@@ -133,7 +133,7 @@ mod tests {
 
     #[test]
     fn many_are_shown_roughly_at_first() {
-        let (mut levels, many) = (Levels::default(), cloud(ROUGH_FROM));
+        let (mut levels, many) = (DetailLevels::default(), cloud(ROUGH_FROM));
         assert!(levels.see(&many));
         assert!(!levels.see(&many), "once");
         assert!(levels.tree(false).is_none(), "where it will not do");

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::failure::Failure;
-use super::levels::Levels;
+use super::levels::DetailLevels;
 use super::thread::panic_failure;
 use super::view_modes::{self, ViewMode};
 use super::view_request::{QualityBudget, SecondPicture, ViewPicture, ViewRequest, ViewResult};
@@ -27,7 +27,7 @@ pub(super) struct ViewRenderer {
     beside: Option<Box<Self>>,
     /// What frames cost lately; `None` before the first.
     cost: Option<Speed>,
-    pub(super) levels: Levels,
+    pub(super) levels: DetailLevels,
     /// What was drawn of the last frame's Gaussians, if not all.
     cut: Option<Arc<Cut>>,
 }
@@ -45,7 +45,15 @@ impl ViewRenderer {
         let choice = if without_gpu { BackendChoice::Cpu } else { BackendChoice::Auto };
         let mut instead_of_gpu = None;
         let renderer = Renderer::choose(choice, |why| instead_of_gpu = Some(why)).unwrap_or_default();
-        Self { renderer, without_gpu, instead_of_gpu, beside: None, cost: None, levels: Levels::default(), cut: None }
+        Self {
+            renderer,
+            without_gpu,
+            instead_of_gpu,
+            beside: None,
+            cost: None,
+            levels: DetailLevels::default(),
+            cut: None,
+        }
     }
 
     /// Goes on with the CPU: a GPU has failed, or buffers may be in any state.
@@ -224,7 +232,7 @@ mod tests {
             instead_of_gpu: None,
             beside: None,
             cost: Some(Speed { fixed_secs, secs_per_px }),
-            levels: Levels::default(),
+            levels: DetailLevels::default(),
             cut: None,
         };
         let slow = of(0.0, 1e-6);

@@ -153,7 +153,7 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
         let project = lap(&mut clock);
         bin::bin(tiles, parts, kept.as_ref(), view.size);
         let bin = lap(&mut clock);
-        sort::sort(tiles);
+        sort::sort(&mut tiles.entries, &tiles.first);
         if CHECKED {
             validate::projected(parts)?;
             validate::binned(tiles, parts)?;

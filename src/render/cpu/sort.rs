@@ -1,11 +1,10 @@
 //! Front-to-back order of the splats: within each tile, which is all that compositing asks for. Splats stay where the
 //! projection left them, so those of a tile lie as near one another as their Gaussians do in the cloud.
 
-use std::sync::atomic::Ordering::Relaxed;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use rayon::prelude::*;
 
-use super::bin::Tiles;
 use super::project::{CHUNK, Chunk, Splat};
 use crate::math::Real;
 
@@ -58,11 +57,11 @@ impl KeptOrder {
     }
 }
 
-/// Brings each tile's entries into order.
-pub(crate) fn sort(tiles: &mut Tiles) {
-    let mut rest = tiles.entries.as_mut_slice();
-    let mut lists = Vec::with_capacity(tiles.first.len());
-    for ends in tiles.first.windows(2) {
+/// Brings each tile's entries, which end where those of the next begin, into order.
+pub(crate) fn sort(entries: &mut [AtomicU64], first: &[u32]) {
+    let mut rest = entries;
+    let mut lists = Vec::with_capacity(first.len());
+    for ends in first.windows(2) {
         let (own, others) = rest.split_at_mut((ends[1] - ends[0]) as usize);
         lists.push(own);
         rest = others;
