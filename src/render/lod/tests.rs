@@ -27,7 +27,7 @@ fn ball(n: usize) -> (GaussianCloud, Vec<u32>) {
 }
 
 fn camera(distance: f64) -> Camera {
-    let eye = DVec3::new(0.3, -0.4, -1.0).normalize() * distance;
+    let eye = DVec3::new(0.3, -0.4, -1.0).normalize_or_zero() * distance;
     Camera::look_at(eye, DVec3::ZERO, DVec3::NEG_Y, 0.8, 160, 120).expect("valid")
 }
 
