@@ -7,7 +7,7 @@ use super::{Verdict, promise};
 use fmlgs::math::Real;
 use fmlgs::math::rotation::unit_quaternion;
 use fmlgs::math::stats::worst;
-use fmlgs::pipeline::train::density::{self, DensityStats};
+use fmlgs::pipeline::train::density::{self, DensityRound, DensityStats};
 use fmlgs::pipeline::train::{TrainConfig, TrainView, trainer::Trainer};
 use fmlgs::render::cpu::CpuRenderer;
 use fmlgs::render::{ALPHA_MIN, COLOR_MAX, CloudGradient, Features, Frame, FrameGradient, RenderSettings};
@@ -303,9 +303,10 @@ pub fn training(n: &mut Numbers) -> Verdict {
         radius: (0..count).map(|_| n.plain(0.0, 1.0) as f32).collect(),
     };
     let budget = n.below(2 * count + 2);
+    let round = DensityRound { extent, budget, rounds: 1 + n.below(5) as u64, prune_large: n.chance(0.5) };
     let mut rng = n.rng();
     let Trainer { cloud, moments, .. } = &mut trainer;
-    density::control(cloud, moments, &stats, extent, budget, n.chance(0.5), &mut rng);
+    density::control(cloud, moments, &stats, &round, &mut rng);
     let state = moments.iter().chain([&*cloud]).try_for_each(GaussianCloud::validate);
     promise!(state.is_ok(), "after density control: {}", state.err().map(|e| e.to_string()).unwrap_or_default());
     promise!(cloud.len() <= budget.max(count), "{} Gaussians are over the budget", cloud.len());
