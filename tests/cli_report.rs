@@ -19,7 +19,7 @@ fn a_start_at_half_the_size_ends_nearly_as_well() {
     let psnr = |name: &str, more: &[&str]| -> f64 {
         let scene = folder.path().join(name);
         let scene = scene.to_str().unwrap();
-        let train = ["train", photos, "--out", scene, "--steps", "200", "--backend", "cpu", "--eval-every", "0", "-q"];
+        let train = ["train", photos, "--out", scene, "--steps", "500", "--backend", "cpu", "--eval-every", "0", "-q"];
         Done::from(command(&[&train[..], more].concat()).output().unwrap()).ok();
         Done::from(command(&["eval", scene, "--json"]).output().unwrap()).ok().json()["psnr"].as_f64().unwrap()
     };

@@ -150,7 +150,7 @@ mod tests {
         png(&path, &bytes, [1, 2], ColorType::L16).expect("write");
         assert_eq!(image::open(&path).expect("read").to_luma16().into_raw(), [258, 3]);
         let path = folder.path().join("a.npy");
-        npy(&path, &[1.0, 2.5, 3.0, 4.0, 5.0, 6.0], [3, 2]).expect("write");
+        npy(&path, &[1.0_f32, 2.5, 3.0, 4.0, 5.0, 6.0], [3, 2]).expect("write");
         let bytes = std::fs::read(&path).expect("read");
         let array = npyz::NpyFile::new(&bytes[..]).expect("npy");
         assert_eq!(array.shape(), [2, 3]);

@@ -221,8 +221,10 @@ fn everything_in_a_picture_is_asked_for_crop_by_crop() {
         let all = all.expect("masks");
         assert!(!all.is_empty(), "{}: nothing", network.name());
         assert!(all.iter().all(|f| f.mask.width_px() == 96 && f.mask.height_px() == 72 && !f.mask.is_empty()));
-        assert_eq!(shares.len(), 15, "five crops, three batches");
-        assert!(shares.windows(2).all(|w| w[0] < w[1]) && shares[14] < 1.0);
+        assert_eq!(shares.len(), 20, "five crops, each a look and three batches");
+        // A look is asked for with the share at which its first batch begins.
+        assert!(shares.windows(2).enumerate().all(|(i, w)| if i % 4 == 0 { w[0] == w[1] } else { w[0] < w[1] }));
+        assert!(shares[19] < 1.0);
         let mut asked = 0;
         let some = everything(&mut *network, &picture, &options, &mut |_| {
             asked += 1;

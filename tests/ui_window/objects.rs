@@ -18,7 +18,7 @@ fn objects_are_found_asked_for_renamed_hidden_and_undone() {
     w.harness.state_mut().layout.config.steps = 60;
     w.ask(Action::StartTraining);
     w.until("objects after training", |a| a.state.semantics.is_some());
-    assert!(w.shows("objects,"), "the pane counts them");
+    assert!(w.shows("parts, from the masks of"), "the pane counts them");
     let map = w.app().state.semantics.clone().expect("found");
     assert!(map.identities.iter().any(|(_, i)| i.names.iter().any(|n| n == "red controller")));
     assert!(map.language.as_ref().is_some_and(|l| l.is_valid(&map.identities)), "the encoder has looked");

@@ -66,7 +66,7 @@ pub struct TrackStep {
 }
 
 /// What was followed before a track was stopped; keeps what is followed now.
-pub trait History {
+pub trait TrackHistory {
     /// What was found there, if the track got that far. Asked in the order in which objects are followed.
     fn earlier(&mut self, step: TrackStep) -> Option<Output>;
 
@@ -77,7 +77,7 @@ pub trait History {
 /// A track that begins anew and is not kept.
 pub(super) struct Afresh;
 
-impl History for Afresh {
+impl TrackHistory for Afresh {
     fn earlier(&mut self, _: TrackStep) -> Option<Output> {
         None
     }

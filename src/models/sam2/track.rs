@@ -3,7 +3,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use super::sequence::{Afresh, FrameSource, History, ObjectId, Output, TrackStep};
+use super::sequence::{Afresh, FrameSource, ObjectId, Output, TrackHistory, TrackStep};
 use super::{Decoded, EncodedFrame, Sam2};
 use crate::math::grid::regions;
 use crate::math::resize::{Filter, resize};
@@ -271,7 +271,7 @@ impl<'a> Track<'a> {
     pub fn resume(
         &mut self,
         backward: bool,
-        history: &mut dyn History,
+        history: &mut dyn TrackHistory,
         mut seen: impl FnMut(usize, &BTreeMap<ObjectId, Output>) -> bool,
     ) -> Result<(), ModelError> {
         self.settle()?;
@@ -300,7 +300,7 @@ impl<'a> Track<'a> {
         Ok(())
     }
 
-    fn follow(&mut self, step: TrackStep, history: &mut dyn History) -> Result<Output, ModelError> {
+    fn follow(&mut self, step: TrackStep, history: &mut dyn TrackHistory) -> Result<Output, ModelError> {
         let out = match history.earlier(step) {
             Some(out) => out,
             None => {

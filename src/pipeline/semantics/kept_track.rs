@@ -11,7 +11,7 @@ use super::kept_frames::{put, take};
 use crate::io::labels::rle::Rle;
 use crate::io::{atomic, files};
 use crate::models::network::Tensor;
-use crate::models::sam2::sequence::{History, Output, TrackStep};
+use crate::models::sam2::sequence::{Output, TrackHistory, TrackStep};
 use crate::scene::Mask;
 
 /// Largest file of kept masks, and largest record of a frame, bytes.
@@ -97,7 +97,7 @@ impl KeptTrack {
     }
 }
 
-impl History for KeptTrack {
+impl TrackHistory for KeptTrack {
     fn earlier(&mut self, step: TrackStep) -> Option<Output> {
         let out = if self.resumes { self.next(step) } else { None };
         self.resumes = out.is_some();

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::merge::{Merged, Part, merge};
+use super::merge::{GaussianMoments, Merged, merge};
 use super::{LodTree, Node};
 use crate::math::morton::{BITS, interleave};
 use crate::math::{Real, sh};
@@ -58,10 +58,10 @@ impl<R: Real> LodTree<R> {
     ) {
         let known = &*self;
         let of = |number: u32| match (number as usize).checked_sub(known.leaves) {
-            None => Part::of(cloud, number as usize),
+            None => GaussianMoments::of(cloud, number as usize),
             Some(node) => {
                 let ((weight, contrast), reach) = (weighed[node], f64::from(known.nodes[node].reach));
-                Part::of(&known.merged, node).map(|part| Part { weight, reach, contrast, ..part })
+                GaussianMoments::of(&known.merged, node).map(|part| GaussianMoments { weight, reach, contrast, ..part })
             }
         };
         let made = |group: &std::ops::Range<usize>| {

@@ -20,7 +20,7 @@ const WIDEST: f64 = 1.7;
 
 /// What is merged.
 #[derive(Clone, Copy)]
-pub(super) struct Part {
+pub(super) struct GaussianMoments {
     pub(super) mean: DVec3,
     pub(super) covariance: DMat3,
     /// Opacity times area.
@@ -41,7 +41,7 @@ fn area(covariance: &DMat3) -> f64 {
     (0.5 * (trace * trace - squares)).max(0.0).sqrt()
 }
 
-impl Part {
+impl GaussianMoments {
     /// Gaussian `i`; `None` if it cannot be drawn.
     pub(super) fn of<R: Real>(cloud: &GaussianCloud<R>, i: usize) -> Option<Self> {
         let mean = DVec3::from_array(cloud.positions[i].map(Real::f64));
@@ -60,7 +60,7 @@ impl Part {
 
 /// The Gaussian of some parts.
 pub(super) struct Merged {
-    pub(super) part: Part,
+    pub(super) part: GaussianMoments,
     pub(super) log_scale: DVec3,
     /// `[w, x, y, z]`.
     pub(super) quaternion: [f64; 4],
@@ -70,12 +70,14 @@ pub(super) struct Merged {
 }
 
 /// Merges parts, of which some cannot be drawn; if none can, what comes out cannot be seen.
-pub(super) fn merge(parts: &[Option<Part>]) -> Merged {
+pub(super) fn merge(parts: &[Option<GaussianMoments>]) -> Merged {
     let usable = parts.iter().flatten();
     let total: f64 = usable.clone().map(|p| p.weight).sum();
     let count = usable.clone().count().max(1) as f64;
     // Those without any weight count alike.
-    let share = |p: &Option<Part>| p.as_ref().map_or(0.0, |p| if total > 0.0 { p.weight / total } else { 1.0 / count });
+    let share = |p: &Option<GaussianMoments>| {
+        p.as_ref().map_or(0.0, |p| if total > 0.0 { p.weight / total } else { 1.0 / count })
+    };
     let shares: Vec<f64> = parts.iter().map(share).collect();
     let each = || parts.iter().zip(&shares).filter_map(|(p, share)| Some((p.as_ref()?, *share)));
     let mean: DVec3 = each().map(|(p, share)| p.mean * share).sum();
@@ -94,7 +96,7 @@ pub(super) fn merge(parts: &[Option<Part>]) -> Merged {
     let color: DVec3 = each().map(|(p, share)| p.color * share).sum();
     let contrast = each().map(|(p, share)| (p.contrast + (p.color - color).length_squared() / 3.0) * share).sum();
     Merged {
-        part: Part { mean, covariance, weight: total, reach, color, contrast },
+        part: GaussianMoments { mean, covariance, weight: total, reach, color, contrast },
         log_scale,
         quaternion: [turn.w, turn.x, turn.y, turn.z],
         opacity_logit: (opacity / (1.0 - opacity)).ln(),
