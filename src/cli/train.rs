@@ -71,7 +71,7 @@ pub(crate) struct TrainOverrides {
     /// Keep the number of Gaussians that training starts with
     #[arg(long)]
     pub(crate) no_densify: bool,
-    /// Upper limit of Gaussians [default: what the memory holds]
+    /// Upper limit of Gaussians [default: one for two pixels of a photo, if the memory holds them]
     #[arg(long, value_parser = number::within(1..=100_000_000_usize))]
     pub(crate) max_gaussians: Option<usize>,
     /// Gaussians to start from where the dataset has no sparse points [default: 20000]

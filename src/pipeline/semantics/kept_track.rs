@@ -124,7 +124,8 @@ fn parse(mut held: &[u8]) -> Option<Output> {
 }
 
 fn checksum(bytes: &[u8]) -> [u8; 8] {
-    std::array::from_fn(|i| Sha256::digest(bytes)[i])
+    let digest = Sha256::digest(bytes);
+    std::array::from_fn(|i| digest[i])
 }
 
 #[cfg(test)]

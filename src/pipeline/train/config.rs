@@ -33,7 +33,7 @@ pub struct TrainConfig {
     pub coarse_share: f64,
     /// Whether Gaussians are added and removed on the way.
     pub densify: bool,
-    /// Upper limit of Gaussians; `None` = from the machine's memory.
+    /// Upper limit of Gaussians; `None` = from the size of the photos and the machine's memory.
     pub max_gaussians: Option<usize>,
     /// Gaussians to start from where the dataset has no sparse points.
     pub random_points: usize,
