@@ -1,6 +1,7 @@
 //! Arguments of camera commands as plain data: directions, distances, closeness. Whoever moves the camera
 //! decides what they come to in the scene.
 
+use glam::DVec3;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::navigate::target::Side;
@@ -22,6 +23,18 @@ impl Direction {
     pub const ALL: [Self; 6] = [Self::Left, Self::Right, Self::Up, Self::Down, Self::Forward, Self::Back];
     /// Those that one can turn to.
     pub const TURNS: &[Self] = Self::ALL.split_at(4).0;
+
+    /// Its axis in the eye's own frame.
+    pub(crate) fn axis(self) -> DVec3 {
+        match self {
+            Self::Forward => DVec3::Z,
+            Self::Back => DVec3::NEG_Z,
+            Self::Left => DVec3::NEG_X,
+            Self::Right => DVec3::X,
+            Self::Up => DVec3::NEG_Y,
+            Self::Down => DVec3::Y,
+        }
+    }
 
     /// Its word.
     pub fn text(self) -> &'static str {

@@ -17,8 +17,8 @@ pub enum Effect {
     Mark(Vec<IdentityId>),
     /// Whose own Gaussians are left out of the picture.
     Hidden(Vec<IdentityId>),
-    /// A scene without this one is made.
-    Remove(IdentityId),
+    /// One scene without all of these is made.
+    Remove(Vec<IdentityId>),
     /// The last change of that was undone: these are left out again.
     HiddenUndone(Vec<IdentityId>),
     /// What the user did last is to be undone.

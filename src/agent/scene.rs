@@ -40,6 +40,8 @@ pub struct SceneWorld {
     done: UndoHistory<Before>,
     /// What the user did last, which the window can undo.
     pub(crate) undoable: Option<String>,
+    /// What is to be removed once the request is done: several things go into one scene.
+    removing: Vec<IdentityId>,
     emit: Emit,
 }
 
@@ -68,6 +70,7 @@ impl SceneWorld {
             bounds,
             shares: ViewShares::default(),
             done: UndoHistory::default(),
+            removing: Vec::new(),
             undoable: None,
             emit,
         })
@@ -277,15 +280,7 @@ impl World for SceneWorld {
             (Distance::Meters(n), None) | (Distance::Relative(n), _) => n * step,
             (Distance::Default, _) => step,
         };
-        let axis = match direction {
-            Direction::Forward => DVec3::Z,
-            Direction::Back => DVec3::NEG_Z,
-            Direction::Left => DVec3::NEG_X,
-            Direction::Right => DVec3::X,
-            Direction::Up => DVec3::NEG_Y,
-            Direction::Down => DVec3::Y,
-        };
-        let (center, stopped_by_obstacle) = explored.navigator.step(&self.eye, axis, wanted);
+        let (center, stopped_by_obstacle) = explored.navigator.step(&self.eye, direction.axis(), wanted);
         let to = Pose { center, ..self.eye };
         let distance_done = self.straight(to, format!("moving {}", direction.text()))?;
         Ok(Movement { distance_done, stopped_by_obstacle })
@@ -338,8 +333,14 @@ impl World for SceneWorld {
         if self.parts.folder.is_none() {
             return Err(WorldError("only from a trained scene can something be removed; hide it instead".into()));
         }
-        (self.emit)(Effect::Remove(id));
+        self.removing.push(id);
         Ok(())
+    }
+
+    fn carry_out(&mut self) {
+        if !self.removing.is_empty() {
+            (self.emit)(Effect::Remove(std::mem::take(&mut self.removing)));
+        }
     }
 
     fn rename(&mut self, id: IdentityId, name: &str) -> Result<(), WorldError> {

@@ -104,6 +104,9 @@ impl Session {
         self.transcript.add(What::User { text: text.chars().take(2 * MAX_CHARS).collect() });
         let mut sink = ProgressSink { on, cancel };
         let mut reply = self.answer(world, &text, &mut sink);
+        if self.pending.is_none() {
+            world.carry_out();
+        }
         reply.text = self.planner.redact(&reply.text);
         reply.pending = self.awaited();
         self.transcript.add(What::Reply { text: reply.text.clone() });

@@ -1,11 +1,15 @@
 //! What the agent takes back, beside what the user does in the meantime.
 
 use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
 use std::sync::{Arc, Mutex};
 
 use glam::{DMat3, DVec3};
 
+use super::commands::Commands;
+use super::policy::Policy;
 use super::scene::{Effect, Parts, SceneWorld};
+use super::session::Session;
 use super::world::World;
 use crate::navigate::Pose;
 use crate::pipeline::semantics::answer::Basis;
@@ -23,24 +27,29 @@ fn map(name: Option<&str>) -> Arc<SemanticMap> {
     Arc::new(SemanticMap { identities, ..SemanticMap::default() })
 }
 
-/// A world in which the lamp was called a torch, and what was said of it.
-fn renamed() -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
+/// A world of this map, whose scene lies in this folder, and what is said of it.
+fn world(map: Arc<SemanticMap>, folder: Option<PathBuf>) -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
     let effects = Arc::new(Mutex::new(Vec::new()));
     let parts = Parts {
         cloud: Arc::new(GaussianCloud::default()),
         settings: RenderSettings::default(),
-        map: map(None),
+        map,
         cameras: Vec::new(),
         up: DVec3::Z,
         meters: None,
         exports: PathBuf::new(),
-        folder: None,
+        folder,
         recipe: Default::default(),
         explored: None,
     };
     let said = Arc::clone(&effects);
     let emit = Box::new(move |effect| said.lock().expect("no panic").push(effect));
-    let mut world = SceneWorld::new(parts, EYE, 1.0, emit).expect("no encoder is needed");
+    (SceneWorld::new(parts, EYE, 1.0, emit).expect("no encoder is needed"), effects)
+}
+
+/// A world in which the lamp was called a torch, and what was said of it.
+fn renamed() -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
+    let (mut world, effects) = world(map(None), None);
     world.rename(1, "torch").expect("it is there");
     (world, effects)
 }
@@ -74,6 +83,23 @@ fn what_the_user_did_last_is_undone_by_the_window() {
     assert_eq!(world.undo().expect("the user's"), "hid torch");
     assert!(matches!(effects.lock().expect("no panic").last(), Some(Effect::Undo)));
     assert!(world.undo().is_err(), "once");
+}
+
+#[test]
+fn things_that_one_request_removes_go_into_one_scene() {
+    let mut identities = Identities::default();
+    ["lamp", "chair", "table"].map(|name| identities.add(Level::Object, NOBODY, vec![name.into()]));
+    let map = Arc::new(SemanticMap { identities, ..SemanticMap::default() });
+    let (mut world, effects) = world(map, Some(PathBuf::from("scene")));
+    let mut session = Session::new(Policy::off(), Box::new(Commands::default()));
+    for text in ["remove the lamp and the table", "remove the chair"] {
+        let reply = session.say(&mut world, text, &mut |_| (), &AtomicBool::new(false));
+        assert!(reply.refused.is_none(), "{}", reply.text);
+    }
+    let effects = effects.lock().expect("no panic");
+    let removed: Vec<_> =
+        effects.iter().filter_map(|e| if let Effect::Remove(ids) = e { Some(ids) } else { None }).collect();
+    assert_eq!(removed, [&vec![1, 3], &vec![2]], "one scene for each request");
 }
 
 #[test]

@@ -107,8 +107,12 @@ pub trait World {
     /// Draws everything again.
     fn show_all(&mut self) -> Result<(), WorldError>;
 
-    /// Makes a scene of its own without an identity, what it hid closed; this one stays as it is.
+    /// Makes a scene of its own without an identity, what it hid closed; this one stays as it is. Waits for
+    /// [`Self::carry_out`].
     fn remove(&mut self, id: IdentityId) -> Result<(), WorldError>;
+
+    /// Does what waited for the end of the request: whatever is removed by one request goes into one scene.
+    fn carry_out(&mut self) {}
 
     /// Gives an identity another first name.
     fn rename(&mut self, id: IdentityId, name: &str) -> Result<(), WorldError>;

@@ -173,7 +173,7 @@ pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
         Box::new(move |effect: Effect| {
             let mut effects = effects.lock().unwrap_or_else(PoisonError::into_inner);
             effects.extend(match &effect {
-                Effect::Remove(id) => folder.as_ref().map(|folder| removed(folder, *id)),
+                Effect::Remove(ids) => folder.as_ref().map(|folder| removed(folder, ids)),
                 other => line(other),
             });
         })
@@ -300,8 +300,8 @@ impl Talk {
 }
 
 /// Makes the scene in `folder` anew without an identity, and says where.
-fn removed(folder: &Path, id: IdentityId) -> String {
-    let request = RemoveRequest { folder: folder.into(), options: RemovalOptions::of(id), retrain: false };
+fn removed(folder: &Path, ids: &[IdentityId]) -> String {
+    let request = RemoveRequest { folder: folder.into(), options: RemovalOptions::of(ids), retrain: false };
     match remove::beside(&request, &mut Silent) {
         Ok(done) => format!("{}: {}", done.folder.display(), remove::told(&done.name, &done.report)),
         Err(e) => format!("failed: {e}"),

@@ -10,6 +10,7 @@ use super::{CliError, number, output, process, view};
 use crate::jobs::bench::{self, BenchRequest};
 use crate::measure::plan::{PlanCost, PlanVariant, SIZE, Saving, table};
 use crate::pipeline::train::TrainConfig;
+use crate::scene::MaskGrid;
 
 /// Time drawing and training on this machine, stage by stage
 ///
@@ -47,6 +48,9 @@ pub(crate) struct BenchArgs {
     /// Time this network on the masks of everything in a photo: a model's name, or the path of its description
     #[arg(long, value_name = "MODEL")]
     masks: Option<String>,
+    /// At which points of the grid it is asked
+    #[arg(long, value_enum, default_value_t, requires = "masks")]
+    mask_grid: MaskGrid,
     /// That photo [default: one is made up]
     #[arg(long, value_name = "FILE", requires = "masks")]
     photo: Option<PathBuf>,
@@ -87,7 +91,7 @@ pub(crate) fn run(args: BenchArgs, quiet: bool) -> Result<(), CliError> {
         repeats: args.repeats as usize,
         gpu: args.gpu,
         queries: args.queries,
-        masks: args.masks.map(|model| (model, args.photo)),
+        masks: args.masks.map(|model| (model, args.mask_grid, args.photo)),
         strokes: args.strokes,
         moving: args.moving,
     };

@@ -16,7 +16,7 @@ use crate::pipeline::semantics::build_map::{CODE_STEPS, Carry, Found};
 use crate::pipeline::semantics::recipe::RecipeName;
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::scene::findings::Doubt;
-use crate::scene::{Findings, Identity, IdentityId, Lifting, MaskPrompt, Preparation, SemanticMap};
+use crate::scene::{Findings, Identity, IdentityId, Lifting, MaskGrid, MaskPrompt, Preparation, SemanticMap};
 
 /// Find the objects and parts of a trained scene
 ///
@@ -51,6 +51,9 @@ pub(crate) struct PreprocessArgs {
     /// What of a mask SAM 2 is given to follow [default: mask; recipe paper: points]
     #[arg(long, value_enum)]
     prompt: Option<MaskPrompt>,
+    /// At which points of its grid a network is asked for masks [default: sparing; recipe paper: all]
+    #[arg(long, value_enum)]
+    mask_grid: Option<MaskGrid>,
     /// Share of its own embedding that a part keeps in semantic deviation, the paper's w [default: 0.7]
     #[arg(long, value_parser = number::within(0.0..=1.0_f32))]
     part_weight: Option<f32>,
@@ -65,7 +68,7 @@ pub(crate) struct PreprocessArgs {
     seed: Option<String>,
     /// Add what this photo, by name, shows that is nobody's yet; objects and parts that are there stay as they are
     #[arg(long, value_name = "PHOTO", conflicts_with_all = ["seed", "max_seeds", "unknown", "recipe", "tracker", "prompt",
-        "part_weight", "lifting", "code_steps", "encoder"])]
+        "mask_grid", "part_weight", "lifting", "code_steps", "encoder"])]
     add: Option<String>,
     /// Most photos whose masks are used
     #[arg(long, default_value_t = TrackOptions::default().max_seeds, value_parser = number::within(1..=100_000_usize))]
@@ -115,6 +118,7 @@ impl PreprocessArgs {
                 lifting: self.lifting.unwrap_or(base.lifting),
                 part_weight: self.part_weight.unwrap_or(base.part_weight),
                 prompt: self.prompt.or(base.prompt).filter(|_| carry != Carry::Gaussians),
+                grid: self.mask_grid.or(base.grid),
             },
             code_steps: self.code_steps,
             seed: self.add.clone().or_else(|| self.seed.clone()),

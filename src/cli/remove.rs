@@ -20,14 +20,16 @@ use crate::scene::LevelFilter;
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs remove scene/ \"the teddy bear\" --out without_bear/\n  \
+    fmlgs remove scene/ \"the mug\" \"the kettle\" --out cleared/\n  \
     fmlgs remove scene/ \"the teddy bear\" --seed 2 --out another_fill/\n  \
     fmlgs remove scene/ \"the teddy bear\" --fill photos --out trained_without_bear/\n  \
     fmlgs remove scene/ \"lid of the kettle\" --fill none --out open_kettle/")]
 pub(crate) struct RemoveArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
-    /// What to remove
-    text: String,
+    /// What to remove; several things go into one scene without all of them
+    #[arg(required = true)]
+    texts: Vec<String>,
     /// Folder for the new scene
     #[arg(long)]
     out: PathBuf,
@@ -73,7 +75,12 @@ enum Fill {
 pub(crate) fn run(args: RemoveArgs, quiet: bool) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
     let map = scene.semantics()?;
-    let ids = query::identities(&map, &args.text, args.kind, args.top)?;
+    let mut ids = Vec::new();
+    for text in &args.texts {
+        ids.extend(query::identities(&map, text, args.kind, args.top)?);
+    }
+    ids.sort_unstable();
+    ids.dedup();
     let names: Vec<String> = ids.iter().map(|id| map.identities.full_name(*id)).collect();
     let name = names.join(", ");
     let paint = match args.fill {

@@ -16,7 +16,7 @@ use crate::pipeline::observer::{Interrupted, Observer, Severity, Silent};
 use crate::pipeline::semantics::network_segmenter::NetworkMasks;
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
 use crate::render::{Device, RenderSettings};
-use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, NOBODY, PhotoPixels};
+use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, MaskGrid, NOBODY, PhotoPixels};
 
 /// Objects and parts of the view that is asked.
 const QUERY_IDENTITIES: usize = 300;
@@ -42,7 +42,7 @@ pub(crate) struct BenchRequest {
     /// So many queries are timed.
     pub(crate) queries: Option<usize>,
     /// Network whose masks of everything in a photo are timed, and the photo, else one is made up.
-    pub(crate) masks: Option<(String, Option<PathBuf>)>,
+    pub(crate) masks: Option<(String, MaskGrid, Option<PathBuf>)>,
     /// So many strokes that select are timed in each scene.
     pub(crate) strokes: Option<usize>,
     /// Whether moving by levels of detail is timed in each cloud.
@@ -60,10 +60,10 @@ pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result
         let mut encoder = models::encoder(models::DEMO)?;
         timings.queries = Some(query::time(encoder.as_mut(), QUERY_IDENTITIES, QUERY_SIZE, count)?);
     }
-    if let Some((model, photo)) = &request.masks {
+    if let Some((model, grid, photo)) = &request.masks {
         observer.note(Severity::Info, format!("Finding everything in a photo with {model}"));
         let photo = photo.as_deref().map_or_else(|| Ok(checks()), io::photo::open)?;
-        let mut network = NetworkMasks::open(model)?;
+        let mut network = NetworkMasks::open(model, *grid)?;
         let options = network.options;
         let timed = masks::time(&mut *network.network, &options, &photo, &mut || observer.proceed().is_ok())?;
         observer.proceed()?;

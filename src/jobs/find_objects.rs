@@ -106,7 +106,7 @@ pub(crate) struct FoundObjects {
 
 /// How objects are looked for: the recipe's name, if it is one, and its choices.
 fn told(with: &FindSettings, preparation: Preparation, masks: &str, encoder: Option<&str>) -> String {
-    let Preparation { lifting, part_weight, prompt } = preparation;
+    let Preparation { lifting, part_weight, prompt, .. } = preparation;
     let named = |name: &&RecipeName| name.recipe().preparation == preparation;
     let name = RecipeName::VARIANTS.iter().find(named).map_or_else(|| "own".to_owned(), RecipeName::to_string);
     let prompt = prompt.unwrap_or_default();
@@ -166,6 +166,7 @@ pub(crate) fn run(
         lifting: preparation.lifting,
         code_steps: with.code_steps,
         part_weight: preparation.part_weight,
+        grid: None,
     };
     let masks = match (masks, &request.known, options.track.seed) {
         (Some(path), Some(_), Some(seed)) if !Labels::open(path)?.has(&photos[seed]) => {
@@ -181,7 +182,10 @@ pub(crate) fn run(
         (None, Some(name)) => Some(name.to_owned()),
         (None, None) => catalog::usable(ModelRole::Segmenter, &mut warn)?.into_iter().next(),
     };
-    let mut segmenter = segmenter(masks, cloud, settings, network.as_deref(), folder.join("cache"))?;
+    let network = network.map(|name| (name, preparation.grid.unwrap_or_default()));
+    let options = FindOptions { grid: network.as_ref().map(|(_, grid)| *grid), ..options };
+    let network = network.as_ref().map(|(name, grid)| (name.as_str(), *grid));
+    let mut segmenter = segmenter(masks, cloud, settings, network, folder.join("cache"))?;
     // What is added is looked at by the encoder that has looked at the rest.
     let looked = |map: &Arc<SemanticMap>| map.language.as_ref().map_or(NO_ENCODER.to_owned(), |l| l.encoder.clone());
     let encoder = request.known.as_ref().map(looked).or_else(|| with.encoder.clone());
@@ -193,9 +197,9 @@ pub(crate) fn run(
             .inspect_err(|e| warn(format!("Objects are found without embeddings: {e}")))
             .ok(),
     };
-    let by = network.as_deref().or(masks.map(|_| "files")).unwrap_or(REGIONS);
+    let by = network.map(|(name, _)| name).or(masks.map(|_| "files")).unwrap_or(REGIONS);
     observer.note(Severity::Info, told(with, preparation, by, encoder.as_ref().map(|e| e.name())));
-    if let Some(look) = network.as_deref().and_then(LookTime::of_installed) {
+    if let Some(look) = network.and_then(|(name, _)| LookTime::of_installed(name)) {
         let most = photos.len().min(options.track.max_seeds);
         observer.note(Severity::Info, forecast::sentence(look, most));
     }

@@ -54,9 +54,9 @@ pub(crate) struct RemovalOptions {
 }
 
 impl RemovalOptions {
-    /// One identity with its fringes and its shadow, painted as usual.
-    pub(crate) fn of(id: IdentityId) -> Self {
-        Self { ids: vec![id], halo: true, lift_shadow: true, paint: Some(Paint::default()), seed: 0 }
+    /// Identities with their fringes and shadows, painted as usual.
+    pub(crate) fn of(ids: &[IdentityId]) -> Self {
+        Self { ids: ids.to_vec(), halo: true, lift_shadow: true, paint: Some(Paint::default()), seed: 0 }
     }
 }
 

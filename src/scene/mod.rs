@@ -35,5 +35,5 @@ pub use language::{LanguageFeatures, ViewFeatures};
 pub use mask::{Mask, PixelBox};
 pub use photo::{Distortion, Photo, PhotoPixels};
 pub use plan::{Limits, Machine, Overrides, PlanLine, SceneFacts, ScenePlan};
-pub use preparation::{Lifting, MaskPrompt, PART_WEIGHT, Preparation};
+pub use preparation::{Lifting, MaskGrid, MaskPrompt, PART_WEIGHT, Preparation};
 pub use semantic_map::SemanticMap;

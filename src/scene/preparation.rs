@@ -39,6 +39,40 @@ pub enum MaskPrompt {
     Points,
 }
 
+/// Which points of its grid a network is asked at for the masks of everything in a picture.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    clap::ValueEnum,
+    strum::Display,
+    strum::VariantArray,
+)]
+#[serde(rename_all = "lowercase")]
+#[strum(serialize_all = "kebab-case")]
+pub enum MaskGrid {
+    /// Every second one, and of the others those between which something changes
+    #[default]
+    Sparing,
+    /// All of them, as the official generators (and the paper)
+    All,
+}
+
+impl MaskGrid {
+    /// In words: "all" points.
+    pub(crate) fn told(self) -> &'static str {
+        match self {
+            Self::Sparing => "half-spaced, then needed,",
+            Self::All => "all",
+        }
+    }
+}
+
 /// Share of its own embedding that a part keeps in semantic deviation, the paper's `w`.
 pub const PART_WEIGHT: f32 = 0.7;
 
@@ -52,10 +86,12 @@ pub struct Preparation {
     pub part_weight: f32,
     /// What of each mask SAM 2 followed; `None` if the Gaussians alone carried masks on.
     pub prompt: Option<MaskPrompt>,
+    /// Where a network was asked for masks; `None` if none was.
+    pub grid: Option<MaskGrid>,
 }
 
 impl Default for Preparation {
     fn default() -> Self {
-        Self { lifting: Lifting::default(), part_weight: PART_WEIGHT, prompt: None }
+        Self { lifting: Lifting::default(), part_weight: PART_WEIGHT, prompt: None, grid: None }
     }
 }

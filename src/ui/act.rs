@@ -47,7 +47,7 @@ impl App {
             Action::Evaluate => self.evaluate(),
             Action::FindObjects => self.find_objects(),
             Action::SegmentPhoto => self.segment_photo(),
-            Action::Remove(id) => self.remove(id),
+            Action::Remove(id) => self.remove(&[id]),
             Action::KeepArranged => self.keep_arranged(),
             Action::MeasureSplats => self.measure_splats(),
             Action::DeleteChosen => self.delete_chosen(),
@@ -150,6 +150,7 @@ impl App {
             | Action::Correct(_)
             | Action::Arrange(_)
             | Action::PaintTrueMask
+            | Action::BrushSplats
             | Action::Isolate(_)
             | Action::Hide(_)
             | Action::ResetView
@@ -336,7 +337,7 @@ impl App {
                 }
             }
             Effect::Hidden(ids) => self.viewport.visibility.set_hidden(ids),
-            Effect::Remove(id) => self.remove(id),
+            Effect::Remove(ids) => self.remove(&ids),
             Effect::Undo => self.edit(EditStep::Undo),
             Effect::HiddenUndone(ids) => self.edit(EditStep::UndoHidden(ids)),
             Effect::Renamed(id, name) => self.edit(EditStep::Request(EditRequest::Apply(Edit::Rename(id, name)))),

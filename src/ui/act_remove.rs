@@ -7,12 +7,12 @@ use crate::scene::IdentityId;
 use crate::worker::Command;
 
 impl App {
-    /// Makes a scene without the identity.
-    pub(super) fn remove(&mut self, id: IdentityId) {
+    /// Makes a scene without these.
+    pub(super) fn remove(&mut self, ids: &[IdentityId]) {
         let Some(folder) = self.state.scene.as_ref().filter(|_| self.state.is_trained()).map(|s| s.out.clone()) else {
             return self.state.toast(Tone::Warning, "Only from a trained scene can something be removed.");
         };
-        self.submit_removal(RemoveRequest { folder, options: RemovalOptions::of(id), retrain: false });
+        self.submit_removal(RemoveRequest { folder, options: RemovalOptions::of(ids), retrain: false });
     }
 
     /// Makes a scene without what the request says, from the one that is open.

@@ -180,8 +180,7 @@ actions! {
     TrueMask(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison with a true mask".into(),
             |p| format!("Compare with the true mask {}", p.display())),
         "Hits, misses, false alarms and IoU of the latest answer.";
-    PaintTrueMask: "Paint a true mask",
-        "Paint what the answer should be in this view. Shows hits, misses, false alarms and IoU.";
+    PaintTrueMask: "Paint a true mask", "Paint what the answer should be here: shows hits, misses, false alarms, IoU.";
     SaveTrueMask: "Save the true mask as .png\u{2026}", "White where the object is; can be loaded again.";
     GoToTarget(id: IdentityId, side: Side): format!("Go to #{id}, {}", side.text()),
         "Fly to its best view, around obstacles.";
@@ -218,6 +217,7 @@ actions! {
     KeepArranged: "Keep the arrangement", "Carry out what the view shows of a moved, duplicated or recolored thing.";
     MeasureSplats: "Clean: measure Gaussians",
         "Size, shape, opacity and neighbors of each, and what the photos show of it: finds floaters and the like.";
+    BrushSplats: "Choose Gaussians by brush", "Brush over what is chosen in the Clean pane, once it is measured.";
     DeleteChosen: "Delete the chosen Gaussians",
         "Delete what is chosen in the Clean pane; can be undone, and the scene that was opened stays as it is.";
     ExportCrop: "Export what the crop box keeps\u{2026}",

@@ -174,8 +174,9 @@ impl App {
         }
         self.explore();
         self.viewport.update(&mut self.state, &self.worker);
+        let brushed = self.viewport.take_brushed();
         let cloud = self.viewport.cloud().map(|cloud| &**cloud);
-        let chosen = self.clean.update(&mut self.state, cloud, self.layout.shows(Pane::Clean));
+        let chosen = self.clean.update(&mut self.state, cloud, brushed, self.layout.shows(Pane::Clean));
         self.viewport.visibility.set_chosen(chosen);
         self.camera.on_scene(self.state.scene_number);
         self.visited();

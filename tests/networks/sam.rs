@@ -123,6 +123,7 @@ fn options(settings: &Value, area: &Value, per_side: &Value) -> AutomaticOptions
         crop_point_divisor: 1,
         crop_nms: number("crop_nms_thresh"),
         least_region_px: area.as_u64().expect("an area") as usize,
+        sparing: false,
     }
 }
 
@@ -138,13 +139,11 @@ fn kept(known: &Value, t: &Tensors, kind: &str, options: &AutomaticOptions) -> V
     let mut collector = MaskCollector { size, side, fit, options, found: Vec::new() };
     let boxes = crops(size.0, size.1, options.crop_layers);
     for (c, (crop, _)) in boxes.iter().enumerate() {
+        let logits: Vec<f32> = logits.iter().map(|b| (f32::from(*b as i8) + shift) * step).collect();
         let answers: Vec<_> = (0..points)
             .map(|p| {
                 let k = c * points + p;
-                let planes = std::array::from_fn(|j| {
-                    let from = (k * 3 + j) * plane;
-                    logits[from..from + plane].iter().map(|b| (f32::from(*b as i8) + shift) * step).collect()
-                });
+                let planes = std::array::from_fn(|j| &logits[(k * 3 + j) * plane..(k * 3 + j + 1) * plane]);
                 let per_side = options.points_per_side;
                 let (w, h) = ((crop[2] - crop[0]) as f64, (crop[3] - crop[1]) as f64);
                 let at = |i: usize| (i as f64 + 0.5) / per_side as f64;
@@ -152,7 +151,8 @@ fn kept(known: &Value, t: &Tensors, kind: &str, options: &AutomaticOptions) -> V
                 (planes, std::array::from_fn(|j| iou.values[k * 3 + j]), point)
             })
             .collect();
-        collector.add_crop(*crop, &answers);
+        let judged = collector.judge(&answers, *crop);
+        collector.keep(judged.concat());
     }
     collector.finish(boxes.len() > 1)
 }

@@ -130,3 +130,29 @@ fn photos_alone_have_nothing_to_clean() {
     w.ask(Action::MeasureSplats);
     assert!(w.app().state.log.iter().any(|line| line.text.contains("Only trained Gaussians can be cleaned")));
 }
+
+#[test]
+fn gaussians_that_are_brushed_over_are_chosen_and_with_shift_they_are_not() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    w.ask(Action::MeasureSplats);
+    w.until("measures", |a| a.state.log.iter().any(|line| line.text.contains("Gaussians measured")));
+    w.ask(Action::BrushSplats);
+    w.until("all is drawn", |a| a.viewport.picture().is_some_and(|p| p.full && p.median_depth.is_some()));
+    assert!(w.shows("Brush over the Gaussians to choose: drag in any view."));
+    let eye = w.app().viewport.pose();
+    let middle = w.harness.get_by_role_and_label(Role::Image, "Viewport").rect().center();
+    let stroke = [-40.0, 40.0].map(|x| middle + egui::vec2(x, 0.0));
+    super::split::drag(&mut w, stroke, Modifiers::NONE);
+    w.harness.run_steps(4);
+    let chosen = |w: &Window| -> usize {
+        let label = w.harness.get_by_label_contains(" Gaussians (").value().expect("how many are chosen");
+        label.split(' ').next().and_then(|n| n.replace(',', "").parse().ok()).expect("a number")
+    };
+    let some = chosen(&w);
+    assert!(some > 0 && some < cloud(w.app()).len(), "{some}");
+    assert_eq!(w.app().viewport.pose(), eye, "the view does not turn");
+    super::split::drag(&mut w, stroke, Modifiers::SHIFT);
+    w.harness.run_steps(4);
+    assert_eq!(chosen(&w), 0, "the same stroke takes all of it out again");
+}

@@ -32,7 +32,7 @@ fn brightness(w: &mut Window) -> f64 {
 }
 
 /// Presses the button, goes elsewhere, lets go.
-fn drag(w: &mut Window, [from, to]: [Pos2; 2], modifiers: Modifiers) {
+pub(super) fn drag(w: &mut Window, [from, to]: [Pos2; 2], modifiers: Modifiers) {
     let button = |pos, pressed| Event::PointerButton { pos, button: PointerButton::Primary, pressed, modifiers };
     w.harness.event(Event::ModifiersChanged(modifiers));
     w.harness.hover_at(from);

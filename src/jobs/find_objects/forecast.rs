@@ -47,7 +47,8 @@ pub(super) fn tracking(tracker: &str, photos: usize) -> Option<String> {
     let seconds = entry.track_seconds.filter(|_| engine().is_ok_and(|e| e.is_fast()))?;
     let [look, follow] = seconds.map(|s| format::about(on_cores(s, memory::cores()) * photos as f64));
     Some(format!(
-        "{} looks at {} first ({look}), then follows each mask through them ({follow} a mask), by estimate. What is done \
+        "{} looks at {} first ({look}), then follows each mask through those that the \
+         Gaussians do not explain (at most {follow} a mask), by estimate. What is done \
          is kept if you stop it.",
         entry.title,
         things(photos, "photo")

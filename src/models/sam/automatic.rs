@@ -4,7 +4,8 @@
 
 use rayon::prelude::*;
 
-use super::{PromptedMasks, in_square};
+use super::grid_points::GridPoints;
+use super::{Prompted, PromptedMasks, in_square};
 use crate::math::grid::regions;
 use crate::models::ModelError;
 use crate::models::network::Tensor;
@@ -33,6 +34,9 @@ pub struct AutomaticOptions {
     /// Holes and islands smaller than this are filled and removed; 0 = none. In px of the picture
     /// for SAM, of the low-resolution masks for SAM 2.
     pub least_region_px: usize,
+    /// Whether points of the grid are left out between others that lie in one mask with them; the official
+    /// generators ask all.
+    pub sparing: bool,
 }
 
 impl Default for AutomaticOptions {
@@ -47,6 +51,7 @@ impl Default for AutomaticOptions {
             crop_point_divisor: 1,
             crop_nms: 0.7,
             least_region_px: 100,
+            sparing: false,
         }
     }
 }
@@ -93,12 +98,6 @@ pub fn crops(width: usize, height: usize, layers: u32) -> Vec<([usize; 4], u32)>
     boxes
 }
 
-/// The points of a grid over the unit square, row by row.
-fn grid(per_side: usize) -> Vec<[f64; 2]> {
-    let at = |i: usize| (i as f64 + 0.5) / per_side as f64;
-    (0..per_side * per_side).map(|k| [at(k % per_side), at(k / per_side)]).collect()
-}
-
 /// Masks of everything in a picture, best first. `go_on` is told the share that is done, and says
 /// whether to go on; what was found until then is returned.
 pub fn everything(
@@ -119,39 +118,51 @@ pub fn everything(
         }
         network.look(&cut(picture, crop))?;
         let per_side = (options.points_per_side / options.crop_point_divisor.max(1).pow(*layer)).max(1);
-        let points = grid(per_side);
         let scale = in_square(network, [w, h]);
-        let mut of_crop = Vec::new();
-        for (k, batch) in points.chunks(options.batch.max(1)).enumerate() {
-            if !go_on(share((k * options.batch) as f64 / points.len() as f64)) {
-                return Ok(collector.finish(boxes.len() > 1));
-            }
-            // The point, and the empty one that marks the absence of a box.
-            let coords = batch
-                .iter()
-                .flat_map(|[x, y]| [(x * w as f64 * scale[0]) as f32, (y * h as f64 * scale[1]) as f32, 0.0, 0.0]);
-            let n = batch.len();
-            let coords = Tensor::new(&[n, 2, 2], coords.collect());
-            let labels = Tensor::new(&[n, 2], [1.0, -1.0].repeat(n));
-            let answer = network.masks(coords, labels, None)?;
-            // The three masks for ambiguous prompts.
-            let low = answer.masks.shape[3];
-            for (p, [x, y]) in batch.iter().enumerate() {
-                let at = |j: usize| 4 * p + 1 + j;
-                let planes: [&[f32]; 3] =
-                    std::array::from_fn(|j| &answer.masks.values[at(j) * low * low..(at(j) + 1) * low * low]);
-                let iou = std::array::from_fn(|j| answer.iou.values[at(j)]);
-                let point = [x * w as f64 + crop[0] as f64, y * h as f64 + crop[1] as f64];
-                of_crop.push((planes.map(<[f32]>::to_vec), iou, point));
+        let at_px = |[x, y]: [f64; 2]| [x * w as f64 + crop[0] as f64, y * h as f64 + crop[1] as f64];
+        let mut points = GridPoints::new(per_side);
+        let (mut of_crop, mut asked) = (Vec::new(), 0);
+        for stage in points.stages(options.sparing) {
+            let open: Vec<usize> =
+                stage.into_iter().filter(|k| !points.is_known(*k, &of_crop, size.0, &at_px)).collect();
+            for batch in open.chunks(options.batch.max(1)) {
+                if !go_on(share(asked as f64 / points.len() as f64)) {
+                    collector.keep(of_crop);
+                    return Ok(collector.finish(boxes.len() > 1));
+                }
+                asked += batch.len();
+                // The point, and the empty one that marks the absence of a box.
+                let coords = batch.iter().map(|k| points.at(*k));
+                let coords = coords
+                    .flat_map(|[x, y]| [(x * w as f64 * scale[0]) as f32, (y * h as f64 * scale[1]) as f32, 0.0, 0.0]);
+                let n = batch.len();
+                let coords = Tensor::new(&[n, 2, 2], coords.collect());
+                let labels = Tensor::new(&[n, 2], [1.0, -1.0].repeat(n));
+                let answer = network.masks(coords, labels, None)?;
+                let answers: Vec<PointMasks<'_>> =
+                    batch.iter().enumerate().map(|(p, k)| answer.of(p, at_px(points.at(*k)))).collect();
+                for (k, found) in batch.iter().zip(collector.judge(&answers, *crop)) {
+                    points.answer(*k, of_crop.len(), &found);
+                    of_crop.extend(found);
+                }
             }
         }
-        collector.add_crop(*crop, &of_crop);
+        collector.keep(of_crop);
     }
     Ok(collector.finish(boxes.len() > 1))
 }
 
+impl Prompted {
+    /// The three masks for ambiguous prompts of a point, which lies at these px of the picture.
+    fn of(&self, point: usize, at_px: [f64; 2]) -> PointMasks<'_> {
+        let (low, first) = (self.masks.shape[3], 4 * point + 1);
+        let plane = |j: usize| &self.masks.values[(first + j) * low * low..(first + j + 1) * low * low];
+        (std::array::from_fn(plane), std::array::from_fn(|j| self.iou.values[first + j]), at_px)
+    }
+}
+
 /// A point's three planes of logits, their predicted IoU, and the point.
-pub(crate) type PointMasks = ([Vec<f32>; 3], [f32; 3], [f64; 2]);
+pub type PointMasks<'a> = ([&'a [f32]; 3], [f32; 3], [f64; 2]);
 
 /// Keeps the good ones of what a network answers.
 pub struct MaskCollector<'a> {
@@ -168,19 +179,23 @@ pub struct MaskCollector<'a> {
 }
 
 impl MaskCollector<'_> {
-    /// Takes the answers to the points of a crop.
-    pub fn add_crop(&mut self, crop: [usize; 4], answers: &[PointMasks]) {
-        let judged = answers.par_iter().flat_map_iter(|(planes, iou, point)| {
-            planes.iter().zip(iou).filter_map(|(plane, iou)| self.judge(plane, *iou, *point, crop)).collect::<Vec<_>>()
-        });
-        let found: Vec<AutomaticMask> = judged.collect();
+    /// The good ones of the answers to each point of a crop.
+    pub fn judge(&self, answers: &[PointMasks<'_>], crop: [usize; 4]) -> Vec<Vec<AutomaticMask>> {
+        let of_point = |(planes, iou, point): &PointMasks<'_>| {
+            planes.iter().zip(iou).filter_map(|(plane, iou)| self.judge_one(plane, *iou, *point, crop)).collect()
+        };
+        answers.par_iter().map(of_point).collect()
+    }
+
+    /// Takes what was found in a crop, without what repeats something better there.
+    pub fn keep(&mut self, found: Vec<AutomaticMask>) {
         let boxes: Vec<[f64; 4]> = found.iter().map(|f| f.bounds).collect();
         let scores: Vec<f32> = found.iter().map(|f| f.predicted_iou).collect();
         let kept = suppress(&boxes, &scores, self.options.box_nms);
         self.found.extend(kept.into_iter().map(|i| found[i].clone()));
     }
 
-    fn judge(&self, plane: &[f32], iou: f32, point: [f64; 2], crop: [usize; 4]) -> Option<AutomaticMask> {
+    fn judge_one(&self, plane: &[f32], iou: f32, point: [f64; 2], crop: [usize; 4]) -> Option<AutomaticMask> {
         let options = self.options;
         if options.predicted_iou > 0.0 && !(iou > options.predicted_iou) {
             return None;

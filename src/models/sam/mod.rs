@@ -4,6 +4,7 @@
 //! asks it for a grid of points and keeps what is good.
 
 pub mod automatic;
+mod grid_points;
 
 use std::path::{Path, PathBuf};
 

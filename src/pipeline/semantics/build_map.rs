@@ -20,7 +20,7 @@ use crate::models::Encoder;
 use crate::pipeline::observer::{Observer, Severity};
 use crate::render::RenderSettings;
 use crate::scene::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
-use crate::scene::{GaussianCloud, IdentityId, Lifting, PART_WEIGHT, Photo, Preparation, SemanticMap};
+use crate::scene::{GaussianCloud, IdentityId, Lifting, MaskGrid, PART_WEIGHT, Photo, Preparation, SemanticMap};
 
 pub(crate) const CODE_STEPS: u64 = 1_000;
 /// Seed of the order in which views are trained on.
@@ -50,6 +50,8 @@ pub(crate) struct FindOptions {
     pub(crate) code_steps: u64,
     /// Share of its own embedding that a part keeps in semantic deviation.
     pub(crate) part_weight: f32,
+    /// Where a network is asked for masks, if one is.
+    pub(crate) grid: Option<MaskGrid>,
 }
 
 impl Default for FindOptions {
@@ -59,6 +61,7 @@ impl Default for FindOptions {
             lifting: Lifting::default(),
             code_steps: CODE_STEPS,
             part_weight: PART_WEIGHT,
+            grid: None,
         }
     }
 }
@@ -78,12 +81,12 @@ pub(crate) fn segmenter<'a>(
     files: Option<&Path>,
     cloud: &'a GaussianCloud,
     settings: &'a RenderSettings,
-    network: Option<&str>,
+    network: Option<(&str, MaskGrid)>,
     cache: PathBuf,
 ) -> Result<Box<dyn Segmenter + 'a>, FindError> {
     Ok(match (files, network) {
         (Some(files), _) => Box::new(FileMasks(Labels::open(files)?)),
-        (None, Some(network)) => Box::new(NetworkMasks::open_kept(network, cache)?),
+        (None, Some((network, grid))) => Box::new(NetworkMasks::open_kept(network, grid, cache)?),
         (None, None) => Box::new(Regions { trained: Some((cloud, settings)), ..Regions::default() }),
     })
 }
@@ -134,7 +137,8 @@ pub(crate) fn find_objects(
     let seeds = tracked.seeds.iter().map(|&i| photos[i].name.clone()).collect();
     let mut map = SemanticMap::from_identities(identities, of, margin, seeds);
     map.findings = Some(tracked.findings(photos));
-    map.prepared = Some(Preparation { lifting: options.lifting, part_weight: options.part_weight, prompt });
+    map.prepared =
+        Some(Preparation { lifting: options.lifting, part_weight: options.part_weight, prompt, grid: options.grid });
     let Tracked { views, masks, mut secs, .. } = tracked;
     let mut timed = |stage: &'static str, start: Instant| secs.push((stage, start.elapsed().as_secs_f64()));
     let start = Instant::now();

@@ -14,7 +14,7 @@ use crate::models::sam::{PromptedMasks, Sam};
 use crate::models::sam2::Sam2;
 use crate::models::{ModelError, manifest};
 use crate::pipeline::observer::{Interrupted, Observer, Ticker};
-use crate::scene::{Level, Mask, Photo, PhotoPixels};
+use crate::scene::{Level, Mask, MaskGrid, Photo, PhotoPixels};
 
 pub(crate) struct NetworkMasks {
     pub(crate) network: Box<dyn PromptedMasks>,
@@ -39,9 +39,9 @@ const LEAST_TILE_PX: usize = 32;
 
 impl NetworkMasks {
     /// The network of this name: a model of the catalog, or the path of a model's description.
-    pub(crate) fn open(name: &str) -> Result<Self, ModelError> {
+    pub(crate) fn open(name: &str, grid: MaskGrid) -> Result<Self, ModelError> {
         let path = catalog::find(name, ModelRole::Segmenter)?;
-        let mut options = AutomaticOptions::default();
+        let mut options = AutomaticOptions { sparing: grid == MaskGrid::Sparing, ..AutomaticOptions::default() };
         let mut tile_points = options.points_per_side;
         let network: Box<dyn PromptedMasks> = match manifest::kind(&path)?.as_str() {
             "sam" => {
@@ -64,9 +64,9 @@ impl NetworkMasks {
     }
 
     /// The same, which looks at a photo once: its answers are kept in `folder`.
-    pub(crate) fn open_kept(name: &str, folder: PathBuf) -> Result<KeptMasks, FindError> {
+    pub(crate) fn open_kept(name: &str, grid: MaskGrid, folder: PathBuf) -> Result<KeptMasks, FindError> {
         let path = catalog::find(name, ModelRole::Segmenter)?;
-        let open = Self::open(name)?;
+        let open = Self::open(name, grid)?;
         // The description holds the checksums of the graphs.
         let description = std::fs::read(&path).map_err(|e| ModelError::Metadata { path, problem: e.to_string() })?;
         let asked = format!("{:?} {:?} {} {}", open.options, open.filters, open.tiles, open.tile_points);

@@ -9,7 +9,7 @@ use strum::VariantArray;
 
 use super::codes::TOLERANCE;
 use super::matching::MatchMode;
-use crate::scene::{Lifting, MaskPrompt, Preparation, SemanticMap};
+use crate::scene::{Lifting, MaskGrid, MaskPrompt, Preparation, SemanticMap};
 
 /// The canonical phrases of the paper, which mean anything.
 pub const PAPERS_PHRASES: [&str; 3] = ["object", "stuff", "texture"];
@@ -291,6 +291,7 @@ impl Recipe {
             preparation: Preparation {
                 lifting: Lifting::Paper,
                 prompt: Some(MaskPrompt::Points),
+                grid: Some(MaskGrid::All),
                 ..Preparation::default()
             },
             ..Self::default()
@@ -334,6 +335,9 @@ impl Recipe {
             let found = found.prompt.map_or_else(|| "none (masks carried by the Gaussians)".into(), |p| p.to_string());
             differs("SAM 2's prompt", prompt.to_string(), found);
         }
+        if let (Some(wanted), Some(found)) = (wanted.grid, found.grid) {
+            differs("the grid of points", wanted.to_string(), found.to_string());
+        }
         unmet
     }
 }
@@ -342,7 +346,7 @@ impl Recipe {
 impl fmt::Display for Recipe {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = self.name().map_or_else(|| "own".into(), |n| n.to_string());
-        let Preparation { lifting, part_weight, prompt } = self.preparation;
+        let Preparation { lifting, part_weight, prompt, grid } = self.preparation;
         write!(
             f,
             "recipe {name}: by {}, strategy {}, deviation {} (part weight {part_weight}), canonical phrases {}, \
@@ -357,6 +361,7 @@ impl fmt::Display for Recipe {
             255.0 * self.tolerance,
             self.rejection.told(),
         )?;
-        prompt.map_or(Ok(()), |prompt| write!(f, ", SAM 2 prompted by {prompt}"))
+        prompt.map_or(Ok(()), |prompt| write!(f, ", SAM 2 prompted by {prompt}"))?;
+        grid.map_or(Ok(()), |grid| write!(f, ", masks asked for at {} points of the grid", grid.told()))
     }
 }

@@ -118,8 +118,9 @@ pub(crate) fn track(
     let seeded = t.seed(first, segmenter, observer)?;
     tried[first] = true;
     if let (Some(follower), Some((found, ids))) = (follower, seeded) {
+        let among = t.worth_following(first, observer)?;
         let start = Instant::now();
-        t.follow(follower, first, &found, &ids, observer)?;
+        t.follow(follower, (&among, first), (&found, &ids), observer)?;
         encode_secs = follower.encode_secs;
         follow_secs = start.elapsed().as_secs_f64() - encode_secs;
     }
@@ -274,32 +275,51 @@ impl Tracker<'_> {
         Ok(Some((found, ids)))
     }
 
-    /// Follows the masks of a photo to all others, where they vote.
+    /// The photos through which masks of `seed` are followed, in their order: those that it does not explain by
+    /// itself, or all if codes are to be trained on what is followed.
+    fn worth_following(&mut self, seed: usize, observer: &mut dyn Observer) -> Result<Vec<usize>, FindError> {
+        let all = self.photos.len();
+        if self.options.keep_masks {
+            return Ok((0..all).collect());
+        }
+        let views = self.look(&self.decided(), observer)?;
+        let open = views.iter().filter(|v| v.photo == seed || v.unknown > self.options.reseed_share);
+        let mut among: Vec<usize> = open.map(|v| v.photo).collect();
+        among.sort_unstable();
+        if among.len() < all {
+            let text =
+                format!("Masks are followed through {} of {all} photos; the Gaussians explain the rest", among.len());
+            observer.note(Severity::Info, text);
+        }
+        Ok(among)
+    }
+
+    /// Follows the masks of the photo `seed` through those of `among`, where they vote.
     fn follow(
         &mut self,
         follower: &mut Sam2Tracker,
-        seed: usize,
-        found: &[FoundMask],
-        ids: &[IdentityId],
+        (among, seed): (&[usize], usize),
+        seeded: (&[FoundMask], &[IdentityId]),
         observer: &mut dyn Observer,
     ) -> Result<(), FindError> {
-        let mut followed = follower.follow(self.photos, seed, (found, ids), self.options.prompt, observer)?;
+        let photos: Vec<Photo> = among.iter().map(|i| self.photos[*i].clone()).collect();
+        let first = among.iter().position(|i| *i == seed).unwrap_or_default();
+        let followed = follower.follow(&photos, first, seeded, self.options.prompt, observer)?;
         // What is known from the seed alone: it shall not be judged by what it is to judge.
         let of = self.decided();
-        for photo in (0..self.photos.len()).filter(|photo| *photo != seed) {
-            let labels = &mut followed[photo];
+        for (&photo, mut labels) in among.iter().zip(followed).filter(|(photo, _)| **photo != seed) {
             if self.options.veto {
                 let known = self.map_of(photo, LABEL_SIDE_PX, &of)?;
-                for id in contradicted(labels, &known.identity, self.identities.len()) {
+                for id in contradicted(&labels, &known.identity, self.identities.len()) {
                     labels.iter_mut().filter(|l| **l == id).for_each(|l| *l = UNKNOWN);
                     self.disagreements.push((photo, Disagreement::Drift(id)));
                 }
             }
             let camera = self.photos[photo].camera.limited_to(LABEL_SIDE_PX);
             self.votes
-                .add_view(&mut self.renderer, self.cloud, &camera, self.settings, labels)
+                .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
                 .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e))?;
-            self.keep(photo, (camera.width_px, camera.height_px), labels);
+            self.keep(photo, (camera.width_px, camera.height_px), &labels);
         }
         Ok(())
     }

@@ -10,6 +10,7 @@ use super::super::labels::sentence;
 use super::super::state::AppState;
 use super::super::theme;
 use super::super::viewport::Viewport;
+use super::super::viewport::choosing::Brushed;
 use super::super::viewport::chosen::ChosenSplats;
 use super::histogram::Histogram;
 use crate::jobs::clean::{self, CleanRule, CloudMeasures, MeasuredCloud, SplatMeasure};
@@ -46,6 +47,8 @@ struct SplatChoice {
     /// The crop box, if what it leaves out is chosen; the selected object or part, if that is.
     crop: Option<CropBox>,
     object: Option<IdentityId>,
+    /// Those that a brush has chosen (`true`) or taken out of the choice, whatever else is said of them; may be empty.
+    brushed: Arc<Vec<Option<bool>>>,
     /// Whether what is chosen is left out of the view; else it is marked.
     hide: bool,
 }
@@ -56,6 +59,7 @@ impl CleanPane {
         &mut self,
         state: &mut AppState,
         cloud: Option<&Arc<GaussianCloud>>,
+        brushed: Vec<Brushed>,
         is_shown: bool,
     ) -> Option<Arc<ChosenSplats>> {
         if let Some(measured) = state.splats_measured.take() {
@@ -70,6 +74,10 @@ impl CleanPane {
                 let measures = measured.measures.without(&deleted.of);
                 self.take(Arc::new(MeasuredCloud { cloud: Arc::clone(cloud), measures }));
             }
+        }
+        if let Some(measured) = self.measured.clone().filter(|_| !brushed.is_empty()) {
+            brushed.iter().for_each(|brushed| self.choice.brush(brushed, measured.cloud.len()));
+            self.choose(&measured, state);
         }
         self.chosen.clone().filter(|_| is_shown)
     }
@@ -109,10 +117,18 @@ impl CleanPane {
         self.show_measure(ui, &measured.measures);
         theme::section(ui, "By color and place");
         self.choice.show_places(ui, view.picking.selected(), view.visibility.crop());
-        if before != self.choice {
-            let of = self.choice.of(&measured, state);
-            self.chosen = of.map(|of| Arc::new(ChosenSplats::new(of, self.choice.hide)));
+        let brush = Action::BrushSplats;
+        if ui.button("Brush\u{2026}").on_hover_text(brush.tooltip()).clicked() {
+            actions.push(brush);
         }
+        if before != self.choice {
+            self.choose(&measured, state);
+        }
+    }
+
+    fn choose(&mut self, measured: &MeasuredCloud, state: &AppState) {
+        let of = self.choice.of(measured, state);
+        self.chosen = of.map(|of| Arc::new(ChosenSplats::new(of, self.choice.hide)));
     }
 
     fn show_chosen(&mut self, ui: &mut Ui, measured: &MeasuredCloud, actions: &mut Vec<Action>) {
@@ -197,6 +213,12 @@ impl SplatChoice {
         });
     }
 
+    fn brush(&mut self, brushed: &Brushed, all: usize) {
+        let of = Arc::make_mut(&mut self.brushed);
+        of.resize(all, None);
+        brushed.numbers.iter().for_each(|i| of[*i] = Some(!brushed.erase));
+    }
+
     fn show_places(&mut self, ui: &mut Ui, selected: Option<IdentityId>, crop: Option<CropBox>) {
         ui.horizontal(|ui| {
             let mut on = self.color.is_some();
@@ -230,6 +252,9 @@ impl SplatChoice {
         }
         if let (Some(id), Some(map)) = (self.object, &state.semantics) {
             map.members(id).into_iter().for_each(|i| of.get_mut(i).into_iter().for_each(|of| *of = true));
+        }
+        for (of, brushed) in of.iter_mut().zip(self.brushed.iter()) {
+            *of = brushed.unwrap_or(*of);
         }
         of.contains(&true).then_some(of)
     }

@@ -4,6 +4,7 @@ use glam::DVec3;
 
 use super::arranging::ArrangeTool;
 use super::brush::Brush;
+use super::choosing::SplatBrush;
 use super::eye::Eye;
 use super::inspector::Inspector;
 use super::photo::PhotoView;
@@ -29,11 +30,11 @@ impl Viewport {
                 self.eye.frame(selected.as_ref().unwrap_or(&scene.home.bounds));
             }
             Action::Paint(of) => {
-                (self.brush, self.arrange) = (None, None);
+                self.drop_tools();
                 self.select = of.map(|of| SelectTool::new(SelectFor::New(of)));
             }
             Action::Arrange(id) => {
-                (self.brush, self.select) = (None, None);
+                self.drop_tools();
                 let up = self.up(&scene);
                 self.arrange = self
                     .cloud
@@ -41,8 +42,18 @@ impl Viewport {
                     .zip(state.semantics.as_ref().filter(|_| state.is_trained()))
                     .map(|(cloud, map)| ArrangeTool::new(*id, cloud, map, up));
             }
-            Action::Correct(id) => self.select = all.map(|_| SelectTool::new(SelectFor::Extent(*id))),
-            Action::PaintTrueMask => (self.brush, self.select) = (all.map(|_| Brush::new()), None),
+            Action::Correct(id) => {
+                self.drop_tools();
+                self.select = all.map(|_| SelectTool::new(SelectFor::Extent(*id)));
+            }
+            Action::PaintTrueMask => {
+                self.drop_tools();
+                self.brush = all.map(|_| Brush::new());
+            }
+            Action::BrushSplats => {
+                self.drop_tools();
+                self.choose = state.is_trained().then(SplatBrush::new);
+            }
             Action::Select(id) => return self.picking.select(*id),
             Action::Isolate(only) => return all.map_or((), |all| self.visibility.isolate(all, *only)),
             Action::Hide(id) => return all.map_or((), |all| self.visibility.toggle(all, *id)),
@@ -67,12 +78,22 @@ impl Viewport {
     /// Which action ends the tool that is in use.
     pub(crate) fn tool(&self) -> Option<Action> {
         let tools = [
-            (self.brush.is_some() || self.select.is_some() || self.arrange.is_some(), Action::Paint(None)),
+            (self.has_brush() || self.arrange.is_some(), Action::Paint(None)),
             (self.ruler.is_some(), Action::Measure),
             (self.cropping, Action::Crop),
             (self.inspector.is_some(), Action::Inspect),
         ];
         tools.into_iter().find(|(used, _)| *used).map(|(_, action)| action)
+    }
+
+    /// Whether dragging marks or chooses something, and does not turn the view.
+    pub(super) fn has_brush(&self) -> bool {
+        self.brush.is_some() || self.select.is_some() || self.choose.is_some()
+    }
+
+    /// Puts away what is painted, selected, chosen or moved with.
+    pub(super) fn drop_tools(&mut self) {
+        (self.brush, self.select, self.choose, self.arrange) = (None, None, None, None);
     }
 
     /// Takes up a tool in place of the one in use, or puts it away.

@@ -37,7 +37,7 @@ impl Viewport {
         let delta = DVec2::new(f64::from(delta.x), f64::from(delta.y));
         if response.dragged_by(PointerButton::Primary) {
             // Whoever paints or selects has this gesture.
-            if self.brush.is_some() || self.select.is_some() {
+            if self.has_brush() {
                 return false;
             }
             self.eye.orbit(-delta.x * ORBIT_RAD, -delta.y * ORBIT_RAD);

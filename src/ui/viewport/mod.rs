@@ -3,6 +3,7 @@
 mod act;
 pub(crate) mod arranging;
 pub(crate) mod brush;
+pub(crate) mod choosing;
 pub(crate) mod chosen;
 mod crop;
 mod display;
@@ -33,6 +34,7 @@ use glam::{DVec2, DVec3};
 
 use self::arranging::ArrangeTool;
 use self::brush::Brush;
+use self::choosing::SplatBrush;
 use self::display::Display;
 use self::eye::Eye;
 use self::inspector::Inspector;
@@ -90,6 +92,8 @@ pub struct Viewport {
     pub(crate) brush: Option<Brush>,
     /// What is being selected by clicks and strokes.
     pub(crate) select: Option<SelectTool>,
+    /// What chooses Gaussians that are brushed over.
+    choose: Option<SplatBrush>,
     /// What is being moved.
     pub(crate) arrange: Option<ArrangeTool>,
     /// Render settings in place of the scene's own.
@@ -122,6 +126,7 @@ impl Viewport {
             inspector: None,
             brush: None,
             select: None,
+            choose: None,
             arrange: None,
             overrides: RenderOverrides::default(),
             zoom_anchor: None,
@@ -165,7 +170,7 @@ impl Viewport {
             self.visibility = Visibility::default();
             self.picking = Picking::default();
             (self.ruler, self.cropping, self.inspector) = (None, false, None);
-            (self.brush, self.select, self.arrange) = (None, None, None);
+            self.drop_tools();
             self.overrides = RenderOverrides::default();
             self.eye = Eye::home(&scene.home, None);
         }
@@ -264,6 +269,7 @@ impl Viewport {
         let now = ui.input(|i| i.time);
         let under = views.under_pointer(ui);
         self.use_brush(&response, under);
+        self.use_splat_brush(&response, under);
         self.use_select_tool(&response, under, state);
         if self.handle_input(ui, &response, under, &scene) {
             self.leave_photo();
@@ -296,7 +302,7 @@ impl Viewport {
                 && !takes_clicks
                 && self.show_frusta(ui, rect, &scene, &response, layout, actions);
         }
-        let picks = self.brush.is_none() && self.select.is_none() && !takes_clicks;
+        let picks = !self.has_brush() && !takes_clicks;
         if let Some(semantics) = state.semantics.as_ref().filter(|_| picks) {
             let is_other = state.beside.is_some() && under != views.first;
             let maps = self.queries.maps().map(|m| &***m).filter(|_| !on_camera && !is_other);
@@ -326,6 +332,9 @@ impl Viewport {
             if let Some(brush) = &mut self.brush {
                 brush.paint(ui, shown, !self.queries.compares());
             }
+            if let Some(brush) = &self.choose {
+                brush.paint(ui, shown);
+            }
             if let Some(tool) = self.select.as_mut().filter(|_| !(second && state.beside.is_some())) {
                 tool.paint(ui, shown, self.queries.shown_maps());
             }
@@ -343,6 +352,9 @@ impl Viewport {
         let worked_in = views.each().last().filter(|_| works_in).map_or(views.first, |(_, rect)| rect);
         self.show_ruler_card(ui, worked_in, scene.meters_per_unit(), actions);
         if let Some(brush) = &mut self.brush {
+            brush.show(ui, worked_in, actions);
+        }
+        if let Some(brush) = &mut self.choose {
             brush.show(ui, worked_in, actions);
         }
         if let Some(tool) = &mut self.select {

@@ -117,6 +117,11 @@ impl Visibility {
         (!is_left).then_some("outside the crop box")
     }
 
+    /// The numbers of the Gaussians that are drawn, if not all.
+    pub(super) fn numbers(&self) -> Option<Arc<Vec<usize>>> {
+        self.left.as_ref().and_then(|(_, visible)| visible.numbers.clone())
+    }
+
     /// How many Gaussians are drawn, if not all.
     pub(crate) fn count(&self) -> Option<usize> {
         let hides = self.chosen.as_ref().is_none_or(|chosen| chosen.hide);

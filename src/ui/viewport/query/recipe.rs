@@ -8,7 +8,7 @@ use super::Queries;
 use crate::pipeline::semantics::recipe::{
     CanonicalPhrases, PartFeatures, Recipe, RecipeName, Rejection, RelevancyScale, Strategy, Understanding,
 };
-use crate::scene::{Lifting, MaskPrompt, SemanticMap};
+use crate::scene::{Lifting, MaskGrid, MaskPrompt, SemanticMap};
 
 impl Queries {
     /// How queries are answered in the view that is worked in.
@@ -81,6 +81,9 @@ fn choices(ui: &mut Ui, recipe: &mut Recipe) {
             .accessible_name("Part weight w")
             .on_hover_text("Share of its own embedding that a part keeps in semantic deviation");
         ui.end_row();
+        let mut grid = prepared.grid.unwrap_or_default();
+        one_of(ui, "Mask grid", MaskGrid::VARIANTS, &mut grid);
+        prepared.grid = (grid != MaskGrid::default()).then_some(grid);
         ui.weak("Masks carried by");
         ui.horizontal(|ui| {
             for (prompt, text) in [

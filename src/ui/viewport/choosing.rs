@@ -1,0 +1,166 @@
+//! Choosing Gaussians by brushing over them: those whose centers lie under the brush, on what is seen or before it, or
+//! all along the line of sight.
+
+use egui::{Align2, Area, Color32, Id, Order, PointerButton, Rect, Slider, Stroke, Ui};
+use glam::DVec2;
+
+use super::super::theme;
+use super::Viewport;
+use crate::scene::{Camera, GaussianCloud};
+use crate::ui::actions::Action;
+
+/// How far behind the surface that is drawn a center may lie to be on it, as a share of its depth.
+const ON_SURFACE: f64 = 0.02;
+
+/// Gaussians that were brushed over since that was asked last.
+pub(crate) struct Brushed {
+    pub(crate) numbers: Vec<usize>,
+    /// Whether they are taken out of the choice.
+    pub(crate) erase: bool,
+}
+
+/// The brush.
+pub(crate) struct SplatBrush {
+    radius_px: f32,
+    /// Whether what is hidden behind the surface is chosen, too.
+    through: bool,
+    /// Where the centers of the Gaussians lie in the frame of this camera; `None` are those that cannot be chosen there.
+    centers: Option<(Camera, bool, Vec<Option<DVec2>>)>,
+    brushed: Vec<Brushed>,
+}
+
+impl SplatBrush {
+    pub(crate) fn new() -> Self {
+        Self { radius_px: 18.0, through: false, centers: None, brushed: Vec::new() }
+    }
+
+    /// The Gaussians under a dab of this radius in px of the frame.
+    fn under(&self, at: DVec2, radius: f64) -> Vec<usize> {
+        let centers = self.centers.iter().flat_map(|(_, _, centers)| centers);
+        let near = |c: &Option<DVec2>| c.is_some_and(|c| c.distance_squared(at) <= radius * radius);
+        centers.enumerate().filter(|(_, c)| near(c)).map(|(i, _)| i).collect()
+    }
+
+    /// The circle that is brushed with, where the pointer is.
+    pub(super) fn paint(&self, ui: &Ui, rect: Rect) {
+        if let Some(pos) = ui.input(|i| i.pointer.hover_pos()).filter(|p| rect.contains(*p)) {
+            ui.painter().circle_stroke(pos, self.radius_px, Stroke::new(3.0, Color32::from_black_alpha(160)));
+            ui.painter().circle_stroke(pos, self.radius_px, Stroke::new(1.0, Color32::WHITE));
+        }
+    }
+
+    pub(super) fn show(&mut self, ui: &Ui, rect: Rect, actions: &mut Vec<Action>) {
+        let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(52.0));
+        let area = Area::new(Id::unique("splat brush")).order(Order::Foreground);
+        let area = area.pivot(Align2::CENTER_BOTTOM).fixed_pos(at).constrain_to(rect);
+        theme::card(ui.ctx(), area, |ui| {
+            ui.set_width((rect.width() - 40.0).clamp(200.0, 430.0));
+            ui.label("Brush over the Gaussians to choose: drag in any view.");
+            ui.weak("Shift takes out of the choice. Right-drag and wheel move the view.");
+            ui.horizontal(|ui| {
+                ui.add(Slider::new(&mut self.radius_px, 2.0..=120.0).show_value(false).text("brush"));
+                ui.checkbox(&mut self.through, "Through").on_hover_text("Choose what lies behind the surface, too.");
+                if ui.button("Done").clicked() {
+                    actions.push(Action::Paint(None));
+                }
+            });
+        });
+    }
+}
+
+/// Where the centers of what is drawn lie in a frame of this camera: those that are no farther than `depth` of the
+/// surface there, if that is given.
+fn centers(
+    cloud: &GaussianCloud,
+    numbers: Option<&[usize]>,
+    camera: &Camera,
+    depth: Option<&[f32]>,
+) -> Vec<Option<DVec2>> {
+    let (w, h) = (camera.width_px as usize, camera.height_px as usize);
+    let center = |i: usize| {
+        let world = cloud.world_position(i);
+        let at = camera.project(world)?;
+        let inside = at.min_element() >= 0.0 && at.x < w as f64 && at.y < h as f64;
+        let surface = |depth: &[f32]| depth.get(at.y as usize * w + at.x as usize).copied().unwrap_or(0.0);
+        let seen = depth.is_none_or(|depth| {
+            let surface = f64::from(surface(depth));
+            surface <= 0.0 || camera.camera_from_world(world).z <= surface * (1.0 + ON_SURFACE)
+        });
+        (inside && seen).then_some(at)
+    };
+    let mut centers = vec![None; cloud.len()];
+    match numbers {
+        Some(numbers) => numbers.iter().for_each(|i| centers[*i] = center(*i)),
+        None => centers.iter_mut().enumerate().for_each(|(i, c)| *c = center(i)),
+    }
+    centers
+}
+
+impl Viewport {
+    /// What was brushed over since this was asked last.
+    pub(crate) fn take_brushed(&mut self) -> Vec<Brushed> {
+        self.choose.as_mut().map(|brush| std::mem::take(&mut brush.brushed)).unwrap_or_default()
+    }
+
+    /// Chooses where the pointer drags or clicks; takes out of the choice with Shift.
+    pub(super) fn use_splat_brush(&mut self, response: &egui::Response, rect: Rect) {
+        let (Some(brush), Some(picture), Some(cloud)) = (&mut self.choose, self.display.picture(), &self.cloud) else {
+            return;
+        };
+        let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
+        let (Some(pos), true) = (
+            response.interact_pointer_pos(),
+            response.dragged_by(PointerButton::Primary) || response.clicked_by(PointerButton::Primary),
+        ) else {
+            return;
+        };
+        // Marks change while it is brushed, the view does not.
+        let is_here = |c: &Camera| (c.center, c.world_from_camera) == (self.eye.center, self.eye.world_from_eye);
+        let known = brush.centers.as_ref().is_some_and(|(camera, through, centers)| {
+            is_here(camera) && (*through, centers.len()) == (brush.through, cloud.len())
+        });
+        if !known {
+            // A frame that is late is not what the eye sees, and a coarse one has no depth.
+            if !picture.full || !is_here(&picture.camera) {
+                return;
+            }
+            let depth = picture.median_depth.as_deref().filter(|_| !brush.through);
+            let numbers = self.visibility.numbers();
+            let centers = centers(cloud, numbers.as_deref().map(Vec::as_slice), &picture.camera, depth);
+            brush.centers = Some((picture.camera.clone(), brush.through, centers));
+        }
+        let Some((camera, ..)) = &brush.centers else { return };
+        let scale = f64::from(camera.width_px) / f64::from(shown.width());
+        let at = DVec2::new(f64::from(pos.x - shown.left()), f64::from(pos.y - shown.top())) * scale;
+        let erase = response.ctx.input(|i| i.modifiers.shift);
+        let numbers = brush.under(at, f64::from(brush.radius_px) * scale);
+        if !numbers.is_empty() {
+            brush.brushed.push(Brushed { numbers, erase });
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    #[test]
+    fn what_is_before_the_surface_or_on_it_is_chosen_and_what_is_behind_only_through_it() {
+        let camera = Camera::look_at(DVec3::new(0.0, -4.0, 0.0), DVec3::ZERO, DVec3::Z, 0.8, 40, 40).expect("valid");
+        // Before the surface, on it, behind it, beside it on it, and behind the eye.
+        let positions = vec![[0.0, -2.0, 0.0], [0.0, 0.03, 0.0], [0.0, 2.0, 0.0], [1.0, 0.0, 0.0], [0.0, -9.0, 0.0]];
+        let cloud = GaussianCloud::isotropic(positions, 0.0, 0.0);
+        let depth = vec![4.0; 40 * 40];
+        let under = |depth, numbers| {
+            let brush = SplatBrush {
+                centers: Some((camera.clone(), false, centers(&cloud, numbers, &camera, depth))),
+                ..SplatBrush::new()
+            };
+            brush.under(DVec2::new(20.0, 20.0), 4.0)
+        };
+        assert_eq!(under(Some(&depth[..]), None), [0, 1]);
+        assert_eq!(under(None, None), [0, 1, 2]);
+        assert_eq!(under(None, Some(&[1, 3][..])), [1], "of those that are drawn");
+    }
+}
