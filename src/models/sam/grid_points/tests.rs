@@ -8,7 +8,7 @@ use crate::models::sam::{Prompted, PromptedMasks};
 use crate::scene::{Mask, PhotoPixels};
 
 /// Side of the picture and of the network's square, px, and of its low-resolution masks.
-const SIDE: usize = 512;
+const SIDE: usize = 256;
 const LOW: usize = SIDE / 4;
 
 /// Things by left, top, right and bottom px, each within those before it that it lies in.
@@ -73,14 +73,14 @@ fn found(things: &[[usize; 4]], sparing: bool) -> (Vec<Mask>, usize) {
 
 /// A table with things on it, which have parts, of which some have parts of their own.
 const THINGS: [[usize; 4]; 8] = [
-    [24, 40, 480, 488],
-    [64, 80, 256, 304],
-    [96, 112, 144, 160],
-    [104, 120, 136, 152],
-    [176, 112, 224, 148],
-    [300, 96, 448, 420],
-    [320, 120, 356, 396],
-    [396, 300, 432, 336],
+    [12, 20, 240, 244],
+    [32, 40, 128, 152],
+    [48, 56, 72, 80],
+    [52, 60, 68, 76],
+    [88, 56, 112, 74],
+    [150, 48, 224, 210],
+    [160, 60, 178, 198],
+    [198, 150, 216, 168],
 ];
 
 #[test]
@@ -96,7 +96,7 @@ fn what_is_larger_than_two_steps_of_the_grid_is_found_with_fewer_points() {
 fn what_is_smaller_than_two_steps_may_be_missed_amid_something_else() {
     // Between the points that are asked first, amid the table.
     let mut things = THINGS.to_vec();
-    things.push([276, 440, 288, 452]);
+    things.push([138, 220, 144, 226]);
     let ((all, _), (sparing, _)) = (found(&things, false), found(&things, true));
     assert_eq!((all.len(), sparing.len()), (things.len(), THINGS.len()));
 }
