@@ -89,6 +89,9 @@ pub(crate) struct PhotoSeconds {
     /// With the engine that is built in.
     #[serde(default)]
     pub(crate) built_in: Option<f64>,
+    /// What a segmenter takes with ONNX Runtime besides, for each object in the photo: its own tile is searched for parts.
+    #[serde(default)]
+    pub(crate) each_object: Option<f64>,
 }
 
 /// An archive with a program for one kind of machine.

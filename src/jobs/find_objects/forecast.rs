@@ -14,6 +14,8 @@ const MOST_CORES: usize = 8;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LookTime {
     secs: f64,
+    /// What each object in it takes besides.
+    object_secs: Option<f64>,
 }
 
 impl LookTime {
@@ -31,7 +33,9 @@ impl LookTime {
     fn estimated(entry: &ModelEntry, is_fast: bool, cores: usize) -> Option<Self> {
         let measured = entry.photo_seconds?;
         let secs = if is_fast { measured.onnx_runtime } else { measured.built_in? };
-        Some(Self { secs: on_cores(secs, cores) })
+        let slower = secs / measured.onnx_runtime;
+        let object_secs = measured.each_object.map(|object| on_cores(slower * object, cores));
+        Some(Self { secs: on_cores(secs, cores), object_secs })
     }
 
     /// For one `what`: a photo, a picture of an object.
@@ -62,13 +66,13 @@ fn on_cores(secs: f64, cores: usize) -> f64 {
 
 /// How long finding takes where up to `most_photos` are looked at.
 pub(crate) fn sentence(look: LookTime, most_photos: usize) -> String {
-    let all = format::about(look.secs * most_photos as f64);
+    let more = look.object_secs.map(|secs| format!(", and {} more for each object in it", format::about(secs)));
+    let (each, more) = (format::about(look.secs), more.unwrap_or_default());
     match most_photos {
-        0 | 1 => format!("Looking at the photo takes {all}."),
+        0 | 1 => format!("Looking at the photo takes {each}{more}."),
         n => format!(
-            "Looking at 1 to {n} photos takes {} each, {all} at most. One photo may be enough; more are looked at only where \
-             something is still unknown.",
-            format::about(look.secs)
+            "Looking at a photo takes {each}{more}. One may be enough; up to {n} are looked at where something is still \
+             unknown."
         ),
     }
 }
@@ -84,7 +88,7 @@ mod tests {
 
     #[test]
     fn more_cores_are_faster_up_to_a_point_and_the_built_in_engine_is_slower() {
-        let measured = Some(PhotoSeconds { onnx_runtime: 60.0, built_in: Some(90.0) });
+        let measured = Some(PhotoSeconds { onnx_runtime: 60.0, built_in: Some(90.0), each_object: None });
         let mut entry = entry();
         entry.photo_seconds = measured;
         let secs = |fast, cores| LookTime::estimated(&entry, fast, cores).expect("a time").secs;
@@ -97,8 +101,10 @@ mod tests {
 
     #[test]
     fn sentences_name_the_most() {
-        let look = LookTime { secs: 60.0 };
-        assert!(sentence(look, 12).contains("1 to 12 photos") && sentence(look, 12).contains("12 min"));
-        assert!(!sentence(look, 1).contains("most"));
+        let look = LookTime { secs: 60.0, object_secs: None };
+        assert!(sentence(look, 12).contains("up to 12"));
+        assert!(!sentence(look, 1).contains("up to") && !sentence(look, 1).contains("object"));
+        let with_objects = LookTime { object_secs: Some(42.0), ..look };
+        assert!(sentence(with_objects, 1).contains("50 s more for each object"));
     }
 }

@@ -1,0 +1,73 @@
+"""Joins what tools/gpu_day.sh wrote into one document (gpu_day.json) and one table (gpu_day.md).
+
+usage: table.py OUT
+"""
+
+import json
+import pathlib
+import sys
+
+
+def read(path):
+    """A step's document; a text that is none is kept as it is (the tests of kernels)."""
+    text = path.read_text(errors="replace").strip()
+    try:
+        return json.loads(text)
+    except ValueError:
+        return text[-2000:] or None
+
+
+def stages(timing):
+    return ", ".join(f"{name} {ms:.2f}" for name, ms in timing.get("stages_ms", []))
+
+
+def rows(steps):
+    """Rows of the table: what, on what, result, where the time goes."""
+    failed = steps.get("failed") or []
+    for name in failed:
+        yield [name, "", "**failed**", "see its log"]
+    if isinstance(steps.get("kernels"), str):
+        results = [line for line in steps["kernels"].splitlines() if line.startswith("test result")]
+        yield ["tests of kernels", f"{len(results)} files", "; ".join(sorted(set(r.split(".")[0] for r in results))), ""]
+    for step in ["images", "steps"]:
+        found = steps.get(step) or {}
+        for where, key in [("GPU", "gpu_render"), ("CPU", "render"), ("GPU", "gpu_train"), ("CPU", "train")]:
+            for t in found.get(key, []):
+                size = "x".join(str(n) for n in t["size"])
+                what = "image" if "render" in key else "training step"
+                yield [f"{what}, {where}", f"{t['name']}, {t['gaussians']}, {size}", f"{t['total_ms']:.2f} ms", stages(t)]
+    for name in ["gsplat_images", "gsplat_garden"]:
+        found = steps.get(name)
+        if not isinstance(found, dict):
+            continue
+        if "missing" in found:
+            yield [name.replace("_", ", "), "", "not measured", found["missing"]]
+        for t in found.get("images", []):
+            result = f"{t['total_ms']:.2f} ms" if "total_ms" in t else t["missing"]
+            yield ["image, gsplat", f"{t['name']}, {t.get('gaussians', '')}, {t.get('size', '')}", result, ""]
+        if "garden" in found:
+            t = found["garden"]
+            yield ["gsplat's garden", f"{t['gaussians']}, {t['size']}", f"image {t['image_ms']:.2f}, step {t['step_ms']:.2f} ms", ""]
+    for name, found in steps.items():
+        if name.startswith("train_") and isinstance(found, dict):
+            quality = found.get("evaluation") or {}
+            yield [f"training, {name[6:]} steps", "", f"{quality.get('psnr', 0):.2f} dB", f"{found.get('secs', 0):.1f} s"]
+
+
+def main():
+    out = pathlib.Path(sys.argv[1])
+    steps = {p.stem: read(p) for p in sorted(out.glob("*.json")) if p.name != "gpu_day.json"}
+    failed = out / "failed"
+    steps["failed"] = failed.read_text().split() if failed.exists() else []
+    adapter = (steps.get("images") or steps.get("steps") or {}).get("gpu")
+    (out / "gpu_day.json").write_text(json.dumps({"adapter": adapter, **steps}, indent=1))
+    head = [["what", "on what", "result", "where the time goes (ms)"], ["---"] * 4]
+    lines = [f"Adapter: {adapter or 'none was asked'}", ""]
+    lines += ["| " + " | ".join(cells) + " |" for cells in head + list(rows(steps))]
+    text = "\n".join(lines) + "\n"
+    (out / "gpu_day.md").write_text(text)
+    print(text)
+
+
+if __name__ == "__main__":
+    main()
