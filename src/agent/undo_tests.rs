@@ -88,7 +88,9 @@ fn what_the_user_did_last_is_undone_by_the_window() {
 #[test]
 fn things_that_one_request_removes_go_into_one_scene() {
     let mut identities = Identities::default();
-    ["lamp", "chair", "table"].map(|name| identities.add(Level::Object, NOBODY, vec![name.into()]));
+    for name in ["lamp", "chair", "table"] {
+        identities.add(Level::Object, NOBODY, vec![name.into()]);
+    }
     let map = Arc::new(SemanticMap { identities, ..SemanticMap::default() });
     let (mut world, effects) = world(map, Some(PathBuf::from("scene")));
     let mut session = Session::new(Policy::off(), Box::new(Commands::default()));

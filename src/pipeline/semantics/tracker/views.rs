@@ -3,7 +3,7 @@
 use super::super::error::FindError;
 use super::super::view_map::ViewMap;
 use super::Tracker;
-use crate::pipeline::observer::{Observer, Ticker, begin};
+use crate::pipeline::observer::{Observer, Ticker};
 use crate::scene::IdentityId;
 
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -57,16 +57,19 @@ impl Tracker<'_> {
     ) -> Result<Option<usize>, FindError> {
         let of = self.decided();
         let mut fresh = vec![false; views.len()];
-        loop {
+        let open = views.iter().filter(|v| is_open(v)).count();
+        let mut ticker = Ticker::new("Looking where most is still unknown", open);
+        for looked in 0.. {
             let open = views.iter().enumerate().filter(|(_, v)| is_open(v));
             let Some((i, _)) = open.max_by(|a, b| a.1.unknown.total_cmp(&b.1.unknown)) else { return Ok(None) };
             if fresh[i] {
                 return Ok(Some(views[i].photo));
             }
-            begin("Looking where most is still unknown", observer)?;
             views[i] = self.look_at(views[i].photo, &of)?;
             fresh[i] = true;
+            ticker.tick(looked + 1, observer)?;
         }
+        Ok(None)
     }
 }
 
