@@ -37,7 +37,7 @@ if [ -z "${FMLGS:-}" ]; then
 fi
 sizes=(--size 1280x720 --size 1920x1080) repeats=20 side=504 marks='500 1000 2000 4000'
 if [ -n "$small" ]; then
-    sizes=(--size 160x90) repeats=1 side=96 marks='20 40'
+    sizes=(--size 160x90) repeats=1 side=96 marks=10
 fi
 
 # step NAME COMMAND...: runs it, its output in OUT/NAME.json (standard output) and OUT/NAME.log.

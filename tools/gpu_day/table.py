@@ -18,7 +18,10 @@ def read(path):
 
 
 def stages(timing):
-    return ", ".join(f"{name} {ms:.2f}" for name, ms in timing.get("stages_ms", []))
+    """Where the time goes: pairs of the GPU, four numbers of the CPU."""
+    told = timing.get("stages_ms") or []
+    pairs = told if told and isinstance(told[0], list) else zip(["project", "sort", "bin", "blend"], told)
+    return ", ".join(f"{name} {ms:.2f}" for name, ms in pairs)
 
 
 def rows(steps):
@@ -35,7 +38,7 @@ def rows(steps):
             for t in found.get(key, []):
                 size = "x".join(str(n) for n in t["size"])
                 what = "image" if "render" in key else "training step"
-                yield [f"{what}, {where}", f"{t['name']}, {t['gaussians']}, {size}", f"{t['total_ms']:.2f} ms", stages(t)]
+                yield [f"{what}, {where}", f"{t['name']}, {t['gaussians']}, {size}", f"{t.get('total_ms', t.get('step_ms')):.2f} ms", stages(t)]
     for name in ["gsplat_images", "gsplat_garden"]:
         found = steps.get(name)
         if not isinstance(found, dict):
@@ -50,8 +53,9 @@ def rows(steps):
             yield ["gsplat's garden", f"{t['gaussians']}, {t['size']}", f"image {t['image_ms']:.2f}, step {t['step_ms']:.2f} ms", ""]
     for name, found in steps.items():
         if name.startswith("train_") and isinstance(found, dict):
-            quality = found.get("evaluation") or {}
-            yield [f"training, {name[6:]} steps", "", f"{quality.get('psnr', 0):.2f} dB", f"{found.get('secs', 0):.1f} s"]
+            for last in found.get("evaluations", [])[-1:]:
+                result = f"{last['psnr']:.2f} dB after {last['secs']:.1f} s"
+                yield [f"training, {name[6:]} steps", f"{last['gaussians']} Gaussians", result, ""]
 
 
 def main():
