@@ -86,7 +86,8 @@ impl ModelEntry {
     }
 
     /// Fetches it into `folder` and checks it: its files, or, of a model that can be made of its official checkpoint,
-    /// that. `from` is the address of a folder of such files or of such a checkpoint, instead of the listed one.
+    /// that. `from` is the address of a folder of such files, of a folder with such a checkpoint, or of one itself, instead
+    /// of the listed one.
     /// `progress` is told the file, its bytes that are there and those that there will be, and says whether to go on;
     /// of a checkpoint that is here, [`WEIGHTS`], those that are written and all of them.
     pub fn fetch(
@@ -105,6 +106,14 @@ impl ModelEntry {
             (Some(official), Some(url)) if is_checkpoint(url) => {
                 self.fetch_checkpoint(official, folder, url, patience, progress)?;
             }
+            (Some(official), Some(_)) => match self.fetch_files(folder, from, patience, progress) {
+                // A folder may hold what the makers publish, under its own name.
+                Err(InstallError::Fetch(FetchError::Refused { status: 404, .. })) => {
+                    let address = in_mirror(&official.url, from);
+                    self.fetch_checkpoint(official, folder, &address, patience, progress)?;
+                }
+                done => done?,
+            },
             _ => self.fetch_files(folder, from, patience, progress)?,
         }
         if let (Some(known), None) = (&self.known, from) {
@@ -213,17 +222,18 @@ mod tests {
         assert_eq!(in_mirror(url, Some("http://lab.example/nets/")), "http://lab.example/nets/net.pt");
     }
 
-    /// Serves one file after another, whatever is asked for.
+    /// Serves one file after another, whatever is asked for; nothing where the name is empty.
     fn server(files: &[&str]) -> String {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let url = format!("http://{}/clip.pt", listener.local_addr().expect("bound"));
-        let files: Vec<Vec<u8>> = files.iter().map(|name| std::fs::read(fixture(name)).expect("a fixture")).collect();
+        let files: Vec<Vec<u8>> = files.iter().map(|name| std::fs::read(fixture(name)).unwrap_or_default()).collect();
         let serve = move || {
             for bytes in files {
                 let Ok((mut stream, _)) = listener.accept() else { return };
                 let lines = BufReader::new(stream.try_clone().expect("a stream")).lines();
                 let _ = lines.map_while(Result::ok).take_while(|line| !line.is_empty()).count();
-                let head = format!("HTTP/1.1 200 OK\r\nContent-Length: {}\r\nConnection: close\r\n\r\n", bytes.len());
+                let status = if bytes.is_empty() { "404 Not Found" } else { "200 OK" };
+                let head = format!("HTTP/1.1 {status}\r\nContent-Length: {}\r\nConnection: close\r\n\r\n", bytes.len());
                 // Whoever called may have gone.
                 let _ = stream.write_all(&[head.as_bytes(), &bytes].concat());
             }
@@ -259,6 +269,20 @@ mod tests {
         let error = entry.fetch(fresh.path(), None, Patience::default(), &mut |_, _, _| true);
         assert!(error.expect_err("another model").to_string().contains("missing"));
         assert_eq!(std::fs::read_dir(fresh.path()).expect("a folder").count(), 0);
+    }
+
+    #[test]
+    fn a_folder_with_the_checkpoint_is_as_good_as_one_with_graphs() {
+        let (folder, url) = (tempfile::tempdir().expect("folder"), server(&["", "clip.pt", "", ""]));
+        let entry = reduced("https://makers.example/clip.pt");
+        let from = url.strip_suffix("/clip.pt").expect("a folder");
+        let mut fetch = |folder: &Path| entry.fetch(folder, Some(from), Patience::default(), &mut |_, _, _| true);
+        fetch(folder.path()).expect("fetched");
+        assert_eq!(entry.state(folder.path()), ModelState::Here);
+        // The control: neither is there.
+        let fresh = tempfile::tempdir().expect("folder");
+        let error = fetch(fresh.path()).expect_err("nothing").to_string();
+        assert!(error.contains("clip.pt answered 404"), "{error}");
     }
 
     #[test]
