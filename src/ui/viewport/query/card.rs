@@ -132,8 +132,19 @@ impl Queries {
         visibility: &Visibility,
         target: IdentityId,
     ) -> Option<&'static str> {
-        let hidden = visibility.why_not_drawn(&semantics.identities, target);
-        hidden.or_else(|| (self.area_of(semantics, target) == Some(0)).then_some("not in this view"))
+        if let Some(hidden) = visibility.why_not_drawn(&semantics.identities, target) {
+            return Some(hidden);
+        }
+        if self.area_of(semantics, target) != Some(0) {
+            return None;
+        }
+        let maps = self.maps.as_ref()?;
+        let Recipe { masks, tolerance, .. } = self.side.settings.recipe;
+        let is_there = || maps.mask(semantics, target, MatchMode::Identities, tolerance).area() > 0;
+        if masks == MatchMode::Codes && is_there() {
+            return Some("blended beyond the tolerance here; the exact mask shows it");
+        }
+        Some("not in this view")
     }
 
     /// The answer in a word or two, with its color and what else is to be said of it.

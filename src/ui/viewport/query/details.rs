@@ -69,22 +69,25 @@ impl Queries {
         let shown = newest.shown(&self.side.settings);
         let hits = newest.answered.answer.hits().iter().filter(|h| h.score > 0.0).take(LISTED);
         let mut chosen = None;
-        egui::Grid::new("hits").num_columns(4).striped(true).show(ui, |ui| {
-            for hit in hits {
-                let name = state.labels.full_name(&semantics.identities, hit.identity);
-                if ui.selectable_label(shown.contains(&hit.identity), RichText::new(name).strong()).clicked() {
-                    chosen = Some(hit.identity);
+        // Names may be long.
+        egui::ScrollArea::horizontal().id_salt("hits").show(ui, |ui| {
+            egui::Grid::new("hits").num_columns(4).striped(true).show(ui, |ui| {
+                for hit in hits {
+                    let name = state.labels.full_name(&semantics.identities, hit.identity);
+                    if ui.selectable_label(shown.contains(&hit.identity), RichText::new(name).strong()).clicked() {
+                        chosen = Some(hit.identity);
+                    }
+                    ui.weak(format!("{:.2}", hit.score)).on_hover_text("Score from 0 to 1");
+                    ui.weak(format!("+{:.2}", hit.margin.max(0.0))).on_hover_text("Margin over the next match");
+                    let pixels = match self.area_of(semantics, hit.identity) {
+                        Some(0) => "not in this view".to_owned(),
+                        Some(n) => format!("{} px", format::count(n as u64)),
+                        None => String::new(),
+                    };
+                    ui.weak(pixels);
+                    ui.end_row();
                 }
-                ui.weak(format!("{:.2}", hit.score)).on_hover_text("Score from 0 to 1");
-                ui.weak(format!("+{:.2}", hit.margin.max(0.0))).on_hover_text("Margin over the next match");
-                let pixels = match self.area_of(semantics, hit.identity) {
-                    Some(0) => "not in this view".to_owned(),
-                    Some(n) => format!("{} px", format::count(n as u64)),
-                    None => String::new(),
-                };
-                ui.weak(pixels);
-                ui.end_row();
-            }
+            });
         });
         self.choose(chosen);
     }

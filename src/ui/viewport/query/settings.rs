@@ -119,10 +119,11 @@ const BINS: usize = 64;
 fn histogram(ui: &mut Ui, settings: &mut OverlaySettings, heat: &[f32]) {
     let mut counts = [0_u32; BINS];
     heat.iter().for_each(|h| counts[((h * BINS as f32) as usize).min(BINS - 1)] += 1);
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.weak("Relevancy of the pixels");
         if settings.threshold > 0.0 {
             let above = heat.iter().filter(|h| **h >= settings.threshold).count();
+            let above = format::count(above as u64);
             ui.weak(format!("· {above} px at {:.2} or more, outlined in white", settings.threshold));
         }
     });
