@@ -54,12 +54,18 @@ impl DeviceRun {
         self.trainer.upload(cloud, Some([&moments[0], &moments[1]]), step)
     }
 
-    /// One step on photo `i`, which `view` is of. Does not wait for the device.
-    pub(crate) fn step(&mut self, i: usize, view: &TrainView, rates: &Rates, sh_degree: u8) -> Result<(), GpuError> {
-        match self.photos.get(i) {
-            Some(photo) => self.trainer.step(&view.camera, photo, rates, sh_degree),
-            None => Ok(()),
-        }
+    /// One step on photo `i`, which `view` is of, with harmonics up to a degree, in front of a background. Does not
+    /// wait for the device.
+    pub(crate) fn step(
+        &mut self,
+        i: usize,
+        view: &TrainView,
+        rates: &Rates,
+        (sh_degree, background): (u8, [f32; 3]),
+    ) -> Result<(), GpuError> {
+        let Some(photo) = self.photos.get(i) else { return Ok(()) };
+        self.trainer.set_background(background);
+        self.trainer.step(&view.camera, photo, rates, sh_degree)
     }
 
     /// What the steps since the last call measured; steps that did not fit into the device's

@@ -152,6 +152,9 @@ impl<'a> Job<'a> {
             }
         };
         trainer.cloud.render_mode = config.render_mode();
+        if dataset.background.is_none() {
+            trainer.before_random_colors(config.seed);
+        }
         let mut info = SceneInfo::of(dataset, held, scene.as_ref().map_or(Path::new("."), SceneFolder::path));
         info.config = serde_json::to_value(config).unwrap_or_default();
         let photos = views.iter().map(|v| v.name.clone()).collect();

@@ -2,6 +2,7 @@
 //! a device.
 
 use rand::seq::SliceRandom;
+use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
 use super::density::{self, DensityReport, DensityRound, DensityStats};
@@ -58,6 +59,9 @@ pub struct Trainer {
     pub(crate) extent: f64,
     pub(crate) budget: usize,
     settings: RenderSettings,
+    /// Where the photos do not say what is behind everything: the seed of a color for each step. What is black in them
+    /// would else stay empty, as nothing looks the same.
+    backdrops: Option<u64>,
     densify: bool,
     renderer: DifferentiableRenderer,
     losses: [PhotoLoss<f32>; 3],
@@ -80,6 +84,7 @@ impl Trainer {
             extent,
             budget: config.max_gaussians.unwrap_or(usize::MAX),
             settings: config.render_settings(Some(background)),
+            backdrops: None,
             densify: config.densify,
             renderer: DifferentiableRenderer::new(),
             losses: Default::default(),
@@ -88,6 +93,11 @@ impl Trainer {
             device: None,
             cloud,
         }
+    }
+
+    /// Trains in front of another color in every step, the same for a seed and a step.
+    pub(crate) fn before_random_colors(&mut self, seed: u64) {
+        self.backdrops = Some(seed);
     }
 
     pub(crate) fn move_to(&mut self, device: &Device, views: &[TrainView]) -> Result<(), GpuError> {
@@ -135,12 +145,16 @@ impl Trainer {
         let next = self.round.pop().map(|i| i as usize);
         let Some((i, view)) = next.and_then(|i| Some((i, views.get(i)?))) else { return Ok(Vec::new()) };
         self.settings.sh_degree = self.schedule.sh_degree(self.step);
+        let background = match self.backdrops {
+            Some(seed) => Pcg64Mcg::seed_from_u64(seed ^ self.step).random(),
+            None => self.settings.background,
+        };
         if let Some(device) = &mut self.device {
-            device.step(i, view, &self.schedule.rates(self.step), self.settings.sh_degree)?;
+            device.step(i, view, &self.schedule.rates(self.step), (self.settings.sh_degree, background))?;
             self.step += 1;
             return Ok(if self.step % REPORT_STEPS == 0 { device.results()? } else { Vec::new() });
         }
-        let settings = RenderSettings { depth: self.geometry.counts(self.step), ..self.settings.clone() };
+        let settings = RenderSettings { depth: self.geometry.counts(self.step), background, ..self.settings.clone() };
         let features = self.geometry.features(&self.cloud, view, self.step);
         let frame = self.renderer.render(&self.cloud, features, &view.camera, &settings)?;
         if settings.depth {

@@ -176,6 +176,11 @@ impl GpuTrainer {
         self.device.check()
     }
 
+    /// The color behind everything from the next step on.
+    pub(crate) fn set_background(&mut self, background: [f32; 3]) {
+        self.settings.render.background = background;
+    }
+
     /// One step on one photo, with harmonics up to `sh_degree`. Returns as soon as the work is
     /// handed to the device, except every [`RING`] steps, when losses are fetched.
     pub fn step(&mut self, camera: &Camera, photo: &DevicePhoto, rates: &Rates, sh_degree: u8) -> Result<(), GpuError> {

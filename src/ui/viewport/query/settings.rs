@@ -6,6 +6,7 @@ use strum::VariantArray;
 use super::super::super::theme;
 use super::recipe;
 use crate::math::colormap::Colormap;
+use crate::math::format;
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::scene::LevelFilter;
