@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 pub(crate) use self::file::{BatchEvaluation, BatchFile, BatchTraining, TableReaders};
-pub(crate) use self::merge::{MergedRow, Spread, merge};
+pub(crate) use self::merge::{MergedRow, merge};
 pub(crate) use self::sbatch::{ArrayScript, script};
 pub(crate) use self::shard::Shard;
 pub(crate) use self::state::UnitState;

@@ -48,7 +48,7 @@ pub(super) fn html(merged: &Merged) -> String {
          content=\"width=device-width\"><title>Results of a batch</title><style>{STYLE}</style></head><body>\n\
          <h1>Results of a batch</h1>\n<p class=\"small\">FMLGS {}. {} done, {} failed, {} unfinished. Means and standard \
          deviations are over seeds, in rows over scenes over the scenes' means. Times compare on one machine only.</p>\n",
-        escape_all_quotes(program),
+        escape_all_quotes(*program),
         format::things(units.len(), "unit"),
         failed.len(),
         unfinished.len()
