@@ -21,7 +21,7 @@ const DEEPEST: usize = 6;
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Merged {
     version: u32,
-    program: &'static str,
+    pub(super) program: &'static str,
     /// By settings and scene; those without a scene are the means over scenes.
     pub(crate) rows: Vec<MergedRow>,
     /// By name.
