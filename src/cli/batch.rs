@@ -10,8 +10,7 @@ use super::progress::Console;
 use super::train::TrainOverrides;
 use super::{CliError, STOPPED, eval, number, output, preprocess, table_args};
 use crate::jobs::batch::{
-    self, ArrayScript, BatchFile, BatchOutcome, BatchRequest, BatchTraining, Shard, TableReaders,
-    UnitState,
+    self, ArrayScript, BatchFile, BatchOutcome, BatchRequest, BatchTraining, Shard, TableReaders, UnitState,
 };
 use crate::jobs::presets;
 use crate::math::format::things;
@@ -146,7 +145,9 @@ pub(crate) fn run(args: BatchArgs, quiet: bool) -> Result<(), CliError> {
     }
     let left = request.out.display();
     if *stopped {
-        return Err(CliError::Stopped(format!("what was done is saved in {left}; the same command goes on from there")));
+        return Err(CliError::Stopped(format!(
+            "what was done is saved in {left}; the same command goes on from there"
+        )));
     }
     if !failed.is_empty() {
         let (failed, file) = (things(failed.len(), "unit"), "failed.json in their folders");

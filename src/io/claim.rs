@@ -6,7 +6,7 @@
 //! sees no change for as long as the claim itself says. On the owner's own machine nobody waits: its claim is locked,
 //! and the system frees the lock of a process that ends, however it ends.
 
-use std::fs::{self, File, OpenOptions, TryLockError};
+use std::fs::{self, File, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -164,7 +164,8 @@ fn held(number: u64, path: &Path, takeover: Duration, watch: &mut Watch) -> Opti
 
 /// Whether nobody has the lock of a file that its owner locks for life.
 fn is_free(path: &Path) -> bool {
-    File::open(path).is_ok_and(|file| file.try_lock().is_ok())
+    // Some network file systems lock only what may be written.
+    OpenOptions::new().read(true).write(true).open(path).is_ok_and(|file| file.try_lock().is_ok())
 }
 
 /// A folder that is this process's to work in. Dropped, it is given back.
@@ -181,10 +182,8 @@ impl Claim {
         let failed = |cause| write_error(&path, cause);
         let mut owner = Owner::here(takeover);
         // Before there is a word in it by which others would try the lock.
-        owner.locked = match file.try_lock() {
-            Ok(()) => true,
-            Err(TryLockError::Error(_) | TryLockError::WouldBlock) => false,
-        };
+        // Where locks keep others from reading, the heartbeat has to do.
+        owner.locked = cfg!(unix) && file.try_lock().is_ok();
         owner.write(&mut file).map_err(failed)?;
         let file = Arc::new(Mutex::new((file, owner)));
         let lost = Arc::<AtomicBool>::default();

@@ -20,8 +20,7 @@ fn leave(folder: &Path, number: u64, beats: u64, takeover: Duration, given_back:
     let claims = folder.join(FOLDER);
     fs::create_dir_all(&claims).expect("folder");
     let here = Owner::here(takeover);
-    let owner =
-        Owner { host: "node7".into(), machine: "another".into(), locked: true, beats, given_back, ..here };
+    let owner = Owner { host: "node7".into(), machine: "another".into(), locked: true, beats, given_back, ..here };
     let mut file = File::create(claims.join(format!("{number:06}.json"))).expect("file");
     owner.write(&mut file).expect("written");
 }

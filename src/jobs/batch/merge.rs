@@ -7,7 +7,7 @@ use serde::Serialize;
 use serde_json::json;
 
 use super::page;
-use super::state::{FAILURE, Failure, RESULT, UnitResult, VERSION, is_done, read};
+use super::state::{FAILURE, RESULT, UnitFailure, UnitResult, VERSION, is_done, read};
 use super::unit::{self, Asked};
 use crate::io::IoError;
 use crate::jobs::{JobError, export};
@@ -26,7 +26,7 @@ pub(crate) struct Merged {
     pub(crate) rows: Vec<MergedRow>,
     /// By name.
     pub(crate) units: Vec<UnitResult>,
-    pub(crate) failed: Vec<Failure>,
+    pub(crate) failed: Vec<UnitFailure>,
     /// Names of units that were begun and have no result.
     pub(crate) unfinished: Vec<String>,
 }
@@ -85,7 +85,7 @@ struct Found {
     folder: PathBuf,
     asked: Asked,
     result: Option<UnitResult>,
-    failure: Option<Failure>,
+    failure: Option<UnitFailure>,
 }
 
 /// Reads all units below `folders` and writes `merged.json`, `merged.csv` and `merged.html` into `out`.
@@ -146,8 +146,10 @@ fn find(folder: &Path, deepest: usize, found: &mut Vec<Found>) -> Result<(), IoE
     let file = folder.join(unit::FILE);
     if file.is_file() {
         if let Some(asked) = read(&file)? {
-            let result: Option<UnitResult> =
-                if is_done(folder) { read(&folder.join(RESULT))? } else { None };
+            let result: Option<UnitResult> = if is_done(folder) { read(&folder.join(RESULT))? } else { None };
+            if let Some(found) = result.as_ref().map(|r| u64::from(r.version)).filter(|v| *v > u64::from(VERSION)) {
+                return Err(IoError::Version { path: folder.join(RESULT), found, supported: u64::from(VERSION) });
+            }
             let asked = result.as_ref().map_or(asked, |r| r.asked.clone());
             found.push(Found { folder: folder.into(), asked, result, failure: read(&folder.join(FAILURE))? });
         }

@@ -20,7 +20,7 @@ pub(crate) use self::merge::{MergedRow, merge};
 pub(crate) use self::sbatch::{ArrayScript, script};
 pub(crate) use self::shard::Shard;
 pub(crate) use self::state::UnitState;
-use self::unit::{Asked, SceneInputs, Unit};
+use self::unit::{Asked, BatchUnit, SceneInputs};
 use self::work::{Worked, work};
 use super::{JobError, export};
 use crate::io::claim::{self, Taken, Watch};
@@ -61,7 +61,7 @@ pub(crate) struct BatchOutcome {
 
 /// A unit of the shard that can be run.
 struct Planned {
-    unit: Unit,
+    unit: BatchUnit,
     name: String,
     folder: PathBuf,
     asked: Asked,

@@ -74,7 +74,11 @@ fn quoted(word: &str) -> Result<String, JobError> {
         return Err(JobError::Batch(text));
     }
     let plain = |c: char| c.is_ascii_alphanumeric() || "/._-=+,:@%".contains(c);
-    Ok(if !word.is_empty() && word.chars().all(plain) { word.into() } else { format!("'{}'", word.replace('\'', r"'\''")) })
+    Ok(if !word.is_empty() && word.chars().all(plain) {
+        word.into()
+    } else {
+        format!("'{}'", word.replace('\'', r"'\''"))
+    })
 }
 
 #[cfg(test)]

@@ -58,7 +58,7 @@ pub(crate) struct UnitSeconds {
 
 /// Why a unit has no result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Failure {
+pub(crate) struct UnitFailure {
     pub(super) version: u32,
     pub(super) program: String,
     pub(crate) asked: Asked,
@@ -88,7 +88,7 @@ impl UnitState {
     /// If a file there cannot be read.
     pub(super) fn of(folder: &Path, asked: &Asked) -> Result<Self, IoError> {
         let there: Option<Asked> = read(&folder.join(unit::FILE))?;
-        let failure: Option<Failure> = read(&folder.join(FAILURE))?;
+        let failure: Option<UnitFailure> = read(&folder.join(FAILURE))?;
         if let Some(failure) = failure {
             return Ok(Self::Failed(failure.error));
         }

@@ -19,7 +19,7 @@ pub(super) const FILE: &str = "unit.json";
 const DEEPEST: usize = 16;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Unit {
+pub(super) struct BatchUnit {
     /// Place of its scene in the file, and of its settings.
     pub(super) scene: usize,
     pub(super) setting: usize,
@@ -62,14 +62,14 @@ fn name(scene: &str, setting: &str, seed: u64) -> String {
 }
 
 /// All units, in the order that shards are made of: the seeds of settings, the settings of scenes.
-pub(super) fn units(batch: &BatchFile) -> Vec<Unit> {
+pub(super) fn units(batch: &BatchFile) -> Vec<BatchUnit> {
     let scenes = 0..batch.scenes.len();
     let of_scene = |scene| (0..batch.settings.len()).map(move |setting| (scene, setting));
-    let of_setting = |(scene, setting)| batch.seeds.iter().map(move |&seed| Unit { scene, setting, seed });
+    let of_setting = |(scene, setting)| batch.seeds.iter().map(move |&seed| BatchUnit { scene, setting, seed });
     scenes.flat_map(of_scene).flat_map(of_setting).collect()
 }
 
-impl Unit {
+impl BatchUnit {
     pub(super) fn scene(self, batch: &BatchFile) -> &BatchScene {
         &batch.scenes[self.scene]
     }
@@ -169,7 +169,7 @@ pub(super) fn hex(bytes: &[u8]) -> String {
 }
 
 /// Refuses results in what is read, and the other way round.
-pub(super) fn check_places(request: &BatchRequest, units: &[Unit]) -> Result<(), JobError> {
+pub(super) fn check_places(request: &BatchRequest, units: &[BatchUnit]) -> Result<(), JobError> {
     for unit in units {
         let (scene, folder) = (unit.scene(&request.batch), request.out.join(unit.name(&request.batch)));
         let real_folder = real(&folder);

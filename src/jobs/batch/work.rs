@@ -15,9 +15,9 @@ use sha2::{Digest, Sha256};
 
 use super::BatchRequest;
 use super::state::{
-    FAILURE, Failure, ObjectCounts, RESULT, SCENE, UnitResult, UnitSeconds, VERSION, is_done, read, scenes,
+    FAILURE, ObjectCounts, RESULT, SCENE, UnitFailure, UnitResult, UnitSeconds, VERSION, is_done, read, scenes,
 };
-use super::unit::{self, Asked, Unit, hex};
+use super::unit::{self, Asked, BatchUnit, hex};
 use crate::io::claim::Claim;
 use crate::io::{IoError, SceneFolder, splat_ply};
 use crate::jobs::error::chain;
@@ -25,9 +25,7 @@ use crate::jobs::evaluate::{EvaluateOptions, PhotoComparison, photometric};
 use crate::jobs::find_objects::{self, FindRequest, FindSettings};
 use crate::jobs::{JobError, Scene, evaluate_masks, export, open, plan, train};
 use crate::measure::computer;
-use crate::pipeline::observer::{
-    Evaluation, Interrupted, Observer, Progress, Severity, Signal, StepMetrics,
-};
+use crate::pipeline::observer::{Evaluation, Interrupted, Observer, Progress, Severity, Signal, StepMetrics};
 use crate::scene::{Dataset, GaussianCloud, Level};
 
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
@@ -48,7 +46,7 @@ pub(super) enum Worked {
 /// If that cannot be recorded, or the folder holds results of other settings.
 pub(super) fn work(
     request: &BatchRequest,
-    unit: Unit,
+    unit: BatchUnit,
     asked: &Asked,
     (folder, claim): (&Path, &Claim),
     observer: &mut dyn Observer,
@@ -56,7 +54,7 @@ pub(super) fn work(
     if is_done(folder) {
         return Ok(Worked::Done);
     }
-    let failure: Option<Failure> = read(&folder.join(FAILURE))?;
+    let failure: Option<UnitFailure> = read(&folder.join(FAILURE))?;
     if let Some(failure) = &failure
         && !request.retry_failed
     {
@@ -73,14 +71,20 @@ pub(super) fn work(
         let path = folder.join(FAILURE);
         std::fs::remove_file(&path).map_err(|cause| crate::io::error::write_error(&path, cause))?;
     }
-    let own = inherit(folder, claim.number())?;
+    let own = match inherit(folder, claim.number()) {
+        Err(_) if claim.is_lost() => return Ok(Worked::Lost),
+        own => own?,
+    };
     let observer = &mut UnitObserver { inner: observer, lost: claim.lost() };
     let made = catch_unwind(AssertUnwindSafe(|| make(request, unit, asked, &own, observer)));
     let made = made.unwrap_or_else(|payload| Err(JobError::Batch(panic_text(&*payload))));
     match made {
         _ if claim.is_lost() => Ok(Worked::Lost),
         Ok(result) => {
-            SceneFolder::move_away(&own, &folder.join(SCENE))?;
+            match SceneFolder::move_away(&own, &folder.join(SCENE)) {
+                Err(_) if claim.is_lost() => return Ok(Worked::Lost),
+                moved => moved?,
+            }
             export::json(&folder.join(RESULT), &result)?;
             claim.forget_earlier();
             Ok(Worked::Done)
@@ -89,7 +93,7 @@ pub(super) fn work(
         Err(e) => {
             let error = chain(&e);
             let (program, host) = (PROGRAM.into(), host());
-            let failure = Failure { version: VERSION, program, asked: asked.clone(), error: error.clone(), host };
+            let failure = UnitFailure { version: VERSION, program, asked: asked.clone(), error: error.clone(), host };
             export::json(&folder.join(FAILURE), &failure)?;
             Ok(Worked::Failed(error))
         }
@@ -120,7 +124,7 @@ fn inherit(folder: &Path, claim: u64) -> Result<PathBuf, IoError> {
 
 fn make(
     request: &BatchRequest,
-    unit: Unit,
+    unit: BatchUnit,
     asked: &Asked,
     folder: &Path,
     observer: &mut dyn Observer,
@@ -165,7 +169,7 @@ fn make(
 /// Finds objects, and counts them and the seconds that took.
 fn objects(
     request: &BatchRequest,
-    unit: Unit,
+    unit: BatchUnit,
     (folder, with): (&Path, &FindSettings),
     dataset: &Arc<Dataset>,
     observer: &mut dyn Observer,
@@ -193,7 +197,7 @@ fn objects(
 /// Colors and objects beside photos and labels that were held out; `None` for what there is none of.
 fn compare(
     request: &BatchRequest,
-    unit: Unit,
+    unit: BatchUnit,
     scene: &Scene,
     dataset: Arc<Dataset>,
     observer: &mut dyn Observer,
