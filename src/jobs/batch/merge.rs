@@ -6,11 +6,10 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde_json::json;
 
-use super::page;
 use super::state::{FAILURE, RESULT, UnitFailure, UnitResult, VERSION, is_done, read};
-use super::unit::{self, Asked};
+use super::unit::{self, UnitRequest};
 use crate::io::IoError;
-use crate::jobs::{JobError, export};
+use crate::jobs::JobError;
 use crate::math::stats::mean;
 use crate::pipeline::observer::{Observer, Severity};
 
@@ -19,7 +18,7 @@ const DEEPEST: usize = 6;
 
 /// All units of some batches.
 #[derive(Clone, Debug, Serialize)]
-pub(crate) struct Merged {
+pub(crate) struct MergedResults {
     version: u32,
     pub(super) program: &'static str,
     /// By settings and scene; those without a scene are the means over scenes.
@@ -83,17 +82,17 @@ impl UnitResult {
 /// A unit's folder and what is in it.
 struct Found {
     folder: PathBuf,
-    asked: Asked,
+    asked: UnitRequest,
     result: Option<UnitResult>,
     failure: Option<UnitFailure>,
 }
 
-/// Reads all units below `folders` and writes `merged.json`, `merged.csv` and `merged.html` into `out`.
+/// Reads all units below `folders`.
 ///
 /// # Errors
 /// If there are no units, results do not go together (settings of one name that are not the same, in one scene or in
-/// two; a scene of one name with other photos), or a file cannot be read or written.
-pub(crate) fn merge(folders: &[PathBuf], out: &Path, observer: &mut dyn Observer) -> Result<Merged, JobError> {
+/// two; a scene of one name with other photos), or a file cannot be read.
+pub(super) fn collect(folders: &[PathBuf], observer: &mut dyn Observer) -> Result<MergedResults, JobError> {
     let mut found = Vec::new();
     for folder in folders {
         let before = found.len();
@@ -120,13 +119,14 @@ pub(crate) fn merge(folders: &[PathBuf], out: &Path, observer: &mut dyn Observer
             (None, None) => unfinished.push(name),
         }
     }
-    let merged =
-        Merged { version: VERSION, program: env!("CARGO_PKG_VERSION"), rows: rows(&units), units, failed, unfinished };
-    export::make_folder(out)?;
-    export::json(&out.join("merged.json"), &merged)?;
-    export::text(&out.join("merged.csv"), &merged.csv())?;
-    export::text(&out.join("merged.html"), &page::html(&merged))?;
-    Ok(merged)
+    Ok(MergedResults {
+        version: VERSION,
+        program: env!("CARGO_PKG_VERSION"),
+        rows: rows(&units),
+        units,
+        failed,
+        unfinished,
+    })
 }
 
 /// Of two folders of one unit, the one that is farther.
@@ -168,11 +168,11 @@ fn find(folder: &Path, deepest: usize, found: &mut Vec<Found>) -> Result<(), IoE
 fn check(found: &[Found]) -> Result<(), JobError> {
     let mut seen: BTreeMap<[&str; 2], &Found> = BTreeMap::new();
     // What must be the same for two results under one name to be of the same kind.
-    let of_setting = |a: &Asked| {
+    let of_setting = |a: &UnitRequest| {
         let config = crate::pipeline::train::TrainConfig { seed: 0, ..a.config.clone() };
         json!({ "config": config, "plan": a.plan, "objects": a.objects, "eval": a.eval })
     };
-    let of_scene = |a: &Asked| json!({ "photos": a.photos, "masks": a.masks, "query": a.query });
+    let of_scene = |a: &UnitRequest| json!({ "photos": a.photos, "masks": a.masks, "query": a.query });
     for unit in found {
         let asked = &unit.asked;
         let kinds = [("settings", &asked.setting, of_setting(asked)), ("scene", &asked.scene, of_scene(asked))];
@@ -231,9 +231,9 @@ fn rows(units: &[UnitResult]) -> Vec<MergedRow> {
     rows
 }
 
-impl Merged {
+impl MergedResults {
     /// A line for each unit that has a result.
-    fn csv(&self) -> String {
+    pub(super) fn csv(&self) -> String {
         // What begins with these is a formula to some spreadsheets.
         let cell = |text: &str| {
             let text = if text.starts_with(['=', '+', '-', '@']) { format!("'{text}") } else { text.to_owned() };

@@ -16,11 +16,12 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 pub(crate) use self::file::{BatchEvaluation, BatchFile, BatchTraining, TableReaders};
-pub(crate) use self::merge::{MergedRow, merge};
+use self::merge::MergedResults;
+pub(crate) use self::merge::MergedRow;
 pub(crate) use self::sbatch::{ArrayScript, script};
 pub(crate) use self::shard::Shard;
 pub(crate) use self::state::UnitState;
-use self::unit::{Asked, BatchUnit, SceneInputs};
+use self::unit::{BatchUnit, SceneInputs, UnitRequest};
 use self::work::{Worked, work};
 use super::{JobError, export};
 use crate::io::claim::{self, Taken, Watch};
@@ -64,7 +65,7 @@ struct Planned {
     unit: BatchUnit,
     name: String,
     folder: PathBuf,
-    asked: Asked,
+    asked: UnitRequest,
 }
 
 /// The units of a shard, and where each stands.
@@ -194,6 +195,19 @@ fn check_networks(batch: &BatchFile) -> Result<(), JobError> {
         catalog::find(&with.tracker, ModelRole::Segmenter).map_err(|e| told("tracker-model", e))?;
     }
     Ok(())
+}
+
+/// Merges the results of all units below `folders`, and writes `merged.json`, `merged.csv` and `merged.html` into `out`.
+///
+/// # Errors
+/// If results do not go together, or a file cannot be read or written.
+pub(crate) fn merge(folders: &[PathBuf], out: &Path, observer: &mut dyn Observer) -> Result<MergedResults, JobError> {
+    let merged = merge::collect(folders, observer)?;
+    export::make_folder(out)?;
+    export::json(&out.join("merged.json"), &merged)?;
+    export::text(&out.join("merged.csv"), &merged.csv())?;
+    export::text(&out.join("merged.html"), &page::html(&merged))?;
+    Ok(merged)
 }
 
 fn changed(folder: &Path, what: &str) -> JobError {

@@ -2,7 +2,7 @@
 
 use htmlize::escape_all_quotes;
 
-use super::merge::{Merged, MergedRow, Spread};
+use super::merge::{MergedResults, MergedRow, Spread};
 use super::state::UnitResult;
 use crate::math::format;
 use crate::measure::page::STYLE;
@@ -41,8 +41,8 @@ impl MergedRow {
     }
 }
 
-pub(super) fn html(merged: &Merged) -> String {
-    let Merged { rows, units, failed, unfinished, program, .. } = merged;
+pub(super) fn html(merged: &MergedResults) -> String {
+    let MergedResults { rows, units, failed, unfinished, program, .. } = merged;
     let mut out = format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" \
          content=\"width=device-width\"><title>Results of a batch</title><style>{STYLE}</style></head><body>\n\

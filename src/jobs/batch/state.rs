@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use super::unit::{self, Asked};
+use super::unit::{self, UnitRequest};
 use crate::io::{IoError, claim, files, trained};
 use crate::measure::Computer;
 use crate::pipeline::observer::Evaluation;
@@ -25,7 +25,7 @@ pub(crate) struct UnitResult {
     pub(super) version: u32,
     /// Version of the program.
     pub(super) program: String,
-    pub(crate) asked: Asked,
+    pub(crate) asked: UnitRequest,
     /// On photos that were held out, if any were.
     pub(crate) evaluation: Option<Evaluation>,
     pub(crate) gaussians: usize,
@@ -61,7 +61,7 @@ pub(crate) struct UnitSeconds {
 pub(crate) struct UnitFailure {
     pub(super) version: u32,
     pub(super) program: String,
-    pub(crate) asked: Asked,
+    pub(crate) asked: UnitRequest,
     pub(crate) error: String,
     pub(super) host: String,
 }
@@ -86,8 +86,8 @@ impl UnitState {
     ///
     /// # Errors
     /// If a file there cannot be read.
-    pub(super) fn of(folder: &Path, asked: &Asked) -> Result<Self, IoError> {
-        let there: Option<Asked> = read(&folder.join(unit::FILE))?;
+    pub(super) fn of(folder: &Path, asked: &UnitRequest) -> Result<Self, IoError> {
+        let there: Option<UnitRequest> = read(&folder.join(unit::FILE))?;
         let failure: Option<UnitFailure> = read(&folder.join(FAILURE))?;
         if let Some(failure) = failure {
             return Ok(Self::Failed(failure.error));

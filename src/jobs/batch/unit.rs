@@ -28,7 +28,7 @@ pub(super) struct BatchUnit {
 
 /// What a unit is asked: with another answer to any of it, its result is another.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct Asked {
+pub(crate) struct UnitRequest {
     pub(crate) scene: String,
     pub(crate) setting: String,
     pub(crate) seed: u64,
@@ -44,7 +44,7 @@ pub(crate) struct Asked {
     pub(crate) eval: Value,
 }
 
-impl Asked {
+impl UnitRequest {
     /// "garden/fast/seed-0".
     pub(crate) fn name(&self) -> String {
         name(&self.scene, &self.setting, self.seed)
@@ -85,10 +85,10 @@ impl BatchUnit {
     }
 
     /// What it is asked, if its scene's files are `inputs`.
-    pub(super) fn asked(self, batch: &BatchFile, inputs: &SceneInputs) -> Asked {
+    pub(super) fn asked(self, batch: &BatchFile, inputs: &SceneInputs) -> UnitRequest {
         let usual = TrainConfig::default();
         let (setting, eval) = (&batch.settings[self.setting], &batch.eval);
-        Asked {
+        UnitRequest {
             scene: self.scene(batch).name.clone(),
             setting: setting.name.clone(),
             seed: self.seed,

@@ -17,7 +17,7 @@ use super::BatchRequest;
 use super::state::{
     FAILURE, ObjectCounts, RESULT, SCENE, UnitFailure, UnitResult, UnitSeconds, VERSION, is_done, read, scenes,
 };
-use super::unit::{self, Asked, BatchUnit, hex};
+use super::unit::{self, BatchUnit, UnitRequest, hex};
 use crate::io::claim::Claim;
 use crate::io::{IoError, SceneFolder, splat_ply};
 use crate::jobs::error::chain;
@@ -47,7 +47,7 @@ pub(super) enum Worked {
 pub(super) fn work(
     request: &BatchRequest,
     unit: BatchUnit,
-    asked: &Asked,
+    asked: &UnitRequest,
     (folder, claim): (&Path, &Claim),
     observer: &mut dyn Observer,
 ) -> Result<Worked, JobError> {
@@ -60,7 +60,7 @@ pub(super) fn work(
     {
         return Ok(Worked::Failed(failure.error.clone()));
     }
-    let there: Option<Asked> = read(&folder.join(unit::FILE))?;
+    let there: Option<UnitRequest> = read(&folder.join(unit::FILE))?;
     if let Some(what) = there.as_ref().and_then(|there| there.difference(asked)) {
         set_aside(folder, claim.number(), failure.is_some(), &what)?;
     }
@@ -125,7 +125,7 @@ fn inherit(folder: &Path, claim: u64) -> Result<PathBuf, IoError> {
 fn make(
     request: &BatchRequest,
     unit: BatchUnit,
-    asked: &Asked,
+    asked: &UnitRequest,
     folder: &Path,
     observer: &mut dyn Observer,
 ) -> Result<UnitResult, JobError> {
