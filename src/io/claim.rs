@@ -45,11 +45,12 @@ struct Owner {
 
 impl Owner {
     fn here(takeover: Duration) -> Self {
-        let host = sysinfo::System::host_name().unwrap_or_else(|_| "this machine".into());
+        // As long as systems take, so that the whole fits.
+        let plain = |c: &char| c.is_ascii_alphanumeric() || ".-_".contains(*c);
+        let host: String = sysinfo::System::host_name().unwrap_or_default().chars().filter(plain).take(64).collect();
         Self {
             machine: machine(&host),
-            // So that the whole fits.
-            host: host.chars().take(64).collect(),
+            host,
             process: std::process::id(),
             locked: false,
             takeover_secs: takeover.as_secs_f64(),
@@ -70,7 +71,7 @@ impl Owner {
 fn machine(host: &str) -> String {
     let boot = fs::read_to_string("/proc/sys/kernel/random/boot_id");
     let mounts = fs::read_link("/proc/self/ns/mnt").map(|p| p.display().to_string()).unwrap_or_default();
-    boot.map_or_else(|_| host.chars().take(64).collect(), |boot| format!("{} {mounts}", boot.trim()))
+    boot.map_or_else(|_| host.to_owned(), |boot| format!("{} {mounts}", boot.trim()))
 }
 
 /// What somebody who waits for a folder has seen of its claims.
@@ -101,7 +102,7 @@ pub(crate) fn take(folder: &Path, takeover: Duration, watch: &mut Watch) -> Resu
     fs::create_dir_all(&claims).map_err(|cause| write_error(&claims, cause))?;
     let number = match last(&claims)? {
         None => 1,
-        Some((number, path)) => match held(number, &path, takeover, watch) {
+        Some((number, path)) => match held(number, &path, takeover, watch)? {
             Some(held) => return Ok(held),
             None => number + 1,
         },
@@ -120,7 +121,7 @@ pub(crate) fn take(folder: &Path, takeover: Duration, watch: &mut Watch) -> Resu
 /// Who holds `folder`, if somebody does as far as can be seen without waiting.
 pub(crate) fn holder(folder: &Path) -> Result<Option<String>, IoError> {
     let Some((number, path)) = last(&folder.join(FOLDER))? else { return Ok(None) };
-    let held = held(number, &path, Duration::MAX, &mut Watch::default());
+    let held = held(number, &path, Duration::MAX, &mut Watch::default())?;
     Ok(held.and_then(|held| match held {
         Taken::Held { by, .. } => Some(by),
         Taken::Mine(_) => None,
@@ -138,20 +139,24 @@ fn last(claims: &Path) -> Result<Option<(u64, PathBuf)>, IoError> {
 }
 
 /// The claim as somebody else's, unless it may be taken over.
-fn held(number: u64, path: &Path, takeover: Duration, watch: &mut Watch) -> Option<Taken> {
-    let bytes = files::read(path, BYTES as u64).unwrap_or_default();
+fn held(number: u64, path: &Path, takeover: Duration, watch: &mut Watch) -> Result<Option<Taken>, IoError> {
+    let bytes = match files::read(path, BYTES as u64) {
+        // Whoever has come since has removed it.
+        Err(IoError::Read { cause, .. }) if cause.kind() == io::ErrorKind::NotFound => Vec::new(),
+        bytes => bytes?,
+    };
     let owner: Option<Owner> = serde_json::from_slice(&bytes).ok();
     let by = owner.as_ref().map_or("another process".into(), |o| format!("process {} on {}", o.process, o.host));
     if let Some(owner) = &owner
         && (owner.given_back || (owner.locked && owner.machine == machine(&owner.host) && is_free(path)))
     {
-        return None;
+        return Ok(None);
     }
     let said = owner.and_then(|o| Duration::try_from_secs_f64(o.takeover_secs).ok()).unwrap_or(takeover);
     match &watch.seen {
         Some((n, b, since)) if *n == number && *b == bytes => {
             if since.elapsed() >= said {
-                return None;
+                return Ok(None);
             }
         }
         before => {
@@ -159,7 +164,7 @@ fn held(number: u64, path: &Path, takeover: Duration, watch: &mut Watch) -> Opti
             watch.seen = Some((number, bytes, Instant::now()));
         }
     }
-    Some(Taken::Held { by, beating: watch.beating })
+    Ok(Some(Taken::Held { by, beating: watch.beating }))
 }
 
 /// Whether nobody has the lock of a file that its owner locks for life.
