@@ -3,7 +3,7 @@
 use std::error::Error;
 use std::process::ExitCode;
 
-use super::output;
+use super::{STOPPED, output};
 use crate::io::OpenError;
 use crate::jobs::error::chain;
 use crate::jobs::{JobError, poses};
@@ -17,6 +17,8 @@ pub(crate) enum CliError {
     Usage(String),
     /// The work failed; exit code 1.
     Failed(Box<dyn Error + Send + Sync>),
+    /// A signal, in a batch; exit code [`STOPPED`]. The text says what was saved.
+    Stopped(String),
     /// Ctrl-C or SIGTERM; exit code 130. The text says what was saved and how to go on.
     Cancelled(String),
 }
@@ -71,6 +73,10 @@ impl CliError {
             Self::Failed(error) => {
                 output::note(&format!("error: {}", chain(error.as_ref())));
                 ExitCode::FAILURE
+            }
+            Self::Stopped(text) => {
+                output::note(&format!("stopped: {text}"));
+                ExitCode::from(STOPPED)
             }
             Self::Cancelled(text) => {
                 output::note(&format!("canceled: {text}"));

@@ -6,7 +6,8 @@ use serde_json::json;
 
 use super::progress::Console;
 use super::recipe::RecipeArgs;
-use super::{CliError, eval_depth, eval_masks, eval_removal, number, output};
+use super::{CliError, eval_depth, eval_masks, eval_removal, number, output, table_args};
+use crate::jobs::batch::BatchEvaluation;
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::evaluate_masks::Protocol;
 use crate::jobs::{export, open};
@@ -65,6 +66,15 @@ pub(crate) struct EvalArgs {
     json: bool,
     #[command(flatten)]
     recipe: RecipeArgs,
+}
+
+/// The table `[eval]` of a batch.
+pub(super) fn of_table(table: &toml::Table) -> Result<BatchEvaluation, String> {
+    const LEFT_OUT: [&str; 8] = ["photos", "holdout-every", "pictures", "masks", "query", "depth", "removal", "json"];
+    // Labels are those of each scene.
+    let args: EvalArgs = table_args::parse(table, &["scene", "--masks=labels"], &LEFT_OUT)?;
+    let EvalArgs { max_side, keep_borders, protocol, recipe, .. } = args;
+    Ok(BatchEvaluation { max_side_px: max_side, keep_borders, protocol, recipe: recipe.recipe() })
 }
 
 impl EvalArgs {

@@ -26,27 +26,22 @@ pub(crate) fn run(
     as_json: bool,
 ) -> Result<(), CliError> {
     let scores = evaluate_masks::run(comparison, scene, labels, protocol, query, recipe)?;
-    let name = clap::ValueEnum::to_possible_value(&protocol).map_or_else(String::new, |v| v.get_name().to_owned());
-    let (views, trained, (miou, miou_by_view)) = (scores.views, scores.trained_on, scores.miou());
+    let (name, views, trained, (miou, miou_by_view)) =
+        (protocol.name(), scores.views, scores.trained_on, scores.miou());
     if as_json {
-        let mut value = json!({
-            "scene": scene, "protocol": name, "views": views, "views_trained_on": trained, "units": scores.units, "recipe": recipe, "unmet": scores.unmet,
-        });
-        if let (Some(all), Some(own)) = (value.as_object_mut(), serde_json::to_value(&scores.summary)?.as_object()) {
-            all.extend(own.clone());
-            if has_units(protocol) {
-                all.extend([("miou".to_owned(), json!(miou)), ("miou_by_view".to_owned(), json!(miou_by_view))]);
-            }
+        let mut value = scores.json(protocol, recipe);
+        if let Some(all) = value.as_object_mut() {
+            all.extend([("scene".to_owned(), json!(scene)), ("units".to_owned(), json!(scores.units))]);
         }
         return output::print_json(&value);
     }
     let mut lines = vec![recipe.to_string()];
     lines.extend(scores.unmet.iter().map(|text| format!("note: {text}")));
     lines.push(summary(&scores.summary));
-    if !has_units(protocol) && protocol != Protocol::PartRecall {
+    if !protocol.has_units() && protocol != Protocol::PartRecall {
         return output::print(&lines.join("\n"));
     }
-    if has_units(protocol) {
+    if protocol.has_units() {
         lines.push(format!("mean IoU {miou:.4} over queries, {miou_by_view:.4} over views"));
     }
     let mut worst: Vec<&Unit> = scores.units.iter().collect();
@@ -59,11 +54,6 @@ pub(crate) fn run(
         scores.units.len(),
         lines.join("\n")
     ))
-}
-
-/// Whether the mean over all queries says something.
-fn has_units(protocol: Protocol) -> bool {
-    !matches!(protocol, Protocol::PartRecall | Protocol::Recipes | Protocol::Strokes | Protocol::Corrections)
 }
 
 /// What the protocol counts, in words.

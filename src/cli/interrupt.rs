@@ -1,10 +1,11 @@
-//! Ctrl-C, SIGTERM and a lost terminal (SIGHUP): the first asks the work to stop at a consistent state, the second does
-//! not wait for that.
+//! Ctrl-C, SIGTERM, a lost terminal (SIGHUP) and a scheduler's SIGUSR1: the first asks the work to stop at a consistent
+//! state, the second does not wait for that.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, LazyLock};
 
-use signal_hook::{consts::TERM_SIGNALS, flag};
+use signal_hook::consts::{SIGINT, TERM_SIGNALS};
+use signal_hook::flag;
 
 use super::output;
 
@@ -12,17 +13,28 @@ static ASKED_TO_STOP: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
 static TOLD: AtomicBool = AtomicBool::new(false);
 
 /// Starts listening. Where that is not possible, Ctrl-C ends the process at once, which loses at
-/// most the time since the last checkpoint.
-pub(crate) fn listen() {
-    for signal in TERM_SIGNALS.iter().copied().chain(hang_up()) {
+/// most the time since the last checkpoint. A `patient` process is ended by a second Ctrl-C only: schedulers warn of a
+/// time limit by one signal and follow it by others, well before they kill.
+pub(crate) fn listen(patient: bool) {
+    for signal in TERM_SIGNALS.iter().copied().chain(hang_up()).chain(warning()) {
         // The shutdown is looked at first, so it only acts on a signal after the first. Files are
         // written under a temporary name and renamed, so it leaves none half-written.
-        let listening = flag::register_conditional_shutdown(signal, 130, Arc::clone(&ASKED_TO_STOP))
-            .and_then(|_| flag::register(signal, Arc::clone(&ASKED_TO_STOP)));
+        let ends = !patient || signal == SIGINT;
+        let shutdown = || flag::register_conditional_shutdown(signal, 130, Arc::clone(&ASKED_TO_STOP)).map(drop);
+        let listening = if ends { shutdown() } else { Ok(()) };
+        let listening = listening.and_then(|()| flag::register(signal, Arc::clone(&ASKED_TO_STOP)));
         if let Err(error) = listening {
             output::note(&format!("warning: signal {signal} will end the program at once: {error}"));
         }
     }
+}
+
+/// The signal by which schedulers warn.
+fn warning() -> Option<i32> {
+    #[cfg(unix)]
+    return Some(libc::SIGUSR1);
+    #[cfg(not(unix))]
+    None
 }
 
 /// The signal of a lost terminal, unless the program was started to outlive it (`nohup`).

@@ -5,6 +5,7 @@
 //! error. Exit codes are listed in `EXIT_CODES`.
 
 mod agent;
+mod batch;
 mod bench;
 mod check_stability;
 mod clean;
@@ -32,10 +33,12 @@ mod recipe;
 mod remove;
 mod render;
 mod report;
+mod report_merge;
 mod reproduce;
 mod segment;
 mod segment_click;
 mod synth;
+mod table_args;
 mod train;
 mod view;
 
@@ -51,13 +54,18 @@ use crate::scene::plan::PlanOverride;
 use crate::scene::{resource_log, text};
 use crate::worker::Start;
 
+/// Exit code of a batch that was stopped and goes on with the same command. Grid Engine queues a job again that ends
+/// with it; the script for Slurm does so itself.
+const STOPPED: u8 = 99;
+
 /// What each exit code means; part of `--help`.
 const EXIT_CODES: &str = "\
 Exit codes:
   0    done
   1    failed; the message names the file, the place in it and what can be done
   2    invalid arguments
-  130  canceled (Ctrl-C, SIGTERM, SIGHUP); what was done so far is saved where the command saves anything";
+  99   batch: stopped by Ctrl-C, SIGTERM, SIGUSR1 or SIGHUP with a checkpoint; the same command goes on
+  130  canceled (Ctrl-C, SIGTERM, SIGUSR1, SIGHUP); what was done so far is saved where the command saves anything";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -75,6 +83,7 @@ Examples:
   fmlgs render scene/ --path path.json --out video.mp4
   fmlgs agent scene/ \"what is on the table?\"
   fmlgs export scene/ --out scene.ply   for any other splat viewer
+  fmlgs batch jobs.toml --shard 1/4     many scenes, settings and seeds, on many machines
   fmlgs models                          neural networks: what is here, what each adds";
 
 /// Train 3D Gaussians from posed photos while you watch, and look around in them.
@@ -118,6 +127,7 @@ enum Command {
     Synth(synth::SynthArgs),
     Demo(demo::DemoArgs),
     Export(export::ExportArgs),
+    Batch(batch::BatchArgs),
     Bench(bench::BenchArgs),
     Report(report::ReportArgs),
     Reproduce(reproduce::ReproduceArgs),
@@ -176,7 +186,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     if !overrides.is_empty() && !matches!(command, Command::Demo(_)) {
         return Err(CliError::Usage("--plan before a command means nothing; put it after it".into()));
     }
-    interrupt::listen();
+    interrupt::listen(matches!(command, Command::Batch(_)));
     match command {
         Command::Info(args) => info::run(args),
         Command::Models(args) => models::run(args, quiet),
@@ -195,6 +205,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Demo(args) if args.headless || args.make.is_some() => demo::run(args, quiet),
         Command::Demo(_) => window(vec![Start::Demo], overrides, open_window),
         Command::Export(args) => export::run(args, quiet),
+        Command::Batch(args) => batch::run(args, quiet),
         Command::Bench(args) => bench::run(args, quiet),
         Command::Report(args) => report::run(args, quiet),
         Command::Reproduce(args) => reproduce::run(args, quiet),

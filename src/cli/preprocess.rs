@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 
 use super::plan::PlanArgs;
 use super::progress::Console;
-use super::{CliError, number, output};
+use super::{CliError, number, output, table_args};
 use crate::jobs::find_objects::{self, FindRequest, FindSettings, FoundObjects};
 use crate::jobs::models::SAM2;
 use crate::jobs::{JobError, open, plan};
@@ -91,6 +91,15 @@ pub(crate) struct PreprocessArgs {
     /// Print one JSON document
     #[arg(long)]
     json: bool,
+}
+
+/// The table `[objects]` of a batch.
+pub(super) fn of_table(table: &toml::Table) -> Result<FindSettings, String> {
+    let args: PreprocessArgs = table_args::parse(table, &["scene"], &["masks", "photos", "add", "plan", "json"])?;
+    match args.segmenter.as_deref() {
+        Some("files") => Err("'segmenter': leave it out: the masks of a scene are used where it has some".into()),
+        _ => Ok(args.settings()),
+    }
 }
 
 /// Whether the arguments agree on where masks come from.

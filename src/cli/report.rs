@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use super::progress::Console;
 use super::recipe::RecipeArgs;
+use super::report_merge::{self, MergeArgs};
 use super::{CliError, number, output};
 use crate::jobs::export;
 use crate::jobs::report::{self, Measured, ReportRequest};
@@ -20,12 +21,16 @@ use crate::pipeline::observer::{Observer, Severity};
 /// Every setting is measured once before any is measured twice, and everything measured is kept: after
 /// Ctrl-C, a kill or the end of the budget the same command resumes.
 #[derive(Debug, clap::Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true, disable_help_subcommand = true)]
 #[command(after_help = "Examples:\n  \
     fmlgs report scene/ --out report/                          all stages that the scene allows\n  \
     fmlgs report scene/ --masks photos/ --budget 600\n  \
     fmlgs report scene/ --stages render,path --repeats 5\n  \
-    fmlgs report --defaults DEFAULTS.md --from report/ --from other/")]
+    fmlgs report --defaults DEFAULTS.md --from report/ --from other/\n  \
+    fmlgs report merge runs/ --out merged/                     one page of all results of a batch")]
 pub(crate) struct ReportArgs {
+    #[command(subcommand)]
+    command: Option<ReportCommand>,
     /// Trained scene
     #[arg(required_unless_present = "defaults")]
     scene: Option<PathBuf>,
@@ -69,7 +74,15 @@ pub(crate) struct ReportArgs {
     recipe: RecipeArgs,
 }
 
+#[derive(Debug, clap::Subcommand)]
+enum ReportCommand {
+    Merge(MergeArgs),
+}
+
 pub(crate) fn run(args: ReportArgs, quiet: bool) -> Result<(), CliError> {
+    if let Some(ReportCommand::Merge(args)) = args.command {
+        return report_merge::run(args, quiet);
+    }
     if let Some(path) = &args.defaults {
         let reports = args.from.iter().map(|p| Report::read(p)).collect::<Result<Vec<_>, _>>();
         let text = defaults::markdown(&reports?);

@@ -153,14 +153,12 @@ impl TrainArgs {
             }
         };
         let base = self.preset.as_deref().map(presets::read).transpose()?.unwrap_or(base);
-        let config = self.settings.over(base);
-        let plan = plan::of_photos(&dataset, &config, &self.plan.overrides());
-        let backend = if plan.on_cpu { BackendChoice::Cpu } else { config.backend };
+        let config = plan::planned(&dataset, self.settings.over(base), &self.plan.overrides());
         let folders = match self.out.clone().or(own) {
             Some(out) => vec![out],
             None => usual_folders(&PathBuf::from("out").join(&dataset.name)),
         };
-        Ok((dataset, TrainConfig { max_side_px: plan.train_side_px, backend, ..config }, folders))
+        Ok((dataset, config, folders))
     }
 }
 

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use super::IoError;
 use super::error::write_error;
 
-const FILE: &str = ".fmlgs.lock";
+pub(super) const FILE: &str = ".fmlgs.lock";
 /// Longest description of a writer that is read.
 const MAX_BYTES: u64 = 200;
 

@@ -8,6 +8,7 @@ pub(crate) mod atomic;
 pub(crate) mod bundle;
 pub mod camera_file;
 pub mod camera_path;
+pub(crate) mod claim;
 pub mod colmap;
 mod commit;
 mod compressed_ply;

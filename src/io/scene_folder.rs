@@ -10,11 +10,11 @@ use std::path::{Path, PathBuf};
 use super::atomic::Draft;
 use super::commit::{self, Commit};
 use super::error::write_error;
-use super::folder_lock::FolderLock;
+use super::folder_lock::{self, FolderLock};
 use super::scene_files::{CHECKPOINT_FILE, CLOUD_FILE, SCENE_FILE, is_scene};
 use super::scene_info::{SceneInfo, VERSION, load_info, relative_to};
 use super::temporary::{sweep, temporary_folder};
-use super::{IoError, semantic_map, splat_ply};
+use super::{IoError, files, semantic_map, splat_ply};
 use crate::scene::{GaussianCloud, SemanticMap};
 
 /// Folder of what was replaced: `earlier/1`, `earlier/2`, each a scene of its own.
@@ -39,6 +39,17 @@ impl SceneFolder {
         commit::carry_out(folder)?;
         [folder, &folder.join(EARLIER), &folder.join("cache")].into_iter().for_each(sweep);
         Ok(Self { lock })
+    }
+
+    /// Moves a scene from one folder to another one beside it, away from whoever may still write there: what they write
+    /// from now on has no folder. `to` must not exist.
+    pub(crate) fn move_away(from: &Path, to: &Path) -> Result<(), IoError> {
+        let moved = fs::rename(from, to).and_then(|()| {
+            // Theirs, in a folder that is no longer theirs; who comes next locks a file of its own.
+            let _ = fs::remove_file(to.join(folder_lock::FILE));
+            files::sync_folder(files::folder_of(to))
+        });
+        moved.map_err(|cause| write_error(to, cause))
     }
 
     pub(crate) fn path(&self) -> &Path {

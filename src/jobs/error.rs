@@ -125,6 +125,9 @@ pub enum JobError {
     /// A file for a result that is not as it must be.
     #[error("{0}")]
     Output(String),
+    /// Units of a batch that cannot be run or merged.
+    #[error("{0}")]
+    Batch(String),
     #[error(transparent)]
     Synth(#[from] SynthError),
 }

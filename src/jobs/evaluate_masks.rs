@@ -1,10 +1,14 @@
 //! Objects and parts against labeled photos, by one of the protocols of the literature.
 
+mod protocol;
+
 use std::path::Path;
 
 use image::ColorType;
 use serde::Serialize;
+use serde_json::json;
 
+pub(crate) use self::protocol::Protocol;
 use super::evaluate::PhotoComparison;
 use super::{JobError, export};
 use crate::io::{self, labels::Labels};
@@ -22,33 +26,6 @@ use crate::pipeline::semantics::splat_tree::hierarchy::Hierarchy;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
 use crate::scene::{Camera, Identities, IdentityId, LevelFilter, NOBODY, Photo, SemanticMap};
-
-/// How objects and parts are compared with labels.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-pub(crate) enum Protocol {
-    /// The pixels of the answer against the region, IoU; objects and parts apart
-    Masks,
-    /// LERF-OVS as LangSplat counts it: smoothed relevancy cut at 0.4, and localization
-    Langsplat,
-    /// FastLGS's evaluator, with its running pooled IoU; for comparison with published numbers only
-    FastlgsEx,
-    /// Gaussians chosen by text, their silhouette cut at 0.7 (OpenGaussian)
-    #[value(name = "3d-selection")]
-    Selection3d,
-    /// One foreground object at 1008 x 567: IoU and accuracy
-    SpinNerf,
-    /// Every class: own masks, and the arg-max over all
-    #[value(name = "3d-ovs")]
-    Ovs3d,
-    /// Part queries by embedding alone, with the paper's components switched on one after another
-    PartRecall,
-    /// What is found and what is rightly not found, by names, embeddings and both, by each strategy and rule
-    Recipes,
-    /// Things selected by strokes in the view that shows most of them, judged in all other views
-    Strokes,
-    /// What is known of things, corrected by strokes in the views where most is wrong, judged in all of them
-    Corrections,
-}
 
 /// What the [`Protocol`] of the same name counts besides the IoU of each query.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -110,6 +87,22 @@ impl MaskScores {
     /// Mean IoU over queries, and over views.
     pub(crate) fn miou(&self) -> (f64, f64) {
         means(&self.units)
+    }
+
+    /// Everything but the single queries, by the names that scripts know.
+    pub(crate) fn json(&self, protocol: Protocol, recipe: &Recipe) -> serde_json::Value {
+        let mut value = json!({
+            "protocol": protocol.name(), "views": self.views, "views_trained_on": self.trained_on, "recipe": recipe,
+            "unmet": self.unmet,
+        });
+        if let (Some(all), serde_json::Value::Object(own)) = (value.as_object_mut(), json!(self.summary)) {
+            all.extend(own);
+            if protocol.has_units() {
+                let (miou, miou_by_view) = self.miou();
+                all.extend([("miou".to_owned(), json!(miou)), ("miou_by_view".to_owned(), json!(miou_by_view))]);
+            }
+        }
+        value
     }
 }
 

@@ -3,6 +3,7 @@
 //! Jobs take plain inputs and an [`Observer`](crate::pipeline::observer::Observer) where they take long,
 //! and return a typed result or a [`JobError`]. Whoever calls them says the result in its own way.
 
+pub(crate) mod batch;
 pub(crate) mod bench;
 pub(crate) mod clean;
 mod coco;

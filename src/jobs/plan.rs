@@ -3,7 +3,7 @@
 use super::Scene;
 use crate::io::memory;
 use crate::pipeline::train::{TrainConfig, budget};
-use crate::render::real_gpu;
+use crate::render::{BackendChoice, real_gpu};
 use crate::scene::{Dataset, GaussianCloud, Machine, Overrides, SceneFacts, ScenePlan};
 
 /// Looks at memory, cores and the graphics adapter. Takes some milliseconds: not for the window's
@@ -42,6 +42,13 @@ pub(crate) fn scene_facts(machine: &Machine, scene: &Scene, config: &TrainConfig
 /// The plan for a scene that is to be drawn; nothing in it depends on the machine.
 pub(crate) fn of_scene(scene: &Scene, overrides: &Overrides) -> ScenePlan {
     ScenePlan::new(scene_facts(&Machine::default(), scene, &scene.config), overrides)
+}
+
+/// The settings of a training on photos once its plan has been made.
+pub(crate) fn planned(dataset: &Dataset, config: TrainConfig, overrides: &Overrides) -> TrainConfig {
+    let plan = of_photos(dataset, &config, overrides);
+    let backend = if plan.on_cpu { BackendChoice::Cpu } else { config.backend };
+    TrainConfig { max_side_px: plan.train_side_px, backend, ..config }
 }
 
 /// The plan for training on photos; nothing in it depends on the machine.

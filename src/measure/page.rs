@@ -7,7 +7,8 @@ use super::plot::{order_svg, svg};
 use super::table::{html as html_table, title};
 use crate::math::format::{number, seconds};
 
-const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;color:#1b1b1f;background:#fff;max-width:1080px;\
+/// How pages of results look.
+pub(crate) const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;color:#1b1b1f;background:#fff;max-width:1080px;\
 margin:2em auto;padding:0 1em}h1{margin-bottom:0}h2{margin-top:2.2em;border-top:1px solid #ccc;padding-top:.6em}\
 table{border-collapse:collapse;font-size:13px;margin:.6em 0}th,td{padding:.25em .7em;border-bottom:1px solid #ddd;\
 text-align:right;font-variant-numeric:tabular-nums}th:first-child,td:first-child,th:nth-child(2),td:nth-child(2)\

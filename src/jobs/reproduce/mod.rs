@@ -143,7 +143,7 @@ fn claim(out: &Path, data: &Path, settings: &ReproduceSettings) -> Result<(), Jo
 }
 
 /// The first setting that differs, with both values.
-fn difference(there: &serde_json::Value, now: &serde_json::Value) -> Option<String> {
+pub(super) fn difference(there: &serde_json::Value, now: &serde_json::Value) -> Option<String> {
     let keys = now.as_object().into_iter().flatten();
     keys.filter(|(key, value)| there.get(key) != Some(value)).find_map(|(key, value)| match there.get(key) {
         Some(old) if old.is_object() && value.is_object() => difference(old, value),

@@ -1,0 +1,278 @@
+//! All units' results as one document, one table and one page, wherever their folders are.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use serde_json::json;
+
+use super::state::{FAILURE, RESULT, UnitFailure, UnitResult, VERSION, is_done, read};
+use super::unit::{self, UnitRequest};
+use crate::io::IoError;
+use crate::jobs::JobError;
+use crate::math::stats::mean;
+use crate::pipeline::observer::{Observer, Severity};
+
+/// Deepest folders that are looked into: those of units are three below that of their batch.
+const DEEPEST: usize = 6;
+
+/// All units of some batches.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct MergedResults {
+    version: u32,
+    pub(super) program: &'static str,
+    /// By settings and scene; those without a scene are the means over scenes.
+    pub(crate) rows: Vec<MergedRow>,
+    /// By name.
+    pub(crate) units: Vec<UnitResult>,
+    pub(crate) failed: Vec<UnitFailure>,
+    /// Names of units that were begun and have no result.
+    pub(crate) unfinished: Vec<String>,
+}
+
+/// What settings bring in a scene, over the seeds.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(crate) struct MergedRow {
+    pub(crate) setting: String,
+    /// `None` for the mean over all scenes, each of which counts once.
+    pub(crate) scene: Option<String>,
+    /// Units in it.
+    pub(crate) units: usize,
+    pub(crate) psnr: Spread,
+    pub(crate) ssim: Spread,
+    pub(crate) gaussians: Spread,
+    pub(crate) training_secs: Spread,
+    pub(crate) miou: Spread,
+}
+
+/// Mean and standard deviation (of a sample) of what is known; `None` where too little is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub(crate) struct Spread {
+    pub(crate) mean: Option<f64>,
+    pub(crate) deviation: Option<f64>,
+}
+
+impl Spread {
+    fn of(values: impl Iterator<Item = Option<f64>>) -> Self {
+        let values: Vec<f64> = values.flatten().filter(|v| v.is_finite()).collect();
+        let mean = (!values.is_empty()).then(|| mean(&values));
+        let deviation = mean.filter(|_| values.len() > 1).map(|m| {
+            let sum: f64 = values.iter().map(|v| (v - m).powi(2)).sum();
+            (sum / (values.len() - 1) as f64).sqrt()
+        });
+        Self { mean, deviation }
+    }
+}
+
+impl UnitResult {
+    /// Mean IoU of its objects and parts, where its protocol has one.
+    pub(super) fn miou(&self) -> Option<f64> {
+        self.masks.as_ref()?.get("miou")?.as_f64()
+    }
+
+    pub(super) fn psnr(&self) -> Option<f64> {
+        self.evaluation.as_ref().map(|e| e.psnr)
+    }
+
+    pub(super) fn ssim(&self) -> Option<f64> {
+        self.evaluation.as_ref().map(|e| e.ssim)
+    }
+}
+
+/// A unit's folder and what is in it.
+struct Found {
+    folder: PathBuf,
+    asked: UnitRequest,
+    result: Option<UnitResult>,
+    failure: Option<UnitFailure>,
+}
+
+/// Reads all units below `folders`.
+///
+/// # Errors
+/// If there are no units, results do not go together (settings of one name that are not the same, in one scene or in
+/// two; a scene of one name with other photos), or a file cannot be read.
+pub(super) fn collect(folders: &[PathBuf], observer: &mut dyn Observer) -> Result<MergedResults, JobError> {
+    let mut found = Vec::new();
+    for folder in folders {
+        let before = found.len();
+        find(folder, DEEPEST, &mut found)?;
+        if found.len() == before {
+            let text = format!("{}: no units of a batch are in it; give the folder of its results", folder.display());
+            return Err(JobError::Batch(text));
+        }
+    }
+    check(&found)?;
+    let mut by_name: BTreeMap<String, Found> = BTreeMap::new();
+    for unit in found {
+        let name = unit.asked.name();
+        match by_name.remove(&name) {
+            None => drop(by_name.insert(name, unit)),
+            Some(other) => drop(by_name.insert(name, same(other, unit, observer))),
+        }
+    }
+    let (mut units, mut failed, mut unfinished) = (Vec::new(), Vec::new(), Vec::new());
+    for (name, unit) in by_name {
+        match (unit.result, unit.failure) {
+            (Some(result), _) => units.push(result),
+            (None, Some(failure)) => failed.push(failure),
+            (None, None) => unfinished.push(name),
+        }
+    }
+    Ok(MergedResults {
+        version: VERSION,
+        program: env!("CARGO_PKG_VERSION"),
+        rows: rows(&units),
+        units,
+        failed,
+        unfinished,
+    })
+}
+
+/// Of two folders of one unit, the one that is farther.
+fn same(one: Found, other: Found, observer: &mut dyn Observer) -> Found {
+    if let (Some(a), Some(b)) = (&one.result, &other.result)
+        && one.folder != other.folder
+    {
+        let same = if a.sha256 == b.sha256 { "the same" } else { "other" };
+        let (a, b) = (one.folder.display(), other.folder.display());
+        let text = format!("{b} is the unit of {a} once more, with {same} Gaussians; the first one counts");
+        observer.note(Severity::Warning, text);
+    }
+    if one.result.is_none() && (other.result.is_some() || one.failure.is_none()) { other } else { one }
+}
+
+fn find(folder: &Path, deepest: usize, found: &mut Vec<Found>) -> Result<(), IoError> {
+    let file = folder.join(unit::FILE);
+    if file.is_file() {
+        if let Some(asked) = read(&file)? {
+            let result: Option<UnitResult> = if is_done(folder) { read(&folder.join(RESULT))? } else { None };
+            if let Some(found) = result.as_ref().map(|r| u64::from(r.version)).filter(|v| *v > u64::from(VERSION)) {
+                return Err(IoError::Version { path: folder.join(RESULT), found, supported: u64::from(VERSION) });
+            }
+            let asked = result.as_ref().map_or(asked, |r| r.asked.clone());
+            found.push(Found { folder: folder.into(), asked, result, failure: read(&folder.join(FAILURE))? });
+        }
+        return Ok(());
+    }
+    let entries = std::fs::read_dir(folder).map_err(|cause| IoError::Read { path: folder.into(), cause })?;
+    let mut folders: Vec<PathBuf> = entries.flatten().map(|e| e.path()).filter(|p| p.is_dir()).collect();
+    folders.sort();
+    for folder in folders.iter().filter(|_| deepest > 0) {
+        find(folder, deepest - 1, found)?;
+    }
+    Ok(())
+}
+
+/// Refuses units that look alike by their names and are not.
+fn check(found: &[Found]) -> Result<(), JobError> {
+    let mut seen: BTreeMap<[&str; 2], &Found> = BTreeMap::new();
+    // What must be the same for two results under one name to be of the same kind.
+    let of_setting = |a: &UnitRequest| {
+        let config = crate::pipeline::train::TrainConfig { seed: 0, ..a.config.clone() };
+        json!({ "config": config, "plan": a.plan, "objects": a.objects, "eval": a.eval })
+    };
+    let of_scene = |a: &UnitRequest| json!({ "photos": a.photos, "masks": a.masks, "query": a.query });
+    for unit in found {
+        let asked = &unit.asked;
+        let kinds = [("settings", &asked.setting, of_setting(asked)), ("scene", &asked.scene, of_scene(asked))];
+        for (kind, name, now) in kinds {
+            let Some(first) = seen.insert([kind, name], unit) else { continue };
+            let before = if kind == "scene" { of_scene(&first.asked) } else { of_setting(&first.asked) };
+            if let Some(what) = crate::jobs::reproduce::difference(&before, &now) {
+                let (a, b) = (first.folder.display(), unit.folder.display());
+                return Err(JobError::Batch(format!(
+                    "{a} and {b}: the {kind} '{name}' of one is not that of the other ({what}); merge them apart"
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
+fn rows(units: &[UnitResult]) -> Vec<MergedRow> {
+    let mut groups: BTreeMap<(&str, &str), Vec<&UnitResult>> = BTreeMap::new();
+    for unit in units {
+        groups.entry((&unit.asked.setting, &unit.asked.scene)).or_default().push(unit);
+    }
+    let row = |((setting, scene), units): (&(&str, &str), &Vec<&UnitResult>)| {
+        let of = |value: fn(&UnitResult) -> Option<f64>| Spread::of(units.iter().map(|u| value(u)));
+        MergedRow {
+            setting: (*setting).into(),
+            scene: Some((*scene).into()),
+            units: units.len(),
+            psnr: of(UnitResult::psnr),
+            ssim: of(UnitResult::ssim),
+            gaussians: of(|u| Some(u.gaussians as f64)),
+            training_secs: of(|u| Some(u.secs.training)),
+            miou: of(UnitResult::miou),
+        }
+    };
+    let mut rows: Vec<MergedRow> = groups.iter().map(row).collect();
+    let mut settings: Vec<String> = rows.iter().map(|r| r.setting.clone()).collect();
+    settings.dedup();
+    for setting in settings {
+        let own: Vec<&MergedRow> = rows.iter().filter(|r| r.setting == setting).collect();
+        let over = |value: fn(&MergedRow) -> Spread| Spread::of(own.iter().map(|r| value(r).mean));
+        let all = MergedRow {
+            scene: None,
+            units: own.iter().map(|r| r.units).sum(),
+            psnr: over(|r| r.psnr),
+            ssim: over(|r| r.ssim),
+            gaussians: over(|r| r.gaussians),
+            training_secs: over(|r| r.training_secs),
+            miou: over(|r| r.miou),
+            setting,
+        };
+        if own.len() > 1 {
+            rows.push(all);
+        }
+    }
+    rows
+}
+
+impl MergedResults {
+    /// A line for each unit that has a result.
+    pub(super) fn csv(&self) -> String {
+        // What begins with these is a formula to some spreadsheets.
+        let cell = |text: &str| {
+            let text = if text.starts_with(['=', '+', '-', '@']) { format!("'{text}") } else { text.to_owned() };
+            format!("\"{}\"", text.replace('"', "\"\""))
+        };
+        let number = |value: Option<f64>| value.map_or_else(String::new, |v| v.to_string());
+        let head = "scene,setting,seed,psnr_db,ssim,gaussians,steps,training_s,evaluation_s,objects_s,objects,parts,\
+                    miou,host,sha256\n";
+        let line = |u: &UnitResult| {
+            let found = u.objects.as_ref();
+            let counts = found.map_or_else(|| ",".to_owned(), |o| format!("{},{}", o.objects, o.parts));
+            let (psnr, ssim, miou) = (number(u.psnr()), number(u.ssim()), number(u.miou()));
+            let UnitResult { asked, gaussians, steps, secs, .. } = u;
+            let times = format!("{},{},{}", secs.training, secs.evaluation, number(secs.objects));
+            format!(
+                "{},{},{},{psnr},{ssim},{gaussians},{steps},{times},{counts},{miou},{},{}\n",
+                cell(&asked.scene),
+                cell(&asked.setting),
+                asked.seed,
+                cell(&u.host),
+                u.sha256
+            )
+        };
+        self.units.iter().fold(head.to_owned(), |all, unit| all + &line(unit))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spread_is_of_what_is_known() {
+        let of = |values: &[Option<f64>]| {
+            let Spread { mean, deviation } = Spread::of(values.iter().copied());
+            (mean, deviation)
+        };
+        assert_eq!(of(&[]), (None, None));
+        assert_eq!(of(&[Some(3.0), None]), (Some(3.0), None));
+        assert_eq!(of(&[Some(1.0), Some(3.0), Some(f64::INFINITY)]), (Some(2.0), Some(2.0_f64.sqrt())));
+    }
+}

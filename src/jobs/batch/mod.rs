@@ -1,0 +1,219 @@
+//! Many scenes, with many settings and seeds, on many machines: each combination is a unit with a folder of its own and
+//! one atomic result. Machines share nothing but the folder of the results; which of them runs what, and when, is left
+//! to the cluster's own scheduler.
+
+mod file;
+mod merge;
+mod page;
+mod sbatch;
+mod shard;
+mod state;
+mod unit;
+mod work;
+
+use std::collections::VecDeque;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+pub(crate) use self::file::{BatchEvaluation, BatchFile, BatchTraining, TableReaders};
+use self::merge::MergedResults;
+pub(crate) use self::merge::MergedRow;
+pub(crate) use self::sbatch::{ArrayScript, script};
+pub(crate) use self::shard::Shard;
+pub(crate) use self::state::UnitState;
+use self::unit::{BatchUnit, SceneInputs, UnitRequest};
+use self::work::{Worked, work};
+use super::{JobError, export};
+use crate::io::claim::{self, Taken, Watch};
+use crate::models::catalog::{self, ModelRole};
+use crate::pipeline::observer::{Observer, Severity, Signal};
+use crate::pipeline::semantics::build_map::{Carry, REGIONS};
+
+/// Time between looks at a unit that is somebody else's.
+const LOOK: Duration = Duration::from_millis(250);
+
+/// A shard of a batch.
+#[derive(Clone, Debug)]
+pub(crate) struct BatchRequest {
+    pub(crate) batch: BatchFile,
+    /// Folder of all results.
+    pub(crate) out: PathBuf,
+    pub(crate) shard: Shard,
+    /// Whether units are tried again that failed.
+    pub(crate) retry_failed: bool,
+    /// How long a unit's heartbeat may stand still before another process takes over.
+    pub(crate) takeover: Duration,
+}
+
+/// What came of a shard.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct BatchOutcome {
+    /// Units of the shard.
+    pub(crate) units: usize,
+    /// Those that are done, now or before.
+    pub(crate) done: usize,
+    /// Those that failed, and why.
+    pub(crate) failed: Vec<(String, String)>,
+    /// Those that others work on, and who.
+    pub(crate) elsewhere: Vec<(String, String)>,
+    /// Whether the observer asked to stop; what was done is saved.
+    pub(crate) stopped: bool,
+}
+
+/// A unit of the shard that can be run.
+struct Planned {
+    unit: BatchUnit,
+    name: String,
+    folder: PathBuf,
+    asked: UnitRequest,
+}
+
+/// The units of a shard, and where each stands.
+pub(crate) fn list(request: &BatchRequest) -> Result<Vec<(String, UnitState)>, JobError> {
+    let state = |p: Planned| Ok((p.name, UnitState::of(&p.folder, &p.asked)?));
+    plan(request)?.into_iter().map(state).collect()
+}
+
+/// How many units a batch has.
+pub(crate) fn count(batch: &BatchFile) -> usize {
+    unit::units(batch).len()
+}
+
+/// Runs the units of a shard, one after another. One that fails does not stop the others.
+///
+/// # Errors
+/// Before anything runs: if a scene is missing, results would lie among what is read or are of other settings, or a
+/// network is missing. Later, if the folder of the results cannot be written.
+pub(crate) fn run(request: &BatchRequest, observer: &mut dyn Observer) -> Result<BatchOutcome, JobError> {
+    let planned = plan(request)?;
+    for p in &planned {
+        if let UnitState::Changed(what) = UnitState::of(&p.folder, &p.asked)? {
+            return Err(changed(&p.folder, &what));
+        }
+    }
+    check_networks(&request.batch)?;
+    let mut outcome = BatchOutcome { units: planned.len(), ..BatchOutcome::default() };
+    let mut waiting: VecDeque<(Planned, Watch)> = planned.into_iter().map(|p| (p, Watch::default())).collect();
+    // How many in a row were somebody else's: if all are, there is nothing to do but to wait.
+    let mut held = 0;
+    while let Some((p, mut watch)) = waiting.pop_front() {
+        if observer.signal() == Signal::Cancel {
+            outcome.stopped = true;
+            break;
+        }
+        match attempt(request, &p, &mut watch, observer)? {
+            Attempt::Worked(Worked::Done) => outcome.done += 1,
+            Attempt::Worked(Worked::Failed(why)) => outcome.failed.push((p.name, why)),
+            Attempt::Worked(Worked::Stopped) => {
+                outcome.stopped = true;
+                break;
+            }
+            Attempt::Worked(Worked::Lost) => {
+                outcome.elsewhere.push((p.name, "another process, which took over".into()));
+            }
+            Attempt::Held { by, beating: true } => outcome.elsewhere.push((p.name, by)),
+            Attempt::Held { by, beating: false } => {
+                if held == 0 {
+                    let text = format!("{} is {by}'s, unless that has ended: its heartbeat is watched", p.name);
+                    observer.note(Severity::Info, text);
+                }
+                waiting.push_back((p, watch));
+                held += 1;
+                if held >= waiting.len() {
+                    std::thread::sleep(LOOK);
+                }
+                continue;
+            }
+        }
+        held = 0;
+    }
+    Ok(outcome)
+}
+
+enum Attempt {
+    Worked(Worked),
+    Held { by: String, beating: bool },
+}
+
+fn attempt(
+    request: &BatchRequest,
+    planned: &Planned,
+    watch: &mut Watch,
+    observer: &mut dyn Observer,
+) -> Result<Attempt, JobError> {
+    let Planned { unit, name, folder, asked } = planned;
+    // What is done is not claimed.
+    match UnitState::of(folder, asked)? {
+        UnitState::Done => return Ok(Attempt::Worked(Worked::Done)),
+        UnitState::Failed(why) if !request.retry_failed => return Ok(Attempt::Worked(Worked::Failed(why))),
+        UnitState::Changed(what) => return Err(changed(folder, &what)),
+        _ => {}
+    }
+    export::make_folder(folder)?;
+    match claim::take(folder, request.takeover, watch)? {
+        Taken::Held { by, beating } => Ok(Attempt::Held { by, beating }),
+        Taken::Mine(claim) => {
+            observer.note(Severity::Info, format!("Unit {name}"));
+            work(request, *unit, asked, (folder, &claim), observer).map(Attempt::Worked)
+        }
+    }
+}
+
+/// The shard's units, once everything is there that they read.
+fn plan(request: &BatchRequest) -> Result<Vec<Planned>, JobError> {
+    let batch = &request.batch;
+    let all = unit::units(batch);
+    unit::check_places(request, &all)?;
+    let mut inputs: Vec<Option<SceneInputs>> = vec![None; batch.scenes.len()];
+    let own = all.into_iter().enumerate().filter(|(k, _)| request.shard.has(*k));
+    let planned = own.map(|(_, unit)| {
+        let scene = unit.scene(batch);
+        let inputs = match &mut inputs[unit.scene] {
+            Some(known) => known,
+            unknown => unknown.insert(SceneInputs::of(scene)?),
+        };
+        let name = unit.name(batch);
+        Ok(Planned { unit, folder: request.out.join(&name), name, asked: unit.asked(batch, inputs) })
+    });
+    planned.collect()
+}
+
+/// Networks that are missing are told before hours of training, not after.
+fn check_networks(batch: &BatchFile) -> Result<(), JobError> {
+    let Some(with) = &batch.objects else { return Ok(()) };
+    let told = |key: &str, e: crate::models::ModelError| {
+        let file = batch.path.display();
+        JobError::Batch(format!("{file}, [objects], '{key}': {e}; 'fmlgs models' lists what is here"))
+    };
+    if let Some(name) = with.encoder.as_deref().filter(|name| *name != super::find_objects::NO_ENCODER) {
+        crate::models::encoder(name).map_err(|e| told("encoder", e))?;
+    }
+    if let Some(name) = with.segmenter.as_deref().filter(|name| *name != REGIONS) {
+        catalog::find(name, ModelRole::Segmenter).map_err(|e| told("segmenter", e))?;
+    }
+    if with.carry != Carry::Gaussians {
+        catalog::find(&with.tracker, ModelRole::Segmenter).map_err(|e| told("tracker-model", e))?;
+    }
+    Ok(())
+}
+
+/// Merges the results of all units below `folders`, and writes `merged.json`, `merged.csv` and `merged.html` into `out`.
+///
+/// # Errors
+/// If results do not go together, or a file cannot be read or written.
+pub(crate) fn merge(folders: &[PathBuf], out: &Path, observer: &mut dyn Observer) -> Result<MergedResults, JobError> {
+    let merged = merge::collect(folders, observer)?;
+    export::make_folder(out)?;
+    export::json(&out.join("merged.json"), &merged)?;
+    export::text(&out.join("merged.csv"), &merged.csv())?;
+    export::text(&out.join("merged.html"), &page::html(&merged))?;
+    Ok(merged)
+}
+
+fn changed(folder: &Path, what: &str) -> JobError {
+    JobError::Batch(format!(
+        "{} holds results of other settings ({what}); give the settings another name or the results another folder \
+         (--out), or remove it",
+        folder.display()
+    ))
+}

@@ -1,0 +1,129 @@
+//! Where a unit stands, as its folder says; its result, and why it failed.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+
+use super::unit::{self, UnitRequest};
+use crate::io::{IoError, claim, files, trained};
+use crate::measure::Computer;
+use crate::pipeline::observer::Evaluation;
+
+/// The result of a unit, in its folder: whole, or not there.
+pub(super) const RESULT: &str = "result.json";
+/// Why a unit failed, in its folder.
+pub(super) const FAILURE: &str = "failed.json";
+/// The trained scene of a unit that is done, in its folder.
+pub(super) const SCENE: &str = "scene";
+/// Version of both documents.
+pub(super) const VERSION: u32 = 1;
+
+/// What came of a unit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct UnitResult {
+    pub(super) version: u32,
+    /// Version of the program.
+    pub(super) program: String,
+    pub(crate) asked: UnitRequest,
+    /// On photos that were held out, if any were.
+    pub(crate) evaluation: Option<Evaluation>,
+    pub(crate) gaussians: usize,
+    pub(crate) steps: u64,
+    /// SHA-256 of the Gaussians as a `.ply`, without what differs from save to save.
+    pub(crate) sha256: String,
+    pub(crate) objects: Option<ObjectCounts>,
+    /// As `fmlgs eval --masks` prints it, without the single queries.
+    pub(crate) masks: Option<Value>,
+    pub(crate) secs: UnitSeconds,
+    pub(super) host: String,
+    pub(super) computer: Computer,
+}
+
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct ObjectCounts {
+    pub(crate) objects: usize,
+    pub(crate) parts: usize,
+    /// Photos whose masks were used.
+    pub(crate) seeds: Vec<String>,
+}
+
+/// Seconds of work, those of interrupted runs included where they are known.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct UnitSeconds {
+    pub(crate) training: f64,
+    pub(crate) evaluation: f64,
+    pub(crate) objects: Option<f64>,
+}
+
+/// Why a unit has no result.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct UnitFailure {
+    pub(super) version: u32,
+    pub(super) program: String,
+    pub(crate) asked: UnitRequest,
+    pub(crate) error: String,
+    pub(super) host: String,
+}
+
+/// Where a unit stands.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum UnitState {
+    Waiting,
+    /// It was stopped, and goes on where it was.
+    Begun,
+    /// Somebody works on it as far as can be seen.
+    Held(String),
+    Done,
+    /// Why.
+    Failed(String),
+    /// Its folder holds results of other settings: which.
+    Changed(String),
+}
+
+impl UnitState {
+    /// Of the unit in `folder` that is `asked` now.
+    ///
+    /// # Errors
+    /// If a file there cannot be read.
+    pub(super) fn of(folder: &Path, asked: &UnitRequest) -> Result<Self, IoError> {
+        let there: Option<UnitRequest> = read(&folder.join(unit::FILE))?;
+        let failure: Option<UnitFailure> = read(&folder.join(FAILURE))?;
+        if let Some(failure) = failure {
+            return Ok(Self::Failed(failure.error));
+        }
+        let changed = there.and_then(|there| there.difference(asked));
+        let begun = !scenes(folder).is_empty();
+        let done = is_done(folder);
+        Ok(match (changed, claim::holder(folder)?) {
+            (Some(what), _) if done || begun => Self::Changed(what),
+            _ if done => Self::Done,
+            (_, Some(by)) => Self::Held(by),
+            _ if begun => Self::Begun,
+            _ => Self::Waiting,
+        })
+    }
+}
+
+/// Whether the unit in `folder` has its result, and the scene that it is of.
+pub(super) fn is_done(folder: &Path) -> bool {
+    folder.join(RESULT).is_file() && trained::is_scene(&folder.join(SCENE))
+}
+
+/// A document, if it is there.
+pub(super) fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>, IoError> {
+    match files::read_json(path) {
+        Err(IoError::Read { cause, .. }) if cause.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        read => read.map(Some),
+    }
+}
+
+/// Folders of the unit's scene, by the number of the claim that worked in each; 0 is the one that is done.
+pub(super) fn scenes(folder: &Path) -> Vec<(u64, PathBuf)> {
+    let number = |name: &str| match name.strip_prefix(SCENE)? {
+        "" => Some(0),
+        rest => rest.strip_prefix('-')?.parse().ok(),
+    };
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.filter_map(|e| Some((number(&e.file_name().to_string_lossy())?, e.path()))).collect()
+}

@@ -1,0 +1,208 @@
+//! A unit of a batch: one scene with one of the settings and one seed; its folder, and what was asked of it.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
+use sha2::{Digest, Sha256};
+
+use super::BatchRequest;
+use super::file::{BatchFile, BatchScene};
+use crate::io::{IoError, files};
+use crate::jobs::{JobError, open};
+use crate::pipeline::train::TrainConfig;
+use crate::scene::Photo;
+
+/// What a unit was asked, in its folder.
+pub(super) const FILE: &str = "unit.json";
+/// Deepest folders of labels that are looked into.
+const DEEPEST: usize = 16;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct BatchUnit {
+    /// Place of its scene in the file, and of its settings.
+    pub(super) scene: usize,
+    pub(super) setting: usize,
+    pub(super) seed: u64,
+}
+
+/// What a unit is asked: with another answer to any of it, its result is another.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct UnitRequest {
+    pub(crate) scene: String,
+    pub(crate) setting: String,
+    pub(crate) seed: u64,
+    /// Checksum of the photos' names, sizes and cameras, and of the sparse points.
+    pub(crate) photos: String,
+    pub(crate) config: TrainConfig,
+    /// What of the scene's plan is decided otherwise.
+    pub(crate) plan: Value,
+    /// Checksum of the names and sizes of the labels' files.
+    pub(crate) masks: Option<String>,
+    pub(crate) query: Option<String>,
+    pub(crate) objects: Value,
+    pub(crate) eval: Value,
+}
+
+impl UnitRequest {
+    /// "garden/fast/seed-0".
+    pub(crate) fn name(&self) -> String {
+        name(&self.scene, &self.setting, self.seed)
+    }
+
+    /// The first thing that is `now` asked otherwise, in words.
+    pub(super) fn difference(&self, now: &Self) -> Option<String> {
+        let told = || crate::jobs::reproduce::difference(&json!(self), &json!(now));
+        (self != now).then(|| told().unwrap_or_else(|| "of another version of the program".into()))
+    }
+}
+
+fn name(scene: &str, setting: &str, seed: u64) -> String {
+    format!("{scene}/{setting}/seed-{seed}")
+}
+
+/// All units, in the order that shards are made of: the seeds of settings, the settings of scenes.
+pub(super) fn units(batch: &BatchFile) -> Vec<BatchUnit> {
+    let scenes = 0..batch.scenes.len();
+    let of_scene = |scene| (0..batch.settings.len()).map(move |setting| (scene, setting));
+    let of_setting = |(scene, setting)| batch.seeds.iter().map(move |&seed| BatchUnit { scene, setting, seed });
+    scenes.flat_map(of_scene).flat_map(of_setting).collect()
+}
+
+impl BatchUnit {
+    pub(super) fn scene(self, batch: &BatchFile) -> &BatchScene {
+        &batch.scenes[self.scene]
+    }
+
+    /// Its name, which is its folder in that of the results.
+    pub(super) fn name(self, batch: &BatchFile) -> String {
+        name(&self.scene(batch).name, &batch.settings[self.setting].name, self.seed)
+    }
+
+    /// The settings of its training, before the scene's plan.
+    pub(super) fn config(self, batch: &BatchFile) -> TrainConfig {
+        TrainConfig { seed: self.seed, ..batch.settings[self.setting].train.config.clone() }
+    }
+
+    /// What it is asked, if its scene's files are `inputs`.
+    pub(super) fn asked(self, batch: &BatchFile, inputs: &SceneInputs) -> UnitRequest {
+        let usual = TrainConfig::default();
+        let (setting, eval) = (&batch.settings[self.setting], &batch.eval);
+        UnitRequest {
+            scene: self.scene(batch).name.clone(),
+            setting: setting.name.clone(),
+            seed: self.seed,
+            photos: inputs.photos.clone(),
+            // How often a run looks and saves does not change it.
+            config: TrainConfig {
+                eval_every: usual.eval_every,
+                checkpoint_secs: usual.checkpoint_secs,
+                ..self.config(batch)
+            },
+            plan: json!(setting.train.plan),
+            masks: inputs.masks.clone(),
+            query: self.scene(batch).query.clone(),
+            objects: json!(batch.objects),
+            eval: json!({
+                "max_side_px": eval.max_side_px,
+                "keep_borders": eval.keep_borders,
+                "protocol": eval.protocol.name(),
+                "recipe": eval.recipe,
+            }),
+        }
+    }
+}
+
+/// Checksums of what is read of a scene. Contents of photos are left out: reading all of them takes long, and others
+/// have other sizes.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct SceneInputs {
+    pub(super) photos: String,
+    pub(super) masks: Option<String>,
+}
+
+impl SceneInputs {
+    /// Opens the scene, so that one that cannot be opened is told before anything runs.
+    pub(super) fn of(scene: &BatchScene) -> Result<Self, JobError> {
+        let dataset = open::dataset(&scene.path)?;
+        let mut sum = Sha256::new();
+        for photo in &dataset.photos {
+            let Photo { name, path, camera, distortion, test_split, background } = photo;
+            sum.update(format!("{:?}", (name, size(path)?, camera, distortion, test_split, background)));
+        }
+        for point in &dataset.points {
+            point.position.to_array().iter().for_each(|x| sum.update(x.to_le_bytes()));
+            sum.update(point.rgb);
+        }
+        sum.update(format!("{:?}", dataset.background));
+        let masks = scene.masks.as_deref().map(|masks| {
+            let mut all = Vec::new();
+            list(masks, "", &mut all, DEEPEST)?;
+            all.sort();
+            Ok::<_, IoError>(hex(&Sha256::digest(json!(all).to_string())))
+        });
+        Ok(Self { photos: hex(&sum.finalize()), masks: masks.transpose()? })
+    }
+}
+
+/// Names and sizes of the files in `folder`, or of the one file that it is.
+fn list(folder: &Path, name: &str, all: &mut Vec<(String, u64)>, deepest: usize) -> Result<(), IoError> {
+    if !folder.is_dir() {
+        all.push((name.into(), size(folder)?));
+        return Ok(());
+    }
+    let entries = std::fs::read_dir(folder).map_err(|cause| IoError::Read { path: folder.into(), cause })?;
+    for entry in entries.flatten().filter(|_| deepest > 0) {
+        list(&entry.path(), &format!("{name}/{}", entry.file_name().to_string_lossy()), all, deepest - 1)?;
+    }
+    Ok(())
+}
+
+fn size(path: &Path) -> Result<u64, IoError> {
+    let size = std::fs::metadata(path).map(|m| m.len());
+    size.map_err(|cause| IoError::Read { path: path.into(), cause })
+}
+
+/// A checksum as it is written.
+pub(super) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Refuses results in what is read, and the other way round.
+pub(super) fn check_places(request: &BatchRequest, units: &[BatchUnit]) -> Result<(), JobError> {
+    for unit in units {
+        let (scene, folder) = (unit.scene(&request.batch), request.out.join(unit.name(&request.batch)));
+        let real_folder = real(&folder);
+        for input in std::iter::once(&scene.path).chain(&scene.masks) {
+            let place = |why: &str| {
+                let (file, input, folder) = (request.batch.path.display(), input.display(), folder.display());
+                let text = format!(
+                    "{file}, [[scene]] '{}': {why} ({folder} of {input}); give another folder with --out",
+                    scene.name
+                );
+                JobError::Batch(text)
+            };
+            if !input.exists() {
+                let (file, input) = (request.batch.path.display(), input.display());
+                let text =
+                    format!("{file}, [[scene]] '{}': {input} does not exist; paths are relative to {file}", scene.name);
+                return Err(JobError::Batch(text));
+            }
+            let read = real(if input.is_dir() { input } else { files::folder_of(input) });
+            if real_folder.starts_with(&read) {
+                return Err(place("its results would lie among what is read"));
+            }
+            if read.starts_with(&real_folder) {
+                return Err(place("what is read lies in the folder of its results"));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Where a path leads, also where its end does not exist yet.
+fn real(path: &Path) -> PathBuf {
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
+    let there = path.ancestors().find_map(|a| Some((a.canonicalize().ok()?, path.strip_prefix(a).ok()?)));
+    there.map_or_else(|| path.clone(), |(real, rest)| if rest == Path::new("") { real } else { real.join(rest) })
+}
