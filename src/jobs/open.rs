@@ -17,6 +17,11 @@ use crate::scene::plan::used_degree;
 use crate::scene::resource_log::{self, ResourceKind};
 use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Machine, SceneFacts, SemanticMap};
 
+mod received;
+
+pub use received::Origin;
+pub(crate) use received::received;
+
 /// Gaussians that can be drawn, and what came with them.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
@@ -190,6 +195,8 @@ pub struct OpenedScene {
     pub(crate) report_out: PathBuf,
     /// Whether edits of Gaussians have made it, and are stored in it.
     pub(crate) is_edited: bool,
+    /// Where it is, if that is another computer.
+    pub remote: Option<Origin>,
 }
 
 impl OpenedScene {

@@ -1,0 +1,407 @@
+//! The client's thread: pulls what is new from a server, and tells it as the worker tells its jobs, so that the window
+//! folds both alike. Where the connection is lost it tries again, ever less often; what came so far stays.
+
+use std::path::Path;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
+
+use super::client::{Client, ClientError, Pulled};
+use super::wire::{Ask, SceneCard, WireEvent};
+use super::Address;
+use crate::io::IoError;
+use crate::jobs::open::{Origin, received};
+use crate::jobs::{Folders, OpenedScene, plan};
+use crate::pipeline::observer::{Evaluation, Severity};
+use crate::pipeline::semantics::edit::Edit;
+use crate::pipeline::train::TrainConfig;
+use crate::scene::{GaussianCloud, Machine, SemanticMap, text};
+use crate::worker::{CloudSnapshot, Event, Failure, JobId, JobKind, Outcome, Repaint, Slot};
+
+/// Time between two questions while a training runs, and while nothing does.
+const BUSY: Duration = Duration::from_millis(300);
+const AT_REST: Duration = Duration::from_millis(1500);
+/// Time to the first try after a lost connection, and the longest between two.
+const FIRST_TRY: Duration = Duration::from_millis(500);
+const LAST_TRY: Duration = Duration::from_secs(10);
+/// Events and wishes that may wait.
+const EVENTS: usize = 1024;
+const ASKS: usize = 32;
+/// From here on jobs are the server's: no worker counts so far.
+const FIRST_JOB: u64 = 1 << 63;
+
+/// How the connection is.
+#[derive(Clone, Debug)]
+pub(crate) struct LinkStatus {
+    /// The server, as it is shown.
+    pub(crate) host: String,
+    pub(crate) connected: bool,
+    /// Why not.
+    pub(crate) problem: Option<String>,
+    /// When it is tried again; `None` where that would be of no use.
+    pub(crate) retry_at: Option<Instant>,
+}
+
+/// A connection to a server. Dropping it ends its thread.
+pub(crate) struct Link {
+    asks: Sender<Ask>,
+    events: Receiver<Event>,
+    clouds: Arc<Slot<CloudSnapshot>>,
+    status: Arc<Mutex<LinkStatus>>,
+}
+
+impl Link {
+    /// Connects to a server; what is made of its scene goes into `folders`. Fails only if the system gives no thread.
+    pub(crate) fn start(address: Address, folders: Folders, repaint: Repaint) -> std::io::Result<Self> {
+        let (asks, asked) = bounded(ASKS);
+        let (sender, events) = bounded(EVENTS);
+        let clouds = Arc::new(Slot::default());
+        let host = address.host.clone();
+        let status = LinkStatus { host, connected: false, problem: None, retry_at: None };
+        let status = Arc::new(Mutex::new(status));
+        let thread = LinkThread {
+            client: Client::new(address)?,
+            folders,
+            machine: None,
+            asked,
+            out: Out { events: sender, clouds: Arc::clone(&clouds), status: Arc::clone(&status), repaint },
+            run: String::new(),
+            since: 0,
+            have: 0,
+            shown: None,
+            jobs: FIRST_JOB,
+            training: None,
+            evaluations: Vec::new(),
+            busy: false,
+        };
+        std::thread::Builder::new().name("remote scene".into()).spawn(move || thread.work())?;
+        Ok(Self { asks, events, clouds, status })
+    }
+
+    /// The next event, if one waits.
+    pub(crate) fn next_event(&self) -> Option<Event> {
+        self.events.try_recv().ok()
+    }
+
+    /// Where the Gaussians are published.
+    pub(crate) fn clouds(&self) -> &Slot<CloudSnapshot> {
+        &self.clouds
+    }
+
+    /// How the connection is.
+    pub(crate) fn status(&self) -> LinkStatus {
+        lock(&self.status).clone()
+    }
+
+    /// Whether a job is the server's.
+    pub(crate) fn owns(job: JobId) -> bool {
+        job.0 >= FIRST_JOB
+    }
+
+    /// Asks the training to wait or to go on. Whether there was room for that.
+    pub(crate) fn set_paused(&self, paused: bool) -> bool {
+        self.asks.try_send(Ask::Pause(paused)).is_ok()
+    }
+
+    /// Asks the training to end. Whether there was room for that.
+    pub(crate) fn cancel(&self) -> bool {
+        self.asks.try_send(Ask::Cancel).is_ok()
+    }
+
+    /// Asks for a change of objects and parts. Whether there was room for that.
+    pub(crate) fn edit(&self, edit: Edit) -> bool {
+        self.asks.try_send(Ask::Edit(edit)).is_ok()
+    }
+}
+
+/// Where the thread tells what it learns.
+struct Out {
+    events: Sender<Event>,
+    clouds: Arc<Slot<CloudSnapshot>>,
+    status: Arc<Mutex<LinkStatus>>,
+    repaint: Repaint,
+}
+
+/// Why the thread stops asking for now.
+enum Break {
+    Client(ClientError),
+    /// Nobody listens any more.
+    Gone,
+    /// The server was started anew.
+    OtherRun,
+}
+
+impl From<ClientError> for Break {
+    fn from(e: ClientError) -> Self {
+        Self::Client(e)
+    }
+}
+
+impl Out {
+    fn tell(&self, event: Event) -> Result<(), Break> {
+        let told = self.events.send(event).map_err(|_| Break::Gone);
+        (self.repaint)();
+        told
+    }
+
+    fn status(&self, change: impl FnOnce(&mut LinkStatus)) {
+        change(&mut lock(&self.status));
+        (self.repaint)();
+    }
+}
+
+struct LinkThread {
+    client: Client,
+    folders: Folders,
+    machine: Option<Machine>,
+    asked: Receiver<Ask>,
+    out: Out,
+    /// Run of the server, number of its news, and generation of its Gaussians that are here.
+    run: String,
+    since: u64,
+    have: u64,
+    /// The scene on screen.
+    shown: Option<(SceneCard, Arc<OpenedScene>)>,
+    jobs: u64,
+    /// The job that the server's training is here.
+    training: Option<JobId>,
+    evaluations: Vec<Evaluation>,
+    /// Whether a training runs there.
+    busy: bool,
+}
+
+impl LinkThread {
+    fn work(mut self) {
+        let job = self.new_job();
+        let title = format!("Connecting to {}", self.client.address.host);
+        if self.out.tell(Event::Started { job, kind: JobKind::Open, title }).is_err() {
+            return;
+        }
+        if self.client.address.is_open() {
+            let text = "The connection is not encrypted: others on the way can read it, the token included.";
+            let _ = self.out.tell(Event::Note(job, Severity::Warning, text.into()));
+        }
+        let mut opening = Some(job);
+        let mut wait = FIRST_TRY;
+        loop {
+            let why = match self.session(&mut opening, &mut wait) {
+                Break::Gone => return,
+                Break::OtherRun => continue,
+                Break::Client(why) => why,
+            };
+            let (problem, again) = match why {
+                ClientError::Lost(problem) => (problem, true),
+                ClientError::Refused(problem) => (problem, false),
+            };
+            let was_connected = lock(&self.out.status).connected;
+            let retry_at = again.then(|| Instant::now() + wait);
+            self.out.status(|s| (s.connected, s.problem, s.retry_at) = (false, Some(problem.clone()), retry_at));
+            let host = &self.client.address.host;
+            let text = match again {
+                true => format!("The connection to {host} is lost ({problem}); what is on screen stays"),
+                false => format!("{host} refuses: {problem}"),
+            };
+            let told = match (again, opening.take_if(|_| !again), self.training.take_if(|_| !again)) {
+                (false, Some(job), _) | (false, None, Some(job)) => {
+                    self.out.tell(Event::Failed(job, Failure { message: text, remedy: String::new() }))
+                }
+                _ if was_connected || !again => self.out.tell(Event::Note(job, Severity::Warning, text)),
+                _ => Ok(()),
+            };
+            if told.is_err() || !again || self.is_left_within(wait) {
+                return;
+            }
+            wait = (wait * 2).min(LAST_TRY);
+        }
+    }
+
+    /// Waits; whether nobody needs the connection any more. Wishes cannot be passed on meanwhile.
+    fn is_left_within(&self, wait: Duration) -> bool {
+        let until = Instant::now() + wait;
+        loop {
+            match self.asked.recv_deadline(until) {
+                Ok(_) => {
+                    let text = "There is no connection at the moment, so that was not passed on";
+                    let note = Event::Note(JobId(FIRST_JOB), Severity::Warning, text.into());
+                    if self.out.tell(note).is_err() {
+                        return true;
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => return false,
+                Err(RecvTimeoutError::Disconnected) => return true,
+            }
+        }
+    }
+
+    /// Talks to the server until that ends.
+    fn session(&mut self, opening: &mut Option<JobId>, wait: &mut Duration) -> Break {
+        match self.talk(opening, wait) {
+            Err(why) => why,
+            Ok(never) => match never {},
+        }
+    }
+
+    fn talk(&mut self, opening: &mut Option<JobId>, wait: &mut Duration) -> Result<std::convert::Infallible, Break> {
+        let card = self.client.scene()?;
+        if card.run != self.run {
+            (self.run, self.since, self.have) = (card.run, 0, 0);
+        }
+        let known = self.shown.as_ref().is_some_and(|(shown, _)| is_same(shown, &card.value));
+        if !known || opening.is_some() {
+            self.open(card.value, opening)?;
+        }
+        *wait = FIRST_TRY;
+        if !lock(&self.out.status).connected {
+            self.out.status(|s| (s.connected, s.problem, s.retry_at) = (true, None, None));
+            let text = format!("Connected to {}", self.client.address.host);
+            self.out.tell(Event::Note(JobId(FIRST_JOB), Severity::Info, text))?;
+        }
+        loop {
+            let news = self.client.news(self.since, self.have)?;
+            if news.run != self.run {
+                return Err(Break::OtherRun);
+            }
+            let mut news = news.value;
+            for event in news.events.drain(..) {
+                self.hear(event)?;
+            }
+            self.since = news.next;
+            if news.generation > self.have {
+                self.pull()?;
+            }
+            if let (Some(job), Some(progress)) = (self.training, news.progress) {
+                self.out.tell(Event::Progress(job, progress))?;
+            }
+            if news.more {
+                continue;
+            }
+            match self.asked.recv_timeout(if self.busy { BUSY } else { AT_REST }) {
+                Ok(ask) => self.ask(&ask)?,
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return Err(Break::Gone),
+            }
+        }
+    }
+
+    /// Shows the server's scene.
+    fn open(&mut self, card: SceneCard, opening: &mut Option<JobId>) -> Result<(), Break> {
+        let pulled = self.client.snapshot(0)?;
+        let exact = pulled.as_ref().is_some_and(|p| p.snapshot.is_exact());
+        let have = pulled.as_ref().map_or(0, |p| p.generation);
+        let sent = pulled.map(|p| self.read(&p)).transpose()?;
+        let machine = self.machine.get_or_insert_with(plan::machine);
+        let host = self.client.address.host.clone();
+        let origin = Origin { host, allow_edit: card.allow_edit };
+        let scene = received(card.info.clone(), sent, exact, origin, &self.folders, machine);
+        let scene = scene.map_err(|e| ClientError::Refused(e.to_string()))?;
+        self.have = have;
+        self.shown = Some((card, Arc::new(scene.clone())));
+        let job = opening.take().unwrap_or_else(|| self.new_job());
+        self.out.tell(Event::Finished(job, Outcome::Opened(Box::new(scene))))
+    }
+
+    /// Tells what happened there as if it happened here.
+    fn hear(&mut self, event: WireEvent) -> Result<(), Break> {
+        if let WireEvent::Started(title) = &event {
+            let job = self.new_job();
+            let title = format!("{} on {}", text::line(title), self.client.address.host);
+            (self.training, self.busy) = (Some(job), true);
+            self.evaluations.clear();
+            return self.out.tell(Event::Started { job, kind: JobKind::Train, title });
+        }
+        let Some(job) = self.training else { return Ok(()) };
+        match event {
+            WireEvent::Started(_) => Ok(()),
+            WireEvent::Step(metrics) => self.out.tell(Event::Step(job, metrics)),
+            WireEvent::Evaluation(evaluation) => {
+                self.evaluations.push(evaluation.clone());
+                self.out.tell(Event::Evaluation(job, evaluation))
+            }
+            WireEvent::Note(severity, text) => self.out.tell(Event::Note(job, severity, text)),
+            WireEvent::Paused(paused) => self.out.tell(Event::Paused(job, paused)),
+            WireEvent::Finished(folder) => {
+                let semantics = self.pull()?;
+                let outcome = self.trained(folder, semantics);
+                self.ends(Event::Finished(job, outcome))
+            }
+            WireEvent::Cancelled => {
+                self.pull()?;
+                self.ends(Event::Cancelled(job))
+            }
+            WireEvent::Failed(message) => self.ends(Event::Failed(job, Failure { message, remedy: String::new() })),
+        }
+    }
+
+    fn ends(&mut self, event: Event) -> Result<(), Break> {
+        (self.training, self.busy) = (None, false);
+        self.out.tell(event)
+    }
+
+    fn trained(&mut self, folder: String, semantics: Option<Arc<SemanticMap>>) -> Outcome {
+        let latest = self.out.clouds.newer_than(0);
+        let cloud = latest.as_ref().map(|(_, snapshot)| (&*snapshot.cloud, snapshot.cloud.sh_degree));
+        let dataset = self.shown.as_ref().and_then(|(_, scene)| scene.dataset.as_deref());
+        let machine = self.machine.get_or_insert_with(plan::machine);
+        let facts = plan::facts(machine, dataset, cloud, &TrainConfig::default());
+        let facts = Box::new(facts.with_semantics(semantics.as_deref()));
+        let evaluations = std::mem::take(&mut self.evaluations);
+        Outcome::Trained { evaluations, out: folder.into(), semantics, facts }
+    }
+
+    /// Fetches the newest Gaussians and publishes them; their objects, if they have any.
+    fn pull(&mut self) -> Result<Option<Arc<SemanticMap>>, Break> {
+        let Some(pulled) = self.client.snapshot(self.have)? else { return Ok(None) };
+        let (cloud, map) = self.read(&pulled)?;
+        self.have = pulled.generation;
+        let map = map.map(Arc::new);
+        match (self.training, &map) {
+            (Some(job), _) => {
+                self.out.clouds.publish(CloudSnapshot { job, cloud: Arc::new(cloud), step: pulled.step });
+            }
+            // At rest, objects are all that changes.
+            (None, Some(map)) => {
+                let job = self.new_job();
+                self.out.tell(Event::Finished(job, Outcome::Edited(Arc::clone(map))))?;
+            }
+            (None, None) => {}
+        }
+        (self.out.repaint)();
+        Ok(map)
+    }
+
+    fn read(&self, pulled: &Pulled) -> Result<(GaussianCloud, Option<SemanticMap>), ClientError> {
+        let read = pulled.snapshot.read(Path::new(&self.client.address.host));
+        read.map_err(|e: IoError| ClientError::Refused(e.to_string()))
+    }
+
+    /// Passes a wish on. One that is refused is told, and no more.
+    fn ask(&mut self, ask: &Ask) -> Result<(), Break> {
+        match self.client.ask(ask) {
+            Err(ClientError::Refused(why)) => {
+                let job = self.new_job();
+                self.out.tell(Event::Finished(job, Outcome::Refused(why)))
+            }
+            done => Ok(done?),
+        }
+    }
+
+    fn new_job(&mut self) -> JobId {
+        self.jobs += 1;
+        JobId(self.jobs)
+    }
+}
+
+/// Whether it is the same scene, whatever was measured of it since.
+fn is_same(a: &SceneCard, b: &SceneCard) -> bool {
+    let (mut a, mut b) = (a.clone(), b.clone());
+    for card in [&mut a, &mut b] {
+        card.info.history = Default::default();
+        card.info.state = None;
+    }
+    a == b
+}
+
+fn lock(status: &Mutex<LinkStatus>) -> std::sync::MutexGuard<'_, LinkStatus> {
+    status.lock().unwrap_or_else(PoisonError::into_inner)
+}
