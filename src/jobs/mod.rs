@@ -49,4 +49,4 @@ pub(crate) mod video;
 
 pub(crate) use error::JobError;
 pub use folders::Folders;
-pub(crate) use open::{OpenedScene, Origin, Scene};
+pub(crate) use open::{OpenedScene, Scene};

@@ -205,6 +205,13 @@ impl OpenedScene {
         if trained::is_scene(&self.out) { &self.out } else { &self.path }
     }
 
+    /// The scene after a training that has kept its results in `out`: other settings are another training, in a folder
+    /// of its own. What another computer keeps lies there.
+    pub(crate) fn trained_in(&self, out: &Path) -> Self {
+        let out = if self.remote.is_some() { &self.out } else { out };
+        Self { out: out.into(), known_held_out: None, ..self.clone() }
+    }
+
     /// Length of a unit in meters, if it is known of the scene or of its photos.
     pub(crate) fn meters_per_unit(&self) -> Option<f64> {
         self.metres_per_unit.or_else(|| self.dataset.as_ref().and_then(|d| d.metres_per_unit))

@@ -60,6 +60,11 @@ impl Response {
         Self { last: true, ..Self::new(status, "text/plain; charset=utf-8", body) }
     }
 
+    /// Whether it may take a while to be sent.
+    pub(super) fn is_large(&self) -> bool {
+        self.body.len() > PIECE
+    }
+
     pub(super) fn with(mut self, name: &'static str, value: impl ToString) -> Self {
         self.headers.push((name, value.to_string()));
         self

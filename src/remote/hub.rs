@@ -4,6 +4,7 @@
 
 use std::collections::HashMap;
 use std::io;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -38,6 +39,8 @@ pub(super) struct Hub {
     packed: Mutex<Option<Packed>>,
     pace: Mutex<Pace>,
     clients: Mutex<HashMap<String, Client>>,
+    /// Answers with Gaussians that are under way.
+    pub(super) sending: AtomicUsize,
 }
 
 /// Gaussians ready to be sent.
@@ -88,6 +91,7 @@ impl Hub {
             packed: Mutex::default(),
             pace: Mutex::new(Pace { wanted: false, next: Instant::now(), copying: None }),
             clients: Mutex::default(),
+            sending: AtomicUsize::new(0),
         })
     }
 
@@ -200,7 +204,9 @@ impl Hub {
         let (next, generation) = (lock(&self.log).next, lock(&self.latest).generation);
         let mut clients = lock(&self.clients);
         clients.retain(|_, client| client.seen.elapsed() < THERE);
-        (clients.len(), clients.values().filter(|c| c.since < next || c.have < generation).count())
+        let lack = clients.values().filter(|c| c.since < next || c.have < generation).count();
+        // Who is being sent something large asks nothing meanwhile.
+        (clients.len(), lack.max(self.sending.load(Ordering::Acquire)))
     }
 }
 

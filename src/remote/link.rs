@@ -2,6 +2,7 @@
 //! folds both alike. Where the connection is lost it tries again, ever less often; what came so far stays.
 
 use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -17,7 +18,7 @@ use crate::pipeline::observer::{Evaluation, Severity};
 use crate::pipeline::semantics::edit::Edit;
 use crate::pipeline::train::TrainConfig;
 use crate::scene::{GaussianCloud, Machine, SemanticMap, text};
-use crate::worker::{CloudSnapshot, Event, Failure, JobId, JobKind, Outcome, Repaint, Slot};
+use crate::worker::{CloudSnapshot, Event, EventSource, Failure, JobId, JobKind, Outcome};
 
 /// Time between two questions while a training runs, and while nothing does.
 const BUSY: Duration = Duration::from_millis(300);
@@ -25,11 +26,12 @@ const AT_REST: Duration = Duration::from_millis(1500);
 /// Time to the first try after a lost connection, and the longest between two.
 const FIRST_TRY: Duration = Duration::from_millis(500);
 const LAST_TRY: Duration = Duration::from_secs(10);
-/// Events and wishes that may wait.
-const EVENTS: usize = 1024;
+/// Wishes that may wait.
 const ASKS: usize = 32;
-/// From here on jobs are the server's: no worker counts so far.
+/// From here on jobs are of servers: no worker counts so far. Each link has numbers of its own.
 const FIRST_JOB: u64 = 1 << 63;
+const JOBS_OF_LINK: u64 = 1 << 32;
+static LINKS: AtomicU64 = AtomicU64::new(0);
 
 /// How the connection is.
 #[derive(Clone, Debug)]
@@ -46,17 +48,16 @@ pub(crate) struct LinkStatus {
 /// A connection to a server. Dropping it ends its thread.
 pub(crate) struct Link {
     asks: Sender<Ask>,
-    events: Receiver<Event>,
-    clouds: Arc<Slot<CloudSnapshot>>,
+    first_job: u64,
     status: Arc<Mutex<LinkStatus>>,
 }
 
 impl Link {
-    /// Connects to a server; what is made of its scene goes into `folders`. Fails only if the system gives no thread.
-    pub(crate) fn start(address: Address, folders: Folders, repaint: Repaint) -> std::io::Result<Self> {
+    /// Connects to a server and tells `source` what comes; what is made of its scene goes into `folders`. Fails only if
+    /// the system gives no thread.
+    pub(crate) fn start(address: Address, folders: Folders, source: EventSource) -> std::io::Result<Self> {
         let (asks, asked) = bounded(ASKS);
-        let (sender, events) = bounded(EVENTS);
-        let clouds = Arc::new(Slot::default());
+        let first_job = FIRST_JOB + JOBS_OF_LINK * LINKS.fetch_add(1, Ordering::Relaxed);
         let host = address.host.clone();
         let status = LinkStatus { host, connected: false, problem: None, retry_at: None };
         let status = Arc::new(Mutex::new(status));
@@ -65,28 +66,19 @@ impl Link {
             folders,
             machine: None,
             asked,
-            out: Out { events: sender, clouds: Arc::clone(&clouds), status: Arc::clone(&status), repaint },
+            out: Out { source, status: Arc::clone(&status) },
             run: String::new(),
             since: 0,
             have: 0,
             shown: None,
-            jobs: FIRST_JOB,
+            jobs: first_job,
             training: None,
             evaluations: Vec::new(),
+            map: None,
             busy: false,
         };
         std::thread::Builder::new().name("remote scene".into()).spawn(move || thread.work())?;
-        Ok(Self { asks, events, clouds, status })
-    }
-
-    /// The next event, if one waits.
-    pub(crate) fn next_event(&self) -> Option<Event> {
-        self.events.try_recv().ok()
-    }
-
-    /// Where the Gaussians are published.
-    pub(crate) fn clouds(&self) -> &Slot<CloudSnapshot> {
-        &self.clouds
+        Ok(Self { asks, first_job, status })
     }
 
     /// How the connection is.
@@ -94,8 +86,13 @@ impl Link {
         lock(&self.status).clone()
     }
 
-    /// Whether a job is the server's.
-    pub(crate) fn owns(job: JobId) -> bool {
+    /// Whether a job is this server's.
+    pub(crate) fn owns(&self, job: JobId) -> bool {
+        (self.first_job..self.first_job + JOBS_OF_LINK).contains(&job.0)
+    }
+
+    /// Whether a job is any server's.
+    pub(crate) fn is_remote(job: JobId) -> bool {
         job.0 >= FIRST_JOB
     }
 
@@ -117,10 +114,8 @@ impl Link {
 
 /// Where the thread tells what it learns.
 struct Out {
-    events: Sender<Event>,
-    clouds: Arc<Slot<CloudSnapshot>>,
+    source: EventSource,
     status: Arc<Mutex<LinkStatus>>,
-    repaint: Repaint,
 }
 
 /// Why the thread stops asking for now.
@@ -140,14 +135,14 @@ impl From<ClientError> for Break {
 
 impl Out {
     fn tell(&self, event: Event) -> Result<(), Break> {
-        let told = self.events.send(event).map_err(|_| Break::Gone);
-        (self.repaint)();
+        let told = self.source.events.send(event).map_err(|_| Break::Gone);
+        (self.source.repaint)();
         told
     }
 
     fn status(&self, change: impl FnOnce(&mut LinkStatus)) {
         change(&mut lock(&self.status));
-        (self.repaint)();
+        (self.source.repaint)();
     }
 }
 
@@ -167,6 +162,8 @@ struct LinkThread {
     /// The job that the server's training is here.
     training: Option<JobId>,
     evaluations: Vec<Evaluation>,
+    /// Objects and parts of the newest Gaussians.
+    map: Option<Arc<SemanticMap>>,
     /// Whether a training runs there.
     busy: bool,
 }
@@ -223,7 +220,7 @@ impl LinkThread {
             match self.asked.recv_deadline(until) {
                 Ok(_) => {
                     let text = "There is no connection at the moment, so that was not passed on";
-                    let note = Event::Note(JobId(FIRST_JOB), Severity::Warning, text.into());
+                    let note = Event::Note(JobId(self.jobs), Severity::Warning, text.into());
                     if self.out.tell(note).is_err() {
                         return true;
                     }
@@ -255,7 +252,7 @@ impl LinkThread {
         if !lock(&self.out.status).connected {
             self.out.status(|s| (s.connected, s.problem, s.retry_at) = (true, None, None));
             let text = format!("Connected to {}", self.client.address.host);
-            self.out.tell(Event::Note(JobId(FIRST_JOB), Severity::Info, text))?;
+            self.out.tell(Event::Note(JobId(self.jobs), Severity::Info, text))?;
         }
         loop {
             let news = self.client.news(self.since, self.have)?;
@@ -296,6 +293,7 @@ impl LinkThread {
         let scene = received(card.info.clone(), sent, exact, origin, &self.folders, machine);
         let scene = scene.map_err(|e| ClientError::Refused(e.to_string()))?;
         self.have = have;
+        self.map = scene.semantics.clone();
         self.shown = Some((card, Arc::new(scene.clone())));
         let job = opening.take().unwrap_or_else(|| self.new_job());
         self.out.tell(Event::Finished(job, Outcome::Opened(Box::new(scene))))
@@ -321,8 +319,8 @@ impl LinkThread {
             WireEvent::Note(severity, text) => self.out.tell(Event::Note(job, severity, text)),
             WireEvent::Paused(paused) => self.out.tell(Event::Paused(job, paused)),
             WireEvent::Finished(folder) => {
-                let semantics = self.pull()?;
-                let outcome = self.trained(folder, semantics);
+                self.pull()?;
+                let outcome = self.trained(folder);
                 self.ends(Event::Finished(job, outcome))
             }
             WireEvent::Cancelled => {
@@ -338,8 +336,9 @@ impl LinkThread {
         self.out.tell(event)
     }
 
-    fn trained(&mut self, folder: String, semantics: Option<Arc<SemanticMap>>) -> Outcome {
-        let latest = self.out.clouds.newer_than(0);
+    fn trained(&mut self, folder: String) -> Outcome {
+        let semantics = self.map.clone();
+        let latest = self.out.source.clouds.newer_than(0);
         let cloud = latest.as_ref().map(|(_, snapshot)| (&*snapshot.cloud, snapshot.cloud.sh_degree));
         let dataset = self.shown.as_ref().and_then(|(_, scene)| scene.dataset.as_deref());
         let machine = self.machine.get_or_insert_with(plan::machine);
@@ -349,25 +348,25 @@ impl LinkThread {
         Outcome::Trained { evaluations, out: folder.into(), semantics, facts }
     }
 
-    /// Fetches the newest Gaussians and publishes them; their objects, if they have any.
-    fn pull(&mut self) -> Result<Option<Arc<SemanticMap>>, Break> {
-        let Some(pulled) = self.client.snapshot(self.have)? else { return Ok(None) };
+    /// Fetches the newest Gaussians and publishes them.
+    fn pull(&mut self) -> Result<(), Break> {
+        let Some(pulled) = self.client.snapshot(self.have)? else { return Ok(()) };
         let (cloud, map) = self.read(&pulled)?;
         self.have = pulled.generation;
-        let map = map.map(Arc::new);
-        match (self.training, &map) {
+        self.map = map.map(Arc::new);
+        match (self.training, self.map.clone()) {
             (Some(job), _) => {
-                self.out.clouds.publish(CloudSnapshot { job, cloud: Arc::new(cloud), step: pulled.step });
+                self.out.source.clouds.publish(CloudSnapshot { job, cloud: Arc::new(cloud), step: pulled.step });
             }
             // At rest, objects are all that changes.
             (None, Some(map)) => {
                 let job = self.new_job();
-                self.out.tell(Event::Finished(job, Outcome::Edited(Arc::clone(map))))?;
+                self.out.tell(Event::Finished(job, Outcome::Edited(map)))?;
             }
             (None, None) => {}
         }
-        (self.out.repaint)();
-        Ok(map)
+        (self.out.source.repaint)();
+        Ok(())
     }
 
     fn read(&self, pulled: &Pulled) -> Result<(GaussianCloud, Option<SemanticMap>), ClientError> {

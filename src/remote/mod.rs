@@ -6,17 +6,31 @@
 //! watcher. On the other side a [`link`] turns what comes into events that the window's state is a fold over.
 
 mod address;
-pub(crate) mod client;
+mod client;
 mod edits;
+mod follow;
 mod hub;
 mod http;
-pub(crate) mod link;
+mod link;
 mod observer;
-pub(crate) mod server;
+pub(crate) mod serve;
+mod server;
 mod token;
-pub(crate) mod wire;
+mod wire;
 
 pub(crate) use address::{Address, bind_address};
 pub(crate) use client::Client;
+pub(crate) use follow::{Followed, follow};
 pub(crate) use link::{Link, LinkStatus};
 pub(crate) use server::{ServeOptions, Server};
+
+use std::io;
+use std::path::Path;
+
+/// The secret of a server: the one in this file, or a new one.
+///
+/// # Errors
+/// If the file can neither be read nor made, or the system gives no random numbers.
+pub(crate) fn token_of(file: Option<&Path>) -> io::Result<token::Token> {
+    file.map_or_else(token::Token::random, token::Token::kept)
+}

@@ -23,7 +23,9 @@ use super::wire::{
 use crate::io::http::is_loopback;
 use crate::io::snapshot;
 use crate::io::trained::SceneInfo;
+use crate::jobs::JobError;
 use crate::pipeline::observer::Observer;
+use crate::scene::GaussianCloud;
 
 /// Connections at once.
 const CONNECTIONS: usize = 32;
@@ -36,7 +38,7 @@ const EDIT_BYTES: usize = 8 << 20;
 /// How long somebody who does not know the token waits for that answer.
 const WRONG_TOKEN: Duration = Duration::from_millis(200);
 /// How long the end of a training waits for its watchers at most.
-const FAREWELL: Duration = Duration::from_secs(60);
+const FAREWELL: Duration = Duration::from_secs(120);
 
 /// How a scene is served.
 #[derive(Clone, Debug)]
@@ -64,6 +66,8 @@ pub enum ServeError {
     Listen(SocketAddr, io::Error),
     #[error("no server could be started: {0}")]
     Start(#[from] io::Error),
+    #[error(transparent)]
+    Scene(#[from] JobError),
 }
 
 struct Shared {
@@ -141,6 +145,11 @@ impl Server {
         self.shared.hub.publish_packed(snapshot);
     }
 
+    /// Shows Gaussians that training starts from.
+    pub(super) fn publish_live(&self, cloud: Arc<GaussianCloud>) {
+        self.shared.hub.publish(cloud, 0);
+    }
+
     /// An observer of a training called `title` that tells `inner` everything, and whoever watches.
     pub(crate) fn observe<'a>(&self, title: String, inner: &'a mut dyn Observer) -> ServedObserver<'a> {
         self.shared.hub.tell(WireEvent::Started(title));
@@ -168,7 +177,7 @@ impl Server {
         self.shared.hub.watchers()
     }
 
-    /// Waits until whoever watches has got everything, a minute at most, or until `stop` says so.
+    /// Waits until whoever watches has got everything, two minutes at most, or until `stop` says so.
     pub(crate) fn see_off(&self, stop: impl Fn() -> bool) {
         let start = Instant::now();
         while self.watchers().1 > 0 && start.elapsed() < FAREWELL && !stop() {
@@ -235,7 +244,12 @@ fn talk(mut connection: Connection, shared: &Shared) {
             Err(refused) => refused,
         };
         let response = response.with(VERSION_HEADER, version()).with(RUN_HEADER, &shared.hub.run);
-        if connection.answer(&response).is_err() {
+        let sending = &shared.hub.sending;
+        let large = response.is_large();
+        sending.fetch_add(usize::from(large), Ordering::AcqRel);
+        let sent = connection.answer(&response);
+        sending.fetch_sub(usize::from(large), Ordering::AcqRel);
+        if sent.is_err() {
             return;
         }
         if response.last {

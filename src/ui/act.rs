@@ -30,16 +30,18 @@ impl App {
             Action::Open(path) if is_report(&path) => self.read_report(path, false),
             Action::Open(path) if path.extension().is_some_and(|e| e == "toml") => self.read_preset(&path),
             Action::OpenDemo | Action::TrainDemo | Action::Open(_) | Action::FindPoses(_) => self.replace_scene(action),
+            Action::Connect(url) => self.connect(&url),
             Action::StartTraining => self.start_training(),
             Action::PauseJob => {
-                if let Some(job) = self.state.job.as_ref().filter(|j| j.kind.can_pause()) {
-                    self.worker.set_paused(job.id, !job.paused);
+                if let Some(job) = self.state.job.clone().filter(|j| j.kind.can_pause()) {
+                    self.set_paused(job.id, !job.paused);
                 }
             }
             Action::Cancel => {
                 if let Some(job) = &mut self.state.job {
-                    self.worker.cancel(job.id);
                     job.canceling = true;
+                    let id = job.id;
+                    self.cancel(id);
                 }
             }
             Action::Dismiss => self.dismiss(ctx),
@@ -166,9 +168,11 @@ impl App {
 
     /// Opens something else; asks first if that ends a running job.
     fn replace_scene(&mut self, action: Action) {
-        match self.state.job.as_ref().map(|j| (j.kind, j.title.clone())) {
+        // What runs on another computer goes on there.
+        let here = |id| !self.link.as_ref().is_some_and(|link| link.owns(id));
+        match self.state.job.as_ref().filter(|j| here(j.id)).map(|j| j.title.clone()) {
             None => self.open(action),
-            Some((_, title)) => {
+            Some(title) => {
                 self.question = Some(Question {
                     text: format!("{title} is still running. Cancel it and continue? Saved progress is kept."),
                     yes: "Cancel and continue",
@@ -182,13 +186,15 @@ impl App {
     /// Cancels what runs and does the action next.
     pub(super) fn give_up_and(&mut self, action: Action) {
         if let Some(job) = &mut self.state.job {
-            self.worker.cancel(job.id);
             job.canceling = true;
+            let id = job.id;
+            self.cancel(id);
         }
         self.open(action);
     }
 
     fn open(&mut self, action: Action) {
+        self.disconnect();
         let command = match action {
             Action::Open(path) => Command::Open { path },
             Action::TrainDemo => Command::DemoPhotos,
@@ -199,6 +205,9 @@ impl App {
     }
 
     pub(super) fn submit(&mut self, command: Command) -> Option<JobId> {
+        if self.settled_remotely(&command) {
+            return None;
+        }
         let title = command.title();
         let job = self.worker.submit(command);
         job.map_err(|e| self.state.toast(Tone::Warning, format!("{title}: {e}"))).ok()

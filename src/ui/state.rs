@@ -27,6 +27,7 @@ use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
+use crate::remote::LinkStatus;
 use crate::scene::findings::IdentityEvidence;
 use crate::scene::{GaussianCloud, Limits, Overrides, PhotoPixels, SceneFacts, ScenePlan, SemanticMap, text};
 use crate::worker::{Event, JobId, JobKind, Outcome, Versioned, WorkerThread};
@@ -121,6 +122,8 @@ pub struct AppState {
     pub report: Option<ShownReport>,
     /// The report that it is compared with.
     pub second_report: Option<ShownReport>,
+    /// How the connection to the server is whose scene is on screen, if it is one's.
+    pub(crate) link: Option<LinkStatus>,
     short_jobs: BTreeMap<JobId, (JobKind, String)>,
     next_toast: u64,
 }
@@ -299,12 +302,11 @@ impl AppState {
                     self.history.evaluations = evaluations;
                     self.set_facts(*facts);
                     self.set_semantics(semantics);
-                    // Other settings are another training, in a folder of its own.
-                    let in_out = |s: &OpenedScene| OpenedScene { out: out.clone(), known_held_out: None, ..s.clone() };
-                    self.scene = self.scene.take().map(|s| Arc::new(in_out(&s)));
+                    self.scene = self.scene.take().map(|s| Arc::new(s.trained_in(&out)));
                 }
                 let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));
-                self.say(Tone::Info, format!("Saved to {}", out.display()));
+                let there = self.scene.as_ref().and_then(|s| s.remote.as_ref()).map(|o| format!(" on {}", o.host));
+                self.say(Tone::Info, format!("Saved to {}{}", out.display(), there.unwrap_or_default()));
                 self.toast(Tone::Good, format!("Training finished{}", quality.unwrap_or_default()));
                 let has_masks = self.scene.as_ref().is_some_and(|s| s.masks.is_some());
                 next.extend((has_masks && !carried).then_some(Action::FindObjects));
@@ -380,7 +382,7 @@ impl AppState {
         let reached = self.history.steps.last().map(|s| s.step);
         self.resumable = scene.resumable.clone().zip(reached);
         self.photos.clear();
-        if !is_demo {
+        if !is_demo && scene.remote.is_none() {
             self.remember(scene.path.clone());
         }
         self.scene_number += 1;

@@ -43,12 +43,20 @@ struct Queued {
 
 type Controls = Arc<Mutex<HashMap<JobId, Arc<Control>>>>;
 
+/// Where jobs that run elsewhere tell what happens, as those of a worker do.
+#[derive(Clone)]
+pub(crate) struct EventSource {
+    pub(crate) events: Sender<Event>,
+    pub(crate) clouds: Arc<Slot<CloudSnapshot>>,
+    pub(crate) repaint: Repaint,
+}
+
 /// Runs jobs in the background. Dropping it cancels all of them and waits a few seconds.
 pub struct Worker {
     long: Option<Sender<Queued>>,
     short: Option<Sender<Queued>>,
     events: Option<Receiver<Event>>,
-    clouds: Arc<Slot<CloudSnapshot>>,
+    source: EventSource,
     controls: Controls,
     next: AtomicU64,
     threads: Vec<JoinHandle<()>>,
@@ -81,7 +89,8 @@ impl Worker {
             Ok::<_, std::io::Error>(Some(sender))
         };
         let (long, short) = (lane("long jobs", super::low_priority_pool::pool())?, lane("short jobs", None)?);
-        Ok(Self { long, short, events: Some(events), clouds, controls, next: AtomicU64::new(1), threads })
+        let source = EventSource { events: event_sender, clouds, repaint };
+        Ok(Self { long, short, events: Some(events), source, controls, next: AtomicU64::new(1), threads })
     }
 
     /// Queues a job on its lane.
@@ -127,7 +136,12 @@ impl Worker {
 
     /// Where the Gaussians in training are published.
     pub fn clouds(&self) -> &Slot<CloudSnapshot> {
-        &self.clouds
+        &self.source.clouds
+    }
+
+    /// Where others tell events beside those of the jobs.
+    pub(crate) fn source(&self) -> EventSource {
+        self.source.clone()
     }
 }
 

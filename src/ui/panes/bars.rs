@@ -1,5 +1,7 @@
 //! The bar at the top (menus, name of the scene) and the bar at the bottom (the running job).
 
+use std::time::{Duration, Instant};
+
 use egui::{Align, Button, RichText, Stroke, Ui, vec2};
 use strum::VariantArray;
 
@@ -8,6 +10,7 @@ use super::super::state::{AppState, RunningJob};
 use super::super::{keys, theme};
 use crate::math::format;
 use crate::pipeline::observer::Progress;
+use crate::remote::LinkStatus;
 use crate::scene::text;
 use crate::ui::actions::{Action, Axis, Pane, THEMES};
 use crate::worker::ViewMode;
@@ -194,6 +197,9 @@ pub(crate) fn status(
                 );
             }
         }
+        if let Some(link) = &state.link {
+            connection(ui, link);
+        }
         ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
             let log = ui.selectable_label(layout.shows(Pane::Log), "Log");
             if log.on_hover_text("Show or hide the log").clicked() {
@@ -207,6 +213,28 @@ pub(crate) fn status(
                 };
             }
         });
+    });
+}
+
+/// How the connection to another computer is.
+fn connection(ui: &mut Ui, link: &LinkStatus) {
+    let host = &link.host;
+    let (color, text) = match (link.connected, link.retry_at) {
+        (true, _) => (theme::good(), format!("Connected to {host}")),
+        (false, Some(at)) => {
+            let secs = at.saturating_duration_since(Instant::now()).as_secs_f64().ceil();
+            ui.ctx().request_repaint_after(Duration::from_millis(500));
+            (theme::warning(), format!("No connection to {host}, trying again in {secs} s"))
+        }
+        (false, None) if link.problem.is_some() => (theme::warning(), format!("Not connected to {host}")),
+        (false, None) => return,
+    };
+    ui.add_space(8.0);
+    dot(ui, color);
+    let shown = ui.label(RichText::new(text).color(if link.connected { theme::weak() } else { color }));
+    shown.on_hover_text(match &link.problem {
+        Some(problem) => format!("{problem}\nWhat is on screen stays."),
+        None => "What is drawn and asked is drawn and asked here; the scene comes from there.".into(),
     });
 }
 

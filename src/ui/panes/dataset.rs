@@ -51,7 +51,9 @@ impl PhotoThumbnails {
     }
 
     fn request(&mut self, index: usize, dataset: &Dataset, worker: &Worker) {
-        let known = self.loaded.contains_key(&index)
+        // Photos stay on the other computer.
+        let known = dataset.photos.get(index).is_none_or(|photo| photo.path.as_os_str().is_empty())
+            || self.loaded.contains_key(&index)
             || self.failed.contains(&index)
             || self.waiting.values().any(|i| *i == index);
         if known || self.waiting.len() >= AT_ONCE {
