@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::{CliError, interrupt, output};
-use crate::remote::{Server, ServeOptions, bind_address, serve, token_of};
+use crate::remote::{ServeOptions, Server, bind_address, serve, token_of};
 
 /// Show a scene on this computer to a window on another
 ///

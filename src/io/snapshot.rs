@@ -134,7 +134,8 @@ impl Snapshot {
         };
         let cloud = splat_ply::parse(ply, path)?;
         let state = splat_ply::state_in(ply, path);
-        let map = self.objects.as_deref().map(|o| semantic_map::decode(o, state.as_deref(), &cloud, path)).transpose()?;
+        let map =
+            self.objects.as_deref().map(|o| semantic_map::decode(o, state.as_deref(), &cloud, path)).transpose()?;
         Ok((cloud, map))
     }
 

@@ -57,7 +57,9 @@ pub(crate) fn bind_address(text: &str) -> Result<SocketAddr, String> {
     let address = || text.parse::<IpAddr>().map(|ip| SocketAddr::from((ip, PORT)));
     let local = || text.replace("localhost:", "127.0.0.1:").parse();
     port.or_else(|_| address()).or_else(|_| local()).map_err(|_| {
-        format!("'{text}' is no address to listen at, such as 127.0.0.1:{PORT} or {PORT} (put what is trained before it)")
+        format!(
+            "'{text}' is no address to listen at, such as 127.0.0.1:{PORT} or {PORT} (put what is trained before it)"
+        )
     })
 }
 

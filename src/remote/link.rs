@@ -8,9 +8,9 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, RecvTimeoutError, Sender, bounded};
 
+use super::Address;
 use super::client::{Client, ClientError, Pulled};
 use super::wire::{Ask, SceneCard, WireEvent};
-use super::Address;
 use crate::io::IoError;
 use crate::jobs::open::{Origin, received};
 use crate::jobs::{Folders, OpenedScene, plan};

@@ -101,7 +101,10 @@ mod tests {
         let made = Token::kept(&path).expect("made");
         assert!(Token::kept(&path).expect("read").is(&made.text()));
         #[cfg(unix)]
-        assert_eq!(std::os::unix::fs::PermissionsExt::mode(&fs::metadata(&path).expect("file").permissions()) & 0o77, 0);
+        assert_eq!(
+            std::os::unix::fs::PermissionsExt::mode(&fs::metadata(&path).expect("file").permissions()) & 0o77,
+            0
+        );
         fs::write(&path, "abc").expect("write");
         assert!(Token::kept(&path).is_err(), "what is in a file is not replaced");
     }

@@ -32,6 +32,11 @@ impl Photo {
         Self { name, path, camera, distortion: None, test_split: false, background: None }
     }
 
+    /// Whether there is a file of it here: of photos on another computer only the cameras are known.
+    pub(crate) fn is_here(&self) -> bool {
+        !self.path.as_os_str().is_empty()
+    }
+
     /// Its name as it may be shown.
     pub(crate) fn title(&self) -> Cow<'_, str> {
         text::line(&self.name)

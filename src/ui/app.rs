@@ -25,9 +25,9 @@ use super::toasts::Toasts;
 use super::viewport::Viewport;
 use super::{keys, theme};
 use crate::measure::is_report;
+use crate::remote::Link;
 use crate::scene::plan::PlanOverride;
 use crate::scene::resource_log::{self, ResourceKind};
-use crate::remote::Link;
 use crate::ui::actions::{Action, Pane};
 use crate::worker::{Jobs, Repaint, Worker};
 

@@ -66,13 +66,17 @@ impl App {
                     false => "there is no connection at the moment".to_owned(),
                 }
             }
-            Command::EditObjects { .. } if origin.allow_edit => "its server keeps no earlier states to go back to".into(),
+            Command::EditObjects { .. } if origin.allow_edit => {
+                "its server keeps no earlier states to go back to".into()
+            }
             Command::EditObjects { .. } => format!("{host} does not allow changes (fmlgs serve --allow-edit)"),
             Command::FindObjects(_) => "run 'fmlgs preprocess' there".into(),
             Command::Train { .. } => "run 'fmlgs train --serve' there".into(),
             Command::Evaluate { .. } => "run 'fmlgs eval' there".into(),
             Command::Remove(_) => "run 'fmlgs remove' there".into(),
-            Command::Rearrange(_) => "run 'fmlgs edit' or 'fmlgs clean' there, or export the Gaussians here first".into(),
+            Command::Rearrange(_) => {
+                "run 'fmlgs edit' or 'fmlgs clean' there, or export the Gaussians here first".into()
+            }
             Command::SetScale { .. } => "its scale is stored with the scene there".into(),
             _ => return false,
         };

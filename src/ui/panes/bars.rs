@@ -120,10 +120,11 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
         });
         ui.menu_button("Train", |ui| {
             ui.set_min_width(260.0);
-            item(ui, has_photos && state.job.is_none(), None, Action::StartTraining, actions);
+            let trains_here = has_photos && state.scene.as_ref().is_some_and(|s| s.remote.is_none());
+            item(ui, trains_here && state.job.is_none(), None, Action::StartTraining, actions);
             item(ui, state.job.as_ref().is_some_and(|j| j.kind.can_pause()), None, Action::PauseJob, actions);
             item(ui, state.job.is_some(), None, Action::Cancel, actions);
-            item(ui, has_photos && state.job.is_none(), None, Action::Evaluate, actions);
+            item(ui, trains_here && state.job.is_none(), None, Action::Evaluate, actions);
         });
         ui.menu_button("Help", |ui| {
             ui.set_min_width(240.0);

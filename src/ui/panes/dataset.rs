@@ -51,8 +51,7 @@ impl PhotoThumbnails {
     }
 
     fn request(&mut self, index: usize, dataset: &Dataset, worker: &Worker) {
-        // Photos stay on the other computer.
-        let known = dataset.photos.get(index).is_none_or(|photo| photo.path.as_os_str().is_empty())
+        let known = dataset.photos.get(index).is_none_or(|photo| !photo.is_here())
             || self.loaded.contains_key(&index)
             || self.failed.contains(&index)
             || self.waiting.values().any(|i| *i == index);
@@ -96,6 +95,9 @@ impl PhotoThumbnails {
         };
         let test: BTreeSet<usize> = scene.held_out(layout.config.holdout_every).into_iter().collect();
         facts(ui, dataset, dataset.photos.len() - test.len(), test.len());
+        if let Some(origin) = &scene.remote {
+            ui.weak(format!("The photos stay on {}; here are their cameras.", origin.host));
+        }
         let scores: HashMap<&str, f64> = state
             .history
             .evaluations

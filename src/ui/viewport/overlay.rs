@@ -253,7 +253,8 @@ impl Viewport {
                         );
                 }
                 if p.failed() {
-                    ui.colored_label(theme::warning(), "photo not loaded");
+                    let why = if scene.remote.is_some() { "camera only" } else { "photo not loaded" };
+                    ui.colored_label(theme::warning(), why);
                 }
             }
             None => {
