@@ -9,6 +9,7 @@ use ureq::http::Response;
 use ureq::{Agent, Body};
 
 use super::address::Address;
+use super::photos;
 use super::token::random_name;
 use super::wire::{
     Ask, CLIENT_HEADER, GENERATION_HEADER, News, RUN_HEADER, STEP_HEADER, SceneCard, VERSION_HEADER, is_understood,
@@ -16,13 +17,14 @@ use super::wire::{
 };
 use crate::io::http;
 use crate::io::snapshot::Snapshot;
-use crate::scene::text;
+use crate::scene::{PhotoPixels, text};
 
 /// How long the server may be silent.
 const STALL: Duration = Duration::from_secs(10);
-/// Most bytes of an answer in JSON, of Gaussians, and of a refusal.
+/// Most bytes of an answer in JSON, of Gaussians, of a photo, and of a refusal.
 const JSON_BYTES: u64 = 64 << 20;
 const SNAPSHOT_BYTES: u64 = 16 << 30;
+const PHOTO_BYTES: u64 = 128 << 20;
 const REFUSAL_BYTES: u64 = 2 << 10;
 
 /// Why there is no answer.
@@ -90,6 +92,12 @@ impl Client {
         let bytes = self.bytes(response, SNAPSHOT_BYTES)?;
         let snapshot = Snapshot::parse(&bytes, Path::new(&self.address.host)).map_err(|e| self.odd(&e.to_string()))?;
         Ok(Some(Pulled { snapshot, generation, step }))
+    }
+
+    /// The photo of this number, at most so large.
+    pub(crate) fn photo(&self, index: usize, side_px: u32) -> Result<PhotoPixels, ClientError> {
+        let response = self.get(&format!("/photo?index={index}&side={side_px}"))?;
+        photos::read(&self.bytes(response, PHOTO_BYTES)?).map_err(|e| self.odd(&e.to_string()))
     }
 
     /// Asks for something to be done. What cannot be done is refused.

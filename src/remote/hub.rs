@@ -17,9 +17,10 @@ use crate::worker::Control;
 
 /// Least time between two snapshots of a training.
 const SNAPSHOT_EVERY: Duration = Duration::from_millis(1000);
-/// The time between two is at least so many times what copying one costs the training, and packing one a core.
+/// The time between two is at least so many times what copying one takes from the training, and what packing one takes
+/// on a thread that yields to it.
 const COPY_SHARE: u32 = 150;
-const PACK_SHARE: u32 = 60;
+const PACK_SHARE: u32 = 10;
 /// Events in one answer, and in the log; if those are more, every other step of training is forgotten.
 const PER_ANSWER: usize = 2000;
 const LOGGED: usize = 200_000;
@@ -232,7 +233,7 @@ mod tests {
     use crate::pipeline::observer::StepMetrics;
 
     fn hub() -> Hub {
-        Hub::new(SceneCard { info: SceneInfo::default(), allow_edit: false }).expect("random numbers")
+        Hub::new(SceneCard { info: SceneInfo::default(), allow_edit: false, photos: false }).expect("random numbers")
     }
 
     fn cloud(n: usize) -> Arc<GaussianCloud> {

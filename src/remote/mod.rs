@@ -13,6 +13,7 @@ mod http;
 mod hub;
 mod link;
 mod observer;
+mod photos;
 pub(crate) mod serve;
 mod server;
 mod token;

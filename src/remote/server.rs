@@ -15,6 +15,7 @@ use super::edits::Editor;
 use super::http::{Connection, Head, Response};
 use super::hub::Hub;
 use super::observer::ServedObserver;
+use super::photos::ServedPhotos;
 use super::token::Token;
 use super::wire::{
     Ask, CLIENT_HEADER, GENERATION_HEADER, RUN_HEADER, STEP_HEADER, SceneCard, VERSION_HEADER, WireEvent,
@@ -74,6 +75,7 @@ struct Shared {
     hub: Arc<Hub>,
     options: ServeOptions,
     editor: Option<Editor>,
+    photos: ServedPhotos,
     connections: AtomicUsize,
     bucket: Mutex<(f64, Instant)>,
     stop: AtomicBool,
@@ -98,9 +100,10 @@ impl Server {
     ///
     /// # Errors
     /// If the address is not free, or is not to be used without the user's word.
-    pub(crate) fn start(
+    pub(super) fn start(
         mut info: SceneInfo,
         editable: Option<(&Path, Option<String>)>,
+        photos: ServedPhotos,
         options: ServeOptions,
     ) -> Result<Self, ServeError> {
         if !options.bind.ip().to_canonical().is_loopback() && !options.anywhere {
@@ -109,13 +112,14 @@ impl Server {
         // Where things lie on this machine is nobody's business.
         info.dataset = None;
         let editor = editable.filter(|_| options.allow_edit).map(|(folder, state)| Editor::new(folder.into(), state));
-        let card = SceneCard { info, allow_edit: editor.is_some() };
+        let card = SceneCard { info, allow_edit: editor.is_some(), photos: !photos.is_empty() };
         let listener = TcpListener::bind(options.bind).map_err(|e| ServeError::Listen(options.bind, e))?;
         let address = listener.local_addr()?;
         let shared = Arc::new(Shared {
             hub: Arc::new(Hub::new(card)?),
             options,
             editor,
+            photos,
             connections: AtomicUsize::new(0),
             bucket: Mutex::new((BURST, Instant::now())),
             stop: AtomicBool::new(false),
@@ -275,6 +279,12 @@ fn answer(connection: &mut Connection, head: &Head, shared: &Shared) -> Result<R
                 .with(STEP_HEADER, packed.step),
             None => Response::new(204, "application/octet-stream", Arc::default()),
         }),
+        ("GET", "/photo") => {
+            let number = |name| head.number(name).unwrap_or(u64::MAX);
+            let png = shared.photos.png(number("index"), number("side"));
+            let missing = || Response::refusal(404, "this photo cannot be read on the server");
+            png.map(|png| Response::new(200, "image/png", Arc::new(png))).ok_or_else(missing)
+        }
         ("POST", "/ask") => {
             let ask = serde_json::from_slice(&body);
             obey(ask.map_err(|e| Response::refusal(400, format!("this cannot be asked for: {e}")))?, shared)

@@ -36,6 +36,8 @@ pub(crate) struct SceneCard {
     pub(crate) info: SceneInfo,
     /// Whether objects and parts may be changed from here.
     pub(crate) allow_edit: bool,
+    /// Whether its photos are sent, by their numbers.
+    pub(crate) photos: bool,
 }
 
 /// One thing that happened, of those that a client is told.

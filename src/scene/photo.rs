@@ -32,8 +32,8 @@ impl Photo {
         Self { name, path, camera, distortion: None, test_split: false, background: None }
     }
 
-    /// Whether there is a file of it here: of photos on another computer only the cameras are known.
-    pub(crate) fn is_here(&self) -> bool {
+    /// Whether it can be had: of some photos on other computers only the cameras are known.
+    pub(crate) fn has_pixels(&self) -> bool {
         !self.path.as_os_str().is_empty()
     }
 

@@ -37,13 +37,7 @@ impl App {
                     self.set_paused(job.id, !job.paused);
                 }
             }
-            Action::Cancel => {
-                if let Some(job) = &mut self.state.job {
-                    job.canceling = true;
-                    let id = job.id;
-                    self.cancel(id);
-                }
-            }
+            Action::Cancel => self.cancel_job(),
             Action::Dismiss => self.dismiss(ctx),
             Action::InspectAt(at) => self.inspect(at),
             Action::Evaluate => self.evaluate(),
@@ -185,11 +179,7 @@ impl App {
 
     /// Cancels what runs and does the action next.
     pub(super) fn give_up_and(&mut self, action: Action) {
-        if let Some(job) = &mut self.state.job {
-            job.canceling = true;
-            let id = job.id;
-            self.cancel(id);
-        }
+        self.cancel_job();
         self.open(action);
     }
 

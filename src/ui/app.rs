@@ -29,7 +29,7 @@ use crate::remote::Link;
 use crate::scene::plan::PlanOverride;
 use crate::scene::resource_log::{self, ResourceKind};
 use crate::ui::actions::{Action, Pane};
-use crate::worker::{Jobs, Repaint, Worker};
+use crate::worker::{Event, JobKind, Jobs, Repaint, Worker};
 
 mod contents;
 
@@ -165,6 +165,9 @@ impl App {
                 continue;
             }
             self.hear(&event);
+            if matches!(event, Event::Started { job, kind: JobKind::Train, .. } if job.is_remote()) {
+                self.layout.dock.activate(Pane::Training);
+            }
             let segmented = self.segmenting.take_if(|s| event.is_end() && event.job() == s.job);
             self.actions.extend(self.state.apply(event));
             segmented.into_iter().for_each(|s| self.segmented(s));

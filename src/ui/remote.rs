@@ -6,7 +6,7 @@ use super::state::Tone;
 use crate::jobs::Folders;
 use crate::jobs::edit::EditRequest;
 use crate::remote::{Address, Link};
-use crate::worker::{Command, Event, Failure, JobId};
+use crate::worker::{Command, Event, Failure, JobId, JobKind};
 
 impl App {
     /// Looks at what a server shows from now on.
@@ -17,13 +17,17 @@ impl App {
             Link::start(address, Folders::of_user(), self.worker.source()).map_err(|e| e.to_string())
         });
         match started {
-            Ok(link) => self.link = Some(link),
+            Ok(link) => {
+                self.worker.set_elsewhere(Some(link.takes()));
+                self.link = Some(link);
+            }
             Err(why) => self.state.fail("Connecting", failed(why)),
         }
     }
 
     /// Ends the connection; what runs there goes on.
     pub(super) fn disconnect(&mut self) {
+        self.worker.set_elsewhere(None);
         if let Some(link) = self.link.take() {
             let left = self.state.job.take_if(|job| link.owns(job.id));
             self.state.training_job.take_if(|job| link.owns(*job));
@@ -35,23 +39,35 @@ impl App {
 
     /// Whether an event comes from a server that is no longer looked at.
     pub(super) fn is_of_earlier_server(&self, event: &Event) -> bool {
-        Link::is_remote(event.job()) && !self.link.as_ref().is_some_and(|link| link.owns(event.job()))
+        event.job().is_remote() && !self.link.as_ref().is_some_and(|link| link.owns(event.job()))
     }
 
     /// Asks a job to wait or to go on, wherever it runs.
     pub(super) fn set_paused(&mut self, job: JobId, paused: bool) {
         match self.link.as_ref().filter(|link| link.owns(job)) {
-            Some(link) => drop(link.set_paused(paused)),
+            Some(link) if !link.status().connected || !link.set_paused(paused) => self.say_unreachable(),
+            Some(_) => {}
             None => self.worker.set_paused(job, paused),
         }
     }
 
-    /// Asks a job to end, wherever it runs.
-    pub(super) fn cancel(&mut self, job: JobId) {
-        match self.link.as_ref().filter(|link| link.owns(job)) {
-            Some(link) => drop(link.cancel()),
-            None => self.worker.cancel(job),
+    /// Asks the job on screen to end, wherever it runs.
+    pub(super) fn cancel_job(&mut self) {
+        let Some(job) = &mut self.state.job else { return };
+        match self.link.as_ref().filter(|link| link.owns(job.id)) {
+            // What is not there yet is nothing to end there.
+            Some(_) if job.kind != JobKind::Train => self.disconnect(),
+            Some(link) if !link.status().connected || !link.cancel() => self.say_unreachable(),
+            Some(_) => job.canceling = true,
+            None => {
+                self.worker.cancel(job.id);
+                job.canceling = true;
+            }
         }
+    }
+
+    fn say_unreachable(&mut self) {
+        self.state.toast(Tone::Warning, "There is no connection at the moment, so that cannot be passed on.");
     }
 
     /// Does with a scene on another computer what its server is asked for, or says that it cannot be done. Whether

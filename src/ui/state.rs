@@ -251,7 +251,9 @@ impl AppState {
     /// Takes a short job off the list if it is `job`.
     fn end_short(&mut self, job: JobId) -> Option<(JobKind, String)> {
         let ended = self.short_jobs.remove(&job)?;
-        self.short_jobs_done = self.short_jobs_done.max(job);
+        if !job.is_remote() {
+            self.short_jobs_done = self.short_jobs_done.max(job);
+        }
         Some(ended)
     }
 
@@ -305,8 +307,7 @@ impl AppState {
                     self.scene = self.scene.take().map(|s| Arc::new(s.trained_in(&out)));
                 }
                 let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));
-                let there = self.scene.as_ref().and_then(|s| s.remote.as_ref()).map(|o| format!(" on {}", o.host));
-                self.say(Tone::Info, format!("Saved to {}{}", out.display(), there.unwrap_or_default()));
+                self.say(Tone::Info, format!("Saved to {}{}", out.display(), self.elsewhere()));
                 self.toast(Tone::Good, format!("Training finished{}", quality.unwrap_or_default()));
                 let has_masks = self.scene.as_ref().is_some_and(|s| s.masks.is_some());
                 next.extend((has_masks && !carried).then_some(Action::FindObjects));

@@ -33,6 +33,16 @@ use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Photo, PhotoPixels,
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct JobId(pub(crate) u64);
 
+impl JobId {
+    /// From here on jobs are of other computers: no worker counts so far.
+    pub(crate) const REMOTE: Self = Self(1 << 63);
+
+    /// Whether it runs on another computer.
+    pub(crate) fn is_remote(self) -> bool {
+        self >= Self::REMOTE
+    }
+}
+
 /// What a job is to do.
 #[derive(Clone, Debug)]
 pub enum Command {

@@ -1,4 +1,5 @@
 //! The real binary as a server, and requests to it as bytes.
+#![allow(dead_code)]
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;

@@ -20,6 +20,8 @@ pub struct Origin {
     pub host: String,
     /// Whether objects and parts may be changed from here.
     pub allow_edit: bool,
+    /// Whether it sends photos.
+    pub photos: bool,
 }
 
 /// The scene that `info` describes, with Gaussians as far as they came.
@@ -47,7 +49,7 @@ pub(crate) fn received(
         None => config.render_settings(info.background),
     };
     let (cloud, sh_stored) = compact(cloud.unwrap_or_default());
-    let dataset = (!info.cameras.is_empty()).then(|| Arc::new(photos(&info)));
+    let dataset = (!info.cameras.is_empty()).then(|| Arc::new(photos(&info, &origin)));
     let scene = Scene {
         name: info.name,
         path,
@@ -75,12 +77,13 @@ pub(crate) fn received(
     })
 }
 
-/// Photos of which the cameras are known, and no more.
-fn photos(info: &SceneInfo) -> Dataset {
+/// Photos of which the cameras are known. Those that can be had are at the other computer, the others nowhere.
+fn photos(info: &SceneInfo, origin: &Origin) -> Dataset {
+    let place = Path::new(if origin.photos { &*origin.host } else { "" });
     Dataset {
         name: info.name.clone(),
         format: "another computer".into(),
-        photos: info.cameras.iter().map(|c| Photo::new(&*c.name, Path::new(""), c.camera.clone())).collect(),
+        photos: info.cameras.iter().map(|c| Photo::new(&*c.name, place, c.camera.clone())).collect(),
         background: info.background,
         metres_per_unit: info.metres_per_unit,
         ..Dataset::default()

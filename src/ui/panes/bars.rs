@@ -134,6 +134,9 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
         if let Some(scene) = &state.scene {
             ui.separator();
             ui.label(RichText::new(&scene.name).strong()).on_hover_text(text::path(&scene.path));
+            if let Some(origin) = &scene.remote {
+                ui.label(RichText::new(format!("on {}", origin.host)).color(theme::weak()));
+            }
         }
         ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
             let search = Button::new(RichText::new("Search actions").color(theme::weak()))
@@ -224,7 +227,7 @@ fn connection(ui: &mut Ui, link: &LinkStatus) {
         (true, _) => (theme::good(), format!("Connected to {host}")),
         (false, Some(at)) => {
             let secs = at.saturating_duration_since(Instant::now()).as_secs_f64().ceil();
-            ui.ctx().request_repaint_after(Duration::from_millis(500));
+            ui.ctx().request_repaint_after(Duration::from_secs(1));
             (theme::warning(), format!("No connection to {host}, trying again in {secs} s"))
         }
         (false, None) if link.problem.is_some() => (theme::warning(), format!("Not connected to {host}")),

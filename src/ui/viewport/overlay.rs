@@ -253,8 +253,7 @@ impl Viewport {
                         );
                 }
                 if p.failed() {
-                    let why = if scene.remote.is_some() { "camera only" } else { "photo not loaded" };
-                    ui.colored_label(theme::warning(), why);
+                    ui.colored_label(theme::warning(), "photo not loaded");
                 }
             }
             None => {
