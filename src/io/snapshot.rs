@@ -30,7 +30,7 @@ const MAX_RATIO: u64 = 1032;
 
 /// What a snapshot holds.
 #[derive(Debug, Default, PartialEq, Eq)]
-pub(crate) struct Snapshot {
+pub(crate) struct SceneSnapshot {
     /// The Gaussians' file, where this is a scene at rest.
     pub(crate) ply: Option<Vec<u8>>,
     packed: Option<Vec<u8>>,
@@ -96,7 +96,7 @@ fn section(out: &mut Vec<u8>, tag: &[u8; 4], bytes: &[u8], unpacked: usize) {
     out.extend_from_slice(bytes);
 }
 
-impl Snapshot {
+impl SceneSnapshot {
     /// The sections of a snapshot; `path` is for errors.
     ///
     /// # Errors
@@ -177,15 +177,15 @@ mod tests {
         let doll = identities.add(Level::Object, NOBODY, vec!["doll".into()]);
         let map = SemanticMap::from_identities(identities, vec![doll; 50], vec![1.0; 50], vec!["a".into()]);
         trained::save(folder.path(), &SceneInfo::default(), &cloud(0.0), Some(&map)).expect("save");
-        let sent = Snapshot::parse(&of_folder(folder.path()).expect("packed"), folder.path()).expect("sections");
+        let sent = SceneSnapshot::parse(&of_folder(folder.path()).expect("packed"), folder.path()).expect("sections");
         let file = std::fs::read(folder.path().join(CLOUD_FILE)).expect("file");
         assert!(sent.ply.as_deref() == Some(&*file) && sent.is_exact());
         let (got, objects) = sent.read(folder.path()).expect("scene");
         assert_eq!((got, objects), (trained::load(folder.path()).expect("load").cloud, Some(map)));
-        let other = Snapshot::parse(&of_cloud(&cloud(0.5)).expect("packed"), folder.path()).expect("sections");
+        let other = SceneSnapshot::parse(&of_cloud(&cloud(0.5)).expect("packed"), folder.path()).expect("sections");
         assert!(other.ply.as_deref() != Some(&*file), "another scene's snapshot is another");
         // Objects of another save do not pass.
-        let torn = Snapshot { objects: sent.objects, ..other };
+        let torn = SceneSnapshot { objects: sent.objects, ..other };
         assert!(matches!(torn.read(folder.path()), Err(IoError::Torn { .. })));
     }
 
@@ -194,7 +194,7 @@ mod tests {
         let sent = of_training(&cloud(0.0)).expect("packed");
         let whole = of_cloud(&cloud(0.0)).expect("packed");
         assert!(2 * sent.len() < whole.len(), "{} of {}", sent.len(), whole.len());
-        let sent = Snapshot::parse(&sent, Path::new("x")).expect("sections");
+        let sent = SceneSnapshot::parse(&sent, Path::new("x")).expect("sections");
         let (got, map) = sent.read(Path::new("x")).expect("Gaussians");
         let far = |of: &GaussianCloud| {
             (0..50).map(|i| got.world_position(i).distance(of.world_position(i))).fold(0.0, f64::max)
@@ -205,7 +205,7 @@ mod tests {
     #[test]
     fn what_lies_about_its_size_is_refused() {
         let good = of_cloud(&cloud(0.0)).expect("packed");
-        let parse = |bytes: &[u8]| Snapshot::parse(bytes, Path::new("x"));
+        let parse = |bytes: &[u8]| SceneSnapshot::parse(bytes, Path::new("x"));
         assert!(parse(&good).is_ok());
         for cut in [0, 7, 8 + 3, 8 + 19, good.len() - 1] {
             assert_eq!(parse(&good[..cut]).is_ok(), cut == 8, "{cut}");

@@ -4,7 +4,7 @@ use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
 use ureq::http::Uri;
 
-use super::token::Token;
+use super::token::AccessToken;
 use crate::io::http::is_loopback;
 
 /// The port where none is given.
@@ -17,7 +17,7 @@ pub(crate) struct Address {
     pub(crate) base: String,
     /// `127.0.0.1:7070`, as it is shown.
     pub(crate) host: String,
-    pub(crate) token: Token,
+    pub(crate) token: AccessToken,
 }
 
 impl Address {
@@ -29,7 +29,8 @@ impl Address {
         let (place, token) = text.trim().split_once('#').ok_or(
             "the part after '#' is missing: copy the whole address that the server printed, and put it in quotes",
         )?;
-        let token = Token::parse(token).ok_or("the part after '#' is not the 64 digits that the server printed")?;
+        let token =
+            AccessToken::parse(token).ok_or("the part after '#' is not the 64 digits that the server printed")?;
         let uri: Uri = place.parse().map_err(|_| format!("'{place}' is no address such as http://127.0.0.1:7070/"))?;
         let (Some(scheme), Some(authority)) = (uri.scheme_str(), uri.authority()) else {
             return Err(format!("'{place}' does not begin with http:// or https://"));

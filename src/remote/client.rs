@@ -16,7 +16,7 @@ use super::wire::{
     version,
 };
 use crate::io::http;
-use crate::io::snapshot::Snapshot;
+use crate::io::snapshot::SceneSnapshot;
 use crate::scene::{PhotoPixels, text};
 
 /// How long the server may be silent.
@@ -48,7 +48,7 @@ pub(crate) struct Answer<T> {
 /// Gaussians as they came.
 #[derive(Debug)]
 pub(crate) struct Pulled {
-    pub(crate) snapshot: Snapshot,
+    pub(crate) snapshot: SceneSnapshot,
     pub(crate) generation: u64,
     /// Step of the training.
     pub(crate) step: u64,
@@ -90,7 +90,8 @@ impl Client {
         let number = |name: &str| self.header(&response, name)?.parse().map_err(|_| self.odd("a header is no number"));
         let (generation, step) = (number(GENERATION_HEADER)?, number(STEP_HEADER)?);
         let bytes = self.bytes(response, SNAPSHOT_BYTES)?;
-        let snapshot = Snapshot::parse(&bytes, Path::new(&self.address.host)).map_err(|e| self.odd(&e.to_string()))?;
+        let snapshot =
+            SceneSnapshot::parse(&bytes, Path::new(&self.address.host)).map_err(|e| self.odd(&e.to_string()))?;
         Ok(Some(Pulled { snapshot, generation, step }))
     }
 

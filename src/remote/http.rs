@@ -21,7 +21,7 @@ const PIECE: usize = 64 << 10;
 
 /// A request before its body.
 #[derive(Debug)]
-pub(super) struct Head {
+pub(super) struct RequestHead {
     pub(super) method: String,
     /// What follows the address, up to a `?`.
     pub(super) path: String,
@@ -71,7 +71,7 @@ impl Response {
     }
 }
 
-impl Head {
+impl RequestHead {
     /// The value of a header; `None` if it is not there, or more than once.
     pub(super) fn header(&self, name: &str) -> Option<&str> {
         let mut all = self.headers.iter().filter(|(n, _)| n == name).map(|(_, value)| value.as_str());
@@ -121,10 +121,10 @@ impl Connection {
     }
 
     /// The next request; `None` if no more comes.
-    pub(super) fn head(&mut self) -> Result<Option<Head>, Response> {
+    pub(super) fn head(&mut self) -> Result<Option<RequestHead>, Response> {
         let mut deadline = Instant::now() + if self.carry.is_empty() { IDLE } else { REQUEST };
         loop {
-            if let Some((head, length)) = Head::parse(&self.carry, deadline)? {
+            if let Some((head, length)) = RequestHead::parse(&self.carry, deadline)? {
                 self.carry.drain(..length);
                 return Ok(Some(head));
             }
@@ -140,7 +140,7 @@ impl Connection {
     }
 
     /// The body that belongs to `head`, of `most` bytes.
-    pub(super) fn body(&mut self, head: &Head, most: usize) -> Result<Vec<u8>, Response> {
+    pub(super) fn body(&mut self, head: &RequestHead, most: usize) -> Result<Vec<u8>, Response> {
         if head.has("transfer-encoding") || (head.has("content-length") && head.header("content-length").is_none()) {
             return Err(Response::refusal(400, "the body's length is not stated as one number"));
         }
@@ -230,8 +230,8 @@ fn reason(status: u16) -> &'static str {
 mod tests {
     use super::*;
 
-    fn parse(text: &str) -> Result<Option<(Head, usize)>, u16> {
-        Head::parse(text.as_bytes(), Instant::now()).map_err(|refused| refused.status)
+    fn parse(text: &str) -> Result<Option<(RequestHead, usize)>, u16> {
+        RequestHead::parse(text.as_bytes(), Instant::now()).map_err(|refused| refused.status)
     }
 
     #[test]

@@ -37,7 +37,7 @@ pub(super) struct Hub {
     pub(super) control: Control,
     log: Mutex<Log>,
     latest: Mutex<Latest>,
-    packed: Mutex<Option<Packed>>,
+    packed: Mutex<Option<PackedSnapshot>>,
     pace: Mutex<Pace>,
     clients: Mutex<HashMap<String, Client>>,
     /// Answers with Gaussians that are under way.
@@ -46,7 +46,7 @@ pub(super) struct Hub {
 
 /// Gaussians ready to be sent.
 #[derive(Clone)]
-pub(super) struct Packed {
+pub(super) struct PackedSnapshot {
     pub(super) generation: u64,
     /// Step of the training.
     pub(super) step: u64,
@@ -143,11 +143,11 @@ impl Hub {
         let mut latest = lock(&self.latest);
         latest.generation += 1;
         latest.live = None;
-        *packed = Some(Packed { generation: latest.generation, step: 0, bytes: Arc::new(bytes) });
+        *packed = Some(PackedSnapshot { generation: latest.generation, step: 0, bytes: Arc::new(bytes) });
     }
 
     /// The newest snapshot, packed now if it was not, where it is newer than `since`.
-    pub(super) fn snapshot(&self, since: u64) -> Option<Packed> {
+    pub(super) fn snapshot(&self, since: u64) -> Option<PackedSnapshot> {
         if lock(&self.latest).generation <= since {
             return None;
         }
@@ -162,7 +162,7 @@ impl Hub {
             let bytes = Arc::new(snapshot::of_training(&cloud).ok()?);
             let mut pace = lock(&self.pace);
             pace.next = pace.next.max(Instant::now() + start.elapsed() * PACK_SHARE);
-            *packed = Some(Packed { generation, step, bytes });
+            *packed = Some(PackedSnapshot { generation, step, bytes });
         }
         packed.clone()
     }

@@ -32,6 +32,6 @@ use std::path::Path;
 ///
 /// # Errors
 /// If the file can neither be read nor made, or the system gives no random numbers.
-pub(crate) fn token_of(file: Option<&Path>) -> io::Result<token::Token> {
-    file.map_or_else(token::Token::random, token::Token::kept)
+pub(crate) fn token_of(file: Option<&Path>) -> io::Result<token::AccessToken> {
+    file.map_or_else(token::AccessToken::random, token::AccessToken::kept)
 }

@@ -12,11 +12,11 @@ use std::{fmt, io, thread};
 use thread_priority::{ThreadPriority, set_current_thread_priority};
 
 use super::edits::Editor;
-use super::http::{Connection, Head, Response};
+use super::http::{Connection, RequestHead, Response};
 use super::hub::Hub;
 use super::observer::ServedObserver;
 use super::photos::ServedPhotos;
-use super::token::Token;
+use super::token::AccessToken;
 use super::wire::{
     Ask, CLIENT_HEADER, GENERATION_HEADER, RUN_HEADER, STEP_HEADER, SceneCard, VERSION_HEADER, WireEvent,
     is_understood, version,
@@ -51,7 +51,7 @@ pub(crate) struct ServeOptions {
     /// Names of this machine, besides those of the loopback, that clients may know it by.
     pub(crate) hosts: Vec<String>,
     pub(crate) allow_edit: bool,
-    pub(crate) token: Token,
+    pub(crate) token: AccessToken,
 }
 
 /// Why nothing is served.
@@ -262,7 +262,7 @@ fn talk(mut connection: Connection, shared: &Shared) {
     }
 }
 
-fn answer(connection: &mut Connection, head: &Head, shared: &Shared) -> Result<Response, Response> {
+fn answer(connection: &mut Connection, head: &RequestHead, shared: &Shared) -> Result<Response, Response> {
     let (hub, options) = (&shared.hub, &shared.options);
     admit(head, options)?;
     if !take_turn(&shared.bucket) {
@@ -294,7 +294,7 @@ fn answer(connection: &mut Connection, head: &Head, shared: &Shared) -> Result<R
 }
 
 /// Refuses whoever is not a client that knows the token, before anything else is read.
-fn admit(head: &Head, options: &ServeOptions) -> Result<(), Response> {
+fn admit(head: &RequestHead, options: &ServeOptions) -> Result<(), Response> {
     // A page in a browser may have had its name's address changed to this machine's; it sends both of these.
     let host = head.header("host").unwrap_or_default();
     let name = host.rsplit_once(':').filter(|(_, port)| port.bytes().all(|b| b.is_ascii_digit())).map_or(host, |h| h.0);

@@ -12,15 +12,15 @@ const BYTES: usize = 32;
 
 /// A secret. Its `Debug` does not show it.
 #[derive(Clone)]
-pub(crate) struct Token([u8; BYTES]);
+pub(crate) struct AccessToken([u8; BYTES]);
 
-impl std::fmt::Debug for Token {
+impl std::fmt::Debug for AccessToken {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str("Token")
+        f.write_str("AccessToken")
     }
 }
 
-impl Token {
+impl AccessToken {
     /// A new one, from the system's source of random numbers.
     pub(crate) fn random() -> io::Result<Self> {
         let mut bytes = [0; BYTES];
@@ -72,7 +72,7 @@ impl Token {
 
 /// A name that no other has: of a run, of a client.
 pub(crate) fn random_name() -> io::Result<String> {
-    Token::random().map(|token| hex(&token.0[..8]))
+    AccessToken::random().map(|token| hex(&token.0[..8]))
 }
 
 fn hex(bytes: &[u8]) -> String {
@@ -85,10 +85,10 @@ mod tests {
 
     #[test]
     fn only_the_whole_token_is_it() {
-        let token = Token::random().expect("random numbers");
+        let token = AccessToken::random().expect("random numbers");
         let text = token.text();
         assert!(text.len() == 64 && token.is(&text) && token.is(&text.to_uppercase()));
-        let other = Token::random().expect("random numbers");
+        let other = AccessToken::random().expect("random numbers");
         assert!(!token.is(&other.text()) && !token.is("") && !token.is(&text[..63]) && !token.is(&format!("{text}0")));
         assert!(!token.is(&"é".repeat(32)) && !token.is(&format!("+{}", &text[1..])));
         assert!(!format!("{token:?}").contains(&text));
@@ -98,14 +98,14 @@ mod tests {
     fn a_token_is_kept_for_the_next_run() {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("token");
-        let made = Token::kept(&path).expect("made");
-        assert!(Token::kept(&path).expect("read").is(&made.text()));
+        let made = AccessToken::kept(&path).expect("made");
+        assert!(AccessToken::kept(&path).expect("read").is(&made.text()));
         #[cfg(unix)]
         assert_eq!(
             std::os::unix::fs::PermissionsExt::mode(&fs::metadata(&path).expect("file").permissions()) & 0o77,
             0
         );
         fs::write(&path, "abc").expect("write");
-        assert!(Token::kept(&path).is_err(), "what is in a file is not replaced");
+        assert!(AccessToken::kept(&path).is_err(), "what is in a file is not replaced");
     }
 }

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::failure::Failure;
-pub use super::kind::{JobKind, WorkerThread};
+pub use super::kind::{JobId, JobKind, WorkerThread};
 use crate::io::unposed::Unposed;
 use crate::jobs::clean::{MeasureRequest, MeasuredCloud};
 use crate::jobs::edit::EditRequest;
@@ -28,20 +28,6 @@ use crate::pipeline::observer::{Evaluation, Progress, Severity, StepMetrics};
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Photo, PhotoPixels, SceneFacts, SemanticMap};
-
-/// Names one job of one worker.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct JobId(pub(crate) u64);
-
-impl JobId {
-    /// From here on jobs are of other computers: no worker counts so far.
-    pub(crate) const REMOTE: Self = Self(1 << 63);
-
-    /// Whether it runs on another computer.
-    pub(crate) fn is_remote(self) -> bool {
-        self >= Self::REMOTE
-    }
-}
 
 /// What a job is to do.
 #[derive(Clone, Debug)]
