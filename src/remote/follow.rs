@@ -15,9 +15,10 @@ const RETRY: Duration = Duration::from_secs(2);
 const GONE: Duration = Duration::from_secs(60);
 
 /// How it ended.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) enum Followed {
     /// Nothing runs there: a scene at rest.
+    #[default]
     AtRest,
     /// The training is done, and saved in this folder of the server.
     Finished(String),
@@ -38,63 +39,65 @@ pub(crate) fn follow(
     observer: &mut dyn Observer,
     save: Option<&Path>,
 ) -> Result<Followed, ClientError> {
-    let (mut run, mut since, mut have) = (String::new(), 0, 0);
-    let (mut running, mut end) = (false, Followed::AtRest);
+    let mut now = Position::default();
     let mut last = Instant::now();
-    loop {
-        if observer.signal() == Signal::Cancel {
-            return Ok(Followed::Left);
-        }
-        let news = match client.news(since, have) {
-            Ok(news) => news,
+    while observer.signal() != Signal::Cancel {
+        match now.go_on(client, observer, save) {
+            Ok(true) => return Ok(now.end),
+            Ok(false) => last = Instant::now(),
             Err(ClientError::Lost(why)) if last.elapsed() < GONE => {
                 observer.note(Severity::Warning, format!("The connection is lost ({why}); trying again"));
                 std::thread::sleep(RETRY);
-                continue;
             }
             Err(e) => return Err(e),
-        };
-        last = Instant::now();
-        if news.run != run {
+        }
+    }
+    Ok(Followed::Left)
+}
+
+/// How far a server was followed.
+#[derive(Default)]
+struct Position {
+    run: String,
+    since: u64,
+    have: u64,
+    running: bool,
+    end: Followed,
+}
+
+impl Position {
+    /// Asks once for what is new. Whether that was the end.
+    fn go_on(
+        &mut self,
+        client: &Client,
+        observer: &mut dyn Observer,
+        save: Option<&Path>,
+    ) -> Result<bool, ClientError> {
+        let news = client.news(self.since, self.have)?;
+        if news.run != self.run {
             // Its numbers are others.
-            let first = run.is_empty();
-            (run, since, have) = (news.run, 0, 0);
+            let first = std::mem::replace(&mut self.run, news.run).is_empty();
+            (self.since, self.have) = (0, 0);
             if !first {
-                continue;
+                return Ok(false);
             }
         }
         let news = news.value;
-        for event in news.events {
-            match event {
-                WireEvent::Started(title) => {
-                    (running, end) = (true, Followed::AtRest);
-                    observer.note(Severity::Info, title);
-                }
-                WireEvent::Step(metrics) => observer.step(metrics),
-                WireEvent::Evaluation(evaluation) => observer.evaluation(evaluation),
-                WireEvent::Note(severity, text) => observer.note(severity, text),
-                WireEvent::Paused(paused) => {
-                    observer.note(Severity::Info, if paused { "Paused" } else { "Goes on" }.into());
-                }
-                WireEvent::Finished(folder) => (running, end) = (false, Followed::Finished(folder)),
-                WireEvent::Cancelled => (running, end) = (false, Followed::Cancelled),
-                WireEvent::Failed(why) => (running, end) = (false, Followed::Failed(why)),
-            }
-        }
-        since = news.next;
+        news.events.into_iter().for_each(|event| self.hear(event, observer));
+        self.since = news.next;
         if news.more {
-            continue;
+            return Ok(false);
         }
-        if let Some(progress) = news.progress.filter(|_| running) {
+        if let Some(progress) = news.progress.filter(|_| self.running) {
             observer.progress(progress);
         }
-        if running {
+        if self.running {
             // What a window would show is fetched as it would be.
-            if let Some(pulled) = client.snapshot(have)? {
-                have = pulled.generation;
+            if let Some(pulled) = client.snapshot(self.have)? {
+                self.have = pulled.generation;
             }
             std::thread::sleep(EVERY);
-            continue;
+            return Ok(false);
         }
         let pulled = client.snapshot(0)?;
         if let (Some(path), Some(pulled)) = (save, &pulled) {
@@ -104,8 +107,26 @@ pub(crate) fn follow(
             };
             written.map_err(|e| ClientError::Refused(e.to_string()))?;
         }
-        // The server is told that all has come.
-        let _ = client.news(since, pulled.map_or(0, |p| p.generation));
-        return Ok(end);
+        // The server is told that all has come; if it has gone meanwhile, it knows.
+        let _ = client.news(self.since, pulled.map_or(0, |p| p.generation));
+        Ok(true)
+    }
+
+    fn hear(&mut self, event: WireEvent, observer: &mut dyn Observer) {
+        match event {
+            WireEvent::Started(title) => {
+                (self.running, self.end) = (true, Followed::AtRest);
+                observer.note(Severity::Info, title);
+            }
+            WireEvent::Step(metrics) => observer.step(metrics),
+            WireEvent::Evaluation(evaluation) => observer.evaluation(evaluation),
+            WireEvent::Note(severity, text) => observer.note(severity, text),
+            WireEvent::Paused(paused) => {
+                observer.note(Severity::Info, if paused { "Paused" } else { "Goes on" }.into());
+            }
+            WireEvent::Finished(folder) => (self.running, self.end) = (false, Followed::Finished(folder)),
+            WireEvent::Cancelled => (self.running, self.end) = (false, Followed::Cancelled),
+            WireEvent::Failed(why) => (self.running, self.end) = (false, Followed::Failed(why)),
+        }
     }
 }
