@@ -12,6 +12,7 @@
 //! * [`measure`]: error against run time, speed, extreme cases: one document, one set of tables;
 //! * [`jobs`]: one file per use case, for the window, the command line and the agent;
 //! * [`worker`]: the background thread that runs jobs for the window;
+//! * [`remote`]: a scene or a training on one computer, the window on another;
 //! * [`agent`]: plain sentences become checked calls of a closed set of tools;
 //! * [`cli`]: one file per subcommand;
 //! * [`ui`]: the window.
@@ -25,6 +26,7 @@ pub mod measure;
 pub mod models;
 pub mod navigate;
 pub mod pipeline;
+pub mod remote;
 pub mod render;
 pub mod scene;
 pub mod ui;

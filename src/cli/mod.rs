@@ -9,6 +9,7 @@ mod batch;
 mod bench;
 mod check_stability;
 mod clean;
+mod connect;
 mod demo;
 mod edit;
 mod error;
@@ -37,6 +38,7 @@ mod report_merge;
 mod reproduce;
 mod segment;
 mod segment_click;
+mod serve;
 mod synth;
 mod table_args;
 mod train;
@@ -84,6 +86,7 @@ Examples:
   fmlgs agent scene/ \"what is on the table?\"
   fmlgs export scene/ --out scene.ply   for any other splat viewer
   fmlgs batch jobs.toml --shard 1/4     many scenes, settings and seeds, on many machines
+  fmlgs serve scene/                    show it to a window on another computer (fmlgs connect)
   fmlgs models                          neural networks: what is here, what each adds";
 
 /// Train 3D Gaussians from posed photos while you watch, and look around in them.
@@ -124,6 +127,8 @@ enum Command {
     Edit(edit::EditArgs),
     Path(path::PathArgs),
     Agent(agent::AgentArgs),
+    Serve(serve::ServeArgs),
+    Connect(connect::ConnectArgs),
     Synth(synth::SynthArgs),
     Demo(demo::DemoArgs),
     Export(export::ExportArgs),
@@ -201,6 +206,11 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Edit(args) => edit::run(args, quiet),
         Command::Path(args) => path::run(args),
         Command::Agent(args) => agent::run(args),
+        Command::Serve(args) => serve::run(args, quiet),
+        Command::Connect(args) => match args.for_window()? {
+            Some(url) => window(vec![Start::Remote(url)], overrides, open_window),
+            None => connect::run(args, quiet),
+        },
         Command::Synth(args) => synth::run(args, quiet),
         Command::Demo(args) if args.headless || args.make.is_some() => demo::run(args, quiet),
         Command::Demo(_) => window(vec![Start::Demo], overrides, open_window),

@@ -1,17 +1,21 @@
 //! `fmlgs train`: from posed photos to a trained scene.
 
+use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 
 use serde_json::json;
 
 use super::plan::PlanArgs;
 use super::progress::Console;
-use super::{CliError, number, output};
+use super::serve::{AccessArgs, announce};
+use super::{CliError, interrupt, number, output};
 use crate::jobs::open::{self, Contents};
 use crate::jobs::presets;
+use crate::jobs::train::Trained;
 use crate::jobs::{plan, train};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::TrainConfig;
+use crate::remote::{Server, bind_address, serve};
 use crate::render::BackendChoice;
 use crate::scene::Dataset;
 
@@ -25,6 +29,7 @@ use crate::scene::Dataset;
     fmlgs train photos/ --out scene/\n  \
     fmlgs train photos/ --out scene/ --steps 30000 --max-side 1600\n  \
     fmlgs train photos/ --out quick/ --steps 500 --max-side 256 --no-densify\n  \
+    fmlgs train photos/ --serve              watch from another computer, see fmlgs connect\n  \
     fmlgs train other/ --preset scene/training.toml\n  \
     fmlgs train scene/                       resume a scene that was canceled, same settings")]
 pub(crate) struct TrainArgs {
@@ -42,6 +47,13 @@ pub(crate) struct TrainArgs {
     preset: Option<PathBuf>,
     #[command(flatten)]
     plan: PlanArgs,
+    /// Show the training to a window on another computer ('fmlgs connect'), listening at this address or port
+    /// [default: 127.0.0.1:7070]
+    #[arg(long, value_name = "ADDRESS", num_args = 0..=1, default_missing_value = "127.0.0.1:7070",
+        value_parser = bind_address)]
+    serve: Option<SocketAddr>,
+    #[command(flatten)]
+    access: AccessArgs,
     /// Print one JSON document at the end
     #[arg(long)]
     json: bool,
@@ -175,7 +187,14 @@ pub(crate) fn run(args: TrainArgs, quiet: bool) -> Result<(), CliError> {
     for warning in &dataset.warnings {
         console.note(Severity::Warning, warning.clone());
     }
-    let done = train::run(&dataset, &config, folders, &mut console)?;
+    let server = match args.serve {
+        Some(bind) => Some(serve::training(&dataset, &config, args.access.options(bind, false)?)?),
+        None => None,
+    };
+    let done = match &server {
+        Some(server) => served(server, &dataset, &config, folders, &mut console)?,
+        None => train::run(&dataset, &config, folders, &mut console)?,
+    };
     let (outcome, finished) = (&done.outcome, done.is_finished());
     let out = done.out.display();
     if args.json {
@@ -194,11 +213,41 @@ pub(crate) fn run(args: TrainArgs, quiet: bool) -> Result<(), CliError> {
         }
         output::print(&format!("trained scene: {out} (look at it with 'fmlgs {out}')"))?;
     }
+    if let Some(server) = server {
+        if !quiet && server.watchers().1 > 0 {
+            output::note("Whoever watches is sent the result ...");
+        }
+        // Where it was canceled from here, another signal ends the program at once.
+        let canceled = interrupt::asked_to_stop();
+        server.see_off(|| !canceled && interrupt::asked_to_stop());
+    }
     if finished {
         return Ok(());
     }
     let (steps, all) = (outcome.steps, config.steps);
     Err(CliError::Cancelled(format!("{steps} of {all} steps are saved in {out}; the same command resumes from there")))
+}
+
+/// Trains while others watch.
+fn served(
+    server: &Server,
+    dataset: &Dataset,
+    config: &TrainConfig,
+    folders: Vec<PathBuf>,
+    console: &mut Console,
+) -> Result<Trained, CliError> {
+    announce(server);
+    let mut observer = server.observe(format!("Training {}", dataset.name), console);
+    let done = train::run(dataset, config, folders, &mut observer);
+    match &done {
+        Ok(done) => {
+            if let Err(e) = server.finished(&done.out, done.is_finished()) {
+                output::warn(format!("Whoever watches does not get the result: {e}"));
+            }
+        }
+        Err(e) => server.failed(e.to_string()),
+    }
+    Ok(done?)
 }
 
 #[cfg(test)]

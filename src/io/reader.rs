@@ -18,6 +18,11 @@ impl<'a> Reader<'a> {
         Self { rest: bytes, path }
     }
 
+    /// Whether all was read.
+    pub(crate) fn is_at_end(&self) -> bool {
+        self.rest.is_empty()
+    }
+
     /// The next `n` bytes; `place` says what they are.
     pub(crate) fn take(&mut self, n: usize, place: &str) -> Result<&'a [u8], IoError> {
         match self.rest.split_at_checked(n) {

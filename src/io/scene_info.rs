@@ -119,11 +119,17 @@ pub fn load_info(folder: &Path) -> Result<SceneInfo, IoError> {
         return Err(IoError::Version { path, found: version, supported: VERSION });
     }
     let info: SceneInfo = serde_json::from_slice(&bytes).map_err(|e| files::json_error(&path, &e))?;
-    for c in &info.cameras {
-        files::photo_name(&c.name, &path)?;
-        c.camera.believe().map_err(|cause| IoError::Camera { path: path.clone(), photo: c.name.clone(), cause })?;
-    }
+    check(&info, &path)?;
     Ok(info)
+}
+
+/// Refuses names and cameras of photos that cannot be; `path` is for errors.
+pub(crate) fn check(info: &SceneInfo, path: &Path) -> Result<(), IoError> {
+    for c in &info.cameras {
+        files::photo_name(&c.name, path)?;
+        c.camera.believe().map_err(|cause| IoError::Camera { path: path.into(), photo: c.name.clone(), cause })?;
+    }
+    Ok(())
 }
 
 /// `path` as seen from `folder`; absolute where they have no common root or do not exist.

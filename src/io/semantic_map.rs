@@ -27,7 +27,8 @@ pub use super::scene_files::MAP_FILE as FILE;
 /// Version that this program writes, and the highest it reads.
 const VERSION: u64 = 1;
 const KEY: &str = "fmlgs";
-const MAX_BYTES: u64 = 256 << 20;
+/// Most bytes of such a file.
+pub(crate) const MAX_BYTES: u64 = 256 << 20;
 
 #[derive(Serialize, Deserialize)]
 struct Header {
@@ -88,22 +89,41 @@ pub fn load(folder: &Path, state: Option<&str>, cloud: &GaussianCloud) -> Result
     if !path.exists() {
         return Ok(None);
     }
-    let torn = || IoError::Torn {
-        path: path.clone(),
-        with: super::scene_files::CLOUD_FILE,
-        remedy: "put back the file that was, or find the objects anew with 'fmlgs preprocess'",
-    };
-    let bytes = files::read(&path, MAX_BYTES)?;
-    let header = header(&path, &bytes)?;
-    if header.state.as_deref() != state {
-        return Err(torn());
-    }
+    decode(&files::read(&path, MAX_BYTES)?, state, cloud, &path).map(Some)
+}
+
+/// The map that such bytes hold, for the Gaussians `cloud` of the save `state`; `path` is for errors.
+pub(crate) fn decode(
+    bytes: &[u8],
+    state: Option<&str>,
+    cloud: &GaussianCloud,
+    path: &Path,
+) -> Result<SemanticMap, IoError> {
+    let header = of_save(bytes, state, path)?;
     let language = match header.encoder {
         None => None,
-        Some(encoder) => Some(features(&path, &bytes, encoder, &header.identities)?),
+        Some(encoder) => Some(features(path, bytes, encoder, &header.identities)?),
     };
-    let map = SemanticMap::restore(header.identities, header.seeds, cloud).ok_or_else(torn)?;
-    Ok(Some(SemanticMap { language, prepared: header.prepared, findings: header.findings, ..map }))
+    let map = SemanticMap::restore(header.identities, header.seeds, cloud).ok_or_else(|| torn(path))?;
+    Ok(SemanticMap { language, prepared: header.prepared, findings: header.findings, ..map })
+}
+
+/// Whether such bytes are of the save `state`.
+///
+/// # Errors
+/// If they are of another, or are no map.
+pub(crate) fn belongs(bytes: &[u8], state: Option<&str>, path: &Path) -> Result<(), IoError> {
+    of_save(bytes, state, path).map(drop)
+}
+
+fn of_save(bytes: &[u8], state: Option<&str>, path: &Path) -> Result<Header, IoError> {
+    let header = header(path, bytes)?;
+    if header.state.as_deref() == state { Ok(header) } else { Err(torn(path)) }
+}
+
+fn torn(path: &Path) -> IoError {
+    let remedy = "put back the file that was, or find the objects anew with 'fmlgs preprocess'";
+    IoError::Torn { path: path.into(), with: super::scene_files::CLOUD_FILE, remedy }
 }
 
 /// Features of all identities, those of the views that are missing as zeros.

@@ -45,6 +45,12 @@ impl Folders {
         unique(&self.data.join("reports"), path)
     }
 
+    /// Folder for what is made here of the scene that another computer serves at `host`.
+    pub(crate) fn of_remote(&self, host: &str) -> PathBuf {
+        let name: String = host.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
+        self.data.join("remote").join(name)
+    }
+
     /// Folder for the camera poses of the photos at `root`.
     pub(crate) fn poses(&self, root: &Path) -> PathBuf {
         unique(&self.data.join("poses"), root)

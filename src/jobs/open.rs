@@ -17,6 +17,11 @@ use crate::scene::plan::used_degree;
 use crate::scene::resource_log::{self, ResourceKind};
 use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Machine, SceneFacts, SemanticMap};
 
+mod received;
+
+pub use received::Origin;
+pub(crate) use received::received;
+
 /// Gaussians that can be drawn, and what came with them.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
@@ -190,12 +195,21 @@ pub struct OpenedScene {
     pub(crate) report_out: PathBuf,
     /// Whether edits of Gaussians have made it, and are stored in it.
     pub(crate) is_edited: bool,
+    /// Where it is, if that is another computer.
+    pub remote: Option<Origin>,
 }
 
 impl OpenedScene {
     /// Where its Gaussians are stored: the folder of a trained scene, or a file.
     pub(crate) fn stored(&self) -> &Path {
         if trained::is_scene(&self.out) { &self.out } else { &self.path }
+    }
+
+    /// The scene after a training that has kept its results in `out`: other settings are another training, in a folder
+    /// of its own. What another computer keeps lies there.
+    pub(crate) fn trained_in(&self, out: &Path) -> Self {
+        let out = if self.remote.is_some() { &self.out } else { out };
+        Self { out: out.into(), known_held_out: None, ..self.clone() }
     }
 
     /// Length of a unit in meters, if it is known of the scene or of its photos.

@@ -32,6 +32,11 @@ impl Photo {
         Self { name, path, camera, distortion: None, test_split: false, background: None }
     }
 
+    /// Whether it can be had: of some photos on other computers only the cameras are known.
+    pub(crate) fn has_pixels(&self) -> bool {
+        !self.path.as_os_str().is_empty()
+    }
+
     /// Its name as it may be shown.
     pub(crate) fn title(&self) -> Cow<'_, str> {
         text::line(&self.name)

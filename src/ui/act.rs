@@ -30,18 +30,14 @@ impl App {
             Action::Open(path) if is_report(&path) => self.read_report(path, false),
             Action::Open(path) if path.extension().is_some_and(|e| e == "toml") => self.read_preset(&path),
             Action::OpenDemo | Action::TrainDemo | Action::Open(_) | Action::FindPoses(_) => self.replace_scene(action),
+            Action::Connect(url) => self.connect(&url),
             Action::StartTraining => self.start_training(),
             Action::PauseJob => {
-                if let Some(job) = self.state.job.as_ref().filter(|j| j.kind.can_pause()) {
-                    self.worker.set_paused(job.id, !job.paused);
+                if let Some(job) = self.state.job.clone().filter(|j| j.kind.can_pause()) {
+                    self.set_paused(job.id, !job.paused);
                 }
             }
-            Action::Cancel => {
-                if let Some(job) = &mut self.state.job {
-                    self.worker.cancel(job.id);
-                    job.canceling = true;
-                }
-            }
+            Action::Cancel => self.cancel_job(),
             Action::Dismiss => self.dismiss(ctx),
             Action::InspectAt(at) => self.inspect(at),
             Action::Evaluate => self.evaluate(),
@@ -167,9 +163,11 @@ impl App {
 
     /// Opens something else; asks first if that ends a running job.
     fn replace_scene(&mut self, action: Action) {
-        match self.state.job.as_ref().map(|j| (j.kind, j.title.clone())) {
+        // What runs on another computer goes on there.
+        let here = |id| !self.link.as_ref().is_some_and(|link| link.owns(id));
+        match self.state.job.as_ref().filter(|j| here(j.id)).map(|j| j.title.clone()) {
             None => self.open(action),
-            Some((_, title)) => {
+            Some(title) => {
                 self.question = Some(Question {
                     text: format!("{title} is still running. Cancel it and continue? Saved progress is kept."),
                     yes: "Cancel and continue",
@@ -182,14 +180,12 @@ impl App {
 
     /// Cancels what runs and does the action next.
     pub(super) fn give_up_and(&mut self, action: Action) {
-        if let Some(job) = &mut self.state.job {
-            self.worker.cancel(job.id);
-            job.canceling = true;
-        }
+        self.cancel_job();
         self.open(action);
     }
 
     fn open(&mut self, action: Action) {
+        self.disconnect();
         let command = match action {
             Action::Open(path) => Command::Open { path },
             Action::TrainDemo => Command::DemoPhotos,
@@ -200,6 +196,9 @@ impl App {
     }
 
     pub(super) fn submit(&mut self, command: Command) -> Option<JobId> {
+        if self.settled_remotely(&command) {
+            return None;
+        }
         let title = command.title();
         let job = self.worker.submit(command);
         job.map_err(|e| self.state.toast(Tone::Warning, format!("{title}: {e}"))).ok()

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
+use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 
 use super::camera::CameraPane;
 use super::chat::Chat;
@@ -25,10 +25,13 @@ use super::toasts::Toasts;
 use super::viewport::Viewport;
 use super::{keys, theme};
 use crate::measure::is_report;
+use crate::remote::Link;
 use crate::scene::plan::PlanOverride;
 use crate::scene::resource_log::{self, ResourceKind};
 use crate::ui::actions::{Action, Pane};
-use crate::worker::{Jobs, Repaint, Worker};
+use crate::worker::{Event, JobKind, Jobs, Repaint, Worker};
+
+mod contents;
 
 /// The window's application.
 pub struct App {
@@ -39,6 +42,8 @@ pub struct App {
     /// The view of the scene.
     pub viewport: Viewport,
     pub(super) worker: Worker,
+    /// The server whose scene is on screen.
+    pub(super) link: Option<Link>,
     pub(super) repaint: Repaint,
     pub(super) dialogs: FileDialogs,
     pub(super) question: Option<Question>,
@@ -99,6 +104,7 @@ impl App {
         state.say(super::state::Tone::Info, format!("FMLGS {}", env!("CARGO_PKG_VERSION")));
         Ok(Self {
             worker: Worker::start(jobs, unhurried)?,
+            link: None,
             viewport: Viewport::new(Arc::clone(&repaint))?,
             state,
             layout,
@@ -155,11 +161,18 @@ impl App {
     /// Takes in everything that happened since.
     fn take_events(&mut self, ctx: &egui::Context) {
         while let Some(event) = self.worker.next_event() {
+            if self.is_of_earlier_server(&event) {
+                continue;
+            }
             self.hear(&event);
+            if matches!(event, Event::Started { job, kind: JobKind::Train, .. } if job.is_remote()) {
+                self.layout.dock.activate(Pane::Training);
+            }
             let segmented = self.segmenting.take_if(|s| event.is_end() && event.job() == s.job);
             self.actions.extend(self.state.apply(event));
             segmented.into_iter().for_each(|s| self.segmented(s));
         }
+        self.state.link = self.link.as_ref().map(Link::status);
         self.state.replan(&self.layout.plan, self.layout.config.limits());
         self.state.stamp_log(resource_log::now_secs());
         for load in resource_log::since(self.traced) {
@@ -332,39 +345,6 @@ impl App {
             self.chosen(action, path);
         }
         self.toasts.show(ctx, &mut self.state, ctx.content_rect().shrink2(egui::vec2(0.0, 44.0)));
-    }
-}
-
-impl DockContents for App {
-    fn has(&self, place: Place) -> bool {
-        let Place::Pane(pane) = place else { return true };
-        let scene = self.state.scene.as_ref();
-        let has_photos = scene.is_some_and(|s| s.dataset.is_some());
-        let has_objects = self.state.semantics.is_some();
-        self.layout.shows(pane)
-            && match pane {
-                Pane::Report | Pane::Log => true,
-                Pane::Dataset | Pane::Training => has_photos,
-                Pane::Objects => has_photos || has_objects,
-                Pane::Phrases => has_objects,
-                _ => scene.is_some(),
-            }
-    }
-
-    fn show(&mut self, ui: &mut Ui, place: Place) {
-        let Place::Pane(pane) = place else { return self.show_view(ui) };
-        Frame::new().fill(theme::panel()).inner_margin(Margin::same(12)).show(ui, |ui| {
-            ui.set_min_size(ui.available_size());
-            if matches!(pane, Pane::Training | Pane::Query | Pane::Plan | Pane::Models | Pane::Clean) {
-                ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| self.show_pane(ui, pane));
-            } else {
-                self.show_pane(ui, pane);
-            }
-        });
-    }
-
-    fn hide(&mut self, pane: Pane) {
-        self.actions.push(Action::TogglePane(pane));
     }
 }
 

@@ -35,6 +35,7 @@ pub(crate) mod labels;
 pub(crate) mod layout;
 pub(crate) mod palette;
 pub(crate) mod panes;
+mod remote;
 pub(crate) mod state;
 mod text_field;
 pub(crate) mod theme;

@@ -26,6 +26,7 @@ use crate::math::format;
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
 use crate::pipeline::train::TrainConfig;
+use crate::remote::LinkStatus;
 use crate::render::RenderSettings;
 use crate::scene::findings::IdentityEvidence;
 use crate::scene::{GaussianCloud, Limits, Overrides, PhotoPixels, SceneFacts, ScenePlan, SemanticMap, text};
@@ -121,6 +122,8 @@ pub struct AppState {
     pub report: Option<ShownReport>,
     /// The report that it is compared with.
     pub second_report: Option<ShownReport>,
+    /// How the connection to the server is whose scene is on screen, if it is one's.
+    pub(crate) link: Option<LinkStatus>,
     short_jobs: BTreeMap<JobId, (JobKind, String)>,
     next_toast: u64,
 }
@@ -248,7 +251,9 @@ impl AppState {
     /// Takes a short job off the list if it is `job`.
     fn end_short(&mut self, job: JobId) -> Option<(JobKind, String)> {
         let ended = self.short_jobs.remove(&job)?;
-        self.short_jobs_done = self.short_jobs_done.max(job);
+        if !job.is_remote() {
+            self.short_jobs_done = self.short_jobs_done.max(job);
+        }
         Some(ended)
     }
 
@@ -299,12 +304,10 @@ impl AppState {
                     self.history.evaluations = evaluations;
                     self.set_facts(*facts);
                     self.set_semantics(semantics);
-                    // Other settings are another training, in a folder of its own.
-                    let in_out = |s: &OpenedScene| OpenedScene { out: out.clone(), known_held_out: None, ..s.clone() };
-                    self.scene = self.scene.take().map(|s| Arc::new(in_out(&s)));
+                    self.scene = self.scene.take().map(|s| Arc::new(s.trained_in(&out)));
                 }
                 let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));
-                self.say(Tone::Info, format!("Saved to {}", out.display()));
+                self.say(Tone::Info, format!("Saved to {}{}", out.display(), self.elsewhere()));
                 self.toast(Tone::Good, format!("Training finished{}", quality.unwrap_or_default()));
                 let has_masks = self.scene.as_ref().is_some_and(|s| s.masks.is_some());
                 next.extend((has_masks && !carried).then_some(Action::FindObjects));
@@ -380,7 +383,7 @@ impl AppState {
         let reached = self.history.steps.last().map(|s| s.step);
         self.resumable = scene.resumable.clone().zip(reached);
         self.photos.clear();
-        if !is_demo {
+        if !is_demo && scene.remote.is_none() {
             self.remember(scene.path.clone());
         }
         self.scene_number += 1;

@@ -1,4 +1,18 @@
-//! Sorts of jobs, and which thread runs each.
+//! Jobs by number and by sort, and which thread runs each.
+
+/// Names one job of one worker.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct JobId(pub(crate) u64);
+
+impl JobId {
+    /// From here on jobs are of other computers: no worker counts so far.
+    pub(crate) const REMOTE: Self = Self(1 << 63);
+
+    /// Whether it runs on another computer.
+    pub(crate) fn is_remote(self) -> bool {
+        self >= Self::REMOTE
+    }
+}
 
 /// What sort of job it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

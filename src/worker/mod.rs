@@ -27,5 +27,6 @@ pub use protocol::{Command, Event, JobId, JobKind, Outcome, WorkerThread};
 pub(crate) use slot::Slot;
 pub use slot::Versioned;
 pub use start::Start;
+pub(crate) use thread::{Elsewhere, EventSource};
 pub use thread::{Jobs, QueueFull, Worker};
 pub use view_modes::ViewMode;

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::failure::Failure;
-pub use super::kind::{JobKind, WorkerThread};
+pub use super::kind::{JobId, JobKind, WorkerThread};
 use crate::io::unposed::Unposed;
 use crate::jobs::clean::{MeasureRequest, MeasuredCloud};
 use crate::jobs::edit::EditRequest;
@@ -28,10 +28,6 @@ use crate::pipeline::observer::{Evaluation, Progress, Severity, StepMetrics};
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Photo, PhotoPixels, SceneFacts, SemanticMap};
-
-/// Names one job of one worker.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct JobId(pub(crate) u64);
 
 /// What a job is to do.
 #[derive(Clone, Debug)]

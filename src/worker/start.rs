@@ -11,6 +11,8 @@ pub enum Start {
     Scene(PathBuf),
     /// Shows this report.
     Report(PathBuf),
+    /// Looks at what is served at this address.
+    Remote(String),
     /// Compares it with this one.
     SecondReport(PathBuf),
 }

@@ -43,12 +43,24 @@ struct Queued {
 
 type Controls = Arc<Mutex<HashMap<JobId, Arc<Control>>>>;
 
+/// Where jobs that run elsewhere tell what happens, as those of a worker do.
+#[derive(Clone)]
+pub(crate) struct EventSource {
+    pub(crate) events: Sender<Event>,
+    pub(crate) clouds: Arc<Slot<CloudSnapshot>>,
+    pub(crate) repaint: Repaint,
+}
+
+/// Takes a command that is carried out elsewhere; its events come through an [`EventSource`].
+pub(crate) type Elsewhere = Box<dyn Fn(&Command) -> Option<JobId> + Send>;
+
 /// Runs jobs in the background. Dropping it cancels all of them and waits a few seconds.
 pub struct Worker {
     long: Option<Sender<Queued>>,
     short: Option<Sender<Queued>>,
     events: Option<Receiver<Event>>,
-    clouds: Arc<Slot<CloudSnapshot>>,
+    source: EventSource,
+    elsewhere: Option<Elsewhere>,
     controls: Controls,
     next: AtomicU64,
     threads: Vec<JoinHandle<()>>,
@@ -81,11 +93,16 @@ impl Worker {
             Ok::<_, std::io::Error>(Some(sender))
         };
         let (long, short) = (lane("long jobs", super::low_priority_pool::pool())?, lane("short jobs", None)?);
-        Ok(Self { long, short, events: Some(events), clouds, controls, next: AtomicU64::new(1), threads })
+        let source = EventSource { events: event_sender, clouds, repaint };
+        let elsewhere = None;
+        Ok(Self { long, short, events: Some(events), source, elsewhere, controls, next: AtomicU64::new(1), threads })
     }
 
     /// Queues a job on its lane.
     pub fn submit(&self, command: Command) -> Result<JobId, QueueFull> {
+        if let Some(job) = self.elsewhere.as_ref().and_then(|takes| takes(&command)) {
+            return Ok(job);
+        }
         let job = JobId(self.next.fetch_add(1, Ordering::Relaxed));
         let control = Arc::new(Control::default());
         lock(&self.controls).insert(job, Arc::clone(&control));
@@ -127,7 +144,17 @@ impl Worker {
 
     /// Where the Gaussians in training are published.
     pub fn clouds(&self) -> &Slot<CloudSnapshot> {
-        &self.clouds
+        &self.source.clouds
+    }
+
+    /// From now on commands are offered to `elsewhere` first.
+    pub(crate) fn set_elsewhere(&mut self, elsewhere: Option<Elsewhere>) {
+        self.elsewhere = elsewhere;
+    }
+
+    /// Where others tell events beside those of the jobs.
+    pub(crate) fn source(&self) -> EventSource {
+        self.source.clone()
     }
 }
 

@@ -6,7 +6,7 @@ use super::source::{SourceFile, library_code, test_module_files};
 pub type Complaint = String;
 
 /// Each module of the library and the other modules it may use, in the order of the data flow.
-const MODULES: [(&str, &[&str]); 13] = [
+const MODULES: [(&str, &[&str]); 14] = [
     ("math", &[]),
     ("scene", &["math"]),
     ("io", &["math", "scene"]),
@@ -17,9 +17,22 @@ const MODULES: [(&str, &[&str]); 13] = [
     ("measure", &["math", "scene", "io", "models", "render", "pipeline", "navigate"]),
     ("jobs", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure"]),
     ("worker", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "jobs"]),
+    ("remote", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "jobs", "worker"]),
     ("agent", &["math", "scene", "io", "render", "pipeline", "navigate", "jobs"]),
-    ("cli", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "jobs", "worker", "agent"]),
-    ("ui", &["math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "jobs", "worker", "agent"]),
+    (
+        "cli",
+        &[
+            "math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "jobs", "worker", "remote",
+            "agent",
+        ],
+    ),
+    (
+        "ui",
+        &[
+            "math", "scene", "io", "models", "render", "pipeline", "navigate", "measure", "jobs", "worker", "remote",
+            "agent",
+        ],
+    ),
 ];
 
 /// Longest Rust file in lines.

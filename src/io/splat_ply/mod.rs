@@ -19,7 +19,7 @@ use crate::io::{IoError, files};
 use crate::scene::GaussianCloud;
 
 pub use read::parse;
-pub(crate) use stream::state;
+pub(crate) use stream::{state, state_in};
 pub use write::{check, encode, write};
 pub(crate) use write::{encode_told, may_be_extra};
 

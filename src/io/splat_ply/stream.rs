@@ -17,9 +17,13 @@ const BLOCK_BYTES: usize = 16 << 20;
 
 /// The id of the scene's state that a `.ply` belongs to, if it says.
 pub(crate) fn state(path: &Path) -> Result<Option<String>, IoError> {
-    let start = files::read_start(path, HEADER_BYTES)?;
-    let ply = Ply::parse(&start, path).ok();
-    Ok(ply.and_then(|ply| ply.comments.iter().find_map(|c| c.strip_prefix(STATE)).map(str::to_owned)))
+    Ok(state_in(&files::read_start(path, HEADER_BYTES)?, path))
+}
+
+/// The same of bytes that a file begins with.
+pub(crate) fn state_in(start: &[u8], path: &Path) -> Option<String> {
+    let ply = Ply::parse(start, path).ok()?;
+    ply.comments.iter().find_map(|c| c.strip_prefix(STATE)).map(str::to_owned)
 }
 
 /// The Gaussians of a little-endian `.ply` whose first element they are; `None` if it is another

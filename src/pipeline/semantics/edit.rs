@@ -4,13 +4,14 @@
 use glam::Vec3;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
+use serde::{Deserialize, Serialize};
 
 use super::codes::{self, RADIUS};
 use crate::math::stats::median;
 use crate::scene::{Findings, GaussianCloud, Identities, IdentityId, Level, NOBODY, SemanticMap, ViewFeatures};
 
 /// A correction.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Edit {
     /// Gives an identity another first name; the old one is still understood.
     Rename(IdentityId, String),

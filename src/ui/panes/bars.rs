@@ -1,5 +1,7 @@
 //! The bar at the top (menus, name of the scene) and the bar at the bottom (the running job).
 
+use std::time::{Duration, Instant};
+
 use egui::{Align, Button, RichText, Stroke, Ui, vec2};
 use strum::VariantArray;
 
@@ -8,6 +10,7 @@ use super::super::state::{AppState, RunningJob};
 use super::super::{keys, theme};
 use crate::math::format;
 use crate::pipeline::observer::Progress;
+use crate::remote::LinkStatus;
 use crate::scene::text;
 use crate::ui::actions::{Action, Axis, Pane, THEMES};
 use crate::worker::ViewMode;
@@ -117,10 +120,11 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
         });
         ui.menu_button("Train", |ui| {
             ui.set_min_width(260.0);
-            item(ui, has_photos && state.job.is_none(), None, Action::StartTraining, actions);
+            let trains_here = has_photos && state.scene.as_ref().is_some_and(|s| s.remote.is_none());
+            item(ui, trains_here && state.job.is_none(), None, Action::StartTraining, actions);
             item(ui, state.job.as_ref().is_some_and(|j| j.kind.can_pause()), None, Action::PauseJob, actions);
             item(ui, state.job.is_some(), None, Action::Cancel, actions);
-            item(ui, has_photos && state.job.is_none(), None, Action::Evaluate, actions);
+            item(ui, trains_here && state.job.is_none(), None, Action::Evaluate, actions);
         });
         ui.menu_button("Help", |ui| {
             ui.set_min_width(240.0);
@@ -130,6 +134,9 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
         if let Some(scene) = &state.scene {
             ui.separator();
             ui.label(RichText::new(&scene.name).strong()).on_hover_text(text::path(&scene.path));
+            if let Some(origin) = &scene.remote {
+                ui.label(RichText::new(format!("on {}", origin.host)).color(theme::weak()));
+            }
         }
         ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
             let search = Button::new(RichText::new("Search actions").color(theme::weak()))
@@ -194,6 +201,9 @@ pub(crate) fn status(
                 );
             }
         }
+        if let Some(link) = &state.link {
+            connection(ui, link);
+        }
         ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
             let log = ui.selectable_label(layout.shows(Pane::Log), "Log");
             if log.on_hover_text("Show or hide the log").clicked() {
@@ -207,6 +217,28 @@ pub(crate) fn status(
                 };
             }
         });
+    });
+}
+
+/// How the connection to another computer is.
+fn connection(ui: &mut Ui, link: &LinkStatus) {
+    let host = &link.host;
+    let (color, text) = match (link.connected, link.retry_at) {
+        (true, _) => (theme::good(), format!("Connected to {host}")),
+        (false, Some(at)) => {
+            let secs = at.saturating_duration_since(Instant::now()).as_secs_f64().ceil();
+            ui.ctx().request_repaint_after(Duration::from_secs(1));
+            (theme::warning(), format!("No connection to {host}, trying again in {secs} s"))
+        }
+        (false, None) if link.problem.is_some() => (theme::warning(), format!("Not connected to {host}")),
+        (false, None) => return,
+    };
+    ui.add_space(8.0);
+    dot(ui, color);
+    let shown = ui.label(RichText::new(text).color(if link.connected { theme::weak() } else { color }));
+    shown.on_hover_text(match &link.problem {
+        Some(problem) => format!("{problem}\nWhat is on screen stays."),
+        None => "What is drawn and asked is drawn and asked here; the scene comes from there.".into(),
     });
 }
 

@@ -51,7 +51,8 @@ impl PhotoThumbnails {
     }
 
     fn request(&mut self, index: usize, dataset: &Dataset, worker: &Worker) {
-        let known = self.loaded.contains_key(&index)
+        let known = dataset.photos.get(index).is_none_or(|photo| !photo.has_pixels())
+            || self.loaded.contains_key(&index)
             || self.failed.contains(&index)
             || self.waiting.values().any(|i| *i == index);
         if known || self.waiting.len() >= AT_ONCE {
@@ -94,6 +95,9 @@ impl PhotoThumbnails {
         };
         let test: BTreeSet<usize> = scene.held_out(layout.config.holdout_every).into_iter().collect();
         facts(ui, dataset, dataset.photos.len() - test.len(), test.len());
+        if scene.remote.as_ref().is_some_and(|origin| !origin.photos) {
+            ui.weak("Its photos are no longer there; these are their cameras.");
+        }
         let scores: HashMap<&str, f64> = state
             .history
             .evaluations
@@ -187,7 +191,9 @@ fn facts(ui: &mut Ui, dataset: &Dataset, train: usize, test: usize) {
         ui.label(RichText::new(format!("{train} train")).color(theme::text()));
         ui.weak("·");
         ui.label(RichText::new(format!("{test} held-out")).color(theme::warning()));
-        ui.weak(format!("·  {} points", format::count(dataset.points.len() as u64)));
+        if !dataset.points.is_empty() {
+            ui.weak(format!("·  {} points", format::count(dataset.points.len() as u64)));
+        }
     });
     if !dataset.warnings.is_empty() {
         let text = format!("{} warning{}", dataset.warnings.len(), if dataset.warnings.len() == 1 { "" } else { "s" });

@@ -291,6 +291,11 @@ impl Tree<'_> {
 }
 
 fn show_how_to_begin(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+    if let Some(origin) = state.scene.as_ref().and_then(|s| s.remote.as_ref()) {
+        let text = format!("No objects are known yet. They are found on {}: fmlgs preprocess SCENE", origin.host);
+        ui.label(RichText::new(text).color(theme::weak()));
+        return;
+    }
     let has_masks = state.scene.as_ref().is_some_and(|s| s.masks.is_some());
     ui.label(
         RichText::new(

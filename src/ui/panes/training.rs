@@ -30,6 +30,10 @@ pub(crate) fn show(
     let job = state.job.as_ref().filter(|j| j.kind == JobKind::Train);
     match job {
         Some(job) => running(ui, job, actions),
+        None if scene.remote.is_some() => {
+            let host = scene.remote.as_ref().map_or("", |origin| &origin.host);
+            ui.weak(format!("The scene is on {host}. To train there: fmlgs train PHOTOS --serve"));
+        }
         None => {
             let largest = dataset.photos.iter().map(|p| p.camera.width_px.max(p.camera.height_px)).max().unwrap_or(1);
             settings(ui, &mut layout.config, largest);

@@ -101,6 +101,12 @@ impl AppState {
         show
     }
 
+    /// " on HOST" where the scene is on another computer.
+    pub(super) fn elsewhere(&self) -> String {
+        let origin = self.scene.as_ref().and_then(|scene| scene.remote.as_ref());
+        origin.map_or_else(String::new, |origin| format!(" on {}", origin.host))
+    }
+
     /// Takes in that a job could not go on.
     pub(super) fn failed(&mut self, job: JobId, failure: Failure) {
         let doing = match self.end_short(job) {

@@ -32,7 +32,7 @@ impl PhotoView {
     pub(super) fn new(index: usize, photo: &Photo, worker: &Worker) -> Self {
         let command = Command::Photo { index, photo: Box::new(photo.clone()), max_side_px: SIDE_PX };
         // With a full queue there is no photo to compare with until the next visit.
-        let job = worker.submit(command).ok();
+        let job = if photo.has_pixels() { worker.submit(command).ok() } else { None };
         Self { index, photo: photo.clone(), job, pixels: None, texture: None, failed: job.is_none(), margin: 1.0 }
     }
 

@@ -1,0 +1,79 @@
+//! `fmlgs connect`: the window, or a line now and then, on what another computer serves.
+
+use std::io::BufRead;
+use std::path::PathBuf;
+
+use serde_json::json;
+
+use super::progress::Console;
+use super::{CliError, output};
+use crate::jobs::export;
+use crate::pipeline::observer::{Observer, Severity};
+use crate::remote::{Address, Client, Followed, follow};
+
+/// Look at what 'fmlgs serve' or 'fmlgs train --serve' shows on another computer
+///
+/// Opens the usual window on it: a training is seen as it goes, can be paused and canceled, and objects can be asked for
+/// in any view, which this computer draws. If the connection is lost, the window keeps what it has and tries again.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "Examples:\n  \
+    ssh -L 7070:127.0.0.1:7070 user@host                         first, if the scene is on another computer\n  \
+    fmlgs connect 'http://127.0.0.1:7070/#TOKEN'                 open the window; the server printed the address\n  \
+    fmlgs connect - < address.txt                                the address does not show in a list of processes\n  \
+    fmlgs connect 'http://…' --headless --save scene.ply         wait for the end of the training, keep the result")]
+pub(crate) struct ConnectArgs {
+    /// Address that the server printed, with the token after '#'; '-' reads it from standard input
+    url: String,
+    /// Print what happens instead of opening the window, until nothing runs there
+    #[arg(long)]
+    headless: bool,
+    /// File for the Gaussians then (.ply): the same bytes as the file of a trained scene
+    #[arg(long, value_name = "PLY", requires = "headless")]
+    save: Option<PathBuf>,
+    /// Print one JSON document at the end
+    #[arg(long, requires = "headless")]
+    json: bool,
+}
+
+impl ConnectArgs {
+    /// The address, if it is for the window.
+    pub(crate) fn for_window(&self) -> Result<Option<String>, CliError> {
+        let url = self.address()?;
+        Address::parse(&url).map_err(CliError::Usage)?;
+        Ok((!self.headless).then_some(url))
+    }
+
+    fn address(&self) -> Result<String, CliError> {
+        if self.url != "-" {
+            return Ok(self.url.clone());
+        }
+        let mut line = String::new();
+        std::io::stdin().lock().read_line(&mut line)?;
+        Ok(line.trim().to_owned())
+    }
+}
+
+pub(crate) fn run(args: ConnectArgs, quiet: bool) -> Result<(), CliError> {
+    let address = Address::parse(&args.address()?).map_err(CliError::Usage)?;
+    if let Some(save) = &args.save {
+        export::check(save, &[".ply"], &[])?;
+    }
+    let mut console = Console::new(quiet);
+    if address.is_open() {
+        console.note(Severity::Warning, "the connection is not encrypted; others can read it, the token too".into());
+    }
+    let client = Client::new(address)?;
+    let end = follow(&client, &mut console, args.save.as_deref())?;
+    let (word, folder) = match &end {
+        Followed::AtRest => ("at rest", None),
+        Followed::Finished(folder) => ("finished", Some(folder)),
+        Followed::Cancelled => ("cancelled", None),
+        Followed::Failed(why) => return Err(CliError::failed(format!("the training failed there: {why}"))),
+        Followed::Left => return Err(CliError::Cancelled("the server goes on".into())),
+    };
+    if args.json {
+        return output::print_json(&json!({ "end": word, "out": folder, "saved": args.save }));
+    }
+    let there = folder.map(|folder| format!(", saved there in {folder}")).unwrap_or_default();
+    output::print(&format!("{}: {word}{there}", client.address.host))
+}

@@ -1,0 +1,170 @@
+//! Asks a server: each question is one request, answered within limits of size and time.
+
+use std::io::Read;
+use std::path::Path;
+use std::time::Duration;
+
+use serde::de::DeserializeOwned;
+use ureq::http::Response;
+use ureq::{Agent, Body};
+
+use super::address::Address;
+use super::photos;
+use super::token::random_name;
+use super::wire::{
+    Ask, CLIENT_HEADER, GENERATION_HEADER, News, RUN_HEADER, STEP_HEADER, SceneCard, VERSION_HEADER, is_understood,
+    version,
+};
+use crate::io::http;
+use crate::io::snapshot::SceneSnapshot;
+use crate::scene::{PhotoPixels, text};
+
+/// How long the server may be silent.
+const STALL: Duration = Duration::from_secs(10);
+/// Most bytes of an answer in JSON, of Gaussians, of a photo, and of a refusal.
+const JSON_BYTES: u64 = 64 << 20;
+const SNAPSHOT_BYTES: u64 = 16 << 30;
+const PHOTO_BYTES: u64 = 128 << 20;
+const REFUSAL_BYTES: u64 = 2 << 10;
+
+/// Why there is no answer.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub(crate) enum ClientError {
+    /// The server cannot be reached now; it may be later.
+    #[error("{0}")]
+    Lost(String),
+    /// It will not answer that.
+    #[error("{0}")]
+    Refused(String),
+}
+
+/// An answer, and which run of the server it is from.
+#[derive(Debug)]
+pub(crate) struct Answer<T> {
+    pub(crate) run: String,
+    pub(crate) value: T,
+}
+
+/// Gaussians as they came.
+#[derive(Debug)]
+pub(crate) struct Pulled {
+    pub(crate) snapshot: SceneSnapshot,
+    pub(crate) generation: u64,
+    /// Step of the training.
+    pub(crate) step: u64,
+}
+
+/// Asks one server.
+#[derive(Debug)]
+pub(crate) struct Client {
+    agent: Agent,
+    pub(crate) address: Address,
+    name: String,
+}
+
+impl Client {
+    /// # Errors
+    /// Only if the system gives no random numbers.
+    pub(crate) fn new(address: Address) -> std::io::Result<Self> {
+        // An address that is told on the way would get the token.
+        let config = http::config(&address.base, STALL).max_redirects(0).max_redirects_will_error(false).build();
+        Ok(Self { agent: config.into(), address, name: random_name()? })
+    }
+
+    /// The scene without its Gaussians.
+    pub(crate) fn scene(&self) -> Result<Answer<SceneCard>, ClientError> {
+        self.json("/scene")
+    }
+
+    /// What happened after number `since`; `have` is the generation of the Gaussians that are here.
+    pub(crate) fn news(&self, since: u64, have: u64) -> Result<Answer<News>, ClientError> {
+        self.json(&format!("/news?since={since}&have={have}"))
+    }
+
+    /// The newest Gaussians, if there are any newer than those of generation `have`.
+    pub(crate) fn snapshot(&self, have: u64) -> Result<Option<Pulled>, ClientError> {
+        let response = self.get(&format!("/snapshot?since={have}"))?;
+        if response.status() == 204 {
+            return Ok(None);
+        }
+        let number = |name: &str| self.header(&response, name)?.parse().map_err(|_| self.odd("a header is no number"));
+        let (generation, step) = (number(GENERATION_HEADER)?, number(STEP_HEADER)?);
+        let bytes = self.bytes(response, SNAPSHOT_BYTES)?;
+        let snapshot =
+            SceneSnapshot::parse(&bytes, Path::new(&self.address.host)).map_err(|e| self.odd(&e.to_string()))?;
+        Ok(Some(Pulled { snapshot, generation, step }))
+    }
+
+    /// The photo of this number, at most so large.
+    pub(crate) fn photo(&self, index: usize, side_px: u32) -> Result<PhotoPixels, ClientError> {
+        let response = self.get(&format!("/photo?index={index}&side={side_px}"))?;
+        photos::read(&self.bytes(response, PHOTO_BYTES)?).map_err(|e| self.odd(&e.to_string()))
+    }
+
+    /// Asks for something to be done. What cannot be done is refused.
+    pub(crate) fn ask(&self, ask: &Ask) -> Result<(), ClientError> {
+        let body = serde_json::to_vec(ask).map_err(|e| ClientError::Refused(e.to_string()))?;
+        let request = self.agent.post(format!("{}/ask", self.address.base));
+        let (token, own) = (format!("Bearer {}", self.address.token.text()), version());
+        let request = request.header("authorization", token).header(VERSION_HEADER, own);
+        self.checked(request.header(CLIENT_HEADER, &self.name).content_type("application/json").send(&body)).map(drop)
+    }
+
+    fn json<T: DeserializeOwned>(&self, path: &str) -> Result<Answer<T>, ClientError> {
+        let response = self.get(path)?;
+        let run = self.header(&response, RUN_HEADER)?;
+        let bytes = self.bytes(response, JSON_BYTES)?;
+        let value = serde_json::from_slice(&bytes).map_err(|e| self.odd(&format!("{path}: {e}")))?;
+        Ok(Answer { run, value })
+    }
+
+    fn get(&self, path: &str) -> Result<Response<Body>, ClientError> {
+        let request = self.agent.get(format!("{}{path}", self.address.base));
+        let (token, own) = (format!("Bearer {}", self.address.token.text()), version());
+        let request = request.header("authorization", token).header(VERSION_HEADER, own);
+        self.checked(request.header(CLIENT_HEADER, &self.name).call())
+    }
+
+    /// An answer of a server that can be talked to, and that is one.
+    fn checked(&self, response: Result<Response<Body>, ureq::Error>) -> Result<Response<Body>, ClientError> {
+        let host = &self.address.host;
+        let response = response.map_err(|e| ClientError::Lost(format!("{host}: {e}")))?;
+        let status = response.status().as_u16();
+        let theirs = match response.headers().get(VERSION_HEADER).and_then(|v| v.to_str().ok()) {
+            Some(theirs) => text::line(theirs).into_owned(),
+            // Also what a tunnel says whose other end has gone.
+            None if status >= 500 => return Err(ClientError::Lost(format!("{host} answers with {status}"))),
+            None => return Err(ClientError::Refused(format!("what answers at {host} is no fmlgs server"))),
+        };
+        if !is_understood(&theirs) {
+            let own = version();
+            let text = format!("{host} speaks {theirs}, this program {own}: install the same fmlgs on both");
+            return Err(ClientError::Refused(text));
+        }
+        match status {
+            200 | 204 => Ok(response),
+            429 | 503 => Err(ClientError::Lost(format!("{host} has too many clients at the moment"))),
+            _ => {
+                let why = self.bytes(response, REFUSAL_BYTES)?;
+                let why = text::line(&String::from_utf8_lossy(&why)).into_owned();
+                Err(ClientError::Refused(if why.is_empty() { format!("{host} answers with {status}") } else { why }))
+            }
+        }
+    }
+
+    fn header(&self, response: &Response<Body>, name: &str) -> Result<String, ClientError> {
+        let value = response.headers().get(name).and_then(|v| v.to_str().ok());
+        value.map(str::to_owned).ok_or_else(|| self.odd(&format!("the header '{name}' is missing")))
+    }
+
+    fn bytes(&self, response: Response<Body>, most: u64) -> Result<Vec<u8>, ClientError> {
+        let mut bytes = Vec::new();
+        let lost = |e: std::io::Error| ClientError::Lost(format!("{}: {e}", self.address.host));
+        response.into_body().into_reader().take(most + 1).read_to_end(&mut bytes).map_err(lost)?;
+        if bytes.len() as u64 > most { Err(self.odd("it is longer than it may be")) } else { Ok(bytes) }
+    }
+
+    fn odd(&self, what: &str) -> ClientError {
+        ClientError::Refused(format!("the answer of {} cannot be read: {what}", self.address.host))
+    }
+}

@@ -1,0 +1,258 @@
+//! The server's side of HTTP/1.1: requests are read within limits of size and time, answers are written to whoever
+//! takes them. Only what this program's client needs is spoken; all else is refused.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{Shutdown, TcpStream};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Most bytes of a request before its body, and most lines of it.
+const HEAD_BYTES: usize = 8 << 10;
+const HEAD_LINES: usize = 32;
+/// How long a request may take to arrive, from its first byte on: who drips is cut off.
+const REQUEST: Duration = Duration::from_secs(5);
+/// How long a connection may be silent between requests.
+const IDLE: Duration = Duration::from_secs(30);
+/// How long an answer may stand still, and how fast it must be taken on the whole, bytes a second.
+const STALL: Duration = Duration::from_secs(10);
+const SLOWEST: f64 = 8192.0;
+/// Bytes that are written at once.
+const PIECE: usize = 64 << 10;
+
+/// A request before its body.
+#[derive(Debug)]
+pub(super) struct RequestHead {
+    pub(super) method: String,
+    /// What follows the address, up to a `?`.
+    pub(super) path: String,
+    query: String,
+    /// Names in small letters.
+    headers: Vec<(String, String)>,
+    deadline: Instant,
+}
+
+/// An answer.
+#[derive(Clone, Debug)]
+pub(super) struct Response {
+    pub(super) status: u16,
+    kind: &'static str,
+    headers: Vec<(&'static str, String)>,
+    body: Arc<Vec<u8>>,
+    /// Whether the connection ends with it.
+    pub(super) last: bool,
+}
+
+/// One connection.
+pub(super) struct Connection {
+    stream: TcpStream,
+    /// Read, and not yet used.
+    carry: Vec<u8>,
+}
+
+impl Response {
+    pub(super) fn new(status: u16, kind: &'static str, body: Arc<Vec<u8>>) -> Self {
+        Self { status, kind, headers: Vec::new(), body, last: false }
+    }
+
+    /// A refusal in words, after which the connection ends.
+    pub(super) fn refusal(status: u16, text: impl Into<String>) -> Self {
+        let body = Arc::new(text.into().into_bytes());
+        Self { last: true, ..Self::new(status, "text/plain; charset=utf-8", body) }
+    }
+
+    /// Whether it may take a while to be sent.
+    pub(super) fn is_large(&self) -> bool {
+        self.body.len() > PIECE
+    }
+
+    pub(super) fn with(mut self, name: &'static str, value: impl ToString) -> Self {
+        self.headers.push((name, value.to_string()));
+        self
+    }
+}
+
+impl RequestHead {
+    /// The value of a header; `None` if it is not there, or more than once.
+    pub(super) fn header(&self, name: &str) -> Option<&str> {
+        let mut all = self.headers.iter().filter(|(n, _)| n == name).map(|(_, value)| value.as_str());
+        all.next().filter(|_| all.next().is_none())
+    }
+
+    /// Whether a header is there at all.
+    pub(super) fn has(&self, name: &str) -> bool {
+        self.headers.iter().any(|(n, _)| n == name)
+    }
+
+    /// A number of the query, `?since=3`.
+    pub(super) fn number(&self, name: &str) -> Option<u64> {
+        self.query.split('&').find_map(|part| part.strip_prefix(name)?.strip_prefix('=')?.parse().ok())
+    }
+
+    fn parse(bytes: &[u8], deadline: Instant) -> Result<Option<(Self, usize)>, Response> {
+        let mut lines = [httparse::EMPTY_HEADER; HEAD_LINES];
+        let mut request = httparse::Request::new(&mut lines);
+        let length = match request.parse(bytes) {
+            Ok(httparse::Status::Complete(length)) => length,
+            Ok(httparse::Status::Partial) if bytes.len() < HEAD_BYTES => return Ok(None),
+            Ok(httparse::Status::Partial) | Err(httparse::Error::TooManyHeaders) => {
+                return Err(Response::refusal(431, "the request's headers are too long"));
+            }
+            Err(_) => return Err(Response::refusal(400, "this is no request")),
+        };
+        let target = request.path.filter(|t| t.starts_with('/') && request.version == Some(1));
+        let (Some(target), Some(method)) = (target, request.method) else {
+            return Err(Response::refusal(400, "this is no request of HTTP/1.1"));
+        };
+        let (path, query) = target.split_once('?').unwrap_or((target, ""));
+        let headers = request.headers.iter().map(|h| {
+            let value = std::str::from_utf8(h.value).map_err(|_| Response::refusal(400, "a header is no text"))?;
+            Ok((h.name.to_ascii_lowercase(), value.trim().to_owned()))
+        });
+        let headers = headers.collect::<Result<_, Response>>()?;
+        let head = Self { method: method.into(), path: path.into(), query: query.into(), headers, deadline };
+        Ok(Some((head, length)))
+    }
+}
+
+impl Connection {
+    pub(super) fn new(stream: TcpStream) -> Self {
+        let _ = stream.set_nodelay(true);
+        Self { stream, carry: Vec::new() }
+    }
+
+    /// The next request; `None` if no more comes.
+    pub(super) fn head(&mut self) -> Result<Option<RequestHead>, Response> {
+        let mut deadline = Instant::now() + if self.carry.is_empty() { IDLE } else { REQUEST };
+        loop {
+            if let Some((head, length)) = RequestHead::parse(&self.carry, deadline)? {
+                self.carry.drain(..length);
+                return Ok(Some(head));
+            }
+            let silent = self.carry.is_empty();
+            match self.read(HEAD_BYTES - self.carry.len().min(HEAD_BYTES - 1), deadline) {
+                Ok(0) => return Ok(None),
+                Ok(_) if silent => deadline = Instant::now() + REQUEST,
+                Ok(_) => {}
+                Err(e) if is_timeout(&e) && !silent => return Err(Response::refusal(408, "the request took too long")),
+                Err(_) => return Ok(None),
+            }
+        }
+    }
+
+    /// The body that belongs to `head`, of `most` bytes.
+    pub(super) fn body(&mut self, head: &RequestHead, most: usize) -> Result<Vec<u8>, Response> {
+        if head.has("transfer-encoding") || (head.has("content-length") && head.header("content-length").is_none()) {
+            return Err(Response::refusal(400, "the body's length is not stated as one number"));
+        }
+        let length = head.header("content-length").unwrap_or("0");
+        if length.is_empty() || !length.bytes().all(|b| b.is_ascii_digit()) {
+            return Err(Response::refusal(400, "the body's length is no number"));
+        }
+        let Some(length) = length.parse().ok().filter(|length| *length <= most) else {
+            return Err(Response::refusal(413, format!("a body here has at most {most} bytes")));
+        };
+        while self.carry.len() < length {
+            match self.read((length - self.carry.len()).min(PIECE), head.deadline) {
+                Ok(0) => return Err(Response::refusal(400, "the body ends early")),
+                Ok(_) => {}
+                Err(_) => return Err(Response::refusal(408, "the request took too long")),
+            }
+        }
+        let rest = self.carry.split_off(length);
+        Ok(std::mem::replace(&mut self.carry, rest))
+    }
+
+    fn read(&mut self, most: usize, deadline: Instant) -> io::Result<usize> {
+        self.stream.set_read_timeout(Some(left(deadline)?))?;
+        let before = self.carry.len();
+        self.carry.resize(before + most, 0);
+        let read = self.stream.read(&mut self.carry[before..]);
+        self.carry.truncate(before + read.as_ref().map_or(0, |n| *n));
+        read
+    }
+
+    /// Writes an answer; whether all of it was taken.
+    pub(super) fn answer(&mut self, response: &Response) -> io::Result<()> {
+        let (status, kind, length) = (response.status, response.kind, response.body.len());
+        let connection = if response.last { "close" } else { "keep-alive" };
+        let mut head = format!("HTTP/1.1 {status} {}\r\nConnection: {connection}\r\n", reason(status));
+        head += "Cache-Control: no-store\r\nX-Content-Type-Options: nosniff\r\n";
+        if status != 204 {
+            head += &format!("Content-Type: {kind}\r\nContent-Length: {length}\r\n");
+        }
+        for (name, value) in &response.headers {
+            head += &format!("{name}: {value}\r\n");
+        }
+        head += "\r\n";
+        let deadline = Instant::now() + STALL + Duration::from_secs_f64(length as f64 / SLOWEST);
+        for mut bytes in [head.as_bytes(), &response.body] {
+            while !bytes.is_empty() {
+                self.stream.set_write_timeout(Some(left(deadline)?.min(STALL)))?;
+                match self.stream.write(&bytes[..bytes.len().min(PIECE)])? {
+                    0 => return Err(ErrorKind::WriteZero.into()),
+                    n => bytes = &bytes[n..],
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Ends a connection so that what was answered still arrives: what the other side has sent is read off, within
+    /// limits.
+    pub(super) fn end(mut self) {
+        let _ = self.stream.shutdown(Shutdown::Write);
+        let deadline = Instant::now() + Duration::from_millis(200);
+        self.carry.clear();
+        for _ in 0..16 {
+            match self.read(PIECE, deadline) {
+                Ok(n) if n > 0 => self.carry.clear(),
+                _ => return,
+            }
+        }
+    }
+}
+
+/// How long it is to then; an error if that is past.
+fn left(deadline: Instant) -> io::Result<Duration> {
+    let left = deadline.saturating_duration_since(Instant::now());
+    if left.is_zero() { Err(ErrorKind::TimedOut.into()) } else { Ok(left) }
+}
+
+fn is_timeout(error: &io::Error) -> bool {
+    matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock)
+}
+
+fn reason(status: u16) -> &'static str {
+    ureq::http::StatusCode::from_u16(status).ok().and_then(|s| s.canonical_reason()).unwrap_or("Refused")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(text: &str) -> Result<Option<(RequestHead, usize)>, u16> {
+        RequestHead::parse(text.as_bytes(), Instant::now()).map_err(|refused| refused.status)
+    }
+
+    #[test]
+    fn heads_are_read_whole_or_not_at_all() {
+        let text = "GET /news?since=12&have=3 HTTP/1.1\r\nHost: x\r\nA: 1\r\na: 2\r\n\r\nrest";
+        let (head, length) = parse(text).expect("a request").expect("whole");
+        assert_eq!((&*head.method, &*head.path, &text[length..]), ("GET", "/news", "rest"));
+        assert_eq!((head.number("since"), head.number("have"), head.number("sinc")), (Some(12), Some(3), None));
+        assert!(head.header("host") == Some("x") && head.header("a").is_none() && head.has("a"));
+        for at in 0..length {
+            assert!(matches!(parse(&text[..at]), Ok(None)), "{at}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_request_is_refused() {
+        let refused = |text: &str| parse(text).expect_err("refused");
+        assert_eq!(refused("\0\0\0\0"), 400);
+        assert_eq!(refused("GET /x HTTP/1.0\r\n\r\n"), 400);
+        assert_eq!(refused("GET http://other/x HTTP/1.1\r\n\r\n"), 400);
+        assert_eq!(refused(&format!("GET /{} HTTP/1.1\r\n", "x".repeat(HEAD_BYTES))), 431);
+        assert_eq!(refused(&format!("GET / HTTP/1.1\r\n{}\r\n", "A: b\r\n".repeat(40))), 431);
+    }
+}

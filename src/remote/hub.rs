@@ -1,0 +1,291 @@
+//! What a server has to tell: the log of a training, the place for its newest Gaussians, and who has asked for them.
+//! The training only ever puts something in; packing is done by whoever asks, and only so often that it costs the
+//! training next to nothing.
+
+use std::collections::HashMap;
+use std::io;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use super::token::random_name;
+use super::wire::{News, SceneCard, WireEvent};
+use crate::io::snapshot;
+use crate::pipeline::observer::Progress;
+use crate::scene::GaussianCloud;
+use crate::worker::Control;
+
+/// Least time between two snapshots of a training.
+const SNAPSHOT_EVERY: Duration = Duration::from_millis(1000);
+/// The time between two is at least so many times what copying one takes from the training, and what packing one takes
+/// on a thread that yields to it.
+const COPY_SHARE: u32 = 150;
+const PACK_SHARE: u32 = 10;
+/// Events in one answer, and in the log; if those are more, every other step of training is forgotten.
+const PER_ANSWER: usize = 2000;
+const LOGGED: usize = 200_000;
+/// Clients that are told apart, and how long one counts as there after its last question.
+const CLIENTS: usize = 64;
+const THERE: Duration = Duration::from_secs(5);
+
+/// What a server shares.
+pub(super) struct Hub {
+    /// Names this run.
+    pub(super) run: String,
+    /// The scene without its Gaussians.
+    pub(super) card: SceneCard,
+    pub(super) control: Control,
+    log: Mutex<Log>,
+    latest: Mutex<Latest>,
+    packed: Mutex<Option<PackedSnapshot>>,
+    pace: Mutex<Pace>,
+    clients: Mutex<HashMap<String, Client>>,
+    /// Answers with Gaussians that are under way.
+    pub(super) sending: AtomicUsize,
+}
+
+/// Gaussians ready to be sent.
+#[derive(Clone)]
+pub(super) struct PackedSnapshot {
+    pub(super) generation: u64,
+    /// Step of the training.
+    pub(super) step: u64,
+    pub(super) bytes: Arc<Vec<u8>>,
+}
+
+#[derive(Default)]
+struct Log {
+    events: Vec<(u64, WireEvent)>,
+    next: u64,
+    progress: Option<Progress>,
+}
+
+#[derive(Default)]
+struct Latest {
+    generation: u64,
+    /// In training, not yet packed.
+    live: Option<(Arc<GaussianCloud>, u64)>,
+}
+
+struct Pace {
+    /// Whether somebody waits for newer Gaussians.
+    wanted: bool,
+    next: Instant,
+    /// Since when the training has been making a copy.
+    copying: Option<Instant>,
+}
+
+struct Client {
+    seen: Instant,
+    since: u64,
+    have: u64,
+}
+
+impl Hub {
+    pub(super) fn new(card: SceneCard) -> io::Result<Self> {
+        Ok(Self {
+            run: random_name()?,
+            card,
+            control: Control::default(),
+            log: Mutex::default(),
+            latest: Mutex::default(),
+            packed: Mutex::default(),
+            pace: Mutex::new(Pace { wanted: false, next: Instant::now(), copying: None }),
+            clients: Mutex::default(),
+            sending: AtomicUsize::new(0),
+        })
+    }
+
+    /// Adds to the log.
+    pub(super) fn tell(&self, event: WireEvent) {
+        let mut log = lock(&self.log);
+        log.next += 1;
+        let number = log.next;
+        log.events.push((number, event));
+        if log.events.len() > LOGGED {
+            thin(&mut log.events);
+        }
+    }
+
+    /// Where the training stands; only the latest counts.
+    pub(super) fn progress(&self, progress: Option<Progress>) {
+        lock(&self.log).progress = progress;
+    }
+
+    /// Whether the training is to copy its Gaussians now.
+    pub(super) fn wants_cloud(&self) -> bool {
+        let mut pace = lock(&self.pace);
+        let now = Instant::now();
+        let wants = pace.wanted && now >= pace.next;
+        pace.copying = wants.then_some(now);
+        wants
+    }
+
+    /// Takes the Gaussians of a training.
+    pub(super) fn publish(&self, cloud: Arc<GaussianCloud>, step: u64) {
+        {
+            let mut pace = lock(&self.pace);
+            let cost = pace.copying.take().map_or(Duration::ZERO, |since| since.elapsed());
+            pace.next = Instant::now() + SNAPSHOT_EVERY.max(cost * COPY_SHARE);
+            pace.wanted = false;
+        }
+        let mut latest = lock(&self.latest);
+        latest.generation += 1;
+        let before = latest.live.replace((cloud, step));
+        drop(latest);
+        // Freed after the lock is gone.
+        drop(before);
+    }
+
+    /// Takes the snapshot of Gaussians at rest.
+    pub(super) fn publish_packed(&self, bytes: Vec<u8>) {
+        let mut packed = lock(&self.packed);
+        let mut latest = lock(&self.latest);
+        latest.generation += 1;
+        latest.live = None;
+        *packed = Some(PackedSnapshot { generation: latest.generation, step: 0, bytes: Arc::new(bytes) });
+    }
+
+    /// The newest snapshot, packed now if it was not, where it is newer than `since`.
+    pub(super) fn snapshot(&self, since: u64) -> Option<PackedSnapshot> {
+        if lock(&self.latest).generation <= since {
+            return None;
+        }
+        // One at a time; whoever waits here gets what the first has packed.
+        let mut packed = lock(&self.packed);
+        let (generation, live) = {
+            let latest = lock(&self.latest);
+            (latest.generation, latest.live.clone())
+        };
+        if let Some((cloud, step)) = live.filter(|_| packed.as_ref().is_none_or(|p| p.generation < generation)) {
+            let start = Instant::now();
+            let bytes = Arc::new(snapshot::of_training(&cloud).ok()?);
+            let mut pace = lock(&self.pace);
+            pace.next = pace.next.max(Instant::now() + start.elapsed() * PACK_SHARE);
+            *packed = Some(PackedSnapshot { generation, step, bytes });
+        }
+        packed.clone()
+    }
+
+    /// What happened after number `since`, for a client that has the Gaussians of generation `have` and wants newer
+    /// ones.
+    pub(super) fn news(&self, client: Option<&str>, since: u64, have: u64) -> News {
+        let generation = lock(&self.latest).generation;
+        if have >= generation {
+            lock(&self.pace).wanted = true;
+        }
+        if let Some(name) = client {
+            self.saw(name, since, have);
+        }
+        let log = lock(&self.log);
+        let first = log.events.partition_point(|(number, _)| *number <= since);
+        let rest = &log.events[first..];
+        let told = &rest[..rest.len().min(PER_ANSWER)];
+        News {
+            events: told.iter().map(|(_, event)| event.clone()).collect(),
+            next: told.last().map_or(log.next, |(number, _)| *number),
+            more: told.len() < rest.len(),
+            progress: log.progress.clone(),
+            generation,
+        }
+    }
+
+    fn saw(&self, name: &str, since: u64, have: u64) {
+        let mut clients = lock(&self.clients);
+        if clients.len() >= CLIENTS && !clients.contains_key(name) {
+            clients.retain(|_, client| client.seen.elapsed() < THERE);
+        }
+        if clients.len() < CLIENTS || clients.contains_key(name) {
+            clients.insert(name.to_owned(), Client { seen: Instant::now(), since, have });
+        }
+    }
+
+    /// How many clients were there lately, and how many of them lack something.
+    pub(super) fn watchers(&self) -> (usize, usize) {
+        let (next, generation) = (lock(&self.log).next, lock(&self.latest).generation);
+        let mut clients = lock(&self.clients);
+        clients.retain(|_, client| client.seen.elapsed() < THERE);
+        let lack = clients.values().filter(|c| c.since < next || c.have < generation).count();
+        // Who is being sent something large asks nothing meanwhile.
+        (clients.len(), lack.max(self.sending.load(Ordering::Acquire)))
+    }
+}
+
+/// Leaves out every other step of training.
+fn thin(events: &mut Vec<(u64, WireEvent)>) {
+    let mut odd = false;
+    events.retain(|(_, event)| {
+        let is_step = matches!(event, WireEvent::Step(_));
+        odd ^= is_step;
+        !is_step || odd
+    });
+}
+
+// What is behind these locks is changed by single calls, which a panic does not leave half done.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::trained::SceneInfo;
+    use crate::pipeline::observer::StepMetrics;
+
+    fn hub() -> Hub {
+        Hub::new(SceneCard { info: SceneInfo::default(), allow_edit: false, photos: false }).expect("random numbers")
+    }
+
+    fn cloud(n: usize) -> Arc<GaussianCloud> {
+        Arc::new(GaussianCloud::isotropic(vec![[0.5; 3]; n], -3.0, 1.0))
+    }
+
+    #[test]
+    fn the_log_is_told_in_order_and_in_pieces() {
+        let hub = hub();
+        let step = |step| WireEvent::Step(StepMetrics { step, ..StepMetrics::default() });
+        (0..PER_ANSWER as u64 + 5).for_each(|i| hub.tell(step(i)));
+        let first = hub.news(None, 0, 0);
+        assert!(first.more && first.events.len() == PER_ANSWER && first.events[0] == step(0));
+        let rest = hub.news(None, first.next, 0);
+        assert!(!rest.more && rest.events.len() == 5 && rest.events[0] == step(PER_ANSWER as u64));
+        assert!(hub.news(None, rest.next, 0).events.is_empty() && hub.news(None, u64::MAX, 0).events.is_empty());
+        // A log that is too long loses steps alone.
+        hub.tell(WireEvent::Paused(true));
+        (0..2 * LOGGED as u64).for_each(|i| hub.tell(step(i)));
+        let log = lock(&hub.log);
+        assert!(log.events.len() <= LOGGED && log.events.iter().any(|(_, e)| *e == WireEvent::Paused(true)));
+    }
+
+    #[test]
+    fn gaussians_are_copied_when_somebody_asks_and_packed_once() {
+        let hub = hub();
+        assert!(!hub.wants_cloud(), "nobody has asked");
+        assert!(hub.snapshot(0).is_none() && !hub.wants_cloud());
+        hub.news(None, 0, 0);
+        assert!(hub.wants_cloud());
+        hub.publish(cloud(3), 7);
+        assert!(!hub.wants_cloud(), "it is there");
+        let (a, b) = (hub.snapshot(0).expect("packed"), hub.snapshot(0).expect("packed"));
+        assert!(Arc::ptr_eq(&a.bytes, &b.bytes) && (a.generation, a.step) == (1, 7));
+        hub.news(None, 0, 1);
+        assert!(hub.snapshot(1).is_none() && !hub.wants_cloud(), "wanted, but not this soon");
+        hub.publish_packed(vec![1, 2]);
+        assert_eq!(*hub.snapshot(1).expect("at rest").bytes, vec![1, 2]);
+    }
+
+    #[test]
+    fn who_lacks_something_is_known() {
+        let hub = hub();
+        hub.tell(WireEvent::Cancelled);
+        hub.publish(cloud(1), 1);
+        assert_eq!(hub.watchers(), (0, 0));
+        hub.news(Some("a"), 0, 0);
+        hub.news(Some("b"), 1, 1);
+        assert_eq!(hub.watchers(), (2, 1));
+        hub.news(Some("a"), 1, 1);
+        assert_eq!(hub.watchers(), (2, 0));
+        (0..200).for_each(|i| drop(hub.news(Some(&i.to_string()), 0, 0)));
+        assert_eq!(hub.watchers().0, CLIENTS, "no more are kept");
+    }
+}

@@ -1,0 +1,338 @@
+//! The thread of a link: asks, and tells.
+
+use std::collections::VecDeque;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use crossbeam_channel::{Receiver, RecvTimeoutError};
+
+use super::super::client::{Client, ClientError, Pulled};
+use super::super::wire::{Ask, SceneCard, WireEvent};
+use super::{Break, Out, Wish, lock};
+use crate::io::IoError;
+use crate::jobs::open::{Origin, received};
+use crate::jobs::{Folders, OpenedScene, plan};
+use crate::pipeline::observer::{Evaluation, Severity};
+use crate::pipeline::train::TrainConfig;
+use crate::scene::{GaussianCloud, Machine, SemanticMap, text};
+use crate::worker::{CloudSnapshot, Event, Failure, JobId, JobKind, Outcome};
+
+/// Time between two questions while a training runs, and while nothing does.
+const BUSY: Duration = Duration::from_millis(300);
+const AT_REST: Duration = Duration::from_millis(1500);
+/// Time to the first try after a lost connection, and the longest between two.
+const FIRST_TRY: Duration = Duration::from_millis(500);
+const LAST_TRY: Duration = Duration::from_secs(10);
+
+pub(super) struct LinkThread {
+    client: Client,
+    folders: Folders,
+    machine: Option<Machine>,
+    wished: Receiver<Wish>,
+    /// Photos that were wished for while there was no connection.
+    later: VecDeque<Wish>,
+    out: Out,
+    /// Run of the server, number of its news, and generation of its Gaussians that are here.
+    run: String,
+    since: u64,
+    have: u64,
+    /// The scene on screen.
+    shown: Option<(SceneCard, Arc<OpenedScene>)>,
+    jobs: Arc<AtomicU64>,
+    /// The job that the server's training is here.
+    training: Option<JobId>,
+    evaluations: Vec<Evaluation>,
+    /// Objects and parts of the newest Gaussians.
+    map: Option<Arc<SemanticMap>>,
+    /// Whether a training runs there.
+    busy: bool,
+}
+
+impl LinkThread {
+    pub(super) fn new(
+        client: Client,
+        folders: Folders,
+        wished: Receiver<Wish>,
+        out: Out,
+        jobs: Arc<AtomicU64>,
+    ) -> Self {
+        Self {
+            client,
+            folders,
+            machine: None,
+            wished,
+            later: VecDeque::new(),
+            out,
+            run: String::new(),
+            since: 0,
+            have: 0,
+            shown: None,
+            jobs,
+            training: None,
+            evaluations: Vec::new(),
+            map: None,
+            busy: false,
+        }
+    }
+
+    pub(super) fn work(mut self) {
+        let job = self.new_job();
+        let title = format!("Connecting to {}", self.client.address.host);
+        if self.out.tell(Event::Started { job, kind: JobKind::Open, title }).is_err() {
+            return;
+        }
+        if self.client.address.is_open() {
+            let text = "The connection is not encrypted: others on the way can read it, the token included.";
+            let _ = self.out.tell(Event::Note(job, Severity::Warning, text.into()));
+        }
+        let mut opening = Some(job);
+        let mut wait = FIRST_TRY;
+        loop {
+            let why = match self.session(&mut opening, &mut wait) {
+                Break::Gone => return,
+                Break::OtherRun => continue,
+                Break::Client(why) => why,
+            };
+            let (problem, again) = match why {
+                ClientError::Lost(problem) => (problem, true),
+                ClientError::Refused(problem) => (problem, false),
+            };
+            let was_connected = lock(&self.out.status).connected;
+            let retry_at = again.then(|| Instant::now() + wait);
+            self.out.status(|s| (s.connected, s.problem, s.retry_at) = (false, Some(problem.clone()), retry_at));
+            let host = &self.client.address.host;
+            let text = match again {
+                true => format!("The connection to {host} is lost ({problem}); what is on screen stays"),
+                false => format!("{host} refuses: {problem}"),
+            };
+            let told = match (again, opening.take_if(|_| !again), self.training.take_if(|_| !again)) {
+                (false, Some(job), _) | (false, None, Some(job)) => {
+                    self.out.tell(Event::Failed(job, Failure { message: text, remedy: String::new() }))
+                }
+                _ if was_connected || !again => self.out.tell(Event::Note(job, Severity::Warning, text)),
+                _ => Ok(()),
+            };
+            if told.is_err() || !again || self.is_left_within(wait) {
+                return;
+            }
+            wait = (wait * 2).min(LAST_TRY);
+        }
+    }
+
+    /// Waits; whether nobody needs the connection any more. What is to be done there cannot be passed on meanwhile.
+    fn is_left_within(&mut self, wait: Duration) -> bool {
+        let until = Instant::now() + wait;
+        loop {
+            match self.wished.recv_deadline(until) {
+                Ok(photo @ Wish::Photo { .. }) => self.later.push_back(photo),
+                Ok(Wish::Ask(_)) => {
+                    let text = "There is no connection at the moment, so that was not passed on";
+                    let note = Event::Note(self.new_job(), Severity::Warning, text.into());
+                    if self.out.tell(note).is_err() {
+                        return true;
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => return false,
+                Err(RecvTimeoutError::Disconnected) => return true,
+            }
+        }
+    }
+
+    /// Talks to the server until that ends.
+    fn session(&mut self, opening: &mut Option<JobId>, wait: &mut Duration) -> Break {
+        match self.talk(opening, wait) {
+            Err(why) => why,
+            Ok(never) => match never {},
+        }
+    }
+
+    fn talk(&mut self, opening: &mut Option<JobId>, wait: &mut Duration) -> Result<std::convert::Infallible, Break> {
+        let card = self.client.scene()?;
+        if card.run != self.run {
+            (self.run, self.since, self.have) = (card.run, 0, 0);
+        }
+        let known = self.shown.as_ref().is_some_and(|(shown, _)| is_same(shown, &card.value));
+        if !known || opening.is_some() {
+            self.open(card.value, opening)?;
+        }
+        *wait = FIRST_TRY;
+        if !lock(&self.out.status).connected {
+            self.out.status(|s| (s.connected, s.problem, s.retry_at) = (true, None, None));
+            let text = format!("Connected to {}", self.client.address.host);
+            let job = self.new_job();
+            self.out.tell(Event::Note(job, Severity::Info, text))?;
+        }
+        loop {
+            let news = self.client.news(self.since, self.have)?;
+            if news.run != self.run {
+                return Err(Break::OtherRun);
+            }
+            let mut news = news.value;
+            for event in news.events.drain(..) {
+                self.hear(event)?;
+            }
+            self.since = news.next;
+            if news.generation > self.have {
+                self.pull()?;
+            }
+            if let (Some(job), Some(progress)) = (self.training, news.progress) {
+                self.out.tell(Event::Progress(job, progress))?;
+            }
+            if news.more {
+                continue;
+            }
+            self.grant_until(Instant::now() + if self.busy { BUSY } else { AT_REST })?;
+        }
+    }
+
+    /// Shows the server's scene.
+    fn open(&mut self, card: SceneCard, opening: &mut Option<JobId>) -> Result<(), Break> {
+        let pulled = self.client.snapshot(0)?;
+        let exact = pulled.as_ref().is_some_and(|p| p.snapshot.is_exact());
+        let have = pulled.as_ref().map_or(0, |p| p.generation);
+        let sent = pulled.map(|p| self.read(&p)).transpose()?;
+        let machine = self.machine.get_or_insert_with(plan::machine);
+        let host = self.client.address.host.clone();
+        let origin = Origin { host, allow_edit: card.allow_edit, photos: card.photos };
+        let scene = received(card.info.clone(), sent, exact, origin, &self.folders, machine);
+        let scene = scene.map_err(|e| ClientError::Refused(e.to_string()))?;
+        self.have = have;
+        self.map = scene.semantics.clone();
+        self.shown = Some((card, Arc::new(scene.clone())));
+        let job = opening.take().unwrap_or_else(|| self.new_job());
+        self.out.tell(Event::Finished(job, Outcome::Opened(Box::new(scene))))
+    }
+
+    /// Tells what happened there as if it happened here.
+    fn hear(&mut self, event: WireEvent) -> Result<(), Break> {
+        if let WireEvent::Started(title) = &event {
+            let job = self.new_job();
+            let title = format!("{} on {}", text::line(title), self.client.address.host);
+            (self.training, self.busy) = (Some(job), true);
+            self.evaluations.clear();
+            return self.out.tell(Event::Started { job, kind: JobKind::Train, title });
+        }
+        let Some(job) = self.training else { return Ok(()) };
+        match event {
+            WireEvent::Started(_) => Ok(()),
+            WireEvent::Step(metrics) => self.out.tell(Event::Step(job, metrics)),
+            WireEvent::Evaluation(evaluation) => {
+                self.evaluations.push(evaluation.clone());
+                self.out.tell(Event::Evaluation(job, evaluation))
+            }
+            WireEvent::Note(severity, text) => self.out.tell(Event::Note(job, severity, text)),
+            WireEvent::Paused(paused) => self.out.tell(Event::Paused(job, paused)),
+            WireEvent::Finished(folder) => {
+                self.pull()?;
+                let outcome = self.trained(folder);
+                self.ends(Event::Finished(job, outcome))
+            }
+            WireEvent::Cancelled => {
+                self.pull()?;
+                self.ends(Event::Cancelled(job))
+            }
+            WireEvent::Failed(message) => self.ends(Event::Failed(job, Failure { message, remedy: String::new() })),
+        }
+    }
+
+    fn ends(&mut self, event: Event) -> Result<(), Break> {
+        (self.training, self.busy) = (None, false);
+        self.out.tell(event)
+    }
+
+    fn trained(&mut self, folder: String) -> Outcome {
+        let semantics = self.map.clone();
+        let latest = self.out.source.clouds.newer_than(0);
+        let cloud = latest.as_ref().map(|(_, snapshot)| (&*snapshot.cloud, snapshot.cloud.sh_degree));
+        let dataset = self.shown.as_ref().and_then(|(_, scene)| scene.dataset.as_deref());
+        let machine = self.machine.get_or_insert_with(plan::machine);
+        let facts = plan::facts(machine, dataset, cloud, &TrainConfig::default());
+        let facts = Box::new(facts.with_semantics(semantics.as_deref()));
+        let evaluations = std::mem::take(&mut self.evaluations);
+        Outcome::Trained { evaluations, out: folder.into(), semantics, facts }
+    }
+
+    /// Fetches the newest Gaussians and publishes them.
+    fn pull(&mut self) -> Result<(), Break> {
+        let Some(pulled) = self.client.snapshot(self.have)? else { return Ok(()) };
+        let (cloud, map) = self.read(&pulled)?;
+        self.have = pulled.generation;
+        self.map = map.map(Arc::new);
+        match (self.training, self.map.clone()) {
+            (Some(job), _) => {
+                self.out.source.clouds.publish(CloudSnapshot { job, cloud: Arc::new(cloud), step: pulled.step });
+            }
+            // At rest, objects are all that changes.
+            (None, Some(map)) => {
+                let job = self.new_job();
+                self.out.tell(Event::Finished(job, Outcome::Edited(map)))?;
+            }
+            (None, None) => {}
+        }
+        (self.out.source.repaint)();
+        Ok(())
+    }
+
+    fn read(&self, pulled: &Pulled) -> Result<(GaussianCloud, Option<SemanticMap>), ClientError> {
+        let read = pulled.snapshot.read(Path::new(&self.client.address.host));
+        read.map_err(|e: IoError| ClientError::Refused(e.to_string()))
+    }
+
+    /// Passes wishes on until the next news are due; what one asks to be done is news.
+    fn grant_until(&mut self, due: Instant) -> Result<(), Break> {
+        loop {
+            match self.later.pop_front().map_or_else(|| self.wished.recv_deadline(due), Ok) {
+                Ok(Wish::Ask(ask)) => return self.ask(&ask),
+                Ok(Wish::Photo { job, index, side_px, title }) => match self.client.photo(index, side_px) {
+                    Ok(pixels) => {
+                        let pixels = Arc::new(pixels);
+                        self.photo(job, title, Ok(Outcome::Photo { index, max_side_px: side_px, pixels }))?;
+                    }
+                    Err(ClientError::Refused(why)) => self.photo(job, title, Err(why))?,
+                    Err(lost) => {
+                        self.later.push_back(Wish::Photo { job, index, side_px, title });
+                        return Err(lost.into());
+                    }
+                },
+                Err(RecvTimeoutError::Timeout) => return Ok(()),
+                Err(RecvTimeoutError::Disconnected) => return Err(Break::Gone),
+            }
+        }
+    }
+
+    /// Tells what became of a photo.
+    fn photo(&self, job: JobId, title: String, got: Result<Outcome, String>) -> Result<(), Break> {
+        self.out.tell(Event::Started { job, kind: JobKind::Photo, title: format!("Loading {title}") })?;
+        self.out.tell(match got {
+            Ok(outcome) => Event::Finished(job, outcome),
+            Err(message) => Event::Failed(job, Failure { message, remedy: String::new() }),
+        })
+    }
+
+    /// Passes a wish on. One that is refused is told, and no more.
+    fn ask(&mut self, ask: &Ask) -> Result<(), Break> {
+        match self.client.ask(ask) {
+            Err(ClientError::Refused(why)) => {
+                let job = self.new_job();
+                self.out.tell(Event::Finished(job, Outcome::Refused(why)))
+            }
+            done => Ok(done?),
+        }
+    }
+
+    fn new_job(&self) -> JobId {
+        JobId(self.jobs.fetch_add(1, Ordering::Relaxed) + 1)
+    }
+}
+
+/// Whether it is the same scene, whatever was measured of it since.
+fn is_same(a: &SceneCard, b: &SceneCard) -> bool {
+    let (mut a, mut b) = (a.clone(), b.clone());
+    for card in [&mut a, &mut b] {
+        card.info.history = Default::default();
+        card.info.state = None;
+    }
+    a == b
+}

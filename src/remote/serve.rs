@@ -1,0 +1,52 @@
+//! What is served: a scene at rest, or a training that is about to begin.
+
+use std::path::Path;
+use std::sync::Arc;
+
+use super::photos::ServedPhotos;
+use super::server::{ServeError, ServeOptions, Server};
+use crate::io::trained::SceneInfo;
+use crate::io::{self, Opened, snapshot};
+use crate::jobs::JobError;
+use crate::jobs::sparse_cloud::sparse_cloud;
+use crate::pipeline::train::TrainConfig;
+use crate::scene::Dataset;
+
+/// Serves the trained scene or splat at `path`, and says what it is called.
+///
+/// # Errors
+/// If it cannot be read, or the server not be started.
+pub(crate) fn scene(path: &Path, options: ServeOptions) -> Result<(Server, String), ServeError> {
+    let (info, bytes, editable, photos) = match io::open(path).map_err(JobError::from)? {
+        Opened::Dataset(_) => return Err(JobError::NotTrained(path.into()).into()),
+        Opened::Trained(scene) => {
+            let bytes = snapshot::of_folder(&scene.folder).map_err(JobError::from)?;
+            let photos = ServedPhotos::of_scene(&scene.info, scene.dataset_path().as_deref());
+            (scene.info, bytes, Some((scene.folder, scene.state)), photos)
+        }
+        Opened::Cloud(cloud) => {
+            let name = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+            (SceneInfo { name, ..SceneInfo::default() }, snapshot::of_cloud(&cloud)?, None, ServedPhotos::default())
+        }
+    };
+    let name = info.name.clone();
+    let editable = editable.as_ref().map(|(folder, state)| (folder.as_path(), state.clone()));
+    let server = Server::start(info, editable, photos, options)?;
+    server.publish(bytes);
+    Ok((server, name))
+}
+
+/// Serves a training of these photos, which [`Server::observe`] then listens to.
+///
+/// # Errors
+/// If the server cannot be started.
+pub(crate) fn training(dataset: &Dataset, config: &TrainConfig, options: ServeOptions) -> Result<Server, ServeError> {
+    let held_out = dataset.split(config.holdout_every).1;
+    let mut info = SceneInfo::of(dataset, &held_out, Path::new("."));
+    info.config = serde_json::to_value(config).unwrap_or_default();
+    let server = Server::start(info, None, ServedPhotos::of(dataset), options)?;
+    if let Some(points) = sparse_cloud(dataset) {
+        server.publish_live(Arc::new(points));
+    }
+    Ok(server)
+}

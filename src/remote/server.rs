@@ -1,0 +1,353 @@
+//! The server: listens, checks who asks, and answers from the [`Hub`]. Each connection has a thread of its own that
+//! yields to the training; paths, and anything else that names a file, are never taken from a client.
+
+use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream};
+use std::path::Path;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+use std::{fmt, io, thread};
+
+use thread_priority::{ThreadPriority, set_current_thread_priority};
+
+use super::edits::Editor;
+use super::http::{Connection, RequestHead, Response};
+use super::hub::Hub;
+use super::observer::ServedObserver;
+use super::photos::ServedPhotos;
+use super::token::AccessToken;
+use super::wire::{
+    Ask, CLIENT_HEADER, GENERATION_HEADER, RUN_HEADER, STEP_HEADER, SceneCard, VERSION_HEADER, WireEvent,
+    is_understood, version,
+};
+use crate::io::http::is_loopback;
+use crate::io::snapshot;
+use crate::io::trained::SceneInfo;
+use crate::jobs::JobError;
+use crate::pipeline::observer::Observer;
+use crate::scene::GaussianCloud;
+
+/// Connections at once.
+const CONNECTIONS: usize = 32;
+/// Requests a second, of all clients together, and how many may come at once.
+const RATE: f64 = 100.0;
+const BURST: f64 = 200.0;
+/// Bytes of what a client asks to be done; more where objects may be changed, as Gaussians are listed by number.
+const ASK_BYTES: usize = 16 << 10;
+const EDIT_BYTES: usize = 8 << 20;
+/// How long somebody who does not know the token waits for that answer.
+const WRONG_TOKEN: Duration = Duration::from_millis(200);
+/// How long the end of a training waits for its watchers at most.
+const FAREWELL: Duration = Duration::from_secs(120);
+
+/// How a scene is served.
+#[derive(Clone, Debug)]
+pub(crate) struct ServeOptions {
+    /// Where to listen.
+    pub(crate) bind: SocketAddr,
+    /// Whether others than this machine may connect.
+    pub(crate) anywhere: bool,
+    /// Names of this machine, besides those of the loopback, that clients may know it by.
+    pub(crate) hosts: Vec<String>,
+    pub(crate) allow_edit: bool,
+    pub(crate) token: AccessToken,
+}
+
+/// Why nothing is served.
+#[derive(Debug, thiserror::Error)]
+#[allow(missing_docs, reason = "each text says what its variant is")]
+pub enum ServeError {
+    #[error(
+        "{0} can be reached from other computers. Listen at 127.0.0.1 and come through SSH, which is safe; or give \
+         --bind-anywhere if everybody on the way may read what is sent"
+    )]
+    Anywhere(SocketAddr),
+    #[error("cannot listen at {0}: {1}; choose another port, for example --serve 7071 or 'fmlgs serve SCENE 7071'")]
+    Listen(SocketAddr, io::Error),
+    #[error("no server could be started: {0}")]
+    Start(#[from] io::Error),
+    #[error(transparent)]
+    Scene(#[from] JobError),
+}
+
+struct Shared {
+    hub: Arc<Hub>,
+    options: ServeOptions,
+    editor: Option<Editor>,
+    photos: ServedPhotos,
+    connections: AtomicUsize,
+    bucket: Mutex<(f64, Instant)>,
+    stop: AtomicBool,
+}
+
+/// A server that runs. It ends when this is dropped.
+pub(crate) struct Server {
+    shared: Arc<Shared>,
+    address: SocketAddr,
+    accepting: Option<JoinHandle<()>>,
+}
+
+impl fmt::Debug for Server {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Server at {}", self.address)
+    }
+}
+
+impl Server {
+    /// Serves a scene that `info` describes. With a trained scene's folder and its save, its objects can be changed,
+    /// where the options allow that.
+    ///
+    /// # Errors
+    /// If the address is not free, or is not to be used without the user's word.
+    pub(super) fn start(
+        mut info: SceneInfo,
+        editable: Option<(&Path, Option<String>)>,
+        photos: ServedPhotos,
+        options: ServeOptions,
+    ) -> Result<Self, ServeError> {
+        if !options.bind.ip().to_canonical().is_loopback() && !options.anywhere {
+            return Err(ServeError::Anywhere(options.bind));
+        }
+        // Where things lie on this machine is nobody's business.
+        info.dataset = None;
+        let editor = editable.filter(|_| options.allow_edit).map(|(folder, state)| Editor::new(folder.into(), state));
+        let card = SceneCard { info, allow_edit: editor.is_some(), photos: !photos.is_empty() };
+        let listener = TcpListener::bind(options.bind).map_err(|e| ServeError::Listen(options.bind, e))?;
+        let address = listener.local_addr()?;
+        let shared = Arc::new(Shared {
+            hub: Arc::new(Hub::new(card)?),
+            options,
+            editor,
+            photos,
+            connections: AtomicUsize::new(0),
+            bucket: Mutex::new((BURST, Instant::now())),
+            stop: AtomicBool::new(false),
+        });
+        let of_thread = Arc::clone(&shared);
+        let accept = move || accept(&listener, &of_thread);
+        let accepting = Some(thread::Builder::new().name("server".into()).spawn(accept)?);
+        Ok(Self { shared, address, accepting })
+    }
+
+    /// Where it listens.
+    pub(crate) fn address(&self) -> SocketAddr {
+        self.address
+    }
+
+    /// The address with the token, for a client on this machine.
+    pub(crate) fn url(&self) -> String {
+        let ip = match self.address.ip() {
+            ip if ip.is_unspecified() => IpAddr::V4(Ipv4Addr::LOCALHOST),
+            ip => ip,
+        };
+        format!("http://{}/#{}", SocketAddr::new(ip, self.address.port()), self.shared.options.token.text())
+    }
+
+    /// Shows Gaussians at rest.
+    pub(crate) fn publish(&self, snapshot: Vec<u8>) {
+        self.shared.hub.publish_packed(snapshot);
+    }
+
+    /// Shows Gaussians that training starts from.
+    pub(super) fn publish_live(&self, cloud: Arc<GaussianCloud>) {
+        self.shared.hub.publish(cloud, 0);
+    }
+
+    /// An observer of a training called `title` that tells `inner` everything, and whoever watches.
+    pub(crate) fn observe<'a>(&self, title: String, inner: &'a mut dyn Observer) -> ServedObserver<'a> {
+        self.shared.hub.tell(WireEvent::Started(title));
+        ServedObserver { inner, hub: Arc::clone(&self.shared.hub), paused: AtomicBool::new(false) }
+    }
+
+    /// Tells how a training has ended; Gaussians that were saved are sent as they lie in `folder`. Returns what
+    /// cannot be sent.
+    pub(crate) fn finished(&self, folder: &Path, all_done: bool) -> Result<(), crate::io::IoError> {
+        let sent = snapshot::of_folder(folder).map(|bytes| self.publish(bytes));
+        self.shared.hub.tell(match all_done {
+            true => WireEvent::Finished(folder.display().to_string()),
+            false => WireEvent::Cancelled,
+        });
+        sent
+    }
+
+    /// Tells that a training has failed.
+    pub(crate) fn failed(&self, why: String) {
+        self.shared.hub.tell(WireEvent::Failed(why));
+    }
+
+    /// How many clients were there in the last seconds, and how many of them have not yet got everything.
+    pub(crate) fn watchers(&self) -> (usize, usize) {
+        self.shared.hub.watchers()
+    }
+
+    /// Waits until whoever watches has got everything, two minutes at most, or until `stop` says so.
+    pub(crate) fn see_off(&self, stop: impl Fn() -> bool) {
+        let start = Instant::now();
+        while self.watchers().1 > 0 && start.elapsed() < FAREWELL && !stop() {
+            thread::sleep(Duration::from_millis(50));
+        }
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        self.shared.stop.store(true, Ordering::Release);
+        // A connection wakes the thread that waits for one.
+        let ip = if self.address.ip().is_unspecified() { Ipv4Addr::LOCALHOST.into() } else { self.address.ip() };
+        let woken = TcpStream::connect_timeout(&(ip, self.address.port()).into(), Duration::from_secs(1));
+        if let Some(accepting) = self.accepting.take().filter(|_| woken.is_ok()) {
+            let _ = accepting.join();
+        }
+    }
+}
+
+/// Counts a connection for as long as it lives.
+struct Counted(Arc<Shared>);
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        self.0.connections.fetch_sub(1, Ordering::AcqRel);
+    }
+}
+
+fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
+    for stream in listener.incoming() {
+        if shared.stop.load(Ordering::Acquire) {
+            return;
+        }
+        let Ok(stream) = stream else {
+            // Too many files are open; that passes.
+            thread::sleep(Duration::from_millis(50));
+            continue;
+        };
+        let others = shared.connections.fetch_add(1, Ordering::AcqRel);
+        let counted = Counted(Arc::clone(shared));
+        if others >= CONNECTIONS {
+            let busy = Response::refusal(503, "too many connections").with("Retry-After", 1);
+            // It fits into the system's own buffer.
+            let _ = Connection::new(stream).answer(&busy);
+            continue;
+        }
+        let work = move || {
+            // Not every system lets a program lower its own priority; then the threads are equal.
+            let _ = set_current_thread_priority(ThreadPriority::Min);
+            talk(Connection::new(stream), &counted.0);
+        };
+        // Without a thread the connection just ends.
+        let _ = thread::Builder::new().name("watcher".into()).spawn(work);
+    }
+}
+
+/// Answers the requests of a connection, one after the other.
+fn talk(mut connection: Connection, shared: &Shared) {
+    while !shared.stop.load(Ordering::Acquire) {
+        let response = match connection.head() {
+            Ok(None) => return,
+            Ok(Some(head)) => answer(&mut connection, &head, shared).unwrap_or_else(|refused| refused),
+            Err(refused) => refused,
+        };
+        let response = response.with(VERSION_HEADER, version()).with(RUN_HEADER, &shared.hub.run);
+        let sending = &shared.hub.sending;
+        let large = response.is_large();
+        sending.fetch_add(usize::from(large), Ordering::AcqRel);
+        let sent = connection.answer(&response);
+        sending.fetch_sub(usize::from(large), Ordering::AcqRel);
+        if sent.is_err() {
+            return;
+        }
+        if response.last {
+            return connection.end();
+        }
+    }
+}
+
+fn answer(connection: &mut Connection, head: &RequestHead, shared: &Shared) -> Result<Response, Response> {
+    let (hub, options) = (&shared.hub, &shared.options);
+    admit(head, options)?;
+    if !take_turn(&shared.bucket) {
+        return Err(Response::refusal(429, "too many requests").with("Retry-After", 1));
+    }
+    let body = connection.body(head, if shared.editor.is_some() { EDIT_BYTES } else { ASK_BYTES })?;
+    let since = head.number("since").unwrap_or(0);
+    match (head.method.as_str(), head.path.as_str()) {
+        ("GET", "/scene") => json(&hub.card),
+        ("GET", "/news") => json(&hub.news(head.header(CLIENT_HEADER), since, head.number("have").unwrap_or(0))),
+        ("GET", "/snapshot") => Ok(match hub.snapshot(since) {
+            Some(packed) => Response::new(200, "application/octet-stream", packed.bytes)
+                .with(GENERATION_HEADER, packed.generation)
+                .with(STEP_HEADER, packed.step),
+            None => Response::new(204, "application/octet-stream", Arc::default()),
+        }),
+        ("GET", "/photo") => {
+            let number = |name| head.number(name).unwrap_or(u64::MAX);
+            let png = shared.photos.png(number("index"), number("side"));
+            let missing = || Response::refusal(404, "this photo cannot be read on the server");
+            png.map(|png| Response::new(200, "image/png", Arc::new(png))).ok_or_else(missing)
+        }
+        ("POST", "/ask") => {
+            let ask = serde_json::from_slice(&body);
+            obey(ask.map_err(|e| Response::refusal(400, format!("this cannot be asked for: {e}")))?, shared)
+        }
+        _ => Err(Response::refusal(404, "there is nothing here")),
+    }
+}
+
+/// Refuses whoever is not a client that knows the token, before anything else is read.
+fn admit(head: &RequestHead, options: &ServeOptions) -> Result<(), Response> {
+    // A page in a browser may have had its name's address changed to this machine's; it sends both of these.
+    let host = head.header("host").unwrap_or_default();
+    let name = host.rsplit_once(':').filter(|(_, port)| port.bytes().all(|b| b.is_ascii_digit())).map_or(host, |h| h.0);
+    let bare = name.trim_start_matches('[').trim_end_matches(']');
+    let known = is_loopback(name)
+        || options.hosts.iter().any(|known| known.eq_ignore_ascii_case(name))
+        || (options.anywhere && bare.parse::<IpAddr>().is_ok());
+    if !known {
+        return Err(Response::refusal(421, "this server is not called so (--host NAME adds a name)"));
+    }
+    if head.has("origin") {
+        return Err(Response::refusal(403, "pages have no business here"));
+    }
+    let token = head.header("authorization").and_then(|value| value.strip_prefix("Bearer "));
+    if !token.is_some_and(|token| options.token.is(token)) {
+        thread::sleep(WRONG_TOKEN);
+        return Err(Response::refusal(401, "the token is missing or wrong: copy the whole address"));
+    }
+    let theirs = head.header(VERSION_HEADER).unwrap_or("none");
+    if !is_understood(theirs) {
+        let text = format!("the server speaks {}, the client {theirs}: install the same fmlgs on both", version());
+        return Err(Response::refusal(426, text));
+    }
+    Ok(())
+}
+
+/// Whether a request may be answered now.
+fn take_turn(bucket: &Mutex<(f64, Instant)>) -> bool {
+    let mut bucket = bucket.lock().unwrap_or_else(PoisonError::into_inner);
+    let since = bucket.1.elapsed().as_secs_f64();
+    *bucket = ((bucket.0 + since * RATE).min(BURST), Instant::now());
+    let may = bucket.0 >= 1.0;
+    bucket.0 -= f64::from(u8::from(may));
+    may
+}
+
+/// Does what a client asks for.
+fn obey(ask: Ask, shared: &Shared) -> Result<Response, Response> {
+    match (ask, &shared.editor) {
+        (Ask::Pause(pause), _) => shared.hub.control.set_paused(pause),
+        (Ask::Cancel, _) => shared.hub.control.cancel(),
+        (Ask::Edit(edit), Some(editor)) => match editor.apply(edit) {
+            Ok(snapshot) => shared.hub.publish_packed(snapshot),
+            Err(e) => return Ok(Response::new(422, "text/plain; charset=utf-8", Arc::new(e.to_string().into_bytes()))),
+        },
+        (Ask::Edit(_), None) => {
+            return Err(Response::refusal(403, "changes are not allowed here (fmlgs serve --allow-edit, at rest)"));
+        }
+    }
+    Ok(Response::new(204, "application/json", Arc::default()))
+}
+
+fn json(value: &impl serde::Serialize) -> Result<Response, Response> {
+    let bytes = serde_json::to_vec(value).map_err(|e| Response::refusal(500, e.to_string()))?;
+    Ok(Response::new(200, "application/json", Arc::new(bytes)))
+}

@@ -1,0 +1,111 @@
+//! The secret that a client must know: 32 random bytes, as 64 hexadecimal digits.
+
+use std::fs::{self, File};
+use std::io::{self, Write};
+use std::path::Path;
+
+use rand::TryRng;
+use rand::rngs::SysRng;
+use subtle::ConstantTimeEq;
+
+const BYTES: usize = 32;
+
+/// A secret. Its `Debug` does not show it.
+#[derive(Clone)]
+pub(crate) struct AccessToken([u8; BYTES]);
+
+impl std::fmt::Debug for AccessToken {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("AccessToken")
+    }
+}
+
+impl AccessToken {
+    /// A new one, from the system's source of random numbers.
+    pub(crate) fn random() -> io::Result<Self> {
+        let mut bytes = [0; BYTES];
+        SysRng.try_fill_bytes(&mut bytes).map_err(io::Error::other)?;
+        Ok(Self(bytes))
+    }
+
+    /// The one in the file at `path`; where there is no file, it is made with a new one that only its owner reads.
+    pub(crate) fn kept(path: &Path) -> io::Result<Self> {
+        match fs::read_to_string(path) {
+            Ok(text) => Self::parse(text.trim())
+                .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidData, "it does not hold 64 hexadecimal digits")),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => {
+                let token = Self::random()?;
+                let mut options = File::options();
+                options.write(true).create_new(true);
+                #[cfg(unix)]
+                std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+                writeln!(options.open(path)?, "{}", token.text())?;
+                Ok(token)
+            }
+            Err(e) => Err(e),
+        }
+    }
+
+    /// The token that these digits are.
+    pub(crate) fn parse(text: &str) -> Option<Self> {
+        let digits = text.as_bytes();
+        let mut bytes = [0; BYTES];
+        if digits.len() != 2 * BYTES || !digits.iter().all(u8::is_ascii_hexdigit) {
+            return None;
+        }
+        for (i, byte) in bytes.iter_mut().enumerate() {
+            *byte = u8::from_str_radix(text.get(2 * i..2 * i + 2)?, 16).ok()?;
+        }
+        Some(Self(bytes))
+    }
+
+    /// Its digits.
+    pub(crate) fn text(&self) -> String {
+        hex(&self.0)
+    }
+
+    /// Whether these digits are this token's, in a time that does not tell how many of them are.
+    pub(crate) fn is(&self, text: &str) -> bool {
+        Self::parse(text).is_some_and(|other| self.0.ct_eq(&other.0).into())
+    }
+}
+
+/// A name that no other has: of a run, of a client.
+pub(crate) fn random_name() -> io::Result<String> {
+    AccessToken::random().map(|token| hex(&token.0[..8]))
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_whole_token_is_it() {
+        let token = AccessToken::random().expect("random numbers");
+        let text = token.text();
+        assert!(text.len() == 64 && token.is(&text) && token.is(&text.to_uppercase()));
+        let other = AccessToken::random().expect("random numbers");
+        assert!(!token.is(&other.text()) && !token.is("") && !token.is(&text[..63]) && !token.is(&format!("{text}0")));
+        assert!(!token.is(&"é".repeat(32)) && !token.is(&format!("+{}", &text[1..])));
+        assert!(!format!("{token:?}").contains(&text));
+    }
+
+    #[test]
+    fn a_token_is_kept_for_the_next_run() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("token");
+        let made = AccessToken::kept(&path).expect("made");
+        assert!(AccessToken::kept(&path).expect("read").is(&made.text()));
+        #[cfg(unix)]
+        assert_eq!(
+            std::os::unix::fs::PermissionsExt::mode(&fs::metadata(&path).expect("file").permissions()) & 0o77,
+            0
+        );
+        fs::write(&path, "abc").expect("write");
+        assert!(AccessToken::kept(&path).is_err(), "what is in a file is not replaced");
+    }
+}
