@@ -87,10 +87,8 @@ pub(crate) struct PhotoSeconds {
     /// With ONNX Runtime.
     pub(crate) onnx_runtime: f64,
     /// With the engine that is built in.
-    #[serde(default)]
     pub(crate) built_in: Option<f64>,
-    /// What a segmenter takes with ONNX Runtime besides, for each object in the photo: its own tile is searched for parts.
-    #[serde(default)]
+    /// With ONNX Runtime, for each object in the photo besides: its own tile is searched for parts.
     pub(crate) each_object: Option<f64>,
 }
 
