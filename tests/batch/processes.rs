@@ -88,6 +88,9 @@ fn of_two_processes_one_works_on_a_unit() {
     let told = Done::from(owner.wait_with_output().unwrap()).ok().stderr;
     assert!(told.contains("took over"), "{told}");
     assert!(!unit.join("failed.json").exists() && !unit.join("result.json").exists());
+    let checkpoint = || std::fs::read(unit.join("scene-2/checkpoint.bin")).unwrap();
+    let before = checkpoint();
+    wait_for("the heir goes on", || checkpoint() != before);
     kill(&heir, "TERM");
     Done::from(heir.wait_with_output().unwrap()).fails_with(STOPPED);
     assert!(unit.join("scene-2/scene.json").exists());
