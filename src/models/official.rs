@@ -276,7 +276,7 @@ mod tests {
         let (folder, url) = (tempfile::tempdir().expect("folder"), server(&["", "clip.pt", "", ""]));
         let entry = reduced("https://makers.example/clip.pt");
         let from = url.strip_suffix("/clip.pt").expect("a folder");
-        let mut fetch = |folder: &Path| entry.fetch(folder, Some(from), Patience::default(), &mut |_, _, _| true);
+        let fetch = |folder: &Path| entry.fetch(folder, Some(from), Patience::default(), &mut |_, _, _| true);
         fetch(folder.path()).expect("fetched");
         assert_eq!(entry.state(folder.path()), ModelState::Here);
         // The control: neither is there.
