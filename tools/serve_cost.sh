@@ -1,6 +1,6 @@
 #!/bin/sh
 # What it costs a training to be watched: steps a second alone, and with three watchers of which one stands still, in
-# turns. Usage: tools/serve_cost.sh FMLGS PHOTOS [ROUNDS] [STEPS] [MAX_SIDE]; needs jq and bash.
+# turns. Usage: tools/serve_cost.sh FMLGS PHOTOS [ROUNDS] [STEPS] [MAX_SIDE]; needs bash and Python.
 set -eu
 fmlgs=$1 photos=$2 rounds=${3:-5} steps=${4:-500} side=${5:-256}
 folder=$(mktemp -d)
@@ -10,7 +10,7 @@ train() {
     "$fmlgs" train "$photos" --out "$folder/out" --steps "$steps" --max-side "$side" --eval-every 0 \
         --checkpoint-secs 0 --json -q "$@"
 }
-rate() { jq -r '.steps / .secs'; }
+rate() { python3 -c 'import json, sys; run = json.load(sys.stdin); print(run["steps"] / run["secs"])'; }
 watched() {
     train --serve 127.0.0.1:0 2>"$folder/said" >"$folder/result" &
     training=$!
