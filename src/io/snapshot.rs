@@ -161,6 +161,8 @@ fn inflate(packed: &[u8], length: u64, path: &Path) -> Result<Vec<u8>, IoError> 
 
 #[cfg(test)]
 mod tests {
+    use rand::{RngExt, SeedableRng};
+
     use super::*;
     use crate::io::trained::{self, SceneInfo};
     use crate::scene::{Identities, Level, NOBODY};
@@ -193,7 +195,17 @@ mod tests {
     fn a_training_arrives_as_it_looks() {
         let sent = of_training(&cloud(0.0)).expect("packed");
         let whole = of_cloud(&cloud(0.0)).expect("packed");
-        assert!(2 * sent.len() < whole.len(), "{} of {}", sent.len(), whole.len());
+        assert!(sent.len() < whole.len());
+        // As many and as varied as in a training, it is less than half of the whole.
+        let mut many = GaussianCloud::isotropic(vec![[0.0; 3]; 3000], -3.2, 1.0);
+        let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(5);
+        for i in 0..many.len() {
+            for column in [&mut many.positions[i], &mut many.log_scales[i], &mut many.sh[i]] {
+                *column = column.map(|v| v + random.random_range(-1.0..1.0_f32));
+            }
+        }
+        let [sent_len, whole_len] = [of_training(&many), of_cloud(&many)].map(|bytes| bytes.expect("packed").len());
+        assert!(2 * sent_len < whole_len, "{sent_len} of {whole_len}");
         let sent = SceneSnapshot::parse(&sent, Path::new("x")).expect("sections");
         let (got, map) = sent.read(Path::new("x")).expect("Gaussians");
         let far = |of: &GaussianCloud| {

@@ -40,7 +40,7 @@ pub(crate) enum ClientError {
 
 /// An answer, and which run of the server it is from.
 #[derive(Debug)]
-pub(crate) struct Answer<T> {
+pub(crate) struct ServerAnswer<T> {
     pub(crate) run: String,
     pub(crate) value: T,
 }
@@ -72,12 +72,12 @@ impl Client {
     }
 
     /// The scene without its Gaussians.
-    pub(crate) fn scene(&self) -> Result<Answer<SceneCard>, ClientError> {
+    pub(crate) fn scene(&self) -> Result<ServerAnswer<SceneCard>, ClientError> {
         self.json("/scene")
     }
 
     /// What happened after number `since`; `have` is the generation of the Gaussians that are here.
-    pub(crate) fn news(&self, since: u64, have: u64) -> Result<Answer<News>, ClientError> {
+    pub(crate) fn news(&self, since: u64, have: u64) -> Result<ServerAnswer<News>, ClientError> {
         self.json(&format!("/news?since={since}&have={have}"))
     }
 
@@ -110,12 +110,12 @@ impl Client {
         self.checked(request.header(CLIENT_HEADER, &self.name).content_type("application/json").send(&body)).map(drop)
     }
 
-    fn json<T: DeserializeOwned>(&self, path: &str) -> Result<Answer<T>, ClientError> {
+    fn json<T: DeserializeOwned>(&self, path: &str) -> Result<ServerAnswer<T>, ClientError> {
         let response = self.get(path)?;
         let run = self.header(&response, RUN_HEADER)?;
         let bytes = self.bytes(response, JSON_BYTES)?;
         let value = serde_json::from_slice(&bytes).map_err(|e| self.odd(&format!("{path}: {e}")))?;
-        Ok(Answer { run, value })
+        Ok(ServerAnswer { run, value })
     }
 
     fn get(&self, path: &str) -> Result<Response<Body>, ClientError> {

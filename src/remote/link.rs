@@ -36,14 +36,14 @@ pub(crate) struct LinkStatus {
 }
 
 /// A connection to a server. Dropping it ends its thread.
-pub(crate) struct Link {
+pub(crate) struct ServerLink {
     wishes: Sender<Wish>,
     jobs: Arc<AtomicU64>,
     first_job: u64,
     status: Arc<Mutex<LinkStatus>>,
 }
 
-impl Link {
+impl ServerLink {
     /// Connects to a server and tells `source` what comes; what is made of its scene goes into `folders`. Fails only if
     /// the system gives no thread.
     pub(crate) fn start(address: Address, folders: Folders, source: EventSource) -> std::io::Result<Self> {

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::sync::Arc;
 
 use super::photos::ServedPhotos;
-use super::server::{ServeError, ServeOptions, Server};
+use super::server::{ServeError, ServeOptions, Server, Shown};
 use crate::io::trained::SceneInfo;
 use crate::io::{self, Opened, snapshot};
 use crate::jobs::JobError;
@@ -31,9 +31,7 @@ pub(crate) fn scene(path: &Path, options: ServeOptions) -> Result<(Server, Strin
     };
     let name = info.name.clone();
     let editable = editable.as_ref().map(|(folder, state)| (folder.as_path(), state.clone()));
-    let server = Server::start(info, editable, photos, options)?;
-    server.publish(bytes);
-    Ok((server, name))
+    Ok((Server::start(info, editable, photos, Shown::AtRest(bytes), options)?, name))
 }
 
 /// Serves a training of these photos, which [`Server::observe`] then listens to.
@@ -44,9 +42,6 @@ pub(crate) fn training(dataset: &Dataset, config: &TrainConfig, options: ServeOp
     let held_out = dataset.split(config.holdout_every).1;
     let mut info = SceneInfo::of(dataset, &held_out, Path::new("."));
     info.config = serde_json::to_value(config).unwrap_or_default();
-    let server = Server::start(info, None, ServedPhotos::of(dataset), options)?;
-    if let Some(points) = sparse_cloud(dataset) {
-        server.publish_live(Arc::new(points));
-    }
-    Ok(server)
+    let shown = Shown::Training(format!("Training {}", dataset.name), sparse_cloud(dataset).map(Arc::new));
+    Server::start(info, None, ServedPhotos::of(dataset), shown, options)
 }

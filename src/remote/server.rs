@@ -81,6 +81,15 @@ struct Shared {
     stop: AtomicBool,
 }
 
+/// What there is to see from the first answer on.
+pub(super) enum Shown {
+    /// A snapshot at rest.
+    AtRest(Vec<u8>),
+    /// A training that is about to begin: what it is called, and the Gaussians that it starts from, where those are
+    /// known.
+    Training(String, Option<Arc<GaussianCloud>>),
+}
+
 /// A server that runs. It ends when this is dropped.
 pub(crate) struct Server {
     shared: Arc<Shared>,
@@ -104,6 +113,7 @@ impl Server {
         mut info: SceneInfo,
         editable: Option<(&Path, Option<String>)>,
         photos: ServedPhotos,
+        shown: Shown,
         options: ServeOptions,
     ) -> Result<Self, ServeError> {
         if !options.bind.ip().to_canonical().is_loopback() && !options.anywhere {
@@ -113,10 +123,18 @@ impl Server {
         info.dataset = None;
         let editor = editable.filter(|_| options.allow_edit).map(|(folder, state)| Editor::new(folder.into(), state));
         let card = SceneCard { info, allow_edit: editor.is_some(), photos: !photos.is_empty() };
+        let hub = Hub::new(card)?;
+        match shown {
+            Shown::AtRest(snapshot) => hub.publish_packed(snapshot),
+            Shown::Training(title, points) => {
+                hub.tell(WireEvent::Started(title));
+                points.into_iter().for_each(|points| hub.publish(points, 0));
+            }
+        }
         let listener = TcpListener::bind(options.bind).map_err(|e| ServeError::Listen(options.bind, e))?;
         let address = listener.local_addr()?;
         let shared = Arc::new(Shared {
-            hub: Arc::new(Hub::new(card)?),
+            hub: Arc::new(hub),
             options,
             editor,
             photos,
@@ -144,26 +162,15 @@ impl Server {
         format!("http://{}/#{}", SocketAddr::new(ip, self.address.port()), self.shared.options.token.text())
     }
 
-    /// Shows Gaussians at rest.
-    pub(crate) fn publish(&self, snapshot: Vec<u8>) {
-        self.shared.hub.publish_packed(snapshot);
-    }
-
-    /// Shows Gaussians that training starts from.
-    pub(super) fn publish_live(&self, cloud: Arc<GaussianCloud>) {
-        self.shared.hub.publish(cloud, 0);
-    }
-
-    /// An observer of a training called `title` that tells `inner` everything, and whoever watches.
-    pub(crate) fn observe<'a>(&self, title: String, inner: &'a mut dyn Observer) -> ServedObserver<'a> {
-        self.shared.hub.tell(WireEvent::Started(title));
+    /// An observer of the training that tells `inner` everything, and whoever watches.
+    pub(crate) fn observe<'a>(&self, inner: &'a mut dyn Observer) -> ServedObserver<'a> {
         ServedObserver { inner, hub: Arc::clone(&self.shared.hub), paused: AtomicBool::new(false) }
     }
 
     /// Tells how a training has ended; Gaussians that were saved are sent as they lie in `folder`. Returns what
     /// cannot be sent.
     pub(crate) fn finished(&self, folder: &Path, all_done: bool) -> Result<(), crate::io::IoError> {
-        let sent = snapshot::of_folder(folder).map(|bytes| self.publish(bytes));
+        let sent = snapshot::of_folder(folder).map(|bytes| self.shared.hub.publish_packed(bytes));
         self.shared.hub.tell(match all_done {
             true => WireEvent::Finished(folder.display().to_string()),
             false => WireEvent::Cancelled,

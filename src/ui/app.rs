@@ -25,7 +25,7 @@ use super::toasts::Toasts;
 use super::viewport::Viewport;
 use super::{keys, theme};
 use crate::measure::is_report;
-use crate::remote::Link;
+use crate::remote::ServerLink;
 use crate::scene::plan::PlanOverride;
 use crate::scene::resource_log::{self, ResourceKind};
 use crate::ui::actions::{Action, Pane};
@@ -43,7 +43,7 @@ pub struct App {
     pub viewport: Viewport,
     pub(super) worker: Worker,
     /// The server whose scene is on screen.
-    pub(super) link: Option<Link>,
+    pub(super) link: Option<ServerLink>,
     pub(super) repaint: Repaint,
     pub(super) dialogs: FileDialogs,
     pub(super) question: Option<Question>,
@@ -172,7 +172,7 @@ impl App {
             self.actions.extend(self.state.apply(event));
             segmented.into_iter().for_each(|s| self.segmented(s));
         }
-        self.state.link = self.link.as_ref().map(Link::status);
+        self.state.link = self.link.as_ref().map(ServerLink::status);
         self.state.replan(&self.layout.plan, self.layout.config.limits());
         self.state.stamp_log(resource_log::now_secs());
         for load in resource_log::since(self.traced) {

@@ -5,7 +5,7 @@ use super::app::App;
 use super::state::Tone;
 use crate::jobs::Folders;
 use crate::jobs::edit::EditRequest;
-use crate::remote::{Address, Link};
+use crate::remote::{Address, ServerLink};
 use crate::worker::{Command, Event, Failure, JobId, JobKind};
 
 impl App {
@@ -14,7 +14,7 @@ impl App {
         self.disconnect();
         let failed = |message: String| Failure { message, remedy: String::new() };
         let started = Address::parse(url).and_then(|address| {
-            Link::start(address, Folders::of_user(), self.worker.source()).map_err(|e| e.to_string())
+            ServerLink::start(address, Folders::of_user(), self.worker.source()).map_err(|e| e.to_string())
         });
         match started {
             Ok(link) => {

@@ -141,8 +141,16 @@ fn gaussians_that_are_brushed_over_are_chosen_and_with_shift_they_are_not() {
     w.until("all is drawn", |a| a.viewport.picture().is_some_and(|p| p.full && p.median_depth.is_some()));
     assert!(w.shows("Brush over the Gaussians to choose: drag in any view."));
     let eye = w.app().viewport.pose();
-    let middle = w.harness.get_by_role_and_label(Role::Image, "Viewport").rect().center();
-    let stroke = [-40.0, 40.0].map(|x| middle + egui::vec2(x, 0.0));
+    let viewport = w.harness.get_by_role_and_label(Role::Image, "Viewport").rect();
+    // Over the center that is nearest to the eye.
+    let camera = w.app().viewport.picture().expect("a picture").camera.clone();
+    let all = cloud(w.app());
+    let depth = |at: &glam::DVec3| camera.camera_from_world(*at).z;
+    let seen = (0..all.len()).map(|i| all.world_position(i)).filter(|at| camera.project(*at).is_some());
+    let nearest = seen.min_by(|a, b| depth(a).total_cmp(&depth(b))).expect("a Gaussian");
+    let at =
+        camera.project(nearest).expect("before the eye") * f64::from(viewport.width()) / f64::from(camera.width_px);
+    let stroke = [-12.0, 8.0].map(|x| viewport.min + egui::vec2(at.x as f32 + x, at.y as f32));
     super::split::drag(&mut w, stroke, Modifiers::NONE);
     w.harness.run_steps(4);
     let chosen = |w: &Window| -> usize {

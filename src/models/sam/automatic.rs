@@ -123,8 +123,12 @@ pub fn everything(
         let mut points = GridPoints::new(per_side);
         let (mut of_crop, mut asked) = (Vec::new(), 0);
         for stage in points.stages(options.sparing) {
-            let open: Vec<usize> =
-                stage.into_iter().filter(|k| !points.is_known(*k, &of_crop, size.0, &at_px)).collect();
+            let holds = |i: usize, at| {
+                let [x, y] = at_px(at);
+                let mask: &AutomaticMask = &of_crop[i];
+                mask.mask.contains(y as usize * size.0 + x as usize)
+            };
+            let open: Vec<usize> = stage.into_iter().filter(|k| !points.is_known(*k, &holds)).collect();
             for batch in open.chunks(options.batch.max(1)) {
                 if !go_on(share(asked as f64 / points.len() as f64)) {
                     collector.keep(of_crop);
@@ -142,7 +146,7 @@ pub fn everything(
                 let answers: Vec<PointMasks<'_>> =
                     batch.iter().enumerate().map(|(p, k)| answer.of(p, at_px(points.at(*k)))).collect();
                 for (k, found) in batch.iter().zip(collector.judge(&answers, *crop)) {
-                    points.answer(*k, of_crop.len(), &found);
+                    points.answer(*k, of_crop.len(), found.iter().map(|f| f.mask.area()));
                     of_crop.extend(found);
                 }
             }

@@ -2,8 +2,6 @@
 //! between those is left out where all of them lie, with it, in one mask that is the smallest of one of them: there
 //! is nothing finer in it, unless it is smaller than two steps of the grid.
 
-use super::automatic::AutomaticMask;
-
 /// Steps between the points that are asked first.
 const STRIDE: usize = 2;
 /// Points along a side under which all are asked.
@@ -44,27 +42,17 @@ impl GridPoints {
         (k % self.per_side).is_multiple_of(STRIDE) && (k / self.per_side).is_multiple_of(STRIDE)
     }
 
-    /// Remembers that a point was answered with `masks`, of which the first has this index in what was found.
-    pub(super) fn answer(&mut self, k: usize, first: usize, masks: &[AutomaticMask]) {
-        let areas = masks.iter().enumerate().map(|(i, m)| (m.mask.area(), first + i));
-        self.smallest[k] = areas.min().map(|(_, i)| i);
+    /// Remembers that a point was answered with masks of these `areas`, of which the first has index `first` in what
+    /// was found.
+    pub(super) fn answer(&mut self, k: usize, first: usize, areas: impl Iterator<Item = usize>) {
+        self.smallest[k] = areas.zip(first..).min().map(|(_, i)| i);
     }
 
-    /// Whether a point would be answered with what was `found` around it. `at_px` says where in a picture of this
-    /// width a place of the unit square is.
-    pub(super) fn is_known(
-        &self,
-        k: usize,
-        found: &[AutomaticMask],
-        width: usize,
-        at_px: &dyn Fn([f64; 2]) -> [f64; 2],
-    ) -> bool {
+    /// Whether a point would be answered with what was found around it. `holds` says whether the mask of an index in
+    /// that holds a place in the unit square.
+    pub(super) fn is_known(&self, k: usize, holds: &dyn Fn(usize, [f64; 2]) -> bool) -> bool {
         let Some(around) = (!self.is_first(k)).then(|| self.around(k)).flatten() else { return false };
-        let pixel = |k: usize| {
-            let [x, y] = at_px(self.at(k));
-            y as usize * width + x as usize
-        };
-        let together = |i: &usize| around.iter().chain([&k]).all(|k| found[*i].mask.contains(pixel(*k)));
+        let together = |i: &usize| around.iter().chain([&k]).all(|k| holds(*i, self.at(*k)));
         around.iter().filter_map(|k| self.smallest[*k].as_ref()).any(together)
     }
 
