@@ -146,7 +146,9 @@ fn gaussians_that_are_brushed_over_are_chosen_and_with_shift_they_are_not() {
     let camera = w.app().viewport.picture().expect("a picture").camera.clone();
     let all = cloud(w.app());
     let depth = |at: &glam::DVec3| camera.camera_from_world(*at).z;
-    let seen = (0..all.len()).map(|i| all.world_position(i)).filter(|at| camera.project(*at).is_some());
+    let size = glam::DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px));
+    let amid = |at: glam::DVec2| at.cmpgt(0.3 * size).all() && at.cmplt(0.7 * size).all();
+    let seen = (0..all.len()).map(|i| all.world_position(i)).filter(|at| camera.project(*at).is_some_and(amid));
     let nearest = seen.min_by(|a, b| depth(a).total_cmp(&depth(b))).expect("a Gaussian");
     let at =
         camera.project(nearest).expect("before the eye") * f64::from(viewport.width()) / f64::from(camera.width_px);
