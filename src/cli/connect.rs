@@ -71,9 +71,13 @@ pub(crate) fn run(args: ConnectArgs, quiet: bool) -> Result<(), CliError> {
         Followed::Failed(why) => return Err(CliError::failed(format!("the training failed there: {why}"))),
         Followed::Left => return Err(CliError::Cancelled("the server goes on".into())),
     };
+    let canceled = end == Followed::Cancelled;
     if args.json {
-        return output::print_json(&json!({ "end": word, "out": folder, "saved": args.save }));
+        let saved = args.save.filter(|_| !canceled);
+        output::print_json(&json!({ "end": word, "out": folder, "saved": saved }))?;
+    } else {
+        let there = folder.map(|folder| format!(", saved there in {folder}")).unwrap_or_default();
+        output::print(&format!("{}: {word}{there}", client.address.host))?;
     }
-    let there = folder.map(|folder| format!(", saved there in {folder}")).unwrap_or_default();
-    output::print(&format!("{}: {word}{there}", client.address.host))
+    if canceled { Err(CliError::Cancelled("the training was canceled there".into())) } else { Ok(()) }
 }

@@ -12,7 +12,7 @@ use super::{CliError, interrupt, number, output};
 use crate::jobs::open::{self, Contents};
 use crate::jobs::presets;
 use crate::jobs::train::Trained;
-use crate::jobs::{plan, train};
+use crate::jobs::{JobError, plan, train};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::TrainConfig;
 use crate::remote::{Server, bind_address, serve};
@@ -192,9 +192,19 @@ pub(crate) fn run(args: TrainArgs, quiet: bool) -> Result<(), CliError> {
         None => None,
     };
     let done = match &server {
-        Some(server) => served(server, &dataset, &config, folders, &mut console)?,
-        None => train::run(&dataset, &config, folders, &mut console)?,
+        Some(server) => served(server, &dataset, &config, folders, &mut console),
+        None => train::run(&dataset, &config, folders, &mut console),
     };
+    let farewell = || {
+        let Some(server) = &server else { return };
+        if !quiet && server.watchers().1 > 0 {
+            output::note("Whoever watches is sent the result ...");
+        }
+        // Where it was canceled from here, another signal ends the program at once.
+        let canceled = interrupt::asked_to_stop();
+        server.see_off(|| !canceled && interrupt::asked_to_stop());
+    };
+    let done = done.inspect_err(|_| farewell())?;
     let (outcome, finished) = (&done.outcome, done.is_finished());
     let out = done.out.display();
     if args.json {
@@ -213,14 +223,7 @@ pub(crate) fn run(args: TrainArgs, quiet: bool) -> Result<(), CliError> {
         }
         output::print(&format!("trained scene: {out} (look at it with 'fmlgs {out}')"))?;
     }
-    if let Some(server) = server {
-        if !quiet && server.watchers().1 > 0 {
-            output::note("Whoever watches is sent the result ...");
-        }
-        // Where it was canceled from here, another signal ends the program at once.
-        let canceled = interrupt::asked_to_stop();
-        server.see_off(|| !canceled && interrupt::asked_to_stop());
-    }
+    farewell();
     if finished {
         return Ok(());
     }
@@ -235,7 +238,7 @@ fn served(
     config: &TrainConfig,
     folders: Vec<PathBuf>,
     console: &mut Console,
-) -> Result<Trained, CliError> {
+) -> Result<Trained, JobError> {
     announce(server);
     let mut observer = server.observe(console);
     let done = train::run(dataset, config, folders, &mut observer);
@@ -247,7 +250,7 @@ fn served(
         }
         Err(e) => server.failed(e.to_string()),
     }
-    Ok(done?)
+    done
 }
 
 #[cfg(test)]

@@ -45,9 +45,7 @@ struct Owner {
 
 impl Owner {
     fn here(takeover: Duration) -> Self {
-        // As long as systems take, so that the whole fits.
-        let plain = |c: &char| c.is_ascii_alphanumeric() || ".-_".contains(*c);
-        let host: String = sysinfo::System::host_name().unwrap_or_default().chars().filter(plain).take(64).collect();
+        let host = host();
         Self {
             machine: machine(&host),
             host,
@@ -65,6 +63,12 @@ impl Owner {
         file.write_all(format!("{text:<width$}\n", width = BYTES - 1).as_bytes())?;
         file.sync_data()
     }
+}
+
+/// The name of this machine, cut so that a claim has room for it.
+fn host() -> String {
+    let plain = |c: &char| c.is_ascii_alphanumeric() || ".-_".contains(*c);
+    sysinfo::System::host_name().unwrap_or_default().chars().filter(plain).take(64).collect()
 }
 
 /// The running system and what of it this process sees: containers of one machine may not see each other's locks.
@@ -128,6 +132,13 @@ pub(crate) fn holder(folder: &Path) -> Result<Option<String>, IoError> {
     }))
 }
 
+/// Whether whoever claimed `folder` last has neither ended nor given it back: it may work there, or have died there.
+pub(crate) fn was_left(folder: &Path) -> bool {
+    let Ok(Some((_, path))) = last(&folder.join(FOLDER)) else { return false };
+    let owner = files::read(&path, BYTES as u64).ok().and_then(|bytes| serde_json::from_slice::<Owner>(&bytes).ok());
+    owner.is_none_or(|owner| !owner.given_back)
+}
+
 /// Number and path of the last claim.
 fn last(claims: &Path) -> Result<Option<(u64, PathBuf)>, IoError> {
     let entries = match fs::read_dir(claims) {
@@ -148,7 +159,7 @@ fn held(number: u64, path: &Path, takeover: Duration, watch: &mut Watch) -> Resu
     let owner: Option<Owner> = serde_json::from_slice(&bytes).ok();
     let by = owner.as_ref().map_or("another process".into(), |o| format!("process {} on {}", o.process, o.host));
     if let Some(owner) = &owner
-        && (owner.given_back || (owner.locked && owner.machine == machine(&owner.host) && is_free(path)))
+        && (owner.given_back || (owner.locked && owner.machine == machine(&host()) && is_free(path)))
     {
         return Ok(None);
     }

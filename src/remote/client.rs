@@ -21,6 +21,8 @@ use crate::scene::{PhotoPixels, text};
 
 /// How long the server may be silent.
 const STALL: Duration = Duration::from_secs(10);
+/// How long it may work on Gaussians, a photo or a change before it answers, beside a training that goes first.
+const WORK: Duration = Duration::from_secs(120);
 /// Most bytes of an answer in JSON, of Gaussians, of a photo, and of a refusal.
 const JSON_BYTES: u64 = 64 << 20;
 const SNAPSHOT_BYTES: u64 = 16 << 30;
@@ -83,7 +85,7 @@ impl Client {
 
     /// The newest Gaussians, if there are any newer than those of generation `have`.
     pub(crate) fn snapshot(&self, have: u64) -> Result<Option<Pulled>, ClientError> {
-        let response = self.get(&format!("/snapshot?since={have}"))?;
+        let response = self.get(&format!("/snapshot?since={have}"), WORK)?;
         if response.status() == 204 {
             return Ok(None);
         }
@@ -97,7 +99,7 @@ impl Client {
 
     /// The photo of this number, at most so large.
     pub(crate) fn photo(&self, index: usize, side_px: u32) -> Result<PhotoPixels, ClientError> {
-        let response = self.get(&format!("/photo?index={index}&side={side_px}"))?;
+        let response = self.get(&format!("/photo?index={index}&side={side_px}"), WORK)?;
         photos::read(&self.bytes(response, PHOTO_BYTES)?).map_err(|e| self.odd(&e.to_string()))
     }
 
@@ -105,21 +107,24 @@ impl Client {
     pub(crate) fn ask(&self, ask: &Ask) -> Result<(), ClientError> {
         let body = serde_json::to_vec(ask).map_err(|e| ClientError::Refused(e.to_string()))?;
         let request = self.agent.post(format!("{}/ask", self.address.base));
+        let request = request.config().timeout_recv_response(Some(WORK)).build();
         let (token, own) = (format!("Bearer {}", self.address.token.text()), version());
         let request = request.header("authorization", token).header(VERSION_HEADER, own);
         self.checked(request.header(CLIENT_HEADER, &self.name).content_type("application/json").send(&body)).map(drop)
     }
 
     fn json<T: DeserializeOwned>(&self, path: &str) -> Result<ServerAnswer<T>, ClientError> {
-        let response = self.get(path)?;
+        let response = self.get(path, STALL)?;
         let run = self.header(&response, RUN_HEADER)?;
         let bytes = self.bytes(response, JSON_BYTES)?;
         let value = serde_json::from_slice(&bytes).map_err(|e| self.odd(&format!("{path}: {e}")))?;
         Ok(ServerAnswer { run, value })
     }
 
-    fn get(&self, path: &str) -> Result<Response<Body>, ClientError> {
+    /// Asks, and waits this long for the start of an answer.
+    fn get(&self, path: &str, wait: Duration) -> Result<Response<Body>, ClientError> {
         let request = self.agent.get(format!("{}{path}", self.address.base));
+        let request = request.config().timeout_recv_response(Some(wait)).build();
         let (token, own) = (format!("Bearer {}", self.address.token.text()), version());
         let request = request.header("authorization", token).header(VERSION_HEADER, own);
         self.checked(request.header(CLIENT_HEADER, &self.name).call())

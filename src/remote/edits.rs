@@ -21,8 +21,8 @@ impl Editor {
         Self { folder, state: Mutex::new(state) }
     }
 
-    /// Makes and stores a change; the snapshot of the scene then.
-    pub(super) fn apply(&self, edit: Edit) -> Result<Vec<u8>, JobError> {
+    /// Makes and stores a change, and shows the snapshot of the scene then, before another change is made.
+    pub(super) fn apply(&self, edit: Edit, show: impl FnOnce(Vec<u8>)) -> Result<(), JobError> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let scene = open::scene(&self.folder)?;
         let map = scene.semantics()?;
@@ -30,6 +30,7 @@ impl Editor {
         if let Some(stored) = edit::store(&self.folder, state.as_deref(), &new, &scene.cloud)? {
             *state = Some(stored);
         }
-        Ok(snapshot::of_folder(&self.folder)?)
+        show(snapshot::of_folder(&self.folder)?);
+        Ok(())
     }
 }

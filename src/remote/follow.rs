@@ -30,7 +30,8 @@ pub(crate) enum Followed {
     Left,
 }
 
-/// Follows the server until nothing runs there, then writes its Gaussians to `save`: those of a file bit for bit.
+/// Follows the server until nothing runs there, then writes its Gaussians to `save`: those of a file bit for bit. Of a
+/// training that was canceled or went wrong nothing is written.
 ///
 /// # Errors
 /// If the server refuses, or is gone for a minute.
@@ -39,13 +40,12 @@ pub(crate) fn follow(
     observer: &mut dyn Observer,
     save: Option<&Path>,
 ) -> Result<Followed, ClientError> {
-    let mut now = Position::default();
-    let mut last = Instant::now();
+    let mut now = Position { heard: Some(Instant::now()), ..Position::default() };
     while observer.signal() != Signal::Cancel {
         match now.go_on(client, observer, save) {
             Ok(true) => return Ok(now.end),
-            Ok(false) => last = Instant::now(),
-            Err(ClientError::Lost(why)) if last.elapsed() < GONE => {
+            Ok(false) => {}
+            Err(ClientError::Lost(why)) if now.heard.is_some_and(|last| last.elapsed() < GONE) => {
                 observer.note(Severity::Warning, format!("The connection is lost ({why}); trying again"));
                 std::thread::sleep(RETRY);
             }
@@ -63,6 +63,8 @@ struct Position {
     have: u64,
     running: bool,
     end: Followed,
+    /// When the server was heard last.
+    heard: Option<Instant>,
 }
 
 impl Position {
@@ -74,10 +76,11 @@ impl Position {
         save: Option<&Path>,
     ) -> Result<bool, ClientError> {
         let news = client.news(self.since, self.have)?;
+        self.heard = Some(Instant::now());
         if news.run != self.run {
-            // Its numbers are others.
+            // Its numbers are others, and it says anew whether something runs.
             let first = std::mem::replace(&mut self.run, news.run).is_empty();
-            (self.since, self.have) = (0, 0);
+            (self.since, self.have, self.running, self.end) = (0, 0, false, Followed::AtRest);
             if !first {
                 return Ok(false);
             }
@@ -100,7 +103,8 @@ impl Position {
             return Ok(false);
         }
         let pulled = client.snapshot(0)?;
-        if let (Some(path), Some(pulled)) = (save, &pulled) {
+        let is_result = matches!(self.end, Followed::AtRest | Followed::Finished(_));
+        if let (Some(path), Some(pulled)) = (save.filter(|_| is_result), &pulled) {
             let written = match &pulled.snapshot.ply {
                 Some(ply) => export::bytes(path, ply),
                 None => pulled.snapshot.read(path).and_then(|(cloud, _)| export::ply(path, &cloud)),

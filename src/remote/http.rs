@@ -11,9 +11,9 @@ const HEAD_BYTES: usize = 8 << 10;
 const HEAD_LINES: usize = 32;
 /// How long a request may take to arrive, from its first byte on: who drips is cut off.
 const REQUEST: Duration = Duration::from_secs(5);
-/// How long a connection may be silent between requests.
+/// How long a connection of who has shown the token may be silent between requests.
 const IDLE: Duration = Duration::from_secs(30);
-/// How long an answer may stand still, and how fast it must be taken on the whole, bytes a second.
+/// How long an answer may stand still, and how fast it must be taken, and a body come, on the whole, bytes a second.
 const STALL: Duration = Duration::from_secs(10);
 const SLOWEST: f64 = 8192.0;
 /// Bytes that are written at once.
@@ -47,6 +47,8 @@ pub(super) struct Connection {
     stream: TcpStream,
     /// Read, and not yet used.
     carry: Vec<u8>,
+    /// Whether a request on it has shown the token.
+    pub(super) is_known: bool,
 }
 
 impl Response {
@@ -117,12 +119,12 @@ impl RequestHead {
 impl Connection {
     pub(super) fn new(stream: TcpStream) -> Self {
         let _ = stream.set_nodelay(true);
-        Self { stream, carry: Vec::new() }
+        Self { stream, carry: Vec::new(), is_known: false }
     }
 
     /// The next request; `None` if no more comes.
     pub(super) fn head(&mut self) -> Result<Option<RequestHead>, Response> {
-        let mut deadline = Instant::now() + if self.carry.is_empty() { IDLE } else { REQUEST };
+        let mut deadline = Instant::now() + if self.carry.is_empty() && self.is_known { IDLE } else { REQUEST };
         loop {
             if let Some((head, length)) = RequestHead::parse(&self.carry, deadline)? {
                 self.carry.drain(..length);
@@ -151,8 +153,9 @@ impl Connection {
         let Some(length) = length.parse().ok().filter(|length| *length <= most) else {
             return Err(Response::refusal(413, format!("a body here has at most {most} bytes")));
         };
+        let deadline = head.deadline + Duration::from_secs_f64(length as f64 / SLOWEST);
         while self.carry.len() < length {
-            match self.read((length - self.carry.len()).min(PIECE), head.deadline) {
+            match self.read((length - self.carry.len()).min(PIECE), deadline) {
                 Ok(0) => return Err(Response::refusal(400, "the body ends early")),
                 Ok(_) => {}
                 Err(_) => return Err(Response::refusal(408, "the request took too long")),

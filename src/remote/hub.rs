@@ -24,9 +24,9 @@ const PACK_SHARE: u32 = 10;
 /// Events in one answer, and in the log; if those are more, every other step of training is forgotten.
 const PER_ANSWER: usize = 2000;
 const LOGGED: usize = 200_000;
-/// Clients that are told apart, and how long one counts as there after its last question.
+/// Clients that are told apart, and how long one counts as there after its last answer: it may be reading Gaussians.
 const CLIENTS: usize = 64;
-const THERE: Duration = Duration::from_secs(5);
+const THERE: Duration = Duration::from_secs(10);
 
 /// What a server shares.
 pub(super) struct Hub {
@@ -79,6 +79,14 @@ struct Client {
     seen: Instant,
     since: u64,
     have: u64,
+    /// Its questions that are being answered.
+    open: usize,
+}
+
+impl Client {
+    fn is_there(&self) -> bool {
+        self.open > 0 || self.seen.elapsed() < THERE
+    }
 }
 
 impl Hub {
@@ -193,10 +201,19 @@ impl Hub {
     fn saw(&self, name: &str, since: u64, have: u64) {
         let mut clients = lock(&self.clients);
         if clients.len() >= CLIENTS && !clients.contains_key(name) {
-            clients.retain(|_, client| client.seen.elapsed() < THERE);
+            clients.retain(|_, client| client.is_there());
         }
         if clients.len() < CLIENTS || clients.contains_key(name) {
-            clients.insert(name.to_owned(), Client { seen: Instant::now(), since, have });
+            let open = clients.get(name).map_or(0, |client| client.open);
+            clients.insert(name.to_owned(), Client { seen: Instant::now(), since, have, open });
+        }
+    }
+
+    /// A question of a client has come, or has been answered: it counts as there meanwhile, however long that takes.
+    pub(super) fn answering(&self, client: &str, begins: bool) {
+        if let Some(client) = lock(&self.clients).get_mut(client) {
+            client.seen = Instant::now();
+            client.open = if begins { client.open + 1 } else { client.open.saturating_sub(1) };
         }
     }
 
@@ -204,7 +221,7 @@ impl Hub {
     pub(super) fn watchers(&self) -> (usize, usize) {
         let (next, generation) = (lock(&self.log).next, lock(&self.latest).generation);
         let mut clients = lock(&self.clients);
-        clients.retain(|_, client| client.seen.elapsed() < THERE);
+        clients.retain(|_, client| client.is_there());
         let lack = clients.values().filter(|c| c.since < next || c.have < generation).count();
         // Who is being sent something large asks nothing meanwhile.
         (clients.len(), lack.max(self.sending.load(Ordering::Acquire)))
@@ -285,6 +302,12 @@ mod tests {
         assert_eq!(hub.watchers(), (2, 1));
         hub.news(Some("a"), 1, 1);
         assert_eq!(hub.watchers(), (2, 0));
+        // Who is being answered is there, however long ago it asked.
+        hub.answering("a", true);
+        lock(&hub.clients).values_mut().for_each(|c| c.seen = Instant::now().checked_sub(2 * THERE).expect("past"));
+        assert_eq!(hub.watchers().0, 1);
+        hub.answering("a", false);
+        assert_eq!(hub.watchers().0, 1, "and for a while after that");
         (0..200).for_each(|i| drop(hub.news(Some(&i.to_string()), 0, 0)));
         assert_eq!(hub.watchers().0, CLIENTS, "no more are kept");
     }

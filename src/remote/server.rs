@@ -38,8 +38,8 @@ const ASK_BYTES: usize = 16 << 10;
 const EDIT_BYTES: usize = 8 << 20;
 /// How long somebody who does not know the token waits for that answer.
 const WRONG_TOKEN: Duration = Duration::from_millis(200);
-/// How long the end of a training waits for its watchers at most.
-const FAREWELL: Duration = Duration::from_secs(120);
+/// How long the end of a training waits for watchers that are being sent nothing.
+const FAREWELL: Duration = Duration::from_secs(60);
 
 /// How a scene is served.
 #[derive(Clone, Debug)]
@@ -171,9 +171,10 @@ impl Server {
     /// cannot be sent.
     pub(crate) fn finished(&self, folder: &Path, all_done: bool) -> Result<(), crate::io::IoError> {
         let sent = snapshot::of_folder(folder).map(|bytes| self.shared.hub.publish_packed(bytes));
-        self.shared.hub.tell(match all_done {
-            true => WireEvent::Finished(folder.display().to_string()),
-            false => WireEvent::Cancelled,
+        self.shared.hub.tell(match (&sent, all_done) {
+            (Ok(()), true) => WireEvent::Finished(folder.display().to_string()),
+            (Err(e), true) => WireEvent::Failed(format!("it is saved there, but cannot be sent: {e}")),
+            (_, false) => WireEvent::Cancelled,
         });
         sent
     }
@@ -188,10 +189,13 @@ impl Server {
         self.shared.hub.watchers()
     }
 
-    /// Waits until whoever watches has got everything, two minutes at most, or until `stop` says so.
+    /// Waits until whoever watches has got everything, or is sent nothing for a minute, or until `stop` says so.
     pub(crate) fn see_off(&self, stop: impl Fn() -> bool) {
-        let start = Instant::now();
-        while self.watchers().1 > 0 && start.elapsed() < FAREWELL && !stop() {
+        let mut last = Instant::now();
+        while self.watchers().1 > 0 && last.elapsed() < FAREWELL && !stop() {
+            if self.shared.hub.sending.load(Ordering::Acquire) > 0 {
+                last = Instant::now();
+            }
             thread::sleep(Duration::from_millis(50));
         }
     }
@@ -249,9 +253,10 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
 /// Answers the requests of a connection, one after the other.
 fn talk(mut connection: Connection, shared: &Shared) {
     while !shared.stop.load(Ordering::Acquire) {
+        let mut of = None;
         let response = match connection.head() {
             Ok(None) => return,
-            Ok(Some(head)) => answer(&mut connection, &head, shared).unwrap_or_else(|refused| refused),
+            Ok(Some(head)) => answer(&mut connection, &head, shared, &mut of).unwrap_or_else(|refused| refused),
             Err(refused) => refused,
         };
         let response = response.with(VERSION_HEADER, version()).with(RUN_HEADER, &shared.hub.run);
@@ -260,6 +265,9 @@ fn talk(mut connection: Connection, shared: &Shared) {
         sending.fetch_add(usize::from(large), Ordering::AcqRel);
         let sent = connection.answer(&response);
         sending.fetch_sub(usize::from(large), Ordering::AcqRel);
+        if let Some(client) = of {
+            shared.hub.answering(&client, false);
+        }
         if sent.is_err() {
             return;
         }
@@ -269,9 +277,20 @@ fn talk(mut connection: Connection, shared: &Shared) {
     }
 }
 
-fn answer(connection: &mut Connection, head: &RequestHead, shared: &Shared) -> Result<Response, Response> {
+/// The answer to a request; `of` becomes the client that asks, if it is a known one.
+fn answer(
+    connection: &mut Connection,
+    head: &RequestHead,
+    shared: &Shared,
+    of: &mut Option<String>,
+) -> Result<Response, Response> {
     let (hub, options) = (&shared.hub, &shared.options);
     admit(head, options)?;
+    connection.is_known = true;
+    if let Some(client) = head.header(CLIENT_HEADER) {
+        hub.answering(client, true);
+        *of = Some(client.to_owned());
+    }
     if !take_turn(&shared.bucket) {
         return Err(Response::refusal(429, "too many requests").with("Retry-After", 1));
     }
@@ -343,8 +362,8 @@ fn obey(ask: Ask, shared: &Shared) -> Result<Response, Response> {
     match (ask, &shared.editor) {
         (Ask::Pause(pause), _) => shared.hub.control.set_paused(pause),
         (Ask::Cancel, _) => shared.hub.control.cancel(),
-        (Ask::Edit(edit), Some(editor)) => match editor.apply(edit) {
-            Ok(snapshot) => shared.hub.publish_packed(snapshot),
+        (Ask::Edit(edit), Some(editor)) => match editor.apply(edit, |snapshot| shared.hub.publish_packed(snapshot)) {
+            Ok(()) => {}
             Err(e) => return Ok(Response::new(422, "text/plain; charset=utf-8", Arc::new(e.to_string().into_bytes()))),
         },
         (Ask::Edit(_), None) => {

@@ -85,7 +85,7 @@ pub(crate) fn count(batch: &BatchFile) -> usize {
 /// Before anything runs: if a scene is missing, results would lie among what is read or are of other settings, or a
 /// network is missing. Later, if the folder of the results cannot be written.
 pub(crate) fn run(request: &BatchRequest, observer: &mut dyn Observer) -> Result<BatchOutcome, JobError> {
-    let planned = plan(request)?;
+    let mut planned = plan(request)?;
     for p in &planned {
         if let UnitState::Changed(what) = UnitState::of(&p.folder, &p.asked)? {
             return Err(changed(&p.folder, &what));
@@ -93,6 +93,8 @@ pub(crate) fn run(request: &BatchRequest, observer: &mut dyn Observer) -> Result
     }
     check_networks(&request.batch)?;
     let mut outcome = BatchOutcome { units: planned.len(), ..BatchOutcome::default() };
+    // What may have killed the process that worked on it comes last, so that it holds up nothing else.
+    planned.sort_by_key(|p| claim::was_left(&p.folder));
     let mut waiting: VecDeque<(Planned, Watch)> = planned.into_iter().map(|p| (p, Watch::default())).collect();
     // How many in a row were somebody else's: if all are, there is nothing to do but to wait.
     let mut held = 0;

@@ -53,13 +53,16 @@ pub(crate) fn script(of: &ArrayScript<'_>) -> Result<String, JobError> {
 #SBATCH --open-mode=append
 #SBATCH --output=fmlgs-batch-%A_%a.log
 
+# srun does not take over how many processors sbatch was asked for.
+[ -z "${{SLURM_CPUS_PER_TASK:-}}" ] || export SRUN_CPUS_PER_TASK="$SLURM_CPUS_PER_TASK"
 # The shard is what SLURM_ARRAY_TASK_ID and its like say.
 srun {command}
 code=$?
 
 # {stopped}: stopped with a checkpoint. Whoever canceled the job wants no more of it: only a running one is queued again.
-if [ "$code" -eq {stopped} ] && [ "$(squeue --noheader --job "$SLURM_JOB_ID" --format %T)" = RUNNING ]; then
-    scontrol requeue "${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}" && exit 0
+task=${{SLURM_ARRAY_JOB_ID}}_$SLURM_ARRAY_TASK_ID
+if [ "$code" -eq {stopped} ] && [ "$(squeue --noheader --job "$task" --format %T)" = RUNNING ]; then
+    scontrol requeue "$task" && exit 0
 fi
 exit "$code"
 "#,

@@ -11,6 +11,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
+use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::BatchRequest;
@@ -29,6 +30,8 @@ use crate::pipeline::observer::{Evaluation, Interrupted, Observer, Progress, Sev
 use crate::scene::{Dataset, GaussianCloud, Level};
 
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
+/// Says what was found, in the folder of the scene.
+const OBJECTS_FILE: &str = "objects-found.json";
 
 /// How the work on a unit ended.
 pub(super) enum Worked {
@@ -166,7 +169,15 @@ fn make(
     })
 }
 
-/// Finds objects, and counts them and the seconds that took.
+/// What was found in which save of the scene.
+#[derive(Serialize, Deserialize)]
+struct FoundBefore {
+    state: Option<String>,
+    objects: ObjectCounts,
+    secs: f64,
+}
+
+/// Finds objects, unless an attempt before has, and counts them and the seconds that took.
 fn objects(
     request: &BatchRequest,
     unit: BatchUnit,
@@ -175,6 +186,11 @@ fn objects(
     observer: &mut dyn Observer,
 ) -> Result<(ObjectCounts, f64), JobError> {
     let scene = open::scene(folder)?;
+    let kept = folder.join(OBJECTS_FILE);
+    let before = std::fs::read(&kept).ok().and_then(|json| serde_json::from_slice::<FoundBefore>(&json).ok());
+    if let Some(before) = before.filter(|b| b.state.is_some() && b.state == scene.state) {
+        return Ok((before.objects, before.secs));
+    }
     let overrides = &request.batch.settings[unit.setting].train.plan;
     let find = FindRequest {
         folder: folder.into(),
@@ -191,7 +207,10 @@ fn objects(
     let map = &done.found.map;
     let count = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();
     let (objects, parts, seeds) = (count(Level::Object), count(Level::Part), map.seeds.clone());
-    Ok((ObjectCounts { objects, parts, seeds }, done.secs))
+    let objects = ObjectCounts { objects, parts, seeds };
+    let found = FoundBefore { state: open::scene(folder)?.state, objects, secs: done.secs };
+    export::json(&kept, &found)?;
+    Ok((found.objects, found.secs))
 }
 
 /// Colors and objects beside photos and labels that were held out; `None` for what there is none of.

@@ -150,12 +150,20 @@ impl LinkThread {
 
     fn talk(&mut self, opening: &mut Option<JobId>, wait: &mut Duration) -> Result<std::convert::Infallible, Break> {
         let card = self.client.scene()?;
+        let mut known = self.shown.as_ref().is_some_and(|(shown, _)| is_same(shown, &card.value));
+        // A training that the server's end has cut off, and that may go on.
+        let mut cut_off = false;
         if card.run != self.run {
             (self.run, self.since, self.have) = (card.run, 0, 0);
+            cut_off = known && self.training.is_some();
+            known = cut_off;
+            if let Some(job) = self.training.take() {
+                self.ends(Event::Cancelled(job))?;
+            }
         }
-        let known = self.shown.as_ref().is_some_and(|(shown, _)| is_same(shown, &card.value));
+        let card = card.value;
         if !known || opening.is_some() {
-            self.open(card.value, opening)?;
+            self.open(card.clone(), opening)?;
         }
         *wait = FIRST_TRY;
         if !lock(&self.out.status).connected {
@@ -174,6 +182,9 @@ impl LinkThread {
                 self.hear(event)?;
             }
             self.since = news.next;
+            if std::mem::take(&mut cut_off) && self.training.is_none() {
+                self.open(card.clone(), opening)?;
+            }
             if news.generation > self.have {
                 self.pull()?;
             }
