@@ -65,7 +65,9 @@ class ProgramTest(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             scene = Path(folder, "scene")
             wanted = ["train", str(PHOTOS), "--out", str(scene), "--backend", "cpu", "-q", "--checkpoint-secs", "1"]
-            script = f"import fmlgs; fmlgs.run({[*wanted, '--steps', '1000000']!r})"
+            # Whoever runs the tests may ignore Ctrl-C, as a shell's jobs in the background do.
+            script = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+            script += f"import fmlgs; fmlgs.run({[*wanted, '--steps', '1000000']!r})"
             process = subprocess.Popen(
                 [sys.executable, "-c", script], start_new_session=True, stderr=subprocess.PIPE, text=True
             )

@@ -161,6 +161,9 @@ fn who_drips_or_stands_still_holds_up_nobody() {
     for stream in &mut stalled {
         stream.write_all(format!("{}\r\n", server.head("GET /snapshot?since=0")).as_bytes()).unwrap();
     }
+    for stream in &stalled {
+        assert!(stream.peek(&mut [0]).unwrap() > 0, "the answer begins");
+    }
     let mut dripping: Vec<TcpStream> = (0..8).map(|_| connect()).collect();
     let request = server.head("GET /scene");
     let start = Instant::now();

@@ -23,7 +23,7 @@ fn a_client_follows_a_server_that_is_killed_again_and_again() {
     let token = folder.path().join("token");
     // A port that was free a moment ago, for all runs.
     let at = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().to_string();
-    let steps = (60 + 20 * kills()).to_string();
+    let steps = (300 + 200 * kills()).to_string();
     let mut arguments = training(text(&photos), text(&out), &steps);
     *arguments.last_mut().unwrap() = &at;
     arguments.extend(["--token-file", text(&token)]);
@@ -34,7 +34,7 @@ fn a_client_follows_a_server_that_is_killed_again_and_again() {
     let client = command(&watch).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     let mut killed = 0;
     for _ in 0..kills() {
-        std::thread::sleep(Duration::from_millis(random.random_range(0..1500)));
+        std::thread::sleep(Duration::from_millis(random.random_range(0..400)));
         if server.child.try_wait().unwrap().is_some() {
             break;
         }
@@ -55,14 +55,14 @@ fn a_training_does_not_care_whose_client_is_killed() {
     let folder = folder();
     let (photos, out) = (tiny_dataset(folder.path()), folder.path().join("out"));
     let alone = folder.path().join("alone");
-    let steps = (40 + 20 * kills()).to_string();
+    let steps = (300 + 100 * kills()).to_string();
     let mut server = Served::start(&training(text(&photos), text(&out), &steps));
     let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(12);
     let mut killed = 0;
     for _ in 0..kills() {
         let mut client = command(&["connect", &server.url, "--headless", "-q"]);
         let mut client = client.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
-        std::thread::sleep(Duration::from_millis(random.random_range(0..700)));
+        std::thread::sleep(Duration::from_millis(random.random_range(0..400)));
         killed += u64::from(client.try_wait().unwrap().is_none());
         client.kill().unwrap();
         client.wait().unwrap();
