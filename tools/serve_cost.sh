@@ -14,7 +14,10 @@ rate() { python3 -c 'import json, sys; run = json.load(sys.stdin); print(run["st
 watched() {
     train --serve 127.0.0.1:0 2>"$folder/said" >"$folder/result" &
     training=$!
-    until url=$(grep -o "http://[^']*" "$folder/said" | head -1) && [ -n "$url" ]; do sleep 0.1; done
+    until url=$(grep -o "http://[^']*" "$folder/said" | head -1) && [ -n "$url" ]; do
+        kill -0 "$training" || { cat "$folder/said" >&2; exit 1; }
+        sleep 0.1
+    done
     nice -n 19 "$fmlgs" connect "$url" --headless -q >/dev/null 2>&1 &
     nice -n 19 "$fmlgs" connect "$url" --headless -q >/dev/null 2>&1 &
     # Asks for the Gaussians again and again, and reads nothing.
