@@ -55,8 +55,8 @@ impl<R: Real> CameraView<R> {
     /// Whether a box around `mean` has a pixel center of the picture in it.
     #[inline(always)]
     pub(crate) fn meets(&self, mean: [R; 2], half: [R; 2]) -> bool {
-        let last = self.size.map(|s| R::of(s as f64) - R::HALF);
-        let inside = |axis: usize| mean[axis] + half[axis] >= R::HALF && mean[axis] - half[axis] <= last[axis];
+        let last = |axis: usize| R::of(self.size[axis] as f64) - R::HALF;
+        let inside = |axis: usize| mean[axis] + half[axis] >= R::HALF && mean[axis] - half[axis] <= last(axis);
         inside(0) && inside(1)
     }
 }
@@ -133,7 +133,9 @@ pub fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &CameraView<R>) -> Op
         }
     }
     let rotation = rotation::matrix_from_quaternion(gaussian.quaternion)?;
-    let scale = gaussian.log_scale.map(Real::exp);
+    let [a, b, c] = gaussian.log_scale;
+    let [a, b, c, _] = R::exp_each([a, b, c, R::ZERO]);
+    let scale = [a, b, c];
     let mut factor = [[R::ZERO; 3]; 2];
     for axis in 0..2 {
         for k in 0..3 {

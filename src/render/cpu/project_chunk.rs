@@ -22,7 +22,6 @@ pub(crate) fn project<R: Real, P: Primitive<R>>(
     parts.resize_with(n.div_ceil(CHUNK), Chunk::default);
     parts.par_iter_mut().enumerate().for_each(|(c, part)| {
         part.splats.clear();
-        part.values.clear();
         part.degenerate = 0;
         project_chunk(part, scene, view, primitive, channels, c * CHUNK..((c + 1) * CHUNK).min(n));
     });
@@ -38,6 +37,10 @@ fn project_chunk<R: Real, P: Primitive<R>>(
     range: std::ops::Range<usize>,
 ) {
     let DrawInput { features, settings, .. } = scene;
+    // As if all were seen: so a splat's values are written where they stay, and nothing grows.
+    let mut written = 0;
+    let stride = P::SHAPE + channels;
+    part.values.resize(range.len() * stride, R::ZERO);
     for k in range {
         if let Some(cut) = scene.cut {
             cut.fetch(scene.cloud, k + AHEAD);
@@ -64,15 +67,24 @@ fn project_chunk<R: Real, P: Primitive<R>>(
         };
         splat.gaussian = stands_for;
         let basis = sh::basis(degree, direction(relative));
-        let first = part.values.len();
-        part.values.extend_from_slice(shape.as_ref());
-        part.values.extend_from_slice(&color(gaussian.sh, &basis, degree));
+        let values = &mut part.values[written..written + stride];
+        let mut at = 0;
+        let mut put = |some: &[R]| {
+            for (value, new) in values[at..at + some.len()].iter_mut().zip(some) {
+                *value = *new;
+            }
+            at += some.len();
+        };
+        put(shape.as_ref());
+        put(&color(gaussian.sh, &basis, degree));
         let own = stands_for as usize * features.channels;
-        part.values.extend_from_slice(&features.values[own..own + features.channels]);
+        put(&features.values[own..own + features.channels]);
         if settings.depth {
-            part.values.extend_from_slice(depth.as_ref());
+            put(depth.as_ref());
         }
-        part.values.resize(first + shape.as_ref().len() + channels, R::ZERO);
+        values[at..].iter_mut().for_each(|value| *value = R::ZERO);
+        written += stride;
         part.splats.push(splat);
     }
+    part.values.truncate(written);
 }
