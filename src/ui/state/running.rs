@@ -41,7 +41,10 @@ impl RunningJob {
         self.left_secs = match (progress.eta_secs(), before) {
             (Some(now), Some((step, left))) => {
                 let expected = left - step;
-                Some((expected + (now - expected) * (1.0 - (-step.max(0.0) / FORECAST_SECS).exp())).max(0.0))
+                let smooth = expected + (now - expected) * (1.0 - (-step.max(0.0) / FORECAST_SECS).exp());
+                // A first forecast that was far too good is not believed until it has run out.
+                let average = progress.elapsed_secs * progress.total as f64 / progress.done.max(1) as f64;
+                Some(smooth.max(0.5 * (average - progress.elapsed_secs).min(now)).max(0.0))
             }
             // All is done of what is counted, or nothing is counted.
             _ if progress.done >= progress.total => None,
@@ -72,6 +75,12 @@ mod tests {
         // Where it stays slower, that is what counts.
         (0..200).for_each(|i| job.goes_on(at(11 + i, 3.0 + i as f64, 1.0)));
         assert!((job.left_secs.expect("known") - 2_790.0).abs() < 60.0, "{:?}", job.left_secs);
+        // The first of 48 took a moment, each of the others a second.
+        let mut job = RunningJob::begun(JobId::default(), JobKind::Train, "Removing".into());
+        let view = |i: u64, rate| Progress { total: 48, ..at(i, i as f64, rate) };
+        job.goes_on(view(1, 100.0));
+        (2..20).for_each(|i| job.goes_on(view(i, 1.0)));
+        assert!((14.0..40.0).contains(&job.left_secs.expect("known")), "{:?}", job.left_secs);
         job.goes_on(Progress { stage: "Saving".into(), ..at(0, 0.5, 100.0) });
         assert_eq!(job.left_secs, Some(30.0), "another stage begins anew");
         job.goes_on(Progress { stage: "Saving".into(), ..at(3_000, 30.5, 100.0) });
