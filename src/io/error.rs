@@ -26,6 +26,10 @@ pub enum IoError {
     Torn { path: PathBuf, with: &'static str, remedy: &'static str },
     #[error("{folder} {what}; choose another folder")]
     Occupied { folder: PathBuf, what: &'static str },
+    #[error(
+        "{folder} holds more than the scene, so nothing was deleted; delete the folder yourself if none of it is needed"
+    )]
+    HoldsMore { folder: PathBuf },
     #[error("{path} is not a regular file but a folder, a pipe or a device; give the path of a file")]
     NotAFile { path: PathBuf },
     #[error("{path}: {what} needs {bytes} bytes, over the limit of {limit} bytes; {remedy}")]

@@ -11,7 +11,7 @@ use super::atomic::Draft;
 use super::commit::{self, Commit};
 use super::error::write_error;
 use super::folder_lock::{self, FolderLock};
-use super::scene_files::{CHECKPOINT_FILE, CLOUD_FILE, SCENE_FILE, is_scene};
+use super::scene_files::{self, CHECKPOINT_FILE, CLOUD_FILE, SCENE_FILE, is_scene};
 use super::scene_info::{SceneInfo, VERSION, load_info, relative_to};
 use super::temporary::{sweep, temporary_folder};
 use super::{IoError, files, semantic_map, splat_ply};
@@ -50,6 +50,29 @@ impl SceneFolder {
             files::sync_folder(files::folder_of(to))
         });
         moved.map_err(|cause| write_error(to, cause))
+    }
+
+    /// Deletes the scene, which is in the state `known`, with its folder.
+    ///
+    /// # Errors
+    /// [`IoError::Changed`] if it is not in that state any more, [`IoError::HoldsMore`] if the folder holds anything
+    /// else; nothing is deleted then.
+    pub(crate) fn delete(self, known: Option<&str>) -> Result<(), IoError> {
+        let folder = self.path().to_path_buf();
+        if load_info(&folder)?.state.as_deref() != known {
+            return Err(IoError::Changed { folder });
+        }
+        let entries = fs::read_dir(&folder).and_then(Iterator::collect::<io::Result<Vec<_>>>);
+        let entries = entries.map_err(|cause| write_error(&folder, cause))?;
+        let mut names = entries.iter().map(fs::DirEntry::file_name);
+        if !names.all(|name| name == folder_lock::FILE || scene_files::FILES.iter().any(|file| name == *file)) {
+            return Err(IoError::HoldsMore { folder });
+        }
+        // Its place is empty at once; what a killed process leaves undeleted is swept away.
+        // Windows does not move a folder in which a file is open.
+        let _held = (!cfg!(windows)).then_some(self.lock);
+        let gone = temporary_folder(files::folder_of(&folder), "deleted");
+        gone.and_then(|gone| fs::rename(&folder, gone.folder.path().join("scene"))).map_err(|e| write_error(&folder, e))
     }
 
     pub(crate) fn path(&self) -> &Path {

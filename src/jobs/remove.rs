@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::{JobError, Scene, derived, export, open, photos_without};
+use crate::io::{IoError, SceneFolder, scene_info};
 use crate::math::format;
 use crate::models::catalog::{self, ModelRole};
 use crate::models::lama::{LAMA, Lama};
@@ -65,6 +66,15 @@ pub struct RemovedScene {
     pub(crate) name: String,
     pub(crate) request: RemoveRequest,
     pub(crate) report: RemovalReport,
+    /// The state in which it was stored.
+    state: Option<String>,
+}
+
+impl RemovedScene {
+    /// Deletes it with its folder, if it is as it was stored, and nothing else is there.
+    pub(crate) fn delete(&self) -> Result<(), IoError> {
+        SceneFolder::hold(&self.folder, "deleting")?.delete(self.state.as_deref())
+    }
 }
 
 /// Takes things out of the scene in a folder and stores the result beside it.
@@ -89,7 +99,8 @@ pub(crate) fn beside(request: &RemoveRequest, observer: &mut dyn Observer) -> Re
         store(&scene, &name, &done, &folder)?;
         folder
     };
-    Ok(RemovedScene { folder, name, request: request.clone(), report: done.report })
+    let state = scene_info::load_info(&folder)?.state;
+    Ok(RemovedScene { folder, name, request: request.clone(), report: done.report, state })
 }
 
 /// In words: what was done.

@@ -48,6 +48,7 @@ impl App {
             Action::MeasureSplats => self.measure_splats(),
             Action::DeleteChosen => self.delete_chosen(),
             Action::AnotherFill(request) => self.submit_removal(*request),
+            Action::DeleteRemoved => self.ask_to_delete_removed(),
             Action::FetchModel(id) => self.install_model(id, None),
             Action::TypeQuery => self.type_question(),
             Action::Ask(text) => {

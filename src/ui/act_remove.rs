@@ -1,6 +1,8 @@
 //! Removing things: the result is a scene of its own, seen beside this one, which stays as it is.
 
+use super::actions::Action;
 use super::app::App;
+use super::dialogs::Question;
 use super::state::Tone;
 use crate::jobs::remove::{RemovalOptions, RemoveRequest};
 use crate::scene::IdentityId;
@@ -13,6 +15,34 @@ impl App {
             return self.state.toast(Tone::Warning, "Only from a trained scene can something be removed.");
         };
         self.submit_removal(RemoveRequest { folder, options: RemovalOptions::of(ids), retrain: false });
+    }
+
+    /// Asks before the scene is deleted that was made by removing something and is shown beside this one.
+    pub(super) fn ask_to_delete_removed(&mut self) {
+        let Some(removed) = &self.state.removed else {
+            return self.state.toast(Tone::Warning, "No scene was made by removing something from this one.");
+        };
+        let text = format!(
+            "Delete {}, the scene without {}? This cannot be undone; the scene that it was made of stays.",
+            removed.folder.display(),
+            removed.name
+        );
+        self.question = Some(Question { text, yes: "Delete it", no: "Keep it", action: Action::DeleteRemoved });
+    }
+
+    /// Deletes that scene.
+    pub(super) fn delete_removed(&mut self) {
+        let Some(removed) = self.state.removed.take() else { return };
+        match removed.delete() {
+            Ok(()) => {
+                self.state.beside = self.state.beside.take().filter(|beside| beside.path != removed.folder);
+                self.state.toast(Tone::Good, format!("Deleted {}", removed.folder.display()));
+            }
+            Err(e) => {
+                self.state.toast(Tone::Error, e.to_string());
+                self.state.removed = Some(removed);
+            }
+        }
     }
 
     /// Makes a scene without what the request says, from the one that is open.

@@ -214,6 +214,8 @@ actions! {
         "Take it out, into a scene of its own that is shown beside this one: what it hid is closed from what is around.";
     AnotherFill(request: Box<RemoveRequest>): "Another fill",
         "Remove it again, with another choice of what hides below it; the scene made before stays.";
+    DeleteRemoved: "Delete this scene\u{2026}",
+        "Delete the scene that was made by removing something, which is shown beside this one. This one stays.";
     Arrange(id: IdentityId): format!("Move, turn or recolor #{id}"),
         "Drag it along the axes, turn, scale, duplicate or recolor it; can be undone.";
     KeepArranged: "Keep the arrangement", "Carry out what the view shows of a moved, duplicated or recolored thing.";

@@ -329,7 +329,10 @@ impl App {
             && let Some(question) = self.question.take()
             && yes
         {
-            self.give_up_and(question.action);
+            match question.action {
+                Action::DeleteRemoved => self.delete_removed(),
+                action => self.give_up_and(action),
+            }
         }
         self.ask_for_means(ctx);
         if let Some(photos) = &self.state.unposed

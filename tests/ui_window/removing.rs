@@ -26,6 +26,27 @@ fn a_scene_without_a_box_is_seen_beside_and_opened() {
     w.until("it is shown", |a| a.state.beside.as_ref().is_some_and(|b| b.path == again));
     w.harness.run_steps(2);
 
+    // One that is not wanted is deleted, once that is said twice, but not with what others put there.
+    let other = again.join("notes.txt");
+    std::fs::write(&other, "mine").expect("a file");
+    let answer = |w: &mut super::Window, answer: &str| {
+        w.click("Delete");
+        w.harness.run_steps(3);
+        w.click(answer);
+        w.harness.run_steps(3);
+    };
+    answer(&mut w, "Delete it");
+    assert!(again.join("scene.json").is_file());
+    assert!(w.app().state.log.iter().any(|line| line.text.contains("holds more than the scene")));
+    std::fs::remove_file(&other).expect("removed");
+    answer(&mut w, "Keep it");
+    assert!(again.join("scene.json").is_file() && w.app().state.beside.is_some());
+    answer(&mut w, "Delete it");
+    assert!(!again.exists() && made.join("scene.json").is_file() && w.app().state.beside.is_none());
+    w.ask(Action::Remove(2));
+    w.until("it is made once more", |a| a.state.beside.as_ref().is_some_and(|b| b.path == again));
+    w.harness.run_steps(2);
+
     w.harness.get_by_role_and_label(Role::Button, "Open").click();
     w.until("two boxes", |a| a.state.semantics.as_ref().is_some_and(|m| m.identities.len() == 2));
     assert!(w.app().state.beside.is_none());

@@ -132,6 +132,10 @@ impl Viewport {
                 actions.push(Action::Open(removed.folder.clone()));
             }
             self.other_fills(ui, &removed.request, state, actions);
+            let delete = Action::DeleteRemoved;
+            if ui.button("Delete").on_hover_text(delete.tooltip()).clicked() {
+                actions.push(delete);
+            }
         }
         if let Some(psnr) = self.picture().and_then(|p| p.second.as_ref()?.psnr) {
             ui.colored_label(theme::accent(), format!("preview {}", format::decibel(psnr)));
