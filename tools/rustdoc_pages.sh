@@ -10,5 +10,5 @@ for argument in "$@"; do
         *) arguments+=("$argument") ;;
     esac
 done
-[ -z "$pages" ] || arguments+=(--document-private-items --output target/doc -D warnings)
+[ -z "$pages" ] || arguments+=(--document-private-items --output "${CARGO_TARGET_DIR:-target}/doc" -D warnings)
 exec rustdoc "${arguments[@]}"

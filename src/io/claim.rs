@@ -66,7 +66,7 @@ impl Owner {
 }
 
 /// The name of this machine, cut so that a claim has room for it.
-fn host() -> String {
+pub(crate) fn host() -> String {
     let plain = |c: &char| c.is_ascii_alphanumeric() || ".-_".contains(*c);
     sysinfo::System::host_name().unwrap_or_default().chars().filter(plain).take(64).collect()
 }

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use serde::de::DeserializeOwned;
 use ureq::http::Response;
-use ureq::{Agent, Body};
+use ureq::{Agent, Body, RequestBuilder};
 
 use super::address::Address;
 use super::photos;
@@ -106,11 +106,8 @@ impl Client {
     /// Asks for something to be done. What cannot be done is refused.
     pub(crate) fn ask(&self, ask: &Ask) -> Result<(), ClientError> {
         let body = serde_json::to_vec(ask).map_err(|e| ClientError::Refused(e.to_string()))?;
-        let request = self.agent.post(format!("{}/ask", self.address.base));
-        let request = request.config().timeout_recv_response(Some(WORK)).build();
-        let (token, own) = (format!("Bearer {}", self.address.token.text()), version());
-        let request = request.header("authorization", token).header(VERSION_HEADER, own);
-        self.checked(request.header(CLIENT_HEADER, &self.name).content_type("application/json").send(&body)).map(drop)
+        let request = self.signed(self.agent.post(format!("{}/ask", self.address.base)), WORK);
+        self.checked(request.content_type("application/json").send(&body)).map(drop)
     }
 
     fn json<T: DeserializeOwned>(&self, path: &str) -> Result<ServerAnswer<T>, ClientError> {
@@ -123,11 +120,14 @@ impl Client {
 
     /// Asks, and waits this long for the start of an answer.
     fn get(&self, path: &str, wait: Duration) -> Result<Response<Body>, ClientError> {
-        let request = self.agent.get(format!("{}{path}", self.address.base));
+        self.checked(self.signed(self.agent.get(format!("{}{path}", self.address.base)), wait).call())
+    }
+
+    /// A request of this client that waits so long for the start of an answer.
+    fn signed<B>(&self, request: RequestBuilder<B>, wait: Duration) -> RequestBuilder<B> {
         let request = request.config().timeout_recv_response(Some(wait)).build();
-        let (token, own) = (format!("Bearer {}", self.address.token.text()), version());
-        let request = request.header("authorization", token).header(VERSION_HEADER, own);
-        self.checked(request.header(CLIENT_HEADER, &self.name).call())
+        let request = request.header("authorization", format!("Bearer {}", self.address.token.text()));
+        request.header(VERSION_HEADER, version()).header(CLIENT_HEADER, &self.name)
     }
 
     /// An answer of a server that can be talked to, and that is one.

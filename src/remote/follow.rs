@@ -15,10 +15,9 @@ const RETRY: Duration = Duration::from_secs(2);
 const GONE: Duration = Duration::from_secs(60);
 
 /// How it ended.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Followed {
     /// Nothing runs there: a scene at rest.
-    #[default]
     AtRest,
     /// The training is done, and saved in this folder of the server.
     Finished(String),
@@ -40,12 +39,12 @@ pub(crate) fn follow(
     observer: &mut dyn Observer,
     save: Option<&Path>,
 ) -> Result<Followed, ClientError> {
-    let mut now = Position { heard: Some(Instant::now()), ..Position::default() };
+    let mut now = Position::new();
     while observer.signal() != Signal::Cancel {
         match now.go_on(client, observer, save) {
             Ok(true) => return Ok(now.end),
             Ok(false) => {}
-            Err(ClientError::Lost(why)) if now.heard.is_some_and(|last| last.elapsed() < GONE) => {
+            Err(ClientError::Lost(why)) if now.heard.elapsed() < GONE => {
                 observer.note(Severity::Warning, format!("The connection is lost ({why}); trying again"));
                 std::thread::sleep(RETRY);
             }
@@ -56,7 +55,6 @@ pub(crate) fn follow(
 }
 
 /// How far a server was followed.
-#[derive(Default)]
 struct Position {
     run: String,
     since: u64,
@@ -64,10 +62,15 @@ struct Position {
     running: bool,
     end: Followed,
     /// When the server was heard last.
-    heard: Option<Instant>,
+    heard: Instant,
 }
 
 impl Position {
+    fn new() -> Self {
+        let (run, end, heard) = (String::new(), Followed::AtRest, Instant::now());
+        Self { run, since: 0, have: 0, running: false, end, heard }
+    }
+
     /// Asks once for what is new. Whether that was the end.
     fn go_on(
         &mut self,
@@ -76,7 +79,7 @@ impl Position {
         save: Option<&Path>,
     ) -> Result<bool, ClientError> {
         let news = client.news(self.since, self.have)?;
-        self.heard = Some(Instant::now());
+        self.heard = Instant::now();
         if news.run != self.run {
             // Its numbers are others, and it says anew whether something runs.
             let first = std::mem::replace(&mut self.run, news.run).is_empty();

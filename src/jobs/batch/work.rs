@@ -19,7 +19,7 @@ use super::state::{
     FAILURE, ObjectCounts, RESULT, SCENE, UnitFailure, UnitResult, UnitSeconds, VERSION, is_done, read, scenes,
 };
 use super::unit::{self, BatchUnit, UnitRequest, hex};
-use crate::io::claim::Claim;
+use crate::io::claim::{Claim, host};
 use crate::io::{IoError, SceneFolder, splat_ply};
 use crate::jobs::error::chain;
 use crate::jobs::evaluate::{EvaluateOptions, PhotoComparison, photometric};
@@ -257,10 +257,6 @@ fn checksum(cloud: &GaussianCloud) -> String {
     // Summing up cannot fail.
     let _ = splat_ply::encode(&mut sum, cloud, None);
     hex(&sum.0.finalize())
-}
-
-fn host() -> String {
-    sysinfo::System::host_name().unwrap_or_default()
 }
 
 fn panic_text(payload: &(dyn Any + Send)) -> String {
