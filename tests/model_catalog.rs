@@ -190,7 +190,7 @@ fn the_command_line_says_what_is_here_and_what_to_do() {
     };
     assert_eq!(state("demo"), "built_in");
     assert!(state("clip-vit-b16")["missing"].as_array().is_some_and(|files| files.len() == 3));
-    assert!(list["engine"].as_str().is_some_and(|e| e.contains("tract")) && list["device"] == "processor");
+    assert!(list["engine"].as_str().is_some_and(|e| e.contains("built in")) && list["device"] == "processor");
     let text = run(&["models"]).ok().stdout;
     assert!(text.contains("sam2.1-tiny") && text.contains("not here") && text.contains("models fetch"), "{text}");
     // A checkpoint of another model is refused by the name of a tensor, whatever way it comes.
@@ -276,7 +276,7 @@ fn the_fetched_engine_is_the_one_that_runs() {
     bytes[middle] ^= 1;
     fs::write(&fetched, bytes).expect("written");
     let list = run(&["models", "--json"]).ok().json();
-    assert!(list["engine"].as_str().is_some_and(|e| e.contains("tract")), "{list}");
+    assert!(list["engine"].as_str().is_some_and(|e| e.contains("built in")), "{list}");
     assert!(list["note"].as_str().is_some_and(|n| n.contains("refused") && n.contains("fetch it")), "{list}");
 }
 
@@ -286,9 +286,9 @@ fn the_shipped_models_are_timed() {
     let folder = cli_support::folder();
     let mut command = cli_support::command(&["models", "bench", "--json"]);
     command.env("FMLGS_MODELS", folder.path()).env("FMLGS_ONNXRUNTIME", "none").env("FMLGS_DEVICE", "cpu");
-    let tract = cli_support::Done::from(command.output().expect("runs")).ok().json();
-    assert!(tract["engine"].as_str().is_some_and(|e| e.contains("tract")));
-    let model = &tract["models"][0];
+    let timed = cli_support::Done::from(command.output().expect("runs")).ok().json();
+    assert!(timed["engine"].as_str().is_some_and(|e| e.contains("built in")));
+    let model = &timed["models"][0];
     let vector = |what: &str| -> Vec<f64> {
         model[what].as_array().expect("a vector").iter().map(|x| x.as_f64().expect("a number")).collect()
     };

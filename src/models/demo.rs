@@ -5,7 +5,8 @@ use std::borrow::Cow;
 use std::path::Path;
 
 use super::engine::engine;
-use super::network::{Network, Tensor};
+use super::network::Network;
+use super::tensor::Tensor;
 use super::vocabulary::Vocabulary;
 use super::{Encoder, IdentityCrop, ModelError};
 use crate::io::{IoError, files};

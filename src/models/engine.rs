@@ -1,4 +1,4 @@
-//! What runs networks: an ONNX Runtime library where there is one, the built-in engine (tract)
+//! What runs networks: an ONNX Runtime library where there is one, the built-in engine (RTen)
 //! otherwise. Chosen once, at the first use of a network.
 //!
 //! A library is taken from the path in `FMLGS_ONNXRUNTIME` or `ORT_DYLIB_PATH`, else from the
@@ -12,11 +12,11 @@ use std::sync::OnceLock;
 
 use ort::environment::Environment;
 use ort::ep::{CUDA, CoreML, DirectML, ExecutionProvider, ExecutionProviderDispatch, TensorRT};
-use ort::session::Session;
-use ort::session::builder::GraphOptimizationLevel;
+use ort::session::builder::{GraphOptimizationLevel, SessionBuilder};
 
 use super::manifest::{self, GraphFile};
-use super::network::{Network, guarded};
+use super::network::Network;
+use super::open_network::{OpenNetwork, guarded};
 use super::{ModelError, folder, session_cache};
 use crate::scene::resource_log::{self, ResourceKind};
 
@@ -26,10 +26,9 @@ const LIBRARY: &str = "onnxruntime.json";
 const MODEL_USE: &str = "its first use";
 
 pub(crate) struct Engine {
-    environment: Environment,
+    /// Of ONNX Runtime; the built-in engine needs none.
+    environment: Option<Environment>,
     name: String,
-    /// Whether it is ONNX Runtime.
-    is_runtime: bool,
     device: Option<Device>,
     note: Option<String>,
 }
@@ -86,7 +85,7 @@ impl Device {
 static CHOSEN: OnceLock<Result<Engine, (String, String)>> = OnceLock::new();
 
 /// Name of the engine that is built in.
-const BUILT_IN: &str = "tract (built in)";
+const BUILT_IN: &str = "RTen (built in)";
 
 /// What runs networks, or would if one were used now.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -204,8 +203,12 @@ impl Engine {
             let path = library?;
             loaded(&path).map(|builder| (builder, path.clone())).map_err(|problem| (path, problem))
         });
-        let (builder, name, is_runtime) = match opened {
-            Some(Ok((builder, path))) => (builder, format!("ONNX Runtime ({})", path.display()), true),
+        let (environment, name) = match opened {
+            Some(Ok((builder, path))) => {
+                let name = format!("ONNX Runtime ({})", path.display());
+                let environment = builder.build().map_err(|e| (name.clone(), e.to_string()))?;
+                (Some(environment), name)
+            }
             other => {
                 if let Some(Err((path, problem))) = other {
                     note = Some(format!(
@@ -215,13 +218,11 @@ impl Engine {
                         path.display()
                     ));
                 }
-                ort::set_api(ort_tract::api());
-                (ort::init(), BUILT_IN.to_owned(), false)
+                (None, BUILT_IN.to_owned())
             }
         };
-        let environment = builder.build().map_err(|e| (name.clone(), e.to_string()))?;
         let wanted = std::env::var("FMLGS_DEVICE").unwrap_or_default();
-        let device = match (is_runtime, wanted.as_str()) {
+        let device = match (environment.is_some(), wanted.as_str()) {
             (false, _) | (true, "cpu") => None,
             (true, "") => Device::TRIED.into_iter().find(|d| d.is_offered()),
             (true, name) => {
@@ -234,7 +235,7 @@ impl Engine {
                 device
             }
         };
-        Ok(Self { environment, name, is_runtime, device, note })
+        Ok(Self { environment, name, device, note })
     }
 
     pub(crate) fn name(&self) -> &str {
@@ -243,7 +244,7 @@ impl Engine {
 
     /// Whether it is ONNX Runtime.
     pub(crate) fn is_fast(&self) -> bool {
-        self.is_runtime
+        self.environment.is_some()
     }
 
     pub(crate) fn device(&self) -> &'static str {
@@ -257,7 +258,11 @@ impl Engine {
 
     pub(crate) fn load(&self, bytes: &[u8], name: &str) -> Result<Network, ModelError> {
         resource_log::record(ResourceKind::Model, format!("network {name}"), MODEL_USE, bytes.len() as u64);
-        Ok(Network::new(self.prepare(name, |builder| builder.commit_from_memory(bytes))?, name))
+        let session = match &self.environment {
+            Some(environment) => self.prepare(environment, name, |builder| builder.commit_from_memory(bytes)),
+            None => guarded(|| OpenNetwork::built_in(bytes)),
+        };
+        Ok(Network::new(session.map_err(|problem| self.refused(name, problem))?, name))
     }
 
     pub(crate) fn load_file(&self, path: &Path) -> Result<Network, ModelError> {
@@ -267,21 +272,31 @@ impl Engine {
     }
 
     /// A session of a network in a file, for which room is made.
-    pub(super) fn session(&self, path: &Path) -> Result<Session, ModelError> {
+    pub(super) fn session(&self, path: &Path) -> Result<OpenNetwork, ModelError> {
         let bytes = std::fs::metadata(path).map_or(0, |m| m.len());
-        resource_log::record(ResourceKind::Model, format!("network {}", path.display()), MODEL_USE, bytes);
+        let name = path.display().to_string();
+        resource_log::record(ResourceKind::Model, format!("network {name}"), MODEL_USE, bytes);
         session_cache::make(bytes);
-        self.prepare(&path.display().to_string(), |builder| builder.commit_from_file(path))
+        let session = match &self.environment {
+            Some(environment) => self.prepare(environment, &name, |builder| builder.commit_from_file(path)),
+            None => guarded(|| OpenNetwork::built_in_file(path)),
+        };
+        session.map_err(|problem| self.refused(&name, problem))
+    }
+
+    fn refused(&self, name: &str, problem: String) -> ModelError {
+        let engine = if self.is_fast() { "ONNX Runtime" } else { "built-in" };
+        ModelError::Load { model: name.into(), engine, problem }
     }
 
     fn prepare(
         &self,
+        environment: &Environment,
         name: &str,
-        commit: impl Fn(&mut ort::session::builder::SessionBuilder) -> ort::Result<Session>,
-    ) -> Result<Session, ModelError> {
-        let load = |device: Option<Device>| -> ort::Result<Session> {
-            let builder = Session::builder(&self.environment)?;
-            // Not asked to optimize, the built-in engine prepares nothing and is ten times slower.
+        commit: impl Fn(&mut SessionBuilder) -> ort::Result<ort::session::Session>,
+    ) -> Result<OpenNetwork, String> {
+        let load = |device: Option<Device>| -> ort::Result<ort::session::Session> {
+            let builder = ort::session::Session::builder(environment)?;
             let mut builder = builder.with_optimization_level(GraphOptimizationLevel::Level3)?;
             if let Some(device) = device {
                 builder = builder.with_execution_providers([device.provider()])?;
@@ -294,12 +309,11 @@ impl Engine {
             resource_log::record(ResourceKind::Model, what, MODEL_USE, 0);
             load(None)
         };
-        let session = guarded(name, || match self.device {
+        let loaded = || match self.device {
             Some(device) => load(Some(device)).or_else(|e| refused(device, e)),
             None => load(None),
-        });
-        let engine = if self.is_fast() { "ONNX Runtime" } else { "built-in" };
-        session.map_err(|problem| ModelError::Load { model: name.into(), engine, problem })
+        };
+        guarded(|| loaded().map(OpenNetwork::Runtime).map_err(|e| e.to_string()))
     }
 }
 

@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::clip::ClipEncoder;
-use super::network::Tensor;
 use super::sam::{PromptedMasks, Sam, in_square};
 use super::sam2::Sam2;
+use super::tensor::Tensor;
 use super::{Encoder, ModelError, manifest};
 use crate::math::vector::dot;
 use crate::scene::PhotoPixels;

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 use serde_json::json;
 
-use super::network::{Network, Tensor};
+use super::network::Network;
+use super::tensor::Tensor;
 use super::{ModelError, manifest};
 use crate::math::resize::nearest;
 

@@ -1,85 +1,13 @@
 //! A network: named arrays in, named arrays out.
 
 use std::collections::BTreeMap;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Instant;
 
-use ort::session::{Session, SessionInputValue};
-
 use super::ModelError;
+use super::open_network::OpenNetwork;
 use super::session_cache::{self, CachedSession};
-
-/// Numbers with a shape, row-major.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Tensor<T = f32> {
-    /// Length of each axis.
-    pub shape: Vec<usize>,
-    /// As many numbers as the axes' product.
-    pub values: Vec<T>,
-}
-
-impl<T: Clone> Tensor<T> {
-    /// An array; its numbers have to fill its shape.
-    pub fn new(shape: &[usize], values: Vec<T>) -> Self {
-        debug_assert_eq!(shape.iter().product::<usize>(), values.len(), "{shape:?}");
-        Self { shape: shape.to_vec(), values }
-    }
-
-    /// The same number everywhere.
-    pub fn filled(shape: &[usize], value: T) -> Self {
-        Self { shape: shape.to_vec(), values: vec![value; shape.iter().product()] }
-    }
-
-    /// Arrays of one shape one after another along their first axis.
-    pub fn joined<'a>(parts: impl IntoIterator<Item = &'a Self>) -> Self
-    where
-        T: 'a,
-    {
-        let mut joined: Option<Self> = None;
-        for part in parts {
-            match &mut joined {
-                None => joined = Some(part.clone()),
-                Some(all) => {
-                    all.shape[0] += part.shape[0];
-                    all.values.extend_from_slice(&part.values);
-                }
-            }
-        }
-        joined.unwrap_or_else(|| Self { shape: vec![0], values: Vec::new() })
-    }
-
-    /// The `i`-th piece along the first axis, which stays, with length 1.
-    pub fn row(&self, i: usize) -> Self {
-        let n = self.values.len() / self.shape[0].max(1);
-        let mut shape = self.shape.clone();
-        shape[0] = 1;
-        Self { shape, values: self.values[i * n..(i + 1) * n].to_vec() }
-    }
-}
-
-pub(crate) enum NetworkInput {
-    Floats(Tensor<f32>),
-    Ints(Tensor<i64>),
-}
-
-impl From<Tensor<f32>> for NetworkInput {
-    fn from(array: Tensor<f32>) -> Self {
-        Self::Floats(array)
-    }
-}
-
-impl From<&Tensor<f32>> for NetworkInput {
-    fn from(array: &Tensor<f32>) -> Self {
-        Self::Floats(array.clone())
-    }
-}
-
-impl From<Tensor<i64>> for NetworkInput {
-    fn from(array: Tensor<i64>) -> Self {
-        Self::Ints(array)
-    }
-}
+use super::tensor::{NetworkInput, Tensor};
 
 /// What comes out of a network, by name.
 #[derive(Clone, Debug, Default)]
@@ -94,7 +22,7 @@ impl Outputs {
     }
 }
 
-type Reopen = Box<dyn Fn() -> Result<Session, ModelError> + Send + Sync>;
+type Reopen = Box<dyn Fn() -> Result<OpenNetwork, ModelError> + Send + Sync>;
 
 pub(crate) struct Network {
     place: Arc<Mutex<CachedSession>>,
@@ -105,12 +33,12 @@ pub(crate) struct Network {
 
 impl Network {
     /// Of a session, with the file name for messages.
-    pub(super) fn new(session: Session, name: &str) -> Self {
+    pub(super) fn new(session: OpenNetwork, name: &str) -> Self {
         Self { place: CachedSession::of(session), name: name.into(), reopen: None }
     }
 
     /// The same, known to lie in a file that `reopen` opens: it may be closed where memory is short.
-    pub(super) fn in_file(self, reopen: impl Fn() -> Result<Session, ModelError> + Send + Sync + 'static) -> Self {
+    pub(super) fn in_file(self, reopen: impl Fn() -> Result<OpenNetwork, ModelError> + Send + Sync + 'static) -> Self {
         session_cache::register(&self.place);
         Self { reopen: Some(Box::new(reopen)), ..self }
     }
@@ -127,39 +55,26 @@ impl Network {
         let Some(session) = &mut place.session else {
             return Err(ModelError::Run { model: name, problem: "it is closed".into() });
         };
-        let failed = |e: ort::Error| ModelError::Run { model: name.clone(), problem: e.to_string() };
-        let mut given: Vec<(&'static str, SessionInputValue<'_>)> = Vec::with_capacity(inputs.len());
-        for (input, value) in inputs {
-            let value: SessionInputValue<'_> = match value {
-                NetworkInput::Floats(a) => tensor(a).map_err(failed)?,
-                NetworkInput::Ints(a) => tensor(a).map_err(failed)?,
-            };
-            given.push((input, value));
-        }
-        for (input, value) in &given {
+        for (input, value) in &inputs {
             let shape = value.shape();
-            let wanted = session.inputs().iter().find(|i| i.name() == *input).and_then(|i| i.dtype().tensor_shape());
-            // Lengths that are left open are below 0. An engine may do worse than fail on another shape.
-            let differs = |w: &&ort::value::Shape| {
-                w.len() != shape.len() || w.iter().zip(shape.iter()).any(|(w, got)| *w >= 0 && w != got)
+            // An engine may do worse than fail on another shape.
+            let differs = |w: &Vec<Option<usize>>| {
+                w.len() != shape.len() || w.iter().zip(shape).any(|(w, got)| w.is_some_and(|w| w != *got))
             };
-            if let Some(wanted) = wanted.filter(differs) {
-                let problem = format!("it takes {wanted:?} as '{input}', not {shape:?}; its description does not fit");
-                return Err(ModelError::Run { model: name.clone(), problem });
+            if let Some(wanted) = session.wanted_shape(input).filter(differs) {
+                let wanted: Vec<String> = wanted.iter().map(|n| n.map_or("any".into(), |n| n.to_string())).collect();
+                let wanted = wanted.join(", ");
+                let problem = format!("it takes [{wanted}] as '{input}', not {shape:?}; its description does not fit");
+                return Err(ModelError::Run { model: name, problem });
             }
         }
-        let outputs = guarded(&name, || session.run(given))
-            .map_err(|problem| ModelError::Run { model: name.clone(), problem })?;
-        let mut arrays = BTreeMap::new();
-        for (output, value) in outputs.iter() {
-            let (shape, values) = value.try_extract_tensor::<f32>().map_err(failed)?;
-            if let Some(index) = values.iter().position(|v| !v.is_finite()) {
-                return Err(ModelError::NotFinite { model: name.clone(), index, value: values[index] });
+        let arrays = session.run(inputs).map_err(|problem| ModelError::Run { model: name.clone(), problem })?;
+        for array in arrays.values() {
+            if let Some(index) = array.values.iter().position(|v| !v.is_finite()) {
+                return Err(ModelError::NotFinite { model: name, index, value: array.values[index] });
             }
-            let shape = shape.iter().map(|n| usize::try_from(*n).unwrap_or(0)).collect();
-            arrays.insert(output.to_owned(), Tensor { shape, values: values.to_vec() });
         }
-        Ok(Outputs { model: name.clone(), arrays })
+        Ok(Outputs { model: name, arrays })
     }
 
     /// The rows of an output, each scaled to unit length; `length` numbers in each are expected.
@@ -175,22 +90,6 @@ impl Network {
             return Err(ModelError::Output { model: self.name.clone(), expected: length, got });
         }
         rows.values.chunks_exact(length).map(|row| unit(row, &self.name)).collect()
-    }
-}
-
-fn tensor<T>(array: Tensor<T>) -> ort::Result<SessionInputValue<'static>>
-where
-    T: ort::value::PrimitiveTensorElementType + std::fmt::Debug + Clone + 'static,
-{
-    let shape: Vec<i64> = array.shape.iter().map(|n| *n as i64).collect();
-    Ok(SessionInputValue::from(ort::value::Tensor::from_array((shape, array.values))?))
-}
-
-/// What an engine makes of a model; a panic in it is an error as any other.
-pub(super) fn guarded<T>(name: &str, work: impl FnOnce() -> ort::Result<T>) -> Result<T, String> {
-    match catch_unwind(AssertUnwindSafe(work)) {
-        Ok(done) => done.map_err(|e| e.to_string()),
-        Err(_) => Err(format!("the engine gave up on {name}; its file is damaged, or made for another engine")),
     }
 }
 
@@ -214,13 +113,5 @@ mod tests {
         for bad in [[1.0, f32::NAN], [f32::INFINITY, 1.0], [0.0, 0.0], [1e-9, 0.0]] {
             assert!(matches!(unit(&bad, "m"), Err(ModelError::NotFinite { .. })), "{bad:?}");
         }
-    }
-
-    #[test]
-    fn arrays_join_and_part_along_their_first_axis() {
-        let (a, b) = (Tensor::new(&[1, 2], vec![1.0, 2.0]), Tensor::new(&[2, 2], vec![3.0, 4.0, 5.0, 6.0]));
-        let both = Tensor::joined([&a, &b]);
-        assert_eq!((both.shape.as_slice(), both.row(2)), ([3, 2].as_slice(), Tensor::new(&[1, 2], vec![5.0, 6.0])));
-        assert_eq!(Tensor::<f32>::joined([]).values.len(), 0);
     }
 }

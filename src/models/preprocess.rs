@@ -1,7 +1,7 @@
 //! Pictures as networks take them: resized as Pillow does, which the networks were trained with,
 //! then normalized.
 
-use super::network::Tensor;
+use super::tensor::Tensor;
 use crate::math::resize::{Filter, resize};
 use crate::scene::PhotoPixels;
 

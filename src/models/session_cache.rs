@@ -4,8 +4,7 @@
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Instant;
 
-use ort::session::Session;
-
+use super::open_network::OpenNetwork;
 use crate::io::memory;
 
 /// Memory that an open network takes, as a multiple of its file's size: weights, their packed copies,
@@ -17,14 +16,14 @@ const SPARE: u64 = 512 << 20;
 /// An open network, or the place of one that was closed.
 pub(super) struct CachedSession {
     /// `None` while it is closed.
-    pub(crate) session: Option<Session>,
+    pub(crate) session: Option<OpenNetwork>,
     /// When it was last asked.
     pub(crate) used: Instant,
 }
 
 impl CachedSession {
     /// The place of a network that was opened just now.
-    pub(crate) fn of(session: Session) -> Arc<Mutex<Self>> {
+    pub(crate) fn of(session: OpenNetwork) -> Arc<Mutex<Self>> {
         Arc::new(Mutex::new(Self { session: Some(session), used: Instant::now() }))
     }
 }

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use fmlgs::math::stats;
-use fmlgs::models::network::Tensor;
+use fmlgs::models::tensor::Tensor;
 use fmlgs::scene::PhotoPixels;
 use safetensors::{Dtype, SafeTensors};
 use serde_json::Value;

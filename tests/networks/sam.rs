@@ -1,12 +1,12 @@
 //! SAM and SAM 2 on single pictures, and their automatic masks.
 
 use fmlgs::math::resize::{Filter, resize};
-use fmlgs::models::network::Tensor;
 use fmlgs::models::preprocess::{FitSide, enlarge};
 use fmlgs::models::sam::automatic::{AutomaticMask, AutomaticOptions, MaskCollector, crops, everything};
 use fmlgs::models::sam::{PromptedMasks, Sam};
 use fmlgs::models::sam2::Sam2;
 use fmlgs::models::session_cache::close_idle;
+use fmlgs::models::tensor::Tensor;
 use fmlgs::scene::Mask;
 use serde_json::Value;
 

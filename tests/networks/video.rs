@@ -3,10 +3,10 @@
 use std::collections::BTreeMap;
 
 use fmlgs::math::stats;
-use fmlgs::models::network::Tensor;
 use fmlgs::models::sam2::Sam2;
 use fmlgs::models::sam2::sequence::{FrameSource, InMemory, ObjectId, Output};
 use fmlgs::models::sam2::track::{Prompt, Track, mask_of};
+use fmlgs::models::tensor::Tensor;
 use fmlgs::models::{ModelError, sam2::EncodedFrame};
 use fmlgs::scene::Mask;
 use serde_json::Value;

@@ -32,18 +32,19 @@ class Encoder(torch.nn.Module):
         super().__init__()
         self.model = model
         trunk, side = model.image_encoder.trunk, model.image_size // 4
-        # The table is stretched with a bicubic filter: by the graph, as products.
-        trunk._get_pos_embed = lambda size: stretched(trunk, side)
+        # The table is stretched with a bicubic filter: by the graph, as products with a matrix that is made here, as
+        # not every engine can make it.
+        up = matrices.resizing(trunk.pos_embed.shape[-1], side, False, "bicubic")
+        trunk._get_pos_embed = lambda size: stretched(trunk, side, up)
 
     def forward(self, image):
         maps = self.model.forward_image(image)["backbone_fpn"]
         return maps[2], maps[0], maps[1]
 
 
-def stretched(trunk, side):
+def stretched(trunk, side, up):
     """The official `_get_pos_embed` of a square, with products."""
     table, window = trunk.pos_embed, trunk.pos_embed_window
-    up = matrices.resizing(table.shape[-1], side, False, "bicubic")
     tiles = side // window.shape[-1]
     tiled = torch.cat([torch.cat([window] * tiles, dim=2)] * tiles, dim=3)
     return (up @ table @ up.T + tiled).permute(0, 2, 3, 1)

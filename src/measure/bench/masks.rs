@@ -6,10 +6,10 @@ use serde::Serialize;
 
 use super::super::table::{Rows, rows};
 use crate::models::ModelError;
-use crate::models::network::Tensor;
 use crate::models::preprocess::FitSide;
 use crate::models::sam::automatic::{AutomaticOptions, everything};
 use crate::models::sam::{Prompted, PromptedMasks};
+use crate::models::tensor::Tensor;
 use crate::scene::PhotoPixels;
 
 #[derive(Clone, Debug, PartialEq, Serialize)]

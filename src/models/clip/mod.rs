@@ -1,6 +1,7 @@
 //! CLIP and its relatives: pictures and phrases as vectors of one space, by two networks that
 //! `tools/export/export_clip.py` makes of an official checkpoint.
 
+mod repair;
 pub mod tokens;
 
 use std::path::{Path, PathBuf};
@@ -8,8 +9,9 @@ use std::path::{Path, PathBuf};
 use serde::Deserialize;
 
 use self::tokens::Tokens;
-use super::network::{Network, Tensor};
+use super::network::Network;
 use super::preprocess::{FitSide, Prepare};
+use super::tensor::Tensor;
 use super::{Encoder, IdentityCrop, ModelError, manifest};
 use crate::math::resize::Filter;
 use crate::scene::PhotoPixels;

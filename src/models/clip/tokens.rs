@@ -2,6 +2,8 @@
 
 use instant_clip_tokenizer::Tokenizer;
 
+use super::repair::repaired;
+
 /// Turns phrases into rows of tokens.
 pub struct Tokens {
     tokenizer: Tokenizer,
@@ -28,8 +30,9 @@ impl Tokens {
 
 /// A text with its encoding repaired and its entities resolved.
 pub fn clean(text: &str) -> String {
-    let repaired = plsfix::fix_text(&without_escapes(text), None);
-    let once = htmlize::unescape(repaired.as_str()).into_owned();
+    // ftfy takes a text without tags for one whose entities were to be shown.
+    let text = if text.contains('<') { text.into() } else { htmlize::unescape(text) };
+    let once = htmlize::unescape(repaired(&without_escapes(&text))).into_owned();
     htmlize::unescape(once.as_str()).trim_matches(is_space).to_owned()
 }
 

@@ -228,10 +228,10 @@ fn both_engines_agree() {
         let json = text.lines().find_map(|line| line.strip_prefix(MARK)).unwrap_or_else(|| panic!("{text}"));
         serde_json::from_str(json).unwrap()
     };
-    let ((tract, a), (runtime, b)) = (of("none".as_ref()), of(library.as_os_str()));
-    assert!(tract.starts_with("tract") && runtime.starts_with("ONNX Runtime"), "{tract}, {runtime}");
+    let ((built_in, a), (runtime, b)) = (of("none".as_ref()), of(library.as_os_str()));
+    assert!(built_in.starts_with("RTen") && runtime.starts_with("ONNX Runtime"), "{built_in}, {runtime}");
     let largest = |b: &[Vec<f32>]| worst(a.iter().zip(b).map(|(a, b)| worst_difference(a, b)));
-    println!("{runtime} against {tract}: {:e}", largest(&b));
+    println!("{runtime} against {built_in}: {:e}", largest(&b));
     assert!(a.len() == b.len() && largest(&b) < 1e-4, "{:e}", largest(&b));
     // Control: the vectors of others.
     let mut others = b;

@@ -8,8 +8,8 @@ use super::grid_points::GridPoints;
 use super::{Prompted, PromptedMasks, in_square};
 use crate::math::grid::regions;
 use crate::models::ModelError;
-use crate::models::network::Tensor;
 use crate::models::preprocess::{FitSide, enlarge};
+use crate::models::tensor::Tensor;
 use crate::scene::{Mask, PhotoPixels};
 
 /// Settings; the defaults are LangSplat's.

@@ -10,8 +10,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::network::{Network, Tensor};
+use super::network::Network;
 use super::preprocess::{FitSide, Prepare};
+use super::tensor::Tensor;
 use super::{ModelError, manifest};
 use crate::math::resize::Filter;
 use crate::scene::PhotoPixels;
@@ -148,7 +149,7 @@ pub(super) fn prompt_inputs(
     labels: Tensor,
     earlier: Option<Tensor>,
     side_px: usize,
-) -> Vec<(&'static str, super::network::NetworkInput)> {
+) -> Vec<(&'static str, super::tensor::NetworkInput)> {
     let (n, low) = (points.shape[0], side_px / 4);
     let has = Tensor::filled(&[n], if earlier.is_some() { 1.0 } else { 0.0 });
     let mask = earlier.unwrap_or_else(|| Tensor::filled(&[n, 1, low, low], 0.0));

@@ -11,9 +11,10 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::network::{Network, Tensor};
+use super::network::Network;
 use super::preprocess::{FitSide, Prepare};
 use super::sam::{Prompted, PromptedMasks, prompt_inputs};
+use super::tensor::Tensor;
 use super::{ModelError, manifest};
 use crate::math::resize::{Filter, resize};
 use crate::scene::PhotoPixels;

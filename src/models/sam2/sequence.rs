@@ -2,7 +2,7 @@
 
 use super::{EncodedFrame, Sam2};
 use crate::models::ModelError;
-use crate::models::network::Tensor;
+use crate::models::tensor::Tensor;
 use crate::scene::PhotoPixels;
 
 /// The caller's number of an object.

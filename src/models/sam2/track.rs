@@ -8,7 +8,7 @@ use super::{Decoded, EncodedFrame, Sam2};
 use crate::math::grid::regions;
 use crate::math::resize::{Filter, resize};
 use crate::models::ModelError;
-use crate::models::network::Tensor;
+use crate::models::tensor::Tensor;
 use crate::scene::Mask;
 
 /// What marks an object in a frame.

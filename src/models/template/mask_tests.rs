@@ -7,11 +7,11 @@ use super::tests::{Weights, fixture, store, swap, transpose, weights_of};
 use super::*;
 use crate::math::stats;
 use crate::models::manifest;
-use crate::models::network::Tensor;
 use crate::models::sam::{PromptedMasks, Sam};
 use crate::models::sam2::Sam2;
 use crate::models::sam2::sequence::InMemory;
 use crate::models::sam2::track::{Prompt, Track};
+use crate::models::tensor::Tensor;
 use crate::scene::PhotoPixels;
 
 /// An official file, the template that it fills, and what both describe.

@@ -7,7 +7,7 @@ use safetensors::tensor::{Dtype, TensorView};
 use super::*;
 use crate::math::stats;
 use crate::models::clip::ClipEncoder;
-use crate::models::network::Tensor;
+use crate::models::tensor::Tensor;
 
 pub(super) type Weights = BTreeMap<String, (Vec<usize>, Vec<f32>)>;
 

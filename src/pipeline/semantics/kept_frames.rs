@@ -8,9 +8,9 @@ use sha2::{Digest, Sha256};
 
 use crate::io::{atomic, files, photo};
 use crate::models::ModelError;
-use crate::models::network::Tensor;
 use crate::models::sam2::sequence::FrameSource;
 use crate::models::sam2::{EncodedFrame, Sam2};
+use crate::models::tensor::Tensor;
 use crate::scene::Photo;
 
 /// Frames that are looked at once, then read from disk.

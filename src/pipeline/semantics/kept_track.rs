@@ -10,8 +10,8 @@ use sha2::{Digest, Sha256};
 use super::kept_frames::{put, take};
 use crate::io::labels::rle::Rle;
 use crate::io::{atomic, files};
-use crate::models::network::Tensor;
 use crate::models::sam2::sequence::{Output, TrackHistory, TrackStep};
+use crate::models::tensor::Tensor;
 use crate::scene::Mask;
 
 /// Largest file of kept masks, and largest record of a frame, bytes.

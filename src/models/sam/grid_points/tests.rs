@@ -1,10 +1,10 @@
 //! A network that knows what is there: things within things, each point answered with those that it lies in.
 
 use crate::models::ModelError;
-use crate::models::network::Tensor;
 use crate::models::preprocess::FitSide;
 use crate::models::sam::automatic::{AutomaticOptions, everything};
 use crate::models::sam::{Prompted, PromptedMasks};
+use crate::models::tensor::Tensor;
 use crate::scene::{Mask, PhotoPixels};
 
 /// Side of the picture and of the network's square, px, and of its low-resolution masks.

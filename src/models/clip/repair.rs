@@ -1,0 +1,110 @@
+//! Text as ftfy leaves it for what people type and paste, which OpenCLIP's tokens are made of: characters that were
+//! read in the wrong encoding, curly quotes, wide letters, ligatures and control characters.
+
+use unicode_normalization::UnicodeNormalization;
+
+/// The text, repaired. Of wrong encodings one is known, UTF-8 that was read as Windows-1252.
+pub(super) fn repaired(text: &str) -> String {
+    let mut text = text.to_owned();
+    // What went through the wrong encoding twice is mended twice.
+    while let Some(better) = decoded(&text) {
+        text = better;
+    }
+    let text: String = text.chars().map(|c| windows_1252(c as u32).filter(|_| is_c1(c)).unwrap_or(c)).collect();
+    let text = text.replace("\r\n", "\n");
+    let kept = text.chars().filter(|c| !is_control(*c));
+    kept.flat_map(|c| plain(c).chars().collect::<Vec<char>>()).nfc().collect()
+}
+
+/// With every character whose UTF-8 was read as Windows-1252; `None` if there is none.
+fn decoded(text: &str) -> Option<String> {
+    let chars: Vec<char> = text.chars().collect();
+    let mut better = String::with_capacity(text.len());
+    let mut at = 0;
+    while at < chars.len() {
+        match sequence(&chars[at..]) {
+            Some((c, n)) => {
+                better.push(c);
+                at += n;
+            }
+            None => {
+                better.push(chars[at]);
+                at += 1;
+            }
+        }
+    }
+    (better != text).then_some(better)
+}
+
+/// The character whose UTF-8 stands at the beginning, one byte a character, and how many those are.
+fn sequence(chars: &[char]) -> Option<(char, usize)> {
+    let first = byte(*chars.first()?)?;
+    // Of two bytes, only what is not likely to be meant: a capital with a quote after it is.
+    let n = match first {
+        0xc2 | 0xc3 => 2,
+        0xe0..=0xef => 3,
+        0xf0..=0xf4 => 4,
+        _ => return None,
+    };
+    let bytes = chars.get(..n)?.iter().map(|c| byte(*c)).collect::<Option<Vec<u8>>>()?;
+    Some((std::str::from_utf8(&bytes).ok()?.chars().next()?, n))
+}
+
+/// What Windows-1252 has at 0x80 and after; what it leaves open stands for itself.
+const HIGH: [char; 32] = [
+    '€', '\u{81}', '‚', 'ƒ', '„', '…', '†', '‡', 'ˆ', '‰', 'Š', '‹', 'Œ', '\u{8d}', 'Ž', '\u{8f}', '\u{90}', '‘', '’',
+    '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{9d}', 'ž', 'Ÿ',
+];
+
+fn windows_1252(byte: u32) -> Option<char> {
+    HIGH.get(byte.checked_sub(0x80)? as usize).copied()
+}
+
+/// The byte of a character in Windows-1252.
+fn byte(c: char) -> Option<u8> {
+    match HIGH.iter().position(|h| *h == c) {
+        Some(at) => u8::try_from(0x80 + at).ok(),
+        None => u8::try_from(c as u32).ok(),
+    }
+}
+
+fn is_c1(c: char) -> bool {
+    ('\u{80}'..='\u{9f}').contains(&c)
+}
+
+/// Control characters that stand for nothing.
+fn is_control(c: char) -> bool {
+    matches!(c, '\0'..='\u{8}' | '\u{b}' | '\u{e}'..='\u{1f}' | '\u{7f}' | '\u{206a}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffc}')
+}
+
+/// A character as it is written plainly.
+fn plain(c: char) -> String {
+    match c {
+        '\u{2bc}' | '\u{2018}'..='\u{201b}' => "'".into(),
+        '\u{201c}'..='\u{201f}' => "\"".into(),
+        '\r' | '\u{2028}' | '\u{2029}' => "\n".into(),
+        // Ligatures and letters of other widths.
+        'Ĳ' | 'ĳ' | 'ŉ' | 'Ǆ'..='ǌ' | 'Ǳ'..='ǳ' | '\u{fb00}'..='\u{fb06}' | '\u{ff01}'..='\u{ffee}' | '\u{3000}' => {
+            std::iter::once(c).nfkc().collect()
+        }
+        _ => c.into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_read_in_the_wrong_encoding_is_mended_and_what_was_meant_stays() {
+        for (wrong, right) in [("dÃ©jÃ\u{a0} vu", "déjà vu"), ("ÃƒÂ©", "é"), ("donâ€™t", "don't"), ("ðŸ˜€", "😀")]
+        {
+            assert_eq!(repaired(wrong), right);
+        }
+        for meant in ["CAFÉ'S", "Ã la carte", "naïve", "10 µm ± 2", "Ångström", "ÄÖÜ", ""] {
+            assert_eq!(repaired(meant), meant);
+        }
+        // A capital before a curly quote would be a character of two bytes.
+        assert_eq!(repaired("CAFÉ’S"), "CAFÉ'S");
+    }
+}
