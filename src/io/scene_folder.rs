@@ -52,13 +52,16 @@ impl SceneFolder {
         moved.map_err(|cause| write_error(to, cause))
     }
 
-    /// Deletes the scene, which is in the state `known`, with its folder.
+    /// Deletes the scene in `folder`, which is in the state `known`, with the folder.
     ///
     /// # Errors
     /// [`IoError::Changed`] if it is not in that state any more, [`IoError::HoldsMore`] if the folder holds anything
     /// else; nothing is deleted then.
-    pub(crate) fn delete(self, known: Option<&str>) -> Result<(), IoError> {
-        let folder = self.path().to_path_buf();
+    pub(crate) fn delete(folder: &Path, known: Option<&str>) -> Result<(), IoError> {
+        // Holding would make the folder anew if somebody else deleted it.
+        load_info(folder)?;
+        let held = Self::hold(folder, "deleting")?;
+        let folder = folder.to_path_buf();
         if load_info(&folder)?.state.as_deref() != known {
             return Err(IoError::Changed { folder });
         }
@@ -70,7 +73,7 @@ impl SceneFolder {
         }
         // Its place is empty at once; what a killed process leaves undeleted is swept away.
         // Windows does not move a folder in which a file is open.
-        let _held = (!cfg!(windows)).then_some(self.lock);
+        let _held = (!cfg!(windows)).then_some(held);
         let gone = temporary_folder(files::folder_of(&folder), "deleted");
         gone.and_then(|gone| fs::rename(&folder, gone.folder.path().join("scene"))).map_err(|e| write_error(&folder, e))
     }

@@ -73,7 +73,7 @@ pub struct RemovedScene {
 impl RemovedScene {
     /// Deletes it with its folder, if it is as it was stored, and nothing else is there.
     pub(crate) fn delete(&self) -> Result<(), IoError> {
-        SceneFolder::hold(&self.folder, "deleting")?.delete(self.state.as_deref())
+        SceneFolder::delete(&self.folder, self.state.as_deref())
     }
 }
 

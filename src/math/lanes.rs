@@ -3,10 +3,18 @@
 //!
 //! A kernel is a [`LaneOp`]; [`Real::vectorize`] runs it with the best [`Lanes`] for its type.
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+
 use super::Real;
+use super::fast_exp::SMALLEST;
+#[cfg(target_arch = "x86_64")]
+pub(super) use avx2::run as run_avx2;
 
 /// Numbers per vector.
 pub(crate) const LANES: usize = 8;
+/// The bits of all of them.
+const ALL: u32 = (1 << LANES) - 1;
 
 /// Eight numbers in memory.
 pub type Lane<R> = [R; LANES];
@@ -48,6 +56,31 @@ pub trait Lanes<R: Real>: Copy + Send + Sync {
     fn bits(self, mask: Self::M) -> u32;
     /// [`Real::exp_neg`].
     fn exp_neg(self, v: Self::V) -> Self::V;
+
+    /// [`Real::exp`].
+    #[inline(always)]
+    fn exp(self, v: Self::V) -> Self::V {
+        // The fast form holds for positive numbers too, up to where the exponent field ends.
+        let (most, least) = (self.splat(R::of(f64::from(-SMALLEST))), self.splat(R::of(f64::from(SMALLEST))));
+        if self.bits(self.both(self.ge(most, v), self.ge(v, least))) == ALL {
+            return self.exp_neg(v);
+        }
+        let mut each = self.store(v);
+        for x in &mut each {
+            *x = Real::exp(*x);
+        }
+        self.load(&each)
+    }
+
+    /// Natural logarithm of positive numbers that are not subnormal, within 5e-7 in `f32`; of others, any number.
+    #[inline(always)]
+    fn ln(self, v: Self::V) -> Self::V {
+        let mut each = self.store(v);
+        for x in &mut each {
+            *x = Real::ln(*x);
+        }
+        self.load(&each)
+    }
 
     /// `a` where the mask holds, else 0.
     #[inline(always)]
@@ -145,126 +178,6 @@ impl<R: Real> Lanes<R> for Plain {
     }
 }
 
-/// `f32` through AVX2 and FMA.
-#[cfg(target_arch = "x86_64")]
-mod avx2 {
-    use pulp::x86::V3;
-    use pulp::{f32x8, m32x8, u32x8};
-
-    use super::{LANES, Lane, LaneOp, Lanes};
-
-    macro_rules! instructions {
-        ($($name:ident $instruction:ident),*) => {$(
-            #[inline(always)]
-            fn $name(self, a: f32x8, b: f32x8) -> f32x8 {
-                self.$instruction(a, b)
-            }
-        )*};
-    }
-
-    impl Lanes<f32> for V3 {
-        type V = f32x8;
-        type M = m32x8;
-        #[inline(always)]
-        fn splat(self, x: f32) -> f32x8 {
-            self.splat_f32x8(x)
-        }
-        #[inline(always)]
-        fn load(self, x: &Lane<f32>) -> f32x8 {
-            bytemuck::cast(*x)
-        }
-        #[inline(always)]
-        fn store(self, v: f32x8) -> Lane<f32> {
-            bytemuck::cast(v)
-        }
-        instructions! { add add_f32x8, sub sub_f32x8, mul mul_f32x8, div div_f32x8, min min_f32x8, max max_f32x8 }
-        #[inline(always)]
-        fn mul_add(self, a: f32x8, b: f32x8, c: f32x8) -> f32x8 {
-            self.mul_add_f32x8(a, b, c)
-        }
-        #[inline(always)]
-        fn ge(self, a: f32x8, b: f32x8) -> m32x8 {
-            self.cmp_ge_f32x8(a, b)
-        }
-        #[inline(always)]
-        fn gt(self, a: f32x8, b: f32x8) -> m32x8 {
-            self.cmp_gt_f32x8(a, b)
-        }
-        #[inline(always)]
-        fn both(self, a: m32x8, b: m32x8) -> m32x8 {
-            self.and_m32x8(a, b)
-        }
-        #[inline(always)]
-        fn select(self, mask: m32x8, a: f32x8, b: f32x8) -> f32x8 {
-            self.select_f32x8(mask, a, b)
-        }
-        #[inline(always)]
-        fn sqrt(self, v: f32x8) -> f32x8 {
-            self.sqrt_f32x8(v)
-        }
-        #[inline(always)]
-        fn bits(self, mask: m32x8) -> u32 {
-            let all: u32x8 = self.select_u32x8(mask, self.splat_u32x8(!0), self.splat_u32x8(0));
-            self.avx._mm256_movemask_ps(bytemuck::cast(all)) as u32
-        }
-        #[inline(always)]
-        fn sums(self, v: [f32x8; LANES]) -> f32x8 {
-            // Neighbors are added three times over; what is left are two halves.
-            let pairs = |a: f32x8, b: f32x8| -> f32x8 {
-                bytemuck::cast(self.avx._mm256_hadd_ps(bytemuck::cast(a), bytemuck::cast(b)))
-            };
-            let first = pairs(pairs(v[0], v[1]), pairs(v[2], v[3]));
-            let second = pairs(pairs(v[4], v[5]), pairs(v[6], v[7]));
-            let [a, b]: [[f32; 4]; 2] = bytemuck::cast(first);
-            let [c, d]: [[f32; 4]; 2] = bytemuck::cast(second);
-            self.add_f32x8(bytemuck::cast([a, c]), bytemuck::cast([b, d]))
-        }
-        #[inline(always)]
-        fn exp_neg(self, v: f32x8) -> f32x8 {
-            // The polynomial of `Real::exp_neg` for f32; see there.
-            use crate::math::fast_exp::{LN2_HI, LN2_LO, POLYNOMIAL, ROUND, SMALLEST};
-            let x = self.max_f32x8(v, self.splat_f32x8(SMALLEST));
-            let round = self.splat_f32x8(ROUND);
-            let shifted = self.mul_add_f32x8(x, self.splat_f32x8(std::f32::consts::LOG2_E), round);
-            let n = self.sub_f32x8(shifted, round);
-            let r = self.negate_mul_add_f32x8(n, self.splat_f32x8(LN2_HI), x);
-            let r = self.negate_mul_add_f32x8(n, self.splat_f32x8(LN2_LO), r);
-            // Estrin's scheme: the same polynomial with half the latency.
-            let pair =
-                |k: usize| self.mul_add_f32x8(self.splat_f32x8(POLYNOMIAL[k]), r, self.splat_f32x8(POLYNOMIAL[k + 1]));
-            let r2 = self.mul_f32x8(r, r);
-            let high = self.mul_add_f32x8(pair(0), r2, pair(2));
-            let low = self.mul_add_f32x8(pair(4), r2, pair(6));
-            let p = self.mul_add_f32x8(high, self.mul_f32x8(r2, r2), low);
-            let bits: u32x8 = bytemuck::cast(shifted);
-            let exponent = self.shl_const_u32x8::<23>(bits);
-            bytemuck::cast(self.wrapping_add_u32x8(bytemuck::cast(p), exponent))
-        }
-    }
-
-    struct Simd<O>(V3, O);
-
-    impl<O: LaneOp<f32>> pulp::NullaryFnOnce for Simd<O> {
-        type Output = O::Output;
-        #[inline(always)]
-        fn call(self) -> O::Output {
-            self.1.run(self.0)
-        }
-    }
-
-    /// Runs `op` compiled for AVX2 and FMA, or gives it back where the machine lacks them.
-    #[inline(always)]
-    pub(crate) fn run<O: LaneOp<f32>>(op: O) -> Result<O::Output, O> {
-        match V3::try_new() {
-            Some(v3) => Ok(v3.vectorize(Simd(v3, op))),
-            None => Err(op),
-        }
-    }
-}
-
-#[cfg(target_arch = "x86_64")]
-pub(super) use avx2::run as run_avx2;
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -312,6 +225,35 @@ mod tests {
                 assert!((x - y).abs() <= 1e-5 * x.abs().max(1e-6), "{x} {y}");
             }
         }
+    }
+
+    #[test]
+    fn logarithms_and_exponentials_are_those_of_each() {
+        struct Both(Lane<f32>);
+        impl LaneOp<f32> for Both {
+            type Output = [Lane<f32>; 2];
+            #[inline(always)]
+            fn run<L: Lanes<f32>>(self, l: L) -> Self::Output {
+                let v = l.load(&self.0);
+                [l.store(l.ln(v)), l.store(l.exp(v))]
+            }
+        }
+        for k in 0..1_000 {
+            // Small ones, those around 1, and large ones; beyond what the fast exponential takes, too.
+            let x: Lane<f32> = std::array::from_fn(|i| (k as f32 * 0.17 - 85.0 + i as f32 * 0.37).exp());
+            let near: Lane<f32> = x.map(|x| 1.0 + x.min(1.0) * 0.5);
+            for x in [x, near] {
+                let [ln, exp] = f32::vectorize(Both(x));
+                for i in 0..LANES {
+                    let exact = f64::from(x[i]).ln();
+                    assert!((f64::from(ln[i]) - exact).abs() <= 5e-7 * exact.abs().max(1.0), "ln {}: {}", x[i], ln[i]);
+                    let exact = f64::from(x[i]).exp() as f32;
+                    assert!(exp[i] == exact || (exp[i] - exact).abs() <= 3e-7 * exact, "exp {}: {}", x[i], exp[i]);
+                }
+            }
+        }
+        let [_, exp] = f32::vectorize(Both([-200.0, 0.0, f32::INFINITY, f32::NEG_INFINITY, 88.0, f32::NAN, 1.0, -1.0]));
+        assert!(exp[2] == f32::INFINITY && exp[3] == 0.0 && exp[5].is_nan() && exp[1] == 1.0 && exp[0] < 1e-38);
     }
 
     #[test]

@@ -35,14 +35,6 @@ pub trait Real:
     fn sqrt(self) -> Self;
     /// Natural exponential, correctly rounded to a few ulp.
     fn exp(self) -> Self;
-    /// [`Real::exp`] of each, side by side.
-    #[inline(always)]
-    fn exp_each<const N: usize>(mut x: [Self; N]) -> [Self; N] {
-        for x in &mut x {
-            *x = x.exp();
-        }
-        x
-    }
     /// Natural exponential of `x <= 0`, free of branches so that loops over it vectorize.
     /// Below -87 it returns a value under 2e-38. Relative error under 3e-7 in `f32`.
     fn exp_neg(self) -> Self;
@@ -126,15 +118,6 @@ impl Real for f32 {
         if self.abs() <= -super::fast_exp::SMALLEST { self.exp_neg() } else { f32::exp(self) }
     }
     #[inline(always)]
-    fn exp_each<const N: usize>(mut x: [Self; N]) -> [Self; N] {
-        // One branch for all, so that they are computed as one vector.
-        let fast = x.iter().fold(true, |fast, x| fast & (x.abs() <= -super::fast_exp::SMALLEST));
-        for x in &mut x {
-            *x = if fast { x.exp_neg() } else { Real::exp(*x) };
-        }
-        x
-    }
-    #[inline(always)]
     fn exp_neg(self) -> Self {
         use super::fast_exp::{LN2_HI, LN2_LO, POLYNOMIAL, ROUND, SMALLEST};
         let x = if self < SMALLEST { SMALLEST } else { self };
@@ -172,19 +155,6 @@ mod tests {
         assert!(worst < 3e-7, "worst relative error {worst:e}");
         assert!((-1e30_f32).exp_neg() < 2e-38);
         assert_eq!(0.0_f32.exp_neg(), 1.0);
-    }
-
-    #[test]
-    fn exponentials_side_by_side_are_those_of_each() {
-        for x in [[-3.0_f32, 0.5, 20.0, 0.0], [-200.0, 1.0, 2.0, 3.0], [f32::INFINITY, f32::NEG_INFINITY, 88.0, -87.5]]
-        {
-            for (each, x) in f32::exp_each(x).into_iter().zip(x) {
-                let exact = f64::from(x).exp() as f32;
-                assert!(each == exact || ((each - exact) / exact).abs() < 3e-7, "{x}: {each} for {exact}");
-            }
-        }
-        assert!(f32::exp_each([f32::NAN, 0.0])[0].is_nan() && f32::exp_each([f32::NAN, 0.0])[1] == 1.0);
-        assert_eq!(f64::exp_each([1.0]), [1.0_f64.exp()]);
     }
 
     #[test]

@@ -3,33 +3,41 @@
 use glam::DMat3;
 
 use super::Real;
+use super::number::Number;
 
 /// The rotation matrix (rows) of the unit quaternion along `q = [w, x, y, z]`, or `None` if `q`
 /// is zero, not finite, or has no usable length (its squares under- or overflow even after scaling).
 #[inline(always)]
 pub fn matrix_from_quaternion<R: Real>(q: [R; 4]) -> Option<[[R; 3]; 3]> {
-    let u = unit_quaternion(q)?;
-    let [w, x, y, z] = u;
-    let (one, two) = (R::ONE, R::of(2.0));
-    Some([
+    Some(matrix_of_unit(unit_quaternion(q)?))
+}
+
+/// The rotation matrix (rows) of a unit quaternion.
+#[inline(always)]
+pub(crate) fn matrix_of_unit<N: Number>([w, x, y, z]: [N; 4]) -> [[N; 3]; 3] {
+    let (one, two) = (w.like(N::Of::ONE), w.like(N::Of::of(2.0)));
+    [
         [one - two * (y * y + z * z), two * (x * y - w * z), two * (x * z + w * y)],
         [two * (x * y + w * z), one - two * (x * x + z * z), two * (y * z - w * x)],
         [two * (x * z - w * y), two * (y * z + w * x), one - two * (x * x + y * y)],
-    ])
+    ]
 }
 
 /// `q` scaled to unit length. Scales by the largest component first, so neither tiny nor huge
 /// quaternions lose their direction.
 #[inline(always)]
 pub fn unit_quaternion<R: Real>(q: [R; 4]) -> Option<[R; 4]> {
-    let largest = q.iter().fold(R::ZERO, |m, c| m.max(c.abs()));
-    if largest <= R::ZERO || q.iter().any(|c| !c.is_finite()) {
-        return None;
-    }
-    let s = q.map(|c| c / largest);
-    let length = (s[0] * s[0] + s[1] * s[1] + s[2] * s[2] + s[3] * s[3]).sqrt();
-    let u = s.map(|c| c / length);
+    let u = scaled_to_unit(q);
     u.iter().all(|c| c.is_finite()).then_some(u)
+}
+
+/// The same; not finite where there is none.
+#[inline(always)]
+pub(crate) fn scaled_to_unit<N: Number>([w, x, y, z]: [N; 4]) -> [N; 4] {
+    let largest = w.abs().max(x.abs()).max(y.abs().max(z.abs()));
+    let [w, x, y, z] = [w / largest, x / largest, y / largest, z / largest];
+    let length = (w * w + x * x + y * y + z * z).sqrt();
+    [w / length, x / length, y / length, z / length]
 }
 
 /// How far `m` is from a proper rotation: the largest entry of `|m mᵀ - I|`, or infinity if its

@@ -3,6 +3,7 @@
 use glam::{DMat3, DVec3};
 
 use super::Real;
+use super::number::Number;
 
 /// Number of coefficients per channel of degree `degree`: `(degree + 1)²`.
 pub const fn coefficients(degree: u8) -> usize {
@@ -32,9 +33,9 @@ const C3: [f64; 7] = [
 
 /// The basis at unit direction `[x, y, z]`; entries past `coefficients(degree)` are zero.
 #[inline(always)]
-pub fn basis<R: Real>(degree: u8, [x, y, z]: [R; 3]) -> [R; 16] {
-    let k = R::of;
-    let mut b = [R::ZERO; 16];
+pub fn basis<N: Number>(degree: u8, [x, y, z]: [N; 3]) -> [N; 16] {
+    let k = |c: f64| x.like(N::Of::of(c));
+    let mut b = [k(0.0); 16];
     b[0] = k(SH_C0);
     if degree == 0 {
         return b;

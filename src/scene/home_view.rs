@@ -23,6 +23,9 @@ pub struct HomeView {
     pub(crate) camera: Option<Camera>,
 }
 
+/// Gaussians that a view is framed by at most.
+const FRAMED: usize = 200_000;
+
 impl Default for HomeView {
     fn default() -> Self {
         Self { bounds: Bounds { min: DVec3::NEG_ONE, max: DVec3::ONE }, up: DVec3::Z, camera: None }
@@ -34,7 +37,11 @@ impl HomeView {
     /// point that they look at, seen as the first shows it. A bare splat is framed as a whole, with `-y`
     /// upwards as in the files that 3DGS writes.
     pub(crate) fn new(cameras: &[Camera], cloud: Option<&GaussianCloud>) -> Self {
-        let whole = || cloud.and_then(|c| Bounds::robust((0..c.len()).map(|i| c.world_position(i))));
+        // Of millions, some say as well where they are, and sooner.
+        let whole = || {
+            let some = |c: &GaussianCloud| c.len().div_ceil(FRAMED).max(1);
+            cloud.and_then(|c| Bounds::robust((0..c.len()).step_by(some(c)).map(|i| c.world_position(i))))
+        };
         let Some(first) = cameras.first() else {
             return Self { up: DVec3::NEG_Y, bounds: whole().unwrap_or(Self::default().bounds), camera: None };
         };

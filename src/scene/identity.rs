@@ -70,6 +70,9 @@ pub struct Identity {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Identities {
     list: Vec<Identity>,
+    /// Names of what was taken out of the scene for good.
+    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "text::read_names")]
+    pub(crate) removed: Vec<String>,
     #[serde(skip)]
     whole_names: Known,
 }

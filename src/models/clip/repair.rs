@@ -10,7 +10,7 @@ pub(super) fn repaired(text: &str) -> String {
     while let Some(better) = decoded(&text) {
         text = better;
     }
-    let text: String = text.chars().map(|c| windows_1252(c as u32).filter(|_| is_c1(c)).unwrap_or(c)).collect();
+    let text: String = text.chars().map(|c| windows_1252(c).unwrap_or(c)).collect();
     let text = text.replace("\r\n", "\n");
     let kept = text.chars().filter(|c| !is_control(*c));
     kept.flat_map(|c| plain(c).chars().collect::<Vec<char>>()).nfc().collect()
@@ -56,8 +56,9 @@ const HIGH: [char; 32] = [
     '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{9d}', 'ž', 'Ÿ',
 ];
 
-fn windows_1252(byte: u32) -> Option<char> {
-    HIGH.get(byte.checked_sub(0x80)? as usize).copied()
+/// What a control character at 0x80 and after is if its number is a byte of Windows-1252.
+fn windows_1252(c: char) -> Option<char> {
+    HIGH.get((c as usize).checked_sub(0x80)?).copied()
 }
 
 /// The byte of a character in Windows-1252.
@@ -66,10 +67,6 @@ fn byte(c: char) -> Option<u8> {
         Some(at) => u8::try_from(0x80 + at).ok(),
         None => u8::try_from(c as u32).ok(),
     }
-}
-
-fn is_c1(c: char) -> bool {
-    ('\u{80}'..='\u{9f}').contains(&c)
 }
 
 /// Control characters that stand for nothing.

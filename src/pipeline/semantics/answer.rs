@@ -1,4 +1,4 @@
-//! One query, answered: by names where the scene's names know the words, else by meaning.
+//! One query, answered: by names where the scene's names know the words or what was removed has them, else by meaning.
 
 use std::time::Instant;
 
@@ -81,6 +81,10 @@ pub(crate) fn answer(
     let named = by_name(identities, reading, level, recipe);
     let known = !reading.called.is_empty() || names::unknown_words(identities, &phrase.text).is_empty();
     if known && !nothing(&named.answer) {
+        return named;
+    }
+    // Something always looks most like it.
+    if nothing(&named.answer) && names::was_removed(identities, &phrase.text) {
         return named;
     }
     let meant = by_embedding(identities, phrase, level, recipe, language);

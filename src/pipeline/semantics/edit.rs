@@ -178,7 +178,10 @@ fn merge(map: &mut SemanticMap, from: IdentityId, into: IdentityId) {
 pub(crate) fn forget(map: &SemanticMap, ids: &[IdentityId]) -> (SemanticMap, Vec<IdentityId>) {
     let inside: Vec<Vec<bool>> = ids.iter().map(|id| map.identities.descendants(*id)).collect();
     let mut new = map.clone();
-    let number = renumber(&mut new, |id| inside.iter().any(|all| all.get(id as usize) == Some(&true)), None);
+    let is_gone = |id: IdentityId| inside.iter().any(|all| all.get(id as usize) == Some(&true));
+    let number = renumber(&mut new, is_gone, None);
+    let gone = map.identities.iter().filter(|(id, _)| is_gone(*id)).flat_map(|(_, i)| i.names.clone());
+    new.identities.removed.extend(gone);
     (new, number)
 }
 
@@ -190,6 +193,7 @@ fn renumber(
     merged: Option<(IdentityId, IdentityId)>,
 ) -> Vec<IdentityId> {
     let old = std::mem::take(&mut map.identities);
+    map.identities.removed.clone_from(&old.removed);
     let codes_before: Vec<_> = (0..=old.len() as IdentityId).map(|id| old.codes(id)).collect();
     // Wholes before pieces, whatever the numbers were.
     let parent_of = |id: IdentityId| -> IdentityId {

@@ -282,25 +282,27 @@ impl Figures {
             ("objects by name, votes", self.votes[0], 0.71),
             ("parts by name, votes", self.votes[1], 0.46),
             ("objects by name, gradients", self.gradients[0], 0.74),
-            ("parts by name, gradients", self.gradients[1], 0.42),
-            ("objects by looks", self.objects, 0.63),
-            ("recall of parts, objects alone", self.recall[0], 0.08),
-            ("recall of parts, multilevel", self.recall[1], 0.12),
-            ("recall of parts, deviation", self.recall[2], 0.18),
-            ("recall of parts, two steps", self.recall[3], 0.23),
-            ("recall of parts, joint", self.recall[4], 0.28),
-            ("order: multilevel over objects alone", self.recall[1] - self.recall[0], 0.03),
+            ("parts by name, gradients", self.gradients[1], 0.49),
+            ("objects by looks", self.objects, 0.64),
+            ("recall of parts, objects alone", self.recall[0], 0.10),
+            ("recall of parts, multilevel", self.recall[1], 0.30),
+            ("recall of parts, deviation", self.recall[2], 0.36),
+            ("recall of parts, two steps", self.recall[3], 0.34),
+            ("recall of parts, joint", self.recall[4], 0.46),
+            ("order: multilevel over objects alone", self.recall[1] - self.recall[0], 0.14),
             ("order: deviation over multilevel", self.recall[2] - self.recall[1], 0.02),
-            ("order: two steps over deviation", self.recall[3] - self.recall[2], 0.01),
+            // 0.000, 0.020 and 0.006 with seeds 0 to 2: one training decides.
+            ("order: two steps over deviation", self.recall[3] - self.recall[2], -0.02),
+            ("order: joint over deviation", self.recall[4] - self.recall[2], 0.01),
             ("order: joint over two steps", self.recall[4] - self.recall[3], 0.0),
-            ("answers for what is there", self.answered, 0.48),
+            ("answers for what is there", self.answered, 0.59),
         ];
         let ceilings = [
-            ("answers for what is absent, by looks", self.false_finds[0], 0.54),
-            ("answers in a wrong color, by looks", self.false_finds[1], 0.59),
-            ("answers for what is absent, by name", self.false_names[0], 0.15),
+            ("answers for what is absent, by looks", self.false_finds[0], 0.47),
+            ("answers in a wrong color, by looks", self.false_finds[1], 0.54),
+            ("answers for what is absent, by name", self.false_names[0], 0.08),
             // Half of the words fit, and "gray" is spelled much like "green": always answered, never in full.
-            ("score of a wrong color, by name", self.wrong_color, 0.96),
+            ("score of a wrong color, by name", self.wrong_color, 0.67),
         ];
         let low = floors.into_iter().filter(|(_, v, bar)| !(v >= bar));
         let high = ceilings.into_iter().filter(|(_, v, bar)| !(v <= bar));

@@ -89,6 +89,14 @@ pub(crate) fn unknown_words(identities: &Identities, phrase: &str) -> Vec<String
     not_in(phrase, &known.into_iter().chain(numbers).collect())
 }
 
+/// Whether a phrase means what was taken out of the scene: it says a name of that, and nothing but such names.
+pub(crate) fn was_removed(identities: &Identities, phrase: &str) -> bool {
+    let (said, names) = (words(phrase), identities.removed.iter().map(|name| words(name)));
+    let known: HashSet<String> = names.clone().flatten().collect();
+    let is_said = |name: Vec<String>| !name.is_empty() && name.iter().all(|word| said.contains(word));
+    not_in(phrase, &known).is_empty() && names.into_iter().any(is_said)
+}
+
 /// The words of a phrase that say nothing about `id`: neither its names nor those of its wholes have them.
 pub(crate) fn words_beside(identities: &Identities, id: IdentityId, phrase: &str) -> Vec<String> {
     let names = |i: IdentityId| match identities.get(i).map(|i| i.names.as_slice()) {

@@ -4,7 +4,8 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use rayon::prelude::*;
 
-use super::project::{Chunk, Splat};
+use super::chunk::Chunk;
+use super::project::Splat;
 use super::sort::{self, KeptOrder};
 use crate::math::Real;
 use crate::render::TILE_PX;

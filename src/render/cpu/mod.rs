@@ -1,7 +1,7 @@
 //! The CPU renderer: at `f64` the oracle that every kernel and gradient is compared with, at `f32`
 //! (tile-parallel, eight pixels a register) the fast path where there is no GPU.
 //!
-//! Stages, one file each: [`project`], [`bin`], [`sort`], [`blend`]; backward: [`blend_backward`],
+//! Stages, one file each: [`project`] ([`mod@project_chunk`]: of a whole cloud), [`bin`], [`sort`], [`blend`]; backward: [`blend_backward`],
 //! [`mod@project_backward`]; [`walk`] is the way through a tile that they share. What is drawn is a
 //! [`walk::Primitive`]: [`splat`] or [`surfel`]. Results do not depend on the number of threads.
 
@@ -9,11 +9,13 @@ pub mod adam;
 pub(crate) mod bin;
 pub(crate) mod blend;
 pub(crate) mod blend_backward;
+pub(crate) mod chunk;
 pub(crate) mod contributions;
 pub mod normals;
 pub mod project;
 pub(crate) mod project_backward;
 mod project_chunk;
+mod project_splats;
 pub(crate) mod rasterizer;
 pub(crate) mod sort;
 pub(crate) mod splat;

@@ -1,12 +1,9 @@
 //! Projection: Gaussians to splats (mean, conic, reach, color) in the picture of one camera.
 
+use crate::math::number::Number;
 use crate::math::{Real, rotation, sh};
-use crate::render::lod::Cut;
-use crate::render::{BLUR_PX2, COLOR_MAX, Features, RenderSettings, TANGENT_CLAMP};
-use crate::scene::{Camera, Gaussian, GaussianCloud};
-
-/// Gaussians that one task projects.
-pub(crate) const CHUNK: usize = 2_048;
+use crate::render::{BLUR_PX2, COLOR_MAX, TANGENT_CLAMP};
+use crate::scene::{Camera, Gaussian};
 
 /// A camera in the renderer's precision, relative to a cloud's origin.
 #[derive(Clone, Debug)]
@@ -80,29 +77,28 @@ pub(crate) struct Splat<R> {
 }
 
 /// Everything between a Gaussian's raw parameters and its splat that the backward pass needs too.
-pub struct SplatGeometry<R> {
+pub struct SplatGeometry<N> {
     /// Center relative to the camera, world axes.
-    pub relative: [R; 3],
+    pub relative: [N; 3],
     /// Center in camera axes.
-    pub local: [R; 3],
-    /// Tangents `x/z`, `y/z` after clamping, and whether they were clamped.
-    pub(crate) tangent: [R; 2],
-    pub(crate) clamped: [bool; 2],
+    pub local: [N; 3],
+    /// Tangents `x/z`, `y/z` after clamping.
+    pub(crate) tangent: [N; 2],
     /// Rows of the linearized projection in world axes, `J W`.
-    pub(crate) jacobian: [[R; 3]; 2],
+    pub(crate) jacobian: [[N; 3]; 2],
     /// Rotation world_from_local.
-    pub(crate) rotation: [[R; 3]; 3],
-    pub(crate) scale: [R; 3],
+    pub(crate) rotation: [[N; 3]; 3],
+    pub(crate) scale: [N; 3],
     /// Rows of `J W R S`.
-    pub(crate) factor: [[R; 3]; 2],
+    pub(crate) factor: [[N; 3]; 2],
     /// Blurred covariance `[xx, xy, yy]`, px².
-    pub covariance: [R; 3],
+    pub covariance: [N; 3],
     /// Determinant of the unblurred and of the blurred covariance.
-    pub determinants: [R; 2],
+    pub determinants: [N; 2],
 }
 
 #[inline(always)]
-pub(crate) fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
+pub(crate) fn dot<N: Number>(a: [N; 3], b: [N; 3]) -> N {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
@@ -110,33 +106,42 @@ pub(crate) fn dot<R: Real>(a: [R; 3], b: [R; 3]) -> R {
 /// depth or the covariance overflows.
 #[inline(always)]
 pub fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &CameraView<R>) -> Option<SplatGeometry<R>> {
-    let relative = view.relative(gaussian.position);
-    let local = [dot(view.rows[0], relative), dot(view.rows[1], relative), dot(view.rows[2], relative)];
-    let z = local[2];
-    if !(z > view.near && z.is_finite()) {
-        return None;
-    }
-    let mut tangent = [local[0] / z, local[1] / z];
-    let mut clamped = [false; 2];
-    for axis in 0..2 {
-        let limit = view.clamp[axis];
-        if tangent[axis] > limit || tangent[axis] < -limit {
-            clamped[axis] = true;
-            tangent[axis] = if tangent[axis] > limit { limit } else { -limit };
-        }
-    }
-    let mut jacobian = [[R::ZERO; 3]; 2];
-    for axis in 0..2 {
-        let s = view.focal[axis] / z;
+    let g = ellipse(view.relative(gaussian.position), gaussian.log_scale, gaussian.quaternion, view);
+    let usable = g.local[2] > view.near && g.local[2].is_finite() && g.determinants[1].is_finite();
+    usable.then_some(g)
+}
+
+/// The ellipse of a Gaussian, or of several, with its center relative to the camera. Its depth is to be beyond the near
+/// plane, and this and the blurred determinant are to be finite, else it has none.
+#[inline(always)]
+pub(crate) fn ellipse<N: Number>(
+    relative: [N; 3],
+    log_scale: [N; 3],
+    quaternion: [N; 4],
+    view: &CameraView<N::Of>,
+) -> SplatGeometry<N> {
+    let same = |x: N::Of| relative[0].like(x);
+    let zero = same(N::Of::ZERO);
+    let mut rows = [[zero; 3]; 3];
+    for axis in 0..3 {
         for k in 0..3 {
-            jacobian[axis][k] = s * (view.rows[axis][k] - tangent[axis] * view.rows[2][k]);
+            rows[axis][k] = same(view.rows[axis][k]);
         }
     }
-    let rotation = rotation::matrix_from_quaternion(gaussian.quaternion)?;
-    let [a, b, c] = gaussian.log_scale;
-    let [a, b, c, _] = R::exp_each([a, b, c, R::ZERO]);
-    let scale = [a, b, c];
-    let mut factor = [[R::ZERO; 3]; 2];
+    let local = [dot(rows[0], relative), dot(rows[1], relative), dot(rows[2], relative)];
+    let z = local[2];
+    let (mut tangent, mut jacobian) = ([zero; 2], [[zero; 3]; 2]);
+    for axis in 0..2 {
+        let limit = same(view.clamp[axis]);
+        tangent[axis] = (local[axis] / z).min(limit).max(-limit);
+        let s = same(view.focal[axis]) / z;
+        for k in 0..3 {
+            jacobian[axis][k] = s * (rows[axis][k] - tangent[axis] * rows[2][k]);
+        }
+    }
+    let rotation = rotation::matrix_of_unit(rotation::scaled_to_unit(quaternion));
+    let scale = [log_scale[0].exp(), log_scale[1].exp(), log_scale[2].exp()];
+    let mut factor = [[zero; 3]; 2];
     for axis in 0..2 {
         for k in 0..3 {
             let column = [rotation[0][k], rotation[1][k], rotation[2][k]];
@@ -144,47 +149,58 @@ pub fn geometry<R: Real>(gaussian: &Gaussian<'_, R>, view: &CameraView<R>) -> Op
         }
     }
     let [u, v] = factor;
-    let blur = R::of(BLUR_PX2);
+    let blur = same(N::Of::of(BLUR_PX2));
     let (uu, uv, vv) = (dot(u, u), dot(u, v), dot(v, v));
     // Lagrange's identity keeps the determinant positive where `uu vv - uv²` would cancel.
     let cross = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
     let sharp = dot(cross, cross);
     let blurred = sharp + blur * (uu + vv) + blur * blur;
-    if !blurred.is_finite() {
-        return None;
-    }
-    Some(SplatGeometry {
+    SplatGeometry {
         relative,
         local,
         tangent,
-        clamped,
         jacobian,
         rotation,
         scale,
         factor,
         covariance: [uu + blur, uv, vv + blur],
         determinants: [sharp, blurred],
-    })
+    }
 }
 
 /// Unit viewing direction of a center relative to the camera; forward if they coincide.
 #[inline(always)]
 pub fn direction<R: Real>(relative: [R; 3]) -> [R; 3] {
-    let largest = relative.iter().fold(R::ZERO, |m, c| m.max(c.abs()));
-    if !(largest > R::ZERO) {
-        return [R::ZERO, R::ZERO, R::ONE];
-    }
-    // Scaled first: the square of what is far away overflows.
-    let scaled = relative.map(|c| c / largest);
-    let length = dot(scaled, scaled).sqrt();
-    scaled.map(|c| c / length)
+    if relative.iter().any(|c| c.abs() > R::ZERO) { toward(relative) } else { [R::ZERO, R::ZERO, R::ONE] }
 }
 
-/// Color before the clamp at zero: `0.5 + sum(basis * sh)`.
+/// The same of what does not coincide.
+#[inline(always)]
+pub(crate) fn toward<N: Number>([x, y, z]: [N; 3]) -> [N; 3] {
+    // Scaled first: the square of what is far away overflows.
+    let largest = x.abs().max(y.abs()).max(z.abs());
+    let [x, y, z] = [x / largest, y / largest, z / largest];
+    let length = dot([x, y, z], [x, y, z]).sqrt();
+    [x / length, y / length, z / length]
+}
+
+/// Color before the clamp at zero: `0.5 + sum(basis * sh)`, up to the degree that is stored.
 #[inline(always)]
 pub fn raw_color<R: Real>(coefficients: &[[R; 3]], basis: &[R; 16], degree: u8) -> [R; 3] {
+    let stored = coefficients.len().min(sh::coefficients(degree));
+    // Each degree for itself: loops whose lengths are known are none.
+    match stored {
+        16.. => sum::<R, 16>(coefficients, basis),
+        9.. => sum::<R, 9>(coefficients, basis),
+        4.. => sum::<R, 4>(coefficients, basis),
+        _ => sum::<R, 1>(coefficients, basis),
+    }
+}
+
+#[inline(always)]
+fn sum<R: Real, const N: usize>(coefficients: &[[R; 3]], basis: &[R; 16]) -> [R; 3] {
     let mut c = [R::HALF; 3];
-    for (b, k) in basis.iter().zip(&coefficients[..sh::coefficients(degree)]) {
+    for (b, k) in basis.iter().zip(coefficients.first_chunk::<N>().into_iter().flatten()) {
         for channel in 0..3 {
             c[channel] += *b * k[channel];
         }
@@ -201,42 +217,8 @@ pub(crate) fn color<R: Real>(coefficients: &[[R; 3]], basis: &[R; 16], degree: u
 
 /// Factor on the opacity that keeps a splat's energy under the blur, `sqrt(det / det_blurred)`.
 #[inline(always)]
-pub fn compensation<R: Real>(g: &SplatGeometry<R>) -> R {
+pub fn compensation<N: Number>(g: &SplatGeometry<N>) -> N {
     (g.determinants[0] / g.determinants[1]).sqrt()
-}
-
-/// The splats of some consecutive Gaussians with their composited values, in the cloud's order.
-#[derive(Debug, Default)]
-pub(crate) struct Chunk<R> {
-    /// The Gaussians that reach at least one pixel center.
-    pub(crate) splats: Vec<Splat<R>>,
-    /// `[splats * channels]`: color, extra channels, depth if asked for, padding zeros.
-    pub(crate) values: Vec<R>,
-    /// Gaussians left out because their covariance or rotation is degenerate.
-    pub(crate) degenerate: usize,
-}
-
-/// What is to be drawn, and how.
-#[derive(Clone, Copy)]
-pub(crate) struct DrawInput<'a, R> {
-    pub(crate) cloud: &'a GaussianCloud<R>,
-    pub(crate) features: Features<'a, R>,
-    pub(crate) settings: &'a RenderSettings,
-    /// What is drawn instead of all of it.
-    pub(crate) cut: Option<&'a Cut<R>>,
-}
-
-impl<'a, R: Real> DrawInput<'a, R> {
-    /// How many Gaussians are to be drawn.
-    pub(crate) fn len(&self) -> usize {
-        self.cut.map_or(self.cloud.len(), Cut::len)
-    }
-
-    /// The `k`-th of them: the cloud that it is in, its place there, and the Gaussian of `cloud` that it stands for.
-    #[inline(always)]
-    pub(crate) fn of(&self, k: usize) -> (&'a GaussianCloud<R>, usize, u32) {
-        self.cut.map_or((self.cloud, k, k as u32), |cut| cut.of(self.cloud, k))
-    }
 }
 
 /// What becomes of a Gaussian in front of the near plane.
@@ -246,36 +228,4 @@ pub(crate) enum Projected<R, S, D> {
     Outside,
     /// Its shape is not usable.
     Degenerate,
-}
-
-#[inline(always)]
-pub(crate) fn splat<R: Real>(
-    gaussian: &Gaussian<'_, R>,
-    mut opacity: R,
-    alpha_min: R,
-    view: &CameraView<R>,
-    settings: &RenderSettings,
-) -> Projected<R, [R; 0], [R; 1]> {
-    let Some(g) = geometry(gaussian, view) else { return Projected::Degenerate };
-    if settings.antialias {
-        opacity *= compensation(&g);
-        if !(opacity >= alpha_min) {
-            return Projected::Outside;
-        }
-    }
-    let depth = g.local[2];
-    let mean = [0, 1].map(|axis| view.focal[axis] * (g.local[axis] / depth) + view.principal[axis]);
-    let reach = R::of(2.0) * (opacity / alpha_min).ln();
-    let [xx, xy, yy] = g.covariance;
-    let half = [(reach * xx).sqrt(), (reach * yy).sqrt()];
-    if !view.meets(mean, half) {
-        return Projected::Outside;
-    }
-    let det = g.determinants[1];
-    let conic = [yy / det, -xy / det, xx / det];
-    // A covariance so wide that its inverse underflows has no usable shape.
-    if !(conic[0] > R::ZERO && conic[2] > R::ZERO && half[0].is_finite() && half[1].is_finite()) {
-        return Projected::Degenerate;
-    }
-    Projected::Splat(Splat { mean, conic, opacity, reach, half, depth, gaussian: 0 }, [], [depth])
 }

@@ -63,7 +63,8 @@ pub(crate) fn project_backward<R: Real>(
         let s = view.focal[axis] / z;
         let d_tangent = -s * dot(view.rows[2], d_jacobian[axis]);
         d_local[2] -= dot(g.jacobian[axis], d_jacobian[axis]) / z;
-        if !g.clamped[axis] {
+        // Where the tangent was clamped it does not depend on the position.
+        if g.tangent[axis] == g.local[axis] / z {
             d_local[axis] += d_tangent / z;
             d_local[2] -= d_tangent * g.tangent[axis] / z;
         }

@@ -1,9 +1,13 @@
-//! Projection of all that is drawn, in parts that threads take one after the other.
+//! Projection of all that is drawn: in parts that threads take one after the other, eight Gaussians at a time.
+
+use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::project::{CHUNK, CameraView, Chunk, DrawInput, Projected, color, direction, dot};
+use super::chunk::{CHUNK, Chunk, DrawInput, Group};
+use super::project::{CameraView, Projected, color, dot, toward};
 use super::walk::Primitive;
+use crate::math::lanes::{LANES, LaneOp, Lanes};
 use crate::math::{Real, sh};
 
 /// Gaussians of a cut between fetching one and needing it.
@@ -21,70 +25,112 @@ pub(crate) fn project<R: Real, P: Primitive<R>>(
     let n = scene.len();
     parts.resize_with(n.div_ceil(CHUNK), Chunk::default);
     parts.par_iter_mut().enumerate().for_each(|(c, part)| {
-        part.splats.clear();
-        part.degenerate = 0;
-        project_chunk(part, scene, view, primitive, channels, c * CHUNK..((c + 1) * CHUNK).min(n));
+        let stride = P::SHAPE + channels;
+        let range = c * CHUNK..((c + 1) * CHUNK).min(n);
+        R::vectorize(ProjectChunk { part, scene, view, primitive, stride, range });
     });
 }
 
-#[multiversion::multiversion(targets("x86_64+avx2+fma"))]
-fn project_chunk<R: Real, P: Primitive<R>>(
-    part: &mut Chunk<R>,
-    scene: DrawInput<'_, R>,
-    view: &CameraView<R>,
+struct ProjectChunk<'a, R, P> {
+    part: &'a mut Chunk<R>,
+    scene: DrawInput<'a, R>,
+    view: &'a CameraView<R>,
     primitive: P,
-    channels: usize,
-    range: std::ops::Range<usize>,
-) {
-    let DrawInput { features, settings, .. } = scene;
-    // As if all were seen: so a splat's values are written where they stay, and nothing grows.
-    let mut written = 0;
-    let stride = P::SHAPE + channels;
-    part.values.resize(range.len() * stride, R::ZERO);
-    for k in range {
-        if let Some(cut) = scene.cut {
-            cut.fetch(scene.cloud, k + AHEAD);
-        }
-        let (cloud, i, stands_for) = scene.of(k);
-        let degree = settings.sh_degree.min(cloud.sh_degree);
-        // Cheap tests first: most Gaussians of a scene are outside the picture.
-        let relative = view.relative(cloud.positions[i]);
-        if !(dot(view.rows[2], relative) > view.near) {
-            continue;
-        }
-        let opacity = cloud.opacity_logits[i].sigmoid();
-        if opacity < primitive.alpha_min() {
-            continue;
-        }
-        let gaussian = cloud.gaussian(i);
-        let (mut splat, shape, depth) = match primitive.project(&gaussian, opacity, view, settings) {
-            Projected::Splat(splat, shape, depth) => (splat, shape, depth),
-            Projected::Outside => continue,
-            Projected::Degenerate => {
-                part.degenerate += 1;
+    /// Values per splat.
+    stride: usize,
+    range: Range<usize>,
+}
+
+impl<R: Real, P: Primitive<R>> LaneOp<R> for ProjectChunk<'_, R, P> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<L: Lanes<R>>(mut self, l: L) {
+        let Self { scene, view, stride, .. } = self;
+        self.part.splats.clear();
+        self.part.degenerate = 0;
+        // As if all were seen: so a splat's values are written where they stay, and nothing grows.
+        self.part.values.resize(self.range.len() * stride, R::ZERO);
+        let mut group = Group::default();
+        for k in self.range.clone() {
+            if let Some(cut) = scene.cut {
+                cut.fetch(scene.cloud, k + AHEAD);
+            }
+            let (cloud, i, stands_for) = scene.of(k);
+            // A cheap test first: many Gaussians of a scene are behind the camera.
+            let relative = view.relative(cloud.positions[i]);
+            if !(dot(view.rows[2], relative) > view.near) {
                 continue;
             }
-        };
-        splat.gaussian = stands_for;
-        let basis = sh::basis(degree, direction(relative));
-        let values = &mut part.values[written..written + stride];
-        let mut at = 0;
-        let mut put = |some: &[R]| {
-            for (value, new) in values[at..at + some.len()].iter_mut().zip(some) {
-                *value = *new;
+            group.push(cloud.gaussian(i), relative, stands_for);
+            if group.len == LANES {
+                self.add(l, &group);
+                group.len = 0;
             }
-            at += some.len();
-        };
-        put(shape.as_ref());
-        put(&color(gaussian.sh, &basis, degree));
-        let own = stands_for as usize * features.channels;
-        put(&features.values[own..own + features.channels]);
-        if settings.depth {
-            put(depth.as_ref());
         }
-        values[at..].iter_mut().for_each(|value| *value = R::ZERO);
-        written += stride;
-        part.splats.push(splat);
+        if group.len > 0 {
+            self.add(l, &group);
+        }
+        self.part.values.truncate(self.part.splats.len() * stride);
     }
-    part.values.truncate(written);
+}
+
+impl<R: Real, P: Primitive<R>> ProjectChunk<'_, R, P> {
+    /// Adds the splats of those that are seen.
+    #[inline(always)]
+    fn add<L: Lanes<R>>(&mut self, l: L, group: &Group<'_, R>) {
+        let DrawInput { features, settings, cloud, .. } = self.scene;
+        let opacity = sigmoid(l, group.each(l, |g| g.opacity_logit).v);
+        let bright = l.bits(l.ge(opacity, l.splat(self.primitive.alpha_min())));
+        let projected = self.primitive.project(l, group, opacity, self.view, settings);
+        let degree = settings.sh_degree.min(cloud.sh_degree);
+        let mut basis = [[R::ZERO; LANES]; 16];
+        for (lane, eight) in basis.iter_mut().zip(sh::basis(degree, toward(group.relative(l)))) {
+            *lane = eight.lane();
+        }
+        for (i, projected) in projected.into_iter().enumerate().take(group.len) {
+            if bright >> i & 1 == 0 {
+                continue;
+            }
+            let (mut splat, shape, depth) = match projected {
+                Projected::Splat(splat, shape, depth) => (splat, shape, depth),
+                Projected::Outside => continue,
+                Projected::Degenerate => {
+                    self.part.degenerate += 1;
+                    continue;
+                }
+            };
+            splat.gaussian = group.stand_for[i];
+            let mut own = [R::ZERO; 16];
+            for (own, lane) in own.iter_mut().zip(&basis) {
+                *own = lane[i];
+            }
+            let written = self.part.splats.len() * self.stride;
+            let values = &mut self.part.values[written..written + self.stride];
+            let mut at = 0;
+            let mut put = |some: &[R]| {
+                for (value, new) in values[at..at + some.len()].iter_mut().zip(some) {
+                    *value = *new;
+                }
+                at += some.len();
+            };
+            put(shape.as_ref());
+            put(&color(group.gaussians[i].sh, &own, degree));
+            let first = splat.gaussian as usize * features.channels;
+            put(&features.values[first..first + features.channels]);
+            if settings.depth {
+                put(depth.as_ref());
+            }
+            values[at..].iter_mut().for_each(|value| *value = R::ZERO);
+            self.part.splats.push(splat);
+        }
+    }
+}
+
+/// [`Real::sigmoid`].
+#[inline(always)]
+fn sigmoid<R: Real, L: Lanes<R>>(l: L, x: L::V) -> L::V {
+    let (zero, one) = (l.splat(R::ZERO), l.splat(R::ONE));
+    let e = l.exp_neg(l.min(x, l.sub(zero, x)));
+    l.div(l.select(l.ge(x, zero), one, e), l.add(one, e))
 }

@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 use rayon::prelude::*;
 
-use super::project::{CHUNK, Chunk, Splat};
+use super::chunk::{CHUNK, Chunk};
+use super::project::Splat;
 use crate::math::Real;
 
 /// The order of splats that were not in the frame before.

@@ -1,10 +1,12 @@
 //! Gaussians drawn as splats: ellipses in the picture plane, each of one depth.
 
-use super::project::{CameraView, Projected, Splat, splat};
+use super::chunk::Group;
+use super::project::{CameraView, Projected, Splat};
 use super::project_backward::{GaussianGradient, MOMENTS, project_backward};
+use super::project_splats::splats;
 use super::walk::{GROUPS, Planes, Primitive, Reach, RowPass, With, with_channels};
 use crate::math::Real;
-use crate::math::lanes::Lanes;
+use crate::math::lanes::{LANES, Lanes};
 use crate::render::{ALPHA_MAX, Frame, FrameGradient, MAX_CHANNELS, RenderSettings, TILE_PX};
 use crate::scene::Gaussian;
 
@@ -70,14 +72,15 @@ impl<R: Real> Primitive<R> for Splats<R> {
     }
 
     #[inline(always)]
-    fn project(
+    fn project<L: Lanes<R>>(
         self,
-        gaussian: &Gaussian<'_, R>,
-        opacity: R,
+        l: L,
+        group: &Group<'_, R>,
+        opacity: L::V,
         view: &CameraView<R>,
         settings: &RenderSettings,
-    ) -> Projected<R, [R; 0], [R; 1]> {
-        splat(gaussian, opacity, self.alpha_min, view, settings)
+    ) -> [Projected<R, [R; 0], [R; 1]>; LANES] {
+        splats(l, group, opacity, self.alpha_min, view, settings)
     }
 
     fn planes<'a>(frame: &'a mut Frame<R>, _: &'a mut [Vec<R>; 3], depth: bool) -> Planes<&'a mut [R]> {

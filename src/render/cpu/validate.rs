@@ -4,7 +4,8 @@
 use std::sync::atomic::Ordering::Relaxed;
 
 use super::bin::Tiles;
-use super::project::{Chunk, Splat};
+use super::chunk::Chunk;
+use super::project::Splat;
 use super::sort;
 use crate::math::Real;
 use crate::math::finite::{NotFinite, all_finite};

@@ -4,7 +4,8 @@
 //! Pixels are taken in lanes of eight; lane group `g` of row `row` of a tile is its slot `g * TILE_PX + row`.
 
 use super::bin::Tiles;
-use super::project::{CameraView, Chunk, Projected, Splat};
+use super::chunk::{Chunk, Group};
+use super::project::{CameraView, Projected, Splat};
 use super::project_backward::GaussianGradient;
 use super::sort::part_of;
 use crate::math::Real;
@@ -70,14 +71,15 @@ pub(crate) trait Primitive<R: Real>: Copy + Send + Sync {
     fn run<T: RowPass<R>>(channels: usize, pass: T) -> T::Output;
     /// Smallest alpha that counts.
     fn alpha_min(self) -> R;
-    /// A Gaussian of this opacity in the picture.
-    fn project(
+    /// Gaussians of these opacities in the picture.
+    fn project<L: Lanes<R>>(
         self,
-        gaussian: &Gaussian<'_, R>,
-        opacity: R,
+        l: L,
+        group: &Group<'_, R>,
+        opacity: L::V,
         view: &CameraView<R>,
         settings: &RenderSettings,
-    ) -> Projected<R, Self::Shape, Self::Depth>;
+    ) -> [Projected<R, Self::Shape, Self::Depth>; LANES];
     /// The planes of a frame that are composited, and those of [`Self::Extra`], of which `kept` is for the
     /// backward pass.
     fn planes<'a>(frame: &'a mut Frame<R>, kept: &'a mut [Vec<R>; 3], depth: bool) -> Planes<&'a mut [R]>;

@@ -132,8 +132,9 @@ impl Viewport {
                 actions.push(Action::Open(removed.folder.clone()));
             }
             self.other_fills(ui, &removed.request, state, actions);
+            // A retrained one holds photos, too, which are not deleted.
             let delete = Action::DeleteRemoved;
-            if ui.button("Delete").on_hover_text(delete.tooltip()).clicked() {
+            if !removed.request.retrain && ui.button("Delete").on_hover_text(delete.tooltip()).clicked() {
                 actions.push(delete);
             }
         }

@@ -26,7 +26,15 @@ fn ask(text: &str, with_meaning: bool) -> QueryAnswer {
 }
 
 fn ask_by(text: &str, recipe: &Recipe, with_meaning: bool) -> QueryAnswer {
-    let (all, features) = scene();
+    ask_of(scene(), text, recipe, with_meaning)
+}
+
+fn ask_of(
+    (all, features): (Identities, LanguageFeatures),
+    text: &str,
+    recipe: &Recipe,
+    with_meaning: bool,
+) -> QueryAnswer {
     let phrase = ParsedQuery::parse(text).expect("a phrase");
     let mut phrases = TextEmbeddings::default();
     let encode = |p: &str| {
@@ -101,6 +109,20 @@ fn an_answer_is_as_sure_as_it_rests_on_names() {
     looks.answer = Answer::Found(vec![Hit { identity: 3, score: 0.9, margin: 0.01 }]);
     assert_eq!(looks.certainty(&[]), Certainty::Guess, "another fits nearly as well");
     assert_eq!(ask("giraffe", true).certainty(&[]), Certainty::Guess);
+}
+
+#[test]
+fn what_was_removed_is_not_found_by_its_looks() {
+    let ask = |removed: &[&str], text: &str| {
+        let (mut all, features) = scene();
+        all.removed = removed.iter().map(|name| (*name).into()).collect();
+        ask_of((all, features), text, &Recipe::default(), true).chosen(1)
+    };
+    assert_eq!(ask(&[], "cup"), [3], "else it looks like the mug");
+    assert_eq!(ask(&["paper cup", "lid"], "cup"), [3], "a cup is not a paper cup");
+    assert!(ask(&["cup"], "cup").is_empty());
+    assert_eq!(ask(&["cup"], "mug"), [3], "another name");
+    assert_eq!(ask(&["mug"], "mug"), [3], "one of two was removed");
 }
 
 #[test]

@@ -18,11 +18,12 @@ use self::disk::{Disk, SurfelHit};
 use self::project::INVERSE_BLUR;
 use self::project::{SHAPE, surfel};
 use self::project_backward::project_backward;
+use super::chunk::Group;
 use super::project::{CameraView, Projected, Splat};
 use super::project_backward::GaussianGradient;
 use super::walk::{GROUPS, Planes, Primitive, Reach, RowPass, With, with_channels};
 use crate::math::Real;
-use crate::math::lanes::Lanes;
+use crate::math::lanes::{LANES, Lanes};
 use crate::render::{ALPHA_MIN, Frame, FrameGradient, MAX_CHANNELS, RenderSettings, TRANSMITTANCE_MIN};
 use crate::scene::Gaussian;
 
@@ -78,14 +79,19 @@ impl<R: Real> Primitive<R> for Surfels<R> {
     }
 
     #[inline(always)]
-    fn project(
+    fn project<L: Lanes<R>>(
         self,
-        gaussian: &Gaussian<'_, R>,
-        opacity: R,
+        l: L,
+        group: &Group<'_, R>,
+        opacity: L::V,
         view: &CameraView<R>,
         _: &RenderSettings,
-    ) -> Projected<R, [R; SHAPE], [R; 3]> {
-        surfel(gaussian, opacity, self.alpha_min(), view)
+    ) -> [Projected<R, [R; SHAPE], [R; 3]>; LANES] {
+        let opacity = l.store(opacity);
+        std::array::from_fn(|i| match group.get(i) {
+            Some(gaussian) => surfel(gaussian, opacity[i], self.alpha_min(), view),
+            None => Projected::Outside,
+        })
     }
 
     fn planes<'a>(frame: &'a mut Frame<R>, kept: &'a mut [Vec<R>; 3], depth: bool) -> Planes<&'a mut [R]> {

@@ -14,7 +14,7 @@ use crate::pipeline::semantics::matching::{self, MatchMode};
 use crate::pipeline::semantics::names;
 use crate::pipeline::semantics::reading::mended_text;
 use crate::pipeline::semantics::recipe::Recipe;
-use crate::scene::{Bounds, GaussianCloud, IdentityId, SemanticMap, text};
+use crate::scene::{Bounds, GaussianCloud, Identities, IdentityId, SemanticMap, text};
 use crate::ui::actions::{Action, Pane};
 use crate::ui::state::AppState;
 use crate::ui::theme;
@@ -162,7 +162,7 @@ impl Queries {
         let shown = newest.shown(&self.side.settings);
         match (&newest.answered.answer, shown.first()) {
             (Answer::NotFound(_), None) => (self.is_settled(ui) && !newest.pending)
-                .then(|| ("no match".to_owned(), theme::warning(), self.nothing_text(&newest))),
+                .then(|| ("no match".to_owned(), theme::warning(), self.nothing_text(&newest, &semantics.identities))),
             (Answer::Ambiguous(_), Some(_)) if newest.chosen.is_none() => {
                 Some((format!("{} fit", shown.len()), theme::warning(), "Which one? Unfold to choose.".to_owned()))
             }
@@ -180,7 +180,10 @@ impl Queries {
         }
     }
 
-    fn nothing_text(&self, newest: &Asked) -> String {
+    fn nothing_text(&self, newest: &Asked, identities: &Identities) -> String {
+        if names::was_removed(identities, &newest.reading.phrase.text) {
+            return "It was removed from this scene.".to_owned();
+        }
         let unknown = newest.unknown.join("\u{201d}, \u{201c}");
         match &*text::shortened(&unknown, 80) {
             "" => "No match.".to_owned(),
@@ -193,7 +196,7 @@ impl Queries {
             ui.weak("Encoding the query\u{2026}");
             return;
         }
-        ui.colored_label(theme::warning(), self.nothing_text(newest));
+        ui.colored_label(theme::warning(), self.nothing_text(newest, &semantics.identities));
         ui.horizontal_wrapped(|ui| match newest.reading.near.first() {
             Some((_, other)) => {
                 ui.weak("Did you mean");
