@@ -20,6 +20,18 @@ fn help_and_version_are_no_failures() {
     assert!(fmlgs(&["--version"]).ok().stdout.contains(env!("CARGO_PKG_VERSION")));
 }
 
+/// `make run ARGS="..."` sources it with the program's arguments, as do other scripts with theirs.
+#[cfg(unix)]
+#[test]
+fn a_script_that_looks_for_rust_may_have_arguments_of_its_own() {
+    let done = std::process::Command::new("bash")
+        .args(["-c", ". tools/rust.sh; echo \"found $#\"", "run.sh", "train", "--steps"])
+        .current_dir(env!("CARGO_MANIFEST_DIR"))
+        .output()
+        .expect("bash");
+    assert_eq!(String::from_utf8_lossy(&done.stdout).trim(), "found 2", "{done:?}");
+}
+
 #[test]
 fn arguments_that_make_no_sense_exit_with_2() {
     let folder = folder();

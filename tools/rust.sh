@@ -1,5 +1,6 @@
 # Sourced by run.sh and test.sh: leaves a `cargo` in PATH that is new enough, or explains.
-# usage: . tools/rust.sh [COMPONENT...]     (clippy, rustfmt)
+# usage: rust_components="clippy rustfmt"; . tools/rust.sh     (what else is needed; whoever sources this may have arguments
+# of their own)
 
 rust_needed=$(sed -n 's/^rust-version = "\(.*\)"/\1/p' Cargo.toml)
 
@@ -32,7 +33,7 @@ if ! rust_is_new_enough cargo; then
     fi
 fi
 
-for component in "$@"; do
+for component in ${rust_components:-}; do
     command=$component
     [ "$component" = rustfmt ] && command=fmt
     cargo "$command" --version >/dev/null 2>&1 && continue

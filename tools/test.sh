@@ -6,7 +6,8 @@ cd "$(dirname "$0")/.."
 exec </dev/null
 
 tools/setup.sh test || exit 1
-. tools/rust.sh clippy rustfmt
+rust_components="clippy rustfmt"
+. tools/rust.sh
 . tools/environment.sh
 
 passed=0 failed=0 skipped=0

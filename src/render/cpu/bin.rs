@@ -45,51 +45,63 @@ fn rectangle<R: Real>(s: &Splat<R>, size: [usize; 2]) -> Option<[usize; 4]> {
     Some(r)
 }
 
-/// Smallest squared Mahalanobis distance over the rectangle of pixel centers `[lo, hi]`.
-#[inline(always)]
-pub(crate) fn nearest<R: Real>(s: &Splat<R>, lo: [R; 2], hi: [R; 2]) -> R {
-    let [a, b, c] = s.conic;
-    // Offsets of the rectangle from the center; the minimum lies on the edges that face it.
-    let (x0, x1) = (lo[0] - s.mean[0], hi[0] - s.mean[0]);
-    let (y0, y1) = (lo[1] - s.mean[1], hi[1] - s.mean[1]);
-    let inside_x = x0 <= R::ZERO && x1 >= R::ZERO;
-    let inside_y = y0 <= R::ZERO && y1 >= R::ZERO;
-    if inside_x && inside_y {
-        return R::ZERO;
+/// Squared Mahalanobis distances from a splat, with what they have in common over all tiles.
+struct Distances<R> {
+    conic: [R; 3],
+    /// Where an edge is nearest: for edges along y, y over x; for those along x, x over y.
+    slopes: [R; 2],
+}
+
+impl<R: Real> Distances<R> {
+    #[inline(always)]
+    fn new(s: &Splat<R>) -> Self {
+        let [a, b, c] = s.conic;
+        Self { conic: s.conic, slopes: [-b / c, -b / a] }
     }
-    let two = R::of(2.0);
-    let q = |x: R, y: R| a * x * x + two * b * x * y + c * y * y;
-    let mut best = None;
-    if !inside_x {
-        let x = if x0 > R::ZERO { x0 } else { x1 };
-        let y = (-b * x / c).max(y0).min(y1);
-        best = Some(q(x, y));
+
+    /// The smallest over a rectangle of pixel centers, given by its edges' offsets from the splat's center.
+    #[inline(always)]
+    fn nearest(&self, [x0, x1]: [R; 2], [y0, y1]: [R; 2]) -> R {
+        // The minimum lies on the edges that face the center.
+        let facing = |from: R, to: R| if from > R::ZERO { from } else { to };
+        let between = |v: R, from: R, to: R| {
+            let v = if v > from { v } else { from };
+            if v < to { v } else { to }
+        };
+        let [a, b, c] = self.conic;
+        let q = |x: R, y: R| a * x * x + R::of(2.0) * b * x * y + c * y * y;
+        let inside = |from: R, to: R| from <= R::ZERO && to >= R::ZERO;
+        let along_y = |x: R| q(x, between(self.slopes[0] * x, y0, y1));
+        let along_x = |y: R| q(between(self.slopes[1] * y, x0, x1), y);
+        match (inside(x0, x1), inside(y0, y1)) {
+            (true, true) => R::ZERO,
+            (false, true) => along_y(facing(x0, x1)),
+            (true, false) => along_x(facing(y0, y1)),
+            (false, false) => {
+                let (p, q) = (along_y(facing(x0, x1)), along_x(facing(y0, y1)));
+                if p < q { p } else { q }
+            }
+        }
     }
-    if !inside_y {
-        let y = if y0 > R::ZERO { y0 } else { y1 };
-        let x = (-b * y / a).max(x0).min(x1);
-        let other = q(x, y);
-        best = Some(best.map_or(other, |q: R| q.min(other)));
-    }
-    best.unwrap_or(R::ZERO)
 }
 
 /// Calls `found` for every tile that the splat reaches.
 #[inline(always)]
 fn each_tile<R: Real>(s: &Splat<R>, size: [usize; 2], columns: usize, mut found: impl FnMut(u32)) {
     let Some([x0, y0, x1, y1]) = rectangle(s, size) else { return };
-    let single = x0 == x1 && y0 == y1;
+    if x0 == x1 && y0 == y1 {
+        return found((y0 * columns + x0) as u32);
+    }
+    let distances = Distances::new(s);
+    // Offsets of a tile's first and last pixel centers.
+    let ends = |axis: usize, tile: usize| {
+        let center = |p: usize| R::of(p.min(size[axis] - 1) as f64 + 0.5) - s.mean[axis];
+        [center(tile * TILE_PX), center(tile * TILE_PX + TILE_PX - 1)]
+    };
     for ty in y0..=y1 {
+        let rows = ends(1, ty);
         for tx in x0..=x1 {
-            let lo = [tx * TILE_PX, ty * TILE_PX];
-            let corner = |axis: usize, p: usize| R::of((p.min(size[axis] - 1)) as f64 + 0.5);
-            let reaches = single
-                || nearest(
-                    s,
-                    [corner(0, lo[0]), corner(1, lo[1])],
-                    [corner(0, lo[0] + TILE_PX - 1), corner(1, lo[1] + TILE_PX - 1)],
-                ) <= s.reach;
-            if reaches {
+            if distances.nearest(ends(0, tx), rows) <= s.reach {
                 found((ty * columns + tx) as u32);
             }
         }
