@@ -15,7 +15,8 @@ profile=${PROFILE:-dist}
 cargo_home=${CARGO_HOME:-$HOME/.cargo}
 export FMLGS_VERSION
 FMLGS_VERSION=${FMLGS_VERSION:-$(tools/version.sh)}
-export RUSTFLAGS="${RUSTFLAGS:-} --remap-path-prefix=$cargo_home/registry/src= --remap-path-prefix=$PWD=fmlgs"
+# Cargo strips a crate that a profile names (fmlgs, in that of releases) of debug information only, whatever is asked for.
+export RUSTFLAGS="${RUSTFLAGS:-} -C strip=symbols --remap-path-prefix=$cargo_home/registry/src= --remap-path-prefix=$PWD=fmlgs"
 # The last of what cargo makes is the program.
 cargo build --locked --profile "$profile" --bin fmlgs --message-format json-render-diagnostics "$@" |
     sed -n 's/.*"executable":"\([^"]*\)".*/\1/p' | sed 's/\\\\/\\/g' | tail -n 1

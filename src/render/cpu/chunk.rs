@@ -10,6 +10,7 @@ use crate::scene::{Gaussian, GaussianCloud};
 
 /// Gaussians that one task projects.
 pub(crate) const CHUNK: usize = 2_048;
+
 /// The splats of some consecutive Gaussians with their composited values, in the cloud's order.
 #[derive(Debug, Default)]
 pub(crate) struct Chunk<R> {
