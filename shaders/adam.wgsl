@@ -2,6 +2,7 @@
 // place in its Gaussian's record of `stride` floats. The rule for outliers is that of
 // `render/cpu/adam.rs`: no gradient counts for more than what doubles the second moment.
 #include "shared/counters.wgsl"
+#include "shared/flat.wgsl"
 
 struct AdamStep {
     // Rate of each float of a record.
@@ -42,7 +43,7 @@ const MARK: u32 = 11u;
 
 @compute @workgroup_size(256)
 fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
-    let i = global.y * groups.x * 256u + global.x;
+    let i = flat(global, groups, 256u);
     // A frame whose pairs did not fit was not drawn: its gradient means nothing.
     if i >= adam.floats || counters[COUNT_OVERFLOW] != 0u {
         return;

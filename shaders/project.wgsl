@@ -4,6 +4,7 @@
 #include "shared/view.wgsl"
 #include "shared/counters.wgsl"
 #include "shared/finite.wgsl"
+#include "shared/flat.wgsl"
 #include "shared/splat.wgsl"
 #include "shared/reach.wgsl"
 #include "shared/harmonics.wgsl"
@@ -79,8 +80,12 @@ fn splat_of(i: u32) -> Splat {
 }
 
 @compute @workgroup_size(256)
-fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
-    let i = global.x;
+fn main(
+    @builtin(global_invocation_id) global: vec3<u32>,
+    @builtin(num_workgroups) groups: vec3<u32>,
+    @builtin(local_invocation_index) thread: u32,
+) {
+    let i = flat(global, groups, 256u);
     if i < view.gaussians {
         var splat = splat_of(i);
         var count = 0u;

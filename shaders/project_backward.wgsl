@@ -4,6 +4,7 @@
 #include "shared/view.wgsl"
 #include "shared/counters.wgsl"
 #include "shared/finite.wgsl"
+#include "shared/flat.wgsl"
 #include "shared/splat.wgsl"
 #include "shared/harmonics.wgsl"
 
@@ -86,8 +87,8 @@ fn store_zero(i: u32, mark: f32) {
 }
 
 @compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) global: vec3<u32>) {
-    let i = global.x;
+fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = flat(global, groups, 64u);
     if i >= view.gaussians {
         return;
     }
@@ -167,8 +168,8 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>) {
 }
 
 @compute @workgroup_size(256)
-fn statistics(@builtin(global_invocation_id) global: vec3<u32>) {
-    let i = global.x;
+fn statistics(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroups) groups: vec3<u32>) {
+    let i = flat(global, groups, 256u);
     let drawn = atomicLoad(&counters[COUNT_OVERFLOW]) == 0u;
     if i >= view.gaussians || splats[i].radius == 0.0 || !drawn {
         return;

@@ -12,7 +12,7 @@ use fmlgs::pipeline::synth::{self, SynthOptions};
 fn day(arguments: &[&Path]) -> Output {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let mut command = Command::new(root.join("tools/gpu_day.sh"));
-    command.args(arguments).env("FMLGS", env!("CARGO_BIN_EXE_fmlgs")).env_remove("GARDEN");
+    command.args(arguments).env("FMLGS", env!("CARGO_BIN_EXE_fmlgs"));
     command.output().expect("it starts")
 }
 

@@ -325,3 +325,59 @@ fn both_backends_draw_the_same_view_and_follow_the_cloud() {
         assert!(gpu.stage_times().is_empty());
     });
 }
+
+#[test]
+fn bytes_are_those_of_the_frame() {
+    with_context(|context| {
+        let scene = Scene::new(300, 2, 0, [51, 37]);
+        let cloud = Arc::new(scene.cloud.cast::<f32>());
+        let mut gpu = fmlgs::render::Renderer::on_gpu(context).unwrap();
+        let frame = gpu.draw(&cloud, &scene.camera, &scene.settings).unwrap().to_rgb8();
+        let bytes = gpu.draw_rgb8(&cloud, &scene.camera, &scene.settings).unwrap();
+        assert_eq!(bytes.len(), 51 * 37);
+        let differ = bytes.iter().flatten().zip(frame.iter().flatten()).filter(|(a, b)| a != b);
+        let worst = differ.clone().map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0);
+        assert!(worst <= 1 && differ.count() < 10, "rounding alone");
+        let levels: std::collections::BTreeSet<u8> = bytes.iter().flatten().copied().collect();
+        assert!(levels.len() > 50, "there is something to see");
+    });
+}
+
+#[test]
+fn labels_have_the_weights_that_the_cpu_finds() {
+    with_context(|context| {
+        let scene = Scene::new(600, 0, 0, [150, 110]);
+        let cloud = Arc::new(scene.cloud.cast::<f32>());
+        let of: Vec<u32> = (0..cloud.len() as u32).map(|i| i % 37).collect();
+        let mut cpu = fmlgs::render::Renderer::new();
+        let want = cpu.label_weights(&cloud, &of, &scene.camera, &scene.settings).unwrap();
+        let mut gpu = fmlgs::render::Renderer::on_gpu(context).unwrap();
+        let elsewhere = camera(64, 48);
+        gpu.draw(&cloud, &elsewhere, &scene.settings).unwrap();
+        // Of a view that was not drawn before, and of one that was; of another cloud the CPU finds them.
+        let first = gpu.label_weights(&cloud, &of, &scene.camera, &scene.settings).unwrap();
+        gpu.draw_rgb8(&cloud, &scene.camera, &scene.settings).unwrap();
+        let second = gpu.label_weights(&cloud, &of, &scene.camera, &scene.settings).unwrap();
+        assert!(first == second && first != want, "the GPU's own");
+        assert!(
+            gpu.label_weights(&cloud.clone().as_ref().clone(), &of, &scene.camera, &scene.settings).unwrap() == want
+        );
+        let boundary = bands(&scene.cloud, &scene.camera, &scene.settings, 1e-3).pixels;
+        let clear: Vec<usize> = (0..want.len()).filter(|&i| !boundary[i]).collect();
+        let weight = |places: &fmlgs::render::PixelWeights, label: u32| -> f32 {
+            places.iter().filter(|p| p.0 == label).map(|p| p.1).sum()
+        };
+        let taken = |places: &fmlgs::render::PixelWeights| places.iter().filter(|p| p.1 > 0.0).count();
+        let far = |i: usize| {
+            let labels = want[i].iter().chain(&first[i]).map(|p| p.0);
+            labels.map(|l| (weight(&first[i], l) - weight(&want[i], l)).abs()).fold(0.0, f32::max) > 1e-4
+        };
+        // Where places are left none is dropped; where none is, rounding may decide which.
+        let (full, roomy): (Vec<usize>, Vec<usize>) = clear.iter().partition(|&&i| taken(&want[i]) == want[i].len());
+        let several = roomy.iter().filter(|&&i| taken(&want[i]) > 3).count();
+        assert!(several > 1000 && full.len() > 100, "{several} {}", full.len());
+        assert_eq!(roomy.iter().find(|&&i| far(i)), None);
+        let differ = full.iter().filter(|&&i| far(i)).count();
+        assert!(differ * 50 < full.len(), "{differ} of {}", full.len());
+    });
+}

@@ -55,7 +55,7 @@ fn every_shader_is_valid() {
             checked += 1;
         }
     }
-    assert_eq!(checked, 8 * 8, "kernels times variants");
+    assert_eq!(checked, 10 * 8, "kernels times variants");
 }
 
 #[test]

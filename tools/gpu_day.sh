@@ -4,7 +4,7 @@
 #
 # usage: tools/gpu_day.sh OUT [--small] [--photos FOLDER] [--cargo-tests] [SPLAT...]
 #   --small        small images and few steps, on whatever adapter there is: shows that this script works
-#   --photos       posed photos to train on, and the garden crop of gsplat where GARDEN names it
+#   --photos       posed photos to train on, undistorted and with a transforms.json for gsplat
 #   --cargo-tests  the tests of kernels too, which are built first; without a real GPU they fail
 #   SPLAT          what is drawn
 # FMLGS names the program; without it, it is built. OUT/gpu_day.json and OUT/gpu_day.md are the result; every step has a
@@ -35,9 +35,9 @@ if [ -z "${FMLGS:-}" ]; then
     cargo build --locked --release --bin fmlgs || exit 1
     FMLGS=${CARGO_TARGET_DIR:-target}/release/fmlgs
 fi
-sizes=(--size 1280x720 --size 1920x1080) repeats=20 side=504 marks='500 1000 2000 4000'
+sizes=(--size 1280x720 --size 1920x1080) repeats=20 side=504 most=45000 marks='1000 3000 7000'
 if [ -n "$small" ]; then
-    sizes=(--size 160x90) repeats=1 side=96 marks=10
+    sizes=(--size 160x90) repeats=1 side=96 most=1000 marks=10
 fi
 
 # step NAME COMMAND...: runs it, its output in OUT/NAME.json (standard output) and OUT/NAME.log.
@@ -62,17 +62,15 @@ if [ -n "$tests" ]; then
 fi
 if [ ${#splats[@]} -gt 0 ]; then
     step images "$FMLGS" bench "${splats[@]}" "${sizes[@]}" --repeats "$repeats" --gpu --json
-    step gsplat_images python3 tools/gpu_day/gsplat_times.py images "${sizes[@]}" --repeats "$repeats" "${splats[@]}"
+    step gsplat_images python3 tools/gpu_day/gsplat_times.py "${sizes[@]}" --repeats "$repeats" "${splats[@]}"
 fi
 if [ -n "$photos" ]; then
     step steps "$FMLGS" bench "$photos" --max-side "$side" --repeats "$repeats" --gpu --json
     for steps in $marks; do
         step "train_$steps" "$FMLGS" train "$photos" --out "$out/scene_$steps" --steps "$steps" --max-side "$side" \
-            --backend gpu --eval-every 0 --json
+            --max-gaussians "$most" --backend gpu --eval-every 0 --json
+        step "gsplat_train_$steps" python3 tools/gpu_day/gsplat_train.py "$photos" --steps "$steps" --gaussians "$most"
     done
-fi
-if [ -n "${GARDEN:-}" ]; then
-    step gsplat_garden python3 tools/gpu_day/gsplat_times.py garden "$GARDEN" --repeats "$repeats"
 fi
 python3 tools/gpu_day/table.py "$out"
 [ ! -e "$out/failed" ]

@@ -8,14 +8,14 @@ use image::ColorType;
 use super::held_out::held_out;
 use super::{JobError, Scene, export, open};
 use crate::io;
-use crate::math::stats::{mean, median};
+use crate::math::stats::median;
 use crate::pipeline::depth::{self, DepthCounter, DepthScores};
-use crate::pipeline::evaluate::evaluate;
+use crate::pipeline::evaluate::scores;
 use crate::pipeline::observer::{Evaluation, Observer, Severity, Ticker, ViewScore};
 use crate::pipeline::train::TrainView;
 use crate::pipeline::train::border::Borders;
 use crate::render::{Features, RenderSettings, Renderer};
-use crate::scene::{Dataset, GaussianCloud};
+use crate::scene::{Camera, Dataset, GaussianCloud};
 
 /// The difference picture shows errors this many times larger.
 const DIFFERENCE_GAIN: i32 = 4;
@@ -107,18 +107,19 @@ pub(crate) fn photometric(comparison: &PhotoComparison, observer: &mut dyn Obser
         observer.note(Severity::Warning, warning.clone());
     }
     let PhotoComparison { cloud, settings, .. } = comparison;
+    let mut renderer = Renderer::new();
     let mut views: Vec<ViewScore> = Vec::with_capacity(comparison.views.len());
     comparison.walk("Measuring", observer, |index| {
         let view = comparison.view(index)?;
-        views.extend(evaluate(cloud, std::slice::from_ref(&view), settings, 0, 0.0)?.views);
+        let draw = |camera: &Camera| renderer.render(cloud, Features::NONE, camera, settings);
+        views.extend(scores(std::slice::from_ref(&view), draw)?);
         if let Some(folder) = &comparison.pictures {
             export::make_folder(folder)?;
             side_by_side(cloud, settings, &view, &folder.join(picture_name(index, &view.name)))?;
         }
         Ok(())
     })?;
-    let of = |f: fn(&ViewScore) -> f64| mean(&views.iter().map(f).collect::<Vec<_>>());
-    Ok(Evaluation { step: 0, secs: 0.0, psnr: of(|s| s.psnr), ssim: of(|s| s.ssim), gaussians: cloud.len(), views })
+    Ok(Evaluation::of(views, cloud.len(), 0, 0.0))
 }
 
 /// Drawn depth against the true depth of synthetic photos, and the median milliseconds of drawing it.

@@ -17,7 +17,7 @@ use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::pipeline::semantics::votes::UNKNOWN;
-use crate::render::{Features, RenderSettings, Renderer};
+use crate::render::{DrawError, Features, RenderError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, LevelFilter, Mask, NOBODY, SemanticMap};
 
 /// What the pixels of a view belong to, drawn once for all questions.
@@ -46,7 +46,7 @@ impl ViewMaps {
         camera: &Camera,
         wanted: bool,
         parts: bool,
-    ) -> Result<Self, crate::render::RenderError> {
+    ) -> Result<Self, DrawError> {
         let seen = |(i, id): (usize, &IdentityId)| if map.is_unknown(i) { UNSEEN } else { *id };
         let of: Vec<IdentityId> = map.identity_of.iter().enumerate().map(seen).collect();
         let mut identities = ViewMap::render(renderer, cloud, &of, &map.identities, camera, settings)?;
@@ -87,7 +87,7 @@ fn invented(
     renderer: &mut Renderer,
     (cloud, settings): (&GaussianCloud, &RenderSettings),
     camera: &Camera,
-) -> Result<Mask, crate::render::RenderError> {
+) -> Result<Mask, RenderError> {
     let Some(flags) = invented_flags(cloud) else { return Ok(Mask::empty(0, 0)) };
     let features = Features { channels: 1, values: flags };
     let bare = RenderSettings { sh_degree: 0, depth: false, ..settings.clone() };

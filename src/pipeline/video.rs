@@ -7,7 +7,7 @@ use super::observer::{Interrupted, Observer, Ticker};
 use super::semantics::view_map::ViewMap;
 use crate::io::video::{VideoFileError, VideoSettings, VideoSummary, VideoWriter};
 
-use crate::render::{DrawError, RenderError, RenderSettings, Renderer};
+use crate::render::{DrawError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
 /// How much of a marked pixel is the mark, of 8.
@@ -26,8 +26,6 @@ pub(crate) struct Marked<'a> {
 pub enum VideoError {
     #[error(transparent)]
     Draw(#[from] DrawError),
-    #[error(transparent)]
-    Identities(#[from] RenderError),
     #[error(transparent)]
     File(#[from] VideoFileError),
     /// The observer asked to stop; nothing is left of the video.
@@ -49,7 +47,7 @@ pub(crate) fn write(
     observer.proceed()?;
     let mut writer = VideoWriter::create(out.0, out.1)?;
     for (done, camera) in cameras.iter().enumerate() {
-        let mut pixels = renderer.draw(cloud, camera, draw)?.to_rgb8();
+        let mut pixels = renderer.draw_rgb8(cloud, camera, draw)?;
         if let Some(marked) = marked.filter(|m| !m.ids.is_empty()) {
             let Marked { map, ids, .. } = marked;
             let view = ViewMap::render(renderer, cloud, &map.identity_of, &map.identities, camera, draw)?;

@@ -15,6 +15,7 @@ mod renderer;
 
 pub(crate) use cpu::adam::{AdamStep, Rates};
 pub(crate) use cpu::contributions::ContributionSink;
+pub use cpu::labels::PixelWeights;
 pub(crate) use cpu::ssim::{LossParts, PhotoLoss, ssim};
 pub(crate) use cpu::{RenderStats, normals, validate};
 pub(crate) use gpu::timing::StageTimes;
@@ -122,6 +123,14 @@ impl Default for RenderSettings {
 }
 
 impl RenderSettings {
+    /// Whether Gaussians have the same weights at each pixel as with `other`.
+    pub(crate) fn sees_like(&self, other: &Self) -> bool {
+        let shape = |s: &Self| (s.near, s.antialias, s.surfels, s.cutoffs);
+        shape(self) == shape(other)
+    }
+}
+
+impl RenderSettings {
     /// How Gaussians of this mode are drawn.
     pub(crate) fn of_mode(mode: SplatRenderMode) -> Self {
         let (antialias, surfels) = (mode == SplatRenderMode::Mip, mode == SplatRenderMode::Surfels);
@@ -170,13 +179,6 @@ pub struct Frame<R> {
 }
 
 impl<R: Real> Frame<R> {
-    /// Interleaved 8-bit RGB, clamped and rounded.
-    pub fn to_rgb8(&self) -> Vec<[u8; 3]> {
-        let byte = |v: R| (v.f32().clamp(0.0, 1.0) * 255.0 + 0.5) as u8;
-        let [r, g, b] = &self.color;
-        r.iter().zip(g).zip(b).map(|((&r, &g), &b)| [byte(r), byte(g), byte(b)]).collect()
-    }
-
     /// Expected depth `sum(w z) / alpha` in scene units, 0 where less than half of the light comes
     /// from the scene; empty unless depth was asked for.
     pub(crate) fn expected_depth(&self) -> Vec<R> {

@@ -4,6 +4,7 @@ use std::sync::{Arc, Weak};
 
 use serde::{Deserialize, Serialize};
 
+use super::cpu::labels::{self, PixelWeights};
 use super::gpu::{self, Device, GpuError};
 use super::lod::Cut;
 use super::{ContributionSink, Features, Frame, RenderError, RenderSettings, RenderStats, StageTimes, cpu};
@@ -132,7 +133,26 @@ impl Renderer {
         camera: &Camera,
         settings: &RenderSettings,
     ) -> Result<Frame<f32>, DrawError> {
-        let Some(gpu) = &mut self.gpu else { return Ok(self.render(cloud, Features::NONE, camera, settings)?) };
+        match self.holding(cloud, camera, settings)? {
+            Some(gpu) => Ok(gpu.renderer.draw(camera, settings)?),
+            None => Ok(self.render(cloud, Features::NONE, camera, settings)?),
+        }
+    }
+
+    /// Draws on a GPU what was drawn from there before, and leaves the picture there; returns before it is drawn. For
+    /// measurements.
+    pub(crate) fn draw_on_device(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<(), DrawError> {
+        self.gpu.as_mut().map_or(Ok(()), |gpu| Ok(gpu.renderer.draw_on_device(camera, settings)?))
+    }
+
+    /// The GPU, if there is one, with this cloud on it.
+    fn holding(
+        &mut self,
+        cloud: &Arc<GaussianCloud>,
+        camera: &Camera,
+        settings: &RenderSettings,
+    ) -> Result<Option<&mut Gpu>, DrawError> {
+        let Some(gpu) = &mut self.gpu else { return Ok(None) };
         camera.validate().map_err(RenderError::from)?;
         // Bands that are not drawn are not sent.
         let degree = settings.sh_degree.min(cloud.sh_degree);
@@ -142,7 +162,39 @@ impl Renderer {
             // A weak handle keeps the address from being given to another cloud.
             (gpu.uploaded, gpu.degree) = (Arc::downgrade(cloud), degree);
         }
-        Ok(gpu.renderer.draw(camera, settings)?)
+        Ok(Some(gpu))
+    }
+
+    /// The colors alone of what [`Self::draw`] draws, as [`Frame::to_rgb8`]: less to copy from a GPU.
+    pub fn draw_rgb8(
+        &mut self,
+        cloud: &Arc<GaussianCloud>,
+        camera: &Camera,
+        settings: &RenderSettings,
+    ) -> Result<Vec<[u8; 3]>, DrawError> {
+        match self.holding(cloud, camera, settings)? {
+            Some(gpu) => Ok(gpu.renderer.draw_rgb8(camera, settings)?),
+            None => Ok(self.render(cloud, Features::NONE, camera, settings)?.to_rgb8()),
+        }
+    }
+
+    /// The labels of largest weight at each pixel, row-major, of which `of` has one for each Gaussian of `cloud`. A GPU
+    /// finds them for the cloud that it drew last.
+    ///
+    /// # Panics
+    /// Where there are not as many labels as Gaussians.
+    pub fn label_weights(
+        &mut self,
+        cloud: &GaussianCloud,
+        of: &[u32],
+        camera: &Camera,
+        settings: &RenderSettings,
+    ) -> Result<Vec<PixelWeights>, DrawError> {
+        assert_eq!(of.len(), cloud.len(), "one label for each Gaussian");
+        match self.gpu.as_mut().filter(|gpu| std::ptr::eq(gpu.uploaded.as_ptr(), cloud)) {
+            Some(gpu) => Ok(gpu.renderer.label_weights(of, camera, settings)?),
+            None => Ok(labels::label_weights(&mut self.cpu, cloud, of, camera, settings)?),
+        }
     }
 
     /// Draws a cloud with values of its Gaussians composited like colors, on the CPU.

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::math::format::count;
+use crate::math::stats::mean;
 
 /// Measurements of one training step (reported every few steps).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -51,6 +52,12 @@ pub struct Evaluation {
 }
 
 impl Evaluation {
+    /// The means of views' scores after `step` steps, which took `secs`.
+    pub(crate) fn of(views: Vec<ViewScore>, gaussians: usize, step: u64, secs: f64) -> Self {
+        let of = |f: fn(&ViewScore) -> f64| mean(&views.iter().map(f).collect::<Vec<_>>());
+        Self { step, secs, psnr: of(|s| s.psnr), ssim: of(|s| s.ssim), gaussians, views }
+    }
+
     /// `step 500, 12.3 s: held-out PSNR 21.34 dB, SSIM 0.712 over 9 views, 23,121 Gaussians`.
     pub(crate) fn line(&self) -> String {
         let Self { step, secs, psnr, ssim, gaussians, views } = self;

@@ -13,7 +13,7 @@ use super::view_renderer::ViewRenderer;
 pub use super::view_request::{QualityBudget, SecondPicture, SkipPasses, ViewPicture, ViewRequest, ViewResult};
 use super::{Slot, levels};
 use crate::jobs::query::ViewMaps;
-use crate::render::{RenderError, Renderer};
+use crate::render::{DrawError, Renderer};
 use crate::scene::Camera;
 use crate::scene::resource_log::{self, ResourceKind};
 
@@ -91,9 +91,14 @@ impl ViewLane {
                     }
                 };
                 mapper.limit_to(renderer.cut());
+                let mut maps_of = || {
+                    let by_gpu = renderer.renderer.is_gpu().then(|| maps_of(&mut renderer.renderer, &request, &camera));
+                    let drawn = by_gpu.flatten().filter(Result::is_ok);
+                    drawn.or_else(|| maps_of(&mut mapper, &request, &camera))
+                };
                 // At rest it comes second, and only if no one waits for a frame.
                 if (!exact || lock(&box_.0).request.is_none())
-                    && let Some(maps) = maps_of(&mut mapper, &request, &camera)
+                    && let Some(maps) = maps_of()
                 {
                     let secs = start.elapsed().as_secs_f64();
                     if let Ok(maps) = &maps
@@ -195,7 +200,7 @@ fn maps_of(renderer: &mut Renderer, request: &ViewRequest, camera: &Camera) -> O
     let draw = AssertUnwindSafe(|| {
         ViewMaps::draw(renderer, (cloud, settings), semantics, camera, request.codes, !request.skip.parts)
     });
-    let told = |e: RenderError| {
+    let told = |e: DrawError| {
         let failure = Failure::of(&e, "Reset the view (Home), or find the objects again.");
         Failure { message: format!("What the pixels belong to cannot be drawn: {}", failure.message), ..failure }
     };

@@ -39,6 +39,12 @@ struct Speed {
     secs_per_px: f64,
 }
 
+/// What was drawn of a view.
+enum Painting {
+    Colors(Vec<[u8; 3]>),
+    Frame(Box<Frame<f32>>),
+}
+
 impl ViewRenderer {
     /// Draws with a real GPU if there is one and it is to be used, else with the CPU.
     pub(super) fn without_gpu(without_gpu: bool) -> Self {
@@ -127,7 +133,7 @@ impl ViewRenderer {
         let full = camera == request.camera && self.cut.is_none();
         // Without times there is still a frame.
         let _ = self.renderer.time_stages(request.timed);
-        let frame = match self.try_render(request, &camera) {
+        let drawn = match self.try_render(request, &camera) {
             // A GPU that fails (lost, out of memory) leaves the CPU to draw from then on.
             Err(failure) if self.renderer.is_gpu() => {
                 self.fall_back(&failure.message);
@@ -144,14 +150,19 @@ impl ViewRenderer {
         }
         let stages = self.renderer.stage_times();
         let start = Instant::now();
-        let paint = |mode| view_modes::paint(&frame, mode, request.photo.as_deref());
-        let drawn = paint(request.mode);
-        let second = request.second.map(|mode| {
-            let view_modes::Drawn { rgb, depth_range, psnr } = paint(mode);
-            SecondPicture { rgb, depth_range, psnr }
-        });
+        let (drawn, second, median_depth) = match drawn {
+            Painting::Colors(rgb) => (view_modes::Drawn { rgb, ..view_modes::Drawn::default() }, None, None),
+            Painting::Frame(frame) => {
+                let paint = |mode| view_modes::paint(&frame, mode, request.photo.as_deref());
+                let second = request.second.map(|mode| {
+                    let view_modes::Drawn { rgb, depth_range, psnr } = paint(mode);
+                    SecondPicture { rgb, depth_range, psnr }
+                });
+                let median_depth = |frame: Frame<f32>| Some(frame.median_depth).filter(|depth| !depth.is_empty());
+                (paint(request.mode), second, median_depth(*frame))
+            }
+        };
         let paint_secs = start.elapsed().as_secs_f64();
-        let median_depth = (!frame.median_depth.is_empty()).then_some(frame.median_depth);
         Ok(ViewPicture {
             ticket: request.ticket,
             full,
@@ -169,11 +180,18 @@ impl ViewRenderer {
         })
     }
 
-    fn try_render(&mut self, request: &ViewRequest, camera: &Camera) -> Result<Frame<f32>, Failure> {
+    fn try_render(&mut self, request: &ViewRequest, camera: &Camera) -> Result<Painting, Failure> {
         let shows_depth = [Some(request.mode), request.second].contains(&Some(ViewMode::Depth));
         let depth = request.budget == QualityBudget::Full || shows_depth || !request.skip.depth;
         let settings = RenderSettings { depth, ..request.settings.clone() };
-        match catch_unwind(AssertUnwindSafe(|| self.renderer.draw(&request.cloud, camera, &settings))) {
+        let (renderer, cloud) = (&mut self.renderer, &request.cloud);
+        // Of a moving view colors are enough, of which there is less to copy from a GPU.
+        let colors = !depth && request.mode == ViewMode::Rgb && request.second.is_none() && request.photo.is_none();
+        let draw = || match colors {
+            true => renderer.draw_rgb8(cloud, camera, &settings).map(Painting::Colors),
+            false => renderer.draw(cloud, camera, &settings).map(|frame| Painting::Frame(Box::new(frame))),
+        };
+        match catch_unwind(AssertUnwindSafe(draw)) {
             Ok(result) => result.map_err(|e| Failure::of(&e, "Reset the view (Home), or open the scene again.")),
             Err(payload) => {
                 let failure = panic_failure(payload.as_ref());

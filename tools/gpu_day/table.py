@@ -38,24 +38,25 @@ def rows(steps):
             for t in found.get(key, []):
                 size = "x".join(str(n) for n in t["size"])
                 what = "image" if "render" in key else "training step"
-                yield [f"{what}, {where}", f"{t['name']}, {t['gaussians']}, {size}", f"{t.get('total_ms', t.get('step_ms')):.2f} ms", stages(t)]
-    for name in ["gsplat_images", "gsplat_garden"]:
-        found = steps.get(name)
+                on = f"{t['name']}, {t['gaussians']}, {size}"
+                yield [f"{what}, {where}", on, f"{t.get('total_ms', t.get('step_ms')):.2f} ms", stages(t)]
+                if t.get("staying_ms"):
+                    yield [f"{what} that stays on the GPU", on, f"{t['staying_ms']:.2f} ms", ""]
+                if t.get("labels_ms"):
+                    yield ["what its pixels belong to", on, "{:.2f} ms, on the CPU {:.2f} ms".format(*t["labels_ms"]), ""]
+    for name, found in steps.items():
         if not isinstance(found, dict):
             continue
-        if "missing" in found:
+        if name.startswith("gsplat_") and "missing" in found:
             yield [name.replace("_", ", "), "", "not measured", found["missing"]]
-        for t in found.get("images", []):
-            result = f"{t['total_ms']:.2f} ms" if "total_ms" in t else t["missing"]
-            yield ["image, gsplat", f"{t['name']}, {t.get('gaussians', '')}, {t.get('size', '')}", result, ""]
-        if "garden" in found:
-            t = found["garden"]
-            yield ["gsplat's garden", f"{t['gaussians']}, {t['size']}", f"image {t['image_ms']:.2f}, step {t['step_ms']:.2f} ms", ""]
-    for name, found in steps.items():
-        if name.startswith("train_") and isinstance(found, dict):
-            for last in found.get("evaluations", [])[-1:]:
+        for t in found.get("images", []) if name == "gsplat_images" else []:
+            result = f"{t['total_ms']:.2f} ms, {t['staying_ms']:.2f} ms" if "total_ms" in t else t["missing"]
+            yield ["image, gsplat: alone, among many", f"{t['name']}, {t.get('gaussians', '')}, {t.get('size', '')}", result, ""]
+        if "train_" in name:
+            who = "gsplat's training" if name.startswith("gsplat") else "training"
+            for last in (found.get("evaluations") or found.get("curve") or [])[-1:]:
                 result = f"{last['psnr']:.2f} dB after {last['secs']:.1f} s"
-                yield [f"training, {name[6:]} steps", f"{last['gaussians']} Gaussians", result, ""]
+                yield [f"{who}, {name.split('_')[-1]} steps", f"{last['gaussians']} Gaussians", result, ""]
 
 
 def main():

@@ -26,7 +26,7 @@ use crate::pipeline::semantics::protocols::{
 use crate::pipeline::semantics::query_engine::{ask_by_embedding, ask_by_name};
 use crate::pipeline::semantics::recipe::{PartFeatures, Recipe, RelevancyScale, Strategy, Understanding};
 use crate::pipeline::semantics::timing::ms_since;
-use crate::pipeline::semantics::view_map::{ViewMap, weights};
+use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
 use crate::scene::{LanguageFeatures, LevelFilter, SemanticMap};
 
@@ -323,7 +323,7 @@ fn rule_rows(
         }
         let pixels = match kept.take() {
             Some((of, pixels)) if of == k => pixels,
-            _ => weights(&mut renderer, cloud, &map.identity_of, views[k].camera, settings)?,
+            _ => renderer.label_weights(cloud, &map.identity_of, views[k].camera, settings)?,
         };
         let relevancy = raw.relevancy(&pixels, &parsed.text, &by.phrases, &recipe);
         kept = Some((k, pixels));

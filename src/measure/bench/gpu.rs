@@ -22,6 +22,8 @@ pub struct Measurement {
     pub stages: StageTimes,
     /// Seconds from the call to the finished result, on the host's clock.
     pub whole_secs: f64,
+    /// Seconds of a frame that stays on the GPU, one after another without a wait; 0 where no GPU draws.
+    pub staying_secs: f64,
 }
 
 /// Draws a cloud `repeats` times, after one that does not count; the copy of the image to the host is included. On a
@@ -49,7 +51,27 @@ pub fn frame(
         }
     }
     renderer.time_stages(false)?;
-    Ok(Measurement { stages: medians(&stages), whole_secs: median(&secs) })
+    let staying_secs = if renderer.is_gpu() { staying(renderer, cloud, camera, settings, repeats)? } else { 0.0 };
+    Ok(Measurement { stages: medians(&stages), whole_secs: median(&secs), staying_secs })
+}
+
+/// Mean seconds of frames that stay on the GPU, of five times as many as `repeats`. A copy of the last one's bytes to
+/// the host, which waits for all of them, is in it.
+fn staying(
+    renderer: &mut Renderer,
+    cloud: &Arc<GaussianCloud>,
+    camera: &Camera,
+    settings: &RenderSettings,
+    repeats: usize,
+) -> Result<f64, DrawError> {
+    let frames = 5 * repeats.max(1);
+    renderer.draw_rgb8(cloud, camera, settings)?;
+    let start = Instant::now();
+    for _ in 1..frames {
+        renderer.draw_on_device(camera, settings)?;
+    }
+    renderer.draw_rgb8(cloud, camera, settings)?;
+    Ok(start.elapsed().as_secs_f64() / frames as f64)
 }
 
 /// Makes `repeats` training steps on one photo, after one that does not count. The whole is the mean over steps
@@ -88,7 +110,7 @@ pub fn training_step(
         trainer.step(camera, &photo, &rates, degree)?;
         runs.push(trainer.times().clone());
     }
-    Ok(Measurement { stages: medians(&runs), whole_secs })
+    Ok(Measurement { stages: medians(&runs), whole_secs, staying_secs: 0.0 })
 }
 
 fn medians(runs: &[StageTimes]) -> StageTimes {
@@ -104,6 +126,11 @@ pub(crate) struct Timing {
     pub(crate) size: [u32; 2],
     /// Milliseconds from the call to the result, median. A frame is copied to the host in it.
     pub(crate) total_ms: f64,
+    /// Milliseconds of a frame that stays on the device, mean; `None` for a training step.
+    pub(crate) staying_ms: Option<f64>,
+    /// Milliseconds of finding what the pixels of the drawn view belong to, on the device and on the CPU, medians;
+    /// `None` for a training step.
+    pub(crate) labels_ms: Option<[f64; 2]>,
     /// Milliseconds on the device per stage, median; empty where the device has no timestamps.
     pub(crate) stages_ms: Vec<(&'static str, f64)>,
 }
@@ -117,9 +144,23 @@ pub(crate) fn render(
     repeats: usize,
 ) -> Result<Timing, DrawError> {
     let mut renderer = Renderer::on_gpu(device)?;
-    let mut frame = |camera| frame(&mut renderer, cloud, camera, &RenderSettings::default(), repeats);
-    let views = views_of(cloud, size[0], size[1]).iter().map(&mut frame).collect::<Result<Vec<_>, _>>()?;
-    Ok(timing(name, cloud.len(), size, &views))
+    let settings = RenderSettings::default();
+    let (mut views, mut labels) = (Vec::new(), [Vec::new(), Vec::new()]);
+    // As many as a scene of things has.
+    let of: Vec<u32> = (0..cloud.len() as u32).map(|i| i % 300).collect();
+    for camera in views_of(cloud, size[0], size[1]) {
+        views.push(frame(&mut renderer, cloud, &camera, &settings, repeats)?);
+        renderer.draw_rgb8(cloud, &camera, &settings)?;
+        for (renderer, secs) in [&mut renderer, &mut Renderer::new()].into_iter().zip(&mut labels) {
+            for _ in 0..repeats.min(5) {
+                let start = Instant::now();
+                renderer.label_weights(cloud, &of, &camera, &settings)?;
+                secs.push(start.elapsed().as_secs_f64() * 1e3);
+            }
+        }
+    }
+    let labels_ms = Some(labels.map(|ms| median(&ms)));
+    Ok(Timing { labels_ms, ..timing(name, cloud.len(), size, &views) })
 }
 
 /// Times GPU training steps from the dataset's own starting cloud, on a few of its photos.
@@ -143,8 +184,10 @@ pub(crate) fn train_steps(
 pub(super) fn timing(name: &str, gaussians: usize, size: [u32; 2], views: &[Measurement]) -> Timing {
     let stages: Vec<StageTimes> = views.iter().map(|v| v.stages.clone()).collect();
     let total_ms = median(&views.iter().map(|v| v.whole_secs).collect::<Vec<_>>()) * 1e3;
+    let staying = median(&views.iter().map(|v| v.staying_secs).collect::<Vec<_>>()) * 1e3;
+    let staying_ms = (staying > 0.0).then_some(staying);
     let stages_ms = medians(&stages).into_iter().map(|(stage, secs)| (stage, secs * 1e3)).collect();
-    Timing { name: name.into(), gaussians, size, total_ms, stages_ms }
+    Timing { name: name.into(), gaussians, size, total_ms, staying_ms, labels_ms: None, stages_ms }
 }
 
 #[cfg(test)]
@@ -155,7 +198,7 @@ mod tests {
     fn medians_are_taken_stage_by_stage_in_milliseconds() {
         let run = |whole_secs: f64, a: f64, b: f64| {
             let stages = vec![("a", a), ("b", b)];
-            Measurement { stages, whole_secs }
+            Measurement { stages, whole_secs, staying_secs: 0.0 }
         };
         let t = timing("x", 5, [4, 3], &[run(0.002, 0.5, 9.0), run(0.004, 0.1, 7.0), run(0.003, 0.2, 8.0)]);
         assert_eq!((t.total_ms, t.stages_ms), (3.0, vec![("a", 200.0), ("b", 8000.0)]));

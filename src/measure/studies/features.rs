@@ -19,7 +19,7 @@ use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::pipeline::semantics::train_codes::{CodeTraining, CodeView, decode, train_codes};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::pipeline::semantics::votes::{UNKNOWN, Votes};
-use crate::render::{RenderError, RenderSettings, Renderer};
+use crate::render::{DrawError, RenderSettings, Renderer};
 use crate::scene::semantic_map::CODE_CHANNELS;
 use crate::scene::{GaussianCloud, Identities, IdentityId, Level, Mask, NOBODY};
 
@@ -47,7 +47,7 @@ pub(crate) fn study<'a>(
     steps: &[u64],
     repeats: u32,
     input: StudyInput,
-) -> Result<Study<'a>, RenderError> {
+) -> Result<Study<'a>, DrawError> {
     let voted = vote(drawn, &identities, &training)?;
     // Codes are chosen once it is known who is next to whom.
     let centers = codes::centers(drawn.0, &voted, &identities);
@@ -96,7 +96,7 @@ fn score(
     views: &[CodeView],
     of: &[IdentityId],
     codes: Option<&[[f32; CODE_CHANNELS]]>,
-) -> Result<Vec<(&'static str, f64)>, RenderError> {
+) -> Result<Vec<(&'static str, f64)>, DrawError> {
     let mut renderer = Renderer::new();
     let mut ious: BTreeMap<Level, Vec<f64>> = BTreeMap::new();
     for CodeView { camera, labels } in views {
@@ -179,7 +179,7 @@ fn vote(
     (cloud, settings): (&GaussianCloud, &RenderSettings),
     identities: &Identities,
     views: &[CodeView],
-) -> Result<Vec<IdentityId>, RenderError> {
+) -> Result<Vec<IdentityId>, DrawError> {
     let mut renderer = Renderer::new();
     let mut votes = Votes::new(cloud.len());
     for view in views {

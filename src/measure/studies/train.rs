@@ -5,10 +5,11 @@ use serde_json::{Value, json};
 use super::{StudyInput, Variants, error, overlap};
 use crate::measure::sweep::failed;
 use crate::measure::{ErrorKind, Measure, Rule, Stage, StageName, Study, StudyError, Trial, turned};
-use crate::pipeline::evaluate::evaluate;
-use crate::pipeline::observer::{Observer, Signal, Silent};
+use crate::pipeline::evaluate::scores;
+use crate::pipeline::observer::{Evaluation, Observer, Signal, Silent};
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, load_views};
-use crate::scene::Dataset;
+use crate::render::{Features, Renderer};
+use crate::scene::{Camera, Dataset};
 
 /// Evaluations on the way, of which the curves are made.
 const EVALUATIONS: u64 = 8;
@@ -40,7 +41,9 @@ pub(crate) fn study(
             return Ok(None);
         }
         let settings = config.render_settings(dataset.background);
-        let e = evaluate(&outcome.cloud, &tests, &settings, outcome.steps, outcome.secs).map_err(failed)?;
+        let mut renderer = Renderer::new();
+        let draw = |camera: &Camera| renderer.render(&outcome.cloud, Features::NONE, camera, &settings);
+        let e = Evaluation::of(scores(&tests, draw).map_err(failed)?, outcome.cloud.len(), outcome.steps, outcome.secs);
         let values = vec![("PSNR", e.psnr), ("SSIM", e.ssim), ("Gaussians", e.gaussians as f64)];
         // Images of another size are scored at that size on the way: another curve.
         let comparable = config.max_side_px == base.max_side_px;

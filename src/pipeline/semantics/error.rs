@@ -3,7 +3,7 @@
 use crate::io::IoError;
 use crate::models::ModelError;
 use crate::pipeline::observer::Interrupted;
-use crate::render::RenderError;
+use crate::render::{DrawError, RenderError};
 
 /// Why objects could not be found, looked at or given codes.
 #[derive(Debug, thiserror::Error)]
@@ -16,7 +16,7 @@ pub enum FindError {
     #[error(transparent)]
     Model(#[from] ModelError),
     #[error("photo {0}: {1}")]
-    Render(String, RenderError),
+    Render(String, DrawError),
     #[error("training codes: {0}")]
     Lift(#[from] RenderError),
     #[error("canceled")]

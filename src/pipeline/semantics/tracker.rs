@@ -212,7 +212,7 @@ impl Tracker<'_> {
             let camera = photo.camera.limited_to(SEE_SIDE_PX);
             self.votes
                 .see(&mut self.renderer, self.cloud, &camera, self.settings)
-                .map_err(|e| FindError::Render(photo.name.clone(), e))?;
+                .map_err(|e| FindError::Render(photo.name.clone(), e.into()))?;
             ticker.tick(i + 1, observer)?;
         }
         Ok(())
@@ -270,7 +270,7 @@ impl Tracker<'_> {
         }
         self.votes
             .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
-            .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e))?;
+            .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e.into()))?;
         self.keep(photo, (camera.width_px, camera.height_px), &labels);
         Ok(Some((found, ids)))
     }
@@ -318,7 +318,7 @@ impl Tracker<'_> {
             let camera = self.photos[photo].camera.limited_to(LABEL_SIDE_PX);
             self.votes
                 .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
-                .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e))?;
+                .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e.into()))?;
             self.keep(photo, (camera.width_px, camera.height_px), &labels);
         }
         Ok(())

@@ -2,16 +2,12 @@
 //!
 //! Rendered once per view; every query then only reads it.
 
-use crate::math::lanes::Lane;
-use crate::render::{ContributionSink, RenderError, RenderSettings, Renderer, TILE_PX};
+use rayon::prelude::*;
+
+use crate::render::{DrawError, PixelWeights, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Mask, NOBODY};
 
 use super::votes::UNKNOWN;
-
-/// Identities that compete for one pixel at most; the least is dropped.
-const SLOTS: usize = 8;
-/// What a pixel's light belongs to: identities with their accumulated weights. Free slots weigh nothing.
-pub(crate) type PixelWeights = [(IdentityId, f32); SLOTS];
 
 /// Identities of a view's pixels, row-major.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -43,17 +39,13 @@ impl ViewMap {
         identities: &Identities,
         camera: &Camera,
         settings: &RenderSettings,
-    ) -> Result<Self, RenderError> {
+    ) -> Result<Self, DrawError> {
         let (width_px, height_px) = (camera.width_px as usize, camera.height_px as usize);
         let objects: Vec<IdentityId> = (0..=identities.len() as IdentityId).map(|i| identities.object_of(i)).collect();
-        let mut map = Self { width_px, height_px, ..Self::default() };
-        for slots in &weights(renderer, cloud, of, camera, settings)? {
-            let (identity, share, alpha) = winner(slots, &objects);
-            map.identity.push(identity);
-            map.share.push(share);
-            map.alpha.push(alpha);
-        }
-        Ok(map)
+        let weights = renderer.label_weights(cloud, of, camera, settings)?;
+        let winners = weights.par_iter().map(|places| winner(places, &objects));
+        let (identity, (share, alpha)) = winners.map(|(identity, share, alpha)| (identity, (share, alpha))).unzip();
+        Ok(Self { width_px, height_px, identity, share, alpha })
     }
 
     /// The pixels of an identity and its pieces.
@@ -63,24 +55,6 @@ impl ViewMap {
             inside.get(self.identity[i] as usize).copied().unwrap_or(false)
         })
     }
-}
-
-/// The weights of a view's pixels, row-major, by the identities `of` the Gaussians of `cloud`.
-pub(crate) fn weights(
-    renderer: &mut Renderer,
-    cloud: &GaussianCloud,
-    of: &[IdentityId],
-    camera: &Camera,
-    settings: &RenderSettings,
-) -> Result<Vec<PixelWeights>, RenderError> {
-    assert_eq!(of.len(), cloud.len(), "one identity per Gaussian");
-    let (width, height) = (camera.width_px as usize, camera.height_px as usize);
-    let strip = |y: usize| TILE_PX.min(height - y * TILE_PX) * width;
-    let mut rows: Vec<Row<'_>> = (0..height.div_ceil(TILE_PX))
-        .map(|ty| Row { of, width, top: ty * TILE_PX, slots: vec![[(NOBODY, 0.0); SLOTS]; strip(ty)] })
-        .collect();
-    renderer.contributions(cloud, camera, settings, &mut rows)?;
-    Ok(rows.into_iter().flat_map(|r| r.slots).collect())
 }
 
 /// Winner of a pixel, the share of its object, and the pixel's alpha. An unknown Gaussian counts as
@@ -106,37 +80,6 @@ fn winner(slots: &PixelWeights, objects: &[IdentityId]) -> (IdentityId, f32, f32
     (identity, most / alpha, alpha)
 }
 
-/// The competitors of the pixels of one row of tiles.
-struct Row<'a> {
-    of: &'a [IdentityId],
-    width: usize,
-    /// First row of pixels.
-    top: usize,
-    slots: Vec<PixelWeights>,
-}
-
-impl ContributionSink<f32> for Row<'_> {
-    fn add(&mut self, gaussian: u32, x: usize, y: usize, weights: &Lane<f32>) {
-        let identity = self.of[gaussian as usize];
-        let first = (y - self.top) * self.width + x;
-        let end = weights.len().min(self.width - x);
-        for (slots, &weight) in self.slots[first..first + end].iter_mut().zip(weights) {
-            if weight <= 0.0 {
-                continue;
-            }
-            // Free slots have no weight.
-            match slots.iter_mut().find(|s| s.0 == identity && s.1 > 0.0) {
-                Some(slot) => slot.1 += weight,
-                None => {
-                    if let Some(least) = slots.iter_mut().min_by(|a, b| a.1.total_cmp(&b.1)).filter(|s| s.1 < weight) {
-                        *least = (identity, weight);
-                    }
-                }
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use glam::DVec3;
@@ -147,14 +90,14 @@ mod tests {
     #[test]
     fn the_object_wins_before_its_piece() {
         let objects = [0, 1, 2, 1, 1];
-        let mut slots = [(NOBODY, 0.0); SLOTS];
+        let mut slots = [(NOBODY, 0.0); 8];
         slots[..3].copy_from_slice(&[(3, 0.25), (4, 0.2), (2, 0.4)]);
         let (identity, share, alpha) = winner(&slots, &objects);
         assert_eq!(identity, 3);
         assert!((share - 0.45 / 0.85).abs() < 1e-6 && (alpha - 0.85).abs() < 1e-6);
         slots[2] = (UNKNOWN, 0.5);
         assert_eq!(winner(&slots, &objects).0, UNKNOWN);
-        assert_eq!(winner(&[(1, 0.05); SLOTS], &objects).0, NOBODY, "mostly see-through");
+        assert_eq!(winner(&[(1, 0.05); 8], &objects).0, NOBODY, "mostly see-through");
     }
 
     #[test]
@@ -186,7 +129,7 @@ mod tests {
     #[test]
     fn of_two_that_are_equal_the_first_wins() {
         let objects = [0, 1, 2];
-        let mut slots = [(NOBODY, 0.0); SLOTS];
+        let mut slots = [(NOBODY, 0.0); 8];
         slots[..2].copy_from_slice(&[(2, 0.25), (1, 0.25)]);
         assert_eq!(winner(&slots, &objects), (2, 0.5, 0.5), "half of the light is enough");
         slots[1].1 = 0.24;
@@ -194,27 +137,6 @@ mod tests {
         slots[..2].copy_from_slice(&[(99, 0.6), (1, 0.3)]);
         let (identity, share, _) = winner(&slots, &objects);
         assert!(identity == 99 && (share - 0.6 / 0.9).abs() < 1e-6, "a number that nobody has is nobody's");
-        assert_eq!(winner(&[(NOBODY, 0.0); SLOTS], &objects), (NOBODY, 0.0, 0.0));
-    }
-
-    #[test]
-    fn a_pixel_keeps_the_heaviest_of_many() {
-        let of: Vec<IdentityId> = (1..=10).collect();
-        let mut row = Row { of: &of, width: 12, top: 4, slots: vec![[(NOBODY, 0.0); SLOTS]; 24] };
-        let only = |lane: usize, w: f32| -> Lane<f32> { std::array::from_fn(|l| if l == lane { w } else { 0.0 }) };
-        // Ten identities, ever heavier, for the pixel at column 9 of row 5; the first twice.
-        (0..10).for_each(|g| row.add(g, 8, 5, &only(1, 0.01 * (g + 1) as f32)));
-        row.add(9, 8, 5, &only(1, 0.5));
-        row.add(0, 8, 5, &only(1, 0.005));
-        let at = row.slots[12 + 9];
-        assert!(at.iter().any(|s| s.0 == 10 && (s.1 - 0.6).abs() < 1e-6), "{at:?}");
-        let mut ids: Vec<IdentityId> = at.iter().map(|s| s.0).collect();
-        ids.sort_unstable();
-        assert_eq!(ids, [3, 4, 5, 6, 7, 8, 9, 10], "the two lightest were dropped, and do not come back");
-        assert!(row.slots.iter().enumerate().all(|(i, s)| i == 21 || s.iter().all(|s| s.1 == 0.0)));
-        // What lies beyond the right edge is not the next row's.
-        row.add(0, 8, 4, &[1.0; 8]);
-        let reached: Vec<usize> = (0..24).filter(|i| row.slots[*i].iter().any(|s| s.0 == 1)).collect();
-        assert_eq!(reached, [8, 9, 10, 11]);
+        assert_eq!(winner(&[(NOBODY, 0.0); 8], &objects), (NOBODY, 0.0, 0.0));
     }
 }

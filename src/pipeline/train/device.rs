@@ -3,9 +3,9 @@
 
 use super::TrainView;
 use crate::render::{
-    DensityStats, Device, DevicePhoto, GpuError, GpuTrainer, Rates, RenderSettings, StepLoss, TrainerSettings,
+    DensityStats, Device, DevicePhoto, Frame, GpuError, GpuTrainer, Rates, RenderSettings, StepLoss, TrainerSettings,
 };
-use crate::scene::GaussianCloud;
+use crate::scene::{Camera, GaussianCloud};
 
 /// Weight of D-SSIM in the loss.
 pub(crate) const LAMBDA: f64 = 0.2;
@@ -79,6 +79,11 @@ impl DeviceRun {
             outliers: s.sums.outliers as usize,
         };
         Ok(done.iter().filter(|s| !s.sums.overflow).map(result).collect())
+    }
+
+    /// A view of the cloud as it is. Waits.
+    pub(crate) fn draw(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<Frame<f32>, GpuError> {
+        self.trainer.draw(camera, settings)
     }
 
     /// The cloud as it is. Waits.

@@ -18,8 +18,8 @@ use super::{TrainConfig, TrainView, coarse, density, geometry, init};
 use crate::io::SceneFolder;
 use crate::io::trained::{History, SceneInfo};
 use crate::math::stats::{mean, median};
-use crate::pipeline::evaluate::evaluate;
-use crate::pipeline::observer::{Observer, Severity, StepMetrics, Ticker};
+use crate::pipeline::evaluate::scores;
+use crate::pipeline::observer::{Evaluation, Observer, Severity, StepMetrics, Ticker};
 use crate::render::Device;
 use crate::scene::{Dataset, GaussianCloud};
 
@@ -320,10 +320,10 @@ impl<'a> Job<'a> {
         if self.tests.is_empty() {
             return Ok(());
         }
-        self.trainer.fetch_cloud()?;
-        let settings = self.trainer.render_settings();
-        let e = evaluate(&self.trainer.cloud, &self.tests, &settings, self.trainer.step, self.secs)
-            .map_err(|e| TrainError::Render("held-out".into(), e))?;
+        let count = self.trainer.cloud.len();
+        let trainer = &mut self.trainer;
+        let scores = scores(&self.tests, |camera| trainer.draw(camera)).map_err(|e| self.failed(e))?;
+        let e = Evaluation::of(scores, count, self.trainer.step, self.secs);
         self.history.evaluations.push(e.clone());
         observer.evaluation(e);
         Ok(())

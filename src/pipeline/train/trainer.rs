@@ -16,8 +16,8 @@ use crate::math::sh;
 use crate::math::stats::psnr_of;
 use crate::pipeline::metrics;
 use crate::render::{
-    Device, DifferentiableRenderer, FrameGradient, GpuError, LossParts, PhotoLoss, RenderError, RenderSettings,
-    normals, validate,
+    Device, DifferentiableRenderer, Features, Frame, FrameGradient, GpuError, LossParts, PhotoLoss, RenderError,
+    RenderSettings, normals, validate,
 };
 use crate::scene::{Camera, GaussianCloud};
 
@@ -132,6 +132,15 @@ impl Trainer {
     /// How the cloud is meant to be drawn.
     pub(crate) fn render_settings(&self) -> RenderSettings {
         RenderSettings { sh_degree: self.cloud.sh_degree, ..self.settings.clone() }
+    }
+
+    /// A view of the Gaussians as they are, by what trains them.
+    pub(crate) fn draw(&mut self, camera: &Camera) -> Result<Frame<f32>, StepError> {
+        let settings = self.render_settings();
+        Ok(match &mut self.device {
+            Some(device) => device.draw(camera, &settings)?,
+            None => self.renderer.render(&self.cloud, Features::NONE, camera, &settings)?,
+        })
     }
 
     /// One step on the next photo of the round. Returns what is known by now and was not returned

@@ -89,9 +89,6 @@ impl Adam {
         let marks = &on.gradient.buffers[0];
         for (k, stride) in strides(stored).into_iter().enumerate() {
             let groups = (u64::from(gaussians) * stride as u64).div_ceil(256);
-            // One axis holds 65,535 workgroups everywhere; the rest goes along the second.
-            let across = groups.min(32_768);
-            let down = groups.div_ceil(across.max(1));
             let buffers = [
                 &self.steps[k],
                 &on.parameters.buffers[k],
@@ -102,7 +99,7 @@ impl Adam {
                 counters,
                 &self.outliers,
             ];
-            stage.run(&self.kernel, &buffers, [across as u32, down as u32, 1]);
+            stage.run_flat(&self.kernel, &buffers, groups);
         }
     }
 }

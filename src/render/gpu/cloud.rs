@@ -1,5 +1,6 @@
 //! A cloud on the device: three buffers of parameters, and the way there and back.
 
+use super::scratch::BIN_BLOCK;
 use super::{Device, GpuError};
 use crate::math::sh;
 use crate::scene::GaussianCloud;
@@ -45,9 +46,8 @@ impl Parameters {
     pub(crate) fn read(&self, device: &Device, n: usize, degree: u8) -> Result<Packed, GpuError> {
         let [a, b, c] = strides(degree).map(|s| (s * n * 4) as u64);
         let [x, y, z] = &self.buffers;
-        let mut bytes = device.read(&[(x, a), (y, b), (z, c)])?.into_iter();
-        let mut next = || bytes.next().map_or_else(Vec::new, |b| bytemuck::pod_collect_to_vec(&b));
-        Ok(Packed { floats: [next(), next(), next()], degree })
+        let copies = device.read(&[(x, a), (y, b), (z, c)])?;
+        Ok(Packed { floats: [0, 1, 2].map(|k| copies.values(k)), degree })
     }
 }
 
@@ -58,7 +58,7 @@ fn check(device: &Device, what: &str, capacity: usize, degree: u8) -> Result<(),
         let what = format!("{what} of {capacity} Gaussians of degree {degree} (bytes in one binding)");
         device.fits_binding(&what, (stride * capacity * 4) as u64, remedy)?;
     }
-    device.fits_dispatch("one thread a Gaussian", capacity.div_ceil(64) as u64, remedy)
+    device.fits_dispatch("blocks of Gaussians", capacity.div_ceil(BIN_BLOCK as usize) as u64, remedy)
 }
 
 /// Parameters on the host in the device's layout.

@@ -1,8 +1,9 @@
 //! The adapter and its device: what they are, what they can do, and how their faults are told.
 
-use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use super::GpuError;
+use super::readback::StagingPool;
 use crate::scene::resource_log::{self, ResourceKind};
 
 /// Features that are used where an adapter offers them. Everything works without any of them.
@@ -17,6 +18,7 @@ pub struct Device {
     info: wgpu::AdapterInfo,
     /// The first fault that no call was there to return.
     fault: Arc<Mutex<Option<GpuError>>>,
+    staging: StagingPool,
 }
 
 fn adapter(software: bool) -> Result<wgpu::Adapter, wgpu::RequestAdapterError> {
@@ -130,7 +132,7 @@ impl Device {
                 keep_first(&slot, GpuError::Lost(text));
             }
         });
-        Self { device, queue, info, fault }
+        Self { device, queue, info, fault, staging: StagingPool::default() }
     }
 
     /// The device.
@@ -282,39 +284,9 @@ impl Device {
         self.check()
     }
 
-    /// Copies the first bytes of buffers to the host; waits for all work submitted before.
-    pub(super) fn read(&self, sources: &[(&wgpu::Buffer, u64)]) -> Result<Vec<Vec<u8>>, GpuError> {
-        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("read") });
-        let mut staged = Vec::with_capacity(sources.len());
-        for &(source, bytes) in sources {
-            let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
-            let staging = self.buffer("a copy for the host", bytes, usage)?;
-            if bytes > 0 {
-                encoder.copy_buffer_to_buffer(source, 0, &staging, 0, bytes);
-            }
-            staged.push((staging, bytes));
-        }
-        let submitted = self.queue.submit([encoder.finish()]);
-        let (sender, receiver) = mpsc::sync_channel(sources.len().max(1));
-        for (staging, _) in &staged {
-            let sender = sender.clone();
-            staging.map_async(wgpu::MapMode::Read, .., move |r| {
-                // The receiver outlives the wait below; if it is gone, nobody needs the result.
-                let _ = sender.send(r);
-            });
-        }
-        self.wait_for(Some(submitted))?;
-        for _ in &staged {
-            let mapped =
-                receiver.try_recv().map_err(|_| GpuError::Lost("a copy to the host never ended".to_owned()))?;
-            mapped.map_err(|e| GpuError::Lost(format!("a copy to the host failed: {e}")))?;
-        }
-        let mut out = Vec::with_capacity(staged.len());
-        for (staging, bytes) in &staged {
-            let view = staging.get_mapped_range(..).map_err(|e| GpuError::Refused(e.to_string()))?;
-            out.push(view.iter().copied().take(*bytes as usize).collect());
-        }
-        Ok(out)
+    /// Memory for copies to the host.
+    pub(super) fn staging(&self) -> &StagingPool {
+        &self.staging
     }
 }
 

@@ -133,6 +133,13 @@ impl RecordedStage<'_> {
     pub(crate) fn run(&mut self, kernel: &Kernel, buffers: &[&wgpu::Buffer], groups: [u32; 3]) {
         kernel.dispatch(self.device, &mut self.pass, buffers, groups);
     }
+
+    /// Records `groups` workgroups that stand in a row; see `shaders/shared/flat.wgsl`.
+    pub(crate) fn run_flat(&mut self, kernel: &Kernel, buffers: &[&wgpu::Buffer], groups: u64) {
+        // One axis holds 65,535 workgroups everywhere; the rest goes along the second.
+        let across = groups.clamp(1, 32_768);
+        self.run(kernel, buffers, [across as u32, groups.div_ceil(across) as u32, 1]);
+    }
 }
 
 /// Commands of one frame or step, with its stages timed if a timer is there.

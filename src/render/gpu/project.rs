@@ -42,7 +42,7 @@ impl Project {
             &scratch.tile_counts,
             bindings.counters,
         ];
-        stage.run(&self.kernel, &buffers, [bindings.gaussians.div_ceil(256), 1, 1]);
+        stage.run_flat(&self.kernel, &buffers, u64::from(bindings.gaussians.div_ceil(256)));
     }
 }
 

@@ -34,7 +34,7 @@ impl ProjectBackward {
         let [geometry, low, high] = &cloud.buffers;
         let [to_geometry, to_low, to_high] = &gradient.buffers;
         let buffers = [bindings.view, geometry, low, high, splats, splat_gradient, to_geometry, to_low, to_high];
-        stage.run(&self.main, &buffers, [bindings.gaussians.div_ceil(64), 1, 1]);
+        stage.run_flat(&self.main, &buffers, u64::from(bindings.gaussians.div_ceil(64)));
     }
 
     /// Records the gathering of screen gradients and radii into `statistics`.
@@ -47,6 +47,6 @@ impl ProjectBackward {
         statistics: &wgpu::Buffer,
     ) {
         let buffers = [bindings.view, splats, &gradient.buffers[0], statistics, bindings.counters];
-        stage.run(&self.statistics, &buffers, [bindings.gaussians.div_ceil(256), 1, 1]);
+        stage.run_flat(&self.statistics, &buffers, u64::from(bindings.gaussians.div_ceil(256)));
     }
 }

@@ -5,10 +5,11 @@ use super::blend::TileKernel;
 use super::kernel::{FrameBindings, Recorder};
 use super::layout::{Counters, View};
 use super::project::{CloudShape, Project, view};
+use super::readback::Copies;
 use super::scratch::{PerGaussian, PerPair, PerPicture, extent};
 use super::sort::Sort;
 use super::{Device, GpuError, Parameters};
-use crate::render::{Cutoffs, RenderError, RenderSettings};
+use crate::render::{Cutoffs, Frame, RenderError, RenderSettings};
 use crate::scene::Camera;
 
 /// Pairs per Gaussian that are assumed before a frame has told.
@@ -101,16 +102,31 @@ impl GpuRasterizer {
 
     /// Records the rest of the forward pass after [`Self::encode_count`].
     pub(crate) fn encode_draw(&self, recorder: &mut Recorder<'_>, features: &wgpu::Buffer) {
+        self.encode_lists(recorder);
+        self.encode_blend(recorder, features);
+    }
+
+    /// Records the lists of the tiles after [`Self::encode_count`].
+    pub(crate) fn encode_lists(&self, recorder: &mut Recorder<'_>) {
         let bindings = self.bindings();
         recorder.clear(&self.picture.ranges);
         recorder.stage("bin", |s| self.bin.encode_emit(s, bindings, &self.gaussians, &self.pairs));
         recorder.stage("sort by tile", |s| self.sort.encode(s, &self.pairs.by_tile, &self.counters));
         recorder.stage("bin", |s| self.bin.encode_ranges(s, bindings, &self.pairs, &self.picture.ranges));
+    }
+
+    fn encode_blend(&self, recorder: &mut Recorder<'_>, features: &wgpu::Buffer) {
+        let bindings = self.bindings();
         recorder.stage("blend", |s| {
             let picture = &self.picture;
             let own = [&picture.colors, &picture.ends, &picture.depths, &picture.features];
             self.blend.encode(s, bindings, (&self.gaussians, &self.pairs, picture), features, own);
         });
+    }
+
+    /// Splats of the tiles, tile by tile, front to back.
+    pub(crate) fn list(&self) -> &wgpu::Buffer {
+        &self.pairs.by_tile.values[self.pairs.by_tile.result()]
     }
 
     /// Makes room for `wanted` pairs and some more.
@@ -125,6 +141,38 @@ impl GpuRasterizer {
         Ok(())
     }
 
+    /// Copies the frame that was drawn last, and its counters, to the host.
+    pub(crate) fn read_frame(
+        &self,
+        device: &Device,
+        camera: &Camera,
+        settings: &RenderSettings,
+    ) -> Result<(Frame<f32>, Counters), GpuError> {
+        let pixels = extent([camera.width_px, camera.height_px])[0] as u64;
+        let (picture, channels) = (&self.picture, self.picture.channels);
+        let depth_bytes = if settings.depth { pixels * 8 } else { 0 };
+        let copies = device.read(&[
+            (&self.counters, size_of::<Counters>() as u64),
+            (&picture.colors, pixels * 16),
+            (&picture.depths, depth_bytes),
+            (&picture.features, pixels * 4 * channels as u64),
+        ])?;
+        let colors: Vec<[f32; 4]> = copies.values(1);
+        let depths: Vec<[f32; 2]> = copies.values(2);
+        let features: Vec<f32> = copies.values(3);
+        let frame = Frame {
+            width_px: camera.width_px as usize,
+            height_px: camera.height_px as usize,
+            color: std::array::from_fn(|c| colors.iter().map(|p| p[c]).collect()),
+            features: (0..channels).map(|c| features.iter().skip(c).step_by(channels).copied().collect()).collect(),
+            alpha: colors.iter().map(|p| 1.0 - p[3]).collect(),
+            depth: depths.iter().map(|d| d[0]).collect(),
+            median_depth: depths.iter().map(|d| d[1]).collect(),
+            ..Frame::default()
+        };
+        Ok((frame, counters_of(&copies)))
+    }
+
     pub(crate) fn device_bytes(&self) -> u64 {
         let (g, p) = (&self.gaussians, &self.picture);
         let own = [&self.view, &self.counters, &g.splats, &g.tile_counts, &g.sums];
@@ -135,11 +183,12 @@ impl GpuRasterizer {
     }
 
     pub(crate) fn read_counters(&self, device: &Device) -> Result<Counters, GpuError> {
-        let bytes = device.read(&[(&self.counters, size_of::<Counters>() as u64)])?;
-        Ok(counters_of(&bytes[0]))
+        let copies = device.read(&[(&self.counters, size_of::<Counters>() as u64)])?;
+        Ok(counters_of(&copies))
     }
 }
 
-pub(crate) fn counters_of(bytes: &[u8]) -> Counters {
-    bytemuck::pod_read_unaligned(&bytes[..size_of::<Counters>()])
+/// The counters, which were read first.
+pub(super) fn counters_of(copies: &Copies) -> Counters {
+    copies.values(0).first().copied().unwrap_or_default()
 }

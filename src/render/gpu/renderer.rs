@@ -4,14 +4,17 @@ use super::blend::TileKernel;
 use super::blend_backward::{BlendGradients, blend_backward};
 use super::cloud::{Packed, Parameters};
 use super::kernel::Recorder;
+use super::labels::LabelPass;
 use super::layout::{Counters, Splat};
+use super::pack::Pack;
 use super::project::CloudShape;
 use super::project_backward::ProjectBackward;
 use super::rasterizer::{GpuRasterizer, counters_of};
 use super::scratch::GRADIENT_BASE;
 use super::timing::{StageTimes, Timer};
 use super::{Device, GpuError};
-use crate::render::{CloudGradient, Features, Frame, FrameGradient, RenderError, RenderSettings};
+use crate::render::cpu::labels::COMPETITORS;
+use crate::render::{CloudGradient, Features, Frame, FrameGradient, PixelWeights, RenderError, RenderSettings};
 use crate::scene::{Camera, GaussianCloud};
 
 /// A renderer with its buffers and the cloud that was uploaded last.
@@ -26,6 +29,8 @@ pub struct GpuRenderer {
     features: wgpu::Buffer,
     channels: usize,
     drawn: Option<Drawn>,
+    labels: LabelPass,
+    pack: Pack,
     timer: Option<Timer>,
     times: StageTimes,
 }
@@ -41,12 +46,23 @@ pub struct Inspection {
     pub list: Vec<u32>,
 }
 
-/// What the backward pass must know of the last frame.
-#[derive(Debug, Clone, Copy)]
+/// What passes over the lists of the last frame must know of it.
+#[derive(Debug, Clone)]
 struct Drawn {
-    size_px: [u32; 2],
-    depth: bool,
+    camera: Camera,
+    settings: RenderSettings,
     counters: Counters,
+}
+
+/// What follows blending in the work of a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum After {
+    Nothing,
+    Pack,
+}
+
+fn pixels_of(camera: &Camera) -> u64 {
+    u64::from(camera.width_px) * u64::from(camera.height_px)
 }
 
 impl GpuRenderer {
@@ -68,6 +84,8 @@ impl GpuRenderer {
             features: device.storage("features", 0)?,
             channels: 0,
             drawn: None,
+            labels: LabelPass::new(device)?,
+            pack: Pack::new(device)?,
             timer: None,
             times: StageTimes::new(),
         })
@@ -90,7 +108,7 @@ impl GpuRenderer {
 
     /// Counters of the last frame.
     pub fn counters(&self) -> Option<Counters> {
-        self.drawn.map(|d| d.counters)
+        self.drawn.as_ref().map(|d| d.counters)
     }
 
     /// Sends a cloud to the device, with its extra channels.
@@ -143,70 +161,109 @@ impl GpuRenderer {
     /// Draws the uploaded cloud.
     pub fn draw(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<Frame<f32>, GpuError> {
         loop {
-            self.rasterizer.prepare(&self.device, camera, settings, self.shape, self.channels)?;
-            let mut recorder = Recorder::new(&self.device, self.timer.as_mut());
-            self.rasterizer.encode_count(&mut recorder, &self.cloud);
-            self.rasterizer.encode_draw(&mut recorder, &self.features);
-            recorder.submit();
-            let (frame, counters) = self.read_frame(camera, settings)?;
-            if let Some(timer) = &mut self.timer {
-                self.times = timer.finish(&self.device)?;
-            }
-            if counters.overflow == 0 {
-                let size_px = [camera.width_px, camera.height_px];
-                self.drawn = Some(Drawn { size_px, depth: settings.depth, counters });
+            self.submit(camera, settings, After::Nothing)?;
+            let (frame, counters) = self.rasterizer.read_frame(&self.device, camera, settings)?;
+            if self.settle(camera, settings, counters)? {
                 return Ok(frame);
             }
-            self.rasterizer.grow_pairs(&self.device, counters.wanted)?;
         }
+    }
+
+    /// Draws the uploaded cloud and returns the colors alone, as [`Frame::to_rgb8`].
+    pub fn draw_rgb8(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<Vec<[u8; 3]>, GpuError> {
+        let pixels = pixels_of(camera);
+        loop {
+            self.submit(camera, settings, After::Pack)?;
+            let counters = (&self.rasterizer.counters, size_of::<Counters>() as u64);
+            let copies = self.device.read(&[counters, (&self.pack.bytes, pixels.div_ceil(4) * 12)])?;
+            if self.settle(camera, settings, counters_of(&copies))? {
+                let rgb = copies.bytes(1).as_chunks().0;
+                return Ok(rgb.iter().copied().take(pixels as usize).collect());
+            }
+        }
+    }
+
+    /// Draws the uploaded cloud again from where it was drawn before and leaves the picture on the device: returns
+    /// when the work is handed over. For measurements.
+    pub(crate) fn draw_on_device(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<(), GpuError> {
+        self.submit(camera, settings, After::Nothing)
+    }
+
+    /// The labels of largest weight at each pixel, row-major; `of` has one for each Gaussian of the uploaded cloud. Of
+    /// the view that was drawn last this is one pass more.
+    pub(crate) fn label_weights(
+        &mut self,
+        of: &[u32],
+        camera: &Camera,
+        settings: &RenderSettings,
+    ) -> Result<Vec<PixelWeights>, GpuError> {
+        let want = self.shape.gaussians as usize;
+        if of.len() != want {
+            return Err(GpuError::Size { what: "labels of Gaussians", have: of.len(), want });
+        }
+        let of = self.device.storage_with("labels of Gaussians", bytemuck::cast_slice(of))?;
+        let pixels = pixels_of(camera);
+        self.labels.prepare(&self.device, pixels)?;
+        loop {
+            if !self.drawn.as_ref().is_some_and(|d| d.camera == *camera && d.settings.sees_like(settings)) {
+                self.submit(camera, settings, After::Nothing)?;
+            }
+            let mut recorder = Recorder::new(&self.device, None);
+            recorder.stage("labels", |s| self.labels.encode(s, &self.rasterizer, &of));
+            recorder.submit();
+            let counters = (&self.rasterizer.counters, size_of::<Counters>() as u64);
+            let bytes = pixels * size_of::<PixelWeights>() as u64;
+            let copies = self.device.read(&[counters, (&self.labels.found, bytes)])?;
+            if self.settle(camera, settings, counters_of(&copies))? {
+                let place = |[label, bits]: [u32; 2]| (label, f32::from_bits(bits));
+                let found: Vec<[[u32; 2]; COMPETITORS]> = copies.values(1);
+                return Ok(found.into_iter().map(|places| places.map(place)).collect());
+            }
+        }
+    }
+
+    /// Hands the work of a frame to the device.
+    fn submit(&mut self, camera: &Camera, settings: &RenderSettings, after: After) -> Result<(), GpuError> {
+        self.drawn = None;
+        self.rasterizer.prepare(&self.device, camera, settings, self.shape, self.channels)?;
+        let pixels = pixels_of(camera);
+        self.pack.prepare(&self.device, if after == After::Pack { pixels } else { 0 })?;
+        let mut recorder = Recorder::new(&self.device, self.timer.as_mut());
+        self.rasterizer.encode_count(&mut recorder, &self.cloud);
+        self.rasterizer.encode_draw(&mut recorder, &self.features);
+        if after == After::Pack {
+            recorder.stage("pack", |s| self.pack.encode(s, &self.rasterizer, pixels));
+        }
+        recorder.submit();
+        Ok(())
+    }
+
+    /// Whether the frame that was handed over was drawn; else there is room for it now.
+    fn settle(&mut self, camera: &Camera, settings: &RenderSettings, counters: Counters) -> Result<bool, GpuError> {
+        if let Some(timer) = &mut self.timer {
+            self.times = timer.finish(&self.device)?;
+        }
+        if counters.overflow == 0 {
+            self.drawn = Some(Drawn { camera: camera.clone(), settings: settings.clone(), counters });
+            return Ok(true);
+        }
+        self.rasterizer.grow_pairs(&self.device, counters.wanted)?;
+        Ok(false)
     }
 
     /// What stands between the kernels of the last frame, for tests and for looking into faults;
     /// `None` before the first frame.
     pub fn inspect(&self) -> Result<Option<Inspection>, GpuError> {
-        let Some(drawn) = self.drawn else { return Ok(None) };
+        let Some(drawn) = &self.drawn else { return Ok(None) };
         let r = &self.rasterizer;
         let n = self.shape.gaussians as usize;
         let tiles = r.bindings().tiles.iter().product::<u32>() as u64;
-        let list = &r.pairs.by_tile.values[r.pairs.by_tile.result()];
-        let bytes = self.device.read(&[
+        let copies = self.device.read(&[
             (&r.gaussians.splats, (n * size_of::<Splat>()) as u64),
             (&r.picture.ranges, tiles * 8),
-            (list, u64::from(drawn.counters.pairs) * 4),
+            (r.list(), u64::from(drawn.counters.pairs) * 4),
         ])?;
-        Ok(Some(Inspection {
-            splats: bytemuck::pod_collect_to_vec(&bytes[0]),
-            ranges: bytemuck::pod_collect_to_vec(&bytes[1]),
-            list: bytemuck::pod_collect_to_vec(&bytes[2]),
-        }))
-    }
-
-    fn read_frame(&self, camera: &Camera, settings: &RenderSettings) -> Result<(Frame<f32>, Counters), GpuError> {
-        let pixels = u64::from(camera.width_px) * u64::from(camera.height_px);
-        let picture = &self.rasterizer.picture;
-        let depth_bytes = if settings.depth { pixels * 8 } else { 0 };
-        let bytes = self.device.read(&[
-            (&self.rasterizer.counters, size_of::<Counters>() as u64),
-            (&picture.colors, pixels * 16),
-            (&picture.depths, depth_bytes),
-            (&picture.features, pixels * 4 * self.channels as u64),
-        ])?;
-        let colors: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes[1]);
-        let depths: Vec<[f32; 2]> = bytemuck::pod_collect_to_vec(&bytes[2]);
-        let features: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes[3]);
-        let frame = Frame {
-            width_px: camera.width_px as usize,
-            height_px: camera.height_px as usize,
-            color: std::array::from_fn(|c| colors.iter().map(|p| p[c]).collect()),
-            features: (0..self.channels)
-                .map(|c| features.iter().skip(c).step_by(self.channels).copied().collect())
-                .collect(),
-            alpha: colors.iter().map(|p| 1.0 - p[3]).collect(),
-            depth: depths.iter().map(|d| d[0]).collect(),
-            median_depth: depths.iter().map(|d| d[1]).collect(),
-            ..Frame::default()
-        };
-        Ok((frame, counters_of(&bytes[0])))
+        Ok(Some(Inspection { splats: copies.values(0), ranges: copies.values(1), list: copies.values(2) }))
     }
 
     /// Gradient with respect to the whole cloud for the last rendered frame, which must have been
@@ -225,14 +282,15 @@ impl GpuRenderer {
             let have = features.channels;
             return Err(GpuError::Size { what: "extra channels of the drawn cloud", have, want: self.channels });
         }
-        let Some(drawn) = self.drawn else {
+        let Some(drawn) = &self.drawn else {
             return Ok(unpack(&Packed { degree: cloud.sh_degree, ..Packed::default() }, &[], &[], 0));
         };
-        let planes = if drawn.depth { 2 } else { 1 };
-        let pixels = (drawn.size_px[0] * drawn.size_px[1]) as usize;
+        let depth = drawn.settings.depth;
+        let planes = if depth { 2 } else { 1 };
+        let pixels = pixels_of(&drawn.camera) as usize;
         let gradients = BlendGradients::new(&self.device, n, pixels, self.channels, planes)?;
         let out = Parameters::new(&self.device, "gradient of the cloud", n, self.shape.degree)?;
-        self.write_gradient(gradient, &gradients, pixels, drawn.depth)?;
+        self.write_gradient(gradient, &gradients, pixels, depth)?;
         let r = &self.rasterizer;
         for (carried, _) in &r.picture.chunks {
             self.blend_backward.prepare(&self.device, *carried)?;
@@ -252,13 +310,12 @@ impl GpuRenderer {
             self.times.extend(timer.finish(&self.device)?);
         }
         let stride = GRADIENT_BASE + self.channels;
-        let bytes = self.device.read(&[
+        let copies = self.device.read(&[
             (&gradients.splats, if self.channels > 0 { (n * stride * 4) as u64 } else { 0 }),
             (splats, (n * size_of::<Splat>()) as u64),
         ])?;
         let packed = out.read(&self.device, n, self.shape.degree)?;
-        let splat_gradient: Vec<f32> = bytemuck::pod_collect_to_vec(&bytes[0]);
-        let splats: Vec<Splat> = bytemuck::pod_collect_to_vec(&bytes[1]);
+        let (splat_gradient, splats) = (copies.values::<f32>(0), copies.values::<Splat>(1));
         Ok(unpack(&packed, &splat_gradient, &splats, self.channels))
     }
 

@@ -120,6 +120,5 @@ pub fn sort_pairs(device: &Device, keys: &[u32], values: &[u32], bits: u32) -> R
     let bytes = keys.len() as u64 * 4;
     let result = buffers.result();
     let out = device.read(&[(&buffers.keys[result], bytes), (&buffers.values[result], bytes)])?;
-    let [keys, values] = [0, 1].map(|i| out.get(i).map_or_else(Vec::new, |b| bytemuck::pod_collect_to_vec(b)));
-    Ok((keys, values))
+    Ok((out.values(0), out.values(1)))
 }

@@ -146,8 +146,7 @@ impl Ssim {
 
     /// Fetches the sums of slots from 0, one for each of `pixels`, the number of pixels compared.
     pub(crate) fn read(&self, device: &Device, pixels: &[usize]) -> Result<Vec<LossSums>, GpuError> {
-        let bytes = device.read(&[(&self.ring, pixels.len() as u64 * SLOT_BYTES)])?;
-        let slots: Vec<[f32; 8]> = bytemuck::pod_collect_to_vec(&bytes[0]);
+        let slots: Vec<[f32; 8]> = device.read(&[(&self.ring, pixels.len() as u64 * SLOT_BYTES)])?.values(0);
         Ok(slots
             .iter()
             .zip(pixels)
@@ -192,7 +191,6 @@ pub fn photo_loss(
     recorder.stage("loss", |s| ssim.encode_sums(s, &counters, &outliers));
     recorder.submit();
     let sums = ssim.read(device, &[pixels])?.first().copied().unwrap_or_default();
-    let bytes = device.read(&[(&gradient, pixels as u64 * 16)])?;
-    let gradient: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes[0]);
+    let gradient: Vec<[f32; 4]> = device.read(&[(&gradient, pixels as u64 * 16)])?.values(0);
     Ok((sums, gradient.iter().map(|g| [g[0], g[1], g[2]]).collect()))
 }

@@ -60,8 +60,7 @@ impl Timer {
     /// is then ready for the next submission.
     pub(crate) fn finish(&mut self, device: &Device) -> Result<StageTimes, GpuError> {
         let names = std::mem::take(&mut self.names);
-        let bytes = device.read(&[(&self.resolved, names.len() as u64 * 16)])?;
-        let ticks: Vec<u64> = bytes.concat().as_chunks().0.iter().map(|b| u64::from_le_bytes(*b)).collect();
+        let ticks: Vec<u64> = device.read(&[(&self.resolved, names.len() as u64 * 16)])?.values(0);
         let mut out: StageTimes = Vec::new();
         for (name, span) in names.into_iter().zip(ticks.chunks_exact(2)) {
             let secs = span[1].saturating_sub(span[0]) as f64 * self.secs_per_tick;

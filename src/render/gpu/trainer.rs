@@ -16,7 +16,7 @@ use super::ssim::{DevicePhoto, LossSums, RING, Ssim};
 use super::timing::{StageTimes, Timer};
 use super::{Device, GpuError};
 use crate::render::cpu::adam::Rates;
-use crate::render::{DensityStats, RenderSettings};
+use crate::render::{DensityStats, Frame, RenderSettings};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 
 /// Steps that wait on the device while it works on one: enough that it never waits for the host, and so few that
@@ -244,6 +244,24 @@ impl GpuTrainer {
         recorder.submit()
     }
 
+    /// Draws the cloud as it is. Waits for the device.
+    pub(crate) fn draw(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<Frame<f32>, GpuError> {
+        // Losses in the ring are of pictures that were drawn before.
+        self.fetch()?;
+        loop {
+            self.rasterizer.prepare(&self.device, camera, settings, self.shape, 0)?;
+            let mut recorder = Recorder::new(&self.device, None);
+            self.rasterizer.encode_count(&mut recorder, &self.cloud);
+            self.rasterizer.encode_draw(&mut recorder, &self.features);
+            recorder.submit();
+            let (frame, counters) = self.rasterizer.read_frame(&self.device, camera, settings)?;
+            if counters.overflow == 0 {
+                return Ok(frame);
+            }
+            self.rasterizer.grow_pairs(&self.device, counters.wanted)?;
+        }
+    }
+
     /// Counts the pairs of one frame, so that the first step of a cloud is not lost.
     fn size_up(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<(), GpuError> {
         let mut recorder = Recorder::new(&self.device, None);
@@ -291,8 +309,7 @@ impl GpuTrainer {
 
     /// Statistics for density control since the cloud was uploaded. Waits for the device.
     pub fn stats(&self) -> Result<DensityStats, GpuError> {
-        let bytes = self.device.read(&[(&self.statistics, self.len() as u64 * 16)])?;
-        let rows: Vec<[f32; 4]> = bytemuck::pod_collect_to_vec(&bytes[0]);
+        let rows: Vec<[f32; 4]> = self.device.read(&[(&self.statistics, self.len() as u64 * 16)])?.values(0);
         Ok(DensityStats {
             gradient: rows.iter().map(|r| r[0]).collect(),
             seen: rows.iter().map(|r| r[1] as u32).collect(),

@@ -8,7 +8,7 @@ use crate::math::vector::dot;
 use crate::pipeline::semantics::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::relevancy::{nearest, score};
-use crate::pipeline::semantics::view_map::PixelWeights;
+use crate::render::PixelWeights;
 use crate::scene::LanguageFeatures;
 
 /// The mean raw feature of each identity by number; that of nobody is zero.

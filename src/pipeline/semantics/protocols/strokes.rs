@@ -10,7 +10,7 @@ use crate::pipeline::semantics::splat_tree::hierarchy::Hierarchy;
 use crate::pipeline::semantics::splat_tree::marks::{Stroke, StrokeMarks};
 use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
-use crate::render::{RenderError, RenderSettings, Renderer};
+use crate::render::{DrawError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Level, Mask};
 
 /// Strokes for each thing.
@@ -54,7 +54,7 @@ pub(crate) fn rows(
     settings: &RenderSettings,
     views: &[LabeledPhoto],
     known: Option<Known<'_>>,
-) -> Result<Vec<StrokeRow>, RenderError> {
+) -> Result<Vec<StrokeRow>, DrawError> {
     let mut things: BTreeMap<&str, Vec<(usize, &Category)>> = BTreeMap::new();
     for (k, view) in views.iter().enumerate() {
         let large = view.categories.iter().filter(|c| c.mask.area() >= LEAST_PX);
@@ -63,7 +63,7 @@ pub(crate) fn rows(
     let mut renderer = Renderer::new();
     let mut rows = Vec::new();
     for (name, seen) in things.into_iter().filter(|(_, seen)| seen.len() > 1) {
-        let mut draw = |selected: &[bool], k: usize| -> Result<Mask, RenderError> {
+        let mut draw = |selected: &[bool], k: usize| -> Result<Mask, DrawError> {
             let all = Identities::objects(1);
             let of: Vec<IdentityId> = selected.iter().map(|s| IdentityId::from(*s)).collect();
             Ok(ViewMap::render(&mut renderer, cloud, &of, &all, &views[k].camera, settings)?.mask(&all, 1))

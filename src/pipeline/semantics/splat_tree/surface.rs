@@ -62,7 +62,7 @@ impl SplatSurface {
         let mut renderer = Renderer::new();
         for (i, camera) in chosen.into_iter().enumerate() {
             let look = look(&mut renderer, cloud, &camera.limited_to(SIDE_PX), settings, &mut colors);
-            looks.push(look.map_err(|e| FindError::Render((i + 1).to_string(), e))?);
+            looks.push(look.map_err(|e| FindError::Render((i + 1).to_string(), e.into()))?);
             ticker.tick(i + 1, observer)?;
         }
         let mut best = vec![0.0_f32; cloud.len()];

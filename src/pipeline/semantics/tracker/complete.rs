@@ -65,7 +65,7 @@ impl Tracker<'_> {
             let camera = photo.camera.limited_to(SIDE_PX);
             self.votes
                 .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
-                .map_err(|e| FindError::Render(photo.name.clone(), e))?;
+                .map_err(|e| FindError::Render(photo.name.clone(), e.into()))?;
             ticker.tick(order.len() + i + 1, observer)?;
         }
         Ok(())

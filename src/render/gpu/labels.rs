@@ -1,0 +1,41 @@
+//! Which labels have how much of a pixel; `shaders/labels.wgsl`.
+
+use super::kernel::{Access, Kernel, Module, RecordedStage};
+use super::rasterizer::GpuRasterizer;
+use super::shader::ShaderVariant;
+use super::{Device, GpuError};
+use crate::render::PixelWeights;
+
+/// The kernel, and room for what it finds.
+#[derive(Debug)]
+pub(crate) struct LabelPass {
+    kernel: Kernel,
+    pub(crate) found: wgpu::Buffer,
+}
+
+impl LabelPass {
+    pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
+        use Access::{Read, Uniform, Write};
+        let module = Module::new(device, "labels", ShaderVariant::default())?;
+        let slots = [(0, Uniform), (1, Read), (2, Read), (3, Read), (4, Read), (5, Write)];
+        let kernel = Kernel::new(device, &module, "main", &slots)?;
+        Ok(Self { kernel, found: device.storage("labels of the picture", 0)? })
+    }
+
+    /// Makes room for a picture.
+    pub(crate) fn prepare(&mut self, device: &Device, pixels: u64) -> Result<(), GpuError> {
+        let bytes = pixels * size_of::<PixelWeights>() as u64;
+        if self.found.size() < bytes {
+            self.found = device.storage("labels of the picture", bytes)?;
+        }
+        Ok(())
+    }
+
+    /// Records the pass over the lists of a frame; `of` has a label for each Gaussian.
+    pub(crate) fn encode(&self, stage: &mut RecordedStage<'_>, rasterizer: &GpuRasterizer, of: &wgpu::Buffer) {
+        let (bindings, list) = (rasterizer.bindings(), rasterizer.list());
+        let ranges = &rasterizer.picture.ranges;
+        let buffers = [bindings.view, ranges, list, &rasterizer.gaussians.splats, of, &self.found];
+        stage.run(&self.kernel, &buffers, [bindings.tiles[0], bindings.tiles[1], 1]);
+    }
+}

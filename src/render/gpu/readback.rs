@@ -1,0 +1,130 @@
+//! Copies from the device to the host, through memory that is kept from one to the next.
+
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
+
+use super::{Device, GpuError};
+
+/// Most bytes of memory for copies that are kept; making it anew takes longer than a small copy does.
+const KEPT_BYTES: u64 = 128 << 20;
+
+/// Memory for copies that nobody uses, by size.
+#[derive(Clone, Debug, Default)]
+pub(super) struct StagingPool(Arc<Mutex<Vec<wgpu::Buffer>>>);
+
+impl StagingPool {
+    /// The smallest that holds `bytes`, unless it is far too large.
+    fn take(&self, bytes: u64) -> Option<wgpu::Buffer> {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let at = kept.partition_point(|b| b.size() < bytes);
+        (kept.get(at)?.size() / 4 <= bytes.max(4096)).then(|| kept.remove(at))
+    }
+
+    /// Keeps a buffer; the largest go where they are too many.
+    fn give(&self, buffer: wgpu::Buffer) {
+        let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let at = kept.partition_point(|b| b.size() < buffer.size());
+        kept.insert(at, buffer);
+        while kept.iter().map(wgpu::Buffer::size).sum::<u64>() > KEPT_BYTES {
+            kept.pop();
+        }
+    }
+}
+
+/// Copies that lie in memory that the device wrote; it goes back to the pool with them.
+pub(super) struct Copies {
+    pool: StagingPool,
+    staging: wgpu::Buffer,
+    view: Option<wgpu::BufferView>,
+    /// Where each begins and ends.
+    spans: Vec<[usize; 2]>,
+}
+
+impl Copies {
+    /// The values of the `k`-th buffer that was read.
+    pub(super) fn values<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(&self, k: usize) -> Vec<T> {
+        bytemuck::pod_collect_to_vec(self.bytes(k))
+    }
+
+    pub(super) fn bytes(&self, k: usize) -> &[u8] {
+        let span = self.spans.get(k).zip(self.view.as_ref());
+        span.and_then(|([from, to], view)| view.get(*from..*to)).unwrap_or(&[])
+    }
+}
+
+impl Drop for Copies {
+    fn drop(&mut self) {
+        drop(self.view.take());
+        self.staging.unmap();
+        self.pool.give(self.staging.clone());
+    }
+}
+
+impl Device {
+    /// Copies the first bytes of buffers to the host; waits for all work submitted before.
+    pub(super) fn read(&self, sources: &[(&wgpu::Buffer, u64)]) -> Result<Copies, GpuError> {
+        let mut spans = Vec::with_capacity(sources.len());
+        let mut end = 0;
+        for (_, bytes) in sources {
+            spans.push([end, end + *bytes as usize]);
+            end = (end + *bytes as usize).next_multiple_of(wgpu::COPY_BUFFER_ALIGNMENT as usize);
+        }
+        let pool = self.staging();
+        let staging = match pool.take(end as u64) {
+            Some(kept) => kept,
+            None => {
+                let usage = wgpu::BufferUsages::MAP_READ | wgpu::BufferUsages::COPY_DST;
+                self.buffer("a copy for the host", end as u64, usage)?
+            }
+        };
+        let mut encoder = self.wgpu().create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("read") });
+        for ((source, bytes), [from, _]) in sources.iter().zip(&spans).filter(|s| s.0.1 > 0) {
+            encoder.copy_buffer_to_buffer(source, 0, &staging, *from as u64, *bytes);
+        }
+        let submitted = self.queue().submit([encoder.finish()]);
+        let (sender, receiver) = mpsc::sync_channel(1);
+        staging.map_async(wgpu::MapMode::Read, .., move |r| {
+            // The receiver outlives the wait below; if it is gone, nobody needs the result.
+            let _ = sender.send(r);
+        });
+        self.wait_for(Some(submitted))?;
+        let mapped = receiver.try_recv().map_err(|_| GpuError::Lost("a copy to the host never ended".to_owned()))?;
+        mapped.map_err(|e| GpuError::Lost(format!("a copy to the host failed: {e}")))?;
+        let view = staging.get_mapped_range(..).map_err(|e| GpuError::Refused(e.to_string()))?;
+        Ok(Copies { pool: pool.clone(), staging, view: Some(view), spans })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_for_copies_is_used_again_and_never_by_two() {
+        let Ok(device) = Device::new() else { return };
+        let buffer = |n: u32| {
+            let values: Vec<u32> = (0..n).collect();
+            device.storage_with("numbers", bytemuck::cast_slice(&values)).expect("fits")
+        };
+        let (few, many) = (buffer(5), buffer(1000));
+        let kept = || device.staging().0.lock().expect("free").len();
+        let first = device.read(&[(&few, 12), (&many, 4000), (&few, 0)]).expect("read");
+        let second = device.read(&[(&few, 20)]).expect("read");
+        assert_eq!(kept(), 0);
+        assert_eq!(first.values::<u32>(0), [0, 1, 2]);
+        assert_eq!(first.values::<u32>(1), (0..1000).collect::<Vec<_>>());
+        assert!(first.values::<u32>(2).is_empty() && first.values::<u32>(3).is_empty());
+        assert_eq!(second.values::<u32>(0), [0, 1, 2, 3, 4]);
+        drop((first, second));
+        assert_eq!(kept(), 2);
+        let again = device.read(&[(&many, 4000)]).expect("read");
+        assert_eq!((kept(), again.values::<u32>(0)[999]), (1, 999));
+        drop(again);
+        // A tiny copy does not hold on to a huge buffer, and not everything is kept.
+        let large = device.storage("much", 96 << 20).expect("fits");
+        drop(device.read(&[(&large, 96 << 20)]).expect("read"));
+        assert_eq!(device.read(&[(&few, 4)]).expect("read").staging.size(), 20);
+        drop([device.read(&[(&large, 64 << 20)]).expect("read"), device.read(&[(&large, 80 << 20)]).expect("read")]);
+        let sizes: u64 = device.staging().0.lock().expect("free").iter().map(wgpu::Buffer::size).sum();
+        assert!(sizes <= KEPT_BYTES, "{sizes}");
+    }
+}
