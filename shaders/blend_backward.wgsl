@@ -1,11 +1,12 @@
 // Gradient of blending: pictures' gradients to those of the splats in the picture. One workgroup
-// a tile; each thread owns one splat of a batch, back to front, and walks over the tile's pixels.
+// a quarter of a tile; each thread owns one splat of a batch, back to front, and walks over the
+// quarter's pixels.
 //
 // The threads walk one pixel apart: at step s, thread t is at item s - t, and item i is pixel
-// i mod 256 of batch i / 256. So each pixel meets the splats in order, its state is handed on
+// i mod PIXELS of batch i / PIXELS. So each pixel meets the splats in order, its state is handed on
 // through shared memory with one barrier a step, no two threads touch one pixel at once, nothing
-// is reduced over threads, and a splat's sums leave with one atomic each. Since a batch is
-// shorter than the walk, the next batch follows with no gap.
+// is reduced over threads, and a splat's sums leave with one atomic each. Since a batch is no
+// longer than the walk, the next batch follows with no gap.
 #include "constants"
 #include "shared/view.wgsl"
 #include "shared/splat.wgsl"
@@ -25,21 +26,31 @@
 // [Gaussian][GRADIENT_BASE + channels], added up over tiles.
 #include "atomic_add"
 
-const PIXELS: u32 = 256u;
+// Side of the part of a tile that a workgroup walks over, and its pixels.
+const SIDE: u32 = 8u;
+const PIXELS: u32 = SIDE * SIDE;
+// Parts along a tile's side.
+const PARTS: u32 = TILE_PX / SIDE;
 // Splats in flight: threads of a workgroup.
 const BATCH: u32 = 64u;
 
 // Each pixel's transmittance behind the splats done so far, and what everything behind adds to
 // the loss along the pixel's gradient.
-var<workgroup> state: array<vec2<f32>, 256>;
+var<workgroup> state: array<vec2<f32>, PIXELS>;
 // Gradient with respect to color and depth.
-var<workgroup> wanted: array<vec4<f32>, 256>;
+var<workgroup> wanted: array<vec4<f32>, PIXELS>;
 // End of the pixel's part of the tile's list.
-var<workgroup> pixel_end: array<u32, 256>;
+var<workgroup> pixel_end: array<u32, PIXELS>;
 var<workgroup> last_end: atomic<u32>;
 
-fn load_pixel(group: vec2<u32>, p: u32) {
-    let pixel = group * TILE_PX + vec2<u32>(p % TILE_PX, p / TILE_PX);
+// Pixel `p` of a workgroup's part of a tile.
+fn pixel_of(group: vec3<u32>, p: u32) -> vec2<u32> {
+    let part = vec2<u32>(group.z % PARTS, group.z / PARTS);
+    return group.xy * TILE_PX + part * SIDE + vec2<u32>(p % SIDE, p / SIDE);
+}
+
+fn load_pixel(group: vec3<u32>, p: u32) {
+    let pixel = pixel_of(group, p);
     var end = 0u;
     if all(pixel < view.size_px) {
         let at = pixel.y * view.size_px.x + pixel.x;
@@ -94,10 +105,10 @@ fn flush(id: u32, sums: Sums) {
     }
 }
 
-@compute @workgroup_size(64)
+@compute @workgroup_size(BATCH)
 fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index) thread: u32) {
-    for (var k = 0u; k < 4u; k++) {
-        load_pixel(group.xy, thread + k * BATCH);
+    for (var p = thread; p < PIXELS; p += BATCH) {
+        load_pixel(group, p);
     }
     let first = ranges[group.y * view.tiles.x + group.x].x;
     let end = workgroupUniformLoad(&last_end);
@@ -128,7 +139,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
                 next_splat = splats[next_id];
             }
         }
-        if phase == BATCH && s > PIXELS {
+        if phase == BATCH % PIXELS && s > PIXELS {
             flush(done_id, done);
         }
         if s >= thread && s - thread <= items {
@@ -147,7 +158,7 @@ fn main(@builtin(workgroup_id) group: vec3<u32>, @builtin(local_invocation_index
                 }
             }
             if slot != 0u && slot <= pixel_end[p] {
-                let pixel = group.xy * TILE_PX + vec2<u32>(p % TILE_PX, p / TILE_PX);
+                let pixel = pixel_of(group, p);
                 let d = vec2<f32>(pixel) + 0.5 - splat.mean;
                 let alpha = alpha_at(splat.opacity, distance2(splat.factor, d));
                 if alpha > 0.0 {

@@ -1,5 +1,5 @@
-// The labels of largest accumulated weight at every pixel: what `src/render/cpu/labels.rs` gathers on the CPU, in the same
-// order. One workgroup a tile, one thread a pixel.
+// The label that wins every pixel: what `src/render/cpu/labels.rs` finds on the CPU, in the same order. One workgroup a
+// tile, one thread a pixel.
 #include "constants"
 #include "shared/view.wgsl"
 #include "shared/splat.wgsl"
@@ -10,12 +10,23 @@
 @group(0) @binding(3) var<storage, read> splats: array<Splat>;
 // [Gaussian]
 @group(0) @binding(4) var<storage, read> labels: array<u32>;
-// [pixel][competitor]: label, bits of its weight.
-@group(0) @binding(5) var<storage, read_write> found: array<vec2<u32>>;
+// The group of each label.
+@group(0) @binding(5) var<storage, read> groups: array<u32>;
+// [pixel]: label, bits of its group's share, bits of alpha.
+@group(0) @binding(6) var<storage, read_write> found: array<u32>;
 
 // Labels that compete for one pixel; the least is dropped.
 const COMPETITORS: u32 = 8u;
 const BATCH: u32 = 256u;
+// A label of which nothing is known is a group of its own.
+const UNKNOWN: u32 = 0xffffffffu;
+
+fn group_of(label: u32) -> u32 {
+    if label < arrayLength(&groups) {
+        return groups[label];
+    }
+    return select(0u, UNKNOWN, label == UNKNOWN);
+}
 
 var<workgroup> batch: array<Splat, 256>;
 var<workgroup> batch_labels: array<u32, 256>;
@@ -89,10 +100,40 @@ fn main(
         workgroupBarrier();
     }
 
-    if inside {
-        let at = (pixel.y * view.size_px.x + pixel.x) * COMPETITORS;
-        for (var c = 0u; c < COMPETITORS; c++) {
-            found[at + c] = vec2<u32>(names[c], bitcast<u32>(weights[c]));
-        }
+    if !inside {
+        return;
     }
+    var alpha = 0.0;
+    for (var c = 0u; c < COMPETITORS; c++) {
+        alpha += weights[c];
+    }
+    var label = 0u;
+    var share = 0.0;
+    if alpha >= 0.5 {
+        var best = 0u;
+        var most = 0.0;
+        for (var c = 0u; c < COMPETITORS; c++) {
+            let own = group_of(names[c]);
+            var sum = 0.0;
+            for (var d = 0u; d < COMPETITORS; d++) {
+                sum += select(0.0, weights[d], group_of(names[d]) == own);
+            }
+            if weights[c] > 0.0 && sum > most {
+                best = own;
+                most = sum;
+            }
+        }
+        var heaviest = 0.0;
+        for (var c = 0u; c < COMPETITORS; c++) {
+            if weights[c] > 0.0 && weights[c] >= heaviest && group_of(names[c]) == best {
+                label = names[c];
+                heaviest = weights[c];
+            }
+        }
+        share = most / alpha;
+    }
+    let at = 3u * (pixel.y * view.size_px.x + pixel.x);
+    found[at] = label;
+    found[at + 1u] = bitcast<u32>(share);
+    found[at + 2u] = bitcast<u32>(alpha);
 }

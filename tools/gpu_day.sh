@@ -69,7 +69,10 @@ if [ -n "$photos" ]; then
     for steps in $marks; do
         step "train_$steps" "$FMLGS" train "$photos" --out "$out/scene_$steps" --steps "$steps" --max-side "$side" \
             --max-gaussians "$most" --backend gpu --eval-every 0 --json
-        step "gsplat_train_$steps" python3 tools/gpu_day/gsplat_train.py "$photos" --steps "$steps" --gaussians "$most"
+        for strategy in mcmc default; do
+            step "gsplat_${strategy}_train_$steps" python3 tools/gpu_day/gsplat_train.py "$photos" \
+                --strategy "$strategy" --steps "$steps" --gaussians "$most"
+        done
     done
 fi
 python3 tools/gpu_day/table.py "$out"

@@ -4,7 +4,7 @@ use std::sync::{Arc, Weak};
 
 use serde::{Deserialize, Serialize};
 
-use super::cpu::labels::{self, PixelWeights};
+use super::cpu::labels::{self, LabelWinner, PixelWeights};
 use super::gpu::{self, Device, GpuError};
 use super::lod::Cut;
 use super::{ContributionSink, Features, Frame, RenderError, RenderSettings, RenderStats, StageTimes, cpu};
@@ -178,23 +178,36 @@ impl Renderer {
         }
     }
 
-    /// The labels of largest weight at each pixel, row-major, of which `of` has one for each Gaussian of `cloud`. A GPU
-    /// finds them for the cloud that it drew last.
+    /// The label that wins each pixel, row-major: `of` has one for each Gaussian of `cloud`, `groups` the group of each
+    /// label. A GPU finds them for the cloud that it drew last.
     ///
     /// # Panics
     /// Where there are not as many labels as Gaussians.
-    pub fn label_weights(
+    pub fn label_winners(
+        &mut self,
+        cloud: &GaussianCloud,
+        (of, groups): (&[u32], &[u32]),
+        camera: &Camera,
+        settings: &RenderSettings,
+    ) -> Result<Vec<LabelWinner>, DrawError> {
+        assert_eq!(of.len(), cloud.len(), "one label for each Gaussian");
+        if let Some(gpu) = self.gpu.as_mut().filter(|gpu| std::ptr::eq(gpu.uploaded.as_ptr(), cloud)) {
+            return Ok(gpu.renderer.label_winners((of, groups), camera, settings)?);
+        }
+        let weights = self.label_weights(cloud, of, camera, settings)?;
+        Ok(weights.iter().map(|places| labels::winner(places, groups)).collect())
+    }
+
+    /// The labels of largest weight at each pixel, row-major, of which `of` has one for each Gaussian of `cloud`; on the
+    /// CPU.
+    pub(crate) fn label_weights(
         &mut self,
         cloud: &GaussianCloud,
         of: &[u32],
         camera: &Camera,
         settings: &RenderSettings,
-    ) -> Result<Vec<PixelWeights>, DrawError> {
-        assert_eq!(of.len(), cloud.len(), "one label for each Gaussian");
-        match self.gpu.as_mut().filter(|gpu| std::ptr::eq(gpu.uploaded.as_ptr(), cloud)) {
-            Some(gpu) => Ok(gpu.renderer.label_weights(of, camera, settings)?),
-            None => Ok(labels::label_weights(&mut self.cpu, cloud, of, camera, settings)?),
-        }
+    ) -> Result<Vec<PixelWeights>, RenderError> {
+        labels::label_weights(&mut self.cpu, cloud, of, camera, settings)
     }
 
     /// Draws a cloud with values of its Gaussians composited like colors, on the CPU.

@@ -1,11 +1,12 @@
 """Trains gsplat, from its package, on the photos that `fmlgs train` is given, and prints PSNR against seconds.
 
-usage: gsplat_train.py FOLDER [--steps N] [--gaussians N] [--marks S,S,...]
+usage: gsplat_train.py FOLDER [--strategy mcmc|default] [--steps N] [--gaussians N] [--marks S,S,...]
 
-FOLDER holds a transforms.json without distortion and its photos, with a sparse cloud. As in gsplat's own trainer: its
-MCMC strategy under a cap of Gaussians, L1 with 0.2 D-SSIM, harmonics up to degree 3, its learning rates. Every eighth
-photo is held out. Seconds are those of the steps alone. Prints one JSON document; without a GPU or gsplat it says so in
-it ("missing").
+FOLDER holds a transforms.json without distortion and its photos, with a sparse cloud. As in gsplat's own trainer: L1 with
+0.2 D-SSIM, harmonics up to degree 3, its learning rates and starting values, its MCMC strategy under a cap of Gaussians
+or its default one, which has none. Milestones, meant for 30,000 steps, are scaled as `fmlgs train` scales its own. Every
+eighth photo is held out. Seconds are those of the steps alone. Prints one JSON document; without a GPU or gsplat it says
+so in it ("missing").
 """
 
 import argparse
@@ -48,10 +49,10 @@ def ssim(a, b):
     return (((2 * ma * mb + c1) * (2 * (ab - ma * mb) + c2)) / ((ma**2 + mb**2 + c1) * (aa - ma**2 + bb - mb**2 + c2))).mean()
 
 
-def train(folder, steps, gaussians, marks):
+def train(folder, mcmc, steps, gaussians, marks):
     import numpy as np
     import torch
-    from gsplat import MCMCStrategy, rasterization
+    from gsplat import DefaultStrategy, MCMCStrategy, rasterization
 
     torch.manual_seed(0)
     photos, cameras, intrinsics, at, colors = dataset(folder)
@@ -64,19 +65,23 @@ def train(folder, steps, gaussians, marks):
     n = len(at)
     values = {
         "means": (at, 1.6e-4 * extent),
-        "scales": (torch.log(spacing * 0.1)[:, None].repeat(1, 3), 5e-3),
+        "scales": (torch.log(spacing * (0.1 if mcmc else 1.0))[:, None].repeat(1, 3), 5e-3),
         "quats": (torch.rand((n, 4), device="cuda"), 1e-3),
-        "opacities": (torch.zeros(n, device="cuda"), 5e-2),
+        "opacities": (torch.logit(torch.full((n,), 0.5 if mcmc else 0.1, device="cuda")), 5e-2),
         "sh0": (((tensor(colors) - 0.5) / 0.28209479177387814)[:, None, :], 2.5e-3),
         "shN": (torch.zeros((n, 15, 3), device="cuda"), 2.5e-3 / 20),
     }
     p = torch.nn.ParameterDict({k: torch.nn.Parameter(v) for k, (v, _) in values.items()}).cuda()
     optimizers = {k: torch.optim.Adam([{"params": p[k], "lr": lr, "name": k}], eps=1e-15, fused=True) for k, (_, lr) in values.items()}
     decay = torch.optim.lr_scheduler.ExponentialLR(optimizers["means"], 0.01 ** (1 / steps))
-    # The strategy's own steps are meant for 30,000.
-    strategy = MCMCStrategy(cap_max=gaussians, refine_start_iter=steps // 60, refine_stop_iter=steps * 5 // 6)
+    every = max(20, min(100, steps // 75))
+    if mcmc:
+        strategy = MCMCStrategy(
+            cap_max=gaussians, refine_start_iter=steps // 60, refine_stop_iter=steps * 5 // 6, refine_every=every)
+    else:
+        strategy = DefaultStrategy(refine_start_iter=steps // 60, refine_stop_iter=steps // 2, refine_every=every)
     strategy.check_sanity(p, optimizers)
-    state = strategy.initialize_state()
+    state = strategy.initialize_state() if mcmc else strategy.initialize_state(scene_scale=extent)
 
     def draw(k, degree):
         return rasterization(
@@ -102,13 +107,18 @@ def train(folder, steps, gaussians, marks):
         picture, _, info = draw(k, degree)
         a, b = picture.permute(0, 3, 1, 2), photos[k][None].permute(0, 3, 1, 2)
         loss = 0.8 * (a - b).abs().mean() + 0.2 * (1 - ssim(a, b))
-        loss = loss + 0.01 * torch.sigmoid(p["opacities"]).mean() + 0.01 * torch.exp(p["scales"]).mean()
+        if mcmc:
+            loss = loss + 0.01 * torch.sigmoid(p["opacities"]).mean() + 0.01 * torch.exp(p["scales"]).mean()
+        strategy.step_pre_backward(p, optimizers, state, step, info)
         loss.backward()
         for optimizer in optimizers.values():
             optimizer.step()
             optimizer.zero_grad(set_to_none=True)
         decay.step()
-        strategy.step_post_backward(p, optimizers, state, step, info, lr=decay.get_last_lr()[0])
+        if mcmc:
+            strategy.step_post_backward(p, optimizers, state, step, info, lr=decay.get_last_lr()[0])
+        else:
+            strategy.step_post_backward(p, optimizers, state, step, info, packed=False)
         if due and secs + time.perf_counter() - start >= due[0]:
             torch.cuda.synchronize()
             secs += time.perf_counter() - start
@@ -125,6 +135,7 @@ def train(folder, steps, gaussians, marks):
 def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("folder", type=pathlib.Path)
+    parser.add_argument("--strategy", choices=["mcmc", "default"], default="mcmc")
     parser.add_argument("--steps", type=int, default=3000)
     parser.add_argument("--gaussians", type=int, default=45_000)
     parser.add_argument("--marks", default="1,2,4,8,16,32")
@@ -137,7 +148,7 @@ def main():
             raise ImportError("torch sees no GPU")
         marks = [float(s) for s in args.marks.split(",")]
         about = {"gsplat": gsplat.__version__, "device": torch.cuda.get_device_name()}
-        print(json.dumps({**about, **train(args.folder, args.steps, args.gaussians, marks)}))
+        print(json.dumps({**about, **train(args.folder, args.strategy == "mcmc", args.steps, args.gaussians, marks)}))
     except ImportError as why:
         print(json.dumps({"missing": str(why)}))
 

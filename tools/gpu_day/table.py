@@ -40,6 +40,8 @@ def rows(steps):
                 what = "image" if "render" in key else "training step"
                 on = f"{t['name']}, {t['gaussians']}, {size}"
                 yield [f"{what}, {where}", on, f"{t.get('total_ms', t.get('step_ms')):.2f} ms", stages(t)]
+                if t.get("bytes_ms"):
+                    yield [f"{what} as bytes", on, f"{t['bytes_ms']:.2f} ms", ""]
                 if t.get("staying_ms"):
                     yield [f"{what} that stays on the GPU", on, f"{t['staying_ms']:.2f} ms", ""]
                 if t.get("labels_ms"):
@@ -53,7 +55,7 @@ def rows(steps):
             result = f"{t['total_ms']:.2f} ms, {t['staying_ms']:.2f} ms" if "total_ms" in t else t["missing"]
             yield ["image, gsplat: alone, among many", f"{t['name']}, {t.get('gaussians', '')}, {t.get('size', '')}", result, ""]
         if "train_" in name:
-            who = "gsplat's training" if name.startswith("gsplat") else "training"
+            who = f"gsplat ({name.split('_')[1]})" if name.startswith("gsplat") else "training"
             for last in (found.get("evaluations") or found.get("curve") or [])[-1:]:
                 result = f"{last['psnr']:.2f} dB after {last['secs']:.1f} s"
                 yield [f"{who}, {name.split('_')[-1]} steps", f"{last['gaussians']} Gaussians", result, ""]

@@ -1,7 +1,7 @@
 //! Times of a frame on whatever draws it, and of a training step on a GPU, stage by stage.
 
 use std::sync::Arc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use rand::SeedableRng;
 use rand_pcg::Pcg64Mcg;
@@ -15,6 +15,9 @@ use crate::render::{
 };
 use crate::scene::{Camera, Dataset, GaussianCloud, PhotoPixels};
 
+/// How long a GPU that rests may take to wake up.
+const WAKING: Duration = Duration::from_millis(300);
+
 /// Medians over the repetitions.
 #[derive(Clone, Debug, Default)]
 pub struct Measurement {
@@ -22,8 +25,9 @@ pub struct Measurement {
     pub stages: StageTimes,
     /// Seconds from the call to the finished result, on the host's clock.
     pub whole_secs: f64,
-    /// Seconds of a frame that stays on the GPU, one after another without a wait; 0 where no GPU draws.
-    pub staying_secs: f64,
+    /// Seconds of a frame of which the host gets the bytes of its colors, and of one that stays on the GPU, one after
+    /// another without a wait; `None` where no GPU draws.
+    pub other_secs: Option<[f64; 2]>,
 }
 
 /// Draws a cloud `repeats` times, after one that does not count; the copy of the image to the host is included. On a
@@ -37,6 +41,7 @@ pub fn frame(
 ) -> Result<Measurement, DrawError> {
     let (mut secs, mut stages) = (Vec::with_capacity(repeats), Vec::with_capacity(repeats));
     renderer.draw(cloud, camera, settings)?;
+    let other_secs = if renderer.is_gpu() { Some(on_gpu(renderer, cloud, camera, settings, repeats)?) } else { None };
     for timed in if renderer.is_gpu() { &[false, true][..] } else { &[false] } {
         renderer.time_stages(*timed)?;
         for _ in 0..repeats {
@@ -51,27 +56,33 @@ pub fn frame(
         }
     }
     renderer.time_stages(false)?;
-    let staying_secs = if renderer.is_gpu() { staying(renderer, cloud, camera, settings, repeats)? } else { 0.0 };
-    Ok(Measurement { stages: medians(&stages), whole_secs: median(&secs), staying_secs })
+    Ok(Measurement { stages: medians(&stages), whole_secs: median(&secs), other_secs })
 }
 
-/// Mean seconds of frames that stay on the GPU, of five times as many as `repeats`. A copy of the last one's bytes to
-/// the host, which waits for all of them, is in it.
-fn staying(
+/// Median seconds of a frame of which the host gets bytes, and mean seconds of five times as many that stay on the GPU; in
+/// the mean is a copy of the last one's bytes, which waits for all. First a GPU that rests is given time to wake up.
+fn on_gpu(
     renderer: &mut Renderer,
     cloud: &Arc<GaussianCloud>,
     camera: &Camera,
     settings: &RenderSettings,
     repeats: usize,
-) -> Result<f64, DrawError> {
-    let frames = 5 * repeats.max(1);
-    renderer.draw_rgb8(cloud, camera, settings)?;
+) -> Result<[f64; 2], DrawError> {
+    let mut many = |frames: usize| {
+        let start = Instant::now();
+        for _ in 1..frames {
+            renderer.draw_on_device(camera, settings)?;
+        }
+        renderer.draw_rgb8(cloud, camera, settings)?;
+        Ok::<_, DrawError>(start.elapsed().as_secs_f64() / frames as f64)
+    };
     let start = Instant::now();
-    for _ in 1..frames {
-        renderer.draw_on_device(camera, settings)?;
+    while start.elapsed() < WAKING && repeats > 1 {
+        many(10)?;
     }
-    renderer.draw_rgb8(cloud, camera, settings)?;
-    Ok(start.elapsed().as_secs_f64() / frames as f64)
+    let staying = many(5 * repeats.max(1))?;
+    let bytes = (0..repeats.max(1)).map(|_| many(1)).collect::<Result<Vec<_>, _>>()?;
+    Ok([median(&bytes), staying])
 }
 
 /// Makes `repeats` training steps on one photo, after one that does not count. The whole is the mean over steps
@@ -96,7 +107,13 @@ pub fn training_step(
         sh_rest: still,
     };
     let degree = cloud.sh_degree;
-    trainer.step(camera, &photo, &rates, degree)?;
+    let woken = Instant::now();
+    loop {
+        trainer.step(camera, &photo, &rates, degree)?;
+        if repeats == 1 || woken.elapsed() > WAKING {
+            break;
+        }
+    }
     trainer.metrics()?;
     let start = Instant::now();
     for _ in 0..repeats {
@@ -110,7 +127,7 @@ pub fn training_step(
         trainer.step(camera, &photo, &rates, degree)?;
         runs.push(trainer.times().clone());
     }
-    Ok(Measurement { stages: medians(&runs), whole_secs, staying_secs: 0.0 })
+    Ok(Measurement { stages: medians(&runs), whole_secs, other_secs: None })
 }
 
 fn medians(runs: &[StageTimes]) -> StageTimes {
@@ -126,7 +143,9 @@ pub(crate) struct Timing {
     pub(crate) size: [u32; 2],
     /// Milliseconds from the call to the result, median. A frame is copied to the host in it.
     pub(crate) total_ms: f64,
-    /// Milliseconds of a frame that stays on the device, mean; `None` for a training step.
+    /// Milliseconds of a frame of which the host gets bytes, and of one that stays on the device; `None` for a training
+    /// step.
+    pub(crate) bytes_ms: Option<f64>,
     pub(crate) staying_ms: Option<f64>,
     /// Milliseconds of finding what the pixels of the drawn view belong to, on the device and on the CPU, medians;
     /// `None` for a training step.
@@ -147,6 +166,7 @@ pub(crate) fn render(
     let settings = RenderSettings::default();
     let (mut views, mut labels) = (Vec::new(), [Vec::new(), Vec::new()]);
     // As many as a scene of things has.
+    let groups: Vec<u32> = (0..300).collect();
     let of: Vec<u32> = (0..cloud.len() as u32).map(|i| i % 300).collect();
     for camera in views_of(cloud, size[0], size[1]) {
         views.push(frame(&mut renderer, cloud, &camera, &settings, repeats)?);
@@ -154,7 +174,7 @@ pub(crate) fn render(
         for (renderer, secs) in [&mut renderer, &mut Renderer::new()].into_iter().zip(&mut labels) {
             for _ in 0..repeats.min(5) {
                 let start = Instant::now();
-                renderer.label_weights(cloud, &of, &camera, &settings)?;
+                renderer.label_winners(cloud, (&of, &groups), &camera, &settings)?;
                 secs.push(start.elapsed().as_secs_f64() * 1e3);
             }
         }
@@ -184,10 +204,12 @@ pub(crate) fn train_steps(
 pub(super) fn timing(name: &str, gaussians: usize, size: [u32; 2], views: &[Measurement]) -> Timing {
     let stages: Vec<StageTimes> = views.iter().map(|v| v.stages.clone()).collect();
     let total_ms = median(&views.iter().map(|v| v.whole_secs).collect::<Vec<_>>()) * 1e3;
-    let staying = median(&views.iter().map(|v| v.staying_secs).collect::<Vec<_>>()) * 1e3;
-    let staying_ms = (staying > 0.0).then_some(staying);
+    let other: Vec<[f64; 2]> = views.iter().filter_map(|v| v.other_secs).collect();
+    let other_ms =
+        |k: usize| (!other.is_empty()).then(|| median(&other.iter().map(|s| s[k]).collect::<Vec<_>>()) * 1e3);
+    let (bytes_ms, staying_ms) = (other_ms(0), other_ms(1));
     let stages_ms = medians(&stages).into_iter().map(|(stage, secs)| (stage, secs * 1e3)).collect();
-    Timing { name: name.into(), gaussians, size, total_ms, staying_ms, labels_ms: None, stages_ms }
+    Timing { name: name.into(), gaussians, size, total_ms, bytes_ms, staying_ms, labels_ms: None, stages_ms }
 }
 
 #[cfg(test)]
@@ -198,7 +220,7 @@ mod tests {
     fn medians_are_taken_stage_by_stage_in_milliseconds() {
         let run = |whole_secs: f64, a: f64, b: f64| {
             let stages = vec![("a", a), ("b", b)];
-            Measurement { stages, whole_secs, staying_secs: 0.0 }
+            Measurement { stages, whole_secs, other_secs: None }
         };
         let t = timing("x", 5, [4, 3], &[run(0.002, 0.5, 9.0), run(0.004, 0.1, 7.0), run(0.003, 0.2, 8.0)]);
         assert_eq!((t.total_ms, t.stages_ms), (3.0, vec![("a", 200.0), ("b", 8000.0)]));

@@ -2,12 +2,8 @@
 //!
 //! Rendered once per view; every query then only reads it.
 
-use rayon::prelude::*;
-
-use crate::render::{DrawError, PixelWeights, RenderSettings, Renderer};
-use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Mask, NOBODY};
-
-use super::votes::UNKNOWN;
+use crate::render::{DrawError, RenderSettings, Renderer};
+use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Mask};
 
 /// Identities of a view's pixels, row-major.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -42,9 +38,8 @@ impl ViewMap {
     ) -> Result<Self, DrawError> {
         let (width_px, height_px) = (camera.width_px as usize, camera.height_px as usize);
         let objects: Vec<IdentityId> = (0..=identities.len() as IdentityId).map(|i| identities.object_of(i)).collect();
-        let weights = renderer.label_weights(cloud, of, camera, settings)?;
-        let winners = weights.par_iter().map(|places| winner(places, &objects));
-        let (identity, (share, alpha)) = winners.map(|(identity, share, alpha)| (identity, (share, alpha))).unzip();
+        let winners = renderer.label_winners(cloud, (of, &objects), camera, settings)?;
+        let (identity, (share, alpha)) = winners.iter().map(|w| (w.label, (w.share, w.alpha))).unzip();
         Ok(Self { width_px, height_px, identity, share, alpha })
     }
 
@@ -57,48 +52,12 @@ impl ViewMap {
     }
 }
 
-/// Winner of a pixel, the share of its object, and the pixel's alpha. An unknown Gaussian counts as
-/// an object of its own; where less than half of the light is blocked, nobody is there.
-fn winner(slots: &PixelWeights, objects: &[IdentityId]) -> (IdentityId, f32, f32) {
-    let alpha: f32 = slots.iter().map(|s| s.1).sum();
-    if alpha < 0.5 {
-        return (NOBODY, 0.0, alpha);
-    }
-    let object_of =
-        |id: IdentityId| if id == UNKNOWN { UNKNOWN } else { objects.get(id as usize).copied().unwrap_or(NOBODY) };
-    let together = |object: IdentityId| slots.iter().filter(|s| object_of(s.0) == object).map(|s| s.1).sum::<f32>();
-    let (mut best, mut most) = (NOBODY, 0.0);
-    for slot in slots.iter().filter(|s| s.1 > 0.0) {
-        let object = object_of(slot.0);
-        let sum = together(object);
-        if sum > most {
-            (best, most) = (object, sum);
-        }
-    }
-    let inner = slots.iter().filter(|s| s.1 > 0.0 && object_of(s.0) == best);
-    let identity = inner.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(NOBODY, |s| s.0);
-    (identity, most / alpha, alpha)
-}
-
 #[cfg(test)]
 mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::scene::Level;
-
-    #[test]
-    fn the_object_wins_before_its_piece() {
-        let objects = [0, 1, 2, 1, 1];
-        let mut slots = [(NOBODY, 0.0); 8];
-        slots[..3].copy_from_slice(&[(3, 0.25), (4, 0.2), (2, 0.4)]);
-        let (identity, share, alpha) = winner(&slots, &objects);
-        assert_eq!(identity, 3);
-        assert!((share - 0.45 / 0.85).abs() < 1e-6 && (alpha - 0.85).abs() < 1e-6);
-        slots[2] = (UNKNOWN, 0.5);
-        assert_eq!(winner(&slots, &objects).0, UNKNOWN);
-        assert_eq!(winner(&[(1, 0.05); 8], &objects).0, NOBODY, "mostly see-through");
-    }
+    use crate::scene::{Level, NOBODY};
 
     #[test]
     fn what_stands_in_front_hides_what_is_behind() {
@@ -124,19 +83,5 @@ mod tests {
         let back = Camera::look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 50, 37).expect("valid");
         let map = ViewMap::render(&mut renderer, &cloud, &[front, behind], &all, &back, &settings).expect("drawn");
         assert!(map.mask(&all, front).is_empty());
-    }
-
-    #[test]
-    fn of_two_that_are_equal_the_first_wins() {
-        let objects = [0, 1, 2];
-        let mut slots = [(NOBODY, 0.0); 8];
-        slots[..2].copy_from_slice(&[(2, 0.25), (1, 0.25)]);
-        assert_eq!(winner(&slots, &objects), (2, 0.5, 0.5), "half of the light is enough");
-        slots[1].1 = 0.24;
-        assert_eq!(winner(&slots, &objects).0, NOBODY);
-        slots[..2].copy_from_slice(&[(99, 0.6), (1, 0.3)]);
-        let (identity, share, _) = winner(&slots, &objects);
-        assert!(identity == 99 && (share - 0.6 / 0.9).abs() < 1e-6, "a number that nobody has is nobody's");
-        assert_eq!(winner(&[(NOBODY, 0.0); 8], &objects), (NOBODY, 0.0, 0.0));
     }
 }

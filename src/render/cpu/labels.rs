@@ -1,4 +1,4 @@
-//! Which labels have how much of a pixel: sums of the weights `alpha * transmittance` of the Gaussians that carry them.
+//! Which label wins each pixel, and which have how much of it: sums of the weights `alpha * transmittance` of the Gaussians that carry them.
 
 use super::CpuRenderer;
 use crate::math::lanes::Lane;
@@ -6,7 +6,20 @@ use crate::render::{ContributionSink, RenderError, RenderSettings, TILE_PX};
 use crate::scene::{Camera, GaussianCloud};
 
 /// Labels that compete for one pixel at most; the least is dropped. `COMPETITORS` in `shaders/labels.wgsl`.
-pub const COMPETITORS: usize = 8;
+const COMPETITORS: usize = 8;
+/// Stands for a label of which nothing is known, a group of its own.
+const UNKNOWN: u32 = u32::MAX;
+
+/// The label that wins a pixel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LabelWinner {
+    /// Of the group of most weight that of most weight; 0 where less than half of the light is blocked.
+    pub label: u32,
+    /// Share of the pixel's weight that belongs to its group.
+    pub share: f32,
+    /// Weight of all labels.
+    pub alpha: f32,
+}
 /// What a pixel's light belongs to: labels with their accumulated weights. Free places weigh nothing.
 pub type PixelWeights = [(u32, f32); COMPETITORS];
 
@@ -25,6 +38,29 @@ pub(crate) fn label_weights(
         .collect();
     renderer.contributions(cloud, camera, settings, &mut rows)?;
     Ok(rows.into_iter().flat_map(|r| r.pixels).collect())
+}
+
+/// The winner of a pixel. `groups` has the group of each label; one that is not there is nobody's, 0, but for
+/// [`UNKNOWN`], which is a group of its own.
+pub(crate) fn winner(places: &PixelWeights, groups: &[u32]) -> LabelWinner {
+    let alpha: f32 = places.iter().map(|p| p.1).sum();
+    if alpha < 0.5 {
+        return LabelWinner { alpha, ..LabelWinner::default() };
+    }
+    let group_of =
+        |label: u32| if label == UNKNOWN { UNKNOWN } else { groups.get(label as usize).copied().unwrap_or(0) };
+    let together = |group: u32| places.iter().filter(|p| group_of(p.0) == group).map(|p| p.1).sum::<f32>();
+    let (mut best, mut most) = (0, 0.0);
+    for place in places.iter().filter(|p| p.1 > 0.0) {
+        let group = group_of(place.0);
+        let sum = together(group);
+        if sum > most {
+            (best, most) = (group, sum);
+        }
+    }
+    let inner = places.iter().filter(|p| p.1 > 0.0 && group_of(p.0) == best);
+    let label = inner.max_by(|a, b| a.1.total_cmp(&b.1)).map_or(0, |p| p.0);
+    LabelWinner { label, share: most / alpha, alpha }
 }
 
 /// The competitors of the pixels of one row of tiles.
@@ -61,6 +97,32 @@ impl ContributionSink<f32> for Row<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A pixel with these places taken.
+    fn pixel(taken: &[(u32, f32)]) -> PixelWeights {
+        std::array::from_fn(|k| taken.get(k).copied().unwrap_or_default())
+    }
+
+    #[test]
+    fn the_group_wins_before_its_label() {
+        let groups = [0, 1, 2, 1, 1];
+        let three = winner(&pixel(&[(3, 0.25), (4, 0.2), (2, 0.4)]), &groups);
+        assert_eq!(three.label, 3);
+        assert!((three.share - 0.45 / 0.85).abs() < 1e-6 && (three.alpha - 0.85).abs() < 1e-6);
+        assert_eq!(winner(&pixel(&[(3, 0.25), (4, 0.2), (UNKNOWN, 0.5)]), &groups).label, UNKNOWN);
+        assert_eq!(winner(&[(1, 0.05); COMPETITORS], &groups).label, 0, "mostly see-through");
+    }
+
+    #[test]
+    fn of_two_that_are_equal_the_first_wins() {
+        let groups = [0, 1, 2];
+        let half = winner(&pixel(&[(2, 0.25), (1, 0.25)]), &groups);
+        assert_eq!(half, LabelWinner { label: 2, share: 0.5, alpha: 0.5 }, "half of the light is enough");
+        assert_eq!(winner(&pixel(&[(2, 0.25), (1, 0.24)]), &groups).label, 0);
+        let found = winner(&pixel(&[(99, 0.6), (1, 0.3)]), &groups);
+        assert!(found.label == 99 && (found.share - 0.6 / 0.9).abs() < 1e-6, "a label without a group is nobody's");
+        assert_eq!(winner(&pixel(&[]), &groups), LabelWinner::default());
+    }
 
     #[test]
     fn a_pixel_keeps_the_heaviest_of_many() {

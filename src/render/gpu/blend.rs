@@ -14,17 +14,19 @@ pub(crate) struct TileKernel {
     float_atomics: bool,
     /// How the kernel's own buffers are used, which follow those that every tile kernel reads.
     own: [Access; 4],
+    /// Workgroups for each tile.
+    parts: u32,
     kernels: BTreeMap<usize, Kernel>,
 }
 
 impl TileKernel {
     /// The blending kernel; no pipelines yet.
     pub(crate) fn blend() -> Self {
-        Self::new("blend", false, [Access::Write; 4])
+        Self::new("blend", false, [Access::Write; 4], 1)
     }
 
-    pub(crate) fn new(shader: &'static str, float_atomics: bool, own: [Access; 4]) -> Self {
-        Self { shader, float_atomics, own, kernels: BTreeMap::new() }
+    pub(crate) fn new(shader: &'static str, float_atomics: bool, own: [Access; 4], parts: u32) -> Self {
+        Self { shader, float_atomics, own, parts, kernels: BTreeMap::new() }
     }
 
     /// Compiles what passes of `channels` extra channels need, if that has not been done.
@@ -53,7 +55,7 @@ impl TileKernel {
             let Some(kernel) = self.kernels.get(channels) else { continue };
             let read = [bindings.view, chunk, &picture.ranges, list, &gaussians.splats, features];
             let buffers: Vec<_> = read.into_iter().chain(own).collect();
-            stage.run(kernel, &buffers, [bindings.tiles[0], bindings.tiles[1], 1]);
+            stage.run(kernel, &buffers, [bindings.tiles[0], bindings.tiles[1], self.parts]);
         }
     }
 }

@@ -105,6 +105,12 @@ impl Packed {
     pub(crate) fn to_cloud(&self) -> GaussianCloud {
         let [_, low, high] = strides(self.degree);
         let mut cloud = GaussianCloud { sh_degree: self.degree, ..GaussianCloud::default() };
+        let n = self.floats[0].len() / GEOMETRY_STRIDE;
+        cloud.positions.reserve_exact(n);
+        cloud.log_scales.reserve_exact(n);
+        cloud.quaternions.reserve_exact(n);
+        cloud.opacity_logits.reserve_exact(n);
+        cloud.sh.reserve_exact(n * sh::coefficients(self.degree));
         for (i, g) in self.floats[0].chunks_exact(GEOMETRY_STRIDE).enumerate() {
             cloud.positions.push([g[0], g[1], g[2]]);
             cloud.log_scales.push([g[3], g[4], g[5]]);

@@ -1,10 +1,9 @@
-//! Which labels have how much of a pixel; `shaders/labels.wgsl`.
+//! Which label wins each pixel; `shaders/labels.wgsl`.
 
 use super::kernel::{Access, Kernel, Module, RecordedStage};
 use super::rasterizer::GpuRasterizer;
 use super::shader::ShaderVariant;
 use super::{Device, GpuError};
-use crate::render::PixelWeights;
 
 /// The kernel, and room for what it finds.
 #[derive(Debug)]
@@ -17,25 +16,30 @@ impl LabelPass {
     pub(crate) fn new(device: &Device) -> Result<Self, GpuError> {
         use Access::{Read, Uniform, Write};
         let module = Module::new(device, "labels", ShaderVariant::default())?;
-        let slots = [(0, Uniform), (1, Read), (2, Read), (3, Read), (4, Read), (5, Write)];
+        let slots = [(0, Uniform), (1, Read), (2, Read), (3, Read), (4, Read), (5, Read), (6, Write)];
         let kernel = Kernel::new(device, &module, "main", &slots)?;
         Ok(Self { kernel, found: device.storage("labels of the picture", 0)? })
     }
 
     /// Makes room for a picture.
     pub(crate) fn prepare(&mut self, device: &Device, pixels: u64) -> Result<(), GpuError> {
-        let bytes = pixels * size_of::<PixelWeights>() as u64;
+        let bytes = pixels * 12;
         if self.found.size() < bytes {
             self.found = device.storage("labels of the picture", bytes)?;
         }
         Ok(())
     }
 
-    /// Records the pass over the lists of a frame; `of` has a label for each Gaussian.
-    pub(crate) fn encode(&self, stage: &mut RecordedStage<'_>, rasterizer: &GpuRasterizer, of: &wgpu::Buffer) {
+    /// Records the pass over the lists of a frame; `of` has a label for each Gaussian, `groups` the group of each label.
+    pub(crate) fn encode(
+        &self,
+        stage: &mut RecordedStage<'_>,
+        rasterizer: &GpuRasterizer,
+        [of, groups]: [&wgpu::Buffer; 2],
+    ) {
         let (bindings, list) = (rasterizer.bindings(), rasterizer.list());
         let ranges = &rasterizer.picture.ranges;
-        let buffers = [bindings.view, ranges, list, &rasterizer.gaussians.splats, of, &self.found];
+        let buffers = [bindings.view, ranges, list, &rasterizer.gaussians.splats, of, groups, &self.found];
         stage.run(&self.kernel, &buffers, [bindings.tiles[0], bindings.tiles[1], 1]);
     }
 }

@@ -157,15 +157,19 @@ impl GpuRasterizer {
             (&picture.depths, depth_bytes),
             (&picture.features, pixels * 4 * channels as u64),
         ])?;
-        let colors: Vec<[f32; 4]> = copies.values(1);
-        let depths: Vec<[f32; 2]> = copies.values(2);
-        let features: Vec<f32> = copies.values(3);
+        let (colors, depths, features) = (copies.slice::<[f32; 4]>(1), copies.slice::<[f32; 2]>(2), copies.slice(3));
+        let plane = |c: usize| colors.iter().map(|p: &[f32; 4]| p[c]).collect::<Vec<f32>>();
+        // Memory that is new takes longer to fill than to copy from; every plane is filled by a thread of its own.
+        let ((red, green), (blue, alpha)) = rayon::join(
+            || rayon::join(|| plane(0), || plane(1)),
+            || rayon::join(|| plane(2), || colors.iter().map(|p| 1.0 - p[3]).collect()),
+        );
         let frame = Frame {
             width_px: camera.width_px as usize,
             height_px: camera.height_px as usize,
-            color: std::array::from_fn(|c| colors.iter().map(|p| p[c]).collect()),
+            color: [red, green, blue],
             features: (0..channels).map(|c| features.iter().skip(c).step_by(channels).copied().collect()).collect(),
-            alpha: colors.iter().map(|p| 1.0 - p[3]).collect(),
+            alpha,
             depth: depths.iter().map(|d| d[0]).collect(),
             median_depth: depths.iter().map(|d| d[1]).collect(),
             ..Frame::default()

@@ -1,5 +1,6 @@
 //! Copies from the device to the host, through memory that is kept from one to the next.
 
+use std::borrow::Cow;
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
 
 use super::{Device, GpuError};
@@ -40,6 +41,11 @@ pub(super) struct Copies {
 }
 
 impl Copies {
+    /// The values of the `k`-th buffer that was read, where they lie.
+    pub(super) fn slice<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(&self, k: usize) -> Cow<'_, [T]> {
+        bytemuck::try_cast_slice(self.bytes(k)).map_or_else(|_| Cow::Owned(self.values(k)), Cow::Borrowed)
+    }
+
     /// The values of the `k`-th buffer that was read.
     pub(super) fn values<T: bytemuck::AnyBitPattern + bytemuck::NoUninit>(&self, k: usize) -> Vec<T> {
         bytemuck::pod_collect_to_vec(self.bytes(k))

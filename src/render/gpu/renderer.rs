@@ -13,8 +13,7 @@ use super::rasterizer::{GpuRasterizer, counters_of};
 use super::scratch::GRADIENT_BASE;
 use super::timing::{StageTimes, Timer};
 use super::{Device, GpuError};
-use crate::render::cpu::labels::COMPETITORS;
-use crate::render::{CloudGradient, Features, Frame, FrameGradient, PixelWeights, RenderError, RenderSettings};
+use crate::render::{CloudGradient, Features, Frame, FrameGradient, LabelWinner, RenderError, RenderSettings};
 use crate::scene::{Camera, GaussianCloud};
 
 /// A renderer with its buffers and the cloud that was uploaded last.
@@ -189,19 +188,20 @@ impl GpuRenderer {
         self.submit(camera, settings, After::Nothing)
     }
 
-    /// The labels of largest weight at each pixel, row-major; `of` has one for each Gaussian of the uploaded cloud. Of
-    /// the view that was drawn last this is one pass more.
-    pub(crate) fn label_weights(
+    /// The label that wins each pixel, row-major; `of` has one for each Gaussian of the uploaded cloud, `groups` the
+    /// group of each label. Of the view that was drawn last this is one pass more.
+    pub(crate) fn label_winners(
         &mut self,
-        of: &[u32],
+        (of, groups): (&[u32], &[u32]),
         camera: &Camera,
         settings: &RenderSettings,
-    ) -> Result<Vec<PixelWeights>, GpuError> {
+    ) -> Result<Vec<LabelWinner>, GpuError> {
         let want = self.shape.gaussians as usize;
         if of.len() != want {
             return Err(GpuError::Size { what: "labels of Gaussians", have: of.len(), want });
         }
         let of = self.device.storage_with("labels of Gaussians", bytemuck::cast_slice(of))?;
+        let groups = self.device.storage_with("groups of labels", bytemuck::cast_slice(groups))?;
         let pixels = pixels_of(camera);
         self.labels.prepare(&self.device, pixels)?;
         loop {
@@ -209,15 +209,17 @@ impl GpuRenderer {
                 self.submit(camera, settings, After::Nothing)?;
             }
             let mut recorder = Recorder::new(&self.device, None);
-            recorder.stage("labels", |s| self.labels.encode(s, &self.rasterizer, &of));
+            recorder.stage("labels", |s| self.labels.encode(s, &self.rasterizer, [&of, &groups]));
             recorder.submit();
             let counters = (&self.rasterizer.counters, size_of::<Counters>() as u64);
-            let bytes = pixels * size_of::<PixelWeights>() as u64;
-            let copies = self.device.read(&[counters, (&self.labels.found, bytes)])?;
+            let copies = self.device.read(&[counters, (&self.labels.found, pixels * 12)])?;
             if self.settle(camera, settings, counters_of(&copies))? {
-                let place = |[label, bits]: [u32; 2]| (label, f32::from_bits(bits));
-                let found: Vec<[[u32; 2]; COMPETITORS]> = copies.values(1);
-                return Ok(found.into_iter().map(|places| places.map(place)).collect());
+                let winner = |[label, share, alpha]: &[u32; 3]| LabelWinner {
+                    label: *label,
+                    share: f32::from_bits(*share),
+                    alpha: f32::from_bits(*alpha),
+                };
+                return Ok(copies.slice(1).iter().map(winner).collect());
             }
         }
     }
