@@ -69,7 +69,6 @@ pub struct FrameCost {
 
 /// A renderer with its buffers, to be kept from frame to frame: a GPU draws the pictures where one was chosen,
 /// the CPU everything else.
-#[derive(Default)]
 pub struct Renderer {
     cpu: cpu::CpuRenderer<f32>,
     gpu: Option<Box<Gpu>>,
@@ -86,6 +85,12 @@ struct Gpu {
     /// Degree of the harmonics that were sent.
     degree: u8,
     timed: bool,
+}
+
+impl Default for Renderer {
+    fn default() -> Self {
+        Self { cpu: cpu::CpuRenderer::forward_only(), gpu: None }
+    }
 }
 
 impl Renderer {
@@ -113,7 +118,7 @@ impl Renderer {
         let renderer = gpu::GpuRenderer::new(device)?;
         let name = device.info().name.clone();
         let gpu = Gpu { renderer, name, uploaded: Weak::new(), degree: 0, timed: false };
-        Ok(Self { cpu: cpu::CpuRenderer::new(), gpu: Some(Box::new(gpu)) })
+        Ok(Self { cpu: cpu::CpuRenderer::forward_only(), gpu: Some(Box::new(gpu)) })
     }
 
     /// Whether a GPU draws the pictures.
@@ -251,7 +256,7 @@ impl Renderer {
     /// Gives back working memory that the next picture can make again: on the CPU all of it; a
     /// device keeps its own, which nobody else needs.
     pub fn rest(&mut self) {
-        self.cpu = cpu::CpuRenderer::new();
+        self.cpu = cpu::CpuRenderer::forward_only();
     }
 
     /// Bytes of buffers on the device; 0 on the CPU.

@@ -11,8 +11,9 @@ pub(crate) struct RowOut<'a, R> {
     /// The primitive's extra values; none = not wanted.
     pub(crate) extra: Vec<&'a mut [R]>,
     pub(crate) transmittance: &'a mut [R],
-    /// Place in the tile's list, from 1, of the last splat that contributed; 0 = none.
-    pub(crate) last: &'a mut [R],
+    /// Place in the tile's list, from 1, of the last splat that contributed; 0 = none. Not wanted without a backward
+    /// pass.
+    pub(crate) last: Option<&'a mut [R]>,
 }
 
 /// Compositing of a row of tiles; returns the number of splat-pixel products evaluated.
@@ -42,6 +43,7 @@ struct Sums<'a, R: Real, P: Primitive<R>, L: Lanes<R>, const C: usize, const EXT
     channels: [[L::V; C]; SLOTS],
     extra: [P::Extra<L::V>; SLOTS],
     last: [L::V; SLOTS],
+    keeps_last: bool,
 }
 
 impl<R: Real, P: Primitive<R>, L: Lanes<R>, const C: usize, const EXTRA: bool> Sink<R, P, L>
@@ -63,7 +65,9 @@ impl<R: Real, P: Primitive<R>, L: Lanes<R>, const C: usize, const EXTRA: bool> S
             let crossed = l.both(l.ge(half, after), l.gt(before, half));
             P::gather(l, &mut self.extra[slot], hit, weight, crossed, *place);
         }
-        self.last[slot] = l.max(self.last[slot], l.keep(l.gt(weight, l.splat(R::ZERO)), *place));
+        if self.keeps_last {
+            self.last[slot] = l.max(self.last[slot], l.keep(l.gt(weight, l.splat(R::ZERO)), *place));
+        }
         for c in 0..C {
             self.channels[slot][c] = l.mul_add(weight, values[c], self.channels[slot][c]);
         }
@@ -84,13 +88,16 @@ fn tile<R: Real, P: Primitive<R>, L: Lanes<R>, const C: usize, const EXTRA: bool
         channels: [[zero; C]; SLOTS],
         extra: [P::Extra::all(zero); SLOTS],
         last: [zero; SLOTS],
+        keeps_last: out.last.is_some(),
     };
     let (left, groups) = row.front_to_back::<L, _, C>(l, &tile, &mut sums);
     for (slot, at, count) in tile.slots(row.size[0]) {
         let store = |plane: &mut [R], v: L::V| plane[at..at + count].copy_from_slice(&l.store(v)[..count]);
         out.planes.iter_mut().zip(sums.channels[slot]).for_each(|(plane, sum)| store(plane, sum));
         store(out.transmittance, l.max(left[slot], l.sub(zero, left[slot])));
-        store(out.last, sums.last[slot]);
+        if let Some(last) = &mut out.last {
+            store(last, sums.last[slot]);
+        }
         if EXTRA {
             out.extra.iter_mut().zip(sums.extra[slot].as_ref()).for_each(|(plane, sum)| store(plane, *sum));
         }

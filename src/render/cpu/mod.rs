@@ -87,6 +87,13 @@ impl<R: Real> CpuRenderer<R> {
         Self::default()
     }
 
+    /// One without a way back, which keeps nothing for it.
+    pub(crate) fn forward_only() -> Self {
+        let mut renderer = Self::default();
+        renderer.splats.forward_only = true;
+        renderer
+    }
+
     /// Draws only this of clouds that it fits, from now on; `None` draws all. No gradients go back through a cut.
     pub(crate) fn limit_to(&mut self, cut: Option<Arc<Cut<R>>>) {
         self.splats.cut = cut;
@@ -127,7 +134,7 @@ impl<R: Real> CpuRenderer<R> {
             let settings = RenderSettings { keep_order: false, ..settings.clone() };
             let cut = self.splats.cut.clone();
             let surfels = self.surfels.get_or_insert_default();
-            surfels.cut = cut;
+            (surfels.cut, surfels.forward_only) = (cut, self.splats.forward_only);
             return Ok(surfels.render(cloud, features, camera, &settings)?);
         }
         self.surfels = None;

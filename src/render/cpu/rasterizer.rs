@@ -38,6 +38,8 @@ pub(crate) struct CpuRasterizer<R, P> {
     frame: Option<FrameInfo<R, P>>,
     /// What is drawn of clouds that it fits, instead of all of them.
     pub(crate) cut: Option<Arc<Cut<R>>>,
+    /// Whether nothing is kept for a backward pass, which then does nothing.
+    pub(crate) forward_only: bool,
     /// What the last frame cost.
     pub(crate) stats: RenderStats,
 }
@@ -94,6 +96,7 @@ impl<R: Real, P> Default for CpuRasterizer<R, P> {
             records: Vec::new(),
             frame: None,
             cut: None,
+            forward_only: false,
             stats: RenderStats::default(),
         }
     }
@@ -199,10 +202,11 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
         let (strip, pixels) = (info.view.size[0] * TILE_PX, frame.alpha.len());
         let Pixels { transmittance, last, kept } = &mut self.pixels;
         transmittance.resize(pixels, R::ONE);
-        last.resize(pixels, R::ZERO);
-        let rows = transmittance.chunks_mut(strip).zip(last.chunks_mut(strip));
-        let mut rows: Vec<RowOut<'_, R>> = rows
-            .map(|(transmittance, last)| RowOut { planes: Vec::new(), extra: Vec::new(), transmittance, last })
+        last.resize(if self.forward_only { 0 } else { pixels }, R::ZERO);
+        let mut last = last.chunks_mut(strip);
+        let mut rows: Vec<RowOut<'_, R>> = transmittance
+            .chunks_mut(strip)
+            .map(|transmittance| RowOut { planes: Vec::new(), extra: Vec::new(), transmittance, last: last.next() })
             .collect();
         let [planes, extra] = P::planes(frame, kept, info.settings.depth);
         for plane in planes {
@@ -232,9 +236,9 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
         Ok(())
     }
 
-    /// Backward pass over the tiles of the last frame; does nothing before the first.
+    /// Backward pass over the tiles of the last frame; does nothing before the first, nor where none was kept.
     pub(crate) fn backward_tiles(&mut self, gradient: &FrameGradient<R>) {
-        let Some(info) = &self.frame else { return };
+        let Some(info) = self.frame.as_ref().filter(|_| !self.forward_only) else { return };
         let clock = Instant::now();
         self.lists.tiles.find_ways_back(self.lists.parts.len() * CHUNK);
         let lists = &self.lists;
