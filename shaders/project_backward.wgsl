@@ -21,9 +21,8 @@
 @group(0) @binding(7) var<storage, read_write> sh_low_gradient: array<f32>;
 @group(0) @binding(8) var<storage, read_write> sh_high_gradient: array<f32>;
 
-// [Gaussian]: sum of screen gradients' lengths, frames in which it was drawn, largest radius as a
-// share of the picture's longer side.
-@group(0) @binding(9) var<storage, read_write> growth: array<vec4<f32>>;
+// [Gaussian]: sum of screen gradients' lengths, frames in which it was drawn.
+@group(0) @binding(9) var<storage, read_write> growth: array<vec2<f32>>;
 @group(0) @binding(10) var<storage, read_write> counters: array<atomic<u32>>;
 
 #include "shared/linearize.wgsl"
@@ -179,7 +178,5 @@ fn statistics(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_wor
         atomicAdd(&counters[COUNT_BAD_GRADIENTS], 1u);
         return;
     }
-    let so_far = growth[i];
-    let share = splats[i].radius / f32(max(view.size_px.x, view.size_px.y));
-    growth[i] = vec4<f32>(so_far.x + screen, so_far.y + 1.0, max(so_far.z, share), 0.0);
+    growth[i] += vec2<f32>(screen, 1.0);
 }

@@ -81,9 +81,7 @@ impl Problem {
         let check = |(name, a, b, each): (&str, &[f32], &[f64], usize)| {
             agree_in_bands(name, a, b, &spread(&boundary, each)).err()
         };
-        let mut out: Vec<String> = groups.into_iter().filter(|g| g.3 > 0).filter_map(check).collect();
-        let radii: Vec<f64> = oracle.radius_px.iter().map(|&r| f64::from(r)).collect();
-        out.extend(agree_in_bands("radius", &ours.radius_px, &radii, &boundary).err());
+        let out: Vec<String> = groups.into_iter().filter(|g| g.3 > 0).filter_map(check).collect();
         assert!(boundary.iter().filter(|b| !**b).count() * 4 > boundary.len(), "too few Gaussians are interior");
         out
     }

@@ -214,8 +214,6 @@ pub struct CloudGradient<R> {
     /// Length of the gradient with respect to the center's position in the picture, in loss per
     /// half picture side (normalized device coordinates, as 3DGS thresholds it); 0 where unseen.
     pub screen: Vec<R>,
-    /// Radius in px at which each Gaussian was drawn (3 sigma along its longer axis); 0 = not drawn.
-    pub radius_px: Vec<f32>,
 }
 
 /// What density control knows of each Gaussian since it last ran.
@@ -225,13 +223,11 @@ pub struct DensityStats {
     pub gradient: Vec<f32>,
     /// Frames in which it was drawn.
     pub seen: Vec<u32>,
-    /// Largest radius as a share of the picture's longer side.
-    pub radius: Vec<f32>,
 }
 
 impl DensityStats {
     /// Nothing seen of `n` Gaussians.
     pub(crate) fn new(n: usize) -> Self {
-        Self { gradient: vec![0.0; n], seen: vec![0; n], radius: vec![0.0; n] }
+        Self { gradient: vec![0.0; n], seen: vec![0; n] }
     }
 }

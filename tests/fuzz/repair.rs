@@ -8,7 +8,7 @@ pub fn repaired(mut input: Vec<u8>) -> Vec<u8> {
         png(&mut input);
     } else if input.starts_with(b"glTF") {
         glb(&mut input);
-    } else if input.starts_with(b"FMLGSCP2") && input.len() >= 40 {
+    } else if [&b"FMLGSCP2"[..], b"FMLGSCP3"].iter().any(|m| input.starts_with(m)) && input.len() >= 40 {
         let body = input.len() - 32;
         let sum = Sha256::digest(&input[..body]);
         input[body..].copy_from_slice(&sum);

@@ -228,7 +228,7 @@ fn checkpoint(header: &Header) -> Vec<u8> {
     out
 }
 
-/// The same as it is written today: with a checksum at its end.
+/// The same as the second version wrote it: with a checksum at its end.
 fn summed(mut checkpoint: Vec<u8>) -> Vec<u8> {
     checkpoint[7] = b'2';
     checkpoint.extend([0; 32]);

@@ -244,7 +244,7 @@ pub(crate) fn cases() -> Vec<Case> {
             t.stats.gradient.fill(1.0);
             t.stats.gradient[1] = if faulty { 0.0 } else { 1.0 };
             let mut rng = Pcg64Mcg::seed_from_u64(1);
-            let round = DensityRound { extent: 1.0, budget: 100, rounds: 1, prune_large: false };
+            let round = DensityRound { budget: 100, rounds: 1 };
             let done = density::control(&mut t.cloud, &mut t.moments, &t.stats, &round, &mut rng);
             let valid = t.cloud.validate();
             Finding::is(format!("{} divided, {valid:?}", done.divided), valid.is_ok() && done.divided == 24)

@@ -23,9 +23,11 @@ use crate::scene::GaussianCloud;
 
 pub use crate::io::scene_files::CHECKPOINT_FILE as FILE;
 
-const MAGIC: &[u8; 8] = b"FMLGSCP2";
-/// How files of the first version begin, which end without a checksum.
+const MAGIC: &[u8; 8] = b"FMLGSCP3";
+/// How files of the first version begin, which end without a checksum, and of the second; both have another array behind
+/// the others, which nobody reads.
 const MAGIC_1: &[u8; 8] = b"FMLGSCP1";
+const MAGIC_2: &[u8; 8] = b"FMLGSCP2";
 
 /// Everything about a run but its arrays.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -80,7 +82,6 @@ pub(crate) fn save(scene: &SceneFolder, trainer: &Trainer, header: &Header) -> R
         }
         w.write_all(cast_slice(&trainer.stats.gradient))?;
         w.write_all(cast_slice(&trainer.stats.seen))?;
-        w.write_all(cast_slice(&trainer.stats.radius))?;
         let sum = w.sum.finalize();
         w.to.write_all(&sum)
     })
@@ -130,7 +131,7 @@ pub fn load(path: &Path) -> Result<Option<Checkpoint>, CheckpointError> {
         Err(e) => return Err(e.into()),
     };
     let body = match bytes.split_last_chunk::<32>() {
-        Some((body, sum)) if bytes.starts_with(MAGIC) => {
+        Some((body, sum)) if bytes.starts_with(MAGIC) || bytes.starts_with(MAGIC_2) => {
             if Sha256::digest(body).as_slice() != sum {
                 return Err(damaged("its checksum is another"));
             }
@@ -138,14 +139,15 @@ pub fn load(path: &Path) -> Result<Option<Checkpoint>, CheckpointError> {
         }
         _ => &bytes,
     };
-    let rest = body.strip_prefix(MAGIC).or_else(|| body.strip_prefix(MAGIC_1));
+    let earlier = !body.starts_with(MAGIC);
+    let rest = [MAGIC, MAGIC_1, MAGIC_2].iter().find_map(|magic| body.strip_prefix(*magic));
     let rest = rest.ok_or_else(|| damaged("it does not begin like one"))?;
     let (length, rest) = rest.split_first_chunk::<8>().ok_or_else(|| damaged("it ends in the header"))?;
     let length = usize::try_from(u64::from_le_bytes(*length)).ok().filter(|&l| l <= rest.len());
     let (text, data) = rest.split_at(length.ok_or_else(|| damaged("it ends in the header"))?);
     let header: Header = serde_json::from_slice(text).map_err(|e| damaged(&e.to_string()))?;
     let (n, degree) = (header.count, header.sh_degree);
-    let per_gaussian = (3 * (3 + 3 + 4 + 1 + 3 * coefficients(degree.min(3))) + 3) * 4;
+    let per_gaussian = (3 * (3 + 3 + 4 + 1 + 3 * coefficients(degree.min(3))) + 2 + usize::from(earlier)) * 4;
     if degree > 3 || n.checked_mul(per_gaussian) != Some(data.len()) {
         return Err(damaged("its arrays do not have the length that its header says"));
     }
@@ -155,8 +157,7 @@ pub fn load(path: &Path) -> Result<Option<Checkpoint>, CheckpointError> {
     [&cloud].into_iter().chain(&moments).try_for_each(GaussianCloud::validate).map_err(|e| damaged(&e.to_string()))?;
     let gradient = at.take(n);
     let seen = at.take(n).iter().map(|v| v.to_bits()).collect();
-    let radius = at.take(n);
-    Ok(Some(Checkpoint { header, cloud, moments, stats: DensityStats { gradient, seen, radius } }))
+    Ok(Some(Checkpoint { header, cloud, moments, stats: DensityStats { gradient, seen } }))
 }
 
 /// Takes arrays off a buffer whose length has been checked.
@@ -184,5 +185,57 @@ impl Floats<'_> {
             sh: self.arrays(n * coefficients(sh_degree)),
             ..GaussianCloud::default()
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::SeedableRng;
+
+    use super::*;
+
+    #[test]
+    fn what_earlier_versions_wrote_is_read() {
+        let folder = tempfile::tempdir().expect("folder");
+        let scene = SceneFolder::hold(folder.path(), "a test").expect("held");
+        let config = TrainConfig { sh_degree: 0, ..TrainConfig::default() };
+        let cloud = GaussianCloud { sh: vec![[0.5; 3]; 2], ..GaussianCloud::isotropic(vec![[1.0; 3]; 2], -1.0, 0.0) };
+        let mut trainer = Trainer::new(cloud, &config, [0.0; 3], 1.0, Pcg64Mcg::seed_from_u64(1));
+        (trainer.stats.gradient, trainer.stats.seen) = (vec![0.25, 0.5], vec![3, 4]);
+        let header = Header {
+            config,
+            photos: Vec::new(),
+            step: 7,
+            secs: 0.0,
+            count: 2,
+            sh_degree: 0,
+            origin: DVec3::ZERO,
+            rng: trainer.rng.clone(),
+            round: Vec::new(),
+            budget: 2,
+            damping: 1.0,
+            history: History::default(),
+        };
+        save(&scene, &trainer, &header).expect("saved");
+        let path = folder.path().join(FILE);
+        let now = std::fs::read(&path).expect("there");
+        assert!(now.starts_with(MAGIC));
+        let read = |bytes: &[u8]| {
+            std::fs::write(&path, bytes).expect("written");
+            load(&path).map(|saved| saved.expect("there")).map(|c| (c.header.step, c.stats, c.cloud))
+        };
+        let want = (7, trainer.stats.clone(), trainer.cloud.clone());
+        assert_eq!(read(&now).expect("today's"), want);
+        let mut earlier = now[..now.len() - 32].to_vec();
+        earlier.extend([0; 8]);
+        earlier[..8].copy_from_slice(MAGIC_1);
+        assert_eq!(read(&earlier).expect("the first version's"), want);
+        earlier[..8].copy_from_slice(MAGIC_2);
+        let sum = Sha256::digest(&earlier);
+        let second = [&earlier, sum.as_slice()].concat();
+        assert_eq!(read(&second).expect("the second version's"), want);
+        // The controls: without its array, and with another sum.
+        assert!(read(&[&now[..8], &second[8..]].concat()).is_err());
+        assert!(read(&earlier).is_err());
     }
 }

@@ -14,10 +14,6 @@ use crate::scene::GaussianCloud;
 
 /// Mean screen gradient (loss per half picture side) under which a region is reconstructed well enough.
 const LEAST_GRADIENT: f32 = 2e-5;
-/// Share of the scene's extent above which a Gaussian is removed, after the first opacity reset.
-const PRUNE_EXTENT: f64 = 0.3;
-/// Share of the picture's longer side above which a splat is removed, after the first reset.
-const PRUNE_SCREEN: f32 = 0.3;
 /// Opacity under which a Gaussian is removed.
 const PRUNE_OPACITY: f32 = 0.005;
 /// Opacities are lowered to this by a reset.
@@ -30,14 +26,10 @@ const MOST_OPAQUE: f32 = 0.999;
 /// What a round of density control may do.
 #[derive(Clone, Copy, Debug)]
 pub struct DensityRound {
-    /// Size of the scene, as in `Dataset::camera_extent`.
-    pub extent: f64,
     /// Most Gaussians when control ends.
     pub budget: usize,
     /// Rounds until then, this one included.
     pub rounds: u64,
-    /// Whether Gaussians that are too large are removed.
-    pub prune_large: bool,
 }
 
 /// What a round of density control did.
@@ -57,7 +49,8 @@ pub fn control(
     rng: &mut Pcg64Mcg,
 ) -> DensityReport {
     let n = cloud.len();
-    let stays: Vec<bool> = (0..n).map(|i| !is_superfluous(cloud, stats, round, i)).collect();
+    // 3DGS removes large ones too, after the first reset. That took what is behind everything (docs/measured.md).
+    let stays: Vec<bool> = cloud.opacity_logits.iter().map(|o| o.sigmoid() >= PRUNE_OPACITY).collect();
     let left = stays.iter().filter(|s| **s).count();
     let room = round.budget.saturating_sub(left).div_ceil(round.rounds.max(1) as usize);
     let needs = |i: usize| stats.gradient[i] >= LEAST_GRADIENT * stats.seen[i].max(1) as f32;
@@ -81,13 +74,6 @@ pub fn control(
         make_half(cloud, i, rng);
     }
     DensityReport { divided: dividing.len(), pruned: n - left }
-}
-
-/// Whether Gaussian `i` is too faint, or too large where that counts.
-fn is_superfluous(cloud: &GaussianCloud, stats: &DensityStats, round: &DensityRound, i: usize) -> bool {
-    let widest = cloud.log_scales[i].iter().fold(f32::NEG_INFINITY, |m, &s| m.max(s)).exp();
-    let large = || f64::from(widest) > PRUNE_EXTENT * round.extent || stats.radius[i] > PRUNE_SCREEN;
-    cloud.opacity_logits[i].sigmoid() < PRUNE_OPACITY || round.prune_large && large()
 }
 
 /// Zeroes moments from Gaussian `from` on.
@@ -144,7 +130,7 @@ mod tests {
 
     use super::*;
 
-    const ROUND: DensityRound = DensityRound { extent: 1.0, budget: 100, rounds: 1, prune_large: false };
+    const ROUND: DensityRound = DensityRound { budget: 100, rounds: 1 };
 
     fn setup(n: usize) -> (GaussianCloud, [GaussianCloud; 2], DensityStats, Pcg64Mcg) {
         let cloud = GaussianCloud {
@@ -194,7 +180,7 @@ mod tests {
     fn growth_is_spread_over_the_rounds_and_goes_to_the_neediest() {
         let (mut cloud, mut moments, mut stats, mut rng) = setup(10);
         stats.gradient = (0..10).map(|i| i as f32).collect();
-        let round = DensityRound { budget: 16, rounds: 3, ..ROUND };
+        let round = DensityRound { budget: 16, rounds: 3 };
         assert_eq!(control(&mut cloud, &mut moments, &stats, &round, &mut rng).divided, 2);
         assert_eq!((cloud.len(), cloud.positions[7]), (12, [7.0, 0.0, 0.0]));
         // A sum counts, not a mean: one that few pictures show is less needy than one that many show.
@@ -212,15 +198,6 @@ mod tests {
         stats.gradient = vec![1.0; 3];
         let full = DensityRound { budget: 2, ..ROUND };
         assert_eq!(control(&mut cloud, &mut moments, &stats, &full, &mut rng).divided, 0);
-    }
-
-    #[test]
-    fn large_ones_go_only_when_asked() {
-        let (mut cloud, mut moments, stats, mut rng) = setup(3);
-        cloud.log_scales[1] = [2.0; 3];
-        assert_eq!(control(&mut cloud, &mut moments, &stats, &ROUND, &mut rng).pruned, 0);
-        let asked = DensityRound { prune_large: true, ..ROUND };
-        assert_eq!(control(&mut cloud, &mut moments, &stats, &asked, &mut rng).pruned, 1);
     }
 
     #[test]

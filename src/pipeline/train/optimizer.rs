@@ -37,7 +37,6 @@ pub(super) struct Update {
     pub(super) adam: AdamStep,
     pub(super) stride: usize,
     pub(super) active: usize,
-    pub(super) radius_scale: f32,
     /// Center of the camera relative to the cloud's origin, where Gaussians carry their normals as
     /// extra channels.
     pub(super) eye: Option<[f32; 3]>,
@@ -57,17 +56,8 @@ impl Update {
             .zip(blocks(second))
             .zip(stats.gradient.chunks_mut(BLOCK))
             .zip(stats.seen.chunks_mut(BLOCK))
-            .zip(stats.radius.chunks_mut(BLOCK))
             .enumerate()
-            .map(|(b, (((((p, m), v), gradient), seen), radius))| Block {
-                first: b * BLOCK,
-                p,
-                m,
-                v,
-                gradient,
-                seen,
-                radius,
-            })
+            .map(|(b, ((((p, m), v), gradient), seen))| Block { first: b * BLOCK, p, m, v, gradient, seen })
             .collect();
         blocks
             .into_par_iter()
@@ -93,7 +83,6 @@ struct Block<'a> {
     v: Slices<'a>,
     gradient: &'a mut [f32],
     seen: &'a mut [u32],
-    radius: &'a mut [f32],
 }
 
 fn blocks(cloud: &mut GaussianCloud) -> impl Iterator<Item = Slices<'_>> {
@@ -129,8 +118,8 @@ fn update_all(adam: &AdamStep, [p, m, v]: [&mut [f32]; 3], g: &[f32], rate: f32)
 /// Updates a block and returns what it left out.
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
 fn step_block(renderer: &DifferentiableRenderer, block: &mut Block<'_>, update: &Update) -> StepStats {
-    let Update { rates, adam, stride, active, radius_scale, eye } = update;
-    let Block { first, p, m, v, gradient, seen, radius } = block;
+    let Update { rates, adam, stride, active, eye } = update;
+    let Block { first, p, m, v, gradient, seen } = block;
     let mut left = StepStats::default();
     for i in 0..p.positions.len() {
         let own = i * stride..(i + 1) * stride;
@@ -158,7 +147,6 @@ fn step_block(renderer: &DifferentiableRenderer, block: &mut Block<'_>, update: 
         }
         gradient[i] += g.screen;
         seen[i] += 1;
-        radius[i] = radius[i].max(g.radius_px * radius_scale);
         let position = [&mut p.positions[i], &mut m.positions[i], &mut v.positions[i]].map(<[f32; 3]>::as_mut_slice);
         let scale = [&mut p.log_scales[i], &mut m.log_scales[i], &mut v.log_scales[i]].map(<[f32; 3]>::as_mut_slice);
         let turn = [&mut p.quaternions[i], &mut m.quaternions[i], &mut v.quaternions[i]];

@@ -76,12 +76,6 @@ impl Schedule {
         self.densify_until.saturating_sub(done) / self.densify_interval + 1
     }
 
-    /// Whether Gaussians that are too large may be removed after `done` steps: after the first
-    /// reset, as in 3DGS. Before it they are the walls behind everything else.
-    pub(crate) fn prunes_large(&self, done: u64) -> bool {
-        done > self.reset_interval
-    }
-
     /// Whether opacities are reset after `done` steps. Never near the end of density control, so
     /// that what the reset hides can come back or be removed.
     pub(crate) fn resets(&self, done: u64) -> bool {

@@ -55,8 +55,6 @@ pub struct Trainer {
     pub(crate) round: Vec<u32>,
     /// Steps done.
     pub step: u64,
-    /// Size of the scene that thresholds scale with.
-    pub(crate) extent: f64,
     pub(crate) budget: usize,
     settings: RenderSettings,
     /// Where the photos do not say what is behind everything: the seed of a color for each step. What is black in them
@@ -81,7 +79,6 @@ impl Trainer {
             rng,
             round: Vec::new(),
             step: 0,
-            extent,
             budget: config.max_gaussians.unwrap_or(usize::MAX),
             settings: config.render_settings(Some(background)),
             backdrops: None,
@@ -198,12 +195,7 @@ impl Trainer {
         self.fetch()?;
         let mut report = None;
         if densifies {
-            let round = DensityRound {
-                extent: self.extent,
-                budget: self.budget,
-                rounds: self.schedule.rounds_left(self.step),
-                prune_large: self.schedule.prunes_large(self.step),
-            };
+            let round = DensityRound { budget: self.budget, rounds: self.schedule.rounds_left(self.step) };
             let (cloud, moments) = (&mut self.cloud, &mut self.moments);
             report = Some(density::control(cloud, moments, &self.stats, &round, &mut self.rng));
             self.stats = DensityStats::new(self.cloud.len());
@@ -269,7 +261,6 @@ impl Trainer {
             adam: self.schedule.adam(self.step),
             stride: self.cloud.sh_stride(),
             active: sh::coefficients(self.settings.sh_degree.min(self.cloud.sh_degree)),
-            radius_scale: 1.0 / camera.width_px.max(camera.height_px) as f32,
             eye: self.geometry.draws_normals(self.step).then(|| normals::eye(camera, &self.cloud)),
         }
     }

@@ -203,7 +203,6 @@ impl<R: Real> CpuRenderer<R> {
             sh: vec![[R::ZERO; 3]; n * stride],
             features: vec![R::ZERO; n * features.channels],
             screen: vec![R::ZERO; n],
-            radius_px: vec![0.0; n],
         };
         for i in 0..n {
             let Some(g) = self.gaussian_gradient(&cloud.gaussian(i), i) else { continue };
@@ -212,7 +211,6 @@ impl<R: Real> CpuRenderer<R> {
             out.quaternions[i] = g.quaternion;
             out.opacity_logits[i] = g.opacity_logit;
             out.screen[i] = g.screen;
-            out.radius_px[i] = g.radius_px.f32();
             for (k, sh) in out.sh[i * stride..(i + 1) * stride].iter_mut().enumerate() {
                 *sh = g.color.map(|c| c * g.basis[k]);
             }

@@ -23,8 +23,6 @@ pub(crate) struct GaussianGradient<R> {
     pub(crate) basis: [R; 16],
     /// Length of the gradient with respect to the projected center, per half picture side.
     pub(crate) screen: R,
-    /// Three standard deviations along the splat's longer axis, px.
-    pub(crate) radius_px: R,
 }
 
 /// Backward of the projection. `record` is the sum of the splat's tile records: moments, color,
@@ -97,17 +95,7 @@ pub(crate) fn project_backward<R: Real>(
         color,
         basis,
         screen: (on_screen[0] * on_screen[0] + on_screen[1] * on_screen[1]).sqrt(),
-        radius_px: radius(g.covariance),
     })
-}
-
-/// Three standard deviations along the longer axis of a covariance `[xx, xy, yy]`.
-#[inline(always)]
-pub(super) fn radius<R: Real>([xx, xy, yy]: [R; 3]) -> R {
-    // In units of the larger variance, whose square may overflow.
-    let unit = xx.max(yy);
-    let (apart, across) = (R::HALF * (xx - yy) / unit, xy / unit);
-    R::of(3.0) * (R::HALF * (xx + yy) + unit * (apart * apart + across * across).sqrt()).sqrt()
 }
 
 /// What the gradient of a Gaussian's color comes to.

@@ -285,7 +285,7 @@ impl GpuRenderer {
             return Err(GpuError::Size { what: "extra channels of the drawn cloud", have, want: self.channels });
         }
         let Some(drawn) = &self.drawn else {
-            return Ok(unpack(&Packed { degree: cloud.sh_degree, ..Packed::default() }, &[], &[], 0));
+            return Ok(unpack(&Packed { degree: cloud.sh_degree, ..Packed::default() }, &[], 0));
         };
         let depth = drawn.settings.depth;
         let planes = if depth { 2 } else { 1 };
@@ -312,13 +312,10 @@ impl GpuRenderer {
             self.times.extend(timer.finish(&self.device)?);
         }
         let stride = GRADIENT_BASE + self.channels;
-        let copies = self.device.read(&[
-            (&gradients.splats, if self.channels > 0 { (n * stride * 4) as u64 } else { 0 }),
-            (splats, (n * size_of::<Splat>()) as u64),
-        ])?;
+        let bytes = if self.channels > 0 { (n * stride * 4) as u64 } else { 0 };
+        let splat_gradient: Vec<f32> = self.device.read(&[(&gradients.splats, bytes)])?.values(0);
         let packed = out.read(&self.device, n, self.shape.degree)?;
-        let (splat_gradient, splats) = (copies.values::<f32>(0), copies.values::<Splat>(1));
-        Ok(unpack(&packed, &splat_gradient, &splats, self.channels))
+        Ok(unpack(&packed, &splat_gradient, self.channels))
     }
 
     fn write_gradient(
@@ -354,7 +351,7 @@ impl GpuRenderer {
     }
 }
 
-fn unpack(packed: &Packed, splat_gradient: &[f32], splats: &[Splat], channels: usize) -> CloudGradient<f32> {
+fn unpack(packed: &Packed, splat_gradient: &[f32], channels: usize) -> CloudGradient<f32> {
     let cloud = packed.to_cloud();
     CloudGradient {
         positions: cloud.positions,
@@ -367,6 +364,5 @@ fn unpack(packed: &Packed, splat_gradient: &[f32], splats: &[Splat], channels: u
             .flat_map(|g| g[GRADIENT_BASE..].iter().copied())
             .collect(),
         screen: packed.pads().map(|s| s.max(0.0)).collect(),
-        radius_px: splats.iter().map(|s| s.radius).collect(),
     }
 }

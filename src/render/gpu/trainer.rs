@@ -149,7 +149,7 @@ impl GpuTrainer {
             let make = |capacity: usize| -> Result<_, GpuError> {
                 let new = |what| Parameters::new(device, what, capacity, degree);
                 let parameters = [new("cloud")?, new("gradient of the cloud")?, new("first moments")?];
-                Ok((parameters, new("second moments")?, device.storage("density statistics", capacity as u64 * 16)?))
+                Ok((parameters, new("second moments")?, device.storage("density statistics", capacity as u64 * 8)?))
             };
             let roomy = n + n / 4;
             let (capacity, made) = match make(roomy) {
@@ -309,11 +309,10 @@ impl GpuTrainer {
 
     /// Statistics for density control since the cloud was uploaded. Waits for the device.
     pub fn stats(&self) -> Result<DensityStats, GpuError> {
-        let rows: Vec<[f32; 4]> = self.device.read(&[(&self.statistics, self.len() as u64 * 16)])?.values(0);
+        let rows: Vec<[f32; 2]> = self.device.read(&[(&self.statistics, self.len() as u64 * 8)])?.values(0);
         Ok(DensityStats {
             gradient: rows.iter().map(|r| r[0]).collect(),
             seen: rows.iter().map(|r| r[1] as u32).collect(),
-            radius: rows.iter().map(|r| r[2]).collect(),
         })
     }
 

@@ -300,10 +300,9 @@ pub fn training(n: &mut Numbers) -> Verdict {
     let stats = DensityStats {
         gradient: (0..count).map(|_| n.around(0.0, 1e-3).abs()).collect(),
         seen: (0..count).map(|_| n.below(5) as u32).collect(),
-        radius: (0..count).map(|_| n.plain(0.0, 1.0) as f32).collect(),
     };
     let budget = n.below(2 * count + 2);
-    let round = DensityRound { extent, budget, rounds: 1 + n.below(5) as u64, prune_large: n.chance(0.5) };
+    let round = DensityRound { budget, rounds: 1 + n.below(5) as u64 };
     let mut rng = n.rng();
     let Trainer { cloud, moments, .. } = &mut trainer;
     density::control(cloud, moments, &stats, &round, &mut rng);

@@ -1,9 +1,9 @@
 //! From the sums of a surfel's tile records back to the raw parameters of its Gaussian.
 
 use super::super::project::CameraView;
-use super::super::project_backward::{ColorGradient, GaussianGradient, color_gradient, quaternion_gradient, radius};
+use super::super::project_backward::{ColorGradient, GaussianGradient, color_gradient, quaternion_gradient};
 use super::RECORD;
-use super::project::{bound, geometry};
+use super::project::geometry;
 use crate::math::Real;
 use crate::render::RenderSettings;
 use crate::scene::Gaussian;
@@ -70,6 +70,5 @@ pub(crate) fn project_backward<R: Real>(
         color,
         basis,
         screen: (on_screen[0] * on_screen[0] + on_screen[1] * on_screen[1]).sqrt(),
-        radius_px: bound(&g, R::ONE).map_or(half[0] + half[1], |b| radius(b.squared)),
     })
 }
