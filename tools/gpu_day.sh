@@ -71,7 +71,7 @@ if [ -n "$photos" ]; then
             --max-gaussians "$most" --backend gpu --eval-every 0 --json
         for strategy in mcmc default; do
             step "gsplat_${strategy}_train_$steps" python3 tools/gpu_day/gsplat_train.py "$photos" \
-                --strategy "$strategy" --steps "$steps" --gaussians "$most"
+                --strategy "$strategy" --steps "$steps" --gaussians "$most" --max-side "$side"
         done
     done
 fi

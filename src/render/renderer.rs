@@ -67,8 +67,8 @@ pub struct FrameCost {
     pub(crate) pixels_secs: f64,
 }
 
-/// A renderer with its buffers, to be kept from frame to frame: a GPU draws the pictures where one was chosen,
-/// the CPU everything else.
+/// A renderer with its buffers, to be kept from frame to frame: where a GPU was chosen, it draws the pictures and finds
+/// what their pixels belong to; the CPU does everything else.
 pub struct Renderer {
     cpu: cpu::CpuRenderer<f32>,
     gpu: Option<Box<Gpu>>,

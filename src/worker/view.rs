@@ -93,8 +93,15 @@ impl ViewLane {
                 mapper.limit_to(renderer.cut());
                 let mut maps_of = || {
                     let by_gpu = renderer.renderer.is_gpu().then(|| maps_of(&mut renderer.renderer, &request, &camera));
-                    let drawn = by_gpu.flatten().filter(Result::is_ok);
-                    drawn.or_else(|| maps_of(&mut mapper, &request, &camera))
+                    match by_gpu.flatten() {
+                        Some(Err(_)) => {
+                            // Buffers may be in any state. The CPU says why, if it cannot either.
+                            renderer.renderer.rest();
+                            maps_of(&mut mapper, &request, &camera)
+                        }
+                        Some(drawn) => Some(drawn),
+                        None => maps_of(&mut mapper, &request, &camera),
+                    }
                 };
                 // At rest it comes second, and only if no one waits for a frame.
                 if (!exact || lock(&box_.0).request.is_none())

@@ -1,6 +1,6 @@
 """Trains gsplat, from its package, on the photos that `fmlgs train` is given, and prints PSNR against seconds.
 
-usage: gsplat_train.py FOLDER [--strategy mcmc|default] [--steps N] [--gaussians N] [--marks S,S,...]
+usage: gsplat_train.py FOLDER [--strategy mcmc|default] [--steps N] [--gaussians N] [--max-side PX] [--marks S,S,...]
 
 FOLDER holds a transforms.json without distortion and its photos, with a sparse cloud. As in gsplat's own trainer: L1 with
 0.2 D-SSIM, harmonics up to degree 3, its learning rates and starting values, its MCMC strategy under a cap of Gaussians
@@ -15,7 +15,7 @@ import pathlib
 import time
 
 
-def dataset(folder):
+def dataset(folder, max_side):
     """Photos [height, width, 3] in 0 to 1, world-to-camera matrices, intrinsics, points [n, 3] and their colors."""
     import numpy as np
     from PIL import Image
@@ -25,7 +25,13 @@ def dataset(folder):
         raise ValueError("the photos are distorted")
     intrinsics = np.array([[about["fl_x"], 0, about["cx"]], [0, about["fl_y"], about["cy"]], [0, 0, 1]])
     frames = sorted(about["frames"], key=lambda frame: frame["file_path"])
-    photos = [np.asarray(Image.open(folder / f["file_path"]).convert("RGB"), dtype=np.float32) / 255 for f in frames]
+    images = [Image.open(folder / f["file_path"]).convert("RGB") for f in frames]
+    size = images[0].size
+    scale = min(1.0, max_side / max(size))
+    small = tuple(round(side * scale) for side in size)
+    intrinsics[0] *= small[0] / size[0]
+    intrinsics[1] *= small[1] / size[1]
+    photos = [np.asarray(image.resize(small, Image.BOX), dtype=np.float32) / 255 for image in images]
     # The file's cameras look along -z with y up; gsplat's along z with y down.
     poses = [np.array(f["transform_matrix"]) @ np.diag([1, -1, -1, 1]) for f in frames]
     head, body = (folder / about["ply_file_path"]).read_bytes().split(b"end_header\n", 1)
@@ -49,13 +55,13 @@ def ssim(a, b):
     return (((2 * ma * mb + c1) * (2 * (ab - ma * mb) + c2)) / ((ma**2 + mb**2 + c1) * (aa - ma**2 + bb - mb**2 + c2))).mean()
 
 
-def train(folder, mcmc, steps, gaussians, marks):
+def train(folder, mcmc, steps, gaussians, max_side, marks):
     import numpy as np
     import torch
     from gsplat import DefaultStrategy, MCMCStrategy, rasterization
 
     torch.manual_seed(0)
-    photos, cameras, intrinsics, at, colors = dataset(folder)
+    photos, cameras, intrinsics, at, colors = dataset(folder, max_side)
     height, width = photos[0].shape[:2]
     tensor = lambda a: torch.tensor(np.asarray(a), dtype=torch.float32, device="cuda")
     photos, cameras, intrinsics, at = [tensor(p) for p in photos], [tensor(c) for c in cameras], tensor(intrinsics)[None], tensor(at)
@@ -138,6 +144,7 @@ def main():
     parser.add_argument("--strategy", choices=["mcmc", "default"], default="mcmc")
     parser.add_argument("--steps", type=int, default=3000)
     parser.add_argument("--gaussians", type=int, default=45_000)
+    parser.add_argument("--max-side", type=int, default=512)
     parser.add_argument("--marks", default="1,2,4,8,16,32")
     args = parser.parse_args()
     try:
@@ -148,7 +155,7 @@ def main():
             raise ImportError("torch sees no GPU")
         marks = [float(s) for s in args.marks.split(",")]
         about = {"gsplat": gsplat.__version__, "device": torch.cuda.get_device_name()}
-        print(json.dumps({**about, **train(args.folder, args.strategy == "mcmc", args.steps, args.gaussians, marks)}))
+        print(json.dumps({**about, **train(args.folder, args.strategy == "mcmc", args.steps, args.gaussians, args.max_side, marks)}))
     except ImportError as why:
         print(json.dumps({"missing": str(why)}))
 

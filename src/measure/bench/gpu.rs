@@ -85,7 +85,7 @@ fn on_gpu(
     Ok([median(&bytes), staying])
 }
 
-/// Makes `repeats` training steps on one photo, after one that does not count. The whole is the mean over steps
+/// Makes `repeats` training steps on one photo, after some that do not count. The whole is the mean over steps
 /// that follow each other without waiting.
 pub fn training_step(
     device: &Device,

@@ -322,7 +322,10 @@ impl<'a> Job<'a> {
         }
         let count = self.trainer.cloud.len();
         let trainer = &mut self.trainer;
-        let scores = scores(&self.tests, |camera| trainer.draw(camera)).map_err(|e| self.failed(e))?;
+        let scores = scores(&self.tests, |camera| trainer.draw(camera)).map_err(|e| match e {
+            StepError::Render(e) => TrainError::Render("held-out".into(), e),
+            e => self.failed(e),
+        })?;
         let e = Evaluation::of(scores, count, self.trainer.step, self.secs);
         self.history.evaluations.push(e.clone());
         observer.evaluation(e);
@@ -354,15 +357,15 @@ impl<'a> Job<'a> {
         self.trainer.fetch_cloud()?;
         let checkpoint = self.checkpoint();
         let scored = self.history.evaluations.last().is_some_and(|e| e.step == self.trainer.step);
-        if end == TrainEnd::Finished && !scored {
-            self.evaluate(observer)?;
-        }
+        // What fails here is told when the scene is saved.
+        let evaluated = if end == TrainEnd::Finished && !scored { self.evaluate(observer) } else { Ok(()) };
         if let Some(scene) = &self.scene {
             self.info.history = self.history.clone();
             let map = objects_for(scene, &self.trainer.cloud, observer).map_err(TrainError::Save)?;
             scene.save(&self.info, &self.trainer.cloud, map.as_ref()).map_err(TrainError::Save)?;
         }
         checkpoint?;
+        evaluated?;
         let cloud = Arc::new(self.trainer.cloud);
         observer.cloud(Arc::clone(&cloud), self.trainer.step);
         Ok(TrainOutcome {

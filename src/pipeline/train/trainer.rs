@@ -131,13 +131,16 @@ impl Trainer {
         RenderSettings { sh_degree: self.cloud.sh_degree, ..self.settings.clone() }
     }
 
-    /// A view of the Gaussians as they are, by what trains them.
+    /// A view of the Gaussians as they are, by what trains them; by the CPU where a GPU has no room for it.
     pub(crate) fn draw(&mut self, camera: &Camera) -> Result<Frame<f32>, StepError> {
         let settings = self.render_settings();
-        Ok(match &mut self.device {
-            Some(device) => device.draw(camera, &settings)?,
-            None => self.renderer.render(&self.cloud, Features::NONE, camera, &settings)?,
-        })
+        if let Some(device) = &mut self.device {
+            match device.draw(camera, &settings) {
+                Ok(frame) => return Ok(frame),
+                Err(_) => self.fetch_cloud()?,
+            }
+        }
+        Ok(self.renderer.render(&self.cloud, Features::NONE, camera, &settings)?)
     }
 
     /// One step on the next photo of the round. Returns what is known by now and was not returned

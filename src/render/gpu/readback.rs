@@ -2,13 +2,16 @@
 
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::time::Duration;
 
 use super::{Device, GpuError};
 
 /// Most bytes of memory for copies that are kept; making it anew takes longer than a small copy does.
-const KEPT_BYTES: u64 = 128 << 20;
+const KEPT_BYTES: u64 = 256 << 20;
+/// Longer than any driver takes to hand over memory that it has written.
+const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Memory for copies that nobody uses, by size.
+/// Memory for copies that nobody uses, in the order in which it was given back.
 #[derive(Clone, Debug, Default)]
 pub(super) struct StagingPool(Arc<Mutex<Vec<wgpu::Buffer>>>);
 
@@ -16,17 +19,20 @@ impl StagingPool {
     /// The smallest that holds `bytes`, unless it is far too large.
     fn take(&self, bytes: u64) -> Option<wgpu::Buffer> {
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let at = kept.partition_point(|b| b.size() < bytes);
-        (kept.get(at)?.size() / 4 <= bytes.max(4096)).then(|| kept.remove(at))
+        let fits = |b: &wgpu::Buffer| b.size() >= bytes && b.size() / 4 <= bytes.max(4096);
+        let (at, _) = kept.iter().enumerate().filter(|(_, b)| fits(b)).min_by_key(|(_, b)| b.size())?;
+        Some(kept.remove(at))
     }
 
-    /// Keeps a buffer; the largest go where they are too many.
+    /// Keeps a buffer unless it is huge; those that were not used for longest go where they are too many.
     fn give(&self, buffer: wgpu::Buffer) {
+        if buffer.size() > KEPT_BYTES {
+            return;
+        }
         let mut kept = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let at = kept.partition_point(|b| b.size() < buffer.size());
-        kept.insert(at, buffer);
+        kept.push(buffer);
         while kept.iter().map(wgpu::Buffer::size).sum::<u64>() > KEPT_BYTES {
-            kept.pop();
+            kept.remove(0);
         }
     }
 }
@@ -93,7 +99,9 @@ impl Device {
             let _ = sender.send(r);
         });
         self.wait_for(Some(submitted))?;
-        let mapped = receiver.try_recv().map_err(|_| GpuError::Lost("a copy to the host never ended".to_owned()))?;
+        // Another thread may have waited for it too, and be about to say so.
+        let mapped =
+            receiver.recv_timeout(PATIENCE).map_err(|_| GpuError::Lost("a copy to the host never ended".to_owned()))?;
         mapped.map_err(|e| GpuError::Lost(format!("a copy to the host failed: {e}")))?;
         let view = staging.get_mapped_range(..).map_err(|e| GpuError::Refused(e.to_string()))?;
         Ok(Copies { pool: pool.clone(), staging, view: Some(view), spans })
@@ -125,12 +133,34 @@ mod tests {
         let again = device.read(&[(&many, 4000)]).expect("read");
         assert_eq!((kept(), again.values::<u32>(0)[999]), (1, 999));
         drop(again);
-        // A tiny copy does not hold on to a huge buffer, and not everything is kept.
-        let large = device.storage("much", 96 << 20).expect("fits");
+        // A tiny copy does not hold on to a huge buffer, and what was not used for longest goes first.
+        let large = device.storage("much", 100 << 20).expect("fits");
         drop(device.read(&[(&large, 96 << 20)]).expect("read"));
         assert_eq!(device.read(&[(&few, 4)]).expect("read").staging.size(), 20);
-        drop([device.read(&[(&large, 64 << 20)]).expect("read"), device.read(&[(&large, 80 << 20)]).expect("read")]);
-        let sizes: u64 = device.staging().0.lock().expect("free").iter().map(wgpu::Buffer::size).sum();
+        drop([device.read(&[(&large, 97 << 20)]).expect("read"), device.read(&[(&large, 98 << 20)]).expect("read")]);
+        let sizes: Vec<u64> = device.staging().0.lock().expect("free").iter().map(wgpu::Buffer::size).collect();
+        assert!(
+            sizes.contains(&(97 << 20)) && sizes.contains(&(98 << 20)) && !sizes.contains(&(96 << 20)),
+            "{sizes:?}"
+        );
+        let sizes: u64 = sizes.iter().sum();
         assert!(sizes <= KEPT_BYTES, "{sizes}");
+    }
+
+    #[test]
+    fn threads_that_read_at_once_all_get_their_own() {
+        let Ok(device) = Device::new() else { return };
+        std::thread::scope(|scope| {
+            for t in 0..4_u32 {
+                let device = &device;
+                scope.spawn(move || {
+                    let values: Vec<u32> = (0..500).map(|i| i * 7 + t).collect();
+                    let buffer = device.storage_with("numbers", bytemuck::cast_slice(&values)).expect("fits");
+                    for _ in 0..50 {
+                        assert_eq!(device.read(&[(&buffer, 2000)]).expect("read").values::<u32>(0), values);
+                    }
+                });
+            }
+        });
     }
 }

@@ -142,7 +142,7 @@ impl GpuRenderer {
     pub(crate) fn device_bytes(&self) -> u64 {
         let sizes = |buffers: &[&wgpu::Buffer]| buffers.iter().map(|b| b.size()).sum::<u64>();
         let [a, b, c] = &self.cloud.buffers;
-        sizes(&[a, b, c, &self.features]) + self.rasterizer.device_bytes()
+        sizes(&[a, b, c, &self.features, &self.labels.found, &self.pack.bytes]) + self.rasterizer.device_bytes()
     }
 
     /// Uploads `cloud` and draws it as `camera` sees it.
@@ -205,7 +205,8 @@ impl GpuRenderer {
         let pixels = pixels_of(camera);
         self.labels.prepare(&self.device, pixels)?;
         loop {
-            if !self.drawn.as_ref().is_some_and(|d| d.camera == *camera && d.settings.sees_like(settings)) {
+            let known = self.drawn.as_ref().is_some_and(|d| d.camera == *camera && d.settings.sees_like(settings));
+            if !known {
                 self.submit(camera, settings, After::Nothing)?;
             }
             let mut recorder = Recorder::new(&self.device, None);
@@ -213,7 +214,7 @@ impl GpuRenderer {
             recorder.submit();
             let counters = (&self.rasterizer.counters, size_of::<Counters>() as u64);
             let copies = self.device.read(&[counters, (&self.labels.found, pixels * 12)])?;
-            if self.settle(camera, settings, counters_of(&copies))? {
+            if known || self.settle(camera, settings, counters_of(&copies))? {
                 let winner = |[label, share, alpha]: &[u32; 3]| LabelWinner {
                     label: *label,
                     share: f32::from_bits(*share),
