@@ -147,16 +147,14 @@ impl Reading<'_> {
     }
 
     fn harmonics(&self, degree: u8, dc: [&Column; 3], rest: &[&Column], to: &mut Vec<[f32; 3]>) -> Result<(), IoError> {
-        let stride = coefficients(degree);
+        let (before, stride) = (to.len(), coefficients(degree));
         let per_channel = stride - 1;
-        let before = to.len();
-        to.par_extend((0..self.table.rows * stride).into_par_iter().map(|at| {
-            let row = self.table.row(at / stride);
-            match at % stride {
-                0 => dc.map(|c| c.f32(row)),
-                k => [0, 1, 2].map(|channel| rest[channel * per_channel + k - 1].f32(row)),
-            }
-        }));
+        match degree {
+            0 => self.coefficients::<1>(dc, rest, to),
+            1 => self.coefficients::<4>(dc, rest, to),
+            2 => self.coefficients::<9>(dc, rest, to),
+            _ => self.coefficients::<16>(dc, rest, to),
+        }
         let sh = &to[before..];
         if !all_finite(sh) {
             let at = sh.iter().position(|v| v.iter().any(|x| !x.is_finite())).unwrap_or(0);
@@ -168,6 +166,17 @@ impl Reading<'_> {
             return Err(self.not_finite(at / stride, name));
         }
         Ok(())
+    }
+
+    /// Adds `N` coefficients of each row. Known to the compiler, their number costs no division for each.
+    fn coefficients<const N: usize>(&self, dc: [&Column; 3], rest: &[&Column], to: &mut Vec<[f32; 3]>) {
+        to.par_extend((0..self.table.rows * N).into_par_iter().map(|at| {
+            let row = self.table.row(at / N);
+            match at % N {
+                0 => dc.map(|c| c.f32(row)),
+                k => [0, 1, 2].map(|channel| rest[channel * (N - 1) + k - 1].f32(row)),
+            }
+        }));
     }
 
     fn extras(&self, to: &mut Vec<ExtraProperty>) {

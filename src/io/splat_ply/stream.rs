@@ -13,7 +13,7 @@ use crate::scene::GaussianCloud;
 /// Bytes in which the header must end.
 const HEADER_BYTES: u64 = 64 << 10;
 /// Bytes of rows that are in memory at once.
-const BLOCK_BYTES: usize = 16 << 20;
+const BLOCK_BYTES: usize = 4 << 20;
 
 /// The id of the scene's state that a `.ply` belongs to, if it says.
 pub(crate) fn state(path: &Path) -> Result<Option<String>, IoError> {
@@ -48,17 +48,27 @@ pub(crate) fn read(path: &Path) -> Result<Option<GaussianCloud>, IoError> {
     file.seek(SeekFrom::Start(header as u64)).map_err(failed)?;
     let mut cloud: Option<GaussianCloud> = None;
     let in_block = (BLOCK_BYTES / stride).max(1);
-    let mut block = vec![0; in_block.min(rows) * stride];
+    // One block is read while the one before becomes Gaussians.
+    let mut read = |first: usize, block: &mut Vec<u8>| {
+        block.resize(in_block.min(rows.saturating_sub(first)) * stride, 0);
+        file.read_exact(block).map_err(failed)
+    };
+    let (mut block, mut next) = (Vec::new(), Vec::new());
+    read(0, &mut block)?;
     for first in (0..rows).step_by(in_block) {
-        let n = in_block.min(rows - first);
-        let block = &mut block[..n * stride];
-        file.read_exact(block).map_err(failed)?;
-        let part = Table { rows: n, stride, columns: columns.clone(), data: Cow::Borrowed(block) };
-        let reading = Reading { ply: &ply, table: &part, first };
-        match &mut cloud {
-            Some(cloud) => reading.append_to(cloud)?,
-            None => cloud = Some(reading.cloud()?.with_room(rows)),
-        }
+        let append = || -> Result<(), IoError> {
+            let data = Cow::Borrowed(block.as_slice());
+            let part = Table { rows: block.len() / stride, stride, columns: columns.clone(), data };
+            let reading = Reading { ply: &ply, table: &part, first };
+            match &mut cloud {
+                Some(cloud) => reading.append_to(cloud)?,
+                None => cloud = Some(reading.cloud()?.with_room(rows)),
+            }
+            Ok(())
+        };
+        let (appended, was_read) = rayon::join(append, || read(first + in_block, &mut next));
+        appended.and(was_read)?;
+        std::mem::swap(&mut block, &mut next);
     }
     Ok(cloud)
 }
