@@ -15,12 +15,9 @@
 // [pixel]: label, bits of its group's share, bits of alpha.
 @group(0) @binding(6) var<storage, read_write> found: array<u32>;
 
-// Labels that compete for one pixel; the least is dropped.
-const COMPETITORS: u32 = 8u;
 const BATCH: u32 = 256u;
-// A label of which nothing is known is a group of its own.
-const UNKNOWN: u32 = 0xffffffffu;
 
+// A label of which nothing is known is a group of its own.
 fn group_of(label: u32) -> u32 {
     if label < arrayLength(&groups) {
         return groups[label];

@@ -47,6 +47,7 @@ pub fn all() -> Vec<Seed> {
         ("checkpoint", "none.bin", checkpoint(&header(0, 0))),
         ("checkpoint", "two.bin", checkpoint(&header(2, 1))),
         ("checkpoint", "two_summed.bin", summed(checkpoint(&header(2, 1)))),
+        ("checkpoint", "two_today.bin", today(checkpoint(&header(2, 1)), 2)),
         ("followed_frame", "small.frame", frame()),
     ];
     let networks = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/networks");
@@ -231,6 +232,14 @@ fn checkpoint(header: &Header) -> Vec<u8> {
 /// The same as the second version wrote it: with a checksum at its end.
 fn summed(mut checkpoint: Vec<u8>) -> Vec<u8> {
     checkpoint[7] = b'2';
+    checkpoint.extend([0; 32]);
+    super::repair::repaired(checkpoint)
+}
+
+/// The same as it is written today: without an array of one number for each of its `count` Gaussians.
+fn today(mut checkpoint: Vec<u8>, count: usize) -> Vec<u8> {
+    checkpoint[7] = b'3';
+    checkpoint.truncate(checkpoint.len() - 4 * count);
     checkpoint.extend([0; 32]);
     super::repair::repaired(checkpoint)
 }

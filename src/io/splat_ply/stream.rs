@@ -12,7 +12,7 @@ use crate::scene::GaussianCloud;
 
 /// Bytes in which the header must end.
 const HEADER_BYTES: u64 = 64 << 10;
-/// Bytes of rows that are in memory at once.
+/// Bytes of a block of rows, of which two are in memory at once.
 const BLOCK_BYTES: usize = 4 << 20;
 
 /// The id of the scene's state that a `.ply` belongs to, if it says.

@@ -6,11 +6,11 @@ use rayon::prelude::*;
 
 use crate::math::finite::{CHECKED, all_finite};
 use crate::math::lanes::Lane;
-use crate::render::{ContributionSink, RenderError, RenderSettings, Renderer, TILE_PX};
+use crate::render::{self, ContributionSink, RenderError, RenderSettings, Renderer, TILE_PX};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, NOBODY, SemanticMap};
 
 /// A pixel about which nothing is known.
-pub(crate) const UNKNOWN: IdentityId = IdentityId::MAX;
+pub(crate) const UNKNOWN: IdentityId = render::UNKNOWN;
 
 /// Most identities that a Gaussian keeps votes for.
 const KEPT: usize = 8;

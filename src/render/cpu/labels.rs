@@ -1,14 +1,15 @@
-//! Which label wins each pixel, and which have how much of it: sums of the weights `alpha * transmittance` of the Gaussians that carry them.
+//! Which label wins each pixel, and which have how much of it: sums of the weights `alpha * transmittance` of the
+//! Gaussians that carry them.
 
 use super::CpuRenderer;
 use crate::math::lanes::Lane;
 use crate::render::{ContributionSink, RenderError, RenderSettings, TILE_PX};
 use crate::scene::{Camera, GaussianCloud};
 
-/// Labels that compete for one pixel at most; the least is dropped. `COMPETITORS` in `shaders/labels.wgsl`.
-const COMPETITORS: usize = 8;
+/// Labels that compete for one pixel at most; the least is dropped.
+pub(crate) const COMPETITORS: usize = 8;
 /// Stands for a label of which nothing is known, a group of its own.
-const UNKNOWN: u32 = u32::MAX;
+pub(crate) const UNKNOWN: u32 = u32::MAX;
 
 /// The label that wins a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -20,6 +21,7 @@ pub struct LabelWinner {
     /// Weight of all labels.
     pub alpha: f32,
 }
+
 /// What a pixel's light belongs to: labels with their accumulated weights. Free places weigh nothing.
 pub type PixelWeights = [(u32, f32); COMPETITORS];
 

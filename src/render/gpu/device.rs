@@ -231,6 +231,14 @@ impl Device {
         self.buffer(what, bytes, usage)
     }
 
+    /// Makes room for `bytes` in a storage buffer, whose contents may be lost.
+    pub(super) fn grow(&self, buffer: &mut wgpu::Buffer, what: &str, bytes: u64) -> Result<(), GpuError> {
+        if buffer.size() < bytes {
+            *buffer = self.storage(what, bytes)?;
+        }
+        Ok(())
+    }
+
     pub(super) fn storage_with(&self, what: &str, contents: &[u8]) -> Result<wgpu::Buffer, GpuError> {
         let buffer = self.storage(what, contents.len() as u64)?;
         self.queue.write_buffer(&buffer, 0, contents);

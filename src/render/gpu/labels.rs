@@ -23,11 +23,7 @@ impl LabelPass {
 
     /// Makes room for a picture.
     pub(crate) fn prepare(&mut self, device: &Device, pixels: u64) -> Result<(), GpuError> {
-        let bytes = pixels * 12;
-        if self.found.size() < bytes {
-            self.found = device.storage("labels of the picture", bytes)?;
-        }
-        Ok(())
+        device.grow(&mut self.found, "labels of the picture", pixels * 12)
     }
 
     /// Records the pass over the lists of a frame; `of` has a label for each Gaussian, `groups` the group of each label.

@@ -23,11 +23,7 @@ impl Pack {
     /// Makes room for a picture.
     pub(crate) fn prepare(&mut self, device: &Device, pixels: u64) -> Result<(), GpuError> {
         // Four pixels are written together.
-        let bytes = pixels.div_ceil(4) * 12;
-        if self.bytes.size() < bytes {
-            self.bytes = device.storage("bytes of the picture", bytes)?;
-        }
-        Ok(())
+        device.grow(&mut self.bytes, "bytes of the picture", pixels.div_ceil(4) * 12)
     }
 
     /// Records the packing of a frame of `pixels`.

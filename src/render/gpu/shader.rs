@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::GpuError;
+use crate::render::cpu::labels::{COMPETITORS, UNKNOWN};
 use crate::render::{ALPHA_MAX, ALPHA_MIN, BLUR_PX2, COLOR_MAX, TILE_PX, TRANSMITTANCE_MIN};
 
 macro_rules! files {
@@ -101,6 +102,7 @@ fn constants(variant: ShaderVariant) -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(out, "const {name}: f32 = {:e};", value as f32);
     }
+    let _ = writeln!(out, "const COMPETITORS: u32 = {COMPETITORS}u;\nconst UNKNOWN: u32 = {UNKNOWN}u;");
     let _ =
         writeln!(out, "const CHANNELS: u32 = {}u;\nconst SLOTS: u32 = {}u;", variant.channels, variant.channels.max(1));
     out

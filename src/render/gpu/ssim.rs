@@ -73,7 +73,6 @@ pub(crate) struct Ssim {
     maps: wgpu::Buffer,
     partials: wgpu::Buffer,
     ring: wgpu::Buffer,
-    capacity: [usize; 2],
 }
 
 impl Ssim {
@@ -90,7 +89,6 @@ impl Ssim {
             maps: device.storage("derivatives of SSIM", 0)?,
             partials: device.storage("sums of the loss", 0)?,
             ring: device.storage("losses of steps", RING as u64 * SLOT_BYTES)?,
-            capacity: [0, 0],
         })
     }
 
@@ -104,14 +102,8 @@ impl Ssim {
         lambda: f64,
     ) -> Result<(), GpuError> {
         let [pixels, tiles] = extent(size_px);
-        if self.capacity[0] < pixels {
-            self.maps = device.storage("derivatives of SSIM", pixels as u64 * 36)?;
-            self.capacity[0] = pixels;
-        }
-        if self.capacity[1] < tiles {
-            self.partials = device.storage("sums of the loss", tiles as u64 * 16)?;
-            self.capacity[1] = tiles;
-        }
+        device.grow(&mut self.maps, "derivatives of SSIM", pixels as u64 * 36)?;
+        device.grow(&mut self.partials, "sums of the loss", tiles as u64 * 16)?;
         let values = (pixels * 3) as f64;
         let loss = Loss {
             size_px,

@@ -246,8 +246,6 @@ impl GpuTrainer {
 
     /// Draws the cloud as it is. Waits for the device.
     pub(crate) fn draw(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<Frame<f32>, GpuError> {
-        // Losses in the ring are of pictures that were drawn before.
-        self.fetch()?;
         loop {
             self.rasterizer.prepare(&self.device, camera, settings, self.shape, 0)?;
             let mut recorder = Recorder::new(&self.device, None);
