@@ -344,6 +344,26 @@ fn bytes_are_those_of_the_frame() {
 }
 
 #[test]
+fn a_picture_that_stays_on_the_device_is_the_same() {
+    with_context(|context| {
+        // Rows that end where those of textures do, and rows that do not.
+        for size in [[51, 37], [64, 9], [193, 40]] {
+            let scene = Scene::new(300, 2, 0, size);
+            let cloud = scene.cloud.cast::<f32>();
+            let mut gpu = GpuRenderer::new(context).unwrap();
+            gpu.upload(&cloud, Features::NONE).unwrap();
+            let bytes = gpu.draw_rgb8(&scene.camera, &scene.settings).unwrap();
+            let picture = gpu.draw_texture(&scene.camera, &scene.settings).unwrap();
+            // What is drawn later leaves it alone.
+            let darker = RenderSettings { sh_degree: 0, background: [0.9; 3], ..scene.settings.clone() };
+            let other = gpu.draw_texture(&scene.camera, &darker).unwrap().to_rgb8().unwrap();
+            assert_eq!(picture.to_rgb8().unwrap(), bytes, "{size:?}");
+            assert_ne!(other, bytes);
+        }
+    });
+}
+
+#[test]
 fn labels_win_the_pixels_that_they_win_on_the_cpu() {
     with_context(|context| {
         let scene = Scene::new(600, 0, 0, [150, 110]);

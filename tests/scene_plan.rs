@@ -171,6 +171,7 @@ fn looked_at(cloud: &GaussianCloud, map: Option<&SemanticMap>, plan: &ScenePlan,
         follow: false,
         codes: false,
         skip: SkipPasses::of(plan),
+        on_device: false,
         timed: false,
         ticket: 1,
     });

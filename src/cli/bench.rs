@@ -42,9 +42,12 @@ pub(crate) struct BenchArgs {
     /// Time the GPU beside the CPU, even a software one
     #[arg(long)]
     gpu: bool,
-    /// Time this many typed queries too, on a made-up view of 1008 x 567 px with 300 objects and parts
+    /// Time this many typed queries too, on a made-up view of 1008 x 567 px
     #[arg(long, value_name = "COUNT", value_parser = number::within(1..=100_000_000_usize))]
     queries: Option<usize>,
+    /// Objects and parts of that view
+    #[arg(long, value_name = "COUNT", default_value_t = 300, requires = "queries", value_parser = number::within(1..=100_000_usize))]
+    identities: usize,
     /// Time this network on the masks of everything in a photo: a model's name, or the path of its description
     #[arg(long, value_name = "MODEL")]
     masks: Option<String>,
@@ -90,7 +93,7 @@ pub(crate) fn run(args: BenchArgs, quiet: bool) -> Result<(), CliError> {
         max_side_px: args.max_side,
         repeats: args.repeats as usize,
         gpu: args.gpu,
-        queries: args.queries,
+        queries: args.queries.map(|count| (count, args.identities)),
         masks: args.masks.map(|model| (model, args.mask_grid, args.photo)),
         strokes: args.strokes,
         moving: args.moving,

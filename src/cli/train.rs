@@ -89,6 +89,9 @@ pub(crate) struct TrainOverrides {
     /// Gaussians to start from where the dataset has no sparse points [default: 20000]
     #[arg(long, value_parser = number::within(1..=10_000_000_usize))]
     pub(crate) random_points: Option<usize>,
+    /// Weight of the mean opacity in the loss, which lets Gaussians fade that no photo needs [default: 0.01]
+    #[arg(long, value_parser = number::within(0.0..=1e6))]
+    pub(crate) opacity_weight: Option<f64>,
     /// Antialias (the 2-D filter of Mip-Splatting)
     #[arg(long)]
     pub(crate) antialias: bool,
@@ -130,6 +133,7 @@ impl TrainOverrides {
             densify: base.densify && !self.no_densify,
             max_gaussians: self.max_gaussians.or(base.max_gaussians),
             random_points: self.random_points.unwrap_or(base.random_points),
+            opacity_weight: self.opacity_weight.unwrap_or(base.opacity_weight),
             antialias: base.antialias || self.antialias,
             seed: self.seed.unwrap_or(base.seed),
             eval_every: self.eval_every.unwrap_or(base.eval_every),

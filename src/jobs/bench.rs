@@ -18,9 +18,7 @@ use crate::pipeline::train::{TrainConfig, TrainView, load_views};
 use crate::render::{Device, RenderSettings};
 use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, MaskGrid, NOBODY, PhotoPixels};
 
-/// Objects and parts of the view that is asked.
-const QUERY_IDENTITIES: usize = 300;
-/// Its size in px.
+/// Size in px of the view that is asked.
 const QUERY_SIZE: [usize; 2] = [1_008, 567];
 /// Size of the view in which strokes are drawn.
 const STROKES_SIZE: [u32; 2] = [640, 480];
@@ -39,8 +37,8 @@ pub(crate) struct BenchRequest {
     pub(crate) repeats: usize,
     /// Whether the GPU is timed beside the CPU.
     pub(crate) gpu: bool,
-    /// So many queries are timed.
-    pub(crate) queries: Option<usize>,
+    /// So many queries are timed, of a view with so many objects and parts.
+    pub(crate) queries: Option<(usize, usize)>,
     /// Network whose masks of everything in a photo are timed, and the photo, else one is made up.
     pub(crate) masks: Option<(String, MaskGrid, Option<PathBuf>)>,
     /// So many strokes that select are timed in each scene.
@@ -56,9 +54,9 @@ pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result
     let gpu_name = device.as_ref().map(Device::describe);
     let one_core_products_per_sec = bench::one_core_limit();
     let mut timings = Timings { gpu: gpu_name, one_core_products_per_sec, ..Timings::default() };
-    if let Some(count) = request.queries {
+    if let Some((count, identities)) = request.queries {
         let mut encoder = models::encoder(models::DEMO)?;
-        timings.queries = Some(query::time(encoder.as_mut(), QUERY_IDENTITIES, QUERY_SIZE, count)?);
+        timings.queries = Some(query::time(encoder.as_mut(), identities, QUERY_SIZE, count)?);
     }
     if let Some((model, grid, photo)) = &request.masks {
         observer.note(Severity::Info, format!("Finding everything in a photo with {model}"));

@@ -21,7 +21,7 @@ pub(crate) use cpu::ssim::{LossParts, PhotoLoss, ssim};
 pub(crate) use cpu::{RenderStats, normals, validate};
 pub(crate) use gpu::timing::StageTimes;
 pub use gpu::trainer::{GpuTrainer, StepLoss, TrainerSettings};
-pub use gpu::{Device, DevicePhoto, GpuError, real_gpu};
+pub use gpu::{Device, DevicePhoto, DevicePicture, GpuError, real_gpu};
 pub use renderer::{BackendChoice, DifferentiableRenderer, DrawError, FrameCost, Renderer, instead_of_gpu};
 
 use serde::{Deserialize, Serialize};

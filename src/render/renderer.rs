@@ -5,7 +5,7 @@ use std::sync::{Arc, Weak};
 use serde::{Deserialize, Serialize};
 
 use super::cpu::labels::{self, LabelWinner, PixelWeights};
-use super::gpu::{self, Device, GpuError};
+use super::gpu::{self, Device, DevicePicture, GpuError};
 use super::lod::Cut;
 use super::{ContributionSink, Features, Frame, RenderError, RenderSettings, RenderStats, StageTimes, cpu};
 use crate::scene::{Camera, GaussianCloud};
@@ -181,6 +181,17 @@ impl Renderer {
             Some(gpu) => Ok(gpu.renderer.draw_rgb8(camera, settings)?),
             None => Ok(self.render(cloud, Features::NONE, camera, settings)?.to_rgb8()),
         }
+    }
+
+    /// As [`Self::draw_rgb8`] where a GPU draws, but the colors stay there; `None` on the CPU.
+    pub(crate) fn draw_texture(
+        &mut self,
+        cloud: &Arc<GaussianCloud>,
+        camera: &Camera,
+        settings: &RenderSettings,
+    ) -> Result<Option<DevicePicture>, DrawError> {
+        let gpu = self.holding(cloud, camera, settings)?;
+        Ok(gpu.map(|gpu| gpu.renderer.draw_texture(camera, settings)).transpose()?)
     }
 
     /// The label that wins each pixel, row-major: `of` has one for each Gaussian of `cloud`, `groups` the group of each

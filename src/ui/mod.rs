@@ -102,11 +102,10 @@ fn open(
         "fmlgs",
         options,
         Box::new(|cc| {
-            if let Some(window) = &cc.wgpu_render_state {
-                Device::adopt(&window.adapter, &window.device, &window.queue);
-            }
+            let shared = cc.wgpu_render_state.clone().filter(|w| Device::adopt(&w.adapter, &w.device, &w.queue));
             let first = first.into_iter().map(Action::from);
             let mut app = app::App::new(cc, PipelineJobs::new(Folders::of_user()), first)?;
+            shared.into_iter().for_each(|window| app.viewport.share(window));
             app.override_plan(overrides);
             Ok(Box::new(app))
         }),

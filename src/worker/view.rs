@@ -249,6 +249,7 @@ mod tests {
                 follow: false,
                 codes: true,
                 skip: SkipPasses { depth: false, parts: false, gpu: true, buffers: false, levels: true },
+                on_device: false,
                 timed: false,
                 ticket,
             });

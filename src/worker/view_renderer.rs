@@ -10,7 +10,7 @@ use super::thread::panic_failure;
 use super::view_modes::{self, ViewMode};
 use super::view_request::{QualityBudget, SecondPicture, ViewPicture, ViewRequest, ViewResult};
 use crate::render::lod::{Cut, LodTree};
-use crate::render::{self, BackendChoice, Frame, RenderSettings, Renderer};
+use crate::render::{self, BackendChoice, DevicePicture, Frame, RenderSettings, Renderer};
 use crate::scene::Camera;
 
 /// Moving frames are no smaller than this, px of their longer side: below, one does not see where one flies.
@@ -42,6 +42,7 @@ struct Speed {
 /// What was drawn of a view.
 enum Painting {
     Colors(Vec<[u8; 3]>),
+    Texture(DevicePicture),
     Frame(Box<Frame<f32>>),
 }
 
@@ -116,7 +117,7 @@ impl ViewRenderer {
             return Ok(Arc::new(drawn));
         };
         let mode = request.second.unwrap_or(request.mode);
-        let other = ViewRequest { cloud, settings, mode, second: None, ..request.clone() };
+        let other = ViewRequest { cloud, settings, mode, second: None, on_device: false, ..request.clone() };
         let painter = self.beside.get_or_insert_with(|| Box::new(Self::without_gpu(self.without_gpu)));
         let _ = painter.sees(&other);
         let ViewPicture { rgb, depth_range, psnr, .. } = painter.draw_at(&other, camera, shares)?;
@@ -150,8 +151,14 @@ impl ViewRenderer {
         }
         let stages = self.renderer.stage_times();
         let start = Instant::now();
+        let nothing = view_modes::Drawn::default;
+        let mut texture = None;
         let (drawn, second, median_depth) = match drawn {
-            Painting::Colors(rgb) => (view_modes::Drawn { rgb, ..view_modes::Drawn::default() }, None, None),
+            Painting::Colors(rgb) => (view_modes::Drawn { rgb, ..nothing() }, None, None),
+            Painting::Texture(picture) => {
+                texture = Some(picture);
+                (nothing(), None, None)
+            }
             Painting::Frame(frame) => {
                 let paint = |mode| view_modes::paint(&frame, mode, request.photo.as_deref());
                 let second = request.second.map(|mode| {
@@ -168,6 +175,7 @@ impl ViewRenderer {
             full,
             camera,
             rgb: drawn.rgb,
+            texture,
             median_depth,
             depth_range: drawn.depth_range,
             psnr: drawn.psnr,
@@ -187,7 +195,12 @@ impl ViewRenderer {
         let (renderer, cloud) = (&mut self.renderer, &request.cloud);
         // Of a moving view colors are enough, of which there is less to copy from a GPU.
         let colors = !depth && request.mode == ViewMode::Rgb && request.second.is_none() && request.photo.is_none();
+        let stays = colors && request.on_device && renderer.is_gpu();
         let draw = || match colors {
+            true if stays => {
+                let picture = renderer.draw_texture(cloud, camera, &settings)?;
+                Ok(picture.map_or_else(|| Painting::Colors(Vec::new()), Painting::Texture))
+            }
             true => renderer.draw_rgb8(cloud, camera, &settings).map(Painting::Colors),
             false => renderer.draw(cloud, camera, &settings).map(|frame| Painting::Frame(Box::new(frame))),
         };

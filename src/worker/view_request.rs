@@ -6,7 +6,7 @@ use super::Versioned;
 use super::failure::Failure;
 use super::view_modes::ViewMode;
 use crate::render::lod::MOVING_SECS;
-use crate::render::{RenderSettings, Renderer, StageTimes};
+use crate::render::{DevicePicture, RenderSettings, Renderer, StageTimes};
 use crate::scene::plan::When;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
 
@@ -37,6 +37,8 @@ pub struct ViewRequest {
     pub codes: bool,
     /// What is left out.
     pub skip: SkipPasses,
+    /// Whether the window can paint what lies on the device that draws: then moving frames stay there.
+    pub on_device: bool,
     /// Whether the stages are to be timed, where that is not free.
     pub timed: bool,
     /// Comes back with the frame.
@@ -110,8 +112,10 @@ pub struct ViewPicture {
     pub full: bool,
     /// The camera at the size that was drawn.
     pub camera: Camera,
-    /// Row-major sRGB.
+    /// Row-major sRGB; empty where the texture holds the colors.
     pub rgb: Vec<[u8; 3]>,
+    /// The colors, where they stayed on the device that drew them.
+    pub(crate) texture: Option<DevicePicture>,
     /// Median depth in scene units, row-major, 0 where there is none; `None` if not drawn.
     pub median_depth: Option<Vec<f32>>,
     /// Depths at the two ends of the color scale, in the depth mode.

@@ -44,6 +44,8 @@ def rows(steps):
                     yield [f"{what} as bytes", on, f"{t['bytes_ms']:.2f} ms", ""]
                 if t.get("staying_ms"):
                     yield [f"{what} that stays on the GPU", on, f"{t['staying_ms']:.2f} ms", ""]
+                if t.get("texture_ms"):
+                    yield [f"{what} that a window paints", on, f"{t['texture_ms']:.2f} ms", ""]
                 if t.get("labels_ms"):
                     yield ["what its pixels belong to", on, "{:.2f} ms, on the CPU {:.2f} ms".format(*t["labels_ms"]), ""]
     for name, found in steps.items():

@@ -27,7 +27,7 @@ pub struct Measurement {
     pub whole_secs: f64,
     /// Seconds of a frame of which the host gets the bytes of its colors, and of one that stays on the GPU, one after
     /// another without a wait; `None` where no GPU draws.
-    pub other_secs: Option<[f64; 2]>,
+    pub other_secs: Option<[f64; 3]>,
 }
 
 /// Draws a cloud `repeats` times, after one that does not count; the copy of the image to the host is included. On a
@@ -59,15 +59,16 @@ pub fn frame(
     Ok(Measurement { stages: medians(&stages), whole_secs: median(&secs), other_secs })
 }
 
-/// Median seconds of a frame of which the host gets bytes, and mean seconds of five times as many that stay on the GPU; in
-/// the mean is a copy of the last one's bytes, which waits for all. First a GPU that rests is given time to wake up.
+/// Median seconds of a frame of which the host gets bytes, mean seconds of five times as many that stay on the GPU, and
+/// median seconds of one that a window of the same device paints; in the mean is a copy of the last one's bytes, which
+/// waits for all. First a GPU that rests is given time to wake up.
 fn on_gpu(
     renderer: &mut Renderer,
     cloud: &Arc<GaussianCloud>,
     camera: &Camera,
     settings: &RenderSettings,
     repeats: usize,
-) -> Result<[f64; 2], DrawError> {
+) -> Result<[f64; 3], DrawError> {
     let mut many = |frames: usize| {
         let start = Instant::now();
         for _ in 1..frames {
@@ -82,7 +83,13 @@ fn on_gpu(
     }
     let staying = many(5 * repeats.max(1))?;
     let bytes = (0..repeats.max(1)).map(|_| many(1)).collect::<Result<Vec<_>, _>>()?;
-    Ok([median(&bytes), staying])
+    let textures = (0..repeats.max(1)).map(|_| {
+        let start = Instant::now();
+        renderer.draw_texture(cloud, camera, settings)?;
+        Ok::<_, DrawError>(start.elapsed().as_secs_f64())
+    });
+    let textures = textures.collect::<Result<Vec<_>, _>>()?;
+    Ok([median(&bytes), staying, median(&textures)])
 }
 
 /// Makes `repeats` training steps on one photo, after some that do not count. The whole is the mean over steps
@@ -105,6 +112,7 @@ pub fn training_step(
         opacity_logit: still,
         sh_constant: still,
         sh_rest: still,
+        per_opacity: 0.0,
     };
     let degree = cloud.sh_degree;
     let woken = Instant::now();
@@ -143,10 +151,11 @@ pub(crate) struct Timing {
     pub(crate) size: [u32; 2],
     /// Milliseconds from the call to the result, median. A frame is copied to the host in it.
     pub(crate) total_ms: f64,
-    /// Milliseconds of a frame of which the host gets bytes, and of one that stays on the device; `None` for a training
-    /// step.
+    /// Milliseconds of a frame of which the host gets bytes, of one among many that stay on the device, and of one that
+    /// a window of the same device paints; `None` for a training step.
     pub(crate) bytes_ms: Option<f64>,
     pub(crate) staying_ms: Option<f64>,
+    pub(crate) texture_ms: Option<f64>,
     /// Milliseconds of finding what the pixels of the drawn view belong to, on the device and on the CPU, medians;
     /// `None` for a training step.
     pub(crate) labels_ms: Option<[f64; 2]>,
@@ -204,12 +213,12 @@ pub(crate) fn train_steps(
 pub(super) fn timing(name: &str, gaussians: usize, size: [u32; 2], views: &[Measurement]) -> Timing {
     let stages: Vec<StageTimes> = views.iter().map(|v| v.stages.clone()).collect();
     let total_ms = median(&views.iter().map(|v| v.whole_secs).collect::<Vec<_>>()) * 1e3;
-    let other: Vec<[f64; 2]> = views.iter().filter_map(|v| v.other_secs).collect();
+    let other: Vec<[f64; 3]> = views.iter().filter_map(|v| v.other_secs).collect();
     let other_ms =
         |k: usize| (!other.is_empty()).then(|| median(&other.iter().map(|s| s[k]).collect::<Vec<_>>()) * 1e3);
-    let (bytes_ms, staying_ms) = (other_ms(0), other_ms(1));
+    let [bytes_ms, staying_ms, texture_ms] = [0, 1, 2].map(other_ms);
     let stages_ms = medians(&stages).into_iter().map(|(stage, secs)| (stage, secs * 1e3)).collect();
-    Timing { name: name.into(), gaussians, size, total_ms, bytes_ms, staying_ms, labels_ms: None, stages_ms }
+    Timing { name: name.into(), gaussians, size, total_ms, bytes_ms, staying_ms, texture_ms, labels_ms: None, stages_ms }
 }
 
 #[cfg(test)]

@@ -61,24 +61,18 @@ fn variants(base: &TrainConfig) -> Result<Variants<TrainConfig>, StudyError> {
         all.add(method, setting, &knob, turned(base, &knobs).map_err(StudyError)?);
         Ok(())
     };
-    for (times, share) in [(1, 4), (1, 2), (2, 1)] {
-        let steps = (base.steps * times / share).max(1);
-        add("steps", steps.to_string(), "steps", json!(steps))?;
-    }
-    for (times, share) in [(1, 2), (3, 4)] {
-        let side = base.max_side_px * times / share;
-        add("picture size", format!("{side} px"), "max_side_px", json!(side))?;
-    }
-    for share in [0.3, 0.6] {
-        add("half size at first", format!("{:.0} % of the steps", 100.0 * share), "coarse_share", json!(share))?;
-    }
-    for most in [5_000, 20_000, 80_000] {
+    // More of them are on the default's own curve.
+    let steps = (base.steps / 2).max(1);
+    add("steps", steps.to_string(), "steps", json!(steps))?;
+    let side = base.max_side_px / 2;
+    add("picture size", format!("{side} px"), "max_side_px", json!(side))?;
+    add("half size at first", "30 % of the steps".into(), "coarse_share", json!(0.3))?;
+    for most in [30_000, 120_000] {
         add("most Gaussians", most.to_string(), "max_gaussians", json!(most))?;
     }
     add("density control", "off".into(), "densify", json!(false))?;
-    for degree in 0..base.sh_degree {
-        add("SH bands", format!("degree {degree}"), "sh_degree", json!(degree))?;
-    }
+    add("mean opacity", "without weight".into(), "opacity_weight", json!(0.0))?;
+    add("SH bands", "degree 1".into(), "sh_degree", json!(1))?;
     add("SH schedule", "all bands from the start".into(), "sh_at_once", json!(true))?;
     add("anti-aliasing", "with the filter".into(), "antialias", json!(!base.antialias))?;
     Ok(all)

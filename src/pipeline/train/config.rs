@@ -37,6 +37,8 @@ pub struct TrainConfig {
     pub max_gaussians: Option<usize>,
     /// Gaussians to start from where the dataset has no sparse points.
     pub random_points: usize,
+    /// Weight of the mean opacity in the loss, as in 3DGS-MCMC: Gaussians that no photo needs fade.
+    pub opacity_weight: f64,
     /// Mip-Splatting's 2-D filter.
     pub antialias: bool,
     /// Seed of every random choice.
@@ -93,6 +95,9 @@ impl TrainConfig {
         }
         if self.sh_degree > 3 {
             return bad("the spherical-harmonics degree must be 0 to 3");
+        }
+        if !(self.opacity_weight.is_finite() && self.opacity_weight >= 0.0) {
+            return bad("the weight of the mean opacity must be a number, 0 or more");
         }
         let (normals, distortion) = self.geometry_weights();
         if ![normals, distortion].iter().all(|w| w.is_finite() && *w >= 0.0) {
@@ -163,6 +168,7 @@ impl Default for TrainConfig {
             densify: true,
             max_gaussians: None,
             random_points: 20_000,
+            opacity_weight: 0.01,
             antialias: false,
             seed: 0,
             eval_every: 500,

@@ -15,7 +15,7 @@ const WANTED: wgpu::Features =
 pub struct Device {
     device: wgpu::Device,
     queue: wgpu::Queue,
-    info: wgpu::AdapterInfo,
+    info: Arc<wgpu::AdapterInfo>,
     /// The first fault that no call was there to return.
     fault: Arc<Mutex<Option<GpuError>>>,
     staging: StagingPool,
@@ -132,7 +132,7 @@ impl Device {
                 keep_first(&slot, GpuError::Lost(text));
             }
         });
-        Self { device, queue, info, fault, staging: StagingPool::default() }
+        Self { device, queue, info: Arc::new(info), fault, staging: StagingPool::default() }
     }
 
     /// The device.

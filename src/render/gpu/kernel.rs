@@ -163,6 +163,11 @@ impl<'a> Recorder<'a> {
         record(&mut RecordedStage { device: self.device, pass });
     }
 
+    /// For copies.
+    pub(crate) fn encoder(&mut self) -> &mut wgpu::CommandEncoder {
+        &mut self.encoder
+    }
+
     /// Records that a buffer is filled with zeros.
     pub(crate) fn clear(&mut self, buffer: &wgpu::Buffer) {
         self.encoder.clear_buffer(buffer, 0, None);

@@ -31,6 +31,7 @@ pub(crate) mod trainer;
 pub use cloud::Parameters;
 pub use device::{Device, real_gpu};
 pub use error::GpuError;
+pub use pack::DevicePicture;
 pub use renderer::GpuRenderer;
 pub use ssim::DevicePhoto;
 pub use trainer::{GpuTrainer, TrainerSettings};

@@ -1,15 +1,51 @@
-//! A picture's colors as bytes, a quarter of what floats take to copy; `shaders/pack.wgsl`.
+//! A picture's colors as bytes, a quarter of what floats take to copy, for the host or for a texture that a window
+//! paints; `shaders/pack.wgsl`.
 
-use super::kernel::{Access, Kernel, Module, RecordedStage};
+use super::kernel::{Access, Kernel, Module, RecordedStage, Recorder};
 use super::rasterizer::GpuRasterizer;
+use super::readback::Copies;
 use super::shader::ShaderVariant;
 use super::{Device, GpuError};
+use crate::scene::Camera;
+
+/// Bytes of a pixel.
+const PIXEL: u32 = 4;
 
 /// The kernel, and room for its bytes.
 #[derive(Debug)]
 pub(crate) struct Pack {
     kernel: Kernel,
     pub(crate) bytes: wgpu::Buffer,
+}
+
+/// The colors of a picture as a texture on the device that drew it, `Rgba8Unorm`. Clones are the same texture.
+#[derive(Clone, Debug)]
+pub struct DevicePicture {
+    device: Device,
+    texture: wgpu::Texture,
+}
+
+/// Bytes from one row to the next.
+fn row_bytes(width_px: u32) -> u32 {
+    (width_px * PIXEL).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
+}
+
+/// Bytes of a picture with its rows apart.
+pub(super) fn packed_bytes(camera: &Camera) -> u64 {
+    u64::from(row_bytes(camera.width_px)) * u64::from(camera.height_px)
+}
+
+/// The pixels of packed rows, row-major.
+pub(super) fn unpacked(rows: &[u8], width_px: u32) -> Vec<[u8; 3]> {
+    let rows = rows.chunks_exact(row_bytes(width_px) as usize);
+    rows.flat_map(|row| row.as_chunks::<4>().0.iter().take(width_px as usize).map(|[r, g, b, _]| [*r, *g, *b]))
+        .collect()
+}
+
+fn rows_of(buffer: &wgpu::Buffer, size: wgpu::Extent3d) -> wgpu::TexelCopyBufferInfo<'_> {
+    let layout =
+        wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row_bytes(size.width)), rows_per_image: None };
+    wgpu::TexelCopyBufferInfo { buffer, layout }
 }
 
 impl Pack {
@@ -21,14 +57,61 @@ impl Pack {
     }
 
     /// Makes room for a picture.
-    pub(crate) fn prepare(&mut self, device: &Device, pixels: u64) -> Result<(), GpuError> {
-        // Four pixels are written together.
-        device.grow(&mut self.bytes, "bytes of the picture", pixels.div_ceil(4) * 12)
+    pub(crate) fn prepare(&mut self, device: &Device, camera: &Camera) -> Result<(), GpuError> {
+        device.grow(&mut self.bytes, "bytes of the picture", packed_bytes(camera))
     }
 
     /// Records the packing of a frame of `pixels`.
     pub(crate) fn encode(&self, stage: &mut RecordedStage<'_>, rasterizer: &GpuRasterizer, pixels: u64) {
         let buffers = [rasterizer.bindings().view, &rasterizer.picture.colors, &self.bytes];
-        stage.run_flat(&self.kernel, &buffers, pixels.div_ceil(4 * 256));
+        stage.run_flat(&self.kernel, &buffers, pixels.div_ceil(256));
+    }
+
+    /// Records the copy of the packed frame into a texture of its size.
+    pub(crate) fn encode_copy(&self, recorder: &mut Recorder<'_>, to: &DevicePicture) {
+        let size = to.texture.size();
+        recorder.encoder().copy_buffer_to_texture(rows_of(&self.bytes, size), to.texture.as_image_copy(), size);
+    }
+}
+
+impl DevicePicture {
+    /// Room for what `camera` sees.
+    pub(super) fn new(device: &Device, camera: &Camera) -> Result<Self, GpuError> {
+        let usage =
+            wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC;
+        let make = || {
+            device.wgpu().create_texture(&wgpu::TextureDescriptor {
+                label: Some("picture"),
+                size: wgpu::Extent3d { width: camera.width_px, height: camera.height_px, depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: wgpu::TextureFormat::Rgba8Unorm,
+                usage,
+                view_formats: &[],
+            })
+        };
+        let texture = device.scoped("picture", packed_bytes(camera), make)?;
+        Ok(Self { device: device.clone(), texture })
+    }
+
+    /// For a window of the same device.
+    pub(crate) fn view(&self) -> wgpu::TextureView {
+        self.texture.create_view(&wgpu::TextureViewDescriptor::default())
+    }
+
+    /// Its pixels on the host, row-major.
+    ///
+    /// # Errors
+    /// If the device was lost, or has no memory for the copy.
+    pub fn to_rgb8(&self) -> Result<Vec<[u8; 3]>, GpuError> {
+        let size = self.texture.size();
+        let bytes = u64::from(row_bytes(size.width)) * u64::from(size.height);
+        let buffer = self.device.storage("bytes of the picture", bytes)?;
+        let mut recorder = Recorder::new(&self.device, None);
+        recorder.encoder().copy_texture_to_buffer(self.texture.as_image_copy(), rows_of(&buffer, size), size);
+        recorder.submit();
+        let copies: Copies = self.device.read(&[(&buffer, bytes)])?;
+        Ok(unpacked(copies.bytes(0), size.width))
     }
 }

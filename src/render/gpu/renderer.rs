@@ -6,7 +6,7 @@ use super::cloud::{Packed, Parameters};
 use super::kernel::Recorder;
 use super::labels::LabelPass;
 use super::layout::{Counters, Splat};
-use super::pack::Pack;
+use super::pack::{DevicePicture, Pack, packed_bytes, unpacked};
 use super::project::CloudShape;
 use super::project_backward::ProjectBackward;
 use super::rasterizer::{GpuRasterizer, counters_of};
@@ -54,10 +54,12 @@ struct Drawn {
 }
 
 /// What follows blending in the work of a frame.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum After {
+#[derive(Debug, Clone, Copy)]
+enum After<'a> {
     Nothing,
     Pack,
+    /// Packing, and a copy of that.
+    Texture(&'a DevicePicture),
 }
 
 fn pixels_of(camera: &Camera) -> u64 {
@@ -170,14 +172,25 @@ impl GpuRenderer {
 
     /// Draws the uploaded cloud and returns the colors alone, as [`Frame::to_rgb8`].
     pub fn draw_rgb8(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<Vec<[u8; 3]>, GpuError> {
-        let pixels = pixels_of(camera);
         loop {
             self.submit(camera, settings, After::Pack)?;
             let counters = (&self.rasterizer.counters, size_of::<Counters>() as u64);
-            let copies = self.device.read(&[counters, (&self.pack.bytes, pixels.div_ceil(4) * 12)])?;
+            let copies = self.device.read(&[counters, (&self.pack.bytes, packed_bytes(camera))])?;
             if self.settle(camera, settings, counters_of(&copies))? {
-                let rgb = copies.bytes(1).as_chunks().0;
-                return Ok(rgb.iter().copied().take(pixels as usize).collect());
+                return Ok(unpacked(copies.bytes(1), camera.width_px));
+            }
+        }
+    }
+
+    /// As [`Self::draw_rgb8`], but the colors stay on the device, for a window of the same.
+    pub fn draw_texture(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<DevicePicture, GpuError> {
+        let picture = DevicePicture::new(&self.device, camera)?;
+        loop {
+            self.submit(camera, settings, After::Texture(&picture))?;
+            let counters = (&self.rasterizer.counters, size_of::<Counters>() as u64);
+            let copies = self.device.read(&[counters])?;
+            if self.settle(camera, settings, counters_of(&copies))? {
+                return Ok(picture);
             }
         }
     }
@@ -226,16 +239,20 @@ impl GpuRenderer {
     }
 
     /// Hands the work of a frame to the device.
-    fn submit(&mut self, camera: &Camera, settings: &RenderSettings, after: After) -> Result<(), GpuError> {
+    fn submit(&mut self, camera: &Camera, settings: &RenderSettings, after: After<'_>) -> Result<(), GpuError> {
         self.drawn = None;
         self.rasterizer.prepare(&self.device, camera, settings, self.shape, self.channels)?;
-        let pixels = pixels_of(camera);
-        self.pack.prepare(&self.device, if after == After::Pack { pixels } else { 0 })?;
+        if !matches!(after, After::Nothing) {
+            self.pack.prepare(&self.device, camera)?;
+        }
         let mut recorder = Recorder::new(&self.device, self.timer.as_mut());
         self.rasterizer.encode_count(&mut recorder, &self.cloud);
         self.rasterizer.encode_draw(&mut recorder, &self.features);
-        if after == After::Pack {
-            recorder.stage("pack", |s| self.pack.encode(s, &self.rasterizer, pixels));
+        if !matches!(after, After::Nothing) {
+            recorder.stage("pack", |s| self.pack.encode(s, &self.rasterizer, pixels_of(camera)));
+        }
+        if let After::Texture(picture) = after {
+            self.pack.encode_copy(&mut recorder, picture);
         }
         recorder.submit();
         Ok(())

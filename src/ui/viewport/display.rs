@@ -4,13 +4,16 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Instant;
 
-use egui::{Color32, ColorImage, Rect, TextureHandle, TextureOptions, Ui, pos2};
+use eframe::egui_wgpu::RenderState;
+use eframe::wgpu::FilterMode;
+use egui::{Color32, ColorImage, Rect, TextureHandle, TextureId, TextureOptions, Ui, pos2};
 use glam::{DVec2, DVec3};
 
 use super::super::theme;
 use super::eye::Eye;
 use super::frame_times::FrameTimes;
 use crate::jobs::query::ViewMaps;
+use crate::render::DevicePicture;
 use crate::scene::resource_log::{self, ResourceKind};
 use crate::worker::view::{MappedView, ViewPicture, ViewResult};
 use crate::worker::{Failure, Slot, Versioned};
@@ -18,11 +21,20 @@ use crate::worker::{Failure, Slot, Versioned};
 /// Over so many seconds frames are counted.
 const RATE_SECS: f64 = 2.0;
 
+/// Pictures that stay on the device that drew them, which is the window's.
+struct NativeTexture {
+    window: RenderState,
+    /// The newest picture's; `None` while another kind is on screen.
+    id: Option<TextureId>,
+}
+
 /// What is on screen.
 #[derive(Default)]
 pub(super) struct Display {
     picture: Option<Arc<ViewPicture>>,
     texture: Option<TextureHandle>,
+    /// Paints what lies on the window's device.
+    native: Option<NativeTexture>,
     /// What the second view shows, where that is something else.
     second: Option<TextureHandle>,
     error: Option<String>,
@@ -52,6 +64,16 @@ impl Display {
         self.times.as_ref()
     }
 
+    /// The worker draws with the device of this window.
+    pub(super) fn share(&mut self, window: RenderState) {
+        self.native = Some(NativeTexture { window, id: None });
+    }
+
+    /// Whether what lies on the device that draws can be painted.
+    pub(super) fn shares_device(&self) -> bool {
+        self.native.is_some()
+    }
+
     /// What could not be drawn, for the user.
     pub(super) fn errors(&self) -> impl Iterator<Item = &String> {
         self.error.iter().chain(&self.unmapped)
@@ -60,6 +82,7 @@ impl Display {
     /// Forgets the frame of another scene.
     pub(super) fn clear(&mut self) {
         (self.picture, self.texture, self.second, self.error, self.unmapped) = (None, None, None, None, None);
+        self.native.iter_mut().for_each(|native| native.show(None));
     }
 
     /// Forgets why there are no maps: the view is another.
@@ -99,7 +122,10 @@ impl Display {
         };
         let start = Instant::now();
         let size = [picture.camera.width_px as usize, picture.camera.height_px as usize];
-        upload(ctx, &mut self.texture, size, &picture.rgb);
+        self.native.iter_mut().for_each(|native| native.show(picture.texture.as_ref()));
+        if picture.texture.is_none() {
+            upload(ctx, &mut self.texture, size, &picture.rgb);
+        }
         match &picture.second {
             Some(second) => upload(ctx, &mut self.second, size, &second.rgb),
             None => self.second = None,
@@ -146,12 +172,14 @@ impl Display {
     /// Paints the frame into `shown`, a part of the view's `rect`; the first or the second view.
     pub(super) fn paint(&self, ui: &Ui, (rect, shown): (Rect, Rect), second: bool) {
         // Filling what the frame covers anyway would be a fifth of a redraw on an emulated adapter.
-        if self.texture.is_none() || shown != rect {
+        let native = self.native.as_ref().and_then(|native| native.id);
+        let first = native.or(self.texture.as_ref().map(TextureHandle::id));
+        if first.is_none() || shown != rect {
             ui.painter().rect_filled(rect, 0.0, theme::canvas());
         }
-        if let Some(texture) = self.second.as_ref().filter(|_| second).or(self.texture.as_ref()) {
+        if let Some(texture) = self.second.as_ref().filter(|_| second).map(TextureHandle::id).or(first) {
             let uv = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-            ui.painter().image(texture.id(), shown, uv, Color32::WHITE);
+            ui.painter().image(texture, shown, uv, Color32::WHITE);
         }
     }
 
@@ -167,6 +195,27 @@ impl Display {
         let index = px.y as usize * picture.camera.width_px as usize + px.x as usize;
         let depth = f64::from(*picture.median_depth.as_ref()?.get(index)?);
         (depth > 0.0).then(|| picture.camera.center + picture.camera.ray(at * size) * depth)
+    }
+}
+
+impl NativeTexture {
+    /// Takes over a picture, or gives back what the last one had.
+    fn show(&mut self, picture: Option<&DevicePicture>) {
+        let RenderState { renderer, device, .. } = &self.window;
+        let mut renderer = renderer.write();
+        match (picture, self.id) {
+            (Some(picture), Some(id)) => {
+                renderer.update_egui_texture_from_wgpu_texture(device, &picture.view(), FilterMode::Linear, id);
+            }
+            (Some(picture), None) => {
+                self.id = Some(renderer.register_native_texture(device, &picture.view(), FilterMode::Linear));
+            }
+            (None, Some(id)) => {
+                renderer.free_texture(&id);
+                self.id = None;
+            }
+            (None, None) => {}
+        }
     }
 }
 
@@ -199,6 +248,7 @@ mod tests {
             full: true,
             camera: eye.camera(4, 4),
             rgb: vec![[9; 3]; 16],
+            texture: None,
             median_depth: Some(depth),
             depth_range: None,
             psnr: None,
@@ -239,6 +289,61 @@ mod tests {
         assert!(display.picture().is_some(), "the last frame stays");
         display.clear();
         assert!(display.picture().is_none() && display.errors().next().is_none());
+    }
+
+    #[test]
+    fn a_picture_that_stays_on_the_windows_device_is_painted_like_any_other() {
+        use crate::render::gpu::GpuRenderer;
+        use crate::render::{Device, Features, RenderSettings};
+        use egui_kittest::wgpu::{WgpuTestRenderer, create_render_state, default_wgpu_setup};
+
+        let mut setup = default_wgpu_setup();
+        if let eframe::egui_wgpu::WgpuSetup::CreateNew(setup) = &mut setup {
+            setup.device_descriptor = Arc::new(Device::device_descriptor);
+        }
+        let window = create_render_state(setup, eframe::egui_wgpu::RendererOptions::PREDICTABLE);
+        let device = Device::from_parts(window.adapter.get_info(), window.device.clone(), window.queue.clone());
+        let place = |i: usize| [(i as f32 * 0.7).sin(), (i as f32 * 0.4).cos(), (i as f32 * 0.9).sin()];
+        let cloud = crate::scene::GaussianCloud {
+            positions: (0..200).map(place).collect(),
+            log_scales: vec![[-2.0; 3]; 200],
+            quaternions: vec![[1.0, 0.0, 0.0, 0.0]; 200],
+            opacity_logits: vec![1.0; 200],
+            sh: (0..200).map(place).collect(),
+            ..crate::scene::GaussianCloud::default()
+        };
+        let eye = Eye::framing(&Bounds { min: DVec3::NEG_ONE, max: DVec3::ONE }, DVec3::Z);
+        let (camera, settings) = (eye.camera(60, 40), RenderSettings::default());
+        let mut renderer = GpuRenderer::new(&device).expect("a renderer");
+        renderer.upload(&cloud, Features::NONE).expect("sent");
+        let rgb = renderer.draw_rgb8(&camera, &settings).expect("drawn");
+        let texture = renderer.draw_texture(&camera, &settings).expect("drawn");
+        assert!(rgb.iter().filter(|c| **c != [0; 3]).count() > 100, "there is something to see");
+
+        let (display, pictures) = (&std::cell::RefCell::new(Display::default()), Arc::new(Slot::default()));
+        display.borrow_mut().share(window.clone());
+        let size = egui::vec2(60.0, 40.0);
+        let mut harness = egui_kittest::Harness::builder()
+            .with_size(size)
+            .renderer(WgpuTestRenderer::from_render_state(window))
+            .build_ui(|ui| {
+                let rect = Rect::from_min_size(egui::Pos2::ZERO, size);
+                display.borrow_mut().take(ui.ctx(), &pictures);
+                display.borrow().paint(ui, (rect, rect), false);
+            });
+        let mut painted = |rgb: &[[u8; 3]], texture: Option<DevicePicture>| {
+            let picture = ViewPicture { camera: camera.clone(), rgb: rgb.to_vec(), texture, ..frame(1, &eye) };
+            pictures.publish(Ok(Arc::new(picture)));
+            harness.run();
+            harness.render().expect("an image")
+        };
+        let of_bytes = painted(&rgb, None);
+        let of_texture = painted(&[], Some(texture.clone()));
+        assert_eq!(of_texture, of_bytes);
+        // Another one, and back: what is on screen is always the newest.
+        let black = painted(&vec![[0; 3]; rgb.len()], None);
+        assert_ne!(black, of_bytes);
+        assert_eq!(painted(&[], Some(texture)), of_bytes);
     }
 
     #[test]

@@ -106,6 +106,7 @@ mod tests {
             full: true,
             camera: Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 4, 4).expect("valid"),
             rgb: Vec::new(),
+            texture: None,
             median_depth: None,
             depth_range: None,
             psnr: None,

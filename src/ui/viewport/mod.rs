@@ -133,6 +133,11 @@ impl Viewport {
         })
     }
 
+    /// The worker draws with the device of this window.
+    pub(super) fn share(&mut self, window: eframe::egui_wgpu::RenderState) {
+        self.display.share(window);
+    }
+
     /// The newest frame.
     pub fn picture(&self) -> Option<&ViewPicture> {
         self.display.picture()
@@ -153,7 +158,11 @@ impl Viewport {
         let p = self.picture()?;
         let (width_px, height_px) = (p.camera.width_px, p.camera.height_px);
         let second = p.second.as_ref().filter(|_| self.queries.is_second());
-        let rgb = second.map_or(&p.rgb, |second| &second.rgb).clone();
+        let rgb = match (second, &p.texture) {
+            (Some(second), _) => second.rgb.clone(),
+            (None, Some(texture)) => texture.to_rgb8().ok()?,
+            (None, None) => p.rgb.clone(),
+        };
         Some(PhotoPixels { width_px, height_px, rgb, coverage: None })
     }
 

@@ -39,6 +39,8 @@ pub(super) struct Wanted {
     /// Whether masks on screen follow the eye.
     pub(super) follow: bool,
     pub(super) skip: SkipPasses,
+    /// Whether the window can paint what lies on the device that draws.
+    pub(super) on_device: bool,
     pub(super) timed: bool,
 }
 
@@ -104,6 +106,7 @@ impl Requests {
             codes,
             follow,
             skip,
+            on_device,
             timed,
         } = wanted;
         let key = Key {
@@ -148,6 +151,7 @@ impl Requests {
             follow,
             codes,
             skip,
+            on_device,
             timed,
             ticket,
         };
@@ -212,6 +216,7 @@ impl Viewport {
                 && (self.queries.tints() || self.picking.selected().is_some() || preview.is_some()),
             semantics,
             skip: SkipPasses::of(plan),
+            on_device: self.display.shares_device(),
             timed: layout.times,
         };
         if let Some((request, moved)) = self.requests.next(wanted, always && drawn) {
@@ -247,6 +252,7 @@ mod tests {
                 codes: false,
                 follow: false,
                 skip: SkipPasses { depth: true, parts: true, gpu: true, buffers: true, levels: true },
+                on_device: false,
                 timed: false,
             };
             change(&mut wanted);
