@@ -22,9 +22,8 @@ struct AdamStep {
     growth: f32,
     // A gradient this many times too large is counted.
     outlier: f32,
-    // Derivative of the loss by each opacity besides the picture; 0 but for the geometry.
-    per_opacity: f32,
-    pad: f32,
+    pad0: f32,
+    pad1: f32,
 }
 
 @group(0) @binding(0) var<uniform> adam: AdamStep;
@@ -38,9 +37,8 @@ struct AdamStep {
 @group(0) @binding(6) var<storage, read> counters: array<u32>;
 @group(0) @binding(7) var<storage, read_write> outliers: array<atomic<u32>>;
 
-// Floats of a record of the geometry and of `marks`, and the places of the opacity's logit and of the mark.
+// Floats of a record of `marks`, and the place of the mark.
 const MARK_STRIDE: u32 = 12u;
-const OPACITY: u32 = 10u;
 const MARK: u32 = 11u;
 
 @compute @workgroup_size(256)
@@ -57,15 +55,10 @@ fn main(@builtin(global_invocation_id) global: vec3<u32>, @builtin(num_workgroup
     }
     let seen = second[i];
     let limit = select(adam.clip, min(sqrt(adam.growth * seen), adam.clip), seen > 0.0);
-    var slope = gradient[i];
-    if adam.per_opacity != 0.0 && place == OPACITY {
-        let opacity = 1.0 / (1.0 + exp(-parameters[i]));
-        slope += adam.per_opacity * opacity * (1.0 - opacity);
-    }
-    if abs(slope) > adam.outlier * limit {
+    if abs(gradient[i]) > adam.outlier * limit {
         atomicAdd(&outliers[0], 1u);
     }
-    let g = clamp(slope, -limit, limit);
+    let g = clamp(gradient[i], -limit, limit);
     let m = mix(g, first[i], adam.beta_first);
     let v = mix(g * g, seen, adam.beta_second);
     first[i] = m;

@@ -158,8 +158,13 @@ fn the_window_and_the_command_line_do_the_same() {
     // Whatever is set for the next training: the scene knows what it has not seen.
     let config = TrainConfig { holdout_every: 3, ..config };
     let (out, settings) = (scene.out.clone(), scene.render.clone());
-    let command =
-        Job::Evaluate { dataset: dataset.clone(), cloud: cloud.clone(), config: config.clone(), out: out.clone() };
+    let command = Job::Evaluate {
+        dataset: dataset.clone(),
+        cloud: cloud.clone(),
+        config: config.clone(),
+        settings: settings.clone(),
+        out: out.clone(),
+    };
     let Outcome::Evaluated(evaluation) = window(command) else { panic!("no evaluation") };
     let eval = fmlgs(&["eval", &trained, "--json"]).ok().json();
     assert_eq!(eval["views"].as_array().unwrap().len(), evaluation.views.len());

@@ -100,7 +100,6 @@ impl Lesson {
             opacity_logit: 2e-2,
             sh_constant: 2e-2,
             sh_rest: 1e-3,
-            per_opacity: 1e-3,
         };
         Self { cloud, photo, camera, rates }
     }
@@ -130,8 +129,7 @@ impl Lesson {
             (0..3).for_each(|k| step(&mut out.positions[i][k], g.positions[i][k], self.rates.position));
             (0..3).for_each(|k| step(&mut out.log_scales[i][k], g.log_scales[i][k], self.rates.log_scale));
             (0..4).for_each(|k| step(&mut out.quaternions[i][k], g.quaternions[i][k], self.rates.quaternion));
-            let pull = f64::from(self.rates.opacity_gradient(out.opacity_logits[i]));
-            step(&mut out.opacity_logits[i], g.opacity_logits[i] + pull, self.rates.opacity_logit);
+            step(&mut out.opacity_logits[i], g.opacity_logits[i], self.rates.opacity_logit);
             let active = fmlgs::math::sh::coefficients(settings.sh_degree);
             for k in 0..active {
                 let at = i * out.sh_stride() + k;

@@ -138,7 +138,7 @@ fn the_page_shows_selects_and_plays_what_the_program_draws() {
     std::fs::write(&path_file, path.to_string()).unwrap();
     let page = shown.at("the page.html");
     let told = fmlgs(&["export", &shown.scene, "--html", &page, "--path", &path_file, "--title", HOSTILE, "-q"]).ok();
-    assert!(told.stdout.contains("59,981 Gaussians · 16 objects · 102 parts, 1 camera path"), "{}", told.stdout);
+    assert!(told.stdout.contains("60,000 Gaussians · 16 objects · 102 parts, 1 camera path"), "{}", told.stdout);
     browser.load(Path::new(&page));
 
     // It starts as the first photo was taken, and draws what this program draws.

@@ -83,18 +83,19 @@ pub(crate) struct TrainOverrides {
     /// Keep the number of Gaussians that training starts with
     #[arg(long)]
     pub(crate) no_densify: bool,
-    /// Upper limit of Gaussians [default: one for two pixels of a photo, if the memory holds them]
+    /// Upper limit of Gaussians [default: one for each pixel of a photo up to
+    /// 100,000, one for two beyond, if the memory holds them]
     #[arg(long, value_parser = number::within(1..=100_000_000_usize))]
     pub(crate) max_gaussians: Option<usize>,
     /// Gaussians to start from where the dataset has no sparse points [default: 20000]
     #[arg(long, value_parser = number::within(1..=10_000_000_usize))]
     pub(crate) random_points: Option<usize>,
-    /// Weight of the mean opacity in the loss, which lets Gaussians fade that no photo needs [default: 0.01]
-    #[arg(long, value_parser = number::within(0.0..=1e6))]
-    pub(crate) opacity_weight: Option<f64>,
-    /// Antialias (the 2-D filter of Mip-Splatting)
-    #[arg(long)]
+    /// Train with the 2-D filter of Mip-Splatting, as new trainings are, where the scene or the preset says otherwise
+    #[arg(long, conflicts_with = "no_antialias")]
     pub(crate) antialias: bool,
+    /// Train without that filter, for viewers that do not know it
+    #[arg(long)]
+    pub(crate) no_antialias: bool,
     /// Seed of every random choice [default: 0]
     #[arg(long)]
     pub(crate) seed: Option<u64>,
@@ -133,8 +134,7 @@ impl TrainOverrides {
             densify: base.densify && !self.no_densify,
             max_gaussians: self.max_gaussians.or(base.max_gaussians),
             random_points: self.random_points.unwrap_or(base.random_points),
-            opacity_weight: self.opacity_weight.unwrap_or(base.opacity_weight),
-            antialias: base.antialias || self.antialias,
+            antialias: (base.antialias || self.antialias) && !self.no_antialias,
             seed: self.seed.unwrap_or(base.seed),
             eval_every: self.eval_every.unwrap_or(base.eval_every),
             checkpoint_secs: self.checkpoint_secs.unwrap_or(base.checkpoint_secs),
@@ -265,9 +265,10 @@ mod tests {
     fn what_is_not_given_keeps_its_value() {
         let base = TrainConfig { steps: 3, seed: 9, densify: false, ..TrainConfig::default() };
         assert_eq!(TrainOverrides::default().over(base.clone()), base);
-        let given = TrainOverrides { steps: Some(5), no_densify: true, antialias: true, ..TrainOverrides::default() };
+        let given =
+            TrainOverrides { steps: Some(5), no_densify: true, no_antialias: true, ..TrainOverrides::default() };
         let config = given.over(TrainConfig::default());
-        assert_eq!((config.steps, config.densify, config.antialias), (5, false, true));
+        assert_eq!((config.steps, config.densify, config.antialias), (5, false, false));
     }
 
     #[test]

@@ -335,7 +335,7 @@ fn tolerant(path: &Path, scene: TrainedScene, observer: &mut dyn Observer) -> Sc
             Severity::Warning,
             format!("The scene may not look as trained: {e}. Train again, or restore the file"),
         );
-        TrainConfig::default()
+        TrainConfig::unknown()
     });
     Scene::trained(path, scene, config)
 }

@@ -2,9 +2,26 @@
 //! applied to the measurements would choose, and the numbers behind both. Written as Markdown by
 //! `fmlgs report --defaults`.
 
-use super::document::{Report, Stage};
-use super::front::NOISE;
-use super::table;
+use super::document::{Report, Stage, StageName};
+use super::front::{KnobChoice, NOISE};
+use super::table::{self, Rows};
+
+/// Why a default stays though the rule would choose another setting, by stage and knob.
+const STAYS: [(StageName, &str, &str); 9] = [
+    (
+        StageName::Train,
+        "most Gaussians",
+        "more always gain something, for time and memory; since this was measured, photos under 200,000 px may have more",
+    ),
+    (StageName::Train, "anti-aliasing", "with the filter is the default since this was measured"),
+    (StageName::Train, "half size at first", "gains on one scene of three"),
+    (StageName::Train, "SH schedule", "gains on one scene of three, loses on another"),
+    (StageName::Features, "views used", "where most photos are labeled a part of them would do; mostly few are"),
+    (StageName::Features, "gradients, exact", "a hundredth of overlap for ten times the time"),
+    (StageName::Features, "votes, then gradients, exact", "a hundredth of overlap for ten times the time"),
+    (StageName::Query, "part features", "the paper's; it depends on the encoder, and this is the one that ships"),
+    (StageName::Query, "encoder", "names alone know no words but the labels'"),
+];
 
 /// The tables of all stages of these reports.
 pub fn markdown(reports: &[Report]) -> String {
@@ -14,7 +31,7 @@ pub fn markdown(reports: &[Report]) -> String {
          the table, is applied to the measurements of that knob's settings and of the default: *chosen* is what \
          it picks, *least error* the best setting whatever it costs. The default *holds* if it is good enough by \
          the rule and not more than {:.0} % slower than what is chosen, or slower by less than repeats \
-         differ. Times are medians of repeats on the machine named; compare them within a table only.\n",
+         differ; where it does not, the last column says why it stays. Times are medians of repeats on the machine named; compare them within a table only.\n",
         100.0 * NOISE
     );
     for report in reports {
@@ -38,15 +55,30 @@ fn stage(stage: &Stage) -> String {
     let mut out = format!("\n### {}\n\nSeconds of {}; {}", stage.name.title(), stage.secs_of, stage.reference);
     out += &format!(" ({}; {} repeats). ", input.join(", "), stage.seeds.len());
     if !stage.complete() {
-        out += &format!("Stopped early: {} of {} settings. ", stage.points.len(), stage.planned);
+        let measured: usize = stage.points.iter().map(|p| p.secs.each.len()).sum();
+        let planned = stage.planned * stage.seeds.len();
+        out += &format!("Stopped early: {measured} of {planned} measurements. ");
     }
     if !choices.is_empty() {
-        out += &format!("Chosen is {}.\n\n{}", stage.rule.words(), table::markdown(&stage.choice_table()));
+        out += &format!("Chosen is {}.\n\n{}", stage.rule.words(), table::markdown(&with_reasons(stage)));
     }
     if !stage.orders.is_empty() {
         out += &format!("\n{}", table::markdown(&stage.order_table()));
     }
     out
+}
+
+/// What the rule says of each knob, and why its default stays where it does not hold.
+fn with_reasons(stage: &Stage) -> Rows {
+    let reason = |c: &KnobChoice<'_>| {
+        let stays = STAYS.iter().find(|(name, knob, _)| (*name, *knob) == (stage.name, c.method));
+        stays.filter(|_| !c.holds).map_or("", |s| s.2)
+    };
+    let choices = stage.choices();
+    let column = std::iter::once("why it stays").chain(choices.iter().map(reason));
+    let mut rows = stage.choice_table();
+    rows.iter_mut().zip(column).for_each(|(row, cell)| row.push(cell.to_owned()));
+    rows
 }
 
 #[cfg(test)]
@@ -58,7 +90,7 @@ mod tests {
     fn every_knob_has_its_row() {
         let text = markdown(&[example()]);
         let row = text.lines().find(|l| l.starts_with("| cut-off")).expect("a row");
-        assert!(row.contains("1/64: 0.004000 in 10.00 ms") && row.ends_with("| **no** |"), "{row}");
+        assert!(row.contains("1/64: 0.004000 in 10.00 ms") && row.ends_with("| **no** |  |"), "{row}");
         assert!(text.contains("| samples | 2 | 2.00 | yes |"));
         assert!(text.contains("at most 1.0e-2 or 10 % over the least"));
     }

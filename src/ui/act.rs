@@ -221,7 +221,7 @@ impl App {
             return;
         }
         let config = self.state.next_training(&self.layout.config);
-        self.state.antialias = config.antialias;
+        self.state.antialias = config.render_settings(None).antialias;
         let reached = self.state.continues_at(&config).unwrap_or(0);
         self.state.resumable = Some((config.clone(), reached));
         self.submit(Command::Train { dataset, config, out });
@@ -233,7 +233,8 @@ impl App {
         match (scene, self.viewport.cloud().cloned()) {
             (Some((dataset, out)), Some(cloud)) if trained => {
                 let (cloud, config) = (Arc::clone(&cloud), self.layout.config.clone());
-                self.submit(Command::Evaluate { dataset, cloud, config, out });
+                let settings = self.state.render_settings();
+                self.submit(Command::Evaluate { dataset, cloud, config, settings, out });
             }
             _ => {
                 self.state.toast(Tone::Warning, "Train first: evaluation needs trained Gaussians and held-out photos.")

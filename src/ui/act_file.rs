@@ -108,11 +108,13 @@ impl App {
             Action::SaveChat => self.save_chat(&path),
             Action::ChooseBeside => self.ask(Action::OpenBeside(Some(path))),
             Action::SaveTrueMask => self.save_true_mask(&path),
-            Action::Screenshot => {
-                if let Some(pixels) = self.viewport.pixels() {
+            Action::Screenshot => match self.viewport.pixels() {
+                Ok(Some(pixels)) => {
                     self.submit(Command::Picture { pixels: Arc::new(pixels), path });
                 }
-            }
+                Ok(None) => {}
+                Err(e) => self.state.fail("Saving the picture", Failure::of(&e, "Try again once the view rests.")),
+            },
             _ => {}
         }
     }

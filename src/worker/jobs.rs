@@ -19,6 +19,7 @@ use crate::jobs::{
 use crate::measure::{End, FILE, Report};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::TrainConfig;
+use crate::render::RenderSettings;
 use crate::scene::{Dataset, GaussianCloud, Machine};
 
 /// Runs commands on the jobs.
@@ -97,8 +98,8 @@ impl Jobs for PipelineJobs {
             Command::Demo => self.opened(demo::open(&self.folders, self.machine(), observer)?),
             Command::DemoPhotos => self.opened(demo::open_photos(&self.folders, self.machine(), observer)?),
             Command::Train { dataset, config, out } => return self.train(&dataset, &config, out, observer),
-            Command::Evaluate { dataset, cloud, config, out } => {
-                Outcome::Evaluated(measured(dataset, cloud, config, &out, observer)?)
+            Command::Evaluate { dataset, cloud, config, settings, out } => {
+                Outcome::Evaluated(measured(dataset, cloud, (config, settings), &out, observer)?)
             }
             Command::FindObjects(request) => {
                 let known = self.known(&request.folder);
@@ -204,12 +205,11 @@ impl Jobs for PipelineJobs {
 fn measured(
     dataset: Arc<Dataset>,
     cloud: Arc<GaussianCloud>,
-    config: TrainConfig,
+    (config, settings): (TrainConfig, RenderSettings),
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<crate::pipeline::observer::Evaluation, JobError> {
     let cameras = if trained::is_scene(out) { trained::load_info(out)?.cameras } else { Vec::new() };
-    let settings = config.render_settings(dataset.background);
     let scene = Scene { cloud, cameras, settings, config, ..Scene::default() };
     evaluate::photometric(&PhotoComparison::of(&scene, dataset, EvaluateOptions::default())?, observer)
 }

@@ -65,6 +65,8 @@ pub enum Command {
         cloud: Arc<GaussianCloud>,
         /// Picture size, and the hold-out rule where the scene does not say which photos are.
         config: TrainConfig,
+        /// How the Gaussians are drawn.
+        settings: RenderSettings,
         /// Folder of the trained scene.
         out: PathBuf,
     },

@@ -195,14 +195,18 @@ impl ViewRenderer {
         let (renderer, cloud) = (&mut self.renderer, &request.cloud);
         // Of a moving view colors are enough, of which there is less to copy from a GPU.
         let colors = !depth && request.mode == ViewMode::Rgb && request.second.is_none() && request.photo.is_none();
-        let stays = colors && request.on_device && renderer.is_gpu();
-        let draw = || match colors {
-            true if stays => {
-                let picture = renderer.draw_texture(cloud, camera, &settings)?;
-                Ok(picture.map_or_else(|| Painting::Colors(Vec::new()), Painting::Texture))
+        let draw = || {
+            if colors
+                && request.on_device
+                && request.budget == QualityBudget::Moving
+                && let Some(picture) = renderer.draw_texture(cloud, camera, &settings)?
+            {
+                return Ok(Painting::Texture(picture));
             }
-            true => renderer.draw_rgb8(cloud, camera, &settings).map(Painting::Colors),
-            false => renderer.draw(cloud, camera, &settings).map(|frame| Painting::Frame(Box::new(frame))),
+            match colors {
+                true => renderer.draw_rgb8(cloud, camera, &settings).map(Painting::Colors),
+                false => renderer.draw(cloud, camera, &settings).map(|frame| Painting::Frame(Box::new(frame))),
+            }
         };
         match catch_unwind(AssertUnwindSafe(draw)) {
             Ok(result) => result.map_err(|e| Failure::of(&e, "Reset the view (Home), or open the scene again.")),
@@ -252,20 +256,73 @@ impl ViewRenderer {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::Device;
+    use crate::scene::GaussianCloud;
+    use crate::worker::Versioned;
+    use crate::worker::view_request::SkipPasses;
     use glam::DVec3;
+
+    fn of(renderer: Renderer, cost: Option<Speed>) -> ViewRenderer {
+        ViewRenderer {
+            renderer,
+            without_gpu: true,
+            instead_of_gpu: None,
+            beside: None,
+            cost,
+            levels: DetailLevels::default(),
+            cut: None,
+        }
+    }
+
+    #[test]
+    fn moving_frames_stay_on_a_device_that_the_window_paints_from() {
+        let Ok(device) = Device::new() else { return };
+        let cloud = GaussianCloud { sh: vec![[0.9; 3]], ..GaussianCloud::isotropic(vec![[0.0; 3]], -1.0, 2.0) };
+        let cloud = Versioned::new(Arc::new(cloud));
+        let moving = ViewRequest {
+            cloud: cloud.clone(),
+            camera: Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 32, 24).expect("valid"),
+            mode: ViewMode::Rgb,
+            second: None,
+            beside: None,
+            settings: RenderSettings::default(),
+            budget: QualityBudget::Moving,
+            photo: None,
+            semantics: None,
+            follow: false,
+            codes: false,
+            skip: SkipPasses { depth: true, parts: true, gpu: false, buffers: false, levels: true },
+            on_device: true,
+            timed: false,
+            ticket: 1,
+        };
+        let (mut gpu, mut cpu) = (of(Renderer::on_gpu(&device).expect("a renderer"), None), of(Renderer::new(), None));
+        let picture = gpu.draw(&moving).expect("drawn");
+        let texture = picture.texture.as_ref().expect("it stays there");
+        assert!(picture.rgb.is_empty());
+        let copied = gpu.draw(&ViewRequest { on_device: false, ..moving.clone() }).expect("drawn");
+        assert!(copied.texture.is_none() && copied.rgb == texture.to_rgb8().expect("copied"));
+        assert_eq!(picture.pixels(false).expect("copied"), copied.pixels(false).expect("there"));
+        assert!(copied.rgb.iter().any(|c| *c != [0; 3]), "there is something to see");
+        // What is picked from, painted over or compared is on the host, and so is all that the CPU draws.
+        let full = ViewRequest { budget: QualityBudget::Full, ..moving.clone() };
+        let shared = ViewRequest { budget: QualityBudget::Shared, ..moving.clone() };
+        let depth = ViewRequest { mode: ViewMode::Depth, ..moving.clone() };
+        for request in [&full, &shared, &depth] {
+            let picture = gpu.draw(request).expect("drawn");
+            assert!(picture.texture.is_none() && !picture.rgb.is_empty());
+        }
+        assert!(cpu.draw(&moving).expect("drawn").texture.is_none());
+        // So are other Gaussians beside.
+        let beside = Some((cloud, RenderSettings::default()));
+        let both = gpu.draw(&ViewRequest { beside, ..moving }).expect("drawn");
+        assert!(!both.second.as_ref().expect("two").rgb.is_empty());
+    }
 
     #[test]
     fn a_slow_machine_draws_smaller_while_the_eye_moves() {
         let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 1000, 600).expect("valid");
-        let of = |fixed_secs, secs_per_px| ViewRenderer {
-            renderer: Renderer::new(),
-            without_gpu: true,
-            instead_of_gpu: None,
-            beside: None,
-            cost: Some(Speed { fixed_secs, secs_per_px }),
-            levels: DetailLevels::default(),
-            cut: None,
-        };
+        let of = |fixed_secs, secs_per_px| of(Renderer::new(), Some(Speed { fixed_secs, secs_per_px }));
         let slow = of(0.0, 1e-6);
         let moving = slow.fitting_camera(&camera, QualityBudget::Moving, 1);
         assert_eq!(moving.width_px, 300, "never smaller");

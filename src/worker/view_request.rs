@@ -6,7 +6,7 @@ use super::Versioned;
 use super::failure::Failure;
 use super::view_modes::ViewMode;
 use crate::render::lod::MOVING_SECS;
-use crate::render::{DevicePicture, RenderSettings, Renderer, StageTimes};
+use crate::render::{DevicePicture, GpuError, RenderSettings, Renderer, StageTimes};
 use crate::scene::plan::When;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
 
@@ -37,7 +37,7 @@ pub struct ViewRequest {
     pub codes: bool,
     /// What is left out.
     pub skip: SkipPasses,
-    /// Whether the window can paint what lies on the device that draws: then moving frames stay there.
+    /// Whether the window can paint what lies on the device that draws: then the colors of moving frames stay there.
     pub on_device: bool,
     /// Whether the stages are to be timed, where that is not free.
     pub timed: bool,
@@ -137,6 +137,20 @@ pub struct ViewPicture {
 }
 
 impl ViewPicture {
+    /// Its pixels on the host; those of the second view, if that is wanted and there is one.
+    ///
+    /// # Errors
+    /// If they lie on a device that does not give them back.
+    pub(crate) fn pixels(&self, second: bool) -> Result<PhotoPixels, GpuError> {
+        let rgb = match (self.second.as_ref().filter(|_| second), &self.texture) {
+            (Some(second), _) => second.rgb.clone(),
+            (None, Some(texture)) => texture.to_rgb8()?,
+            (None, None) => self.rgb.clone(),
+        };
+        let Camera { width_px, height_px, .. } = self.camera;
+        Ok(PhotoPixels { width_px, height_px, rgb, coverage: None })
+    }
+
     /// Whether a GPU drew it.
     pub(crate) fn on_gpu(&self) -> bool {
         self.drawn_by != Renderer::CPU

@@ -25,8 +25,8 @@ pub struct Measurement {
     pub stages: StageTimes,
     /// Seconds from the call to the finished result, on the host's clock.
     pub whole_secs: f64,
-    /// Seconds of a frame of which the host gets the bytes of its colors, and of one that stays on the GPU, one after
-    /// another without a wait; `None` where no GPU draws.
+    /// Seconds of a frame of which the host gets the bytes of its colors, of one that stays on the GPU, one after
+    /// another without a wait, and of one that a window of the same device paints; `None` where no GPU draws.
     pub other_secs: Option<[f64; 3]>,
 }
 
@@ -112,7 +112,6 @@ pub fn training_step(
         opacity_logit: still,
         sh_constant: still,
         sh_rest: still,
-        per_opacity: 0.0,
     };
     let degree = cloud.sh_degree;
     let woken = Instant::now();
@@ -218,7 +217,17 @@ pub(super) fn timing(name: &str, gaussians: usize, size: [u32; 2], views: &[Meas
         |k: usize| (!other.is_empty()).then(|| median(&other.iter().map(|s| s[k]).collect::<Vec<_>>()) * 1e3);
     let [bytes_ms, staying_ms, texture_ms] = [0, 1, 2].map(other_ms);
     let stages_ms = medians(&stages).into_iter().map(|(stage, secs)| (stage, secs * 1e3)).collect();
-    Timing { name: name.into(), gaussians, size, total_ms, bytes_ms, staying_ms, texture_ms, labels_ms: None, stages_ms }
+    Timing {
+        name: name.into(),
+        gaussians,
+        size,
+        total_ms,
+        bytes_ms,
+        staying_ms,
+        texture_ms,
+        labels_ms: None,
+        stages_ms,
+    }
 }
 
 #[cfg(test)]

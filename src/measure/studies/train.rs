@@ -53,7 +53,8 @@ pub(crate) fn study(
 }
 
 fn variants(base: &TrainConfig) -> Result<Variants<TrainConfig>, StudyError> {
-    let words = format!("{} steps, {} px, SH {}", base.steps, base.max_side_px, base.sh_degree);
+    let filter = if base.antialias { "filter" } else { "no filter" };
+    let words = format!("{} steps, {} px, SH {}, {filter}", base.steps, base.max_side_px, base.sh_degree);
     let mut all = Variants::new(words, base.clone());
     let mut add = |method: &str, setting: String, name: &str, value: Value| -> Result<(), StudyError> {
         let knob = [(name, value)];
@@ -71,10 +72,10 @@ fn variants(base: &TrainConfig) -> Result<Variants<TrainConfig>, StudyError> {
         add("most Gaussians", most.to_string(), "max_gaussians", json!(most))?;
     }
     add("density control", "off".into(), "densify", json!(false))?;
-    add("mean opacity", "without weight".into(), "opacity_weight", json!(0.0))?;
     add("SH bands", "degree 1".into(), "sh_degree", json!(1))?;
     add("SH schedule", "all bands from the start".into(), "sh_at_once", json!(true))?;
-    add("anti-aliasing", "with the filter".into(), "antialias", json!(!base.antialias))?;
+    let filter = if base.antialias { "without the filter" } else { "with the filter" };
+    add("anti-aliasing", filter.into(), "antialias", json!(!base.antialias))?;
     Ok(all)
 }
 

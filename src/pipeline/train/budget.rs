@@ -9,11 +9,14 @@ pub(crate) const BYTES_PER_GAUSSIAN: u64 = 59 * 4 * 5 + 12 + 64 + 4 * 60;
 /// Share of the memory that is free now which the Gaussians may take.
 const SHARE: f64 = 0.4;
 
-/// Most Gaussians that are worth having and fit: one for two pixels of a training picture, at least
-/// `start` (those there are to begin with) and a half more, at most what the memory holds. Twice as many gain 0.2 dB
+/// As many Gaussians are cheap, and small pictures may show a large place.
+const CHEAP: usize = 100_000;
+
+/// Most Gaussians that are worth having and fit: one for each pixel of a training picture up to [`CHEAP`], one for two
+/// beyond that, at least `start` (those there are to begin with) and a half more, at most what the memory holds
 /// (docs/measured.md).
 pub(crate) fn worthwhile(pixels: usize, start: usize) -> usize {
-    (pixels / 2).max(start + start / 2).min(gaussians())
+    pixels.min(CHEAP).max(pixels / 2).max(start + start / 2).min(gaussians())
 }
 
 /// Most Gaussians that the memory holds, between ten thousand and ten million.
@@ -32,7 +35,9 @@ mod tests {
         assert!(super::fitting(1 << 30) > 200_000);
         assert!(super::fitting(1 << 30) < super::fitting(2 << 30));
         assert_eq!(super::fitting(0), 10_000);
-        assert_eq!(super::worthwhile(100_000, 20_000), 50_000);
+        assert_eq!(super::worthwhile(60_000, 20_000), 60_000);
+        assert_eq!(super::worthwhile(150_000, 20_000), 100_000);
+        assert_eq!(super::worthwhile(500_000, 20_000), 250_000);
         assert_eq!(super::worthwhile(5_000, 8_000), 12_000);
     }
 }

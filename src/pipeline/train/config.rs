@@ -37,8 +37,6 @@ pub struct TrainConfig {
     pub max_gaussians: Option<usize>,
     /// Gaussians to start from where the dataset has no sparse points.
     pub random_points: usize,
-    /// Weight of the mean opacity in the loss, as in 3DGS-MCMC: Gaussians that no photo needs fade.
-    pub opacity_weight: f64,
     /// Mip-Splatting's 2-D filter.
     pub antialias: bool,
     /// Seed of every random choice.
@@ -70,15 +68,23 @@ pub struct UnreadableConfig {
 
 impl TrainConfig {
     /// The settings that the scene in `folder` stores; the defaults for what it does not say, or if it says
-    /// nothing.
+    /// nothing, but for the filter, which scenes say they were trained with.
     pub(crate) fn stored(folder: &Path, config: serde_json::Value) -> Result<Self, UnreadableConfig> {
         let read = match config {
-            serde_json::Value::Null => Ok(Self::default()),
-            named @ serde_json::Value::Object(_) => serde_json::from_value(named),
+            serde_json::Value::Null => Ok(Self::unknown()),
+            serde_json::Value::Object(mut named) => {
+                named.entry("antialias").or_insert(false.into());
+                serde_json::from_value(named.into())
+            }
             // A list would be taken for the settings in their order.
             _ => Err(serde::de::Error::custom("they have no names")),
         };
         read.map_err(|cause| UnreadableConfig { path: folder.join(SCENE_FILE).display().to_string(), cause })
+    }
+
+    /// For a scene that does not say how it was trained.
+    pub(crate) fn unknown() -> Self {
+        Self { antialias: false, ..Self::default() }
     }
 
     /// Whether these settings make sense.
@@ -95,9 +101,6 @@ impl TrainConfig {
         }
         if self.sh_degree > 3 {
             return bad("the spherical-harmonics degree must be 0 to 3");
-        }
-        if !(self.opacity_weight.is_finite() && self.opacity_weight >= 0.0) {
-            return bad("the weight of the mean opacity must be a number, 0 or more");
         }
         let (normals, distortion) = self.geometry_weights();
         if ![normals, distortion].iter().all(|w| w.is_finite() && *w >= 0.0) {
@@ -128,7 +131,9 @@ impl TrainConfig {
     /// Whether a training with these settings goes on where one with the others stopped: how often to look and save
     /// does not change the trajectory.
     pub(crate) fn is_same_run(&self, other: &Self) -> bool {
-        *other == Self { eval_every: other.eval_every, checkpoint_secs: other.checkpoint_secs, ..self.clone() }
+        let own = Self { eval_every: other.eval_every, checkpoint_secs: other.checkpoint_secs, ..self.clone() };
+        // Surfels are never filtered.
+        *other == Self { antialias: if self.surfels { other.antialias } else { self.antialias }, ..own }
     }
 
     /// Whether only the CPU can do what is asked.
@@ -140,7 +145,7 @@ impl TrainConfig {
     pub(crate) fn render_settings(&self, background: Option<[f32; 3]>) -> RenderSettings {
         RenderSettings {
             background: background.unwrap_or_default(),
-            antialias: self.antialias,
+            antialias: self.antialias && !self.surfels,
             surfels: self.surfels,
             ..RenderSettings::default()
         }
@@ -168,8 +173,7 @@ impl Default for TrainConfig {
             densify: true,
             max_gaussians: None,
             random_points: 20_000,
-            opacity_weight: 0.01,
-            antialias: false,
+            antialias: true,
             seed: 0,
             eval_every: 500,
             checkpoint_secs: 60.0,
@@ -190,12 +194,12 @@ mod tests {
     #[test]
     fn stored_settings_are_read_or_refused_but_never_guessed() {
         let stored = |config: Value| TrainConfig::stored(Path::new("desk"), config);
-        assert_eq!(stored(Value::Null).expect("none"), TrainConfig::default());
-        let own = TrainConfig { steps: 77, antialias: true, normal_weight: Some(0.5), ..TrainConfig::default() };
+        assert_eq!(stored(Value::Null).expect("none"), TrainConfig::unknown());
+        let own = TrainConfig { steps: 77, antialias: false, normal_weight: Some(0.5), ..TrainConfig::default() };
         assert_eq!(stored(serde_json::to_value(&own).expect("JSON")).expect("its own"), own);
         // Of an earlier version, and of a later one.
         let partial = stored(json!({ "steps": 9, "surfels": true, "new": {} })).expect("what it knows");
-        assert_eq!(partial, TrainConfig { steps: 9, surfels: true, ..TrainConfig::default() });
+        assert_eq!(partial, TrainConfig { steps: 9, surfels: true, ..TrainConfig::unknown() });
         for broken in [json!({ "steps": "many" }), json!({ "antialias": 3 }), json!([1, 2]), json!("x")] {
             let text = stored(broken.clone()).expect_err("unreadable").to_string();
             assert!(text.contains("desk/scene.json") && text.contains("'config'"), "{broken}: {text}");

@@ -45,11 +45,6 @@ impl DeviceRun {
         Ok(Self { trainer, photos })
     }
 
-    /// Gaussians there are.
-    pub(crate) fn gaussians(&self) -> usize {
-        self.trainer.len()
-    }
-
     pub(crate) fn upload(
         &mut self,
         cloud: &GaussianCloud,

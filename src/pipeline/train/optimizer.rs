@@ -145,7 +145,6 @@ fn step_block(renderer: &DifferentiableRenderer, block: &mut Block<'_>, update: 
             left.first = left.first.or(Some(*first + i));
             continue;
         }
-        let pulled = g.opacity_logit + rates.opacity_gradient(gaussian.opacity_logit);
         gradient[i] += g.screen;
         seen[i] += 1;
         let position = [&mut p.positions[i], &mut m.positions[i], &mut v.positions[i]].map(<[f32; 3]>::as_mut_slice);
@@ -155,7 +154,7 @@ fn step_block(renderer: &DifferentiableRenderer, block: &mut Block<'_>, update: 
         left.outliers += update_all(adam, position, &g.position, rates.position)
             + update_all(adam, scale, &g.log_scale, rates.log_scale)
             + update_all(adam, turn.map(<[f32; 4]>::as_mut_slice), &g.quaternion, rates.quaternion)
-            + update_all(adam, opacity.map(std::slice::from_mut), &[pulled], rates.opacity_logit);
+            + update_all(adam, opacity.map(std::slice::from_mut), &[g.opacity_logit], rates.opacity_logit);
         // All SH coefficients in one loop, which then runs in vectors.
         let mut d_sh = [0.0; 48];
         for (d, (k, c)) in d_sh.iter_mut().zip((0..*active).flat_map(|k| (0..3).map(move |c| (k, c)))) {

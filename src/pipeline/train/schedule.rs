@@ -14,8 +14,6 @@ pub struct Schedule {
     steps: u64,
     sh_degree: u8,
     extent: f64,
-    /// Weight of the mean opacity in the loss.
-    opacity_weight: f64,
     /// Factor on every rate, lowered after a divergence.
     pub damping: f64,
     /// Steps between openings of SH bands; 0 = all are open.
@@ -37,7 +35,6 @@ impl Schedule {
             steps: config.steps,
             sh_degree: config.sh_degree,
             extent,
-            opacity_weight: config.opacity_weight,
             damping: 1.0,
             sh_interval: if config.sh_at_once { 0 } else { scaled(2_000.0).clamp(1, 1_000) },
             densify_from: scaled(1_000.0).clamp(50, 500),
@@ -48,9 +45,8 @@ impl Schedule {
         }
     }
 
-    /// Rates at `step`, counted from 0, of so many Gaussians: exponential decay by 100 for positions, constant
-    /// otherwise.
-    pub(crate) fn rates(&self, step: u64, gaussians: usize) -> Rates {
+    /// Rates at `step`, counted from 0: exponential decay by 100 for positions, constant otherwise.
+    pub(crate) fn rates(&self, step: u64) -> Rates {
         let t = step as f64 / self.steps.max(1) as f64;
         let position = 1.6e-4 * self.extent * 0.01_f64.powf(t);
         let rate = |r: f64| (r * self.damping) as f32;
@@ -62,7 +58,6 @@ impl Schedule {
             sh_constant: rate(2.5e-3),
             // 3DGS has a twentieth, with which short runs hardly learn them (docs/measured.md).
             sh_rest: rate(2.5e-3 / 8.0),
-            per_opacity: (self.opacity_weight / gaussians.max(1) as f64) as f32,
         }
     }
 
@@ -104,10 +99,9 @@ mod tests {
     #[test]
     fn rates_decay_to_a_hundredth() {
         let s = schedule(1_000);
-        let (a, b) = (s.rates(0, 10).position, s.rates(1_000, 10).position);
+        let (a, b) = (s.rates(0).position, s.rates(1_000).position);
         assert!((a - 3.2e-4).abs() < 1e-9 && (a / b - 100.0).abs() < 1e-2);
-        assert_eq!(s.rates(0, 10).opacity_logit, s.rates(999, 10).opacity_logit);
-        assert_eq!(s.rates(0, 10).per_opacity, 10.0 * s.rates(999, 100).per_opacity);
+        assert_eq!(s.rates(0).opacity_logit, s.rates(999).opacity_logit);
     }
 
     #[test]

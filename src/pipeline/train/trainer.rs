@@ -159,8 +159,7 @@ impl Trainer {
             None => self.settings.background,
         };
         if let Some(device) = &mut self.device {
-            let rates = self.schedule.rates(self.step, device.gaussians());
-            device.step(i, view, &rates, (self.settings.sh_degree, background))?;
+            device.step(i, view, &self.schedule.rates(self.step), (self.settings.sh_degree, background))?;
             self.step += 1;
             return Ok(if self.step % REPORT_STEPS == 0 { device.results()? } else { Vec::new() });
         }
@@ -261,7 +260,7 @@ impl Trainer {
 
     fn update(&self, camera: &Camera) -> Update {
         Update {
-            rates: self.schedule.rates(self.step, self.cloud.len()),
+            rates: self.schedule.rates(self.step),
             adam: self.schedule.adam(self.step),
             stride: self.cloud.sh_stride(),
             active: sh::coefficients(self.settings.sh_degree.min(self.cloud.sh_degree)),

@@ -7,9 +7,7 @@
 //! for good is caught up with, because doubling is fast. A parameter without a second moment, new or
 //! just reset, has nothing to compare with: its first gradient counts as it is.
 
-use crate::math::Real;
-
-/// Learning rates of one step, in units of the parameters, and what it weighs besides the picture.
+/// Learning rates of one step, in units of the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[allow(missing_docs, reason = "each name says what it is")]
 pub struct Rates {
@@ -19,18 +17,6 @@ pub struct Rates {
     pub opacity_logit: f32,
     pub sh_constant: f32,
     pub sh_rest: f32,
-    /// Derivative of the loss by each opacity, whatever the picture says: the weight of the mean opacity over the
-    /// number of Gaussians.
-    pub per_opacity: f32,
-}
-
-impl Rates {
-    /// What the mean opacity adds to the gradient of an opacity's logit.
-    #[inline(always)]
-    pub fn opacity_gradient(&self, logit: f32) -> f32 {
-        let opacity = logit.sigmoid();
-        self.per_opacity * opacity * (1.0 - opacity)
-    }
 }
 
 /// Constants of one optimizer step.
@@ -88,20 +74,6 @@ mod tests {
             let (mut p, mut m, mut v) = (0.0, 0.0, 0.0);
             AdamStep::new(1).update(&mut p, g, &mut m, &mut v, 0.1);
             assert!((p + 0.1).abs() < 1e-3, "{g}: {p}");
-        }
-    }
-
-    #[test]
-    fn mean_opacity_has_its_gradient() {
-        let rates = Rates { per_opacity: 0.25, ..Rates::default() };
-        for logit in [-8.0_f32, -1.0, 0.0, 0.7, 6.0] {
-            let term = |x: f64| 0.25 / (1.0 + (-x).exp());
-            let x = f64::from(logit);
-            let difference = (term(x + 1e-5) - term(x - 1e-5)) / 2e-5;
-            assert!((f64::from(rates.opacity_gradient(logit)) - difference).abs() < 1e-7, "{logit}");
-        }
-        for logit in [f32::MIN, -1e3, 1e3, f32::MAX] {
-            assert_eq!(rates.opacity_gradient(logit), 0.0, "{logit}");
         }
     }
 

@@ -58,9 +58,7 @@ impl Adam {
     /// degrees are kept and `active` trained.
     pub(crate) fn prepare(&self, device: &Device, gaussians: u32, [stored, active]: [u8; 2], rates: &Rates, t: u64) {
         let constants = Constants::new(t);
-        let per_opacity = [rates.per_opacity, 0.0, 0.0];
-        let records = records(rates, active).into_iter().zip(per_opacity);
-        for ((buffer, stride), (rates, per_opacity)) in self.steps.iter().zip(strides(stored)).zip(records) {
+        for ((buffer, stride), rates) in self.steps.iter().zip(strides(stored)).zip(records(rates, active)) {
             let mut step = AdamStep {
                 floats: gaussians * stride as u32,
                 stride: stride.max(1) as u32,
@@ -72,7 +70,6 @@ impl Adam {
                 clip: CLIP,
                 growth: GROWTH,
                 outlier: OUTLIER,
-                per_opacity,
                 ..AdamStep::default()
             };
             step.rates.as_flattened_mut().copy_from_slice(&rates);

@@ -138,9 +138,8 @@ twins! {
         growth: f32,
         /// A gradient this many times too large is counted.
         outlier: f32,
-        /// See `Rates`; 0 but for the geometry.
-        per_opacity: f32,
-        pad: f32,
+        pad0: f32,
+        pad1: f32,
     }
 }
 

@@ -3,7 +3,6 @@
 
 use super::kernel::{Access, Kernel, Module, RecordedStage, Recorder};
 use super::rasterizer::GpuRasterizer;
-use super::readback::Copies;
 use super::shader::ShaderVariant;
 use super::{Device, GpuError};
 use crate::scene::Camera;
@@ -95,6 +94,11 @@ impl DevicePicture {
         Ok(Self { device: device.clone(), texture })
     }
 
+    /// Whether a window of this device can paint it.
+    pub(crate) fn lies_on(&self, device: &wgpu::Device) -> bool {
+        self.device.wgpu() == device
+    }
+
     /// For a window of the same device.
     pub(crate) fn view(&self) -> wgpu::TextureView {
         self.texture.create_view(&wgpu::TextureViewDescriptor::default())
@@ -111,7 +115,7 @@ impl DevicePicture {
         let mut recorder = Recorder::new(&self.device, None);
         recorder.encoder().copy_texture_to_buffer(self.texture.as_image_copy(), rows_of(&buffer, size), size);
         recorder.submit();
-        let copies: Copies = self.device.read(&[(&buffer, bytes)])?;
+        let copies = self.device.read(&[(&buffer, bytes)])?;
         Ok(unpacked(copies.bytes(0), size.width))
     }
 }

@@ -105,7 +105,8 @@ fn row(item: Item, plan: &ScenePlan) -> Option<Said> {
         (Item::Objects, _) => search_size(plan),
         (Item::Gaussians, _) => {
             photos?;
-            let reason = format!("What fits into {} of free memory", bytes(machine.free_memory_bytes));
+            let reason =
+                format!("What fits into {} of free memory; small photos need fewer", bytes(machine.free_memory_bytes));
             only(format!("at most {}", count(plan.max_gaussians as u64)), reason, "")
         }
         (Item::Backend, _) => match &machine.gpu {

@@ -57,7 +57,7 @@ impl FirstPage {
         }
         let Some(scene) = state.scene.as_ref().filter(|_| self.kept_for != state.scene_number) else { return };
         if viewport.picture().is_some_and(|p| p.full)
-            && let Some(pixels) = viewport.pixels()
+            && let Ok(Some(pixels)) = viewport.pixels()
         {
             self.kept_for = state.scene_number;
             if state.recent.contains(&scene.path) {

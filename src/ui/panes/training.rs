@@ -103,8 +103,7 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
         ui.add(DragValue::new(&mut config.holdout_every).range(0..=100).speed(0.1).custom_formatter(shown))
             .labelled_by(id);
         ui.end_row();
-        let id =
-            label(ui, "Gaussians", "Adds Gaussians where detail is missing; removes transparent and oversized ones.");
+        let id = label(ui, "Gaussians", "Adds Gaussians where detail is missing; removes transparent ones.");
         ui.checkbox(&mut config.densify, "densify and prune").labelled_by(id);
         ui.end_row();
     });
@@ -118,7 +117,7 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
             if let Some(n) = &mut config.max_gaussians {
                 ui.add(DragValue::new(n).range(1_000..=6_000_000).speed(1000)).accessible_name("Maximum Gaussians");
             } else {
-                ui.weak("limited by free memory");
+                ui.weak("by the photos' size and free memory");
             }
         });
         ui.horizontal(|ui| {

@@ -122,9 +122,17 @@ impl Display {
         };
         let start = Instant::now();
         let size = [picture.camera.width_px as usize, picture.camera.height_px as usize];
-        self.native.iter_mut().for_each(|native| native.show(picture.texture.as_ref()));
-        if picture.texture.is_none() {
-            upload(ctx, &mut self.texture, size, &picture.rgb);
+        // After a device was lost the worker may draw with another one than the window.
+        let native = self.native.as_mut();
+        let paints = |texture: &&DevicePicture| native.as_ref().is_some_and(|n| texture.lies_on(&n.window.device));
+        let texture = picture.texture.as_ref().filter(paints);
+        native.into_iter().for_each(|native| native.show(texture));
+        match &picture.texture {
+            None => upload(ctx, &mut self.texture, size, &picture.rgb),
+            Some(elsewhere) if texture.is_none() => {
+                elsewhere.to_rgb8().iter().for_each(|rgb| upload(ctx, &mut self.texture, size, rgb));
+            }
+            Some(_) => {}
         }
         match &picture.second {
             Some(second) => upload(ctx, &mut self.second, size, &second.rgb),

@@ -53,6 +53,7 @@ use super::layout::Layout;
 use super::state::{AppState, Tone};
 use crate::jobs::OpenedScene;
 use crate::navigate::Pose;
+use crate::render::GpuError;
 use crate::scene::{Camera, GaussianCloud, Identities, PhotoPixels};
 use crate::ui::actions::Action;
 use crate::worker::view::{ViewLane, ViewPicture};
@@ -154,16 +155,11 @@ impl Viewport {
     }
 
     /// The frame as pixels, for saving: that of the view that is worked in.
-    pub(crate) fn pixels(&self) -> Option<PhotoPixels> {
-        let p = self.picture()?;
-        let (width_px, height_px) = (p.camera.width_px, p.camera.height_px);
-        let second = p.second.as_ref().filter(|_| self.queries.is_second());
-        let rgb = match (second, &p.texture) {
-            (Some(second), _) => second.rgb.clone(),
-            (None, Some(texture)) => texture.to_rgb8().ok()?,
-            (None, None) => p.rgb.clone(),
-        };
-        Some(PhotoPixels { width_px, height_px, rgb, coverage: None })
+    ///
+    /// # Errors
+    /// If they lie on a device that does not give them back.
+    pub(crate) fn pixels(&self) -> Result<Option<PhotoPixels>, GpuError> {
+        self.picture().map(|picture| picture.pixels(self.queries.is_second())).transpose()
     }
 
     /// Takes over a new scene, new Gaussians and loaded photos.
