@@ -59,10 +59,11 @@ fn what_ships_is_as_good_as_its_record_says() {
     let mut map = scene.semantics().expect("objects");
     let mut job = PhotoComparison::new(scene, &folder.join("photos"), EvaluateOptions::default()).expect("photos");
     assert_eq!(job.views.len(), 8);
-    // Two of the eight views are a sample; the photos are JPEG here.
-    job.views.truncate(2);
     let quality = evaluate::photometric(&job, &mut Silent).expect("measured");
-    assert!(quality.psnr > record.psnr - 3.0, "{} {}", quality.psnr, record.psnr);
+    // The photos are JPEG here.
+    assert!((quality.psnr - record.psnr).abs() < 1.0, "{} {}", quality.psnr, record.psnr);
+    // Two of the eight views are a sample.
+    job.views.truncate(2);
     let asked = |map: &SemanticMap| demo_questions::ask(map, &folder.join("photos"), &job, None).expect("asked");
     let found = asked(&map);
     assert!(found.object_miou > 0.75 && found.part_miou > 0.5, "{found:?}");
