@@ -7,7 +7,12 @@ use super::front::{KnobChoice, NOISE};
 use super::table::{self, Rows};
 
 /// Why a default stays though the rule would choose another setting, by stage and knob.
-const STAYS: [(StageName, &str, &str); 9] = [
+const STAYS: [(StageName, &str, &str); 11] = [
+    (
+        StageName::Render,
+        "alpha cut-off",
+        "3DGS's: scenes are trained with it, here and elsewhere, and look as trained with no other",
+    ),
     (
         StageName::Train,
         "most Gaussians",
@@ -19,6 +24,7 @@ const STAYS: [(StageName, &str, &str); 9] = [
     (StageName::Features, "views used", "where most photos are labeled a part of them would do; mostly few are"),
     (StageName::Features, "gradients, exact", "a hundredth of overlap for ten times the time"),
     (StageName::Features, "votes, then gradients, exact", "a hundredth of overlap for ten times the time"),
+    (StageName::Depth, "transmittance cut-off", "depth comes with the colors, which need the rest"),
     (StageName::Query, "part features", "the paper's; it depends on the encoder, and this is the one that ships"),
     (StageName::Query, "encoder", "names alone know no words but the labels'"),
 ];
