@@ -37,7 +37,8 @@ pub fn markdown(reports: &[Report]) -> String {
          the table, is applied to the measurements of that knob's settings and of the default: *chosen* is what \
          it picks, *least error* the best setting whatever it costs. The default *holds* if it is good enough by \
          the rule and not more than {:.0} % slower than what is chosen, or slower by less than repeats \
-         differ; where it does not, the last column says why it stays. Times are medians of repeats on the machine named; compare them within a table only.\n",
+         differ; where it does not, the last column says why it stays. Times are medians of repeats on the machine \
+         named; compare them within a table only.\n",
         100.0 * NOISE
     );
     for report in reports {

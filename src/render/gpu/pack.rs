@@ -2,13 +2,10 @@
 //! paints; `shaders/pack.wgsl`.
 
 use super::kernel::{Access, Kernel, Module, RecordedStage, Recorder};
+use super::layout::{PACKED_BYTES, ROW_PX};
 use super::rasterizer::GpuRasterizer;
 use super::shader::ShaderVariant;
 use super::{Device, GpuError};
-use crate::scene::Camera;
-
-/// Bytes of a pixel.
-const PIXEL: u32 = 4;
 
 /// The kernel, and room for its bytes.
 #[derive(Debug)]
@@ -26,12 +23,12 @@ pub struct DevicePicture {
 
 /// Bytes from one row to the next.
 fn row_bytes(width_px: u32) -> u32 {
-    (width_px * PIXEL).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT)
+    width_px.next_multiple_of(ROW_PX) * PACKED_BYTES
 }
 
 /// Bytes of a picture with its rows apart.
-pub(super) fn packed_bytes(camera: &Camera) -> u64 {
-    u64::from(row_bytes(camera.width_px)) * u64::from(camera.height_px)
+pub(super) fn packed_bytes([width_px, height_px]: [u32; 2]) -> u64 {
+    u64::from(row_bytes(width_px)) * u64::from(height_px)
 }
 
 /// The pixels of packed rows, row-major.
@@ -56,8 +53,8 @@ impl Pack {
     }
 
     /// Makes room for a picture.
-    pub(crate) fn prepare(&mut self, device: &Device, camera: &Camera) -> Result<(), GpuError> {
-        device.grow(&mut self.bytes, "bytes of the picture", packed_bytes(camera))
+    pub(crate) fn prepare(&mut self, device: &Device, size_px: [u32; 2]) -> Result<(), GpuError> {
+        device.grow(&mut self.bytes, "bytes of the picture", packed_bytes(size_px))
     }
 
     /// Records the packing of a frame of `pixels`.
@@ -74,14 +71,15 @@ impl Pack {
 }
 
 impl DevicePicture {
-    /// Room for what `camera` sees.
-    pub(super) fn new(device: &Device, camera: &Camera) -> Result<Self, GpuError> {
+    /// Room for a picture.
+    pub(super) fn new(device: &Device, size_px: [u32; 2]) -> Result<Self, GpuError> {
         let usage =
             wgpu::TextureUsages::TEXTURE_BINDING | wgpu::TextureUsages::COPY_DST | wgpu::TextureUsages::COPY_SRC;
+        let [width, height] = size_px;
         let make = || {
             device.wgpu().create_texture(&wgpu::TextureDescriptor {
                 label: Some("picture"),
-                size: wgpu::Extent3d { width: camera.width_px, height: camera.height_px, depth_or_array_layers: 1 },
+                size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
                 mip_level_count: 1,
                 sample_count: 1,
                 dimension: wgpu::TextureDimension::D2,
@@ -90,7 +88,7 @@ impl DevicePicture {
                 view_formats: &[],
             })
         };
-        let texture = device.scoped("picture", packed_bytes(camera), make)?;
+        let texture = device.scoped("picture", packed_bytes(size_px), make)?;
         Ok(Self { device: device.clone(), texture })
     }
 
@@ -110,7 +108,7 @@ impl DevicePicture {
     /// If the device was lost, or has no memory for the copy.
     pub fn to_rgb8(&self) -> Result<Vec<[u8; 3]>, GpuError> {
         let size = self.texture.size();
-        let bytes = u64::from(row_bytes(size.width)) * u64::from(size.height);
+        let bytes = packed_bytes([size.width, size.height]);
         let buffer = self.device.storage("bytes of the picture", bytes)?;
         let mut recorder = Recorder::new(&self.device, None);
         recorder.encoder().copy_texture_to_buffer(self.texture.as_image_copy(), rows_of(&buffer, size), size);

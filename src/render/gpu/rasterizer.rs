@@ -152,7 +152,7 @@ impl GpuRasterizer {
         let (picture, channels) = (&self.picture, self.picture.channels);
         let depth_bytes = if settings.depth { pixels * 8 } else { 0 };
         let copies = device.read(&[
-            (&self.counters, size_of::<Counters>() as u64),
+            self.counted(),
             (&picture.colors, pixels * 16),
             (&picture.depths, depth_bytes),
             (&picture.features, pixels * 4 * channels as u64),
@@ -187,12 +187,26 @@ impl GpuRasterizer {
     }
 
     pub(crate) fn read_counters(&self, device: &Device) -> Result<Counters, GpuError> {
-        let copies = device.read(&[(&self.counters, size_of::<Counters>() as u64)])?;
-        Ok(counters_of(&copies))
+        Ok(counters_of(&device.read(&[self.counted()])?))
+    }
+
+    /// Copies the first bytes of a buffer, which come second, and the frame's counters.
+    pub(super) fn read_with(
+        &self,
+        device: &Device,
+        source: (&wgpu::Buffer, u64),
+    ) -> Result<(Copies, Counters), GpuError> {
+        let copies = device.read(&[self.counted(), source])?;
+        let counters = counters_of(&copies);
+        Ok((copies, counters))
+    }
+
+    fn counted(&self) -> (&wgpu::Buffer, u64) {
+        (&self.counters, size_of::<Counters>() as u64)
     }
 }
 
 /// The counters, which were read first.
-pub(super) fn counters_of(copies: &Copies) -> Counters {
+fn counters_of(copies: &Copies) -> Counters {
     copies.values(0).first().copied().unwrap_or_default()
 }

@@ -9,7 +9,7 @@ use super::layout::{Counters, Splat};
 use super::pack::{DevicePicture, Pack, packed_bytes, unpacked};
 use super::project::CloudShape;
 use super::project_backward::ProjectBackward;
-use super::rasterizer::{GpuRasterizer, counters_of};
+use super::rasterizer::GpuRasterizer;
 use super::scratch::GRADIENT_BASE;
 use super::timing::{StageTimes, Timer};
 use super::{Device, GpuError};
@@ -60,6 +60,10 @@ enum After<'a> {
     Pack,
     /// Packing, and a copy of that.
     Texture(&'a DevicePicture),
+}
+
+fn size_px(camera: &Camera) -> [u32; 2] {
+    [camera.width_px, camera.height_px]
 }
 
 fn pixels_of(camera: &Camera) -> u64 {
@@ -174,9 +178,9 @@ impl GpuRenderer {
     pub fn draw_rgb8(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<Vec<[u8; 3]>, GpuError> {
         loop {
             self.submit(camera, settings, After::Pack)?;
-            let counters = (&self.rasterizer.counters, size_of::<Counters>() as u64);
-            let copies = self.device.read(&[counters, (&self.pack.bytes, packed_bytes(camera))])?;
-            if self.settle(camera, settings, counters_of(&copies))? {
+            let packed = (&self.pack.bytes, packed_bytes(size_px(camera)));
+            let (copies, counters) = self.rasterizer.read_with(&self.device, packed)?;
+            if self.settle(camera, settings, counters)? {
                 return Ok(unpacked(copies.bytes(1), camera.width_px));
             }
         }
@@ -184,12 +188,11 @@ impl GpuRenderer {
 
     /// As [`Self::draw_rgb8`], but the colors stay on the device, for a window of the same.
     pub fn draw_texture(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<DevicePicture, GpuError> {
-        let picture = DevicePicture::new(&self.device, camera)?;
+        let picture = DevicePicture::new(&self.device, size_px(camera))?;
         loop {
             self.submit(camera, settings, After::Texture(&picture))?;
-            let counters = (&self.rasterizer.counters, size_of::<Counters>() as u64);
-            let copies = self.device.read(&[counters])?;
-            if self.settle(camera, settings, counters_of(&copies))? {
+            let counters = self.rasterizer.read_counters(&self.device)?;
+            if self.settle(camera, settings, counters)? {
                 return Ok(picture);
             }
         }
@@ -225,9 +228,8 @@ impl GpuRenderer {
             let mut recorder = Recorder::new(&self.device, None);
             recorder.stage("labels", |s| self.labels.encode(s, &self.rasterizer, [&of, &groups]));
             recorder.submit();
-            let counters = (&self.rasterizer.counters, size_of::<Counters>() as u64);
-            let copies = self.device.read(&[counters, (&self.labels.found, pixels * 12)])?;
-            if known || self.settle(camera, settings, counters_of(&copies))? {
+            let (copies, counters) = self.rasterizer.read_with(&self.device, (&self.labels.found, pixels * 12))?;
+            if known || self.settle(camera, settings, counters)? {
                 let winner = |[label, share, alpha]: &[u32; 3]| LabelWinner {
                     label: *label,
                     share: f32::from_bits(*share),
@@ -243,7 +245,7 @@ impl GpuRenderer {
         self.drawn = None;
         self.rasterizer.prepare(&self.device, camera, settings, self.shape, self.channels)?;
         if !matches!(after, After::Nothing) {
-            self.pack.prepare(&self.device, camera)?;
+            self.pack.prepare(&self.device, size_px(camera))?;
         }
         let mut recorder = Recorder::new(&self.device, self.timer.as_mut());
         self.rasterizer.encode_count(&mut recorder, &self.cloud);

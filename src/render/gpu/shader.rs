@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use super::GpuError;
+use super::layout::ROW_PX;
 use crate::render::cpu::labels::{COMPETITORS, UNKNOWN};
 use crate::render::{ALPHA_MAX, ALPHA_MIN, BLUR_PX2, COLOR_MAX, TILE_PX, TRANSMITTANCE_MIN};
 
@@ -102,7 +103,9 @@ fn constants(variant: ShaderVariant) -> String {
         // Writing to a String cannot fail.
         let _ = writeln!(out, "const {name}: f32 = {:e};", value as f32);
     }
-    let _ = writeln!(out, "const COMPETITORS: u32 = {COMPETITORS}u;\nconst UNKNOWN: u32 = {UNKNOWN}u;");
+    for (name, value) in [("COMPETITORS", COMPETITORS as u32), ("UNKNOWN", UNKNOWN), ("ROW_PX", ROW_PX)] {
+        let _ = writeln!(out, "const {name}: u32 = {value}u;");
+    }
     let _ =
         writeln!(out, "const CHANNELS: u32 = {}u;\nconst SLOTS: u32 = {}u;", variant.channels, variant.channels.max(1));
     out
