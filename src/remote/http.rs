@@ -16,6 +16,9 @@ const IDLE: Duration = Duration::from_secs(30);
 /// How long an answer may stand still, and how fast it must be taken, and a body come, on the whole, bytes a second.
 const STALL: Duration = Duration::from_secs(10);
 const SLOWEST: f64 = 8192.0;
+/// How long one write waits: a write that times out with a part taken does not tell when, so that this is how exactly
+/// a standstill is timed.
+const LOOK: Duration = Duration::from_millis(500);
 /// Bytes that are written at once.
 const PIECE: usize = 64 << 10;
 
@@ -188,12 +191,18 @@ impl Connection {
         }
         head += "\r\n";
         let deadline = Instant::now() + STALL + Duration::from_secs_f64(length as f64 / SLOWEST);
+        let mut stands_still = Instant::now() + STALL;
         for mut bytes in [head.as_bytes(), &response.body] {
             while !bytes.is_empty() {
-                self.stream.set_write_timeout(Some(left(deadline)?.min(STALL)))?;
-                match self.stream.write(&bytes[..bytes.len().min(PIECE)])? {
-                    0 => return Err(ErrorKind::WriteZero.into()),
-                    n => bytes = &bytes[n..],
+                self.stream.set_write_timeout(Some(left(deadline.min(stands_still))?.min(LOOK)))?;
+                match self.stream.write(&bytes[..bytes.len().min(PIECE)]) {
+                    Ok(0) => return Err(ErrorKind::WriteZero.into()),
+                    Ok(n) => {
+                        bytes = &bytes[n..];
+                        stands_still = Instant::now() + STALL;
+                    }
+                    Err(e) if is_timeout(&e) || e.kind() == ErrorKind::Interrupted => {}
+                    Err(e) => return Err(e),
                 }
             }
         }
