@@ -258,7 +258,7 @@ fn recall(
     let mut encoder = crate::models::encoder(&language.encoder)?;
     let mut rows = Vec::new();
     for components in part_recall::Components::ROWS {
-        rows.push(part_recall::row((components, recipe), map, language, views, |p| encoder.text(p))?);
+        rows.push(part_recall::row((components, recipe), map, language, views, &mut *encoder)?);
     }
     // The paper's full method, not ours, is what others can compare with.
     let units = rows.iter().rfind(|r| r.components.localization).map(|r| r.units.clone()).unwrap_or_default();

@@ -8,7 +8,7 @@ use super::engine::engine;
 use super::network::Network;
 use super::tensor::Tensor;
 use super::vocabulary::Vocabulary;
-use super::{Encoder, IdentityCrop, ModelError};
+use super::{Encoder, IdentityCrop, ModelError, token_rows};
 use crate::io::{IoError, files};
 
 const IMAGE: (&str, &[u8]) = ("demo_image.onnx", include_bytes!("../../assets/models/demo_image.onnx"));
@@ -89,10 +89,13 @@ impl Encoder for DemoEncoder {
     }
 
     fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
-        let tokens = self.words.encode(phrase)?;
-        let tokens = Tensor::new(&[1, tokens.len()], tokens);
-        let rows = self.text.ready()?.unit_rows(vec![("tokens", tokens.into())], "embedding", self.words.dimension)?;
-        self.only(rows)
+        let one = self.texts(&[phrase]).into_iter().collect::<Result<_, _>>()?;
+        self.only(one)
+    }
+
+    fn texts(&mut self, phrases: &[&str]) -> Vec<Result<Vec<f32>, ModelError>> {
+        let rows = phrases.iter().map(|phrase| self.words.encode(phrase)).collect();
+        token_rows::each(rows, |rows| Ok(token_rows::embed(self.text.ready()?, rows, self.words.dimension)))
     }
 
     fn unknown_words(&self, phrase: &str) -> Vec<String> {

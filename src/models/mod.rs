@@ -31,6 +31,7 @@ pub mod session_cache;
 mod template;
 pub mod tensor;
 mod tile;
+mod token_rows;
 mod unpack;
 mod vocabulary;
 mod words;
@@ -81,8 +82,39 @@ pub trait Encoder: Send {
     /// no other words is an error ([`ModelError::NoKnownWord`]).
     fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError>;
 
+    /// The vectors of several phrases, each as [`Encoder::text`] gives it, faster together. Fewer if the encoder
+    /// itself fails: the last says why.
+    fn texts(&mut self, phrases: &[&str]) -> Vec<Result<Vec<f32>, ModelError>> {
+        phrases.iter().map(|phrase| self.text(phrase)).collect()
+    }
+
     /// The words of a phrase that it does not know, each once, the first few of them.
     fn unknown_words(&self, phrase: &str) -> Vec<String>;
+}
+
+/// What gives the vectors of phrases: an encoder, or a function that knows one at a time.
+pub trait TextSource {
+    /// Why it has none of a phrase.
+    type Error;
+
+    /// The vectors of these phrases, in their order; fewer if it fails itself: the last says why.
+    fn texts(&mut self, phrases: &[&str]) -> Vec<Result<Vec<f32>, Self::Error>>;
+}
+
+impl TextSource for dyn Encoder + '_ {
+    type Error = ModelError;
+
+    fn texts(&mut self, phrases: &[&str]) -> Vec<Result<Vec<f32>, ModelError>> {
+        Encoder::texts(self, phrases)
+    }
+}
+
+impl<E, F: FnMut(&str) -> Result<Vec<f32>, E>> TextSource for F {
+    type Error = E;
+
+    fn texts(&mut self, phrases: &[&str]) -> Vec<Result<Vec<f32>, E>> {
+        phrases.iter().map(|phrase| self(phrase)).collect()
+    }
 }
 
 /// Name of the encoder that comes with the program.

@@ -1,7 +1,7 @@
 //! A network: named arrays in, named arrays out.
 
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
 use super::ModelError;
@@ -43,15 +43,27 @@ impl Network {
         Self { reopen: Some(Box::new(reopen)), ..self }
     }
 
-    /// Runs it. Every number that comes out is finite.
-    pub(crate) fn run(&mut self, inputs: Vec<(&'static str, NetworkInput)>) -> Result<Outputs, ModelError> {
-        let name = self.name.clone();
+    /// Its session, opened again if it was closed.
+    fn opened(&self) -> Result<MutexGuard<'_, CachedSession>, ModelError> {
         // A panic while it ran leaves a session that runs again.
         let mut place = self.place.lock().unwrap_or_else(PoisonError::into_inner);
         if let (None, Some(reopen)) = (&place.session, &self.reopen) {
             place.session = Some(reopen()?);
         }
         place.used = Instant::now();
+        Ok(place)
+    }
+
+    /// Which axes of an input may be of any length; none if that cannot be told.
+    pub(super) fn free_axes(&self, input: &str) -> Vec<bool> {
+        let shape = self.opened().ok().and_then(|place| place.session.as_ref()?.wanted_shape(input));
+        shape.unwrap_or_default().iter().map(Option::is_none).collect()
+    }
+
+    /// Runs it. Every number that comes out is finite.
+    pub(crate) fn run(&mut self, inputs: Vec<(&'static str, NetworkInput)>) -> Result<Outputs, ModelError> {
+        let name = self.name.clone();
+        let mut place = self.opened()?;
         let Some(session) = &mut place.session else {
             return Err(ModelError::Run { model: name, problem: "it is closed".into() });
         };

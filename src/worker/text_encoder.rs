@@ -96,10 +96,10 @@ fn encode(encoder: &mut dyn Encoder, known: &mut TextEmbeddings, texts: TextRequ
     let mut encoded = Encoded::default();
     for (phrase, recipe) in texts {
         let start = Instant::now();
-        let learned = known.learn(&phrase, &recipe, |p| encoder.text(p));
-        let copy = |p: &str| known.get(p).map(<[f32]>::to_vec).ok_or(());
+        let learned = known.learn(&phrase, &recipe, encoder);
+        let mut copy = |p: &str| known.get(p).map(<[f32]>::to_vec).ok_or(());
         let one = EncodedText {
-            known: learned.is_ok() && encoded.phrases.learn(&phrase, &recipe, copy).is_ok(),
+            known: learned.is_ok() && encoded.phrases.learn(&phrase, &recipe, &mut copy).is_ok(),
             unknown: encoder.unknown_words(&phrase.text),
             problem: match learned {
                 // A word that it does not know is no failure.

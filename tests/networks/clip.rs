@@ -79,6 +79,21 @@ fn embeddings_are_those_of_open_clip() {
 }
 
 #[test]
+fn texts_may_end_where_their_rows_say_nothing_more() {
+    let (t, mut clip) =
+        (Tensors::open("clip.safetensors"), ClipEncoder::open(&fixture::path("clip.json")).expect("opens"));
+    let (tokens, official) = (t.ints("tokens"), t.floats("text_embedding"));
+    for k in 0..tokens.shape[0] {
+        let row = tokens.row(k);
+        let ends = row.values.iter().position(|id| *id == 1023).expect("an end") + 1;
+        let mut cut =
+            |n: usize| clip.embed_tokens(Tensor::new(&[1, n], row.values[..n].to_vec())).expect("embeds").concat();
+        let right = unit(&official.row(k).values).expect("a direction");
+        agrees("a cut text", &cut(ends), &cut(ends - 1), &right);
+    }
+}
+
+#[test]
 fn tiles_of_any_size_and_phrases_without_words() {
     let mut clip = ClipEncoder::open(&fixture::path("clip.json")).expect("opens");
     assert_eq!((clip.name(), clip.dimension(), clip.tile_side_px()), ("clip", 32, None));

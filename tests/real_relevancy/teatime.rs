@@ -74,9 +74,10 @@ impl Scene {
     /// Embeddings of questions and of all phrases that answering them by `recipe` needs, as far as there are any.
     pub fn phrases<'q>(&self, questions: impl IntoIterator<Item = &'q str>, recipe: &Recipe) -> TextEmbeddings {
         let mut phrases = TextEmbeddings::default();
-        let known = |p: &str| self.texts.iter().find(|t| t.0.eq_ignore_ascii_case(p)).map(|t| t.1.clone()).ok_or(());
+        let mut known =
+            |p: &str| self.texts.iter().find(|t| t.0.eq_ignore_ascii_case(p)).map(|t| t.1.clone()).ok_or(());
         for question in questions {
-            phrases.learn(&plain(question), recipe, known).expect("known");
+            phrases.learn(&plain(question), recipe, &mut known).expect("known");
         }
         phrases
     }

@@ -47,6 +47,9 @@ def check_clip(folder, report):
     wrong = f["tokens"].copy()
     wrong[:, 1] = (wrong[:, 1] + 5) % 1022  # also the end token of the empty text, which then has none
     report.tensor("clip text", text(tokens=f["tokens"])["embedding"], f["text_embedding"], text(tokens=wrong)["embedding"])
+    ends = f["tokens"].argmax(1) + 1
+    cut = lambda short: np.concatenate([text(tokens=row[None, :end - short])["embedding"] for row, end in zip(f["tokens"], ends)])
+    report.tensor("clip text, rows cut after their end", cut(0), f["text_embedding"], cut(1))
 
 
 def check_decoder(folder, report, kind):

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import open_clip
 import torch
+import torch.nn.functional as F
+from open_clip import model as open_clip_model
 from open_clip import transformer as open_clip_transformer
 
 import graphs
@@ -43,6 +45,37 @@ class Text(torch.nn.Module):
 
     def forward(self, tokens):
         return self.model.encode_text(tokens)
+
+
+class TextOfAnyLength(torch.nn.Module):
+    """The same of rows that may end after the end token: the official steps, positions and mask cut to them."""
+
+    def __init__(self, model):
+        super().__init__()
+        self.model = model
+
+    def forward(self, tokens):
+        m = self.model
+        # By index, as the exporter takes the lengths of slices for fixed.
+        at = torch.arange(tokens.shape[1])
+        x = m.token_embedding(tokens) + m.positional_embedding.index_select(0, at)
+        x = m.ln_final(m.transformer(x, attn_mask=m.attn_mask.index_select(0, at).index_select(1, at)))
+        x = open_clip_model.text_global_pool(x, tokens, "argmax")
+        return m.text_projection(x) if isinstance(m.text_projection, torch.nn.Linear) else x @ m.text_projection
+
+
+def attention_of_any_length(self, query, key, value, need_weights=False, attn_mask=None, **more):
+    """The official self-attention of rows of one batch, written so that no length becomes fixed when it is exported."""
+    n, t, width = query.shape
+    each = F.linear(query, self.in_proj_weight, self.in_proj_bias).reshape(n, t, 3 * self.num_heads, self.head_dim).transpose(1, 2)
+    q, k, v = each.chunk(3, 1)
+    weights = torch.softmax(q @ k.transpose(2, 3) * self.head_dim ** -.5 + attn_mask, -1)
+    return self.out_proj((weights @ v).transpose(1, 2).reshape(n, t, width)), None
+
+
+def may_be_cut(model):
+    """Whether a token sees those before it alone, and the end token's row is the result."""
+    return getattr(model, "text_pool_type", None) == "argmax" and model.attn_mask is not None and model.text_projection is not None
 
 
 def pool_by_one_hot(pool):
@@ -116,14 +149,17 @@ def write(model, out, name, architecture=None, source=""):
     tokens[:, 0], tokens[0, 4], tokens[1, 9] = vocab - 2, vocab - 1, vocab - 1
     image = graphs.export(Image(model), {"pixels": pixels}, ["embedding"], out / f"{name}_image.onnx",
                           {"pixels": {0: "n"}, "embedding": {0: "n"}})
-    official = open_clip_transformer.text_global_pool
-    from open_clip import model as open_clip_model
+    wrapped, axes = (TextOfAnyLength(model), {0: "n", 1: "t"}) if may_be_cut(model) else (Text(model), {0: "n"})
+    official, attention = open_clip_transformer.text_global_pool, torch.nn.MultiheadAttention.forward
     open_clip_transformer.text_global_pool = open_clip_model.text_global_pool = pool_by_one_hot(official)
+    if 1 in axes:
+        torch.nn.MultiheadAttention.forward = attention_of_any_length
     try:
-        text = graphs.export(Text(model), {"tokens": tokens}, ["embedding"], out / f"{name}_text.onnx",
-                             {"tokens": {0: "n"}, "embedding": {0: "n"}})
+        text = graphs.export(wrapped, {"tokens": tokens}, ["embedding"], out / f"{name}_text.onnx",
+                             {"tokens": axes, "embedding": {0: "n"}})
     finally:
         open_clip_transformer.text_global_pool = open_clip_model.text_global_pool = official
+        torch.nn.MultiheadAttention.forward = attention
     with torch.no_grad():
         dimension = model.encode_text(tokens).shape[1]
     bias = getattr(model, "logit_bias", None)

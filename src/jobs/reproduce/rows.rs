@@ -95,7 +95,7 @@ pub(super) fn measure(
     let mut rows = Vec::new();
     if settings.table == PaperTable::PartAblation {
         for components in Components::ROWS {
-            let row = part_recall::row((components, &ours()), map, language, &views, |p| by.encoder.text(p))?;
+            let row = part_recall::row((components, &ours()), map, language, &views, &mut *by.encoder)?;
             let recall = percent(row.units.iter().map(|u| f64::from(u.iou >= part_recall::HIT_IOU)));
             let ious = percent(row.units.iter().map(|u| u.iou));
             let scores = BTreeMap::from([(RECALL.into(), recall), (PART_IOU.into(), ious)]);
@@ -151,8 +151,7 @@ impl ByEmbedding {
         how: (&LanguageFeatures, &Recipe),
         text: &str,
     ) -> Result<Option<QueryAnswer>, ModelError> {
-        let encode = |p: &str| self.encoder.text(p);
-        match ask_by_embedding(&map.identities, how, text, &mut self.phrases, encode) {
+        match ask_by_embedding(&map.identities, how, text, &mut self.phrases, &mut *self.encoder) {
             Err(ModelError::NoKnownWord { .. }) => {
                 self.unknown.insert(text.to_owned());
                 Ok(None)
@@ -316,7 +315,7 @@ fn rule_rows(
     let mut kept = None;
     let blended = table.ruled_row("raw features per Gaussian, LERF's mask rule", views, &mut |k, phrase| {
         let Some(parsed) = ParsedQuery::parse(phrase) else { return Ok(None) };
-        match by.phrases.learn(&parsed, &recipe, |p| by.encoder.text(p)) {
+        match by.phrases.learn(&parsed, &recipe, &mut *by.encoder) {
             // The row before has noted it.
             Err(ModelError::NoKnownWord { .. }) => return Ok(None),
             learned => learned?,
@@ -340,7 +339,7 @@ fn times(
     by: &mut ByEmbedding,
 ) -> Result<QueryTimes, JobError> {
     let (mut canonical, recipe) = (TextEmbeddings::default(), ours());
-    canonical.learn_canonical(&recipe, |p| by.encoder.text(p));
+    canonical.learn_canonical(&recipe, &mut *by.encoder);
     let (mut whole, mut without) = (Vec::new(), Vec::new());
     for view in views {
         for phrase in table.phrases(view) {

@@ -85,7 +85,7 @@ pub(crate) fn time(
     // Canonical phrases are encoded when a scene opens, once.
     let mut canonical = TextEmbeddings::default();
     let recipe = Recipe::default();
-    canonical.learn_canonical(&recipe, |p| encoder.text(p));
+    canonical.learn_canonical(&recipe, encoder);
     for _ in 0..queries {
         let word = |list: &[&str], rng: &mut Pcg64Mcg| list.choose(rng).copied().unwrap_or("mug").to_owned();
         let (color, thing) = (word(&COLORS, &mut rng), word(&THINGS, &mut rng));
@@ -95,7 +95,7 @@ pub(crate) fn time(
         };
         let mut phrases = canonical.clone();
         let how = (&features, &recipe);
-        let Some(answered) = ask_by_embedding(&all, how, &text, &mut phrases, |p| encoder.text(p))? else { continue };
+        let Some(answered) = ask_by_embedding(&all, how, &text, &mut phrases, encoder)? else { continue };
         let target = answered.answer.hits().first().map_or(NOBODY, |h| h.identity);
         let start = Instant::now();
         let pixels = matching::exact(&map, &all, target, TOLERANCE);

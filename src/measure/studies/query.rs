@@ -78,7 +78,7 @@ pub(crate) fn study<'a>(
     Ok(Study::new(stage, variants(recipe).0, move |variant: &Variant, _seed, observer| {
         let features = reduced(language, map, variant);
         let mut canonical = TextEmbeddings::default();
-        canonical.learn_canonical(&variant.recipe, |p| encoder.text(p));
+        canonical.learn_canonical(&variant.recipe, &mut *encoder);
         let mut renderer = Renderer::new();
         let (mut secs, mut ious, mut hits) = (Vec::new(), [Vec::new(), Vec::new()], Vec::new());
         let (mut not_understood, mut broken) = (Vec::new(), None);
@@ -225,7 +225,7 @@ fn ask(
     if recipe.understanding == Understanding::Names {
         return Ok(ask_by_name(&map.identities, text, LevelFilter::Auto, recipe));
     }
-    match ask_by_embedding(&map.identities, (features, recipe), text, &mut phrases, |p| encoder.text(p)) {
+    match ask_by_embedding(&map.identities, (features, recipe), text, &mut phrases, encoder) {
         Err(ModelError::NoKnownWord { .. }) => Ok(None),
         answered => answered.map_err(failed),
     }

@@ -12,7 +12,7 @@ use self::tokens::Tokens;
 use super::network::Network;
 use super::preprocess::{FitSide, Prepare};
 use super::tensor::Tensor;
-use super::{Encoder, IdentityCrop, ModelError, manifest};
+use super::{Encoder, IdentityCrop, ModelError, manifest, token_rows};
 use crate::math::resize::Filter;
 use crate::scene::PhotoPixels;
 
@@ -104,6 +104,20 @@ impl ClipEncoder {
         network.unit_rows(vec![("pixels", pixels.into())], "embedding", self.about.embed_dim)
     }
 
+    /// The tokens of a phrase.
+    fn row(&self, phrase: &str) -> Result<Vec<i64>, ModelError> {
+        if !phrase.chars().any(char::is_alphanumeric) {
+            return Err(ModelError::NoKnownWord { unknown: Vec::new() });
+        }
+        let row = self.tokens.row(phrase);
+        // Looking up a token that is not in its table would end some engines' process.
+        if let Some(token) = row.iter().find(|t| **t >= self.about.vocab_size as i64) {
+            let (model, tokens) = (self.about.name.clone(), self.about.vocab_size);
+            return Err(ModelError::Token { model, token: *token, tokens });
+        }
+        Ok(row)
+    }
+
     /// Embeddings of rows of tokens, of unit length.
     pub fn embed_tokens(&mut self, tokens: Tensor<i64>) -> Result<Vec<Vec<f32>>, ModelError> {
         let network = self.about.graphs.text.ready(&mut self.text, &self.folder)?;
@@ -135,17 +149,15 @@ impl Encoder for ClipEncoder {
     }
 
     fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
-        if !phrase.chars().any(char::is_alphanumeric) {
-            return Err(ModelError::NoKnownWord { unknown: Vec::new() });
-        }
-        let row = self.tokens.row(phrase);
-        // Looking up a token that is not in its table would end some engines' process.
-        if let Some(token) = row.iter().find(|t| **t >= self.about.vocab_size as i64) {
-            let (model, tokens) = (self.about.name.clone(), self.about.vocab_size);
-            return Err(ModelError::Token { model, token: *token, tokens });
-        }
-        let mut rows = self.embed_tokens(Tensor::new(&[1, row.len()], row))?;
-        rows.pop().ok_or(ModelError::NoKnownWord { unknown: Vec::new() })
+        self.texts(&[phrase]).pop().unwrap_or(Err(ModelError::NoKnownWord { unknown: Vec::new() }))
+    }
+
+    fn texts(&mut self, phrases: &[&str]) -> Vec<Result<Vec<f32>, ModelError>> {
+        let rows = phrases.iter().map(|phrase| self.row(phrase)).collect();
+        token_rows::each(rows, |rows| {
+            let network = self.about.graphs.text.ready(&mut self.text, &self.folder)?;
+            Ok(token_rows::embed(network, rows, self.about.embed_dim))
+        })
     }
 
     fn unknown_words(&self, _: &str) -> Vec<String> {

@@ -192,6 +192,30 @@ fn combinations_that_training_never_saw_are_found() {
     assert!(right > FOUND && wrong < 0.2, "above the canonical phrases: right {right}, wrong {wrong}");
 }
 
+#[test]
+fn phrases_together_are_as_alone() {
+    let mut encoder = DemoEncoder::new().unwrap();
+    let phrases = ["red mug", "the wheel of the green toy car", "giraffe", "things", "red mug", "button"];
+    let together = encoder.texts(&phrases);
+    assert_eq!(together.len(), phrases.len());
+    for (phrase, got) in phrases.iter().zip(&together) {
+        match (got, encoder.text(phrase)) {
+            (Ok(got), Ok(alone)) => assert!(worst_difference(got, &alone) < 1e-6, "{phrase}"),
+            (Err(ModelError::NoKnownWord { .. }), Err(ModelError::NoKnownWord { .. })) => {
+                assert_eq!(*phrase, "giraffe")
+            }
+            other => panic!("{phrase}: {other:?}"),
+        }
+    }
+    assert!(encoder.texts(&["giraffe"])[0].is_err() && encoder.texts(&[]).is_empty());
+    // Longer than needed, as networks of fixed shapes ask for, is the same.
+    let row = encoder.words.encode("red mug").unwrap();
+    let tokens = Tensor::new(&[1, row.len()], row);
+    let network = encoder.text.ready().unwrap();
+    let whole = network.unit_rows(vec![("tokens", tokens.into())], "embedding", encoder.words.dimension).unwrap();
+    assert!(worst_difference(together[0].as_ref().unwrap(), &whole[0]) < 1e-6);
+}
+
 /// What this process's engine makes of the golden phrases and tiles.
 fn embeddings() -> Vec<Vec<f32>> {
     let mut encoder = DemoEncoder::new().unwrap();

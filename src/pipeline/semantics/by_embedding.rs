@@ -10,7 +10,7 @@ use super::parse::ParsedQuery;
 use super::recipe::{PartFeatures, Recipe, Rejection, Strategy};
 use super::relevancy::{advantage, score};
 use crate::math::finite::{all_finite, insist};
-use crate::models;
+use crate::models::{self, TextSource};
 use crate::scene::{Identities, IdentityId, LanguageFeatures, ViewFeatures};
 
 /// Embeddings of phrases, kept from query to query; `None` for those that the encoder could not read.
@@ -23,34 +23,48 @@ impl TextEmbeddings {
 
     /// Adds the embeddings that `encode` makes of the phrases that answering a question by this recipe needs, unless
     /// they are there already. Only those of the question itself have to be understood.
-    pub fn learn<E>(
+    pub fn learn<S: TextSource + ?Sized>(
         &mut self,
         phrase: &ParsedQuery,
         recipe: &Recipe,
-        mut encode: impl FnMut(&str) -> Result<Vec<f32>, E>,
-    ) -> Result<(), E> {
+        source: &mut S,
+    ) -> Result<(), S::Error> {
         if self.0.len() > Self::MOST {
             self.0.clear();
         }
-        for needed in std::iter::once(&phrase.text).chain(&phrase.whole) {
-            if self.get(needed).is_none() {
-                self.0.insert(needed.clone(), Some(encode(needed)?));
-            }
-        }
-        self.try_to_learn(helpful(phrase, recipe), encode);
-        Ok(())
+        let own: Vec<&str> = std::iter::once(&phrase.text).chain(&phrase.whole).map(String::as_str).collect();
+        let helpful = helpful(phrase, recipe);
+        self.add(&own, helpful.iter().map(String::as_str), source)
     }
 
     /// Adds the embeddings of the canonical phrases of a recipe.
-    pub(crate) fn learn_canonical<E>(&mut self, recipe: &Recipe, encode: impl FnMut(&str) -> Result<Vec<f32>, E>) {
-        self.try_to_learn(recipe.canonical.iter().map(str::to_owned).collect(), encode);
+    pub(crate) fn learn_canonical<S: TextSource + ?Sized>(&mut self, recipe: &Recipe, source: &mut S) {
+        // Nothing that has to be understood is among them.
+        let _ = self.add(&[], recipe.canonical.iter(), source);
     }
 
-    fn try_to_learn<E>(&mut self, phrases: Vec<String>, mut encode: impl FnMut(&str) -> Result<Vec<f32>, E>) {
-        for phrase in phrases {
-            let embedding = |phrase: &String| encode(phrase).ok();
-            self.0.entry(phrase).or_insert_with_key(embedding);
+    /// Adds what is not known of these phrases, encoded together: those that have to be understood, and others.
+    fn add<'p, S: TextSource + ?Sized>(
+        &mut self,
+        own: &[&'p str],
+        helpful: impl Iterator<Item = &'p str>,
+        source: &mut S,
+    ) -> Result<(), S::Error> {
+        let mut needed: Vec<&str> = own.iter().copied().filter(|p| self.get(p).is_none()).collect();
+        let own = needed.len();
+        for phrase in helpful {
+            if !self.0.contains_key(phrase) && !needed.contains(&phrase) {
+                needed.push(phrase);
+            }
         }
+        if needed.is_empty() {
+            return Ok(());
+        }
+        let mut embeddings = source.texts(&needed).into_iter();
+        let understood: Vec<Vec<f32>> = embeddings.by_ref().take(own).collect::<Result<_, _>>()?;
+        let all = understood.into_iter().map(Some).chain(embeddings.map(Result::ok));
+        self.0.extend(needed.into_iter().map(str::to_owned).zip(all));
+        Ok(())
     }
 
     /// Whether the encoder was asked for a phrase in vain.
@@ -207,7 +221,7 @@ mod tests {
 
     fn book() -> TextEmbeddings {
         let mut book = TextEmbeddings::default();
-        let encode = |p: &str| {
+        let mut encode = |p: &str| {
             Ok::<_, ()>(match p {
                 "lid" => vec![0.0, 1.0],
                 "pot" => vec![1.0, 0.0],
@@ -215,7 +229,7 @@ mod tests {
             })
         };
         for phrase in ["lid", "pot"] {
-            book.learn(&parsed(phrase), &Recipe::default(), encode).expect("encodes");
+            book.learn(&parsed(phrase), &Recipe::default(), &mut encode).expect("encodes");
         }
         book
     }
@@ -250,14 +264,14 @@ mod tests {
         let mut book = TextEmbeddings::default();
         let mut calls = 0;
         for _ in 0..3 {
-            let encode = |_: &str| {
+            let mut encode = |_: &str| {
                 calls += 1;
                 Ok::<_, ()>(vec![1.0])
             };
-            book.learn(&parsed("lid"), &Recipe::default(), encode).expect("encodes");
+            book.learn(&parsed("lid"), &Recipe::default(), &mut encode).expect("encodes");
         }
         assert_eq!(calls, 1 + PAPERS_PHRASES.len());
-        assert_eq!(book.learn(&parsed("pot"), &Recipe::default(), |_| Err("no")), Err("no"));
+        assert_eq!(book.learn(&parsed("pot"), &Recipe::default(), &mut |_: &str| Err("no")), Err("no"));
         assert!(book.get("pot").is_none());
     }
 
@@ -286,7 +300,7 @@ mod tests {
         let mut book = TextEmbeddings::default();
         let recipe = Recipe::default();
         let learn = |phrase: &str, book: &mut TextEmbeddings| {
-            book.learn(&parsed(phrase), &recipe, |_| Ok::<_, ()>(vec![1.0])).expect("encodes")
+            book.learn(&parsed(phrase), &recipe, &mut |_: &str| Ok::<_, ()>(vec![1.0])).expect("encodes")
         };
         let half = TextEmbeddings::MOST / 2;
         (0..half).for_each(|i| learn(&i.to_string(), &mut book));
@@ -300,12 +314,12 @@ mod tests {
     fn the_recipe_says_which_phrases_are_needed() {
         let learned = |phrase: &str, recipe: Recipe| {
             let mut asked = Vec::new();
-            let encode = |p: &str| {
+            let mut encode = |p: &str| {
                 asked.push(p.to_owned());
                 if p == "bear" { Err("no") } else { Ok(vec![1.0]) }
             };
             let mut book = TextEmbeddings::default();
-            book.learn(&parsed(phrase), &recipe, encode).expect("only what was asked has to be understood");
+            book.learn(&parsed(phrase), &recipe, &mut encode).expect("only what was asked has to be understood");
             asked
         };
         let of = |strategy, rejection| Recipe { strategy, rejection, ..Recipe::default() };

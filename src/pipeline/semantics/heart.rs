@@ -175,7 +175,7 @@ fn by_looks(
 ) -> Option<QueryAnswer> {
     let phrase = ParsedQuery::parse(text)?;
     let recipe = plain();
-    book.learn(&phrase, &recipe, |p| encoder.text(p)).ok()?;
+    book.learn(&phrase, &recipe, &mut |p: &str| encoder.text(p)).ok()?;
     let language = Language { features, phrases: book };
     Some(by_embedding(&map.identities, &phrase, LevelFilter::Auto, &recipe, language))
 }
@@ -235,7 +235,9 @@ fn figures(scene: &Scene, map: &SemanticMap, trained: &SemanticMap, encoder: &mu
     let (drawn, blended) = (scene.drawn(map), CodeMap::default());
     let views = scene.views(&drawn, &blended);
     let recall = Components::ROWS.map(|row| {
-        part_recall::row((row, &Recipe::default()), map, features, &views, |p| encoder.text(p)).expect("encodes").recall
+        part_recall::row((row, &Recipe::default()), map, features, &views, &mut |p: &str| encoder.text(p))
+            .expect("encodes")
+            .recall
     });
     let mut book = TextEmbeddings::default();
     let (mut objects, mut present) = (Vec::new(), Vec::new());

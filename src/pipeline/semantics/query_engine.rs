@@ -10,7 +10,7 @@ use super::parse::ParsedQuery;
 use super::reading::QueryReading;
 use super::recipe::{Recipe, Understanding};
 use super::timing::{StagesMs, ms_since};
-use crate::models::{self, Encoder, ModelError};
+use crate::models::{self, Encoder, ModelError, TextSource};
 use crate::scene::{Identities, LanguageFeatures, LevelFilter, SemanticMap};
 
 /// What answers questions about a scene; without an encoder, by names alone.
@@ -69,7 +69,7 @@ impl QueryEngine {
         let start = Instant::now();
         let wanted = self.recipe.understanding != Understanding::Names;
         let known = match self.encoder.as_mut().filter(|_| wanted) {
-            Some(encoder) => match self.phrases.learn(&reading.phrase, &self.recipe, |p| encoder.text(p)) {
+            Some(encoder) => match self.phrases.learn(&reading.phrase, &self.recipe, &mut **encoder) {
                 Ok(()) => true,
                 // Words that nobody knows are no failure: names may know them.
                 Err(ModelError::NoKnownWord { .. }) => false,
@@ -112,17 +112,17 @@ pub(crate) fn ask_by_name(
 }
 
 /// Answers a question by these `features` alone, whatever identities are called; `None` if there is nothing in
-/// it. `encode` gives the embedding of a phrase, and `phrases` keeps it.
-pub(crate) fn ask_by_embedding<E>(
+/// it. `source` gives the embeddings of phrases, and `phrases` keeps them.
+pub(crate) fn ask_by_embedding<S: TextSource + ?Sized>(
     identities: &Identities,
     (features, recipe): (&LanguageFeatures, &Recipe),
     text: &str,
     phrases: &mut TextEmbeddings,
-    encode: impl FnMut(&str) -> Result<Vec<f32>, E>,
-) -> Result<Option<QueryAnswer>, E> {
+    source: &mut S,
+) -> Result<Option<QueryAnswer>, S::Error> {
     let start = Instant::now();
     let Some(phrase) = ParsedQuery::parse(text) else { return Ok(None) };
-    phrases.learn(&phrase, recipe, encode)?;
+    phrases.learn(&phrase, recipe, source)?;
     let encode = ms_since(start);
     let language = Language { features, phrases };
     let mut answered = by_embedding(identities, &phrase, LevelFilter::Auto, recipe, language);

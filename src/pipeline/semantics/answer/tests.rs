@@ -37,14 +37,14 @@ fn ask_of(
 ) -> QueryAnswer {
     let phrase = ParsedQuery::parse(text).expect("a phrase");
     let mut phrases = TextEmbeddings::default();
-    let encode = |p: &str| {
+    let mut encode = |p: &str| {
         Ok::<_, ()>(match p {
             "cup" => vec![1.0, 0.0, 0.0],
             "giraffe" => vec![0.0, 0.0, -1.0],
             _ => vec![0.5, 0.5, 0.5],
         })
     };
-    phrases.learn(&phrase, recipe, encode).expect("encodes");
+    phrases.learn(&phrase, recipe, &mut encode).expect("encodes");
     let language = Language { features: &features, phrases: &phrases };
     answer(&all, &read(&all, text, recipe), LevelFilter::Auto, recipe, with_meaning.then_some(language))
 }
@@ -78,9 +78,9 @@ fn meaning_comes_first_where_a_word_is_unknown_and_names_where_it_finds_nothing(
     let ask = |text: &str, to: [f32; 3]| {
         let phrase = ParsedQuery::parse(text).expect("a phrase");
         let mut phrases = TextEmbeddings::default();
-        let encode = |p: &str| Ok::<_, ()>(if p == text { to.to_vec() } else { vec![0.5, 0.5, 0.5] });
+        let mut encode = |p: &str| Ok::<_, ()>(if p == text { to.to_vec() } else { vec![0.5, 0.5, 0.5] });
         let recipe = Recipe::default();
-        phrases.learn(&phrase, &recipe, encode).expect("encodes");
+        phrases.learn(&phrase, &recipe, &mut encode).expect("encodes");
         let language = Language { features: &features, phrases: &phrases };
         answer(&all, &read(&all, text, &recipe), LevelFilter::Auto, &recipe, Some(language))
     };
@@ -172,8 +172,8 @@ fn the_recipe_says_what_is_asked_and_when_nothing_fits() {
         let recipe = Recipe { rejection, ..by(Understanding::Embedding) };
         let phrase = ParsedQuery::parse("cup").expect("a phrase");
         let mut phrases = TextEmbeddings::default();
-        let encode = |p: &str| Ok::<_, ()>(if p == "cup" { vec![0.5134, 0.5, 0.5] } else { vec![0.5, 0.5, 0.5] });
-        phrases.learn(&phrase, &recipe, encode).expect("encodes");
+        let mut encode = |p: &str| Ok::<_, ()>(if p == "cup" { vec![0.5134, 0.5, 0.5] } else { vec![0.5, 0.5, 0.5] });
+        phrases.learn(&phrase, &recipe, &mut encode).expect("encodes");
         let language = Language { features: &features, phrases: &phrases };
         answer(&all, &read(&all, "cup", &recipe), LevelFilter::Auto, &recipe, Some(language)).chosen(1)
     };
@@ -192,11 +192,11 @@ fn what_has_another_color_is_not_found_by_embedding() {
         let phrase = ParsedQuery::parse(text).expect("a phrase");
         let mut phrases = TextEmbeddings::default();
         // The mug is red: any other color fits less, and "mug" is what makes it fit at all.
-        let encode = |p: &str| {
+        let mut encode = |p: &str| {
             let red = if p.starts_with("red") { 0.2 } else { 0.0 };
             Ok::<_, ()>(if p.ends_with("mug") { vec![0.8 + red, 0.0, 0.0] } else { vec![0.5, 0.5, 0.5] })
         };
-        phrases.learn(&phrase, &recipe, encode).expect("encodes");
+        phrases.learn(&phrase, &recipe, &mut encode).expect("encodes");
         let language = Language { features: &features, phrases: &phrases };
         answer(&all, &read(&all, text, &recipe), LevelFilter::Auto, &recipe, Some(language)).chosen(1)
     };

@@ -306,7 +306,7 @@ fn part_recall_rises_with_every_component() {
     ];
     let (camera, blended) = (camera(20, 1), CodeMap::default());
     let views = [LabeledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories }];
-    let encode = |phrase: &str| {
+    let mut encode = |phrase: &str| {
         Ok::<_, Infallible>(match phrase {
             "mug" => mixed(&[(MUG, 1.0)]),
             "pan" => mixed(&[(PAN, 1.0)]),
@@ -317,8 +317,9 @@ fn part_recall_rises_with_every_component() {
             _ => mixed(&[(ANYTHING, 1.0)]),
         })
     };
-    let row =
-        |c: Components| part_recall::row((c, &Recipe::default()), &map, &language, &views, encode).expect("encodes");
+    let mut row = |c: Components| {
+        part_recall::row((c, &Recipe::default()), &map, &language, &views, &mut encode).expect("encodes")
+    };
     let worked_out = [
         // Objects alone: the whole mug (10 px) for its handle and lid, the whole pan (10 px) for its own.
         [0.2, 0.3, 0.4, 0.2],
@@ -351,7 +352,7 @@ fn an_overlap_of_a_half_is_a_hit_and_less_is_none() {
     let (map, language) = kitchen();
     let view = exact(4, vec![3, 3, 1, 1]);
     let (camera, blended) = (camera(4, 1), CodeMap::default());
-    let encode = |phrase: &str| {
+    let mut encode = |phrase: &str| {
         Ok::<_, Infallible>(match phrase {
             "handle of the mug" => mixed(&[(MUG, 0.6), (HANDLE, 0.8)]),
             "mug" => mixed(&[(MUG, 1.0)]),
@@ -362,7 +363,7 @@ fn an_overlap_of_a_half_is_a_hit_and_less_is_none() {
     for (from, recall, iou) in [(0, 1.0, 0.5), (1, 0.0, 0.25)] {
         let categories = vec![label("handle of the mug", Level::Part, [4, 1], move |i| i >= from)];
         let view = LabeledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
-        let row = part_recall::row((Components::ROWS[4], &Recipe::default()), &map, &language, &[view], encode)
+        let row = part_recall::row((Components::ROWS[4], &Recipe::default()), &map, &language, &[view], &mut encode)
             .expect("encodes");
         close(&[row.recall, row.mean_iou], &[recall, iou]);
     }

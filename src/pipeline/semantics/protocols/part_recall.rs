@@ -4,6 +4,7 @@
 
 use super::{LabeledView, Unit};
 use crate::math::stats::mean;
+use crate::models::TextSource;
 use crate::pipeline::semantics::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::query_engine::ask_by_embedding;
 use crate::pipeline::semantics::recipe::{PartFeatures, Recipe, Strategy, Understanding};
@@ -65,28 +66,28 @@ pub(crate) struct Row {
     pub(crate) units: Vec<Unit>,
 }
 
-/// Asks for every part of the `views` by its phrase and compares, for one row of the table. `encode`
-/// gives the embedding of a phrase.
-pub(crate) fn row<E>(
+/// Asks for every part of the `views` by its phrase and compares, for one row of the table. `source`
+/// gives the embeddings of phrases.
+pub(crate) fn row<S: TextSource + ?Sized>(
     (components, recipe): (Components, &Recipe),
     map: &SemanticMap,
     language: &LanguageFeatures,
     views: &[LabeledView<'_>],
-    mut encode: impl FnMut(&str) -> Result<Vec<f32>, E>,
-) -> Result<Row, E> {
+    source: &mut S,
+) -> Result<Row, S::Error> {
     let objects = objects_alone(language, &map.identities);
     let features = if components.extraction { language } else { &objects };
     let (mut units, mut secs) = (Vec::new(), Vec::new());
     // Canonical phrases are encoded once for all queries.
     let mut phrases = TextEmbeddings::default();
     let recipe = components.recipe(recipe);
-    phrases.learn_canonical(&recipe, &mut encode);
+    phrases.learn_canonical(&recipe, source);
     for view in views {
         for category in view.categories.iter().filter(|c| c.level == Level::Part) {
             let start = std::time::Instant::now();
             let mut mask = Mask::empty(view.exact.width_px, view.exact.height_px);
             let answered =
-                ask_by_embedding(&map.identities, (features, &recipe), &category.name, &mut phrases, &mut encode)?;
+                ask_by_embedding(&map.identities, (features, &recipe), &category.name, &mut phrases, source)?;
             // The best is the answer whatever its score: recall asks where, not whether.
             if let Some(best) = answered.iter().flat_map(|a| a.answer.hits()).next() {
                 mask = view.exact.mask(&map.identities, best.identity);

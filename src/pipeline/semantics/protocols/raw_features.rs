@@ -69,7 +69,7 @@ mod tests {
         let by_identity = features.map(of).to_vec();
         let raw = RawFeatures::new(&LanguageFeatures { encoder: "t".into(), dimension: 3, by_identity });
         let mut phrases = TextEmbeddings::default();
-        let encode = |p: &str| {
+        let mut encode = |p: &str| {
             Ok::<_, ()>(match p {
                 "mug" => vec![0.8, 0.6, 0.0],
                 "stuff" => vec![0.0, 0.0, 1.0],
@@ -77,7 +77,7 @@ mod tests {
             })
         };
         let recipe = Recipe::default();
-        phrases.learn(&ParsedQuery::parse("mug").expect("a phrase"), &recipe, encode).expect("encodes");
+        phrases.learn(&ParsedQuery::parse("mug").expect("a phrase"), &recipe, &mut encode).expect("encodes");
         let mut mixed: PixelWeights = [(NOBODY, 0.0); 8];
         mixed[..3].copy_from_slice(&[(1, 0.3), (2, 0.5), (NOBODY, 0.1)]);
         let mut alone = mixed;

@@ -160,8 +160,8 @@ impl<'a> Asked<'a> {
     fn tell(&self, reading: &QueryReading) -> (Answer, Vec<IdentityId>) {
         let mut phrases = TextEmbeddings::default();
         let phrase = &reading.phrase;
-        let encode = |p: &str| Ok::<_, ()>(if *p == phrase.text { vec![1.0, 0.0] } else { vec![0.5, 0.5] });
-        phrases.learn(phrase, &self.recipe, encode).expect("encodes");
+        let mut encode = |p: &str| Ok::<_, ()>(if *p == phrase.text { vec![1.0, 0.0] } else { vec![0.5, 0.5] });
+        phrases.learn(phrase, &self.recipe, &mut encode).expect("encodes");
         let language = Language { features: &self.features, phrases: &phrases };
         let language = (self.recipe.understanding == Understanding::Both).then_some(language);
         let answered = answer(self.all, reading, LevelFilter::Auto, &self.recipe, language);
