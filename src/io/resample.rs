@@ -86,6 +86,21 @@ pub(super) fn shrink(photo: &PhotoPixels, camera: &Camera, target: &Camera) -> P
     resample(&Pixels { width, height, channels, data }, camera, None, target)
 }
 
+/// The pixel of the stored picture, of `camera`'s size, that the center of each pixel of the undistorted picture of
+/// `width` by `height` px shows, row-major; `None` beyond its border.
+pub(super) fn centers(camera: &Camera, distortion: &Distortion, [width, height]: [usize; 2]) -> Vec<Option<usize>> {
+    let size = Vec2::new(camera.width_px as f32, camera.height_px as f32);
+    let (lens, step) = (Lens::new(camera, distortion), size / Vec2::new(width as f32, height as f32));
+    let row = |y: usize| {
+        let mut at = vec![Vec2::ZERO; width];
+        lens.source_row((y as f32 + 0.5) * step.y, step.x, &mut at);
+        // Written so that NaN is outside.
+        let inside = |p: &Vec2| p.x >= 0.0 && p.x < size.x && p.y >= 0.0 && p.y < size.y;
+        at.into_iter().map(move |p| inside(&p).then_some(p.y as usize * size.x as usize + p.x as usize))
+    };
+    (0..height).into_par_iter().flat_map_iter(row).collect()
+}
+
 /// Whether anything of the picture is left once it is undistorted: one of the places of a grid, at least.
 pub(super) fn covers(camera: &Camera, distortion: &Distortion) -> bool {
     const ACROSS: usize = 32;

@@ -184,7 +184,7 @@ pub(crate) fn fitted(mask: Mask, width_px: usize, height_px: usize, place: &Path
         let remedy = "use a mask that was drawn on this view";
         return Err(JobError::Phrases(format!("{}: {shapes}: {remedy}", place.display())));
     }
-    Ok(if (w, h) == (width_px, height_px) { mask } else { mask.resized(width_px, height_px) })
+    Ok(mask.resized(width_px, height_px))
 }
 
 fn row(

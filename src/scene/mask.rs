@@ -149,10 +149,21 @@ impl Mask {
 
     /// The same region in a picture of another size: each pixel takes the value at its center.
     pub(crate) fn resized(&self, width_px: usize, height_px: usize) -> Self {
-        Self::from_fn(width_px, height_px, |i| {
-            let (x, y) = (i % width_px, i / width_px);
-            self.contains(nearest(y, self.height_px, height_px) * self.width_px + nearest(x, self.width_px, width_px))
-        })
+        if (width_px, height_px) == (self.width_px, self.height_px) {
+            return self.clone();
+        }
+        let mut resized = Self::empty(width_px, height_px);
+        let columns: Vec<usize> = (0..width_px).map(|x| nearest(x, self.width_px, width_px)).collect();
+        for y in 0..height_px {
+            let first = nearest(y, self.height_px, height_px) * self.width_px;
+            // Most masks are small, and most rows empty.
+            let words = first / 64..(first + self.width_px).div_ceil(64);
+            if self.words[words].iter().any(|word| *word != 0) {
+                let inside = columns.iter().enumerate().filter(|(_, column)| self.contains(first + *column));
+                inside.for_each(|(x, _)| resized.insert(y * width_px + x));
+            }
+        }
+        resized
     }
 }
 

@@ -27,7 +27,7 @@ pub(crate) mod three_d_ovs;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::resample::{Pixels, resample};
+use super::resample::centers;
 use super::{IoError, files, memory, photo_list};
 use crate::scene::{Camera, Level, Mask, Photo, text};
 
@@ -134,8 +134,9 @@ impl Labels {
         };
         let mut place = Vec::with_capacity(regions.len());
         let mut kept: Vec<Region> = Vec::new();
+        let mut as_loaded = AsLoaded::new(photo, max_side_px);
         for region in regions {
-            let mask = as_photo(&region.mask, photo, max_side_px);
+            let mask = as_loaded.mask(&region.mask);
             let parent = region.parent.and_then(|p| place.get(p).copied().flatten());
             place.push((!mask.is_empty()).then_some(kept.len()));
             if !mask.is_empty() {
@@ -183,20 +184,30 @@ pub(crate) fn stem(name: &str) -> String {
     file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned()
 }
 
-/// A mask of a photo as stored, or of a scaled copy, as the photo is loaded.
-fn as_photo(mask: &Mask, photo: &Photo, max_side_px: u32) -> Mask {
-    let size = (mask.width_px(), mask.height_px());
-    let target = photo.camera.limited_to(max_side_px);
-    let (w, h) = (target.width_px as usize, target.height_px as usize);
-    if photo.distortion.is_none() {
-        return mask.resized(w, h);
+/// Masks on a photo as stored, or on scaled copies, as the photo is loaded: each pixel takes the value at its center.
+struct AsLoaded<'a> {
+    photo: &'a Photo,
+    size: [usize; 2],
+    /// Where the centers lie on a distorted copy, by its size.
+    centers: BTreeMap<[usize; 2], Vec<Option<usize>>>,
+}
+
+impl<'a> AsLoaded<'a> {
+    fn new(photo: &'a Photo, max_side_px: u32) -> Self {
+        let camera = photo.camera.limited_to(max_side_px);
+        Self { photo, size: [camera.width_px as usize, camera.height_px as usize], centers: BTreeMap::new() }
     }
-    let gray = |i| if mask.contains(i) { [u8::MAX; 3] } else { [0; 3] };
-    let data = (0..size.0 * size.1).flat_map(gray).collect();
-    let picture = Pixels { width: size.0, height: size.1, channels: 3, data };
-    let camera = photo.camera.resized(size.0 as u32, size.1 as u32);
-    let straight = resample(&picture, &camera, photo.distortion.as_ref(), &target);
-    Mask::from_fn(w, h, |i| straight.rgb[i][0] > 127)
+
+    fn mask(&mut self, mask: &Mask) -> Mask {
+        let [width, height] = self.size;
+        let Some(distortion) = self.photo.distortion.as_ref().filter(|_| !mask.is_empty()) else {
+            return mask.resized(width, height);
+        };
+        let drawn = [mask.width_px(), mask.height_px()];
+        let camera = || self.photo.camera.resized(drawn[0] as u32, drawn[1] as u32);
+        let centers = self.centers.entry(drawn).or_insert_with(|| centers(&camera(), distortion, self.size));
+        Mask::from_fn(width, height, |i| centers[i].is_some_and(|at| mask.contains(at)))
+    }
 }
 
 /// File names in a folder, sorted; none if there is no such folder.

@@ -77,12 +77,17 @@ impl SynthIds {
         for level in [Level::Object, Level::Part] {
             let path = self.path(level, stem);
             let (width, height, ids) = read_ids(&path, sheet, self.list.len())?;
+            // Which regions show an id, so that all are filled in one pass.
+            let mut shown_by = vec![Vec::new(); usize::from(u16::MAX) + 1];
             for listed in self.list.iter().filter(|l| l.level == level) {
                 let parent = listed.parent.and_then(|p| ids_of.iter().position(|id| *id == p));
-                let own = self.with_pieces(listed);
-                let mask = Mask::from_fn(width, height, |i| own.contains(&ids[i]));
+                self.with_pieces(listed).into_iter().for_each(|id| shown_by[usize::from(id)].push(regions.len()));
+                let mask = Mask::empty(width, height);
                 regions.push(Region { name: listed.name.clone(), level: Some(level), parent, mask });
                 ids_of.push(listed.id);
+            }
+            for (i, id) in ids.into_iter().enumerate() {
+                shown_by[usize::from(id)].iter().for_each(|region| regions[*region].mask.insert(i));
             }
         }
         Ok(regions)

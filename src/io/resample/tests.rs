@@ -99,6 +99,30 @@ fn undistortion_inverts_the_lens() {
 }
 
 #[test]
+fn centers_are_what_the_lens_shows_there() {
+    let (c, small) = (camera(240, 180, 200.0), camera(96, 72, 80.0));
+    let disk = |x: f64, y: f64| (x - 150.0).hypot(y - 60.0) < 45.0;
+    let drawn = picture(240, 180, |x, y| [if disk(x, y) { 255.0 } else { 0.0 }; 3]);
+    for d in
+        [Distortion { k1: 0.2, ..Distortion::default() }, Distortion { k1: -0.12, k2: 0.03, p1: 0.002, p2: -0.003 }]
+    {
+        let lens = resample(&drawn, &c, Some(&d), &small);
+        // Pixels of either that the other has not; pixels at the border may be of both.
+        let differ = |d: &Distortion| {
+            let shown = |at: usize| disk((at % 240) as f64 + 0.5, (at / 240) as f64 + 0.5);
+            let found = centers(&c, d, [96, 72]);
+            assert_eq!(found.len(), 96 * 72);
+            found.iter().zip(&lens.rgb).filter(|(at, rgb)| at.is_some_and(shown) != (rgb[0] > 127)).count()
+        };
+        let wrong = differ(&Distortion { k1: -d.k1, ..d });
+        // Its center decides here, most of its area there: some of the 110 pixels along the border differ.
+        assert!(differ(&d) <= 20 && wrong > 4 * differ(&d), "{} and with a wrong lens {wrong}", differ(&d));
+        let beyond = centers(&c, &d, [96, 72])[0].is_none();
+        assert_eq!(beyond, lens.coverage.is_some_and(|coverage| coverage[0] == 0));
+    }
+}
+
+#[test]
 fn pixels_that_the_lens_does_not_show_have_no_coverage() {
     let c = camera(240, 180, 200.0);
     let white = picture(240, 180, |_, _| [255.0; 3]);
