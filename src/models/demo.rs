@@ -88,11 +88,6 @@ impl Encoder for DemoEncoder {
         tiles.iter().map(|tile| self.look(tile)).collect()
     }
 
-    fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
-        let one = self.texts(&[phrase]).into_iter().collect::<Result<_, _>>()?;
-        self.only(one)
-    }
-
     fn texts(&mut self, phrases: &[&str]) -> Vec<Result<Vec<f32>, ModelError>> {
         let rows = phrases.iter().map(|phrase| self.words.encode(phrase)).collect();
         token_rows::each(rows, |rows| Ok(token_rows::embed(self.text.ready()?, rows, self.words.dimension)))

@@ -78,14 +78,14 @@ pub trait Encoder: Send {
         one.pop().ok_or_else(|| ModelError::NoOutput { model: self.name().to_owned(), output: "embedding".into() })
     }
 
-    /// The vector of a phrase; of unit length. Words it does not know are left out; a phrase with
-    /// no other words is an error ([`ModelError::NoKnownWord`]).
-    fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError>;
+    /// The vectors of phrases; of unit length. Words it does not know are left out; a phrase with no other words is
+    /// an error ([`ModelError::NoKnownWord`]). Fewer if the encoder itself fails: the last says why.
+    fn texts(&mut self, phrases: &[&str]) -> Vec<Result<Vec<f32>, ModelError>>;
 
-    /// The vectors of several phrases, each as [`Encoder::text`] gives it, faster together. Fewer if the encoder
-    /// itself fails: the last says why.
-    fn texts(&mut self, phrases: &[&str]) -> Vec<Result<Vec<f32>, ModelError>> {
-        phrases.iter().map(|phrase| self.text(phrase)).collect()
+    /// The vector of one phrase.
+    fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
+        let one = self.texts(&[phrase]).pop();
+        one.ok_or_else(|| ModelError::NoOutput { model: self.name().to_owned(), output: "embedding".into() })?
     }
 
     /// The words of a phrase that it does not know, each once, the first few of them.

@@ -141,13 +141,14 @@ mod tests {
             Ok(Vec::new())
         }
 
-        fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
-            self.asked.push(phrase.to_owned());
-            match phrase {
+        fn texts(&mut self, phrases: &[&str]) -> Vec<Result<Vec<f32>, ModelError>> {
+            self.asked.extend(phrases.iter().map(|p| (*p).to_owned()));
+            let one = |phrase: &&str| match *phrase {
                 "broken" => Err(ModelError::Run { model: "text.onnx".into(), problem: "out of memory".into() }),
                 "giraffe" => Err(ModelError::NoKnownWord { unknown: vec!["giraffe".into()] }),
                 _ => Ok(vec![1.0, 0.0]),
-            }
+            };
+            phrases.iter().map(one).collect()
         }
 
         fn unknown_words(&self, phrase: &str) -> Vec<String> {

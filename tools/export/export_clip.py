@@ -55,11 +55,9 @@ class TextOfAnyLength(torch.nn.Module):
         self.model = model
 
     def forward(self, tokens):
-        m = self.model
-        # By index, as the exporter takes the lengths of slices for fixed.
-        at = torch.arange(tokens.shape[1])
-        x = m.token_embedding(tokens) + m.positional_embedding.index_select(0, at)
-        x = m.ln_final(m.transformer(x, attn_mask=m.attn_mask.index_select(0, at).index_select(1, at)))
+        t, m = tokens.shape[1], self.model
+        x = m.token_embedding(tokens) + m.positional_embedding[:t]
+        x = m.ln_final(m.transformer(x, attn_mask=m.attn_mask[:t, :t]))
         x = open_clip_model.text_global_pool(x, tokens, "argmax")
         return m.text_projection(x) if isinstance(m.text_projection, torch.nn.Linear) else x @ m.text_projection
 

@@ -148,10 +148,6 @@ impl Encoder for ClipEncoder {
         Ok(all)
     }
 
-    fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
-        self.texts(&[phrase]).pop().unwrap_or(Err(ModelError::NoKnownWord { unknown: Vec::new() }))
-    }
-
     fn texts(&mut self, phrases: &[&str]) -> Vec<Result<Vec<f32>, ModelError>> {
         let rows = phrases.iter().map(|phrase| self.row(phrase)).collect();
         token_rows::each(rows, |rows| {

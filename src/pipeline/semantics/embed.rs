@@ -199,8 +199,8 @@ mod tests {
             Ok(tiles.iter().map(|t| if red(t) { vec![1.0, 0.0] } else { vec![0.0, 1.0] }).collect())
         }
 
-        fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
-            Err(ModelError::NoKnownWord { unknown: vec![phrase.into()] })
+        fn texts(&mut self, phrases: &[&str]) -> Vec<Result<Vec<f32>, ModelError>> {
+            phrases.iter().map(|p| Err(ModelError::NoKnownWord { unknown: vec![(*p).into()] })).collect()
         }
 
         fn unknown_words(&self, _: &str) -> Vec<String> {

@@ -157,13 +157,14 @@ mod tests {
             Ok(Vec::new())
         }
 
-        fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
-            match phrase {
+        fn texts(&mut self, phrases: &[&str]) -> Vec<Result<Vec<f32>, ModelError>> {
+            let one = |phrase: &&str| match *phrase {
                 "red" => Ok(vec![1.0, 0.0]),
                 "giraffe" => Err(ModelError::NoKnownWord { unknown: vec!["giraffe".into()] }),
                 "broken" => Err(ModelError::Run { model: "text.onnx".into(), problem: "out of memory".into() }),
                 _ => Ok(vec![0.0, 1.0]),
-            }
+            };
+            phrases.iter().map(one).collect()
         }
 
         fn unknown_words(&self, phrase: &str) -> Vec<String> {
