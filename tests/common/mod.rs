@@ -24,6 +24,16 @@ pub fn data(name: &str) -> Option<PathBuf> {
     path
 }
 
+/// The input `name` of those made after public reports; says so and returns `None` where they are absent.
+pub fn case(name: &str) -> Option<PathBuf> {
+    let path = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../shared/cases/files").join(name);
+    let path = Some(path).filter(|p| p.exists());
+    if path.is_none() {
+        println!("skipped: no {name} among the inputs of reports");
+    }
+    path
+}
+
 /// A generator for tests.
 pub fn rng(seed: u64) -> rand_pcg::Pcg64Mcg {
     rand_pcg::Pcg64Mcg::seed_from_u64(seed)

@@ -1,0 +1,1 @@
+//! Photos with poses: layouts, names, splits, poses.

@@ -1,0 +1,1 @@
+//! Label files: what belongs to which photo, groups, holes, other formats.

@@ -1,0 +1,1 @@
+//! Splats of other programs: axes, numbers, properties.
