@@ -125,8 +125,15 @@ fn of_dataset(d: &Dataset, holdout_every: usize) -> Facts {
 fn of_splat(s: &Scene) -> Facts {
     let (mut lines, json) = cloud_facts(s);
     lines.insert(0, ("kind", "Gaussian splat".into()));
-    let mut facts = facts(lines, json, Vec::new());
+    if !s.cameras.is_empty() {
+        let held_out = s.cameras.iter().filter(|c| c.held_out).count();
+        lines.push(("cameras", format!("{} ({held_out} held out), beside it", s.cameras.len())));
+    }
+    lines.extend(s.dataset_path.as_ref().map(|path| ("photos", path.display().to_string())));
+    let mut facts = facts(lines, json, s.warnings.clone());
     facts.json.insert("kind".into(), json!("splat"));
+    facts.json.insert("cameras".into(), json!(s.cameras));
+    facts.json.insert("dataset".into(), json!(s.dataset_path));
     facts
 }
 

@@ -19,7 +19,7 @@ enum CameraFile {
 /// Reads a camera.
 pub fn read(path: &Path) -> Result<Camera, IoError> {
     let bytes = files::read(path, MAX_BYTES)?;
-    let camera = match serde_json::from_slice(&bytes) {
+    let camera = match serde_json::from_slice(files::without_mark(&bytes, path)?) {
         Ok(CameraFile::Entry { camera } | CameraFile::Alone(camera)) => camera,
         Err(_) => {
             return Err(IoError::syntax(

@@ -89,8 +89,10 @@ pub enum OpenError {
     #[error("{path} is not a scene, splat or photo set that FMLGS can open. Looked for: {looked_for}. Found: {found}.")]
     Unrecognized { path: PathBuf, looked_for: String, found: String },
     /// Photos alone.
-    #[error("{}: {} photos, no camera poses", .0.images.display(), .0.photos.len())]
+    #[error("{}: {} photos, no camera poses{}", .0.images.display(), .0.photos.len(), .0.in_brackets())]
     NoPoses(Box<Unposed>),
+    #[error("{path} is {what}; unpack it, with {command}, and open the folder")]
+    Packed { path: PathBuf, what: String, command: String },
     #[error(transparent)]
     Io(#[from] IoError),
 }

@@ -67,15 +67,71 @@ pub(crate) fn read_start(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
     Ok(bytes)
 }
 
-/// The text of a UTF-8 file of at most [`MAX_TEXT_BYTES`].
+/// The text of a UTF-8 file of at most [`MAX_TEXT_BYTES`], without a byte order mark.
 pub(crate) fn read_text(path: &Path) -> Result<String, IoError> {
-    String::from_utf8(read(path, MAX_TEXT_BYTES)?)
-        .map_err(|e| IoError::syntax(path, format!("byte {}", e.utf8_error().valid_up_to()), "not UTF-8 text"))
+    let bytes = read(path, MAX_TEXT_BYTES)?;
+    let text = str::from_utf8(without_mark(&bytes, path)?);
+    let text = text.map_err(|e| IoError::syntax(path, format!("byte {}", e.valid_up_to()), "not UTF-8 text"))?;
+    Ok(text.to_owned())
 }
 
 pub(crate) fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T, IoError> {
-    let bytes = read(path, MAX_TEXT_BYTES)?;
-    serde_json::from_slice(&bytes).map_err(|e| json_error(path, &e))
+    json(&read(path, MAX_TEXT_BYTES)?, path)
+}
+
+/// The value that the bytes of a JSON file hold; `path` is for errors. Every JSON file is parsed here.
+pub(crate) fn json<'a, T: serde::Deserialize<'a>>(bytes: &'a [u8], path: &Path) -> Result<T, IoError> {
+    serde_json::from_slice(without_mark(bytes, path)?).map_err(|e| json_error(path, &e))
+}
+
+/// The bytes of a text file after the mark by which Windows' programs say that it is UTF-8.
+///
+/// # Errors
+/// If the file is UTF-16 or UTF-32, which no format read here is.
+pub(crate) fn without_mark<'a>(bytes: &'a [u8], path: &Path) -> Result<&'a [u8], IoError> {
+    match bytes {
+        [0xEF, 0xBB, 0xBF, text @ ..] => Ok(text),
+        // With a mark; or without one, where every second byte of a plain letter is zero.
+        [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] | [0, 1..=127, ..] | [1..=127, 0, ..] => Err(IoError::syntax(
+            path,
+            "byte 0",
+            "this is UTF-16 text, as PowerShell's '>' and Notepad's 'Unicode' write it; save the file as UTF-8",
+        )),
+        text => Ok(text),
+    }
+}
+
+/// Whether a file's or folder's name is one that systems leave everywhere (`._a.jpg`, `.DS_Store`, `__MACOSX`,
+/// `Thumbs.db`), or hidden: nothing that a person put there to be read.
+pub(crate) fn is_debris(name: &str) -> bool {
+    let others = ["__MACOSX", "Thumbs.db", "ehthumbs.db", "desktop.ini", "@eaDir"];
+    name.starts_with('.') || others.iter().any(|o| name.eq_ignore_ascii_case(o))
+}
+
+/// The file or folder of this path below `folder`, in other letters where nothing is called just so and one thing alike.
+pub(crate) fn called(folder: &Path, name: &str) -> Option<PathBuf> {
+    let exact = folder.join(name);
+    if exact.exists() {
+        return Some(exact);
+    }
+    name.split('/').try_fold(folder.to_path_buf(), |at, part| {
+        let next = at.join(part);
+        if next.exists() {
+            return Some(next);
+        }
+        let mut alike = names_in(&at).ok()?.into_iter().filter(|other| other.eq_ignore_ascii_case(part));
+        alike.next().filter(|_| alike.next().is_none()).map(|one| at.join(one))
+    })
+}
+
+/// Names in a folder without [debris](is_debris), sorted. Names that are not UTF-8 are passed over.
+pub(crate) fn names_in(folder: &Path) -> io::Result<Vec<String>> {
+    let mut names = Vec::new();
+    for entry in fs::read_dir(folder)? {
+        names.extend(entry?.file_name().into_string().ok().filter(|name| !is_debris(name)));
+    }
+    names.sort();
+    Ok(names)
 }
 
 /// A JSON error with its place taken apart.
@@ -183,6 +239,25 @@ mod tests {
         assert!(matches!(inside(&root, "out.png", source), Err(IoError::Outside { .. })));
         assert!(matches!(inside(&root, "in.png", source), Ok(Some(_))));
         assert!(matches!(inside(&root, "none.png", source), Ok(None)));
+    }
+
+    #[test]
+    fn byte_order_marks_are_skipped_and_other_encodings_named() {
+        let path = Path::new("a.json");
+        assert_eq!(json::<Vec<u8>>(b"\xEF\xBB\xBF[1]", path).expect("marked"), [1]);
+        assert_eq!(json::<Vec<u8>>(b"[1]", path).expect("plain"), [1]);
+        for bytes in [&b"\xFF\xFE[\0"[..], b"\xFE\xFF\0[", b"[\0]\0", b"\0[\0]"] {
+            let e = json::<Vec<u8>>(bytes, path).expect_err("UTF-16").to_string();
+            assert!(e.contains("UTF-16") && e.contains("save the file as UTF-8"), "{e}");
+        }
+    }
+
+    #[test]
+    fn what_systems_leave_is_no_data() {
+        for name in ["._a.jpg", ".DS_Store", "__MACOSX", "Thumbs.db", "thumbs.db", ".hidden.png"] {
+            assert!(is_debris(name), "{name}");
+        }
+        assert!(!is_debris("a._b.jpg") && !is_debris("MACOSX.png"));
     }
 
     #[test]

@@ -64,7 +64,7 @@ fn read_bytes(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<MeshSc
 }
 
 pub(super) fn parse<T: serde::de::DeserializeOwned>(text: &[u8], path: &Path) -> Result<T, IoError> {
-    serde_json::from_slice(text).map_err(|e| files::json_error(path, &e))
+    files::json(text, path)
 }
 
 /// Whether a scene that requires the extension can be drawn right: those that only refine the look

@@ -4,19 +4,17 @@
 //! down, right, back, then the nearest and farthest depth. Rows belong to the photos in the order
 //! of their names.
 
-use std::fs;
 use std::path::Path;
 
 use glam::{DMat3, DVec2, DVec3};
 
 use super::photo_list::{self, Focal, Lens, ListedPhoto, photos};
-use super::{IoError, files, npy};
+use super::{IoError, files, npy, photo};
 use crate::scene::{Camera, Dataset, Distortion};
 
 pub(crate) const POSES_FILE: &str = "poses_bounds.npy";
 /// Numbers per photo.
 const ROW: usize = 17;
-const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
 
 /// Reads the dataset in `root`.
 pub fn read(root: &Path) -> Result<Dataset, IoError> {
@@ -56,16 +54,7 @@ pub fn poses(bytes: &[u8], path: &Path) -> Result<Vec<[f64; ROW]>, IoError> {
     if n > possible {
         return Err(IoError::Count { path: path.into(), what: "photos".into(), claimed: n, possible });
     }
-    let values = array.values()?;
-    if let Some(at) = values.iter().position(|v| !v.is_finite()) {
-        return Err(IoError::NotFinite {
-            path: path.into(),
-            element: "pose",
-            index: at / ROW,
-            property: format!("column {}", at % ROW),
-        });
-    }
-    Ok(values.as_chunks::<ROW>().0.to_vec())
+    Ok(array.values()?.as_chunks::<ROW>().0.to_vec())
 }
 
 const ROW_U64: u64 = ROW as u64;
@@ -78,15 +67,9 @@ pub(super) fn is_helper(name: &str) -> bool {
 /// The photos in a folder, sorted; SPIn-NeRF's helper pictures are left out.
 pub(super) fn names(folder: &Path) -> Result<Vec<String>, IoError> {
     let failed = |cause| IoError::Read { path: folder.into(), cause };
-    let mut names = Vec::new();
-    for entry in fs::read_dir(folder).map_err(failed)? {
-        let name = entry.map_err(failed)?.file_name().to_string_lossy().into_owned();
-        let ending = name.rsplit_once('.').map_or(String::new(), |(_, e)| e.to_lowercase());
-        if ENDINGS.contains(&ending.as_str()) && !is_helper(&name) {
-            names.push(name);
-        }
-    }
-    names.sort();
+    let mut names = files::names_in(folder).map_err(failed)?;
+    // Those that cannot be read keep their place in the order, and are named when they are looked at.
+    names.retain(|name| photo::stem(name).is_some() && !is_helper(name));
     Ok(names)
 }
 
@@ -102,8 +85,8 @@ fn listed(row: &[f64; ROW], name: &str, folder: &str, source: &Path) -> Result<L
         ));
     };
     Ok(ListedPhoto {
-        name: name.into(),
-        entry: format!("{folder}/{name}"),
+        entry: name.into(),
+        folder: folder.into(),
         lens: Lens {
             size_px: Some((w, h)),
             focal: Focal::Px(DVec2::splat(focal)),
@@ -113,6 +96,8 @@ fn listed(row: &[f64; ROW], name: &str, folder: &str, source: &Path) -> Result<L
         // Down, right, back to right, down, forward.
         world_from_camera: DMat3::from_cols(column(1), column(0), -column(2)),
         center: column(3),
+        normalized: false,
+        broken: None,
         test_split: false,
         background: None,
     })
@@ -120,6 +105,8 @@ fn listed(row: &[f64; ROW], name: &str, folder: &str, source: &Path) -> Result<L
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use image::RgbImage;
     use npyz::WriterBuilder;
 
@@ -190,10 +177,13 @@ mod tests {
         assert!(matches!(poses(other.as_bytes(), path), Err(IoError::Syntax { .. })));
         assert!(matches!(with_shape("(17, 1)"), Err(IoError::Syntax { .. })));
         assert!(matches!(with_shape("(17,)"), Err(IoError::Syntax { .. })));
+        let f = folder(2);
         let mut bad = POSE;
         bad[7] = f64::NAN;
-        assert!(matches!(poses(&npy(&bad, &[1, 17]), path), Err(IoError::NotFinite { element: "pose", index: 0, .. })));
-        let f = folder(2);
+        fs::write(f.path().join(POSES_FILE), npy(&[POSE, bad].concat(), &[2, 17])).expect("write");
+        let d = read(f.path()).expect("one is good");
+        assert_eq!((d.photos.len(), &*d.photos[0].name), (1, "a.png"));
+        assert!(d.warnings[0].contains("1 of 2 listed photos have no usable pose") && d.warnings[0].contains("b.png"));
         let mut mirrored = POSE;
         mirrored[7] = 1.0;
         fs::write(f.path().join(POSES_FILE), npy(&mirrored.repeat(2), &[2, 17])).expect("write");

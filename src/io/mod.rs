@@ -17,6 +17,7 @@ pub(crate) mod error;
 pub(crate) mod files;
 pub(crate) mod folder_lock;
 pub mod gltf_mesh;
+pub(crate) mod gs_output;
 pub(crate) mod http;
 pub mod khr_gltf;
 pub mod ksplat;
@@ -44,6 +45,7 @@ pub mod sog;
 pub mod splat;
 pub(crate) mod splat_format;
 pub mod splat_ply;
+mod splits;
 pub mod spz;
 pub(crate) mod temporary;
 #[cfg(test)]

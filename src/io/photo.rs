@@ -5,11 +5,67 @@
 use std::io::Cursor;
 use std::path::Path;
 
-use image::{DynamicImage, ImageBuffer, ImageDecoder, ImageError, ImageReader, Limits, Luma, RgbaImage};
+use image::{
+    ColorType, DynamicImage, ImageBuffer, ImageDecoder, ImageError, ImageFormat, ImageReader, Limits, Luma, RgbaImage,
+};
 
 use super::resample::{Pixels, resample, shrink};
 use super::{IoError, files, memory};
 use crate::scene::{Camera, Photo, PhotoPixels};
+
+/// Endings of the pictures that are read.
+const ENDINGS: [&str; 7] = ["jpg", "jpeg", "png", "webp", "tif", "tiff", "bmp"];
+/// Endings of pictures that are known, but not read.
+const UNREAD: [&str; 6] = ["heic", "heif", "hif", "avif", "jxl", "dng"];
+/// Kinds of a file of ISO's base media format that are pictures, and their names.
+const BRANDS: [([u8; 4], &str); 9] = [
+    (*b"heic", "HEIC"),
+    (*b"heix", "HEIC"),
+    (*b"heim", "HEIC"),
+    (*b"heis", "HEIC"),
+    (*b"hevc", "HEIC"),
+    (*b"mif1", "HEIF"),
+    (*b"msf1", "HEIF"),
+    (*b"avif", "AVIF"),
+    (*b"avis", "AVIF"),
+];
+/// How pictures that are not read become such that are.
+pub(crate) const CONVERT: &str = "convert the photos, with ImageMagick: 'magick mogrify -format jpg *.heic' \
+                                  (*.avif and the like), and open the folder again";
+
+/// The name of a picture without its ending, if that is one of pictures.
+pub(crate) fn stem(name: &str) -> Option<&str> {
+    let (stem, ending) = name.rsplit_once('.').filter(|(stem, _)| !stem.is_empty())?;
+    ENDINGS.iter().chain(&UNREAD).any(|known| ending.eq_ignore_ascii_case(known)).then_some(stem)
+}
+
+/// Whether a file of this name is a picture that can be read.
+pub(crate) fn is_photo(name: &str) -> bool {
+    stem(name).is_some() && !is_unread(name) && !files::is_debris(name)
+}
+
+/// Whether a file of this name is a picture that cannot be read.
+pub(crate) fn is_unread(name: &str) -> bool {
+    let is = |ending: &str| UNREAD.iter().any(|known| ending.eq_ignore_ascii_case(known));
+    name.rsplit_once('.').is_some_and(|(_, ending)| is(ending)) && !files::is_debris(name)
+}
+
+/// What a picture is that is known, but not read.
+fn unread(bytes: &[u8], path: &Path) -> Option<IoError> {
+    let what = match bytes {
+        [_, _, _, _, b'f', b't', b'y', b'p', a, b, c, d, ..] => {
+            BRANDS.iter().find(|(brand, _)| brand == &[*a, *b, *c, *d]).map(|(_, name)| *name)
+        }
+        [0xFF, 0x0A, ..] | [0, 0, 0, 0x0C, b'J', b'X', b'L', b' ', ..] => Some("JPEG XL"),
+        // Its first picture is a preview.
+        [b'I', b'I', ..] | [b'M', b'M', ..] if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("dng")) => {
+            Some("DNG")
+        }
+        _ => None,
+    };
+    let what = format!("the picture format {}", what?);
+    Some(IoError::Unsupported { path: path.into(), what, remedy: CONVERT })
+}
 
 /// Bytes at the start of a picture file that hold its size in all but rare cases.
 const HEADER_BYTES: u64 = 256 << 10;
@@ -18,6 +74,10 @@ const HEADER_BYTES: u64 = 256 << 10;
 /// `max_side_px` along the longer side. `photo.camera.limited_to(max_side_px)` is the camera that
 /// goes with them.
 pub fn load(photo: &Photo, max_side_px: u32) -> Result<PhotoPixels, IoError> {
+    if !photo.has_pixels() {
+        let reason = "only its camera is known here; open the data set that it is of".into();
+        return Err(IoError::Picture { path: (&*photo.name).into(), reason });
+    }
     let expected = (photo.camera.width_px, photo.camera.height_px);
     let mut pixels = decode(&photo.path, expected)?;
     if let Some(background) = photo.background {
@@ -81,6 +141,11 @@ fn decode(path: &Path, expected: (u32, u32)) -> Result<Pixels, IoError> {
         return Err(IoError::PhotoSize { path: path.into(), found, expected });
     }
     let picture = DynamicImage::from_decoder(decoder).map_err(|e| failed(path, &e))?;
+    if matches!(picture.color(), ColorType::Rgb32F | ColorType::Rgba32F) {
+        let reason =
+            "its colors are floating-point numbers, of which nobody says what is white; save it with 8 or 16 bits";
+        return Err(IoError::Picture { path: path.into(), reason: reason.into() });
+    }
     let (width, height) = (found.0 as usize, found.1 as usize);
     Ok(if picture.color().has_alpha() {
         Pixels { width, height, channels: 4, data: picture.into_rgba8().into_raw() }
@@ -141,8 +206,13 @@ fn decoder<'a>(bytes: &'a [u8], path: &Path) -> Result<impl ImageDecoder + 'a, I
     let mut reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
         .map_err(|cause| IoError::Read { path: path.into(), cause })?;
-    if reader.format().is_none() {
-        return Err(IoError::Picture { path: path.into(), reason: "not a JPEG, PNG or WebP picture".into() });
+    if let Some(known) = unread(bytes, path) {
+        return Err(known);
+    }
+    let read = [ImageFormat::Jpeg, ImageFormat::Png, ImageFormat::WebP, ImageFormat::Tiff, ImageFormat::Bmp];
+    if !reader.format().is_some_and(|format| read.contains(&format)) {
+        let reason = "not a JPEG, PNG, WebP, TIFF or BMP picture".into();
+        return Err(IoError::Picture { path: path.into(), reason });
     }
     let mut limits = Limits::default();
     limits.max_image_width = Some(Camera::MAX_SIDE_PX);

@@ -1,8 +1,12 @@
 //! From what a dataset's files say about its photos to [`Photo`]s that exist: paths stay inside
-//! the folder, missing files are counted, sizes are compared with the files' own, poses against
-//! what a pose must be.
+//! the folder, what is missing, found under another name or without a usable pose is counted, sizes
+//! are compared with the files' own.
 
-use std::collections::HashSet;
+mod find;
+mod pose;
+mod tally;
+
+use std::collections::HashMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -11,14 +15,12 @@ use rayon::prelude::*;
 
 use super::resample::covers;
 use super::{IoError, files, photo};
-use crate::math::rotation::{nearest_rotation, rotation_error};
 use crate::scene::{Camera, CameraError, Distortion, Photo};
 
-/// Endings tried where a file lists a photo without one (Blender's convention).
-const ENDINGS: [&str; 8] = ["png", "jpg", "jpeg", "webp", "PNG", "JPG", "JPEG", "WEBP"];
-
-/// Largest deviation from a rotation that is taken for rounding and corrected.
-const ROUNDING: f64 = 1e-3;
+pub(super) use find::{FoundFile, PhotoFinder, Search, fold};
+pub(super) use pose::straightened;
+use tally::Tally;
+pub(super) use tally::some_of;
 
 /// Focal lengths as files give them.
 #[derive(Clone, Copy, Debug)]
@@ -41,20 +43,45 @@ pub(super) struct Lens {
 
 #[derive(Clone, Debug)]
 pub(super) struct ListedPhoto {
-    pub(crate) name: String,
-    /// Its file, relative to the dataset's folder, from [`files::relative`].
+    /// Its file as it is listed, whatever is written there.
     pub(crate) entry: String,
+    /// Folder that the entry is relative to, itself relative to the dataset's folder; empty for that.
+    pub(crate) folder: String,
     pub(crate) lens: Lens,
     /// Axes of the camera (x right, y down, z forward) in the world, as columns.
     pub(crate) world_from_camera: DMat3,
     /// Camera center in the world.
     pub(crate) center: DVec3,
+    /// Whether the pose had to be made one already.
+    pub(crate) normalized: bool,
+    /// Why there is no pose, if there is none.
+    pub(crate) broken: Option<String>,
     pub(crate) test_split: bool,
     /// What transparent pixels are composited over.
     pub(crate) background: Option<[f32; 3]>,
 }
 
-/// The listed photos that exist, sorted by name, with a warning that counts the others.
+impl ListedPhoto {
+    /// The file with its folder, for display.
+    fn listed_as(&self) -> String {
+        let entry = self.entry.trim_start_matches("./");
+        if self.folder.is_empty() { entry.into() } else { format!("{}/{entry}", self.folder) }
+    }
+}
+
+/// What came of a listed photo.
+enum Fate {
+    Photo {
+        photo: Box<Photo>,
+        file: FoundFile,
+        normalized: bool,
+    },
+    /// Its pose cannot be used.
+    Broken(String, Option<CameraError>),
+    Unfound(Search),
+}
+
+/// The listed photos that exist and have a pose, sorted by name, with warnings that count the others.
 ///
 /// `root` is the dataset's folder, `source` the file that lists them.
 pub(super) fn photos(
@@ -63,57 +90,101 @@ pub(super) fn photos(
     source: &Path,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Photo>, IoError> {
-    listed.iter().try_for_each(|l| files::photo_name(&l.name, source))?;
-    let mut names = HashSet::new();
-    if let Some(twice) = listed.iter().find(|l| !names.insert(l.name.as_str())) {
-        return Err(IoError::Duplicate { path: source.into(), photo: twice.name.clone() });
-    }
-    let resolved: Vec<Result<Option<Photo>, IoError>> = listed.par_iter().map(|l| resolve(l, root, source)).collect();
-    let mut photos = Vec::new();
-    let mut missing = Vec::new();
-    for (l, photo) in listed.iter().zip(resolved) {
-        match photo? {
-            Some(p) => photos.push(p),
-            None => missing.push(l.entry.as_str()),
+    listed.iter().try_for_each(|l| files::photo_name(&l.entry, source))?;
+    let finder = PhotoFinder::new(root)?;
+    let fates: Vec<Result<Fate, IoError>> = listed.par_iter().map(|l| fate(l, &finder, source)).collect();
+    let mut tally = Tally { listed: listed.len(), ..Tally::default() };
+    let mut found = Vec::new();
+    let mut first_cause = None;
+    for (l, fate) in listed.iter().zip(fates) {
+        match fate? {
+            Fate::Photo { photo, file, normalized } => found.push((l, photo, file, normalized)),
+            Fate::Broken(why, cause) => {
+                first_cause = first_cause.or(cause.map(|cause| (l.entry.clone(), cause)));
+                tally.broken.push((l.listed_as(), why));
+            }
+            Fate::Unfound(Search::Outside) => tally.outside.push(l.entry.clone()),
+            Fate::Unfound(Search::Several(two)) => tally.several.push((l.listed_as(), two)),
+            Fate::Unfound(_) => tally.missing.push(l.listed_as()),
         }
     }
+    // Two that are listed under different names cannot both be one file: one of them is only called alike.
+    let mut users: HashMap<PathBuf, Vec<String>> = HashMap::new();
+    for (l, _, file, _) in &found {
+        users.entry(real(&file.path)).or_default().push(l.listed_as());
+    }
+    let mut photos: Vec<Photo> = Vec::new();
+    for (l, photo, file, normalized) in found {
+        let of_file = users.get(&real(&file.path)).map_or(&[][..], Vec::as_slice);
+        let other = of_file.iter().find(|name| **name != l.listed_as());
+        if let (Some(called), Some(other)) = (&file.called, other) {
+            tally.shared.push([l.listed_as(), other.clone(), called.clone()]);
+            continue;
+        }
+        if let Some(called) = file.called {
+            tally.renamed.push((l.listed_as(), called));
+        }
+        if normalized {
+            tally.normalized.push(photo.name.clone());
+        }
+        if file.linked {
+            tally.linked.push(photo.name.clone());
+        }
+        photos.push(*photo);
+    }
     if photos.is_empty() {
-        let first = missing.first().map_or_else(String::new, |m| (*m).into());
-        return Err(IoError::NoPhotos { path: source.into(), listed: listed.len(), first });
+        return Err(match first_cause.filter(|_| tally.broken.len() == listed.len()) {
+            Some((photo, cause)) => IoError::Camera { path: source.into(), photo, cause },
+            None => tally.error(source, root),
+        });
     }
-    if let Some(first) = missing.first() {
-        warnings.push(format!(
-            "{} of {} listed photos are missing and were skipped (first: {first})",
-            missing.len(),
-            listed.len()
-        ));
+    photos.sort_by(|a, b| a.name.cmp(&b.name));
+    if let Some(pair) = photos.windows(2).find(|w| w[0].name == w[1].name) {
+        return Err(IoError::Duplicate { path: source.into(), photo: pair[0].name.clone() });
     }
-    photos.sort_by(|a: &Photo, b| a.name.cmp(&b.name));
+    warnings.extend(tally.warnings(source));
     Ok(photos)
 }
 
-fn resolve(l: &ListedPhoto, root: &Path, source: &Path) -> Result<Option<Photo>, IoError> {
-    let bad = |cause| IoError::Camera { path: source.into(), photo: l.name.clone(), cause };
-    let rotation = rotation(l.world_from_camera).map_err(bad)?;
+fn real(path: &Path) -> PathBuf {
+    fs::canonicalize(path).unwrap_or_else(|_| path.into())
+}
+
+fn fate(l: &ListedPhoto, finder: &PhotoFinder<'_>, source: &Path) -> Result<Fate, IoError> {
+    let bad = |cause| IoError::Camera { path: source.into(), photo: l.entry.clone(), cause };
+    let unusable = |cause: CameraError| Ok(Fate::Broken(cause.to_string(), Some(cause)));
     let d = l.lens.distortion;
     for (property, value) in [("k1", d.k1), ("k2", d.k2), ("p1", d.p1), ("p2", d.p2)] {
         if !value.is_finite() {
             let property = format!("distortion {property}");
             return Err(IoError::syntax(
                 source,
-                format!("photo '{}'", l.name),
+                format!("photo '{}'", l.entry),
                 format!("{property} = {value} is not finite"),
             ));
         }
     }
-    let Some(path) = find(root, &l.entry, source)? else { return Ok(None) };
-    let found = photo::size(&path)?;
+    if let Some(why) = &l.broken {
+        return Ok(Fate::Broken(why.clone(), None));
+    }
+    let (rotation, scaled) = match straightened(l.world_from_camera) {
+        Ok(straight) => straight,
+        Err(cause) => return unusable(cause),
+    };
+    let file = match finder.find(&l.folder, &l.entry) {
+        Search::Found(file) => file,
+        other => return Ok(Fate::Unfound(other)),
+    };
+    let found = photo::size(&file.path)?;
     let declared = l.lens.camera(found, rotation, l.center);
-    declared.believe().map_err(bad)?;
+    match declared.believe() {
+        Err(cause @ (CameraError::Center(..) | CameraError::Far(..))) => return unusable(cause),
+        other => other.map_err(bad)?,
+    }
     if d != Distortion::default() && !covers(&declared, &d) {
         return Err(IoError::syntax(
             source,
-            format!("photo '{}'", l.name),
+            format!("photo '{}'", l.entry),
             format!(
                 "its lens distortion (k1 {:e}, k2 {:e}, p1 {:e}, p2 {:e}) leaves nothing of the picture; calibrate the camera \
                  anew or undistort the photo",
@@ -123,18 +194,19 @@ fn resolve(l: &ListedPhoto, root: &Path, source: &Path) -> Result<Option<Photo>,
     }
     let expected = (declared.width_px, declared.height_px);
     if !is_scaled(expected, found) {
-        return Err(IoError::PhotoSize { path, found, expected });
+        return Err(IoError::PhotoSize { path: file.path, found, expected });
     }
     let camera = if found == expected { declared } else { declared.resized(found.0, found.1) };
     camera.validate().map_err(bad)?;
-    Ok(Some(Photo {
-        name: l.name.clone(),
-        path,
+    let photo = Photo {
+        name: file.name.clone(),
+        path: file.path.clone(),
         camera,
         distortion: (d != Distortion::default()).then_some(d),
         test_split: l.test_split,
         background: l.background,
-    }))
+    };
+    Ok(Fate::Photo { photo: Box::new(photo), file, normalized: l.normalized || scaled })
 }
 
 /// The place of a point, if it is one: the error names the file, the kind of thing, its index and the axis.
@@ -149,20 +221,6 @@ pub(super) fn place(p: DVec3, element: &'static str, index: usize, path: &Path) 
         format!("{element} {index}"),
         format!("{property} = {value:e} is farther than {:e} units from the origin", Camera::FARTHEST),
     ))
-}
-
-/// The listed file, with one of the usual endings if it has none.
-fn find(root: &Path, entry: &str, source: &Path) -> Result<Option<PathBuf>, IoError> {
-    let is_file = |p: Option<PathBuf>| p.filter(|p| p.is_file());
-    if let Some(path) = is_file(files::inside(root, entry, source)?) {
-        return Ok(Some(path));
-    }
-    for ending in ENDINGS {
-        if let Some(path) = is_file(files::inside(root, &format!("{entry}.{ending}"), source)?) {
-            return Ok(Some(path));
-        }
-    }
-    Ok(None)
 }
 
 /// The folder with the photos of a dataset that lists names only: `images`, or else the least
@@ -210,15 +268,6 @@ impl Lens {
     }
 }
 
-/// `m` with rounding errors removed; an error if it is no rotation.
-fn rotation(m: DMat3) -> Result<DMat3, CameraError> {
-    let error = rotation_error(&m);
-    if error > ROUNDING || error.is_nan() {
-        return Err(CameraError::Rotation(error));
-    }
-    Ok(nearest_rotation(&m))
-}
-
 /// Whether a picture of `found` px shows the same as one of `expected` px, larger or smaller: one
 /// factor for both sides, up to rounding of the smaller picture's sides.
 pub(super) fn is_scaled(expected: (u32, u32), found: (u32, u32)) -> bool {
@@ -244,19 +293,5 @@ mod tests {
         }
         // Mip-NeRF 360's reduced folders round each side on its own.
         assert!(is_scaled((5187, 3361), (648, 420)));
-    }
-
-    #[test]
-    fn rounding_is_removed_and_scale_refused() {
-        let exact = DMat3::from_rotation_z(0.3) * DMat3::from_rotation_x(1.1);
-        let rounded = DMat3::from_cols_array(&exact.to_cols_array().map(|v| (v * 1e4).round() / 1e4));
-        assert!(rotation_error(&rounded) > 1e-6);
-        let fixed = rotation(rounded).expect("close");
-        assert!(rotation_error(&fixed) < 1e-14);
-        assert!((fixed - exact).to_cols_array().iter().all(|v| v.abs() < 1e-4));
-        assert!(matches!(rotation(exact * 1.01), Err(CameraError::Rotation(_))));
-        assert!(matches!(rotation(-exact), Err(CameraError::Rotation(_))));
-        assert!(matches!(rotation(DMat3::ZERO), Err(CameraError::Rotation(_))));
-        assert!(matches!(rotation(DMat3::NAN), Err(CameraError::Rotation(_))));
     }
 }

@@ -1,7 +1,7 @@
 //! Sparse points as `.ply`: `x y z` and, where present, `red green blue`.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -15,6 +15,24 @@ const GRAY: u8 = 128;
 
 pub(crate) fn read(path: &Path) -> Result<Vec<SparsePoint>, IoError> {
     parse(&files::read(path, u64::MAX)?, path)
+}
+
+/// What sparse points are called that no list names.
+const NAMES: [&str; 6] =
+    ["points3d.ply", "sparse_pc.ply", "points.ply", "pointcloud.ply", "point_cloud.ply", "sparse.ply"];
+/// Bytes in which a splat shows that it is one.
+const HEADER_BYTES: u64 = 8 << 10;
+
+/// The sparse points in a folder, in a `.ply` of one of the usual names, in whatever letters; a splat is none.
+pub(crate) fn beside(folder: &Path) -> Option<PathBuf> {
+    let there = files::names_in(folder).ok()?;
+    let called = |name: &&str| there.iter().find(|other| other.eq_ignore_ascii_case(name));
+    let is_splat = |path: &PathBuf| {
+        let start = files::read_start(path, HEADER_BYTES).unwrap_or_default();
+        start.windows(8).any(|word| word == b" opacity" || word == b" scale_0")
+    };
+    let all = NAMES.iter().filter_map(called).map(|name| folder.join(name));
+    all.filter(|path| path.is_file()).find(|path| !is_splat(path))
 }
 
 /// The points of a `.ply`'s bytes; `path` is for errors.

@@ -94,7 +94,7 @@ impl SceneInfo {
             version: VERSION,
             name: dataset.name.clone(),
             dataset: Some(DatasetReference {
-                path: relative_to(&dataset.root, folder),
+                path: relative_to(dataset.source(), folder),
                 format: dataset.format.clone(),
             }),
             cameras: dataset.photos.iter().enumerate().map(camera).collect(),
@@ -114,11 +114,11 @@ pub fn load_info(folder: &Path) -> Result<SceneInfo, IoError> {
     let path = folder.join(SCENE_FILE);
     let bytes = files::read(&path, files::MAX_TEXT_BYTES)?;
     // The version first: the rest of a newer file may not parse.
-    let Versioned { version } = serde_json::from_slice(&bytes).map_err(|e| files::json_error(&path, &e))?;
+    let Versioned { version } = files::json(&bytes, &path)?;
     if version == 0 || version > VERSION {
         return Err(IoError::Version { path, found: version, supported: VERSION });
     }
-    let info: SceneInfo = serde_json::from_slice(&bytes).map_err(|e| files::json_error(&path, &e))?;
+    let info: SceneInfo = files::json(&bytes, &path)?;
     check(&info, &path)?;
     Ok(info)
 }

@@ -3,18 +3,24 @@
 //!
 //! `transform_matrix` is world_from_camera with OpenGL camera axes (x right, y up, z back).
 
-use std::collections::HashSet;
+mod blender;
+mod matrix;
+
 use std::path::Path;
 
 use glam::{DMat3, DVec2, DVec3};
 use serde::Deserialize;
 
-use super::photo_list::{Focal, Lens, ListedPhoto, photos};
+pub use blender::read_blender;
+use matrix::{Matrix, pose};
+
+use super::photo_list::{Focal, Lens, ListedPhoto, PhotoFinder, Search, photos};
+use super::splits::Splits;
 use super::{IoError, files, points_ply};
 use crate::scene::{Camera, Dataset, Distortion};
 
-/// Blender's synthetic scenes have no backdrop; the literature shows them on white.
-const WHITE: [f32; 3] = [1.0; 3];
+/// The usual name of a list.
+pub(crate) const USUAL: &str = "transforms.json";
 
 #[derive(Deserialize)]
 struct File {
@@ -22,6 +28,10 @@ struct File {
     lens: Intrinsics,
     frames: Vec<Frame>,
     ply_file_path: Option<String>,
+    #[serde(default)]
+    train_filenames: Vec<String>,
+    #[serde(default)]
+    val_filenames: Vec<String>,
     #[serde(default)]
     test_filenames: Vec<String>,
     /// What this program's own data sets say beyond nerfstudio's keys.
@@ -39,7 +49,7 @@ struct Own {
 #[derive(Deserialize)]
 struct Frame {
     file_path: String,
-    transform_matrix: Vec<Vec<f64>>,
+    transform_matrix: Matrix,
     #[serde(flatten)]
     lens: Intrinsics,
 }
@@ -67,23 +77,32 @@ struct Intrinsics {
 
 /// Reads the dataset that a `transforms.json` describes.
 pub fn read(file: &Path) -> Result<Dataset, IoError> {
-    let root = file.parent().unwrap_or(Path::new("."));
-    let parsed: File = files::read_json(file)?;
-    let test: HashSet<String> =
-        parsed.test_filenames.iter().map(|n| files::relative(root, n, file)).collect::<Result<_, _>>()?;
-    let mut listed = Vec::with_capacity(parsed.frames.len());
-    for frame in &parsed.frames {
-        let mut l = frame.listed(&parsed.lens, root, file)?;
-        l.test_split = test.contains(&l.name);
-        listed.push(l);
-    }
+    let root = files::folder_of(file);
+    let parsed = File::read(file)?;
+    let finder = PhotoFinder::new(root)?;
+    let mut listed: Vec<ListedPhoto> =
+        parsed.frames.iter().map(|frame| frame.listed(&parsed.lens, file)).collect::<Result<_, _>>()?;
     let mut warnings = Vec::new();
+    let list = |name: &str, names: &[String]| (name.to_owned(), names.to_owned());
+    let splits = Splits {
+        train: vec![list("train_filenames", &parsed.train_filenames)],
+        held_out: vec![list("val_filenames", &parsed.val_filenames), list("test_filenames", &parsed.test_filenames)],
+    };
+    splits.apply(&mut listed, &finder, &mut warnings);
     let photos = photos(listed, root, file, &mut warnings)?;
     let points = match &parsed.ply_file_path {
-        None => Vec::new(),
-        Some(entry) => match files::inside(root, &files::relative(root, entry, file)?, file)? {
-            Some(path) => points_ply::read(&path)?,
-            None => {
+        None => points_ply::beside(root).map(|path| points_ply::read(&path)).transpose()?.unwrap_or_default(),
+        Some(entry) => match finder.find("", entry) {
+            Search::Found(found) => {
+                if let Some(called) = found.called {
+                    warnings.push(format!("the sparse points {entry} were found as {called}"));
+                }
+                points_ply::read(&found.path)?
+            }
+            Search::Outside => {
+                return Err(IoError::Outside { path: file.into(), entry: entry.clone(), folder: root.into() });
+            }
+            Search::Missing | Search::Several(_) => {
                 warnings.push(format!("the sparse points {entry} are missing; training starts from random points"));
                 Vec::new()
             }
@@ -92,6 +111,7 @@ pub fn read(file: &Path) -> Result<Dataset, IoError> {
     Ok(Dataset {
         name: files::folder_name(root),
         root: root.into(),
+        source: file.file_name().is_some_and(|name| name != USUAL).then(|| file.into()),
         format: "transforms.json".into(),
         photos,
         points,
@@ -101,6 +121,13 @@ pub fn read(file: &Path) -> Result<Dataset, IoError> {
     })
 }
 
+impl File {
+    fn read(path: &Path) -> Result<Self, IoError> {
+        let bytes = files::read(path, files::MAX_TEXT_BYTES)?;
+        files::json(&matrix::quoted(&bytes), path)
+    }
+}
+
 /// nerfstudio's camera: 4x4 rows of world_from_camera with x right, y up, z back.
 pub(crate) fn opengl_pose(camera: &Camera) -> [[f64; 4]; 4] {
     let m = camera.world_from_camera;
@@ -108,69 +135,28 @@ pub(crate) fn opengl_pose(camera: &Camera) -> [[f64; 4]; 4] {
     [[x.x, y.x, z.x, c.x], [x.y, y.y, z.y, c.y], [x.z, y.z, z.z, c.z], [0.0, 0.0, 0.0, 1.0]]
 }
 
-/// Reads a Blender dataset: photos of `transforms_train.json` to train on, those of
-/// `transforms_test.json` (or else of `transforms_val.json`) marked as test.
-pub fn read_blender(root: &Path) -> Result<Dataset, IoError> {
-    let train = root.join("transforms_train.json");
-    let held_out =
-        ["transforms_test.json", "transforms_val.json"].map(|n| root.join(n)).into_iter().find(|p| p.is_file());
-    let mut warnings = Vec::new();
-    let mut all = Vec::new();
-    for (file, test_split) in std::iter::once((train, false)).chain(held_out.map(|p| (p, true))) {
-        let parsed: File = files::read_json(&file)?;
-        let mut listed = Vec::with_capacity(parsed.frames.len());
-        for frame in &parsed.frames {
-            let mut l = frame.listed(&parsed.lens, root, &file)?;
-            l.test_split = test_split;
-            l.background = Some(WHITE);
-            listed.push(l);
-        }
-        all.extend(photos(listed, root, &file, &mut warnings)?);
-    }
-    all.sort_by(|a, b| a.name.cmp(&b.name));
-    if let Some(pair) = all.windows(2).find(|w| w[0].name == w[1].name) {
-        return Err(IoError::Duplicate { path: root.into(), photo: pair[0].name.clone() });
-    }
-    Ok(Dataset {
-        name: files::folder_name(root),
-        root: root.into(),
-        format: "Blender synthetic".into(),
-        photos: all,
-        background: Some(WHITE),
-        warnings,
-        ..Dataset::default()
-    })
-}
-
 impl Frame {
-    fn listed(&self, shared: &Intrinsics, root: &Path, source: &Path) -> Result<ListedPhoto, IoError> {
-        let name = files::relative(root, &self.file_path, source)?;
+    fn listed(&self, shared: &Intrinsics, source: &Path) -> Result<ListedPhoto, IoError> {
+        let name = &self.file_path;
         let bad = |reason: String| IoError::Syntax { path: source.into(), place: format!("frame '{name}'"), reason };
-        let (world_from_camera, center) = pose(&self.transform_matrix).map_err(|r| bad(r.into()))?;
         let lens = self.lens.or(shared).lens(source, &bad)?;
+        let (pose, broken) = match pose(&self.transform_matrix) {
+            Ok(pose) => (pose, None),
+            Err(why) => ((DMat3::IDENTITY, DVec3::ZERO, false), Some(why)),
+        };
+        let (world_from_camera, center, normalized) = pose;
         Ok(ListedPhoto {
             entry: name.clone(),
-            name,
+            folder: String::new(),
             lens,
             world_from_camera,
             center,
+            normalized,
+            broken,
             test_split: false,
             background: None,
         })
     }
-}
-
-/// Rotation (columns right, down, forward) and center of an OpenGL world_from_camera matrix.
-fn pose(m: &[Vec<f64>]) -> Result<(DMat3, DVec3), &'static str> {
-    let rows: Vec<[f64; 4]> = m.iter().filter_map(|r| r.as_slice().try_into().ok()).collect();
-    if rows.len() != m.len() || !(3..=4).contains(&rows.len()) {
-        return Err("transform_matrix is not 4 x 4");
-    }
-    if rows.get(3).is_some_and(|last| *last != [0.0, 0.0, 0.0, 1.0]) {
-        return Err("the last row of transform_matrix is not 0 0 0 1");
-    }
-    let column = |c: usize| DVec3::new(rows[0][c], rows[1][c], rows[2][c]);
-    Ok((DMat3::from_cols(column(0), -column(1), -column(2)), column(3)))
 }
 
 impl Intrinsics {

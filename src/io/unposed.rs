@@ -2,15 +2,19 @@
 
 use std::path::{Path, PathBuf};
 
-/// Endings of photos.
-const ENDINGS: [&str; 4] = ["jpg", "jpeg", "png", "webp"];
+use super::{IoError, files, photo};
+
 /// Where they may lie in a folder.
 const FOLDERS: [&str; 3] = [".", "images", "input"];
 /// From how many on a folder of pictures is taken for photos of a scene.
 const FEWEST: usize = 2;
+/// Endings of files in which other programs keep poses.
+const POSES: [&str; 8] = ["nvm", "out", "sfm", "psx", "xml", "rcproj", "p4d", "db"];
+/// Names of such files.
+const POSE_FILES: [&str; 5] = ["cameras.json", "sfm_data.json", "reconstruction.json", "images.txt", "images.bin"];
 
 /// A folder of photos without camera poses.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Unposed {
     /// The folder that was opened.
     pub folder: PathBuf,
@@ -18,20 +22,57 @@ pub struct Unposed {
     pub images: PathBuf,
     /// Names of the photos in it, in order.
     pub photos: Vec<String>,
+    /// What else lies there, in words: pictures that cannot be read, poses in formats of other programs; or nothing.
+    pub(crate) beside: String,
+}
+
+impl Unposed {
+    /// What lies beside, in brackets after a sentence.
+    pub(super) fn in_brackets(&self) -> String {
+        if self.beside.is_empty() { String::new() } else { format!(" ({})", self.beside) }
+    }
 }
 
 /// The photos in `folder`, if there are any.
-pub(super) fn find(folder: &Path) -> Option<Unposed> {
-    FOLDERS.iter().find_map(|below| {
-        let images = if *below == "." { folder.to_path_buf() } else { folder.join(below) };
-        let entries = std::fs::read_dir(&images).ok()?.flatten();
-        let is_photo = |name: &str| {
-            let ending = Path::new(name).extension().map(|e| e.to_string_lossy().to_lowercase());
-            !name.starts_with('.') && ending.is_some_and(|e| ENDINGS.contains(&e.as_str()))
-        };
-        let names = entries.filter(|e| e.path().is_file()).filter_map(|e| e.file_name().into_string().ok());
-        let mut photos: Vec<String> = names.filter(|name| is_photo(name)).collect();
-        photos.sort();
-        (photos.len() >= FEWEST).then(|| Unposed { folder: folder.into(), images, photos })
-    })
+///
+/// # Errors
+/// If there are pictures, and none that can be read.
+pub(super) fn find(folder: &Path) -> Result<Option<Unposed>, IoError> {
+    for below in FOLDERS {
+        let images = if below == "." { folder.to_path_buf() } else { folder.join(below) };
+        let Ok(names) = files::names_in(&images) else { continue };
+        let (photos, others): (Vec<String>, Vec<String>) =
+            names.into_iter().filter(|name| images.join(name).is_file()).partition(|name| photo::is_photo(name));
+        let unread: Vec<&String> = others.iter().filter(|name| photo::is_unread(name)).collect();
+        if photos.len() >= FEWEST {
+            let mut beside: Vec<String> = unread
+                .first()
+                .map(|first| {
+                    format!("{} pictures are of formats that are not read ({first}): {}", unread.len(), photo::CONVERT)
+                })
+                .into_iter()
+                .collect();
+            beside.extend(poses(&[folder, &images]));
+            return Ok(Some(Unposed { folder: folder.into(), images, photos, beside: beside.join(". ") }));
+        }
+        if unread.len() + photos.len() >= FEWEST {
+            let n = unread.len();
+            let what = format!("{n} pictures of formats that are not read (first: {})", unread[0]);
+            return Err(IoError::Unsupported { path: images, what, remedy: photo::CONVERT });
+        }
+    }
+    Ok(None)
+}
+
+/// A sentence about a file with poses of another program, if there is one.
+fn poses(folders: &[&Path]) -> Option<String> {
+    let has_poses = |name: &String| {
+        let ending = Path::new(name).extension().map(|e| e.to_string_lossy().to_lowercase());
+        POSE_FILES.contains(&name.as_str()) || ending.is_some_and(|e| POSES.contains(&e.as_str()))
+    };
+    let file = folders.iter().find_map(|folder| files::names_in(folder).ok()?.into_iter().find(has_poses))?;
+    Some(format!(
+        "{file} may hold poses, in a form that is not read by itself: export them from that program for COLMAP (cameras, \
+         images and points3D)"
+    ))
 }

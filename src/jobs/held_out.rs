@@ -1,5 +1,6 @@
 //! Which photos a scene was not trained on.
 
+use crate::io::gs_output::is_of;
 use crate::io::trained::SceneCamera;
 use crate::scene::Dataset;
 
@@ -15,7 +16,9 @@ pub(crate) fn held_out(
     if every.is_some() || cameras.is_empty() {
         return dataset.split(every.unwrap_or(default_every)).1;
     }
-    let held = |name: &str| cameras.iter().any(|c| c.held_out && c.name == name);
+    let is_exact = cameras.iter().any(|c| dataset.photos.iter().any(|p| p.name == c.name));
+    let is_of = |camera: &str, photo: &str| if is_exact { camera == photo } else { is_of(camera, photo) };
+    let held = |name: &str| cameras.iter().any(|c| c.held_out && is_of(&c.name, name));
     (0..dataset.photos.len()).filter(|&i| held(&dataset.photos[i].name)).collect()
 }
 

@@ -17,6 +17,7 @@ use crate::scene::plan::used_degree;
 use crate::scene::resource_log::{self, ResourceKind};
 use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Machine, SceneFacts, SemanticMap};
 
+mod beside;
 mod received;
 
 pub use received::Origin;
@@ -46,6 +47,10 @@ pub struct Scene {
     pub(crate) metres_per_unit: Option<f64>,
     /// Id of the save that its files are of, if it has one.
     pub(crate) state: Option<String>,
+    /// The folder beside a splat that its cameras are from.
+    pub(crate) cameras_from: Option<PathBuf>,
+    /// What of the things beside a splat could not be used.
+    pub(crate) warnings: Vec<String>,
 }
 
 impl Scene {
@@ -90,7 +95,7 @@ impl Scene {
         let name = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let settings = RenderSettings::of_mode(cloud.render_mode);
         let (cloud, sh_stored) = compact(cloud);
-        Self { path: path.into(), name, cloud, sh_stored, settings, ..Self::default() }
+        Self { path: path.into(), name, cloud, sh_stored, settings, ..Self::default() }.with_what_lies_beside()
     }
 
     fn trained(path: &Path, scene: TrainedScene, config: TrainConfig) -> Self {
@@ -113,6 +118,7 @@ impl Scene {
             dataset_path,
             metres_per_unit: info.metres_per_unit.filter(|m| m.is_finite() && *m > 0.0),
             state,
+            ..Self::default()
         }
     }
 }
@@ -128,6 +134,7 @@ pub(crate) enum Contents {
 
 /// Reads what lies at `path`.
 pub(crate) fn contents(path: &Path) -> Result<Contents, JobError> {
+    let path = &*beside::splat_of(path);
     Ok(match io::open(path)? {
         Opened::Dataset(dataset) => Contents::Photos(dataset),
         Opened::Cloud(cloud) => Contents::Scene(Scene::bare(path, cloud)),
@@ -261,10 +268,16 @@ pub(crate) fn open(
     machine: &Machine,
     observer: &mut dyn Observer,
 ) -> Result<OpenedScene, JobError> {
-    let path = &std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let path = &beside::splat_of(&std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()));
     let mut scene = match io::open(path)? {
         Opened::Dataset(dataset) => photos(dataset, folders, observer),
-        Opened::Cloud(cloud) => OpenedScene::of(Scene::bare(path, cloud), None, observer),
+        Opened::Cloud(cloud) => {
+            let scene = Scene::bare(path, cloud);
+            scene.warnings.iter().for_each(|text| observer.note(Severity::Warning, text.clone()));
+            let seen = scene.dataset_path.is_some().then(|| photos_of(&scene, observer)).flatten();
+            let dataset = seen.or_else(|| scene.photos_unseen().map(Arc::new));
+            OpenedScene::of(scene, dataset, observer)
+        }
         Opened::Trained(trained) => {
             let scene = tolerant(path, trained, observer);
             let dataset = photos_of(&scene, observer);
@@ -306,7 +319,7 @@ pub(crate) fn known_objects(scene: &Scene, observer: &mut dyn Observer) -> Optio
 
 /// Photos, with the Gaussians that were trained on them before, if there are any.
 fn photos(dataset: Dataset, folders: &Folders, observer: &mut dyn Observer) -> OpenedScene {
-    let out = folders.trained(&dataset.root);
+    let out = folders.trained(dataset.source());
     let before = trained::is_scene(&out).then(|| trained::load(&out)).and_then(|loaded| match loaded {
         Ok(scene) => Some(scene),
         Err(e) => {

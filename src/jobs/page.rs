@@ -7,8 +7,8 @@ use std::time::SystemTime;
 use glam::DVec3;
 
 use super::{JobError, Scene, export, video};
-use crate::io::IoError;
 use crate::io::page::{Page, PageIdentity, PagePath, PageScene, PageView, packed};
+use crate::io::{IoError, files};
 use crate::math::format::{self, things};
 use crate::math::rotation::nearest_rotation;
 use crate::navigate::camera_spline::steps_of;
@@ -88,7 +88,9 @@ impl PageRequest {
 /// Camera paths among the files of a scene's folder, by the names of the files. What is none is passed over.
 pub(crate) fn paths_in(folder: &Path) -> Vec<(String, CameraPath)> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let small = |e: &std::fs::DirEntry| e.metadata().is_ok_and(|m| m.is_file() && m.len() <= MAX_PATH_BYTES);
+    let is_debris = |e: &std::fs::DirEntry| e.file_name().to_str().is_none_or(files::is_debris);
+    let is_small = |e: &std::fs::DirEntry| e.metadata().is_ok_and(|m| m.is_file() && m.len() <= MAX_PATH_BYTES);
+    let small = |e: &std::fs::DirEntry| is_small(e) && !is_debris(e);
     let mut files: Vec<PathBuf> = entries.filter(small).map(|e| e.path()).collect();
     files.sort();
     let json = files.iter().filter(|f| f.extension().is_some_and(|e| e.eq_ignore_ascii_case("json")));

@@ -98,19 +98,19 @@ struct Head {
 pub(crate) fn read<T: DeserializeOwned>(path: &Path, kind: &str) -> Result<T, ModelError> {
     let refused = |problem: String| ModelError::Metadata { path: path.into(), problem };
     let bytes = crate::io::files::read(path, MAX_BYTES).map_err(|e| refused(e.to_string()))?;
-    let head: Head = serde_json::from_slice(&bytes).map_err(|e| refused(e.to_string()))?;
+    let head: Head = crate::io::files::json(&bytes, path).map_err(|e| refused(e.to_string()))?;
     if head.version != VERSION {
         return Err(refused(format!("version {}, this program reads {VERSION}; export the model anew", head.version)));
     }
     if head.kind != kind {
         return Err(refused(format!("it describes a '{}' model where '{kind}' is wanted", head.kind)));
     }
-    serde_json::from_slice(&bytes).map_err(|e| refused(e.to_string()))
+    crate::io::files::json(&bytes, path).map_err(|e| refused(e.to_string()))
 }
 
 /// The kind of model that a metadata file describes.
 pub fn kind(path: &Path) -> Result<String, ModelError> {
     let refused = |problem: String| ModelError::Metadata { path: path.into(), problem };
     let bytes = crate::io::files::read(path, MAX_BYTES).map_err(|e| refused(e.to_string()))?;
-    serde_json::from_slice::<Head>(&bytes).map(|head| head.kind).map_err(|e| refused(e.to_string()))
+    crate::io::files::json::<Head>(&bytes, path).map(|head| head.kind).map_err(|e| refused(e.to_string()))
 }

@@ -1,6 +1,6 @@
 //! A set of posed photos with whatever sparse geometry came with it.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
@@ -12,6 +12,8 @@ pub struct Dataset {
     /// Short name for titles: the folder's.
     pub name: String,
     pub(crate) root: PathBuf,
+    /// What to open to get the same again, where that is not [`Self::root`]: one of several files or reconstructions.
+    pub(crate) source: Option<PathBuf>,
     /// Which layout it was read from, for display: "COLMAP binary", "transforms.json", ...
     pub format: String,
     /// The photos that exist, sorted by name.
@@ -46,6 +48,11 @@ impl Dataset {
             let held = if marked { self.photos[i].test_split } else { every > 0 && i % every == 0 };
             !held
         })
+    }
+
+    /// What to open to get the same again.
+    pub(crate) fn source(&self) -> &Path {
+        self.source.as_deref().unwrap_or(&self.root)
     }
 
     /// The cameras of all photos.

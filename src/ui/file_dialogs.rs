@@ -18,7 +18,8 @@ use crate::worker::Repaint;
 const NO_DIALOG: Duration = Duration::from_millis(500);
 
 /// Endings of scenes.
-const SCENES: [&str; 9] = ["ply", "splat", "ksplat", "spz", "sog", "gltf", "glb", "json", "toml"];
+const SCENES: [&str; 13] =
+    ["ply", "splat", "ksplat", "spz", "sog", "gltf", "glb", "json", "toml", "npy", "bin", "txt", "zip"];
 
 /// What is to be chosen.
 #[derive(Clone, Debug, PartialEq)]
@@ -224,7 +225,9 @@ fn dialog(action: &Action, name: &str) -> Option<(String, Kind)> {
         }
         Action::ExportAll => ("Choose an empty folder for all objects and parts", Kind::Folder),
         Action::ExportPhrases => ("Choose a folder for the masks", Kind::Folder),
-        Action::ChooseTrueMask => ("Choose the true mask of this view", Kind::File("Masks", &["png"])),
+        Action::ChooseTrueMask => {
+            ("Choose the true mask of this view", Kind::File("Masks", &["png", "bmp", "tif", "tiff"]))
+        }
         Action::ChooseMasks => ("Choose the folder with the masks", Kind::Folder),
         Action::ExportPly | Action::ExportTarget(_) | Action::ExportCrop => {
             let title = format!("Export Gaussians: the ending chooses among {}", SplatFormat::endings());

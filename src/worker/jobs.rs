@@ -66,7 +66,7 @@ impl PipelineJobs {
         observer: &mut dyn Observer,
     ) -> Result<Outcome, Stop> {
         // Other settings get a folder of their own; which one is seen when it is needed.
-        let folders = std::iter::once(out).chain(std::iter::once_with(|| self.folders.fresh(&dataset.root)));
+        let folders = std::iter::once(out).chain(std::iter::once_with(|| self.folders.fresh(dataset.source())));
         let done = train::run(dataset, config, folders, observer)?;
         self.knows(&done.out, done.state.clone());
         if !done.is_finished() {

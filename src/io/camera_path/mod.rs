@@ -23,7 +23,7 @@ pub(crate) fn open(path: &Path) -> Result<CameraPath, IoError> {
 
 /// As [`open`], of bytes; `path` is what errors call them.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<CameraPath, IoError> {
-    let marks: Marks = serde_json::from_slice(bytes).map_err(|e| files::json_error(path, &e))?;
+    let marks: Marks = files::json(bytes, path)?;
     let camera_path = match marks {
         Marks { format: Some(format), .. } if format == FORMAT => own::parse(bytes, marks.version, path)?,
         Marks { format: None, keyframes: Some(_), .. } | Marks { format: None, camera_path: Some(_), .. } => {

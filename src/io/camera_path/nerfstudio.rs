@@ -67,7 +67,7 @@ fn frames<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Frame>, D::Error> {
 
 /// The path in `bytes`: its keyframes, or else every frame of the video as a key. Values are not all checked yet.
 pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<CameraPath, IoError> {
-    let file: File = serde_json::from_slice(bytes).map_err(|e| files::json_error(path, &e))?;
+    let file: File = files::json(bytes, path)?;
     if let Some(kind) = file.camera_type.as_deref().filter(|k| !k.eq_ignore_ascii_case("perspective")) {
         return Err(IoError::Unsupported {
             path: path.into(),

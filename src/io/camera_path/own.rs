@@ -80,7 +80,7 @@ pub(crate) fn parse(bytes: &[u8], version: Option<u64>, path: &Path) -> Result<C
             return Err(IoError::Syntax { path: path.into(), place: "the head".into(), reason });
         }
     }
-    let file: File = serde_json::from_slice(bytes).map_err(|e| files::json_error(path, &e))?;
+    let file: File = files::json(bytes, path)?;
     Ok(CameraPath {
         keys: file.keys.into_iter().map(PathKey::from).collect(),
         closed: file.closed,

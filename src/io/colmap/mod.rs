@@ -1,27 +1,28 @@
-//! COLMAP reconstructions, binary and text: `cameras`, `images` and `points3D` in `sparse/0`,
-//! `sparse` or the dataset's folder, photos in `images` (or a reduced `images_<factor>`).
+//! COLMAP reconstructions, binary and text: `cameras`, `images` and `points3D` in `sparse/0` or wherever else those who
+//! use COLMAP put them ([`find`]), photos in `images` or wherever they are ([`photo_folder`]).
 //!
 //! Poses are camera_from_world with the axes that this program uses (x right, y down, z forward).
 
 mod binary;
+mod find;
 mod lens;
+mod photo_folder;
 mod text;
 
-use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::path::Path;
 
 use glam::{DMat3, DVec3};
 
-use super::photo_list::{Lens, ListedPhoto, photos};
-use super::{IoError, files, photo_list};
+use super::photo_list::{Lens, ListedPhoto, PhotoFinder, photos, some_of};
+use super::splits::Splits;
+use super::{IoError, files, llff, photo, photo_list, points_ply};
 use crate::math::rotation::matrix_from_quaternion;
-use crate::scene::{CameraError, Dataset, SparsePoint};
+use crate::scene::{Dataset, Photo, SparsePoint};
+use find::{Largest, Model};
 
 pub use binary::{check_cameras, check_images, check_points};
 pub use text::{check_text_cameras, check_text_images, check_text_points};
-
-/// Where a reconstruction may lie, relative to the dataset's folder.
-const FOLDERS: [&str; 3] = ["sparse/0", "sparse", "."];
 
 struct Image {
     name: String,
@@ -34,62 +35,116 @@ struct Image {
 
 type Cameras = HashMap<u32, Lens>;
 
-/// The folder of the reconstruction of the dataset in `root`, and whether it is binary.
-fn find(root: &Path) -> Option<(PathBuf, bool)> {
-    let has = |folder: &Path, ending: &str| {
-        ["cameras", "images"].iter().all(|n| folder.join(format!("{n}.{ending}")).is_file())
-    };
-    FOLDERS.iter().map(|f| root.join(f)).find_map(|folder| {
-        let binary = has(&folder, "bin");
-        (binary || has(&folder, "txt")).then_some((folder, binary))
-    })
-}
-
 pub(crate) fn is_colmap(root: &Path) -> bool {
-    find(root).is_some()
+    find::any(root)
 }
 
-/// Reads the dataset in `root`.
+/// Reads the dataset in `root`, or the one that a reconstruction in `root` is of.
 pub fn read(root: &Path) -> Result<Dataset, IoError> {
-    let Some((folder, is_binary)) = find(root) else {
+    let Some(Largest { model, images, others }) = find::largest(root)? else {
         let cause = std::io::Error::from(std::io::ErrorKind::NotFound);
         return Err(IoError::Read { path: root.join("sparse/0/cameras.bin"), cause });
     };
-    let ending = if is_binary { "bin" } else { "txt" };
-    let file = |name: &str| folder.join(format!("{name}.{ending}"));
-    let (cameras_file, images_file, points_file) = (file("cameras"), file("images"), file("points3D"));
-    let load = |path: &Path| files::read(path, u64::MAX);
-    let (cameras, images) = if is_binary {
-        let cameras = binary::cameras(&load(&cameras_file)?, &cameras_file)?;
-        (cameras, binary::images(&load(&images_file)?, &images_file)?)
-    } else {
-        let cameras = text::cameras(&files::read_text(&cameras_file)?, &cameras_file)?;
-        (cameras, text::images(&files::read_text(&images_file)?, &images_file)?)
-    };
+    let opened = root;
+    let images_file = model.file("images");
+    let place = photo_folder::find(opened, &model.folder, &images, &images_file)?;
+    let root = place.root.as_path();
     let mut warnings = Vec::new();
-    let points = match points_file.is_file() {
-        false => Vec::new(),
-        true if is_binary => binary::points(&load(&points_file)?, &points_file)?,
-        true => text::points(&files::read_text(&points_file)?, &points_file)?,
-    };
+    if !others.is_empty() {
+        let told = |other: &find::Other| format!("{} ({})", shown(&other.folder, opened), other.what);
+        let others: Vec<String> = others.iter().map(told).collect();
+        warnings.push(format!(
+            "{} is taken, the reconstruction with the most photos ({}); others were left out: {}; open one of their \
+             folders to see it",
+            shown(&model.folder, opened),
+            images.len(),
+            some_of(&others, ", ")
+        ));
+    }
+    let cameras = cameras(&model)?;
+    let mut listed = Vec::with_capacity(images.len());
+    for image in &images {
+        listed.push(self::listed(image, &cameras, &place.below, &images_file)?);
+    }
+    Splits::beside(&[&model.folder, root])?.apply(&mut listed, &PhotoFinder::new(root)?, &mut warnings);
+    let photos = photos(listed, root, &images_file, &mut warnings)?;
+    warnings.extend(without_pose(&photos, &images, root));
+    let points = points(&model)?;
     if points.is_empty() {
         warnings.push("the reconstruction has no sparse points; training starts from random points".into());
     }
-    let photo_folder = photo_list::photo_folder(root, &images_file)?;
-    let listed =
-        images.iter().map(|i| listed(i, &cameras, root, &photo_folder, &images_file)).collect::<Result<_, _>>()?;
     Ok(Dataset {
         name: files::folder_name(root),
         root: root.into(),
-        format: if is_binary { "COLMAP binary" } else { "COLMAP text" }.into(),
-        photos: photos(listed, root, &images_file, &mut warnings)?,
+        source: (root != opened).then(|| opened.into()),
+        format: if model.is_binary { "COLMAP binary" } else { "COLMAP text" }.into(),
+        photos,
         points,
         warnings,
         ..Dataset::default()
     })
 }
 
-fn listed(image: &Image, cameras: &Cameras, root: &Path, folder: &str, source: &Path) -> Result<ListedPhoto, IoError> {
+/// A folder as seen from another that it lies in.
+fn shown(folder: &Path, from: &Path) -> String {
+    let inside = folder.strip_prefix(from).unwrap_or(folder);
+    if inside.as_os_str().is_empty() { "the folder itself".into() } else { inside.display().to_string() }
+}
+
+fn cameras(model: &Model) -> Result<Cameras, IoError> {
+    let file = model.file("cameras");
+    match model.is_binary {
+        true => binary::cameras(&files::read(&file, u64::MAX)?, &file),
+        false => text::cameras(&files::read_text(&file)?, &file),
+    }
+}
+
+/// The points of COLMAP's file, or else of a `.ply` beside it.
+fn points(model: &Model) -> Result<Vec<SparsePoint>, IoError> {
+    let file = model.file("points3D");
+    let points = match file.is_file() {
+        false => Vec::new(),
+        true if model.is_binary => binary::points(&files::read(&file, u64::MAX)?, &file)?,
+        true => text::points(&files::read_text(&file)?, &file)?,
+    };
+    match points_ply::beside(&model.folder).filter(|_| points.is_empty()) {
+        Some(ply) => points_ply::read(&ply),
+        None => Ok(points),
+    }
+}
+
+/// A warning that counts the photos that lie beside those of the reconstruction and have no pose, if there are any.
+fn without_pose(photos: &[Photo], images: &[Image], root: &Path) -> Option<String> {
+    let mut folders: BTreeMap<&Path, HashSet<&str>> = BTreeMap::new();
+    for photo in photos {
+        let name = photo.path.file_name()?.to_str()?;
+        folders.entry(photo.path.parent()?).or_default().insert(name);
+    }
+    // Those that were left out for another reason are told already.
+    let known: HashSet<String> = images.iter().map(|image| photo_list::fold(end(&image.name))).collect();
+    let mut all = 0;
+    let mut rest = Vec::new();
+    for (folder, used) in folders {
+        for name in files::names_in(folder).unwrap_or_default() {
+            let of_another = photo::stem(&name).is_some_and(|stem| used.contains(stem)) || llff::is_helper(&name);
+            if (photo::is_photo(&name) || photo::is_unread(&name)) && !of_another {
+                all += 1;
+                if !used.contains(&*name) && !known.contains(&photo_list::fold(&name)) {
+                    rest.push(folder.join(name).strip_prefix(root).ok()?.display().to_string());
+                }
+            }
+        }
+    }
+    let shown = some_of(&rest, ", ");
+    let n = rest.len();
+    (n > 0).then(|| format!("{n} of {all} photos have no pose in the reconstruction and were left out: {shown}"))
+}
+
+fn end(name: &str) -> &str {
+    name.rsplit(['/', '\\']).next().unwrap_or(name)
+}
+
+fn listed(image: &Image, cameras: &Cameras, folder: &str, source: &Path) -> Result<ListedPhoto, IoError> {
     let Some(lens) = cameras.get(&image.camera) else {
         return Err(IoError::syntax(
             source,
@@ -97,17 +152,17 @@ fn listed(image: &Image, cameras: &Cameras, root: &Path, folder: &str, source: &
             format!("there is no camera {}", image.camera),
         ));
     };
-    let bad = |cause| IoError::Camera { path: source.into(), photo: image.name.clone(), cause };
-    let [x, y, z] = matrix_from_quaternion(image.quaternion).ok_or_else(|| bad(CameraError::Rotation(f64::NAN)))?;
     // The rows of camera_from_world are the columns of world_from_camera.
-    let world_from_camera = DMat3::from_cols(x.into(), y.into(), z.into());
-    let name = files::relative(root, &image.name, source)?;
+    let axes = matrix_from_quaternion(image.quaternion).map(|[x, y, z]| DMat3::from_cols(x.into(), y.into(), z.into()));
+    let world_from_camera = axes.unwrap_or(DMat3::NAN);
     Ok(ListedPhoto {
-        entry: format!("{folder}/{name}"),
-        name,
+        entry: image.name.clone(),
+        folder: folder.into(),
         lens: lens.clone(),
         world_from_camera,
         center: -(world_from_camera * image.translation),
+        normalized: false,
+        broken: None,
         test_split: false,
         background: None,
     })

@@ -288,10 +288,10 @@ fn lenses_and_places_that_cannot_be_are_refused_on_reading() {
         read(t.path()).map(|d| d.photos.len()).map_err(|e| e.to_string())
     };
     assert_eq!(with("cameras.txt", "50.0", "70.0"), Ok(2), "control");
+    assert_eq!(with("images.txt", "-1.0 ", "1e308 "), Ok(1), "one pose is no place: the other photo stays");
     for (file, from, to, what) in [
         ("cameras.txt", "50.0", "1e-30", "focal length"),
         ("cameras.txt", " 0.1 ", " 1e10 ", "leaves nothing"),
-        ("images.txt", "-1.0 ", "1e308 ", "camera center"),
         ("points3D.txt", "3.5", "1e308", "z = 1e308"),
     ] {
         let e = with(file, from, to).expect_err(what);
@@ -303,7 +303,11 @@ fn lenses_and_places_that_cannot_be_are_refused_on_reading() {
 fn a_camera_without_photos_folder_is_named() {
     let b = binary("sparse/0");
     fs::rename(b.path().join("images"), b.path().join("pictures")).expect("rename");
+    assert_eq!(read(b.path()).expect("another name").photos.len(), 2);
+    let elsewhere = tempfile::tempdir().expect("folder");
+    let taken = elsewhere.path().join("pictures");
+    fs::rename(b.path().join("pictures"), &taken).expect("rename");
     assert!(matches!(read(b.path()), Err(IoError::Syntax { reason, .. }) if reason.contains("images_<factor>")));
-    fs::rename(b.path().join("pictures"), b.path().join("images_2")).expect("rename");
+    fs::rename(taken, b.path().join("images_2")).expect("rename");
     assert_eq!(read(b.path()).expect("reduced folder").photos.len(), 2);
 }

@@ -82,7 +82,7 @@ impl Labels {
     fn open_json(path: &Path) -> Result<Self, IoError> {
         let json = |p: &Path| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
         let mut candidates: Vec<PathBuf> = match std::fs::read_dir(path) {
-            Ok(entries) => entries.flatten().map(|e| e.path()).filter(|p| json(p)).collect(),
+            Ok(_) => entries(path).iter().map(|name| path.join(name)).filter(|p| json(p)).collect(),
             Err(_) if json(path) => vec![path.into()],
             Err(cause) => return Err(IoError::Read { path: path.into(), cause }),
         };
@@ -212,10 +212,7 @@ impl<'a> AsLoaded<'a> {
 
 /// File names in a folder, sorted; none if there is no such folder.
 fn entries(folder: &Path) -> Vec<String> {
-    let found = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let mut names: Vec<String> = found.filter_map(|e| e.file_name().into_string().ok()).collect();
-    names.sort();
-    names
+    files::names_in(folder).unwrap_or_default()
 }
 
 /// A picture file's id per pixel: 8- or 16-bit gray, of the photo's shape; `masks` are made of it.

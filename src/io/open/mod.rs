@@ -1,11 +1,15 @@
 //! One `open` for everything: looks at what is there and calls the reader for it.
 
+mod beside;
+mod packed;
+
 use std::fs;
 use std::path::Path;
 
 use super::trained::{self, TrainedScene};
 use super::{
-    IoError, OpenError, colmap, files, khr_gltf, ksplat, llff, sog, splat, splat_ply, spz, transforms, unposed,
+    IoError, OpenError, colmap, files, gs_output, khr_gltf, ksplat, llff, sog, splat, splat_ply, spz, transforms,
+    unposed,
 };
 use crate::scene::{Dataset, GaussianCloud};
 
@@ -25,7 +29,7 @@ pub enum Opened {
 type Result<T> = std::result::Result<T, OpenError>;
 
 /// What is looked for in a folder, in this order, and the reader of each.
-const FOLDERS: [Layout; 6] = [
+const FOLDERS: [Layout; 7] = [
     Layout {
         name: "a trained scene (scene.json)",
         is: trained::is_scene,
@@ -33,8 +37,11 @@ const FOLDERS: [Layout; 6] = [
     },
     Layout {
         name: "nerfstudio or instant-ngp photos (transforms.json)",
-        is: |p| p.join("transforms.json").is_file(),
-        open: |p| Ok(Opened::Dataset(transforms::read(&p.join("transforms.json"))?)),
+        is: |p| files::called(p, transforms::USUAL).is_some(),
+        open: |p| {
+            let list = files::called(p, transforms::USUAL).unwrap_or_else(|| p.join(transforms::USUAL));
+            Ok(Opened::Dataset(transforms::read(&list)?))
+        },
     },
     Layout {
         name: "Blender photos (transforms_train.json)",
@@ -42,7 +49,8 @@ const FOLDERS: [Layout; 6] = [
         open: |p| Ok(Opened::Dataset(transforms::read_blender(p)?)),
     },
     Layout {
-        name: "a COLMAP reconstruction ({cameras,images}.{bin,txt} in sparse/0, sparse or the folder)",
+        name: "a COLMAP reconstruction ({cameras,images}.{bin,txt} in sparse/0, colmap/sparse/0, distorted/sparse/0, \
+               another folder or the folder itself)",
         is: colmap::is_colmap,
         open: |p| Ok(Opened::Dataset(colmap::read(p)?)),
     },
@@ -50,6 +58,11 @@ const FOLDERS: [Layout; 6] = [
         name: "LLFF photos (poses_bounds.npy)",
         is: |p| p.join(llff::POSES_FILE).is_file(),
         open: |p| Ok(Opened::Dataset(llff::read(p)?)),
+    },
+    Layout {
+        name: "a folder of 3D Gaussian Splatting (point_cloud/iteration_<n>/point_cloud.ply)",
+        is: |p| gs_output::latest(p).is_some(),
+        open: |p| Ok(Opened::Cloud(splat_ply::read(&gs_output::latest(p).unwrap_or_else(|| p.into()))?)),
     },
     Layout {
         name: "a SOG splat (meta.json)",
@@ -84,7 +97,16 @@ fn open_folder(path: &Path) -> Result<Opened> {
     if let Some(layout) = FOLDERS.iter().find(|l| (l.is)(path)) {
         return Ok((layout.open)(path)?);
     }
-    if let Some(photos) = unposed::find(path) {
+    if let Some(dataset) = beside::other_list(path)? {
+        return Ok(Opened::Dataset(dataset));
+    }
+    let photos = unposed::find(path);
+    if !matches!(photos, Ok(None))
+        && let Some(dataset) = beside::of_photos(path)?
+    {
+        return Ok(Opened::Dataset(dataset));
+    }
+    if let Some(photos) = photos? {
         return Err(OpenError::NoPoses(Box::new(photos)));
     }
     Err(OpenError::Unrecognized {
@@ -109,13 +131,20 @@ fn open_file(path: &Path) -> Result<Opened> {
         }
         sog::META_FILE => return Ok(Opened::Cloud(sog::read_folder(path)?)),
         llff::POSES_FILE => return Ok(Opened::Dataset(llff::read(folder)?)),
+        "images.bin" | "images.txt" | "cameras.bin" | "cameras.txt" | "points3d.bin" | "points3d.txt"
+            if colmap::is_colmap(folder) =>
+        {
+            return Ok(Opened::Dataset(colmap::read(folder)?));
+        }
         n if n.starts_with("transforms") && n.ends_with(".json") => {
             return Ok(Opened::Dataset(transforms::read(path)?));
         }
         _ => {}
     }
-    match files::read_start(path, MAGIC_BYTES)?.as_slice() {
-        [b'p', b'l', b'y', b'\n' | b'\r'] => Ok(Opened::Cloud(splat_ply::read(path)?)),
+    let start = files::read_start(path, MAGIC_BYTES)?;
+    packed::refuse(path, &name, &start)?;
+    match start.as_slice() {
+        [b'p', b'l', b'y', b'\n' | b'\r'] | [0xEF, 0xBB, 0xBF, b'p'] => Ok(Opened::Cloud(splat_ply::read(path)?)),
         start if khr_gltf::is_gltf(start, &name) => Ok(Opened::Cloud(khr_gltf::read(path)?)),
         b"PK\x03\x04" => Ok(Opened::Cloud(sog::read_archive(path)?)),
         start if spz::is_spz(start) => Ok(Opened::Cloud(spz::read(path)?)),
@@ -154,6 +183,7 @@ fn contents(folder: &Path) -> Result<String> {
         let slash = if entry.path().is_dir() { "/" } else { "" };
         names.push(entry.file_name().to_string_lossy().into_owned() + slash);
     }
+    names.retain(|name| !files::is_debris(name.trim_end_matches('/')));
     names.sort();
     let more = names.len().saturating_sub(SHOWN);
     names.truncate(SHOWN);

@@ -26,7 +26,8 @@ pub(crate) struct Ply<'a> {
 impl<'a> Ply<'a> {
     /// Reads the header of a file's bytes. Nothing is allocated for the rows it claims.
     pub(crate) fn parse(bytes: &'a [u8], path: &'a Path) -> Result<Self, IoError> {
-        header::parse(bytes, path)
+        // Editors put a byte order mark before those that are text.
+        header::parse(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes), path)
     }
 
     pub(crate) fn element(&self, name: &str) -> Option<&Element> {

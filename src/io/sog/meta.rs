@@ -91,7 +91,7 @@ enum Bounds {
 
 /// Parses and checks a `meta.json`.
 pub(super) fn parse(bytes: &[u8], path: &Path) -> Result<Meta, IoError> {
-    let file: File = serde_json::from_slice(bytes).map_err(|e| files::json_error(path, &e))?;
+    let file: File = files::json(bytes, path)?;
     let version = file.version.unwrap_or(1);
     if !(1..=2).contains(&version) {
         return Err(IoError::Version { path: path.into(), found: version, supported: 2 });

@@ -20,7 +20,7 @@ feature_extractor)
 exhaustive_matcher) echo "Matching block [1/1, 1/1] in 0.1s"; MATCHING ;;
 mapper)
   echo "=> Registered"; echo "Registering image #2 (3)"
-  mkdir -p "$7/0" "$7/1"; echo few > "$7/0/images.bin"; cp "HERE"/model/* "$7/1" ;;
+  mkdir -p "$7/0" "$7/1"; echo few > "$7/0/images.bin"; cp "HERE"/of/program/* "$7/1" ;;
 esac
 "##;
 
@@ -34,8 +34,8 @@ impl Fake {
     fn new(matching: &str) -> Self {
         let guard = tempfile::tempdir().expect("folder");
         let here = guard.path();
-        let (images, model) = (here.join("my photos"), here.join("model"));
-        let mut all = fs::create_dir(&images).and_then(|()| fs::create_dir(&model));
+        let (images, model) = (here.join("my photos"), here.join("of/program"));
+        let mut all = fs::create_dir(&images).and_then(|()| fs::create_dir_all(&model));
         let mut poses = 3_u64.to_le_bytes().to_vec();
         for i in 0..3_u32 {
             let picture = image::RgbImage::from_pixel(8, 6, image::Rgb([40 * i as u8, 90, 200]));
@@ -144,11 +144,11 @@ fn lines_are_read_as_progress() {
 
 #[test]
 fn the_commands_can_be_copied_into_a_shell() {
-    let photos = Unposed { folder: "/a b/it's".into(), images: "/a b/it's".into(), photos: vec![] };
+    let photos = Unposed { folder: "/a b/it's".into(), images: "/a b/it's".into(), ..Unposed::default() };
     let lines = commands(&photos);
     assert_eq!(lines[1], r"cp -r '/a b/it'\''s' '/a b/it'\''s-posed/images'");
     assert_eq!(lines.last().map(String::as_str), Some(r"fmlgs train '/a b/it'\''s-posed'"));
-    let tidy = Unposed { folder: "/data/fox".into(), images: "/data/fox/images".into(), photos: vec![] };
+    let tidy = Unposed { folder: "/data/fox".into(), images: "/data/fox/images".into(), ..Unposed::default() };
     let lines = commands(&tidy);
     assert_eq!(lines.len(), 5, "nothing is copied: {lines:?}");
     assert_eq!(

@@ -14,6 +14,9 @@ pub(crate) fn show(ctx: &egui::Context, photos: &Unposed, actions: &mut Vec<Acti
         ui.set_width(620.0_f32.min(ui.ctx().content_rect().width() - 80.0));
         ui.heading(format!("{} photos, no camera poses", photos.photos.len()));
         ui.weak(text::path(&photos.images));
+        if !photos.beside.is_empty() {
+            ui.label(text::lines(&photos.beside));
+        }
         ui.add_space(6.0);
         ui.label("Training needs the camera pose of every photo. COLMAP estimates poses from the photos alone.");
         ui.add_space(10.0);

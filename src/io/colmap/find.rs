@@ -1,0 +1,154 @@
+//! Where COLMAP's reconstructions lie: in the folders that COLMAP itself and those who use it write, or anywhere near;
+//! the one with the most photos is taken.
+
+use std::path::{Path, PathBuf};
+
+use super::{Image, binary, text};
+use crate::io::{IoError, files};
+
+/// Where a reconstruction may lie relative to a dataset's folder, the most likely first; in these also each in a folder
+/// of its own. Of two with as many photos the first is taken: that of undistorted photos comes before the other.
+const PLACES: [&str; 14] = [
+    "sparse",
+    "",
+    "colmap/sparse",
+    "colmap",
+    "dense/sparse",
+    "dense",
+    "undistorted/sparse",
+    "aligned/sparse",
+    "reconstruction",
+    "sfm",
+    "distorted/sparse",
+    "colmap_sparse",
+    "colmap_text",
+    "sparse_txt",
+];
+/// Most folders that are looked into in one place.
+const MOST: usize = 1000;
+
+/// Files of a reconstruction.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Model {
+    pub(super) folder: PathBuf,
+    pub(super) is_binary: bool,
+    /// Index of the place in [`PLACES`].
+    place: usize,
+}
+
+impl Model {
+    /// The reconstruction whose files lie in `folder` itself.
+    fn at(folder: &Path, place: usize) -> Option<Self> {
+        let has = |ending: &str| ["cameras", "images"].iter().all(|n| folder.join(format!("{n}.{ending}")).is_file());
+        let is_binary = has("bin");
+        (is_binary || has("txt")).then(|| Self { folder: folder.into(), is_binary, place })
+    }
+
+    pub(super) fn file(&self, name: &str) -> PathBuf {
+        self.folder.join(format!("{name}.{}", if self.is_binary { "bin" } else { "txt" }))
+    }
+
+    /// Its photos' names and poses.
+    pub(super) fn images(&self) -> Result<Vec<Image>, IoError> {
+        let file = self.file("images");
+        match self.is_binary {
+            true => binary::images(&files::read(&file, u64::MAX)?, &file),
+            false => text::images(&files::read_text(&file)?, &file),
+        }
+    }
+
+    /// How many photos it has; a binary file says so at its start.
+    fn count(&self) -> Result<u64, IoError> {
+        if !self.is_binary {
+            return Ok(self.images()?.len() as u64);
+        }
+        let start = files::read_start(&self.file("images"), 8)?;
+        Ok(start.first_chunk().map_or(0, |count| u64::from_le_bytes(*count)))
+    }
+}
+
+/// A reconstruction that is not taken, and what there is to say of it.
+pub(super) struct Other {
+    pub(super) folder: PathBuf,
+    pub(super) what: String,
+}
+
+/// Whether there is any reconstruction of the dataset in `root`.
+pub(super) fn any(root: &Path) -> bool {
+    !models(root).is_empty()
+}
+
+/// All reconstructions of the dataset in `root`, in the order of [`PLACES`].
+fn models(root: &Path) -> Vec<Model> {
+    let mut found: Vec<Model> = Vec::new();
+    for (place, name) in PLACES.iter().enumerate() {
+        let Some(folder) = files::called(root, name) else { continue };
+        let folder = if name.is_empty() { root.to_path_buf() } else { folder };
+        let mut below: Vec<String> = files::names_in(&folder).unwrap_or_default();
+        // 0, 1, 2, ..., 10.
+        below.sort_by_key(|name| (name.parse::<u64>().unwrap_or(u64::MAX), name.clone()));
+        let below = below.iter().take(MOST).map(|name| folder.join(name));
+        let mut folders: Vec<PathBuf> = std::iter::once(folder.clone()).chain(below).collect();
+        if !name.is_empty() {
+            // `sparse/0` before what was copied out of it.
+            folders.rotate_left(1);
+        }
+        for folder in folders {
+            // `sparse` of the dataset is also a folder in it.
+            let is_new = |model: &Model| found.iter().all(|other| other.folder != model.folder);
+            let model = Model::at(&folder, place).filter(is_new);
+            found.extend(model);
+        }
+    }
+    found
+}
+
+/// The reconstruction that is taken.
+pub(super) struct Largest {
+    pub(super) model: Model,
+    pub(super) images: Vec<Image>,
+    /// Others that have photos of their own, or cannot be read.
+    pub(super) others: Vec<Other>,
+}
+
+/// The reconstruction of most photos of the dataset in `root`; `None` if there is none.
+///
+/// # Errors
+/// If none can be read.
+pub(super) fn largest(root: &Path) -> Result<Option<Largest>, IoError> {
+    let mut all = models(root);
+    if all.len() <= 1 {
+        let Some(model) = all.pop() else { return Ok(None) };
+        return Ok(Some(Largest { images: model.images()?, model, others: Vec::new() }));
+    }
+    let mut counted: Vec<_> = all.into_iter().map(|model| (model.count(), model)).collect();
+    counted.sort_by_key(|(count, _)| std::cmp::Reverse(count.as_ref().ok().copied()));
+    let mut taken: Option<(Model, Vec<Image>)> = None;
+    let (mut others, mut failed) = (Vec::new(), None);
+    for (count, model) in counted {
+        let what = match (count, &taken) {
+            (Ok(_), None) => match model.images() {
+                Ok(images) => {
+                    taken = Some((model, images));
+                    continue;
+                }
+                Err(e) => Err(e),
+            },
+            // The same once more: before its photos were undistorted, or as text.
+            (Ok(n), Some((taken, images))) if n == images.len() as u64 && model.place != taken.place => continue,
+            (Ok(n), Some(_)) => Ok(format!("{n} photos")),
+            (Err(e), _) => Err(e),
+        };
+        let what = what.unwrap_or_else(|e| {
+            let text = format!("cannot be read: {e}");
+            failed.get_or_insert(e);
+            text
+        });
+        others.push(Other { folder: model.folder, what });
+    }
+    match (taken, failed) {
+        (Some((model, images)), _) => Ok(Some(Largest { model, images, others })),
+        (None, Some(e)) => Err(e),
+        (None, None) => Ok(None),
+    }
+}

@@ -1,0 +1,62 @@
+//! Poses that lie beside what is opened: a list of another name, or the data set that a folder of photos belongs to.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::io::{IoError, colmap, files, llff, transforms};
+use crate::scene::Dataset;
+
+/// The data set of the only `transforms*.json` in a folder that has none of the usual name.
+///
+/// # Errors
+/// If there are several, or the one cannot be read.
+pub(super) fn other_list(folder: &Path) -> Result<Option<Dataset>, IoError> {
+    let is_list = |name: &String| {
+        let name = name.to_lowercase();
+        name.starts_with("transform") && name.ends_with(".json") && folder.join(&name).is_file()
+            || name.starts_with("transforms") && name.ends_with(".json")
+    };
+    let lists: Vec<String> = files::names_in(folder).unwrap_or_default().into_iter().filter(is_list).collect();
+    match lists.as_slice() {
+        [] => Ok(None),
+        [one] => transforms::read(&folder.join(one)).map(Some),
+        several => Err(IoError::syntax(
+            folder,
+            several.join(" and "),
+            "each may list photos with poses; open the file that is meant",
+        )),
+    }
+}
+
+/// The data set beside or above a folder of photos, if its photos lie in that folder.
+///
+/// # Errors
+/// If there is one that cannot be read.
+pub(super) fn of_photos(folder: &Path) -> Result<Option<Dataset>, IoError> {
+    let Ok(real) = fs::canonicalize(folder) else { return Ok(None) };
+    // By its own name first: a link to photos elsewhere lies beside the poses, what it leads to does not.
+    let named = std::path::absolute(folder).unwrap_or_else(|_| real.clone());
+    let mut above: Vec<PathBuf> = [&named, &real].into_iter().filter_map(|p| Some(p.parent()?.to_path_buf())).collect();
+    above.dedup();
+    for root in above {
+        let Some(mut dataset) = read(&root).transpose()? else { continue };
+        let is_here = |path: &Path| fs::canonicalize(path).is_ok_and(|path| path.starts_with(&real));
+        if dataset.photos.iter().any(|photo| is_here(&photo.path)) {
+            let text = format!("the poses of the photos in {} are those of {}", folder.display(), root.display());
+            dataset.warnings.insert(0, text);
+            return Ok(Some(dataset));
+        }
+    }
+    Ok(None)
+}
+
+fn read(root: &Path) -> Option<Result<Dataset, IoError>> {
+    let list = root.join(transforms::USUAL);
+    Some(match () {
+        () if list.is_file() => transforms::read(&list),
+        () if root.join("transforms_train.json").is_file() => transforms::read_blender(root),
+        () if colmap::is_colmap(root) => colmap::read(root),
+        () if root.join(llff::POSES_FILE).is_file() => llff::read(root),
+        () => return None,
+    })
+}

@@ -1,0 +1,301 @@
+//! Files of listed photos: as they are listed, or else by what moving a folder to another place, system or format
+//! makes of names. Whatever a list says, no path leads out of the data set's folder; links in it are followed.
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use unicode_normalization::UnicodeNormalization;
+
+use crate::io::{IoError, files, photo};
+
+/// Looks for the photos of one list.
+pub(crate) struct PhotoFinder<'a> {
+    root: &'a Path,
+    /// The folder by its real name, and as the system is told of it: lists may name photos by either.
+    names: [PathBuf; 2],
+    /// What is in each folder that was looked into.
+    folders: Mutex<HashMap<PathBuf, Arc<Vec<String>>>>,
+}
+
+/// A file that exists.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct FoundFile {
+    pub(crate) path: PathBuf,
+    /// The name that is listed, relative to the folder that the list is about, with `/` between its parts.
+    pub(crate) name: String,
+    /// What it is called in the folder where that is not what is listed.
+    pub(crate) called: Option<String>,
+    /// Whether links lead to it out of the folder.
+    pub(crate) linked: bool,
+}
+
+/// What came of looking for a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum Search {
+    Found(FoundFile),
+    /// These two fit alike.
+    Several([String; 2]),
+    Missing,
+    /// The path leads out of the folder, and nothing inside is called like its end.
+    Outside,
+}
+
+/// The parts of a path in a list.
+struct Parts {
+    parts: Vec<String>,
+    /// Whether it begins somewhere outside of the folder, or on another computer.
+    away: bool,
+}
+
+impl<'a> PhotoFinder<'a> {
+    /// For the data set in `root`.
+    ///
+    /// # Errors
+    /// If the folder cannot be read.
+    pub(crate) fn new(root: &'a Path) -> Result<Self, IoError> {
+        let failed = |cause| IoError::Read { path: root.into(), cause };
+        let names = [fs::canonicalize(root).map_err(failed)?, std::path::absolute(root).map_err(failed)?];
+        Ok(Self { root, names, folders: Mutex::default() })
+    }
+
+    /// The name of a listed path by which lists can be compared: relative to the folder where it lies inside.
+    pub(crate) fn key(&self, entry: &str) -> String {
+        self.parts(entry).parts.join("/")
+    }
+
+    /// Looks for `entry` in the folder `below` the data set's; `below` is empty for that itself.
+    pub(crate) fn find(&self, below: &str, entry: &str) -> Search {
+        if entry.contains('\0') {
+            return Search::Outside;
+        }
+        let base = if below.is_empty() { self.root.to_path_buf() } else { self.root.join(below) };
+        // Where a backslash is a letter like others.
+        if entry.contains('\\') {
+            let plain = || Path::new(entry).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
+            let path = base.join(entry);
+            if plain() && path.is_file() {
+                return self.found(path, entry.into(), None);
+            }
+        }
+        let Parts { parts, away } = self.parts(entry);
+        if parts.is_empty() {
+            return Search::Outside;
+        }
+        // Then the end of the path, the longest first: the folder was called otherwise, or lay elsewhere.
+        for first in 0..parts.len() {
+            match self.walk(&base, &parts[first..]) {
+                Walk::Found { path, parts: real } => {
+                    let name = parts[first..].join("/");
+                    let is_listed = first == 0 && !away && !entry.contains('\\') && real.is_none();
+                    let called = (!is_listed).then(|| {
+                        let inside = real.unwrap_or_else(|| name.clone());
+                        if below.is_empty() { inside } else { format!("{below}/{inside}") }
+                    });
+                    return self.found(path, name, called);
+                }
+                Walk::Several(two) => return Search::Several(two),
+                Walk::Missing => {}
+            }
+        }
+        if away { Search::Outside } else { Search::Missing }
+    }
+
+    fn found(&self, path: PathBuf, name: String, called: Option<String>) -> Search {
+        let linked = fs::canonicalize(&path).is_ok_and(|real| !real.starts_with(&self.names[0]));
+        Search::Found(FoundFile { path, name, called, linked })
+    }
+
+    /// A path taken apart, whatever system wrote it.
+    fn parts(&self, entry: &str) -> Parts {
+        let inside = self.names.iter().find_map(|name| Path::new(entry).strip_prefix(name).ok()?.to_str());
+        let entry = inside.unwrap_or(entry).replace('\\', "/");
+        let drive = |part: &str| part.len() == 2 && part.ends_with(':') && part.as_bytes()[0].is_ascii_alphabetic();
+        let mut away = entry.starts_with('/');
+        let mut parts: Vec<String> = Vec::new();
+        for (i, part) in entry.split('/').enumerate() {
+            match part {
+                "" | "." => {}
+                ".." => away |= parts.pop().is_none(),
+                part if i == 0 && drive(part) => away = true,
+                part => parts.push(part.into()),
+            }
+        }
+        Parts { parts, away }
+    }
+
+    /// Goes down from `folder` by the parts of a path, by their exact names where these exist.
+    fn walk(&self, folder: &Path, parts: &[String]) -> Walk {
+        let Some((file, folders)) = parts.split_last() else { return Walk::Missing };
+        let mut at = folder.to_path_buf();
+        let mut real = Vec::new();
+        for part in folders {
+            let next = at.join(part);
+            if next.is_dir() {
+                real.push(part.clone());
+                at = next;
+                continue;
+            }
+            let alike = self.in_folder(&at, |name| fold(name) == fold(part) && at.join(name).is_dir());
+            match alike.as_slice() {
+                [] => return Walk::Missing,
+                [one] => {
+                    at.push(one);
+                    real.push(one.clone());
+                }
+                [a, b, ..] => return Walk::several(&real, a, b),
+            }
+        }
+        let exact = at.join(file);
+        if exact.is_file() {
+            return Walk::Found { path: exact, parts: (real != folders).then(|| joined(&real, file)) };
+        }
+        let stem = photo::stem(file);
+        let is_photo = |name: &str| photo::stem(name).is_some() && at.join(name).is_file();
+        // Listed without an ending, which is a convention; then in other letters; then with another ending.
+        let added = self.in_folder(&at, |name| stem.is_none() && photo::stem(name) == Some(file) && is_photo(name));
+        let usual = added.iter().find(|name| name.ends_with(".png")).filter(|_| added.len() > 1);
+        let added = usual.map_or_else(|| added.clone(), |png| vec![png.clone()]);
+        if let [one] = added.as_slice() {
+            return Walk::Found { path: at.join(one), parts: (real != folders).then(|| joined(&real, one)) };
+        }
+        let levels: [&dyn Fn(&str) -> bool; 3] = [
+            &|name| fold(name) == fold(file) && at.join(name).is_file(),
+            &|name| photo::stem(name).is_some_and(|s| stem.is_some_and(|own| s == own)) && is_photo(name),
+            &|name| photo::stem(name).is_some_and(|s| fold(s) == fold(stem.unwrap_or(file))) && is_photo(name),
+        ];
+        for fits in std::iter::once(added).chain(levels.iter().map(|fits| self.in_folder(&at, fits))) {
+            match fits.as_slice() {
+                [] => {}
+                [one] => return Walk::Found { path: at.join(one), parts: Some(joined(&real, one)) },
+                [a, b, ..] => return Walk::several(&real, a, b),
+            }
+        }
+        Walk::Missing
+    }
+
+    /// The names in a folder that fit, sorted.
+    fn in_folder(&self, folder: &Path, fits: impl Fn(&str) -> bool) -> Vec<String> {
+        let mut known = self.folders.lock().unwrap_or_else(PoisonError::into_inner);
+        let names = known.entry(folder.into()).or_insert_with(|| Arc::new(files::names_in(folder).unwrap_or_default()));
+        let names = Arc::clone(names);
+        drop(known);
+        names.iter().filter(|name| fits(name)).cloned().collect()
+    }
+}
+
+/// What came of going down a path; names with `/` where they are not those that were looked for.
+enum Walk {
+    Found { path: PathBuf, parts: Option<String> },
+    Several([String; 2]),
+    Missing,
+}
+
+impl Walk {
+    fn several(folders: &[String], a: &str, b: &str) -> Self {
+        Self::Several([joined(folders, a), joined(folders, b)])
+    }
+}
+
+fn joined(folders: &[String], file: &str) -> String {
+    folders.iter().map(String::as_str).chain([file]).collect::<Vec<_>>().join("/")
+}
+
+/// A name without what systems differ in: letter case, and how accents are composed.
+pub(crate) fn fold(name: &str) -> String {
+    name.nfc().collect::<String>().to_lowercase()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(files: &[&str]) -> tempfile::TempDir {
+        let folder = tempfile::tempdir().expect("folder");
+        for file in files {
+            let path = folder.path().join(file);
+            fs::create_dir_all(path.parent().expect("parent")).expect("create");
+            fs::write(path, "x").expect("write");
+        }
+        folder
+    }
+
+    /// Name and what it is called otherwise of a file that is found.
+    fn of(search: Search) -> (String, Option<String>) {
+        let Search::Found(file) = search else { panic!("{search:?}") };
+        (file.name, file.called)
+    }
+
+    #[test]
+    fn names_of_other_systems_lead_to_the_file() {
+        let f = folder(&["images/a.jpg", "images/Sub/b.JPG", "images/c.png", "images/e\u{301}.png", "._x.png"]);
+        let finder = PhotoFinder::new(f.path()).expect("folder");
+        let inside = f.path().join("images/a.jpg").to_string_lossy().into_owned();
+        for (entry, name, called) in [
+            ("images/a.jpg", "images/a.jpg", None),
+            ("./images//a.jpg", "images/a.jpg", None),
+            ("images/../images/a.jpg", "images/a.jpg", None),
+            (&*inside, "images/a.jpg", None),
+            ("images/c", "images/c", None),
+            ("images\\a.jpg", "images/a.jpg", Some("images/a.jpg")),
+            ("Images/A.JPG", "Images/A.JPG", Some("images/a.jpg")),
+            ("images/sub/B.jpg", "images/sub/B.jpg", Some("images/Sub/b.JPG")),
+            ("images/a.png", "images/a.png", Some("images/a.jpg")),
+            ("images/C", "images/C", Some("images/c.png")),
+            ("images/\u{e9}.png", "images/\u{e9}.png", Some("images/e\u{301}.png")),
+            ("/home/u/fox/images/a.jpg", "images/a.jpg", Some("images/a.jpg")),
+            ("C:\\Users\\u\\fox\\images\\a.jpg", "images/a.jpg", Some("images/a.jpg")),
+            ("../data/fox/images/a.jpg", "images/a.jpg", Some("images/a.jpg")),
+            ("data/fox/images/a.jpg", "images/a.jpg", Some("images/a.jpg")),
+        ] {
+            assert_eq!(of(finder.find("", entry)), (name.into(), called.map(str::to_owned)), "{entry}");
+        }
+        assert_eq!(of(finder.find("images", "A.jpg")), ("A.jpg".into(), Some("images/a.jpg".into())));
+        assert_eq!(of(finder.find("images", "x/y/c.png")), ("c.png".into(), Some("images/c.png".into())));
+        assert_eq!(finder.find("", "x.png"), Search::Missing, "what systems leave is no photo");
+    }
+
+    #[test]
+    fn nothing_outside_is_found_and_two_that_fit_are_told() {
+        let outer = folder(&["secret.png", "scene/images/a.png", "scene/images/b.JPG", "scene/images/B.jpg"]);
+        fs::write(outer.path().join("scene/images/d.jpg"), "x").expect("write");
+        fs::write(outer.path().join("scene/images/d.webp"), "x").expect("write");
+        let root = outer.path().join("scene");
+        let finder = PhotoFinder::new(&root).expect("folder");
+        for entry in ["../secret.png", "images/../../secret.png", "/etc/passwd", "..\\secret.png", "", ".", "a\0b"] {
+            assert_eq!(finder.find("", entry), Search::Outside, "{entry:?}");
+        }
+        let absolute = outer.path().join("secret.png").to_string_lossy().into_owned();
+        assert_eq!(finder.find("", &absolute), Search::Outside);
+        assert_eq!(finder.find("", "images/none.png"), Search::Missing);
+        for (entry, a, b) in
+            [("images/b.jpg", "images/B.jpg", "images/b.JPG"), ("images/d.png", "images/d.jpg", "images/d.webp")]
+        {
+            assert_eq!(finder.find("", entry), Search::Several([a.into(), b.into()]), "{entry}");
+        }
+        assert_eq!(of(finder.find("", "images/B.jpg")).1, None, "the control: exact");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_are_followed_and_told_where_they_leave_the_folder() {
+        let outer = folder(&["store/a.png", "scene/own/b.png"]);
+        let root = outer.path().join("scene");
+        std::os::unix::fs::symlink("../store", root.join("images")).expect("link");
+        std::os::unix::fs::symlink("own/b.png", root.join("c.png")).expect("link");
+        let finder = PhotoFinder::new(&root).expect("folder");
+        for (entry, is_linked) in [("images/a.png", true), ("c.png", false), ("own/b.png", false)] {
+            let Search::Found(file) = finder.find("", entry) else { panic!("{entry}") };
+            assert_eq!((file.linked, file.called), (is_linked, None), "{entry}");
+        }
+        // By another name the same folder is the same.
+        std::os::unix::fs::symlink("scene", outer.path().join("alias")).expect("link");
+        let alias = outer.path().join("alias");
+        let finder = PhotoFinder::new(&alias).expect("folder");
+        for named in [alias.join("own/b.png"), root.join("own/b.png")] {
+            let named = fs::canonicalize(named.parent().expect("parent")).expect("real").join("b.png");
+            assert_eq!(of(finder.find("", &named.to_string_lossy())), ("own/b.png".into(), None));
+        }
+    }
+}
