@@ -306,10 +306,14 @@ impl World for SceneWorld {
         Ok(())
     }
 
-    fn isolate(&mut self, id: IdentityId) -> Result<(), WorldError> {
+    fn isolate(&mut self, ids: &[IdentityId]) -> Result<(), WorldError> {
         let all = &self.parts.map.identities;
-        let hidden = all.descendants(id).into_iter().map(|inside| !inside).collect();
-        let what = format!("showing only {}", self.name(id));
+        let mut hidden = vec![true; all.len() + 1];
+        for id in ids {
+            all.descendants(*id).iter().zip(&mut hidden).for_each(|(inside, hidden)| *hidden &= !inside);
+        }
+        let names: Vec<String> = ids.iter().map(|id| self.name(*id)).collect();
+        let what = format!("showing only {}", names.join(", "));
         self.set_hidden_list(hidden, what);
         Ok(())
     }

@@ -122,11 +122,12 @@ pub(crate) struct QueryResult {
     /// How the question was read.
     pub(crate) reading: QueryReading,
     pub(crate) mask: Mask,
-    pub(crate) unknown_words: Vec<String>,
     /// Canonical phrases that the encoder could not read and that were left out.
     pub(crate) unread: Vec<String>,
     /// Words that the answer does not rest on.
     pub(crate) ignored_words: Vec<String>,
+    /// Words for want of which there is no answer.
+    pub(crate) unexplained_words: Vec<String>,
     /// Milliseconds from the text to the mask, the view there.
     pub(crate) query_ms: f64,
     pub(crate) maps: ViewMaps,
@@ -144,9 +145,9 @@ pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &QueryRequest<'_>) 
     let mask = maps.of_answer(map, &answered, request.top);
     answered.stages.mask = ms_since(matching_since);
     let query_ms = ms_since(start);
-    let unknown_words = engine.unknown_words(&map.identities, &reading.phrase);
-    let ignored_words = answered.ignored_words(&map.identities, &reading, &unknown_words);
-    Ok(QueryResult { answered, reading, mask, unknown_words, unread: engine.unread(), ignored_words, query_ms, maps })
+    let (ignored_words, unexplained_words) = engine.left_out(&map.identities, &reading, &answered);
+    let unread = engine.unread();
+    Ok(QueryResult { answered, reading, mask, unread, ignored_words, unexplained_words, query_ms, maps })
 }
 
 /// The identities that are meant, at most `top` of them.

@@ -56,13 +56,7 @@ fn named(map: &SemanticMap) -> impl FnMut(&str) -> Option<QueryAnswer> + '_ {
 /// An answer whose relevancies are given, best identity first.
 fn answered(best: IdentityId, relevancy: &[f32]) -> QueryAnswer {
     let hit = Hit { identity: best, score: relevancy[best as usize], margin: 0.5 };
-    QueryAnswer {
-        answer: Answer::Found(vec![hit]),
-        basis: Basis::Embedding,
-        relevancy: relevancy.to_vec(),
-        stages: StagesMs::default(),
-        recipe: Recipe::default(),
-    }
+    QueryAnswer::new(Answer::Found(vec![hit]), Basis::Embedding, relevancy.to_vec(), &Recipe::default())
 }
 
 fn close(found: &[f64], worked_out: &[f64]) {
