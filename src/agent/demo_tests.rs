@@ -11,12 +11,13 @@ use super::policy::Policy;
 use super::refusal::RefusalKind;
 use super::scene::{Parts, SceneWorld};
 use super::session::{Awaited, Reply, Session};
-use crate::jobs::{Folders, demo, open};
+use crate::jobs::{Folders, Scene, demo, open, query};
 use crate::navigate::Pose;
+use crate::pipeline::semantics::answer::{Basis, Certainty};
 use crate::pipeline::semantics::localize::Answer;
 use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::recipe::{Recipe, Rejection, Understanding};
-use crate::scene::{LevelFilter, SemanticMap};
+use crate::scene::{IdentityId, LevelFilter, SemanticMap};
 
 fn rows(list: &str) -> Vec<[String; 3]> {
     let table: toml::Table = include_str!("../../tests/data/demo_questions.toml").parse().expect("sound TOML");
@@ -24,7 +25,7 @@ fn rows(list: &str) -> Vec<[String; 3]> {
     table[list].as_array().expect("a list").iter().map(|row| [0, 1, 2].map(|at| text(row, at))).collect()
 }
 
-fn opened() -> (tempfile::TempDir, open::Scene) {
+fn opened() -> (tempfile::TempDir, Scene) {
     let data = tempfile::tempdir().expect("folder");
     let folder = demo::unpacked(&Folders { data: data.path().into() }).expect("unpacked");
     let scene = open::scene(&folder.join("scene")).expect("opened");
@@ -68,6 +69,24 @@ fn what_is_asked_of_the_demo_is_found_or_said_not_to_be_there() {
     let mut engine = QueryEngine::new(map.language.as_ref(), Recipe::default()).expect("an engine");
     let banana = engine.ask(&map, "banana", LevelFilter::Auto).expect("encodes").expect("words");
     assert!(!banana.offers(3)[1].is_empty() && banana.chosen(8).is_empty(), "{banana:?}");
+}
+
+#[test]
+fn where_nothing_has_a_name_the_small_encoder_guesses_and_nothing_is_changed_for_it() {
+    let (_data, scene) = opened();
+    let mut map = scene.semantics().expect("objects");
+    assert_eq!(query::named(&map, "kettle", LevelFilter::Auto, 1).expect("by name").len(), 1);
+    for id in 1..=map.identities.len() as IdentityId {
+        map.identities.get_mut(id).expect("there").names.clear();
+    }
+    let mut engine = QueryEngine::new(map.language.as_ref(), Recipe::default()).expect("an engine");
+    let answered = engine.ask(&map, "teddy bear", LevelFilter::Auto).expect("encodes").expect("words");
+    assert_eq!((answered.basis, answered.certainty(&[])), (Basis::Embedding, Certainty::Guess), "{answered:?}");
+    let id = answered.chosen(1)[0];
+    let refused = query::named(&map, "teddy bear", LevelFilter::Auto, 1).expect_err("only by its looks").to_string();
+    assert!(refused.contains(&format!("ask for '#{id}'")), "{refused}");
+    // The number that it says is enough.
+    assert_eq!(query::named(&map, &format!("#{id}"), LevelFilter::Auto, 1).expect("by number"), [id]);
 }
 
 fn ends(reply: &Reply) -> &'static str {

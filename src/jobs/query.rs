@@ -8,7 +8,7 @@ use image::ColorType;
 use super::{JobError, Scene, export};
 use crate::math::colormap::Colormap;
 use crate::pipeline::removal::invented_flags;
-use crate::pipeline::semantics::answer::QueryAnswer;
+use crate::pipeline::semantics::answer::{Basis, QueryAnswer};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::matching::{self, MatchMode};
 pub(crate) use crate::pipeline::semantics::query_engine::{QueryEngine, answer_encoded};
@@ -158,6 +158,26 @@ pub(crate) fn identities(
     top: usize,
 ) -> Result<Vec<IdentityId>, JobError> {
     Ok(answered(map, text, level, &Recipe::default())?.chosen(top))
+}
+
+/// The same for whoever changes them: by names alone.
+///
+/// # Errors
+/// If nothing is found, or only by what it looks like.
+pub(crate) fn named(
+    map: &SemanticMap,
+    text: &str,
+    level: LevelFilter,
+    top: usize,
+) -> Result<Vec<IdentityId>, JobError> {
+    let answered = answered(map, text, level, &Recipe::default())?;
+    match (answered.basis, answered.chosen(top)) {
+        (Basis::Embedding, ids) => {
+            let name = ids.first().map(|id| map.identities.full_name(*id)).unwrap_or_default();
+            Err(JobError::OnlyLooks { text: text.to_owned(), name })
+        }
+        (Basis::Names, ids) => Ok(ids),
+    }
 }
 
 /// The answer to a question.

@@ -11,7 +11,6 @@ use crate::pipeline::semantics::localize::{Answer, Hit};
 use crate::pipeline::semantics::query_engine::ask_by_name;
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::relevancy::deviate;
-use crate::pipeline::semantics::timing::StagesMs;
 use crate::render::RenderSettings;
 use crate::scene::{
     GaussianCloud, Identities, IdentityId, LanguageFeatures, LevelFilter, NOBODY, PART_WEIGHT, ViewFeatures,

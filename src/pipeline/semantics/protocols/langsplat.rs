@@ -115,7 +115,6 @@ mod tests {
     use crate::pipeline::semantics::code_map::CodeMap;
     use crate::pipeline::semantics::localize::Answer;
     use crate::pipeline::semantics::recipe::Recipe;
-    use crate::pipeline::semantics::timing::StagesMs;
     use crate::scene::{Camera, NOBODY, SemanticMap};
     use glam::DVec3;
 
