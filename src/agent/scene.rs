@@ -307,14 +307,10 @@ impl World for SceneWorld {
     }
 
     fn isolate(&mut self, ids: &[IdentityId]) -> Result<(), WorldError> {
-        let all = &self.parts.map.identities;
-        let mut hidden = vec![true; all.len() + 1];
-        for id in ids {
-            all.descendants(*id).iter().zip(&mut hidden).for_each(|(inside, hidden)| *hidden &= !inside);
-        }
+        let inside: Vec<_> = ids.iter().map(|id| self.parts.map.identities.descendants(*id)).collect();
+        let hidden = (0..self.hidden.len()).map(|i| !inside.iter().any(|of| of.get(i) == Some(&true))).collect();
         let names: Vec<String> = ids.iter().map(|id| self.name(*id)).collect();
-        let what = format!("showing only {}", names.join(", "));
-        self.set_hidden_list(hidden, what);
+        self.set_hidden_list(hidden, format!("showing only {}", names.join(", ")));
         Ok(())
     }
 

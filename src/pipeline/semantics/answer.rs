@@ -85,18 +85,17 @@ pub(crate) fn answer(
         return named;
     }
     let mut meant = by_embedding(identities, phrase, level, recipe, language);
+    let first = meant.chosen(1);
+    let alike = || meant.answer.hits().iter().filter(|hit| first.contains(&hit.identity)).copied().collect();
+    let alike: Vec<Hit> = if is_strict { alike() } else { Vec::new() };
     if is_strict {
         meant.answer = grounded(identities, phrase, language, meant.answer);
     }
     // Both were looked at, whichever is taken.
     let stages = named.stages.and(meant.stages);
     let taken = match (nothing(&meant.answer), nothing(&named.answer)) {
-        (false, _) if is_strict && !may_answer(identities, language.features) => {
-            let first = meant.chosen(1);
-            let alike = meant.answer.hits().iter().filter(|hit| first.contains(&hit.identity)).copied().collect();
-            QueryAnswer { alike, ..named }
-        }
-        (true, _) if is_strict && identities.have_names() => named,
+        (false, _) if is_strict && !may_answer(identities, language.features) => QueryAnswer { alike, ..named },
+        (true, _) if is_strict && identities.have_names() => QueryAnswer { alike, ..named },
         (true, false) => named,
         _ => meant,
     };
@@ -109,9 +108,10 @@ pub(crate) fn may_answer(identities: &Identities, features: &LanguageFeatures) -
     !identities.have_names() || !models::is_rough(&features.encoder)
 }
 
-/// An answer by embedding, unless it leaves a word out or what it found has another color than was said.
+/// An answer by embedding, unless a word is left out or is about places, comparisons or numbers, of which an embedding
+/// knows nothing, or what it found has another color than was said.
 fn grounded(identities: &Identities, phrase: &ParsedQuery, language: Language<'_>, answer: Answer) -> Answer {
-    let leaves_out = !grounds::telling(language.unknown).is_empty();
+    let leaves_out = !grounds::telling(language.unknown).is_empty() || grounds::asks_for_more(identities, &phrase.text);
     match answer {
         Answer::Found(hits) | Answer::Ambiguous(hits)
             if leaves_out || grounds::is_of_another_color(identities, hits[0].identity, phrase) =>

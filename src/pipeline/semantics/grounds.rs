@@ -21,8 +21,14 @@ pub(crate) const BINDING: [&str; 3] = ["in", "inside", "at"];
 const GRAMMAR: &str = "on the left side of, on the right side of, to the left of, to the right of, on top of, in front of, left of, \
     right of, next to, close to, behind, under, underneath, below, beneath, above, over, beside, near, between, around, \
     nearest, closest, farthest, largest, biggest, smallest, tallest, shortest, longest, highest, lowest, leftmost, \
-    rightmost, larger, bigger, smaller, two, three, four, five, six, seven, eight, nine, ten, both, all, every, each, \
-    other, and, or, but, not, without, except, with";
+    rightmost, larger, bigger, smaller, two, three, four, five, six, seven, eight, nine, ten, both, all, every, each, other";
+/// Words that join things and deny them.
+const JOINING: [&str; 7] = ["and", "or", "but", "not", "without", "except", "with"];
+
+/// Whether a text asks for places, comparisons or numbers.
+pub(crate) fn asks_for_more(identities: &Identities, text: &str) -> bool {
+    grammar(identities, text).iter().any(|word| !JOINING.contains(&word.as_str()))
+}
 
 /// The places, comparisons and the like that a text names and no name of the scene has.
 pub(crate) fn grammar(identities: &Identities, text: &str) -> Vec<String> {
@@ -30,7 +36,7 @@ pub(crate) fn grammar(identities: &Identities, text: &str) -> Vec<String> {
     let known: HashSet<String> = identities.iter().flat_map(|(_, i)| &i.names).flat_map(|name| words(name)).collect();
     let mut taken = vec![false; said.len()];
     let mut found = Vec::new();
-    for phrase in GRAMMAR.split(',').map(str::trim) {
+    for phrase in GRAMMAR.split(',').map(str::trim).chain(JOINING) {
         let own: Vec<&str> = phrase.split(' ').collect();
         let is_plain = own.len() > 1 || !known.contains(phrase);
         for at in (0..said.len()).filter(|_| is_plain) {

@@ -113,6 +113,9 @@ fn the_small_encoder_answers_only_where_nothing_has_a_name() {
     // Controls: an encoder of photos answers, and names that know the words come first to both.
     let photos = ask("clip-vit-b16", true, "cup");
     assert_eq!((photos.basis, photos.chosen(1), photos.certainty(&[])), (Basis::Embedding, vec![3], Certainty::Likely));
+    // A place is nothing that looks so, whatever the encoder makes of it; what it looks like is an offer.
+    let placed = ask("clip-vit-b16", true, "cup behind the lamp");
+    assert!(placed.chosen(1).is_empty(), "{placed:?}");
     for encoder in ["demo", "clip-vit-b16", "/models/demo_vocab.json"] {
         assert_eq!(ask(encoder, true, "shade of the lamp").chosen(1), [2], "{encoder}");
     }

@@ -74,8 +74,12 @@ impl QueryAnswer {
         let Answer::NotFound(hits) = &self.answer else { return [Vec::new(), Vec::new()] };
         let by_name = if self.basis == Basis::Names { hits.as_slice() } else { &[] };
         let by_looks = if self.basis == Basis::Names { self.alike.as_slice() } else { hits.as_slice() };
-        let first = |hits: &[Hit]| hits.iter().filter(|h| h.score > 0.0).take(most).map(|h| h.identity).collect();
-        [first(by_name), first(by_looks)]
+        let first = |hits: &[Hit]| -> Vec<IdentityId> {
+            hits.iter().filter(|h| h.score > 0.0).take(most).map(|h| h.identity).collect()
+        };
+        let by_name = first(by_name);
+        let by_looks = first(by_looks).into_iter().filter(|id| !by_name.contains(id)).collect();
+        [by_name, by_looks]
     }
 
     /// How sure the first hit is, some words being `ignored`.
