@@ -3,6 +3,8 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod agent_common;
+#[path = "agent_commands/looks.rs"]
+mod looks;
 
 use std::fmt::Write as _;
 use std::sync::atomic::AtomicBool;

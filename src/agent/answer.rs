@@ -75,7 +75,7 @@ pub(crate) fn choice(world: &mut dyn World, text: &str, candidates: &[IdentityId
     }
     let among = DialogState { group: candidates.to_vec(), ..dialog.clone() };
     for phrase in [words.join(" "), format!("{} one", words.join(" "))] {
-        if let Resolved::One { id, .. } = resolve(world, &phrase, LevelFilter::Auto, &among)
+        if let Resolved::One { id, by_looks: false, .. } = resolve(world, &phrase, LevelFilter::Auto, &among)
             && candidates.contains(&id)
         {
             return Choice::One(id);

@@ -12,6 +12,8 @@ pub(crate) struct DialogState {
     pub(crate) group: Vec<IdentityId>,
     /// What the present request has marked.
     pub(crate) marked: Vec<IdentityId>,
+    /// What the present request draws alone.
+    pub(crate) isolated: Vec<IdentityId>,
     /// The last movement or flight, for "again" and "a bit more".
     pub(crate) moved: Option<ToolCall>,
     /// How close the last target was looked at.
@@ -20,6 +22,7 @@ pub(crate) struct DialogState {
 
 impl Default for DialogState {
     fn default() -> Self {
-        Self { last: None, group: Vec::new(), marked: Vec::new(), moved: None, closeness: NORMAL }
+        let (group, marked, isolated) = (Vec::new(), Vec::new(), Vec::new());
+        Self { last: None, group, marked, isolated, moved: None, closeness: NORMAL }
     }
 }

@@ -88,7 +88,7 @@ pub(crate) fn check(
         return CheckedCall::Refused { refusal, near: Vec::new() };
     }
     let mut call = call.clone();
-    let (mut ids, mut note) = (Vec::new(), String::new());
+    let (mut ids, mut note, mut guessed) = (Vec::new(), String::new(), None);
     let wanted = match &call {
         ToolCall::Locate { query, kind } => Some((Target::Query(query.clone()), *kind)),
         // "The part of" may be asked of parts, too.
@@ -96,8 +96,10 @@ pub(crate) fn check(
     };
     if let Some((target, level)) = wanted {
         match find(world, &target, level, dialog) {
-            Resolved::One { id, note: said } => {
+            Resolved::One { id, note: said, by_looks } => {
                 note = said;
+                guessed =
+                    if let Target::Query(words) = &target { Some(words.clone()).filter(|_| by_looks) } else { None };
                 ids.push(id);
                 if !matches!(call, ToolCall::Locate { .. }) {
                     call = call.with_target(Target::Identity(id));
@@ -126,10 +128,32 @@ pub(crate) fn check(
     if let Some(conflict) = conflict(world, &call, ids.first().copied()) {
         return CheckedCall::Refused { refusal: conflict, near: ids };
     }
-    if !is_confirmed && let Some(question) = question(world, &call, policy, ids.first().copied()) {
+    let id = ids.first().copied();
+    // What only looks like it is no reason to change anything.
+    let looks = guessed.zip(id).filter(|_| changes(&call));
+    let looks = looks.map(|(words, id)| format!("No name here says '{words}'; {} looks most like it.", the(world, id)));
+    let question = match (question(world, &call, policy, id), looks) {
+        (Some(question), Some(looks)) => Some(format!("{looks} {question}")),
+        (None, Some(looks)) => Some(format!("{looks} {}: continue? (yes or no)", call.line(world.identities()))),
+        (question, None) => question,
+    };
+    if let Some(question) = question.filter(|_| !is_confirmed) {
         return CheckedCall::Confirm { question, call, ids };
     }
     CheckedCall::Ready { call, ids, note }
+}
+
+/// Whether a call changes what is drawn, named or on disk.
+fn changes(call: &ToolCall) -> bool {
+    matches!(
+        call,
+        ToolCall::Hide { .. }
+            | ToolCall::Unhide { .. }
+            | ToolCall::Isolate { .. }
+            | ToolCall::Remove { .. }
+            | ToolCall::Rename { .. }
+            | ToolCall::Export { .. }
+    )
 }
 
 fn find(world: &mut dyn World, target: &Target, level: LevelFilter, dialog: &DialogState) -> Resolved {
@@ -294,8 +318,12 @@ fn act(
             format!("Turned {} by {} degrees.", direction.text(), crate::math::format::short(*degrees))
         }
         ToolCall::Isolate { .. } => {
-            world.isolate(id).map_err(failed)?;
-            format!("Only {it} is drawn now; say 'show everything' for the rest.")
+            dialog.isolated.push(id);
+            world.isolate(&dialog.isolated).map_err(failed)?;
+            match dialog.isolated.len() {
+                1 => format!("Only {it} is drawn now; say 'show everything' for the rest."),
+                _ => format!("{} is drawn, too.", capital(&it)),
+            }
         }
         ToolCall::Hide { .. } => {
             world.set_hidden(id, true).map_err(failed)?;

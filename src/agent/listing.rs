@@ -17,8 +17,10 @@ pub(super) fn list_ids(
     relation: Relation,
     named: Option<&str>,
 ) -> Result<Vec<IdentityId>, Refusal> {
-    let named = match named {
-        Some(name) => Some(resolve_all(world, name, LevelFilter::Auto, &DialogState::default())?),
+    let named = match named.map(|name| resolve_all(world, name, LevelFilter::Auto, &DialogState::default())) {
+        // That there is none is an answer.
+        Some(Err(refusal)) if refusal.kind == RefusalKind::Conflict => Some(Vec::new()),
+        Some(found) => Some(found?),
         None => None,
     };
     let all = world.identities();

@@ -16,6 +16,8 @@
 pub(crate) mod answer;
 pub mod camera_args;
 pub mod commands;
+#[cfg(test)]
+mod demo_tests;
 pub(crate) mod describe;
 pub(crate) mod dialog;
 mod effect;

@@ -15,7 +15,7 @@ pub enum RefusalKind {
     /// It took too many steps or too long.
     Limit,
     Failed,
-    /// The user did not want it after all, or stopped it.
+    /// The user stopped it.
     Stopped,
 }
 

@@ -306,11 +306,11 @@ impl World for SceneWorld {
         Ok(())
     }
 
-    fn isolate(&mut self, id: IdentityId) -> Result<(), WorldError> {
-        let all = &self.parts.map.identities;
-        let hidden = all.descendants(id).into_iter().map(|inside| !inside).collect();
-        let what = format!("showing only {}", self.name(id));
-        self.set_hidden_list(hidden, what);
+    fn isolate(&mut self, ids: &[IdentityId]) -> Result<(), WorldError> {
+        let inside: Vec<_> = ids.iter().map(|id| self.parts.map.identities.descendants(*id)).collect();
+        let hidden = (0..self.hidden.len()).map(|i| !inside.iter().any(|of| of.get(i) == Some(&true))).collect();
+        let names: Vec<String> = ids.iter().map(|id| self.name(*id)).collect();
+        self.set_hidden_list(hidden, format!("showing only {}", names.join(", ")));
         Ok(())
     }
 

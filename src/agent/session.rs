@@ -126,14 +126,14 @@ impl Session {
         match self.pending.take() {
             Some(Pending::Confirm { call, ids }) => match confirmation(text) {
                 Confirmation::Yes => return self.confirmed(world, call, ids, sink),
-                Confirmation::No => return self.refuse(RefusalKind::Stopped, "All right, I leave it as it is."),
+                Confirmation::No => return self.left("All right, I leave it as it is."),
                 Confirmation::Neither => self.note("no yes", "The open question is dropped: something else was said."),
             },
             Some(Pending::Choose { call, candidates, question }) => {
                 self.dialog.group.clone_from(&candidates);
                 match choice(world, text, &candidates, &self.dialog) {
                     Choice::One(id) => return self.chosen(world, call, id, text, sink),
-                    Choice::None => return self.refuse(RefusalKind::Stopped, "All right, never mind."),
+                    Choice::None => return self.left("All right, never mind."),
                     // What a planner asked, it hears the answer to.
                     Choice::Unclear if call.is_none() => {}
                     Choice::Unclear => {
@@ -155,6 +155,7 @@ impl Session {
     /// A new request: the outer loop.
     fn plan(&mut self, world: &mut dyn World, text: &str, sink: &mut ProgressSink<'_>) -> Reply {
         self.dialog.marked.clear();
+        self.dialog.isolated.clear();
         let (dialog, policy) = (&self.dialog, &self.policy);
         self.planner.start(
             text,
@@ -308,6 +309,12 @@ impl Session {
 
     fn note(&mut self, verdict: &str, text: &str) {
         self.transcript.add(What::Check { verdict: verdict.into(), text: text.into() });
+    }
+
+    /// What the user says no to is left as it is: that is an answer, and no fault.
+    fn left(&mut self, text: &str) -> Reply {
+        self.note("answered no", text);
+        Reply { text: text.into(), ..Reply::default() }
     }
 
     fn refuse(&mut self, kind: RefusalKind, text: &str) -> Reply {

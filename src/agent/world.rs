@@ -5,11 +5,9 @@ use super::camera_args::{Direction, Distance};
 use super::relation::{Extent, Viewpoint};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::answer::{Basis, QueryAnswer};
-use crate::pipeline::semantics::localize::Answer;
-use crate::pipeline::semantics::query_engine::ask_by_name;
+use crate::pipeline::semantics::query_engine::{ask_by_name, ask_with};
 use crate::pipeline::semantics::recipe::{Recipe, Understanding};
-use crate::pipeline::semantics::timing::StagesMs;
-use crate::scene::{Bounds, Identities, IdentityId, Level, LevelFilter};
+use crate::scene::{Bounds, Identities, IdentityId, LanguageFeatures, Level, LevelFilter};
 
 /// What is known of one identity.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,8 +96,8 @@ pub trait World {
     /// Marks these in the view, and nothing else.
     fn highlight(&mut self, ids: &[IdentityId]) -> Result<(), WorldError>;
 
-    /// Draws one identity alone.
-    fn isolate(&mut self, id: IdentityId) -> Result<(), WorldError>;
+    /// Draws these identities, and nothing else.
+    fn isolate(&mut self, ids: &[IdentityId]) -> Result<(), WorldError>;
 
     /// Leaves an identity out of the picture, or draws it again.
     fn set_hidden(&mut self, id: IdentityId, hidden: bool) -> Result<(), WorldError>;
@@ -130,11 +128,20 @@ pub trait World {
 /// Answers a query by names alone: a [`World::locate`] for scenes without an encoder.
 pub fn locate_by_names(identities: &Identities, query: &str, kind: LevelFilter) -> QueryAnswer {
     let recipe = Recipe::default();
-    ask_by_name(identities, query, kind, &recipe).unwrap_or_else(|| QueryAnswer {
-        answer: Answer::NotFound(Vec::new()),
-        basis: Basis::Names,
-        relevancy: vec![0.0; identities.len() + 1],
-        stages: StagesMs::default(),
-        recipe,
-    })
+    let asked = ask_by_name(identities, query, kind, &recipe);
+    asked.unwrap_or_else(|| QueryAnswer::nothing(Basis::Names, identities, &recipe))
+}
+
+/// Answers a query as a scene does that an encoder has looked at: a [`World::locate`] for scenes whose encoder's
+/// `features` and phrases (`encode`, of the same dimension) are at hand.
+pub fn locate_with(
+    identities: &Identities,
+    features: &LanguageFeatures,
+    query: &str,
+    kind: LevelFilter,
+    encode: &mut dyn FnMut(&str) -> Vec<f32>,
+) -> QueryAnswer {
+    let recipe = Recipe::default();
+    let asked = ask_with(identities, (features, &recipe), query, kind, &mut |phrase: &str| Ok::<_, ()>(encode(phrase)));
+    asked.unwrap_or_else(|| QueryAnswer::nothing(Basis::Names, identities, &recipe))
 }

@@ -75,7 +75,7 @@ pub(crate) fn run(args: EditArgs, quiet: bool) -> Result<(), CliError> {
     let scene = open::scene(&args.scene)?;
     let map = scene.semantics()?;
     derived::check_place(&scene, &args.out)?;
-    let ids = query::identities(&map, &args.text, args.kind, 1)?;
+    let ids = query::named(&map, &args.text, args.kind, 1)?;
     let Some(&id) = ids.first() else { return Err(JobError::NoMatch(args.text).into()) };
     let axis = args.axis.unwrap_or_else(|| scene.home().up);
     let to = Placement {

@@ -12,6 +12,7 @@ use crate::io::splat_format::SplatFormat;
 use crate::jobs::export_all::{self, ExportAllRequest, ExportedAll, MaskFormat};
 use crate::jobs::{Scene, export, export_splat, open, query, render, segment};
 use crate::math::format::things;
+use crate::pipeline::semantics::answer::Basis;
 use crate::scene::{Camera, LevelFilter, SemanticMap};
 
 /// Write the Gaussians of an object or a part, or of all of them, with masks of the photos
@@ -95,7 +96,8 @@ fn one(args: &SegmentArgs, text: &str, out: &Path, scene: &Scene, quiet: bool) -
     let done = args.measure.write(kept, out, scene, quiet)?;
     let names: Vec<String> = answered.chosen(args.top).iter().map(|id| map.identities.full_name(*id)).collect();
     let what = if args.rest { format!("all but {}", names.join(", ")) } else { names.join(", ") };
-    let written = format!("{what}: {count} of {} Gaussians", scene.cloud.len());
+    let how = if answered.basis == Basis::Embedding { ", found by embedding, not by name" } else { "" };
+    let written = format!("{what}: {count} of {} Gaussians{how}", scene.cloud.len());
     output::print(
         &args.recipe.lines(&map).into_iter().chain([written]).chain(done.lines()).collect::<Vec<_>>().join("\n"),
     )

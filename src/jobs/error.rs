@@ -51,6 +51,14 @@ pub enum JobError {
     EmptyQuery,
     #[error("no match for '{0}'")]
     NoMatch(String),
+    /// What only looks like it is changed only if it is said which one.
+    #[error("no name here says '{text}'; by embedding it may be {name}: to change that, ask for '{name}'")]
+    OnlyLooks {
+        /// What was asked for.
+        text: String,
+        /// The full name of what looks most like it.
+        name: String,
+    },
     #[error("{0}")]
     Phrases(String),
     #[error("no Gaussians left to export")]

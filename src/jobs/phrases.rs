@@ -113,8 +113,7 @@ pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Resu
     for phrase in phrases {
         let reading = engine.read(&map.identities, phrase, *level).ok_or(JobError::EmptyQuery)?;
         let answered = engine.answer(map, &reading, *level)?;
-        let unknown = engine.unknown_words(&map.identities, &reading.phrase);
-        let ignored = answered.ignored_words(&map.identities, &reading, &unknown);
+        let (ignored, _) = engine.left_out(&map.identities, &reading, &answered);
         asked.push((answered.certainty(&ignored), answered));
     }
     let mut colors = request.colors.clone();

@@ -8,7 +8,7 @@ use image::ColorType;
 use super::{JobError, Scene, export};
 use crate::math::colormap::Colormap;
 use crate::pipeline::removal::invented_flags;
-use crate::pipeline::semantics::answer::QueryAnswer;
+use crate::pipeline::semantics::answer::{Basis, QueryAnswer};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::matching::{self, MatchMode};
 pub(crate) use crate::pipeline::semantics::query_engine::{QueryEngine, answer_encoded};
@@ -122,11 +122,12 @@ pub(crate) struct QueryResult {
     /// How the question was read.
     pub(crate) reading: QueryReading,
     pub(crate) mask: Mask,
-    pub(crate) unknown_words: Vec<String>,
     /// Canonical phrases that the encoder could not read and that were left out.
     pub(crate) unread: Vec<String>,
     /// Words that the answer does not rest on.
     pub(crate) ignored_words: Vec<String>,
+    /// Words for want of which there is no answer.
+    pub(crate) unexplained_words: Vec<String>,
     /// Milliseconds from the text to the mask, the view there.
     pub(crate) query_ms: f64,
     pub(crate) maps: ViewMaps,
@@ -144,9 +145,9 @@ pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &QueryRequest<'_>) 
     let mask = maps.of_answer(map, &answered, request.top);
     answered.stages.mask = ms_since(matching_since);
     let query_ms = ms_since(start);
-    let unknown_words = engine.unknown_words(&map.identities, &reading.phrase);
-    let ignored_words = answered.ignored_words(&map.identities, &reading, &unknown_words);
-    Ok(QueryResult { answered, reading, mask, unknown_words, unread: engine.unread(), ignored_words, query_ms, maps })
+    let (ignored_words, unexplained_words) = engine.left_out(&map.identities, &reading, &answered);
+    let unread = engine.unread();
+    Ok(QueryResult { answered, reading, mask, unread, ignored_words, unexplained_words, query_ms, maps })
 }
 
 /// The identities that are meant, at most `top` of them.
@@ -157,6 +158,26 @@ pub(crate) fn identities(
     top: usize,
 ) -> Result<Vec<IdentityId>, JobError> {
     Ok(answered(map, text, level, &Recipe::default())?.chosen(top))
+}
+
+/// The same for whoever changes them: by names alone.
+///
+/// # Errors
+/// If nothing is found, or only by what it looks like.
+pub(crate) fn named(
+    map: &SemanticMap,
+    text: &str,
+    level: LevelFilter,
+    top: usize,
+) -> Result<Vec<IdentityId>, JobError> {
+    let answered = answered(map, text, level, &Recipe::default())?;
+    match (answered.basis, answered.chosen(top)) {
+        (Basis::Embedding, ids) => {
+            let name = ids.first().map(|id| map.identities.full_name(*id)).unwrap_or_default();
+            Err(JobError::OnlyLooks { text: text.to_owned(), name })
+        }
+        (Basis::Names, ids) => Ok(ids),
+    }
 }
 
 /// The answer to a question.

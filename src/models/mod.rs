@@ -120,6 +120,12 @@ impl<E, F: FnMut(&str) -> Result<Vec<f32>, E>> TextSource for F {
 /// Name of the encoder that comes with the program.
 pub(crate) const DEMO: &str = "demo";
 
+/// Whether an encoder is the one that comes with the program, or made like it: it knows a few hundred made-up things,
+/// and takes all others for one of them.
+pub(crate) fn is_rough(name: &str) -> bool {
+    name == DEMO || Path::new(name).ends_with(demo::WORDS.0)
+}
+
 /// The best encoder that can be used on this machine. `told` hears of better ones that are broken.
 pub(crate) fn best_encoder(told: &mut dyn FnMut(String)) -> Result<Box<dyn Encoder>, ModelError> {
     let best = catalog::usable(ModelRole::Encoder, told)?.into_iter().next();

@@ -101,6 +101,9 @@ pub(crate) fn apply(
             if let Some(color) = color {
                 recolor(&mut cloud, &thing, color.map(f64::from));
             }
+            if *duplicate || color.is_some() {
+                map.see_colors(&cloud);
+            }
             Ok((cloud, Some(map)))
         }
     }

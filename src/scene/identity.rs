@@ -7,6 +7,7 @@ use std::sync::{Arc, OnceLock};
 use serde::{Deserialize, Serialize};
 
 use self::whole_names::{WholeNames, key};
+use super::colors::SeenColors;
 use super::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
 use super::text;
 use crate::math::format::things;
@@ -73,6 +74,9 @@ pub struct Identities {
     /// Names of what was taken out of the scene for good.
     #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "text::read_names")]
     pub(crate) removed: Vec<String>,
+    /// What color each is, where somebody has looked at its Gaussians.
+    #[serde(skip)]
+    pub(crate) colors: SeenColors,
     #[serde(skip)]
     whole_names: Known,
 }
@@ -105,6 +109,11 @@ impl Identities {
         self.whole_names = Known::default();
         self.list.push(Identity { level, parent, names, code: [0.5; 3] });
         self.list.len() as IdentityId
+    }
+
+    /// Whether any of them has a name.
+    pub(crate) fn have_names(&self) -> bool {
+        self.list.iter().any(|i| i.names.iter().any(|name| !key(name).is_empty()))
     }
 
     /// How many there are.

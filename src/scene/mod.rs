@@ -5,6 +5,7 @@ pub(crate) mod bounds;
 pub(crate) mod camera;
 pub(crate) mod camera_path;
 pub(crate) mod cloud;
+pub(crate) mod colors;
 pub(crate) mod crop;
 pub(crate) mod dataset;
 pub(crate) mod findings;

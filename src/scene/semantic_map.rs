@@ -1,5 +1,6 @@
 //! Identities together with the Gaussians that belong to them.
 
+use super::colors::SeenColors;
 use super::findings::IdentityEvidence;
 use super::{ExtraProperty, Findings, GaussianCloud, Identities, IdentityId, LanguageFeatures, NOBODY, Preparation};
 
@@ -78,7 +79,13 @@ impl SemanticMap {
             let stored = values(name).into_iter().flatten().filter(|v| v.is_finite());
             map.codes.iter_mut().zip(stored).for_each(|(codes, v)| codes[c] = *v);
         }
+        map.see_colors(cloud);
         Some(map)
+    }
+
+    /// Looks at the colors of the Gaussians `cloud`, for questions that name one.
+    pub(crate) fn see_colors(&mut self, cloud: &GaussianCloud) {
+        self.identities.colors = SeenColors::of(cloud, self);
     }
 
     /// Indices of the Gaussians of an identity and its pieces, rising.

@@ -2,11 +2,12 @@
 
 use fmlgs::agent::camera_args::{Direction, Distance};
 use fmlgs::agent::relation::Viewpoint;
-use fmlgs::agent::world::{Arrival, IdentityFacts, Movement, Unreachable, World, WorldError, locate_by_names};
+use fmlgs::agent::world::{Arrival, IdentityFacts, Movement, Unreachable, World, WorldError};
+use fmlgs::agent::world::{locate_by_names, locate_with};
 use fmlgs::navigate::target::Side;
 use fmlgs::pipeline::semantics::answer::QueryAnswer;
 use fmlgs::scene::LevelFilter;
-use fmlgs::scene::{Bounds, Identities, IdentityId, Level, NOBODY};
+use fmlgs::scene::{Bounds, Identities, IdentityId, LanguageFeatures, Level, NOBODY, ViewFeatures};
 use glam::{DQuat, DVec3};
 
 /// A name that tries to give orders.
@@ -27,6 +28,8 @@ pub struct Room {
     pub log: Vec<String>,
     /// Length of a unit in meters, if that is known.
     pub meters: Option<f64>,
+    /// The encoder that has looked at it, if one has. To it, everything that is said looks like the piano.
+    encoder: Option<&'static str>,
 }
 
 impl Room {
@@ -52,6 +55,7 @@ impl Room {
             undo: Vec::new(),
             log: Vec::new(),
             meters: Some(1.0),
+            encoder: Some("demo"),
         };
         let top = 0.75;
         let table = r.add(NOBODY, &["table"], [0.0, 0.0, 0.0], [2.2, 0.9, top]);
@@ -105,6 +109,19 @@ impl Room {
         r
     }
 
+    /// The same looked at by another encoder.
+    pub fn with_encoder(encoder: Option<&'static str>) -> Self {
+        Self { encoder, ..Self::new() }
+    }
+
+    /// What the encoder makes of everything: the piano is like any phrase, the rest a little less.
+    fn looks(&self, encoder: &str) -> LanguageFeatures {
+        let view = |name: &[String]| if name == ["piano"] { vec![1.0, 0.0] } else { vec![0.9, 0.435_889_9] };
+        let each = self.identities.iter().map(|(_, i)| view(&i.names));
+        let by_identity = each.map(|v| ViewFeatures { raw: vec![v.clone()], deviated: vec![v] }).collect();
+        LanguageFeatures { encoder: encoder.into(), dimension: 2, by_identity }
+    }
+
     /// Adds a thing or a part on the table.
     #[allow(dead_code, reason = "not every test furnishes the room")]
     pub fn put(&mut self, whole: IdentityId, name: &str) -> IdentityId {
@@ -136,7 +153,10 @@ impl World for Room {
     }
 
     fn locate(&mut self, query: &str, kind: LevelFilter) -> Result<QueryAnswer, WorldError> {
-        Ok(locate_by_names(&self.identities, query, kind))
+        let Some(encoder) = self.encoder else { return Ok(locate_by_names(&self.identities, query, kind)) };
+        let canonical = ["object", "stuff", "texture"];
+        let mut encode = |phrase: &str| if canonical.contains(&phrase) { vec![0.0, 1.0] } else { vec![1.0, 0.0] };
+        Ok(locate_with(&self.identities, &self.looks(encoder), query, kind, &mut encode))
     }
 
     fn facts(&self, id: IdentityId) -> Option<IdentityFacts> {
@@ -230,8 +250,9 @@ impl World for Room {
         Ok(())
     }
 
-    fn isolate(&mut self, id: IdentityId) -> Result<(), WorldError> {
-        self.log.push(format!("isolate {}", self.name(id)));
+    fn isolate(&mut self, ids: &[IdentityId]) -> Result<(), WorldError> {
+        let names: Vec<String> = ids.iter().map(|id| self.name(*id)).collect();
+        self.log.push(format!("isolate {}", names.join(", ")));
         Ok(())
     }
 

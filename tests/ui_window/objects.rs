@@ -35,7 +35,8 @@ fn objects_are_found_asked_for_renamed_hidden_and_undone() {
     assert!(w.shows("Read \"buton\" as \"button\""), "what was mended is said");
     w.ask(Action::Ask("red controller wheel".into()));
     w.until("an answer", |a| a.viewport.queries.all().last().is_some_and(|q| !q.pending));
-    assert!(w.shows("Ignored: \u{201c}wheel\u{201d}") && !w.shows("certain"), "the object is no sure answer");
+    assert!(w.shows("No match for \u{201c}wheel\u{201d}") && w.shows("Did you mean"), "the object is an offer");
+    assert!(!w.shows("Ignored") && w.app().viewport.queries.found().is_empty(), "and nothing is outlined");
     w.until("what the pixels belong to", |a| a.viewport.queries.maps().is_some());
     w.ask(Action::Ask("giraffe".into()));
     w.until("an answer", |a| a.viewport.queries.all().last().is_some_and(|q| !q.pending));

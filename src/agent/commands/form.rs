@@ -7,7 +7,7 @@ use std::sync::OnceLock;
 use crate::agent::camera_args::{Direction, Distance};
 use crate::agent::language::{CommandHelp, CommandLanguage, commands, find};
 use crate::agent::relation::Relation;
-use crate::agent::resolve::{NameWords, is_thing};
+use crate::agent::resolve::{NameWords, counted, is_thing};
 use crate::agent::words::{Token, number};
 use crate::navigate::target::Side;
 use crate::scene::identity::whole_names::key;
@@ -269,13 +269,18 @@ fn quoted(words: &[&str]) -> String {
     words.join(" ").replace(" 's", "'s").replace('"', "")
 }
 
-/// What follows "all", "both" and the like: everything that it means is meant.
+/// What follows "all", "both" and the like, or begins with a number: everything that it means is meant.
 pub(super) fn many<'a, 'b>(words: &'b [&'a str]) -> Option<&'b [&'a str]> {
+    let bare = |words: &'b [&'a str]| match words {
+        [first, rest @ ..] if CommandLanguage::get().determiners.iter().any(|d| d == first) => rest,
+        all => all,
+    };
     let rest = match words {
-        ["all", "of", rest @ ..] | ["all" | "both" | "every" | "each", rest @ ..] => rest,
+        ["all" | "both" | "each", "of", rest @ ..] | ["all" | "both" | "every" | "each", rest @ ..] => rest,
+        _ if counted(bare(words)).is_some() => words,
         _ => return None,
     };
-    Some(rest.strip_prefix(&["the"]).unwrap_or(rest)).filter(|r| !r.is_empty())
+    Some(bare(rest)).filter(|r| !r.is_empty())
 }
 
 /// "20", "half a", "thirty five".

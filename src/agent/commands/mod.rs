@@ -24,6 +24,7 @@ use super::tool::{Reference, Target, ToolCall};
 use super::words::{Token, alike, request_tokens};
 use super::world::World;
 use crate::navigate::target::Side;
+use crate::pipeline::semantics::recipe::Understanding;
 use crate::scene::{Identities, LevelFilter};
 
 /// Most tasks of one request.
@@ -241,6 +242,7 @@ fn settled(tasks: Vec<Task>, context: &mut PlannerContext<'_>) -> Result<Vec<Tas
     let is_alone = tasks.len() == 1;
     for task in tasks {
         if let (Task::Call(call), [phrase]) = (&task, phrases(&task).as_slice())
+            && is_done_to_several(call)
             && let Some(ids) = all_of(phrase, context.world, &dialog)?
         {
             dialog.last = ids.last().copied();
@@ -271,12 +273,27 @@ fn settled(tasks: Vec<Task>, context: &mut PlannerContext<'_>) -> Result<Vec<Tas
     Ok(done)
 }
 
-/// What "all bottles", "both controllers" or "the bottles" mean; `None` if one thing is meant.
+/// Whether a call can be made for one of several things after the other.
+fn is_done_to_several(call: &ToolCall) -> bool {
+    !matches!(
+        call,
+        ToolCall::GoTo { .. }
+            | ToolCall::LookAt { .. }
+            | ToolCall::Rename { .. }
+            | ToolCall::Measure { to: Some(_), .. }
+    )
+}
+
+/// What "all bottles", "both controllers" or "the two controllers" mean; `None` if one thing is meant.
 fn all_of(phrase: &str, world: &mut dyn World, dialog: &DialogState) -> Result<Option<Vec<u32>>, Refusal> {
     let words: Vec<&str> = phrase.split(' ').collect();
     let is_name = !world.identities().called(phrase, LevelFilter::Auto).is_empty();
     let Some(rest) = many(&words).filter(|_| !is_name) else { return Ok(None) };
     let ids = resolve_all(world, &rest.join(" "), LevelFilter::Auto, dialog)?;
+    if world.understanding() == Understanding::Embedding {
+        let text = "What is found by embedding is no count: ask for one thing at a time.";
+        return Err(Refusal::new(RefusalKind::Unclear, text));
+    }
     let is_both = words[0] == "both";
     if is_both && ids.len() != 2 {
         let text = format!("There are {} of them here, not two.", ids.len());

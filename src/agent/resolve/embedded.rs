@@ -1,32 +1,58 @@
 //! What no name says, asked of the scene's encoder.
 
 use super::{Lost, Resolver, Set};
+use crate::agent::describe::names;
 use crate::agent::refusal::RefusalKind;
-use crate::pipeline::semantics::answer::Basis;
+use crate::pipeline::semantics::answer::{Basis, QueryAnswer};
 use crate::pipeline::semantics::localize::Answer;
+use crate::pipeline::semantics::recipe::Understanding;
 use crate::scene::{IdentityId, LevelFilter};
 
+/// Things that are offered.
+const OFFERED: usize = 3;
+
 impl Resolver<'_> {
-    /// What the words mean to the scene's encoder.
+    /// What the words mean to the scene's encoder, where it may be asked.
     pub(super) fn embedded(&mut self, words: &[String]) -> Result<Set, Lost> {
         let text = words.join(" ");
         let found = self.by_embedding(&text, self.level)?;
         found.map(Set::new).ok_or_else(|| self.not_found(&text, words))
     }
 
-    /// What the scene's encoder says, where it has one and that finds something.
+    /// What the scene's encoder says, where it may be asked and finds something.
     pub(super) fn by_embedding(&mut self, text: &str, kind: LevelFilter) -> Result<Option<Vec<IdentityId>>, Lost> {
-        let found = self.world.locate(text, kind).map_err(|e| Lost::new(RefusalKind::Failed, e.0, Vec::new()))?;
+        if !self.may_look {
+            return Ok(None);
+        }
+        let found = self.located(text, kind)?;
         let ids = match (&found.basis, &found.answer) {
             (Basis::Embedding, Answer::Found(_)) => found.chosen(1),
             (Basis::Embedding, Answer::Ambiguous(_)) => found.chosen(2),
             _ => Vec::new(),
         };
         let ids: Vec<IdentityId> = ids.into_iter().filter(|id| self.world.facts(*id).is_some()).take(12).collect();
-        if ids.is_empty() {
-            return Ok(None);
+        self.looked |= !ids.is_empty();
+        Ok(Some(ids).filter(|ids| !ids.is_empty()))
+    }
+
+    /// The same refusal with what looks most like the phrase beneath.
+    pub(super) fn with_offers(&mut self, mut lost: Lost, phrase: &str) -> Lost {
+        if !lost.is_open || self.world.understanding() == Understanding::Names {
+            return lost;
         }
-        self.note = "(Found by embedding, not by name.)".into();
-        Ok(Some(ids))
+        let Ok(found) = self.located(phrase, self.level) else { return lost };
+        let [_, offered] = found.offers(OFFERED);
+        let answered = if found.basis == Basis::Embedding { found.chosen(1) } else { Vec::new() };
+        let alike: Vec<IdentityId> =
+            offered.into_iter().chain(answered).filter(|id| self.world.facts(*id).is_some()).collect();
+        if !alike.is_empty() {
+            lost.refusal.text += &format!(" Looks most like: {}.", names(self.world, &alike, OFFERED));
+            lost.near.extend(alike.into_iter().filter(|id| !lost.near.contains(id)).collect::<Vec<_>>());
+        }
+        lost
+    }
+
+    fn located(&mut self, text: &str, kind: LevelFilter) -> Result<QueryAnswer, Lost> {
+        self.world.locate(text, kind).map_err(|e| Lost::new(RefusalKind::Failed, e.0, Vec::new()))
     }
 }

@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use crate::agent::language::{CommandLanguage, Key, find};
 use crate::agent::relation::Relation;
-use crate::agent::words::{request_tokens, singular, tokens};
+use crate::agent::words::{number, request_tokens, singular, tokens};
 use crate::scene::Identities;
 use crate::scene::identity::whole_names::key;
 
@@ -19,6 +19,8 @@ pub(super) enum Noun {
     Named(Vec<String>),
     /// One among others: "the largest ...".
     Picked(Pick, Box<Noun>),
+    /// All of them, if there are so many: "the two ...".
+    Counted(usize, Box<Noun>),
     PieceOf(Box<Noun>, Box<Noun>),
     /// Something that stands so to something else.
     Placed(Box<Noun>, Relation, Box<Noun>),
@@ -43,6 +45,13 @@ pub(super) fn pick(word: &str) -> Option<Pick> {
     let more = || find(&all.more, word).map(|key| Pick::More(key, true));
     let less = || find(&all.less, word).map(|key| Pick::More(key, false));
     if word == "other" { Some(Pick::Other) } else { most().or_else(least).or_else(more).or_else(less) }
+}
+
+/// The number that words begin with, two or more, and what there are so many of.
+pub(crate) fn counted<'a, 'b>(words: &'b [&'a str]) -> Option<(usize, &'b [&'a str])> {
+    let (first, rest) = words.split_first().filter(|(_, rest)| !rest.is_empty())?;
+    let count = number(first).filter(|n| (2.0..=99.0).contains(n) && n.fract() == 0.0)?;
+    Some((count as usize, rest))
 }
 
 /// Words of a thing at most.
@@ -152,7 +161,8 @@ pub(super) fn readings(words: &[&str], known: &NameWords, strict: bool) -> Vec<N
     for i in 1..words.len() {
         let (left, right) = (&words[..i], &words[i + 1..]);
         let mut both = |left: &[&str], right: &[&str], make: &dyn Fn(Box<Noun>, Box<Noun>) -> Noun| {
-            let things = readings(left, known, strict).into_iter().filter(|l| !matches!(l, Noun::Picked(..)));
+            let is_one = |l: &Noun| !matches!(l, Noun::Picked(..) | Noun::Counted(..));
+            let things = readings(left, known, strict).into_iter().filter(is_one);
             for thing in things {
                 found.extend(
                     readings(right, known, strict).into_iter().map(|r| make(Box::new(thing.clone()), Box::new(r))),
@@ -177,6 +187,10 @@ pub(super) fn readings(words: &[&str], known: &NameWords, strict: bool) -> Vec<N
     if let Some((choice, rest)) = pick(words[0]).zip(words.get(1..).filter(|r| !r.is_empty())) {
         let rest = readings(rest, known, strict);
         found.extend(rest.into_iter().map(|r| Noun::Picked(choice, Box::new(r))));
+    }
+    if let Some((count, rest)) = counted(words) {
+        let rest = readings(rest, known, strict);
+        found.extend(rest.into_iter().map(|r| Noun::Counted(count, Box::new(r))));
     }
     let any = |w: &str| w == "one" || w == "ones" || [&ANYTHING[..], &PARTS].concat().contains(&singular(w).as_str());
     let inner = |w: &&str| language.is_no_name(w) || language.relation_at(&[w]).is_some();

@@ -15,13 +15,16 @@ use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::localize::{Answer, Hit};
 use crate::pipeline::semantics::reading::mended_text;
 use crate::pipeline::semantics::timing::ms_since;
-use crate::scene::{LevelFilter, SemanticMap};
+use crate::scene::{IdentityId, LevelFilter, SemanticMap};
+
+/// Things that are offered where nothing fits, at most, by name and by embedding.
+const OFFERED: usize = 3;
 
 /// Ask a scene for an object or a part
 ///
-/// "X of the Y" and "Y's X" ask for a part. Answers by the names that identities have, else by what
-/// they look like to the encoder that has looked at them; --recipe paper asks as the paper does. Exit code 1 if
-/// nothing fits.
+/// "X of the Y" and "Y's X" ask for a part. Answers by the names that identities have; what they look like to the
+/// encoder that has looked at them answers where nothing has a name, or if that encoder is CLIP, else it is an offer.
+/// --recipe paper asks as the paper does. Exit code 1 if nothing fits.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs query scene/ \"a button of the red controller\"\n  \
@@ -102,7 +105,7 @@ pub(crate) fn run(args: QueryArgs) -> Result<(), CliError> {
 }
 
 fn tell(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -> Result<(), CliError> {
-    let QueryResult { answered, reading, mask, unknown_words: unknown, ignored_words: ignored, query_ms, .. } = result;
+    let QueryResult { answered, reading, mask, ignored_words: ignored, unexplained_words, query_ms, .. } = result;
     let full_name = |hit: &Hit| map.identities.full_name(hit.identity);
     let basis = if answered.basis == Basis::Names { "names" } else { "looks" };
     let mut lines = args.recipe.lines(map);
@@ -123,9 +126,10 @@ fn tell(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -
             "answer": answer.verdict(),
             "basis": basis,
             "hits": hits.iter().map(hit).collect::<Vec<_>>(),
+            "looks_like": answered.alike.iter().map(hit).collect::<Vec<_>>(),
             "pixels": mask.area(),
             "in_view": !mask.is_empty(),
-            "unknown_words": unknown,
+            "unknown_words": unexplained_words,
             "ignored_words": ignored,
             "mended": reading.mended.iter().map(|(typed, read)| json!({ "typed": typed, "read": read })).collect::<Vec<_>>(),
             "query_ms": query_ms,
@@ -137,14 +141,17 @@ fn tell(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -
     }
     match answer {
         Answer::NotFound(_) => {
-            let alike = reading.near.iter().map(|(_, other)| other.clone());
-            let near = hits.iter().filter(|h| h.score > 0.0).map(full_name).chain(alike).collect::<Vec<_>>().join(", ");
-            let near = if near.is_empty() { String::new() } else { format!("; nearest: {near}") };
-            let known = match unknown.as_slice() {
+            let [by_name, by_looks] = answered.offers(OFFERED);
+            let name = |id: IdentityId| map.identities.full_name(id);
+            let slips = reading.near.iter().map(|(_, other)| other.clone());
+            let offer = |what: &str, names: Vec<String>| match names.as_slice() {
                 [] => String::new(),
-                words => format!("; words that are not known: {}", words.join(", ")),
+                names => format!("; {what}: {}", names.join(", ")),
             };
-            Err(CliError::failed(format!("no match for '{text}'{near}{known}")))
+            let near = offer("nearest", slips.chain(by_name.into_iter().map(name)).collect());
+            let looks = offer("looks most like", by_looks.into_iter().map(name).collect());
+            let words = offer("words that nothing here fits", unexplained_words.clone());
+            Err(CliError::failed(format!("no match for '{text}'{words}{near}{looks}")))
         }
         _ if args.json => Ok(()),
         _ => {

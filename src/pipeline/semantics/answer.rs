@@ -1,4 +1,5 @@
-//! One query, answered: by names where the scene's names know the words or what was removed has them, else by meaning.
+//! One query, answered: by names where there are any, else by embedding. Where names decide, what looks alike is only
+//! offered, unless an encoder of photos (CLIP) says it.
 
 use std::time::Instant;
 
@@ -6,15 +7,17 @@ use rayon::prelude::*;
 
 use super::by_embedding::{EmbeddingScorer, TextEmbeddings};
 use super::code_map::CodeMap;
-use super::localize::{Answer, Hit, Scorer, called, localize};
+use super::grounds;
+use super::localize::{Answer, Hit, Scorer, called, localize, nearest};
 use super::matching::{self, MatchMode};
 use super::names::{self, ByName};
 use super::parse::ParsedQuery;
 use super::reading::QueryReading;
-use super::recipe::{Recipe, RelevancyScale, Strategy, Understanding};
+use super::recipe::{Recipe, Rejection, RelevancyScale, Strategy, Understanding};
 use super::relevancy::{LERFS_SHARE, on_lerfs_scale};
 use super::timing::{StagesMs, ms_since};
 use super::view_map::ViewMap;
+use crate::models;
 use crate::scene::{Identities, IdentityId, LanguageFeatures, LevelFilter, Mask};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,25 +28,15 @@ pub(crate) enum Basis {
     Embedding,
 }
 
-/// How sure an answer is, in a word.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, strum::IntoStaticStr)]
-#[strum(serialize_all = "lowercase")]
-pub(crate) enum Certainty {
-    /// Every word is in its name or in those of its wholes, and every word of its name was said.
-    Certain,
-    /// A part of its name was said, or it looks like it far more than anything else.
-    Likely,
-    Guess,
-}
-
-/// Score from which, and margin by which, what looks like the query is likely meant.
-const LIKELY: (f32, f32) = (0.6, 0.05);
-
 /// An answered query.
 #[derive(Clone, Debug, PartialEq)]
 pub struct QueryAnswer {
     pub(crate) answer: Answer,
     pub(crate) basis: Basis,
+    /// What looks most like the question where names have no answer, best first: an offer, no answer.
+    pub(crate) alike: Vec<Hit>,
+    /// Whether the encoder is the small one that comes with the program, which is sure of nothing.
+    pub(crate) is_rough: bool,
     /// Relevancy of every identity by number, 0 to 1; a piece is at least as relevant as its whole
     /// where names decide.
     pub(crate) relevancy: Vec<f32>,
@@ -59,9 +52,11 @@ pub(crate) struct Language<'a> {
     pub(crate) features: &'a LanguageFeatures,
     /// With the query's phrases learned.
     pub(crate) phrases: &'a TextEmbeddings,
+    /// The words of the query that the encoder does not know and left out.
+    pub(crate) unknown: &'a [String],
 }
 
-/// Answers as the recipe says: by names where all words are known, by meaning where that finds something, or by one
+/// Answers as the recipe says: by names, by embedding where names have no answer and the encoder may give one, or by one
 /// of them alone.
 pub(crate) fn answer(
     identities: &Identities,
@@ -79,7 +74,9 @@ pub(crate) fn answer(
         (Understanding::Both, Some(language)) => language,
     };
     let named = by_name(identities, reading, level, recipe);
-    let known = !reading.called.is_empty() || names::unknown_words(identities, &phrase.text).is_empty();
+    let is_strict = recipe.rejection == Rejection::Strict;
+    // Under other rules, an answer by name may leave words out; then the encoder comes first.
+    let known = is_strict || !reading.called.is_empty() || names::unknown_words(identities, &phrase.text).is_empty();
     if known && !nothing(&named.answer) {
         return named;
     }
@@ -87,22 +84,47 @@ pub(crate) fn answer(
     if nothing(&named.answer) && names::was_removed(identities, &phrase.text) {
         return named;
     }
-    let meant = by_embedding(identities, phrase, level, recipe, language);
+    let mut meant = by_embedding(identities, phrase, level, recipe, language);
+    let first = meant.chosen(1);
+    let alike = || meant.answer.hits().iter().filter(|hit| first.contains(&hit.identity)).copied().collect();
+    let alike: Vec<Hit> = if is_strict { alike() } else { Vec::new() };
+    if is_strict {
+        meant.answer = grounded(identities, phrase, language, meant.answer);
+    }
     // Both were looked at, whichever is taken.
     let stages = named.stages.and(meant.stages);
-    let taken = if nothing(&meant.answer) && !nothing(&named.answer) { named } else { meant };
+    let taken = match (nothing(&meant.answer), nothing(&named.answer)) {
+        (false, _) if is_strict && !may_answer(identities, language.features) => QueryAnswer { alike, ..named },
+        (true, _) if is_strict && identities.have_names() => QueryAnswer { alike, ..named },
+        (true, false) => named,
+        _ => meant,
+    };
     QueryAnswer { stages, ..taken }
+}
+
+/// Whether an encoder answers by itself: where nothing has a name, or if it knows photos. To the small one that comes
+/// with the program, everything that it does not know looks like something that it knows (docs/measured.md).
+pub(crate) fn may_answer(identities: &Identities, features: &LanguageFeatures) -> bool {
+    !identities.have_names() || !models::is_rough(&features.encoder)
+}
+
+/// An answer by embedding, unless a word is left out or is about places, comparisons or numbers, of which an embedding
+/// knows nothing, or what it found has another color than was said.
+fn grounded(identities: &Identities, phrase: &ParsedQuery, language: Language<'_>, answer: Answer) -> Answer {
+    let leaves_out = !grounds::telling(language.unknown).is_empty() || grounds::asks_for_more(identities, &phrase.text);
+    match answer {
+        Answer::Found(hits) | Answer::Ambiguous(hits)
+            if leaves_out || grounds::is_of_another_color(identities, hits[0].identity, phrase) =>
+        {
+            Answer::NotFound(hits)
+        }
+        other => other,
+    }
 }
 
 /// What is answered by embedding where there are no embeddings.
 fn unanswered(identities: &Identities, recipe: &Recipe) -> QueryAnswer {
-    QueryAnswer {
-        answer: Answer::NotFound(Vec::new()),
-        basis: Basis::Embedding,
-        relevancy: vec![0.0; identities.len() + 1],
-        stages: StagesMs::default(),
-        recipe: recipe.clone(),
-    }
+    QueryAnswer::nothing(Basis::Embedding, identities, recipe)
 }
 
 struct Timed<'a, S> {
@@ -124,6 +146,10 @@ impl<S: Scorer> Scorer for Timed<'_, S> {
 
     fn resolution(&self) -> f32 {
         self.scorer.resolution()
+    }
+
+    fn admits(&mut self, phrase: &ParsedQuery, hit: &Hit) -> bool {
+        self.scorer.admits(phrase, hit)
     }
 
     fn rejects(&mut self, phrase: &ParsedQuery, hit: &Hit) -> bool {
@@ -151,6 +177,13 @@ fn judged<S: Scorer>(
         [] => localize(identities, phrase, level, strategy, &mut timed),
         ids => called(identities, (ids, &phrase.text), level, &mut timed),
     };
+    let answer = match answer {
+        // What comes near may be no piece of what was said.
+        Answer::NotFound(hits) if basis == Basis::Names && hits.iter().all(|hit| hit.score <= 0.0) => {
+            Answer::NotFound(nearest(identities, &phrase.text, level, &mut timed))
+        }
+        other => other,
+    };
     let (scored_ms, localized_ms) = (timed.ms, ms_since(start));
     let relevancy = relevancy(&answer, scorer);
     let stages = StagesMs {
@@ -158,7 +191,7 @@ fn judged<S: Scorer>(
         localize: localized_ms - scored_ms,
         ..StagesMs::default()
     };
-    QueryAnswer { answer, basis, relevancy, stages, recipe: recipe.clone() }
+    QueryAnswer { stages, ..QueryAnswer::new(answer, basis, relevancy, recipe) }
 }
 
 pub(crate) fn by_name(
@@ -171,8 +204,9 @@ pub(crate) fn by_name(
     judged((identities, phrase, level), called, (Basis::Names, recipe), &mut scorer, |answer, _| {
         let alone = names::scores(identities, &phrase.target);
         let mut relevancy = vec![0.0; identities.len() + 1];
+        let meant = if let Answer::NotFound(_) = answer { &[] } else { answer.hits() };
         for (id, identity) in identities.iter() {
-            let hit = answer.hits().iter().find(|h| h.identity == id);
+            let hit = meant.iter().find(|h| h.identity == id);
             // What shares the words but not the whole is related, not meant.
             let own = hit.map_or(0.5 * alone[id as usize - 1], |h| h.score);
             relevancy[id as usize] = f32::max(own, relevancy[identity.parent as usize]);
@@ -189,17 +223,29 @@ pub(crate) fn by_embedding(
     recipe: &Recipe,
     language: Language<'_>,
 ) -> QueryAnswer {
-    let Language { features, phrases } = language;
+    let Language { features, phrases, .. } = language;
     let mut scorer = EmbeddingScorer::new(identities, features, phrases, recipe);
-    judged((identities, phrase, level), &[], (Basis::Embedding, recipe), &mut scorer, |_, scorer| {
+    let found = judged((identities, phrase, level), &[], (Basis::Embedding, recipe), &mut scorer, |_, scorer| {
         let mut relevancy = vec![0.0];
         relevancy.extend(scorer.scores(&phrase.text, None));
         relevancy.resize(identities.len() + 1, 0.0);
         relevancy
-    })
+    });
+    QueryAnswer { is_rough: models::is_rough(&features.encoder), ..found }
 }
 
 impl QueryAnswer {
+    /// An answer with nothing alike, found in no time.
+    pub(crate) fn new(answer: Answer, basis: Basis, relevancy: Vec<f32>, recipe: &Recipe) -> Self {
+        let (stages, recipe) = (StagesMs::default(), recipe.clone());
+        Self { answer, basis, alike: Vec::new(), is_rough: false, relevancy, stages, recipe }
+    }
+
+    /// Nothing is found.
+    pub(crate) fn nothing(basis: Basis, identities: &Identities, recipe: &Recipe) -> Self {
+        Self::new(Answer::NotFound(Vec::new()), basis, vec![0.0; identities.len() + 1], recipe)
+    }
+
     /// The best identities: none if nothing was found, all that fit alike if the answer is
     /// ambiguous, else up to `top` that fit.
     pub fn chosen(&self, top: usize) -> Vec<IdentityId> {
@@ -211,44 +257,6 @@ impl QueryAnswer {
             Answer::NotFound(_) => (0, self.threshold()),
         };
         hits.iter().take(most).filter(|h| h.score >= threshold).map(|h| h.identity).collect()
-    }
-
-    /// The words of a query that the answer does not rest on; `unknown` are those that nothing here knows.
-    pub(crate) fn ignored_words(
-        &self,
-        identities: &Identities,
-        QueryReading { phrase, called, .. }: &QueryReading,
-        unknown: &[String],
-    ) -> Vec<String> {
-        match (&self.answer, self.basis) {
-            (Answer::NotFound(_), _) => Vec::new(),
-            (_, Basis::Names) if !called.is_empty() => Vec::new(),
-            (found, Basis::Names) => {
-                let first = found.hits().first();
-                first.map_or_else(Vec::new, |h| names::words_beside(identities, h.identity, &phrase.text))
-            }
-            (_, Basis::Embedding) => unknown.to_vec(),
-        }
-    }
-
-    /// How sure the first hit is, some words being `ignored`.
-    pub(crate) fn certainty(&self, ignored: &[String]) -> Certainty {
-        let hits = self.answer.hits();
-        match (&self.answer, hits.first(), self.basis) {
-            (Answer::Found(_), Some(first), Basis::Names) if first.score > 0.999 && ignored.is_empty() => {
-                Certainty::Certain
-            }
-            (Answer::Found(_), Some(_), Basis::Names) if ignored.is_empty() => Certainty::Likely,
-            (Answer::Found(_), Some(first), Basis::Embedding) if ignored.is_empty() && self.is_likely(first) => {
-                Certainty::Likely
-            }
-            _ => Certainty::Guess,
-        }
-    }
-
-    fn is_likely(&self, hit: &Hit) -> bool {
-        let score = self.usual(hit.score);
-        score >= LIKELY.0 && score - self.usual((hit.score - hit.margin).max(0.0)) >= LIKELY.1
     }
 
     /// Score from which an identity is what was asked for.
@@ -316,6 +324,10 @@ impl QueryAnswer {
         map.identity.par_iter().with_min_len(1 << 16).map(|id| table[(*id as usize).min(last)]).collect()
     }
 }
+
+mod told;
+
+pub(crate) use told::Certainty;
 
 #[cfg(test)]
 mod tests;

@@ -1,27 +1,7 @@
 //! Words for colors in questions and names: a thing of another color is another thing.
 
 use super::words::words;
-
-/// Words for colors, those that mean much the same in one row.
-const COLORS: [&[&str]; 12] = [
-    &["black"],
-    &["blue"],
-    &["brown"],
-    &["gray", "grey"],
-    &["green"],
-    &["orange"],
-    &["pink"],
-    &["purple", "violet"],
-    &["red"],
-    &["turquoise", "teal"],
-    &["white"],
-    &["yellow"],
-];
-
-/// The row of a word for a color.
-fn row(word: &str) -> Option<usize> {
-    COLORS.iter().position(|all| all.contains(&word))
-}
+use crate::scene::colors::{COLORS, row};
 
 /// The colors that a phrase says something has, by row. A last word is the thing itself: an orange.
 pub(crate) fn said(phrase: &str) -> Vec<usize> {

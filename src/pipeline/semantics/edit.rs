@@ -115,6 +115,9 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
             reshape(&mut new, known(*id)?, gaussians);
         }
     }
+    if !matches!(edit, Edit::Rename(..)) {
+        new.see_colors(cloud);
+    }
     Ok(new)
 }
 

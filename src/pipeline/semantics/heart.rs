@@ -176,7 +176,7 @@ fn by_looks(
     let phrase = ParsedQuery::parse(text)?;
     let recipe = plain();
     book.learn(&phrase, &recipe, &mut |p: &str| encoder.text(p)).ok()?;
-    let language = Language { features, phrases: book };
+    let language = Language { features, phrases: book, unknown: &[] };
     Some(by_embedding(&map.identities, &phrase, LevelFilter::Auto, &recipe, language))
 }
 

@@ -21,6 +21,11 @@ pub trait Scorer {
     /// Difference of scores under which two identities cannot be told apart.
     fn resolution(&self) -> f32;
 
+    /// Whether an identity can be meant at all, though its score would do.
+    fn admits(&mut self, _phrase: &ParsedQuery, _hit: &Hit) -> bool {
+        true
+    }
+
     /// Whether what fits best is not what was asked for, though its score would do.
     fn rejects(&mut self, _phrase: &ParsedQuery, _hit: &Hit) -> bool {
         false
@@ -57,6 +62,14 @@ impl Answer {
         }
     }
 
+    /// The same with so many candidates at most.
+    fn cut(mut self, most: usize) -> Self {
+        match &mut self {
+            Self::Found(hits) | Self::Ambiguous(hits) | Self::NotFound(hits) => hits.truncate(most),
+        }
+        self
+    }
+
     /// In a word or two: "found", "ambiguous" or "not found".
     pub(crate) fn verdict(&self) -> &'static str {
         match self {
@@ -76,10 +89,31 @@ pub fn localize(
     scorer: &mut dyn Scorer,
 ) -> Answer {
     let answer = meant(identities, phrase, level, strategy, scorer);
-    match answer {
+    let answer = match &answer {
+        Answer::Found(hits) | Answer::Ambiguous(hits) => {
+            let able = &hits[..hits.partition_point(|hit| hit.score >= scorer.threshold())];
+            let admitted: Vec<Hit> = able.iter().filter(|hit| scorer.admits(phrase, hit)).copied().collect();
+            match admitted.len() {
+                0 => Answer::NotFound(hits.clone()),
+                n if n == able.len() => answer,
+                _ => judge(identities, with_margins(admitted), scorer),
+            }
+        }
+        Answer::NotFound(_) => answer,
+    };
+    let answer = match answer {
         Answer::Found(hits) | Answer::Ambiguous(hits) if scorer.rejects(phrase, &hits[0]) => Answer::NotFound(hits),
         other => other,
-    }
+    };
+    answer.cut(TOP)
+}
+
+/// What shares most with a text, whatever is meant by it.
+pub(super) fn nearest(identities: &Identities, text: &str, level: LevelFilter, scorer: &mut dyn Scorer) -> Vec<Hit> {
+    let mut hits = ranked(identities, &scorer.scores(text, None), level);
+    hits.retain(|hit| hit.score > 0.0);
+    hits.truncate(TOP);
+    hits
 }
 
 /// What is meant where these are called so as a whole; the others only come near.
@@ -94,7 +128,8 @@ pub(super) fn called(
     scores.iter_mut().for_each(|score| *score = score.min(below));
     ids.iter().filter_map(|id| (*id as usize).checked_sub(1)).for_each(|i| scores[i] = 1.0);
     let candidates = identities.iter().filter(|(_, i)| level.accepts(i.level)).map(|(id, _)| id);
-    judge(identities, best(candidates, &scores, TOP.max(ids.len())), scorer)
+    let most = TOP.max(ids.len());
+    judge_first(identities, rank(candidates, &scores), most, scorer).cut(most)
 }
 
 /// What is meant by scores alone.
@@ -244,22 +279,26 @@ fn piece_of(identities: &Identities, piece: &str, whole: &str, scorer: &mut dyn 
 
 /// Candidates by falling score; equal ones by number. A score that is no number is none.
 fn rank(candidates: impl Iterator<Item = IdentityId>, scores: &[f32]) -> Vec<Hit> {
-    best(candidates, scores, TOP)
-}
-
-fn best(candidates: impl Iterator<Item = IdentityId>, scores: &[f32], most: usize) -> Vec<Hit> {
     let hit = |id: IdentityId| Hit { identity: id, score: scores[id as usize - 1], margin: 0.0 };
     let mut hits: Vec<Hit> = candidates.map(hit).filter(|h| !h.score.is_nan()).collect();
     hits.sort_by(|a, b| b.score.total_cmp(&a.score).then(a.identity.cmp(&b.identity)));
+    with_margins(hits)
+}
+
+fn with_margins(mut hits: Vec<Hit>) -> Vec<Hit> {
     for i in 0..hits.len() {
         hits[i].margin = hits[i].score - hits.get(i + 1).map_or(0.0, |next| next.score);
     }
-    hits.truncate(most);
     hits
 }
 
 /// Whether the first hit is meant, nothing is, or others could be as well.
 fn judge(identities: &Identities, hits: Vec<Hit>, scorer: &dyn Scorer) -> Answer {
+    judge_first(identities, hits, TOP, scorer)
+}
+
+/// The same, where so many of the first count.
+fn judge_first(identities: &Identities, hits: Vec<Hit>, most: usize, scorer: &dyn Scorer) -> Answer {
     let Some(first) = hits.first().filter(|h| h.score > 0.0 && h.score >= scorer.threshold()) else {
         return Answer::NotFound(hits);
     };
@@ -267,7 +306,7 @@ fn judge(identities: &Identities, hits: Vec<Hit>, scorer: &dyn Scorer) -> Answer
     let related = |id: IdentityId| {
         identities.ancestors(id).any(|i| i == first.identity) || identities.ancestors(first.identity).any(|i| i == id)
     };
-    let rival = hits.iter().skip(1).find(|h| !related(h.identity));
+    let rival = hits.iter().take(most).skip(1).find(|h| !related(h.identity));
     match rival {
         Some(rival) if first.score - rival.score < scorer.resolution() => Answer::Ambiguous(hits),
         _ => Answer::Found(hits),

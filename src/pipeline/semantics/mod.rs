@@ -5,8 +5,8 @@
 //! tell objects from parts), [`tracker`] makes them identities over all views, [`votes`] gives every Gaussian its
 //! identity, [`codes`] every identity its point in code space, [`view_map`] draws identities into a view;
 //! [`parse`] takes a query apart, [`reading`] mends its slips and reads noun compounds, [`names`] and
-//! [`by_embedding`] score identities for it by name and by embedding, [`localize`] picks those that are
-//! meant, and [`answer`] puts it together, with the time of each of the [`timing`] stages.
+//! [`by_embedding`] score identities for it by name and by embedding, [`grounds`] say which words an answer rests
+//! on, [`localize`] picks those that are meant, and [`answer`] puts it together, with the time of each of the [`timing`] stages.
 
 pub(crate) mod add_photo;
 pub mod answer;
@@ -23,6 +23,7 @@ pub(crate) mod embed;
 pub(crate) mod error;
 pub(crate) mod filters;
 mod floaters;
+pub(crate) mod grounds;
 #[cfg(test)]
 mod heart;
 pub mod kept_frames;

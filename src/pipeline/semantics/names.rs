@@ -3,12 +3,12 @@
 
 use std::collections::HashSet;
 
-use super::colors;
 use super::localize::{Hit, Scorer};
 use super::parse::{ParsedQuery, is_glue};
 use super::recipe::Rejection;
 pub(crate) use super::words::singular;
 use super::words::words;
+use super::{colors, grounds};
 use crate::scene::identity::whole_names::key;
 use crate::scene::{Identities, IdentityId};
 
@@ -30,6 +30,10 @@ impl Scorer for ByName<'_> {
 
     fn threshold(&self) -> f32 {
         self.rejection.threshold(THRESHOLD)
+    }
+
+    fn admits(&mut self, phrase: &ParsedQuery, hit: &Hit) -> bool {
+        self.rejection != Rejection::Strict || grounds::unexplained(self.identities, hit.identity, phrase).is_empty()
     }
 
     fn rejects(&mut self, phrase: &ParsedQuery, hit: &Hit) -> bool {

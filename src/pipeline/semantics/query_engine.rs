@@ -78,7 +78,9 @@ impl QueryEngine {
             None => false,
         };
         let encode = ms_since(start);
-        let answered = answer_encoded(map, reading, level, &self.recipe, known.then_some(&self.phrases));
+        let unknown = self.encoder.as_ref().map(|e| e.unknown_words(&reading.phrase.text)).unwrap_or_default();
+        let encoded = known.then_some((&self.phrases, unknown.as_slice()));
+        let answered = answer_encoded(map, reading, level, &self.recipe, encoded);
         Ok(QueryAnswer { stages: StagesMs { encode, ..answered.stages }, ..answered })
     }
 
@@ -87,18 +89,48 @@ impl QueryEngine {
         let to_encoder = self.encoder.as_ref().map(|e| e.unknown_words(&phrase.text));
         names::unknown_to_all(identities, &phrase.text, to_encoder.as_deref())
     }
+
+    /// What an answer did not rest on: the words that it ignored, and those for want of which there is none.
+    pub(crate) fn left_out(
+        &self,
+        identities: &Identities,
+        reading: &QueryReading,
+        answered: &QueryAnswer,
+    ) -> (Vec<String>, Vec<String>) {
+        let unknown = self.unknown_words(identities, &reading.phrase);
+        let ignored = answered.ignored_words(identities, reading, &unknown);
+        (ignored, answered.unexplained(identities, reading, &unknown))
+    }
 }
 
-/// Answers a question whose phrases are among those that were encoded, or by names alone without them.
+/// Answers a question whose phrases are among those that were `encoded`, with the words of it that the encoder does not
+/// know, or by names alone without them.
 pub(crate) fn answer_encoded(
     map: &SemanticMap,
     reading: &QueryReading,
     level: LevelFilter,
     recipe: &Recipe,
-    phrases: Option<&TextEmbeddings>,
+    encoded: Option<(&TextEmbeddings, &[String])>,
 ) -> QueryAnswer {
-    let language = map.language.as_ref().zip(phrases).map(|(features, phrases)| Language { features, phrases });
+    let with = |(features, (phrases, unknown))| Language { features, phrases, unknown };
+    let language = map.language.as_ref().zip(encoded).map(with);
     answer(&map.identities, reading, level, recipe, language)
+}
+
+/// Answers a question by names and these `features`, as the recipe says; `None` if there is nothing in it. `source`
+/// gives the embeddings of phrases; without those of the question, names alone answer.
+pub(crate) fn ask_with<S: TextSource + ?Sized>(
+    identities: &Identities,
+    (features, recipe): (&LanguageFeatures, &Recipe),
+    text: &str,
+    level: LevelFilter,
+    source: &mut S,
+) -> Option<QueryAnswer> {
+    let reading = QueryReading::new(identities, text, level, recipe)?;
+    let mut phrases = TextEmbeddings::default();
+    let is_known = phrases.learn(&reading.phrase, recipe, source).is_ok();
+    let language = is_known.then_some(Language { features, phrases: &phrases, unknown: &[] });
+    Some(answer(identities, &reading, level, recipe, language))
 }
 
 /// Answers a question by names alone; `None` if there is nothing in it.
@@ -124,7 +156,7 @@ pub(crate) fn ask_by_embedding<S: TextSource + ?Sized>(
     let Some(phrase) = ParsedQuery::parse(text) else { return Ok(None) };
     phrases.learn(&phrase, recipe, source)?;
     let encode = ms_since(start);
-    let language = Language { features, phrases };
+    let language = Language { features, phrases, unknown: &[] };
     let mut answered = by_embedding(identities, &phrase, LevelFilter::Auto, recipe, language);
     answered.stages.encode = encode;
     Ok(Some(answered))

@@ -3,6 +3,7 @@
 
 use std::collections::BTreeMap;
 
+use super::grounds::{BINDING, without_courtesy};
 use super::parse::{MAX_CHARS, ParsedQuery, is_glue};
 use super::recipe::{Recipe, Understanding};
 use super::words::{singular, words, written};
@@ -41,18 +42,22 @@ impl QueryReading {
             let phrase = ParsedQuery::parse(query)?;
             return Some(Self { phrase, called: Vec::new(), mended: Vec::new(), near: Vec::new() });
         }
-        let called = identities.called(query, level);
-        if !called.is_empty() {
-            let text = ParsedQuery::parse(query).map_or_else(|| key(query), |p| p.text);
-            return Some(Self { phrase: ParsedQuery::undivided(text), called, mended: Vec::new(), near: Vec::new() });
+        for query in [query, without_courtesy(query)] {
+            let called = identities.called(query, level);
+            if !called.is_empty() {
+                let text = ParsedQuery::parse(query).map_or_else(|| key(query), |p| p.text);
+                return Some(Self { phrase: ParsedQuery::undivided(text), called, mended: vec![], near: vec![] });
+            }
         }
+        let query = without_courtesy(query);
         let (text, mended, near) = mend_all(identities, query);
         let partings = ParsedQuery::partings(&text);
         let (at, called) = by_whole_names(identities, &text, &partings, level);
         let parsed = partings.into_iter().nth(at)?;
         // A level that is asked for is not overruled.
         let is_compound = called.is_empty() && level != LevelFilter::Object;
-        let compound = if is_compound { compound(identities, &parsed) } else { None };
+        let compound =
+            if is_compound { bound(identities, &parsed).or_else(|| compound(identities, &parsed)) } else { None };
         Some(Self { phrase: compound.unwrap_or(parsed), called, mended, near })
     }
 }
@@ -179,6 +184,22 @@ fn slip(word: &str, known: &SceneWords) -> Slip {
         [(_, other), ..] => Slip::Of((*other).clone()),
         [] => Slip::None,
     }
+}
+
+/// "B in the A" as "B of the A", where names say that B is a piece of A: both have the last words that are said.
+fn bound(identities: &Identities, phrase: &ParsedQuery) -> Option<ParsedQuery> {
+    let raw: Vec<&str> = phrase.text.split_whitespace().collect();
+    let at = raw.iter().position(|word| BINDING.contains(word)).filter(|_| phrase.whole.is_none())?;
+    let parted = ParsedQuery::parse(&format!("{} of {}", raw[..at].join(" "), raw[at + 1..].join(" ")))?;
+    let asked = |text: &str| text.split_whitespace().map(words).collect::<Vec<_>>();
+    let (piece, whole) = (asked(&parted.target), asked(parted.whole.as_ref()?));
+    let is_called = |id: IdentityId, asked: &[Vec<String>]| {
+        identities.get(id).is_some_and(|i| i.names.iter().any(|name| has_last(asked, &words(name))))
+    };
+    let is_piece = |id: IdentityId| {
+        is_called(id, &piece) && identities.ancestors(id).skip(1).any(|whole_id| is_called(whole_id, &whole))
+    };
+    identities.iter().any(|(id, _)| is_piece(id)).then_some(parted)
 }
 
 /// "A B" as "B of the A", where that explains more words by names than any single name does: A is in the name of

@@ -39,7 +39,7 @@ pub enum Understanding {
     Names,
     /// The embeddings that an encoder made of them, as in the paper
     Embedding,
-    /// Names first, embeddings where they do not know all words
+    /// Names first; embeddings where nothing has a name, or if CLIP made them
     #[default]
     Both,
 }
@@ -146,7 +146,7 @@ pub enum Rejection {
     Never,
     /// What is less relevant than a canonical phrase
     Canonical,
-    /// That, what is hardly more relevant for this encoder, and what has another color than was asked for
+    /// That, what is hardly more relevant for this encoder, what has another color, and what leaves a word unexplained
     #[default]
     Strict,
 }
@@ -157,7 +157,9 @@ impl Rejection {
         match self {
             Self::Never => "something is always found",
             Self::Canonical => "not found if a canonical phrase is nearer",
-            Self::Strict => "not found if a canonical phrase is nearer, by a margin, or the color is another",
+            Self::Strict => {
+                "not found if a canonical phrase is nearer, by a margin, the color is another, or a word says something else"
+            }
         }
     }
 

@@ -45,7 +45,7 @@ fn ask_of(
         })
     };
     phrases.learn(&phrase, recipe, &mut encode).expect("encodes");
-    let language = Language { features: &features, phrases: &phrases };
+    let language = Language { features: &features, phrases: &phrases, unknown: &[] };
     answer(&all, &read(&all, text, recipe), LevelFilter::Auto, recipe, with_meaning.then_some(language))
 }
 
@@ -73,7 +73,7 @@ fn names_come_first_and_meaning_where_they_fail() {
 }
 
 #[test]
-fn meaning_comes_first_where_a_word_is_unknown_and_names_where_it_finds_nothing() {
+fn an_encoder_of_photos_answers_what_names_do_not_know() {
     let (all, features) = scene();
     let ask = |text: &str, to: [f32; 3]| {
         let phrase = ParsedQuery::parse(text).expect("a phrase");
@@ -81,16 +81,81 @@ fn meaning_comes_first_where_a_word_is_unknown_and_names_where_it_finds_nothing(
         let mut encode = |p: &str| Ok::<_, ()>(if p == text { to.to_vec() } else { vec![0.5, 0.5, 0.5] });
         let recipe = Recipe::default();
         phrases.learn(&phrase, &recipe, &mut encode).expect("encodes");
-        let language = Language { features: &features, phrases: &phrases };
+        let language = Language { features: &features, phrases: &phrases, unknown: &[] };
         answer(&all, &read(&all, text, &recipe), LevelFilter::Auto, &recipe, Some(language))
     };
     let a = ask("beige lamp", [1.0, 0.0, 0.0]);
     assert_eq!((a.basis, a.chosen(1)), (Basis::Embedding, vec![3]), "by name it would be the lamp");
     let a = ask("beige lamp", [0.0, 0.0, -1.0]);
-    assert_eq!((a.basis, a.chosen(1)), (Basis::Names, vec![1]));
+    assert_eq!((a.basis, a.chosen(1)), (Basis::Names, vec![]), "a word is left over");
+    assert_eq!(a.offers(3), [vec![1], vec![]]);
     let a = ask("mug", [0.0, 1.0, 0.0]);
     assert_eq!((a.basis, a.chosen(1)), (Basis::Names, vec![3]), "a known name is not asked of the encoder");
     assert_eq!((a.threshold(), ask("cup", [1.0, 0.0, 0.0]).threshold()), (names::THRESHOLD, 0.5));
+}
+
+#[test]
+fn the_small_encoder_answers_only_where_nothing_has_a_name() {
+    let ask = |encoder: &str, has_names: bool, text: &str| {
+        let (mut all, mut features) = scene();
+        features.encoder = encoder.into();
+        if !has_names {
+            all = Identities::objects(3);
+        }
+        ask_of((all, features), text, &Recipe::default(), true)
+    };
+    let small = ask("demo", true, "cup");
+    assert_eq!((small.basis, small.chosen(8), small.offers(3)), (Basis::Names, vec![], [vec![], vec![3]]));
+    assert_eq!(small.relevancy, [0.0; 4], "nothing is shown of a guess");
+    let nameless = ask("demo", false, "cup");
+    assert_eq!((nameless.basis, nameless.chosen(1)), (Basis::Embedding, vec![3]));
+    assert_eq!(nameless.certainty(&[]), Certainty::Guess, "it is sure of nothing");
+    // Controls: an encoder of photos answers, and names that know the words come first to both.
+    let photos = ask("clip-vit-b16", true, "cup");
+    assert_eq!((photos.basis, photos.chosen(1), photos.certainty(&[])), (Basis::Embedding, vec![3], Certainty::Likely));
+    // A place is nothing that looks so, whatever the encoder makes of it; what it looks like is an offer.
+    let placed = ask("clip-vit-b16", true, "cup behind the lamp");
+    assert!(placed.chosen(1).is_empty(), "{placed:?}");
+    for encoder in ["demo", "clip-vit-b16", "/models/demo_vocab.json"] {
+        assert_eq!(ask(encoder, true, "shade of the lamp").chosen(1), [2], "{encoder}");
+    }
+    assert!(ask("/models/demo_vocab.json", true, "cup").chosen(1).is_empty(), "another of its make");
+}
+
+#[test]
+fn words_that_an_encoder_leaves_out_and_colors_that_are_not_so_find_nothing() {
+    let ask = |text: &str, unknown: &[String]| {
+        let (_, features) = scene();
+        let all = Identities::objects(3);
+        let mut phrases = TextEmbeddings::default();
+        let phrase = ParsedQuery::parse(text).expect("a phrase");
+        let mut encode = |p: &str| Ok::<_, ()>(if p == text { vec![1.0, 0.0, 0.0] } else { vec![0.5, 0.5, 0.5] });
+        phrases.learn(&phrase, &Recipe::default(), &mut encode).expect("encodes");
+        let language = Language { features: &features, phrases: &phrases, unknown };
+        let reading = read(&all, text, &Recipe::default());
+        answer(&all, &reading, LevelFilter::Auto, &Recipe::default(), Some(language))
+    };
+    assert_eq!(ask("steering wheel", &[]).chosen(1), [3]);
+    let left_out = ask("steering wheel", &["steering".into()]);
+    assert!(left_out.chosen(1).is_empty());
+    let all = Identities::objects(3);
+    let reading = read(&all, "steering wheel", &Recipe::default());
+    assert_eq!(left_out.unexplained(&all, &reading, &["steering".into()]), ["steering"]);
+    assert_eq!(ask("my wheel", &["my".into()]).chosen(1), [3], "a word that says nothing may be left out");
+}
+
+#[test]
+fn what_is_ignored_is_nothing_that_is_shown() {
+    let lax = Recipe { rejection: Rejection::Canonical, ..Recipe::default() };
+    let (all, _) = scene();
+    let answered = ask_by("mug and lamp", &lax, false);
+    assert_eq!(answered.chosen(1), [1, 3]);
+    assert_eq!(answered.ignored_words(&all, &read(&all, "mug and lamp", &lax), &[]), ["and"], "both are shown");
+    // By default, a word that is left over finds nothing; both are offered.
+    let strict = ask("mug and lamp", false);
+    assert_eq!((strict.chosen(1), strict.offers(3)), (vec![], [vec![1, 3], vec![]]));
+    let reading = read(&all, "mug and lamp", &Recipe::default());
+    assert_eq!(strict.unexplained(&all, &reading, &[]), ["and"]);
 }
 
 #[test]
@@ -127,18 +192,10 @@ fn what_was_removed_is_not_found_by_its_looks() {
 
 #[test]
 fn those_that_fit_alike_are_all_chosen_and_top_is_a_limit() {
-    let answered = |answer: fn(Vec<Hit>) -> Answer, scores: &[f32]| QueryAnswer {
-        answer: answer(
-            scores
-                .iter()
-                .enumerate()
-                .map(|(i, s)| Hit { identity: i as IdentityId + 1, score: *s, margin: 0.0 })
-                .collect(),
-        ),
-        basis: Basis::Names,
-        relevancy: vec![0.0, 0.25, 0.5],
-        stages: StagesMs::default(),
-        recipe: Recipe::default(),
+    let answered = |answer: fn(Vec<Hit>) -> Answer, scores: &[f32]| {
+        let hit = |(i, s): (usize, &f32)| Hit { identity: i as IdentityId + 1, score: *s, margin: 0.0 };
+        let hits = scores.iter().enumerate().map(hit).collect();
+        QueryAnswer::new(answer(hits), Basis::Names, vec![0.0, 0.25, 0.5], &Recipe::default())
     };
     let hits = [0.9, 0.89, 0.6, 0.3];
     assert_eq!(answered(Answer::Ambiguous, &hits).chosen(1), [1, 2], "0.01 apart, under 0.02");
@@ -174,7 +231,7 @@ fn the_recipe_says_what_is_asked_and_when_nothing_fits() {
         let mut phrases = TextEmbeddings::default();
         let mut encode = |p: &str| Ok::<_, ()>(if p == "cup" { vec![0.5134, 0.5, 0.5] } else { vec![0.5, 0.5, 0.5] });
         phrases.learn(&phrase, &recipe, &mut encode).expect("encodes");
-        let language = Language { features: &features, phrases: &phrases };
+        let language = Language { features: &features, phrases: &phrases, unknown: &[] };
         answer(&all, &read(&all, "cup", &recipe), LevelFilter::Auto, &recipe, Some(language)).chosen(1)
     };
     assert_eq!([Rejection::Never, Rejection::Canonical].map(hardly), [vec![3], vec![3]]);
@@ -197,7 +254,7 @@ fn what_has_another_color_is_not_found_by_embedding() {
             Ok::<_, ()>(if p.ends_with("mug") { vec![0.8 + red, 0.0, 0.0] } else { vec![0.5, 0.5, 0.5] })
         };
         phrases.learn(&phrase, &recipe, &mut encode).expect("encodes");
-        let language = Language { features: &features, phrases: &phrases };
+        let language = Language { features: &features, phrases: &phrases, unknown: &[] };
         answer(&all, &read(&all, text, &recipe), LevelFilter::Auto, &recipe, Some(language)).chosen(1)
     };
     assert_eq!(ask("red mug", Rejection::Strict), [3]);
@@ -208,13 +265,11 @@ fn what_has_another_color_is_not_found_by_embedding() {
 
 #[test]
 fn relevancy_is_shown_raw_or_on_lerfs_scale_and_cut_at_a_fifth() {
-    let answered = |scale| QueryAnswer {
-        answer: Answer::NotFound(vec![]),
-        basis: Basis::Embedding,
+    let answered = |scale| {
+        let recipe = Recipe { scale, masks: MatchMode::Relevancy, ..Recipe::default() };
         // Of the background, and of five identities, the last of which is not in view.
-        relevancy: vec![0.0, 0.4, 0.55, 0.6, 0.7, 0.9],
-        stages: StagesMs::default(),
-        recipe: Recipe { scale, masks: MatchMode::Relevancy, ..Recipe::default() },
+        let relevancy = vec![0.0, 0.4, 0.55, 0.6, 0.7, 0.9];
+        QueryAnswer::new(Answer::NotFound(vec![]), Basis::Embedding, relevancy, &recipe)
     };
     let map = ViewMap::certain(5, vec![0, 1, 2, 3, 4]);
     let (all, raw, lerf) = (Identities::objects(5), answered(RelevancyScale::Raw), answered(RelevancyScale::Lerf));

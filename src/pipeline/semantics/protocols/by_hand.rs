@@ -11,7 +11,6 @@ use crate::pipeline::semantics::localize::{Answer, Hit};
 use crate::pipeline::semantics::query_engine::ask_by_name;
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::relevancy::deviate;
-use crate::pipeline::semantics::timing::StagesMs;
 use crate::render::RenderSettings;
 use crate::scene::{
     GaussianCloud, Identities, IdentityId, LanguageFeatures, LevelFilter, NOBODY, PART_WEIGHT, ViewFeatures,
@@ -56,13 +55,7 @@ fn named(map: &SemanticMap) -> impl FnMut(&str) -> Option<QueryAnswer> + '_ {
 /// An answer whose relevancies are given, best identity first.
 fn answered(best: IdentityId, relevancy: &[f32]) -> QueryAnswer {
     let hit = Hit { identity: best, score: relevancy[best as usize], margin: 0.5 };
-    QueryAnswer {
-        answer: Answer::Found(vec![hit]),
-        basis: Basis::Embedding,
-        relevancy: relevancy.to_vec(),
-        stages: StagesMs::default(),
-        recipe: Recipe::default(),
-    }
+    QueryAnswer::new(Answer::Found(vec![hit]), Basis::Embedding, relevancy.to_vec(), &Recipe::default())
 }
 
 fn close(found: &[f64], worked_out: &[f64]) {

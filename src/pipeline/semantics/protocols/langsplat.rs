@@ -115,7 +115,6 @@ mod tests {
     use crate::pipeline::semantics::code_map::CodeMap;
     use crate::pipeline::semantics::localize::Answer;
     use crate::pipeline::semantics::recipe::Recipe;
-    use crate::pipeline::semantics::timing::StagesMs;
     use crate::scene::{Camera, NOBODY, SemanticMap};
     use glam::DVec3;
 
@@ -167,13 +166,8 @@ mod tests {
         let blended = CodeMap::default();
         let compare_with = |relevancy: Vec<f32>| {
             let mut ask = |_: &str| {
-                Some(QueryAnswer {
-                    answer: Answer::NotFound(vec![]),
-                    basis: Basis::Embedding,
-                    relevancy: relevancy.clone(),
-                    stages: StagesMs::default(),
-                    recipe: Recipe::default(),
-                })
+                let nothing = Answer::NotFound(vec![]);
+                Some(QueryAnswer::new(nothing, Basis::Embedding, relevancy.clone(), &Recipe::default()))
             };
             let boxes = truth.bounds().into_iter().collect();
             let categories = vec![Category { name: "eye".into(), level: Level::Object, mask: truth.clone(), boxes }];

@@ -162,7 +162,7 @@ impl<'a> Asked<'a> {
         let phrase = &reading.phrase;
         let mut encode = |p: &str| Ok::<_, ()>(if *p == phrase.text { vec![1.0, 0.0] } else { vec![0.5, 0.5] });
         phrases.learn(phrase, &self.recipe, &mut encode).expect("encodes");
-        let language = Language { features: &self.features, phrases: &phrases };
+        let language = Language { features: &self.features, phrases: &phrases, unknown: &[] };
         let language = (self.recipe.understanding == Understanding::Both).then_some(language);
         let answered = answer(self.all, reading, LevelFilter::Auto, &self.recipe, language);
         let chosen = answered.chosen(1);

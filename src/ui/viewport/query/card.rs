@@ -184,10 +184,10 @@ impl Queries {
         if names::was_removed(identities, &newest.reading.phrase.text) {
             return "It was removed from this scene.".to_owned();
         }
-        let unknown = newest.unknown.join("\u{201d}, \u{201c}");
-        match &*text::shortened(&unknown, 80) {
+        let unexplained = newest.unexplained.join("\u{201d}, \u{201c}");
+        match &*text::shortened(&unexplained, 80) {
             "" => "No match.".to_owned(),
-            unknown => format!("No match for \u{201c}{unknown}\u{201d}."),
+            words => format!("No match for \u{201c}{words}\u{201d}."),
         }
     }
 
@@ -197,12 +197,18 @@ impl Queries {
             return;
         }
         ui.colored_label(theme::warning(), self.nothing_text(newest, &semantics.identities));
-        ui.horizontal_wrapped(|ui| match newest.reading.near.first() {
-            Some((_, other)) => {
+        let [by_name, by_looks] = newest
+            .answered
+            .offers(NAMED)
+            .map(|ids| ids.into_iter().map(|id| semantics.identities.full_name(id)).collect::<Vec<_>>());
+        let named: Vec<String> = newest.reading.near.iter().map(|(_, other)| other.clone()).chain(by_name).collect();
+        ui.horizontal_wrapped(|ui| match (named.is_empty(), by_looks.is_empty()) {
+            (false, _) => {
                 ui.weak("Did you mean");
-                self.show_names(ui, std::slice::from_ref(other), semantics);
+                self.show_names(ui, &named[..named.len().min(NAMED)], semantics);
             }
-            None => {
+            (true, false) => {}
+            (true, true) => {
                 let mut known = names::completions(&semantics.identities, "", usize::MAX);
                 if known.is_empty() {
                     ui.weak("Nothing here has a name yet; Details lists what comes nearest.");
@@ -213,6 +219,12 @@ impl Queries {
                 self.show_names(ui, &known, semantics);
             }
         });
+        if !by_looks.is_empty() {
+            ui.horizontal_wrapped(|ui| {
+                ui.weak("Looks most like").on_hover_text("By embedding: no name says so");
+                self.show_names(ui, &by_looks, semantics);
+            });
+        }
     }
 }
 

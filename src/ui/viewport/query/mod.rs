@@ -51,8 +51,8 @@ pub struct Asked {
     chosen: Option<IdentityId>,
     /// How it was read.
     reading: QueryReading,
-    /// Words that neither names nor the encoder know.
-    unknown: Vec<String>,
+    /// Words for want of which nothing was found.
+    unexplained: Vec<String>,
     /// Words that the answer does not rest on.
     ignored: Vec<String>,
 }
@@ -242,13 +242,16 @@ impl Queries {
         let phrase = &reading.phrase;
         let encoded = self.embeddings.of(phrase);
         let OverlaySettings { kind, recipe, .. } = &self.side.settings;
-        let mut answered = answer_encoded(semantics, &reading, *kind, recipe, self.embeddings.phrases(phrase));
+        let unread = encoded.map(|t| t.unknown.as_slice()).unwrap_or_default();
+        let phrases = self.embeddings.phrases(phrase).map(|phrases| (phrases, unread));
+        let mut answered = answer_encoded(semantics, &reading, *kind, recipe, phrases);
         answered.stages.encode = encoded.map_or(0.0, |t| t.encode_ms);
         let to_encoder = encoded.map(|t| t.unknown.as_slice());
         let unknown = names::unknown_to_all(&semantics.identities, &phrase.text, to_encoder);
         let ignored = answered.ignored_words(&semantics.identities, &reading, &unknown);
+        let unexplained = answered.unexplained(&semantics.identities, &reading, &unknown);
         let pending = semantics.language.is_some() && self.embeddings.is_pending(phrase);
-        Some(Asked { text: text.to_owned(), answered, pending, chosen: None, reading, unknown, ignored })
+        Some(Asked { text: text.to_owned(), answered, pending, chosen: None, reading, unexplained, ignored })
     }
 
     /// The target's pixels in the present view.

@@ -1,0 +1,140 @@
+//! The shipped demo, whose things the small encoder has looked at, asked in the query box and by the agent
+//! (`tests/data/demo_questions.toml`).
+
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use super::commands::Commands;
+use super::event::AgentEvent;
+use super::policy::Policy;
+use super::refusal::RefusalKind;
+use super::scene::{Parts, SceneWorld};
+use super::session::{Awaited, Reply, Session};
+use crate::jobs::{Folders, Scene, demo, open, query};
+use crate::navigate::Pose;
+use crate::pipeline::semantics::answer::{Basis, Certainty};
+use crate::pipeline::semantics::localize::Answer;
+use crate::pipeline::semantics::query_engine::QueryEngine;
+use crate::pipeline::semantics::recipe::{Recipe, Rejection, Understanding};
+use crate::scene::{IdentityId, LevelFilter, SemanticMap};
+
+fn rows(list: &str) -> Vec<[String; 3]> {
+    let table: toml::Table = include_str!("../../tests/data/demo_questions.toml").parse().expect("sound TOML");
+    let text = |row: &toml::Value, at: usize| row[at].as_str().expect("a text").to_owned();
+    table[list].as_array().expect("a list").iter().map(|row| [0, 1, 2].map(|at| text(row, at))).collect()
+}
+
+fn opened() -> (tempfile::TempDir, Scene) {
+    let data = tempfile::tempdir().expect("folder");
+    let folder = demo::unpacked(&Folders { data: data.path().into() }).expect("unpacked");
+    let scene = open::scene(&folder.join("scene")).expect("opened");
+    (data, scene)
+}
+
+/// The questions that do not come to what they must by a recipe.
+fn wrong(map: &SemanticMap, recipe: Recipe) -> Vec<String> {
+    let mut engine = QueryEngine::new(map.language.as_ref(), recipe).expect("an engine");
+    let mut wrong = Vec::new();
+    for [text, verdict, what] in rows("questions") {
+        let reading = engine.read(&map.identities, &text, LevelFilter::Auto).expect("words");
+        let answered = engine.answer(map, &reading, LevelFilter::Auto).expect("encodes");
+        let chosen = answered.chosen(1);
+        let (ignored, unexplained) = engine.left_out(&map.identities, &reading, &answered);
+        let told = match answered.answer {
+            Answer::Found(_) => map.identities.full_name(chosen[0]),
+            Answer::Ambiguous(_) => chosen.len().to_string(),
+            Answer::NotFound(_) => unexplained.join(" "),
+        };
+        if answered.answer.verdict() != verdict || (what != "*" && told != what) || !ignored.is_empty() {
+            wrong.push(format!("'{text}': {}, {told}, ignored {ignored:?}", answered.answer.verdict()));
+        }
+    }
+    wrong
+}
+
+#[test]
+fn what_is_asked_of_the_demo_is_found_or_said_not_to_be_there() {
+    let (_data, scene) = opened();
+    let map = scene.semantics().expect("objects");
+    assert!(map.language.is_some(), "an encoder has looked at it");
+    for understanding in [Understanding::Both, Understanding::Names] {
+        let wrong = wrong(&map, Recipe { understanding, ..Recipe::default() });
+        assert!(wrong.is_empty(), "{understanding}:\n{}", wrong.join("\n"));
+    }
+    // The control: where an answer may leave words out and the small encoder answers by itself, much is wrong.
+    let before = wrong(&map, Recipe { rejection: Rejection::Canonical, ..Recipe::default() });
+    assert!(before.len() >= 20, "{}", before.join("\n"));
+    // What it looks like to the encoder is offered.
+    let mut engine = QueryEngine::new(map.language.as_ref(), Recipe::default()).expect("an engine");
+    let banana = engine.ask(&map, "banana", LevelFilter::Auto).expect("encodes").expect("words");
+    assert!(!banana.offers(3)[1].is_empty() && banana.chosen(8).is_empty(), "{banana:?}");
+}
+
+#[test]
+fn where_nothing_has_a_name_the_small_encoder_guesses_and_nothing_is_changed_for_it() {
+    let (_data, scene) = opened();
+    let mut map = scene.semantics().expect("objects");
+    assert_eq!(query::named(&map, "kettle", LevelFilter::Auto, 1).expect("by name").len(), 1);
+    for id in 1..=map.identities.len() as IdentityId {
+        map.identities.get_mut(id).expect("there").names.clear();
+    }
+    let mut engine = QueryEngine::new(map.language.as_ref(), Recipe::default()).expect("an engine");
+    let answered = engine.ask(&map, "teddy bear", LevelFilter::Auto).expect("encodes").expect("words");
+    assert_eq!((answered.basis, answered.certainty(&[])), (Basis::Embedding, Certainty::Guess), "{answered:?}");
+    let id = answered.chosen(1)[0];
+    let refused = query::named(&map, "teddy bear", LevelFilter::Auto, 1).expect_err("only by its looks").to_string();
+    assert!(refused.contains(&format!("ask for '#{id}'")), "{refused}");
+    // The number that it says is enough.
+    assert_eq!(query::named(&map, &format!("#{id}"), LevelFilter::Auto, 1).expect("by number"), [id]);
+}
+
+fn ends(reply: &Reply) -> &'static str {
+    match (reply.pending, reply.refused.as_ref().map(|r| r.kind)) {
+        (Some(Awaited::Confirmation), _) => "confirm",
+        (Some(Awaited::Choice), _) => "ask",
+        (None, None) => "done",
+        (None, Some(RefusalKind::NotFound)) => "not found",
+        (None, Some(RefusalKind::Conflict)) => "conflict",
+        (None, Some(RefusalKind::Unclear)) => "not understood",
+        (None, Some(_)) => "another refusal",
+    }
+}
+
+#[test]
+fn what_is_said_of_the_demo_is_done_or_refused() {
+    let (_data, scene) = opened();
+    let map = Arc::new(scene.semantics().expect("objects"));
+    for understanding in [Understanding::Both, Understanding::Names] {
+        let parts = Parts {
+            cameras: scene.views(),
+            up: scene.home().up,
+            cloud: Arc::clone(&scene.cloud),
+            settings: scene.settings.clone(),
+            map: Arc::clone(&map),
+            meters: scene.metres_per_unit,
+            exports: PathBuf::new(),
+            folder: scene.folder.clone(),
+            recipe: Recipe { understanding, ..Recipe::default() },
+            explored: None,
+        };
+        let eye = Pose::of(&scene.views()[0]);
+        let mut world = SceneWorld::new(parts, eye, 1.5, Box::new(|_| {})).expect("a world");
+        let policy = Policy::built_in().expect("policy");
+        let mut session = Session::new(policy, Box::new(Commands::default()));
+        let mut wrong = Vec::new();
+        for [text, calls, end] in rows("sentences") {
+            let mut done = Vec::new();
+            let mut on = |event| {
+                if let AgentEvent::Call { line, .. } = event {
+                    done.push(line);
+                }
+            };
+            let reply = session.say(&mut world, &text, &mut on, &AtomicBool::new(false));
+            if (done.join("; "), ends(&reply)) != (calls.clone(), end.as_str()) {
+                wrong.push(format!("'{text}': {done:?}, {}: {}", ends(&reply), reply.text));
+            }
+        }
+        assert!(wrong.is_empty(), "{understanding}:\n{}", wrong.join("\n"));
+    }
+}
