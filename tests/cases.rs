@@ -14,3 +14,5 @@ mod lenses;
 mod splats;
 #[path = "cases/training.rs"]
 mod training;
+#[path = "cases/words.rs"]
+mod words;

@@ -132,6 +132,14 @@ fn every_stage_is_measured_and_resumed() {
     assert_eq!((times(&twice, "path"), times(&twice, "render")), (2, 1));
     assert_eq!(points(&twice, "path")[0]["secs"]["each"][0], points(&once, "path")[0]["secs"]["each"][0]);
 
+    // The page says of each stage how often it ran, and by which commands.
+    let page = std::fs::read_to_string(format!("{out}/report.html")).unwrap();
+    for said in ["each setting 2 times", "each setting once", "<small>one run</small>", "--repeats 2 --stages path"] {
+        assert!(page.contains(said), "{said}");
+    }
+    let commands = twice["commands"].as_array().unwrap();
+    assert!(commands.len() == 3 && commands.iter().all(|c| c.as_str().unwrap().starts_with("fmlgs report ")));
+
     // The table of defaults.
     let table = at("DEFAULTS.md");
     run(&["report", "--defaults", &table, "--from", &out]).ok();

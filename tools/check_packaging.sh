@@ -34,4 +34,5 @@ if has mypy; then (cd python && mypy); fi
 if has actionlint; then actionlint; fi
 if has cffconvert; then cffconvert --validate; fi
 if has cargo-deny; then cargo deny check licenses bans sources; fi
+tools/advisories.sh || [ $? -eq 3 ]
 echo "packaging: checked"

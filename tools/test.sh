@@ -62,6 +62,13 @@ export RUSTC_WORKSPACE_WRAPPER=clippy-driver CLIPPY_ARGS=-Dwarnings__CLIPPY_HACK
 check "lints and compilation" cargo test --locked --no-run --quiet
 echo "== tests (full output in $log)"
 run_tests
+echo "== advisories"
+tools/advisories.sh
+case $? in
+    0) passed=$((passed + 1)) ;;
+    3) skipped=$((skipped + 1)) ;;
+    *) failed=$((failed + 1)) ;;
+esac
 RUSTDOC=$PWD/tools/rustdoc_pages.sh check "documentation" cargo test --locked --doc --quiet
 
 echo "== $((SECONDS - started)) s in all"

@@ -44,7 +44,7 @@ pub(crate) fn run(args: DemoArgs, quiet: bool) -> Result<(), CliError> {
     }
     show_shipped(&args.out.join("shipped"), &mut console);
     let config = args.settings.over(demo_tour::config());
-    let report = demo_tour::run(&args.out, config, &mut console)
+    let report = demo_tour::run(&args.out, config, output::command_line(), &mut console)
         .map_err(|e| CliError::of_work(e, "what is done is kept; the same command resumes there"))?;
     drop(console);
     if args.json {

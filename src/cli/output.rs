@@ -33,6 +33,12 @@ pub(crate) fn note(text: &str) {
     let _ = writeln!(std::io::stderr(), "{}", text::message(text));
 }
 
+/// The command line of this process, as it can be given to a shell again.
+pub(crate) fn command_line() -> String {
+    let words = std::env::args_os().skip(1).map(|word| text::shell_word(&word.to_string_lossy()));
+    std::iter::once("fmlgs".to_owned()).chain(words).collect::<Vec<_>>().join(" ")
+}
+
 /// Rows of cells as aligned columns: the first to the left, the others to the right.
 pub(crate) fn table(rows: &[Vec<String>]) -> String {
     // A cell is one line, and no wider than a name: formatting takes no width over 65,535.

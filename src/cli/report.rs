@@ -101,7 +101,8 @@ pub(crate) fn run(args: ReportArgs, quiet: bool) -> Result<(), CliError> {
     };
     let subject = report::subject(scene, options)?;
     let ReportArgs { stages, out, fresh, budget, .. } = args;
-    let request = ReportRequest { subject, stages, out, fresh, budget_secs: budget.unwrap_or(f64::INFINITY) };
+    let (budget_secs, command) = (budget.unwrap_or(f64::INFINITY), output::command_line());
+    let request = ReportRequest { subject, stages, out, fresh, budget_secs, command };
     let Measured { report, stages, end } = report::run(&request, console)?;
     let tables = report.stages.iter().filter(|s| stages.contains(&s.name)).map(printed);
     output::print(&tables.collect::<Vec<_>>().join("\n"))?;
@@ -118,7 +119,7 @@ pub(crate) fn run(args: ReportArgs, quiet: bool) -> Result<(), CliError> {
 }
 
 fn printed(stage: &Stage) -> String {
-    let head = format!("{}: seconds of {}", stage.name.title(), stage.secs_of);
+    let head = format!("{}: seconds of {}; {}", stage.name.title(), stage.secs_of, stage.runs());
     let orders = stage.orders.iter().map(|o| {
         let agrees = if o.agrees { "agrees" } else { "does NOT agree" };
         format!("{}: order {:.2} seen, {} expected: {agrees}\n", o.what, o.observed, o.expected)

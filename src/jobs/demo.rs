@@ -59,7 +59,8 @@ impl DemoRecipe {
     }
 }
 
-/// What a trained demo says of itself: how it was made, and how good it is on photos that training did not see.
+/// What a trained demo says of itself: how it was made, and how good it is on the photos in it that training did not
+/// see.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct DemoRecord {
     recipe: DemoRecipe,
@@ -184,8 +185,21 @@ pub(crate) fn make(
     };
     let job = PhotoComparison::of(&seen, Arc::clone(&dataset), EvaluateOptions::default())?;
     let mut map = demo_questions::find(&photos, &job, recipe.max_seeds, observer)?;
+
+    // Labels of the photos that objects were found with, and of those to compare with.
+    let held_out = job.views.iter().map(|i| dataset.photos[*i].name.clone());
+    let labeled: Vec<String> = map.seeds.iter().cloned().chain(held_out).collect();
+    let packed = photo_files(&photos, &dataset.photos, &labeled, recipe.jpeg_quality)?;
+    // The record is of the photos that ship, JPEG and all: whoever measures the demo measures those.
+    let shipped = work.join("shipped");
+    if shipped.exists() {
+        std::fs::remove_dir_all(&shipped).map_err(unwritten)?;
+    }
+    bundle::unpack(&bundle::pack(&packed).map_err(unwritten)?, &shipped)?;
+    let shipped = shipped.join("photos");
+    let job = PhotoComparison::of(&seen, Arc::new(open::dataset(&shipped)?), EvaluateOptions::default())?;
     let quality = evaluate::photometric(&job, observer)?;
-    let DemoQueries { object_miou, part_miou, .. } = demo_questions::ask(&map, &photos, &job, None)?;
+    let DemoQueries { object_miou, part_miou, .. } = demo_questions::ask(&map, &shipped, &job, None)?;
     let (psnr, ssim) = (quality.psnr, quality.ssim);
     let gaussians = cloud.len();
     let record = DemoRecord {
@@ -198,9 +212,6 @@ pub(crate) fn make(
         part_miou,
     };
 
-    // Labels of the photos that objects were found with, and of those to compare with.
-    let held_out = job.views.iter().map(|i| dataset.photos[*i].name.clone());
-    let labeled: Vec<String> = map.seeds.iter().cloned().chain(held_out).collect();
     let home = dataset.photos.get(recipe.home).or(dataset.photos.first());
     let home = home.ok_or_else(|| JobError::NoPhotos(photos.clone()))?.camera.resized(PICTURE_PX[0], PICTURE_PX[1]);
     let frame = Renderer::new().render(&cloud, Features::NONE, &home, &settings)?;
@@ -225,7 +236,7 @@ pub(crate) fn make(
         ("scene/point_cloud.ply".to_owned(), ply),
         ("scene/semantic_map.safetensors".to_owned(), semantic_map::encode(&map, None, Path::new(NAME))?),
     ];
-    all.extend(photo_files(&photos, &dataset.photos, &labeled, recipe.jpeg_quality)?);
+    all.extend(packed);
     Ok((bundle::pack(&all).map_err(unwritten)?, record))
 }
 

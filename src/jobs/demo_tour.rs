@@ -51,11 +51,16 @@ pub(crate) struct DemoReport {
     total_secs: f64,
 }
 
-/// Goes it into the folder `out`, or on from where it was.
+/// Goes it into the folder `out`, or on from where it was; `command` is how it was asked for.
 ///
 /// # Errors
 /// If something cannot be read, drawn or written, or the observer asks to stop.
-pub(crate) fn run(out: &Path, config: TrainConfig, observer: &mut dyn Observer) -> Result<DemoReport, JobError> {
+pub(crate) fn run(
+    out: &Path,
+    config: TrainConfig,
+    command: String,
+    observer: &mut dyn Observer,
+) -> Result<DemoReport, JobError> {
     let started = Instant::now();
     let [photos, scene, compare, queries, flight] =
         ["photos", "scene", "compare", "queries", "flight"].map(|f| out.join(f));
@@ -73,7 +78,8 @@ pub(crate) fn run(out: &Path, config: TrainConfig, observer: &mut dyn Observer) 
     let queries = demo_questions::find_and_ask(&scene, &photos, &job, &queries, observer)?;
     let millis = fly(&job.cloud, &job.settings, &dataset, &flight, observer)?;
 
-    let document = document(out, &outcome, [psnr, ssim], &queries);
+    let mut document = document(out, &outcome, [psnr, ssim], &queries);
+    document.commands = vec![command];
     let report = DemoReport {
         document,
         machine: plan::machine(),

@@ -21,6 +21,8 @@ pub struct ReportRequest {
     pub(crate) fresh: bool,
     /// Seconds for everything.
     pub(crate) budget_secs: f64,
+    /// How it was asked for: a command line.
+    pub(crate) command: String,
 }
 
 pub(crate) struct Measured {
@@ -37,6 +39,9 @@ pub(crate) fn run(request: &ReportRequest, observer: &mut dyn Observer) -> Resul
         true => Report::empty(&subject.name, &computer),
         false => Report::begin(out, &subject.name, &computer)?,
     };
+    if !report.commands.contains(&request.command) {
+        report.commands.push(request.command.clone());
+    }
     let (stages, missing) = subject.stages(&request.stages)?;
     missing.into_iter().for_each(|m| observer.note(Severity::Info, m));
     export::make_folder(out)?;
@@ -87,7 +92,7 @@ fn write(folder: &Path, report: &Report) -> Result<(), JobError> {
     export::text(&folder.join("report.csv"), &report.csv())?;
     export::text(&folder.join("report.html"), &page::html(report))?;
     for stage in &report.stages {
-        if let Some(plot) = stage.measures.first().and_then(|m| plot::svg(stage, m).ok()) {
+        if let Some(plot) = stage.measures.first().and_then(|m| plot::svg(report, stage, m)) {
             export::text(&folder.join(format!("{}.svg", stage.name.name())), &plot)?;
         }
     }
@@ -143,7 +148,8 @@ mod tests {
         };
         let out = folder.path().join("report");
         let stages = vec![StageName::Render];
-        let mut request = ReportRequest { subject, stages, out, fresh: false, budget_secs: f64::INFINITY };
+        let mut request =
+            ReportRequest { subject, stages, out, fresh: false, budget_secs: f64::INFINITY, command: "x".into() };
         std::fs::create_dir_all(&request.out).expect("folder");
         std::fs::write(request.out.join(FILE), "{").expect("written");
         let refused = run(&request, &mut Silent).err().expect("refused");

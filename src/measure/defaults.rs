@@ -37,8 +37,8 @@ pub fn markdown(reports: &[Report]) -> String {
          the table, is applied to the measurements of that knob's settings and of the default: *chosen* is what \
          it picks, *least error* the best setting whatever it costs. The default *holds* if it is good enough by \
          the rule and not more than {:.0} % slower than what is chosen, or slower by less than repeats \
-         differ; where it does not, the last column says why it stays. Times are medians of repeats on the machine \
-         named; compare them within a table only.\n",
+         differ; where it does not, the last column says why it stays. Numbers are medians of the runs, with the least and \
+         the most of them in brackets; compare times within a table only.\n",
         100.0 * NOISE
     );
     for report in reports {
@@ -60,7 +60,7 @@ fn stage(stage: &Stage) -> String {
     }
     let input: Vec<String> = stage.input.iter().map(|(k, v)| format!("{k} {v}")).collect();
     let mut out = format!("\n### {}\n\nSeconds of {}; {}", stage.name.title(), stage.secs_of, stage.reference);
-    out += &format!(" ({}; {} repeats). ", input.join(", "), stage.seeds.len());
+    out += &format!(" ({}; {}). ", input.join(", "), stage.runs());
     if !stage.complete() {
         let measured: usize = stage.points.iter().map(|p| p.secs.each.len()).sum();
         let planned = stage.planned * stage.seeds.len();
@@ -97,8 +97,12 @@ mod tests {
     fn every_knob_has_its_row() {
         let text = markdown(&[example()]);
         let row = text.lines().find(|l| l.starts_with("| cut-off")).expect("a row");
-        assert!(row.contains("1/64: 0.004000 in 10.00 ms") && row.ends_with("| **no** |  |"), "{row}");
-        assert!(text.contains("| samples | 2 | 2.00 | yes |"));
+        assert!(
+            row.contains("1/64: 0.004000 (0.003600 to 0.004400) in 10.00 ms (9.000 ms to 11.00 ms)")
+                && row.ends_with("| **no** |  |"),
+            "{row}"
+        );
+        assert!(text.contains("; each setting 3 times). ") && text.contains("| samples | 2 | 2.00 | yes |"));
         assert!(text.contains("at most 1.0e-2 or 10 % over the least"));
     }
 }

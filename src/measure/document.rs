@@ -6,7 +6,11 @@ use std::collections::BTreeMap;
 use serde::{Deserialize, Serialize};
 
 use super::knobs::Knobs;
+use crate::math::format::things;
 use crate::math::stats::median;
+
+/// PSNR of images without any difference, dB: what stands for it is no error.
+pub(crate) const MOST_PSNR: f64 = 150.0;
 
 /// Version of the JSON document.
 pub const VERSION: u32 = 2;
@@ -96,6 +100,8 @@ impl Measure {
         match self.kind {
             ErrorKind::Error => value,
             ErrorKind::Share => 1.0 - value,
+            // That of images without any difference, which has no decibels.
+            ErrorKind::Decibels if value >= MOST_PSNR => 0.0,
             ErrorKind::Decibels => 10.0_f64.powf(-value / 20.0),
         }
     }
@@ -106,7 +112,7 @@ impl Measure {
             ErrorKind::Error if self.unit.is_empty() => self.name.clone(),
             ErrorKind::Error => format!("{} ({})", self.name, self.unit),
             ErrorKind::Share => format!("1 - {}", self.name),
-            ErrorKind::Decibels => format!("error, as {}", self.name),
+            ErrorKind::Decibels => format!("RMS error (from {})", self.name),
         }
     }
 }
@@ -296,6 +302,21 @@ impl Stage {
         self.measures.iter().find(|m| m.name == name)
     }
 
+    /// How often settings were measured: "each setting 3 times", "7 settings 2 times, 12 once".
+    pub(crate) fn runs(&self) -> String {
+        let mut settings: BTreeMap<usize, usize> = BTreeMap::new();
+        self.points.iter().for_each(|p| *settings.entry(p.secs.each.len()).or_default() += 1);
+        let times = |runs: usize| if runs == 1 { "once".to_owned() } else { format!("{runs} times") };
+        match settings.len() {
+            0 => "no setting measured".into(),
+            1 => settings.keys().map(|runs| format!("each setting {}", times(*runs))).collect(),
+            _ => {
+                let each = settings.iter().rev().map(|(runs, n)| format!("{} {}", things(*n, "setting"), times(*runs)));
+                each.collect::<Vec<_>>().join(", ")
+            }
+        }
+    }
+
     /// Whether every setting was measured at every seed.
     pub(crate) fn complete(&self) -> bool {
         self.points.len() == self.planned && self.points.iter().all(|p| p.secs.each.len() >= self.seeds.len())
@@ -330,6 +351,9 @@ pub struct Report {
     pub scene: String,
     /// The machine.
     pub computer: Computer,
+    /// How it was measured, in the order in which it was: commands. Earlier reports do not say.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub commands: Vec<String>,
     /// The stages.
     pub stages: Vec<Stage>,
 }

@@ -65,7 +65,7 @@ impl Report {
 
     pub(crate) fn empty(scene: &str, computer: &Computer) -> Self {
         let (scene, computer) = (scene.into(), computer.clone());
-        Self { version: VERSION, program: PROGRAM.into(), scene, computer, stages: Vec::new() }
+        Self { version: VERSION, program: PROGRAM.into(), scene, computer, commands: Vec::new(), stages: Vec::new() }
     }
 
     /// Reads a report: the JSON file, or the folder that it is in.

@@ -1,29 +1,80 @@
-//! Which points are worth having: the Pareto front of time and error, and the choice of a default.
+//! Points worth having: the Pareto front of time and error beyond the spread of repeats, and the choice of a default.
 
-use super::document::{Measure, Point, Rule, Stage};
+use super::document::{Measure, Point, Rule, Sample, Stage};
+use crate::math::stats::median;
 
-/// Indices of the `(seconds, error)` that no other beats in both, fastest first. Points that are no
-/// numbers are left out; of equal ones the first stays.
-pub(crate) fn pareto(points: &[(f64, f64)]) -> Vec<usize> {
-    let mut order: Vec<usize> =
-        (0..points.len()).filter(|&i| points[i].0.is_finite() && points[i].1.is_finite()).collect();
-    order.sort_by(|&a, &b| {
-        points[a].0.total_cmp(&points[b].0).then(points[a].1.total_cmp(&points[b].1)).then(a.cmp(&b))
+/// From where to where the repeats of a number go, and their middle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Span {
+    least: f64,
+    median: f64,
+    most: f64,
+    runs: usize,
+}
+
+impl Span {
+    /// Of a number that was measured; smaller is better. `None` of nothing, and of what is no number.
+    fn of(sample: &Sample, error: impl Fn(f64) -> f64) -> Option<Self> {
+        let (a, b) = (error(sample.least), error(sample.most));
+        let found = Self { least: a.min(b), median: error(sample.median), most: a.max(b), runs: sample.each.len() };
+        (found.runs > 0 && [a, b, found.median].iter().all(|v| v.is_finite())).then_some(found)
+    }
+
+    /// How far the repeats are apart, as a share; `None` of a single one.
+    fn share(&self) -> Option<f64> {
+        (self.runs > 1 && self.median > 0.0).then(|| (self.most - self.least) / self.median)
+    }
+
+    /// Whether it is worse by more than repeats differ: no run of it is better than any of the other. `usual` is by what
+    /// share runs differ elsewhere, for what ran once.
+    fn is_worse_than(&self, other: &Self, usual: f64) -> bool {
+        let usual = if self.runs.min(other.runs) > 1 { 0.0 } else { usual };
+        self.least >= other.most * (1.0 + usual) && self.most > other.least
+    }
+}
+
+/// Indices of the points that nothing is better than, the fastest first. `usual` is the share by which repeats of time
+/// and of error differ usually.
+///
+/// A point is out if one on the front is better in time or in error by more than repeats differ, and not worse in the
+/// other by as much. So neither a lucky nor an unlucky run decides.
+fn front_of(points: &[Option<[Span; 2]>], usual: [f64; 2]) -> Vec<usize> {
+    let worse = |k: usize, a: &[Span; 2], b: &[Span; 2]| a[k].is_worse_than(&b[k], usual[k]);
+    let is_beaten =
+        |a: &[Span; 2], by: &[Span; 2]| worse(0, a, by) && !worse(1, by, a) || worse(1, a, by) && !worse(0, by, a);
+    let mut left: Vec<(usize, [Span; 2])> = points.iter().enumerate().filter_map(|(i, p)| Some((i, (*p)?))).collect();
+    let mut front: Vec<(usize, [Span; 2])> = Vec::new();
+    while !left.is_empty() {
+        let best = |p: &&(usize, [Span; 2])| !left.iter().any(|q| is_beaten(&p.1, &q.1));
+        let mut found: Vec<_> = left.iter().filter(best).copied().collect();
+        if found.is_empty() {
+            found.clone_from(&left);
+        }
+        // What only such points beat that are out themselves is looked at again.
+        left.retain(|p| !found.iter().any(|q| q.0 == p.0 || is_beaten(&p.1, &q.1)));
+        front.extend(found);
+    }
+    front.sort_by(|a, b| {
+        let by = |k: usize| a.1[k].median.total_cmp(&b.1[k].median);
+        by(0).then(by(1)).then(a.0.cmp(&b.0))
     });
-    let mut least = f64::INFINITY;
-    order.retain(|&i| {
-        let better = points[i].1 < least;
-        least = least.min(points[i].1);
-        better
-    });
-    order
+    front.into_iter().map(|(i, _)| i).collect()
 }
 
 impl Stage {
-    /// Indices of the points that no other point beats in both time and error, fastest first.
+    /// Indices of the points that no other is better than by more than repeats differ, the fastest first. Times of
+    /// settings that ran once are taken for the same within [`NOISE`].
     pub(crate) fn front(&self, measure: &Measure) -> Vec<usize> {
-        let at = |p: &Point| (p.secs.median, p.error(measure).unwrap_or(f64::NAN));
-        pareto(&self.points.iter().map(at).collect::<Vec<_>>())
+        let spans = |p: &Point| {
+            let error = Span::of(p.values.get(&measure.name)?, |v| measure.error(v))?;
+            Some([Span::of(&p.secs, |s| s)?, error])
+        };
+        let spans: Vec<Option<[Span; 2]>> = self.points.iter().map(spans).collect();
+        let usual = |k: usize| {
+            let shares: Vec<f64> = spans.iter().flatten().filter_map(|s| s[k].share()).collect();
+            if shares.is_empty() { 0.0 } else { median(&shares) }
+        };
+        front_of(&spans, [usual(0).max(NOISE), usual(1)])
     }
 }
 
@@ -83,17 +134,74 @@ mod tests {
     use super::*;
     use crate::measure::tests::example;
 
+    /// A stage of points with these times and values of "RMS", a list of repeats each.
+    fn stage(points: &[(&[f64], &[f64])]) -> Stage {
+        let mut stage = example().stages.remove(0);
+        let sample = |values: &[f64]| values.iter().copied().collect::<Sample>();
+        let point = |(secs, values): &(&[f64], &[f64])| Point {
+            secs: sample(secs),
+            values: [("RMS".to_owned(), sample(values))].into(),
+            ..Point::default()
+        };
+        stage.points = points.iter().map(point).collect();
+        stage
+    }
+
+    fn front(points: &[(&[f64], &[f64])]) -> Vec<usize> {
+        let stage = stage(points);
+        stage.front(&stage.measures[0])
+    }
+
     #[test]
     fn the_front_holds_what_nothing_beats() {
+        let exact = |v: f64| [v, v];
         let points =
             [(1.0, 5.0), (2.0, 3.0), (2.5, 3.0), (3.0, 4.0), (4.0, 1.0), (f64::NAN, 0.0), (0.5, f64::INFINITY)];
-        assert_eq!(pareto(&points), [0, 1, 4]);
-        // Every other point is beaten by one on the front.
-        for p in [(2.5, 3.0), (3.0, 4.0)] {
-            assert!(pareto(&points).iter().any(|&i| points[i].0 <= p.0 && points[i].1 <= p.1));
-        }
-        assert_eq!(pareto(&[(1.0, 1.0), (1.0, 1.0)]), [0]);
-        assert!(pareto(&[]).is_empty());
+        let points = points.map(|(s, e)| (exact(s), exact(e)));
+        let all: Vec<(&[f64], &[f64])> = points.iter().map(|(s, e)| (&s[..], &e[..])).collect();
+        assert_eq!(front(&all), [0, 1, 4]);
+        // Of equal ones none is better.
+        assert_eq!(front(&[all[0], all[0]]), [0, 1]);
+        assert!(front(&[]).is_empty());
+    }
+
+    #[test]
+    fn noise_puts_nothing_on_the_front_and_takes_nothing_off() {
+        // Both the same within repeats: neither is better, whichever has the better median.
+        assert_eq!(front(&[(&[1.0, 1.2], &[0.10, 0.12]), (&[1.05, 1.3], &[0.11, 0.13])]), [0, 1]);
+        // Clearly worse, and faster by a median within noise: off.
+        assert_eq!(front(&[(&[1.0, 1.2], &[0.10, 0.12]), (&[0.99, 1.15], &[0.20, 0.22])]), [0]);
+        // The control: clearly worse and clearly faster is a choice.
+        assert_eq!(front(&[(&[1.0, 1.2], &[0.10, 0.12]), (&[0.5, 0.6], &[0.20, 0.22])]), [1, 0]);
+        // A chain: the last is beaten by the second alone, which is out itself, and is faster than the first.
+        let chain: [(&[f64], &[f64]); 3] =
+            [(&[5.0, 7.0], &[1.0, 1.0]), (&[4.0, 6.0], &[2.0, 2.0]), (&[3.0, 4.5], &[3.0, 3.0])];
+        assert_eq!(front(&chain), [2, 0]);
+    }
+
+    #[test]
+    fn what_ran_once_is_as_noisy_as_the_rest() {
+        // The same training took 11.2 and 14.7 s: a single run at 12 s is no faster than one at 13.
+        let noisy: (&[f64], &[f64]) = (&[11.2, 14.7], &[0.030, 0.031]);
+        assert_eq!(front(&[noisy, (&[13.0], &[0.020]), (&[12.0], &[0.025])]), [1]);
+        // The control: with exact repeats beside them it is 15 % that count.
+        assert_eq!(front(&[(&[13.0], &[0.020]), (&[12.0], &[0.025])]), [0]);
+        assert_eq!(front(&[(&[13.0], &[0.020]), (&[10.0], &[0.025])]), [1, 0]);
+    }
+
+    #[test]
+    fn what_is_perfect_in_every_run_is_better_than_what_is_in_some() {
+        assert_eq!(front(&[(&[2.0, 2.1], &[0.0, 0.0]), (&[1.0, 1.1], &[0.0, 0.02])]), [1, 0]);
+        // The control: one bad run of each, and only the faster is left.
+        assert_eq!(front(&[(&[2.0, 2.1], &[0.0, 0.01]), (&[1.0, 1.1], &[0.0, 0.02])]), [1]);
+    }
+
+    #[test]
+    fn of_perfect_ones_the_fastest_is_on_the_front() {
+        assert_eq!(
+            front(&[(&[2.0, 2.1], &[0.0, 0.0]), (&[1.0, 1.1], &[0.0, 0.0]), (&[0.5, 0.6], &[0.1, 0.1])]),
+            [2, 1]
+        );
     }
 
     #[test]

@@ -3,7 +3,7 @@
 
 use nv_flip::{DEFAULT_PIXELS_PER_DEGREE, FlipImageRgb8};
 
-use super::document::Order;
+use super::document::{MOST_PSNR, Order};
 use crate::math::Real;
 use crate::math::resize::{Filter, resize};
 use crate::math::stats::{mean, psnr_of, quantile, worst};
@@ -11,9 +11,6 @@ use crate::pipeline::metrics::psnr;
 use crate::render::cpu::CpuRenderer;
 use crate::render::{Features, Frame, RenderError, RenderSettings};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
-
-/// PSNR of images that are (nearly) the same, dB.
-const MOST_PSNR: f64 = 150.0;
 
 /// Red, green and blue as they are shown, 0 to 1.
 #[derive(Clone, Debug, Default, PartialEq)]

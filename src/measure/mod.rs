@@ -5,9 +5,11 @@
 //! [`subject`] opens those that a scene allows, [`sweep`] goes through their settings; [`front`] says which are worth
 //! having, [`order`] how errors fall, [`compare`] what another report has of the same. [`mod@bench`] times drawing,
 //! training and queries, [`plan`] what a scene's plan saves, [`survey`] how well flights do; [`stability`] is the
-//! catalog of extreme cases. [`table`], [`plot`] and [`page`] show all of it, [`defaults`] justifies the program's
-//! defaults.
+//! catalog of extreme cases. [`table`], [`plot`] and [`page`] show all of it, by [`look`], [`axis`], [`axes`] and
+//! [`labels`], as the window's pane does; [`defaults`] justifies the program's defaults.
 
+pub(crate) mod axes;
+pub(crate) mod axis;
 pub mod bench;
 pub(crate) mod compare;
 pub(crate) mod computer;
@@ -17,6 +19,8 @@ pub(crate) mod file;
 pub(crate) mod front;
 mod image_error;
 pub(crate) mod knobs;
+pub(crate) mod labels;
+pub(crate) mod look;
 mod order;
 pub mod page;
 pub(crate) mod plan;
@@ -25,6 +29,7 @@ pub(crate) mod stability;
 pub(crate) mod studies;
 pub(crate) mod subject;
 pub(crate) mod survey;
+mod svg;
 pub(crate) mod sweep;
 pub(crate) mod table;
 
@@ -80,6 +85,7 @@ mod tests {
             program: "0.0".into(),
             scene: "an example".into(),
             computer: Computer { processor: "one".into(), cores: 2, ..Computer::default() },
+            commands: vec!["fmlgs report example".into()],
             stages: vec![stage],
         }
     }

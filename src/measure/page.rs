@@ -1,115 +1,153 @@
-//! A report as one HTML page that needs nothing but itself: plots, fronts, tables, orders, defaults.
+//! A report as one HTML page that needs nothing but itself, on a screen or printed: what was measured, where and how,
+//! plots, tables, orders, defaults.
 
 use htmlize::escape_all_quotes;
 
-use super::document::{Report, Stage};
+use super::document::{Measure, Point, Report, Sample, Stage};
 use super::plot::{order_svg, svg};
-use super::table::{html as html_table, title};
+use super::table::{html as html_table, range, title};
 use crate::math::format::{number, seconds};
 
-/// How pages of results look.
+/// Looks of pages of results: light, for paper too.
 pub(crate) const STYLE: &str = "body{font:15px/1.5 system-ui,sans-serif;color:#1b1b1f;background:#fff;max-width:1080px;\
-margin:2em auto;padding:0 1em}h1{margin-bottom:0}h2{margin-top:2.2em;border-top:1px solid #ccc;padding-top:.6em}\
+margin:2em auto;padding:0 1em;color-scheme:light}h1{margin-bottom:0}h2{margin-top:2.2em;border-top:1px solid #ccc;padding-top:.6em}\
 table{border-collapse:collapse;font-size:13px;margin:.6em 0}th,td{padding:.25em .7em;border-bottom:1px solid #ddd;\
-text-align:right;font-variant-numeric:tabular-nums}th:first-child,td:first-child,th:nth-child(2),td:nth-child(2)\
+text-align:right;vertical-align:top;font-variant-numeric:tabular-nums}th:first-child,td:first-child,th:nth-child(2),td:nth-child(2)\
 {text-align:left}td:nth-child(n+3){white-space:nowrap}tr.front{background:#eef5e9}tr.default{font-weight:600}.no{color:#a40000;font-weight:600}\
-p.small,details{color:#555;font-size:13px}svg{max-width:100%;height:auto}.orders{display:flex;flex-wrap:wrap;gap:1em}\
-nav a{margin-right:1.2em}summary{cursor:pointer}";
+td small{display:block;color:#555;font-weight:400;font-size:11px}\
+p.small,dl,details{color:#555;font-size:13px}dt{float:left;clear:left;margin-right:.6em;font-weight:600}dd{margin:0 0 .1em 9em}\
+.wide{overflow-x:auto}code{overflow-wrap:anywhere}svg{max-width:100%;height:auto}figure{margin:1em 0}.orders{display:flex;flex-wrap:wrap;gap:1em}\
+.orders figure{max-width:430px;margin:0}figcaption{color:#555;font-size:13px}nav a{margin-right:1.2em}summary{cursor:pointer}\
+@page{size:A4 landscape;margin:12mm}@media print{body{max-width:none;margin:0;padding:0;font-size:12px}nav{display:none}.wide{overflow:visible}\
+h2,h3{break-after:avoid}h2{break-before:page}h2:first-of-type{break-before:auto}figure,tr,dl{break-inside:avoid}\
+table{font-size:9.5px}td small{font-size:8px}th,td{padding:.15em .4em}td:nth-child(n+3){white-space:normal}\
+tr.front{print-color-adjust:exact;-webkit-print-color-adjust:exact}}";
 
 /// The page.
 pub fn html(report: &Report) -> String {
     let title = format!("Error vs. run time: {}", report.scene);
     let mut out = format!(
         "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><meta name=\"viewport\" \
-         content=\"width=device-width\"><title>{0}</title><style>{STYLE}</style></head><body>\n<h1>{0}</h1>\n\
-         <p class=\"small\">FMLGS {1}. Measured on: {2}. Times are medians; compare them within a page only.</p>\n<nav>",
+         content=\"width=device-width\"><title>{0}</title><style>{STYLE}</style></head><body>\n<h1>{0}</h1>\n{1}\n<nav>",
         escape_all_quotes(&title),
-        escape_all_quotes(&report.program),
-        escape_all_quotes(report.computer.words())
+        about(report)
     );
     for stage in &report.stages {
         out += &format!("<a href=\"#{}\">{}</a>", stage.name.name(), stage.name.title());
     }
     out += "</nav>\n";
-    report.stages.iter().for_each(|s| out += &section(s));
+    report.stages.iter().for_each(|s| out += &section(report, s));
     if report.stages.is_empty() {
         out += "<p>No stage has been measured yet.</p>\n";
     }
     out + "</body></html>\n"
 }
 
-fn section(stage: &Stage) -> String {
+/// On what machine, by what command, and how to read it.
+fn about(report: &Report) -> String {
+    let commands = report.commands.iter().map(|c| format!("<code>{}</code>", escape_all_quotes(c)));
+    let commands = match report.commands.is_empty() {
+        true => "not noted".to_owned(),
+        false => commands.collect::<Vec<_>>().join("<br>"),
+    };
+    let rows = [
+        ("machine", escape_all_quotes(report.computer.words()).into_owned()),
+        ("program", format!("FMLGS {}", escape_all_quotes(&report.program))),
+        ("command", commands),
+    ];
+    let rows: String = rows.iter().map(|(name, text)| format!("<dt>{name}</dt><dd>{text}</dd>")).collect();
+    format!(
+        "<dl>{rows}</dl>\n<p class=\"small\">Each stage of the program has knobs that trade accuracy for time. One is \
+         turned at a time; the others stay at the default. Numbers are medians of the runs, with the least and the most \
+         below them, or \u{201c}one run\u{201d}. In the plots every mark is a setting, its look is the knob, bars reach \
+         from the least to the most, and zero has a band of its own, for the axes are logarithmic. On the front (*, gray \
+         rings) is what no setting beats in time or error by more than repeats differ; times of single runs within 15 % \
+         are the same. Times compare within this page only.</p>"
+    )
+}
+
+fn section(report: &Report, stage: &Stage) -> String {
     let input: Vec<String> =
         stage.input.iter().map(|(k, v)| format!("{}: {}", escape_all_quotes(k), escape_all_quotes(v))).collect();
     let mut out = format!(
-        "<h2 id=\"{}\">{}</h2>\n<p>Seconds of {}; {}.</p><p class=\"small\">{}; {} repeats.",
+        "<h2 id=\"{}\">{}</h2>\n<p>Seconds of {}; {}.</p><p class=\"small\">{}; {}.",
         stage.name.name(),
         stage.name.title(),
         escape_all_quotes(&stage.secs_of),
         escape_all_quotes(&stage.reference),
         input.join("; "),
-        stage.seeds.len()
+        stage.runs()
     );
     if !stage.complete() {
-        out +=
-            &format!(" <span class=\"no\">Stopped early: {} of {} settings.</span>", stage.points.len(), stage.planned);
+        let measured: usize = stage.points.iter().map(|p| p.secs.each.len()).sum();
+        let planned = stage.planned * stage.seeds.len();
+        out += &format!(" <span class=\"no\">Stopped early: {measured} of {planned} measurements.</span>");
     }
     out += "</p>\n";
     for text in &stage.left_out {
         out += &format!("<p class=\"no\">Left out: {}</p>\n", escape_all_quotes(text));
     }
-    for (i, measure) in stage.measures.iter().enumerate() {
-        let Ok(image) = svg(stage, measure) else { continue };
-        // The first is shown, the others on request.
-        out += &match i {
-            0 => image,
-            _ => format!(
-                "<details><summary>{}: {}</summary>{image}</details>\n",
-                escape_all_quotes(title(measure)),
-                escape_all_quotes(&measure.meaning)
-            ),
-        };
+    let mut figures = stage.measures.iter().filter_map(|m| Some(figure(m, &svg(report, stage, m)?)));
+    // One plot is what is looked at first; the tables are nearer to it than the other plots.
+    out += &figures.next().unwrap_or_default();
+    out += &(table(stage) + &choices(stage) + &orders(stage));
+    let others: String = figures.collect();
+    match others.is_empty() {
+        true => out,
+        false => format!("{out}<h3>{}: the other measures</h3>\n{others}", stage.name.title()),
     }
-    out + &table(stage) + &choices(stage) + &orders(stage)
+}
+
+fn figure(measure: &Measure, image: &str) -> String {
+    let (name, meaning) = (escape_all_quotes(title(measure)), escape_all_quotes(&measure.meaning));
+    format!("<figure>{image}<figcaption>{name}: {meaning}.</figcaption></figure>\n")
 }
 
 fn table(stage: &Stage) -> String {
-    let head: Vec<String> = stage
+    let head = ["knob", "setting", "runs", "time"].map(str::to_owned).into_iter();
+    let head = head.chain(stage.measures.iter().map(title)).chain(["front".to_owned()]);
+    let head: String = head.map(|name| format!("<th>{}</th>", escape_all_quotes(name))).collect();
+    let front = stage.measures.first().map(|m| stage.front(m)).unwrap_or_default();
+    let rows: String = stage.points.iter().enumerate().map(|(i, p)| row(stage, p, front.contains(&i))).collect();
+    let meanings = stage
         .measures
         .iter()
-        .map(|m| format!("<th title=\"{}\">{}</th>", escape_all_quotes(&m.meaning), escape_all_quotes(title(m))))
-        .collect();
-    let mut out =
-        format!("<table><thead><tr><th>knob</th><th>setting</th><th>time</th>{}</tr></thead><tbody>\n", head.concat());
-    let front = stage.measures.first().map(|m| stage.front(m)).unwrap_or_default();
-    for (i, p) in stage.points.iter().enumerate() {
-        let class = match (front.contains(&i), p.default) {
-            (true, true) => "front default",
-            (true, false) => "front",
-            (false, true) => "default",
-            (false, false) => "",
-        };
-        let knobs = serde_json::to_string(&p.knobs).unwrap_or_default();
-        let spread = format!("{} to {}", seconds(p.secs.least), seconds(p.secs.most));
-        out += &format!(
-            "<tr class=\"{class}\"><td>{}</td><td title=\"{}\">{}</td><td title=\"{spread}\">{}</td>",
-            escape_all_quotes(&p.method),
-            escape_all_quotes(&knobs),
-            escape_all_quotes(&p.setting),
-            seconds(p.secs.median)
-        );
-        for m in &stage.measures {
-            out += &match p.values.get(&m.name) {
-                Some(v) => {
-                    format!("<td title=\"{} to {}\">{}</td>", number(v.least), number(v.most), number(v.median))
-                }
-                None => "<td></td>".into(),
-            };
+        .map(|m| format!("<dt>{}</dt><dd>{}</dd>", escape_all_quotes(title(m)), escape_all_quotes(&m.meaning)));
+    format!(
+        "<div class=\"wide\"><table><thead><tr>{head}</tr></thead><tbody>\n{rows}</tbody></table></div>\n<p class=\"small\">*, green: on the front \
+         of the first measure. Bold: the defaults. Below a setting: its fields of the settings.</p>\n<dl>{}</dl>\n",
+        meanings.collect::<String>()
+    )
+}
+
+fn row(stage: &Stage, p: &Point, is_on_front: bool) -> String {
+    let class = match (is_on_front, p.default) {
+        (true, true) => "front default",
+        (true, false) => "front",
+        (false, true) => "default",
+        (false, false) => "",
+    };
+    let knobs = match p.knobs.is_empty() {
+        true => String::new(),
+        false => {
+            let knobs = p.knobs.iter().map(|(name, value)| format!("{name} {value}")).collect::<Vec<_>>().join(", ");
+            format!("<small>{}</small>", escape_all_quotes(knobs))
         }
-        out += "</tr>\n";
-    }
-    out + "</tbody></table>\n<p class=\"small\">Green: on the Pareto front of the first measure. Bold: the defaults. \
-           Hover for the spread of repeats and the exact settings.</p>\n"
+    };
+    let cell = |sample: &Sample, show: fn(f64) -> String| match sample.each.is_empty() {
+        true => "<td></td>".to_owned(),
+        false => format!("<td>{}<small>{}</small></td>", show(sample.median), range(sample, show)),
+    };
+    let values = stage.measures.iter().map(|m| p.values.get(&m.name).map_or("<td></td>".into(), |v| cell(v, number)));
+    format!(
+        "<tr class=\"{class}\"><td>{}</td><td>{}{knobs}</td><td>{}</td>{}{}<td>{}</td></tr>\n",
+        escape_all_quotes(&p.method),
+        escape_all_quotes(&p.setting),
+        p.secs.each.len(),
+        cell(&p.secs, seconds),
+        values.collect::<String>(),
+        if is_on_front { "*" } else { "" }
+    )
 }
 
 fn choices(stage: &Stage) -> String {
@@ -129,7 +167,7 @@ fn orders(stage: &Stage) -> String {
     for o in &stage.orders {
         let (class, word) = if o.agrees { ("", "agrees") } else { ("no", "does not agree") };
         out += &format!(
-            "<figure>{}<figcaption>{}: order {:.2} seen, {} expected: <span class=\"{class}\">{word}</span>. {}</figcaption></figure>\n",
+            "<figure>{}<figcaption>{}: order {:.2} seen, {} expected (wide line): <span class=\"{class}\">{word}</span>. {}</figcaption></figure>\n",
             order_svg(o).unwrap_or_default(),
             escape_all_quotes(&o.what),
             o.observed,
@@ -153,6 +191,30 @@ mod tests {
         // Nothing is loaded from elsewhere; the names of XML namespaces are no addresses.
         let addresses = page.replace("http://www.w3.org/2000/svg", "");
         assert!(!addresses.contains("http") && !page.contains("<script"), "it loads something");
+    }
+
+    #[test]
+    fn printed_it_reads_by_itself() {
+        let page = html(&example());
+        for said in
+            ["one, 2 cores", "<code>fmlgs report example</code>", "each setting 3 times", "Seconds of one frame"]
+        {
+            assert!(page.contains(said), "{said}");
+        }
+        // Both measures are drawn, and what they mean is said, without a pointer over anything.
+        assert_eq!(page.matches("<figure><svg").count(), 2 + 1);
+        assert!(!page.contains("<details") && !page.contains(" title=\""));
+        assert!(
+            page.contains("<dd>root mean square</dd>") && page.contains("0.004000<small>0.003600 to 0.004400</small>")
+        );
+        let mut single = example();
+        single.stages[0].points[1].secs = [11.2].into_iter().collect();
+        assert!(html(&single).contains("11.20 s<small>one run</small>"));
+        assert!(html(&single).contains("3 settings 3 times, 1 setting once"));
+        // What was made before commands were noted is read and says so.
+        let text = serde_json::to_string(&Report { commands: Vec::new(), ..example() }).expect("JSON");
+        assert!(!text.contains("commands"));
+        assert!(html(&serde_json::from_str(&text).expect("read")).contains("not noted"));
     }
 
     #[test]

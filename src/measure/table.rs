@@ -34,10 +34,17 @@ pub(crate) fn html(rows: &Rows) -> String {
 
 /// The middle, and how far the repeats are apart.
 pub(crate) fn spread(sample: &Sample, show: impl Fn(f64) -> String) -> String {
+    let range = range(sample, &show);
+    if range.is_empty() { range } else { format!("{} ({range})", show(sample.median)) }
+}
+
+/// How far the repeats are apart: "0.03530 to 0.03640", "one run", "3 runs alike".
+pub(crate) fn range(sample: &Sample, show: impl Fn(f64) -> String) -> String {
     match sample.each.len() {
         0 => String::new(),
-        1 => show(sample.median),
-        _ => format!("{} ({} to {})", show(sample.median), show(sample.least), show(sample.most)),
+        1 => "one run".into(),
+        n if show(sample.least) == show(sample.most) => format!("{n} runs alike"),
+        _ => format!("{} to {}", show(sample.least), show(sample.most)),
     }
 }
 
@@ -50,13 +57,14 @@ impl Stage {
     pub(crate) fn table(&self) -> Rows {
         let titles: Vec<String> = self.measures.iter().map(title).collect();
         let titles = titles.iter().map(String::as_str);
-        let head: Vec<&str> = ["knob", "setting", "time"].into_iter().chain(titles).chain(["front"]).collect();
+        let head: Vec<&str> = ["knob", "setting", "runs", "time"].into_iter().chain(titles).chain(["front"]).collect();
         let front = self.measures.first().map(|m| self.front(m)).unwrap_or_default();
         rows(
             &head,
             self.points.iter().enumerate().map(|(i, p)| {
                 let of = |m: &Measure| p.values.get(&m.name).map_or_else(String::new, |s| spread(s, number));
-                let fixed = [p.method.clone(), p.setting.clone(), spread(&p.secs, seconds)];
+                let runs = p.secs.each.len().to_string();
+                let fixed = [p.method.clone(), p.setting.clone(), runs, spread(&p.secs, seconds)];
                 let mark = if front.contains(&i) { "*" } else { "" };
                 fixed.into_iter().chain(self.measures.iter().map(of)).chain([mark.to_owned()]).collect()
             }),
@@ -66,8 +74,8 @@ impl Stage {
     /// What the rule says of each knob's default.
     pub(crate) fn choice_table(&self) -> Rows {
         let with = |p: &Point| {
-            let value = p.values.get(&self.rule.measure).map_or_else(String::new, |v| number(v.median));
-            format!("{}: {value} in {}", p.setting, seconds(p.secs.median))
+            let value = p.values.get(&self.rule.measure).map_or_else(String::new, |v| spread(v, number));
+            format!("{}: {value} in {}", p.setting, spread(&p.secs, seconds))
         };
         let or_default = |p: &Point| if p.default { "the default".to_owned() } else { with(p) };
         rows(
@@ -118,15 +126,39 @@ impl Report {
 
 #[cfg(test)]
 mod tests {
+    use super::*;
     use crate::measure::tests::example;
+
+    #[test]
+    fn every_number_says_how_far_its_repeats_are_apart() {
+        let of = |values: &[f64]| spread(&values.iter().copied().collect(), seconds);
+        assert_eq!(of(&[14.7, 11.2]), "12.95 s (11.20 s to 14.70 s)");
+        assert_eq!(of(&[11.2]), "11.20 s (one run)");
+        assert_eq!(of(&[0.5, 0.5, 0.5]), "500.0 ms (3 runs alike)");
+        assert_eq!(of(&[]), "");
+    }
+
+    #[test]
+    fn settings_that_ran_less_often_are_told() {
+        let mut stage = example().stages.remove(0);
+        assert_eq!(stage.runs(), "each setting 3 times");
+        for p in &mut stage.points[2..] {
+            p.secs = [0.1].into_iter().collect();
+        }
+        assert_eq!(stage.runs(), "2 settings 3 times, 2 settings once");
+        assert_eq!(stage.table()[4][2..4], ["1".to_owned(), "100.0 ms (one run)".to_owned()]);
+        stage.points.clear();
+        assert_eq!(stage.runs(), "no setting measured");
+    }
 
     #[test]
     fn tables_hold_every_measure_of_every_point() {
         let report = example();
         let rows = report.stages[0].table();
-        assert_eq!(rows[0], ["knob", "setting", "time", "RMS", "IoU", "front"]);
-        assert_eq!(rows[1][2], "20.00 ms (18.00 ms to 22.00 ms)");
-        assert_eq!(rows.iter().map(|r| r[5].as_str()).collect::<Vec<_>>(), ["front", "*", "*", "*", "*"]);
+        assert_eq!(rows[0], ["knob", "setting", "runs", "time", "RMS", "IoU", "front"]);
+        assert_eq!((rows[1][2].as_str(), rows[1][3].as_str()), ("3", "20.00 ms (18.00 ms to 22.00 ms)"));
+        // The last is slower than the default, and better by less than repeats differ.
+        assert_eq!(rows.iter().map(|r| r[6].as_str()).collect::<Vec<_>>(), ["front", "*", "*", "*", ""]);
         let csv = report.csv();
         assert_eq!(csv.lines().count(), 1 + 2 * 4);
         assert!(csv.contains("\"1/255 <&> \"\"quoted\"\"\",true,\"{}\",\"RMS\",\"\",3,0.02,"));

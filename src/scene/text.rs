@@ -79,6 +79,15 @@ pub(crate) fn elided(text: &str, most: usize) -> String {
     text.chars().take(head).chain(['\u{2026}']).chain(text.chars().skip(n - tail)).collect()
 }
 
+/// A word as a shell takes it: quoted where it would mean more than itself.
+pub(crate) fn shell_word(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+=:,@%".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
 pub(crate) fn path(path: &std::path::Path) -> String {
     line(&path.to_string_lossy()).into_owned()
 }
@@ -175,6 +184,7 @@ mod tests {
         );
         assert_eq!(name("  kettle \n"), "kettle");
         assert_eq!(elided("short", 10), "short");
+        assert_eq!(["/a/b-1.ply", "", "/my scene/it's"].map(shell_word), ["/a/b-1.ply", "''", r"'/my scene/it'\''s'"]);
         assert_eq!(elided("a/very/long/path/to/a/file.ply", 12), "a/ver\u{2026}le.ply");
     }
 }

@@ -42,7 +42,8 @@ impl App {
             options: StudyOptions::default(),
         };
         let (stages, out) = (vec![StageName::Render], scene.report_out.clone());
-        let request = ReportRequest { subject, stages, out, fresh: false, budget_secs: f64::INFINITY };
+        let command = "'Benchmark rendering' in the window".into();
+        let request = ReportRequest { subject, stages, out, fresh: false, budget_secs: f64::INFINITY, command };
         self.layout.show(Pane::Report);
         self.submit(Command::Measure(Box::new(request)));
     }

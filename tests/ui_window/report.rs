@@ -45,6 +45,7 @@ pub(crate) fn write_report(folder: &Path, times: f64, cores: usize) {
         program: "test".into(),
         scene: "dots".into(),
         computer: measure::Computer { cores, ..Default::default() },
+        commands: vec!["fmlgs report dots".into()],
         stages: vec![stage(StageName::Render, drawing), stage(StageName::Train, training)],
     };
     std::fs::create_dir_all(folder).expect("folder");

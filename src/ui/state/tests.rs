@@ -141,7 +141,14 @@ fn reports_are_shown_and_compared_and_a_canceled_measurement_is_read() {
     use crate::measure::{Computer, Report, VERSION};
     let read = |scene: &str, second| {
         let computer = Computer::default();
-        let report = Report { version: VERSION, program: String::new(), scene: scene.into(), computer, stages: vec![] };
+        let report = Report {
+            version: VERSION,
+            program: String::new(),
+            scene: scene.into(),
+            computer,
+            commands: vec![],
+            stages: vec![],
+        };
         Event::Finished(JOB, Outcome::Report { path: scene.into(), report: Arc::new(report), second })
     };
     let mut s = fold([started(JobKind::Report), read("a", false), started(JobKind::Report), read("b", true)]);

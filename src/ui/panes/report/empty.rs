@@ -70,17 +70,8 @@ fn command(state: &AppState) -> String {
     let trained = state.scene.as_ref().filter(|_| state.is_trained());
     // A scene that was trained here lies in its own folder; a splat is its own.
     let scene = trained.map(|s| if s.out.as_os_str().is_empty() { &s.path } else { &s.out });
-    let scene = scene.map_or_else(|| "SCENE".to_owned(), |path| quoted(&path.display().to_string()));
+    let scene = scene.map_or_else(|| "SCENE".to_owned(), |path| text::shell_word(&path.display().to_string()));
     format!("fmlgs report {scene} --out report")
-}
-
-/// A word of a shell.
-fn quoted(word: &str) -> String {
-    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:,".contains(c);
-    match word.chars().all(plain) {
-        true => word.to_owned(),
-        false => format!("'{}'", word.replace('\'', "'\\''")),
-    }
 }
 
 #[cfg(test)]
@@ -90,7 +81,5 @@ mod tests {
     #[test]
     fn the_command_can_be_pasted() {
         assert_eq!(command(&AppState::default()), "fmlgs report SCENE --out report");
-        assert_eq!(quoted("/a/b-1.ply"), "/a/b-1.ply");
-        assert_eq!(quoted("/my scene/it's"), "'/my scene/it'\\''s'");
     }
 }

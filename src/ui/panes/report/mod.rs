@@ -3,7 +3,7 @@
 
 pub(crate) mod apply;
 mod empty;
-mod scale;
+mod grid;
 mod scatter;
 mod tables;
 
@@ -209,11 +209,11 @@ fn section<R>(ui: &mut Ui, title: &str, open: bool, add: impl FnOnce(&mut Ui) ->
 fn warnings(ui: &mut Ui, stage: &Stage, report: &Report, second: Option<&Report>) {
     let warn = |ui: &mut Ui, text: String| ui.label(RichText::new(text).small().color(theme::warning()));
     if !stage.complete() {
-        let done = stage.points.iter().filter(|p| p.secs.each.len() >= stage.seeds.len()).count();
         let text = format!(
-            "Incomplete: {done} of {} settings measured {} times. Run the same command to continue.",
+            "Incomplete: {} planned settings, {} runs each; so far {}. Run the same command to continue.",
             stage.planned,
-            stage.seeds.len()
+            stage.seeds.len(),
+            stage.runs()
         );
         warn(ui, text);
     }
@@ -297,7 +297,8 @@ mod tests {
             left_out: Vec::new(),
         };
         let computer = Computer::default();
-        Report { version: VERSION, program: String::new(), scene: String::new(), computer, stages: vec![stage] }
+        let stages = vec![stage];
+        Report { version: VERSION, program: String::new(), scene: String::new(), computer, commands: vec![], stages }
     }
 
     #[test]

@@ -1,18 +1,21 @@
-//! Error over seconds, both logarithmic: one color per knob, the Pareto front, the repeats' spread.
+//! Error over seconds as the report's own plots have it: one look per knob, every point with its setting, the front,
+//! the repeats' spread, zero in a band of its own.
 
-use egui::{Color32, Response, Stroke, Ui, Vec2b};
-use egui_plot::{Corner, Legend, Line, MarkerShape, Plot, PlotPoint, PlotPoints, PlotTransform, Points};
+use egui::{Color32, FontId, Response, Stroke, Ui, Vec2b};
+use egui_plot::{Corner, HLine, Legend, Line, MarkerShape, Plot, PlotPoint, PlotPoints, PlotTransform, Points, VLine};
 
 use super::super::super::theme;
-use super::scale;
+use super::grid;
 use crate::math::format;
-use crate::measure::plot::{COLORS, LEAST};
+use crate::measure::axes::Axes;
+use crate::measure::labels::{self, Place};
+use crate::measure::look::{Shape, look};
 use crate::measure::{Measure, Point, Stage, table};
 
 /// How near the pointer must be to a point, in window points.
 const NEAR: f32 = 14.0;
-/// Shapes of knobs, in turn with each round of colors.
-const SHAPES: [MarkerShape; 3] = [MarkerShape::Circle, MarkerShape::Diamond, MarkerShape::Square];
+/// How far a label is from its point before a line leads to it, in window points.
+const AWAY: f32 = 12.0;
 
 pub(crate) struct Scatter<'a> {
     pub(crate) stage: &'a Stage,
@@ -29,10 +32,17 @@ impl<'a> Scatter<'a> {
     pub(crate) fn show(&self, ui: &mut Ui, height: f32) -> Option<&'a Point> {
         let (stage, measure) = (self.stage, self.measure);
         let name = (stage.name.name(), measure.name.clone(), self.second.is_some());
-        let places = self.places();
+        let stages: Vec<&Stage> = std::iter::once(stage).chain(self.second).collect();
+        let Some(axes) = Axes::of(&stages, measure) else {
+            ui.weak("This metric was not measured.");
+            return None;
+        };
+        let axes = &axes;
+        let places = self.places(axes);
         let corner = free_corner(&places);
         let plot = Plot::new(name)
             .include_x(beside_legend(&places, corner, self.legend_width() / ui.available_width()))
+            .include_y(axes.error.bounds().0)
             .height(height)
             .show_background(false)
             .show_grid(Vec2b::TRUE)
@@ -41,17 +51,25 @@ impl<'a> Scatter<'a> {
             .show_crosshair(false)
             .set_margin_fraction(egui::vec2(0.06, 0.1))
             .x_axis_label(format!("seconds of {}", stage.secs_of))
-            .y_axis_label(measure.error_name())
+            .y_axis_label(format!("{}: less is better", measure.error_name()))
             .y_axis_min_width(46.0)
-            .x_grid_spacer(|input| scale::marks(input.bounds))
-            .y_grid_spacer(|input| scale::marks(input.bounds))
-            .x_axis_formatter(|mark, range| scale::label(mark, range, format::tick_secs))
-            .y_axis_formatter(|mark, range| scale::label(mark, range, format::tick))
+            .x_grid_spacer(|input| grid::marks(&axes.secs, &input))
+            .y_grid_spacer(|input| grid::marks(&axes.error, &input))
+            .x_axis_formatter(|mark, _| grid::label(&axes.secs, mark, format::tick_secs))
+            .y_axis_formatter(|mark, _| grid::label(&axes.error, mark, format::tick))
             .label_formatter(|_| None)
             .legend(Legend::default().position(corner).text_style(egui::TextStyle::Small).background_alpha(0.6));
-        let shown = plot.show(ui, |p| self.items().into_iter().for_each(|item| item.add_to(p)));
+        let shown = plot.show(ui, |p| {
+            // Beyond these lines is zero, which has no logarithm.
+            let style = Stroke::new(1.0, theme::weak());
+            let lines = [axes.secs.band_end(), axes.error.band_end()];
+            lines[0].into_iter().for_each(|at| p.vline(VLine::new("", at).stroke(style).allow_hover(false)));
+            lines[1].into_iter().for_each(|at| p.hline(HLine::new("", at).stroke(style).allow_hover(false)));
+            self.items(axes).into_iter().for_each(|item| item.add_to(p));
+        });
+        self.name_points(ui, axes, &shown.transform);
         shown.response.clone().accessible_name(format!("Plot of {} against run time", measure.error_name()));
-        let nearest = self.nearest(&shown.response, &shown.transform);
+        let nearest = self.nearest(axes, &shown.response, &shown.transform);
         if let Some(point) = nearest {
             let stage = if self.second.is_some_and(|s| s.points.iter().any(|p| std::ptr::eq(p, point))) {
                 "in the second report"
@@ -64,9 +82,35 @@ impl<'a> Scatter<'a> {
     }
 
     /// Where the points are.
-    fn places(&self) -> Vec<[f64; 2]> {
+    fn places(&self, axes: &Axes) -> Vec<[f64; 2]> {
         let both = self.stage.points.iter().chain(self.second.into_iter().flat_map(|s| &s.points));
-        both.filter_map(|p| scale::place(p, self.measure)).collect()
+        both.filter_map(|p| axes.place(p, self.measure)).collect()
+    }
+
+    /// The setting beside every point that is in view, with a thin line to it where it had to go away.
+    fn name_points(&self, ui: &Ui, axes: &Axes, transform: &PlotTransform) {
+        let (frame, methods) = (*transform.frame(), self.stage.methods());
+        let painter = ui.painter_at(frame);
+        let named = |p: &Point| {
+            let [x, y] = axes.place(p, self.measure)?;
+            let at = transform.position_from_point(&PlotPoint::new(x, y));
+            let color = color(methods.iter().position(|m| *m == p.method).unwrap_or(0));
+            let text = painter.layout_no_wrap(p.label(), FontId::proportional(10.5), color);
+            frame.contains(at).then_some((at, text, color))
+        };
+        let named: Vec<_> = self.stage.points.iter().filter_map(named).collect();
+        let points: Vec<[f32; 2]> = named.iter().map(|n| [n.0.x, n.0.y]).collect();
+        let sizes: Vec<[f32; 2]> = named.iter().map(|n| [n.1.size().x, n.1.size().y]).collect();
+        let frame = Place { min: [frame.min.x, frame.min.y], size: [frame.width(), frame.height()] };
+        for ((at, text, color), place) in named.into_iter().zip(labels::place(&points, &sizes, frame)) {
+            let near: egui::Pos2 = place.nearest([at.x, at.y]).into();
+            if near.distance(at) > AWAY {
+                painter.line_segment([at, near], Stroke::new(0.6, color.gamma_multiply(0.7)));
+            }
+            let ground = egui::Rect::from_min_size(place.min.into(), text.size());
+            painter.rect_filled(ground, 2.0, theme::surface().gamma_multiply(0.7));
+            painter.galley(ground.min, text, color);
+        }
     }
 
     /// About how wide the legend is, points of the screen.
@@ -76,11 +120,11 @@ impl<'a> Scatter<'a> {
     }
 
     /// The point under the pointer.
-    fn nearest(&self, response: &Response, transform: &PlotTransform) -> Option<&'a Point> {
+    fn nearest(&self, axes: &Axes, response: &Response, transform: &PlotTransform) -> Option<&'a Point> {
         let pointer = response.hover_pos()?;
         let all = self.stage.points.iter().chain(self.second.into_iter().flat_map(|s| &s.points));
         let far = |p: &'a Point| {
-            let [x, y] = scale::place(p, self.measure)?;
+            let [x, y] = axes.place(p, self.measure)?;
             Some((p, transform.position_from_point(&PlotPoint::new(x, y)).distance(pointer)))
         };
         let near = all.filter_map(far).filter(|(_, d)| *d <= NEAR);
@@ -88,63 +132,55 @@ impl<'a> Scatter<'a> {
     }
 
     /// Everything in the plot, from back to front.
-    fn items(&self) -> Vec<Item> {
-        let mut items = vec![self.front()];
+    fn items(&self, axes: &Axes) -> Vec<Item> {
+        let mut items = vec![self.front(axes)];
         let methods = self.stage.methods();
         for (k, method) in methods.iter().enumerate() {
-            self.series(method, k, &mut items);
+            self.series(axes, method, k, &mut items);
         }
         for p in self.second.into_iter().flat_map(|s| &s.points) {
             // Knobs that only the second has are gray.
             let k = methods.iter().position(|m| *m == p.method);
             let color = k.map_or(theme::weak(), color);
             let shape = k.map_or(MarkerShape::Circle, shape);
-            if let Some(at) = scale::place(p, self.measure) {
+            if let Some(at) = axes.place(p, self.measure) {
                 let hollow = Points::new("second report", vec![at]).shape(shape).filled(false);
                 items.push(Item::Points(hollow.radius(5.5).color(color)));
             }
         }
-        if let Some(at) = self.selected.and_then(|p| scale::place(p, self.measure)) {
+        if let Some(at) = self.selected.and_then(|p| axes.place(p, self.measure)) {
             let ring = Points::new("", vec![at]).radius(10.0).filled(false).color(theme::text());
             items.push(Item::Points(ring));
         }
         items
     }
 
-    fn front(&self) -> Item {
+    /// Rings around what nothing is better than by more than repeats differ.
+    fn front(&self, axes: &Axes) -> Item {
         let points = self.stage.front(self.measure).into_iter();
-        let places: Vec<[f64; 2]> = points.filter_map(|i| scale::place(&self.stage.points[i], self.measure)).collect();
-        let style = Stroke::new(8.0, theme::text().gamma_multiply(0.16));
-        Item::Line(Line::new("Pareto front", PlotPoints::from(places)).stroke(style).allow_hover(false))
+        let places: Vec<[f64; 2]> = points.filter_map(|i| axes.place(&self.stage.points[i], self.measure)).collect();
+        let rings = Points::new("on the front", PlotPoints::from(places)).radius(9.5);
+        Item::Points(rings.color(theme::text().gamma_multiply(0.28)).allow_hover(false))
     }
 
-    fn series(&self, method: &str, k: usize, items: &mut Vec<Item>) {
+    fn series(&self, axes: &Axes, method: &str, k: usize, items: &mut Vec<Item>) {
         let color = color(k);
         let points: Vec<&Point> = self.stage.points.iter().filter(|p| p.method == method).collect();
         // What has the series' name has its color, too: the legend shows one.
         let line = |name: &str, places: Vec<[f64; 2]>, style: Stroke| {
             Item::Line(Line::new(name, PlotPoints::from(places)).stroke(style).allow_hover(false))
         };
-        // What happened on the way was measured of the first measure only.
-        if self.stage.measures.first() == Some(self.measure) {
-            let curves = points.iter().filter(|p| p.curve.len() > 1);
-            let faint = Stroke::new(1.0, color.gamma_multiply(0.4));
-            items.extend(curves.map(|p| line("", self.way(&p.curve), faint)));
-        }
-        let mut places: Vec<[f64; 2]> = points.iter().filter_map(|p| scale::place(p, self.measure)).collect();
-        places.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        let ways = points.iter().map(|p| axes.way(self.stage, p, self.measure)).filter(|way| way.len() > 1);
+        let faint = Stroke::new(1.0, color.gamma_multiply(0.4));
+        items.extend(ways.map(|way| line("", way, faint)));
+        // In the order of the settings: times in the order of their noise would zigzag.
+        let places: Vec<[f64; 2]> = points.iter().filter_map(|p| axes.place(p, self.measure)).collect();
         items.push(line(method, places.clone(), Stroke::new(0.8, color)));
-        let whiskers = points.iter().filter_map(|p| scale::whiskers(p, self.measure)).flatten();
-        items.extend(whiskers.filter(|w| w[0] != w[1]).map(|w| line(method, w.to_vec(), Stroke::new(1.6, color))));
+        let whiskers = points.iter().flat_map(|p| axes.whiskers(p, self.measure));
+        items.extend(whiskers.map(|w| line(method, w.to_vec(), Stroke::new(1.6, color))));
         let radius = if points.iter().any(|p| p.default) { 6.5 } else { 4.0 };
         let marks = Points::new(method, PlotPoints::from(places)).shape(shape(k)).radius(radius);
         items.push(Item::Points(marks.color(color)));
-    }
-
-    /// A training's way as logarithms.
-    fn way(&self, curve: &[[f64; 2]]) -> Vec<[f64; 2]> {
-        let at = |c: &[f64; 2]| [c[0].max(1e-9).log10(), self.measure.error(c[1]).max(LEAST).log10()];
-        curve.iter().map(at).filter(|p| p.iter().all(|v| v.is_finite())).collect()
     }
 }
 
@@ -193,16 +229,22 @@ impl Item {
     }
 }
 
-/// Color of the setting with this number: those of the report's own plots, lighter on dark ground; once all are used,
-/// paler still.
+/// Color of the knob with this number: that of the report's own plots, lighter on dark ground.
 pub(crate) fn color(k: usize) -> Color32 {
-    let paler = if k / COLORS.len() % 2 == 0 { 4 } else { 2 };
-    let [r, g, b] = COLORS[k % COLORS.len()].map(|v| v + (255 - v) / paler);
+    let [r, g, b] = look(k).color.map(|v| v + (255 - v) / 4);
     Color32::from_rgb(r, g, b)
 }
 
 fn shape(k: usize) -> MarkerShape {
-    SHAPES[k / COLORS.len() % SHAPES.len()]
+    match look(k).shape {
+        Shape::Circle => MarkerShape::Circle,
+        Shape::Square => MarkerShape::Square,
+        Shape::Diamond => MarkerShape::Diamond,
+        Shape::Up => MarkerShape::Up,
+        Shape::Down => MarkerShape::Down,
+        Shape::Left => MarkerShape::Left,
+        Shape::Right => MarkerShape::Right,
+    }
 }
 
 /// All that was measured of a point.
@@ -260,8 +302,8 @@ mod tests {
 
     #[test]
     fn series_differ_in_color_or_shape() {
-        let looks: Vec<_> = (0..14).map(|k| (color(k), shape(k))).collect();
-        assert!((0..14).all(|i| (0..i).all(|j| looks[i] != looks[j])));
-        assert!((0..14).all(|i| (0..i).all(|j| color(i) != color(j))), "twice as many colors as the palette has");
+        let looks: Vec<_> = (0..70).map(|k| (color(k), shape(k))).collect();
+        assert!((0..70).all(|i| (0..i).all(|j| looks[i] != looks[j])));
+        assert!((0..10).all(|i| (0..i).all(|j| color(i) != color(j))));
     }
 }

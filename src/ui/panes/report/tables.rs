@@ -31,7 +31,7 @@ pub(crate) fn points<'a>(
             if row.on_hover_text(title(p)).clicked() {
                 clicked = Some(p);
             }
-            ui.label(format::seconds(p.secs.median));
+            ui.label(table::spread(&p.secs, format::seconds));
             ui.label(value(p, measure));
             ui.label(if front.contains(&i) { "\u{2022}" } else { "" });
             ui.end_row();
@@ -45,7 +45,7 @@ pub(crate) fn title(p: &Point) -> String {
 }
 
 fn value(p: &Point, measure: &Measure) -> String {
-    p.values.get(&measure.name).map_or_else(|| "\u{2013}".into(), |s| format::number(s.median))
+    p.values.get(&measure.name).map_or_else(|| "\u{2013}".into(), |s| table::spread(s, format::number))
 }
 
 /// What each knob's rule says of its default.
@@ -133,7 +133,8 @@ pub(crate) fn about(ui: &mut Ui, report: &Report, stage: &Stage) {
         row("program", &report.program);
         row("reference", &stage.reference);
         stage.input.iter().filter(|(name, _)| *name != "scene").for_each(|(name, value)| row(name, value));
-        row("repeats", &stage.seeds.len().to_string());
+        row("runs", &stage.runs());
+        report.commands.iter().for_each(|command| row("command", command));
     });
 }
 
