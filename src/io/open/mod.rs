@@ -7,7 +7,7 @@ use super::trained::{self, TrainedScene};
 use super::{
     IoError, OpenError, colmap, files, khr_gltf, ksplat, llff, sog, splat, splat_ply, spz, transforms, unposed,
 };
-use crate::scene::{Dataset, GaussianCloud};
+use crate::scene::{Axes, Dataset, GaussianCloud};
 
 /// What a path turned out to be.
 // One value exists per opening; a box would only be in the reader's way.
@@ -73,16 +73,37 @@ const MAGIC_BYTES: u64 = 4;
 
 /// Opens a dataset's folder or its `transforms.json`, a splat file, or a trained scene.
 pub fn open(path: &Path) -> Result<Opened> {
+    open_in(path, None)
+}
+
+/// The same with the axes of a splat's numbers, where they are not those that its file says or its format has.
+///
+/// # Errors
+/// As [`open`], and if axes are given for something else than a splat.
+pub fn open_in(path: &Path, axes: Option<Axes>) -> Result<Opened> {
+    match (open_any(path, axes)?, axes) {
+        (opened @ Opened::Cloud(_), _) | (opened, None) => Ok(opened),
+        (_, Some(_)) => {
+            let (path, what) = (path.into(), "axes for what is no splat file".into());
+            Err(IoError::Unsupported { path, what, remedy: "photos and trained scenes say how they lie" }.into())
+        }
+    }
+}
+
+fn open_any(path: &Path, axes: Option<Axes>) -> Result<Opened> {
     let meta = fs::metadata(path).map_err(|cause| match cause.kind() {
         std::io::ErrorKind::NotFound => OpenError::NotFound { path: path.into() },
         _ => IoError::Read { path: path.into(), cause }.into(),
     })?;
-    if meta.is_dir() { open_folder(path) } else { open_file(path) }
+    if meta.is_dir() { open_folder(path, axes) } else { open_file(path, axes) }
 }
 
-fn open_folder(path: &Path) -> Result<Opened> {
+fn open_folder(path: &Path, axes: Option<Axes>) -> Result<Opened> {
     if let Some(layout) = FOLDERS.iter().find(|l| (l.is)(path)) {
-        return Ok((layout.open)(path)?);
+        return Ok(match (layout.open)(path)? {
+            Opened::Cloud(cloud) => Opened::Cloud(turned(cloud, axes)),
+            other => other,
+        });
     }
     if let Some(photos) = unposed::find(path) {
         return Err(OpenError::NoPoses(Box::new(photos)));
@@ -94,7 +115,15 @@ fn open_folder(path: &Path) -> Result<Opened> {
     })
 }
 
-fn open_file(path: &Path) -> Result<Opened> {
+/// A cloud of a format that has the axes of the scene.
+fn turned(cloud: GaussianCloud, axes: Option<Axes>) -> GaussianCloud {
+    match axes {
+        Some(axes) => GaussianCloud { up: None, ..cloud }.turned(&axes.scene_from_file(), true),
+        None => cloud,
+    }
+}
+
+fn open_file(path: &Path, axes: Option<Axes>) -> Result<Opened> {
     let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().to_lowercase());
     let folder = match path.parent() {
         Some(p) if !p.as_os_str().is_empty() => p,
@@ -107,27 +136,30 @@ fn open_file(path: &Path) -> Result<Opened> {
         {
             return Ok(Opened::Dataset(transforms::read_blender(folder)?));
         }
-        sog::META_FILE => return Ok(Opened::Cloud(sog::read_folder(path)?)),
+        sog::META_FILE => return Ok(Opened::Cloud(turned(sog::read_folder(path)?, axes))),
         llff::POSES_FILE => return Ok(Opened::Dataset(llff::read(folder)?)),
         n if n.starts_with("transforms") && n.ends_with(".json") => {
             return Ok(Opened::Dataset(transforms::read(path)?));
         }
         _ => {}
     }
-    match files::read_start(path, MAGIC_BYTES)?.as_slice() {
-        [b'p', b'l', b'y', b'\n' | b'\r'] => Ok(Opened::Cloud(splat_ply::read(path)?)),
-        start if khr_gltf::is_gltf(start, &name) => Ok(Opened::Cloud(khr_gltf::read(path)?)),
-        b"PK\x03\x04" => Ok(Opened::Cloud(sog::read_archive(path)?)),
-        start if spz::is_spz(start) => Ok(Opened::Cloud(spz::read(path)?)),
+    let cloud = match files::read_start(path, MAGIC_BYTES)?.as_slice() {
+        [b'p', b'l', b'y', b'\n' | b'\r'] => turned(splat_ply::read(path)?, axes),
+        start if khr_gltf::is_gltf(start, &name) => khr_gltf::read(path, axes)?,
+        b"PK\x03\x04" => turned(sog::read_archive(path)?, axes),
+        start if spz::is_spz(start) => spz::read(path, axes)?,
         // These two begin with anything.
-        [_, ..] if name.ends_with(".splat") => Ok(Opened::Cloud(splat::read(path)?)),
-        [_, ..] if name.ends_with(".ksplat") => Ok(Opened::Cloud(ksplat::read(path)?)),
-        start => Err(OpenError::Unrecognized {
-            path: path.into(),
-            looked_for: FILES.into(),
-            found: in_words(&name, start).into(),
-        }),
-    }
+        [_, ..] if name.ends_with(".splat") => turned(splat::read(path)?, axes),
+        [_, ..] if name.ends_with(".ksplat") => turned(ksplat::read(path)?, axes),
+        start => {
+            return Err(OpenError::Unrecognized {
+                path: path.into(),
+                looked_for: FILES.into(),
+                found: in_words(&name, start).into(),
+            });
+        }
+    };
+    Ok(Opened::Cloud(cloud))
 }
 
 /// What a file is that is of no format known here.
