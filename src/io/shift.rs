@@ -70,13 +70,16 @@ mod tests {
         let (near, shift) = near_zero(&far);
         let shift = shift.expect("far");
         assert!(shift == origin.round() && near.origin == DVec3::ZERO);
-        let most = (0..far.len()).map(|i| (near.world_position(i) + shift - far.world_position(i)).length()).fold(0.0, f64::max);
+        let most = (0..far.len())
+            .map(|i| (near.world_position(i) + shift - far.world_position(i)).length())
+            .fold(0.0, f64::max);
         assert!(most < 1e-6, "{most}");
         assert_eq!(of_comments(&["x", &comment(shift)]), Ok(Some(shift)));
         assert!(of_comments(&["fmlgs shift 1 2"]).is_err() && of_comments(&["fmlgs shift 1 2 inf"]).is_err());
         let close = GaussianCloud { origin: DVec3::ONE, ..far.clone() };
         assert!(near_zero(&close) == (Cow::Borrowed(&close), None));
-        let small = GaussianCloud { positions: far.positions.iter().map(|p| p.map(|v| v * 1e-3)).collect(), ..far.clone() };
+        let small =
+            GaussianCloud { positions: far.positions.iter().map(|p| p.map(|v| v * 1e-3)).collect(), ..far.clone() };
         assert_eq!(of(&small), Some(origin), "half a unit is much for it");
     }
 }

@@ -15,7 +15,7 @@ use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::plan::used_degree;
 use crate::scene::resource_log::{self, ResourceKind};
-use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Machine, SceneFacts, SemanticMap};
+use crate::scene::{Axes, Camera, Dataset, GaussianCloud, HomeView, Machine, SceneFacts, SemanticMap};
 
 mod received;
 
@@ -46,6 +46,8 @@ pub struct Scene {
     pub(crate) metres_per_unit: Option<f64>,
     /// Id of the save that its files are of, if it has one.
     pub(crate) state: Option<String>,
+    /// Things the user should know of the file that its Gaussians are from.
+    pub(crate) warnings: Vec<String>,
 }
 
 impl Scene {
@@ -86,11 +88,12 @@ impl Scene {
         known.ok_or_else(|| JobError::PhotosGone(self.path.clone()))
     }
 
-    fn bare(path: &Path, cloud: GaussianCloud) -> Self {
+    fn bare(path: &Path, mut cloud: GaussianCloud) -> Self {
         let name = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let settings = RenderSettings::of_mode(cloud.render_mode);
+        let warnings = std::mem::take(&mut cloud.warnings);
         let (cloud, sh_stored) = compact(cloud);
-        Self { path: path.into(), name, cloud, sh_stored, settings, ..Self::default() }
+        Self { path: path.into(), name, cloud, sh_stored, settings, warnings, ..Self::default() }
     }
 
     fn trained(path: &Path, scene: TrainedScene, config: TrainConfig) -> Self {
@@ -98,6 +101,7 @@ impl Scene {
         let TrainedScene { folder, info, mut cloud, state } = scene;
         // Its files of earlier versions do not say it.
         cloud.render_mode = config.render_mode();
+        let warnings = std::mem::take(&mut cloud.warnings);
         let (cloud, sh_stored) = compact(cloud);
         Self {
             path: path.into(),
@@ -113,6 +117,7 @@ impl Scene {
             dataset_path,
             metres_per_unit: info.metres_per_unit.filter(|m| m.is_finite() && *m > 0.0),
             state,
+            warnings,
         }
     }
 }
@@ -126,9 +131,9 @@ pub(crate) enum Contents {
     Scene(Scene),
 }
 
-/// Reads what lies at `path`.
-pub(crate) fn contents(path: &Path) -> Result<Contents, JobError> {
-    Ok(match io::open(path)? {
+/// Reads what lies at `path`; the numbers of a splat by these axes, if they are given.
+pub(crate) fn contents(path: &Path, axes: Option<Axes>) -> Result<Contents, JobError> {
+    Ok(match io::open_in(path, axes)? {
         Opened::Dataset(dataset) => Contents::Photos(dataset),
         Opened::Cloud(cloud) => Contents::Scene(Scene::bare(path, cloud)),
         Opened::Trained(scene) => {
@@ -140,7 +145,12 @@ pub(crate) fn contents(path: &Path) -> Result<Contents, JobError> {
 
 /// Reads a trained scene or a splat.
 pub fn scene(path: &Path) -> Result<Scene, JobError> {
-    match contents(path)? {
+    scene_in(path, None)
+}
+
+/// The same, the numbers of a splat by these axes, if they are given.
+pub(crate) fn scene_in(path: &Path, axes: Option<Axes>) -> Result<Scene, JobError> {
+    match contents(path, axes)? {
         Contents::Scene(scene) => Ok(scene),
         Contents::Photos(_) => Err(JobError::NotTrained(path.into())),
     }
@@ -224,6 +234,7 @@ impl OpenedScene {
     }
 
     fn of(scene: Scene, dataset: Option<Arc<Dataset>>, observer: &mut dyn Observer) -> Self {
+        scene.warnings.iter().for_each(|warning| observer.note(Severity::Warning, warning.clone()));
         let without = |d: &Arc<Dataset>| held_out(d, &scene.cameras, None, scene.config.holdout_every);
         let known_held_out = dataset.as_ref().filter(|_| !scene.cameras.is_empty()).map(without);
         let home = match &dataset {

@@ -58,9 +58,11 @@ impl FromStr for Axes {
         seen.sort_unstable();
         match (letters.as_slice(), seen.as_slice()) {
             (&[x, y, z], [Some(0), Some(1), Some(2)]) => Ok(Self([x, y, z])),
-            _ => Err("three letters are needed, where x, y and z count to: r or l, u or d, f or b; a .ply has rdf, SPZ \
+            _ => {
+                Err("three letters are needed, where x, y and z count to: r or l, u or d, f or b; a .ply has rdf, SPZ \
                       rub, glTF luf"
-                .into()),
+                    .into())
+            }
         }
     }
 }
@@ -104,9 +106,8 @@ impl GaussianCloud {
             self.sh.par_chunks_exact_mut(stride).for_each(|all| {
                 let mut turned = [[0.0_f32; 3]; 7];
                 for (row, out) in band.clone().zip(&mut turned) {
-                    *out = [0, 1, 2].map(|c| {
-                        band.clone().map(|k| matrix[row][k] * f64::from(all[k][c])).sum::<f64>() as f32
-                    });
+                    *out = [0, 1, 2]
+                        .map(|c| band.clone().map(|k| matrix[row][k] * f64::from(all[k][c])).sum::<f64>() as f32);
                 }
                 all[band.clone()].copy_from_slice(&turned[..band.len()]);
             });
@@ -160,7 +161,9 @@ mod tests {
 
     #[test]
     fn gaussians_look_the_same_from_the_turned_side() {
-        for (letters, own) in [("rub", true), ("luf", false), ("rfu", true), ("ruf", true), ("ldb", false), ("bul", false)] {
+        for (letters, own) in
+            [("rub", true), ("luf", false), ("rfu", true), ("ruf", true), ("ldb", false), ("bul", false)]
+        {
             let turn = letters.parse::<Axes>().expect("axes").scene_from_file();
             let (a, b) = (cloud(), cloud().turned(&turn, own));
             assert!((b.world_position(0) - turn * a.world_position(0)).length() < 1e-9, "{letters}");
@@ -186,7 +189,8 @@ mod tests {
     #[test]
     fn what_is_upwards_comes_upright() {
         for up in [DVec3::Z, DVec3::Y, DVec3::X, DVec3::NEG_X, DVec3::NEG_Z] {
-            let lying = GaussianCloud { up: Some(up), origin: 5.0 * up, ..GaussianCloud::isotropic(vec![[0.0; 3]], 0.0, 0.0) };
+            let lying =
+                GaussianCloud { up: Some(up), origin: 5.0 * up, ..GaussianCloud::isotropic(vec![[0.0; 3]], 0.0, 0.0) };
             let right = lying.clone().upright();
             assert!((right.world_position(0) - 5.0 * DVec3::NEG_Y).length() < 1e-9 && right.up.is_none(), "{up}");
         }

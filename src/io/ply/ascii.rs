@@ -42,13 +42,7 @@ pub(super) fn rows(ply: &Ply<'_>, at: usize, columns: &[Column], stride: usize) 
 }
 
 /// Passes over a list with its length in front.
-fn pass_list(
-    ply: &Ply<'_>,
-    words: &mut Words<'_>,
-    element: &Element,
-    row: u64,
-    property: &str,
-) -> Result<(), IoError> {
+fn pass_list(ply: &Ply<'_>, words: &mut Words<'_>, element: &Element, row: u64, property: &str) -> Result<(), IoError> {
     let items = number(ply, words, element, row, property)?.max(0.0) as u64;
     for _ in 0..items {
         words.next().ok_or_else(|| ply.short(element, row))?;
@@ -56,13 +50,7 @@ fn pass_list(
     Ok(())
 }
 
-fn number(
-    ply: &Ply<'_>,
-    words: &mut Words<'_>,
-    element: &Element,
-    row: u64,
-    property: &str,
-) -> Result<f64, IoError> {
+fn number(ply: &Ply<'_>, words: &mut Words<'_>, element: &Element, row: u64, property: &str) -> Result<f64, IoError> {
     let word = words.next().ok_or_else(|| ply.short(element, row))?;
     std::str::from_utf8(word).ok().and_then(|w| w.parse().ok()).ok_or_else(|| {
         let shown: String = String::from_utf8_lossy(word).chars().take(30).collect();

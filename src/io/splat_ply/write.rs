@@ -50,12 +50,7 @@ pub(crate) fn encode_near_zero(out: &mut dyn Write, cloud: &GaussianCloud, told:
     encode_told(out, &near, shift.map(shift::comment).as_slice(), told)
 }
 
-fn encode_told(
-    out: &mut dyn Write,
-    cloud: &GaussianCloud,
-    comments: &[String],
-    told: &mut Told<'_>,
-) -> io::Result<()> {
+fn encode_told(out: &mut dyn Write, cloud: &GaussianCloud, comments: &[String], told: &mut Told<'_>) -> io::Result<()> {
     told(0)?;
     let shifted = cloud.origin != DVec3::ZERO;
     out.write_all(header(cloud, shifted, comments).as_bytes())?;

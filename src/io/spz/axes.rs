@@ -11,9 +11,8 @@ use crate::scene::Axes;
 
 /// The extension record that holds the axes, and the order of its numbers from 1 on (Adobe's).
 const COORDINATE_SYSTEM: u32 = 0xADBE_0003;
-const SYSTEMS: [&str; 16] = [
-    "LDB", "RDB", "LUB", "RUB", "LDF", "RDF", "LUF", "RUF", "LFD", "RFD", "LFU", "RFU", "LBD", "RBD", "LBU", "RBU",
-];
+const SYSTEMS: [&str; 16] =
+    ["LDB", "RDB", "LUB", "RUB", "LDF", "RDF", "LUF", "RUF", "LFD", "RFD", "LFU", "RFU", "LBD", "RBD", "LBU", "RBU"];
 /// The operating system in gzip headers that this program writes, "unknown"; others name theirs.
 const UNKNOWN_SYSTEM: u8 = 255;
 
