@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 use serde_json::json;
 
 use super::recipe::RecipeArgs;
+use super::scene_args::open_scene;
 use super::{CliError, interrupt, number, output, view};
 use crate::agent::commands::Commands;
 use crate::agent::llm::settings::{LlmSettings, RequestPatience};
@@ -14,7 +15,7 @@ use crate::agent::llm::{Llm, SENT, discover};
 use crate::agent::scene::{Effect, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Session};
 use crate::jobs::remove::{self, RemovalOptions, RemoveRequest};
-use crate::jobs::{export, open, render};
+use crate::jobs::{export, render};
 use crate::navigate::Pose;
 use crate::pipeline::observer::Silent;
 use crate::scene::IdentityId;
@@ -141,7 +142,7 @@ pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
     }
     let (planner, policy) = (args.planner()?, args.policy()?);
     let folder = args.scene.as_deref().unwrap_or(Path::new(""));
-    let scene = open::scene(folder)?;
+    let scene = open_scene(folder)?;
     if let Some(view) = &args.view {
         export::check(view, &[".png"], &scene.reads())?;
     }

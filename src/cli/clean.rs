@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use super::progress::Console;
+use super::scene_args::open_scene;
 use super::{CliError, output};
 use crate::jobs::clean::{self, CleanRule};
-use crate::jobs::{derived, open};
+use crate::jobs::derived;
 use crate::math::format;
 
 /// Find floaters, needles and haze, and write the scene without them
@@ -40,7 +41,7 @@ pub(crate) struct CleanArgs {
 }
 
 pub(crate) fn run(args: CleanArgs, quiet: bool) -> Result<(), CliError> {
-    let scene = open::scene(&args.scene)?;
+    let scene = open_scene(&args.scene)?;
     if let Some(out) = &args.out {
         derived::check_place(&scene, out)?;
     }

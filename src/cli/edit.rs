@@ -6,9 +6,10 @@ use std::sync::Arc;
 use glam::{DQuat, DVec3};
 
 use super::progress::Console;
+use super::scene_args::open_scene;
 use super::{CliError, output};
 use crate::jobs::rearrange::{self, Arrangement, Placement, SplatEdit};
-use crate::jobs::{JobError, derived, open, query};
+use crate::jobs::{JobError, derived, query};
 use crate::math::{format, srgb};
 use crate::scene::LevelFilter;
 
@@ -72,7 +73,7 @@ fn color(text: &str) -> Result<[f32; 3], String> {
 }
 
 pub(crate) fn run(args: EditArgs, quiet: bool) -> Result<(), CliError> {
-    let scene = open::scene(&args.scene)?;
+    let scene = open_scene(&args.scene)?;
     let map = scene.semantics()?;
     derived::check_place(&scene, &args.out)?;
     let ids = query::named(&map, &args.text, args.kind, 1)?;

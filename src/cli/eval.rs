@@ -6,11 +6,12 @@ use serde_json::json;
 
 use super::progress::Console;
 use super::recipe::RecipeArgs;
+use super::scene_args::open_scene;
 use super::{CliError, eval_depth, eval_masks, eval_removal, number, output, table_args};
 use crate::jobs::batch::BatchEvaluation;
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::evaluate_masks::Protocol;
-use crate::jobs::{export, open};
+use crate::jobs::export;
 
 /// Measure PSNR and SSIM of a scene on held-out photos
 ///
@@ -79,7 +80,7 @@ pub(super) fn of_table(table: &toml::Table) -> Result<BatchEvaluation, String> {
 
 impl EvalArgs {
     fn check(&self) -> Result<PhotoComparison, CliError> {
-        let scene = open::scene(&self.scene)?;
+        let scene = open_scene(&self.scene)?;
         let photos = scene.photos(self.photos.as_deref())?;
         if let Some(folder) = &self.pictures {
             export::check_folder(folder, &[&photos])?;
@@ -102,7 +103,7 @@ pub(crate) fn run(args: EvalArgs, quiet: bool) -> Result<(), CliError> {
     }
     let mut console = Console::new(quiet);
     if let Some(truth) = &args.removal {
-        return eval_removal::run(&open::scene(&args.scene)?, truth, &comparison, args.json, &mut console);
+        return eval_removal::run(&open_scene(&args.scene)?, truth, &comparison, args.json, &mut console);
     }
     if args.depth {
         return eval_depth::run(&args.scene, &comparison, args.json, &mut console);

@@ -6,10 +6,11 @@ use std::sync::Arc;
 use glam::DVec3;
 
 use super::progress::Console;
+use super::scene_args::AxesArgs;
 use super::{CliError, output};
 use crate::jobs::export_splat::{self, ExportedSplat, LossViews};
 use crate::jobs::page::{self, PageRequest};
-use crate::jobs::{Scene, export, open};
+use crate::jobs::{Scene, export};
 use crate::math::format;
 use crate::scene::{Bounds, CropBox, GaussianCloud};
 
@@ -34,6 +35,8 @@ pub(crate) struct ExportArgs {
     /// File to write, in the format of its ending
     #[arg(long, required_unless_present = "html")]
     out: Option<PathBuf>,
+    #[command(flatten)]
+    axes: AxesArgs,
     #[command(flatten)]
     measure: MeasureArgs,
     /// The page (.html) to write
@@ -97,7 +100,7 @@ fn parse_box(text: &str) -> Result<Bounds, String> {
 }
 
 pub(crate) fn run(args: ExportArgs, quiet: bool) -> Result<(), CliError> {
-    let mut scene = open::scene(&args.scene)?;
+    let mut scene = args.axes.open(&args.scene)?;
     let reads: Vec<&Path> = scene.reads().into_iter().chain(args.path.iter().map(PathBuf::as_path)).collect();
     if let Some(out) = &args.out {
         export_splat::check(out, &reads)?;

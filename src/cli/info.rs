@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::plan::PlanArgs;
 use super::preprocess::identities;
+use super::scene_args::AxesArgs;
 use super::{CliError, output};
 use crate::io::scene_files::MAP_FILE;
 use crate::io::trained::CLOUD_FILE;
@@ -30,6 +31,8 @@ pub(crate) struct InfoArgs {
     #[arg(long, default_value_t = TrainConfig::default().max_side_px, value_parser = clap::value_parser!(u32).range(1..=16384))]
     max_side: u32,
     #[command(flatten)]
+    axes: AxesArgs,
+    #[command(flatten)]
     plan: PlanArgs,
     /// Print one JSON document, with every camera
     #[arg(long)]
@@ -47,7 +50,7 @@ pub(crate) fn run(args: InfoArgs) -> Result<(), CliError> {
     let defaults = TrainConfig::default();
     let config = TrainConfig { max_side_px: args.max_side, ..defaults.clone() };
     let machine = plan::machine();
-    let (mut facts, planned) = match open::contents(&args.path)? {
+    let (mut facts, planned) = match open::contents(&args.path, args.axes.axes)? {
         Contents::Photos(d) => (of_dataset(&d, defaults.holdout_every), plan::facts(&machine, Some(&d), None, &config)),
         Contents::Scene(s) => {
             let planned = plan::scene_facts(&machine, &s, &config);
@@ -134,6 +137,7 @@ fn of_splat(s: &Scene) -> Facts {
     facts.json.insert("kind".into(), json!("splat"));
     facts.json.insert("cameras".into(), json!(s.cameras));
     facts.json.insert("dataset".into(), json!(s.dataset_path));
+    facts.json.insert("up".into(), json!(s.home().up));
     facts
 }
 
@@ -170,7 +174,8 @@ fn of_trained(s: &Scene, folder: &Path) -> (Facts, Option<SemanticMap>) {
     let map = map.ok().flatten();
     let known = map.as_ref().map(|m| m.identities.len());
     lines.push(("objects and parts", known.map_or_else(|| "none known".into(), |n| n.to_string())));
-    let mut facts = facts(lines, json, warning.into_iter().collect());
+    let warnings = s.warnings.iter().cloned().chain(warning).collect();
+    let mut facts = facts(lines, json, warnings);
     facts.json.insert("kind".into(), json!("trained"));
     facts.json.insert("name".into(), json!(s.name));
     facts.json.insert("dataset".into(), json!(s.dataset_path));
@@ -190,6 +195,9 @@ fn cloud_facts(s: &Scene) -> (Vec<(&'static str, String)>, Value) {
         vec![("Gaussians", c.len().to_string()), ("color", format!("spherical harmonics of degree {}", s.sh_stored))];
     if let Some(b) = bounds {
         lines.push(("middle 96 %", format!("{} to {} scene units", vector(b.min), vector(b.max))));
+    }
+    if let Some(up) = c.up {
+        lines.push(("upwards", vector(up)));
     }
     if !extras.is_empty() {
         lines.push(("kept besides", extras.join(", ")));

@@ -36,6 +36,7 @@ mod render;
 mod report;
 mod report_merge;
 mod reproduce;
+mod scene_args;
 mod segment;
 mod segment_click;
 mod serve;

@@ -6,9 +6,10 @@ use std::time::Instant;
 
 use serde_json::json;
 
+use super::scene_args::open_scene;
 use super::{CliError, number, output, view};
 use crate::jobs::go_to::{self, ApproachRequest, Explored};
-use crate::jobs::{Scene, export, open, query};
+use crate::jobs::{Scene, export, query};
 use crate::measure::survey::{self, smoothness};
 use crate::measure::table::rows;
 use crate::navigate::flight::Smoothness;
@@ -75,7 +76,7 @@ fn explored(scene: &Scene) -> Arc<Explored> {
 }
 
 pub(crate) fn run(args: PathArgs) -> Result<(), CliError> {
-    let scene = open::scene(&args.scene)?;
+    let scene = open_scene(&args.scene)?;
     if let Some(out) = &args.out {
         export::check(out, &[".json"], &scene.reads())?;
     }

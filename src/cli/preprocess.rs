@@ -7,6 +7,7 @@ use serde_json::{Value, json};
 
 use super::plan::PlanArgs;
 use super::progress::Console;
+use super::scene_args::open_scene;
 use super::{CliError, number, output, table_args};
 use crate::jobs::find_objects::{self, FindRequest, FindSettings, FoundObjects};
 use crate::jobs::models::SAM2;
@@ -140,7 +141,7 @@ impl PreprocessArgs {
 pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
     let mut observer = Console::new(quiet);
     check_segmenter(&args)?;
-    let scene = open::scene(&args.scene)?;
+    let scene = open_scene(&args.scene)?;
     let folder = scene.folder.clone().ok_or_else(|| JobError::NoScene(args.scene.clone()))?;
     let known = args.add.as_ref().map(|_| scene.semantics()).transpose()?.map(Arc::new);
     let dataset = open::dataset(&scene.photos(args.photos.as_deref())?)?;

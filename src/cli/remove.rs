@@ -5,9 +5,10 @@ use std::path::PathBuf;
 use serde_json::json;
 
 use super::progress::Console;
+use super::scene_args::open_scene;
 use super::{CliError, number, output};
 use crate::jobs::remove::{self, Paint, RemovalOptions};
-use crate::jobs::{derived, open, photos_without, query};
+use crate::jobs::{derived, photos_without, query};
 use crate::math::format;
 use crate::scene::LevelFilter;
 
@@ -73,7 +74,7 @@ enum Fill {
 }
 
 pub(crate) fn run(args: RemoveArgs, quiet: bool) -> Result<(), CliError> {
-    let scene = open::scene(&args.scene)?;
+    let scene = open_scene(&args.scene)?;
     let map = scene.semantics()?;
     let mut ids = Vec::new();
     for text in &args.texts {

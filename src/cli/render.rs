@@ -7,6 +7,7 @@ use serde_json::json;
 
 use super::plan::PlanArgs;
 use super::progress::Console;
+use super::scene_args::AxesArgs;
 use super::{CliError, number, output, view};
 use crate::io::video::{VideoEncoder, VideoSettings};
 use crate::jobs::render::{self, Quantity};
@@ -71,6 +72,8 @@ pub(crate) struct RenderArgs {
     #[arg(long, value_enum, default_value_t = BackendChoice::Auto)]
     backend: BackendChoice,
     #[command(flatten)]
+    axes: AxesArgs,
+    #[command(flatten)]
     plan: PlanArgs,
     /// Print one JSON document about what was drawn
     #[arg(long)]
@@ -84,7 +87,7 @@ impl RenderArgs {
             let file = self.out.display();
             return Err(CliError::Usage(format!("'{file}' must end in .png, or in .npy for depth and alpha")));
         }
-        let mut scene = open::scene(&self.scene)?;
+        let mut scene = self.axes.open(&self.scene)?;
         if let Some(photos) = &self.photos {
             scene.cameras = open::cameras(&open::dataset(photos)?, scene.config.holdout_every);
         }
@@ -138,7 +141,7 @@ fn video(args: &RenderArgs, path: &Path, quiet: bool) -> Result<(), CliError> {
     let keys = video::camera_path(path)?;
     let spline = CameraSpline::new(&keys, Speed::Constant);
     let spline = spline.ok_or_else(|| CliError::failed(format!("{}: there are no keys in it", path.display())))?;
-    let scene = open::scene(&args.scene)?;
+    let scene = args.axes.open(&args.scene)?;
     let reads: Vec<&Path> = scene.reads().into_iter().chain([path]).collect();
     if args.out.is_dir() {
         export::check_folder(&args.out, &reads)?

@@ -6,11 +6,12 @@ use std::sync::Arc;
 use super::export::MeasureArgs;
 use super::progress::Console;
 use super::recipe::RecipeArgs;
+use super::scene_args::open_scene;
 use super::segment_click::{self, ClickArgs};
 use super::{CliError, number, output, view};
 use crate::io::splat_format::SplatFormat;
 use crate::jobs::export_all::{self, ExportAllRequest, ExportedAll, MaskFormat};
-use crate::jobs::{Scene, export, export_splat, open, query, render, segment};
+use crate::jobs::{Scene, export, export_splat, query, render, segment};
 use crate::math::format::things;
 use crate::pipeline::semantics::answer::Basis;
 use crate::scene::{Camera, LevelFilter, SemanticMap};
@@ -72,7 +73,7 @@ pub(crate) struct SegmentArgs {
 }
 
 pub(crate) fn run(args: SegmentArgs, quiet: bool) -> Result<(), CliError> {
-    let scene = open::scene(&args.scene)?;
+    let scene = open_scene(&args.scene)?;
     match (&args.text, &args.out) {
         (Some(text), Some(out)) => one(&args, text, out, &scene, quiet),
         (None, Some(out)) if args.all => {

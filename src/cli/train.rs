@@ -150,7 +150,7 @@ impl TrainArgs {
     /// What to train on, how, and in which folders: the one that is given, or else the first that holds no
     /// training with other settings.
     fn check(&self) -> Result<(Dataset, TrainConfig, Vec<PathBuf>), CliError> {
-        let (dataset, base, own) = match open::contents(&self.data)? {
+        let (dataset, base, own) = match open::contents(&self.data, None)? {
             Contents::Photos(dataset) => (dataset, TrainConfig::default(), None),
             Contents::Scene(scene) if scene.folder.is_some() => {
                 let Some(photos) = &scene.dataset_path else {

@@ -31,7 +31,7 @@ pub(crate) fn read(path: &Path) -> Result<GaussianCloud, IoError> {
 /// The Gaussians in the bytes of a `.ksplat`; `path` is for errors.
 ///
 /// # Errors
-/// If it is of another version, a count exceeds what follows, or a number is not finite.
+/// If it is of another version, a count exceeds what follows, or no Gaussian is finite.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
     let mut rest = Reader::new(bytes, path);
     let header = Fields(rest.take(HEADER, "the header")?);
@@ -69,8 +69,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
     if cloud.is_empty() {
         return Err(IoError::syntax(path, "the header", "no section holds a Gaussian"));
     }
-    cloud.validate().map_err(|cause| IoError::Cloud { path: path.into(), cause })?;
-    Ok(cloud)
+    cloud.finite().map_err(|cause| IoError::Cloud { path: path.into(), cause })
 }
 
 fn count(path: &Path, what: &str, claimed: u32, possible: usize) -> IoError {

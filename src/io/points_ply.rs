@@ -1,4 +1,4 @@
-//! Sparse points as `.ply`: `x y z` and, where present, `red green blue`.
+//! Sparse points as `.ply`: `x y z` and, where present, colors.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::ply::{Ply, Scalar, Table};
+use super::ply::{Colors, Ply, Table};
 use super::{IoError, atomic, files, photo_list};
 use crate::scene::{Camera, SparsePoint};
 
@@ -43,14 +43,15 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<Vec<SparsePoint>, IoError> {
     };
     let xyz =
         table.all(["x", "y", "z"]).map_err(|name| ply.syntax("vertex", format!("property '{name}' is missing")))?;
-    let rgb = table.all(["red", "green", "blue"]).ok();
+    let colors = Colors::of(&table);
+    let byte = |v: f64| if v.is_finite() { (v * 255.0).round().clamp(0.0, 255.0) as u8 } else { GRAY };
     let points: Vec<SparsePoint> = (0..table.rows)
         .into_par_iter()
         .map(|i| {
             let row = table.row(i);
             SparsePoint {
                 position: DVec3::from_array(xyz.map(|c| c.f64(row))),
-                rgb: rgb.map_or([GRAY; 3], |c| c.map(|c| byte(c.scalar, c.f64(row)))),
+                rgb: colors.as_ref().map_or([GRAY; 3], |c| c.rgb(row).map(byte)),
             }
         })
         .collect();
@@ -72,16 +73,6 @@ pub(crate) fn write(path: &Path, points: &[SparsePoint]) -> Result<(), IoError> 
         }
         Ok(())
     })
-}
-
-/// A color channel as 8 bits: floating-point colors are 0 to 1, 16-bit ones fill their range.
-fn byte(scalar: Scalar, value: f64) -> u8 {
-    let scaled = match scalar {
-        Scalar::F32 | Scalar::F64 => value * 255.0,
-        Scalar::U16 => value / 257.0,
-        _ => value,
-    };
-    scaled.round().clamp(0.0, 255.0) as u8
 }
 
 fn first_bad(points: &[SparsePoint], table: &Table<'_>, path: &Path) -> Result<(), IoError> {
@@ -127,6 +118,65 @@ mod tests {
         assert_eq!(ascii[0], SparsePoint { position: DVec3::new(1.5, -2.0, 300.0), rgb: [255, 0, 9] });
         assert_eq!(ascii, parse_bytes(&binary(false)).expect("little endian"));
         assert_eq!(ascii, parse_bytes(&binary(true)).expect("big endian"));
+    }
+
+    /// The colors of points with these three columns, as text.
+    fn colors(header: &str, rows: &[&str]) -> Vec<[u8; 3]> {
+        let head = format!("ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\n{header}", rows.len());
+        let rows: String = rows.iter().map(|row| format!("0 {row} 0 0\n")).collect();
+        let text = format!("{head}property float y\nproperty float z\nend_header\n{rows}");
+        parse_bytes(text.as_bytes()).expect("points").iter().map(|p| p.rgb).collect()
+    }
+
+    #[test]
+    fn colors_are_read_by_name_and_range() {
+        let three = |kind: &str, names: [&str; 3]| names.map(|name| format!("property {kind} {name}\n")).concat();
+        let rgb = ["red", "green", "blue"];
+        for (header, rows, first) in [
+            (three("float", rgb), ["0.2 0.4 1", "0 0 0.5"], [51, 102, 255]),
+            (three("float", rgb), ["51 102 255", "0 0 1"], [51, 102, 255]),
+            (three("double", rgb), ["51.0 102.4 254.6", "0 0 1"], [51, 102, 255]),
+            (three("half", rgb), ["0.2 0.4 1", "0 0 0"], [51, 102, 255]),
+            (three("ushort", rgb), ["13107 26214 65535", "0 0 1"], [51, 102, 255]),
+            (three("ushort", rgb), ["51 102 255", "0 0 1"], [51, 102, 255]),
+            (three("float", rgb), ["13107 26214 65535", "0 0 1"], [51, 102, 255]),
+            (three("uchar", rgb), ["1 0 1", "0 0 1"], [1, 0, 1]),
+            (three("int", rgb), ["1 0 1", "0 0 1"], [1, 0, 1]),
+            (three("uchar", ["diffuse_red", "diffuse_green", "diffuse_blue"]), ["51 102 255", "0 0 0"], [51, 102, 255]),
+            (three("float", ["r", "g", "b"]), ["0.2 0.4 1.5", "0 0 0"], [51, 102, 255]),
+            (three("float", ["f_dc_0", "f_dc_1", "f_dc_2"]), ["-1.06347 0 3", "0 0 0"], [51, 128, 255]),
+            (three("float", rgb), ["nan 0.4 1", "0 0 0"], [GRAY, 102, 255]),
+        ] {
+            assert_eq!(colors(&header, &rows)[0], first, "{header}{rows:?}");
+        }
+        // Alpha and lists beside the colors are passed over.
+        let beside = "property list uchar int seen\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\n";
+        assert_eq!(colors(beside, &["2 7 8 51 102 255 9", "0 1 2 3 4"]), [[51, 102, 255], [1, 2, 3]]);
+    }
+
+    #[test]
+    fn lists_among_the_points_are_passed_over_in_every_encoding() {
+        let header = |format: &str| {
+            format!(
+                "ply\nformat {format} 1.0\nelement vertex 2\nproperty float x\nproperty list uchar short seen\nproperty float y\nproperty float z\nend_header\n"
+            )
+        };
+        let ascii = parse_bytes(format!("{}1 2 7 8 2 3\n4 0 5 6\n", header("ascii")).as_bytes()).expect("ascii");
+        assert_eq!(ascii.iter().map(|p| p.position.to_array()).collect::<Vec<_>>(), [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+        for big in [false, true] {
+            let mut bytes = header(if big { "binary_big_endian" } else { "binary_little_endian" }).into_bytes();
+            let float = |v: f32| if big { v.to_be_bytes() } else { v.to_le_bytes() };
+            for (x, seen, yz) in [(1.0, &[7_u8, 0, 8, 0][..], [2.0, 3.0]), (4.0, &[], [5.0, 6.0])] {
+                bytes.extend(float(x));
+                bytes.push(seen.len() as u8 / 2);
+                bytes.extend(seen);
+                yz.into_iter().for_each(|v| bytes.extend(float(v)));
+            }
+            assert_eq!(parse_bytes(&bytes).expect("binary"), ascii);
+            for n in bytes.len() - 20..bytes.len() {
+                parse_bytes(&bytes[..n]).expect_err("cut off");
+            }
+        }
     }
 
     #[test]

@@ -19,7 +19,7 @@ use flate2::write::{GzEncoder, ZlibEncoder};
 use super::reader::Reader;
 use super::scene_files::{CLOUD_FILE, MAP_FILE};
 use super::{IoError, files, semantic_map, splat_ply, spz};
-use crate::scene::{GaussianCloud, SemanticMap};
+use crate::scene::{Axes, GaussianCloud, SemanticMap};
 
 const MAGIC: &[u8; 8] = b"FMLGSNP1";
 const PACKED: &[u8; 4] = b"spz ";
@@ -130,7 +130,9 @@ impl SceneSnapshot {
     pub(crate) fn read(&self, path: &Path) -> Result<(GaussianCloud, Option<SemanticMap>), IoError> {
         let Some(ply) = &self.ply else {
             let missing = || IoError::syntax(path, "the sections", "there are no Gaussians");
-            return Ok((spz::parse(self.packed.as_deref().ok_or_else(missing)?, path)?, None));
+            let packed = self.packed.as_deref().ok_or_else(missing)?;
+            // They are packed with the axes of the scene.
+            return Ok((spz::parse_in(packed, path, spz::SpzAxes::Given(Axes::PLY))?, None));
         };
         let cloud = splat_ply::parse(ply, path)?;
         let state = splat_ply::state_in(ply, path);

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 
 use super::atomic::Told;
 use super::quantized::{color, constant, log_scale, logit, opacity_byte, to_byte, unit, unorm};
-use super::{IoError, files};
+use super::{IoError, files, shift};
 use crate::scene::GaussianCloud;
 
 /// Bytes of a Gaussian.
@@ -26,7 +26,7 @@ pub(crate) fn read(path: &Path) -> Result<GaussianCloud, IoError> {
 /// The Gaussians in the bytes of a `.splat`; `path` is for errors.
 ///
 /// # Errors
-/// If the size is no multiple of 32 bytes, or a number is not finite.
+/// If the size is no multiple of 32 bytes, or no Gaussian is finite.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
     let (rows, rest) = bytes.as_chunks::<ROW>();
     if rows.is_empty() || !rest.is_empty() {
@@ -47,12 +47,13 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
         sh: rows.par_iter().map(|row| [24, 25, 26].map(|k| constant(unorm(row[k].into(), 8)))).collect(),
         ..GaussianCloud::default()
     };
-    cloud.validate().map_err(|cause| IoError::Cloud { path: path.into(), cause })?;
-    Ok(cloud)
+    cloud.finite().map_err(|cause| IoError::Cloud { path: path.into(), cause })
 }
 
 /// Writes the bytes of a `.splat` of a valid cloud, in its order.
 pub(super) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
+    let (near, _) = shift::near_zero(cloud);
+    let cloud = &*near;
     let stride = cloud.sh_stride();
     for first in (0..cloud.len()).step_by(BLOCK) {
         told(first)?;
@@ -116,11 +117,13 @@ mod tests {
         for n in [0, 1, 31, 33, 95] {
             assert!(matches!(parse(&good[..n], Path::new("a.splat")), Err(IoError::Syntax { .. })), "{n}");
         }
-        for (at, name) in [(32 + 8, "position"), (64 + 12, "scale")] {
-            let mut bad = good.clone();
+        let mut bad = good.clone();
+        for (at, name) in [(32 + 8, "position"), (12, "scale")] {
             bad[at..at + 4].copy_from_slice(&f32::NAN.to_le_bytes());
-            let e = parse(&bad, Path::new("a.splat")).expect_err("NaN");
-            assert!(e.to_string().contains(&format!("Gaussian {}: {name}", at / 32)), "{e}");
+            let told = parse(&bad, Path::new("a.splat")).expect("others are finite").warnings.concat();
+            assert!(told.contains(&format!("Gaussian {}, {name}", at / 32)), "{told}");
         }
+        bad[64..68].copy_from_slice(&f32::INFINITY.to_le_bytes());
+        assert!(matches!(parse(&bad, Path::new("a.splat")), Err(IoError::Cloud { .. })));
     }
 }

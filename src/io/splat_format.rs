@@ -1,5 +1,6 @@
 //! The formats that Gaussians are written in, each by its ending, and what each of them cannot hold.
 
+use std::borrow::Cow;
 use std::io::{self, Write};
 use std::path::Path;
 
@@ -7,8 +8,8 @@ use glam::DVec3;
 use strum::VariantArray;
 
 use super::atomic::{self, Told};
-use super::{IoError, compressed_ply, khr_gltf, sog, splat, splat_ply, spz};
-use crate::scene::{Bounds, GaussianCloud, SplatRenderMode};
+use super::{IoError, compressed_ply, khr_gltf, shift, sog, splat, splat_ply, spz};
+use crate::scene::{GaussianCloud, SplatRenderMode};
 
 /// A format for Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, strum::VariantArray)]
@@ -95,10 +96,23 @@ impl SplatFormat {
             (_, SplatRenderMode::Surfels) => Some("that they are drawn as surfels"),
         };
         all.extend(mode.map(str::to_owned));
-        if !floats && let Some(step) = coarseness(cloud) {
-            all.push(format!("places between steps of {step} units, as the scene is far from zero"));
+        if self == Self::Splat && self.shift(cloud).is_some() {
+            all.push("where zero is, which has to be added to its places again".to_owned());
         }
         all
+    }
+
+    /// The cloud as it is written: with `-y` upwards where the format cannot say what is.
+    pub(crate) fn prepared(self, cloud: &GaussianCloud) -> Cow<'_, GaussianCloud> {
+        match (self, cloud.up) {
+            (Self::Ply, _) | (_, None) => Cow::Borrowed(cloud),
+            _ => Cow::Owned(cloud.clone().upright()),
+        }
+    }
+
+    /// What a cloud as [`Self::prepared`] is written relative to, if it is far from zero; glTF has nodes for that.
+    pub(crate) fn shift(self, cloud: &GaussianCloud) -> Option<DVec3> {
+        if matches!(self, Self::Glb | Self::Gltf) { None } else { shift::of(cloud) }
     }
 
     /// Bytes of the file, or of all files of a folder, that was written at `path`; 0 if it is gone.
@@ -124,6 +138,7 @@ impl SplatFormat {
                 return Err(IoError::Unsupported { path: path.into(), what: "no Gaussians at all".into(), remedy });
             }
         }
+        let cloud = &*self.prepared(cloud);
         match self {
             Self::SogFolder => sog::write_folder(path, cloud, told),
             _ => atomic::write(path, |w| self.encode(w, cloud, told)),
@@ -132,7 +147,7 @@ impl SplatFormat {
 
     fn encode(self, out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
         match self {
-            Self::Ply => splat_ply::encode_told(out, cloud, None, told),
+            Self::Ply => splat_ply::encode_near_zero(out, cloud, told),
             Self::CompressedPly => compressed_ply::encode(out, cloud, told),
             Self::Spz => spz::encode(out, cloud, told),
             Self::Sog | Self::SogFolder => sog::encode(out, cloud, told),
@@ -141,16 +156,6 @@ impl SplatFormat {
             Self::Gltf => khr_gltf::encode_text(out, cloud, told),
         }
     }
-}
-
-/// How far the cloud's places are rounded in single precision, in units, where that is over a hundred-thousandth of
-/// its size.
-fn coarseness(cloud: &GaussianCloud) -> Option<f32> {
-    let far = cloud.origin.abs().max_element() as f32;
-    let step = far.next_up() - far;
-    let places = cloud.positions.iter().map(|p| DVec3::from_array(p.map(f64::from)));
-    let radius = Bounds::robust(places)?.radius();
-    (f64::from(step) > 1e-5 * radius && far > 0.0).then_some(step)
 }
 
 #[cfg(test)]

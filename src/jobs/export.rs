@@ -9,13 +9,18 @@ use npyz::WriterBuilder;
 use serde::Serialize;
 
 use super::JobError;
-use crate::io::{self, IoError, atomic, scene_files, splat_ply, trained};
+use crate::io::splat_format::SplatFormat;
+use crate::io::{self, IoError, atomic, scene_files, trained};
 use crate::navigate::{CameraSpline, Pose, Speed};
 use crate::scene::{CameraPath, CropBox, GaussianCloud, Identities, IdentityId, PathKey, PhotoPixels};
 
+/// Writes Gaussians as a `.ply` for any viewer.
+///
+/// # Errors
+/// If the file cannot be written.
 pub(crate) fn ply(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     make_parent(path)?;
-    splat_ply::write(path, cloud)
+    SplatFormat::Ply.write(path, cloud, &mut |_| Ok(()))
 }
 
 /// The Gaussians that a crop box keeps, if it keeps any.

@@ -11,9 +11,9 @@ use std::sync::Arc;
 
 use self::folder::ExportFolder;
 use self::labels::LabelWriter;
-use super::{JobError, export};
+use super::{JobError, export, export_splat};
 use crate::io::splat_format::SplatFormat;
-use crate::pipeline::observer::{Observer, Ticker};
+use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, SemanticMap};
@@ -81,6 +81,9 @@ fn write(
     observer: &mut dyn Observer,
 ) -> Result<ExportedAll, JobError> {
     let ExportAllRequest { cloud, map, settings, views, format, masks, .. } = request;
+    if let Some(shift) = format.shift(&format.prepared(cloud)) {
+        observer.note(Severity::Info, export_splat::shift_line(shift.to_array()));
+    }
     let all = &map.identities;
     let mut done = ExportedAll { folder: request.folder.clone(), ..ExportedAll::default() };
     let mut ticker = Ticker::new("Writing Gaussians", all.len());

@@ -1,9 +1,11 @@
 //! Gaussians as a file for other programs, in the format that its name asks for, and what that lost: told, and measured
 //! by drawing both.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use glam::DVec3;
 use serde::Serialize;
 
 use super::{JobError, Scene, export};
@@ -53,6 +55,10 @@ pub struct ExportedSplat {
     pub(crate) rounded: Option<&'static str>,
     /// What the format cannot hold.
     pub(crate) left_out: Vec<String>,
+    /// What its places are relative to, as the scene is far from zero: to be added to them again, in the scene's axes.
+    pub(crate) shift: Option<[f64; 3]>,
+    /// Whether what the scene's file says is upwards was turned there, as the format cannot say it.
+    pub(crate) turned_upright: bool,
     /// How what is in the file differs where both are drawn; not known where that was not asked for.
     pub(crate) drawn: Option<DrawnLoss>,
 }
@@ -70,16 +76,28 @@ pub struct DrawnLoss {
 impl ExportedSplat {
     /// In words, a line for each matter.
     pub(crate) fn lines(&self) -> Vec<String> {
-        let Self { path, gaussians, sh_degree, bytes, rounded, left_out, drawn } = self;
+        let Self { path, gaussians, sh_degree, bytes, rounded, left_out, shift, turned_upright, drawn } = self;
         let size = format::bytes(*bytes);
         let mut lines = vec![format!("{}: {gaussians} Gaussians, SH degree {sh_degree}, {size}", path.display())];
         lines.extend(rounded.map(|what| format!("rounded: {what}")));
         if !left_out.is_empty() {
             lines.push(format!("left out: {}", left_out.join("; ")));
         }
+        lines.extend(shift.map(shift_line));
+        if *turned_upright {
+            lines.push("turned: upwards is -y in the file, as its format cannot say what is".into());
+        }
         lines.extend(drawn.map(|drawn| drawn.line()));
         lines
     }
+}
+
+/// That places are relative to one near by, in words.
+pub(crate) fn shift_line([x, y, z]: [f64; 3]) -> String {
+    format!(
+        "shifted: places are relative to ({x}, {y}, {z}), as other viewers hold single precision and would see steps so \
+         far from zero; add that to put them back"
+    )
 }
 
 impl ExportedSplat {
@@ -132,14 +150,17 @@ pub(crate) fn run(
     write(cloud, format, path, observer)?;
     // What went into a pipe is gone.
     let views = views.filter(|_| !atomic::is_stream(path));
+    let prepared = format.prepared(cloud);
     Ok(ExportedSplat {
         path: path.into(),
         gaussians: cloud.len(),
         sh_degree: cloud.sh_degree,
         bytes: format.bytes(path),
         rounded: format.rounding(),
-        left_out: format.left_out(cloud),
-        drawn: views.map(|views| drawn(cloud, path, views, observer)).transpose()?,
+        left_out: format.left_out(&prepared),
+        shift: format.shift(&prepared).map(|shift| shift.to_array()),
+        turned_upright: matches!(prepared, Cow::Owned(_)),
+        drawn: views.map(|views| drawn(&prepared, path, views, observer)).transpose()?,
     })
 }
 
@@ -166,14 +187,18 @@ pub(crate) fn write(
 
 /// What is in the file, drawn against what was to be in it.
 fn drawn(
-    cloud: &Arc<GaussianCloud>,
+    cloud: &GaussianCloud,
     path: &Path,
     views: &LossViews,
     observer: &mut dyn Observer,
 ) -> Result<DrawnLoss, JobError> {
-    let Opened::Cloud(written) = io::open(path)? else {
+    let Opened::Cloud(mut written) = io::open(path)? else {
         return Err(JobError::Output(format!("{} was written, but is no splat when it is read", path.display())));
     };
+    // A format that has no place for the shift is near zero.
+    if written.origin == DVec3::ZERO {
+        written.origin = SplatFormat::of(path).and_then(|format| format.shift(cloud)).unwrap_or_default();
+    }
     let cameras: Vec<Camera> = match views.cameras.as_slice() {
         [] => HomeView::new(&[], Some(cloud)).around([SIDE_PX, SIDE_PX * 3 / 4], VIEWS),
         all => spread(all, VIEWS).iter().map(|camera| camera.limited_to(SIDE_PX)).collect(),
@@ -247,8 +272,17 @@ mod tests {
         let surfels = GaussianCloud { render_mode: SplatRenderMode::Surfels, ..(*cloud).clone() };
         assert!(SplatFormat::Spz.left_out(&surfels).concat().contains("surfels"));
         let far = GaussianCloud { origin: glam::DVec3::new(1e6, 0.0, 0.0), ..(*cloud).clone() };
-        assert!(SplatFormat::Sog.left_out(&far).concat().contains("0.0625 units"));
-        assert!(!SplatFormat::Glb.left_out(&far).concat().contains("units"));
+        for (name, kept) in [("far.ply", true), ("far.sog", true), ("far.compressed.ply", true), ("far.splat", false)] {
+            let path = folder.path().join(name);
+            let done = run(&Arc::new(far.clone()), &path, Some(&LossViews::default()), &mut Silent).expect(name);
+            assert_eq!(done.shift, Some([1e6, 0.0, 0.0]), "{name}");
+            assert!(done.lines().iter().any(|line| line.contains("(1000000, 0, 0)")), "{:?}", done.lines());
+            assert_eq!(done.left_out.concat().contains("where zero is"), !kept, "{name}");
+            let Ok(Opened::Cloud(back)) = io::open(&path) else { panic!("{name}") };
+            assert_eq!(back.origin.x, if kept { 1e6 } else { 0.0 }, "{name}");
+            assert!(done.drawn.is_some_and(|drawn| drawn.psnr.is_none_or(|db| db > 15.0)), "{name}: {:?}", done.drawn);
+        }
+        assert!(SplatFormat::Glb.shift(&far).is_none(), "nodes say it");
     }
 
     #[test]

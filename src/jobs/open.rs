@@ -15,7 +15,7 @@ use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::plan::used_degree;
 use crate::scene::resource_log::{self, ResourceKind};
-use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Machine, SceneFacts, SemanticMap};
+use crate::scene::{Axes, Camera, Dataset, GaussianCloud, HomeView, Machine, SceneFacts, SemanticMap};
 
 mod beside;
 mod received;
@@ -49,7 +49,7 @@ pub struct Scene {
     pub(crate) state: Option<String>,
     /// The folder beside a splat that its cameras are from.
     pub(crate) cameras_from: Option<PathBuf>,
-    /// What of the things beside a splat could not be used.
+    /// Things the user should know of its files and of what lies beside them.
     pub(crate) warnings: Vec<String>,
 }
 
@@ -91,11 +91,12 @@ impl Scene {
         known.ok_or_else(|| JobError::PhotosGone(self.path.clone()))
     }
 
-    fn bare(path: &Path, cloud: GaussianCloud) -> Self {
+    fn bare(path: &Path, mut cloud: GaussianCloud) -> Self {
         let name = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let settings = RenderSettings::of_mode(cloud.render_mode);
+        let warnings = std::mem::take(&mut cloud.warnings);
         let (cloud, sh_stored) = compact(cloud);
-        Self { path: path.into(), name, cloud, sh_stored, settings, ..Self::default() }.with_what_lies_beside()
+        Self { path: path.into(), name, cloud, sh_stored, settings, warnings, ..Self::default() }.with_what_lies_beside()
     }
 
     fn trained(path: &Path, scene: TrainedScene, config: TrainConfig) -> Self {
@@ -103,6 +104,7 @@ impl Scene {
         let TrainedScene { folder, info, mut cloud, state } = scene;
         // Its files of earlier versions do not say it.
         cloud.render_mode = config.render_mode();
+        let warnings = std::mem::take(&mut cloud.warnings);
         let (cloud, sh_stored) = compact(cloud);
         Self {
             path: path.into(),
@@ -118,6 +120,7 @@ impl Scene {
             dataset_path,
             metres_per_unit: info.metres_per_unit.filter(|m| m.is_finite() && *m > 0.0),
             state,
+            warnings,
             ..Self::default()
         }
     }
@@ -132,10 +135,10 @@ pub(crate) enum Contents {
     Scene(Scene),
 }
 
-/// Reads what lies at `path`.
-pub(crate) fn contents(path: &Path) -> Result<Contents, JobError> {
+/// Reads what lies at `path`; the numbers of a splat by these axes, if they are given.
+pub(crate) fn contents(path: &Path, axes: Option<Axes>) -> Result<Contents, JobError> {
     let path = &*beside::splat_of(path);
-    Ok(match io::open(path)? {
+    Ok(match io::open_in(path, axes)? {
         Opened::Dataset(dataset) => Contents::Photos(dataset),
         Opened::Cloud(cloud) => Contents::Scene(Scene::bare(path, cloud)),
         Opened::Trained(scene) => {
@@ -147,7 +150,12 @@ pub(crate) fn contents(path: &Path) -> Result<Contents, JobError> {
 
 /// Reads a trained scene or a splat.
 pub fn scene(path: &Path) -> Result<Scene, JobError> {
-    match contents(path)? {
+    scene_in(path, None)
+}
+
+/// The same, the numbers of a splat by these axes, if they are given.
+pub(crate) fn scene_in(path: &Path, axes: Option<Axes>) -> Result<Scene, JobError> {
+    match contents(path, axes)? {
         Contents::Scene(scene) => Ok(scene),
         Contents::Photos(_) => Err(JobError::NotTrained(path.into())),
     }
@@ -231,6 +239,7 @@ impl OpenedScene {
     }
 
     fn of(scene: Scene, dataset: Option<Arc<Dataset>>, observer: &mut dyn Observer) -> Self {
+        scene.warnings.iter().for_each(|warning| observer.note(Severity::Warning, warning.clone()));
         let without = |d: &Arc<Dataset>| held_out(d, &scene.cameras, None, scene.config.holdout_every);
         let known_held_out = dataset.as_ref().filter(|_| !scene.cameras.is_empty()).map(without);
         let home = match &dataset {
@@ -273,7 +282,6 @@ pub(crate) fn open(
         Opened::Dataset(dataset) => photos(dataset, folders, observer),
         Opened::Cloud(cloud) => {
             let scene = Scene::bare(path, cloud);
-            scene.warnings.iter().for_each(|text| observer.note(Severity::Warning, text.clone()));
             let seen = scene.dataset_path.is_some().then(|| photos_of(&scene, observer)).flatten();
             let dataset = seen.or_else(|| scene.photos_unseen().map(Arc::new));
             OpenedScene::of(scene, dataset, observer)

@@ -25,8 +25,12 @@ pub struct GaussianCloud<R = f32> {
     pub sh: Vec<[R; 3]>,
     /// How they were trained, and so are to be drawn.
     pub render_mode: SplatRenderMode,
+    /// Upwards in the world, unit length, where a file says so and it is not `-y` as elsewhere.
+    pub up: Option<DVec3>,
     /// Per-Gaussian properties that the program does not interpret but keeps from a file.
     pub extras: Vec<ExtraProperty>,
+    /// Things the user should know of the file that it was read from.
+    pub warnings: Vec<String>,
 }
 
 /// How Gaussians are to be drawn: as those were that they were trained as.
@@ -73,6 +77,8 @@ pub enum CloudError {
     Length(&'static str, usize, usize),
     #[error("Gaussian {index}: {field} is not finite")]
     NotFinite { index: usize, field: &'static str },
+    #[error("none of its {count} Gaussians is finite: {field} of the first is not")]
+    NoneFinite { count: usize, field: &'static str },
     #[error("spherical-harmonics degree {0} is over 3")]
     Degree(u8),
 }
@@ -133,6 +139,18 @@ impl<R: Real> GaussianCloud<R> {
 
     /// Checks lengths and finiteness; the error names the first offender.
     pub fn validate(&self) -> Result<(), CloudError> {
+        self.lengths()?;
+        if !self.origin.is_finite() {
+            return Err(CloudError::NotFinite { index: 0, field: "origin" });
+        }
+        match (0..self.len()).find_map(|index| Some((index, self.flaw(index)?))) {
+            Some((index, field)) => Err(CloudError::NotFinite { index, field }),
+            None => Ok(()),
+        }
+    }
+
+    /// Checks that all arrays are of as many Gaussians.
+    pub(super) fn lengths(&self) -> Result<(), CloudError> {
         let n = self.len();
         if self.sh_degree > 3 {
             return Err(CloudError::Degree(self.sh_degree));
@@ -143,37 +161,24 @@ impl<R: Real> GaussianCloud<R> {
             ("opacity_logits", self.opacity_logits.len(), n),
             ("sh", self.sh.len(), n * self.sh_stride()),
         ];
-        for (name, have, want) in lengths {
-            if have != want {
-                return Err(CloudError::Length(name, have, want));
-            }
+        let extras = self.extras.iter().map(|e| ("extras", e.values.len(), n));
+        match lengths.into_iter().chain(extras).find(|(_, have, want)| have != want) {
+            Some((name, have, want)) => Err(CloudError::Length(name, have, want)),
+            None => Ok(()),
         }
-        if let Some(e) = self.extras.iter().find(|e| e.values.len() != n) {
-            return Err(CloudError::Length("extras", e.values.len(), n));
-        }
-        let bad = |index, field| Err(CloudError::NotFinite { index, field });
-        if !self.origin.is_finite() {
-            return bad(0, "origin");
-        }
-        let stride = self.sh_stride();
-        for i in 0..n {
-            if !self.positions[i].iter().all(|v| v.is_finite()) {
-                return bad(i, "position");
-            }
-            if !self.log_scales[i].iter().all(|v| v.is_finite()) {
-                return bad(i, "scale");
-            }
-            if !self.quaternions[i].iter().all(|v| v.is_finite()) {
-                return bad(i, "rotation");
-            }
-            if !self.opacity_logits[i].is_finite() {
-                return bad(i, "opacity");
-            }
-            if !self.sh[i * stride..(i + 1) * stride].iter().flatten().all(|v| v.is_finite()) {
-                return bad(i, "spherical harmonics");
-            }
-        }
-        Ok(())
+    }
+
+    /// What of Gaussian `i` is not finite.
+    pub(super) fn flaw(&self, i: usize) -> Option<&'static str> {
+        let Gaussian { position, log_scale, quaternion, opacity_logit, sh } = self.gaussian(i);
+        let fields = [
+            ("position", position.iter().all(|v| v.is_finite())),
+            ("scale", log_scale.iter().all(|v| v.is_finite())),
+            ("rotation", quaternion.iter().all(|v| v.is_finite())),
+            ("opacity", opacity_logit.is_finite()),
+            ("spherical harmonics", sh.iter().flatten().all(|v| v.is_finite())),
+        ];
+        fields.iter().find(|(_, finite)| !finite).map(|(name, _)| *name)
     }
 
     /// Adds the Gaussians of a cloud with the same origin, degree and extra properties.
@@ -255,7 +260,9 @@ impl<R: Real> GaussianCloud<R> {
             sh_degree: self.sh_degree,
             sh: three(&self.sh),
             render_mode: self.render_mode,
+            up: self.up,
             extras: self.extras.clone(),
+            warnings: self.warnings.clone(),
         }
     }
 
@@ -271,6 +278,8 @@ impl<R: Real> GaussianCloud<R> {
             sh_degree: self.sh_degree,
             sh: indices.iter().flat_map(|&i| self.sh[i * stride..(i + 1) * stride].iter().copied()).collect(),
             render_mode: self.render_mode,
+            up: self.up,
+            warnings: Vec::new(),
             extras: self
                 .extras
                 .iter()

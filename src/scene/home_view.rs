@@ -35,7 +35,7 @@ impl Default for HomeView {
 impl HomeView {
     /// Of a scene with photos from these cameras and these Gaussians. Photos say where it is: around the
     /// point that they look at, seen as the first shows it. A bare splat is framed as a whole, with `-y`
-    /// upwards as in the files that 3DGS writes.
+    /// upwards as in the files that 3DGS writes, or what its file says.
     pub(crate) fn new(cameras: &[Camera], cloud: Option<&GaussianCloud>) -> Self {
         // Of millions, some say as well where they are, and sooner.
         let whole = || {
@@ -43,7 +43,8 @@ impl HomeView {
             cloud.and_then(|c| Bounds::robust((0..c.len()).step_by(some(c)).map(|i| c.world_position(i))))
         };
         let Some(first) = cameras.first() else {
-            return Self { up: DVec3::NEG_Y, bounds: whole().unwrap_or(Self::default().bounds), camera: None };
+            let up = cloud.and_then(|c| c.up).unwrap_or(DVec3::NEG_Y);
+            return Self { up, bounds: whole().unwrap_or(Self::default().bounds), camera: None };
         };
         let focus = Camera::focus_of(cameras.iter())
             .or_else(|| Some(whole()?.center()))
@@ -77,7 +78,12 @@ impl HomeView {
     /// A camera that shows all of `bounds` from obliquely above, from where a splat's front usually is: x
     /// right, z away.
     pub(crate) fn overview(bounds: &Bounds, up: DVec3, [width_px, height_px]: [u32; 2]) -> Camera {
-        let front = DVec3::NEG_Z.reject_from(up).try_normalize().unwrap_or_else(|| up.any_orthonormal_vector());
+        // Where z or y is upwards, as files say that are not 3DGS's, x is on the right as well.
+        let front = match up.z.abs().max(up.y) == 1.0 {
+            true => DVec3::X.cross(up),
+            false => DVec3::NEG_Z.reject_from(up),
+        };
+        let front = front.try_normalize().unwrap_or_else(|| up.any_orthonormal_vector());
         let away = (front + up * ABOVE).normalize_or(front);
         let eye = bounds.center() + away * Self::distance(bounds, FOV_Y_RAD);
         Camera::look_at(eye, bounds.center(), up, FOV_Y_RAD, width_px, height_px)

@@ -1,6 +1,7 @@
 //! What a scene is made of. Pure data: nothing here reads or writes files.
 
 pub(crate) mod appearance;
+mod axes;
 pub(crate) mod bounds;
 pub(crate) mod camera;
 pub(crate) mod camera_path;
@@ -9,6 +10,7 @@ pub(crate) mod colors;
 pub(crate) mod crop;
 pub(crate) mod dataset;
 pub(crate) mod findings;
+mod finite;
 pub(crate) mod history;
 pub(crate) mod home_view;
 pub(crate) mod identity;
@@ -22,6 +24,7 @@ pub(crate) mod semantic_map;
 pub(crate) mod text;
 pub(crate) mod undo;
 
+pub use axes::Axes;
 pub use bounds::Bounds;
 pub use camera::{Camera, CameraError};
 pub(crate) use camera_path::{CameraPath, PathError, PathKey};

@@ -8,9 +8,10 @@ use std::time::Instant;
 use serde_json::{Value, json};
 
 use super::recipe::RecipeArgs;
+use super::scene_args::open_scene;
 use super::{CliError, number, output, view};
 use crate::jobs::query::{self, QueryRequest, QueryResult};
-use crate::jobs::{export, open, render};
+use crate::jobs::{export, render};
 use crate::pipeline::semantics::answer::Basis;
 use crate::pipeline::semantics::localize::{Answer, Hit};
 use crate::pipeline::semantics::reading::mended_text;
@@ -76,7 +77,7 @@ pub(crate) struct QueryArgs {
 }
 
 pub(crate) fn run(args: QueryArgs) -> Result<(), CliError> {
-    let scene = open::scene(&args.scene)?;
+    let scene = open_scene(&args.scene)?;
     for out in args.mask.iter().chain(&args.heat) {
         export::check(out, &query::MAP_ENDINGS, &scene.reads())?;
     }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 use super::{BOUNDS, CHUNK, HARMONICS, PACKED};
 use crate::io::ply::{Column, Ply, Table};
 use crate::io::quantized::{constant, logit, unit_quaternion, unorm};
-use crate::io::{IoError, render_mode};
+use crate::io::{IoError, render_mode, shift, vertical};
 use crate::math::sh::coefficients;
 use crate::scene::GaussianCloud;
 
@@ -36,7 +36,9 @@ pub(in crate::io) fn decode(ply: &Ply<'_>) -> Result<GaussianCloud, IoError> {
             out[1..].copy_from_slice(&rest[i * (stride - 1)..(i + 1) * (stride - 1)]);
         }
     });
+    let shift = shift::of_comments(&ply.comments).map_err(|reason| ply.syntax("vertex", reason))?;
     let cloud = GaussianCloud {
+        origin: shift.unwrap_or_default(),
         positions: rows().map(|(c, row)| c.position(position.u32(row))).collect(),
         log_scales: rows().map(|(c, row)| c.scale(scale.u32(row))).collect(),
         quaternions: rows().map(|(_, row)| quaternion(rotation.u32(row))).collect(),
@@ -44,11 +46,11 @@ pub(in crate::io) fn decode(ply: &Ply<'_>) -> Result<GaussianCloud, IoError> {
         sh_degree: degree,
         sh,
         render_mode: render_mode::of_comments(&ply.comments),
+        up: vertical::of_comments(&ply.comments),
         ..GaussianCloud::default()
     };
     // Bounds are finite, but their difference may not be.
-    cloud.validate().map_err(|cause| IoError::Cloud { path: ply.path.into(), cause })?;
-    Ok(cloud)
+    cloud.finite().map_err(|cause| IoError::Cloud { path: ply.path.into(), cause })
 }
 
 /// Bounds of a chunk: minimum and extent of position, log-scale and color.

@@ -3,12 +3,13 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
+use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{BOUNDS, CHUNK, HARMONICS, PACKED};
 use crate::io::atomic::Told;
 use crate::io::quantized::{color, opacity_byte, to_unorm, without_largest};
-use crate::io::{morton, render_mode};
+use crate::io::{morton, render_mode, shift};
 use crate::scene::GaussianCloud;
 
 /// Lowest and highest values of three numbers.
@@ -16,9 +17,11 @@ type Bounds3 = [[f32; 3]; 2];
 
 /// Writes the bytes of a compressed `.ply` of a valid cloud, in an order in which chunks are small.
 pub(in crate::io) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
+    let (near, shift) = shift::near_zero(cloud);
+    let cloud = &*near;
     let order = morton::order(cloud);
     let chunks: Vec<(Vec<u8>, Vec<u8>)> = order.par_chunks(CHUNK).map(|chunk| packed(cloud, chunk)).collect();
-    out.write_all(header(cloud).as_bytes())?;
+    out.write_all(header(cloud, shift).as_bytes())?;
     chunks.iter().try_for_each(|(bounds, _)| out.write_all(bounds))?;
     for (k, (_, rows)) in chunks.iter().enumerate() {
         told(k * CHUNK)?;
@@ -35,10 +38,11 @@ pub(in crate::io) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &m
     Ok(())
 }
 
-fn header(cloud: &GaussianCloud) -> String {
+fn header(cloud: &GaussianCloud, shift: Option<DVec3>) -> String {
     let mut text = String::from("ply\nformat binary_little_endian 1.0\n");
-    if let Some(mode) = render_mode::comment(cloud.render_mode) {
-        let _ = writeln!(text, "comment {mode}");
+    let mode = render_mode::comment(cloud.render_mode).map(str::to_owned);
+    for comment in mode.into_iter().chain(shift.map(shift::comment)) {
+        let _ = writeln!(text, "comment {comment}");
     }
     let mut element = |name: &str, rows: usize, kind: &str, properties: &[String]| {
         let _ = writeln!(text, "element {name} {rows}");

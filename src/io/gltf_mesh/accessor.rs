@@ -9,7 +9,7 @@ use crate::io::IoError;
 /// Values of an accessor as `f32`, those of one element together.
 pub(crate) struct AccessorValues {
     pub(crate) width: usize,
-    /// `[count * width]`, finite.
+    /// `[count * width]`.
     pub(crate) data: Vec<f32>,
     pub(crate) signed_integer: bool,
 }
@@ -24,6 +24,18 @@ impl AccessorValues {
 impl File<'_> {
     /// Reads a numeric accessor; integers are scaled to 0..1 or -1..1 where it says `normalized`.
     pub(crate) fn values(&self, index: usize, place: &str) -> Result<AccessorValues, IoError> {
+        let values = self.any_values(index, place)?;
+        match values.data.iter().position(|v| !v.is_finite()) {
+            None => Ok(values),
+            Some(i) => {
+                let (path, index, property) = (self.path.into(), i / values.width, format!("accessors[{index}]"));
+                Err(IoError::NotFinite { path, element: "element", index, property })
+            }
+        }
+    }
+
+    /// The same where floats may be other than finite.
+    pub(crate) fn any_values(&self, index: usize, place: &str) -> Result<AccessorValues, IoError> {
         let root = self.root;
         let accessor = self.item(&root.accessors, index, "accessors", place)?;
         let place = format!("accessors[{index}]");
@@ -72,10 +84,6 @@ impl File<'_> {
                     *t = number(b, component, normalized);
                 }
             }
-        }
-        if let Some(i) = data.iter().position(|v| !v.is_finite()) {
-            let (path, index) = (self.path.into(), i / width);
-            return Err(IoError::NotFinite { path, element: "element", index, property: place });
         }
         Ok(AccessorValues { width, data, signed_integer: matches!(component, ComponentType::I8 | ComponentType::I16) })
     }
@@ -130,7 +138,7 @@ impl File<'_> {
         Ok((0..count).map(move |i| &bytes[offset + i * stride..][..size]))
     }
 
-    pub(super) fn view_bytes(&self, index: usize, place: &str) -> Result<&[u8], IoError> {
+    pub(crate) fn view_bytes(&self, index: usize, place: &str) -> Result<&[u8], IoError> {
         let view = self.item(&self.root.buffer_views, index, "bufferViews", place)?;
         let buffer = self.item(&self.buffers, view.buffer.value(), "buffers", &format!("bufferViews[{index}]"))?;
         let start = view.byte_offset.map_or(0, |o| o.0);

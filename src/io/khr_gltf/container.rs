@@ -68,6 +68,16 @@ impl<'a> Gltf<'a> {
         IoError::Unsupported { path: self.path.into(), what, remedy }
     }
 
+    /// For errors.
+    pub(crate) fn path(&self) -> &Path {
+        self.path
+    }
+
+    /// The bytes of buffer view `index`.
+    pub(crate) fn view_bytes(&self, index: usize) -> Result<&[u8], IoError> {
+        self.file.view_bytes(index, "a splat primitive")
+    }
+
     pub(crate) fn nodes(&self) -> Result<Vec<MeshNode>, IoError> {
         Ok(self.file.nodes()?.0)
     }
@@ -78,7 +88,7 @@ impl<'a> Gltf<'a> {
 
     /// The values of accessor `index`, integers as the accessor says: normalized or as they are.
     pub(crate) fn values<const N: usize>(&self, index: usize) -> Result<AttributeValues<N>, IoError> {
-        let values = self.file.values(index, "a splat primitive")?;
+        let values = self.file.any_values(index, "a splat primitive")?;
         if values.width != N {
             let reason = format!("it has {} components, expected {N}", values.width);
             return Err(self.bad(&format!("accessors[{index}]"), reason));

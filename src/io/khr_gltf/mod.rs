@@ -1,4 +1,7 @@
-//! Splats in glTF 2.0 (`.gltf`, `.glb`): the extension `KHR_gaussian_splatting`.
+//! Splats in glTF 2.0 (`.gltf`, `.glb`): the extension `KHR_gaussian_splatting`, plain or as SPZ within.
+//!
+//! The axes of glTF are left, up, front. Files that this program wrote before it turned them (generator `fmlgs`) have
+//! those of the scene.
 //!
 //! Scales are linear since the extension's draft of April 2026; earlier files hold logarithms.
 //! A negative value or a signed integer type gives the latter away. Colors of the linear color
@@ -6,6 +9,7 @@
 //! first order around it.
 
 mod container;
+mod packed;
 mod primitive;
 mod write;
 
@@ -16,30 +20,39 @@ pub(super) use write::{encode_binary, encode_text};
 
 use super::gltf_mesh::resource::split_container;
 use super::{IoError, files};
-use crate::scene::GaussianCloud;
+use crate::scene::{Axes, GaussianCloud};
 use container::Gltf;
 
 /// Name of the extension, and prefix of its attributes.
 const EXTENSION: &str = "KHR_gaussian_splatting";
 /// Prefix of attributes that the format leaves to applications.
 const EXTRA: &str = "_";
+/// The generator of files in the scene's axes.
+const UNTURNED: &str = "fmlgs";
 
-/// Reads every splat of a glTF file's scene.
-pub(crate) fn read(path: &Path) -> Result<GaussianCloud, IoError> {
-    parse(&files::read(path, u64::MAX)?, path)
+/// Reads every splat of a glTF file's scene, by these axes if they are given.
+pub(crate) fn read(path: &Path, axes: Option<Axes>) -> Result<GaussianCloud, IoError> {
+    parse_in(&files::read(path, u64::MAX)?, path, axes)
 }
 
-/// The Gaussians in the bytes of a glTF file. External buffers are read from the folder of `path`.
+/// The Gaussians in the bytes of a glTF file, in the scene's axes. External buffers are read from the folder of `path`.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
+    parse_in(bytes, path, None)
+}
+
+fn parse_in(bytes: &[u8], path: &Path, axes: Option<Axes>) -> Result<GaussianCloud, IoError> {
     let (text, blob) = split_container(bytes, path)?;
     let json = container::json(text, path)?;
     let gltf = Gltf::open(&json, blob, path)?;
     let mut parts = Vec::new();
     for node in gltf.nodes()? {
         for primitive in gltf.primitives(&node) {
-            if let Some(extension) = primitive.extensions.get(EXTENSION) {
-                parts.push(primitive::cloud(&gltf, primitive, extension, node.world_from_node)?);
-            }
+            let part = match (packed::view(primitive), primitive.extensions.get(EXTENSION)) {
+                (Some(view), _) => packed::cloud(&gltf, view)?,
+                (None, Some(extension)) => primitive::cloud(&gltf, primitive, extension)?,
+                (None, None) => continue,
+            };
+            parts.push(primitive::placed(&gltf, part, node.world_from_node)?);
         }
     }
     if parts.is_empty() {
@@ -49,9 +62,12 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
             remedy: "turn the meshes into posed photos first: fmlgs synth",
         });
     }
-    let cloud = GaussianCloud::joined(parts);
-    cloud.validate().map_err(|cause| IoError::Cloud { path: path.into(), cause })?;
-    Ok(cloud)
+    let warnings = parts.iter_mut().flat_map(|part| std::mem::take(&mut part.warnings)).collect();
+    let cloud = GaussianCloud { warnings, ..GaussianCloud::joined(parts) };
+    let unturned = json.0.asset.generator.as_deref() == Some(UNTURNED);
+    let axes = axes.unwrap_or(if unturned { Axes::PLY } else { Axes::GLTF });
+    let cloud = cloud.finite().map_err(|cause| IoError::Cloud { path: path.into(), cause })?;
+    Ok(cloud.turned(&axes.scene_from_file(), false))
 }
 
 #[cfg(test)]

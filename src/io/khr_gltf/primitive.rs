@@ -1,6 +1,6 @@
-//! A primitive with the extension, as Gaussians in the world.
+//! A primitive with the extension, as Gaussians, and where its node puts them.
 
-use glam::{DMat3, DMat4, DQuat, DVec3};
+use glam::{DMat3, DMat4, DVec3};
 
 use super::container::{Gltf, SplatPrimitive};
 use super::{EXTENSION, EXTRA};
@@ -11,11 +11,11 @@ use crate::math::sh::{SH_C0, coefficients};
 use crate::math::srgb;
 use crate::scene::{ExtraProperty, GaussianCloud};
 
+/// The Gaussians in the axes of their node.
 pub(super) fn cloud(
     gltf: &Gltf<'_>,
     primitive: &SplatPrimitive,
     extension: &serde_json::Value,
-    world: DMat4,
 ) -> Result<GaussianCloud, IoError> {
     let setting = |key: &str| extension.get(key).and_then(|v| v.as_str()).unwrap_or("");
     let kernel = setting("kernel");
@@ -57,32 +57,26 @@ pub(super) fn cloud(
     }
     let logarithms = scales.signed_integer || scales.rows.iter().flatten().any(|s| *s < 0.0);
     let log_scale = |s: f32| if logarithms { s } else { log_scale(s) };
-    let (turn, scale) = similarity(gltf, world)?;
-    if degree > 0 && turn.is_some() {
-        return Err(
-            gltf.unsupported("a rotated node with view-dependent colors".into(), "apply the rotation to the splats")
-        );
-    }
-    let grown = scale.ln() as f32;
-    let turned = |[x, y, z, w]: [f32; 4]| match turn {
-        None => [w, x, y, z],
-        Some(turn) => {
-            let q = turn * DQuat::from_array([x, y, z, w].map(f64::from));
-            [q.w, q.x, q.y, q.z].map(|v| v as f32)
-        }
-    };
-    let place = |p: &[f32; 3]| world.transform_vector3(DVec3::from_array(p.map(f64::from))).as_vec3().to_array();
     Ok(GaussianCloud {
-        origin: world.w_axis.truncate(),
-        positions: positions.iter().map(place).collect(),
-        log_scales: scales.rows.iter().map(|s| s.map(|s| log_scale(s) + grown)).collect(),
-        quaternions: rotations.into_iter().map(turned).collect(),
+        positions,
+        log_scales: scales.rows.iter().map(|s| s.map(log_scale)).collect(),
+        quaternions: rotations.into_iter().map(|[x, y, z, w]| [w, x, y, z]).collect(),
         opacity_logits: opacities.into_iter().map(|[o]| logit(o)).collect(),
         sh_degree: degree,
         sh,
         extras: extras(gltf, primitive, n)?,
         ..GaussianCloud::default()
     })
+}
+
+/// Gaussians of a node in the world: turned with their harmonics, grown, and around an origin where the node is.
+pub(super) fn placed(gltf: &Gltf<'_>, cloud: GaussianCloud, world: DMat4) -> Result<GaussianCloud, IoError> {
+    let (turn, scale) = similarity(gltf, world)?;
+    let (mut cloud, size, grown) = (cloud.turned(&turn, false), scale as f32, scale.ln() as f32);
+    cloud.positions.iter_mut().flatten().for_each(|v| *v *= size);
+    cloud.log_scales.iter_mut().flatten().for_each(|s| *s += grown);
+    cloud.origin = world.transform_point3(DVec3::ZERO) + cloud.origin * scale;
+    Ok(cloud)
 }
 
 /// Numbers of applications, one of each Gaussian.
@@ -104,8 +98,8 @@ fn equal(gltf: &Gltf<'_>, n: usize, count: usize) -> Result<(), IoError> {
     Err(gltf.bad("a splat primitive", format!("{n} positions, but another attribute has {count} values")))
 }
 
-/// Rotation (`None` for none) and scale of a node's transform.
-fn similarity(gltf: &Gltf<'_>, world: DMat4) -> Result<(Option<DQuat>, f64), IoError> {
+/// Rotation and scale of a node's transform.
+fn similarity(gltf: &Gltf<'_>, world: DMat4) -> Result<(DMat3, f64), IoError> {
     let m = DMat3::from_mat4(world);
     let scale = m.determinant().cbrt();
     let unit = m * scale.recip();
@@ -115,8 +109,7 @@ fn similarity(gltf: &Gltf<'_>, world: DMat4) -> Result<(Option<DQuat>, f64), IoE
             .unsupported("a node that is stretched, sheared or mirrored".into(), "apply its transform to the splats"));
     }
     let r = nearest_rotation(&unit);
-    let turned = !r.abs_diff_eq(DMat3::IDENTITY, 1e-9);
-    Ok((turned.then(|| DQuat::from_mat3(&r)), scale))
+    Ok((if r.abs_diff_eq(DMat3::IDENTITY, 1e-9) { DMat3::IDENTITY } else { r }, scale))
 }
 
 /// Harmonics of linear light to those of display values.

@@ -9,7 +9,7 @@ use super::{EXTENSION, EXTRA};
 use crate::io::atomic::Told;
 use crate::io::quantized::unit;
 use crate::math::Real;
-use crate::scene::GaussianCloud;
+use crate::scene::{Axes, GaussianCloud};
 
 /// Gaussians between two reports.
 const BLOCK: usize = 4096;
@@ -29,6 +29,7 @@ struct Attribute<'a> {
 
 /// Writes the bytes of a `.glb` of a valid cloud that is not empty.
 pub(in crate::io) fn encode_binary(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
+    let cloud = &turned(cloud);
     let attributes = attributes(cloud);
     let (mut text, bytes) = (document(cloud, &attributes, None).to_string(), buffer_bytes(cloud, &attributes));
     // Chunks end at multiples of four; the buffer's own does as it is.
@@ -49,6 +50,7 @@ pub(in crate::io) fn encode_binary(out: &mut dyn Write, cloud: &GaussianCloud, t
 /// Writes the text of a `.gltf` of a valid cloud that is not empty, its buffer within.
 pub(in crate::io) fn encode_text(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
     const HERE: &str = "data:application/octet-stream;base64,";
+    let cloud = &turned(cloud);
     let attributes = attributes(cloud);
     let text = document(cloud, &attributes, Some(HERE)).to_string();
     let (before, after) = text.split_once(HERE).unwrap_or((&text, ""));
@@ -58,6 +60,11 @@ pub(in crate::io) fn encode_text(out: &mut dyn Write, cloud: &GaussianCloud, tol
     encoded.finish()?;
     drop(encoded);
     out.write_all(after.as_bytes())
+}
+
+/// The cloud in the axes of glTF.
+fn turned(cloud: &GaussianCloud) -> GaussianCloud {
+    cloud.clone().turned(&Axes::GLTF.scene_from_file().transpose(), false)
 }
 
 fn attributes(cloud: &GaussianCloud) -> Vec<Attribute<'_>> {
@@ -135,7 +142,7 @@ fn document(cloud: &GaussianCloud, attributes: &[Attribute<'_>], uri: Option<&st
         buffer["uri"] = json!(uri);
     }
     json!({
-        "asset": { "version": "2.0", "generator": "fmlgs" },
+        "asset": { "version": "2.0", "generator": concat!("fmlgs ", env!("CARGO_PKG_VERSION")) },
         "extensionsUsed": [EXTENSION],
         "scene": 0,
         "scenes": [{ "nodes": [0] }],

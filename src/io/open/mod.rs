@@ -11,7 +11,7 @@ use super::{
     IoError, OpenError, colmap, files, gs_output, khr_gltf, ksplat, llff, sog, splat, splat_ply, spz, transforms,
     unposed,
 };
-use crate::scene::{Dataset, GaussianCloud};
+use crate::scene::{Axes, Dataset, GaussianCloud};
 
 /// What a path turned out to be.
 // One value exists per opening; a box would only be in the reader's way.
@@ -86,16 +86,37 @@ const MAGIC_BYTES: u64 = 4;
 
 /// Opens a dataset's folder or its `transforms.json`, a splat file, or a trained scene.
 pub fn open(path: &Path) -> Result<Opened> {
+    open_in(path, None)
+}
+
+/// The same with the axes of a splat's numbers, where they are not those that its file says or its format has.
+///
+/// # Errors
+/// As [`open`], and if axes are given for something else than a splat.
+pub fn open_in(path: &Path, axes: Option<Axes>) -> Result<Opened> {
+    match (open_any(path, axes)?, axes) {
+        (opened @ Opened::Cloud(_), _) | (opened, None) => Ok(opened),
+        (_, Some(_)) => {
+            let (path, what) = (path.into(), "axes for what is no splat file".into());
+            Err(IoError::Unsupported { path, what, remedy: "photos and trained scenes say how they lie" }.into())
+        }
+    }
+}
+
+fn open_any(path: &Path, axes: Option<Axes>) -> Result<Opened> {
     let meta = fs::metadata(path).map_err(|cause| match cause.kind() {
         std::io::ErrorKind::NotFound => OpenError::NotFound { path: path.into() },
         _ => IoError::Read { path: path.into(), cause }.into(),
     })?;
-    if meta.is_dir() { open_folder(path) } else { open_file(path) }
+    if meta.is_dir() { open_folder(path, axes) } else { open_file(path, axes) }
 }
 
-fn open_folder(path: &Path) -> Result<Opened> {
+fn open_folder(path: &Path, axes: Option<Axes>) -> Result<Opened> {
     if let Some(layout) = FOLDERS.iter().find(|l| (l.is)(path)) {
-        return Ok((layout.open)(path)?);
+        return Ok(match (layout.open)(path)? {
+            Opened::Cloud(cloud) => Opened::Cloud(turned(cloud, axes)),
+            other => other,
+        });
     }
     if let Some(dataset) = beside::other_list(path)? {
         return Ok(Opened::Dataset(dataset));
@@ -116,7 +137,15 @@ fn open_folder(path: &Path) -> Result<Opened> {
     })
 }
 
-fn open_file(path: &Path) -> Result<Opened> {
+/// A cloud of a format that has the axes of the scene.
+fn turned(cloud: GaussianCloud, axes: Option<Axes>) -> GaussianCloud {
+    match axes {
+        Some(axes) => GaussianCloud { up: None, ..cloud }.turned(&axes.scene_from_file(), true),
+        None => cloud,
+    }
+}
+
+fn open_file(path: &Path, axes: Option<Axes>) -> Result<Opened> {
     let name = path.file_name().map_or_else(String::new, |n| n.to_string_lossy().to_lowercase());
     let folder = match path.parent() {
         Some(p) if !p.as_os_str().is_empty() => p,
@@ -129,7 +158,7 @@ fn open_file(path: &Path) -> Result<Opened> {
         {
             return Ok(Opened::Dataset(transforms::read_blender(folder)?));
         }
-        sog::META_FILE => return Ok(Opened::Cloud(sog::read_folder(path)?)),
+        sog::META_FILE => return Ok(Opened::Cloud(turned(sog::read_folder(path)?, axes))),
         llff::POSES_FILE => return Ok(Opened::Dataset(llff::read(folder)?)),
         "images.bin" | "images.txt" | "cameras.bin" | "cameras.txt" | "points3d.bin" | "points3d.txt"
             if colmap::is_colmap(folder) =>
@@ -143,20 +172,23 @@ fn open_file(path: &Path) -> Result<Opened> {
     }
     let start = files::read_start(path, MAGIC_BYTES)?;
     packed::refuse(path, &name, &start)?;
-    match start.as_slice() {
-        [b'p', b'l', b'y', b'\n' | b'\r'] | [0xEF, 0xBB, 0xBF, b'p'] => Ok(Opened::Cloud(splat_ply::read(path)?)),
-        start if khr_gltf::is_gltf(start, &name) => Ok(Opened::Cloud(khr_gltf::read(path)?)),
-        b"PK\x03\x04" => Ok(Opened::Cloud(sog::read_archive(path)?)),
-        start if spz::is_spz(start) => Ok(Opened::Cloud(spz::read(path)?)),
+    let cloud = match start.as_slice() {
+        [b'p', b'l', b'y', b'\n' | b'\r'] | [0xEF, 0xBB, 0xBF, b'p'] => turned(splat_ply::read(path)?, axes),
+        start if khr_gltf::is_gltf(start, &name) => khr_gltf::read(path, axes)?,
+        b"PK\x03\x04" => turned(sog::read_archive(path)?, axes),
+        start if spz::is_spz(start) => spz::read(path, axes)?,
         // These two begin with anything.
-        [_, ..] if name.ends_with(".splat") => Ok(Opened::Cloud(splat::read(path)?)),
-        [_, ..] if name.ends_with(".ksplat") => Ok(Opened::Cloud(ksplat::read(path)?)),
-        start => Err(OpenError::Unrecognized {
-            path: path.into(),
-            looked_for: FILES.into(),
-            found: in_words(&name, start).into(),
-        }),
-    }
+        [_, ..] if name.ends_with(".splat") => turned(splat::read(path)?, axes),
+        [_, ..] if name.ends_with(".ksplat") => turned(ksplat::read(path)?, axes),
+        start => {
+            return Err(OpenError::Unrecognized {
+                path: path.into(),
+                looked_for: FILES.into(),
+                found: in_words(&name, start).into(),
+            });
+        }
+    };
+    Ok(Opened::Cloud(cloud))
 }
 
 /// What a file is that is of no format known here.

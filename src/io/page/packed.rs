@@ -6,10 +6,7 @@ use glam::DVec3;
 
 pub(crate) use crate::io::morton::order;
 use crate::io::spz;
-use crate::scene::{GaussianCloud, SplatRenderMode};
-
-/// Signs that half a turn about x gives to the harmonics above the first, degree 1 to 3.
-const TURNED: [f32; 15] = [-1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0];
+use crate::scene::{Axes, GaussianCloud, SplatRenderMode};
 
 /// The cloud's Gaussians with the axes of browsers (x right, y up, z backward), centers relative to its origin; `order`
 /// has the place in the cloud of each that is written.
@@ -18,14 +15,8 @@ const TURNED: [f32; 15] = [-1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, -1.0, 1.0
 /// If it reaches farther than the format does.
 pub(crate) fn encode(cloud: &GaussianCloud, order: &[usize], antialias: bool) -> io::Result<Vec<u8>> {
     let render_mode = if antialias { SplatRenderMode::Mip } else { SplatRenderMode::default() };
-    let mut turned = GaussianCloud { origin: DVec3::ZERO, render_mode, ..cloud.select(order) };
-    let stride = turned.sh_stride();
-    turned.positions.iter_mut().for_each(|[_, y, z]| (*y, *z) = (-*y, -*z));
-    turned.quaternions.iter_mut().for_each(|[_, _, y, z]| (*y, *z) = (-*y, -*z));
-    for own in turned.sh.chunks_mut(stride) {
-        own[1..].iter_mut().zip(TURNED).for_each(|(rgb, sign)| rgb.iter_mut().for_each(|v| *v *= sign));
-    }
-    spz::unpacked(&turned, &mut |_| Ok(()))
+    let part = GaussianCloud { origin: DVec3::ZERO, render_mode, ..cloud.select(order) };
+    spz::unpacked(&part.turned(&Axes::SPZ.scene_from_file().transpose(), true), &mut |_| Ok(()))
 }
 
 /// Numbers below 2^24 in `order`, all low bytes first, then the next ones, then the highest.
@@ -37,6 +28,9 @@ pub(crate) fn identities(of: &[u32], order: &[usize]) -> Vec<u8> {
 #[cfg(test)]
 pub(crate) mod tests {
     use super::*;
+
+    /// Signs that half a turn about x gives to the harmonics above the first, degree 1 to 3.
+    const TURNED: [f32; 15] = [-1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0];
 
     /// What a page's script reads: the cloud again, in the axes of the scene, centers relative to the origin.
     pub(crate) fn decode(bytes: &[u8]) -> GaussianCloud {

@@ -1,6 +1,6 @@
 //! Rows of numbers as text, turned into the binary form.
 
-use super::{Column, Encoding, Kind, Ply};
+use super::{Column, Element, Encoding, Kind, Ply};
 use crate::io::IoError;
 
 /// The rows of element `at` as little-endian bytes.
@@ -13,12 +13,9 @@ pub(super) fn rows(ply: &Ply<'_>, at: usize, columns: &[Column], stride: usize) 
         }
         for row in 0..element.count {
             for p in &element.properties {
-                let items = match p.kind {
-                    Kind::Scalar(_) => 1,
-                    Kind::List { .. } => number(ply, &mut words, at, row, &p.name)?.max(0.0) as u64,
-                };
-                for _ in 0..items {
-                    words.next().ok_or_else(|| ply.short(element, row))?;
+                match p.kind {
+                    Kind::Scalar(_) => drop(words.next().ok_or_else(|| ply.short(element, row))?),
+                    Kind::List { .. } => pass_list(ply, &mut words, element, row, &p.name)?,
                 }
             }
         }
@@ -28,8 +25,14 @@ pub(super) fn rows(ply: &Ply<'_>, at: usize, columns: &[Column], stride: usize) 
     ply.fits(element, (words.rest.len() + 1) / (2 * columns.len()))?;
     let mut out = Vec::with_capacity(element.count as usize * stride);
     for row in 0..element.count {
-        for c in columns {
-            let value = number(ply, &mut words, at, row, &c.name)?;
+        let mut columns = columns.iter();
+        for p in &element.properties {
+            if let Kind::List { .. } = p.kind {
+                pass_list(ply, &mut words, element, row, &p.name)?;
+                continue;
+            }
+            let Some(c) = columns.next() else { break };
+            let value = number(ply, &mut words, element, row, &c.name)?;
             if c.scalar.push(&mut out, value).is_none() {
                 return Err(ply.syntax(&element.name, format!("row {row}: {} = {value} does not fit its type", c.name)));
             }
@@ -38,8 +41,16 @@ pub(super) fn rows(ply: &Ply<'_>, at: usize, columns: &[Column], stride: usize) 
     Ok(out)
 }
 
-fn number(ply: &Ply<'_>, words: &mut Words<'_>, at: usize, row: u64, property: &str) -> Result<f64, IoError> {
-    let element = &ply.elements[at];
+/// Passes over a list with its length in front.
+fn pass_list(ply: &Ply<'_>, words: &mut Words<'_>, element: &Element, row: u64, property: &str) -> Result<(), IoError> {
+    let items = number(ply, words, element, row, property)?.max(0.0) as u64;
+    for _ in 0..items {
+        words.next().ok_or_else(|| ply.short(element, row))?;
+    }
+    Ok(())
+}
+
+fn number(ply: &Ply<'_>, words: &mut Words<'_>, element: &Element, row: u64, property: &str) -> Result<f64, IoError> {
     let word = words.next().ok_or_else(|| ply.short(element, row))?;
     std::str::from_utf8(word).ok().and_then(|w| w.parse().ok()).ok_or_else(|| {
         let shown: String = String::from_utf8_lossy(word).chars().take(30).collect();

@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use half::f16;
+
 use super::Ply;
 use crate::io::IoError;
 
@@ -23,6 +25,7 @@ pub(crate) enum Scalar {
     U16,
     I32,
     U32,
+    F16,
     F32,
     F64,
 }
@@ -36,16 +39,21 @@ impl Scalar {
             "ushort" | "uint16" => Self::U16,
             "int" | "int32" => Self::I32,
             "uint" | "uint32" => Self::U32,
+            "half" | "float16" | "f16" => Self::F16,
             "float" | "float32" => Self::F32,
             "double" | "float64" => Self::F64,
             _ => return None,
         })
     }
 
+    pub(crate) const fn is_float(self) -> bool {
+        matches!(self, Self::F16 | Self::F32 | Self::F64)
+    }
+
     pub(crate) const fn bytes(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
-            Self::I16 | Self::U16 => 2,
+            Self::I16 | Self::U16 | Self::F16 => 2,
             Self::I32 | Self::U32 | Self::F32 => 4,
             Self::F64 => 8,
         }
@@ -65,6 +73,7 @@ impl Scalar {
             Self::U16 => f64::from(u16::from_le_bytes(get(b))),
             Self::I32 => f64::from(i32::from_le_bytes(get(b))),
             Self::U32 => f64::from(u32::from_le_bytes(get(b))),
+            Self::F16 => f64::from(f16::from_le_bytes(get(b))),
             Self::F32 => f64::from(f32::from_le_bytes(get(b))),
             Self::F64 => f64::from_le_bytes(get(b)),
         }
@@ -80,6 +89,7 @@ impl Scalar {
             Self::U16 => out.extend((int(0.0, 65_535.0)? as u16).to_le_bytes()),
             Self::I32 => out.extend((int(f64::from(i32::MIN), f64::from(i32::MAX))? as i32).to_le_bytes()),
             Self::U32 => out.extend((int(0.0, f64::from(u32::MAX))? as u32).to_le_bytes()),
+            Self::F16 => out.extend(f16::from_f64(value).to_le_bytes()),
             Self::F32 => out.extend((value as f32).to_le_bytes()),
             Self::F64 => out.extend(value.to_le_bytes()),
         }
@@ -112,6 +122,13 @@ pub(crate) struct Element {
     /// Rows, as the file claims.
     pub(crate) count: u64,
     pub(crate) properties: Vec<Property>,
+}
+
+impl Element {
+    /// Whether a row holds lists, and so may have any size.
+    pub(super) fn has_lists(&self) -> bool {
+        self.properties.iter().any(|p| matches!(p.kind, Kind::List { .. }))
+    }
 }
 
 pub(super) fn parse<'a>(bytes: &'a [u8], path: &'a Path) -> Result<Ply<'a>, IoError> {

@@ -2,12 +2,14 @@
 //! the file's encoding. What the columns mean is up to `splat_ply` and `points_ply`.
 
 mod ascii;
+mod color;
 mod header;
 mod table;
 
 use std::borrow::Cow;
 use std::path::Path;
 
+pub(crate) use color::Colors;
 pub(crate) use header::{Element, Encoding, Kind, Scalar};
 pub(crate) use table::{Column, Table};
 
@@ -37,7 +39,7 @@ impl<'a> Ply<'a> {
     /// Columns and bytes of a row of the element of that name, if it comes first and its rows are of
     /// one size.
     pub(crate) fn first_rows(&self, name: &str) -> Option<(Vec<Column>, usize)> {
-        let element = self.elements.first().filter(|e| e.name == name)?;
+        let element = self.elements.first().filter(|e| e.name == name && !e.has_lists())?;
         self.columns(element).ok()
     }
 
@@ -45,7 +47,7 @@ impl<'a> Ply<'a> {
         self.body.len()
     }
 
-    /// The rows of the element of that name; `None` if the file has no such element.
+    /// The rows of the element of that name without its lists; `None` if the file has no such element.
     pub(crate) fn table(&self, name: &str) -> Result<Option<Table<'a>>, IoError> {
         let Some(at) = self.elements.iter().position(|e| e.name == name) else { return Ok(None) };
         let element = &self.elements[at];
@@ -57,21 +59,17 @@ impl<'a> Ply<'a> {
         Ok(Some(Table { rows: element.count as usize, stride, columns, data }))
     }
 
-    /// The columns of an element of scalars and the bytes that they take in binary.
+    /// The columns of an element but for its lists, and the bytes that they take in binary.
     fn columns(&self, element: &Element) -> Result<(Vec<Column>, usize), IoError> {
         let mut offset = 0;
         let mut columns = Vec::with_capacity(element.properties.len());
         for p in &element.properties {
-            let Kind::Scalar(scalar) = p.kind else {
-                return Err(
-                    self.syntax(&element.name, format!("list property '{}' where a number is expected", p.name))
-                );
-            };
+            let Kind::Scalar(scalar) = p.kind else { continue };
             columns.push(Column { name: p.name.clone(), scalar, offset });
             offset += scalar.bytes();
         }
         if columns.is_empty() {
-            return Err(self.syntax(&element.name, "no properties".into()));
+            return Err(self.syntax(&element.name, "no properties that are numbers".into()));
         }
         Ok((columns, offset))
     }
@@ -83,6 +81,9 @@ impl<'a> Ply<'a> {
         }
         let element = &self.elements[at];
         self.fits(element, rest.len() / stride)?;
+        if element.has_lists() {
+            return self.rows_beside_lists(element, rest, stride).map(Cow::Owned);
+        }
         let data = &rest[..element.count as usize * stride];
         if self.encoding == Encoding::LittleEndian {
             return Ok(Cow::Borrowed(data));
@@ -94,6 +95,32 @@ impl<'a> Ply<'a> {
             }
         }
         Ok(Cow::Owned(swapped))
+    }
+
+    /// The numbers of rows with lists between them, little-endian.
+    fn rows_beside_lists(&self, element: &Element, rest: &[u8], stride: usize) -> Result<Vec<u8>, IoError> {
+        let mut out = Vec::with_capacity(element.count as usize * stride);
+        let mut left = rest;
+        for row in 0..element.count {
+            for p in &element.properties {
+                let (bytes, kept) = match p.kind {
+                    Kind::Scalar(s) => (s.bytes(), true),
+                    Kind::List { count, item } => {
+                        let head = left.get(..count.bytes()).ok_or_else(|| self.short(element, row))?;
+                        let items = self.list_len(head, count) as usize;
+                        (items.saturating_mul(item.bytes()).saturating_add(count.bytes()), false)
+                    }
+                };
+                let (value, after) = left.split_at_checked(bytes).ok_or_else(|| self.short(element, row))?;
+                left = after;
+                match (kept, self.encoding) {
+                    (true, Encoding::BigEndian) => out.extend(value.iter().rev()),
+                    (true, _) => out.extend_from_slice(value),
+                    (false, _) => {}
+                }
+            }
+        }
+        Ok(out)
     }
 
     /// Bytes that an element takes at the front of `rest`.

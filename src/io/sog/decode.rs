@@ -59,6 +59,7 @@ pub(super) fn cloud(
         _ => (0, constant.collect()),
     };
     let cloud = GaussianCloud {
+        origin: meta.origin,
         positions: low.pixels.par_iter().zip(&high.pixels).map(|(l, h)| position(meta, *l, *h)).collect(),
         log_scales: scales.pixels.par_iter().map(|p| [0, 1, 2].map(|k| meta.scales.0[k][usize::from(p[k])])).collect(),
         quaternions: quats.pixels.par_iter().map(|p| quaternion(*p)).collect(),
@@ -69,8 +70,7 @@ pub(super) fn cloud(
         ..GaussianCloud::default()
     };
     // Bounds and codebooks are finite, but a position's exponential may not be.
-    cloud.validate().map_err(|cause| IoError::Cloud { path: path.into(), cause })?;
-    Ok(cloud)
+    cloud.finite().map_err(|cause| IoError::Cloud { path: path.into(), cause })
 }
 
 fn position(meta: &Meta, low: [u8; 4], high: [u8; 4]) -> [f32; 3] {

@@ -11,7 +11,7 @@ use super::palette::{codebook, palette};
 use super::{FIRST_TAG, META_FILE, PALETTE_ROW};
 use crate::io::atomic::Told;
 use crate::io::quantized::{opacity_byte, to_byte, to_unorm, without_largest};
-use crate::io::{morton, render_mode};
+use crate::io::{morton, render_mode, shift};
 use crate::scene::GaussianCloud;
 
 /// Longest side of a WebP picture in px.
@@ -32,6 +32,8 @@ struct Picture {
 /// # Errors
 /// If there are more Gaussians than a picture has pixels.
 pub(super) fn files(cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<Vec<(String, Vec<u8>)>> {
+    let (near, shift) = shift::near_zero(cloud);
+    let cloud = &*near;
     let order = morton::order(cloud);
     let n = order.len();
     let width = ((n as f64).sqrt() / 4.0).ceil() as usize * 4;
@@ -73,6 +75,9 @@ pub(super) fn files(cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<Ve
         "quats": { "files": ["quats.webp"] },
         "sh0": part(&colors, "sh0.webp"),
     });
+    if let Some(shift) = shift {
+        meta["fmlgs_shift"] = json!(shift.to_array());
+    }
     if let Some(model) = render_mode::sog_model(cloud.render_mode) {
         meta["model"] = json!(model);
     }

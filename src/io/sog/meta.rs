@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use glam::DVec3;
 use serde::Deserialize;
 
 use crate::io::render_mode::of_sog_model;
@@ -25,6 +26,8 @@ pub(super) struct Meta {
     pub(crate) sh0_file: String,
     pub(crate) rest: Option<Rest>,
     pub(crate) render_mode: SplatRenderMode,
+    /// What the positions are relative to.
+    pub(crate) origin: DVec3,
 }
 
 /// What the 256 values of a byte stand for, by channel.
@@ -68,6 +71,8 @@ struct File {
     sh0: Part,
     #[serde(rename = "shN")]
     rest: Option<Part>,
+    /// This program's own.
+    fmlgs_shift: Option<[f64; 3]>,
 }
 
 #[derive(Deserialize)]
@@ -142,7 +147,25 @@ fn convert(file: File, codebooks: bool) -> Result<Meta, Flaw> {
     };
     let render_mode = file.model.as_deref().map(of_sog_model).unwrap_or_default();
     let means_files = [low, high];
-    Ok(Meta { count, means, means_files, scales, scales_file, quats_file, sh0, opacity, sh0_file, rest, render_mode })
+    let origin = DVec3::from_array(file.fmlgs_shift.unwrap_or_default());
+    if !origin.is_finite() {
+        return Err(flaw("fmlgs_shift", "not finite"));
+    }
+    let read = Meta {
+        count,
+        means,
+        means_files,
+        scales,
+        scales_file,
+        quats_file,
+        sh0,
+        opacity,
+        sh0_file,
+        rest,
+        render_mode,
+        origin,
+    };
+    Ok(read)
 }
 
 fn flaw(part: &'static str, reason: &str) -> Flaw {

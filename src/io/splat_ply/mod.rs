@@ -3,11 +3,13 @@
 //! One `vertex` per Gaussian: `x y z`, `nx ny nz` (unused, 0), `f_dc_0..2`, `f_rest_0..` (all red
 //! coefficients, then green, then blue), `opacity` (before the sigmoid), `scale_0..2`
 //! (logarithms), `rot_0..3` (w x y z). Properties may come in any order; further ones are kept in
-//! [`GaussianCloud::extras`](crate::scene::GaussianCloud) and written back.
+//! [`GaussianCloud::extras`](crate::scene::GaussianCloud) and written back. Without `scale_2` they are the disks of 2D
+//! Gaussian Splatting; without `f_dc_0..2`, `red green blue` are the color, as nerfstudio writes them.
 //!
 //! A cloud whose origin is not zero keeps its full precision in a way that other programs ignore:
 //! a comment `fmlgs origin X Y Z` and properties `x_residual y_residual z_residual`, so that
-//! `world = x + x_residual` in double precision.
+//! `world = x + x_residual` in double precision. For other programs it is exported relative to a place near it, which a
+//! comment `fmlgs shift X Y Z` says.
 
 mod read;
 mod stream;
@@ -21,7 +23,7 @@ use crate::scene::GaussianCloud;
 pub use read::parse;
 pub(crate) use stream::{state, state_in};
 pub use write::{check, encode, write};
-pub(crate) use write::{encode_told, may_be_extra};
+pub(crate) use write::{encode_near_zero, may_be_extra};
 
 /// Properties that carry Gaussians, besides `f_rest_*`.
 const STANDARD: [&str; 20] = [

@@ -6,11 +6,11 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{ORIGIN, is_standard};
-use crate::io::ply::{Column, Ply, Scalar, Table};
-use crate::io::quantized::logit;
-use crate::io::{IoError, compressed_ply, render_mode};
+use crate::io::ply::{Colors, Column, Ply, Scalar, Table};
+use crate::io::quantized::{constant, logit};
+use crate::io::{IoError, compressed_ply, render_mode, shift, vertical};
 use crate::math::sh::coefficients;
-use crate::scene::{ExtraProperty, GaussianCloud};
+use crate::scene::{Bounds, ExtraProperty, GaussianCloud, SplatRenderMode};
 
 /// The Gaussians of a splat `.ply`'s bytes; `path` is for errors.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
@@ -21,21 +21,28 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
     let Some(table) = ply.table("vertex")? else {
         return Err(ply.syntax("vertex", "missing".into()));
     };
-    Reading { ply: &ply, table: &table, first: 0 }.cloud()
+    finite(Reading { ply: &ply, table: &table }.cloud()?, path)
 }
+
+/// The cloud without Gaussians that are not finite.
+pub(super) fn finite(cloud: GaussianCloud, path: &Path) -> Result<GaussianCloud, IoError> {
+    cloud.finite().map_err(|cause| IoError::Cloud { path: path.into(), cause })
+}
+
+/// Logarithm of the third standard deviation of 2D Gaussian Splatting's disks, which has none: as other viewers set it.
+const FLAT: f32 = -13.815_511;
 
 pub(super) struct Reading<'a> {
     pub(crate) ply: &'a Ply<'a>,
     pub(crate) table: &'a Table<'a>,
-    /// Number of the first row, for errors.
-    pub(crate) first: usize,
 }
 
 impl Reading<'_> {
-    /// Whether positions of any rows alone have the origin that those of all have.
-    pub(crate) fn has_one_origin(&self) -> bool {
+    /// Whether any rows alone have the origin and the range of colors that all have.
+    pub(crate) fn is_told_by_any_row(&self) -> bool {
         let single = ["x", "y", "z"].iter().all(|n| self.table.column(n).is_some_and(|c| c.scalar != Scalar::F64));
-        self.stated_origin().is_ok_and(|stated| stated.is_some() || single)
+        let one_origin = self.stated_origin().is_ok_and(|stated| stated.is_some() || single);
+        one_origin && (self.table.column("f_dc_0").is_some() || Colors::has_one_range(&self.table.columns))
     }
 
     pub(crate) fn cloud(&self) -> Result<GaussianCloud, IoError> {
@@ -46,16 +53,30 @@ impl Reading<'_> {
 
     /// Adds the Gaussians of these rows to those of the rows before them.
     pub(crate) fn append_to(&self, cloud: &mut GaussianCloud) -> Result<(), IoError> {
-        let dc = self.columns(["f_dc_0", "f_dc_1", "f_dc_2"])?;
         let (degree, rest) = self.rest_columns()?;
-        (cloud.sh_degree, cloud.render_mode) = (degree, render_mode::of_comments(&self.ply.comments));
+        let (flat, scales) = self.scales()?;
+        cloud.render_mode = if flat { SplatRenderMode::Surfels } else { render_mode::of_comments(&self.ply.comments) };
+        (cloud.sh_degree, cloud.up) = (degree, vertical::of_comments(&self.ply.comments));
         cloud.origin = self.positions(&mut cloud.positions)?;
-        self.values(self.columns(["scale_0", "scale_1", "scale_2"])?, &mut cloud.log_scales)?;
-        self.values(self.columns(["rot_0", "rot_1", "rot_2", "rot_3"])?, &mut cloud.quaternions)?;
+        let row = |i: usize| self.table.row(i);
+        let all = || (0..self.table.rows).into_par_iter();
+        cloud.log_scales.par_extend(all().map(|i| scales.map(|c| c.map_or(FLAT, |c| c.f32(row(i))))));
+        self.values(self.columns(["rot_0", "rot_1", "rot_2", "rot_3"])?, &mut cloud.quaternions);
         self.opacities(&mut cloud.opacity_logits)?;
-        self.harmonics(degree, dc, &rest, &mut cloud.sh)?;
+        self.harmonics(degree, &rest, &mut cloud.sh)?;
         self.extras(&mut cloud.extras);
         Ok(())
+    }
+
+    /// The columns of the scales, and whether they are of disks, which have two.
+    fn scales(&self) -> Result<(bool, [Option<&Column>; 3]), IoError> {
+        match self.table.column("scale_2") {
+            Some(_) => Ok((false, self.columns(["scale_0", "scale_1", "scale_2"])?.map(Some))),
+            None => {
+                let [first, second] = self.columns(["scale_0", "scale_1"])?;
+                Ok((true, [Some(first), Some(second), None]))
+            }
+        }
     }
 
     fn columns<const N: usize>(&self, names: [&'static str; N]) -> Result<[&Column; N], IoError> {
@@ -66,35 +87,25 @@ impl Reading<'_> {
         })
     }
 
-    /// Adds what `N` columns hold, every value checked.
-    fn values<const N: usize>(&self, columns: [&Column; N], to: &mut Vec<[f32; N]>) -> Result<(), IoError> {
-        let before = to.len();
+    /// Adds what `N` columns hold.
+    fn values<const N: usize>(&self, columns: [&Column; N], to: &mut Vec<[f32; N]>) {
         let row = |i: usize| self.table.row(i);
         to.par_extend((0..self.table.rows).into_par_iter().map(|i| columns.map(|c| c.f32(row(i)))));
-        self.check(&to[before..], |k| &columns[k].name)
     }
 
-    /// Logits; infinite ones, which other programs make of opacities of 0 and 1, become large ones.
+    /// Logits; infinite ones, which other programs make of opacities of 0 and 1, become large ones. Where there are none
+    /// but an alpha channel, that is the opacity.
     fn opacities(&self, to: &mut Vec<f32>) -> Result<(), IoError> {
-        let before = to.len();
-        let [column] = self.columns(["opacity"])?;
         let finite = |v: f32| if v.is_infinite() { logit(f32::from(v > 0.0)) } else { v };
-        to.par_extend((0..self.table.rows).into_par_iter().map(|i| finite(column.f32(self.table.row(i)))));
-        self.check(to[before..].as_chunks::<1>().0, |_| &column.name)
-    }
-
-    fn check<'n, const N: usize>(&self, values: &[[f32; N]], name: impl Fn(usize) -> &'n str) -> Result<(), IoError> {
-        if all_finite(values) {
-            return Ok(());
+        let rows = (0..self.table.rows).into_par_iter();
+        match (self.table.column("opacity"), self.table.column("alpha").filter(|c| c.scalar == Scalar::U8)) {
+            (None, Some(alpha)) => to.par_extend(rows.map(|i| logit(alpha.f32(self.table.row(i)) / 255.0))),
+            _ => {
+                let [column] = self.columns(["opacity"])?;
+                to.par_extend(rows.map(|i| finite(column.f32(self.table.row(i)))));
+            }
         }
-        let index = values.iter().position(|v| v.iter().any(|x| !x.is_finite())).unwrap_or(0);
-        let k = values[index].iter().position(|x| !x.is_finite()).unwrap_or(0);
-        Err(self.not_finite(index, name(k)))
-    }
-
-    fn not_finite(&self, index: usize, property: &str) -> IoError {
-        let index = self.first + index;
-        IoError::NotFinite { path: self.ply.path.into(), element: "vertex", index, property: property.into() }
+        Ok(())
     }
 
     /// Positions relative to an origin: the one that the file states, the middle of the scene
@@ -104,9 +115,11 @@ impl Reading<'_> {
         let residual = self.table.all(["x_residual", "y_residual", "z_residual"]).ok();
         let doubles = xyz.iter().any(|c| c.scalar == Scalar::F64);
         let stated = self.stated_origin()?;
+        let shift = shift::of_comments(&self.ply.comments).map_err(|reason| self.ply.syntax("vertex", reason))?;
+        let shift = shift.unwrap_or_default();
         if !doubles && (residual.is_none() || stated.is_none()) {
-            self.values(xyz, to)?;
-            return Ok(DVec3::ZERO);
+            self.values(xyz, to);
+            return Ok(shift);
         }
         let world: Vec<DVec3> = (0..self.table.rows)
             .into_par_iter()
@@ -116,21 +129,16 @@ impl Reading<'_> {
                 DVec3::from_array(xyz.map(|c| c.f64(row))) + fine
             })
             .collect();
-        let origin = stated
-            .unwrap_or_else(|| crate::scene::Bounds::of(world.iter().copied()).map_or(DVec3::ZERO, |b| b.center()));
-        let before = to.len();
+        let finite = world.iter().copied().filter(|p| p.is_finite());
+        let origin = stated.unwrap_or_else(|| Bounds::of(finite).map_or(DVec3::ZERO, |b| b.center()));
         to.par_extend(world.par_iter().map(|p| (*p - origin).as_vec3().to_array()));
-        self.check(&to[before..], |k| &xyz[k].name)?;
-        Ok(origin)
+        Ok(origin + shift)
     }
 
     fn stated_origin(&self) -> Result<Option<DVec3>, IoError> {
         let Some(text) = self.ply.comments.iter().find_map(|c| c.strip_prefix(ORIGIN)) else { return Ok(None) };
-        let numbers: Vec<f64> = text.split_ascii_whitespace().filter_map(|w| w.parse().ok()).collect();
-        match numbers[..] {
-            [x, y, z] if numbers.iter().all(|v| v.is_finite()) => Ok(Some(DVec3::new(x, y, z))),
-            _ => Err(self.ply.syntax("vertex", format!("the comment '{ORIGIN}' does not hold three numbers"))),
-        }
+        let broken = || self.ply.syntax("vertex", format!("the comment '{ORIGIN}' does not hold three numbers"));
+        shift::parsed(text).map(Some).ok_or_else(broken)
     }
 
     /// Degree and columns of the higher harmonics, in file order.
@@ -146,51 +154,45 @@ impl Reading<'_> {
         }
     }
 
-    fn harmonics(&self, degree: u8, dc: [&Column; 3], rest: &[&Column], to: &mut Vec<[f32; 3]>) -> Result<(), IoError> {
-        let (before, stride) = (to.len(), coefficients(degree));
-        let per_channel = stride - 1;
+    /// Adds all harmonics: the constant ones by their columns, or by those of colors.
+    fn harmonics(&self, degree: u8, rest: &[&Column], to: &mut Vec<[f32; 3]>) -> Result<(), IoError> {
+        let (before, dc) = (to.len(), self.table.all(["f_dc_0", "f_dc_1", "f_dc_2"]).ok());
+        let colors = if dc.is_none() { Colors::of(self.table) } else { None };
+        if dc.is_none() && colors.is_none() {
+            return self.columns(["f_dc_0", "f_dc_1", "f_dc_2"]).map(drop);
+        }
         match degree {
             0 => self.coefficients::<1>(dc, rest, to),
             1 => self.coefficients::<4>(dc, rest, to),
             2 => self.coefficients::<9>(dc, rest, to),
             _ => self.coefficients::<16>(dc, rest, to),
         }
-        let sh = &to[before..];
-        if !all_finite(sh) {
-            let at = sh.iter().position(|v| v.iter().any(|x| !x.is_finite())).unwrap_or(0);
-            let channel = sh[at].iter().position(|x| !x.is_finite()).unwrap_or(0);
-            let name = match at % stride {
-                0 => &dc[channel].name,
-                k => &rest[channel * per_channel + k - 1].name,
-            };
-            return Err(self.not_finite(at / stride, name));
+        if let Some(colors) = colors {
+            let constants = to[before..].iter_mut().step_by(coefficients(degree)).enumerate();
+            constants.for_each(|(i, out)| *out = colors.rgb(self.table.row(i)).map(|v| constant(v as f32)));
         }
         Ok(())
     }
 
     /// Adds `N` coefficients of each row. Known to the compiler, their number costs no division for each.
-    fn coefficients<const N: usize>(&self, dc: [&Column; 3], rest: &[&Column], to: &mut Vec<[f32; 3]>) {
+    fn coefficients<const N: usize>(&self, dc: Option<[&Column; 3]>, rest: &[&Column], to: &mut Vec<[f32; 3]>) {
         to.par_extend((0..self.table.rows * N).into_par_iter().map(|at| {
             let row = self.table.row(at / N);
             match at % N {
-                0 => dc.map(|c| c.f32(row)),
+                0 => dc.map_or([0.0; 3], |dc| dc.map(|c| c.f32(row))),
                 k => [0, 1, 2].map(|channel| rest[channel * (N - 1) + k - 1].f32(row)),
             }
         }));
     }
 
     fn extras(&self, to: &mut Vec<ExtraProperty>) {
-        for (k, column) in self.table.columns.iter().filter(|c| !is_standard(&c.name)).enumerate() {
+        let plain = self.table.column("f_dc_0").is_some();
+        let used = |name: &str| is_standard(name) || !plain && Colors::is_name(name);
+        for (k, column) in self.table.columns.iter().filter(|c| !used(&c.name)).enumerate() {
             if to.len() == k {
                 to.push(ExtraProperty { name: column.name.clone(), values: Vec::new() });
             }
             to[k].values.par_extend((0..self.table.rows).into_par_iter().map(|i| column.f32(self.table.row(i))));
         }
     }
-}
-
-/// Whether all numbers are. Without a way out early, so that it is fast where they are.
-fn all_finite<const N: usize>(values: &[[f32; N]]) -> bool {
-    let finite = |part: &[[f32; N]]| part.as_flattened().iter().fold(true, |all, x| all & x.is_finite());
-    values.par_chunks(1 << 12).all(finite)
 }

@@ -5,7 +5,7 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 use super::STATE;
-use super::read::Reading;
+use super::read::{Reading, finite};
 use crate::io::ply::{Encoding, Ply, Table};
 use crate::io::{IoError, files, memory};
 use crate::scene::GaussianCloud;
@@ -41,7 +41,7 @@ pub(crate) fn read(path: &Path) -> Result<Option<GaussianCloud>, IoError> {
     let end = rows.checked_mul(stride).and_then(|n| n.checked_add(header));
     let fits = end.is_some_and(|end| end as u64 <= bytes) && bytes <= memory::budget();
     let empty = Table { rows: 0, stride, columns: columns.clone(), data: Cow::default() };
-    let plain = Reading { ply: &ply, table: &empty, first: 0 }.has_one_origin();
+    let plain = Reading { ply: &ply, table: &empty }.is_told_by_any_row();
     if ply.encoding != Encoding::LittleEndian || ply.element("chunk").is_some() || !fits || !plain {
         return Ok(None);
     }
@@ -59,7 +59,7 @@ pub(crate) fn read(path: &Path) -> Result<Option<GaussianCloud>, IoError> {
         let append = || -> Result<(), IoError> {
             let data = Cow::Borrowed(block.as_slice());
             let part = Table { rows: block.len() / stride, stride, columns: columns.clone(), data };
-            let reading = Reading { ply: &ply, table: &part, first };
+            let reading = Reading { ply: &ply, table: &part };
             match &mut cloud {
                 Some(cloud) => reading.append_to(cloud)?,
                 None => cloud = Some(reading.cloud()?.with_room(rows)),
@@ -70,5 +70,5 @@ pub(crate) fn read(path: &Path) -> Result<Option<GaussianCloud>, IoError> {
         appended.and(was_read)?;
         std::mem::swap(&mut block, &mut next);
     }
-    Ok(cloud)
+    cloud.map(|cloud| finite(cloud, path)).transpose()
 }

@@ -8,7 +8,7 @@ use glam::DVec3;
 
 use super::{ORIGIN, STATE, is_standard};
 use crate::io::atomic::{self, Told};
-use crate::io::{IoError, render_mode};
+use crate::io::{IoError, render_mode, shift, vertical};
 use crate::scene::GaussianCloud;
 
 /// Gaussians per block handed to the file.
@@ -40,19 +40,20 @@ pub(crate) fn may_be_extra(name: &str) -> bool {
 
 /// The bytes of a splat `.ply` of a valid cloud, with the id of the scene's state that it belongs to.
 pub fn encode(out: &mut dyn Write, cloud: &GaussianCloud, state: Option<&str>) -> io::Result<()> {
-    encode_told(out, cloud, state, &mut |_| Ok(()))
+    encode_told(out, cloud, state.map(|state| format!("{STATE}{state}")).as_slice(), &mut |_| Ok(()))
 }
 
-/// [`encode`] that tells how far it is.
-pub(crate) fn encode_told(
-    out: &mut dyn Write,
-    cloud: &GaussianCloud,
-    state: Option<&str>,
-    told: &mut Told<'_>,
-) -> io::Result<()> {
+/// [`encode`] for other programs, that tells how far it is: a cloud far from zero is written near zero, with a comment
+/// that says where that is.
+pub(crate) fn encode_near_zero(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
+    let (near, shift) = shift::near_zero(cloud);
+    encode_told(out, &near, shift.map(shift::comment).as_slice(), told)
+}
+
+fn encode_told(out: &mut dyn Write, cloud: &GaussianCloud, comments: &[String], told: &mut Told<'_>) -> io::Result<()> {
     told(0)?;
     let shifted = cloud.origin != DVec3::ZERO;
-    out.write_all(header(cloud, shifted, state).as_bytes())?;
+    out.write_all(header(cloud, shifted, comments).as_bytes())?;
     let stride = cloud.sh_stride();
     let mut block = Vec::new();
     for i in 0..cloud.len() {
@@ -82,17 +83,15 @@ pub(crate) fn encode_told(
     out.write_all(&block)
 }
 
-fn header(cloud: &GaussianCloud, shifted: bool, state: Option<&str>) -> String {
+fn header(cloud: &GaussianCloud, shifted: bool, comments: &[String]) -> String {
     let mut text = String::from("ply\nformat binary_little_endian 1.0\n");
     if shifted {
         let DVec3 { x, y, z } = cloud.origin;
         let _ = writeln!(text, "comment {ORIGIN}{x:?} {y:?} {z:?}");
     }
-    if let Some(state) = state {
-        let _ = writeln!(text, "comment {STATE}{state}");
-    }
-    if let Some(mode) = render_mode::comment(cloud.render_mode) {
-        let _ = writeln!(text, "comment {mode}");
+    let mode = render_mode::comment(cloud.render_mode).map(str::to_owned);
+    for comment in comments.iter().cloned().chain(mode).chain(vertical::comment(cloud.up)) {
+        let _ = writeln!(text, "comment {comment}");
     }
     let _ = writeln!(text, "element vertex {}", cloud.len());
     let mut property = |name: &str| {

@@ -2,22 +2,26 @@
 //!
 //! A header, then one column after another: positions (24-bit fixed point), opacities, colors, log-scales, rotations
 //! and harmonics, mostly bytes. Up to version 3 all of it is one gzip stream; in version 4 the header is plain and
-//! each column a Zstandard stream of its own. The axes are kept as they are, as other converters do between `.ply`
-//! and SPZ, though the format names axes of its own (right, up, back).
+//! each column a Zstandard stream of its own. The format's axes are right, up, back; see [`axes`] for those of a file.
 
+mod axes;
+mod decode;
 mod read;
 mod write;
 
 use crate::math::sh::coefficients;
 
+pub use axes::SpzAxes;
 pub use read::parse;
-pub(crate) use read::{is_spz, read};
+pub(crate) use read::{is_spz, parse_in, read};
 pub(super) use write::{encode, unpacked};
 
 /// How the header starts.
 const MAGIC: &[u8; 4] = b"NGSP";
 /// Of the flags: drawn with the filter of Mip-Splatting.
 const ANTIALIASED: u8 = 1;
+/// Of the flags: records of extensions.
+const EXTENSIONS: u8 = 2;
 /// Log-scales are bytes of this step, from this one on.
 const SCALE_STEP: f32 = 1.0 / 16.0;
 const SCALE_FIRST: f32 = -10.0;
@@ -27,12 +31,25 @@ const COLOR_SCALE: f32 = 0.15;
 const HARMONIC_MIDDLE: f32 = 128.0;
 /// What the 9 bits of a quaternion's component reach at 1/√2.
 const COMPONENT_MOST: f32 = 511.0;
+/// Largest coordinate in steps: 24 bits with a sign.
+const MOST_STEPS: f64 = 8_388_607.0;
+/// Most bits behind the point that are written: the format has 24 in all.
+const MOST_FRACTION: u8 = 23;
+/// Start of the comment in the gzip header of files whose axes this program has turned to the format's; then may come
+/// what places are relative to, in the axes of the scene.
+const TURNED: &str = "axes: right up back";
+const SHIFT: &str = "; shift ";
 
 /// Bytes a Gaussian in each column, in the order of the file.
 fn columns(version: u32, degree: u8) -> [usize; 6] {
     let position = if version == 1 { 6 } else { 9 };
     let rotation = if version < 3 { 3 } else { 4 };
     [position, 1, 3, 3, rotation, 3 * (coefficients(degree) - 1)]
+}
+
+/// The most bits behind the point with which a coordinate so far from zero fits.
+fn fraction(farthest: f64) -> Option<u8> {
+    (0..=MOST_FRACTION).rev().find(|bits| farthest * f64::from(*bits).exp2() <= MOST_STEPS)
 }
 
 #[cfg(test)]

@@ -4,16 +4,13 @@ use std::io::Read;
 use std::path::Path;
 
 use flate2::read::GzDecoder;
-use half::f16;
-use rayon::prelude::*;
 use ruzstd::decoding::FrameDecoder;
 
-use super::{ANTIALIASED, COLOR_SCALE, COMPONENT_MOST, HARMONIC_MIDDLE, MAGIC, SCALE_FIRST, SCALE_STEP, columns};
-use crate::io::quantized::{logit, unit_quaternion, unorm};
+use super::axes::{Marks, SpzAxes};
+use super::{EXTENSIONS, MAGIC, columns};
 use crate::io::reader::Reader;
 use crate::io::{IoError, files, memory};
-use crate::math::sh::coefficients;
-use crate::scene::{GaussianCloud, SplatRenderMode};
+use crate::scene::{Axes, GaussianCloud};
 
 /// Bytes of the header up to version 3, and of what version 4 adds.
 const HEADER: usize = 16;
@@ -24,28 +21,40 @@ const GZIP: &[u8; 2] = &[0x1f, 0x8b];
 const MAX_RATIO: u64 = 1032;
 /// More bits behind the point than a coordinate has bits.
 const MAX_FRACTION: u8 = 24;
+/// Highest degree of harmonics in a file.
+const MAX_DEGREE: u8 = 4;
+/// Bytes of extension records that are looked at, at the end of a gzip stream.
+const MAX_RECORDS: u64 = 1 << 16;
 
 /// Whether the first bytes of a file are those of SPZ; others are packed by gzip too, but no splats.
 pub(crate) fn is_spz(start: &[u8]) -> bool {
     start.starts_with(GZIP) || start.starts_with(MAGIC)
 }
 
-pub(crate) fn read(path: &Path) -> Result<GaussianCloud, IoError> {
-    parse(&files::read(path, u64::MAX)?, path)
+/// Reads a file, by these axes if they are given.
+pub(crate) fn read(path: &Path, axes: Option<Axes>) -> Result<GaussianCloud, IoError> {
+    parse_in(&files::read(path, u64::MAX)?, path, axes.map_or(SpzAxes::Unknown, SpzAxes::Given))
 }
 
-/// The Gaussians in the bytes of an SPZ file; `path` is for errors.
+/// The Gaussians in the bytes of an SPZ file, in the scene's axes; `path` is for errors.
 ///
 /// # Errors
 /// If it is of another version, is cut off, or claims more than it can hold.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
+    parse_in(bytes, path, SpzAxes::Unknown)
+}
+
+/// The same where something is known of the axes.
+pub(crate) fn parse_in(bytes: &[u8], path: &Path, known: SpzAxes) -> Result<GaussianCloud, IoError> {
     if bytes.starts_with(MAGIC) {
         let mut file = Reader::new(bytes, path);
         let header = Header::parse(file.take(HEADER, "the header")?, path)?;
         let per_gaussian = header.checked(bytes.len(), path)?;
         let more = file.take(MORE_HEADER, "the header")?;
         let toc = u32::from_le_bytes([more[0], more[1], more[2], more[3]]) as usize;
-        return header.cloud(streams(&header, per_gaussian, toc, bytes, path)?, path);
+        let records = bytes.get(HEADER + MORE_HEADER..toc).unwrap_or_default();
+        let marks = Marks::default().with_records(header.flags, records);
+        return header.cloud(&streams(&header, per_gaussian, toc, bytes, path)?, &marks, known, path);
     }
     let mut unpacked = GzDecoder::new(bytes);
     let mut next = |n: usize, place: &str| {
@@ -65,7 +74,13 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
     for (bytes, name) in per_gaussian.into_iter().zip(NAMES) {
         all.push(next(bytes * header.count, name)?);
     }
-    header.cloud(all, path)
+    let mut records = Vec::new();
+    if header.flags & EXTENSIONS != 0 {
+        let broken = |e| IoError::syntax(path, "the extensions", format!("they cannot be unpacked: {e}"));
+        (&mut unpacked).take(MAX_RECORDS).read_to_end(&mut records).map_err(broken)?;
+    }
+    let marks = Marks::of_gzip(unpacked.header()).with_records(header.flags, &records);
+    header.cloud(&all, &marks, known, path)
 }
 
 /// What the columns are called in errors.
@@ -111,12 +126,12 @@ fn streams(
 }
 
 /// What all versions say at first.
-struct Header {
-    version: u32,
-    count: usize,
-    degree: u8,
-    fraction: u8,
-    flags: u8,
+pub(super) struct Header {
+    pub(crate) version: u32,
+    pub(crate) count: usize,
+    pub(crate) degree: u8,
+    pub(crate) fraction: u8,
+    pub(crate) flags: u8,
     /// In version 4.
     streams: u8,
 }
@@ -133,7 +148,7 @@ impl Header {
         if !(1..=4).contains(&version) {
             return Err(IoError::Version { path: path.into(), found: version.into(), supported: 4 });
         }
-        if degree > 3 {
+        if degree > MAX_DEGREE {
             let what = format!("harmonics of degree {degree}");
             return Err(IoError::Unsupported { path: path.into(), what, remedy: "up to degree 3 can be drawn" });
         }
@@ -159,66 +174,4 @@ impl Header {
         }
         Ok(columns)
     }
-
-    fn cloud(&self, columns: Vec<Vec<u8>>, path: &Path) -> Result<GaussianCloud, IoError> {
-        let [positions, opacities, colors, scales, rotations, harmonics] = columns.as_slice() else {
-            return Ok(GaussianCloud::default());
-        };
-        let step = (-f32::from(self.fraction)).exp2();
-        let position = |bytes: &[u8]| match self.version {
-            1 => [0, 2, 4].map(|k| f16::from_le_bytes([bytes[k], bytes[k + 1]]).to_f32()),
-            // The sign is in the third byte of four.
-            _ => [0, 3, 6].map(|k| (i32::from_le_bytes([0, bytes[k], bytes[k + 1], bytes[k + 2]]) >> 8) as f32 * step),
-        };
-        let color = |byte: u8| (unorm(byte.into(), 8) - 0.5) / COLOR_SCALE;
-        let stride = coefficients(self.degree);
-        let mut sh = vec![[0.0; 3]; self.count * stride];
-        sh.par_chunks_exact_mut(stride).enumerate().for_each(|(i, out)| {
-            out[0] = [0, 1, 2].map(|k| color(colors[3 * i + k]));
-            let rest = harmonics[3 * (stride - 1) * i..].as_chunks::<3>().0;
-            out[1..].iter_mut().zip(rest).for_each(|(rgb, bytes)| {
-                *rgb = bytes.map(|byte| (f32::from(byte) - HARMONIC_MIDDLE) / HARMONIC_MIDDLE);
-            });
-        });
-        let antialiased = self.flags & ANTIALIASED != 0;
-        let cloud = GaussianCloud {
-            positions: positions.par_chunks_exact(super::columns(self.version, 0)[0]).map(position).collect(),
-            log_scales: scales
-                .as_chunks::<3>()
-                .0
-                .par_iter()
-                .map(|s| s.map(|byte| f32::from(byte) * SCALE_STEP + SCALE_FIRST))
-                .collect(),
-            quaternions: match rotations.as_chunks::<4>() {
-                (packed, _) if self.version >= 3 => {
-                    packed.par_iter().map(|bytes| smallest_three(u32::from_le_bytes(*bytes))).collect()
-                }
-                _ => rotations.as_chunks::<3>().0.par_iter().map(|bytes| first_three(*bytes)).collect(),
-            },
-            opacity_logits: opacities.par_iter().map(|byte| logit(unorm((*byte).into(), 8))).collect(),
-            sh_degree: self.degree,
-            sh,
-            render_mode: if antialiased { SplatRenderMode::Mip } else { SplatRenderMode::Plain },
-            ..GaussianCloud::default()
-        };
-        // Half floats may be infinite.
-        cloud.validate().map_err(|cause| IoError::Cloud { path: path.into(), cause })?;
-        Ok(cloud)
-    }
-}
-
-/// Versions 1 and 2: x, y and z, w positive.
-fn first_three(bytes: [u8; 3]) -> [f32; 4] {
-    let [x, y, z] = bytes.map(|byte| f32::from(byte) / 127.5 - 1.0);
-    [(1.0 - (x * x + y * y + z * z)).max(0.0).sqrt(), x, y, z]
-}
-
-/// Versions 3 and 4: which of x, y, z, w is largest in 2 bits, a sign and 9 bits for each of the others.
-fn smallest_three(packed: u32) -> [f32; 4] {
-    let part = |shift: u32| {
-        let size = (packed >> shift & 511) as f32 / COMPONENT_MOST * 0.5;
-        0.5 + if packed >> shift & 512 == 0 { size } else { -size }
-    };
-    let [x, y, z, w] = unit_quaternion((packed >> 30) as usize, [part(20), part(10), part(0)]);
-    [w, x, y, z]
 }

@@ -2,35 +2,35 @@
 
 use std::io::{self, Write};
 
-use flate2::Compression;
-use flate2::write::GzEncoder;
+use flate2::{Compression, GzBuilder};
 
-use super::{ANTIALIASED, COLOR_SCALE, COMPONENT_MOST, HARMONIC_MIDDLE, MAGIC, SCALE_FIRST, SCALE_STEP, columns};
+use super::{ANTIALIASED, COLOR_SCALE, COMPONENT_MOST, HARMONIC_MIDDLE, MAGIC, MOST_STEPS, SCALE_FIRST, SCALE_STEP};
+use super::{SHIFT, TURNED, columns};
 use crate::io::atomic::Told;
 use crate::io::quantized::{opacity_byte, to_byte, without_largest};
-use crate::scene::{GaussianCloud, SplatRenderMode};
+use crate::io::shift;
+use crate::scene::{Axes, GaussianCloud, SplatRenderMode};
 
 const VERSION: u32 = 3;
-/// Largest coordinate in steps: 24 bits with a sign.
-const MOST_STEPS: f64 = 8_388_607.0;
-/// Most bits behind the point: the format has 24 in all.
-const MOST_FRACTION: u8 = 23;
 /// Gaussians between two reports.
 const BLOCK: usize = 4096;
 /// Steps of harmonics of the first band, and of those above: as the reference packs them.
 const HARMONIC_STEPS: [i32; 2] = [8, 16];
 
-/// Writes the bytes of an SPZ file of a valid cloud, in its order.
+/// Writes the bytes of an SPZ file of a valid cloud, in its order, in the axes of the format.
 ///
 /// # Errors
 /// If it reaches farther from zero than 24 bits do, or cannot be written.
 pub(in crate::io) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
-    let mut gzip = GzEncoder::new(out, Compression::default());
-    gzip.write_all(&unpacked(cloud, told)?)?;
+    let (near, shift) = shift::near_zero(cloud);
+    let comment = shift.map_or_else(|| TURNED.to_owned(), |shift| format!("{TURNED}{SHIFT}{}", shift::text(shift)));
+    let mut gzip = GzBuilder::new().comment(comment).write(out, Compression::default());
+    let turned = near.into_owned().turned(&Axes::SPZ.scene_from_file().transpose(), true);
+    gzip.write_all(&unpacked(&turned, told)?)?;
     gzip.finish().map(drop)
 }
 
-/// What such a file holds before compression.
+/// What such a file holds before compression, the numbers as they are.
 pub(in crate::io) fn unpacked(cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<Vec<u8>> {
     let fraction = fraction(cloud)?;
     let steps = f64::from(fraction).exp2();
@@ -62,8 +62,7 @@ pub(in crate::io) fn unpacked(cloud: &GaussianCloud, told: &mut Told<'_>) -> io:
 /// The most bits behind the point with which every coordinate fits.
 fn fraction(cloud: &GaussianCloud) -> io::Result<u8> {
     let farthest = (0..cloud.len()).map(|i| cloud.world_position(i).abs().max_element()).fold(0.0, f64::max);
-    let fits = |bits: &u8| farthest * f64::from(*bits).exp2() <= MOST_STEPS;
-    (0..=MOST_FRACTION).rev().find(fits).ok_or_else(|| {
+    super::fraction(farthest).ok_or_else(|| {
         let text = format!("SPZ holds coordinates up to {MOST_STEPS}, the scene reaches {farthest:.0}: use .ply");
         io::Error::new(io::ErrorKind::InvalidInput, text)
     })

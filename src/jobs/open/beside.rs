@@ -21,7 +21,7 @@ impl Scene {
             return self;
         };
         self.dataset_path = source.clone().filter(|source| source.is_dir());
-        self.warnings = warnings;
+        self.warnings.extend(warnings);
         if let Some(gone) = source.as_ref().filter(|_| self.dataset_path.is_none()) {
             self.warnings.push(format!("its photos were in {}, which is not here", gone.display()));
         }

@@ -66,6 +66,7 @@ pub(crate) fn cloud<R: Real>(stage: &'static str, cloud: &GaussianCloud<R>) -> R
     cloud.validate().map_err(|e| match e {
         CloudError::NotFinite { index, field } => NotFinite { stage, field, index },
         CloudError::Length(field, index, _) => NotFinite { stage, field, index },
+        CloudError::NoneFinite { field, .. } => NotFinite { stage, field, index: 0 },
         CloudError::Degree(degree) => NotFinite { stage, field: "degree", index: usize::from(degree) },
     })
 }

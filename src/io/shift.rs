@@ -1,0 +1,85 @@
+//! Scenes far from zero in files of single precision: places near zero, and where zero is.
+//!
+//! At UTM coordinates a float holds steps of half a unit. So what is exported is written relative to a place nearby,
+//! which is told and kept in the file where the format has room; reading it puts the scene back.
+
+use std::borrow::Cow;
+
+use glam::DVec3;
+
+use crate::scene::{Bounds, GaussianCloud};
+
+/// Start of the comment of a `.ply` that holds the place; its x, y and z are relative to it.
+const COMMENT: &str = "fmlgs shift ";
+/// Steps of single precision that are told, as a share of the scene's size.
+const COARSE: f64 = 1e-5;
+
+/// The place to write a cloud relative to, if single precision would round its places beyond a hundred-thousandth of
+/// its size. Whole numbers, unless the cloud is small.
+pub(super) fn of(cloud: &GaussianCloud) -> Option<DVec3> {
+    let far = cloud.origin.abs().max_element() as f32;
+    let step = f64::from(far.next_up() - far);
+    let places = cloud.positions.iter().map(|p| DVec3::from_array(p.map(f64::from)));
+    let radius = Bounds::robust(places)?.radius();
+    let is_coarse = step > COARSE * radius && far > 0.0;
+    is_coarse.then(|| if radius > 1.0 { cloud.origin.round() } else { cloud.origin })
+}
+
+/// The cloud as it is written: relative to the place that is returned, if there is one.
+pub(super) fn near_zero(cloud: &GaussianCloud) -> (Cow<'_, GaussianCloud>, Option<DVec3>) {
+    let Some(shift) = of(cloud) else { return (Cow::Borrowed(cloud), None) };
+    let mut near = cloud.clone();
+    let rest = cloud.origin - shift;
+    near.positions.iter_mut().for_each(|p| *p = (DVec3::from_array(p.map(f64::from)) + rest).as_vec3().to_array());
+    near.origin = DVec3::ZERO;
+    (Cow::Owned(near), Some(shift))
+}
+
+/// The comment, without the word `comment`.
+pub(super) fn comment(shift: DVec3) -> String {
+    format!("{COMMENT}{}", text(shift))
+}
+
+/// The three numbers in words that [`parsed`] reads back as they are.
+pub(super) fn text(DVec3 { x, y, z }: DVec3) -> String {
+    format!("{x} {y} {z}")
+}
+
+/// The place by the comments of a `.ply`; `Err` if one does not hold it.
+pub(super) fn of_comments(comments: &[&str]) -> Result<Option<DVec3>, String> {
+    let Some(text) = comments.iter().find_map(|c| c.strip_prefix(COMMENT)) else { return Ok(None) };
+    parsed(text).map(Some).ok_or_else(|| format!("the comment '{COMMENT}' does not hold three numbers"))
+}
+
+/// Three finite numbers.
+pub(super) fn parsed(text: &str) -> Option<DVec3> {
+    let numbers: Vec<f64> = text.split_ascii_whitespace().filter_map(|w| w.parse().ok()).collect();
+    let place = DVec3::from_array(<[f64; 3]>::try_from(numbers).ok()?);
+    place.is_finite().then_some(place)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::test_clouds;
+
+    #[test]
+    fn far_clouds_are_written_near_zero_and_put_back() {
+        let origin = DVec3::new(456_789.25, 5_678_901.5, 312.0);
+        let far = GaussianCloud { origin, ..test_clouds::random(500, 0) };
+        let (near, shift) = near_zero(&far);
+        let shift = shift.expect("far");
+        assert!(shift == origin.round() && near.origin == DVec3::ZERO);
+        let most = (0..far.len())
+            .map(|i| (near.world_position(i) + shift - far.world_position(i)).length())
+            .fold(0.0, f64::max);
+        assert!(most < 1e-6, "{most}");
+        assert_eq!(of_comments(&["x", &comment(shift)]), Ok(Some(shift)));
+        assert!(of_comments(&["fmlgs shift 1 2"]).is_err() && of_comments(&["fmlgs shift 1 2 inf"]).is_err());
+        let close = GaussianCloud { origin: DVec3::ONE, ..far.clone() };
+        assert!(near_zero(&close) == (Cow::Borrowed(&close), None));
+        let small =
+            GaussianCloud { positions: far.positions.iter().map(|p| p.map(|v| v * 1e-3)).collect(), ..far.clone() };
+        assert_eq!(of(&small), Some(origin), "half a unit is much for it");
+    }
+}
