@@ -10,7 +10,7 @@ use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::resample::covers;
-use super::{IoError, files, photo};
+use super::{IoError, files, lenses, photo};
 use crate::math::rotation::{nearest_rotation, rotation_error};
 use crate::scene::{Camera, CameraError, Distortion, Photo};
 
@@ -89,6 +89,7 @@ pub(super) fn photos(
         ));
     }
     photos.sort_by(|a: &Photo, b| a.name.cmp(&b.name));
+    warnings.extend(lenses::told(&photos));
     Ok(photos)
 }
 
@@ -96,7 +97,7 @@ fn resolve(l: &ListedPhoto, root: &Path, source: &Path) -> Result<Option<Photo>,
     let bad = |cause| IoError::Camera { path: source.into(), photo: l.name.clone(), cause };
     let rotation = rotation(l.world_from_camera).map_err(bad)?;
     let d = l.lens.distortion;
-    for (property, value) in [("k1", d.k1), ("k2", d.k2), ("p1", d.p1), ("p2", d.p2)] {
+    for (property, value) in d.coefficients() {
         if !value.is_finite() {
             let property = format!("distortion {property}");
             return Err(IoError::syntax(
@@ -115,9 +116,8 @@ fn resolve(l: &ListedPhoto, root: &Path, source: &Path) -> Result<Option<Photo>,
             source,
             format!("photo '{}'", l.name),
             format!(
-                "its lens distortion (k1 {:e}, k2 {:e}, p1 {:e}, p2 {:e}) leaves nothing of the picture; calibrate the camera \
-                 anew or undistort the photo",
-                d.k1, d.k2, d.p1, d.p2
+                "its lens distortion ({}) leaves nothing of the picture; calibrate the camera anew or undistort the photo",
+                d.coefficients().iter().map(|(name, value)| format!("{name} {value:e}")).collect::<Vec<_>>().join(", ")
             ),
         ));
     }

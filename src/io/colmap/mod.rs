@@ -12,8 +12,8 @@ use std::path::{Path, PathBuf};
 
 use glam::{DMat3, DVec3};
 
-use super::photo_list::{Lens, ListedPhoto, photos};
-use super::{IoError, files, photo_list};
+use super::photo_list::{ListedPhoto, photos};
+use super::{IoError, files, lenses, photo_list};
 use crate::math::rotation::matrix_from_quaternion;
 use crate::scene::{CameraError, Dataset, SparsePoint};
 
@@ -32,7 +32,8 @@ struct Image {
     translation: DVec3,
 }
 
-type Cameras = HashMap<u32, Lens>;
+/// Cameras by their number.
+type Cameras = HashMap<u32, lens::Found>;
 
 /// The folder of the reconstruction of the dataset in `root`, and whether it is binary.
 fn find(root: &Path) -> Option<(PathBuf, bool)> {
@@ -76,8 +77,8 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
         warnings.push("the reconstruction has no sparse points; training starts from random points".into());
     }
     let photo_folder = photo_list::photo_folder(root, &images_file)?;
-    let listed =
-        images.iter().map(|i| listed(i, &cameras, root, &photo_folder, &images_file)).collect::<Result<_, _>>()?;
+    let of = |i| listed(i, &cameras, root, &photo_folder, &images_file);
+    let listed = lenses::readable(images.iter().map(of).collect::<Result<_, _>>()?, &cameras_file, &mut warnings)?;
     Ok(Dataset {
         name: files::folder_name(root),
         root: root.into(),
@@ -89,7 +90,14 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
     })
 }
 
-fn listed(image: &Image, cameras: &Cameras, root: &Path, folder: &str, source: &Path) -> Result<ListedPhoto, IoError> {
+/// A photo, or the name of its camera's model if that is not supported.
+fn listed(
+    image: &Image,
+    cameras: &Cameras,
+    root: &Path,
+    folder: &str,
+    source: &Path,
+) -> Result<Result<ListedPhoto, String>, IoError> {
     let Some(lens) = cameras.get(&image.camera) else {
         return Err(IoError::syntax(
             source,
@@ -97,20 +105,24 @@ fn listed(image: &Image, cameras: &Cameras, root: &Path, folder: &str, source: &
             format!("there is no camera {}", image.camera),
         ));
     };
+    let lens = match lens {
+        Ok(lens) => lens.clone(),
+        Err(model) => return Ok(Err(model.clone())),
+    };
     let bad = |cause| IoError::Camera { path: source.into(), photo: image.name.clone(), cause };
     let [x, y, z] = matrix_from_quaternion(image.quaternion).ok_or_else(|| bad(CameraError::Rotation(f64::NAN)))?;
     // The rows of camera_from_world are the columns of world_from_camera.
     let world_from_camera = DMat3::from_cols(x.into(), y.into(), z.into());
     let name = files::relative(root, &image.name, source)?;
-    Ok(ListedPhoto {
+    Ok(Ok(ListedPhoto {
         entry: format!("{folder}/{name}"),
         name,
-        lens: lens.clone(),
+        lens,
         world_from_camera,
         center: -(world_from_camera * image.translation),
         test_split: false,
         background: None,
-    })
+    }))
 }
 
 fn point(position: DVec3, rgb: [u8; 3], index: usize, path: &Path) -> Result<SparsePoint, IoError> {
