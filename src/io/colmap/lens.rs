@@ -10,6 +10,7 @@ use crate::io::photo_list::{Focal, Lens};
 use crate::scene::{Camera, Distortion, Projection};
 
 /// A camera model by its number in binary files.
+#[derive(Debug)]
 pub(super) struct Model {
     name: &'static str,
     pub(super) params: usize,

@@ -174,7 +174,7 @@ fn models_have_colmaps_numbers_and_parameters() {
         (16, "EUCM", 6),
         (17, PANORAMA, 2),
     ] {
-        let model = by_number(number, "camera 1", path).ok().expect(name);
+        let model = by_number(number, "camera 1", path).expect(name);
         assert_eq!((model.name, model.params), (name, params));
     }
     assert!(by_number(18, "camera 1", path).is_err_and(|e| e.to_string().contains("number 18 (camera 1)")));
