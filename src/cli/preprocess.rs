@@ -34,8 +34,8 @@ use crate::scene::{Findings, Identity, IdentityId, Lifting, MaskGrid, MaskPrompt
 pub(crate) struct PreprocessArgs {
     /// Trained scene
     scene: PathBuf,
-    /// Where the masks are: id maps of 'fmlgs synth', ISAT files as in lerf_ovs, the folders of SPIn-NeRF,
-    /// 3D-OVS or LERF-Mask, or masklets as in SA-V
+    /// Where the masks are: id maps of 'fmlgs synth', label files of ISAT (as in lerf_ovs), LabelMe, COCO or YOLO, the
+    /// folders of SPIn-NeRF, 3D-OVS or LERF-Mask, or masklets as in SA-V
     #[arg(long)]
     masks: Option<PathBuf>,
     /// Where masks come from: 'files', 'regions' (built in, no weights: rough and unnamed), a model of
@@ -157,13 +157,15 @@ pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
         with: args.settings(),
     };
     let done = find_objects::run(&request, scene.state.as_deref(), &mut observer);
-    let FoundObjects { found, photos, secs, .. } = done.map_err(|e| CliError::of_work(e, "nothing was stored"))?;
+    let FoundObjects { found, photos, secs, warnings, .. } =
+        done.map_err(|e| CliError::of_work(e, "nothing was stored"))?;
     let Found { map, views, secs: stages } = found;
     let unknown = map.findings.as_ref().and_then(Findings::unknown);
     if args.json {
         return output::print_json(&json!({
             "scene": args.scene,
             "seeds": map.seeds,
+            "warnings": warnings,
             "secs": secs,
             "prepared": map.prepared,
             "stages": stages.iter().map(|(stage, secs)| json!({ "stage": stage, "secs": secs })).collect::<Vec<_>>(),

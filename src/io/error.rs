@@ -47,11 +47,12 @@ pub enum IoError {
     #[error("{path} uses {what}, which is not supported; {remedy}")]
     Unsupported { path: PathBuf, what: String, remedy: &'static str },
     #[error(
-        "{path} holds no labels: looked for identities.json with id maps (fmlgs synth), images_<factor>/label/*.png \
-         (SPIn-NeRF), segmentations/classes.txt (3D-OVS), test_mask/<view>/*.png (LERF-Mask), and .json files with \
-         polygons (ISAT, as in lerf_ovs) or masklets (SA-V)"
+        "{path} holds no labels{passed}: looked for identities.json with id maps (fmlgs synth), images_<factor>/label/*.png \
+         (SPIn-NeRF), segmentations/classes.txt (3D-OVS), test_mask/<view>/*.png (LERF-Mask), and label files in it and the \
+         folders below: .json of ISAT (as in lerf_ovs), LabelMe, COCO (instances) or SA-V (masklets), .txt of YOLO \
+         (segments)"
     )]
-    NoLabels { path: PathBuf },
+    NoLabels { path: PathBuf, passed: String },
     #[error("{path} refers to '{entry}', which lies outside the folder {folder}; copy the file into it")]
     Outside { path: PathBuf, entry: String, folder: PathBuf },
     #[error("{path} lists the photo '{photo}' twice")]

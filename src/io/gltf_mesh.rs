@@ -2,7 +2,8 @@
 //!
 //! Read: the node tree with its transforms, triangles of every index type and of lists, strips and
 //! fans, sparse and quantized accessors, normals, all texture coordinate sets, vertex colors, base
-//! color and emission (factor and texture, `KHR_texture_transform`), alpha modes, unlit materials.
+//! color and emission (factor and texture, `KHR_texture_transform`), alpha modes, unlit materials; geometry packed by
+//! Draco (`KHR_draco_mesh_compression`) and meshoptimizer (`EXT_meshopt_compression`).
 //! Left out: animation, skinning, morph targets, cameras and lights.
 //!
 //! Nothing in a file is believed: every index is looked up, every byte range is checked against the
@@ -12,12 +13,14 @@
 mod accessor;
 mod geometry;
 mod material;
+mod meshopt;
 mod model;
+mod packed;
 pub(super) mod resource;
 #[cfg(test)]
 pub(crate) mod tests;
 
-use std::cell::Cell;
+use std::cell::{Cell, OnceCell};
 use std::path::Path;
 
 use glam::{DMat4, DQuat, DVec3};
@@ -25,6 +28,8 @@ use gltf::json::{self, Root};
 
 use super::{IoError, files};
 use crate::scene::text;
+
+use packed::{DRACO, MESHOPT, Packed};
 
 pub(crate) use model::{AlphaMode, Material, Mesh, MeshNode, MeshPrimitive, MeshScene, TextureImage, TextureUse, Wrap};
 
@@ -54,9 +59,15 @@ fn read_bytes(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<MeshSc
     let root: Root = parse(text, path)?;
     if let Some(extension) = root.extensions_required.iter().find(|e| !supported(e)) {
         let what = format!("the required extension {extension}");
-        return Err(IoError::Unsupported { path: path.into(), what, remedy: "export the scene without it" });
+        // gltf-transform reads what it can unpack, and writes it plain.
+        let remedy = match extension.contains("compression") || extension.contains("meshopt") {
+            true => "unpack it with 'gltf-transform copy IN OUT.glb', or pack it with 'gltfpack -c'",
+            false => "export the scene without it",
+        };
+        return Err(IoError::Unsupported { path: path.into(), what, remedy });
     }
-    let mut file = File::open(&root, path, folder, blob, [MAX_FILE_BYTES, MAX_VALUES])?;
+    let packed: Packed = parse(text, path)?;
+    let mut file = File::open_packed(&root, path, folder, blob, [MAX_FILE_BYTES, MAX_VALUES], packed)?;
     let (nodes, roots) = file.nodes()?;
     let (materials, images) = file.materials()?;
     let meshes = file.meshes(&nodes, &materials)?;
@@ -71,7 +82,7 @@ pub(super) fn parse<T: serde::de::DeserializeOwned>(text: &[u8], path: &Path) ->
 /// of a surface may be ignored.
 fn supported(extension: &str) -> bool {
     let exact = ["KHR_texture_transform", "KHR_mesh_quantization", "KHR_lights_punctual", "KHR_xmp_json_ld"];
-    exact.contains(&extension) || extension.starts_with("KHR_materials_")
+    exact.contains(&extension) || [MESHOPT, DRACO].contains(&extension) || extension.starts_with("KHR_materials_")
 }
 
 /// A parsed file while its content is taken over.
@@ -81,6 +92,9 @@ pub(super) struct File<'a> {
     root: &'a Root,
     buffers: Vec<std::borrow::Cow<'a, [u8]>>,
     values_left: Cell<u64>,
+    packed: Packed,
+    /// Views that were packed.
+    unpacked: Vec<OnceCell<Vec<u8>>>,
     warnings: Vec<String>,
 }
 
@@ -92,13 +106,27 @@ impl<'a> File<'a> {
         path: &'a Path,
         folder: Option<&'a Path>,
         blob: Option<&'a [u8]>,
-        [most_bytes, most_values]: [u64; 2],
+        limits: [u64; 2],
     ) -> Result<Self, IoError> {
-        let buffers = resource::load_buffers(root, path, folder, blob, most_bytes)?;
+        Self::open_packed(root, path, folder, blob, limits, Packed::default())
+    }
+
+    /// The same of a file some of whose geometry is packed.
+    fn open_packed(
+        root: &'a Root,
+        path: &'a Path,
+        folder: Option<&'a Path>,
+        blob: Option<&'a [u8]>,
+        [most_bytes, most_values]: [u64; 2],
+        packed: Packed,
+    ) -> Result<Self, IoError> {
+        let is_empty = |buffer| packed.is_fallback(buffer);
+        let buffers = resource::load_buffers(root, path, folder, blob, most_bytes, &is_empty)?;
         // Primitives may share vertices, but a small file that decodes to gigabytes means harm.
         let held = buffers.iter().map(|b| b.len() as u64).sum::<u64>();
         let values_left = Cell::new(held.saturating_mul(MAX_SHARING).clamp(1 << 20, most_values));
-        Ok(Self { path, folder, root, buffers, values_left, warnings: Vec::new() })
+        let unpacked = (0..root.buffer_views.len()).map(|_| OnceCell::new()).collect();
+        Ok(Self { path, folder, root, buffers, values_left, packed, unpacked, warnings: Vec::new() })
     }
 
     /// Something at `place` that does not follow the format.

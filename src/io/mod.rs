@@ -22,6 +22,7 @@ pub(crate) mod http;
 pub mod khr_gltf;
 pub mod ksplat;
 pub mod labels;
+mod lenses;
 pub mod llff;
 pub(crate) mod memory;
 mod morton;

@@ -14,7 +14,7 @@ use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::resample::covers;
-use super::{IoError, files, photo};
+use super::{IoError, files, lenses, photo};
 use crate::scene::{Camera, CameraError, Distortion, Photo};
 
 pub(super) use find::{FoundFile, PhotoFinder, Search, fold};
@@ -143,6 +143,7 @@ pub(super) fn photos(
         return Err(IoError::Duplicate { path: source.into(), photo: pair[0].name.clone() });
     }
     warnings.extend(tally.warnings(source));
+    warnings.extend(lenses::told(&photos));
     Ok(photos)
 }
 
@@ -154,7 +155,7 @@ fn fate(l: &ListedPhoto, finder: &PhotoFinder<'_>, source: &Path) -> Result<Fate
     let bad = |cause| IoError::Camera { path: source.into(), photo: l.entry.clone(), cause };
     let unusable = |cause: CameraError| Ok(Fate::Broken(cause.to_string(), Some(cause)));
     let d = l.lens.distortion;
-    for (property, value) in [("k1", d.k1), ("k2", d.k2), ("p1", d.p1), ("p2", d.p2)] {
+    for (property, value) in d.coefficients() {
         if !value.is_finite() {
             let property = format!("distortion {property}");
             return Err(IoError::syntax(
@@ -186,9 +187,8 @@ fn fate(l: &ListedPhoto, finder: &PhotoFinder<'_>, source: &Path) -> Result<Fate
             source,
             format!("photo '{}'", l.entry),
             format!(
-                "its lens distortion (k1 {:e}, k2 {:e}, p1 {:e}, p2 {:e}) leaves nothing of the picture; calibrate the camera \
-                 anew or undistort the photo",
-                d.k1, d.k2, d.p1, d.p2
+                "its lens distortion ({}) leaves nothing of the picture; calibrate the camera anew or undistort the photo",
+                d.coefficients().iter().map(|(name, value)| format!("{name} {value:e}")).collect::<Vec<_>>().join(", ")
             ),
         ));
     }

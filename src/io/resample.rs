@@ -4,10 +4,11 @@
 //! Without distortion that mean is exact. With distortion it is taken over a grid of samples at
 //! least as dense as the full-size pixels, each a bilinear look-up in the picture on disk.
 
-use glam::Vec2;
+use glam::{DVec2, Vec2};
 use rayon::prelude::*;
 
 use crate::math::resize::{Filter, Tap, taps};
+use crate::scene::distortion::fold;
 use crate::scene::{Camera, Distortion, PhotoPixels};
 
 pub(super) struct Pixels {
@@ -113,8 +114,15 @@ pub(super) fn covers(camera: &Camera, distortion: &Distortion) -> bool {
     })
 }
 
-/// A distorting lens in single precision (a few 1e-4 px at 10,000 px).
+/// A distorting lens.
 struct Lens {
+    plain: Plain,
+    /// Where k1, k2, p1 and p2 do not say all: the lens, and the squared distance from the axis that it reaches.
+    full: Option<(Distortion, f64)>,
+}
+
+/// The lens of four coefficients in single precision (a few 1e-4 px at 10,000 px).
+struct Plain {
     focal: Vec2,
     principal: Vec2,
     k: [f32; 2],
@@ -125,13 +133,14 @@ struct Lens {
 
 impl Lens {
     fn new(camera: &Camera, d: &Distortion) -> Self {
-        Self {
+        let plain = Plain {
             focal: camera.focal_px.as_vec2(),
             principal: camera.principal_px.as_vec2(),
             k: [d.k1 as f32, d.k2 as f32],
             p: [d.p1 as f32, d.p2 as f32],
             fold: fold(d.k1, d.k2) as f32,
-        }
+        };
+        Self { plain, full: (!d.is_plain()).then(|| (*d, d.reach().powi(2))) }
     }
 
     /// Row `y` of the undistorted `w x h` picture.
@@ -156,8 +165,22 @@ impl Lens {
         sums
     }
 
-    /// Where the row of pinhole positions `((i + 0.5) * step, v)` lies in the picture on disk;
-    /// NaN beyond the fold. No branches, so that the loop vectorizes.
+    /// Where the row of pinhole positions `((i + 0.5) * step, v)` lies in the picture on disk; NaN where the lens shows
+    /// nothing.
+    fn source_row(&self, v: f32, step: f32, out: &mut [Vec2]) {
+        let Some((lens, reach2)) = &self.full else { return self.plain.source_row(v, step, out) };
+        let [focal, principal] = [self.plain.focal, self.plain.principal].map(Vec2::as_dvec2);
+        let y = (f64::from(v) - principal.y) / focal.y;
+        for (i, out) in out.iter_mut().enumerate() {
+            let q = DVec2::new(((i as f64 + 0.5) * f64::from(step) - principal.x) / focal.x, y);
+            let shown = q.length_squared() < *reach2;
+            *out = if shown { (lens.bend(q) * focal + principal).as_vec2() } else { Vec2::NAN };
+        }
+    }
+}
+
+impl Plain {
+    /// As [`Lens::source_row`]. No branches, so that the loop vectorizes.
     fn source_row(&self, v: f32, step: f32, out: &mut [Vec2]) {
         let y = (v - self.principal.y) / self.focal.y;
         let yy = y * y;
@@ -172,19 +195,6 @@ impl Lens {
             *out = Vec2::new(if r2 < self.fold { sx } else { f32::NAN }, yd * self.focal.y + self.principal.y);
         }
     }
-}
-
-/// The smallest `r²` at which `r (1 + k1 r² + k2 r⁴)` stops growing; infinite if it never does.
-fn fold(k1: f64, k2: f64) -> f64 {
-    // Derivative: 1 + 3 k1 t + 5 k2 t² with t = r².
-    let (a, b) = (5.0 * k2, 3.0 * k1);
-    let discriminant = b * b - 4.0 * a;
-    if discriminant < 0.0 {
-        return f64::INFINITY;
-    }
-    // Both roots in the form that does not cancel: q / a and 1 / q.
-    let q = -0.5 * (b + discriminant.sqrt().copysign(b));
-    [q / a, 1.0 / q].into_iter().filter(|t| *t > 0.0).fold(f64::INFINITY, f64::min)
 }
 
 /// The picture at pixel position `p` between its four nearest pixels; `None` outside of it.

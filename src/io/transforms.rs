@@ -16,8 +16,8 @@ use matrix::{Matrix, pose};
 
 use super::photo_list::{Focal, Lens, ListedPhoto, PhotoFinder, Search, photos};
 use super::splits::Splits;
-use super::{IoError, files, points_ply};
-use crate::scene::{Camera, Dataset, Distortion};
+use super::{IoError, files, lenses, points_ply};
+use crate::scene::{Camera, Dataset, Distortion, Projection, text};
 
 /// The usual name of a list.
 pub(crate) const USUAL: &str = "transforms.json";
@@ -59,6 +59,11 @@ struct Frame {
 struct Intrinsics {
     camera_model: Option<String>,
     is_fisheye: Option<bool>,
+    /// instant-ngp's panoramas.
+    equirectangular: Option<bool>,
+    latlong: Option<bool>,
+    /// instant-ngp's F-theta lenses.
+    ftheta_p0: Option<f64>,
     w: Option<f64>,
     h: Option<f64>,
     fl_x: Option<f64>,
@@ -69,6 +74,8 @@ struct Intrinsics {
     k2: Option<f64>,
     k3: Option<f64>,
     k4: Option<f64>,
+    k5: Option<f64>,
+    k6: Option<f64>,
     p1: Option<f64>,
     p2: Option<f64>,
     camera_angle_x: Option<f64>,
@@ -80,9 +87,10 @@ pub fn read(file: &Path) -> Result<Dataset, IoError> {
     let root = files::folder_of(file);
     let parsed = File::read(file)?;
     let finder = PhotoFinder::new(root)?;
-    let mut listed: Vec<ListedPhoto> =
+    let listed: Vec<_> =
         parsed.frames.iter().map(|frame| frame.listed(&parsed.lens, file)).collect::<Result<_, _>>()?;
     let mut warnings = Vec::new();
+    let mut listed = lenses::readable(listed, file, &mut warnings)?;
     let list = |name: &str, names: &[String]| (name.to_owned(), names.to_owned());
     let splits = Splits {
         train: vec![list("train_filenames", &parsed.train_filenames)],
@@ -136,16 +144,20 @@ pub(crate) fn opengl_pose(camera: &Camera) -> [[f64; 4]; 4] {
 }
 
 impl Frame {
-    fn listed(&self, shared: &Intrinsics, source: &Path) -> Result<ListedPhoto, IoError> {
+    /// The photo, or its camera model if that is not supported.
+    fn listed(&self, shared: &Intrinsics, source: &Path) -> Result<Result<ListedPhoto, String>, IoError> {
         let name = &self.file_path;
         let bad = |reason: String| IoError::Syntax { path: source.into(), place: format!("frame '{name}'"), reason };
-        let lens = self.lens.or(shared).lens(source, &bad)?;
+        let lens = match self.lens.or(shared).lens(&bad)? {
+            Ok(lens) => lens,
+            Err(model) => return Ok(Err(model)),
+        };
         let (pose, broken) = match pose(&self.transform_matrix) {
             Ok(pose) => (pose, None),
             Err(why) => ((DMat3::IDENTITY, DVec3::ZERO, false), Some(why)),
         };
         let (world_from_camera, center, normalized) = pose;
-        Ok(ListedPhoto {
+        Ok(Ok(ListedPhoto {
             entry: name.clone(),
             folder: String::new(),
             lens,
@@ -155,7 +167,7 @@ impl Frame {
             broken,
             test_split: false,
             background: None,
-        })
+        }))
     }
 }
 
@@ -168,6 +180,9 @@ impl Intrinsics {
         Self {
             camera_model: self.camera_model.clone().or_else(|| shared.camera_model.clone()),
             is_fisheye: self.is_fisheye.or(shared.is_fisheye),
+            equirectangular: self.equirectangular.or(shared.equirectangular),
+            latlong: self.latlong.or(shared.latlong),
+            ftheta_p0: self.ftheta_p0.or(shared.ftheta_p0),
             w: self.w.or(shared.w),
             h: self.h.or(shared.h),
             fl_x: focal.fl_x,
@@ -180,25 +195,48 @@ impl Intrinsics {
             k2: self.k2.or(shared.k2),
             k3: self.k3.or(shared.k3),
             k4: self.k4.or(shared.k4),
+            k5: self.k5.or(shared.k5),
+            k6: self.k6.or(shared.k6),
             p1: self.p1.or(shared.p1),
             p2: self.p2.or(shared.p2),
         }
     }
 
-    /// The lens; `bad` makes an error of a value that cannot be.
-    fn lens(&self, source: &Path, bad: &dyn Fn(String) -> IoError) -> Result<Lens, IoError> {
-        let remedy = "undistort the photos to a pinhole camera first";
-        let unsupported = |what: String| IoError::Unsupported { path: source.into(), what, remedy };
-        let known = ["SIMPLE_PINHOLE", "PINHOLE", "SIMPLE_RADIAL", "RADIAL", "OPENCV", "PERSPECTIVE"];
-        if let Some(model) = self.camera_model.as_deref().filter(|m| !known.contains(m)) {
-            return Err(unsupported(format!("the camera model {model}")));
+    /// How the lens bends, or its model if that is not supported.
+    fn distortion(&self) -> Result<Distortion, String> {
+        let model = self.camera_model.as_deref().unwrap_or_default().to_ascii_uppercase();
+        let [k1, k2, k3, k4, k5, k6, p1, p2] =
+            [self.k1, self.k2, self.k3, self.k4, self.k5, self.k6, self.p1, self.p2].map(Option::unwrap_or_default);
+        let of = |more, divisor, projection| {
+            Ok(Distortion { k1, k2, p1, p2, more, divisor, projection, ..Distortion::default() })
+        };
+        let fisheye = self.is_fisheye == Some(true);
+        match model.as_str() {
+            _ if self.equirectangular == Some(true) => Err(lenses::PANORAMA.into()),
+            _ if self.latlong == Some(true) => Err("LATLONG".into()),
+            _ if self.ftheta_p0.is_some() => Err("FTHETA".into()),
+            "OPENCV_FISHEYE" | "FISHEYE" | "SIMPLE_FISHEYE" | "RADIAL_FISHEYE" | "SIMPLE_RADIAL_FISHEYE" => {
+                of([k3, k4, k5, k6], [0.0; 3], Projection::Fisheye)
+            }
+            "" | "SIMPLE_PINHOLE" | "PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" | "OPENCV" | "PERSPECTIVE"
+            | "FULL_OPENCV" => {
+                match model == "FULL_OPENCV" || k5 != 0.0 || k6 != 0.0 {
+                    _ if fisheye => of([k3, k4, k5, k6], [0.0; 3], Projection::Fisheye),
+                    // OpenCV's k4 to k6 divide; nerfstudio's and Metashape's k4 is one more power.
+                    true => of([k3, 0.0, 0.0, 0.0], [k4, k5, k6], Projection::Perspective),
+                    false => of([k3, k4, 0.0, 0.0], [0.0; 3], Projection::Perspective),
+                }
+            }
+            _ => Err(text::shortened(&model, 40).into_owned()),
         }
-        if self.is_fisheye == Some(true) {
-            return Err(unsupported("a fisheye camera model".into()));
-        }
-        if [self.k3, self.k4].iter().any(|k| k.is_some_and(|k| k != 0.0)) {
-            return Err(unsupported("the distortion coefficients k3 or k4".into()));
-        }
+    }
+
+    /// The lens, or its model if that is not supported; `bad` makes an error of a value that cannot be.
+    fn lens(&self, bad: &dyn Fn(String) -> IoError) -> Result<Result<Lens, String>, IoError> {
+        let distortion = match self.distortion() {
+            Ok(distortion) => distortion,
+            Err(model) => return Ok(Err(model)),
+        };
         let focal = match (self.fl_x, self.camera_angle_x) {
             (Some(x), _) => Focal::Px(DVec2::new(x, self.fl_y.unwrap_or(x))),
             (None, Some(x)) => Focal::Angle(x, self.camera_angle_y),
@@ -212,9 +250,7 @@ impl Intrinsics {
             (Some(x), Some(y)) => Some(DVec2::new(x, y)),
             _ => None,
         };
-        let [k1, k2, p1, p2] = [self.k1, self.k2, self.p1, self.p2].map(Option::unwrap_or_default);
-        let distortion = Distortion { k1, k2, p1, p2 };
-        Ok(Lens { size_px, focal, principal_px, distortion })
+        Ok(Ok(Lens { size_px, focal, principal_px, distortion }))
     }
 }
 

@@ -71,7 +71,7 @@ pub(crate) fn find(
     max_seeds: usize,
     observer: &mut dyn Observer,
 ) -> Result<SemanticMap, JobError> {
-    let mut segmenter = FileMasks(Labels::open(photos)?);
+    let mut segmenter = FileMasks(Labels::of_photos(photos, &job.dataset.photos)?);
     let training: Vec<Photo> = (0..job.dataset.photos.len())
         .filter(|i| !job.views.contains(i))
         .map(|i| job.dataset.photos[i].clone())
@@ -116,7 +116,7 @@ pub(crate) fn ask(
     job: &PhotoComparison,
     pictures: Option<&Path>,
 ) -> Result<DemoQueries, JobError> {
-    let mut segmenter = FileMasks(Labels::open(photos)?);
+    let mut segmenter = FileMasks(Labels::of_photos(photos, &job.dataset.photos)?);
     let mut engine = QueryEngine::new(map.language.as_ref(), Recipe::default())?;
     let (mut units, mut asked) = (Vec::new(), Vec::new());
     let mut renderer = Renderer::new();

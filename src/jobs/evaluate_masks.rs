@@ -116,15 +116,16 @@ pub(crate) fn run(
     query: Option<&str>,
     recipe: &Recipe,
 ) -> Result<MaskScores, JobError> {
+    let opened = || Labels::of_photos(labels, &comparison.dataset.photos).map(FileMasks);
     if protocol == Protocol::Strokes {
-        return by_strokes(comparison, FileMasks(Labels::open(labels)?), None);
+        return by_strokes(comparison, opened()?, None);
     }
     let map = io::semantic_map::load(scene, comparison.state.as_deref(), &comparison.cloud)?;
     let map = &map.ok_or_else(|| JobError::NoObjects(scene.into()))?;
     if protocol == Protocol::Corrections {
-        return by_strokes(comparison, FileMasks(Labels::open(labels)?), Some(map));
+        return by_strokes(comparison, opened()?, Some(map));
     }
-    let mut known = FileMasks(Labels::open(labels)?);
+    let mut known = opened()?;
     let views = labeled(comparison, map, &mut known)?;
     if views.is_empty() {
         let text = format!("{}: none of the compared photos has labels", labels.display());

@@ -15,6 +15,7 @@ use super::held_out::held_out;
 use crate::io::labels::Labels;
 use crate::io::trained::{self, CLOUD_FILE};
 use crate::io::{IoError, SceneFolder, splat_ply};
+use crate::math::format::things;
 use crate::models;
 use crate::models::catalog::{self, ModelRole, SAM2};
 use crate::pipeline::observer::{Observer, Severity};
@@ -102,6 +103,8 @@ pub(crate) struct FoundObjects {
     pub(crate) photos: Vec<Photo>,
     pub(crate) state: String,
     pub(crate) secs: f64,
+    /// What of the labels was passed over, not used or joined.
+    pub(crate) warnings: Vec<String>,
 }
 
 /// How objects are looked for: the recipe's name, if it is one, and its choices.
@@ -168,16 +171,29 @@ pub(crate) fn run(
         part_weight: preparation.part_weight,
         grid: None,
     };
-    let masks = match (masks, &request.known, options.track.seed) {
-        (Some(path), Some(_), Some(seed)) if !Labels::open(path)?.has(&photos[seed]) => {
+    let labels = masks.map(|path| Labels::of_photos(path, &dataset.photos)).transpose()?;
+    let mut warnings = labels.as_ref().map_or_else(Vec::new, |labels| labels.notes().to_vec());
+    let labels_of_held = |labels: &Labels| held.iter().filter(|i| labels.has(&dataset.photos[**i])).count();
+    match labels.as_ref().map_or(0, labels_of_held) {
+        0 => {}
+        _ if labels.as_ref().is_some_and(|labels| photos.iter().any(|p| labels.has(p))) => {}
+        n => warnings.push(format!(
+            "All labels are of {}, whose labels are not used; label others, or train with other photos held out",
+            things(n, "held-out photo")
+        )),
+    }
+    warnings.iter().for_each(|text| observer.note(Severity::Warning, text.clone()));
+    let labels = match (labels, &request.known, options.track.seed) {
+        (Some(labels), Some(_), Some(seed)) if !labels.has(&photos[seed]) => {
+            let path = masks.unwrap_or(folder);
             let text = format!("{} has no labels of {}: it is segmented instead", path.display(), photos[seed].name);
             observer.note(Severity::Info, text);
             None
         }
-        (masks, ..) => masks,
+        (labels, ..) => labels,
     };
     let mut warn = |text: String| observer.note(Severity::Warning, text);
-    let network = match (masks, with.segmenter.as_deref()) {
+    let network = match (&labels, with.segmenter.as_deref()) {
         (Some(_), _) | (None, Some(REGIONS)) => None,
         (None, Some(name)) => Some(name.to_owned()),
         (None, None) => catalog::usable(ModelRole::Segmenter, &mut warn)?.into_iter().next(),
@@ -185,7 +201,8 @@ pub(crate) fn run(
     let network = network.map(|name| (name, preparation.grid.unwrap_or_default()));
     let options = FindOptions { grid: network.as_ref().map(|(_, grid)| *grid), ..options };
     let network = network.as_ref().map(|(name, grid)| (name.as_str(), *grid));
-    let mut segmenter = segmenter(masks, cloud, settings, network, folder.join("cache"))?;
+    let by_files = labels.as_ref().map(|_| "files");
+    let mut segmenter = segmenter(labels, cloud, settings, network, folder.join("cache"))?;
     // What is added is looked at by the encoder that has looked at the rest.
     let looked = |map: &Arc<SemanticMap>| map.language.as_ref().map_or(NO_ENCODER.to_owned(), |l| l.encoder.clone());
     let encoder = request.known.as_ref().map(looked).or_else(|| with.encoder.clone());
@@ -197,7 +214,7 @@ pub(crate) fn run(
             .inspect_err(|e| warn(format!("Objects are found without embeddings: {e}")))
             .ok(),
     };
-    let by = network.map(|(name, _)| name).or(masks.map(|_| "files")).unwrap_or(REGIONS);
+    let by = network.map(|(name, _)| name).or(by_files).unwrap_or(REGIONS);
     observer.note(Severity::Info, told(with, preparation, by, encoder.as_ref().map(|e| e.name())));
     if let Some(look) = network.and_then(|(name, _)| LookTime::of_installed(name)) {
         let most = photos.len().min(options.track.max_seeds);
@@ -219,5 +236,5 @@ pub(crate) fn run(
     if let Some(kept) = kept {
         observer.note(Severity::Info, format!("The previous objects and parts are kept in {}", kept.display()));
     }
-    Ok(FoundObjects { found, photos, state, secs: start.elapsed().as_secs_f64() })
+    Ok(FoundObjects { found, photos, state, secs: start.elapsed().as_secs_f64(), warnings })
 }

@@ -140,7 +140,7 @@ impl Subject {
 
     fn labels(&self) -> Result<FileMasks, StudyError> {
         let masks = self.options.masks.as_ref().ok_or_else(|| failed("labels are needed"))?;
-        Ok(FileMasks(Labels::open(masks).map_err(failed)?))
+        Ok(FileMasks(Labels::of_photos(masks, &self.dataset()?.photos).map_err(failed)?))
     }
 
     fn few_labels(&self, what: &str) -> StudyError {

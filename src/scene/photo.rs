@@ -1,11 +1,9 @@
-//! Photos: where they are, how their lens bends, and their pixels once loaded.
+//! Photos: where they are, and their pixels once loaded.
 
 use std::borrow::Cow;
 use std::path::PathBuf;
 
-use serde::{Deserialize, Serialize};
-
-use super::{Camera, text};
+use super::{Camera, Distortion, text};
 
 /// A posed photo of a dataset. Its pixels are loaded by `io`, undistorted.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,17 +39,6 @@ impl Photo {
     pub(crate) fn title(&self) -> Cow<'_, str> {
         text::line(&self.name)
     }
-}
-
-/// OpenCV's radial-tangential lens model: `x' = x (1 + k1 r² + k2 r⁴) + 2 p1 x y + p2 (r² + 2 x²)`,
-/// `y' = y (1 + k1 r² + k2 r⁴) + p1 (r² + 2 y²) + 2 p2 x y`. `k3` is zero in every model we read.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Distortion {
-    /// Quadratic radial coefficient.
-    pub k1: f64,
-    pub(crate) k2: f64,
-    pub(crate) p1: f64,
-    pub(crate) p2: f64,
 }
 
 /// A loaded, undistorted photo.

@@ -33,6 +33,7 @@ pub fn all() -> Vec<Seed> {
         ("depth_map", "a.npy", depth_map()),
         ("transforms", "nerfstudio.json", transforms().to_string().into_bytes()),
         ("transforms", "per_frame.json", per_frame().to_string().into_bytes()),
+        ("transforms", "fisheye.json", fisheye().to_string().into_bytes()),
         ("camera_path", "own.json", camera_path().to_string().into_bytes()),
         ("camera_path", "nerfstudio.json", nerfstudio_path(json!(ROWS)).to_string().into_bytes()),
         ("camera_path", "nerfstudio_old.json", nerfstudio_path(json!(COLUMNS)).to_string().into_bytes()),
@@ -225,6 +226,15 @@ fn per_frame() -> serde_json::Value {
     json!({ "frames": [f] })
 }
 
+fn fisheye() -> serde_json::Value {
+    let mut f = transforms();
+    f["camera_model"] = json!("OPENCV_FISHEYE");
+    f["fl_x"] = json!(5.5);
+    f["k3"] = json!(0.01);
+    f["k6"] = json!(-0.001);
+    f
+}
+
 fn blender() -> serde_json::Value {
     let mut f = frame();
     f["file_path"] = json!("./a");
@@ -270,6 +280,9 @@ pub fn identities() -> serde_json::Value {
         { "id": 1, "name": "handle", "level": "part", "parent": 255 }] })
 }
 
+/// Two segments and a box of YOLO's.
+pub const SEGMENTS: &[u8] = b"0 0.1 0.1 0.5 0.1 0.5 0.6 0.1 0.6\n1 0.5 0.5 0.9 0.5 0.7 0.9 0.8\n1 0.5 0.5 0.1 0.1\n";
+
 fn labels() -> Vec<Seed> {
     let square = |x: i32| [[x, 1], [x + 6, 1], [x + 6, 9], [x, 9]];
     let polygons = json!({ "info": { "name": "photo.png", "width": 16, "height": 12 }, "objects": [
@@ -287,8 +300,31 @@ fn labels() -> Vec<Seed> {
         picture(&mut out);
         out.into_inner()
     };
+    let groups = json!({ "info": { "name": "photo.png", "folder": "d:\\set", "width": 16, "height": 12 }, "objects": [
+        { "category": "ring", "group": 1, "layer": 1.0, "segmentation": square(1) },
+        { "category": "ring", "group": "2", "layer": 3, "segmentation": square(8) },
+        { "category": "__background__", "group": 0, "layer": 2, "segmentation": [[2, 2], [4, 2], [4, 5]] }] });
+    let shape = |kind: &str, points: serde_json::Value| json!({ "label": kind, "shape_type": kind, "points": points, "group_id": 1 });
+    let mut mask = shape("mask", json!([[3, 4], [5, 6]]));
+    mask["mask"] = json!(base64::encode(png(&|w| luma.write_to(w, ImageFormat::Png).expect("encode"))));
+    let shapes = json!({ "version": "5.0", "imagePath": "..\\photo.png", "imageWidth": 16, "imageHeight": 12, "shapes": [
+        shape("polygon", json!(square(1))), shape("circle", json!([[5, 5], [7, 5]])), mask,
+        shape("rectangle", json!([[1, 1], [9, 4]])), shape("linestrip", json!([[1, 1], [9, 4], [3, 3], [1, 1]])) ] });
+    let flat = json!([1, 1, 7, 1, 7, 9, 1.5, 9]);
+    let instances = json!({ "images": [{ "id": 1, "file_name": "a/photo.png", "width": 16, "height": 12 }],
+        "categories": [{ "id": 1, "name": "cup", "supercategory": "object", "parent": null },
+            { "id": 2, "name": "rim \u{b7} cup", "supercategory": "part", "parent": 1 }],
+        "annotations": [{ "image_id": 1, "category_id": 1, "segmentation": [flat, flat], "iscrowd": 0 },
+            { "image_id": 1, "category_id": 2, "segmentation": rle(json!("n0X1j3")), "iscrowd": 1 },
+            { "image_id": 1, "category_id": 2, "bbox": [1, 2, 3, 4] }] });
     vec![
         ("label_polygons", "isat.json", polygons.to_string().into_bytes()),
+        ("label_polygons", "groups.json", groups.to_string().into_bytes()),
+        ("label_shapes", "labelme.json", shapes.to_string().into_bytes()),
+        ("label_instances", "coco.json", instances.to_string().into_bytes()),
+        ("label_segments", "yolo.txt", SEGMENTS.to_vec()),
+        ("label_names", "table.yaml", b"nc: 2\nnames:\n  0: cup  # of tea\n  1: 'plate'\n".to_vec()),
+        ("label_names", "list.yaml", b"names: [cup, \"plate\"]\n".to_vec()),
         ("label_masklets", "sav.json", masklets.to_string().into_bytes()),
         ("label_ids", "identities.json", identities().to_string().into_bytes()),
         ("label_id_map", "grey8.png", png(&|w| luma.write_to(w, ImageFormat::Png).expect("encode"))),
@@ -298,6 +334,13 @@ fn labels() -> Vec<Seed> {
         ("label_picture", "rgba.png", encode(&gray, ImageFormat::Png)),
     ]
 }
+
+/// Cameras of models that are no pinhole's; the photos of the folder are of the first two.
+const WIDE: &[u8] =
+    b"1 OPENCV_FISHEYE 16 12 5 5 8 6 .05 -.02 .003 -.001\n2 EUCM 16 12 8 8 8 6 .6 1.1\n3 FOV 16 12 9 9 8 6 .9\n\
+    4 FULL_OPENCV 16 12 9 9 8 6 .2 -.05 .003 -.002 .01 .15 -.03 .006\n5 SIMPLE_DIVISION 16 12 9 8 6 -.1\n\
+    6 THIN_PRISM_FISHEYE 16 12 9 9 8 6 .02 -.01 .002 -.001 .004 -.0007 .001 -.002\n7 EQUIRECTANGULAR 16 12 16 12\n\
+    8 RAD_TAN_THIN_PRISM_FISHEYE 16 12 9 9 8 6 .02 -.01 .004 -.002 .0005 -.0001 .002 -.001 .001 -.0005 .0008 .0002\n";
 
 fn colmap() -> Vec<Seed> {
     let le = |values: &[f64]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>();
@@ -322,6 +365,7 @@ fn colmap() -> Vec<Seed> {
         ("colmap_cameras", "two.bin", cameras.concat()),
         ("colmap_images", "two.bin", [longs(&[2]), image(1), image(2)].concat()),
         ("colmap_points", "two.bin", [longs(&[2]), point(9), point(10)].concat()),
+        ("colmap_cameras_text", "wide.txt", WIDE.to_vec()),
         (
             "colmap_cameras_text",
             "two.txt",

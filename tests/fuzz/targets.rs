@@ -167,6 +167,10 @@ pub fn all() -> Vec<Target> {
             },
         ),
         Target::in_folder("label_polygons", Door::Json, "a.json", |_| {}, labels),
+        Target::in_folder("label_shapes", Door::Json, "a.json", |_| {}, labels),
+        Target::in_folder("label_instances", Door::Json, "a.json", |_| {}, labels),
+        Target::in_folder("label_segments", Door::Any, "photo.txt", |_| {}, labels),
+        Target::in_folder("label_names", Door::Any, "data.yaml", segments, labels),
         Target::in_folder("label_masklets", Door::Json, "a.json", |_| {}, labels),
         Target::in_folder("label_ids", Door::Json, "identities.json", id_maps, labels),
         Target::in_folder("label_id_map", Door::Picture, "object_ids/photo.png", id_maps, labels),
@@ -209,6 +213,10 @@ fn labels(folder: &Path) -> Result<Vec<io::labels::Region>, IoError> {
     // The frame of a video.
     photo.name = "0".into();
     Ok([regions, found.of(&photo, 16)?].concat())
+}
+
+fn segments(folder: &Path) {
+    fs::write(folder.join("photo.txt"), super::seeds::SEGMENTS).expect("write");
 }
 
 fn gray(folder: &Path, inner: &str) {

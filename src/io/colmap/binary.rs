@@ -9,8 +9,8 @@ use crate::io::IoError;
 use crate::io::reader::Reader;
 use crate::scene::SparsePoint;
 
-/// Least bytes of a camera: id, model, size, three parameters.
-const CAMERA_BYTES: usize = 4 + 4 + 16 + 24;
+/// Least bytes of a camera: id, model, size, two parameters.
+const CAMERA_BYTES: usize = 4 + 4 + 16 + 16;
 /// Least bytes of an image: id, pose, camera, empty name, number of 2-D points.
 const IMAGE_BYTES: usize = 4 + 56 + 4 + 1 + 8;
 const OBSERVATION_BYTES: usize = 24;
@@ -30,14 +30,8 @@ pub(super) fn cameras(bytes: &[u8], path: &Path) -> Result<Cameras, IoError> {
         ids.push(u64::from(id));
         let number = r.u32(&place)?;
         let size = (r.u64(&place)?, r.u64(&place)?);
-        let Some((model, count)) = lens::by_number(number) else {
-            return Err(IoError::Unsupported {
-                path: path.into(),
-                what: format!("the camera model number {number}"),
-                remedy: "undistort the photos with COLMAP's image_undistorter first",
-            });
-        };
-        let params = (0..count).map(|_| r.f64(&place)).collect::<Result<Vec<_>, _>>()?;
+        let model = lens::by_number(number, &place, path)?;
+        let params = (0..model.params).map(|_| r.f64(&place)).collect::<Result<Vec<_>, _>>()?;
         cameras.insert(id, lens::lens(model, size, &params, id, path)?);
     }
     distinct(ids, "camera", path)?;

@@ -5,50 +5,69 @@ use std::path::Path;
 use glam::DVec2;
 
 use crate::io::IoError;
+use crate::io::lenses::PANORAMA;
 use crate::io::photo_list::{Focal, Lens};
-use crate::scene::{Camera, Distortion};
+use crate::scene::{Camera, Distortion, Projection};
 
-/// Name and number of parameters of each model, by its number in binary files.
-const MODELS: [(&str, usize); 12] = [
-    ("SIMPLE_PINHOLE", 3),
-    ("PINHOLE", 4),
-    ("SIMPLE_RADIAL", 4),
-    ("RADIAL", 5),
-    ("OPENCV", 8),
-    ("OPENCV_FISHEYE", 8),
-    ("FULL_OPENCV", 12),
-    ("FOV", 5),
-    ("SIMPLE_RADIAL_FISHEYE", 4),
-    ("RADIAL_FISHEYE", 5),
-    ("THIN_PRISM_FISHEYE", 12),
-    ("RAD_TAN_THIN_PRISM_FISHEYE", 16),
-];
-
-/// Name and number of parameters of model number `id`.
-pub(super) fn by_number(id: u32) -> Option<(&'static str, usize)> {
-    MODELS.get(id as usize).copied()
+/// A camera model by its number in binary files.
+#[derive(Debug)]
+pub(super) struct Model {
+    name: &'static str,
+    pub(super) params: usize,
+    /// Parameters before the principal point; 0 = there is none.
+    focals: usize,
 }
 
-/// The lens of a camera of the model named `model`.
-pub(super) fn lens(model: &str, size: (u64, u64), params: &[f64], id: u32, path: &Path) -> Result<Lens, IoError> {
+const fn model(name: &'static str, params: usize, focals: usize) -> Model {
+    Model { name, params, focals }
+}
+
+/// The models of COLMAP 4, in the order of their numbers.
+const MODELS: [Model; 18] = [
+    model("SIMPLE_PINHOLE", 3, 1),
+    model("PINHOLE", 4, 2),
+    model("SIMPLE_RADIAL", 4, 1),
+    model("RADIAL", 5, 1),
+    model("OPENCV", 8, 2),
+    model("OPENCV_FISHEYE", 8, 2),
+    model("FULL_OPENCV", 12, 2),
+    model("FOV", 5, 2),
+    model("SIMPLE_RADIAL_FISHEYE", 4, 1),
+    model("RADIAL_FISHEYE", 5, 1),
+    model("THIN_PRISM_FISHEYE", 12, 2),
+    model("RAD_TAN_THIN_PRISM_FISHEYE", 16, 2),
+    model("SIMPLE_DIVISION", 4, 1),
+    model("DIVISION", 5, 2),
+    model("SIMPLE_FISHEYE", 3, 1),
+    model("FISHEYE", 4, 2),
+    model("EUCM", 6, 2),
+    model(PANORAMA, 2, 0),
+];
+
+/// A camera, or the name of its model if photos cannot be undistorted with that.
+pub(super) type Found = Result<Lens, String>;
+
+/// Model number `number` of the camera `place`.
+pub(super) fn by_number(number: u32, place: &str, path: &Path) -> Result<&'static Model, IoError> {
+    MODELS.get(number as usize).ok_or_else(|| IoError::Unsupported {
+        path: path.into(),
+        what: format!("the camera model number {number} ({place}), newer than COLMAP 4's {}", MODELS.len()),
+        remedy: "undistort the photos with COLMAP's image_undistorter first",
+    })
+}
+
+/// The model of a name; an unknown one is told when a photo needs it.
+pub(super) fn by_name(name: &str) -> Result<&'static Model, String> {
+    MODELS.iter().find(|m| m.name == name).ok_or_else(|| name.chars().take(40).collect())
+}
+
+/// The camera `id` of a model.
+pub(super) fn lens(model: &Model, size: (u64, u64), params: &[f64], id: u32, path: &Path) -> Result<Found, IoError> {
     let bad = |reason: String| IoError::Syntax { path: path.into(), place: format!("camera {id}"), reason };
-    let (fx, fy, cx, cy, d) = match (model, params) {
-        ("SIMPLE_PINHOLE", &[f, cx, cy]) => (f, f, cx, cy, [0.0; 4]),
-        ("PINHOLE", &[fx, fy, cx, cy]) => (fx, fy, cx, cy, [0.0; 4]),
-        ("SIMPLE_RADIAL", &[f, cx, cy, k1]) => (f, f, cx, cy, [k1, 0.0, 0.0, 0.0]),
-        ("RADIAL", &[f, cx, cy, k1, k2]) => (f, f, cx, cy, [k1, k2, 0.0, 0.0]),
-        ("OPENCV", &[fx, fy, cx, cy, k1, k2, p1, p2]) => (fx, fy, cx, cy, [k1, k2, p1, p2]),
-        ("SIMPLE_PINHOLE" | "PINHOLE" | "SIMPLE_RADIAL" | "RADIAL" | "OPENCV", _) => {
-            return Err(bad(format!("{} parameters do not make a {model} camera", params.len())));
-        }
-        _ => {
-            return Err(IoError::Unsupported {
-                path: path.into(),
-                what: format!("the camera model {}", model.chars().take(40).collect::<String>()),
-                remedy: "undistort the photos with COLMAP's image_undistorter first",
-            });
-        }
-    };
+    if params.len() != model.params {
+        return Err(bad(format!("{} parameters do not make a {} camera", params.len(), model.name)));
+    }
+    let Some((focal, principal, distortion)) = parts(model, params) else { return Ok(Err(model.name.into())) };
     let side = |v: u64| u32::try_from(v).ok().filter(|v| (1..=Camera::MAX_SIDE_PX).contains(v));
     let (Some(w), Some(h)) = (side(size.0), side(size.1)) else {
         return Err(bad(format!(
@@ -58,11 +77,52 @@ pub(super) fn lens(model: &str, size: (u64, u64), params: &[f64], id: u32, path:
             Camera::MAX_SIDE_PX
         )));
     };
-    let [k1, k2, p1, p2] = d;
-    Ok(Lens {
-        size_px: Some((w, h)),
-        focal: Focal::Px(DVec2::new(fx, fy)),
-        principal_px: Some(DVec2::new(cx, cy)),
-        distortion: Distortion { k1, k2, p1, p2 },
-    })
+    Ok(Ok(Lens { size_px: Some((w, h)), focal: Focal::Px(focal), principal_px: Some(principal), distortion }))
 }
+
+/// Focal lengths, principal point and distortion; `None` of a model without a pinhole.
+fn parts(model: &Model, params: &[f64]) -> Option<(DVec2, DVec2, Distortion)> {
+    let (focal, principal, rest) = match (model.focals, params) {
+        (1, [f, cx, cy, rest @ ..]) => (DVec2::splat(*f), DVec2::new(*cx, *cy), rest),
+        (2, [fx, fy, cx, cy, rest @ ..]) => (DVec2::new(*fx, *fy), DVec2::new(*cx, *cy), rest),
+        _ => return None,
+    };
+    let plain = |[k1, k2, p1, p2]: [f64; 4]| Distortion { k1, k2, p1, p2, ..Distortion::default() };
+    let of = |projection| Distortion { projection, ..Distortion::default() };
+    let fisheye = |k: [f64; 4], p1, p2| Distortion {
+        more: [k[2], k[3], 0.0, 0.0],
+        projection: Projection::Fisheye,
+        ..plain([k[0], k[1], p1, p2])
+    };
+    let distortion = match (model.name, rest) {
+        ("SIMPLE_PINHOLE" | "PINHOLE", []) => Distortion::default(),
+        ("SIMPLE_RADIAL", &[k1]) => plain([k1, 0.0, 0.0, 0.0]),
+        ("RADIAL", &[k1, k2]) => plain([k1, k2, 0.0, 0.0]),
+        ("OPENCV", &[k1, k2, p1, p2]) => plain([k1, k2, p1, p2]),
+        ("FULL_OPENCV", &[k1, k2, p1, p2, k3, k4, k5, k6]) => {
+            Distortion { more: [k3, 0.0, 0.0, 0.0], divisor: [k4, k5, k6], ..plain([k1, k2, p1, p2]) }
+        }
+        ("SIMPLE_FISHEYE" | "FISHEYE", []) => of(Projection::Fisheye),
+        ("SIMPLE_RADIAL_FISHEYE", &[k1]) => fisheye([k1, 0.0, 0.0, 0.0], 0.0, 0.0),
+        ("RADIAL_FISHEYE", &[k1, k2]) => fisheye([k1, k2, 0.0, 0.0], 0.0, 0.0),
+        ("OPENCV_FISHEYE", &[k1, k2, k3, k4]) => fisheye([k1, k2, k3, k4], 0.0, 0.0),
+        ("THIN_PRISM_FISHEYE", &[k1, k2, p1, p2, k3, k4, s1, s2]) => {
+            Distortion { prism: [s1, 0.0, s2, 0.0], ..fisheye([k1, k2, k3, k4], p1, p2) }
+        }
+        // Its tangential parameters come in the other order.
+        ("RAD_TAN_THIN_PRISM_FISHEYE", &[k1, k2, k3, k4, k5, k6, p2, p1, s1, s2, s3, s4]) => Distortion {
+            more: [k3, k4, k5, k6],
+            prism: [s1, s2, s3, s4],
+            radial_first: true,
+            ..fisheye([k1, k2, k3, k4], p1, p2)
+        },
+        ("FOV", &[omega]) => of(Projection::Fov(omega)),
+        ("SIMPLE_DIVISION" | "DIVISION", &[k]) => of(Projection::Division(k)),
+        ("EUCM", &[alpha, beta]) => of(Projection::Unified(alpha, beta)),
+        _ => return None,
+    };
+    Some((focal, principal, distortion))
+}
+
+#[cfg(test)]
+mod tests;

@@ -14,9 +14,9 @@ use std::path::Path;
 
 use glam::{DMat3, DVec3};
 
-use super::photo_list::{Lens, ListedPhoto, PhotoFinder, photos, some_of};
+use super::photo_list::{ListedPhoto, PhotoFinder, photos, some_of};
 use super::splits::Splits;
-use super::{IoError, files, llff, photo, photo_list, points_ply};
+use super::{IoError, files, lenses, llff, photo, photo_list, points_ply};
 use crate::math::rotation::matrix_from_quaternion;
 use crate::scene::{Dataset, Photo, SparsePoint};
 use find::{Largest, Model};
@@ -33,7 +33,8 @@ struct Image {
     translation: DVec3,
 }
 
-type Cameras = HashMap<u32, Lens>;
+/// Cameras by their number.
+type Cameras = HashMap<u32, lens::Found>;
 
 pub(crate) fn is_colmap(root: &Path) -> bool {
     find::any(root)
@@ -62,10 +63,9 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
         ));
     }
     let cameras = cameras(&model)?;
-    let mut listed = Vec::with_capacity(images.len());
-    for image in &images {
-        listed.push(self::listed(image, &cameras, &place.below, &images_file)?);
-    }
+    let of = |image| listed(image, &cameras, &place.below, &images_file);
+    let listed: Vec<_> = images.iter().map(of).collect::<Result<_, _>>()?;
+    let mut listed = lenses::readable(listed, &model.file("cameras"), &mut warnings)?;
     Splits::beside(&[&model.folder, root])?.apply(&mut listed, &PhotoFinder::new(root)?, &mut warnings);
     let photos = photos(listed, root, &images_file, &mut warnings)?;
     warnings.extend(without_pose(&photos, &images, root));
@@ -73,6 +73,7 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
     if points.is_empty() {
         warnings.push("the reconstruction has no sparse points; training starts from random points".into());
     }
+
     Ok(Dataset {
         name: files::folder_name(root),
         root: root.into(),
@@ -144,7 +145,13 @@ fn end(name: &str) -> &str {
     name.rsplit(['/', '\\']).next().unwrap_or(name)
 }
 
-fn listed(image: &Image, cameras: &Cameras, folder: &str, source: &Path) -> Result<ListedPhoto, IoError> {
+/// A photo, or the name of its camera's model if that is not supported.
+fn listed(
+    image: &Image,
+    cameras: &Cameras,
+    folder: &str,
+    source: &Path,
+) -> Result<Result<ListedPhoto, String>, IoError> {
     let Some(lens) = cameras.get(&image.camera) else {
         return Err(IoError::syntax(
             source,
@@ -152,20 +159,24 @@ fn listed(image: &Image, cameras: &Cameras, folder: &str, source: &Path) -> Resu
             format!("there is no camera {}", image.camera),
         ));
     };
+    let lens = match lens {
+        Ok(lens) => lens.clone(),
+        Err(model) => return Ok(Err(model.clone())),
+    };
     // The rows of camera_from_world are the columns of world_from_camera.
     let axes = matrix_from_quaternion(image.quaternion).map(|[x, y, z]| DMat3::from_cols(x.into(), y.into(), z.into()));
     let world_from_camera = axes.unwrap_or(DMat3::NAN);
-    Ok(ListedPhoto {
+    Ok(Ok(ListedPhoto {
         entry: image.name.clone(),
         folder: folder.into(),
-        lens: lens.clone(),
+        lens,
         world_from_camera,
         center: -(world_from_camera * image.translation),
         normalized: false,
         broken: None,
         test_split: false,
         background: None,
-    })
+    }))
 }
 
 fn point(position: DVec3, rgb: [u8; 3], index: usize, path: &Path) -> Result<SparsePoint, IoError> {

@@ -63,7 +63,11 @@ pub(super) fn cameras(text: &str, path: &Path) -> Result<Cameras, IoError> {
                 Err(_) => return Err(l.bad("a parameter is not a number".into())),
             }
         }
-        cameras.insert(id, lens::lens(model, size, &params, id, path)?);
+        let found = match lens::by_name(model) {
+            Ok(model) => lens::lens(model, size, &params, id, path)?,
+            Err(unknown) => Err(unknown),
+        };
+        cameras.insert(id, found);
     }
     distinct(ids, "camera", path)?;
     Ok(cameras)

@@ -140,15 +140,20 @@ impl File<'_> {
 
     pub(crate) fn view_bytes(&self, index: usize, place: &str) -> Result<&[u8], IoError> {
         let view = self.item(&self.root.buffer_views, index, "bufferViews", place)?;
-        let buffer = self.item(&self.buffers, view.buffer.value(), "buffers", &format!("bufferViews[{index}]"))?;
+        if let Some(bytes) = self.packed_view(index)? {
+            return Ok(bytes);
+        }
         let start = view.byte_offset.map_or(0, |o| o.0);
-        let range = start
-            .checked_add(view.byte_length.0)
-            .and_then(|end| Some(usize::try_from(start).ok()?..usize::try_from(end).ok()?));
+        self.buffer_bytes(view.buffer.value(), start, view.byte_length.0, &format!("bufferViews[{index}]"))
+    }
+
+    /// `length` bytes of a buffer.
+    pub(super) fn buffer_bytes(&self, buffer: usize, start: u64, length: u64, place: &str) -> Result<&[u8], IoError> {
+        let buffer = self.item(&self.buffers, buffer, "buffers", place)?;
+        let end = start.checked_add(length);
+        let range = end.and_then(|end| Some(usize::try_from(start).ok()?..usize::try_from(end).ok()?));
         range.and_then(|r| buffer.get(r)).ok_or_else(|| {
-            let problem =
-                format!("{} bytes from {start} lie outside its buffer of {}", view.byte_length.0, buffer.len());
-            self.content(format!("bufferViews[{index}]"), problem)
+            self.content(place, format!("{length} bytes from {start} lie outside its buffer of {}", buffer.len()))
         })
     }
 }

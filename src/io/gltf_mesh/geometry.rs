@@ -4,6 +4,8 @@ use glam::{Vec2, Vec3, Vec4};
 use gltf::json::mesh::{Mode, Primitive as JsonPrimitive, Semantic};
 use gltf::json::validation::Checked;
 
+use super::accessor::AccessorValues;
+use super::packed::Unpacked;
 use super::{File, MAX_ITEMS, Material, Mesh, MeshNode, MeshPrimitive};
 use crate::io::IoError;
 use crate::scene::text;
@@ -27,7 +29,8 @@ impl File<'_> {
             let mut out = Mesh { name: mesh.name.as_deref().map(text::name), primitives: Vec::new() };
             for (p, primitive) in mesh.primitives.iter().enumerate().filter(|_| used[m]) {
                 let place = format!("meshes[{m}].primitives[{p}]");
-                out.primitives.extend(self.primitive(primitive, &place, materials)?);
+                let draco = self.draco(m, p)?;
+                out.primitives.extend(self.primitive(primitive, draco.as_ref(), &place, materials)?);
             }
             meshes.push(out);
         }
@@ -37,6 +40,7 @@ impl File<'_> {
     fn primitive(
         &mut self,
         primitive: &JsonPrimitive,
+        draco: Option<&Unpacked>,
         place: &str,
         materials: &[Material],
     ) -> Result<Option<MeshPrimitive>, IoError> {
@@ -53,25 +57,26 @@ impl File<'_> {
             self.warnings.push(format!("{place}: has no positions, left out"));
             return Ok(None);
         };
-        let values = self.values(positions, place)?;
+        let values = self.attribute(draco, "POSITION", positions, place)?;
         if values.width != 3 {
             return Err(self.content(place, "its POSITION is not VEC3"));
         }
         let positions: Vec<Vec3> = values.arrays(0.0).map(Vec3::from_array).collect();
         let count = positions.len();
         let normals = match attribute(Semantic::Normals) {
-            Some(i) => self.values(i, place)?.arrays(0.0).map(Vec3::from_array).collect(),
+            Some(i) => self.attribute(draco, "NORMAL", i, place)?.arrays(0.0).map(Vec3::from_array).collect(),
             None => Vec::new(),
         };
         let colors = match attribute(Semantic::Colors(0)) {
-            Some(i) => self.values(i, place)?.arrays(1.0).map(Vec4::from_array).collect(),
+            Some(i) => self.attribute(draco, "COLOR_0", i, place)?.arrays(1.0).map(Vec4::from_array).collect(),
             None => Vec::new(),
         };
         let mut uv_sets: Vec<Vec<Vec2>> = Vec::new();
         for set in 0..MAX_UV_SETS {
             if let Some(i) = attribute(Semantic::TexCoords(set)) {
                 uv_sets.resize(set as usize + 1, Vec::new());
-                uv_sets[set as usize] = self.values(i, place)?.arrays(0.0).map(Vec2::from_array).collect();
+                let values = self.attribute(draco, &format!("TEXCOORD_{set}"), i, place)?;
+                uv_sets[set as usize] = values.arrays(0.0).map(Vec2::from_array).collect();
             }
         }
         let lengths = [normals.len(), colors.len()].into_iter().chain(uv_sets.iter().map(Vec::len));
@@ -79,6 +84,7 @@ impl File<'_> {
             return Err(self.content(place, format!("one attribute has {length} elements, POSITION has {count}")));
         }
         let order: Vec<u32> = match primitive.indices {
+            _ if draco.is_some() => draco.map(Unpacked::indices).unwrap_or_default(),
             Some(i) => self.indices(i.value(), place)?,
             None => (0..u32::try_from(count).unwrap_or(u32::MAX)).collect(),
         };
@@ -93,8 +99,21 @@ impl File<'_> {
             }
             None => materials.len() - 1,
         };
-        let triangles = triangles(&order, mode);
+        // Draco knows no strips and fans: what it unpacks is triangles.
+        let triangles = triangles(&order, if draco.is_some() { Mode::Triangles } else { mode });
         Ok(Some(MeshPrimitive { positions, normals, uv_sets, colors, triangles, material }))
+    }
+
+    /// An attribute of a primitive, unpacked where Draco has packed it.
+    fn attribute(
+        &self,
+        draco: Option<&Unpacked>,
+        name: &str,
+        accessor: usize,
+        place: &str,
+    ) -> Result<AccessorValues, IoError> {
+        let unpacked = draco.map(|draco| self.unpacked_values(draco, name, accessor, place)).transpose()?.flatten();
+        unpacked.map_or_else(|| self.values(accessor, place), Ok)
     }
 }
 

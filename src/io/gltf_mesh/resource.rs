@@ -46,17 +46,23 @@ fn word(bytes: &[u8], at: usize) -> Option<u32> {
     bytes.get(at..at.checked_add(4)?)?.try_into().ok().map(u32::from_le_bytes)
 }
 
-/// Every buffer, each at least as long as it says, together at most `limit` bytes.
+/// Every buffer, each at least as long as it says, together at most `limit` bytes; those without bytes of their own that
+/// `is_empty` names are empty.
 pub(crate) fn load_buffers<'a>(
     root: &Root,
     path: &Path,
     folder: Option<&Path>,
     mut blob: Option<&'a [u8]>,
     limit: u64,
+    is_empty: &dyn Fn(usize) -> bool,
 ) -> Result<Vec<Cow<'a, [u8]>>, IoError> {
     let mut total = 0_u64;
     let mut buffers = Vec::new();
     for (i, buffer) in root.buffers.iter().enumerate() {
+        if is_empty(i) && buffer.uri.is_none() {
+            buffers.push(Cow::Borrowed(&[][..]));
+            continue;
+        }
         let place = format!("buffers[{i}]");
         let content = |reason: String| IoError::Syntax { path: path.into(), place: place.clone(), reason };
         let bytes: Cow<'a, [u8]> = match &buffer.uri {

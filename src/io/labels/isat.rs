@@ -1,14 +1,15 @@
-//! ISAT label files, as lerf_ovs has them: polygons with a category, several of which may make up
-//! one region. Two fields more are understood: `level` ("object" or "part") and `parent` (the
-//! category that it is a piece of).
+//! ISAT label files, as lerf_ovs has them: polygons with a category and a group, drawn by layer. Polygons of one
+//! category and one group are one region; `__background__` cuts what is drawn below it. Two fields more are
+//! understood: `level` ("object" or "part") and `parent` (the category that it is a piece of).
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::path::Path;
 
 use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::polygons::polygons;
+use super::things::{Thing, is_background, is_ignored, wholes_first};
 use super::{Region, Sheet};
 use crate::io::{IoError, files};
 use crate::scene::identity::whole_names::BETWEEN;
@@ -31,6 +32,11 @@ struct Info {
 #[derive(Deserialize)]
 struct Polygon {
     category: String,
+    /// A number, in some versions a text; files of other programs leave it out.
+    #[serde(default)]
+    group: Value,
+    #[serde(default)]
+    layer: Value,
     segmentation: Vec<[f64; 2]>,
     #[serde(default)]
     level: Option<Level>,
@@ -38,66 +44,72 @@ struct Polygon {
     parent: Option<String>,
 }
 
-/// The photo that a label file belongs to; `None` if it is JSON of another kind.
-pub(crate) fn photo_of(file: &serde_json::Value) -> Option<&str> {
-    file["info"]["name"].as_str().filter(|_| file["objects"].is_array())
+impl Polygon {
+    fn layer(&self) -> f64 {
+        self.layer.as_f64().or_else(|| self.layer.as_str()?.trim().parse().ok()).unwrap_or(0.0)
+    }
 }
 
-/// The regions of a label file: polygons of one category together, objects before parts.
+/// The folder and the name of the photo that a label file says it is of; `None` if it is JSON of another kind.
+pub(crate) fn photo_of(file: &Value) -> Option<(&str, &str)> {
+    let info = &file["info"];
+    let name = info["name"].as_str().filter(|_| file["objects"].is_array())?;
+    Some((info["folder"].as_str().unwrap_or_default(), name))
+}
+
+/// The regions of a label file, objects before parts.
 pub(crate) fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
     let file: File = files::read_json(path)?;
     let Info { width, height, .. } = file.info;
-    let names: HashSet<&str> = file.objects.iter().map(|p| p.category.as_str()).collect();
-    sheet.check(path, (width, height), names.len())?;
     let bad = |place: String, reason: &str| IoError::Syntax { path: path.into(), place, reason: reason.into() };
     if file.objects.iter().map(|p| p.segmentation.len()).sum::<usize>() > MAX_VERTICES {
         return Err(bad("objects".into(), "more vertices than a label file can need"));
     }
-    let mut regions: Vec<(Option<String>, Region)> = Vec::new();
-    let mut place: HashMap<String, usize> = HashMap::new();
-    for (i, polygon) in file.objects.into_iter().enumerate() {
+    // What each polygon is drawn into, in the file's order.
+    let mut place: HashMap<(&str, String), usize> = HashMap::new();
+    let mut first: Vec<&Polygon> = Vec::new();
+    let mut drawn_into: Vec<Option<usize>> = Vec::with_capacity(file.objects.len());
+    for (i, polygon) in file.objects.iter().enumerate() {
         if polygon.segmentation.iter().flatten().any(|v| !v.is_finite()) {
             return Err(bad(format!("objects[{i}].segmentation"), "a vertex that is not a number"));
         }
-        let at = *place.entry(polygon.category).or_insert_with_key(|name| {
-            let mask = Mask::empty(width as usize, height as usize);
-            let region = Region { name: name.clone(), level: polygon.level, parent: None, mask };
-            regions.push((polygon.parent, region));
-            regions.len() - 1
-        });
+        let is_thing = !is_background(&polygon.category) && !is_ignored(&polygon.category);
+        drawn_into.push(is_thing.then(|| {
+            *place.entry((&polygon.category, polygon.group.to_string())).or_insert_with(|| {
+                first.push(polygon);
+                first.len() - 1
+            })
+        }));
+    }
+    sheet.check(path, (width, height), first.len())?;
+    let mut masks = vec![Mask::empty(width as usize, height as usize); first.len()];
+    let mut order: Vec<usize> = (0..file.objects.len()).collect();
+    order.sort_by(|a, b| file.objects[*a].layer().total_cmp(&file.objects[*b].layer()));
+    for i in order {
+        let polygon = &file.objects[i];
         // The convention of the LERF evaluations: vertices are cut to whole pixels.
         let whole: Vec<[f64; 2]> = polygon.segmentation.iter().map(|v| v.map(f64::trunc)).collect();
-        regions[at].1.mask.add_polygon(&whole);
-    }
-    // Whole before piece, as deep as pieces of pieces go.
-    let mut ordered: Vec<Region> = Vec::with_capacity(regions.len());
-    let mut placed: HashMap<String, usize> = HashMap::new();
-    while !regions.is_empty() {
-        let before = regions.len();
-        let mut waiting = Vec::new();
-        for (parent, mut region) in regions {
-            let at = parent.as_ref().and_then(|p| placed.get(p).copied());
-            match parent {
-                Some(_) if at.is_none() => waiting.push((parent, region)),
-                _ => {
-                    region.parent = at;
-                    placed.insert(region.name.clone(), ordered.len());
-                    // "handle · mug" of the mug is its handle.
-                    let whole = parent.map(|parent| format!("{BETWEEN}{parent}"));
-                    if let Some(own) = whole.and_then(|whole| region.name.strip_suffix(&whole).map(str::to_owned)) {
-                        region.name = own;
-                    }
-                    ordered.push(region);
-                }
+        match drawn_into[i] {
+            Some(at) => masks[at].add_polygon(&whole),
+            None if is_ignored(&polygon.category) => {}
+            None => {
+                let mut hole = Mask::empty(width as usize, height as usize);
+                hole.add_polygon(&whole);
+                masks.iter_mut().for_each(|mask| mask.subtract(&hole));
             }
         }
-        regions = waiting;
-        if regions.len() == before {
-            let place = format!("category '{}'", regions[0].1.name);
-            return Err(bad(place, "its parent is not in the file, or is a piece of itself"));
-        }
     }
-    Ok(ordered)
+    let thing = |(polygon, mask): (&Polygon, Mask)| {
+        // "handle · mug" of the mug is its handle.
+        let suffix = polygon.parent.as_ref().map(|parent| format!("{BETWEEN}{parent}"));
+        let own = suffix.and_then(|suffix| polygon.category.strip_suffix(&suffix));
+        let name = own.unwrap_or(&polygon.category).to_owned();
+        let region = Region { name, level: polygon.level, parent: None, mask };
+        Thing { key: polygon.category.clone(), whole: polygon.parent.clone(), region }
+    };
+    wholes_first(first.into_iter().zip(masks).map(thing).collect()).map_err(|category| {
+        bad(format!("category '{category}'"), "its parent is not in the file, or is a piece of itself")
+    })
 }
 
 /// A label file of a photo that [`read`] reads as it was: regions with names of their own, wholes first.

@@ -19,13 +19,9 @@ pub(crate) fn find(root: &Path) -> Result<Option<Pictures>, IoError> {
         let inner = folder.join(&view);
         let masks: Vec<_> =
             entries(&inner).iter().filter_map(|n| Some((png_stem(n)?.to_owned(), inner.join(n)))).collect();
-        if masks.is_empty() {
-            continue;
+        if !masks.is_empty() {
+            of.insert(view, masks);
         }
-        if view.bytes().all(|b| b.is_ascii_digit()) {
-            of.entry(format!("test_{view}")).or_insert_with(|| masks.clone());
-        }
-        of.insert(view, masks);
     }
-    Ok((!of.is_empty()).then_some(Pictures { of, least: 129, level: None }))
+    Ok((!of.is_empty()).then_some(Pictures { of, least: 129, level: None, prefix: Some("test_") }))
 }

@@ -4,13 +4,15 @@
 //! SA-V labels every fourth frame; how many lie between labeled ones follows from
 //! `video_frame_count`. The photo of frame n has n as the last number in its name.
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
 use super::rle::Rle;
-use super::{Region, Sheet};
+use super::{Region, Sheet, stem};
 use crate::io::{IoError, files};
+use crate::scene::Photo;
 
 #[derive(Deserialize)]
 struct File {
@@ -48,6 +50,20 @@ impl Masklets {
         let number: u64 = digits[start..].parse().ok()?;
         let frame = usize::try_from(number / self.stride).ok()?;
         (number % self.stride == 0 && frame < self.frames.len()).then_some(frame)
+    }
+
+    /// Refuses photos of several videos, two of which are one frame by their numbers.
+    pub(super) fn of_one_video(&self, photos: &[Photo]) -> Result<(), IoError> {
+        let mut of: HashMap<usize, &str> = HashMap::new();
+        for photo in photos {
+            let Some(frame) = self.frame(&stem(&photo.name)) else { continue };
+            if let Some(other) = of.insert(frame, &photo.name) {
+                let reason =
+                    format!("the photos '{other}' and '{}' are both frame {frame} by their numbers", photo.name);
+                return Err(IoError::syntax(&self.path, "masklet", reason));
+            }
+        }
+        Ok(())
     }
 
     /// Whether the photo `stem` is a labeled frame.

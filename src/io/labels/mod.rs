@@ -8,36 +8,38 @@
 //! | `images_<factor>/label/*.png` | SPIn-NeRF ([`spin_nerf`]) |
 //! | `segmentations/classes.txt` | 3D-OVS ([`three_d_ovs`]) |
 //! | `test_mask/<view>/*.png` | LERF-Mask ([`lerf_mask`]) |
-//! | `*.json` with `objects` of polygons | ISAT, as in lerf_ovs ([`isat`]); also a single such file |
-//! | `*.json` with `masklet` | a video's masklets, as in SA-V ([`masklets`]); also a single such file |
+//! | files ([`files`](label_files)), also a single one, and in folders below | ISAT, as in lerf_ovs ([`isat`]); LabelMe; COCO; YOLO's segments; masklets of a video, as in SA-V ([`masklets`]) |
 //!
 //! Masks are drawn on the photos as stored, or on a larger or smaller copy of them; they are
-//! undistorted and scaled like the photos.
+//! undistorted and scaled like the photos. Labels belong to one photo each.
 
+mod belongs;
+mod coco;
 pub(crate) mod isat;
+#[path = "files.rs"]
+pub(crate) mod label_files;
+mod labelme;
 pub(crate) mod lerf_mask;
 pub(crate) mod masklets;
 pub(crate) mod pictures;
 mod polygons;
 pub(crate) mod rle;
+mod sheet;
 pub(crate) mod spin_nerf;
 pub(crate) mod synth_ids;
+mod things;
 pub(crate) mod three_d_ovs;
+mod yolo;
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::resample::centers;
-use super::{IoError, files, memory, photo_list};
-use crate::scene::{Camera, Level, Mask, Photo, text};
-
-/// How many times longer than the photo's the sides of a mask may be.
-const MOST_LARGER: f64 = 8.0;
-
-/// Most masks of one photo: what finds objects compares each with each.
-const MOST_MASKS: usize = 4096;
-/// Most memory that the masks of one photo take, bytes: a thousand of eight million pixels.
-const MOST_BYTES: u64 = 1 << 30;
+use self::belongs::{Address, PhotoNames, PicturesOf, bound};
+use self::label_files::LabelFile;
+pub(crate) use self::sheet::Sheet;
+use self::sheet::{AsLoaded, draw, read_ids};
+use super::IoError;
+use crate::scene::{Level, Mask, Photo, text};
 
 /// A labeled region of one photo.
 #[derive(Clone, Debug, PartialEq)]
@@ -53,128 +55,160 @@ pub struct Region {
 }
 
 /// Labels of some of a dataset's photos.
-pub enum Labels {
+pub struct Labels {
+    source: Source,
+    /// What each of the source's pictures says of the photo that it is of.
+    addresses: Vec<Address>,
+    /// The pictures of each photo, by its name, once the photos are known.
+    of: Option<PicturesOf>,
+    notes: Vec<String>,
+}
+
+enum Source {
     /// Id maps of `fmlgs synth`.
     SynthIds(synth_ids::SynthIds),
-    /// Files of polygons, by the stem of the photo that they belong to.
-    Isat(BTreeMap<String, PathBuf>),
     /// A picture per mask: SPIn-NeRF, 3D-OVS, LERF-Mask.
     Pictures(pictures::Pictures),
     /// Masklets of a video.
     Masklets(masklets::Masklets),
+    /// Label files of one picture or several.
+    Files(Vec<LabelFile>),
 }
 
 impl Labels {
-    /// Finds out what is at `path`.
+    /// Finds out what is at `path`. Photos are then taken as if each were the only one.
     pub fn open(path: &Path) -> Result<Self, IoError> {
+        let with = |source, addresses| Ok(Self { source, addresses, of: None, notes: Vec::new() });
         if path.join(synth_ids::LIST_FILE).is_file() {
-            return Ok(Self::SynthIds(synth_ids::SynthIds::open(path)?));
+            let ids = synth_ids::SynthIds::open(path)?;
+            let addresses = ids.addresses();
+            return with(Source::SynthIds(ids), addresses);
         }
         for find in [spin_nerf::find, three_d_ovs::find, lerf_mask::find] {
             if let Some(pictures) = find(path)? {
-                return Ok(Self::Pictures(pictures));
+                let addresses = pictures.addresses();
+                return with(Source::Pictures(pictures), addresses);
             }
         }
-        Self::open_json(path)
+        let found = label_files::find(path)?;
+        let mut notes = found.passed.notes();
+        let (source, addresses) = match found.video {
+            video if !found.files.is_empty() => {
+                let unused = |(path, _): (PathBuf, _)| {
+                    format!("{}: a video's masklets beside label files are not used", path.display())
+                };
+                notes.extend(video.map(unused));
+                let addresses = found.files.iter().map(|file| file.address.clone()).collect();
+                (Source::Files(found.files), addresses)
+            }
+            Some((_, masklets)) => (Source::Masklets(masklets), Vec::new()),
+            None => {
+                let passed = notes.iter().map(|note| format!(" ({note})")).collect();
+                return Err(IoError::NoLabels { path: path.into(), passed });
+            }
+        };
+        Ok(Self { source, addresses, of: None, notes })
     }
 
-    /// Labels in a JSON file, or in those of a folder.
-    fn open_json(path: &Path) -> Result<Self, IoError> {
-        let json = |p: &Path| p.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-        let mut candidates: Vec<PathBuf> = match std::fs::read_dir(path) {
-            Ok(_) => entries(path).iter().map(|name| path.join(name)).filter(|p| json(p)).collect(),
-            Err(_) if json(path) => vec![path.into()],
-            Err(cause) => return Err(IoError::Read { path: path.into(), cause }),
-        };
-        candidates.sort();
-        let mut polygons = BTreeMap::new();
-        let mut video: Option<(PathBuf, masklets::Masklets)> = None;
-        for file in candidates {
-            let value: serde_json::Value = files::read_json(&file)?;
-            if let Some(photo) = isat::photo_of(&value) {
-                polygons.insert(stem(photo), file);
-            } else if let Some(found) = masklets::Masklets::parse(value, &file)? {
-                if let Some((other, _)) = &video {
-                    let reason = format!("{} holds masklets too; name one of the two files", other.display());
-                    return Err(IoError::Syntax { path: file, place: "masklet".into(), reason });
-                }
-                video = Some((file, found));
-            }
+    /// The labels at `path` of these photos, which are all of a data set: each label file belongs to one of them.
+    ///
+    /// # Errors
+    /// As [`open`](Self::open), and if a file could be of two photos.
+    pub fn of_photos(path: &Path, photos: &[Photo]) -> Result<Self, IoError> {
+        let mut labels = Self::open(path)?;
+        let names = PhotoNames::new(photos.iter().map(|photo| photo.name.as_str()));
+        let (of, notes) = bound(&labels.addresses, &names)?;
+        labels.notes.extend(notes);
+        labels.of = Some(of);
+        if let Source::Masklets(masklets) = &labels.source {
+            masklets.of_one_video(photos)?;
         }
-        match video {
-            _ if !polygons.is_empty() => Ok(Self::Isat(polygons)),
-            Some((_, masklets)) => Ok(Self::Masklets(masklets)),
-            None => Err(IoError::NoLabels { path: path.into() }),
+        Ok(labels)
+    }
+
+    /// What is passed over, not used or joined, a sentence each.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// The pictures of a photo.
+    fn pictures_of(&self, photo: &Photo) -> Vec<usize> {
+        match &self.of {
+            Some(of) => of.get(&photo.name).cloned().unwrap_or_default(),
+            None => {
+                let alone = PhotoNames::new(std::iter::once(photo.name.as_str()));
+                let is_own = |i: &usize| alone.owner(&self.addresses[*i]).is_ok_and(|owner| owner.is_some());
+                (0..self.addresses.len()).filter(is_own).collect()
+            }
         }
     }
 
     /// Whether a photo has labels.
     pub fn has(&self, photo: &Photo) -> bool {
-        match self {
-            Self::SynthIds(ids) => ids.has(&stem(&photo.name)),
-            Self::Isat(files) => files.contains_key(&stem(&photo.name)),
-            Self::Pictures(pictures) => pictures.has(&stem(&photo.name)),
-            Self::Masklets(masklets) => masklets.has(&stem(&photo.name)),
+        match &self.source {
+            Source::Masklets(masklets) => masklets.has(&stem(&photo.name)),
+            _ => !self.pictures_of(photo).is_empty(),
         }
     }
 
     /// The regions of a photo, undistorted and scaled to at most `max_side_px`; regions without a
     /// pixel are left out, and pieces of them then have no parent. Empty if it has no labels.
     pub fn of(&self, photo: &Photo, max_side_px: u32) -> Result<Vec<Region>, IoError> {
-        let name = stem(&photo.name);
-        let sheet = Sheet(photo);
-        let regions = match self {
-            Self::SynthIds(ids) => ids.regions(&name, sheet)?,
-            Self::Isat(files) => match files.get(&name) {
-                Some(file) => isat::read(file, sheet)?,
-                None => Vec::new(),
-            },
-            Self::Pictures(pictures) => pictures.regions(&name, sheet)?,
-            Self::Masklets(masklets) => masklets.regions(&name, sheet)?,
-        };
-        let mut place = Vec::with_capacity(regions.len());
-        let mut kept: Vec<Region> = Vec::new();
+        let sheet = Sheet::new(photo);
         let mut as_loaded = AsLoaded::new(photo, max_side_px);
-        for region in regions {
-            let mask = as_loaded.mask(&region.mask);
-            let parent = region.parent.and_then(|p| place.get(p).copied().flatten());
-            place.push((!mask.is_empty()).then_some(kept.len()));
-            if !mask.is_empty() {
-                kept.push(Region { name: text::name(&region.name), mask, parent, ..region });
-            }
+        if let Source::Masklets(masklets) = &self.source {
+            return Ok(shown(masklets.regions(&stem(&photo.name), sheet)?, &mut as_loaded));
         }
-        Ok(kept)
+        let mut all = Vec::new();
+        for picture in self.pictures_of(photo) {
+            let regions = match &self.source {
+                Source::SynthIds(ids) => ids.regions(picture, sheet)?,
+                Source::Pictures(pictures) => pictures.regions(picture, sheet)?,
+                Source::Files(files) => files[picture].regions(sheet)?,
+                Source::Masklets(_) => Vec::new(),
+            };
+            things::join(&mut all, shown(regions, &mut as_loaded));
+        }
+        Ok(all)
     }
 }
 
-/// What masks are drawn on: a photo as stored, or a larger or smaller copy of it.
-#[derive(Clone, Copy)]
-pub(crate) struct Sheet<'a>(&'a Photo);
+/// The regions that have a pixel in the photo as it is loaded.
+fn shown(regions: Vec<Region>, as_loaded: &mut AsLoaded<'_>) -> Vec<Region> {
+    let mut place = Vec::with_capacity(regions.len());
+    let mut kept: Vec<Region> = Vec::new();
+    for region in regions {
+        let mask = as_loaded.mask(&region.mask);
+        let parent = region.parent.and_then(|p| place.get(p).copied().flatten());
+        place.push((!mask.is_empty()).then_some(kept.len()));
+        if !mask.is_empty() {
+            kept.push(Region { name: text::name(&region.name), mask, parent, ..region });
+        }
+    }
+    kept
+}
 
-impl Sheet<'_> {
-    /// Whether `masks` masks of `size_px` (width, height), which `path` holds, are of the photo's
-    /// shape and fit into memory. To be asked before they are made.
-    pub(crate) fn check(self, path: &Path, size_px: (u32, u32), masks: usize) -> Result<(), IoError> {
-        let (w, h) = size_px;
-        if w == 0 || h == 0 || w > Camera::MAX_SIDE_PX || h > Camera::MAX_SIDE_PX {
-            return Err(IoError::EmptyPicture { path: path.into(), width_px: w, height_px: h });
-        }
-        let expected = (self.0.camera.width_px, self.0.camera.height_px);
-        let larger = f64::from(w.max(h)) / f64::from(expected.0.max(expected.1));
-        if !photo_list::is_scaled(expected, size_px) || larger > MOST_LARGER {
-            return Err(IoError::PhotoSize { path: path.into(), found: size_px, expected });
-        }
-        if masks > MOST_MASKS {
-            let reason = format!("{masks} regions of one photo; at most {MOST_MASKS} are taken");
-            return Err(IoError::Syntax { path: path.into(), place: "masks".into(), reason });
-        }
-        let pixels = (u64::from(w) * u64::from(h)).max(u64::from(expected.0) * u64::from(expected.1));
-        let (bytes, limit) = (pixels.div_ceil(8).saturating_mul(masks as u64), memory::budget().min(MOST_BYTES));
-        if bytes > limit {
-            let remedy = "label fewer regions, or smaller photos";
-            return Err(IoError::OverBudget { path: path.into(), what: "its masks", bytes, limit, remedy });
-        }
-        Ok(())
+/// What label files hold that is not used or read as something else: how often, and where first.
+#[derive(Default)]
+pub(crate) struct Passed(BTreeMap<String, (usize, PathBuf)>);
+
+impl Passed {
+    /// Counts something that is passed over.
+    fn add(&mut self, what: &str, path: &Path) {
+        self.told(&format!("{what} are passed over"), path);
+    }
+
+    /// Counts something to be told.
+    fn told(&mut self, what: &str, path: &Path) {
+        self.0.entry(what.to_owned()).or_insert_with(|| (0, path.to_owned())).0 += 1;
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let note = |(what, (count, first)): (&String, &(usize, PathBuf))| {
+            let first = first.file_name().unwrap_or(first.as_os_str()).to_string_lossy();
+            format!("{count} {what} (first in {first})")
+        };
+        self.0.iter().map(note).collect()
     }
 }
 
@@ -184,43 +218,9 @@ pub(crate) fn stem(name: &str) -> String {
     file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned()
 }
 
-/// Masks on a photo as stored, or on scaled copies, as the photo is loaded: each pixel takes the value at its center.
-struct AsLoaded<'a> {
-    photo: &'a Photo,
-    size: [usize; 2],
-    /// Where the centers lie on a distorted copy, by its size.
-    centers: BTreeMap<[usize; 2], Vec<Option<usize>>>,
-}
-
-impl<'a> AsLoaded<'a> {
-    fn new(photo: &'a Photo, max_side_px: u32) -> Self {
-        let camera = photo.camera.limited_to(max_side_px);
-        Self { photo, size: [camera.width_px as usize, camera.height_px as usize], centers: BTreeMap::new() }
-    }
-
-    fn mask(&mut self, mask: &Mask) -> Mask {
-        let [width, height] = self.size;
-        let Some(distortion) = self.photo.distortion.as_ref().filter(|_| !mask.is_empty()) else {
-            return mask.resized(width, height);
-        };
-        let drawn = [mask.width_px(), mask.height_px()];
-        let camera = || self.photo.camera.resized(drawn[0] as u32, drawn[1] as u32);
-        let centers = self.centers.entry(drawn).or_insert_with(|| centers(&camera(), distortion, self.size));
-        Mask::from_fn(width, height, |i| centers[i].is_some_and(|at| mask.contains(at)))
-    }
-}
-
 /// File names in a folder, sorted; none if there is no such folder.
 fn entries(folder: &Path) -> Vec<String> {
     files::names_in(folder).unwrap_or_default()
-}
-
-/// A picture file's id per pixel: 8- or 16-bit gray, of the photo's shape; `masks` are made of it.
-fn read_ids(path: &Path, sheet: Sheet<'_>, masks: usize) -> Result<(usize, usize, Vec<u16>), IoError> {
-    sheet.check(path, super::photo::size(path)?, masks)?;
-    let bytes = files::read(path, files::MAX_PICTURE_BYTES)?;
-    let ids = super::photo::decode_gray16(&bytes, path)?;
-    Ok((ids.width() as usize, ids.height() as usize, ids.into_raw()))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use super::belongs::Address;
 use super::{Region, Sheet};
 use crate::io::{IoError, files, photo};
 use crate::scene::{Level, Mask};
@@ -16,16 +17,24 @@ pub struct Pictures {
     pub(crate) least: u8,
     /// What all regions are, where the layout says.
     pub(crate) level: Option<Level>,
+    /// What may stand before the stem in the name of a photo.
+    pub(crate) prefix: Option<&'static str>,
 }
 
 impl Pictures {
-    pub(crate) fn has(&self, stem: &str) -> bool {
-        self.of.contains_key(stem)
+    /// Of each stem, in their order.
+    pub(super) fn addresses(&self) -> Vec<Address> {
+        let address = |(stem, masks): (&String, &Vec<(String, PathBuf)>)| {
+            let number = self.prefix.filter(|_| stem.bytes().all(|b| b.is_ascii_digit()));
+            let names = std::iter::once(stem.clone()).chain(number.map(|prefix| format!("{prefix}{stem}"))).collect();
+            Address { file: masks.first().map(|(_, path)| path.clone()).unwrap_or_default(), names }
+        };
+        self.of.iter().map(address).collect()
     }
 
-    /// The regions of the photo `stem`; none if it has no masks.
-    pub(crate) fn regions(&self, stem: &str, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
-        let listed = self.of.get(stem).map_or(&[][..], Vec::as_slice);
+    /// The regions of the stem at `index`.
+    pub(super) fn regions(&self, index: usize, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
+        let listed = self.of.values().nth(index).map_or(&[][..], Vec::as_slice);
         let read = |(name, path): &(String, PathBuf)| {
             let mask = read(path, self.least, sheet, listed.len())?;
             Ok(Region { name: name.clone(), level: self.level, parent: None, mask })

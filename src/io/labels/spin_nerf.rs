@@ -29,7 +29,7 @@ pub(crate) fn find(root: &Path) -> Result<Option<Pictures>, IoError> {
             }
         }
         if !of.is_empty() {
-            return Ok(Some(Pictures { of, least: 1, level: Some(Level::Object) }));
+            return Ok(Some(Pictures { of, least: 1, level: Some(Level::Object), prefix: None }));
         }
     }
     Ok(None)

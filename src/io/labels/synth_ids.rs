@@ -5,7 +5,9 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::{Region, Sheet, read_ids};
+use super::belongs::Address;
+use super::pictures::png_stem;
+use super::{Region, Sheet, entries, read_ids};
 use crate::io::{IoError, files};
 use crate::scene::{Level, Mask, text};
 
@@ -32,6 +34,8 @@ pub(crate) struct ListedIdentity {
 pub struct SynthIds {
     root: PathBuf,
     list: Vec<ListedIdentity>,
+    /// The pictures in the folder of objects, without their ending.
+    pictures: Vec<String>,
 }
 
 /// Where the pictures of a level are.
@@ -43,11 +47,19 @@ impl SynthIds {
     /// Reads the list in the folder `root`.
     pub fn open(root: &Path) -> Result<Self, IoError> {
         let file: File = files::read_json(&root.join(LIST_FILE))?;
-        Ok(Self { root: root.into(), list: file.identities })
+        let names = entries(&root.join(folder(Level::Object)));
+        let pictures = names.iter().filter_map(|name| png_stem(name).map(str::to_owned)).collect();
+        Ok(Self { root: root.into(), list: file.identities, pictures })
     }
 
-    fn path(&self, level: Level, stem: &str) -> PathBuf {
-        self.root.join(folder(level)).join(format!("{stem}.png"))
+    /// Of each picture of objects.
+    pub(super) fn addresses(&self) -> Vec<Address> {
+        let address = |name: &String| Address::of_file(self.path(Level::Object, name), "", "");
+        self.pictures.iter().map(address).collect()
+    }
+
+    fn path(&self, level: Level, name: &str) -> PathBuf {
+        self.root.join(folder(level)).join(format!("{name}.png"))
     }
 
     /// The ids of what is listed and of its pieces: a picture shows the innermost of a level.
@@ -62,20 +74,14 @@ impl SynthIds {
         ids
     }
 
-    pub(crate) fn has(&self, stem: &str) -> bool {
-        self.path(Level::Object, stem).is_file()
-    }
-
-    /// The regions of the photo `stem`, those without a pixel too: objects, then parts, in the
-    /// list's order. Empty if it has no maps.
-    pub(crate) fn regions(&self, stem: &str, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
-        if !self.has(stem) {
-            return Ok(Vec::new());
-        }
+    /// The regions of the picture at `index`, those without a pixel too: objects, then parts, in the
+    /// list's order.
+    pub(super) fn regions(&self, index: usize, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
+        let Some(name) = self.pictures.get(index) else { return Ok(Vec::new()) };
         let mut regions = Vec::with_capacity(self.list.len());
         let mut ids_of = Vec::new();
         for level in [Level::Object, Level::Part] {
-            let path = self.path(level, stem);
+            let path = self.path(level, name);
             let (width, height, ids) = read_ids(&path, sheet, self.list.len())?;
             // Which regions show an id, so that all are filled in one pass.
             let mut shown_by = vec![Vec::new(); usize::from(u16::MAX) + 1];

@@ -7,6 +7,9 @@ use glam::DVec3;
 use super::*;
 use crate::scene::Camera;
 
+mod isat_files;
+mod other_programs;
+
 fn photo(name: &str, w: u32, h: u32) -> Photo {
     let camera = Camera::look_at(DVec3::new(0.0, -3.0, 0.0), DVec3::ZERO, DVec3::Z, 0.8, w, h).expect("valid");
     Photo::new(name, name, camera)
@@ -42,7 +45,7 @@ fn broken_labels_are_named() {
     let at = folder.path().join("label.json");
     let read = |text: String| {
         fs::write(&at, text).expect("write");
-        isat::read(&at, Sheet(&photo("a.png", 20, 10)))
+        isat::read(&at, Sheet::new(&photo("a.png", 20, 10)))
     };
     assert!(matches!(read(LABEL.replace("\"doll\", \"level\"", "\"cat\", \"level\"")), Err(IoError::Syntax { .. })));
     assert!(matches!(read(LABEL.replace("\"width\": 20", "\"width\": 0")), Err(IoError::EmptyPicture { .. })));

@@ -50,5 +50,5 @@ pub(crate) fn find(root: &Path) -> Result<Option<Pictures>, IoError> {
         let reason = "no image in the folders beside it is named after one of its classes".into();
         return Err(IoError::Syntax { path: list, place: format!("{} classes", classes.len()), reason });
     }
-    Ok(Some(Pictures { of, least: u8::MAX, level: Some(Level::Object) }))
+    Ok(Some(Pictures { of, least: u8::MAX, level: Some(Level::Object), prefix: None }))
 }

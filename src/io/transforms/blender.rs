@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use super::File;
-use crate::io::photo_list::photos;
-use crate::io::{IoError, files, points_ply};
+use crate::io::photo_list::{ListedPhoto, photos};
+use crate::io::{IoError, files, lenses, points_ply};
 use crate::scene::{Dataset, Photo};
 
 /// Blender's synthetic scenes have no backdrop; the literature shows them on white.
@@ -58,12 +58,11 @@ fn listed(root: &Path, name: &str, test_split: bool, warnings: &mut Vec<String>)
     let parsed = File::read(&file)?;
     let mut listed = Vec::with_capacity(parsed.frames.len());
     for frame in &parsed.frames {
-        let mut l = frame.listed(&parsed.lens, &file)?;
-        l.test_split = test_split;
-        l.background = Some(WHITE);
-        listed.push(l);
+        let l = frame.listed(&parsed.lens, &file)?;
+        listed.push(l.map(|l| ListedPhoto { test_split, background: Some(WHITE), ..l }));
     }
     let mut told = Vec::new();
+    let listed = lenses::readable(listed, &file, &mut told)?;
     let photos = photos(listed, root, &file, &mut told)?;
     warnings.extend(told.iter().map(|text| format!("{name}: {text}")));
     Ok(photos)

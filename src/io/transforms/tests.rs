@@ -161,13 +161,43 @@ fn bad_lenses_are_named() {
     for value in [json!(0), json!(-50.0)] {
         assert!(matches!(with("fl_x", value), IoError::Camera { cause: CameraError::Focal(..), .. }));
     }
-    let e = with("camera_model", json!("OPENCV_FISHEYE"));
-    assert!(matches!(&e, IoError::Unsupported { what, .. } if what.contains("OPENCV_FISHEYE")), "{e}");
-    assert!(matches!(with("is_fisheye", json!(true)), IoError::Unsupported { .. }));
-    assert!(matches!(with("k3", json!(0.1)), IoError::Unsupported { .. }));
+    for (key, value, model) in [
+        ("camera_model", json!("EQUIRECTANGULAR"), "EQUIRECTANGULAR"),
+        ("equirectangular", json!(true), "EQUIRECTANGULAR"),
+        ("camera_model", json!("FISHEYE624"), "FISHEYE624"),
+        ("ftheta_p0", json!(0.5), "FTHETA"),
+    ] {
+        let e = with(key, value);
+        assert!(matches!(&e, IoError::Unsupported { what, .. } if what.contains(model)), "{e}");
+        assert_eq!(e.to_string().contains("panorama_sfm"), model == "EQUIRECTANGULAR", "{e}");
+    }
     let mut f = Folder::new();
     f.json = json!({ "frames": [frame("images/a.png")] });
     assert!(matches!(f.read(), Err(IoError::Syntax { .. })));
+}
+
+#[test]
+fn coefficients_mean_what_the_camera_model_says() {
+    let read = |keys: &[(&str, Value)]| {
+        let mut f = Folder::new();
+        for (key, value) in keys {
+            f.json[*key] = value.clone();
+        }
+        f.json["k1"] = json!(0.1);
+        f.json["k3"] = json!(0.01);
+        f.json["k4"] = json!(-0.02);
+        f.read().expect("read").photos[0].distortion.expect("a lens")
+    };
+    let k1 = Distortion { k1: 0.1, ..Distortion::default() };
+    // nerfstudio's and Metashape's k4 is a power, OpenCV's a divisor, a fisheye's one of the angle.
+    assert_eq!(read(&[]), Distortion { more: [0.01, -0.02, 0.0, 0.0], ..k1 });
+    let rational = Distortion { more: [0.01, 0.0, 0.0, 0.0], divisor: [-0.02, 0.0, 0.3], ..k1 };
+    assert_eq!(read(&[("k6", json!(0.3))]), rational);
+    let without = Distortion { divisor: [-0.02, 0.0, 0.0], ..rational };
+    assert_eq!(read(&[("camera_model", json!("FULL_OPENCV"))]), without);
+    let fisheye = Distortion { more: [0.01, -0.02, 0.0, 0.0], projection: Projection::Fisheye, ..k1 };
+    assert_eq!(read(&[("camera_model", json!("OPENCV_FISHEYE"))]), fisheye);
+    assert_eq!(read(&[("is_fisheye", json!(true))]), fisheye);
 }
 
 #[test]

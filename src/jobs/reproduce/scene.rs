@@ -79,13 +79,13 @@ pub(super) fn run(
 ) -> Result<SceneResult, JobError> {
     once(&out.join("result.json"), || {
         export::make_folder(out)?;
-        let labels = Labels::open(&input.labels)?;
         let mut dataset = open::dataset(&input.photos)?;
+        let labels = Labels::of_photos(&input.labels, &dataset.photos)?;
         let split = Split::new(&dataset, &labels, settings, input)?;
         for (i, photo) in dataset.photos.iter_mut().enumerate() {
             photo.test_split = !split.trained_on && split.compared.contains(&i);
         }
-        for warning in &dataset.warnings {
+        for warning in dataset.warnings.iter().chain(labels.notes()) {
             observer.note(Severity::Warning, warning.clone());
         }
         let (dataset, folder) = (Arc::new(dataset), out.join("scene"));
@@ -217,7 +217,7 @@ fn compare(
         pictures: None,
         state: scene.state.clone(),
     };
-    let mut labels = FileMasks(Labels::open(&input.labels)?);
+    let mut labels = FileMasks(Labels::of_photos(&input.labels, &dataset.photos)?);
     let views = evaluate_masks::draw(&comparison, &map, &mut labels, &compared, split.trained_on)?;
     let query = settings.queries.get(&input.name).cloned();
     let query = query.unwrap_or_else(|| input.name.replace(['_', '-'], " "));

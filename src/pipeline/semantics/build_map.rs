@@ -1,6 +1,6 @@
 //! The whole way from trained Gaussians and masks to a semantic map.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
@@ -78,14 +78,14 @@ pub(crate) struct Found {
 /// What finds the masks of photos that `cloud` was trained on: files, where there are any, else the
 /// network of this name, else regions of the photos. What a network finds is kept in `cache`.
 pub(crate) fn segmenter<'a>(
-    files: Option<&Path>,
+    files: Option<Labels>,
     cloud: &'a GaussianCloud,
     settings: &'a RenderSettings,
     network: Option<(&str, MaskGrid)>,
     cache: PathBuf,
 ) -> Result<Box<dyn Segmenter + 'a>, FindError> {
     Ok(match (files, network) {
-        (Some(files), _) => Box::new(FileMasks(Labels::open(files)?)),
+        (Some(files), _) => Box::new(FileMasks(files)),
         (None, Some((network, grid))) => Box::new(NetworkMasks::open_kept(network, grid, cache)?),
         (None, None) => Box::new(Regions { trained: Some((cloud, settings)), ..Regions::default() }),
     })
