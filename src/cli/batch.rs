@@ -82,7 +82,7 @@ fn training(table: &toml::Table, folder: &Path) -> Result<BatchTraining, String>
     if table.contains_key("seed") {
         return Err("'seed': seeds are for all settings; put them at the top: seeds = [0, 1]".into());
     }
-    let table: TrainingTable = table_args::parse(table, &[], &["seed"])?;
+    let table: TrainingTable = table_args::parse("train", table, &[], &["seed"])?;
     let base = table.preset.as_ref().map(|preset| presets::read(&folder.join(preset))).transpose();
     let config = table.settings.over(base.map_err(|e| format!("'preset': {e}"))?.unwrap_or_default());
     Ok(BatchTraining { config, plan: table.plan.overrides() })

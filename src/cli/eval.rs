@@ -72,7 +72,7 @@ pub(crate) struct EvalArgs {
 pub(super) fn of_table(table: &toml::Table) -> Result<BatchEvaluation, String> {
     const LEFT_OUT: [&str; 8] = ["photos", "holdout-every", "pictures", "masks", "query", "depth", "removal", "json"];
     // Labels are those of each scene.
-    let args: EvalArgs = table_args::parse(table, &["scene", "--masks=labels"], &LEFT_OUT)?;
+    let args: EvalArgs = table_args::parse("batch eval", table, &["scene", "--masks=labels"], &LEFT_OUT)?;
     let EvalArgs { max_side, keep_borders, protocol, recipe, .. } = args;
     Ok(BatchEvaluation { max_side_px: max_side, keep_borders, protocol, recipe: recipe.recipe() })
 }

@@ -2,11 +2,9 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use crate::io::folder_lock::FolderLock;
 use crate::io::{IoError, atomic, files};
@@ -67,7 +65,7 @@ impl ExportFolder {
         if !is_within || !path.is_file() {
             return Ok(false);
         }
-        if checksum(&path)? == sum {
+        if files::sha256(&path)? == sum {
             return Ok(true);
         }
         let text =
@@ -89,7 +87,7 @@ impl ExportFolder {
         }
         export::make_parent(&path)?;
         fill(&path)?;
-        self.now.insert(place.to_owned(), checksum(&path)?);
+        self.now.insert(place.to_owned(), files::sha256(&path)?);
         Ok(())
     }
 
@@ -112,17 +110,4 @@ impl ExportFolder {
         let list = List { complete, files: files.clone() };
         Ok(atomic::write(&self.root.join(LIST), |w| Ok(serde_json::to_writer_pretty(w, &list)?))?)
     }
-}
-
-fn checksum(path: &Path) -> Result<String, JobError> {
-    let failed = |cause| IoError::Read { path: path.into(), cause };
-    let (mut hash, mut bytes) = (Sha256::new(), vec![0; 1 << 16]);
-    let mut file = fs::File::open(path).map_err(failed)?;
-    loop {
-        match file.read(&mut bytes).map_err(failed)? {
-            0 => break,
-            n => hash.update(&bytes[..n]),
-        }
-    }
-    Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
 }

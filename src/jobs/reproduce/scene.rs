@@ -143,7 +143,7 @@ fn gaussians(
     settings: &ReproduceSettings,
     observer: &mut dyn Observer,
 ) -> Result<TrainedFacts, JobError> {
-    let done = train::run(dataset, &settings.train, [folder.to_path_buf()], observer)?;
+    let done = train::run(dataset, &settings.train, [folder.to_path_buf()], train::IfChanged::Ask, observer)?;
     if !done.is_finished() {
         return Err(Interrupted.into());
     }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::TrainConfig;
 use super::checkpoint::{self, Checkpoint, CheckpointError};
+use super::inputs::TrainInputs;
 use super::outcome::{TrainEnd, TrainError, TrainOutcome};
 use crate::io::trained::{self, CLOUD_FILE};
 use crate::io::{IoError, SceneFolder, semantic_map};
@@ -52,12 +53,14 @@ pub(super) fn finished(
     }))
 }
 
-/// The checkpoint in `folder`, if there is one and it is of this run.
+/// The checkpoint in `folder`, if there is one and it is of this run. What was trained on has to be what it is `now`,
+/// unless the run goes on `anyway`.
 pub(super) fn resumable(
     folder: &Path,
     dataset: &Dataset,
-    config: &TrainConfig,
-    train: &[usize],
+    (config, train): (&TrainConfig, &[usize]),
+    (now, anyway): (&TrainInputs, bool),
+    observer: &mut dyn Observer,
 ) -> Result<Option<Checkpoint>, CheckpointError> {
     let path = folder.join(checkpoint::FILE);
     let Some(saved) = checkpoint::load(&path)? else { return Ok(None) };
@@ -65,8 +68,22 @@ pub(super) fn resumable(
     if !h.config.is_same_run(config) {
         return Err(CheckpointError::OtherRun { path, what: "settings" });
     }
-    if h.photos != photo_names(dataset, train) {
-        return Err(CheckpointError::OtherRun { path, what: "photos" });
+    let changes = match &h.inputs {
+        Some(before) => before.changes(now),
+        None if h.photos != photo_names(dataset, train) => vec!["photos of other names".into()],
+        None => {
+            let text = "The checkpoint is of an earlier version, which did not store poses and checksums of the photos: \
+                        nobody can tell whether they are the same now";
+            observer.note(Severity::Warning, text.into());
+            Vec::new()
+        }
+    };
+    if !changes.is_empty() && !anyway {
+        return Err(CheckpointError::OtherInputs { folder: folder.into(), changes });
+    }
+    if !changes.is_empty() {
+        let text = format!("The training goes on, but not with what it began with: {}", changes.join("; "));
+        observer.note(Severity::Warning, text);
     }
     Ok(Some(saved))
 }

@@ -11,9 +11,11 @@ use rand_pcg::Pcg64Mcg;
 use super::checkpoint::{self, Checkpoint, Header};
 use super::device::StepResult;
 use super::folder::{claim, finished, objects_for, resumable};
+use super::inputs::{Compare, TrainInputs};
 use super::outcome::{TrainEnd, TrainError, TrainOutcome};
 use super::photos::load_views;
 use super::trainer::{REPORT_STEPS, StepError, Trainer};
+use super::window::Window;
 use super::{TrainConfig, TrainView, coarse, density, geometry, init};
 use crate::io::SceneFolder;
 use crate::io::trained::{History, SceneInfo};
@@ -43,15 +45,31 @@ pub(crate) fn run(
     out: Option<&Path>,
     observer: &mut dyn Observer,
 ) -> Result<TrainOutcome, TrainError> {
+    run_on(dataset, config, out, false, observer)
+}
+
+/// The same; with `anyway`, a checkpoint is continued also where photos, poses or sparse points are no longer those
+/// that its run began with.
+pub(crate) fn run_on(
+    dataset: &Dataset,
+    config: &TrainConfig,
+    out: Option<&Path>,
+    anyway: bool,
+    observer: &mut dyn Observer,
+) -> Result<TrainOutcome, TrainError> {
     config.check().map_err(TrainError::Config)?;
     let (train, held) = dataset.split(config.holdout_every);
     if train.is_empty() {
         return Err(TrainError::NoPhotos(dataset.name.clone(), dataset.photos.len()));
     }
     let scene = out.map(|folder| claim(folder, dataset)).transpose()?;
-    let saved = match out {
-        Some(folder) => resumable(folder, dataset, config, &train)?,
+    let inputs = match out {
+        Some(_) => Some(TrainInputs::of(dataset, Compare::Contents).map_err(TrainError::Photo)?),
         None => None,
+    };
+    let saved = match (out, &inputs) {
+        (Some(folder), Some(now)) => resumable(folder, dataset, (config, &train), (now, anyway), observer)?,
+        _ => None,
     };
     if let (Some(folder), Some(saved)) = (out, &saved)
         && let Some(done) = finished(folder, saved, config)?
@@ -61,13 +79,14 @@ pub(crate) fn run(
         return Ok(done);
     }
     let Some(mut views) = load_views(dataset, &train, config, "Loading photos", observer)? else {
-        return Ok(stopped_early());
+        return Ok(TrainOutcome::stopped_early());
     };
     let Some(tests) = load_views(dataset, &held, config, "Loading held-out photos", observer)? else {
-        return Ok(stopped_early());
+        return Ok(TrainOutcome::stopped_early());
     };
     views.shrink_to_fit();
-    let mut job = Job::start(dataset, config, scene, &held, views, tests, saved);
+    let mut job = Job::start(dataset, config, scene, &held, (views, tests), saved);
+    job.inputs = inputs;
     let told = |why| observer.note(Severity::Warning, why);
     job.device = if config.needs_cpu() { None } else { config.backend.gpu(told)? };
     match &job.device {
@@ -81,20 +100,13 @@ pub(crate) fn run(
     job.finish(end, observer)
 }
 
-/// Steps that see the photos at half their size.
-fn coarse_steps(config: &TrainConfig) -> u64 {
-    (config.coarse_share * config.steps as f64).round() as u64
-}
-
-fn stopped_early() -> TrainOutcome {
-    TrainOutcome { cloud: Arc::default(), evaluations: Vec::new(), end: TrainEnd::Cancelled, steps: 0, secs: 0.0 }
-}
-
 struct Job<'a> {
     config: &'a TrainConfig,
     scene: Option<SceneFolder>,
     info: SceneInfo,
     photos: Vec<String>,
+    /// What is trained on, for who goes on.
+    inputs: Option<TrainInputs>,
     views: Vec<TrainView>,
     /// The same at half their size, while those are trained on.
     coarse: Option<Vec<TrainView>>,
@@ -118,8 +130,7 @@ impl<'a> Job<'a> {
         config: &'a TrainConfig,
         scene: Option<SceneFolder>,
         held: &[usize],
-        views: Vec<TrainView>,
-        tests: Vec<TrainView>,
+        (views, tests): (Vec<TrainView>, Vec<TrainView>),
         saved: Option<Checkpoint>,
     ) -> Self {
         let (_, extent) = dataset.camera_extent();
@@ -132,7 +143,8 @@ impl<'a> Job<'a> {
                 t.moments = s.moments;
                 t.stats = s.stats;
                 t.step = s.header.step;
-                t.round = s.header.round;
+                // Photos may have gone since.
+                t.round = s.header.round.into_iter().filter(|k| (*k as usize) < views.len()).collect();
                 t.budget = s.header.budget;
                 t.schedule.damping = s.header.damping;
                 (secs, history) = (s.header.secs, s.header.history);
@@ -159,12 +171,13 @@ impl<'a> Job<'a> {
         info.config = serde_json::to_value(config).unwrap_or_default();
         let photos = views.iter().map(|v| v.name.clone()).collect();
         let safe = trainer.cloud.clone();
-        let coarse = (trainer.step < coarse_steps(config)).then(|| coarse::halved(&views));
+        let coarse = (trainer.step < coarse::steps(config)).then(|| coarse::halved(&views));
         Self {
             config,
             scene,
             info,
             photos,
+            inputs: None,
             views,
             coarse,
             tests,
@@ -245,7 +258,7 @@ impl<'a> Job<'a> {
 
     /// One step with its guard against divergence, and density control.
     fn step(&mut self, observer: &mut dyn Observer) -> Result<Vec<StepResult>, TrainError> {
-        if self.coarse.is_some() && self.trainer.step >= coarse_steps(self.config) {
+        if self.coarse.is_some() && self.trainer.step >= coarse::steps(self.config) {
             self.coarse = None;
             if let Some(device) = &self.device {
                 self.trainer.fetch()?;
@@ -339,6 +352,7 @@ impl<'a> Job<'a> {
         let header = Header {
             config: self.config.clone(),
             photos: self.photos.clone(),
+            inputs: self.inputs.clone(),
             step: t.step,
             secs: self.secs,
             count: t.cloud.len(),
@@ -375,21 +389,5 @@ impl<'a> Job<'a> {
             steps: self.trainer.step,
             secs: self.secs,
         })
-    }
-}
-
-/// Losses and PSNRs since the last report.
-#[derive(Default)]
-struct Window {
-    losses: Vec<f64>,
-    psnrs: Vec<f64>,
-}
-
-impl Window {
-    fn add(&mut self, loss: f64, psnr: f64) {
-        self.losses.push(loss);
-        if psnr.is_finite() {
-            self.psnrs.push(psnr);
-        }
     }
 }
