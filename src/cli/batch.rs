@@ -127,9 +127,13 @@ pub(crate) fn run(args: BatchArgs, quiet: bool) -> Result<(), CliError> {
     if args.dry_run {
         return list(&request, args.json);
     }
+    let (shard, all) = (request.shard, batch::count(&request.batch));
+    if !(0..all).any(|unit| shard.has(unit)) {
+        let text = format!("--shard: there is nothing in shard {shard}, the batch has {}", things(all, "unit"));
+        return Err(CliError::Usage(text));
+    }
     let outcome = batch::run(&request, &mut Console::new(quiet))?;
     let BatchOutcome { units, done, failed, elsewhere, stopped } = &outcome;
-    let shard = request.shard;
     if args.json {
         let named = |all: &[(String, String)], what: &str| -> Vec<serde_json::Value> {
             all.iter().map(|(unit, why)| json!({ "unit": unit, what: why })).collect()

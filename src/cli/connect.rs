@@ -2,6 +2,7 @@
 
 use std::io::BufRead;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use serde_json::json;
 
@@ -72,7 +73,7 @@ pub(crate) fn run(args: ConnectArgs, quiet: bool) -> Result<(), CliError> {
     if address.is_open() {
         console.note(Severity::Warning, "the connection is not encrypted; others can read it, the token too".into());
     }
-    let client = Client::new(address)?;
+    let client = Arc::new(Client::new(address)?);
     let end = follow(&client, &mut console, args.save.as_deref())?;
     let (word, folder) = match &end {
         Followed::AtRest => ("at rest", None),

@@ -27,8 +27,7 @@ struct Rule {
 impl Given<'_> {
     /// Whether somebody has given it; a default is not given.
     fn has(&self, id: &str) -> bool {
-        self.0.try_contains_id(id).is_ok_and(|there| there)
-            && self.0.value_source(id) == Some(ValueSource::CommandLine)
+        self.0.try_contains_id(id).is_ok_and(|there| there) && self.0.value_source(id) == Some(ValueSource::CommandLine)
     }
 
     fn has_any(&self, ids: &[&str]) -> bool {

@@ -9,12 +9,7 @@ use super::idle;
 ///
 /// # Errors
 /// What is wrong, and with which key.
-pub(crate) fn parse<A: Args>(
-    name: &str,
-    table: &toml::Table,
-    given: &[&str],
-    left_out: &[&str],
-) -> Result<A, String> {
+pub(crate) fn parse<A: Args>(name: &str, table: &toml::Table, given: &[&str], left_out: &[&str]) -> Result<A, String> {
     let command = A::augment_args(Command::new("fmlgs").no_binary_name(true).disable_help_flag(true));
     let known: Vec<(&str, &Arg)> = command.get_arguments().filter_map(|a| Some((a.get_long()?, a))).collect();
     let mut line: Vec<String> = given.iter().map(|word| (*word).to_owned()).collect();

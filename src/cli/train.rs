@@ -12,7 +12,7 @@ use super::{CliError, interrupt, number, output};
 use crate::jobs::open::{self, Contents};
 use crate::jobs::presets;
 use crate::jobs::train::{IfChanged, Trained};
-use crate::jobs::{JobError, plan, train};
+use crate::jobs::{JobError, held_out, plan, train};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{TrainConfig, TrainError};
@@ -173,6 +173,15 @@ impl TrainArgs {
                 )));
             }
         };
+        if self.settings.holdout_every.is_some() {
+            held_out::refuse_holdout(&dataset)?;
+        }
+        if self.settings.random_points.is_some() && !dataset.points.is_empty() {
+            let (data, points) = (self.data.display(), dataset.points.len());
+            return Err(CliError::Usage(format!(
+                "--random-points has no effect here: {data} has {points} sparse points to start from"
+            )));
+        }
         let base = self.preset.as_deref().map(presets::read).transpose()?.unwrap_or(base);
         let config = plan::planned(&dataset, self.settings.over(base), &self.plan.overrides());
         let folders = match self.out.clone().or(own) {

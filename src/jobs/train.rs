@@ -8,7 +8,7 @@ use super::{JobError, Scene, open};
 use crate::io::{semantic_map, splat_ply, trained};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::checkpoint::CheckpointError;
-use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError, TrainOutcome};
+use crate::pipeline::train::{self, FolderUse, TrainConfig, TrainEnd, TrainError, TrainOutcome};
 use crate::scene::{Dataset, SemanticMap};
 
 #[derive(Clone, Debug)]
@@ -38,6 +38,8 @@ pub enum IfChanged {
     Anew,
     /// It goes on with what there is now.
     GoOn,
+    /// As [`Self::Ask`], in a folder that others take away where they go on with it.
+    AskClaimed,
 }
 
 /// Trains into the first of these `folders` that holds no training with other settings: that is another training,
@@ -49,13 +51,14 @@ pub(crate) fn run(
     changed: IfChanged,
     observer: &mut dyn Observer,
 ) -> Result<Trained, JobError> {
+    let may = FolderUse { anyway: changed == IfChanged::GoOn, remake: changed != IfChanged::AskClaimed };
     let mut folders = folders.into_iter().peekable();
     let mut earlier: Option<String> = None;
     while let Some(out) = folders.next() {
         if let Some(earlier) = earlier.take() {
             observer.note(Severity::Info, format!("{earlier}, so this is a new training; the earlier one stays"));
         }
-        match train::run_on(dataset, config, Some(&out), changed == IfChanged::GoOn, observer) {
+        match train::run_on(dataset, config, Some(&out), may, observer) {
             Err(TrainError::Checkpoint(e)) if folders.peek().is_some() && makes_another(&e, changed) => {
                 let settings = || format!("The settings are not those of the training in {}", out.display());
                 let is_other = matches!(e, CheckpointError::OtherInputs { .. });

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
 use crate::io::unposed::Unposed;
-use crate::jobs::train::IfChanged;
 use crate::jobs::remove::RemoveRequest;
+use crate::jobs::train::IfChanged;
 use crate::measure::{Knobs, StageName};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;

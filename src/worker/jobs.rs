@@ -103,7 +103,9 @@ impl Jobs for PipelineJobs {
             }
             Command::Demo => self.opened(demo::open(&self.folders, self.machine(), observer)?),
             Command::DemoPhotos => self.opened(demo::open_photos(&self.folders, self.machine(), observer)?),
-            Command::Train { dataset, config, out, changed } => return self.train((&dataset, &config), out, changed, observer),
+            Command::Train { dataset, config, out, changed } => {
+                return self.train((&dataset, &config), out, changed, observer);
+            }
             Command::Evaluate { dataset, cloud, config, settings, out } => {
                 Outcome::Evaluated(measured(dataset, cloud, (config, settings), &out, observer)?)
             }

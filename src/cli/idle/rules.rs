@@ -141,9 +141,7 @@ pub(super) const RULES: &[Rule] = &[
     }),
     rule(&["preprocess"], &["tracker_model"], |g| when(g.has("add"), "with --add, which looks at one photo")),
     rule(&["preprocess"], &["mask_grid"], |g| when(without_network(g), "where no network is asked for masks")),
-    rule(&["preprocess"], &["code_steps"], |g| {
-        when(lifts_by_votes(g), "with --lifting votes, which trains no codes")
-    }),
+    rule(&["preprocess"], &["code_steps"], |g| when(lifts_by_votes(g), "with --lifting votes, which trains no codes")),
     rule(&["preprocess"], &["part_weight"], |g| when(g.is("encoder", "none"), "with --encoder none")),
     rule(&["remove"], &["paint", "seed"], |g| when(g.is("fill", "none"), "with --fill none")),
     rule(&["remove"], &["paint"], |g| when(g.is("fill", "lama"), "with --fill lama, which paints itself")),

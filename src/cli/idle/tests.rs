@@ -77,7 +77,8 @@ fn typed(argument: &Arg) -> Vec<String> {
 /// What an argument requires, which clap shows nowhere else.
 fn required_by(argument: &Arg) -> Vec<String> {
     let text = format!("{argument:?}");
-    let list = text.split_once(" requires: [").map_or("", |(_, rest)| rest.split_once(']').map_or("", |(list, _)| list));
+    let list =
+        text.split_once(" requires: [").map_or("", |(_, rest)| rest.split_once(']').map_or("", |(list, _)| list));
     list.split('"').skip(1).step_by(2).map(str::to_owned).collect()
 }
 
@@ -103,9 +104,9 @@ fn what_is_required_is_required_whatever_else_is_given() {
                 let Some(required) = of(&required) else { continue };
                 let told = |line: &[String]| format!("'{}' is accepted", line.join(" "));
                 // The control: together they are accepted, with something beside them.
-                let together = besides(&command, &[argument, required]).into_iter().any(|rest| {
-                    refusal(&[words.clone(), rest, typed(required), typed(argument)].concat()).is_none()
-                });
+                let together = besides(&command, &[argument, required])
+                    .into_iter()
+                    .any(|rest| refusal(&[words.clone(), rest, typed(required), typed(argument)].concat()).is_none());
                 assert!(together, "{words:?}: --{} is never accepted", argument.get_id());
                 for rest in besides(&command, &[argument, required]) {
                     let line = [words.clone(), rest, typed(argument)].concat();
@@ -135,13 +136,21 @@ fn what_is_required_is_required_whatever_else_is_given() {
 const LINES: &[(&str, &[&str], &str)] = &[
     ("query s lamp {}", &["--tolerance 3", "--export o", "--truth t", "--views all", "--relevancy raw"], ""),
     ("query s lamp --match identities {}", &["--tolerance 3"], "query s lamp --match codes --tolerance 3"),
-    ("query s lamp --recipe paper --match relevancy {}", &["--tolerance 3"], "query s lamp --recipe paper --tolerance 3"),
+    (
+        "query s lamp --recipe paper --match relevancy {}",
+        &["--tolerance 3"],
+        "query s lamp --recipe paper --tolerance 3",
+    ),
     ("query s lamp --by names {}", &["--temperature 2", "--canonical lerf", "--deviation off"], ""),
     ("query s lamp --mask a.png {}", &["--heat a.png", "--heat ./a.png"], "query s lamp --mask a.png --heat b.png"),
     ("query s --phrases f {}", &["--relevancy raw"], "query s --phrases f --top 2 --kind part --views all --export o"),
     ("segment s lamp --out o.ply {}", &["--format spz", "--masks isat", "--photos none", "--max-side 64"], ""),
     ("segment s lamp --out o.ply {}", &["--click-out 1,1", "--view 0", "--keep lamp", "--relevancy raw"], ""),
-    ("segment s --click 1,1 --out o.ply {}", &["--top 2", "--kind part", "--by names"], "segment s --click 1,1 --keep x"),
+    (
+        "segment s --click 1,1 --out o.ply {}",
+        &["--top 2", "--kind part", "--by names"],
+        "segment s --click 1,1 --keep x",
+    ),
     ("segment s --click 1,1 --out o.ply {}", RECIPE, "segment s lamp --out o.ply --by names --top 2"),
     ("segment s --click 1,1 --keep x {}", &["--no-measure"], "segment s --click 1,1 --out o.ply --no-measure"),
     ("segment s --all --out o {}", &["--no-measure"], "segment s --all --out o --format spz --photos none"),
@@ -158,16 +167,28 @@ const LINES: &[(&str, &[&str], &str)] = &[
     ("train p --sh-degree 0 {}", &["--sh-at-once"], "train p --sh-degree 1 --sh-at-once"),
     ("train p --surfels {}", &["--antialias", "--no-antialias"], "train p --surfels --distortion-weight 1"),
     ("train p {}", &["--distortion-weight 1"], ""),
-    ("demo {}", &["--steps 9", "--max-side 64", "--seed 2", "--surfels", "--json", "--out o"], "demo --headless --steps 9"),
+    (
+        "demo {}",
+        &["--steps 9", "--max-side 64", "--seed 2", "--surfels", "--json", "--out o"],
+        "demo --headless --steps 9",
+    ),
     ("demo --headless {}", &["--holdout-every 4"], "demo --headless --json --out o"),
     ("demo --headless --no-densify {}", &["--max-gaussians 9"], ""),
     ("demo --headless --sh-degree 0 {}", &["--sh-at-once"], ""),
     ("demo --headless --surfels {}", &["--antialias", "--no-antialias"], ""),
     ("demo --make z.zip {}", &["--steps 9", "--json", "--backend cpu"], "demo --make z.zip --out o"),
     ("preprocess s {}", &["--tracker-model x", "--prompt mask"], "preprocess s --tracker sam2 --tracker-model x"),
-    ("preprocess s --recipe paper --tracker geometry {}", &["--prompt mask"], "preprocess s --recipe paper --prompt mask"),
+    (
+        "preprocess s --recipe paper --tracker geometry {}",
+        &["--prompt mask"],
+        "preprocess s --recipe paper --prompt mask",
+    ),
     ("preprocess s --add p {}", &["--tracker-model x"], "preprocess s --add p"),
-    ("preprocess s --masks m {}", &["--mask-grid all", "--code-steps 5"], "preprocess s --lifting refined --code-steps 5"),
+    (
+        "preprocess s --masks m {}",
+        &["--mask-grid all", "--code-steps 5"],
+        "preprocess s --lifting refined --code-steps 5",
+    ),
     ("preprocess s --segmenter regions {}", &["--mask-grid all"], "preprocess s --segmenter m --mask-grid all"),
     ("preprocess s --encoder none {}", &["--part-weight 0.5"], "preprocess s --encoder demo --part-weight 0.5"),
     ("remove s lamp --out o --fill none {}", &["--paint smooth", "--seed 2"], "remove s lamp --out o --seed 2"),
@@ -175,20 +196,40 @@ const LINES: &[(&str, &[&str], &str)] = &[
     ("remove s lamp --out o --paint smooth {}", &["--seed 2"], "remove s lamp --out o --paint patches --seed 2"),
     ("render s --out a.png {}", &["--quality 50", "--fps 9", "--mark lamp", "--ffmpeg f"], ""),
     ("render s --path p.json --out frames/ {}", &["--quality 50"], "render s --path p.json --out v.webp --quality 50"),
-    ("path s --to-photo 3 {}", &["--side other", "--distance 2", "--cameras 9", "--aspect 1"], "path s --to a --side other"),
-    ("path s --survey 3 {}", &["--side other", "--distance 2", "--from 2", "--aspect 1"], "path s --survey 3 --frames 9"),
+    (
+        "path s --to-photo 3 {}",
+        &["--side other", "--distance 2", "--cameras 9", "--aspect 1"],
+        "path s --to a --side other",
+    ),
+    (
+        "path s --survey 3 {}",
+        &["--side other", "--distance 2", "--from 2", "--aspect 1"],
+        "path s --survey 3 --frames 9",
+    ),
     ("export s --html p.html {}", &["--no-measure"], "export s --html p.html --out a.ply --no-measure"),
     ("agent s hi {}", &["--url u", "--model m", "--key-variable k"], "agent s hi --planner llm --url u --model m"),
     ("agent --find-model {}", &["--url u", "--from 0", "--transcript t.md", "--by names"], "agent --find-model --json"),
     ("agent --test-model --url u --model m {}", &["--json", "--view v.png"], "agent --test-model --url u --model m"),
     ("agent s hi {}", &["--tolerance 3"], "agent s hi --blend --tolerance 3"),
     ("agent s hi --by names {}", &["--temperature 2"], ""),
-    ("report s {}", &["--from f", "--steps 9", "--by names", "--relevancy raw"], "report s --masks m --steps 9 --by names"),
-    ("report s --stages render {}", &["--steps 9", "--masks m", "--train-steps 50", "--by names"], "report s --train-steps 50"),
+    (
+        "report s {}",
+        &["--from f", "--steps 9", "--by names", "--relevancy raw"],
+        "report s --masks m --steps 9 --by names",
+    ),
+    (
+        "report s --stages render {}",
+        &["--steps 9", "--masks m", "--train-steps 50", "--by names"],
+        "report s --train-steps 50",
+    ),
     ("report s --masks m --stages query {}", &["--steps 9"], "report s --masks m --stages features,query --steps 9"),
     ("report s --stages path {}", &["--views 2"], "report s --stages path,render --views 2"),
     ("report --defaults d.md --from f {}", &["--budget 9", "--out o", "--fresh", "--repeats 2", "--by names"], ""),
-    ("batch j.toml --dry-run {}", &["--retry-failed", "--takeover-secs 9"], "batch j.toml --retry-failed --takeover-secs 9"),
+    (
+        "batch j.toml --dry-run {}",
+        &["--retry-failed", "--takeover-secs 9"],
+        "batch j.toml --retry-failed --takeover-secs 9",
+    ),
     ("bench s {}", &["--runs 2", "--identities 5", "--mask-grid all", "--photo f"], "bench s --plan --runs 2"),
     ("bench s --plan {}", &["--max-side 64"], "bench s --max-side 64"),
     ("bench --queries 5 {}", &["--size 64x48", "--max-side 64", "--gpu"], "bench --queries 5 --identities 9"),
@@ -203,7 +244,8 @@ const LINES: &[(&str, &[&str], &str)] = &[
 fn options_that_do_nothing_are_refused_by_name() {
     let mut fired: BTreeSet<usize> = BTreeSet::new();
     for (line, options, accepted) in LINES {
-        let command = parsed(&split(&line.replace("{}", ""))).ok().map(|m| m.subcommand_name().unwrap_or("").to_owned());
+        let command =
+            parsed(&split(&line.replace("{}", ""))).ok().map(|m| m.subcommand_name().unwrap_or("").to_owned());
         for option in *options {
             // An option by its name alone gets a value.
             let words = match option.strip_prefix("--") {
@@ -258,7 +300,8 @@ fn the_rules_speak_of_what_there_is() {
     let all = commands();
     for rule in RULES {
         for name in rule.commands.iter().filter(|name| **name != "batch eval") {
-            let (_, command) = all.iter().find(|(words, _)| words.join(" ") == *name).unwrap_or_else(|| panic!("{name}"));
+            let (_, command) =
+                all.iter().find(|(words, _)| words.join(" ") == *name).unwrap_or_else(|| panic!("{name}"));
             for id in rule.options {
                 assert!(command.get_arguments().any(|a| a.get_id() == *id) || *id == "json", "{name} has no '{id}'");
             }

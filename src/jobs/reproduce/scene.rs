@@ -212,6 +212,7 @@ fn compare(
         settings: scene.settings.clone(),
         dataset: Arc::clone(dataset),
         views: compared.clone(),
+        trained_on: vec![split.trained_on; compared.len()],
         max_side_px: settings.train.max_side_px,
         borders: None,
         pictures: None,

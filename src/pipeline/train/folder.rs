@@ -13,6 +13,29 @@ use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::carry;
 use crate::scene::{Dataset, GaussianCloud, SemanticMap};
 
+/// What a training may do with the folder of its result.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct FolderUse {
+    /// A checkpoint is continued also where photos, poses or sparse points are not those that its run began with.
+    pub(crate) anyway: bool,
+    /// The folder is made again where it goes away meanwhile. Not where it was taken away by who went on.
+    pub(crate) remake: bool,
+}
+
+/// Holds the folder again if it went away, and says so.
+pub(super) fn remade(scene: SceneFolder, observer: &mut dyn Observer) -> Result<SceneFolder, TrainError> {
+    let folder = scene.path().to_path_buf();
+    if folder.is_dir() {
+        return Ok(scene);
+    }
+    // Else it would take away the lock of the new one.
+    drop(scene);
+    let held = SceneFolder::hold(&folder, "training").map_err(TrainError::Save)?;
+    let text = format!("{} went away during the training and is made again; what was in it is gone", folder.display());
+    observer.note(Severity::Warning, text);
+    Ok(held)
+}
+
 /// Holds the folder for the result, which must not hold anything that would be lost.
 pub(super) fn claim(folder: &Path, dataset: &Dataset) -> Result<SceneFolder, TrainError> {
     let occupied = |what| Err(TrainError::Save(IoError::Occupied { folder: folder.into(), what }));

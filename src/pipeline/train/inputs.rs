@@ -73,7 +73,8 @@ impl TrainInputs {
 
     /// Names of what is not as it was, one sentence part for each sort of change; nothing if all is.
     pub(crate) fn changes(&self, now: &Self) -> Vec<String> {
-        let by_name = |all: &'_ Self| all.photos.iter().map(|p| (p.name.clone(), p.clone())).collect::<BTreeMap<_, _>>();
+        let by_name =
+            |all: &'_ Self| all.photos.iter().map(|p| (p.name.clone(), p.clone())).collect::<BTreeMap<_, _>>();
         let (before, after) = (by_name(self), by_name(now));
         let missing = |from: &BTreeMap<String, PhotoInput>, names: &BTreeMap<String, PhotoInput>| -> Vec<String> {
             names.keys().filter(|name| !from.contains_key(*name)).cloned().collect()
@@ -153,7 +154,11 @@ fn same_lens(before: &Camera, now: &Camera) -> bool {
 /// A number without needless zeros.
 fn amount(v: f64) -> String {
     let text = number(v);
-    if text.contains('.') && !text.contains('e') { text.trim_end_matches('0').trim_end_matches('.').into() } else { text }
+    if text.contains('.') && !text.contains('e') {
+        text.trim_end_matches('0').trim_end_matches('.').into()
+    } else {
+        text
+    }
 }
 
 /// The first few names.
@@ -208,10 +213,10 @@ mod tests {
         let lens = |d: &mut Dataset| d.photos[2].distortion = Some(Distortion { k1: 0.1, ..Distortion::default() });
         assert_eq!(changed(&lens), ["1 photo has another lens or size (2.png)"]);
         assert_eq!(changed(&|d| d.photos[0].test_split = true), ["1 photo is marked otherwise as test (0.png)"]);
-        assert_eq!(changed(&|d| d.photos[0].name = "z.png".into()), [
-            "1 photo is gone (0.png)",
-            "1 photo is new (z.png)"
-        ]);
+        assert_eq!(
+            changed(&|d| d.photos[0].name = "z.png".into()),
+            ["1 photo is gone (0.png)", "1 photo is new (z.png)"]
+        );
         let point = |d: &mut Dataset| d.points[0].position.x += 1.0;
         assert_eq!(changed(&point), ["the sparse points are others (2 then, 2 now)"]);
         assert_eq!(changed(&|d| d.background = Some([1.0; 3])), ["the background has another color"]);

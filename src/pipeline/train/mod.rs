@@ -23,6 +23,7 @@ pub mod trainer;
 mod window;
 
 pub use config::TrainConfig;
+pub(crate) use folder::FolderUse;
 pub(crate) use outcome::{TrainEnd, TrainError, TrainOutcome};
 pub(crate) use photos::load_views;
 pub(crate) use run::{run, run_on};

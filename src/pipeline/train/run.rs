@@ -10,10 +10,10 @@ use rand_pcg::Pcg64Mcg;
 
 use super::checkpoint::{self, Checkpoint, Header};
 use super::device::StepResult;
-use super::folder::{claim, finished, objects_for, resumable};
+use super::folder::{FolderUse, claim, finished, objects_for, remade, resumable};
 use super::inputs::{Compare, TrainInputs};
 use super::outcome::{TrainEnd, TrainError, TrainOutcome};
-use super::photos::load_views;
+use super::photos::{load_views, tell_marks};
 use super::trainer::{REPORT_STEPS, StepError, Trainer};
 use super::window::Window;
 use super::{TrainConfig, TrainView, coarse, density, geometry, init};
@@ -45,16 +45,15 @@ pub(crate) fn run(
     out: Option<&Path>,
     observer: &mut dyn Observer,
 ) -> Result<TrainOutcome, TrainError> {
-    run_on(dataset, config, out, false, observer)
+    run_on(dataset, config, out, FolderUse::default(), observer)
 }
 
-/// The same; with `anyway`, a checkpoint is continued also where photos, poses or sparse points are no longer those
-/// that its run began with.
+/// The same, with what may be done with the folder.
 pub(crate) fn run_on(
     dataset: &Dataset,
     config: &TrainConfig,
     out: Option<&Path>,
-    anyway: bool,
+    may: FolderUse,
     observer: &mut dyn Observer,
 ) -> Result<TrainOutcome, TrainError> {
     config.check().map_err(TrainError::Config)?;
@@ -62,13 +61,14 @@ pub(crate) fn run_on(
     if train.is_empty() {
         return Err(TrainError::NoPhotos(dataset.name.clone(), dataset.photos.len()));
     }
+    tell_marks(dataset, config, observer);
     let scene = out.map(|folder| claim(folder, dataset)).transpose()?;
     let inputs = match out {
         Some(_) => Some(TrainInputs::of(dataset, Compare::Contents).map_err(TrainError::Photo)?),
         None => None,
     };
     let saved = match (out, &inputs) {
-        (Some(folder), Some(now)) => resumable(folder, dataset, (config, &train), (now, anyway), observer)?,
+        (Some(folder), Some(now)) => resumable(folder, dataset, (config, &train), (now, may.anyway), observer)?,
         _ => None,
     };
     if let (Some(folder), Some(saved)) = (out, &saved)
@@ -86,7 +86,7 @@ pub(crate) fn run_on(
     };
     views.shrink_to_fit();
     let mut job = Job::start(dataset, config, scene, &held, (views, tests), saved);
-    job.inputs = inputs;
+    (job.inputs, job.remake) = (inputs, may.remake);
     let told = |why| observer.note(Severity::Warning, why);
     job.device = if config.needs_cpu() { None } else { config.backend.gpu(told)? };
     match &job.device {
@@ -107,6 +107,8 @@ struct Job<'a> {
     photos: Vec<String>,
     /// What is trained on, for who goes on.
     inputs: Option<TrainInputs>,
+    /// Whether the folder is made again where it goes away.
+    remake: bool,
     views: Vec<TrainView>,
     /// The same at half their size, while those are trained on.
     coarse: Option<Vec<TrainView>>,
@@ -178,6 +180,7 @@ impl<'a> Job<'a> {
             info,
             photos,
             inputs: None,
+            remake: false,
             views,
             coarse,
             tests,
@@ -238,7 +241,7 @@ impl<'a> Job<'a> {
             }
             let due = self.config.checkpoint_secs;
             if due > 0.0 && saved_at.elapsed().as_secs_f64() >= due {
-                match self.checkpoint() {
+                match self.checkpoint(observer) {
                     // A full disk now is no reason to lose what is in memory.
                     Err(TrainError::Save(e)) if !std::mem::replace(&mut self.unsaved, true) => {
                         observer.note(Severity::Warning, format!("Checkpoint not saved, training continues: {e}"));
@@ -345,7 +348,10 @@ impl<'a> Job<'a> {
         Ok(())
     }
 
-    fn checkpoint(&mut self) -> Result<(), TrainError> {
+    fn checkpoint(&mut self, observer: &mut dyn Observer) -> Result<(), TrainError> {
+        if let Some(scene) = self.scene.take_if(|_| self.remake) {
+            self.scene = Some(remade(scene, observer)?);
+        }
         let Some(scene) = &self.scene else { return Ok(()) };
         self.trainer.fetch()?;
         let t = &self.trainer;
@@ -369,7 +375,7 @@ impl<'a> Job<'a> {
 
     fn finish(mut self, end: TrainEnd, observer: &mut dyn Observer) -> Result<TrainOutcome, TrainError> {
         self.trainer.fetch_cloud()?;
-        let checkpoint = self.checkpoint();
+        let checkpoint = self.checkpoint(observer);
         let scored = self.history.evaluations.last().is_some_and(|e| e.step == self.trainer.step);
         // What fails here is told when the scene is saved.
         let evaluated = if end == TrainEnd::Finished && !scored { self.evaluate(observer) } else { Ok(()) };
