@@ -30,7 +30,7 @@ const EXAMPLES: &str = "Examples:\n  \
 ///
 /// Each TEXT is one request of the same conversation; without any, requests are read from standard input, one
 /// per line. The planner 'commands' is built in; 'llm' asks a chat model behind an OpenAI-compatible
-/// address. Exit code 1 if the last request was refused.
+/// address. Exit code 1 if the last request was refused, or ends at a question.
 #[derive(Debug, clap::Args)]
 #[command(after_help = format!("{EXAMPLES}\n\n{SENT}"))]
 pub(crate) struct AgentArgs {
@@ -210,6 +210,12 @@ pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
             "planner": session.planner(), "requests": talk.told, "recipe": args.recipe.recipe(),
         }))?;
     }
+    if let Some(question) = talk.open {
+        let asked = if args.json { String::new() } else { format!(" ({question})") };
+        return Err(CliError::failed(format!(
+            "the last request waits for an answer, so it was not carried out{asked}; answer with a TEXT more"
+        )));
+    }
     match talk.refused {
         Some(text) if !args.json => Err(CliError::failed(format!("the last request was not carried out: {text}"))),
         Some(_) => Err(CliError::failed("the last request was not carried out".to_owned())),
@@ -254,6 +260,8 @@ struct Talk {
     told: Vec<serde_json::Value>,
     /// Why the last request was refused, if it was.
     refused: Option<String>,
+    /// The question to which the last request has led, if nobody has answered it.
+    open: Option<String>,
 }
 
 impl Talk {
@@ -276,6 +284,7 @@ impl Talk {
         }
         let done = std::mem::take(&mut *effects.lock().unwrap_or_else(PoisonError::into_inner));
         self.refused = reply.refused.as_ref().map(|r| r.text.clone());
+        self.open = reply.pending.map(|_| reply.text.clone());
         if self.json {
             let refused = reply.refused.as_ref().map(|r| json!({ "kind": format!("{:?}", r.kind), "text": r.text }));
             let names = reply.candidates.iter().map(|id| {

@@ -82,7 +82,7 @@ fn training(table: &toml::Table, folder: &Path) -> Result<BatchTraining, String>
     if table.contains_key("seed") {
         return Err("'seed': seeds are for all settings; put them at the top: seeds = [0, 1]".into());
     }
-    let table: TrainingTable = table_args::parse(table, &[], &["seed"])?;
+    let table: TrainingTable = table_args::parse("train", table, &[], &["seed"])?;
     let base = table.preset.as_ref().map(|preset| presets::read(&folder.join(preset))).transpose();
     let config = table.settings.over(base.map_err(|e| format!("'preset': {e}"))?.unwrap_or_default());
     Ok(BatchTraining { config, plan: table.plan.overrides() })
@@ -127,9 +127,13 @@ pub(crate) fn run(args: BatchArgs, quiet: bool) -> Result<(), CliError> {
     if args.dry_run {
         return list(&request, args.json);
     }
+    let (shard, all) = (request.shard, batch::count(&request.batch));
+    if !(0..all).any(|unit| shard.has(unit)) {
+        let text = format!("--shard: there is nothing in shard {shard}, the batch has {}", things(all, "unit"));
+        return Err(CliError::Usage(text));
+    }
     let outcome = batch::run(&request, &mut Console::new(quiet))?;
     let BatchOutcome { units, done, failed, elsewhere, stopped } = &outcome;
-    let shard = request.shard;
     if args.json {
         let named = |all: &[(String, String)], what: &str| -> Vec<serde_json::Value> {
             all.iter().map(|(unit, why)| json!({ "unit": unit, what: why })).collect()

@@ -45,6 +45,10 @@ pub(crate) fn run(args: CleanArgs, quiet: bool) -> Result<(), CliError> {
     if let Some(out) = &args.out {
         derived::check_place(&scene, out)?;
     }
+    if args.photos.is_some() && scene.cameras.is_empty() {
+        let text = "--photos has no effect here: a file of splats does not say from which cameras it was trained";
+        return Err(CliError::Usage(text.into()));
+    }
     let measures = clean::measure(&scene, args.photos.as_deref(), &mut Console::new(quiet))
         .map_err(|e| CliError::of_work(e, "nothing was written"))?;
     let rules = match (args.rules.is_empty(), &args.out) {

@@ -2,6 +2,7 @@
 
 use std::io::BufRead;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use serde_json::json;
 
@@ -10,6 +11,9 @@ use super::{CliError, output};
 use crate::jobs::export;
 use crate::pipeline::observer::{Observer, Severity};
 use crate::remote::{Address, Client, Followed, follow};
+
+/// Longest address that is read from standard input, in bytes: beyond it is no address but an endless file.
+const MAX_ADDRESS_BYTES: u64 = 16 << 10;
 
 /// Look at what 'fmlgs serve' or 'fmlgs train --serve' shows on another computer
 ///
@@ -26,7 +30,7 @@ pub(crate) struct ConnectArgs {
     url: String,
     /// Print what happens instead of opening the window, until nothing runs there
     #[arg(long)]
-    headless: bool,
+    pub(crate) headless: bool,
     /// File for the Gaussians then (.ply): the same bytes as the file of a trained scene
     #[arg(long, value_name = "PLY", requires = "headless")]
     save: Option<PathBuf>,
@@ -36,25 +40,32 @@ pub(crate) struct ConnectArgs {
 }
 
 impl ConnectArgs {
-    /// The address, if it is for the window.
-    pub(crate) fn for_window(&self) -> Result<Option<String>, CliError> {
-        let url = self.address()?;
+    /// The address for the window, which reads it again.
+    pub(crate) fn url_for_window(&self) -> Result<String, CliError> {
+        let url = self.address(std::io::stdin().lock())?;
         Address::parse(&url).map_err(CliError::Usage)?;
-        Ok((!self.headless).then_some(url))
+        Ok(url)
     }
 
-    fn address(&self) -> Result<String, CliError> {
+    /// The address that was given, or the first line of `input`, which is read once.
+    fn address(&self, input: impl BufRead) -> Result<String, CliError> {
         if self.url != "-" {
             return Ok(self.url.clone());
         }
-        let mut line = String::new();
-        std::io::stdin().lock().read_line(&mut line)?;
+        let mut line = Vec::new();
+        input.take(MAX_ADDRESS_BYTES + 1).read_until(b'\n', &mut line)?;
+        if line.len() as u64 > MAX_ADDRESS_BYTES {
+            let text = format!("standard input holds no address: its first line has over {MAX_ADDRESS_BYTES} bytes");
+            return Err(CliError::Usage(text));
+        }
+        let line = String::from_utf8(line);
+        let line = line.map_err(|_| CliError::Usage("standard input holds no address: it is not UTF-8 text".into()))?;
         Ok(line.trim().to_owned())
     }
 }
 
 pub(crate) fn run(args: ConnectArgs, quiet: bool) -> Result<(), CliError> {
-    let address = Address::parse(&args.address()?).map_err(CliError::Usage)?;
+    let address = Address::parse(&args.address(std::io::stdin().lock())?).map_err(CliError::Usage)?;
     if let Some(save) = &args.save {
         export::check(save, &[".ply"], &[])?;
     }
@@ -62,7 +73,7 @@ pub(crate) fn run(args: ConnectArgs, quiet: bool) -> Result<(), CliError> {
     if address.is_open() {
         console.note(Severity::Warning, "the connection is not encrypted; others can read it, the token too".into());
     }
-    let client = Client::new(address)?;
+    let client = Arc::new(Client::new(address)?);
     let end = follow(&client, &mut console, args.save.as_deref())?;
     let (word, folder) = match &end {
         Followed::AtRest => ("at rest", None),
@@ -80,4 +91,20 @@ pub(crate) fn run(args: ConnectArgs, quiet: bool) -> Result<(), CliError> {
         output::print(&format!("{}: {word}{there}", client.address.host))?;
     }
     if canceled { Err(CliError::Cancelled("the training was canceled there".into())) } else { Ok(()) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_is_the_first_line_of_what_is_read() {
+        let args = |url: &str| ConnectArgs { url: url.into(), headless: true, save: None, json: false };
+        let read = |input: &[u8]| args("-").address(input);
+        assert_eq!(read(b"http://h:7/#ab \r\nmore\n").expect("a line"), "http://h:7/#ab");
+        assert_eq!(args("http://given").address(&b"other"[..]).expect("given"), "http://given");
+        let endless = std::io::BufReader::new(std::io::repeat(0));
+        assert!(matches!(args("-").address(endless), Err(CliError::Usage(e)) if e.contains("over 16384 bytes")));
+        assert!(matches!(read(b"\xff\n"), Err(CliError::Usage(e)) if e.contains("UTF-8")));
+    }
 }

@@ -9,6 +9,8 @@ use crate::jobs::error::chain;
 use crate::jobs::{JobError, poses};
 use crate::measure::BeginError;
 use crate::pipeline::observer::Interrupted;
+use crate::pipeline::train::TrainError;
+use crate::pipeline::train::checkpoint::CheckpointError;
 
 /// Why a subcommand did not do what was asked.
 #[derive(Debug)]
@@ -39,6 +41,12 @@ impl CliError {
             JobError::Open(OpenError::NoPoses(photos)) => {
                 let commands: String = poses::commands(photos).iter().map(|line| format!("\n  {line}")).collect();
                 format!(". COLMAP finds them, and the window runs it where it is installed; by hand:{commands}")
+            }
+            JobError::TestPhotos { .. } => {
+                return Self::Usage(format!("--holdout-every has no effect here: {error}. Leave the option out"));
+            }
+            JobError::Train(TrainError::Checkpoint(CheckpointError::OtherInputs { .. })) => {
+                return Self::Usage(format!("{error}. Choose another folder to train anew"));
             }
             JobError::Output(_) => return Self::Usage(error.to_string()),
             JobError::Report(BeginError::Other(..)) => " (--out); --fresh forgets it".into(),

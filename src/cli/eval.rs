@@ -11,13 +11,15 @@ use super::{CliError, eval_depth, eval_masks, eval_removal, number, output, tabl
 use crate::jobs::batch::BatchEvaluation;
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::evaluate_masks::Protocol;
-use crate::jobs::export;
+use crate::jobs::{export, open};
+use crate::pipeline::observer::{Evaluation, ViewScore};
 
 /// Measure PSNR and SSIM of a scene on held-out photos
 ///
 /// The held-out photos are those that training left out; for a splat that was trained elsewhere,
 /// give the photos with --photos. SSIM is that of the 3D Gaussian Splatting literature (11 x 11
-/// Gaussian window). Photos are undistorted and scaled as in training.
+/// Gaussian window). Photos are undistorted and scaled as in training. What training saw is marked "trained on"
+/// and has a mean of its own. A splat is drawn before the photos' background.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs eval scene/\n  \
@@ -73,7 +75,7 @@ pub(crate) struct EvalArgs {
 pub(super) fn of_table(table: &toml::Table) -> Result<BatchEvaluation, String> {
     const LEFT_OUT: [&str; 8] = ["photos", "holdout-every", "pictures", "masks", "query", "depth", "removal", "json"];
     // Labels are those of each scene.
-    let args: EvalArgs = table_args::parse(table, &["scene", "--masks=labels"], &LEFT_OUT)?;
+    let args: EvalArgs = table_args::parse("batch eval", table, &["scene", "--masks=labels"], &LEFT_OUT)?;
     let EvalArgs { max_side, keep_borders, protocol, recipe, .. } = args;
     Ok(BatchEvaluation { max_side_px: max_side, keep_borders, protocol, recipe: recipe.recipe() })
 }
@@ -110,19 +112,50 @@ pub(crate) fn run(args: EvalArgs, quiet: bool) -> Result<(), CliError> {
     }
     let found = evaluate::photometric(&comparison, &mut console).map_err(CliError::of_views)?;
     drop(console);
+    // A mean over photos that training saw says nothing about those that it did not see.
+    let seen = &comparison.trained_on;
+    let of = |trained_on: bool| -> Option<Evaluation> {
+        let own = found.views.iter().zip(seen).filter(|(_, seen)| **seen == trained_on).map(|(view, _)| view.clone());
+        let views: Vec<ViewScore> = own.collect();
+        (!views.is_empty()).then(|| Evaluation::of(views, found.gaussians, found.step, found.secs))
+    };
+    let [held_out, trained_on] = [of(false), of(true)];
     if args.json {
+        let view = |(view, seen): (&ViewScore, &bool)| {
+            let mut view = json!(view);
+            view["trained_on"] = json!(seen);
+            view
+        };
+        let means = |of: &Option<Evaluation>| {
+            of.as_ref().map(|e| json!({ "views": e.views.len(), "psnr": e.psnr, "ssim": e.ssim }))
+        };
         return output::print_json(&json!({
             "scene": args.scene,
             "gaussians": found.gaussians,
             "max_side_px": comparison.max_side_px,
             "psnr": found.psnr,
             "ssim": found.ssim,
-            "views": found.views,
+            "held_out": means(&held_out),
+            "trained_on": means(&trained_on),
+            "views": found.views.iter().zip(seen).map(view).collect::<Vec<_>>(),
         }));
     }
+    let row = |name: String, psnr: f64, ssim: f64| vec![name, format!("{psnr:.2}"), format!("{ssim:.4}")];
     let mut rows = vec![vec!["view".to_owned(), "PSNR dB".to_owned(), "SSIM".to_owned()]];
-    rows.extend(found.views.iter().map(|s| vec![s.name.clone(), format!("{:.2}", s.psnr), format!("{:.4}", s.ssim)]));
-    let count = found.views.len();
-    rows.push(vec![format!("mean of {count}"), format!("{:.2}", found.psnr), format!("{:.4}", found.ssim)]);
+    rows.extend(
+        found.views.iter().zip(seen).map(|(s, seen)| {
+            row(if *seen { format!("{} (trained on)", s.name) } else { s.name.clone() }, s.psnr, s.ssim)
+        }),
+    );
+    let mut mean =
+        |what: &str, e: &Evaluation| rows.push(row(format!("mean of {}{what}", e.views.len()), e.psnr, e.ssim));
+    match (&held_out, &trained_on) {
+        (Some(held_out), Some(trained_on)) => {
+            mean(" held out", held_out);
+            mean(" trained on", trained_on);
+        }
+        (None, Some(trained_on)) => mean(" trained on", trained_on),
+        _ => mean("", &found),
+    }
     output::print(&output::table(&rows))
 }

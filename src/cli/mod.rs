@@ -19,6 +19,7 @@ mod eval_masks;
 mod eval_removal;
 mod export;
 mod generate;
+mod idle;
 mod info;
 mod interrupt;
 mod models;
@@ -148,8 +149,12 @@ pub(crate) type OpenWindow = fn(Vec<Start>, Vec<PlanOverride>) -> Result<(), Box
 /// Runs the command line of this process and returns its exit code. `version` is what `--version` says; `open_window`
 /// stands above this module, so the caller hands it in.
 pub fn main(version: &'static str, open_window: OpenWindow) -> ExitCode {
-    let parsed = Cli::command().version(version).try_get_matches();
+    process::quiet_libraries();
+    let command = Cli::command().version(version);
+    let parsed = command.clone().try_get_matches();
+    let idle = parsed.as_ref().map_or(Ok(()), |matches| idle::check_all(&command, matches));
     let cli = match parsed.and_then(|matches| Cli::from_arg_matches(&matches)) {
+        Ok(_) if let Err(text) = idle => return CliError::Usage(text).report(),
         Ok(cli) => cli,
         Err(error) => {
             // Help and version are "errors" for clap, with exit code 0. A closed pipe is no failure.
@@ -172,10 +177,10 @@ pub fn main(version: &'static str, open_window: OpenWindow) -> ExitCode {
 fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
     let quiet = cli.quiet;
     let overrides = cli.plan.overrides;
-    if cli.trace {
-        resource_log::listen(|load| output::note(&load.line()));
-    }
     let Some(command) = cli.command else {
+        if cli.trace {
+            resource_log::listen(|load| output::note(&load.line()));
+        }
         if cli.report.len() > 2 {
             return Err(CliError::Usage("--report: at most two reports are compared".into()));
         }
@@ -183,6 +188,9 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         let first = cli.path.map(Start::Scene).into_iter().chain(reports.map(|(path, start)| start(path)));
         return window(first.collect(), overrides, open_window);
     };
+    if cli.trace {
+        return Err(CliError::Usage("--trace is for the window; a command has no use for it".into()));
+    }
     if !cli.report.is_empty() {
         return Err(CliError::Usage("--report is for the window; a command has no use for it".into()));
     }
@@ -208,10 +216,8 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Path(args) => path::run(args),
         Command::Agent(args) => agent::run(args),
         Command::Serve(args) => serve::run(args, quiet),
-        Command::Connect(args) => match args.for_window()? {
-            Some(url) => window(vec![Start::Remote(url)], overrides, open_window),
-            None => connect::run(args, quiet),
-        },
+        Command::Connect(args) if args.headless => connect::run(args, quiet),
+        Command::Connect(args) => window(vec![Start::Remote(args.url_for_window()?)], overrides, open_window),
         Command::Synth(args) => synth::run(args, quiet),
         Command::Demo(args) if args.headless || args.make.is_some() => demo::run(args, quiet),
         Command::Demo(_) => window(vec![Start::Demo], overrides, open_window),

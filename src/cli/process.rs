@@ -1,5 +1,5 @@
-//! What the process asks of the system when it starts: threads, and an allocator that gives freed
-//! memory back, so that an idle window holds what it shows.
+//! What the process asks of the system when it starts: threads, an allocator that gives freed
+//! memory back, so that an idle window holds what it shows, and libraries that are silent.
 
 /// Most threads that share the work on a machine with fewer than half as many cores.
 const MOST_THREADS: usize = 64;
@@ -7,6 +7,10 @@ const MOST_THREADS: usize = 64;
 /// Blocks of at least so many bytes go back to the system when they are freed.
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 const LARGE_BYTES: i32 = 1 << 20;
+
+/// Leaves out Mesa's layer that chooses among GPUs (its `disable_environment`).
+#[cfg(target_os = "linux")]
+const LAYER_OFF: &str = "NODEVICE_SELECT";
 
 /// Starts the threads that share the work: as many as there are cores, or as `RAYON_NUM_THREADS` says
 /// within reason.
@@ -20,6 +24,28 @@ pub(crate) fn start_threads() -> Result<(), String> {
             "{threads} threads cannot be started ({e}); set RAYON_NUM_THREADS to fewer, or lift the limits (ulimit)"
         )
     })
+}
+
+/// Keeps a library from saying "error" where nothing is wrong. Has to be called before there are threads.
+///
+/// Mesa's layer that chooses among GPUs asks the Wayland compositor each time that somebody looks for one, and its
+/// library complains where there is none to ask. The layer is left out then, by the variable that it has for that, unless
+/// the user chooses a GPU by it.
+pub(crate) fn quiet_libraries() {
+    #[cfg(target_os = "linux")]
+    {
+        let is_path = |name: &str| std::env::var_os(name).is_some_and(|v| std::path::Path::new(&v).is_absolute());
+        let is_set = |name: &str| std::env::var_os(name).is_some();
+        let asked = ["WAYLAND_SOCKET", "MESA_VK_DEVICE_SELECT", "DRI_PRIME", LAYER_OFF].iter().any(|name| is_set(name));
+        if is_path("XDG_RUNTIME_DIR") || is_path("WAYLAND_DISPLAY") || asked {
+            return;
+        }
+        #[allow(unsafe_code)]
+        // SAFETY: this thread is the only one, so nobody reads the environment meanwhile.
+        unsafe {
+            std::env::set_var(LAYER_OFF, "1");
+        }
+    }
 }
 
 /// Fixes the size from which freed blocks are returned.

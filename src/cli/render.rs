@@ -38,7 +38,7 @@ pub(crate) struct RenderArgs {
     /// Photo by index from 0 or by name, or a JSON camera file [default: the first photo, or all of the splat]
     #[arg(long)]
     camera: Option<String>,
-    /// Dataset whose cameras to use, for a splat that came without
+    /// Dataset whose cameras and background to use, for a splat that came without
     #[arg(long)]
     photos: Option<PathBuf>,
     /// Size of the image, for example 1280x720 [default: the camera's own]
@@ -89,7 +89,9 @@ impl RenderArgs {
         }
         let mut scene = self.axes.open(&self.scene)?;
         if let Some(photos) = &self.photos {
-            scene.cameras = open::cameras(&open::dataset(photos)?, scene.config.holdout_every);
+            let dataset = open::dataset(photos)?;
+            scene.settings = scene.settings_beside(&dataset);
+            scene.cameras = open::cameras(&dataset, scene.config.holdout_every);
         }
         export::check(&self.out, &[], &scene.reads())?;
         let mut camera = view::choose(self.camera.as_deref(), &scene)?;
@@ -141,7 +143,10 @@ fn video(args: &RenderArgs, path: &Path, quiet: bool) -> Result<(), CliError> {
     let keys = video::camera_path(path)?;
     let spline = CameraSpline::new(&keys, Speed::Constant);
     let spline = spline.ok_or_else(|| CliError::failed(format!("{}: there are no keys in it", path.display())))?;
-    let scene = args.axes.open(&args.scene)?;
+    let mut scene = args.axes.open(&args.scene)?;
+    if let Some(photos) = &args.photos {
+        scene.settings = scene.settings_beside(&open::dataset(photos)?);
+    }
     let reads: Vec<&Path> = scene.reads().into_iter().chain([path]).collect();
     if args.out.is_dir() {
         export::check_folder(&args.out, &reads)?

@@ -2,12 +2,14 @@
 
 use clap::{Arg, ArgAction, Args, Command};
 
-/// Reads `table`; `left_out` are options that make no sense there, `given` what stands before them (positional
+use super::idle;
+
+/// Reads `table` as the command `name` is given it; `left_out` are options that make no sense there, `given` what stands before them (positional
 /// arguments, for example).
 ///
 /// # Errors
 /// What is wrong, and with which key.
-pub(crate) fn parse<A: Args>(table: &toml::Table, given: &[&str], left_out: &[&str]) -> Result<A, String> {
+pub(crate) fn parse<A: Args>(name: &str, table: &toml::Table, given: &[&str], left_out: &[&str]) -> Result<A, String> {
     let command = A::augment_args(Command::new("fmlgs").no_binary_name(true).disable_help_flag(true));
     let known: Vec<(&str, &Arg)> = command.get_arguments().filter_map(|a| Some((a.get_long()?, a))).collect();
     let mut line: Vec<String> = given.iter().map(|word| (*word).to_owned()).collect();
@@ -37,6 +39,7 @@ pub(crate) fn parse<A: Args>(table: &toml::Table, given: &[&str], left_out: &[&s
         }
     }
     let matches = command.clone().try_get_matches_from(line).map_err(|e| told(&e))?;
+    idle::check(name, &command, &matches)?;
     A::from_arg_matches(&matches).map_err(|e| told(&e))
 }
 

@@ -11,10 +11,11 @@ use super::serve::{AccessArgs, announce};
 use super::{CliError, interrupt, number, output};
 use crate::jobs::open::{self, Contents};
 use crate::jobs::presets;
-use crate::jobs::train::Trained;
-use crate::jobs::{JobError, plan, train};
+use crate::jobs::train::{IfChanged, Trained};
+use crate::jobs::{JobError, held_out, plan, train};
 use crate::pipeline::observer::{Observer, Severity};
-use crate::pipeline::train::TrainConfig;
+use crate::pipeline::train::checkpoint::CheckpointError;
+use crate::pipeline::train::{TrainConfig, TrainError};
 use crate::remote::{Server, bind_address, serve};
 use crate::render::BackendChoice;
 use crate::scene::Dataset;
@@ -41,6 +42,10 @@ pub(crate) struct TrainArgs {
     out: Option<PathBuf>,
     #[command(flatten)]
     settings: TrainOverrides,
+    /// Go on with a training that began with other photos, poses or sparse points; without it the change is named, and
+    /// nothing is done
+    #[arg(long)]
+    anyway: bool,
     /// Settings to start from, a TOML file as every trained scene has one ("training.toml"); others given here
     /// go before
     #[arg(long, value_name = "TOML")]
@@ -168,6 +173,15 @@ impl TrainArgs {
                 )));
             }
         };
+        if self.settings.holdout_every.is_some() {
+            held_out::refuse_holdout(&dataset)?;
+        }
+        if self.settings.random_points.is_some() && !dataset.points.is_empty() {
+            let (data, points) = (self.data.display(), dataset.points.len());
+            return Err(CliError::Usage(format!(
+                "--random-points has no effect here: {data} has {points} sparse points to start from"
+            )));
+        }
         let base = self.preset.as_deref().map(presets::read).transpose()?.unwrap_or(base);
         let config = plan::planned(&dataset, self.settings.over(base), &self.plan.overrides());
         let folders = match self.out.clone().or(own) {
@@ -187,6 +201,7 @@ fn usual_folders(first: &Path) -> Vec<PathBuf> {
 
 pub(crate) fn run(args: TrainArgs, quiet: bool) -> Result<(), CliError> {
     let (dataset, config, folders) = args.check()?;
+    let changed = if args.anyway { IfChanged::GoOn } else { IfChanged::Anew };
     let mut console = Console::new(quiet);
     for warning in &dataset.warnings {
         console.note(Severity::Warning, warning.clone());
@@ -196,9 +211,10 @@ pub(crate) fn run(args: TrainArgs, quiet: bool) -> Result<(), CliError> {
         None => None,
     };
     let done = match &server {
-        Some(server) => served(server, &dataset, &config, folders, &mut console),
-        None => train::run(&dataset, &config, folders, &mut console),
+        Some(server) => served(server, (&dataset, &config), folders, changed, &mut console),
+        None => train::run(&dataset, &config, folders, changed, &mut console),
     };
+    let done = done.map_err(|e| with_remedy(e, &args));
     let farewell = || {
         let Some(server) = &server else { return };
         if !quiet && server.watchers().1 > 0 {
@@ -235,17 +251,28 @@ pub(crate) fn run(args: TrainArgs, quiet: bool) -> Result<(), CliError> {
     Err(CliError::Cancelled(format!("{steps} of {all} steps are saved in {out}; the same command resumes from there")))
 }
 
+/// The error of a training, with what can be done about other photos here.
+fn with_remedy(error: JobError, args: &TrainArgs) -> CliError {
+    match error {
+        JobError::Train(TrainError::Checkpoint(e @ CheckpointError::OtherInputs { .. })) => {
+            let anew = if args.out.is_some() { "another --out" } else { "--out" };
+            CliError::Usage(format!("{e}. Train anew in another folder ({anew}), or go on with --anyway"))
+        }
+        other => other.into(),
+    }
+}
+
 /// Trains while others watch.
 fn served(
     server: &Server,
-    dataset: &Dataset,
-    config: &TrainConfig,
+    (dataset, config): (&Dataset, &TrainConfig),
     folders: Vec<PathBuf>,
+    changed: IfChanged,
     console: &mut Console,
 ) -> Result<Trained, JobError> {
     announce(server);
     let mut observer = server.observe(console);
-    let done = train::run(dataset, config, folders, &mut observer);
+    let done = train::run(dataset, config, folders, changed, &mut observer);
     match &done {
         Ok(done) => {
             if let Err(e) = server.finished(&done.out, done.is_finished()) {

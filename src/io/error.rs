@@ -12,10 +12,19 @@ use crate::scene::{CameraError, CloudError};
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum IoError {
     #[error("cannot read {path}: {cause}")]
-    Read { path: PathBuf, cause: io::Error },
+    Read {
+        path: PathBuf,
+        #[source]
+        cause: io::Error,
+    },
     /// The operating system refused to write. What was there before is untouched.
     #[error("cannot write {path}: {cause}; {remedy}")]
-    Write { path: PathBuf, remedy: &'static str, cause: io::Error },
+    Write {
+        path: PathBuf,
+        remedy: &'static str,
+        #[source]
+        cause: io::Error,
+    },
     #[error("{path} is a file of the trained scene in {folder} and is not replaced; choose another name")]
     Protected { path: PathBuf, folder: PathBuf },
     #[error("{folder} is being written by {holder}; wait until that is done, or choose another folder")]

@@ -4,6 +4,8 @@ use std::fs::{self, File};
 use std::io::{self, Read};
 use std::path::{Component, Path, PathBuf};
 
+use sha2::{Digest, Sha256};
+
 use super::{IoError, memory};
 use crate::scene::text;
 
@@ -32,6 +34,24 @@ pub fn open(path: &Path) -> Result<File, IoError> {
         return Err(IoError::NotAFile { path: path.into() });
     }
     File::open(path).map_err(failed)
+}
+
+/// SHA-256 of a regular file, as 64 hexadecimal digits.
+pub(crate) fn sha256(path: &Path) -> Result<String, IoError> {
+    let mut file = open(path)?;
+    let (mut sum, mut bytes) = (Sha256::new(), vec![0; 1 << 16]);
+    loop {
+        match file.read(&mut bytes) {
+            Ok(0) => return Ok(hex(&sum.finalize())),
+            Ok(n) => sum.update(&bytes[..n]),
+            Err(cause) => return Err(IoError::Read { path: path.into(), cause }),
+        }
+    }
+}
+
+/// Bytes as hexadecimal digits.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// The whole file, if it is a regular one of at most `limit` bytes that [`memory::budget`] allows.

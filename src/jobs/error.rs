@@ -41,6 +41,16 @@ pub enum JobError {
     PhotosGone(PathBuf),
     #[error("{}: no photo is held out, so there is nothing to measure on", .0.display())]
     NothingHeldOut(PathBuf),
+    /// The data set itself says which photos are held out.
+    #[error("{} marks {marked} of its {all} photos as test: these are held out, not every n-th", .data.display())]
+    TestPhotos {
+        /// The data set.
+        data: PathBuf,
+        /// Photos that it marks.
+        marked: usize,
+        /// All of its photos.
+        all: usize,
+    },
     #[error("no photo that was trained on is called '{0}'")]
     UnknownPhoto(String),
     #[error("the photo '{0}' is held out to measure with, so nothing is learned from it; choose another one")]
@@ -152,6 +162,20 @@ impl JobError {
     }
 }
 
+/// Whether the machine is what failed, not what was asked: the disk is full or cannot be written to.
+pub(crate) fn is_of_machine(error: &(dyn Error + 'static)) -> bool {
+    use std::io::ErrorKind as K;
+    let mut next = Some(error);
+    while let Some(cause) = next {
+        let kind = cause.downcast_ref::<std::io::Error>().map(std::io::Error::kind);
+        if let Some(K::StorageFull | K::QuotaExceeded | K::ReadOnlyFilesystem) = kind {
+            return true;
+        }
+        next = cause.source();
+    }
+    false
+}
+
 /// The error and its causes, each once: many errors already quote their cause.
 pub(crate) fn chain(error: &dyn Error) -> String {
     let mut text = error.to_string();
@@ -177,6 +201,19 @@ mod tests {
         Silent(#[source] std::io::Error),
         #[error("cannot save: {0}")]
         Quoting(#[source] std::io::Error),
+    }
+
+    #[test]
+    fn a_full_disk_is_the_machines_fault_however_deep_it_lies() {
+        let of = |kind: std::io::ErrorKind| {
+            let (path, remedy) = (PathBuf::from("x"), "");
+            IoError::Write { path, remedy, cause: kind.into() }
+        };
+        let full = || of(std::io::ErrorKind::StorageFull);
+        assert!(is_of_machine(&JobError::Io(full())) && is_of_machine(&JobError::Train(TrainError::Save(full()))));
+        assert!(is_of_machine(&JobError::Io(of(std::io::ErrorKind::ReadOnlyFilesystem))));
+        assert!(!is_of_machine(&JobError::Io(of(std::io::ErrorKind::NotFound))));
+        assert!(!is_of_machine(&JobError::EmptyQuery));
     }
 
     #[test]

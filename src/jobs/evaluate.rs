@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use image::ColorType;
 
-use super::held_out::held_out;
+use super::held_out::{held_out, refuse_holdout};
 use super::{JobError, Scene, export, open};
 use crate::io;
 use crate::math::stats::median;
@@ -39,6 +39,8 @@ pub(crate) struct PhotoComparison {
     pub(crate) settings: RenderSettings,
     pub(crate) dataset: Arc<Dataset>,
     pub(crate) views: Vec<usize>,
+    /// Which of them the scene says that it was trained on.
+    pub(crate) trained_on: Vec<bool>,
     pub(crate) max_side_px: u32,
     /// Borders of the photos, which are left out.
     pub(crate) borders: Option<Borders>,
@@ -60,6 +62,9 @@ impl PhotoComparison {
     pub(crate) fn of(scene: &Scene, dataset: Arc<Dataset>, options: EvaluateOptions) -> Result<Self, JobError> {
         let EvaluateOptions { max_side_px, holdout_every, keep_borders, pictures } = options;
         let default_every = scene.config.holdout_every;
+        if let Some(1..) = holdout_every {
+            refuse_holdout(&dataset)?;
+        }
         let views = match holdout_every {
             Some(0) => (0..dataset.photos.len()).collect(),
             every => held_out(&dataset, &scene.cameras, every, default_every),
@@ -70,8 +75,13 @@ impl PhotoComparison {
         let max_side_px = max_side_px.unwrap_or(scene.config.max_side_px);
         let (training, _) = dataset.split(holdout_every.unwrap_or(default_every));
         let borders = if keep_borders { None } else { Some(Borders::of(&dataset, &training, max_side_px)?) };
-        let (cloud, settings) = (Arc::clone(&scene.cloud), scene.settings.clone());
-        Ok(Self { cloud, settings, dataset, views, max_side_px, borders, pictures, state: None })
+        let (cloud, settings) = (Arc::clone(&scene.cloud), scene.settings_beside(&dataset));
+        let seen = |i: &usize| {
+            let name = &dataset.photos[*i].name;
+            scene.cameras.iter().any(|c| !c.held_out && c.name == *name)
+        };
+        let trained_on = views.iter().map(seen).collect();
+        Ok(Self { cloud, settings, dataset, views, trained_on, max_side_px, borders, pictures, state: None })
     }
 
     pub(crate) fn view(&self, index: usize) -> Result<TrainView, JobError> {

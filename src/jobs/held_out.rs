@@ -1,5 +1,6 @@
 //! Which photos a scene was not trained on.
 
+use super::JobError;
 use crate::io::gs_output::is_of;
 use crate::io::trained::SceneCamera;
 use crate::scene::Dataset;
@@ -20,6 +21,17 @@ pub(crate) fn held_out(
     let is_of = |camera: &str, photo: &str| if is_exact { camera == photo } else { is_of(camera, photo) };
     let held = |name: &str| cameras.iter().any(|c| c.held_out && is_of(&c.name, name));
     (0..dataset.photos.len()).filter(|&i| held(&dataset.photos[i].name)).collect()
+}
+
+/// Refuses to hold out every n-th photo where the data set itself marks photos as test.
+///
+/// # Errors
+/// [`JobError::TestPhotos`] where it does.
+pub(crate) fn refuse_holdout(dataset: &Dataset) -> Result<(), JobError> {
+    match dataset.test_photos() {
+        0 => Ok(()),
+        marked => Err(JobError::TestPhotos { data: dataset.root.clone(), marked, all: dataset.photos.len() }),
+    }
 }
 
 #[cfg(test)]

@@ -38,6 +38,8 @@ pub struct Scene {
     pub(crate) cameras: Vec<SceneCamera>,
     /// How it is drawn: background, filter and so on, as it was trained.
     pub(crate) settings: RenderSettings,
+    /// Whether it says its background: a file of splats does not.
+    pub(crate) says_background: bool,
     /// How it was trained; defaults where that is not known.
     pub(crate) config: TrainConfig,
     pub(crate) history: History,
@@ -66,6 +68,12 @@ impl Scene {
     /// How to look at it at first.
     pub(crate) fn home(&self) -> HomeView {
         HomeView::new(&self.views(), Some(&self.cloud))
+    }
+
+    /// How it is drawn beside these photos: before their background, unless it says one itself.
+    pub(crate) fn settings_beside(&self, dataset: &Dataset) -> RenderSettings {
+        let background = dataset.background.filter(|_| !self.says_background);
+        RenderSettings { background: background.unwrap_or(self.settings.background), ..self.settings.clone() }
     }
 
     /// Its objects and parts.
@@ -114,6 +122,7 @@ impl Scene {
             sh_stored,
             cameras: info.cameras,
             settings: config.render_settings(info.background),
+            says_background: true,
             config,
             history: info.history,
             photos: info.dataset.map(|d| d.path),

@@ -44,7 +44,7 @@ pub(crate) fn retrain(
     }
     let mut dataset = open::dataset(&photos)?;
     dataset.name = format!("{} without {name}", from.name);
-    let done = train::run(&dataset, &from.config, [out.to_owned()], observer)?;
+    let done = train::run(&dataset, &from.config, [out.to_owned()], train::IfChanged::Ask, observer)?;
     if !done.is_finished() {
         return Ok(false);
     }

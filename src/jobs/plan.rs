@@ -26,6 +26,7 @@ pub(crate) fn facts(
 ) -> SceneFacts {
     let cameras = dataset.map(Dataset::cameras).unwrap_or_default();
     let facts = SceneFacts::of(machine.clone(), config.limits()).with_photos(&cameras);
+    let facts = facts.with_test_photos(dataset.map_or(0, Dataset::test_photos));
     match cloud {
         Some((cloud, sh_stored)) => facts.with_cloud(cloud, sh_stored, &cameras),
         None => facts,

@@ -8,7 +8,7 @@ use super::{JobError, Scene, open};
 use crate::io::{semantic_map, splat_ply, trained};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::checkpoint::CheckpointError;
-use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError, TrainOutcome};
+use crate::pipeline::train::{self, FolderUse, TrainConfig, TrainEnd, TrainError, TrainOutcome};
 use crate::scene::{Dataset, SemanticMap};
 
 #[derive(Clone, Debug)]
@@ -28,27 +28,41 @@ impl Trained {
     }
 }
 
+/// What is done where a training in a folder began with other photos or poses than there are now.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum IfChanged {
+    /// Somebody is asked: it is an error that names what has changed.
+    #[default]
+    Ask,
+    /// It stays, and another training begins in the next folder; without one it is that error.
+    Anew,
+    /// It goes on with what there is now.
+    GoOn,
+    /// As [`Self::Ask`], in a folder that others take away where they go on with it.
+    AskClaimed,
+}
+
 /// Trains into the first of these `folders` that holds no training with other settings: that is another training,
 /// and the earlier one stays. A training that was stopped there goes on.
 pub(crate) fn run(
     dataset: &Dataset,
     config: &TrainConfig,
     folders: impl IntoIterator<Item = PathBuf>,
+    changed: IfChanged,
     observer: &mut dyn Observer,
 ) -> Result<Trained, JobError> {
+    let may = FolderUse { anyway: changed == IfChanged::GoOn, remake: changed != IfChanged::AskClaimed };
     let mut folders = folders.into_iter().peekable();
-    let mut earlier: Option<PathBuf> = None;
+    let mut earlier: Option<String> = None;
     while let Some(out) = folders.next() {
         if let Some(earlier) = earlier.take() {
-            let kept = earlier.display();
-            let text = format!("The settings changed, so this is a new training; the earlier one stays in {kept}");
-            observer.note(Severity::Info, text);
+            observer.note(Severity::Info, format!("{earlier}, so this is a new training; the earlier one stays"));
         }
-        match train::run(dataset, config, Some(&out), observer) {
-            Err(TrainError::Checkpoint(CheckpointError::OtherRun { .. } | CheckpointError::Missing { .. }))
-                if folders.peek().is_some() =>
-            {
-                earlier = Some(out);
+        match train::run_on(dataset, config, Some(&out), may, observer) {
+            Err(TrainError::Checkpoint(e)) if folders.peek().is_some() && makes_another(&e, changed) => {
+                let settings = || format!("The settings are not those of the training in {}", out.display());
+                let is_other = matches!(e, CheckpointError::OtherInputs { .. });
+                earlier = Some(if is_other { sentence(&e) } else { settings() });
             }
             result => {
                 let outcome = result?;
@@ -62,6 +76,22 @@ pub(crate) fn run(
         }
     }
     Err(TrainError::Config("there is no folder to train into".into()).into())
+}
+
+/// Whether a folder that holds this is left alone for the next one.
+fn makes_another(error: &CheckpointError, changed: IfChanged) -> bool {
+    match error {
+        CheckpointError::OtherRun { .. } | CheckpointError::Missing { .. } => true,
+        CheckpointError::OtherInputs { .. } => changed == IfChanged::Anew,
+        _ => false,
+    }
+}
+
+/// The error as the beginning of a sentence.
+fn sentence(error: &CheckpointError) -> String {
+    let text = error.to_string();
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// Objects are carried over to Gaussians that went on, and have to be read with their state.

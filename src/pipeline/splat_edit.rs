@@ -14,6 +14,9 @@ const BRIGHTNESS: [f64; 3] = [0.2126, 0.7152, 0.0722];
 /// Brightness that a thing has at least when it gets another color: shades of black are noise.
 const DARKEST: f64 = 0.1;
 
+/// Sine of half the angle that is left of whole turns by rounding.
+const WHOLE_TURN: f64 = 1e-9;
+
 /// A change of Gaussians.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SplatEdit {
@@ -50,6 +53,14 @@ pub struct Placement {
     pub(crate) scale: f64,
 }
 
+impl Placement {
+    /// Whether it leaves everything where it is, whole turns included.
+    fn is_nothing(&self) -> bool {
+        let axis = DVec3::new(self.turn.x, self.turn.y, self.turn.z);
+        self.shift == DVec3::ZERO && self.scale == 1.0 && axis.length() <= WHOLE_TURN * self.turn.length()
+    }
+}
+
 impl Default for Placement {
     fn default() -> Self {
         Self { shift: DVec3::ZERO, turn: DQuat::IDENTITY, scale: 1.0 }
@@ -66,8 +77,14 @@ pub enum SplatEditError {
     Unknown(IdentityId),
     #[error("'{0}' has no Gaussians")]
     Empty(String),
+    #[error("no Gaussian is chosen, so nothing would change")]
+    NothingChosen,
     #[error("nothing would be left of the scene")]
     NothingLeft,
+    #[error("nothing would change: it stays where it is, as large and in the color that it has")]
+    NoChange,
+    #[error("nothing would be seen of it: a second one would lie exactly in the first; move, turn or scale it as well")]
+    SamePlace,
     #[error("a scale must be more than 0, and all numbers finite")]
     Placement,
     #[error("'{0}' would be too far away or too large for the numbers that a scene is stored in")]
@@ -89,6 +106,11 @@ pub(crate) fn apply(
         SplatEdit::Delete(gone) => delete(cloud, map, gone),
         SplatEdit::Arrange(Arrangement { id, duplicate, to, color }) => {
             let (map, mut thing) = thing(map, *id)?;
+            match (to.is_nothing(), duplicate, color) {
+                (true, false, None) => return Err(SplatEditError::NoChange),
+                (true, true, _) => return Err(SplatEditError::SamePlace),
+                _ => {}
+            }
             let (mut cloud, mut map) = (cloud.clone(), map.clone());
             if *duplicate {
                 let all: Vec<usize> = (0..cloud.len()).chain(thing).collect();
@@ -125,6 +147,9 @@ fn delete(
     gone: &[bool],
 ) -> Result<(GaussianCloud, Option<SemanticMap>)> {
     let kept: Vec<usize> = (0..cloud.len()).filter(|&i| gone.get(i) != Some(&true)).collect();
+    if kept.len() == cloud.len() {
+        return Err(SplatEditError::NothingChosen);
+    }
     if kept.is_empty() {
         return Err(SplatEditError::NothingLeft);
     }

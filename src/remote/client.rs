@@ -2,7 +2,7 @@
 
 use std::io::Read;
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde::de::DeserializeOwned;
 use ureq::http::Response;
@@ -15,8 +15,8 @@ use super::wire::{
     Ask, CLIENT_HEADER, GENERATION_HEADER, News, RUN_HEADER, STEP_HEADER, SceneCard, VERSION_HEADER, is_understood,
     version,
 };
-use crate::io::http;
 use crate::io::snapshot::SceneSnapshot;
+use crate::io::{http, memory};
 use crate::scene::{PhotoPixels, text};
 
 /// How long the server may be silent.
@@ -28,6 +28,15 @@ const JSON_BYTES: u64 = 64 << 20;
 const SNAPSHOT_BYTES: u64 = 16 << 30;
 const PHOTO_BYTES: u64 = 128 << 20;
 const REFUSAL_BYTES: u64 = 2 << 10;
+
+/// Bytes a second that an answer has at least, on the whole, after some patience.
+const SLOWEST: u64 = 1_000;
+const PATIENCE: Duration = Duration::from_secs(30);
+
+/// Whether an answer comes so slowly that it may never end.
+fn is_too_slow(bytes: usize, time: Duration) -> bool {
+    time > PATIENCE && (bytes as u64) < SLOWEST * time.as_secs()
+}
 
 /// Why there is no answer.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -163,13 +172,37 @@ impl Client {
     }
 
     fn bytes(&self, response: Response<Body>, most: u64) -> Result<Vec<u8>, ClientError> {
-        let mut bytes = Vec::new();
-        let lost = |e: std::io::Error| ClientError::Lost(format!("{}: {e}", self.address.host));
-        response.into_body().into_reader().take(most + 1).read_to_end(&mut bytes).map_err(lost)?;
-        if bytes.len() as u64 > most { Err(self.odd("it is longer than it may be")) } else { Ok(bytes) }
+        let host = &self.address.host;
+        let most = most.min(memory::budget());
+        let (mut reader, mut bytes) = (response.into_body().into_reader(), Vec::new());
+        let (begin, mut piece) = (Instant::now(), vec![0; 1 << 16]);
+        loop {
+            match reader.read(&mut piece).map_err(|e| ClientError::Lost(format!("{host}: {e}")))? {
+                0 => return Ok(bytes),
+                n if (bytes.len() + n) as u64 > most => {
+                    return Err(self.odd(&format!("it is longer than the {most} bytes that it may have here")));
+                }
+                n => bytes.extend_from_slice(&piece[..n]),
+            }
+            if is_too_slow(bytes.len(), begin.elapsed()) {
+                return Err(ClientError::Lost(format!("{host} sends less than {SLOWEST} bytes a second")));
+            }
+        }
     }
 
     fn odd(&self, what: &str) -> ClientError {
         ClientError::Refused(format!("the answer of {} cannot be read: {what}", self.address.host))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_byte_now_and_then_is_no_answer() {
+        let secs = Duration::from_secs;
+        assert!(is_too_slow(11, secs(31)) && is_too_slow(30_000, secs(40)));
+        assert!(!is_too_slow(0, secs(29)) && !is_too_slow(31_000, secs(31)) && !is_too_slow(1 << 30, secs(900)));
     }
 }

@@ -1,12 +1,17 @@
 //! Following a server without a window: what it tells goes to an [`Observer`], its Gaussians into a file at the end.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
+
+use crossbeam_channel::{RecvTimeoutError, bounded};
 
 use super::client::{Client, ClientError};
 use super::wire::WireEvent;
+use crate::io::http::TICK;
 use crate::jobs::export;
 use crate::pipeline::observer::{Observer, Severity, Signal};
+use crate::scene::text;
 
 /// Time between two questions, and to the next try after a lost connection.
 const EVERY: Duration = Duration::from_millis(300);
@@ -35,7 +40,7 @@ pub(crate) enum Followed {
 /// # Errors
 /// If the server refuses, or is gone for a minute.
 pub(crate) fn follow(
-    client: &Client,
+    client: &Arc<Client>,
     observer: &mut dyn Observer,
     save: Option<&Path>,
 ) -> Result<Followed, ClientError> {
@@ -46,12 +51,45 @@ pub(crate) fn follow(
             Ok(false) => {}
             Err(ClientError::Lost(why)) if now.heard.elapsed() < GONE => {
                 observer.note(Severity::Warning, format!("The connection is lost ({why}); trying again"));
-                std::thread::sleep(RETRY);
+                wait(RETRY, observer);
             }
             Err(e) => return Err(e),
         }
     }
     Ok(Followed::Left)
+}
+
+/// Waits so long, or until `observer` has had enough.
+fn wait(time: Duration, observer: &dyn Observer) {
+    let begin = Instant::now();
+    while begin.elapsed() < time && observer.signal() != Signal::Cancel {
+        std::thread::sleep(TICK);
+    }
+}
+
+/// What `ask` says, asked on a thread of its own: a server that is silent holds up nobody. `None` once `observer` has had
+/// enough; the request ends then by its own limits.
+fn attended<T: Send + 'static>(
+    client: &Arc<Client>,
+    observer: &dyn Observer,
+    ask: impl FnOnce(&Client) -> Result<T, ClientError> + Send + 'static,
+) -> Result<Option<T>, ClientError> {
+    let (send, receive) = bounded(1);
+    let client = Arc::clone(client);
+    let talk = move || {
+        // Whoever asked may have gone.
+        let _ = send.send(ask(&client));
+    };
+    let thread = std::thread::Builder::new().name("network".into()).spawn(talk);
+    thread.map_err(|e| ClientError::Refused(format!("no thread can be started: {e}")))?;
+    loop {
+        match receive.recv_timeout(TICK) {
+            Ok(answer) => return answer.map(Some),
+            Err(RecvTimeoutError::Timeout) if observer.signal() != Signal::Cancel => {}
+            Err(RecvTimeoutError::Timeout) => return Ok(None),
+            Err(RecvTimeoutError::Disconnected) => return Err(ClientError::Lost("the request broke off".into())),
+        }
+    }
 }
 
 /// How far a server was followed.
@@ -74,11 +112,12 @@ impl Position {
     /// Asks once for what is new. Whether that was the end.
     fn go_on(
         &mut self,
-        client: &Client,
+        client: &Arc<Client>,
         observer: &mut dyn Observer,
         save: Option<&Path>,
     ) -> Result<bool, ClientError> {
-        let news = client.news(self.since, self.have)?;
+        let (since, have) = (self.since, self.have);
+        let Some(news) = attended(client, observer, move |client| client.news(since, have))? else { return Ok(false) };
         self.heard = Instant::now();
         if news.run != self.run {
             // Its numbers are others, and it says anew whether something runs.
@@ -89,9 +128,13 @@ impl Position {
             }
         }
         let news = news.value;
+        let is_empty = news.events.is_empty();
         news.events.into_iter().for_each(|event| self.hear(event, observer));
         self.since = news.next;
         if news.more {
+            if is_empty {
+                wait(EVERY, observer);
+            }
             return Ok(false);
         }
         if let Some(progress) = news.progress.filter(|_| self.running) {
@@ -99,13 +142,14 @@ impl Position {
         }
         if self.running {
             // What a window would show is fetched as it would be.
-            if let Some(pulled) = client.snapshot(self.have)? {
+            let have = self.have;
+            if let Some(Some(pulled)) = attended(client, observer, move |client| client.snapshot(have))? {
                 self.have = pulled.generation;
             }
-            std::thread::sleep(EVERY);
+            wait(EVERY, observer);
             return Ok(false);
         }
-        let pulled = client.snapshot(0)?;
+        let Some(pulled) = attended(client, observer, |client| client.snapshot(0))? else { return Ok(false) };
         let is_result = matches!(self.end, Followed::AtRest | Followed::Finished(_));
         if let (Some(path), Some(pulled)) = (save.filter(|_| is_result), &pulled) {
             let written = match &pulled.snapshot.ply {
@@ -113,9 +157,13 @@ impl Position {
                 None => pulled.snapshot.read(path).and_then(|(cloud, _)| export::ply(path, &cloud)),
             };
             written.map_err(|e| ClientError::Refused(e.to_string()))?;
+        } else if let (Some(path), None) = (save.filter(|_| is_result), &pulled) {
+            let text = format!("{} has no Gaussians, so {} was not written", client.address.host, path.display());
+            return Err(ClientError::Refused(text));
         }
         // The server is told that all has come; if it has gone meanwhile, it knows.
-        let _ = client.news(self.since, pulled.map_or(0, |p| p.generation));
+        let (since, generation) = (self.since, pulled.map_or(0, |p| p.generation));
+        let _ = attended(client, observer, move |client| client.news(since, generation));
         Ok(true)
     }
 
@@ -123,17 +171,22 @@ impl Position {
         match event {
             WireEvent::Started(title) => {
                 (self.running, self.end) = (true, Followed::AtRest);
-                observer.note(Severity::Info, title);
+                observer.note(Severity::Info, text::line(&title).into_owned());
             }
             WireEvent::Step(metrics) => observer.step(metrics),
             WireEvent::Evaluation(evaluation) => observer.evaluation(evaluation),
-            WireEvent::Note(severity, text) => observer.note(severity, text),
+            // On a line of its own, whatever a server puts into it.
+            WireEvent::Note(severity, text) => observer.note(severity, text::line(&text).into_owned()),
             WireEvent::Paused(paused) => {
                 observer.note(Severity::Info, if paused { "Paused" } else { "Goes on" }.into());
             }
-            WireEvent::Finished(folder) => (self.running, self.end) = (false, Followed::Finished(folder)),
+            WireEvent::Finished(folder) => {
+                (self.running, self.end) = (false, Followed::Finished(text::line(&folder).into_owned()));
+            }
             WireEvent::Cancelled => (self.running, self.end) = (false, Followed::Cancelled),
-            WireEvent::Failed(why) => (self.running, self.end) = (false, Followed::Failed(why)),
+            WireEvent::Failed(why) => {
+                (self.running, self.end) = (false, Followed::Failed(text::line(&why).into_owned()));
+            }
         }
     }
 }

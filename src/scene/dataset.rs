@@ -43,7 +43,7 @@ impl Dataset {
     /// with the first (the convention of the 3DGS literature). `every == 0` holds none out.
     pub(crate) fn split(&self, every: usize) -> (Vec<usize>, Vec<usize>) {
         let every = super::plan::holdout(self.photos.len(), every);
-        let marked = self.photos.iter().any(|p| p.test_split);
+        let marked = self.test_photos() > 0;
         (0..self.photos.len()).partition(|&i| {
             let held = if marked { self.photos[i].test_split } else { every > 0 && i % every == 0 };
             !held
@@ -53,6 +53,11 @@ impl Dataset {
     /// What to open to get the same again.
     pub(crate) fn source(&self) -> &Path {
         self.source.as_deref().unwrap_or(&self.root)
+    }
+
+    /// How many photos the data set itself marks as test.
+    pub(crate) fn test_photos(&self) -> usize {
+        self.photos.iter().filter(|p| p.test_split).count()
     }
 
     /// The cameras of all photos.

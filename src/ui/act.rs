@@ -14,6 +14,7 @@ use super::viewport::selecting::SelectTool;
 use crate::agent::scene::{Effect, Parts};
 use crate::jobs::edit::EditRequest;
 use crate::jobs::go_to::{ApproachRequest, Approached};
+use crate::jobs::train::IfChanged;
 use crate::measure::is_report;
 use crate::navigate::FRAMES;
 use crate::navigate::target::ViewPreference;
@@ -31,7 +32,9 @@ impl App {
             Action::Open(path) if path.extension().is_some_and(|e| e == "toml") => self.read_preset(&path),
             Action::OpenDemo | Action::TrainDemo | Action::Open(_) | Action::FindPoses(_) => self.replace_scene(action),
             Action::Connect(url) => self.connect(&url),
-            Action::StartTraining => self.start_training(),
+            Action::StartTraining => self.start_training(IfChanged::Ask),
+            Action::TrainChanged(how) => self.start_training(how),
+            Action::AskHowToTrain(changes) => self.ask_how_to_train(&changes),
             Action::PauseJob => {
                 if let Some(job) = self.state.job.clone().filter(|j| j.kind.can_pause()) {
                     self.set_paused(job.id, !job.paused);
@@ -172,6 +175,7 @@ impl App {
                 self.question = Some(Question {
                     text: format!("{title} is still running. Cancel it and continue? Saved progress is kept."),
                     yes: "Cancel and continue",
+                    other: None,
                     no: "Keep running",
                     action,
                 });
@@ -209,7 +213,7 @@ impl App {
         self.submit(Command::InstallModel { id, brought });
     }
 
-    fn start_training(&mut self) {
+    fn start_training(&mut self, changed: IfChanged) {
         let scene = self.state.scene.as_ref();
         let Some((dataset, out)) = scene.and_then(|s| Some((s.dataset.clone()?, s.out.clone()))) else {
             self.state.toast(Tone::Warning, "Open a folder of posed photos first: training needs them.");
@@ -224,7 +228,18 @@ impl App {
         self.state.antialias = config.render_settings(None).antialias;
         let reached = self.state.continues_at(&config).unwrap_or(0);
         self.state.resumable = Some((config.clone(), reached));
-        self.submit(Command::Train { dataset, config, out });
+        self.submit(Command::Train { dataset, config, out, changed });
+    }
+
+    /// Asks whether a training goes on with other photos than it began with.
+    fn ask_how_to_train(&mut self, changes: &str) {
+        let text = format!(
+            "{changes}.\n\nTrain anew in a folder of its own, or go on with the photos as they are now? The training so \
+             far stays as it is if you train anew."
+        );
+        let action = Action::TrainChanged(IfChanged::Anew);
+        let other = Some(("Go on", Action::TrainChanged(IfChanged::GoOn)));
+        self.question = Some(Question { text, yes: "Train anew", other, no: "Leave it", action });
     }
 
     fn evaluate(&mut self) {

@@ -27,7 +27,8 @@ impl App {
             removed.folder.display(),
             removed.name
         );
-        self.question = Some(Question { text, yes: "Delete it", no: "Keep it", action: Action::DeleteRemoved });
+        self.question =
+            Some(Question { text, yes: "Delete it", other: None, no: "Keep it", action: Action::DeleteRemoved });
     }
 
     /// Deletes that scene.

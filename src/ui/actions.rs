@@ -10,6 +10,7 @@ use strum::{IntoStaticStr, VariantArray};
 
 use crate::io::unposed::Unposed;
 use crate::jobs::remove::RemoveRequest;
+use crate::jobs::train::IfChanged;
 use crate::measure::{Knobs, StageName};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::edit::Edit;
@@ -157,6 +158,11 @@ actions! {
     Screenshot: "Save the view as .png\u{2026}", "Write the image in the viewport, without the drawn cameras.", "Ctrl+S";
     StartTraining: "Start training",
         "Fit Gaussians to the photos. Resumes from the last checkpoint if the settings are the same.", "Ctrl+T";
+    AskHowToTrain(changes: String): "Ask how to train", "The photos are not those that the training began with: ask how to go on.";
+    TrainChanged(how: IfChanged): match how {
+            IfChanged::GoOn => "Go on with the photos as they are now",
+            _ => "Train anew on the photos as they are now",
+        }, "The photos are not those that the training began with.";
     PauseJob: "Pause or resume the running job", "Training, a search for objects, a download: it waits and loses nothing.", "T";
     Cancel: "Cancel the running job", "Stop the running job at its next step. Progress so far is kept.";
     Dismiss: "Deselect, or cancel the running job", "Deselect what is selected; with nothing selected, stop the running job.",

@@ -325,13 +325,14 @@ impl App {
         }
         shortcut_sheet(ctx, &mut self.sheet);
         if let Some(question) = &self.question
-            && let Some(yes) = dialogs::show_question(ctx, &question.text, question.yes, question.no)
-            && let Some(question) = self.question.take()
-            && yes
+            && let Some(answer) = question.show(ctx)
         {
-            match question.action {
-                Action::DeleteRemoved => self.delete_removed(),
-                action => self.give_up_and(action),
+            self.question = None;
+            match answer {
+                Some(Action::DeleteRemoved) => self.delete_removed(),
+                Some(action @ Action::TrainChanged(_)) => self.actions.push(action),
+                Some(action) => self.give_up_and(action),
+                None => {}
             }
         }
         self.ask_for_means(ctx);

@@ -4,6 +4,7 @@ use egui::RichText;
 
 use super::state::{ErrorBox, Tone};
 use super::theme;
+use crate::scene::text;
 use crate::ui::actions::Action;
 
 /// A question before something is given up.
@@ -11,6 +12,8 @@ pub(crate) struct Question {
     pub(crate) text: String,
     /// The button that goes ahead.
     pub(crate) yes: &'static str,
+    /// A button that does something else.
+    pub(crate) other: Option<(&'static str, Action)>,
     /// The button that does not.
     pub(crate) no: &'static str,
     pub(crate) action: Action,
@@ -50,6 +53,29 @@ pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox, has_scene: bool,
         .inner
     });
     response.inner || response.should_close()
+}
+
+impl Question {
+    /// Asks it. `Some` once somebody has answered, with what is to be done.
+    pub(crate) fn show(&self, ctx: &egui::Context) -> Option<Option<Action>> {
+        let response = theme::dialog("dialog question").show(ctx, |ui| {
+            ui.set_width(420.0);
+            egui::ScrollArea::vertical().max_height(260.0).show(ui, |ui| ui.label(text::lines(&self.text)));
+            ui.add_space(12.0);
+            ui.horizontal(|ui| {
+                let mut answer = ui.add(theme::primary_button(self.yes)).clicked().then(|| Some(self.action.clone()));
+                if let Some((other, action)) = &self.other
+                    && ui.button(*other).clicked()
+                {
+                    answer = Some(Some(action.clone()));
+                }
+                if ui.button(self.no).clicked() { Some(None) } else { answer }
+            })
+            .inner
+        });
+        let closed = response.should_close();
+        response.inner.or_else(|| closed.then_some(None))
+    }
 }
 
 /// Asks a question. `Some(true)` to go ahead, `Some(false)` not to, `None` while no one answered.

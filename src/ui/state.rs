@@ -312,6 +312,7 @@ impl AppState {
                 let has_masks = self.scene.as_ref().is_some_and(|s| s.masks.is_some());
                 next.extend((has_masks && !carried).then_some(Action::FindObjects));
             }
+            Outcome::InputsChanged(how) => next.push(Action::AskHowToTrain(how)),
             Outcome::Evaluated(mut e) => {
                 if let Some(last) = self.history.steps.last() {
                     (e.step, e.secs) = (last.step, last.secs);
@@ -345,11 +346,7 @@ impl AppState {
             Outcome::Selected(selected) => self.selected = Some(selected),
             Outcome::Explored(explored) => self.explored = Some(explored),
             Outcome::Report { path, report, second } => {
-                let shown = Some(ShownReport { path, report });
-                match second {
-                    true => self.second_report = shown,
-                    false => self.report = shown,
-                }
+                *(if second { &mut self.second_report } else { &mut self.report }) = Some(ShownReport { path, report });
             }
             Outcome::Thumbnails(map, drawn) => self.thumbnails = Some((map, drawn)),
             Outcome::Phrases(rows, to) => self.phrases.finished(rows, to),

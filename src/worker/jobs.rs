@@ -11,14 +11,15 @@ use crate::io::{self, OpenError, trained};
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::export_splat::{self, LossViews};
 use crate::jobs::models::Source;
-use crate::jobs::train::Trained;
+use crate::jobs::train::{IfChanged, Trained};
 use crate::jobs::{
     Folders, JobError, OpenedScene, Scene, clean, demo, edit, export, export_all, find_objects, go_to, inspect, models,
     open, page, phrases, plan, poses, rearrange, recent, remove, report, scale, select, thumbnails, train, video,
 };
 use crate::measure::{End, FILE, Report};
 use crate::pipeline::observer::{Observer, Severity};
-use crate::pipeline::train::TrainConfig;
+use crate::pipeline::train::checkpoint::CheckpointError;
+use crate::pipeline::train::{TrainConfig, TrainError};
 use crate::render::RenderSettings;
 use crate::scene::{Dataset, GaussianCloud, Machine};
 
@@ -60,14 +61,19 @@ impl PipelineJobs {
 
     fn train(
         &self,
-        dataset: &Dataset,
-        config: &TrainConfig,
+        (dataset, config): (&Dataset, &TrainConfig),
         out: PathBuf,
+        changed: IfChanged,
         observer: &mut dyn Observer,
     ) -> Result<Outcome, Stop> {
         // Other settings get a folder of their own; which one is seen when it is needed.
         let folders = std::iter::once(out).chain(std::iter::once_with(|| self.folders.fresh(dataset.source())));
-        let done = train::run(dataset, config, folders, observer)?;
+        let done = match train::run(dataset, config, folders, changed, observer) {
+            Err(JobError::Train(TrainError::Checkpoint(e @ CheckpointError::OtherInputs { .. }))) => {
+                return Ok(Outcome::InputsChanged(e.to_string()));
+            }
+            done => done?,
+        };
         self.knows(&done.out, done.state.clone());
         if !done.is_finished() {
             return Err(Stop::Cancelled);
@@ -97,7 +103,9 @@ impl Jobs for PipelineJobs {
             }
             Command::Demo => self.opened(demo::open(&self.folders, self.machine(), observer)?),
             Command::DemoPhotos => self.opened(demo::open_photos(&self.folders, self.machine(), observer)?),
-            Command::Train { dataset, config, out } => return self.train(&dataset, &config, out, observer),
+            Command::Train { dataset, config, out, changed } => {
+                return self.train((&dataset, &config), out, changed, observer);
+            }
             Command::Evaluate { dataset, cloud, config, settings, out } => {
                 Outcome::Evaluated(measured(dataset, cloud, (config, settings), &out, observer)?)
             }

@@ -21,6 +21,7 @@ use crate::jobs::remove::{RemoveRequest, RemovedScene};
 use crate::jobs::report::ReportRequest;
 use crate::jobs::select::{SelectRequest, Selected};
 use crate::jobs::thumbnails::ThumbnailSet;
+use crate::jobs::train::IfChanged;
 use crate::jobs::video::VideoRequest;
 use crate::jobs::{OpenedScene, find_objects};
 use crate::measure::Report;
@@ -56,6 +57,8 @@ pub enum Command {
         config: TrainConfig,
         /// Folder of the trained scene and its checkpoints.
         out: PathBuf,
+        /// What is done where the training there began with other photos.
+        changed: IfChanged,
     },
     /// Measure PSNR and SSIM on the held-out photos.
     Evaluate {
@@ -282,6 +285,8 @@ pub enum Outcome {
         /// What the plan of the result is computed from.
         facts: Box<SceneFacts>,
     },
+    /// Nothing was done: the training to go on with began with other photos or poses, and how they differ.
+    InputsChanged(String),
     /// Held-out quality was measured.
     Evaluated(Evaluation),
     /// Objects and parts were found.

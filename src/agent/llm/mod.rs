@@ -52,6 +52,8 @@ pub struct Llm {
     wrong: u32,
     tokens: u64,
     asked: Vec<(String, String)>,
+    /// Why the model's last call was none, if no valid one followed.
+    objection: Option<String>,
 }
 
 impl Llm {
@@ -91,6 +93,7 @@ impl Llm {
             wrong: 0,
             tokens: 0,
             asked: Vec::new(),
+            objection: None,
         })
     }
 
@@ -111,6 +114,7 @@ impl Llm {
     fn object(&mut self, call: &RawCall, problem: &str, context: &mut PlannerContext<'_>) -> Result<(), Refusal> {
         self.push_result(call, &json!({ "done": false, "error": problem }));
         (context.on)(AgentEvent::Note(self.clean(&format!("The model's call was not valid: {problem}"))));
+        self.objection = Some(problem.to_owned());
         self.wrong += 1;
         if self.wrong > self.limits.wrong {
             let text = "I stopped: the model kept asking for things that are no valid calls. Try other words, or the built-in planner.";
@@ -136,7 +140,7 @@ impl Llm {
                         )?;
                         continue;
                     }
-                    self.current = Some(raw);
+                    (self.current, self.objection) = (Some(raw), None);
                     return Ok(Some(call));
                 }
             }
@@ -333,6 +337,7 @@ impl Planner for Llm {
         self.talk.push(json!({ "role": "user", "content": message }));
         (self.begun, self.answers, self.wrong, self.tokens) = (Instant::now(), 0, 0, 0);
         self.asked.clear();
+        self.objection = None;
         self.stream = self.settings.stream;
     }
 
@@ -367,7 +372,10 @@ impl Planner for Llm {
                 if answer.text.trim().is_empty() {
                     return Err(self.failed("The chat model gave an empty answer."));
                 }
-                return Ok(Step::Finish { text: answer.text, refusal: None });
+                let why = self.objection.take();
+                let why = why.map(|why| format!("The model's last call was not valid, so it was not made: {why}."));
+                let refusal = why.map(|why| Refusal::new(RefusalKind::Failed, self.clean(&why)));
+                return Ok(Step::Finish { text: answer.text, refusal });
             }
             self.waiting.extend(answer.calls);
         }

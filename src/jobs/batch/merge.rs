@@ -172,14 +172,16 @@ fn check(found: &[Found]) -> Result<(), JobError> {
         let config = crate::pipeline::train::TrainConfig { seed: 0, ..a.config.clone() };
         json!({ "config": config, "plan": a.plan, "objects": a.objects, "eval": a.eval })
     };
-    let of_scene = |a: &UnitRequest| json!({ "photos": a.photos, "masks": a.masks, "query": a.query });
+    let of_scene = |a: &UnitRequest| json!({ "masks": a.masks, "query": a.query });
     for unit in found {
         let asked = &unit.asked;
         let kinds = [("settings", &asked.setting, of_setting(asked)), ("scene", &asked.scene, of_scene(asked))];
         for (kind, name, now) in kinds {
             let Some(first) = seen.insert([kind, name], unit) else { continue };
             let before = if kind == "scene" { of_scene(&first.asked) } else { of_setting(&first.asked) };
-            if let Some(what) = crate::jobs::reproduce::difference(&before, &now) {
+            let photos = || "other photos".to_owned();
+            let others = (kind == "scene" && !first.asked.may_have_photos_of(asked)).then(photos);
+            if let Some(what) = others.or_else(|| crate::jobs::reproduce::difference(&before, &now)) {
                 let (a, b) = (first.folder.display(), unit.folder.display());
                 return Err(JobError::Batch(format!(
                     "{a} and {b}: the {kind} '{name}' of one is not that of the other ({what}); merge them apart"

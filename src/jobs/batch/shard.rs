@@ -17,7 +17,7 @@ impl Shard {
 
     /// Whether the unit of this number, from 0 on, is in it. Neighbors go to different shards, so that the units of a
     /// large scene do not all come to one.
-    pub(super) fn has(self, unit: usize) -> bool {
+    pub(crate) fn has(self, unit: usize) -> bool {
         unit % self.count == self.index - 1
     }
 

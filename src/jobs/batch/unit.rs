@@ -11,12 +11,14 @@ use super::file::{BatchFile, BatchScene};
 use crate::io::{IoError, files};
 use crate::jobs::{JobError, open};
 use crate::pipeline::train::TrainConfig;
-use crate::scene::Photo;
+use crate::pipeline::train::inputs::{Compare, TrainInputs};
 
 /// What a unit was asked, in its folder.
 pub(super) const FILE: &str = "unit.json";
 /// Deepest folders of labels that are looked into.
 const DEEPEST: usize = 16;
+/// How checksums of photos begin that [`TrainInputs`] makes; those of earlier versions have no beginning.
+const OWN: &str = "2:";
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BatchUnit {
@@ -50,10 +52,19 @@ impl UnitRequest {
         name(&self.scene, &self.setting, self.seed)
     }
 
+    /// Whether both may be of the same photos: checksums of different versions say nothing beside each other.
+    pub(super) fn may_have_photos_of(&self, other: &Self) -> bool {
+        self.photos == other.photos || self.photos.starts_with(OWN) != other.photos.starts_with(OWN)
+    }
+
     /// The first thing that is `now` asked otherwise, in words.
     pub(super) fn difference(&self, now: &Self) -> Option<String> {
-        let told = || crate::jobs::reproduce::difference(&json!(self), &json!(now));
-        (self != now).then(|| told().unwrap_or_else(|| "of another version of the program".into()))
+        if !self.may_have_photos_of(now) {
+            return Some("the photos' names, sizes or cameras, or the sparse points, were others".into());
+        }
+        let there = Self { photos: now.photos.clone(), ..self.clone() };
+        let told = || crate::jobs::reproduce::difference(&json!(there), &json!(now));
+        (there != *now).then(|| told().unwrap_or_else(|| "of another version of the program".into()))
     }
 }
 
@@ -113,8 +124,8 @@ impl BatchUnit {
     }
 }
 
-/// Checksums of what is read of a scene. Contents of photos are left out: reading all of them takes long, and others
-/// have other sizes.
+/// Checksums of what is read of a scene. Contents of photos are left out: reading all of them on each start of each shard
+/// takes long. Their sizes differ where they do, and a training compares contents where it goes on.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SceneInputs {
     pub(super) photos: String,
@@ -124,24 +135,14 @@ pub(super) struct SceneInputs {
 impl SceneInputs {
     /// Opens the scene, so that one that cannot be opened is told before anything runs.
     pub(super) fn of(scene: &BatchScene) -> Result<Self, JobError> {
-        let dataset = open::dataset(&scene.path)?;
-        let mut sum = Sha256::new();
-        for photo in &dataset.photos {
-            let Photo { name, path, camera, distortion, test_split, background } = photo;
-            sum.update(format!("{:?}", (name, size(path)?, camera, distortion, test_split, background)));
-        }
-        for point in &dataset.points {
-            point.position.to_array().iter().for_each(|x| sum.update(x.to_le_bytes()));
-            sum.update(point.rgb);
-        }
-        sum.update(format!("{:?}", dataset.background));
+        let inputs = TrainInputs::of(&open::dataset(&scene.path)?, Compare::Sizes)?;
         let masks = scene.masks.as_deref().map(|masks| {
             let mut all = Vec::new();
             list(masks, "", &mut all, DEEPEST)?;
             all.sort();
             Ok::<_, IoError>(hex(&Sha256::digest(json!(all).to_string())))
         });
-        Ok(Self { photos: hex(&sum.finalize()), masks: masks.transpose()? })
+        Ok(Self { photos: format!("{OWN}{}", inputs.digest()), masks: masks.transpose()? })
     }
 }
 

@@ -21,7 +21,7 @@ use super::state::{
 use super::unit::{self, BatchUnit, UnitRequest, hex};
 use crate::io::claim::{Claim, host};
 use crate::io::{IoError, SceneFolder, splat_ply};
-use crate::jobs::error::chain;
+use crate::jobs::error::{chain, is_of_machine};
 use crate::jobs::evaluate::{EvaluateOptions, PhotoComparison, photometric};
 use crate::jobs::find_objects::{self, FindRequest, FindSettings};
 use crate::jobs::{JobError, Scene, evaluate_masks, export, open, plan, train};
@@ -93,6 +93,8 @@ pub(super) fn work(
             Ok(Worked::Done)
         }
         Err(e) if e.is_cancelled() => Ok(Worked::Stopped),
+        // No unit is to blame for a disk that is full: others would fail the same.
+        Err(e) if is_of_machine(&e) => Err(e),
         Err(e) => {
             let error = chain(&e);
             let (program, host) = (PROGRAM.into(), host());
@@ -137,7 +139,7 @@ fn make(
     dataset.warnings.iter().for_each(|w| observer.note(Severity::Warning, w.clone()));
     let overrides = &batch.settings[unit.setting].train.plan;
     let config = plan::planned(&dataset, unit.config(batch), overrides);
-    let done = train::run(&dataset, &config, [folder.to_path_buf()], observer)?;
+    let done = train::run(&dataset, &config, [folder.to_path_buf()], train::IfChanged::AskClaimed, observer)?;
     if !done.is_finished() {
         return Err(Interrupted.into());
     }

@@ -1,19 +1,22 @@
 //! The folder of an export: nothing in it is replaced but what an export has written and nobody has changed since.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::io::Read;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
+use crate::io::error::write_error;
 use crate::io::folder_lock::FolderLock;
 use crate::io::{IoError, atomic, files};
 use crate::jobs::{JobError, export};
 
 /// Says what an export has written.
 pub(super) const LIST: &str = "export.json";
+/// Says it while an export runs: "- PLACE" before a file is there, "SHA256 PLACE" once it is. So what a killed export has
+/// left is told from what somebody else has put there.
+const BEGUN: &str = ".export-begun";
 
 #[derive(Default, Serialize, Deserialize)]
 struct List {
@@ -29,6 +32,9 @@ pub(super) struct ExportFolder {
     /// As an earlier export has left it.
     before: BTreeMap<String, String>,
     now: BTreeMap<String, String>,
+    /// Places where an export that was killed was about to write.
+    begun: BTreeSet<String>,
+    journal: fs::File,
     _lock: FolderLock,
 }
 
@@ -43,7 +49,7 @@ impl ExportFolder {
         let hidden = |e: &fs::DirEntry| e.file_name().to_string_lossy().starts_with('.');
         let holds_something = fs::read_dir(root).is_ok_and(|all| all.flatten().any(|e| !hidden(&e)));
         let list = root.join(LIST);
-        let before = match list.is_file() {
+        let mut before = match list.is_file() {
             true => files::read_json::<List>(&list)?.files,
             false if holds_something => {
                 let what = "holds something that 'fmlgs segment --all' has not written";
@@ -51,7 +57,21 @@ impl ExportFolder {
             }
             false => BTreeMap::new(),
         };
-        let folder = Self { root: root.into(), before, now: BTreeMap::new(), _lock: lock };
+        let path = root.join(BEGUN);
+        let failed = |cause| write_error(&path, cause);
+        let mut begun = BTreeSet::new();
+        let text = if path.is_file() { files::read_text(&path)? } else { String::new() };
+        for (sum, place) in text.lines().filter_map(|line| line.split_once(' ')) {
+            if sum == "-" {
+                before.remove(place);
+                begun.insert(place.to_owned());
+            } else {
+                begun.remove(place);
+                before.insert(place.to_owned(), sum.to_owned());
+            }
+        }
+        let journal = fs::File::options().append(true).create(true).open(&path).map_err(failed)?;
+        let folder = Self { root: root.into(), before, now: BTreeMap::new(), begun, journal, _lock: lock };
         for (place, sum) in &folder.before {
             folder.is_as_written(place, sum)?;
         }
@@ -62,12 +82,10 @@ impl ExportFolder {
     /// Whether a file of an earlier export is there.
     fn is_as_written(&self, place: &str, sum: &str) -> Result<bool, JobError> {
         let path = self.root.join(place);
-        // A list that somebody wrote leads nowhere else.
-        let is_within = Path::new(place).components().all(|c| matches!(c, std::path::Component::Normal(_)));
-        if !is_within || !path.is_file() {
+        if !is_within(place) || !path.is_file() {
             return Ok(false);
         }
-        if checksum(&path)? == sum {
+        if files::sha256(&path)? == sum {
             return Ok(true);
         }
         let text =
@@ -82,15 +100,24 @@ impl ExportFolder {
         fill: impl FnOnce(&Path) -> Result<(), IoError>,
     ) -> Result<(), JobError> {
         let path = self.root.join(place);
-        let is_ours = self.before.get(place).map(|sum| self.is_as_written(place, sum)).transpose()?;
-        if is_ours != Some(true) && path.exists() {
+        let is_listed = self.before.get(place).map(|sum| self.is_as_written(place, sum)).transpose()?;
+        let is_ours = is_listed == Some(true) || (is_listed.is_none() && self.begun.contains(place));
+        if !is_ours && path.exists() {
             let text = format!("{} is there and was not exported: move it, or choose another folder", path.display());
             return Err(JobError::Output(text));
         }
         export::make_parent(&path)?;
+        // Files come whole or not at all, so what lies there later is ours.
+        self.note("-", place)?;
         fill(&path)?;
-        self.now.insert(place.to_owned(), checksum(&path)?);
+        let sum = files::sha256(&path)?;
+        self.note(&sum, place)?;
+        self.now.insert(place.to_owned(), sum);
         Ok(())
+    }
+
+    fn note(&mut self, sum: &str, place: &str) -> Result<(), JobError> {
+        Ok(writeln!(self.journal, "{sum} {place}").map_err(|cause| write_error(&self.root.join(BEGUN), cause))?)
     }
 
     /// Takes away what the earlier export has left, if this one is complete, and says what is here.
@@ -105,7 +132,21 @@ impl ExportFolder {
                 files.insert(place.clone(), sum.clone());
             }
         }
-        self.save(&files, complete)
+        // What a killed export has left and this one does not write is listed from now on.
+        for place in
+            self.begun.iter().filter(|place| !self.now.contains_key(*place) && !self.before.contains_key(*place))
+        {
+            let path = self.root.join(place);
+            if is_within(place) && path.is_file() {
+                match complete {
+                    true => fs::remove_file(&path).map_err(|cause| write_error(&path, cause))?,
+                    false => drop(files.insert(place.clone(), files::sha256(&path)?)),
+                }
+            }
+        }
+        self.save(&files, complete)?;
+        let journal = self.root.join(BEGUN);
+        fs::remove_file(&journal).map_err(|cause| write_error(&journal, cause).into())
     }
 
     fn save(&self, files: &BTreeMap<String, String>, complete: bool) -> Result<(), JobError> {
@@ -114,15 +155,7 @@ impl ExportFolder {
     }
 }
 
-fn checksum(path: &Path) -> Result<String, JobError> {
-    let failed = |cause| IoError::Read { path: path.into(), cause };
-    let (mut hash, mut bytes) = (Sha256::new(), vec![0; 1 << 16]);
-    let mut file = fs::File::open(path).map_err(failed)?;
-    loop {
-        match file.read(&mut bytes).map_err(failed)? {
-            0 => break,
-            n => hash.update(&bytes[..n]),
-        }
-    }
-    Ok(hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect())
+/// Whether a place lies in the folder: a list that somebody wrote leads nowhere else.
+fn is_within(place: &str) -> bool {
+    Path::new(place).components().all(|c| matches!(c, std::path::Component::Normal(_)))
 }

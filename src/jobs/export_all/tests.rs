@@ -206,3 +206,48 @@ fn a_canceled_export_can_be_made_again() {
     assert!(files(folder.path()).len() < 7 && !files(folder.path()).is_empty());
     assert_eq!(run(&request, &mut Silent).expect("written").written, 7);
 }
+
+#[test]
+fn an_export_that_was_killed_can_be_made_again() {
+    let folder = tempfile::tempdir().expect("folder");
+    let root = folder.path().join("out");
+    let text = |text: &'static str| move |path: &Path| Ok(std::fs::write(path, text).expect("written"));
+    let begin = || {
+        let mut export = ExportFolder::open(&root).expect("open");
+        export.write("a.txt", text("one")).expect("a");
+        export.write("in/b.txt", text("two")).expect("b");
+        export
+    };
+    // A process that is killed drops nothing.
+    let killed = |mut export: ExportFolder| {
+        let cut = export.write("c.txt", |path| {
+            text("three")(path)?;
+            Err(IoError::NotAFile { path: path.into() })
+        });
+        assert!(cut.is_err(), "between the file and the word that it is there");
+        std::mem::forget(export);
+        // The system would free the lock.
+        std::fs::remove_file(root.join(".fmlgs.lock")).expect("lock");
+    };
+    killed(begin());
+    killed(begin());
+    let mut again = begin();
+    again.write("c.txt", text("3")).expect("what was cut short is ours");
+    again.close(true).expect("closed");
+    assert_eq!(files(&root), ["a.txt", "c.txt", "export.json", "in/b.txt"]);
+    // What an earlier run has left and this one does not write goes.
+    let mut less = ExportFolder::open(&root).expect("open");
+    less.write("a.txt", text("one")).expect("a");
+    killed(less);
+    let mut less = ExportFolder::open(&root).expect("open");
+    less.write("a.txt", text("one")).expect("a");
+    less.close(true).expect("closed");
+    assert_eq!(files(&root), ["a.txt", "export.json"]);
+    // The controls: what somebody has put there or changed since stays.
+    std::fs::write(root.join("d.txt"), "mine").expect("written");
+    let mut export = begin();
+    assert!(export.write("d.txt", text("theirs")).is_err());
+    killed(export);
+    std::fs::write(root.join("a.txt"), "changed").expect("written");
+    assert!(ExportFolder::open(&root).is_err());
+}

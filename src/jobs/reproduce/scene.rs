@@ -143,7 +143,7 @@ fn gaussians(
     settings: &ReproduceSettings,
     observer: &mut dyn Observer,
 ) -> Result<TrainedFacts, JobError> {
-    let done = train::run(dataset, &settings.train, [folder.to_path_buf()], observer)?;
+    let done = train::run(dataset, &settings.train, [folder.to_path_buf()], train::IfChanged::Ask, observer)?;
     if !done.is_finished() {
         return Err(Interrupted.into());
     }
@@ -212,6 +212,7 @@ fn compare(
         settings: scene.settings.clone(),
         dataset: Arc::clone(dataset),
         views: compared.clone(),
+        trained_on: vec![split.trained_on; compared.len()],
         max_side_px: settings.train.max_side_px,
         borders: None,
         pictures: None,

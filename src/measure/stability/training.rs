@@ -132,6 +132,7 @@ fn resumed(faulty: bool) -> Finding {
         let header = Header {
             config: config.clone(),
             photos: Vec::new(),
+            inputs: None,
             step: half.step,
             secs: 0.0,
             count: half.cloud.len(),

@@ -130,7 +130,7 @@ fn a_duplicate_is_another_with_parts_of_its_own() {
     let gap = after.world_position(100) - before.world_position(0);
     assert!((gap - DVec3::X).length() < 1e-6);
     // Another handle of the same mug.
-    let (_, new) = done(doubled(HANDLE, Placement::default()));
+    let (_, new) = done(doubled(HANDLE, Placement { shift: DVec3::X, ..Placement::default() }));
     assert_eq!(new.identities.get(4).expect("there").parent, MUG);
     assert_eq!((new.members(MUG).len(), map.members(MUG).len()), (80, 60));
 }
@@ -154,6 +154,29 @@ fn another_color_keeps_the_shades() {
     map.members(MUG).into_iter().for_each(|i| black.sh[16 * i..16 * (i + 1)].fill([-0.5 / SH_C0 as f32; 3]));
     let (after, _) = apply(&black, Some(&map), &recolored(MUG, [1.0; 3])).expect("edited");
     after.validate().expect("finite");
+}
+
+#[test]
+fn what_changes_nothing_is_refused() {
+    let (cloud, map) = scene();
+    let refused = |edit: SplatEdit| apply(&cloud, Some(&map), &edit).expect_err("refused");
+    let turned = |degrees: f64| Placement {
+        turn: DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), degrees.to_radians()),
+        ..Placement::default()
+    };
+    let shifted = Placement { shift: DVec3::new(0.0, 0.0, 1e-9), ..Placement::default() };
+    for nothing in [Placement::default(), turned(360.0), turned(-720.0), turned(0.0)] {
+        assert_eq!(refused(moved(MUG, nothing)), SplatEditError::NoChange);
+        assert_eq!(refused(doubled(MUG, nothing)), SplatEditError::SamePlace);
+        let colored = Arrangement { to: nothing, color: Some([1.0, 0.0, 0.0]), ..Arrangement::of(MUG) };
+        assert!(apply(&cloud, Some(&map), &SplatEdit::Arrange(colored)).is_ok(), "the color changes");
+    }
+    assert_eq!(refused(SplatEdit::Delete(vec![false; 100])), SplatEditError::NothingChosen);
+    // The controls: little is something.
+    for little in [turned(0.001), turned(359.9), shifted] {
+        assert!(apply(&cloud, Some(&map), &moved(MUG, little)).is_ok(), "{little:?}");
+        assert!(apply(&cloud, Some(&map), &doubled(MUG, little)).is_ok(), "{little:?}");
+    }
 }
 
 #[test]

@@ -15,6 +15,7 @@ use sha2::{Digest, Sha256};
 
 use super::TrainConfig;
 use super::density::DensityStats;
+use super::inputs::TrainInputs;
 use super::trainer::Trainer;
 use crate::io::trained::History;
 use crate::io::{IoError, SceneFolder, files};
@@ -23,11 +24,12 @@ use crate::scene::GaussianCloud;
 
 pub use crate::io::scene_files::CHECKPOINT_FILE as FILE;
 
-const MAGIC: &[u8; 8] = b"FMLGSCP3";
+const MAGIC: &[u8; 8] = b"FMLGSCP4";
 /// How files of the first version begin, which end without a checksum, and of the second; both have another array behind
-/// the others, which nobody reads.
+/// the others, which nobody reads. Those of the third do not say what was trained on.
 const MAGIC_1: &[u8; 8] = b"FMLGSCP1";
 const MAGIC_2: &[u8; 8] = b"FMLGSCP2";
+const MAGIC_3: &[u8; 8] = b"FMLGSCP3";
 
 /// Everything about a run but its arrays.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -36,6 +38,9 @@ pub struct Header {
     pub config: TrainConfig,
     /// Names of the photos trained on.
     pub photos: Vec<String>,
+    /// What was trained on; files of earlier versions do not say.
+    #[serde(default)]
+    pub inputs: Option<TrainInputs>,
     pub step: u64,
     pub secs: f64,
     /// Gaussians.
@@ -64,6 +69,8 @@ pub enum CheckpointError {
     Missing { folder: std::path::PathBuf },
     #[error("{path} belongs to a run with other {what}; choose another folder for the result")]
     OtherRun { path: std::path::PathBuf, what: &'static str },
+    #[error("the training in {folder} began with other photos or poses: {}", .changes.join("; "))]
+    OtherInputs { folder: std::path::PathBuf, changes: Vec<String> },
 }
 
 /// Writes the state atomically.
@@ -131,7 +138,7 @@ pub fn load(path: &Path) -> Result<Option<Checkpoint>, CheckpointError> {
         Err(e) => return Err(e.into()),
     };
     let body = match bytes.split_last_chunk::<32>() {
-        Some((body, sum)) if bytes.starts_with(MAGIC) || bytes.starts_with(MAGIC_2) => {
+        Some((body, sum)) if [MAGIC, MAGIC_3, MAGIC_2].iter().any(|magic| bytes.starts_with(*magic)) => {
             if Sha256::digest(body).as_slice() != sum {
                 return Err(damaged("its checksum is another"));
             }
@@ -139,8 +146,8 @@ pub fn load(path: &Path) -> Result<Option<Checkpoint>, CheckpointError> {
         }
         _ => &bytes,
     };
-    let earlier = !body.starts_with(MAGIC);
-    let rest = [MAGIC, MAGIC_1, MAGIC_2].iter().find_map(|magic| body.strip_prefix(*magic));
+    let earlier = body.starts_with(MAGIC_1) || body.starts_with(MAGIC_2);
+    let rest = [MAGIC, MAGIC_1, MAGIC_2, MAGIC_3].iter().find_map(|magic| body.strip_prefix(*magic));
     let rest = rest.ok_or_else(|| damaged("it does not begin like one"))?;
     let (length, rest) = rest.split_first_chunk::<8>().ok_or_else(|| damaged("it ends in the header"))?;
     let length = usize::try_from(u64::from_le_bytes(*length)).ok().filter(|&l| l <= rest.len());
@@ -205,6 +212,7 @@ mod tests {
         let header = Header {
             config,
             photos: Vec::new(),
+            inputs: Some(TrainInputs::default()),
             step: 7,
             secs: 0.0,
             count: 2,
@@ -234,6 +242,9 @@ mod tests {
         let sum = Sha256::digest(&earlier);
         let second = [&earlier, sum.as_slice()].concat();
         assert_eq!(read(&second).expect("the second version's"), want);
+        let body = [MAGIC_3, &now[8..now.len() - 32]].concat();
+        let third = [&body, Sha256::digest(&body).as_slice()].concat();
+        assert_eq!(read(&third).expect("the third version's"), want);
         // The controls: without its array, and with another sum.
         assert!(read(&[&now[..8], &second[8..]].concat()).is_err());
         assert!(read(&earlier).is_err());

@@ -1,10 +1,15 @@
 //! Photos at half their size, for the first steps: what is large is found at a quarter of the cost.
 
-use super::TrainView;
+use super::{TrainConfig, TrainView};
 use crate::io::photo;
 
 /// Halves have at least this many px along their sides.
 const LEAST_PX: u32 = 16;
+
+/// Steps that see the photos at half their size.
+pub(super) fn steps(config: &TrainConfig) -> u64 {
+    (config.coarse_share * config.steps as f64).round() as u64
+}
 
 pub(crate) fn halved(views: &[TrainView]) -> Vec<TrainView> {
     views.iter().map(half).collect()

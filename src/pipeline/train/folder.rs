@@ -5,12 +5,36 @@ use std::sync::Arc;
 
 use super::TrainConfig;
 use super::checkpoint::{self, Checkpoint, CheckpointError};
+use super::inputs::TrainInputs;
 use super::outcome::{TrainEnd, TrainError, TrainOutcome};
 use crate::io::trained::{self, CLOUD_FILE};
 use crate::io::{IoError, SceneFolder, semantic_map};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::carry;
 use crate::scene::{Dataset, GaussianCloud, SemanticMap};
+
+/// What a training may do with the folder of its result.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct FolderUse {
+    /// A checkpoint is continued also where photos, poses or sparse points are not those that its run began with.
+    pub(crate) anyway: bool,
+    /// The folder is made again where it goes away meanwhile. Not where it was taken away by who went on.
+    pub(crate) remake: bool,
+}
+
+/// Holds the folder again if it went away, and says so.
+pub(super) fn remade(scene: SceneFolder, observer: &mut dyn Observer) -> Result<SceneFolder, TrainError> {
+    let folder = scene.path().to_path_buf();
+    if folder.is_dir() {
+        return Ok(scene);
+    }
+    // Else it would take away the lock of the new one.
+    drop(scene);
+    let held = SceneFolder::hold(&folder, "training").map_err(TrainError::Save)?;
+    let text = format!("{} went away during the training and is made again; what was in it is gone", folder.display());
+    observer.note(Severity::Warning, text);
+    Ok(held)
+}
 
 /// Holds the folder for the result, which must not hold anything that would be lost.
 pub(super) fn claim(folder: &Path, dataset: &Dataset) -> Result<SceneFolder, TrainError> {
@@ -52,12 +76,14 @@ pub(super) fn finished(
     }))
 }
 
-/// The checkpoint in `folder`, if there is one and it is of this run.
+/// The checkpoint in `folder`, if there is one and it is of this run. What was trained on has to be what it is `now`,
+/// unless the run goes on `anyway`.
 pub(super) fn resumable(
     folder: &Path,
     dataset: &Dataset,
-    config: &TrainConfig,
-    train: &[usize],
+    (config, train): (&TrainConfig, &[usize]),
+    (now, anyway): (&TrainInputs, bool),
+    observer: &mut dyn Observer,
 ) -> Result<Option<Checkpoint>, CheckpointError> {
     let path = folder.join(checkpoint::FILE);
     let Some(saved) = checkpoint::load(&path)? else { return Ok(None) };
@@ -65,8 +91,22 @@ pub(super) fn resumable(
     if !h.config.is_same_run(config) {
         return Err(CheckpointError::OtherRun { path, what: "settings" });
     }
-    if h.photos != photo_names(dataset, train) {
-        return Err(CheckpointError::OtherRun { path, what: "photos" });
+    let changes = match &h.inputs {
+        Some(before) => before.changes(now),
+        None if h.photos != photo_names(dataset, train) => vec!["photos of other names".into()],
+        None => {
+            let text = "The checkpoint is of an earlier version, which did not store poses and checksums of the photos: \
+                        nobody can tell whether they are the same now";
+            observer.note(Severity::Warning, text.into());
+            Vec::new()
+        }
+    };
+    if !changes.is_empty() && !anyway {
+        return Err(CheckpointError::OtherInputs { folder: folder.into(), changes });
+    }
+    if !changes.is_empty() {
+        let text = format!("The training goes on, but not with what it began with: {}", changes.join("; "));
+        observer.note(Severity::Warning, text);
     }
     Ok(Some(saved))
 }

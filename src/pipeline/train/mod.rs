@@ -13,17 +13,20 @@ pub(crate) mod device;
 mod folder;
 pub(crate) mod geometry;
 pub(crate) mod init;
+pub(crate) mod inputs;
 mod optimizer;
 mod outcome;
 mod photos;
 mod run;
 pub(crate) mod schedule;
 pub mod trainer;
+mod window;
 
 pub use config::TrainConfig;
+pub(crate) use folder::FolderUse;
 pub(crate) use outcome::{TrainEnd, TrainError, TrainOutcome};
 pub(crate) use photos::load_views;
-pub(crate) use run::run;
+pub(crate) use run::{run, run_on};
 
 use crate::scene::{Camera, PhotoPixels};
 

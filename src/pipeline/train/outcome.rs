@@ -26,6 +26,13 @@ pub(crate) struct TrainOutcome {
     pub(crate) secs: f64,
 }
 
+impl TrainOutcome {
+    /// Of a run that was asked to stop before its first step.
+    pub(super) fn stopped_early() -> Self {
+        Self { cloud: Arc::default(), evaluations: Vec::new(), end: TrainEnd::Cancelled, steps: 0, secs: 0.0 }
+    }
+}
+
 /// Why a run failed.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]

@@ -8,6 +8,16 @@ use crate::io::IoError;
 use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::scene::Dataset;
 
+/// Says so where others are held out than the settings ask for, because the data set marks them.
+pub(super) fn tell_marks(dataset: &Dataset, config: &TrainConfig, observer: &mut dyn Observer) {
+    let (marked, every) = (dataset.test_photos(), config.holdout_every);
+    if marked > 0 && every > 0 && every != TrainConfig::default().holdout_every {
+        let text =
+            format!("{marked} photos are marked as test and held out; that every {every}th is does not count here");
+        observer.note(Severity::Warning, text);
+    }
+}
+
 /// Loads and scales photos, several at a time; `None` if the observer cancels.
 pub(crate) fn load_views(
     dataset: &Dataset,

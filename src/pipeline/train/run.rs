@@ -10,10 +10,12 @@ use rand_pcg::Pcg64Mcg;
 
 use super::checkpoint::{self, Checkpoint, Header};
 use super::device::StepResult;
-use super::folder::{claim, finished, objects_for, resumable};
+use super::folder::{FolderUse, claim, finished, objects_for, remade, resumable};
+use super::inputs::{Compare, TrainInputs};
 use super::outcome::{TrainEnd, TrainError, TrainOutcome};
-use super::photos::load_views;
+use super::photos::{load_views, tell_marks};
 use super::trainer::{REPORT_STEPS, StepError, Trainer};
+use super::window::Window;
 use super::{TrainConfig, TrainView, coarse, density, geometry, init};
 use crate::io::SceneFolder;
 use crate::io::trained::{History, SceneInfo};
@@ -43,15 +45,31 @@ pub(crate) fn run(
     out: Option<&Path>,
     observer: &mut dyn Observer,
 ) -> Result<TrainOutcome, TrainError> {
+    run_on(dataset, config, out, FolderUse::default(), observer)
+}
+
+/// The same, with what may be done with the folder.
+pub(crate) fn run_on(
+    dataset: &Dataset,
+    config: &TrainConfig,
+    out: Option<&Path>,
+    may: FolderUse,
+    observer: &mut dyn Observer,
+) -> Result<TrainOutcome, TrainError> {
     config.check().map_err(TrainError::Config)?;
     let (train, held) = dataset.split(config.holdout_every);
     if train.is_empty() {
         return Err(TrainError::NoPhotos(dataset.name.clone(), dataset.photos.len()));
     }
+    tell_marks(dataset, config, observer);
     let scene = out.map(|folder| claim(folder, dataset)).transpose()?;
-    let saved = match out {
-        Some(folder) => resumable(folder, dataset, config, &train)?,
+    let inputs = match out {
+        Some(_) => Some(TrainInputs::of(dataset, Compare::Contents).map_err(TrainError::Photo)?),
         None => None,
+    };
+    let saved = match (out, &inputs) {
+        (Some(folder), Some(now)) => resumable(folder, dataset, (config, &train), (now, may.anyway), observer)?,
+        _ => None,
     };
     if let (Some(folder), Some(saved)) = (out, &saved)
         && let Some(done) = finished(folder, saved, config)?
@@ -61,13 +79,14 @@ pub(crate) fn run(
         return Ok(done);
     }
     let Some(mut views) = load_views(dataset, &train, config, "Loading photos", observer)? else {
-        return Ok(stopped_early());
+        return Ok(TrainOutcome::stopped_early());
     };
     let Some(tests) = load_views(dataset, &held, config, "Loading held-out photos", observer)? else {
-        return Ok(stopped_early());
+        return Ok(TrainOutcome::stopped_early());
     };
     views.shrink_to_fit();
-    let mut job = Job::start(dataset, config, scene, &held, views, tests, saved);
+    let mut job = Job::start(dataset, config, scene, &held, (views, tests), saved);
+    (job.inputs, job.remake) = (inputs, may.remake);
     let told = |why| observer.note(Severity::Warning, why);
     job.device = if config.needs_cpu() { None } else { config.backend.gpu(told)? };
     match &job.device {
@@ -81,20 +100,15 @@ pub(crate) fn run(
     job.finish(end, observer)
 }
 
-/// Steps that see the photos at half their size.
-fn coarse_steps(config: &TrainConfig) -> u64 {
-    (config.coarse_share * config.steps as f64).round() as u64
-}
-
-fn stopped_early() -> TrainOutcome {
-    TrainOutcome { cloud: Arc::default(), evaluations: Vec::new(), end: TrainEnd::Cancelled, steps: 0, secs: 0.0 }
-}
-
 struct Job<'a> {
     config: &'a TrainConfig,
     scene: Option<SceneFolder>,
     info: SceneInfo,
     photos: Vec<String>,
+    /// What is trained on, for who goes on.
+    inputs: Option<TrainInputs>,
+    /// Whether the folder is made again where it goes away.
+    remake: bool,
     views: Vec<TrainView>,
     /// The same at half their size, while those are trained on.
     coarse: Option<Vec<TrainView>>,
@@ -118,8 +132,7 @@ impl<'a> Job<'a> {
         config: &'a TrainConfig,
         scene: Option<SceneFolder>,
         held: &[usize],
-        views: Vec<TrainView>,
-        tests: Vec<TrainView>,
+        (views, tests): (Vec<TrainView>, Vec<TrainView>),
         saved: Option<Checkpoint>,
     ) -> Self {
         let (_, extent) = dataset.camera_extent();
@@ -132,7 +145,8 @@ impl<'a> Job<'a> {
                 t.moments = s.moments;
                 t.stats = s.stats;
                 t.step = s.header.step;
-                t.round = s.header.round;
+                // Photos may have gone since.
+                t.round = s.header.round.into_iter().filter(|k| (*k as usize) < views.len()).collect();
                 t.budget = s.header.budget;
                 t.schedule.damping = s.header.damping;
                 (secs, history) = (s.header.secs, s.header.history);
@@ -159,12 +173,14 @@ impl<'a> Job<'a> {
         info.config = serde_json::to_value(config).unwrap_or_default();
         let photos = views.iter().map(|v| v.name.clone()).collect();
         let safe = trainer.cloud.clone();
-        let coarse = (trainer.step < coarse_steps(config)).then(|| coarse::halved(&views));
+        let coarse = (trainer.step < coarse::steps(config)).then(|| coarse::halved(&views));
         Self {
             config,
             scene,
             info,
             photos,
+            inputs: None,
+            remake: false,
             views,
             coarse,
             tests,
@@ -225,7 +241,7 @@ impl<'a> Job<'a> {
             }
             let due = self.config.checkpoint_secs;
             if due > 0.0 && saved_at.elapsed().as_secs_f64() >= due {
-                match self.checkpoint() {
+                match self.checkpoint(observer) {
                     // A full disk now is no reason to lose what is in memory.
                     Err(TrainError::Save(e)) if !std::mem::replace(&mut self.unsaved, true) => {
                         observer.note(Severity::Warning, format!("Checkpoint not saved, training continues: {e}"));
@@ -245,7 +261,7 @@ impl<'a> Job<'a> {
 
     /// One step with its guard against divergence, and density control.
     fn step(&mut self, observer: &mut dyn Observer) -> Result<Vec<StepResult>, TrainError> {
-        if self.coarse.is_some() && self.trainer.step >= coarse_steps(self.config) {
+        if self.coarse.is_some() && self.trainer.step >= coarse::steps(self.config) {
             self.coarse = None;
             if let Some(device) = &self.device {
                 self.trainer.fetch()?;
@@ -332,13 +348,17 @@ impl<'a> Job<'a> {
         Ok(())
     }
 
-    fn checkpoint(&mut self) -> Result<(), TrainError> {
+    fn checkpoint(&mut self, observer: &mut dyn Observer) -> Result<(), TrainError> {
+        if let Some(scene) = self.scene.take_if(|_| self.remake) {
+            self.scene = Some(remade(scene, observer)?);
+        }
         let Some(scene) = &self.scene else { return Ok(()) };
         self.trainer.fetch()?;
         let t = &self.trainer;
         let header = Header {
             config: self.config.clone(),
             photos: self.photos.clone(),
+            inputs: self.inputs.clone(),
             step: t.step,
             secs: self.secs,
             count: t.cloud.len(),
@@ -355,7 +375,7 @@ impl<'a> Job<'a> {
 
     fn finish(mut self, end: TrainEnd, observer: &mut dyn Observer) -> Result<TrainOutcome, TrainError> {
         self.trainer.fetch_cloud()?;
-        let checkpoint = self.checkpoint();
+        let checkpoint = self.checkpoint(observer);
         let scored = self.history.evaluations.last().is_some_and(|e| e.step == self.trainer.step);
         // What fails here is told when the scene is saved.
         let evaluated = if end == TrainEnd::Finished && !scored { self.evaluate(observer) } else { Ok(()) };
@@ -375,21 +395,5 @@ impl<'a> Job<'a> {
             steps: self.trainer.step,
             secs: self.secs,
         })
-    }
-}
-
-/// Losses and PSNRs since the last report.
-#[derive(Default)]
-struct Window {
-    losses: Vec<f64>,
-    psnrs: Vec<f64>,
-}
-
-impl Window {
-    fn add(&mut self, loss: f64, psnr: f64) {
-        self.losses.push(loss);
-        if psnr.is_finite() {
-            self.psnrs.push(psnr);
-        }
     }
 }

@@ -53,6 +53,8 @@ pub struct CloudFacts {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PhotoFacts {
     pub(crate) photos: usize,
+    /// Those that the data set itself marks as test.
+    pub(crate) test_photos: usize,
     /// Width and height of the first, px.
     pub(crate) size_px: [u32; 2],
     /// Longest side of all of them, px.
@@ -96,6 +98,12 @@ impl SceneFacts {
         self
     }
 
+    /// With so many photos that the data set itself marks as test.
+    pub(crate) fn with_test_photos(mut self, test_photos: usize) -> Self {
+        self.photos = self.photos.map(|photos| PhotoFacts { test_photos, ..photos });
+        self
+    }
+
     /// With these Gaussians, whose file had harmonics of degree `sh_stored`, seen by `cameras`.
     pub fn with_cloud(mut self, cloud: &GaussianCloud, sh_stored: u8, cameras: &[Camera]) -> Self {
         self.cloud = Some(CloudFacts {
@@ -129,6 +137,7 @@ impl SceneFacts {
     pub(crate) fn with_limits(mut self, limits: Limits, dataset: Option<&Dataset>) -> Self {
         if let (Some(dataset), true) = (dataset, limits.train_side_px != self.limits.train_side_px) {
             self.photos = PhotoFacts::of(&dataset.cameras(), limits.train_side_px);
+            self = self.with_test_photos(dataset.test_photos());
         }
         self.limits = limits;
         self
@@ -141,6 +150,7 @@ impl PhotoFacts {
         let pixels = |c: &Camera| u64::from(c.width_px) * u64::from(c.height_px);
         Some(Self {
             photos: cameras.len(),
+            test_photos: 0,
             size_px: [first.width_px, first.height_px],
             longest_px: cameras.iter().map(|c| c.width_px.max(c.height_px)).max().unwrap_or(0),
             pixels: cameras.iter().map(pixels).sum(),

@@ -96,6 +96,10 @@ fn row(item: Item, plan: &ScenePlan) -> Option<Said> {
         }
         (Item::Photos, _) => training_size(plan),
         (Item::Holdout, _) => match (photos?.photos, plan.holdout_every) {
+            (all, _) if photos?.test_photos > 0 => {
+                let choice = format!("{} of {}", photos?.test_photos, things(all, "photo"));
+                only(choice, "The data set marks them as test; quality is measured on them", "")
+            }
             (1, _) => only("none", "The only photo is needed for training", "evaluation, which has nothing left"),
             (_, 0) => only("none", "As set for training", "evaluation"),
             (_, n) => {
