@@ -83,6 +83,13 @@ pub fn encode(map: &SemanticMap, state: Option<&str>, path: &Path) -> Result<Vec
     safetensors::serialize(tensors, Some(metadata)).map_err(|e| broken(&e))
 }
 
+/// How many objects and parts are stored with the scene in `folder`; 0 where that cannot be read.
+pub(crate) fn count(folder: &Path) -> usize {
+    let path = folder.join(FILE);
+    let header = files::read(&path, MAX_BYTES).and_then(|bytes| header(&path, &bytes));
+    header.map_or(0, |header| header.identities.len())
+}
+
 /// The map of the scene in `folder`, whose Gaussians `cloud` are of the save `state`; `None` if it has none.
 pub fn load(folder: &Path, state: Option<&str>, cloud: &GaussianCloud) -> Result<Option<SemanticMap>, IoError> {
     let path = folder.join(FILE);

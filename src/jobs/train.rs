@@ -1,12 +1,14 @@
 //! Training Gaussians on posed photos.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::presets;
 use super::{JobError, Scene, open};
-use crate::io::{semantic_map, splat_ply, trained};
+use crate::io::{IoError, SceneFolder, semantic_map, splat_ply, trained};
+use crate::math::format::things;
 use crate::pipeline::observer::{Observer, Severity};
+use crate::pipeline::semantics::carry;
 use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainError, TrainOutcome};
 use crate::scene::{Dataset, SemanticMap};
@@ -28,6 +30,15 @@ impl Trained {
     }
 }
 
+/// What a training begins with.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct TrainStart {
+    /// Whether it goes on where one with the same settings and fewer steps ended.
+    pub more_steps: bool,
+    /// The scene whose objects and parts are carried over, by place, to a training in another folder.
+    pub objects_of: Option<PathBuf>,
+}
+
 /// Trains into the first of these `folders` that holds no training with other settings: that is another training,
 /// and the earlier one stays. A training that was stopped there goes on.
 pub(crate) fn run(
@@ -36,15 +47,30 @@ pub(crate) fn run(
     folders: impl IntoIterator<Item = PathBuf>,
     observer: &mut dyn Observer,
 ) -> Result<Trained, JobError> {
+    run_from(dataset, config, (folders, &TrainStart::default()), observer)
+}
+
+/// As [`run`], from a start.
+pub(crate) fn run_from(
+    dataset: &Dataset,
+    config: &TrainConfig,
+    (folders, from): (impl IntoIterator<Item = PathBuf>, &TrainStart),
+    observer: &mut dyn Observer,
+) -> Result<Trained, JobError> {
     let mut folders = folders.into_iter().peekable();
     let mut earlier: Option<PathBuf> = None;
     while let Some(out) = folders.next() {
         if let Some(earlier) = earlier.take() {
+            let objects = match semantic_map::count(&earlier) {
+                0 => String::new(),
+                n => format!(", with its {}", things(n, "object or part")),
+            };
             let kept = earlier.display();
-            let text = format!("The settings changed, so this is a new training; the earlier one stays in {kept}");
+            let text =
+                format!("The settings changed, so this is a new training; the earlier one{objects} stays in {kept}");
             observer.note(Severity::Info, text);
         }
-        match train::run(dataset, config, Some(&out), observer) {
+        match train::run_on(dataset, config, (Some(&out), from.more_steps), observer) {
             Err(TrainError::Checkpoint(CheckpointError::OtherRun { .. } | CheckpointError::Missing { .. }))
                 if folders.peek().is_some() =>
             {
@@ -57,11 +83,38 @@ pub(crate) fn run(
                 {
                     observer.note(Severity::Warning, format!("The settings could not be saved to a file: {e}"));
                 }
+                if let Some(other) = &from.objects_of
+                    && let Err(e) = carry_over(other, &out, observer)
+                {
+                    observer
+                        .note(Severity::Warning, format!("The earlier objects and parts are not carried over: {e}"));
+                }
                 return finished(outcome, out, observer);
             }
         }
     }
     Err(TrainError::Config("there is no folder to train into".into()).into())
+}
+
+/// Gives the scene in the folder `to`, unless it has objects and parts, those of the scene in another.
+fn carry_over(from: &Path, to: &Path, observer: &mut dyn Observer) -> Result<(), IoError> {
+    let has_objects = |folder: &Path| trained::is_scene(folder) && folder.join(semantic_map::FILE).exists();
+    if from == to || !has_objects(from) || has_objects(to) || !trained::is_scene(to) {
+        return Ok(());
+    }
+    let old = trained::load(from)?;
+    let Some(map) = semantic_map::load(from, old.state.as_deref(), &old.cloud)? else { return Ok(()) };
+    let new = trained::load(to)?;
+    let (carried, share) = carry::carry(&map, &old.cloud, &new.cloud);
+    SceneFolder::hold(to, "carrying objects over")?.save_map(new.state.as_deref(), &carried, &new.cloud)?;
+    let text = format!(
+        "{} of the training in {} were carried over to {:.1} % of the Gaussians, by place",
+        map.identities.counted(),
+        from.display(),
+        100.0 * share
+    );
+    observer.note(Severity::Info, text);
+    Ok(())
 }
 
 /// Objects are carried over to Gaussians that went on, and have to be read with their state.

@@ -108,6 +108,14 @@ impl SemanticMap {
         Self { language: self.language.clone(), findings: self.findings.clone(), ..self.select(gaussians) }
     }
 
+    /// What somebody named, selected, merged, split or corrected, or had added, by rising number. Versions that did not
+    /// note it left a second name where one was given, and no photo where all was selected by clicks.
+    pub(crate) fn by_hand(&self) -> Vec<IdentityId> {
+        let by_clicks = self.seeds.is_empty();
+        let is = |i: &super::Identity| i.by_hand || by_clicks || i.names.len() > 1;
+        self.identities.iter().filter(|(_, i)| is(i)).map(|(id, _)| id).collect()
+    }
+
     /// Whether nothing is known of a Gaussian: no mask and no photo says whose it is, nor that it is nobody's.
     pub(crate) fn is_unknown(&self, i: usize) -> bool {
         self.identity_of.get(i) == Some(&NOBODY) && self.margin.get(i) == Some(&0.0)

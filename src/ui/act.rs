@@ -26,12 +26,16 @@ use crate::worker::{Command, JobId};
 impl App {
     /// Does what a user asked for.
     pub(super) fn act(&mut self, action: Action, ctx: &egui::Context) {
+        if self.is_about_nothing(&action) {
+            return;
+        }
         match action {
             Action::Open(path) if is_report(&path) => self.read_report(path, false),
             Action::Open(path) if path.extension().is_some_and(|e| e == "toml") => self.read_preset(&path),
             Action::OpenDemo | Action::TrainDemo | Action::Open(_) | Action::FindPoses(_) => self.replace_scene(action),
             Action::Connect(url) => self.connect(&url),
-            Action::StartTraining => self.start_training(),
+            Action::StartTraining => self.start_training(false),
+            Action::TrainAnew => self.start_training(true),
             Action::PauseJob => {
                 if let Some(job) = self.state.job.clone().filter(|j| j.kind.can_pause()) {
                     self.set_paused(job.id, !job.paused);
@@ -50,7 +54,7 @@ impl App {
             Action::AnotherFill(request) => self.submit_removal(*request),
             Action::DeleteRemoved => self.ask_to_delete_removed(),
             Action::FetchModel(id) => self.install_model(id, None),
-            Action::TypeQuery => self.type_question(),
+            Action::TypeQuery => self.type_question(ctx),
             Action::Ask(text) => {
                 if let Some(semantics) = self.state.semantics.clone() {
                     self.viewport.queries.ask(&text, &semantics);
@@ -209,24 +213,6 @@ impl App {
         self.submit(Command::InstallModel { id, brought });
     }
 
-    fn start_training(&mut self) {
-        let scene = self.state.scene.as_ref();
-        let Some((dataset, out)) = scene.and_then(|s| Some((s.dataset.clone()?, s.out.clone()))) else {
-            self.state.toast(Tone::Warning, "Open a folder of posed photos first: training needs them.");
-            return;
-        };
-        if let Some(job) = &self.state.job {
-            let text = format!("{} is still running; cancel it first (Esc).", job.title);
-            self.state.toast(Tone::Warning, text);
-            return;
-        }
-        let config = self.state.next_training(&self.layout.config);
-        self.state.antialias = config.render_settings(None).antialias;
-        let reached = self.state.continues_at(&config).unwrap_or(0);
-        self.state.resumable = Some((config.clone(), reached));
-        self.submit(Command::Train { dataset, config, out });
-    }
-
     fn evaluate(&mut self) {
         let scene = self.state.scene.as_ref().and_then(|s| Some((s.dataset.clone()?, s.out.clone())));
         let trained = self.state.training_job.is_some() || self.state.scene.as_ref().is_some_and(|s| s.trained);
@@ -344,18 +330,6 @@ impl App {
             Effect::Renamed(id, name) => self.edit(EditStep::Request(EditRequest::Apply(Edit::Rename(id, name)))),
             Effect::RenameUndone(id, name) => self.edit(EditStep::UndoRename(id, name)),
             Effect::Explored(explored) => self.state.explored = Some(explored),
-        }
-    }
-
-    fn type_question(&mut self) {
-        if self.state.semantics.is_some() {
-            // Another scene in the second view is not asked.
-            if self.state.beside.is_some() {
-                self.viewport.queries.work_in(false);
-            }
-            self.viewport.queries.start_typing();
-        } else {
-            self.state.toast(Tone::Warning, "Nothing to query yet: find objects first (Objects pane).");
         }
     }
 }

@@ -157,6 +157,8 @@ actions! {
     Screenshot: "Save the view as .png\u{2026}", "Write the image in the viewport, without the drawn cameras.", "Ctrl+S";
     StartTraining: "Start training",
         "Fit Gaussians to the photos. Resumes from the last checkpoint if the settings are the same.", "Ctrl+T";
+    TrainAnew: "Begin training anew",
+        "Another training of the same photos, in a folder of its own. The one before stays, and its objects are carried over.";
     PauseJob: "Pause or resume the running job", "Training, a search for objects, a download: it waits and loses nothing.", "T";
     Cancel: "Cancel the running job", "Stop the running job at its next step. Progress so far is kept.";
     Dismiss: "Deselect, or cancel the running job", "Deselect what is selected; with nothing selected, stop the running job.",

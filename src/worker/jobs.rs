@@ -11,7 +11,7 @@ use crate::io::{self, OpenError, trained};
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::export_splat::{self, LossViews};
 use crate::jobs::models::Source;
-use crate::jobs::train::Trained;
+use crate::jobs::train::{TrainStart, Trained};
 use crate::jobs::{
     Folders, JobError, OpenedScene, Scene, clean, demo, edit, export, export_all, find_objects, go_to, inspect, models,
     open, page, phrases, plan, poses, rearrange, recent, remove, report, scale, select, thumbnails, train, video,
@@ -47,6 +47,12 @@ impl PipelineJobs {
         self.known.lock().unwrap_or_else(PoisonError::into_inner).get(folder).cloned().flatten()
     }
 
+    /// The next time, the photos are opened with this training of them.
+    fn uses(&self, folder: &Path) {
+        // Nobody has asked for it, so nobody is stopped by a full disk.
+        let _ = self.folders.note_use(folder);
+    }
+
     /// What the machine offers, looked up once.
     fn machine(&self) -> &Machine {
         self.machine.get_or_init(plan::machine)
@@ -55,6 +61,7 @@ impl PipelineJobs {
     fn opened(&self, mut scene: OpenedScene) -> Outcome {
         scene.reports = report::known(&scene.path, &scene.report_out);
         self.knows(&scene.out, scene.state.clone());
+        self.uses(&scene.out);
         Outcome::Opened(Box::new(scene))
     }
 
@@ -62,13 +69,14 @@ impl PipelineJobs {
         &self,
         dataset: &Dataset,
         config: &TrainConfig,
-        out: PathBuf,
+        (out, from): (Option<PathBuf>, &TrainStart),
         observer: &mut dyn Observer,
     ) -> Result<Outcome, Stop> {
         // Other settings get a folder of their own; which one is seen when it is needed.
-        let folders = std::iter::once(out).chain(std::iter::once_with(|| self.folders.fresh(&dataset.root)));
-        let done = train::run(dataset, config, folders, observer)?;
+        let folders = out.into_iter().chain(std::iter::once_with(|| self.folders.fresh(&dataset.root)));
+        let done = train::run_from(dataset, config, (folders, from), observer)?;
         self.knows(&done.out, done.state.clone());
+        self.uses(&done.out);
         if !done.is_finished() {
             return Err(Stop::Cancelled);
         }
@@ -76,7 +84,8 @@ impl PipelineJobs {
         let cloud = &outcome.cloud;
         let facts = plan::facts(self.machine(), Some(dataset), Some((cloud, cloud.sh_degree)), config);
         let facts = Box::new(facts.with_semantics(semantics.as_deref()));
-        Ok(Outcome::Trained { evaluations: outcome.evaluations, out, semantics, facts })
+        let runs = recent::runs(&self.folders, &dataset.root);
+        Ok(Outcome::Trained { evaluations: outcome.evaluations, out, semantics, runs, facts })
     }
 }
 
@@ -97,7 +106,9 @@ impl Jobs for PipelineJobs {
             }
             Command::Demo => self.opened(demo::open(&self.folders, self.machine(), observer)?),
             Command::DemoPhotos => self.opened(demo::open_photos(&self.folders, self.machine(), observer)?),
-            Command::Train { dataset, config, out } => return self.train(&dataset, &config, out, observer),
+            Command::Train { dataset, config, out, from } => {
+                return self.train(&dataset, &config, (out, &from), observer);
+            }
             Command::Evaluate { dataset, cloud, config, settings, out } => {
                 Outcome::Evaluated(measured(dataset, cloud, (config, settings), &out, observer)?)
             }
@@ -158,6 +169,7 @@ impl Jobs for PipelineJobs {
                 }
                 Outcome::Kept
             }
+            Command::RecentRuns(of) => Outcome::RecentRuns(recent::several(&self.folders, of)),
             Command::RecentPictures(of) => Outcome::RecentPictures(recent::load(&self.folders, of)),
             Command::InstallModel { id, brought } => {
                 let source = brought.as_deref().map_or(Source::Fetch(None), Source::Brought);

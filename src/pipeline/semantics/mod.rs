@@ -25,6 +25,7 @@ pub(crate) mod filters;
 mod floaters;
 #[cfg(test)]
 mod heart;
+pub(crate) mod keep;
 pub mod kept_frames;
 pub(crate) mod kept_masks;
 mod kept_track;

@@ -56,13 +56,14 @@ pub(super) fn finished(
 pub(super) fn resumable(
     folder: &Path,
     dataset: &Dataset,
-    config: &TrainConfig,
+    (config, takes_more_steps): (&TrainConfig, bool),
     train: &[usize],
 ) -> Result<Option<Checkpoint>, CheckpointError> {
     let path = folder.join(checkpoint::FILE);
     let Some(saved) = checkpoint::load(&path)? else { return Ok(None) };
     let h = &saved.header;
-    if !h.config.is_same_run(config) {
+    let goes_on = takes_more_steps && h.config.is_same_but_for_steps(config) && config.steps > h.step;
+    if !h.config.is_same_run(config) && !goes_on {
         return Err(CheckpointError::OtherRun { path, what: "settings" });
     }
     if h.photos != photo_names(dataset, train) {

@@ -23,9 +23,25 @@ pub mod trainer;
 pub use config::TrainConfig;
 pub(crate) use outcome::{TrainEnd, TrainError, TrainOutcome};
 pub(crate) use photos::load_views;
-pub(crate) use run::run;
+pub(crate) use run::run_on;
 
-use crate::scene::{Camera, PhotoPixels};
+use std::path::Path;
+
+use crate::pipeline::observer::Observer;
+use crate::scene::{Camera, Dataset, PhotoPixels};
+
+/// Trains as [`run_on`] does; a checkpoint is continued only for the number of steps that it is of.
+///
+/// # Errors
+/// See [`TrainError`].
+pub(crate) fn run(
+    dataset: &Dataset,
+    config: &TrainConfig,
+    out: Option<&Path>,
+    observer: &mut dyn Observer,
+) -> Result<TrainOutcome, TrainError> {
+    run_on(dataset, config, (out, false), observer)
+}
 
 /// A photo ready for comparison: undistorted, scaled, with its camera.
 #[derive(Clone, Debug)]

@@ -32,15 +32,16 @@ const MAX_ROLLBACKS: u32 = 4;
 
 /// Trains on `dataset` and saves into the folder `out`, if given. A checkpoint of the same run in
 /// that folder is continued; where that run is finished, nothing is done. Objects and parts that the
-/// scene there has are carried over, and kept as they were beside it. Blocks until done; all contact
+/// scene there has are carried over, and kept as they were beside it. Where it `takes_more_steps`, a checkpoint of the
+/// same settings for fewer steps is continued, too. Blocks until done; all contact
 /// is through `observer`.
 ///
 /// # Errors
 /// See [`TrainError`]. A checkpoint that cannot be saved on the way ends nothing; at the end it does.
-pub(crate) fn run(
+pub(crate) fn run_on(
     dataset: &Dataset,
     config: &TrainConfig,
-    out: Option<&Path>,
+    (out, takes_more_steps): (Option<&Path>, bool),
     observer: &mut dyn Observer,
 ) -> Result<TrainOutcome, TrainError> {
     config.check().map_err(TrainError::Config)?;
@@ -50,7 +51,7 @@ pub(crate) fn run(
     }
     let scene = out.map(|folder| claim(folder, dataset)).transpose()?;
     let saved = match out {
-        Some(folder) => resumable(folder, dataset, config, &train)?,
+        Some(folder) => resumable(folder, dataset, (config, takes_more_steps), &train)?,
         None => None,
     };
     if let (Some(folder), Some(saved)) = (out, &saved)
@@ -126,6 +127,8 @@ impl<'a> Job<'a> {
         let background = dataset.background.unwrap_or([0.0; 3]);
         let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
         let (mut secs, mut history) = (0.0, History::default());
+        // What was seen in full is not seen coarsely again, where more steps make those for that more.
+        let was_coarse = saved.as_ref().is_none_or(|s| s.header.step < coarse_steps(&s.header.config));
         let mut trainer = match saved {
             Some(s) => {
                 let mut t = Trainer::new(s.cloud, config, background, extent, s.header.rng);
@@ -159,7 +162,7 @@ impl<'a> Job<'a> {
         info.config = serde_json::to_value(config).unwrap_or_default();
         let photos = views.iter().map(|v| v.name.clone()).collect();
         let safe = trainer.cloud.clone();
-        let coarse = (trainer.step < coarse_steps(config)).then(|| coarse::halved(&views));
+        let coarse = (was_coarse && trainer.step < coarse_steps(config)).then(|| coarse::halved(&views));
         Self {
             config,
             scene,
