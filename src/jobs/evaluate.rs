@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use image::ColorType;
 
+use super::changed::ChangedScene;
 use super::held_out::held_out;
 use super::{JobError, Scene, export, open};
 use crate::io;
@@ -45,6 +46,8 @@ pub(crate) struct PhotoComparison {
     pub(crate) pictures: Option<PathBuf>,
     /// Id of the save that the scene's files are of.
     pub(crate) state: Option<String>,
+    /// What of the scene the photos show otherwise.
+    pub(crate) changed: ChangedScene,
 }
 
 impl PhotoComparison {
@@ -71,16 +74,18 @@ impl PhotoComparison {
         let (training, _) = dataset.split(holdout_every.unwrap_or(default_every));
         let borders = if keep_borders { None } else { Some(Borders::of(&dataset, &training, max_side_px)?) };
         let (cloud, settings) = (Arc::clone(&scene.cloud), scene.settings.clone());
-        Ok(Self { cloud, settings, dataset, views, max_side_px, borders, pictures, state: None })
+        let changed = ChangedScene::of(scene, &dataset);
+        Ok(Self { cloud, settings, dataset, views, max_side_px, borders, pictures, state: None, changed })
     }
 
     pub(crate) fn view(&self, index: usize) -> Result<TrainView, JobError> {
         let photo = &self.dataset.photos[index];
-        let pixels = match &self.borders {
+        let mut pixels = match &self.borders {
             Some(borders) => borders.load(photo)?,
             None => io::photo::load(photo, self.max_side_px)?,
         };
         let camera = photo.camera.resized(pixels.width_px, pixels.height_px);
+        self.changed.leave_out(&mut pixels, &camera, &self.settings)?;
         Ok(TrainView { name: photo.name.clone(), camera, pixels })
     }
 
@@ -105,6 +110,9 @@ impl PhotoComparison {
 pub(crate) fn photometric(comparison: &PhotoComparison, observer: &mut dyn Observer) -> Result<Evaluation, JobError> {
     for warning in &comparison.dataset.warnings {
         observer.note(Severity::Warning, warning.clone());
+    }
+    if let Some((severity, text)) = comparison.changed.told() {
+        observer.note(severity, text);
     }
     let PhotoComparison { cloud, settings, .. } = comparison;
     let mut renderer = Renderer::new();

@@ -151,6 +151,7 @@ pub(crate) fn run(
     if !kept.is_empty() {
         observer.note(Severity::Info, kept_text(&kept));
     }
+    let (removed, removed_names) = gone(before.as_ref(), observer);
     let cameras = trained::load_info(folder)?.cameras;
     let held = held_out(dataset, &cameras, None, request.holdout_every);
     let all = dataset.photos.iter().enumerate();
@@ -174,6 +175,8 @@ pub(crate) fn run(
             max_side_px: request.side_px,
             prompt: preparation.prompt.unwrap_or_default(),
             known: request.known.clone(),
+            removed: removed.clone(),
+            removed_names,
             ..TrackOptions::default()
         },
         lifting: preparation.lifting,
@@ -229,8 +232,9 @@ pub(crate) fn run(
     let start = Instant::now();
     let tools = Tools { segmenter: &mut *segmenter, follower: follower.as_mut(), encoder: encoder.as_deref_mut() };
     let mut found = find_objects(cloud, &photos, settings, tools, &options, observer)?;
-    let removed = before.map(|map| map.identities.removed).unwrap_or_default();
-    found.map.identities.add_removed(removed);
+    let names = before.map(|map| map.identities.removed).unwrap_or_default();
+    found.map.identities.add_removed(names);
+    found.map.removed = removed;
     let (earlier, state) = scene.replace_map(known, &found.map, cloud)?;
     if let Some(earlier) = earlier {
         observer.note(Severity::Info, format!("The previous objects and parts are kept in {}", earlier.display()));
@@ -243,6 +247,25 @@ fn before(folder: &Path, observer: &mut dyn Observer) -> Option<SemanticMap> {
     // Not those of the request: its Gaussians do not say whose they are by now.
     let map = trained::load(folder).and_then(|scene| semantic_map::load(folder, scene.state.as_deref(), &scene.cloud));
     map.inspect_err(|e| observer.note(Severity::Warning, format!("Nothing is kept of the objects before: {e}"))).ok()?
+}
+
+/// What was taken out of a scene, and names by which it is told where its Gaussians were not kept.
+fn gone(before: Option<&SemanticMap>, observer: &mut dyn Observer) -> (Option<Arc<GaussianCloud>>, Vec<String>) {
+    let Some(map) = before.filter(|map| !map.identities.removed.is_empty()) else { return (None, Vec::new()) };
+    let names = listed(&map.identities.removed);
+    if map.removed.is_some() {
+        let text =
+            format!("What was removed ({names}) is not looked for: where photos still show it, they are left out");
+        observer.note(Severity::Info, text);
+        return (map.removed.clone(), Vec::new());
+    }
+    let text = format!(
+        "{names} was removed by a version that did not keep where it was: masks of that name are left out, others may find \
+         it again"
+    );
+    observer.note(Severity::Warning, text);
+    let is_left = |name: &String| map.identities.iter().any(|(_, i)| i.names.contains(name));
+    (None, map.identities.removed.iter().filter(|name| !is_left(name)).cloned().collect())
 }
 
 /// Full names of what somebody has worked on.

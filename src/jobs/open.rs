@@ -47,6 +47,8 @@ pub struct Scene {
     pub(crate) metres_per_unit: Option<f64>,
     /// Id of the save that its files are of, if it has one.
     pub(crate) state: Option<String>,
+    /// Whether its Gaussians were edited since it was trained.
+    pub(crate) edited: bool,
 }
 
 impl Scene {
@@ -113,6 +115,7 @@ impl Scene {
             photos: info.dataset.map(|d| d.path),
             dataset_path,
             metres_per_unit: info.metres_per_unit.filter(|m| m.is_finite() && *m > 0.0),
+            edited: info.edited,
             state,
         }
     }

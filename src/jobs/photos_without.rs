@@ -72,6 +72,11 @@ pub(crate) fn is_begun(from: &Scene, without: (&RemovalOptions, &str), out: &Pat
     files::read_json::<serde_json::Value>(&out.join(PHOTOS).join(MARK)).is_ok_and(|m| m == mark(from, without))
 }
 
+/// Whether the photos in a folder are made without something.
+pub(crate) fn is_without(photos: &Path) -> bool {
+    photos.join(MARK).is_file()
+}
+
 fn mark(from: &Scene, (options, name): (&RemovalOptions, &str)) -> serde_json::Value {
     json!({ "version": 2, "scene": from.path, "state": from.state, "without": name, "options": options })
 }

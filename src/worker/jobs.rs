@@ -221,7 +221,9 @@ fn measured(
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<crate::pipeline::observer::Evaluation, JobError> {
-    let cameras = if trained::is_scene(out) { trained::load_info(out)?.cameras } else { Vec::new() };
-    let scene = Scene { cloud, cameras, settings, config, ..Scene::default() };
+    let info = if trained::is_scene(out) { Some(trained::load_info(out)?) } else { None };
+    let folder = info.is_some().then(|| out.to_path_buf());
+    let (cameras, edited) = info.map(|info| (info.cameras, info.edited)).unwrap_or_default();
+    let scene = Scene { cloud, cameras, settings, config, folder, edited, ..Scene::default() };
     evaluate::photometric(&PhotoComparison::of(&scene, dataset, EvaluateOptions::default())?, observer)
 }

@@ -10,6 +10,7 @@ use super::rows::{self, QueryTimes, RowResult};
 use super::{LABELS, ReproduceSettings};
 use crate::io::labels::Labels;
 use crate::io::semantic_map;
+use crate::jobs::changed::ChangedScene;
 use crate::jobs::evaluate::PhotoComparison;
 use crate::jobs::find_objects::{self, FindRequest, FindSettings};
 use crate::jobs::{JobError, evaluate_masks, export, open, train};
@@ -216,6 +217,7 @@ fn compare(
         borders: None,
         pictures: None,
         state: scene.state.clone(),
+        changed: ChangedScene::default(),
     };
     let mut labels = FileMasks(Labels::open(&input.labels)?);
     let views = evaluate_masks::draw(&comparison, &map, &mut labels, &compared, split.trained_on)?;

@@ -30,6 +30,7 @@ pub(crate) fn carry_by(map: &SemanticMap, nearest: &[Option<usize>]) -> (Semanti
         *codes = near.map_or(*codes, |i| map.codes[i]);
     }
     carried.prepared = map.prepared;
+    carried.removed.clone_from(&map.removed);
     carried.language.clone_from(&map.language);
     carried.findings.clone_from(&map.findings);
     let reached = nearest.iter().flatten().count();

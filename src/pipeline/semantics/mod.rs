@@ -43,6 +43,7 @@ pub(crate) mod reading;
 pub mod recipe;
 pub mod regions;
 pub mod relevancy;
+pub(crate) mod removed;
 pub(crate) mod sam2_tracker;
 pub mod segmenter;
 pub(crate) mod splat_tree;
