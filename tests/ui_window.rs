@@ -11,6 +11,8 @@ mod doubts;
 mod edits;
 #[path = "ui_window/hands.rs"]
 mod hands;
+#[path = "ui_window/kept.rs"]
+mod kept;
 #[path = "ui_window/keyboard.rs"]
 mod keyboard;
 #[path = "ui_window/objects.rs"]
@@ -33,6 +35,8 @@ mod report;
 mod selecting;
 #[path = "ui_window/split.rs"]
 mod split;
+#[path = "ui_window/typing.rs"]
+mod typing;
 mod ui_common;
 
 use std::path::{Path, PathBuf};

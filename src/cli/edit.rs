@@ -87,7 +87,7 @@ pub(crate) fn run(args: EditArgs, quiet: bool) -> Result<(), CliError> {
     let edit = SplatEdit::Arrange(Arrangement { id, duplicate: args.duplicate, to, color: args.color });
     let (cloud, new) = rearrange::apply(&scene.cloud, Some(&map), &edit)?;
     let cloud = Arc::new(cloud);
-    derived::write(&scene, "edited", &cloud, new.as_ref(), &args.out, &mut Console::new(quiet))?;
+    derived::write(&scene, derived::EDITED, &cloud, new.as_ref(), &args.out, &mut Console::new(quiet))?;
     let what = if args.duplicate { "duplicated" } else { "edited" };
     let (out, name, size) = (args.out.display(), map.identities.full_name(id), format::things(cloud.len(), "Gaussian"));
     output::print(&format!("{out}: {name} {what}, {size}"))

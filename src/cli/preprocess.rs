@@ -71,6 +71,9 @@ pub(crate) struct PreprocessArgs {
     #[arg(long, value_name = "PHOTO", conflicts_with_all = ["seed", "max_seeds", "unknown", "recipe", "tracker", "prompt",
         "mask_grid", "part_weight", "lifting", "code_steps", "encoder"])]
     add: Option<String>,
+    /// Find anew what was named, selected or corrected by hand, too; without it, that stays as it is
+    #[arg(long, conflicts_with = "add")]
+    replace_all: bool,
     /// Most photos whose masks are used
     #[arg(long, default_value_t = TrackOptions::default().max_seeds, value_parser = number::within(1..=100_000_usize))]
     max_seeds: usize,
@@ -96,8 +99,12 @@ pub(crate) struct PreprocessArgs {
 
 /// The table `[objects]` of a batch.
 pub(super) fn of_table(table: &toml::Table) -> Result<FindSettings, String> {
-    let args: PreprocessArgs =
-        table_args::parse("preprocess", table, &["scene"], &["masks", "photos", "add", "plan", "json"])?;
+    let args: PreprocessArgs = table_args::parse(
+        "preprocess",
+        table,
+        &["scene"],
+        &["masks", "photos", "add", "replace-all", "plan", "json"],
+    )?;
     match args.segmenter.as_deref() {
         Some("files") => Err("'segmenter': leave it out: the masks of a scene are used where it has some".into()),
         _ => Ok(args.settings()),
@@ -135,6 +142,7 @@ impl PreprocessArgs {
             seed: self.add.clone().or_else(|| self.seed.clone()),
             max_seeds: self.max_seeds,
             unknown_share: self.unknown / 100.0,
+            replace_all: self.replace_all,
         }
     }
 }
@@ -158,7 +166,7 @@ pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
         with: args.settings(),
     };
     let done = find_objects::run(&request, scene.state.as_deref(), &mut observer);
-    let FoundObjects { found, photos, secs, warnings, .. } =
+    let FoundObjects { found, photos, kept, secs, warnings, .. } =
         done.map_err(|e| CliError::of_work(e, "nothing was stored"))?;
     let Found { map, views, secs: stages } = found;
     let unknown = map.findings.as_ref().and_then(Findings::unknown);
@@ -169,6 +177,7 @@ pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
             "warnings": warnings,
             "secs": secs,
             "prepared": map.prepared,
+            "kept": kept,
             "stages": stages.iter().map(|(stage, secs)| json!({ "stage": stage, "secs": secs })).collect::<Vec<_>>(),
             "identities": identities(&map),
             "unknown": unknown,
@@ -179,8 +188,12 @@ pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
         }));
     }
     let doubts = map.findings.as_ref().map_or(0, |f| f.doubts().len());
+    let kept = match kept.as_slice() {
+        [] => String::new(),
+        names => format!("\nkept by hand: {}; --replace-all finds them anew", names.join(", ")),
+    };
     output::print(&format!(
-        "{} from {} in {secs:.1} s, {:.1} % of the photos unknown, {}; ask with 'fmlgs query {} \"...\"'",
+        "{} from {} in {secs:.1} s, {:.1} % of the photos unknown, {}; ask with 'fmlgs query {} \"...\"'{kept}",
         map.identities.counted(),
         things(map.seeds.len(), "photo"),
         100.0 * unknown.unwrap_or(0.0),

@@ -7,7 +7,7 @@ use super::export::MeasureArgs;
 use super::progress::Console;
 use super::{CliError, output, view};
 use crate::jobs::edit::{self, EditRequest};
-use crate::jobs::select::{self, SelectFor, SelectRequest, Selected, Stroke, kept_as};
+use crate::jobs::select::{self, SelectFor, SelectRequest, SelectStep, Selected, Stroke, kept_as};
 use crate::jobs::{Scene, query};
 use crate::scene::{LevelFilter, Mask, NOBODY};
 
@@ -81,7 +81,7 @@ pub(crate) fn run(
             map: Arc::clone(&map),
             purpose: purpose.clone(),
             before: selected,
-            stroke: Some(stroke),
+            step: SelectStep::Stroke(stroke),
         };
         selected = Some(Arc::new(select::run(&request, &mut console)?));
     }

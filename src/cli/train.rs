@@ -9,9 +9,10 @@ use super::plan::PlanArgs;
 use super::progress::Console;
 use super::serve::{AccessArgs, announce};
 use super::{CliError, interrupt, number, output};
+use crate::io::scene_files::CHECKPOINT_FILE;
 use crate::jobs::open::{self, Contents};
 use crate::jobs::presets;
-use crate::jobs::train::{IfChanged, Trained};
+use crate::jobs::train::{IfChanged, TrainStart, Trained};
 use crate::jobs::{JobError, held_out, plan, train};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::checkpoint::CheckpointError;
@@ -46,6 +47,9 @@ pub(crate) struct TrainArgs {
     /// nothing is done
     #[arg(long)]
     anyway: bool,
+    /// Go on where a training with the same settings and fewer --steps ended, instead of beginning another one
+    #[arg(long, requires = "steps")]
+    go_on: bool,
     /// Settings to start from, a TOML file as every trained scene has one ("training.toml"); others given here
     /// go before
     #[arg(long, value_name = "TOML")]
@@ -184,10 +188,16 @@ impl TrainArgs {
         }
         let base = self.preset.as_deref().map(presets::read).transpose()?.unwrap_or(base);
         let config = plan::planned(&dataset, self.settings.over(base), &self.plan.overrides());
-        let folders = match self.out.clone().or(own) {
+        let mut folders = match self.out.clone().or(own) {
             Some(out) => vec![out],
             None => usual_folders(&PathBuf::from("out").join(&dataset.name)),
         };
+        if self.go_on {
+            folders.retain(|folder| folder.join(CHECKPOINT_FILE).is_file());
+            if folders.is_empty() {
+                return Err(CliError::failed("--go-on: there is no training yet that could go on"));
+            }
+        }
         Ok((dataset, config, folders))
     }
 }
@@ -206,13 +216,14 @@ pub(crate) fn run(args: TrainArgs, quiet: bool) -> Result<(), CliError> {
     for warning in &dataset.warnings {
         console.note(Severity::Warning, warning.clone());
     }
+    let from = TrainStart { more_steps: args.go_on, objects_of: None };
     let server = match args.serve {
         Some(bind) => Some(serve::training(&dataset, &config, args.access.options(bind, false)?)?),
         None => None,
     };
     let done = match &server {
-        Some(server) => served(server, (&dataset, &config), folders, changed, &mut console),
-        None => train::run(&dataset, &config, folders, changed, &mut console),
+        Some(server) => served(server, (&dataset, &config), folders, &from, &mut console),
+        None => train::run(&dataset, &config, folders, &from, &mut console),
     };
     let done = done.map_err(|e| with_remedy(e, &args));
     let farewell = || {
@@ -267,12 +278,12 @@ fn served(
     server: &Server,
     (dataset, config): (&Dataset, &TrainConfig),
     folders: Vec<PathBuf>,
-    changed: IfChanged,
+    from: &TrainStart,
     console: &mut Console,
 ) -> Result<Trained, JobError> {
     announce(server);
     let mut observer = server.observe(console);
-    let done = train::run(dataset, config, folders, changed, &mut observer);
+    let done = train::run(dataset, config, folders, from, &mut observer);
     match &done {
         Ok(done) => {
             if let Err(e) = server.finished(&done.out, done.is_finished()) {

@@ -38,6 +38,21 @@ pub(crate) fn read(bytes: &[u8], name: &str, path: &Path) -> Result<Vec<u8>, IoE
     Ok(content)
 }
 
+/// The files of the archive with their sizes in bytes; `path` is for errors.
+///
+/// # Errors
+/// If the archive is broken.
+pub(crate) fn sizes(bytes: &[u8], path: &Path) -> Result<Vec<(String, u64)>, IoError> {
+    let broken = |e: zip::result::ZipError| broken(path, "the archive", &e);
+    let mut zip = ZipArchive::new(Cursor::new(bytes)).map_err(broken)?;
+    let count = zip.len();
+    let mut of = |i: usize| {
+        let file = zip.by_index(i)?;
+        Ok((file.name()?.into_owned(), file.size()))
+    };
+    (0..count).map(|i| of(i).map_err(broken)).collect()
+}
+
 /// Unpacks the archive into `folder`, which must not exist: afterwards it is complete, or still not there.
 ///
 /// # Errors

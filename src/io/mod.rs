@@ -35,6 +35,7 @@ mod ply;
 pub mod points_ply;
 mod quantized;
 mod reader;
+mod removed;
 mod render_mode;
 mod resample;
 pub(crate) mod scene_files;

@@ -16,7 +16,7 @@ pub const CHECKPOINT_FILE: &str = "checkpoint.bin";
 /// What a save has decided on and not carried out yet.
 pub(super) const JOURNAL: &str = ".fmlgs_commit.json";
 
-pub(super) const FILES: [&str; 4] = [SCENE_FILE, CLOUD_FILE, MAP_FILE, CHECKPOINT_FILE];
+pub(crate) const FILES: [&str; 4] = [SCENE_FILE, CLOUD_FILE, MAP_FILE, CHECKPOINT_FILE];
 
 /// Whether `folder` is a trained scene.
 pub fn is_scene(folder: &Path) -> bool {

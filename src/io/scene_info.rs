@@ -39,6 +39,9 @@ pub struct SceneInfo {
     /// Measurements of the training run.
     #[serde(default)]
     pub history: History,
+    /// Whether Gaussians were moved, recolored, duplicated or deleted since: photos show them as they were.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub edited: bool,
     /// Id of the save that wrote it, which the files that belong to it carry too.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state: Option<String>,

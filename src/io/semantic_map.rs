@@ -7,18 +7,20 @@
 //! | tensor `parents` | `[identities]` u32, 0 = none; identities count from 1 |
 //! | tensor `views` | `[identities]` u32, views with language features, if an encoder has looked |
 //! | tensors `raw`, `deviated` | `[identities, 4, dimension]` f16, unit length; 0 beyond `views` |
+//! | tensors `removed_places`, `removed_shapes` | `[n, 3]` f64, `[n, 8]` f32: Gaussians that were taken out for good |
 //!
 //! Which Gaussian is whose, and its codes, are in `point_cloud.ply`, beside the Gaussians.
 
 use std::collections::HashMap;
 use std::path::Path;
+use std::sync::Arc;
 
 use bytemuck::cast_slice;
 use half::f16;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use serde::{Deserialize, Serialize};
 
-use super::{IoError, files};
+use super::{IoError, files, removed};
 use crate::scene::language::MAX_VIEWS;
 use crate::scene::{Findings, GaussianCloud, Identities, LanguageFeatures, Preparation, SemanticMap, ViewFeatures};
 
@@ -79,8 +81,21 @@ pub fn encode(map: &SemanticMap, state: Option<&str>, path: &Path) -> Result<Vec
         tensors.push(("raw", view(Dtype::F16, shape.clone(), cast_slice(&raw))?));
         tensors.push(("deviated", view(Dtype::F16, shape, cast_slice(&deviated))?));
     }
+    let gone = map.removed.as_deref().map(removed::pack);
+    if let Some((places, shapes)) = &gone {
+        let n = places.len();
+        tensors.push((removed::PLACES, view(Dtype::F64, vec![n, 3], cast_slice(places))?));
+        tensors.push((removed::SHAPES, view(Dtype::F32, vec![n, removed::SHAPE], cast_slice(shapes))?));
+    }
     let metadata = HashMap::from([(KEY.to_owned(), text)]);
     safetensors::serialize(tensors, Some(metadata)).map_err(|e| broken(&e))
+}
+
+/// How many objects and parts are stored with the scene in `folder`; 0 where that cannot be read.
+pub(crate) fn count(folder: &Path) -> usize {
+    let path = folder.join(FILE);
+    let header = files::read(&path, MAX_BYTES).and_then(|bytes| header(&path, &bytes));
+    header.map_or(0, |header| header.identities.len())
 }
 
 /// The map of the scene in `folder`, whose Gaussians `cloud` are of the save `state`; `None` if it has none.
@@ -105,7 +120,19 @@ pub(crate) fn decode(
         Some(encoder) => Some(features(path, bytes, encoder, &header.identities)?),
     };
     let map = SemanticMap::restore(header.identities, header.seeds, cloud).ok_or_else(|| torn(path))?;
-    Ok(SemanticMap { language, prepared: header.prepared, findings: header.findings, ..map })
+    let removed = removed::unpack(bytes, path)?.map(Arc::new);
+    Ok(SemanticMap { language, prepared: header.prepared, findings: header.findings, removed, ..map })
+}
+
+/// Names of what was taken out of the scene in `folder` for good, and its Gaussians, where they were kept; nothing where
+/// that cannot be read.
+pub(crate) fn removed_of(folder: &Path) -> (Vec<String>, Option<GaussianCloud>) {
+    let path = folder.join(FILE);
+    let read = files::read(&path, MAX_BYTES).and_then(|bytes| {
+        let names = header(&path, &bytes)?.identities.removed;
+        Ok((names, removed::unpack(&bytes, &path)?))
+    });
+    read.unwrap_or_default()
 }
 
 /// Whether such bytes are of the save `state`.

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::select::{self, SelectFor, SelectRequest, Stroke};
+use super::select::{self, SelectFor, SelectRequest, SelectStep, Stroke};
 use super::{Folders, JobError, open, plan};
 use crate::io::{self, Opened};
 use crate::measure::StudyError;
@@ -130,7 +130,7 @@ fn strokes(
             map: Arc::clone(&map),
             purpose: SelectFor::New(NOBODY),
             before,
-            stroke: Some(Stroke { camera: camera.clone(), pixels, is_plus: k % 3 != 2 }),
+            step: SelectStep::Stroke(Stroke { camera: camera.clone(), pixels, is_plus: k % 3 != 2 }),
         };
         let start = Instant::now();
         let selected = select::run(&request, observer)?;

@@ -1,7 +1,7 @@
 //! The demo: the trained one that ships with the program, how it is made, and the photos to train it anew.
 
 use std::io::Cursor;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
 use image::codecs::jpeg::JpegEncoder;
@@ -81,33 +81,12 @@ pub(crate) fn picture() -> Result<Vec<u8>, IoError> {
     bundle::read(BUNDLE, PICTURE, Path::new(NAME))
 }
 
-/// The folder of the trained demo, unpacked where that was not done before. What a user has changed in it stays.
-///
-/// # Errors
-/// If it cannot be written.
-pub(crate) fn unpacked(folders: &Folders) -> Result<PathBuf, IoError> {
-    let folder = folders.shipped_demo(&digest(BUNDLE)[..12]);
-    let is_there = || trained::is_scene(&folder.join("scene"));
-    if is_there() {
-        return Ok(folder);
-    }
-    match bundle::unpack(BUNDLE, &folder) {
-        // Another process was as quick.
-        Err(_) if is_there() => Ok(folder),
-        Err(_) if folder.exists() => Err(IoError::Occupied {
-            folder,
-            what: "is the demo folder but no longer holds a scene; remove it and try again",
-        }),
-        result => result.map(|()| folder),
-    }
-}
-
 /// Opens the trained demo.
 ///
 /// # Errors
 /// As [`unpacked`] and [`open::open`].
 pub(crate) fn open(folders: &Folders, machine: &Machine, observer: &mut dyn Observer) -> Result<OpenedScene, JobError> {
-    let mut scene = open::open(&unpacked(folders)?.join("scene"), folders, machine, observer)?;
+    let mut scene = open::open(&unpacked(folders, observer)?.join("scene"), folders, machine, observer)?;
     call(&mut scene, "Demo");
     let photo = scene.dataset.as_ref().and_then(|d| d.photos.get(DemoRecipe::shipped().home));
     scene.home.camera = photo.map(|p| p.camera.clone()).or(scene.home.camera);
@@ -147,7 +126,7 @@ pub(crate) fn examine(
     pictures: &Path,
     observer: &mut dyn Observer,
 ) -> Result<([f64; 2], DemoQueries), JobError> {
-    let folder = unpacked(folders)?;
+    let folder = unpacked(folders, observer)?;
     let (scene, photos) = (open::scene(&folder.join("scene"))?, folder.join("photos"));
     let map = scene.semantics()?;
     let job = PhotoComparison::new(scene, &photos, EvaluateOptions::default())?;
@@ -327,6 +306,9 @@ fn rounded(cloud: &GaussianCloud) -> GaussianCloud {
         ..GaussianCloud::default()
     }
 }
+
+mod unpacked;
+pub(crate) use self::unpacked::unpacked;
 
 #[cfg(test)]
 mod tests;

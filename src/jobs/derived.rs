@@ -12,6 +12,9 @@ use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::{GaussianCloud, SemanticMap};
 
+/// How a scene is made in which something was moved, recolored or duplicated.
+pub(crate) const EDITED: &str = "edited";
+
 /// Refuses a place for the result that is taken or not fit for it: a file of splats where it is called so, else a folder.
 pub(crate) fn check_place(scene: &Scene, out: &Path) -> Result<(), JobError> {
     match SplatFormat::of(out) {
@@ -34,7 +37,7 @@ pub(crate) fn write(
         export_splat::run(cloud, out, None, observer)?.tell_loss(observer);
         return Ok(());
     }
-    store(from, format!("{} {how}", from.name), cloud, map, out)?;
+    store(from, (format!("{} {how}", from.name), how == EDITED), cloud, map, out)?;
     Ok(())
 }
 
@@ -70,11 +73,11 @@ fn drawn_as(from: &Scene) -> Result<serde_json::Value, JobError> {
     serde_json::to_value(config).map_err(|e| JobError::Output(e.to_string()))
 }
 
-/// Stores Gaussians that were made of `from`, and their objects and parts, as the scene `name` in the folder `out`.
-/// Returns the id of its state.
+/// Stores Gaussians that were made of `from`, and their objects and parts, as the scene `name` in the folder `out`;
+/// whether they are `edited`, so that photos show them otherwise. Returns the id of its state.
 pub(crate) fn store(
     from: &Scene,
-    name: String,
+    (name, edited): (String, bool),
     cloud: &GaussianCloud,
     map: Option<&SemanticMap>,
     out: &Path,
@@ -88,6 +91,7 @@ pub(crate) fn store(
         None => SceneInfo { config: drawn_as(from)?, ..SceneInfo::default() },
     };
     info.name = name;
+    info.edited |= edited;
     // What was measured was measured before.
     info.history.evaluations.clear();
     if let (Some(dataset), Some(path)) = (&mut info.dataset, &from.dataset_path) {
@@ -111,10 +115,10 @@ mod tests {
             let cloud = GaussianCloud::isotropic(vec![[0.0; 3]; 3], -3.0, 1.0);
             splat_ply::write(&file, &GaussianCloud { render_mode: mode, ..cloud }).expect("written");
             let from = open::scene(&file).expect("opened");
-            store(&from, "a".into(), &from.cloud, None, &out).expect("stored");
+            store(&from, ("a".into(), false), &from.cloud, None, &out).expect("stored");
             let made = open::scene(&out).expect("opened");
             assert_eq!((&made.settings, made.cloud.render_mode), (&from.settings, mode));
-            assert!(store(&from, "a".into(), &from.cloud, None, &out).is_err(), "nothing is written over");
+            assert!(store(&from, ("a".into(), false), &from.cloud, None, &out).is_err(), "nothing is written over");
         }
     }
 }

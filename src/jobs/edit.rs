@@ -32,6 +32,11 @@ pub(crate) fn apply(
     })
 }
 
+/// Full names of what a change left without a Gaussian that had some, where it changed no numbers.
+pub(crate) fn emptied(before: &SemanticMap, after: &SemanticMap) -> Vec<String> {
+    edit::emptied(before, after).into_iter().map(|id| before.identities.full_name(id)).collect()
+}
+
 /// Stores the map of the scene in `folder`, which is known in the state `known`. Returns its state then; `None`
 /// if nothing is stored because there is no scene yet.
 pub(crate) fn store(

@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use image::ColorType;
 
+use super::changed::ChangedScene;
 use super::held_out::{held_out, refuse_holdout};
 use super::{JobError, Scene, export, open};
 use crate::io;
@@ -47,6 +48,8 @@ pub(crate) struct PhotoComparison {
     pub(crate) pictures: Option<PathBuf>,
     /// Id of the save that the scene's files are of.
     pub(crate) state: Option<String>,
+    /// What of the scene the photos show otherwise.
+    pub(crate) changed: ChangedScene,
 }
 
 impl PhotoComparison {
@@ -81,16 +84,18 @@ impl PhotoComparison {
             scene.cameras.iter().any(|c| !c.held_out && c.name == *name)
         };
         let trained_on = views.iter().map(seen).collect();
-        Ok(Self { cloud, settings, dataset, views, trained_on, max_side_px, borders, pictures, state: None })
+        let changed = ChangedScene::of(scene, &dataset);
+        Ok(Self { cloud, settings, dataset, views, trained_on, max_side_px, borders, pictures, state: None, changed })
     }
 
     pub(crate) fn view(&self, index: usize) -> Result<TrainView, JobError> {
         let photo = &self.dataset.photos[index];
-        let pixels = match &self.borders {
+        let mut pixels = match &self.borders {
             Some(borders) => borders.load(photo)?,
             None => io::photo::load(photo, self.max_side_px)?,
         };
         let camera = photo.camera.resized(pixels.width_px, pixels.height_px);
+        self.changed.leave_out(&mut pixels, &camera, &self.settings)?;
         Ok(TrainView { name: photo.name.clone(), camera, pixels })
     }
 
@@ -115,6 +120,9 @@ impl PhotoComparison {
 pub(crate) fn photometric(comparison: &PhotoComparison, observer: &mut dyn Observer) -> Result<Evaluation, JobError> {
     for warning in &comparison.dataset.warnings {
         observer.note(Severity::Warning, warning.clone());
+    }
+    if let Some((severity, text)) = comparison.changed.told() {
+        observer.note(severity, text);
     }
     let PhotoComparison { cloud, settings, .. } = comparison;
     let mut renderer = Renderer::new();

@@ -2,7 +2,7 @@
 
 pub(crate) mod forecast;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::Instant;
 
@@ -14,7 +14,7 @@ use super::JobError;
 use super::held_out::held_out;
 use crate::io::labels::Labels;
 use crate::io::trained::{self, CLOUD_FILE};
-use crate::io::{IoError, SceneFolder, splat_ply};
+use crate::io::{IoError, SceneFolder, semantic_map, splat_ply};
 use crate::math::format::things;
 use crate::models;
 use crate::models::catalog::{self, ModelRole, SAM2};
@@ -22,6 +22,7 @@ use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::build_map::{
     CODE_STEPS, Carry, FindOptions, Found, REGIONS, Tools, find_objects, segmenter,
 };
+use crate::pipeline::semantics::keep;
 use crate::pipeline::semantics::recipe::RecipeName;
 use crate::pipeline::semantics::sam2_tracker::Sam2Tracker;
 use crate::pipeline::semantics::tracker::TrackOptions;
@@ -53,6 +54,9 @@ pub struct FindSettings {
     pub max_seeds: usize,
     /// Share of a photo that may stay unknown before its masks are used too.
     pub unknown_share: f64,
+    /// Whether objects and parts that somebody has worked on are found anew, too; else they stay as they are.
+    #[serde(skip)]
+    pub replace_all: bool,
 }
 
 impl Default for FindSettings {
@@ -68,6 +72,7 @@ impl Default for FindSettings {
             seed: None,
             max_seeds,
             unknown_share: reseed_share,
+            replace_all: false,
         }
     }
 }
@@ -101,6 +106,8 @@ pub(crate) struct FoundObjects {
     pub(crate) found: Found,
     /// The photos that were looked at; what was found counts them.
     pub(crate) photos: Vec<Photo>,
+    /// Names of what somebody had worked on before, and stayed as it was.
+    pub(crate) kept: Vec<String>,
     pub(crate) state: String,
     pub(crate) secs: f64,
     /// What of the labels was passed over, not used or joined.
@@ -141,6 +148,13 @@ pub(crate) fn run(
     if splat_ply::state(&folder.join(CLOUD_FILE))?.as_deref() != known {
         return Err(IoError::Changed { folder: folder.into() }.into());
     }
+    let before = before(folder, observer);
+    let keep = before.as_ref().filter(|_| request.known.is_none() && !with.replace_all).and_then(keep::worked_on);
+    let kept = keep.as_ref().map_or_else(Vec::new, by_hand);
+    if !kept.is_empty() {
+        observer.note(Severity::Info, kept_text(&kept));
+    }
+    let (removed, removed_names) = gone(before.as_ref(), observer);
     let cameras = trained::load_info(folder)?.cameras;
     let held = held_out(dataset, &cameras, None, request.holdout_every);
     let all = dataset.photos.iter().enumerate();
@@ -164,12 +178,15 @@ pub(crate) fn run(
             max_side_px: request.side_px,
             prompt: preparation.prompt.unwrap_or_default(),
             known: request.known.clone(),
+            removed: removed.clone(),
+            removed_names,
             ..TrackOptions::default()
         },
         lifting: preparation.lifting,
         code_steps: with.code_steps,
         part_weight: preparation.part_weight,
         grid: None,
+        keep: keep.map(Arc::new),
     };
     let labels = masks.map(|path| Labels::of_photos(path, &dataset.photos)).transpose()?;
     let mut warnings = labels.as_ref().map_or_else(Vec::new, |labels| labels.notes().to_vec());
@@ -231,10 +248,63 @@ pub(crate) fn run(
     };
     let start = Instant::now();
     let tools = Tools { segmenter: &mut *segmenter, follower: follower.as_mut(), encoder: encoder.as_deref_mut() };
-    let found = find_objects(cloud, &photos, settings, tools, &options, observer)?;
-    let (kept, state) = scene.replace_map(known, &found.map, cloud)?;
-    if let Some(kept) = kept {
-        observer.note(Severity::Info, format!("The previous objects and parts are kept in {}", kept.display()));
+    let mut found = find_objects(cloud, &photos, settings, tools, &options, observer)?;
+    let names = before.map(|map| map.identities.removed).unwrap_or_default();
+    found.map.identities.add_removed(names);
+    found.map.removed = removed;
+    let (earlier, state) = scene.replace_map(known, &found.map, cloud)?;
+    if let Some(earlier) = earlier {
+        observer.note(Severity::Info, format!("The previous objects and parts are kept in {}", earlier.display()));
     }
-    Ok(FoundObjects { found, photos, state, secs: start.elapsed().as_secs_f64(), warnings })
+    Ok(FoundObjects { found, photos, kept, state, secs: start.elapsed().as_secs_f64(), warnings })
+}
+
+/// The objects and parts that are stored with the scene in a folder; `None` if there are none, or they are broken.
+fn before(folder: &Path, observer: &mut dyn Observer) -> Option<SemanticMap> {
+    // Not those of the request: its Gaussians do not say whose they are by now.
+    let map = trained::load(folder).and_then(|scene| semantic_map::load(folder, scene.state.as_deref(), &scene.cloud));
+    map.inspect_err(|e| observer.note(Severity::Warning, format!("Nothing is kept of the objects before: {e}"))).ok()?
+}
+
+/// What was taken out of a scene, and names by which it is told where its Gaussians were not kept.
+fn gone(before: Option<&SemanticMap>, observer: &mut dyn Observer) -> (Option<Arc<GaussianCloud>>, Vec<String>) {
+    let Some(map) = before.filter(|map| !map.identities.removed.is_empty()) else { return (None, Vec::new()) };
+    let names = listed(&map.identities.removed);
+    if map.removed.is_some() {
+        let text =
+            format!("What was removed ({names}) is not looked for: where photos still show it, they are left out");
+        observer.note(Severity::Info, text);
+        return (map.removed.clone(), Vec::new());
+    }
+    let text = format!(
+        "{names} was removed by a version that did not keep where it was: masks of that name are left out, others may find \
+         it again"
+    );
+    observer.note(Severity::Warning, text);
+    let is_left = |name: &String| map.identities.iter().any(|(_, i)| i.names.contains(name));
+    (None, map.identities.removed.iter().filter(|name| !is_left(name)).cloned().collect())
+}
+
+/// Full names of what somebody has worked on.
+pub(crate) fn by_hand(map: &SemanticMap) -> Vec<String> {
+    map.by_hand().into_iter().map(|id| map.identities.full_name(id)).collect()
+}
+
+/// Most names that are listed in a sentence.
+const LISTED: usize = 6;
+
+/// Some of these names, and how many more there are: "lamp, mug and 3 more".
+pub(crate) fn listed(names: &[String]) -> String {
+    match names.len().checked_sub(LISTED).filter(|more| *more > 0) {
+        Some(more) => format!("{} and {more} more", names[..LISTED].join(", ")),
+        None => names.join(", "),
+    }
+}
+
+fn kept_text(names: &[String]) -> String {
+    format!(
+        "Kept as it was, with its parts and its whole: what was named, selected or corrected by hand ({} in all: {})",
+        names.len(),
+        listed(names)
+    )
 }

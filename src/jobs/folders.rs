@@ -1,11 +1,16 @@
 //! Where the program keeps what it makes without being told where: demo photos, trained scenes, reports.
 
+use std::fs;
 use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
 use crate::io::data_folder::data_folder;
-use crate::io::files;
+use crate::io::scene_files::{SCENE_FILE, is_scene};
+use crate::io::{IoError, atomic, files};
+
+/// Beside the trainings of a data set, the name of the one that was used last.
+const USED: &str = "used-last";
 
 /// The program's folders, all below one.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -30,9 +35,39 @@ impl Folders {
         self.data.join(format!("demo-{}-trained-{digest}", env!("CARGO_PKG_VERSION")))
     }
 
-    /// Folder of the newest scene trained from the dataset at `root`, whether it exists or not.
+    /// Folder of the scene trained from the dataset at `root` that was used last, whether it exists or not.
     pub(crate) fn trained(&self, root: &Path) -> PathBuf {
-        self.runs(root).take_while(|run| run.exists()).last().unwrap_or_else(|| self.fresh(root))
+        let runs = self.trainings(root);
+        // Where nobody noted it, the one that was written last; of two of one moment the newer.
+        let noted = runs.first().and_then(|run| fs::read_to_string(run.with_file_name(USED)).ok());
+        let used = runs.iter().find(|run| noted.as_deref().is_some_and(|name| run.ends_with(name.trim())));
+        let written = |run: &&PathBuf| fs::metadata(run.join(SCENE_FILE)).and_then(|m| m.modified()).ok();
+        let used = used.filter(|run| is_scene(run)).or_else(|| runs.iter().max_by_key(written));
+        used.cloned().unwrap_or_else(|| self.fresh(root))
+    }
+
+    /// Folders of all trainings of the dataset at `root`, first to last.
+    pub(crate) fn trainings(&self, root: &Path) -> Vec<PathBuf> {
+        self.runs(root).take_while(|run| run.exists()).collect()
+    }
+
+    /// Whether a folder is one of those of trainings.
+    pub(crate) fn is_training(&self, run: &Path) -> bool {
+        run.parent().and_then(Path::parent) == Some(self.data.join("trained").as_path())
+    }
+
+    /// Notes that a training is the one that is used; anything else than a training is left alone.
+    ///
+    /// # Errors
+    /// If that cannot be written.
+    pub(crate) fn note_use(&self, run: &Path) -> Result<(), IoError> {
+        let Some(name) = run.file_name().filter(|_| self.is_training(run) && is_scene(run)) else { return Ok(()) };
+        let path = run.with_file_name(USED);
+        let name = name.to_string_lossy();
+        if fs::read_to_string(&path).is_ok_and(|noted| noted == name) {
+            return Ok(());
+        }
+        atomic::write(&path, |w| w.write_all(name.as_bytes()))
     }
 
     /// A folder for a new training of the dataset at `root`, next to those of earlier ones.
@@ -112,6 +147,37 @@ mod tests {
         assert_eq!(places.trained(root), first);
         std::fs::create_dir_all(&second).expect("create");
         assert_eq!(places.trained(root), second, "the newest is shown");
+    }
+
+    #[test]
+    fn the_training_that_was_used_last_is_shown_not_the_highest_number() {
+        let folder = tempfile::tempdir().expect("folder");
+        let folders = Folders { data: folder.path().into() };
+        let root = Path::new("/one/fox");
+        let runs: Vec<PathBuf> = (0..3)
+            .map(|_| {
+                let run = folders.fresh(root);
+                fs::create_dir_all(&run).expect("created");
+                fs::write(run.join(SCENE_FILE), "{}").expect("written");
+                run
+            })
+            .collect();
+        assert_eq!((folders.trainings(root), folders.trained(root)), (runs.clone(), runs[2].clone()));
+        folders.note_use(&runs[0]).expect("noted");
+        assert_eq!(folders.trained(root), runs[0]);
+        folders.note_use(&folder.path().join("elsewhere/run-2")).expect("none of them");
+        assert_eq!(folders.trained(root), runs[0], "the control");
+        fs::remove_file(runs[0].join(SCENE_FILE)).expect("removed");
+        assert_eq!(folders.trained(root), runs[2], "what is no scene any more is not shown");
+        // As earlier versions left it: nothing is noted, and the first was worked on last.
+        fs::remove_file(runs[0].with_file_name(USED)).expect("removed");
+        let later = std::time::SystemTime::now() + std::time::Duration::from_secs(5);
+        fs::File::options()
+            .write(true)
+            .open(runs[1].join(SCENE_FILE))
+            .and_then(|f| f.set_modified(later))
+            .expect("set");
+        assert_eq!(folders.trained(root), runs[1]);
     }
 
     #[test]

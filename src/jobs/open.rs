@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::held_out::held_out;
+use super::recent::{self, RunSummary};
 use super::sparse_cloud::sparse_cloud;
 use super::{Folders, JobError, plan};
 use crate::io::labels::Labels;
@@ -53,6 +54,8 @@ pub struct Scene {
     pub(crate) cameras_from: Option<PathBuf>,
     /// Things the user should know of its files and of what lies beside them.
     pub(crate) warnings: Vec<String>,
+    /// Whether its Gaussians were edited since it was trained.
+    pub(crate) edited: bool,
 }
 
 impl Scene {
@@ -128,6 +131,7 @@ impl Scene {
             photos: info.dataset.map(|d| d.path),
             dataset_path,
             metres_per_unit: info.metres_per_unit.filter(|m| m.is_finite() && *m > 0.0),
+            edited: info.edited,
             state,
             warnings,
             ..Self::default()
@@ -215,6 +219,8 @@ pub struct OpenedScene {
     pub(crate) state: Option<String>,
     /// Settings of a training in `out` that can go on.
     pub(crate) resumable: Option<TrainConfig>,
+    /// All trainings of its photos that this program keeps, itself among them.
+    pub runs: Vec<RunSummary>,
     pub(crate) reports: Vec<PathBuf>,
     pub(crate) report_out: PathBuf,
     /// Whether edits of Gaussians have made it, and are stored in it.
@@ -287,6 +293,7 @@ pub(crate) fn open(
     observer: &mut dyn Observer,
 ) -> Result<OpenedScene, JobError> {
     let path = &beside::splat_of(&std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()));
+    let mut at = path.clone();
     let mut scene = match io::open(path)? {
         Opened::Dataset(dataset) => photos(dataset, folders, observer),
         Opened::Cloud(cloud) => {
@@ -298,10 +305,18 @@ pub(crate) fn open(
         Opened::Trained(trained) => {
             let scene = tolerant(path, trained, observer);
             let dataset = photos_of(&scene, observer);
+            if let Some(dataset) = dataset.as_ref().filter(|_| folders.is_training(path)) {
+                // One of several trainings of these photos, which are what somebody knows it by.
+                at.clone_from(&dataset.root);
+            }
             OpenedScene::of(scene, dataset, observer)
         }
     };
-    scene.path.clone_from(path);
+    scene.path = at;
+    scene.runs = scene.dataset.as_ref().map_or_else(Vec::new, |d| recent::runs(folders, &d.root));
+    if let Some(text) = objects_elsewhere(&scene) {
+        observer.note(Severity::Warning, text);
+    }
     let root = scene.dataset.as_ref().map(|d| d.root.clone());
     scene.masks = root.filter(|root| Labels::open(root).is_ok());
     scene.report_out = match scene.out.as_os_str().is_empty() {
@@ -312,6 +327,19 @@ pub(crate) fn open(
     let facts = plan::facts(machine, scene.dataset.as_deref(), cloud, &TrainConfig::default());
     scene.facts = facts.with_semantics(scene.semantics.as_deref());
     Ok(scene)
+}
+
+/// Where a scene without objects is one of several trainings, another of which has some: which, in words.
+fn objects_elsewhere(scene: &OpenedScene) -> Option<String> {
+    if scene.semantics.is_some() || !scene.trained || scene.runs.iter().all(|run| run.folder != scene.out) {
+        return None;
+    }
+    let other = scene.runs.iter().max_by_key(|run| run.objects).filter(|run| run.objects > 0)?;
+    Some(format!(
+        "This training has no objects; an earlier one of these photos has ({}). Open it in the Training pane, or at {}",
+        other.text(),
+        other.folder.display()
+    ))
 }
 
 /// The objects and parts stored with a trained scene; broken ones are told and left out.

@@ -44,7 +44,7 @@ pub(crate) fn retrain(
     }
     let mut dataset = open::dataset(&photos)?;
     dataset.name = format!("{} without {name}", from.name);
-    let done = train::run(&dataset, &from.config, [out.to_owned()], train::IfChanged::Ask, observer)?;
+    let done = train::run(&dataset, &from.config, [out.to_owned()], &train::IfChanged::Ask.into(), observer)?;
     if !done.is_finished() {
         return Ok(false);
     }
@@ -70,6 +70,11 @@ pub(crate) fn check(from: &Scene, without: (&RemovalOptions, &str), out: &Path) 
 /// Whether [`retrain`] has begun exactly this in a folder.
 pub(crate) fn is_begun(from: &Scene, without: (&RemovalOptions, &str), out: &Path) -> bool {
     files::read_json::<serde_json::Value>(&out.join(PHOTOS).join(MARK)).is_ok_and(|m| m == mark(from, without))
+}
+
+/// Whether the photos in a folder are made without something.
+pub(crate) fn is_without(photos: &Path) -> bool {
+    photos.join(MARK).is_file()
 }
 
 fn mark(from: &Scene, (options, name): (&RemovalOptions, &str)) -> serde_json::Value {

@@ -70,9 +70,9 @@ pub(crate) fn run(request: &RearrangeRequest, known: Option<&str>) -> Result<Rea
             (path.clone(), request.name.clone(), held.save_edited(known, map.as_deref(), &cloud)?)
         }
         false => {
-            let (scene, folder) = (open::scene(path)?, derived::free_folder(path, "edited"));
+            let (scene, folder) = (open::scene(path)?, derived::free_folder(path, derived::EDITED));
             let name = format!("{} edited", request.name);
-            let state = derived::store(&scene, name.clone(), &cloud, map.as_deref(), &folder)?;
+            let state = derived::store(&scene, (name.clone(), true), &cloud, map.as_deref(), &folder)?;
             (folder, name, state)
         }
     };

@@ -3,7 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use super::{Folders, JobError, export};
-use crate::io::{IoError, files};
+use crate::io::{IoError, files, semantic_map, trained};
+use crate::math::format;
 use crate::math::resize::{Filter, resize};
 use crate::scene::PhotoPixels;
 
@@ -40,6 +41,52 @@ pub(crate) fn load(folders: &Folders, of: Vec<PathBuf>) -> Vec<(PathBuf, PhotoPi
         Ok(PhotoPixels { width_px, height_px, rgb: rgb.pixels().map(|p| p.0).collect(), coverage: None })
     };
     of.into_iter().filter_map(|path| Some((read(&path).ok()?, path))).map(|(pixels, path)| (path, pixels)).collect()
+}
+
+/// A training of a data set, as it is told of in lists.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunSummary {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// Steps that it has come to.
+    pub steps: u64,
+    /// Objects and parts that are stored with it.
+    pub objects: usize,
+    psnr: Option<f64>,
+}
+
+impl RunSummary {
+    /// In words: "run-1: 600 steps, 26.6 dB, 13 objects and parts".
+    pub(crate) fn text(&self) -> String {
+        let name = self.folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let quality = self.psnr.map_or_else(String::new, |psnr| format!(", {psnr:.1} dB"));
+        let objects = match self.objects {
+            0 => "no objects".to_owned(),
+            1 => "1 object".to_owned(),
+            n => format!("{n} objects and parts"),
+        };
+        format!("{name}: {}{quality}, {objects}", format::things(self.steps as usize, "step"))
+    }
+}
+
+/// The trainings of the photos at `path`, first to last. Those that cannot be read are left out.
+pub(crate) fn runs(folders: &Folders, path: &Path) -> Vec<RunSummary> {
+    let summary = |folder: PathBuf| {
+        let info = trained::load_info(&folder).ok()?;
+        let last = info.history.evaluations.last();
+        let steps = info.history.steps.last().map(|s| s.step).or(last.map(|e| e.step)).unwrap_or(0);
+        let psnr = last.map(|e| e.psnr).filter(|psnr| psnr.is_finite());
+        Some(RunSummary { objects: semantic_map::count(&folder), folder, steps, psnr })
+    };
+    folders.trainings(path).into_iter().filter_map(summary).collect()
+}
+
+/// The trainings of those of these photos that have several.
+pub(crate) fn several(folders: &Folders, of: Vec<PathBuf>) -> Vec<(PathBuf, Vec<RunSummary>)> {
+    // Photos may have been opened by the file that lists them.
+    let root = |path: &Path| if path.is_file() { files::folder_of(path).to_path_buf() } else { path.to_path_buf() };
+    let all = of.into_iter().map(|path| (runs(folders, &root(&path)), path)).map(|(runs, path)| (path, runs));
+    all.filter(|(_, runs)| runs.len() > 1).collect()
 }
 
 #[cfg(test)]

@@ -44,6 +44,11 @@ pub(crate) fn run(
         new.margin.push(GUESSED);
         new.codes.push(new.identities.codes(id));
     }
+    let mut stays = vec![false; scene.cloud.len()];
+    done.kept.iter().for_each(|i| stays[*i] = true);
+    let gone: Vec<usize> = (0..stays.len()).filter(|i| !stays[*i]).collect();
+    // Photos still show it, where it was.
+    new.add_removed(scene.cloud.select(&gone));
     Ok(Reduced { cloud: done.cloud.into(), map: new.into(), report: done.report })
 }
 
@@ -134,6 +139,7 @@ pub(crate) fn store(from: &Scene, name: &str, reduced: &Reduced, out: &Path) -> 
     if from.folder.is_none() {
         return Err(JobError::NoScene(from.path.clone()));
     }
-    derived::store(from, format!("{} without {name}", from.name), &reduced.cloud, Some(&reduced.map), out)?;
+    let name = format!("{} without {name}", from.name);
+    derived::store(from, (name, false), &reduced.cloud, Some(&reduced.map), out)?;
     Ok(())
 }

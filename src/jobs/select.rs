@@ -24,7 +24,18 @@ pub enum SelectFor {
     Extent(IdentityId),
 }
 
-/// A further stroke.
+/// What is to be done for a selection.
+#[derive(Clone, Debug)]
+pub enum SelectStep {
+    /// Make ready for the first stroke.
+    Prepare,
+    /// Take in a further stroke.
+    Stroke(Stroke),
+    /// Take the last one back.
+    TakeBack,
+}
+
+/// A step of a selection.
 #[derive(Clone, Debug)]
 pub struct SelectRequest {
     pub(crate) cloud: Arc<GaussianCloud>,
@@ -37,14 +48,15 @@ pub struct SelectRequest {
     pub(crate) purpose: SelectFor,
     /// What was made ready for these Gaussians before, and what was marked.
     pub(crate) before: Option<Arc<Selected>>,
-    /// `None` takes the last one back.
-    pub(crate) stroke: Option<Stroke>,
+    pub(crate) step: SelectStep,
 }
 
 /// What clicks and strokes select.
 #[derive(Clone, Debug)]
 pub struct Selected {
     hierarchy: Arc<Hierarchy>,
+    /// The Gaussians that it is of.
+    cloud: Arc<GaussianCloud>,
     marks: StrokeMarks,
     /// Indices, rising.
     pub(crate) gaussians: Vec<u32>,
@@ -62,25 +74,40 @@ impl Selected {
     }
 
     /// Nothing selected, with all that was made ready.
-    pub(super) fn begun_anew(&self) -> Self {
-        Self { marks: StrokeMarks::default(), ..self.clone() }
+    pub(crate) fn begun_anew(&self) -> Self {
+        Self { marks: StrokeMarks::default(), gaussians: Vec::new(), id: NOBODY, ..self.clone() }
+    }
+
+    /// Whether it was made ready for these Gaussians.
+    pub(crate) fn is_of(&self, cloud: &Arc<GaussianCloud>) -> bool {
+        Arc::ptr_eq(&self.cloud, cloud)
+    }
+
+    /// Whether the other was made ready with it, once for both.
+    pub(crate) fn shares(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.hierarchy, &other.hierarchy)
     }
 }
 
 /// Adds the stroke, or takes the last one back.
 pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Result<Selected, JobError> {
-    let SelectRequest { cloud, settings, map, purpose, before, stroke, .. } = request;
-    // Where training has changed the Gaussians meanwhile, it begins anew.
-    let before = before.as_ref().filter(|before| before.hierarchy.gaussians() == cloud.len());
-    let hierarchy = match before {
+    let SelectRequest { cloud, settings, map, purpose, before, step, .. } = request;
+    // Where the Gaussians have changed meanwhile, what hangs together is looked at anew.
+    let hierarchy = match before.as_ref().filter(|before| before.is_of(cloud)) {
         Some(before) => Arc::clone(&before.hierarchy),
         None => Arc::new(Hierarchy::new(cloud, &views(&request.cameras, &request.home), settings, observer)?),
     };
     let start = Instant::now();
+    // Marks name Gaussians by number.
+    let before = before.as_ref().filter(|before| before.hierarchy.gaussians() == cloud.len());
     let mut marks = before.map(|b| b.marks.clone()).unwrap_or_default();
-    match stroke {
-        Some(stroke) => marks.add(&mut Renderer::new(), cloud, settings, stroke)?,
-        None => marks.remove_last(),
+    match step {
+        SelectStep::Prepare => {
+            let (cloud, preview) = (Arc::clone(cloud), Arc::clone(map));
+            return Ok(Selected { hierarchy, cloud, marks, gaussians: Vec::new(), preview, id: NOBODY, ms: 0.0 });
+        }
+        SelectStep::Stroke(stroke) => marks.add(&mut Renderer::new(), cloud, settings, stroke)?,
+        SelectStep::TakeBack => marks.remove_last(),
     }
     let from = match purpose {
         SelectFor::Extent(id) => map.members(*id).into_iter().filter(|i| *i < cloud.len()).collect(),
@@ -99,7 +126,7 @@ pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Resul
         };
         (Arc::new(preview), id)
     };
-    Ok(Selected { hierarchy, marks, gaussians, preview, id, ms })
+    Ok(Selected { hierarchy, cloud: Arc::clone(cloud), marks, gaussians, preview, id, ms })
 }
 
 /// The edit that keeps what is selected.

@@ -1,12 +1,14 @@
 //! Training Gaussians on posed photos.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::presets;
 use super::{JobError, Scene, open};
-use crate::io::{semantic_map, splat_ply, trained};
+use crate::io::{IoError, SceneFolder, semantic_map, splat_ply, trained};
+use crate::math::format::things;
 use crate::pipeline::observer::{Observer, Severity};
+use crate::pipeline::semantics::carry;
 use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{self, FolderUse, TrainConfig, TrainEnd, TrainError, TrainOutcome};
 use crate::scene::{Dataset, SemanticMap};
@@ -42,27 +44,53 @@ pub enum IfChanged {
     AskClaimed,
 }
 
+/// What a training begins with.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct TrainStart {
+    /// Goes on where a training with the same settings and fewer steps ended.
+    pub more_steps: bool,
+    /// The scene whose objects and parts are carried over, by place, to a training in another folder.
+    pub objects_of: Option<PathBuf>,
+    /// The answer for a training that began with other photos.
+    pub if_changed: IfChanged,
+}
+
+impl From<IfChanged> for TrainStart {
+    fn from(if_changed: IfChanged) -> Self {
+        Self { if_changed, ..Self::default() }
+    }
+}
 /// Trains into the first of these `folders` that holds no training with other settings: that is another training,
 /// and the earlier one stays. A training that was stopped there goes on.
 pub(crate) fn run(
     dataset: &Dataset,
     config: &TrainConfig,
     folders: impl IntoIterator<Item = PathBuf>,
-    changed: IfChanged,
+    from: &TrainStart,
     observer: &mut dyn Observer,
 ) -> Result<Trained, JobError> {
-    let may = FolderUse { anyway: changed == IfChanged::GoOn, remake: changed != IfChanged::AskClaimed };
+    let changed = from.if_changed;
+    let may = FolderUse {
+        anyway: changed == IfChanged::GoOn,
+        remake: changed != IfChanged::AskClaimed,
+        more_steps: from.more_steps,
+    };
     let mut folders = folders.into_iter().peekable();
-    let mut earlier: Option<String> = None;
+    let mut earlier: Option<(String, PathBuf)> = None;
     while let Some(out) = folders.next() {
         if let Some(earlier) = earlier.take() {
-            observer.note(Severity::Info, format!("{earlier}, so this is a new training; the earlier one stays"));
+            let objects = match semantic_map::count(&earlier.1) {
+                0 => String::new(),
+                n => format!(", with its {}", things(n, "object or part")),
+            };
+            let text = format!("{}, so this is a new training; the earlier one{objects} stays", earlier.0);
+            observer.note(Severity::Info, text);
         }
         match train::run_on(dataset, config, Some(&out), may, observer) {
             Err(TrainError::Checkpoint(e)) if folders.peek().is_some() && makes_another(&e, changed) => {
                 let settings = || format!("The settings are not those of the training in {}", out.display());
                 let is_other = matches!(e, CheckpointError::OtherInputs { .. });
-                earlier = Some(if is_other { sentence(&e) } else { settings() });
+                earlier = Some((if is_other { sentence(&e) } else { settings() }, out));
             }
             result => {
                 let outcome = result?;
@@ -70,6 +98,12 @@ pub(crate) fn run(
                     && let Err(e) = presets::keep(&out, config)
                 {
                     observer.note(Severity::Warning, format!("The settings could not be saved to a file: {e}"));
+                }
+                if let Some(other) = &from.objects_of
+                    && let Err(e) = carry_over(other, &out, observer)
+                {
+                    observer
+                        .note(Severity::Warning, format!("The earlier objects and parts are not carried over: {e}"));
                 }
                 return finished(outcome, out, observer);
             }
@@ -92,6 +126,27 @@ fn sentence(error: &CheckpointError) -> String {
     let text = error.to_string();
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// Gives the scene in the folder `to`, unless it has objects and parts, those of the scene in another.
+fn carry_over(from: &Path, to: &Path, observer: &mut dyn Observer) -> Result<(), IoError> {
+    let has_objects = |folder: &Path| trained::is_scene(folder) && folder.join(semantic_map::FILE).exists();
+    if from == to || !has_objects(from) || has_objects(to) || !trained::is_scene(to) {
+        return Ok(());
+    }
+    let old = trained::load(from)?;
+    let Some(map) = semantic_map::load(from, old.state.as_deref(), &old.cloud)? else { return Ok(()) };
+    let new = trained::load(to)?;
+    let (carried, share) = carry::carry(&map, &old.cloud, &new.cloud);
+    SceneFolder::hold(to, "carrying objects over")?.save_map(new.state.as_deref(), &carried, &new.cloud)?;
+    let text = format!(
+        "{} of the training in {} were carried over to {:.1} % of the Gaussians, by place",
+        map.identities.counted(),
+        from.display(),
+        100.0 * share
+    );
+    observer.note(Severity::Info, text);
+    Ok(())
 }
 
 /// Objects are carried over to Gaussians that went on, and have to be read with their state.

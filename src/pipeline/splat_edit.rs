@@ -205,7 +205,7 @@ fn doubled(map: &SemanticMap, all: &[usize], id: IdentityId) -> SemanticMap {
         let added = edit::add(&mut new, identity.level, parent, name, &own);
         number[old as usize] = added;
         if let Some(copy) = new.identities.get_mut(added) {
-            copy.names = identity.names.clone();
+            (copy.names, copy.by_hand) = (identity.names.clone(), true);
         }
         if let Some(language) = &mut new.language
             && let Some(seen) = language.by_identity.get(old as usize - 1).cloned()

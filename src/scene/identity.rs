@@ -65,6 +65,9 @@ pub struct Identity {
     pub names: Vec<String>,
     /// Its point in code space, each coordinate in 0..1.
     pub code: [f32; 3],
+    /// Whether somebody named, selected, merged, split or corrected it, or had it added: finding objects anew keeps it.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub by_hand: bool,
 }
 
 /// All identities of a scene. Parents come before their pieces.
@@ -107,7 +110,7 @@ impl Identities {
         let parent = if self.get(parent).is_some() { parent } else { NOBODY };
         let names = names.iter().map(|name| text::name(name)).collect();
         self.whole_names = Known::default();
-        self.list.push(Identity { level, parent, names, code: [0.5; 3] });
+        self.list.push(Identity { level, parent, names, code: [0.5; 3], by_hand: false });
         self.list.len() as IdentityId
     }
 
@@ -155,6 +158,17 @@ impl Identities {
             identity.names.retain(|n| *n != name);
             identity.names.insert(0, name);
         }
+    }
+
+    /// Notes names of what was taken out for good, once each.
+    pub(crate) fn add_removed(&mut self, names: impl IntoIterator<Item = String>) {
+        let new: Vec<String> = names.into_iter().filter(|name| !self.removed.contains(name)).collect();
+        self.removed.extend(new);
+    }
+
+    /// Marks an identity as one that somebody has worked on.
+    pub(crate) fn mark_by_hand(&mut self, id: IdentityId) {
+        self.get_mut(id).into_iter().for_each(|identity| identity.by_hand = true);
     }
 
     /// Its own name: the first, or its number.

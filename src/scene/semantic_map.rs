@@ -1,5 +1,7 @@
 //! Identities together with the Gaussians that belong to them.
 
+use std::sync::Arc;
+
 use super::colors::SeenColors;
 use super::findings::IdentityEvidence;
 use super::{ExtraProperty, Findings, GaussianCloud, Identities, IdentityId, LanguageFeatures, NOBODY, Preparation};
@@ -41,6 +43,8 @@ pub struct SemanticMap {
     pub prepared: Option<Preparation>,
     /// What was noticed as it was found, if that is known.
     pub findings: Option<Findings>,
+    /// The Gaussians that were taken out of the scene for good, as they were: photos still show them.
+    pub removed: Option<Arc<GaussianCloud>>,
 }
 
 impl SemanticMap {
@@ -48,7 +52,17 @@ impl SemanticMap {
     pub fn from_identities(identities: Identities, of: Vec<IdentityId>, margin: Vec<f32>, seeds: Vec<String>) -> Self {
         let by_id: Vec<_> = (0..=identities.len() as IdentityId).map(|id| identities.codes(id)).collect();
         let codes = of.iter().map(|id| by_id.get(*id as usize).copied().unwrap_or(by_id[0])).collect();
-        Self { identities, identity_of: of, margin, codes, language: None, seeds, prepared: None, findings: None }
+        Self {
+            identities,
+            identity_of: of,
+            margin,
+            codes,
+            language: None,
+            seeds,
+            prepared: None,
+            findings: None,
+            removed: None,
+        }
     }
 
     /// Writes identities, margins and codes into the cloud's extra properties.
@@ -88,6 +102,13 @@ impl SemanticMap {
         self.identities.colors = SeenColors::of(cloud, self);
     }
 
+    /// Notes Gaussians that are taken out of the scene for good, beside those that were before.
+    pub(crate) fn add_removed(&mut self, gone: GaussianCloud) {
+        let bare = GaussianCloud { extras: Vec::new(), ..gone };
+        let before = self.removed.take().map(Arc::unwrap_or_clone);
+        self.removed = Some(Arc::new(GaussianCloud::joined(before.into_iter().chain([bare]).collect())));
+    }
+
     /// Indices of the Gaussians of an identity and its pieces, rising.
     pub(crate) fn members(&self, id: IdentityId) -> Vec<usize> {
         let inside = self.identities.descendants(id);
@@ -107,12 +128,26 @@ impl SemanticMap {
             seeds: self.seeds.clone(),
             prepared: self.prepared,
             findings: None,
+            removed: None,
         }
     }
 
     /// The same with all that is known of its identities.
     pub(crate) fn select_fully(&self, gaussians: &[usize]) -> Self {
-        Self { language: self.language.clone(), findings: self.findings.clone(), ..self.select(gaussians) }
+        Self {
+            language: self.language.clone(),
+            findings: self.findings.clone(),
+            removed: self.removed.clone(),
+            ..self.select(gaussians)
+        }
+    }
+
+    /// What somebody named, selected, merged, split or corrected, or had added, by rising number. Versions that did not
+    /// note it left a second name where one was given, and no photo where all was selected by clicks.
+    pub(crate) fn by_hand(&self) -> Vec<IdentityId> {
+        let by_clicks = self.seeds.is_empty();
+        let is = |i: &super::Identity| i.by_hand || by_clicks || i.names.len() > 1;
+        self.identities.iter().filter(|(_, i)| is(i)).map(|(id, _)| id).collect()
     }
 
     /// Whether nothing is known of a Gaussian: no mask and no photo says whose it is, nor that it is nobody's.

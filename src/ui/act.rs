@@ -27,13 +27,17 @@ use crate::worker::{Command, JobId};
 impl App {
     /// Does what a user asked for.
     pub(super) fn act(&mut self, action: Action, ctx: &egui::Context) {
+        if self.is_about_nothing(&action) {
+            return;
+        }
         match action {
             Action::Open(path) if is_report(&path) => self.read_report(path, false),
             Action::Open(path) if path.extension().is_some_and(|e| e == "toml") => self.read_preset(&path),
             Action::OpenDemo | Action::TrainDemo | Action::Open(_) | Action::FindPoses(_) => self.replace_scene(action),
             Action::Connect(url) => self.connect(&url),
-            Action::StartTraining => self.start_training(IfChanged::Ask),
-            Action::TrainChanged(how) => self.start_training(how),
+            Action::StartTraining => self.start_training(false, IfChanged::Ask),
+            Action::TrainAnew => self.start_training(true, IfChanged::Ask),
+            Action::TrainChanged(how) => self.start_training(false, how),
             Action::AskHowToTrain(changes) => self.ask_how_to_train(&changes),
             Action::PauseJob => {
                 if let Some(job) = self.state.job.clone().filter(|j| j.kind.can_pause()) {
@@ -53,7 +57,7 @@ impl App {
             Action::AnotherFill(request) => self.submit_removal(*request),
             Action::DeleteRemoved => self.ask_to_delete_removed(),
             Action::FetchModel(id) => self.install_model(id, None),
-            Action::TypeQuery => self.type_question(),
+            Action::TypeQuery => self.type_question(ctx),
             Action::Ask(text) => {
                 if let Some(semantics) = self.state.semantics.clone() {
                     self.viewport.queries.ask(&text, &semantics);
@@ -213,34 +217,6 @@ impl App {
         self.submit(Command::InstallModel { id, brought });
     }
 
-    fn start_training(&mut self, changed: IfChanged) {
-        let scene = self.state.scene.as_ref();
-        let Some((dataset, out)) = scene.and_then(|s| Some((s.dataset.clone()?, s.out.clone()))) else {
-            self.state.toast(Tone::Warning, "Open a folder of posed photos first: training needs them.");
-            return;
-        };
-        if let Some(job) = &self.state.job {
-            let text = format!("{} is still running; cancel it first (Esc).", job.title);
-            self.state.toast(Tone::Warning, text);
-            return;
-        }
-        let config = self.state.next_training(&self.layout.config);
-        self.state.antialias = config.render_settings(None).antialias;
-        let reached = self.state.continues_at(&config).unwrap_or(0);
-        self.state.resumable = Some((config.clone(), reached));
-        self.submit(Command::Train { dataset, config, out, changed });
-    }
-
-    /// Asks whether a training goes on with other photos than it began with.
-    fn ask_how_to_train(&mut self, changes: &str) {
-        let text = format!(
-            "{changes}.\n\nTrain anew in a folder of its own, or go on with the photos as they are now? The training so \
-             far stays as it is if you train anew."
-        );
-        let action = Action::TrainChanged(IfChanged::Anew);
-        let other = Some(("Go on", Action::TrainChanged(IfChanged::GoOn)));
-        self.question = Some(Question { text, yes: "Train anew", other, no: "Leave it", action });
-    }
 
     fn evaluate(&mut self) {
         let scene = self.state.scene.as_ref().and_then(|s| Some((s.dataset.clone()?, s.out.clone())));
@@ -359,18 +335,6 @@ impl App {
             Effect::Renamed(id, name) => self.edit(EditStep::Request(EditRequest::Apply(Edit::Rename(id, name)))),
             Effect::RenameUndone(id, name) => self.edit(EditStep::UndoRename(id, name)),
             Effect::Explored(explored) => self.state.explored = Some(explored),
-        }
-    }
-
-    fn type_question(&mut self) {
-        if self.state.semantics.is_some() {
-            // Another scene in the second view is not asked.
-            if self.state.beside.is_some() {
-                self.viewport.queries.work_in(false);
-            }
-            self.viewport.queries.start_typing();
-        } else {
-            self.state.toast(Tone::Warning, "Nothing to query yet: find objects first (Objects pane).");
         }
     }
 }

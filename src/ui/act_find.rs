@@ -8,13 +8,21 @@ use glam::DVec3;
 
 use super::app::App;
 use super::find_dialog::{AwaitedModels, Means};
-use super::history::Editing;
+use super::keep_dialog::{KeepAnswer, KeepDialog, PlannedSearch};
 use super::labels::sentence;
 use super::panes::models::Models;
 use super::state::Tone;
-use crate::jobs::find_objects::FindRequest;
+use crate::jobs::find_objects::{self, FindRequest, FindSettings};
 use crate::scene::{Camera, SemanticMap};
 use crate::worker::{Command, Event, JobId};
+
+/// A search of objects and parts, which becomes a step of the history.
+pub(super) struct FoundStep {
+    pub(super) job: JobId,
+    what: String,
+    /// Whether it adds to what is there.
+    adds: bool,
+}
 
 impl App {
     /// Finds objects and parts with the labels that came with the photos; without, asks what is to look at them.
@@ -43,15 +51,43 @@ impl App {
     fn find_with(&mut self, means: Means) {
         let Means { segmenter, encoder, missing } = means;
         (self.layout.finding.segmenter, self.layout.finding.encoder) = (Some(segmenter), Some(encoder));
-        self.find_after(missing);
+        self.begin_search(PlannedSearch { masks: None, missing, replace_all: false });
     }
 
-    /// Finds objects once these models are here: downloads the first of them, or finds if there is none.
-    fn find_after(&mut self, mut missing: VecDeque<String>) {
-        let Some(id) = missing.pop_front() else { return self.find_objects_by(None) };
+    /// Begins a search, or first asks what is to become of objects and parts that somebody has worked on.
+    fn begin_search(&mut self, search: PlannedSearch) {
+        let by_hand = self.state.semantics.as_deref().map_or_else(Vec::new, |map| find_objects::by_hand(map));
+        match by_hand.is_empty() {
+            true => self.find_after(search),
+            false => self.keep_dialog = Some(KeepDialog { by_hand, search }),
+        }
+    }
+
+    /// Finds objects once the models for it are here: downloads the first that is missing, or finds if there is none.
+    fn find_after(&mut self, mut search: PlannedSearch) {
+        let Some(id) = search.missing.pop_front() else { return self.search_all(search) };
         let scene = self.state.scene_number;
         let job = self.submit(Command::InstallModel { id, brought: None });
-        self.awaited = job.map(|job| AwaitedModels { job, then: missing, scene });
+        self.awaited = job.map(|job| AwaitedModels { job, then: search, scene });
+    }
+
+    fn search_all(&mut self, search: PlannedSearch) {
+        let PlannedSearch { masks, replace_all, .. } = search;
+        let had_objects = self.state.semantics.is_some();
+        let job = self.submit_search(masks, None, replace_all);
+        let step = |job| FoundStep { job, what: "found objects anew".into(), adds: false };
+        self.finding = job.filter(|_| had_objects).map(step);
+    }
+
+    /// Asks what is to be kept, while that is open.
+    pub(super) fn ask_what_to_keep(&mut self, ctx: &egui::Context) {
+        let Some(answer) = self.keep_dialog.as_ref().and_then(|dialog| dialog.show(ctx)) else { return };
+        let Some(KeepDialog { search, .. }) = self.keep_dialog.take() else { return };
+        match answer {
+            KeepAnswer::Keep => self.find_after(search),
+            KeepAnswer::ReplaceAll => self.find_after(PlannedSearch { replace_all: true, ..search }),
+            KeepAnswer::Cancel => {}
+        }
     }
 
     /// Takes note of what happens to the downloads that a search waits for.
@@ -70,7 +106,7 @@ impl App {
 
     /// Finds objects and parts with these masks, those that came with the photos, or none.
     pub(super) fn find_objects_by(&mut self, masks: Option<PathBuf>) {
-        self.submit_search(masks, None);
+        self.begin_search(PlannedSearch { masks, missing: VecDeque::new(), replace_all: false });
     }
 
     /// Adds what the photo that is looked through, or else the nearest that was trained on, shows that is nobody's.
@@ -101,16 +137,22 @@ impl App {
         let Some(photo) = self.viewport.photo_index().or_else(nearest) else { return };
         let name = dataset.photos[photo].name.clone();
         let what = format!("segmented {name}");
-        let job = self.submit_search(None, Some((known, name)));
-        self.segmenting = job.map(|job| Editing { job, what: Some(what), redo: false });
+        let job = self.submit_search(None, Some((known, name)), false);
+        self.finding = job.map(|job| FoundStep { job, what, adds: true });
     }
 
-    /// Takes in that what a photo shows was added, as a change that can be undone.
-    pub(super) fn segmented(&mut self, segmenting: Editing) {
+    /// Takes in that a search is over: what it changed can be undone.
+    pub(super) fn found(&mut self, step: FoundStep) {
         let count = |map: Option<&Arc<SemanticMap>>| map.map_or(0, |map| map.identities.len());
         let before = self.state.changes.now().map_or(0, |now| count(now.map.as_ref()));
         let new = count(self.state.semantics.as_deref()).saturating_sub(before);
-        if let Some(what) = self.state.changes.settle(&self.snapshot(), segmenting.what.as_deref()) {
+        if !step.adds && !self.state.changes.has(&self.snapshot()) {
+            // Numbers are of others now.
+            self.viewport.visibility.set_hidden([]);
+            self.viewport.picking.select(None);
+        }
+        let settled = self.state.changes.settle(&self.snapshot(), Some(&step.what));
+        if let Some(what) = settled.filter(|_| step.adds) {
             let new = match new {
                 0 => "nothing new".to_owned(),
                 1 => "one new object or part".to_owned(),
@@ -121,14 +163,19 @@ impl App {
     }
 
     /// Searches all photos, or the one of this name for what is not known yet.
-    fn submit_search(&mut self, masks: Option<PathBuf>, add: Option<(Arc<SemanticMap>, String)>) -> Option<JobId> {
+    fn submit_search(
+        &mut self,
+        masks: Option<PathBuf>,
+        add: Option<(Arc<SemanticMap>, String)>,
+        replace_all: bool,
+    ) -> Option<JobId> {
         let scene = self.state.scene.clone();
         let Some((scene, dataset)) = scene.as_ref().and_then(|s| Some((s, s.dataset.clone()?))) else {
             self.state.toast(Tone::Warning, "Open a folder of posed photos first: masks refer to photos.");
             return None;
         };
         let (known, seed) = add.unzip();
-        let mut with = self.layout.finding.clone();
+        let mut with = FindSettings { replace_all, ..self.layout.finding.clone() };
         with.seed = seed.or(with.seed);
         let masks = masks.or_else(|| scene.masks.clone());
         match self.viewport.cloud().cloned().filter(|_| self.state.is_trained()) {

@@ -30,6 +30,22 @@ impl App {
         }
     }
 
+    /// Whether an action is about the Gaussians of what has none, which is said then.
+    pub(super) fn is_about_nothing(&mut self, action: &Action) -> bool {
+        let (Action::GoToTarget(id, _)
+        | Action::Isolate(Some(id))
+        | Action::Arrange(id)
+        | Action::Remove(id)
+        | Action::ExportTarget(id)) = action
+        else {
+            return false;
+        };
+        let Some(map) = self.state.semantics.as_ref().filter(|_| self.state.is_empty(*id)) else { return false };
+        let name = self.state.labels.full_name(&map.identities, *id);
+        self.state.toast(Tone::Warning, format!("{name} is empty: all of its Gaussians became others'."));
+        true
+    }
+
     /// Looks into the pixel at a relative place of the view.
     pub(super) fn inspect(&mut self, at: DVec2) {
         if let Some(request) = self.viewport.inspect_request(at, &self.state) {

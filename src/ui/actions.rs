@@ -163,6 +163,8 @@ actions! {
             IfChanged::GoOn => "Go on with the photos as they are now",
             _ => "Train anew on the photos as they are now",
         }, "The photos are not those that the training began with.";
+    TrainAnew: "Begin training anew",
+        "Another training of the same photos, in a folder of its own. The one before stays, and its objects are carried over.";
     PauseJob: "Pause or resume the running job", "Training, a search for objects, a download: it waits and loses nothing.", "T";
     Cancel: "Cancel the running job", "Stop the running job at its next step. Progress so far is kept.";
     Dismiss: "Deselect, or cancel the running job", "Deselect what is selected; with nothing selected, stop the running job.",

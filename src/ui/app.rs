@@ -1,11 +1,11 @@
 //! The application: takes events in, draws the window, sends commands out.
 
 use std::collections::VecDeque;
-use std::path::PathBuf;
 use std::sync::Arc;
 
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 
+use super::act_find::FoundStep;
 use super::camera::CameraPane;
 use super::chat::Chat;
 use super::dialogs::{self, Question};
@@ -13,6 +13,7 @@ use super::dock::{DockContents, Place};
 use super::file_dialogs::FileDialogs;
 use super::find_dialog::{AwaitedModels, FindDialog};
 use super::history::{EditStep, Editing};
+use super::keep_dialog::KeepDialog;
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};
 use super::panes::{
@@ -21,10 +22,9 @@ use super::panes::{
     report::ReportPane, training, unposed,
 };
 use super::state::AppState;
+use super::theme;
 use super::toasts::Toasts;
 use super::viewport::Viewport;
-use super::{keys, theme};
-use crate::measure::is_report;
 use crate::remote::ServerLink;
 use crate::scene::plan::PlanOverride;
 use crate::scene::resource_log::{self, ResourceKind};
@@ -32,6 +32,7 @@ use crate::ui::actions::{Action, Pane};
 use crate::worker::{Event, JobKind, Jobs, Repaint, Worker};
 
 mod contents;
+mod keyboard;
 
 /// The window's application.
 pub struct App {
@@ -49,6 +50,8 @@ pub struct App {
     pub(super) question: Option<Question>,
     pub(super) find_dialog: FindDialog,
     pub(super) awaited: Option<AwaitedModels>,
+    /// Whether the query field is open where nothing can be asked.
+    pub(super) asks_in_vain: bool,
     pub(super) palette: Palette,
     pub(super) sheet: bool,
     first_page: FirstPage,
@@ -76,8 +79,9 @@ pub struct App {
     /// Edits of objects and parts that wait for the one that is under way.
     pub(super) edits: VecDeque<EditStep>,
     pub(super) editing: Option<Editing>,
-    /// The search of one more photo that is under way.
-    pub(super) segmenting: Option<Editing>,
+    /// The search that is under way, where there were objects before.
+    pub(super) finding: Option<FoundStep>,
+    pub(super) keep_dialog: Option<KeepDialog>,
     /// Whether the view takes the whole window.
     pub(super) full_view: bool,
     /// Whether objects were known in the last frame.
@@ -113,6 +117,7 @@ impl App {
             question: None,
             find_dialog: FindDialog::default(),
             awaited: None,
+            asks_in_vain: false,
             palette: Palette::default(),
             sheet: false,
             first_page: FirstPage::default(),
@@ -131,7 +136,8 @@ impl App {
             traced: 0,
             edits: VecDeque::new(),
             editing: None,
-            segmenting: None,
+            finding: None,
+            keep_dialog: None,
             full_view: false,
             had_objects: false,
             actions: first.into_iter().collect(),
@@ -168,9 +174,9 @@ impl App {
             if matches!(event, Event::Started { job, kind: JobKind::Train, .. } if job.is_remote()) {
                 self.layout.dock.activate(Pane::Training);
             }
-            let segmented = self.segmenting.take_if(|s| event.is_end() && event.job() == s.job);
+            let found = self.finding.take_if(|s| event.is_end() && event.job() == s.job);
             self.actions.extend(self.state.apply(event));
-            segmented.into_iter().for_each(|s| self.segmented(s));
+            found.into_iter().for_each(|step| self.found(step));
         }
         self.state.link = self.link.as_ref().map(ServerLink::status);
         self.state.replan(&self.layout.plan, self.layout.config.limits());
@@ -219,31 +225,6 @@ impl App {
         }
     }
 
-    fn keys_and_drops(&mut self, ctx: &egui::Context) {
-        keys::watch_typing(ctx);
-        let has_dialog = self.state.error.is_some()
-            || self.state.unposed.is_some()
-            || self.question.is_some()
-            || self.find_dialog.is_open()
-            || self.dialogs.is_own_open();
-        // Keys are the open menu's; Escape closes it, and nothing else.
-        let has_menu = egui::Popup::is_any_open(ctx);
-        if has_menu && ctx.input_mut(|i| i.consume_key(egui::Modifiers::NONE, egui::Key::Escape)) {
-            egui::Popup::close_all(ctx);
-        }
-        if !self.palette.is_open() && !has_dialog && !self.sheet && !has_menu {
-            self.actions.extend(keys::pressed(ctx));
-        }
-        let dropped: Vec<PathBuf> =
-            ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_path_buf()).take(2).collect());
-        match dropped.as_slice() {
-            [one, other] if is_report(one) && is_report(other) => {
-                self.actions.extend([Action::OpenReport(one.clone()), Action::CompareReport(other.clone())]);
-            }
-            all => self.actions.extend(all.first().cloned().map(Action::Open)),
-        }
-    }
-
     fn panes(&mut self, ui: &mut Ui) {
         let bar = Frame::new().fill(theme::panel()).inner_margin(Margin::symmetric(10, 6));
         if !self.fills_window() {
@@ -272,12 +253,15 @@ impl App {
     }
 
     fn show_view(&mut self, ui: &mut Ui) {
+        let rect = ui.available_rect_before_wrap();
         let Self { state, layout, actions, viewport, .. } = self;
         if state.scene.is_none() {
-            return self.first_page.show(ui, state, actions);
+            self.first_page.show(ui, state, actions);
+            return self.show_vain_query(ui, rect);
         }
         let route = layout.shows(Pane::Camera).then_some(&self.camera);
         theme::dark(ui, |ui| viewport.show(ui, state, layout, route, actions));
+        theme::dark(ui, |ui| self.show_vain_query(ui, rect));
     }
 
     fn show_pane(&mut self, ui: &mut Ui, pane: Pane) {
@@ -336,6 +320,7 @@ impl App {
             }
         }
         self.ask_for_means(ctx);
+        self.ask_what_to_keep(ctx);
         if let Some(photos) = &self.state.unposed
             && !unposed::show(ctx, photos, &mut self.actions)
         {

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
-use egui::{Button, Key, Modifiers, Response, RichText, ScrollArea, TextEdit, Ui};
+use egui::{Button, Id, Key, Modifiers, Response, RichText, ScrollArea, TextEdit, Ui};
 
 use super::chat_lines::{self, Line};
 pub(crate) use super::chat_model::ChatSettings;
@@ -191,11 +191,12 @@ impl Chat {
             let hint = if ready { "show me \u{2026}" } else { "Find objects first" };
             let takes_tab = !self.continuations.1.is_empty();
             let edit = TextEdit::singleline(&mut self.typed).hint_text(hint).desired_width(width).char_limit(1000);
-            let edit = edit.lock_focus(takes_tab);
-            let response = ui.add_enabled(ready, edit).accessible_name("Chat box");
+            let field = Id::unique("chat box");
             if std::mem::take(&mut self.focus) {
-                response.request_focus();
+                ui.memory_mut(|m| m.request_focus(field));
             }
+            // Where nothing can be done yet, that is the answer: keys are no commands meanwhile.
+            let response = ui.add(edit.id(field).lock_focus(takes_tab)).accessible_name("Chat box");
             self.take_continuation(ui, &response);
             let enter = response.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
             let some = !self.typed.trim().is_empty();
@@ -207,7 +208,7 @@ impl Chat {
                     }
                     false
                 }
-                None => ui.add_enabled(ready && some, Button::new("Send")).clicked(),
+                None => ui.add_enabled(some, Button::new("Send")).clicked(),
             };
             // The next sentence goes into the box, too, whether this one is answered yet or not.
             if enter || clicked {

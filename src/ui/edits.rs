@@ -7,8 +7,7 @@ use super::context::SceneContext;
 use super::history::{EditSnapshot, EditStep, Editing, ViewState, edit_text, splat_edit_text};
 use super::labels::sentence;
 use super::state::Tone;
-use super::viewport::selecting::SelectTool;
-use crate::jobs::edit::EditRequest;
+use crate::jobs::edit::{self, EditRequest};
 use crate::jobs::rearrange::{RearrangeRequest, SplatChange, SplatEdit};
 use crate::jobs::select::{SelectRequest, empty_map};
 use crate::pipeline::semantics::edit::Edit;
@@ -54,22 +53,20 @@ impl App {
         self.state.changes.before().is_some_and(like)
     }
 
-    /// Hands the next click or stroke of the selection on.
+    /// Hands the next click or stroke of the selection on, or has it made ready.
     pub(super) fn next_stroke(&mut self) {
-        let Some(stroke) = self.viewport.select.as_mut().and_then(SelectTool::next) else { return };
+        let (done, is_training) = (self.state.short_jobs_done, self.state.is_training());
+        let Some((step, before)) = self.viewport.next_select_step(done, is_training) else { return };
         let (Some(SceneContext { scene, cloud, map, settings, cameras, .. }), Some(tool)) =
             (self.context(), &self.viewport.select)
         else {
             return;
         };
         let map = map.map_or_else(|| Arc::new(empty_map(&cloud)), |map| Arc::clone(&map));
-        let (purpose, before, home) = (tool.purpose.clone(), tool.selected.clone(), scene.home.clone());
-        let cloud = Arc::clone(&cloud);
-        let request = SelectRequest { cloud, settings, cameras, home, map, purpose, before, stroke };
+        let (purpose, home, cloud) = (tool.purpose.clone(), scene.home.clone(), Arc::clone(&cloud));
+        let request = SelectRequest { cloud, settings, cameras, home, map, purpose, before, step: step.clone() };
         let job = self.submit(Command::Select(Box::new(request)));
-        if let Some(tool) = &mut self.viewport.select {
-            tool.running = job;
-        }
+        self.viewport.select_step_runs(job, &step);
     }
 
     fn request(&mut self, request: EditRequest) {
@@ -124,14 +121,21 @@ impl App {
             return;
         };
         let before = self.state.changes.now().and_then(|now| now.map.clone());
-        if let (Some(old), Some(new)) = (before, map)
-            && old.identities.len() > new.identities.len()
-        {
-            self.viewport.visibility.renumber(&old.identities, &new.identities);
+        let mut emptied = Vec::new();
+        if let (Some(old), Some(new)) = (before, map) {
+            if old.identities.len() > new.identities.len() {
+                self.viewport.visibility.renumber(&old.identities, &new.identities);
+            } else {
+                emptied = edit::emptied(&old, &new);
+            }
         }
         // Where it was refused or failed that was said, and there is nothing to undo.
         if let Some(what) = self.state.changes.settle(&self.snapshot(), Some(&what)) {
             self.state.toast(Tone::Good, sentence(&what));
+            for name in emptied {
+                let text = format!("{name} is empty now: all of its Gaussians became others'. Undo brings them back.");
+                self.state.toast(Tone::Warning, text);
+            }
         }
     }
 

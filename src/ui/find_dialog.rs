@@ -5,6 +5,7 @@ use std::collections::VecDeque;
 
 use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
 
+use super::keep_dialog::PlannedSearch;
 use super::state::AppState;
 use super::theme;
 use crate::jobs::find_objects::forecast::{self, LookTime};
@@ -42,8 +43,8 @@ pub(crate) struct Means {
 pub(super) struct AwaitedModels {
     /// The download under way.
     pub(super) job: JobId,
-    /// What comes after it.
-    pub(super) then: VecDeque<String>,
+    /// The search that comes after it, with what is missing then.
+    pub(super) then: PlannedSearch,
     /// The scene that is searched.
     pub(super) scene: u64,
 }

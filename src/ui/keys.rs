@@ -1,6 +1,8 @@
 //! Key bindings, read off the actions.
 
-use egui::{Event, Id, Key, KeyboardShortcut, Modifiers};
+use std::collections::BTreeSet;
+
+use egui::{Event, Id, InputState, Key, KeyboardShortcut, Modifiers};
 
 use crate::ui::actions::{Action, Shortcut};
 
@@ -51,6 +53,8 @@ struct Typing {
     /// Whether a field has the keyboard, and whether it loses it by Escape now, which is then no shortcut.
     in_field: bool,
     leaves: bool,
+    /// Whether a field is open that takes nothing, and what is typed goes nowhere.
+    in_vain: bool,
 }
 
 /// Looks who types; once per frame, before anybody takes keys.
@@ -69,9 +73,20 @@ pub(crate) fn watch_typing(ctx: &egui::Context) {
             false => typing.until,
         };
         let leaves = typing.in_field && i.key_pressed(Key::Escape);
-        Typing { until, unsent, in_field: field.is_some(), leaves }
+        Typing { until, unsent, in_field: field.is_some(), leaves, ..typing }
     });
     ctx.data_mut(|d| d.insert_temp(Id::NULL, typing));
+}
+
+/// Letters belong to a field that opens in this frame, before it is drawn.
+pub(crate) fn begin_typing(ctx: &egui::Context) {
+    let until = ctx.input(|i| i.time) + TYPING_SECS;
+    ctx.data_mut(|d| d.get_temp_mut_or_default::<Typing>(Id::NULL).until = until);
+}
+
+/// Sets whether letters go nowhere: a field is open in which nothing can be typed.
+pub(crate) fn type_in_vain(ctx: &egui::Context, in_vain: bool) {
+    ctx.data_mut(|d| d.get_temp_mut_or_default::<Typing>(Id::NULL).in_vain = in_vain);
 }
 
 fn typing(ctx: &egui::Context) -> Typing {
@@ -80,13 +95,32 @@ fn typing(ctx: &egui::Context) -> Typing {
 
 /// Whether letters belong to a text field: it has the keyboard, or lost it while it was typed into.
 pub(crate) fn is_typing(ctx: &egui::Context) -> bool {
-    ctx.text_edit_focused() || ctx.input(|i| i.time) < typing(ctx).until
+    let typing = typing(ctx);
+    ctx.text_edit_focused() || typing.in_vain || ctx.input(|i| i.time) < typing.until
 }
 
-/// Takes every bound key that was pressed off the input, as often as it was pressed, unless it belongs to a text
-/// field.
+/// Whether the action opens a text field, to which what is pressed after it belongs.
+pub(crate) fn opens_field(action: &Action) -> bool {
+    matches!(action, Action::TypeQuery | Action::Palette | Action::StartChat | Action::Rename)
+}
+
+/// Follows which keys move the eye: those that were pressed without Control or Command, as long as they are held.
+pub(crate) fn follow_held(held: &mut BTreeSet<Key>, input: &InputState) {
+    for event in &input.events {
+        if let Event::Key { key, pressed: true, repeat: false, modifiers, .. } = event
+            && !modifiers.command
+            && !modifiers.ctrl
+        {
+            held.insert(*key);
+        }
+    }
+    held.retain(|key| input.key_down(*key));
+}
+
+/// Takes every bound key that was pressed off the input, in order and as often as it was pressed, unless it belongs to
+/// a text field. It ends with what opens such a field: what was pressed later, in a slow frame, is for that.
 pub(crate) fn pressed(ctx: &egui::Context) -> Vec<Action> {
-    let (has_field, is_typing) = (ctx.text_edit_focused(), is_typing(ctx));
+    let (has_field, is_typing) = (ctx.text_edit_focused() || typing(ctx).in_vain, is_typing(ctx));
     let has_focus = ctx.memory(|m| m.focused()).is_some();
     let unsent = has_field && typing(ctx).unsent.is_some();
     let is_fields = |action: &Action, shortcut: Shortcut| match shortcut {
@@ -98,14 +132,38 @@ pub(crate) fn pressed(ctx: &egui::Context) -> Vec<Action> {
         Shortcut { key: "Escape", .. } => has_field || typing(ctx).leaves,
         Shortcut { key, .. } => has_field || is_typing && key.len() == 1,
     };
-    let mut found = Vec::new();
-    for action in Action::all() {
-        let Some(shortcut) = action.shortcut().filter(|s| !is_fields(&action, *s)) else { continue };
-        let Some(key) = binding(shortcut) else { continue };
-        let times = ctx.input_mut(|i| i.count_and_consume_key(key.modifiers, key.logical_key));
-        found.extend(std::iter::repeat_n(action, times));
-    }
-    found
+    let keys = |action: Action| {
+        let shortcut = action.shortcut().filter(|s| !is_fields(&action, *s))?;
+        Some((binding(shortcut)?, action))
+    };
+    let bound: Vec<(KeyboardShortcut, Action)> = Action::all().into_iter().filter_map(keys).collect();
+    ctx.input_mut(|i| {
+        let (mut found, mut left) = (Vec::new(), Vec::new());
+        let mut events = std::mem::take(&mut i.events).into_iter().peekable();
+        while let Some(event) = events.next() {
+            let Some(action) = bound_to(&bound, &event) else {
+                left.push(event);
+                continue;
+            };
+            let opens = opens_field(action);
+            found.push(action.clone());
+            if opens {
+                left.retain(|e| !matches!(e, Event::Key { .. } | Event::Text(_)));
+                // The letter of the key itself is none of what is typed.
+                events.next_if(|e| matches!(e, Event::Text(text) if action.shortcut().is_some_and(|s| s.key == text)));
+                break;
+            }
+        }
+        i.events = left.into_iter().chain(events).collect();
+        found
+    })
+}
+
+/// The action whose key such an event presses.
+fn bound_to<'a>(bound: &'a [(KeyboardShortcut, Action)], event: &Event) -> Option<&'a Action> {
+    let Event::Key { key, pressed: true, modifiers, .. } = event else { return None };
+    let is_pressed = |b: &KeyboardShortcut| b.logical_key == *key && modifiers.matches_logically(b.modifiers);
+    bound.iter().find(|(b, _)| is_pressed(b)).map(|(_, action)| action)
 }
 
 #[cfg(test)]

@@ -30,8 +30,6 @@ impl Palette {
         if !self.open {
             return None;
         }
-        let found = matches(&self.query, layout);
-        let last = found.len().saturating_sub(1);
         let step = |key| ctx.input_mut(|i| i.consume_key(Modifiers::NONE, key));
         if step(Key::ArrowDown) {
             self.selected += 1;
@@ -39,19 +37,26 @@ impl Palette {
         if step(Key::ArrowUp) {
             self.selected = self.selected.saturating_sub(1);
         }
-        self.selected = self.selected.min(last);
         let entered = step(Key::Enter);
-        let mut chosen = if entered { found.get(self.selected).cloned() } else { None };
+        let mut chosen = None;
+        let field = egui::Id::unique("palette query");
+        // Before it is drawn: what is typed in this very frame is for it.
+        ctx.memory_mut(|m| m.request_focus(field));
         let area = theme::dialog_area("palette").anchor(Align2::CENTER_TOP, [0.0, 90.0]);
         let response = theme::dialog("palette").area(area).show(ctx, |ui| {
             ui.set_width(520.0);
             let edit = TextEdit::singleline(&mut self.query)
+                .id(field)
                 .hint_text("Type an action, or a path to open")
                 .desired_width(f32::INFINITY);
             let edit = ui.add(edit).accessible_name("Search actions");
-            edit.request_focus();
             if edit.changed() {
                 self.selected = 0;
+            }
+            let found = matches(&self.query, layout);
+            self.selected = self.selected.min(found.len().saturating_sub(1));
+            if entered {
+                chosen = found.get(self.selected).cloned();
             }
             ui.add_space(4.0);
             ScrollArea::vertical().max_height(380.0).auto_shrink([false, true]).show(ui, |ui| {

@@ -19,6 +19,7 @@ use crate::jobs::demo::QUESTION;
 use crate::jobs::go_to::{Approached, Explored};
 use crate::jobs::inspect::InspectedPixel;
 use crate::jobs::models::ModelList;
+use crate::jobs::recent::RunSummary;
 use crate::jobs::remove::RemovedScene;
 use crate::jobs::select::Selected;
 use crate::jobs::thumbnails::ThumbnailSet;
@@ -32,8 +33,10 @@ use crate::scene::findings::IdentityEvidence;
 use crate::scene::{GaussianCloud, Limits, Overrides, PhotoPixels, SceneFacts, ScenePlan, SemanticMap, text};
 use crate::worker::{Event, JobId, JobKind, Outcome, Versioned, WorkerThread};
 
+mod asking;
 mod edited;
 mod messages;
+mod opened;
 mod running;
 
 /// Files and folders kept in the recent list.
@@ -81,7 +84,7 @@ pub struct AppState {
     pub(crate) rearranged: Option<Arc<GaussianCloud>>,
     pub(crate) splats_measured: Option<Arc<MeasuredCloud>>,
     /// What clicks and strokes select, until the tool takes it.
-    pub(crate) selected: Option<Arc<Selected>>,
+    pub(crate) selected: Option<(JobId, Arc<Selected>)>,
     /// Models and the engine that runs them, once they were listed.
     pub(crate) models: Option<Arc<ModelList>>,
     /// Models that were put in place so far.
@@ -112,6 +115,8 @@ pub struct AppState {
     pub(crate) unposed: Option<Box<Unposed>>,
     /// Files and folders opened lately, newest first.
     pub recent: Vec<PathBuf>,
+    /// All trainings of those of them that have several.
+    pub recent_runs: Vec<(PathBuf, Vec<RunSummary>)>,
     /// Small pictures of them, until the window takes them.
     pub(crate) recent_pictures: Vec<(PathBuf, PhotoPixels)>,
     /// Photos loaded lately, by index and size limit; the window takes them out.
@@ -226,10 +231,15 @@ impl AppState {
         TrainConfig { max_side_px: self.plan.train_side_px, ..config.clone() }
     }
 
-    /// The step at which a training with these settings goes on, if it does.
+    /// The step at which a training with these settings goes on, if it does: for as many steps or for more.
     pub(crate) fn continues_at(&self, config: &TrainConfig) -> Option<u64> {
         let (before, step) = self.resumable.as_ref()?;
-        (before.is_same_run(config) && (1..config.steps).contains(step)).then_some(*step)
+        (before.is_same_but_for_steps(config) && (1..config.steps).contains(step)).then_some(*step)
+    }
+
+    /// Whether a training is there beside which another could begin.
+    pub(crate) fn can_begin_anew(&self) -> bool {
+        self.resumable.as_ref().is_some_and(|(_, step)| *step > 0)
     }
 
     fn set_facts(&mut self, facts: SceneFacts) {
@@ -298,13 +308,15 @@ impl AppState {
                 self.say(Tone::Info, format!("{} measured", format::things(measured.cloud.len(), "Gaussian")));
                 self.splats_measured = Some(measured);
             }
-            Outcome::Trained { evaluations, out, semantics, facts } => {
+            Outcome::Trained { evaluations, out, semantics, runs, facts } => {
                 let carried = semantics.is_some();
                 if self.training_job == Some(job) {
                     self.history.evaluations = evaluations;
                     self.set_facts(*facts);
                     self.set_semantics(semantics);
-                    self.scene = self.scene.take().map(|s| Arc::new(s.trained_in(&out)));
+                    self.scene = self.scene.take().map(|s| Arc::new(OpenedScene { runs, ..s.trained_in(&out) }));
+                    let reached = self.history.steps.last().map(|s| s.step);
+                    self.resumable.iter_mut().zip(reached).for_each(|((_, step), reached)| *step = reached);
                 }
                 let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));
                 self.say(Tone::Info, format!("Saved to {}{}", out.display(), self.elsewhere()));
@@ -343,7 +355,7 @@ impl AppState {
                 self.visited = Some(visited);
             }
             Outcome::Inspected(pixel) => self.inspected = Some(pixel),
-            Outcome::Selected(selected) => self.selected = Some(selected),
+            Outcome::Selected(selected) => self.selected = Some((job, selected)),
             Outcome::Explored(explored) => self.explored = Some(explored),
             Outcome::Report { path, report, second } => {
                 *(if second { &mut self.second_report } else { &mut self.report }) = Some(ShownReport { path, report });
@@ -353,43 +365,13 @@ impl AppState {
             Outcome::Written(path) => self.toast(Tone::Good, format!("Saved to {}", path.display())),
             Outcome::Unposed(photos) => self.unposed = Some(photos),
             Outcome::Kept => {}
+            Outcome::RecentRuns(runs) => self.recent_runs = runs,
             Outcome::RecentPictures(pictures) => self.recent_pictures = pictures,
             Outcome::Photo { index, max_side_px, pixels } => {
                 self.photos.insert((index, max_side_px), pixels);
             }
         }
         next
-    }
-
-    /// Sets objects and parts, with what is counted of them.
-    fn set_semantics(&mut self, map: Option<Arc<SemanticMap>>) {
-        self.facts = map.as_ref().map_or_else(Vec::new, |m| m.facts());
-        self.sizes = self.facts.iter().map(|f| f.gaussians).collect();
-        self.set_facts(self.plan.facts.clone().with_semantics(map.as_deref()));
-        self.semantics = map.map(Versioned::new);
-    }
-
-    fn opened(&mut self, scene: OpenedScene, is_demo: bool) {
-        for warning in scene.dataset.iter().flat_map(|d| d.warnings.clone()) {
-            self.toast(Tone::Warning, warning);
-        }
-        self.history =
-            TrainHistory { steps: scene.history.steps.clone(), evaluations: scene.history.evaluations.clone() };
-        self.training_job = None;
-        self.previous = TrainHistory::default();
-        let reached = self.history.steps.last().map(|s| s.step);
-        self.resumable = scene.resumable.clone().zip(reached);
-        self.photos.clear();
-        if !is_demo && scene.remote.is_none() {
-            self.remember(scene.path.clone());
-        }
-        self.scene_number += 1;
-        (self.explored, self.visited, self.beside, self.removed) = (None, None, None, None);
-        self.set_facts(scene.facts.clone());
-        self.antialias = scene.render.antialias;
-        self.set_semantics(scene.semantics.clone());
-        (self.labels, self.phrases) = Default::default();
-        self.scene = Some(Arc::new(scene));
     }
 }
 

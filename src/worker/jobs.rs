@@ -11,7 +11,7 @@ use crate::io::{self, OpenError, trained};
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::export_splat::{self, LossViews};
 use crate::jobs::models::Source;
-use crate::jobs::train::{IfChanged, Trained};
+use crate::jobs::train::{TrainStart, Trained};
 use crate::jobs::{
     Folders, JobError, OpenedScene, Scene, clean, demo, edit, export, export_all, find_objects, go_to, inspect, models,
     open, page, phrases, plan, poses, rearrange, recent, remove, report, scale, select, thumbnails, train, video,
@@ -48,6 +48,12 @@ impl PipelineJobs {
         self.known.lock().unwrap_or_else(PoisonError::into_inner).get(folder).cloned().flatten()
     }
 
+    /// The next time, the photos are opened with this training of them.
+    fn uses(&self, folder: &Path) {
+        // Nobody has asked for it, so nobody is stopped by a full disk.
+        let _ = self.folders.note_use(folder);
+    }
+
     /// What the machine offers, looked up once.
     fn machine(&self) -> &Machine {
         self.machine.get_or_init(plan::machine)
@@ -56,25 +62,27 @@ impl PipelineJobs {
     fn opened(&self, mut scene: OpenedScene) -> Outcome {
         scene.reports = report::known(&scene.path, &scene.report_out);
         self.knows(&scene.out, scene.state.clone());
+        self.uses(&scene.out);
         Outcome::Opened(Box::new(scene))
     }
 
     fn train(
         &self,
-        (dataset, config): (&Dataset, &TrainConfig),
-        out: PathBuf,
-        changed: IfChanged,
+        dataset: &Dataset,
+        config: &TrainConfig,
+        (out, from): (Option<PathBuf>, &TrainStart),
         observer: &mut dyn Observer,
     ) -> Result<Outcome, Stop> {
         // Other settings get a folder of their own; which one is seen when it is needed.
-        let folders = std::iter::once(out).chain(std::iter::once_with(|| self.folders.fresh(dataset.source())));
-        let done = match train::run(dataset, config, folders, changed, observer) {
+        let folders = out.into_iter().chain(std::iter::once_with(|| self.folders.fresh(dataset.source())));
+        let done = match train::run(dataset, config, folders, from, observer) {
             Err(JobError::Train(TrainError::Checkpoint(e @ CheckpointError::OtherInputs { .. }))) => {
                 return Ok(Outcome::InputsChanged(e.to_string()));
             }
             done => done?,
         };
         self.knows(&done.out, done.state.clone());
+        self.uses(&done.out);
         if !done.is_finished() {
             return Err(Stop::Cancelled);
         }
@@ -82,7 +90,8 @@ impl PipelineJobs {
         let cloud = &outcome.cloud;
         let facts = plan::facts(self.machine(), Some(dataset), Some((cloud, cloud.sh_degree)), config);
         let facts = Box::new(facts.with_semantics(semantics.as_deref()));
-        Ok(Outcome::Trained { evaluations: outcome.evaluations, out, semantics, facts })
+        let runs = recent::runs(&self.folders, &dataset.root);
+        Ok(Outcome::Trained { evaluations: outcome.evaluations, out, semantics, runs, facts })
     }
 }
 
@@ -103,8 +112,8 @@ impl Jobs for PipelineJobs {
             }
             Command::Demo => self.opened(demo::open(&self.folders, self.machine(), observer)?),
             Command::DemoPhotos => self.opened(demo::open_photos(&self.folders, self.machine(), observer)?),
-            Command::Train { dataset, config, out, changed } => {
-                return self.train((&dataset, &config), out, changed, observer);
+            Command::Train { dataset, config, out, from } => {
+                return self.train(&dataset, &config, (out, &from), observer);
             }
             Command::Evaluate { dataset, cloud, config, settings, out } => {
                 Outcome::Evaluated(measured(dataset, cloud, (config, settings), &out, observer)?)
@@ -166,6 +175,7 @@ impl Jobs for PipelineJobs {
                 }
                 Outcome::Kept
             }
+            Command::RecentRuns(of) => Outcome::RecentRuns(recent::several(&self.folders, of)),
             Command::RecentPictures(of) => Outcome::RecentPictures(recent::load(&self.folders, of)),
             Command::InstallModel { id, brought } => {
                 let source = brought.as_deref().map_or(Source::Fetch(None), Source::Brought);
@@ -217,7 +227,9 @@ fn measured(
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<crate::pipeline::observer::Evaluation, JobError> {
-    let cameras = if trained::is_scene(out) { trained::load_info(out)?.cameras } else { Vec::new() };
-    let scene = Scene { cloud, cameras, settings, config, ..Scene::default() };
+    let info = if trained::is_scene(out) { Some(trained::load_info(out)?) } else { None };
+    let folder = info.is_some().then(|| out.to_path_buf());
+    let (cameras, edited) = info.map(|info| (info.cameras, info.edited)).unwrap_or_default();
+    let scene = Scene { cloud, cameras, settings, config, folder, edited, ..Scene::default() };
     evaluate::photometric(&PhotoComparison::of(&scene, dataset, EvaluateOptions::default())?, observer)
 }

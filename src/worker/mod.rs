@@ -15,6 +15,7 @@ pub(crate) mod slot;
 mod start;
 pub(crate) mod text_encoder;
 pub(crate) mod thread;
+mod title;
 pub mod view;
 pub(crate) mod view_modes;
 mod view_renderer;

@@ -17,11 +17,12 @@ use crate::jobs::models::ModelList;
 use crate::jobs::page::PageRequest;
 use crate::jobs::phrases::{PhraseRow, PhrasesRequest};
 use crate::jobs::rearrange::{RearrangeRequest, RearrangedScene};
+use crate::jobs::recent::RunSummary;
 use crate::jobs::remove::{RemoveRequest, RemovedScene};
 use crate::jobs::report::ReportRequest;
 use crate::jobs::select::{SelectRequest, Selected};
 use crate::jobs::thumbnails::ThumbnailSet;
-use crate::jobs::train::IfChanged;
+use crate::jobs::train::TrainStart;
 use crate::jobs::video::VideoRequest;
 use crate::jobs::{OpenedScene, find_objects};
 use crate::measure::Report;
@@ -55,10 +56,10 @@ pub enum Command {
         dataset: Arc<Dataset>,
         /// How.
         config: TrainConfig,
-        /// Folder of the trained scene and its checkpoints.
-        out: PathBuf,
-        /// What is done where the training there began with other photos.
-        changed: IfChanged,
+        /// Folder of the trained scene and its checkpoints; `None` = a new one.
+        out: Option<PathBuf>,
+        /// What it begins with.
+        from: TrainStart,
     },
     /// Measure PSNR and SSIM on the held-out photos.
     Evaluate {
@@ -126,6 +127,8 @@ pub enum Command {
     },
     /// Read the pictures that were kept of these scenes.
     RecentPictures(Vec<PathBuf>),
+    /// List the trainings of those of these photos that have several.
+    RecentRuns(Vec<PathBuf>),
     /// Fetch a model of the catalog, or take over files that somebody brings.
     InstallModel {
         /// Its name.
@@ -204,7 +207,9 @@ impl Command {
             Self::Select(_) => JobKind::Select,
             Self::Export { .. } => JobKind::Export,
             Self::Photo { .. } => JobKind::Photo,
-            Self::Picture { .. } | Self::KeepPicture { .. } | Self::RecentPictures(_) => JobKind::Picture,
+            Self::Picture { .. } | Self::KeepPicture { .. } | Self::RecentPictures(_) | Self::RecentRuns(_) => {
+                JobKind::Picture
+            }
             Self::Thumbnails { .. } => JobKind::Thumbnails,
             Self::ListModels => JobKind::Models,
             Self::Explore { .. } => JobKind::Explore,
@@ -218,49 +223,6 @@ impl Command {
             Self::ExportPage(_) => JobKind::ExportPage,
             Self::SetScale { .. } => JobKind::Scale,
             Self::ReadReport { .. } => JobKind::Report,
-        }
-    }
-
-    /// What it does, as a title: "Opening fox".
-    pub(crate) fn title(&self) -> String {
-        let name =
-            |p: &PathBuf| p.file_name().map_or_else(|| p.display().to_string(), |n| n.to_string_lossy().into_owned());
-        match self {
-            Self::Open { path } => format!("Opening {}", name(path)),
-            Self::OpenBeside { path } => format!("Opening {} beside", name(path)),
-            Self::Demo => "Opening the demo".into(),
-            Self::DemoPhotos => "Rendering the demo scene".into(),
-            Self::FindPoses(photos) => format!("Finding camera poses of {}", name(&photos.folder)),
-            Self::Train { dataset, .. } => format!("Training {}", dataset.name),
-            Self::Evaluate { dataset, .. } => format!("Evaluating {}", dataset.name),
-            Self::FindObjects(request) if request.known.is_some() => {
-                format!("Segmenting {}", request.with.seed.as_deref().unwrap_or("a photo"))
-            }
-            Self::FindObjects(request) => format!("Finding objects in {}", request.dataset.name),
-            Self::Remove(_) => "Removing".into(),
-            Self::EditObjects { .. } => "Editing objects".into(),
-            Self::Rearrange(_) => "Editing Gaussians".into(),
-            Self::MeasureSplats(_) => "Measuring Gaussians".into(),
-            Self::Select(_) => "Selecting".into(),
-            Self::SetScale { .. } => "Saving the scale".into(),
-            Self::Export { path, .. } | Self::Picture { path, .. } => format!("Writing {}", name(path)),
-            Self::Photo { photo, .. } => format!("Loading {}", photo.name),
-            Self::KeepPicture { of, .. } => format!("Saving the thumbnail of {}", name(of)),
-            Self::RecentPictures(_) => "Loading thumbnails of recent scenes".into(),
-            Self::Thumbnails { .. } => "Rendering thumbnails".into(),
-            Self::ListModels => "Listing models".into(),
-            Self::Explore { .. } => "Building the navigation graph".into(),
-            Self::InstallModel { id, .. } => format!("Installing the model {id}"),
-            Self::Approach(request) => {
-                format!("Planning the flight to {}", request.map.identities.full_name(request.id))
-            }
-            Self::Inspect(_) => "Looking into a pixel".into(),
-            Self::Video(request) => format!("Rendering {}", name(&request.out)),
-            Self::Measure(_) => "Benchmarking rendering".into(),
-            Self::Phrases(_) => "Running the phrase list".into(),
-            Self::ExportAll(request) => format!("Writing {}", name(&request.folder)),
-            Self::ExportPage(request) => format!("Writing {}", name(&request.out)),
-            Self::ReadReport { path, .. } => format!("Opening the report {}", name(path)),
         }
     }
 }
@@ -282,6 +244,8 @@ pub enum Outcome {
         out: PathBuf,
         /// Objects and parts that were carried over from the scene before.
         semantics: Option<Arc<SemanticMap>>,
+        /// All trainings of these photos that this program keeps.
+        runs: Vec<RunSummary>,
         /// What the plan of the result is computed from.
         facts: Box<SceneFacts>,
     },
@@ -313,6 +277,8 @@ pub enum Outcome {
     Kept,
     /// Pictures that were kept, with the scenes that they are of.
     RecentPictures(Vec<(PathBuf, PhotoPixels)>),
+    /// Trainings of photos that have several.
+    RecentRuns(Vec<(PathBuf, Vec<RunSummary>)>),
     /// A report was read or measured.
     Report {
         /// Where it lies.

@@ -107,3 +107,115 @@ fn what_was_found_is_corrected_and_nothing_is_kept_by_cancel() {
     }
     w.until("it is larger", |a| size_of(a, 1) > size);
 }
+
+#[test]
+fn a_scene_is_prepared_once_and_as_soon_as_the_tool_opens() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    w.harness.state_mut().layout.cameras = false;
+    w.ask(Action::Ask("box 0".into()));
+    w.until("maps", at_rest);
+    let box_1 = middle_of(&w, 2);
+    assert_eq!(w.app().viewport.times_prepared(), 0);
+    w.ask(Action::Paint(Some(0)));
+    w.until("prepared before anybody clicks", |a| a.viewport.times_prepared() == 1);
+    assert_eq!(w.app().viewport.selection(), None);
+    for action in [Action::Paint(Some(0)), Action::Correct(1), Action::Paint(Some(1)), Action::Paint(Some(0))] {
+        w.ask(Action::Paint(None));
+        w.ask(action);
+        w.until("a picture for it", |a| a.viewport.picture().is_some_and(|p| p.full));
+        click(&mut w, box_1, Modifiers::NONE);
+        w.until("an answer", |a| a.viewport.lines_drawn() == 0);
+    }
+    w.until("an answer", |a| a.viewport.selection().is_some_and(|n| n > 0));
+    w.harness.get_by_label("Keep").click();
+    w.until("kept", |a| a.state.semantics.as_ref().is_some_and(|m| m.identities.len() == 4));
+    w.ask(Action::Paint(Some(0)));
+    click(&mut w, box_1, Modifiers::NONE);
+    w.until("an answer", |a| a.viewport.selection().is_some_and(|n| n > 0));
+    assert_eq!(w.app().viewport.times_prepared(), 1, "once for all of them");
+}
+
+#[test]
+fn strokes_drawn_while_it_is_prepared_are_all_taken_in() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    w.harness.state_mut().layout.cameras = false;
+    w.ask(Action::Ask("box 0".into()));
+    w.until("maps", at_rest);
+    let places = [middle_of(&w, 2), middle_of(&w, 3)];
+    // What one click selects, each for itself.
+    let mut each = Vec::new();
+    for at in places {
+        w.ask(Action::Paint(Some(0)));
+        click(&mut w, at, Modifiers::NONE);
+        w.until("an answer", |a| a.viewport.selection().is_some_and(|n| n > 0));
+        each.push(w.app().viewport.selection().expect("something"));
+        w.ask(Action::Paint(None));
+    }
+    drop(w);
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    w.harness.state_mut().layout.cameras = false;
+    w.ask(Action::Ask("box 0".into()));
+    w.until("maps", at_rest);
+    // Both in the frame after the tool opened, before anything can be ready.
+    w.harness.state_mut().ask(Action::Paint(Some(0)));
+    w.harness.step();
+    for at in places {
+        let button = |pressed| Event::PointerButton {
+            pos: at,
+            button: PointerButton::Primary,
+            pressed,
+            modifiers: Modifiers::NONE,
+        };
+        w.harness.hover_at(at);
+        w.harness.step();
+        w.harness.event(button(true));
+        w.harness.step();
+        w.harness.event(button(false));
+        w.harness.step();
+    }
+    w.until("both are taken in", |a| a.viewport.lines_drawn() == 0 && a.viewport.selection().is_some());
+    let both = w.app().viewport.selection().expect("something");
+    assert!(both > each[0].max(each[1]), "{both} of {each:?}");
+    assert_eq!(w.app().viewport.times_prepared(), 1);
+}
+
+#[test]
+fn the_result_of_a_canceled_selection_is_not_that_of_the_next() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    w.harness.state_mut().layout.cameras = false;
+    w.ask(Action::Ask("box 0".into()));
+    w.until("maps", at_rest);
+    let places = [middle_of(&w, 2), middle_of(&w, 3)];
+    w.ask(Action::Paint(Some(0)));
+    w.until("prepared", |a| a.viewport.times_prepared() == 1);
+    let button = |pos, pressed| Event::PointerButton {
+        pos,
+        button: PointerButton::Primary,
+        pressed,
+        modifiers: Modifiers::NONE,
+    };
+    w.harness.hover_at(places[0]);
+    w.harness.step();
+    w.harness.event(button(places[0], true));
+    w.harness.step();
+    w.harness.event(button(places[0], false));
+    w.harness.step();
+    // It is handed on in the frame in which the tool is canceled and another one opens.
+    w.harness.state_mut().ask(Action::Paint(None));
+    w.harness.state_mut().ask(Action::Paint(Some(0)));
+    w.harness.step();
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    w.harness.run_steps(20);
+    assert_eq!(w.app().viewport.selection(), None, "nothing was drawn in this one");
+    click(&mut w, places[1], Modifiers::NONE);
+    w.until("its own answer", |a| a.viewport.selection().is_some_and(|n| n > 0));
+    w.harness.get_by_label("Keep").click();
+    w.until("kept", |a| a.state.semantics.as_ref().is_some_and(|m| m.identities.len() == 4));
+    let map = w.app().state.semantics.clone().expect("objects");
+    let left = |id: u32| map.identity_of.iter().filter(|of| **of == id).count();
+    assert!(left(3) < left(2), "what was clicked on is taken from box 2, nothing from box 1");
+}

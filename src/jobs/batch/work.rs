@@ -139,7 +139,7 @@ fn make(
     dataset.warnings.iter().for_each(|w| observer.note(Severity::Warning, w.clone()));
     let overrides = &batch.settings[unit.setting].train.plan;
     let config = plan::planned(&dataset, unit.config(batch), overrides);
-    let done = train::run(&dataset, &config, [folder.to_path_buf()], train::IfChanged::AskClaimed, observer)?;
+    let done = train::run(&dataset, &config, [folder.to_path_buf()], &train::IfChanged::AskClaimed.into(), observer)?;
     if !done.is_finished() {
         return Err(Interrupted.into());
     }

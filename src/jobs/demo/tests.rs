@@ -1,5 +1,7 @@
 //! The demo that ships is what its recipe says, the recipe always makes the same, and what is asked is found.
 
+use std::path::PathBuf;
+
 use super::*;
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::query_engine::QueryEngine;
@@ -24,7 +26,7 @@ fn made(recipe: &DemoRecipe, work: &Path) -> Vec<u8> {
 
 fn opened() -> (tempfile::TempDir, PathBuf, Scene) {
     let data = tempfile::tempdir().expect("folder");
-    let folder = unpacked(&Folders { data: data.path().into() }).expect("unpacked");
+    let folder = unpacked(&Folders { data: data.path().into() }, &mut Silent).expect("unpacked");
     let scene = open::scene(&folder.join("scene")).expect("opened");
     (data, folder, scene)
 }
@@ -117,17 +119,74 @@ fn the_first_question_is_answered_by_buttons_that_are_seen() {
     assert!(seen >= 20, "{seen} px are seen from where it opens");
 }
 
+/// Notes that are taken.
+#[derive(Default)]
+struct Notes(Vec<String>);
+
+impl Observer for Notes {
+    fn note(&mut self, _: crate::pipeline::observer::Severity, text: String) {
+        self.0.push(text);
+    }
+}
+
 #[test]
 fn it_is_unpacked_once_and_a_users_copy_is_kept() {
     let data = tempfile::tempdir().expect("folder");
     let folders = Folders { data: data.path().into() };
-    let folder = unpacked(&folders).expect("unpacked");
+    let mut notes = Notes::default();
+    let folder = unpacked(&folders, &mut notes).expect("unpacked");
     let own = folder.join("scene/own.txt");
     std::fs::write(&own, "mine").expect("written");
-    assert_eq!(unpacked(&folders).expect("again"), folder);
+    assert_eq!(unpacked(&folders, &mut notes).expect("again"), folder);
     assert_eq!(std::fs::read(&own).expect("kept"), b"mine");
-    std::fs::remove_file(folder.join("scene/scene.json")).expect("removed");
-    let e = unpacked(&folders).expect_err("it is no scene any more").to_string();
-    assert!(e.contains(&folder.display().to_string()), "{e}");
-    assert!(own.exists(), "nothing is written over");
+    assert!(notes.0.is_empty(), "{:?}", notes.0);
+}
+
+#[test]
+fn what_is_damaged_is_unpacked_again_and_what_was_there_is_kept() {
+    let data = tempfile::tempdir().expect("folder");
+    let folders = Folders { data: data.path().into() };
+    let folder = unpacked(&folders, &mut Silent).expect("unpacked");
+    let at = |name: &str| folder.join("scene").join(name);
+    let cut = |path: &Path| {
+        let bytes = std::fs::read(path).expect("read");
+        std::fs::write(path, &bytes[..bytes.len() / 2]).expect("written");
+    };
+    let strange = |path: &Path| {
+        let text = std::fs::read_to_string(path).expect("read").replacen('{', "{ \"state\": \"another\",", 1);
+        std::fs::write(path, text).expect("written");
+    };
+    type Damage<'a> = (&'a str, &'a dyn Fn(&Path));
+    let remove = |path: &Path| std::fs::remove_file(path).expect("removed");
+    let damages: [Damage<'_>; 6] = [
+        ("scene.json", &remove),
+        ("scene.json", &cut),
+        ("scene.json", &strange),
+        ("point_cloud.ply", &remove),
+        ("point_cloud.ply", &cut),
+        ("semantic_map.safetensors", &remove),
+    ];
+    for (k, (name, damage)) in damages.into_iter().enumerate() {
+        std::fs::write(at("own.txt"), format!("mine {k}")).expect("written");
+        damage(&at(name));
+        let mut notes = Notes::default();
+        assert_eq!(unpacked(&folders, &mut notes).expect("unpacked again"), folder);
+        let aside = folder.with_added_extension(format!("damaged-{}", k + 1));
+        assert!(notes.0.len() == 1 && notes.0[0].contains(&aside.display().to_string()), "{name}: {:?}", notes.0);
+        let scene = open::scene(&folder.join("scene")).expect("sound");
+        assert!(scene.semantics().is_ok() && !at("own.txt").exists(), "{name}");
+        assert_eq!(std::fs::read_to_string(aside.join("scene/own.txt")).expect("kept"), format!("mine {k}"));
+    }
+    // Photos are put back, and nothing of the scene changes.
+    let photos = open::dataset(&folder.join("photos")).expect("photos");
+    std::fs::write(at("own.txt"), "mine").expect("written");
+    cut(&photos.photos[0].path);
+    remove(&photos.photos[1].path);
+    let mut notes = Notes::default();
+    unpacked(&folders, &mut notes).expect("mended");
+    assert!(notes.0.len() == 1 && notes.0[0].starts_with("2 damaged or missing files"), "{:?}", notes.0);
+    assert!(at("own.txt").exists() && photos.photos[..2].iter().all(|p| image::open(&p.path).is_ok()));
+    notes.0.clear();
+    unpacked(&folders, &mut notes).expect("sound");
+    assert!(notes.0.is_empty());
 }

@@ -10,6 +10,7 @@ use super::rows::{self, QueryTimes, RowResult};
 use super::{LABELS, ReproduceSettings};
 use crate::io::labels::Labels;
 use crate::io::semantic_map;
+use crate::jobs::changed::ChangedScene;
 use crate::jobs::evaluate::PhotoComparison;
 use crate::jobs::find_objects::{self, FindRequest, FindSettings};
 use crate::jobs::{JobError, evaluate_masks, export, open, train};
@@ -143,7 +144,7 @@ fn gaussians(
     settings: &ReproduceSettings,
     observer: &mut dyn Observer,
 ) -> Result<TrainedFacts, JobError> {
-    let done = train::run(dataset, &settings.train, [folder.to_path_buf()], train::IfChanged::Ask, observer)?;
+    let done = train::run(dataset, &settings.train, [folder.to_path_buf()], &train::IfChanged::Ask.into(), observer)?;
     if !done.is_finished() {
         return Err(Interrupted.into());
     }
@@ -217,6 +218,7 @@ fn compare(
         borders: None,
         pictures: None,
         state: scene.state.clone(),
+        changed: ChangedScene::default(),
     };
     let mut labels = FileMasks(Labels::of_photos(&input.labels, &dataset.photos)?);
     let views = evaluate_masks::draw(&comparison, &map, &mut labels, &compared, split.trained_on)?;

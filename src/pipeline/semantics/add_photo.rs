@@ -26,7 +26,9 @@ pub(crate) fn joined(known: &SemanticMap, tracked: &Tracked, photos: &[Photo]) -
         let whole = number[identity.parent as usize];
         let is_one = size >= LEAST && (identity.parent == NOBODY || whole != NOBODY);
         let name = identity.names.first().cloned().unwrap_or_default();
-        number.push(if is_one { add(&mut map, identity.level, whole, name, &[]) } else { NOBODY });
+        let new = if is_one { add(&mut map, identity.level, whole, name, &[]) } else { NOBODY };
+        map.identities.mark_by_hand(new);
+        number.push(new);
     }
     for (id, gaussians) in own.iter().enumerate() {
         let now = number[id];

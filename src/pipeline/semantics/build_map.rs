@@ -1,6 +1,7 @@
 //! The whole way from trained Gaussians and masks to a semantic map.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
@@ -9,6 +10,7 @@ use super::add_photo::{joined, told};
 use super::codes;
 use super::embed::embed;
 use super::error::FindError;
+use super::keep;
 use super::network_segmenter::NetworkMasks;
 use super::regions::Regions;
 use super::sam2_tracker::Sam2Tracker;
@@ -52,6 +54,8 @@ pub(crate) struct FindOptions {
     pub(crate) part_weight: f32,
     /// Where a network is asked for masks, if one is.
     pub(crate) grid: Option<MaskGrid>,
+    /// Objects and parts that somebody has worked on, which stay beside what is found.
+    pub(crate) keep: Option<Arc<SemanticMap>>,
 }
 
 impl Default for FindOptions {
@@ -62,6 +66,7 @@ impl Default for FindOptions {
             code_steps: CODE_STEPS,
             part_weight: PART_WEIGHT,
             grid: None,
+            keep: None,
         }
     }
 }
@@ -149,6 +154,9 @@ pub(crate) fn find_objects(
         lift(&mut map, cloud, &masks, settings, options, observer)?;
     }
     timed("train codes", start);
+    if let Some(kept) = &options.keep {
+        map = keep::joined(&map, kept);
+    }
     if let Some(encoder) = encoder {
         let start = Instant::now();
         map.language = Some(embed(cloud, &map, photos, settings, options.part_weight, encoder, observer)?);

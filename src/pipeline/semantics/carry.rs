@@ -29,6 +29,8 @@ pub(crate) fn carry_by(map: &SemanticMap, nearest: &[Option<usize>]) -> (Semanti
     for (codes, near) in carried.codes.iter_mut().zip(nearest) {
         *codes = near.map_or(*codes, |i| map.codes[i]);
     }
+    carried.prepared = map.prepared;
+    carried.removed.clone_from(&map.removed);
     carried.language.clone_from(&map.language);
     carried.findings.clone_from(&map.findings);
     let reached = nearest.iter().flatten().count();

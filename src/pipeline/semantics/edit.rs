@@ -57,6 +57,8 @@ pub enum EditError {
     Nothing,
     #[error("what you selected is not a piece of '{0}'; select inside it")]
     Outside(String),
+    #[error("'{0}' is empty: all of its Gaussians became others'; undo that, correct it by clicks, or merge it")]
+    Empty(String),
 }
 
 /// The map after an edit.
@@ -74,25 +76,30 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
                 return Err(EditError::NoName);
             }
             new.identities.rename(known(*id)?, name);
+            new.identities.mark_by_hand(*id);
         }
         Edit::Merge(from, into) => {
             let (from, into) = (known(*from)?, known(*into)?);
             if all.descendants(from)[into as usize] {
                 return Err(EditError::Related(all.name(from), all.name(into)));
             }
-            merge(&mut new, from, into);
+            let into = merge(&mut new, from, into);
+            new.identities.mark_by_hand(into);
         }
         Edit::Split(id) => {
             let own: Vec<usize> = (0..map.identity_of.len()).filter(|&i| map.identity_of[i] == *id).collect();
             let (name, whole) = (all.name(known(*id)?), map.members(*id).len());
             let too_small = || match own.len() {
                 own if whole > own => EditError::OfParts { name, own, all: whole },
+                0 => EditError::Empty(name),
                 own => EditError::TooSmall { name, own },
             };
             let parts = pieces(cloud, &own).ok_or_else(too_small)?;
             let (level, parent) = all.get(*id).map_or((Level::Object, NOBODY), |i| (i.level, i.parent));
+            new.identities.mark_by_hand(*id);
             for part in parts.iter().skip(1) {
-                add(&mut new, level, parent, String::new(), part);
+                let part = add(&mut new, level, parent, String::new(), part);
+                new.identities.mark_by_hand(part);
             }
             // Which photos show which of the pieces was not noticed.
             new.findings.iter_mut().for_each(|f| f.forget_seen(*id));
@@ -103,16 +110,22 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
             let is_in = |i: &usize| map.identity_of.get(*i).is_some_and(is);
             let own: Vec<usize> = gaussians.iter().map(|i| *i as usize).filter(is_in).collect();
             if own.is_empty() {
-                return Err(if gaussians.is_empty() { EditError::Nothing } else { EditError::Outside(all.name(*of)) });
+                return Err(match gaussians.is_empty() {
+                    true => EditError::Nothing,
+                    false if *of != NOBODY && map.members(*of).is_empty() => EditError::Empty(all.name(*of)),
+                    false => EditError::Outside(all.name(*of)),
+                });
             }
             let level = if *of == NOBODY { Level::Object } else { Level::Part };
-            add(&mut new, level, *of, name.trim().to_owned(), &own);
+            let piece = add(&mut new, level, *of, name.trim().to_owned(), &own);
+            new.identities.mark_by_hand(piece);
         }
         Edit::Reshape { id, gaussians } => {
             if gaussians.is_empty() {
                 return Err(EditError::Nothing);
             }
             reshape(&mut new, known(*id)?, gaussians);
+            new.identities.mark_by_hand(*id);
         }
     }
     if !matches!(edit, Edit::Rename(..)) {
@@ -165,16 +178,23 @@ pub(crate) fn add(
 }
 
 /// The point of the code sphere that is farthest from all codes that are taken.
-fn free_code(identities: &Identities) -> [f32; 3] {
+pub(super) fn free_code(identities: &Identities) -> [f32; 3] {
     let taken: Vec<Vec3> = identities.iter().map(|(_, i)| Vec3::from(i.code)).collect();
     let points = codes::sphere(2 * taken.len() + 8).into_iter().map(|p| p * RADIUS + Vec3::splat(0.5));
     let far = |p: &Vec3| taken.iter().map(|t| t.distance_squared(*p)).fold(f32::INFINITY, f32::min);
     points.max_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or(Vec3::ONE).to_array()
 }
 
-/// `from` becomes `into`. Numbers change, because there is one identity less.
-fn merge(map: &mut SemanticMap, from: IdentityId, into: IdentityId) {
-    renumber(map, |id| id == from, Some((from, into)));
+/// `from` becomes `into`. Numbers change, because there is one identity less; that of `into`.
+fn merge(map: &mut SemanticMap, from: IdentityId, into: IdentityId) -> IdentityId {
+    renumber(map, |id| id == from, Some((from, into)))[into as usize]
+}
+
+/// What an edit left without a Gaussian that had some, where the edit changed no numbers.
+pub(crate) fn emptied(before: &SemanticMap, after: &SemanticMap) -> Vec<IdentityId> {
+    let (before, after) = (before.sizes(), after.sizes());
+    let is_empty = |id: &usize| before[*id] > 0 && after.get(*id) == Some(&0);
+    (1..before.len()).filter(is_empty).map(|id| id as IdentityId).collect()
 }
 
 /// The map without these identities and their pieces, whose Gaussians are nobody's then; and the new number of each.
@@ -190,7 +210,7 @@ pub(crate) fn forget(map: &SemanticMap, ids: &[IdentityId]) -> (SemanticMap, Vec
 
 /// Leaves out the identities that are `gone`; where one became another (`merged`: from, into), its pieces and Gaussians
 /// are that one's. Returns the new number of each.
-fn renumber(
+pub(super) fn renumber(
     map: &mut SemanticMap,
     gone: impl Fn(IdentityId) -> bool,
     merged: Option<(IdentityId, IdentityId)>,
@@ -219,7 +239,7 @@ fn renumber(
         }
         number[id as usize] = map.identities.add(identity.level, number[parent_of(id) as usize], names);
         if let Some(new) = map.identities.get_mut(number[id as usize]) {
-            new.code = identity.code;
+            (new.code, new.by_hand) = (identity.code, identity.by_hand);
         }
         features.extend(map.language.as_ref().map(|l| l.by_identity.get(id as usize - 1).cloned().unwrap_or_default()));
     }

@@ -26,6 +26,7 @@ mod floaters;
 pub(crate) mod grounds;
 #[cfg(test)]
 mod heart;
+pub(crate) mod keep;
 pub mod kept_frames;
 pub(crate) mod kept_masks;
 mod kept_track;
@@ -43,6 +44,7 @@ pub(crate) mod reading;
 pub mod recipe;
 pub mod regions;
 pub mod relevancy;
+pub(crate) mod removed;
 pub(crate) mod sam2_tracker;
 pub mod segmenter;
 pub(crate) mod splat_tree;

@@ -3,6 +3,7 @@
 //! too, their masks linked to what is known; the tree of what belongs together decides. No network is needed.
 
 mod complete;
+mod gone;
 mod options;
 mod views;
 
@@ -15,6 +16,7 @@ use super::associate::{Link, disagreements, link};
 use super::error::FindError;
 use super::floaters::drop_floaters;
 use super::propagate::extend;
+use super::removed::RemovedThings;
 use super::sam2_tracker::{LABEL_SIDE_PX, Sam2Tracker};
 use super::segmenter::{FoundMask, Segmenter};
 use super::splat_tree::hierarchy::Hierarchy;
@@ -102,6 +104,7 @@ pub(crate) fn track(
         settings,
         options,
         renderer: Renderer::new(),
+        removed: options.removed.as_deref().map(|gone| RemovedThings::new(cloud, gone)),
         identities: options.known.as_ref().map_or_else(Identities::default, |map| map.identities.clone()),
         votes: match &options.known {
             Some(map) => Votes::known(map, options.least_seen),
@@ -192,6 +195,7 @@ struct Tracker<'a> {
     settings: &'a RenderSettings,
     options: &'a TrackOptions,
     renderer: Renderer,
+    removed: Option<RemovedThings>,
     identities: Identities,
     votes: Votes,
     disagreements: Vec<(usize, Disagreement)>,
@@ -231,7 +235,7 @@ impl Tracker<'_> {
         begin(format!("Finding masks in {name}"), observer)?;
         let found = segmenter.segment(&self.photos[photo], self.options.max_side_px, observer);
         self.segment_secs += start.elapsed().as_secs_f64();
-        let found = found?;
+        let (found, gone) = self.without_gone(photo, found?)?;
         if found.is_empty() {
             return Ok(None);
         }
@@ -268,6 +272,7 @@ impl Tracker<'_> {
             let known = labels.iter_mut().zip(&map.identity).filter(|(_, known)| !is_free(**known));
             known.for_each(|(label, _)| *label = UNKNOWN);
         }
+        gone::forget(&mut labels, gone.as_ref());
         self.votes
             .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
             .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e.into()))?;
@@ -315,6 +320,7 @@ impl Tracker<'_> {
                     self.disagreements.push((photo, Disagreement::Drift(id)));
                 }
             }
+            gone::forget(&mut labels, self.gone(photo, LABEL_SIDE_PX)?.as_ref());
             let camera = self.photos[photo].camera.limited_to(LABEL_SIDE_PX);
             self.votes
                 .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)

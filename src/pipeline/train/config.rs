@@ -136,6 +136,11 @@ impl TrainConfig {
         *other == Self { antialias: if self.surfels { other.antialias } else { self.antialias }, ..own }
     }
 
+    /// Whether a training with these settings is that with the others, for another number of steps.
+    pub(crate) fn is_same_but_for_steps(&self, other: &Self) -> bool {
+        Self { steps: other.steps, ..self.clone() }.is_same_run(other)
+    }
+
     /// Whether only the CPU can do what is asked.
     pub(crate) fn needs_cpu(&self) -> bool {
         self.surfels || self.geometry_weights().0 > 0.0

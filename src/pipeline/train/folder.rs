@@ -20,6 +20,8 @@ pub(crate) struct FolderUse {
     pub(crate) anyway: bool,
     /// The folder is made again where it goes away meanwhile. Not where it was taken away by who went on.
     pub(crate) remake: bool,
+    /// A checkpoint of the same settings with fewer steps is continued.
+    pub(crate) more_steps: bool,
 }
 
 /// Holds the folder again if it went away, and says so.
@@ -82,13 +84,14 @@ pub(super) fn resumable(
     folder: &Path,
     dataset: &Dataset,
     (config, train): (&TrainConfig, &[usize]),
-    (now, anyway): (&TrainInputs, bool),
+    (now, may): (&TrainInputs, FolderUse),
     observer: &mut dyn Observer,
 ) -> Result<Option<Checkpoint>, CheckpointError> {
     let path = folder.join(checkpoint::FILE);
     let Some(saved) = checkpoint::load(&path)? else { return Ok(None) };
     let h = &saved.header;
-    if !h.config.is_same_run(config) {
+    let goes_on = may.more_steps && h.config.is_same_but_for_steps(config) && config.steps > h.step;
+    if !h.config.is_same_run(config) && !goes_on {
         return Err(CheckpointError::OtherRun { path, what: "settings" });
     }
     let changes = match &h.inputs {
@@ -101,7 +104,7 @@ pub(super) fn resumable(
             Vec::new()
         }
     };
-    if !changes.is_empty() && !anyway {
+    if !changes.is_empty() && !may.anyway {
         return Err(CheckpointError::OtherInputs { folder: folder.into(), changes });
     }
     if !changes.is_empty() {

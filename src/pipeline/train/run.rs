@@ -68,7 +68,7 @@ pub(crate) fn run_on(
         None => None,
     };
     let saved = match (out, &inputs) {
-        (Some(folder), Some(now)) => resumable(folder, dataset, (config, &train), (now, may.anyway), observer)?,
+        (Some(folder), Some(now)) => resumable(folder, dataset, (config, &train), (now, may), observer)?,
         _ => None,
     };
     if let (Some(folder), Some(saved)) = (out, &saved)
@@ -139,6 +139,8 @@ impl<'a> Job<'a> {
         let background = dataset.background.unwrap_or([0.0; 3]);
         let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
         let (mut secs, mut history) = (0.0, History::default());
+        // What was seen in full is not seen coarsely again, where more steps make those for that more.
+        let was_coarse = saved.as_ref().is_none_or(|s| s.header.step < coarse_steps(&s.header.config));
         let mut trainer = match saved {
             Some(s) => {
                 let mut t = Trainer::new(s.cloud, config, background, extent, s.header.rng);
@@ -173,7 +175,7 @@ impl<'a> Job<'a> {
         info.config = serde_json::to_value(config).unwrap_or_default();
         let photos = views.iter().map(|v| v.name.clone()).collect();
         let safe = trainer.cloud.clone();
-        let coarse = (trainer.step < coarse::steps(config)).then(|| coarse::halved(&views));
+        let coarse = (was_coarse && trainer.step < coarse::steps(config)).then(|| coarse::halved(&views));
         Self {
             config,
             scene,

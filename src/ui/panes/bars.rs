@@ -43,6 +43,12 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
                     if ui.button(text).clicked() {
                         actions.push(Action::Open(path.clone()));
                     }
+                    let runs = state.recent_runs.iter().find(|(of, _)| of == path);
+                    for run in runs.into_iter().flat_map(|(_, runs)| runs) {
+                        if ui.button(format!("{INDENT}{}", run.text())).clicked() {
+                            actions.push(Action::Open(run.folder.clone()));
+                        }
+                    }
                 }
             });
             ui.separator();
@@ -122,6 +128,7 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
             ui.set_min_width(260.0);
             let trains_here = has_photos && state.scene.as_ref().is_some_and(|s| s.remote.is_none());
             item(ui, trains_here && state.job.is_none(), None, Action::StartTraining, actions);
+            item(ui, trains_here && state.job.is_none() && state.can_begin_anew(), None, Action::TrainAnew, actions);
             item(ui, state.job.as_ref().is_some_and(|j| j.kind.can_pause()), None, Action::PauseJob, actions);
             item(ui, state.job.is_some(), None, Action::Cancel, actions);
             item(ui, trains_here && state.job.is_none(), None, Action::Evaluate, actions);

@@ -49,6 +49,7 @@ impl FirstPage {
             if !state.recent.is_empty() {
                 // Without them the page is as useful.
                 let _ = worker.submit(Command::RecentPictures(state.recent.clone()));
+                let _ = worker.submit(Command::RecentRuns(state.recent.clone()));
             }
         }
         for (path, p) in std::mem::take(&mut state.recent_pictures) {
@@ -144,6 +145,19 @@ impl FirstPage {
                 }
             });
             ui.add_space(gap - 4.0);
+        }
+        for (path, runs) in &state.recent_runs {
+            let name = text::path(path.file_name().map_or(path, Path::new));
+            ui.horizontal_wrapped(|ui| {
+                ui.label(
+                    RichText::new(format!("{name} was trained {} times:", runs.len())).small().color(theme::weak()),
+                );
+                for run in runs {
+                    if ui.link(RichText::new(run.text()).small()).clicked() {
+                        actions.push(Action::Open(run.folder.clone()));
+                    }
+                }
+            });
         }
     }
 

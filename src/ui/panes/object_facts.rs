@@ -124,6 +124,12 @@ impl<'a> RowFacts<'a> {
     /// What stands at the end of a row, and what that is.
     pub(super) fn number(&self, id: IdentityId) -> (String, &'static str) {
         let Some(fact) = self.of(id) else { return (NONE.into(), "") };
+        if fact.gaussians == 0 {
+            return (
+                "empty".into(),
+                "All of its Gaussians became others': undo that, correct it by clicks, or merge it",
+            );
+        }
         let known = |n: Option<usize>| n.map_or_else(|| NONE.into(), |n| format::count(n as u64));
         match self.order.key {
             SortKey::Photos => (known(fact.photos), "Photos in which it is seen"),

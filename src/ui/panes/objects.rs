@@ -7,7 +7,7 @@ use egui::{
 
 use super::super::labels::{self, ScreenNames};
 use super::super::state::AppState;
-use super::super::text_field::select_all;
+use super::super::text_field::take_keyboard;
 use super::super::theme;
 use super::super::viewport::visible::Visibility;
 use super::object_facts::{ListOrder, RowFacts};
@@ -227,15 +227,19 @@ impl Tree<'_> {
     fn name_field(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
         let Some(Renaming { id, name, frames }) = self.renaming.as_mut() else { return };
         let field = Id::unique("name").with(*id);
+        let begins = *frames < 2;
+        if begins {
+            // Twice: the first time, the selection does not last.
+            take_keyboard(ui.ctx(), field, name);
+            *frames += 1;
+        }
         let edit = ui.add(TextEdit::singleline(name).id(field).char_limit(80).desired_width(f32::INFINITY));
         let edit = edit.accessible_name("New name");
-        if *frames < 2 {
-            // The keyboard comes with the next frame, and puts the cursor behind the name.
-            edit.request_focus();
+        if edit.changed() {
+            *frames = 2;
+        }
+        if begins {
             edit.scroll_to_me(None);
-            select_all(ui.ctx(), field, name);
-            ui.ctx().request_repaint();
-            *frames += 1;
         } else if !edit.has_focus() {
             let is_new = name.trim() != self.identities.name(*id) && !ui.input(|i| i.key_pressed(Key::Escape));
             actions.extend(is_new.then(|| Action::Change(Edit::Rename(*id, name.clone()))));

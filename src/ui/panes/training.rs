@@ -9,6 +9,7 @@ use super::plots::{self, PsnrCurve};
 use crate::jobs::presets;
 use crate::math::format;
 use crate::pipeline::train::TrainConfig;
+use crate::scene::text;
 use crate::ui::actions::Action;
 use crate::worker::JobKind;
 
@@ -38,6 +39,7 @@ pub(crate) fn show(
             let largest = dataset.photos.iter().map(|p| p.camera.width_px.max(p.camera.height_px)).max().unwrap_or(1);
             settings(ui, &mut layout.config, largest);
             start(ui, state, &layout.config, actions);
+            other_runs(ui, state, actions);
         }
     }
     if !state.history.steps.is_empty() || !state.history.evaluations.is_empty() {
@@ -55,8 +57,13 @@ fn start(ui: &mut Ui, state: &AppState, config: &TrainConfig, actions: &mut Vec<
     ui.horizontal(|ui| {
         let tip = format!("{}  {}", Action::StartTraining.tooltip(), keys::label(ui.ctx(), &Action::StartTraining));
         let steps = format::count(config.steps);
-        let text = match state.continues_at(&state.next_training(config)) {
-            Some(step) => format!("Continue ({} of {steps})", format::count(step)),
+        let next = state.next_training(config);
+        let before = state.resumable.as_ref().map(|(before, _)| before);
+        let text = match state.continues_at(&next) {
+            Some(step) if before.is_some_and(|before| before.steps == next.steps) => {
+                format!("Continue ({} of {steps})", format::count(step))
+            }
+            Some(step) => format!("Go on from {} steps", format::count(step)),
             None => "Start training".to_owned(),
         };
         let button = theme::primary_button(&text).min_size(egui::vec2(150.0, 30.0));
@@ -64,6 +71,12 @@ fn start(ui: &mut Ui, state: &AppState, config: &TrainConfig, actions: &mut Vec<
             ui.add_enabled(!busy, button).on_hover_text(tip).on_disabled_hover_text("Another job is running.");
         if response.clicked() {
             actions.push(Action::StartTraining);
+        }
+        if state.can_begin_anew() {
+            let anew = ui.add_enabled(!busy, egui::Button::new("Begin anew").min_size(egui::vec2(90.0, 30.0)));
+            if anew.on_hover_text(Action::TrainAnew.tooltip()).clicked() {
+                actions.push(Action::TrainAnew);
+            }
         }
         let trained = state.training_job.is_some() || state.scene.as_ref().is_some_and(|s| s.trained);
         let can_measure = trained && !busy;
@@ -76,6 +89,21 @@ fn start(ui: &mut Ui, state: &AppState, config: &TrainConfig, actions: &mut Vec<
             actions.push(Action::Evaluate);
         }
     });
+}
+
+/// The other trainings of these photos, each of which can be opened.
+fn other_runs(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+    let Some(scene) = &state.scene else { return };
+    for run in scene.runs.iter().filter(|run| run.folder != scene.out) {
+        ui.horizontal(|ui| {
+            let open = ui.add_enabled(state.job.is_none(), egui::Button::new("Open").small());
+            let open = open.on_hover_text(text::path(&run.folder)).on_disabled_hover_text("Another job is running.");
+            if open.accessible_name(format!("Open {}", run.text())).clicked() {
+                actions.push(Action::Open(run.folder.clone()));
+            }
+            ui.label(RichText::new(run.text()).small().color(theme::weak()));
+        });
+    }
 }
 
 fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {

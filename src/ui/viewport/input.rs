@@ -65,11 +65,16 @@ impl Viewport {
     }
 
     fn fly(&mut self, ui: &Ui, scene: &OpenedScene) -> bool {
-        if keys::is_typing(ui.ctx()) || !ui.is_enabled() || ui.memory(|m| m.top_modal_layer().is_some()) {
+        let has_menu = egui::Popup::is_any_open(ui.ctx());
+        let is_taken = keys::is_typing(ui.ctx()) || has_menu || ui.memory(|m| m.top_modal_layer().is_some());
+        if is_taken || !ui.is_enabled() {
+            // What is held now was pressed for something else.
+            self.flying.clear();
             return false;
         }
+        ui.input(|i| keys::follow_held(&mut self.flying, i));
         let (direction, speed, dt) = ui.input(|i| {
-            let held = |k| if i.key_down(k) { 1.0 } else { 0.0 };
+            let held = |k| if self.flying.contains(&k) { 1.0 } else { 0.0 };
             let free = if i.modifiers.command || i.modifiers.ctrl { 0.0 } else { 1.0 };
             let direction =
                 DVec3::new(held(Key::D) - held(Key::A), held(Key::E) - held(Key::Q), held(Key::W) - held(Key::S));
@@ -84,5 +89,15 @@ impl Viewport {
         self.eye.fly(direction * (scene.home.bounds.radius() * FLY_RADII * speed * dt));
         ui.ctx().request_repaint();
         true
+    }
+
+    /// The world point under a window position: at the drawn depth, else at the pivot's.
+    pub(super) fn point_at(&self, pos: egui::Pos2, shown: Rect) -> DVec3 {
+        let at = DVec2::new(
+            f64::from((pos.x - shown.left()) / shown.width().max(1.0)),
+            f64::from((pos.y - shown.top()) / shown.height().max(1.0)),
+        );
+        let aspect = f64::from(shown.height() / shown.width().max(1.0));
+        self.display.picked(at, &self.eye).unwrap_or_else(|| self.eye.point_at_pivot_depth(at, aspect))
     }
 }

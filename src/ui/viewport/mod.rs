@@ -20,6 +20,7 @@ pub(crate) mod overrides;
 mod photo;
 pub mod picking;
 pub(crate) mod query;
+mod ready;
 mod request;
 mod route;
 mod ruler;
@@ -27,10 +28,11 @@ pub(crate) mod selecting;
 mod split;
 pub(crate) mod visible;
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use egui::{Rect, Sense, Ui};
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
 use self::arranging::ArrangeTool;
 use self::brush::Brush;
@@ -43,6 +45,7 @@ use self::overrides::RenderOverrides;
 use self::photo::PhotoView;
 use self::picking::Picking;
 use self::query::Queries;
+use self::ready::ReadySelection;
 use self::request::Requests;
 use self::ruler::Ruler;
 use self::selecting::SelectTool;
@@ -76,6 +79,8 @@ pub struct Viewport {
     photo: Option<PhotoView>,
     /// When the eye last moved, in window time.
     moved_at: f64,
+    /// Keys that are held to move it.
+    flying: BTreeSet<egui::Key>,
     /// What was asked, and where the answers are.
     pub queries: Queries,
     /// What is left out of the frame.
@@ -93,6 +98,8 @@ pub struct Viewport {
     pub(crate) brush: Option<Brush>,
     /// What is being selected by clicks and strokes.
     pub(crate) select: Option<SelectTool>,
+    /// What selections of this scene are made ready with.
+    ready: ReadySelection,
     /// What chooses Gaussians that are brushed over.
     choose: Option<SplatBrush>,
     /// What is being moved.
@@ -118,6 +125,7 @@ impl Viewport {
             snapshot: 0,
             photo: None,
             moved_at: f64::NEG_INFINITY,
+            flying: BTreeSet::new(),
             queries: Queries::default(),
             visibility: Visibility::default(),
             picking: Picking::default(),
@@ -127,6 +135,7 @@ impl Viewport {
             inspector: None,
             brush: None,
             select: None,
+            ready: ReadySelection::default(),
             choose: None,
             arrange: None,
             overrides: RenderOverrides::default(),
@@ -167,6 +176,7 @@ impl Viewport {
         if let Some(scene) = state.scene.as_ref().filter(|_| state.scene_number != self.scene) {
             self.scene = state.scene_number;
             self.photo = None;
+            self.ready.forget(worker);
             self.requests.forget();
             self.display.clear();
             self.set_cloud(scene.cloud.clone());
@@ -189,8 +199,9 @@ impl Viewport {
         if let Some(cloud) = state.rearranged.take() {
             self.set_cloud(Some(cloud));
         }
-        if let (Some(found), Some(tool)) = (state.selected.take(), &mut self.select) {
-            tool.take(found);
+        if let Some((job, found)) = state.selected.take() {
+            self.ready.take(job, &found);
+            self.select.iter_mut().for_each(|tool| tool.take(job, Arc::clone(&found)));
         }
         if let (Some(found), Some(inspector)) = (state.inspected.take(), &mut self.inspector) {
             inspector.take(found);
@@ -379,15 +390,5 @@ impl Viewport {
     /// Whether a GPU draws the view.
     pub(crate) fn on_gpu(&self) -> bool {
         self.display.picture().is_some_and(|p| p.on_gpu())
-    }
-
-    /// The world point under a window position: at the drawn depth, else at the pivot's.
-    fn point_at(&self, pos: egui::Pos2, shown: Rect) -> DVec3 {
-        let at = DVec2::new(
-            f64::from((pos.x - shown.left()) / shown.width().max(1.0)),
-            f64::from((pos.y - shown.top()) / shown.height().max(1.0)),
-        );
-        let aspect = f64::from(shown.height() / shown.width().max(1.0));
-        self.display.picked(at, &self.eye).unwrap_or_else(|| self.eye.point_at_pivot_depth(at, aspect))
     }
 }

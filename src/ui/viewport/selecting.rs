@@ -14,7 +14,7 @@ use super::Viewport;
 use super::outline;
 use super::picking::DrawnOutline;
 use crate::jobs::query::ViewMaps;
-use crate::jobs::select::{SelectFor, Selected, Stroke, kept_as};
+use crate::jobs::select::{SelectFor, SelectStep, Selected, Stroke, kept_as};
 use crate::math::format;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::{Camera, Identities, Level, Mask, NOBODY, SemanticMap};
@@ -36,17 +36,18 @@ pub(crate) struct SelectTool {
     radius_pt: f32,
     /// Whether strokes take away.
     takes_away: bool,
-    /// Places of the window that the stroke under way went through, and whether it takes away.
-    line: Vec<Pos2>,
-    line_takes_away: bool,
-    /// The view in which it was begun.
-    line_camera: Option<Camera>,
-    /// Whether that line waits to be taken in: it stays on screen.
-    is_drawn: bool,
-    /// Strokes that wait for their turn; `None` takes the last one back.
-    waiting: VecDeque<Option<Stroke>>,
-    /// The stroke that is being taken in.
-    pub(crate) running: Option<JobId>,
+    /// The stroke under way, and the view in which it was begun.
+    line: Option<(DrawnLine, Camera)>,
+    /// Lines that wait to be taken in, oldest first: they stay on screen.
+    drawn_lines: VecDeque<DrawnLine>,
+    /// Steps that wait for their turn.
+    waiting: VecDeque<SelectStep>,
+    /// The step that is being taken in, and whether it is a stroke: another selection's result is none of its own.
+    running: Option<(JobId, bool)>,
+    /// Whether the scene is being made ready for strokes.
+    pub(super) is_prepared: bool,
+    /// Whether that has failed: it is tried again with the next stroke.
+    pub(super) gave_up: bool,
     pub(crate) selected: Option<Arc<Selected>>,
     /// Objects and parts as they would be.
     preview: Option<Versioned<SemanticMap>>,
@@ -60,30 +61,66 @@ impl SelectTool {
             name: String::new(),
             radius_pt: 5.0,
             takes_away: false,
-            line: Vec::new(),
-            line_takes_away: false,
-            line_camera: None,
-            is_drawn: false,
+            line: None,
+            drawn_lines: VecDeque::new(),
             waiting: VecDeque::new(),
             running: None,
+            is_prepared: false,
+            gave_up: false,
             selected: None,
             preview: None,
             drawn: DrawnOutline::default(),
         }
     }
 
-    /// The next stroke to be taken in, if none is.
-    pub(crate) fn next(&mut self) -> Option<Option<Stroke>> {
+    /// The next step to be taken in, if none is.
+    pub(crate) fn next(&mut self) -> Option<SelectStep> {
         self.waiting.pop_front_if(|_| self.running.is_none())
     }
 
-    /// Takes in what strokes select by now.
-    pub(crate) fn take(&mut self, selected: Arc<Selected>) {
-        if self.is_drawn && self.waiting.is_empty() {
-            (self.is_drawn, self.line) = (false, Vec::new());
+    /// The step that was handed on is taken in by this job; `None` if nobody takes it.
+    pub(crate) fn runs(&mut self, job: Option<JobId>, is_stroke: bool) {
+        self.running = job.map(|job| (job, is_stroke));
+        if job.is_none() {
+            self.end_step(is_stroke);
         }
+    }
+
+    /// Whether steps wait to be taken in.
+    pub(crate) fn waits(&self) -> bool {
+        !self.waiting.is_empty()
+    }
+
+    /// Forgets what waits: nothing can be selected here.
+    pub(crate) fn give_up(&mut self) {
+        (self.waiting, self.drawn_lines, self.gave_up) = (VecDeque::new(), VecDeque::new(), true);
+    }
+
+    /// Takes in what strokes select by now, if that is what it waits for.
+    pub(crate) fn take(&mut self, job: JobId, selected: Arc<Selected>) {
+        let Some((_, is_stroke)) = self.running.take_if(|(running, _)| *running == job) else { return };
+        self.end_step(is_stroke);
         self.preview = Some(Versioned::new(Arc::clone(&selected.preview)));
         self.selected = Some(selected);
+    }
+
+    fn end_step(&mut self, is_stroke: bool) {
+        if is_stroke {
+            self.drawn_lines.pop_front();
+        }
+    }
+
+    /// Takes back the last stroke: one that waits is not taken in at all.
+    fn take_back(&mut self) {
+        match self.waiting.pop_back_if(|step| matches!(step, SelectStep::Stroke(_))) {
+            Some(_) => drop(self.drawn_lines.pop_back()),
+            None => self.waiting.push_back(SelectStep::TakeBack),
+        }
+    }
+
+    /// Whether there is a stroke that could be taken back.
+    fn has_strokes(&self) -> bool {
+        !self.drawn_lines.is_empty() || self.selected.as_ref().is_some_and(|s| s.strokes() > 0)
     }
 
     pub(super) fn preview(&self) -> Option<&Versioned<SemanticMap>> {
@@ -109,13 +146,15 @@ impl SelectTool {
         }
         let painter = ui.painter_at(shown);
         let color = |takes_away: bool| if takes_away { MINUS } else { PLUS };
-        let ink = color(self.line_takes_away).gamma_multiply(0.6);
-        let line = Line::new(2.0 * self.radius_pt, ink);
-        self.line.windows(2).for_each(|pair| {
-            painter.line_segment([pair[0], pair[1]], line);
-        });
-        if let Some(pos) = self.line.first() {
-            painter.circle_filled(*pos, self.radius_pt, ink);
+        for drawn in self.drawn_lines.iter().chain(self.line.iter().map(|(line, _)| line)) {
+            let ink = color(drawn.takes_away).gamma_multiply(0.6);
+            let line = Line::new(2.0 * drawn.radius_pt, ink);
+            drawn.at.windows(2).for_each(|pair| {
+                painter.line_segment([pair[0], pair[1]], line);
+            });
+            if let Some(pos) = drawn.at.first() {
+                painter.circle_filled(*pos, drawn.radius_pt, ink);
+            }
         }
         if let Some(pos) = ui.input(|i| i.pointer.hover_pos()).filter(|pos| shown.contains(*pos)) {
             let takes_away = self.takes_away != ui.input(|i| i.modifiers.shift);
@@ -163,9 +202,8 @@ impl SelectTool {
                 if ui.add_enabled(!self.is_empty(), theme::primary_button("Keep")).clicked() {
                     actions.push(Action::AddPainted);
                 }
-                let strokes = self.selected.as_ref().map_or(0, |s| s.strokes());
-                if ui.add_enabled(strokes > 0, egui::Button::new("Undo stroke")).clicked() {
-                    self.waiting.push_back(None);
+                if ui.add_enabled(self.has_strokes(), egui::Button::new("Undo stroke")).clicked() {
+                    self.take_back();
                 }
                 if ui.button("Cancel").clicked() {
                     actions.push(Action::Paint(None));
@@ -173,16 +211,20 @@ impl SelectTool {
                 self.status(ui);
             });
         });
-        if !keys::is_typing(ui.ctx()) && ui.input(|i| i.key_pressed(Key::Backspace)) {
-            self.waiting.push_back(None);
+        if !keys::is_typing(ui.ctx()) && ui.input(|i| i.key_pressed(Key::Backspace)) && self.has_strokes() {
+            self.take_back();
         }
     }
 
     fn status(&self, ui: &mut Ui) {
         let text = match &self.selected {
-            _ if self.running.is_some() && self.selected.is_none() => {
+            _ if !self.is_prepared => {
                 ui.spinner();
-                "Looking at surfaces\u{2026}".to_owned()
+                "Preparing selection, once for this scene\u{2026}".to_owned()
+            }
+            _ if self.running.is_some() => {
+                ui.spinner();
+                String::new()
             }
             Some(s) if s.id != NOBODY => {
                 format!("{} Gaussians, {:.0} ms", format::count(s.gaussians.len() as u64), s.ms)
@@ -192,13 +234,24 @@ impl SelectTool {
         };
         ui.weak(text);
     }
+}
 
-    /// The pixels of a view, at most [`SIDE_PX`] large, that the line under way went over.
+/// A line through the view.
+#[derive(Clone, Debug)]
+struct DrawnLine {
+    /// Places of the window that it went through.
+    at: Vec<Pos2>,
+    takes_away: bool,
+    radius_pt: f32,
+}
+
+impl DrawnLine {
+    /// The pixels of a view, at most [`SIDE_PX`] large, that it went over.
     fn pixels(&self, shown: Rect, camera: &Camera) -> Mask {
         let (w, h) = (camera.width_px as usize, camera.height_px as usize);
         let scale = w as f32 / shown.width().max(1.0);
         let radius = (self.radius_pt * scale).max(1.0);
-        let at: Vec<egui::Vec2> = self.line.iter().map(|p| (*p - shown.min) * scale).collect();
+        let at: Vec<egui::Vec2> = self.at.iter().map(|p| (*p - shown.min) * scale).collect();
         let near = |p: egui::Vec2, pair: &[egui::Vec2]| {
             let (a, b) = (pair[0], pair[pair.len() - 1]);
             let along = if a == b { 0.0 } else { ((p - a).dot(b - a) / (b - a).length_sq()).clamp(0.0, 1.0) };
@@ -219,35 +272,41 @@ impl Viewport {
         tool.selected.as_ref().map(|s| s.gaussians.len())
     }
 
+    /// How many lines are drawn that are not taken in yet.
+    pub fn lines_drawn(&self) -> usize {
+        self.select.as_ref().map_or(0, |tool| tool.drawn_lines.len())
+    }
+
     /// Takes clicks and drags as strokes.
     pub(super) fn use_select_tool(&mut self, response: &egui::Response, rect: Rect, state: &AppState) {
         let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
         let (Some(tool), Some(picture)) = (&mut self.select, self.display.picture()) else { return };
-        if tool.running.is_some_and(|job| job <= state.short_jobs_done) {
-            tool.running = None;
+        // What was refused or failed has no result.
+        if let Some((_, is_stroke)) = tool.running.take_if(|(job, _)| *job <= state.short_jobs_done) {
+            tool.end_step(is_stroke);
         }
         let Some(pos) = response.interact_pointer_pos() else { return };
         if response.drag_started_by(PointerButton::Primary) || response.clicked() {
-            tool.is_drawn = false;
-            tool.line = response.ctx.input(|i| i.pointer.press_origin()).into_iter().collect();
-            tool.line_takes_away = tool.takes_away != response.ctx.input(|i| i.modifiers.shift);
+            let at = response.ctx.input(|i| i.pointer.press_origin()).into_iter().collect();
+            let takes_away = tool.takes_away != response.ctx.input(|i| i.modifiers.shift);
             // What the eye sees there, though a newer picture may be on its way.
-            tool.line_camera = Some(picture.camera.limited_to(SIDE_PX));
+            let camera = picture.camera.limited_to(SIDE_PX);
+            tool.line = Some((DrawnLine { at, takes_away, radius_pt: tool.radius_pt }, camera));
         }
-        let is_dragged = response.dragged_by(PointerButton::Primary);
-        if is_dragged || response.clicked() {
-            tool.line.push(pos);
+        if let Some((line, _)) = &mut tool.line
+            && (response.dragged_by(PointerButton::Primary) || response.clicked())
+        {
+            line.at.push(pos);
         }
         if (response.drag_stopped_by(PointerButton::Primary) || response.clicked())
-            && !tool.line.is_empty()
-            && !tool.is_drawn
-            && let Some(camera) = tool.line_camera.take()
+            && let Some((line, camera)) = tool.line.take()
         {
-            let pixels = tool.pixels(shown, &camera);
+            let pixels = line.pixels(shown, &camera);
             if !pixels.is_empty() {
-                tool.waiting.push_back(Some(Stroke { camera, pixels, is_plus: !tool.line_takes_away }));
+                let stroke = Stroke { camera, pixels, is_plus: !line.takes_away };
+                tool.waiting.push_back(SelectStep::Stroke(stroke));
+                tool.drawn_lines.push_back(line);
             }
-            tool.is_drawn = true;
         }
     }
 }

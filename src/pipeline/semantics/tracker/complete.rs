@@ -14,6 +14,7 @@ use super::super::regions::lab::{lab, planes};
 use super::super::regions::shape::ends_of;
 use super::super::view_map::ViewMap;
 use super::super::votes::UNKNOWN;
+use super::gone::forget;
 use super::{Tracker, ViewReport};
 use crate::io;
 use crate::math::grid::neighbors;
@@ -51,7 +52,9 @@ impl Tracker<'_> {
             let ends = ends_of(self.cloud, self.settings, &camera);
             let terrain = Terrain::new(pixels.width_px as usize, &pixels.rgb, ends.as_deref(), &options);
             let map = self.map_of(view.photo, SIDE_PX, &of)?;
-            counts.add(&terrain, &sure(&map, options.share));
+            let mut known = sure(&map, options.share);
+            forget(&mut known, self.gone(view.photo, SIDE_PX)?.as_ref());
+            counts.add(&terrain, &known);
             terrains.push((view.photo, terrain));
             ticker.tick(i + 1, observer)?;
         }
@@ -61,6 +64,7 @@ impl Tracker<'_> {
             let known = sure(&map, options.share);
             let mut labels = grow(terrain, &known, &colors, &options);
             labels.iter_mut().zip(&known).filter(|(_, k)| **k != UNKNOWN).for_each(|(l, _)| *l = UNKNOWN);
+            forget(&mut labels, self.gone(*photo, SIDE_PX)?.as_ref());
             let photo = &self.photos[*photo];
             let camera = photo.camera.limited_to(SIDE_PX);
             self.votes

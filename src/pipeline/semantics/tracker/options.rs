@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::super::votes::LEAST_SEEN;
-use crate::scene::{MaskPrompt, SemanticMap};
+use crate::scene::{GaussianCloud, MaskPrompt, SemanticMap};
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TrackOptions {
@@ -32,6 +32,10 @@ pub(crate) struct TrackOptions {
     pub(crate) least_seen: f32,
     /// Objects and parts that are there and stay as they are: masks only tell of what is nobody's yet.
     pub(crate) known: Option<Arc<SemanticMap>>,
+    /// Gaussians that are no more there, though photos show them.
+    pub(crate) removed: Option<Arc<GaussianCloud>>,
+    /// Names of what is no more there, where its Gaussians were not kept.
+    pub(crate) removed_names: Vec<String>,
 }
 
 impl Default for TrackOptions {
@@ -49,6 +53,8 @@ impl Default for TrackOptions {
             hidden_steps: 4.0,
             least_seen: LEAST_SEEN,
             known: None,
+            removed: None,
+            removed_names: Vec::new(),
         }
     }
 }

@@ -60,7 +60,7 @@ impl Picking {
     }
 
     /// Selects an identity, or nothing.
-    pub(super) fn select(&mut self, id: Option<IdentityId>) {
+    pub(crate) fn select(&mut self, id: Option<IdentityId>) {
         self.selected = id;
     }
 

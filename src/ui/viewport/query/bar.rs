@@ -1,11 +1,11 @@
 //! The query field: typing, completion from known names, history.
 
-use egui::{Id, Key, Modifiers, RichText, TextEdit, Ui};
+use egui::{Event, Id, InputState, Key, Modifiers, RichText, TextEdit, Ui};
 
 use super::Queries;
 use crate::pipeline::semantics::names;
 use crate::scene::SemanticMap;
-use crate::ui::text_field::{cursor_to_end, select_all};
+use crate::ui::text_field::{cursor_to_end, take_keyboard};
 use crate::ui::theme;
 
 /// Completions that are offered.
@@ -21,7 +21,18 @@ impl Queries {
         // The same in a card that is folded and in one that is not.
         let id = Id::unique(("query", self.is_second));
         // Taken before the field sees them: it would move its cursor.
+        if self.side.focus > 0 {
+            // Twice: the first time, the selection does not last.
+            self.side.focus -= 1;
+            leave_out_slashes(ui);
+            take_keyboard(ui.ctx(), id, &mut self.side.typed);
+        }
         let focused = ui.memory(|m| m.has_focus(id));
+        self.side.begun |= !focused;
+        if focused && (!self.side.begun || self.side.typed.is_empty()) {
+            // The key that opened it types nothing, however often it is pressed.
+            leave_out_slashes(ui);
+        }
         self.wanted |= focused;
         if focused {
             self.recall(ui, id, semantics);
@@ -42,6 +53,7 @@ impl Queries {
             self.side.typed.clone_from(&offered[0]);
             cursor_to_end(ui.ctx(), id, &self.side.typed);
         }
+        self.side.begun |= response.changed() || ui.input(goes_on);
         if response.changed() || complete {
             (self.side.recalled, self.side.focus) = (None, 0);
             self.side.typed_at = Some(ui.input(|i| i.time));
@@ -53,13 +65,6 @@ impl Queries {
             if ui.input(|i| i.key_pressed(Key::Enter)) {
                 self.side.start_typing();
             }
-        }
-        if self.side.focus > 0 {
-            // The keyboard comes with the next frame, and puts the cursor behind the text.
-            self.side.focus -= 1;
-            response.request_focus();
-            select_all(ui.ctx(), id, &self.side.typed);
-            ui.ctx().request_repaint();
         }
         (focused, offered)
     }
@@ -131,4 +136,24 @@ impl Queries {
         }
         is_word && wait <= 0.0
     }
+}
+
+/// Takes the slashes off that come before anything else is typed.
+fn leave_out_slashes(ui: &Ui) {
+    ui.input_mut(|i| {
+        let mut has_begun = false;
+        i.events.retain(|event| match event {
+            Event::Text(text) if !has_begun && text == "/" => false,
+            event => {
+                has_begun |= matches!(event, Event::Text(_) | Event::Paste(_));
+                true
+            }
+        });
+    });
+}
+
+/// Whether something else is done with the text that is selected than to type in its place.
+fn goes_on(input: &InputState) -> bool {
+    let is_key = |e: &Event| matches!(e, Event::Key { key, pressed: true, .. } if *key != Key::Slash);
+    input.pointer.any_pressed() || input.events.iter().any(is_key)
 }

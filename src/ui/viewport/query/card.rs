@@ -20,6 +20,9 @@ use crate::ui::state::AppState;
 use crate::ui::theme;
 use crate::worker::Versioned;
 
+/// Said of what has no Gaussian.
+const EMPTY: &str = "empty: all of its Gaussians became others'";
+
 /// Things that fit equally and are named.
 const NAMED: usize = 3;
 
@@ -97,17 +100,22 @@ impl Queries {
         actions: &mut Vec<Action>,
     ) {
         let facts = self.facts_of(target, semantics, cloud);
+        let is_empty = state.is_empty(target);
         ui.horizontal(|ui| {
             swatch(ui, self.color_of(newest));
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let go = Action::GoToTarget(target, Side::Best);
-                if ui.small_button("Go there").on_hover_text(go.tooltip()).clicked() {
+                if !is_empty && ui.small_button("Go there").on_hover_text(go.tooltip()).clicked() {
                     actions.push(go);
                 }
                 let name = RichText::new(state.labels.full_name(&semantics.identities, target)).strong();
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| ui.add(egui::Label::new(name).truncate()));
             });
         });
+        if is_empty {
+            ui.colored_label(theme::warning(), format!("It is {EMPTY}."));
+            return;
+        }
         ui.horizontal(|ui| {
             let (certainty, color, numbers) = certainty(newest);
             ui.colored_label(color, certainty).on_hover_text(numbers);
@@ -168,6 +176,9 @@ impl Queries {
             }
             (_, Some(&target)) => {
                 let name = state.labels.full_name(&semantics.identities, target);
+                if state.is_empty(target) {
+                    return Some(("empty".to_owned(), theme::warning(), format!("{name} is {EMPTY}.")));
+                }
                 match self.why_unseen(semantics, visibility, target) {
                     Some(why) => Some((why.to_owned(), theme::warning(), name)),
                     None => {

@@ -6,6 +6,7 @@
 
 mod bar;
 mod card;
+pub(crate) mod closed;
 mod details;
 mod embeddings;
 mod overlay;

@@ -12,7 +12,7 @@ use crate::ui::state::AppState;
 use crate::worker::Versioned;
 
 /// Around cards, points.
-const MARGIN: f32 = 12.0;
+pub(super) const MARGIN: f32 = 12.0;
 
 /// Where a card of the view is on screen.
 fn on_screen(ctx: &Context, name: &'static str) -> Option<Rect> {
@@ -23,6 +23,11 @@ fn on_screen(ctx: &Context, name: &'static str) -> Option<Rect> {
 
 /// Views that are smaller than this have the answer in a word, points.
 const SMALL: Vec2 = vec2(540.0, 420.0);
+
+/// Width of the card in a view, points.
+pub(super) fn width_in(view: Rect) -> f32 {
+    (view.width() - 410.0).clamp(300.0, 380.0).min(view.width() - 40.0)
+}
 
 impl Queries {
     /// The field, the answer, and the queries that are pinned. Whether the field has the keyboard. The card keeps
@@ -39,7 +44,7 @@ impl Queries {
         let is_folded = is_small && !self.side.unfolded;
         // In the corner: what is looked for is mostly in the middle.
         let mut at = Align2::RIGHT_TOP.pos_in_rect(&rect.shrink(MARGIN));
-        let width = (rect.width() - 410.0).clamp(300.0, 380.0).min(rect.width() - 40.0);
+        let width = width_in(rect);
         for card in ["modes", "photo"].into_iter().filter_map(|name| on_screen(ui.ctx(), name)) {
             let card = card.translate(rect.min - first.min);
             // Below the view's own cards where they reach that far.

@@ -20,6 +20,8 @@ pub(super) struct QuerySide {
     pub(super) typed_at: Option<f64>,
     /// Frames in which the field is yet to take the keyboard, with all of its text selected.
     pub(super) focus: u8,
+    /// Whether anything was typed since, or the cursor moved.
+    pub(super) begun: bool,
     /// Whether a small view shows the answer in full, too.
     pub(super) unfolded: bool,
     /// Place in the history while going through it.
@@ -64,7 +66,7 @@ impl QuerySide {
 
     /// Puts the keyboard into the field, and what is typed next in place of its text.
     pub(super) fn start_typing(&mut self) {
-        self.focus = 2;
+        (self.focus, self.begun) = (2, false);
     }
 
     /// What is asked, for the text encoder.

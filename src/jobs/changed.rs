@@ -1,0 +1,70 @@
+//! What of a scene its photos show otherwise: what was removed from it, and that it was edited.
+
+use super::photos_without::is_without;
+use super::{JobError, Scene};
+use crate::io::semantic_map;
+use crate::jobs::find_objects::listed;
+use crate::pipeline::observer::Severity;
+use crate::pipeline::semantics::removed::RemovedThings;
+use crate::render::{RenderSettings, Renderer};
+use crate::scene::{Camera, Dataset, PhotoPixels};
+
+/// What photos of a scene show otherwise than it is.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct ChangedScene {
+    /// Names of what was removed, and where that is known, what it looked like.
+    names: Vec<String>,
+    removed: Option<RemovedThings>,
+    edited: bool,
+}
+
+impl ChangedScene {
+    /// Of a scene, and photos that may be made without what was removed.
+    pub(crate) fn of(scene: &Scene, photos: &Dataset) -> Self {
+        let (names, removed) = match &scene.folder {
+            Some(folder) if !is_without(&photos.root) => semantic_map::removed_of(folder),
+            _ => Default::default(),
+        };
+        let removed = removed.map(|removed| RemovedThings::new(&scene.cloud, &removed));
+        Self { names, removed, edited: scene.edited }
+    }
+
+    /// In words, if there is anything to say.
+    pub(crate) fn told(&self) -> Option<(Severity, String)> {
+        let names = listed(&self.names);
+        let removed = match (self.names.is_empty(), &self.removed) {
+            (true, _) => None,
+            (false, Some(_)) => Some((
+                Severity::Info,
+                format!("The photos still show what was removed ({names}): their pixels of it are left out"),
+            )),
+            (false, None) => Some((
+                Severity::Warning,
+                format!("The photos still show what was removed ({names}): that counts as an error of the scene"),
+            )),
+        };
+        let edited = self.edited.then(|| {
+            let text =
+                "The scene was edited after it was trained and its photos were not: each change counts as an error";
+            (Severity::Warning, text.to_owned())
+        });
+        match (removed, edited) {
+            (Some((_, removed)), Some((severity, edited))) => Some((severity, format!("{removed}. {edited}"))),
+            (removed, edited) => removed.or(edited),
+        }
+    }
+
+    /// Leaves out the pixels of a photo that show what was removed.
+    pub(crate) fn leave_out(
+        &self,
+        pixels: &mut PhotoPixels,
+        camera: &Camera,
+        settings: &RenderSettings,
+    ) -> Result<(), JobError> {
+        let Some(removed) = &self.removed else { return Ok(()) };
+        let shown = removed.shows(&mut Renderer::new(), camera, settings)?;
+        let coverage = pixels.coverage.get_or_insert_with(|| vec![u8::MAX; shown.len()]);
+        coverage.iter_mut().zip(shown).filter(|(_, shown)| *shown).for_each(|(c, _)| *c = 0);
+        Ok(())
+    }
+}

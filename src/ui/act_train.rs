@@ -1,0 +1,42 @@
+//! Training from the window: it goes on where the one on screen ended, or begins anew beside it.
+
+use super::actions::Action;
+use super::app::App;
+use super::dialogs::Question;
+use super::state::Tone;
+use crate::jobs::train::{IfChanged, TrainStart};
+use crate::worker::Command;
+
+impl App {
+    /// Goes on with the training on screen where its settings allow it and it is not to begin `anew`.
+    pub(super) fn start_training(&mut self, anew: bool, if_changed: IfChanged) {
+        let scene = self.state.scene.as_ref();
+        let Some((dataset, out)) = scene.and_then(|s| Some((s.dataset.clone()?, s.out.clone()))) else {
+            self.state.toast(Tone::Warning, "Open a folder of posed photos first: training needs them.");
+            return;
+        };
+        if let Some(job) = &self.state.job {
+            let text = format!("{} is still running; cancel it first (Esc).", job.title);
+            self.state.toast(Tone::Warning, text);
+            return;
+        }
+        let config = self.state.next_training(&self.layout.config);
+        self.state.antialias = config.render_settings(None).antialias;
+        let reached = self.state.continues_at(&config).filter(|_| !anew);
+        self.state.resumable = Some((config.clone(), reached.unwrap_or(0)));
+        let from = TrainStart { more_steps: reached.is_some(), objects_of: Some(out.clone()), if_changed };
+        let out = Some(out).filter(|_| !anew);
+        self.submit(Command::Train { dataset, config, out, from });
+    }
+
+    /// Asks whether a training goes on with other photos than it began with.
+    pub(super) fn ask_how_to_train(&mut self, changes: &str) {
+        let text = format!(
+            "{changes}.\n\nTrain anew in a folder of its own, or go on with the photos as they are now? The training so \
+             far stays as it is if you train anew."
+        );
+        let action = Action::TrainChanged(IfChanged::Anew);
+        let other = Some(("Go on", Action::TrainChanged(IfChanged::GoOn)));
+        self.question = Some(Question { text, yes: "Train anew", other, no: "Leave it", action });
+    }
+}

@@ -1,0 +1,65 @@
+//! The question what becomes of objects and parts that somebody has worked on, where objects are found anew.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+
+use super::theme;
+use crate::jobs::find_objects::listed;
+
+/// A search that is yet to begin.
+pub(super) struct PlannedSearch {
+    /// Where masks are, if others than those of the photos.
+    pub(super) masks: Option<PathBuf>,
+    /// Models to download first.
+    pub(super) missing: VecDeque<String>,
+    /// Whether what somebody has worked on is found anew, too.
+    pub(super) replace_all: bool,
+}
+
+/// The question, and the search that waits for its answer.
+pub(super) struct KeepDialog {
+    /// Full names of what somebody has worked on.
+    pub(super) by_hand: Vec<String>,
+    pub(super) search: PlannedSearch,
+}
+
+/// What was answered.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum KeepAnswer {
+    Keep,
+    ReplaceAll,
+    Cancel,
+}
+
+impl KeepDialog {
+    /// Shows it; the answer, once there is one.
+    pub(super) fn show(&self, ctx: &egui::Context) -> Option<KeepAnswer> {
+        let response = theme::dialog("keep").show(ctx, |ui| {
+            ui.set_width(440.0);
+            ui.heading(match self.by_hand.len() {
+                1 => "Keep the one that you named or made?".to_owned(),
+                n => format!("Keep the {n} that you named or made?"),
+            });
+            ui.add_space(6.0);
+            ui.label(listed(&self.by_hand));
+            ui.add_space(6.0);
+            let text = "Objects are about to be found anew. What you keep stays as it is, with its parts and its whole. \
+                        Undo brings back what is there now, either way.";
+            ui.label(egui::RichText::new(text).color(theme::weak()));
+            ui.add_space(12.0);
+            let buttons = |ui: &mut egui::Ui| {
+                let keeps = ui.add(theme::primary_button("Keep them")).clicked();
+                let replaces = ui.button("Replace all").clicked();
+                let cancels = ui.button("Cancel").clicked();
+                let answers = [
+                    (keeps, KeepAnswer::Keep),
+                    (replaces, KeepAnswer::ReplaceAll),
+                    (cancels, KeepAnswer::Cancel),
+                ];
+                answers.into_iter().find(|(clicked, _)| *clicked).map(|(_, answer)| answer)
+            };
+            ui.horizontal(buttons).inner
+        });
+        response.inner.or_else(|| response.should_close().then_some(KeepAnswer::Cancel))
+    }
+}
