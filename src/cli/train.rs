@@ -17,7 +17,7 @@ use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::train::TrainConfig;
 use crate::remote::{Server, bind_address, serve};
 use crate::render::BackendChoice;
-use crate::scene::Dataset;
+use crate::scene::{AlphaUse, Dataset};
 
 /// Train 3D Gaussians from posed photos
 ///
@@ -90,6 +90,9 @@ pub(crate) struct TrainOverrides {
     /// Gaussians to start from where the dataset has no sparse points [default: 20000]
     #[arg(long, value_parser = number::within(1..=10_000_000_usize))]
     pub(crate) random_points: Option<usize>,
+    /// What transparent pixels of the photos are taken for [default: by the photos, see 'fmlgs info']
+    #[arg(long, value_enum)]
+    pub(crate) alpha: Option<AlphaUse>,
     /// Train with the 2-D filter of Mip-Splatting, as new trainings are, where the scene or the preset says otherwise
     #[arg(long, conflicts_with = "no_antialias")]
     pub(crate) antialias: bool,
@@ -134,6 +137,7 @@ impl TrainOverrides {
             densify: base.densify && !self.no_densify,
             max_gaussians: self.max_gaussians.or(base.max_gaussians),
             random_points: self.random_points.unwrap_or(base.random_points),
+            alpha: self.alpha.or(base.alpha),
             antialias: (base.antialias || self.antialias) && !self.no_antialias,
             seed: self.seed.unwrap_or(base.seed),
             eval_every: self.eval_every.unwrap_or(base.eval_every),

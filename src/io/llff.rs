@@ -115,6 +115,7 @@ fn listed(row: &[f64; ROW], name: &str, folder: &str, source: &Path) -> Result<L
         center: column(3),
         test_split: false,
         background: None,
+        mask: None,
     })
 }
 

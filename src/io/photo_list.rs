@@ -10,7 +10,7 @@ use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::resample::covers;
-use super::{IoError, files, photo};
+use super::{IoError, files, photo, pixel_masks};
 use crate::math::rotation::{nearest_rotation, rotation_error};
 use crate::scene::{Camera, CameraError, Distortion, Photo};
 
@@ -52,6 +52,8 @@ pub(super) struct ListedPhoto {
     pub(crate) test_split: bool,
     /// What transparent pixels are composited over.
     pub(crate) background: Option<[f32; 3]>,
+    /// The file with its mask, relative to the dataset's folder, as it is written.
+    pub(crate) mask: Option<String>,
 }
 
 /// The listed photos that exist, sorted by name, with a warning that counts the others.
@@ -86,6 +88,13 @@ pub(super) fn photos(
             "{} of {} listed photos are missing and were skipped (first: {first})",
             missing.len(),
             listed.len()
+        ));
+    }
+    let has_mask: HashSet<&str> = listed.iter().filter(|l| l.mask.is_some()).map(|l| l.name.as_str()).collect();
+    let unmasked = photos.iter().filter(|p: &&Photo| p.mask.is_none() && has_mask.contains(p.name.as_str()));
+    if let Some((first, count)) = unmasked.clone().next().map(|p| (p.name.clone(), unmasked.count())) {
+        warnings.push(format!(
+            "{count} listed masks are missing, so all pixels of those photos count (first: that of {first})"
         ));
     }
     photos.sort_by(|a: &Photo, b| a.name.cmp(&b.name));
@@ -127,6 +136,7 @@ fn resolve(l: &ListedPhoto, root: &Path, source: &Path) -> Result<Option<Photo>,
     }
     let camera = if found == expected { declared } else { declared.resized(found.0, found.1) };
     camera.validate().map_err(bad)?;
+    let mask = l.mask.as_deref().map(|entry| pixel_masks::listed(root, entry, source, found)).transpose()?.flatten();
     Ok(Some(Photo {
         name: l.name.clone(),
         path,
@@ -134,6 +144,8 @@ fn resolve(l: &ListedPhoto, root: &Path, source: &Path) -> Result<Option<Photo>,
         distortion: (d != Distortion::default()).then_some(d),
         test_split: l.test_split,
         background: l.background,
+        cut_out: false,
+        mask,
     }))
 }
 

@@ -40,6 +40,8 @@ struct Own {
 struct Frame {
     file_path: String,
     transform_matrix: Vec<Vec<f64>>,
+    /// A picture of the pixels that count.
+    mask_path: Option<String>,
     #[serde(flatten)]
     lens: Intrinsics,
 }
@@ -84,7 +86,7 @@ pub fn read(file: &Path) -> Result<Dataset, IoError> {
         Some(entry) => match files::inside(root, &files::relative(root, entry, file)?, file)? {
             Some(path) => points_ply::read(&path)?,
             None => {
-                warnings.push(format!("the sparse points {entry} are missing; training starts from random points"));
+                warnings.push(format!("the sparse points {entry} are missing; training starts where the photos agree"));
                 Vec::new()
             }
         },
@@ -98,6 +100,7 @@ pub fn read(file: &Path) -> Result<Dataset, IoError> {
         background: parsed.fmlgs.background.filter(|b| b.iter().all(|c| (0.0..=1.0).contains(c))),
         metres_per_unit: parsed.fmlgs.metres_per_unit.filter(|m| m.is_finite() && *m > 0.0),
         warnings,
+        alpha: None,
     })
 }
 
@@ -156,6 +159,7 @@ impl Frame {
             center,
             test_split: false,
             background: None,
+            mask: self.mask_path.clone(),
         })
     }
 }

@@ -221,7 +221,7 @@ impl App {
             return;
         }
         let config = self.state.next_training(&self.layout.config);
-        self.state.antialias = config.render_settings(None).antialias;
+        self.state.antialias = config.render_settings(None, 1.0).antialias;
         let reached = self.state.continues_at(&config).unwrap_or(0);
         self.state.resumable = Some((config.clone(), reached));
         self.submit(Command::Train { dataset, config, out });

@@ -73,7 +73,7 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
         true => text::points(&files::read_text(&points_file)?, &points_file)?,
     };
     if points.is_empty() {
-        warnings.push("the reconstruction has no sparse points; training starts from random points".into());
+        warnings.push("the reconstruction has no sparse points; training starts where the photos agree".into());
     }
     let photo_folder = photo_list::photo_folder(root, &images_file)?;
     let listed =
@@ -110,6 +110,7 @@ fn listed(image: &Image, cameras: &Cameras, root: &Path, folder: &str, source: &
         center: -(world_from_camera * image.translation),
         test_split: false,
         background: None,
+        mask: None,
     })
 }
 

@@ -5,7 +5,8 @@ use std::path::Path;
 
 use super::trained::{self, TrainedScene};
 use super::{
-    IoError, OpenError, colmap, files, khr_gltf, ksplat, llff, sog, splat, splat_ply, spz, transforms, unposed,
+    IoError, OpenError, alpha, colmap, files, khr_gltf, ksplat, llff, pixel_masks, sog, splat, splat_ply, spz,
+    transforms, unposed,
 };
 use crate::scene::{Dataset, GaussianCloud};
 
@@ -77,7 +78,13 @@ pub fn open(path: &Path) -> Result<Opened> {
         std::io::ErrorKind::NotFound => OpenError::NotFound { path: path.into() },
         _ => IoError::Read { path: path.into(), cause }.into(),
     })?;
-    if meta.is_dir() { open_folder(path) } else { open_file(path) }
+    let mut opened = if meta.is_dir() { open_folder(path) } else { open_file(path) }?;
+    if let Opened::Dataset(dataset) = &mut opened {
+        pixel_masks::find(dataset);
+        alpha::decide(dataset);
+        dataset.warnings.extend(dataset.stray_warning());
+    }
+    Ok(opened)
 }
 
 fn open_folder(path: &Path) -> Result<Opened> {

@@ -127,8 +127,12 @@ impl SceneInputs {
         let dataset = open::dataset(&scene.path)?;
         let mut sum = Sha256::new();
         for photo in &dataset.photos {
-            let Photo { name, path, camera, distortion, test_split, background } = photo;
+            let Photo { name, path, camera, distortion, test_split, background, cut_out, mask } = photo;
             sum.update(format!("{:?}", (name, size(path)?, camera, distortion, test_split, background)));
+            if *cut_out || mask.is_some() {
+                let mask = mask.as_deref().map(size).transpose()?;
+                sum.update(format!("{:?}", (cut_out, mask)));
+            }
         }
         for point in &dataset.points {
             point.position.to_array().iter().for_each(|x| sum.update(x.to_le_bytes()));

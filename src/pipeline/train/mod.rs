@@ -18,6 +18,8 @@ mod outcome;
 mod photos;
 mod run;
 pub(crate) mod schedule;
+mod sweep;
+mod sweep_view;
 pub mod trainer;
 
 pub use config::TrainConfig;
