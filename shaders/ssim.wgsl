@@ -13,14 +13,18 @@ struct Loss {
     // Weights of L1 and of D-SSIM in the loss, over the number of pixels and channels.
     l1: f32,
     dssim: f32,
+    // 1 if alpha follows the photo's pixels.
+    has_alpha: u32,
     pad0: u32,
-    pad1: u32,
+    // Color in xyz that is added where the photo is transparent.
+    shift: vec4<f32>,
 }
 
 @group(0) @binding(0) var<uniform> loss: Loss;
 // Rendered color in xyz.
 @group(0) @binding(1) var<storage, read> pixels: array<vec4<f32>>;
-// Photo: red, green, blue, coverage from the low byte up.
+// Photo: red, green, blue, coverage from the low byte up; then, of a thing that was cut out, the
+// alpha of each pixel.
 @group(0) @binding(2) var<storage, read> photo: array<u32>;
 // [channel][derivative][pixel]: of SSIM to the windowed means of x, x x and x y.
 @group(0) @binding(3) var<storage, read_write> maps: array<f32>;
@@ -63,8 +67,13 @@ fn index_of(pixel: vec2<u32>) -> u32 {
 
 // Rendered and wanted value of a channel of a pixel.
 fn compared(at: u32, channel: u32) -> vec2<f32> {
-    let wanted = unpack4x8unorm(photo[at]);
-    return vec2<f32>(mix(wanted[channel], pixels[at][channel], wanted.w), wanted[channel]);
+    let stored = unpack4x8unorm(photo[at]);
+    var wanted = stored[channel];
+    if loss.has_alpha != 0u {
+        let alpha = unpack4x8unorm(photo[loss.size_px.x * loss.size_px.y + at]).x;
+        wanted += (1.0 - alpha) * loss.shift[channel];
+    }
+    return vec2<f32>(mix(wanted, pixels[at][channel], stored.w), wanted);
 }
 
 // Sum over the workgroup's 256 threads; the result is thread 0's.

@@ -10,6 +10,8 @@ mod data_sets;
 mod labels;
 #[path = "cases/lenses.rs"]
 mod lenses;
+#[path = "cases/object_photos.rs"]
+mod object_photos;
 #[path = "cases/splats.rs"]
 mod splats;
 #[path = "cases/training.rs"]

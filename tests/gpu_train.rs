@@ -18,6 +18,9 @@ use rand::RngExt;
 
 const LAMBDA: f64 = 0.2;
 
+/// What another color behind everything adds where a photo is transparent.
+const SHIFT: [f32; 3] = [0.3, -0.2, 0.7];
+
 fn noise_photo(size: [u32; 2], covered: bool, seed: u64) -> PhotoPixels {
     let mut r = rng(seed);
     let pixels = (size[0] * size[1]) as usize;
@@ -26,17 +29,20 @@ fn noise_photo(size: [u32; 2], covered: bool, seed: u64) -> PhotoPixels {
         height_px: size[1],
         rgb: (0..pixels).map(|_| std::array::from_fn(|_| r.random_range(0..=255))).collect(),
         coverage: covered.then(|| (0..pixels).map(|i| if i % 7 == 0 { 0 } else { (i % 256) as u8 }).collect()),
+        alpha: covered.then(|| (0..pixels).map(|i| (i * 31 % 256) as u8).collect()),
     }
 }
 
 /// Loss and gradient in f64 as the CPU trainer forms them: the picture faded toward the photo
-/// where that is not covered.
+/// where that is not covered, the photo before another color where it is transparent.
 fn oracle(rendered: &[[f64; 3]], photo: &PhotoPixels) -> (f64, Vec<f64>) {
     let share = |i: usize| photo.coverage.as_ref().map_or(1.0, |c| f64::from(c[i]) / 255.0);
     let mut gradient = vec![0.0; rendered.len() * 3];
     let mut total = 0.0;
     for c in 0..3 {
-        let want: Vec<f64> = photo.rgb.iter().map(|p| f64::from(p[c]) / 255.0).collect();
+        let clear = |i: usize| photo.alpha.as_ref().map_or(0.0, |a| 1.0 - f64::from(a[i]) / 255.0);
+        let wanted = |(i, p): (usize, &[u8; 3])| f64::from(p[c]) / 255.0 + clear(i) * f64::from(SHIFT[c]);
+        let want: Vec<f64> = photo.rgb.iter().enumerate().map(wanted).collect();
         let have: Vec<f64> = (0..want.len()).map(|i| want[i] + share(i) * (rendered[i][c] - want[i])).collect();
         let mut own = vec![0.0; want.len()];
         let width = photo.width_px as usize;
@@ -57,20 +63,23 @@ fn loss_and_gradient_match_the_oracle() {
                 photo.rgb.iter().map(|_| std::array::from_fn(|_| r.random_range(-0.1..1.1))).collect();
             let wide: Vec<[f64; 3]> = rendered.iter().map(|p| p.map(f64::from)).collect();
             let (loss, gradient) = oracle(&wide, &photo);
-            let (sums, ours) = photo_loss(context, &rendered, &photo, LAMBDA).unwrap();
+            let (sums, ours) = photo_loss(context, &rendered, &photo, LAMBDA, SHIFT).unwrap();
             assert!((sums.total(LAMBDA) - loss).abs() < 1e-5 * loss, "{} {loss}", sums.total(LAMBDA));
             let all = vec![true; gradient.len()];
             agree("gradient", ours.as_flattened(), &gradient, &all, INTERIOR).unwrap();
             // Negative controls: another photo, another weight, other coverage.
             let other = noise_photo(size, covered, 5);
-            let (sums, theirs) = photo_loss(context, &rendered, &other, LAMBDA).unwrap();
+            let (sums, theirs) = photo_loss(context, &rendered, &other, LAMBDA, SHIFT).unwrap();
             assert!((sums.total(LAMBDA) - loss).abs() > 1e-4 * loss);
             assert!(agree("another photo", theirs.as_flattened(), &gradient, &all, INTERIOR).is_err());
-            let (_, theirs) = photo_loss(context, &rendered, &photo, 0.3).unwrap();
+            let (_, theirs) = photo_loss(context, &rendered, &photo, 0.3, SHIFT).unwrap();
             assert!(agree("another weight", theirs.as_flattened(), &gradient, &all, INTERIOR).is_err());
             let bare = noise_photo(size, !covered, 4);
-            let (_, theirs) = photo_loss(context, &rendered, &bare, LAMBDA).unwrap();
+            let (_, theirs) = photo_loss(context, &rendered, &bare, LAMBDA, SHIFT).unwrap();
             assert!(agree("other coverage", theirs.as_flattened(), &gradient, &all, INTERIOR).is_err());
+            let (sums, _) = photo_loss(context, &rendered, &photo, LAMBDA, [0.0; 3]).unwrap();
+            let another_color = (sums.total(LAMBDA) - loss).abs() > 1e-4 * loss;
+            assert_eq!(another_color, covered, "only transparent pixels see another color");
         }
     });
 }
@@ -89,7 +98,7 @@ impl Lesson {
         let truth: GaussianCloud = random_cloud(80, degree, 0.2, 11).cast();
         let settings = RenderSettings::default();
         let frame = cpu::CpuRenderer::<f32>::new().render(&truth, Features::NONE, &camera, &settings).unwrap();
-        let photo = PhotoPixels { width_px: 48, height_px: 36, rgb: frame.to_rgb8(), coverage: None };
+        let photo = PhotoPixels { width_px: 48, height_px: 36, rgb: frame.to_rgb8(), coverage: None, alpha: None };
         let mut cloud = truth;
         cloud.sh.iter_mut().for_each(|c| *c = c.map(|v| 0.3 * v));
         cloud.positions.iter_mut().for_each(|p| p[1] += 0.05);

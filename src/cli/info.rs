@@ -101,14 +101,24 @@ fn of_dataset(d: &Dataset, holdout_every: usize) -> Facts {
     let distorted = d.photos.iter().filter(|p| p.distortion.is_some()).count();
     let points = d.points.len();
     let (center, extent) = d.camera_extent();
-    let lines = vec![
+    let mut lines = vec![
         ("kind", format!("posed photos, {}", d.format)),
         ("photos", format!("{} ({} to train on, {} held out)", d.photos.len(), train.len(), held_out.len())),
         ("sizes", size_text),
         ("lens distortion", if distorted > 0 { format!("on {distorted}, undone on load") } else { "none".into() }),
-        ("sparse points", if points > 0 { points.to_string() } else { "none: training starts at random".into() }),
+        (
+            "sparse points",
+            if points > 0 { points.to_string() } else { "none: training starts where photos agree".into() },
+        ),
         ("camera extent", format!("{extent:.3} scene units around {}", vector(center))),
     ];
+    if let Some(alpha) = d.alpha {
+        lines.push(("transparency", format!("{} (fmlgs train --alpha)", alpha.title())));
+    }
+    let masked = d.masked();
+    if masked > 0 {
+        lines.push(("masks", format!("of {masked} photos; what is black there does not count")));
+    }
     let json = json!({
         "kind": "dataset",
         "name": d.name,
@@ -120,6 +130,8 @@ fn of_dataset(d: &Dataset, holdout_every: usize) -> Facts {
         "points": points,
         "camera_extent": extent,
         "background": d.background,
+        "alpha": d.alpha,
+        "masks": masked,
         "cameras": open::cameras(d, holdout_every),
     });
     facts(lines, json, d.warnings.clone())

@@ -19,7 +19,7 @@ use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{TrainConfig, TrainError};
 use crate::remote::{Server, bind_address, serve};
 use crate::render::BackendChoice;
-use crate::scene::Dataset;
+use crate::scene::{AlphaUse, Dataset};
 
 /// Train 3D Gaussians from posed photos
 ///
@@ -99,6 +99,9 @@ pub(crate) struct TrainOverrides {
     /// Gaussians to start from where the dataset has no sparse points [default: 20000]
     #[arg(long, value_parser = number::within(1..=10_000_000_usize))]
     pub(crate) random_points: Option<usize>,
+    /// What transparent pixels of the photos are taken for [default: by the photos, see 'fmlgs info']
+    #[arg(long, value_enum)]
+    pub(crate) alpha: Option<AlphaUse>,
     /// Train with the 2-D filter of Mip-Splatting, as new trainings are, where the scene or the preset says otherwise
     #[arg(long, conflicts_with = "no_antialias")]
     pub(crate) antialias: bool,
@@ -143,6 +146,7 @@ impl TrainOverrides {
             densify: base.densify && !self.no_densify,
             max_gaussians: self.max_gaussians.or(base.max_gaussians),
             random_points: self.random_points.unwrap_or(base.random_points),
+            alpha: self.alpha.or(base.alpha),
             antialias: (base.antialias || self.antialias) && !self.no_antialias,
             seed: self.seed.unwrap_or(base.seed),
             eval_every: self.eval_every.unwrap_or(base.eval_every),
@@ -216,7 +220,7 @@ pub(crate) fn run(args: TrainArgs, quiet: bool) -> Result<(), CliError> {
     for warning in &dataset.warnings {
         console.note(Severity::Warning, warning.clone());
     }
-    let from = TrainStart { more_steps: args.go_on, objects_of: None };
+    let from = TrainStart { more_steps: args.go_on, objects_of: None, if_changed: changed };
     let server = match args.serve {
         Some(bind) => Some(serve::training(&dataset, &config, args.access.options(bind, false)?)?),
         None => None,

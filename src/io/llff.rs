@@ -100,6 +100,7 @@ fn listed(row: &[f64; ROW], name: &str, folder: &str, source: &Path) -> Result<L
         broken: None,
         test_split: false,
         background: None,
+        mask: None,
     })
 }
 

@@ -4,6 +4,7 @@
 //! before memory is set aside for it, and paths inside a dataset may not leave its folder. Every
 //! error names the file and the place in it.
 
+mod alpha;
 pub(crate) mod atomic;
 pub(crate) mod bundle;
 pub mod camera_file;
@@ -31,6 +32,7 @@ mod open;
 pub(crate) mod page;
 pub mod photo;
 mod photo_list;
+mod pixel_masks;
 mod ply;
 pub mod points_ply;
 mod quantized;

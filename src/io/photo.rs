@@ -10,7 +10,7 @@ use image::{
 };
 
 use super::resample::{Pixels, resample, shrink};
-use super::{IoError, files, memory};
+use super::{IoError, files, memory, pixel_masks};
 use crate::scene::{Camera, Photo, PhotoPixels};
 
 /// Endings of the pictures that are read.
@@ -79,11 +79,20 @@ pub fn load(photo: &Photo, max_side_px: u32) -> Result<PhotoPixels, IoError> {
         return Err(IoError::Picture { path: (&*photo.name).into(), reason });
     }
     let expected = (photo.camera.width_px, photo.camera.height_px);
+    let target = photo.camera.limited_to(max_side_px);
+    let through_lens = |pixels: &Pixels| resample(pixels, &photo.camera, photo.distortion.as_ref(), &target);
     let mut pixels = decode(&photo.path, expected)?;
+    let mut alpha = None;
     if let Some(background) = photo.background {
+        if photo.cut_out && pixels.channels == 4 {
+            alpha = Some(through_lens(&alpha_as_gray(&pixels)).rgb.iter().map(|p| p[0]).collect());
+        }
         pixels = over(pixels, background);
     }
-    let seen = resample(&pixels, &photo.camera, photo.distortion.as_ref(), &photo.camera.limited_to(max_side_px));
+    if let Some(mask) = &photo.mask {
+        pixels = pixel_masks::apply(pixels, mask)?;
+    }
+    let seen = PhotoPixels { alpha, ..through_lens(&pixels) };
     // Compared with nothing, any drawing would be perfect.
     match seen.coverage.as_ref().is_some_and(|c| c.iter().all(|c| *c == 0)) {
         true => Err(IoError::NothingShown { path: photo.path.clone() }),
@@ -94,7 +103,22 @@ pub fn load(photo: &Photo, max_side_px: u32) -> Result<PhotoPixels, IoError> {
 /// A loaded photo and its camera at half their size; pixels that the photo does not cover do not count.
 pub(crate) fn half(pixels: &PhotoPixels, camera: &Camera) -> (PhotoPixels, Camera) {
     let small = camera.reduced(2);
-    (shrink(pixels, camera, &small), small)
+    let alpha = pixels.alpha.as_ref().map(|alpha| {
+        let gray = PhotoPixels { rgb: alpha.iter().map(|&a| [a; 3]).collect(), alpha: None, ..pixels.clone() };
+        shrink(&gray, camera, &small).rgb.iter().map(|p| p[0]).collect()
+    });
+    (PhotoPixels { alpha, ..shrink(pixels, camera, &small) }, small)
+}
+
+/// Width, height and alpha of every pixel of a picture file; `None`, from its header, if it has none.
+pub(super) fn alpha(path: &Path) -> Result<Option<(usize, usize, Vec<u8>)>, IoError> {
+    let start = files::read_start(path, HEADER_BYTES)?;
+    if decoder(&start, path).is_ok_and(|d| !d.color_type().has_alpha()) {
+        return Ok(None);
+    }
+    let picture = decode_rgba(&read_whole(path)?, MOST_PX, path)?;
+    let (width, height) = (picture.width() as usize, picture.height() as usize);
+    Ok(Some((width, height, picture.pixels().map(|p| p.0[3]).collect())))
 }
 
 /// Width and height in px of a picture file, from its header.
@@ -117,7 +141,7 @@ pub(crate) fn open(path: &Path) -> Result<PhotoPixels, IoError> {
     let picture = decode_rgba(&read_whole(path)?, MOST_PX, path)?;
     let (width_px, height_px) = picture.dimensions();
     let rgb = picture.pixels().map(|p| [p[0], p[1], p[2]]).collect();
-    Ok(PhotoPixels { width_px, height_px, rgb, coverage: None })
+    Ok(PhotoPixels { width_px, height_px, rgb, coverage: None, alpha: None })
 }
 
 /// The bytes of a picture file that is not cut off.
@@ -257,6 +281,12 @@ fn jpeg_scan(bytes: &[u8]) -> Option<&[u8]> {
             }
         }
     }
+}
+
+/// The alpha of an RGBA picture as its color.
+fn alpha_as_gray(pixels: &Pixels) -> Pixels {
+    let data = pixels.data.chunks_exact(4).flat_map(|p| [p[3]; 3]).collect();
+    Pixels { channels: 3, data, ..*pixels }
 }
 
 /// Transparent pixels over a color.

@@ -14,7 +14,7 @@ use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::resample::covers;
-use super::{IoError, files, lenses, photo};
+use super::{IoError, files, lenses, photo, pixel_masks};
 use crate::scene::{Camera, CameraError, Distortion, Photo};
 
 pub(super) use find::{FoundFile, PhotoFinder, Search, fold};
@@ -59,6 +59,8 @@ pub(super) struct ListedPhoto {
     pub(crate) test_split: bool,
     /// What transparent pixels are composited over.
     pub(crate) background: Option<[f32; 3]>,
+    /// The file with its mask, relative to the dataset's folder, as it is written.
+    pub(crate) mask: Option<String>,
 }
 
 impl ListedPhoto {
@@ -126,6 +128,9 @@ pub(super) fn photos(
         }
         if normalized {
             tally.normalized.push(photo.name.clone());
+        }
+        if l.mask.is_some() && photo.mask.is_none() {
+            tally.unmasked.push(photo.name.clone());
         }
         if file.linked {
             tally.linked.push(photo.name.clone());
@@ -198,6 +203,10 @@ fn fate(l: &ListedPhoto, finder: &PhotoFinder<'_>, source: &Path) -> Result<Fate
     }
     let camera = if found == expected { declared } else { declared.resized(found.0, found.1) };
     camera.validate().map_err(bad)?;
+    let mask = match l.mask.as_deref() {
+        Some(entry) => pixel_masks::listed(finder, entry, source, found)?,
+        None => None,
+    };
     let photo = Photo {
         name: file.name.clone(),
         path: file.path.clone(),
@@ -205,6 +214,8 @@ fn fate(l: &ListedPhoto, finder: &PhotoFinder<'_>, source: &Path) -> Result<Fate
         distortion: (d != Distortion::default()).then_some(d),
         test_split: l.test_split,
         background: l.background,
+        cut_out: false,
+        mask,
     };
     Ok(Fate::Photo { photo: Box::new(photo), file, normalized: l.normalized || scaled })
 }

@@ -52,7 +52,7 @@ pub(super) fn resample(
         }
     });
     let partial = coverage.iter().any(|&c| c != u8::MAX);
-    PhotoPixels { width_px, height_px, rgb, coverage: partial.then_some(coverage) }
+    PhotoPixels { width_px, height_px, rgb, coverage: partial.then_some(coverage), alpha: None }
 }
 
 /// Color (0 to 255) times alpha, and alpha, of the pixel at `index`.

@@ -50,6 +50,8 @@ struct Own {
 struct Frame {
     file_path: String,
     transform_matrix: Matrix,
+    /// A picture of the pixels that count.
+    mask_path: Option<String>,
     #[serde(flatten)]
     lens: Intrinsics,
 }
@@ -111,7 +113,7 @@ pub fn read(file: &Path) -> Result<Dataset, IoError> {
                 return Err(IoError::Outside { path: file.into(), entry: entry.clone(), folder: root.into() });
             }
             Search::Missing | Search::Several(_) => {
-                warnings.push(format!("the sparse points {entry} are missing; training starts from random points"));
+                warnings.push(format!("the sparse points {entry} are missing; training starts where the photos agree"));
                 Vec::new()
             }
         },
@@ -126,6 +128,7 @@ pub fn read(file: &Path) -> Result<Dataset, IoError> {
         background: parsed.fmlgs.background.filter(|b| b.iter().all(|c| (0.0..=1.0).contains(c))),
         metres_per_unit: parsed.fmlgs.metres_per_unit.filter(|m| m.is_finite() && *m > 0.0),
         warnings,
+        alpha: None,
     })
 }
 
@@ -167,6 +170,7 @@ impl Frame {
             broken,
             test_split: false,
             background: None,
+            mask: self.mask_path.clone(),
         }))
     }
 }

@@ -147,7 +147,13 @@ fn checks() -> PhotoPixels {
         let (x, y) = (i % width_px / 84, i / width_px / 84);
         [(x * 20) as u8, (y * 27) as u8, ((x * 7 + y * 13) % 16 * 16) as u8]
     };
-    PhotoPixels { width_px, height_px, rgb: (0..width_px * height_px).map(color).collect(), coverage: None }
+    PhotoPixels {
+        width_px,
+        height_px,
+        rgb: (0..width_px * height_px).map(color).collect(),
+        coverage: None,
+        alpha: None,
+    }
 }
 
 /// The photos to train on, and how.

@@ -153,7 +153,7 @@ pub(crate) fn make(
     }
     let mut info = trained::load_info(&scene)?;
     let cloud = Arc::new(rounded(&outcome.cloud));
-    let settings = recipe.training.render_settings(dataset.background);
+    let settings = recipe.training.render_settings(dataset.background, dataset.camera_extent().1);
     let seen = Scene {
         path: scene,
         cloud: Arc::clone(&cloud),

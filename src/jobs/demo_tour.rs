@@ -246,15 +246,9 @@ mod tests {
     fn the_flight_stays_with_the_photos() {
         let photo = |i: usize| {
             let (sin, cos) = (i as f64 * 0.7).sin_cos();
-            Photo {
-                name: i.to_string(),
-                path: PathBuf::new(),
-                camera: Camera::look_at(DVec3::new(3.0 * cos, 3.0 * sin, 1.0), DVec3::ZERO, DVec3::Z, 0.8, 64, 48)
-                    .expect("valid"),
-                distortion: None,
-                background: None,
-                test_split: false,
-            }
+            let eye = DVec3::new(3.0 * cos, 3.0 * sin, 1.0);
+            let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid");
+            Photo::new(i.to_string(), PathBuf::new(), camera)
         };
         let dataset = Dataset { photos: (0..9).map(photo).collect(), ..Dataset::default() };
         let cameras = circle(&dataset);

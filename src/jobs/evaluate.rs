@@ -1,5 +1,6 @@
 //! Measuring a scene on photos that it was not trained on: colors and depth.
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -64,6 +65,10 @@ impl PhotoComparison {
     /// Of `scene` with the photos of `dataset`.
     pub(crate) fn of(scene: &Scene, dataset: Arc<Dataset>, options: EvaluateOptions) -> Result<Self, JobError> {
         let EvaluateOptions { max_side_px, holdout_every, keep_borders, pictures } = options;
+        let dataset = match dataset.with_alpha(scene.config.alpha) {
+            Cow::Borrowed(_) => dataset,
+            Cow::Owned(other) => Arc::new(other),
+        };
         let default_every = scene.config.holdout_every;
         if let Some(1..) = holdout_every {
             refuse_holdout(&dataset)?;

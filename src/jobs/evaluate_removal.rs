@@ -232,5 +232,8 @@ fn picture(path: &Path, view: &TrueView, drawn: [&[[u8; 3]]; 2]) -> Result<(), J
     let rows = (0..h).flat_map(|y| [drawn[0], drawn[1], &truth, &regions].map(|p| &p[y * w..(y + 1) * w]));
     let rgb = rows.flatten().copied().collect();
     export::make_parent(path)?;
-    Ok(export::picture(path, &PhotoPixels { width_px: 4 * w as u32, height_px: h as u32, rgb, coverage: None })?)
+    Ok(export::picture(
+        path,
+        &PhotoPixels { width_px: 4 * w as u32, height_px: h as u32, rgb, coverage: None, alpha: None },
+    )?)
 }

@@ -16,7 +16,7 @@ use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::plan::used_degree;
 use crate::scene::resource_log::{self, ResourceKind};
-use crate::scene::{Axes, Camera, Dataset, GaussianCloud, HomeView, Machine, SceneFacts, SemanticMap};
+use crate::scene::{Axes, Bounds, Camera, Dataset, GaussianCloud, HomeView, Machine, SceneFacts, SemanticMap};
 
 mod beside;
 mod received;
@@ -104,7 +104,12 @@ impl Scene {
 
     fn bare(path: &Path, mut cloud: GaussianCloud) -> Self {
         let name = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-        let settings = RenderSettings::of_mode(cloud.render_mode);
+        let mut settings = RenderSettings::of_mode(cloud.render_mode);
+        // Small ones would lie before the near plane. Of large ones little is known: what is near may be seen, too.
+        if let Some(bounds) = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i))) {
+            let near = Camera::near_plane(bounds.radius());
+            settings.near = if near > 0.0 { settings.near.min(near) } else { settings.near };
+        }
         let warnings = std::mem::take(&mut cloud.warnings);
         let (cloud, sh_stored) = compact(cloud);
         Self { path: path.into(), name, cloud, sh_stored, settings, warnings, ..Self::default() }.with_what_lies_beside()
@@ -113,6 +118,7 @@ impl Scene {
     fn trained(path: &Path, scene: TrainedScene, config: TrainConfig) -> Self {
         let dataset_path = scene.dataset_path();
         let TrainedScene { folder, info, mut cloud, state } = scene;
+        let (_, extent) = Camera::extent_of(info.cameras.iter().map(|c| &c.camera));
         // Its files of earlier versions do not say it.
         cloud.render_mode = config.render_mode();
         let warnings = std::mem::take(&mut cloud.warnings);
@@ -124,7 +130,7 @@ impl Scene {
             cloud,
             sh_stored,
             cameras: info.cameras,
-            settings: config.render_settings(info.background),
+            settings: config.render_settings(info.background, extent),
             says_background: true,
             config,
             history: info.history,
@@ -381,7 +387,7 @@ fn photos(dataset: Dataset, folders: &Folders, observer: &mut dyn Observer) -> O
         return OpenedScene { name, ..opened };
     }
     let cloud = sparse_cloud(&dataset).map(Arc::new);
-    let render = TrainConfig::default().render_settings(background);
+    let render = TrainConfig::default().render_settings(background, dataset.camera_extent().1);
     let home = HomeView::new(&dataset.cameras(), cloud.as_deref());
     OpenedScene { name, dataset: Some(dataset), cloud, out, render, home, ..OpenedScene::default() }
 }
@@ -401,7 +407,9 @@ fn tolerant(path: &Path, scene: TrainedScene, observer: &mut dyn Observer) -> Sc
 /// The photos of a trained scene, if they are still where they were.
 fn photos_of(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<Dataset>> {
     let why = match scene.dataset_path.as_deref().map(|p| (io::open(p), p)) {
-        Some((Ok(Opened::Dataset(dataset)), _)) => return Some(Arc::new(dataset)),
+        Some((Ok(Opened::Dataset(dataset)), _)) => {
+            return Some(Arc::new(dataset.with_alpha(scene.config.alpha).into_owned()));
+        }
         Some((Ok(_), p)) => format!("{} no longer holds photos; the scene opens without them", p.display()),
         Some((Err(e), _)) => format!("The photos cannot be read, the scene opens without them: {e}"),
         None => "The photos were moved or deleted; the scene opens without them".into(),

@@ -90,7 +90,7 @@ fn write(
     out: &Path,
     observer: &mut dyn Observer,
 ) -> Result<(), JobError> {
-    let dataset = open::dataset(&from.photos(None)?)?;
+    let dataset = open::dataset(&from.photos(None)?)?.with_alpha(from.config.alpha).into_owned();
     export::make_parent(&out.join("images").join("0"))?;
     let json = |file: &str, value: &serde_json::Value| {
         atomic::write(&out.join(file), |w| serde_json::to_writer_pretty(w, value).map_err(Into::into))

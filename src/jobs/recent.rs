@@ -25,7 +25,10 @@ pub(crate) fn keep(folders: &Folders, of: &Path, pixels: &PhotoPixels) -> Result
     let rgb = small.into_iter().map(|p| p.map(|v| v.round().clamp(0.0, 255.0) as u8)).collect();
     let path = folders.picture(of);
     export::make_parent(&path)?;
-    Ok(export::picture(&path, &PhotoPixels { width_px: w as u32, height_px: h as u32, rgb, coverage: None })?)
+    Ok(export::picture(
+        &path,
+        &PhotoPixels { width_px: w as u32, height_px: h as u32, rgb, coverage: None, alpha: None },
+    )?)
 }
 
 /// The pictures that were kept of these scenes. Those that cannot be read are left out: they are drawn anew when
@@ -38,7 +41,7 @@ pub(crate) fn load(folders: &Folders, of: Vec<PathBuf>) -> Vec<(PathBuf, PhotoPi
             .map_err(|e| IoError::Picture { path: file, reason: e.to_string() })?;
         let rgb = picture.to_rgb8();
         let (width_px, height_px) = rgb.dimensions();
-        Ok(PhotoPixels { width_px, height_px, rgb: rgb.pixels().map(|p| p.0).collect(), coverage: None })
+        Ok(PhotoPixels { width_px, height_px, rgb: rgb.pixels().map(|p| p.0).collect(), coverage: None, alpha: None })
     };
     of.into_iter().filter_map(|path| Some((read(&path).ok()?, path))).map(|(pixels, path)| (path, pixels)).collect()
 }
@@ -98,7 +101,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("folder");
         let folders = Folders { data: folder.path().into() };
         let rgb = (0..800 * 400).map(|i| if i % 800 < 400 { [200, 10, 10] } else { [10, 10, 200] }).collect();
-        let pixels = PhotoPixels { width_px: 800, height_px: 400, rgb, coverage: None };
+        let pixels = PhotoPixels { width_px: 800, height_px: 400, rgb, coverage: None, alpha: None };
         keep(&folders, Path::new("/one/fox"), &pixels).expect("kept");
         let found = load(&folders, vec!["/two/fox".into(), "/one/fox".into()]);
         assert_eq!(found.len(), 1, "nothing is known of the other fox");

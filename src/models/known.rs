@@ -103,7 +103,7 @@ mod tests {
 
     fn pattern(blue: u8) -> PhotoPixels {
         let color = |i: u32| [(i % 96 * 2) as u8, (i / 96 * 3) as u8, blue];
-        PhotoPixels { width_px: 96, height_px: 72, rgb: (0..96 * 72).map(color).collect(), coverage: None }
+        PhotoPixels { width_px: 96, height_px: 72, rgb: (0..96 * 72).map(color).collect(), coverage: None, alpha: None }
     }
 
     fn known(numbers: Vec<f64>) -> KnownAnswer {

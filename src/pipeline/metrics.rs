@@ -11,6 +11,20 @@ pub(crate) fn planes<R: Real>(photo: &PhotoPixels) -> [Vec<R>; 3] {
     std::array::from_fn(|c| photo.rgb.iter().map(|p| R::of(f64::from(p[c]) / 255.0)).collect())
 }
 
+/// The color planes of a photo of a thing that was cut out, in front of a color that differs by `shift` from the one that
+/// it is stored with; of other photos as [`planes`].
+pub(crate) fn planes_before<R: Real>(photo: &PhotoPixels, shift: [f32; 3]) -> [Vec<R>; 3] {
+    let mut planes = planes::<R>(photo);
+    if let Some(alpha) = photo.alpha.as_ref().filter(|_| shift != [0.0; 3]) {
+        for (plane, by) in planes.iter_mut().zip(shift) {
+            for (value, a) in plane.iter_mut().zip(alpha) {
+                *value += R::of(f64::from(by) * (1.0 - f64::from(*a) / 255.0));
+            }
+        }
+    }
+    planes
+}
+
 /// PSNR in dB of a picture of (width, height) px, clamped to 0..1, against a photo; infinite for an exact match. Pixels
 /// that the photo does not cover do not count; of a photo of another size the nearest pixels are compared.
 pub(crate) fn psnr<R: Real>(color: &[Vec<R>; 3], (width, height): (usize, usize), photo: &PhotoPixels) -> f64 {
@@ -55,7 +69,7 @@ mod tests {
     use super::*;
 
     fn photo(level: u8, coverage: Option<Vec<u8>>) -> PhotoPixels {
-        PhotoPixels { width_px: 4, height_px: 4, rgb: vec![[level; 3]; 16], coverage }
+        PhotoPixels { width_px: 4, height_px: 4, rgb: vec![[level; 3]; 16], coverage, alpha: None }
     }
 
     fn frame(level: f32) -> Frame<f32> {
@@ -72,7 +86,7 @@ mod tests {
 
     #[test]
     fn a_photo_of_another_size_is_looked_at_where_the_pixels_centers_lie() {
-        let mut big = PhotoPixels { width_px: 8, height_px: 8, rgb: vec![[255; 3]; 64], coverage: None };
+        let mut big = PhotoPixels { width_px: 8, height_px: 8, rgb: vec![[255; 3]; 64], coverage: None, alpha: None };
         (0..16).for_each(|i| big.rgb[(2 * (i / 4) + 1) * 8 + 2 * (i % 4) + 1] = [0; 3]);
         assert!((psnr(&frame(0.1).color, (4, 4), &big) - 20.0).abs() < 1e-6);
         assert!(psnr(&frame(0.1).color, (4, 4), &photo(255, None)) < 1.0);

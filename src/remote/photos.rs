@@ -73,7 +73,7 @@ pub(super) fn read(png: &[u8]) -> Result<PhotoPixels, image::ImageError> {
     let (width_px, height_px) = (picture.width(), picture.height());
     let coverage = picture.color().has_alpha().then(|| picture.to_rgba8().pixels().map(|p| p.0[3]).collect());
     let rgb = picture.to_rgb8().pixels().map(|p| p.0).collect();
-    Ok(PhotoPixels { width_px, height_px, rgb, coverage })
+    Ok(PhotoPixels { width_px, height_px, rgb, coverage, alpha: None })
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ use std::ops::RangeInclusive;
 use glam::{DMat3, DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
+use super::rig;
 use crate::math::rotation::rotation_error;
 
 /// A pinhole camera: size, intrinsics (px) and pose.
@@ -158,10 +159,10 @@ impl Camera {
     }
 
     /// The point nearest to the axes of these cameras: what they look at. `None` where the axes are
-    /// parallel.
+    /// parallel. Cameras far from all others do not count.
     pub(crate) fn focus_of<'a>(cameras: impl Iterator<Item = &'a Self>) -> Option<DVec3> {
         let (mut a, mut b, mut n) = (DMat3::ZERO, DVec3::ZERO, 0.0);
-        for c in cameras {
+        for c in rig::together(cameras) {
             let d = c.forward();
             let m = DMat3::IDENTITY - DMat3::from_cols(d * d.x, d * d.y, d * d.z);
             a += m;

@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
-use super::{Bounds, Camera, Photo};
+use super::rig;
+use super::{AlphaUse, Bounds, Camera, Photo};
 
 /// Posed photos, as read from any of the supported layouts.
 #[derive(Clone, Debug, Default)]
@@ -22,6 +23,8 @@ pub struct Dataset {
     pub points: Vec<SparsePoint>,
     /// The color behind everything (Blender's renders are composited over it); `None` = unknown.
     pub(crate) background: Option<[f32; 3]>,
+    /// What transparent pixels of its photos are taken for; `None` = there are none.
+    pub(crate) alpha: Option<AlphaUse>,
     /// Length of a scene unit in meters, if that is known; photos alone do not tell.
     pub(crate) metres_per_unit: Option<f64>,
     /// Things the user should know: photos that are listed but missing, and so on.
@@ -67,11 +70,34 @@ impl Dataset {
 
     /// Mean camera center, and 1.1 times the largest distance from it: the `extent` that
     /// position learning rates and densification thresholds scale with (3DGS `getNerfppNorm`).
+    /// Cameras far from all others do not count.
     pub(crate) fn camera_extent(&self) -> (DVec3, f64) {
-        let n = self.photos.len().max(1) as f64;
-        let mean = self.photos.iter().map(|p| p.camera.center).sum::<DVec3>() / n;
-        let far = self.photos.iter().map(|p| p.camera.center.distance(mean)).fold(0.0, f64::max);
-        (mean, if far > 0.0 { far * 1.1 } else { 1.0 })
+        Camera::extent_of(self.photos.iter().map(|p| &p.camera))
+    }
+
+    /// Indices of photos whose cameras stand far from all others, as wrong poses do.
+    pub(crate) fn strays(&self) -> Vec<usize> {
+        let centers: Vec<DVec3> = self.photos.iter().map(|p| p.camera.center).collect();
+        let stray = rig::strays(&centers);
+        (0..stray.len()).filter(|&i| stray[i]).collect()
+    }
+
+    /// A warning that names those photos, if there are any.
+    pub(crate) fn stray_warning(&self) -> Option<String> {
+        let strays = self.strays();
+        let first = strays.first()?;
+        let (center, extent) = self.camera_extent();
+        let times = self.photos[*first].camera.center.distance(center) / extent;
+        let of = if strays.len() == 1 {
+            "The camera of 1 photo stands".into()
+        } else {
+            format!("The cameras of {} photos stand", strays.len())
+        };
+        Some(format!(
+            "{of} far from all others (first: {}, {times:.0} times as far as the rest); sizes are taken without, but if its pose \
+             is wrong, leave it out",
+            self.photos[*first].title()
+        ))
     }
 
     /// Upwards in the world: against the mean of the cameras' down axes, or `+z` if they cancel.

@@ -1,5 +1,6 @@
 //! What a scene is made of. Pure data: nothing here reads or writes files.
 
+pub(crate) mod alpha;
 pub(crate) mod appearance;
 mod axes;
 pub(crate) mod bounds;
@@ -21,10 +22,12 @@ pub(crate) mod photo;
 pub mod plan;
 pub(crate) mod preparation;
 pub mod resource_log;
+mod rig;
 pub(crate) mod semantic_map;
 pub(crate) mod text;
 pub(crate) mod undo;
 
+pub use alpha::AlphaUse;
 pub use axes::Axes;
 pub use bounds::Bounds;
 pub use camera::{Camera, CameraError};

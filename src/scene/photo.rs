@@ -21,13 +21,19 @@ pub struct Photo {
     /// Color that the file's transparent pixels are composited over; `None` = they count for
     /// nothing (coverage 0).
     pub background: Option<[f32; 3]>,
+    /// Whether nothing is where the file is transparent, which training then asks for; see [`AlphaUse`].
+    ///
+    /// [`AlphaUse`]: super::AlphaUse
+    pub(crate) cut_out: bool,
+    /// A picture of which pixels count: those that are not black.
+    pub(crate) mask: Option<PathBuf>,
 }
 
 impl Photo {
     /// A photo without a lens of its own.
     pub fn new(name: impl Into<String>, path: impl Into<PathBuf>, camera: Camera) -> Self {
         let (name, path) = (name.into(), path.into());
-        Self { name, path, camera, distortion: None, test_split: false, background: None }
+        Self { name, path, camera, distortion: None, test_split: false, background: None, cut_out: false, mask: None }
     }
 
     /// Whether it can be had: of some photos on other computers only the cameras are known.
@@ -51,8 +57,11 @@ pub struct PhotoPixels {
     /// Row-major sRGB, as displayed; black where `coverage` is 0.
     pub rgb: Vec<[u8; 3]>,
     /// Row-major weight of each pixel, 0 where the photo shows nothing (outside the lens after
-    /// undistortion, transparent); `None` means all of it counts.
+    /// undistortion, transparent, black in its mask); `None` means all of it counts.
     pub coverage: Option<Vec<u8>>,
+    /// Row-major share of each pixel that is not transparent, 0 to 255, of photos of things that were cut out: `rgb` is
+    /// then over [`Photo::background`]. `None` where the photo does not say.
+    pub alpha: Option<Vec<u8>>,
 }
 
 impl PhotoPixels {
@@ -71,7 +80,13 @@ mod tests {
 
     #[test]
     fn pixels_are_counted() {
-        let photo = |n: usize| PhotoPixels { width_px: n as u32, height_px: 1, rgb: vec![[0; 3]; n], coverage: None };
+        let photo = |n: usize| PhotoPixels {
+            width_px: n as u32,
+            height_px: 1,
+            rgb: vec![[0; 3]; n],
+            coverage: None,
+            alpha: None,
+        };
         assert_eq!((photo(3).len(), photo(3).is_empty(), photo(0).is_empty()), (3, false, true));
     }
 }

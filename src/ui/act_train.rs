@@ -21,7 +21,7 @@ impl App {
             return;
         }
         let config = self.state.next_training(&self.layout.config);
-        self.state.antialias = config.render_settings(None).antialias;
+        self.state.antialias = config.render_settings(None, 1.0).antialias;
         let reached = self.state.continues_at(&config).filter(|_| !anew);
         self.state.resumable = Some((config.clone(), reached.unwrap_or(0)));
         let from = TrainStart { more_steps: reached.is_some(), objects_of: Some(out.clone()), if_changed };

@@ -121,7 +121,7 @@ mod tests {
     }
 
     fn photo(level: u8, coverage: Option<Vec<u8>>) -> PhotoPixels {
-        PhotoPixels { width_px: 2, height_px: 2, rgb: vec![[level; 3]; 4], coverage }
+        PhotoPixels { width_px: 2, height_px: 2, rgb: vec![[level; 3]; 4], coverage, alpha: None }
     }
 
     #[test]
@@ -144,7 +144,13 @@ mod tests {
 
     #[test]
     fn a_photo_of_another_size_is_sampled_at_pixel_centers() {
-        let big = PhotoPixels { width_px: 4, height_px: 4, rgb: (0..16).map(|i| [i; 3]).collect(), coverage: None };
+        let big = PhotoPixels {
+            width_px: 4,
+            height_px: 4,
+            rgb: (0..16).map(|i| [i; 3]).collect(),
+            coverage: None,
+            alpha: None,
+        };
         assert_eq!(paint(&frame(0.0), ViewMode::Photo, Some(&photo(7, None))).rgb, vec![[7; 3]; 4], "as it is");
         assert_eq!(paint(&frame(0.0), ViewMode::Photo, Some(&big)).rgb.len(), 4);
         assert_eq!(paint(&frame(0.0), ViewMode::Photo, None).rgb, vec![[0; 3]; 4], "the rendering without one");

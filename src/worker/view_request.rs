@@ -148,7 +148,7 @@ impl ViewPicture {
             (None, None) => self.rgb.clone(),
         };
         let Camera { width_px, height_px, .. } = self.camera;
-        Ok(PhotoPixels { width_px, height_px, rgb, coverage: None })
+        Ok(PhotoPixels { width_px, height_px, rgb, coverage: None, alpha: None })
     }
 
     /// Whether a GPU drew it.

@@ -170,7 +170,7 @@ fn a_real_photo_is_prepared_as_the_golden_tensor() {
         let picture = image::open(folder.join(name)).expect("a picture").to_rgb8();
         let (width_px, height_px) = picture.dimensions();
         let rgb = picture.pixels().map(|p| p.0).collect();
-        prepare.picture(&PhotoPixels { width_px, height_px, rgb, coverage: None }).expect("pixels").values
+        prepare.picture(&PhotoPixels { width_px, height_px, rgb, coverage: None, alpha: None }).expect("pixels").values
     };
     let mean =
         |got: &[f32]| got.iter().zip(&golden).map(|(a, b)| f64::from((a - b).abs())).sum::<f64>() / golden.len() as f64;

@@ -72,7 +72,7 @@ impl Tensors {
         let (shape, data) = self.bytes(name);
         let [h, w] = [shape[shape.len() - 3], shape[shape.len() - 2]];
         let rgb = data[k * h * w * 3..(k + 1) * h * w * 3].chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
-        PhotoPixels { width_px: w as u32, height_px: h as u32, rgb, coverage: None }
+        PhotoPixels { width_px: w as u32, height_px: h as u32, rgb, coverage: None, alpha: None }
     }
 }
 

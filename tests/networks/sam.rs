@@ -92,7 +92,7 @@ fn refusals_have_a_reason() {
     let mut sam = Sam::open(&fixture::path("sam.json")).expect("opens");
     let point = || (Tensor::filled(&[1, 2, 2], 0.0), Tensor::filled(&[1, 2], -1.0));
     assert!(sam.masks(point().0, point().1, None).is_err(), "no image was encoded");
-    let nothing = fmlgs::scene::PhotoPixels { width_px: 0, height_px: 0, rgb: vec![], coverage: None };
+    let nothing = fmlgs::scene::PhotoPixels { width_px: 0, height_px: 0, rgb: vec![], coverage: None, alpha: None };
     assert!(sam.look(&nothing).is_err());
     assert!(Sam::open(&fixture::path("sam2.json")).is_err() && Sam2::open(&fixture::path("sam.json")).is_err());
 }

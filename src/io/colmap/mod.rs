@@ -71,7 +71,7 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
     warnings.extend(without_pose(&photos, &images, root));
     let points = points(&model)?;
     if points.is_empty() {
-        warnings.push("the reconstruction has no sparse points; training starts from random points".into());
+        warnings.push("the reconstruction has no sparse points; training starts where the photos agree".into());
     }
 
     Ok(Dataset {
@@ -176,6 +176,7 @@ fn listed(
         broken: None,
         test_split: false,
         background: None,
+        mask: None,
     }))
 }
 

@@ -8,8 +8,8 @@ use std::path::Path;
 
 use super::trained::{self, TrainedScene};
 use super::{
-    IoError, OpenError, colmap, files, gs_output, khr_gltf, ksplat, llff, sog, splat, splat_ply, spz, transforms,
-    unposed,
+    IoError, OpenError, alpha, colmap, files, gs_output, khr_gltf, ksplat, llff, pixel_masks, sog, splat, splat_ply, spz,
+    transforms, unposed,
 };
 use crate::scene::{Axes, Dataset, GaussianCloud};
 
@@ -108,7 +108,13 @@ fn open_any(path: &Path, axes: Option<Axes>) -> Result<Opened> {
         std::io::ErrorKind::NotFound => OpenError::NotFound { path: path.into() },
         _ => IoError::Read { path: path.into(), cause }.into(),
     })?;
-    if meta.is_dir() { open_folder(path, axes) } else { open_file(path, axes) }
+    let mut opened = if meta.is_dir() { open_folder(path, axes) } else { open_file(path, axes) }?;
+    if let Opened::Dataset(dataset) = &mut opened {
+        pixel_masks::find(dataset);
+        alpha::decide(dataset);
+        dataset.warnings.extend(dataset.stray_warning());
+    }
+    Ok(opened)
 }
 
 fn open_folder(path: &Path, axes: Option<Axes>) -> Result<Opened> {

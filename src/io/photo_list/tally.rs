@@ -20,6 +20,8 @@ pub(super) struct Tally {
     /// Name, and what it is called.
     pub(super) renamed: Vec<(String, String)>,
     pub(super) linked: Vec<String>,
+    /// Photos whose listed mask is missing.
+    pub(super) unmasked: Vec<String>,
     pub(super) normalized: Vec<String>,
     /// Name and why.
     pub(super) broken: Vec<(String, String)>,
@@ -74,6 +76,12 @@ impl Tally {
             all.push(format!(
                 "{} of {n} listed photos were found under other names than listed (first: {first} is {called})",
                 self.renamed.len()
+            ));
+        }
+        if let Some(first) = self.unmasked.first() {
+            all.push(format!(
+                "{} listed masks are missing, so all pixels of those photos count (first: that of {first})",
+                self.unmasked.len()
             ));
         }
         if let Some(first) = self.linked.first() {

@@ -11,7 +11,7 @@ use crate::io::trained::SceneInfo;
 use crate::pipeline::observer::Silent;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
-use crate::scene::{Dataset, GaussianCloud, Machine, Photo, SemanticMap};
+use crate::scene::{Camera, Dataset, GaussianCloud, Machine, Photo, SemanticMap};
 
 /// The computer that a scene is on.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -40,13 +40,14 @@ pub(crate) fn received(
     scene_info::check(&info, &path)?;
     let config = TrainConfig::stored(&path, info.config.clone())?;
     let (mut cloud, map) = sent.map_or((None, None), |(cloud, map)| (Some(cloud), map));
+    let (_, extent) = Camera::extent_of(info.cameras.iter().map(|c| &c.camera));
     let settings = match &mut cloud {
         Some(cloud) if info.config.is_null() => RenderSettings::of_mode(cloud.render_mode),
         Some(cloud) => {
             cloud.render_mode = config.render_mode();
-            config.render_settings(info.background)
+            config.render_settings(info.background, extent)
         }
-        None => config.render_settings(info.background),
+        None => config.render_settings(info.background, extent),
     };
     let (cloud, sh_stored) = compact(cloud.unwrap_or_default());
     let dataset = (!info.cameras.is_empty()).then(|| Arc::new(photos(&info, &origin)));

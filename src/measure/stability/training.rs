@@ -24,7 +24,7 @@ pub(crate) fn flat(level: u8) -> TrainView {
     let rgb = vec![[level; 3]; 48 * 32];
     TrainView {
         name: "flat".into(),
-        pixels: PhotoPixels { width_px: at.width_px, height_px: at.height_px, rgb, coverage: None },
+        pixels: PhotoPixels { width_px: at.width_px, height_px: at.height_px, rgb, coverage: None, alpha: None },
         camera: at,
     }
 }

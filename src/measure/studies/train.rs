@@ -40,7 +40,7 @@ pub(crate) fn study(
         if outcome.end == TrainEnd::Cancelled {
             return Ok(None);
         }
-        let settings = config.render_settings(dataset.background);
+        let settings = config.render_settings(dataset.background, dataset.camera_extent().1);
         let mut renderer = Renderer::new();
         let draw = |camera: &Camera| renderer.render(&outcome.cloud, Features::NONE, camera, &settings);
         let e = Evaluation::of(scores(&tests, draw).map_err(failed)?, outcome.cloud.len(), outcome.steps, outcome.secs);

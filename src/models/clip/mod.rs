@@ -175,5 +175,5 @@ fn picture(tile: &IdentityCrop) -> Result<PhotoPixels, ModelError> {
     }
     let side = tile.side_px as u32;
     let rgb = tile.rgb.iter().map(|p| p.map(|c| (c.clamp(0.0, 1.0) * 255.0).round() as u8)).collect();
-    Ok(PhotoPixels { width_px: side, height_px: side, rgb, coverage: None })
+    Ok(PhotoPixels { width_px: side, height_px: side, rgb, coverage: None, alpha: None })
 }

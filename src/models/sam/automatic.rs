@@ -323,5 +323,5 @@ fn cut(picture: &PhotoPixels, crop: &[usize; 4]) -> PhotoPixels {
     let [x0, y0, x1, y1] = *crop;
     let rows = picture.rgb.chunks_exact((picture.width_px as usize).max(1)).skip(y0).take(y1 - y0);
     let rgb = rows.flat_map(|row| row[x0..x1].iter().copied()).collect();
-    PhotoPixels { width_px: (x1 - x0) as u32, height_px: (y1 - y0) as u32, rgb, coverage: None }
+    PhotoPixels { width_px: (x1 - x0) as u32, height_px: (y1 - y0) as u32, rgb, coverage: None, alpha: None }
 }

@@ -76,7 +76,7 @@ fn picture(turn: u32) -> PhotoPixels {
         let (x, y) = (i % 96 + turn, i / 96);
         [(x * x / 40 + y) as u8, (y * 3) as u8 ^ (x as u8 & 0x38), (x * 2 + y) as u8]
     };
-    PhotoPixels { width_px: 96, height_px: 72, rgb: (0..96 * 72).map(color).collect(), coverage: None }
+    PhotoPixels { width_px: 96, height_px: 72, rgb: (0..96 * 72).map(color).collect(), coverage: None, alpha: None }
 }
 
 /// What the networks of a description say, group by group: every graph takes part.

@@ -113,7 +113,7 @@ fn open(name: &str, seed: u64, folder: &Path) -> Scene {
         (photo.name.clone(), photo.camera.limited_to(COMPARE_PX), categories(&found))
     };
     Scene {
-        settings: config.render_settings(dataset.background),
+        settings: config.render_settings(dataset.background, dataset.camera_extent().1),
         training: training.iter().map(of).collect(),
         held: held.iter().map(of).map(&mut labeled).collect(),
         masks,

@@ -103,7 +103,8 @@ impl NetworkMasks {
         let width = picture.width_px as usize;
         let pixel = |i: usize| if object.contains(i) { picture.rgb[i] } else { [0; 3] };
         let rgb = at.y.clone().flat_map(|y| at.x.clone().map(move |x| y * width + x)).map(pixel).collect();
-        let tile = PhotoPixels { width_px: at.x.len() as u32, height_px: at.y.len() as u32, rgb, coverage: None };
+        let tile =
+            PhotoPixels { width_px: at.x.len() as u32, height_px: at.y.len() as u32, rgb, coverage: None, alpha: None };
         let options = AutomaticOptions { crop_layers: 0, points_per_side: self.tile_points, ..self.options };
         let masks = self.look(&tile, &options, watch)?;
         let place = |mask: Mask| {

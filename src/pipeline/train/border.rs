@@ -157,7 +157,7 @@ mod tests {
             .map(|k| {
                 let level = |x, y| if inside(x, y) { (90 + (x * 7 + y * 13 + k * 37) % 160) as u8 } else { 0 };
                 let rgb = (0..h).flat_map(|y| (0..w).map(move |x| [level(x, y); 3])).collect();
-                PhotoPixels { width_px: w, height_px: h, rgb, coverage: None }
+                PhotoPixels { width_px: w, height_px: h, rgb, coverage: None, alpha: None }
             })
             .collect()
     }
@@ -190,7 +190,7 @@ mod tests {
             (255.0 * (1.0 - d / 16.0)).max(0.0) as u8
         };
         let rgb = (0..30).flat_map(|y| (0..40).map(move |x| [fade(x, y); 3])).collect();
-        let photo = PhotoPixels { width_px: 40, height_px: 30, rgb, coverage: None };
+        let photo = PhotoPixels { width_px: 40, height_px: 30, rgb, coverage: None, alpha: None };
         assert_eq!(find(&[&photo; 10]), None);
     }
 }

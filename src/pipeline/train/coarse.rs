@@ -32,7 +32,11 @@ mod tests {
     fn view(w: u32, h: u32, coverage: Option<Vec<u8>>) -> TrainView {
         let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, w, h).expect("valid");
         let rgb = (0..w * h).map(|i| [(i % w) as u8, (i / w) as u8, 100]).collect();
-        TrainView { name: "a".into(), camera, pixels: PhotoPixels { width_px: w, height_px: h, rgb, coverage } }
+        TrainView {
+            name: "a".into(),
+            camera,
+            pixels: PhotoPixels { width_px: w, height_px: h, rgb, coverage, alpha: None },
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::io::trained::SCENE_FILE;
 use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::render::{BackendChoice, RenderSettings};
-use crate::scene::{Limits, SplatRenderMode};
+use crate::scene::{AlphaUse, Camera, Limits, SplatRenderMode};
 
 /// Weight of the normals' term where surfels are trained (2DGS's).
 const SURFEL_NORMALS: f64 = 0.05;
@@ -37,6 +37,9 @@ pub struct TrainConfig {
     pub max_gaussians: Option<usize>,
     /// Gaussians to start from where the dataset has no sparse points.
     pub random_points: usize,
+    /// What transparent pixels are taken for; `None` = what the photos make likely.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub alpha: Option<AlphaUse>,
     /// Mip-Splatting's 2-D filter.
     pub antialias: bool,
     /// Seed of every random choice.
@@ -146,10 +149,12 @@ impl TrainConfig {
         self.surfels || self.geometry_weights().0 > 0.0
     }
 
-    /// How what was trained is drawn in front of `background`, black if unknown.
-    pub(crate) fn render_settings(&self, background: Option<[f32; 3]>) -> RenderSettings {
+    /// How what was trained is drawn in front of `background`, black if unknown, in a scene of this extent (see
+    /// [`Camera::extent_of`]).
+    pub(crate) fn render_settings(&self, background: Option<[f32; 3]>, extent: f64) -> RenderSettings {
         RenderSettings {
             background: background.unwrap_or_default(),
+            near: Camera::near_plane(extent),
             antialias: self.antialias && !self.surfels,
             surfels: self.surfels,
             ..RenderSettings::default()
@@ -178,6 +183,7 @@ impl Default for TrainConfig {
             densify: true,
             max_gaussians: None,
             random_points: 20_000,
+            alpha: None,
             antialias: true,
             seed: 0,
             eval_every: 500,

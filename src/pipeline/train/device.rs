@@ -54,17 +54,18 @@ impl DeviceRun {
         self.trainer.upload(cloud, Some([&moments[0], &moments[1]]), step)
     }
 
-    /// One step on photo `i`, which `view` is of, with harmonics up to a degree, in front of a background. Does not
-    /// wait for the device.
+    /// One step on photo `i`, which `view` is of, with harmonics up to a degree, in front of a color, and with what
+    /// that changes where the photo is transparent. Does not wait for the device.
     pub(crate) fn step(
         &mut self,
         i: usize,
         view: &TrainView,
         rates: &Rates,
-        (sh_degree, background): (u8, [f32; 3]),
+        sh_degree: u8,
+        [background, shift]: [[f32; 3]; 2],
     ) -> Result<(), GpuError> {
         let Some(photo) = self.photos.get(i) else { return Ok(()) };
-        self.trainer.set_background(background);
+        self.trainer.set_background(background, shift);
         self.trainer.step(&view.camera, photo, rates, sh_degree)
     }
 

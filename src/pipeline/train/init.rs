@@ -1,16 +1,15 @@
 //! The Gaussians a run starts from.
 
 use glam::{DVec2, DVec3};
-use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 use rstar::RTree;
 
-use super::TrainView;
+use super::{TrainView, sweep};
 use crate::math::sh::{SH_C0, coefficients};
 use crate::math::stats::quantile;
 use crate::render::{Features, RenderSettings, Renderer};
-use crate::scene::{Bounds, Dataset, GaussianCloud, SparsePoint};
+use crate::scene::{Bounds, Camera, Dataset, GaussianCloud, SparsePoint};
 
 /// Opacity of a new Gaussian.
 const OPACITY: f64 = 0.1;
@@ -21,8 +20,8 @@ const HOLE_CELL_PX: usize = 8;
 /// How much farther than nearly everything else in a view its holes are filled.
 const HOLE_DEPTH: f64 = 1.3;
 
-/// A cloud at the dataset's sparse points or, where it has fewer than a hundred, at `random`
-/// points in front of the cameras, colored by the photos they were shot from.
+/// A cloud at the dataset's sparse points or, where it has fewer than a hundred, at `random` points
+/// where the photos agree.
 pub(crate) fn initial_cloud(
     dataset: &Dataset,
     views: &[TrainView],
@@ -30,21 +29,25 @@ pub(crate) fn initial_cloud(
     random: usize,
     rng: &mut Pcg64Mcg,
 ) -> GaussianCloud {
+    // A camera far from all others has a wrong pose, or sees little.
+    let strays: Vec<&str> = dataset.strays().into_iter().map(|i| dataset.photos[i].name.as_str()).collect();
+    let views: Vec<&TrainView> = views.iter().filter(|v| !strays.contains(&v.name.as_str())).collect();
     let finite: Vec<SparsePoint> = dataset.points.iter().copied().filter(|p| p.position.is_finite()).collect();
     if finite.len() < 100 {
-        return from_points(&random_points(dataset, views, random, rng), degree);
+        return from_points(&sweep::points(dataset.focus(), &views, dataset.background, random, rng), degree);
     }
     let mut cloud = from_points(&finite, degree);
-    fill_holes(&mut cloud, dataset, views);
+    fill_holes(&mut cloud, dataset, &views);
     cloud
 }
 
 /// Puts Gaussians where photos show something but no sparse point is: walls, sky, the rest of the
 /// room. They stand a little behind what the view shows otherwise, in its photo's colors, and
 /// training moves them from there. Views that already see such a Gaussian add none.
-fn fill_holes(cloud: &mut GaussianCloud, dataset: &Dataset, views: &[TrainView]) {
+fn fill_holes(cloud: &mut GaussianCloud, dataset: &Dataset, views: &[&TrainView]) {
     let stride = cloud.sh_stride();
-    let settings = RenderSettings { sh_degree: 0, depth: true, ..RenderSettings::default() };
+    let near = Camera::near_plane(dataset.camera_extent().1);
+    let settings = RenderSettings { sh_degree: 0, depth: true, near, ..RenderSettings::default() };
     let mut renderer = Renderer::new();
     // The same cloud all but opaque, so that its alpha says where it covers the picture.
     let mut solid = cloud.clone();
@@ -70,7 +73,8 @@ fn fill_holes(cloud: &mut GaussianCloud, dataset: &Dataset, views: &[TrainView])
                 let (u, v) = ((at.x * scale) as u32, (at.y * scale) as u32);
                 let (u, v) = (u.min(view.pixels.width_px - 1), v.min(view.pixels.height_px - 1));
                 let pixel = (v * view.pixels.width_px + u) as usize;
-                if view.pixels.coverage.as_ref().is_some_and(|c| c[pixel] == 0) {
+                let is_clear = |plane: &Option<Vec<u8>>| plane.as_ref().is_some_and(|p| p[pixel] == 0);
+                if is_clear(&view.pixels.coverage) || is_clear(&view.pixels.alpha) {
                     continue;
                 }
                 let position = camera.center + camera.ray(at) * depth - cloud.origin;
@@ -126,28 +130,10 @@ pub(crate) fn from_points(points: &[SparsePoint], degree: u8) -> GaussianCloud {
     cloud
 }
 
-/// Points along random viewing rays of random photos, log-uniform in depth between a quarter and
-/// four times the distance to what the photos look at: every one of them is seen by some photo,
-/// and the cloud is bounded.
-fn random_points(dataset: &Dataset, views: &[TrainView], n: usize, rng: &mut Pcg64Mcg) -> Vec<SparsePoint> {
-    let focus = dataset.focus();
-    (0..n)
-        .filter_map(|_| {
-            let view = views.get(rng.random_range(0..views.len().max(1)))?;
-            let (x, y) = (rng.random_range(0..view.pixels.width_px), rng.random_range(0..view.pixels.height_px));
-            let rgb = *view.pixels.rgb.get((y * view.pixels.width_px + x) as usize)?;
-            let distance = view.camera.center.distance(focus).max(1e-9);
-            let depth = distance * 4.0_f64.powf(rng.random_range(-1.0..1.0));
-            let ray = view.camera.ray(DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5));
-            Some(SparsePoint { position: view.camera.center + ray * depth, rgb })
-        })
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Camera, PhotoPixels};
+    use crate::scene::PhotoPixels;
 
     #[test]
     fn scales_follow_the_spacing() {
@@ -170,8 +156,13 @@ mod tests {
     fn what_photos_show_without_points_is_filled_once() {
         let photo = |eye: DVec3| {
             let camera = Camera::look_at(eye, DVec3::ZERO, DVec3::Z, 0.8, 128, 96).expect("valid");
-            let pixels =
-                PhotoPixels { width_px: 128, height_px: 96, rgb: vec![[200, 30, 30]; 128 * 96], coverage: None };
+            let pixels = PhotoPixels {
+                width_px: 128,
+                height_px: 96,
+                rgb: vec![[200, 30, 30]; 128 * 96],
+                coverage: None,
+                alpha: None,
+            };
             TrainView { name: String::new(), camera, pixels }
         };
         let views = [photo(DVec3::new(0.0, -4.0, 0.1)), photo(DVec3::new(0.01, -4.0, 0.1))];

@@ -40,6 +40,8 @@ struct PhotoInput {
     distortion: Option<Distortion>,
     background: Option<[f32; 3]>,
     test_split: bool,
+    #[serde(default)]
+    cut_out: bool,
     files: Vec<FileInput>,
 }
 
@@ -100,7 +102,7 @@ impl TrainInputs {
         tell(is_moved.map(|([b, _], _)| b.name.clone()).collect(), &how, &how);
         let lens = which(&|b, a| !same_lens(&b.camera, &a.camera) || b.distortion != a.distortion);
         tell(lens, "has another lens or size", "have other lenses or sizes");
-        let pixels = which(&|b, a| b.files != a.files || b.background != a.background);
+        let pixels = which(&|b, a| b.files != a.files || b.background != a.background || b.cut_out != a.cut_out);
         tell(pixels, "has other pixels", "have other pixels");
         let marks = which(&|b, a| b.test_split != a.test_split);
         tell(marks, "is marked otherwise as test", "are marked otherwise as test");
@@ -128,7 +130,8 @@ impl PhotoInput {
             distortion: photo.distortion,
             background: photo.background,
             test_split: photo.test_split,
-            files: [&photo.path].into_iter().map(|path| file(path)).collect::<Result<_, _>>()?,
+            cut_out: photo.cut_out,
+            files: std::iter::once(&photo.path).chain(&photo.mask).map(|path| file(path)).collect::<Result<_, _>>()?,
         })
     }
 }

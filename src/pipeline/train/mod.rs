@@ -19,6 +19,8 @@ mod outcome;
 mod photos;
 mod run;
 pub(crate) mod schedule;
+mod sweep;
+mod sweep_view;
 pub mod trainer;
 mod window;
 

@@ -18,6 +18,17 @@ pub(super) fn tell_marks(dataset: &Dataset, config: &TrainConfig, observer: &mut
     }
 }
 
+/// Says what transparent pixels and masks are taken for.
+pub(super) fn tell_of_pixels(dataset: &Dataset, config: &TrainConfig, observer: &mut dyn Observer) {
+    for note in dataset.pixel_notes() {
+        observer.note(Severity::Info, note);
+    }
+    if config.alpha.is_some() && dataset.alpha.is_none() {
+        let text = "--alpha changes nothing: the photos that were looked at have no transparent pixels";
+        observer.note(Severity::Warning, text.into());
+    }
+}
+
 /// Loads and scales photos, several at a time; `None` if the observer cancels.
 pub(crate) fn load_views(
     dataset: &Dataset,

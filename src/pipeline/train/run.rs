@@ -13,7 +13,7 @@ use super::device::StepResult;
 use super::folder::{FolderUse, claim, finished, objects_for, remade, resumable};
 use super::inputs::{Compare, TrainInputs};
 use super::outcome::{TrainEnd, TrainError, TrainOutcome};
-use super::photos::{load_views, tell_marks};
+use super::photos::{load_views, tell_marks, tell_of_pixels};
 use super::trainer::{REPORT_STEPS, StepError, Trainer};
 use super::window::Window;
 use super::{TrainConfig, TrainView, coarse, density, geometry, init};
@@ -57,6 +57,8 @@ pub(crate) fn run_on(
     observer: &mut dyn Observer,
 ) -> Result<TrainOutcome, TrainError> {
     config.check().map_err(TrainError::Config)?;
+    let dataset = &*dataset.with_alpha(config.alpha);
+    tell_of_pixels(dataset, config, observer);
     let (train, held) = dataset.split(config.holdout_every);
     if train.is_empty() {
         return Err(TrainError::NoPhotos(dataset.name.clone(), dataset.photos.len()));
@@ -169,7 +171,7 @@ impl<'a> Job<'a> {
         };
         trainer.cloud.render_mode = config.render_mode();
         if dataset.background.is_none() {
-            trainer.before_random_colors(config.seed);
+            trainer.before_random_colors();
         }
         let mut info = SceneInfo::of(dataset, held, scene.as_ref().map_or(Path::new("."), SceneFolder::path));
         info.config = serde_json::to_value(config).unwrap_or_default();

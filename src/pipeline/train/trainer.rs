@@ -57,9 +57,11 @@ pub struct Trainer {
     pub step: u64,
     pub(crate) budget: usize,
     settings: RenderSettings,
-    /// Where the photos do not say what is behind everything: the seed of a color for each step. What is black in them
-    /// would else stay empty, as nothing looks the same.
-    backdrops: Option<u64>,
+    /// Seed of a color behind everything for each step.
+    seed: u64,
+    /// Whether the photos do not say what is behind everything, so that each step has a color of its own. What is black
+    /// in them would else stay empty, as nothing looks the same.
+    unknown_backdrop: bool,
     densify: bool,
     renderer: DifferentiableRenderer,
     losses: [PhotoLoss<f32>; 3],
@@ -80,8 +82,9 @@ impl Trainer {
             round: Vec::new(),
             step: 0,
             budget: config.max_gaussians.unwrap_or(usize::MAX),
-            settings: config.render_settings(Some(background)),
-            backdrops: None,
+            settings: config.render_settings(Some(background), extent),
+            seed: config.seed,
+            unknown_backdrop: false,
             densify: config.densify,
             renderer: DifferentiableRenderer::new(),
             losses: Default::default(),
@@ -93,8 +96,20 @@ impl Trainer {
     }
 
     /// Trains in front of another color in every step, the same for a seed and a step.
-    pub(crate) fn before_random_colors(&mut self, seed: u64) {
-        self.backdrops = Some(seed);
+    pub(crate) fn before_random_colors(&mut self) {
+        self.unknown_backdrop = true;
+    }
+
+    /// The color behind everything in this step, and what that changes where the photo is transparent. In front of one
+    /// color alone, fog of that color would look like nothing.
+    fn backdrop(&self, view: &TrainView) -> ([f32; 3], [f32; 3]) {
+        let usual = self.settings.background;
+        let cut_out = view.pixels.alpha.is_some();
+        if !cut_out && !self.unknown_backdrop {
+            return (usual, [0.0; 3]);
+        }
+        let color: [f32; 3] = Pcg64Mcg::seed_from_u64(self.seed ^ self.step).random();
+        (color, if cut_out { std::array::from_fn(|c| color[c] - usual[c]) } else { [0.0; 3] })
     }
 
     pub(crate) fn move_to(&mut self, device: &Device, views: &[TrainView]) -> Result<(), GpuError> {
@@ -154,12 +169,9 @@ impl Trainer {
         let next = self.round.pop().map(|i| i as usize);
         let Some((i, view)) = next.and_then(|i| Some((i, views.get(i)?))) else { return Ok(Vec::new()) };
         self.settings.sh_degree = self.schedule.sh_degree(self.step);
-        let background = match self.backdrops {
-            Some(seed) => Pcg64Mcg::seed_from_u64(seed ^ self.step).random(),
-            None => self.settings.background,
-        };
+        let (background, shift) = self.backdrop(view);
         if let Some(device) = &mut self.device {
-            device.step(i, view, &self.schedule.rates(self.step), (self.settings.sh_degree, background))?;
+            device.step(i, view, &self.schedule.rates(self.step), self.settings.sh_degree, [background, shift])?;
             self.step += 1;
             return Ok(if self.step % REPORT_STEPS == 0 { device.results()? } else { Vec::new() });
         }
@@ -169,7 +181,7 @@ impl Trainer {
         if settings.depth {
             self.geometry.compare(&frame, view, self.step, &mut self.gradient);
         }
-        let parts = self.compare(frame.color, view);
+        let parts = self.compare(frame.color, view, shift);
         self.renderer.backward_tiles(&self.gradient);
         if CHECKED {
             all_finite("the loss", "part", &[parts.l1, parts.ssim, parts.mse])?;
@@ -230,9 +242,9 @@ impl Trainer {
         self.send()
     }
 
-    /// Fills the picture gradient and returns the loss.
-    fn compare(&mut self, mut rendered: [Vec<f32>; 3], view: &TrainView) -> LossParts {
-        let target = metrics::planes::<f32>(&view.pixels);
+    /// Fills the picture gradient and returns the loss, with the photo in front of another color than it is stored with.
+    fn compare(&mut self, mut rendered: [Vec<f32>; 3], view: &TrainView, shift: [f32; 3]) -> LossParts {
+        let target = metrics::planes_before::<f32>(&view.pixels, shift);
         let coverage = view.pixels.coverage.as_deref();
         if let Some(coverage) = coverage {
             for (plane, want) in rendered.iter_mut().zip(&target) {

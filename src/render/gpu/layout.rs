@@ -119,8 +119,11 @@ twins! {
         l1: f32,
         /// Weight of D-SSIM, likewise.
         dssim: f32,
+        /// 1 if alpha follows the photo's pixels.
+        has_alpha: u32,
         pad0: u32,
-        pad1: u32,
+        /// Color added where the photo is transparent.
+        shift: [f32; 4],
     }
 
     /// One Adam step over one buffer.

@@ -14,10 +14,12 @@ pub(crate) const RING: usize = 64;
 /// Bytes of one step's sums.
 const SLOT_BYTES: u64 = 32;
 
-/// A photo on the device, 4 bytes a pixel.
+/// A photo on the device, 4 bytes a pixel; 8 of a thing that was cut out.
 #[derive(Clone, Debug)]
 pub struct DevicePhoto {
     pixels: wgpu::Buffer,
+    /// Whether behind all pixels there is the alpha of each.
+    pub(crate) has_alpha: bool,
     pub(crate) size_px: [u32; 2],
 }
 
@@ -25,13 +27,17 @@ impl DevicePhoto {
     pub(crate) fn new(device: &Device, photo: &PhotoPixels) -> Result<Self, GpuError> {
         let size_px = [photo.width_px, photo.height_px];
         let [want, _] = extent(size_px);
-        let lengths = [photo.rgb.len(), photo.coverage.as_ref().map_or(want, Vec::len)];
+        let length = |plane: &Option<Vec<u8>>| plane.as_ref().map_or(want, Vec::len);
+        let lengths = [photo.rgb.len(), length(&photo.coverage), length(&photo.alpha)];
         if let Some(&have) = lengths.iter().find(|&&l| l != want) {
             return Err(GpuError::Size { what: "pixels of a photo", have, want });
         }
         let covered = |i: usize| photo.coverage.as_ref().map_or(255, |c| c[i]);
-        let packed: Vec<[u8; 4]> = photo.rgb.iter().enumerate().map(|(i, &[r, g, b])| [r, g, b, covered(i)]).collect();
-        Ok(Self { pixels: device.storage_with("photo", packed.as_flattened())?, size_px })
+        let colors = photo.rgb.iter().enumerate().map(|(i, &[r, g, b])| [r, g, b, covered(i)]);
+        let alpha = photo.alpha.iter().flatten().map(|a| [*a; 4]);
+        let packed: Vec<[u8; 4]> = colors.chain(alpha).collect();
+        let pixels = device.storage_with("photo", packed.as_flattened())?;
+        Ok(Self { pixels, has_alpha: photo.alpha.is_some(), size_px })
     }
 }
 
@@ -93,13 +99,14 @@ impl Ssim {
     }
 
     /// Makes room for pictures of this size and says where the sums go. `lambda` is the share of
-    /// D-SSIM in the loss.
+    /// D-SSIM in the loss, `shift` what is added where the photo, which then has an alpha, is transparent.
     pub(crate) fn prepare(
         &mut self,
         device: &Device,
         size_px: [u32; 2],
         slot: usize,
         lambda: f64,
+        shift: Option<[f32; 3]>,
     ) -> Result<(), GpuError> {
         let [pixels, tiles] = extent(size_px);
         device.grow(&mut self.maps, "derivatives of SSIM", pixels as u64 * 36)?;
@@ -111,6 +118,8 @@ impl Ssim {
             tiles: tiles as u32,
             l1: ((1.0 - lambda) / values) as f32,
             dssim: (lambda / values) as f32,
+            has_alpha: u32::from(shift.is_some()),
+            shift: shift.map_or([0.0; 4], |[r, g, b]| [r, g, b, 0.0]),
             ..Loss::default()
         };
         device.queue().write_buffer(&self.loss, 0, bytemuck::bytes_of(&loss));
@@ -159,13 +168,14 @@ impl Ssim {
     }
 }
 
-/// Loss of a rendered picture (interleaved RGB) against a photo, and its gradient: the loss alone,
-/// for tests and measurements.
+/// Loss of a rendered picture (interleaved RGB) against a photo, to which `shift` is added where it is transparent, and
+/// its gradient: the loss alone, for tests and measurements.
 pub fn photo_loss(
     device: &Device,
     rendered: &[[f32; 3]],
     photo: &PhotoPixels,
     lambda: f64,
+    shift: [f32; 3],
 ) -> Result<(LossSums, Vec<[f32; 3]>), GpuError> {
     let target = DevicePhoto::new(device, photo)?;
     let [pixels, _] = extent(target.size_px);
@@ -173,7 +183,7 @@ pub fn photo_loss(
         return Err(GpuError::Size { what: "pixels of a picture", have: rendered.len(), want: pixels });
     }
     let mut ssim = Ssim::new(device)?;
-    ssim.prepare(device, target.size_px, 0, lambda)?;
+    ssim.prepare(device, target.size_px, 0, lambda, target.has_alpha.then_some(shift))?;
     let wide: Vec<[f32; 4]> = rendered.iter().map(|&[r, g, b]| [r, g, b, 0.0]).collect();
     let colors = device.storage_with("picture", bytemuck::cast_slice(&wide))?;
     let gradient = device.storage("gradient of the picture", pixels as u64 * 16)?;

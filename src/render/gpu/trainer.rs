@@ -54,6 +54,8 @@ pub struct StepLoss {
 pub struct GpuTrainer {
     device: Device,
     settings: TrainerSettings,
+    /// Color added to photos where they are transparent.
+    shift: [f32; 3],
     rasterizer: GpuRasterizer,
     ssim: Ssim,
     blend_backward: TileKernel,
@@ -88,6 +90,7 @@ impl GpuTrainer {
         let mut trainer = Self {
             device: device.clone(),
             settings,
+            shift: [0.0; 3],
             rasterizer: GpuRasterizer::new(device)?,
             ssim: Ssim::new(device)?,
             blend_backward: blend_backward(device.has_float_atomics()),
@@ -176,9 +179,10 @@ impl GpuTrainer {
         self.device.check()
     }
 
-    /// The color behind everything from the next step on.
-    pub(crate) fn set_background(&mut self, background: [f32; 3]) {
+    /// The color behind everything from the next step on, and what it adds to photos where they are transparent.
+    pub fn set_background(&mut self, background: [f32; 3], shift: [f32; 3]) {
         self.settings.render.background = background;
+        self.shift = shift;
     }
 
     /// One step on one photo, with harmonics up to `sh_degree`. Returns as soon as the work is
@@ -202,7 +206,8 @@ impl GpuTrainer {
         if !self.sized {
             self.size_up(camera, &settings)?;
         }
-        self.ssim.prepare(&self.device, size_px, self.pending.len(), self.settings.lambda)?;
+        let shift = photo.has_alpha.then_some(self.shift);
+        self.ssim.prepare(&self.device, size_px, self.pending.len(), self.settings.lambda, shift)?;
         let degrees = [self.shape.degree, sh_degree.min(self.shape.degree)];
         let n = self.shape.gaussians;
         self.adam.prepare(&self.device, n, degrees, rates, self.step + 1);

@@ -195,6 +195,9 @@ fn facts(ui: &mut Ui, dataset: &Dataset, train: usize, test: usize) {
             ui.weak(format!("·  {} points", format::count(dataset.points.len() as u64)));
         }
     });
+    for note in dataset.pixel_notes() {
+        ui.weak(note);
+    }
     if !dataset.warnings.is_empty() {
         let text = format!("{} warning{}", dataset.warnings.len(), if dataset.warnings.len() == 1 { "" } else { "s" });
         ui.label(RichText::new(text).color(theme::warning())).on_hover_text(text::lines(&dataset.warnings.join("\n")));

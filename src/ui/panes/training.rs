@@ -1,6 +1,6 @@
 //! Settings, progress and plots of training.
 
-use egui::{DragValue, Grid, RichText, Slider, Ui};
+use egui::{ComboBox, DragValue, Grid, RichText, Slider, Ui};
 
 use super::super::layout::Layout;
 use super::super::state::{AppState, RunningJob};
@@ -9,7 +9,7 @@ use super::plots::{self, PsnrCurve};
 use crate::jobs::presets;
 use crate::math::format;
 use crate::pipeline::train::TrainConfig;
-use crate::scene::text;
+use crate::scene::{AlphaUse, text};
 use crate::ui::actions::Action;
 use crate::worker::JobKind;
 
@@ -137,6 +137,18 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
     });
     ui.collapsing("Advanced", |ui| {
         ui.checkbox(&mut config.antialias, "Anti-aliasing (2-D filter of Mip-Splatting)");
+        ui.horizontal(|ui| {
+            let tip = "What the photos' transparent pixels are taken for: pixels that do not count, empty space around a thing \
+                       that was cut out, or the background's color.";
+            let id = ui.label("Transparent pixels").on_hover_text(tip).id;
+            let all = [None, Some(AlphaUse::Ignore), Some(AlphaUse::Empty), Some(AlphaUse::Background)];
+            let name = |alpha: Option<AlphaUse>| alpha.map_or("by the photos", AlphaUse::word);
+            let list = ComboBox::from_id_salt("alpha").selected_text(name(config.alpha));
+            let shown = list.show_ui(ui, |ui| {
+                all.into_iter().for_each(|alpha| drop(ui.selectable_value(&mut config.alpha, alpha, name(alpha))));
+            });
+            shown.response.labelled_by(id);
+        });
         let mut limited = config.max_gaussians.is_some();
         ui.horizontal(|ui| {
             if ui.checkbox(&mut limited, "Limit Gaussians to").changed() {

@@ -237,7 +237,7 @@ mod tests {
     #[test]
     fn a_frame_is_asked_for_once_and_anew_as_anything_changes() {
         let cloud = Versioned::new(Arc::new(GaussianCloud::default()));
-        let photo = Arc::new(PhotoPixels { width_px: 1, height_px: 1, rgb: vec![[0; 3]], coverage: None });
+        let photo = Arc::new(PhotoPixels { width_px: 1, height_px: 1, rgb: vec![[0; 3]], coverage: None, alpha: None });
         let wanted = |change: &dyn Fn(&mut Wanted)| {
             let mut wanted = Wanted {
                 cloud: cloud.clone(),

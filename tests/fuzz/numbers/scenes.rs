@@ -274,6 +274,7 @@ pub fn training(n: &mut Numbers) -> Verdict {
         height_px: camera.height_px,
         rgb: (0..pixels).map(|_| std::array::from_fn(|_| n.below(256) as u8)).collect(),
         coverage: n.chance(0.3).then(|| (0..pixels).map(|_| n.pick(&[0, 1, 254, 255])).collect()),
+        alpha: n.chance(0.3).then(|| (0..pixels).map(|_| n.pick(&[0, 1, 254, 255])).collect()),
     };
     let views = [TrainView { name: "fuzz".into(), camera, pixels }];
     let config = TrainConfig {

@@ -63,7 +63,7 @@ impl PromptedMasks for Knowing {
 fn found(things: &[[usize; 4]], sparing: bool) -> (Vec<Mask>, usize) {
     let mut network = Knowing { things: things.to_vec(), asked: 0 };
     let rgb = vec![[0; 3]; SIDE * SIDE];
-    let picture = PhotoPixels { width_px: SIDE as u32, height_px: SIDE as u32, rgb, coverage: None };
+    let picture = PhotoPixels { width_px: SIDE as u32, height_px: SIDE as u32, rgb, coverage: None, alpha: None };
     let options = AutomaticOptions { crop_layers: 0, sparing, ..AutomaticOptions::default() };
     let masks = everything(&mut network, &picture, &options, &mut |_| true).expect("masks");
     let mut masks: Vec<Mask> = masks.into_iter().map(|m| m.mask).collect();

@@ -1,0 +1,244 @@
+//! Masks that say which pixels of a photo count: `mask_path` of `transforms.json`, and a folder `masks` beside `images`
+//! as COLMAP's `ImageReader.mask_path` has it. What is black in them does not count.
+//!
+//! A folder of that name may hold labels of objects, too; those have more than two values and are passed over.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use rayon::prelude::*;
+
+use super::photo_list::{PhotoFinder, Search, is_scaled};
+use super::resample::Pixels;
+use super::{IoError, files, photo};
+use crate::math::resize::nearest;
+use crate::scene::{Dataset, Photo};
+
+/// Pictures of a folder that are looked at to tell masks from labels.
+const SAMPLE: usize = 12;
+/// Values this near to black or to the brightest are taken for these: JPEG's noise.
+const NOISE: u8 = 24;
+/// Largest share of other values, which smoothed edges have.
+const BETWEEN: f64 = 0.03;
+/// Endings of masks that are named after the photo's stem.
+const ENDINGS: [&str; 4] = ["png", "jpg", "jpeg", "webp"];
+
+/// What a picture holds.
+#[derive(Debug, PartialEq)]
+enum Content {
+    /// Black and this.
+    Mask(u8),
+    /// Colors, or several values: labels.
+    Labels,
+    /// Nothing but black.
+    Black,
+}
+
+/// Finds the masks beside the photos' folder, for photos that have none yet. Warnings name what is passed over.
+pub(super) fn find(dataset: &mut Dataset) {
+    let root = dataset.root.clone();
+    let mut folders: Vec<PathBuf> = Vec::new();
+    let mut found: Vec<(usize, PathBuf)> = Vec::new();
+    for (i, photo) in dataset.photos.iter().enumerate().filter(|(_, p)| p.mask.is_none()) {
+        let Some((folder, inside)) = place(&root, photo) else { continue };
+        for masks in mask_folders(&root, &folder) {
+            if !folders.contains(&masks) {
+                folders.push(masks.clone());
+            }
+            if let Some(mask) = names(&masks, &inside).into_iter().find(|p| p.is_file()) {
+                found.push((i, mask));
+                break;
+            }
+        }
+    }
+    let Some(first) = folders.first() else { return };
+    if found.is_empty() {
+        let pictures = fs::read_dir(first).map_or(0, |all| all.flatten().filter(|e| is_picture(&e.path())).count());
+        if pictures > 0 {
+            dataset.warnings.push(format!(
+                "{} is passed over: none of its {pictures} pictures is named like a photo (<photo>.png)",
+                first.display()
+            ));
+        }
+        return;
+    }
+    let step = found.len().div_ceil(SAMPLE).max(1);
+    let sample: Vec<(&Path, Content)> =
+        found.par_iter().step_by(step).filter_map(|(_, path)| Some((path.as_path(), content(path).ok()?))).collect();
+    let mut levels: Vec<u8> =
+        sample.iter().filter_map(|s| if let Content::Mask(v) = s.1 { Some(v) } else { None }).collect();
+    levels.sort_unstable();
+    let labels = sample.iter().find(|s| s.1 == Content::Labels).map(|s| s.0);
+    // Masks of one value each, but not the same, are numbers of objects.
+    let numbers = levels.last().zip(levels.first()).is_some_and(|(a, b)| a - b > 2 * NOISE || (*a < 64 && a != b));
+    if let Some(labels) = labels.or_else(|| sample.first().map(|s| s.0).filter(|_| numbers)) {
+        dataset.warnings.push(format!(
+            "{} pictures beside the photos are passed over: they have colors or more than two values, so they are labels and no \
+             masks of the pixels that count (first: {})",
+            found.len(),
+            labels.display()
+        ));
+        return;
+    }
+    let found: Vec<(usize, PathBuf, Option<String>)> = found
+        .into_par_iter()
+        .map(|(i, path)| {
+            let fault = fault(&path, &dataset.photos[i]);
+            (i, path, fault)
+        })
+        .collect();
+    let broken: Vec<&String> = found.iter().filter_map(|f| f.2.as_ref()).collect();
+    if let Some(first) = broken.first() {
+        dataset.warnings.push(format!(
+            "{} of {} masks cannot be used, so all pixels of those photos count (first: {first})",
+            broken.len(),
+            found.len()
+        ));
+    }
+    for (i, path, _) in found.into_iter().filter(|f| f.2.is_none()) {
+        dataset.photos[i].mask = Some(path);
+    }
+}
+
+/// The mask that a file names for a photo; `None` if it does not exist.
+///
+/// # Errors
+/// If it lies outside of the folder, cannot be read or has another shape than the photo.
+pub(super) fn listed(
+    finder: &PhotoFinder<'_>,
+    entry: &str,
+    source: &Path,
+    size_px: (u32, u32),
+) -> Result<Option<PathBuf>, IoError> {
+    let path = match finder.find("", entry) {
+        Search::Found(found) => found.path,
+        Search::Missing | Search::Several(_) => return Ok(None),
+        Search::Outside => {
+            let folder = files::folder_of(source).into();
+            return Err(IoError::Outside { path: source.into(), entry: entry.into(), folder });
+        }
+    };
+    let found = photo::size(&path)?;
+    if !is_scaled(size_px, found) {
+        return Err(IoError::PhotoSize { path, found, expected: size_px });
+    }
+    Ok(Some(path))
+}
+
+/// Leaves out the pixels that are black in a mask, of any size of the same shape.
+pub(super) fn apply(pixels: Pixels, mask: &Path) -> Result<Pixels, IoError> {
+    let (w, h, values) = photo::decode_brightest(&files::read(mask, files::MAX_PICTURE_BYTES)?, mask)?;
+    let least = if values.iter().max().is_some_and(|m| *m >= 128) { 128 } else { 1 };
+    let Pixels { width, height, channels, data } = pixels;
+    let columns: Vec<usize> = (0..width).map(|x| nearest(x, w, width)).collect();
+    let mut out = Vec::with_capacity(width * height * 4);
+    for (y, row) in data.chunks_exact(width * channels).enumerate() {
+        let of = &values[nearest(y, h, height) * w..][..w];
+        for (p, x) in row.chunks_exact(channels).zip(&columns) {
+            let alpha = if channels == 4 { p[3] } else { u8::MAX };
+            out.extend([p[0], p[1], p[2], if of[*x] >= least { alpha } else { 0 }]);
+        }
+    }
+    Ok(Pixels { width, height, channels: 4, data: out })
+}
+
+/// A photo's folder below `root`, and its path inside of it.
+fn place(root: &Path, photo: &Photo) -> Option<(PathBuf, PathBuf)> {
+    let relative = photo.path.strip_prefix(root).ok()?;
+    let mut parts = relative.components();
+    let folder = parts.next()?;
+    let inside = parts.as_path();
+    Some(if inside.as_os_str().is_empty() {
+        (PathBuf::new(), relative.into())
+    } else {
+        (PathBuf::from(folder.as_os_str()), inside.into())
+    })
+}
+
+/// Where masks of photos in `folder` may lie: for `images_2` in `masks_2` or `masks`.
+fn mask_folders(root: &Path, folder: &Path) -> Vec<PathBuf> {
+    let name = folder.to_string_lossy();
+    let reduced = name.strip_prefix("images").filter(|rest| !rest.is_empty());
+    let own = reduced.map(|rest| format!("masks{rest}"));
+    own.into_iter().chain(["masks".into()]).map(|n| root.join(n)).filter(|p| p.is_dir()).collect()
+}
+
+/// What the mask of a photo may be called.
+fn names(masks: &Path, inside: &Path) -> Vec<PathBuf> {
+    let whole = masks.join(inside);
+    let longer = PathBuf::from(format!("{}.png", whole.display()));
+    std::iter::once(longer).chain(ENDINGS.map(|e| whole.with_extension(e))).collect()
+}
+
+fn is_picture(path: &Path) -> bool {
+    path.extension().is_some_and(|e| ENDINGS.contains(&&*e.to_string_lossy().to_lowercase()))
+}
+
+fn content(path: &Path) -> Result<Content, IoError> {
+    let picture = photo::open(path)?;
+    let is_gray = |p: &[u8; 3]| p[0].abs_diff(p[1]).max(p[1].abs_diff(p[2])) <= NOISE;
+    if !picture.rgb.iter().all(is_gray) {
+        return Ok(Content::Labels);
+    }
+    let brightest = picture.rgb.iter().map(|p| p[1]).max().unwrap_or(0);
+    if brightest == 0 {
+        return Ok(Content::Black);
+    }
+    let noise = if brightest >= 128 { NOISE } else { 0 };
+    let between = picture.rgb.iter().filter(|p| p[1] > noise && p[1] < brightest - noise).count();
+    let is_mask = between as f64 <= BETWEEN * picture.rgb.len() as f64;
+    Ok(if is_mask { Content::Mask(brightest) } else { Content::Labels })
+}
+
+/// Why a mask cannot be used for a photo.
+fn fault(path: &Path, photo: &Photo) -> Option<String> {
+    let (found, expected) = (photo::size(path), (photo.camera.width_px, photo.camera.height_px));
+    match found {
+        Err(e) => Some(e.to_string()),
+        Ok(found) if !is_scaled(expected, found) => {
+            Some(IoError::PhotoSize { path: path.into(), found, expected }.to_string())
+        }
+        Ok(_) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use image::{GrayImage, Luma, Rgb, RgbImage};
+
+    use super::*;
+
+    #[test]
+    fn masks_are_told_from_labels() {
+        let folder = tempfile::tempdir().expect("folder");
+        let of = |name: &str, value: fn(u32, u32) -> u8| {
+            let path = folder.path().join(name);
+            GrayImage::from_fn(40, 30, |x, y| Luma([value(x, y)])).save(&path).expect("save");
+            content(&path).expect("read")
+        };
+        assert_eq!(of("a.png", |x, _| if x < 20 { 0 } else { 255 }), Content::Mask(255));
+        assert!(matches!(of("a.jpg", |x, _| if x < 20 { 0 } else { 255 }), Content::Mask(240..)));
+        assert_eq!(of("b.png", |x, _| u8::from(x < 20)), Content::Mask(1));
+        assert_eq!(of("c.png", |x, _| (x / 10) as u8), Content::Labels);
+        assert_eq!(of("d.png", |x, _| (x / 10 * 80) as u8), Content::Labels);
+        assert_eq!(of("e.png", |_, _| 0), Content::Black);
+        let path = folder.path().join("f.png");
+        RgbImage::from_fn(9, 9, |x, _| Rgb([if x < 3 { 200 } else { 0 }, 0, 0])).save(&path).expect("save");
+        assert_eq!(content(&path).expect("read"), Content::Labels);
+    }
+
+    #[test]
+    fn what_is_black_in_a_mask_of_half_the_size_does_not_count() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("m.png");
+        GrayImage::from_fn(2, 1, |x, _| Luma([if x == 0 { 0 } else { 255 }])).save(&path).expect("save");
+        let photo = Pixels { width: 4, height: 2, channels: 3, data: vec![7; 24] };
+        let alpha: Vec<u8> = apply(photo, &path).expect("read").data.chunks_exact(4).map(|p| p[3]).collect();
+        assert_eq!(alpha, [0, 0, 255, 255, 0, 0, 255, 255]);
+        let folders = |folder: &str| mask_folders(Path::new("/nowhere"), Path::new(folder)).len();
+        assert_eq!(folders("images_2"), 0);
+        let stems: Vec<String> =
+            names(Path::new("masks"), Path::new("a/b.jpg")).iter().map(|p| p.display().to_string()).collect();
+        assert_eq!(stems[..3], ["masks/a/b.jpg.png", "masks/a/b.png", "masks/a/b.jpg"]);
+    }
+}
