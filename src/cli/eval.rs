@@ -11,7 +11,7 @@ use super::{CliError, eval_depth, eval_masks, eval_removal, number, output, tabl
 use crate::jobs::batch::BatchEvaluation;
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::evaluate_masks::Protocol;
-use crate::jobs::{export, open};
+use crate::jobs::export;
 use crate::pipeline::observer::{Evaluation, ViewScore};
 
 /// Measure PSNR and SSIM of a scene on held-out photos

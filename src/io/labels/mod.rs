@@ -220,7 +220,7 @@ pub(crate) fn stem(name: &str) -> String {
 
 /// File names in a folder, sorted; none if there is no such folder.
 fn entries(folder: &Path) -> Vec<String> {
-    files::names_in(folder).unwrap_or_default()
+    crate::io::files::names_in(folder).unwrap_or_default()
 }
 
 #[cfg(test)]

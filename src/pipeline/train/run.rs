@@ -142,7 +142,7 @@ impl<'a> Job<'a> {
         let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
         let (mut secs, mut history) = (0.0, History::default());
         // What was seen in full is not seen coarsely again, where more steps make those for that more.
-        let was_coarse = saved.as_ref().is_none_or(|s| s.header.step < coarse_steps(&s.header.config));
+        let was_coarse = saved.as_ref().is_none_or(|s| s.header.step < coarse::steps(&s.header.config));
         let mut trainer = match saved {
             Some(s) => {
                 let mut t = Trainer::new(s.cloud, config, background, extent, s.header.rng);
