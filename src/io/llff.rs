@@ -25,7 +25,7 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
     if names.len() != rows.len() {
         return Err(IoError::Count {
             path: file,
-            what: format!("photos (the folder {folder} holds another number)"),
+            what: format!("photos ({} holds another number)", root.join(&folder).display()),
             claimed: rows.len() as u64,
             possible: names.len() as u64,
         });

@@ -224,14 +224,14 @@ pub(super) fn place(p: DVec3, element: &'static str, index: usize, path: &Path) 
 }
 
 /// The folder with the photos of a dataset that lists names only: `images`, or else the least
-/// reduced `images_<factor>`. `source` is the file that lists them.
+/// reduced `images_<factor>`, or else the dataset's own (empty). `source` is the file that lists them.
 pub(super) fn photo_folder(root: &Path, source: &Path) -> Result<String, IoError> {
     let mut best: Option<(u32, String)> = None;
     let failed = |cause| IoError::Read { path: root.into(), cause };
     for entry in fs::read_dir(root).map_err(failed)? {
         let entry = entry.map_err(failed)?;
         let Some(name) = entry.file_name().to_str().map(str::to_owned) else { continue };
-        let factor = match name.strip_prefix("images") {
+        let factor = match name.to_lowercase().strip_prefix("images") {
             Some("") => Some(1),
             Some(rest) => rest.strip_prefix('_').and_then(|f| f.parse().ok()).filter(|f| *f > 1),
             None => None,
@@ -240,8 +240,10 @@ pub(super) fn photo_folder(root: &Path, source: &Path) -> Result<String, IoError
             best = Some((factor, name));
         }
     }
+    let of_root = || files::names_in(root).is_ok_and(|names| names.iter().any(|name| photo::is_photo(name)));
     match best {
         Some((_, name)) => Ok(name),
+        None if of_root() => Ok(String::new()),
         None => Err(IoError::syntax(
             source,
             "photos",

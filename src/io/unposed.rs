@@ -9,7 +9,7 @@ const FOLDERS: [&str; 3] = [".", "images", "input"];
 /// From how many on a folder of pictures is taken for photos of a scene.
 const FEWEST: usize = 2;
 /// Endings of files in which other programs keep poses.
-const POSES: [&str; 8] = ["nvm", "out", "sfm", "psx", "xml", "rcproj", "p4d", "db"];
+const POSES: [&str; 7] = ["nvm", "out", "sfm", "psx", "xml", "rcproj", "p4d"];
 /// Names of such files.
 const POSE_FILES: [&str; 5] = ["cameras.json", "sfm_data.json", "reconstruction.json", "images.txt", "images.bin"];
 

@@ -16,7 +16,38 @@ pub(crate) struct PhotoFinder<'a> {
     /// The folder by its real name, and as the system is told of it: lists may name photos by either.
     names: [PathBuf; 2],
     /// What is in each folder that was looked into.
-    folders: Mutex<HashMap<PathBuf, Arc<Vec<String>>>>,
+    folders: Mutex<HashMap<PathBuf, Arc<Listing>>>,
+}
+
+/// The names in a folder, by what they have in common with others.
+#[derive(Default)]
+struct Listing {
+    by_fold: HashMap<String, Vec<String>>,
+    /// Pictures by their folded stems.
+    by_stem: HashMap<String, Vec<String>>,
+}
+
+impl Listing {
+    fn of(folder: &Path) -> Self {
+        let mut listing = Self::default();
+        for name in files::names_in(folder).unwrap_or_default() {
+            if let Some(stem) = photo::stem(&name) {
+                listing.by_stem.entry(fold(stem)).or_default().push(name.clone());
+            }
+            listing.by_fold.entry(fold(&name)).or_default().push(name);
+        }
+        listing
+    }
+
+    /// Names that differ from this one in letter case at most.
+    fn alike(&self, name: &str) -> &[String] {
+        self.by_fold.get(&fold(name)).map_or(&[], Vec::as_slice)
+    }
+
+    /// Pictures whose stem differs from this one in letter case at most.
+    fn of_stem(&self, stem: &str) -> &[String] {
+        self.by_stem.get(&fold(stem)).map_or(&[], Vec::as_slice)
+    }
 }
 
 /// A file that exists.
@@ -119,6 +150,8 @@ impl<'a> PhotoFinder<'a> {
                 "" | "." => {}
                 ".." => away |= parts.pop().is_none(),
                 part if i == 0 && drive(part) => away = true,
+                // Where a drive's letter leads away from anywhere.
+                part if cfg!(windows) && part.contains(':') => away = true,
                 part => parts.push(part.into()),
             }
         }
@@ -137,12 +170,13 @@ impl<'a> PhotoFinder<'a> {
                 at = next;
                 continue;
             }
-            let alike = self.in_folder(&at, |name| fold(name) == fold(part) && at.join(name).is_dir());
+            let listing = self.listing(&at);
+            let alike: Vec<&String> = listing.alike(part).iter().filter(|name| at.join(name).is_dir()).collect();
             match alike.as_slice() {
                 [] => return Walk::Missing,
                 [one] => {
                     at.push(one);
-                    real.push(one.clone());
+                    real.push((*one).clone());
                 }
                 [a, b, ..] => return Walk::several(&real, a, b),
             }
@@ -151,21 +185,26 @@ impl<'a> PhotoFinder<'a> {
         if exact.is_file() {
             return Walk::Found { path: exact, parts: (real != folders).then(|| joined(&real, file)) };
         }
+        let listing = self.listing(&at);
+        let there = |names: &[String]| -> Vec<String> {
+            names.iter().filter(|name| at.join(name).is_file()).cloned().collect()
+        };
         let stem = photo::stem(file);
-        let is_photo = |name: &str| photo::stem(name).is_some() && at.join(name).is_file();
-        // Listed without an ending, which is a convention; then in other letters; then with another ending.
-        let added = self.in_folder(&at, |name| stem.is_none() && photo::stem(name) == Some(file) && is_photo(name));
-        let usual = added.iter().find(|name| name.ends_with(".png")).filter(|_| added.len() > 1);
-        let added = usual.map_or_else(|| added.clone(), |png| vec![png.clone()]);
+        let same_stem = there(listing.of_stem(stem.unwrap_or(file)));
+        let of_stem = |exact: &str| -> Vec<String> {
+            same_stem.iter().filter(|name| photo::stem(name) == Some(exact)).cloned().collect()
+        };
+        // Listed without an ending, which is a convention: that of .png.
+        let mut added: Vec<String> = if stem.is_none() { of_stem(file) } else { Vec::new() };
+        if let Some(png) = added.iter().find(|name| name.ends_with(".png")).cloned() {
+            added = vec![png];
+        }
         if let [one] = added.as_slice() {
             return Walk::Found { path: at.join(one), parts: (real != folders).then(|| joined(&real, one)) };
         }
-        let levels: [&dyn Fn(&str) -> bool; 3] = [
-            &|name| fold(name) == fold(file) && at.join(name).is_file(),
-            &|name| photo::stem(name).is_some_and(|s| stem.is_some_and(|own| s == own)) && is_photo(name),
-            &|name| photo::stem(name).is_some_and(|s| fold(s) == fold(stem.unwrap_or(file))) && is_photo(name),
-        ];
-        for fits in std::iter::once(added).chain(levels.iter().map(|fits| self.in_folder(&at, fits))) {
+        // Then in other letters, then with another ending.
+        let other_ending: Vec<String> = stem.map_or_else(Vec::new, of_stem);
+        for fits in [added, there(listing.alike(file)), other_ending, same_stem.clone()] {
             match fits.as_slice() {
                 [] => {}
                 [one] => return Walk::Found { path: at.join(one), parts: Some(joined(&real, one)) },
@@ -175,13 +214,9 @@ impl<'a> PhotoFinder<'a> {
         Walk::Missing
     }
 
-    /// The names in a folder that fit, sorted.
-    fn in_folder(&self, folder: &Path, fits: impl Fn(&str) -> bool) -> Vec<String> {
+    fn listing(&self, folder: &Path) -> Arc<Listing> {
         let mut known = self.folders.lock().unwrap_or_else(PoisonError::into_inner);
-        let names = known.entry(folder.into()).or_insert_with(|| Arc::new(files::names_in(folder).unwrap_or_default()));
-        let names = Arc::clone(names);
-        drop(known);
-        names.iter().filter(|name| fits(name)).cloned().collect()
+        Arc::clone(known.entry(folder.into()).or_insert_with(|| Arc::new(Listing::of(folder))))
     }
 }
 
