@@ -5,6 +5,7 @@
 mod find;
 mod pose;
 mod tally;
+mod unlisted;
 
 use std::collections::HashMap;
 use std::fs;
@@ -17,10 +18,11 @@ use super::resample::covers;
 use super::{IoError, files, photo};
 use crate::scene::{Camera, CameraError, Distortion, Photo};
 
-pub(super) use find::{FoundFile, PhotoFinder, Search, fold};
+pub(super) use find::{FoundFile, Lookup, PhotoFinder, fold, reduction};
 pub(super) use pose::straightened;
-use tally::Tally;
+use tally::ListTally;
 pub(super) use tally::some_of;
+pub(super) use unlisted::{is_helper, unlisted};
 
 /// Focal lengths as files give them.
 #[derive(Clone, Copy, Debug)]
@@ -78,7 +80,7 @@ enum Fate {
     },
     /// Its pose cannot be used.
     Broken(String, Option<CameraError>),
-    Unfound(Search),
+    Unfound(Lookup),
 }
 
 /// The listed photos that exist and have a pose, sorted by name, with warnings that count the others.
@@ -93,7 +95,7 @@ pub(super) fn photos(
     listed.iter().try_for_each(|l| files::photo_name(&l.entry, source))?;
     let finder = PhotoFinder::new(root)?;
     let fates: Vec<Result<Fate, IoError>> = listed.par_iter().map(|l| fate(l, &finder, source)).collect();
-    let mut tally = Tally { listed: listed.len(), ..Tally::default() };
+    let mut tally = ListTally { listed: listed.len(), ..ListTally::default() };
     let mut found = Vec::new();
     let mut first_cause = None;
     for (l, fate) in listed.iter().zip(fates) {
@@ -103,8 +105,8 @@ pub(super) fn photos(
                 first_cause = first_cause.or(cause.map(|cause| (l.entry.clone(), cause)));
                 tally.broken.push((l.listed_as(), why));
             }
-            Fate::Unfound(Search::Outside) => tally.outside.push(l.entry.clone()),
-            Fate::Unfound(Search::Several(two)) => tally.several.push((l.listed_as(), two)),
+            Fate::Unfound(Lookup::Outside) => tally.outside.push(l.entry.clone()),
+            Fate::Unfound(Lookup::Several(two)) => tally.several.push((l.listed_as(), two)),
             Fate::Unfound(_) => tally.missing.push(l.listed_as()),
         }
     }
@@ -172,7 +174,7 @@ fn fate(l: &ListedPhoto, finder: &PhotoFinder<'_>, source: &Path) -> Result<Fate
         Err(cause) => return unusable(cause),
     };
     let file = match finder.find(&l.folder, &l.entry) {
-        Search::Found(file) => file,
+        Lookup::Found(file) => file,
         other => return Ok(Fate::Unfound(other)),
     };
     let found = photo::size(&file.path)?;

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use super::Image;
-use crate::io::photo_list::{self, PhotoFinder, Search};
+use crate::io::photo_list::{self, Lookup, PhotoFinder, reduction};
 use crate::io::{IoError, files};
 
 /// How many of the names are looked for in each folder.
@@ -54,7 +54,7 @@ fn best(root: &Path, folders: &[String], names: &[&str]) -> Result<Option<String
     let finder = PhotoFinder::new(root)?;
     let mut best: Option<(usize, &String)> = None;
     for folder in folders {
-        let there = names.iter().filter(|name| matches!(finder.find(folder, name), Search::Found(_))).count();
+        let there = names.iter().filter(|name| matches!(finder.find(folder, name), Lookup::Found(_))).count();
         if there > best.map_or(0, |(most, _)| most) {
             best = Some((there, folder));
         }
@@ -95,11 +95,6 @@ fn near(root: &Path, model: &Path) -> Vec<String> {
         add("");
     }
     all
-}
-
-/// The factor of a folder `images_<factor>`.
-fn reduction(name: &str) -> Option<u32> {
-    name.strip_prefix("images_")?.parse().ok().filter(|factor| *factor > 1)
 }
 
 /// Folders in a folder, those least deep first.

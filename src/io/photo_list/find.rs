@@ -25,6 +25,8 @@ struct Listing {
     by_fold: HashMap<String, Vec<String>>,
     /// Pictures by their folded stems.
     by_stem: HashMap<String, Vec<String>>,
+    /// Folders `images_<factor>`, the least reduced first.
+    reduced: Vec<String>,
 }
 
 impl Listing {
@@ -34,8 +36,12 @@ impl Listing {
             if let Some(stem) = photo::stem(&name) {
                 listing.by_stem.entry(fold(stem)).or_default().push(name.clone());
             }
+            if reduction(&name).is_some() && folder.join(&name).is_dir() {
+                listing.reduced.push(name.clone());
+            }
             listing.by_fold.entry(fold(&name)).or_default().push(name);
         }
+        listing.reduced.sort_by_key(|name| reduction(name));
         listing
     }
 
@@ -64,7 +70,7 @@ pub(crate) struct FoundFile {
 
 /// What came of looking for a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Search {
+pub(crate) enum Lookup {
     Found(FoundFile),
     /// These two fit alike.
     Several([String; 2]),
@@ -97,9 +103,9 @@ impl<'a> PhotoFinder<'a> {
     }
 
     /// Looks for `entry` in the folder `below` the data set's; `below` is empty for that itself.
-    pub(crate) fn find(&self, below: &str, entry: &str) -> Search {
+    pub(crate) fn find(&self, below: &str, entry: &str) -> Lookup {
         if entry.contains('\0') {
-            return Search::Outside;
+            return Lookup::Outside;
         }
         let base = if below.is_empty() { self.root.to_path_buf() } else { self.root.join(below) };
         // Where a backslash is a letter like others.
@@ -112,7 +118,7 @@ impl<'a> PhotoFinder<'a> {
         }
         let Parts { parts, away } = self.parts(entry);
         if parts.is_empty() {
-            return Search::Outside;
+            return Lookup::Outside;
         }
         // Then the end of the path, the longest first: the folder was called otherwise, or lay elsewhere.
         for first in 0..parts.len() {
@@ -126,16 +132,16 @@ impl<'a> PhotoFinder<'a> {
                     });
                     return self.found(path, name, called);
                 }
-                Walk::Several(two) => return Search::Several(two),
+                Walk::Several(two) => return Lookup::Several(two),
                 Walk::Missing => {}
             }
         }
-        if away { Search::Outside } else { Search::Missing }
+        if away { Lookup::Outside } else { Lookup::Missing }
     }
 
-    fn found(&self, path: PathBuf, name: String, called: Option<String>) -> Search {
+    fn found(&self, path: PathBuf, name: String, called: Option<String>) -> Lookup {
         let linked = fs::canonicalize(&path).is_ok_and(|real| !real.starts_with(&self.names[0]));
-        Search::Found(FoundFile { path, name, called, linked })
+        Lookup::Found(FoundFile { path, name, called, linked })
     }
 
     /// A path taken apart, whatever system wrote it.
@@ -172,7 +178,10 @@ impl<'a> PhotoFinder<'a> {
             }
             let listing = self.listing(&at);
             let alike: Vec<&String> = listing.alike(part).iter().filter(|name| at.join(name).is_dir()).collect();
-            match alike.as_slice() {
+            // A data set that was handed around with reduced photos only.
+            let reduced = listing.reduced.iter().filter(|_| alike.is_empty() && fold(part) == "images");
+            let reduced: Vec<&String> = reduced.take(1).collect();
+            match if alike.is_empty() { reduced.as_slice() } else { alike.as_slice() } {
                 [] => return Walk::Missing,
                 [one] => {
                     at.push(one);
@@ -237,6 +246,11 @@ fn joined(folders: &[String], file: &str) -> String {
     folders.iter().map(String::as_str).chain([file]).collect::<Vec<_>>().join("/")
 }
 
+/// The factor of a folder `images_<factor>`.
+pub(crate) fn reduction(name: &str) -> Option<u32> {
+    name.strip_prefix("images_")?.parse().ok().filter(|factor| *factor > 1)
+}
+
 /// A name without what systems differ in: letter case, and how accents are composed.
 pub(crate) fn fold(name: &str) -> String {
     name.nfc().collect::<String>().to_lowercase()
@@ -257,8 +271,8 @@ mod tests {
     }
 
     /// Name and what it is called otherwise of a file that is found.
-    fn of(search: Search) -> (String, Option<String>) {
-        let Search::Found(file) = search else { panic!("{search:?}") };
+    fn of(search: Lookup) -> (String, Option<String>) {
+        let Lookup::Found(file) = search else { panic!("{search:?}") };
         (file.name, file.called)
     }
 
@@ -288,7 +302,7 @@ mod tests {
         }
         assert_eq!(of(finder.find("images", "A.jpg")), ("A.jpg".into(), Some("images/a.jpg".into())));
         assert_eq!(of(finder.find("images", "x/y/c.png")), ("c.png".into(), Some("images/c.png".into())));
-        assert_eq!(finder.find("", "x.png"), Search::Missing, "what systems leave is no photo");
+        assert_eq!(finder.find("", "x.png"), Lookup::Missing, "what systems leave is no photo");
     }
 
     #[test]
@@ -299,15 +313,15 @@ mod tests {
         let root = outer.path().join("scene");
         let finder = PhotoFinder::new(&root).expect("folder");
         for entry in ["../secret.png", "images/../../secret.png", "/etc/passwd", "..\\secret.png", "", ".", "a\0b"] {
-            assert_eq!(finder.find("", entry), Search::Outside, "{entry:?}");
+            assert_eq!(finder.find("", entry), Lookup::Outside, "{entry:?}");
         }
         let absolute = outer.path().join("secret.png").to_string_lossy().into_owned();
-        assert_eq!(finder.find("", &absolute), Search::Outside);
-        assert_eq!(finder.find("", "images/none.png"), Search::Missing);
+        assert_eq!(finder.find("", &absolute), Lookup::Outside);
+        assert_eq!(finder.find("", "images/none.png"), Lookup::Missing);
         for (entry, a, b) in
             [("images/b.jpg", "images/B.jpg", "images/b.JPG"), ("images/d.png", "images/d.jpg", "images/d.webp")]
         {
-            assert_eq!(finder.find("", entry), Search::Several([a.into(), b.into()]), "{entry}");
+            assert_eq!(finder.find("", entry), Lookup::Several([a.into(), b.into()]), "{entry}");
         }
         assert_eq!(of(finder.find("", "images/B.jpg")).1, None, "the control: exact");
     }
@@ -321,7 +335,7 @@ mod tests {
         std::os::unix::fs::symlink("own/b.png", root.join("c.png")).expect("link");
         let finder = PhotoFinder::new(&root).expect("folder");
         for (entry, is_linked) in [("images/a.png", true), ("c.png", false), ("own/b.png", false)] {
-            let Search::Found(file) = finder.find("", entry) else { panic!("{entry}") };
+            let Lookup::Found(file) = finder.find("", entry) else { panic!("{entry}") };
             assert_eq!((file.linked, file.called), (is_linked, None), "{entry}");
         }
         // By another name the same folder is the same.
