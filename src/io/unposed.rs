@@ -27,6 +27,12 @@ pub struct Unposed {
 }
 
 impl Unposed {
+    /// With one more sentence on what lies beside.
+    pub(super) fn with(self, sentence: Option<String>) -> Self {
+        let all: Vec<String> = sentence.into_iter().chain(Some(self.beside).filter(|b| !b.is_empty())).collect();
+        Self { beside: all.join(". "), ..self }
+    }
+
     /// What lies beside, in brackets after a sentence.
     pub(super) fn in_brackets(&self) -> String {
         if self.beside.is_empty() { String::new() } else { format!(" ({})", self.beside) }

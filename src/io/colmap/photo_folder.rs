@@ -27,7 +27,8 @@ pub(super) struct PhotoFolder {
 /// `source` is the file that lists them.
 pub(super) fn find(root: &Path, model: &Path, images: &[Image], source: &Path) -> Result<PhotoFolder, IoError> {
     let names: Vec<&str> = sample(images);
-    if let Some(below) = best(root, &near(root, model), &names)?.or(best(root, &anywhere(root), &names)?) {
+    let usual = best(root, &near(root, model), &names)?;
+    if let Some(below) = usual.map_or_else(|| best(root, &anywhere(root), &names), |below| Ok(Some(below)))? {
         return Ok(PhotoFolder { root: root.into(), below });
     }
     let whole = std::path::absolute(root).unwrap_or_else(|_| root.into());
