@@ -102,7 +102,8 @@ fn all_in_one_folder_is_a_data_set_too() {
 #[test]
 fn data_sets_in_a_folder_are_not_the_folders() {
     let Some(set) = Copy::of("13_realityscan_flat") else { return };
-    for name in fs::read_dir(set.path()).expect("list").flatten().map(|e| e.file_name()) {
+    let names: Vec<_> = fs::read_dir(set.path()).expect("list").flatten().map(|e| e.file_name()).collect();
+    for name in names {
         let name = name.to_str().expect("a name").to_owned();
         set.rename(&name, &format!("one/{name}"));
     }
