@@ -94,7 +94,8 @@ impl Policy {
     /// If it is no policy: broken TOML, or names of tools that are not there.
     pub fn parse(text: &str, place: &str) -> Result<Self, PolicyError> {
         let wrong = |problem: String| PolicyError::Wrong { place: place.to_owned(), problem };
-        let policy: Self = toml::from_str(text).map_err(|e| wrong(e.to_string()))?;
+        let policy: Self =
+            toml::from_str(text.strip_prefix('\u{feff}').unwrap_or(text)).map_err(|e| wrong(e.to_string()))?;
         let tools = &policy.tools;
         let lists = [&tools.allowed, &tools.confirm, &tools.confirm_overwrite, &tools.forbidden];
         if let Some(stranger) = lists.into_iter().flatten().find(|t| !NAMES.contains(&t.as_str())) {

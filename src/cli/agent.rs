@@ -249,7 +249,8 @@ impl<R: BufRead> Requests<R> {
         if self.line > MAX_REQUESTS {
             return Err(bad(format!("a conversation has at most {MAX_REQUESTS} requests; start another")));
         }
-        String::from_utf8(bytes).map(Some).map_err(|_| bad("it is not UTF-8 text".into()))
+        let text = String::from_utf8(bytes).map_err(|_| bad("it is not UTF-8 text".into()))?;
+        Ok(Some(text.strip_prefix('\u{feff}').map_or_else(|| text.clone(), str::to_owned)))
     }
 }
 

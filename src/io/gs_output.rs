@@ -45,6 +45,10 @@ struct Entry {
 
 /// The splat of a folder that 3D Gaussian Splatting wrote: that of the latest iteration.
 pub(crate) fn latest(folder: &Path) -> Option<PathBuf> {
+    let is_iteration = folder.file_name().is_some_and(|name| name.to_string_lossy().starts_with("iteration_"));
+    if is_iteration && folder.join(CLOUD).is_file() {
+        return Some(folder.join(CLOUD));
+    }
     let clouds = folder.join(CLOUDS);
     let names = files::names_in(&clouds).ok()?;
     let iteration = |name: &String| name.strip_prefix("iteration_")?.parse::<u64>().ok();

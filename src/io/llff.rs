@@ -8,7 +8,7 @@ use std::path::Path;
 
 use glam::{DMat3, DVec2, DVec3};
 
-use super::photo_list::{self, Focal, Lens, ListedPhoto, photos};
+use super::photo_list::{self, Focal, Lens, ListedPhoto, is_helper, photos};
 use super::{IoError, files, npy, photo};
 use crate::scene::{Camera, Dataset, Distortion};
 
@@ -25,7 +25,7 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
     if names.len() != rows.len() {
         return Err(IoError::Count {
             path: file,
-            what: format!("photos (the folder {folder} holds another number)"),
+            what: format!("photos ({} holds another number)", root.join(&folder).display()),
             claimed: rows.len() as u64,
             possible: names.len() as u64,
         });
@@ -58,11 +58,6 @@ pub fn poses(bytes: &[u8], path: &Path) -> Result<Vec<[f64; ROW]>, IoError> {
 }
 
 const ROW_U64: u64 = ROW as u64;
-
-/// Whether this is one of SPIn-NeRF's pictures that are neither photo nor mask.
-pub(super) fn is_helper(name: &str) -> bool {
-    name.contains("cutout") || name.contains("pseudo")
-}
 
 /// The photos in a folder, sorted; SPIn-NeRF's helper pictures are left out.
 pub(super) fn names(folder: &Path) -> Result<Vec<String>, IoError> {

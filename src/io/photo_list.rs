@@ -5,6 +5,7 @@
 mod find;
 mod pose;
 mod tally;
+mod unlisted;
 
 use std::collections::HashMap;
 use std::fs;
@@ -17,10 +18,11 @@ use super::resample::covers;
 use super::{IoError, files, lenses, photo, pixel_masks};
 use crate::scene::{Camera, CameraError, Distortion, Photo};
 
-pub(super) use find::{FoundFile, PhotoFinder, Search, fold};
+pub(super) use find::{FoundFile, Lookup, PhotoFinder, fold, reduction};
 pub(super) use pose::straightened;
-use tally::Tally;
+use tally::ListTally;
 pub(super) use tally::some_of;
+pub(super) use unlisted::{is_helper, unlisted};
 
 /// Focal lengths as files give them.
 #[derive(Clone, Copy, Debug)]
@@ -80,7 +82,7 @@ enum Fate {
     },
     /// Its pose cannot be used.
     Broken(String, Option<CameraError>),
-    Unfound(Search),
+    Unfound(Lookup),
 }
 
 /// The listed photos that exist and have a pose, sorted by name, with warnings that count the others.
@@ -95,7 +97,7 @@ pub(super) fn photos(
     listed.iter().try_for_each(|l| files::photo_name(&l.entry, source))?;
     let finder = PhotoFinder::new(root)?;
     let fates: Vec<Result<Fate, IoError>> = listed.par_iter().map(|l| fate(l, &finder, source)).collect();
-    let mut tally = Tally { listed: listed.len(), ..Tally::default() };
+    let mut tally = ListTally { listed: listed.len(), ..ListTally::default() };
     let mut found = Vec::new();
     let mut first_cause = None;
     for (l, fate) in listed.iter().zip(fates) {
@@ -105,8 +107,8 @@ pub(super) fn photos(
                 first_cause = first_cause.or(cause.map(|cause| (l.entry.clone(), cause)));
                 tally.broken.push((l.listed_as(), why));
             }
-            Fate::Unfound(Search::Outside) => tally.outside.push(l.entry.clone()),
-            Fate::Unfound(Search::Several(two)) => tally.several.push((l.listed_as(), two)),
+            Fate::Unfound(Lookup::Outside) => tally.outside.push(l.entry.clone()),
+            Fate::Unfound(Lookup::Several(two)) => tally.several.push((l.listed_as(), two)),
             Fate::Unfound(_) => tally.missing.push(l.listed_as()),
         }
     }
@@ -178,7 +180,7 @@ fn fate(l: &ListedPhoto, finder: &PhotoFinder<'_>, source: &Path) -> Result<Fate
         Err(cause) => return unusable(cause),
     };
     let file = match finder.find(&l.folder, &l.entry) {
-        Search::Found(file) => file,
+        Lookup::Found(file) => file,
         other => return Ok(Fate::Unfound(other)),
     };
     let found = photo::size(&file.path)?;
@@ -235,14 +237,14 @@ pub(super) fn place(p: DVec3, element: &'static str, index: usize, path: &Path) 
 }
 
 /// The folder with the photos of a dataset that lists names only: `images`, or else the least
-/// reduced `images_<factor>`. `source` is the file that lists them.
+/// reduced `images_<factor>`, or else the dataset's own (empty). `source` is the file that lists them.
 pub(super) fn photo_folder(root: &Path, source: &Path) -> Result<String, IoError> {
     let mut best: Option<(u32, String)> = None;
     let failed = |cause| IoError::Read { path: root.into(), cause };
     for entry in fs::read_dir(root).map_err(failed)? {
         let entry = entry.map_err(failed)?;
         let Some(name) = entry.file_name().to_str().map(str::to_owned) else { continue };
-        let factor = match name.strip_prefix("images") {
+        let factor = match name.to_lowercase().strip_prefix("images") {
             Some("") => Some(1),
             Some(rest) => rest.strip_prefix('_').and_then(|f| f.parse().ok()).filter(|f| *f > 1),
             None => None,
@@ -251,8 +253,10 @@ pub(super) fn photo_folder(root: &Path, source: &Path) -> Result<String, IoError
             best = Some((factor, name));
         }
     }
+    let of_root = || files::names_in(root).is_ok_and(|names| names.iter().any(|name| photo::is_photo(name)));
     match best {
         Some((_, name)) => Ok(name),
+        None if of_root() => Ok(String::new()),
         None => Err(IoError::syntax(
             source,
             "photos",

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::photo_list::{PhotoFinder, Search, is_scaled};
+use super::photo_list::{Lookup, PhotoFinder, is_scaled};
 use super::resample::Pixels;
 use super::{IoError, files, photo};
 use crate::math::resize::nearest;
@@ -111,9 +111,9 @@ pub(super) fn listed(
     size_px: (u32, u32),
 ) -> Result<Option<PathBuf>, IoError> {
     let path = match finder.find("", entry) {
-        Search::Found(found) => found.path,
-        Search::Missing | Search::Several(_) => return Ok(None),
-        Search::Outside => {
+        Lookup::Found(found) => found.path,
+        Lookup::Missing | Lookup::Several(_) => return Ok(None),
+        Lookup::Outside => {
             let folder = files::folder_of(source).into();
             return Err(IoError::Outside { path: source.into(), entry: entry.into(), folder });
         }

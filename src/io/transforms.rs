@@ -14,7 +14,7 @@ use serde::Deserialize;
 pub use blender::read_blender;
 use matrix::{Matrix, pose};
 
-use super::photo_list::{Focal, Lens, ListedPhoto, PhotoFinder, Search, photos};
+use super::photo_list::{Focal, Lens, ListedPhoto, Lookup, PhotoFinder, photos, unlisted};
 use super::splits::Splits;
 use super::{IoError, files, lenses, points_ply};
 use crate::scene::{Camera, Dataset, Distortion, Projection, text};
@@ -100,19 +100,20 @@ pub fn read(file: &Path) -> Result<Dataset, IoError> {
     };
     splits.apply(&mut listed, &finder, &mut warnings);
     let photos = photos(listed, root, file, &mut warnings)?;
+    warnings.extend(unlisted(&photos, parsed.frames.iter().map(|frame| &*frame.file_path), root));
     let points = match &parsed.ply_file_path {
         None => points_ply::beside(root).map(|path| points_ply::read(&path)).transpose()?.unwrap_or_default(),
         Some(entry) => match finder.find("", entry) {
-            Search::Found(found) => {
+            Lookup::Found(found) => {
                 if let Some(called) = found.called {
                     warnings.push(format!("the sparse points {entry} were found as {called}"));
                 }
                 points_ply::read(&found.path)?
             }
-            Search::Outside => {
+            Lookup::Outside => {
                 return Err(IoError::Outside { path: file.into(), entry: entry.clone(), folder: root.into() });
             }
-            Search::Missing | Search::Several(_) => {
+            Lookup::Missing | Lookup::Several(_) => {
                 warnings.push(format!("the sparse points {entry} are missing; training starts where the photos agree"));
                 Vec::new()
             }

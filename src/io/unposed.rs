@@ -9,7 +9,7 @@ const FOLDERS: [&str; 3] = [".", "images", "input"];
 /// From how many on a folder of pictures is taken for photos of a scene.
 const FEWEST: usize = 2;
 /// Endings of files in which other programs keep poses.
-const POSES: [&str; 8] = ["nvm", "out", "sfm", "psx", "xml", "rcproj", "p4d", "db"];
+const POSES: [&str; 7] = ["nvm", "out", "sfm", "psx", "xml", "rcproj", "p4d"];
 /// Names of such files.
 const POSE_FILES: [&str; 5] = ["cameras.json", "sfm_data.json", "reconstruction.json", "images.txt", "images.bin"];
 
@@ -27,6 +27,12 @@ pub struct Unposed {
 }
 
 impl Unposed {
+    /// With one more sentence on what lies beside.
+    pub(super) fn with(self, sentence: Option<String>) -> Self {
+        let all: Vec<String> = sentence.into_iter().chain(Some(self.beside).filter(|b| !b.is_empty())).collect();
+        Self { beside: all.join(". "), ..self }
+    }
+
     /// What lies beside, in brackets after a sentence.
     pub(super) fn in_brackets(&self) -> String {
         if self.beside.is_empty() { String::new() } else { format!(" ({})", self.beside) }

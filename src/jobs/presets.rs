@@ -24,7 +24,8 @@ pub(crate) fn text(config: &TrainConfig) -> String {
 pub(crate) fn read(path: &Path) -> Result<TrainConfig, IoError> {
     let bytes = files::read(path, MAX_BYTES)?;
     let broken = |place: &str, reason: String| IoError::Syntax { path: path.into(), place: place.into(), reason };
-    let text = std::str::from_utf8(&bytes).map_err(|e| broken("the text", e.to_string()))?;
+    let text =
+        std::str::from_utf8(files::without_mark(&bytes, path)?).map_err(|e| broken("the text", e.to_string()))?;
     let table: toml::Table = toml::from_str(text).map_err(|e| broken("the settings", e.to_string()))?;
     let known = fields(&TrainConfig::default());
     if let Some(name) = table.keys().find(|name| !known.contains_key(*name)) {

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use super::{Image, binary, text};
-use crate::io::{IoError, files};
+use crate::io::{IoError, files, photo};
 
 /// Where a reconstruction may lie relative to a dataset's folder, the most likely first; in these also each in a folder
 /// of its own. Of two with as many photos the first is taken: that of undistorted photos comes before the other.
@@ -96,11 +96,18 @@ fn models(root: &Path) -> Vec<Model> {
         for folder in folders {
             // `sparse` of the dataset is also a folder in it.
             let is_new = |model: &Model| found.iter().all(|other| other.folder != model.folder);
-            let model = Model::at(&folder, place).filter(is_new);
+            // A folder with photos of its own is another dataset.
+            let is_here = |model: &Model| !name.is_empty() || model.folder == root || !has_photos(&model.folder);
+            let model = Model::at(&folder, place).filter(|model| is_new(model) && is_here(model));
             found.extend(model);
         }
     }
     found
+}
+
+fn has_photos(folder: &Path) -> bool {
+    let is_photo = |name: &String| photo::is_photo(name) || name.eq_ignore_ascii_case("images");
+    files::names_in(folder).is_ok_and(|names| names.iter().any(is_photo))
 }
 
 /// The reconstruction that is taken.

@@ -9,16 +9,16 @@ mod lens;
 mod photo_folder;
 mod text;
 
-use std::collections::{BTreeMap, HashMap, HashSet};
+use std::collections::HashMap;
 use std::path::Path;
 
 use glam::{DMat3, DVec3};
 
-use super::photo_list::{ListedPhoto, PhotoFinder, photos, some_of};
+use super::photo_list::{ListedPhoto, PhotoFinder, photos, some_of, unlisted};
 use super::splits::Splits;
-use super::{IoError, files, lenses, llff, photo, photo_list, points_ply};
+use super::{IoError, files, lenses, photo_list, points_ply};
 use crate::math::rotation::matrix_from_quaternion;
-use crate::scene::{Dataset, Photo, SparsePoint};
+use crate::scene::{Dataset, SparsePoint};
 use find::{Largest, Model};
 
 pub use binary::{check_cameras, check_images, check_points};
@@ -68,7 +68,7 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
     let mut listed = lenses::readable(listed, &model.file("cameras"), &mut warnings)?;
     Splits::beside(&[&model.folder, root])?.apply(&mut listed, &PhotoFinder::new(root)?, &mut warnings);
     let photos = photos(listed, root, &images_file, &mut warnings)?;
-    warnings.extend(without_pose(&photos, &images, root));
+    warnings.extend(unlisted(&photos, images.iter().map(|image| &*image.name), root));
     let points = points(&model)?;
     if points.is_empty() {
         warnings.push("the reconstruction has no sparse points; training starts where the photos agree".into());
@@ -112,37 +112,6 @@ fn points(model: &Model) -> Result<Vec<SparsePoint>, IoError> {
         Some(ply) => points_ply::read(&ply),
         None => Ok(points),
     }
-}
-
-/// A warning that counts the photos that lie beside those of the reconstruction and have no pose, if there are any.
-fn without_pose(photos: &[Photo], images: &[Image], root: &Path) -> Option<String> {
-    let mut folders: BTreeMap<&Path, HashSet<&str>> = BTreeMap::new();
-    for photo in photos {
-        let name = photo.path.file_name()?.to_str()?;
-        folders.entry(photo.path.parent()?).or_default().insert(name);
-    }
-    // Those that were left out for another reason are told already.
-    let known: HashSet<String> = images.iter().map(|image| photo_list::fold(end(&image.name))).collect();
-    let mut all = 0;
-    let mut rest = Vec::new();
-    for (folder, used) in folders {
-        for name in files::names_in(folder).unwrap_or_default() {
-            let of_another = photo::stem(&name).is_some_and(|stem| used.contains(stem)) || llff::is_helper(&name);
-            if (photo::is_photo(&name) || photo::is_unread(&name)) && !of_another {
-                all += 1;
-                if !used.contains(&*name) && !known.contains(&photo_list::fold(&name)) {
-                    rest.push(folder.join(name).strip_prefix(root).ok()?.display().to_string());
-                }
-            }
-        }
-    }
-    let shown = some_of(&rest, ", ");
-    let n = rest.len();
-    (n > 0).then(|| format!("{n} of {all} photos have no pose in the reconstruction and were left out: {shown}"))
-}
-
-fn end(name: &str) -> &str {
-    name.rsplit(['/', '\\']).next().unwrap_or(name)
 }
 
 /// A photo, or the name of its camera's model if that is not supported.

@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 
 use super::Image;
-use crate::io::photo_list::{self, PhotoFinder, Search};
+use crate::io::photo_list::{self, Lookup, PhotoFinder, reduction};
 use crate::io::{IoError, files};
 
 /// How many of the names are looked for in each folder.
@@ -27,7 +27,8 @@ pub(super) struct PhotoFolder {
 /// `source` is the file that lists them.
 pub(super) fn find(root: &Path, model: &Path, images: &[Image], source: &Path) -> Result<PhotoFolder, IoError> {
     let names: Vec<&str> = sample(images);
-    if let Some(below) = best(root, &near(root, model), &names)?.or(best(root, &anywhere(root), &names)?) {
+    let usual = best(root, &near(root, model), &names)?;
+    if let Some(below) = usual.map_or_else(|| best(root, &anywhere(root), &names), |below| Ok(Some(below)))? {
         return Ok(PhotoFolder { root: root.into(), below });
     }
     let whole = std::path::absolute(root).unwrap_or_else(|_| root.into());
@@ -54,7 +55,7 @@ fn best(root: &Path, folders: &[String], names: &[&str]) -> Result<Option<String
     let finder = PhotoFinder::new(root)?;
     let mut best: Option<(usize, &String)> = None;
     for folder in folders {
-        let there = names.iter().filter(|name| matches!(finder.find(folder, name), Search::Found(_))).count();
+        let there = names.iter().filter(|name| matches!(finder.find(folder, name), Lookup::Found(_))).count();
         if there > best.map_or(0, |(most, _)| most) {
             best = Some((there, folder));
         }
@@ -95,11 +96,6 @@ fn near(root: &Path, model: &Path) -> Vec<String> {
         add("");
     }
     all
-}
-
-/// The factor of a folder `images_<factor>`.
-fn reduction(name: &str) -> Option<u32> {
-    name.strip_prefix("images_")?.parse().ok().filter(|factor| *factor > 1)
 }
 
 /// Folders in a folder, those least deep first.

@@ -6,7 +6,7 @@ use glam::{DQuat, DVec2};
 use image::RgbImage;
 
 use super::*;
-use crate::scene::Distortion;
+use crate::scene::{CameraError, Distortion};
 
 /// A camera at (1, 2, 3) that looks along +y with +z up.
 fn world_from_camera() -> DMat3 {

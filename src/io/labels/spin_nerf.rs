@@ -7,7 +7,7 @@ use std::path::Path;
 use super::entries;
 use super::pictures::{Pictures, png_stem};
 use crate::io::IoError;
-use crate::io::llff::is_helper;
+use crate::io::photo_list::is_helper;
 use crate::scene::Level;
 
 /// The masks of the dataset in `root`, or in the folder `label` itself; those of the least reduced

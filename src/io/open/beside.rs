@@ -31,15 +31,23 @@ pub(super) fn other_list(folder: &Path) -> Result<Option<Dataset>, IoError> {
 /// The data set beside or above a folder of photos, if its photos lie in that folder.
 ///
 /// # Errors
-/// If there is one that cannot be read.
-pub(super) fn of_photos(folder: &Path) -> Result<Option<Dataset>, IoError> {
+/// If there is one that cannot be read: a sentence about it.
+pub(super) fn of_photos(folder: &Path) -> Result<Option<Dataset>, String> {
     let Ok(real) = fs::canonicalize(folder) else { return Ok(None) };
+    let mut broken = None;
     // By its own name first: a link to photos elsewhere lies beside the poses, what it leads to does not.
     let named = std::path::absolute(folder).unwrap_or_else(|_| real.clone());
     let mut above: Vec<PathBuf> = [&named, &real].into_iter().filter_map(|p| Some(p.parent()?.to_path_buf())).collect();
     above.dedup();
     for root in above {
-        let Some(mut dataset) = read(&root).transpose()? else { continue };
+        let mut dataset = match read(&root) {
+            None => continue,
+            Some(Ok(dataset)) => dataset,
+            Some(Err(e)) => {
+                broken.get_or_insert(format!("{} holds poses that cannot be read: {e}", root.display()));
+                continue;
+            }
+        };
         let is_here = |path: &Path| fs::canonicalize(path).is_ok_and(|path| path.starts_with(&real));
         if dataset.photos.iter().any(|photo| is_here(&photo.path)) {
             let text = format!("the poses of the photos in {} are those of {}", folder.display(), root.display());
@@ -47,7 +55,7 @@ pub(super) fn of_photos(folder: &Path) -> Result<Option<Dataset>, IoError> {
             return Ok(Some(dataset));
         }
     }
-    Ok(None)
+    broken.map_or(Ok(None), Err)
 }
 
 fn read(root: &Path) -> Option<Result<Dataset, IoError>> {

@@ -128,13 +128,12 @@ fn open_folder(path: &Path, axes: Option<Axes>) -> Result<Opened> {
         return Ok(Opened::Dataset(dataset));
     }
     let photos = unposed::find(path);
-    if !matches!(photos, Ok(None))
-        && let Some(dataset) = beside::of_photos(path)?
-    {
+    let beside = if matches!(photos, Ok(None)) { Ok(None) } else { beside::of_photos(path) };
+    if let Ok(Some(dataset)) = beside {
         return Ok(Opened::Dataset(dataset));
     }
     if let Some(photos) = photos? {
-        return Err(OpenError::NoPoses(Box::new(photos)));
+        return Err(OpenError::NoPoses(Box::new(photos.with(beside.err()))));
     }
     Err(OpenError::Unrecognized {
         path: path.into(),

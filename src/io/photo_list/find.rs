@@ -16,7 +16,44 @@ pub(crate) struct PhotoFinder<'a> {
     /// The folder by its real name, and as the system is told of it: lists may name photos by either.
     names: [PathBuf; 2],
     /// What is in each folder that was looked into.
-    folders: Mutex<HashMap<PathBuf, Arc<Vec<String>>>>,
+    folders: Mutex<HashMap<PathBuf, Arc<Listing>>>,
+}
+
+/// The names in a folder, by what they have in common with others.
+#[derive(Default)]
+struct Listing {
+    by_fold: HashMap<String, Vec<String>>,
+    /// Pictures by their folded stems.
+    by_stem: HashMap<String, Vec<String>>,
+    /// Folders `images_<factor>`, the least reduced first.
+    reduced: Vec<String>,
+}
+
+impl Listing {
+    fn of(folder: &Path) -> Self {
+        let mut listing = Self::default();
+        for name in files::names_in(folder).unwrap_or_default() {
+            if let Some(stem) = photo::stem(&name) {
+                listing.by_stem.entry(fold(stem)).or_default().push(name.clone());
+            }
+            if reduction(&name).is_some() && folder.join(&name).is_dir() {
+                listing.reduced.push(name.clone());
+            }
+            listing.by_fold.entry(fold(&name)).or_default().push(name);
+        }
+        listing.reduced.sort_by_key(|name| reduction(name));
+        listing
+    }
+
+    /// Names that differ from this one in letter case at most.
+    fn alike(&self, name: &str) -> &[String] {
+        self.by_fold.get(&fold(name)).map_or(&[], Vec::as_slice)
+    }
+
+    /// Pictures whose stem differs from this one in letter case at most.
+    fn of_stem(&self, stem: &str) -> &[String] {
+        self.by_stem.get(&fold(stem)).map_or(&[], Vec::as_slice)
+    }
 }
 
 /// A file that exists.
@@ -33,7 +70,7 @@ pub(crate) struct FoundFile {
 
 /// What came of looking for a file.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) enum Search {
+pub(crate) enum Lookup {
     Found(FoundFile),
     /// These two fit alike.
     Several([String; 2]),
@@ -66,9 +103,9 @@ impl<'a> PhotoFinder<'a> {
     }
 
     /// Looks for `entry` in the folder `below` the data set's; `below` is empty for that itself.
-    pub(crate) fn find(&self, below: &str, entry: &str) -> Search {
+    pub(crate) fn find(&self, below: &str, entry: &str) -> Lookup {
         if entry.contains('\0') {
-            return Search::Outside;
+            return Lookup::Outside;
         }
         let base = if below.is_empty() { self.root.to_path_buf() } else { self.root.join(below) };
         // Where a backslash is a letter like others.
@@ -81,7 +118,7 @@ impl<'a> PhotoFinder<'a> {
         }
         let Parts { parts, away } = self.parts(entry);
         if parts.is_empty() {
-            return Search::Outside;
+            return Lookup::Outside;
         }
         // Then the end of the path, the longest first: the folder was called otherwise, or lay elsewhere.
         for first in 0..parts.len() {
@@ -95,16 +132,16 @@ impl<'a> PhotoFinder<'a> {
                     });
                     return self.found(path, name, called);
                 }
-                Walk::Several(two) => return Search::Several(two),
+                Walk::Several(two) => return Lookup::Several(two),
                 Walk::Missing => {}
             }
         }
-        if away { Search::Outside } else { Search::Missing }
+        if away { Lookup::Outside } else { Lookup::Missing }
     }
 
-    fn found(&self, path: PathBuf, name: String, called: Option<String>) -> Search {
+    fn found(&self, path: PathBuf, name: String, called: Option<String>) -> Lookup {
         let linked = fs::canonicalize(&path).is_ok_and(|real| !real.starts_with(&self.names[0]));
-        Search::Found(FoundFile { path, name, called, linked })
+        Lookup::Found(FoundFile { path, name, called, linked })
     }
 
     /// A path taken apart, whatever system wrote it.
@@ -119,6 +156,8 @@ impl<'a> PhotoFinder<'a> {
                 "" | "." => {}
                 ".." => away |= parts.pop().is_none(),
                 part if i == 0 && drive(part) => away = true,
+                // Where a drive's letter leads away from anywhere.
+                part if cfg!(windows) && part.contains(':') => away = true,
                 part => parts.push(part.into()),
             }
         }
@@ -137,12 +176,16 @@ impl<'a> PhotoFinder<'a> {
                 at = next;
                 continue;
             }
-            let alike = self.in_folder(&at, |name| fold(name) == fold(part) && at.join(name).is_dir());
-            match alike.as_slice() {
+            let listing = self.listing(&at);
+            let alike: Vec<&String> = listing.alike(part).iter().filter(|name| at.join(name).is_dir()).collect();
+            // A data set that was handed around with reduced photos only.
+            let reduced = listing.reduced.iter().filter(|_| alike.is_empty() && fold(part) == "images");
+            let reduced: Vec<&String> = reduced.take(1).collect();
+            match if alike.is_empty() { reduced.as_slice() } else { alike.as_slice() } {
                 [] => return Walk::Missing,
                 [one] => {
                     at.push(one);
-                    real.push(one.clone());
+                    real.push((*one).clone());
                 }
                 [a, b, ..] => return Walk::several(&real, a, b),
             }
@@ -151,21 +194,26 @@ impl<'a> PhotoFinder<'a> {
         if exact.is_file() {
             return Walk::Found { path: exact, parts: (real != folders).then(|| joined(&real, file)) };
         }
+        let listing = self.listing(&at);
+        let there = |names: &[String]| -> Vec<String> {
+            names.iter().filter(|name| at.join(name).is_file()).cloned().collect()
+        };
         let stem = photo::stem(file);
-        let is_photo = |name: &str| photo::stem(name).is_some() && at.join(name).is_file();
-        // Listed without an ending, which is a convention; then in other letters; then with another ending.
-        let added = self.in_folder(&at, |name| stem.is_none() && photo::stem(name) == Some(file) && is_photo(name));
-        let usual = added.iter().find(|name| name.ends_with(".png")).filter(|_| added.len() > 1);
-        let added = usual.map_or_else(|| added.clone(), |png| vec![png.clone()]);
+        let same_stem = there(listing.of_stem(stem.unwrap_or(file)));
+        let of_stem = |exact: &str| -> Vec<String> {
+            same_stem.iter().filter(|name| photo::stem(name) == Some(exact)).cloned().collect()
+        };
+        // Listed without an ending, which is a convention: that of .png.
+        let mut added: Vec<String> = if stem.is_none() { of_stem(file) } else { Vec::new() };
+        if let Some(png) = added.iter().find(|name| name.ends_with(".png")).cloned() {
+            added = vec![png];
+        }
         if let [one] = added.as_slice() {
             return Walk::Found { path: at.join(one), parts: (real != folders).then(|| joined(&real, one)) };
         }
-        let levels: [&dyn Fn(&str) -> bool; 3] = [
-            &|name| fold(name) == fold(file) && at.join(name).is_file(),
-            &|name| photo::stem(name).is_some_and(|s| stem.is_some_and(|own| s == own)) && is_photo(name),
-            &|name| photo::stem(name).is_some_and(|s| fold(s) == fold(stem.unwrap_or(file))) && is_photo(name),
-        ];
-        for fits in std::iter::once(added).chain(levels.iter().map(|fits| self.in_folder(&at, fits))) {
+        // Then in other letters, then with another ending.
+        let other_ending: Vec<String> = stem.map_or_else(Vec::new, of_stem);
+        for fits in [added, there(listing.alike(file)), other_ending, same_stem.clone()] {
             match fits.as_slice() {
                 [] => {}
                 [one] => return Walk::Found { path: at.join(one), parts: Some(joined(&real, one)) },
@@ -175,13 +223,9 @@ impl<'a> PhotoFinder<'a> {
         Walk::Missing
     }
 
-    /// The names in a folder that fit, sorted.
-    fn in_folder(&self, folder: &Path, fits: impl Fn(&str) -> bool) -> Vec<String> {
+    fn listing(&self, folder: &Path) -> Arc<Listing> {
         let mut known = self.folders.lock().unwrap_or_else(PoisonError::into_inner);
-        let names = known.entry(folder.into()).or_insert_with(|| Arc::new(files::names_in(folder).unwrap_or_default()));
-        let names = Arc::clone(names);
-        drop(known);
-        names.iter().filter(|name| fits(name)).cloned().collect()
+        Arc::clone(known.entry(folder.into()).or_insert_with(|| Arc::new(Listing::of(folder))))
     }
 }
 
@@ -200,6 +244,11 @@ impl Walk {
 
 fn joined(folders: &[String], file: &str) -> String {
     folders.iter().map(String::as_str).chain([file]).collect::<Vec<_>>().join("/")
+}
+
+/// The factor of a folder `images_<factor>`.
+pub(crate) fn reduction(name: &str) -> Option<u32> {
+    name.strip_prefix("images_")?.parse().ok().filter(|factor| *factor > 1)
 }
 
 /// A name without what systems differ in: letter case, and how accents are composed.
@@ -222,8 +271,8 @@ mod tests {
     }
 
     /// Name and what it is called otherwise of a file that is found.
-    fn of(search: Search) -> (String, Option<String>) {
-        let Search::Found(file) = search else { panic!("{search:?}") };
+    fn of(search: Lookup) -> (String, Option<String>) {
+        let Lookup::Found(file) = search else { panic!("{search:?}") };
         (file.name, file.called)
     }
 
@@ -253,7 +302,7 @@ mod tests {
         }
         assert_eq!(of(finder.find("images", "A.jpg")), ("A.jpg".into(), Some("images/a.jpg".into())));
         assert_eq!(of(finder.find("images", "x/y/c.png")), ("c.png".into(), Some("images/c.png".into())));
-        assert_eq!(finder.find("", "x.png"), Search::Missing, "what systems leave is no photo");
+        assert_eq!(finder.find("", "x.png"), Lookup::Missing, "what systems leave is no photo");
     }
 
     #[test]
@@ -264,15 +313,15 @@ mod tests {
         let root = outer.path().join("scene");
         let finder = PhotoFinder::new(&root).expect("folder");
         for entry in ["../secret.png", "images/../../secret.png", "/etc/passwd", "..\\secret.png", "", ".", "a\0b"] {
-            assert_eq!(finder.find("", entry), Search::Outside, "{entry:?}");
+            assert_eq!(finder.find("", entry), Lookup::Outside, "{entry:?}");
         }
         let absolute = outer.path().join("secret.png").to_string_lossy().into_owned();
-        assert_eq!(finder.find("", &absolute), Search::Outside);
-        assert_eq!(finder.find("", "images/none.png"), Search::Missing);
+        assert_eq!(finder.find("", &absolute), Lookup::Outside);
+        assert_eq!(finder.find("", "images/none.png"), Lookup::Missing);
         for (entry, a, b) in
             [("images/b.jpg", "images/B.jpg", "images/b.JPG"), ("images/d.png", "images/d.jpg", "images/d.webp")]
         {
-            assert_eq!(finder.find("", entry), Search::Several([a.into(), b.into()]), "{entry}");
+            assert_eq!(finder.find("", entry), Lookup::Several([a.into(), b.into()]), "{entry}");
         }
         assert_eq!(of(finder.find("", "images/B.jpg")).1, None, "the control: exact");
     }
@@ -286,7 +335,7 @@ mod tests {
         std::os::unix::fs::symlink("own/b.png", root.join("c.png")).expect("link");
         let finder = PhotoFinder::new(&root).expect("folder");
         for (entry, is_linked) in [("images/a.png", true), ("c.png", false), ("own/b.png", false)] {
-            let Search::Found(file) = finder.find("", entry) else { panic!("{entry}") };
+            let Lookup::Found(file) = finder.find("", entry) else { panic!("{entry}") };
             assert_eq!((file.linked, file.called), (is_linked, None), "{entry}");
         }
         // By another name the same folder is the same.

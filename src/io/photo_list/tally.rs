@@ -9,7 +9,7 @@ const NAMED: usize = 5;
 
 /// Listed photos of each fate.
 #[derive(Default)]
-pub(super) struct Tally {
+pub(super) struct ListTally {
     pub(super) listed: usize,
     pub(super) missing: Vec<String>,
     pub(super) outside: Vec<String>,
@@ -27,7 +27,7 @@ pub(super) struct Tally {
     pub(super) broken: Vec<(String, String)>,
 }
 
-impl Tally {
+impl ListTally {
     /// The warnings, one for each kind that there is.
     pub(super) fn warnings(&self, source: &Path) -> Vec<String> {
         let n = self.listed;

@@ -20,8 +20,13 @@ pub fn read_blender(root: &Path) -> Result<Dataset, IoError> {
     let mut is_held_out = false;
     for name in HELD_OUT.iter().filter(|name| root.join(name).is_file()) {
         if is_held_out {
-            let n = File::read(&root.join(name))?.frames.len();
-            warnings.push(format!("{n} photos of {name} are left out; those of transforms_test.json are held out"));
+            warnings.push(match File::read(&root.join(name)) {
+                Ok(list) => {
+                    let n = list.frames.len();
+                    format!("{n} photos of {name} are left out; those of transforms_test.json are held out")
+                }
+                Err(e) => format!("{name} is left out: {e}"),
+            });
             continue;
         }
         match listed(root, name, true, &mut warnings) {

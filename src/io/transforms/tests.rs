@@ -224,6 +224,6 @@ fn blender_splits_are_marked_and_composited_over_white() {
     let d = read_blender(f.guard.path()).expect("read");
     let names: Vec<_> = d.photos.iter().map(|p| (p.name.as_str(), p.test_split)).collect();
     assert_eq!(names, [("test/r_0", true), ("train/r_0", false)]);
-    assert_eq!((d.background, d.photos[0].background), (Some(WHITE), Some(WHITE)));
+    assert_eq!((d.background, d.photos[0].background), (Some([1.0; 3]), Some([1.0; 3])));
     assert!(d.photos[0].path.ends_with("test/r_0.png"));
 }

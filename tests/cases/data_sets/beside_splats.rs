@@ -45,7 +45,7 @@ fn cameras_and_photos_beside_a_splat_are_found() {
     let out = tempfile::tempdir().expect("folder");
     output(out.path(), &set);
     let splat = out.path().join("point_cloud/iteration_7000/point_cloud.ply");
-    for path in [out.path(), &splat] {
+    for path in [out.path(), &splat, &out.path().join("point_cloud/iteration_30000")] {
         let found = info(path);
         assert_eq!((&found["kind"], &found["gaussians"]), (&json!("splat"), &json!(3)));
         right(&found, 8);

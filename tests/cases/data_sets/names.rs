@@ -160,6 +160,21 @@ fn points_and_cameras_may_begin_with_a_mark_and_be_named_by_a_path_of_elsewhere(
 }
 
 #[test]
+fn reduced_photos_stand_for_those_that_are_listed_and_gone() {
+    let Some(set) = Copy::of("06_val_filenames") else { return };
+    fs::create_dir(set.at("images_2")).expect("create");
+    set.rename("images", "images_4");
+    for i in 0..8 {
+        let small = image::open(set.at(&format!("images_4/img_0{i}.png"))).expect("a picture").thumbnail_exact(42, 32);
+        small.save(set.at(&format!("images_4/img_0{i}.png"))).expect("saved");
+    }
+    fs::remove_dir(set.at("images_2")).expect("remove");
+    let found = info(set.path());
+    warns(&found, &["8 of 8 listed photos were found under other names", "is images_4/img_00.png"]);
+    assert_eq!(found["cameras"][0]["camera"]["width_px"], 42);
+}
+
+#[test]
 fn what_systems_leave_is_passed_over() {
     let Some(set) = Copy::of("12_colmap_elsewhere") else { return };
     for (name, text) in [

@@ -100,6 +100,23 @@ fn all_in_one_folder_is_a_data_set_too() {
 }
 
 #[test]
+fn data_sets_in_a_folder_are_not_the_folders() {
+    let Some(set) = Copy::of("13_realityscan_flat") else { return };
+    let names: Vec<_> = fs::read_dir(set.path()).expect("list").flatten().map(|e| e.file_name()).collect();
+    for name in names {
+        let name = name.to_str().expect("a name").to_owned();
+        set.rename(&name, &format!("one/{name}"));
+    }
+    fs::create_dir(set.at("others")).expect("create");
+    for i in 0..2 {
+        fs::copy(set.at("one/img_00.png"), set.at(&format!("others/{i}.png"))).expect("copy");
+    }
+    assert!(refusal(set.path()).contains("Found: one/, others/"));
+    assert!(refusal(&set.at("others")).contains("2 photos, no camera poses"));
+    right(&info(&set.at("one")), 8);
+}
+
+#[test]
 fn points_are_read_from_a_ply_beside_the_reconstruction() {
     for (name, points) in [("points3D.ply", 400), ("points3d.ply", 400), ("sparse.ply", 400), ("other.ply", 0)] {
         let Some(set) = Copy::of("11_points3D_ply") else { return };
@@ -133,6 +150,11 @@ fn lists_of_another_name_and_photos_beside_their_list_are_opened() {
     let e = refusal(set.path());
     assert!(e.contains("transforms_colmap.json and transforms_other.json") && e.contains("open the file"), "{e}");
     right(&info(&set.at("transforms_other.json")), 8);
+    // Of photos alone what is wrong with the poses beside them is said, and data sets beside them are not theirs.
+    fs::write(set.at("transforms.json"), "{").expect("write");
+    let e = refusal(&set.at("images"));
+    assert!(e.contains("8 photos, no camera poses") && e.contains("holds poses that cannot be read"), "{e}");
+    fs::remove_file(set.at("transforms.json")).expect("remove");
     // Poses that nobody here reads are named.
     fs::remove_file(set.at("transforms_colmap.json")).expect("remove");
     fs::remove_file(set.at("transforms_other.json")).expect("remove");

@@ -43,6 +43,24 @@ fn lists_of_photos_to_train_on_and_to_hold_out_are_obeyed() {
 }
 
 #[test]
+fn photos_beside_a_list_that_has_no_pose_for_them_are_counted_and_what_belongs_to_a_photo_is_not() {
+    let Some(set) = Copy::of("06_val_filenames") else { return };
+    set.edit_json("transforms.json", |json| {
+        let frames = json["frames"].as_array_mut().expect("frames");
+        frames.truncate(5);
+        json["train_filenames"] = json!([]);
+        json["val_filenames"] = json!([]);
+    });
+    for companion in ["img_00_depth.png", "img_00.png.png", "img_01.mask.png"] {
+        fs::copy(set.at("images/img_00.png"), set.at(&format!("images/{companion}"))).expect("copy");
+    }
+    let found = info(set.path());
+    right(&found, 5);
+    assert_eq!(warnings(&found).len(), 1);
+    warns(&found, &["3 of 8 photos have no pose and were left out", "img_05.png", "img_07.png"]);
+}
+
+#[test]
 fn lists_beside_a_reconstruction_are_obeyed() {
     for (place, both) in [("colmap/sparse/0/test.txt", false), ("test_list.txt", true), ("train_test_lists.json", true)]
     {
