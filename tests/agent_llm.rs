@@ -234,7 +234,7 @@ fn what_is_destructive_waits_for_the_users_own_yes() {
     let t = talk(vec![remove.clone(), text("As you like.")], "remove the mug").say("what would that do?");
     assert_eq!((t.outcome(), t.room.log.len()), ("done", 0));
     let t = talk(vec![remove.clone(), remove.clone()], "remove the mug").say("no");
-    assert_eq!((t.outcome(), t.room.log.len()), ("stopped", 0));
+    assert_eq!((t.outcome(), t.room.log.len()), ("done", 0), "a no is an answer, and nothing is removed");
     // The model says yes to itself, asks for it again and again, or claims it is done.
     let t = talk(
         vec![calls(&[("ask_user", json!({ "question": "yes" })), ("remove", json!({ "target": "mug" }))]), remove],

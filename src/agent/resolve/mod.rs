@@ -176,6 +176,7 @@ impl Resolver<'_> {
                 (Ok(_), _) => {}
                 // Of reasons why nothing is found, one about the scene says more than an unknown word.
                 (Err(new), _) if lost.refusal.kind != RefusalKind::Conflict => lost = new,
+                (Err(new), _) if new.refusal.kind == RefusalKind::Conflict && lost.is_open => lost = new,
                 (Err(_), _) => {}
             }
         }
