@@ -10,6 +10,8 @@ mod data_sets;
 mod labels;
 #[path = "cases/lenses.rs"]
 mod lenses;
+#[path = "cases/splat_numbers.rs"]
+mod splat_numbers;
 #[path = "cases/splats.rs"]
 mod splats;
 #[path = "cases/training.rs"]
