@@ -12,6 +12,8 @@ mod labels;
 mod lenses;
 #[path = "cases/object_photos.rs"]
 mod object_photos;
+#[path = "cases/splat_numbers.rs"]
+mod splat_numbers;
 #[path = "cases/splats.rs"]
 mod splats;
 #[path = "cases/training.rs"]

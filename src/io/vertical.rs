@@ -29,7 +29,7 @@ pub(super) fn of_comments(comments: &[&str]) -> Option<DVec3> {
 /// The comment, without the word `comment`, for what is upwards along an axis other than `-y`.
 pub(super) fn comment(up: Option<DVec3>) -> Option<String> {
     let up = up.filter(|up| *up != DVec3::NEG_Y)?;
-    let k = (0..3).find(|&k| up[k].abs() == 1.0)?;
+    let k = (0..3).find(|&k| up.abs() == DVec3::AXES[k])?;
     Some(format!("Vertical Axis: {}{}", if up[k] < 0.0 { "-" } else { "" }, ["x", "y", "z"][k]))
 }
 

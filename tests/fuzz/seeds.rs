@@ -20,15 +20,20 @@ pub fn all() -> Vec<Seed> {
         ("splat_ply", "degree0.ply", splat(0, DVec3::ZERO)),
         ("splat_ply", "degree1_origin.ply", splat(1, DVec3::new(1e6, 0.0, -3.0))),
         ("splat_ply", "ascii.ply", ascii_splat()),
+        ("splat_ply", "disks.ply", replaced(&ascii_splat(), &[("property double scale_2\n", ""), ("-2 -3 1", "-2 1")])),
+        ("splat_ply", "rgb.ply", replaced(&ascii_splat(), &RGB)),
+        ("splat_ply", "comments.ply", replaced(&ascii_splat(), &[("element", COMMENTED)])),
         ("compressed_ply", "degree1.ply", compressed()),
         ("points_ply", "ascii.ply", points("ascii", b"1 2 3 4 5 6\n7 8 9 10 11 12\n")),
         ("points_ply", "binary.ply", points("binary_little_endian", &[7; 30])),
         ("points_ply", "faces_first.ply", faces_first()),
+        ("points_ply", "lists.ply", LISTS.to_vec()),
         ("sog", "v2.sog", sog()),
         ("sog_meta", "v2.json", sog_meta(2).to_string().into_bytes()),
         ("sog_meta", "v1.json", sog_meta(1).to_string().into_bytes()),
         ("khr_gltf", "a.gltf", gltf(None)),
         ("khr_gltf", "a.glb", gltf(Some(*b"glTF"))),
+        ("khr_gltf", "spz.gltf", gltf_of_spz()),
         ("llff", "two.npy", npy()),
         ("depth_map", "a.npy", depth_map()),
         ("transforms", "nerfstudio.json", transforms().to_string().into_bytes()),
@@ -79,6 +84,42 @@ fn ascii_splat() -> Vec<u8> {
     text += "end_header\n";
     text += &"1 2 3 .1 .2 .3 .5 -1 -2 -3 1 0 0 0\n".repeat(2);
     text.into_bytes()
+}
+
+/// Colors in place of harmonics, of a type whose range the values tell.
+const RGB: [(&str, &str); 3] = [
+    ("property double f_dc_0", "property ushort red"),
+    ("property double f_dc_1\nproperty double f_dc_2", "property half green\nproperty float blue"),
+    (".1 .2 .3", "300 .2 3"),
+];
+
+/// What this program and others say in comments.
+const COMMENTED: &str =
+    "comment Vertical Axis: z\ncomment fmlgs shift 456789 5678901 312\ncomment antialiased 1\nelement";
+
+/// Points with a list among their numbers, and colors in harmonics.
+const LISTS: &[u8] = b"ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty list uchar int seen\nproperty float y\nproperty float z\nproperty float f_dc_0\nproperty float f_dc_1\nproperty float f_dc_2\nend_header\n1 2 7 8 2 3 .1 .2 .3\n4 0 5 6 .1 .2 .3\n";
+
+fn replaced(file: &[u8], words: &[(&str, &str)]) -> Vec<u8> {
+    let text = String::from_utf8(file.to_vec()).expect("text");
+    words.iter().fold(text, |text, (from, to)| text.replace(from, to)).into_bytes()
+}
+
+/// An SPZ of one Gaussian within glTF, with a record that says its axes.
+fn gltf_of_spz() -> Vec<u8> {
+    let head = [b"NGSP".to_vec(), [3_u32, 1].map(u32::to_le_bytes).concat(), vec![0, 12, 2, 0]].concat();
+    let record = [0xADBE_0003_u32, 4, 7].map(u32::to_le_bytes).concat();
+    let spz = super::targets::gzip(&[head, vec![9; 20], record].concat());
+    json!({
+        "asset": { "version": "2.0" },
+        "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0, "rotation": [0, 0, 1, 0], "scale": [2, 2, 2] }],
+        "meshes": [{ "primitives": [{ "attributes": {}, "extensions": { "KHR_gaussian_splatting": {
+            "extensions": { "KHR_gaussian_splatting_compression_spz_2": { "bufferView": 0 } } } } }] }],
+        "bufferViews": [{ "buffer": 0, "byteLength": spz.len() }],
+        "buffers": [{ "byteLength": spz.len(), "uri": format!("data:;base64,{}", base64::encode(&spz)) }],
+    })
+    .to_string()
+    .into_bytes()
 }
 
 fn points(format: &str, body: &[u8]) -> Vec<u8> {

@@ -187,7 +187,7 @@ pub fn all() -> Vec<Target> {
     all
 }
 
-fn gzip(bytes: &[u8]) -> Vec<u8> {
+pub fn gzip(bytes: &[u8]) -> Vec<u8> {
     let mut out = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
     out.write_all(bytes).expect("pack");
     out.finish().expect("packed")

@@ -7,13 +7,14 @@ use crate::io::test_clouds;
 use crate::math::sh::SH_C0;
 use crate::scene::ExtraProperty;
 
-/// One Gaussian of degree 0 with float attributes, in one embedded buffer.
+/// One Gaussian of degree 0 with float attributes, in one embedded buffer, in the axes of the scene as this program wrote
+/// them once.
 fn gltf() -> Value {
     let floats: [f32; 14] = [1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0, 0.5, 1.0, 2.0, 0.75, 0.1, 0.2, 0.3];
     let bytes: Vec<u8> = floats.iter().flat_map(|v| v.to_le_bytes()).collect();
     let accessor = |offset: usize, kind: &str| json!({ "bufferView": 0, "byteOffset": offset * 4, "componentType": 5126, "count": 1, "type": kind });
     json!({
-        "asset": { "version": "2.0" }, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
+        "asset": { "version": "2.0", "generator": "fmlgs" }, "scenes": [{ "nodes": [0] }], "nodes": [{ "mesh": 0 }],
         "meshes": [{ "primitives": [{
             "mode": 0,
             "attributes": {
@@ -44,6 +45,35 @@ fn values_arrive_in_our_units() {
     assert!(near(c.log_scales[0][0], 0.5_f32.ln()) && near(c.log_scales[0][2], 2.0_f32.ln()));
     assert!(near(c.opacity_logits[0], 3.0_f32.ln()));
     assert_eq!(c.sh, [[0.1, 0.2, 0.3]]);
+}
+
+#[test]
+fn others_files_are_left_up_front() {
+    let mut g = gltf();
+    for generator in [json!("splat-transform 2.7.1"), json!("fmlgs 0.2.0"), json!(null)] {
+        g["asset"]["generator"] = generator;
+        let c = read_json(&g).expect("read");
+        // Half a turn around z.
+        assert_eq!((c.positions[0], c.quaternions[0]), ([-1.0, -2.0, 3.0], [0.0, 0.0, 0.0, 1.0]));
+    }
+    let c = parse_in(g.to_string().as_bytes(), Path::new("a.gltf"), Some(Axes::PLY)).expect("read");
+    assert_eq!(c.positions[0], [1.0, 2.0, 3.0]);
+}
+
+#[test]
+fn harmonics_turn_with_their_node() {
+    let cloud = test_clouds::random(50, 3);
+    let mut text = Vec::new();
+    encode_text(&mut text, &cloud, &mut |_| Ok(())).expect("gltf");
+    let mut g: Value = serde_json::from_slice(&text).expect("json");
+    let turn = glam::DQuat::from_axis_angle(glam::DVec3::new(0.6, 0.0, 0.8), 0.7);
+    g["nodes"][1]["rotation"] = json!(turn.to_array());
+    let turned = read_json(&g).expect("read");
+    // The turn is in the axes of the file.
+    let axes = Axes::GLTF.scene_from_file();
+    let expected = cloud.clone().turned(&(axes * glam::DMat3::from_quat(turn) * axes.transpose()), false);
+    test_clouds::assert_near(&turned, &expected, [1e-5, 1e-5, 1e-5, 1e-5, 1e-5]);
+    assert!((turned.sh[5][0] - cloud.sh[5][0]).abs() > 1e-3, "it turned");
 }
 
 #[test]

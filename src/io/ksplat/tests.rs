@@ -116,14 +116,17 @@ fn hostile_files_are_named() {
         (HEADER + 4, u32::MAX, "ends early"),
         (HEADER + 8, 1, "buckets hold fewer"),
         (HEADER + 12, u32::MAX, "ends early"),
-        (HEADER + 16, f32::NAN.to_bits(), "not finite"),
+        (HEADER + 16, f32::NAN.to_bits(), "none of its 3 Gaussians is finite"),
         (HEADER + 20, 11, "bucket has 11"),
         (HEADER + 32, u32::MAX, "buckets"),
         (HEADER + 36, 2, "buckets"),
         (HEADER + 40, 3, "degree 3"),
         (HEADER, 0, "no section holds"),
-        (good.len() - 4 - 18 - 14, f16::NAN.to_bits().into(), "not finite"),
     ] {
         assert!(with(at, v).contains(told), "{at} {v}: {}", with(at, v));
     }
+    let (mut one, at) = (good.clone(), good.len() - 4 - 18 - 14);
+    one[at..at + 2].copy_from_slice(&f16::NAN.to_le_bytes());
+    let left = parsed(&one).expect("two are finite");
+    assert!(left.len() == 2 && left.warnings.concat().contains("1 of 3 Gaussians"), "{:?}", left.warnings);
 }

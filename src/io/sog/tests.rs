@@ -146,8 +146,15 @@ fn hostile_descriptions_are_named() {
     assert!(matches!(with(|m| m["means"]["files"][0] = json!("gone.webp")), IoError::Syntax { .. }));
     assert!(matches!(with(|m| m["means"]["mins"] = json!([0.0, 0.0])), IoError::Syntax { .. }));
     assert!(matches!(with(|m| m["means"]["mins"][0] = json!(1e300)), IoError::Syntax { .. }));
-    let e = with(|m| m["means"]["maxs"][1] = json!(1000.0));
-    assert!(matches!(e, IoError::Cloud { cause: CloudError::NotFinite { field: "position", .. }, .. }), "{e}");
+    let mut far = Sog::v2();
+    far.meta["means"]["maxs"][1] = json!(1000.0);
+    let left = far.folder().expect("one is finite");
+    assert!(left.len() == 1 && left.warnings.concat().contains("Gaussian 0, position"), "{:?}", left.warnings);
+    let e = with(|m| {
+        m["means"] = json!({ "files": m["means"]["files"], "mins": [1e3, 1e3, 1e3], "maxs": [1e3, 1e3, 1e3] })
+    });
+    assert!(matches!(e, IoError::Cloud { cause: CloudError::NoneFinite { field: "position", .. }, .. }), "{e}");
+    assert!(matches!(with(|m| m["fmlgs_shift"] = json!([1.0, 2.0])), IoError::Syntax { .. }));
     assert!(matches!(with(|m| m["shN"]["bands"] = json!(2)), IoError::Syntax { .. }));
     assert!(matches!(with(|m| m["shN"]["bands"] = json!(9)), IoError::Syntax { .. }));
     let e = with(|m| m["shN"]["count"] = json!(63));

@@ -22,6 +22,8 @@ fn random_cloud(n: usize, sh_degree: u8, origin: DVec3) -> GaussianCloud {
         sh_degree,
         sh: (0..n * coefficients(sh_degree)).map(|_| [v(), v(), v()]).collect(),
         render_mode: SplatRenderMode::Mip,
+        up: None,
+        warnings: Vec::new(),
         extras: vec![ExtraProperty { name: "confidence".into(), values: (0..n).map(|_| v()).collect() }],
     }
 }
@@ -85,17 +87,16 @@ fn doubles_get_an_origin_that_keeps_their_precision() {
 }
 
 #[test]
-fn non_finite_values_name_vertex_and_property() {
+fn gaussians_that_are_not_finite_are_left_out_and_named() {
     let good = random_cloud(3000, 2, DVec3::ZERO);
     let mut c = good.clone();
     c.sh[2100 * 9 + 4][1] = f32::NAN;
-    let e = parsed(&bytes(&c)).expect_err("NaN");
-    // Coefficient 4 is the fourth after the constant one; green follows eight red ones.
-    assert!(matches!(&e, IoError::NotFinite { index: 2100, property, .. } if property == "f_rest_11"), "{e}");
-    let mut c = good.clone();
     c.log_scales[7][2] = f32::INFINITY;
-    let e = parsed(&bytes(&c)).expect_err("infinite");
-    assert!(matches!(&e, IoError::NotFinite { index: 7, property, .. } if property == "scale_2"), "{e}");
+    let left = parsed(&bytes(&c)).expect("others are finite");
+    let told = left.warnings.concat();
+    assert!(told.contains("2 of 3000 Gaussians") && told.contains("first: Gaussian 7, scale"), "{told}");
+    let kept: Vec<usize> = (0..3000).filter(|i| ![7, 2100].contains(i)).collect();
+    assert!(GaussianCloud { warnings: Vec::new(), ..left } == good.select(&kept));
     let folder = tempfile::tempdir().expect("folder");
     let e = write(&folder.path().join("a.ply"), &c).expect_err("infinite");
     assert!(matches!(e, IoError::Cloud { cause: CloudError::NotFinite { index: 7, .. }, .. }));
@@ -116,7 +117,9 @@ fn infinite_opacities_become_large_ones() {
         "{read:?}"
     );
     c.opacity_logits[0] = f32::NAN;
-    assert!(matches!(parsed(&bytes(&c)), Err(IoError::NotFinite { index: 0, .. })));
+    assert!(parsed(&bytes(&c)).expect("two are left").warnings.concat().contains("Gaussian 0, opacity"));
+    c.opacity_logits = vec![f32::NAN; 3];
+    assert!(matches!(parsed(&bytes(&c)), Err(IoError::Cloud { cause: CloudError::NoneFinite { count: 3, .. }, .. })));
 }
 
 #[test]
@@ -165,8 +168,9 @@ fn a_file_read_in_blocks_is_the_file_read_as_a_whole() {
     let last = bytes.len() - bytes.len() / cloud.len() * 2;
     bytes[last..last + 8].copy_from_slice(&[0xff; 8]);
     std::fs::write(&path, &bytes).expect("written");
-    let told = [stream::read(&path).expect_err("bad").to_string(), parse(&bytes, &path).expect_err("bad").to_string()];
-    assert_eq!(told[0], told[1]);
+    let parts = [stream::read(&path).expect("read").expect("plain"), parse(&bytes, &path).expect("parsed")];
+    assert!(parts[0] == parts[1] && parts[0].len() == 4_999, "{:?}", parts[0].warnings);
+    assert!(parts[0].warnings.concat().contains("Gaussian 4998"), "{:?}", parts[0].warnings);
     // One that is too short is left to the whole to tell.
     std::fs::write(&path, &bytes[..bytes.len() - 1]).expect("written");
     assert_eq!(stream::read(&path).expect("not told here"), None);

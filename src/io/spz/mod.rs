@@ -2,7 +2,7 @@
 //!
 //! A header, then one column after another: positions (24-bit fixed point), opacities, colors, log-scales, rotations
 //! and harmonics, mostly bytes. Up to version 3 all of it is one gzip stream; in version 4 the header is plain and
-//! each column a Zstandard stream of its own. The format's axes are right, up, back; see [`axes`] for those of a file.
+//! each column a Zstandard stream of its own. The format's axes are right, up, back; see `axes` for those of a file.
 
 mod axes;
 mod decode;

@@ -8,7 +8,7 @@ use flate2::write::GzEncoder;
 
 use super::*;
 use crate::io::{IoError, test_clouds};
-use crate::scene::{GaussianCloud, SplatRenderMode};
+use crate::scene::{Axes, GaussianCloud, SplatRenderMode};
 
 const P: &str = "a.spz";
 
@@ -46,6 +46,11 @@ fn parsed(bytes: &[u8]) -> Result<GaussianCloud, IoError> {
     parse(bytes, Path::new(P))
 }
 
+/// The numbers as they are in the file.
+fn raw(bytes: &[u8]) -> Result<GaussianCloud, IoError> {
+    parse_in(bytes, Path::new(P), SpzAxes::Given(Axes::PLY))
+}
+
 fn bytes(cloud: &GaussianCloud) -> Vec<u8> {
     let mut out = Vec::new();
     encode(&mut out, cloud, &mut |_| Ok(())).expect("encode");
@@ -77,7 +82,7 @@ fn fields_are_where_each_version_puts_them() {
         (&four, [1.0, -1.0 / 256.0, -32_768.0], SplatRenderMode::Mip, 1, true),
         (&one, [1.0, -2.0, 0.5], SplatRenderMode::Plain, 0, false),
     ] {
-        let c = parsed(file).expect("valid");
+        let c = raw(file).expect("valid");
         assert_eq!((c.len(), c.sh_degree, c.positions[0], c.render_mode), (1, degree, position, mode));
         assert_eq!(c.log_scales[0], [-10.0, 0.0, 5.9375]);
         near(c.opacity_logits[0], (0.2_f32 / 0.8).ln());
@@ -122,11 +127,12 @@ fn coordinates_get_all_the_bits_that_fit() {
         origin: glam::DVec3::new(x, 0.0, 0.0),
         ..GaussianCloud::isotropic(vec![[0.25, 0.0, 0.0]], -3.0, 0.0)
     };
-    for (x, most) in [(0.0, 1e-7), (1e6, 0.25), (-8e6, 0.5)] {
+    for (x, most) in [(0.0, 1e-7), (1e6, 1e-6), (-8e6, 1e-6)] {
         let error = parsed(&bytes(&at(x))).expect("valid").world_position(0).x - (x + 0.25);
         assert!(error.abs() <= most, "{x}: {error}");
     }
-    let e = encode(&mut Vec::new(), &at(1e7), &mut |_| Ok(())).expect_err("too far");
+    let wide = GaussianCloud::isotropic(vec![[1e7, 0.0, 0.0], [0.0; 3]], -3.0, 0.0);
+    let e = encode(&mut Vec::new(), &wide, &mut |_| Ok(())).expect_err("too far");
     assert!(e.to_string().contains("10000000"), "{e}");
 }
 
@@ -144,7 +150,7 @@ fn hostile_files_are_named() {
     }
     let refused = |head: Vec<u8>| parsed(&gzip(&[&head, &[0; 20]])).expect_err("refused");
     assert!(matches!(refused(header(5, 1, [0; 4])), IoError::Version { found: 5, supported: 4, .. }));
-    assert!(matches!(refused(header(3, 1, [4, 0, 0, 0])), IoError::Unsupported { .. }));
+    assert!(matches!(refused(header(3, 1, [5, 0, 0, 0])), IoError::Unsupported { .. }));
     assert!(matches!(refused(header(3, 1, [0, 25, 0, 0])), IoError::Syntax { .. }));
     assert!(matches!(refused(header(3, 2, [0; 4])), IoError::Truncated { .. }));
     assert!(matches!(refused(header(3, u32::MAX, [0; 4])), IoError::Count { .. }));
@@ -163,4 +169,33 @@ fn hostile_files_are_named() {
     // A half float that is infinite.
     let infinite = gzip(&[&header(1, 1, [0; 4]), &[0, 0x7c, 0, 0, 0, 0], &BYTES, &[0; 3]]);
     assert!(matches!(parsed(&infinite), Err(IoError::Cloud { .. })));
+}
+
+#[test]
+fn records_of_version_4_say_the_axes_and_broken_ones_end_them() {
+    let columns: [&[u8]; 5] = [&POSITION, &BYTES[..1], &BYTES[1..4], &BYTES[4..], &ROTATION.to_le_bytes()];
+    let plain = version_4(&header(4, 1, [0, 8, 2, 5]), &columns);
+    let with = |record: &[u8]| {
+        let mut file = plain.clone();
+        file[16..20].copy_from_slice(&(32 + record.len() as u32).to_le_bytes());
+        file.splice(32..32, record.iter().copied());
+        parsed(&file).expect("valid")
+    };
+    let record = |kind: u32, length: u32, value: u32| [kind, length, value].map(u32::to_le_bytes).concat();
+    for (number, place) in [(6, [1.0, -1.0, -1.0]), (4, [1.0, 1.0, 1.0]), (2, [1.0, -1.0, 1.0])] {
+        let c = with(&record(0xADBE_0003, 4, number));
+        let numbers = [1.0, 1.0 / 256.0, 32_768.0];
+        assert_eq!(c.positions[0], [0, 1, 2].map(|k| numbers[k] * place[k]), "{number}");
+        assert!(c.warnings.is_empty());
+    }
+    for (broken, told) in [
+        (record(0xADBE_0003, 400, 6), 1),
+        (record(0xADBE_0003, 4, 99), 1),
+        (record(7, u32::MAX, 6), 1),
+        (record(7, 4, 6), 2),
+        (vec![1, 2, 3], 1),
+    ] {
+        let c = with(&broken);
+        assert_eq!((c.positions[0], c.warnings.len()), ([1.0, 1.0 / 256.0, 32_768.0], told), "{:?}", c.warnings);
+    }
 }
