@@ -175,7 +175,7 @@ actions! {
     SegmentPhoto: "Segment this photo",
         "Find what this photo, or else the nearest one, shows that is nobody's yet. Objects and parts stay; can be undone.";
     ChooseMasks: "Find objects with other masks\u{2026}",
-        "Id maps of fmlgs synth, ISAT files, folders of SPIn-NeRF, 3D-OVS or LERF-Mask; one labeled photo is enough.";
+        "Labels of ISAT, LabelMe, COCO, YOLO, fmlgs synth, SPIn-NeRF, 3D-OVS or LERF-Mask; one labeled photo is enough.";
     FetchModel(id: String): format!("Download the model {id}"), "Download it, verify it, and use it from then on.";
     AddModel(id: String): format!("Add files of the model {id}\u{2026}"),
         "Choose a folder with its files; they are verified and copied.";

@@ -341,7 +341,7 @@ fn labels() -> Vec<Seed> {
         picture(&mut out);
         out.into_inner()
     };
-    let groups = json!({ "info": { "name": "photo.png", "folder": "d:\\set", "width": 16, "height": 12 }, "objects": [
+    let groups = json!({ "info": { "description": "ISAT", "name": "photo.png", "folder": "d:\\set", "width": 16, "height": 12 }, "objects": [
         { "category": "ring", "group": 1, "layer": 1.0, "segmentation": square(1) },
         { "category": "ring", "group": "2", "layer": 3, "segmentation": square(8) },
         { "category": "__background__", "group": 0, "layer": 2, "segmentation": [[2, 2], [4, 2], [4, 5]] }] });

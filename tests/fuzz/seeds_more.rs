@@ -31,6 +31,8 @@ pub fn all() -> Vec<Seed> {
         ("scene_cloud", "a.ply", cloud),
         ("gltf_mesh", "triangle.gltf", mesh(true).to_string().into_bytes()),
         ("gltf_mesh", "triangle.glb", glb(&mesh(false), &mesh_bytes())),
+        ("gltf_mesh", "draco.glb", draco()),
+        ("gltf_mesh", "meshopt.glb", meshopt()),
         ("gltf_mesh_folder", "triangle.gltf", mesh_in_folder().to_string().into_bytes()),
         ("camera_file", "alone.json", json!(camera).to_string().into_bytes()),
         (
@@ -147,6 +149,48 @@ fn mesh_in_folder() -> Value {
     mesh["buffers"][0]["uri"] = json!("a.bin");
     mesh["images"][0]["uri"] = json!("a.png");
     mesh
+}
+
+/// Five vertices in three triangles by Draco's own encoder.
+const DRACO: &str = "RFJBQ08CAgEBAAAABQMDAwAAAt8A/wER/wEi/wEi/wEiBAAAAAEAAAIAAP8AAAECAgMBAAEBAwkCAQEAAQEJAwACAAEACQMAAwIBAQEACRdpJg\
+    OZGQMy9oYUyk/pjuwND2AbEKg+AAAAAP8AAAAAAIA/AACAPwAAgD8AAAAAAAAAPwAAgD4AAAAAAACAPwAAAAAAAAAAAAAAAAAAAAAAAIA/AAAA\
+    AAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AAAAAAAAAAAAAIA/AQEBABEDmRk3aSYDTAmH/////wCAAAD///9//v8AAP//AQAAAA\
+    D//wAAAAAAAAAAAAAAAAAAAAAAQBA=";
+
+/// A mesh that Draco has packed.
+fn draco() -> Vec<u8> {
+    let bytes = base64::decode(DRACO).expect("base64");
+    let accessor = |kind: &str| json!({ "componentType": 5126, "count": 5, "type": kind });
+    let file = json!({
+        "asset": { "version": "2.0" }, "nodes": [{ "mesh": 0 }], "extensionsRequired": ["KHR_draco_mesh_compression"],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0, "TEXCOORD_0": 1 }, "indices": 2,
+            "extensions": { "KHR_draco_mesh_compression": { "bufferView": 0, "attributes": { "POSITION": 3, "TEXCOORD_0": 1 } } } }] }],
+        "accessors": [accessor("VEC3"), accessor("VEC2"), { "componentType": 5125, "count": 9, "type": "SCALAR" }],
+        "bufferViews": [{ "buffer": 0, "byteLength": bytes.len() }], "buffers": [{ "byteLength": bytes.len() }],
+    });
+    glb(&file, &bytes)
+}
+
+/// Four vertices and two triangles that meshoptimizer has packed.
+fn meshopt() -> Vec<u8> {
+    let [vertices, triangles] = ["oAE/AAAACnYSAT8AAABAB0IAAT8AAAAfGiABPAAAADgIAT8AAAAEP0ABJgAAAAE/AAAAHxogAQ8AAAD//wE/AAAAY0hHAAE/AAAAHxogAAAAAAAAAAAA\
+        AAAAAAAAAAAAAAAAAADAAAD54P7/+QAyAPk=", "4fAQAHaHVmd4qYZliWiYAWkAAA=="].map(|text| base64::decode(text).expect("base64"));
+    let view = |at: usize, length: usize, stride: u32, count: u32, mode: &str, filter: &str| {
+        json!({ "buffer": 1, "byteLength": count * stride,
+        "extensions": { "EXT_meshopt_compression": { "buffer": 0, "byteOffset": at, "byteLength": length, "byteStride": stride,
+            "count": count, "mode": mode, "filter": filter } } })
+    };
+    let bytes = [vertices.clone(), triangles.clone()].concat();
+    let file = json!({
+        "asset": { "version": "2.0" }, "nodes": [{ "mesh": 0 }], "extensionsRequired": ["EXT_meshopt_compression"],
+        "meshes": [{ "primitives": [{ "attributes": { "POSITION": 0 }, "indices": 1 }] }],
+        "accessors": [{ "bufferView": 0, "componentType": 5126, "count": 4, "type": "VEC3" },
+            { "bufferView": 1, "componentType": 5123, "count": 6, "type": "SCALAR" }],
+        "bufferViews": [view(0, vertices.len(), 12, 4, "ATTRIBUTES", "EXPONENTIAL"),
+            view(vertices.len(), triangles.len(), 2, 6, "TRIANGLES", "NONE")],
+        "buffers": [{ "byteLength": bytes.len() }, { "byteLength": 60, "extensions": { "EXT_meshopt_compression": { "fallback": true } } }],
+    });
+    glb(&file, &bytes)
 }
 
 fn glb(json: &Value, binary: &[u8]) -> Vec<u8> {

@@ -42,6 +42,12 @@ fn parts(path: &str) -> (Vec<&str>, &str) {
     (parts, name)
 }
 
+/// Whether a name ends as a picture's does.
+fn is_picture(name: &str) -> bool {
+    let ending = name.rsplit_once('.').map_or("", |(_, ending)| ending);
+    ["png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp"].iter().any(|known| ending.eq_ignore_ascii_case(known))
+}
+
 /// How many folders two paths have in common, from the file upwards.
 fn in_common(a: &[&str], b: &[&str]) -> usize {
     a.iter().rev().zip(b.iter().rev()).take_while(|(a, b)| a.eq_ignore_ascii_case(b)).count()
@@ -78,6 +84,8 @@ impl<'a> PhotoNames<'a> {
         let best = self.folders.iter().map(|folder| alike(folder)).max().unwrap_or(0);
         for name in &labels.names {
             let called = stem(name);
+            // "a.png.json" is of "a.png".
+            let called = if is_picture(&called) { stem(&called) } else { called };
             let Some(all) = self.by_stem.get(&called.to_lowercase()) else { continue };
             let mut fit: Vec<usize> = all.iter().copied().filter(|i| alike(&parts(self.names[*i]).0) == best).collect();
             // Letter case and endings decide only where they have to.
@@ -181,6 +189,7 @@ mod tests {
         assert_eq!(owner(&photos, &address("/l/second.json", "", "img_00.png")).as_deref(), Some("img_00.png"));
         assert_eq!(owner(&photos, &address("/l/IMG_00.json", "", "")).as_deref(), Some("img_00.png"));
         assert_eq!(owner(&photos, &address("/l/A.json", "", "")).as_deref(), Some("A.jpg"));
+        assert_eq!(owner(&photos, &address("/l/img_00.png.json", "", "")).as_deref(), Some("img_00.png"));
         assert_eq!(owner(&photos, &address("/l/b.json", "", "b.png")).as_deref(), Some("b.png"));
         let names = PhotoNames::new(photos.into_iter());
         assert!(names.owner(&address("/l/b.json", "", "")).is_err());

@@ -1,6 +1,7 @@
 //! ISAT label files, as lerf_ovs has them: polygons with a category and a group, drawn by layer. Polygons of one
-//! category and one group are one region; `__background__` cuts what is drawn below it. Two fields more are
-//! understood: `level` ("object" or "part") and `parent` (the category that it is a piece of).
+//! category and one group are one region; `__background__` cuts what is drawn below it. The files of lerf_ovs, which
+//! do not say that they are ISAT's, number polygons as groups: there a category is one region, as its evaluations have
+//! it. Two fields more are understood: `level` ("object" or "part") and `parent` (the category that it is a piece of).
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -27,6 +28,11 @@ struct File {
 struct Info {
     width: u32,
     height: u32,
+    /// "ISAT"; lerf_ovs has neither this nor the folder.
+    #[serde(default)]
+    description: Option<Value>,
+    #[serde(default)]
+    folder: Option<Value>,
 }
 
 #[derive(Deserialize)]
@@ -60,7 +66,8 @@ pub(crate) fn photo_of(file: &Value) -> Option<(&str, &str)> {
 /// The regions of a label file, objects before parts.
 pub(crate) fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
     let file: File = files::read_json(path)?;
-    let Info { width, height, .. } = file.info;
+    let Info { width, height, description, folder } = &file.info;
+    let (width, height, has_groups) = (*width, *height, description.is_some() || folder.is_some());
     let bad = |place: String, reason: &str| IoError::Syntax { path: path.into(), place, reason: reason.into() };
     if file.objects.iter().map(|p| p.segmentation.len()).sum::<usize>() > MAX_VERTICES {
         return Err(bad("objects".into(), "more vertices than a label file can need"));
@@ -75,7 +82,8 @@ pub(crate) fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError
         }
         let is_thing = !is_background(&polygon.category) && !is_ignored(&polygon.category);
         drawn_into.push(is_thing.then(|| {
-            *place.entry((&polygon.category, polygon.group.to_string())).or_insert_with(|| {
+            let group = if has_groups { polygon.group.to_string() } else { String::new() };
+            *place.entry((&polygon.category, group)).or_insert_with(|| {
                 first.push(polygon);
                 first.len() - 1
             })

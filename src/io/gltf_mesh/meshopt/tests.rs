@@ -64,10 +64,7 @@ fn filters_are_undone() {
         HxogAAAAAAAAAAAAAAAAAAAAAAAAAADAAAD54P7/+QAyAPk=";
     let found = unpack(&bytes(floats), 4, 12, Mode::Attributes, Filter::Exponential).expect("unpacked");
     let list: Vec<f32> = found.chunks(4).map(|b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
-    assert_eq!(
-        list,
-        [1.5, -2.25, 100.0, 0.001000046730041504, 0.000030040740966796875, 0.0, 7.0, -8.0, 9.125, 1e6, 0.0, 0.0]
-    );
+    assert_eq!(list, [1.5, -2.25, 100.0, 0.001_000_046_7, 0.000_030_040_741, 0.0, 7.0, -8.0, 9.125, 1e6, 0.0, 0.0]);
 }
 
 #[test]

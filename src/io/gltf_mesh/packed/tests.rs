@@ -135,7 +135,7 @@ fn broken_views_are_named() {
         ("filter", json!("QUATERNION"), "the filter QUATERNION is not known"),
         ("filter", json!("OCTAHEDRAL"), "its filter does not go with 2 bytes"),
         ("byteLength", json!(20), "ends early"),
-        ("byteLength", json!(1 << 40), "lie outside its buffer"),
+        ("byteLength", json!(1_u64 << 40), "lie outside its buffer"),
         ("count", json!(1_u64 << 60), "what its buffers can hold"),
         ("buffer", json!(7), "buffers[7]"),
         ("byteStride", json!(null), "bufferViews[1], EXT_meshopt_compression"),

@@ -6,7 +6,8 @@ use super::*;
 fn file(name: &str, objects: &[(&str, serde_json::Value, f64, [i32; 4])]) -> String {
     let object = |(category, group, layer, [l, t, r, b]): &(&str, serde_json::Value, f64, [i32; 4])| serde_json::json!({ "category": category, "group": group, "layer": layer, "segmentation": [[l, t], [r, t], [r, b], [l, b]] });
     let objects: Vec<_> = objects.iter().map(object).collect();
-    serde_json::json!({ "info": { "name": name, "width": 20, "height": 10 }, "objects": objects }).to_string()
+    let info = serde_json::json!({ "description": "ISAT", "folder": "", "name": name, "width": 20, "height": 10 });
+    serde_json::json!({ "info": info, "objects": objects }).to_string()
 }
 
 fn regions(files: &[(&str, String)], photo_name: &str) -> (Vec<(String, usize)>, Vec<String>) {
@@ -33,7 +34,10 @@ fn a_category_and_a_group_are_one_thing() {
     let (found, notes) = regions(&[("a.json", file("a.png", &cups))], "a.png");
     assert_eq!(found, [("cup".into(), 2 * 4 * 4), ("cup".into(), 4 * 4)]);
     assert!(notes.is_empty(), "{notes:?}");
-    // Without groups a category is one thing, as in lerf_ovs; texts are groups too; one group may hold two categories.
+    // lerf_ovs numbers polygons, and a category is one thing.
+    let lerf = file("a.png", &cups).replace("\"description\":\"ISAT\",", "").replace("\"folder\":\"\",", "");
+    assert_eq!(regions(&[("a.json", lerf)], "a.png").0, [("cup".into(), 3 * 4 * 4)]);
+    // Without groups a category is one thing; texts are groups too; one group may hold two categories.
     let none = serde_json::Value::Null;
     let (found, _) = regions(
         &[(
