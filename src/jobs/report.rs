@@ -21,7 +21,7 @@ pub struct ReportRequest {
     pub(crate) fresh: bool,
     /// Seconds for everything.
     pub(crate) budget_secs: f64,
-    /// How it was asked for: a command line.
+    /// The command line that asked for it.
     pub(crate) command: String,
 }
 

@@ -1,6 +1,6 @@
 //! Places of measured points in a plot of error over time, on paper and in the window.
 
-use super::axis::Axis;
+use super::axis::LogAxis;
 use super::document::{Measure, Point, Stage};
 use crate::scene::text;
 
@@ -10,8 +10,8 @@ const MOST_LETTERS: usize = 28;
 /// Both axes: seconds to the right, errors up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Axes {
-    pub(crate) secs: Axis,
-    pub(crate) error: Axis,
+    pub(crate) secs: LogAxis,
+    pub(crate) error: LogAxis,
 }
 
 impl Axes {
@@ -30,10 +30,10 @@ impl Axes {
                 }
             }
         }
-        Some(Self { secs: Axis::of(secs)?, error: Axis::of(errors)? })
+        Some(Self { secs: LogAxis::of(secs)?, error: LogAxis::of(errors)? })
     }
 
-    /// Where a point is; `None` if the measure was not taken there.
+    /// The place of a point; `None` if the measure was not taken there.
     pub(crate) fn place(&self, point: &Point, measure: &Measure) -> Option<[f64; 2]> {
         let error = point.error(measure).filter(|e| e.is_finite())?;
         (!point.secs.each.is_empty()).then(|| [self.secs.at(point.secs.median), self.error.at(error)])
@@ -66,7 +66,7 @@ impl Stage {
 }
 
 impl Point {
-    /// What stands beside it in a plot.
+    /// The words beside it in a plot.
     pub(crate) fn label(&self) -> String {
         if self.default { "default".into() } else { text::elided(&self.setting, MOST_LETTERS) }
     }

@@ -16,13 +16,13 @@ const LEAST: usize = 3;
 
 /// An axis in decimal logarithms.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Axis {
-    /// Where the logarithmic part begins and ends.
+pub(crate) struct LogAxis {
+    /// Ends of the logarithmic part.
     low: f64,
     high: f64,
-    /// Whether something is zero.
+    /// Set if something is zero.
     zero: bool,
-    /// Whether something is less, which is drawn there as well.
+    /// Set if something is less, which is drawn there as well.
     negative: bool,
 }
 
@@ -34,7 +34,7 @@ pub(crate) struct Tick {
     pub(crate) named: bool,
 }
 
-impl Axis {
+impl LogAxis {
     /// The axis that holds these values; those that are no numbers are left out. `None` of none.
     pub(crate) fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let (mut least, mut most) = (f64::INFINITY, 0.0_f64);
@@ -57,7 +57,7 @@ impl Axis {
         Some(Self { low: middle - half, high: middle + half, zero, negative })
     }
 
-    /// Where a value is; zero, and what is less, in the middle of its band.
+    /// The place of a value; that of zero, and of what is less, is the middle of its band.
     pub(crate) fn at(&self, value: f64) -> f64 {
         if value > 0.0 { value.log10() } else { self.low - 0.5 * BAND * (self.high - self.low) }
     }
@@ -68,12 +68,12 @@ impl Axis {
         (self.low - band, self.high)
     }
 
-    /// Where the band of zero ends, if there is one.
+    /// The end of the band of zero, if there is one.
     pub(crate) fn band_end(&self) -> Option<f64> {
         self.zero.then_some(self.low)
     }
 
-    /// What stands at the band of zero.
+    /// The number at the band of zero.
     pub(crate) fn zero_name(&self) -> &'static str {
         if self.negative { "\u{2264} 0" } else { "0" }
     }
@@ -169,26 +169,26 @@ mod tests {
 
     #[test]
     fn zero_is_below_all_that_is_not_and_in_no_place_of_theirs() {
-        let axis = Axis::of([0.0, 1e-9, 0.02, f64::NAN]).expect("an axis");
+        let axis = LogAxis::of([0.0, 1e-9, 0.02, f64::NAN]).expect("an axis");
         let band = axis.band_end().expect("a band");
         let (low, high) = axis.bounds();
         assert!(low < axis.at(0.0) && axis.at(0.0) < band && band < axis.at(1e-9) && axis.at(0.02) < high);
         assert!(axis.ticks().iter().all(|t| t.at >= band), "the band has no logarithms");
         assert_eq!(axis.zero_name(), "0");
         // The control: where nothing is zero, there is no band.
-        let above = Axis::of([1e-9, 0.02]).expect("an axis");
+        let above = LogAxis::of([1e-9, 0.02]).expect("an axis");
         assert_eq!((above.band_end(), above.bounds().0), (None, band));
     }
 
     #[test]
     fn zeros_alone_and_a_single_value_have_axes_too() {
-        let zeros = Axis::of([0.0, -1e-12]).expect("an axis");
+        let zeros = LogAxis::of([0.0, -1e-12]).expect("an axis");
         assert!(zeros.band_end().is_some() && zeros.ticks().len() > 2);
         assert_eq!(zeros.zero_name(), "\u{2264} 0");
-        let one = Axis::of([3.0]).expect("an axis");
+        let one = LogAxis::of([3.0]).expect("an axis");
         assert!(one.bounds().0 < one.at(3.0) && one.at(3.0) < one.bounds().1 && names(&one.ticks()).len() >= 3);
-        let alike = Axis::of([3.0, 3.000_001]).expect("an axis");
+        let alike = LogAxis::of([3.0, 3.000_001]).expect("an axis");
         assert!(names(&alike.ticks()).len() >= 3, "{:?}", names(&alike.ticks()));
-        assert!(Axis::of([f64::NAN, f64::INFINITY]).is_none() && Axis::of([]).is_none());
+        assert!(LogAxis::of([f64::NAN, f64::INFINITY]).is_none() && LogAxis::of([]).is_none());
     }
 }

@@ -302,7 +302,7 @@ impl Stage {
         self.measures.iter().find(|m| m.name == name)
     }
 
-    /// How often settings were measured: "each setting 3 times", "7 settings 2 times, 12 once".
+    /// Numbers of runs: "each setting 3 times", "7 settings 2 times, 12 once".
     pub(crate) fn runs(&self) -> String {
         let mut settings: BTreeMap<usize, usize> = BTreeMap::new();
         self.points.iter().for_each(|p| *settings.entry(p.secs.each.len()).or_default() += 1);
@@ -351,7 +351,7 @@ pub struct Report {
     pub scene: String,
     /// The machine.
     pub computer: Computer,
-    /// How it was measured, in the order in which it was: commands. Earlier reports do not say.
+    /// Commands that measured it, the first first. Earlier reports do not say.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub commands: Vec<String>,
     /// The stages.

@@ -20,12 +20,12 @@ impl Span {
         (found.runs > 0 && [a, b, found.median].iter().all(|v| v.is_finite())).then_some(found)
     }
 
-    /// How far the repeats are apart, as a share; `None` of a single one.
+    /// Distance of the repeats, as a share; `None` of a single one.
     fn share(&self) -> Option<f64> {
         (self.runs > 1 && self.median > 0.0).then(|| (self.most - self.least) / self.median)
     }
 
-    /// Whether it is worse by more than repeats differ: no run of it is better than any of the other. `usual` is by what
+    /// Says if it is worse by more than repeats differ: no run of it is better than any of the other. `usual` is by what
     /// share runs differ elsewhere, for what ran once.
     fn is_worse_than(&self, other: &Self, usual: f64) -> bool {
         let usual = if self.runs.min(other.runs) > 1 { 0.0 } else { usual };

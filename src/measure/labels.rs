@@ -2,12 +2,12 @@
 
 /// A rectangle: least corner and size, y down.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Place {
+pub(crate) struct LabelBox {
     pub(crate) min: [f32; 2],
     pub(crate) size: [f32; 2],
 }
 
-impl Place {
+impl LabelBox {
     fn max(&self) -> [f32; 2] {
         [self.min[0] + self.size[0], self.min[1] + self.size[1]]
     }
@@ -32,18 +32,19 @@ const MARK: f32 = 6.0;
 const REACHES: [f32; 8] = [9.0, 16.0, 26.0, 40.0, 58.0, 80.0, 108.0, 140.0];
 /// Directions: right first, then above and below, left at last.
 const TURNS: [f32; 12] = [0.0, -30.0, 30.0, -60.0, 60.0, -90.0, 90.0, -120.0, 120.0, -150.0, 150.0, 180.0];
-/// What lies outside of the frame counts as much more than what lies under another label.
+/// Factor by which area outside of the frame counts more than area under another label.
 const OUTSIDE: f32 = 20.0;
-/// What a unit of distance counts, in units of hidden area.
+/// Cost of a unit of distance, in units of hidden area.
 const FAR: f32 = 1.0;
 
 /// A place for a label of each of these sizes beside its point, within `frame`. Labels come in the order that is given:
 /// earlier ones get the nearer places.
-pub(crate) fn place(points: &[[f32; 2]], sizes: &[[f32; 2]], frame: Place) -> Vec<Place> {
-    let marks: Vec<Place> = points.iter().map(|p| Place { min: p.map(|v| v - MARK), size: [2.0 * MARK; 2] }).collect();
-    let mut placed: Vec<Place> = Vec::with_capacity(points.len());
+pub(crate) fn place(points: &[[f32; 2]], sizes: &[[f32; 2]], frame: LabelBox) -> Vec<LabelBox> {
+    let marks: Vec<LabelBox> =
+        points.iter().map(|p| LabelBox { min: p.map(|v| v - MARK), size: [2.0 * MARK; 2] }).collect();
+    let mut placed: Vec<LabelBox> = Vec::with_capacity(points.len());
     for (point, size) in points.iter().zip(sizes) {
-        let mut best = (f32::INFINITY, Place { min: *point, size: *size });
+        let mut best = (f32::INFINITY, LabelBox { min: *point, size: *size });
         'search: for reach in REACHES {
             for turn in TURNS {
                 let label = beside(*point, *size, reach, turn);
@@ -66,22 +67,22 @@ pub(crate) fn place(points: &[[f32; 2]], sizes: &[[f32; 2]], frame: Place) -> Ve
 
 /// The label of this size whose nearest border is `reach` away from `point` in a direction, degrees from the right
 /// downward.
-fn beside(point: [f32; 2], size: [f32; 2], reach: f32, turn: f32) -> Place {
+fn beside(point: [f32; 2], size: [f32; 2], reach: f32, turn: f32) -> LabelBox {
     let (sin, cos) = turn.to_radians().sin_cos();
     // The side that is turned to the point slides along as the direction turns.
     let x = point[0] + reach * cos + size[0] * (0.5 * cos - 0.5);
     let y = point[1] + reach * sin + size[1] * (0.5 * sin - 0.5);
-    Place { min: [x, y], size }
+    LabelBox { min: [x, y], size }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const FRAME: Place = Place { min: [0.0; 2], size: [700.0, 460.0] };
+    const FRAME: LabelBox = LabelBox { min: [0.0; 2], size: [700.0, 460.0] };
 
-    fn hidden(labels: &[Place], points: &[[f32; 2]]) -> f32 {
-        let marks = points.iter().map(|p| Place { min: p.map(|v| v - MARK), size: [2.0 * MARK; 2] });
+    fn hidden(labels: &[LabelBox], points: &[[f32; 2]]) -> f32 {
+        let marks = points.iter().map(|p| LabelBox { min: p.map(|v| v - MARK), size: [2.0 * MARK; 2] });
         let under: f32 = marks.map(|m| labels.iter().map(|l| l.overlap(&m)).sum::<f32>()).sum();
         let each = |i: usize| labels[..i].iter().map(|o| o.overlap(&labels[i])).sum::<f32>();
         under + (0..labels.len()).map(each).sum::<f32>()
@@ -98,7 +99,7 @@ mod tests {
         assert_eq!(hidden(&labels, &points), 0.0, "{labels:?}");
         assert!(labels.iter().zip(&sizes).all(|(l, s)| (l.overlap(&FRAME) - s[0] * s[1]).abs() < 0.5), "all inside");
         // The control: labels that are all to the right of their points hide a good deal.
-        let naive: Vec<Place> = points.iter().zip(&sizes).map(|(p, s)| beside(*p, *s, 9.0, 0.0)).collect();
+        let naive: Vec<LabelBox> = points.iter().zip(&sizes).map(|(p, s)| beside(*p, *s, 9.0, 0.0)).collect();
         assert!(hidden(&naive, &points) > 2_000.0);
     }
 
@@ -114,7 +115,7 @@ mod tests {
     #[test]
     fn more_than_there_is_room_for_are_placed_all_the_same() {
         let points = vec![[20.0, 10.0]; 30];
-        let frame = Place { min: [0.0; 2], size: [60.0, 30.0] };
+        let frame = LabelBox { min: [0.0; 2], size: [60.0, 30.0] };
         assert_eq!(place(&points, &vec![[40.0, 12.0]; 30], frame).len(), 30);
     }
 }

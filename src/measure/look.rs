@@ -16,7 +16,7 @@ pub(crate) const COLORS: [[u8; 3]; 10] = [
 
 /// The shape of a mark, all of them closed: they can be filled or hollow.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Shape {
+pub(crate) enum MarkShape {
     Circle,
     Square,
     Diamond,
@@ -28,21 +28,28 @@ pub(crate) enum Shape {
 
 /// Shapes in turn. As many as have no divisor in common with the number of colors: only after 70 knobs does a look
 /// come again.
-const SHAPES: [Shape; 7] =
-    [Shape::Circle, Shape::Square, Shape::Up, Shape::Diamond, Shape::Down, Shape::Left, Shape::Right];
+const SHAPES: [MarkShape; 7] = [
+    MarkShape::Circle,
+    MarkShape::Square,
+    MarkShape::Up,
+    MarkShape::Diamond,
+    MarkShape::Down,
+    MarkShape::Left,
+    MarkShape::Right,
+];
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Look {
+pub(crate) struct KnobLook {
     pub(crate) color: [u8; 3],
-    pub(crate) shape: Shape,
+    pub(crate) shape: MarkShape,
 }
 
 /// The look of the knob with this number in its stage.
-pub(crate) fn look(k: usize) -> Look {
-    Look { color: COLORS[k % COLORS.len()], shape: SHAPES[k % SHAPES.len()] }
+pub(crate) fn look(k: usize) -> KnobLook {
+    KnobLook { color: COLORS[k % COLORS.len()], shape: SHAPES[k % SHAPES.len()] }
 }
 
-impl Shape {
+impl MarkShape {
     /// Corners of the shape around the origin, y down, as far from it as a circle of radius 1 looks; none of a circle.
     pub(crate) fn corners(self) -> &'static [[f64; 2]] {
         match self {
@@ -83,7 +90,7 @@ mod tests {
 
     #[test]
     fn no_two_of_seventy_knobs_look_alike() {
-        let looks: Vec<Look> = (0..70).map(look).collect();
+        let looks: Vec<KnobLook> = (0..70).map(look).collect();
         assert!((0..70).all(|i| (0..i).all(|j| looks[i] != looks[j])));
         // The control: there are 70 looks, and no more.
         assert_eq!(look(70), look(0));

@@ -2,16 +2,16 @@
 //! per knob, every point with its setting, the front under them, the spread of repeats through them.
 
 use super::axes::Axes;
-use super::axis::{Axis, Tick};
+use super::axis::{LogAxis, Tick};
 use super::document::{Measure, Point, Report, Stage};
-use super::labels::{self, Place};
-use super::look::{Look, look};
-use super::svg::{Anchor, BLACK, Stroke, Svg, lines, width};
+use super::labels::{self, LabelBox};
+use super::look::{KnobLook, look};
+use super::svg::{Anchor, BLACK, Svg, SvgStroke, lines, width};
 use crate::math::format;
 use crate::scene::text;
 
 const SIZE: [f64; 2] = [1000.0, 620.0];
-/// Where points are: least corner and size. The legend is beside it, the notes are below.
+/// The part for the points: least corner and size. The legend is beside it, the notes are below.
 const FRAME: Frame = Frame { min: [82.0, 52.0], size: [700.0, 452.0] };
 const GRAY: [u8; 3] = [90; 3];
 /// Size of labels, of numbers at axes and of the legend.
@@ -34,11 +34,11 @@ impl Frame {
         [self.x(&axes.secs, at[0]), self.y(&axes.error, at[1])]
     }
 
-    fn x(&self, axis: &Axis, at: f64) -> f64 {
+    fn x(&self, axis: &LogAxis, at: f64) -> f64 {
         self.min[0] + self.size[0] * share(axis, at)
     }
 
-    fn y(&self, axis: &Axis, at: f64) -> f64 {
+    fn y(&self, axis: &LogAxis, at: f64) -> f64 {
         self.min[1] + self.size[1] * (1.0 - share(axis, at))
     }
 
@@ -63,7 +63,7 @@ impl Frame {
                 false => svg.text([self.min[0] - 7.0, self.y(axis, at) + 4.0], Anchor::End, SMALL, BLACK, text),
             };
             for Tick { at, named } in axis.ticks() {
-                svg.line(&line(at), Stroke(BLACK, 1.0, if named { 0.14 } else { 0.05 }));
+                svg.line(&line(at), SvgStroke(BLACK, 1.0, if named { 0.14 } else { 0.05 }));
                 if named {
                     let value = 10.0_f64.powf(at);
                     name(svg, at, &if is_x { number(value) } else { format::tick(value) });
@@ -74,23 +74,23 @@ impl Frame {
                 let corner = if is_x { [self.min[0], self.min[1]] } else { from };
                 let size = if is_x { [to[0] - self.min[0], self.size[1]] } else { [self.size[0], bottom - from[1]] };
                 svg.area(corner, size, BLACK, 0.05);
-                svg.line(&[from, to], Stroke(GRAY, 1.0, 0.6));
+                svg.line(&[from, to], SvgStroke(GRAY, 1.0, 0.6));
                 name(svg, axis.at(0.0), axis.zero_name());
                 // Two strokes across the axis: what is beyond is no continuation of it.
                 for k in [-2.5, 2.5] {
                     let at = if is_x { [from[0] + k, bottom] } else { [self.min[0], from[1] + k] };
                     let ends = [[at[0] - 4.0, at[1] + 3.0], [at[0] + 4.0, at[1] - 3.0]];
-                    svg.line(&ends, Stroke(BLACK, 1.2, 1.0));
+                    svg.line(&ends, SvgStroke(BLACK, 1.2, 1.0));
                 }
             }
         }
-        svg.line(&[self.min, [self.min[0], bottom], [right, bottom]], Stroke(BLACK, 1.2, 0.8));
+        svg.line(&[self.min, [self.min[0], bottom], [right, bottom]], SvgStroke(BLACK, 1.2, 0.8));
         svg.text([self.min[0] + 0.5 * self.size[0], bottom + 36.0], Anchor::Middle, 13.0, BLACK, x_name);
         svg.text_upward([self.min[0] - 62.0, self.min[1] + 0.5 * self.size[1]], 13.0, y_name);
     }
 }
 
-fn share(axis: &Axis, at: f64) -> f64 {
+fn share(axis: &LogAxis, at: f64) -> f64 {
     let (low, high) = axis.bounds();
     (at - low) / (high - low)
 }
@@ -134,27 +134,27 @@ fn front(svg: &mut Svg, axes: &Axes, stage: &Stage, measure: &Measure) {
             along.push(*at);
         }
     }
-    svg.line(&along, Stroke(BLACK, 8.0, 0.1));
-    on.iter().for_each(|at| svg.halo(*at, 8.5, Stroke(BLACK, 3.0, 0.3)));
+    svg.line(&along, SvgStroke(BLACK, 8.0, 0.1));
+    on.iter().for_each(|at| svg.halo(*at, 8.5, SvgStroke(BLACK, 3.0, 0.3)));
 }
 
-fn series(svg: &mut Svg, axes: &Axes, (stage, measure): (&Stage, &Measure), method: &str, look: Look) {
+fn series(svg: &mut Svg, axes: &Axes, (stage, measure): (&Stage, &Measure), method: &str, look: KnobLook) {
     let points: Vec<&Point> = stage.points.iter().filter(|p| p.method == method).collect();
     let placed = |at: &[f64; 2]| FRAME.place(axes, *at);
     for p in &points {
         let way: Vec<[f64; 2]> = axes.way(stage, p, measure).iter().map(placed).collect();
         if way.len() > 1 {
-            svg.line(&way, Stroke(look.color, 1.0, 0.35));
+            svg.line(&way, SvgStroke(look.color, 1.0, 0.35));
         }
         for ends in axes.whiskers(p, measure) {
-            svg.line(&ends.map(|at| placed(&at)), Stroke(look.color, 1.6, 0.55));
+            svg.line(&ends.map(|at| placed(&at)), SvgStroke(look.color, 1.6, 0.55));
         }
     }
     // In the order of the settings: times in the order of their noise would zigzag.
     let placed = |p: &&Point| Some((placed(&axes.place(p, measure)?), p.default));
     let line: Vec<([f64; 2], bool)> = points.iter().filter_map(placed).collect();
     let places: Vec<[f64; 2]> = line.iter().map(|l| l.0).collect();
-    svg.line(&places, Stroke(look.color, 1.0, 0.5));
+    svg.line(&places, SvgStroke(look.color, 1.0, 0.5));
     line.iter().for_each(|(at, default)| svg.mark(look, *at, RADIUS[usize::from(*default)]));
 }
 
@@ -169,12 +169,12 @@ fn name_points(svg: &mut Svg, axes: &Axes, (stage, measure): (&Stage, &Measure),
     let single = |v: [f64; 2]| v.map(|v| v as f32);
     let points: Vec<[f32; 2]> = named.iter().map(|n| single(n.0)).collect();
     let sizes: Vec<[f32; 2]> = named.iter().map(|n| single([width(&n.1, SMALL) + 3.0, SMALL + 1.0])).collect();
-    let places = labels::place(&points, &sizes, Place { min: single(FRAME.min), size: single(FRAME.size) });
+    let places = labels::place(&points, &sizes, LabelBox { min: single(FRAME.min), size: single(FRAME.size) });
     for ((at, label, color), place) in named.iter().zip(places) {
         let dark = color.map(|v| (f64::from(v) * 0.72) as u8);
         let near = place.nearest(single(*at)).map(f64::from);
         if (near[0] - at[0]).hypot(near[1] - at[1]) > 12.0 {
-            svg.line(&[*at, near], Stroke(dark, 0.6, 0.7));
+            svg.line(&[*at, near], SvgStroke(dark, 0.6, 0.7));
         }
         let base = [f64::from(place.min[0]), f64::from(place.min[1]) + SMALL - 1.5];
         svg.label(base, SMALL, dark, label);
@@ -200,7 +200,7 @@ fn legend(svg: &mut Svg, axes: &Axes, (stage, measure): (&Stage, &Measure), meth
         let mark = |svg: &mut Svg, at| svg.mark(look(k), at, RADIUS[usize::from(is_default)]);
         row(svg, &text::elided(method, MOST_LETTERS), &mark);
     }
-    row(svg, "on the front: nothing is better", &|svg, at| svg.halo(at, 7.0, Stroke(BLACK, 3.0, 0.3)));
+    row(svg, "on the front: nothing is better", &|svg, at| svg.halo(at, 7.0, SvgStroke(BLACK, 3.0, 0.3)));
     row(svg, "by more than repeats differ", &|_, _| {});
 }
 
@@ -208,7 +208,7 @@ fn legend(svg: &mut Svg, axes: &Axes, (stage, measure): (&Stage, &Measure), meth
 pub(crate) fn order_svg(order: &super::document::Order) -> Option<String> {
     let pairs: Vec<[f64; 2]> = order.pairs.iter().filter(|p| p[0] > 0.0 && p[1].is_finite()).copied().collect();
     let first = pairs.iter().find(|p| p[1] > 0.0)?;
-    let axes = Axes { secs: Axis::of(pairs.iter().map(|p| p[0]))?, error: Axis::of(pairs.iter().map(|p| p[1]))? };
+    let axes = Axes { secs: LogAxis::of(pairs.iter().map(|p| p[0]))?, error: LogAxis::of(pairs.iter().map(|p| p[1]))? };
     let frame = Frame { min: [78.0, 34.0], size: [330.0, 212.0] };
     let mut svg = Svg::new([430.0, 300.0]);
     svg.text([12.0, 20.0], Anchor::Start, 13.0, BLACK, &text::elided(&order.what, 60));
@@ -220,10 +220,10 @@ pub(crate) fn order_svg(order: &super::document::Order) -> Option<String> {
     let end = (first[0] * (first[1] / least).powf(1.0 / order.expected)).min(last[0]);
     if order.expected > 0.0 && end > first[0] {
         let slope = [end, first[1] * (end / first[0]).powf(-order.expected)];
-        svg.line(&[at(*first), at(slope)], Stroke(BLACK, 5.0, 0.15));
+        svg.line(&[at(*first), at(slope)], SvgStroke(BLACK, 5.0, 0.15));
     }
     let places: Vec<[f64; 2]> = pairs.iter().map(|p| at(*p)).collect();
-    svg.line(&places, Stroke(look(0).color, 1.0, 0.6));
+    svg.line(&places, SvgStroke(look(0).color, 1.0, 0.6));
     places.iter().for_each(|p| svg.mark(look(0), *p, RADIUS[0]));
     Some(svg.finish(&order.what))
 }

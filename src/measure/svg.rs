@@ -2,13 +2,13 @@
 
 use htmlize::escape_all_quotes;
 
-use super::look::{Look, Shape};
+use super::look::{KnobLook, MarkShape};
 
 /// A stroke: color, width, opacity.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Stroke(pub(crate) [u8; 3], pub(crate) f64, pub(crate) f64);
+pub(crate) struct SvgStroke(pub(crate) [u8; 3], pub(crate) f64, pub(crate) f64);
 
-/// Which end of a text is at its place.
+/// The end of a text that is at its place.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Anchor {
     Start,
@@ -50,7 +50,7 @@ impl Svg {
         );
     }
 
-    pub(crate) fn line(&mut self, points: &[[f64; 2]], Stroke(color, width, opacity): Stroke) {
+    pub(crate) fn line(&mut self, points: &[[f64; 2]], SvgStroke(color, width, opacity): SvgStroke) {
         let all: Vec<String> = points.iter().map(|[x, y]| format!("{x:.1},{y:.1}")).collect();
         self.body += &format!(
             "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{width}\" stroke-opacity=\"{opacity}\" \
@@ -61,10 +61,10 @@ impl Svg {
     }
 
     /// A mark, with a rim that sets it off from what lies under it.
-    pub(crate) fn mark(&mut self, look: Look, [x, y]: [f64; 2], radius: f64) {
+    pub(crate) fn mark(&mut self, look: KnobLook, [x, y]: [f64; 2], radius: f64) {
         let how = format!("fill=\"{}\" stroke=\"#fff\" stroke-width=\"0.8\"", hex(look.color));
         self.body += &match look.shape {
-            Shape::Circle => format!("<circle class=\"mark\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" {how}/>\n"),
+            MarkShape::Circle => format!("<circle class=\"mark\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" {how}/>\n"),
             shape => {
                 let corner = |c: &[f64; 2]| format!("{:.1},{:.1}", x + radius * c[0], y + radius * c[1]);
                 let corners: Vec<String> = shape.corners().iter().map(corner).collect();
@@ -74,7 +74,7 @@ impl Svg {
     }
 
     /// A pale ring of this radius around a place.
-    pub(crate) fn halo(&mut self, [x, y]: [f64; 2], radius: f64, Stroke(color, width, opacity): Stroke) {
+    pub(crate) fn halo(&mut self, [x, y]: [f64; 2], radius: f64, SvgStroke(color, width, opacity): SvgStroke) {
         self.body += &format!(
             "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{width}\" \
              stroke-opacity=\"{opacity}\"/>\n",

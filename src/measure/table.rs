@@ -38,7 +38,7 @@ pub(crate) fn spread(sample: &Sample, show: impl Fn(f64) -> String) -> String {
     if range.is_empty() { range } else { format!("{} ({range})", show(sample.median)) }
 }
 
-/// How far the repeats are apart: "0.03530 to 0.03640", "one run", "3 runs alike".
+/// Distance of the repeats: "0.03530 to 0.03640", "one run", "3 runs alike".
 pub(crate) fn range(sample: &Sample, show: impl Fn(f64) -> String) -> String {
     match sample.each.len() {
         0 => String::new(),

@@ -18,9 +18,10 @@ fn root() -> &'static Path {
 fn texts(folder: &Path, found: &mut Vec<String>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
-        let is_test = path.file_stem().is_some_and(|name| name.to_string_lossy().starts_with("test"));
-        if is_test {
-        } else if path.is_dir() {
+        if path.file_stem().is_some_and(|name| name.to_string_lossy().starts_with("test")) {
+            continue;
+        }
+        if path.is_dir() {
             texts(&path, found);
         } else if path.extension().is_some_and(|e| e == "rs") {
             literals(&fs::read_to_string(&path).unwrap(), found);
@@ -39,10 +40,10 @@ fn literals(code: &str, found: &mut Vec<String>) {
         } else if here.starts_with("'\"'") || here.starts_with("'\\") {
             // A character, which may be a quotation mark.
             &here[here[2..].find('\'').map_or(2, |end| end + 3)..]
-        } else if here.starts_with('"') {
+        } else if let Some(inside) = here.strip_prefix('"') {
             let hashes = before.chars().rev().take_while(|c| *c == '#').count();
             let is_raw = before.trim_end_matches('#').ends_with('r');
-            let (text, next) = if is_raw { raw(&here[1..], hashes) } else { cooked(&here[1..]) };
+            let (text, next) = if is_raw { raw(inside, hashes) } else { cooked(inside) };
             found.push(text);
             next
         } else {
@@ -91,7 +92,7 @@ fn code_after(code: &str, from: usize) -> std::str::CharIndices<'_> {
     letters
 }
 
-/// Whether a text has the parts of a phrase, one after the other.
+/// Says if a text has the parts of a phrase, one after the other.
 fn says(text: &str, phrase: &str) -> bool {
     let mut rest = text;
     phrase.split('…').all(|part| match rest.find(part.trim()) {
@@ -112,7 +113,7 @@ fn phrases(document: &str) -> Vec<(String, String)> {
     rows.flat_map(|row| quoted(row).into_iter().map(|phrase| (phrase, row.to_owned()))).collect()
 }
 
-/// What is wrong with the table: rows without words, phrases that are too short or that nothing says.
+/// Faults of the table: rows without words, phrases that are too short or that nothing says.
 fn complaints(document: &str, texts: &[String]) -> Vec<String> {
     let found = phrases(document);
     let table = document.split_once(HEADING).map_or("", |(_, rest)| rest);

@@ -2,13 +2,13 @@
 
 use egui_plot::{GridInput, GridMark};
 
-use crate::measure::axis::{Axis, ticks};
+use crate::measure::axis::{LogAxis, ticks};
 
-/// What counts for a mark with a number, and for one without.
+/// Step sizes of marks without a number, and with one.
 const SIZES: [f64; 2] = [0.08, 1.0];
 
 /// Marks of an axis in the part of it that is in view, in decimal logarithms, and one in the band of zero.
-pub(crate) fn marks(axis: &Axis, input: &GridInput) -> Vec<GridMark> {
+pub(crate) fn marks(axis: &LogAxis, input: &GridInput) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     let low = axis.band_end().map_or(low, |end| low.max(end));
     let mark = |at: f64, named: bool| GridMark { value: at, step_size: SIZES[usize::from(named)] };
@@ -17,7 +17,7 @@ pub(crate) fn marks(axis: &Axis, input: &GridInput) -> Vec<GridMark> {
 }
 
 /// The number of a mark, if it has one.
-pub(crate) fn label(axis: &Axis, mark: GridMark, text: impl Fn(f64) -> String) -> String {
+pub(crate) fn label(axis: &LogAxis, mark: GridMark, text: impl Fn(f64) -> String) -> String {
     match axis.band_end() {
         _ if mark.step_size < SIZES[1] => String::new(),
         Some(end) if mark.value < end => axis.zero_name().to_owned(),
@@ -30,18 +30,18 @@ mod tests {
     use super::*;
     use crate::math::format::tick;
 
-    fn texts(axis: &Axis, bounds: (f64, f64)) -> Vec<String> {
+    fn texts(axis: &LogAxis, bounds: (f64, f64)) -> Vec<String> {
         let input = GridInput { bounds, base_step_size: 1.0 };
         marks(axis, &input).into_iter().map(|m| label(axis, m, tick)).filter(|t| !t.is_empty()).collect()
     }
 
     #[test]
     fn marks_follow_what_is_in_view_and_zero_has_its_own() {
-        let axis = Axis::of([0.0, 1e-3, 1.0]).expect("an axis");
+        let axis = LogAxis::of([0.0, 1e-3, 1.0]).expect("an axis");
         assert_eq!(texts(&axis, axis.bounds()), ["0.001", "0.01", "0.1", "1", "0"]);
         assert_eq!(texts(&axis, (0.030_f64.log10(), 0.0305_f64.log10())).len(), 6 + 1, "zoomed in");
         // The control: without a zero there is no mark of one.
-        let above = Axis::of([1e-3, 1.0]).expect("an axis");
+        let above = LogAxis::of([1e-3, 1.0]).expect("an axis");
         assert_eq!(texts(&above, above.bounds()), ["0.001", "0.01", "0.1", "1"]);
     }
 }

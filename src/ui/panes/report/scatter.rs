@@ -8,13 +8,13 @@ use super::super::super::theme;
 use super::grid;
 use crate::math::format;
 use crate::measure::axes::Axes;
-use crate::measure::labels::{self, Place};
-use crate::measure::look::{Shape, look};
+use crate::measure::labels::{self, LabelBox};
+use crate::measure::look::{MarkShape, look};
 use crate::measure::{Measure, Point, Stage, table};
 
 /// How near the pointer must be to a point, in window points.
 const NEAR: f32 = 14.0;
-/// How far a label is from its point before a line leads to it, in window points.
+/// Distance of a label from its point at which a line leads to it, in window points.
 const AWAY: f32 = 12.0;
 
 pub(crate) struct Scatter<'a> {
@@ -101,7 +101,7 @@ impl<'a> Scatter<'a> {
         let named: Vec<_> = self.stage.points.iter().filter_map(named).collect();
         let points: Vec<[f32; 2]> = named.iter().map(|n| [n.0.x, n.0.y]).collect();
         let sizes: Vec<[f32; 2]> = named.iter().map(|n| [n.1.size().x, n.1.size().y]).collect();
-        let frame = Place { min: [frame.min.x, frame.min.y], size: [frame.width(), frame.height()] };
+        let frame = LabelBox { min: [frame.min.x, frame.min.y], size: [frame.width(), frame.height()] };
         for ((at, text, color), place) in named.into_iter().zip(labels::place(&points, &sizes, frame)) {
             let near: egui::Pos2 = place.nearest([at.x, at.y]).into();
             if near.distance(at) > AWAY {
@@ -237,13 +237,13 @@ pub(crate) fn color(k: usize) -> Color32 {
 
 fn shape(k: usize) -> MarkerShape {
     match look(k).shape {
-        Shape::Circle => MarkerShape::Circle,
-        Shape::Square => MarkerShape::Square,
-        Shape::Diamond => MarkerShape::Diamond,
-        Shape::Up => MarkerShape::Up,
-        Shape::Down => MarkerShape::Down,
-        Shape::Left => MarkerShape::Left,
-        Shape::Right => MarkerShape::Right,
+        MarkShape::Circle => MarkerShape::Circle,
+        MarkShape::Square => MarkerShape::Square,
+        MarkShape::Diamond => MarkerShape::Diamond,
+        MarkShape::Up => MarkerShape::Up,
+        MarkShape::Down => MarkerShape::Down,
+        MarkShape::Left => MarkerShape::Left,
+        MarkShape::Right => MarkerShape::Right,
     }
 }
 
