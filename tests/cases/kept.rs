@@ -14,7 +14,13 @@ fn boxes(to: &Path) -> (PathBuf, PathBuf) {
         for entry in std::fs::read_dir(from).expect("folder") {
             let path = entry.expect("entry").path();
             let to = to.join(path.file_name().expect("a name"));
-            if path.is_dir() { copy(&path, &to) } else { drop(std::fs::copy(&path, &to).expect("copied")) }
+            if path.is_dir() {
+                copy(&path, &to)
+            } else {
+                {
+                    std::fs::copy(&path, &to).expect("copied");
+                }
+            }
         }
     }
     copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/first_version"), to);
