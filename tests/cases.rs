@@ -6,6 +6,8 @@ mod cli_support;
 mod common;
 #[path = "cases/data_sets.rs"]
 mod data_sets;
+#[path = "cases/kept.rs"]
+mod kept;
 #[path = "cases/labels.rs"]
 mod labels;
 #[path = "cases/lenses.rs"]

@@ -104,6 +104,9 @@ pub(crate) fn run(
         edit::store(folder, scene.state.as_deref(), &new, &scene.cloud)?;
         let id = new.identities.len() as crate::scene::IdentityId;
         lines.push(format!("kept as '{}': {count}", new.identities.full_name(id)));
+        lines.extend(
+            edit::emptied(&map, &new).iter().map(|name| format!("{name} is empty now: it had no other Gaussians")),
+        );
     }
     output::print(&lines.join("\n"))
 }

@@ -46,6 +46,9 @@ pub(super) fn unpack(bytes: &[u8], path: &Path) -> Result<Option<GaussianCloud>,
     let shapes: Vec<&[f32]> = shapes.chunks_exact(SHAPE).collect();
     // What was taken out hangs together, so one of its places is near all others.
     let origin = places.first().copied().unwrap_or_default();
+    if !places.iter().all(|p| (*p - origin).as_vec3().is_finite()) {
+        return Err(broken("its places are too far apart"));
+    }
     Ok(Some(GaussianCloud {
         origin,
         positions: places.iter().map(|p| (*p - origin).as_vec3().to_array()).collect(),
@@ -55,4 +58,33 @@ pub(super) fn unpack(bytes: &[u8], path: &Path) -> Result<Option<GaussianCloud>,
         sh: vec![[0.0; 3]; places.len()],
         ..GaussianCloud::default()
     }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::io::semantic_map;
+    use crate::scene::{Identities, SemanticMap};
+
+    #[test]
+    fn what_was_taken_out_is_stored_with_the_map() {
+        let gone = |x: f64| GaussianCloud {
+            origin: DVec3::new(500_000.0, x, 0.0),
+            ..GaussianCloud::isotropic(vec![[0.25, 0.0, 0.0], [0.0, 0.5, 0.0]], -2.0, 1.5)
+        };
+        let path = Path::new("map");
+        let mut map = SemanticMap::from_identities(Identities::default(), Vec::new(), Vec::new(), Vec::new());
+        let bytes = semantic_map::encode(&map, None, path).expect("encoded");
+        assert_eq!(unpack(&bytes, path).expect("readable"), None, "nothing was taken out");
+        map.add_removed(gone(0.0));
+        map.add_removed(gone(7.0));
+        let bytes = semantic_map::encode(&map, None, path).expect("encoded");
+        let read = unpack(&bytes, path).expect("readable").expect("both");
+        let places = |cloud: &GaussianCloud| (0..cloud.len()).map(|i| cloud.world_position(i)).collect::<Vec<_>>();
+        let all = map.removed.expect("both");
+        assert_eq!((places(&read), read.len()), (places(&all), 4));
+        assert_eq!((&read.log_scales, &read.quaternions, &read.opacity_logits), {
+            (&all.log_scales, &all.quaternions, &all.opacity_logits)
+        });
+    }
 }

@@ -3,7 +3,7 @@
 use super::photos_without::is_without;
 use super::{JobError, Scene};
 use crate::io::semantic_map;
-use crate::jobs::find_objects::listed;
+use crate::jobs::find_objects::removed_names;
 use crate::pipeline::observer::Severity;
 use crate::pipeline::semantics::removed::RemovedThings;
 use crate::render::{RenderSettings, Renderer};
@@ -31,10 +31,10 @@ impl ChangedScene {
 
     /// In words, if there is anything to say.
     pub(crate) fn told(&self) -> Option<(Severity, String)> {
-        let names = listed(&self.names);
+        let names = removed_names(&self.names);
         let removed = match (self.names.is_empty(), &self.removed) {
-            (true, _) => None,
-            (false, Some(_)) => Some((
+            (true, None) => None,
+            (_, Some(_)) => Some((
                 Severity::Info,
                 format!("The photos still show what was removed ({names}): their pixels of it are left out"),
             )),

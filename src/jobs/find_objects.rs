@@ -268,8 +268,9 @@ fn before(folder: &Path, observer: &mut dyn Observer) -> Option<SemanticMap> {
 
 /// What was taken out of a scene, and names by which it is told where its Gaussians were not kept.
 fn gone(before: Option<&SemanticMap>, observer: &mut dyn Observer) -> (Option<Arc<GaussianCloud>>, Vec<String>) {
-    let Some(map) = before.filter(|map| !map.identities.removed.is_empty()) else { return (None, Vec::new()) };
-    let names = listed(&map.identities.removed);
+    let is_whole = |map: &&SemanticMap| map.identities.removed.is_empty() && map.removed.is_none();
+    let Some(map) = before.filter(|map| !is_whole(map)) else { return (None, Vec::new()) };
+    let names = removed_names(&map.identities.removed);
     if map.removed.is_some() {
         let text =
             format!("What was removed ({names}) is not looked for: where photos still show it, they are left out");
@@ -283,6 +284,11 @@ fn gone(before: Option<&SemanticMap>, observer: &mut dyn Observer) -> (Option<Ar
     observer.note(Severity::Warning, text);
     let is_left = |name: &String| map.identities.iter().any(|(_, i)| i.names.contains(name));
     (None, map.identities.removed.iter().filter(|name| !is_left(name)).cloned().collect())
+}
+
+/// What was removed, in words; what had no name has none here.
+pub(crate) fn removed_names(names: &[String]) -> String {
+    if names.is_empty() { "a thing without a name".to_owned() } else { listed(names) }
 }
 
 /// Full names of what somebody has worked on.

@@ -162,9 +162,5 @@ fn finished(outcome: TrainOutcome, out: PathBuf, observer: &mut dyn Observer) ->
         let scene = Scene { path: done.out.clone(), folder, cloud, state, ..Scene::default() };
         done.semantics = open::known_objects(&scene, observer);
     }
-    if !done.is_finished() && done.semantics.is_some() {
-        let text = "Its objects are stored with the Gaussians as they are now; open the scene again to see them";
-        observer.note(Severity::Info, text.into());
-    }
     Ok(done)
 }

@@ -8,6 +8,7 @@ use glam::DVec3;
 
 use super::app::App;
 use super::find_dialog::{AwaitedModels, Means};
+use super::history::FoundStep;
 use super::keep_dialog::{KeepAnswer, KeepDialog, PlannedSearch};
 use super::labels::sentence;
 use super::panes::models::Models;
@@ -15,14 +16,6 @@ use super::state::Tone;
 use crate::jobs::find_objects::{self, FindRequest, FindSettings};
 use crate::scene::{Camera, SemanticMap};
 use crate::worker::{Command, Event, JobId};
-
-/// A search of objects and parts, which becomes a step of the history.
-pub(super) struct FoundStep {
-    pub(super) job: JobId,
-    what: String,
-    /// Whether it adds to what is there.
-    adds: bool,
-}
 
 impl App {
     /// Finds objects and parts with the labels that came with the photos; without, asks what is to look at them.

@@ -5,14 +5,13 @@ use std::sync::Arc;
 
 use egui::{CentralPanel, Frame, Margin, Panel, Ui};
 
-use super::act_find::FoundStep;
 use super::camera::CameraPane;
 use super::chat::Chat;
 use super::dialogs::{self, Question};
 use super::dock::{DockContents, Place};
 use super::file_dialogs::FileDialogs;
 use super::find_dialog::{AwaitedModels, FindDialog};
-use super::history::{EditStep, Editing};
+use super::history::{EditStep, Editing, FoundStep};
 use super::keep_dialog::KeepDialog;
 use super::layout::Layout;
 use super::palette::{Palette, shortcut_sheet};

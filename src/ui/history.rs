@@ -281,6 +281,15 @@ pub(super) struct Editing {
     pub(super) redo: bool,
 }
 
+/// A search of objects and parts that is under way and becomes a step of the history.
+pub(super) struct FoundStep {
+    pub(super) job: JobId,
+    /// What it does, in words.
+    pub(super) what: String,
+    /// Whether it adds to what is there.
+    pub(super) adds: bool,
+}
+
 #[cfg(test)]
 mod tests {
     use glam::{DMat3, DVec3};

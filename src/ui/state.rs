@@ -308,18 +308,22 @@ impl AppState {
                 self.say(Tone::Info, format!("{} measured", format::things(measured.cloud.len(), "Gaussian")));
                 self.splats_measured = Some(measured);
             }
-            Outcome::Trained { evaluations, out, semantics, runs, facts } => {
+            Outcome::Trained { evaluations, out, semantics, runs, stopped_at, facts } => {
                 let carried = semantics.is_some();
                 if self.training_job == Some(job) {
                     self.history.evaluations = evaluations;
                     self.set_facts(*facts);
                     self.set_semantics(semantics);
                     self.scene = self.scene.take().map(|s| Arc::new(OpenedScene { runs, ..s.trained_in(&out) }));
-                    let reached = self.history.steps.last().map(|s| s.step);
+                    let reached = stopped_at.or(self.history.steps.last().map(|s| s.step));
                     self.resumable.iter_mut().zip(reached).for_each(|((_, step), reached)| *step = reached);
                 }
-                let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));
                 self.say(Tone::Info, format!("Saved to {}{}", out.display(), self.elsewhere()));
+                if let Some(ended) = ended.filter(|_| stopped_at.is_some()) {
+                    self.toast(Tone::Info, format!("{}: canceled", ended.title));
+                    return next;
+                }
+                let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));
                 self.toast(Tone::Good, format!("Training finished{}", quality.unwrap_or_default()));
                 let has_masks = self.scene.as_ref().is_some_and(|s| s.masks.is_some());
                 next.extend((has_masks && !carried).then_some(Action::FindObjects));

@@ -83,7 +83,8 @@ impl PipelineJobs {
         };
         self.knows(&done.out, done.state.clone());
         self.uses(&done.out);
-        if !done.is_finished() {
+        let stopped_at = (!done.is_finished()).then_some(done.outcome.steps);
+        if stopped_at == Some(0) {
             return Err(Stop::Cancelled);
         }
         let Trained { outcome, out, semantics, .. } = done;
@@ -91,7 +92,7 @@ impl PipelineJobs {
         let facts = plan::facts(self.machine(), Some(dataset), Some((cloud, cloud.sh_degree)), config);
         let facts = Box::new(facts.with_semantics(semantics.as_deref()));
         let runs = recent::runs(&self.folders, &dataset.root);
-        Ok(Outcome::Trained { evaluations: outcome.evaluations, out, semantics, runs, facts })
+        Ok(Outcome::Trained { evaluations: outcome.evaluations, out, semantics, runs, stopped_at, facts })
     }
 }
 

@@ -236,7 +236,7 @@ pub enum Outcome {
     Beside(Box<OpenedScene>),
     /// There are photos, and nobody knows from where they were taken.
     Unposed(Box<Unposed>),
-    /// Training is done; the Gaussians lie in the slot.
+    /// Training is done, or was canceled and is stored as far as it came; the Gaussians lie in the slot.
     Trained {
         /// Evaluations of the whole run, oldest first.
         evaluations: Vec<Evaluation>,
@@ -246,6 +246,8 @@ pub enum Outcome {
         semantics: Option<Arc<SemanticMap>>,
         /// All trainings of these photos that this program keeps.
         runs: Vec<RunSummary>,
+        /// The step at which it was canceled, if it was.
+        stopped_at: Option<u64>,
         /// What the plan of the result is computed from.
         facts: Box<SceneFacts>,
     },

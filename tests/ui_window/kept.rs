@@ -21,6 +21,16 @@ fn own(map: &SemanticMap, name: &str) -> Vec<usize> {
     id.map_or_else(Vec::new, |id| (0..map.identity_of.len()).filter(|i| map.identity_of[*i] == id).collect())
 }
 
+/// Finds objects, with this answer where there is a question, and waits for the end.
+fn search(w: &mut Window, answer: Option<&str>) {
+    let before = said(w.app(), "found");
+    w.ask(Action::FindObjects);
+    answer.into_iter().for_each(|answer| w.click(answer));
+    w.until("the search", |a| a.state.job.is_some());
+    w.until("its end", |a| a.state.job.is_none());
+    assert!(said(w.app(), "found") > before && w.app().state.error.is_none());
+}
+
 fn said(app: &App, text: &str) -> usize {
     app.state.log.iter().filter(|line| line.text.contains(text)).count()
 }
@@ -51,9 +61,7 @@ fn finding_objects_anew_asks_what_is_kept_and_is_undone() {
     w.harness.run_steps(3);
     assert!(!w.shows("Keep the 2") && w.app().state.job.is_none() && *map(w.app()) == before);
 
-    w.ask(Action::FindObjects);
-    w.click("Keep them");
-    w.until("objects", |a| said(a, " found") == 1);
+    search(&mut w, Some("Keep them"));
     assert_eq!(said(w.app(), "Kept as it was"), 1, "what is kept is told");
     for name in ["crate", "lid", "box 1"] {
         assert_eq!(own(map(w.app()), name), own(&before, name), "{name}");
@@ -66,13 +74,11 @@ fn finding_objects_anew_asks_what_is_kept_and_is_undone() {
     w.ask(Action::Redo);
     w.until("again", |a| *map(a) == kept);
 
-    w.ask(Action::FindObjects);
-    w.click("Replace all");
-    w.until("objects", |a| said(a, " found") == 2);
+    search(&mut w, Some("Replace all"));
     assert!(own(map(w.app()), "crate").is_empty() && own(map(w.app()), "lid").is_empty());
     assert!(!own(map(w.app()), "box 0").is_empty());
-    w.ask(Action::FindObjects);
-    w.until("without a question: nothing was made by hand", |a| said(a, " found") == 3);
+    // Without a question: nothing was made by hand.
+    search(&mut w, None);
     for _ in 0..2 {
         w.ask(Action::Undo);
         w.harness.run_steps(5);
@@ -112,7 +118,7 @@ fn a_second_training_goes_on_or_stands_beside_the_first_with_its_objects() {
     w.until("the photos", |a| a.state.scene.is_some());
     let last = |a: &App| a.state.history.steps.last().map_or(0, |s| s.step);
     let layout = &mut w.harness.state_mut().layout;
-    (layout.config.steps, layout.finding.encoder) = (60, Some("none".into()));
+    (layout.config.steps, layout.finding.encoder) = (100, Some("none".into()));
     w.ask(Action::StartTraining);
     w.until("objects after training", |a| a.state.semantics.is_some() && a.state.job.is_none());
     let out = |a: &App| a.state.scene.as_ref().expect("open").out.clone();
@@ -122,31 +128,47 @@ fn a_second_training_goes_on_or_stands_beside_the_first_with_its_objects() {
 
     // More steps go on from those that were done.
     w.click("Training");
-    w.harness.state_mut().layout.config.steps = 90;
+    w.harness.state_mut().layout.config.steps = 150;
     w.harness.run_steps(2);
-    assert!(w.shows("Go on from 60 steps") && w.shows("Begin anew"));
+    assert!(w.shows("Go on from 100 steps") && w.shows("Begin anew"));
     w.ask(Action::StartTraining);
-    w.until("30 more steps", |a| a.state.job.is_none() && last(a) == 90);
+    w.until("50 more steps", |a| a.state.job.is_none() && last(a) == 150);
     assert_eq!((out(w.app()), map(w.app()).identities.name(1)), (first.clone(), "mine".into()));
-    assert!(w.app().state.history.steps.iter().any(|s| s.step <= 60), "it is one training");
-    assert_eq!(said(w.app(), "Continuing at step 60 of 90"), 1);
+    assert!(w.app().state.history.steps.iter().any(|s| s.step <= 100), "it is one training");
+    assert_eq!(said(w.app(), "Continuing at step 100 of 150"), 1);
 
     // One that begins anew stands beside it, with its objects.
     w.click("Training");
     w.click("Begin anew");
-    w.until("another training", |a| a.state.job.is_none() && last(a) == 90 && out(a) != first);
+    w.until("another training", |a| a.state.job.is_none() && last(a) == 150 && out(a) != first);
     let second = out(w.app());
     assert_eq!(map(w.app()).identities.name(1), "mine", "objects came along");
     assert_eq!(said(w.app(), "were carried over to"), 1);
     assert_eq!(w.app().state.scene.as_ref().expect("open").runs.len(), 2);
     w.click("Training");
-    assert!(w.shows("run-1: 90 steps"), "the other one is listed");
+    assert!(w.shows("run-1: 150 steps"), "the other one is listed");
+
+    // One that is canceled has them, too, and goes on where it was, not beside that.
+    w.harness.state_mut().layout.config.steps = 50_000;
+    w.ask(Action::TrainAnew);
+    w.until("a third training", |a| a.state.is_training() && last(a) > 5 && last(a) != 150);
+    w.ask(Action::Cancel);
+    w.until("its end", |a| a.state.job.is_none());
+    let third = out(w.app());
+    assert!(third != first && third != second && map(w.app()).identities.name(1) == "mine");
+    let reached = last(w.app());
+    w.click("Training");
+    w.harness.get_by_label_contains("Continue (").click();
+    w.until("further steps", |a| a.state.is_training() && last(a) > reached);
+    w.ask(Action::Cancel);
+    w.until("its end", |a| a.state.job.is_none());
+    assert_eq!(out(w.app()), third);
 
     // Whichever is used last is what the photos are opened with.
     w.ask(Action::Open(first.clone()));
     w.until("the first training", |a| out(a) == first);
     assert_eq!(w.app().state.recent, [photos()], "one entry for the photos");
-    for used in [first, second] {
+    for used in [first, second, third] {
         w.ask(Action::Open(used.clone()));
         w.until("a training", |a| out(a) == used);
         drop(w);
@@ -161,7 +183,7 @@ fn a_second_training_goes_on_or_stands_beside_the_first_with_its_objects() {
     std::fs::remove_file(bare.join("semantic_map.safetensors")).expect("removed");
     let mut w = Window::keeping(data, Some(Action::Open(photos())));
     w.until("the photos", |a| a.state.scene.is_some());
-    assert!(said(w.app(), "This training has no objects; an earlier one of these photos has (run-1: 90 steps") > 0);
+    assert!(said(w.app(), "This training has no objects; an earlier one of these photos has (run-") > 0);
 }
 
 #[test]
@@ -170,7 +192,7 @@ fn the_first_page_lists_every_training_of_recent_photos() {
     let data = folder.path().join("data");
     let mut w = Window::keeping(data.clone(), Some(Action::Open(photos())));
     w.until("the photos", |a| a.state.scene.is_some());
-    w.harness.state_mut().layout.config.steps = 20;
+    w.harness.state_mut().layout.config.steps = 100;
     w.harness.state_mut().layout.finding.encoder = Some("none".into());
     w.ask(Action::StartTraining);
     w.until("trained", |a| a.state.semantics.is_some() && a.state.job.is_none());
@@ -182,7 +204,7 @@ fn the_first_page_lists_every_training_of_recent_photos() {
     w.harness.state_mut().state.recent = vec![photos()];
     w.until("the list", |a| !a.state.recent_runs.is_empty());
     assert!(w.shows("was trained 2 times"));
-    let link = w.harness.query_all_by_label_contains("run-1: 20 steps").next().expect("a link");
+    let link = w.harness.query_all_by_label_contains("run-1: 100 steps").next().expect("a link");
     link.click();
     w.until("the first", |a| a.state.scene.as_ref().is_some_and(|s| s.out.ends_with("run-1")));
 }

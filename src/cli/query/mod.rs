@@ -118,6 +118,7 @@ fn tell(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -
     }
     let answer = &answered.answer;
     let hits = answer.hits();
+    let is_empty = hits.first().is_some_and(|hit| map.members(hit.identity).is_empty());
     if args.json {
         let hit = |h: &Hit| -> Value {
             json!({ "identity": h.identity, "name": full_name(h), "score": h.score, "margin": h.margin })
@@ -130,6 +131,7 @@ fn tell(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -
             "looks_like": answered.alike.iter().map(hit).collect::<Vec<_>>(),
             "pixels": mask.area(),
             "in_view": !mask.is_empty(),
+            "empty": is_empty,
             "unknown_words": unexplained_words,
             "ignored_words": ignored,
             "mended": reading.mended.iter().map(|(typed, read)| json!({ "typed": typed, "read": read })).collect::<Vec<_>>(),
@@ -161,6 +163,7 @@ fn tell(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -
             let ambiguous = matches!(answer, Answer::Ambiguous(_));
             let note = if ambiguous { " (ambiguous: the first two fit alike)" } else { "" };
             let seen = match mask.area() {
+                0 if is_empty => "empty: all of its Gaussians became others'".to_owned(),
                 0 => "not in this view (--camera looks from another photo)".to_owned(),
                 n => format!("{n} px in this view"),
             };

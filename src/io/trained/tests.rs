@@ -35,6 +35,7 @@ fn info() -> SceneInfo {
         dataset: Some(DatasetReference { path: "../plush".into(), format: "transforms.json".into() }),
         cameras: vec![SceneCamera { name: "a.jpg".into(), camera: camera(), held_out: true }],
         background: Some([1.0, 0.5, 0.25]),
+        edited: true,
         config: serde_json::json!({ "steps": 7000 }),
         history: History {
             steps: vec![StepMetrics { step: 10, secs: 0.1, loss: 0.3, train_psnr: 12.0, gaussians: 5 }],

@@ -262,7 +262,7 @@ impl LinkThread {
         let facts = plan::facts(machine, dataset, cloud, &TrainConfig::default());
         let facts = Box::new(facts.with_semantics(semantics.as_deref()));
         let evaluations = std::mem::take(&mut self.evaluations);
-        Outcome::Trained { evaluations, out: folder.into(), semantics, runs: Vec::new(), facts }
+        Outcome::Trained { evaluations, out: folder.into(), semantics, runs: Vec::new(), stopped_at: None, facts }
     }
 
     /// Fetches the newest Gaussians and publishes them.

@@ -54,7 +54,7 @@ pub(crate) fn show(
 fn start(ui: &mut Ui, state: &AppState, config: &TrainConfig, actions: &mut Vec<Action>) {
     ui.add_space(2.0);
     let busy = state.job.is_some();
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         let tip = format!("{}  {}", Action::StartTraining.tooltip(), keys::label(ui.ctx(), &Action::StartTraining));
         let steps = format::count(config.steps);
         let next = state.next_training(config);

@@ -172,7 +172,10 @@ fn reports_are_shown_and_compared_and_a_canceled_measurement_is_read() {
 fn objects_carried_by_masks_are_found_after_training() {
     let trained = |semantics| {
         let (out, facts) = (PathBuf::from("out"), Box::default());
-        Event::Finished(JOB, Outcome::Trained { evaluations: Vec::new(), out, semantics, facts })
+        Event::Finished(
+            JOB,
+            Outcome::Trained { evaluations: Vec::new(), out, semantics, runs: Vec::new(), stopped_at: None, facts },
+        )
     };
     let with_masks = |masks: bool| {
         let masks = masks.then(|| PathBuf::from("masks"));
