@@ -10,7 +10,7 @@ use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::resample::covers;
-use super::{IoError, files, photo, pixel_masks};
+use super::{IoError, files, photo};
 use crate::math::rotation::{nearest_rotation, rotation_error};
 use crate::scene::{Camera, CameraError, Distortion, Photo};
 
@@ -136,7 +136,7 @@ fn resolve(l: &ListedPhoto, root: &Path, source: &Path) -> Result<Option<Photo>,
     }
     let camera = if found == expected { declared } else { declared.resized(found.0, found.1) };
     camera.validate().map_err(bad)?;
-    let mask = l.mask.as_deref().map(|entry| pixel_masks::listed(root, entry, source, found)).transpose()?.flatten();
+    let mask = l.mask.as_deref().map(|entry| listed_mask(root, entry, source, found)).transpose()?.flatten();
     Ok(Some(Photo {
         name: l.name.clone(),
         path,
@@ -147,6 +147,22 @@ fn resolve(l: &ListedPhoto, root: &Path, source: &Path) -> Result<Option<Photo>,
         cut_out: false,
         mask,
     }))
+}
+
+/// The mask that a file names for a photo; `None` if it does not exist.
+///
+/// # Errors
+/// If it cannot be read or has another shape than the photo.
+fn listed_mask(root: &Path, entry: &str, source: &Path, size_px: (u32, u32)) -> Result<Option<PathBuf>, IoError> {
+    let Some(path) = files::inside(root, &files::relative(root, entry, source)?, source)?.filter(|p| p.is_file())
+    else {
+        return Ok(None);
+    };
+    let found = photo::size(&path)?;
+    if !is_scaled(size_px, found) {
+        return Err(IoError::PhotoSize { path, found, expected: size_px });
+    }
+    Ok(Some(path))
 }
 
 /// The place of a point, if it is one: the error names the file, the kind of thing, its index and the axis.
