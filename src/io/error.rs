@@ -71,7 +71,9 @@ pub enum IoError {
     PhotoSize { path: PathBuf, found: (u32, u32), expected: (u32, u32) },
     #[error("{path} is an image of {width_px} x {height_px} px")]
     EmptyPicture { path: PathBuf, width_px: u32, height_px: u32 },
-    #[error("{path} shows nothing: every pixel is transparent or outside of its lens; take it out of the data set")]
+    #[error(
+        "{path} shows nothing: every pixel is transparent, outside of its lens or black in its mask; take it out of the data set"
+    )]
     NothingShown { path: PathBuf },
     #[error("{path} cannot be decoded: {reason}")]
     Picture { path: PathBuf, reason: String },

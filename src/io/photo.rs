@@ -10,7 +10,8 @@ use image::{
 };
 
 use super::resample::{Pixels, resample, shrink};
-use super::{IoError, files, memory, pixel_masks};
+use super::{IoError, files, memory};
+use crate::math::resize::nearest;
 use crate::scene::{Camera, Photo, PhotoPixels};
 
 /// Endings of the pictures that are read.
@@ -90,7 +91,7 @@ pub fn load(photo: &Photo, max_side_px: u32) -> Result<PhotoPixels, IoError> {
         pixels = over(pixels, background);
     }
     if let Some(mask) = &photo.mask {
-        pixels = pixel_masks::apply(pixels, mask)?;
+        pixels = masked(pixels, mask)?;
     }
     let seen = PhotoPixels { alpha, ..through_lens(&pixels) };
     // Compared with nothing, any drawing would be perfect.
@@ -281,6 +282,23 @@ fn jpeg_scan(bytes: &[u8]) -> Option<&[u8]> {
             }
         }
     }
+}
+
+/// Leaves out the pixels that are black in a mask, of any size of the same shape.
+pub(super) fn masked(pixels: Pixels, mask: &Path) -> Result<Pixels, IoError> {
+    let (w, h, values) = decode_brightest(&files::read(mask, files::MAX_PICTURE_BYTES)?, mask)?;
+    let least = if values.iter().max().is_some_and(|m| *m >= 128) { 128 } else { 1 };
+    let Pixels { width, height, channels, data } = pixels;
+    let columns: Vec<usize> = (0..width).map(|x| nearest(x, w, width)).collect();
+    let mut out = Vec::with_capacity(width * height * 4);
+    for (y, row) in data.chunks_exact(width * channels).enumerate() {
+        let of = &values[nearest(y, h, height) * w..][..w];
+        for (p, x) in row.chunks_exact(channels).zip(&columns) {
+            let alpha = if channels == 4 { p[3] } else { u8::MAX };
+            out.extend([p[0], p[1], p[2], if of[*x] >= least { alpha } else { 0 }]);
+        }
+    }
+    Ok(Pixels { width, height, channels: 4, data: out })
 }
 
 /// The alpha of an RGBA picture as its color.

@@ -15,7 +15,7 @@ use glam::{DMat3, DVec2, DVec3};
 use rayon::prelude::*;
 
 use super::resample::covers;
-use super::{IoError, files, lenses, photo, pixel_masks};
+use super::{IoError, files, lenses, photo};
 use crate::scene::{Camera, CameraError, Distortion, Photo};
 
 pub(super) use find::{FoundFile, Lookup, PhotoFinder, fold, reduction};
@@ -206,7 +206,7 @@ fn fate(l: &ListedPhoto, finder: &PhotoFinder<'_>, source: &Path) -> Result<Fate
     let camera = if found == expected { declared } else { declared.resized(found.0, found.1) };
     camera.validate().map_err(bad)?;
     let mask = match l.mask.as_deref() {
-        Some(entry) => pixel_masks::listed(finder, entry, source, found)?,
+        Some(entry) => listed_mask(finder, entry, source, found)?,
         None => None,
     };
     let photo = Photo {
@@ -220,6 +220,31 @@ fn fate(l: &ListedPhoto, finder: &PhotoFinder<'_>, source: &Path) -> Result<Fate
         mask,
     };
     Ok(Fate::Photo { photo: Box::new(photo), file, normalized: l.normalized || scaled })
+}
+
+/// The mask that a file names for a photo; `None` if it does not exist.
+///
+/// # Errors
+/// If it lies outside of the folder, cannot be read or has another shape than the photo.
+fn listed_mask(
+    finder: &PhotoFinder<'_>,
+    entry: &str,
+    source: &Path,
+    size_px: (u32, u32),
+) -> Result<Option<PathBuf>, IoError> {
+    let path = match finder.find("", entry) {
+        Lookup::Found(found) => found.path,
+        Lookup::Missing | Lookup::Several(_) => return Ok(None),
+        Lookup::Outside => {
+            let folder = files::folder_of(source).into();
+            return Err(IoError::Outside { path: source.into(), entry: entry.into(), folder });
+        }
+    };
+    let found = photo::size(&path)?;
+    if !is_scaled(size_px, found) {
+        return Err(IoError::PhotoSize { path, found, expected: size_px });
+    }
+    Ok(Some(path))
 }
 
 /// The place of a point, if it is one: the error names the file, the kind of thing, its index and the axis.

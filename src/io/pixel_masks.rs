@@ -8,10 +8,8 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::photo_list::{Lookup, PhotoFinder, is_scaled};
-use super::resample::Pixels;
-use super::{IoError, files, photo};
-use crate::math::resize::nearest;
+use super::photo_list::is_scaled;
+use super::{IoError, photo};
 use crate::scene::{Dataset, Photo};
 
 /// Pictures of a folder that are looked at to tell masks from labels.
@@ -100,47 +98,6 @@ pub(super) fn find(dataset: &mut Dataset) {
     }
 }
 
-/// The mask that a file names for a photo; `None` if it does not exist.
-///
-/// # Errors
-/// If it lies outside of the folder, cannot be read or has another shape than the photo.
-pub(super) fn listed(
-    finder: &PhotoFinder<'_>,
-    entry: &str,
-    source: &Path,
-    size_px: (u32, u32),
-) -> Result<Option<PathBuf>, IoError> {
-    let path = match finder.find("", entry) {
-        Lookup::Found(found) => found.path,
-        Lookup::Missing | Lookup::Several(_) => return Ok(None),
-        Lookup::Outside => {
-            let folder = files::folder_of(source).into();
-            return Err(IoError::Outside { path: source.into(), entry: entry.into(), folder });
-        }
-    };
-    let found = photo::size(&path)?;
-    if !is_scaled(size_px, found) {
-        return Err(IoError::PhotoSize { path, found, expected: size_px });
-    }
-    Ok(Some(path))
-}
-
-/// Leaves out the pixels that are black in a mask, of any size of the same shape.
-pub(super) fn apply(pixels: Pixels, mask: &Path) -> Result<Pixels, IoError> {
-    let (w, h, values) = photo::decode_brightest(&files::read(mask, files::MAX_PICTURE_BYTES)?, mask)?;
-    let least = if values.iter().max().is_some_and(|m| *m >= 128) { 128 } else { 1 };
-    let Pixels { width, height, channels, data } = pixels;
-    let columns: Vec<usize> = (0..width).map(|x| nearest(x, w, width)).collect();
-    let mut out = Vec::with_capacity(width * height * 4);
-    for (y, row) in data.chunks_exact(width * channels).enumerate() {
-        let of = &values[nearest(y, h, height) * w..][..w];
-        for (p, x) in row.chunks_exact(channels).zip(&columns) {
-            let alpha = if channels == 4 { p[3] } else { u8::MAX };
-            out.extend([p[0], p[1], p[2], if of[*x] >= least { alpha } else { 0 }]);
-        }
-    }
-    Ok(Pixels { width, height, channels: 4, data: out })
-}
 
 /// A photo's folder below `root`, and its path inside of it.
 fn place(root: &Path, photo: &Photo) -> Option<(PathBuf, PathBuf)> {
@@ -207,6 +164,7 @@ mod tests {
     use image::{GrayImage, Luma, Rgb, RgbImage};
 
     use super::*;
+    use crate::io::resample::Pixels;
 
     #[test]
     fn masks_are_told_from_labels() {
@@ -232,8 +190,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("folder");
         let path = folder.path().join("m.png");
         GrayImage::from_fn(2, 1, |x, _| Luma([if x == 0 { 0 } else { 255 }])).save(&path).expect("save");
-        let photo = Pixels { width: 4, height: 2, channels: 3, data: vec![7; 24] };
-        let alpha: Vec<u8> = apply(photo, &path).expect("read").data.chunks_exact(4).map(|p| p[3]).collect();
+        let pixels = Pixels { width: 4, height: 2, channels: 3, data: vec![7; 24] };
+        let alpha: Vec<u8> = photo::masked(pixels, &path).expect("read").data.chunks_exact(4).map(|p| p[3]).collect();
         assert_eq!(alpha, [0, 0, 255, 255, 0, 0, 255, 255]);
         let folders = |folder: &str| mask_folders(Path::new("/nowhere"), Path::new(folder)).len();
         assert_eq!(folders("images_2"), 0);

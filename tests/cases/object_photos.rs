@@ -77,8 +77,8 @@ impl ObjectPhotos {
     }
 
     fn axes(&self, i: usize) -> DMat3 {
-        let back = self.eye(i).normalize();
-        let right = DVec3::Z.cross(back).normalize();
+        let back = self.eye(i).normalize_or_zero();
+        let right = DVec3::Z.cross(back).normalize_or_zero();
         DMat3::from_cols(right, back.cross(right), back)
     }
 
@@ -93,7 +93,7 @@ impl ObjectPhotos {
                     (f64::from(p) + (f64::from(sub) + 0.5) / 3.0) / f64::from(self.side_px) * 2.0 - 1.0
                 };
                 let (u, v) = (along(x, k % 3), along(y, k / 3));
-                let ray = (axes * DVec3::new(u * half, -v * half, -1.0)).normalize();
+                let ray = (axes * DVec3::new(u * half, -v * half, -1.0)).normalize_or_zero();
                 if let Some(color) = seen(eye, ray) {
                     (0..3).for_each(|c| sum[c] += color[c] / 9.0);
                     sum[3] += 1.0 / 9.0;

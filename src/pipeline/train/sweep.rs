@@ -11,7 +11,7 @@ use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 use super::TrainView;
-use super::sweep_view::{Pair, Shows, SmallView, common_backdrop, neighbors};
+use super::sweep_view::{Shows, SmallView, ViewPair, common_backdrop, neighbors};
 use crate::math::stats::quantile;
 use crate::scene::SparsePoint;
 
@@ -60,7 +60,7 @@ pub(super) fn points(
 
 struct Sweep<'a> {
     views: &'a [SmallView],
-    neighbors: Vec<Vec<Pair>>,
+    neighbors: Vec<Vec<ViewPair>>,
     focus: DVec3,
     /// View and pixel of everything that is shown.
     pixels: Vec<(u32, u32)>,

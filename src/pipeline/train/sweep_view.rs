@@ -102,7 +102,7 @@ pub(super) fn common_backdrop(views: &[&TrainView]) -> Option<[u8; 3]> {
 }
 
 /// From the rays of one view to the pixels of another.
-pub(super) struct Pair {
+pub(super) struct ViewPair {
     /// The other view.
     pub(super) other: usize,
     /// Turns a ray of camera depth 1 to the other camera's pixels, homogeneous.
@@ -110,7 +110,7 @@ pub(super) struct Pair {
     shift: DVec3,
 }
 
-impl Pair {
+impl ViewPair {
     fn new(from: &Camera, to: &Camera, other: usize) -> Self {
         let (f, c) = (to.focal_px, to.principal_px);
         let lens = DMat3::from_cols(DVec3::new(f.x, 0.0, 0.0), DVec3::new(0.0, f.y, 0.0), DVec3::new(c.x, c.y, 1.0));
@@ -126,10 +126,10 @@ impl Pair {
 }
 
 /// The views that show what each view shows, from a little beside it.
-pub(super) fn neighbors(views: &[SmallView], focus: DVec3) -> Vec<Vec<Pair>> {
+pub(super) fn neighbors(views: &[SmallView], focus: DVec3) -> Vec<Vec<ViewPair>> {
     let [least, best, most] = ANGLES;
     let toward: Vec<DVec3> = views.iter().map(|v| (v.camera.center - focus).normalize_or_zero()).collect();
-    let of = |i: usize| -> Vec<Pair> {
+    let of = |i: usize| -> Vec<ViewPair> {
         let mut near: Vec<(f64, usize)> = (0..views.len())
             .filter(|&j| j != i && views[i].camera.forward().dot(views[j].camera.forward()) > 0.3)
             .map(|j| (toward[i].dot(toward[j]).clamp(-1.0, 1.0).acos().to_degrees(), j))
@@ -138,7 +138,7 @@ pub(super) fn neighbors(views: &[SmallView], focus: DVec3) -> Vec<Vec<Pair>> {
             .collect();
         near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         near.truncate(NEIGHBORS);
-        near.into_iter().map(|(_, j)| Pair::new(&views[i].camera, &views[j].camera, j)).collect()
+        near.into_iter().map(|(_, j)| ViewPair::new(&views[i].camera, &views[j].camera, j)).collect()
     };
     (0..views.len()).map(of).collect()
 }
