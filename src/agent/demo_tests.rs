@@ -13,6 +13,7 @@ use super::scene::{Parts, SceneWorld};
 use super::session::{Awaited, Reply, Session};
 use crate::jobs::{Folders, Scene, demo, open, query};
 use crate::navigate::Pose;
+use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::answer::{Basis, Certainty};
 use crate::pipeline::semantics::localize::Answer;
 use crate::pipeline::semantics::query_engine::QueryEngine;
@@ -27,7 +28,7 @@ fn rows(list: &str) -> Vec<[String; 3]> {
 
 fn opened() -> (tempfile::TempDir, Scene) {
     let data = tempfile::tempdir().expect("folder");
-    let folder = demo::unpacked(&Folders { data: data.path().into() }).expect("unpacked");
+    let folder = demo::unpacked(&Folders { data: data.path().into() }, &mut Silent).expect("unpacked");
     let scene = open::scene(&folder.join("scene")).expect("opened");
     (data, scene)
 }

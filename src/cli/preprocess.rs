@@ -99,12 +99,8 @@ pub(crate) struct PreprocessArgs {
 
 /// The table `[objects]` of a batch.
 pub(super) fn of_table(table: &toml::Table) -> Result<FindSettings, String> {
-    let args: PreprocessArgs = table_args::parse(
-        "preprocess",
-        table,
-        &["scene"],
-        &["masks", "photos", "add", "replace-all", "plan", "json"],
-    )?;
+    let args: PreprocessArgs =
+        table_args::parse("preprocess", table, &["scene"], &["masks", "photos", "add", "replace-all", "plan", "json"])?;
     match args.segmenter.as_deref() {
         Some("files") => Err("'segmenter': leave it out: the masks of a scene are used where it has some".into()),
         _ => Ok(args.settings()),

@@ -98,7 +98,6 @@ pub(super) fn find(dataset: &mut Dataset) {
     }
 }
 
-
 /// A photo's folder below `root`, and its path inside of it.
 fn place(root: &Path, photo: &Photo) -> Option<(PathBuf, PathBuf)> {
     let relative = photo.path.strip_prefix(root).ok()?;

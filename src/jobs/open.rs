@@ -112,7 +112,8 @@ impl Scene {
         }
         let warnings = std::mem::take(&mut cloud.warnings);
         let (cloud, sh_stored) = compact(cloud);
-        Self { path: path.into(), name, cloud, sh_stored, settings, warnings, ..Self::default() }.with_what_lies_beside()
+        Self { path: path.into(), name, cloud, sh_stored, settings, warnings, ..Self::default() }
+            .with_what_lies_beside()
     }
 
     fn trained(path: &Path, scene: TrainedScene, config: TrainConfig) -> Self {

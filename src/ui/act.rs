@@ -217,8 +217,6 @@ impl App {
         self.submit(Command::InstallModel { id, brought });
     }
 
-
-
     fn evaluate(&mut self) {
         let scene = self.state.scene.as_ref().and_then(|s| Some((s.dataset.clone()?, s.out.clone())));
         let trained = self.state.training_job.is_some() || self.state.scene.as_ref().is_some_and(|s| s.trained);

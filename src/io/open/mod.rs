@@ -8,8 +8,8 @@ use std::path::Path;
 
 use super::trained::{self, TrainedScene};
 use super::{
-    IoError, OpenError, alpha, colmap, files, gs_output, khr_gltf, ksplat, llff, pixel_masks, sog, splat, splat_ply, spz,
-    transforms, unposed,
+    IoError, OpenError, alpha, colmap, files, gs_output, khr_gltf, ksplat, llff, pixel_masks, sog, splat, splat_ply,
+    spz, transforms, unposed,
 };
 use crate::scene::{Axes, Dataset, GaussianCloud};
 

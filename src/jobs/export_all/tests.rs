@@ -8,6 +8,7 @@ use glam::DVec3;
 
 use super::folder::LIST;
 use super::*;
+use crate::io::IoError;
 use crate::io::labels::Labels;
 use crate::io::labels::rle::Rle;
 use crate::io::splat_format::SplatFormat;
