@@ -12,7 +12,7 @@ use super::checkpoint::{self, Checkpoint, Header};
 use super::device::StepResult;
 use super::folder::{claim, finished, objects_for, resumable};
 use super::outcome::{TrainEnd, TrainError, TrainOutcome};
-use super::photos::{load_views, tell_of_pixels};
+use super::photos::{before_backdrop, load_views, tell_of_pixels};
 use super::trainer::{REPORT_STEPS, StepError, Trainer};
 use super::{TrainConfig, TrainView, coarse, density, geometry, init};
 use crate::io::SceneFolder;
@@ -69,6 +69,7 @@ pub(crate) fn run(
         return Ok(stopped_early());
     };
     views.shrink_to_fit();
+    let dataset = &*before_backdrop(dataset, &views, observer);
     let mut job = Job::start(dataset, config, scene, &held, views, tests, saved);
     let told = |why| observer.note(Severity::Warning, why);
     job.device = if config.needs_cpu() { None } else { config.backend.gpu(told)? };
