@@ -68,7 +68,7 @@ fn a_thing_that_was_cut_out_needs_no_points() {
     let (data, out) = (folder.path().join("data"), folder.path().join("scene"));
     ObjectPhotos::default().blender(&data);
     let db = held_out_db(&train(&data, &out, 300, &["--random-points", "3000"]));
-    assert!(db > 22.0, "{db}");
+    assert!(db > 16.0, "{db}");
     assert_eq!(outside(&out, 1.0), 0);
 
     // Negative control: points strewn along the rays of photos before white, as training began once.
@@ -91,8 +91,8 @@ fn a_thing_that_was_cut_out_needs_no_points() {
     (about["ply_file_path"], about["fmlgs"]) = (json!("points.ply"), json!({ "background": [1.0, 1.0, 1.0] }));
     fs::write(data.join("transforms.json"), about.to_string()).expect("write");
     let strewn = held_out_db(&train(&data, &out, 300, &[]));
-    assert!(strewn < db - 1.0, "{strewn} {db}");
-    assert!(outside(&out, 1.0) > 20);
+    assert!(strewn < db - 3.0, "{strewn} {db}");
+    assert!(outside(&out, 1.0) > 50);
 }
 
 #[test]
@@ -106,7 +106,8 @@ fn photos_before_a_backdrop_need_no_points_either() {
             false => photos.nerfstudio(&data, |_, _| {}),
         }
         let db = held_out_db(&train(&data, &out, 300, &["--random-points", "3000"]));
-        assert!(db > 20.0, "{stated}: {db}");
+        assert!(db > 16.0, "{stated}: {db}");
+        assert_eq!(outside(&out, 1.0), 0);
     }
 }
 
@@ -143,7 +144,12 @@ fn cut_out_photos_of_every_layout_are_scored_before_what_they_were_trained_befor
     // The same again goes on where it stopped; with another meaning of alpha it is another run.
     train(&data, &out, 200, &["--alpha", "background", "--random-points", "2000"]);
     let data = data.to_str().expect("UTF-8");
-    let other = ["train", data, "--out", scene, "--steps", "200", "--backend", "cpu", "--alpha", "ignore"];
+    let other = [
+        &["train", data, "--out", scene, "--steps", "200", "--backend", "cpu", "--sh-degree", "1", "--eval-every", "0"]
+            [..],
+        &["--random-points", "2000", "--alpha", "ignore"],
+    ]
+    .concat();
     assert_ne!(fmlgs(&other).code, Some(0));
 }
 
@@ -183,7 +189,8 @@ fn masked_pixels_do_not_count(data: &Path, masked: impl Fn(u32, u32) -> bool, ph
         train(data, &out, 60, &["--max-side", "84"]);
         let scene = out.to_str().expect("UTF-8");
         let scored = fmlgs(&["eval", scene, "--json"]).ok().json()["psnr"].as_f64().expect("a number");
-        (fs::read(out.join("point_cloud.ply")).expect("cloud"), scored)
+        let Ok(Opened::Trained(scene)) = open(&out) else { panic!("a scene") };
+        (scene.cloud, scored)
     });
     assert!(clouds[0].0 == clouds[1].0, "other Gaussians");
     assert_eq!(clouds[0].1, clouds[1].1, "another score");

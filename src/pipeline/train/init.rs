@@ -17,10 +17,12 @@ const OPACITY: f64 = 0.1;
 const HOLE_SIDE_PX: u32 = 128;
 /// Side of the squares that are found empty or covered, px.
 const HOLE_CELL_PX: usize = 8;
+/// Fewest sparse points that training starts from.
+const FEWEST_POINTS: usize = 100;
 /// How much farther than nearly everything else in a view its holes are filled.
 const HOLE_DEPTH: f64 = 1.3;
 
-/// A cloud at the dataset's sparse points or, where it has fewer than a hundred, at `random` points
+/// A cloud at the dataset's sparse points or, where it lacks these, at `random` points
 /// where the photos agree.
 pub(crate) fn initial_cloud(
     dataset: &Dataset,
@@ -33,12 +35,17 @@ pub(crate) fn initial_cloud(
     let strays: Vec<&str> = dataset.strays().into_iter().map(|i| dataset.photos[i].name.as_str()).collect();
     let views: Vec<&TrainView> = views.iter().filter(|v| !strays.contains(&v.name.as_str())).collect();
     let finite: Vec<SparsePoint> = dataset.points.iter().copied().filter(|p| p.position.is_finite()).collect();
-    if finite.len() < 100 {
+    if lacks_points(dataset) {
         return from_points(&sweep::points(dataset.focus(), &views, dataset.background, random, rng), degree);
     }
     let mut cloud = from_points(&finite, degree);
     fill_holes(&mut cloud, dataset, &views);
     cloud
+}
+
+/// Whether there are too few sparse points to start from.
+pub(super) fn lacks_points(dataset: &Dataset) -> bool {
+    dataset.points.iter().filter(|p| p.position.is_finite()).count() < FEWEST_POINTS
 }
 
 /// Puts Gaussians where photos show something but no sparse point is: walls, sky, the rest of the

@@ -1,9 +1,12 @@
 //! Photos ready for comparison: loaded, undistorted, scaled, without borders.
 
+use std::borrow::Cow;
+
 use rayon::prelude::*;
 
 use super::border::Borders;
-use super::{TrainConfig, TrainError, TrainView};
+use super::sweep_view::common_backdrop;
+use super::{TrainConfig, TrainError, TrainView, init};
 use crate::io::IoError;
 use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::scene::Dataset;
@@ -27,6 +30,22 @@ pub(super) fn tell_of_pixels(dataset: &Dataset, config: &TrainConfig, observer: 
         let text = "--alpha changes nothing: the photos that were looked at have no transparent pixels";
         observer.note(Severity::Warning, text.into());
     }
+}
+
+/// The dataset with the color that the edges of nearly all photos have as its background, where it states none and has
+/// no points: made-up scenes are rendered like that. Fog of that color would else have to be trained around the thing.
+pub(super) fn before_backdrop<'a>(
+    dataset: &'a Dataset,
+    views: &[TrainView],
+    observer: &mut dyn Observer,
+) -> Cow<'a, Dataset> {
+    let unknown = dataset.background.is_none() && init::lacks_points(dataset);
+    let Some(color) = unknown.then(|| common_backdrop(views)).flatten() else { return Cow::Borrowed(dataset) };
+    let [r, g, b] = color;
+    let text = format!("The photos end in one color (#{r:02x}{g:02x}{b:02x}), which is taken for an empty background");
+    observer.note(Severity::Info, text);
+    let background = Some(color.map(|c| f32::from(c) / 255.0));
+    Cow::Owned(Dataset { background, ..dataset.clone() })
 }
 
 /// Loads and scales photos, several at a time; `None` if the observer cancels.

@@ -13,7 +13,7 @@ use super::device::StepResult;
 use super::folder::{FolderUse, claim, finished, objects_for, remade, resumable};
 use super::inputs::{Compare, TrainInputs};
 use super::outcome::{TrainEnd, TrainError, TrainOutcome};
-use super::photos::{load_views, tell_marks, tell_of_pixels};
+use super::photos::{before_backdrop, load_views, tell_marks, tell_of_pixels};
 use super::trainer::{REPORT_STEPS, StepError, Trainer};
 use super::window::Window;
 use super::{TrainConfig, TrainView, coarse, density, geometry, init};
@@ -87,6 +87,7 @@ pub(crate) fn run_on(
         return Ok(TrainOutcome::stopped_early());
     };
     views.shrink_to_fit();
+    let dataset = &*before_backdrop(dataset, &views, observer);
     let mut job = Job::start(dataset, config, scene, &held, (views, tests), saved);
     (job.inputs, job.remake) = (inputs, may.remake);
     let told = |why| observer.note(Severity::Warning, why);

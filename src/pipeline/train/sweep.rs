@@ -11,7 +11,7 @@ use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 use super::TrainView;
-use super::sweep_view::{Shows, SmallView, ViewPair, common_backdrop, neighbors};
+use super::sweep_view::{Shows, SmallView, ViewPair, neighbors};
 use crate::math::stats::quantile;
 use crate::scene::SparsePoint;
 
@@ -43,7 +43,7 @@ pub(super) fn points(
     n: usize,
     rng: &mut Pcg64Mcg,
 ) -> Vec<SparsePoint> {
-    let backdrop = background.map(|b| b.map(|c| (c * 255.0).round() as u8)).or_else(|| common_backdrop(views));
+    let backdrop = background.map(|b| b.map(|c| (c * 255.0).round() as u8));
     let small: Vec<SmallView> = views.par_iter().map(|v| SmallView::new(v, backdrop)).collect();
     let sweep = Sweep::new(&small, focus);
     if sweep.pixels.is_empty() {

@@ -87,8 +87,8 @@ fn alike(a: &[u8; 3], b: &[u8; 3]) -> bool {
 }
 
 /// The color that the edges of nearly all photos have: that of a backdrop, which no photo states.
-pub(super) fn common_backdrop(views: &[&TrainView]) -> Option<[u8; 3]> {
-    let edge = |view: &&TrainView| -> Vec<[u8; 3]> {
+pub(super) fn common_backdrop(views: &[TrainView]) -> Option<[u8; 3]> {
+    let edge = |view: &TrainView| -> Vec<[u8; 3]> {
         let (w, h) = (view.pixels.width_px as usize, view.pixels.height_px as usize);
         let rows = (0..w).flat_map(|x| [x, w * (h - 1) + x]);
         rows.chain((0..h).flat_map(|y| [y * w, y * w + w - 1])).map(|i| view.pixels.rgb[i]).collect()
