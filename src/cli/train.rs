@@ -211,7 +211,10 @@ pub(crate) fn run(args: TrainArgs, quiet: bool) -> Result<(), CliError> {
         None => None,
     };
     let done = match &server {
-        Some(server) => served(server, (&dataset, &config), folders, changed, &mut console),
+        Some(server) => {
+            announce(server, quiet, args.access.has_new_token());
+            served(server, (&dataset, &config), folders, changed, &mut console)
+        }
         None => train::run(&dataset, &config, folders, changed, &mut console),
     };
     let done = done.map_err(|e| with_remedy(e, &args));
@@ -270,7 +273,6 @@ fn served(
     changed: IfChanged,
     console: &mut Console,
 ) -> Result<Trained, JobError> {
-    announce(server);
     let mut observer = server.observe(console);
     let done = train::run(dataset, config, folders, changed, &mut observer);
     match &done {
