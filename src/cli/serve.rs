@@ -46,6 +46,11 @@ pub(crate) struct AccessArgs {
 }
 
 impl AccessArgs {
+    /// Whether nobody knows the token but who is told.
+    pub(crate) fn has_new_token(&self) -> bool {
+        self.token_file.is_none()
+    }
+
     /// The options of a server at `bind`.
     pub(crate) fn options(&self, bind: SocketAddr, allow_edit: bool) -> Result<ServeOptions, CliError> {
         let token = token_of(self.token_file.as_deref()).map_err(|e| {
@@ -56,14 +61,20 @@ impl AccessArgs {
     }
 }
 
-/// Says how to look at what is served.
-pub(crate) fn announce(server: &Server) {
+/// Says how to look at what is served; to a log that wants results only it says what nobody could connect without, if
+/// `needed`.
+pub(crate) fn announce(server: &Server, quiet: bool, needed: bool) {
     let address = server.address();
     let port = address.port();
     if !address.ip().to_canonical().is_loopback() {
         output::warn(format!("others can reach {address}, and everybody on the way can read the token; SSH is safer"));
     }
-    output::note(&format!("Look at it:  fmlgs connect '{}'", server.url()));
+    if !quiet || needed {
+        output::note(&format!("Look at it:  fmlgs connect '{}'", server.url()));
+    }
+    if quiet {
+        return;
+    }
     output::note(&format!("From another computer, first:  ssh -L {port}:127.0.0.1:{port} {}", user_at_host()));
 }
 
@@ -76,7 +87,7 @@ fn user_at_host() -> String {
 pub(crate) fn run(args: ServeArgs, quiet: bool) -> Result<(), CliError> {
     let (server, name) = serve::scene(&args.scene, args.access.options(args.address, args.allow_edit)?)?;
     output::print(&server.url())?;
-    announce(&server);
+    announce(&server, quiet, false);
     if !quiet {
         output::note(&format!("Serving {name}; Ctrl-C ends it"));
     }

@@ -226,7 +226,10 @@ pub(crate) fn run(args: TrainArgs, quiet: bool) -> Result<(), CliError> {
         None => None,
     };
     let done = match &server {
-        Some(server) => served(server, (&dataset, &config), folders, &from, &mut console),
+        Some(server) => {
+            announce(server, quiet, args.access.has_new_token());
+            served(server, (&dataset, &config), folders, &from, &mut console)
+        }
         None => train::run(&dataset, &config, folders, &from, &mut console),
     };
     let done = done.map_err(|e| with_remedy(e, &args));
@@ -285,7 +288,6 @@ fn served(
     from: &TrainStart,
     console: &mut Console,
 ) -> Result<Trained, JobError> {
-    announce(server);
     let mut observer = server.observe(console);
     let done = train::run(dataset, config, folders, from, &mut observer);
     match &done {

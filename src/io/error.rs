@@ -81,7 +81,7 @@ pub enum IoError {
     NoPhotos { path: PathBuf, listed: usize, first: String },
     #[error("{path}: {cause}")]
     Cloud { path: PathBuf, cause: CloudError },
-    #[error("{path} has format version {found}; this program reads versions up to {supported}; update the program")]
+    #[error("{path} has format version {found}; this program reads versions up to {supported}; {}", version_remedy(*found, *supported))]
     Version { path: PathBuf, found: u64, supported: u64 },
 }
 
@@ -113,6 +113,11 @@ pub(crate) fn write_error(path: &Path, cause: io::Error) -> IoError {
     IoError::Write { path: path.into(), remedy: remedy(cause.kind()), cause }
 }
 
+/// What the user can do about a version that is not read.
+fn version_remedy(found: u64, supported: u64) -> &'static str {
+    if found > supported { "update the program" } else { "there was never such a version: the file is damaged" }
+}
+
 /// What the user can do about a failed write.
 fn remedy(kind: io::ErrorKind) -> &'static str {
     use io::ErrorKind as K;
@@ -133,5 +138,7 @@ mod tests {
     fn a_failed_write_has_its_remedy() {
         assert!(remedy(io::ErrorKind::FileTooLarge).contains("files of this size"));
         assert!(remedy(io::ErrorKind::QuotaExceeded).contains("disk is full"));
+        let of = |found| IoError::Version { path: "x".into(), found, supported: 2 }.to_string();
+        assert!(of(3).ends_with("update the program") && of(0).ends_with("the file is damaged"), "{}", of(0));
     }
 }

@@ -22,10 +22,13 @@ use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::query_engine::QueryEngine;
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::render::{RenderSettings, Renderer};
+use crate::scene::text;
 use crate::scene::{Camera, GaussianCloud, LevelFilter, Mask, SemanticMap};
 
 /// Phrases of a list at most.
 pub(crate) const MOST: usize = 1_000;
+/// Characters of a line that are told at most.
+const LONGEST_TOLD: usize = 60;
 
 /// What phrases are compared with.
 #[derive(Clone, Debug, Default)]
@@ -85,7 +88,12 @@ pub struct PhraseRow {
 /// # Errors
 /// If there are none, or too many.
 pub(crate) fn listed(text: &str) -> Result<Vec<String>, JobError> {
-    let phrases: Vec<String> = text.lines().map(str::trim).filter(|l| !l.is_empty()).map(str::to_owned).collect();
+    let lines = text.lines().map(str::trim).enumerate().filter(|(_, l)| !l.is_empty());
+    let phrases: Vec<String> = lines.clone().map(|(_, l)| l.to_owned()).collect();
+    if let Some((k, line)) = lines.clone().find(|(_, l)| !l.chars().any(char::is_alphanumeric)) {
+        let (line, k) = (text::shortened(line, LONGEST_TOLD), k + 1);
+        return Err(JobError::Phrases(format!("line {k}: '{line}' has no letter or digit; leave the line out")));
+    }
     match phrases.len() {
         0 => Err(JobError::Phrases("the list is empty: write one phrase per line".into())),
         n if n > MOST => Err(JobError::Phrases(format!("{n} phrases exceed the limit of {MOST}: split the list"))),
@@ -111,7 +119,8 @@ pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Resu
     let mut engine = QueryEngine::new(map.language.as_ref(), request.recipe.clone())?;
     let mut asked = Vec::new();
     for phrase in phrases {
-        let reading = engine.read(&map.identities, phrase, *level).ok_or(JobError::EmptyQuery)?;
+        let reading = engine.read(&map.identities, phrase, *level);
+        let reading = reading.ok_or_else(|| JobError::Phrases(format!("'{phrase}' has no word to look for")))?;
         let answered = engine.answer(map, &reading, *level)?;
         let (ignored, _) = engine.left_out(&map.identities, &reading, &answered);
         asked.push((answered.certainty(&ignored), answered));

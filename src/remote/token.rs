@@ -1,7 +1,7 @@
 //! The secret that a client must know: 32 random bytes, as 64 hexadecimal digits.
 
 use std::fs::{self, File};
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 use rand::TryRng;
@@ -9,6 +9,8 @@ use rand::rngs::SysRng;
 use subtle::ConstantTimeEq;
 
 const BYTES: usize = 32;
+/// Longest file of a token, in bytes.
+const MOST_BYTES: u64 = 4 << 10;
 
 /// A secret. Its `Debug` does not show it.
 #[derive(Clone)]
@@ -30,7 +32,7 @@ impl AccessToken {
 
     /// The one in the file at `path`; where there is no file, it is made with a new one that only its owner reads.
     pub(crate) fn kept(path: &Path) -> io::Result<Self> {
-        match fs::read_to_string(path) {
+        match read(path) {
             Ok(text) => Self::parse(text.trim())
                 .ok_or_else(|| io::Error::new(io::ErrorKind::InvalidData, "it does not hold 64 hexadecimal digits")),
             Err(e) if e.kind() == io::ErrorKind::NotFound => {
@@ -70,6 +72,23 @@ impl AccessToken {
     }
 }
 
+/// What a file of a token says: a short regular one that only its owner reads and writes.
+fn read(path: &Path) -> io::Result<String> {
+    let bad = |why: &str| Err(io::Error::new(io::ErrorKind::InvalidData, why));
+    // Looked at before it is opened: a pipe would keep the program waiting.
+    let about = fs::metadata(path)?;
+    if !about.is_file() || about.len() > MOST_BYTES {
+        return bad("it is no file of 64 hexadecimal digits");
+    }
+    #[cfg(unix)]
+    if std::os::unix::fs::PermissionsExt::mode(&about.permissions()) & 0o077 != 0 {
+        return bad("others than its owner may read or write it: 'chmod 600' it, or name a file that is not there yet");
+    }
+    let mut text = String::new();
+    File::open(path)?.take(MOST_BYTES).read_to_string(&mut text)?;
+    Ok(text)
+}
+
 /// A name that no other has: of a run, of a client.
 pub(crate) fn random_name() -> io::Result<String> {
     AccessToken::random().map(|token| hex(&token.0[..8]))
@@ -107,5 +126,19 @@ mod tests {
         );
         fs::write(&path, "abc").expect("write");
         assert!(AccessToken::kept(&path).is_err(), "what is in a file is not replaced");
+        let long = folder.path().join("long");
+        fs::write(&long, "0".repeat(5_000)).expect("write");
+        assert!(AccessToken::kept(&long).is_err());
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt;
+            fs::write(&path, made.text()).expect("write");
+            for (mode, is_taken) in [(0o600, true), (0o400, true), (0o666, false), (0o640, false), (0o604, false)] {
+                fs::set_permissions(&path, fs::Permissions::from_mode(mode)).expect("mode");
+                assert_eq!(AccessToken::kept(&path).is_ok(), is_taken, "{mode:o}");
+            }
+            let told = AccessToken::kept(Path::new("/dev/zero")).expect_err("no end");
+            assert!(told.to_string().contains("no file of 64"), "{told}");
+        }
     }
 }

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DVec3;
 
-use super::folder::LIST;
+use super::folder::{ExportFolder, LIST};
 use super::*;
 use crate::io::IoError;
 use crate::io::labels::Labels;
@@ -235,7 +235,7 @@ fn an_export_that_was_killed_can_be_made_again() {
     let mut again = begin();
     again.write("c.txt", text("3")).expect("what was cut short is ours");
     again.close(true).expect("closed");
-    assert_eq!(files(&root), ["a.txt", "c.txt", "export.json", "in/b.txt"]);
+    assert_eq!(files(&root), ["a.txt", "c.txt", "in/b.txt"]);
     // What an earlier run has left and this one does not write goes.
     let mut less = ExportFolder::open(&root).expect("open");
     less.write("a.txt", text("one")).expect("a");
@@ -243,7 +243,8 @@ fn an_export_that_was_killed_can_be_made_again() {
     let mut less = ExportFolder::open(&root).expect("open");
     less.write("a.txt", text("one")).expect("a");
     less.close(true).expect("closed");
-    assert_eq!(files(&root), ["a.txt", "export.json"]);
+    assert_eq!(files(&root), ["a.txt"]);
+    assert!(!root.join("c.txt").exists() && !root.join("in/b.txt").exists());
     // The controls: what somebody has put there or changed since stays.
     std::fs::write(root.join("d.txt"), "mine").expect("written");
     let mut export = begin();
