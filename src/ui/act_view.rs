@@ -42,7 +42,7 @@ impl App {
         };
         let Some(map) = self.state.semantics.as_ref().filter(|_| self.state.is_empty(*id)) else { return false };
         let name = self.state.labels.full_name(&map.identities, *id);
-        self.state.toast(Tone::Warning, format!("{name} is empty: all of its Gaussians became others'."));
+        self.state.toast(Tone::Warning, format!("{name} is empty: no Gaussians belong to it."));
         true
     }
 

@@ -163,7 +163,7 @@ fn tell(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -
             let ambiguous = matches!(answer, Answer::Ambiguous(_));
             let note = if ambiguous { " (ambiguous: the first two fit alike)" } else { "" };
             let seen = match mask.area() {
-                0 if is_empty => "empty: all of its Gaussians became others'".to_owned(),
+                0 if is_empty => "empty: no Gaussians belong to it".to_owned(),
                 0 => "not in this view (--camera looks from another photo)".to_owned(),
                 n => format!("{n} px in this view"),
             };

@@ -57,7 +57,7 @@ pub enum EditError {
     Nothing,
     #[error("what you selected is not a piece of '{0}'; select inside it")]
     Outside(String),
-    #[error("'{0}' is empty: all of its Gaussians became others'; undo that, correct it by clicks, or merge it")]
+    #[error("'{0}' is empty: no Gaussians belong to it; undo what took them, correct it by clicks, or merge it")]
     Empty(String),
 }
 

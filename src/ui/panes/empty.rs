@@ -29,6 +29,8 @@ const COLUMNS: usize = 3;
 pub(crate) struct FirstPage {
     /// Whether its pictures were asked for.
     asked: bool,
+    /// Recent scenes whose trainings were asked for.
+    listed: Vec<PathBuf>,
     demo: Option<TextureHandle>,
     recent: BTreeMap<PathBuf, TextureHandle>,
     /// Number of the scene whose picture was kept last.
@@ -49,8 +51,11 @@ impl FirstPage {
             if !state.recent.is_empty() {
                 // Without them the page is as useful.
                 let _ = worker.submit(Command::RecentPictures(state.recent.clone()));
-                let _ = worker.submit(Command::RecentRuns(state.recent.clone()));
             }
+        }
+        if self.listed != state.recent {
+            self.listed.clone_from(&state.recent);
+            let _ = worker.submit(Command::RecentRuns(state.recent.clone()));
         }
         for (path, p) in std::mem::take(&mut state.recent_pictures) {
             let shown = texture(&path.to_string_lossy(), [p.width_px, p.height_px], p.rgb.as_flattened());

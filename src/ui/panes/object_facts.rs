@@ -127,7 +127,7 @@ impl<'a> RowFacts<'a> {
         if fact.gaussians == 0 {
             return (
                 "empty".into(),
-                "All of its Gaussians became others': undo that, correct it by clicks, or merge it",
+                "No Gaussians belong to it: undo what took them, correct it by clicks, or merge it",
             );
         }
         let known = |n: Option<usize>| n.map_or_else(|| NONE.into(), |n| format::count(n as u64));

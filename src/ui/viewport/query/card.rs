@@ -1,7 +1,7 @@
 //! The answer to the query in the field: what is meant, how surely, how large it is, and the way there; in small views
 //! a word.
 
-use egui::{Align, Color32, Layout, RichText, Ui};
+use egui::{Align, Button, Color32, Layout, RichText, Ui};
 
 use super::super::visible::Visibility;
 use super::pins::swatch;
@@ -21,7 +21,7 @@ use crate::ui::theme;
 use crate::worker::Versioned;
 
 /// Said of what has no Gaussian.
-const EMPTY: &str = "empty: all of its Gaussians became others'";
+const EMPTY: &str = "empty: no Gaussians belong to it";
 
 /// Things that fit equally and are named.
 const NAMED: usize = 3;
@@ -105,24 +105,22 @@ impl Queries {
             swatch(ui, self.color_of(newest));
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 let go = Action::GoToTarget(target, Side::Best);
-                if !is_empty && ui.small_button("Go there").on_hover_text(go.tooltip()).clicked() {
+                let button = ui.add_enabled(!is_empty, Button::new("Go there").small());
+                if button.on_hover_text(go.tooltip()).clicked() {
                     actions.push(go);
                 }
                 let name = RichText::new(state.labels.full_name(&semantics.identities, target)).strong();
                 ui.with_layout(Layout::left_to_right(Align::Center), |ui| ui.add(egui::Label::new(name).truncate()));
             });
         });
-        if is_empty {
-            ui.colored_label(theme::warning(), format!("It is {EMPTY}."));
-            return;
-        }
         ui.horizontal(|ui| {
             let (certainty, color, numbers) = certainty(newest);
             ui.colored_label(color, certainty).on_hover_text(numbers);
             if let Some(bounds) = facts.bounds {
                 ui.weak(size_text(bounds, state)).on_hover_text("Longest edge of its bounding box");
             }
-            if let Some(why) = self.why_unseen(semantics, visibility, target) {
+            let unseen = if is_empty { Some(EMPTY) } else { self.why_unseen(semantics, visibility, target) };
+            if let Some(why) = unseen {
                 ui.colored_label(theme::warning(), format!("It is {why}."));
                 if visibility.draws(&semantics.identities, target) == Some(false)
                     && ui.small_button("Show it").clicked()
