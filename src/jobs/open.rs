@@ -104,6 +104,7 @@ impl Scene {
 
     fn bare(path: &Path, mut cloud: GaussianCloud) -> Self {
         let name = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+<<<<<<< HEAD
         let mut settings = RenderSettings::of_mode(cloud.render_mode);
         // Small ones would lie before the near plane. Of large ones little is known: what is near may be seen, too.
         if let Some(bounds) = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i))) {
@@ -111,6 +112,17 @@ impl Scene {
             settings.near = if near > 0.0 { settings.near.min(near) } else { settings.near };
         }
         let warnings = std::mem::take(&mut cloud.warnings);
+||||||| 30a22de6
+        let mut settings = RenderSettings::of_mode(cloud.render_mode);
+        // Small ones would lie before the near plane. Of large ones little is known: what is near may be seen, too.
+        if let Some(bounds) = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i))) {
+            let near = Camera::near_plane(bounds.radius());
+            settings.near = if near > 0.0 { settings.near.min(near) } else { settings.near };
+        }
+=======
+        let near = near_without_cameras(&cloud);
+        let settings = RenderSettings { near, ..RenderSettings::of_mode(cloud.render_mode) };
+>>>>>>> w1
         let (cloud, sh_stored) = compact(cloud);
         Self { path: path.into(), name, cloud, sh_stored, settings, warnings, ..Self::default() }
             .with_what_lies_beside()
@@ -122,7 +134,15 @@ impl Scene {
         let (_, extent) = Camera::extent_of(info.cameras.iter().map(|c| &c.camera));
         // Its files of earlier versions do not say it.
         cloud.render_mode = config.render_mode();
+<<<<<<< HEAD
         let warnings = std::mem::take(&mut cloud.warnings);
+||||||| 30a22de6
+=======
+        let mut settings = config.render_settings(info.background, extent);
+        if info.cameras.is_empty() {
+            settings.near = near_without_cameras(&cloud);
+        }
+>>>>>>> w1
         let (cloud, sh_stored) = compact(cloud);
         Self {
             path: path.into(),
@@ -131,8 +151,14 @@ impl Scene {
             cloud,
             sh_stored,
             cameras: info.cameras,
+<<<<<<< HEAD
             settings: config.render_settings(info.background, extent),
             says_background: true,
+||||||| 30a22de6
+            settings: config.render_settings(info.background, extent),
+=======
+            settings,
+>>>>>>> w1
             config,
             history: info.history,
             photos: info.dataset.map(|d| d.path),
@@ -417,6 +443,15 @@ fn photos_of(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<Dataset>>
     };
     observer.note(Severity::Warning, why);
     None
+}
+
+/// Distance of the near plane for Gaussians of which no cameras are known. Small ones would lie before the usual one; of
+/// large ones what is near may be seen, too.
+fn near_without_cameras(cloud: &GaussianCloud) -> f64 {
+    let usual = RenderSettings::default().near;
+    let bounds = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i)));
+    let near = bounds.map_or(0.0, |b| Camera::near_plane(b.radius()));
+    if near > 0.0 { usual.min(near) } else { usual }
 }
 
 /// The Gaussians without bands of harmonics that are zero, and the degree that they came with.

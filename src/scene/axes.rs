@@ -128,6 +128,7 @@ impl GaussianCloud {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::rotation::unit_quaternion;
 
     fn cloud() -> GaussianCloud {
         let sh = (0..16).map(|k| [0.1 * k as f32, 0.5 - 0.07 * k as f32, (k as f32).sin()]).collect();
@@ -142,8 +143,9 @@ mod tests {
 
     /// The matrix R S Rᵀ of the Gaussian with standard deviations 1, 2, 3.
     fn covariance(c: &GaussianCloud) -> DMat3 {
-        let [w, x, y, z] = c.quaternions[0].map(f64::from);
-        let r = DMat3::from_quat(DQuat::from_xyzw(x, y, z, w).normalize());
+        let [w, x, y, z] = unit_quaternion(c.quaternions[0].map(f64::from)).expect("a rotation");
+        let turn = DQuat::from_xyzw(x, y, z, w);
+        let r = DMat3::from_quat(turn);
         r * DMat3::from_diagonal(DVec3::new(1.0, 4.0, 9.0)) * r.transpose()
     }
 

@@ -94,8 +94,7 @@ fn a_fisheye_becomes_a_pinhole_of_the_same_focal_length() {
     assert!(warnings.contains("2 photos were taken through a lens that sees 1"), "{warnings}");
     let wrong = |k1: f64| {
         let mut photo = data.photos[0].clone();
-        let lens = photo.distortion.expect("a lens");
-        photo.distortion = Some(fmlgs::scene::Distortion { k1, ..lens });
+        photo.distortion.as_mut().expect("a lens").k1 = k1;
         let pixels = io::photo::load(&photo, 240).expect("pixels");
         let coverage = pixels.coverage.clone().unwrap_or_else(|| vec![255; pixels.rgb.len()]);
         let mut worst = 0.0_f64;

@@ -212,7 +212,12 @@ fn a_canceled_export_can_be_made_again() {
 fn an_export_that_was_killed_can_be_made_again() {
     let folder = tempfile::tempdir().expect("folder");
     let root = folder.path().join("out");
-    let text = |text: &'static str| move |path: &Path| Ok(std::fs::write(path, text).expect("written"));
+    let text = |text: &'static str| {
+        move |path: &Path| {
+            std::fs::write(path, text).expect("written");
+            Ok(())
+        }
+    };
     let begin = || {
         let mut export = ExportFolder::open(&root).expect("open");
         export.write("a.txt", text("one")).expect("a");

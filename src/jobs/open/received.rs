@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::super::{Folders, JobError, plan};
-use super::{OpenedScene, Scene, compact};
+use super::{OpenedScene, Scene, compact, near_without_cameras};
 use crate::io::scene_info;
 use crate::io::trained::SceneInfo;
 use crate::pipeline::observer::Silent;
@@ -41,7 +41,7 @@ pub(crate) fn received(
     let config = TrainConfig::stored(&path, info.config.clone())?;
     let (mut cloud, map) = sent.map_or((None, None), |(cloud, map)| (Some(cloud), map));
     let (_, extent) = Camera::extent_of(info.cameras.iter().map(|c| &c.camera));
-    let settings = match &mut cloud {
+    let mut settings = match &mut cloud {
         Some(cloud) if info.config.is_null() => RenderSettings::of_mode(cloud.render_mode),
         Some(cloud) => {
             cloud.render_mode = config.render_mode();
@@ -50,6 +50,9 @@ pub(crate) fn received(
         None => config.render_settings(info.background, extent),
     };
     let (cloud, sh_stored) = compact(cloud.unwrap_or_default());
+    if info.cameras.is_empty() {
+        settings.near = near_without_cameras(&cloud);
+    }
     let dataset = (!info.cameras.is_empty()).then(|| Arc::new(photos(&info, &origin)));
     let scene = Scene {
         name: info.name,

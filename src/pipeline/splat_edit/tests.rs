@@ -161,7 +161,7 @@ fn what_changes_nothing_is_refused() {
     let (cloud, map) = scene();
     let refused = |edit: SplatEdit| apply(&cloud, Some(&map), &edit).expect_err("refused");
     let turned = |degrees: f64| Placement {
-        turn: DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize(), degrees.to_radians()),
+        turn: DQuat::from_axis_angle(DVec3::new(1.0, 2.0, 3.0).normalize_or(DVec3::X), degrees.to_radians()),
         ..Placement::default()
     };
     let shifted = Placement { shift: DVec3::new(0.0, 0.0, 1e-9), ..Placement::default() };
