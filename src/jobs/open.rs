@@ -104,25 +104,9 @@ impl Scene {
 
     fn bare(path: &Path, mut cloud: GaussianCloud) -> Self {
         let name = path.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-<<<<<<< HEAD
-        let mut settings = RenderSettings::of_mode(cloud.render_mode);
-        // Small ones would lie before the near plane. Of large ones little is known: what is near may be seen, too.
-        if let Some(bounds) = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i))) {
-            let near = Camera::near_plane(bounds.radius());
-            settings.near = if near > 0.0 { settings.near.min(near) } else { settings.near };
-        }
         let warnings = std::mem::take(&mut cloud.warnings);
-||||||| 30a22de6
-        let mut settings = RenderSettings::of_mode(cloud.render_mode);
-        // Small ones would lie before the near plane. Of large ones little is known: what is near may be seen, too.
-        if let Some(bounds) = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i))) {
-            let near = Camera::near_plane(bounds.radius());
-            settings.near = if near > 0.0 { settings.near.min(near) } else { settings.near };
-        }
-=======
         let near = near_without_cameras(&cloud);
         let settings = RenderSettings { near, ..RenderSettings::of_mode(cloud.render_mode) };
->>>>>>> w1
         let (cloud, sh_stored) = compact(cloud);
         Self { path: path.into(), name, cloud, sh_stored, settings, warnings, ..Self::default() }
             .with_what_lies_beside()
@@ -134,15 +118,11 @@ impl Scene {
         let (_, extent) = Camera::extent_of(info.cameras.iter().map(|c| &c.camera));
         // Its files of earlier versions do not say it.
         cloud.render_mode = config.render_mode();
-<<<<<<< HEAD
         let warnings = std::mem::take(&mut cloud.warnings);
-||||||| 30a22de6
-=======
         let mut settings = config.render_settings(info.background, extent);
         if info.cameras.is_empty() {
             settings.near = near_without_cameras(&cloud);
         }
->>>>>>> w1
         let (cloud, sh_stored) = compact(cloud);
         Self {
             path: path.into(),
@@ -151,14 +131,8 @@ impl Scene {
             cloud,
             sh_stored,
             cameras: info.cameras,
-<<<<<<< HEAD
-            settings: config.render_settings(info.background, extent),
-            says_background: true,
-||||||| 30a22de6
-            settings: config.render_settings(info.background, extent),
-=======
             settings,
->>>>>>> w1
+            says_background: true,
             config,
             history: info.history,
             photos: info.dataset.map(|d| d.path),
