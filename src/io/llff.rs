@@ -23,6 +23,11 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
     let folder = photo_list::photo_folder(root, &file)?;
     let names = names(&root.join(&folder))?;
     if names.len() != rows.len() {
+        let all = files::names_in(&root.join(&folder)).unwrap_or_default();
+        if let Some(unread) = all.iter().find(|name| photo::is_unread(name)) {
+            let (path, what) = (root.join(&folder).join(unread), "a picture format that is not read".into());
+            return Err(IoError::Unsupported { path, what, remedy: photo::CONVERT });
+        }
         return Err(IoError::Count {
             path: file,
             what: format!("photos ({} holds another number)", root.join(&folder).display()),
@@ -63,8 +68,7 @@ const ROW_U64: u64 = ROW as u64;
 pub(super) fn names(folder: &Path) -> Result<Vec<String>, IoError> {
     let failed = |cause| IoError::Read { path: folder.into(), cause };
     let mut names = files::names_in(folder).map_err(failed)?;
-    // Those that cannot be read keep their place in the order, and are named when they are looked at.
-    names.retain(|name| photo::stem(name).is_some() && !is_helper(name));
+    names.retain(|name| photo::is_photo(name) && !is_helper(name));
     Ok(names)
 }
 

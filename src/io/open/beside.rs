@@ -13,8 +13,7 @@ use crate::scene::Dataset;
 pub(super) fn other_list(folder: &Path) -> Result<Option<Dataset>, IoError> {
     let is_list = |name: &String| {
         let name = name.to_lowercase();
-        name.starts_with("transform") && name.ends_with(".json") && folder.join(&name).is_file()
-            || name.starts_with("transforms") && name.ends_with(".json")
+        name.ends_with(".json") && (name.starts_with("transforms") || name == "transform.json")
     };
     let lists: Vec<String> = files::names_in(folder).unwrap_or_default().into_iter().filter(is_list).collect();
     match lists.as_slice() {

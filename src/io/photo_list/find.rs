@@ -199,7 +199,11 @@ impl<'a> PhotoFinder<'a> {
             names.iter().filter(|name| at.join(name).is_file()).cloned().collect()
         };
         let stem = photo::stem(file);
-        let same_stem = there(listing.of_stem(stem.unwrap_or(file)));
+        let mut same_stem = there(listing.of_stem(stem.unwrap_or(file)));
+        // Phones and cameras leave one that cannot be read beside one that can.
+        if same_stem.iter().any(|name| !photo::is_unread(name)) {
+            same_stem.retain(|name| !photo::is_unread(name));
+        }
         let of_stem = |exact: &str| -> Vec<String> {
             same_stem.iter().filter(|name| photo::stem(name) == Some(exact)).cloned().collect()
         };

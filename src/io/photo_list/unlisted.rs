@@ -20,7 +20,6 @@ pub(crate) fn unlisted<'a>(photos: &[Photo], listed: impl Iterator<Item = &'a st
     // What was left out for another reason is told already; a list may name photos without their ending.
     let key = |name: &str| fold(photo::stem(name).unwrap_or(name));
     let known: HashSet<String> = listed.map(|name| key(name.rsplit(['/', '\\']).next().unwrap_or(name))).collect();
-    let mut all = 0;
     let mut rest = Vec::new();
     for (folder, used) in folders {
         for name in files::names_in(folder).unwrap_or_default() {
@@ -31,14 +30,13 @@ pub(crate) fn unlisted<'a>(photos: &[Photo], listed: impl Iterator<Item = &'a st
             if !is_listed && (used.contains(stem) || is_helper(&name) || COMPANIONS.into_iter().any(companion)) {
                 continue;
             }
-            all += 1;
             if !is_listed && !known.contains(&key(&name)) {
                 let path = folder.join(name);
                 rest.push(path.strip_prefix(root).unwrap_or(&path).display().to_string());
             }
         }
     }
-    let n = rest.len();
+    let (n, all) = (rest.len(), photos.len() + rest.len());
     (n > 0).then(|| format!("{n} of {all} photos have no pose and were left out: {}", some_of(&rest, ", ")))
 }
 

@@ -30,6 +30,7 @@ impl Scene {
         self.cameras_from = Some(folder);
         if white_background {
             self.settings.background = [1.0; 3];
+            self.says_background = true;
         }
         self
     }

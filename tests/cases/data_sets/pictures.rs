@@ -129,6 +129,20 @@ fn an_archive_says_that_it_has_to_be_unpacked() {
 }
 
 #[test]
+fn a_raw_picture_beside_a_photo_is_no_second_one() {
+    let Some(set) = Copy::of("06_val_filenames") else { return };
+    for i in 0..8 {
+        set.rename(&format!("images/img_0{i}.png"), &format!("images/img_0{i}.PNG"));
+        fs::write(set.at(&format!("images/img_0{i}.dng")), b"II*\0").expect("write");
+    }
+    set.edit("transforms.json", |text| text.replace(".png", ".jpg"));
+    let found = info(set.path());
+    right(&found, 8);
+    assert_eq!(warnings(&found).len(), 1);
+    warns(&found, &["8 of 8 listed photos were found under other names"]);
+}
+
+#[test]
 fn a_data_set_of_numbered_rows_passes_over_what_systems_leave() {
     let Some(set) = Copy::of("12_colmap_elsewhere") else { return };
     // LLFF counts the photos in the folder: a picture that is none must not count.
