@@ -5,6 +5,7 @@
 //! description (JSON) that holds the SHA-256 of its graphs; a graph that differs is refused.
 
 use std::fs;
+use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};

@@ -55,6 +55,8 @@ pub enum EditError {
     OfParts { name: String, own: usize, all: usize },
     #[error("nothing is selected; click on something that is visible")]
     Nothing,
+    #[error("the scene has no such Gaussians; it may have changed since they were selected")]
+    NotThere,
     #[error("what you selected is not a piece of '{0}'; select inside it")]
     Outside(String),
 }
@@ -103,7 +105,11 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
             let is_in = |i: &usize| map.identity_of.get(*i).is_some_and(is);
             let own: Vec<usize> = gaussians.iter().map(|i| *i as usize).filter(is_in).collect();
             if own.is_empty() {
-                return Err(if gaussians.is_empty() { EditError::Nothing } else { EditError::Outside(all.name(*of)) });
+                return Err(match (gaussians.is_empty(), *of) {
+                    (true, _) => EditError::Nothing,
+                    (_, NOBODY) => EditError::NotThere,
+                    (_, of) => EditError::Outside(all.name(of)),
+                });
             }
             let level = if *of == NOBODY { Level::Object } else { Level::Part };
             add(&mut new, level, *of, name.trim().to_owned(), &own);
