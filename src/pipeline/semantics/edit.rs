@@ -55,6 +55,8 @@ pub enum EditError {
     OfParts { name: String, own: usize, all: usize },
     #[error("nothing is selected; click on something that is visible")]
     Nothing,
+    #[error("the scene has no such Gaussians; it may have changed since they were selected")]
+    NotThere,
     #[error("what you selected is not a piece of '{0}'; select inside it")]
     Outside(String),
     #[error("'{0}' is empty: no Gaussians belong to it; undo what took them, correct it by clicks, or merge it")]
@@ -110,10 +112,11 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
             let is_in = |i: &usize| map.identity_of.get(*i).is_some_and(is);
             let own: Vec<usize> = gaussians.iter().map(|i| *i as usize).filter(is_in).collect();
             if own.is_empty() {
-                return Err(match gaussians.is_empty() {
-                    true => EditError::Nothing,
-                    false if *of != NOBODY && map.members(*of).is_empty() => EditError::Empty(all.name(*of)),
-                    false => EditError::Outside(all.name(*of)),
+                return Err(match (gaussians.is_empty(), *of) {
+                    (true, _) => EditError::Nothing,
+                    (_, NOBODY) => EditError::NotThere,
+                    (_, of) if map.members(of).is_empty() => EditError::Empty(all.name(of)),
+                    (_, of) => EditError::Outside(all.name(of)),
                 });
             }
             let level = if *of == NOBODY { Level::Object } else { Level::Part };
