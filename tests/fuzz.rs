@@ -24,6 +24,8 @@ mod repair;
 mod search;
 #[path = "fuzz/seeds.rs"]
 mod seeds;
+#[path = "fuzz/seeds_data_sets.rs"]
+mod seeds_data_sets;
 #[path = "fuzz/seeds_more.rs"]
 mod seeds_more;
 #[path = "fuzz/targets.rs"]

@@ -1,7 +1,7 @@
 //! Bounded reading, and paths that stay inside their folder.
 
 use std::fs::{self, File};
-use std::io::{self, Read};
+use std::io::{self, Read, Write};
 use std::path::{Component, Path, PathBuf};
 
 use sha2::{Digest, Sha256};
@@ -228,6 +228,19 @@ pub(crate) fn renamed(now: PathBuf, earlier: PathBuf) -> PathBuf {
         return earlier;
     }
     now
+}
+
+/// Copies a file. Which of the two a failure is of, the system does not say by itself: `failed` is told.
+pub(crate) fn copy<E>(from: &Path, to: &Path, failed: impl Fn(&Path, io::Error) -> E) -> Result<(), E> {
+    let mut source = fs::File::open(from).map_err(|e| failed(from, e))?;
+    let mut target = fs::File::create(to).map_err(|e| failed(to, e))?;
+    let mut piece = vec![0; 1 << 20];
+    loop {
+        match source.read(&mut piece).map_err(|e| failed(from, e))? {
+            0 => return target.sync_all().map_err(|e| failed(to, e)),
+            n => target.write_all(&piece[..n]).map_err(|e| failed(to, e))?,
+        }
+    }
 }
 
 #[cfg(test)]

@@ -20,9 +20,12 @@ use crate::scene::{Axes, Bounds, Camera, Dataset, GaussianCloud, HomeView, Machi
 
 mod beside;
 mod received;
+mod tolerant;
 
 pub use received::Origin;
 pub(crate) use received::received;
+pub(crate) use tolerant::known_objects;
+use tolerant::{objects_elsewhere, photos_of, tolerant};
 
 /// Gaussians that can be drawn, and what came with them.
 #[derive(Clone, Debug, Default)]
@@ -336,39 +339,6 @@ pub(crate) fn open(
     Ok(scene)
 }
 
-/// Where a scene without objects is one of several trainings, another of which has some: which, in words.
-fn objects_elsewhere(scene: &OpenedScene) -> Option<String> {
-    if scene.semantics.is_some() || !scene.trained || scene.runs.iter().all(|run| run.folder != scene.out) {
-        return None;
-    }
-    let other = scene.runs.iter().max_by_key(|run| run.objects).filter(|run| run.objects > 0)?;
-    Some(format!(
-        "This training has no objects; an earlier one of these photos has ({}). Open it in the Training pane, or at {}",
-        other.text(),
-        other.folder.display()
-    ))
-}
-
-/// The objects and parts stored with a trained scene; broken ones are told and left out.
-pub(crate) fn known_objects(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<SemanticMap>> {
-    match scene.known_semantics() {
-        Ok(map) => map.map(|map| {
-            let what = map.identities.counted();
-            resource_log::record(ResourceKind::Objects, what, "the scene was opened", map.bytes());
-            Arc::new(map)
-        }),
-        Err(e) => {
-            observer.note(
-                Severity::Warning,
-                format!(
-                    "The scene's objects cannot be loaded: {e}. Find them again (Objects pane, or fmlgs preprocess)"
-                ),
-            );
-            None
-        }
-    }
-}
-
 /// Photos, with the Gaussians that were trained on them before, if there are any.
 fn photos(dataset: Dataset, folders: &Folders, observer: &mut dyn Observer) -> OpenedScene {
     let out = folders.trained(dataset.source());
@@ -391,32 +361,6 @@ fn photos(dataset: Dataset, folders: &Folders, observer: &mut dyn Observer) -> O
     let render = TrainConfig::default().render_settings(background, dataset.camera_extent().1);
     let home = HomeView::new(&dataset.cameras(), cloud.as_deref());
     OpenedScene { name, dataset: Some(dataset), cloud, out, render, home, ..OpenedScene::default() }
-}
-
-/// A trained scene; where its settings cannot be read this is told, and it is drawn with the defaults.
-fn tolerant(path: &Path, scene: TrainedScene, observer: &mut dyn Observer) -> Scene {
-    let config = TrainConfig::stored(&scene.folder, scene.info.config.clone()).unwrap_or_else(|e| {
-        observer.note(
-            Severity::Warning,
-            format!("The scene may not look as trained: {e}. Train again, or restore the file"),
-        );
-        TrainConfig::unknown()
-    });
-    Scene::trained(path, scene, config)
-}
-
-/// The photos of a trained scene, if they are still where they were.
-fn photos_of(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<Dataset>> {
-    let why = match scene.dataset_path.as_deref().map(|p| (io::open(p), p)) {
-        Some((Ok(Opened::Dataset(dataset)), _)) => {
-            return Some(Arc::new(dataset.with_alpha(scene.config.alpha).into_owned()));
-        }
-        Some((Ok(_), p)) => format!("{} no longer holds photos; the scene opens without them", p.display()),
-        Some((Err(e), _)) => format!("The photos cannot be read, the scene opens without them: {e}"),
-        None => "The photos were moved or deleted; the scene opens without them".into(),
-    };
-    observer.note(Severity::Warning, why);
-    None
 }
 
 /// Distance of the near plane for Gaussians of which no cameras are known. Small ones would lie before the usual one; of

@@ -5,13 +5,13 @@
 //! description (JSON) that holds the SHA-256 of its graphs; a graph that differs is refused.
 
 use std::fs;
-use std::io::{self, Read, Write};
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
 use super::fetch::{self, FetchError, FileToFetch, Patience};
 use super::{KnownAnswer, ModelError, folder, manifest};
+use crate::io::files;
 
 const LIST: &str = include_str!("../../assets/models.toml");
 
@@ -326,23 +326,11 @@ impl ModelEntry {
         for name in names {
             let (from, to) = (brought.join(name), folder.join(name));
             let part = folder.join(format!("{name}.part"));
-            let copied = copy(&from, &part, failed).and_then(|()| fs::rename(&part, &to).map_err(|e| failed(&to, e)));
+            let copied =
+                files::copy(&from, &part, failed).and_then(|()| fs::rename(&part, &to).map_err(|e| failed(&to, e)));
             copied.inspect_err(|_| drop(fs::remove_file(&part)))?;
         }
         self.verify(folder)
-    }
-}
-
-/// Copies a file. Which of the two a failure is of, the system does not say by itself.
-fn copy(from: &Path, to: &Path, failed: impl Fn(&Path, io::Error) -> FetchError) -> Result<(), FetchError> {
-    let mut source = fs::File::open(from).map_err(|e| failed(from, e))?;
-    let mut target = fs::File::create(to).map_err(|e| failed(to, e))?;
-    let mut piece = vec![0; 1 << 20];
-    loop {
-        match source.read(&mut piece).map_err(|e| failed(from, e))? {
-            0 => return target.sync_all().map_err(|e| failed(to, e)),
-            n => target.write_all(&piece[..n]).map_err(|e| failed(to, e))?,
-        }
     }
 }
 

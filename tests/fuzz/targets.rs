@@ -216,7 +216,7 @@ fn labels(folder: &Path) -> Result<Vec<io::labels::Region>, IoError> {
 }
 
 fn segments(folder: &Path) {
-    fs::write(folder.join("photo.txt"), super::seeds::SEGMENTS).expect("write");
+    fs::write(folder.join("photo.txt"), super::seeds_data_sets::SEGMENTS).expect("write");
 }
 
 fn gray(folder: &Path, inner: &str) {

@@ -65,10 +65,7 @@ pub(crate) fn run_on(
     }
     tell_marks(dataset, config, observer);
     let scene = out.map(|folder| claim(folder, dataset)).transpose()?;
-    let inputs = match out {
-        Some(_) => Some(TrainInputs::of(dataset, Compare::Contents).map_err(TrainError::Photo)?),
-        None => None,
-    };
+    let inputs = out.map(|_| TrainInputs::of(dataset, Compare::Contents).map_err(TrainError::Photo)).transpose()?;
     let saved = match (out, &inputs) {
         (Some(folder), Some(now)) => resumable(folder, dataset, (config, &train), (now, may), observer)?,
         _ => None,
@@ -138,8 +135,7 @@ impl<'a> Job<'a> {
         (views, tests): (Vec<TrainView>, Vec<TrainView>),
         saved: Option<Checkpoint>,
     ) -> Self {
-        let (_, extent) = dataset.camera_extent();
-        let background = dataset.background.unwrap_or([0.0; 3]);
+        let (extent, background) = (dataset.camera_extent().1, dataset.background.unwrap_or([0.0; 3]));
         let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
         let (mut secs, mut history) = (0.0, History::default());
         // What was seen in full is not seen coarsely again, where more steps make those for that more.
