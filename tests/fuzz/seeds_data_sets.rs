@@ -5,7 +5,7 @@ use std::io::Cursor;
 use image::{ImageFormat, Rgba, RgbaImage};
 use serde_json::json;
 
-use super::seeds::Seed;
+use super::seeds::{Seed, encode, identities};
 
 /// Two segments and a box of YOLO's.
 pub const SEGMENTS: &[u8] = b"0 0.1 0.1 0.5 0.1 0.5 0.6 0.1 0.6\n1 0.5 0.5 0.9 0.5 0.7 0.9 0.8\n1 0.5 0.5 0.1 0.1\n";
