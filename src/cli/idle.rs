@@ -72,9 +72,11 @@ pub(super) fn check(name: &str, command: &Command, matches: &ArgMatches) -> Resu
 /// An option as it is typed.
 fn written(command: &Command, id: &str) -> String {
     let argument = command.get_arguments().find(|a| a.get_id() == id);
-    match argument.and_then(|a| a.get_long()) {
-        Some(long) => format!("--{long}"),
-        None => id.to_uppercase(),
+    match argument.map(|a| a.get_long()) {
+        Some(Some(long)) => format!("--{long}"),
+        Some(None) => id.to_uppercase(),
+        // One that all commands have in common.
+        None => format!("--{}", id.replace('_', "-")),
     }
 }
 

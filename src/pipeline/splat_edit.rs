@@ -57,7 +57,8 @@ impl Placement {
     /// Whether it leaves everything where it is, whole turns included.
     fn is_nothing(&self) -> bool {
         let axis = DVec3::new(self.turn.x, self.turn.y, self.turn.z);
-        self.shift == DVec3::ZERO && self.scale == 1.0 && axis.length() <= WHOLE_TURN * self.turn.length()
+        let is_whole = axis.length() < WHOLE_TURN * self.turn.length();
+        self.shift == DVec3::ZERO && self.scale == 1.0 && is_whole
     }
 }
 

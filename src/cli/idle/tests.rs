@@ -94,6 +94,16 @@ fn besides(command: &Command, without: &[&Arg]) -> Vec<Vec<String>> {
     all
 }
 
+/// Nothing, and each choice among named ones that a command has besides: some options go with one only.
+fn choices(command: &Command, without: &[&Arg]) -> Vec<Vec<String>> {
+    let mut all = vec![Vec::new()];
+    for argument in command.get_arguments().filter(|a| !without.iter().any(|w| w.get_id() == a.get_id())) {
+        let Some(long) = argument.get_long().filter(|_| argument.get_action().takes_values()) else { continue };
+        all.extend(argument.get_possible_values().iter().map(|v| vec![format!("--{long}={}", v.get_name())]));
+    }
+    all
+}
+
 #[test]
 fn what_is_required_is_required_whatever_else_is_given() {
     let (mut pairs, mut alone) = (0, 0);
@@ -104,9 +114,11 @@ fn what_is_required_is_required_whatever_else_is_given() {
                 let Some(required) = of(&required) else { continue };
                 let told = |line: &[String]| format!("'{}' is accepted", line.join(" "));
                 // The control: together they are accepted, with something beside them.
-                let together = besides(&command, &[argument, required])
-                    .into_iter()
-                    .any(|rest| refusal(&[words.clone(), rest, typed(required), typed(argument)].concat()).is_none());
+                let choices = choices(&command, &[argument, required]);
+                let together = besides(&command, &[argument, required]).into_iter().any(|rest| {
+                    let line = [words.clone(), rest, typed(required), typed(argument)].concat();
+                    choices.iter().any(|choice| refusal(&[line.clone(), choice.clone()].concat()).is_none())
+                });
                 assert!(together, "{words:?}: --{} is never accepted", argument.get_id());
                 for rest in besides(&command, &[argument, required]) {
                     let line = [words.clone(), rest, typed(argument)].concat();

@@ -110,7 +110,9 @@ fn lists_and_masks_that_make_no_sense_are_refused() {
     assert_eq!(listed(" lamp \n\n #3\r\n").expect("two"), ["lamp", "#3"]);
     assert!(listed("\n \n").is_err_and(|e| e.to_string().contains("one phrase per line")));
     assert!(listed(&"lamp\n".repeat(MOST + 1)).is_err_and(|e| e.to_string().contains("split")));
-    assert!(matches!(run(&request(&["?"]), &mut Silent), Err(JobError::EmptyQuery)));
+    let wordless = run(&request(&["?"]), &mut Silent);
+    assert!(matches!(&wordless, Err(JobError::Phrases(e)) if e.contains("'?' has no word")), "{wordless:?}");
+    assert!(listed("lamp\n..\n").is_err_and(|e| e.to_string().contains("line 2: '..'")));
     let place = Path::new("a/b.png");
     let fit = |w, h| fitted(Mask::from_fn(w, h, |_| true), 64, 48, place);
     assert_eq!(fit(128, 96).expect("twice the size").area(), 64 * 48);
