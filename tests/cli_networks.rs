@@ -29,9 +29,9 @@ fn networks_find_follow_and_look() {
     let (sam2, clip) = (network("sam2.json"), network("clip.json"));
     let masks = photos.to_str().unwrap();
     let by = |tracker: &str| {
-        let tracking =
-            ["--tracker", tracker, "--tracker-model", &sam2, "--encoder", &clip, "--max-seeds", "1", "--json", "-q"];
-        run(&[&["preprocess", &scene, "--masks", masks], &tracking[..]].concat()).ok().json()
+        let network: &[&str] = if tracker == "geometry" { &[] } else { &["--tracker-model", &sam2] };
+        let tracking = ["--tracker", tracker, "--encoder", &clip, "--max-seeds", "1", "--json", "-q"];
+        run(&[&["preprocess", &scene, "--masks", masks], network, &tracking[..]].concat()).ok().json()
     };
     let (geometry, both) = (by("geometry"), by("both"));
     let is_frame = |file: &PathBuf| file.extension().is_some_and(|e| e == "frame");

@@ -1,8 +1,6 @@
-//! The networks that the program can use (`assets/models.toml`), and which of them are on this
-//! machine.
-//!
-//! They lie in one folder: `FMLGS_MODELS`, else `models` in the user's data folder. Each model has a
-//! description (JSON) that holds the SHA-256 of its graphs; a graph that differs is refused.
+//! The networks that the program can use (`assets/models.toml`), and which of them are on this machine. They lie in one
+//! folder: `FMLGS_MODELS`, else `models` in the user's data folder. Each model has a description (JSON) that holds the
+//! SHA-256 of its graphs; a graph that differs is refused.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -119,5 +119,5 @@ fn a_unit_that_fails_is_recorded_and_stops_no_other() {
         std::fs::read(folder.path().join("photos/images/0001.png")).unwrap(),
     )
     .unwrap();
-    assert!(done(batch(&jobs, &out, &[])).fails_with(1).stderr.contains("photos: "));
+    assert!(done(batch(&jobs, &out, &[])).fails_with(1).stderr.contains("the photos' names, sizes or cameras"));
 }

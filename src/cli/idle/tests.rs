@@ -1,3 +1,5 @@
+//! Options without effect are refused; every requirement holds whatever else is given.
+
 use std::collections::BTreeSet;
 
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory};
