@@ -5,7 +5,6 @@ use std::path::Path;
 use serde_json::json;
 
 use super::{CliError, output};
-use crate::io::labels::Labels;
 use crate::jobs::evaluate::PhotoComparison;
 use crate::jobs::evaluate_masks::{self, Protocol, ProtocolSummary};
 use crate::math::stats::mean;
@@ -26,7 +25,7 @@ pub(crate) fn run(
     comparison: &PhotoComparison,
     as_json: bool,
 ) -> Result<(), CliError> {
-    Labels::of_photos(labels, &comparison.dataset.photos)?.notes().iter().for_each(|text| output::warn(text.clone()));
+    evaluate_masks::label_notes(labels, comparison)?.into_iter().for_each(output::warn);
     let scores = evaluate_masks::run(comparison, scene, labels, protocol, query, recipe)?;
     let (name, views, trained, (miou, miou_by_view)) =
         (protocol.name(), scores.views, scores.trained_on, scores.miou());

@@ -29,7 +29,7 @@ use gltf::json::{self, Root};
 use super::{IoError, files};
 use crate::scene::text;
 
-use packed::{DRACO, MESHOPT, Packed};
+use packed::{DRACO, MESHOPT, PackedFile};
 
 pub(crate) use model::{AlphaMode, Material, Mesh, MeshNode, MeshPrimitive, MeshScene, TextureImage, TextureUse, Wrap};
 
@@ -66,7 +66,7 @@ fn read_bytes(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<MeshSc
         };
         return Err(IoError::Unsupported { path: path.into(), what, remedy });
     }
-    let packed: Packed = parse(text, path)?;
+    let packed: PackedFile = parse(text, path)?;
     let mut file = File::open_packed(&root, path, folder, blob, [MAX_FILE_BYTES, MAX_VALUES], packed)?;
     let (nodes, roots) = file.nodes()?;
     let (materials, images) = file.materials()?;
@@ -92,7 +92,7 @@ pub(super) struct File<'a> {
     root: &'a Root,
     buffers: Vec<std::borrow::Cow<'a, [u8]>>,
     values_left: Cell<u64>,
-    packed: Packed,
+    packed: PackedFile,
     /// Views that were packed.
     unpacked: Vec<OnceCell<Vec<u8>>>,
     warnings: Vec<String>,
@@ -108,7 +108,7 @@ impl<'a> File<'a> {
         blob: Option<&'a [u8]>,
         limits: [u64; 2],
     ) -> Result<Self, IoError> {
-        Self::open_packed(root, path, folder, blob, limits, Packed::default())
+        Self::open_packed(root, path, folder, blob, limits, PackedFile::default())
     }
 
     /// The same of a file some of whose geometry is packed.
@@ -118,7 +118,7 @@ impl<'a> File<'a> {
         folder: Option<&'a Path>,
         blob: Option<&'a [u8]>,
         [most_bytes, most_values]: [u64; 2],
-        packed: Packed,
+        packed: PackedFile,
     ) -> Result<Self, IoError> {
         let is_empty = |buffer| packed.is_fallback(buffer);
         let buffers = resource::load_buffers(root, path, folder, blob, most_bytes, &is_empty)?;

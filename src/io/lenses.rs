@@ -6,7 +6,6 @@ use std::path::Path;
 use glam::{DVec2, DVec3};
 
 use super::IoError;
-use super::photo_list::ListedPhoto;
 use crate::math::format::things;
 use crate::scene::distortion::Rays;
 use crate::scene::{Camera, Distortion, Photo};
@@ -32,11 +31,11 @@ pub(super) fn unsupported(model: &str, path: &Path) -> IoError {
 
 /// The photos whose camera model is read. The others, of which only the model is known, are left out with a warning; if
 /// there are no others, that is an error.
-pub(super) fn readable(
-    listed: Vec<Result<ListedPhoto, String>>,
+pub(super) fn readable<T>(
+    listed: Vec<Result<T, String>>,
     source: &Path,
     warnings: &mut Vec<String>,
-) -> Result<Vec<ListedPhoto>, IoError> {
+) -> Result<Vec<T>, IoError> {
     let all = listed.len();
     let (mut readable, mut others) = (Vec::new(), Vec::new());
     for photo in listed {

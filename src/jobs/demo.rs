@@ -176,6 +176,8 @@ pub(crate) fn make(
     }
     bundle::unpack(&bundle::pack(&packed).map_err(unwritten)?, &shipped)?;
     let shipped = shipped.join("photos");
+    info.cameras.iter_mut().for_each(|c| c.name = as_jpeg(&c.name));
+    let seen = Scene { cameras: info.cameras.clone(), ..seen };
     let job = PhotoComparison::of(&seen, Arc::new(open::dataset(&shipped)?), EvaluateOptions::default())?;
     let quality = evaluate::photometric(&job, observer)?;
     let DemoQueries { object_miou, part_miou, .. } = demo_questions::ask(&map, &shipped, &job, None)?;
@@ -197,7 +199,6 @@ pub(crate) fn make(
     let rgb = image::RgbImage::from_raw(PICTURE_PX[0], PICTURE_PX[1], frame.to_rgb8().into_flattened());
 
     info.dataset = Some(DatasetReference { path: "../photos".into(), format: dataset.format.clone() });
-    info.cameras.iter_mut().for_each(|c| c.name = as_jpeg(&c.name));
     // Times differ from run to run.
     let last = crate::scene::Evaluation { step: outcome.steps, ..quality };
     info.history = History { steps: Vec::new(), evaluations: vec![last] };

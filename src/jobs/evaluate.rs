@@ -7,7 +7,7 @@ use std::sync::Arc;
 use image::ColorType;
 
 use super::changed::ChangedScene;
-use super::held_out::{held_out, refuse_holdout};
+use super::held_out::{held_out, naming, refuse_holdout};
 use super::{JobError, Scene, export, open};
 use crate::io;
 use crate::math::stats::median;
@@ -84,9 +84,10 @@ impl PhotoComparison {
         let (training, _) = dataset.split(holdout_every.unwrap_or(default_every));
         let borders = if keep_borders { None } else { Some(Borders::of(&dataset, &training, max_side_px)?) };
         let (cloud, settings) = (Arc::clone(&scene.cloud), scene.settings_beside(&dataset));
+        let is_of = naming(&dataset, &scene.cameras);
         let seen = |i: &usize| {
             let name = &dataset.photos[*i].name;
-            scene.cameras.iter().any(|c| !c.held_out && c.name == *name)
+            scene.cameras.iter().any(|c| !c.held_out && is_of(&c.name, name))
         };
         let trained_on = views.iter().map(seen).collect();
         let changed = ChangedScene::of(scene, &dataset);

@@ -106,6 +106,14 @@ impl MaskScores {
     }
 }
 
+/// What of the labels of these photos is passed over, not used or joined, a sentence each.
+///
+/// # Errors
+/// If they cannot be read, or a file could be of two photos.
+pub(crate) fn label_notes(labels: &Path, comparison: &PhotoComparison) -> Result<Vec<String>, JobError> {
+    Ok(Labels::of_photos(labels, &comparison.dataset.photos)?.notes().to_vec())
+}
+
 /// Compares the objects and parts of a scene with `labels`; `query` is what to ask for where those do not name it.
 /// Pictures show the identities over the photos.
 pub(crate) fn run(

@@ -1,5 +1,7 @@
 //! Which photos a scene was not trained on.
 
+use std::path::Path;
+
 use super::JobError;
 use crate::io::gs_output::is_of;
 use crate::io::trained::SceneCamera;
@@ -17,10 +19,23 @@ pub(crate) fn held_out(
     if every.is_some() || cameras.is_empty() {
         return dataset.split(every.unwrap_or(default_every)).1;
     }
-    let is_exact = cameras.iter().any(|c| dataset.photos.iter().any(|p| p.name == c.name));
-    let is_of = |camera: &str, photo: &str| if is_exact { camera == photo } else { is_of(camera, photo) };
+    let is_of = naming(dataset, cameras);
     let held = |name: &str| cameras.iter().any(|c| c.held_out && is_of(&c.name, name));
     (0..dataset.photos.len()).filter(|&i| held(&dataset.photos[i].name)).collect()
+}
+
+/// Rule by which a camera's name is a photo's: the strictest that holds for any of these. Names are the same, or they
+/// are 3D Gaussian Splatting's, or the photos were stored in another format since.
+pub(crate) fn naming(dataset: &Dataset, cameras: &[SceneCamera]) -> fn(&str, &str) -> bool {
+    let rules: [fn(&str, &str) -> bool; 3] = [|camera, photo| camera == photo, is_of, is_but_for_ending];
+    let holds =
+        |is_of: &fn(&str, &str) -> bool| cameras.iter().any(|c| dataset.photos.iter().any(|p| is_of(&c.name, &p.name)));
+    rules.into_iter().find(holds).unwrap_or(is_but_for_ending)
+}
+
+/// Whether two names with folders differ in nothing but the ending of the file.
+fn is_but_for_ending(one: &str, other: &str) -> bool {
+    Path::new(one).with_extension("") == Path::new(other).with_extension("")
 }
 
 /// Refuses to hold out every n-th photo where the data set itself marks photos as test.
@@ -64,5 +79,23 @@ mod tests {
         assert_eq!(held_out(&now, &cameras, None, 2), [1], "a is gone, b and d were trained on, e is new");
         assert_eq!(held_out(&now, &cameras, Some(2), 9), [0, 2], "somebody wants otherwise");
         assert_eq!(held_out(&now, &[], None, 2), [0, 2], "a splat says nothing");
+    }
+
+    #[test]
+    fn photos_are_known_under_other_endings_where_none_has_its_own() {
+        let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid");
+        let set = |names: &[&str]| {
+            let photo = |name: &&str| Photo::new(*name, PathBuf::new(), camera.clone());
+            Dataset { photos: names.iter().map(photo).collect(), ..Dataset::default() }
+        };
+        let cameras = ["a/1.png", "a/2.png", "b/1.png"].map(|name| SceneCamera {
+            name: name.into(),
+            camera: camera.clone(),
+            held_out: name == "a/1.png",
+        });
+        let held = |names: &[&str]| held_out(&set(names), &cameras, None, 2);
+        assert_eq!(held(&["a/1.jpg", "a/2.jpg", "b/1.jpg"]), [0], "packed anew; b/1 is another photo");
+        assert_eq!(held(&["a/1.jpg", "a/2.png"]), [0_usize; 0], "names are kept, so a/1.jpg is a new photo");
+        assert_eq!(held(&["c/7.jpg"]), [0_usize; 0], "of no camera");
     }
 }

@@ -9,12 +9,12 @@ const MOST_LETTERS: usize = 28;
 
 /// Both axes: seconds to the right, errors up.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Axes {
+pub(crate) struct PlotAxes {
     pub(crate) secs: LogAxis,
     pub(crate) error: LogAxis,
 }
 
-impl Axes {
+impl PlotAxes {
     /// Those that hold all points of these stages, their repeats, and the ways to them; `None` where nothing was
     /// measured.
     pub(crate) fn of(stages: &[&Stage], measure: &Measure) -> Option<Self> {
@@ -94,14 +94,14 @@ mod tests {
     #[test]
     fn places_are_logarithms_of_time_and_error() {
         let (stage, psnr) = one([0.1, 0.01, 1.0], [40.0, 20.0, 60.0]);
-        let (axes, p) = (Axes::of(&[&stage], &psnr).expect("axes"), &stage.points[0]);
+        let (axes, p) = (PlotAxes::of(&[&stage], &psnr).expect("axes"), &stage.points[0]);
         assert!(near(axes.place(p, &psnr).expect("a place"), [-1.0, -2.0]), "40 dB are an error of a hundredth");
         let whiskers = axes.whiskers(p, &psnr);
         assert!(near(whiskers[0][0], [-2.0, -2.0]) && near(whiskers[0][1], [0.0, -2.0]), "{whiskers:?}");
         assert!(near(whiskers[1][0], [-1.0, -1.0]) && near(whiskers[1][1], [-1.0, -3.0]), "{whiskers:?}");
         let other = Measure::new("SSIM", "", ErrorKind::Share, "");
         assert!(axes.place(p, &other).is_none() && axes.whiskers(p, &other).is_empty());
-        assert!(Axes::of(&[&stage], &other).is_none());
+        assert!(PlotAxes::of(&[&stage], &other).is_none());
     }
 
     #[test]
@@ -109,7 +109,7 @@ mod tests {
         let (mut stage, psnr) = one([0.1, 0.1, 0.1], [150.0, 150.0, 150.0]);
         let (other, _) = one([0.2, 0.2, 0.2], [60.0, 60.0, 60.0]);
         stage.points.extend(other.points);
-        let axes = Axes::of(&[&stage], &psnr).expect("axes");
+        let axes = PlotAxes::of(&[&stage], &psnr).expect("axes");
         let place = |k: usize| axes.place(&stage.points[k], &psnr).expect("a place")[1];
         let band = axes.error.band_end().expect("a band");
         assert!(place(0) < band && place(1) > band, "a PSNR at its limit is no error, not one of 3e-8");
@@ -123,7 +123,7 @@ mod tests {
         stage.points.truncate(2);
         stage.points[0].values.insert("RMS".into(), [0.0, 0.02].into_iter().collect());
         stage.points[1].values.insert("RMS".into(), [0.0, 0.0].into_iter().collect());
-        let axes = Axes::of(&[&stage], &rms).expect("axes");
+        let axes = PlotAxes::of(&[&stage], &rms).expect("axes");
         let band = axes.error.band_end().expect("a band");
         let [middle, zero] = [0, 1].map(|k| axes.place(&stage.points[k], &rms).expect("a place")[1]);
         assert!(middle > band && zero < band, "{middle} {zero} {band}");
@@ -136,7 +136,7 @@ mod tests {
         stage.points[0].values.insert("SSIM".into(), [0.9].into_iter().collect());
         stage.points[0].curve = vec![[0.0, 5.0], [5.0, 20.0], [10.0, 30.0]];
         stage.measures.push(ssim.clone());
-        let axes = Axes::of(&[&stage], &psnr).expect("axes");
+        let axes = PlotAxes::of(&[&stage], &psnr).expect("axes");
         assert_eq!(axes.way(&stage, &stage.points[0], &psnr).len(), 2, "what took no time has no place");
         assert!(axes.way(&stage, &stage.points[0], &ssim).is_empty(), "20 dB are no SSIM of 20");
     }

@@ -1,7 +1,7 @@
 //! A stage as an image that reads by itself: error over seconds, both logarithmic, zero in a band of its own; a look
 //! per knob, every point with its setting, the front under them, the spread of repeats through them.
 
-use super::axes::Axes;
+use super::axes::PlotAxes;
 use super::axis::{LogAxis, Tick};
 use super::document::{Measure, Point, Report, Stage};
 use super::labels::{self, LabelBox};
@@ -30,7 +30,7 @@ struct Frame {
 
 impl Frame {
     /// The place of a pair of coordinates of these axes.
-    fn place(&self, axes: &Axes, at: [f64; 2]) -> [f64; 2] {
+    fn place(&self, axes: &PlotAxes, at: [f64; 2]) -> [f64; 2] {
         [self.x(&axes.secs, at[0]), self.y(&axes.error, at[1])]
     }
 
@@ -51,7 +51,7 @@ impl Frame {
     }
 
     /// Grid, numbers and names of both axes.
-    fn draw(&self, svg: &mut Svg, axes: &Axes, [x_name, y_name]: [&str; 2], number: fn(f64) -> String) {
+    fn draw(&self, svg: &mut Svg, axes: &PlotAxes, [x_name, y_name]: [&str; 2], number: fn(f64) -> String) {
         let (right, bottom) = (self.right(), self.bottom());
         for (axis, is_x) in [(&axes.secs, true), (&axes.error, false)] {
             let line = |at: f64| match is_x {
@@ -97,7 +97,7 @@ fn share(axis: &LogAxis, at: f64) -> f64 {
 
 /// The plot of a measure of a stage; `None` if it was not taken.
 pub(crate) fn svg(report: &Report, stage: &Stage, measure: &Measure) -> Option<String> {
-    let axes = Axes::of(&[stage], measure)?;
+    let axes = PlotAxes::of(&[stage], measure)?;
     let mut svg = Svg::new(SIZE);
     let title = format!("{}: {} over time", stage.name.title(), measure.error_name());
     svg.text([FRAME.min[0], 24.0], Anchor::Start, 17.0, BLACK, &title);
@@ -124,7 +124,7 @@ pub(crate) fn svg(report: &Report, stage: &Stage, measure: &Measure) -> Option<S
 }
 
 /// Rings around what is on the front, and a wide pale line along the best of it.
-fn front(svg: &mut Svg, axes: &Axes, stage: &Stage, measure: &Measure) {
+fn front(svg: &mut Svg, axes: &PlotAxes, stage: &Stage, measure: &Measure) {
     let on = stage.front(measure).into_iter().filter_map(|i| axes.place(&stage.points[i], measure));
     let on: Vec<[f64; 2]> = on.map(|at| FRAME.place(axes, at)).collect();
     let mut along: Vec<[f64; 2]> = Vec::new();
@@ -138,7 +138,7 @@ fn front(svg: &mut Svg, axes: &Axes, stage: &Stage, measure: &Measure) {
     on.iter().for_each(|at| svg.halo(*at, 8.5, SvgStroke(BLACK, 3.0, 0.3)));
 }
 
-fn series(svg: &mut Svg, axes: &Axes, (stage, measure): (&Stage, &Measure), method: &str, look: KnobLook) {
+fn series(svg: &mut Svg, axes: &PlotAxes, (stage, measure): (&Stage, &Measure), method: &str, look: KnobLook) {
     let points: Vec<&Point> = stage.points.iter().filter(|p| p.method == method).collect();
     let placed = |at: &[f64; 2]| FRAME.place(axes, *at);
     for p in &points {
@@ -159,7 +159,7 @@ fn series(svg: &mut Svg, axes: &Axes, (stage, measure): (&Stage, &Measure), meth
 }
 
 /// The setting beside every point, with a thin line to it where it had to go away.
-fn name_points(svg: &mut Svg, axes: &Axes, (stage, measure): (&Stage, &Measure), methods: &[&str]) {
+fn name_points(svg: &mut Svg, axes: &PlotAxes, (stage, measure): (&Stage, &Measure), methods: &[&str]) {
     let named = |p: &Point| {
         let at = FRAME.place(axes, axes.place(p, measure)?);
         let k = methods.iter().position(|m| *m == p.method).unwrap_or(0);
@@ -182,7 +182,7 @@ fn name_points(svg: &mut Svg, axes: &Axes, (stage, measure): (&Stage, &Measure),
 }
 
 /// The knobs that have a point here.
-fn legend(svg: &mut Svg, axes: &Axes, (stage, measure): (&Stage, &Measure), methods: &[&str]) {
+fn legend(svg: &mut Svg, axes: &PlotAxes, (stage, measure): (&Stage, &Measure), methods: &[&str]) {
     let x = FRAME.right() + 18.0;
     let mut y = FRAME.min[1] + 4.0;
     let mut row = |svg: &mut Svg, name: &str, mark: &dyn Fn(&mut Svg, [f64; 2])| {
@@ -208,7 +208,8 @@ fn legend(svg: &mut Svg, axes: &Axes, (stage, measure): (&Stage, &Measure), meth
 pub(crate) fn order_svg(order: &super::document::Order) -> Option<String> {
     let pairs: Vec<[f64; 2]> = order.pairs.iter().filter(|p| p[0] > 0.0 && p[1].is_finite()).copied().collect();
     let first = pairs.iter().find(|p| p[1] > 0.0)?;
-    let axes = Axes { secs: LogAxis::of(pairs.iter().map(|p| p[0]))?, error: LogAxis::of(pairs.iter().map(|p| p[1]))? };
+    let axes =
+        PlotAxes { secs: LogAxis::of(pairs.iter().map(|p| p[0]))?, error: LogAxis::of(pairs.iter().map(|p| p[1]))? };
     let frame = Frame { min: [78.0, 34.0], size: [330.0, 212.0] };
     let mut svg = Svg::new([430.0, 300.0]);
     svg.text([12.0, 20.0], Anchor::Start, 13.0, BLACK, &text::elided(&order.what, 60));
@@ -275,7 +276,7 @@ mod tests {
                 p.secs = [secs[k]].into_iter().collect();
                 p.values.insert("RMS".into(), [error[k]].into_iter().collect());
             }
-            let axes = Axes::of(&[&report.stages[0]], &report.stages[0].measures[0]).expect("axes");
+            let axes = PlotAxes::of(&[&report.stages[0]], &report.stages[0].measures[0]).expect("axes");
             for axis in [axes.secs, axes.error] {
                 assert!(axis.ticks().iter().filter(|t| t.named).count() >= 3, "{axis:?}");
             }

@@ -109,7 +109,7 @@ pub(crate) fn apply(
             let (map, mut thing) = thing(map, *id)?;
             match (to.is_nothing(), duplicate, color) {
                 (true, false, None) => return Err(SplatEditError::NoChange),
-                (true, true, _) => return Err(SplatEditError::SamePlace),
+                (true, true, None) => return Err(SplatEditError::SamePlace),
                 _ => {}
             }
             let (mut cloud, mut map) = (cloud.clone(), map.clone());

@@ -40,7 +40,12 @@ fn a_panorama_is_named_and_what_to_do_with_it() {
     assert!(unknown.contains("the camera model number 33") && unknown.contains("image_undistorter"), "{unknown}");
     let cut = with(17, &bytes[..bytes.len() - 8]).fails_with(1).stderr;
     assert!(cut.contains("claims 1 cameras"), "{cut}");
-    // A fisheye in its place is read.
+    // A fisheye in its place is read, once the photos are called as they are listed: by camera and frame.
+    for i in 0..8 {
+        let to = at.path().join(format!("images/cam{}/frame{:02}.png", i % 2, i / 2));
+        fs::create_dir_all(to.parent().expect("parent")).expect("folder");
+        fs::rename(at.path().join(format!("images/img_{i:02}.png")), to).expect("renamed");
+    }
     let mut fisheye = bytes[..32].to_vec();
     fisheye.extend([40.0, 42.0, 31.5].map(f64::to_le_bytes).concat());
     let read = with(14, &fisheye).ok().stdout;

@@ -105,11 +105,14 @@ fn points_start_in_the_color_that_they_have() {
     let scene = folder.path().join("scene");
     fmlgs(&["train", text(&case), "--out", text(&scene), "--steps", "1", "--no-densify", "-q"]).ok();
     let c = cloud(&scene.join("point_cloud.ply"));
-    let (stride, n) = (c.sh_stride(), c.len() as f64);
+    // Those of the points come first; the others fill what photos show where no point is.
+    let (stride, points) = (c.sh_stride(), 400);
+    assert!(c.len() >= points, "{}", c.len());
     for (k, want) in [0.54, 0.53, 0.54].into_iter().enumerate() {
-        let mean = c.sh.iter().step_by(stride).map(|sh| 0.5 + SH_C0 * f64::from(sh[k])).sum::<f64>() / n;
-        // Training adds a few Gaussians of its own to those of the points; cut at white, the mean was 0.93.
-        assert!((mean - want).abs() < 0.04, "{k}: {mean}");
+        let own = c.sh.iter().step_by(stride).take(points);
+        let mean = own.map(|sh| 0.5 + SH_C0 * f64::from(sh[k])).sum::<f64>() / points as f64;
+        // Cut at white, it would be over 0.9.
+        assert!((mean - want).abs() < 0.01, "{k}: {mean}");
     }
 }
 

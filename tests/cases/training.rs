@@ -117,7 +117,7 @@ fn the_cut_out_thing_of_a_report_stands_alone() {
     assert_eq!(info(&data)["alpha"], "empty");
     let folder = folder();
     let out = folder.path().join("scene");
-    let done = train(&data, &out, 400, &["--holdout-every", "0"]);
+    let done = train(&data, &out, 1000, &["--holdout-every", "0"]);
     assert!(done.stderr.contains("Transparent pixels are kept empty"), "{}", done.stderr);
     let photo = image::open(data.join("images/img_05.png")).expect("photo").to_rgba8();
     let [outside, inside] = drawn_alpha(&out, "5", &photo);

@@ -67,7 +67,10 @@ fn a_report_is_opened_compared_and_its_settings_are_applied() {
     w.ask(Action::Open(at("one")));
     w.until("the report", |a| a.state.report.is_some());
     assert_eq!(w.app().state.scene.as_ref().map(|s| s.name.as_str()), Some("dots"));
-    assert!(w.shows("Incomplete: 3 of 4"), "an incomplete sweep says so");
+    assert!(
+        w.shows("Incomplete: 4 planned settings, 3 runs each; so far each setting 3 times"),
+        "an incomplete sweep says so"
+    );
     assert!(w.is_drawn());
     w.click("precision: 16 bits");
     assert!(w.shows("measured for comparison") && !w.shows("Apply to the view"), "what cannot be applied says why");

@@ -5,7 +5,7 @@ use super::{Lost, Resolver, Set, name_words};
 use crate::agent::describe::join;
 use crate::agent::refusal::RefusalKind;
 use crate::agent::words::{alike, singular};
-use crate::pipeline::semantics::grounds::color_of;
+use crate::jobs::query::color_of;
 use crate::pipeline::semantics::recipe::Understanding;
 use crate::scene::colors::row;
 use crate::scene::{Identity, IdentityId, Level};

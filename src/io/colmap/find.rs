@@ -29,14 +29,14 @@ const MOST: usize = 1000;
 
 /// Files of a reconstruction.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(super) struct Model {
+pub(super) struct ModelFolder {
     pub(super) folder: PathBuf,
     pub(super) is_binary: bool,
     /// Index of the place in [`PLACES`].
     place: usize,
 }
 
-impl Model {
+impl ModelFolder {
     /// The reconstruction whose files lie in `folder` itself.
     fn at(folder: &Path, place: usize) -> Option<Self> {
         let has = |ending: &str| ["cameras", "images"].iter().all(|n| folder.join(format!("{n}.{ending}")).is_file());
@@ -79,8 +79,8 @@ pub(super) fn any(root: &Path) -> bool {
 }
 
 /// All reconstructions of the dataset in `root`, in the order of [`PLACES`].
-fn models(root: &Path) -> Vec<Model> {
-    let mut found: Vec<Model> = Vec::new();
+fn models(root: &Path) -> Vec<ModelFolder> {
+    let mut found: Vec<ModelFolder> = Vec::new();
     for (place, name) in PLACES.iter().enumerate() {
         let Some(folder) = files::called(root, name) else { continue };
         let folder = if name.is_empty() { root.to_path_buf() } else { folder };
@@ -95,10 +95,10 @@ fn models(root: &Path) -> Vec<Model> {
         }
         for folder in folders {
             // `sparse` of the dataset is also a folder in it.
-            let is_new = |model: &Model| found.iter().all(|other| other.folder != model.folder);
+            let is_new = |model: &ModelFolder| found.iter().all(|other| other.folder != model.folder);
             // A folder with photos of its own is another dataset.
-            let is_here = |model: &Model| !name.is_empty() || model.folder == root || !has_photos(&model.folder);
-            let model = Model::at(&folder, place).filter(|model| is_new(model) && is_here(model));
+            let is_here = |model: &ModelFolder| !name.is_empty() || model.folder == root || !has_photos(&model.folder);
+            let model = ModelFolder::at(&folder, place).filter(|model| is_new(model) && is_here(model));
             found.extend(model);
         }
     }
@@ -112,7 +112,7 @@ fn has_photos(folder: &Path) -> bool {
 
 /// The reconstruction that is taken.
 pub(super) struct Largest {
-    pub(super) model: Model,
+    pub(super) model: ModelFolder,
     pub(super) images: Vec<Image>,
     /// Others that have photos of their own, or cannot be read.
     pub(super) others: Vec<Other>,
@@ -130,7 +130,7 @@ pub(super) fn largest(root: &Path) -> Result<Option<Largest>, IoError> {
     }
     let mut counted: Vec<_> = all.into_iter().map(|model| (model.count(), model)).collect();
     counted.sort_by_key(|(count, _)| std::cmp::Reverse(count.as_ref().ok().copied()));
-    let mut taken: Option<(Model, Vec<Image>)> = None;
+    let mut taken: Option<(ModelFolder, Vec<Image>)> = None;
     let (mut others, mut failed) = (Vec::new(), None);
     for (count, model) in counted {
         let what = match (count, &taken) {

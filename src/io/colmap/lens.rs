@@ -11,19 +11,19 @@ use crate::scene::{Camera, Distortion, Projection};
 
 /// A camera model by its number in binary files.
 #[derive(Debug)]
-pub(super) struct Model {
+pub(super) struct LensModel {
     name: &'static str,
     pub(super) params: usize,
     /// Parameters before the principal point; 0 = there is none.
     focals: usize,
 }
 
-const fn model(name: &'static str, params: usize, focals: usize) -> Model {
-    Model { name, params, focals }
+const fn model(name: &'static str, params: usize, focals: usize) -> LensModel {
+    LensModel { name, params, focals }
 }
 
 /// The models of COLMAP 4, in the order of their numbers.
-const MODELS: [Model; 18] = [
+const MODELS: [LensModel; 18] = [
     model("SIMPLE_PINHOLE", 3, 1),
     model("PINHOLE", 4, 2),
     model("SIMPLE_RADIAL", 4, 1),
@@ -45,10 +45,10 @@ const MODELS: [Model; 18] = [
 ];
 
 /// A camera, or the name of its model if photos cannot be undistorted with that.
-pub(super) type Found = Result<Lens, String>;
+pub(super) type FoundLens = Result<Lens, String>;
 
 /// Model number `number` of the camera `place`.
-pub(super) fn by_number(number: u32, place: &str, path: &Path) -> Result<&'static Model, IoError> {
+pub(super) fn by_number(number: u32, place: &str, path: &Path) -> Result<&'static LensModel, IoError> {
     MODELS.get(number as usize).ok_or_else(|| IoError::Unsupported {
         path: path.into(),
         what: format!("the camera model number {number} ({place}), newer than COLMAP 4's {}", MODELS.len()),
@@ -57,12 +57,18 @@ pub(super) fn by_number(number: u32, place: &str, path: &Path) -> Result<&'stati
 }
 
 /// The model of a name; an unknown one is told when a photo needs it.
-pub(super) fn by_name(name: &str) -> Result<&'static Model, String> {
+pub(super) fn by_name(name: &str) -> Result<&'static LensModel, String> {
     MODELS.iter().find(|m| m.name == name).ok_or_else(|| name.chars().take(40).collect())
 }
 
 /// The camera `id` of a model.
-pub(super) fn lens(model: &Model, size: (u64, u64), params: &[f64], id: u32, path: &Path) -> Result<Found, IoError> {
+pub(super) fn lens(
+    model: &LensModel,
+    size: (u64, u64),
+    params: &[f64],
+    id: u32,
+    path: &Path,
+) -> Result<FoundLens, IoError> {
     let bad = |reason: String| IoError::Syntax { path: path.into(), place: format!("camera {id}"), reason };
     if params.len() != model.params {
         return Err(bad(format!("{} parameters do not make a {} camera", params.len(), model.name)));
@@ -81,7 +87,7 @@ pub(super) fn lens(model: &Model, size: (u64, u64), params: &[f64], id: u32, pat
 }
 
 /// Focal lengths, principal point and distortion; `None` of a model without a pinhole.
-fn parts(model: &Model, params: &[f64]) -> Option<(DVec2, DVec2, Distortion)> {
+fn parts(model: &LensModel, params: &[f64]) -> Option<(DVec2, DVec2, Distortion)> {
     let (focal, principal, rest) = match (model.focals, params) {
         (1, [f, cx, cy, rest @ ..]) => (DVec2::splat(*f), DVec2::new(*cx, *cy), rest),
         (2, [fx, fy, cx, cy, rest @ ..]) => (DVec2::new(*fx, *fy), DVec2::new(*cx, *cy), rest),

@@ -19,7 +19,7 @@ use super::splits::Splits;
 use super::{IoError, files, lenses, photo_list, points_ply};
 use crate::math::rotation::matrix_from_quaternion;
 use crate::scene::{Dataset, SparsePoint};
-use find::{Largest, Model};
+use find::{Largest, ModelFolder};
 
 pub use binary::{check_cameras, check_images, check_points};
 pub use text::{check_text_cameras, check_text_images, check_text_points};
@@ -34,7 +34,7 @@ struct Image {
 }
 
 /// Cameras by their number.
-type Cameras = HashMap<u32, lens::Found>;
+type Cameras = HashMap<u32, lens::FoundLens>;
 
 pub(crate) fn is_colmap(root: &Path) -> bool {
     find::any(root)
@@ -92,7 +92,7 @@ fn shown(folder: &Path, from: &Path) -> String {
     if inside.as_os_str().is_empty() { "the folder itself".into() } else { inside.display().to_string() }
 }
 
-fn cameras(model: &Model) -> Result<Cameras, IoError> {
+fn cameras(model: &ModelFolder) -> Result<Cameras, IoError> {
     let file = model.file("cameras");
     match model.is_binary {
         true => binary::cameras(&files::read(&file, u64::MAX)?, &file),
@@ -101,7 +101,7 @@ fn cameras(model: &Model) -> Result<Cameras, IoError> {
 }
 
 /// The points of COLMAP's file, or else of a `.ply` beside it.
-fn points(model: &Model) -> Result<Vec<SparsePoint>, IoError> {
+fn points(model: &ModelFolder) -> Result<Vec<SparsePoint>, IoError> {
     let file = model.file("points3D");
     let points = match file.is_file() {
         false => Vec::new(),

@@ -219,7 +219,7 @@ fn hostile_values_are_named() {
         read(b.path()).expect_err("hostile")
     };
     let cameras = cameras_bin(4, &OPENCV);
-    let outside = replaced(&images_bin(&["../a.png"]), &cameras);
+    let outside = replaced(&images_bin(&["../c.png"]), &cameras);
     assert!(matches!(outside, IoError::Outside { .. }), "{outside}");
     let twice = replaced(&images_bin(&["b.png", "b.png"]), &cameras);
     assert!(matches!(twice, IoError::Duplicate { .. }), "{twice}");

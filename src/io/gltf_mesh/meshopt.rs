@@ -13,7 +13,7 @@ pub(super) enum Mode {
 
 /// What was done to vertices before they were packed.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Filter {
+pub(super) enum MeshoptFilter {
     None,
     Octahedral,
     Exponential,
@@ -31,23 +31,29 @@ const TABLE: usize = 16;
 const INDEX_TAIL: usize = 4;
 
 /// The `count` elements of `stride` bytes that `data` packs; what is wrong otherwise.
-pub(super) fn unpack(data: &[u8], count: usize, stride: usize, mode: Mode, filter: Filter) -> Result<Vec<u8>, String> {
+pub(super) fn unpack(
+    data: &[u8],
+    count: usize,
+    stride: usize,
+    mode: Mode,
+    filter: MeshoptFilter,
+) -> Result<Vec<u8>, String> {
     let mut out = match mode {
         Mode::Attributes => vertices(data, count, stride)?,
         Mode::Triangles => written(triangles(data, count)?, stride)?,
         Mode::Indices => written(indices(data, count)?, stride)?,
     };
     match (filter, stride) {
-        (Filter::None, _) => {}
-        (Filter::Octahedral, 4) => out.chunks_exact_mut(4).for_each(|v| {
+        (MeshoptFilter::None, _) => {}
+        (MeshoptFilter::Octahedral, 4) => out.chunks_exact_mut(4).for_each(|v| {
             let unit = octahedral([v[0], v[1], v[2]].map(|b| f32::from(b as i8)), 127.0);
             (0..3).for_each(|i| v[i] = unit[i] as i8 as u8);
         }),
-        (Filter::Octahedral, 8) => out.chunks_exact_mut(8).for_each(|v| {
+        (MeshoptFilter::Octahedral, 8) => out.chunks_exact_mut(8).for_each(|v| {
             let unit = octahedral([0, 2, 4].map(|i| f32::from(i16::from_le_bytes([v[i], v[i + 1]]))), 32767.0);
             (0..3).for_each(|i| v[2 * i..2 * i + 2].copy_from_slice(&(unit[i] as i16).to_le_bytes()));
         }),
-        (Filter::Exponential, s) if s % 4 == 0 => out.chunks_exact_mut(4).for_each(|v| {
+        (MeshoptFilter::Exponential, s) if s % 4 == 0 => out.chunks_exact_mut(4).for_each(|v| {
             let word = i32::from_le_bytes([v[0], v[1], v[2], v[3]]);
             let (mantissa, exponent) = (word << 8 >> 8, word >> 24);
             v.copy_from_slice(&(mantissa as f32 * (exponent as f32).exp2()).to_le_bytes());

@@ -8,7 +8,7 @@ use gltf::json::validation::Checked;
 use serde::Deserialize;
 
 use super::accessor::AccessorValues;
-use super::meshopt::{self, Filter, Mode};
+use super::meshopt::{self, MeshoptFilter, Mode};
 use super::{File, MAX_VALUES};
 use crate::io::IoError;
 
@@ -18,7 +18,7 @@ pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 /// What a file says about what it packs.
 #[derive(Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
-pub(crate) struct Packed {
+pub(crate) struct PackedFile {
     buffers: Vec<With<Fallback>>,
     buffer_views: Vec<With<PackedView>>,
     meshes: Vec<PackedMesh>,
@@ -72,7 +72,7 @@ impl<T: serde::de::DeserializeOwned> With<T> {
     }
 }
 
-impl Packed {
+impl PackedFile {
     /// Whether a buffer is only a place for what its packed views hold.
     pub(super) fn is_fallback(&self, buffer: usize) -> bool {
         let told = self.buffers.get(buffer).and_then(|b| b.get(MESHOPT));
@@ -105,9 +105,9 @@ impl File<'_> {
                 other => return Err(bad(format!("the mode {other} is not known"))),
             };
             let filter = match view.filter.as_deref() {
-                None | Some("NONE") => Filter::None,
-                Some("OCTAHEDRAL") => Filter::Octahedral,
-                Some("EXPONENTIAL") => Filter::Exponential,
+                None | Some("NONE") => MeshoptFilter::None,
+                Some("OCTAHEDRAL") => MeshoptFilter::Octahedral,
+                Some("EXPONENTIAL") => MeshoptFilter::Exponential,
                 Some(other) => return Err(bad(format!("the filter {other} is not known"))),
             };
             self.spend(view.count.saturating_mul(view.byte_stride).div_ceil(4))?;

@@ -9,14 +9,14 @@ use crate::io::IoError;
 
 /// What labels say about the photo that they are of.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Address {
+pub(crate) struct LabelAddress {
     /// The file that holds them.
     pub(crate) file: PathBuf,
     /// Names that the photo may have, the surest first, with the folders that are known.
     pub(crate) names: Vec<String>,
 }
 
-impl Address {
+impl LabelAddress {
     /// Of a label file that may name its photo, in this folder.
     pub(super) fn of_file(file: PathBuf, folder: &str, name: &str) -> Self {
         let own = std::path::absolute(&file).unwrap_or_else(|_| file.clone()).to_string_lossy().into_owned();
@@ -77,7 +77,7 @@ impl<'a> PhotoNames<'a> {
     ///
     /// # Errors
     /// If two photos could be meant: both are named.
-    pub(super) fn owner(&self, labels: &Address) -> Result<Option<usize>, IoError> {
+    pub(super) fn owner(&self, labels: &LabelAddress) -> Result<Option<usize>, IoError> {
         let known: Vec<Vec<&str>> = labels.names.iter().map(|name| parts(name).0).collect();
         let alike = |folder: &[&str]| known.iter().map(|k| in_common(k, folder)).max().unwrap_or(0);
         // Of a data set with one folder a camera, labels of one camera's folder are of no other camera.
@@ -115,7 +115,7 @@ impl<'a> PhotoNames<'a> {
 }
 
 /// Which labels each photo has, by name, and what to say about those that are of no photo, or joined.
-pub(super) fn bound(addresses: &[Address], photos: &PhotoNames<'_>) -> Result<(PicturesOf, Vec<String>), IoError> {
+pub(super) fn bound(addresses: &[LabelAddress], photos: &PhotoNames<'_>) -> Result<(PicturesOf, Vec<String>), IoError> {
     let (mut of, mut unused) = (PicturesOf::new(), Vec::new());
     for (i, address) in addresses.iter().enumerate() {
         match photos.owner(address)? {
@@ -149,11 +149,11 @@ pub(super) fn bound(addresses: &[Address], photos: &PhotoNames<'_>) -> Result<(P
 mod tests {
     use super::*;
 
-    fn address(file: &str, folder: &str, name: &str) -> Address {
-        Address::of_file(file.into(), folder, name)
+    fn address(file: &str, folder: &str, name: &str) -> LabelAddress {
+        LabelAddress::of_file(file.into(), folder, name)
     }
 
-    fn owner(photos: &[&str], labels: &Address) -> Option<String> {
+    fn owner(photos: &[&str], labels: &LabelAddress) -> Option<String> {
         let names = PhotoNames::new(photos.iter().copied());
         names.owner(labels).expect("one at most").map(|i| photos[i].to_owned())
     }

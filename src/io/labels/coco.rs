@@ -4,8 +4,8 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use serde::Deserialize;
 use serde::de::IgnoredAny;
+use serde::{Deserialize, Deserializer};
 use serde_json::Value;
 
 use super::rle::Rle;
@@ -40,8 +40,13 @@ struct ListedCategory {
     name: String,
     #[serde(default)]
     supercategory: Value,
-    #[serde(default)]
+    /// `null` is a word, too: of something that is no piece.
+    #[serde(default, deserialize_with = "stated")]
     parent: Option<Value>,
+}
+
+fn stated<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<Value>, D::Error> {
+    Value::deserialize(deserializer).map(Some)
 }
 
 #[derive(Deserialize)]
@@ -71,7 +76,7 @@ struct Category {
 }
 
 /// The pictures of a file and what they show.
-pub(crate) struct Coco {
+pub(crate) struct CocoFile {
     categories: HashMap<String, Category>,
     images: Vec<Image>,
 }
@@ -83,7 +88,7 @@ struct Image {
     annotations: Vec<(usize, Annotation)>,
 }
 
-impl Coco {
+impl CocoFile {
     /// Takes a JSON file apart; `None` if it is of another kind. What is left out is counted.
     pub(super) fn parse(file: Value, path: &Path, passed: &mut Passed) -> Result<Option<Self>, IoError> {
         if !file["images"].is_array() || !file["annotations"].is_array() {

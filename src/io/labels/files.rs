@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use serde_json::Value;
 
-use super::belongs::Address;
-use super::coco::Coco;
+use super::belongs::LabelAddress;
+use super::coco::CocoFile;
 use super::masklets::Masklets;
 use super::yolo::Names;
 use super::{Passed, Region, Sheet, isat, labelme, yolo};
@@ -20,7 +20,7 @@ const NAMES_ABOVE: usize = 3;
 
 /// The labels of one picture.
 pub struct LabelFile {
-    pub(super) address: Address,
+    pub(super) address: LabelAddress,
     form: Form,
 }
 
@@ -28,7 +28,7 @@ enum Form {
     Isat,
     LabelMe,
     /// A file, and the picture's place in it.
-    Coco(Arc<Coco>, usize),
+    Coco(Arc<CocoFile>, usize),
     Yolo(Arc<Names>),
 }
 
@@ -46,21 +46,21 @@ impl LabelFile {
 
 /// What is in label files.
 #[derive(Default)]
-pub(super) struct Found {
+pub(super) struct FoundLabels {
     pub(super) files: Vec<LabelFile>,
     pub(super) video: Option<(PathBuf, Masklets)>,
     pub(super) passed: Passed,
 }
 
 /// The label files in a folder, or that which `path` is.
-pub(super) fn find(path: &Path) -> Result<Found, IoError> {
+pub(super) fn find(path: &Path) -> Result<FoundLabels, IoError> {
     let mut candidates = Vec::new();
     match std::fs::read_dir(path) {
         Ok(_) => walk(path, 0, &mut candidates),
         Err(_) if is(path, "json") || is(path, "txt") => candidates.push(path.to_owned()),
         Err(cause) => return Err(IoError::Read { path: path.into(), cause }),
     }
-    let mut found = Found::default();
+    let mut found = FoundLabels::default();
     let mut names: HashMap<PathBuf, Arc<Names>> = HashMap::new();
     for file in candidates {
         if is(&file, "json") {
@@ -76,7 +76,7 @@ pub(super) fn find(path: &Path) -> Result<Found, IoError> {
                             is nameless";
                 found.passed.told(what, &file);
             }
-            found.files.push(LabelFile { address: Address::of_file(file, "", ""), form: Form::Yolo(names) });
+            found.files.push(LabelFile { address: LabelAddress::of_file(file, "", ""), form: Form::Yolo(names) });
         }
     }
     Ok(found)
@@ -108,14 +108,14 @@ fn names_for(folder: &Path) -> Result<Names, IoError> {
     Ok(Names::new())
 }
 
-impl Found {
+impl FoundLabels {
     /// Adds what a JSON file holds, if that is labels.
     fn json(&mut self, file: PathBuf) -> Result<(), IoError> {
         let value: Value = files::read_json(&file)?;
         if let Some((folder, name)) = isat::photo_of(&value) {
-            self.files.push(LabelFile { address: Address::of_file(file, folder, name), form: Form::Isat });
+            self.files.push(LabelFile { address: LabelAddress::of_file(file, folder, name), form: Form::Isat });
         } else if let Some(name) = labelme::photo_of(&value, &file, &mut self.passed) {
-            self.files.push(LabelFile { address: Address::of_file(file, "", name), form: Form::LabelMe });
+            self.files.push(LabelFile { address: LabelAddress::of_file(file, "", name), form: Form::LabelMe });
         } else if value["masklet"].is_array() {
             let Some(masklets) = Masklets::parse(value, &file)? else { return Ok(()) };
             if let Some((other, _)) = &self.video {
@@ -123,10 +123,10 @@ impl Found {
                 return Err(IoError::Syntax { path: file, place: "masklet".into(), reason });
             }
             self.video = Some((file, masklets));
-        } else if let Some(coco) = Coco::parse(value, &file, &mut self.passed)? {
+        } else if let Some(coco) = CocoFile::parse(value, &file, &mut self.passed)? {
             let coco = Arc::new(coco);
             for (i, name) in coco.labeled() {
-                let address = Address { file: file.clone(), names: vec![name.to_owned()] };
+                let address = LabelAddress { file: file.clone(), names: vec![name.to_owned()] };
                 self.files.push(LabelFile { address, form: Form::Coco(Arc::clone(&coco), i) });
             }
         }

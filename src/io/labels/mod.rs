@@ -34,12 +34,15 @@ mod yolo;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use self::belongs::{Address, PhotoNames, PicturesOf, bound};
+use self::belongs::{LabelAddress, PhotoNames, PicturesOf, bound};
 use self::label_files::LabelFile;
 pub(crate) use self::sheet::Sheet;
 use self::sheet::{AsLoaded, draw, read_ids};
 use super::IoError;
 use crate::scene::{Level, Mask, Photo, text};
+
+/// Longer side of the masks that are made only for their names, px.
+const NAMES_SIDE_PX: u32 = 512;
 
 /// A labeled region of one photo.
 #[derive(Clone, Debug, PartialEq)]
@@ -58,7 +61,7 @@ pub struct Region {
 pub struct Labels {
     source: Source,
     /// What each of the source's pictures says of the photo that it is of.
-    addresses: Vec<Address>,
+    addresses: Vec<LabelAddress>,
     /// The pictures of each photo, by its name, once the photos are known.
     of: Option<PicturesOf>,
     notes: Vec<String>,
@@ -148,6 +151,17 @@ impl Labels {
         match &self.source {
             Source::Masklets(masklets) => masklets.has(&stem(&photo.name)),
             _ => !self.pictures_of(photo).is_empty(),
+        }
+    }
+
+    /// The names in the label files of a photo; none where masks are pictures or a video's.
+    pub(crate) fn names(&self, photo: &Photo) -> Result<Vec<String>, IoError> {
+        match &self.source {
+            Source::Files(_) if self.has(photo) => {
+                let regions = self.of(photo, NAMES_SIDE_PX)?;
+                Ok(regions.into_iter().map(|region| region.name).filter(|name| !name.is_empty()).collect())
+            }
+            _ => Ok(Vec::new()),
         }
     }
 

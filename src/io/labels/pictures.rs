@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use super::belongs::Address;
+use super::belongs::LabelAddress;
 use super::{Region, Sheet};
 use crate::io::{IoError, files, photo};
 use crate::scene::{Level, Mask};
@@ -23,11 +23,11 @@ pub struct Pictures {
 
 impl Pictures {
     /// Of each stem, in their order.
-    pub(super) fn addresses(&self) -> Vec<Address> {
+    pub(super) fn addresses(&self) -> Vec<LabelAddress> {
         let address = |(stem, masks): (&String, &Vec<(String, PathBuf)>)| {
             let number = self.prefix.filter(|_| stem.bytes().all(|b| b.is_ascii_digit()));
             let names = std::iter::once(stem.clone()).chain(number.map(|prefix| format!("{prefix}{stem}"))).collect();
-            Address { file: masks.first().map(|(_, path)| path.clone()).unwrap_or_default(), names }
+            LabelAddress { file: masks.first().map(|(_, path)| path.clone()).unwrap_or_default(), names }
         };
         self.of.iter().map(address).collect()
     }

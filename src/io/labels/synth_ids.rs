@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::belongs::Address;
+use super::belongs::LabelAddress;
 use super::pictures::png_stem;
 use super::{Region, Sheet, entries, read_ids};
 use crate::io::{IoError, files};
@@ -53,8 +53,8 @@ impl SynthIds {
     }
 
     /// Of each picture of objects.
-    pub(super) fn addresses(&self) -> Vec<Address> {
-        let address = |name: &String| Address::of_file(self.path(Level::Object, name), "", "");
+    pub(super) fn addresses(&self) -> Vec<LabelAddress> {
+        let address = |name: &String| LabelAddress::of_file(self.path(Level::Object, name), "", "");
         self.pictures.iter().map(address).collect()
     }
 

@@ -29,7 +29,7 @@ pub enum SpzAxes {
 
 /// What a file has besides its columns.
 #[derive(Default)]
-pub(super) struct Marks {
+pub(super) struct AxisMarks {
     /// Records of extensions: type and bytes.
     pub(crate) records: Vec<(u32, Vec<u8>)>,
     /// Comment in the gzip header.
@@ -38,7 +38,7 @@ pub(super) struct Marks {
     pub(crate) own_header: bool,
 }
 
-impl Marks {
+impl AxisMarks {
     pub(super) fn of_gzip(header: Option<&flate2::GzHeader>) -> Self {
         let own = |h: &flate2::GzHeader| {
             h.operating_system() == UNKNOWN_SYSTEM && h.mtime() == 0 && h.filename().is_none() && h.extra().is_none()

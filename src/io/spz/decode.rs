@@ -5,8 +5,8 @@ use std::path::Path;
 use half::f16;
 use rayon::prelude::*;
 
-use super::axes::{Marks, SpzAxes};
-use super::read::Header;
+use super::axes::{AxisMarks, SpzAxes};
+use super::read::SpzHeader;
 use super::{ANTIALIASED, COLOR_SCALE, COMPONENT_MOST, HARMONIC_MIDDLE, SCALE_FIRST, SCALE_STEP};
 use crate::io::IoError;
 use crate::io::quantized::{logit, unit_quaternion, unorm};
@@ -18,12 +18,12 @@ const MOST_BANDS: u8 = 3;
 /// Of the flags: coarser Gaussians among the others, as Spark writes them.
 const LEVELS: u8 = 0x80;
 
-impl Header {
+impl SpzHeader {
     /// The Gaussians in the scene's axes.
     pub(super) fn cloud(
         &self,
         columns: &[Vec<u8>],
-        marks: &Marks,
+        marks: &AxisMarks,
         known: SpzAxes,
         path: &Path,
     ) -> Result<GaussianCloud, IoError> {

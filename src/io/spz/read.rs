@@ -6,7 +6,7 @@ use std::path::Path;
 use flate2::read::GzDecoder;
 use ruzstd::decoding::FrameDecoder;
 
-use super::axes::{Marks, SpzAxes};
+use super::axes::{AxisMarks, SpzAxes};
 use super::{EXTENSIONS, MAGIC, columns};
 use crate::io::reader::Reader;
 use crate::io::{IoError, files, memory};
@@ -48,12 +48,12 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
 pub(crate) fn parse_in(bytes: &[u8], path: &Path, known: SpzAxes) -> Result<GaussianCloud, IoError> {
     if bytes.starts_with(MAGIC) {
         let mut file = Reader::new(bytes, path);
-        let header = Header::parse(file.take(HEADER, "the header")?, path)?;
+        let header = SpzHeader::parse(file.take(HEADER, "the header")?, path)?;
         let per_gaussian = header.checked(bytes.len(), path)?;
         let more = file.take(MORE_HEADER, "the header")?;
         let toc = u32::from_le_bytes([more[0], more[1], more[2], more[3]]) as usize;
         let records = bytes.get(HEADER + MORE_HEADER..toc).unwrap_or_default();
-        let marks = Marks::default().with_records(header.flags, records);
+        let marks = AxisMarks::default().with_records(header.flags, records);
         return header.cloud(&streams(&header, per_gaussian, toc, bytes, path)?, &marks, known, path);
     }
     let mut unpacked = GzDecoder::new(bytes);
@@ -68,7 +68,7 @@ pub(crate) fn parse_in(bytes: &[u8], path: &Path, known: SpzAxes) -> Result<Gaus
             _ => Ok(all),
         }
     };
-    let header = Header::parse(&next(HEADER, "the header")?, path)?;
+    let header = SpzHeader::parse(&next(HEADER, "the header")?, path)?;
     let per_gaussian = header.checked(bytes.len(), path)?;
     let mut all = Vec::new();
     for (bytes, name) in per_gaussian.into_iter().zip(NAMES) {
@@ -79,7 +79,7 @@ pub(crate) fn parse_in(bytes: &[u8], path: &Path, known: SpzAxes) -> Result<Gaus
         let broken = |e| IoError::syntax(path, "the extensions", format!("they cannot be unpacked: {e}"));
         (&mut unpacked).take(MAX_RECORDS).read_to_end(&mut records).map_err(broken)?;
     }
-    let marks = Marks::of_gzip(unpacked.header()).with_records(header.flags, &records);
+    let marks = AxisMarks::of_gzip(unpacked.header()).with_records(header.flags, &records);
     header.cloud(&all, &marks, known, path)
 }
 
@@ -88,7 +88,7 @@ const NAMES: [&str; 6] = ["positions", "opacities", "colors", "scales", "rotatio
 
 /// The columns of a file of version 4; `toc` is where the sizes of its streams are.
 fn streams(
-    header: &Header,
+    header: &SpzHeader,
     per_gaussian: [usize; 6],
     toc: usize,
     bytes: &[u8],
@@ -126,7 +126,7 @@ fn streams(
 }
 
 /// What all versions say at first.
-pub(super) struct Header {
+pub(super) struct SpzHeader {
     pub(crate) version: u32,
     pub(crate) count: usize,
     pub(crate) degree: u8,
@@ -136,7 +136,7 @@ pub(super) struct Header {
     streams: u8,
 }
 
-impl Header {
+impl SpzHeader {
     fn parse(bytes: &[u8], path: &Path) -> Result<Self, IoError> {
         let mut fields = Reader::new(bytes, path);
         let bad = |reason: String| IoError::syntax(path, "the header", reason);

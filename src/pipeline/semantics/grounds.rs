@@ -4,9 +4,8 @@
 use std::collections::HashSet;
 
 use super::colors;
-use super::names::words_beside;
 use super::parse::ParsedQuery;
-use super::words::words;
+use super::words::{not_in, words};
 use crate::scene::colors::row;
 use crate::scene::{Identities, IdentityId};
 
@@ -69,6 +68,15 @@ pub(crate) fn without_courtesy(query: &str) -> &str {
     polite.map_or(rest, |(asked, _)| asked.trim_end_matches([',', ' ']))
 }
 
+/// The words of a phrase that say nothing about `id`: neither its names nor those of its wholes have them.
+fn words_beside(identities: &Identities, id: IdentityId, phrase: &str) -> Vec<String> {
+    let names = |i: IdentityId| match identities.get(i).map(|i| i.names.as_slice()) {
+        Some([]) | None => vec![identities.name(i)],
+        Some(names) => names.to_vec(),
+    };
+    not_in(phrase, &identities.ancestors(id).flat_map(names).flat_map(|n| words(&n)).collect())
+}
+
 /// The words of a phrase that say something, and nothing about `id`.
 pub(crate) fn unexplained(identities: &Identities, id: IdentityId, phrase: &ParsedQuery) -> Vec<String> {
     let mut left = telling(&words_beside(identities, id, &phrase.text));
@@ -128,6 +136,16 @@ mod tests {
         let mut map = SemanticMap::from_identities(all, of, vec![1.0; 5], vec![]);
         map.see_colors(&cloud);
         map.identities
+    }
+
+    #[test]
+    fn words_beside_an_identity_are_those_that_neither_it_nor_its_wholes_have() {
+        let mut all = scene();
+        let nameless = all.add(Level::Object, NOBODY, vec![]);
+        assert_eq!(words_beside(&all, 2, "the green handles of the mug"), ["green"]);
+        assert_eq!(words_beside(&all, 1, "red mugs"), ["red"], "a color is a word like any other here");
+        assert_eq!(words_beside(&all, 1, "handle of the mug"), ["handle"], "what a piece is called says nothing of it");
+        assert!(words_beside(&all, nameless, "#4").is_empty());
     }
 
     #[test]

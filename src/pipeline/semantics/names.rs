@@ -4,10 +4,10 @@
 use std::collections::HashSet;
 
 use super::localize::{Hit, Scorer};
-use super::parse::{ParsedQuery, is_glue};
+use super::parse::ParsedQuery;
 use super::recipe::Rejection;
 pub(crate) use super::words::singular;
-use super::words::words;
+use super::words::{not_in, words};
 use super::{colors, grounds};
 use crate::scene::identity::whole_names::key;
 use crate::scene::{Identities, IdentityId};
@@ -101,19 +101,6 @@ pub(crate) fn was_removed(identities: &Identities, phrase: &str) -> bool {
     not_in(phrase, &known).is_empty() && names.into_iter().any(is_said)
 }
 
-/// The words of a phrase that say nothing about `id`: neither its names nor those of its wholes have them.
-pub(crate) fn words_beside(identities: &Identities, id: IdentityId, phrase: &str) -> Vec<String> {
-    let names = |i: IdentityId| match identities.get(i).map(|i| i.names.as_slice()) {
-        Some([]) | None => vec![identities.name(i)],
-        Some(names) => names.to_vec(),
-    };
-    not_in(phrase, &identities.ancestors(id).flat_map(names).flat_map(|n| words(&n)).collect())
-}
-
-fn not_in(phrase: &str, known: &HashSet<String>) -> Vec<String> {
-    words(phrase).into_iter().filter(|w| !is_glue(w) && !known.contains(w)).collect()
-}
-
 /// Full names for a phrase that is being typed, by any name, best first.
 pub(crate) fn completions(identities: &Identities, typed: &str, most: usize) -> Vec<String> {
     let typed = key(typed);
@@ -204,14 +191,6 @@ mod tests {
         assert!((similarity(&words("red lamp"), &words("lamp")) - 2.0 / 3.0).abs() < 1e-12);
         assert_eq!((similarity(&words("lamb"), &words("lamp")), similarity(&words("red"), &words("lamp"))), (0.0, 0.0));
         assert_eq!((similarity(&[], &[]), similarity(&words("lamp"), &[])), (0.0, 0.0));
-    }
-
-    #[test]
-    fn words_beside_an_identity_are_those_that_neither_it_nor_its_wholes_have() {
-        let all = scene();
-        assert_eq!(words_beside(&all, 3, "the green button of the red controllers"), ["green"]);
-        assert_eq!(words_beside(&all, 2, "red controller"), ["red"]);
-        assert!(words_beside(&all, 4, "#4").is_empty());
     }
 
     #[test]

@@ -30,6 +30,14 @@ pub trait Segmenter {
         Ok(photos.iter().position(|p| self.covers(p)))
     }
 
+    /// Names that somebody gave to what a photo shows; none where masks are found.
+    ///
+    /// # Errors
+    /// If they cannot be read.
+    fn names(&self, _: &Photo) -> Result<Vec<String>, FindError> {
+        Ok(Vec::new())
+    }
+
     /// Masks of a photo, undistorted and scaled to at most `max_side_px`, wholes before pieces.
     /// Empty where it finds nothing.
     fn segment(
@@ -84,6 +92,10 @@ impl Segmenter for FileMasks {
             ticker.tick(k + 1, observer)?;
         }
         Ok(most.map(|m| m.1))
+    }
+
+    fn names(&self, photo: &Photo) -> Result<Vec<String>, FindError> {
+        Ok(self.0.names(photo)?)
     }
 
     fn segment(&mut self, photo: &Photo, max_side_px: u32, _: &mut dyn Observer) -> Result<Vec<FoundMask>, FindError> {

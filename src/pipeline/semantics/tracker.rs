@@ -139,6 +139,7 @@ pub(crate) fn track(
             seeds.push(next);
         }
     }
+    t.seed_named(&mut seeds, segmenter, observer)?;
     if seeds.len() > 1 {
         views = t.look(&t.decided(), observer)?;
     }

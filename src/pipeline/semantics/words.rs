@@ -1,6 +1,8 @@
 //! Words of names and questions, as they are compared.
 
-use super::parse::MAX_CHARS;
+use std::collections::HashSet;
+
+use super::parse::{MAX_CHARS, is_glue};
 
 /// Lower-case words of a name; an English plural counts like its singular.
 pub(crate) fn words(text: &str) -> Vec<String> {
@@ -13,6 +15,11 @@ pub(super) fn written(text: &str) -> impl Iterator<Item = String> {
     let lower = text.chars().take(MAX_CHARS).collect::<String>().to_lowercase();
     let apart = lower.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty() && *w != "s");
     apart.map(str::to_owned).collect::<Vec<_>>().into_iter()
+}
+
+/// The words of a phrase that are not among these; articles and the like left out.
+pub(super) fn not_in(phrase: &str, known: &HashSet<String>) -> Vec<String> {
+    words(phrase).into_iter().filter(|w| !is_glue(w) && !known.contains(w)).collect()
 }
 
 /// A word without an English plural's ending.

@@ -128,11 +128,12 @@ fn words_that_an_encoder_leaves_out_and_colors_that_are_not_so_find_nothing() {
         let (_, features) = scene();
         let all = Identities::objects(3);
         let mut phrases = TextEmbeddings::default();
-        let phrase = ParsedQuery::parse(text).expect("a phrase");
-        let mut encode = |p: &str| Ok::<_, ()>(if p == text { vec![1.0, 0.0, 0.0] } else { vec![0.5, 0.5, 0.5] });
-        phrases.learn(&phrase, &Recipe::default(), &mut encode).expect("encodes");
-        let language = Language { features: &features, phrases: &phrases, unknown };
+        // What is asked of the encoder is what was read: without courtesy.
         let reading = read(&all, text, &Recipe::default());
+        let is_asked = |p: &str| p == reading.phrase.text;
+        let mut encode = |p: &str| Ok::<_, ()>(if is_asked(p) { vec![1.0, 0.0, 0.0] } else { vec![0.5, 0.5, 0.5] });
+        phrases.learn(&reading.phrase, &Recipe::default(), &mut encode).expect("encodes");
+        let language = Language { features: &features, phrases: &phrases, unknown };
         answer(&all, &reading, LevelFilter::Auto, &Recipe::default(), Some(language))
     };
     assert_eq!(ask("steering wheel", &[]).chosen(1), [3]);

@@ -1,6 +1,7 @@
 //! Who is seen in each photo, and how much of it is unknown.
 
 use super::super::error::FindError;
+use super::super::segmenter::Segmenter;
 use super::super::view_map::ViewMap;
 use super::Tracker;
 use crate::pipeline::observer::{Observer, Ticker};
@@ -39,6 +40,31 @@ impl Tracker<'_> {
             ticker.tick(photo + 1, observer)?;
         }
         Ok(views)
+    }
+
+    /// Segments the photos in which somebody named what is not found yet: where another photo said that there is
+    /// nothing, nothing looks unknown.
+    pub(super) fn seed_named(
+        &mut self,
+        seeds: &mut Vec<usize>,
+        segmenter: &mut dyn Segmenter,
+        observer: &mut dyn Observer,
+    ) -> Result<(), FindError> {
+        let photos = self.photos;
+        for (i, photo) in photos.iter().enumerate() {
+            if seeds.len() >= self.options.max_seeds {
+                break;
+            }
+            if seeds.contains(&i) || !segmenter.covers(photo) {
+                continue;
+            }
+            let names = segmenter.names(photo)?;
+            let is_known = |name: &String| self.identities.iter().any(|(_, identity)| identity.names.contains(name));
+            if !names.iter().all(is_known) && self.seed(i, segmenter, observer)?.is_some() {
+                seeds.push(i);
+            }
+        }
+        Ok(())
     }
 
     fn look_at(&mut self, photo: usize, of: &[IdentityId]) -> Result<ViewReport, FindError> {

@@ -7,7 +7,7 @@ use egui_plot::{Corner, HLine, Legend, Line, MarkerShape, Plot, PlotPoint, PlotP
 use super::super::super::theme;
 use super::grid;
 use crate::math::format;
-use crate::measure::axes::Axes;
+use crate::measure::axes::PlotAxes;
 use crate::measure::labels::{self, LabelBox};
 use crate::measure::look::{MarkShape, look};
 use crate::measure::{Measure, Point, Stage, table};
@@ -33,7 +33,7 @@ impl<'a> Scatter<'a> {
         let (stage, measure) = (self.stage, self.measure);
         let name = (stage.name.name(), measure.name.clone(), self.second.is_some());
         let stages: Vec<&Stage> = std::iter::once(stage).chain(self.second).collect();
-        let Some(axes) = Axes::of(&stages, measure) else {
+        let Some(axes) = PlotAxes::of(&stages, measure) else {
             ui.weak("This metric was not measured.");
             return None;
         };
@@ -82,13 +82,13 @@ impl<'a> Scatter<'a> {
     }
 
     /// Where the points are.
-    fn places(&self, axes: &Axes) -> Vec<[f64; 2]> {
+    fn places(&self, axes: &PlotAxes) -> Vec<[f64; 2]> {
         let both = self.stage.points.iter().chain(self.second.into_iter().flat_map(|s| &s.points));
         both.filter_map(|p| axes.place(p, self.measure)).collect()
     }
 
     /// The setting beside every point that is in view, with a thin line to it where it had to go away.
-    fn name_points(&self, ui: &Ui, axes: &Axes, transform: &PlotTransform) {
+    fn name_points(&self, ui: &Ui, axes: &PlotAxes, transform: &PlotTransform) {
         let (frame, methods) = (*transform.frame(), self.stage.methods());
         let painter = ui.painter_at(frame);
         let named = |p: &Point| {
@@ -120,7 +120,7 @@ impl<'a> Scatter<'a> {
     }
 
     /// The point under the pointer.
-    fn nearest(&self, axes: &Axes, response: &Response, transform: &PlotTransform) -> Option<&'a Point> {
+    fn nearest(&self, axes: &PlotAxes, response: &Response, transform: &PlotTransform) -> Option<&'a Point> {
         let pointer = response.hover_pos()?;
         let all = self.stage.points.iter().chain(self.second.into_iter().flat_map(|s| &s.points));
         let far = |p: &'a Point| {
@@ -132,7 +132,7 @@ impl<'a> Scatter<'a> {
     }
 
     /// Everything in the plot, from back to front.
-    fn items(&self, axes: &Axes) -> Vec<Item> {
+    fn items(&self, axes: &PlotAxes) -> Vec<Item> {
         let mut items = vec![self.front(axes)];
         let methods = self.stage.methods();
         for (k, method) in methods.iter().enumerate() {
@@ -156,14 +156,14 @@ impl<'a> Scatter<'a> {
     }
 
     /// Rings around what nothing is better than by more than repeats differ.
-    fn front(&self, axes: &Axes) -> Item {
+    fn front(&self, axes: &PlotAxes) -> Item {
         let points = self.stage.front(self.measure).into_iter();
         let places: Vec<[f64; 2]> = points.filter_map(|i| axes.place(&self.stage.points[i], self.measure)).collect();
         let rings = Points::new("on the front", PlotPoints::from(places)).radius(9.5);
         Item::Points(rings.color(theme::text().gamma_multiply(0.28)).allow_hover(false))
     }
 
-    fn series(&self, axes: &Axes, method: &str, k: usize, items: &mut Vec<Item>) {
+    fn series(&self, axes: &PlotAxes, method: &str, k: usize, items: &mut Vec<Item>) {
         let color = color(k);
         let points: Vec<&Point> = self.stage.points.iter().filter(|p| p.method == method).collect();
         // What has the series' name has its color, too: the legend shows one.
