@@ -156,6 +156,7 @@ pub(super) const RULES: &[Rule] = &[
     rule(&["path"], &["from", "aspect"], |g| when(g.has("survey"), "with --survey")),
     rule(&["path"], &["aspect"], |g| when(g.has("to_photo") && !g.has("out"), "without --out")),
     rule(&["path"], &["cameras"], |g| when(!g.has("survey"), "without --survey")),
+    rule(&["export"], &["title", "path"], |g| when(!g.has("html"), "without --html")),
     rule(&["export"], &["no_measure"], |g| when(!g.has("out"), "without --out")),
     // Talks and reports.
     rule(&["agent"], &["url", "model", "key_variable"], |g| {

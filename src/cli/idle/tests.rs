@@ -242,6 +242,11 @@ const LINES: &[(&str, &[&str], &str)] = &[
         &["--side other", "--distance 2", "--from 2", "--aspect 1"],
         "path s --survey 3 --frames 9",
     ),
+    (
+        "export s --out a.ply --json {}",
+        &["--title t", "--path p.json"],
+        "export s --html p.html --title t --path p.json",
+    ),
     ("export s --html p.html {}", &["--no-measure"], "export s --html p.html --out a.ply --no-measure"),
     ("agent s hi {}", &["--url u", "--model m", "--key-variable k"], "agent s hi --planner llm --url u --model m"),
     ("agent --find-model {}", &["--url u", "--from 0", "--transcript t.md", "--by names"], "agent --find-model --json"),
