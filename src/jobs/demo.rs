@@ -84,7 +84,7 @@ pub(crate) fn picture() -> Result<Vec<u8>, IoError> {
 /// Opens the trained demo.
 ///
 /// # Errors
-/// As [`unpacked`] and [`open::open`].
+/// As [`unpacked()`] and [`open::open`].
 pub(crate) fn open(folders: &Folders, machine: &Machine, observer: &mut dyn Observer) -> Result<OpenedScene, JobError> {
     let mut scene = open::open(&unpacked(folders, observer)?.join("scene"), folders, machine, observer)?;
     call(&mut scene, "Demo");
