@@ -277,7 +277,7 @@ fn unwritten(cause: std::io::Error) -> IoError {
 
 /// SHA-256, in hexadecimal.
 pub(crate) fn digest(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+    files::hex(&Sha256::digest(bytes))
 }
 
 /// The Gaussians with numbers that are as exact as can be seen, which a third of the bytes hold.

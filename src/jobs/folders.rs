@@ -109,7 +109,7 @@ fn unique(parent: &Path, path: &Path) -> PathBuf {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let name = path.file_name().map_or_else(|| "scene".into(), |n| n.to_string_lossy().into_owned());
     let digest = Sha256::digest(path.as_os_str().as_encoded_bytes());
-    let sum: String = digest.iter().take(8).map(|byte| format!("{byte:02x}")).collect();
+    let sum = files::hex(&digest[..8]);
     files::renamed(parent.join(format!("{name}-{sum}")), parent.join(first_name(&name, &path)))
 }
 

@@ -11,6 +11,7 @@ use sha2::{Digest, Sha256};
 use ureq::Agent;
 use ureq::http::StatusCode;
 
+use crate::io::files;
 use crate::io::http::{self, ResponsePart, TICK};
 
 /// Least that has to arrive within the patience for a stall: a server that sends a byte now and then is
@@ -151,7 +152,7 @@ pub fn sha256(path: &Path) -> io::Result<String> {
             n => hasher.update(&buffer[..n]),
         }
     }
-    Ok(hasher.finalize().iter().map(|b| format!("{b:02x}")).collect())
+    Ok(files::hex(&hasher.finalize()))
 }
 
 /// What has arrived so far, beside the file that it will become.

@@ -22,6 +22,7 @@ use zip::ZipArchive;
 use super::ModelError;
 use super::checkpoint::{WeightFile, WeightFileError};
 use crate::io::error::write_error;
+use crate::io::files::hex;
 use crate::io::temporary::temporary_folder;
 
 /// Folders of a checkpoint in which its tensors may lie.
@@ -178,10 +179,6 @@ pub(super) fn put_in_place(
 
 pub(super) fn failed(path: &Path, e: io::Error) -> ModelError {
     ModelError::File(write_error(path, e))
-}
-
-pub(super) fn hex(digest: &[u8]) -> String {
-    digest.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 /// A file, with the checksum of what was written.

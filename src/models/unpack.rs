@@ -11,8 +11,9 @@ use tar::{Archive, EntryType};
 use zip::ZipArchive;
 
 use super::engine::engine;
-use super::template::{failed, hex, put_in_place};
+use super::template::{failed, put_in_place};
 use super::{ModelError, lama};
+use crate::io::files::hex;
 use crate::io::temporary::temporary_folder;
 
 /// Largest library, bytes; those of the processor's releases have some 20 to 40 MB.

@@ -8,6 +8,8 @@ use rand::TryRng;
 use rand::rngs::SysRng;
 use subtle::ConstantTimeEq;
 
+use crate::io::files::hex;
+
 const BYTES: usize = 32;
 /// Longest file of a token, in bytes.
 const MOST_BYTES: u64 = 4 << 10;
@@ -92,10 +94,6 @@ fn read(path: &Path) -> io::Result<String> {
 /// A name that no other has: of a run, of a client.
 pub(crate) fn random_name() -> io::Result<String> {
     AccessToken::random().map(|token| hex(&token.0[..8]))
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|b| format!("{b:02x}")).collect()
 }
 
 #[cfg(test)]

@@ -8,7 +8,8 @@ use sha2::{Digest, Sha256};
 
 use super::BatchRequest;
 use super::file::{BatchFile, BatchScene};
-use crate::io::{IoError, files};
+use crate::io::IoError;
+use crate::io::files::{self, hex};
 use crate::jobs::{JobError, open};
 use crate::pipeline::train::TrainConfig;
 use crate::pipeline::train::inputs::{Compare, TrainInputs};
@@ -162,11 +163,6 @@ fn list(folder: &Path, name: &str, all: &mut Vec<(String, u64)>, deepest: usize)
 fn size(path: &Path) -> Result<u64, IoError> {
     let size = std::fs::metadata(path).map(|m| m.len());
     size.map_err(|cause| IoError::Read { path: path.into(), cause })
-}
-
-/// A checksum as it is written.
-pub(super) fn hex(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Refuses results in what is read, and the other way round.

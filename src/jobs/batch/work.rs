@@ -18,8 +18,9 @@ use super::BatchRequest;
 use super::state::{
     FAILURE, ObjectCounts, RESULT, SCENE, UnitFailure, UnitResult, UnitSeconds, VERSION, is_done, read, scenes,
 };
-use super::unit::{self, BatchUnit, UnitRequest, hex};
+use super::unit::{self, BatchUnit, UnitRequest};
 use crate::io::claim::{Claim, host};
+use crate::io::files::hex;
 use crate::io::{IoError, SceneFolder, splat_ply};
 use crate::jobs::error::{chain, is_of_machine};
 use crate::jobs::evaluate::{EvaluateOptions, PhotoComparison, photometric};

@@ -72,8 +72,7 @@ pub(super) fn kept_name((model, digest): (&str, &str), photo: &Photo, written: O
     }
     let since = written.and_then(|t| t.duration_since(SystemTime::UNIX_EPOCH).ok());
     sum.update(since.map_or(u128::MAX, |t| t.as_nanos()).to_le_bytes());
-    let sum: String = sum.finalize().iter().take(12).map(|byte| format!("{byte:02x}")).collect();
-    format!("{model}-{sum}.frame")
+    format!("{model}-{}.frame", files::hex(&sum.finalize()[..12]))
 }
 
 /// What the first version called the file, by a digest that the standard library does not promise to keep.

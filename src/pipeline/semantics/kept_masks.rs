@@ -40,7 +40,7 @@ impl KeptMasks {
             sum.update((part.len() as u64).to_le_bytes());
             sum.update(part);
         }
-        let digest = sum.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+        let digest = files::hex(&sum.finalize());
         Self { inner, folder, digest }
     }
 

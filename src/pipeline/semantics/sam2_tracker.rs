@@ -12,6 +12,7 @@ use super::kept_track::{self, KeptTrack};
 use super::prompt_points::prompt_points;
 use super::segmenter::FoundMask;
 use super::votes::UNKNOWN;
+use crate::io::files::hex;
 use crate::models::ModelError;
 use crate::models::catalog::{self, ModelRole};
 use crate::models::sam2::Sam2;
@@ -115,6 +116,5 @@ fn track_name(of_photos: &[String], seed: usize, mask: &Mask, prompt: MaskPrompt
     of_photos.iter().for_each(|name| sum.update(name));
     sum.update(format!("{seed} {prompt} {}", mask.width_px()));
     mask.pixels().for_each(|i| sum.update((i as u64).to_le_bytes()));
-    let sum: String = sum.finalize().iter().take(12).map(|byte| format!("{byte:02x}")).collect();
-    format!("{sum}.track")
+    format!("{}.track", hex(&sum.finalize()[..12]))
 }
