@@ -1,6 +1,7 @@
 //! The whole window, headless: what the user sees and does, with the software adapter.
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+mod cli_support;
 #[path = "ui_window/crop.rs"]
 mod crop;
 #[path = "ui_window/demo.rs"]

@@ -5,26 +5,12 @@ use std::path::{Path, PathBuf};
 use fmlgs::io::{SceneFolder, semantic_map, trained};
 use fmlgs::scene::SemanticMap;
 
-use super::cli_support::{Done, fmlgs, folder};
+use super::cli_support::{Done, first_version, fmlgs, folder};
 
 /// Three boxes and their photos, trained for a moment.
 fn boxes(to: &Path) -> (PathBuf, PathBuf) {
-    fn copy(from: &Path, to: &Path) {
-        std::fs::create_dir_all(to).expect("folder");
-        for entry in std::fs::read_dir(from).expect("folder") {
-            let path = entry.expect("entry").path();
-            let to = to.join(path.file_name().expect("a name"));
-            if path.is_dir() {
-                copy(&path, &to)
-            } else {
-                {
-                    std::fs::copy(&path, &to).expect("copied");
-                }
-            }
-        }
-    }
-    copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/first_version"), to);
-    (to.join("scene"), to.join("photos"))
+    let photos = first_version(to);
+    (to.join("scene"), photos)
 }
 
 fn run(arguments: &[&dyn AsRef<std::ffi::OsStr>]) -> Done {

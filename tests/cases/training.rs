@@ -8,7 +8,7 @@ use glam::DVec3;
 use image::{GrayImage, Luma, Rgb, RgbImage};
 use serde_json::json;
 
-use crate::cli_support::{Done, fmlgs, folder};
+use crate::cli_support::{Done, copy, fmlgs, folder};
 use crate::common::case;
 use crate::object_photos::{BALLS, ObjectPhotos};
 
@@ -194,14 +194,6 @@ fn masked_pixels_do_not_count(data: &Path, masked: impl Fn(u32, u32) -> bool, ph
     });
     assert!(clouds[0].0 == clouds[1].0, "other Gaussians");
     assert_eq!(clouds[0].1, clouds[1].1, "another score");
-}
-
-fn copy(from: &Path, to: &Path) {
-    fs::create_dir_all(to).expect("folder");
-    for entry in fs::read_dir(from).expect("folder").map(|e| e.expect("entry").path()) {
-        let to = to.join(entry.file_name().expect("name"));
-        if entry.is_dir() { copy(&entry, &to) } else { fs::copy(&entry, &to).map(drop).expect("copied") }
-    }
 }
 
 #[test]

@@ -12,26 +12,12 @@ use fmlgs::ui::app::App;
 use fmlgs::worker::ViewMode;
 
 use super::Window;
+use super::cli_support::first_version;
 
 /// Three boxes and their photos, trained for a moment by the first version.
 pub(crate) fn boxes(folder: &Path) -> PathBuf {
-    copy(&Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/first_version"), folder);
+    first_version(folder);
     folder.join("scene")
-}
-
-fn copy(from: &Path, to: &Path) {
-    std::fs::create_dir_all(to).expect("folder");
-    for entry in std::fs::read_dir(from).expect("folder") {
-        let path = entry.expect("entry").path();
-        let to = to.join(path.file_name().expect("a name"));
-        if path.is_dir() {
-            copy(&path, &to)
-        } else {
-            {
-                std::fs::copy(&path, &to).expect("copied");
-            }
-        }
-    }
 }
 
 /// A window with the boxes, drawn.

@@ -1,5 +1,7 @@
 //! Selecting by clicks and strokes, naming what is selected, and correcting what was found.
 
+use std::path::Path;
+
 use egui::{Event, Key, Modifiers, PointerButton, Pos2, Rect};
 use egui_kittest::kittest::Queryable;
 
@@ -49,13 +51,19 @@ fn at_rest(a: &App) -> bool {
     a.viewport.picture().is_some_and(|p| p.full) && a.viewport.queries.maps().is_some()
 }
 
-#[test]
-fn a_click_selects_and_a_name_is_kept_and_asked_for() {
-    let folder = tempfile::tempdir().expect("folder");
-    let mut w = window(folder.path());
+/// The boxes, one of them asked for and whose every pixel is known, without the cameras in the way.
+fn asked(folder: &Path) -> Window {
+    let mut w = window(folder);
     w.harness.state_mut().layout.cameras = false;
     w.ask(Action::Ask("box 0".into()));
     w.until("maps", at_rest);
+    w
+}
+
+#[test]
+fn a_click_selects_and_a_name_is_kept_and_asked_for() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = asked(folder.path());
     let before = w.app().state.semantics.as_ref().expect("objects").identities.len();
     let box_1 = middle_of(&w, 2);
     w.ask(Action::Paint(Some(0)));
@@ -87,10 +95,7 @@ fn a_click_selects_and_a_name_is_kept_and_asked_for() {
 #[test]
 fn what_was_found_is_corrected_and_nothing_is_kept_by_cancel() {
     let folder = tempfile::tempdir().expect("folder");
-    let mut w = window(folder.path());
-    w.harness.state_mut().layout.cameras = false;
-    w.ask(Action::Ask("box 0".into()));
-    w.until("maps", at_rest);
+    let mut w = asked(folder.path());
     let size = size_of(w.app(), 1);
     let box_1 = middle_of(&w, 2);
     for keep in [false, true] {
@@ -111,10 +116,7 @@ fn what_was_found_is_corrected_and_nothing_is_kept_by_cancel() {
 #[test]
 fn a_scene_is_prepared_once_and_as_soon_as_the_tool_opens() {
     let folder = tempfile::tempdir().expect("folder");
-    let mut w = window(folder.path());
-    w.harness.state_mut().layout.cameras = false;
-    w.ask(Action::Ask("box 0".into()));
-    w.until("maps", at_rest);
+    let mut w = asked(folder.path());
     let box_1 = middle_of(&w, 2);
     assert_eq!(w.app().viewport.times_prepared(), 0);
     w.ask(Action::Paint(Some(0)));
@@ -139,10 +141,7 @@ fn a_scene_is_prepared_once_and_as_soon_as_the_tool_opens() {
 #[test]
 fn strokes_drawn_while_it_is_prepared_are_all_taken_in() {
     let folder = tempfile::tempdir().expect("folder");
-    let mut w = window(folder.path());
-    w.harness.state_mut().layout.cameras = false;
-    w.ask(Action::Ask("box 0".into()));
-    w.until("maps", at_rest);
+    let mut w = asked(folder.path());
     let places = [middle_of(&w, 2), middle_of(&w, 3)];
     // What one click selects, each for itself.
     let mut each = Vec::new();
@@ -155,10 +154,7 @@ fn strokes_drawn_while_it_is_prepared_are_all_taken_in() {
     }
     drop(w);
     let folder = tempfile::tempdir().expect("folder");
-    let mut w = window(folder.path());
-    w.harness.state_mut().layout.cameras = false;
-    w.ask(Action::Ask("box 0".into()));
-    w.until("maps", at_rest);
+    let mut w = asked(folder.path());
     // Both in the frame after the tool opened, before anything can be ready.
     w.harness.state_mut().ask(Action::Paint(Some(0)));
     w.harness.step();
@@ -185,10 +181,7 @@ fn strokes_drawn_while_it_is_prepared_are_all_taken_in() {
 #[test]
 fn the_result_of_a_canceled_selection_is_not_that_of_the_next() {
     let folder = tempfile::tempdir().expect("folder");
-    let mut w = window(folder.path());
-    w.harness.state_mut().layout.cameras = false;
-    w.ask(Action::Ask("box 0".into()));
-    w.until("maps", at_rest);
+    let mut w = asked(folder.path());
     let places = [middle_of(&w, 2), middle_of(&w, 3)];
     w.ask(Action::Paint(Some(0)));
     w.until("prepared", |a| a.viewport.times_prepared() == 1);
