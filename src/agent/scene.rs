@@ -1,23 +1,24 @@
 //! A scene on this machine as the agent's [`World`]: what it does is emitted to whoever shows the scene.
 
+mod moves;
+
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::{DMat3, DVec3};
+use glam::DVec3;
 
-use super::camera_args::{Direction, Distance, NORMAL};
+use super::camera_args::{Direction, Distance};
 pub use super::effect::Effect;
 use super::effect::Emit;
 use super::relation::{Extent, Viewpoint};
 pub use super::view_shares::Parts;
 use super::view_shares::ViewShares;
 use super::world::{Arrival, IdentityFacts, Movement, Unreachable, World, WorldError};
-use crate::jobs::export;
-use crate::jobs::go_to::{self, ApproachRequest, Approached, Explored};
 use crate::jobs::query::QueryEngine;
-use crate::navigate::approach::Approach;
-use crate::navigate::target::{Side, ViewPreference};
-use crate::navigate::{CameraTrajectory, FRAMES, Pose, Speed};
+use crate::jobs::{export, export_splat};
+use crate::navigate::Pose;
+use crate::navigate::target::Side;
+use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::recipe::{Recipe, Understanding};
 use crate::scene::undo::UndoHistory;
@@ -25,8 +26,6 @@ use crate::scene::{Bounds, Identities, IdentityId, LevelFilter, SemanticMap, tex
 
 /// Points of a thing that its size is measured by, at most.
 const MEASURED_POINTS: usize = 2048;
-/// A step, as a multiple of the distance that flights keep to occupied space.
-const STEP: f64 = 6.0;
 
 /// A scene that the agent acts in.
 pub struct SceneWorld {
@@ -112,16 +111,6 @@ impl SceneWorld {
         self.eye
     }
 
-    fn explored(&mut self) -> Arc<Explored> {
-        if let Some(known) = self.parts.explored.as_ref().filter(|e| Arc::ptr_eq(&e.cloud, &self.parts.cloud)) {
-            return Arc::clone(known);
-        }
-        let new = Arc::new(Explored::new(Arc::clone(&self.parts.cloud), &self.parts.cameras, self.parts.up));
-        self.parts.explored = Some(Arc::clone(&new));
-        (self.emit)(Effect::Explored(Arc::clone(&new)));
-        new
-    }
-
     /// Whether the user sees an identity's Gaussians, or those of any of its pieces.
     fn drawn(&self, id: IdentityId) -> bool {
         let inside = self.parts.map.identities.descendants(id);
@@ -131,14 +120,6 @@ impl SceneWorld {
     /// Share of the present view that an identity covers, pieces included.
     fn share_of(&self, id: IdentityId) -> f64 {
         self.shares.of(&self.parts, self.eye, self.aspect, &self.hidden, id)
-    }
-
-    fn fly(&mut self, flight: CameraTrajectory, about: Option<DVec3>, what: String) {
-        self.done.record(Before::Eye(self.eye, what));
-        if let Some(last) = flight.poses.last() {
-            self.eye = *last;
-        }
-        (self.emit)(Effect::Fly(Box::new(flight), about));
     }
 
     fn hidden_list(&self) -> Vec<IdentityId> {
@@ -158,17 +139,6 @@ impl SceneWorld {
 
     fn export_file(&self, id: IdentityId) -> PathBuf {
         self.parts.exports.join(export::identity_file(&self.parts.map.identities, id, ".ply"))
-    }
-
-    /// A turn or a straight way, without looking for one.
-    fn straight(&mut self, to: Pose, what: String) -> Result<f64, Unreachable> {
-        let eye = self.eye;
-        let flight = CameraTrajectory::new(&[eye.center, to.center], [&eye, &to], None, None, FRAMES / 2, Speed::Eased);
-        let mut flight = flight.ok_or_else(|| Unreachable { reason: "the view has no place".into(), nearest: None })?;
-        flight.seconds = 1.2;
-        let length = flight.length;
-        self.fly(flight, None, what);
-        Ok(length)
     }
 }
 
@@ -220,85 +190,19 @@ impl World for SceneWorld {
     }
 
     fn go_to(&mut self, id: IdentityId, from: Side, closeness: f64) -> Result<Arrival, Unreachable> {
-        let explored = self.explored();
-        let in_view = self.share_of(id) > 0.0;
-        let eye = self.eye;
-        let preference = |side: Side| ViewPreference { side, distance: NORMAL / closeness.max(0.01) };
-        let visit = |side: Side| {
-            let request = ApproachRequest {
-                explored: Some(Arc::clone(&explored)),
-                cloud: Arc::clone(&self.parts.cloud),
-                cameras: Vec::new(),
-                up: self.parts.up,
-                settings: self.parts.settings.clone(),
-                map: Arc::clone(&self.parts.map),
-                id,
-                preference: preference(side),
-                from: eye,
-                aspect: self.aspect,
-                frames: FRAMES,
-            };
-            go_to::visit(request).1
-        };
-        // What is in view is seen from where it is seen now; what is not, from wherever it is seen best.
-        let mut visited = visit(if from == Side::Same && !in_view { Side::Best } else { from });
-        if visited.problem.is_some() && from == Side::Same && in_view {
-            visited = visit(Side::Best);
-        }
-        let Approached { name, flight, problem } = visited;
-        match (problem, flight.map(|f| *f)) {
-            (None, Some(Approach { view, target, flight })) => {
-                let arrival = Arrival { distance: flight.length, in_view: view.covers };
-                (self.emit)(Effect::Mark(vec![id]));
-                self.fly(flight, Some(target), format!("going to {name}"));
-                Ok(arrival)
-            }
-            (problem, nearest) => {
-                let center = self.bounds.get(id as usize).copied().flatten().map(|b| b.center());
-                let nearest = nearest.and_then(|n| Some(n.view.pose.center.distance(center?)));
-                Err(Unreachable { reason: problem.unwrap_or_default(), nearest })
-            }
-        }
+        self.fly_to(id, from, closeness)
     }
 
     fn look_at(&mut self, id: IdentityId) -> Result<Arrival, Unreachable> {
-        let center = self.bounds.get(id as usize).copied().flatten().map(|b| b.center());
-        let center = center.ok_or_else(|| Unreachable { reason: "it has no Gaussians".into(), nearest: None })?;
-        let eye = self.eye;
-        let to = Pose::looking_at(eye.center, center, self.parts.up, eye.fov_y_rad, &eye.world_from_camera);
-        let what = format!("looking at {}", self.name(id));
-        self.straight(to, what)?;
-        Ok(Arrival { distance: 0.0, in_view: self.share_of(id) })
+        self.turn_to(id)
     }
 
     fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Movement, Unreachable> {
-        let explored = self.explored();
-        let step = STEP * explored.navigator.clearance;
-        let wanted = match (distance, self.parts.meters) {
-            (Distance::Meters(m), Some(meters)) => m / meters.max(1e-9),
-            // Nobody knows what a meter is here: the agent asks for steps then.
-            (Distance::Meters(n), None) | (Distance::Relative(n), _) => n * step,
-            (Distance::Default, _) => step,
-        };
-        let (center, stopped_by_obstacle) = explored.navigator.step(&self.eye, direction.axis(), wanted);
-        let to = Pose { center, ..self.eye };
-        let distance_done = self.straight(to, format!("moving {}", direction.text()))?;
-        Ok(Movement { distance_done, stopped_by_obstacle })
+        self.step(direction, distance)
     }
 
     fn turn(&mut self, direction: Direction, degrees: f64) -> Result<(), Unreachable> {
-        let eye = self.eye;
-        let (axis, sign) = match direction {
-            Direction::Left => (self.parts.up, 1.0),
-            Direction::Right => (self.parts.up, -1.0),
-            Direction::Up => (eye.world_from_camera.x_axis, 1.0),
-            Direction::Down => (eye.world_from_camera.x_axis, -1.0),
-            Direction::Forward | Direction::Back => return Ok(()),
-        };
-        let axis = axis.try_normalize().unwrap_or(DVec3::Z);
-        let turn = DMat3::from_axis_angle(axis, sign * degrees.to_radians());
-        let to = Pose { world_from_camera: turn * eye.world_from_camera, ..eye };
-        self.straight(to, format!("turning {}", direction.text())).map(|_| ())
+        self.turn_by(direction, degrees)
     }
 
     fn highlight(&mut self, ids: &[IdentityId]) -> Result<(), WorldError> {
@@ -389,8 +293,10 @@ impl World for SceneWorld {
         if members.is_empty() {
             return Err(WorldError(format!("{} has no Gaussians", self.name(id))));
         }
-        export::ply(&file, &self.parts.cloud.select(&members)).map_err(|e| failed(&e))?;
-        Ok(file.display().to_string())
+        let cloud = Arc::new(self.parts.cloud.select(&members));
+        let done = export_splat::run(&cloud, &file, None, &mut Silent).map_err(|e| failed(&e))?;
+        let shift = done.shift.map(|shift| format!("; {}", export_splat::shift_line(shift)));
+        Ok(format!("{}{}", file.display(), shift.unwrap_or_default()))
     }
 
     fn export_replaces(&self, id: IdentityId) -> Option<String> {

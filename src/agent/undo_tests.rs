@@ -1,4 +1,4 @@
-//! What the agent takes back, beside what the user does in the meantime.
+//! What the agent takes back, beside what the user does in the meantime, and what it says of what it wrote.
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -27,10 +27,9 @@ fn map(name: Option<&str>) -> Arc<SemanticMap> {
     Arc::new(SemanticMap { identities, ..SemanticMap::default() })
 }
 
-/// A world of this map, whose scene lies in this folder, and what is said of it.
-fn world(map: Arc<SemanticMap>, folder: Option<PathBuf>) -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
-    let effects = Arc::new(Mutex::new(Vec::new()));
-    let parts = Parts {
+/// A scene of this map without Gaussians, which lies in this folder.
+fn parts(map: Arc<SemanticMap>, folder: Option<PathBuf>) -> Parts {
+    Parts {
         cloud: Arc::new(GaussianCloud::default()),
         settings: RenderSettings::default(),
         map,
@@ -41,7 +40,12 @@ fn world(map: Arc<SemanticMap>, folder: Option<PathBuf>) -> (SceneWorld, Arc<Mut
         folder,
         recipe: Default::default(),
         explored: None,
-    };
+    }
+}
+
+/// A world of this, and what is said of it.
+fn world(parts: Parts) -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
+    let effects = Arc::new(Mutex::new(Vec::new()));
     let said = Arc::clone(&effects);
     let emit = Box::new(move |effect| said.lock().expect("no panic").push(effect));
     (SceneWorld::new(parts, EYE, 1.0, emit).expect("no encoder is needed"), effects)
@@ -49,7 +53,7 @@ fn world(map: Arc<SemanticMap>, folder: Option<PathBuf>) -> (SceneWorld, Arc<Mut
 
 /// A world in which the lamp was called a torch, and what was said of it.
 fn renamed() -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
-    let (mut world, effects) = world(map(None), None);
+    let (mut world, effects) = world(parts(map(None), None));
     world.rename(1, "torch").expect("it is there");
     (world, effects)
 }
@@ -92,7 +96,7 @@ fn things_that_one_request_removes_go_into_one_scene() {
         identities.add(Level::Object, NOBODY, vec![name.into()]);
     }
     let map = Arc::new(SemanticMap { identities, ..SemanticMap::default() });
-    let (mut world, effects) = world(map, Some(PathBuf::from("scene")));
+    let (mut world, effects) = world(parts(map, Some(PathBuf::from("scene"))));
     let mut session = Session::new(Policy::off(), Box::new(Commands::default()));
     for text in ["remove the lamp and the table", "remove the chair"] {
         let reply = session.say(&mut world, text, &mut |_| (), &AtomicBool::new(false));
@@ -102,6 +106,24 @@ fn things_that_one_request_removes_go_into_one_scene() {
     let removed: Vec<_> =
         effects.iter().filter_map(|e| if let Effect::Remove(ids) = e { Some(ids) } else { None }).collect();
     assert_eq!(removed, [&vec![1, 3], &vec![2]], "one scene for each request");
+}
+
+#[test]
+fn what_is_exported_far_from_zero_says_what_it_is_relative_to() {
+    let folder = tempfile::tempdir().expect("folder");
+    let positions: Vec<[f32; 3]> = (0..60_u8).map(|i| [i % 5, i / 5 % 4, i / 20].map(f32::from)).collect();
+    let lamp = SemanticMap { identity_of: vec![1; positions.len()], ..(*map(None)).clone() };
+    for (origin, shift) in
+        [(DVec3::ONE, None), (DVec3::new(456_789.0, 5_678_901.0, 312.0), Some("(456789, 5678901, 312)"))]
+    {
+        let cloud = Arc::new(GaussianCloud { origin, ..GaussianCloud::isotropic(positions.clone(), -3.0, 1.0) });
+        let exports = folder.path().to_path_buf();
+        let (mut world, _) = world(Parts { cloud, exports, ..parts(Arc::new(lamp.clone()), None) });
+        let said = world.export(1).expect("written");
+        assert!(said.starts_with(&folder.path().join("1-lamp.ply").display().to_string()), "{said}");
+        assert_eq!(said.contains("shifted: places are relative to"), shift.is_some(), "{said}");
+        assert!(shift.is_none_or(|shift| said.contains(shift)), "{said}");
+    }
 }
 
 #[test]

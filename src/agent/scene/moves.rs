@@ -1,0 +1,134 @@
+//! How the eye moves in a scene: flights to things, steps and turns.
+
+use std::sync::Arc;
+
+use glam::{DMat3, DVec3};
+
+use super::{Before, Effect, SceneWorld};
+use crate::agent::camera_args::{Direction, Distance, NORMAL};
+use crate::agent::world::{Arrival, Movement, Unreachable};
+use crate::jobs::go_to::{self, ApproachRequest, Approached, Explored};
+use crate::navigate::approach::Approach;
+use crate::navigate::target::{Side, ViewPreference};
+use crate::navigate::{CameraTrajectory, FRAMES, Pose, Speed};
+use crate::scene::IdentityId;
+
+/// A step, as a multiple of the distance that flights keep to occupied space.
+const STEP: f64 = 6.0;
+
+impl SceneWorld {
+    /// Flies to an identity, to see it from a side.
+    pub(super) fn fly_to(&mut self, id: IdentityId, from: Side, closeness: f64) -> Result<Arrival, Unreachable> {
+        let explored = self.explored();
+        let in_view = self.share_of(id) > 0.0;
+        let eye = self.eye;
+        let preference = |side: Side| ViewPreference { side, distance: NORMAL / closeness.max(0.01) };
+        let visit = |side: Side| {
+            let request = ApproachRequest {
+                explored: Some(Arc::clone(&explored)),
+                cloud: Arc::clone(&self.parts.cloud),
+                cameras: Vec::new(),
+                up: self.parts.up,
+                settings: self.parts.settings.clone(),
+                map: Arc::clone(&self.parts.map),
+                id,
+                preference: preference(side),
+                from: eye,
+                aspect: self.aspect,
+                frames: FRAMES,
+            };
+            go_to::visit(request).1
+        };
+        // What is in view is seen from where it is seen now; what is not, from wherever it is seen best.
+        let mut visited = visit(if from == Side::Same && !in_view { Side::Best } else { from });
+        if visited.problem.is_some() && from == Side::Same && in_view {
+            visited = visit(Side::Best);
+        }
+        let Approached { name, flight, problem } = visited;
+        match (problem, flight.map(|f| *f)) {
+            (None, Some(Approach { view, target, flight })) => {
+                let arrival = Arrival { distance: flight.length, in_view: view.covers };
+                (self.emit)(Effect::Mark(vec![id]));
+                self.fly(flight, Some(target), format!("going to {name}"));
+                Ok(arrival)
+            }
+            (problem, nearest) => {
+                let center = self.bounds.get(id as usize).copied().flatten().map(|b| b.center());
+                let nearest = nearest.and_then(|n| Some(n.view.pose.center.distance(center?)));
+                Err(Unreachable { reason: problem.unwrap_or_default(), nearest })
+            }
+        }
+    }
+
+    /// Turns toward an identity.
+    pub(super) fn turn_to(&mut self, id: IdentityId) -> Result<Arrival, Unreachable> {
+        let center = self.bounds.get(id as usize).copied().flatten().map(|b| b.center());
+        let center = center.ok_or_else(|| Unreachable { reason: "it has no Gaussians".into(), nearest: None })?;
+        let eye = self.eye;
+        let to = Pose::looking_at(eye.center, center, self.parts.up, eye.fov_y_rad, &eye.world_from_camera);
+        let what = format!("looking at {}", self.name(id));
+        self.straight(to, what)?;
+        Ok(Arrival { distance: 0.0, in_view: self.share_of(id) })
+    }
+
+    /// Moves the eye, up to what is in the way.
+    pub(super) fn step(&mut self, direction: Direction, distance: Distance) -> Result<Movement, Unreachable> {
+        let explored = self.explored();
+        let step = STEP * explored.navigator.clearance;
+        let wanted = match (distance, self.parts.meters) {
+            (Distance::Meters(m), Some(meters)) => m / meters.max(1e-9),
+            // Nobody knows what a meter is here: the agent asks for steps then.
+            (Distance::Meters(n), None) | (Distance::Relative(n), _) => n * step,
+            (Distance::Default, _) => step,
+        };
+        let (center, stopped_by_obstacle) = explored.navigator.step(&self.eye, direction.axis(), wanted);
+        let to = Pose { center, ..self.eye };
+        let distance_done = self.straight(to, format!("moving {}", direction.text()))?;
+        Ok(Movement { distance_done, stopped_by_obstacle })
+    }
+
+    /// Turns the eye.
+    pub(super) fn turn_by(&mut self, direction: Direction, degrees: f64) -> Result<(), Unreachable> {
+        let eye = self.eye;
+        let (axis, sign) = match direction {
+            Direction::Left => (self.parts.up, 1.0),
+            Direction::Right => (self.parts.up, -1.0),
+            Direction::Up => (eye.world_from_camera.x_axis, 1.0),
+            Direction::Down => (eye.world_from_camera.x_axis, -1.0),
+            Direction::Forward | Direction::Back => return Ok(()),
+        };
+        let axis = axis.try_normalize().unwrap_or(DVec3::Z);
+        let turn = DMat3::from_axis_angle(axis, sign * degrees.to_radians());
+        let to = Pose { world_from_camera: turn * eye.world_from_camera, ..eye };
+        self.straight(to, format!("turning {}", direction.text())).map(|_| ())
+    }
+
+    /// A turn or a straight way, without looking for one.
+    pub(super) fn straight(&mut self, to: Pose, what: String) -> Result<f64, Unreachable> {
+        let eye = self.eye;
+        let flight = CameraTrajectory::new(&[eye.center, to.center], [&eye, &to], None, None, FRAMES / 2, Speed::Eased);
+        let mut flight = flight.ok_or_else(|| Unreachable { reason: "the view has no place".into(), nearest: None })?;
+        flight.seconds = 1.2;
+        let length = flight.length;
+        self.fly(flight, None, what);
+        Ok(length)
+    }
+
+    fn fly(&mut self, flight: CameraTrajectory, about: Option<DVec3>, what: String) {
+        self.done.record(Before::Eye(self.eye, what));
+        if let Some(last) = flight.poses.last() {
+            self.eye = *last;
+        }
+        (self.emit)(Effect::Fly(Box::new(flight), about));
+    }
+
+    fn explored(&mut self) -> Arc<Explored> {
+        if let Some(known) = self.parts.explored.as_ref().filter(|e| Arc::ptr_eq(&e.cloud, &self.parts.cloud)) {
+            return Arc::clone(known);
+        }
+        let new = Arc::new(Explored::new(Arc::clone(&self.parts.cloud), &self.parts.cameras, self.parts.up));
+        self.parts.explored = Some(Arc::clone(&new));
+        (self.emit)(Effect::Explored(Arc::clone(&new)));
+        new
+    }
+}
