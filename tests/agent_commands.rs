@@ -3,8 +3,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
 mod agent_common;
+mod cli_support;
 #[path = "agent_commands/looks.rs"]
 mod looks;
+#[path = "agent_commands/stored.rs"]
+mod stored;
 
 use std::fmt::Write as _;
 use std::sync::atomic::AtomicBool;

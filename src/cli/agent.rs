@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::json;
 
+use super::agent_work::SceneWork;
 use super::recipe::RecipeArgs;
 use super::scene_args::open_scene;
 use super::{CliError, interrupt, number, output, view};
@@ -14,11 +15,8 @@ use crate::agent::llm::settings::{LlmSettings, RequestPatience};
 use crate::agent::llm::{Llm, SENT, discover};
 use crate::agent::scene::{Effect, Parts, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Session};
-use crate::jobs::remove::{self, RemovalOptions, RemoveRequest};
 use crate::jobs::{export, render};
 use crate::navigate::Pose;
-use crate::pipeline::observer::Silent;
-use crate::scene::IdentityId;
 
 const EXAMPLES: &str = "Examples:\n  \
     fmlgs agent scene/ \"show me the handle of the kettle from the other side\" \"step back half a meter\"\n  \
@@ -30,7 +28,9 @@ const EXAMPLES: &str = "Examples:\n  \
 ///
 /// Each TEXT is one request of the same conversation; without any, requests are read from standard input, one
 /// per line. The planner 'commands' is built in; 'llm' asks a chat model behind an OpenAI-compatible
-/// address. Exit code 1 if the last request was refused, or ends at a question.
+/// address. Names that it gives are stored in the scene, after a yes; what it removes, it leaves out of a scene of
+/// its own beside this one. Exit code 1 if the last request was refused, or ends at a question, or if something could
+/// not be stored.
 #[derive(Debug, clap::Args)]
 #[command(after_help = format!("{EXAMPLES}\n\n{SENT}"))]
 pub(crate) struct AgentArgs {
@@ -167,17 +167,10 @@ pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
         recipe: args.recipe.recipe(),
         explored: None,
     };
-    let effects: Arc<Mutex<Vec<String>>> = Arc::default();
+    let work = Arc::new(Mutex::new(SceneWork::new(&parts, scene.state)));
     let emit = {
-        let effects = Arc::clone(&effects);
-        let folder = scene.folder;
-        Box::new(move |effect: Effect| {
-            let mut effects = effects.lock().unwrap_or_else(PoisonError::into_inner);
-            effects.extend(match &effect {
-                Effect::Remove(ids) => folder.as_ref().map(|folder| removed(folder, ids)),
-                other => line(other),
-            });
-        })
+        let work = Arc::clone(&work);
+        Box::new(move |effect: Effect| work.lock().unwrap_or_else(PoisonError::into_inner).carry_out(&effect))
     };
     let (cloud, settings) = (Arc::clone(&parts.cloud), parts.settings.clone());
     let aspect = f64::from(camera.width_px) / f64::from(camera.height_px);
@@ -189,12 +182,12 @@ pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
         let mut requests = Requests { input: std::io::stdin().lock(), line: 0 };
         while let Some(text) = requests.next()? {
             if !text.trim().is_empty() {
-                talk.say(&mut session, &mut world, &text, &effects)?;
+                talk.say(&mut session, &mut world, &text, &work)?;
             }
         }
     }
     for text in &args.text {
-        talk.say(&mut session, &mut world, text, &effects)?;
+        talk.say(&mut session, &mut world, text, &work)?;
     }
     if let Some(path) = &args.transcript {
         let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
@@ -209,6 +202,9 @@ pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
         output::print_json(&json!({
             "planner": session.planner(), "requests": talk.told, "recipe": args.recipe.recipe(),
         }))?;
+    }
+    if let Some(failure) = work.lock().unwrap_or_else(PoisonError::into_inner).failure.take() {
+        return Err(failure);
     }
     if let Some(question) = talk.open {
         let asked = if args.json { String::new() } else { format!(" ({question})") };
@@ -271,7 +267,7 @@ impl Talk {
         session: &mut Session,
         world: &mut SceneWorld,
         text: &str,
-        effects: &Mutex<Vec<String>>,
+        work: &Mutex<SceneWork>,
     ) -> Result<(), CliError> {
         let mut calls = Vec::new();
         let mut on = |event| {
@@ -283,7 +279,7 @@ impl Talk {
         if interrupt::asked_to_stop() {
             return Err(CliError::Cancelled("the conversation ends here".into()));
         }
-        let done = std::mem::take(&mut *effects.lock().unwrap_or_else(PoisonError::into_inner));
+        let done = std::mem::take(&mut work.lock().unwrap_or_else(PoisonError::into_inner).done);
         self.refused = reply.refused.as_ref().map(|r| r.text.clone());
         self.open = reply.pending.map(|_| reply.text.clone());
         if self.json {
@@ -307,30 +303,6 @@ impl Talk {
         lines.extend(done.iter().map(|d| format!("  {d}")));
         lines.push(reply.text);
         output::print(&lines.join("\n"))
-    }
-}
-
-/// Makes the scene in `folder` anew without an identity, and says where.
-fn removed(folder: &Path, ids: &[IdentityId]) -> String {
-    let request = RemoveRequest { folder: folder.into(), options: RemovalOptions::of(ids), retrain: false };
-    match remove::beside(&request, &mut Silent) {
-        Ok(done) => format!("{}: {}", done.folder.display(), remove::told(&done.name, &done.report)),
-        Err(e) => format!("failed: {e}"),
-    }
-}
-
-/// An effect for display; `None` where there is nothing to say.
-fn line(effect: &Effect) -> Option<String> {
-    match effect {
-        Effect::Fly(flight, _) => {
-            let (length, secs) = (flight.length, flight.seconds);
-            Some(format!("flies {length:.2} units in {secs:.1} s, {} poses", flight.poses.len()))
-        }
-        Effect::Mark(ids) => Some(format!("marks {} of them", ids.len())),
-        Effect::Undo => None,
-        Effect::Hidden(ids) | Effect::HiddenUndone(ids) => Some(format!("hides {} of them", ids.len())),
-        Effect::Renamed(id, name) | Effect::RenameUndone(id, name) => Some(format!("calls #{id} {name}")),
-        Effect::Explored(_) | Effect::Remove(_) => None,
     }
 }
 

@@ -5,6 +5,7 @@
 //! error. Exit codes are listed in `EXIT_CODES`.
 
 mod agent;
+mod agent_work;
 mod batch;
 mod bench;
 mod check_stability;

@@ -1,0 +1,114 @@
+//! Work that the agent's sentences make: names are stored in the scene, and what is removed makes a scene beside it.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use super::CliError;
+use crate::agent::scene::{Effect, Parts};
+use crate::jobs::JobError;
+use crate::jobs::edit::{self, EditRequest};
+use crate::jobs::error::chain;
+use crate::jobs::remove::{self, RemovalOptions, RemoveRequest};
+use crate::pipeline::observer::Silent;
+use crate::pipeline::semantics::edit::Edit;
+use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
+
+/// A scene whose changes are stored as they are made, as the window stores them.
+pub(super) struct SceneWork {
+    folder: Option<PathBuf>,
+    /// Id of its last save.
+    state: Option<String>,
+    cloud: Arc<GaussianCloud>,
+    map: Arc<SemanticMap>,
+    /// The maps before each new name that was not taken back.
+    before: Vec<Arc<SemanticMap>>,
+    /// What was done since somebody took it, in words.
+    pub(super) done: Vec<String>,
+    /// Why something could not be done; the last, if there are several.
+    pub(super) failure: Option<CliError>,
+}
+
+impl SceneWork {
+    /// The scene of `parts`, which lies in its folder in the state `state`.
+    pub(super) fn new(parts: &Parts, state: Option<String>) -> Self {
+        Self {
+            folder: parts.folder.clone(),
+            state,
+            cloud: Arc::clone(&parts.cloud),
+            map: Arc::clone(&parts.map),
+            before: Vec::new(),
+            done: Vec::new(),
+            failure: None,
+        }
+    }
+
+    /// Does what the agent has decided, as far as that is more than a look.
+    pub(super) fn carry_out(&mut self, effect: &Effect) {
+        let line = match effect {
+            Effect::Fly(flight, _) => {
+                let (length, secs) = (flight.length, flight.seconds);
+                format!("flies {length:.2} units in {secs:.1} s, {} poses", flight.poses.len())
+            }
+            Effect::Mark(ids) => format!("marks {} of them", ids.len()),
+            Effect::Hidden(ids) | Effect::HiddenUndone(ids) => format!("hides {} of them", ids.len()),
+            Effect::Renamed(id, name) => self.renamed(*id, name),
+            Effect::RenameUndone(id, name) => self.rename_undone(*id, name),
+            Effect::Remove(ids) => match self.folder.clone() {
+                Some(folder) => self.removed(&folder, ids),
+                None => return,
+            },
+            Effect::Undo | Effect::Explored(_) => return,
+        };
+        self.done.push(line);
+    }
+
+    fn renamed(&mut self, id: IdentityId, name: &str) -> String {
+        self.before.push(Arc::clone(&self.map));
+        let request = EditRequest::Apply(Edit::Rename(id, name.to_owned()));
+        match edit::apply(&self.cloud, &self.map, &request) {
+            Ok(map) => {
+                self.map = map;
+                self.stored(&format!("calls #{id} {name}"))
+            }
+            Err(e) => self.failed(e),
+        }
+    }
+
+    fn rename_undone(&mut self, id: IdentityId, name: &str) -> String {
+        if let Some(before) = self.before.pop() {
+            self.map = before;
+        }
+        self.stored(&format!("calls #{id} {name} again"))
+    }
+
+    /// Stores the names as they are now, and says so.
+    fn stored(&mut self, what: &str) -> String {
+        let stored = match &self.folder {
+            Some(folder) => edit::store(folder, self.state.as_deref(), &self.map, &self.cloud),
+            None => Ok(None),
+        };
+        match stored {
+            Ok(Some(state)) => {
+                self.state = Some(state);
+                format!("{what}, stored in the scene")
+            }
+            Ok(None) => format!("{what}, which is stored nowhere: only a trained scene keeps names"),
+            Err(e) => self.failed(e),
+        }
+    }
+
+    /// Makes the scene in `folder` anew without these, and says where.
+    fn removed(&mut self, folder: &Path, ids: &[IdentityId]) -> String {
+        let request = RemoveRequest { folder: folder.into(), options: RemovalOptions::of(ids), retrain: false };
+        match remove::beside(&request, &mut Silent) {
+            Ok(done) => format!("{}: {}", done.folder.display(), remove::told(&done.name, &done.report)),
+            Err(e) => self.failed(e),
+        }
+    }
+
+    fn failed(&mut self, e: JobError) -> String {
+        let text = format!("failed: {}", chain(&e));
+        self.failure = Some(e.into());
+        text
+    }
+}
