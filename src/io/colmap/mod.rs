@@ -63,8 +63,8 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
         ));
     }
     let cameras = cameras(&model)?;
-    let of = |image| listed(image, &cameras, &place.below, &images_file);
-    let listed: Vec<_> = images.iter().map(of).collect::<Result<_, _>>()?;
+    let known = with_cameras(&images, &cameras, &model, &mut warnings)?;
+    let listed = known.into_iter().map(|(image, lens)| listed(image, lens, &place.below)).collect();
     let mut listed = lenses::readable(listed, &model.file("cameras"), &mut warnings)?;
     Splits::beside(&[&model.folder, root])?.apply(&mut listed, &PhotoFinder::new(root)?, &mut warnings);
     let photos = photos(listed, root, &images_file, &mut warnings)?;
@@ -114,28 +114,43 @@ fn points(model: &ModelFolder) -> Result<Vec<SparsePoint>, IoError> {
     }
 }
 
+/// The photos that have a camera, with it. The others are left out with a warning that names them; if all are so, that
+/// is an error.
+fn with_cameras<'a>(
+    images: &'a [Image],
+    cameras: &'a Cameras,
+    model: &ModelFolder,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<(&'a Image, &'a lens::FoundLens)>, IoError> {
+    let (mut known, mut others) = (Vec::new(), Vec::new());
+    for image in images {
+        match cameras.get(&image.camera) {
+            Some(lens) => known.push((image, lens)),
+            None => others.push(image),
+        }
+    }
+    let Some(&first) = others.first() else { return Ok(known) };
+    let why = |image: &Image| format!("there is no camera {}", image.camera);
+    if known.is_empty() {
+        return Err(IoError::syntax(&model.file("images"), format!("photo '{}'", first.name), why(first)));
+    }
+    let named: Vec<String> = others.iter().map(|&image| format!("{}: {}", image.name, why(image))).collect();
+    warnings.push(format!(
+        "{} of {} listed photos have no camera and were skipped: {}",
+        others.len(),
+        images.len(),
+        some_of(&named, "; ")
+    ));
+    Ok(known)
+}
+
 /// A photo, or the name of its camera's model if that is not supported.
-fn listed(
-    image: &Image,
-    cameras: &Cameras,
-    folder: &str,
-    source: &Path,
-) -> Result<Result<ListedPhoto, String>, IoError> {
-    let Some(lens) = cameras.get(&image.camera) else {
-        return Err(IoError::syntax(
-            source,
-            format!("photo '{}'", image.name),
-            format!("there is no camera {}", image.camera),
-        ));
-    };
-    let lens = match lens {
-        Ok(lens) => lens.clone(),
-        Err(model) => return Ok(Err(model.clone())),
-    };
+fn listed(image: &Image, lens: &lens::FoundLens, folder: &str) -> Result<ListedPhoto, String> {
+    let lens = lens.clone()?;
     // The rows of camera_from_world are the columns of world_from_camera.
     let axes = matrix_from_quaternion(image.quaternion).map(|[x, y, z]| DMat3::from_cols(x.into(), y.into(), z.into()));
     let world_from_camera = axes.unwrap_or(DMat3::NAN);
-    Ok(Ok(ListedPhoto {
+    Ok(ListedPhoto {
         entry: image.name.clone(),
         folder: folder.into(),
         lens,
@@ -146,7 +161,7 @@ fn listed(
         test_split: false,
         background: None,
         mask: None,
-    }))
+    })
 }
 
 fn point(position: DVec3, rgb: [u8; 3], index: usize, path: &Path) -> Result<SparsePoint, IoError> {

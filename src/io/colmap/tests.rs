@@ -302,6 +302,59 @@ fn lenses_and_places_that_cannot_be_are_refused_on_reading() {
 }
 
 #[test]
+fn photos_without_a_camera_are_left_out_and_named() {
+    // As text and as binary, photos of these cameras.
+    let read_with = |cameras: [u32; 3]| {
+        let (t, b) = (text(), binary("sparse"));
+        let [lines_at, bytes_at] =
+            [(&t, "images.txt"), (&b, "images.bin")].map(|(f, n)| f.path().join("sparse").join(n));
+        let (mut lines, mut bytes) =
+            (fs::read_to_string(&lines_at).expect("text"), fs::read(&bytes_at).expect("bytes"));
+        for ((name, at), camera) in [("sub/a.png", 68), ("b.png", 198), ("gone.png", 324)].into_iter().zip(cameras) {
+            lines = lines.replace(&format!(" 7 {name}"), &format!(" {camera} {name}"));
+            assert_eq!(bytes[at..at + 4], 7_u32.to_le_bytes(), "{name}");
+            bytes[at..at + 4].copy_from_slice(&camera.to_le_bytes());
+        }
+        fs::write(lines_at, lines).expect("write");
+        fs::write(bytes_at, bytes).expect("write");
+        [t, b].map(|folder| {
+            RgbImage::new(64, 48).save(folder.path().join("images/gone.png")).expect("save");
+            let set = read(folder.path()).map_err(|e| e.to_string())?;
+            Ok::<_, String>((set.photos.into_iter().map(|p| p.name).collect::<Vec<_>>(), set.warnings))
+        })
+    };
+    let some = |names: &[&str], warnings: &[&str]| {
+        let owned = |all: &[&str]| all.iter().map(|&text| text.to_owned()).collect::<Vec<_>>();
+        Ok((owned(names), owned(warnings)))
+    };
+    for (cameras, left) in [
+        ([7, 7, 7], some(&["b.png", "gone.png", "sub/a.png"], &[])),
+        (
+            [7, 9, 7],
+            some(
+                &["gone.png", "sub/a.png"],
+                &["1 of 3 listed photos have no camera and were skipped: b.png: there is no camera 9"],
+            ),
+        ),
+        (
+            [8, 9, 7],
+            some(
+                &["gone.png"],
+                &[
+                    "2 of 3 listed photos have no camera and were skipped: sub/a.png: there is no camera 8; b.png: there \
+                   is no camera 9",
+                ],
+            ),
+        ),
+    ] {
+        read_with(cameras).into_iter().for_each(|read| assert_eq!(read, left, "{cameras:?}"));
+    }
+    for e in read_with([9; 3]).map(|read| read.expect_err("no photo is left")) {
+        assert!(e.contains("photo 'sub/a.png'") && e.contains("there is no camera 9"), "{e}");
+    }
+}
+
+#[test]
 fn a_camera_without_photos_folder_is_named() {
     let b = binary("sparse/0");
     fs::rename(b.path().join("images"), b.path().join("pictures")).expect("rename");
