@@ -239,6 +239,39 @@ fn masks_that_frames_name_and_masks_of_the_photos_stems_count() {
 }
 
 #[test]
+fn photos_whose_masks_are_all_black_are_left_out_and_named() {
+    let folder = folder();
+    let data = folder.path().join("data");
+    let photos = ObjectPhotos { backdrop: Some([90, 120, 60]), views: 10, ..ObjectPhotos::default() };
+    photos.nerfstudio(&data, |i, frame| frame["mask_path"] = json!(format!("counts/{i:02}.png")));
+    fs::create_dir(data.join("counts")).expect("folder");
+    let mask = |i: usize, value: u8| {
+        let path = data.join(format!("counts/{i:02}.png"));
+        GrayImage::from_pixel(24, 24, Luma([value])).save(path).expect("save");
+    };
+    let out = |name: &str| folder.path().join(name);
+    let said = |name: &str, every: &str| train(&data, &out(name), 20, &["--holdout-every", every]).stderr;
+    (0..10).for_each(|i| mask(i, 255));
+    assert!(!said("all", "0").contains("show nothing"), "the control");
+    mask(3, 0);
+    let one = said("one", "0");
+    assert!(one.contains("1 of 10 photos show nothing and are left out") && one.contains("03.png"), "{one}");
+    assert_eq!(one.matches("show nothing").count(), 1, "{one}");
+    // The same run goes on: it is the same photo that is left out.
+    train(&data, &out("one"), 40, &["--holdout-every", "0", "--go-on"]);
+    // One that is held out is no reason to stop either.
+    (0..10).for_each(|i| mask(i, 255));
+    mask(0, 0);
+    let held = said("held", "5");
+    assert!(held.contains("1 of 2 photos show nothing") && held.contains("00.png"), "{held}");
+    // Without any that shows something, there is nothing to train on.
+    (0..10).for_each(|i| mask(i, 0));
+    let (data, out) = (data.to_str().expect("UTF-8"), out("none"));
+    let none = fmlgs(&["train", data, "--out", out.to_str().expect("UTF-8"), "--steps", "20", "--backend", "cpu"]);
+    assert!(none.fails_with(1).stderr.contains("shows nothing"));
+}
+
+#[test]
 fn labels_beside_the_photos_are_no_masks() {
     let photos = ObjectPhotos { backdrop: Some([90, 120, 60]), views: 6, ..ObjectPhotos::default() };
     let several = |x: u32| Rgb([(x / 12 * 60) as u8; 3]);

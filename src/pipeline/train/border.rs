@@ -43,9 +43,10 @@ impl Borders {
         }
         let mut by_camera = BTreeMap::new();
         for (camera, photos) in cameras.into_iter().filter(|(_, photos)| photos.len() >= MIN_PHOTOS) {
-            let sample: Result<Vec<PhotoPixels>, IoError> =
-                photos.par_iter().step_by(photos.len().div_ceil(SAMPLE)).map(|p| photo::load(p, max_side_px)).collect();
-            let sample = sample?;
+            let step = photos.len().div_ceil(SAMPLE);
+            let sample: Result<Vec<Option<PhotoPixels>>, IoError> =
+                photos.par_iter().step_by(step).map(|p| unless_blank(photo::load(p, max_side_px))).collect();
+            let sample: Vec<PhotoPixels> = sample?.into_iter().flatten().collect();
             if let Some(border) = find(&sample.iter().collect::<Vec<_>>()) {
                 by_camera.insert(camera, border);
             }
@@ -66,6 +67,14 @@ impl Borders {
     pub(crate) fn share(&self) -> f64 {
         let share = |b: &Vec<bool>| b.iter().filter(|b| **b).count() as f64 / b.len().max(1) as f64;
         self.by_camera.values().map(share).fold(0.0, f64::max)
+    }
+}
+
+/// What was loaded of a photo; `None` of one that shows nothing.
+pub(super) fn unless_blank<T>(loaded: Result<T, IoError>) -> Result<Option<T>, IoError> {
+    match loaded {
+        Err(IoError::NothingShown { .. }) => Ok(None),
+        loaded => loaded.map(Some),
     }
 }
 

@@ -4,12 +4,15 @@ use std::borrow::Cow;
 
 use rayon::prelude::*;
 
-use super::border::Borders;
+use super::border::{Borders, unless_blank};
 use super::sweep_view::common_backdrop;
 use super::{TrainConfig, TrainError, TrainView, init};
 use crate::io::IoError;
 use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::scene::Dataset;
+
+/// Names of photos that a warning gives.
+const NAMED: usize = 5;
 
 /// Says so where others are held out than the settings ask for, because the data set marks them.
 pub(super) fn tell_marks(dataset: &Dataset, config: &TrainConfig, observer: &mut dyn Observer) {
@@ -48,7 +51,24 @@ pub(super) fn before_backdrop<'a>(
     Cow::Owned(Dataset { background, ..dataset.clone() })
 }
 
-/// Loads and scales photos, several at a time; `None` if the observer cancels.
+/// The photos to train on, as [`load_views`] loads them; an error if none of them shows anything.
+pub(super) fn load_training(
+    dataset: &Dataset,
+    indices: &[usize],
+    config: &TrainConfig,
+    observer: &mut dyn Observer,
+) -> Result<Option<Vec<TrainView>>, TrainError> {
+    let Some(mut views) = load_views(dataset, indices, config, "Loading photos", observer)? else { return Ok(None) };
+    if let (true, Some(&first)) = (views.is_empty(), indices.first()) {
+        let path = dataset.photos[first].path.clone();
+        return Err(TrainError::Photo(IoError::NothingShown { path }));
+    }
+    views.shrink_to_fit();
+    Ok(Some(views))
+}
+
+/// Loads and scales photos, several at a time; `None` if the observer cancels. Those that show nothing are left out,
+/// with a warning that names them.
 pub(crate) fn load_views(
     dataset: &Dataset,
     indices: &[usize],
@@ -63,24 +83,40 @@ pub(crate) fn load_views(
         let percent = 100.0 * borders.share();
         observer.note(Severity::Info, format!("{stage}: a black border ({percent:.1} % of the image) is left out"));
     }
-    let mut views = Vec::with_capacity(indices.len());
+    let (mut views, mut blank) = (Vec::with_capacity(indices.len()), Vec::new());
     if observer.proceed().is_err() {
         return Ok(None);
     }
     for batch in indices.chunks(8) {
-        let loaded: Result<Vec<TrainView>, IoError> = batch
+        let loaded: Result<Vec<Option<TrainView>>, IoError> = batch
             .par_iter()
             .map(|&i| {
                 let photo = &dataset.photos[i];
-                let pixels = borders.load(photo)?;
+                let Some(pixels) = unless_blank(borders.load(photo))? else { return Ok(None) };
                 let camera = photo.camera.resized(pixels.width_px, pixels.height_px);
-                Ok(TrainView { name: photo.name.clone(), camera, pixels })
+                Ok(Some(TrainView { name: photo.name.clone(), camera, pixels }))
             })
             .collect();
-        views.extend(loaded.map_err(TrainError::Photo)?);
-        if ticker.tick(views.len(), observer).is_err() {
+        for (&i, view) in batch.iter().zip(loaded.map_err(TrainError::Photo)?) {
+            match view {
+                Some(view) => views.push(view),
+                None => blank.push(dataset.photos[i].name.as_str()),
+            }
+        }
+        if ticker.tick(views.len() + blank.len(), observer).is_err() {
             return Ok(None);
         }
+    }
+    if !blank.is_empty() {
+        let names = blank.iter().take(NAMED).copied().collect::<Vec<_>>().join(", ");
+        let more = if blank.len() > NAMED { ", ..." } else { "" };
+        let text = format!(
+            "{stage}: {} of {} photos show nothing and are left out: every pixel is transparent, outside of its lens or \
+             black in its mask ({names}{more})",
+            blank.len(),
+            indices.len()
+        );
+        observer.note(Severity::Warning, text);
     }
     Ok(Some(views))
 }

@@ -13,7 +13,7 @@ use super::device::StepResult;
 use super::folder::{FolderUse, claim, finished, objects_for, remade, resumable};
 use super::inputs::{Compare, TrainInputs};
 use super::outcome::{TrainEnd, TrainError, TrainOutcome};
-use super::photos::{before_backdrop, load_views, tell_marks, tell_of_pixels};
+use super::photos::{before_backdrop, load_training, load_views, tell_marks, tell_of_pixels};
 use super::trainer::{REPORT_STEPS, StepError, Trainer};
 use super::window::Window;
 use super::{TrainConfig, TrainView, coarse, density, geometry, init};
@@ -77,13 +77,12 @@ pub(crate) fn run_on(
         observer.cloud(Arc::clone(&done.cloud), done.steps);
         return Ok(done);
     }
-    let Some(mut views) = load_views(dataset, &train, config, "Loading photos", observer)? else {
+    let Some(views) = load_training(dataset, &train, config, observer)? else {
         return Ok(TrainOutcome::stopped_early());
     };
     let Some(tests) = load_views(dataset, &held, config, "Loading held-out photos", observer)? else {
         return Ok(TrainOutcome::stopped_early());
     };
-    views.shrink_to_fit();
     let dataset = &*before_backdrop(dataset, &views, observer);
     let mut job = Job::start(dataset, config, scene, &held, (views, tests), saved);
     (job.inputs, job.remake) = (inputs, may.remake);
