@@ -113,8 +113,7 @@ pub(crate) fn half(pixels: &PhotoPixels, camera: &Camera) -> (PhotoPixels, Camer
 
 /// Width, height and alpha of every pixel of a picture file; `None`, from its header, if it has none.
 pub(super) fn alpha(path: &Path) -> Result<Option<(usize, usize, Vec<u8>)>, IoError> {
-    let start = files::read_start(path, HEADER_BYTES)?;
-    if decoder(&start, path).is_ok_and(|d| !d.color_type().has_alpha()) {
+    if !header(path)?.1.has_alpha() {
         return Ok(None);
     }
     let picture = decode_rgba(&read_whole(path)?, MOST_PX, path)?;
@@ -124,14 +123,26 @@ pub(super) fn alpha(path: &Path) -> Result<Option<(usize, usize, Vec<u8>)>, IoEr
 
 /// Width and height in px of a picture file, from its header.
 pub fn size(path: &Path) -> Result<(u32, u32), IoError> {
+    header(path).map(|(size, _)| size)
+}
+
+/// Size in px and kind of pixels of a picture file, none of which is decoded. A PNG whose colors have a transparent one
+/// has alpha.
+fn header(path: &Path) -> Result<((u32, u32), ColorType), IoError> {
+    let of = |bytes: &[u8]| decoder(bytes, path).map(|d| (d.dimensions(), d.color_type()));
     let start = files::read_start(path, HEADER_BYTES)?;
-    let complete = (start.len() as u64) < HEADER_BYTES;
-    match decoder(&start, path) {
-        Ok(d) => Ok(d.dimensions()),
-        Err(e) if complete => Err(e),
-        // A large color profile or preview can push the size past the start.
-        Err(_) => Ok(decoder(&files::read(path, files::MAX_PICTURE_BYTES)?, path)?.dimensions()),
+    let is_whole = (start.len() as u64) < HEADER_BYTES;
+    match of(&start) {
+        // A large color profile or preview can push it past the start, and a TIFF may have it at its end.
+        Err(_) if !is_whole => of(&files::read(path, files::MAX_PICTURE_BYTES)?),
+        known => known,
     }
+}
+
+/// Whether a picture file is a gray PNG of one bit a pixel, by its first bytes: black and white, and nothing between.
+pub(super) fn is_black_and_white(path: &Path) -> Result<bool, IoError> {
+    let start = files::read_start(path, 26)?;
+    Ok(start.starts_with(b"\x89PNG\r\n\x1a\n") && start.get(24..) == Some([1, 0].as_slice()))
 }
 
 /// Largest picture that is opened for itself, px.

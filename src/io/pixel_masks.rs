@@ -131,6 +131,10 @@ fn is_picture(path: &Path) -> bool {
 }
 
 fn content(path: &Path) -> Result<Content, IoError> {
+    // It needs no look at its pixels, as it can hold nothing else.
+    if photo::is_black_and_white(path)? {
+        return Ok(Content::Mask(u8::MAX));
+    }
     let picture = photo::open(path)?;
     let is_gray = |p: &[u8; 3]| p[0].abs_diff(p[1]).max(p[1].abs_diff(p[2])) <= NOISE;
     if !picture.rgb.iter().all(is_gray) {
@@ -179,6 +183,12 @@ mod tests {
         assert_eq!(of("c.png", |x, _| (x / 10) as u8), Content::Labels);
         assert_eq!(of("d.png", |x, _| (x / 10 * 80) as u8), Content::Labels);
         assert_eq!(of("e.png", |_, _| 0), Content::Black);
+        // One bit a pixel, by the header alone: these pixels are those of labels.
+        let path = folder.path().join("c.png");
+        let mut bytes = fs::read(&path).expect("read");
+        bytes[24] = 1;
+        fs::write(&path, bytes).expect("write");
+        assert_eq!(content(&path).expect("read"), Content::Mask(255));
         let path = folder.path().join("f.png");
         RgbImage::from_fn(9, 9, |x, _| Rgb([if x < 3 { 200 } else { 0 }, 0, 0])).save(&path).expect("save");
         assert_eq!(content(&path).expect("read"), Content::Labels);

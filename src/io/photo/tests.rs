@@ -4,7 +4,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use glam::{DMat3, DVec2, DVec3};
-use image::{ImageFormat, Rgb, RgbImage, Rgba, RgbaImage};
+use image::codecs::jpeg::JpegEncoder;
+use image::{ImageEncoder, ImageFormat, Rgb, RgbImage, Rgba, RgbaImage};
 
 use super::*;
 
@@ -134,6 +135,39 @@ fn absurd_sizes_are_refused_before_decoding() {
     fs::write(&path, &good).expect("write");
     let e = load(&photo(path, 64, 47), 100).expect_err("another size");
     assert!(matches!(e, IoError::PhotoSize { found: (64, 48), expected: (64, 47), .. }));
+}
+
+#[test]
+fn pictures_without_alpha_are_told_by_their_headers() {
+    let folder = tempfile::tempdir().expect("folder");
+    let path = folder.path().join("a");
+    let encoded = |picture: &DynamicImage| {
+        let mut bytes = Cursor::new(Vec::new());
+        picture.write_to(&mut bytes, ImageFormat::Png).expect("encode");
+        bytes.into_inner()
+    };
+    let alpha_of = |bytes: &[u8]| {
+        fs::write(&path, bytes).expect("write");
+        alpha(&path)
+    };
+    // Their pixels are cut off, so whoever decodes them fails.
+    let opaque = encoded(&gradient(64, 48).into());
+    assert!(matches!(alpha_of(&opaque[..opaque.len() / 2]), Ok(None)));
+    let clear = encoded(&RgbaImage::from_pixel(64, 48, Rgba([9, 9, 9, 0])).into());
+    assert!(alpha_of(&clear[..clear.len() / 2]).is_err(), "the control");
+    assert!(matches!(alpha_of(&clear), Ok(Some((64, 48, alpha))) if alpha.iter().all(|a| *a == 0)));
+    // A profile that is longer than what is read first.
+    let mut jpeg = Vec::new();
+    let mut encoder = JpegEncoder::new(&mut jpeg);
+    encoder.set_icc_profile(vec![7; 2 * HEADER_BYTES as usize]).expect("a profile");
+    encoder.encode_image(&gradient(64, 48)).expect("encode");
+    assert!(matches!(alpha_of(&jpeg[..jpeg.len() - 2]), Ok(None)));
+    // One color is transparent: that of the first pixel.
+    let mut chunk = b"tRNS\0\0\0\0\0\x5a".to_vec();
+    chunk.extend(crc32(&chunk).to_be_bytes());
+    let keyed = [&opaque[..33], &6_u32.to_be_bytes(), &chunk, &opaque[33..]].concat();
+    let (.., alpha) = alpha_of(&keyed).expect("read").expect("transparent somewhere");
+    assert_eq!((alpha[0], alpha[1]), (0, 255));
 }
 
 /// The checksum of PNG chunks.
