@@ -165,7 +165,7 @@ fn pictures_without_alpha_are_told_by_their_headers() {
     // One color is transparent: that of the first pixel.
     let mut chunk = b"tRNS\0\0\0\0\0\x5a".to_vec();
     chunk.extend(crc32(&chunk).to_be_bytes());
-    let keyed = [&opaque[..33], &6_u32.to_be_bytes(), &chunk, &opaque[33..]].concat();
+    let keyed = [&opaque[..33], &6_u32.to_be_bytes(), &chunk[..], &opaque[33..]].concat();
     let (.., alpha) = alpha_of(&keyed).expect("read").expect("transparent somewhere");
     assert_eq!((alpha[0], alpha[1]), (0, 255));
 }
