@@ -44,7 +44,7 @@ pub(crate) struct TrainArgs {
     #[command(flatten)]
     settings: TrainOverrides,
     /// Go on with a training that began with other photos, poses or sparse points; without it the change is named, and
-    /// nothing is done
+    /// another training begun, or nothing done where --out names the folder
     #[arg(long)]
     anyway: bool,
     /// Go on where a training with the same settings and fewer --steps ended, instead of beginning another one
