@@ -22,9 +22,9 @@ pub(super) struct SceneWork {
     map: Arc<SemanticMap>,
     /// The maps before each new name that was not taken back.
     before: Vec<Arc<SemanticMap>>,
-    /// What was done since somebody took it, in words.
+    /// Lines on what was done since somebody took them.
     pub(super) done: Vec<String>,
-    /// Why something could not be done; the last, if there are several.
+    /// The last error, if something could not be done.
     pub(super) failure: Option<CliError>,
 }
 

@@ -139,7 +139,7 @@ fn header(path: &Path) -> Result<((u32, u32), ColorType), IoError> {
     }
 }
 
-/// Whether a picture file is a gray PNG of one bit a pixel, by its first bytes: black and white, and nothing between.
+/// Tells a gray PNG of one bit a pixel by its first bytes: it is black and white, and nothing between.
 pub(super) fn is_black_and_white(path: &Path) -> Result<bool, IoError> {
     let start = files::read_start(path, 26)?;
     Ok(start.starts_with(b"\x89PNG\r\n\x1a\n") && start.get(24..) == Some([1, 0].as_slice()))

@@ -51,7 +51,7 @@ fn at_rest(a: &App) -> bool {
     a.viewport.picture().is_some_and(|p| p.full) && a.viewport.queries.maps().is_some()
 }
 
-/// The boxes, one of them asked for and whose every pixel is known, without the cameras in the way.
+/// The boxes, one of them asked for, once it is known whose each pixel is; without the cameras in the way.
 fn asked(folder: &Path) -> Window {
     let mut w = window(folder);
     w.harness.state_mut().layout.cameras = false;

@@ -1,4 +1,4 @@
-//! How the eye moves in a scene: flights to things, steps and turns.
+//! Movements of the eye in a scene: flights to things, steps and turns.
 
 use std::sync::Arc;
 

@@ -70,7 +70,7 @@ impl Borders {
     }
 }
 
-/// What was loaded of a photo; `None` of one that shows nothing.
+/// Pixels that were loaded of a photo; `None` of one that shows nothing.
 pub(super) fn unless_blank<T>(loaded: Result<T, IoError>) -> Result<Option<T>, IoError> {
     match loaded {
         Err(IoError::NothingShown { .. }) => Ok(None),
