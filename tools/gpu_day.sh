@@ -54,11 +54,7 @@ step() {
 }
 
 if [ -n "$tests" ]; then
-    names=()
-    for file in tests/gpu_*.rs; do
-        names+=(--test "$(basename "$file" .rs)")
-    done
-    REQUIRE_GPU=1 LIMIT=600 step kernels cargo test --locked --release "${names[@]}"
+    REQUIRE_GPU=1 LIMIT=600 step kernels cargo test --locked --release --test gpu
 fi
 if [ ${#splats[@]} -gt 0 ]; then
     step images "$FMLGS" bench "${splats[@]}" "${sizes[@]}" --repeats "$repeats" --gpu --json

@@ -2,6 +2,7 @@
 #![allow(dead_code, clippy::expect_used)]
 
 use std::path::PathBuf;
+use std::process::Command;
 
 use fmlgs::math::Real;
 use fmlgs::scene::{Bounds, Camera, GaussianCloud};
@@ -85,4 +86,24 @@ pub fn psnr<A: Real, B: Real>(a: &[Vec<A>], b: &[Vec<B>]) -> f64 {
         n += 1.0;
     }
     -10.0 * (sum / n).log10()
+}
+
+/// Runs a test that counts what its whole process does in a process of its own: says whether this is that process,
+/// and where it is not, starts it and waits. `module` is `module_path!()`.
+///
+/// # Panics
+/// Panics if the test fails there.
+#[must_use]
+pub fn alone(module: &str, test: &str) -> bool {
+    const ALONE: &str = "FMLGS_TEST_ALONE";
+    let name = module.split_once("::").map_or_else(|| test.to_owned(), |(_, inner)| format!("{inner}::{test}"));
+    if std::env::var(ALONE).is_ok_and(|only| only == name) {
+        return true;
+    }
+    let mut command = Command::new(std::env::current_exe().expect("this program"));
+    let done = command.args(["--exact", &name]).env(ALONE, &name).output().expect("it starts");
+    let said = String::from_utf8_lossy(&done.stdout);
+    assert!(done.status.success(), "{said}{}", String::from_utf8_lossy(&done.stderr));
+    assert!(said.contains("1 passed"), "no test is called {name}:\n{said}");
+    false
 }

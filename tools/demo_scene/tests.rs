@@ -6,7 +6,7 @@ use super::*;
 #[test]
 fn the_shipped_scene_is_the_built_one() {
     let built = build().unwrap();
-    let remedy = "cargo test --test architecture write_the_demo_scene -- --ignored";
+    let remedy = "cargo test --test it write_the_demo_scene -- --ignored";
     assert!(
         built == include_bytes!("../../assets/demo.glb"),
         "assets/demo.glb is out of date; write it anew: {remedy}"

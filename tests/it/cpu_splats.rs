@@ -1,0 +1,27 @@
+//! Forward pictures of trained splats: f32 against the f64 oracle, three views each.
+
+use crate::common::psnr;
+use fmlgs::measure::bench::views_of;
+use fmlgs::render::cpu::CpuRenderer;
+use fmlgs::render::{Features, RenderSettings};
+use fmlgs::scene::Camera;
+
+#[test]
+fn trained_splats_in_single_precision_are_within_60_db_of_the_oracle() {
+    for name in ["guitar_sh0_90854.ply", "statue_narcissus_sh0_101275.ply", "playbot_lod3_sh2_31000.ply"] {
+        let Some(path) = crate::common::data(&format!("splats/{name}")) else { return };
+        let cloud = fmlgs::io::splat_ply::read(&path).expect("a readable splat file");
+        let oracle = cloud.cast::<f64>();
+        for camera in views_of(&cloud, 320, 240) {
+            let s = RenderSettings::default();
+            let a = CpuRenderer::new().render(&oracle, Features::NONE, &camera, &s).expect("renders");
+            let b = CpuRenderer::new().render(&cloud, Features::NONE, &camera, &s).expect("renders");
+            let db = psnr(&a.color, &b.color);
+            println!("{name}: {db:.1} dB");
+            assert!(db > 60.0, "{name}: {db} dB");
+            let tilted = Camera { center: camera.center * 1.002, ..camera.clone() };
+            let c = CpuRenderer::new().render(&cloud, Features::NONE, &tilted, &s).expect("renders");
+            assert!(psnr(&a.color, &c.color) < 60.0, "negative control: another camera");
+        }
+    }
+}
