@@ -4,6 +4,8 @@
 
 mod cli_support;
 mod common;
+#[path = "cases/compared.rs"]
+mod compared;
 #[path = "cases/data_sets.rs"]
 mod data_sets;
 #[path = "cases/kept.rs"]

@@ -1,7 +1,10 @@
-//! What survives: a kill, Ctrl-C, a second writer, an older version; and ([`disk`]) a disk that is full.
+//! What survives: a kill, Ctrl-C, a second writer, an older version; ([`changed`]) other photos, a folder that goes away;
+//! and ([`disk`]) a disk that is full.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
+#[path = "cli_survival/changed.rs"]
+mod changed;
 mod cli_support;
 #[path = "cli_survival/disk.rs"]
 mod disk;
