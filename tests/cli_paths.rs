@@ -182,7 +182,7 @@ fn what_is_found_and_not_seen_is_said_to_be_so() {
     let info: serde_json::Value = serde_json::from_slice(&std::fs::read(scene.join("scene.json")).unwrap()).unwrap();
     // The first camera, turned around: rightwards and forward are the other way.
     let mut camera = info["cameras"][0]["camera"].clone();
-    for k in [0, 1, 2, 6, 7, 8] {
+    for k in [0_usize, 1, 2, 6, 7, 8] {
         let axis = &mut camera["world_from_camera"][k];
         *axis = (-axis.as_f64().unwrap()).into();
     }

@@ -1,5 +1,5 @@
 //! What survives: a kill, Ctrl-C, a second writer, an older version; ([`changed`]) other photos, a folder that goes away;
-//! and ([`disk`]) a disk that is full.
+//! ([`disk`]) a disk that is full; and ([`places`]) what lies where results are put.
 #![cfg(unix)]
 #![allow(clippy::unwrap_used, clippy::expect_used, clippy::panic)]
 
@@ -8,6 +8,8 @@ mod changed;
 mod cli_support;
 #[path = "cli_survival/disk.rs"]
 mod disk;
+#[path = "cli_survival/places.rs"]
+mod places;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};

@@ -90,7 +90,7 @@ fn photos_that_training_saw_are_marked() {
     assert_eq!((&held_out["views"], &trained_on["views"]), (&json!(1), &json!(1)));
     assert_eq!(held_out["psnr"], measured["views"][0]["psnr"]);
     assert_eq!(trained_on["psnr"], measured["views"][1]["psnr"]);
-    assert_eq!([0, 1].map(|i| &measured["views"][i]["trained_on"]), [&json!(false), &json!(true)]);
+    assert_eq!([0_usize, 1].map(|i| &measured["views"][i]["trained_on"]), [&json!(false), &json!(true)]);
     let all = eval(&scene, &["--holdout-every", "0"]);
     assert_eq!((&all["held_out"]["views"], &all["trained_on"]["views"]), (&json!(3), &json!(9)));
     let own = eval(&scene, &[]);
