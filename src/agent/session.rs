@@ -13,7 +13,7 @@ use super::tool::ToolCall;
 use super::transcript::{Transcript, What};
 use super::words::MAX_CHARS;
 use super::world::World;
-use crate::scene::{IdentityId, LevelFilter};
+use crate::scene::{IdentityId, LevelFilter, text};
 
 /// Calls that one request may lead to.
 pub(crate) const MOST_CALLS: usize = 24;
@@ -256,8 +256,10 @@ impl Session {
                 return Ok(self.refused_call(call, refusal, sink));
             }
             let there: Vec<IdentityId> = candidates.iter().copied().filter(|id| world.facts(*id).is_some()).collect();
+            // On a line of its own, whatever a model puts into it.
+            let question = text::line(question).into_owned();
             let reply = Reply { text: question.clone(), candidates: there.clone(), ..Reply::default() };
-            self.pending = Some(Pending::Choose { call: None, candidates: there, question: question.clone() });
+            self.pending = Some(Pending::Choose { call: None, candidates: there, question });
             return Err(Box::new(reply));
         }
         match check(world, &call, &self.policy, &self.dialog, false) {

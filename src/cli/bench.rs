@@ -33,9 +33,9 @@ pub(crate) struct BenchArgs {
     /// Size of the drawn images; may be given several times [default: 640x480 1280x720]
     #[arg(long, value_parser = view::parse_size)]
     size: Vec<[u32; 2]>,
-    /// Longer side of the training images in px
-    #[arg(long, default_value_t = TrainConfig::default().max_side_px, value_parser = clap::value_parser!(u32).range(16..=16384))]
-    max_side: u32,
+    /// Longer side of the training images in px [default: 512]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(16..=16384))]
+    max_side: Option<u32>,
     /// Repeats of each measurement
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     repeats: u32,
@@ -86,11 +86,16 @@ pub(crate) fn run(args: BenchArgs, quiet: bool) -> Result<(), CliError> {
     if args.plan {
         return savings(&args);
     }
+    if args.max_side.is_some() && !args.paths.iter().any(|path| bench::may_be_photos(path)) {
+        let text =
+            "--max-side has no effect here: splats and trained scenes are drawn (--size), posed photos trained on";
+        return Err(CliError::Usage(text.into()));
+    }
     let mut console = Console::new(quiet);
     let request = BenchRequest {
         paths: args.paths,
         sizes: if args.size.is_empty() { vec![[640, 480], [1280, 720]] } else { args.size },
-        max_side_px: args.max_side,
+        max_side_px: args.max_side.unwrap_or(TrainConfig::default().max_side_px),
         repeats: args.repeats as usize,
         gpu: args.gpu,
         queries: args.queries.map(|count| (count, args.identities)),

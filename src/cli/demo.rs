@@ -39,7 +39,9 @@ pub(crate) struct DemoArgs {
 
 pub(crate) fn run(args: DemoArgs, quiet: bool) -> Result<(), CliError> {
     let mut console = Console::new(quiet);
+    export::check_folder(&args.out, &[])?;
     if let Some(file) = &args.make {
+        export::check(file, &[], &[])?;
         return make(file, &args.out, console);
     }
     show_shipped(&args.out.join("shipped"), &mut console);

@@ -27,9 +27,9 @@ use crate::scene::{Bounds, Dataset, ScenePlan, SemanticMap};
 pub(crate) struct InfoArgs {
     /// Dataset folder, transforms.json, splat file or trained scene
     path: PathBuf,
-    /// Training images are limited to this many px along the longer side; the plan depends on it
-    #[arg(long, default_value_t = TrainConfig::default().max_side_px, value_parser = clap::value_parser!(u32).range(1..=16384))]
-    max_side: u32,
+    /// Training images are limited to this many px along the longer side; the plan depends on it [default: 512]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16384))]
+    max_side: Option<u32>,
     #[command(flatten)]
     axes: AxesArgs,
     #[command(flatten)]
@@ -48,9 +48,16 @@ struct Facts {
 
 pub(crate) fn run(args: InfoArgs) -> Result<(), CliError> {
     let defaults = TrainConfig::default();
-    let config = TrainConfig { max_side_px: args.max_side, ..defaults.clone() };
+    let config = TrainConfig { max_side_px: args.max_side.unwrap_or(defaults.max_side_px), ..defaults.clone() };
     let machine = plan::machine();
-    let (mut facts, planned) = match open::contents(&args.path, args.axes.axes)? {
+    let contents = open::contents(&args.path, args.axes.axes)?;
+    if let (Some(_), Contents::Scene(scene)) = (args.max_side, &contents)
+        && scene.cameras.is_empty()
+    {
+        let text = "--max-side has no effect here: a splat file does not say which photos it could be trained on";
+        return Err(CliError::Usage(text.into()));
+    }
+    let (mut facts, planned) = match contents {
         Contents::Photos(d) => (of_dataset(&d, defaults.holdout_every), plan::facts(&machine, Some(&d), None, &config)),
         Contents::Scene(s) => {
             let planned = plan::scene_facts(&machine, &s, &config);

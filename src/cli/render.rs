@@ -148,10 +148,11 @@ fn video(args: &RenderArgs, path: &Path, quiet: bool) -> Result<(), CliError> {
         scene.settings = scene.settings_beside(&open::dataset(photos)?);
     }
     let reads: Vec<&Path> = scene.reads().into_iter().chain([path]).collect();
-    if args.out.is_dir() {
-        export::check_folder(&args.out, &reads)?
+    // Without an ending it is a folder of frames.
+    if args.out.is_dir() || args.out.extension().is_none() {
+        export::check_folder(&args.out, &reads)?;
     } else {
-        export::check(&args.out, &[], &reads)?
+        export::check(&args.out, &[], &reads)?;
     }
     let plan = plan::of_scene(&scene, &args.plan.overrides());
     let draw = RenderSettings { sh_degree: plan.sh_degree, ..scene.settings.clone() };

@@ -62,6 +62,7 @@ mod vertical;
 pub(crate) mod video;
 
 pub use error::{IoError, OpenError};
+pub(crate) use open::data_set_around;
 pub use open::{Opened, open, open_in};
 pub use scene_folder::SceneFolder;
 pub(crate) use trained::TrainedScene;

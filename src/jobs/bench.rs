@@ -6,6 +6,8 @@ use std::time::Instant;
 
 use super::select::{self, SelectFor, SelectRequest, SelectStep, Stroke};
 use super::{Folders, JobError, open, plan};
+use crate::io::scene_files::is_scene;
+use crate::io::splat_format::SplatFormat;
 use crate::io::{self, Opened};
 use crate::measure::StudyError;
 use crate::measure::bench::strokes::{StrokesTiming, stroke};
@@ -45,6 +47,11 @@ pub(crate) struct BenchRequest {
     pub(crate) strokes: Option<usize>,
     /// Whether moving by levels of detail is timed in each cloud.
     pub(crate) moving: bool,
+}
+
+/// Whether a path may hold posed photos: it is neither called as a splat file is nor a trained scene.
+pub(crate) fn may_be_photos(path: &Path) -> bool {
+    SplatFormat::of(path).is_none() && !is_scene(path)
 }
 
 /// Times stage by stage.

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use super::JobError;
 use crate::io::splat_format::SplatFormat;
-use crate::io::{self, IoError, atomic, scene_files, trained};
+use crate::io::{self, IoError, atomic, files, scene_files, trained};
 use crate::navigate::{CameraSpline, Pose, Speed};
 use crate::scene::{CameraPath, CropBox, GaussianCloud, Identities, IdentityId, PathKey, PhotoPixels};
 
@@ -112,8 +112,8 @@ pub(crate) fn make_folder(folder: &Path) -> Result<(), IoError> {
 }
 
 /// Refuses a file for a result, before any work is done, that does not end as it should (`endings`, any
-/// if there are none) or is one of those that the job reads: `reads` are files and folders.
-/// Devices and pipes may be written into whatever they are called.
+/// if there are none), is one of those that the job reads (`reads` are files and folders), or would lie among the files of
+/// a data set. Devices and pipes may be written into whatever they are called.
 pub(crate) fn check(path: &Path, endings: &[&str], reads: &[&Path]) -> Result<(), JobError> {
     if atomic::is_stream(path) {
         return Ok(());
@@ -123,6 +123,12 @@ pub(crate) fn check(path: &Path, endings: &[&str], reads: &[&Path]) -> Result<()
         return Err(JobError::Output(format!("'{}' must end in {}", path.display(), endings.join(" or "))));
     }
     scene_files::refuse_scene_file(path)?;
+    refuse_read(path, reads)?;
+    refuse_among(path, if path.is_dir() { path } else { files::folder_of(path) })
+}
+
+/// Refuses what the job reads.
+fn refuse_read(path: &Path, reads: &[&Path]) -> Result<(), JobError> {
     let Ok(real) = path.canonicalize() else { return Ok(()) };
     for read in reads {
         let within = read.canonicalize().is_ok_and(|read| real.starts_with(read));
@@ -135,10 +141,19 @@ pub(crate) fn check(path: &Path, endings: &[&str], reads: &[&Path]) -> Result<()
     Ok(())
 }
 
-/// Refuses a folder for pictures that holds what the job reads, as [`check`] does files.
+/// Refuses a result in a `folder` whose data set would take it for its own.
+fn refuse_among(path: &Path, folder: &Path) -> Result<(), JobError> {
+    let Some(set) = io::data_set_around(folder) else { return Ok(()) };
+    let (path, set) = (path.display(), set.display());
+    Err(JobError::Output(format!(
+        "'{path}' would lie among the files of the data set '{set}', which would take it for one of them; choose another folder"
+    )))
+}
+
+/// Refuses a folder for pictures that holds what the job reads, or photos, as [`check`] does files.
 pub(crate) fn check_folder(folder: &Path, reads: &[&Path]) -> Result<(), JobError> {
     // Where it does not exist yet, nothing in it is read.
-    if folder.exists() { check(folder, &[], reads) } else { Ok(()) }
+    if folder.exists() { check(folder, &[], reads) } else { refuse_among(folder, folder) }
 }
 
 #[cfg(test)]

@@ -5,8 +5,10 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::{JobError, export, open};
+use crate::measure::in_time::InTime;
 use crate::measure::subject::{StudyOptions, Subject};
-use crate::measure::{End, Report, StageName, computer, is_report, page, plot};
+use crate::measure::sweep::failed;
+use crate::measure::{End, FILE, Report, StageName, computer, is_report, page, plot};
 use crate::pipeline::observer::{Observer, Severity};
 
 /// What is measured, and where it is kept.
@@ -48,10 +50,18 @@ pub(crate) fn run(request: &ReportRequest, observer: &mut dyn Observer) -> Resul
     let start = Instant::now();
     let mut end = End::Finished;
     for (k, name) in stages.iter().enumerate() {
-        let left = (budget_secs - start.elapsed().as_secs_f64()).max(0.0);
-        let share = left / (stages.len() - k) as f64;
-        let study = subject.study(*name);
-        let stage_end = match study.and_then(|mut study| report.measure(&mut study, out, share, observer)) {
+        let left = || (budget_secs - start.elapsed().as_secs_f64()).max(0.0);
+        let share = left() / (stages.len() - k) as f64;
+        // Without what a stage is compared with, nothing of it can be measured: that may take what it takes.
+        let prepared = subject.study(*name, &mut InTime::new(observer, left()));
+        let measured = prepared.and_then(|study| match study {
+            Some(mut study) => report.measure(&mut study, out, share.min(left()), observer),
+            None => {
+                report.write(&out.join(FILE)).map_err(failed)?;
+                Ok(if observer.proceed().is_err() { End::Cancelled } else { End::OutOfTime })
+            }
+        });
+        let stage_end = match measured {
             // A stage that nobody named may turn out impossible; the others go on.
             Err(why) if request.stages.is_empty() => {
                 observer.note(Severity::Warning, format!("Stage '{}' left out: {why}", name.name()));
@@ -114,12 +124,58 @@ pub(crate) fn known(scene: &Path, own: &Path) -> Vec<PathBuf> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::measure::{BeginError, FILE};
-    use crate::pipeline::observer::Silent;
-    use crate::render::RenderSettings;
-    use crate::scene::Camera;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
     use glam::DVec3;
+
+    use super::*;
+    use crate::measure::BeginError;
+    use crate::pipeline::observer::{Signal, Silent};
+    use crate::render::RenderSettings;
+    use crate::scene::{Camera, GaussianCloud};
+
+    /// A Gaussian and one view of it, to be drawn.
+    fn request(out: PathBuf) -> ReportRequest {
+        let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid");
+        let subject = Subject {
+            name: "nothing".into(),
+            cloud: Arc::new(GaussianCloud::isotropic(vec![[0.0; 3]], -3.0, 1.0)),
+            settings: RenderSettings::default(),
+            cameras: vec![(camera, false)],
+            holdout_every: 8,
+            dataset: None,
+            map: None,
+            options: StudyOptions::default(),
+        };
+        let stages = vec![StageName::Render];
+        ReportRequest { subject, stages, out, fresh: false, budget_secs: f64::INFINITY, command: "x".into() }
+    }
+
+    /// Asks to stop once it was asked so often.
+    struct Patience(AtomicUsize);
+
+    impl Observer for Patience {
+        fn signal(&self) -> Signal {
+            let left = self.0.load(Ordering::Relaxed);
+            self.0.store(left.saturating_sub(1), Ordering::Relaxed);
+            if left > 0 { Signal::Continue } else { Signal::Cancel }
+        }
+    }
+
+    #[test]
+    fn preparing_a_stage_ends_in_time_and_when_it_is_to_stop() {
+        let folder = tempfile::tempdir().expect("folder");
+        let stages = |budget_secs: f64, patience: usize, name: &str| {
+            let request = ReportRequest { budget_secs, ..request(folder.path().join(name)) };
+            let done = run(&request, &mut Patience(AtomicUsize::new(patience))).expect("measured");
+            assert!(is_report(&request.out), "a whole report is left");
+            (done.end, done.report.stages.len())
+        };
+        assert_eq!(stages(0.0, usize::MAX, "no time"), (End::OutOfTime, 0), "not even prepared");
+        assert_eq!(stages(f64::INFINITY, 0, "stopped"), (End::Cancelled, 0));
+        // The control: stopped once its one view is prepared, the stage is there.
+        assert_eq!(stages(f64::INFINITY, 1, "prepared"), (End::Cancelled, 1));
+    }
 
     #[test]
     fn a_report_beside_a_scene_is_found() {
@@ -135,21 +191,7 @@ mod tests {
     #[test]
     fn what_is_no_report_is_not_written_over() {
         let folder = tempfile::tempdir().expect("folder");
-        let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 64, 48).expect("valid");
-        let subject = Subject {
-            name: "nothing".into(),
-            cloud: Arc::default(),
-            settings: RenderSettings::default(),
-            cameras: vec![(camera, false)],
-            holdout_every: 8,
-            dataset: None,
-            map: None,
-            options: StudyOptions::default(),
-        };
-        let out = folder.path().join("report");
-        let stages = vec![StageName::Render];
-        let mut request =
-            ReportRequest { subject, stages, out, fresh: false, budget_secs: f64::INFINITY, command: "x".into() };
+        let mut request = request(folder.path().join("report"));
         std::fs::create_dir_all(&request.out).expect("folder");
         std::fs::write(request.out.join(FILE), "{").expect("written");
         let refused = run(&request, &mut Silent).err().expect("refused");

@@ -18,6 +18,7 @@ pub(crate) mod document;
 pub(crate) mod file;
 pub(crate) mod front;
 mod image_error;
+pub(crate) mod in_time;
 pub(crate) mod knobs;
 pub(crate) mod labels;
 pub(crate) mod look;

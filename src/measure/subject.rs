@@ -12,7 +12,7 @@ use super::{StageName, Study, StudyError};
 use crate::io::labels::Labels;
 use crate::models;
 use crate::pipeline::depth as true_depth;
-use crate::pipeline::observer::{Interrupted, Silent};
+use crate::pipeline::observer::{Interrupted, Observer, Silent};
 use crate::pipeline::semantics::protocols::categories;
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::segmenter::{FileMasks, FoundMask, Segmenter};
@@ -104,18 +104,19 @@ impl Subject {
         }
     }
 
-    pub(crate) fn study(&self, name: StageName) -> Result<Study<'_>, StudyError> {
+    /// What is to be measured of a stage; `None` if the observer asks to stop while that is prepared.
+    pub(crate) fn study(&self, name: StageName, observer: &mut dyn Observer) -> Result<Option<Study<'_>>, StudyError> {
         match name {
-            StageName::Render => self.drawing(),
-            StageName::Train => self.training(),
-            StageName::Features => self.features(),
-            StageName::Query => self.asking(),
+            StageName::Render => self.drawing(observer),
+            StageName::Train => self.training().map(Some),
+            StageName::Features => self.features(observer),
+            StageName::Query => self.asking(observer),
             StageName::Path => {
                 let cameras: Vec<Camera> = self.cameras.iter().map(|c| c.0.clone()).collect();
                 let input = self.input(&[("cameras", cameras.len().to_string())]);
-                Ok(path::study(&self.cloud, &cameras, self.options.repeats, input))
+                Ok(Some(path::study(&self.cloud, &cameras, self.options.repeats, input)))
             }
-            StageName::Depth => self.depth(),
+            StageName::Depth => self.depth(observer),
         }
     }
 
@@ -148,13 +149,13 @@ impl Subject {
         failed(format!("{}: {what}", masks.display()))
     }
 
-    fn drawing(&self) -> Result<Study<'_>, StudyError> {
+    fn drawing(&self, observer: &mut dyn Observer) -> Result<Option<Study<'_>>, StudyError> {
         let (side, count) = (self.options.max_side_px, self.options.views);
-        let mut views = match &self.dataset {
-            Some(dataset) => held_out(dataset, self.holdout_every, side, count, &mut Silent).map_err(failed)?,
-            None => None,
-        }
-        .unwrap_or_default();
+        let loaded = match &self.dataset {
+            Some(dataset) => held_out(dataset, self.holdout_every, side, count, observer).map_err(failed)?,
+            None => Some(Vec::new()),
+        };
+        let Some(mut views) = loaded else { return Ok(None) };
         if views.is_empty() {
             // Spread over those that training did not see, or over all.
             let held: Vec<&Camera> = self.cameras.iter().filter(|c| c.1).map(|c| &c.0).collect();
@@ -162,7 +163,8 @@ impl Subject {
             views = spread(&from, count).into_iter().map(|c| (c.limited_to(side), None)).collect();
         }
         let input = self.input(&[("views", views.len().to_string())]);
-        render::study(Arc::clone(&self.cloud), &self.settings, views, self.options.repeats, input).map_err(failed)
+        let (cloud, repeats) = (Arc::clone(&self.cloud), self.options.repeats);
+        render::study(cloud, &self.settings, views, repeats, input, observer).map_err(failed)
     }
 
     fn training(&self) -> Result<Study<'_>, StudyError> {
@@ -181,7 +183,7 @@ impl Subject {
         train::study(dataset, base, self.options.repeats, input)
     }
 
-    fn asking(&self) -> Result<Study<'_>, StudyError> {
+    fn asking(&self, observer: &dyn Observer) -> Result<Option<Study<'_>>, StudyError> {
         let (dataset, mut labels) = (self.dataset()?, self.labels()?);
         let (map, encoder) = self.language().ok_or_else(|| failed("objects are needed"))?;
         let encoder = models::encoder(encoder).map_err(failed)?;
@@ -191,6 +193,9 @@ impl Subject {
         let side = self.options.max_side_px;
         let mut views = Vec::new();
         for i in spread(&asked, self.options.views) {
+            if observer.proceed().is_err() {
+                return Ok(None);
+            }
             let photo = &dataset.photos[i];
             let categories = categories(&labels.segment(photo, side, &mut Silent).map_err(failed)?);
             let camera = photo.camera.limited_to(side);
@@ -201,7 +206,7 @@ impl Subject {
         }
         let input = self.input(&[("photos", which.into())]);
         let how = (self.options.repeats, &self.options.recipe);
-        query::study((&self.cloud, &self.settings), map, encoder, views, how, input)
+        query::study((&self.cloud, &self.settings), map, encoder, views, how, input).map(Some)
     }
 
     /// Indices of the labeled photos that training saw, and of those that it did not see.
@@ -210,20 +215,23 @@ impl Subject {
         [seen, held_out].map(|of| of.into_iter().filter(|&i| labels.covers(&dataset.photos[i])).collect())
     }
 
-    fn depth(&self) -> Result<Study<'_>, StudyError> {
+    fn depth(&self, observer: &dyn Observer) -> Result<Option<Study<'_>>, StudyError> {
         let dataset = self.dataset()?;
         let held = dataset.split(self.holdout_every).1;
         let mut views = Vec::new();
         for i in spread(&held, self.options.views) {
+            if observer.proceed().is_err() {
+                return Ok(None);
+            }
             let photo = &dataset.photos[i];
             let camera = photo.camera.limited_to(self.options.max_side_px);
             views.push((camera, true_depth::of_photo(&dataset.root, photo).map_err(failed)?));
         }
         let input = self.input(&[("views", views.len().to_string())]);
-        Ok(depth::study(&self.cloud, &self.settings, views, self.options.repeats, input))
+        Ok(Some(depth::study(&self.cloud, &self.settings, views, self.options.repeats, input)))
     }
 
-    fn features(&self) -> Result<Study<'_>, StudyError> {
+    fn features(&self, observer: &dyn Observer) -> Result<Option<Study<'_>>, StudyError> {
         let (dataset, mut segmenter) = (self.dataset()?, self.labels()?);
         let [mut training, mut held_out] = self.labeled(dataset, &segmenter);
         // Few labels may all be of photos that the Gaussians were trained on; the lifting does without some.
@@ -232,12 +240,19 @@ impl Subject {
             training.retain(|i| !held_out.contains(i));
         }
         let mut identities = Identities::default();
-        let mut views = |indices: &[usize]| -> Result<Vec<CodeView>, StudyError> {
-            let photos = indices.iter().map(|&i| &dataset.photos[i]);
-            let each = photos.map(|p| view(p, &mut segmenter, &mut identities, self.options.max_side_px));
-            each.collect()
+        let mut views = |indices: &[usize]| -> Result<Option<Vec<CodeView>>, StudyError> {
+            let mut all = Vec::with_capacity(indices.len());
+            for &i in indices {
+                if observer.proceed().is_err() {
+                    return Ok(None);
+                }
+                all.push(view(&dataset.photos[i], &mut segmenter, &mut identities, self.options.max_side_px)?);
+            }
+            Ok(Some(all))
         };
-        let views = [views(&training)?, views(&spread(&held_out, self.options.views))?];
+        let both = (views(&training)?, views(&spread(&held_out, self.options.views))?);
+        let (Some(seen), Some(compared)) = both else { return Ok(None) };
+        let views = [seen, compared];
         if views.iter().any(Vec::is_empty) {
             return Err(self.few_labels("masks of two photos of the scene are needed at least"));
         }
@@ -257,7 +272,8 @@ impl Subject {
             }
         });
         let views = (tracking, views);
-        features::study(drawn, identities, views, &self.options.steps, self.options.repeats, input).map_err(failed)
+        let study = features::study(drawn, identities, views, &self.options.steps, self.options.repeats, input);
+        study.map(Some).map_err(failed)
     }
 }
 

@@ -118,7 +118,9 @@ pub(crate) fn sweep(
     let what = format!("Measuring {}", stage.name.title().to_lowercase());
     let mut ticker = Ticker::resumed(what, total, measured(&stage), 0.0);
     if stage.orders.is_empty() {
-        stage.orders = (study.orders)()?;
+        if observer.proceed().is_ok() && budget_secs > 0.0 {
+            stage.orders = (study.orders)()?;
+        }
         keep(&stage)?;
     }
     for (repeat, seed) in stage.seeds.clone().into_iter().enumerate() {
@@ -265,6 +267,26 @@ mod tests {
         let (stage, end, ran) = kept(ALL, "left", None, f64::INFINITY);
         assert_eq!((end, stage.points.len(), ran.len(), stage.complete()), (End::Finished, 2, 6, false));
         assert_eq!(stage.left_out, ["knob, left: it is broken"]);
+    }
+
+    #[test]
+    fn without_time_no_order_is_measured() {
+        let stage = Stage { points: vec![], orders: vec![], ..example().stages.remove(0) };
+        let study = || {
+            let cases = vec![(SweepCase::default("all"), 0_u8)];
+            let study = Study::new(stage.clone(), cases, |_: &u8, _, _: &mut dyn Observer| Ok(None));
+            study.with_orders(|| Err(failed("orders were measured")))
+        };
+        let keeps = std::cell::Cell::new(0);
+        let mut keep = |_: &Stage| {
+            keeps.set(keeps.get() + 1);
+            Ok(())
+        };
+        let observer = &mut crate::pipeline::observer::Silent;
+        let (_, end) = sweep(&mut study(), None, 0.0, &mut keep, observer).expect("not measured");
+        assert_eq!((end, keeps.get()), (End::OutOfTime, 1), "what there is of it is kept");
+        // The control: with time they are.
+        assert!(sweep(&mut study(), None, 9.0, &mut keep, observer).is_err());
     }
 
     #[test]

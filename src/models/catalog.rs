@@ -165,6 +165,8 @@ pub enum InstallError {
          --out FOLDER, then 'fmlgs models add {id} FOLDER'; or give the address of a folder that has them with --from"
     )]
     NoAddress { id: String, source_page: String, export: String },
+    #[error("{folder} lacks {missing}, which '{id}' consists of; {remedy}")]
+    Incomplete { id: String, folder: PathBuf, missing: String, remedy: String },
     #[error(transparent)]
     Fetch(#[from] FetchError),
     #[error(transparent)]
@@ -204,6 +206,12 @@ impl ModelEntry {
         std::iter::once(self.description.as_str()).chain(self.file.iter().map(|f| f.name.as_str())).collect()
     }
 
+    /// Names of its files that are not in `folder`.
+    fn missing_from(&self, folder: &Path) -> Vec<String> {
+        let is_missing = |name: &&str| !folder.join(name).is_file();
+        self.files().into_iter().filter(is_missing).map(str::to_owned).collect()
+    }
+
     /// About how large it is, MB.
     pub fn megabytes(&self) -> u64 {
         self.file.iter().map(|f| f.megabytes).sum()
@@ -241,8 +249,7 @@ impl ModelEntry {
         if self.built_in {
             return ModelState::BuiltIn;
         }
-        let missing = |name: &&str| !folder.join(name).is_file();
-        let missing: Vec<String> = self.files().into_iter().filter(missing).map(str::to_owned).collect();
+        let missing = self.missing_from(folder);
         if !missing.is_empty() {
             return ModelState::Missing(missing);
         }
@@ -315,6 +322,15 @@ impl ModelEntry {
         if self.built_in {
             return Err(InstallError::BuiltIn(self.id.clone()));
         }
+        let missing = self.missing_from(brought);
+        if !missing.is_empty() {
+            let (id, export) = (self.id.clone(), &self.export);
+            let remedy = match self.is_hosted() {
+                true => format!("get it with 'fmlgs models fetch {id}', or give its official checkpoint instead"),
+                false => format!("make it of the official checkpoint: python tools/export/{export} --out FOLDER"),
+            };
+            return Err(InstallError::Incomplete { id, folder: brought.into(), missing: missing.join(", "), remedy });
+        }
         self.verify(brought)?;
         let failed = |path: &Path, source| FetchError::File { path: path.into(), source };
         fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
@@ -376,25 +392,4 @@ fn usable_of(all: &[ModelEntry], role: ModelRole, folder: &Path, told: &mut dyn 
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_broken_model_is_told() {
-        let folder = tempfile::tempdir().expect("folder");
-        let all = entries().expect("the list");
-        let listed = all.iter().find(|e| e.role == ModelRole::Encoder && !e.built_in).expect("an encoder");
-        let told = |folder: &Path| {
-            let mut told = Vec::new();
-            let usable = usable_of(&all, ModelRole::Encoder, folder, &mut |text| told.push(text));
-            assert_eq!(usable, ["demo"]);
-            told
-        };
-        assert!(told(folder.path()).is_empty(), "what is not here is no trouble");
-        for name in listed.files() {
-            fs::write(folder.path().join(name), "{").expect("written");
-        }
-        let told = told(folder.path());
-        assert!(told.len() == 1 && told[0].contains(&listed.id) && told[0].contains("broken"), "{told:?}");
-    }
-}
+mod tests;

@@ -1,6 +1,8 @@
 //! Downloads of model files: resumed, checked, cancellable. Nothing is fetched that nobody has
 //! asked for.
 
+mod answer;
+
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
@@ -13,10 +15,17 @@ use ureq::http::StatusCode;
 
 use crate::io::files;
 use crate::io::http::{self, ResponsePart, TICK};
+use crate::scene::text;
+
+use answer::{content_range, elsewhere};
 
 /// Least that has to arrive within the patience for a stall: a server that sends a byte now and then is
 /// as good as silent.
 const LEAST_BYTES: u64 = 1024;
+
+/// How often a server may send on to another address, and letters of one that are shown.
+const MOST_HOPS: usize = 10;
+const SHOWN: usize = 200;
 
 /// Largest file whose size nobody has promised: a description.
 pub const MOST_UNPROMISED: u64 = 16 << 20;
@@ -62,6 +71,8 @@ pub enum FetchError {
     Unreachable { url: String, problem: String },
     #[error("{url} answered {status}; the address may have changed")]
     Refused { url: String, status: u16 },
+    #[error("{url} sends on to '{to}', which is no address of a server (http or https), so nothing was fetched there")]
+    Elsewhere { url: String, to: String },
     #[error("{url} sent nothing for {secs} s, after {got} bytes; try again, what arrived is kept")]
     Stalled { url: String, secs: u64, got: u64 },
     #[error("{url} ended after {got} of {expected} bytes; try again, what arrived is kept")]
@@ -100,7 +111,9 @@ pub fn fetch(
     if let Some(folder) = wanted.to.parent() {
         fs::create_dir_all(folder).map_err(|source| FetchError::File { path: folder.into(), source })?;
     }
-    let agent = Agent::from(http::config(wanted.url, 2 * patience.stall).build());
+    // Where a server sends on to is looked at before it is asked.
+    let config = http::config(wanted.url, 2 * patience.stall).max_redirects(0).max_redirects_will_error(false);
+    let agent = Agent::from(config.build());
     let part = Part::of(wanted);
     let mut pause = patience.pause;
     for attempt in 1.. {
@@ -217,31 +230,41 @@ fn receive(
     stall: Duration,
     progress: &mut dyn FnMut(u64, Option<u64>) -> bool,
 ) -> Result<(), FetchError> {
-    let url = wanted.url.to_owned();
     let most = wanted.bytes.unwrap_or(wanted.most);
-    let too_large = |offered| match wanted.bytes {
-        Some(expected) => FetchError::OtherSize { url: url.clone(), offered, expected },
-        None => FetchError::TooLarge { url: url.clone(), most },
-    };
     let (mut there, tag) = part.there();
     if there > most {
         part.forget();
         there = 0;
     }
-    let mut request = agent.get(&url);
-    if there > 0 {
-        request = request.header("Range", format!("bytes={there}-"));
-        if let Some(tag) = &tag {
-            request = request.header("If-Range", tag);
+    let (mut url, mut hops) = (wanted.url.to_owned(), 0);
+    let (mut wait, status, headers) = loop {
+        let mut request = agent.get(&url);
+        if there > 0 {
+            request = request.header("Range", format!("bytes={there}-"));
+            if let Some(tag) = &tag {
+                request = request.header("If-Range", tag);
+            }
         }
-    }
-    let pieces = http::ask(move || request.call()).map_err(|e| part.failed(e))?;
-    let mut wait = Wait { pieces, stall, since: Instant::now(), got: 0 };
-    let (status, headers) = match wait.next(there, wanted.bytes, progress) {
-        Ok(Some(ResponsePart::Head(status, headers))) => (status, headers),
-        Ok(Some(ResponsePart::Failed(problem))) => return Err(FetchError::Unreachable { url, problem }),
-        Ok(_) => return Err(FetchError::Unreachable { url, problem: "the connection ended".into() }),
-        Err(ended) => return Err(ended.error(url, stall, there)),
+        let pieces = http::ask(move || request.call()).map_err(|e| part.failed(e))?;
+        let mut wait = Wait { pieces, stall, since: Instant::now(), got: 0 };
+        let (status, headers) = match wait.next(there, wanted.bytes, progress) {
+            Ok(Some(ResponsePart::Head(status, headers))) => (status, headers),
+            Ok(Some(ResponsePart::Failed(problem))) => return Err(FetchError::Unreachable { url, problem }),
+            Ok(_) => return Err(FetchError::Unreachable { url, problem: "the connection ended".into() }),
+            Err(ended) => return Err(ended.error(url, stall, there)),
+        };
+        let to = headers.get("location").filter(|_| status.is_redirection() && hops < MOST_HOPS);
+        let Some(to) = to.map(|to| String::from_utf8_lossy(to.as_bytes()).into_owned()) else {
+            break (wait, status, headers);
+        };
+        let Some(next) = elsewhere(&url, &to) else {
+            return Err(FetchError::Elsewhere { url, to: text::elided(&to, SHOWN) });
+        };
+        (url, hops) = (next, hops + 1);
+    };
+    let too_large = |offered| match wanted.bytes {
+        Some(expected) => FetchError::OtherSize { url: url.clone(), offered, expected },
+        None => FetchError::TooLarge { url: url.clone(), most },
     };
     let header = |name: &str| headers.get(name).and_then(|v| v.to_str().ok()).map(str::to_owned);
     let total = match status {
@@ -361,37 +384,5 @@ impl Wait {
             }
             return Ok(Some(piece));
         }
-    }
-}
-
-/// Start and total of "bytes 5-9/10".
-fn content_range(value: &str) -> Option<(u64, Option<u64>)> {
-    let (range, total) = value.strip_prefix("bytes ")?.split_once('/')?;
-    Some((range.split_once('-')?.0.parse().ok()?, total.parse().ok()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn ranges_of_content() {
-        assert_eq!(content_range("bytes 5-9/10"), Some((5, Some(10))));
-        assert_eq!(content_range("bytes 5-9/*"), Some((5, None)));
-        for bad in ["", "bytes", "bytes x-9/10", "items 5-9/10"] {
-            assert_eq!(content_range(bad), None, "{bad}");
-        }
-    }
-
-    #[test]
-    fn checksums_tell_files_apart() {
-        let folder = tempfile::tempdir().expect("folder");
-        let path = folder.path().join("a");
-        fs::write(&path, "abc").expect("written");
-        let known = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
-        assert!(check(&path, &known.to_uppercase()).is_ok());
-        fs::write(&path, "abd").expect("written");
-        assert!(matches!(check(&path, known), Err(FetchError::Checksum { .. })));
-        assert!(matches!(check(&folder.path().join("none"), known), Err(FetchError::File { .. })));
     }
 }

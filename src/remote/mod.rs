@@ -14,6 +14,7 @@ mod hub;
 mod link;
 mod observer;
 mod photos;
+mod seats;
 pub(crate) mod serve;
 mod server;
 mod token;

@@ -3,7 +3,7 @@
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -16,6 +16,7 @@ use super::http::{Connection, RequestHead, Response};
 use super::hub::Hub;
 use super::observer::ServedObserver;
 use super::photos::ServedPhotos;
+use super::seats::{Seat, Seats};
 use super::token::AccessToken;
 use super::wire::{
     Ask, CLIENT_HEADER, GENERATION_HEADER, RUN_HEADER, STEP_HEADER, SceneCard, VERSION_HEADER, WireEvent,
@@ -28,8 +29,6 @@ use crate::jobs::JobError;
 use crate::pipeline::observer::Observer;
 use crate::scene::GaussianCloud;
 
-/// Connections at once.
-const CONNECTIONS: usize = 32;
 /// Requests a second, of all clients together, and how many may come at once.
 const RATE: f64 = 100.0;
 const BURST: f64 = 200.0;
@@ -76,7 +75,7 @@ struct Shared {
     options: ServeOptions,
     editor: Option<Editor>,
     photos: ServedPhotos,
-    connections: AtomicUsize,
+    seats: Arc<Seats>,
     bucket: Mutex<(f64, Instant)>,
     stop: AtomicBool,
 }
@@ -138,7 +137,7 @@ impl Server {
             options,
             editor,
             photos,
-            connections: AtomicUsize::new(0),
+            seats: Arc::default(),
             bucket: Mutex::new((BURST, Instant::now())),
             stop: AtomicBool::new(false),
         });
@@ -213,15 +212,6 @@ impl Drop for Server {
     }
 }
 
-/// Counts a connection for as long as it lives.
-struct Counted(Arc<Shared>);
-
-impl Drop for Counted {
-    fn drop(&mut self) {
-        self.0.connections.fetch_sub(1, Ordering::AcqRel);
-    }
-}
-
 fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
     for stream in listener.incoming() {
         if shared.stop.load(Ordering::Acquire) {
@@ -232,18 +222,17 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
             thread::sleep(Duration::from_millis(50));
             continue;
         };
-        let others = shared.connections.fetch_add(1, Ordering::AcqRel);
-        let counted = Counted(Arc::clone(shared));
-        if others >= CONNECTIONS {
+        let Some(seat) = shared.seats.take(&stream) else {
             let busy = Response::refusal(503, "too many connections").with("Retry-After", 1);
             // It fits into the system's own buffer.
             let _ = Connection::new(stream).answer(&busy);
             continue;
-        }
+        };
+        let of_thread = Arc::clone(shared);
         let work = move || {
             // Not every system lets a program lower its own priority; then the threads are equal.
             let _ = set_current_thread_priority(ThreadPriority::Min);
-            talk(Connection::new(stream), &counted.0);
+            talk(Connection::new(stream), &of_thread, &seat);
         };
         // Without a thread the connection just ends.
         let _ = thread::Builder::new().name("watcher".into()).spawn(work);
@@ -251,12 +240,12 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
 }
 
 /// Answers the requests of a connection, one after the other.
-fn talk(mut connection: Connection, shared: &Shared) {
+fn talk(mut connection: Connection, shared: &Shared, seat: &Seat) {
     while !shared.stop.load(Ordering::Acquire) {
         let mut of = None;
         let response = match connection.head() {
             Ok(None) => return,
-            Ok(Some(head)) => answer(&mut connection, &head, shared, &mut of).unwrap_or_else(|refused| refused),
+            Ok(Some(head)) => answer(&mut connection, &head, (shared, seat), &mut of).unwrap_or_else(|refused| refused),
             Err(refused) => refused,
         };
         let response = response.with(VERSION_HEADER, version()).with(RUN_HEADER, &shared.hub.run);
@@ -281,12 +270,13 @@ fn talk(mut connection: Connection, shared: &Shared) {
 fn answer(
     connection: &mut Connection,
     head: &RequestHead,
-    shared: &Shared,
+    (shared, seat): (&Shared, &Seat),
     of: &mut Option<String>,
 ) -> Result<Response, Response> {
     let (hub, options) = (&shared.hub, &shared.options);
     admit(head, options)?;
     connection.is_known = true;
+    seat.keep();
     if let Some(client) = head.header(CLIENT_HEADER) {
         hub.answering(client, true);
         *of = Some(client.to_owned());

@@ -258,6 +258,7 @@ fn header(count: usize, sh_degree: u8) -> Header {
         budget: 100,
         damping: 1.0,
         history: trained::History::default(),
+        unreported: Default::default(),
         inputs: None,
     }
 }

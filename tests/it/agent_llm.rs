@@ -345,6 +345,16 @@ fn questions_of_the_model_are_answered_and_talks_go_on() {
 }
 
 #[test]
+fn a_question_of_the_model_stays_on_one_line() {
+    let forged = "Which one?\r\nerror: all is lost\u{1b}[2J\u{202e}";
+    let t = talk(vec![calls(&[("ask_user", json!({ "question": forged, "candidates": [12, 16] }))])], "the controller");
+    assert_eq!((t.outcome(), t.reply.text.as_str()), ("ask", "Which one?  error: all is lost\u{fffd}[2J"));
+    // The control: what is no question may have paragraphs.
+    let t = talk(vec![text("There are two.\nWhich one?")], "the controller");
+    assert_eq!(t.reply.text, "There are two.\nWhich one?");
+}
+
+#[test]
 fn a_request_can_be_ended_while_the_server_is_silent() {
     let server = Server::new(vec![Say::Silence]);
     let settings = LlmSettings { base_url: server.url.clone(), model: "m".into(), ..LlmSettings::default() };

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use crate::cli_support::{acts, fmlgs, folder, tiny_splat};
+use crate::cli_support::{acts, first_version, fmlgs, folder, tiny_splat};
 
 #[test]
 fn help_and_version_are_no_failures() {
@@ -179,6 +179,33 @@ fn info_tells_people_and_scripts_the_same() {
     assert_eq!(json["gaussians"], 3);
     assert_eq!(json["sh_degree"], 0);
     assert!(json["plan"]["lines"].as_array().is_some_and(|l| !l.is_empty()));
+}
+
+#[test]
+fn sides_of_training_images_are_for_photos() {
+    let folder = folder();
+    let splat = tiny_splat(&folder.path().join("a.ply"));
+    let photos = first_version(folder.path());
+    let (splat, photos, scene) = (splat.to_str().unwrap(), photos.to_str().unwrap(), folder.path().join("scene"));
+    for command in ["info", "bench"] {
+        let refused = fmlgs(&[command, splat, "--max-side", "64"]).fails_with(2).stderr;
+        assert!(refused.contains("--max-side has no effect here"), "{command}: {refused}");
+    }
+    fmlgs(&["bench", scene.to_str().unwrap(), "--max-side", "64"]).fails_with(2);
+    // The controls: photos are limited, and those of a trained scene are known.
+    for path in [photos, scene.to_str().unwrap()] {
+        let plan = fmlgs(&["info", path, "--max-side", "32"]).ok().stdout;
+        assert!(plan.contains("32 x 24 px"), "{path}: {plan}");
+        assert!(!fmlgs(&["info", path]).ok().stdout.contains("32 x 24 px"), "{path}");
+    }
+    let timed = fmlgs(&["bench", splat, photos, "--size", "32x24", "--max-side", "32", "--repeats", "1", "--json"]);
+    assert_eq!(timed.ok().json()["train"].as_array().map(Vec::len), Some(1));
+    // The help states the default.
+    for command in ["info", "bench"] {
+        let help = fmlgs(&[command, "--help"]).ok().stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+        let side = fmlgs::pipeline::train::TrainConfig::default().max_side_px;
+        assert!(help.contains(&format!("[default: {side}]")), "{command}: {help}");
+    }
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! The real binary moves about: flights to photos and targets, videos of them, and the agent.
 
-use crate::cli_support::{Done, Server, acts, command, folder, tiny_dataset};
+use std::path::Path;
+
+use crate::cli_support::{Done, Server, acts, command, first_version, fmlgs, folder, tiny_dataset};
 
 #[test]
 fn a_scene_is_flown_through_filmed_and_talked_to() {
@@ -139,4 +141,61 @@ fn a_chat_model_is_asked(scene: &str) {
         // Generous: the model's own patience is 45 s.
         assert!(begin.elapsed() < Duration::from_secs(10), "{:?}", begin.elapsed());
     }
+}
+
+/// Names of what is in a folder.
+fn names_in(folder: &Path) -> Vec<String> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn a_request_that_ends_at_a_question_is_no_success() {
+    let folder = folder();
+    first_version(folder.path());
+    let scene = folder.path().join("scene");
+    let ask = |more: &[&str]| fmlgs(&[&["agent", scene.to_str().unwrap()], more].concat());
+    let before = names_in(folder.path());
+    let said = ask(&["remove box 1"]).fails_with(1).stderr;
+    assert!(said.contains("waits for an answer, so it was not carried out (Remove "), "{said}");
+    let told = ask(&["remove box 1", "--json"]).fails_with(1);
+    assert_eq!(told.json()["requests"][0]["awaits"], "Confirmation");
+    assert!(told.stderr.contains("waits for an answer"), "{}", told.stderr);
+    // The controls: an answer ends it well, also a no, and so does what asks nothing.
+    ask(&["remove box 1", "no"]).ok();
+    ask(&["show me box 1"]).ok();
+    assert_eq!(names_in(folder.path()), before, "something was removed");
+    ask(&["remove box 1", "yes"]).ok();
+    assert_eq!(names_in(folder.path()).len(), before.len() + 1);
+}
+
+#[test]
+fn what_is_found_and_not_seen_is_said_to_be_so() {
+    let folder = folder();
+    first_version(folder.path());
+    let scene = folder.path().join("scene");
+    let info: serde_json::Value = serde_json::from_slice(&std::fs::read(scene.join("scene.json")).unwrap()).unwrap();
+    // The first camera, turned around: rightwards and forward are the other way.
+    let mut camera = info["cameras"][0]["camera"].clone();
+    for k in [0_usize, 1, 2, 6, 7, 8] {
+        let axis = &mut camera["world_from_camera"][k];
+        *axis = (-axis.as_f64().unwrap()).into();
+    }
+    let away = folder.path().join("away.json");
+    std::fs::write(&away, camera.to_string()).unwrap();
+    let query = |camera: &str, more: &[&str]| {
+        fmlgs(&[&["query", scene.to_str().unwrap(), "box 1", "--camera", camera], more].concat()).ok()
+    };
+    let away = away.to_str().unwrap();
+    let found = query(away, &["--json"]).json();
+    assert_eq!((&found["answer"], &found["hits"][0]["name"]), (&"found".into(), &"box 1".into()));
+    assert_eq!((&found["pixels"], &found["in_view"], &found["empty"]), (&0.into(), &false.into(), &false.into()));
+    let said = query(away, &[]).stdout;
+    assert!(said.contains("not in this view (--camera looks from another photo)"), "{said}");
+    // The control: from where it is seen.
+    let seen = query("0", &["--json"]).json();
+    assert!(seen["pixels"].as_u64().unwrap() > 100 && seen["in_view"] == true, "{seen}");
+    assert!(query("0", &[]).stdout.contains("px in this view"));
 }

@@ -1,7 +1,10 @@
-//! What survives: a kill, Ctrl-C, a second writer, an older version; and ([`disk`]) a disk that is full.
+//! What survives: a kill, Ctrl-C, a second writer, an older version; ([`changed`]) other photos, a folder that goes away;
+//! ([`disk`]) a disk that is full; and ([`places`]) what lies where results are put.
 #![cfg(unix)]
 
+mod changed;
 mod disk;
+mod places;
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -77,10 +80,17 @@ fn a_killed_training_goes_on_from_its_last_checkpoint_to_the_same_result() {
     fmlgs(&train_arguments(photos, &straight, steps)).ok();
     let cloud = |scene: &str| fmlgs::io::trained::load(Path::new(scene)).unwrap().cloud;
     assert!(cloud(&out) == cloud(&straight), "the resumed run ended elsewhere than the straight one");
+    // What it told on the way is the same, also of the steps around the kill.
+    let told = |scene: &str| {
+        let steps = fmlgs::io::trained::load_info(Path::new(scene)).unwrap().history.steps;
+        steps.iter().map(|s| (s.step, s.loss.to_bits(), s.train_psnr.to_bits(), s.gaussians)).collect::<Vec<_>>()
+    };
+    assert_eq!(told(&out), told(&straight));
     // Negative control: another seed must end elsewhere.
     let other = at("other");
     fmlgs(&[&train_arguments(photos, &other, steps)[..], &["--seed", "1"]].concat()).ok();
-    assert!(cloud(&other) != cloud(&straight), "the comparison cannot tell runs apart");
+    let differs = cloud(&other) != cloud(&straight) && told(&other) != told(&straight);
+    assert!(differs, "the comparison cannot tell runs apart");
 }
 
 #[test]

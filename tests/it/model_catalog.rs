@@ -200,7 +200,7 @@ fn the_command_line_says_what_is_here_and_what_to_do() {
     assert!(error.contains("clip-vit-b16.json"), "{error}");
     // The description of exported files stands for their folder.
     let error = run(&["models", "add", "sam-vit-b", "/nowhere/exported.json"]).fails_with(1).stderr;
-    assert!(error.contains("/nowhere/sam-vit-b.json"), "{error}");
+    assert!(error.contains("/nowhere lacks sam-vit-b.json"), "{error}");
     assert!(run(&["models", "check"]).ok().stdout.contains("demo: right"));
     // Of one model, what it answers too.
     assert!(run(&["models", "check", "demo"]).ok().stdout.contains("no answer of it is known"));

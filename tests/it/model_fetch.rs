@@ -114,10 +114,32 @@ fn a_server_that_sends_elsewhere_gets_no_file_of_this_machine() {
     for to in [&*secret.leak(), "/model.onnx", "gopher://127.0.0.1/model.onnx", "//"] {
         let (s, p) = (server(&[Turn::Redirect(to)]), place());
         let error = get(&s, &p.to, None, None).expect_err("nothing to be had");
-        assert!(matches!(error, FetchError::Unreachable { .. } | FetchError::Refused { .. }), "{to}: {error}");
+        // What is no server is told by its name; where it is one, others are asked, but not for ever.
+        match to.starts_with('/') {
+            true => {
+                assert!(matches!(error, FetchError::Unreachable { .. } | FetchError::Refused { .. }), "{to}: {error}")
+            }
+            false => {
+                assert!(matches!(&error, FetchError::Elsewhere { to: told, .. } if told == to), "{to}: {error}");
+                assert_eq!(s.log.lock().expect("log").len(), 1, "{to}: nothing else is asked for");
+            }
+        }
         assert_eq!(fs::read_dir(p.to.parent().expect("folder")).expect("listed").count(), 0, "{to}: something is left");
         assert!(s.log.lock().expect("log").len() < 100, "{to}: it goes round in circles");
     }
+}
+
+#[test]
+fn a_server_that_sends_to_another_address_is_followed() {
+    let (s, p) = (server(&[Turn::Redirect("/moved/model.onnx"), Turn::Redirect("newest.onnx"), Turn::Serve]), place());
+    get(&s, &p.to, None, Some(&digest(0))).expect("fetched");
+    assert!(is_right(&p.to, 0) && s.log.lock().expect("log").len() == 3);
+    // What broke off is gone on with behind a redirect, too.
+    let turns = [Turn::BreakAfter(70_000), Turn::Redirect("/moved/model.onnx"), Turn::Serve];
+    let (s, p) = (server(&turns), place());
+    get(&s, &p.to, None, Some(&digest(0))).expect("fetched");
+    let rest = Some("bytes=70000-".to_owned());
+    assert!(is_right(&p.to, 0) && *s.log.lock().expect("log") == [None, rest.clone(), rest]);
 }
 
 #[test]

@@ -7,9 +7,10 @@ mod hostile;
 mod kills;
 mod served;
 
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use crate::cli_support::{first_version, fmlgs, folder, tiny_dataset, tiny_splat};
+use crate::cli_support::{Server, first_version, fmlgs, folder, tiny_dataset, tiny_splat};
 use fmlgs::io::{semantic_map, trained};
 use served::Served;
 
@@ -59,6 +60,30 @@ fn a_scene_at_rest_arrives_bit_for_bit() {
     let mixed = format!("http://{}/#{}", other.at, server.token);
     let refused = fmlgs(&["connect", &mixed, "--headless"]).fails_with(1);
     assert!(refused.stderr.contains("token"), "{}", refused.stderr);
+}
+
+#[test]
+fn where_there_are_no_gaussians_none_are_said_to_be_saved() {
+    let folder = folder();
+    let got = folder.path().join("got.ply");
+    // It says in order that nothing runs there, and that it has nothing to show.
+    let empty = Server::new(|stream, head| {
+        let news = r#"{"events":[],"next":0,"more":false,"progress":null,"generation":0}"#;
+        let head = match head.contains("/snapshot") {
+            true => "204 No Content\r\n".to_owned(),
+            false => format!("200 OK\r\nContent-Length: {}\r\n", news.len()),
+        };
+        let body = if head.starts_with("204") { "" } else { news };
+        // Whoever asked may have gone.
+        let _ = write!(stream, "HTTP/1.1 {head}fmlgs-protocol: 1.0\r\nfmlgs-run: a\r\nConnection: close\r\n\r\n{body}");
+    });
+    let url = format!("http://{}/#{}", empty.at, "0".repeat(64));
+    let done = fmlgs(&["connect", &url, "--headless", "--save", text(&got), "--json"]).fails_with(1);
+    assert!(done.stderr.contains("has no Gaussians") && done.stderr.contains("got.ply"), "{}", done.stderr);
+    assert!(done.stdout.is_empty() && !got.exists(), "{}", done.stdout);
+    // The control: who wants none to be saved misses nothing.
+    let done = fmlgs(&["connect", &url, "--headless", "--json"]).ok().json();
+    assert_eq!((&done["end"], &done["saved"]), (&"at rest".into(), &serde_json::Value::Null));
 }
 
 #[test]

@@ -1,5 +1,7 @@
 //! Materials and the images that they use.
 
+use std::borrow::Cow;
+use std::collections::BTreeSet;
 use std::io::Cursor;
 
 use glam::{Vec2, Vec3, Vec4};
@@ -9,10 +11,12 @@ use gltf::json::validation::Checked;
 
 use super::{AlphaMode, File, MAX_FILE_BYTES, Material, TextureImage, TextureUse, Wrap, resource};
 use crate::io::IoError;
+use crate::math::format::{count, things};
 
 const MAX_TEXTURE_SIDE_PX: u32 = 16_384;
-/// Most bytes that all decoded textures together may take.
+/// Most bytes that all decoded textures together may take, and their pixels, of four bytes each.
 const MAX_TEXTURE_BYTES: u64 = 1 << 30;
+const MAX_TEXTURE_PX: u64 = MAX_TEXTURE_BYTES / 4;
 
 impl Default for Material {
     /// glTF's default material, matt instead of metallic.
@@ -40,6 +44,7 @@ struct Images {
 impl File<'_> {
     /// All materials, the default one appended, and the images that they use.
     pub(super) fn materials(&mut self) -> Result<(Vec<Material>, Vec<TextureImage>), IoError> {
+        self.check_sizes()?;
         let root = self.root;
         let known = vec![None; root.images.len()];
         let mut images = Images { list: Vec::new(), known, bytes_left: MAX_TEXTURE_BYTES };
@@ -118,25 +123,12 @@ impl File<'_> {
             return Ok(known);
         }
         let place = format!("images[{index}]");
-        let json = &self.root.images[index];
-        let loaded;
-        let bytes: &[u8] = match (&json.uri, json.buffer_view) {
-            (Some(uri), _) => match resource::load_uri(uri, &place, self.path, self.folder, MAX_FILE_BYTES) {
-                Ok(bytes) => {
-                    loaded = bytes;
-                    &loaded
-                }
-                Err(e @ (IoError::Outside { .. } | IoError::Syntax { .. })) => return Err(e),
-                Err(e) => {
-                    self.warnings.push(format!("{place}: {e}; drawn without it"));
-                    images.known[index] = Some(None);
-                    return Ok(None);
-                }
-            },
-            (None, Some(view)) => self.view_bytes(view.value(), &place)?,
-            (None, None) => return Err(self.content(place, "has neither a URI nor a bufferView")),
+        let is_beside = self.root.images[index].uri.is_some();
+        let decoded = match self.image_bytes(index, &place) {
+            Ok(bytes) => decode(&bytes, images.bytes_left).map_err(|e| e.to_string()),
+            Err(e) if !is_beside || matches!(e, IoError::Outside { .. } | IoError::Syntax { .. }) => return Err(e),
+            Err(e) => Err(e.to_string()),
         };
-        let decoded = decode(bytes, images.bytes_left);
         let out = match decoded {
             Ok(image) => {
                 images.bytes_left = images.bytes_left.saturating_sub(image.rgba.len() as u64 * 4);
@@ -151,6 +143,50 @@ impl File<'_> {
         images.known[index] = Some(out);
         Ok(out)
     }
+
+    /// The file of an image, not decoded.
+    fn image_bytes(&self, index: usize, place: &str) -> Result<Cow<'_, [u8]>, IoError> {
+        let json = &self.root.images[index];
+        match (&json.uri, json.buffer_view) {
+            (Some(uri), _) => resource::load_uri(uri, place, self.path, self.folder, MAX_FILE_BYTES).map(Cow::Owned),
+            (None, Some(view)) => self.view_bytes(view.value(), place).map(Cow::Borrowed),
+            (None, None) => Err(self.content(place, "has neither a URI nor a bufferView")),
+        }
+    }
+
+    /// Refuses textures that are too large together, before one of them is decoded. What cannot be read is told later.
+    fn check_sizes(&self) -> Result<(), IoError> {
+        let root = self.root;
+        let used: BTreeSet<usize> = root
+            .materials
+            .iter()
+            .flat_map(|m| [m.pbr_metallic_roughness.base_color_texture.as_ref(), m.emissive_texture.as_ref()])
+            .flatten()
+            .filter_map(|info| Some(root.textures.get(info.index.value())?.source.value()))
+            .filter(|image| *image < root.images.len())
+            .collect();
+        let size = |image: usize| size_of_image(&self.image_bytes(image, "").ok()?);
+        let sizes: Vec<[u64; 2]> = used.into_iter().filter_map(size).collect();
+        let all = sizes.iter().fold(0_u64, |all, [w, h]| all.saturating_add(w * h));
+        let Some([w, h]) = sizes.iter().max_by_key(|[w, h]| w * h).filter(|_| all > MAX_TEXTURE_PX) else {
+            return Ok(());
+        };
+        Err(self.content(
+            "images",
+            format!(
+                "{} have {} pixels together (the largest is {w} x {h} px), and at most {} are read; make them smaller",
+                things(sizes.len(), "texture"),
+                count(all),
+                count(MAX_TEXTURE_PX)
+            ),
+        ))
+    }
+}
+
+/// Width and height that an image says it has, px.
+fn size_of_image(bytes: &[u8]) -> Option<[u64; 2]> {
+    let reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok()?;
+    reader.into_dimensions().ok().map(|(w, h)| [w, h].map(u64::from))
 }
 
 fn decode(bytes: &[u8], max_bytes: u64) -> Result<TextureImage, image::ImageError> {

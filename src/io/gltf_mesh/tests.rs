@@ -303,6 +303,34 @@ fn images_that_are_missing_or_broken_leave_a_warning() {
     }
 }
 
+/// A BMP that says it has so many pixels, and has none.
+fn bmp_without_pixels(side_px: i32) -> Vec<u8> {
+    let mut bytes = b"BM".to_vec();
+    [54_u32, 0, 54, 40].iter().for_each(|v| bytes.extend(v.to_le_bytes()));
+    [side_px, side_px].iter().for_each(|v| bytes.extend(v.to_le_bytes()));
+    [1_u16, 24].iter().for_each(|v| bytes.extend(v.to_le_bytes()));
+    bytes.resize(54, 0);
+    bytes
+}
+
+#[test]
+fn textures_that_are_too_large_together_are_refused_before_one_is_decoded() {
+    let read_with = |side_px: i32| {
+        let texture = |i: usize| json!({ "pbrMetallicRoughness": { "baseColorTexture": { "index": i } } });
+        let materials: Vec<Value> = (0..20).map(texture).collect();
+        let (mut root, bin) = cubes(json!([{ "mesh": 0 }]), json!([0]), materials.into());
+        let uri = format!("data:image/bmp;base64,{}", base64::encode(bmp_without_pixels(side_px)));
+        root["textures"] = (0..20).map(|i| json!({ "source": i })).collect();
+        root["images"] = (0..20).map(|_| json!({ "uri": uri })).collect();
+        read_slice(&glb(&root, &bin), "huge.glb")
+    };
+    let text = read_with(16_384).unwrap_err().to_string();
+    let told = ["huge.glb, images: 20 textures", "5,368,709,120 pixels", "16384 x 16384 px", "make them smaller"];
+    told.iter().for_each(|words| assert!(text.contains(words), "{text}"));
+    // The control: of a usual size, each is read as far as it goes.
+    assert_eq!(read_with(64).unwrap().materials.len(), 21);
+}
+
 #[test]
 fn real_scenes_are_read() {
     let Some(folder) = real_scenes() else { return };

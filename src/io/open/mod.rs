@@ -1,9 +1,11 @@
 //! One `open` for everything: looks at what is there and calls the reader for it.
 
+mod among;
 mod beside;
 mod packed;
 
 use std::fs;
+use std::ops::Range;
 use std::path::Path;
 
 use super::trained::{self, TrainedScene};
@@ -25,6 +27,8 @@ pub enum Opened {
     /// A folder that this program trained.
     Trained(TrainedScene),
 }
+
+pub(crate) use among::data_set_around;
 
 type Result<T> = std::result::Result<T, OpenError>;
 
@@ -70,6 +74,14 @@ const FOLDERS: [Layout; 7] = [
         open: |p| Ok(Opened::Cloud(sog::read_folder(&p.join(sog::META_FILE))?)),
     },
 ];
+
+/// Which of them are posed photos.
+const OF_PHOTOS: Range<usize> = 1..5;
+
+/// Whether a folder holds posed photos, and no trained scene.
+fn is_data_set(folder: &Path) -> bool {
+    !trained::is_scene(folder) && FOLDERS[OF_PHOTOS].iter().any(|layout| (layout.is)(folder))
+}
 
 /// A way to keep a scene in a folder.
 struct Layout {

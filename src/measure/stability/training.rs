@@ -143,6 +143,7 @@ fn resumed(faulty: bool) -> Finding {
             budget: half.budget,
             damping: half.schedule.damping,
             history: Default::default(),
+            unreported: Default::default(),
         };
         checkpoint::save(&scene, &half, &header).map_err(|e| broken(e.to_string()))?;
         let loaded = || -> Result<Trainer, Finding> {

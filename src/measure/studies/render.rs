@@ -13,6 +13,7 @@ use crate::math::stats::mean;
 use crate::measure::image_error::{Errors, RgbPlanes, errors, footprint_order, named, planes, psnr_in_photo, resized};
 use crate::measure::sweep::failed;
 use crate::measure::{ErrorKind, Measure, Rule, Stage, StageName, Study, StudyError, Trial};
+use crate::pipeline::observer::Observer;
 use crate::render::{BackendChoice, Cutoffs, Features, Frame, GpuError, RenderError, RenderSettings, Renderer, cpu};
 use crate::scene::{Camera, GaussianCloud};
 
@@ -49,14 +50,15 @@ struct Drawing {
     gpu: Option<Renderer>,
 }
 
-/// The sweep of drawing `cloud` by `settings` from these views.
+/// The sweep of drawing `cloud` by `settings` from these views; `None` if the observer asks to stop.
 pub(crate) fn study(
     cloud: Arc<GaussianCloud>,
     settings: &RenderSettings,
     views: Vec<StudyView>,
     repeats: u32,
     mut input: StudyInput,
-) -> Result<Study<'static>, RenderError> {
+    observer: &dyn Observer,
+) -> Result<Option<Study<'static>>, RenderError> {
     let settings = RenderSettings { depth: false, ..settings.clone() };
     let why = |e: GpuError| drop(input.insert("GPU".into(), format!("not measured: {e}")));
     let gpu = Renderer::choose(BackendChoice::Gpu, drop).map_err(why).ok();
@@ -80,6 +82,9 @@ pub(crate) fn study(
     let mut renderer = cpu::CpuRenderer::<f64>::new();
     let mut exact = Vec::with_capacity(views.len());
     for (camera, _) in &views {
+        if observer.proceed().is_err() {
+            return Ok(None);
+        }
         exact.push(planes(&renderer.render(&double, Features::NONE, camera, &exactly)?));
     }
     let afar: Vec<RgbPlanes> =
@@ -110,10 +115,10 @@ pub(crate) fn study(
         }
         Ok(Some(Trial { secs: mean(&secs), values, curve: Vec::new() }))
     });
-    Ok(study.with_orders(move || {
+    Ok(Some(study.with_orders(move || {
         let order = first.iter().map(|camera| footprint_order(&order_of, camera, &exactly).map_err(failed));
         order.collect()
-    }))
+    })))
 }
 
 impl Drawing {

@@ -17,6 +17,7 @@ use super::TrainConfig;
 use super::density::DensityStats;
 use super::inputs::TrainInputs;
 use super::trainer::Trainer;
+use super::window::StepWindow;
 use crate::io::trained::History;
 use crate::io::{IoError, SceneFolder, files};
 use crate::math::sh::coefficients;
@@ -55,6 +56,9 @@ pub struct Header {
     /// Factor on the learning rates.
     pub damping: f64,
     pub history: History,
+    /// What was measured since its last row; files of earlier versions do not say.
+    #[serde(default)]
+    pub unreported: StepWindow,
 }
 
 /// Why a checkpoint cannot be used.
@@ -223,6 +227,7 @@ mod tests {
             budget: 2,
             damping: 1.0,
             history: History::default(),
+            unreported: StepWindow::default(),
         };
         save(&scene, &trainer, &header).expect("saved");
         let path = folder.path().join(FILE);

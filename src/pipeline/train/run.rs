@@ -15,13 +15,13 @@ use super::inputs::{Compare, TrainInputs};
 use super::outcome::{TrainEnd, TrainError, TrainOutcome};
 use super::photos::{before_backdrop, load_training, load_views, tell_marks, tell_of_pixels};
 use super::trainer::{REPORT_STEPS, StepError, Trainer};
-use super::window::Window;
+use super::window::StepWindow;
 use super::{TrainConfig, TrainView, coarse, density, geometry, init};
 use crate::io::SceneFolder;
 use crate::io::trained::{History, SceneInfo};
-use crate::math::stats::{mean, median};
+use crate::math::stats::median;
 use crate::pipeline::evaluate::scores;
-use crate::pipeline::observer::{Evaluation, Observer, Severity, StepMetrics, Ticker};
+use crate::pipeline::observer::{Evaluation, Observer, Severity, Ticker};
 use crate::render::Device;
 use crate::scene::{Dataset, GaussianCloud};
 
@@ -116,6 +116,8 @@ struct Job<'a> {
     trainer: Trainer,
     secs: f64,
     history: History,
+    /// What was measured since the last row of it.
+    unreported: StepWindow,
     safe: GaussianCloud,
     rollbacks: u32,
     recent: VecDeque<f64>,
@@ -136,7 +138,7 @@ impl<'a> Job<'a> {
     ) -> Self {
         let (extent, background) = (dataset.camera_extent().1, dataset.background.unwrap_or([0.0; 3]));
         let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
-        let (mut secs, mut history) = (0.0, History::default());
+        let (mut secs, mut history, mut unreported) = (0.0, History::default(), StepWindow::default());
         // What was seen in full is not seen coarsely again, where more steps make those for that more.
         let was_coarse = saved.as_ref().is_none_or(|s| s.header.step < coarse::steps(&s.header.config));
         let mut trainer = match saved {
@@ -149,7 +151,7 @@ impl<'a> Job<'a> {
                 t.round = s.header.round.into_iter().filter(|k| (*k as usize) < views.len()).collect();
                 t.budget = s.header.budget;
                 t.schedule.damping = s.header.damping;
-                (secs, history) = (s.header.secs, s.header.history);
+                (secs, history, unreported) = (s.header.secs, s.header.history, s.header.unreported);
                 t
             }
             None => {
@@ -188,6 +190,7 @@ impl<'a> Job<'a> {
             trainer,
             secs,
             history,
+            unreported,
             safe,
             rollbacks: 0,
             recent: VecDeque::new(),
@@ -208,7 +211,6 @@ impl<'a> Job<'a> {
             );
         }
         let mut ticker = Ticker::resumed("Training", self.config.steps, self.trainer.step, self.secs);
-        let mut window = Window::default();
         let mut saved_at = Instant::now();
         while self.trainer.step < self.config.steps {
             if ticker.proceed(observer).is_err() {
@@ -217,17 +219,11 @@ impl<'a> Job<'a> {
             let start = Instant::now();
             let results = self.step(observer)?;
             self.secs += start.elapsed().as_secs_f64();
-            results.iter().for_each(|r| window.add(r.loss, r.psnr));
+            results.iter().for_each(|r| self.unreported.add(r.loss, r.psnr));
             let step = self.trainer.step;
             if step % REPORT_STEPS == 0 || step == self.config.steps {
-                let metrics = StepMetrics {
-                    step,
-                    secs: self.secs,
-                    loss: mean(&window.losses),
-                    train_psnr: mean(&window.psnrs),
-                    gaussians: self.trainer.cloud.len(),
-                };
-                window = Window::default();
+                let window = std::mem::take(&mut self.unreported);
+                let metrics = window.metrics(step, self.secs, self.trainer.cloud.len());
                 self.history.steps.push(metrics);
                 observer.step(metrics);
             }
@@ -369,6 +365,7 @@ impl<'a> Job<'a> {
             budget: t.budget,
             damping: t.schedule.damping,
             history: self.history.clone(),
+            unreported: self.unreported.clone(),
         };
         checkpoint::save(scene, t, &header).map_err(TrainError::Save)
     }

@@ -1,17 +1,56 @@
-//! Measurements between two reports of a training.
+//! Measurements between two reports of a training. A checkpoint keeps those that were not reported yet, so that the next
+//! report is of as many steps as any.
+
+use serde::{Deserialize, Serialize};
+
+use crate::math::stats::mean;
+use crate::pipeline::observer::StepMetrics;
 
 /// Losses and PSNRs since the last report.
-#[derive(Default)]
-pub(super) struct Window {
-    pub(super) losses: Vec<f64>,
-    pub(super) psnrs: Vec<f64>,
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StepWindow {
+    /// Those that are no finite numbers, which JSON does not have, are `None`.
+    losses: Vec<Option<f64>>,
+    psnrs: Vec<f64>,
 }
 
-impl Window {
+impl StepWindow {
     pub(super) fn add(&mut self, loss: f64, psnr: f64) {
-        self.losses.push(loss);
+        self.losses.push(Some(loss).filter(|loss| loss.is_finite()));
         if psnr.is_finite() {
             self.psnrs.push(psnr);
         }
+    }
+
+    /// The report after `step`: means of what was measured since the last one.
+    pub(super) fn metrics(&self, step: u64, secs: f64, gaussians: usize) -> StepMetrics {
+        let losses: Vec<f64> = self.losses.iter().map(|loss| loss.unwrap_or(f64::NAN)).collect();
+        StepMetrics { step, secs, loss: mean(&losses), train_psnr: mean(&self.psnrs), gaussians }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_checkpoint_keeps_is_reported_as_if_it_had_never_been_stored() {
+        let step = |k: u64| (0.1 + 0.01 * k as f64, 20.0 + 0.3 * k as f64);
+        let added = |mut window: StepWindow, steps: std::ops::Range<u64>| {
+            steps.map(step).for_each(|(loss, psnr)| window.add(loss, psnr));
+            window
+        };
+        let stored = |window: &StepWindow| -> StepWindow {
+            serde_json::from_str(&serde_json::to_string(window).expect("JSON")).expect("read")
+        };
+        let through = added(StepWindow::default(), 0..10).metrics(10, 1.0, 7);
+        let half = stored(&added(StepWindow::default(), 0..4));
+        assert_eq!(added(half, 4..10).metrics(10, 1.0, 7), through);
+        // The control: without the first half it is another report.
+        assert!(added(StepWindow::default(), 4..10).metrics(10, 1.0, 7) != through);
+        // A loss that is none stays none, and makes no checkpoint unreadable.
+        let mut broken = StepWindow::default();
+        broken.add(f64::INFINITY, f64::NAN);
+        assert!(stored(&broken) == broken && broken.metrics(1, 0.0, 1).loss.is_nan());
     }
 }

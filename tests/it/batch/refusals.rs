@@ -62,6 +62,15 @@ fn what_is_wrong_is_told_before_anything_runs() {
     for (arguments, code) in [(&["--shard", "0/4"][..], 2), (&["--shard", "5/4"], 2), (&["--takeover-secs", "0"], 2)] {
         done(batch(&jobs, &out, arguments)).fails_with(code);
     }
+    // A shard beyond the units has nothing to do; one that has some lists them.
+    let two = format!("seeds = [0, 1]\n{scene}");
+    std::fs::write(&jobs, two).unwrap();
+    let empty = done(batch(&jobs, &out, &["--shard", "9/9", "--json"])).fails_with(2);
+    assert!(empty.stderr.contains("nothing in shard 9/9, the batch has 2 units"), "{}", empty.stderr);
+    assert!(empty.stdout.is_empty() && !out.exists(), "{}", empty.stdout);
+    let listed = done(batch(&jobs, &out, &["--shard", "2/9", "--dry-run", "--json"])).ok().json();
+    assert_eq!(listed["units"].as_array().unwrap().len(), 1, "{listed}");
+    std::fs::write(&jobs, scene).unwrap();
     // Arrays whose tasks are no range.
     let mut uneven = batch(&jobs, &out, &[]);
     uneven.env("SLURM_ARRAY_TASK_ID", "7").env("SLURM_ARRAY_TASK_COUNT", "2").env("SLURM_ARRAY_TASK_MIN", "3");

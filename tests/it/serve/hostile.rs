@@ -190,15 +190,43 @@ fn who_drips_or_stands_still_holds_up_nobody() {
 }
 
 #[test]
+fn who_has_not_shown_the_token_keeps_nobody_out() {
+    let folder = folder();
+    let server = Served::scene(text(&scene(folder.path())), &[]);
+    let connect = || TcpStream::connect(&server.at).unwrap();
+    // One that has shown it, and keeps its connection.
+    let request = format!("{}\r\n", server.head("GET /scene"));
+    let mut known = connect();
+    known.write_all(request.as_bytes()).unwrap();
+    assert_eq!(read_answer(&mut known).0, 200);
+    let mut dripping: Vec<TcpStream> = Vec::new();
+    for byte in request.bytes().take(20) {
+        // All of them begin a request, and those that were ended come again.
+        dripping.retain_mut(|stream| stream.write_all(&[byte]).is_ok());
+        dripping.resize_with(200, connect);
+        assert_eq!(server.get("/scene").0, 200, "a new client is answered");
+    }
+    known.write_all(request.as_bytes()).unwrap();
+    assert_eq!(read_answer(&mut known).0, 200, "who is known stays");
+}
+
+#[test]
 fn too_many_connections_are_turned_away_and_come_in_later() {
     let folder = folder();
     let server = Served::scene(text(&scene(folder.path())), &[]);
-    let idle: Vec<TcpStream> = (0..64).map(|_| TcpStream::connect(&server.at).unwrap()).collect();
+    let known: Vec<TcpStream> = (0..32)
+        .map(|_| {
+            let mut stream = TcpStream::connect(&server.at).unwrap();
+            stream.write_all(format!("{}\r\n", server.head("GET /scene")).as_bytes()).unwrap();
+            assert_eq!(read_answer(&mut stream).0, 200);
+            stream
+        })
+        .collect();
     let until = Instant::now() + Duration::from_secs(60);
     while server.get("/scene").0 != 503 {
-        assert!(Instant::now() < until, "64 connections were let in");
+        assert!(Instant::now() < until, "more than 32 connections were let in");
     }
-    drop(idle);
+    drop(known);
     while server.get("/scene").0 != 200 {
         assert!(Instant::now() < until, "nobody comes in again");
         std::thread::sleep(Duration::from_millis(50));

@@ -1,0 +1,51 @@
+//! A limit of time as a wish to stop: what is prepared for a measurement ends by it as by Ctrl-C.
+
+use std::time::{Duration, Instant};
+
+use crate::pipeline::observer::{Observer, Signal};
+
+/// Passes the wish to stop on, has it itself once a time is over, and tells nothing.
+pub(crate) struct InTime<'a> {
+    of: &'a mut dyn Observer,
+    /// `None` for no limit.
+    until: Option<Instant>,
+}
+
+impl<'a> InTime<'a> {
+    /// For so many seconds from now on.
+    pub(crate) fn new(of: &'a mut dyn Observer, secs: f64) -> Self {
+        let until = Duration::try_from_secs_f64(secs).ok().and_then(|time| Instant::now().checked_add(time));
+        Self { of, until }
+    }
+}
+
+impl Observer for InTime<'_> {
+    fn signal(&self) -> Signal {
+        match self.until {
+            Some(until) if Instant::now() >= until => Signal::Cancel,
+            _ => self.of.signal(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::pipeline::observer::Silent;
+
+    struct Stopped;
+
+    impl Observer for Stopped {
+        fn signal(&self) -> Signal {
+            Signal::Cancel
+        }
+    }
+
+    #[test]
+    fn it_stops_in_time_and_where_somebody_asks_for_it() {
+        assert!(InTime::new(&mut Silent, 0.0).proceed().is_err());
+        assert!(InTime::new(&mut Silent, f64::INFINITY).proceed().is_ok());
+        assert!(InTime::new(&mut Silent, 1e9).proceed().is_ok());
+        assert!(InTime::new(&mut Stopped, f64::INFINITY).proceed().is_err());
+    }
+}

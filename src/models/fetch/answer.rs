@@ -1,0 +1,69 @@
+//! What the headers of an answer say: where to ask instead, and which part of a file follows.
+
+/// The address that a server means by `location` where somebody has asked for `url`; `None` where that is of no server.
+pub(super) fn elsewhere(url: &str, location: &str) -> Option<String> {
+    let is_scheme = |start: &str| {
+        start.starts_with(|c: char| c.is_ascii_alphabetic())
+            && start.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
+    };
+    if let Some((start, _)) = location.split_once(':').filter(|(start, _)| is_scheme(start)) {
+        return ["http", "https"].iter().any(|s| start.eq_ignore_ascii_case(s)).then(|| location.to_owned());
+    }
+    let (scheme, rest) = url.split_once("://")?;
+    let (host, path) = rest.split_at(rest.find(['/', '?', '#']).unwrap_or(rest.len()));
+    if location.starts_with("//") {
+        return Some(format!("{scheme}:{location}"));
+    }
+    if location.starts_with('/') {
+        return Some(format!("{scheme}://{host}{location}"));
+    }
+    let above = |path: &str| path.rsplit_once('/').map_or(String::new(), |(folder, _)| folder.to_owned());
+    let mut folder = above(path.split(['?', '#']).next().unwrap_or_default());
+    let mut name = location;
+    while let Some(rest) = name.strip_prefix("../") {
+        (folder, name) = (above(&folder), rest);
+    }
+    Some(format!("{scheme}://{host}{folder}/{}", name.trim_start_matches("./")))
+}
+
+/// Start and total of "bytes 5-9/10".
+pub(super) fn content_range(value: &str) -> Option<(u64, Option<u64>)> {
+    let (range, total) = value.strip_prefix("bytes ")?.split_once('/')?;
+    Some((range.split_once('-')?.0.parse().ok()?, total.parse().ok()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_servers_are_elsewhere() {
+        let from = |location: &str| elsewhere("https://a.example:8/models/m.onnx?x=1", location);
+        for (location, meant) in [
+            ("https://b.example/m", "https://b.example/m"),
+            ("HTTP://b.example/m?at=1:2", "HTTP://b.example/m?at=1:2"),
+            ("//b.example/m", "https://b.example/m"),
+            ("/other/m", "https://a.example:8/other/m"),
+            ("other/m", "https://a.example:8/models/other/m"),
+            ("./m2?a=b", "https://a.example:8/models/m2?a=b"),
+            ("../m", "https://a.example:8/m"),
+            ("../../../m", "https://a.example:8/m"),
+        ] {
+            assert_eq!(from(location).as_deref(), Some(meant), "{location}");
+        }
+        for location in ["file:///etc/passwd", "FILE:/etc/passwd", "gopher://b.example/m", "data:,x", "b.example:80/m"]
+        {
+            assert_eq!(from(location), None, "{location}");
+        }
+        assert_eq!(elsewhere("http://a.example", "m").as_deref(), Some("http://a.example/m"));
+    }
+
+    #[test]
+    fn ranges_of_content() {
+        assert_eq!(content_range("bytes 5-9/10"), Some((5, Some(10))));
+        assert_eq!(content_range("bytes 5-9/*"), Some((5, None)));
+        for bad in ["", "bytes", "bytes x-9/10", "items 5-9/10"] {
+            assert_eq!(content_range(bad), None, "{bad}");
+        }
+    }
+}
