@@ -1,29 +1,11 @@
 //! What the headers of an answer say: where to ask instead, and which part of a file follows.
 
+use url::Url;
+
 /// The address that a server means by `location` where somebody has asked for `url`; `None` where that is of no server.
 pub(super) fn elsewhere(url: &str, location: &str) -> Option<String> {
-    let is_scheme = |start: &str| {
-        start.starts_with(|c: char| c.is_ascii_alphabetic())
-            && start.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
-    };
-    if let Some((start, _)) = location.split_once(':').filter(|(start, _)| is_scheme(start)) {
-        return ["http", "https"].iter().any(|s| start.eq_ignore_ascii_case(s)).then(|| location.to_owned());
-    }
-    let (scheme, rest) = url.split_once("://")?;
-    let (host, path) = rest.split_at(rest.find(['/', '?', '#']).unwrap_or(rest.len()));
-    if location.starts_with("//") {
-        return Some(format!("{scheme}:{location}"));
-    }
-    if location.starts_with('/') {
-        return Some(format!("{scheme}://{host}{location}"));
-    }
-    let above = |path: &str| path.rsplit_once('/').map_or(String::new(), |(folder, _)| folder.to_owned());
-    let mut folder = above(path.split(['?', '#']).next().unwrap_or_default());
-    let mut name = location;
-    while let Some(rest) = name.strip_prefix("../") {
-        (folder, name) = (above(&folder), rest);
-    }
-    Some(format!("{scheme}://{host}{folder}/{}", name.trim_start_matches("./")))
+    let to = Url::parse(url).ok()?.join(location).ok()?;
+    matches!(to.scheme(), "http" | "https").then(|| to.into())
 }
 
 /// Start and total of "bytes 5-9/10".
@@ -41,7 +23,7 @@ mod tests {
         let from = |location: &str| elsewhere("https://a.example:8/models/m.onnx?x=1", location);
         for (location, meant) in [
             ("https://b.example/m", "https://b.example/m"),
-            ("HTTP://b.example/m?at=1:2", "HTTP://b.example/m?at=1:2"),
+            ("HTTP://b.example/m?at=1:2", "http://b.example/m?at=1:2"),
             ("//b.example/m", "https://b.example/m"),
             ("/other/m", "https://a.example:8/other/m"),
             ("other/m", "https://a.example:8/models/other/m"),

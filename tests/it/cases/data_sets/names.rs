@@ -154,7 +154,8 @@ fn points_and_cameras_may_begin_with_a_mark_and_be_named_by_a_path_of_elsewhere(
     let first = format!("\u{feff}{}", found["cameras"][0]);
     fs::write(&camera, first).expect("write");
     let splat = crate::cli_support::tiny_splat(&set.at("a.ply"));
-    let out = set.at("a.png");
+    let pictures = crate::cli_support::folder();
+    let out = pictures.path().join("a.png");
     let words = [&splat, &camera, &out].map(|p| p.to_str().expect("a name").to_owned());
     crate::cli_support::fmlgs(&["render", &words[0], "--camera", &words[1], "--out", &words[2]]).ok();
 }
