@@ -9,7 +9,8 @@ use image::ColorType;
 use super::changed::ChangedScene;
 use super::held_out::{held_out, naming, refuse_holdout};
 use super::{JobError, Scene, export, open};
-use crate::io;
+use crate::io::{self, IoError};
+use crate::math::format::things;
 use crate::math::stats::median;
 use crate::pipeline::depth::{self, DepthCounter, DepthScores};
 use crate::pipeline::evaluate::scores;
@@ -133,8 +134,15 @@ pub(crate) fn photometric(comparison: &PhotoComparison, observer: &mut dyn Obser
     let PhotoComparison { cloud, settings, .. } = comparison;
     let mut renderer = Renderer::new();
     let mut views: Vec<ViewScore> = Vec::with_capacity(comparison.views.len());
+    let mut left_out = None;
     comparison.walk("Measuring", observer, |index| {
-        let view = comparison.view(index)?;
+        let view = match comparison.view(index) {
+            Err(nothing @ JobError::Io(IoError::NothingShown { .. })) => {
+                left_out = Some(nothing);
+                return Ok(());
+            }
+            view => view?,
+        };
         let draw = |camera: &Camera| renderer.render(cloud, Features::NONE, camera, settings);
         views.extend(scores(std::slice::from_ref(&view), draw)?);
         if let Some(folder) = &comparison.pictures {
@@ -143,6 +151,13 @@ pub(crate) fn photometric(comparison: &PhotoComparison, observer: &mut dyn Obser
         }
         Ok(())
     })?;
+    if let Some(last) = left_out {
+        let n = comparison.views.len() - views.len();
+        if views.is_empty() {
+            return Err(last);
+        }
+        observer.note(Severity::Warning, format!("{} left out: {last}", things(n, "photo")));
+    }
     Ok(Evaluation::of(views, cloud.len(), 0, 0.0))
 }
 

@@ -61,10 +61,8 @@ fn stage(stage: &Stage) -> String {
     let input: Vec<String> = stage.input.iter().map(|(k, v)| format!("{k} {v}")).collect();
     let mut out = format!("\n### {}\n\nSeconds of {}; {}", stage.name.title(), stage.secs_of, stage.reference);
     out += &format!(" ({}; {}). ", input.join(", "), stage.runs());
-    if !stage.complete() {
-        let measured: usize = stage.points.iter().map(|p| p.secs.each.len()).sum();
-        let planned = stage.planned * stage.seeds.len();
-        out += &format!("Stopped early: {measured} of {planned} measurements. ");
+    if let Some(far) = stage.stopped_at() {
+        out += &format!("Stopped early: {far}. ");
     }
     if !choices.is_empty() {
         out += &format!("Chosen is {}.\n\n{}", stage.rule.words(), table::markdown(&with_reasons(stage)));

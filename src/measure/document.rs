@@ -317,6 +317,14 @@ impl Stage {
         }
     }
 
+    /// "3 of 24 measurements", where some are missing: how far a stage came that was stopped.
+    pub(crate) fn stopped_at(&self) -> Option<String> {
+        let measured: usize = self.points.iter().map(|p| p.secs.each.len()).sum();
+        // A file may plan as many as it likes.
+        let planned = self.planned.saturating_mul(self.seeds.len());
+        (!self.complete()).then(|| format!("{measured} of {planned} measurements"))
+    }
+
     /// Whether every setting was measured at every seed.
     pub(crate) fn complete(&self) -> bool {
         self.points.len() == self.planned && self.points.iter().all(|p| p.secs.each.len() >= self.seeds.len())

@@ -78,10 +78,8 @@ fn section(report: &Report, stage: &Stage) -> String {
         input.join("; "),
         stage.runs()
     );
-    if !stage.complete() {
-        let measured: usize = stage.points.iter().map(|p| p.secs.each.len()).sum();
-        let planned = stage.planned * stage.seeds.len();
-        out += &format!(" <span class=\"no\">Stopped early: {measured} of {planned} measurements.</span>");
+    if let Some(far) = stage.stopped_at() {
+        out += &format!(" <span class=\"no\">Stopped early: {far}.</span>");
     }
     out += "</p>\n";
     for text in &stage.left_out {

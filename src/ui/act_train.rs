@@ -3,6 +3,7 @@
 use super::actions::Action;
 use super::app::App;
 use super::dialogs::Question;
+use super::labels::sentence;
 use super::state::Tone;
 use crate::jobs::train::{IfChanged, TrainStart};
 use crate::worker::Command;
@@ -32,8 +33,9 @@ impl App {
     /// Asks whether a training goes on with other photos than it began with.
     pub(super) fn ask_how_to_train(&mut self, changes: &str) {
         let text = format!(
-            "{changes}.\n\nTrain anew in a folder of its own, or go on with the photos as they are now? The training so \
-             far stays as it is if you train anew."
+            "{}.\n\nTrain anew in a folder of its own, or go on with the photos as they are now? The training so \
+             far stays as it is if you train anew.",
+            sentence(changes)
         );
         let action = Action::TrainChanged(IfChanged::Anew);
         let other = Some(("Go on", Action::TrainChanged(IfChanged::GoOn)));

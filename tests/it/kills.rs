@@ -4,13 +4,16 @@
 //! `FMLGS_KILLS=50 cargo test --test it kills -- --nocapture` kills each command 50 times.
 #![cfg(unix)]
 
-use std::io::Write;
+mod written;
+
+use std::collections::BTreeMap;
+use std::io::{BufRead, Write};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::cli_support::{Done, Server, command, fmlgs, folder, tiny_dataset};
+use crate::cli_support::{Done, Server, command, first_version, fmlgs, folder, tiny_dataset};
 use fmlgs::io::{SceneFolder, semantic_map, trained};
 use fmlgs::jobs::Folders;
 use fmlgs::jobs::edit::EditRequest;

@@ -264,6 +264,10 @@ fn photos_whose_masks_are_all_black_are_left_out_and_named() {
     mask(0, 0);
     let held = said("held", "5");
     assert!(held.contains("1 of 2 photos show nothing") && held.contains("00.png"), "{held}");
+    let scene = out("held");
+    let judged = fmlgs(&["eval", scene.to_str().expect("UTF-8"), "--json"]).ok();
+    assert!(judged.stderr.contains("1 photo left out") && judged.stderr.contains("00.png"), "{}", judged.stderr);
+    assert_eq!(judged.json()["views"].as_array().map(Vec::len), Some(1));
     // Without any that shows something, there is nothing to train on.
     (0..10).for_each(|i| mask(i, 0));
     let (data, out) = (data.to_str().expect("UTF-8"), out("none"));

@@ -1,0 +1,63 @@
+//! What is written file by file: all objects of a scene, and the demo as it is unpacked.
+
+use super::*;
+
+/// All files below `folder` with their contents, but for the list that says when they were written.
+fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            let inner = contents(&path).into_iter();
+            all.extend(inner.map(|(name, bytes)| (Path::new(path.file_name().unwrap()).join(name), bytes)));
+        } else {
+            all.insert(path.file_name().unwrap().into(), std::fs::read(&path).unwrap());
+        }
+    }
+    all
+}
+
+#[test]
+fn all_objects_being_exported() {
+    let folder = folder();
+    first_version(folder.path());
+    let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let export = |out: &str| command(&["segment", &at("scene"), "--all", "--out", &at(out), "-q"]);
+    let longest = time(&mut export("whole"));
+    kill_often("segment --all", longest, &mut |_| export("out"), &mut || ());
+    Done::from(export("out").output().unwrap()).ok();
+    assert_tidy(&folder.path().join("out"));
+    let [whole, out] = ["whole", "out"].map(|name| contents(&folder.path().join(name)));
+    assert!(out == whole, "{:?} instead of {:?}", out.keys(), whole.keys());
+}
+
+#[test]
+fn the_demo_being_unpacked() {
+    let folder = folder();
+    let (data, out) = (folder.path().join("data"), folder.path().join("out"));
+    let demo = || {
+        let mut demo = command(&["demo", "--headless", "--steps", "1", "--out", out.to_str().unwrap()]);
+        demo.env("XDG_DATA_HOME", &data);
+        demo
+    };
+    let unpacked = || -> Vec<PathBuf> {
+        let folders = std::fs::read_dir(data.join("fmlgs")).into_iter().flatten().map(|e| e.unwrap().path());
+        folders.filter(|p| p.file_name().unwrap().to_string_lossy().starts_with("demo-")).collect()
+    };
+    let mut there = 0;
+    kill_often("demo", Duration::from_millis(400), &mut |_| demo(), &mut || {
+        for folder in unpacked() {
+            there += 1;
+            assert_eq!(std::fs::read_dir(folder.join("photos/images")).unwrap().count(), 64);
+            assert!(trained::load(&folder.join("scene")).is_ok());
+            std::fs::remove_dir_all(folder).unwrap();
+        }
+    });
+    println!("demo: unpacked {there} times");
+    let mut last = demo().stderr(Stdio::piped()).spawn().unwrap();
+    let mut lines = std::io::BufReader::new(last.stderr.take().unwrap()).lines().map(Result::unwrap);
+    assert!(lines.any(|line| line.contains("The trained demo: held-out PSNR 28.9")));
+    last.kill().unwrap();
+    last.wait().unwrap();
+    assert_eq!(unpacked().len(), 1);
+}
