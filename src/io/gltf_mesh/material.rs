@@ -34,7 +34,7 @@ impl Default for Material {
     }
 }
 
-/// Decoded images by index in the file; `None` for an image that could not be read.
+/// Images decoded so far; `known` maps an image of the file to its index, `None` if it could not be read.
 struct Images {
     list: Vec<TextureImage>,
     known: Vec<Option<Option<usize>>>,
