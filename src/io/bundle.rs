@@ -1,4 +1,4 @@
-//! Files in one archive, as the program ships them: packed always alike, unpacked all or none.
+//! Archives of files that the program ships: packed reproducibly, unpacked completely or not at all.
 
 use std::fs;
 use std::io::{self, Cursor, Read, Write};

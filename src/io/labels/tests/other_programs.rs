@@ -121,7 +121,7 @@ fn coco_annotations_are_things_of_their_own() {
     assert_eq!(set.regions("a.png"), named(&[("cup", 32), ("cup", 16), ("plate", 40), ("plate", 40)]));
     let labels = set.labels();
     assert!(!labels.has(&photo("b.png", 20, 10)), "nothing is said about it");
-    // "object" without 'parent' is another program's word.
+    // "object" without 'parent' is another program's term.
     assert!(labels.of(&photo("a.png", 20, 10), 4096).expect("regions").iter().all(|r| r.level.is_none()));
     let notes = labels.notes().join("; ");
     for words in [
