@@ -92,7 +92,7 @@ mod tests {
         // The round picture of a lens is at the same place in every photo.
         let lens: Vec<Transparency> = (0..3).map(|_| picture(|x, y| disk(x, y, (30, 20), 20))).collect();
         assert!(!is_cut_out(&lens));
-        // Persons who were taken out of photos of a street.
+        // Persons removed from photos of a street.
         let holes: Vec<Transparency> =
             [(20, 15), (35, 22), (30, 12)].map(|c| picture(|x, y| !disk(x, y, c, 12))).into_iter().collect();
         assert!(!is_cut_out(&holes));

@@ -58,7 +58,7 @@ fn read_bytes(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<MeshSc
     let root: Root = parse(text, path)?;
     if let Some(extension) = root.extensions_required.iter().find(|e| !supported(e)) {
         let what = format!("the required extension {extension}");
-        // gltf-transform reads what it can unpack, and writes it plain.
+        // gltf-transform unpacks the formats that it supports, and writes them plain.
         let remedy = match extension.contains("compression") || extension.contains("meshopt") {
             true => "unpack it with 'gltf-transform copy IN OUT.glb', or pack it with 'gltfpack -c'",
             false => "export the scene without it",
@@ -98,7 +98,7 @@ pub(super) struct File<'a> {
 }
 
 impl<'a> File<'a> {
-    /// Loads the buffers of a file whose binary chunk is `blob`; its limits are the bytes of all buffers, and the values
+    /// Loads the buffers of a file whose binary chunk is `blob`. `limits` are the bytes of all buffers, and the values
     /// that all accessors together may decode to.
     pub fn open(
         root: &'a Root,

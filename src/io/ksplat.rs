@@ -198,7 +198,7 @@ impl<'a> Section<'a> {
                 _ => layout.number(&row, layout.rest, k),
             };
             for k in 1..stride {
-                // Those of one band together: all red ones, then green, then blue.
+                // Harmonics of one band together: all red ones, then green, then blue.
                 let (first, of_band) = if k < 4 { (0, 3) } else { (9, 5) };
                 let at = first + k - if k < 4 { 1 } else { 4 };
                 cloud.sh.push([0, 1, 2].map(|channel| harmonic(at + channel * of_band)));

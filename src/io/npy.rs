@@ -9,7 +9,7 @@ use super::{IoError, files};
 /// Largest header of an `.npy` file in bytes; that of an array of numbers takes 128.
 const MAX_HEADER_BYTES: usize = 1024;
 
-/// An array whose header has been checked and whose numbers are still to be read.
+/// An array with a validated header and numbers still to be read.
 pub struct NpyArray<'a> {
     path: &'a Path,
     npy: NpyFile<&'a [u8]>,

@@ -154,7 +154,7 @@ pub(crate) fn open(path: &Path) -> Result<PhotoPixels, IoError> {
     Ok(PhotoPixels { width_px, height_px, rgb, coverage: None, alpha: None })
 }
 
-/// Reads the bytes of a picture file; a truncated file is an error.
+/// Reads the bytes of a picture file; a truncated JPEG is an error.
 fn read_whole(path: &Path) -> Result<Vec<u8>, IoError> {
     let bytes = files::read(path, files::MAX_PICTURE_BYTES)?;
     if is_cut_jpeg(&bytes) {

@@ -246,7 +246,8 @@ fn listed_mask(
     Ok(Some(path))
 }
 
-/// Checks that a point is finite: the error names the file, the kind of thing, its index and the axis.
+/// Returns a point that is finite and within [`Camera::FARTHEST`]; the error names the file, the kind of thing, its
+/// index and the axis.
 pub(super) fn place(p: DVec3, element: &'static str, index: usize, path: &Path) -> Result<DVec3, IoError> {
     let Some(axis) = p.to_array().iter().position(|v| !(v.abs() <= Camera::FARTHEST)) else { return Ok(p) };
     let (property, value) = (["x", "y", "z"][axis], p[axis]);

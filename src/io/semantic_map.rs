@@ -29,7 +29,7 @@ pub use super::scene_files::MAP_FILE as FILE;
 /// Version that this program writes, and the highest it reads.
 const VERSION: u64 = 1;
 const KEY: &str = "fmlgs";
-/// Most bytes of such a file.
+/// Largest file of a semantic map, bytes.
 pub(crate) const MAX_BYTES: u64 = 256 << 20;
 
 #[derive(Serialize, Deserialize)]

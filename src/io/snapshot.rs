@@ -5,7 +5,7 @@
 //!
 //! | tag | what |
 //! |---|---|
-//! | `spz ` | the Gaussians as [`spz`], a tenth of the size, enough to view a training |
+//! | `spz ` | the Gaussians as [`spz`], a tenth of the size, enough to view a training run |
 //! | `ply ` | the Gaussians as [`splat_ply`], bit for bit those of the file, packed by zlib |
 //! | `objs` | objects and parts as [`semantic_map`], for the Gaussians of the same snapshot |
 

@@ -1,4 +1,4 @@
-//! Temporary files beside their final place, and the removal of those that killed processes left.
+//! Temporary files beside their final place, and the removal of leftovers of killed processes.
 //!
 //! A process holds the lock of every temporary file that it writes, and the system frees the locks of a process that
 //! ends. So a temporary file that can be locked is a leftover.

@@ -24,8 +24,7 @@ pub(super) fn random(n: usize, sh_degree: u8) -> GaussianCloud {
 }
 
 /// Asserts that every Gaussian of `a` equals that of `b` up to these errors: of position, log-scale, rotation (1 less
-/// the cosine of
-/// half the angle), opacity and harmonics.
+/// the cosine of half the angle), opacity and harmonics.
 pub(super) fn assert_near(a: &GaussianCloud, b: &GaussianCloud, most: [f32; 5]) {
     assert_eq!((a.len(), a.sh_degree, a.render_mode), (b.len(), b.sh_degree, b.render_mode));
     let stride = a.sh_stride();

@@ -10,7 +10,7 @@ const FOLDERS: [&str; 3] = [".", "images", "input"];
 const FEWEST: usize = 2;
 /// Endings of files in which other programs store poses.
 const POSES: [&str; 7] = ["nvm", "out", "sfm", "psx", "xml", "rcproj", "p4d"];
-/// Names of such files.
+/// Names of files in which other programs store poses.
 const POSE_FILES: [&str; 5] = ["cameras.json", "sfm_data.json", "reconstruction.json", "images.txt", "images.bin"];
 
 /// A folder of photos without camera poses.

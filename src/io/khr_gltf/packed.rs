@@ -20,7 +20,7 @@ pub(super) fn view(primitive: &SplatPrimitive) -> Option<&Value> {
     within.or_else(|| BESIDE.iter().find_map(|name| primitive.extensions.get(*name)))
 }
 
-/// Reads the Gaussians in the buffer view, in the axes of glTF: SPZ has its own, and is unpacked into those.
+/// Reads the Gaussians in the buffer view, in the axes of glTF.
 pub(super) fn cloud(gltf: &Gltf<'_>, extension: &Value) -> Result<GaussianCloud, IoError> {
     let index = extension.get("bufferView").and_then(Value::as_u64).and_then(|index| usize::try_from(index).ok());
     let index = index.ok_or_else(|| gltf.bad("a splat primitive", "its SPZ has no bufferView".into()))?;

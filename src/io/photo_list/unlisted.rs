@@ -7,7 +7,7 @@ use super::{fold, some_of};
 use crate::io::{files, photo};
 use crate::scene::Photo;
 
-/// Ends of names of pictures that belong to a photo but are none: `0001_depth.png`, `0001.mask.png`.
+/// Ends of names of pictures that accompany a photo: `0001_depth.png`, `0001.mask.png`.
 const COMPANIONS: [&str; 9] =
     ["depth", "mask", "masks", "normal", "normals", "label", "alpha", "confidence", "segmentation"];
 

@@ -19,7 +19,7 @@ const MORE_HEADER: usize = 16;
 const GZIP: &[u8; 2] = &[0x1f, 0x8b];
 /// Most bytes unpacked from one byte: gzip's own limit, which real files never approach.
 const MAX_RATIO: u64 = 1032;
-/// Fractional bits of a coordinate at most: all of its bits.
+/// Most fractional bits of a coordinate: all of its bits.
 const MAX_FRACTION: u8 = 24;
 /// Highest degree of harmonics in a file.
 const MAX_DEGREE: u8 = 4;
