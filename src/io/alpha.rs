@@ -1,5 +1,5 @@
-//! Decides by the photos what their transparent pixels are: the surroundings of a thing that was cut out, or pixels of
-//! which nothing is known.
+//! Use of the transparent pixels of photos: the surroundings of a thing that was cut out, or pixels of which nothing is
+//! known.
 
 use rayon::prelude::*;
 
@@ -7,9 +7,9 @@ use super::photo;
 use crate::math::resize::nearest;
 use crate::scene::{AlphaUse, Dataset};
 
-/// Photos that are looked at.
+/// Photos sampled for the decision.
 const SAMPLE: usize = 12;
-/// Cells along the sides of the pictures of transparency that are compared.
+/// Cells along each side of the transparency grids that are compared.
 const CELLS: usize = 32;
 /// Alpha of 255 up to which a pixel is wholly transparent.
 const CLEAR: u8 = 8;
@@ -20,7 +20,7 @@ const CLEAR_EDGE: f64 = 0.7;
 /// Share of cells that differ between photos up to which they are transparent at the same places, as behind a lens.
 const SAME: f64 = 0.02;
 
-/// How a photo is transparent.
+/// Transparency of a photo: shares of clear pixels in all and along the edges.
 struct Transparency {
     share: f64,
     edge: f64,
@@ -28,8 +28,8 @@ struct Transparency {
     cells: Vec<bool>,
 }
 
-/// Looks at some photos, and takes transparent pixels for what they then are. Where a background is stated, nothing else
-/// can be there. Photos that cannot be read are left to those who need them.
+/// Samples some photos and sets the use of transparent pixels for the dataset. With a stated background they count as
+/// empty. Photos that cannot be read are skipped here and reported by the loader.
 pub(super) fn decide(dataset: &mut Dataset) {
     let photos = &dataset.photos;
     let step = photos.len().div_ceil(SAMPLE).max(1);
@@ -42,7 +42,7 @@ pub(super) fn decide(dataset: &mut Dataset) {
     dataset.use_alpha(if stated || is_cut_out(&seen) { AlphaUse::Empty } else { AlphaUse::Ignore });
 }
 
-/// Whether much of the photos is clear, the edges too, and not at the same places in all of them.
+/// Returns whether much of the photos is clear, the edges too, and not at the same places in all of them.
 fn is_cut_out(seen: &[Transparency]) -> bool {
     let mean = |of: fn(&Transparency) -> f64| seen.iter().map(of).sum::<f64>() / seen.len() as f64;
     let differing = (0..CELLS * CELLS).filter(|&i| seen.iter().any(|s| s.cells[i] != seen[0].cells[i])).count();
@@ -50,7 +50,7 @@ fn is_cut_out(seen: &[Transparency]) -> bool {
     mean(|s| s.share) >= CLEAR_SHARE && mean(|s| s.edge) >= CLEAR_EDGE && moves
 }
 
-/// `None` of an opaque picture.
+/// Measures the transparency; `None` for an opaque picture.
 fn of_alpha((width, height, alpha): &(usize, usize, Vec<u8>)) -> Option<Transparency> {
     if alpha.iter().all(|a| *a == u8::MAX) {
         return None;
@@ -92,7 +92,7 @@ mod tests {
         // The round picture of a lens is at the same place in every photo.
         let lens: Vec<Transparency> = (0..3).map(|_| picture(|x, y| disk(x, y, (30, 20), 20))).collect();
         assert!(!is_cut_out(&lens));
-        // Persons who were taken out of photos of a street.
+        // Persons removed from photos of a street.
         let holes: Vec<Transparency> =
             [(20, 15), (35, 22), (30, 12)].map(|c| picture(|x, y| !disk(x, y, c, 12))).into_iter().collect();
         assert!(!is_cut_out(&holes));

@@ -1,4 +1,4 @@
-//! Files that are either the old one or the new one, whatever happens in between.
+//! Atomic file writes: after an interruption the old file or the new one is there, never a mixture.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
@@ -12,21 +12,20 @@ use super::files::{folder_of, sync_folder};
 use super::scene_files::refuse_scene_file;
 use super::temporary::temporary_file;
 
-/// Hears how many of the Gaussians are written; an error ends the writing.
+/// Progress callback with the number of Gaussians written; an error ends the writing.
 pub(crate) type Told<'a> = dyn FnMut(usize) -> io::Result<()> + 'a;
 
-/// Replaces `path` by what `fill` writes: a temporary file in the same folder is filled, synced
-/// and renamed over it, and the folder is synced. On any failure the temporary file is removed
-/// and what was at `path` before stays as it was. Links are followed; what is no regular file (a
-/// device, a pipe) is written into.
+/// Replaces `path` by the output of `fill`: a temporary file in the same folder is filled, synced and renamed over it,
+/// and the folder is synced. On any failure the temporary file is removed and the old content of `path` stays. Links
+/// are followed. A device or a pipe is written into.
 pub(crate) fn write(path: &Path, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), IoError> {
     let mut draft = Draft::create(path)?;
     fill(&mut draft).map_err(|cause| write_error(path, cause))?;
     draft.commit().map(drop)
 }
 
-/// A file in the making: bytes go to a temporary file beside `path`, which [`Draft::commit`] puts
-/// in its place. Dropped before that, it leaves nothing behind.
+/// A file being written: bytes go to a temporary file beside `path`, and [`Draft::commit`] puts that in place. Dropped
+/// before that, it leaves nothing behind.
 pub(crate) struct Draft {
     path: PathBuf,
     into: Into,
@@ -40,7 +39,7 @@ enum Into {
 }
 
 impl Draft {
-    /// Starts a file at `path`; what is there stays until [`Draft::commit`].
+    /// Starts a file at `path`; the old file stays until [`Draft::commit`].
     pub(crate) fn create(path: &Path) -> Result<Self, IoError> {
         let failed = |cause| write_error(path, cause);
         let real = behind_links(path).map_err(failed)?;
@@ -52,7 +51,7 @@ impl Draft {
         Self::beside(&real)
     }
 
-    /// A new file at `path`, which may be a file of a scene: for those who hold the scene's folder.
+    /// Starts a new file at `path`, which may be a file of a scene; the caller holds the scene's folder.
     pub(super) fn beside(path: &Path) -> Result<Self, IoError> {
         let file = temporary_file(path, "tmp").map_err(|cause| write_error(path, cause))?;
         Ok(Self { path: path.into(), into: Into::New(BufWriter::with_capacity(1 << 20, file)) })
@@ -61,7 +60,7 @@ impl Draft {
     /// Puts the file in its place and returns its size in bytes.
     ///
     /// # Errors
-    /// [`IoError::Write`]; what was at the path before is then unchanged.
+    /// [`IoError::Write`]; the old content of the path is then unchanged.
     pub(crate) fn commit(self) -> Result<u64, IoError> {
         let Self { path, into } = self;
         let end = || match into {
@@ -105,14 +104,14 @@ impl Seek for Draft {
     }
 }
 
-/// Whether something is at `path` that is neither file nor folder: it is written into.
+/// Returns whether `path` is neither file nor folder, such as a device or a pipe; it is then written into.
 pub(crate) fn is_stream(path: &Path) -> bool {
     fs::metadata(path).is_ok_and(|m| !m.is_file() && !m.is_dir())
 }
 
-/// Where `path` leads, also where the last link's end does not exist yet.
+/// Resolves the links of `path`, also if the end of the last one does not exist yet.
 fn behind_links(path: &Path) -> io::Result<PathBuf> {
-    /// As many as Linux follows.
+    /// Most links followed, as in Linux.
     const MOST_LINKS: usize = 40;
     let mut path = path.to_path_buf();
     for _ in 0..MOST_LINKS {

@@ -1,4 +1,4 @@
-//! Files in one archive, as the program ships them: packed always alike, unpacked all or none.
+//! Archives of files that the program ships: packed reproducibly, unpacked completely or not at all.
 
 use std::fs;
 use std::io::{self, Cursor, Read, Write};
@@ -12,7 +12,7 @@ use super::error::write_error;
 use super::files::folder_of;
 use super::temporary::temporary_folder;
 
-/// An archive of files with their names (`photos/a.jpg`). The same files make the same bytes.
+/// Packs files with their names (`photos/a.jpg`) into an archive. The same files make the same bytes.
 pub(crate) fn pack(files: &[(String, Vec<u8>)]) -> io::Result<Vec<u8>> {
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Deflated)
@@ -26,7 +26,7 @@ pub(crate) fn pack(files: &[(String, Vec<u8>)]) -> io::Result<Vec<u8>> {
     Ok(zip.finish().map_err(io::Error::other)?.into_inner())
 }
 
-/// One file of the archive; `path` is for errors.
+/// Reads one file of the archive; `path` is for errors.
 ///
 /// # Errors
 /// If the archive is broken, or has no such file.
@@ -38,7 +38,7 @@ pub(crate) fn read(bytes: &[u8], name: &str, path: &Path) -> Result<Vec<u8>, IoE
     Ok(content)
 }
 
-/// The files of the archive with their sizes in bytes; `path` is for errors.
+/// Lists the files of the archive with their sizes in bytes; `path` is for errors.
 ///
 /// # Errors
 /// If the archive is broken.
@@ -53,7 +53,7 @@ pub(crate) fn sizes(bytes: &[u8], path: &Path) -> Result<Vec<(String, u64)>, IoE
     (0..count).map(|i| of(i).map_err(broken)).collect()
 }
 
-/// Unpacks the archive into `folder`, which must not exist: afterwards it is complete, or still not there.
+/// Unpacks the archive into `folder`, which must not exist. On an error the folder still does not exist.
 ///
 /// # Errors
 /// If the archive is broken, names a place outside the folder, or the folder cannot be made.

@@ -1,10 +1,10 @@
-//! One worker a folder among machines that share nothing but its files: numbered claims, each with a heartbeat.
+//! One worker per folder, among machines that share nothing but files: numbered claims, each with a heartbeat.
 //!
-//! Who creates claim `n + 1` first takes over from the owner of claim `n`, and creating a file that must not exist yet
-//! succeeds once, on network file systems too, where locks may not work. That is allowed where claim `n` was given back,
-//! or its heartbeat stands still. Clocks of two machines are never compared: a heartbeat stands still if who watches
-//! sees no change for as long as the claim itself says. On the owner's own machine nobody waits: its claim is locked,
-//! and the system frees the lock of a process that ends, however it ends.
+//! The process that first creates claim `n + 1` takes over from the owner of claim `n`. Creating a file that must not
+//! exist yet succeeds for one process only, on network file systems too, where locks may not work. A takeover is
+//! allowed if claim `n` was given back or its heartbeat has stopped. Clocks of two machines are never compared: a
+//! heartbeat has stopped if a waiting process sees no change for as long as the claim states. On the owner's own
+//! machine nobody waits: its claim is locked, and the system frees the lock of a process that ends, however it ends.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
@@ -22,24 +22,24 @@ use super::{IoError, files};
 
 /// Folder of the claims.
 const FOLDER: &str = "claims";
-/// Every claim has this many bytes, so that it is written in place at once.
+/// Size of every claim in bytes; fixed, so that a claim is overwritten in place by one write.
 const BYTES: usize = 512;
-/// Heartbeats in the time after which a claim that stands still is taken over.
+/// Heartbeats within the time after which a stopped claim is taken over.
 const BEATS: u32 = 12;
 
-/// Who works in a folder, as the claim says.
+/// Content of a claim: the process that works in the folder.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Owner {
     host: String,
-    /// What two processes have in common whose locks see each other.
+    /// System and mount namespace; two processes with the same value see each other's locks.
     machine: String,
     process: u32,
-    /// Whether the claim is locked for as long as the process lives.
+    /// True if the claim is locked for as long as the process lives.
     locked: bool,
-    /// Seconds without a heartbeat after which it is taken over.
+    /// Seconds without a heartbeat after which the claim is taken over.
     takeover_secs: f64,
     beats: u64,
-    /// Whether the work was ended or left to whoever comes next.
+    /// True if the work has ended or was left to the next process.
     given_back: bool,
 }
 
@@ -65,39 +65,40 @@ impl Owner {
     }
 }
 
-/// The name of this machine, cut so that a claim has room for it.
+/// Name of this machine, cut so that it fits a claim.
 pub(crate) fn host() -> String {
     let plain = |c: &char| c.is_ascii_alphanumeric() || ".-_".contains(*c);
     sysinfo::System::host_name().unwrap_or_default().chars().filter(plain).take(64).collect()
 }
 
-/// The running system and what of it this process sees: containers of one machine may not see each other's locks.
+/// Id of the running system and of this process's mount namespace: containers of one machine may not see each other's
+/// locks.
 fn machine(host: &str) -> String {
     let boot = fs::read_to_string("/proc/sys/kernel/random/boot_id");
     let mounts = fs::read_link("/proc/self/ns/mnt").map(|p| p.display().to_string()).unwrap_or_default();
     boot.map_or_else(|_| host.to_owned(), |boot| format!("{} {mounts}", boot.trim()))
 }
 
-/// What somebody who waits for a folder has seen of its claims.
+/// Claims of a folder as a waiting process has seen them.
 #[derive(Default)]
 pub(crate) struct Watch {
     seen: Option<(u64, Vec<u8>, Instant)>,
     beating: bool,
 }
 
-/// What came of wanting a folder.
+/// Result of an attempt to take a folder.
 pub(crate) enum Taken {
     Mine(Claim),
-    /// Somebody else's.
+    /// Claimed by another process.
     Held {
         /// Host and process.
         by: String,
-        /// Whether its heart was seen to beat.
+        /// True if its heartbeat was seen to change.
         beating: bool,
     },
 }
 
-/// Takes `folder`, which exists. A claim without a readable word in it counts as one of `takeover`.
+/// Takes `folder`, which exists. A claim that cannot be parsed counts as one with the timeout `takeover`.
 ///
 /// # Errors
 /// If claims cannot be read or written.
@@ -114,7 +115,7 @@ pub(crate) fn take(folder: &Path, takeover: Duration, watch: &mut Watch) -> Resu
     let path = claims.join(format!("{number:06}.json"));
     let mut options = OpenOptions::new();
     match options.read(true).write(true).create_new(true).open(&path) {
-        // Another was first.
+        // Another process created the claim first.
         Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {
             Ok(Taken::Held { by: "another process".into(), beating: false })
         }
@@ -122,7 +123,7 @@ pub(crate) fn take(folder: &Path, takeover: Duration, watch: &mut Watch) -> Resu
     }
 }
 
-/// Who holds `folder`, if somebody does as far as can be seen without waiting.
+/// Returns the process that holds `folder`, if there is one as far as can be seen without waiting.
 pub(crate) fn holder(folder: &Path) -> Result<Option<String>, IoError> {
     let Some((number, path)) = last(&folder.join(FOLDER))? else { return Ok(None) };
     let held = held(number, &path, Duration::MAX, &mut Watch::default())?;
@@ -132,14 +133,14 @@ pub(crate) fn holder(folder: &Path) -> Result<Option<String>, IoError> {
     }))
 }
 
-/// Whether whoever claimed `folder` last has neither ended nor given it back: it may work there, or have died there.
+/// Returns whether the last owner of `folder` has neither ended nor given it back: it may still work, or have crashed.
 pub(crate) fn was_left(folder: &Path) -> bool {
     let Ok(Some((_, path))) = last(&folder.join(FOLDER)) else { return false };
     let owner = files::read(&path, BYTES as u64).ok().and_then(|bytes| serde_json::from_slice::<Owner>(&bytes).ok());
     owner.is_none_or(|owner| !owner.given_back)
 }
 
-/// Number and path of the last claim.
+/// Returns number and path of the last claim.
 fn last(claims: &Path) -> Result<Option<(u64, PathBuf)>, IoError> {
     let entries = match fs::read_dir(claims) {
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
@@ -149,10 +150,10 @@ fn last(claims: &Path) -> Result<Option<(u64, PathBuf)>, IoError> {
     Ok(entries.flatten().filter_map(|e| Some((number(&e.path())?, e.path()))).max_by_key(|(n, _)| *n))
 }
 
-/// The claim as somebody else's, unless it may be taken over.
+/// Returns the claim as held by another process; `None` if it may be taken over.
 fn held(number: u64, path: &Path, takeover: Duration, watch: &mut Watch) -> Result<Option<Taken>, IoError> {
     let bytes = match files::read(path, BYTES as u64) {
-        // Whoever has come since has removed it.
+        // A later owner has removed it.
         Err(IoError::Read { cause, .. }) if cause.kind() == io::ErrorKind::NotFound => Vec::new(),
         bytes => bytes?,
     };
@@ -178,13 +179,13 @@ fn held(number: u64, path: &Path, takeover: Duration, watch: &mut Watch) -> Resu
     Ok(Some(Taken::Held { by, beating: watch.beating }))
 }
 
-/// Whether nobody has the lock of a file that its owner locks for life.
+/// Returns whether the lock of a file is free that its owner holds for life.
 fn is_free(path: &Path) -> bool {
     // Some network file systems lock only what may be written.
     OpenOptions::new().read(true).write(true).open(path).is_ok_and(|file| file.try_lock().is_ok())
 }
 
-/// A folder that is this process's to work in. Dropped, it is given back.
+/// A folder claimed by this process. Dropped, it is given back.
 pub(crate) struct Claim {
     number: u64,
     path: PathBuf,
@@ -197,8 +198,8 @@ impl Claim {
     fn start(mut file: File, path: PathBuf, number: u64, takeover: Duration) -> Result<Self, IoError> {
         let failed = |cause| write_error(&path, cause);
         let mut owner = Owner::here(takeover);
-        // Before there is a word in it by which others would try the lock.
-        // Where locks keep others from reading, the heartbeat has to do.
+        // Locked before the owner is written, as others try the lock once they can read it. If the lock fails, the
+        // heartbeat alone has to do.
         owner.locked = cfg!(unix) && file.try_lock().is_ok();
         owner.write(&mut file).map_err(failed)?;
         let file = Arc::new(Mutex::new((file, owner)));
@@ -215,7 +216,7 @@ impl Claim {
                     let mut file = file.lock().unwrap_or_else(PoisonError::into_inner);
                     let (file, owner) = &mut *file;
                     owner.beats += 1;
-                    // Where that fails for long, another takes over.
+                    // If this fails for long, another process takes over.
                     let _ = owner.write(file);
                 }
             }
@@ -224,23 +225,23 @@ impl Claim {
         Ok(Self { number, path, file, lost, heart: Some((stop, heart)) })
     }
 
-    /// How many had claimed the folder, this one included.
+    /// Number of claims of the folder so far, this one included.
     pub(crate) fn number(&self) -> u64 {
         self.number
     }
 
-    /// Set once another has taken over, because this process stood still for too long.
+    /// Flag that is set once another process has taken over because this one stopped for too long.
     pub(crate) fn lost(&self) -> Arc<AtomicBool> {
         Arc::clone(&self.lost)
     }
 
-    /// Whether another has taken over, as of now.
+    /// Returns whether another process has taken over by now.
     pub(crate) fn is_lost(&self) -> bool {
         self.lost.load(Ordering::SeqCst) || is_superseded(self.number, &self.path)
     }
 
-    /// Removes the claims before this one. For work that is done for good: before, a process that looked at them long
-    /// ago could take a number for free that was taken.
+    /// Removes the claims before this one. To be called only once the work is done for good: earlier, a process with an
+    /// old listing could take a number as free that was in use.
     pub(crate) fn forget_earlier(&self) {
         let Some(folder) = self.path.parent() else { return };
         for number in 1..self.number {
@@ -249,7 +250,7 @@ impl Claim {
     }
 }
 
-/// Whether there is a claim after this one.
+/// Returns whether there is a claim after this one.
 fn is_superseded(number: u64, path: &Path) -> bool {
     path.parent().is_some_and(|claims| matches!(last(claims), Ok(Some((n, _))) if n > number))
 }
@@ -263,7 +264,7 @@ impl Drop for Claim {
         let mut file = self.file.lock().unwrap_or_else(PoisonError::into_inner);
         let (file, owner) = &mut *file;
         owner.given_back = true;
-        // Else its lock, or a heartbeat that stands still, says the same.
+        // If this fails, the free lock or the stopped heartbeat says the same.
         let _ = owner.write(file);
     }
 }

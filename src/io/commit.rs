@@ -1,8 +1,8 @@
-//! Several files of one folder that change together or not at all.
+//! Changes of several files of one folder, carried out together or not at all.
 //!
-//! Each is written beside its place first. Then one file, the journal, is put into the folder: it
-//! says which are to be renamed to what, and from then on the change is decided. Whoever finds a
-//! journal carries out what is left of it; who finds none finds the files as they were.
+//! Each file is first written beside its place. Then one file, the journal, is put into the folder: it lists the
+//! renames, and from then on the change is decided. A process that finds a journal carries out the rest of it; without
+//! a journal the old files are valid.
 
 use std::fs::{self, File};
 use std::io::{self, Write};
@@ -22,7 +22,7 @@ const MAX_BYTES: u64 = 1 << 16;
 
 #[derive(Default, Serialize, Deserialize)]
 struct Journal {
-    /// Temporary names, and what they become.
+    /// Temporary names and final names.
     put: Vec<(String, String)>,
     remove: Vec<String>,
 }
@@ -35,12 +35,12 @@ pub(super) struct Commit<'a> {
 }
 
 impl<'a> Commit<'a> {
-    /// Of files in `folder`, which the caller holds.
+    /// Starts a change in `folder`, which the caller holds.
     pub(crate) fn new(folder: &'a Path) -> Self {
         Self { folder, drafts: Vec::new(), remove: Vec::new() }
     }
 
-    /// Writes what `name` is to be.
+    /// Writes the new content of `name` to a temporary file.
     pub(crate) fn add(
         &mut self,
         name: &str,
@@ -58,16 +58,16 @@ impl<'a> Commit<'a> {
         Ok(())
     }
 
-    /// `name` is to go, if it is there.
+    /// Marks `name` for removal, if it exists.
     pub(crate) fn remove(&mut self, name: &str) {
         self.remove.push(name.into());
     }
 
-    /// Puts all in place.
+    /// Puts all files in place.
     ///
     /// # Errors
-    /// If the change could not be decided: all is as before. Or if it was, but not all files could be
-    /// renamed: whoever opens the folder next does that.
+    /// If the change could not be decided: all is as before. Or if it was, but not all files could be renamed: the next
+    /// process that opens the folder completes it.
     pub(crate) fn finish(self) -> Result<(), IoError> {
         let Self { folder, drafts, remove } = self;
         let name = |file: &NamedTempFile| file.path().file_name().map(|n| n.to_string_lossy().into_owned());
@@ -76,10 +76,10 @@ impl<'a> Commit<'a> {
         let text = serde_json::to_vec(&Journal { put, remove }).map_err(|e| write_error(&path, io::Error::other(e)))?;
         let mut journal = Draft::beside(&path)?;
         journal.write_all(&text).map_err(|cause| write_error(&path, cause))?;
-        // Kept from now on, and held until they are in place.
+        // Kept and held until all files are in place, so that no sweep removes them.
         let kept: Vec<_> = drafts.into_iter().map(|(file, _)| file.into_parts()).collect();
         if let Err(e) = journal.commit() {
-            // Dropping the parts removes the files, unless the journal stands after all.
+            // Dropping the parts removes the files, unless the journal is in place after all.
             if is_pending(folder) {
                 kept.into_iter().for_each(|(_, path)| drop(path.keep()));
             }
@@ -96,7 +96,7 @@ impl<'a> Commit<'a> {
     }
 }
 
-/// Carries out a change that was decided; the caller holds the folder. Does nothing where there is none.
+/// Carries out a decided change; the caller holds the folder. Does nothing without a journal.
 pub(super) fn carry_out(folder: &Path) -> Result<(), IoError> {
     if !is_pending(folder) {
         return Ok(());
@@ -174,7 +174,7 @@ mod tests {
         assert_eq!(state(folder.path()), of(&[("a", "new"), ("b", "new")]));
     }
 
-    /// Stopped after the decision and after any number of renames, the change is carried out by the next.
+    /// Interrupted after the decision and after any number of renames, the change is completed by the next process.
     #[test]
     fn what_was_decided_is_carried_out_by_whoever_comes_next() {
         for renamed in 0..=2 {

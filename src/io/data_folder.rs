@@ -1,10 +1,10 @@
-//! Where a user's data lies.
+//! Location of the user's data.
 
 use std::ffi::OsString;
 use std::path::PathBuf;
 
-/// The folder for the program's data: below the user's data folder; below the system's temporary
-/// folder where there is none.
+/// Returns the folder for the program's data: below the user's data folder, or below the system's temporary folder if
+/// there is none.
 pub(crate) fn data_folder() -> PathBuf {
     base(|name| std::env::var_os(name)).unwrap_or_else(std::env::temp_dir).join("fmlgs")
 }

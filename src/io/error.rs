@@ -1,5 +1,4 @@
-//! What can go wrong with files: every error names the file, the place in it and, where there is
-//! one, the remedy.
+//! Errors of reading and writing files: each names the file, the place in it and, if there is one, the remedy.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -17,7 +16,7 @@ pub enum IoError {
         #[source]
         cause: io::Error,
     },
-    /// The operating system refused to write. What was there before is untouched.
+    /// The operating system refused to write. The old content is untouched.
     #[error("cannot write {path}: {cause}; {remedy}")]
     Write {
         path: PathBuf,
@@ -86,13 +85,13 @@ pub enum IoError {
 }
 
 impl IoError {
-    /// Something at `place` of a file that does not follow its format.
+    /// Makes an error about `place` of a file that does not follow its format.
     pub(crate) fn syntax(path: &Path, place: impl Into<String>, reason: impl Into<String>) -> Self {
         Self::Syntax { path: path.into(), place: place.into(), reason: reason.into() }
     }
 }
 
-/// Why a path could not be opened.
+/// Reason why a path could not be opened.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum OpenError {
@@ -100,7 +99,7 @@ pub enum OpenError {
     NotFound { path: PathBuf },
     #[error("{path} is not a scene, splat or photo set that FMLGS can open. Looked for: {looked_for}. Found: {found}.")]
     Unrecognized { path: PathBuf, looked_for: String, found: String },
-    /// Photos alone.
+    /// Photos without camera poses.
     #[error("{}: {} photos, no camera poses{}", .0.images.display(), .0.photos.len(), .0.in_brackets())]
     NoPoses(Box<Unposed>),
     #[error("{path} is {what}; unpack it, with {command}, and open the folder")]
@@ -113,12 +112,12 @@ pub(crate) fn write_error(path: &Path, cause: io::Error) -> IoError {
     IoError::Write { path: path.into(), remedy: remedy(cause.kind()), cause }
 }
 
-/// What the user can do about a version that is not read.
+/// Remedy for an unsupported version.
 fn version_remedy(found: u64, supported: u64) -> &'static str {
     if found > supported { "update the program" } else { "there was never such a version: the file is damaged" }
 }
 
-/// What the user can do about a failed write.
+/// Remedy for a failed write.
 fn remedy(kind: io::ErrorKind) -> &'static str {
     use io::ErrorKind as K;
     match kind {

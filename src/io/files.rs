@@ -25,9 +25,8 @@ pub(crate) fn sync_folder(folder: &Path) -> io::Result<()> {
     if cfg!(unix) { std::fs::File::open(folder)?.sync_all() } else { Ok(()) }
 }
 
-/// Opens a file to be read, if it is a regular one. A pipe would keep the program waiting and a
-/// device has no end, so both are refused before they are opened; every read of a file that a
-/// person or another file names goes through here.
+/// Opens a file for reading, if it is a regular one. Pipes and devices are refused before they are opened: a pipe would
+/// block the program and a device has no end. Every file named by a user or by another file is opened here.
 pub fn open(path: &Path) -> Result<File, IoError> {
     let failed = |cause| IoError::Read { path: path.into(), cause };
     if !fs::metadata(path).map_err(failed)?.is_file() {
@@ -54,7 +53,7 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// The whole file, if it is a regular one of at most `limit` bytes that [`memory::budget`] allows.
+/// Reads the whole file, if it is a regular one of at most `limit` bytes and within [`memory::budget`].
 pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
     let failed = |cause| IoError::Read { path: path.into(), cause };
     let file = open(path)?;
@@ -79,7 +78,7 @@ pub(crate) fn read(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
     Ok(bytes)
 }
 
-/// The first `limit` bytes of a file, or all of it if it is shorter.
+/// Reads the first `limit` bytes of a file, or all of a shorter one.
 pub(crate) fn read_start(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
     let mut bytes = Vec::new();
     let read = open(path)?.take(limit).read_to_end(&mut bytes);
@@ -87,7 +86,7 @@ pub(crate) fn read_start(path: &Path, limit: u64) -> Result<Vec<u8>, IoError> {
     Ok(bytes)
 }
 
-/// The text of a UTF-8 file of at most [`MAX_TEXT_BYTES`], without a byte order mark.
+/// Reads the text of a UTF-8 file of at most [`MAX_TEXT_BYTES`], without a byte order mark.
 pub(crate) fn read_text(path: &Path) -> Result<String, IoError> {
     let bytes = read(path, MAX_TEXT_BYTES)?;
     let text = str::from_utf8(without_mark(&bytes, path)?);
@@ -99,19 +98,19 @@ pub(crate) fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<T
     json(&read(path, MAX_TEXT_BYTES)?, path)
 }
 
-/// The value that the bytes of a JSON file hold; `path` is for errors. Every JSON file is parsed here.
+/// Parses the bytes of a JSON file; `path` is for errors. Every JSON file is parsed here.
 pub(crate) fn json<'a, T: serde::Deserialize<'a>>(bytes: &'a [u8], path: &Path) -> Result<T, IoError> {
     serde_json::from_slice(without_mark(bytes, path)?).map_err(|e| json_error(path, &e))
 }
 
-/// The bytes of a text file after the mark by which Windows' programs say that it is UTF-8.
+/// Strips the byte order mark that Windows programs put before UTF-8 text.
 ///
 /// # Errors
 /// If the file is UTF-16 or UTF-32, which no format read here is.
 pub(crate) fn without_mark<'a>(bytes: &'a [u8], path: &Path) -> Result<&'a [u8], IoError> {
     match bytes {
         [0xEF, 0xBB, 0xBF, text @ ..] => Ok(text),
-        // With a mark; or without one, where every second byte of a plain letter is zero.
+        // With a byte order mark, or without one if every second byte of a plain letter is zero.
         [0xFF, 0xFE, ..] | [0xFE, 0xFF, ..] | [0, 1..=127, ..] | [1..=127, 0, ..] => Err(IoError::syntax(
             path,
             "byte 0",
@@ -121,14 +120,14 @@ pub(crate) fn without_mark<'a>(bytes: &'a [u8], path: &Path) -> Result<&'a [u8],
     }
 }
 
-/// Whether a file's or folder's name is one that systems leave everywhere (`._a.jpg`, `.DS_Store`, `__MACOSX`,
-/// `Thumbs.db`), or hidden: nothing that a person put there to be read.
+/// Returns whether a name is hidden or one that systems leave everywhere (`._a.jpg`, `.DS_Store`, `__MACOSX`,
+/// `Thumbs.db`), so nothing that the user put there.
 pub(crate) fn is_debris(name: &str) -> bool {
     let others = ["__MACOSX", "Thumbs.db", "ehthumbs.db", "desktop.ini", "@eaDir"];
     name.starts_with('.') || others.iter().any(|o| name.eq_ignore_ascii_case(o))
 }
 
-/// The file or folder of this path below `folder`, in other letters where nothing is called just so and one thing alike.
+/// Finds the path `name` below `folder`, ignoring letter case if there is no exact match and a single similar one.
 pub(crate) fn called(folder: &Path, name: &str) -> Option<PathBuf> {
     let exact = folder.join(name);
     if exact.exists() {
@@ -144,7 +143,7 @@ pub(crate) fn called(folder: &Path, name: &str) -> Option<PathBuf> {
     })
 }
 
-/// Names in a folder without [debris](is_debris), sorted. Names that are not UTF-8 are passed over.
+/// Lists names in a folder without [debris](is_debris), sorted. Names that are not UTF-8 are skipped.
 pub(crate) fn names_in(folder: &Path) -> io::Result<Vec<String>> {
     let mut names = Vec::new();
     for entry in fs::read_dir(folder)? {
@@ -154,7 +153,7 @@ pub(crate) fn names_in(folder: &Path) -> io::Result<Vec<String>> {
     Ok(names)
 }
 
-/// A JSON error with its place taken apart.
+/// Makes an error of a JSON error, with its line and column.
 pub(crate) fn json_error(path: &Path, e: &serde_json::Error) -> IoError {
     let text = e.to_string();
     let reason = text.rsplit_once(" at line ").map_or(text.as_str(), |(reason, _)| reason);
@@ -184,8 +183,8 @@ pub(crate) fn relative(root: &Path, entry: &str, source: &Path) -> Result<String
     Ok(parts.join("/"))
 }
 
-/// The existing file `root/entry` once its symbolic links are followed, which must stay inside
-/// `root`; `None` if it does not exist. `entry` comes from [`relative`].
+/// Resolves the symbolic links of `root/entry`, which must stay inside `root`; `None` if the file does not exist.
+/// `entry` comes from [`relative`].
 pub(crate) fn inside(root: &Path, entry: &str, source: &Path) -> Result<Option<PathBuf>, IoError> {
     let path = root.join(entry);
     let Ok(real) = fs::canonicalize(&path) else { return Ok(None) };
@@ -196,7 +195,7 @@ pub(crate) fn inside(root: &Path, entry: &str, source: &Path) -> Result<Option<P
     Ok(Some(path))
 }
 
-/// Refuses the name of a photo that no file can have. `source` lists it.
+/// Refuses a photo name that no file can have. `source` lists it.
 pub(crate) fn photo_name(name: &str, source: &Path) -> Result<(), IoError> {
     let most = text::LONGEST_PHOTO_NAME;
     match name.chars().count() {
@@ -209,20 +208,20 @@ pub(crate) fn photo_name(name: &str, source: &Path) -> Result<(), IoError> {
     }
 }
 
-/// Whether a folder holds anything but hidden files: locks, and what a process that was killed left.
+/// Returns whether a folder holds anything but hidden files such as locks and leftovers of killed processes.
 pub(crate) fn holds_something(folder: &Path) -> bool {
     let hidden = |e: &fs::DirEntry| e.file_name().to_string_lossy().starts_with('.');
     fs::read_dir(folder).is_ok_and(|all| all.flatten().any(|e| !hidden(&e)))
 }
 
-/// The name of a folder for display, also where its path ends in `.` or `..`.
+/// Name of a folder for display, also if its path ends in `.` or `..`.
 pub(crate) fn folder_name(folder: &Path) -> String {
     let real = fs::canonicalize(folder).unwrap_or_else(|_| folder.into());
     text::name(&real.file_name().unwrap_or(real.as_os_str()).to_string_lossy())
 }
 
-/// The path `now` of something that was called `earlier` by another version: it is renamed once, and used as it
-/// is where that is not possible.
+/// Returns the path `now` of something named `earlier` by another version. It is renamed once; if that fails, `earlier`
+/// is used.
 pub(crate) fn renamed(now: PathBuf, earlier: PathBuf) -> PathBuf {
     if !now.exists() && earlier.exists() && fs::rename(&earlier, &now).is_err() {
         return earlier;
@@ -230,7 +229,7 @@ pub(crate) fn renamed(now: PathBuf, earlier: PathBuf) -> PathBuf {
     now
 }
 
-/// Copies a file. Which of the two a failure is of, the system does not say by itself: `failed` is told.
+/// Copies a file. `failed` gets the path, source or target, that an error belongs to; the system does not report it.
 pub(crate) fn copy<E>(from: &Path, to: &Path, failed: impl Fn(&Path, io::Error) -> E) -> Result<(), E> {
     let mut source = fs::File::open(from).map_err(|e| failed(from, e))?;
     let mut target = fs::File::create(to).map_err(|e| failed(to, e))?;

@@ -1,4 +1,4 @@
-//! One writer a folder: a file in it that is locked for as long as somebody writes there.
+//! One writer per folder: a file in it is locked for as long as a process writes there.
 //!
 //! The system frees the lock of a process that ends, however it ends.
 
@@ -10,10 +10,10 @@ use super::IoError;
 use super::error::write_error;
 
 pub(super) const FILE: &str = ".fmlgs.lock";
-/// Longest description of a writer that is read.
+/// Longest description of the lock's holder that is read, bytes.
 const MAX_BYTES: u64 = 200;
 
-/// A folder that nobody else writes into.
+/// A folder locked for writing by this process.
 #[derive(Debug)]
 pub(crate) struct FolderLock {
     folder: PathBuf,
@@ -40,12 +40,12 @@ impl FolderLock {
                 Err(TryLockError::Error(e)) if e.kind() != io::ErrorKind::Unsupported => return Err(failed(e)),
                 _ => {}
             }
-            // The one before may have removed the file between opening and locking.
+            // The previous holder may have removed the file between opening and locking.
             if !is_at(&file, &path) {
                 continue;
             }
             let told = format!("process {} ({what})", std::process::id());
-            // For people only, so a full disk does not matter.
+            // Shown to users only, so a full disk does not matter.
             let _ = file.set_len(0).and_then(|()| file.rewind()).and_then(|()| file.write_all(told.as_bytes()));
             return Ok(Self { folder: folder.into(), _file: file });
         }
@@ -58,14 +58,14 @@ impl FolderLock {
 
 impl Drop for FolderLock {
     fn drop(&mut self) {
-        // While it is still locked, so that it is nobody else's.
+        // Removed while it is still locked, so that it cannot be another process's lock.
         if cfg!(unix) {
             let _ = fs::remove_file(self.folder.join(FILE));
         }
     }
 }
 
-/// Whether `file` is what is at `path`.
+/// Returns whether `file` is still the file at `path`.
 #[cfg(unix)]
 fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -73,7 +73,7 @@ fn is_at(file: &File, path: &Path) -> bool {
     matches!((file.metadata().map(id), fs::metadata(path).map(id)), (Ok(a), Ok(b)) if a == b)
 }
 
-/// Elsewhere the file is never removed.
+/// Always true: outside of Unix the lock file is never removed.
 #[cfg(not(unix))]
 fn is_at(_: &File, _: &Path) -> bool {
     true
@@ -93,7 +93,7 @@ mod tests {
         drop(first);
         drop(FolderLock::take(folder.path(), "finding objects").expect("free again"));
         assert_eq!(fs::read_dir(folder.path()).expect("list").count(), usize::from(!cfg!(unix)));
-        // What a killed process left is in nobody's way.
+        // A lock file left by a killed process blocks nobody.
         fs::write(folder.path().join(FILE), "process 1 (training)").expect("written");
         drop(FolderLock::take(folder.path(), "training").expect("free"));
         assert!(FolderLock::take(&folder.path().join("missing"), "x").is_err());

@@ -6,9 +6,8 @@
 //! Draco (`KHR_draco_mesh_compression`) and meshoptimizer (`EXT_meshopt_compression`).
 //! Left out: animation, skinning, morph targets, cameras and lights.
 //!
-//! Nothing in a file is believed: every index is looked up, every byte range is checked against the
-//! bytes that are really there, decoded data counts against a budget, and files named by a scene
-//! must lie in the scene's own folder.
+//! No file is trusted: every index is looked up, every byte range is checked against the bytes present, decoded data
+//! counts against a budget, and files named by a scene must lie in its own folder.
 
 mod accessor;
 mod geometry;
@@ -37,7 +36,7 @@ pub(crate) use model::{AlphaMode, Material, Mesh, MeshNode, MeshPrimitive, MeshS
 const MAX_FILE_BYTES: u64 = 2 << 30;
 /// Most values that all accessors together may decode to (4 bytes each).
 const MAX_VALUES: u64 = 256 << 20;
-/// How many values may be decoded for each byte in the buffers.
+/// Most values decoded per byte in the buffers.
 const MAX_SHARING: u64 = 64;
 /// Most nodes and most primitives.
 const MAX_ITEMS: usize = 1 << 20;
@@ -59,7 +58,7 @@ fn read_bytes(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<MeshSc
     let root: Root = parse(text, path)?;
     if let Some(extension) = root.extensions_required.iter().find(|e| !supported(e)) {
         let what = format!("the required extension {extension}");
-        // gltf-transform reads what it can unpack, and writes it plain.
+        // gltf-transform unpacks the formats that it supports, and writes them plain.
         let remedy = match extension.contains("compression") || extension.contains("meshopt") {
             true => "unpack it with 'gltf-transform copy IN OUT.glb', or pack it with 'gltfpack -c'",
             false => "export the scene without it",
@@ -78,14 +77,14 @@ pub(super) fn parse<T: serde::de::DeserializeOwned>(text: &[u8], path: &Path) ->
     files::json(text, path)
 }
 
-/// Whether a scene that requires the extension can be drawn right: those that only refine the look
-/// of a surface may be ignored.
+/// Returns whether a scene that requires the extension can be drawn correctly. Extensions that only refine the look of
+/// a surface may be ignored.
 fn supported(extension: &str) -> bool {
     let exact = ["KHR_texture_transform", "KHR_mesh_quantization", "KHR_lights_punctual", "KHR_xmp_json_ld"];
     exact.contains(&extension) || [MESHOPT, DRACO].contains(&extension) || extension.starts_with("KHR_materials_")
 }
 
-/// A parsed file while its content is taken over.
+/// A parsed file during conversion.
 pub(super) struct File<'a> {
     path: &'a Path,
     folder: Option<&'a Path>,
@@ -93,13 +92,13 @@ pub(super) struct File<'a> {
     buffers: Vec<std::borrow::Cow<'a, [u8]>>,
     values_left: Cell<u64>,
     packed: PackedFile,
-    /// Views that were packed.
+    /// Unpacked content of packed buffer views.
     unpacked: Vec<OnceCell<Vec<u8>>>,
     warnings: Vec<String>,
 }
 
 impl<'a> File<'a> {
-    /// Loads the buffers of a file whose binary chunk is `blob`; its limits are the bytes of all buffers, and the values
+    /// Loads the buffers of a file whose binary chunk is `blob`. `limits` are the bytes of all buffers, and the values
     /// that all accessors together may decode to.
     pub fn open(
         root: &'a Root,
@@ -111,7 +110,7 @@ impl<'a> File<'a> {
         Self::open_packed(root, path, folder, blob, limits, PackedFile::default())
     }
 
-    /// The same of a file some of whose geometry is packed.
+    /// As [`open`](Self::open), for a file with packed geometry.
     fn open_packed(
         root: &'a Root,
         path: &'a Path,
@@ -122,19 +121,19 @@ impl<'a> File<'a> {
     ) -> Result<Self, IoError> {
         let is_empty = |buffer| packed.is_fallback(buffer);
         let buffers = resource::load_buffers(root, path, folder, blob, most_bytes, &is_empty)?;
-        // Primitives may share vertices, but a small file that decodes to gigabytes means harm.
+        // Primitives may share vertices, but a small file that decodes to gigabytes is hostile.
         let held = buffers.iter().map(|b| b.len() as u64).sum::<u64>();
         let values_left = Cell::new(held.saturating_mul(MAX_SHARING).clamp(1 << 20, most_values));
         let unpacked = (0..root.buffer_views.len()).map(|_| OnceCell::new()).collect();
         Ok(Self { path, folder, root, buffers, values_left, packed, unpacked, warnings: Vec::new() })
     }
 
-    /// Something at `place` that does not follow the format.
+    /// Makes an error about `place`, which does not follow the format.
     pub(crate) fn content(&self, place: impl Into<String>, problem: impl Into<String>) -> IoError {
         IoError::Syntax { path: self.path.into(), place: place.into(), reason: problem.into() }
     }
 
-    /// `list[index]`, or an error that names both.
+    /// Returns `list[index]`, or an error that names both.
     fn item<'l, T>(&self, list: &'l [T], index: usize, name: &str, place: &str) -> Result<&'l T, IoError> {
         list.get(index)
             .ok_or_else(|| self.content(place, format!("refers to {name}[{index}], but there are {}", list.len())))
@@ -209,7 +208,7 @@ impl<'a> File<'a> {
     }
 }
 
-/// The node's own transform; not finite where the file's numbers are not.
+/// The node's own transform; not finite if the file's numbers are not.
 fn local_transform(node: &json::Node) -> DMat4 {
     if let Some(m) = node.matrix {
         return DMat4::from_cols_array(&m.map(f64::from));

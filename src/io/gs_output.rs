@@ -1,5 +1,5 @@
-//! What 3D Gaussian Splatting's training leaves beside a splat: `cameras.json` with the photos' cameras, `cfg_args` with
-//! where the photos were and over which background.
+//! Files that 3D Gaussian Splatting's training leaves beside a splat: `cameras.json` with the photos' cameras,
+//! `cfg_args` with the photos' folder and the background.
 
 use std::path::{Path, PathBuf};
 
@@ -16,13 +16,13 @@ const SETTINGS: &str = "cfg_args";
 const CLOUDS: &str = "point_cloud";
 const CLOUD: &str = "point_cloud.ply";
 
-/// What lies beside a splat.
+/// Training output found beside a splat.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct GsOutput {
-    /// The folder of it all.
+    /// Folder of the training output.
     pub(crate) folder: PathBuf,
     pub(crate) cameras: Vec<SceneCamera>,
-    /// Where the photos were when it was trained.
+    /// Folder of the photos at training time.
     pub(crate) source: Option<PathBuf>,
     pub(crate) white_background: bool,
     pub(crate) warnings: Vec<String>,
@@ -43,7 +43,7 @@ struct Entry {
     fy: f64,
 }
 
-/// The splat of a folder that 3D Gaussian Splatting wrote: that of the latest iteration.
+/// Finds the splat of the latest iteration in a folder that 3D Gaussian Splatting wrote.
 pub(crate) fn latest(folder: &Path) -> Option<PathBuf> {
     let is_iteration = folder.file_name().is_some_and(|name| name.to_string_lossy().starts_with("iteration_"));
     if is_iteration && folder.join(CLOUD).is_file() {
@@ -57,7 +57,7 @@ pub(crate) fn latest(folder: &Path) -> Option<PathBuf> {
     Some(clouds.join(latest.1).join(CLOUD))
 }
 
-/// What lies beside `splat`, or above it where that is in `point_cloud/iteration_<n>`.
+/// Reads the training output beside `splat`, or above it if that is in `point_cloud/iteration_<n>`.
 pub(crate) fn beside(splat: &Path) -> Option<GsOutput> {
     let folder = files::folder_of(splat);
     let is_called = |path: &Path, start: &str| path.file_name().is_some_and(|n| n.to_string_lossy().starts_with(start));
@@ -89,7 +89,7 @@ pub(crate) fn beside(splat: &Path) -> Option<GsOutput> {
     Some(found)
 }
 
-/// Whether a camera's name is a photo's: 3D Gaussian Splatting keeps no folders, and no endings.
+/// Returns whether a camera's name is that of a photo: 3D Gaussian Splatting drops folders and endings.
 pub(crate) fn is_of(camera: &str, photo: &str) -> bool {
     let file = photo.rsplit('/').next().unwrap_or(photo);
     camera == photo || camera == file || camera == labels::stem(photo)
@@ -111,10 +111,10 @@ fn value<'a>(text: &'a str, key: &str) -> Option<&'a str> {
     }
 }
 
-/// The cameras of the file that can be ones; the others are told.
+/// Reads the valid cameras of the file; the others are reported in `warnings`.
 fn cameras(file: &Path, is_split: bool, warnings: &mut Vec<String>) -> Result<Vec<SceneCamera>, IoError> {
     let entries: Vec<Entry> = files::read_json(file)?;
-    // The photos that were held out come first, then the others; each sorted by name.
+    // Held-out photos come first, then the training photos; each list is sorted by name.
     let falls: Vec<usize> = (1..entries.len()).filter(|i| entries[*i].img_name < entries[i - 1].img_name).collect();
     let held_out = match falls.as_slice() {
         [one] if is_split => *one,

@@ -1,5 +1,5 @@
-//! Requests over the network, each on a thread of its own, so that whoever asks can stop waiting at any
-//! moment. What is on this machine is never asked through a proxy.
+//! HTTP requests, each on a thread of its own, so that the caller can stop waiting at any moment. Addresses of this
+//! machine are never requested through a proxy.
 
 use std::io::{self, Read};
 use std::net::IpAddr;
@@ -11,26 +11,26 @@ use ureq::http::{HeaderMap, Response, StatusCode, Uri};
 use ureq::typestate::AgentScope;
 use ureq::{Agent, Body};
 
-/// How often a wait looks whether it is to end.
+/// Interval at which a wait checks for cancellation.
 pub(crate) const TICK: Duration = Duration::from_millis(20);
 
 pub(crate) enum ResponsePart {
-    /// Once: the status and the headers.
+    /// Sent once: the status and the headers.
     Head(StatusCode, HeaderMap),
     Bytes(Vec<u8>),
     /// The connection failed; nothing follows. Without it, the body was read to its end.
     Failed(String),
 }
 
-/// Whether a host of an address is this machine: `localhost`, or a loopback address as the standards write
-/// it. Other spellings of one (decimal, short, with a dot at the end) are not relied upon.
+/// Returns whether the host of an address is this machine: `localhost`, or a loopback address in standard spelling.
+/// Other spellings (decimal, short, with a dot at the end) are not recognized.
 pub(crate) fn is_loopback(host: &str) -> bool {
     let address = host.strip_prefix('[').and_then(|h| h.strip_suffix(']')).unwrap_or(host);
     host.eq_ignore_ascii_case("localhost")
         || address.parse().is_ok_and(|address: IpAddr| address.to_canonical().is_loopback())
 }
 
-/// How requests to `url` are made: any status is an answer, nothing may be silent for longer than `stall`.
+/// Settings of requests to `url`: any status is an answer, and no pause may be longer than `stall`.
 pub(crate) fn config(url: &str, stall: Duration) -> ConfigBuilder<AgentScope> {
     let config = Agent::config_builder()
         .http_status_as_error(false)
@@ -43,8 +43,8 @@ pub(crate) fn config(url: &str, stall: Duration) -> ConfigBuilder<AgentScope> {
     if is_here { config.proxy(None) } else { config }
 }
 
-/// Makes a request on a thread of its own. The thread ends by the request's own time limits, or at the
-/// first piece that nobody takes.
+/// Sends a request on a thread of its own. The thread ends by the request's own time limits, or at the first piece that
+/// the caller does not take.
 pub(crate) fn ask(
     request: impl FnOnce() -> Result<Response<Body>, ureq::Error> + Send + 'static,
 ) -> io::Result<Receiver<ResponsePart>> {
@@ -53,7 +53,7 @@ pub(crate) fn ask(
         let response = match request() {
             Ok(response) => response,
             Err(e) => {
-                // Whoever asked may have gone.
+                // The caller may have gone.
                 let _ = send.send(ResponsePart::Failed(e.to_string()));
                 return;
             }

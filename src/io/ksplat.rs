@@ -1,9 +1,9 @@
-//! `.ksplat` of GaussianSplats3D, read only: sections of rows, the plain ones in floats (level 0), the others in half
-//! floats with positions relative to buckets (level 1) and harmonics in bytes (level 2).
+//! `.ksplat` of GaussianSplats3D, read only: sections of rows, as floats (level 0), or as half floats with positions
+//! relative to buckets (level 1) and harmonics in bytes (level 2).
 //!
-//! The header of 4096 bytes: version, counts of sections and Gaussians, level, range of the harmonics' bytes. Then
-//! 1024 bytes a section, then the sections, each with the sizes of its buckets that are not full, the buckets'
-//! centers, and the rows. Nothing but the version tells such a file from others, so its name does.
+//! The header of 4096 bytes: version, counts of sections and Gaussians, level, range of the harmonics' bytes. Then 1024
+//! bytes a section, then the sections, each with the sizes of its buckets that are not full, the buckets' centers, and
+//! the rows. The format has no signature, so files are recognized by their name.
 
 use std::path::Path;
 
@@ -17,18 +17,18 @@ use crate::scene::GaussianCloud;
 
 const HEADER: usize = 4096;
 const SECTION_HEADER: usize = 1024;
-/// Most sections; those who write such files make a few.
+/// Most sections; files have a few.
 const MAX_SECTIONS: u32 = 4096;
-/// Harmonics in bytes span this far from 0 where the header does not say.
+/// Largest absolute value of harmonics in bytes, if the header states none.
 const HARMONICS_RANGE: f32 = 1.5;
-/// What a position of 16 bits counts from where the section does not say.
+/// Value of a 16-bit position at the center of its bucket, if the section states none.
 const POSITION_RANGE: u32 = 32_767;
 
 pub(crate) fn read(path: &Path) -> Result<GaussianCloud, IoError> {
     parse(&files::read(path, u64::MAX)?, path)
 }
 
-/// The Gaussians in the bytes of a `.ksplat`; `path` is for errors.
+/// Parses the Gaussians of a `.ksplat`; `path` is for errors.
 ///
 /// # Errors
 /// If it is of another version, a count exceeds what follows, or no Gaussian is finite.
@@ -76,7 +76,7 @@ fn count(path: &Path, what: &str, claimed: u32, possible: usize) -> IoError {
     IoError::Count { path: path.into(), what: what.into(), claimed: claimed.into(), possible: possible as u64 }
 }
 
-/// Numbers at places of a header that is long enough.
+/// Reads numbers at fixed offsets of a header, which is long enough.
 struct Fields<'a>(&'a [u8]);
 
 impl Fields<'_> {
@@ -93,18 +93,18 @@ impl Fields<'_> {
     }
 }
 
-/// Where the fields of a row start, in bytes; positions are at its start.
+/// Offsets of the fields of a row, in bytes; positions are at its start.
 struct Layout {
     scale: usize,
     rotation: usize,
     color: usize,
     rest: usize,
-    /// Bytes of a harmonic.
+    /// Bytes of a harmonic coefficient.
     harmonic: usize,
 }
 
 impl Layout {
-    /// The `k`th of the numbers that start at `at`, a float or half of one.
+    /// Returns the `k`th of the numbers that start at `at`, floats or half floats.
     fn number(&self, row: &Fields<'_>, at: usize, k: usize) -> f32 {
         match self.harmonic {
             4 => row.f32(at + 4 * k),
@@ -118,7 +118,7 @@ struct Section<'a> {
     stride: usize,
     degree: u8,
     rows: &'a [u8],
-    /// What positions of 16 bits count from, and the length of a step.
+    /// Value of a 16-bit position at its bucket's center, and the length of a step.
     middle: f32,
     step: f32,
     /// The center of each bucket, and the number of its last row plus 1.
@@ -198,7 +198,7 @@ impl<'a> Section<'a> {
                 _ => layout.number(&row, layout.rest, k),
             };
             for k in 1..stride {
-                // Those of one band together: all red ones, then green, then blue.
+                // Harmonics of one band together: all red ones, then green, then blue.
                 let (first, of_band) = if k < 4 { (0, 3) } else { (9, 5) };
                 let at = first + k - if k < 4 { 1 } else { 4 };
                 cloud.sh.push([0, 1, 2].map(|channel| harmonic(at + channel * of_band)));

@@ -1,5 +1,5 @@
-//! What a data set's lenses leave of its photos: camera models that are no pinhole's, and the field that remains of
-//! those that are made one.
+//! Losses to the lenses of a data set: camera models that cannot be read, and the field of view that remains after
+//! undistortion to a pinhole camera.
 
 use std::path::Path;
 
@@ -10,27 +10,27 @@ use crate::math::format::things;
 use crate::scene::distortion::Rays;
 use crate::scene::{Camera, Distortion, Photo};
 
-/// What COLMAP and nerfstudio call a sphere around the camera, unrolled.
+/// Name in COLMAP and nerfstudio of a full equirectangular panorama.
 pub(super) const PANORAMA: &str = "EQUIRECTANGULAR";
 
 const UNDISTORT: &str = "undistort the photos with COLMAP's image_undistorter first";
 const CUT: &str = "a panorama is no pinhole photo: cut the panoramas into perspective photos, as COLMAP does with 'python \
      python/examples/panorama_sfm.py --input_image_path PANORAMAS --output_path NEW', and open NEW";
 
-/// Share of a photo's pixels that a lens may lose without a word.
+/// Share of a photo's pixels that a lens may lose without a warning.
 const LOST: f64 = 0.1;
-/// Places across a photo at which it is looked what remains.
+/// Samples across a photo at which the loss is measured.
 const ACROSS: u32 = 48;
 
-/// The camera model `model` of `path`, photos of which are not read.
+/// Makes the error of the camera model `model` in `path`, photos of which are not read.
 pub(super) fn unsupported(model: &str, path: &Path) -> IoError {
     let panorama = [PANORAMA, "LATLONG", "VR180", "OMNIDIRECTIONALSTEREO"].iter().any(|name| model.starts_with(name));
     let remedy = if panorama { CUT } else { UNDISTORT };
     IoError::Unsupported { path: path.into(), what: format!("the camera model {model}"), remedy }
 }
 
-/// The photos whose camera model is read. The others, of which only the model is known, are left out with a warning; if
-/// there are no others, that is an error.
+/// Returns the photos with a supported camera model. The others, of which only the model is known, are left out with a
+/// warning; if there are no others, that is an error.
 pub(super) fn readable<T>(
     listed: Vec<Result<T, String>>,
     source: &Path,
@@ -53,7 +53,7 @@ pub(super) fn readable<T>(
     Ok(readable)
 }
 
-/// What is left of photos once their lenses are undone, a sentence for each lens that loses much.
+/// Reports the field of view and the pixels that remain after undistortion, a sentence for each lens that loses much.
 pub(super) fn told(photos: &[Photo]) -> Vec<String> {
     let mut lenses: Vec<(&Camera, Distortion, usize)> = Vec::new();
     let same = |a: &Camera, b: &Camera| {
@@ -85,11 +85,11 @@ pub(super) fn told(photos: &[Photo]) -> Vec<String> {
     told
 }
 
-/// What a lens sees, and what is left of it.
+/// Field of view of a lens, before and after undistortion.
 struct Field {
     /// Angles of view through the axis, across and down, rad.
     seen: [f64; 2],
-    /// Those of the pinhole's picture that the lens fills.
+    /// Angles of the pinhole picture that the lens fills, rad.
     left: [f64; 2],
     /// Share of the photo's pixels that are in the pinhole's picture.
     share: f64,
@@ -120,7 +120,7 @@ impl Field {
     }
 }
 
-/// The angle from the axis that a lens sees at `edge` of its picture, and that which is left there, rad.
+/// Returns the angle from the axis of the lens at `edge` of its picture, and the angle that remains there, rad.
 fn angles(rays: &Rays, reach: f64, edge: DVec2) -> [f64; 2] {
     let seen = rays.at(edge).map_or(rays.most_angle, |ray| ray.z.clamp(-1.0, 1.0).acos());
     [seen, edge.length().min(reach).atan().min(seen)]

@@ -48,7 +48,7 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
     })
 }
 
-/// The rows in the bytes of a `poses_bounds.npy`.
+/// Parses the rows of a `poses_bounds.npy`.
 pub fn poses(bytes: &[u8], path: &Path) -> Result<Vec<[f64; ROW]>, IoError> {
     let array = npy::open(bytes, path)?;
     let &[n, ROW_U64] = array.shape() else {
@@ -64,7 +64,7 @@ pub fn poses(bytes: &[u8], path: &Path) -> Result<Vec<[f64; ROW]>, IoError> {
 
 const ROW_U64: u64 = ROW as u64;
 
-/// The photos in a folder, sorted; SPIn-NeRF's helper pictures are left out.
+/// Lists the photos in a folder, sorted; SPIn-NeRF's helper pictures are left out.
 pub(super) fn names(folder: &Path) -> Result<Vec<String>, IoError> {
     let failed = |cause| IoError::Read { path: folder.into(), cause };
     let mut names = files::names_in(folder).map_err(failed)?;

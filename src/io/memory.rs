@@ -1,13 +1,13 @@
-//! How much memory the program may still take, and on how many cores it runs: one answer for all who plan by it.
+//! Memory that the program may still take, and its number of cores; every plan by memory asks here.
 
 use std::sync::OnceLock;
 
 use sysinfo::{MemoryRefreshKind, ProcessRefreshKind, ProcessesToUpdate, System};
 
-/// What is assumed where the system does not say: what any machine can spare.
+/// Free memory assumed if the system does not report it; any machine can spare that much.
 const UNKNOWN: u64 = 2 << 30;
 
-/// Cores that the program may use; 1 if the system does not say.
+/// Number of cores that the program may use; 1 if the system does not say.
 pub(crate) fn cores() -> usize {
     std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
 }
@@ -18,7 +18,7 @@ pub(crate) fn budget() -> u64 {
     *BUDGET.get_or_init(|| free() / 2)
 }
 
-/// Bytes that the program may still take: what the machine has left, and no more than the limits of
+/// Bytes that the program may still take: the free memory of the machine, and no more than the limits of
 /// its control group (a container's) and of the process itself (`ulimit -v`, `ulimit -d`) allow.
 pub(crate) fn free() -> u64 {
     let Ok(mut system) = System::new() else { return UNKNOWN };
@@ -29,7 +29,7 @@ pub(crate) fn free() -> u64 {
     }
 }
 
-/// Something that does not fit into the memory that is free.
+/// An operation that does not fit into the free memory.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{what} takes about {} MB of memory, and {} MB are free; {remedy}", bytes.div_ceil(1_000_000), free / 1_000_000)]
 pub struct NoRoom {
@@ -39,13 +39,13 @@ pub struct NoRoom {
     remedy: &'static str,
 }
 
-/// Whether `what` fits, which takes about so many bytes. To be asked before it is begun.
+/// Checks that `what`, which takes about `bytes`, fits into memory. To be called before it is begun.
 pub(crate) fn room(what: impl Into<String>, bytes: u64, remedy: &'static str) -> Result<(), NoRoom> {
     let free = free();
     if bytes <= free { Ok(()) } else { Err(NoRoom { what: what.into(), bytes, free, remedy }) }
 }
 
-/// What the control group leaves, the file cache not counted: the system gives that back.
+/// Bytes left to the control group. The file cache does not count: the system frees it on demand.
 fn of_group(system: &mut System) -> u64 {
     let Ok(own) = sysinfo::get_current_pid() else { return u64::MAX };
     system.refresh_processes_specifics(ProcessesToUpdate::Some(&[own]), false, ProcessRefreshKind::nothing());
@@ -53,13 +53,13 @@ fn of_group(system: &mut System) -> u64 {
     limits.map_or(u64::MAX, |l| l.total_memory.saturating_sub(l.rss))
 }
 
-/// What the limits on the process leave, where the system tells them in `/proc`.
+/// Bytes left under the limits of the process, if `/proc` reports them.
 fn of_process() -> u64 {
     let text = |name: &str| std::fs::read_to_string(format!("/proc/self/{name}")).unwrap_or_default();
     within(&text("limits"), &text("status"))
 }
 
-/// What is left under the limits in `/proc/self/limits` of what `/proc/self/status` says is used.
+/// Bytes left by the limits in `/proc/self/limits` and the use in `/proc/self/status`.
 fn within(limits: &str, status: &str) -> u64 {
     let number = |text: &str, line: &str| -> Option<u64> {
         text.lines().find_map(|l| l.strip_prefix(line))?.split_whitespace().next()?.parse().ok()

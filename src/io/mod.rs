@@ -1,8 +1,7 @@
 //! Files: one per format, and one [`open()`] that sniffs.
 //!
-//! Readers never trust a length field: what a file claims is compared with the file's real size
-//! before memory is set aside for it, and paths inside a dataset may not leave its folder. Every
-//! error names the file and the place in it.
+//! Readers never trust a length field: each is compared with the file's real size before memory is allocated, and paths
+//! inside a dataset may not leave its folder. Every error names the file and the place in it.
 
 mod alpha;
 pub(crate) mod atomic;

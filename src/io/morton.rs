@@ -1,12 +1,12 @@
-//! Gaussians in an order in which those that lie together are near one another: quantized formats need it, and it
-//! packs better.
+//! Morton order of Gaussians, which puts neighbors in space near one another: quantized formats need it, and it
+//! compresses better.
 
 use rayon::prelude::*;
 
 use crate::math::morton::{BITS, interleave};
 use crate::scene::GaussianCloud;
 
-/// Indices of the Gaussians along a Z-order curve through their bounds, the same for the same cloud.
+/// Returns indices of the Gaussians along a Z-order curve through their bounds. The same cloud gives the same order.
 pub(crate) fn order(cloud: &GaussianCloud) -> Vec<usize> {
     let ends = |end: fn(f32, f32) -> f32, from: f32| {
         cloud.positions.iter().fold([from; 3], |a, p| [0, 1, 2].map(|k| end(a[k], p[k])))
@@ -32,7 +32,7 @@ mod tests {
         let order = order(&cloud);
         assert!(order[..8].iter().all(|i| i % 2 == 0) && order[8..].iter().all(|i| i % 2 == 1), "{order:?}");
         assert_eq!(order[..8], [0, 2, 4, 6, 8, 10, 12, 14]);
-        // All in one place: nothing is divided by nothing.
+        // All in one place: there is no division by the zero extent.
         assert_eq!(super::order(&GaussianCloud::isotropic(vec![[2.0; 3]; 3], 0.0, 0.0)), [0, 1, 2]);
         assert!(super::order(&GaussianCloud::default()).is_empty());
     }

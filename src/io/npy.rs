@@ -9,13 +9,13 @@ use super::{IoError, files};
 /// Largest header of an `.npy` file in bytes; that of an array of numbers takes 128.
 const MAX_HEADER_BYTES: usize = 1024;
 
-/// An array whose header has been checked and whose numbers are still to be read.
+/// An array with a validated header and numbers still to be read.
 pub struct NpyArray<'a> {
     path: &'a Path,
     npy: NpyFile<&'a [u8]>,
     /// Bytes per number, 4 or 8.
     item: usize,
-    /// How many numbers the file holds, whatever it claims.
+    /// Most numbers that the file's size allows, whatever the header claims.
     pub(crate) possible: u64,
 }
 
@@ -23,7 +23,7 @@ pub struct NpyArray<'a> {
 pub fn open<'a>(bytes: &'a [u8], path: &'a Path) -> Result<NpyArray<'a>, IoError> {
     let bad = |reason: String| syntax(path, reason);
     let header = header_len(bytes).ok_or_else(|| bad("not an .npy file, or its header is cut off".into()))?;
-    // The library that reads the header multiplies sizes and the shape's entries unchecked.
+    // The library that parses the header multiplies sizes and the shape's entries unchecked.
     let text = String::from_utf8_lossy(&bytes[..header]);
     let kind = text.split_once("'descr'").and_then(|(_, rest)| rest.split('\'').nth(1)).unwrap_or_default();
     if !["<f4", ">f4", "<f8", ">f8", "=f4", "=f8"].contains(&kind) {
@@ -46,7 +46,7 @@ impl NpyArray<'_> {
         self.npy.shape()
     }
 
-    /// The numbers, row by row; they may be infinite or NaN.
+    /// Reads the numbers, row by row; they may be infinite or NaN.
     pub(crate) fn values(self) -> Result<Vec<f64>, IoError> {
         let failed = |e: std::io::Error| syntax(self.path, e.to_string());
         match self.item {
@@ -56,12 +56,12 @@ impl NpyArray<'_> {
     }
 }
 
-/// A map of one number per pixel, such as `fmlgs synth` writes depths: width, height, rows from the top.
+/// Reads a map of one number per pixel, such as the depths of `fmlgs synth`: width, height, rows from the top.
 pub(crate) fn read_map(path: &Path) -> Result<(usize, usize, Vec<f32>), IoError> {
     map(&files::read(path, files::MAX_PICTURE_BYTES)?, path)
 }
 
-/// The same from the file's bytes.
+/// As [`read_map`], from the file's bytes.
 pub fn map(bytes: &[u8], path: &Path) -> Result<(usize, usize, Vec<f32>), IoError> {
     let array = open(bytes, path)?;
     let &[height, width] = array.shape() else {
@@ -83,7 +83,7 @@ fn syntax(path: &Path, reason: String) -> IoError {
     IoError::Syntax { path: path.into(), place: "npy".into(), reason }
 }
 
-/// Bytes before the data of an `.npy` file.
+/// Returns the number of bytes before the data of an `.npy` file.
 fn header_len(bytes: &[u8]) -> Option<usize> {
     let [0x93, b'N', b'U', b'M', b'P', b'Y', major, _, rest @ ..] = bytes else { return None };
     let (start, length) = match major {
@@ -94,7 +94,7 @@ fn header_len(bytes: &[u8]) -> Option<usize> {
     (length <= MAX_HEADER_BYTES && end <= bytes.len()).then_some(end)
 }
 
-/// The product of the shape in an `.npy` header; the largest number if it has none or overflows.
+/// Returns the product of the shape in an `.npy` header; `u64::MAX` if it has none or overflows.
 fn values_claimed(text: &str) -> u64 {
     let tuple = |text: &str| Some(text.split_once("shape")?.1.split_once('(')?.1.split_once(')')?.0.to_owned());
     let shape = tuple(text).unwrap_or_else(|| "?".into());

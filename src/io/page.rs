@@ -1,8 +1,8 @@
-//! A scene as one HTML page that opens in any browser without a server and asks for nothing outside of itself.
+//! A scene as one HTML page that opens in any browser without a server and loads nothing from outside.
 //!
 //! `assets/page` has its text, style and scripts; the renderer is the PlayCanvas engine, made into one file by
-//! `tools/page`. What is foreign (names, titles) enters as escaped text or as JSON that no tag can end, and scripts run
-//! by their checksums alone.
+//! `tools/page`. Names and titles enter as escaped text or as JSON that no tag can end, and only scripts with a listed
+//! checksum run.
 
 pub(crate) mod packed;
 
@@ -22,7 +22,7 @@ const TEMPLATE: &str = include_str!("../../assets/page/page.html");
 const STYLE: &str = include_str!("../../assets/page/page.css");
 const RENDERER: &[u8] = include_bytes!("../../assets/page/renderer.js");
 const LICENSE: &str = include_str!("../../assets/page/renderer.LICENSE.txt");
-/// In this order they are one script.
+/// Scripts, joined into one in this order.
 const SCRIPTS: [&str; 8] = [
     include_str!("../../assets/page/decode.js"),
     include_str!("../../assets/page/pose.js"),
@@ -38,18 +38,18 @@ const SCRIPTS: [&str; 8] = [
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct PageIdentity {
     pub(crate) id: IdentityId,
-    /// What it is a piece of; 0 for objects.
+    /// Whole that it is a part of; 0 for objects.
     pub(crate) parent: IdentityId,
-    /// As it is called among the pieces of its whole, and with its wholes.
+    /// Name among the parts of its whole; `full` includes the names of its wholes.
     pub(crate) name: String,
     pub(crate) full: String,
-    /// Gaussians, its pieces included.
+    /// Number of Gaussians, its parts included.
     pub(crate) count: usize,
     /// RGB.
     pub(crate) color: [u8; 3],
     pub(crate) center: [f64; 3],
     pub(crate) radius: f64,
-    /// Unit vector of the direction in which it is seen best, where photos tell.
+    /// Unit vector of the direction from which it is seen best, if there are photos.
     pub(crate) from: Option<[f64; 3]>,
 }
 
@@ -74,27 +74,27 @@ pub(crate) struct PagePath {
     pub(crate) frames: Vec<f32>,
 }
 
-/// What the scripts of a page read as JSON.
+/// Scene data that the scripts of a page read as JSON.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct PageScene {
-    /// Wholes come before their pieces.
+    /// Objects and parts; wholes come before their parts.
     pub(crate) identities: Vec<PageIdentity>,
     /// World position of the page's origin, scene units.
     pub(crate) origin: [f64; 3],
     pub(crate) view: PageView,
     /// Unit vector.
     pub(crate) up: [f64; 3],
-    /// What the view orbits around, and how far away that is.
+    /// Point that the view orbits around; `distance` is the camera's distance from it.
     pub(crate) focus: [f64; 3],
     pub(crate) distance: f64,
     /// Color behind the Gaussians, 0 to 1.
     pub(crate) background: [f32; 3],
-    /// Whether Mip-Splatting's filter is on.
+    /// True if Mip-Splatting's filter is on.
     pub(crate) antialias: bool,
     pub(crate) paths: Vec<PagePath>,
 }
 
-/// All that a page consists of besides its scripts.
+/// Contents of a page besides its scripts.
 #[derive(Clone, Debug)]
 pub(crate) struct Page {
     pub(crate) title: String,
@@ -103,14 +103,14 @@ pub(crate) struct Page {
     /// Year, month and day.
     pub(crate) date: String,
     pub(crate) scene: PageScene,
-    /// As [`packed::encode`] writes them.
+    /// Gaussians as written by [`packed::encode`].
     pub(crate) gaussians: Vec<u8>,
-    /// As [`packed::identities`] writes them.
+    /// Identities as written by [`packed::identities`].
     pub(crate) identities: Vec<u8>,
 }
 
 impl Page {
-    /// Writes it, whole or not at all.
+    /// Writes the page atomically.
     ///
     /// # Errors
     /// [`IoError::Write`].
@@ -118,7 +118,7 @@ impl Page {
         atomic::write(path, |out| out.write_all(self.html()?.as_bytes()))
     }
 
-    /// Its text.
+    /// Returns the text of the page.
     pub(crate) fn html(&self) -> std::io::Result<String> {
         let script = format!("(() => {{\n'use strict';\n{}}})();\n", SCRIPTS.join("\n"));
         let fields = [
@@ -129,7 +129,7 @@ impl Page {
             ("date", escape_all_quotes(&self.date).into_owned()),
             ("style", STYLE.to_owned()),
             ("license", escape_all_quotes(LICENSE).into_owned()),
-            // Without `<` nothing in it can end the element.
+            // Without `<` the text cannot end the element.
             ("scene", serde_json::to_string(&self.scene)?.replace('<', "\\u003c")),
             ("gaussians", packed_text(&self.gaussians)?),
             ("identities", packed_text(&self.identities)?),
@@ -140,7 +140,7 @@ impl Page {
     }
 }
 
-/// What the browser is to allow: the page's own script and style, what they make, and no connection.
+/// Content security policy: allows the page's own script and style and the data that they make, and no connection.
 fn policy(script: &str) -> String {
     let sum = |text: &str| format!("'sha256-{}'", base64::encode(Sha256::digest(text.as_bytes())));
     format!(
@@ -158,7 +158,7 @@ fn packed_text(bytes: &[u8]) -> std::io::Result<String> {
     Ok(base64::encode(gzip.finish()?))
 }
 
-/// `template` with each `{{name}}` replaced; what is put in is not searched again.
+/// Returns `template` with each `{{name}}` replaced; inserted text is not searched again.
 fn filled(template: &str, fields: &[(&str, String)]) -> String {
     let mut pieces = template.split("{{");
     let mut out = pieces.next().unwrap_or_default().to_owned();

@@ -1,4 +1,4 @@
-//! Photos: decoded within bounds, undistorted, and reduced to the size that is wanted.
+//! Photos: decoded within limits, undistorted, and reduced to the requested size.
 //!
 //! Orientation tags are left alone: poses and intrinsics refer to the pixels as stored.
 
@@ -16,9 +16,9 @@ use crate::scene::{Camera, Photo, PhotoPixels};
 
 /// Endings of the pictures that are read.
 const ENDINGS: [&str; 7] = ["jpg", "jpeg", "png", "webp", "tif", "tiff", "bmp"];
-/// Endings of pictures that are known, but not read.
+/// Endings of known picture formats that cannot be read.
 const UNREAD: [&str; 6] = ["heic", "heif", "hif", "avif", "jxl", "dng"];
-/// Kinds of a file of ISO's base media format that are pictures, and their names.
+/// Brands of picture files in ISO's base media file format, and their names.
 const BRANDS: [([u8; 4], &str); 9] = [
     (*b"heic", "HEIC"),
     (*b"heix", "HEIC"),
@@ -30,28 +30,28 @@ const BRANDS: [([u8; 4], &str); 9] = [
     (*b"avif", "AVIF"),
     (*b"avis", "AVIF"),
 ];
-/// How pictures that are not read become such that are.
+/// Remedy for pictures of formats that are not read.
 pub(crate) const CONVERT: &str = "convert the photos, with ImageMagick: 'magick mogrify -format jpg *.heic' \
                                   (*.avif and the like), and open the folder again";
 
-/// The name of a picture without its ending, if that is one of pictures.
+/// Returns the name of a picture without its ending; `None` for other files.
 pub(crate) fn stem(name: &str) -> Option<&str> {
     let (stem, ending) = name.rsplit_once('.').filter(|(stem, _)| !stem.is_empty())?;
     ENDINGS.iter().chain(&UNREAD).any(|known| ending.eq_ignore_ascii_case(known)).then_some(stem)
 }
 
-/// Whether a file of this name is a picture that can be read.
+/// Returns whether a file of this name is a picture that can be read.
 pub(crate) fn is_photo(name: &str) -> bool {
     stem(name).is_some() && !is_unread(name) && !files::is_debris(name)
 }
 
-/// Whether a file of this name is a picture that cannot be read.
+/// Returns whether a file of this name is a picture that cannot be read.
 pub(crate) fn is_unread(name: &str) -> bool {
     let is = |ending: &str| UNREAD.iter().any(|known| ending.eq_ignore_ascii_case(known));
     name.rsplit_once('.').is_some_and(|(_, ending)| is(ending)) && !files::is_debris(name)
 }
 
-/// What a picture is that is known, but not read.
+/// Makes the error of a known picture format that cannot be read; `None` for other files.
 fn unread(bytes: &[u8], path: &Path) -> Option<IoError> {
     let what = match bytes {
         [_, _, _, _, b'f', b't', b'y', b'p', a, b, c, d, ..] => {
@@ -71,9 +71,8 @@ fn unread(bytes: &[u8], path: &Path) -> Option<IoError> {
 /// Bytes at the start of a picture file that hold its size in all but rare cases.
 const HEADER_BYTES: u64 = 256 << 10;
 
-/// The photo's pixels: undistorted to its pinhole camera and averaged down to at most
-/// `max_side_px` along the longer side. `photo.camera.limited_to(max_side_px)` is the camera that
-/// goes with them.
+/// Loads the photo's pixels: undistorted to its pinhole camera and averaged down to at most `max_side_px` along the
+/// longer side. The matching camera is `photo.camera.limited_to(max_side_px)`.
 pub fn load(photo: &Photo, max_side_px: u32) -> Result<PhotoPixels, IoError> {
     if !photo.has_pixels() {
         let reason = "only its camera is known here; open the data set that it is of".into();
@@ -94,14 +93,14 @@ pub fn load(photo: &Photo, max_side_px: u32) -> Result<PhotoPixels, IoError> {
         pixels = masked(pixels, mask)?;
     }
     let seen = PhotoPixels { alpha, ..through_lens(&pixels) };
-    // Compared with nothing, any drawing would be perfect.
+    // A photo without a counting pixel would match any rendering.
     match seen.coverage.as_ref().is_some_and(|c| c.iter().all(|c| *c == 0)) {
         true => Err(IoError::NothingShown { path: photo.path.clone() }),
         false => Ok(seen),
     }
 }
 
-/// A loaded photo and its camera at half their size; pixels that the photo does not cover do not count.
+/// Halves a loaded photo and its camera; pixels that the photo does not cover do not count.
 pub(crate) fn half(pixels: &PhotoPixels, camera: &Camera) -> (PhotoPixels, Camera) {
     let small = camera.reduced(2);
     let alpha = pixels.alpha.as_ref().map(|alpha| {
@@ -111,7 +110,7 @@ pub(crate) fn half(pixels: &PhotoPixels, camera: &Camera) -> (PhotoPixels, Camer
     (PhotoPixels { alpha, ..shrink(pixels, camera, &small) }, small)
 }
 
-/// Width, height and alpha of every pixel of a picture file; `None`, from its header, if it has none.
+/// Reads width, height and alpha of every pixel of a picture file; `None`, from its header, if it has no alpha.
 pub(super) fn alpha(path: &Path) -> Result<Option<(usize, usize, Vec<u8>)>, IoError> {
     if !header(path)?.1.has_alpha() {
         return Ok(None);
@@ -121,13 +120,12 @@ pub(super) fn alpha(path: &Path) -> Result<Option<(usize, usize, Vec<u8>)>, IoEr
     Ok(Some((width, height, picture.pixels().map(|p| p.0[3]).collect())))
 }
 
-/// Width and height in px of a picture file, from its header.
+/// Reads width and height in px of a picture file, from its header.
 pub fn size(path: &Path) -> Result<(u32, u32), IoError> {
     header(path).map(|(size, _)| size)
 }
 
-/// Size in px and kind of pixels of a picture file, none of which is decoded. A PNG whose colors have a transparent one
-/// has alpha.
+/// Reads size in px and pixel type of a picture file without decoding pixels. A PNG with a transparent color has alpha.
 fn header(path: &Path) -> Result<((u32, u32), ColorType), IoError> {
     let of = |bytes: &[u8]| decoder(bytes, path).map(|d| (d.dimensions(), d.color_type()));
     let start = files::read_start(path, HEADER_BYTES)?;
@@ -139,16 +137,16 @@ fn header(path: &Path) -> Result<((u32, u32), ColorType), IoError> {
     }
 }
 
-/// Tells a gray PNG of one bit a pixel by its first bytes: it is black and white, and nothing between.
+/// Returns whether a file is a gray PNG of one bit a pixel, by its first bytes; such a picture is black and white only.
 pub(super) fn is_black_and_white(path: &Path) -> Result<bool, IoError> {
     let start = files::read_start(path, 26)?;
     Ok(start.starts_with(b"\x89PNG\r\n\x1a\n") && start.get(24..) == Some([1, 0].as_slice()))
 }
 
-/// Largest picture that is opened for itself, px.
+/// Largest picture that is opened on its own, px.
 const MOST_PX: u64 = 1 << 28;
 
-/// A picture as it is stored; what is transparent has its color all the same.
+/// Opens a picture as stored; transparent pixels keep their color.
 pub(crate) fn open(path: &Path) -> Result<PhotoPixels, IoError> {
     let picture = decode_rgba(&read_whole(path)?, MOST_PX, path)?;
     let (width_px, height_px) = picture.dimensions();
@@ -156,7 +154,7 @@ pub(crate) fn open(path: &Path) -> Result<PhotoPixels, IoError> {
     Ok(PhotoPixels { width_px, height_px, rgb, coverage: None, alpha: None })
 }
 
-/// The bytes of a picture file that is not cut off.
+/// Reads the bytes of a picture file; a truncated JPEG is an error.
 fn read_whole(path: &Path) -> Result<Vec<u8>, IoError> {
     let bytes = files::read(path, files::MAX_PICTURE_BYTES)?;
     if is_cut_jpeg(&bytes) {
@@ -219,8 +217,8 @@ pub(super) fn decode_gray16(bytes: &[u8], path: &Path) -> Result<ImageBuffer<Lum
     }
 }
 
-/// Width, height and the brightest color channel of every pixel, of 255, of the bytes of a picture.
-/// What is not black stays at least 1.
+/// Decodes width, height and the brightest color channel of every pixel, 0 to 255. Pixels that are not black stay at
+/// least 1.
 pub(super) fn decode_brightest(bytes: &[u8], path: &Path) -> Result<(usize, usize, Vec<u8>), IoError> {
     let picture = DynamicImage::from_decoder(decoder(bytes, path)?).map_err(|e| failed(path, &e))?;
     let (width, height) = (picture.width() as usize, picture.height() as usize);
@@ -237,7 +235,7 @@ pub(super) fn decode_brightest(bytes: &[u8], path: &Path) -> Result<(usize, usiz
     Ok((width, height, values))
 }
 
-/// A decoder that has read the header, with its memory bounded.
+/// Makes a decoder that has read the header and has bounded memory.
 fn decoder<'a>(bytes: &'a [u8], path: &Path) -> Result<impl ImageDecoder + 'a, IoError> {
     let mut reader = ImageReader::new(Cursor::new(bytes))
         .with_guessed_format()
@@ -267,7 +265,7 @@ fn failed(path: &Path, e: &ImageError) -> IoError {
     IoError::Picture { path: path.into(), reason: e.to_string() }
 }
 
-/// Whether this is a JPEG without its end marker. The decoder fills what is missing with gray.
+/// Returns whether this is a JPEG without its end marker. The decoder fills missing parts with gray.
 fn is_cut_jpeg(bytes: &[u8]) -> bool {
     // Inside the coded data every 0xFF is followed by 0 or a restart marker, so the end marker
     // cannot occur by chance; a preview embedded before the coded data can contain one, which is
@@ -276,7 +274,7 @@ fn is_cut_jpeg(bytes: &[u8]) -> bool {
         && !jpeg_scan(bytes).is_some_and(|scan| scan.windows(2).any(|w| w == [0xFF, 0xD9]))
 }
 
-/// What follows the first start-of-scan marker.
+/// Returns the bytes after the first start-of-scan marker.
 fn jpeg_scan(bytes: &[u8]) -> Option<&[u8]> {
     let mut rest = bytes.get(2..)?;
     loop {
@@ -295,7 +293,7 @@ fn jpeg_scan(bytes: &[u8]) -> Option<&[u8]> {
     }
 }
 
-/// Leaves out the pixels that are black in a mask, of any size of the same shape.
+/// Leaves out the pixels that are black in a mask, which may have another size of the same shape.
 pub(super) fn masked(pixels: Pixels, mask: &Path) -> Result<Pixels, IoError> {
     let (w, h, values) = decode_brightest(&files::read(mask, files::MAX_PICTURE_BYTES)?, mask)?;
     let least = if values.iter().max().is_some_and(|m| *m >= 128) { 128 } else { 1 };
@@ -312,13 +310,13 @@ pub(super) fn masked(pixels: Pixels, mask: &Path) -> Result<Pixels, IoError> {
     Ok(Pixels { width, height, channels: 4, data: out })
 }
 
-/// The alpha of an RGBA picture as its color.
+/// Returns the alpha of an RGBA picture as its color.
 fn alpha_as_gray(pixels: &Pixels) -> Pixels {
     let data = pixels.data.chunks_exact(4).flat_map(|p| [p[3]; 3]).collect();
     Pixels { channels: 3, data, ..*pixels }
 }
 
-/// Transparent pixels over a color.
+/// Composites transparent pixels over a color.
 fn over(mut pixels: Pixels, background: [f32; 3]) -> Pixels {
     if pixels.channels == 3 {
         return pixels;

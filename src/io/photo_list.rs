@@ -1,6 +1,5 @@
-//! From what a dataset's files say about its photos to [`Photo`]s that exist: paths stay inside
-//! the folder, what is missing, found under another name or without a usable pose is counted, sizes
-//! are compared with the files' own.
+//! Turns the photos listed in a dataset's files into [`Photo`]s that exist. Paths stay inside the folder, sizes are
+//! compared with the files' own, and warnings count photos that are missing, renamed or without a usable pose.
 
 mod find;
 mod pose;
@@ -45,23 +44,23 @@ pub(super) struct Lens {
 
 #[derive(Clone, Debug)]
 pub(super) struct ListedPhoto {
-    /// Its file as it is listed, whatever is written there.
+    /// Path of its file exactly as listed.
     pub(crate) entry: String,
-    /// Folder that the entry is relative to, itself relative to the dataset's folder; empty for that.
+    /// Folder that the entry is relative to, itself relative to the dataset's folder; empty for the dataset's folder.
     pub(crate) folder: String,
     pub(crate) lens: Lens,
     /// Axes of the camera (x right, y down, z forward) in the world, as columns.
     pub(crate) world_from_camera: DMat3,
     /// Camera center in the world.
     pub(crate) center: DVec3,
-    /// Whether the pose had to be made one already.
+    /// True if the pose was already normalized.
     pub(crate) normalized: bool,
-    /// Why there is no pose, if there is none.
+    /// Reason why there is no usable pose, if so.
     pub(crate) broken: Option<String>,
     pub(crate) test_split: bool,
-    /// What transparent pixels are composited over.
+    /// Color behind transparent pixels.
     pub(crate) background: Option<[f32; 3]>,
-    /// The file with its mask, relative to the dataset's folder, as it is written.
+    /// Path of its mask file as listed, relative to the dataset's folder.
     pub(crate) mask: Option<String>,
 }
 
@@ -73,7 +72,7 @@ impl ListedPhoto {
     }
 }
 
-/// What came of a listed photo.
+/// Outcome for a listed photo.
 enum Fate {
     Photo {
         photo: Box<Photo>,
@@ -85,7 +84,7 @@ enum Fate {
     Unfound(Lookup),
 }
 
-/// The listed photos that exist and have a pose, sorted by name, with warnings that count the others.
+/// Returns the listed photos that exist and have a pose, sorted by name, with warnings that count the others.
 ///
 /// `root` is the dataset's folder, `source` the file that lists them.
 pub(super) fn photos(
@@ -112,7 +111,7 @@ pub(super) fn photos(
             Fate::Unfound(_) => tally.missing.push(l.listed_as()),
         }
     }
-    // Two that are listed under different names cannot both be one file: one of them is only called alike.
+    // Two photos listed under different names cannot both be one file: one name only resembles that of the file.
     let mut users: HashMap<PathBuf, Vec<String>> = HashMap::new();
     for (l, _, file, _) in &found {
         users.entry(real(&file.path)).or_default().push(l.listed_as());
@@ -222,7 +221,7 @@ fn fate(l: &ListedPhoto, finder: &PhotoFinder<'_>, source: &Path) -> Result<Fate
     Ok(Fate::Photo { photo: Box::new(photo), file, normalized: l.normalized || scaled })
 }
 
-/// The mask that a file names for a photo; `None` if it does not exist.
+/// Finds the mask listed for a photo; `None` if it does not exist.
 ///
 /// # Errors
 /// If it lies outside of the folder, cannot be read or has another shape than the photo.
@@ -247,7 +246,8 @@ fn listed_mask(
     Ok(Some(path))
 }
 
-/// The place of a point, if it is one: the error names the file, the kind of thing, its index and the axis.
+/// Returns a point that is finite and within [`Camera::FARTHEST`]; the error names the file, the kind of thing, its
+/// index and the axis.
 pub(super) fn place(p: DVec3, element: &'static str, index: usize, path: &Path) -> Result<DVec3, IoError> {
     let Some(axis) = p.to_array().iter().position(|v| !(v.abs() <= Camera::FARTHEST)) else { return Ok(p) };
     let (property, value) = (["x", "y", "z"][axis], p[axis]);
@@ -261,8 +261,8 @@ pub(super) fn place(p: DVec3, element: &'static str, index: usize, path: &Path) 
     ))
 }
 
-/// The folder with the photos of a dataset that lists names only: `images`, or else the least
-/// reduced `images_<factor>`, or else the dataset's own (empty). `source` is the file that lists them.
+/// Finds the photos' folder of a dataset that lists names only: `images`, or else the least reduced `images_<factor>`,
+/// or else the dataset's own (empty). `source` is the file with the list.
 pub(super) fn photo_folder(root: &Path, source: &Path) -> Result<String, IoError> {
     let mut best: Option<(u32, String)> = None;
     let failed = |cause| IoError::Read { path: root.into(), cause };
@@ -291,7 +291,7 @@ pub(super) fn photo_folder(root: &Path, source: &Path) -> Result<String, IoError
 }
 
 impl Lens {
-    /// The pinhole camera that the lens describes, for a file of `found` px if it declares no size.
+    /// Makes the pinhole camera of the lens, for a file of `found` px if it declares no size.
     fn camera(&self, found: (u32, u32), world_from_camera: DMat3, center: DVec3) -> Camera {
         let (width_px, height_px) = self.size_px.unwrap_or(found);
         let size = DVec2::new(f64::from(width_px), f64::from(height_px));
@@ -308,8 +308,8 @@ impl Lens {
     }
 }
 
-/// Whether a picture of `found` px shows the same as one of `expected` px, larger or smaller: one
-/// factor for both sides, up to rounding of the smaller picture's sides.
+/// Returns whether a picture of `found` px has the shape of one of `expected` px: one factor for both sides, up to
+/// rounding of the smaller picture's sides.
 pub(super) fn is_scaled(expected: (u32, u32), found: (u32, u32)) -> bool {
     let scaled = |side: u32, by: (u32, u32)| f64::from(side) * f64::from(by.0) / f64::from(by.1);
     let across = scaled(expected.1, (found.0, expected.0)) - f64::from(found.1);

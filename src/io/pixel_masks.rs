@@ -1,7 +1,7 @@
-//! Masks that say which pixels of a photo count: `mask_path` of `transforms.json`, and a folder `masks` beside `images`
-//! as COLMAP's `ImageReader.mask_path` has it. What is black in them does not count.
+//! Masks of the pixels that count in a photo: `mask_path` of `transforms.json`, and a folder `masks` beside `images` as
+//! in COLMAP's `ImageReader.mask_path`. Black pixels do not count.
 //!
-//! A folder of that name may hold labels of objects, too; those have more than two values and are passed over.
+//! A folder of that name may hold labels of objects, too; these have more than two values and are skipped.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,19 +12,19 @@ use super::photo_list::is_scaled;
 use super::{IoError, photo};
 use crate::scene::{Dataset, Photo};
 
-/// Pictures of a folder that are looked at to tell masks from labels.
+/// Pictures sampled to tell masks from labels.
 const SAMPLE: usize = 12;
-/// Values this near to black or to the brightest are taken for these: JPEG's noise.
+/// Values this close to black or to the brightest count as these: noise of JPEG.
 const NOISE: u8 = 24;
-/// Largest share of other values, which smoothed edges have.
+/// Largest share of other values, as at smoothed edges.
 const BETWEEN: f64 = 0.03;
 /// Endings of masks that are named after the photo's stem.
 const ENDINGS: [&str; 4] = ["png", "jpg", "jpeg", "webp"];
 
-/// What a picture holds.
+/// Kind of a picture's content.
 #[derive(Debug, PartialEq)]
 enum Content {
-    /// Black and this.
+    /// Black and this value.
     Mask(u8),
     /// Colors, or several values: labels.
     Labels,
@@ -32,7 +32,7 @@ enum Content {
     Black,
 }
 
-/// Finds the masks beside the photos' folder, for photos that have none yet. Warnings name what is passed over.
+/// Finds the masks beside the photos' folder, for photos that have none yet. Warnings name pictures that are skipped.
 pub(super) fn find(dataset: &mut Dataset) {
     let root = dataset.root.clone();
     let mut folders: Vec<PathBuf> = Vec::new();
@@ -67,7 +67,7 @@ pub(super) fn find(dataset: &mut Dataset) {
         sample.iter().filter_map(|s| if let Content::Mask(v) = s.1 { Some(v) } else { None }).collect();
     levels.sort_unstable();
     let labels = sample.iter().find(|s| s.1 == Content::Labels).map(|s| s.0);
-    // Masks of one value each, but not the same, are numbers of objects.
+    // Pictures of one value each, with different values, hold ids of objects.
     let numbers = levels.last().zip(levels.first()).is_some_and(|(a, b)| a - b > 2 * NOISE || (*a < 64 && a != b));
     if let Some(labels) = labels.or_else(|| sample.first().map(|s| s.0).filter(|_| numbers)) {
         dataset.warnings.push(format!(
@@ -98,7 +98,7 @@ pub(super) fn find(dataset: &mut Dataset) {
     }
 }
 
-/// A photo's folder below `root`, and its path inside of it.
+/// Splits a photo's path into its folder below `root` and the path inside of it.
 fn place(root: &Path, photo: &Photo) -> Option<(PathBuf, PathBuf)> {
     let relative = photo.path.strip_prefix(root).ok()?;
     let mut parts = relative.components();
@@ -111,7 +111,7 @@ fn place(root: &Path, photo: &Photo) -> Option<(PathBuf, PathBuf)> {
     })
 }
 
-/// Where masks of photos in `folder` may lie: for `images_2` in `masks_2` or `masks`.
+/// Lists folders for masks of photos in `folder`: for `images_2`, `masks_2` or `masks`.
 fn mask_folders(root: &Path, folder: &Path) -> Vec<PathBuf> {
     let name = folder.to_string_lossy();
     let reduced = name.strip_prefix("images").filter(|rest| !rest.is_empty());
@@ -119,7 +119,7 @@ fn mask_folders(root: &Path, folder: &Path) -> Vec<PathBuf> {
     own.into_iter().chain(["masks".into()]).map(|n| root.join(n)).filter(|p| p.is_dir()).collect()
 }
 
-/// What the mask of a photo may be called.
+/// Lists the possible paths of a photo's mask.
 fn names(masks: &Path, inside: &Path) -> Vec<PathBuf> {
     let whole = masks.join(inside);
     let longer = PathBuf::from(format!("{}.png", whole.display()));
@@ -131,7 +131,7 @@ fn is_picture(path: &Path) -> bool {
 }
 
 fn content(path: &Path) -> Result<Content, IoError> {
-    // It needs no look at its pixels, as it can hold nothing else.
+    // Decided by the header alone, as the pixels can hold nothing else.
     if photo::is_black_and_white(path)? {
         return Ok(Content::Mask(u8::MAX));
     }
@@ -150,7 +150,7 @@ fn content(path: &Path) -> Result<Content, IoError> {
     Ok(if is_mask { Content::Mask(brightest) } else { Content::Labels })
 }
 
-/// Why a mask cannot be used for a photo.
+/// Returns the reason why a mask cannot be used for a photo.
 fn fault(path: &Path, photo: &Photo) -> Option<String> {
     let (found, expected) = (photo::size(path), (photo.camera.width_px, photo.camera.height_px));
     match found {

@@ -17,13 +17,13 @@ pub(crate) fn read(path: &Path) -> Result<Vec<SparsePoint>, IoError> {
     parse(&files::read(path, u64::MAX)?, path)
 }
 
-/// What sparse points are called that no list names.
+/// Names of files with sparse points that no list refers to.
 const NAMES: [&str; 6] =
     ["points3d.ply", "sparse_pc.ply", "points.ply", "pointcloud.ply", "point_cloud.ply", "sparse.ply"];
-/// Bytes in which a splat shows that it is one.
+/// Bytes at the start of a `.ply` that are checked for the columns of a splat.
 const HEADER_BYTES: u64 = 8 << 10;
 
-/// The sparse points in a folder, in a `.ply` of one of the usual names, in whatever letters; a splat is none.
+/// Finds the sparse points in a folder: a `.ply` with one of the usual names, in any letter case, that is not a splat.
 pub(crate) fn beside(folder: &Path) -> Option<PathBuf> {
     let there = files::names_in(folder).ok()?;
     let called = |name: &&str| there.iter().find(|other| other.eq_ignore_ascii_case(name));
@@ -35,7 +35,7 @@ pub(crate) fn beside(folder: &Path) -> Option<PathBuf> {
     all.filter(|path| path.is_file()).find(|path| !is_splat(path))
 }
 
-/// The points of a `.ply`'s bytes; `path` is for errors.
+/// Parses the points of a `.ply`; `path` is for errors.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<Vec<SparsePoint>, IoError> {
     let ply = Ply::parse(bytes, path)?;
     let Some(table) = ply.table("vertex")? else {
@@ -120,7 +120,7 @@ mod tests {
         assert_eq!(ascii, parse_bytes(&binary(true)).expect("big endian"));
     }
 
-    /// The colors of points with these three columns, as text.
+    /// Parses the colors of points with these three columns, as text.
     fn colors(header: &str, rows: &[&str]) -> Vec<[u8; 3]> {
         let head = format!("ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\n{header}", rows.len());
         let rows: String = rows.iter().map(|row| format!("0 {row} 0 0\n")).collect();
@@ -149,7 +149,7 @@ mod tests {
         ] {
             assert_eq!(colors(&header, &rows)[0], first, "{header}{rows:?}");
         }
-        // Alpha and lists beside the colors are passed over.
+        // Alpha and lists beside the colors are skipped.
         let beside = "property list uchar int seen\nproperty uchar red\nproperty uchar green\nproperty uchar blue\nproperty uchar alpha\n";
         assert_eq!(colors(beside, &["2 7 8 51 102 255 9", "0 1 2 3 4"]), [[51, 102, 255], [1, 2, 3]]);
     }

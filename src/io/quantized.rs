@@ -1,5 +1,5 @@
-//! What the quantized splat formats share, in both directions: fixed-point numbers, colors, opacities,
-//! scales, quaternions without their largest component.
+//! Encoding and decoding shared by the quantized splat formats: fixed-point numbers, colors, opacities, scales,
+//! quaternions without their largest component.
 
 use std::f32::consts::SQRT_2;
 
@@ -7,46 +7,46 @@ use crate::math::Real;
 use crate::math::rotation;
 use crate::math::sh::SH_C0;
 
-/// Opacities nearer to 0 or 1 than this are moved here: their logit would be infinite.
+/// Opacities are kept this far from 0 and 1: their logit would be infinite.
 const OPACITY_MARGIN: f32 = 1e-6;
 
-/// The low `bits` of `value` as 0 to 1.
+/// Maps the low `bits` of `value` to 0 to 1.
 pub(super) fn unorm(value: u32, bits: u32) -> f32 {
     let mask = (1_u32 << bits) - 1;
     (value & mask) as f32 / mask as f32
 }
 
-/// 0 to 1 as a number of so many `bits`, the nearest one; what lies outside becomes the end.
+/// Rounds 0 to 1 to a number of so many `bits`; values outside are clamped.
 pub(super) fn to_unorm(value: f32, bits: u32) -> u32 {
     let most = (1_u32 << bits) - 1;
-    // A float that is no number becomes 0.
+    // NaN becomes 0.
     ((value * most as f32 + 0.5) as u32).min(most)
 }
 
-/// 0 to 1 as a byte.
+/// Rounds 0 to 1 to a byte.
 pub(super) fn to_byte(value: f32) -> u8 {
     to_unorm(value, 8) as u8
 }
 
-/// The color that a constant harmonic gives, 0 to 1 for what a screen can show.
+/// Color of a constant harmonic, 0 to 1 within the range of a display.
 pub(super) fn color(dc: f32) -> f32 {
     0.5 + SH_C0 as f32 * dc
 }
 
-/// The constant harmonic of a color.
+/// Constant harmonic of a color.
 pub(super) fn constant(color: f32) -> f32 {
     (color - 0.5) / SH_C0 as f32
 }
 
-/// Standard deviations under this are raised to it: their logarithm would be infinite.
+/// Smallest standard deviation; smaller ones are raised to it, as the logarithm of 0 is infinite.
 const SMALLEST_SCALE: f32 = 1e-12;
 
-/// The logarithm of a standard deviation; NaN stays NaN, to be refused.
+/// Logarithm of a standard deviation; NaN stays NaN and is refused later.
 pub(super) fn log_scale(scale: f32) -> f32 {
     if scale < SMALLEST_SCALE { SMALLEST_SCALE.ln() } else { scale.ln() }
 }
 
-/// The opacity of a logit as a byte.
+/// Opacity of a logit as a byte.
 pub(super) fn opacity_byte(logit: f32) -> u8 {
     to_byte(logit.sigmoid())
 }
@@ -56,8 +56,8 @@ pub(super) fn logit(opacity: f32) -> f32 {
     (p / (1.0 - p)).ln()
 }
 
-/// The unit quaternion `[w, x, y, z]` whose component `largest` is left out and whose others,
-/// in that order, are `rest`: 0 to 1 for -1/√2 to 1/√2.
+/// Restores the unit quaternion `[w, x, y, z]` whose component `largest` is left out and whose others, in that order,
+/// are `rest`: 0 to 1 for -1/√2 to 1/√2.
 pub(super) fn unit_quaternion(largest: usize, rest: [f32; 3]) -> [f32; 4] {
     let [a, b, c] = rest.map(|t| (t - 0.5) * SQRT_2);
     let d = (1.0 - (a * a + b * b + c * c)).max(0.0).sqrt();
@@ -69,12 +69,12 @@ pub(super) fn unit_quaternion(largest: usize, rest: [f32; 3]) -> [f32; 4] {
     }
 }
 
-/// A quaternion at unit length; one that has no direction turns nothing.
+/// Normalizes a quaternion; one without a direction becomes the identity.
 pub(super) fn unit(q: [f32; 4]) -> [f32; 4] {
     rotation::unit_quaternion(q).unwrap_or([1.0, 0.0, 0.0, 0.0])
 }
 
-/// What [`unit_quaternion`] takes for the rotation of `q`: the place of its largest component, and the others.
+/// Index of the largest component of `q`, and the others as [`unit_quaternion`] takes them.
 pub(super) fn without_largest(q: [f32; 4]) -> (usize, [f32; 3]) {
     let q = unit(q);
     let largest = (1..4).fold(0, |best, k| if q[k].abs() > q[best].abs() { k } else { best });

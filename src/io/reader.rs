@@ -18,12 +18,12 @@ impl<'a> Reader<'a> {
         Self { rest: bytes, path }
     }
 
-    /// Whether all was read.
+    /// Returns whether all bytes were read.
     pub(crate) fn is_at_end(&self) -> bool {
         self.rest.is_empty()
     }
 
-    /// The next `n` bytes; `place` says what they are.
+    /// Takes the next `n` bytes; `place` describes them in errors.
     pub(crate) fn take(&mut self, n: usize, place: &str) -> Result<&'a [u8], IoError> {
         match self.rest.split_at_checked(n) {
             Some((head, tail)) => {
@@ -56,8 +56,8 @@ impl<'a> Reader<'a> {
         self.array(place).map(f64::from_le_bytes)
     }
 
-    /// A 64-bit count of things that take at least `least_bytes` each: refused if the rest of the
-    /// slice cannot hold them.
+    /// Reads a 64-bit count of things that take at least `least_bytes` each; refused if the rest of the slice cannot
+    /// hold them.
     pub(crate) fn count(&mut self, what: &str, least_bytes: usize) -> Result<usize, IoError> {
         let claimed = self.u64(what)?;
         let possible = (self.rest.len() / least_bytes.max(1)) as u64;
@@ -67,7 +67,7 @@ impl<'a> Reader<'a> {
         Ok(claimed as usize)
     }
 
-    /// The bytes up to the next zero byte, which is skipped.
+    /// Takes the bytes up to the next zero byte, which is skipped.
     pub(crate) fn c_string(&mut self, place: &str) -> Result<&'a [u8], IoError> {
         match self.rest.iter().position(|&b| b == 0) {
             Some(end) => {

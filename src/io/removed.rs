@@ -1,4 +1,4 @@
-//! Gaussians that were taken out of a scene for good, in the semantic map's file: their places and shapes, without colors.
+//! Gaussians removed from a scene for good, in the semantic map's file: positions and shapes, without colors.
 
 use std::path::Path;
 
@@ -11,10 +11,10 @@ use crate::scene::GaussianCloud;
 /// Names of the tensors: world positions, and logarithms of scales, quaternions and opacity logits.
 pub(super) const PLACES: &str = "removed_places";
 pub(super) const SHAPES: &str = "removed_shapes";
-/// Numbers of a shape.
+/// Numbers per shape.
 pub(super) const SHAPE: usize = 8;
 
-/// What is stored of them.
+/// Returns positions and shapes as they are stored.
 pub(super) fn pack(cloud: &GaussianCloud) -> (Vec<[f64; 3]>, Vec<[f32; SHAPE]>) {
     let places = (0..cloud.len()).map(|i| cloud.world_position(i).to_array()).collect();
     let shape = |i: usize| {
@@ -24,7 +24,7 @@ pub(super) fn pack(cloud: &GaussianCloud) -> (Vec<[f64; 3]>, Vec<[f32; SHAPE]>) 
     (places, (0..cloud.len()).map(shape).collect())
 }
 
-/// Those that such bytes hold; `path` is for errors.
+/// Reads the removed Gaussians from a map's file; `path` is for errors.
 pub(super) fn unpack(bytes: &[u8], path: &Path) -> Result<Option<GaussianCloud>, IoError> {
     let broken = |reason: &str| IoError::syntax(path, format!("tensors '{PLACES}', '{SHAPES}'"), reason);
     let file = SafeTensors::deserialize(bytes).map_err(|e| broken(&e.to_string()))?;
@@ -44,7 +44,7 @@ pub(super) fn unpack(bytes: &[u8], path: &Path) -> Result<Option<GaussianCloud>,
     }
     let places: Vec<DVec3> = places.chunks_exact(3).map(DVec3::from_slice).collect();
     let shapes: Vec<&[f32]> = shapes.chunks_exact(SHAPE).collect();
-    // What was taken out hangs together, so one of its places is near all others.
+    // Removed Gaussians lie close together, so any of their positions is near all others.
     let origin = places.first().copied().unwrap_or_default();
     if !places.iter().all(|p| (*p - origin).as_vec3().is_finite()) {
         return Err(broken("its places are too far apart"));

@@ -1,13 +1,13 @@
-//! How files say how their Gaussians are to be drawn.
+//! Render mode of Gaussians as stored in files.
 
 use crate::scene::SplatRenderMode;
 
-/// Start of the comment in which Brush, and others after it, write the mode into a `.ply`.
+/// Start of the `.ply` comment with the mode, as written by Brush and programs that follow it.
 const COMMENT: &str = "splatrendermode:";
 /// Postshot's comment for the same: 0 or 1.
 const ANTIALIASED: &str = "antialiased ";
 
-/// The comment of a `.ply`, without the word `comment`; none for what is drawn as usual.
+/// Comment of a `.ply`, without the word `comment`; `None` for the usual mode.
 pub(super) fn comment(mode: SplatRenderMode) -> Option<&'static str> {
     match mode {
         SplatRenderMode::Plain => None,
@@ -16,7 +16,7 @@ pub(super) fn comment(mode: SplatRenderMode) -> Option<&'static str> {
     }
 }
 
-/// What the comments of a `.ply` say, the last one first.
+/// Reads the mode from the comments of a `.ply`; the last one counts.
 pub(super) fn of_comments(comments: &[&str]) -> SplatRenderMode {
     let told = |comment: &&str| {
         let comment = comment.to_lowercase();
@@ -31,7 +31,7 @@ pub(super) fn of_comments(comments: &[&str]) -> SplatRenderMode {
     comments.iter().rev().find_map(told).unwrap_or_default()
 }
 
-/// The value of `model` in a SOG's `meta.json`; none for what is drawn as usual.
+/// Value of `model` in a SOG's `meta.json`; `None` for the usual mode.
 pub(super) fn sog_model(mode: SplatRenderMode) -> Option<&'static str> {
     match mode {
         SplatRenderMode::Plain => None,

@@ -1,8 +1,8 @@
 //! Undistortion and reduction of a picture in one pass.
 //!
-//! Every output pixel is the mean of what its square covers in the full-size pinhole picture.
-//! Without distortion that mean is exact. With distortion it is taken over a grid of samples at
-//! least as dense as the full-size pixels, each a bilinear look-up in the picture on disk.
+//! Every output pixel is the mean over its square in the full-size pinhole picture. Without distortion that mean is
+//! exact. With distortion it is taken over a grid of samples at least as dense as the full-size pixels, each a bilinear
+//! look-up in the picture on disk.
 
 use glam::{DVec2, Vec2};
 use rayon::prelude::*;
@@ -23,8 +23,8 @@ pub(super) struct Pixels {
 /// Color times weight, and weight.
 type Sum = [f32; 4];
 
-/// `pixels`, taken through a lens of `distortion` with `camera`'s intrinsics, as `target` (the
-/// same camera, possibly smaller) would see it.
+/// Resamples `pixels`, taken through a lens of `distortion` with `camera`'s intrinsics, to the view of `target` (the
+/// same camera, possibly smaller).
 pub(super) fn resample(
     pixels: &Pixels,
     camera: &Camera,
@@ -77,7 +77,7 @@ fn area_row<const C: usize>(pixels: &Pixels, columns: &[Tap<Sum>], row: &Tap<Sum
     columns.iter().map(|tap| tap.mix(|x| line[x])).collect()
 }
 
-/// A photo as `target` (the same camera, smaller) would see it: means of what it covers.
+/// Reduces a photo to the view of `target` (the same camera, smaller) by area means over covered pixels.
 pub(super) fn shrink(photo: &PhotoPixels, camera: &Camera, target: &Camera) -> PhotoPixels {
     let (width, height) = (photo.width_px as usize, photo.height_px as usize);
     let (channels, data) = match &photo.coverage {
@@ -87,8 +87,8 @@ pub(super) fn shrink(photo: &PhotoPixels, camera: &Camera, target: &Camera) -> P
     resample(&Pixels { width, height, channels, data }, camera, None, target)
 }
 
-/// The pixel of the stored picture, of `camera`'s size, that the center of each pixel of the undistorted picture of
-/// `width` by `height` px shows, row-major; `None` beyond its border.
+/// Finds the pixel of the stored picture, of `camera`'s size, at the center of each pixel of the undistorted picture of
+/// `width` by `height` px, row-major; `None` beyond its border.
 pub(super) fn centers(camera: &Camera, distortion: &Distortion, [width, height]: [usize; 2]) -> Vec<Option<usize>> {
     let size = Vec2::new(camera.width_px as f32, camera.height_px as f32);
     let (lens, step) = (Lens::new(camera, distortion), size / Vec2::new(width as f32, height as f32));
@@ -102,7 +102,7 @@ pub(super) fn centers(camera: &Camera, distortion: &Distortion, [width, height]:
     (0..height).into_par_iter().flat_map_iter(row).collect()
 }
 
-/// Whether anything of the picture is left once it is undistorted: one of the places of a grid, at least.
+/// Returns whether any of the picture remains after undistortion: at least one point of a grid.
 pub(super) fn covers(camera: &Camera, distortion: &Distortion) -> bool {
     const ACROSS: usize = 32;
     let size = Vec2::new(camera.width_px as f32, camera.height_px as f32);
@@ -117,7 +117,7 @@ pub(super) fn covers(camera: &Camera, distortion: &Distortion) -> bool {
 /// A distorting lens.
 struct Lens {
     plain: Plain,
-    /// Where k1, k2, p1 and p2 do not say all: the lens, and the squared distance from the axis that it reaches.
+    /// Lens beyond k1, k2, p1 and p2, if it has more, and the squared distance from the axis that it reaches.
     full: Option<(Distortion, f64)>,
 }
 
@@ -165,8 +165,7 @@ impl Lens {
         sums
     }
 
-    /// Where the row of pinhole positions `((i + 0.5) * step, v)` lies in the picture on disk; NaN where the lens shows
-    /// nothing.
+    /// Maps the row of pinhole positions `((i + 0.5) * step, v)` to the picture on disk; NaN beyond the lens's field.
     fn source_row(&self, v: f32, step: f32, out: &mut [Vec2]) {
         let Some((lens, reach2)) = &self.full else { return self.plain.source_row(v, step, out) };
         let [focal, principal] = [self.plain.focal, self.plain.principal].map(Vec2::as_dvec2);
@@ -197,7 +196,7 @@ impl Plain {
     }
 }
 
-/// The picture at pixel position `p` between its four nearest pixels; `None` outside of it.
+/// Samples the picture bilinearly at pixel position `p`; `None` outside of it.
 #[inline(always)]
 fn bilinear<const C: usize>(pixels: &Pixels, p: Vec2) -> Option<Sum> {
     let (w, h) = (pixels.width as f32, pixels.height as f32);

@@ -1,29 +1,29 @@
-//! The files of a trained scene's folder, which nothing but a save of the scene may replace.
+//! Files of a trained scene's folder, which only a save of the scene may replace.
 
 use std::path::Path;
 
 use super::IoError;
 use super::files::folder_of;
 
-/// The file that makes a folder a trained scene.
+/// File that makes a folder a trained scene.
 pub const SCENE_FILE: &str = "scene.json";
 /// The Gaussians.
 pub const CLOUD_FILE: &str = "point_cloud.ply";
 /// Objects and parts.
 pub const MAP_FILE: &str = "semantic_map.safetensors";
-/// The state of a training, if it can be resumed.
+/// State of a training run, if it can be resumed.
 pub const CHECKPOINT_FILE: &str = "checkpoint.bin";
-/// What a save has decided on and not carried out yet.
+/// Journal of a save that is decided and not yet carried out.
 pub(super) const JOURNAL: &str = ".fmlgs_commit.json";
 
 pub(crate) const FILES: [&str; 4] = [SCENE_FILE, CLOUD_FILE, MAP_FILE, CHECKPOINT_FILE];
 
-/// Whether `folder` is a trained scene.
+/// Returns whether `folder` is a trained scene.
 pub fn is_scene(folder: &Path) -> bool {
     folder.join(SCENE_FILE).is_file()
 }
 
-/// Whether a change of this folder was decided and not carried out.
+/// Returns whether a decided change of this folder is not yet carried out.
 pub(super) fn is_pending(folder: &Path) -> bool {
     folder.join(JOURNAL).exists()
 }

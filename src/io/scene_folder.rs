@@ -17,7 +17,7 @@ use super::temporary::{sweep, temporary_folder};
 use super::{IoError, files, semantic_map, splat_ply};
 use crate::scene::{GaussianCloud, SemanticMap};
 
-/// Folder of what was replaced: `earlier/1`, `earlier/2`, each a scene of its own.
+/// Folder of replaced scenes: `earlier/1`, `earlier/2`, each complete.
 const EARLIER: &str = "earlier";
 
 /// A scene's folder, held for writing.
@@ -27,8 +27,8 @@ pub struct SceneFolder {
 }
 
 impl SceneFolder {
-    /// Holds `folder`, which is created if need be, for `what` ("training"). A save that was
-    /// interrupted there is finished first, and what dead processes left is removed.
+    /// Holds `folder`, which is created if need be, for `what` ("training"). An interrupted save is completed first,
+    /// and temporary files of dead processes are removed.
     pub fn hold(folder: &Path, what: &str) -> Result<Self, IoError> {
         fs::create_dir_all(folder).map_err(|cause| IoError::Write {
             path: folder.into(),
@@ -41,24 +41,24 @@ impl SceneFolder {
         Ok(Self { lock })
     }
 
-    /// Moves a scene from one folder to another one beside it, away from whoever may still write there: what they write
-    /// from now on has no folder. `to` must not exist.
+    /// Moves a scene to a folder beside it, away from a process that may still write to it; later writes of that
+    /// process have no folder. `to` must not exist.
     pub(crate) fn move_away(from: &Path, to: &Path) -> Result<(), IoError> {
         let moved = fs::rename(from, to).and_then(|()| {
-            // Theirs, in a folder that is no longer theirs; who comes next locks a file of its own.
+            // The lock file is that of the other process; the next holder creates its own.
             let _ = fs::remove_file(to.join(folder_lock::FILE));
             files::sync_folder(files::folder_of(to))
         });
         moved.map_err(|cause| write_error(to, cause))
     }
 
-    /// Deletes the scene in `folder`, which is in the state `known`, with the folder.
+    /// Deletes the scene in `folder`, which must be in the state `known`, with the folder.
     ///
     /// # Errors
     /// [`IoError::Changed`] if it is not in that state any more, [`IoError::HoldsMore`] if the folder holds anything
     /// else; nothing is deleted then.
     pub(crate) fn delete(folder: &Path, known: Option<&str>) -> Result<(), IoError> {
-        // Holding would make the folder anew if somebody else deleted it.
+        // Holding would create the folder again if another process deleted it.
         load_info(folder)?;
         let held = Self::hold(folder, "deleting")?;
         let folder = folder.to_path_buf();
@@ -71,8 +71,8 @@ impl SceneFolder {
         if !names.all(|name| name == folder_lock::FILE || scene_files::FILES.iter().any(|file| name == *file)) {
             return Err(IoError::HoldsMore { folder });
         }
-        // Its place is empty at once; what a killed process leaves undeleted is swept away.
-        // Windows does not move a folder in which a file is open.
+        // The path is free at once; files left by a killed process are swept later. Windows does not move a folder in
+        // which a file is open.
         let _held = (!cfg!(windows)).then_some(held);
         let gone = temporary_folder(files::folder_of(&folder), "deleted");
         gone.and_then(|gone| fs::rename(&folder, gone.folder.path().join("scene"))).map_err(|e| write_error(&folder, e))
@@ -108,7 +108,7 @@ impl SceneFolder {
         Ok(state)
     }
 
-    /// Stores how long a unit of the scene is, in meters; its state stays what it is.
+    /// Stores the length of a scene unit in meters; the state id stays the same.
     ///
     /// # Errors
     /// If it cannot be written; [`IoError::Changed`] if the scene is not in the state `known` any more.
@@ -122,7 +122,7 @@ impl SceneFolder {
         commit.finish()
     }
 
-    /// Saves another map of the Gaussians `cloud`, which are those of the scene in the state `known`.
+    /// Saves another map of the Gaussians `cloud`, which must be those of the scene in the state `known`.
     /// Returns the id of the new state.
     pub(crate) fn save_map(
         &self,
@@ -133,7 +133,7 @@ impl SceneFolder {
         self.save_edited(known, Some(map), cloud)
     }
 
-    /// As [`Self::save_map`] for other Gaussians, with their map if they have one.
+    /// As [`Self::save_map`], for other Gaussians, with their map if they have one.
     pub(crate) fn save_edited(
         &self,
         known: Option<&str>,
@@ -147,8 +147,8 @@ impl SceneFolder {
         self.save(&info, cloud, map)
     }
 
-    /// As [`Self::save_map`], but what was there before is kept (see [`Self::keep_earlier`]): where, and the
-    /// id of the new state. The map that is there already changes nothing.
+    /// As [`Self::save_map`], but the earlier scene is kept (see [`Self::keep_earlier`]); returns its folder and the id
+    /// of the new state. A map equal to the stored one changes nothing.
     pub(crate) fn replace_map(
         &self,
         known: Option<&str>,
@@ -162,7 +162,7 @@ impl SceneFolder {
         Ok((kept, self.save_map(known, map, cloud)?))
     }
 
-    /// The scene's state, if `map` is what is stored in it.
+    /// Returns the scene's state if `map` equals the stored map.
     fn has(&self, map: &SemanticMap) -> Result<Option<String>, IoError> {
         let path = self.path().join(semantic_map::FILE);
         let cloud = self.path().join(CLOUD_FILE);
@@ -183,7 +183,7 @@ impl SceneFolder {
     /// Replaces the checkpoint.
     ///
     /// # Errors
-    /// If it cannot be written; the one before is then unchanged.
+    /// If it cannot be written; the earlier checkpoint is then unchanged.
     pub(crate) fn save_checkpoint(&self, fill: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> Result<(), IoError> {
         let path = self.path().join(CHECKPOINT_FILE);
         let mut draft = Draft::beside(&path)?;
@@ -191,8 +191,8 @@ impl SceneFolder {
         draft.commit().map(drop)
     }
 
-    /// Keeps the scene as it is now beside what will replace it, as a scene of its own; `None` if it
-    /// has no objects and parts, which are what took somebody time. Returns where.
+    /// Keeps a copy of the current scene before it is replaced and returns its folder; `None` if it has no objects and
+    /// parts, as only these are worth keeping.
     pub(crate) fn keep_earlier(&self) -> Result<Option<PathBuf>, IoError> {
         if !self.path().join(semantic_map::FILE).exists() || !is_scene(self.path()) {
             return Ok(None);

@@ -1,4 +1,4 @@
-//! `scene.json`: what a trained scene says of itself, its photos, settings and history.
+//! `scene.json`: description of a trained scene, its photos, settings and history.
 
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -12,8 +12,7 @@ use crate::scene::{Camera, Dataset, Evaluation, StepMetrics, text};
 /// Version of the folder's format that this program writes, and the highest it reads.
 pub const VERSION: u64 = 1;
 
-/// The contents of `scene.json`. Fields that a later version adds are left out when this version
-/// reads; fields that are missing get their defaults.
+/// The contents of `scene.json`. Unknown fields of a later version are ignored; missing fields get their defaults.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SceneInfo {
     /// Version of the format.
@@ -21,13 +20,13 @@ pub struct SceneInfo {
     /// Short name for titles.
     #[serde(default, deserialize_with = "text::read_name")]
     pub name: String,
-    /// The photos that it was trained on, if known.
+    /// Training photos, if known.
     #[serde(default)]
     pub dataset: Option<DatasetReference>,
     /// The photos' cameras, in the dataset's order.
     #[serde(default)]
     pub cameras: Vec<SceneCamera>,
-    /// Length of a scene unit in meters, if that is known.
+    /// Length of a scene unit in meters, if known.
     #[serde(default)]
     pub metres_per_unit: Option<f64>,
     /// Color behind everything.
@@ -39,15 +38,16 @@ pub struct SceneInfo {
     /// Measurements of the training run.
     #[serde(default)]
     pub history: History,
-    /// Whether Gaussians were moved, recolored, duplicated or deleted since: photos show them as they were.
+    /// True if Gaussians were moved, recolored, duplicated or deleted since training, so that the photos differ from
+    /// the scene.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub edited: bool,
-    /// Id of the save that wrote it, which the files that belong to it carry too.
+    /// Id of the save that wrote the file; the other files of the scene carry it too.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub state: Option<String>,
 }
 
-/// Where the photos of a trained scene are.
+/// Location of the photos of a trained scene.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DatasetReference {
     /// Path of the dataset's folder or file, relative to the scene's folder where it can be.
@@ -56,7 +56,7 @@ pub struct DatasetReference {
 }
 
 impl DatasetReference {
-    /// The same dataset, which lies at `path`, for a scene in `folder`.
+    /// Returns the reference to the same dataset at `path`, for a scene in `folder`.
     pub(crate) fn moved(&self, path: &Path, folder: &Path) -> Self {
         Self { path: relative_to(path, folder), format: self.format.clone() }
     }
@@ -69,11 +69,11 @@ pub struct SceneCamera {
     pub name: String,
     /// Its pinhole camera at full resolution.
     pub camera: Camera,
-    /// Whether it was held out from training.
+    /// True if the photo was held out from training.
     pub held_out: bool,
 }
 
-/// What was measured while training, in order.
+/// Measurements of a training run, in order.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct History {
     /// Training steps (every few).
@@ -85,8 +85,8 @@ pub struct History {
 }
 
 impl SceneInfo {
-    /// The description of a scene in `folder` trained on `dataset`, whose photos at `held_out`
-    /// were not trained on. Settings and history are empty.
+    /// Makes the description of a scene in `folder` trained on `dataset` without the photos at `held_out`. Settings and
+    /// history are empty.
     pub(crate) fn of(dataset: &Dataset, held_out: &[usize], folder: &Path) -> Self {
         let camera = |(i, p): (usize, &crate::scene::Photo)| SceneCamera {
             name: p.name.clone(),
@@ -126,7 +126,7 @@ pub fn load_info(folder: &Path) -> Result<SceneInfo, IoError> {
     Ok(info)
 }
 
-/// Refuses names and cameras of photos that cannot be; `path` is for errors.
+/// Refuses invalid names and cameras of photos; `path` is for errors.
 pub(crate) fn check(info: &SceneInfo, path: &Path) -> Result<(), IoError> {
     for c in &info.cameras {
         files::photo_name(&c.name, path)?;
@@ -135,7 +135,7 @@ pub(crate) fn check(info: &SceneInfo, path: &Path) -> Result<(), IoError> {
     Ok(())
 }
 
-/// `path` as seen from `folder`; absolute where they have no common root or do not exist.
+/// Returns `path` relative to `folder`; absolute if they have no common root or do not exist.
 pub(super) fn relative_to(path: &Path, folder: &Path) -> PathBuf {
     // The scene's folder may not exist yet; its parents do not matter then beyond their names.
     let real = |p: &Path| fs::canonicalize(p).or_else(|_| std::path::absolute(p));

@@ -9,7 +9,7 @@
 //! | tensors `raw`, `deviated` | `[identities, 4, dimension]` f16, unit length; 0 beyond `views` |
 //! | tensors `removed_places`, `removed_shapes` | `[n, 3]` f64, `[n, 8]` f32: Gaussians that were taken out for good |
 //!
-//! Which Gaussian is whose, and its codes, are in `point_cloud.ply`, beside the Gaussians.
+//! The identity of each Gaussian and its code are in `point_cloud.ply`.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -29,13 +29,13 @@ pub use super::scene_files::MAP_FILE as FILE;
 /// Version that this program writes, and the highest it reads.
 const VERSION: u64 = 1;
 const KEY: &str = "fmlgs";
-/// Most bytes of such a file.
+/// Largest file of a semantic map, bytes.
 pub(crate) const MAX_BYTES: u64 = 256 << 20;
 
 #[derive(Serialize, Deserialize)]
 struct Header {
     version: u64,
-    /// Of the scene that it was saved with.
+    /// State of the scene that it was saved with.
     #[serde(default)]
     state: Option<String>,
     #[serde(default)]
@@ -49,7 +49,7 @@ struct Header {
     findings: Option<Findings>,
 }
 
-/// The bytes of a map that belongs to a scene's state; `path` is for errors.
+/// Encodes a map that belongs to a scene's state; `path` is for errors.
 pub fn encode(map: &SemanticMap, state: Option<&str>, path: &Path) -> Result<Vec<u8>, IoError> {
     let language = map.language.as_ref();
     let header = Header {
@@ -91,14 +91,14 @@ pub fn encode(map: &SemanticMap, state: Option<&str>, path: &Path) -> Result<Vec
     safetensors::serialize(tensors, Some(metadata)).map_err(|e| broken(&e))
 }
 
-/// How many objects and parts are stored with the scene in `folder`; 0 where that cannot be read.
+/// Number of objects and parts stored with the scene in `folder`; 0 if it cannot be read.
 pub(crate) fn count(folder: &Path) -> usize {
     let path = folder.join(FILE);
     let header = files::read(&path, MAX_BYTES).and_then(|bytes| header(&path, &bytes));
     header.map_or(0, |header| header.identities.len())
 }
 
-/// The map of the scene in `folder`, whose Gaussians `cloud` are of the save `state`; `None` if it has none.
+/// Loads the map of the scene in `folder`, whose Gaussians `cloud` are of the save `state`; `None` if it has none.
 pub fn load(folder: &Path, state: Option<&str>, cloud: &GaussianCloud) -> Result<Option<SemanticMap>, IoError> {
     let path = folder.join(FILE);
     if !path.exists() {
@@ -107,7 +107,7 @@ pub fn load(folder: &Path, state: Option<&str>, cloud: &GaussianCloud) -> Result
     decode(&files::read(&path, MAX_BYTES)?, state, cloud, &path).map(Some)
 }
 
-/// The map that such bytes hold, for the Gaussians `cloud` of the save `state`; `path` is for errors.
+/// Decodes a map for the Gaussians `cloud` of the save `state`; `path` is for errors.
 pub(crate) fn decode(
     bytes: &[u8],
     state: Option<&str>,
@@ -124,8 +124,8 @@ pub(crate) fn decode(
     Ok(SemanticMap { language, prepared: header.prepared, findings: header.findings, removed, ..map })
 }
 
-/// Names of what was taken out of the scene in `folder` for good, and its Gaussians, where they were kept; nothing where
-/// that cannot be read.
+/// Reads the names of objects removed for good from the scene in `folder`, and their Gaussians, if kept; empty if that
+/// cannot be read.
 pub(crate) fn removed_of(folder: &Path) -> (Vec<String>, Option<GaussianCloud>) {
     let path = folder.join(FILE);
     let read = files::read(&path, MAX_BYTES).and_then(|bytes| {
@@ -135,7 +135,7 @@ pub(crate) fn removed_of(folder: &Path) -> (Vec<String>, Option<GaussianCloud>) 
     read.unwrap_or_default()
 }
 
-/// Whether such bytes are of the save `state`.
+/// Checks that the bytes of a map are of the save `state`.
 ///
 /// # Errors
 /// If they are of another, or are no map.
@@ -153,7 +153,7 @@ fn torn(path: &Path) -> IoError {
     IoError::Torn { path: path.into(), with: super::scene_files::CLOUD_FILE, remedy }
 }
 
-/// Features of all identities, those of the views that are missing as zeros.
+/// Packs the features of all identities; missing views are zeros.
 fn packed(language: &LanguageFeatures, of: impl Fn(&ViewFeatures) -> &Vec<Vec<f32>>) -> Vec<f16> {
     let missing = vec![0.0; language.dimension];
     let view =

@@ -1,7 +1,7 @@
-//! Scenes far from zero in files of single precision: places near zero, and where zero is.
+//! Scenes far from zero in files of single precision: positions near zero, and the shift of the origin.
 //!
-//! At UTM coordinates a float holds steps of half a unit. So what is exported is written relative to a place nearby,
-//! which is told and kept in the file where the format has room; reading it puts the scene back.
+//! At UTM coordinates a float has steps of half a unit. So exports are written relative to a nearby point. It is
+//! reported and, if the format has room, kept in the file; reading the file restores the scene.
 
 use std::borrow::Cow;
 
@@ -9,13 +9,13 @@ use glam::DVec3;
 
 use crate::scene::{Bounds, GaussianCloud};
 
-/// Start of the comment of a `.ply` that holds the place; its x, y and z are relative to it.
+/// Start of the `.ply` comment with the shift, to which x, y and z are relative.
 const COMMENT: &str = "fmlgs shift ";
-/// Steps of single precision that are told, as a share of the scene's size.
+/// Steps of single precision that call for a shift, as a share of the scene's size.
 const COARSE: f64 = 1e-5;
 
-/// The place to write a cloud relative to, if single precision would round its places beyond a hundred-thousandth of
-/// its size. Whole numbers, unless the cloud is small.
+/// Returns the shift of a cloud if single precision would round its positions beyond a hundred-thousandth of its size.
+/// Whole numbers, unless the cloud is small.
 pub(super) fn of(cloud: &GaussianCloud) -> Option<DVec3> {
     let far = cloud.origin.abs().max_element() as f32;
     let step = f64::from(far.next_up() - far);
@@ -25,7 +25,7 @@ pub(super) fn of(cloud: &GaussianCloud) -> Option<DVec3> {
     is_coarse.then(|| if radius > 1.0 { cloud.origin.round() } else { cloud.origin })
 }
 
-/// The cloud as it is written: relative to the place that is returned, if there is one.
+/// Returns the cloud relative to the returned shift, if it needs one.
 pub(super) fn near_zero(cloud: &GaussianCloud) -> (Cow<'_, GaussianCloud>, Option<DVec3>) {
     let Some(shift) = of(cloud) else { return (Cow::Borrowed(cloud), None) };
     let mut near = cloud.clone();
@@ -35,23 +35,23 @@ pub(super) fn near_zero(cloud: &GaussianCloud) -> (Cow<'_, GaussianCloud>, Optio
     (Cow::Owned(near), Some(shift))
 }
 
-/// The comment, without the word `comment`.
+/// Comment with the shift, without the word `comment`.
 pub(super) fn comment(shift: DVec3) -> String {
     format!("{COMMENT}{}", text(shift))
 }
 
-/// The three numbers in words that [`parsed`] reads back as they are.
+/// The three numbers as text, which [`parsed`] reads back exactly.
 pub(super) fn text(DVec3 { x, y, z }: DVec3) -> String {
     format!("{x} {y} {z}")
 }
 
-/// The place by the comments of a `.ply`; `Err` if one does not hold it.
+/// Finds the shift in the comments of a `.ply`; `Err` if a comment does not hold three numbers.
 pub(super) fn of_comments(comments: &[&str]) -> Result<Option<DVec3>, String> {
     let Some(text) = comments.iter().find_map(|c| c.strip_prefix(COMMENT)) else { return Ok(None) };
     parsed(text).map(Some).ok_or_else(|| format!("the comment '{COMMENT}' does not hold three numbers"))
 }
 
-/// Three finite numbers.
+/// Parses three finite numbers.
 pub(super) fn parsed(text: &str) -> Option<DVec3> {
     let numbers: Vec<f64> = text.split_ascii_whitespace().filter_map(|w| w.parse().ok()).collect();
     let place = DVec3::from_array(<[f64; 3]>::try_from(numbers).ok()?);

@@ -1,11 +1,11 @@
-//! Gaussians as they go over the network: packed while they are trained, the scene's own files once they rest.
+//! Gaussians sent over the network: compressed while they are trained, the scene's own files afterwards.
 //!
-//! After eight bytes that say what it is come sections: a tag of four bytes, the length of what follows and its
-//! length unpacked (two `u64`, little-endian), and the bytes.
+//! Eight bytes of signature, then sections: a tag of four bytes, the length of the content and its unpacked length (two
+//! `u64`, little-endian), and the content.
 //!
 //! | tag | what |
 //! |---|---|
-//! | `spz ` | the Gaussians as [`spz`], a tenth of the size: what a picture of a training needs |
+//! | `spz ` | the Gaussians as [`spz`], a tenth of the size, enough to view a training run |
 //! | `ply ` | the Gaussians as [`splat_ply`], bit for bit those of the file, packed by zlib |
 //! | `objs` | objects and parts as [`semantic_map`], for the Gaussians of the same snapshot |
 
@@ -25,24 +25,24 @@ const MAGIC: &[u8; 8] = b"FMLGSNP1";
 const PACKED: &[u8; 4] = b"spz ";
 const PLY: &[u8; 4] = b"ply ";
 const OBJECTS: &[u8; 4] = b"objs";
-/// Bytes that come out of one packed byte at most: zlib's own limit.
+/// Most bytes unpacked from one packed byte: zlib's own limit.
 const MAX_RATIO: u64 = 1032;
 
-/// What a snapshot holds.
+/// Sections of a snapshot.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(crate) struct SceneSnapshot {
-    /// The Gaussians' file, where this is a scene at rest.
+    /// The Gaussians' file, if the scene is not in training.
     pub(crate) ply: Option<Vec<u8>>,
     packed: Option<Vec<u8>>,
     objects: Option<Vec<u8>>,
 }
 
-/// The snapshot of Gaussians in training: positions to 24 bits, most else to 8.
+/// Makes the snapshot of Gaussians in training: positions to 24 bits, most else to 8.
 ///
 /// # Errors
 /// Only if the Gaussians cannot be written at all.
 pub(crate) fn of_training(cloud: &GaussianCloud) -> io::Result<Vec<u8>> {
-    // What reaches too far for 24 bits goes as it is.
+    // Positions beyond the range of 24 bits are sent unpacked.
     let Ok(unpacked) = spz::unpacked(cloud, &mut |_| Ok(())) else { return of_cloud(cloud) };
     let mut gzip = GzEncoder::new(Vec::new(), Compression::fast());
     gzip.write_all(&unpacked)?;
@@ -52,7 +52,7 @@ pub(crate) fn of_training(cloud: &GaussianCloud) -> io::Result<Vec<u8>> {
     Ok(out)
 }
 
-/// The snapshot of Gaussians without a folder, every number as it is.
+/// Makes the snapshot of Gaussians without a folder, in full precision.
 ///
 /// # Errors
 /// Only if the Gaussians cannot be written at all.
@@ -62,7 +62,7 @@ pub(crate) fn of_cloud(cloud: &GaussianCloud) -> io::Result<Vec<u8>> {
     of_files(&ply, None)
 }
 
-/// The snapshot of the trained scene in `folder`: its files, which are of one save.
+/// Makes the snapshot of the trained scene in `folder` from its files, which must be of one save.
 ///
 /// # Errors
 /// If a file cannot be read, or the two are of different saves.
@@ -97,7 +97,7 @@ fn section(out: &mut Vec<u8>, tag: &[u8; 4], bytes: &[u8], unpacked: usize) {
 }
 
 impl SceneSnapshot {
-    /// The sections of a snapshot; `path` is for errors.
+    /// Parses the sections of a snapshot; `path` is for errors.
     ///
     /// # Errors
     /// If it is cut off, is of another kind, or claims more than it can hold.
@@ -123,7 +123,7 @@ impl SceneSnapshot {
         Ok(all)
     }
 
-    /// The Gaussians, and their objects and parts where they have any.
+    /// Reads the Gaussians, and their objects and parts if they have any.
     ///
     /// # Errors
     /// If a section does not follow its format, or the two do not belong together.
@@ -141,7 +141,7 @@ impl SceneSnapshot {
         Ok((cloud, map))
     }
 
-    /// Whether the numbers are those of the file.
+    /// Returns whether the Gaussians have the full precision of the file.
     pub(crate) fn is_exact(&self) -> bool {
         self.ply.is_some()
     }

@@ -1,8 +1,7 @@
 //! `.splat`: 32 bytes a Gaussian and nothing else, as the first viewers on the web read it (antimatter15's).
 //!
-//! Position and standard deviations as floats, color and opacity as four bytes, the unit quaternion
-//! `w x y z` as four bytes around 128. Nothing tells such a file from others but its name and that
-//! its size is a multiple of 32.
+//! Position and standard deviations as floats, color and opacity as four bytes, the unit quaternion `w x y z` as four
+//! bytes around 128. The format has no signature: only the name and a size that is a multiple of 32 identify it.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -16,14 +15,14 @@ use crate::scene::GaussianCloud;
 
 /// Bytes of a Gaussian.
 const ROW: usize = 32;
-/// Gaussians that are written at once.
+/// Gaussians per write.
 const BLOCK: usize = 4096;
 
 pub(crate) fn read(path: &Path) -> Result<GaussianCloud, IoError> {
     parse(&files::read(path, u64::MAX)?, path)
 }
 
-/// The Gaussians in the bytes of a `.splat`; `path` is for errors.
+/// Parses the Gaussians of a `.splat`; `path` is for errors.
 ///
 /// # Errors
 /// If the size is no multiple of 32 bytes, or no Gaussian is finite.

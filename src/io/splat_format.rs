@@ -1,4 +1,4 @@
-//! The formats that Gaussians are written in, each by its ending, and what each of them cannot hold.
+//! Formats that Gaussians are written in, each by its ending, and the losses of each.
 
 use std::borrow::Cow;
 use std::io::{self, Write};
@@ -35,7 +35,7 @@ pub enum SplatFormat {
 }
 
 impl SplatFormat {
-    /// The format that a file's name asks for; of `.json` files, a SOG's `meta.json` alone.
+    /// Returns the format of a file name; of `.json` files, only a SOG's `meta.json`.
     pub(crate) fn of(path: &Path) -> Option<Self> {
         let name = path.file_name()?.to_string_lossy().to_lowercase();
         let fits = |format: &Self| match format {
@@ -46,7 +46,7 @@ impl SplatFormat {
         Self::VARIANTS.iter().filter(|format| fits(format)).max_by_key(|format| format.ending().len()).copied()
     }
 
-    /// How its files end, or what they are called.
+    /// Ending of its files, or their name.
     pub(crate) fn ending(self) -> &'static str {
         match self {
             Self::Ply => ".ply",
@@ -65,7 +65,7 @@ impl SplatFormat {
         Self::VARIANTS.iter().map(|format| format.ending()).collect::<Vec<_>>().join(", ")
     }
 
-    /// What is rounded in it, in a few words; nothing where all numbers are floats.
+    /// Rounded values, in a few words; `None` if all numbers are floats.
     pub(crate) fn rounding(self) -> Option<&'static str> {
         match self {
             Self::Ply | Self::Glb | Self::Gltf => None,
@@ -78,7 +78,7 @@ impl SplatFormat {
         }
     }
 
-    /// What of this cloud is left out or does not fit, each in a few words.
+    /// Lists properties of this cloud that are left out or do not fit, each in a few words.
     pub(crate) fn left_out(self, cloud: &GaussianCloud) -> Vec<String> {
         let mut all = Vec::new();
         let floats = self.rounding().is_none();
@@ -102,7 +102,7 @@ impl SplatFormat {
         all
     }
 
-    /// The cloud as it is written: with `-y` upwards where the format cannot say what is.
+    /// Prepares the cloud for writing: with `-y` upward if the format cannot state the up direction.
     pub(crate) fn prepared(self, cloud: &GaussianCloud) -> Cow<'_, GaussianCloud> {
         match (self, cloud.up) {
             (Self::Ply, _) | (_, None) => Cow::Borrowed(cloud),
@@ -110,7 +110,7 @@ impl SplatFormat {
         }
     }
 
-    /// What a cloud as [`Self::prepared`] is written relative to, if it is far from zero; glTF has nodes for that.
+    /// Shift of a [`Self::prepared`] cloud that is far from zero; none for glTF, which has nodes for that.
     pub(crate) fn shift(self, cloud: &GaussianCloud) -> Option<DVec3> {
         if matches!(self, Self::Glb | Self::Gltf) { None } else { shift::of(cloud) }
     }
@@ -124,7 +124,7 @@ impl SplatFormat {
         }
     }
 
-    /// Writes the cloud, replacing the file at once or not at all. `told` hears how far it is.
+    /// Writes the cloud, replacing the file atomically. `told` gets the progress.
     ///
     /// # Errors
     /// If the cloud is not valid, the format cannot hold it, `told` asks to stop or the file cannot be written.

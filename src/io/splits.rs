@@ -1,4 +1,4 @@
-//! Which photos a data set wants to be trained on and which held out, where it says so by lists of names.
+//! Training and held-out photos of a data set, if lists of names state them.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -8,7 +8,7 @@ use serde::Deserialize;
 use super::photo_list::{ListedPhoto, PhotoFinder, fold, some_of};
 use super::{IoError, files, photo};
 
-/// Lists of file names, each with what it is called.
+/// Lists of photo names, each with the name of its file.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Splits {
     pub(super) train: Vec<(String, Vec<String>)>,
@@ -28,7 +28,7 @@ struct TrainTest {
 }
 
 impl Splits {
-    /// The lists that lie in these folders; in the first of them that has a list.
+    /// Reads the lists in the first of these folders that has one.
     pub(super) fn beside(folders: &[&Path]) -> Result<Self, IoError> {
         let mut splits = Self::default();
         for folder in folders {
@@ -50,8 +50,7 @@ impl Splits {
         Ok(splits)
     }
 
-    /// Marks the photos that are held out, and leaves out those that are in no list where there is one of those to
-    /// train on.
+    /// Marks held-out photos. If there is a list of training photos, photos in no list are left out.
     pub(super) fn apply(&self, listed: &mut Vec<ListedPhoto>, finder: &PhotoFinder<'_>, warnings: &mut Vec<String>) {
         let keys = Keys::of(listed, finder);
         let mut chosen = |lists: &[(String, Vec<String>)]| {
@@ -84,7 +83,7 @@ impl Splits {
                 some_of(&both, ", ")
             ));
         }
-        // A list of which no name fits is of other photos.
+        // A list without a matching name is of other photos.
         let is_whole = !train.contains(&true);
         let neither = named(&|i| !is_whole && !train[i] && !held_out[i]);
         if !neither.is_empty() {
@@ -107,7 +106,7 @@ impl Splits {
 /// Photos by their names.
 struct Keys {
     whole: HashMap<String, usize>,
-    /// By the last part alone, without ending; `None` where several are called so.
+    /// Photos by the last part of the name, without ending; `None` if several share it.
     ends: HashMap<String, Option<usize>>,
 }
 
@@ -122,7 +121,7 @@ impl Keys {
         Self { whole, ends }
     }
 
-    /// The photo of a name: as it is listed, or the only one whose file is called so.
+    /// Finds the photo of a name: an exact match, or the only photo with that file name.
     fn find(&self, key: &str) -> Option<usize> {
         self.whole.get(&fold(key)).copied().or_else(|| self.ends.get(&end(key)).copied().flatten())
     }

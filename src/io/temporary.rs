@@ -1,7 +1,7 @@
-//! Temporary files beside what they are to become, and the removal of those that killed processes left.
+//! Temporary files beside their final place, and the removal of leftovers of killed processes.
 //!
-//! A process holds the lock of every temporary file that it writes, and the system frees the locks
-//! of a process that ends. So one that can be locked belongs to nobody.
+//! A process holds the lock of every temporary file that it writes, and the system frees the locks of a process that
+//! ends. So a temporary file that can be locked is a leftover.
 
 use std::collections::HashSet;
 use std::fs::{self, File};
@@ -17,12 +17,12 @@ use super::scene_files::is_pending;
 /// Part of the name of every temporary file, and of no other.
 const MARK: &str = ".fmlgs-";
 
-/// Whether a name is that of a temporary file of this program.
+/// Returns whether a name is that of a temporary file of this program.
 pub(super) fn is_temporary(name: &str) -> bool {
     name.starts_with('.') && name.contains(MARK)
 }
 
-/// An empty temporary file beside `path`, its name ending in `.extension`.
+/// Creates an empty temporary file beside `path`, its name ending in `.extension`.
 pub(super) fn temporary_file(path: &Path, extension: &str) -> io::Result<NamedTempFile> {
     let name = path.file_name().ok_or_else(|| io::Error::new(io::ErrorKind::InvalidInput, "not a file name"))?;
     if path.is_dir() {
@@ -38,21 +38,21 @@ pub(super) fn temporary_file(path: &Path, extension: &str) -> io::Result<NamedTe
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
         let file = builder.tempfile_in(folder)?;
-        // Another process may have swept it away before it was locked.
+        // Another process may have swept it before it was locked.
         if hold(file.as_file()) && file.path().exists() {
             return Ok(file);
         }
     }
 }
 
-/// A temporary folder that is kept from being swept away for as long as this lives.
+/// A temporary folder that is protected from sweeping for as long as this lives.
 pub(crate) struct TemporaryFolder {
     /// The folder; removed when this is dropped.
     pub(crate) folder: TempDir,
     _held: Option<File>,
 }
 
-/// An empty temporary folder in `parent` for what is to be called `name`.
+/// Creates an empty temporary folder in `parent` for the final `name`.
 pub(crate) fn temporary_folder(parent: &Path, name: &str) -> io::Result<TemporaryFolder> {
     sweep_once(parent);
     loop {
@@ -62,7 +62,7 @@ pub(crate) fn temporary_folder(parent: &Path, name: &str) -> io::Result<Temporar
         #[cfg(unix)]
         builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o777));
         let folder = builder.tempdir_in(parent)?;
-        // Not every system opens folders as files; there, nothing is swept either.
+        // Not every system opens folders as files; those that do not are not swept either.
         let held = File::open(folder.path()).ok();
         if held.as_ref().is_none_or(hold) && folder.path().exists() {
             return Ok(TemporaryFolder { folder, _held: held });
@@ -77,7 +77,7 @@ fn prefix(name: &std::ffi::OsStr) -> std::ffi::OsString {
     prefix
 }
 
-/// Locks a file that is this process's own; `true` also where the file system has no locks.
+/// Locks a file of this process; `true` also if the file system has no locks.
 fn hold(file: &File) -> bool {
     !cfg!(unix) || !matches!(file.try_lock(), Err(fs::TryLockError::WouldBlock))
 }
@@ -91,8 +91,8 @@ fn sweep_once(folder: &Path) {
     }
 }
 
-/// Removes the temporary files and folders in `folder` that no process holds. What cannot be removed
-/// stays: nothing depends on it.
+/// Removes the temporary files and folders in `folder` that no process holds. Files that cannot be removed stay:
+/// nothing depends on them.
 pub(super) fn sweep(folder: &Path) {
     if !cfg!(unix) {
         return;
@@ -103,7 +103,7 @@ pub(super) fn sweep(folder: &Path) {
         }
         let path = entry.path();
         let Ok(file) = File::open(&path) else { continue };
-        // Looked at once the lock is there: files that a save has decided on are not for sweeping.
+        // Checked under the lock: files of a decided save must stay.
         if file.try_lock().is_err() || is_pending(folder) {
             continue;
         }
@@ -125,7 +125,7 @@ mod tests {
         let dead = temporary_file(&at("b.bin"), "mp4").expect("file").keep().expect("kept").1;
         let dead_folder = temporary_folder(folder.path(), "frames").expect("folder").folder.keep();
         fs::write(dead_folder.join("frame"), "x").expect("written");
-        // Neither ours, nor to be mistaken for ours.
+        // Names of other programs, similar to those of this one.
         let others = [at(".hidden"), at(".a.bin.tmp"), at("a.fmlgs-b.tmp")];
         others.iter().for_each(|o| fs::write(o, "x").expect("written"));
         sweep(folder.path());

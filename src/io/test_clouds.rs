@@ -1,4 +1,4 @@
-//! Gaussians for the tests of formats, and how near they must come back.
+//! Gaussians for the tests of formats, and the errors allowed after reading them back.
 
 use rand::{RngExt, SeedableRng};
 
@@ -23,8 +23,8 @@ pub(super) fn random(n: usize, sh_degree: u8) -> GaussianCloud {
     }
 }
 
-/// Every Gaussian of `a` is that of `b` up to these errors: of position, log-scale, rotation (1 less the cosine of
-/// half the angle), opacity and harmonics.
+/// Asserts that every Gaussian of `a` equals that of `b` up to these errors: of position, log-scale, rotation (1 less
+/// the cosine of half the angle), opacity and harmonics.
 pub(super) fn assert_near(a: &GaussianCloud, b: &GaussianCloud, most: [f32; 5]) {
     assert_eq!((a.len(), a.sh_degree, a.render_mode), (b.len(), b.sh_degree, b.render_mode));
     let stride = a.sh_stride();
@@ -44,7 +44,7 @@ pub(super) fn assert_near(a: &GaussianCloud, b: &GaussianCloud, most: [f32; 5]) 
     }
 }
 
-/// `a` in the order in which writers put Gaussians that lie together.
+/// Returns `a` in the Morton order that the writers use.
 pub(super) fn in_order(a: &GaussianCloud) -> GaussianCloud {
     a.select(&super::morton::order(a))
 }

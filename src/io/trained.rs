@@ -1,4 +1,4 @@
-//! A trained scene: a folder that any splat viewer can use, with what this program needs beside.
+//! A trained scene: a folder that any splat viewer can use, with the additional files of this program.
 //!
 //! | file | what |
 //! |---|---|
@@ -26,16 +26,16 @@ pub use super::scene_info::{DatasetReference, History, SceneCamera, SceneInfo, V
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainedScene {
     pub(crate) folder: PathBuf,
-    /// What `scene.json` says.
+    /// Contents of `scene.json`.
     pub info: SceneInfo,
     /// The Gaussians.
     pub cloud: GaussianCloud,
-    /// Id of the save that its files are of; `None` in folders of the first versions.
+    /// Id of the save that wrote its files; `None` in folders of the first versions.
     pub state: Option<String>,
 }
 
 impl TrainedScene {
-    /// Where the photos are, if the scene knows and the folder still exists.
+    /// Folder of the photos, if the scene has a reference and the folder still exists.
     pub(crate) fn dataset_path(&self) -> Option<PathBuf> {
         let path = self.folder.join(&self.info.dataset.as_ref()?.path);
         path.exists().then_some(path)
@@ -53,9 +53,9 @@ pub(crate) fn save(
     SceneFolder::hold(folder, "saving")?.save(info, cloud, map)
 }
 
-/// Reads a scene. A save that was interrupted is finished first.
+/// Reads a scene. An interrupted save is completed first.
 pub fn load(folder: &Path) -> Result<TrainedScene, IoError> {
-    // Somebody may be saving at this moment, which takes milliseconds once the files are written.
+    // Another process may be saving at this moment, which takes milliseconds once the files are written.
     const TRIES: u32 = 20;
     const PAUSE: Duration = Duration::from_millis(25);
     let mut tries = 0;

@@ -19,7 +19,7 @@ use super::splits::Splits;
 use super::{IoError, files, lenses, points_ply};
 use crate::scene::{Camera, Dataset, Distortion, Projection, text};
 
-/// The usual name of a list.
+/// Usual name of a list.
 pub(crate) const USUAL: &str = "transforms.json";
 
 #[derive(Deserialize)]
@@ -34,7 +34,7 @@ struct File {
     val_filenames: Vec<String>,
     #[serde(default)]
     test_filenames: Vec<String>,
-    /// What this program's own data sets say beyond nerfstudio's keys.
+    /// Keys of this program's own data sets beyond nerfstudio's.
     #[serde(default)]
     fmlgs: Own,
 }
@@ -50,7 +50,7 @@ struct Own {
 struct Frame {
     file_path: String,
     transform_matrix: Matrix,
-    /// A picture of the pixels that count.
+    /// Mask of the pixels that count.
     mask_path: Option<String>,
     #[serde(flatten)]
     lens: Intrinsics,
@@ -84,7 +84,7 @@ struct Intrinsics {
     camera_angle_y: Option<f64>,
 }
 
-/// Reads the dataset that a `transforms.json` describes.
+/// Reads the dataset of a `transforms.json`.
 pub fn read(file: &Path) -> Result<Dataset, IoError> {
     let root = files::folder_of(file);
     let parsed = File::read(file)?;
@@ -148,7 +148,7 @@ pub(crate) fn opengl_pose(camera: &Camera) -> [[f64; 4]; 4] {
 }
 
 impl Frame {
-    /// The photo, or its camera model if that is not supported.
+    /// Makes the photo, or returns the name of its camera model if that is not supported.
     fn listed(&self, shared: &Intrinsics, source: &Path) -> Result<Result<ListedPhoto, String>, IoError> {
         let name = &self.file_path;
         let bad = |reason: String| IoError::Syntax { path: source.into(), place: format!("frame '{name}'"), reason };
@@ -177,8 +177,7 @@ impl Frame {
 }
 
 impl Intrinsics {
-    /// These values, with those that are missing taken from `shared`. A frame that gives an angle
-    /// or a focal length of its own overrides both of the shared ones.
+    /// Fills missing values from `shared`. An angle or focal length of a frame overrides both of the shared ones.
     fn or(&self, shared: &Self) -> Self {
         let own_focal = self.fl_x.is_some() || self.camera_angle_x.is_some();
         let focal = if own_focal { self } else { shared };
@@ -207,7 +206,7 @@ impl Intrinsics {
         }
     }
 
-    /// How the lens bends, or its model if that is not supported.
+    /// Returns the distortion of the lens, or the name of its model if that is not supported.
     fn distortion(&self) -> Result<Distortion, String> {
         let model = self.camera_model.as_deref().unwrap_or_default().to_ascii_uppercase();
         let [k1, k2, k3, k4, k5, k6, p1, p2] =
@@ -236,7 +235,7 @@ impl Intrinsics {
         }
     }
 
-    /// The lens, or its model if that is not supported; `bad` makes an error of a value that cannot be.
+    /// Returns the lens, or the name of its model if that is not supported; `bad` makes an error of an invalid value.
     fn lens(&self, bad: &dyn Fn(String) -> IoError) -> Result<Result<Lens, String>, IoError> {
         let distortion = match self.distortion() {
             Ok(distortion) => distortion,
@@ -259,7 +258,7 @@ impl Intrinsics {
     }
 }
 
-/// A picture side in px, which files give as a floating-point number.
+/// Checks a picture side in px, which files give as a floating-point number.
 fn side(name: &str, value: f64) -> Result<u32, String> {
     let max = f64::from(Camera::MAX_SIDE_PX);
     if value >= 1.0 && value <= max && value.fract() == 0.0 {

@@ -1,16 +1,16 @@
-//! Photos whose camera poses nobody knows yet.
+//! Photos without known camera poses.
 
 use std::path::{Path, PathBuf};
 
 use super::{IoError, files, photo};
 
-/// Where they may lie in a folder.
+/// Folders searched for the photos.
 const FOLDERS: [&str; 3] = [".", "images", "input"];
-/// From how many on a folder of pictures is taken for photos of a scene.
+/// Fewest pictures of a folder that is taken for photos of a scene.
 const FEWEST: usize = 2;
-/// Endings of files in which other programs keep poses.
+/// Endings of files in which other programs store poses.
 const POSES: [&str; 7] = ["nvm", "out", "sfm", "psx", "xml", "rcproj", "p4d"];
-/// Names of such files.
+/// Names of files in which other programs store poses.
 const POSE_FILES: [&str; 5] = ["cameras.json", "sfm_data.json", "reconstruction.json", "images.txt", "images.bin"];
 
 /// A folder of photos without camera poses.
@@ -22,24 +22,24 @@ pub struct Unposed {
     pub images: PathBuf,
     /// Names of the photos in it, in order.
     pub photos: Vec<String>,
-    /// What else lies there, in words: pictures that cannot be read, poses in formats of other programs; or nothing.
+    /// Sentences on other findings: pictures that cannot be read, poses in formats of other programs; may be empty.
     pub(crate) beside: String,
 }
 
 impl Unposed {
-    /// With one more sentence on what lies beside.
+    /// Adds one more sentence to [`Self::beside`].
     pub(super) fn with(self, sentence: Option<String>) -> Self {
         let all: Vec<String> = sentence.into_iter().chain(Some(self.beside).filter(|b| !b.is_empty())).collect();
         Self { beside: all.join(". "), ..self }
     }
 
-    /// What lies beside, in brackets after a sentence.
+    /// Other findings, in brackets after a sentence.
     pub(super) fn in_brackets(&self) -> String {
         if self.beside.is_empty() { String::new() } else { format!(" ({})", self.beside) }
     }
 }
 
-/// The photos in `folder`, if there are any.
+/// Finds the photos in `folder`, if there are any.
 ///
 /// # Errors
 /// If there are pictures, and none that can be read.
@@ -70,7 +70,7 @@ pub(super) fn find(folder: &Path) -> Result<Option<Unposed>, IoError> {
     Ok(None)
 }
 
-/// A sentence about a file with poses of another program, if there is one.
+/// Returns a sentence about a file with poses of another program, if there is one.
 fn poses(folders: &[&Path]) -> Option<String> {
     let has_poses = |name: &String| {
         let ending = Path::new(name).extension().map(|e| e.to_string_lossy().to_lowercase());

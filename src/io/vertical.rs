@@ -1,16 +1,16 @@
-//! How a `.ply` says what is upwards: a comment that nerfstudio writes, and Brush.
+//! Up direction of a `.ply`: a comment that nerfstudio and Brush write.
 
 use glam::DVec3;
 
 /// The comment's start, in lower case.
 const COMMENT: &str = "vertical axis:";
-/// The same as Brush writes it, who counts its y down, as 3DGS does.
+/// Brush's spelling of the comment; its y axis counts downward, as in 3DGS.
 const OF_BRUSH: &str = "Vertical axis:";
 /// Start of another comment in Brush's files.
 const BRUSH: &str = "exported from brush";
 
-/// Upwards by the comments of a `.ply`, the last one first; `None` where they do not say, or where it is `-y` as
-/// usual.
+/// Reads the up direction from the comments of a `.ply`; the last one counts. `None` if they state none, or the usual
+/// `-y`.
 pub(super) fn of_comments(comments: &[&str]) -> Option<DVec3> {
     let is_brush = comments.iter().any(|c| c.to_lowercase().starts_with(BRUSH));
     let told = |comment: &&str| {
@@ -26,7 +26,7 @@ pub(super) fn of_comments(comments: &[&str]) -> Option<DVec3> {
     comments.iter().rev().find_map(told).filter(|up| *up != DVec3::NEG_Y)
 }
 
-/// The comment, without the word `comment`, for what is upwards along an axis other than `-y`.
+/// Comment for an up direction along an axis other than `-y`, without the word `comment`.
 pub(super) fn comment(up: Option<DVec3>) -> Option<String> {
     let up = up.filter(|up| *up != DVec3::NEG_Y)?;
     let k = (0..3).find(|&k| up.abs() == DVec3::AXES[k])?;

@@ -1,4 +1,4 @@
-//! Camera paths as files: the program's own JSON, and nerfstudio's.
+//! Camera paths as files: the program's own JSON format and nerfstudio's.
 
 use std::path::Path;
 
@@ -16,12 +16,12 @@ pub use own::{FORMAT, VERSION, write};
 /// Largest file of a camera path in bytes; a path of [`CameraPath::MAX_KEYS`] keys fits.
 pub(crate) const MAX_BYTES: u64 = 128 << 20;
 
-/// Reads a camera path, of the program's own format or of nerfstudio's, whichever the file is.
+/// Reads a camera path in the program's own format or in nerfstudio's.
 pub(crate) fn open(path: &Path) -> Result<CameraPath, IoError> {
     parse(&files::read(path, MAX_BYTES)?, path)
 }
 
-/// As [`open`], of bytes; `path` is what errors call them.
+/// As [`open`], from bytes; `path` is for errors.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<CameraPath, IoError> {
     let marks: Marks = files::json(bytes, path)?;
     let camera_path = match marks {
@@ -42,7 +42,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<CameraPath, IoError> {
     Ok(camera_path)
 }
 
-/// What tells the formats apart; the rest is skipped without being kept.
+/// Keys that tell the formats apart; all others are skipped without being stored.
 #[derive(Deserialize)]
 struct Marks {
     format: Option<String>,
@@ -51,7 +51,7 @@ struct Marks {
     camera_path: Option<IgnoredAny>,
 }
 
-/// A path that breaks a rule, as an error about its file.
+/// Makes an error about a file from a path that breaks a rule.
 fn error(path: &Path, e: &PathError) -> IoError {
     let (place, reason) = match e {
         PathError::Key { field, reason, .. } => {
@@ -64,7 +64,7 @@ fn error(path: &Path, e: &PathError) -> IoError {
     IoError::Syntax { path: path.into(), place, reason }
 }
 
-/// A list of at most [`CameraPath::MAX_KEYS`] members; a bad one is named by its number.
+/// Reads a list of at most [`CameraPath::MAX_KEYS`] members; errors name the member by its number.
 fn members<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D, what: &'static str) -> Result<Vec<T>, D::Error> {
     Members { what, member: std::marker::PhantomData }.deserialize(from)
 }

@@ -4,8 +4,8 @@
 //! `fov` is vertical, in degrees. The first viewer (before nerfstudio 1.0) wrote a keyframe's matrix
 //! as a text of 16 numbers column by column; both are read.
 //!
-//! Positions are those of the scene as nerfstudio holds it. Where nerfstudio turned or scaled the
-//! scene on loading (its `dataparser_transforms.json`), they are not those of the photos' poses.
+//! Positions are in nerfstudio's scene. If nerfstudio rotated or scaled the scene on loading (its
+//! `dataparser_transforms.json`), they differ from the photos' poses.
 
 use std::path::Path;
 
@@ -18,7 +18,7 @@ use crate::io::{IoError, atomic, files};
 use crate::math::rotation::{nearest_rotation, rotation_error};
 use crate::scene::{CameraPath, PathKey};
 
-/// What of a file is read. `camera_path` are the frames of the video, `keyframes` what they were made from.
+/// Fields of the file that are read. `camera_path` has the frames of the video, `keyframes` their source.
 #[derive(Deserialize)]
 struct File {
     camera_type: Option<String>,
@@ -49,7 +49,7 @@ struct Frame {
     aspect: Option<f64>,
 }
 
-/// A keyframe's matrix, as either viewer writes it.
+/// Matrix of a keyframe, as either viewer writes it.
 #[derive(Deserialize)]
 #[serde(untagged, expecting = "a matrix of 16 numbers")]
 enum Matrix {
@@ -65,7 +65,7 @@ fn frames<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Frame>, D::Error> {
     members(from, "frame")
 }
 
-/// The path in `bytes`: its keyframes, or else every frame of the video as a key. Values are not all checked yet.
+/// Parses a path: its keyframes, or else every frame of the video as a key. Not all values are checked yet.
 pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<CameraPath, IoError> {
     let file: File = files::json(bytes, path)?;
     if let Some(kind) = file.camera_type.as_deref().filter(|k| !k.eq_ignore_ascii_case("perspective")) {
@@ -102,9 +102,9 @@ pub(crate) fn parse(bytes: &[u8], path: &Path) -> Result<CameraPath, IoError> {
     Ok(CameraPath { keys, closed, fps, seconds: file.seconds.unwrap_or(film) })
 }
 
-/// Writes a path for nerfstudio: `keys` as keyframes, `frames` (the interpolated video at the path's
-/// `fps`, which is what `ns-render` renders) as `camera_path`, for pictures of `size_px`. Waits and
-/// names have no place in the format and are left out; the roll goes into the matrices.
+/// Writes a path for nerfstudio: `keys` as keyframes, and `frames` (the interpolated video at the path's `fps`, which
+/// `ns-render` renders) as `camera_path`, for pictures of `size_px`. Waits and names have no place in the format and
+/// are left out; the roll goes into the matrices.
 ///
 /// # Errors
 /// [`IoError::Syntax`] names the key and field of a path that breaks a rule; [`IoError::Write`].
@@ -145,8 +145,8 @@ pub fn write(path: &Path, keys: &CameraPath, frames: &[PathKey], size_px: (u32, 
     })
 }
 
-/// Seconds of the way to each key; that of the first is the way back from the last. Equal parts of
-/// the whole unless every key has its time.
+/// Seconds of the way to each key; the first value is the way back from the last key. Equal parts of the total unless
+/// every key has its time.
 fn spans(path: &CameraPath) -> Vec<f64> {
     /// The shortest transition of nerfstudio's viewer.
     const SHORTEST_SECS: f64 = 1e-3;
@@ -172,7 +172,7 @@ fn matrix(key: &PathKey) -> [f64; 16] {
     DMat4::from_cols(columns[0], columns[1], columns[2], columns[3]).transpose().to_cols_array()
 }
 
-/// The key of a matrix (OpenGL axes, row by row) and a field of view in degrees.
+/// Makes the key of a matrix (OpenGL axes, row by row) and a field of view in degrees.
 fn key(rows: &[f64; 16], fov_deg: f64) -> Result<PathKey, String> {
     if rows.iter().any(|v| !v.is_finite()) {
         return Err("the matrix has a number that is not finite".into());

@@ -11,9 +11,9 @@ use super::{error, members};
 use crate::io::{IoError, atomic, files};
 use crate::scene::{CameraPath, PathKey, text};
 
-/// What `format` says in a file.
+/// Value of `format` in a file.
 pub const FORMAT: &str = "fmlgs-camera-path";
-/// The version that is written, and the highest that is read.
+/// Version that is written, and the highest that is read.
 pub const VERSION: u64 = 1;
 
 #[derive(Serialize, Deserialize)]
@@ -48,7 +48,7 @@ fn keys<'de, D: Deserializer<'de>>(from: D) -> Result<Vec<Key>, D::Error> {
     members(from, "key")
 }
 
-/// Writes a valid camera path, whole or not at all.
+/// Writes a valid camera path atomically.
 ///
 /// # Errors
 /// [`IoError::Syntax`] names the key and field of a path that breaks a rule; [`IoError::Write`].
@@ -68,7 +68,7 @@ pub fn write(path: &Path, camera_path: &CameraPath) -> Result<(), IoError> {
     })
 }
 
-/// The path in `bytes`, whose head says `version`; its values are not checked yet.
+/// Parses a path with the `version` of its head; its values are not checked yet.
 pub(crate) fn parse(bytes: &[u8], version: Option<u64>, path: &Path) -> Result<CameraPath, IoError> {
     match version {
         Some(VERSION) => {}

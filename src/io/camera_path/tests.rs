@@ -24,7 +24,7 @@ fn path() -> CameraPath {
     CameraPath { keys, closed: true, fps: 29.97, seconds: 7.25 }
 }
 
-/// The path without what nerfstudio cannot hold: no waits, no names, every key with its time.
+/// Path without the properties that nerfstudio cannot hold: no waits, no names, every key with its time.
 fn plain() -> CameraPath {
     let mut path = path();
     for (i, key) in path.keys.iter_mut().enumerate() {
@@ -84,7 +84,7 @@ fn nerfstudio_reads_back() {
     }
 }
 
-/// Where a pinhole camera of nerfstudio (its `Cameras`, OpenGL axes) sees a point.
+/// Projection of a point in a pinhole camera of nerfstudio (its `Cameras`, OpenGL axes).
 fn seen_by_nerfstudio(rows: &[f64], fov_deg: f64, (width, height): (f64, f64), p: DVec3) -> Option<DVec2> {
     let world_from_camera = DMat4::from_cols_slice(rows).transpose();
     let q: DVec4 = world_from_camera.inverse() * p.extend(1.0);

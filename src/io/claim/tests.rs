@@ -1,4 +1,4 @@
-//! Claims: one owner at any time, taken over where that is right and nowhere else.
+//! Claims: one owner at any time, taken over only if that is allowed.
 
 use super::*;
 
@@ -15,7 +15,7 @@ fn now(folder: &Path) -> Option<Claim> {
     mine(folder, LONG, &mut Watch::default())
 }
 
-/// A claim as another machine leaves it, whose locks nobody here sees.
+/// Writes a claim as another machine leaves it, whose locks cannot be seen here.
 fn leave(folder: &Path, number: u64, beats: u64, takeover: Duration, given_back: bool) {
     let claims = folder.join(FOLDER);
     fs::create_dir_all(&claims).expect("folder");
@@ -42,7 +42,7 @@ fn a_folder_has_one_owner_until_it_is_given_back() {
     assert!(!second.is_lost() && now(folder.path()).is_none());
 }
 
-/// The lock of a dead process is free: nobody waits for its heartbeat on its own machine.
+/// The lock of a dead process is free, so no process on its machine waits for its heartbeat.
 #[test]
 fn a_dead_owner_of_this_machine_is_followed_at_once() {
     let folder = tempfile::tempdir().expect("folder");
@@ -69,7 +69,7 @@ fn an_owner_elsewhere_is_followed_once_its_heartbeat_stands_still() {
     let short = Duration::from_millis(60);
     leave(folder.path(), 3, 5, short, false);
     let mut watch = Watch::default();
-    // What the claim says counts, not what the one who waits would like.
+    // The timeout of the claim counts, not that of the waiting process.
     assert!(mine(folder.path(), Duration::ZERO, &mut watch).is_none(), "not watched yet");
     std::thread::sleep(2 * short);
     leave(folder.path(), 3, 6, short, false);
@@ -116,7 +116,7 @@ fn a_heart_beats_until_another_has_taken_over() {
     assert!(now(folder.path()).is_none(), "what was lost is not given back");
 }
 
-/// Whoever is told that the folder is theirs is the only one.
+/// Of many processes that take over at once, one succeeds.
 #[test]
 fn of_many_who_take_over_at_once_one_succeeds() {
     let folder = tempfile::tempdir().expect("folder");

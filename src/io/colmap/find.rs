@@ -1,13 +1,13 @@
-//! Where COLMAP's reconstructions lie: in the folders that COLMAP itself and those who use it write, or anywhere near;
-//! the one with the most photos is taken.
+//! Location of COLMAP's reconstructions: in the folders that COLMAP and its users write, or close to them. The one with
+//! the most photos is used.
 
 use std::path::{Path, PathBuf};
 
 use super::{Image, binary, text};
 use crate::io::{IoError, files, photo};
 
-/// Where a reconstruction may lie relative to a dataset's folder, the most likely first; in these also each in a folder
-/// of its own. Of two with as many photos the first is taken: that of undistorted photos comes before the other.
+/// Folders of reconstructions relative to a dataset's folder, the most likely first; each may also hold them in
+/// subfolders. Of two with as many photos the first is used: undistorted photos come before distorted ones.
 const PLACES: [&str; 14] = [
     "sparse",
     "",
@@ -24,7 +24,7 @@ const PLACES: [&str; 14] = [
     "colmap_text",
     "sparse_txt",
 ];
-/// Most folders that are looked into in one place.
+/// Most subfolders searched in one place.
 const MOST: usize = 1000;
 
 /// Files of a reconstruction.
@@ -37,7 +37,7 @@ pub(super) struct ModelFolder {
 }
 
 impl ModelFolder {
-    /// The reconstruction whose files lie in `folder` itself.
+    /// Returns the reconstruction with files in `folder` itself.
     fn at(folder: &Path, place: usize) -> Option<Self> {
         let has = |ending: &str| ["cameras", "images"].iter().all(|n| folder.join(format!("{n}.{ending}")).is_file());
         let is_binary = has("bin");
@@ -48,7 +48,7 @@ impl ModelFolder {
         self.folder.join(format!("{name}.{}", if self.is_binary { "bin" } else { "txt" }))
     }
 
-    /// Its photos' names and poses.
+    /// Reads names and poses of its photos.
     pub(super) fn images(&self) -> Result<Vec<Image>, IoError> {
         let file = self.file("images");
         match self.is_binary {
@@ -57,7 +57,7 @@ impl ModelFolder {
         }
     }
 
-    /// How many photos it has; a binary file says so at its start.
+    /// Reads the number of its photos, in a binary file from the start alone.
     fn count(&self) -> Result<u64, IoError> {
         if !self.is_binary {
             return Ok(self.images()?.len() as u64);
@@ -67,18 +67,18 @@ impl ModelFolder {
     }
 }
 
-/// A reconstruction that is not taken, and what there is to say of it.
+/// A reconstruction that is not used, and its description.
 pub(super) struct Other {
     pub(super) folder: PathBuf,
     pub(super) what: String,
 }
 
-/// Whether there is any reconstruction of the dataset in `root`.
+/// Returns whether there is any reconstruction of the dataset in `root`.
 pub(super) fn any(root: &Path) -> bool {
     !models(root).is_empty()
 }
 
-/// All reconstructions of the dataset in `root`, in the order of [`PLACES`].
+/// Finds all reconstructions of the dataset in `root`, in the order of [`PLACES`].
 fn models(root: &Path) -> Vec<ModelFolder> {
     let mut found: Vec<ModelFolder> = Vec::new();
     for (place, name) in PLACES.iter().enumerate() {
@@ -90,11 +90,11 @@ fn models(root: &Path) -> Vec<ModelFolder> {
         let below = below.iter().take(MOST).map(|name| folder.join(name));
         let mut folders: Vec<PathBuf> = std::iter::once(folder.clone()).chain(below).collect();
         if !name.is_empty() {
-            // `sparse/0` before what was copied out of it.
+            // `sparse/0` before copies of it in `sparse` itself.
             folders.rotate_left(1);
         }
         for folder in folders {
-            // `sparse` of the dataset is also a folder in it.
+            // The dataset's `sparse` is also a subfolder of its root.
             let is_new = |model: &ModelFolder| found.iter().all(|other| other.folder != model.folder);
             // A folder with photos of its own is another dataset.
             let is_here = |model: &ModelFolder| !name.is_empty() || model.folder == root || !has_photos(&model.folder);
@@ -110,15 +110,15 @@ fn has_photos(folder: &Path) -> bool {
     files::names_in(folder).is_ok_and(|names| names.iter().any(is_photo))
 }
 
-/// The reconstruction that is taken.
+/// The reconstruction that is used.
 pub(super) struct Largest {
     pub(super) model: ModelFolder,
     pub(super) images: Vec<Image>,
-    /// Others that have photos of their own, or cannot be read.
+    /// Reconstructions that have other photos, or cannot be read.
     pub(super) others: Vec<Other>,
 }
 
-/// The reconstruction of most photos of the dataset in `root`; `None` if there is none.
+/// Finds the reconstruction with the most photos of the dataset in `root`; `None` if there is none.
 ///
 /// # Errors
 /// If none can be read.
@@ -141,7 +141,7 @@ pub(super) fn largest(root: &Path) -> Result<Option<Largest>, IoError> {
                 }
                 Err(e) => Err(e),
             },
-            // The same once more: before its photos were undistorted, or as text.
+            // The same reconstruction again: before its photos were undistorted, or as text.
             (Ok(n), Some((taken, images))) if n == images.len() as u64 && model.place != taken.place => continue,
             (Ok(n), Some(_)) => Ok(format!("{n} photos")),
             (Err(e), _) => Err(e),

@@ -44,10 +44,10 @@ const MODELS: [LensModel; 18] = [
     model(PANORAMA, 2, 0),
 ];
 
-/// A camera, or the name of its model if photos cannot be undistorted with that.
+/// A camera, or the name of its model if that cannot be undistorted.
 pub(super) type FoundLens = Result<Lens, String>;
 
-/// Model number `number` of the camera `place`.
+/// Returns model number `number` of the camera `place`.
 pub(super) fn by_number(number: u32, place: &str, path: &Path) -> Result<&'static LensModel, IoError> {
     MODELS.get(number as usize).ok_or_else(|| IoError::Unsupported {
         path: path.into(),
@@ -56,12 +56,12 @@ pub(super) fn by_number(number: u32, place: &str, path: &Path) -> Result<&'stati
     })
 }
 
-/// The model of a name; an unknown one is told when a photo needs it.
+/// Returns the model of a name; an unknown one is reported once a photo needs it.
 pub(super) fn by_name(name: &str) -> Result<&'static LensModel, String> {
     MODELS.iter().find(|m| m.name == name).ok_or_else(|| name.chars().take(40).collect())
 }
 
-/// The camera `id` of a model.
+/// Makes the camera `id` of a model.
 pub(super) fn lens(
     model: &LensModel,
     size: (u64, u64),
@@ -86,7 +86,7 @@ pub(super) fn lens(
     Ok(Ok(Lens { size_px: Some((w, h)), focal: Focal::Px(focal), principal_px: Some(principal), distortion }))
 }
 
-/// Focal lengths, principal point and distortion; `None` of a model without a pinhole.
+/// Splits parameters into focal lengths, principal point and distortion; `None` for a model without a pinhole.
 fn parts(model: &LensModel, params: &[f64]) -> Option<(DVec2, DVec2, Distortion)> {
     let (focal, principal, rest) = match (model.focals, params) {
         (1, [f, cx, cy, rest @ ..]) => (DVec2::splat(*f), DVec2::new(*cx, *cy), rest),

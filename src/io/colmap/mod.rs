@@ -1,5 +1,5 @@
-//! COLMAP reconstructions, binary and text: `cameras`, `images` and `points3D` in `sparse/0` or wherever else those who
-//! use COLMAP put them ([`find`]), photos in `images` or wherever they are ([`photo_folder`]).
+//! COLMAP reconstructions, binary and text: `cameras`, `images` and `points3D` in `sparse/0` or other usual folders
+//! ([`find`]), photos in `images` or elsewhere ([`photo_folder`]).
 //!
 //! Poses are camera_from_world with the axes that this program uses (x right, y down, z forward).
 
@@ -40,7 +40,7 @@ pub(crate) fn is_colmap(root: &Path) -> bool {
     find::any(root)
 }
 
-/// Reads the dataset in `root`, or the one that a reconstruction in `root` is of.
+/// Reads the dataset in `root`, or the dataset of a reconstruction in `root`.
 pub fn read(root: &Path) -> Result<Dataset, IoError> {
     let Some(Largest { model, images, others }) = find::largest(root)? else {
         let cause = std::io::Error::from(std::io::ErrorKind::NotFound);
@@ -86,7 +86,7 @@ pub fn read(root: &Path) -> Result<Dataset, IoError> {
     })
 }
 
-/// A folder as seen from another that it lies in.
+/// Path of a folder relative to one that contains it.
 fn shown(folder: &Path, from: &Path) -> String {
     let inside = folder.strip_prefix(from).unwrap_or(folder);
     if inside.as_os_str().is_empty() { "the folder itself".into() } else { inside.display().to_string() }
@@ -100,7 +100,7 @@ fn cameras(model: &ModelFolder) -> Result<Cameras, IoError> {
     }
 }
 
-/// The points of COLMAP's file, or else of a `.ply` beside it.
+/// Reads the points of COLMAP's file, or else of a `.ply` beside it.
 fn points(model: &ModelFolder) -> Result<Vec<SparsePoint>, IoError> {
     let file = model.file("points3D");
     let points = match file.is_file() {
@@ -114,7 +114,7 @@ fn points(model: &ModelFolder) -> Result<Vec<SparsePoint>, IoError> {
     }
 }
 
-/// The photos that have a camera, with it. The others are left out with a warning that names them; if all are so, that
+/// Pairs photos with their cameras. Photos without one are left out with a warning that names them; if all are so, that
 /// is an error.
 fn with_cameras<'a>(
     images: &'a [Image],
@@ -144,7 +144,7 @@ fn with_cameras<'a>(
     Ok(known)
 }
 
-/// A photo, or the name of its camera's model if that is not supported.
+/// Makes the photo, or returns the name of its camera model if that is not supported.
 fn listed(image: &Image, lens: &lens::FoundLens, folder: &str) -> Result<ListedPhoto, String> {
     let lens = lens.clone()?;
     // The rows of camera_from_world are the columns of world_from_camera.
@@ -168,7 +168,7 @@ fn point(position: DVec3, rgb: [u8; 3], index: usize, path: &Path) -> Result<Spa
     photo_list::place(position, "point", index, path).map(|position| SparsePoint { position, rgb })
 }
 
-/// An error where a number that names one thing names two.
+/// Refuses two things with one id.
 fn distinct(mut ids: Vec<u64>, what: &str, path: &Path) -> Result<(), IoError> {
     ids.sort_unstable();
     match ids.windows(2).find(|w| w[0] == w[1]) {

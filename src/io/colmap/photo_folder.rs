@@ -1,5 +1,5 @@
-//! Where the photos of a reconstruction lie: beside it, in the folders that COLMAP and those who use it fill, or anywhere
-//! near; by their names.
+//! Location of a reconstruction's photos, found by their names: beside it, in the folders that COLMAP and its users
+//! fill, or close to them.
 
 use std::path::{Path, PathBuf};
 
@@ -7,24 +7,24 @@ use super::Image;
 use crate::io::photo_list::{self, Lookup, PhotoFinder, reduction};
 use crate::io::{IoError, files};
 
-/// How many of the names are looked for in each folder.
+/// Photo names looked for in each folder.
 const SAMPLE: usize = 32;
-/// Most folders that are looked into, and how deep they lie.
+/// Most folders searched, and their greatest depth.
 const MOST: usize = 500;
 const DEEPEST: usize = 3;
-/// How far above a reconstruction that was opened itself its dataset is looked for.
+/// Levels above a reconstruction, opened on its own, at which its dataset is searched.
 const ABOVE: usize = 3;
-/// Folders of a dataset that hold no photos, so that those who open them mean what lies beside.
+/// Subfolders of a dataset that hold no photos; a user who opens one means the dataset around it.
 const INNER: [&str; 7] = ["sparse", "colmap", "distorted", "dense", "undistorted", "aligned", "sfm"];
 
-/// A dataset's folder, and the one of its photos relative to it.
+/// A dataset's folder, and the photos' folder relative to it.
 pub(super) struct PhotoFolder {
     pub(super) root: PathBuf,
     pub(super) below: String,
 }
 
-/// The folder with the photos of the reconstruction in `model`, which is one of the dataset in `root` or lies there.
-/// `source` is the file that lists them.
+/// Finds the photos' folder of the reconstruction in `model`, which belongs to the dataset in `root` or lies there.
+/// `source` is the file that lists the photos.
 pub(super) fn find(root: &Path, model: &Path, images: &[Image], source: &Path) -> Result<PhotoFolder, IoError> {
     let names: Vec<&str> = sample(images);
     let usual = best(root, &near(root, model), &names)?;
@@ -41,7 +41,7 @@ pub(super) fn find(root: &Path, model: &Path, images: &[Image], source: &Path) -
             }
         }
     }
-    // None is there: the error says where they should be.
+    // No photos are there: the error names the expected folder.
     Ok(PhotoFolder { root: root.into(), below: photo_list::photo_folder(root, source)? })
 }
 
@@ -50,7 +50,7 @@ fn sample(images: &[Image]) -> Vec<&str> {
     images.iter().step_by(step).map(|image| image.name.as_str()).collect()
 }
 
-/// The first of the folders in which most of the names are files; `None` if there are none.
+/// Returns the first of the folders with the most of the named files; `None` if there are none.
 fn best(root: &Path, folders: &[String], names: &[&str]) -> Result<Option<String>, IoError> {
     let finder = PhotoFinder::new(root)?;
     let mut best: Option<(usize, &String)> = None;
@@ -66,10 +66,10 @@ fn best(root: &Path, folders: &[String], names: &[&str]) -> Result<Option<String
     Ok(best.map(|(_, folder)| folder.clone()))
 }
 
-/// Folders that photos usually lie in, from the reconstruction up to the dataset's folder; what exists of them.
+/// Lists the usual folders of photos that exist, from the reconstruction up to the dataset's folder.
 fn near(root: &Path, model: &Path) -> Vec<String> {
     let inside = model.strip_prefix(root).unwrap_or(Path::new(""));
-    // What was distorted when the reconstruction was made lies apart from what was undistorted since.
+    // Distorted photos, as of the reconstruction, lie apart from photos undistorted later.
     let usual = match inside.components().any(|part| part.as_os_str().eq_ignore_ascii_case("distorted")) {
         true => ["input", "images"],
         false => ["images", "input"],
@@ -98,7 +98,7 @@ fn near(root: &Path, model: &Path) -> Vec<String> {
     all
 }
 
-/// Folders in a folder, those least deep first.
+/// Lists folders in a folder, the shallowest first.
 fn anywhere(root: &Path) -> Vec<String> {
     let mut all: Vec<String> = vec![String::new()];
     let mut next = 0;

@@ -1,4 +1,4 @@
-//! COLMAP's text files: `#` starts a comment, one thing a line (images: two lines each).
+//! COLMAP's text files: `#` starts a comment, one entry per line (images: two lines each).
 
 use std::path::Path;
 use std::str::{FromStr, SplitAsciiWhitespace};
@@ -41,7 +41,7 @@ impl<'a> Line<'a> {
     }
 }
 
-/// The lines that are neither empty nor comments.
+/// Returns the lines that are neither empty nor comments.
 fn lines<'a>(text: &'a str, path: &'a Path) -> impl Iterator<Item = Line<'a>> {
     let full = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
     full.map(move |(i, l)| Line::new(l, i + 1, path))
@@ -90,7 +90,7 @@ pub(super) fn images(text: &str, path: &Path) -> Result<Vec<Image>, IoError> {
         }
         let translation = l.vector("translation")?;
         let camera = l.next("camera id")?;
-        // A name may hold blanks: it is what is left of the line.
+        // A name may hold blanks, so it is the rest of the line.
         let first = l.word("name")?;
         let name = line.get(first.as_ptr() as usize - line.as_ptr() as usize..).unwrap_or(first).trim_end();
         images.push(Image { name: name.into(), camera, quaternion, translation });
@@ -106,7 +106,7 @@ pub(super) fn images(text: &str, path: &Path) -> Result<Vec<Image>, IoError> {
     Ok(images)
 }
 
-/// Whether a line is a photo's 2-D points: nothing, or `x y id` again and again.
+/// Returns whether a line holds a photo's 2-D points: nothing, or `x y id` repeated.
 fn is_observations(line: &str) -> bool {
     let words: Vec<&str> = line.split_ascii_whitespace().collect();
     let is_point =

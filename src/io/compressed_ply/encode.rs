@@ -15,7 +15,7 @@ use crate::scene::GaussianCloud;
 /// Lowest and highest values of three numbers.
 type Bounds3 = [[f32; 3]; 2];
 
-/// Writes the bytes of a compressed `.ply` of a valid cloud, in an order in which chunks are small.
+/// Writes the bytes of a compressed `.ply` of a valid cloud, in Morton order, which keeps the chunks small.
 pub(in crate::io) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
     let (near, shift) = shift::near_zero(cloud);
     let cloud = &*near;
@@ -61,7 +61,7 @@ fn names(names: &[&str]) -> Vec<String> {
     names.iter().map(|name| (*name).to_owned()).collect()
 }
 
-/// The bounds of a chunk, and its rows.
+/// Packs the bounds of a chunk and its rows.
 fn packed(cloud: &GaussianCloud, chunk: &[usize]) -> (Vec<u8>, Vec<u8>) {
     let stride = cloud.sh_stride();
     let all = |of: &dyn Fn(usize) -> [f32; 3]| chunk.iter().map(|i| of(*i)).collect::<Vec<_>>();

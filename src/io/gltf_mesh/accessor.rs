@@ -15,14 +15,14 @@ pub(crate) struct AccessorValues {
 }
 
 impl AccessorValues {
-    /// Elements as arrays, filled up with `fill` where the accessor has fewer components.
+    /// Elements as arrays, padded with `fill` if the accessor has fewer components.
     pub(crate) fn arrays<const N: usize>(&self, fill: f32) -> impl Iterator<Item = [f32; N]> + '_ {
         self.data.chunks_exact(self.width).map(move |c| std::array::from_fn(|i| c.get(i).copied().unwrap_or(fill)))
     }
 }
 
 impl File<'_> {
-    /// Reads a numeric accessor; integers are scaled to 0..1 or -1..1 where it says `normalized`.
+    /// Reads a numeric accessor; `normalized` integers are scaled to 0..1 or -1..1.
     pub(crate) fn values(&self, index: usize, place: &str) -> Result<AccessorValues, IoError> {
         let values = self.any_values(index, place)?;
         match values.data.iter().position(|v| !v.is_finite()) {
@@ -34,7 +34,7 @@ impl File<'_> {
         }
     }
 
-    /// The same where floats may be other than finite.
+    /// As [`Self::values`], but floats need not be finite.
     pub(crate) fn any_values(&self, index: usize, place: &str) -> Result<AccessorValues, IoError> {
         let root = self.root;
         let accessor = self.item(&root.accessors, index, "accessors", place)?;
@@ -110,7 +110,7 @@ impl File<'_> {
         }
     }
 
-    /// The bytes of each of `count` elements of `width` components.
+    /// Returns the bytes of each of `count` elements of `width` components.
     fn elements<'s>(
         &'s self,
         view: Index<View>,
@@ -147,7 +147,7 @@ impl File<'_> {
         self.buffer_bytes(view.buffer.value(), start, view.byte_length.0, &format!("bufferViews[{index}]"))
     }
 
-    /// `length` bytes of a buffer.
+    /// Returns `length` bytes of a buffer.
     pub(super) fn buffer_bytes(&self, buffer: usize, start: u64, length: u64, place: &str) -> Result<&[u8], IoError> {
         let buffer = self.item(&self.buffers, buffer, "buffers", place)?;
         let end = start.checked_add(length);
@@ -158,7 +158,7 @@ impl File<'_> {
     }
 }
 
-/// One little-endian component; 0 where `b` is not as long as the type (never so here).
+/// Reads one little-endian component; 0 if `b` is shorter than the type (never so here).
 fn number(b: &[u8], component: ComponentType, normalized: bool) -> f32 {
     let (value, largest) = match (component, b) {
         (ComponentType::I8, [a, ..]) => (f32::from(*a as i8), 127.0),

@@ -14,7 +14,7 @@ use crate::scene::text;
 const MAX_UV_SETS: u32 = 8;
 
 impl File<'_> {
-    /// The meshes that `nodes` use; the others stay empty.
+    /// Converts the meshes that `nodes` use; the others stay empty.
     pub(super) fn meshes(&mut self, nodes: &[MeshNode], materials: &[Material]) -> Result<Vec<Mesh>, IoError> {
         let root = self.root;
         let mut used = vec![false; root.meshes.len()];
@@ -99,12 +99,12 @@ impl File<'_> {
             }
             None => materials.len() - 1,
         };
-        // Draco knows no strips and fans: what it unpacks is triangles.
+        // Draco has no strips and fans: it unpacks to triangles.
         let triangles = triangles(&order, if draco.is_some() { Mode::Triangles } else { mode });
         Ok(Some(MeshPrimitive { positions, normals, uv_sets, colors, triangles, material }))
     }
 
-    /// An attribute of a primitive, unpacked where Draco has packed it.
+    /// Reads an attribute of a primitive, unpacked if Draco has packed it.
     fn attribute(
         &self,
         draco: Option<&Unpacked>,
@@ -117,7 +117,7 @@ impl File<'_> {
     }
 }
 
-/// Triangles of a list, strip or fan; incomplete ones at the end are dropped.
+/// Makes triangles of a list, strip or fan; incomplete ones at the end are dropped.
 pub(crate) fn triangles(order: &[u32], mode: Mode) -> Vec<[u32; 3]> {
     match mode {
         Mode::TriangleStrip => order

@@ -34,7 +34,7 @@ impl Default for Material {
     }
 }
 
-/// Images decoded so far: by index in the file, where that image could be read.
+/// Images decoded so far; `known` maps an image of the file to its index, `None` if it could not be read.
 struct Images {
     list: Vec<TextureImage>,
     known: Vec<Option<Option<usize>>>,
@@ -42,7 +42,7 @@ struct Images {
 }
 
 impl File<'_> {
-    /// All materials, the default one appended, and the images that they use.
+    /// Converts all materials, the default one appended, and the images that they use.
     pub(super) fn materials(&mut self) -> Result<(Vec<Material>, Vec<TextureImage>), IoError> {
         self.check_sizes()?;
         let root = self.root;
@@ -116,7 +116,7 @@ impl File<'_> {
         Ok(Some(TextureUse { image, uv_set, offset, rotation_rad, scale, wrap, nearest }))
     }
 
-    /// Index of the decoded image, or `None` with a warning where it is missing or does not decode.
+    /// Returns the index of the decoded image, or `None` with a warning if it is missing or does not decode.
     fn image(&mut self, index: usize, place: &str, images: &mut Images) -> Result<Option<usize>, IoError> {
         self.item(&self.root.images, index, "images", place)?;
         if let Some(known) = images.known[index] {
@@ -144,7 +144,7 @@ impl File<'_> {
         Ok(out)
     }
 
-    /// The file of an image, not decoded.
+    /// Returns the encoded bytes of an image.
     fn image_bytes(&self, index: usize, place: &str) -> Result<Cow<'_, [u8]>, IoError> {
         let json = &self.root.images[index];
         match (&json.uri, json.buffer_view) {
@@ -154,7 +154,7 @@ impl File<'_> {
         }
     }
 
-    /// Refuses textures that are too large together, before one of them is decoded. What cannot be read is told later.
+    /// Refuses textures that are too large together, before any is decoded. Unreadable images are reported later.
     fn check_sizes(&self) -> Result<(), IoError> {
         let root = self.root;
         let used: BTreeSet<usize> = root
@@ -183,7 +183,7 @@ impl File<'_> {
     }
 }
 
-/// Width and height that an image says it has, px.
+/// Reads width and height from an image's header, px.
 fn size_of_image(bytes: &[u8]) -> Option<[u64; 2]> {
     let reader = image::ImageReader::new(Cursor::new(bytes)).with_guessed_format().ok()?;
     reader.into_dimensions().ok().map(|(w, h)| [w, h].map(u64::from))

@@ -1,9 +1,9 @@
-//! Buffer views that meshoptimizer has packed (`EXT_meshopt_compression`, version 0 of its vertex codec).
+//! Buffer views packed by meshoptimizer (`EXT_meshopt_compression`, version 0 of its vertex codec).
 //!
 //! Vertices are bytes in planes: each plane differences to the vertex before, in groups of 16 of 0, 2, 4 or 8 bits.
 //! Triangles are codes that refer to edges and vertices seen before.
 
-/// What a packed view holds.
+/// Content of a packed view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Mode {
     Attributes,
@@ -11,7 +11,7 @@ pub(super) enum Mode {
     Indices,
 }
 
-/// What was done to vertices before they were packed.
+/// Filter applied to vertices before packing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum MeshoptFilter {
     None,
@@ -22,7 +22,7 @@ pub(super) enum MeshoptFilter {
 /// Most bytes and vertices of a block.
 const BLOCK_BYTES: usize = 8192;
 const BLOCK_VERTICES: usize = 256;
-/// Vertices whose bits are told at once.
+/// Vertices that share a bit width.
 const GROUP: usize = 16;
 /// Least bytes behind the blocks, which end in the first vertex.
 const TAIL: usize = 32;
@@ -30,7 +30,7 @@ const TAIL: usize = 32;
 const TABLE: usize = 16;
 const INDEX_TAIL: usize = 4;
 
-/// The `count` elements of `stride` bytes that `data` packs; what is wrong otherwise.
+/// Unpacks `count` elements of `stride` bytes from `data`; the error is the reason.
 pub(super) fn unpack(
     data: &[u8],
     count: usize,
@@ -63,9 +63,9 @@ pub(super) fn unpack(
     Ok(out)
 }
 
-/// A unit vector of its point on an octahedron, in steps of 1 / `one`.
+/// Decodes a unit vector from its point on an octahedron, in steps of 1 / `one`.
 fn octahedral([x, y, z]: [f32; 3], one: f32) -> [f32; 3] {
-    // The third number is what the first two sum up to at most.
+    // The third component starts as the bound on the sum of the first two.
     let z = z - x.abs() - y.abs();
     let fold = z.min(0.0);
     let [x, y] = [x, y].map(|v| v + if v >= 0.0 { fold } else { -fold });
@@ -81,7 +81,7 @@ fn written(list: Vec<u32>, stride: usize) -> Result<Vec<u8>, String> {
     }
 }
 
-/// Bytes from the start of a slice.
+/// Takes bytes off the start of a slice.
 struct Bytes<'a>(&'a [u8]);
 
 impl<'a> Bytes<'a> {
@@ -95,7 +95,7 @@ impl<'a> Bytes<'a> {
         Ok(self.take(1)?[0])
     }
 
-    /// A number of seven bits a byte, the lowest first.
+    /// Reads a number of seven bits a byte, the lowest first.
     fn number(&mut self) -> Result<u32, String> {
         let mut value = 0_u32;
         for shift in (0..35).step_by(7) {
@@ -108,7 +108,7 @@ impl<'a> Bytes<'a> {
         Err("a number of more than five bytes".into())
     }
 
-    /// What the next number adds to `last`.
+    /// Reads the next zigzag difference and adds it to `last`.
     fn after(&mut self, last: u32) -> Result<u32, String> {
         let number = self.number()?;
         Ok(last.wrapping_add(number >> 1 ^ (number & 1).wrapping_neg()))
@@ -119,7 +119,7 @@ impl<'a> Bytes<'a> {
     }
 }
 
-/// What lies between the first byte, which must be `magic` and a version up to `newest`, and the last `tail` bytes.
+/// Returns version, body and the last `tail` bytes; the first byte must be `magic` and a version up to `newest`.
 fn between(data: &[u8], magic: u8, newest: u8, tail: usize) -> Result<(u8, Bytes<'_>, &[u8]), String> {
     let (&first, rest) = data.split_first().ok_or("it is empty")?;
     if first & 0xf0 != magic || first & 15 > newest {
@@ -160,7 +160,7 @@ fn vertices(data: &[u8], count: usize, stride: usize) -> Result<Vec<u8>, String>
     Ok(out)
 }
 
-/// 16 numbers of so many bits each, the highest first; where all bits are set, the number follows in a byte.
+/// Reads 16 numbers of so many bits each, the highest first; if all bits are set, the number follows in a byte.
 fn unpack_group(bytes: &mut Bytes<'_>, group: &mut [u8], bits: usize) -> Result<(), String> {
     match bits {
         0 => group.fill(0),
@@ -178,7 +178,7 @@ fn unpack_group(bytes: &mut Bytes<'_>, group: &mut [u8], bits: usize) -> Result<
     Ok(())
 }
 
-/// The last 16 of something, the newest at 0.
+/// Ring of the last 16 values, the newest at 0.
 struct Recent<T>([T; 16], usize);
 
 impl<T: Copy> Recent<T> {
@@ -214,7 +214,7 @@ fn triangles(data: &[u8], count: usize) -> Result<Vec<u32>, String> {
                 0 => new(&mut next),
                 _ if low < plain => seen.at(low),
                 _ => {
-                    // 13 and 14 are the index before and after the last that was told.
+                    // 13 and 14 are the index before and after the last explicit one.
                     last = match low {
                         13 => last.wrapping_sub(1),
                         14 => last.wrapping_add(1),
@@ -231,7 +231,7 @@ fn triangles(data: &[u8], count: usize) -> Result<Vec<u32>, String> {
             edges.push([a, c]);
             continue;
         }
-        // Vertices of a triangle of its own: new, seen, or told.
+        // Vertices of a triangle without a known edge: new, seen, or explicit.
         let (first, pair) = match low {
             14 => (0, bytes.byte()?),
             15 => (15, bytes.byte()?),
@@ -247,7 +247,7 @@ fn triangles(data: &[u8], count: usize) -> Result<Vec<u32>, String> {
             triangle[i] = match mark {
                 0 => new(&mut next),
                 _ if is_told(mark) => 0,
-                // Counted before this triangle's own are remembered.
+                // Counted before the vertices of this triangle are remembered.
                 _ => seen.at(mark - 1),
             };
         }

@@ -1,4 +1,4 @@
-//! What a glTF scene is turned into.
+//! Contents of a glTF scene after conversion.
 
 use glam::{DMat4, Vec2, Vec3, Vec4};
 
@@ -9,7 +9,7 @@ pub struct MeshScene {
     pub(crate) nodes: Vec<MeshNode>,
     /// Indices of the nodes without a parent, in the file's order.
     pub(crate) roots: Vec<usize>,
-    /// Meshes, indexed by [`MeshNode::mesh`]; empty where no shown node uses one.
+    /// Meshes, indexed by [`MeshNode::mesh`]; empty if no shown node uses one.
     pub(crate) meshes: Vec<Mesh>,
     /// Materials; the last is the default for primitives that name none.
     pub(crate) materials: Vec<Material>,
@@ -20,12 +20,12 @@ pub struct MeshScene {
 
 #[derive(Clone, Debug)]
 pub(crate) struct MeshNode {
-    /// Its name, never blank.
+    /// Name of the node, never blank.
     pub(crate) name: Option<String>,
     pub(crate) parent: Option<usize>,
     pub(crate) children: Vec<usize>,
     pub(crate) mesh: Option<usize>,
-    /// Points of the node to world points (glTF axes: y up, meters).
+    /// Transform of points of the node to the world (glTF axes: y up, meters).
     pub(crate) world_from_node: DMat4,
 }
 
@@ -54,7 +54,7 @@ pub(crate) struct MeshPrimitive {
     pub(crate) material: usize,
 }
 
-/// How a surface looks, as far as it is used.
+/// Appearance of a surface, as far as it is used.
 #[derive(Clone, Debug)]
 pub(crate) struct Material {
     /// Linear base color and alpha.
@@ -69,14 +69,14 @@ pub(crate) struct Material {
     /// 0 for a mirror, 1 for chalk.
     pub(crate) roughness: f32,
     pub(crate) alpha: AlphaMode,
-    /// Shown in its own color whatever the light.
+    /// True if it is shown in its own color, independent of light.
     pub(crate) unlit: bool,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum AlphaMode {
     Opaque,
-    /// The surface is absent where alpha is below this.
+    /// The surface is absent if alpha is below this.
     Mask(f32),
     /// The surface covers what is behind it by this share.
     Blend,
@@ -93,9 +93,9 @@ pub(crate) struct TextureUse {
     pub(crate) rotation_rad: f32,
     /// `KHR_texture_transform`: applied first.
     pub(crate) scale: Vec2,
-    /// Outside 0..1 along u and v.
+    /// Wrap modes outside 0..1 along u and v.
     pub(crate) wrap: [Wrap; 2],
-    /// Nearest texel when enlarged, instead of interpolation.
+    /// True for the nearest texel when enlarged, instead of interpolation.
     pub(crate) nearest: bool,
 }
 
@@ -108,7 +108,7 @@ impl TextureUse {
     }
 }
 
-/// What lies outside a texture's 0..1.
+/// Wrap mode of a texture outside 0..1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Wrap {
     Repeat,

@@ -1,4 +1,4 @@
-//! Geometry that a file packs: what `EXT_meshopt_compression` and `KHR_draco_mesh_compression` say, and its unpacking.
+//! Packed geometry: the fields of `EXT_meshopt_compression` and `KHR_draco_mesh_compression`, and its unpacking.
 
 use std::collections::BTreeMap;
 
@@ -15,7 +15,7 @@ use crate::io::IoError;
 pub(super) const MESHOPT: &str = "EXT_meshopt_compression";
 pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
 
-/// What a file says about what it packs.
+/// Fields of a file that describe packed geometry.
 #[derive(Default, Deserialize)]
 #[serde(rename_all = "camelCase", default)]
 pub(crate) struct PackedFile {
@@ -24,7 +24,7 @@ pub(crate) struct PackedFile {
     meshes: Vec<PackedMesh>,
 }
 
-/// Something with the extensions of its own.
+/// Extensions of an object, one of which parses as `T`.
 #[derive(Deserialize)]
 struct With<T> {
     #[serde(default = "BTreeMap::new")]
@@ -73,21 +73,21 @@ impl<T: serde::de::DeserializeOwned> With<T> {
 }
 
 impl PackedFile {
-    /// Whether a buffer is only a place for what its packed views hold.
+    /// Returns whether a buffer is only a placeholder for the content of its packed views.
     pub(super) fn is_fallback(&self, buffer: usize) -> bool {
         let told = self.buffers.get(buffer).and_then(|b| b.get(MESHOPT));
         told.is_some_and(|b| b.is_ok_and(|b| b.fallback))
     }
 }
 
-/// A mesh of Draco's, and its attributes' numbers.
+/// Unpacked Draco mesh, and the ids of its attributes.
 pub(super) struct Unpacked {
     mesh: DracoMesh,
     attributes: BTreeMap<String, u32>,
 }
 
 impl File<'_> {
-    /// The bytes of a view that meshoptimizer has packed; `None` if it is not packed.
+    /// Returns the unpacked bytes of a view packed by meshoptimizer; `None` if it is not packed.
     pub(super) fn packed_view(&self, index: usize) -> Result<Option<&[u8]>, IoError> {
         let Some(told) = self.packed.buffer_views.get(index).and_then(|view| view.get(MESHOPT)) else {
             return Ok(None);
@@ -119,7 +119,7 @@ impl File<'_> {
         Ok(cell.get().map(Vec::as_slice))
     }
 
-    /// The mesh of a primitive that Draco has packed; `None` if it is not packed.
+    /// Unpacks the mesh of a primitive packed by Draco; `None` if it is not packed.
     pub(super) fn draco(&self, mesh: usize, primitive: usize) -> Result<Option<Unpacked>, IoError> {
         let told = self.packed.meshes.get(mesh).and_then(|m| m.primitives.get(primitive)).and_then(|p| p.get(DRACO));
         let Some(told) = told else { return Ok(None) };
@@ -137,7 +137,7 @@ impl File<'_> {
         Ok(Some(Unpacked { mesh, attributes }))
     }
 
-    /// An attribute of an unpacked mesh as numbers, scaled as its accessor says; `None` if it is not in it.
+    /// Reads an attribute of an unpacked mesh, scaled as its accessor says; `None` if the mesh does not have it.
     pub(super) fn unpacked_values(
         &self,
         unpacked: &Unpacked,
@@ -173,7 +173,7 @@ impl File<'_> {
 }
 
 impl Unpacked {
-    /// The corners of its triangles, one after another.
+    /// Vertex indices of its triangles, one after another.
     pub(super) fn indices(&self) -> Vec<u32> {
         self.mesh.faces().iter().flatten().map(|point| point.0).collect()
     }

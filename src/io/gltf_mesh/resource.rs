@@ -1,4 +1,4 @@
-//! Bytes behind a glTF file: the container, its buffers and what addresses lead to.
+//! Bytes of a glTF file: the container, its buffers and the data behind URIs.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -11,7 +11,7 @@ use crate::io::{IoError, files};
 const HEADER: usize = 12;
 const CHUNK_HEADER: usize = 8;
 
-/// The JSON text and the binary chunk of a `.glb`, or the whole of a `.gltf`.
+/// Splits the JSON text and the binary chunk of a `.glb`; a `.gltf` is returned whole.
 pub(crate) fn split_container<'a>(bytes: &'a [u8], path: &Path) -> Result<(&'a [u8], Option<&'a [u8]>), IoError> {
     if !bytes.starts_with(b"glTF") {
         return Ok((bytes, None));
@@ -46,7 +46,7 @@ fn word(bytes: &[u8], at: usize) -> Option<u32> {
     bytes.get(at..at.checked_add(4)?)?.try_into().ok().map(u32::from_le_bytes)
 }
 
-/// Every buffer, each at least as long as it says, together at most `limit` bytes; those without bytes of their own that
+/// Loads every buffer, each at least as long as it says, together at most `limit` bytes. Buffers without data that
 /// `is_empty` names are empty.
 pub(crate) fn load_buffers<'a>(
     root: &Root,
@@ -82,7 +82,7 @@ pub(crate) fn load_buffers<'a>(
     Ok(buffers)
 }
 
-/// The bytes behind a URI: `data:` or a file inside `folder`, links resolved.
+/// Loads the bytes behind a URI: `data:` or a file inside `folder`, links resolved.
 pub(crate) fn load_uri(
     uri: &str,
     place: &str,
@@ -106,7 +106,7 @@ pub(crate) fn load_uri(
     files::read(&file, limit)
 }
 
-/// `%41` and the like replaced; `None` where that is not UTF-8 or an escape is broken.
+/// Decodes `%41` and the like; `None` if an escape is broken or the result is not UTF-8.
 fn percent_decoded(uri: &str) -> Option<String> {
     let mut bytes = uri.bytes();
     let mut out = Vec::with_capacity(uri.len());

@@ -1,4 +1,4 @@
-//! Files made here, right and wrong, and the real ones where they are at hand.
+//! Files made here, valid and broken, and real ones if they are available.
 
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ use serde_json::{Value, json};
 use super::geometry::triangles;
 use super::*;
 
-/// A binary glTF file of a JSON part and a binary part.
+/// Makes a binary glTF file of a JSON part and a binary part.
 pub(crate) fn glb(json: &Value, bin: &[u8]) -> Vec<u8> {
     let mut text = json.to_string().into_bytes();
     text.resize(text.len().next_multiple_of(4), b' ');
@@ -63,14 +63,14 @@ fn one_cube() -> (Value, Vec<u8>) {
     cubes(json!([{ "name": "cube", "mesh": 0 }]), json!([0]), json!([]))
 }
 
-/// What reading the cube gives after `change` to its JSON.
+/// Reads the cube after `change` to its JSON.
 fn read_changed(change: impl FnOnce(&mut Value)) -> Result<MeshScene, IoError> {
     let (mut root, bin) = one_cube();
     change(&mut root);
     read_slice(&glb(&root, &bin), "cube.glb")
 }
 
-/// The folder with the real scenes, where it is at hand.
+/// Folder with the real scenes, if available.
 pub(crate) fn real_scenes() -> Option<PathBuf> {
     let data = std::env::var_os("FMLGS_DATA").map(PathBuf::from);
     let data = data.unwrap_or_else(|| Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/data"));
@@ -303,7 +303,7 @@ fn images_that_are_missing_or_broken_leave_a_warning() {
     }
 }
 
-/// A BMP that says it has so many pixels, and has none.
+/// A BMP with a header of so many pixels, and none in it.
 fn bmp_without_pixels(side_px: i32) -> Vec<u8> {
     let mut bytes = b"BM".to_vec();
     [54_u32, 0, 54, 40].iter().for_each(|v| bytes.extend(v.to_le_bytes()));
@@ -327,7 +327,7 @@ fn textures_that_are_too_large_together_are_refused_before_one_is_decoded() {
     let text = read_with(16_384).unwrap_err().to_string();
     let told = ["huge.glb, images: 20 textures", "5,368,709,120 pixels", "16384 x 16384 px", "make them smaller"];
     told.iter().for_each(|words| assert!(text.contains(words), "{text}"));
-    // The control: of a usual size, each is read as far as it goes.
+    // Control: with a usual size, each is read as far as it goes.
     assert_eq!(read_with(64).unwrap().materials.len(), 21);
 }
 

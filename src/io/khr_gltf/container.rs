@@ -1,5 +1,5 @@
-//! What splats need of a glTF file beyond [`crate::io::gltf_mesh`]: the extension's attributes, whose names are unknown
-//! to general glTF readers.
+//! Parts of a glTF file with splats that [`crate::io::gltf_mesh`] does not read: the extension's attributes, whose
+//! names general glTF readers do not know.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,7 +10,7 @@ use serde::Deserialize;
 use crate::io::IoError;
 use crate::io::gltf_mesh::{File, MeshNode, parse};
 
-/// The part of the JSON with attributes by their names.
+/// Part of the JSON with attributes by their names.
 #[derive(Deserialize)]
 pub(super) struct Meshes {
     #[serde(default)]
@@ -40,12 +40,12 @@ pub(super) struct Gltf<'a> {
     path: &'a Path,
 }
 
-/// Whether the first bytes of a file are those of a `.glb`, or its name is that of a `.gltf`.
+/// Returns whether the first bytes of a file are those of a `.glb`, or its name is that of a `.gltf`.
 pub(crate) fn is_gltf(start: &[u8], name: &str) -> bool {
     start.starts_with(b"glTF") || name.ends_with(".gltf")
 }
 
-/// Both views of the JSON part.
+/// Parses the JSON part in both forms.
 pub(super) fn json(text: &[u8], path: &Path) -> Result<(Root, Meshes), IoError> {
     Ok((parse(text, path)?, parse(text, path)?))
 }
@@ -68,12 +68,12 @@ impl<'a> Gltf<'a> {
         IoError::Unsupported { path: self.path.into(), what, remedy }
     }
 
-    /// For errors.
+    /// Path of the file, for errors.
     pub(crate) fn path(&self) -> &Path {
         self.path
     }
 
-    /// The bytes of buffer view `index`.
+    /// Returns the bytes of buffer view `index`.
     pub(crate) fn view_bytes(&self, index: usize) -> Result<&[u8], IoError> {
         self.file.view_bytes(index, "a splat primitive")
     }
@@ -86,7 +86,7 @@ impl<'a> Gltf<'a> {
         node.mesh.and_then(|mesh| self.meshes.meshes.get(mesh)).map_or(&[], |mesh| &mesh.primitives)
     }
 
-    /// The values of accessor `index`, integers as the accessor says: normalized or as they are.
+    /// Reads the values of accessor `index`; integers are normalized if the accessor says so.
     pub(crate) fn values<const N: usize>(&self, index: usize) -> Result<AttributeValues<N>, IoError> {
         let values = self.file.any_values(index, "a splat primitive")?;
         if values.width != N {
@@ -97,7 +97,7 @@ impl<'a> Gltf<'a> {
         Ok(AttributeValues { rows: rows.to_vec(), signed_integer: values.signed_integer })
     }
 
-    /// The values of accessor `index` if each is one number.
+    /// Reads the values of accessor `index` if each is one number.
     pub(crate) fn scalars(&self, index: usize) -> Result<Option<Vec<f32>>, IoError> {
         let values = self.file.values(index, "a splat primitive")?;
         Ok((values.width == 1).then_some(values.data))

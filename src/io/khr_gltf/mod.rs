@@ -1,12 +1,10 @@
-//! Splats in glTF 2.0 (`.gltf`, `.glb`): the extension `KHR_gaussian_splatting`, plain or as SPZ within.
+//! Splats in glTF 2.0 (`.gltf`, `.glb`): the extension `KHR_gaussian_splatting`, plain or with SPZ inside.
 //!
-//! The axes of glTF are left, up, front. Files that this program wrote before it turned them (generator `fmlgs`) have
-//! those of the scene.
+//! The axes of glTF are left, up, front. Early files of this program (generator `fmlgs`) have the axes of the scene.
 //!
-//! Scales are linear since the extension's draft of April 2026; earlier files hold logarithms.
-//! A negative value or a signed integer type gives the latter away. Colors of the linear color
-//! space are carried over to the display's: the constant harmonic exactly, the higher ones to
-//! first order around it.
+//! Scales are linear since the extension's draft of April 2026; earlier files hold logarithms, recognized by a negative
+//! value or a signed integer type. Colors in the linear color space are converted to that of the display: the constant
+//! harmonic exactly, the higher ones to first order around it.
 
 mod container;
 mod packed;
@@ -30,12 +28,12 @@ const EXTRA: &str = "_";
 /// The generator of files in the scene's axes.
 const UNTURNED: &str = "fmlgs";
 
-/// Reads every splat of a glTF file's scene, by these axes if they are given.
+/// Reads every splat of a glTF file's scene, with these axes if given.
 pub(crate) fn read(path: &Path, axes: Option<Axes>) -> Result<GaussianCloud, IoError> {
     parse_in(&files::read(path, u64::MAX)?, path, axes)
 }
 
-/// The Gaussians in the bytes of a glTF file, in the scene's axes. External buffers are read from the folder of `path`.
+/// Parses the Gaussians of a glTF file, in the scene's axes. External buffers are read from the folder of `path`.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
     parse_in(bytes, path, None)
 }

@@ -1,4 +1,4 @@
-//! SPZ within glTF: `KHR_gaussian_splatting_compression_spz`, its second draft and the names that it had before.
+//! SPZ within glTF: `KHR_gaussian_splatting_compression_spz`, its second draft and its earlier names.
 
 use serde_json::Value;
 
@@ -13,14 +13,14 @@ const WITHIN: [&str; 2] = ["KHR_gaussian_splatting_compression_spz_2", "KHR_gaus
 /// Extensions of a primitive, in earlier drafts.
 const BESIDE: [&str; 2] = ["KHR_spz_gaussian_splats_compression", "KHR_spz_compression"];
 
-/// What such an extension of the primitive says: `bufferView`.
+/// Returns the extension's content of the primitive: `bufferView`.
 pub(super) fn view(primitive: &SplatPrimitive) -> Option<&Value> {
     let inner = primitive.extensions.get(EXTENSION).and_then(|e| e.get("extensions"));
     let within = WITHIN.iter().find_map(|name| inner?.get(name));
     within.or_else(|| BESIDE.iter().find_map(|name| primitive.extensions.get(*name)))
 }
 
-/// The Gaussians in the buffer view, in the axes of glTF: SPZ has its own, and is unpacked into those.
+/// Reads the Gaussians in the buffer view, in the axes of glTF.
 pub(super) fn cloud(gltf: &Gltf<'_>, extension: &Value) -> Result<GaussianCloud, IoError> {
     let index = extension.get("bufferView").and_then(Value::as_u64).and_then(|index| usize::try_from(index).ok());
     let index = index.ok_or_else(|| gltf.bad("a splat primitive", "its SPZ has no bufferView".into()))?;

@@ -1,4 +1,4 @@
-//! A primitive with the extension, as Gaussians, and where its node puts them.
+//! Gaussians of a primitive with the extension, and their placement by its node.
 
 use glam::{DMat3, DMat4, DVec3};
 
@@ -11,7 +11,7 @@ use crate::math::sh::{SH_C0, coefficients};
 use crate::math::srgb;
 use crate::scene::{ExtraProperty, GaussianCloud};
 
-/// The Gaussians in the axes of their node.
+/// Reads the Gaussians in the axes of their node.
 pub(super) fn cloud(
     gltf: &Gltf<'_>,
     primitive: &SplatPrimitive,
@@ -69,7 +69,7 @@ pub(super) fn cloud(
     })
 }
 
-/// Gaussians of a node in the world: turned with their harmonics, grown, and around an origin where the node is.
+/// Transforms Gaussians of a node to the world: rotated with their harmonics, scaled, and around an origin at the node.
 pub(super) fn placed(gltf: &Gltf<'_>, cloud: GaussianCloud, world: DMat4) -> Result<GaussianCloud, IoError> {
     let (turn, scale) = similarity(gltf, world)?;
     let (mut cloud, size, grown) = (cloud.turned(&turn, false), scale as f32, scale.ln() as f32);
@@ -79,7 +79,7 @@ pub(super) fn placed(gltf: &Gltf<'_>, cloud: GaussianCloud, world: DMat4) -> Res
     Ok(cloud)
 }
 
-/// Numbers of applications, one of each Gaussian.
+/// Reads numbers of applications, one of each Gaussian.
 fn extras(gltf: &Gltf<'_>, primitive: &SplatPrimitive, n: usize) -> Result<Vec<ExtraProperty>, IoError> {
     let mut extras = Vec::new();
     for (name, at) in &primitive.attributes {
@@ -98,7 +98,7 @@ fn equal(gltf: &Gltf<'_>, n: usize, count: usize) -> Result<(), IoError> {
     Err(gltf.bad("a splat primitive", format!("{n} positions, but another attribute has {count} values")))
 }
 
-/// Rotation and scale of a node's transform.
+/// Returns rotation and scale of a node's transform.
 fn similarity(gltf: &Gltf<'_>, world: DMat4) -> Result<(DMat3, f64), IoError> {
     let m = DMat3::from_mat4(world);
     let scale = m.determinant().cbrt();
@@ -112,7 +112,7 @@ fn similarity(gltf: &Gltf<'_>, world: DMat4) -> Result<(DMat3, f64), IoError> {
     Ok((if r.abs_diff_eq(DMat3::IDENTITY, 1e-9) { DMat3::IDENTITY } else { r }, scale))
 }
 
-/// Harmonics of linear light to those of display values.
+/// Converts harmonics of linear light to those of display values.
 fn to_display(sh: &mut [[f32; 3]]) {
     let c0 = SH_C0 as f32;
     for channel in 0..3 {

@@ -16,10 +16,10 @@ const BLOCK: usize = 4096;
 /// Component type of floats.
 const FLOAT: u32 = 5126;
 
-/// Adds the bytes of a Gaussian's numbers.
+/// Appends the numbers of a Gaussian as bytes.
 type Put<'a> = Box<dyn Fn(usize, &mut Vec<u8>) + 'a>;
 
-/// One number, or several, of each Gaussian.
+/// An attribute: one number or several per Gaussian.
 struct Attribute<'a> {
     name: String,
     kind: &'static str,
@@ -32,7 +32,7 @@ pub(in crate::io) fn encode_binary(out: &mut dyn Write, cloud: &GaussianCloud, t
     let cloud = &turned(cloud);
     let attributes = attributes(cloud);
     let (mut text, bytes) = (document(cloud, &attributes, None).to_string(), buffer_bytes(cloud, &attributes));
-    // Chunks end at multiples of four; the buffer's own does as it is.
+    // Chunks end at multiples of four; the buffer's length already is one.
     text.extend(std::iter::repeat_n(' ', text.len().next_multiple_of(4) - text.len()));
     let size = |n: usize| {
         u32::try_from(n).map(u32::to_le_bytes).map_err(|_| {
@@ -62,7 +62,7 @@ pub(in crate::io) fn encode_text(out: &mut dyn Write, cloud: &GaussianCloud, tol
     out.write_all(after.as_bytes())
 }
 
-/// The cloud in the axes of glTF.
+/// Turns the cloud to the axes of glTF.
 fn turned(cloud: &GaussianCloud) -> GaussianCloud {
     cloud.clone().turned(&Axes::GLTF.scene_from_file().transpose(), false)
 }
@@ -117,8 +117,8 @@ fn buffer(
     Ok(())
 }
 
-/// The JSON part. The origin of the cloud is the translation of two nodes, one within the other: of a node, readers
-/// keep single precision.
+/// Makes the JSON part. The origin of the cloud is the translation of two nested nodes, as readers keep single
+/// precision for each.
 fn document(cloud: &GaussianCloud, attributes: &[Attribute<'_>], uri: Option<&str>) -> Value {
     let (mut accessors, mut views, mut names) = (Vec::new(), Vec::new(), Map::new());
     let mut offset = 0;

@@ -2,7 +2,7 @@
 
 use super::*;
 
-/// A file of one section: header fields by place, then what follows the section's header.
+/// A file of one section: header fields by position, then the bytes after the section's header.
 fn file(level: u16, counts: [u32; 2], section: &[(usize, u32)], body: &[u8]) -> Vec<u8> {
     let mut out = vec![0; HEADER + SECTION_HEADER];
     out[1] = 1;
@@ -89,7 +89,7 @@ fn positions_count_from_the_centers_of_their_buckets() {
     }
     let c = parsed(&bucketed(1, 1)).expect("valid");
     assert_eq!(c.sh[1], [0.0, 3.0, 6.0].map(|v| v / 16.0));
-    // Bytes span 1.5 on both sides of zero unless the header says otherwise.
+    // Bytes span 1.5 on both sides of zero unless the header states a range.
     assert_eq!(parsed(&bucketed(2, 1)).expect("valid").sh[1..3], [[-1.5; 3], [1.5; 3]]);
     let mut other = bucketed(2, 1);
     other[36..40].copy_from_slice(&(-0.5_f32).to_le_bytes());

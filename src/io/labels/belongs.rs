@@ -1,5 +1,5 @@
-//! Which photo labels belong to: exactly one, by the label file's own name, else by the name that it gives; where
-//! several photos are called so, by their folders.
+//! Assignment of labels to photos. Labels belong to exactly one photo, by the label file's own name, else by the name
+//! that it gives; if several photos have that name, by their folders.
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::PathBuf;
@@ -7,17 +7,17 @@ use std::path::PathBuf;
 use super::stem;
 use crate::io::IoError;
 
-/// What labels say about the photo that they are of.
+/// Names by which labels refer to their photo.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct LabelAddress {
-    /// The file that holds them.
+    /// Label file.
     pub(crate) file: PathBuf,
-    /// Names that the photo may have, the surest first, with the folders that are known.
+    /// Possible names of the photo, the most reliable first, with the folders that are known.
     pub(crate) names: Vec<String>,
 }
 
 impl LabelAddress {
-    /// Of a label file that may name its photo, in this folder.
+    /// Makes the address of a label file that may name its photo, in this folder.
     pub(super) fn of_file(file: PathBuf, folder: &str, name: &str) -> Self {
         let own = std::path::absolute(&file).unwrap_or_else(|_| file.clone()).to_string_lossy().into_owned();
         let given = if folder.is_empty() { name.to_owned() } else { format!("{folder}/{name}") };
@@ -25,7 +25,7 @@ impl LabelAddress {
         Self { file, names }
     }
 
-    /// How the file is called for people, and the photo that it names where that is another name.
+    /// Name of the file for messages, and the photo that it names if that is another name.
     fn told(&self) -> String {
         let file = self.file.file_name().unwrap_or(self.file.as_os_str()).to_string_lossy();
         match self.names.last().map(|name| parts(name)) {
@@ -35,20 +35,20 @@ impl LabelAddress {
     }
 }
 
-/// The folders and the file name of a path of any system.
+/// Splits a path of any system into its folders and the file name.
 fn parts(path: &str) -> (Vec<&str>, &str) {
     let mut parts: Vec<&str> = path.split(['/', '\\']).filter(|part| !matches!(*part, "" | ".")).collect();
     let name = parts.pop().unwrap_or_default();
     (parts, name)
 }
 
-/// Whether a name ends as a picture's does.
+/// Returns whether a name ends like that of a picture.
 fn is_picture(name: &str) -> bool {
     let ending = name.rsplit_once('.').map_or("", |(_, ending)| ending);
     ["png", "jpg", "jpeg", "webp", "tif", "tiff", "bmp"].iter().any(|known| ending.eq_ignore_ascii_case(known))
 }
 
-/// How many folders two paths have in common, from the file upwards.
+/// Number of folders that two paths have in common, from the file upward.
 fn in_common(a: &[&str], b: &[&str]) -> usize {
     a.iter().rev().zip(b.iter().rev()).take_while(|(a, b)| a.eq_ignore_ascii_case(b)).count()
 }
@@ -59,7 +59,7 @@ pub(super) type PicturesOf = HashMap<String, Vec<usize>>;
 /// The photos of a data set, by name.
 pub(super) struct PhotoNames<'a> {
     names: Vec<&'a str>,
-    /// By their names without ending, in small letters.
+    /// Photos by their lowercase names without ending.
     by_stem: HashMap<String, Vec<usize>>,
     folders: BTreeSet<Vec<&'a str>>,
 }
@@ -73,14 +73,14 @@ impl<'a> PhotoNames<'a> {
         Self { names, by_stem, folders }
     }
 
-    /// The photo that labels belong to, by index; `None` if there is no such photo.
+    /// Finds the photo that labels belong to, by index; `None` if there is no such photo.
     ///
     /// # Errors
-    /// If two photos could be meant: both are named.
+    /// If two photos match: both are named.
     pub(super) fn owner(&self, labels: &LabelAddress) -> Result<Option<usize>, IoError> {
         let known: Vec<Vec<&str>> = labels.names.iter().map(|name| parts(name).0).collect();
         let alike = |folder: &[&str]| known.iter().map(|k| in_common(k, folder)).max().unwrap_or(0);
-        // Of a data set with one folder a camera, labels of one camera's folder are of no other camera.
+        // In a data set with one folder per camera, labels in one camera's folder belong to no other camera.
         let best = self.folders.iter().map(|folder| alike(folder)).max().unwrap_or(0);
         for name in &labels.names {
             let called = stem(name);
@@ -88,7 +88,7 @@ impl<'a> PhotoNames<'a> {
             let called = if is_picture(&called) { stem(&called) } else { called };
             let Some(all) = self.by_stem.get(&called.to_lowercase()) else { continue };
             let mut fit: Vec<usize> = all.iter().copied().filter(|i| alike(&parts(self.names[*i]).0) == best).collect();
-            // Letter case and endings decide only where they have to.
+            // Letter case and endings decide only if the names are otherwise equal.
             let files: Vec<&str> = labels.names.iter().map(|name| parts(name).1).collect();
             let surer: [&dyn Fn(&str) -> bool; 2] =
                 [&|photo| stem(photo) == called, &|photo| files.contains(&parts(photo).1)];
@@ -114,7 +114,7 @@ impl<'a> PhotoNames<'a> {
     }
 }
 
-/// Which labels each photo has, by name, and what to say about those that are of no photo, or joined.
+/// Assigns labels to photos, by name, with notes on labels that belong to no photo or were joined.
 pub(super) fn bound(addresses: &[LabelAddress], photos: &PhotoNames<'_>) -> Result<(PicturesOf, Vec<String>), IoError> {
     let (mut of, mut unused) = (PicturesOf::new(), Vec::new());
     for (i, address) in addresses.iter().enumerate() {
@@ -167,7 +167,7 @@ mod tests {
             ("/l/cam1/frame00.json", "", "frame00.png", Some(1)),
             ("/l/frame00.json", "", "..\\images\\cam1\\frame00.png", Some(1)),
             ("/l/frame01.json", "", "", Some(2)),
-            // Of the other camera there is no such frame.
+            // The other camera has no such frame.
             ("/l/cam0/frame01.json", "", "", None),
             ("/l/frame02.json", "", "", None),
         ] {

@@ -1,5 +1,6 @@
-//! COCO's instances: one file for many pictures, each annotation a thing, as polygons or run lengths. `fmlgs segment
-//! --all` writes such files too, with the level of a category as `supercategory` and its whole as `parent`.
+//! COCO's instances: one file for many pictures, each annotation a region, as polygons or run lengths.
+//! `fmlgs segment --all` writes such files too, with the level of a category as `supercategory` and its
+//! whole as `parent`.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -40,7 +41,7 @@ struct ListedCategory {
     name: String,
     #[serde(default)]
     supercategory: Value,
-    /// `null` is a word, too: of something that is no piece.
+    /// Present but `null` for an object, which is a part of nothing.
     #[serde(default, deserialize_with = "stated")]
     parent: Option<Value>,
 }
@@ -68,14 +69,14 @@ enum Segmentation {
     Other(IgnoredAny),
 }
 
-/// What a category is called, what it is, and the category that it is a piece of.
+/// Name and level of a category, and the category that it is a part of.
 struct Category {
     name: String,
     level: Option<Level>,
     whole: Option<String>,
 }
 
-/// The pictures of a file and what they show.
+/// The pictures of a file and their regions.
 pub(crate) struct CocoFile {
     categories: HashMap<String, Category>,
     images: Vec<Image>,
@@ -84,12 +85,12 @@ pub(crate) struct CocoFile {
 struct Image {
     file_name: String,
     size: [Option<u32>; 2],
-    /// Place in the file's list, and the annotation.
+    /// Index in the file's list, and the annotation.
     annotations: Vec<(usize, Annotation)>,
 }
 
 impl CocoFile {
-    /// Takes a JSON file apart; `None` if it is of another kind. What is left out is counted.
+    /// Parses a JSON file; `None` if it is of another kind. Skipped content is counted.
     pub(super) fn parse(file: Value, path: &Path, passed: &mut Passed) -> Result<Option<Self>, IoError> {
         if !file["images"].is_array() || !file["annotations"].is_array() {
             return Ok(None);
@@ -98,7 +99,7 @@ impl CocoFile {
         let known: HashMap<String, String> =
             file.categories.iter().map(|c| (c.id.to_string(), c.name.clone())).collect();
         let category = |c: ListedCategory| {
-            // Other programs' supercategories say nothing about wholes.
+            // Other programs' supercategories do not state wholes.
             let level = c.parent.is_some().then(|| serde_json::from_value(c.supercategory).ok()).flatten();
             let whole = c.parent.filter(|p| !p.is_null()).map(|p| p.to_string());
             let suffix = whole.as_ref().and_then(|whole| known.get(whole)).map(|whole| format!("{BETWEEN}{whole}"));
@@ -134,13 +135,13 @@ impl CocoFile {
         Ok(Some(Self { categories, images }))
     }
 
-    /// The names of the pictures that show something, and their places in the file's list.
+    /// Returns the labeled pictures: index in the file's list, and name.
     pub(super) fn labeled(&self) -> impl Iterator<Item = (usize, &str)> {
         let labeled = self.images.iter().enumerate().filter(|(_, image)| !image.annotations.is_empty());
         labeled.map(|(i, image)| (i, image.file_name.as_str()))
     }
 
-    /// The regions of the picture `index` of the file, wholes first.
+    /// Reads the regions of the picture `index` of the file, wholes first.
     pub(super) fn regions(&self, index: usize, path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
         let Some(image) = self.images.get(index) else { return Ok(Vec::new()) };
         let [w, h] = sheet.size_px();
@@ -175,7 +176,7 @@ impl CocoFile {
             let region = Region { name, level: category.and_then(|c| c.level), parent: None, mask };
             things.push(Thing { key, whole: category.and_then(|c| c.whole.clone()), region });
         }
-        // A whole that the picture does not show has no pieces there.
+        // Without its whole in the picture, a part has no parent there.
         let shown: Vec<String> = things.iter().map(|t| t.key.clone()).collect();
         things.iter_mut().for_each(|t| t.whole = t.whole.take().filter(|whole| shown.contains(whole)));
         wholes_first(things)

@@ -1,4 +1,4 @@
-//! Label files in a folder and those below: which kind each is of, by what it holds.
+//! Label files in a folder and its subfolders, recognized by their content.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -13,9 +13,9 @@ use super::yolo::Names;
 use super::{Passed, Region, Sheet, isat, labelme, yolo};
 use crate::io::{IoError, files};
 
-/// Folders within folders that are looked into.
+/// Deepest level of subfolders searched.
 const DEEPEST: usize = 3;
-/// Folders above that of a label file in which names of classes may be.
+/// Levels, from a label file's folder upward, searched for class names.
 const NAMES_ABOVE: usize = 3;
 
 /// The labels of one picture.
@@ -27,7 +27,7 @@ pub struct LabelFile {
 enum Form {
     Isat,
     LabelMe,
-    /// A file, and the picture's place in it.
+    /// A file, and the picture's index in it.
     Coco(Arc<CocoFile>, usize),
     Yolo(Arc<Names>),
 }
@@ -44,7 +44,7 @@ impl LabelFile {
     }
 }
 
-/// What is in label files.
+/// Label files that were found.
 #[derive(Default)]
 pub(super) struct FoundLabels {
     pub(super) files: Vec<LabelFile>,
@@ -52,7 +52,7 @@ pub(super) struct FoundLabels {
     pub(super) passed: Passed,
 }
 
-/// The label files in a folder, or that which `path` is.
+/// Finds the label files in a folder, or reads the single file `path`.
 pub(super) fn find(path: &Path) -> Result<FoundLabels, IoError> {
     let mut candidates = Vec::new();
     match std::fs::read_dir(path) {
@@ -86,7 +86,7 @@ fn is(path: &Path, ending: &str) -> bool {
     path.extension().is_some_and(|e| e.eq_ignore_ascii_case(ending))
 }
 
-/// The files in a folder that may be label files, then those in the folders in it; hidden ones are none.
+/// Lists possible label files in a folder, then those in its subfolders; hidden ones are skipped.
 fn walk(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
     let names = super::entries(folder);
     let visible = names.iter().filter(|name| !name.starts_with('.')).map(|name| folder.join(name));
@@ -97,7 +97,7 @@ fn walk(folder: &Path, depth: usize, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// The names of classes that are nearest above a label file.
+/// Reads the class names nearest above a label file.
 fn names_for(folder: &Path) -> Result<Names, IoError> {
     let whole = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
     for above in whole.ancestors().take(NAMES_ABOVE) {
@@ -109,7 +109,7 @@ fn names_for(folder: &Path) -> Result<Names, IoError> {
 }
 
 impl FoundLabels {
-    /// Adds what a JSON file holds, if that is labels.
+    /// Adds the labels of a JSON file, if it has any.
     fn json(&mut self, file: PathBuf) -> Result<(), IoError> {
         let value: Value = files::read_json(&file)?;
         if let Some((folder, name)) = isat::photo_of(&value) {

@@ -1,7 +1,7 @@
-//! ISAT label files, as lerf_ovs has them: polygons with a category and a group, drawn by layer. Polygons of one
-//! category and one group are one region; `__background__` cuts what is drawn below it. The files of lerf_ovs, which
-//! do not say that they are ISAT's, number polygons as groups: there a category is one region, as its evaluations have
-//! it. Two fields more are understood: `level` ("object" or "part") and `parent` (the category that it is a piece of).
+//! ISAT label files, as in lerf_ovs: polygons with a category and a group, drawn by layer. Polygons of one category and
+//! one group are one region; `__background__` cuts regions of lower layers. The files of lerf_ovs, which lack ISAT's
+//! marks, number polygons as groups: there a category is one region, as in its evaluations. Two additional fields are
+//! read: `level` ("object" or "part") and `parent` (the category that it is a part of).
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -38,7 +38,7 @@ struct Info {
 #[derive(Deserialize)]
 struct Polygon {
     category: String,
-    /// A number, in some versions a text; files of other programs leave it out.
+    /// A number, in some versions a string; files of other programs lack it.
     #[serde(default)]
     group: Value,
     #[serde(default)]
@@ -56,14 +56,14 @@ impl Polygon {
     }
 }
 
-/// The folder and the name of the photo that a label file says it is of; `None` if it is JSON of another kind.
+/// Returns the folder and the name of the photo stated in a label file; `None` if it is JSON of another kind.
 pub(crate) fn photo_of(file: &Value) -> Option<(&str, &str)> {
     let info = &file["info"];
     let name = info["name"].as_str().filter(|_| file["objects"].is_array())?;
     Some((info["folder"].as_str().unwrap_or_default(), name))
 }
 
-/// The regions of a label file, objects before parts.
+/// Reads the regions of a label file, objects before parts.
 pub(crate) fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
     let file: File = files::read_json(path)?;
     let Info { width, height, description, folder } = &file.info;
@@ -72,7 +72,7 @@ pub(crate) fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError
     if file.objects.iter().map(|p| p.segmentation.len()).sum::<usize>() > MAX_VERTICES {
         return Err(bad("objects".into(), "more vertices than a label file can need"));
     }
-    // What each polygon is drawn into, in the file's order.
+    // Region of each polygon, in the file's order.
     let mut place: HashMap<(&str, String), usize> = HashMap::new();
     let mut first: Vec<&Polygon> = Vec::new();
     let mut drawn_into: Vec<Option<usize>> = Vec::with_capacity(file.objects.len());
@@ -95,7 +95,7 @@ pub(crate) fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError
     order.sort_by(|a, b| file.objects[*a].layer().total_cmp(&file.objects[*b].layer()));
     for i in order {
         let polygon = &file.objects[i];
-        // The convention of the LERF evaluations: vertices are cut to whole pixels.
+        // Convention of the LERF evaluations: vertices are truncated to whole pixels.
         let whole: Vec<[f64; 2]> = polygon.segmentation.iter().map(|v| v.map(f64::trunc)).collect();
         match drawn_into[i] {
             Some(at) => masks[at].add_polygon(&whole),
@@ -108,7 +108,7 @@ pub(crate) fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError
         }
     }
     let thing = |(polygon, mask): (&Polygon, Mask)| {
-        // "handle · mug" of the mug is its handle.
+        // "handle · mug", a part of the mug, is named "handle".
         let suffix = polygon.parent.as_ref().map(|parent| format!("{BETWEEN}{parent}"));
         let own = suffix.and_then(|suffix| polygon.category.strip_suffix(&suffix));
         let name = own.unwrap_or(&polygon.category).to_owned();
@@ -120,7 +120,7 @@ pub(crate) fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError
     })
 }
 
-/// A label file of a photo that [`read`] reads as it was: regions with names of their own, wholes first.
+/// Makes a label file of a photo that [`read`] restores exactly: regions with distinct names, wholes first.
 pub(crate) fn document(photo: &str, [width, height]: [usize; 2], regions: &[Region]) -> Value {
     let mut objects = Vec::new();
     for (i, region) in regions.iter().enumerate() {

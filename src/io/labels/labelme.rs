@@ -1,5 +1,5 @@
-//! LabelMe's label files: shapes with a label, those of one label and one `group_id` together. Lines and points have
-//! no area and are passed over.
+//! LabelMe's label files: shapes with a label; shapes of one label and one `group_id` are one region. Lines and points
+//! have no area and are skipped.
 
 use std::path::Path;
 
@@ -13,7 +13,7 @@ use crate::scene::Mask;
 
 /// Corners of the polygon that stands for a circle.
 const CORNERS: u32 = 90;
-/// Distance of a line's ends, px, at which it is closed.
+/// Largest distance of a line's ends, px, at which it counts as closed.
 const CLOSED_PX: f64 = 1.5;
 /// Most pixels of a mask that is stored as a picture.
 const MOST_PX: u64 = 1 << 28;
@@ -35,15 +35,15 @@ struct Shape {
     shape_type: Option<String>,
     #[serde(default)]
     group_id: Value,
-    /// A picture in base64 of what lies between the two points.
+    /// Mask of the rectangle between the two points, a picture in base64.
     #[serde(default)]
     mask: Option<String>,
 }
 
-/// What a shape covers.
+/// Area of a shape.
 enum Area {
     Polygon(Vec<[f64; 2]>),
-    /// A picture, and where its left top pixel is.
+    /// A picture, and the position of its top left pixel.
     Picture(String, [f64; 2]),
 }
 
@@ -52,7 +52,7 @@ impl Shape {
         self.shape_type.as_deref().unwrap_or("polygon")
     }
 
-    /// `None` of what has no area.
+    /// Returns the area; `None` for a shape without one.
     fn area(self) -> Option<Area> {
         let kind = self.kind().to_owned();
         let points = self.points;
@@ -67,7 +67,7 @@ impl Shape {
                 (0..CORNERS).map(corner).map(at).collect()
             }
             ("polygon" | "rectangle" | "rotation" | "quadrilateral", [_, _, _, ..]) => points,
-            // What is drawn as a line around a thing.
+            // A line drawn around a region.
             ("linestrip", [first, _, _, .., last]) if far(*first, *last) <= CLOSED_PX => points,
             _ => return None,
         };
@@ -75,8 +75,8 @@ impl Shape {
     }
 }
 
-/// The name of the photo that a label file says it is of, or nothing; `None` if it is JSON of another kind or shows
-/// nothing. What [`read`] leaves out is counted.
+/// Returns the name of the photo stated in a label file, may be empty; `None` if it is JSON of another kind or has no
+/// regions. Shapes that [`read`] leaves out are counted.
 pub(super) fn photo_of<'a>(file: &'a Value, path: &Path, passed: &mut Passed) -> Option<&'a str> {
     let shapes = file["shapes"].as_array()?;
     let is_own = ["imagePath", "imageHeight", "version"].iter().any(|key| file.get(key).is_some());
@@ -98,7 +98,7 @@ pub(super) fn photo_of<'a>(file: &'a Value, path: &Path, passed: &mut Passed) ->
     (left > 0).then(|| file["imagePath"].as_str().unwrap_or_default())
 }
 
-/// The regions of a label file.
+/// Reads the regions of a label file.
 pub(super) fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
     let file: File = files::read_json(path)?;
     let [w, h] = sheet.size_px();
@@ -122,7 +122,7 @@ pub(super) fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError
             regions.iter_mut().for_each(|(_, region)| region.mask.subtract(&mask));
             continue;
         }
-        // Shapes without a group are things of their own.
+        // Shapes without a group are regions of their own.
         let same = |(of, region): &&mut (Value, Region)| !group.is_null() && *of == group && region.name == label;
         match regions.iter_mut().find(same) {
             Some((_, region)) => region.mask.add(&mask),
@@ -132,7 +132,7 @@ pub(super) fn read(path: &Path, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError
     Ok(regions.into_iter().map(|(_, region)| region).collect())
 }
 
-/// Adds what is not black of a picture in base64.
+/// Adds the pixels of a picture in base64 that are not black.
 fn picture(mask: &mut Mask, text: &str, start: [f64; 2], path: &Path, place: &str) -> Result<(), IoError> {
     let bad = |reason: String| IoError::syntax(path, place, format!("its mask {reason}"));
     let bytes = base64::decode(text.trim()).map_err(|e| bad(format!("is no base64: {e}")))?;

@@ -10,7 +10,7 @@ use crate::io::IoError;
 
 const FOLDER: &str = "test_mask";
 
-/// The masks of the dataset in `root`, or in the folder `test_mask` itself; `None` if there are none.
+/// Finds the masks of the dataset in `root`, or in the folder `test_mask` itself; `None` if there are none.
 pub(crate) fn find(root: &Path) -> Result<Option<Pictures>, IoError> {
     let own = root.file_name().is_some_and(|n| n == FOLDER);
     let folder = if own { root.to_owned() } else { root.join(FOLDER) };

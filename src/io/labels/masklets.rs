@@ -1,8 +1,8 @@
-//! Masklets of a video as in SA-V: one JSON file with `masklet`, a list of frames, each a list of
-//! run-length masks, the n-th of every frame the same thing.
+//! Masklets of a video as in SA-V: one JSON file with `masklet`, a list of frames, each a list of run-length masks. The
+//! n-th mask of every frame is of the same object.
 //!
-//! SA-V labels every fourth frame; how many lie between labeled ones follows from
-//! `video_frame_count`. The photo of frame n has n as the last number in its name.
+//! SA-V labels every fourth frame; the step between labeled frames follows from `video_frame_count`. The photo of frame
+//! n has n as the last number in its name.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -31,7 +31,7 @@ pub struct Masklets {
 }
 
 impl Masklets {
-    /// Takes a JSON file apart; `None` if it is of another kind.
+    /// Parses a JSON file; `None` if it is of another kind.
     pub(crate) fn parse(file: serde_json::Value, path: &Path) -> Result<Option<Self>, IoError> {
         if !file["masklet"].is_array() {
             return Ok(None);
@@ -52,7 +52,7 @@ impl Masklets {
         (number % self.stride == 0 && frame < self.frames.len()).then_some(frame)
     }
 
-    /// Refuses photos of several videos, two of which are one frame by their numbers.
+    /// Refuses photos of several videos, two of which have the same frame number.
     pub(super) fn of_one_video(&self, photos: &[Photo]) -> Result<(), IoError> {
         let mut of: HashMap<usize, &str> = HashMap::new();
         for photo in photos {
@@ -66,12 +66,12 @@ impl Masklets {
         Ok(())
     }
 
-    /// Whether the photo `stem` is a labeled frame.
+    /// Returns whether the photo `stem` is a labeled frame.
     pub(crate) fn has(&self, stem: &str) -> bool {
         self.frame(stem).is_some()
     }
 
-    /// The masks in the photo `stem`, nameless; none if it is no labeled frame.
+    /// Reads the masks of the photo `stem`, without names; empty if it is no labeled frame.
     pub(crate) fn regions(&self, stem: &str, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
         let Some(frame) = self.frame(stem) else { return Ok(Vec::new()) };
         let masks = &self.frames[frame];

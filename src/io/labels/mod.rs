@@ -1,6 +1,6 @@
-//! Masks that come with a dataset: which pixels of a photo show which object or part.
+//! Masks of objects and parts in a dataset's photos.
 //!
-//! [`Labels::open`] sniffs, as `io::open` does:
+//! [`Labels::open`] recognizes the layout, as `io::open` does:
 //!
 //! | folder | what |
 //! |---|---|
@@ -41,17 +41,17 @@ use self::sheet::{AsLoaded, draw, read_ids};
 use super::IoError;
 use crate::scene::{Level, Mask, Photo, text};
 
-/// Longer side of the masks that are made only for their names, px.
+/// Longer side of masks of which only the names are needed, px.
 const NAMES_SIDE_PX: u32 = 512;
 
 /// A labeled region of one photo.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
-    /// What it is called; empty = not named.
+    /// Name of the region; empty if unnamed.
     pub(crate) name: String,
-    /// Object or part, where the file says.
+    /// Object or part, if the file says.
     pub level: Option<Level>,
-    /// Index of the region that it is a piece of.
+    /// Index of the region that it is a part of.
     pub(crate) parent: Option<usize>,
     /// Its pixels.
     pub mask: Mask,
@@ -60,9 +60,9 @@ pub struct Region {
 /// Labels of some of a dataset's photos.
 pub struct Labels {
     source: Source,
-    /// What each of the source's pictures says of the photo that it is of.
+    /// Address of each labeled picture: its file and possible photo names.
     addresses: Vec<LabelAddress>,
-    /// The pictures of each photo, by its name, once the photos are known.
+    /// Labeled pictures of each photo, by name, once the photos are known.
     of: Option<PicturesOf>,
     notes: Vec<String>,
 }
@@ -79,7 +79,7 @@ enum Source {
 }
 
 impl Labels {
-    /// Finds out what is at `path`. Photos are then taken as if each were the only one.
+    /// Recognizes and reads the labels at `path`. Until the photos are known, each is treated as the only one.
     pub fn open(path: &Path) -> Result<Self, IoError> {
         let with = |source, addresses| Ok(Self { source, addresses, of: None, notes: Vec::new() });
         if path.join(synth_ids::LIST_FILE).is_file() {
@@ -113,10 +113,10 @@ impl Labels {
         Ok(Self { source, addresses, of: None, notes })
     }
 
-    /// The labels at `path` of these photos, which are all of a data set: each label file belongs to one of them.
+    /// Reads the labels at `path` of these photos, which are all of a data set: each label file belongs to one of them.
     ///
     /// # Errors
-    /// As [`open`](Self::open), and if a file could be of two photos.
+    /// As [`open`](Self::open), and if a file matches two photos.
     pub fn of_photos(path: &Path, photos: &[Photo]) -> Result<Self, IoError> {
         let mut labels = Self::open(path)?;
         let names = PhotoNames::new(photos.iter().map(|photo| photo.name.as_str()));
@@ -129,12 +129,12 @@ impl Labels {
         Ok(labels)
     }
 
-    /// What is passed over, not used or joined, a sentence each.
+    /// Notes on labels that are skipped, unused or joined, a sentence each.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
 
-    /// The pictures of a photo.
+    /// Returns the labeled pictures of a photo.
     fn pictures_of(&self, photo: &Photo) -> Vec<usize> {
         match &self.of {
             Some(of) => of.get(&photo.name).cloned().unwrap_or_default(),
@@ -146,7 +146,7 @@ impl Labels {
         }
     }
 
-    /// Whether a photo has labels.
+    /// Returns whether a photo has labels.
     pub fn has(&self, photo: &Photo) -> bool {
         match &self.source {
             Source::Masklets(masklets) => masklets.has(&stem(&photo.name)),
@@ -154,7 +154,7 @@ impl Labels {
         }
     }
 
-    /// The names in the label files of a photo; none where masks are pictures or a video's.
+    /// Reads the names in the label files of a photo; none if masks are pictures or a video's.
     pub(crate) fn names(&self, photo: &Photo) -> Result<Vec<String>, IoError> {
         match &self.source {
             Source::Files(_) if self.has(photo) => {
@@ -165,8 +165,8 @@ impl Labels {
         }
     }
 
-    /// The regions of a photo, undistorted and scaled to at most `max_side_px`; regions without a
-    /// pixel are left out, and pieces of them then have no parent. Empty if it has no labels.
+    /// Reads the regions of a photo, undistorted and scaled to at most `max_side_px`. Regions without a pixel are left
+    /// out, and their parts then have no parent. Empty if the photo has no labels.
     pub fn of(&self, photo: &Photo, max_side_px: u32) -> Result<Vec<Region>, IoError> {
         let sheet = Sheet::new(photo);
         let mut as_loaded = AsLoaded::new(photo, max_side_px);
@@ -187,7 +187,7 @@ impl Labels {
     }
 }
 
-/// The regions that have a pixel in the photo as it is loaded.
+/// Returns the regions that have a pixel in the photo as loaded.
 fn shown(regions: Vec<Region>, as_loaded: &mut AsLoaded<'_>) -> Vec<Region> {
     let mut place = Vec::with_capacity(regions.len());
     let mut kept: Vec<Region> = Vec::new();
@@ -202,17 +202,17 @@ fn shown(regions: Vec<Region>, as_loaded: &mut AsLoaded<'_>) -> Vec<Region> {
     kept
 }
 
-/// What label files hold that is not used or read as something else: how often, and where first.
+/// Content of label files that is skipped or reinterpreted: its count, and the first file with it.
 #[derive(Default)]
 pub(crate) struct Passed(BTreeMap<String, (usize, PathBuf)>);
 
 impl Passed {
-    /// Counts something that is passed over.
+    /// Counts skipped content.
     fn add(&mut self, what: &str, path: &Path) {
         self.told(&format!("{what} are passed over"), path);
     }
 
-    /// Counts something to be told.
+    /// Counts content to be reported.
     fn told(&mut self, what: &str, path: &Path) {
         self.0.entry(what.to_owned()).or_insert_with(|| (0, path.to_owned())).0 += 1;
     }
@@ -232,7 +232,7 @@ pub(crate) fn stem(name: &str) -> String {
     file.rsplit_once('.').map_or(file, |(stem, _)| stem).to_owned()
 }
 
-/// File names in a folder, sorted; none if there is no such folder.
+/// Lists file names in a folder, sorted; empty if there is no such folder.
 fn entries(folder: &Path) -> Vec<String> {
     crate::io::files::names_in(folder).unwrap_or_default()
 }

@@ -1,21 +1,20 @@
-//! The outlines of a mask as polygons, from which [`Mask::add_polygon`] makes the same pixels again.
+//! Outlines of a mask as polygons, from which [`Mask::add_polygon`] restores the same pixels.
 //!
-//! One polygon for each piece of pixels that touch along a side. A hole is entered and left along one row of the
-//! border's corners, where no pixel lies between, so that one polygon tells of the holes too.
+//! One polygon for each piece of pixels connected along sides. It enters and leaves a hole along one row of corners,
+//! with no pixel between, so that a single polygon describes the holes too.
 
 use crate::scene::Mask;
 
-/// A border between pixels inside and outside along one column: x, from y to y. Down it goes on a piece's right, up on
-/// its left.
+/// Vertical border between pixels inside and outside: x, from y to y. It goes down on a piece's right, up on its left.
 type Side = [i32; 3];
 
-/// Closed ways along borders, and where the pixels of the mask are.
+/// Closed paths along borders, and their position in the mask.
 struct Borders {
     /// Corners per row.
     width: usize,
-    /// Ways out of each corner: east, south, west, north.
+    /// Directions that leave each corner: east, south, west, north.
     ways: Vec<u8>,
-    /// Left and top of the corners in the mask.
+    /// Left and top of the corner grid in the mask.
     origin: [i32; 2],
 }
 
@@ -40,7 +39,7 @@ impl Borders {
         Some(Self { width, ways, origin: [b.x.start as i32, b.y.start as i32] })
     }
 
-    /// The sides of the way around that begins eastward at a corner; it is taken away.
+    /// Removes the closed path that starts eastward at a corner, and returns its vertical sides.
     fn around(&mut self, start: usize) -> Vec<Side> {
         let (mut sides, mut at, mut way) = (Vec::<Side>::new(), start, 0);
         loop {
@@ -60,7 +59,7 @@ impl Borders {
                     None => sides.push([x, y, to]),
                 }
             }
-            // To the right where two ways go on: pixels that touch at a corner are two pieces.
+            // Right turn first if two directions are left: pixels that touch at a corner are two pieces.
             let mut next = [1, 0, 3].map(|turn| (way + turn) % 4).into_iter();
             match next.find(|way| self.ways[at] >> way & 1 == 1 || (at, *way) == (start, 0)) {
                 Some(next) if (at, next) != (start, 0) => way = next,
@@ -70,18 +69,18 @@ impl Borders {
     }
 }
 
-/// Twice the area inside, by which an outline is positive and a hole negative.
+/// Twice the enclosed area: positive for an outline, negative for a hole.
 fn area(sides: &[Side]) -> i64 {
     sides.iter().map(|[x, from, to]| i64::from(*x) * i64::from(to - from)).sum()
 }
 
-/// The corners of a polygon as the pixels' own columns: one to the left on the right of a piece.
+/// Converts corners to pixel columns: one to the left on the right side of a piece.
 fn vertices(sides: &[Side]) -> Vec<[i32; 2]> {
     let column = |[x, from, to]: &Side| x - i32::from(to > from);
     sides.iter().flat_map(|side| [[column(side), side[1]], [column(side), side[2]]]).collect()
 }
 
-/// The polygons of a mask, with their holes.
+/// Returns the polygons of a mask, with their holes.
 pub(crate) fn polygons(mask: &Mask) -> Vec<Vec<[i32; 2]>> {
     let Some(mut borders) = Borders::new(mask) else { return Vec::new() };
     let (mut outlines, mut holes) = (Vec::new(), Vec::new());
@@ -91,7 +90,7 @@ pub(crate) fn polygons(mask: &Mask) -> Vec<Vec<[i32; 2]>> {
             if area(&sides) > 0 { outlines.push(sides) } else { holes.push(sides) }
         }
     }
-    // The innermost outline around a hole is that of the piece that it is in.
+    // The smallest outline around a hole is that of the piece with the hole.
     outlines.sort_by_key(|sides| area(sides));
     let is_around = |sides: &[Side], [x, y]: [i32; 2]| {
         let left = sides.iter().filter(|[at, from, to]| *at <= x && (*from.min(to)..*from.max(to)).contains(&y));
@@ -105,12 +104,12 @@ pub(crate) fn polygons(mask: &Mask) -> Vec<Vec<[i32; 2]>> {
         let at = outlines.iter().position(|outline| is_around(outline, beside));
         at.into_iter().for_each(|at| cut(&mut found[at], &vertices(&hole)));
     }
-    // Where a piece is a pixel wide, both of its sides are one column.
+    // In a piece one pixel wide, both sides are the same column.
     found.iter_mut().for_each(Vec::dedup);
     found
 }
 
-/// Leads an outline around a hole in it, there and back along one row.
+/// Connects a hole to the outline around it, there and back along one row.
 fn cut(outline: &mut Vec<[i32; 2]>, hole: &[[i32; 2]]) {
     let Some(&entry) = hole.first() else { return };
     let crosses = |i: &usize| {
@@ -169,7 +168,7 @@ mod tests {
             let mask = Mask::from_fn(w, h, |i| pixels[i]);
             let polygons = polygons(&mask);
             assert_eq!(again(&mask, &polygons), mask, "round {round}");
-            // The control: without one of the polygons, pixels are missing.
+            // Control: without one of the polygons, pixels are missing.
             assert!(polygons.is_empty() || again(&mask, &polygons[1..]) != mask);
         }
     }

@@ -1,5 +1,5 @@
-//! COCO's run lengths of a mask: column by column from the top left, off and on in turn, starting
-//! with off; either a list of numbers or packed into a string.
+//! COCO's run lengths of a mask: column by column from the top left, off and on in turn, starting with off; a list of
+//! numbers or packed into a string.
 //!
 //! In the string a number is a run of characters from 48 on, five bits each with the lowest first,
 //! 32 where more follow, 16 in the last for a negative number; from the fourth on it is the
@@ -26,7 +26,7 @@ enum Counts {
 }
 
 impl Rle {
-    /// The plain run lengths of a mask.
+    /// Makes the plain run lengths of a mask.
     pub(crate) fn of(mask: &Mask) -> Self {
         let (w, h) = (mask.width_px(), mask.height_px());
         let (mut counts, mut on, mut length) = (Vec::new(), false, 0);
@@ -46,8 +46,7 @@ impl Rle {
         (self.size[1], self.size[0])
     }
 
-    /// The mask; what is wrong otherwise. Takes memory for `size`, which the caller has checked,
-    /// and no more.
+    /// Decodes the mask; the error is the reason. Takes memory for `size`, which the caller has checked, and no more.
     pub(crate) fn mask(&self) -> Result<Mask, String> {
         let (w, h) = (self.size[1] as usize, self.size[0] as usize);
         let mut mask = Mask::empty(w, h);
@@ -75,7 +74,7 @@ impl Rle {
     }
 }
 
-/// Hands each number of a packed string to `run`.
+/// Passes each number of a packed string to `run`.
 fn unpack(text: &[u8], run: &mut dyn FnMut(u64) -> Result<(), String>) -> Result<(), String> {
     // The last two numbers, once there are three.
     let mut before: VecDeque<i64> = VecDeque::with_capacity(3);
@@ -116,7 +115,7 @@ mod tests {
         serde_json::from_str::<Rle>(text).map_err(|e| e.to_string())?.mask()
     }
 
-    /// Packs as pycocotools does.
+    /// Packs numbers like pycocotools.
     fn pack(counts: &[i64]) -> String {
         let mut out = String::new();
         for i in 0..counts.len() {

@@ -1,4 +1,4 @@
-//! What masks are drawn on: a photo as stored or a copy of it, and what they are once the photo is loaded.
+//! Sizes of masks: drawn on a photo as stored or on a copy of it, and resampled to the photo as loaded.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -7,15 +7,15 @@ use crate::io::resample::centers;
 use crate::io::{IoError, files, memory, photo, photo_list};
 use crate::scene::{Camera, Mask, Photo};
 
-/// How many times longer than the photo's the sides of a mask may be.
+/// Largest ratio of a mask's sides to the photo's.
 const MOST_LARGER: f64 = 8.0;
 
-/// Most masks of one photo: what finds objects compares each with each.
+/// Most masks of one photo: object detection compares every pair.
 const MOST_MASKS: usize = 4096;
-/// Most memory that the masks of one photo take, bytes: a thousand of eight million pixels.
+/// Most memory for the masks of one photo, bytes: a thousand of eight million pixels.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// What masks are drawn on: a photo as stored, or a larger or smaller copy of it.
+/// Photo that masks are drawn on, as stored or as a larger or smaller copy.
 #[derive(Clone, Copy)]
 pub(crate) struct Sheet<'a>(&'a Photo);
 
@@ -29,8 +29,8 @@ impl<'a> Sheet<'a> {
         [self.0.camera.width_px, self.0.camera.height_px]
     }
 
-    /// Whether `masks` masks of `size_px` (width, height), which `path` holds, are of the photo's
-    /// shape and fit into memory. To be asked before they are made.
+    /// Checks that `masks` masks of `size_px` (width, height), from `path`, have the photo's shape and fit into memory.
+    /// To be called before they are made.
     pub(crate) fn check(self, path: &Path, size_px: (u32, u32), masks: usize) -> Result<(), IoError> {
         let (w, h) = size_px;
         if w == 0 || h == 0 || w > Camera::MAX_SIDE_PX || h > Camera::MAX_SIDE_PX {
@@ -55,11 +55,12 @@ impl<'a> Sheet<'a> {
     }
 }
 
-/// Masks on a photo as stored, or on scaled copies, as the photo is loaded: each pixel takes the value at its center.
+/// Resampling of masks on a photo as stored, or on scaled copies, to the photo as loaded: each pixel takes the value at
+/// its center.
 pub(super) struct AsLoaded<'a> {
     photo: &'a Photo,
     size: [usize; 2],
-    /// Where the centers lie on a distorted copy, by its size.
+    /// Pixel of a distorted copy at each center, by the copy's size.
     centers: BTreeMap<[usize; 2], Vec<Option<usize>>>,
 }
 
@@ -81,12 +82,12 @@ impl<'a> AsLoaded<'a> {
     }
 }
 
-/// Adds the pixels whose centers are in a polygon, where (0, 0) is the corner of the first pixel.
+/// Adds the pixels with centers in a polygon, where (0, 0) is the corner of the first pixel.
 pub(super) fn draw(mask: &mut Mask, points: impl Iterator<Item = [f64; 2]>) {
     mask.add_polygon(&points.map(|p| p.map(|v| v - 0.5)).collect::<Vec<_>>());
 }
 
-/// A picture file's id per pixel: 8- or 16-bit gray, of the photo's shape; `masks` are made of it.
+/// Reads a picture file's id per pixel: 8- or 16-bit gray, of the photo's shape; `masks` masks are made of it.
 pub(super) fn read_ids(path: &Path, sheet: Sheet<'_>, masks: usize) -> Result<(usize, usize, Vec<u16>), IoError> {
     sheet.check(path, photo::size(path)?, masks)?;
     let bytes = files::read(path, files::MAX_PICTURE_BYTES)?;

@@ -1,5 +1,5 @@
-//! SPIn-NeRF's masks: `images_<factor>/label/*.png`, named like the photos, of one object; every
-//! value over 0 is the object. Helper pictures (`cutout`, `pseudo`) are passed over.
+//! SPIn-NeRF's masks: `images_<factor>/label/*.png`, named like the photos, of one object; every value over 0 is the
+//! object. Helper pictures (`cutout`, `pseudo`) are skipped.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -10,8 +10,8 @@ use crate::io::IoError;
 use crate::io::photo_list::is_helper;
 use crate::scene::Level;
 
-/// The masks of the dataset in `root`, or in the folder `label` itself; those of the least reduced
-/// photos where there are several. `None` if there are none.
+/// Finds the masks of the dataset in `root`, or in the folder `label` itself. Of several, the masks of the least
+/// reduced photos are used. `None` if there are none.
 pub(crate) fn find(root: &Path) -> Result<Option<Pictures>, IoError> {
     let own = root.file_name().is_some_and(|n| n == "label").then(|| (1, root.to_owned()));
     let factor = |name: &str| -> Option<u32> {

@@ -1,4 +1,4 @@
-//! The id maps that `fmlgs synth` writes.
+//! Id maps written by `fmlgs synth`.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -25,7 +25,7 @@ pub(crate) struct ListedIdentity {
     #[serde(deserialize_with = "text::read_name")]
     pub(crate) name: String,
     pub(crate) level: Level,
-    /// For a part, the id of its object or of the part that it is a piece of.
+    /// For a part, the id of the object or part that contains it.
     #[serde(default)]
     pub(crate) parent: Option<u16>,
 }
@@ -34,11 +34,11 @@ pub(crate) struct ListedIdentity {
 pub struct SynthIds {
     root: PathBuf,
     list: Vec<ListedIdentity>,
-    /// The pictures in the folder of objects, without their ending.
+    /// Names of the pictures in the folder of objects, without ending.
     pictures: Vec<String>,
 }
 
-/// Where the pictures of a level are.
+/// Folder with the pictures of a level.
 pub(crate) fn folder(level: Level) -> &'static str {
     if level == Level::Object { "object_ids" } else { "part_ids" }
 }
@@ -52,7 +52,7 @@ impl SynthIds {
         Ok(Self { root: root.into(), list: file.identities, pictures })
     }
 
-    /// Of each picture of objects.
+    /// Addresses of the pictures of objects.
     pub(super) fn addresses(&self) -> Vec<LabelAddress> {
         let address = |name: &String| LabelAddress::of_file(self.path(Level::Object, name), "", "");
         self.pictures.iter().map(address).collect()
@@ -62,10 +62,10 @@ impl SynthIds {
         self.root.join(folder(level)).join(format!("{name}.png"))
     }
 
-    /// The ids of what is listed and of its pieces: a picture shows the innermost of a level.
+    /// Returns the ids of a listed identity and of its parts: a picture shows the innermost one of a level.
     fn with_pieces(&self, listed: &ListedIdentity) -> HashSet<u16> {
         let mut ids = HashSet::from([listed.id]);
-        // As often as pieces are added: a list need not be in order.
+        // Repeated until no part is added: the list may be in any order.
         while let Some(piece) = self.list.iter().find(|l| {
             l.level == listed.level && !ids.contains(&l.id) && l.parent.is_some_and(|parent| ids.contains(&parent))
         }) {
@@ -74,8 +74,8 @@ impl SynthIds {
         ids
     }
 
-    /// The regions of the picture at `index`, those without a pixel too: objects, then parts, in the
-    /// list's order.
+    /// Reads the regions of the picture at `index`, also those without a pixel: objects, then parts, in the list's
+    /// order.
     pub(super) fn regions(&self, index: usize, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
         let Some(name) = self.pictures.get(index) else { return Ok(Vec::new()) };
         let mut regions = Vec::with_capacity(self.list.len());
@@ -83,7 +83,7 @@ impl SynthIds {
         for level in [Level::Object, Level::Part] {
             let path = self.path(level, name);
             let (width, height, ids) = read_ids(&path, sheet, self.list.len())?;
-            // Which regions show an id, so that all are filled in one pass.
+            // Regions that show each id, so that all are filled in one pass.
             let mut shown_by = vec![Vec::new(); usize::from(u16::MAX) + 1];
             for listed in self.list.iter().filter(|l| l.level == level) {
                 let parent = listed.parent.and_then(|p| ids_of.iter().position(|id| *id == p));

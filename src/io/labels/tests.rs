@@ -1,4 +1,4 @@
-//! Label files as they are, and broken.
+//! Label files, valid and broken.
 
 use std::fs;
 
@@ -34,7 +34,7 @@ fn polygons_of_a_category_are_one_region_and_wholes_come_first() {
     let small = labels.of(&photo("a", 20, 10), 10).expect("regions");
     assert_eq!((small[0].mask.width_px(), small[0].mask.height_px()), (10, 5));
     assert!(labels.of(&photo("c", 20, 10), 10).expect("none").is_empty());
-    // A photo of another size is not this label's.
+    // A photo of another size does not match this label.
     assert!(matches!(labels.of(&photo("a", 25, 10), 4096), Err(IoError::PhotoSize { .. })));
 }
 
@@ -98,7 +98,7 @@ fn spin_nerf_masks_are_anything_but_black() {
         let labels = Labels::open(root).expect("labels");
         assert_eq!(summary(&labels, "images_4/a.jpg"), [(String::new(), Some(Level::Object), 3 * 6)]);
         assert!(!labels.has(&photo("b.jpg", 8, 6)) && !labels.has(&photo("c.jpg", 8, 6)));
-        // The same photo at full size, bent and straight.
+        // The same photo at full size, with and without distortion.
         let large = photo("a.jpg", 32, 24);
         assert_eq!(labels.of(&large, 4096).expect("scaled")[0].mask.area(), 12 * 24);
         let bent = Photo { distortion: Some(crate::scene::Distortion::default()), ..large };

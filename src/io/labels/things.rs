@@ -1,30 +1,30 @@
-//! Regions as label files list them: drawn in order, holes cut, pieces with their wholes.
+//! Regions of label files: drawn in order, with holes cut and parts linked to their wholes.
 
 use super::Region;
 use crate::scene::Mask;
 
-/// A region, the key that its pieces name, and that of what it is a piece of.
+/// A region, its key, and the key of the whole that it is a part of.
 pub(super) struct Thing {
     pub(super) key: String,
     pub(super) whole: Option<String>,
     pub(super) region: Region,
 }
 
-/// Whether a category is what lies behind all things: it cuts holes, and is no thing itself.
+/// Returns whether a category is the background, which cuts holes and is no region itself.
 pub(super) fn is_background(name: &str) -> bool {
     matches!(name.trim(), "__background__" | "_background_")
 }
 
-/// Whether a category says that pixels do not count.
+/// Returns whether pixels of a category do not count.
 pub(super) fn is_ignored(name: &str) -> bool {
     matches!(name.trim(), "__ignore__" | "_ignore_")
 }
 
-/// The wholes before their pieces, as deep as pieces of pieces go; of several wholes with one key a piece belongs to
-/// the one that it covers most of its own pixels with.
+/// Sorts wholes before their parts, at any depth. If several wholes share a key, a part belongs to the one that covers
+/// most of its pixels.
 ///
 /// # Errors
-/// The key of a piece whose whole is not there, or is a piece of itself.
+/// The key of a part whose whole is missing, or is a part of itself.
 pub(super) fn wholes_first(things: Vec<Thing>) -> Result<Vec<Region>, String> {
     let mut ordered: Vec<Region> = Vec::with_capacity(things.len());
     let mut keys: Vec<String> = Vec::with_capacity(things.len());
@@ -57,12 +57,12 @@ pub(super) fn wholes_first(things: Vec<Thing>) -> Result<Vec<Region>, String> {
     Ok(ordered)
 }
 
-/// Pixels that two masks of one picture share.
+/// Number of pixels that two masks of one picture share.
 fn shared(a: &Mask, b: &Mask) -> usize {
     if (a.width_px(), a.height_px()) == (b.width_px(), b.height_px()) { a.overlap(b) } else { 0 }
 }
 
-/// Adds the regions of one more label file of a photo. What has the same name and shows mostly the same is one thing.
+/// Adds the regions of one more label file of a photo. Regions of one name that mostly overlap are merged.
 pub(super) fn join(all: &mut Vec<Region>, more: Vec<Region>) {
     let before = all.len();
     let mut place = Vec::with_capacity(more.len());

@@ -1,6 +1,5 @@
-//! 3D-OVS's masks: `segmentations/classes.txt` with a class a line, and
-//! `segmentations/<NN>/<class>.png` where only 255 is foreground. `NN` is the place of the photo in
-//! the sorted list of the dataset's photos, from 0.
+//! 3D-OVS's masks: `segmentations/classes.txt` with a class a line, and `segmentations/<NN>/<class>.png` where only 255
+//! is foreground. `NN` is the index of the photo in the sorted list of the dataset's photos, from 0.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
@@ -13,10 +12,9 @@ use crate::scene::Level;
 const FOLDER: &str = "segmentations";
 const LIST_FILE: &str = "classes.txt";
 
-/// The masks of the dataset in `root`, or in the folder `segmentations` itself; `None` if there
-/// are none.
+/// Finds the masks of the dataset in `root`, or in the folder `segmentations` itself; `None` if there are none.
 pub(crate) fn find(root: &Path) -> Result<Option<Pictures>, IoError> {
-    // A folder given as `.` has a name only once it is made whole.
+    // A folder given as `.` has a name only as an absolute path.
     let whole = std::path::absolute(root).unwrap_or_else(|_| root.into());
     let (root, folder) = match (whole.parent(), whole.file_name()) {
         (Some(parent), Some(name)) if name == FOLDER => (parent, whole.clone()),

@@ -1,5 +1,5 @@
-//! YOLO's segments: a text file for each photo, a line for each thing: the number of its class and a polygon in shares
-//! of the photo's sides. Names are in `classes.txt`, `obj.names`, or the list `names` of a `.yaml` beside or above.
+//! YOLO's segments: a text file per photo, a line per region: the number of its class and a polygon in fractions of the
+//! photo's sides. Names are in `classes.txt`, `obj.names`, or the list `names` of a `.yaml` beside or above.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -12,14 +12,14 @@ use crate::scene::Mask;
 /// Names of classes by their numbers.
 pub(crate) type Names = BTreeMap<usize, String>;
 
-/// Bytes from which it is told whether a text is such a file.
+/// Bytes at the start of a text file that decide whether it is one of segments.
 const START_BYTES: u64 = 4096;
-/// How far beyond the photo a corner may lie, in shares of its side.
+/// Largest distance of a corner from the photo, in fractions of its side.
 const BEYOND: f64 = 0.5;
 /// Largest list of names, bytes.
 const NAMES_BYTES: u64 = 1 << 20;
 
-/// A line's class and the numbers that follow.
+/// Parses a line: its class and the numbers after it.
 fn line(text: &str) -> Option<(usize, Vec<f64>)> {
     let mut words = text.split_ascii_whitespace();
     let class = words.next()?.parse().ok()?;
@@ -27,13 +27,13 @@ fn line(text: &str) -> Option<(usize, Vec<f64>)> {
     numbers.collect::<Option<Vec<f64>>>().map(|numbers| (class, numbers)).filter(|(_, numbers)| numbers.len() >= 4)
 }
 
-/// Whether a text file is of this kind, by its first line, and has a polygon; boxes are counted.
+/// Returns whether a text file is of this kind, by its first line, and has a polygon; boxes are counted.
 pub(super) fn is_own(path: &Path, passed: &mut Passed) -> bool {
     let Ok(start) = files::read_start(path, START_BYTES) else { return false };
     let whole = (start.len() as u64) < START_BYTES;
     let text = String::from_utf8_lossy(&start);
     let Some(first) = text.lines().find(|l| !l.trim().is_empty()) else { return false };
-    // A line that is cut off ends in half a number.
+    // A truncated line may end in half a number.
     let first = if whole || text.lines().count() > 1 { first } else { first.rsplit_once(' ').map_or("", |p| p.0) };
     if line(first).is_none() {
         return false;
@@ -44,7 +44,7 @@ pub(super) fn is_own(path: &Path, passed: &mut Passed) -> bool {
     !polygons.is_empty()
 }
 
-/// The regions of a label file.
+/// Reads the regions of a label file.
 pub(super) fn read(path: &Path, names: &Names, sheet: Sheet<'_>) -> Result<Vec<Region>, IoError> {
     let text = files::read_text(path)?;
     let [w, h] = sheet.size_px();
@@ -59,7 +59,7 @@ pub(super) fn read(path: &Path, names: &Names, sheet: Sheet<'_>) -> Result<Vec<R
         if numbers.len() < 6 {
             continue;
         }
-        // One number more is how sure a network was.
+        // An additional number is the confidence of a network.
         numbers.truncate(numbers.len() / 2 * 2);
         let name = names.get(&class).cloned().unwrap_or_default();
         if is_background(&name) || is_ignored(&name) {
@@ -72,7 +72,7 @@ pub(super) fn read(path: &Path, names: &Names, sheet: Sheet<'_>) -> Result<Vec<R
     Ok(regions)
 }
 
-/// The names in a folder; `None` if it has none.
+/// Reads the class names in a folder; `None` if it has none.
 pub(super) fn names_in(folder: &Path) -> Result<Option<Names>, IoError> {
     let read = |path: &Path| {
         let bytes = files::read(path, NAMES_BYTES)?;
@@ -93,7 +93,7 @@ pub(super) fn names_in(folder: &Path) -> Result<Option<Names>, IoError> {
     Ok(None)
 }
 
-/// The list or table `names` of a YAML file, on one line or several.
+/// Parses the list or table `names` of a YAML file, on one line or several.
 fn of_yaml(text: &str) -> Option<Names> {
     let mut lines = text.lines().map(|l| l.split(" #").next().unwrap_or_default().trim_end());
     let first = lines.find_map(|l| l.strip_prefix("names:"))?.trim().to_owned();

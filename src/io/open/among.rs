@@ -1,16 +1,16 @@
-//! Whether a place for results lies among the files of a data set, which would be taken for its own.
+//! Check of an output folder: files among those of a data set would be taken for its own.
 
 use std::ffi::OsStr;
 use std::path::{Path, PathBuf};
 
 use super::is_data_set;
 
-/// How the names of folders of photos begin.
+/// Starts of names of photo folders.
 const PHOTO_FOLDERS: [&str; 8] = ["images", "input", "photos", "rgb", "frames", "train", "test", "val"];
-/// How far above a folder of photos its data set lies at most.
+/// Most levels from a folder of photos up to its data set.
 const ABOVE: usize = 3;
 
-/// The data set that `folder` is, or among whose photos it lies. Other folders in a data set are nobody's.
+/// Returns the data set that is `folder`, or has it among its photos. Other folders in a data set are free to use.
 pub(crate) fn data_set_around(folder: &Path) -> Option<PathBuf> {
     let folder = folder.canonicalize().or_else(|_| std::path::absolute(folder)).ok()?;
     let mut below: Option<&OsStr> = None;
@@ -23,7 +23,7 @@ pub(crate) fn data_set_around(folder: &Path) -> Option<PathBuf> {
     None
 }
 
-/// Whether a folder in a data set is called as those of photos are: `images`, `images_4`.
+/// Returns whether a folder has a name for photos: `images`, `images_4`.
 fn is_of_photos(name: &OsStr) -> bool {
     let name = name.to_string_lossy().to_lowercase();
     let mut rests = PHOTO_FOLDERS.iter().filter_map(|start| name.strip_prefix(start));
@@ -56,7 +56,7 @@ mod tests {
             }
         }
         assert_eq!(data_set_around(&root), None, "what holds data sets is none");
-        // A trained scene may lie where its photos do; its own files are guarded elsewhere.
+        // A trained scene may lie in its photos' folder; its own files are protected elsewhere.
         fs::write(list.join("scene.json"), "{}").expect("written");
         assert_eq!(data_set_around(&list), None);
     }

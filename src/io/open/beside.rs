@@ -1,4 +1,4 @@
-//! Poses that lie beside what is opened: a list of another name, or the data set that a folder of photos belongs to.
+//! Poses beside the opened folder: a list of another name, or the data set that a folder of photos belongs to.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,10 +6,10 @@ use std::path::{Path, PathBuf};
 use crate::io::{IoError, colmap, files, llff, transforms};
 use crate::scene::Dataset;
 
-/// The data set of the only `transforms*.json` in a folder that has none of the usual name.
+/// Reads the data set of the only `transforms*.json` in a folder without one of the usual name.
 ///
 /// # Errors
-/// If there are several, or the one cannot be read.
+/// If there are several, or the only one cannot be read.
 pub(super) fn other_list(folder: &Path) -> Result<Option<Dataset>, IoError> {
     let is_list = |name: &String| {
         let name = name.to_lowercase();
@@ -27,14 +27,14 @@ pub(super) fn other_list(folder: &Path) -> Result<Option<Dataset>, IoError> {
     }
 }
 
-/// The data set beside or above a folder of photos, if its photos lie in that folder.
+/// Reads the data set beside or above a folder of photos, if its photos lie in that folder.
 ///
 /// # Errors
-/// If there is one that cannot be read: a sentence about it.
+/// A sentence about a data set there that cannot be read.
 pub(super) fn of_photos(folder: &Path) -> Result<Option<Dataset>, String> {
     let Ok(real) = fs::canonicalize(folder) else { return Ok(None) };
     let mut broken = None;
-    // By its own name first: a link to photos elsewhere lies beside the poses, what it leads to does not.
+    // By its own name first: poses lie beside the link to a folder of photos, not beside its target.
     let named = std::path::absolute(folder).unwrap_or_else(|_| real.clone());
     let mut above: Vec<PathBuf> = [&named, &real].into_iter().filter_map(|p| Some(p.parent()?.to_path_buf())).collect();
     above.dedup();

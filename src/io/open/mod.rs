@@ -1,4 +1,4 @@
-//! One `open` for everything: looks at what is there and calls the reader for it.
+//! One `open` for every input: recognizes the content and calls its reader.
 
 mod among;
 mod beside;
@@ -15,7 +15,7 @@ use super::{
 };
 use crate::scene::{Axes, Dataset, GaussianCloud};
 
-/// What a path turned out to be.
+/// Content found at a path.
 // One value exists per opening; a box would only be in the reader's way.
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug)]
@@ -32,7 +32,7 @@ pub(crate) use among::data_set_around;
 
 type Result<T> = std::result::Result<T, OpenError>;
 
-/// What is looked for in a folder, in this order, and the reader of each.
+/// Layouts of folders that are recognized, in this order, and the reader of each.
 const FOLDERS: [Layout; 7] = [
     Layout {
         name: "a trained scene (scene.json)",
@@ -75,25 +75,25 @@ const FOLDERS: [Layout; 7] = [
     },
 ];
 
-/// Which of them are posed photos.
+/// Range in [`FOLDERS`] of the layouts of posed photos.
 const OF_PHOTOS: Range<usize> = 1..5;
 
-/// Whether a folder holds posed photos, and no trained scene.
+/// Returns whether a folder holds posed photos, and no trained scene.
 fn is_data_set(folder: &Path) -> bool {
     !trained::is_scene(folder) && FOLDERS[OF_PHOTOS].iter().any(|layout| (layout.is)(folder))
 }
 
-/// A way to keep a scene in a folder.
+/// Layout of a scene in a folder.
 struct Layout {
     name: &'static str,
     is: fn(&Path) -> bool,
     open: fn(&Path) -> std::result::Result<Opened, IoError>,
 }
 
-/// What is looked for in a file.
+/// Files that are recognized, for the error.
 const FILES: &str = "splats (.ply, .compressed.ply, .splat, .ksplat, .spz, .sog, SOG's meta.json, .gltf or .glb with KHR_gaussian_splatting), transforms.json, scene.json, poses_bounds.npy";
 
-/// Bytes that tell file formats apart.
+/// Bytes at the start of a file that tell formats apart.
 const MAGIC_BYTES: u64 = 4;
 
 /// Opens a dataset's folder or its `transforms.json`, a splat file, or a trained scene.
@@ -101,10 +101,10 @@ pub fn open(path: &Path) -> Result<Opened> {
     open_in(path, None)
 }
 
-/// The same with the axes of a splat's numbers, where they are not those that its file says or its format has.
+/// As [`open`], with other axes of a splat than its file or format states.
 ///
 /// # Errors
-/// As [`open`], and if axes are given for something else than a splat.
+/// As [`open`], and if axes are given for anything but a splat.
 pub fn open_in(path: &Path, axes: Option<Axes>) -> Result<Opened> {
     match (open_any(path, axes)?, axes) {
         (opened @ Opened::Cloud(_), _) | (opened, None) => Ok(opened),
@@ -154,7 +154,7 @@ fn open_folder(path: &Path, axes: Option<Axes>) -> Result<Opened> {
     })
 }
 
-/// A cloud of a format that has the axes of the scene.
+/// Turns a cloud of a format with the axes of the scene.
 fn turned(cloud: GaussianCloud, axes: Option<Axes>) -> GaussianCloud {
     match axes {
         Some(axes) => GaussianCloud { up: None, ..cloud }.turned(&axes.scene_from_file(), true),
@@ -194,7 +194,7 @@ fn open_file(path: &Path, axes: Option<Axes>) -> Result<Opened> {
         start if khr_gltf::is_gltf(start, &name) => khr_gltf::read(path, axes)?,
         b"PK\x03\x04" => turned(sog::read_archive(path)?, axes),
         start if spz::is_spz(start) => spz::read(path, axes)?,
-        // These two begin with anything.
+        // These two formats have no signature.
         [_, ..] if name.ends_with(".splat") => turned(splat::read(path)?, axes),
         [_, ..] if name.ends_with(".ksplat") => turned(ksplat::read(path)?, axes),
         start => {
@@ -208,7 +208,7 @@ fn open_file(path: &Path, axes: Option<Axes>) -> Result<Opened> {
     Ok(Opened::Cloud(cloud))
 }
 
-/// What a file is that is of no format known here.
+/// Describes a file of an unknown format.
 fn in_words(name: &str, start: &[u8]) -> &'static str {
     let is_called = |ending: &str| name.ends_with(ending);
     let is_text = |byte: &u8| byte.is_ascii_graphic() || byte.is_ascii_whitespace();
@@ -222,7 +222,7 @@ fn in_words(name: &str, start: &[u8]) -> &'static str {
     }
 }
 
-/// The first few names in a folder, for display.
+/// Lists the first few names in a folder, for display.
 fn contents(folder: &Path) -> Result<String> {
     const SHOWN: usize = 8;
     let failed = |cause| IoError::Read { path: folder.into(), cause };

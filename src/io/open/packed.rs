@@ -1,4 +1,4 @@
-//! Archives: a bundled splat is read from one, everything else has to be unpacked first.
+//! Archives: a bundled splat is read directly, all others have to be unpacked first.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -8,7 +8,7 @@ use zip::ZipArchive;
 
 use crate::io::{IoError, OpenError, files, sog};
 
-/// Endings of archives that are told by their names, and the command that unpacks each.
+/// Endings of archives that are recognized by name, and the command that unpacks each.
 const ARCHIVES: [(&str, &str); 8] = [
     (".tar.gz", "tar xf"),
     (".tgz", "tar xf"),
@@ -19,7 +19,7 @@ const ARCHIVES: [(&str, &str); 8] = [
     (".7z", "7z x"),
     (".rar", "unrar x"),
 ];
-/// What a data set in an archive is told by.
+/// File names that mark a data set in an archive.
 const LISTS: [&str; 8] = [
     "transforms.json",
     "transforms_train.json",
@@ -30,10 +30,10 @@ const LISTS: [&str; 8] = [
     "cfg_args",
     "point_cloud.ply",
 ];
-/// Largest number of files in an archive that are looked at.
+/// Most files listed of an archive.
 const MOST: usize = 100_000;
 
-/// Refuses an archive that no splat is bundled in, with the command that unpacks it; `name` is in small letters.
+/// Refuses an archive without a bundled splat, with the command that unpacks it; `name` is in lowercase.
 pub(super) fn refuse(path: &Path, name: &str, start: &[u8]) -> Result<(), OpenError> {
     if let Some((ending, command)) = ARCHIVES.iter().find(|(ending, _)| name.ends_with(ending)) {
         return Err(packed(path, format!("a {ending} archive"), command));
@@ -56,7 +56,7 @@ fn packed(path: &Path, what: String, command: &str) -> OpenError {
     OpenError::Packed { path: path.into(), what, command: format!("{command} '{}'", path.display()) }
 }
 
-/// The names of an archive's files, without what systems leave.
+/// Lists the names of an archive's files, without debris of systems.
 fn names(file: BufReader<File>) -> Result<Vec<String>, String> {
     let zip = ZipArchive::new(file).map_err(|e| e.to_string())?;
     let is_file = |name: &String| !name.ends_with('/') && !name.split('/').any(files::is_debris);

@@ -1,4 +1,4 @@
-//! Gaussians as few bytes: a file of the format SPZ before compression, in the order of a Morton curve.
+//! Compact encoding of Gaussians for a page: SPZ before its compression, in Morton order.
 
 use std::io;
 
@@ -8,18 +8,18 @@ pub(crate) use crate::io::morton::order;
 use crate::io::spz;
 use crate::scene::{Axes, GaussianCloud, SplatRenderMode};
 
-/// The cloud's Gaussians with the axes of browsers (x right, y up, z backward), centers relative to its origin; `order`
-/// has the place in the cloud of each that is written.
+/// Encodes the cloud's Gaussians with the axes of browsers (x right, y up, z backward), centers relative to its origin;
+/// `order` has the index in the cloud of each written Gaussian.
 ///
 /// # Errors
-/// If it reaches farther than the format does.
+/// If the cloud exceeds the range of the format.
 pub(crate) fn encode(cloud: &GaussianCloud, order: &[usize], antialias: bool) -> io::Result<Vec<u8>> {
     let render_mode = if antialias { SplatRenderMode::Mip } else { SplatRenderMode::default() };
     let part = GaussianCloud { origin: DVec3::ZERO, render_mode, ..cloud.select(order) };
     spz::unpacked(&part.turned(&Axes::SPZ.scene_from_file().transpose(), true), &mut |_| Ok(()))
 }
 
-/// Numbers below 2^24 in `order`, all low bytes first, then the next ones, then the highest.
+/// Encodes numbers below 2^24 in `order`, all low bytes first, then the middle ones, then the highest.
 pub(crate) fn identities(of: &[u32], order: &[usize]) -> Vec<u8> {
     let plane = |k: usize| order.iter().map(move |&i| of[i].to_le_bytes()[k]);
     (0..3).flat_map(plane).collect()
@@ -29,10 +29,10 @@ pub(crate) fn identities(of: &[u32], order: &[usize]) -> Vec<u8> {
 pub(crate) mod tests {
     use super::*;
 
-    /// Signs that half a turn about x gives to the harmonics above the first, degree 1 to 3.
+    /// Signs of the harmonics of degree 1 to 3 under a half turn about x.
     const TURNED: [f32; 15] = [-1.0, -1.0, 1.0, -1.0, 1.0, 1.0, -1.0, 1.0, -1.0, 1.0, -1.0, -1.0, 1.0, -1.0, 1.0];
 
-    /// What a page's script reads: the cloud again, in the axes of the scene, centers relative to the origin.
+    /// Decodes like a page's script: the cloud in the axes of the scene, centers relative to the origin.
     pub(crate) fn decode(bytes: &[u8]) -> GaussianCloud {
         let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four bytes"));
         assert_eq!((&bytes[..4], word(4)), (&b"NGSP"[..], 3));

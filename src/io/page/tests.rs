@@ -1,4 +1,4 @@
-//! What a page's text holds, read as a browser would.
+//! Content of a page, read like in a browser.
 
 use std::io::Read;
 
@@ -6,13 +6,13 @@ use flate2::read::GzDecoder;
 
 use super::*;
 
-/// The text of the element with this id.
+/// Text of the element with this id.
 pub(crate) fn element<'a>(html: &'a str, id: &str) -> &'a str {
     let (_, after) = html.split_once(&format!("id=\"{id}\">")).expect(id);
     after.split_once("</script>").expect("its end").0
 }
 
-/// The bytes that an element carries.
+/// Bytes encoded in an element.
 pub(crate) fn carried(html: &str, id: &str) -> Vec<u8> {
     let packed = base64::decode(element(html, id)).expect("base64");
     let mut bytes = Vec::new();
@@ -90,7 +90,7 @@ fn the_browser_is_told_to_run_this_script_and_to_ask_for_nothing() {
         let sum = base64::encode(Sha256::digest(text.as_bytes()));
         assert!(policy.contains(&format!("{directive} 'sha256-{sum}'")), "{directive}");
     }
-    // Nothing that would make a browser ask.
+    // Nothing in the page makes a browser load anything.
     for asks in ["<link rel=\"stylesheet", "<iframe", "@import", "url(", "src=\""] {
         assert_eq!(html.matches(asks).count(), 0, "{asks}");
     }

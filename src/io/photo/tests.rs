@@ -150,13 +150,13 @@ fn pictures_without_alpha_are_told_by_their_headers() {
         fs::write(&path, bytes).expect("write");
         alpha(&path)
     };
-    // Their pixels are cut off, so whoever decodes them fails.
+    // Their pixels are cut off, so decoding them fails.
     let opaque = encoded(&gradient(64, 48).into());
     assert!(matches!(alpha_of(&opaque[..opaque.len() / 2]), Ok(None)));
     let clear = encoded(&RgbaImage::from_pixel(64, 48, Rgba([9, 9, 9, 0])).into());
     assert!(alpha_of(&clear[..clear.len() / 2]).is_err(), "the control");
     assert!(matches!(alpha_of(&clear), Ok(Some((64, 48, alpha))) if alpha.iter().all(|a| *a == 0)));
-    // A profile that is longer than what is read first.
+    // A profile that is longer than the part that is read first.
     let mut jpeg = Vec::new();
     let mut encoder = JpegEncoder::new(&mut jpeg);
     encoder.set_icc_profile(vec![7; 2 * HEADER_BYTES as usize]).expect("a profile");

@@ -1,5 +1,5 @@
-//! Files of listed photos: as they are listed, or else by what moving a folder to another place, system or format
-//! makes of names. Whatever a list says, no path leads out of the data set's folder; links in it are followed.
+//! Lookup of listed photos: by the listed path, or else by a name changed through a move to another folder, system or
+//! format. No path leads out of the data set's folder, whatever a list says; links inside it are followed.
 
 use std::collections::HashMap;
 use std::fs;
@@ -10,16 +10,16 @@ use unicode_normalization::UnicodeNormalization;
 
 use crate::io::{IoError, files, photo};
 
-/// Looks for the photos of one list.
+/// Finder for the photos of one list.
 pub(crate) struct PhotoFinder<'a> {
     root: &'a Path,
-    /// The folder by its real name, and as the system is told of it: lists may name photos by either.
+    /// Real path and given path of the folder: lists may contain either.
     names: [PathBuf; 2],
-    /// What is in each folder that was looked into.
+    /// Contents of each folder that was searched.
     folders: Mutex<HashMap<PathBuf, Arc<Listing>>>,
 }
 
-/// The names in a folder, by what they have in common with others.
+/// Names in a folder, indexed for lookup.
 #[derive(Default)]
 struct Listing {
     by_fold: HashMap<String, Vec<String>>,
@@ -45,12 +45,12 @@ impl Listing {
         listing
     }
 
-    /// Names that differ from this one in letter case at most.
+    /// Returns the names that differ from this one in letter case at most.
     fn alike(&self, name: &str) -> &[String] {
         self.by_fold.get(&fold(name)).map_or(&[], Vec::as_slice)
     }
 
-    /// Pictures whose stem differs from this one in letter case at most.
+    /// Returns the pictures whose stem differs from this one in letter case at most.
     fn of_stem(&self, stem: &str) -> &[String] {
         self.by_stem.get(&fold(stem)).map_or(&[], Vec::as_slice)
     }
@@ -60,34 +60,34 @@ impl Listing {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct FoundFile {
     pub(crate) path: PathBuf,
-    /// The name that is listed, relative to the folder that the list is about, with `/` between its parts.
+    /// Listed name, relative to the folder of the list, with `/` between its parts.
     pub(crate) name: String,
-    /// What it is called in the folder where that is not what is listed.
+    /// Name in the folder if it differs from the listed one.
     pub(crate) called: Option<String>,
-    /// Whether links lead to it out of the folder.
+    /// True if links lead to it out of the folder.
     pub(crate) linked: bool,
 }
 
-/// What came of looking for a file.
+/// Outcome of a lookup.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Lookup {
     Found(FoundFile),
-    /// These two fit alike.
+    /// These two match equally well.
     Several([String; 2]),
     Missing,
-    /// The path leads out of the folder, and nothing inside is called like its end.
+    /// The path leads out of the folder, and nothing inside matches its end.
     Outside,
 }
 
 /// The parts of a path in a list.
 struct Parts {
     parts: Vec<String>,
-    /// Whether it begins somewhere outside of the folder, or on another computer.
+    /// True if it begins outside of the folder, or on another computer.
     away: bool,
 }
 
 impl<'a> PhotoFinder<'a> {
-    /// For the data set in `root`.
+    /// Makes a finder for the data set in `root`.
     ///
     /// # Errors
     /// If the folder cannot be read.
@@ -97,18 +97,18 @@ impl<'a> PhotoFinder<'a> {
         Ok(Self { root, names, folders: Mutex::default() })
     }
 
-    /// The name of a listed path by which lists can be compared: relative to the folder where it lies inside.
+    /// Returns the name of a listed path for comparing lists: relative to the folder if it lies inside.
     pub(crate) fn key(&self, entry: &str) -> String {
         self.parts(entry).parts.join("/")
     }
 
-    /// Looks for `entry` in the folder `below` the data set's; `below` is empty for that itself.
+    /// Looks for `entry` in the folder `below` the data set's; an empty `below` means that folder itself.
     pub(crate) fn find(&self, below: &str, entry: &str) -> Lookup {
         if entry.contains('\0') {
             return Lookup::Outside;
         }
         let base = if below.is_empty() { self.root.to_path_buf() } else { self.root.join(below) };
-        // Where a backslash is a letter like others.
+        // First with the backslash as a letter, as on Unix.
         if entry.contains('\\') {
             let plain = || Path::new(entry).components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir));
             let path = base.join(entry);
@@ -120,7 +120,7 @@ impl<'a> PhotoFinder<'a> {
         if parts.is_empty() {
             return Lookup::Outside;
         }
-        // Then the end of the path, the longest first: the folder was called otherwise, or lay elsewhere.
+        // Then the end of the path, the longest first: the folder may have had another name or place.
         for first in 0..parts.len() {
             match self.walk(&base, &parts[first..]) {
                 Walk::Found { path, parts: real } => {
@@ -144,7 +144,7 @@ impl<'a> PhotoFinder<'a> {
         Lookup::Found(FoundFile { path, name, called, linked })
     }
 
-    /// A path taken apart, whatever system wrote it.
+    /// Splits a path, whatever system wrote it.
     fn parts(&self, entry: &str) -> Parts {
         let inside = self.names.iter().find_map(|name| Path::new(entry).strip_prefix(name).ok()?.to_str());
         let entry = inside.unwrap_or(entry).replace('\\', "/");
@@ -156,7 +156,7 @@ impl<'a> PhotoFinder<'a> {
                 "" | "." => {}
                 ".." => away |= parts.pop().is_none(),
                 part if i == 0 && drive(part) => away = true,
-                // Where a drive's letter leads away from anywhere.
+                // A drive's letter leads out of any folder.
                 part if cfg!(windows) && part.contains(':') => away = true,
                 part => parts.push(part.into()),
             }
@@ -164,7 +164,7 @@ impl<'a> PhotoFinder<'a> {
         Parts { parts, away }
     }
 
-    /// Goes down from `folder` by the parts of a path, by their exact names where these exist.
+    /// Follows the parts of a path down from `folder`, by their exact names if these exist.
     fn walk(&self, folder: &Path, parts: &[String]) -> Walk {
         let Some((file, folders)) = parts.split_last() else { return Walk::Missing };
         let mut at = folder.to_path_buf();
@@ -178,7 +178,7 @@ impl<'a> PhotoFinder<'a> {
             }
             let listing = self.listing(&at);
             let alike: Vec<&String> = listing.alike(part).iter().filter(|name| at.join(name).is_dir()).collect();
-            // A data set that was handed around with reduced photos only.
+            // A data set that was shared with reduced photos only.
             let reduced = listing.reduced.iter().filter(|_| alike.is_empty() && fold(part) == "images");
             let reduced: Vec<&String> = reduced.take(1).collect();
             match if alike.is_empty() { reduced.as_slice() } else { alike.as_slice() } {
@@ -200,14 +200,14 @@ impl<'a> PhotoFinder<'a> {
         };
         let stem = photo::stem(file);
         let mut same_stem = there(listing.of_stem(stem.unwrap_or(file)));
-        // Phones and cameras leave one that cannot be read beside one that can.
+        // Phones and cameras store an unreadable file beside a readable one.
         if same_stem.iter().any(|name| !photo::is_unread(name)) {
             same_stem.retain(|name| !photo::is_unread(name));
         }
         let of_stem = |exact: &str| -> Vec<String> {
             same_stem.iter().filter(|name| photo::stem(name) == Some(exact)).cloned().collect()
         };
-        // Listed without an ending, which is a convention: that of .png.
+        // Listed without an ending, by convention `.png`.
         let mut added: Vec<String> = if stem.is_none() { of_stem(file) } else { Vec::new() };
         if let Some(png) = added.iter().find(|name| name.ends_with(".png")).cloned() {
             added = vec![png];
@@ -215,7 +215,7 @@ impl<'a> PhotoFinder<'a> {
         if let [one] = added.as_slice() {
             return Walk::Found { path: at.join(one), parts: (real != folders).then(|| joined(&real, one)) };
         }
-        // Then in other letters, then with another ending.
+        // Then with other letter case, then with another ending.
         let other_ending: Vec<String> = stem.map_or_else(Vec::new, of_stem);
         for fits in [added, there(listing.alike(file)), other_ending, same_stem.clone()] {
             match fits.as_slice() {
@@ -233,7 +233,7 @@ impl<'a> PhotoFinder<'a> {
     }
 }
 
-/// What came of going down a path; names with `/` where they are not those that were looked for.
+/// Outcome of following a path; names are joined by `/`, and `None` if they are as listed.
 enum Walk {
     Found { path: PathBuf, parts: Option<String> },
     Several([String; 2]),
@@ -255,7 +255,7 @@ pub(crate) fn reduction(name: &str) -> Option<u32> {
     name.strip_prefix("images_")?.parse().ok().filter(|factor| *factor > 1)
 }
 
-/// A name without what systems differ in: letter case, and how accents are composed.
+/// Folds a name: letter case and the composition of accents, in which systems differ.
 pub(crate) fn fold(name: &str) -> String {
     name.nfc().collect::<String>().to_lowercase()
 }
@@ -274,7 +274,7 @@ mod tests {
         folder
     }
 
-    /// Name and what it is called otherwise of a file that is found.
+    /// Listed name and actual name, if different, of a found file.
     fn of(search: Lookup) -> (String, Option<String>) {
         let Lookup::Found(file) = search else { panic!("{search:?}") };
         (file.name, file.called)
@@ -342,7 +342,7 @@ mod tests {
             let Lookup::Found(file) = finder.find("", entry) else { panic!("{entry}") };
             assert_eq!((file.linked, file.called), (is_linked, None), "{entry}");
         }
-        // By another name the same folder is the same.
+        // Another path of the same folder.
         std::os::unix::fs::symlink("scene", outer.path().join("alias")).expect("link");
         let alias = outer.path().join("alias");
         let finder = PhotoFinder::new(&alias).expect("folder");

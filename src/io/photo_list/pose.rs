@@ -1,19 +1,19 @@
-//! Poses as files give them: rotations of which rounding and scale are removed.
+//! Poses from files, with rounding and scale removed from their rotations.
 
 use glam::DMat3;
 
 use crate::math::rotation::{nearest_rotation, rotation_error};
 use crate::scene::CameraError;
 
-/// Largest deviation from a rotation that is taken for rounding.
+/// Largest deviation from a rotation that counts as rounding.
 const ROUNDING: f64 = 1e-3;
-/// Scales that a pose is believed to have.
+/// Accepted scales of a pose.
 const SCALES: std::ops::RangeInclusive<f64> = 1e-6..=1e6;
 
-/// The rotation that `m` is up to one scale and rounding, and whether more than rounding was removed.
+/// Returns the rotation closest to `m` without its scale, and true if more than rounding was removed.
 ///
 /// # Errors
-/// If it mirrors, shears or flattens, or is not finite.
+/// If `m` mirrors, shears or flattens, or is not finite.
 pub(crate) fn straightened(m: DMat3) -> Result<(DMat3, bool), CameraError> {
     let scale = m.determinant().cbrt();
     if !SCALES.contains(&scale) {

@@ -1,34 +1,34 @@
-//! What was passed over or mended in a list of photos, as one warning of each kind that counts.
+//! Warnings about a list of photos, one for each kind of skipped or corrected entry.
 
 use std::path::Path;
 
 use crate::io::IoError;
 
-/// How many names a warning gives.
+/// Most names in a warning.
 const NAMED: usize = 5;
 
-/// Listed photos of each fate.
+/// Listed photos by outcome.
 #[derive(Default)]
 pub(super) struct ListTally {
     pub(super) listed: usize,
     pub(super) missing: Vec<String>,
     pub(super) outside: Vec<String>,
-    /// Name, and the two files that it could be.
+    /// Name, and the two files that match it.
     pub(super) several: Vec<(String, [String; 2])>,
-    /// Name, the other that is listed, and the one file that both would be.
+    /// Name, the other listed name, and the one file that matches both.
     pub(super) shared: Vec<[String; 3]>,
-    /// Name, and what it is called.
+    /// Listed name, and actual name.
     pub(super) renamed: Vec<(String, String)>,
     pub(super) linked: Vec<String>,
     /// Photos whose listed mask is missing.
     pub(super) unmasked: Vec<String>,
     pub(super) normalized: Vec<String>,
-    /// Name and why.
+    /// Name and reason.
     pub(super) broken: Vec<(String, String)>,
 }
 
 impl ListTally {
-    /// The warnings, one for each kind that there is.
+    /// Returns the warnings, one for each kind that occurs.
     pub(super) fn warnings(&self, source: &Path) -> Vec<String> {
         let n = self.listed;
         let list = source.file_name().unwrap_or_default().to_string_lossy();
@@ -91,7 +91,7 @@ impl ListTally {
         all
     }
 
-    /// Why there is no photo at all.
+    /// Returns the reason why no photo is left.
     pub(super) fn error(&self, source: &Path, root: &Path) -> IoError {
         if let (Some((name, why)), true) = (self.broken.first(), self.missing.is_empty()) {
             return IoError::syntax(source, format!("photo '{name}'"), why.clone());
@@ -112,7 +112,7 @@ impl ListTally {
     }
 }
 
-/// The first few of many names.
+/// Joins the first few of many names.
 pub(crate) fn some_of(names: &[String], between: &str) -> String {
     let shown = names.iter().take(NAMED).map(String::as_str).collect::<Vec<_>>().join(between);
     match names.len().saturating_sub(NAMED) {

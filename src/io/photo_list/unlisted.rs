@@ -1,4 +1,4 @@
-//! Photos that lie among those of a data set, but that its list does not have.
+//! Photos that lie among those of a data set but are missing from its list.
 
 use std::collections::{BTreeMap, HashSet};
 use std::path::Path;
@@ -7,17 +7,17 @@ use super::{fold, some_of};
 use crate::io::{files, photo};
 use crate::scene::Photo;
 
-/// Ends of names of pictures that belong to a photo and are none: `0001_depth.png`, `0001.mask.png`.
+/// Ends of names of pictures that accompany a photo: `0001_depth.png`, `0001.mask.png`.
 const COMPANIONS: [&str; 9] =
     ["depth", "mask", "masks", "normal", "normals", "label", "alpha", "confidence", "segmentation"];
 
-/// A warning that counts the photos beside `photos` that are not in the list of these names, if there are any.
+/// Returns a warning that counts the photos beside `photos` that are not in the list of these names, if there are any.
 pub(crate) fn unlisted<'a>(photos: &[Photo], listed: impl Iterator<Item = &'a str>, root: &Path) -> Option<String> {
     let mut folders: BTreeMap<&Path, HashSet<&str>> = BTreeMap::new();
     for photo in photos {
         folders.entry(photo.path.parent()?).or_default().insert(photo.path.file_name()?.to_str()?);
     }
-    // What was left out for another reason is told already; a list may name photos without their ending.
+    // Listed photos that were left out already have a warning; a list may name photos without their ending.
     let key = |name: &str| fold(photo::stem(name).unwrap_or(name));
     let known: HashSet<String> = listed.map(|name| key(name.rsplit(['/', '\\']).next().unwrap_or(name))).collect();
     let mut rest = Vec::new();
@@ -40,7 +40,7 @@ pub(crate) fn unlisted<'a>(photos: &[Photo], listed: impl Iterator<Item = &'a st
     (n > 0).then(|| format!("{n} of {all} photos have no pose and were left out: {}", some_of(&rest, ", ")))
 }
 
-/// Whether this is one of SPIn-NeRF's pictures that are neither photo nor mask.
+/// Returns whether this is one of SPIn-NeRF's pictures that are neither photo nor mask.
 pub(crate) fn is_helper(name: &str) -> bool {
     name.contains("cutout") || name.contains("pseudo")
 }

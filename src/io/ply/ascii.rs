@@ -1,9 +1,9 @@
-//! Rows of numbers as text, turned into the binary form.
+//! Rows of numbers as text, converted to the binary form.
 
 use super::{Column, Element, Encoding, Kind, Ply};
 use crate::io::IoError;
 
-/// The rows of element `at` as little-endian bytes.
+/// Converts the rows of element `at` to little-endian bytes.
 pub(super) fn rows(ply: &Ply<'_>, at: usize, columns: &[Column], stride: usize) -> Result<Vec<u8>, IoError> {
     debug_assert_eq!(ply.encoding, Encoding::Ascii);
     let mut words = Words { rest: ply.body };
@@ -41,7 +41,7 @@ pub(super) fn rows(ply: &Ply<'_>, at: usize, columns: &[Column], stride: usize) 
     Ok(out)
 }
 
-/// Passes over a list with its length in front.
+/// Skips a list with its length in front.
 fn pass_list(ply: &Ply<'_>, words: &mut Words<'_>, element: &Element, row: u64, property: &str) -> Result<(), IoError> {
     let items = number(ply, words, element, row, property)?.max(0.0) as u64;
     for _ in 0..items {

@@ -1,20 +1,20 @@
-//! Colors of a PLY element, whatever they are called and in whatever range they are.
+//! Colors of a PLY element, under any of the usual names and in any usual range.
 
 use rayon::prelude::*;
 
 use super::{Column, Scalar, Table};
 use crate::math::sh::SH_C0;
 
-/// Names of red, green and blue, the first that are there.
+/// Names of red, green and blue; the first that exist are used.
 const NAMES: [[&str; 3]; 4] = [
     ["red", "green", "blue"],
     ["diffuse_red", "diffuse_green", "diffuse_blue"],
     ["r", "g", "b"],
     ["f_dc_0", "f_dc_1", "f_dc_2"],
 ];
-/// Largest values of colors, the usual first.
+/// Largest values of colors, in the order tried.
 const RANGES: [f64; 3] = [1.0, 255.0, 65_535.0];
-/// Floats up to this much over a range are in it: colors may be brighter than white.
+/// Largest excess of floats over a range: colors may be brighter than white.
 const ABOVE: f64 = 2.0;
 
 /// The columns of colors.
@@ -25,26 +25,26 @@ pub(crate) struct Colors<'a> {
 
 #[derive(Clone, Copy)]
 enum Kind {
-    /// Up to this value.
+    /// Values up to this one.
     Range(f64),
     /// Constant harmonics.
     Harmonics,
 }
 
 impl<'a> Colors<'a> {
-    /// Names that are looked for where there are no harmonics.
+    /// Returns whether a name is that of a color without harmonics.
     pub(crate) fn is_name(name: &str) -> bool {
         NAMES[..3].iter().flatten().any(|known| *known == name)
     }
 
-    /// Whether the range follows from the type alone, so that any rows tell it.
+    /// Returns whether the type alone fixes the range, so that any block of rows is enough to decode.
     pub(crate) fn has_one_range(columns: &[Column]) -> bool {
         let of_colors = |c: &&Column| Self::is_name(&c.name);
         columns.iter().filter(of_colors).all(|c| c.scalar == Scalar::U8)
     }
 
-    /// The colors of a table, if it has any. Bytes fill their range; the range of other types is the smallest that holds
-    /// all values.
+    /// Finds the colors of a table, if it has any. Bytes fill their range; the range of other types is the smallest
+    /// that holds all values.
     pub(crate) fn of(table: &'a Table<'_>) -> Option<Self> {
         let (columns, names) = NAMES.iter().find_map(|names| Some((table.all(*names).ok()?, names)))?;
         if names[0].starts_with("f_dc") {
@@ -63,7 +63,7 @@ impl<'a> Colors<'a> {
         Some(Self { columns, kind: Kind::Range(*RANGES.iter().find(fits).unwrap_or(&most)) })
     }
 
-    /// Red, green and blue of a row, 0 to 1 for what a screen can show.
+    /// Red, green and blue of a row, 0 to 1 within the range of a display.
     #[inline]
     pub(crate) fn rgb(&self, row: &[u8]) -> [f64; 3] {
         match self.kind {

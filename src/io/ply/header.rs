@@ -59,7 +59,7 @@ impl Scalar {
         }
     }
 
-    /// The value at the front of `b`, little-endian; 0 if `b` is too short.
+    /// Reads the value at the front of `b`, little-endian; 0 if `b` is too short.
     #[inline]
     pub(crate) fn read(self, b: &[u8]) -> f64 {
         #[inline]
@@ -119,13 +119,13 @@ pub(crate) struct Property {
 pub(crate) struct Element {
     /// Its name: `vertex`, `face`, `chunk`.
     pub(crate) name: String,
-    /// Rows, as the file claims.
+    /// Number of rows, as the header claims.
     pub(crate) count: u64,
     pub(crate) properties: Vec<Property>,
 }
 
 impl Element {
-    /// Whether a row holds lists, and so may have any size.
+    /// Returns whether a row holds lists, and so may have any size.
     pub(super) fn has_lists(&self) -> bool {
         self.properties.iter().any(|p| matches!(p.kind, Kind::List { .. }))
     }
@@ -202,7 +202,7 @@ pub(super) fn parse<'a>(bytes: &'a [u8], path: &'a Path) -> Result<Ply<'a>, IoEr
 
 fn add(elements: &mut [Element], name: &str, kind: Kind) -> Result<(), String> {
     let element = elements.last_mut().ok_or("a property before any element")?;
-    // Thousands of properties would make this quadratic check slow; no format has as many.
+    // Thousands of properties would make this quadratic check slow; no format has that many.
     if element.properties.len() >= 1024 {
         return Err("more than 1024 properties".into());
     }

@@ -1,5 +1,5 @@
-//! Stanford PLY: headers, and the fixed-size rows of an element as a table of columns, whatever
-//! the file's encoding. What the columns mean is up to `splat_ply` and `points_ply`.
+//! Stanford PLY: headers, and the fixed-size rows of an element as a table of columns, in any encoding. `splat_ply` and
+//! `points_ply` interpret the columns.
 
 mod ascii;
 mod color;
@@ -28,7 +28,7 @@ pub(crate) struct Ply<'a> {
 impl<'a> Ply<'a> {
     /// Reads the header of a file's bytes. Nothing is allocated for the rows it claims.
     pub(crate) fn parse(bytes: &'a [u8], path: &'a Path) -> Result<Self, IoError> {
-        // Editors put a byte order mark before those that are text.
+        // Editors may put a byte order mark before a text file.
         header::parse(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes), path)
     }
 
@@ -36,8 +36,7 @@ impl<'a> Ply<'a> {
         self.elements.iter().find(|e| e.name == name)
     }
 
-    /// Columns and bytes of a row of the element of that name, if it comes first and its rows are of
-    /// one size.
+    /// Columns and bytes per row of the element of that name, if it comes first and its rows have a fixed size.
     pub(crate) fn first_rows(&self, name: &str) -> Option<(Vec<Column>, usize)> {
         let element = self.elements.first().filter(|e| e.name == name && !e.has_lists())?;
         self.columns(element).ok()
@@ -47,7 +46,7 @@ impl<'a> Ply<'a> {
         self.body.len()
     }
 
-    /// The rows of the element of that name without its lists; `None` if the file has no such element.
+    /// Reads the rows of the element of that name without its lists; `None` if the file has no such element.
     pub(crate) fn table(&self, name: &str) -> Result<Option<Table<'a>>, IoError> {
         let Some(at) = self.elements.iter().position(|e| e.name == name) else { return Ok(None) };
         let element = &self.elements[at];
@@ -59,7 +58,7 @@ impl<'a> Ply<'a> {
         Ok(Some(Table { rows: element.count as usize, stride, columns, data }))
     }
 
-    /// The columns of an element but for its lists, and the bytes that they take in binary.
+    /// Columns of an element except its lists, and their bytes per row in binary.
     fn columns(&self, element: &Element) -> Result<(Vec<Column>, usize), IoError> {
         let mut offset = 0;
         let mut columns = Vec::with_capacity(element.properties.len());
@@ -97,7 +96,7 @@ impl<'a> Ply<'a> {
         Ok(Cow::Owned(swapped))
     }
 
-    /// The numbers of rows with lists between them, little-endian.
+    /// Copies the numbers of rows with lists between them, little-endian.
     fn rows_beside_lists(&self, element: &Element, rest: &[u8], stride: usize) -> Result<Vec<u8>, IoError> {
         let mut out = Vec::with_capacity(element.count as usize * stride);
         let mut left = rest;
@@ -123,7 +122,7 @@ impl<'a> Ply<'a> {
         Ok(out)
     }
 
-    /// Bytes that an element takes at the front of `rest`.
+    /// Bytes of an element at the front of `rest`.
     fn binary_len(&self, element: &Element, rest: &[u8]) -> Result<usize, IoError> {
         let fixed = |k: &Kind| match k {
             Kind::Scalar(s) => Some(s.bytes()),
@@ -187,7 +186,7 @@ impl<'a> Ply<'a> {
         }
     }
 
-    /// An error about the element `element`.
+    /// Makes an error about the element `element`.
     pub(crate) fn syntax(&self, element: &str, reason: String) -> IoError {
         IoError::Syntax { path: self.path.into(), place: format!("element '{element}'"), reason }
     }

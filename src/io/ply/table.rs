@@ -9,7 +9,7 @@ use super::Scalar;
 pub(crate) struct Column {
     pub(crate) name: String,
     pub(crate) scalar: Scalar,
-    /// Where it starts in a row, in bytes.
+    /// Offset in a row, in bytes.
     pub(crate) offset: usize,
 }
 
@@ -27,7 +27,7 @@ impl Column {
         }
     }
 
-    /// The value in `row` of an integer column that fits 32 bits.
+    /// Reads the value in `row` of an integer column that fits 32 bits.
     #[inline]
     pub(crate) fn u32(&self, row: &[u8]) -> u32 {
         self.f64(row) as u32
@@ -53,7 +53,7 @@ impl Table<'_> {
         self.columns.iter().find(|c| c.name == name)
     }
 
-    /// The columns of those names, or the first name that is missing.
+    /// Returns the columns of those names, or the first name that is missing.
     pub(crate) fn all<const N: usize>(&self, names: [&'static str; N]) -> Result<[&Column; N], &'static str> {
         if let Some(missing) = names.iter().find(|n| self.column(n).is_none()) {
             return Err(missing);

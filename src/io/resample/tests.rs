@@ -16,7 +16,7 @@ fn camera(width_px: u32, height_px: u32, focal: f64) -> Camera {
     }
 }
 
-/// A picture that is smooth, so that bilinear look-ups are accurate.
+/// A smooth picture, so that bilinear look-ups are accurate.
 fn smooth(u: f64, v: f64) -> [f64; 3] {
     [128.0 + 100.0 * (u / 37.0).sin(), 128.0 + 100.0 * (v / 29.0).cos(), 128.0 + 60.0 * ((u + v) / 53.0).sin()]
 }
@@ -31,8 +31,8 @@ fn picture(width: usize, height: usize, color: impl Fn(f64, f64) -> [f64; 3]) ->
     Pixels { width, height, channels: 3, data }
 }
 
-/// The pinhole position that the lens bends to the position `bent`, by Newton's method on
-/// numerical derivatives: shares no code with the mapping under test, which goes the other way.
+/// Finds the pinhole position that the lens maps to `bent`, by Newton's method on numerical derivatives: shares no code
+/// with the mapping under test, which goes the other way.
 fn straighten(c: &Camera, d: &Distortion, bent: DVec2) -> DVec2 {
     let target = (bent - c.principal_px) / c.focal_px;
     let bend = |q: DVec2| {
@@ -80,7 +80,7 @@ fn undistortion_inverts_the_lens() {
         Distortion { k1: 0.06, k2: -0.08, p1: -0.001, p2: 0.0002, ..Distortion::default() },
     ];
     for d in lenses {
-        // What the lens would show: the smooth picture at the straightened position.
+        // Picture through the lens: the smooth picture at the undistorted position.
         let bent = picture(240, 180, |u, v| {
             let p = straighten(&c, &d, DVec2::new(u, v));
             smooth(p.x, p.y)
@@ -88,7 +88,7 @@ fn undistortion_inverts_the_lens() {
         let out = resample(&bent, &c, Some(&d), &c);
         let error = worst(&out, 1.0);
         assert!(error < 1.6, "worst error {error}");
-        // Control: the wrong lens is seen to be wrong.
+        // Control: the wrong lens is detected.
         let wrong = Distortion { k1: -d.k1, ..d };
         assert!(worst(&resample(&bent, &c, Some(&wrong), &c), 1.0) > 10.0);
         // And reduced by a factor that is no integer, in the same pass.
@@ -108,7 +108,7 @@ fn centers_are_what_the_lens_shows_there() {
         Distortion { k1: -0.12, k2: 0.03, p1: 0.002, p2: -0.003, ..Distortion::default() },
     ] {
         let lens = resample(&drawn, &c, Some(&d), &small);
-        // Pixels of either that the other has not; pixels at the border may be of both.
+        // Counts pixels covered in one picture only; pixels at the border may be either.
         let differ = |d: &Distortion| {
             let shown = |at: usize| disk((at % 240) as f64 + 0.5, (at / 240) as f64 + 0.5);
             let found = centers(&c, d, [96, 72]);
@@ -133,7 +133,7 @@ fn pixels_that_the_lens_does_not_show_have_no_coverage() {
     let coverage = out.coverage.expect("partial");
     assert_eq!((coverage[0], out.rgb[0]), (0, [0; 3]));
     assert_eq!((coverage[90 * 240 + 120], out.rgb[90 * 240 + 120]), (255, [255; 3]));
-    // Strong negative k1 folds back: what lies beyond the fold must not be a mirror image.
+    // Strong negative k1 folds back: the part beyond the fold must not be a mirror image.
     let d = Distortion { k1: -1.2, ..Distortion::default() };
     let out = resample(&white, &c, Some(&d), &c);
     assert_eq!(out.coverage.expect("partial")[0], 0);
@@ -159,7 +159,7 @@ fn same_size_without_distortion_is_the_identity() {
     let c = camera(31, 17, 20.0);
     let out = resample(&p, &c, None, &c);
     assert_eq!(out.rgb.as_flattened(), p.data);
-    // A lens that does nothing takes the other path to the same pixels.
+    // A lens without distortion takes the other path to the same pixels.
     let out = resample(&p, &c, Some(&Distortion::default()), &c);
     assert_eq!(out.rgb.as_flattened(), p.data);
 }

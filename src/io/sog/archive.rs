@@ -1,4 +1,4 @@
-//! The archive that bundles a SOG, read within bounds.
+//! Archive of a bundled SOG, read within limits.
 
 use std::io::{Cursor, Read};
 use std::path::Path;
@@ -10,9 +10,9 @@ use crate::io::IoError;
 
 /// Most entries of an archive; a SOG has eight.
 const MAX_ENTRIES: usize = 64;
-/// Unpacked bytes that every archive may have.
+/// Unpacked bytes allowed for every archive.
 const FREE_BYTES: u64 = 1 << 20;
-/// Unpacked bytes per byte of the archive beyond that. Pictures hardly shrink, JSON by 20 at most.
+/// Unpacked bytes per further byte of the archive. Pictures hardly shrink, JSON by 20 at most.
 const MAX_RATIO: u64 = 32;
 
 pub(super) struct Archive<'a> {
@@ -48,7 +48,7 @@ impl<'a> Archive<'a> {
         Ok(Self { zip, prefix, left: limit, limit, path })
     }
 
-    /// The unpacked bytes of the entry `name` beside `meta.json`.
+    /// Unpacks the entry `name` beside `meta.json`.
     pub(super) fn read(&mut self, name: &str) -> Result<Vec<u8>, IoError> {
         let path = self.path;
         let full = format!("{}{name}", self.prefix);
@@ -68,7 +68,7 @@ impl<'a> Archive<'a> {
         if entry.size() > self.left {
             return Err(over(entry.size()));
         }
-        // What the entry claims is not what it unpacks to, so the reading is bounded as well.
+        // The claimed size may be wrong, so the reading is bounded as well.
         let mut bytes = Vec::new();
         entry.take(self.left + 1).read_to_end(&mut bytes).map_err(|e| broken(path, &place, &e.to_string()))?;
         let used = bytes.len() as u64;

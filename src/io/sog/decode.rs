@@ -1,4 +1,4 @@
-//! From pictures to Gaussians.
+//! Decoding of a SOG's pictures to Gaussians.
 
 use std::path::Path;
 
@@ -11,9 +11,9 @@ use crate::io::{IoError, photo};
 use crate::math::sh::coefficients;
 use crate::scene::GaussianCloud;
 
-/// Labels have 16 bits.
+/// Most palette entries: labels have 16 bits.
 const MAX_PALETTE: usize = 1 << 16;
-/// Pixels that a picture may have beyond one per Gaussian, for rows that are not full.
+/// Pixels allowed in a picture beyond one per Gaussian, for incomplete rows.
 const MARGIN_PX: u64 = 1 << 16;
 
 /// A decoded picture: RGBA, row by row.
@@ -22,7 +22,7 @@ struct Texture {
     pixels: Vec<[u8; 4]>,
 }
 
-/// The Gaussians that `meta` and the files that `load` returns describe.
+/// Decodes the Gaussians of `meta`; `load` returns its files by name.
 pub(super) fn cloud(
     meta: &Meta,
     mut load: impl FnMut(&str) -> Result<Vec<u8>, IoError>,
@@ -97,7 +97,7 @@ fn opacity(kind: &Opacity, byte: u8) -> f32 {
     }
 }
 
-/// Degree and all harmonics, the constant ones included.
+/// Decodes degree and all harmonics, the constant ones included.
 fn harmonics(
     rest: &Rest,
     palette: &[u8],
@@ -123,7 +123,7 @@ fn harmonics(
     let mut sh = vec![[0.0; 3]; labels.len() * (per_entry + 1)];
     sh.par_chunks_exact_mut(per_entry + 1).zip(labels).zip(constant).for_each(|((out, p), constant)| {
         out[0] = constant;
-        // Entries follow each other row by row, so this is also where entry `label` starts.
+        // Entries follow each other row by row, so entry `label` starts here.
         let start = label(p) * per_entry;
         for (rgb, texel) in out[1..].iter_mut().zip(&palette.pixels[start..start + per_entry]) {
             *rgb = [0, 1, 2].map(|k| levels[usize::from(texel[k])]);

@@ -1,4 +1,4 @@
-//! From Gaussians to pictures, version 2.
+//! Encoding of Gaussians as SOG pictures, version 2.
 
 use std::io::{self, Cursor};
 
@@ -19,15 +19,14 @@ const MOST_PX: usize = 16_383;
 /// Most entries of the palette of harmonics.
 const MOST_ENTRIES: usize = 1 << 16;
 
-/// Pixels of a picture, as far as they are used.
+/// Pixels of a picture, the used ones only.
 struct Picture {
     name: &'static str,
     size_px: [usize; 2],
     pixels: Vec<[u8; 4]>,
 }
 
-/// The files of a SOG by their names, `meta.json` last: of a valid cloud that is not empty, its Gaussians in an order
-/// in which those that lie together follow one another.
+/// Encodes a valid cloud that is not empty as the files of a SOG, `meta.json` last, with its Gaussians in Morton order.
 ///
 /// # Errors
 /// If there are more Gaussians than a picture has pixels.
@@ -108,7 +107,7 @@ fn with([r, g, b]: [u8; 3], alpha: u8) -> [u8; 4] {
     [r, g, b, alpha]
 }
 
-/// Positions in 16 bits an axis on a logarithmic scale, and the ends of that scale.
+/// Encodes positions in 16 bits an axis on a logarithmic scale; returns the ends of that scale too.
 fn places(cloud: &GaussianCloud) -> (Vec<[u16; 3]>, [f32; 3], [f32; 3]) {
     let logarithm = |v: f32| v.abs().ln_1p().copysign(v);
     let all: Vec<[f32; 3]> =
@@ -121,7 +120,7 @@ fn places(cloud: &GaussianCloud) -> (Vec<[u16; 3]>, [f32; 3], [f32; 3]) {
     (all.iter().map(place).collect(), min, max)
 }
 
-/// A lossless picture; what is not used of it is black.
+/// Encodes a lossless picture; unused pixels are black.
 fn webp(picture: Picture) -> io::Result<(String, Vec<u8>)> {
     let Picture { name, size_px: [width, height], mut pixels } = picture;
     pixels.resize(width * height, [0, 0, 0, 255]);

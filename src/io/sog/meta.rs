@@ -1,4 +1,4 @@
-//! `meta.json`: both versions, checked, in one form.
+//! `meta.json`: both versions, validated, in one form.
 
 use std::path::Path;
 
@@ -9,7 +9,7 @@ use crate::io::render_mode::of_sog_model;
 use crate::io::{IoError, files};
 use crate::scene::SplatRenderMode;
 
-/// What a file says, checked: every number is finite, every list has its length.
+/// Validated contents: every number is finite, every list has its length.
 pub(super) struct Meta {
     /// Number of Gaussians, not yet compared with the pictures.
     pub(crate) count: u64,
@@ -26,11 +26,11 @@ pub(super) struct Meta {
     pub(crate) sh0_file: String,
     pub(crate) rest: Option<Rest>,
     pub(crate) render_mode: SplatRenderMode,
-    /// What the positions are relative to.
+    /// Shift that the positions are relative to.
     pub(crate) origin: DVec3,
 }
 
-/// What the 256 values of a byte stand for, by channel.
+/// Values of the 256 levels of a byte, by channel.
 pub(super) struct Codebook<const N: usize>(pub [[f32; 256]; N]);
 
 pub(super) enum Opacity {
@@ -41,9 +41,9 @@ pub(super) enum Opacity {
 }
 
 pub(super) struct Rest {
-    /// Degree, where the file says; else it follows from the palette's width.
+    /// Degree, if stated; else it follows from the palette's width.
     pub(crate) degree: Option<u8>,
-    /// Palette entries, where the file says.
+    /// Palette entries, if stated.
     pub(crate) count: Option<u64>,
     pub(crate) levels: Codebook<1>,
     pub(crate) centroids_file: String,
@@ -51,7 +51,7 @@ pub(super) struct Rest {
 }
 
 impl Meta {
-    /// The pictures, in the order in which they are decoded; the palette of harmonics comes last.
+    /// Names of the pictures, in the order of decoding; the palette of harmonics comes last.
     pub(crate) fn files(&self) -> Vec<String> {
         let [low, high] = &self.means_files;
         let rest = self.rest.iter().flat_map(|rest| [&rest.labels_file, &rest.centroids_file]);
@@ -71,7 +71,7 @@ struct File {
     sh0: Part,
     #[serde(rename = "shN")]
     rest: Option<Part>,
-    /// This program's own.
+    /// Key of this program's own.
     fmlgs_shift: Option<[f64; 3]>,
 }
 

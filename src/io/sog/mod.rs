@@ -1,9 +1,9 @@
 //! SOG: splats quantized into WebP pictures beside a `meta.json`, in a folder or in one `.sog`
 //! archive (PlayCanvas). Versions 1 and 2 are read, version 2 is written.
 //!
-//! Pixel `i` of each picture belongs to Gaussian `i`. Positions have 16 bits an axis, in two
-//! pictures, on a logarithmic scale; version 2 looks scales and colors up in codebooks where
-//! version 1 interpolates between bounds; higher harmonics are entries of a palette.
+//! Pixel `i` of each picture belongs to Gaussian `i`. Positions have 16 bits an axis, in two pictures, on a logarithmic
+//! scale. Version 2 has codebooks for scales and colors; version 1 interpolates them between bounds. Higher harmonics
+//! are entries of a palette.
 
 mod archive;
 mod decode;
@@ -19,12 +19,12 @@ use super::error::write_error;
 use super::{IoError, bundle, files};
 use crate::scene::GaussianCloud;
 
-/// The file that makes a folder a SOG scene.
+/// File that makes a folder a SOG scene.
 pub(crate) const META_FILE: &str = "meta.json";
 
 /// Palette entries in a row of the palette's picture.
 const PALETTE_ROW: usize = 64;
-/// Value of the alpha channel that says that `w` is the largest component of a quaternion.
+/// Alpha value of a quaternion with `w` as its largest component.
 const FIRST_TAG: u8 = 252;
 
 /// Reads an unbundled SOG by its `meta.json`.
@@ -45,7 +45,7 @@ pub(crate) fn read_archive(path: &Path) -> Result<GaussianCloud, IoError> {
     parse_archive(&files::read(path, u64::MAX)?, path)
 }
 
-/// The Gaussians in the bytes of a bundled `.sog`; `path` is for errors.
+/// Parses the Gaussians of a bundled `.sog`; `path` is for errors.
 pub fn parse_archive(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
     let mut archive = archive::Archive::open(bytes, path)?;
     let meta = meta::parse(&archive.read(META_FILE)?, path)?;
@@ -57,10 +57,10 @@ pub(super) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told
     out.write_all(&bundle::pack(&encode::files(cloud, told)?)?)
 }
 
-/// Writes an unbundled SOG: its pictures first, then `meta_file`, without which they are nothing.
+/// Writes an unbundled SOG: its pictures first, then `meta_file`, without which they are not used.
 ///
 /// # Errors
-/// If something is at `meta_file` already: all files could not be replaced at once.
+/// If `meta_file` exists already: all files could not be replaced at once.
 pub(super) fn write_folder(meta_file: &Path, cloud: &GaussianCloud, told: &mut Told<'_>) -> Result<(), IoError> {
     let folder = files::folder_of(meta_file);
     if meta_file.exists() {
@@ -77,7 +77,7 @@ pub(super) fn write_folder(meta_file: &Path, cloud: &GaussianCloud, told: &mut T
     drafts.into_iter().try_for_each(|draft| draft.commit().map(drop))
 }
 
-/// The files of an unbundled SOG, as far as they can be told.
+/// Lists the files of an unbundled SOG, as far as they are known.
 pub(super) fn files_of(meta_file: &Path) -> Vec<PathBuf> {
     let meta = files::read(meta_file, files::MAX_TEXT_BYTES).and_then(|bytes| meta::parse(&bytes, meta_file));
     let names = meta.map(|meta| meta.files()).unwrap_or_default();

@@ -1,26 +1,26 @@
-//! Palettes: a few vectors that stand for many.
+//! Palettes: vector quantization of many vectors to a few.
 
 use std::collections::BinaryHeap;
 
-/// What stands for a list of vectors of `dimensions` numbers each.
+/// Palette for a list of vectors of `dimensions` numbers each.
 pub(super) struct VectorPalette {
     /// Its entries, one after another.
     pub(super) entries: Vec<f32>,
-    /// Which entry stands for each of the vectors.
+    /// Index of the entry for each of the vectors.
     pub(super) labels: Vec<u16>,
 }
 
-/// Vectors that lie together, in a list of all of them.
+/// Range of similar vectors in the sorted list of all.
 struct Group {
     start: usize,
     end: usize,
     mean: Vec<f64>,
-    /// The axis along which they differ most.
+    /// Axis of the largest variance.
     axis: usize,
 }
 
-/// A palette of at most `most` entries, up to 65,536: the group that is farthest from its mean is halved there, along
-/// the axis along which it is widest, until there are as many groups as that. Nothing is random.
+/// Builds a palette of at most `most` entries, up to 65,536. The group with the largest squared error is split at the
+/// mean of its widest axis until there are `most` groups. The result is deterministic.
 pub(super) fn palette(vectors: &[f32], dimensions: usize, most: usize) -> VectorPalette {
     let n = vectors.len() / dimensions;
     let mut order: Vec<u32> = (0..n as u32).collect();
@@ -31,7 +31,7 @@ pub(super) fn palette(vectors: &[f32], dimensions: usize, most: usize) -> Vector
         let mean: Vec<f64> = (0..dimensions).map(|axis| sum(axis, &|v| v) / count).collect();
         let spread: Vec<f64> = (0..dimensions).map(|axis| sum(axis, &|v| (v - mean[axis]).powi(2))).collect();
         let axis = (0..dimensions).max_by(|a, b| spread[*a].total_cmp(&spread[*b])).unwrap_or(0);
-        // Bits of floats that are not negative are ordered as the floats are.
+        // Bits of non-negative floats have the order of the floats.
         (spread.iter().sum::<f64>().to_bits(), Group { start, end: start + order.len(), mean, axis })
     };
     let (error, all) = group(&order, 0);
@@ -42,7 +42,7 @@ pub(super) fn palette(vectors: &[f32], dimensions: usize, most: usize) -> Vector
         let Group { start, end, axis, .. } = groups[at];
         let (part, middle) = (&mut order[start..end], groups[at].mean[axis]);
         let left = partition(part, |i| value(i, axis) < middle);
-        // Nothing is left of a mean that is rounded.
+        // A rounded mean may leave one half empty.
         if left == 0 || left == part.len() {
             continue;
         }
@@ -62,7 +62,7 @@ pub(super) fn palette(vectors: &[f32], dimensions: usize, most: usize) -> Vector
     VectorPalette { entries: groups.iter().flat_map(|g| g.mean.iter().map(|v| *v as f32)).collect(), labels }
 }
 
-/// Puts those that are `first` to the front, and counts them.
+/// Moves the elements that satisfy `first` to the front, and counts them.
 fn partition(all: &mut [u32], first: impl Fn(u32) -> bool) -> usize {
     let mut count = 0;
     for k in 0..all.len() {
@@ -74,9 +74,9 @@ fn partition(all: &mut [u32], first: impl Fn(u32) -> bool) -> usize {
     count
 }
 
-/// A palette of 256 numbers in ascending order, and the byte of each value: of its nearest entry.
+/// Returns a palette of 256 numbers in ascending order, and for each value the index of the nearest.
 pub(super) fn codebook(values: &[f32]) -> ([f32; 256], Vec<u8>) {
-    /// Rounds in which every entry moves to the mean of what is nearest to it.
+    /// Rounds in which every entry moves to the mean of its nearest values.
     const ROUNDS: usize = 8;
     let mut entries = palette(values, 1, 256).entries;
     entries.sort_by(f32::total_cmp);

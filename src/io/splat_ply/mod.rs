@@ -6,10 +6,10 @@
 //! [`GaussianCloud::extras`](crate::scene::GaussianCloud) and written back. Without `scale_2` they are the disks of 2D
 //! Gaussian Splatting; without `f_dc_0..2`, `red green blue` are the color, as nerfstudio writes them.
 //!
-//! A cloud whose origin is not zero keeps its full precision in a way that other programs ignore:
-//! a comment `fmlgs origin X Y Z` and properties `x_residual y_residual z_residual`, so that
-//! `world = x + x_residual` in double precision. For other programs it is exported relative to a place near it, which a
-//! comment `fmlgs shift X Y Z` says.
+//! A cloud whose origin is not zero keeps its full precision in a way that other programs ignore: a comment
+//! `fmlgs origin X Y Z` and properties `x_residual y_residual z_residual`, so that `world = x + x_residual`
+//! in double precision. Exports for other programs are relative to a nearby point, stated in a comment
+//! `fmlgs shift X Y Z`.
 
 mod read;
 mod stream;
@@ -25,7 +25,7 @@ pub(crate) use stream::{state, state_in};
 pub use write::{check, encode, write};
 pub(crate) use write::{encode_near_zero, may_be_extra};
 
-/// Properties that carry Gaussians, besides `f_rest_*`.
+/// Properties of Gaussians, besides `f_rest_*`.
 const STANDARD: [&str; 20] = [
     "x",
     "y",
@@ -52,10 +52,10 @@ const STANDARD: [&str; 20] = [
 /// Start of the comment that holds the cloud's origin.
 const ORIGIN: &str = "fmlgs origin ";
 
-/// Start of the comment that says to which state of a scene the file belongs.
+/// Start of the comment with the id of the scene's state.
 const STATE: &str = "fmlgs state ";
 
-/// Whether a property is one that this module writes itself.
+/// Returns whether a property is one that this module writes itself.
 fn is_standard(name: &str) -> bool {
     STANDARD.contains(&name) || name.strip_prefix("f_rest_").is_some_and(|k| k.bytes().all(|b| b.is_ascii_digit()))
 }

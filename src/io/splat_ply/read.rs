@@ -12,7 +12,7 @@ use crate::io::{IoError, compressed_ply, render_mode, shift, vertical};
 use crate::math::sh::coefficients;
 use crate::scene::{Bounds, ExtraProperty, GaussianCloud, SplatRenderMode};
 
-/// The Gaussians of a splat `.ply`'s bytes; `path` is for errors.
+/// Parses the Gaussians of a splat `.ply`; `path` is for errors.
 pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
     let ply = Ply::parse(bytes, path)?;
     if ply.element("chunk").is_some() {
@@ -24,12 +24,12 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
     finite(Reading { ply: &ply, table: &table }.cloud()?, path)
 }
 
-/// The cloud without Gaussians that are not finite.
+/// Removes Gaussians that are not finite.
 pub(super) fn finite(cloud: GaussianCloud, path: &Path) -> Result<GaussianCloud, IoError> {
     cloud.finite().map_err(|cause| IoError::Cloud { path: path.into(), cause })
 }
 
-/// Logarithm of the third standard deviation of 2D Gaussian Splatting's disks, which has none: as other viewers set it.
+/// Logarithm of the third standard deviation of 2D Gaussian Splatting's disks, which have none; as in other viewers.
 const FLAT: f32 = -13.815_511;
 
 pub(super) struct Reading<'a> {
@@ -38,7 +38,7 @@ pub(super) struct Reading<'a> {
 }
 
 impl Reading<'_> {
-    /// Whether any rows alone have the origin and the range of colors that all have.
+    /// Returns whether any block of rows alone has the origin and the color range of the whole file.
     pub(crate) fn is_told_by_any_row(&self) -> bool {
         let single = ["x", "y", "z"].iter().all(|n| self.table.column(n).is_some_and(|c| c.scalar != Scalar::F64));
         let one_origin = self.stated_origin().is_ok_and(|stated| stated.is_some() || single);
@@ -51,7 +51,7 @@ impl Reading<'_> {
         Ok(cloud)
     }
 
-    /// Adds the Gaussians of these rows to those of the rows before them.
+    /// Appends the Gaussians of these rows.
     pub(crate) fn append_to(&self, cloud: &mut GaussianCloud) -> Result<(), IoError> {
         let (degree, rest) = self.rest_columns()?;
         let (flat, scales) = self.scales()?;
@@ -68,7 +68,7 @@ impl Reading<'_> {
         Ok(())
     }
 
-    /// The columns of the scales, and whether they are of disks, which have two.
+    /// Returns true for disks, and the columns of the scales; disks have two.
     fn scales(&self) -> Result<(bool, [Option<&Column>; 3]), IoError> {
         match self.table.column("scale_2") {
             Some(_) => Ok((false, self.columns(["scale_0", "scale_1", "scale_2"])?.map(Some))),
@@ -87,14 +87,14 @@ impl Reading<'_> {
         })
     }
 
-    /// Adds what `N` columns hold.
+    /// Appends the values of `N` columns.
     fn values<const N: usize>(&self, columns: [&Column; N], to: &mut Vec<[f32; N]>) {
         let row = |i: usize| self.table.row(i);
         to.par_extend((0..self.table.rows).into_par_iter().map(|i| columns.map(|c| c.f32(row(i)))));
     }
 
-    /// Logits; infinite ones, which other programs make of opacities of 0 and 1, become large ones. Where there are none
-    /// but an alpha channel, that is the opacity.
+    /// Reads the logits; infinite ones, written by other programs for opacities of 0 and 1, are made finite. Without
+    /// them, an alpha channel is the opacity.
     fn opacities(&self, to: &mut Vec<f32>) -> Result<(), IoError> {
         let finite = |v: f32| if v.is_infinite() { logit(f32::from(v > 0.0)) } else { v };
         let rows = (0..self.table.rows).into_par_iter();
@@ -108,8 +108,8 @@ impl Reading<'_> {
         Ok(())
     }
 
-    /// Positions relative to an origin: the one that the file states, the middle of the scene
-    /// where the file stores doubles, else zero (single precision loses nothing there).
+    /// Reads positions relative to an origin: the stated one, the middle of the scene if the file stores doubles, else
+    /// zero (single precision loses nothing there).
     fn positions(&self, to: &mut Vec<[f32; 3]>) -> Result<DVec3, IoError> {
         let xyz = self.columns(["x", "y", "z"])?;
         let residual = self.table.all(["x_residual", "y_residual", "z_residual"]).ok();
@@ -141,7 +141,7 @@ impl Reading<'_> {
         shift::parsed(text).map(Some).ok_or_else(broken)
     }
 
-    /// Degree and columns of the higher harmonics, in file order.
+    /// Returns degree and columns of the higher harmonics, in file order.
     fn rest_columns(&self) -> Result<(u8, Vec<&Column>), IoError> {
         let columns: Vec<&Column> = (0..).map_while(|k| self.table.column(&format!("f_rest_{k}"))).collect();
         let named = self.table.columns.iter().filter(|c| c.name.starts_with("f_rest_")).count();
@@ -154,7 +154,7 @@ impl Reading<'_> {
         }
     }
 
-    /// Adds all harmonics: the constant ones by their columns, or by those of colors.
+    /// Appends all harmonics: the constant ones from their columns, or from colors.
     fn harmonics(&self, degree: u8, rest: &[&Column], to: &mut Vec<[f32; 3]>) -> Result<(), IoError> {
         let (before, dc) = (to.len(), self.table.all(["f_dc_0", "f_dc_1", "f_dc_2"]).ok());
         let colors = if dc.is_none() { Colors::of(self.table) } else { None };
@@ -174,7 +174,7 @@ impl Reading<'_> {
         Ok(())
     }
 
-    /// Adds `N` coefficients of each row. Known to the compiler, their number costs no division for each.
+    /// Appends `N` coefficients of each row. A compile-time `N` avoids a division per coefficient.
     fn coefficients<const N: usize>(&self, dc: Option<[&Column; 3]>, rest: &[&Column], to: &mut Vec<[f32; 3]>) {
         to.par_extend((0..self.table.rows * N).into_par_iter().map(|at| {
             let row = self.table.row(at / N);

@@ -1,4 +1,4 @@
-//! Splats read block by block, so that a file is never in memory as a whole beside its Gaussians.
+//! Splats read block by block, so that the whole file is never in memory beside its Gaussians.
 
 use std::borrow::Cow;
 use std::io::{Read, Seek, SeekFrom};
@@ -10,27 +10,27 @@ use crate::io::ply::{Encoding, Ply, Table};
 use crate::io::{IoError, files, memory};
 use crate::scene::GaussianCloud;
 
-/// Bytes in which the header must end.
+/// Most bytes of the header.
 const HEADER_BYTES: u64 = 64 << 10;
 /// Bytes of a block of rows, of which two are in memory at once.
 const BLOCK_BYTES: usize = 4 << 20;
 
-/// The id of the scene's state that a `.ply` belongs to, if it says.
+/// Reads the id of the scene's state that a `.ply` belongs to, if stated.
 pub(crate) fn state(path: &Path) -> Result<Option<String>, IoError> {
     Ok(state_in(&files::read_start(path, HEADER_BYTES)?, path))
 }
 
-/// The same of bytes that a file begins with.
+/// As [`state`], from the first bytes of a file.
 pub(crate) fn state_in(start: &[u8], path: &Path) -> Option<String> {
     let ply = Ply::parse(start, path).ok()?;
     ply.comments.iter().find_map(|c| c.strip_prefix(STATE)).map(str::to_owned)
 }
 
-/// The Gaussians of a little-endian `.ply` whose first element they are; `None` if it is another
-/// sort of file, which has to be read as a whole.
+/// Reads a little-endian `.ply` with the Gaussians as its first element; `None` for other files, which have to be read
+/// as a whole.
 pub(crate) fn read(path: &Path) -> Result<Option<GaussianCloud>, IoError> {
     let start = files::read_start(path, HEADER_BYTES)?;
-    // What is wrong with the header is told by reading the whole.
+    // Reading the whole file reports the errors of the header.
     let Ok(ply) = Ply::parse(&start, path) else { return Ok(None) };
     let Some((columns, stride)) = ply.first_rows("vertex") else { return Ok(None) };
     let rows = ply.elements.first().map_or(0, |e| e.count) as usize;
@@ -48,7 +48,7 @@ pub(crate) fn read(path: &Path) -> Result<Option<GaussianCloud>, IoError> {
     file.seek(SeekFrom::Start(header as u64)).map_err(failed)?;
     let mut cloud: Option<GaussianCloud> = None;
     let in_block = (BLOCK_BYTES / stride).max(1);
-    // One block is read while the one before becomes Gaussians.
+    // One block is read while the previous one is converted.
     let mut read = |first: usize, block: &mut Vec<u8>| {
         block.resize(in_block.min(rows.saturating_sub(first)) * stride, 0);
         file.read_exact(block).map_err(failed)

@@ -51,7 +51,7 @@ fn a_far_origin_survives_a_round_trip_and_others_read_world_positions() {
     let cloud = random_cloud(1000, 1, DVec3::new(1e6, -2e6 + 0.125, 3.7));
     let bytes = bytes(&cloud);
     assert!(parsed(&bytes).expect("parse") == cloud);
-    // A reader that knows nothing of the origin sees the world in single precision.
+    // A reader without support for the origin sees the world in single precision.
     let points = crate::io::points_ply::parse(&bytes, Path::new("cloud.ply")).expect("points");
     assert!((points[3].position - cloud.world_position(3)).abs().max_element() < 0.1);
 }
@@ -164,14 +164,14 @@ fn a_file_read_in_blocks_is_the_file_read_as_a_whole() {
     let whole = parse(&bytes, &path).expect("parsed");
     assert_eq!(stream::read(&path).expect("read"), Some(whole.clone()));
     assert_eq!((whole.len(), whole.origin), (cloud.len(), cloud.origin));
-    // What is wrong far behind is told with its own number.
+    // An error far behind is reported with the Gaussian's own number.
     let last = bytes.len() - bytes.len() / cloud.len() * 2;
     bytes[last..last + 8].copy_from_slice(&[0xff; 8]);
     std::fs::write(&path, &bytes).expect("written");
     let parts = [stream::read(&path).expect("read").expect("plain"), parse(&bytes, &path).expect("parsed")];
     assert!(parts[0] == parts[1] && parts[0].len() == 4_999, "{:?}", parts[0].warnings);
     assert!(parts[0].warnings.concat().contains("Gaussian 4998"), "{:?}", parts[0].warnings);
-    // One that is too short is left to the whole to tell.
+    // A file that is too short is left to the reader of whole files.
     std::fs::write(&path, &bytes[..bytes.len() - 1]).expect("written");
     assert_eq!(stream::read(&path).expect("not told here"), None);
 }

@@ -20,7 +20,7 @@ pub fn write(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     atomic::write(path, |w| encode(w, cloud, None))
 }
 
-/// Refuses a cloud that a `.ply` cannot hold; `path` is for the error.
+/// Refuses a cloud that a `.ply` cannot hold; `path` is for errors.
 pub fn check(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     cloud.validate().map_err(|cause| IoError::Cloud { path: path.into(), cause })?;
     if let Some(e) = cloud.extras.iter().find(|e| !may_be_extra(&e.name)) {
@@ -33,18 +33,18 @@ pub fn check(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     Ok(())
 }
 
-/// Whether an extra property may have this name: one that a PLY header can hold and that is not taken.
+/// Returns whether an extra property may have this name: valid in a PLY header, and not taken.
 pub(crate) fn may_be_extra(name: &str) -> bool {
     !name.is_empty() && name.bytes().all(|b| b.is_ascii_graphic()) && !is_standard(name)
 }
 
-/// The bytes of a splat `.ply` of a valid cloud, with the id of the scene's state that it belongs to.
+/// Writes the bytes of a splat `.ply` of a valid cloud, with the id of the scene's state that it belongs to.
 pub fn encode(out: &mut dyn Write, cloud: &GaussianCloud, state: Option<&str>) -> io::Result<()> {
     encode_told(out, cloud, state.map(|state| format!("{STATE}{state}")).as_slice(), &mut |_| Ok(()))
 }
 
-/// [`encode`] for other programs, that tells how far it is: a cloud far from zero is written near zero, with a comment
-/// that says where that is.
+/// As [`encode`], for other programs and with progress: a cloud far from zero is written near zero, with a comment that
+/// states the shift.
 pub(crate) fn encode_near_zero(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
     let (near, shift) = shift::near_zero(cloud);
     encode_told(out, &near, shift.map(shift::comment).as_slice(), told)

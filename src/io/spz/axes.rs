@@ -1,6 +1,6 @@
 //! Axes of SPZ files. The format documents right, up, back, and Niantic's apps, Spark, three.js and splat-transform 2
-//! write and read that; Niantic's converter, splat-transform 3 and earlier versions of this program keep the axes of
-//! the `.ply`. Nothing in the header tells them apart, so it is looked for what else does.
+//! write and read that. Niantic's converter, splat-transform 3 and earlier versions of this program keep the axes of
+//! the `.ply`. The header does not state the axes, so other marks of the writer decide.
 
 use glam::DVec3;
 
@@ -9,32 +9,32 @@ use crate::io::reader::Reader;
 use crate::io::shift;
 use crate::scene::Axes;
 
-/// The extension record that holds the axes, and the order of its numbers from 1 on (Adobe's).
+/// Extension record with the axes, and their numbering from 1 on (Adobe's).
 const COORDINATE_SYSTEM: u32 = 0xADBE_0003;
 const SYSTEMS: [&str; 16] =
     ["LDB", "RDB", "LUB", "RUB", "LDF", "RDF", "LUF", "RUF", "LFD", "RFD", "LFU", "RFU", "LBD", "RBD", "LBU", "RBU"];
 /// The operating system in gzip headers that this program writes, "unknown"; others name theirs.
 const UNKNOWN_SYSTEM: u8 = 255;
 
-/// What is known of the axes beforehand.
+/// Prior knowledge of the axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SpzAxes {
-    /// Nothing: they are what the file says, else those of the format, which is told.
+    /// None: the axes stated in the file, else those of the format, with a warning.
     Unknown,
-    /// Those of the format, unless a record says otherwise.
+    /// Axes of the format, unless a record says otherwise.
     Documented,
-    /// These.
+    /// These axes.
     Given(Axes),
 }
 
-/// What a file has besides its columns.
+/// Marks of a file's writer, besides its columns.
 #[derive(Default)]
 pub(super) struct AxisMarks {
     /// Records of extensions: type and bytes.
     pub(crate) records: Vec<(u32, Vec<u8>)>,
     /// Comment in the gzip header.
     pub(crate) comment: Option<Vec<u8>>,
-    /// Whether the gzip header is one that this program writes.
+    /// True if the gzip header has the form that this program writes.
     pub(crate) own_header: bool,
 }
 
@@ -50,7 +50,7 @@ impl AxisMarks {
         }
     }
 
-    /// Takes the records off the bytes that hold them; what does not follow the format ends them.
+    /// Reads the extension records; the first malformed one ends them.
     pub(super) fn with_records(mut self, flags: u8, bytes: &[u8]) -> Self {
         let mut rest = Reader::new(bytes, std::path::Path::new(""));
         while flags & EXTENSIONS != 0 && !rest.is_at_end() {
@@ -61,12 +61,12 @@ impl AxisMarks {
         self
     }
 
-    /// The axes that the file says, by a record or by what this program leaves; `farthest` is the largest coordinate,
-    /// in steps of `bits` behind the point.
+    /// Returns the axes by a record or by marks of this program; `farthest` is the largest coordinate, in steps of
+    /// `bits` fractional bits.
     fn said(&self, version: u32, bits: u8, farthest: i32) -> Option<Axes> {
         let record = self.records.iter().find(|(kind, _)| *kind == COORDINATE_SYSTEM);
         let number = record.and_then(|(_, body)| body.first_chunk::<4>()).map(|b| u32::from_le_bytes(*b) as usize);
-        // 0 is "unspecified", which Adobe's reader takes for the format's own.
+        // 0 is "unspecified", which Adobe's reader treats as the format's own.
         let system = number.map(|n| if n == 0 { 4 } else { n }).and_then(|n| SYSTEMS.get(n - 1));
         if let Some(axes) = system.and_then(|letters| letters.parse().ok()) {
             return Some(axes);
@@ -74,22 +74,23 @@ impl AxisMarks {
         if self.own_comment().is_some() {
             return Some(Axes::SPZ);
         }
-        // Before it turned them, this program alone used all the bits that fit: others have 12 behind the point.
+        // Only early versions of this program, which kept the scene's axes, used all the bits that fit: others have 12
+        // fractional bits.
         let all_bits = fraction(f64::from(farthest) / f64::from(bits).exp2()) == Some(bits);
         (version == 3 && self.own_header && self.comment.is_none() && all_bits).then_some(Axes::PLY)
     }
 
-    /// What follows the axes in a comment of this program.
+    /// Text after the axes in a comment of this program.
     fn own_comment(&self) -> Option<&str> {
         std::str::from_utf8(self.comment.as_deref()?).ok()?.strip_prefix(TURNED)
     }
 
-    /// What places are relative to, in the axes of the scene.
+    /// Shift that the positions are relative to, in the axes of the scene.
     pub(super) fn shift(&self) -> DVec3 {
         self.own_comment().and_then(|rest| shift::parsed(rest.strip_prefix(SHIFT)?)).unwrap_or_default()
     }
 
-    /// The axes to read by, and what is to be told of them and of records that are passed over.
+    /// Returns the axes to read with, and warnings about them and about skipped records.
     pub(super) fn decide(&self, known: SpzAxes, version: u32, bits: u8, farthest: i32) -> (Axes, Vec<String>) {
         let passed = |(kind, body): &(u32, Vec<u8>)| {
             let text = format!("the extension record {kind:#010x} of {} bytes is passed over", body.len());

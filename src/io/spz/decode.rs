@@ -1,4 +1,4 @@
-//! Columns of an SPZ file, unpacked, as Gaussians.
+//! Unpacked columns of an SPZ file, decoded to Gaussians.
 
 use std::path::Path;
 
@@ -13,13 +13,13 @@ use crate::io::quantized::{logit, unit_quaternion, unorm};
 use crate::math::sh::coefficients;
 use crate::scene::{GaussianCloud, SplatRenderMode};
 
-/// Most bands of harmonics that are kept.
+/// Highest degree of harmonics that is kept.
 const MOST_BANDS: u8 = 3;
-/// Of the flags: coarser Gaussians among the others, as Spark writes them.
+/// Flag: level of detail, coarser Gaussians among the others, as Spark writes them.
 const LEVELS: u8 = 0x80;
 
 impl SpzHeader {
-    /// The Gaussians in the scene's axes.
+    /// Decodes the Gaussians in the scene's axes.
     pub(super) fn cloud(
         &self,
         columns: &[Vec<u8>],
@@ -89,13 +89,14 @@ impl SpzHeader {
     }
 }
 
-/// Versions 1 and 2: x, y and z, w positive.
+/// Decodes versions 1 and 2: x, y and z; w is positive.
 fn first_three(bytes: [u8; 3]) -> [f32; 4] {
     let [x, y, z] = bytes.map(|byte| f32::from(byte) / 127.5 - 1.0);
     [(1.0 - (x * x + y * y + z * z)).max(0.0).sqrt(), x, y, z]
 }
 
-/// Versions 3 and 4: which of x, y, z, w is largest in 2 bits, a sign and 9 bits for each of the others.
+/// Decodes versions 3 and 4: the index of the largest of x, y, z, w in 2 bits, a sign and 9 bits for each of the
+/// others.
 fn smallest_three(packed: u32) -> [f32; 4] {
     let part = |shift: u32| {
         let size = (packed >> shift & 511) as f32 / COMPONENT_MOST * 0.5;

@@ -12,31 +12,31 @@ use crate::io::reader::Reader;
 use crate::io::{IoError, files, memory};
 use crate::scene::{Axes, GaussianCloud};
 
-/// Bytes of the header up to version 3, and of what version 4 adds.
+/// Bytes of the header up to version 3, and of the addition in version 4.
 const HEADER: usize = 16;
 const MORE_HEADER: usize = 16;
-/// How gzip starts.
+/// First bytes of a gzip stream.
 const GZIP: &[u8; 2] = &[0x1f, 0x8b];
-/// What is unpacked from a byte at most: gzip's own limit, which real files never come near.
+/// Most bytes unpacked from one byte: gzip's own limit, which real files never approach.
 const MAX_RATIO: u64 = 1032;
-/// More bits behind the point than a coordinate has bits.
+/// Most fractional bits of a coordinate: all of its bits.
 const MAX_FRACTION: u8 = 24;
 /// Highest degree of harmonics in a file.
 const MAX_DEGREE: u8 = 4;
-/// Bytes of extension records that are looked at, at the end of a gzip stream.
+/// Bytes of extension records that are read, at the end of a gzip stream.
 const MAX_RECORDS: u64 = 1 << 16;
 
-/// Whether the first bytes of a file are those of SPZ; others are packed by gzip too, but no splats.
+/// Returns whether the first bytes of a file may be SPZ; a gzip stream may also hold something else.
 pub(crate) fn is_spz(start: &[u8]) -> bool {
     start.starts_with(GZIP) || start.starts_with(MAGIC)
 }
 
-/// Reads a file, by these axes if they are given.
+/// Reads a file, with these axes if given.
 pub(crate) fn read(path: &Path, axes: Option<Axes>) -> Result<GaussianCloud, IoError> {
     parse_in(&files::read(path, u64::MAX)?, path, axes.map_or(SpzAxes::Unknown, SpzAxes::Given))
 }
 
-/// The Gaussians in the bytes of an SPZ file, in the scene's axes; `path` is for errors.
+/// Parses the Gaussians of an SPZ file, in the scene's axes; `path` is for errors.
 ///
 /// # Errors
 /// If it is of another version, is cut off, or claims more than it can hold.
@@ -44,7 +44,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
     parse_in(bytes, path, SpzAxes::Unknown)
 }
 
-/// The same where something is known of the axes.
+/// As [`parse`], with prior knowledge of the axes.
 pub(crate) fn parse_in(bytes: &[u8], path: &Path, known: SpzAxes) -> Result<GaussianCloud, IoError> {
     if bytes.starts_with(MAGIC) {
         let mut file = Reader::new(bytes, path);
@@ -83,10 +83,10 @@ pub(crate) fn parse_in(bytes: &[u8], path: &Path, known: SpzAxes) -> Result<Gaus
     header.cloud(&all, &marks, known, path)
 }
 
-/// What the columns are called in errors.
+/// Names of the columns in errors.
 const NAMES: [&str; 6] = ["positions", "opacities", "colors", "scales", "rotations", "harmonics"];
 
-/// The columns of a file of version 4; `toc` is where the sizes of its streams are.
+/// Unpacks the columns of a file of version 4; `toc` is the offset of the sizes of its streams.
 fn streams(
     header: &SpzHeader,
     per_gaussian: [usize; 6],
@@ -112,7 +112,7 @@ fn streams(
         }
         let stream = table.take(usize::try_from(packed).unwrap_or(usize::MAX), name)?;
         let mut decoder = FrameDecoder::new();
-        // A frame may ask for a window of any size before its content is seen.
+        // A frame may ask for a window of any size before its content is decoded.
         decoder.set_max_window_size((size as u64).max(1 << 20));
         let mut out = vec![0; size];
         match decoder.decode_all(stream, &mut out) {
@@ -125,14 +125,14 @@ fn streams(
     Ok(all)
 }
 
-/// What all versions say at first.
+/// Fields of the header common to all versions.
 pub(super) struct SpzHeader {
     pub(crate) version: u32,
     pub(crate) count: usize,
     pub(crate) degree: u8,
     pub(crate) fraction: u8,
     pub(crate) flags: u8,
-    /// In version 4.
+    /// Number of streams, in version 4.
     streams: u8,
 }
 
@@ -158,7 +158,7 @@ impl SpzHeader {
         Ok(Self { version, count: count as usize, degree, fraction, flags, streams })
     }
 
-    /// Bytes a Gaussian in each column, once it is known that a file of so many bytes may hold them.
+    /// Returns bytes per Gaussian in each column, after checking that a file of so many bytes may hold them.
     fn checked(&self, file_bytes: usize, path: &Path) -> Result<[usize; 6], IoError> {
         let columns = columns(self.version, self.degree);
         let each = columns.iter().sum::<usize>() as u64;

@@ -23,7 +23,7 @@ fn gzip(parts: &[&[u8]]) -> Vec<u8> {
     out.finish().expect("packed")
 }
 
-/// A Zstandard stream that holds `bytes` as they are.
+/// A Zstandard stream of uncompressed `bytes`.
 fn zstd(bytes: &[u8]) -> Vec<u8> {
     let size = (bytes.len() as u32).to_le_bytes();
     // One segment with its size in four bytes, and one raw block, the last.
@@ -31,7 +31,7 @@ fn zstd(bytes: &[u8]) -> Vec<u8> {
     [&[0x28, 0xb5, 0x2f, 0xfd, 0xa0][..], &size, &block[..3], bytes].concat()
 }
 
-/// A file of version 4 of these columns.
+/// A file of version 4 with these columns.
 fn version_4(head: &[u8], columns: &[&[u8]]) -> Vec<u8> {
     let streams: Vec<Vec<u8>> = columns.iter().map(|c| zstd(c)).collect();
     let mut out = [head, &32_u32.to_le_bytes(), &[0; 12]].concat();
@@ -46,7 +46,7 @@ fn parsed(bytes: &[u8]) -> Result<GaussianCloud, IoError> {
     parse(bytes, Path::new(P))
 }
 
-/// The numbers as they are in the file.
+/// Parses the numbers without a change of axes.
 fn raw(bytes: &[u8]) -> Result<GaussianCloud, IoError> {
     parse_in(bytes, Path::new(P), SpzAxes::Given(Axes::PLY))
 }
@@ -57,11 +57,11 @@ fn bytes(cloud: &GaussianCloud) -> Vec<u8> {
     out
 }
 
-/// x = 1, y = -1/256, z = -32768 with 8 bits behind the point.
+/// x = 1, y = -1/256, z = -32768 with 8 fractional bits.
 const POSITION: [u8; 9] = [0, 1, 0, 255, 255, 255, 0, 0, 128];
 /// Opacity 51/255, color, scales.
 const BYTES: [u8; 7] = [51, 255, 0, 128, 0, 160, 255];
-/// The largest is z; x is +1/2 of what it may be, y as much below zero, w 0.
+/// The largest is z; x is +1/2 of its maximum, y as much below zero, w 0.
 const ROTATION: u32 = 2 << 30 | 256 << 20 | (512 | 256) << 10;
 /// One band: -1, 0, 127/128.
 const HARMONICS: [u8; 9] = [0, 128, 255, 0, 128, 255, 0, 128, 255];
@@ -116,7 +116,7 @@ fn what_is_written_comes_back_as_near_as_its_bytes_are() {
         let back = parsed(&bytes(&cloud)).expect("valid");
         // Sixteen steps of 1/128 in the upper bands.
         test_clouds::assert_near(&back, &cloud, [1e-6, 0.032, 3e-6, 0.0021, 0.07]);
-        // What is packed already loses nothing more.
+        // A second pass of packing loses nothing more.
         test_clouds::assert_near(&parsed(&bytes(&back)).expect("again"), &back, [1e-6; 5]);
     }
 }
@@ -155,7 +155,7 @@ fn hostile_files_are_named() {
     assert!(matches!(refused(header(3, 2, [0; 4])), IoError::Truncated { .. }));
     assert!(matches!(refused(header(3, u32::MAX, [0; 4])), IoError::Count { .. }));
     assert!(matches!(refused(b"NGSQ000000000000".to_vec()), IoError::Syntax { .. }));
-    // Counts and sizes that do not fit one another.
+    // Counts and sizes that contradict one another.
     for (place, value) in [(8, 2_u8), (15, 6), (16, 255), (32, 255), (40, 10), (47, 255)] {
         let mut bad = four.clone();
         bad[place] = value;

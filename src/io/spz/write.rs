@@ -12,15 +12,15 @@ use crate::io::shift;
 use crate::scene::{Axes, GaussianCloud, SplatRenderMode};
 
 const VERSION: u32 = 3;
-/// Gaussians between two reports.
+/// Gaussians between two progress reports.
 const BLOCK: usize = 4096;
-/// Steps of harmonics of the first band, and of those above: as the reference packs them.
+/// Steps of harmonics of the first band, and of higher ones; as in the reference encoder.
 const HARMONIC_STEPS: [i32; 2] = [8, 16];
 
 /// Writes the bytes of an SPZ file of a valid cloud, in its order, in the axes of the format.
 ///
 /// # Errors
-/// If it reaches farther from zero than 24 bits do, or cannot be written.
+/// If the cloud exceeds the range of 24 bits, or cannot be written.
 pub(in crate::io) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
     let (near, shift) = shift::near_zero(cloud);
     let comment = shift.map_or_else(|| TURNED.to_owned(), |shift| format!("{TURNED}{SHIFT}{}", shift::text(shift)));
@@ -30,7 +30,7 @@ pub(in crate::io) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &m
     gzip.finish().map(drop)
 }
 
-/// What such a file holds before compression, the numbers as they are.
+/// Returns the uncompressed content of such a file, without a change of axes.
 pub(in crate::io) fn unpacked(cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<Vec<u8>> {
     let fraction = fraction(cloud)?;
     let steps = f64::from(fraction).exp2();
@@ -59,7 +59,7 @@ pub(in crate::io) fn unpacked(cloud: &GaussianCloud, told: &mut Told<'_>) -> io:
     Ok(head.into_iter().flatten().chain(all.into_iter().flatten()).collect())
 }
 
-/// The most bits behind the point with which every coordinate fits.
+/// Returns the most fractional bits with which every coordinate fits.
 fn fraction(cloud: &GaussianCloud) -> io::Result<u8> {
     let farthest = (0..cloud.len()).map(|i| cloud.world_position(i).abs().max_element()).fold(0.0, f64::max);
     super::fraction(farthest).ok_or_else(|| {
@@ -77,7 +77,7 @@ fn smallest_three([w, x, y, z]: [f32; 4]) -> u32 {
     rest.into_iter().fold(largest as u32, |packed, t| packed << 10 | part(t))
 }
 
-/// A harmonic in steps of so many of its byte, one of which is 0.
+/// Rounds a harmonic to a byte in multiples of `steps`.
 fn harmonic(value: f32, steps: i32) -> u8 {
     let byte = (value * HARMONIC_MIDDLE).round() as i32 + HARMONIC_MIDDLE as i32;
     (byte.saturating_add(steps / 2).div_euclid(steps) * steps).clamp(0, 255) as u8

@@ -7,13 +7,13 @@ use crate::io::photo_list::{ListedPhoto, photos};
 use crate::io::{IoError, files, lenses, points_ply};
 use crate::scene::{Dataset, Photo};
 
-/// Blender's synthetic scenes have no backdrop; the literature shows them on white.
+/// Background of Blender's synthetic scenes, which have none; the literature shows them on white.
 const WHITE: [f32; 3] = [1.0; 3];
-/// Lists of photos to hold out; the first that has photos is used.
+/// Lists of held-out photos; the first that has photos is used.
 const HELD_OUT: [&str; 2] = ["transforms_test.json", "transforms_val.json"];
 
-/// Reads a Blender dataset: photos of `transforms_train.json` to train on, those of
-/// `transforms_test.json` (or else of `transforms_val.json`) marked as test.
+/// Reads a Blender dataset: training photos of `transforms_train.json`; photos of `transforms_test.json` (or else of
+/// `transforms_val.json`) are marked as test.
 pub fn read_blender(root: &Path) -> Result<Dataset, IoError> {
     let mut warnings = Vec::new();
     let mut all = listed(root, "transforms_train.json", false, &mut warnings)?;
@@ -57,7 +57,7 @@ pub fn read_blender(root: &Path) -> Result<Dataset, IoError> {
     })
 }
 
-/// The photos of one list.
+/// Reads the photos of one list.
 fn listed(root: &Path, name: &str, test_split: bool, warnings: &mut Vec<String>) -> Result<Vec<Photo>, IoError> {
     let file = root.join(name);
     let parsed = File::read(&file)?;

@@ -1,4 +1,4 @@
-//! `transform_matrix`: world_from_camera with OpenGL's camera axes, as programs write it, numbers that are none included.
+//! `transform_matrix`: world_from_camera with OpenGL's camera axes, in the spellings of several programs, NaN included.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -10,12 +10,12 @@ use serde::de::{Deserializer, Error, Visitor};
 /// Rows of numbers.
 pub(super) type Matrix = Vec<Vec<Entry>>;
 
-/// Deviation of the last row from 0 0 0 1 that nobody needs to know.
+/// Deviation of the last row from 0 0 0 1 up to which no warning is needed.
 const ROUNDING: f64 = 1e-9;
-/// Largest deviation of the last row that is taken for an error of rounding.
+/// Largest deviation of the last row that counts as rounding.
 const LARGEST: f64 = 1e-3;
 
-/// A number of a matrix; NaN for what a program wrote in place of one.
+/// A number of a matrix; NaN if the program wrote none.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Entry(f64);
 
@@ -46,12 +46,12 @@ impl Visitor<'_> for Number {
         Ok(Entry(v as f64))
     }
 
-    /// JavaScript's way to write NaN.
+    /// NaN as JavaScript writes it, `null`.
     fn visit_unit<E: Error>(self) -> Result<Entry, E> {
         Ok(Entry(f64::NAN))
     }
 
-    /// Python's way, once it is [`quoted`].
+    /// NaN and infinity as Python writes them, once they are [`quoted`].
     fn visit_str<E: Error>(self, v: &str) -> Result<Entry, E> {
         match v {
             "NaN" => Ok(Entry(f64::NAN)),
@@ -62,7 +62,7 @@ impl Visitor<'_> for Number {
     }
 }
 
-/// JSON in which Python's NaN and Infinity, which are none, stand in quotes: a matrix may have them, nothing else.
+/// Quotes Python's NaN and Infinity, which are no JSON; a matrix may have them, nothing else.
 pub(super) fn quoted(json: &[u8]) -> Cow<'_, [u8]> {
     const WORDS: [&[u8]; 3] = [b"NaN", b"-Infinity", b"Infinity"];
     let word_at = |at: usize| WORDS.iter().find(|word| json[at..].starts_with(word));
@@ -94,8 +94,8 @@ pub(super) fn quoted(json: &[u8]) -> Cow<'_, [u8]> {
     Cow::Owned(out)
 }
 
-/// Axes (columns right, down, forward) and center of an OpenGL world_from_camera matrix, and whether its last row had to
-/// be made 0 0 0 1.
+/// Returns axes (columns right, down, forward) and center of an OpenGL world_from_camera matrix, and true if its last
+/// row had to be made 0 0 0 1.
 ///
 /// # Errors
 /// If it has another shape, or another last row.

@@ -189,7 +189,7 @@ fn coefficients_mean_what_the_camera_model_says() {
         f.read().expect("read").photos[0].distortion.expect("a lens")
     };
     let k1 = Distortion { k1: 0.1, ..Distortion::default() };
-    // nerfstudio's and Metashape's k4 is a power, OpenCV's a divisor, a fisheye's one of the angle.
+    // nerfstudio's and Metashape's k4 belongs to a power, OpenCV's to the divisor, a fisheye's to a power of the angle.
     assert_eq!(read(&[]), Distortion { more: [0.01, -0.02, 0.0, 0.0], ..k1 });
     let rational = Distortion { more: [0.01, 0.0, 0.0, 0.0], divisor: [-0.02, 0.0, 0.3], ..k1 };
     assert_eq!(read(&[("k6", json!(0.3))]), rational);

@@ -1,4 +1,4 @@
-//! What can go wrong with a video: every error names the file and the remedy.
+//! Errors of writing a video: each names the file and the remedy.
 
 use std::path::PathBuf;
 

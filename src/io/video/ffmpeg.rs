@@ -13,7 +13,7 @@ use crate::io::atomic::put;
 use crate::io::error::write_error;
 use crate::io::temporary::temporary_file;
 
-/// Lines of the program's error output that are kept.
+/// Lines of the program's error output that are kept for messages.
 const LAST_LINES: usize = 12;
 /// Longest line that is kept, in bytes.
 const LINE_BYTES: u64 = 2000;
@@ -30,7 +30,7 @@ pub(super) struct Ffmpeg {
 impl Ffmpeg {
     pub(super) fn create(path: &Path, settings: &VideoSettings, program: &Path, args: &[String]) -> Result<Self> {
         let extension = path.extension().map(|e| e.to_string_lossy().into_owned()).unwrap_or_default();
-        // The program chooses the format by the ending, so the temporary file has the same one.
+        // The program chooses the format by the ending, so the temporary file has the same ending.
         let draft = temporary_file(path, &extension).map_err(|cause| write_error(path, cause))?;
         let (width, height) = (settings.width_px, settings.height_px);
         let mut command = Command::new(program);
@@ -58,7 +58,7 @@ impl Ffmpeg {
         Ok(ffmpeg)
     }
 
-    /// Ends the input, waits for the program, and returns its status and last words.
+    /// Ends the input, waits for the program, and returns its status and the last lines of its error output.
     fn wait(&mut self) -> io::Result<(std::process::ExitStatus, String)> {
         drop(self.frames_in.take());
         let status = self.child.wait()?;
@@ -66,7 +66,7 @@ impl Ffmpeg {
         Ok((status, words))
     }
 
-    /// The error of a program that ended, or did not take a frame.
+    /// Makes the error of a program that ended, or did not take a frame.
     fn failed(&self, status: String, words: &str) -> VideoFileError {
         let last_words = if words.is_empty() { "(none)".into() } else { words.to_owned() };
         VideoFileError::ProgramFailed { path: self.path.clone(), program: self.program.clone(), status, last_words }
@@ -79,7 +79,7 @@ impl Sink for Ffmpeg {
             return Err(VideoFileError::Broken { path: self.path.clone() });
         };
         let Err(cause) = frames_in.write_all(rgb) else { return Ok(()) };
-        // The program closed the pipe; its own words say more than "broken pipe".
+        // The program closed the pipe; its own message says more than "broken pipe".
         match self.wait() {
             Ok((status, words)) => Err(self.failed(status.to_string(), &words)),
             Err(_) => Err(self.failed(cause.to_string(), "")),
@@ -107,15 +107,15 @@ impl Drop for Ffmpeg {
     fn drop(&mut self) {
         drop(self.frames_in.take());
         if self.draft.is_some() {
-            // Cancelled or failed. Both calls fail where the program has ended, which is as well.
+            // Canceled or failed. Both calls fail harmlessly if the program has ended.
             let _ = self.child.kill();
             let _ = self.child.wait();
         }
     }
 }
 
-/// Arguments that the usual containers get unless the person's own say otherwise: H.264 of the wanted
-/// quality that every player takes, its colors said.
+/// Default arguments for the usual containers, before the user's own: H.264 of the requested quality that every player
+/// supports, with its colors tagged.
 fn usual(extension: &str, settings: &VideoSettings) -> Vec<String> {
     if !["mp4", "m4v", "mov", "mkv"].contains(&extension.to_ascii_lowercase().as_str()) {
         return Vec::new();
@@ -135,7 +135,7 @@ fn usual(extension: &str, settings: &VideoSettings) -> Vec<String> {
     args.as_flattened().iter().map(|a| (*a).to_owned()).collect()
 }
 
-/// A path that is no option and no protocol.
+/// Makes a path that is not taken for an option or a protocol.
 fn output(path: &Path) -> std::ffi::OsString {
     let mut output = std::ffi::OsString::from("file:");
     output.push(path);

@@ -1,4 +1,4 @@
-//! The formats of videos and what each can hold.
+//! Formats of videos and their limits.
 
 use std::path::Path;
 
@@ -29,8 +29,8 @@ impl Format {
         }
     }
 
-    /// The format that a path names: by its ending, or [`Format::Frames`] for a folder that exists, a
-    /// path with `/` at its end, or one without an ending.
+    /// Returns the format of a path: by its ending, or [`Format::Frames`] for an existing folder, a path with `/` at
+    /// its end, or one without an ending.
     pub(crate) fn of(path: &Path) -> Result<Self> {
         let folder = path.is_dir() || path.as_os_str().to_string_lossy().ends_with(std::path::is_separator);
         if folder && path.file_name().is_some() {
@@ -49,12 +49,12 @@ impl Format {
     }
 
     pub(super) fn check(self, path: &Path, settings: &VideoSettings) -> Result<()> {
-        /// What H.264's level 5.2, and with it openh264, can hold along the longer and the shorter side.
+        /// Largest longer and shorter side in level 5.2 of H.264, and so in openh264.
         const MP4_PX: (u32, u32) = (3840, 2160);
         const MP4_LEAST_PX: u32 = 16;
-        /// The side of a WebP picture has 14 bits.
+        /// Largest side of a WebP picture, which has 14 bits.
         const WEBP_PX: u32 = 16_383;
-        /// Shorter delays than 20 ms are shown as 100 ms by most viewers.
+        /// Highest frame rate: delays below 20 ms are shown as 100 ms by most viewers.
         const GIF_FPS: f64 = 50.0;
         let (w, h, fps) = (settings.width_px, settings.height_px, settings.fps);
         let bad = |what, remedy| Err(VideoFileError::Setting { path: path.into(), what, remedy });

@@ -1,7 +1,7 @@
 //! PNG frames in a folder: `frame_00000.png`, `frame_00001.png` and so on.
 //!
-//! The frames are written into a temporary folder; at the end that folder is renamed, or, where the
-//! folder was there before, its files are moved. Other files in the folder are left alone.
+//! The frames are written into a temporary folder. At the end that folder is renamed, or its files are moved if the
+//! final folder existed before. Other files in the folder stay.
 
 use std::fs;
 use std::io::{self, Write};
@@ -17,7 +17,7 @@ use crate::io::temporary::{TemporaryFolder, temporary_folder};
 
 pub(super) struct Frames {
     folder: PathBuf,
-    /// Whether `folder` was there before.
+    /// True if `folder` existed before.
     existed: bool,
     draft: TemporaryFolder,
     size_px: (u32, u32),
@@ -60,7 +60,7 @@ impl Frames {
         for frame in 0..self.frames {
             fs::rename(self.draft.folder.path().join(name(frame)), self.folder.join(name(frame)))?;
         }
-        // Frames of a longer video before would follow this video's last one.
+        // Old frames of a longer video would follow this video's last one.
         for stale in before.iter().filter(|p| number(p).is_some_and(|n| n >= self.frames)) {
             fs::remove_file(stale)?;
         }
@@ -98,7 +98,7 @@ fn name(frame: u64) -> String {
     format!("frame_{frame:05}.png")
 }
 
-/// The frame that a file of [`name`] is.
+/// Returns the frame number in a file name made by [`name`].
 fn number(path: &Path) -> Option<u64> {
     let digits = path.file_name()?.to_str()?.strip_prefix("frame_")?.strip_suffix(".png")?;
     digits.parse().ok().filter(|n| path.file_name().is_some_and(|f| f.to_str() == Some(&name(*n))))

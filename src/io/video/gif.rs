@@ -33,13 +33,13 @@ impl Gif {
 
 impl Sink for Gif {
     fn push(&mut self, rgb: &[u8]) -> Result<()> {
-        // NeuQuant's step through the pixels: 1 looks at all of them, 30 at every thirtieth. It learns
-        // little from fewer than this many.
+        // NeuQuant's step through the pixels: 1 samples all of them, 30 every thirtieth. It learns little from fewer
+        // pixels than this.
         const ENOUGH: u64 = 50_000;
         let pixels = self.settings.frame_bytes() / 3;
         let coarsest = (pixels / ENOUGH).clamp(1, 30) as i32;
         let step = (1 + (100 - i32::from(self.settings.quality)) * 29 / 100).min(coarsest);
-        // A small picture is shown to it several times, one below the other.
+        // A small picture is repeated, one copy below the other.
         let (width, height) = self.side_px;
         let times = ENOUGH.div_ceil(pixels.max(1)).clamp(1, u64::from(u16::MAX / height.max(1))) as u16;
         let mut frame = Frame::from_rgb_speed(width, height * times, &rgb.repeat(usize::from(times)), step);

@@ -1,9 +1,9 @@
-//! Videos of pictures: MP4, GIF, WebP, or PNG frames in a folder; or whatever an ffmpeg program writes.
+//! Videos: MP4, GIF, WebP, or PNG frames in a folder, and any format of an ffmpeg program.
 //!
-//! Frames go through one at a time and are not kept. What is written lies in a temporary place and
-//! appears under its name when [`VideoWriter::finish`] succeeds; a writer that is dropped before
-//! leaves nothing behind. Two formats keep more than a frame in memory: WebP all *compressed* frames
-//! (its container begins with the whole size), MP4 about 16 bytes per frame for its index.
+//! Frames are encoded one at a time and not kept. The output is written to a temporary place and gets its name when
+//! [`VideoWriter::finish`] succeeds; a writer that is dropped before leaves nothing behind. Two formats keep more than
+//! a frame in memory: WebP all *compressed* frames (its container begins with the total size), MP4 about 16 bytes per
+//! frame for its index.
 
 mod error;
 mod ffmpeg;
@@ -27,14 +27,13 @@ pub(crate) type Result<T> = std::result::Result<T, VideoFileError>;
 pub(crate) struct VideoSummary {
     /// The file, or the folder of PNG frames.
     pub(crate) path: PathBuf,
-    /// Its format; `None` where ffmpeg chose it by the file's name.
+    /// Its format; `None` if ffmpeg chose it by the file's name.
     pub(crate) format: Option<Format>,
     pub(crate) frames: u64,
     pub(crate) bytes: u64,
     /// Playing time in seconds.
     pub(crate) secs: f64,
-    /// Width and height of the video in px: those of the frames, less a last column or row of odd
-    /// number where the format (MP4) has even sides only.
+    /// Width and height of the video in px: those of the frames, rounded down to even numbers in MP4.
     pub(crate) size_px: (u32, u32),
 }
 
@@ -48,18 +47,21 @@ pub(crate) struct VideoWriter {
     sink: Option<Box<dyn Sink>>,
 }
 
-/// Where the frames of one format go. Dropped without `finish`, it removes what it wrote.
+/// Encoder of one format. Dropped without `finish`, it removes its output.
 trait Sink: Send {
     /// Takes the next frame: sRGB, `width * height * 3` bytes.
     fn push(&mut self, rgb: &[u8]) -> Result<()>;
-    /// Completes the video, puts it in its place and returns its bytes.
+    /// Completes the video, puts it in its place and returns its size in bytes.
     fn finish(self: Box<Self>) -> Result<u64>;
 }
 
 impl VideoWriter {
-    /// Starts a video at `path`, in the format that the path's ending names (see [`Format::of`]);
-    /// with [`VideoEncoder::Ffmpeg`] any ending that the program knows.
-    /// a file that exists (unless [`VideoSettings::overwrite`]), a folder that cannot be written to, a
+    /// Starts a video at `path`, in the format of the path's ending (see [`Format::of`]); with [`VideoEncoder::Ffmpeg`]
+    /// any ending that the program knows.
+    ///
+    /// # Errors
+    /// [`VideoFileError`]: an ending that no format has, a size or rate that the format cannot hold, a file that exists
+    /// (unless [`VideoSettings::overwrite`]), a folder that cannot be written to, a program that is missing.
     pub(crate) fn create(path: &Path, settings: &VideoSettings) -> Result<Self> {
         settings.check(path)?;
         let (format, sink): (_, Box<dyn Sink>) = match &settings.encoder {

@@ -1,7 +1,7 @@
 //! H.264 (Baseline, constant quantizer) in MP4.
 //!
-//! The stream says its colors: BT.709 primaries and matrix, sRGB's transfer curve, limited range.
-//! Sides are even: a last odd column or row is left out.
+//! The stream states its colors: BT.709 primaries and matrix, sRGB's transfer curve, limited range. Sides are even: a
+//! last odd column or row is left out.
 
 use std::io::{Seek, SeekFrom, Write};
 use std::num::NonZeroU32;
@@ -32,7 +32,7 @@ pub(super) struct Mp4 {
     encoder: Encoder,
     muxer: Mp4FileMuxer,
     draft: Draft,
-    /// Where the next frame goes in the file.
+    /// Position of the next frame in the file.
     position: u64,
     /// Ticks per second and per frame.
     ticks: (NonZeroU32, u32),
@@ -109,8 +109,8 @@ impl Sink for Mp4 {
     }
 }
 
-/// A frame as MP4 stores it: each unit after its length in 4 bytes, without the parameters, which the file's
-/// head has.
+/// Converts a frame to MP4's form: each unit after its length in 4 bytes, without the parameter sets, which are in the
+/// file's header.
 fn picture(stream: &[u8]) -> std::result::Result<Vec<u8>, shiguredo_mp4::Error> {
     let mut frame = Vec::with_capacity(stream.len());
     for unit in parse_annexb_nal_units(stream)? {
@@ -131,7 +131,7 @@ fn config(settings: &VideoSettings) -> EncoderConfig {
     let quantizer = settings.quantizer();
     EncoderConfig::new()
         .usage_type(UsageType::CameraVideoRealTime)
-        // The mode that never leaves a frame out; with one quantizer there is nothing to control.
+        // Of the modes, the one that never drops a frame; the quantizer is fixed anyway.
         .rate_control_mode(RateControlMode::Bufferbased)
         .qp(QpRange::new(quantizer, quantizer))
         .skip_frames(false)
@@ -140,13 +140,13 @@ fn config(settings: &VideoSettings) -> EncoderConfig {
         .scene_change_detect(false)
         .max_frame_rate(FrameRate::from_hz(rate))
         .bitrate(BitRate::from_bps(bits))
-        // A whole frame every two seconds, where players can jump to.
+        // A key frame every two seconds, to which players can seek.
         .intra_frame_period(IntraFramePeriod::from_num_frames((2.0 * settings.fps).ceil() as u32))
         .vui(VuiConfig::bt709().transfer_characteristics(TransferCharacteristics::Srgb))
 }
 
-/// Ticks per second and per frame that give the rate: to a thousandth, or exactly for television's
-/// rates (24, 30, 60 less a thousandth part).
+/// Returns ticks per second and per frame of the rate: to a thousandth, or exactly for television's rates (24, 30, 60
+/// less a thousandth part).
 fn ticks(fps: f64) -> (NonZeroU32, u32) {
     let whole = fps.round();
     let television = (fps * 1.001 - whole).abs() < 1e-3 * fps.min(1.0) && (fps - whole).abs() > 1e-6;

@@ -1,4 +1,4 @@
-//! How a video is written.
+//! Settings of a video.
 
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ pub(crate) struct VideoSettings {
     pub(crate) fps: f64,
     /// From 0 (smallest file) to 100 (best picture).
     pub(crate) quality: u8,
-    /// Whether a video or frames of the same name may be replaced.
+    /// True if a video or frames of the same name may be replaced.
     pub(crate) overwrite: bool,
     pub(crate) encoder: VideoEncoder,
 }
@@ -25,18 +25,18 @@ pub(crate) enum VideoEncoder {
     Ffmpeg {
         /// The program: `ffmpeg`, or a path to it.
         program: PathBuf,
-        /// Arguments for the output, after the program's own and so above them.
+        /// Arguments for the output, after the program's own, so that they take precedence.
         args: Vec<String>,
     },
 }
 
 impl VideoSettings {
-    /// A video of this size and rate: quality 80, built-in encoder, nothing is overwritten.
+    /// Makes settings for a video of this size and rate: quality 80, built-in encoder, nothing is overwritten.
     pub(crate) fn new(width_px: u32, height_px: u32, fps: f64) -> Self {
         Self { width_px, height_px, fps, quality: 80, overwrite: false, encoder: VideoEncoder::BuiltIn }
     }
 
-    /// Refuses what no format can hold.
+    /// Refuses settings that no format supports.
     pub(super) fn check(&self, path: &Path) -> Result<()> {
         /// Lowest and highest frames per second.
         const FPS: std::ops::RangeInclusive<f64> = 0.01..=240.0;
@@ -56,7 +56,7 @@ impl VideoSettings {
         Ok(())
     }
 
-    /// Refuses a path that is taken, unless it may be overwritten.
+    /// Refuses an existing path, unless it may be overwritten.
     pub(super) fn check_free(&self, path: &Path) -> Result<()> {
         if !self.overwrite && path.symlink_metadata().is_ok() {
             return Err(VideoFileError::Exists { path: path.into() });
@@ -68,12 +68,12 @@ impl VideoSettings {
         u64::from(self.width_px) * u64::from(self.height_px) * 3
     }
 
-    /// Frames of a day, the longest video; every time in it fits the formats' numbers.
+    /// Most frames, those of a day, so that every time fits the formats' numbers.
     pub(super) fn most_frames(&self) -> u64 {
         (86_400.0 * self.fps).max(1.0) as u64
     }
 
-    /// When frame `frame` begins, in parts of a second, to the nearest part: errors do not add up.
+    /// Start of frame `frame`, in parts of a second, rounded once so that errors do not add up.
     pub(super) fn time(&self, frame: u64, parts_per_sec: f64) -> u64 {
         (frame as f64 * parts_per_sec / self.fps).round() as u64
     }

@@ -21,10 +21,10 @@ pub(super) struct WebP {
     encoder: Option<(Sender<Message>, JoinHandle<Film>)>,
 }
 
-/// The file, or why there is none.
+/// Bytes of the file, or the error.
 type Film = std::result::Result<Vec<u8>, Error>;
 
-/// What the encoder's thread is told. Without an end, it throws everything away.
+/// Messages to the encoder's thread. Without [`Message::End`], the video is discarded.
 enum Message {
     Frame(Vec<u8>),
     End,
@@ -63,7 +63,7 @@ impl Sink for WebP {
 
     fn finish(mut self: Box<Self>) -> Result<u64> {
         if let Some((to_encoder, _)) = &self.encoder {
-            // A thread that has failed does not listen; its result says why.
+            // A failed thread does not receive; its result has the error.
             let _ = to_encoder.send(Message::End);
         }
         let film = self.result()?;
@@ -77,7 +77,7 @@ impl Sink for WebP {
 fn encode(settings: &VideoSettings, inbox: &Receiver<Message>) -> Film {
     let encoding_type = if settings.quality == 100 { EncodingType::Lossless } else { EncodingType::new_lossy() };
     let options = EncoderOptions {
-        // Every frame whole: in a flight nothing stays the same from frame to frame.
+        // Every frame is a key frame: in a camera flight no part stays the same between frames.
         kmin: 0,
         kmax: 1,
         color_mode: ColorMode::Rgb,
@@ -98,6 +98,6 @@ fn encode(settings: &VideoSettings, inbox: &Receiver<Message>) -> Film {
         }
         frames += 1;
     }
-    // Cancelled: nobody waits for the result.
+    // Canceled: the result is not used.
     Ok(Vec::new())
 }

@@ -19,10 +19,10 @@ impl YuvPlanes {
         Self { width, height, y: vec![16; width * height], u: color.clone(), v: color }
     }
 
-    /// Takes over the picture `rgb` with `row_px` pixels a row, as much of it as the planes hold.
+    /// Converts the picture `rgb` with `row_px` pixels a row, cropped to the planes.
     ///
-    /// A color sample lies on the left column of its four pixels, halfway between their rows (where
-    /// H.264 has it unless told otherwise), so the columns weigh 1 : 2 : 1 about it.
+    /// A color sample lies on the left column of its four pixels, halfway between their rows (H.264's default), so the
+    /// columns weigh 1 : 2 : 1 about it.
     pub(super) fn fill(&mut self, rgb: &[u8], row_px: usize) {
         let color_row = self.width / 2;
         let pixel = |row: usize, column: usize| {

@@ -1,8 +1,8 @@
-//! COLMAP's camera models against what pycolmap 4.2.1 says (`Camera.img_from_cam`).
+//! COLMAP's camera models compared with pycolmap 4.2.1 (`Camera.img_from_cam`).
 
 use super::*;
 
-/// A model, its parameters, and where the rays (0.3, -0.2, 1), (-0.7, 0.5, 1) and (1.1, 0.9, 1) are seen, px.
+/// A model, its parameters, and the projections of the rays (0.3, -0.2, 1), (-0.7, 0.5, 1) and (1.1, 0.9, 1), px.
 type Reference = (&'static str, &'static [f64], [[f64; 2]; 3]);
 
 const RAYS: [[f64; 2]; 3] = [[0.3, -0.2], [-0.7, 0.5], [1.1, 0.9]];
@@ -157,7 +157,7 @@ fn every_model_sees_rays_where_pycolmap_sees_them() {
         }
         assert!(lens.distortion.reach() > 1.5, "{name} reaches {}", lens.distortion.reach());
     }
-    // The control: another coefficient is seen.
+    // Control: another coefficient changes the projection.
     let (name, params, places) = REFERENCES[4];
     let other = Distortion { k1: params[4] + 1e-6, ..read(name, params).distortion };
     let off = other.bend(RAYS[2].into()) * DVec2::new(200.0, 205.0) + DVec2::new(321.0, 239.0);

@@ -1,4 +1,4 @@
-//! glTF files that are packed, by Draco and by meshoptimizer.
+//! glTF files packed by Draco and by meshoptimizer.
 
 use serde_json::{Value, json};
 
@@ -44,7 +44,7 @@ fn a_mesh_of_dracos_is_unpacked() {
     let scene = scene(&root, &bin).expect("read");
     let mesh = &scene.meshes[0].primitives[0];
     assert_eq!((mesh.positions.len(), mesh.triangles.len(), mesh.normals.len()), (5, 3, 5));
-    // As what went in, in whatever order: a vertex by its place has its texture coordinates and color.
+    // As before packing, in any order: a vertex with this position has this texture coordinate and color.
     for (place, uv, color) in [
         ([0.0, 0.0, 0.0], [0.0, 0.0], [255.0, 0.0, 0.0]),
         ([1.0, 0.0, 0.0], [1.0, 0.0], [0.0, 255.0, 0.0]),
@@ -85,7 +85,7 @@ fn a_broken_mesh_of_dracos_is_named() {
     let mut more = root;
     more["meshes"][0]["primitives"][0]["extensions"]["KHR_draco_mesh_compression"]["attributes"] =
         json!({ "POSITION": 77 });
-    // What is not in it is read as the accessor says, which has no bytes: nothing, and no crash.
+    // An attribute that is not in it is read by its accessor, which has no bytes: nothing, and no crash.
     let _ = scene(&more, &bin);
 }
 

@@ -34,10 +34,10 @@ fn a_category_and_a_group_are_one_thing() {
     let (found, notes) = regions(&[("a.json", file("a.png", &cups))], "a.png");
     assert_eq!(found, [("cup".into(), 2 * 4 * 4), ("cup".into(), 4 * 4)]);
     assert!(notes.is_empty(), "{notes:?}");
-    // lerf_ovs numbers polygons, and a category is one thing.
+    // lerf_ovs numbers polygons, and a category is one region.
     let lerf = file("a.png", &cups).replace("\"description\":\"ISAT\",", "").replace("\"folder\":\"\",", "");
     assert_eq!(regions(&[("a.json", lerf)], "a.png").0, [("cup".into(), 3 * 4 * 4)]);
-    // Without groups a category is one thing; texts are groups too; one group may hold two categories.
+    // Without groups a category is one region; groups may be strings; one group may hold two categories.
     let none = serde_json::Value::Null;
     let (found, _) = regions(
         &[(

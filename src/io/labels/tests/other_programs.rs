@@ -1,4 +1,4 @@
-//! Labels of LabelMe, COCO and YOLO, told apart by what they hold.
+//! Labels of LabelMe, COCO and YOLO, recognized by their content.
 
 use serde_json::{Value, json};
 
@@ -121,7 +121,7 @@ fn coco_annotations_are_things_of_their_own() {
     assert_eq!(set.regions("a.png"), named(&[("cup", 32), ("cup", 16), ("plate", 40), ("plate", 40)]));
     let labels = set.labels();
     assert!(!labels.has(&photo("b.png", 20, 10)), "nothing is said about it");
-    // "object" without 'parent' is another program's word.
+    // "object" without 'parent' is another program's term.
     assert!(labels.of(&photo("a.png", 20, 10), 4096).expect("regions").iter().all(|r| r.level.is_none()));
     let notes = labels.notes().join("; ");
     for words in [
@@ -173,7 +173,7 @@ fn yolo_polygons_are_shares_of_the_photo() {
         notes.contains("1 boxes") && notes.contains("1 of 2 labeled pictures") && notes.contains("c.txt"),
         "{notes}"
     );
-    // Without names they are nameless, and that is told.
+    // Without names they are unnamed, and a note says so.
     let bare = Set::new(&files[..1]);
     assert_eq!(bare.regions("a.png"), named(&[("", 16), ("", 20)]));
     assert!(bare.labels().notes().iter().any(|note| note.contains("no names of classes")));
@@ -193,7 +193,7 @@ fn kinds_are_told_by_what_they_hold_and_may_lie_together() {
     ]);
     assert_eq!(set.regions("a.png"), named(&[("cup", 16)]));
     assert_eq!(set.regions("b.png").len(), 3);
-    // Boxes alone are no labels, and that is said.
+    // Boxes alone are no labels, and the error says so.
     let boxes = Set::new(&[("a.txt", "0 0.5 0.5 0.2 0.2\n".into())]).fails();
     assert!(boxes.contains("holds no labels (1 boxes"), "{boxes}");
     let hostile = coco(&json!([{ "image_id": 3, "segmentation": [[0, 0, 1e300, 5, 3, "x"]] }]), &json!([]));

@@ -14,7 +14,7 @@ use super::super::Format;
 pub(crate) struct Decoded {
     pub(crate) size_px: (u32, u32),
     pub(crate) frames: Vec<Vec<u8>>,
-    /// Playing time, where the format has times.
+    /// Playing time, if the format stores times.
     pub(crate) secs: Option<f64>,
     pub(crate) bytes: u64,
 }
@@ -117,7 +117,7 @@ fn mp4(bytes: &[u8]) -> Decoded {
     Decoded { size_px, frames, secs, bytes: bytes.len() as u64 }
 }
 
-/// The parameter sets of an `avcC` box as a stream, and what they say about colors.
+/// Returns the parameter sets of an `avcC` box as a stream, and a summary of their colors.
 fn parameters(avcc: &[u8]) -> (Vec<u8>, String) {
     assert_eq!((avcc[0], avcc[4] & 3), (1, 3), "version 1, lengths of 4 bytes");
     let (mut at, mut stream, mut vui) = (5, Vec::new(), String::new());
@@ -149,14 +149,14 @@ impl Bits<'_> {
         })
     }
 
-    /// An Exp-Golomb number.
+    /// Reads an Exp-Golomb number.
     fn number(&mut self) -> u32 {
         let zeros = (0..).take_while(|_| self.bits(1) == 0).count();
         (1 << zeros) - 1 + self.bits(zeros)
     }
 }
 
-/// What a sequence parameter set of the Baseline profile (H.264, 7.3.2.1.1 and E.1.1) says of colors.
+/// Summarizes the colors in a sequence parameter set of the Baseline profile (H.264, 7.3.2.1.1 and E.1.1).
 fn colors(unit: &[u8]) -> String {
     let raw: Vec<u8> =
         (0..unit.len()).filter(|i| !(*i >= 2 && unit[i - 2..=*i] == [0, 0, 3])).map(|i| unit[i]).collect();
@@ -194,7 +194,7 @@ fn colors(unit: &[u8]) -> String {
     format!("{range} range, primaries {}, transfer {}, matrix {}", b.bits(8), b.bits(8), b.bits(8))
 }
 
-/// RGB of BT.709's limited range; color samples lie on even columns, between rows.
+/// Converts from BT.709's limited range; color samples lie on even columns, between rows.
 fn rgb(yuv: &openh264::decoder::DecodedYUV) -> Vec<u8> {
     let (width, height) = yuv.dimensions();
     let (y_row, u_row, v_row) = yuv.strides();

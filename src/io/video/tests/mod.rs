@@ -1,4 +1,4 @@
-//! Videos written, then read by decoders that know nothing of the writer.
+//! Videos written, then decoded independently of the writer.
 
 mod decode;
 mod refusals;
@@ -27,7 +27,7 @@ fn picture(t: u64, (width, height): (u32, u32)) -> Vec<u8> {
     rgb
 }
 
-/// Writes the test video and returns what was said of it.
+/// Writes the test video and returns its summary.
 fn film(path: &Path, settings: &VideoSettings) -> VideoSummary {
     let mut writer = VideoWriter::create(path, settings).expect("create");
     for t in 0..FRAMES {
@@ -48,7 +48,7 @@ fn psnr(a: &[u8], b: &[u8]) -> f64 {
     10.0 * (255.0_f64.powi(2) * a.len() as f64 / squares.max(1e-9)).log10()
 }
 
-/// The worst frame, each compared with the one `shift` further on.
+/// Lowest PSNR of a frame, each compared with the one `shift` further on.
 fn worst_psnr(film: &Decoded, shift: u64) -> f64 {
     let frames = film.frames.len() as u64;
     let of = |(t, frame): (usize, &Vec<u8>)| psnr(frame, &picture((t as u64 + shift) % frames, film.size_px));
@@ -124,7 +124,7 @@ fn an_odd_last_column_and_row_are_left_out_of_mp4_only() {
         assert_eq!(film(&path, &odd).size_px, size, "{name}");
         let film = decode(&path, format);
         assert_eq!(film.size_px, size, "{name}");
-        // The pattern depends on the place only, so the cropped picture is a smaller one's.
+        // The pattern depends on the position only, so the cropped picture equals a smaller one.
         assert!(worst_psnr(&film, 0) > 28.0, "{name}: {}", worst_psnr(&film, 0));
     }
 }

@@ -1,4 +1,4 @@
-//! What cannot be written is refused by name, and leaves nothing behind.
+//! Refused videos: errors name the reason, and nothing is left behind.
 
 use std::fs;
 use std::path::Path;
@@ -98,7 +98,7 @@ fn a_folder_of_frames_keeps_other_files() {
     let first = image::open(frames.join("frame_00000.png")).expect("open").into_rgb8();
     assert_eq!(first.into_raw(), picture(3, SIZE));
 
-    // Frames that appear while a video is made are not lost.
+    // Frames that another program writes meanwhile are not lost.
     let other = folder.path().join("other");
     fs::create_dir(&other).expect("create");
     let mut writer = VideoWriter::create(&other, &settings()).expect("create");
@@ -168,7 +168,7 @@ fn a_missing_program_is_named() {
     assert_eq!(entries(folder.path()), [""; 0]);
 }
 
-/// A shell script in ffmpeg's place; its last argument is `file:` and the output.
+/// Writes a shell script in ffmpeg's place; its last argument is `file:` and the output.
 #[cfg(unix)]
 fn script(folder: &Path, body: &str) -> std::path::PathBuf {
     use std::os::unix::fs::PermissionsExt;
@@ -197,7 +197,7 @@ fn a_program_gets_every_frame_and_its_words_are_passed_on() {
     assert!(places.is_sorted(), "{args}");
     assert!(refused(&path, &with_program(&copies, &[])).contains("exists"));
 
-    // It complains at length and gives up while frames are coming.
+    // The script writes long errors and exits while frames are sent.
     let fails =
         script(folder.path(), "for i in $(seq 50); do echo \"line $i\" >&2; done; head -c 100 >/dev/null; exit 3");
     let failure = |path: &Path, settings: &VideoSettings| {
@@ -215,7 +215,7 @@ fn a_program_gets_every_frame_and_its_words_are_passed_on() {
     assert!(text.contains("b.mp4") && text.contains("exit status: 3"), "{text}");
     assert!(text.contains("line 50") && text.contains("line 39") && !text.contains("line 38\n"), "{text}");
 
-    // It takes everything and fails at the end, or ends well without a video.
+    // The script takes all input and fails at the end, or succeeds without a video.
     let late = script(folder.path(), "cat >/dev/null; echo 'disk is gone' >&2; exit 1");
     assert!(failure(&films.join("b.mp4"), &with_program(&late, &[])).contains("disk is gone"));
     let idle = script(folder.path(), "cat >/dev/null");
@@ -247,7 +247,7 @@ fn a_program_does_not_outlive_a_film_that_is_dropped() {
     assert_eq!(entries(folder.path()), ["program", "program.pid"]);
 }
 
-/// Through a real ffmpeg, where there is one.
+/// Writes a video with a real ffmpeg, if there is one.
 #[test]
 fn a_real_ffmpeg_writes_what_was_pushed() {
     let ffmpeg = Path::new("ffmpeg");
