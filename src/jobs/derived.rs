@@ -74,7 +74,7 @@ fn drawn_as(from: &Scene) -> Result<serde_json::Value, JobError> {
 }
 
 /// Stores Gaussians that were derived from `from`, with their objects and parts, as the scene `name` in the folder
-/// `out`. True `edited`: photos show the scene as it was before. Returns the id of its state.
+/// `out`. `edited` marks that photos show the scene as it was before. Returns the id of its state.
 pub(crate) fn store(
     from: &Scene,
     (name, edited): (String, bool),

@@ -23,7 +23,7 @@ const OWN: &str = "2:";
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BatchUnit {
-    /// Index of its scene in the file, as `setting` is of its settings.
+    /// Indices in the file of its scene and of its settings.
     pub(super) scene: usize,
     pub(super) setting: usize,
     pub(super) seed: u64,
