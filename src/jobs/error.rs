@@ -82,7 +82,7 @@ pub enum JobError {
         program: PathBuf,
         /// Its task.
         doing: &'static str,
-        /// Its exit status.
+        /// Reason of its failure.
         why: String,
         /// Its last output.
         said: String,

@@ -50,7 +50,7 @@ pub(crate) enum ProtocolSummary {
         accuracy: f64,
     },
     Ovs3d {
-        /// Mean IoU if every pixel has the best class.
+        /// Mean IoU if every pixel is assigned to its best class.
         argmax_miou: f64,
         #[serde(skip)]
         classes: usize,

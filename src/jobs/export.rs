@@ -23,7 +23,7 @@ pub(crate) fn ply(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     SplatFormat::Ply.write(path, cloud, &mut |_| Ok(()))
 }
 
-/// Returns the Gaussians that a crop box keeps.
+/// Returns the Gaussians that a crop box keeps; an error if it keeps none.
 pub(crate) fn cropped(cloud: &GaussianCloud, crop: &CropBox) -> Result<GaussianCloud, JobError> {
     let kept = crop.crop(cloud);
     if kept.is_empty() { Err(JobError::NoGaussians) } else { Ok(kept) }

@@ -28,13 +28,13 @@ pub struct ViewMaps {
     pub identities: ViewMap,
     /// Blended codes, if they were requested.
     pub(crate) codes: Option<CodeMap>,
-    /// Pixels dominated by unseen Gaussians, which nothing is known of; everything else treats them as unlabeled.
+    /// Pixels dominated by unknown Gaussians: no mask or photo tells about them. All else treats them as unlabeled.
     pub(crate) unknown: Mask,
     /// Pixels dominated by Gaussians that were invented to close a surface; empty if there are none.
     pub(crate) invented: Mask,
 }
 
-/// Stands for unseen Gaussians while a view is drawn. No identity has this number, so they count together with
+/// Stands for unknown Gaussians while a view is drawn. No identity has this number, so they count together with
 /// unlabeled ones, and masks are the same with them or without.
 const UNSEEN: IdentityId = UNKNOWN - 1;
 
@@ -67,7 +67,7 @@ impl ViewMaps {
         self.invented.area() as f64 / self.identities.identity.len().max(1) as f64
     }
 
-    /// Share of the view dominated by unseen Gaussians.
+    /// Share of the view dominated by unknown Gaussians.
     pub(crate) fn unknown_share(&self) -> f64 {
         self.unknown.area() as f64 / self.identities.identity.len().max(1) as f64
     }
@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn what_nothing_is_known_of_is_nobodys_and_told_apart() {
-        // A row of four: one of an object, one unlabeled by masks, one unseen, and a guess at the object.
+        // A row of four: one of an object, one unlabeled by masks, one unknown, and a guess at the object.
         let at = |x: f32| [x, 0.0, 0.0];
         let cloud = GaussianCloud::isotropic(vec![at(-0.9), at(-0.3), at(0.3), at(0.9)], -2.0, 6.0);
         let camera =
@@ -260,7 +260,7 @@ mod tests {
         let at = [-0.9, -0.3, 0.3, 0.9].map(|x| (maps.identities.identity[px(x)], maps.unknown.contains(px(x))));
         assert_eq!(at, [(1, false), (NOBODY, false), (NOBODY, true), (1, false)]);
         assert!((0.002..0.05).contains(&maps.unknown_share()), "{}", maps.unknown_share());
-        // The control: if all are seen, none is unseen, and every pixel has the same identity.
+        // The control: if none is unknown, no pixel is, and every pixel has the same identity as before.
         let known = draw([1.0; 4]);
         assert!(known.unknown.is_empty() && known.identities == maps.identities && known.unknown_share() == 0.0);
     }

@@ -22,7 +22,7 @@ pub enum SplatChange {
     Restore(Arc<GaussianCloud>, Option<Arc<SemanticMap>>),
 }
 
-/// Request of the window. The opened scene is never changed: the first edit creates another one beside it, in which it
+/// Request of the window. The opened scene stays unchanged: the first edit creates another one beside it, in which it
 /// and all later edits are stored.
 #[derive(Clone, Debug)]
 pub struct RearrangeRequest {

@@ -58,7 +58,7 @@ pub struct RemoveRequest {
     /// Folder of the scene.
     pub(crate) folder: PathBuf,
     pub(crate) options: RemovalOptions,
-    /// True if the scene is retrained on its photos without the thing, which takes as long as its training.
+    /// True if the scene is retrained on its photos without the thing, which takes as long as the first training.
     pub(crate) retrain: bool,
 }
 

@@ -149,7 +149,8 @@ fn carry_over(from: &Path, to: &Path, observer: &mut dyn Observer) -> Result<(),
     Ok(())
 }
 
-/// Objects are carried over to Gaussians that were trained further, and have to be read with their state.
+/// Returns the outcome with the scene's state and its objects. Those are carried over to Gaussians that were trained
+/// further, and have to be read with their state.
 fn finished(outcome: TrainOutcome, out: PathBuf, observer: &mut dyn Observer) -> Result<Trained, JobError> {
     let mut done = Trained { outcome, out, state: None, semantics: None };
     if trained::is_scene(&done.out) {

@@ -13,7 +13,7 @@ use crate::jobs::JobError;
 use crate::math::stats::mean;
 use crate::pipeline::observer::{Observer, Severity};
 
-/// Deepest folders that are searched; units are three below the folder of their batch.
+/// Levels of folders that are searched; units are three below the folder of their batch.
 const DEEPEST: usize = 6;
 
 /// All units of some batches.

@@ -199,7 +199,7 @@ fn check_networks(batch: &BatchFile) -> Result<(), JobError> {
     Ok(())
 }
 
-/// Merges the results of all units below `folders`, and writes `merged.json`, `merged.csv` and `merged.html` into `out`.
+/// Merges the results of all units below `folders`, and writes `merged.json`, `merged.csv`, `merged.html` into `out`.
 ///
 /// # Errors
 /// If results do not go together, or a file cannot be read or written.

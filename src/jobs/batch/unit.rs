@@ -16,7 +16,7 @@ use crate::pipeline::train::inputs::{Compare, TrainInputs};
 
 /// File name of a unit's request, in its folder.
 pub(super) const FILE: &str = "unit.json";
-/// Deepest folders of labels that are searched.
+/// Levels of folders of labels that are searched.
 const DEEPEST: usize = 16;
 /// Prefix of checksums of photos that [`TrainInputs`] makes; those of earlier versions have none.
 const OWN: &str = "2:";
