@@ -1,4 +1,4 @@
-//! How long drawing, training and queries take on this machine, and what a scene costs as the window opens it.
+//! Times of drawing, training and queries on this machine, and the costs of opening a scene as the window does.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,41 +20,41 @@ use crate::pipeline::train::{TrainConfig, TrainView, load_views};
 use crate::render::{Device, RenderSettings};
 use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, MaskGrid, NOBODY, PhotoPixels};
 
-/// Size in px of the view that is asked.
+/// Size in px of the queried view.
 const QUERY_SIZE: [usize; 2] = [1_008, 567];
-/// Size of the view in which strokes are drawn.
+/// Size in px of the view in which strokes are drawn.
 const STROKES_SIZE: [u32; 2] = [640, 480];
-/// Size of the views in which one moves.
+/// Size in px of the views of a moving camera.
 const MOVING_SIZE: [u32; 2] = [1_008, 567];
-/// Size of a made-up photo.
+/// Size in px of a synthetic photo.
 const PHOTO_SIZE: [u32; 2] = [1_008, 756];
 
 pub(crate) struct BenchRequest {
     /// Splats or trained scenes to draw, posed photos to train on.
     pub(crate) paths: Vec<PathBuf>,
-    /// Sizes of the drawn images.
+    /// Sizes in px of the drawn images.
     pub(crate) sizes: Vec<[u32; 2]>,
     /// Longer side of the training images in px.
     pub(crate) max_side_px: u32,
     pub(crate) repeats: usize,
-    /// Whether the GPU is timed beside the CPU.
+    /// True if the GPU is timed beside the CPU.
     pub(crate) gpu: bool,
-    /// So many queries are timed, of a view with so many objects and parts.
+    /// Number of timed queries, and number of objects and parts in their view.
     pub(crate) queries: Option<(usize, usize)>,
-    /// Network whose masks of everything in a photo are timed, and the photo, else one is made up.
+    /// Network whose masks of everything in a photo are timed, its grid, and the photo; `None` for a synthetic one.
     pub(crate) masks: Option<(String, MaskGrid, Option<PathBuf>)>,
-    /// So many strokes that select are timed in each scene.
+    /// Number of timed selection strokes in each scene.
     pub(crate) strokes: Option<usize>,
-    /// Whether moving by levels of detail is timed in each cloud.
+    /// True if moving by levels of detail is timed in each cloud.
     pub(crate) moving: bool,
 }
 
-/// Whether a path may hold posed photos: it is neither called as a splat file is nor a trained scene.
+/// Returns whether a path may hold posed photos: it has no splat file's name and is no trained scene.
 pub(crate) fn may_be_photos(path: &Path) -> bool {
     SplatFormat::of(path).is_none() && !is_scene(path)
 }
 
-/// Times stage by stage.
+/// Times each stage.
 pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result<Timings, JobError> {
     let repeats = request.repeats;
     let device = request.gpu.then(Device::shared).transpose()?;
@@ -111,7 +111,7 @@ pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result
     Ok(timings)
 }
 
-/// Selects by strokes in the first view, three for each selection.
+/// Times selections by strokes in the first view, three strokes each.
 fn strokes(
     name: &str,
     cloud: &Arc<GaussianCloud>,
@@ -127,7 +127,7 @@ fn strokes(
     for k in 0..=count {
         observer.proceed()?;
         let size = [camera.width_px as usize, camera.height_px as usize];
-        // The first one of each selection adds, one of those after it takes away.
+        // The third stroke of each selection takes away, the others add.
         let pixels = stroke(k, size);
         let request = SelectRequest {
             cloud: Arc::clone(cloud),
@@ -147,7 +147,7 @@ fn strokes(
     Ok(StrokesTiming::new(name, cloud.len(), &secs))
 }
 
-/// A made-up photo of squares in many colors.
+/// Returns a synthetic photo of squares in many colors.
 fn checks() -> PhotoPixels {
     let [width_px, height_px] = PHOTO_SIZE;
     let color = |i: u32| {
@@ -163,7 +163,7 @@ fn checks() -> PhotoPixels {
     }
 }
 
-/// The photos to train on, and how.
+/// Returns the training settings and the photos to train on.
 fn photos(
     dataset: &Dataset,
     max_side_px: u32,
@@ -179,7 +179,7 @@ fn photos(
     Ok((config, views))
 }
 
-/// What opening and drawing a scene as the window does costs this process.
+/// Measures the cost to this process of opening and drawing a scene as the window does.
 pub(crate) fn cost_of(scene: &Path, variant: PlanVariant, repeats: usize) -> Result<PlanCost, JobError> {
     Ok(cost(|| as_the_window(scene), variant, repeats)?)
 }
@@ -195,7 +195,7 @@ fn as_the_window(path: &Path) -> Result<OpenScene, StudyError> {
     Ok(OpenScene { cloud, settings, map, cameras, up: scene.home.up, first, facts: scene.facts.clone() })
 }
 
-/// The GPU of this machine, if there is one.
+/// Name of this machine's GPU, if there is one.
 pub(crate) fn adapter() -> Option<String> {
     Device::shared().ok().map(|device| device.describe())
 }

@@ -1,4 +1,4 @@
-//! What of a scene its photos show otherwise: what was removed from it, and that it was edited.
+//! Differences between a scene and its photos: removed things, and edits.
 
 use super::photos_without::is_without;
 use super::{JobError, Scene};
@@ -9,17 +9,17 @@ use crate::pipeline::semantics::removed::RemovedThings;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, Dataset, PhotoPixels};
 
-/// What photos of a scene show otherwise than it is.
+/// Differences between a scene and its photos.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ChangedScene {
-    /// Names of what was removed, and where that is known, what it looked like.
+    /// Names of removed things; `removed` holds their Gaussians, if those are known.
     names: Vec<String>,
     removed: Option<RemovedThings>,
     edited: bool,
 }
 
 impl ChangedScene {
-    /// Of a scene, and photos that may be made without what was removed.
+    /// Differences between a scene and its photos, which may be made without the removed things.
     pub(crate) fn of(scene: &Scene, photos: &Dataset) -> Self {
         let (names, removed) = match &scene.folder {
             Some(folder) if !is_without(&photos.root) => semantic_map::removed_of(folder),
@@ -29,7 +29,7 @@ impl ChangedScene {
         Self { names, removed, edited: scene.edited }
     }
 
-    /// In words, if there is anything to say.
+    /// Returns a report in words, if anything differs.
     pub(crate) fn told(&self) -> Option<(Severity, String)> {
         let names = removed_names(&self.names);
         let removed = match (self.names.is_empty(), &self.removed) {
@@ -54,7 +54,7 @@ impl ChangedScene {
         }
     }
 
-    /// Leaves out the pixels of a photo that show what was removed.
+    /// Leaves out the pixels of a photo that show removed things.
     pub(crate) fn leave_out(
         &self,
         pixels: &mut PhotoPixels,

@@ -1,4 +1,4 @@
-//! Cleaning a scene: what is measured of its Gaussians, and the scene without those that were chosen.
+//! Cleaning a scene: measures of its Gaussians, and the scene without the chosen ones.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -10,8 +10,8 @@ use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::splat_edit::SplatEdit;
 use crate::scene::{Dataset, GaussianCloud};
 
-/// Measures the Gaussians of `scene`, by the photos that it was trained on where they are at hand; `photos` says where
-/// they are if that is somewhere else than the scene says.
+/// Measures the Gaussians of `scene`, with its training photos if they are available; `photos` is their place if it
+/// differs from the scene's record.
 pub(crate) fn measure(
     scene: &Scene,
     photos: Option<&Path>,
@@ -32,16 +32,16 @@ pub(crate) fn measure(
     Ok(cleaning::measure(&scene.cloud, &views, &scene.settings, observer)?)
 }
 
-/// What the window asks for.
+/// Request of the window to measure Gaussians.
 #[derive(Clone, Debug)]
 pub struct MeasureRequest {
-    /// Where the scene lies.
+    /// Path of the scene.
     pub(crate) path: PathBuf,
     /// Its Gaussians as they are now.
     pub(crate) cloud: Arc<GaussianCloud>,
 }
 
-/// Gaussians and what was measured of them.
+/// Gaussians and their measures.
 #[derive(Clone, Debug)]
 pub struct MeasuredCloud {
     pub(crate) cloud: Arc<GaussianCloud>,
@@ -55,14 +55,14 @@ pub(crate) fn measured(request: MeasureRequest, observer: &mut dyn Observer) -> 
     Ok(MeasuredCloud { cloud, measures: measure(&scene, None, observer)? })
 }
 
-/// The photos that the scene was trained on, without those that are held out to measure with.
+/// Returns the training views of the scene, without held-out ones; each has its photo if the dataset has it.
 fn views(scene: &Scene, dataset: Option<&Dataset>) -> Vec<CleanView> {
     let photo = |name: &str| dataset.and_then(|d| d.photos.iter().find(|p| p.name == name)).cloned();
     let trained = scene.cameras.iter().filter(|c| !c.held_out);
     trained.map(|c| CleanView { camera: c.camera.clone(), photo: photo(&c.name) }).collect()
 }
 
-/// Gaussians that any of the rules means.
+/// Returns for each Gaussian whether any of the rules chooses it.
 pub(crate) fn choose(rules: &[CleanRule], of: &CloudMeasures) -> Result<Vec<bool>, JobError> {
     let mut gone: Vec<bool> = Vec::new();
     for rule in rules {
@@ -72,7 +72,8 @@ pub(crate) fn choose(rules: &[CleanRule], of: &CloudMeasures) -> Result<Vec<bool
     Ok(gone)
 }
 
-/// Writes `scene` without what is `gone` to `out`, as [`derived::write`] does. How many Gaussians are left.
+/// Writes `scene` without the `gone` Gaussians to `out`, as [`derived::write`] does. Returns the number of Gaussians
+/// left.
 pub(crate) fn store(
     scene: &Scene,
     gone: Vec<bool>,

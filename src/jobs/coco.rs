@@ -1,4 +1,4 @@
-//! Masks as COCO has them: run lengths, column by column.
+//! Masks in the format of COCO: run lengths, column by column.
 
 use serde_json::{Value, json};
 
@@ -20,7 +20,7 @@ impl Coco {
         }));
     }
 
-    /// A mask in the newest view; nothing if it is empty.
+    /// Adds a mask to the newest view, unless it is empty.
     pub(super) fn mask(&mut self, category: usize, mask: &Mask, score: Option<f32>) {
         let Some(b) = mask.bounds() else { return };
         let mut annotation = json!({

@@ -1,4 +1,4 @@
-//! The demo: the trained one that ships with the program, how it is made, and the photos to train it anew.
+//! The demo: the trained scene that ships with the program, its recipe, and the photos to train it anew.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -22,30 +22,30 @@ use crate::scene::{GaussianCloud, Machine};
 
 /// The trained demo.
 const BUNDLE: &[u8] = include_bytes!("../../assets/demo/demo.zip");
-/// What it is called in errors.
+/// Name of the demo in errors.
 const NAME: &str = "demo.zip";
-/// What is asked of it at once.
+/// Query that is asked at once.
 pub(crate) const QUESTION: &str = "a button of the red controller";
 
 const RECORD: &str = "record.json";
 const PICTURE: &str = "picture.jpg";
-/// Size of the picture that invites to open it, px.
+/// Size in px of the picture that invites to open it.
 const PICTURE_PX: [u32; 2] = [640, 480];
 
-/// How a trained demo is made.
+/// Recipe of a trained demo.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct DemoRecipe {
     photos: SynthOptions,
     training: TrainConfig,
-    /// Photos whose labels objects are found with at most.
+    /// Most photos whose labels are used to find objects.
     max_seeds: usize,
-    /// Number of the photo through whose camera it is seen at first.
+    /// Index of the photo whose camera gives the first view.
     home: usize,
     jpeg_quality: u8,
 }
 
 impl DemoRecipe {
-    /// That of the demo that ships: minutes on two cores, and always the same on one machine.
+    /// Recipe of the shipped demo: minutes on two cores, and reproducible on one machine.
     pub(crate) fn shipped() -> Self {
         let training = TrainConfig {
             steps: 5_000,
@@ -59,8 +59,7 @@ impl DemoRecipe {
     }
 }
 
-/// What a trained demo says of itself: how it was made, and how good it is on the photos in it that training did not
-/// see.
+/// Record of a trained demo: its recipe, and its quality on its held-out photos.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct DemoRecord {
     recipe: DemoRecipe,
@@ -73,7 +72,7 @@ pub(crate) struct DemoRecord {
     pub(crate) part_miou: f64,
 }
 
-/// The picture that invites to open the demo, a JPEG.
+/// Returns the picture that invites to open the demo, as a JPEG.
 ///
 /// # Errors
 /// If the archive in the program is broken.
@@ -93,7 +92,7 @@ pub(crate) fn open(folders: &Folders, machine: &Machine, observer: &mut dyn Obse
     Ok(scene)
 }
 
-/// Opens the demo's photos, to train on them; they are made unless that was done before.
+/// Opens the demo's photos, to train on them; they are rendered unless they exist.
 ///
 /// # Errors
 /// If they cannot be made or read, or the observer asks to stop.
@@ -109,7 +108,7 @@ pub(crate) fn open_photos(
     Ok(scene)
 }
 
-/// Gives a scene a name other than its folder's.
+/// Gives a scene a name that differs from its folder's.
 fn call(scene: &mut OpenedScene, name: &str) {
     scene.name = name.into();
     if let Some(dataset) = scene.dataset.as_mut().map(Arc::make_mut) {
@@ -117,7 +116,7 @@ fn call(scene: &mut OpenedScene, name: &str) {
     }
 }
 
-/// Compares the trained demo with its held-out photos and asks its questions; heat maps go to `pictures`.
+/// Compares the trained demo with its held-out photos and asks its queries; heat maps go to `pictures`.
 ///
 /// # Errors
 /// If it cannot be read, or a picture cannot be written.
@@ -134,8 +133,8 @@ pub(crate) fn examine(
     Ok(([quality.psnr, quality.ssim], demo_questions::ask(&map, &photos, &job, Some(pictures))?))
 }
 
-/// Makes a trained demo: renders photos, trains, finds objects, and packs what is needed to look at it. What is
-/// done already in the folder `work` is taken over.
+/// Makes a trained demo: renders photos, trains, finds objects, and packs the files for viewing it. Earlier work in the
+/// folder `work` is reused.
 ///
 /// # Errors
 /// If anything fails on the way, or the observer asks to stop.
@@ -165,11 +164,11 @@ pub(crate) fn make(
     let job = PhotoComparison::of(&seen, Arc::clone(&dataset), EvaluateOptions::default())?;
     let mut map = demo_questions::find(&photos, &job, recipe.max_seeds, observer)?;
 
-    // Labels of the photos that objects were found with, and of those to compare with.
+    // Labels of the photos that objects were found with, and of the held-out photos.
     let held_out = job.views.iter().map(|i| dataset.photos[*i].name.clone());
     let labeled: Vec<String> = map.seeds.iter().cloned().chain(held_out).collect();
     let packed = photo_files(&photos, &dataset.photos, &labeled, recipe.jpeg_quality)?;
-    // The record is of the photos that ship, JPEG and all: whoever measures the demo measures those.
+    // Measured on the shipped photos, JPEG and all, so that anyone can measure the same.
     let shipped = work.join("shipped");
     if shipped.exists() {
         std::fs::remove_dir_all(&shipped).map_err(unwritten)?;
@@ -227,7 +226,7 @@ fn photograph(out: &Path, options: &SynthOptions, observer: &mut dyn Observer) -
     Ok(())
 }
 
-/// The photos as JPEG, their poses and sparse points, and the labels of some of them.
+/// Returns the photos as JPEG, their poses and sparse points, and the labels of some of them.
 fn photo_files(
     folder: &Path,
     photos: &[crate::scene::Photo],
@@ -280,7 +279,7 @@ pub(crate) fn digest(bytes: &[u8]) -> String {
     files::hex(&Sha256::digest(bytes))
 }
 
-/// The Gaussians with numbers that are as exact as can be seen, which a third of the bytes hold.
+/// Rounds the Gaussians' values below visible differences, to a third of the bytes.
 fn rounded(cloud: &GaussianCloud) -> GaussianCloud {
     let to = |steps: f32| move |v: f32| (v * steps).round() / steps;
     let (near, size, turn, opacity) = (to(16_384.0), to(64.0), to(128.0), to(16.0));

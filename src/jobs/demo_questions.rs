@@ -1,4 +1,4 @@
-//! The demo's questions: objects found from the labels of a few photos, asked for in held-out views.
+//! The demo's queries: objects are found from the labels of a few photos, and queried in held-out views.
 
 use std::path::Path;
 use std::time::Instant;
@@ -22,7 +22,7 @@ use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
 use crate::scene::{LevelFilter, Photo, SemanticMap};
 
-/// What is asked; the last two are not in the scene.
+/// Queries; the last two things are not in the scene.
 const QUESTIONS: [&str; 7] = [
     "the red controller",
     "a button of the blue controller",
@@ -32,7 +32,7 @@ const QUESTIONS: [&str; 7] = [
     "a giraffe",
     "the trunk of the elephant",
 ];
-/// Photos whose labels are used at most where objects are found while one waits.
+/// Most photos whose labels are used if objects are found while the user waits.
 const MAX_SEEDS: usize = 3;
 
 #[derive(Debug, Serialize)]
@@ -40,28 +40,27 @@ pub(crate) struct DemoQuestion {
     pub(crate) question: String,
     /// "found", "ambiguous" or "not found".
     pub(crate) verdict: &'static str,
-    /// Names of what was chosen.
+    /// Names of the chosen identities.
     pub(crate) answer: Vec<String>,
-    /// Pixels of it in the view.
+    /// Number of their pixels in the view.
     pub(crate) pixels: usize,
-    /// From the text to the mask, ms.
+    /// Time from the text to the mask, ms.
     pub(crate) millis: f64,
 }
 
-/// How well every name was found in all held-out views, and the questions.
+/// Scores of every name over all held-out views, and the queries.
 #[derive(Debug, Serialize)]
 pub(crate) struct DemoQueries {
     /// Photos whose masks were used.
     pub(crate) seeds: Vec<String>,
     pub(crate) find_secs: f64,
-    /// Mean IoU of whole objects in held-out photos, asked for by name.
+    /// Mean IoU of whole objects in held-out photos, queried by name.
     pub(crate) object_miou: f64,
     pub(crate) part_miou: f64,
     pub(crate) asked: Vec<DemoQuestion>,
 }
 
-/// Finds objects from the labels of one photo in `photos` (and of more, up to `max_seeds`, where much is
-/// unknown).
+/// Finds objects from the labels of one photo in `photos`, and of more, up to `max_seeds`, if much is unlabeled.
 ///
 /// # Errors
 /// If a photo or its labels cannot be read, or the observer asks to stop.
@@ -83,10 +82,10 @@ pub(crate) fn find(
     Ok(find_objects(&job.cloud, &training, &job.settings, tools, &options, observer)?.map)
 }
 
-/// [`find`], stored in the folder `scene`; and [`ask`].
+/// Runs [`find`], stores the result in the folder `scene`, and runs [`ask`].
 ///
 /// # Errors
-/// As these, and if the scene cannot be written.
+/// As both, and if the scene cannot be written.
 pub(crate) fn find_and_ask(
     scene: &Path,
     photos: &Path,
@@ -105,11 +104,11 @@ pub(crate) fn find_and_ask(
     Ok(DemoQueries { find_secs, ..ask(&map, photos, job, Some(pictures))? })
 }
 
-/// Asks for every label of the views of `job`, which lie in `photos`, and the questions in the first of them.
-/// Heat maps of the answers go to `pictures`.
+/// Queries every label of the views of `job`, which lie in `photos`, and the demo's queries in the first view. Heat
+/// maps of the answers go to `pictures`.
 ///
 /// # Errors
-/// If a label cannot be read, a view not be drawn or a picture not be written.
+/// If a label cannot be read, a view cannot be drawn or a picture cannot be written.
 pub(crate) fn ask(
     map: &SemanticMap,
     photos: &Path,

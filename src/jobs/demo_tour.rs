@@ -1,4 +1,4 @@
-//! The whole way on the scene that ships with the program: photos, training, scores, questions, a flight, a report.
+//! The whole pipeline on the scene that ships with the program: photos, training, scores, queries, a flight, a report.
 
 use std::path::Path;
 use std::time::Instant;
@@ -20,7 +20,7 @@ use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainOutcome};
 use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, Dataset, GaussianCloud, Machine};
 
-/// Images of the flight around the scene.
+/// Number of images of the flight around the scene.
 const FLIGHT_PICTURES: usize = 24;
 
 /// Settings of the demo's training: minutes on two cores.
@@ -28,7 +28,7 @@ pub(crate) fn config() -> TrainConfig {
     TrainConfig { steps: 1_500, max_side_px: 400, eval_every: 250, checkpoint_secs: 30.0, ..TrainConfig::default() }
 }
 
-/// What the demo found, as written to `report.json`: a report of training and queries, and more.
+/// Results of the demo as written to `report.json`: a report of training and queries, and more.
 #[derive(Debug, Serialize)]
 pub(crate) struct DemoReport {
     #[serde(flatten)]
@@ -51,7 +51,7 @@ pub(crate) struct DemoReport {
     total_secs: f64,
 }
 
-/// Goes it into the folder `out`, or on from where it was; `command` is how it was asked for.
+/// Runs or resumes the tour in the folder `out`; `command` is the command line that asked for it.
 ///
 /// # Errors
 /// If something cannot be read, drawn or written, or the observer asks to stop.
@@ -138,7 +138,7 @@ fn make_photos(folder: &Path, observer: &mut dyn Observer) -> Result<Option<f64>
     Ok(Some(report.secs))
 }
 
-/// Draws a circle around what the photos look at; returns the median milliseconds per image.
+/// Draws a circle around the photos' focus; returns the median milliseconds per image.
 fn fly(
     cloud: &GaussianCloud,
     settings: &RenderSettings,
@@ -161,7 +161,7 @@ fn fly(
     Ok(median(&millis))
 }
 
-/// Cameras on a circle around the focus, as far from it and as high over it as the photos are.
+/// Returns cameras on a circle around the focus, at the photos' median distance and height.
 fn circle(dataset: &Dataset) -> Vec<Camera> {
     let Some(first) = dataset.photos.first() else { return Vec::new() };
     let (focus, up) = (dataset.focus(), dataset.up());
@@ -180,7 +180,7 @@ fn circle(dataset: &Dataset) -> Vec<Camera> {
 }
 
 impl DemoReport {
-    /// All of it in a line.
+    /// Returns the results in one line.
     pub(crate) fn summary(&self) -> String {
         format!(
             "{} steps in {:.0} s: {} Gaussians, held-out PSNR {:.2} dB, SSIM {:.3} over {} views; asked by name, objects \
@@ -198,7 +198,7 @@ impl DemoReport {
     }
 }
 
-/// Writes `report.json`, and `report.md` to be read.
+/// Writes `report.json`, and a readable `report.md`.
 fn write_report(r: &DemoReport, folder: &Path) -> Result<(), JobError> {
     export::json(&folder.join("report.json"), r)?;
     let curve: String = r.curve.iter().map(|e| format!("* {}\n", e.line())).collect();

@@ -1,4 +1,4 @@
-//! A scene that is made of another: it goes into a folder of its own, and the other one stays as it is.
+//! A scene that is derived from another: it goes into its own folder, and the other one stays unchanged.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -12,10 +12,10 @@ use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::{GaussianCloud, SemanticMap};
 
-/// How a scene is made in which something was moved, recolored or duplicated.
+/// Suffix of a scene in which things were moved, recolored or duplicated.
 pub(crate) const EDITED: &str = "edited";
 
-/// Refuses a place for the result that is taken or not fit for it: a file of splats where it is called so, else a folder.
+/// Refuses a place for the result that is taken or not fit: a splat file if the path names one, else a folder.
 pub(crate) fn check_place(scene: &Scene, out: &Path) -> Result<(), JobError> {
     match SplatFormat::of(out) {
         Some(_) => export_splat::check(out, &scene.reads()).map(|_| ()),
@@ -23,8 +23,8 @@ pub(crate) fn check_place(scene: &Scene, out: &Path) -> Result<(), JobError> {
     }
 }
 
-/// Writes Gaussians that were made of `from`, and their objects and parts, to `out`: a file of splats where it is called
-/// so, else a scene of its own.
+/// Writes Gaussians that were derived from `from`, with their objects and parts, to `out`: a splat file if the path
+/// names one, else a scene folder.
 pub(crate) fn write(
     from: &Scene,
     how: &str,
@@ -50,12 +50,12 @@ pub(crate) fn check(out: &Path) -> Result<(), JobError> {
     Ok(())
 }
 
-/// `desk-cleaned` beside `desk` for `how` "cleaned", with a number if there is one already.
+/// Returns `desk-cleaned` beside `desk` for `how` "cleaned", with a number if that exists.
 pub(crate) fn free_folder(scene: &Path, how: &str) -> PathBuf {
     folder_beside(scene, how, |_| false)
 }
 
-/// The same, or the first one that may be gone on with.
+/// Returns the same, or the first folder that may be resumed.
 pub(crate) fn folder_beside(scene: &Path, how: &str, goes_on: impl Fn(&Path) -> bool) -> PathBuf {
     let name = if scene.is_dir() { scene.file_name() } else { scene.file_stem() };
     let stem = name.map_or_else(|| "scene".into(), |n| n.to_string_lossy());
@@ -66,15 +66,15 @@ pub(crate) fn folder_beside(scene: &Path, how: &str, goes_on: impl Fn(&Path) -> 
     (1..).map(place).find(|folder| !folder.exists() || goes_on(folder)).unwrap_or_default()
 }
 
-/// The settings of a training whose result is drawn as `from` is.
+/// Returns the settings of a training run whose result is drawn as `from` is.
 fn drawn_as(from: &Scene) -> Result<serde_json::Value, JobError> {
     let RenderSettings { antialias, surfels, .. } = from.settings;
     let config = TrainConfig { antialias, surfels, ..from.config.clone() };
     serde_json::to_value(config).map_err(|e| JobError::Output(e.to_string()))
 }
 
-/// Stores Gaussians that were made of `from`, and their objects and parts, as the scene `name` in the folder `out`;
-/// whether they are `edited`, so that photos show them otherwise. Returns the id of its state.
+/// Stores Gaussians that were derived from `from`, with their objects and parts, as the scene `name` in the folder
+/// `out`. `edited` marks that photos show the scene as it was before. Returns the id of its state.
 pub(crate) fn store(
     from: &Scene,
     (name, edited): (String, bool),
@@ -83,16 +83,16 @@ pub(crate) fn store(
     out: &Path,
 ) -> Result<String, JobError> {
     let held = SceneFolder::hold(out, "storing a scene")?;
-    // Somebody may have made one there since it was looked at.
+    // Another process may have made one there since the earlier check.
     check(out)?;
     let mut info = match &from.folder {
         Some(folder) => trained::load_info(folder)?,
-        // How a file of splats is drawn is said in its scene's settings from now on.
+        // A splat file does not say how it is drawn; the scene's settings do from now on.
         None => SceneInfo { config: drawn_as(from)?, ..SceneInfo::default() },
     };
     info.name = name;
     info.edited |= edited;
-    // What was measured was measured before.
+    // Quality was measured before the change.
     info.history.evaluations.clear();
     if let (Some(dataset), Some(path)) = (&mut info.dataset, &from.dataset_path) {
         *dataset = dataset.moved(path, out);

@@ -8,19 +8,19 @@ use crate::io::{SceneFolder, trained};
 use crate::pipeline::semantics::edit::{self, Edit};
 use crate::scene::{GaussianCloud, SemanticMap};
 
-/// What is to be changed.
+/// A change of the map.
 #[derive(Clone, Debug)]
 pub enum EditRequest {
     /// A correction.
     Apply(Edit),
-    /// Another state of the map: undo and redo.
+    /// Another state of the map, for undo and redo.
     Restore(Arc<SemanticMap>),
 }
 
-/// The map after the change.
+/// Returns the map after the change.
 ///
 /// # Errors
-/// If the edit makes no sense; nothing has changed then.
+/// If the edit is invalid; nothing has changed then.
 pub(crate) fn apply(
     cloud: &GaussianCloud,
     map: &SemanticMap,
@@ -32,13 +32,13 @@ pub(crate) fn apply(
     })
 }
 
-/// Full names of what a change left without a Gaussian that had some, where it changed no numbers.
+/// Returns full names of identities that lost all their Gaussians by a change, if it changed no numbers.
 pub(crate) fn emptied(before: &SemanticMap, after: &SemanticMap) -> Vec<String> {
     edit::emptied(before, after).into_iter().map(|id| before.identities.full_name(id)).collect()
 }
 
-/// Stores the map of the scene in `folder`, which is known in the state `known`. Returns its state then; `None`
-/// if nothing is stored because there is no scene yet.
+/// Stores the map of the scene in `folder`, last read in the state `known`. Returns its new state; `None` if nothing is
+/// stored because there is no scene yet.
 pub(crate) fn store(
     folder: &Path,
     known: Option<&str>,

@@ -1,4 +1,4 @@
-//! Why a job did not do what was asked.
+//! Errors of jobs.
 
 use std::error::Error;
 use std::path::PathBuf;
@@ -23,7 +23,7 @@ use crate::pipeline::train::trainer::StepError;
 use crate::pipeline::video::VideoError;
 use crate::render::{DrawError, GpuError, RenderError};
 
-/// Why a job did not do what was asked.
+/// Error of a job.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum JobError {
@@ -41,14 +41,14 @@ pub enum JobError {
     PhotosGone(PathBuf),
     #[error("{}: no photo is held out, so there is nothing to measure on", .0.display())]
     NothingHeldOut(PathBuf),
-    /// The data set itself says which photos are held out.
+    /// The data set itself marks its held-out photos.
     #[error("{} marks {marked} of its {all} photos as test: these are held out, not every n-th", .data.display())]
     TestPhotos {
         /// The data set.
         data: PathBuf,
-        /// Photos that it marks.
+        /// Number of photos that it marks.
         marked: usize,
-        /// All of its photos.
+        /// Number of all its photos.
         all: usize,
     },
     #[error("no photo that was trained on is called '{0}'")]
@@ -61,12 +61,12 @@ pub enum JobError {
     EmptyQuery,
     #[error("no match for '{0}'")]
     NoMatch(String),
-    /// What only looks like it is changed only if it is said which one.
+    /// Found only by embedding; changes need a name.
     #[error("no name here says '{text}'; by embedding it may be {name}: to change that, ask for '{name}'")]
     OnlyLooks {
-        /// What was asked for.
+        /// The query.
         text: String,
-        /// The full name of what looks most like it.
+        /// Full name of the best match.
         name: String,
     },
     #[error("{0}")]
@@ -80,20 +80,20 @@ pub enum JobError {
     Program {
         /// The program.
         program: PathBuf,
-        /// What it was to do.
+        /// Its task.
         doing: &'static str,
-        /// How it ended.
+        /// Reason of its failure.
         why: String,
-        /// What it said last.
+        /// Its last output.
         said: String,
     },
     /// COLMAP is needed and not installed.
     #[error("neither COLMAP nor GLOMAP is installed here: 'colmap' is not found on the PATH")]
     NoTools,
-    /// Photos that do not hang together.
+    /// Photos that overlap too little.
     #[error("{}: no camera poses were found; the photos overlap too little or have too little texture", .0.display())]
     NoPosesFound(PathBuf),
-    /// The memory that is free is not enough.
+    /// Too little free memory.
     #[error(transparent)]
     Room(#[from] NoRoom),
     #[error(transparent)]
@@ -140,7 +140,7 @@ pub enum JobError {
     /// A measurement failed.
     #[error(transparent)]
     Study(#[from] StudyError),
-    /// A file for a result that is not as it must be.
+    /// A file for a result that is not valid.
     #[error("{0}")]
     Output(String),
     /// Units of a batch that cannot be run or merged.
@@ -162,7 +162,7 @@ impl JobError {
     }
 }
 
-/// Whether the machine is what failed, not what was asked: the disk is full or cannot be written to.
+/// Returns whether the machine failed, not the request: the disk is full or cannot be written to.
 pub(crate) fn is_of_machine(error: &(dyn Error + 'static)) -> bool {
     use std::io::ErrorKind as K;
     let mut next = Some(error);
@@ -176,7 +176,7 @@ pub(crate) fn is_of_machine(error: &(dyn Error + 'static)) -> bool {
     false
 }
 
-/// The error and its causes, each once: many errors already quote their cause.
+/// Joins the error and its causes, each once: many errors already quote their cause.
 pub(crate) fn chain(error: &dyn Error) -> String {
     let mut text = error.to_string();
     let mut next = error.source();

@@ -1,4 +1,4 @@
-//! Measuring a scene on photos that it was not trained on: colors and depth.
+//! Measures a scene on held-out photos: colors and depth.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -23,14 +23,14 @@ use crate::scene::{Camera, Dataset, GaussianCloud};
 /// The difference picture shows errors this many times larger.
 const DIFFERENCE_GAIN: i32 = 4;
 
-/// What is compared; what is not given is as in training.
+/// Options of a comparison; the defaults are those of training.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct EvaluateOptions {
     /// Longer side of the compared pictures in px.
     pub(crate) max_side_px: Option<u32>,
-    /// Which photos count as held out: every n-th, 0 = all photos.
+    /// Every n-th photo is held out; 0 = all photos.
     pub(crate) holdout_every: Option<usize>,
-    /// Whether the black borders of photos that were undistorted elsewhere are compared, too.
+    /// True if the black borders of photos that were undistorted elsewhere are compared, too.
     pub(crate) keep_borders: bool,
     /// Folder for pictures: photo, render and difference side by side.
     pub(crate) pictures: Option<PathBuf>,
@@ -42,20 +42,20 @@ pub(crate) struct PhotoComparison {
     pub(crate) settings: RenderSettings,
     pub(crate) dataset: Arc<Dataset>,
     pub(crate) views: Vec<usize>,
-    /// Which of them the scene says that it was trained on.
+    /// For each of `views`, whether the scene was trained on it, by its own record.
     pub(crate) trained_on: Vec<bool>,
     pub(crate) max_side_px: u32,
     /// Borders of the photos, which are left out.
     pub(crate) borders: Option<Borders>,
     pub(crate) pictures: Option<PathBuf>,
-    /// Id of the save that the scene's files are of.
+    /// Id of the save that the scene's files belong to.
     pub(crate) state: Option<String>,
-    /// What of the scene the photos show otherwise.
+    /// Differences between the scene and its photos.
     pub(crate) changed: ChangedScene,
 }
 
 impl PhotoComparison {
-    /// Of `scene` with `photos`.
+    /// Prepares the comparison of `scene` with the data set at `photos`.
     pub(crate) fn new(scene: Scene, photos: &Path, options: EvaluateOptions) -> Result<Self, JobError> {
         let dataset = Arc::new(open::dataset(photos)?);
         let mut comparison = Self::of(&scene, dataset, options)?;
@@ -63,7 +63,7 @@ impl PhotoComparison {
         Ok(comparison)
     }
 
-    /// Of `scene` with the photos of `dataset`.
+    /// Prepares the comparison of `scene` with the photos of `dataset`.
     pub(crate) fn of(scene: &Scene, dataset: Arc<Dataset>, options: EvaluateOptions) -> Result<Self, JobError> {
         let EvaluateOptions { max_side_px, holdout_every, keep_borders, pictures } = options;
         let dataset = match dataset.with_alpha(scene.config.alpha) {
@@ -106,7 +106,7 @@ impl PhotoComparison {
         Ok(TrainView { name: photo.name.clone(), camera, pixels })
     }
 
-    /// Calls `each` with every photo, and says how far that is.
+    /// Calls `each` with every photo, and reports progress.
     fn walk(
         &self,
         stage: &str,
@@ -123,7 +123,7 @@ impl PhotoComparison {
     }
 }
 
-/// PSNR and SSIM of every view, one at a time so that memory holds one photo. Writes the pictures.
+/// Measures PSNR and SSIM of every view, one at a time so that memory holds one photo. Writes the pictures.
 pub(crate) fn photometric(comparison: &PhotoComparison, observer: &mut dyn Observer) -> Result<Evaluation, JobError> {
     for warning in &comparison.dataset.warnings {
         observer.note(Severity::Warning, warning.clone());
@@ -161,7 +161,7 @@ pub(crate) fn photometric(comparison: &PhotoComparison, observer: &mut dyn Obser
     Ok(Evaluation::of(views, cloud.len(), 0, 0.0))
 }
 
-/// Drawn depth against the true depth of synthetic photos, and the median milliseconds of drawing it.
+/// Compares drawn depth with the true depth of synthetic photos; returns the median milliseconds of drawing it, too.
 pub(crate) fn depth(comparison: &PhotoComparison, observer: &mut dyn Observer) -> Result<(DepthScores, f64), JobError> {
     let mut renderer = Renderer::new();
     let mut counter = DepthCounter::default();
@@ -177,7 +177,7 @@ pub(crate) fn depth(comparison: &PhotoComparison, observer: &mut dyn Observer) -
     Ok((counter.scores(), median(&millis)))
 }
 
-/// `012_images_0012.png` for photo 12, `images/0012.jpg`: in order, and safe as a file name.
+/// Returns `012_images_0012.png` for photo 12, `images/0012.jpg`: sorted, and safe as a file name.
 fn picture_name(index: usize, photo: &str) -> String {
     let stem = photo.rsplit_once('.').map_or(photo, |(stem, _)| stem);
     let safe: String = stem.chars().map(|c| if c.is_alphanumeric() || c == '-' { c } else { '_' }).collect();

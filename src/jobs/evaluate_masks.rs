@@ -1,4 +1,4 @@
-//! Objects and parts against labeled photos, by one of the protocols of the literature.
+//! Comparison of objects and parts with labeled photos, by one of the protocols of the literature.
 
 mod protocol;
 
@@ -27,7 +27,7 @@ use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
 use crate::scene::{Camera, Identities, IdentityId, LevelFilter, NOBODY, Photo, SemanticMap};
 
-/// What the [`Protocol`] of the same name counts besides the IoU of each query.
+/// Scores of the [`Protocol`] of the same name besides the IoU of each query.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub(crate) enum ProtocolSummary {
@@ -50,7 +50,7 @@ pub(crate) enum ProtocolSummary {
         accuracy: f64,
     },
     Ovs3d {
-        /// Mean IoU where every pixel is of the class that fits best.
+        /// Mean IoU if every pixel is assigned to its best class.
         argmax_miou: f64,
         #[serde(skip)]
         classes: usize,
@@ -60,14 +60,14 @@ pub(crate) enum ProtocolSummary {
         rows: Vec<part_recall::Row>,
     },
     Recipes {
-        /// Questions for what is not there: other kinds, other colors, parts that a thing lacks.
+        /// Queries for absent things: other kinds, other colors, parts that a thing lacks.
         absent: [usize; 3],
         rows: Vec<recipes::RecipeRow>,
     },
     Strokes {
         /// Gaussians of the scene.
         gaussians: usize,
-        /// Seconds that looking at its surfaces and merging them took, once for all.
+        /// Seconds of looking at its surfaces and merging them, once for all.
         prepare_secs: f64,
         rows: Vec<strokes::StrokeRow>,
     },
@@ -79,7 +79,7 @@ pub(crate) struct MaskScores {
     pub(crate) trained_on: usize,
     pub(crate) units: Vec<Unit>,
     pub(crate) summary: ProtocolSummary,
-    /// What of the recipe the scene was not prepared for.
+    /// Settings of the recipe that the scene was not prepared for.
     pub(crate) unmet: Vec<String>,
 }
 
@@ -89,7 +89,7 @@ impl MaskScores {
         means(&self.units)
     }
 
-    /// Everything but the single queries, by the names that scripts know.
+    /// Returns everything but the single queries, with stable names for scripts.
     pub(crate) fn json(&self, protocol: Protocol, recipe: &Recipe) -> serde_json::Value {
         let mut value = json!({
             "protocol": protocol.name(), "views": self.views, "views_trained_on": self.trained_on, "recipe": recipe,
@@ -106,16 +106,16 @@ impl MaskScores {
     }
 }
 
-/// What of the labels of these photos is passed over, not used or joined, a sentence each.
+/// Returns labels of these photos that are skipped, unused or joined, a sentence each.
 ///
 /// # Errors
-/// If they cannot be read, or a file could be of two photos.
+/// If they cannot be read, or a file could belong to two photos.
 pub(crate) fn label_notes(labels: &Path, comparison: &PhotoComparison) -> Result<Vec<String>, JobError> {
     Ok(Labels::of_photos(labels, &comparison.dataset.photos)?.notes().to_vec())
 }
 
-/// Compares the objects and parts of a scene with `labels`; `query` is what to ask for where those do not name it.
-/// Pictures show the identities over the photos.
+/// Compares the objects and parts of a scene with `labels`; `query` is the query if labels have no names. Pictures show
+/// the identities over the photos.
 pub(crate) fn run(
     comparison: &PhotoComparison,
     scene: &Path,
@@ -156,7 +156,7 @@ pub(crate) fn run(
                 })
             };
             let scores = compare(protocol, query, comparison, &mut AskedScene { map, ask: &mut ask }, &list)?;
-            // An encoder that fails is no answer that misses.
+            // A failing encoder is an error, not a wrong answer.
             failed.map_or(Ok(scores), Err)?
         }
     };
@@ -219,7 +219,7 @@ fn compare(
     Ok((units, summary))
 }
 
-/// Selects what the held-out photos with labels show by strokes, or corrects what is `known` of it.
+/// Selects the labeled things of the held-out photos by strokes, or corrects the `known` ones.
 fn by_strokes(
     comparison: &PhotoComparison,
     mut labels: FileMasks,
@@ -269,7 +269,7 @@ fn recall(
     for components in part_recall::Components::ROWS {
         rows.push(part_recall::row((components, recipe), map, language, views, &mut *encoder)?);
     }
-    // The paper's full method, not ours, is what others can compare with.
+    // Others can compare with the paper's full method, not with ours.
     let units = rows.iter().rfind(|r| r.components.localization).map(|r| r.units.clone()).unwrap_or_default();
     Ok((units, ProtocolSummary::PartRecall { encoder: language.encoder.clone(), rows }))
 }
@@ -285,7 +285,7 @@ fn compare_recipes(map: &SemanticMap, recipe: &Recipe, views: &[LabeledView<'_>]
     Ok(ProtocolSummary::Recipes { absent: counts, rows })
 }
 
-/// A labeled photo and what is drawn of its view.
+/// A labeled photo and the maps drawn of its view.
 pub(crate) struct DrawnView {
     index: usize,
     name: String,
@@ -308,8 +308,7 @@ impl DrawnView {
     }
 }
 
-/// The held-out photos with labels; else those that were trained on, as long as no mask of theirs was
-/// used.
+/// Returns the held-out photos with labels; else training photos, except those whose masks were used.
 fn labeled(
     comparison: &PhotoComparison,
     map: &SemanticMap,
@@ -323,7 +322,7 @@ fn labeled(
     draw(comparison, map, labels, &views, trained_on)
 }
 
-/// What is to be compared in these `views` of the photos.
+/// Draws the maps to be compared in these `views` of the photos.
 pub(crate) fn draw(
     comparison: &PhotoComparison,
     map: &SemanticMap,
@@ -362,7 +361,7 @@ fn pictures(
     Ok(())
 }
 
-/// The photo with every identity's code as a tint.
+/// Returns the photo with every identity's code as a tint.
 fn tinted(rgb: &[[u8; 3]], of: &[IdentityId], identities: &Identities) -> Vec<[u8; 3]> {
     let tint = |(rgb, id): (&[u8; 3], &IdentityId)| match identities.get(*id) {
         Some(identity) if *id != NOBODY => {

@@ -1,4 +1,4 @@
-//! Removing things from a scene of synthetic photos, against what is really behind them.
+//! Removal of things from a scene of synthetic photos, compared with the truth behind them.
 
 use std::path::{Path, PathBuf};
 
@@ -18,8 +18,8 @@ use crate::pipeline::synth::{SETTINGS, SynthOptions};
 use crate::render::{Features, Frame, RenderSettings, Renderer};
 use crate::scene::{Camera, LevelFilter, PhotoPixels, SemanticMap};
 
-/// The ways that are compared: nothing is filled, and each way to paint; LaMa, too, where it is there, and the
-/// usual one with the shadow lifted.
+/// Compared ways: no fill, and each way to paint; LaMa, too, if it is installed, and the default one with the shadow
+/// lifted.
 const WAYS: [Option<Paint>; 5] =
     [None, Some(Paint::Nearest), Some(Paint::Telea), Some(Paint::Smooth), Some(Paint::Patches)];
 
@@ -27,35 +27,35 @@ const WAYS: [Option<Paint>; 5] =
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct RemovalRow {
     pub(crate) name: String,
-    /// How it was filled; `None` = not at all.
+    /// Paint of its fill; `None` = no fill.
     pub(crate) paint: Option<Paint>,
-    /// Whether its shadow was lifted.
+    /// True if its shadow was lifted.
     pub(crate) lift_shadow: bool,
     pub(crate) uncovered: Option<RegionScore>,
     pub(crate) invented: Option<RegionScore>,
-    /// What its shadow and its light lay on, against the photos without it: before it was removed and after.
+    /// Surfaces under its shadow and light, compared with the photos without it: before the removal and after.
     pub(crate) shaded: [Option<RegionScore>; 2],
     /// Everything else: before and after.
     pub(crate) outside: [Option<RegionScore>; 2],
-    /// The share of what is behind it that is flat.
+    /// Share of the background behind it that is flat.
     pub(crate) flat: f64,
     pub(crate) gaussians_removed: usize,
     pub(crate) gaussians_invented: usize,
     pub(crate) secs: f64,
-    /// Whether its name still finds something.
+    /// True if its name still finds something.
     pub(crate) found_again: bool,
 }
 
-/// What is true in one view.
+/// Ground truth of one view.
 struct TrueView {
     camera: Camera,
     regions: Vec<RemovalRegion>,
     with: [Vec<f64>; 3],
     without: [Vec<f64>; 3],
-    /// Without it; and with it.
+    /// Depth without it, then with it.
     depth: TrueDepth,
     before: TrueDepth,
-    /// The scene with it.
+    /// The scene with it, as drawn.
     was: Frame<f32>,
     index: usize,
 }
@@ -65,7 +65,7 @@ struct Settings {
     options: SynthOptions,
 }
 
-/// Removes each thing of which `truth` has views without it, in every way.
+/// Removes each thing in every way, if `truth` has views without it.
 pub(crate) fn run(
     scene: &Scene,
     truth: &Path,
@@ -86,7 +86,7 @@ pub(crate) fn run(
     Ok(rows)
 }
 
-/// The folder itself, or those in it, that have views without a thing.
+/// Returns the folder itself, or its subfolders, if they have views without a thing.
 fn folders(truth: &Path) -> Result<Vec<PathBuf>, JobError> {
     let is_one = |path: &Path| path.join(SETTINGS).is_file();
     if is_one(truth) {
@@ -102,7 +102,7 @@ fn folders(truth: &Path) -> Result<Vec<PathBuf>, JobError> {
     Ok(all)
 }
 
-/// The cameras of the photos that were trained on, and their true depths.
+/// Returns the training cameras and their true depths.
 fn photos(comparison: &PhotoComparison) -> Result<Vec<(Camera, TrueDepth)>, JobError> {
     let dataset = &comparison.dataset;
     let trained = (0..dataset.photos.len()).filter(|i| !comparison.views.contains(i));
@@ -115,7 +115,7 @@ fn photos(comparison: &PhotoComparison) -> Result<Vec<(Camera, TrueDepth)>, JobE
     trained.map(one).collect()
 }
 
-/// The thing's name and the views in which it was.
+/// Returns the thing's name and its views.
 fn views(
     scene: &Scene,
     comparison: &PhotoComparison,
@@ -218,7 +218,8 @@ fn one(
     })
 }
 
-/// Before, after, the truth without the thing, and the regions: uncovered blue, invented red, shaded green.
+/// Writes the view before, after, the truth without the thing, and the regions: uncovered blue, invented red, shaded
+/// green.
 fn picture(path: &Path, view: &TrueView, drawn: [&[[u8; 3]]; 2]) -> Result<(), JobError> {
     let (w, h) = (view.camera.width_px as usize, view.camera.height_px as usize);
     let truth: Vec<[u8; 3]> = (0..w * h).map(|i| std::array::from_fn(|c| (255.0 * view.without[c][i]) as u8)).collect();

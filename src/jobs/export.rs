@@ -1,4 +1,4 @@
-//! Writing what somebody wants to have: Gaussians for other viewers, pictures, arrays.
+//! Writes results for users: Gaussians for other viewers, pictures, arrays.
 
 use std::io::Write;
 use std::path::Path;
@@ -23,7 +23,7 @@ pub(crate) fn ply(path: &Path, cloud: &GaussianCloud) -> Result<(), IoError> {
     SplatFormat::Ply.write(path, cloud, &mut |_| Ok(()))
 }
 
-/// The Gaussians that a crop box keeps, if it keeps any.
+/// Returns the Gaussians that a crop box keeps; an error if it keeps none.
 pub(crate) fn cropped(cloud: &GaussianCloud, crop: &CropBox) -> Result<GaussianCloud, JobError> {
     let kept = crop.crop(cloud);
     if kept.is_empty() { Err(JobError::NoGaussians) } else { Ok(kept) }
@@ -72,7 +72,7 @@ pub(crate) fn npy<T: npyz::AutoSerialize + Copy>(path: &Path, values: &[T], size
     })
 }
 
-/// Writes a camera path: this program's `.json`, or frames of this `aspect` for nerfstudio where the name ends in
+/// Writes a camera path: this program's `.json`, or frames of this `aspect` for nerfstudio if the name ends in
 /// `.nerfstudio.json`.
 pub(crate) fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), IoError> {
     make_parent(file)?;
@@ -85,16 +85,16 @@ pub(crate) fn camera_path(file: &Path, path: &CameraPath, aspect: f64) -> Result
     io::camera_path::nerfstudio::write(file, path, &frames, (1280, (1280.0 / aspect.max(0.01)) as u32))
 }
 
-/// The name of a file for an identity's Gaussians, of its number and full name, that no other one has.
+/// Returns a unique file name for an identity's Gaussians, of its number and full name.
 pub(crate) fn identity_file(all: &Identities, id: IdentityId, ending: &str) -> String {
     format!("{id}-{}{ending}", identity_name(all, id))
 }
 
-/// A full name as every system takes it in a file's name.
+/// Returns a full name that is valid in file names on every system.
 pub(crate) fn identity_name(all: &Identities, id: IdentityId) -> String {
     let name = all.full_name(id);
     let words: Vec<&str> = name.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).collect();
-    // Of four bytes each at most: systems take 255.
+    // Four bytes each at most: systems take 255.
     words.join("-").chars().take(60).collect()
 }
 
@@ -111,9 +111,9 @@ pub(crate) fn make_folder(folder: &Path) -> Result<(), IoError> {
     std::fs::create_dir_all(folder).map_err(|cause| IoError::Write { path: folder.into(), remedy, cause })
 }
 
-/// Refuses a file for a result, before any work is done, that does not end as it should (`endings`, any
-/// if there are none), is one of those that the job reads (`reads` are files and folders), or would lie among the files of
-/// a data set. Devices and pipes may be written into whatever they are called.
+/// Refuses a file for a result, before any work is done. The file must have one of the `endings` (any if there are
+/// none), must not be one of the job's inputs (`reads`: files and folders), and must not lie among the files of a data
+/// set. Devices and pipes may have any name.
 pub(crate) fn check(path: &Path, endings: &[&str], reads: &[&Path]) -> Result<(), JobError> {
     if atomic::is_stream(path) {
         return Ok(());
@@ -127,12 +127,12 @@ pub(crate) fn check(path: &Path, endings: &[&str], reads: &[&Path]) -> Result<()
     refuse_among(path, if path.is_dir() { path } else { files::folder_of(path) })
 }
 
-/// Refuses what the job reads.
+/// Refuses an input of the job.
 fn refuse_read(path: &Path, reads: &[&Path]) -> Result<(), JobError> {
     let Ok(real) = path.canonicalize() else { return Ok(()) };
     for read in reads {
         let within = read.canonicalize().is_ok_and(|read| real.starts_with(read));
-        // Results may lie in a scene's folder; its own files are told above.
+        // Results may lie in a scene's folder; its own files are refused above.
         if within && !trained::is_scene(read) {
             let (path, read) = (path.display(), read.display());
             return Err(JobError::Output(format!("'{path}' is read by this command ('{read}'); choose another name")));
@@ -141,7 +141,7 @@ fn refuse_read(path: &Path, reads: &[&Path]) -> Result<(), JobError> {
     Ok(())
 }
 
-/// Refuses a result in a `folder` whose data set would take it for its own.
+/// Refuses a result in a `folder` whose data set would take it for one of its files.
 fn refuse_among(path: &Path, folder: &Path) -> Result<(), JobError> {
     let Some(set) = io::data_set_around(folder) else { return Ok(()) };
     let (path, set) = (path.display(), set.display());
@@ -150,9 +150,9 @@ fn refuse_among(path: &Path, folder: &Path) -> Result<(), JobError> {
     )))
 }
 
-/// Refuses a folder for pictures that holds what the job reads, or photos, as [`check`] does files.
+/// Refuses a folder for pictures that holds the job's inputs, or photos, as [`check`] does files.
 pub(crate) fn check_folder(folder: &Path, reads: &[&Path]) -> Result<(), JobError> {
-    // Where it does not exist yet, nothing in it is read.
+    // Nothing is read from a folder that does not exist yet.
     if folder.exists() { check(folder, &[], reads) } else { refuse_among(folder, folder) }
 }
 

@@ -1,4 +1,4 @@
-//! Everything in a scene as files: the Gaussians of every object and part, and their masks in photos.
+//! Exports a whole scene to files: the Gaussians of every object and part, and their masks in photos.
 
 mod folder;
 mod labels;
@@ -18,7 +18,7 @@ use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, SemanticMap};
 
-/// How masks are written.
+/// Format of masks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum MaskFormat {
     /// Polygons, a file for each photo
@@ -33,37 +33,37 @@ impl MaskFormat {
     pub(crate) const ALL: [Self; 3] = [Self::Isat, Self::Coco, Self::Ids];
 }
 
-/// What is to be written, and where.
+/// Request to export a scene.
 #[derive(Clone, Debug)]
 pub struct ExportAllRequest {
     pub(crate) cloud: Arc<GaussianCloud>,
     pub(crate) map: Arc<SemanticMap>,
     pub(crate) settings: RenderSettings,
-    /// Photos by name, of which masks are written.
+    /// Photos whose masks are written, by name.
     pub(crate) views: Vec<(String, Camera)>,
-    /// Of the files with Gaussians.
+    /// Format of the files with Gaussians.
     pub(crate) format: SplatFormat,
     pub(crate) masks: Vec<MaskFormat>,
     pub(crate) folder: PathBuf,
 }
 
-/// What was written.
+/// Result of an export.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ExportedAll {
     pub(crate) folder: PathBuf,
-    /// Objects and parts.
+    /// Number of objects and parts.
     pub(crate) written: usize,
-    /// Those without Gaussians.
+    /// Number of objects and parts without Gaussians.
     pub(crate) left_out: usize,
-    /// Photos with masks.
+    /// Number of photos with masks.
     pub(crate) photos: usize,
 }
 
-/// Writes all of it.
+/// Exports a scene.
 ///
 /// # Errors
-/// If the folder holds anything but an earlier export as it was written, something cannot be drawn or written, or the
-/// observer asks to stop: what is written by then stays and is known as an export's.
+/// If the folder holds anything but an unchanged earlier export, something cannot be drawn or written, or the observer
+/// asks to stop: files written by then stay and are recorded as an export's.
 pub(crate) fn run(request: &ExportAllRequest, observer: &mut dyn Observer) -> Result<ExportedAll, JobError> {
     if request.map.identities.is_empty() {
         return Err(JobError::NoObjects(request.folder.clone()));
@@ -113,11 +113,11 @@ fn write(
     Ok(done)
 }
 
-/// Labels belong to photos by the stems of their names, which two photos may share.
+/// Refuses two photos with the same stem, which would share the files of their masks.
 fn different_files(views: &[(String, Camera)]) -> Result<(), JobError> {
     let mut known = BTreeMap::new();
     for (name, _) in views {
-        // As systems compare names of files that do not tell letter cases apart.
+        // Some file systems do not distinguish letter cases.
         if let Some(other) = known.insert(labels::stem(name).to_lowercase(), name) {
             let text = format!("'{other}' and '{name}' would share the files of their masks: choose photos by --views");
             return Err(JobError::Output(text));

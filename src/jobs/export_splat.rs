@@ -1,5 +1,5 @@
-//! Gaussians as a file for other programs, in the format that its name asks for, and what that lost: told, and measured
-//! by drawing both.
+//! Gaussians as a file for other programs, in the format of its name's ending, and the loss: reported, and measured by
+//! drawing both.
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
@@ -18,63 +18,63 @@ use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, HomeView};
 
-/// Views that are compared.
+/// Number of views that are compared.
 const VIEWS: usize = 4;
-/// Longer side of such a view, px.
+/// Longer side of a compared view, px.
 const SIDE_PX: u32 = 480;
 
-/// How to draw what was written, and from where.
+/// Cameras and settings to draw the written file with.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LossViews {
-    /// Cameras of the scene's photos; where there are none, the Gaussians are looked at from all sides.
+    /// Cameras of the scene's photos; if there are none, the Gaussians are viewed from all sides.
     pub(crate) cameras: Vec<Camera>,
     pub(crate) settings: RenderSettings,
 }
 
 impl LossViews {
-    /// From all sides.
+    /// Views from all sides.
     pub(crate) fn of_cloud(cloud: &GaussianCloud) -> Self {
         Self { cameras: Vec::new(), settings: RenderSettings::of_mode(cloud.render_mode) }
     }
 
-    /// As the scene is seen.
+    /// The scene's own views.
     pub(crate) fn of(scene: &Scene) -> Self {
         Self { cameras: scene.views(), settings: scene.settings.clone() }
     }
 }
 
-/// What was written.
+/// Result of an export.
 #[derive(Clone, Debug, Serialize)]
 pub struct ExportedSplat {
     pub(crate) path: PathBuf,
     pub(crate) gaussians: usize,
     pub(crate) sh_degree: u8,
-    /// Of the file, or of all of them.
+    /// Size of the file, or of all of them.
     pub(crate) bytes: u64,
-    /// What the format rounds; nothing where all numbers are floats.
+    /// Values that the format rounds; `None` if all numbers are floats.
     pub(crate) rounded: Option<&'static str>,
-    /// What the format cannot hold.
+    /// Values that the format cannot hold.
     pub(crate) left_out: Vec<String>,
-    /// What its places are relative to, as the scene is far from zero: to be added to them again, in the scene's axes.
+    /// Origin of the positions in the file, for scenes far from zero: to be added to them again, in the scene's axes.
     pub(crate) shift: Option<[f64; 3]>,
-    /// Whether what the scene's file says is upwards was turned there, as the format cannot say it.
+    /// True if the Gaussians were turned upright, as the format cannot store the up axis of the scene's file.
     pub(crate) turned_upright: bool,
-    /// How what is in the file differs where both are drawn; not known where that was not asked for.
+    /// Differences if both are drawn; `None` if that was not asked for.
     pub(crate) drawn: Option<DrawnLoss>,
 }
 
-/// How pictures of two clouds differ.
+/// Difference between the drawings of two clouds.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct DrawnLoss {
     pub(crate) views: usize,
-    /// Of the pixels of all views, in dB; nothing where the pictures are the same.
+    /// PSNR over the pixels of all views, in dB; `None` if the pictures are equal.
     pub(crate) psnr: Option<f64>,
-    /// Of the view that differs most.
+    /// PSNR of the view that differs most, in dB.
     pub(crate) worst_psnr: Option<f64>,
 }
 
 impl ExportedSplat {
-    /// In words, a line for each matter.
+    /// Returns the report in words, one line per topic.
     pub(crate) fn lines(&self) -> Vec<String> {
         let Self { path, gaussians, sh_degree, bytes, rounded, left_out, shift, turned_upright, drawn } = self;
         let size = format::bytes(*bytes);
@@ -92,7 +92,7 @@ impl ExportedSplat {
     }
 }
 
-/// That places are relative to one near by, in words.
+/// Describes the origin of the positions in words.
 pub(crate) fn shift_line([x, y, z]: [f64; 3]) -> String {
     format!(
         "shifted: places are relative to ({x}, {y}, {z}), as other viewers hold single precision and would see steps so \
@@ -101,14 +101,14 @@ pub(crate) fn shift_line([x, y, z]: [f64; 3]) -> String {
 }
 
 impl ExportedSplat {
-    /// Tells what the format rounds and leaves out, and what that lost.
+    /// Reports the values that the format rounds and leaves out, and the loss.
     pub(crate) fn tell_loss(&self, observer: &mut dyn Observer) {
         self.lines().into_iter().skip(1).for_each(|line| observer.note(Severity::Info, line));
     }
 }
 
 impl DrawnLoss {
-    /// In words.
+    /// Returns the loss in words.
     pub(crate) fn line(&self) -> String {
         let views = format::things(self.views, "view");
         match (self.psnr, self.worst_psnr) {
@@ -130,15 +130,15 @@ pub(crate) fn check(path: &Path, reads: &[&Path]) -> Result<SplatFormat, JobErro
     Ok(format)
 }
 
-/// The format that a name asks for; devices and pipes may be called anything, and get a `.ply`.
+/// Returns the format of a name; devices and pipes may have any name, and get a `.ply`.
 fn format_of(path: &Path) -> Option<SplatFormat> {
     SplatFormat::of(path).or_else(|| atomic::is_stream(path).then_some(SplatFormat::Ply))
 }
 
-/// Writes the Gaussians, and draws them and what was written from some of `views`, if there are any.
+/// Writes the Gaussians, and compares drawings of them and of the file from some of `views`, if given.
 ///
 /// # Errors
-/// If the name asks for no format, the file cannot be written, or not be read back.
+/// If the name has no known format, the file cannot be written, or cannot be read back.
 pub(crate) fn run(
     cloud: &Arc<GaussianCloud>,
     path: &Path,
@@ -148,7 +148,7 @@ pub(crate) fn run(
     let format = check(path, &[])?;
     export::make_parent(path)?;
     write(cloud, format, path, observer)?;
-    // What went into a pipe is gone.
+    // A pipe cannot be read back.
     let views = views.filter(|_| !atomic::is_stream(path));
     let prepared = format.prepared(cloud);
     Ok(ExportedSplat {
@@ -164,7 +164,7 @@ pub(crate) fn run(
     })
 }
 
-/// Writes the Gaussians, and tells how far it is.
+/// Writes the Gaussians, and reports progress.
 pub(crate) fn write(
     cloud: &GaussianCloud,
     format: SplatFormat,
@@ -185,7 +185,7 @@ pub(crate) fn write(
     }
 }
 
-/// What is in the file, drawn against what was to be in it.
+/// Compares drawings of the file and of the Gaussians.
 fn drawn(
     cloud: &GaussianCloud,
     path: &Path,
@@ -195,7 +195,7 @@ fn drawn(
     let Opened::Cloud(mut written) = io::open(path)? else {
         return Err(JobError::Output(format!("{} was written, but is no splat when it is read", path.display())));
     };
-    // A format that has no place for the shift is near zero.
+    // A format that cannot store the shift has positions near zero.
     if written.origin == DVec3::ZERO {
         written.origin = SplatFormat::of(path).and_then(|format| format.shift(cloud)).unwrap_or_default();
     }
@@ -210,7 +210,7 @@ fn drawn(
         ticker.tick(k, observer)?;
         let mut draw = |cloud: &GaussianCloud| renderer.render(cloud, Features::NONE, camera, &views.settings);
         let (a, b) = (draw(cloud)?, draw(&written)?);
-        // As a screen shows it.
+        // As on a screen.
         let squared = |(a, b): (&f32, &f32)| f64::from(a.clamp(0.0, 1.0) - b.clamp(0.0, 1.0)).powi(2);
         let planes = a.color.iter().zip(&b.color);
         let sum: f64 = planes.flat_map(|(a, b)| a.iter().zip(b)).map(squared).sum();

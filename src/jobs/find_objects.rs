@@ -1,4 +1,4 @@
-//! Finding the objects and parts of a trained scene, and storing them with it.
+//! Finds the objects and parts of a trained scene, and stores them with it.
 
 pub(crate) mod forecast;
 
@@ -29,22 +29,22 @@ use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::render::RenderSettings;
 use crate::scene::{Dataset, GaussianCloud, Photo, Preparation, SemanticMap};
 
-/// Name of the encoder that is none.
+/// Name for no encoder.
 pub(crate) const NO_ENCODER: &str = "none";
 
-/// How objects are found. Models that are not named are the best that are here.
+/// Settings of finding objects. Models without a name default to the best installed ones.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct FindSettings {
-    /// What finds masks where none came with the photos.
+    /// Segmenter of photos that came without masks.
     pub segmenter: Option<String>,
-    /// What carries them to the other photos.
+    /// Method that carries masks to the other photos.
     pub carry: Carry,
-    /// The SAM 2 that follows masks.
+    /// Name of the SAM 2 that tracks masks.
     pub tracker: String,
     /// The encoder for open-vocabulary queries, or [`NO_ENCODER`].
     pub encoder: Option<String>,
-    /// How Gaussians get their codes, how far parts are deviated, and what SAM 2 is prompted by.
+    /// Lifting of codes to Gaussians, weight of parts' deviation, and prompts of SAM 2.
     pub preparation: Preparation,
     /// Steps of training codes.
     pub code_steps: u64,
@@ -54,7 +54,7 @@ pub struct FindSettings {
     pub max_seeds: usize,
     /// Share of a photo that may stay unknown before its masks are used too.
     pub unknown_share: f64,
-    /// Whether objects and parts that somebody has worked on are found anew, too; else they stay as they are.
+    /// True if objects and parts that the user has edited are found anew, too; else they are kept.
     #[serde(skip)]
     pub replace_all: bool,
 }
@@ -77,26 +77,26 @@ impl Default for FindSettings {
     }
 }
 
-/// A scene whose objects are to be found.
+/// A scene to find objects in.
 #[derive(Clone, Debug)]
 pub struct FindRequest {
     /// Folder of the trained scene.
     pub folder: PathBuf,
     /// Its Gaussians.
     pub cloud: Arc<GaussianCloud>,
-    /// How they are drawn.
+    /// Its render settings.
     pub settings: RenderSettings,
     /// The photos.
     pub dataset: Arc<Dataset>,
-    /// Every how-manieth photo is held out, if the scene does not say which.
+    /// Every n-th photo is held out, if the scene does not say which.
     pub holdout_every: usize,
-    /// Where masks are; `None` = they are found.
+    /// Folder of masks; `None` = they are found.
     pub masks: Option<PathBuf>,
-    /// Objects and parts that stay as they are: what the photo to begin with shows that is nobody's is added.
+    /// Objects and parts that are kept: unlabeled things that the first photo shows are added.
     pub known: Option<Arc<SemanticMap>>,
-    /// Longer side of the pictures that are looked at, px.
+    /// Longer side in px of the pictures for networks.
     pub side_px: u32,
-    /// How.
+    /// Settings of the search.
     pub with: FindSettings,
 }
 
@@ -104,17 +104,17 @@ pub struct FindRequest {
 #[derive(Clone, Debug)]
 pub(crate) struct FoundObjects {
     pub(crate) found: Found,
-    /// The photos that were looked at; what was found counts them.
+    /// The photos in use; `found` refers to them by index.
     pub(crate) photos: Vec<Photo>,
-    /// Names of what somebody had worked on before, and stayed as it was.
+    /// Names of kept identities, which the user had edited before.
     pub(crate) kept: Vec<String>,
     pub(crate) state: String,
     pub(crate) secs: f64,
-    /// What of the labels was passed over, not used or joined.
+    /// Labels that were skipped, unused or joined.
     pub(crate) warnings: Vec<String>,
 }
 
-/// How objects are looked for: the recipe's name, if it is one, and its choices.
+/// Describes the search: the recipe's name, if it has one, and its choices.
 fn told(with: &FindSettings, preparation: Preparation, masks: &str, encoder: Option<&str>) -> String {
     let Preparation { lifting, part_weight, prompt, .. } = preparation;
     let named = |name: &&RecipeName| name.recipe().preparation == preparation;
@@ -143,7 +143,7 @@ pub(crate) fn run(
     if !trained::is_scene(folder) {
         return Err(JobError::NoScene(folder.into()));
     }
-    // Held from the beginning: nobody waits for objects that cannot be stored.
+    // Held from the beginning: objects must not be found and then fail to be stored.
     let scene = SceneFolder::hold(folder, "finding objects")?;
     if splat_ply::state(&folder.join(CLOUD_FILE))?.as_deref() != known {
         return Err(IoError::Changed { folder: folder.into() }.into());
@@ -167,7 +167,7 @@ pub(crate) fn run(
         let place = exact.or_else(|| photos.iter().position(|p| p.name.contains(name.as_str())));
         place.ok_or_else(|| JobError::UnknownPhoto(name.clone()))
     };
-    // What is added is prepared as the rest was.
+    // Additions are prepared as the rest was.
     let preparation = request.known.as_ref().and_then(|map| map.prepared).unwrap_or(with.preparation);
     let options = FindOptions {
         track: TrackOptions {
@@ -220,7 +220,7 @@ pub(crate) fn run(
     let network = network.as_ref().map(|(name, grid)| (name.as_str(), *grid));
     let by_files = labels.as_ref().map(|_| "files");
     let mut segmenter = segmenter(labels, cloud, settings, network, folder.join("cache"))?;
-    // What is added is looked at by the encoder that has looked at the rest.
+    // Additions use the encoder of the rest.
     let looked = |map: &Arc<SemanticMap>| map.language.as_ref().map_or(NO_ENCODER.to_owned(), |l| l.encoder.clone());
     let encoder = request.known.as_ref().map(looked).or_else(|| with.encoder.clone());
     let mut encoder = match encoder.as_deref() {
@@ -259,14 +259,14 @@ pub(crate) fn run(
     Ok(FoundObjects { found, photos, kept, state, secs: start.elapsed().as_secs_f64(), warnings })
 }
 
-/// The objects and parts that are stored with the scene in a folder; `None` if there are none, or they are broken.
+/// Loads the objects and parts stored with the scene in a folder; `None` if there are none, or they are broken.
 fn before(folder: &Path, observer: &mut dyn Observer) -> Option<SemanticMap> {
-    // Not those of the request: its Gaussians do not say whose they are by now.
+    // Not those of the request: its Gaussians may have lost their identities by now.
     let map = trained::load(folder).and_then(|scene| semantic_map::load(folder, scene.state.as_deref(), &scene.cloud));
     map.inspect_err(|e| observer.note(Severity::Warning, format!("Nothing is kept of the objects before: {e}"))).ok()?
 }
 
-/// What was taken out of a scene, and names by which it is told where its Gaussians were not kept.
+/// Returns the removed Gaussians of a scene, and names of removed things whose Gaussians were not kept.
 fn gone(before: Option<&SemanticMap>, observer: &mut dyn Observer) -> (Option<Arc<GaussianCloud>>, Vec<String>) {
     let is_whole = |map: &&SemanticMap| map.identities.removed.is_empty() && map.removed.is_none();
     let Some(map) = before.filter(|map| !is_whole(map)) else { return (None, Vec::new()) };
@@ -286,12 +286,12 @@ fn gone(before: Option<&SemanticMap>, observer: &mut dyn Observer) -> (Option<Ar
     (None, map.identities.removed.iter().filter(|name| !is_left(name)).cloned().collect())
 }
 
-/// What was removed, in words; what had no name has none here.
+/// Lists the removed things in words, also if none has a name.
 pub(crate) fn removed_names(names: &[String]) -> String {
     if names.is_empty() { "a thing without a name".to_owned() } else { listed(names) }
 }
 
-/// Full names of what somebody has worked on.
+/// Returns full names of identities that the user has edited.
 pub(crate) fn by_hand(map: &SemanticMap) -> Vec<String> {
     map.by_hand().into_iter().map(|id| map.identities.full_name(id)).collect()
 }
@@ -299,7 +299,7 @@ pub(crate) fn by_hand(map: &SemanticMap) -> Vec<String> {
 /// Most names that are listed in a sentence.
 const LISTED: usize = 6;
 
-/// Some of these names, and how many more there are: "lamp, mug and 3 more".
+/// Joins some of these names, and the number of the others: "lamp, mug and 3 more".
 pub(crate) fn listed(names: &[String]) -> String {
     match names.len().checked_sub(LISTED).filter(|more| *more > 0) {
         Some(more) => format!("{} and {more} more", names[..LISTED].join(", ")),

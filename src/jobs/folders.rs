@@ -1,4 +1,4 @@
-//! Where the program keeps what it makes without being told where: demo photos, trained scenes, reports.
+//! Default places of the program's results: demo photos, trained scenes, reports.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,7 +9,7 @@ use crate::io::data_folder::data_folder;
 use crate::io::scene_files::{SCENE_FILE, is_scene};
 use crate::io::{IoError, atomic, files};
 
-/// Beside the trainings of a data set, the name of the one that was used last.
+/// Name of a file beside the training runs of a data set; it names the run that was used last.
 const USED: &str = "used-last";
 
 /// The program's folders, all below one.
@@ -20,7 +20,7 @@ pub struct Folders {
 }
 
 impl Folders {
-    /// Below the user's data folder; below the system's temporary folder where there is none.
+    /// Folders below the user's data folder; below the system's temporary folder if there is none.
     pub(crate) fn of_user() -> Self {
         Self { data: data_folder() }
     }
@@ -35,10 +35,10 @@ impl Folders {
         self.data.join(format!("demo-{}-trained-{digest}", env!("CARGO_PKG_VERSION")))
     }
 
-    /// Folder of the scene trained from the dataset at `root` that was used last, whether it exists or not.
+    /// Folder of the scene trained from the dataset at `root` that was used last; it need not exist.
     pub(crate) fn trained(&self, root: &Path) -> PathBuf {
         let runs = self.trainings(root);
-        // Where nobody noted it, the one that was written last; of two of one moment the newer.
+        // If none is noted, the one that was written last; of two with one time the newer.
         let noted = runs.first().and_then(|run| fs::read_to_string(run.with_file_name(USED)).ok());
         let used = runs.iter().find(|run| noted.as_deref().is_some_and(|name| run.ends_with(name.trim())));
         let written = |run: &&PathBuf| fs::metadata(run.join(SCENE_FILE)).and_then(|m| m.modified()).ok();
@@ -46,20 +46,20 @@ impl Folders {
         used.cloned().unwrap_or_else(|| self.fresh(root))
     }
 
-    /// Folders of all trainings of the dataset at `root`, first to last.
+    /// Folders of all training runs of the dataset at `root`, oldest first.
     pub(crate) fn trainings(&self, root: &Path) -> Vec<PathBuf> {
         self.runs(root).take_while(|run| run.exists()).collect()
     }
 
-    /// Whether a folder is one of those of trainings.
+    /// Returns whether a folder is that of a training run.
     pub(crate) fn is_training(&self, run: &Path) -> bool {
         run.parent().and_then(Path::parent) == Some(self.data.join("trained").as_path())
     }
 
-    /// Notes that a training is the one that is used; anything else than a training is left alone.
+    /// Notes that a training run is in use; ignores any other folder.
     ///
     /// # Errors
-    /// If that cannot be written.
+    /// If the note cannot be written.
     pub(crate) fn note_use(&self, run: &Path) -> Result<(), IoError> {
         let Some(name) = run.file_name().filter(|_| self.is_training(run) && is_scene(run)) else { return Ok(()) };
         let path = run.with_file_name(USED);
@@ -70,7 +70,7 @@ impl Folders {
         atomic::write(&path, |w| w.write_all(name.as_bytes()))
     }
 
-    /// A folder for a new training of the dataset at `root`, next to those of earlier ones.
+    /// Returns a folder for a new training run of the dataset at `root`, next to the earlier ones.
     pub(crate) fn fresh(&self, root: &Path) -> PathBuf {
         self.runs(root).find(|run| !run.exists()).unwrap_or_default()
     }
@@ -80,7 +80,7 @@ impl Folders {
         unique(&self.data.join("reports"), path)
     }
 
-    /// Folder for what is made here of the scene that another computer serves at `host`.
+    /// Folder for local results of a scene that another computer serves at `host`.
     pub(crate) fn of_remote(&self, host: &str) -> PathBuf {
         let name: String = host.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).collect();
         self.data.join("remote").join(name)
@@ -91,20 +91,20 @@ impl Folders {
         unique(&self.data.join("poses"), root)
     }
 
-    /// The small picture of the scene at `path`.
+    /// File of the small picture of the scene at `path`.
     pub(crate) fn picture(&self, path: &Path) -> PathBuf {
         unique(&self.data.join("pictures"), path).with_added_extension("png")
     }
 
-    /// Folders of the trainings of the dataset at `root`, first to last without end.
+    /// Folders of the training runs of the dataset at `root`, in order, without end.
     fn runs(&self, root: &Path) -> impl Iterator<Item = PathBuf> {
         let all = unique(&self.data.join("trained"), root);
         (1..).map(move |n: usize| all.join(format!("run-{n}")))
     }
 }
 
-/// The folder in `parent` for what belongs to `path`: called by its last name and a digest of all of it, so
-/// that two of one name do not share it.
+/// Returns the folder in `parent` that belongs to `path`: named by its last name and a digest of all of it, so that two
+/// paths with one name do not share it.
 fn unique(parent: &Path, path: &Path) -> PathBuf {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     let name = path.file_name().map_or_else(|| "scene".into(), |n| n.to_string_lossy().into_owned());
@@ -113,7 +113,7 @@ fn unique(parent: &Path, path: &Path) -> PathBuf {
     files::renamed(parent.join(format!("{name}-{sum}")), parent.join(first_name(&name, &path)))
 }
 
-/// What the first version called the folder, by a digest that the standard library does not promise to keep.
+/// Returns the first version's name of the folder, by a digest that the standard library does not promise to keep.
 fn first_name(name: &str, path: &Path) -> String {
     use std::hash::{DefaultHasher, Hash, Hasher};
     let mut hasher = DefaultHasher::new();
@@ -169,7 +169,7 @@ mod tests {
         assert_eq!(folders.trained(root), runs[0], "the control");
         fs::remove_file(runs[0].join(SCENE_FILE)).expect("removed");
         assert_eq!(folders.trained(root), runs[2], "what is no scene any more is not shown");
-        // As earlier versions left it: nothing is noted, and the first was worked on last.
+        // As earlier versions left it: no note, and the first was written last.
         fs::remove_file(runs[0].with_file_name(USED)).expect("removed");
         let later = std::time::SystemTime::now() + std::time::Duration::from_secs(5);
         fs::File::options()

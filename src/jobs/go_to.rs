@@ -1,4 +1,4 @@
-//! Moving through a scene: what one knows before, and the flight to where an identity is seen best.
+//! Camera navigation in a scene: prepared data, and the flight to the best view of an identity.
 
 use std::sync::Arc;
 
@@ -14,11 +14,11 @@ use crate::render::RenderSettings;
 use crate::scene::resource_log::{self, ResourceKind};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
-/// A scene in which one can move about.
+/// A scene prepared for camera navigation.
 pub struct Explored {
     pub(crate) navigator: Navigator,
     pub(crate) cloud: Arc<GaussianCloud>,
-    /// The number of the connected part that each keypoint belongs to, the largest part first.
+    /// Index of the connected part of each keypoint, the largest part first.
     pub(crate) parts: Vec<usize>,
 }
 
@@ -41,12 +41,12 @@ impl Explored {
         Self { navigator, cloud, parts }
     }
 
-    /// The flight from one pose to another; `frames` poses long.
+    /// Returns the flight from one pose to another, `frames` poses long.
     pub(crate) fn fly(&self, from: &Pose, to: &Pose, frames: usize) -> Result<CameraTrajectory, NoRoute> {
         self.navigator.fly(from, to, None, frames, Speed::Eased)
     }
 
-    /// How smooth the paper's interpolation of a flight's ends is, and that through all keypoints of the route.
+    /// Smoothness of the paper's interpolation between a flight's ends, and of that through all keypoints of the route.
     pub(crate) fn of_paper(&self, flight: &CameraTrajectory) -> [Option<Smoothness>; 2] {
         let [first, .., last] = flight.poses.as_slice() else { return [None, None] };
         let (navigator, frames) = (&self.navigator, flight.poses.len());
@@ -55,23 +55,23 @@ impl Explored {
             .map(|p| p.map(|p| p.smoothness(&navigator.occupancy, navigator.clearance)))
     }
 
-    /// Why there is no way, with how much of the scene hangs together.
+    /// Describes why there is no route, with the number of the scene's connected parts.
     pub(crate) fn no_route(&self, why: &NoRoute) -> String {
         let count = self.parts.iter().max().map_or(0, |m| m + 1);
         format!("{why} ({} keypoints in {count} parts that are not connected)", self.parts.len())
     }
 }
 
-/// How flights through a scene fare, with each of these counts of cameras.
+/// Surveys flights through a scene, for each of these numbers of cameras.
 pub(crate) fn survey(scene: &Scene, counts: &[u32], flights: usize, frames: usize) -> Vec<Surveyed> {
     let own = scene.views();
     counts.iter().map(|count| surveyed(&scene.cloud, &own, *count as usize, flights, frames)).collect()
 }
 
-/// What is to be visited.
+/// Request of a flight to an identity.
 #[derive(Clone, Debug)]
 pub struct ApproachRequest {
-    /// The scene, if it was looked at before.
+    /// The prepared scene, if there is one.
     pub(crate) explored: Option<Arc<Explored>>,
     pub(crate) cloud: Arc<GaussianCloud>,
     pub(crate) cameras: Vec<Camera>,
@@ -85,7 +85,7 @@ pub struct ApproachRequest {
     pub(crate) frames: usize,
 }
 
-/// Finds the flight to an identity. What was learned about the scene comes back with it.
+/// Finds the flight to an identity. Returns the prepared scene, too.
 pub(crate) fn visit(request: ApproachRequest) -> (Arc<Explored>, Approached) {
     let ApproachRequest { explored, cloud, cameras, up, settings, map, id, preference, from, aspect, frames } = request;
     let known = explored.filter(|e| Arc::ptr_eq(&e.cloud, &cloud));
@@ -102,12 +102,12 @@ pub(crate) fn visit(request: ApproachRequest) -> (Arc<Explored>, Approached) {
     (explored, visit)
 }
 
-/// What came of a visit.
+/// Outcome of a visit.
 #[derive(Clone, Debug)]
 pub struct Approached {
     pub(crate) name: String,
     /// The flight there, or to the nearest place that can be reached.
     pub(crate) flight: Option<Box<Approach>>,
-    /// Why it does not lead there.
+    /// Reason that it does not lead there.
     pub(crate) problem: Option<String>,
 }

@@ -1,4 +1,4 @@
-//! Which photos a scene was not trained on.
+//! Held-out photos of a scene.
 
 use std::path::Path;
 
@@ -7,9 +7,9 @@ use crate::io::gs_output::is_of;
 use crate::io::trained::SceneCamera;
 use crate::scene::Dataset;
 
-/// The photos of `dataset` that a scene with these `cameras` was not trained on, or every `every`-th if that is
-/// given. By name, where the scene says which: the dataset may have gained or lost photos since, and settings
-/// may have changed; by `default_every` where it does not.
+/// Returns the indices of the photos of `dataset` that a scene with these `cameras` was not trained on, or every
+/// `every`-th if given. If the scene records them, by name, since the dataset may have gained or lost photos and
+/// settings may have changed; else by `default_every`.
 pub(crate) fn held_out(
     dataset: &Dataset,
     cameras: &[SceneCamera],
@@ -24,8 +24,8 @@ pub(crate) fn held_out(
     (0..dataset.photos.len()).filter(|&i| held(&dataset.photos[i].name)).collect()
 }
 
-/// Rule by which a camera's name is a photo's: the strictest that holds for any of these. Names are the same, or they
-/// are 3D Gaussian Splatting's, or the photos were stored in another format since.
+/// Returns the rule by which a camera's name is a photo's: the strictest that matches any of these. Names are equal, or
+/// follow 3D Gaussian Splatting, or the photos were stored in another format since.
 pub(crate) fn naming(dataset: &Dataset, cameras: &[SceneCamera]) -> fn(&str, &str) -> bool {
     let rules: [fn(&str, &str) -> bool; 3] = [|camera, photo| camera == photo, is_of, is_but_for_ending];
     let holds =
@@ -33,15 +33,15 @@ pub(crate) fn naming(dataset: &Dataset, cameras: &[SceneCamera]) -> fn(&str, &st
     rules.into_iter().find(holds).unwrap_or(is_but_for_ending)
 }
 
-/// Whether two names with folders differ in nothing but the ending of the file.
+/// Returns whether two names with folders differ in nothing but the file extension.
 fn is_but_for_ending(one: &str, other: &str) -> bool {
     Path::new(one).with_extension("") == Path::new(other).with_extension("")
 }
 
-/// Refuses to hold out every n-th photo where the data set itself marks photos as test.
+/// Refuses to hold out every n-th photo if the data set itself marks photos as test.
 ///
 /// # Errors
-/// [`JobError::TestPhotos`] where it does.
+/// [`JobError::TestPhotos`] if it does.
 pub(crate) fn refuse_holdout(dataset: &Dataset) -> Result<(), JobError> {
     match dataset.test_photos() {
         0 => Ok(()),

@@ -1,4 +1,4 @@
-//! Which Gaussians a pixel of a view consists of, and everything that is known of each.
+//! Gaussians that contribute to a pixel of a view, and the known values of each.
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -11,67 +11,67 @@ use crate::math::{Real, rotation, sh};
 use crate::render::{COLOR_MAX, ContributionSink, RenderSettings, Renderer, TILE_PX};
 use crate::scene::{Camera, GaussianCloud, IdentityId, Level, NOBODY, SemanticMap};
 
-/// A pixel that is to be looked into.
+/// Request to inspect a pixel.
 #[derive(Clone, Debug)]
 pub struct InspectRequest {
     /// The Gaussians that are drawn.
     pub(crate) cloud: Arc<GaussianCloud>,
-    /// What they belong to.
+    /// Their objects and parts.
     pub(crate) map: Option<Arc<SemanticMap>>,
-    /// Their numbers in the scene, if they are not all of it.
+    /// Their numbers in the scene, if `cloud` is not all of it.
     pub(crate) numbers: Option<Arc<Vec<usize>>>,
     pub(crate) camera: Camera,
     pub(crate) settings: RenderSettings,
     pub(crate) pixel: [u32; 2],
 }
 
-/// What a pixel consists of.
+/// Contributions to a pixel.
 #[derive(Clone, Debug)]
 pub struct InspectedPixel {
     pub(crate) request: InspectRequest,
     /// Gaussians of [`InspectRequest::cloud`] with their weights in the pixel, the largest first.
     pub(crate) weights: Vec<(usize, f32)>,
-    /// What all of them cover of the pixel.
+    /// Accumulated opacity of the pixel.
     pub(crate) alpha: f32,
 }
 
-/// All that is known of a Gaussian, as it is copied.
+/// Record of a Gaussian, as it is copied.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct GaussianRecord {
-    /// In the scene, counted from 0 as in its `.ply`.
+    /// Number in the scene, from 0 as in its `.ply`.
     pub(crate) number: usize,
-    /// Scene units, as are the scales.
+    /// Position in scene units, as are the scales.
     pub(crate) center: [f64; 3],
     /// Standard deviations along its own axes.
     pub(crate) scales: [f64; 3],
     /// World from its own axes, `[w, x, y, z]`, length 1; `None` if it has no direction.
     pub(crate) rotation_wxyz: Option<[f32; 4]>,
     pub(crate) opacity: f32,
-    /// As seen from where the view was drawn, and from everywhere on average.
+    /// Color in the view's direction; `base_color` is the mean over all directions.
     pub(crate) color: [f32; 3],
     pub(crate) base_color: [f32; 3],
     /// Coefficients of red, green and blue; bands of degree 0, 1, 2, 3 have 1, 3, 5, 7.
     pub(crate) sh: Vec<[f32; 3]>,
     pub(crate) pixel: PixelRecord,
-    /// What it belongs to, the innermost first; empty for nobody's.
+    /// Its identities, the innermost first; empty if it is unlabeled.
     pub(crate) identities: Vec<IdentityRecord>,
-    /// Codes of object and part.
+    /// Codes of its object and part.
     pub(crate) codes: Option<[[f32; 3]; 2]>,
-    /// What else came with it from a file.
+    /// Other properties from its file.
     pub(crate) extras: BTreeMap<String, f32>,
 }
 
-/// A Gaussian's part in a pixel.
+/// Contribution of a Gaussian to a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(crate) struct PixelRecord {
     pub(crate) x: u32,
     pub(crate) y: u32,
-    /// Place by weight, from 1, among so many.
+    /// Rank by weight, from 1; `of` is the number of ranks.
     pub(crate) place: usize,
     pub(crate) of: usize,
-    /// Opacity in the pixel times what those in front let through.
+    /// Opacity in the pixel times the transmittance of the Gaussians in front.
     pub(crate) weight: f32,
-    /// The same as a share of what all Gaussians cover.
+    /// Share of the pixel's accumulated opacity.
     pub(crate) share: f32,
 }
 
@@ -80,16 +80,16 @@ pub(crate) struct IdentityRecord {
     pub(crate) number: IdentityId,
     pub(crate) level: Level,
     pub(crate) name: String,
-    /// Margin of the votes by which it belongs there, 0 (a guess) to 1. Wholes have that of their piece.
+    /// Margin of the votes for this identity, 0 (a guess) to 1. Wholes have the margin of their part.
     pub(crate) weight: f32,
-    /// Share of the pixel that this identity and its pieces have.
+    /// Share of the pixel for this identity and its parts.
     pub(crate) pixel_share: f32,
 }
 
 /// Finds the weights of all Gaussians in the pixel.
 pub(crate) fn run(request: InspectRequest) -> Result<InspectedPixel, JobError> {
     let at = request.pixel.map(|v| v as usize);
-    // The rows of tiles below have no part in it.
+    // Rows of tiles below do not touch the pixel.
     let mut rows: Vec<PixelSink> = (0..=at[1] / TILE_PX).map(|_| PixelSink { at, weights: Vec::new() }).collect();
     Renderer::new().contributions(&request.cloud, &request.camera, &request.settings, &mut rows)?;
     let mut weights = rows.pop().map_or_else(Vec::new, |row| row.weights);
@@ -99,7 +99,7 @@ pub(crate) fn run(request: InspectRequest) -> Result<InspectedPixel, JobError> {
 }
 
 impl InspectedPixel {
-    /// The Gaussian at a place by weight, from 0.
+    /// Returns the Gaussian of a rank by weight, from 0.
     pub(crate) fn record(&self, place: usize) -> Option<GaussianRecord> {
         let (i, weight) = *self.weights.get(place)?;
         let InspectRequest { cloud, map, numbers, camera, settings, pixel: [x, y] } = &self.request;
@@ -152,7 +152,7 @@ impl InspectedPixel {
         })
     }
 
-    /// Share of the pixel that an identity and its pieces have.
+    /// Share of the pixel for an identity and its parts.
     fn share_of(&self, map: &SemanticMap, id: IdentityId) -> f32 {
         let inside = map.identities.descendants(id);
         let is_its = |i: usize| inside.get(map.identity_of[i] as usize) == Some(&true);
@@ -160,7 +160,7 @@ impl InspectedPixel {
     }
 }
 
-/// Takes the weights at one pixel.
+/// Collects the weights at one pixel.
 struct PixelSink {
     at: [usize; 2],
     weights: Vec<(usize, f32)>,

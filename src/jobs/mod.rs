@@ -1,7 +1,7 @@
-//! One file per use case: what the window, the command line and the agent do with a scene, wired once.
+//! One file per use case: the jobs that the window, the command line and the agent run on a scene.
 //!
-//! Jobs take plain inputs and an [`Observer`](crate::pipeline::observer::Observer) where they take long,
-//! and return a typed result or a [`JobError`]. Whoever calls them says the result in its own way.
+//! Jobs take plain inputs and an [`Observer`](crate::pipeline::observer::Observer) if they take long, and return a
+//! typed result or a [`JobError`]. The caller reports the result in its own way.
 
 pub(crate) mod batch;
 pub(crate) mod bench;

@@ -1,4 +1,4 @@
-//! Putting networks in place, and checking those that are there.
+//! Installs networks, and checks installed ones.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,40 +18,40 @@ use crate::pipeline::observer::{Observer, Ticker};
 /// Engine and models of this machine.
 #[derive(Clone, Debug)]
 pub struct ModelList {
-    /// What runs them, and on what; `None` if that cannot be used.
+    /// Engine and its device; `None` if it cannot be used.
     pub(crate) engine: Option<[String; 2]>,
-    /// Whether that is the fast one, and whether it stays until the program ends.
+    /// True if it is the fast engine; `is_settled` if it stays until the program ends.
     pub(crate) is_fast: bool,
     pub(crate) is_settled: bool,
     /// Cores of this machine.
     pub(crate) cores: usize,
-    /// What is wrong with it, or could be better.
+    /// Problem of the engine, or a hint to improve it.
     pub(crate) note: Option<String>,
-    /// Where they lie.
+    /// Folder of the models.
     pub(crate) folder: PathBuf,
     pub(crate) models: Vec<(ModelEntry, ModelState)>,
-    /// Downloads that were cut off: what has arrived, MB.
+    /// Downloads that were cut off: received MB.
     pub(crate) arrived: BTreeMap<String, u64>,
 }
 
 impl ModelList {
-    /// The model of this name.
+    /// Returns the model of this name.
     pub(crate) fn get(&self, id: &str) -> Option<&(ModelEntry, ModelState)> {
         self.models.iter().find(|(e, _)| e.id == id)
     }
 
-    /// About how much is still to be fetched for it, and how much has arrived already, MB.
+    /// Returns about how many MB remain to be downloaded for it, and how many were received.
     pub(crate) fn to_load(&self, entry: &ModelEntry) -> [u64; 2] {
         let arrived = self.arrived.get(&entry.id).copied().unwrap_or(0);
         [entry.download_megabytes().saturating_sub(arrived), arrived]
     }
 
-    /// The models for one purpose.
+    /// Returns the models for one purpose.
     pub(crate) fn of(&self, role: ModelRole) -> impl Iterator<Item = (&ModelEntry, &ModelState)> {
         self.models.iter().filter(move |(e, _)| e.role == role).map(|(e, s)| (e, s))
     }
 
-    /// What to propose for it: what was installed, else what is recommended, else what is built in.
+    /// Returns the model to propose: an installed one, else a recommended one, else a built-in one.
     pub(crate) fn best(&self, role: ModelRole) -> Option<&ModelEntry> {
         let rank = |(e, s): &(&ModelEntry, &ModelState)| match s {
             ModelState::Here => 0,
@@ -81,19 +81,19 @@ pub(crate) fn list() -> ModelList {
     ModelList { engine, is_fast, is_settled, cores: memory::cores(), note, folder, models, arrived }
 }
 
-/// Where the files of a model come from.
+/// Source of a model's files.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Source<'a> {
-    /// An address; `None` = the one in the list.
+    /// Download from an address; `None` = the one in the list.
     Fetch(Option<&'a str>),
-    /// A folder with its files, or the description in it; or its official checkpoint.
+    /// A folder with its files, or the description in it, or its official checkpoint.
     Brought(&'a Path),
 }
 
-/// What is done with a checkpoint once it is here.
+/// Stage of converting a checkpoint.
 const WRITING: &str = "Writing the weights";
 
-/// Puts the model called `id` in place.
+/// Installs the model called `id`.
 pub(crate) fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer) -> Result<ModelEntry, JobError> {
     let (folder, mut ticker) = (models::folder(), Ticker::new("", 0));
     let entry = catalog::entry(id)?;
@@ -118,7 +118,7 @@ pub(crate) fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer)
     Ok(entry)
 }
 
-/// Compares all files that are here with their checksums: what is wrong with each model, if anything.
+/// Compares all installed files with their checksums; returns each model with its error, if any.
 pub fn check() -> Result<Vec<(String, Option<String>)>, JobError> {
     let folder = models::folder();
     let here = |e: &ModelEntry| !matches!(e.state(&folder), ModelState::Missing(_));
@@ -126,19 +126,19 @@ pub fn check() -> Result<Vec<(String, Option<String>)>, JobError> {
     Ok(catalog::entries()?.into_iter().filter(here).map(check).collect())
 }
 
-/// What asking a model came to.
+/// Outcome of asking a model a known question.
 pub(crate) enum KnownCheck {
     Answer(KnownResult),
-    /// No answer of it was published.
+    /// The model has no published answer.
     NothingKnown,
-    /// The picture is neither here nor given.
+    /// The picture is neither installed nor given.
     NoPicture {
         address: String,
     },
 }
 
-/// Compares the files of one model with their checksums, and what it answers with what was published, about `picture`
-/// instead of the one that was fetched with it.
+/// Compares the files of one model with their checksums, and its answer with the published one, for `picture` instead
+/// of the installed one.
 pub(crate) fn ask_known(id: &str, picture: Option<&Path>) -> Result<KnownCheck, JobError> {
     let (entry, folder) = (catalog::entry(id)?, models::folder());
     entry.verify(&folder)?;
@@ -154,7 +154,7 @@ pub(crate) fn ask_known(id: &str, picture: Option<&Path>) -> Result<KnownCheck, 
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct EncoderTimes {
     pub(crate) id: String,
-    /// Loading it and its first use, ms.
+    /// Milliseconds of loading it and its first use.
     pub(crate) load_ms: f64,
     pub(crate) picture_ms: f64,
     pub(crate) phrase_ms: f64,
@@ -162,8 +162,8 @@ pub(crate) struct EncoderTimes {
     pub(crate) phrase: Vec<f32>,
 }
 
-/// Times every encoder that can be used here on a picture and a phrase: medians of so many `runs`. `told` hears
-/// of each that is here and cannot be used.
+/// Times every installed encoder on a picture and a phrase: medians over `runs`. `told` receives a report of each that
+/// cannot be used.
 pub(crate) fn time_encoders(runs: usize, told: &mut dyn FnMut(String)) -> Result<Vec<EncoderTimes>, JobError> {
     const PHRASE: &str = "a red wooden chair";
     let times = |run: &mut dyn FnMut() -> Result<(), ModelError>| -> Result<f64, ModelError> {

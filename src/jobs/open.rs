@@ -1,4 +1,4 @@
-//! Opening a scene: what the window and the command line see of a path, whatever kind of thing lies there.
+//! Opens a scene: the contents of a path, of any kind, for the window and the command line.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -27,42 +27,42 @@ pub(crate) use received::received;
 pub(crate) use tolerant::known_objects;
 use tolerant::{objects_elsewhere, photos_of, tolerant};
 
-/// Gaussians that can be drawn, and what came with them.
+/// Gaussians that can be drawn, and data that belongs to them.
 #[derive(Clone, Debug, Default)]
 pub struct Scene {
     pub(crate) path: PathBuf,
     /// Folder of the trained scene, if it is one.
     pub(crate) folder: Option<PathBuf>,
     pub(crate) name: String,
-    /// The Gaussians, without bands of harmonics that are zero.
+    /// The Gaussians, without zero bands of spherical harmonics.
     pub(crate) cloud: Arc<GaussianCloud>,
-    /// Degree of the harmonics in its file.
+    /// Degree of the spherical harmonics in its file.
     pub(crate) sh_stored: u8,
     /// The photos' cameras, possibly none.
     pub(crate) cameras: Vec<SceneCamera>,
-    /// How it is drawn: background, filter and so on, as it was trained.
+    /// Render settings: background, filter and so on, as in training.
     pub(crate) settings: RenderSettings,
-    /// Whether it says its background: a file of splats does not.
+    /// True if it has its own background: a splat file does not.
     pub(crate) says_background: bool,
-    /// How it was trained; defaults where that is not known.
+    /// Training settings; defaults if they are unknown.
     pub(crate) config: TrainConfig,
     pub(crate) history: History,
     pub(crate) photos: Option<PathBuf>,
-    /// Where its photos are, if they are still there.
+    /// Path of its photos, if they still exist.
     pub(crate) dataset_path: Option<PathBuf>,
     pub(crate) metres_per_unit: Option<f64>,
-    /// Id of the save that its files are of, if it has one.
+    /// Id of the save that its files belong to, if it has one.
     pub(crate) state: Option<String>,
-    /// The folder beside a splat that its cameras are from.
+    /// Folder beside a splat that its cameras are from.
     pub(crate) cameras_from: Option<PathBuf>,
-    /// Things the user should know of its files and of what lies beside them.
+    /// Warnings about its files and the files beside them.
     pub(crate) warnings: Vec<String>,
-    /// Whether its Gaussians were edited since it was trained.
+    /// True if its Gaussians were edited since training.
     pub(crate) edited: bool,
 }
 
 impl Scene {
-    /// What was read to open it, which no result may replace.
+    /// Returns the paths it was read from, which no result may replace.
     pub(crate) fn reads(&self) -> Vec<&Path> {
         std::iter::once(self.path.as_path()).chain(self.dataset_path.as_deref()).collect()
     }
@@ -71,18 +71,18 @@ impl Scene {
         self.cameras.iter().map(|c| c.camera.clone()).collect()
     }
 
-    /// How to look at it at first.
+    /// Returns its first view.
     pub(crate) fn home(&self) -> HomeView {
         HomeView::new(&self.views(), Some(&self.cloud))
     }
 
-    /// How it is drawn beside these photos: before their background, unless it says one itself.
+    /// Returns the render settings to compare with these photos: with their background, unless the scene has its own.
     pub(crate) fn settings_beside(&self, dataset: &Dataset) -> RenderSettings {
         let background = dataset.background.filter(|_| !self.says_background);
         RenderSettings { background: background.unwrap_or(self.settings.background), ..self.settings.clone() }
     }
 
-    /// Its objects and parts.
+    /// Loads its objects and parts.
     pub fn semantics(&self) -> Result<SemanticMap, JobError> {
         let map = match &self.folder {
             Some(folder) => io::semantic_map::load(folder, self.state.as_deref(), &self.cloud)?,
@@ -91,7 +91,7 @@ impl Scene {
         map.ok_or_else(|| JobError::NoObjects(self.path.clone()))
     }
 
-    /// Its objects and parts, if they were found.
+    /// Loads its objects and parts, if there are any.
     pub(crate) fn known_semantics(&self) -> Result<Option<SemanticMap>, JobError> {
         match self.semantics() {
             Err(JobError::NoObjects(_)) => Ok(None),
@@ -99,7 +99,7 @@ impl Scene {
         }
     }
 
-    /// Where its photos are, unless they are somewhere else.
+    /// Returns the path of its photos, or `elsewhere` if given.
     pub(crate) fn photos(&self, elsewhere: Option<&Path>) -> Result<PathBuf, JobError> {
         let known = elsewhere.map(Path::to_path_buf).or_else(|| self.dataset_path.clone());
         known.ok_or_else(|| JobError::PhotosGone(self.path.clone()))
@@ -119,7 +119,7 @@ impl Scene {
         let dataset_path = scene.dataset_path();
         let TrainedScene { folder, info, mut cloud, state } = scene;
         let (_, extent) = Camera::extent_of(info.cameras.iter().map(|c| &c.camera));
-        // Its files of earlier versions do not say it.
+        // Cloud files of earlier versions do not say it.
         cloud.render_mode = config.render_mode();
         let warnings = std::mem::take(&mut cloud.warnings);
         let mut settings = config.render_settings(info.background, extent);
@@ -149,8 +149,8 @@ impl Scene {
     }
 }
 
-/// What lies at a path.
-// One value exists per opening; a box would only be in the reader's way.
+/// Contents of a path.
+// One value exists per opening; a box would not help the reader.
 #[allow(clippy::large_enum_variant)]
 #[derive(Debug)]
 pub(crate) enum Contents {
@@ -158,7 +158,7 @@ pub(crate) enum Contents {
     Scene(Scene),
 }
 
-/// Reads what lies at `path`; the numbers of a splat by these axes, if they are given.
+/// Reads the contents of `path`; a splat with these axes, if given.
 pub(crate) fn contents(path: &Path, axes: Option<Axes>) -> Result<Contents, JobError> {
     let path = &*beside::splat_of(path);
     Ok(match io::open_in(path, axes)? {
@@ -176,7 +176,7 @@ pub fn scene(path: &Path) -> Result<Scene, JobError> {
     scene_in(path, None)
 }
 
-/// The same, the numbers of a splat by these axes, if they are given.
+/// Reads the same; a splat with these axes, if given.
 pub(crate) fn scene_in(path: &Path, axes: Option<Axes>) -> Result<Scene, JobError> {
     match contents(path, axes)? {
         Contents::Scene(scene) => Ok(scene),
@@ -191,13 +191,13 @@ pub(crate) fn dataset(path: &Path) -> Result<Dataset, JobError> {
     }
 }
 
-/// The cameras of a dataset's photos, those that `every` holds out marked.
+/// Returns the cameras of a dataset's photos, with every `every`-th marked as held out.
 pub(crate) fn cameras(dataset: &Dataset, every: usize) -> Vec<SceneCamera> {
     let (_, held_out) = dataset.split(every);
     trained::SceneInfo::of(dataset, &held_out, Path::new("")).cameras
 }
 
-/// A scene with all that is known of it, as it is looked at and worked on.
+/// A scene with all its data, as the user views and edits it.
 #[derive(Clone, Debug, Default)]
 pub struct OpenedScene {
     pub(crate) path: PathBuf,
@@ -205,48 +205,48 @@ pub struct OpenedScene {
     pub name: String,
     /// Posed photos, if it has any.
     pub dataset: Option<Arc<Dataset>>,
-    /// Those of them that its Gaussians were not trained on, if that is known.
+    /// Indices of held-out photos, if they are known.
     pub(crate) known_held_out: Option<Vec<usize>>,
-    /// What to draw: trained Gaussians, or the sparse points as small ones.
+    /// The drawn Gaussians: trained ones, or the sparse points as small ones.
     pub cloud: Option<Arc<GaussianCloud>>,
-    /// Whether `cloud` is a result, not just sparse points.
+    /// True if `cloud` is a result, not just sparse points.
     pub(crate) trained: bool,
     /// Objects and parts, if they were found before.
     pub semantics: Option<Arc<SemanticMap>>,
-    /// Where masks of its photos are, if they came with them.
+    /// Path of its photos' masks, if they came with the photos.
     pub(crate) masks: Option<PathBuf>,
     /// Folder in which training keeps its results and checkpoints.
     pub out: PathBuf,
     pub(crate) history: History,
     pub(crate) metres_per_unit: Option<f64>,
-    /// How to look at it at first.
+    /// The first view.
     pub home: HomeView,
-    /// How to draw it: background and filter.
+    /// Render settings: background and filter.
     pub render: RenderSettings,
     pub(crate) sh_stored: u8,
     pub(crate) facts: SceneFacts,
-    /// Id of the save that its files are of, if it has one.
+    /// Id of the save that its files belong to, if it has one.
     pub(crate) state: Option<String>,
-    /// Settings of a training in `out` that can go on.
+    /// Settings of a training run in `out` that can be resumed.
     pub(crate) resumable: Option<TrainConfig>,
-    /// All trainings of its photos that this program keeps, itself among them.
+    /// All training runs of its photos that this program keeps, itself included.
     pub runs: Vec<RunSummary>,
     pub(crate) reports: Vec<PathBuf>,
     pub(crate) report_out: PathBuf,
-    /// Whether edits of Gaussians have made it, and are stored in it.
+    /// True if edits of Gaussians created it, and are stored in it.
     pub(crate) is_edited: bool,
-    /// Where it is, if that is another computer.
+    /// Its computer, if that is another one.
     pub remote: Option<Origin>,
 }
 
 impl OpenedScene {
-    /// Where its Gaussians are stored: the folder of a trained scene, or a file.
+    /// Returns the path of its Gaussians: the folder of a trained scene, or a file.
     pub(crate) fn stored(&self) -> &Path {
         if trained::is_scene(&self.out) { &self.out } else { &self.path }
     }
 
-    /// The scene after a training that has kept its results in `out`: other settings are another training, in a folder
-    /// of its own. What another computer keeps lies there.
+    /// Returns the scene after training into `out`: other settings are another training run, in its own folder. A scene
+    /// on another computer keeps its results there.
     pub(crate) fn trained_in(&self, out: &Path) -> Self {
         let out = if self.remote.is_some() { &self.out } else { out };
         Self { out: out.into(), known_held_out: None, ..self.clone() }
@@ -257,7 +257,7 @@ impl OpenedScene {
         self.metres_per_unit.or_else(|| self.dataset.as_ref().and_then(|d| d.metres_per_unit))
     }
 
-    /// The photos that its Gaussians were not trained on, by index; where nobody knows, every `every`-th.
+    /// Returns the indices of its held-out photos; if they are unknown, every `every`-th.
     pub(crate) fn held_out(&self, every: usize) -> Vec<usize> {
         let split = || self.dataset.as_ref().map(|d| d.split(every).1);
         self.known_held_out.clone().or_else(split).unwrap_or_default()
@@ -294,8 +294,8 @@ impl OpenedScene {
     }
 }
 
-/// Opens a path with all that is known of it: photos with the Gaussians that were trained on them before, a
-/// trained scene with its photos. What is missing or broken beside the scene itself is told and left out.
+/// Opens a path with all its data: photos with the Gaussians that were trained on them before, a trained scene with its
+/// photos. Missing or broken files beside the scene itself are reported and left out.
 pub(crate) fn open(
     path: &Path,
     folders: &Folders,
@@ -316,7 +316,7 @@ pub(crate) fn open(
             let scene = tolerant(path, trained, observer);
             let dataset = photos_of(&scene, observer);
             if let Some(dataset) = dataset.as_ref().filter(|_| folders.is_training(path)) {
-                // One of several trainings of these photos, which are what somebody knows it by.
+                // One of several training runs of these photos, by which the user knows it.
                 at.clone_from(&dataset.root);
             }
             OpenedScene::of(scene, dataset, observer)
@@ -339,7 +339,7 @@ pub(crate) fn open(
     Ok(scene)
 }
 
-/// Photos, with the Gaussians that were trained on them before, if there are any.
+/// Opens photos, with the Gaussians that were trained on them before, if there are any.
 fn photos(dataset: Dataset, folders: &Folders, observer: &mut dyn Observer) -> OpenedScene {
     let out = folders.trained(dataset.source());
     let before = trained::is_scene(&out).then(|| trained::load(&out)).and_then(|loaded| match loaded {
@@ -363,8 +363,8 @@ fn photos(dataset: Dataset, folders: &Folders, observer: &mut dyn Observer) -> O
     OpenedScene { name, dataset: Some(dataset), cloud, out, render, home, ..OpenedScene::default() }
 }
 
-/// Distance of the near plane for Gaussians of which no cameras are known. Small ones would lie before the usual one; of
-/// large ones what is near may be seen, too.
+/// Returns the near plane's distance for Gaussians without cameras. Small scenes would lie before the default one; in
+/// large ones, near things may be visible, too.
 fn near_without_cameras(cloud: &GaussianCloud) -> f64 {
     let usual = RenderSettings::default().near;
     let bounds = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i)));
@@ -372,7 +372,7 @@ fn near_without_cameras(cloud: &GaussianCloud) -> f64 {
     if near > 0.0 { usual.min(near) } else { usual }
 }
 
-/// The Gaussians without bands of harmonics that are zero, and the degree that they came with.
+/// Drops zero bands of spherical harmonics; returns the degree in the file, too.
 fn compact(cloud: GaussianCloud) -> (Arc<GaussianCloud>, u8) {
     let stored = cloud.sh_degree;
     let used = used_degree(&cloud);

@@ -1,4 +1,4 @@
-//! A scene as a page to show: its Gaussians, objects and parts by name, and camera paths, in one HTML file.
+//! A scene as a web page: its Gaussians, objects and parts by name, and camera paths, in one HTML file.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -20,16 +20,16 @@ use crate::scene::{
     Bounds, Camera, CameraPath, CropBox, GaussianCloud, HomeView, Identities, IdentityId, NOBODY, SemanticMap, text,
 };
 
-/// The name's ending.
+/// Endings of the page's file name.
 pub(crate) const ENDINGS: [&str; 2] = [".html", ".htm"];
-/// Poses of a camera path in a second, and at most; the page mixes neighbors.
+/// Poses of a camera path per second, and at most; the page interpolates neighbors.
 const FRAMES: (f64, f64) = (20.0, 2_000.0);
-/// Photos that are looked through for where things are seen best, and their longer side in px.
+/// Number of photos that are searched for the best views of things, and their longer side in px.
 const LOOKS: (usize, u32) = (32, 160);
-/// Largest file beside a scene's that is looked into for a camera path, bytes.
+/// Largest file beside a scene's files that may be a camera path, bytes.
 const MAX_PATH_BYTES: u64 = 8 << 20;
 
-/// What is to be shown, and where it is written.
+/// Contents of a page, and its path.
 #[derive(Clone, Debug)]
 pub struct PageRequest {
     pub(crate) title: String,
@@ -46,7 +46,7 @@ pub struct PageRequest {
 }
 
 impl PageRequest {
-    /// All of a scene, with the camera paths that lie in its folder.
+    /// Returns a page of a whole scene, with the camera paths in its folder.
     ///
     /// # Errors
     /// If its objects and parts cannot be read.
@@ -64,7 +64,7 @@ impl PageRequest {
         })
     }
 
-    /// A line about what is on the page.
+    /// Returns a line that counts the contents of the page.
     pub(crate) fn facts(&self) -> String {
         let mut facts = things(self.cloud.len(), "Gaussian");
         if let Some(all) = self.map.as_ref().map(|map| &map.identities).filter(|all| !all.is_empty()) {
@@ -85,7 +85,7 @@ impl PageRequest {
     }
 }
 
-/// Camera paths among the files of a scene's folder, by the names of the files. What is none is passed over.
+/// Returns the camera paths among the files of a scene's folder, by file name. Other files are skipped.
 pub(crate) fn paths_in(folder: &Path) -> Vec<(String, CameraPath)> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     let is_debris = |e: &std::fs::DirEntry| e.file_name().to_str().is_none_or(files::is_debris);
@@ -97,13 +97,13 @@ pub(crate) fn paths_in(folder: &Path) -> Vec<(String, CameraPath)> {
     json.filter_map(|file| named_path(file).ok()).collect()
 }
 
-/// A camera path from a file, called like it.
+/// Reads a camera path from a file, with the file's name.
 pub(crate) fn named_path(file: &Path) -> Result<(String, CameraPath), IoError> {
     let stem = file.file_stem().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     Ok((stem.trim_end_matches(".nerfstudio").to_owned(), video::camera_path(file)?))
 }
 
-/// Writes the page and returns how many bytes it has.
+/// Writes the page and returns its size in bytes.
 ///
 /// # Errors
 /// If there are no Gaussians, something cannot be drawn or written, or the observer asks to stop.
@@ -128,7 +128,7 @@ fn page(request: &PageRequest, observer: &mut dyn Observer) -> Result<Page, JobE
     let view = home.camera([4, 3]);
     let focus = home.bounds.center();
     let around = (focus - view.center).dot(view.forward());
-    // A camera that looks away from the scene's middle turns about a point before it.
+    // A camera that looks away from the scene's middle orbits a point before it.
     let distance = if around > 0.0 { around } else { home.bounds.radius() };
     let order = packed::order(cloud);
     let identity_of = map.as_ref().map_or_else(|| vec![NOBODY; cloud.len()], |map| map.identity_of.clone());
@@ -157,7 +157,7 @@ fn page(request: &PageRequest, observer: &mut dyn Observer) -> Result<Page, JobE
     })
 }
 
-/// A path's poses at even times, if it has any.
+/// Returns a path's poses at even times, if it has any.
 fn frames(name: &str, path: &CameraPath, origin: DVec3) -> Option<PagePath> {
     let spline = CameraSpline::new(path, Speed::Constant)?;
     let flight = spline.flight(steps_of(spline.seconds(), FRAMES.0, FRAMES.1) + 1);
@@ -173,7 +173,7 @@ fn rotation(pose: &Pose) -> [f64; 4] {
     glam::DQuat::from_mat3(&nearest_rotation(&pose.world_from_camera)).to_array()
 }
 
-/// Those identities that have Gaussians; `best` are the cameras that see each best, by number.
+/// Returns the identities that have Gaussians; `best` are the cameras that see each best, by number.
 fn identities(cloud: &GaussianCloud, map: &SemanticMap, best: &[Option<DVec3>]) -> Vec<PageIdentity> {
     let all = &map.identities;
     let mut members: Vec<Vec<usize>> = vec![Vec::new(); all.len() + 1];
@@ -205,7 +205,7 @@ fn size(cloud: &GaussianCloud, i: usize) -> f64 {
     cloud.log_scales[i].iter().fold(f64::NEG_INFINITY, |most, v| most.max(f64::from(*v))).exp()
 }
 
-/// For each number, where the photo was taken that shows most of the identity, if one shows it.
+/// Returns for each number the position of the photo that shows most of the identity, if one shows it.
 fn best_views(
     cloud: &GaussianCloud,
     map: &SemanticMap,

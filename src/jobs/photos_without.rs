@@ -1,7 +1,7 @@
-//! The photos of a scene without a thing, and a scene that is trained anew on them.
+//! The photos of a scene without a thing, and a scene retrained on them.
 //!
-//! Where the thing was, a photo shows what the scene has there now, which is the same from all sides; where only its shadow
-//! was, it becomes as much brighter as the scene did; elsewhere it stays as it is.
+//! At the thing, a photo shows the scene's new content there, which is the same from all sides. At its shadow, it is
+//! brightened as the scene was. Elsewhere it is unchanged.
 
 use std::path::Path;
 
@@ -19,17 +19,17 @@ use crate::pipeline::semantics::carry::{carry_by, nearest};
 use crate::render::{Features, Renderer};
 use crate::scene::{Camera, Dataset, ExtraProperty, GaussianCloud, PhotoPixels, SemanticMap, SparsePoint};
 
-/// The folder of the photos in that of the scene, and what marks them as complete.
+/// Folder of the photos in that of the scene, and the file that marks them as complete.
 const PHOTOS: &str = "photos";
 const TRANSFORMS: &str = "transforms.json";
-/// What the photos lack, for who goes on.
+/// File that names the removed thing, to resume.
 const MARK: &str = "without.json";
-/// Share of a pixel from which the thing covers it, and what is replaced around that, px.
+/// Share of a pixel from which the thing covers it, and the replaced rim around that, px.
 const TOUCHED: f32 = 0.02;
 const RIM_PX: usize = 3;
 
-/// Trains the scene `from` anew on its photos without a thing, into `out`. What was stopped there goes on. `false` if the
-/// observer stopped it.
+/// Retrains the scene `from` on its photos without a thing, into `out`. A stopped run there is resumed. Returns `false`
+/// if the observer stopped it.
 pub(crate) fn retrain(
     from: &Scene,
     map: &SemanticMap,
@@ -62,17 +62,17 @@ pub(crate) fn retrain(
     Ok(true)
 }
 
-/// Refuses a folder that holds something else than what [`retrain`] has begun there.
+/// Refuses a folder with anything but the results of [`retrain`] with the same request.
 pub(crate) fn check(from: &Scene, without: (&RemovalOptions, &str), out: &Path) -> Result<(), JobError> {
     if is_begun(from, without, out) { Ok(()) } else { super::derived::check(out) }
 }
 
-/// Whether [`retrain`] has begun exactly this in a folder.
+/// Returns whether [`retrain`] has begun exactly this in a folder.
 pub(crate) fn is_begun(from: &Scene, without: (&RemovalOptions, &str), out: &Path) -> bool {
     files::read_json::<serde_json::Value>(&out.join(PHOTOS).join(MARK)).is_ok_and(|m| m == mark(from, without))
 }
 
-/// Whether the photos in a folder are made without something.
+/// Returns whether the photos in a folder were made without a thing.
 pub(crate) fn is_without(photos: &Path) -> bool {
     photos.join(MARK).is_file()
 }
@@ -81,7 +81,7 @@ fn mark(from: &Scene, (options, name): (&RemovalOptions, &str)) -> serde_json::V
     json!({ "version": 2, "scene": from.path, "state": from.state, "without": name, "options": options })
 }
 
-/// Writes the photos as a data set of its own, in the size that was trained on.
+/// Writes the photos as their own data set, in the training size.
 fn write(
     from: &Scene,
     map: &SemanticMap,
@@ -142,14 +142,14 @@ fn frame(camera: &Camera, file: &str) -> serde_json::Value {
     })
 }
 
-/// What counts for nothing is transparent.
+/// Writes a photo; pixels that do not count are transparent.
 fn store(path: &Path, pixels: PhotoPixels) -> Result<(), IoError> {
     let Some(coverage) = &pixels.coverage else { return export::picture(path, &pixels) };
     let samples: Vec<u8> = pixels.rgb.iter().zip(coverage).flat_map(|(c, a)| [c[0], c[1], c[2], *a]).collect();
     export::png(path, &samples, [pixels.width_px, pixels.height_px], image::ColorType::Rgba8)
 }
 
-/// The sparse points that are not of the thing, and what was invented.
+/// Returns the sparse points without the thing's, and the invented Gaussians.
 fn points(dataset: &Dataset, from: &Scene, thing: &[bool], cloud: &GaussianCloud) -> Vec<SparsePoint> {
     let places: Vec<DVec3> = dataset.points.iter().map(|p| p.position).collect();
     let near = nearest(&from.cloud, &places);

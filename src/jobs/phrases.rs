@@ -1,4 +1,4 @@
-//! A list of phrases asked of some views: scores, areas, IoU with true masks, and the masks as files.
+//! A list of phrases queried in some views: scores, areas, IoU with true masks, and the masks as files.
 
 pub(crate) mod colors;
 
@@ -25,23 +25,23 @@ use crate::render::{RenderSettings, Renderer};
 use crate::scene::text;
 use crate::scene::{Camera, GaussianCloud, LevelFilter, Mask, SemanticMap};
 
-/// Phrases of a list at most.
+/// Most phrases of a list.
 pub(crate) const MOST: usize = 1_000;
-/// Characters of a line that are told at most.
+/// Most characters of a line that are quoted in errors.
 const LONGEST_TOLD: usize = 60;
 
-/// What phrases are compared with.
+/// Masks that phrases are compared with.
 #[derive(Clone, Debug, Default)]
 pub(crate) enum TrueMasks {
     #[default]
     None,
-    /// `FOLDER/<view>/<phrase>.png`, named as masks are exported; what has no file is not compared.
+    /// `FOLDER/<view>/<phrase>.png`, named as masks are exported; phrases without a file are not compared.
     Folder(PathBuf),
     /// One mask for every phrase and view.
     Mask(Arc<Mask>),
 }
 
-/// What is to be asked, and where.
+/// Phrases, and the scene and views to query.
 #[derive(Clone, Debug)]
 pub struct PhrasesRequest {
     pub(crate) cloud: Arc<GaussianCloud>,
@@ -50,11 +50,11 @@ pub struct PhrasesRequest {
     /// Views with their names.
     pub(crate) views: Vec<(String, Camera)>,
     pub(crate) phrases: Vec<String>,
-    /// Those that phrases have already.
+    /// Colors that phrases have already.
     pub(crate) colors: PhraseColors,
     pub(crate) level: LevelFilter,
     pub(crate) recipe: Recipe,
-    /// Answers whose pixels go into a mask at most.
+    /// Most answers whose pixels go into a mask.
     pub(crate) top: usize,
     pub(crate) truth: TrueMasks,
     /// Folder for masks and tables, if they are wanted.
@@ -66,24 +66,24 @@ pub struct PhrasesRequest {
 pub struct PhraseRow {
     pub(crate) view: String,
     pub(crate) phrase: String,
-    /// In which it is shown, red, green and blue.
+    /// Color of its display, red, green and blue.
     pub(crate) color: [u8; 3],
     /// "found", "ambiguous" or "not found".
     pub(crate) verdict: &'static str,
     /// "certain", "likely" or "guess".
     pub(crate) certainty: &'static str,
-    /// What is meant, in full.
+    /// Full name of the answer.
     pub(crate) answer: String,
     pub(crate) score: f32,
     pub(crate) margin: f32,
     pub(crate) area_px: usize,
     /// Share of the view.
     pub(crate) share: f64,
-    /// With the true mask, where there is one.
+    /// IoU with the true mask, if there is one.
     pub iou: Option<f64>,
 }
 
-/// The phrases of a list, one a line, blank lines left out.
+/// Returns the phrases of a list, one a line, without blank lines.
 ///
 /// # Errors
 /// If there are none, or too many.
@@ -110,10 +110,10 @@ pub(crate) fn read(path: &Path) -> Result<Vec<String>, JobError> {
     listed(&files::read_text(path)?).map_err(named)
 }
 
-/// Asks every phrase of every view.
+/// Queries every phrase in every view.
 ///
 /// # Errors
-/// If an encoder fails, a view cannot be drawn, or a file not be read or written.
+/// If an encoder fails, a view cannot be drawn, or a file cannot be read or written.
 pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Result<Vec<PhraseRow>, JobError> {
     let PhrasesRequest { cloud, map, settings, views, phrases, level, .. } = request;
     let mut engine = QueryEngine::new(map.language.as_ref(), request.recipe.clone())?;
@@ -159,7 +159,7 @@ pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Resu
     Ok(rows)
 }
 
-/// The true mask, in the size of `like`.
+/// Loads the true mask, in the size of `like`.
 fn truth(truth: &TrueMasks, place: &Path, like: &Mask) -> Result<Option<Mask>, JobError> {
     let read = match truth {
         TrueMasks::None => None,
@@ -172,7 +172,7 @@ fn truth(truth: &TrueMasks, place: &Path, like: &Mask) -> Result<Option<Mask>, J
     read.map(|mask| fitted(mask, like.width_px(), like.height_px(), place)).transpose()
 }
 
-/// Reads a true mask: what is white in a picture.
+/// Reads a true mask: the white pixels of a picture.
 ///
 /// # Errors
 /// If it cannot be read, or is too large.
@@ -180,13 +180,13 @@ pub(crate) fn true_mask(path: &Path) -> Result<Mask, JobError> {
     Ok(pictures::mask(path)?)
 }
 
-/// A mask in the size of a view of the same shape.
+/// Resizes a mask to a view of the same shape.
 ///
 /// # Errors
-/// If its shape is another.
+/// If its shape differs.
 pub(crate) fn fitted(mask: Mask, width_px: usize, height_px: usize, place: &Path) -> Result<Mask, JobError> {
     let (w, h) = (mask.width_px(), mask.height_px());
-    // A pixel more or less is from rounding.
+    // Rounding may differ by a pixel.
     if (w * height_px).abs_diff(h * width_px) > w.max(h).max(width_px).max(height_px) {
         let shapes = format!("the mask has {w} x {h} px, the view {width_px} x {height_px}");
         let remedy = "use a mask that was drawn on this view";
@@ -221,9 +221,9 @@ fn row(
     }
 }
 
-/// The rows as a table for spreadsheets.
+/// Returns the rows as a table for spreadsheets.
 fn csv(rows: &[PhraseRow]) -> String {
-    // What begins with these is a formula to some spreadsheets.
+    // Some spreadsheets take text that begins so for a formula.
     let cell = |text: &str| {
         let text = if text.starts_with(['=', '+', '-', '@']) { format!("'{text}") } else { text.to_owned() };
         format!("\"{}\"", text.replace('"', "\"\""))
@@ -243,7 +243,7 @@ fn csv(rows: &[PhraseRow]) -> String {
     all
 }
 
-/// A name as a file may have it: letters and digits in lower case, `_` between them; without the ending of a picture.
+/// Returns a name fit for files: letters and digits in lower case, `_` between them, without the ending of a picture.
 fn stem(name: &str) -> String {
     let is_ending = |e: &str| (1..=4).contains(&e.len()) && e.chars().all(char::is_alphanumeric);
     let name = name.rsplit_once('.').filter(|(_, ending)| is_ending(ending)).map_or(name, |(stem, _)| stem);
@@ -253,7 +253,7 @@ fn stem(name: &str) -> String {
     if stem.is_empty() { "unnamed".into() } else { stem }
 }
 
-/// A file stem for each phrase; what would be the same gets a number.
+/// Returns a file stem for each phrase; equal ones get a number.
 fn stems(phrases: &[String]) -> Vec<String> {
     let mut taken = BTreeSet::new();
     let mut next = |phrase: &String| {

@@ -1,4 +1,4 @@
-//! What a scene's plan is computed from, for all who make one.
+//! Facts that a scene's plan is computed from, for all callers.
 
 use super::Scene;
 use crate::io::memory;
@@ -17,7 +17,7 @@ pub(crate) fn machine() -> Machine {
     }
 }
 
-/// Facts about photos and trained Gaussians; those come with the degree of the harmonics in their file.
+/// Returns facts about photos and trained Gaussians; those come with the degree of spherical harmonics in their file.
 pub(crate) fn facts(
     machine: &Machine,
     dataset: Option<&Dataset>,
@@ -33,26 +33,26 @@ pub(crate) fn facts(
     }
 }
 
-/// Facts about a scene and its cameras, without looking at its photos.
+/// Returns facts about a scene and its cameras, without its photos.
 pub(crate) fn scene_facts(machine: &Machine, scene: &Scene, config: &TrainConfig) -> SceneFacts {
     let cameras = scene.views();
     let facts = SceneFacts::of(machine.clone(), config.limits()).with_photos(&cameras);
     facts.with_cloud(&scene.cloud, scene.sh_stored, &cameras)
 }
 
-/// The plan for a scene that is to be drawn; nothing in it depends on the machine.
+/// Returns the plan for drawing a scene; nothing in it depends on the machine.
 pub(crate) fn of_scene(scene: &Scene, overrides: &Overrides) -> ScenePlan {
     ScenePlan::new(scene_facts(&Machine::default(), scene, &scene.config), overrides)
 }
 
-/// The settings of a training on photos once its plan has been made.
+/// Returns the settings of training on photos, with its plan applied.
 pub(crate) fn planned(dataset: &Dataset, config: TrainConfig, overrides: &Overrides) -> TrainConfig {
     let plan = of_photos(dataset, &config, overrides);
     let backend = if plan.on_cpu { BackendChoice::Cpu } else { config.backend };
     TrainConfig { max_side_px: plan.train_side_px, backend, ..config }
 }
 
-/// The plan for training on photos; nothing in it depends on the machine.
+/// Returns the plan for training on photos; nothing in it depends on the machine.
 pub(crate) fn of_photos(dataset: &Dataset, config: &TrainConfig, overrides: &Overrides) -> ScenePlan {
     ScenePlan::new(facts(&Machine::default(), Some(dataset), None, config), overrides)
 }

@@ -1,26 +1,26 @@
-//! Settings of a training as a TOML file, to be kept, changed and taken to another scene.
+//! Training settings as a TOML file, to be kept, edited and used for another scene.
 
 use std::path::Path;
 
 use crate::io::{IoError, atomic, files};
 use crate::pipeline::train::TrainConfig;
 
-/// What the settings that a scene was trained with are called in its folder.
+/// File name of the training settings in a scene's folder.
 const FILE: &str = "training.toml";
 /// Largest file that is read.
 const MAX_BYTES: u64 = 1 << 16;
 
-/// The settings as TOML, a line each. What is left to the program is left out.
+/// Returns the settings as TOML, a line each. Automatic ones are left out.
 pub(crate) fn text(config: &TrainConfig) -> String {
-    // Numbers, truth values and plain words are written alike in JSON and in TOML.
+    // Numbers, booleans and plain words are written alike in JSON and in TOML.
     let known = fields(config).into_iter().filter(|(_, value)| !value.is_null());
     known.map(|(name, value)| format!("{name} = {value}\n")).collect()
 }
 
-/// Reads settings; those that the file does not name have their defaults.
+/// Reads settings; those that are missing in the file have their defaults.
 ///
 /// # Errors
-/// If the file cannot be read, is no TOML, or names what is no setting.
+/// If the file cannot be read, is not TOML, or has an unknown setting.
 pub(crate) fn read(path: &Path) -> Result<TrainConfig, IoError> {
     let bytes = files::read(path, MAX_BYTES)?;
     let broken = |place: &str, reason: String| IoError::Syntax { path: path.into(), place: place.into(), reason };
@@ -35,7 +35,7 @@ pub(crate) fn read(path: &Path) -> Result<TrainConfig, IoError> {
     table.try_into().map_err(|e: toml::de::Error| broken("the settings", e.to_string()))
 }
 
-/// Writes the settings into the folder of the scene that was trained with them.
+/// Writes the settings into the folder of their trained scene.
 ///
 /// # Errors
 /// If the file cannot be written.

@@ -1,4 +1,4 @@
-//! Asking a scene where something is: the answer, its pixels in a view, and the relevancy of all others.
+//! Queries of a scene: the answer, its pixels in a view, and the relevancy of all others.
 
 use std::path::Path;
 use std::time::Instant;
@@ -21,25 +21,25 @@ use crate::pipeline::semantics::votes::UNKNOWN;
 use crate::render::{DrawError, Features, RenderError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, LevelFilter, Mask, NOBODY, SemanticMap};
 
-/// What the pixels of a view belong to, drawn once for all questions.
+/// Identities of a view's pixels, drawn once for all queries.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct ViewMaps {
-    /// By identity of largest weight.
+    /// Identity of largest weight per pixel.
     pub identities: ViewMap,
-    /// Blended codes, if they were wanted.
+    /// Blended codes, if they were requested.
     pub(crate) codes: Option<CodeMap>,
-    /// Where those win of which nothing is known; to everything else these pixels are nobody's.
+    /// Pixels dominated by unknown Gaussians: no mask or photo tells about them. All else treats them as unlabeled.
     pub(crate) unknown: Mask,
-    /// Where those win that were invented to close a surface; empty where there are none.
+    /// Pixels dominated by Gaussians that were invented to close a surface; empty if there are none.
     pub(crate) invented: Mask,
 }
 
-/// Stands for Gaussians of which nothing is known while a view is drawn. No identity has this number, so they count
-/// together with what is nobody's, and masks are the same with them or without.
+/// Stands for unknown Gaussians while a view is drawn. No identity has this number, so they count together with
+/// unlabeled ones, and masks are the same with them or without.
 const UNSEEN: IdentityId = UNKNOWN - 1;
 
 impl ViewMaps {
-    /// Draws them; codes where they are `wanted`, those of parts too if `parts` are.
+    /// Draws them; codes if `wanted`, those of parts too if `parts`.
     pub(crate) fn draw(
         renderer: &mut Renderer,
         (cloud, settings): (&GaussianCloud, &RenderSettings),
@@ -62,28 +62,28 @@ impl ViewMaps {
         Ok(Self { identities, codes, unknown, invented })
     }
 
-    /// Share of the view that no photo has seen.
+    /// Share of the view dominated by invented Gaussians.
     pub(crate) fn invented_share(&self) -> f64 {
         self.invented.area() as f64 / self.identities.identity.len().max(1) as f64
     }
 
-    /// Share of the view of which nothing is known.
+    /// Share of the view dominated by unknown Gaussians.
     pub(crate) fn unknown_share(&self) -> f64 {
         self.unknown.area() as f64 / self.identities.identity.len().max(1) as f64
     }
 
-    /// The pixels of an identity; a match differs by at most `tolerance` per channel.
+    /// Returns the pixels of an identity; a match differs by at most `tolerance` per channel.
     pub(crate) fn mask(&self, map: &SemanticMap, id: IdentityId, mode: MatchMode, tolerance: f32) -> Mask {
         matching::pixels((&self.identities, self.codes.as_ref()), &map.identities, id, mode, tolerance)
     }
 
-    /// The pixels of an answer, of at most `top` identities.
+    /// Returns the pixels of an answer, of at most `top` identities.
     pub(crate) fn of_answer(&self, map: &SemanticMap, answered: &QueryAnswer, top: usize) -> Mask {
         answered.mask(&self.identities, self.codes.as_ref(), &map.identities, top)
     }
 }
 
-/// The pixels that invented Gaussians have most of.
+/// Returns the pixels dominated by invented Gaussians.
 fn invented(
     renderer: &mut Renderer,
     (cloud, settings): (&GaussianCloud, &RenderSettings),
@@ -96,7 +96,7 @@ fn invented(
     Ok(Mask::from_fn(frame.width_px, frame.height_px, |i| frame.features[0][i] >= 0.5))
 }
 
-/// What the pixels of a view belong to.
+/// Draws the identities of a view's pixels.
 pub(crate) fn identities_in_view(
     drawn: (&GaussianCloud, &RenderSettings),
     map: &SemanticMap,
@@ -105,31 +105,31 @@ pub(crate) fn identities_in_view(
     Ok(ViewMaps::draw(&mut Renderer::new(), drawn, map, camera, false, false)?.identities)
 }
 
-/// A question about a scene in a view.
+/// A query of a scene in a view.
 #[derive(Clone, Debug)]
 pub(crate) struct QueryRequest<'a> {
     pub(crate) text: &'a str,
     pub(crate) level: LevelFilter,
     pub(crate) camera: &'a Camera,
     pub(crate) recipe: &'a Recipe,
-    /// Answers whose pixels go into the mask at most.
+    /// Most answers whose pixels go into the mask.
     pub(crate) top: usize,
 }
 
 #[derive(Clone, Debug)]
 pub(crate) struct QueryResult {
-    /// What is meant, and how long that took.
+    /// The answer, and the time it took.
     pub(crate) answered: QueryAnswer,
-    /// How the question was read.
+    /// The parsed query.
     pub(crate) reading: QueryReading,
     pub(crate) mask: Mask,
     /// Canonical phrases that the encoder could not read and that were left out.
     pub(crate) unread: Vec<String>,
-    /// Words that the answer does not rest on.
+    /// Words that the answer does not use.
     pub(crate) ignored_words: Vec<String>,
-    /// Words for want of which there is no answer.
+    /// Words that would have been needed for an answer.
     pub(crate) unexplained_words: Vec<String>,
-    /// Milliseconds from the text to the mask, the view there.
+    /// Milliseconds from the text to the mask, with the view drawn before.
     pub(crate) query_ms: f64,
     pub(crate) maps: ViewMaps,
 }
@@ -151,7 +151,7 @@ pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &QueryRequest<'_>) 
     Ok(QueryResult { answered, reading, mask, unread, ignored_words, unexplained_words, query_ms, maps })
 }
 
-/// The identities that are meant, at most `top` of them.
+/// Returns the identities of the answer, at most `top` of them.
 pub(crate) fn identities(
     map: &SemanticMap,
     text: &str,
@@ -161,10 +161,10 @@ pub(crate) fn identities(
     Ok(answered(map, text, level, &Recipe::default())?.chosen(top))
 }
 
-/// The same for whoever changes them: by names alone.
+/// Returns the same for edits: by names alone.
 ///
 /// # Errors
-/// If nothing is found, or only by what it looks like.
+/// If nothing is found, or only by embedding.
 pub(crate) fn named(
     map: &SemanticMap,
     text: &str,
@@ -181,7 +181,7 @@ pub(crate) fn named(
     }
 }
 
-/// The answer to a question.
+/// Returns the answer to a query.
 ///
 /// # Errors
 /// If nothing is found, or the encoder fails.
@@ -195,7 +195,7 @@ pub(crate) fn answered(
     answered.filter(|a| !a.chosen(1).is_empty()).ok_or_else(|| JobError::NoMatch(text.to_owned()))
 }
 
-/// Endings of what [`write_mask`] and [`write_heat`] write.
+/// Endings of files that [`write_mask`] and [`write_heat`] write.
 pub(crate) const MAP_ENDINGS: [&str; 2] = [".png", ".npy"];
 
 fn is_array(path: &Path) -> bool {
@@ -214,7 +214,7 @@ pub(crate) fn write_mask(path: &Path, mask: &Mask) -> Result<(), JobError> {
     Ok(export::png(path, &pixels, size, ColorType::L8)?)
 }
 
-/// Writes the relevancy of every pixel: over the picture in gray, or as an array of numbers.
+/// Writes the relevancy of every pixel: over the gray picture, or as an array of numbers.
 pub(crate) fn write_heat(
     path: &Path,
     (cloud, settings): (&GaussianCloud, &RenderSettings),
@@ -244,7 +244,7 @@ mod tests {
 
     #[test]
     fn what_nothing_is_known_of_is_nobodys_and_told_apart() {
-        // A row of four: an object's, one that masks give to nobody, one that nothing is known of, and a guess at the object.
+        // A row of four: one of an object, one unlabeled by masks, one unknown, and a guess at the object.
         let at = |x: f32| [x, 0.0, 0.0];
         let cloud = GaussianCloud::isotropic(vec![at(-0.9), at(-0.3), at(0.3), at(0.9)], -2.0, 6.0);
         let camera =
@@ -260,7 +260,7 @@ mod tests {
         let at = [-0.9, -0.3, 0.3, 0.9].map(|x| (maps.identities.identity[px(x)], maps.unknown.contains(px(x))));
         assert_eq!(at, [(1, false), (NOBODY, false), (NOBODY, true), (1, false)]);
         assert!((0.002..0.05).contains(&maps.unknown_share()), "{}", maps.unknown_share());
-        // The control: where something is known of all, none of it is told apart, and every pixel belongs to the same.
+        // The control: if none is unknown, no pixel is, and every pixel has the same identity as before.
         let known = draw([1.0; 4]);
         assert!(known.unknown.is_empty() && known.identities == maps.identities && known.unknown_share() == 0.0);
     }

@@ -8,33 +8,33 @@ use crate::io::SceneFolder;
 pub(crate) use crate::pipeline::splat_edit::{Arrangement, Placement, SplatEdit, apply};
 use crate::scene::{Camera, GaussianCloud, SceneFacts, SemanticMap};
 
-/// The Gaussians of `scene` and its objects and parts, if it has any, after an edit.
+/// Returns the Gaussians of `scene` and its objects and parts, if it has any, after an edit.
 pub(crate) fn applied(scene: &Scene, edit: &SplatEdit) -> Result<(GaussianCloud, Option<SemanticMap>), JobError> {
     Ok(apply(&scene.cloud, scene.known_semantics()?.as_ref(), edit)?)
 }
 
-/// What is to be changed.
+/// A change of the scene.
 #[derive(Clone, Debug)]
 pub enum SplatChange {
     /// An edit.
     Apply(SplatEdit),
-    /// Other Gaussians, with their objects and parts: undo and redo.
+    /// Other Gaussians, with their objects and parts, for undo and redo.
     Restore(Arc<GaussianCloud>, Option<Arc<SemanticMap>>),
 }
 
-/// What the window asks for. The scene that was opened stays as it is: the first edit makes another one beside it, in
-/// which it is stored with all that follow.
+/// Request of the window. The opened scene stays unchanged: the first edit creates another one beside it, in which it
+/// and all later edits are stored.
 #[derive(Clone, Debug)]
 pub struct RearrangeRequest {
-    /// Where the scene on screen lies, and what it is called.
+    /// Path and name of the scene on screen.
     pub(crate) path: PathBuf,
     pub(crate) name: String,
-    /// Whether that is one that an edit has made.
+    /// True if an edit has created that scene.
     pub(crate) is_edited: bool,
     pub(crate) cloud: Arc<GaussianCloud>,
     pub(crate) map: Option<Arc<SemanticMap>>,
     pub(crate) change: SplatChange,
-    /// What is known of the scene, and the photos' cameras.
+    /// Facts about the scene, and the photos' cameras.
     pub(crate) facts: SceneFacts,
     pub(crate) cameras: Vec<Camera>,
 }
@@ -44,17 +44,17 @@ pub struct RearrangeRequest {
 pub struct RearrangedScene {
     pub(crate) cloud: Arc<GaussianCloud>,
     pub(crate) map: Option<Arc<SemanticMap>>,
-    /// Where it is stored, what it is called, and the id of its state.
+    /// Its folder, its name, and the id of its state.
     pub(crate) folder: PathBuf,
     pub(crate) name: String,
     pub(crate) state: String,
     pub(crate) facts: SceneFacts,
 }
 
-/// Carries a change out and stores the result; `known` is the state in which the edited scene is known.
+/// Applies a change and stores the result; `known` is the state in which the edited scene was last read.
 ///
 /// # Errors
-/// If the edit makes no sense or cannot be stored; nothing has changed then.
+/// If the edit is invalid or cannot be stored; nothing has changed then.
 pub(crate) fn run(request: &RearrangeRequest, known: Option<&str>) -> Result<RearrangedScene, JobError> {
     let RearrangeRequest { path, cloud, map, .. } = request;
     let (cloud, map) = match &request.change {

@@ -1,4 +1,4 @@
-//! Small pictures of the scenes that were opened lately, for the first page of the window.
+//! Small pictures of recently opened scenes, for the start page of the window.
 
 use std::path::{Path, PathBuf};
 
@@ -31,8 +31,7 @@ pub(crate) fn keep(folders: &Folders, of: &Path, pixels: &PhotoPixels) -> Result
     )?)
 }
 
-/// The pictures that were kept of these scenes. Those that cannot be read are left out: they are drawn anew when
-/// the scene is opened.
+/// Loads the kept pictures of these scenes. Unreadable ones are left out: they are drawn anew when the scene is opened.
 pub(crate) fn load(folders: &Folders, of: Vec<PathBuf>) -> Vec<(PathBuf, PhotoPixels)> {
     let read = |path: &Path| -> Result<PhotoPixels, IoError> {
         let file = folders.picture(path);
@@ -46,20 +45,20 @@ pub(crate) fn load(folders: &Folders, of: Vec<PathBuf>) -> Vec<(PathBuf, PhotoPi
     of.into_iter().filter_map(|path| Some((read(&path).ok()?, path))).map(|(pixels, path)| (path, pixels)).collect()
 }
 
-/// A training of a data set, as it is told of in lists.
+/// Summary of a training run, for lists.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunSummary {
     /// Its folder.
     pub folder: PathBuf,
-    /// Steps that it has come to.
+    /// Number of finished steps.
     pub steps: u64,
-    /// Objects and parts that are stored with it.
+    /// Number of objects and parts stored with it.
     pub objects: usize,
     psnr: Option<f64>,
 }
 
 impl RunSummary {
-    /// In words: "run-1: 600 steps, 26.6 dB, 13 objects and parts".
+    /// Returns text such as "run-1: 600 steps, 26.6 dB, 13 objects and parts".
     pub(crate) fn text(&self) -> String {
         let name = self.folder.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let quality = self.psnr.map_or_else(String::new, |psnr| format!(", {psnr:.1} dB"));
@@ -72,7 +71,7 @@ impl RunSummary {
     }
 }
 
-/// The trainings of the photos at `path`, first to last. Those that cannot be read are left out.
+/// Returns the training runs of the photos at `path`, oldest first. Unreadable ones are left out.
 pub(crate) fn runs(folders: &Folders, path: &Path) -> Vec<RunSummary> {
     let summary = |folder: PathBuf| {
         let info = trained::load_info(&folder).ok()?;
@@ -84,7 +83,7 @@ pub(crate) fn runs(folders: &Folders, path: &Path) -> Vec<RunSummary> {
     folders.trainings(path).into_iter().filter_map(summary).collect()
 }
 
-/// The trainings of those of these photos that have several.
+/// Returns the training runs of these photos, for photos with several.
 pub(crate) fn several(folders: &Folders, of: Vec<PathBuf>) -> Vec<(PathBuf, Vec<RunSummary>)> {
     // Photos may have been opened by the file that lists them.
     let root = |path: &Path| if path.is_file() { files::folder_of(path).to_path_buf() } else { path.to_path_buf() };

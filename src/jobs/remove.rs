@@ -1,4 +1,4 @@
-//! Taking things out of a scene, for good, into a scene of its own.
+//! Removal of things from a scene, for good, into another scene.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -22,7 +22,7 @@ pub(crate) struct Reduced {
     pub(crate) report: RemovalReport,
 }
 
-/// Takes things out of `scene`, whose objects are those of `map`.
+/// Removes things from `scene`, whose objects are those of `map`.
 pub(crate) fn run(
     scene: &Scene,
     map: &SemanticMap,
@@ -40,49 +40,49 @@ pub(crate) fn run(
     let mut new = rest.select_fully(&done.kept);
     for id in done.identity_of.iter().skip(done.kept.len()).map(|id| number[*id as usize]) {
         new.identity_of.push(id);
-        // Whose it is was guessed, as all of it was.
+        // All identities of invented Gaussians are guesses.
         new.margin.push(GUESSED);
         new.codes.push(new.identities.codes(id));
     }
     let mut stays = vec![false; scene.cloud.len()];
     done.kept.iter().for_each(|i| stays[*i] = true);
     let gone: Vec<usize> = (0..stays.len()).filter(|i| !stays[*i]).collect();
-    // Photos still show it, where it was.
+    // Photos still show the removed things.
     new.add_removed(scene.cloud.select(&gone));
     Ok(Reduced { cloud: done.cloud.into(), map: new.into(), report: done.report })
 }
 
-/// What the window and the agent ask for: the result goes into a folder beside the scene's.
+/// Request of the window and the agent: the result goes into a folder beside the scene's.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RemoveRequest {
     /// Folder of the scene.
     pub(crate) folder: PathBuf,
     pub(crate) options: RemovalOptions,
-    /// Whether the scene is trained anew on its photos without the thing, which takes as long as it took.
+    /// True if the scene is retrained on its photos without the thing, which takes as long as the first training.
     pub(crate) retrain: bool,
 }
 
-/// A scene that was stored without some things.
+/// A stored scene without some things.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RemovedScene {
-    /// Where it lies.
+    /// Folder of the new scene.
     pub(crate) folder: PathBuf,
-    /// What is not in it.
+    /// Names of the removed things.
     pub(crate) name: String,
     pub(crate) request: RemoveRequest,
     pub(crate) report: RemovalReport,
-    /// The state in which it was stored.
+    /// State of the stored scene.
     state: Option<String>,
 }
 
 impl RemovedScene {
-    /// Deletes it with its folder, if it is as it was stored, and nothing else is there.
+    /// Deletes it with its folder, if it is unchanged since it was stored, and nothing else is there.
     pub(crate) fn delete(&self) -> Result<(), IoError> {
         SceneFolder::delete(&self.folder, self.state.as_deref())
     }
 }
 
-/// Takes things out of the scene in a folder and stores the result beside it.
+/// Removes things from the scene in a folder and stores the result beside it.
 pub(crate) fn beside(request: &RemoveRequest, observer: &mut dyn Observer) -> Result<RemovedScene, JobError> {
     let scene = open::scene(&request.folder)?;
     let map = scene.semantics()?;
@@ -108,7 +108,7 @@ pub(crate) fn beside(request: &RemoveRequest, observer: &mut dyn Observer) -> Re
     Ok(RemovedScene { folder, name, request: request.clone(), report: done.report, state })
 }
 
-/// In words: what was done.
+/// Returns a report in words.
 pub(crate) fn told(name: &str, report: &RemovalReport) -> String {
     let count = |n: usize| format::things(n, "Gaussian");
     let mut text = format!("{name}: {} removed", count(report.taken()));
@@ -131,10 +131,10 @@ pub(crate) fn told(name: &str, report: &RemovalReport) -> String {
 /// Unevenness of a surface, as a share of the hole in it, from which its fill is a guess.
 const ROUGH: f64 = 0.1;
 
-/// How sure it is whose invented Gaussians are.
+/// Margin of the identities of invented Gaussians.
 const GUESSED: f32 = 0.5;
 
-/// Stores the result, which is without `name`, as a scene in the folder `out`, beside which that in `from` stays as it is.
+/// Stores the result, which is without `name`, as a scene in the folder `out`; the one in `from` is unchanged.
 pub(crate) fn store(from: &Scene, name: &str, reduced: &Reduced, out: &Path) -> Result<(), JobError> {
     if from.folder.is_none() {
         return Err(JobError::NoScene(from.path.clone()));

@@ -1,4 +1,4 @@
-//! Drawing a scene from a camera, and writing what was drawn.
+//! Draws a scene from a camera, and writes the image.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -27,7 +27,7 @@ pub(crate) enum Quantity {
 }
 
 impl Quantity {
-    /// How a file name for it may end.
+    /// Valid endings of its file names.
     pub(crate) fn endings(self) -> &'static [&'static str] {
         match self {
             Self::Picture | Self::Normals => &[".png"],
@@ -38,12 +38,12 @@ impl Quantity {
 
 pub(crate) struct Rendered {
     pub(crate) frame: Frame<f32>,
-    /// What drew it: "CPU", or the name of the GPU.
+    /// The renderer: "CPU", or the name of the GPU.
     pub(crate) backend: String,
     pub(crate) millis: f64,
-    /// Degree of the spherical harmonics that were drawn.
+    /// Degree of the drawn spherical harmonics.
     pub(crate) sh_degree: u8,
-    /// Whether surfels were drawn as flat Gaussians: only the CPU draws them as such.
+    /// True if surfels were drawn as flat Gaussians: only the CPU draws them as surfels.
     pub(crate) flat: bool,
 }
 
@@ -84,18 +84,18 @@ pub(crate) fn camera(path: &Path) -> Result<Camera, IoError> {
     camera_file::read(path)
 }
 
-/// Bytes that drawing a pixel takes: color, depth and opacity, their copies on the way to the file.
+/// Bytes per pixel to draw: color, depth and opacity, their copies on the way to the file.
 const BYTES_PER_PX: u64 = 64;
 
-/// Whether a picture of this size can be drawn in the memory that is free.
+/// Refuses a picture that does not fit in free memory.
 pub(crate) fn check_room(width_px: u32, height_px: u32) -> Result<(), JobError> {
     let bytes = u64::from(width_px) * u64::from(height_px) * BYTES_PER_PX;
     let what = format!("drawing {width_px} x {height_px} px");
     Ok(memory::room(what, bytes, "make it smaller with --size or --max-side")?)
 }
 
-/// Writes a frame as a `.png`, or as an array where the name ends in `.npy`. Returns the depth that 65535 stands
-/// for, where that is how it is stored.
+/// Writes a frame as a `.png`, or as an array if the name ends in `.npy`. Returns the depth that 65535 stands for, if
+/// depth is stored so.
 pub fn write(path: &Path, frame: &Frame<f32>, camera: &Camera, what: Quantity) -> Result<Option<f32>, IoError> {
     export::make_parent(path)?;
     let size = [frame.width_px as u32, frame.height_px as u32];
@@ -105,7 +105,7 @@ pub fn write(path: &Path, frame: &Frame<f32>, camera: &Camera, what: Quantity) -
             return export::png(path, frame.to_rgb8().as_flattened(), size, ColorType::Rgb8).map(|()| None);
         }
         Quantity::Normals => {
-            // Where there is none it is 0, which is the gray in the middle.
+            // A pixel without a normal has 0, the gray in the middle.
             let code = |n: [f32; 3]| n.map(|c| (c * 127.5 + 128.0) as u8);
             let rgb: Vec<[u8; 3]> = normals::of_depth(&frame.median_depth, camera).into_iter().map(code).collect();
             return export::png(path, rgb.as_flattened(), size, ColorType::Rgb8).map(|()| None);

@@ -1,4 +1,4 @@
-//! Measuring error against run time, stage by stage, into a report that resumes; and which reports there are.
+//! Measures error against run time, stage by stage, into a report that can be resumed; lists known reports.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -11,17 +11,17 @@ use crate::measure::sweep::failed;
 use crate::measure::{End, FILE, Report, StageName, computer, is_report, page, plot};
 use crate::pipeline::observer::{Observer, Severity};
 
-/// What is measured, and where it is kept.
+/// Request of a report: its subject, stages and folder.
 #[derive(Clone, Debug)]
 pub struct ReportRequest {
     pub(crate) subject: Subject,
-    /// Stages to measure; none for all that the scene allows.
+    /// Stages to measure; empty for all that the scene allows.
     pub(crate) stages: Vec<StageName>,
-    /// Folder of the report. What is measured there already is resumed.
+    /// Folder of the report. Earlier measurements there are resumed.
     pub(crate) out: PathBuf,
-    /// Whether what is measured there is forgotten.
+    /// True if earlier measurements are discarded.
     pub(crate) fresh: bool,
-    /// Seconds for everything.
+    /// Seconds for all measurements.
     pub(crate) budget_secs: f64,
     /// The command line that asked for it.
     pub(crate) command: String,
@@ -33,7 +33,7 @@ pub(crate) struct Measured {
     pub(crate) end: End,
 }
 
-/// Measures, and writes the report after every measurement.
+/// Measures, and saves the report after every measurement.
 pub(crate) fn run(request: &ReportRequest, observer: &mut dyn Observer) -> Result<Measured, JobError> {
     let ReportRequest { subject, out, budget_secs, .. } = request;
     let computer = computer::look();
@@ -52,7 +52,7 @@ pub(crate) fn run(request: &ReportRequest, observer: &mut dyn Observer) -> Resul
     for (k, name) in stages.iter().enumerate() {
         let left = || (budget_secs - start.elapsed().as_secs_f64()).max(0.0);
         let share = left() / (stages.len() - k) as f64;
-        // Without what a stage is compared with, nothing of it can be measured: that may take what it takes.
+        // Its reference is needed before anything can be measured, however long that takes.
         let prepared = subject.study(*name, &mut InTime::new(observer, left()));
         let measured = prepared.and_then(|study| match study {
             Some(mut study) => report.measure(&mut study, out, share.min(left()), observer),
@@ -62,7 +62,7 @@ pub(crate) fn run(request: &ReportRequest, observer: &mut dyn Observer) -> Resul
             }
         });
         let stage_end = match measured {
-            // A stage that nobody named may turn out impossible; the others go on.
+            // A stage that was not requested by name may turn out impossible; the others go on.
             Err(why) if request.stages.is_empty() => {
                 observer.note(Severity::Warning, format!("Stage '{}' left out: {why}", name.name()));
                 continue;
@@ -80,7 +80,7 @@ pub(crate) fn run(request: &ReportRequest, observer: &mut dyn Observer) -> Resul
     Ok(Measured { report, stages, end })
 }
 
-/// A trained scene with its photos, if they are there.
+/// Loads a trained scene with its photos, if they exist.
 pub(crate) fn subject(path: &Path, options: StudyOptions) -> Result<Subject, JobError> {
     let scene = open::scene(path)?;
     let dataset = scene.dataset_path.as_ref().filter(|p| p.exists()).map(|p| open::dataset(p)).transpose()?;
@@ -97,7 +97,7 @@ pub(crate) fn subject(path: &Path, options: StudyOptions) -> Result<Subject, Job
     })
 }
 
-/// Everything but the JSON, which is there already.
+/// Writes everything but the JSON, which is there already.
 fn write(folder: &Path, report: &Report) -> Result<(), JobError> {
     export::text(&folder.join("report.csv"), &report.csv())?;
     export::text(&folder.join("report.html"), &page::html(report))?;
@@ -109,8 +109,8 @@ fn write(folder: &Path, report: &Report) -> Result<(), JobError> {
     Ok(())
 }
 
-/// Where reports of a scene may lie: where this program writes them, beside it, and where the command
-/// line writes them.
+/// Returns the folders with reports of a scene: this program's folder for them, the one beside it, and the command
+/// line's default.
 pub(crate) fn known(scene: &Path, own: &Path) -> Vec<PathBuf> {
     let usual = Path::new("out/report");
     let mut found = Vec::new();
@@ -151,7 +151,7 @@ mod tests {
         ReportRequest { subject, stages, out, fresh: false, budget_secs: f64::INFINITY, command: "x".into() }
     }
 
-    /// Asks to stop once it was asked so often.
+    /// Cancels after this many checks.
     struct Patience(AtomicUsize);
 
     impl Observer for Patience {

@@ -1,15 +1,15 @@
-//! How long a unit of a scene is, as somebody measured it.
+//! Scale of a scene, as the user measured it.
 
 use std::path::Path;
 
 use super::JobError;
 use crate::io::{SceneFolder, trained};
 
-/// Stores the length of a unit with the scene in `folder`, which is known in the state `known`. Whether there is a
+/// Stores the length of a unit with the scene in `folder`, last read in the state `known`. Returns whether there is a
 /// scene to store it with.
 ///
 /// # Errors
-/// If it cannot be written, or somebody else has changed the scene.
+/// If it cannot be written, or another process has changed the scene.
 pub(crate) fn store(folder: &Path, known: Option<&str>, meters_per_unit: f64) -> Result<bool, JobError> {
     if !trained::is_scene(folder) {
         return Ok(false);

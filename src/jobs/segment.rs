@@ -6,7 +6,7 @@ use crate::pipeline::semantics::matching::{MatchMode, gaussians};
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
 
-/// The Gaussians of an answer, of at most `top` identities, or all others.
+/// Returns the Gaussians of an answer, of at most `top` identities, or all others.
 pub(crate) fn select(
     cloud: &GaussianCloud,
     map: &SemanticMap,

@@ -1,4 +1,4 @@
-//! Selecting by clicks and strokes: the Gaussians that are meant, and objects and parts as they would be with them.
+//! Selection by clicks and strokes: the selected Gaussians, and a preview of objects and parts with them.
 
 use std::sync::Arc;
 use std::time::Instant;
@@ -15,23 +15,23 @@ use crate::pipeline::semantics::timing::ms_since;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, HomeView, Identities, IdentityId, NOBODY, SemanticMap};
 
-/// What the selection is to become.
+/// Purpose of a selection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SelectFor {
-    /// A new part of this identity; of nobody, an object.
+    /// A new part of this identity; for `NOBODY`, a new object.
     New(IdentityId),
-    /// The extent of this identity, which it begins with.
+    /// The extent of this identity, which is the initial selection.
     Extent(IdentityId),
 }
 
-/// What is to be done for a selection.
+/// Action of a selection step.
 #[derive(Clone, Debug)]
 pub enum SelectStep {
-    /// Make ready for the first stroke.
+    /// Prepare for the first stroke.
     Prepare,
-    /// Take in a further stroke.
+    /// Add a stroke.
     Stroke(Stroke),
-    /// Take the last one back.
+    /// Undo the last stroke.
     TakeBack,
 }
 
@@ -43,62 +43,62 @@ pub struct SelectRequest {
     /// The photos' cameras, possibly none.
     pub(crate) cameras: Vec<Camera>,
     pub(crate) home: HomeView,
-    /// Objects and parts as they are.
+    /// Current objects and parts.
     pub(crate) map: Arc<SemanticMap>,
     pub(crate) purpose: SelectFor,
-    /// What was made ready for these Gaussians before, and what was marked.
+    /// Preparations and strokes of earlier steps.
     pub(crate) before: Option<Arc<Selected>>,
     pub(crate) step: SelectStep,
 }
 
-/// What clicks and strokes select.
+/// Result of clicks and strokes.
 #[derive(Clone, Debug)]
 pub struct Selected {
     hierarchy: Arc<Hierarchy>,
-    /// The Gaussians that it is of.
+    /// The selected scene's Gaussians.
     cloud: Arc<GaussianCloud>,
     marks: StrokeMarks,
-    /// Indices, rising.
+    /// Indices of the selected Gaussians, ascending.
     pub(crate) gaussians: Vec<u32>,
-    /// Objects and parts as they would be with it, and which of them it would be; `NOBODY` if nothing is selected.
+    /// Objects and parts with the selection, and its identity among them; `NOBODY` if nothing is selected.
     pub(crate) preview: Arc<SemanticMap>,
     pub(crate) id: IdentityId,
-    /// Milliseconds from the stroke to the Gaussians, where everything was ready.
+    /// Milliseconds from the stroke to the Gaussians, once all is prepared.
     pub(crate) ms: f64,
 }
 
 impl Selected {
-    /// Strokes so far.
+    /// Number of strokes so far.
     pub(crate) fn strokes(&self) -> usize {
         self.marks.len()
     }
 
-    /// Nothing selected, with all that was made ready.
+    /// Returns an empty selection with all preparations.
     pub(crate) fn begun_anew(&self) -> Self {
         Self { marks: StrokeMarks::default(), gaussians: Vec::new(), id: NOBODY, ..self.clone() }
     }
 
-    /// Whether it was made ready for these Gaussians.
+    /// Returns whether it was prepared for these Gaussians.
     pub(crate) fn is_of(&self, cloud: &Arc<GaussianCloud>) -> bool {
         Arc::ptr_eq(&self.cloud, cloud)
     }
 
-    /// Whether the other was made ready with it, once for both.
+    /// Returns whether both share one preparation.
     pub(crate) fn shares(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.hierarchy, &other.hierarchy)
     }
 }
 
-/// Adds the stroke, or takes the last one back.
+/// Adds the stroke, or undoes the last one.
 pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Result<Selected, JobError> {
     let SelectRequest { cloud, settings, map, purpose, before, step, .. } = request;
-    // Where the Gaussians have changed meanwhile, what hangs together is looked at anew.
+    // If the Gaussians have changed meanwhile, their hierarchy is built anew.
     let hierarchy = match before.as_ref().filter(|before| before.is_of(cloud)) {
         Some(before) => Arc::clone(&before.hierarchy),
         None => Arc::new(Hierarchy::new(cloud, &views(&request.cameras, &request.home), settings, observer)?),
     };
     let start = Instant::now();
-    // Marks name Gaussians by number.
+    // Strokes refer to Gaussians by number.
     let before = before.as_ref().filter(|before| before.hierarchy.gaussians() == cloud.len());
     let mut marks = before.map(|b| b.marks.clone()).unwrap_or_default();
     match step {
@@ -129,7 +129,7 @@ pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Resul
     Ok(Selected { hierarchy, cloud: Arc::clone(cloud), marks, gaussians, preview, id, ms })
 }
 
-/// The edit that keeps what is selected.
+/// Returns the edit that stores the selection.
 pub(crate) fn kept_as(purpose: &SelectFor, name: String, gaussians: Vec<u32>) -> Edit {
     match purpose {
         SelectFor::New(of) => Edit::AddPiece { of: *of, name, gaussians },
@@ -137,13 +137,13 @@ pub(crate) fn kept_as(purpose: &SelectFor, name: String, gaussians: Vec<u32>) ->
     }
 }
 
-/// Objects and parts of a scene in which none were found.
+/// Returns a map of a scene without objects and parts.
 pub(crate) fn empty_map(cloud: &GaussianCloud) -> SemanticMap {
     let n = cloud.len();
     SemanticMap::from_identities(Identities::default(), vec![NOBODY; n], vec![0.0; n], Vec::new())
 }
 
-/// Views from all around where there are no photos.
+/// Number of views all around, if there are no photos.
 const AROUND: u32 = 24;
 
 fn views(cameras: &[Camera], home: &HomeView) -> Vec<Camera> {

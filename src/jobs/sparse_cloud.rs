@@ -1,12 +1,12 @@
-//! Gaussians to look at where nothing is trained yet: the sparse points that came with the photos.
+//! Gaussians to view before training: the sparse points of the photos.
 
 use glam::DVec3;
 
 use crate::math::sh::SH_C0;
 use crate::scene::{Bounds, Dataset, GaussianCloud};
 
-/// The sparse points as opaque round Gaussians of one size, about half the spacing that as many
-/// points would have on a surface. `None` without points.
+/// Returns the sparse points as opaque round Gaussians of one size, about half the spacing that as many points would
+/// have on a surface. `None` without points.
 pub(crate) fn sparse_cloud(dataset: &Dataset) -> Option<GaussianCloud> {
     let bounds = Bounds::robust(dataset.points.iter().map(|p| p.position))?;
     let origin = bounds.center();

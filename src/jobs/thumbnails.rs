@@ -1,4 +1,4 @@
-//! Small pictures of a scene's objects and parts, as its first view sees them, and what those without a name look like.
+//! Small pictures of a scene's objects and parts in its first view, and the appearance of those without a name.
 
 use super::JobError;
 use crate::pipeline::semantics::thumbnails::{Thumbnails, draw_thumbnails};
@@ -7,15 +7,15 @@ use crate::scene::appearance::{self, Appearance};
 use crate::scene::resource_log::{self, ResourceKind};
 use crate::scene::{GaussianCloud, HomeView, SemanticMap};
 
-/// What is known of objects and parts, by number less one.
+/// Pictures and appearances of objects and parts, by number less one.
 #[derive(Clone, Debug)]
 pub struct ThumbnailSet {
     pub(crate) pictures: Thumbnails,
-    /// Of those without a name.
+    /// Appearance of identities without a name.
     pub(crate) appearances: Vec<Option<Appearance>>,
 }
 
-/// Draws every object and part alone.
+/// Draws every object and part by itself.
 pub(crate) fn draw(
     cloud: &GaussianCloud,
     map: &SemanticMap,

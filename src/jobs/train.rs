@@ -19,39 +19,39 @@ pub(crate) struct Trained {
     pub(crate) out: PathBuf,
     /// Id of its save.
     pub(crate) state: Option<String>,
-    /// Objects and parts that were carried over from the scene before.
+    /// Objects and parts that were carried over from the previous scene.
     pub(crate) semantics: Option<Arc<SemanticMap>>,
 }
 
 impl Trained {
-    /// Whether all steps are done; else the observer has stopped it.
+    /// Returns whether all steps are done; else the observer has stopped it.
     pub(crate) fn is_finished(&self) -> bool {
         self.outcome.end == TrainEnd::Finished
     }
 }
 
-/// What is done where a training in a folder began with other photos or poses than there are now.
+/// Action if a training run in a folder began with photos or poses that have changed since.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum IfChanged {
-    /// Somebody is asked: it is an error that names what has changed.
+    /// The user is asked: it is an error that names the changes.
     #[default]
     Ask,
-    /// It stays, and another training begins in the next folder; without one it is that error.
+    /// Keep that run, and start another one in the next folder; without one it is that error.
     Anew,
-    /// It goes on with what there is now.
+    /// Resume with the changed photos.
     GoOn,
-    /// As [`Self::Ask`], in a folder that others take away where they go on with it.
+    /// As [`Self::Ask`], in a folder that another process takes away when it resumes the run.
     AskClaimed,
 }
 
-/// What a training begins with.
+/// Start of a training run.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct TrainStart {
-    /// Goes on where a training with the same settings and fewer steps ended.
+    /// Continue a finished run with the same settings and fewer steps.
     pub more_steps: bool,
-    /// The scene whose objects and parts are carried over, by place, to a training in another folder.
+    /// Scene whose objects and parts are carried over, by position, to a training run in another folder.
     pub objects_of: Option<PathBuf>,
-    /// The answer for a training that began with other photos.
+    /// Action for a run that began with other photos.
     pub if_changed: IfChanged,
 }
 
@@ -60,8 +60,8 @@ impl From<IfChanged> for TrainStart {
         Self { if_changed, ..Self::default() }
     }
 }
-/// Trains into the first of these `folders` that holds no training with other settings: that is another training,
-/// and the earlier one stays. A training that was stopped there goes on.
+/// Trains into the first of these `folders` that holds no training run with other settings: that is another run, and
+/// the earlier one stays. A stopped run there is resumed.
 pub(crate) fn run(
     dataset: &Dataset,
     config: &TrainConfig,
@@ -112,7 +112,7 @@ pub(crate) fn run(
     Err(TrainError::Config("there is no folder to train into".into()).into())
 }
 
-/// Whether a folder that holds this is left alone for the next one.
+/// Returns whether a folder with this error is skipped for the next one.
 fn makes_another(error: &CheckpointError, changed: IfChanged) -> bool {
     match error {
         CheckpointError::OtherRun { .. } | CheckpointError::Missing { .. } => true,
@@ -121,14 +121,14 @@ fn makes_another(error: &CheckpointError, changed: IfChanged) -> bool {
     }
 }
 
-/// The error as the beginning of a sentence.
+/// Returns the error as the beginning of a sentence.
 fn sentence(error: &CheckpointError) -> String {
     let text = error.to_string();
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// Gives the scene in the folder `to`, unless it has objects and parts, those of the scene in another.
+/// Gives the scene in the folder `to` the objects and parts of the scene in `from`, unless it has some.
 fn carry_over(from: &Path, to: &Path, observer: &mut dyn Observer) -> Result<(), IoError> {
     let has_objects = |folder: &Path| trained::is_scene(folder) && folder.join(semantic_map::FILE).exists();
     if from == to || !has_objects(from) || has_objects(to) || !trained::is_scene(to) {
@@ -149,14 +149,15 @@ fn carry_over(from: &Path, to: &Path, observer: &mut dyn Observer) -> Result<(),
     Ok(())
 }
 
-/// Objects are carried over to Gaussians that went on, and have to be read with their state.
+/// Returns the outcome with the scene's state and its objects. Those are carried over to Gaussians that were trained
+/// further, and have to be read with their state.
 fn finished(outcome: TrainOutcome, out: PathBuf, observer: &mut dyn Observer) -> Result<Trained, JobError> {
     let mut done = Trained { outcome, out, state: None, semantics: None };
     if trained::is_scene(&done.out) {
         done.state = splat_ply::state(&done.out.join(trained::CLOUD_FILE))?;
     }
     if done.out.join(semantic_map::FILE).exists() {
-        // Whose each Gaussian is stands in their file.
+        // The identity of each Gaussian is in their file.
         let cloud = Arc::new(trained::load(&done.out)?.cloud);
         let (folder, state) = (Some(done.out.clone()), done.state.clone());
         let scene = Scene { path: done.out.clone(), folder, cloud, state, ..Scene::default() };

@@ -1,4 +1,4 @@
-//! Drawing a video of a scene along a path.
+//! Draws a video of a scene along a camera path.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use crate::scene::{Camera, CameraPath, GaussianCloud, IdentityId, SemanticMap};
 
 const MARK: [u8; 3] = [255, 64, 160];
 
-/// A video to be made.
+/// A video to draw.
 #[derive(Clone, Debug)]
 pub struct VideoRequest {
     pub(crate) cloud: Arc<GaussianCloud>,
@@ -30,13 +30,13 @@ pub struct VideoRequest {
 #[derive(Clone, Debug)]
 pub(crate) struct Video {
     pub(crate) summary: VideoSummary,
-    /// What drew it: "CPU", or the name of the GPU.
+    /// The renderer: "CPU", or the name of the GPU.
     pub(crate) backend: String,
     pub(crate) secs: f64,
 }
 
-/// Which renderer draws with these settings: only the CPU draws surfels as such, so it is chosen for them, as it
-/// is where a plan wants it, unless somebody demands another.
+/// Returns the renderer for these settings. Only the CPU draws surfels as such, so they get the CPU, as does a plan
+/// that wants it, unless the user demands another.
 pub(crate) fn backend(wanted: BackendChoice, settings: &RenderSettings, on_cpu: bool) -> BackendChoice {
     let cpu = (settings.surfels || on_cpu) && wanted == BackendChoice::Auto;
     if cpu { BackendChoice::Cpu } else { wanted }
@@ -45,8 +45,8 @@ pub(crate) fn backend(wanted: BackendChoice, settings: &RenderSettings, on_cpu: 
 /// Draws a video.
 ///
 /// # Errors
-/// If the renderer that is demanded is not there, a frame cannot be drawn or written, or the observer asks to
-/// stop; nothing is left of the video then.
+/// If the demanded renderer is not available, a frame cannot be drawn or written, or the observer asks to stop; nothing
+/// is left of the video then.
 pub(crate) fn run(request: VideoRequest, observer: &mut dyn Observer) -> Result<Video, JobError> {
     let VideoRequest { cloud, draw, cameras, marked, out, settings, backend } = request;
     let marked = marked.as_ref().map(|(map, ids)| Marked { map, ids, color: MARK });
@@ -58,7 +58,7 @@ pub(crate) fn run(request: VideoRequest, observer: &mut dyn Observer) -> Result<
     Ok(Video { summary, backend: renderer.name().to_owned(), secs: start.elapsed().as_secs_f64() })
 }
 
-/// A camera path from a file: this program's or nerfstudio's.
+/// Reads a camera path from a file: this program's or nerfstudio's.
 pub(crate) fn camera_path(path: &Path) -> Result<CameraPath, IoError> {
     open(path)
 }

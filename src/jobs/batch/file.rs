@@ -1,4 +1,4 @@
-//! The file of a batch, `jobs.toml`: scenes, settings and seeds, each of which is combined with each of the others.
+//! The file of a batch, `jobs.toml`: scenes, settings and seeds, all combined with one another.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -12,10 +12,10 @@ use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::train::TrainConfig;
 use crate::scene::Overrides;
 
-/// Longest name of a scene or of settings.
+/// Longest name of a scene or of settings, in letters.
 const LONGEST_NAME: usize = 100;
 
-/// A batch as its file says.
+/// A batch as its file states it.
 #[derive(Clone, Debug)]
 pub(crate) struct BatchFile {
     pub(crate) path: PathBuf,
@@ -24,7 +24,7 @@ pub(crate) struct BatchFile {
     pub(super) scenes: Vec<BatchScene>,
     pub(super) settings: Vec<BatchSetting>,
     pub(super) seeds: Vec<u64>,
-    /// How objects are found, if they are.
+    /// Settings of finding objects, if any are to be found.
     pub(super) objects: Option<FindSettings>,
     pub(super) eval: BatchEvaluation,
 }
@@ -33,9 +33,9 @@ pub(crate) struct BatchFile {
 pub(super) struct BatchScene {
     pub(super) name: String,
     pub(super) path: PathBuf,
-    /// Labels: objects are found by those of photos that are trained on, and compared with the others.
+    /// Labels: those of training photos find the objects, the others are compared with them.
     pub(super) masks: Option<PathBuf>,
-    /// What to ask for, where labels do not name it.
+    /// Query of the object, if labels do not name it.
     pub(super) query: Option<String>,
 }
 
@@ -45,14 +45,14 @@ pub(super) struct BatchSetting {
     pub(super) train: BatchTraining,
 }
 
-/// Settings of trainings but for their seed.
+/// Settings of training runs without their seed.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct BatchTraining {
     pub(crate) config: TrainConfig,
     pub(crate) plan: Overrides,
 }
 
-/// How scenes are compared with photos that were held out, and their objects with labels.
+/// Settings of the comparison of scenes with held-out photos, and of their objects with labels.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct BatchEvaluation {
     pub(crate) max_side_px: Option<u32>,
@@ -61,8 +61,8 @@ pub(crate) struct BatchEvaluation {
     pub(crate) recipe: Recipe,
 }
 
-/// How the tables of the file are understood: by the names and rules of the command line, which stands above this
-/// module. Each says what is wrong and with which key.
+/// Readers of the file's tables, by the names and rules of the command line, which stands above this module. Each error
+/// says what is wrong and with which key.
 #[derive(Clone, Copy)]
 pub(crate) struct TableReaders {
     /// A `[[setting]]` without its name; files that it names are relative to the folder.
@@ -95,10 +95,10 @@ struct SceneTable {
 }
 
 impl BatchFile {
-    /// Reads a batch. Its paths are relative to the folder that the file is in.
+    /// Reads a batch. Its paths are relative to the file's folder.
     ///
     /// # Errors
-    /// If it cannot be read, is no TOML, names what is unknown, or gives two units one folder.
+    /// If it cannot be read, is not TOML, has unknown keys or values, or gives two units the same folder.
     pub(crate) fn read(path: &Path, readers: TableReaders) -> Result<Self, IoError> {
         let text = files::read_text(path)?;
         let wrong = |place: String, reason: String| IoError::syntax(path, place, reason);
@@ -138,7 +138,7 @@ impl BatchFile {
         Ok(batch)
     }
 
-    /// What is wrong with it, and where.
+    /// Returns the first error of the batch, as its place and reason.
     fn check(&self) -> Result<(), (String, String)> {
         let bad = |place: String, reason: &str| Err((place, reason.to_owned()));
         if self.scenes.is_empty() {
@@ -155,7 +155,7 @@ impl BatchFile {
             if let Some(why) = unfit(&name) {
                 return bad(format!("{of} '{name}'"), &format!("{why}, so it cannot be a folder's; give it a 'name'"));
             }
-            // Folders of some systems are one in capitals and small letters.
+            // Some file systems do not distinguish capital letters.
             if seen.insert((of, name.to_lowercase()), ()).is_some() {
                 let remedy = "it is there twice, and two units would have one folder; give one another 'name'";
                 return bad(format!("{of} '{name}'"), if of == "seeds" { "it is there twice" } else { remedy });
@@ -184,7 +184,7 @@ impl BatchScene {
     }
 }
 
-/// Why a name cannot be that of a folder everywhere.
+/// Returns the reason that a name cannot be a folder's on every system.
 fn unfit(name: &str) -> Option<&'static str> {
     let bad = |c: char| c.is_control() || "/\\:*?\"<>|".contains(c);
     match name {

@@ -1,4 +1,4 @@
-//! All units' results as one document, one table and one page, wherever their folders are.
+//! Results of all units as one document, one table and one page, from any folders.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -13,7 +13,7 @@ use crate::jobs::JobError;
 use crate::math::stats::mean;
 use crate::pipeline::observer::{Observer, Severity};
 
-/// Deepest folders that are looked into: those of units are three below that of their batch.
+/// Levels of folders that are searched; units are three below the folder of their batch.
 const DEEPEST: usize = 6;
 
 /// All units of some batches.
@@ -21,20 +21,20 @@ const DEEPEST: usize = 6;
 pub(crate) struct MergedResults {
     version: u32,
     pub(super) program: &'static str,
-    /// By settings and scene; those without a scene are the means over scenes.
+    /// Sorted by settings and scene; those without a scene are the means over scenes.
     pub(crate) rows: Vec<MergedRow>,
-    /// By name.
+    /// Sorted by name.
     pub(crate) units: Vec<UnitResult>,
     pub(crate) failed: Vec<UnitFailure>,
-    /// Names of units that were begun and have no result.
+    /// Names of units that were started and have no result.
     pub(crate) unfinished: Vec<String>,
 }
 
-/// What settings bring in a scene, over the seeds.
+/// Results of one setting in one scene, over the seeds.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct MergedRow {
     pub(crate) setting: String,
-    /// `None` for the mean over all scenes, each of which counts once.
+    /// `None` for the mean over all scenes, in which each counts once.
     pub(crate) scene: Option<String>,
     /// Units in it.
     pub(crate) units: usize,
@@ -45,7 +45,7 @@ pub(crate) struct MergedRow {
     pub(crate) miou: Spread,
 }
 
-/// Mean and standard deviation (of a sample) of what is known; `None` where too little is.
+/// Mean and sample standard deviation of the known values; `None` where too few are known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct Spread {
     pub(crate) mean: Option<f64>,
@@ -65,7 +65,7 @@ impl Spread {
 }
 
 impl UnitResult {
-    /// Mean IoU of its objects and parts, where its protocol has one.
+    /// Mean IoU of its objects and parts, if its protocol has one.
     pub(super) fn miou(&self) -> Option<f64> {
         self.masks.as_ref()?.get("miou")?.as_f64()
     }
@@ -79,7 +79,7 @@ impl UnitResult {
     }
 }
 
-/// A unit's folder and what is in it.
+/// A unit's folder and its contents.
 struct Found {
     folder: PathBuf,
     asked: UnitRequest,
@@ -90,8 +90,8 @@ struct Found {
 /// Reads all units below `folders`.
 ///
 /// # Errors
-/// If there are no units, results do not go together (settings of one name that are not the same, in one scene or in
-/// two; a scene of one name with other photos), or a file cannot be read.
+/// If there are no units, results do not match (settings of one name that differ, in one scene or in two; a scene of
+/// one name with other photos), or a file cannot be read.
 pub(super) fn collect(folders: &[PathBuf], observer: &mut dyn Observer) -> Result<MergedResults, JobError> {
     let mut found = Vec::new();
     for folder in folders {
@@ -129,7 +129,7 @@ pub(super) fn collect(folders: &[PathBuf], observer: &mut dyn Observer) -> Resul
     })
 }
 
-/// Of two folders of one unit, the one that is farther.
+/// Returns the one of two folders of a unit that is further along.
 fn same(one: Found, other: Found, observer: &mut dyn Observer) -> Found {
     if let (Some(a), Some(b)) = (&one.result, &other.result)
         && one.folder != other.folder
@@ -164,10 +164,10 @@ fn find(folder: &Path, deepest: usize, found: &mut Vec<Found>) -> Result<(), IoE
     Ok(())
 }
 
-/// Refuses units that look alike by their names and are not.
+/// Refuses units that have the same name and differ.
 fn check(found: &[Found]) -> Result<(), JobError> {
     let mut seen: BTreeMap<[&str; 2], &Found> = BTreeMap::new();
-    // What must be the same for two results under one name to be of the same kind.
+    // Two results of one name must agree in these values.
     let of_setting = |a: &UnitRequest| {
         let config = crate::pipeline::train::TrainConfig { seed: 0, ..a.config.clone() };
         json!({ "config": config, "plan": a.plan, "objects": a.objects, "eval": a.eval })
@@ -234,9 +234,9 @@ fn rows(units: &[UnitResult]) -> Vec<MergedRow> {
 }
 
 impl MergedResults {
-    /// A line for each unit that has a result.
+    /// Returns a table with one line per unit that has a result.
     pub(super) fn csv(&self) -> String {
-        // What begins with these is a formula to some spreadsheets.
+        // Some spreadsheets take text that begins so for a formula.
         let cell = |text: &str| {
             let text = if text.starts_with(['=', '+', '-', '@']) { format!("'{text}") } else { text.to_owned() };
             format!("\"{}\"", text.replace('"', "\"\""))

@@ -1,6 +1,6 @@
-//! Many scenes, with many settings and seeds, on many machines: each combination is a unit with a folder of its own and
-//! one atomic result. Machines share nothing but the folder of the results; which of them runs what, and when, is left
-//! to the cluster's own scheduler.
+//! Many scenes, with many settings and seeds, on many machines: each combination is a unit with its own folder and one
+//! atomic result. Machines share nothing but the folder of the results; the cluster's own scheduler decides which of
+//! them runs a unit, and at what time.
 
 mod file;
 mod merge;
@@ -29,7 +29,7 @@ use crate::models::catalog::{self, ModelRole};
 use crate::pipeline::observer::{Observer, Severity, Signal};
 use crate::pipeline::semantics::build_map::{Carry, REGIONS};
 
-/// Time between looks at a unit that is somebody else's.
+/// Time between looks at a unit that another process holds.
 const LOOK: Duration = Duration::from_millis(250);
 
 /// A shard of a batch.
@@ -39,24 +39,24 @@ pub(crate) struct BatchRequest {
     /// Folder of all results.
     pub(crate) out: PathBuf,
     pub(crate) shard: Shard,
-    /// Whether units are tried again that failed.
+    /// True if units that failed are tried again.
     pub(crate) retry_failed: bool,
-    /// How long a unit's heartbeat may stand still before another process takes over.
+    /// Time that a unit's heartbeat may stand still before another process takes over.
     pub(crate) takeover: Duration,
 }
 
-/// What came of a shard.
+/// Outcome of a shard.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct BatchOutcome {
     /// Units of the shard.
     pub(crate) units: usize,
-    /// Those that are done, now or before.
+    /// Units that are done, now or before.
     pub(crate) done: usize,
-    /// Those that failed, and why.
+    /// Units that failed, with the error.
     pub(crate) failed: Vec<(String, String)>,
-    /// Those that others work on, and who.
+    /// Units that other processes hold, with the holder.
     pub(crate) elsewhere: Vec<(String, String)>,
-    /// Whether the observer asked to stop; what was done is saved.
+    /// True if the observer asked to stop; finished work is saved.
     pub(crate) stopped: bool,
 }
 
@@ -68,13 +68,13 @@ struct Planned {
     asked: UnitRequest,
 }
 
-/// The units of a shard, and where each stands.
+/// Lists the units of a shard and their states.
 pub(crate) fn list(request: &BatchRequest) -> Result<Vec<(String, UnitState)>, JobError> {
     let state = |p: Planned| Ok((p.name, UnitState::of(&p.folder, &p.asked)?));
     plan(request)?.into_iter().map(state).collect()
 }
 
-/// How many units a batch has.
+/// Number of units in a batch.
 pub(crate) fn count(batch: &BatchFile) -> usize {
     unit::units(batch).len()
 }
@@ -82,8 +82,8 @@ pub(crate) fn count(batch: &BatchFile) -> usize {
 /// Runs the units of a shard, one after another. One that fails does not stop the others.
 ///
 /// # Errors
-/// Before anything runs: if a scene is missing, results would lie among what is read or are of other settings, or a
-/// network is missing. Later, if the folder of the results cannot be written.
+/// Before anything runs: if a scene is missing, results would lie among inputs or are of other settings, or a network
+/// is missing. Later, if the folder of the results cannot be written.
 pub(crate) fn run(request: &BatchRequest, observer: &mut dyn Observer) -> Result<BatchOutcome, JobError> {
     let mut planned = plan(request)?;
     for p in &planned {
@@ -93,10 +93,10 @@ pub(crate) fn run(request: &BatchRequest, observer: &mut dyn Observer) -> Result
     }
     check_networks(&request.batch)?;
     let mut outcome = BatchOutcome { units: planned.len(), ..BatchOutcome::default() };
-    // What may have killed the process that worked on it comes last, so that it holds up nothing else.
+    // A unit may have killed the process that worked on it: it comes last, so that it delays no other.
     planned.sort_by_key(|p| claim::was_left(&p.folder));
     let mut waiting: VecDeque<(Planned, Watch)> = planned.into_iter().map(|p| (p, Watch::default())).collect();
-    // How many in a row were somebody else's: if all are, there is nothing to do but to wait.
+    // Number of held units in a row: if all are held, there is nothing to do but to wait.
     let mut held = 0;
     while let Some((p, mut watch)) = waiting.pop_front() {
         if observer.signal() == Signal::Cancel {
@@ -144,7 +144,7 @@ fn attempt(
     observer: &mut dyn Observer,
 ) -> Result<Attempt, JobError> {
     let Planned { unit, name, folder, asked } = planned;
-    // What is done is not claimed.
+    // A finished unit is not claimed.
     match UnitState::of(folder, asked)? {
         UnitState::Done => return Ok(Attempt::Worked(Worked::Done)),
         UnitState::Failed(why) if !request.retry_failed => return Ok(Attempt::Worked(Worked::Failed(why))),
@@ -161,7 +161,7 @@ fn attempt(
     }
 }
 
-/// The shard's units, once everything is there that they read.
+/// Returns the shard's units, once all their inputs are known to exist.
 fn plan(request: &BatchRequest) -> Result<Vec<Planned>, JobError> {
     let batch = &request.batch;
     let all = unit::units(batch);
@@ -180,7 +180,7 @@ fn plan(request: &BatchRequest) -> Result<Vec<Planned>, JobError> {
     planned.collect()
 }
 
-/// Networks that are missing are told before hours of training, not after.
+/// Reports missing networks before hours of training, not after.
 fn check_networks(batch: &BatchFile) -> Result<(), JobError> {
     let Some(with) = &batch.objects else { return Ok(()) };
     let told = |key: &str, e: crate::models::ModelError| {
@@ -199,7 +199,7 @@ fn check_networks(batch: &BatchFile) -> Result<(), JobError> {
     Ok(())
 }
 
-/// Merges the results of all units below `folders`, and writes `merged.json`, `merged.csv` and `merged.html` into `out`.
+/// Merges the results of all units below `folders`, and writes `merged.json`, `merged.csv`, `merged.html` into `out`.
 ///
 /// # Errors
 /// If results do not go together, or a file cannot be read or written.

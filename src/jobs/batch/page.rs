@@ -1,4 +1,4 @@
-//! The page of merged results: means over seeds and scenes, then every unit; it needs nothing but itself.
+//! The page of merged results: means over seeds and scenes, then every unit. It needs no other file.
 
 use htmlize::escape_all_quotes;
 
@@ -8,7 +8,7 @@ use crate::math::format;
 use crate::measure::page::STYLE;
 
 impl Spread {
-    /// "27.41 ± 0.12".
+    /// Returns text such as "27.41 ± 0.12".
     pub(crate) fn text(&self, digits: usize) -> String {
         match (self.mean, self.deviation) {
             (None, _) => "-".into(),
@@ -18,12 +18,12 @@ impl Spread {
     }
 }
 
-/// What the cells of [`MergedRow::cells`] are.
+/// Headings of [`MergedRow::cells`].
 pub(super) const HEAD: [&str; 8] =
     ["settings", "scene", "units", "PSNR dB", "SSIM", "Gaussians", "training s", "mean IoU"];
 
 impl MergedRow {
-    /// What the cells of a row are, for a table.
+    /// Headings of the cells of a row.
     pub(crate) const HEAD: [&str; 8] = HEAD;
 
     /// The row as text.
@@ -80,7 +80,7 @@ fn cells(unit: &UnitResult) -> Vec<String> {
     ]
 }
 
-/// A table of rows, some of which stand out.
+/// Returns a table of rows, each with whether it is highlighted.
 fn table(head: &[&str], rows: impl Iterator<Item = (bool, Vec<String>)>) -> String {
     let cell = |tag: &str, text: &str| format!("<{tag}>{}</{tag}>", escape_all_quotes(text));
     let head: String = head.iter().map(|text| cell("th", text)).collect();

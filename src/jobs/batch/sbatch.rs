@@ -1,31 +1,31 @@
-//! The script of an array of Slurm in which every task runs a shard.
+//! The script of a Slurm array in which every task runs a shard.
 
 use std::path::Path;
 
 use crate::jobs::JobError;
 
-/// Most tasks of an array that a cluster takes unless its administrators say otherwise (MaxArraySize is 1001).
+/// Most tasks of an array that a cluster takes by default (MaxArraySize is 1001).
 const MOST_TASKS: usize = 1000;
 /// Seconds before the time limit at which a task is asked to stop.
 const STOP_SECS: u32 = 180;
 
-/// What an array's script is made of.
+/// Parts of an array's script.
 pub(crate) struct ArrayScript<'a> {
     pub(crate) program: &'a Path,
     pub(crate) file: &'a Path,
     /// The command's other arguments.
     pub(crate) arguments: &'a [String],
     pub(crate) units: usize,
-    /// Tasks; one for each unit if it is not said.
+    /// Number of tasks; one per unit if `None`.
     pub(crate) tasks: Option<usize>,
-    /// Exit code of a shard that was stopped and can go on.
+    /// Exit code of a shard that was stopped and can be resumed.
     pub(crate) stopped: u8,
 }
 
-/// The script, to be given to `sbatch`.
+/// Returns the script, to be given to `sbatch`.
 ///
 /// # Errors
-/// If a path cannot stand in it.
+/// If a path or an argument cannot stand in it.
 pub(crate) fn script(of: &ArrayScript<'_>) -> Result<String, JobError> {
     let tasks = of.tasks.unwrap_or(of.units).clamp(1, MOST_TASKS);
     let absolute = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.into());
@@ -70,7 +70,7 @@ exit "$code"
     ))
 }
 
-/// A word that the shell takes as it is.
+/// Quotes a word for the shell.
 fn quoted(word: &str) -> Result<String, JobError> {
     if word.contains(char::is_control) {
         let text = format!("'{}' has a control character in it and cannot stand in a script", word.escape_debug());

@@ -1,9 +1,9 @@
-//! Which units are whose: shard `I` of `N`, as given or as an array of the cluster's scheduler says.
+//! Shards: shard `I` of `N`, as given or as the cluster's array of tasks says.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// One of so many equal shares of the units.
+/// One of `count` equal shares of the units.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Shard {
     /// From 1 to `count`.
@@ -15,17 +15,17 @@ impl Shard {
     /// All units.
     pub(crate) const ALL: Self = Self { index: 1, count: 1 };
 
-    /// Whether the unit of this number, from 0 on, is in it. Neighbors go to different shards, so that the units of a
-    /// large scene do not all come to one.
+    /// Returns whether the shard has the unit of this number, from 0 on. Neighbors go to different shards, so that the
+    /// units of a large scene do not all fall into one.
     pub(crate) fn has(self, unit: usize) -> bool {
         unit % self.count == self.index - 1
     }
 
-    /// The shard that an array of Slurm tells its tasks by environment variables, which `variable` reads; `None`
-    /// outside of one.
+    /// Returns the shard of a task of a Slurm array from environment variables, which `variable` reads; `None` outside
+    /// of an array.
     ///
     /// # Errors
-    /// If the variables do not make sense together.
+    /// If the variables contradict one another.
     pub(crate) fn of_array(variable: impl Fn(&str) -> Option<String>) -> Result<Option<Self>, String> {
         let number = |name: &str| -> Result<Option<usize>, String> {
             let Some(text) = variable(name) else { return Ok(None) };

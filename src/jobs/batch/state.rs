@@ -1,4 +1,4 @@
-//! Where a unit stands, as its folder says; its result, and why it failed.
+//! State of a unit, as its folder shows it; its result, and the error if it failed.
 
 use std::path::{Path, PathBuf};
 
@@ -10,30 +10,30 @@ use crate::io::{IoError, claim, files, trained};
 use crate::measure::Computer;
 use crate::pipeline::observer::Evaluation;
 
-/// The result of a unit, in its folder: whole, or not there.
+/// File name of a unit's result: complete, or absent.
 pub(super) const RESULT: &str = "result.json";
-/// Why a unit failed, in its folder.
+/// File name of a unit's failure.
 pub(super) const FAILURE: &str = "failed.json";
-/// The trained scene of a unit that is done, in its folder.
+/// Folder name of the trained scene of a finished unit.
 pub(super) const SCENE: &str = "scene";
 /// Version of both documents.
 pub(super) const VERSION: u32 = 1;
 
-/// What came of a unit.
+/// Result of a unit.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct UnitResult {
     pub(super) version: u32,
     /// Version of the program.
     pub(super) program: String,
     pub(crate) asked: UnitRequest,
-    /// On photos that were held out, if any were.
+    /// Quality on held-out photos, if there are any.
     pub(crate) evaluation: Option<Evaluation>,
     pub(crate) gaussians: usize,
     pub(crate) steps: u64,
-    /// SHA-256 of the Gaussians as a `.ply`, without what differs from save to save.
+    /// SHA-256 of the Gaussians as a `.ply`, without parts that differ from save to save.
     pub(crate) sha256: String,
     pub(crate) objects: Option<ObjectCounts>,
-    /// As `fmlgs eval --masks` prints it, without the single queries.
+    /// Scores as `fmlgs eval --masks` prints them, without the single queries.
     pub(crate) masks: Option<Value>,
     pub(crate) secs: UnitSeconds,
     pub(super) host: String,
@@ -48,7 +48,7 @@ pub(crate) struct ObjectCounts {
     pub(crate) seeds: Vec<String>,
 }
 
-/// Seconds of work, those of interrupted runs included where they are known.
+/// Seconds of work, those of interrupted runs included if they are known.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct UnitSeconds {
     pub(crate) training: f64,
@@ -56,7 +56,7 @@ pub(crate) struct UnitSeconds {
     pub(crate) objects: Option<f64>,
 }
 
-/// Why a unit has no result.
+/// Failure of a unit: the error in place of a result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct UnitFailure {
     pub(super) version: u32,
@@ -66,23 +66,23 @@ pub(crate) struct UnitFailure {
     pub(super) host: String,
 }
 
-/// Where a unit stands.
+/// State of a unit.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum UnitState {
     Waiting,
-    /// It was stopped, and goes on where it was.
+    /// It was stopped, and can be resumed.
     Begun,
-    /// Somebody works on it as far as can be seen.
+    /// Another process seems to work on it; its name.
     Held(String),
     Done,
-    /// Why.
+    /// The error.
     Failed(String),
-    /// Its folder holds results of other settings: which.
+    /// Its folder holds results of other settings; the difference.
     Changed(String),
 }
 
 impl UnitState {
-    /// Of the unit in `folder` that is `asked` now.
+    /// Returns the state of the unit in `folder` that is `asked` now.
     ///
     /// # Errors
     /// If a file there cannot be read.
@@ -105,12 +105,12 @@ impl UnitState {
     }
 }
 
-/// Whether the unit in `folder` has its result, and the scene that it is of.
+/// Returns whether the unit in `folder` has its result and its scene.
 pub(super) fn is_done(folder: &Path) -> bool {
     folder.join(RESULT).is_file() && trained::is_scene(&folder.join(SCENE))
 }
 
-/// A document, if it is there.
+/// Reads a document, if it exists.
 pub(super) fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>, IoError> {
     match files::read_json(path) {
         Err(IoError::Read { cause, .. }) if cause.kind() == std::io::ErrorKind::NotFound => Ok(None),
@@ -118,7 +118,7 @@ pub(super) fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option
     }
 }
 
-/// Folders of the unit's scene, by the number of the claim that worked in each; 0 is the one that is done.
+/// Returns the folders of the unit's scene, each with the number of the claim that worked in it; 0 is the finished one.
 pub(super) fn scenes(folder: &Path) -> Vec<(u64, PathBuf)> {
     let number = |name: &str| match name.strip_prefix(SCENE)? {
         "" => Some(0),

@@ -1,4 +1,4 @@
-//! A unit of a batch: one scene with one of the settings and one seed; its folder, and what was asked of it.
+//! A unit of a batch: one scene with one of the settings and one seed; its folder, and its request.
 
 use std::path::{Path, PathBuf};
 
@@ -14,22 +14,22 @@ use crate::jobs::{JobError, open};
 use crate::pipeline::train::TrainConfig;
 use crate::pipeline::train::inputs::{Compare, TrainInputs};
 
-/// What a unit was asked, in its folder.
+/// File name of a unit's request, in its folder.
 pub(super) const FILE: &str = "unit.json";
-/// Deepest folders of labels that are looked into.
+/// Levels of folders of labels that are searched.
 const DEEPEST: usize = 16;
-/// How checksums of photos begin that [`TrainInputs`] makes; those of earlier versions have no beginning.
+/// Prefix of checksums of photos that [`TrainInputs`] makes; those of earlier versions have none.
 const OWN: &str = "2:";
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct BatchUnit {
-    /// Place of its scene in the file, and of its settings.
+    /// Indices in the file of its scene and of its settings.
     pub(super) scene: usize,
     pub(super) setting: usize,
     pub(super) seed: u64,
 }
 
-/// What a unit is asked: with another answer to any of it, its result is another.
+/// Request of a unit: a unit with any other value has another result.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct UnitRequest {
     pub(crate) scene: String,
@@ -38,7 +38,7 @@ pub(crate) struct UnitRequest {
     /// Checksum of the photos' names, sizes and cameras, and of the sparse points.
     pub(crate) photos: String,
     pub(crate) config: TrainConfig,
-    /// What of the scene's plan is decided otherwise.
+    /// Changes to the scene's plan.
     pub(crate) plan: Value,
     /// Checksum of the names and sizes of the labels' files.
     pub(crate) masks: Option<String>,
@@ -48,17 +48,17 @@ pub(crate) struct UnitRequest {
 }
 
 impl UnitRequest {
-    /// "garden/fast/seed-0".
+    /// Returns a name such as "garden/fast/seed-0".
     pub(crate) fn name(&self) -> String {
         name(&self.scene, &self.setting, self.seed)
     }
 
-    /// Whether both may be of the same photos: checksums of different versions say nothing beside each other.
+    /// Returns whether both may have the same photos: checksums of different versions cannot be compared.
     pub(super) fn may_have_photos_of(&self, other: &Self) -> bool {
         self.photos == other.photos || self.photos.starts_with(OWN) != other.photos.starts_with(OWN)
     }
 
-    /// The first thing that is `now` asked otherwise, in words.
+    /// Returns the first difference to the request `now`, in words.
     pub(super) fn difference(&self, now: &Self) -> Option<String> {
         if !self.may_have_photos_of(now) {
             return Some("the photos' names, sizes or cameras, or the sparse points, were others".into());
@@ -73,7 +73,7 @@ fn name(scene: &str, setting: &str, seed: u64) -> String {
     format!("{scene}/{setting}/seed-{seed}")
 }
 
-/// All units, in the order that shards are made of: the seeds of settings, the settings of scenes.
+/// Returns all units in the order of shards: scenes, in each its settings, in each the seeds.
 pub(super) fn units(batch: &BatchFile) -> Vec<BatchUnit> {
     let scenes = 0..batch.scenes.len();
     let of_scene = |scene| (0..batch.settings.len()).map(move |setting| (scene, setting));
@@ -86,17 +86,17 @@ impl BatchUnit {
         &batch.scenes[self.scene]
     }
 
-    /// Its name, which is its folder in that of the results.
+    /// Returns its name, which is its folder below that of the results.
     pub(super) fn name(self, batch: &BatchFile) -> String {
         name(&self.scene(batch).name, &batch.settings[self.setting].name, self.seed)
     }
 
-    /// The settings of its training, before the scene's plan.
+    /// Returns the settings of its training, before the scene's plan.
     pub(super) fn config(self, batch: &BatchFile) -> TrainConfig {
         TrainConfig { seed: self.seed, ..batch.settings[self.setting].train.config.clone() }
     }
 
-    /// What it is asked, if its scene's files are `inputs`.
+    /// Returns its request, if its scene's files are `inputs`.
     pub(super) fn asked(self, batch: &BatchFile, inputs: &SceneInputs) -> UnitRequest {
         let usual = TrainConfig::default();
         let (setting, eval) = (&batch.settings[self.setting], &batch.eval);
@@ -105,7 +105,7 @@ impl BatchUnit {
             setting: setting.name.clone(),
             seed: self.seed,
             photos: inputs.photos.clone(),
-            // How often a run looks and saves does not change it.
+            // Evaluations and checkpoints in between do not change the result.
             config: TrainConfig {
                 eval_every: usual.eval_every,
                 checkpoint_secs: usual.checkpoint_secs,
@@ -125,8 +125,8 @@ impl BatchUnit {
     }
 }
 
-/// Checksums of what is read of a scene. Contents of photos are left out: reading all of them on each start of each shard
-/// takes long. Their sizes differ where they do, and a training compares contents where it goes on.
+/// Checksums of a scene's inputs. Contents of photos are left out: reading all of them on each start of each shard
+/// takes long. Sizes mostly differ if contents do, and training compares contents when it resumes.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct SceneInputs {
     pub(super) photos: String,
@@ -134,7 +134,7 @@ pub(super) struct SceneInputs {
 }
 
 impl SceneInputs {
-    /// Opens the scene, so that one that cannot be opened is told before anything runs.
+    /// Opens the scene, so that one that cannot be opened is reported before anything runs.
     pub(super) fn of(scene: &BatchScene) -> Result<Self, JobError> {
         let inputs = TrainInputs::of(&open::dataset(&scene.path)?, Compare::Sizes)?;
         let masks = scene.masks.as_deref().map(|masks| {
@@ -147,7 +147,7 @@ impl SceneInputs {
     }
 }
 
-/// Names and sizes of the files in `folder`, or of the one file that it is.
+/// Adds the names and sizes of the files in `folder`, or of the one file that it is.
 fn list(folder: &Path, name: &str, all: &mut Vec<(String, u64)>, deepest: usize) -> Result<(), IoError> {
     if !folder.is_dir() {
         all.push((name.into(), size(folder)?));
@@ -165,7 +165,7 @@ fn size(path: &Path) -> Result<u64, IoError> {
     size.map_err(|cause| IoError::Read { path: path.into(), cause })
 }
 
-/// Refuses results in what is read, and the other way round.
+/// Refuses results inside the inputs, and inputs inside the results.
 pub(super) fn check_places(request: &BatchRequest, units: &[BatchUnit]) -> Result<(), JobError> {
     for unit in units {
         let (scene, folder) = (unit.scene(&request.batch), request.out.join(unit.name(&request.batch)));
@@ -197,7 +197,7 @@ pub(super) fn check_places(request: &BatchRequest, units: &[BatchUnit]) -> Resul
     Ok(())
 }
 
-/// Where a path leads, also where its end does not exist yet.
+/// Resolves a path, even if its end does not exist yet.
 fn real(path: &Path) -> PathBuf {
     let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
     let there = path.ancestors().find_map(|a| Some((a.canonicalize().ok()?, path.strip_prefix(a).ok()?)));

@@ -1,7 +1,7 @@
-//! One unit from beginning to end: trained, its objects found, both compared with photos that were held out.
+//! Work on one unit: trains it, finds its objects, and compares both with held-out photos.
 //!
-//! Whoever has the unit's claim works in a folder of its own, which it takes over with all that was done there. One who
-//! was taken for dead and was not finds its folder gone, so that it cannot spoil what another goes on with.
+//! The process with the unit's claim works in its own folder, which it takes over with all earlier work. A process
+//! whose claim was taken finds its folder gone, so that it cannot damage the work of the next one.
 
 use std::any::Any;
 use std::io::{self, Write};
@@ -31,23 +31,23 @@ use crate::pipeline::observer::{Evaluation, Interrupted, Observer, Progress, Sev
 use crate::scene::{Dataset, GaussianCloud, Level};
 
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
-/// Says what was found, in the folder of the scene.
+/// File name of the objects that were found, in the scene's folder.
 const OBJECTS_FILE: &str = "objects-found.json";
 
-/// How the work on a unit ended.
+/// End of the work on a unit.
 pub(super) enum Worked {
     Done,
     Failed(String),
     /// Another process took over.
     Lost,
-    /// The observer asked to stop; what was done is saved.
+    /// The observer asked to stop; finished work is saved.
     Stopped,
 }
 
-/// Works on a unit in its `folder`, which is claimed. What fails is recorded there.
+/// Works on a unit in its `folder`, which is claimed. Failures are recorded there.
 ///
 /// # Errors
-/// If that cannot be recorded, or the folder holds results of other settings.
+/// If a failure cannot be recorded, or the folder holds results of other settings.
 pub(super) fn work(
     request: &BatchRequest,
     unit: BatchUnit,
@@ -94,7 +94,7 @@ pub(super) fn work(
             Ok(Worked::Done)
         }
         Err(e) if e.is_cancelled() => Ok(Worked::Stopped),
-        // No unit is to blame for a disk that is full: others would fail the same.
+        // A full disk is not the unit's fault: others would fail the same way.
         Err(e) if is_of_machine(&e) => Err(e),
         Err(e) => {
             let error = chain(&e);
@@ -106,7 +106,7 @@ pub(super) fn work(
     }
 }
 
-/// Work with other settings that failed stays beside what is to come; what did not fail is nobody's to move.
+/// Moves failed work with other settings aside; refuses to move work that did not fail.
 fn set_aside(folder: &Path, claim: u64, failed: bool, what: &str) -> Result<(), JobError> {
     for (number, path) in scenes(folder) {
         if !failed {
@@ -117,10 +117,10 @@ fn set_aside(folder: &Path, claim: u64, failed: bool, what: &str) -> Result<(), 
     Ok(())
 }
 
-/// The folder that the claim of this number works in, with what was done on the unit before.
+/// Returns the folder of this claim's number, with all earlier work on the unit moved into it.
 fn inherit(folder: &Path, claim: u64) -> Result<PathBuf, IoError> {
     let own = folder.join(format!("{SCENE}-{claim}"));
-    // What is done is the last; else who claimed it last came farthest.
+    // Finished work comes first, then that of the latest claim, which is furthest along.
     let last = scenes(folder).into_iter().max_by_key(|(number, _)| if *number == 0 { u64::MAX } else { *number });
     if let Some((_, path)) = last {
         SceneFolder::move_away(&path, &own)?;
@@ -172,7 +172,7 @@ fn make(
     })
 }
 
-/// What was found in which save of the scene.
+/// Objects found before, and the save of the scene in which they were found.
 #[derive(Serialize, Deserialize)]
 struct FoundBefore {
     state: Option<String>,
@@ -180,7 +180,7 @@ struct FoundBefore {
     secs: f64,
 }
 
-/// Finds objects, unless an attempt before has, and counts them and the seconds that took.
+/// Finds objects, unless an earlier attempt has, and returns their counts and the seconds taken.
 fn objects(
     request: &BatchRequest,
     unit: BatchUnit,
@@ -216,7 +216,7 @@ fn objects(
     Ok((found.objects, found.secs))
 }
 
-/// Colors and objects beside photos and labels that were held out; `None` for what there is none of.
+/// Compares colors with held-out photos and objects with labels; `None` where there are none.
 fn compare(
     request: &BatchRequest,
     unit: BatchUnit,
@@ -257,7 +257,7 @@ fn checksum(cloud: &GaussianCloud) -> String {
         }
     }
     let mut sum = Sum(Sha256::new());
-    // Summing up cannot fail.
+    // Hashing cannot fail.
     let _ = splat_ply::encode(&mut sum, cloud, None);
     hex(&sum.0.finalize())
 }
@@ -268,7 +268,7 @@ fn panic_text(payload: &(dyn Any + Send)) -> String {
     format!("the program failed ({text}); please report it")
 }
 
-/// Passes all on, and stops the work once another process has taken over.
+/// Passes everything on, and cancels the work once another process has taken over.
 struct UnitObserver<'a> {
     inner: &'a mut dyn Observer,
     lost: Arc<AtomicBool>,

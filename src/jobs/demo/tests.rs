@@ -1,4 +1,4 @@
-//! The demo that ships is what its recipe says, the recipe always makes the same, and what is asked is found.
+//! The shipped demo matches its recipe, the recipe is reproducible, and the queries are answered.
 
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{LevelFilter, SemanticMap};
 
-/// The recipe's way with a fraction of its photos, pixels and steps.
+/// The recipe with a fraction of its photos, pixels and steps.
 fn small(seed: u64) -> DemoRecipe {
     let full = DemoRecipe::shipped();
     let photos =
@@ -18,7 +18,7 @@ fn small(seed: u64) -> DemoRecipe {
     DemoRecipe { photos, training, max_seeds: 2, home: 3, ..full }
 }
 
-/// What the recipe makes in `work`, of the photos that are there already and nothing else.
+/// Runs the recipe in `work`, from nothing but the photos there.
 fn made(recipe: &DemoRecipe, work: &Path) -> Vec<u8> {
     let _ = std::fs::remove_dir_all(work.join("scene"));
     make(recipe, work, &mut Silent).expect("made").0
@@ -80,7 +80,7 @@ fn what_ships_is_as_good_as_its_record_says() {
     let mut job = PhotoComparison::new(scene, &folder.join("photos"), EvaluateOptions::default()).expect("photos");
     assert_eq!(job.views.len(), 8);
     let quality = evaluate::photometric(&job, &mut Silent).expect("measured");
-    // One number, whoever measures it: only the last bits differ from processor to processor.
+    // The same on every machine but for the last bits, which differ between processors.
     assert!((quality.psnr - record.psnr).abs() < 5e-3, "{} {}", quality.psnr, record.psnr);
     assert!((quality.ssim - record.ssim).abs() < 5e-4, "{} {}", quality.ssim, record.ssim);
     let info = trained::load_info(&folder.join("scene")).expect("read");
@@ -119,7 +119,7 @@ fn the_first_question_is_answered_by_buttons_that_are_seen() {
     assert!(seen >= 20, "{seen} px are seen from where it opens");
 }
 
-/// Notes that are taken.
+/// Collects notes.
 #[derive(Default)]
 struct Notes(Vec<String>);
 

@@ -1,4 +1,4 @@
-//! The folder of the trained demo: unpacked once, and again where it is damaged.
+//! The folder of the trained demo: unpacked once, and again if it is damaged.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -9,9 +9,8 @@ use crate::jobs::Folders;
 use crate::math::format::things;
 use crate::pipeline::observer::{Observer, Severity};
 
-/// The folder of the trained demo, unpacked where that was not done before. What a user has changed in it stays: photos
-/// that are damaged are put back, and where the scene itself is, all of it is unpacked anew and the damaged folder kept
-/// beside.
+/// Returns the folder of the trained demo, unpacked if it does not exist. A user's changes stay: damaged photos are put
+/// back; if the scene itself is damaged, all of it is unpacked anew and the damaged folder kept beside it.
 ///
 /// # Errors
 /// If it cannot be written.
@@ -34,13 +33,13 @@ pub(crate) fn unpacked(folders: &Folders, observer: &mut dyn Observer) -> Result
         }
     }
     match bundle::unpack(BUNDLE, &folder) {
-        // Another process was as quick.
+        // Another process unpacked it at the same time.
         Err(_) if trained::is_scene(&folder.join("scene")) => Ok(folder),
         result => result.map(|()| folder),
     }
 }
 
-/// Whether the demo's scene can be read, with its objects.
+/// Checks that the demo's scene can be read, with its objects.
 fn scene_of(folder: &Path) -> Result<(), IoError> {
     let folder = &folder.join("scene");
     let scene = trained::load(folder)?;
@@ -64,7 +63,7 @@ fn put_aside(folder: &Path) -> Result<PathBuf, IoError> {
     Ok(aside)
 }
 
-/// Puts back what is missing or cut off beside the scene, which nobody edits there.
+/// Puts back missing or cut-off files beside the scene, which users do not edit.
 fn mend_files(folder: &Path, observer: &mut dyn Observer) -> Result<(), IoError> {
     let is_scene = |name: &str| scene_files::FILES.iter().any(|file| name.strip_prefix("scene/") == Some(file));
     let mut mended = 0;

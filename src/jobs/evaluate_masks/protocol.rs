@@ -1,6 +1,6 @@
-//! Which protocol compares objects and parts with labels.
+//! Protocols that compare objects and parts with labels.
 
-/// How objects and parts are compared with labels.
+/// Protocol of comparing objects and parts with labels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Protocol {
     /// The pixels of the answer against the region, IoU; objects and parts apart
@@ -19,21 +19,21 @@ pub(crate) enum Protocol {
     Ovs3d,
     /// Part queries by embedding alone, with the paper's components switched on one after another
     PartRecall,
-    /// What is found and what is rightly not found, by names, embeddings and both, by each strategy and rule
+    /// Things found and rightly not found, by names, embeddings and both, by each strategy and rule
     Recipes,
     /// Things selected by strokes in the view that shows most of them, judged in all other views
     Strokes,
-    /// What is known of things, corrected by strokes in the views where most is wrong, judged in all of them
+    /// Known things, corrected by strokes in the views where most is wrong, judged in all of them
     Corrections,
 }
 
 impl Protocol {
-    /// Its name on the command line.
+    /// Returns its name on the command line.
     pub(crate) fn name(self) -> String {
         clap::ValueEnum::to_possible_value(&self).map_or_else(String::new, |v| v.get_name().to_owned())
     }
 
-    /// Whether the mean over all queries says something.
+    /// Returns whether the mean over all queries has a meaning.
     pub(crate) fn has_units(self) -> bool {
         !matches!(self, Self::PartRecall | Self::Recipes | Self::Strokes | Self::Corrections)
     }

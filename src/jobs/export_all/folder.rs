@@ -1,4 +1,4 @@
-//! The folder of an export: nothing in it is replaced but what an export has written and nobody has changed since.
+//! The folder of an export: only files that an export wrote and that are unchanged since are replaced.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -12,15 +12,15 @@ use crate::io::folder_lock::FolderLock;
 use crate::io::{IoError, atomic, files};
 use crate::jobs::{JobError, export};
 
-/// Says what an export has written.
+/// File name of the list of exported files.
 pub(super) const LIST: &str = "export.json";
-/// Says it while an export runs: "- PLACE" before a file is there, "SHA256 PLACE" once it is. So what a killed export has
-/// left is told from what somebody else has put there.
+/// File name of the journal of a running export: "- PLACE" before a file is there, "SHA256 PLACE" once it is. It tells
+/// files of a killed export from files of others.
 const BEGUN: &str = ".export-begun";
 
 #[derive(Default, Serialize, Deserialize)]
 struct List {
-    /// Whether the export came to its end.
+    /// True if the export finished.
     complete: bool,
     /// SHA-256 of each file, by its place in the folder.
     files: BTreeMap<String, String>,
@@ -29,20 +29,20 @@ struct List {
 /// A folder that an export writes into.
 pub(super) struct ExportFolder {
     root: PathBuf,
-    /// As an earlier export has left it.
+    /// Files of an earlier export.
     before: BTreeMap<String, String>,
     now: BTreeMap<String, String>,
-    /// Places where an export that was killed was about to write.
+    /// Places where a killed export was about to write.
     begun: BTreeSet<String>,
     journal: fs::File,
     _lock: FolderLock,
 }
 
 impl ExportFolder {
-    /// Makes or takes over a folder.
+    /// Creates or reopens a folder.
     ///
     /// # Errors
-    /// If it holds anything, unless that is of an earlier export; if somebody has changed what that wrote.
+    /// If it holds anything but an earlier export, or files of that were changed.
     pub(super) fn open(root: &Path) -> Result<Self, JobError> {
         export::make_folder(root)?;
         let lock = FolderLock::take(root, "exporting")?;
@@ -79,7 +79,7 @@ impl ExportFolder {
         Ok(folder)
     }
 
-    /// Whether a file of an earlier export is there.
+    /// Returns whether a file of an earlier export is there; fails if it was changed.
     fn is_as_written(&self, place: &str, sum: &str) -> Result<bool, JobError> {
         let path = self.root.join(place);
         if !is_within(place) || !path.is_file() {
@@ -93,7 +93,7 @@ impl ExportFolder {
         Err(JobError::Output(text))
     }
 
-    /// Writes a file at a place in the folder by `fill`, which writes at once or not at all.
+    /// Writes a file at a place in the folder by `fill`, which writes the whole file or nothing.
     pub(super) fn write(
         &mut self,
         place: &str,
@@ -107,7 +107,7 @@ impl ExportFolder {
             return Err(JobError::Output(text));
         }
         export::make_parent(&path)?;
-        // Files come whole or not at all, so what lies there later is ours.
+        // Files are written whole or not at all, so a file found there later is ours.
         self.note("-", place)?;
         fill(&path)?;
         let sum = files::sha256(&path)?;
@@ -120,7 +120,7 @@ impl ExportFolder {
         Ok(writeln!(self.journal, "{sum} {place}").map_err(|cause| write_error(&self.root.join(BEGUN), cause))?)
     }
 
-    /// Takes away what the earlier export has left, if this one is complete, and says what is here.
+    /// Removes files of the earlier export that this one did not write, if this one is complete, and writes the list.
     pub(super) fn close(self, complete: bool) -> Result<(), JobError> {
         let mut files = self.now.clone();
         for (place, sum) in self.before.iter().filter(|(place, _)| !self.now.contains_key(*place)) {
@@ -132,7 +132,7 @@ impl ExportFolder {
                 files.insert(place.clone(), sum.clone());
             }
         }
-        // What a killed export has left and this one does not write is listed from now on.
+        // Files of a killed export that this one does not write are listed from now on.
         for place in
             self.begun.iter().filter(|place| !self.now.contains_key(*place) && !self.before.contains_key(*place))
         {
@@ -155,7 +155,7 @@ impl ExportFolder {
     }
 }
 
-/// Whether a place lies in the folder: a list that somebody wrote leads nowhere else.
+/// Returns whether a place lies in the folder: a forged list must not lead elsewhere.
 fn is_within(place: &str) -> bool {
     Path::new(place).components().all(|c| matches!(c, std::path::Component::Normal(_)))
 }

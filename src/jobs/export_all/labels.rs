@@ -1,4 +1,4 @@
-//! Masks of photos as label files, in the forms that [`Labels`](crate::io::labels::Labels) reads.
+//! Masks of photos as label files, in the formats that [`Labels`](crate::io::labels::Labels) reads.
 
 use std::collections::HashMap;
 use std::path::Path;
@@ -22,14 +22,14 @@ pub(super) use crate::io::labels::stem;
 pub(super) struct LabelWriter<'a> {
     all: &'a Identities,
     masks: &'a [MaskFormat],
-    /// What each is called in a file of polygons, by number less one: no two alike.
+    /// Unique names in a file of polygons, by number less one.
     categories: Vec<String>,
     coco: Coco,
 }
 
 impl<'a> LabelWriter<'a> {
     /// # Errors
-    /// If a scene has more identities than a picture has numbers.
+    /// If a scene has more identities than a 16-bit picture has numbers.
     pub(super) fn new(all: &'a Identities, masks: &'a [MaskFormat]) -> Result<Self, JobError> {
         if masks.contains(&MaskFormat::Ids) && all.len() > usize::from(u16::MAX) {
             let text =
@@ -75,7 +75,7 @@ impl<'a> LabelWriter<'a> {
         Ok(())
     }
 
-    /// Numbers of objects, and of the innermost parts.
+    /// Writes pictures of the numbers of objects, and of the innermost parts.
     fn pictures(&self, stem: &str, view: &ViewMap, folder: &mut ExportFolder) -> Result<(), JobError> {
         let numbers: Vec<[u16; 2]> = (0..=self.all.len() as IdentityId).map(|id| self.numbers(id)).collect();
         for (level, of) in [Level::Object, Level::Part].into_iter().zip(0..) {
@@ -88,14 +88,14 @@ impl<'a> LabelWriter<'a> {
         Ok(())
     }
 
-    /// The object and the part that a pixel of an identity shows.
+    /// Returns the object and the part that a pixel of an identity shows.
     fn numbers(&self, id: IdentityId) -> [u16; 2] {
         let is = |id: IdentityId, level: Level| self.all.get(id).is_some_and(|i| i.level == level);
         let number = |id: IdentityId, level: Level| if is(id, level) { id as u16 } else { NOBODY as u16 };
         [number(self.all.object_of(id), Level::Object), number(id, Level::Part)]
     }
 
-    /// Writes what is of all photos.
+    /// Writes the files that cover all photos.
     pub(super) fn finish(self, folder: &mut ExportFolder) -> Result<(), JobError> {
         let ids = || self.all.iter().map(|(id, i)| (id, i, self.all.full_name(id)));
         if self.masks.contains(&MaskFormat::Ids) {
@@ -121,12 +121,12 @@ impl<'a> LabelWriter<'a> {
     }
 }
 
-/// Lists of thousands of numbers, not one a line.
+/// Writes JSON without line breaks: lists have thousands of numbers.
 fn compact(path: &Path, value: &Value) -> Result<(), IoError> {
     atomic::write(path, |w| Ok(serde_json::to_writer(w, value)?))
 }
 
-/// Labels where no other identity has them, else labels with those of their wholes.
+/// Returns labels if they are unique, else labels with those of their wholes.
 fn categories(all: &Identities) -> Vec<String> {
     let mut found: Vec<String> = Vec::with_capacity(all.len());
     let labels: Vec<String> = all.iter().map(|(id, _)| all.label(id)).collect();

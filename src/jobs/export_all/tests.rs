@@ -1,4 +1,4 @@
-//! What is exported is read back as it was, and nobody's files are replaced.
+//! Exports are read back unchanged, and files of others are never replaced.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -17,7 +17,7 @@ use crate::scene::{Identities, IdentityId, Level, Mask, NOBODY, Photo};
 
 const SIZE: [u32; 2] = [96, 72];
 
-/// A ring of blobs around another one, two mugs of one name with a handle each, a part of a part, and what nobody sees.
+/// A ring of blobs around another one, two mugs of one name with a handle each, a part of a part, and a hidden one.
 fn request(folder: &Path, masks: &[MaskFormat]) -> ExportAllRequest {
     let mut all = Identities::default();
     let mut add = |whole: IdentityId, name: &str| {
@@ -73,7 +73,7 @@ fn request(folder: &Path, masks: &[MaskFormat]) -> ExportAllRequest {
     }
 }
 
-/// The masks of a view by the full names of what they are of.
+/// The masks of a view by full names.
 fn truth(request: &ExportAllRequest, camera: &Camera) -> BTreeMap<String, Mask> {
     let ExportAllRequest { cloud, map, settings, .. } = request;
     let all = &map.identities;
@@ -107,7 +107,7 @@ fn masks_are_read_back_as_they_were() {
                     std::iter::successors(Some(at), |at| regions[*at].parent).map(|at| regions[at].name.as_str());
                 line.collect::<Vec<_>>().join(" \u{b7} ")
             };
-            // Pictures tell what has one name apart by their list, by numbers.
+            // Pictures distinguish things of one name by the numbers in their list.
             let is_told = |name: &str| format != "ids" || !name.contains("mug");
             let told: BTreeMap<String, Mask> = (0..regions.len())
                 .map(|at| (full(at), regions[at].mask.clone()))
@@ -163,7 +163,7 @@ fn only_what_an_export_has_written_is_replaced() {
     let mut first = request(folder.path(), &MaskFormat::ALL);
     run(&first, &mut Silent).expect("written");
     let before = files(folder.path());
-    // Again, with other names and fewer masks: what is left of the first goes.
+    // Again, with other names and fewer masks: remains of the first are removed.
     let map = Arc::make_mut(&mut first.map);
     map.identities.rename(8, "spook");
     map.identities.rename(3, "cup");
@@ -175,7 +175,7 @@ fn only_what_an_export_has_written_is_replaced() {
     let gone: Vec<&String> = before.iter().filter(|f| !after.contains(f)).collect();
     assert!(gone.iter().all(|f| !folder.path().join(f).exists()) && gone.len() > 5, "{gone:?}");
     assert_eq!(std::fs::read_to_string(folder.path().join("thesis.txt")).expect("there"), "work");
-    // What somebody has corrected, or put where something is to be written, stops it before anything is written.
+    // Corrected files, or others in a place to be written, stop it before anything is written.
     let labels = folder.path().join("isat/0002.json");
     let corrected = std::fs::read_to_string(&labels).expect("there").replace("spook", "ghost") + " ";
     std::fs::write(&labels, &corrected).expect("written");
@@ -241,7 +241,7 @@ fn an_export_that_was_killed_can_be_made_again() {
     again.write("c.txt", text("3")).expect("what was cut short is ours");
     again.close(true).expect("closed");
     assert_eq!(files(&root), ["a.txt", "c.txt", "in/b.txt"]);
-    // What an earlier run has left and this one does not write goes.
+    // Remains of an earlier run that this one does not write are removed.
     let mut less = ExportFolder::open(&root).expect("open");
     less.write("a.txt", text("one")).expect("a");
     killed(less);
@@ -250,7 +250,7 @@ fn an_export_that_was_killed_can_be_made_again() {
     less.close(true).expect("closed");
     assert_eq!(files(&root), ["a.txt"]);
     assert!(!root.join("c.txt").exists() && !root.join("in/b.txt").exists());
-    // The controls: what somebody has put there or changed since stays.
+    // The controls: files of others and changed files stay.
     std::fs::write(root.join("d.txt"), "mine").expect("written");
     let mut export = begin();
     assert!(export.write("d.txt", text("theirs")).is_err());

@@ -1,4 +1,4 @@
-//! How long looking for masks takes, said before it is begun.
+//! Estimated times of finding masks, reported before it starts.
 
 use crate::io::memory;
 use crate::jobs::models::{ModelEntry, ModelList};
@@ -6,25 +6,26 @@ use crate::math::format::{self, things};
 use crate::models::catalog;
 use crate::models::engine::engine;
 
-/// Cores on which the times of the list were measured, and those beyond which networks gain little.
+/// Cores of the machine that measured the times of the list, and the number beyond which networks gain little.
 const MEASURED_CORES: usize = 2;
 const MOST_CORES: usize = 8;
 
-/// How long a segmenter looks at one photo here, or an encoder at one picture of an object, estimated from times measured elsewhere.
+/// Estimated time of a segmenter on one photo here, or of an encoder on one picture of an object, from times measured
+/// elsewhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct LookTime {
     secs: f64,
-    /// What each object in it takes besides.
+    /// Seconds for each object in it besides.
     object_secs: Option<f64>,
 }
 
 impl LookTime {
-    /// That of a model of the list if its time was measured, by the engine that is here or by the fast one.
+    /// Returns the time of a model of the list, if it was measured, by this machine's engine or by the fast one.
     pub(crate) fn of(model: &str, known: &ModelList, is_fast: bool) -> Option<Self> {
         Self::estimated(&known.get(model)?.0, is_fast, known.cores)
     }
 
-    /// The same for work that has no list at hand.
+    /// Returns the same for jobs without the list.
     pub(super) fn of_installed(model: &str) -> Option<Self> {
         let entry = catalog::entry(model).ok()?;
         Self::estimated(&entry, engine().ok()?.is_fast(), memory::cores())
@@ -38,14 +39,14 @@ impl LookTime {
         Some(Self { secs: on_cores(secs, cores), object_secs })
     }
 
-    /// For one `what`: a photo, a picture of an object.
+    /// Returns the time in words for one `what`: a photo, a picture of an object.
     pub(crate) fn text(self, what: &str) -> String {
         let time = if self.secs < 5.0 { format::seconds(self.secs) } else { format::about(self.secs) };
         format!("{time} {what} here, by estimate")
     }
 }
 
-/// How long following masks through so many photos takes with a network of this name, if that was measured.
+/// Returns the time of tracking masks through this many photos with a network of this name, if it was measured.
 pub(super) fn tracking(tracker: &str, photos: usize) -> Option<String> {
     let entry = catalog::entry(tracker).ok()?;
     let seconds = entry.track_seconds.filter(|_| engine().is_ok_and(|e| e.is_fast()))?;
@@ -59,12 +60,12 @@ pub(super) fn tracking(tracker: &str, photos: usize) -> Option<String> {
     ))
 }
 
-/// What took so many seconds where times are measured takes with other cores.
+/// Scales measured seconds to another number of cores.
 fn on_cores(secs: f64, cores: usize) -> f64 {
     secs * MEASURED_CORES as f64 / cores.clamp(1, MOST_CORES) as f64
 }
 
-/// How long finding takes where up to `most_photos` are looked at.
+/// Returns the time of finding objects in up to `most_photos` photos, in words.
 pub(crate) fn sentence(look: LookTime, most_photos: usize) -> String {
     let more = look.object_secs.map(|secs| format!(", and {} more for each object in it", format::about(secs)));
     let (each, more) = (format::about(look.secs), more.unwrap_or_default());

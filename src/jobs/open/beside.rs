@@ -1,4 +1,4 @@
-//! What lies beside a splat of 3D Gaussian Splatting: cameras to look through, and the photos where they still are.
+//! Files beside a splat of 3D Gaussian Splatting: cameras to view it from, and the photos if they still exist.
 
 use std::path::{Path, PathBuf};
 
@@ -6,7 +6,7 @@ use super::Scene;
 use crate::io::gs_output::{self, GsOutput};
 use crate::scene::{Dataset, Photo};
 
-/// The splat of a folder that 3D Gaussian Splatting wrote, else the path itself.
+/// Returns the splat of a folder that 3D Gaussian Splatting wrote, else the path itself.
 pub(super) fn splat_of(path: &Path) -> PathBuf {
     let is_dataset = || path.join("transforms.json").is_file() || path.join("scene.json").is_file();
     let latest = path.is_dir().then(|| gs_output::latest(path)).flatten();
@@ -14,7 +14,7 @@ pub(super) fn splat_of(path: &Path) -> PathBuf {
 }
 
 impl Scene {
-    /// The scene with what lies beside its file.
+    /// Adds the files beside the scene's file.
     pub(super) fn with_what_lies_beside(mut self) -> Self {
         let Some(GsOutput { folder, cameras, source, white_background, warnings }) = gs_output::beside(&self.path)
         else {
@@ -35,7 +35,7 @@ impl Scene {
         self
     }
 
-    /// Its cameras as photos of which nothing else is known, if it has cameras beside it.
+    /// Returns its cameras as photos without files, if it has cameras beside it.
     pub(super) fn photos_unseen(&self) -> Option<Dataset> {
         let root = self.cameras_from.clone()?;
         let photo = |c: &crate::io::trained::SceneCamera| Photo::new(&*c.name, PathBuf::new(), c.camera.clone());

@@ -1,5 +1,4 @@
-//! A scene that came over the network: the same to all who look at it as one that was opened here, but for what it
-//! has no files for.
+//! A scene received over the network: the same as one opened here, except for data without files here.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -16,18 +15,18 @@ use crate::scene::{Camera, Dataset, GaussianCloud, Machine, Photo, SemanticMap};
 /// The computer that a scene is on.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Origin {
-    /// As it is shown: `127.0.0.1:7070`.
+    /// Address for display: `127.0.0.1:7070`.
     pub host: String,
-    /// Whether objects and parts may be changed from here.
+    /// True if objects and parts may be changed from here.
     pub allow_edit: bool,
-    /// Whether it sends photos.
+    /// True if it sends photos.
     pub photos: bool,
 }
 
-/// The scene that `info` describes, with Gaussians as far as they came.
+/// Builds the scene that `info` describes, with the Gaussians received.
 ///
 /// # Errors
-/// If its cameras or settings cannot be.
+/// If its cameras or settings are invalid.
 pub(crate) fn received(
     info: SceneInfo,
     sent: Option<(GaussianCloud, Option<SemanticMap>)>,
@@ -81,7 +80,7 @@ pub(crate) fn received(
     })
 }
 
-/// Photos of which the cameras are known. Those that can be had are at the other computer, the others nowhere.
+/// Returns photos with known cameras. Available ones are at the other computer; the others have no place.
 fn photos(info: &SceneInfo, origin: &Origin) -> Dataset {
     let place = Path::new(if origin.photos { &*origin.host } else { "" });
     Dataset {

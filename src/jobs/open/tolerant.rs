@@ -1,4 +1,4 @@
-//! What belongs to a scene and may be broken or gone: it is told, and the scene opens without it.
+//! Parts of a scene that may be broken or missing: they are reported, and the scene opens without them.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -11,7 +11,7 @@ use crate::pipeline::train::TrainConfig;
 use crate::scene::resource_log::{self, ResourceKind};
 use crate::scene::{Dataset, SemanticMap};
 
-/// Where a scene without objects is one of several trainings, another of which has some: which, in words.
+/// Returns a note in words if a scene has no objects, and another training run of its photos has some.
 pub(super) fn objects_elsewhere(scene: &OpenedScene) -> Option<String> {
     if scene.semantics.is_some() || !scene.trained || scene.runs.iter().all(|run| run.folder != scene.out) {
         return None;
@@ -24,7 +24,7 @@ pub(super) fn objects_elsewhere(scene: &OpenedScene) -> Option<String> {
     ))
 }
 
-/// The objects and parts stored with a trained scene; broken ones are told and left out.
+/// Loads the objects and parts stored with a trained scene; broken ones are reported and left out.
 pub(crate) fn known_objects(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<SemanticMap>> {
     match scene.known_semantics() {
         Ok(map) => map.map(|map| {
@@ -44,7 +44,7 @@ pub(crate) fn known_objects(scene: &Scene, observer: &mut dyn Observer) -> Optio
     }
 }
 
-/// A trained scene; where its settings cannot be read this is told, and it is drawn with the defaults.
+/// Builds a trained scene; unreadable settings are reported, and it is drawn with the defaults.
 pub(super) fn tolerant(path: &Path, scene: TrainedScene, observer: &mut dyn Observer) -> Scene {
     let config = TrainConfig::stored(&scene.folder, scene.info.config.clone()).unwrap_or_else(|e| {
         observer.note(
@@ -56,7 +56,7 @@ pub(super) fn tolerant(path: &Path, scene: TrainedScene, observer: &mut dyn Obse
     Scene::trained(path, scene, config)
 }
 
-/// The photos of a trained scene, if they are still where they were.
+/// Loads the photos of a trained scene, if they still exist.
 pub(super) fn photos_of(scene: &Scene, observer: &mut dyn Observer) -> Option<Arc<Dataset>> {
     let why = match scene.dataset_path.as_deref().map(|p| (io::open(p), p)) {
         Some((Ok(Opened::Dataset(dataset)), _)) => {

@@ -1,4 +1,4 @@
-//! What a page carries is what the scene has.
+//! A page has the same contents as the scene.
 
 use glam::DMat3;
 
@@ -7,7 +7,7 @@ use crate::io::page::packed;
 use crate::pipeline::observer::Silent;
 use crate::scene::{Level, PathKey};
 
-/// Two heaps of Gaussians, a mug with a handle and nobody's, and photos from two sides.
+/// Two heaps of Gaussians, a mug with a handle and an unlabeled one, and photos from two sides.
 fn request(out: &Path) -> PageRequest {
     let (mut positions, mut of) = (Vec::new(), Vec::new());
     let mut all = Identities::default();

@@ -1,8 +1,8 @@
-//! A color for each phrase, the same wherever and however often the phrase is shown.
+//! A color for each phrase, the same in every view and every time.
 
 use std::collections::HashMap;
 
-/// Colors that are told apart on a picture, and from what is selected.
+/// Colors that are easy to distinguish in a picture, and from the selection.
 const COLORS: [[u8; 3]; 12] = [
     [255, 179, 0],
     [225, 90, 255],
@@ -18,14 +18,14 @@ const COLORS: [[u8; 3]; 12] = [
     [255, 175, 190],
 ];
 
-/// Phrases with their colors, in the order in which they were asked first.
+/// Phrases with their colors, in the order of their first use.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PhraseColors {
     known: HashMap<String, usize>,
 }
 
 impl PhraseColors {
-    /// The color of a phrase, or the one that it would get.
+    /// Returns the color of a phrase, or the one that it would get.
     pub(crate) fn of(&self, phrase: &str) -> [u8; 3] {
         let place = self.known.get(&normal(phrase)).copied().unwrap_or(self.known.len());
         COLORS[place % COLORS.len()]
@@ -39,13 +39,13 @@ impl PhraseColors {
         }
     }
 
-    /// Does so for all of a list.
+    /// Gives all phrases of a list their colors.
     pub(crate) fn keep_all(&mut self, phrases: &[String]) {
         phrases.iter().for_each(|phrase| self.keep(phrase));
     }
 }
 
-/// A phrase without what makes no difference to what it means.
+/// Normalizes a phrase: lower case, single spaces.
 fn normal(phrase: &str) -> String {
     phrase.split_whitespace().map(str::to_lowercase).collect::<Vec<_>>().join(" ")
 }

@@ -1,4 +1,4 @@
-//! Phrases on a scene of two blobs, and what is written of them.
+//! Phrases on a scene of two blobs, and the written files.
 
 use glam::DVec3;
 use serde_json::Value;
@@ -69,7 +69,7 @@ fn masks_are_written_in_three_forms_and_compared_with_what_was_written() {
     let mut asked = request(&["lamp", "mug", "Mug!"]);
     asked.export = Some(folder.path().into());
     let rows = run(&asked, &mut Silent).expect("runs");
-    // What was written is the truth: all of it is met, and what is nowhere is nowhere.
+    // The written masks are the truth: all of it is met, and absent things stay absent.
     asked.truth = TrueMasks::Folder(folder.path().join("masks"));
     asked.export = None;
     let again = run(&asked, &mut Silent).expect("runs");

@@ -1,4 +1,4 @@
-//! Camera poses of photos that have none: COLMAP and GLOMAP, run as programs of their own.
+//! Camera poses of photos that have none: COLMAP and GLOMAP, run as separate programs.
 
 mod process;
 #[cfg(test)]
@@ -22,17 +22,17 @@ pub(crate) struct PoseTools {
     glomap: Option<PathBuf>,
 }
 
-/// What has to be run, in order.
+/// A command to run.
 #[derive(Clone, Debug, PartialEq, Eq)]
 struct PoseStage {
-    /// What it does, for display.
+    /// Its task, for display.
     title: &'static str,
     program: PathBuf,
     args: Vec<String>,
 }
 
 impl PoseTools {
-    /// Those that are installed. GLOMAP works on what COLMAP has matched, so without that there is nothing.
+    /// Returns the installed tools. GLOMAP needs matches of COLMAP, so `None` without that.
     pub(crate) fn installed() -> Option<Self> {
         Self::on(&std::env::var_os("PATH").unwrap_or_default())
     }
@@ -52,7 +52,7 @@ impl PoseTools {
         if self.glomap.is_some() { "COLMAP and GLOMAP" } else { "COLMAP" }
     }
 
-    /// What brings the poses of photos in `out/images` into `out/sparse`.
+    /// Returns the commands that compute the poses of photos in `out/images` into `out/sparse`.
     fn stages(&self, out: &Path, one_camera: bool, gpu: &Gpu) -> Vec<PoseStage> {
         let at = |name: &str| out.join(name).to_string_lossy().into_owned();
         let args = |command: &str, pairs: &[(&str, String)]| {
@@ -84,7 +84,7 @@ impl PoseTools {
     }
 }
 
-/// Whether features are found on a GPU, which COLMAP asks for even where it was built without.
+/// Use of a GPU for features; COLMAP asks for one even in builds without.
 enum Gpu {
     AsItIs,
     /// Options of extraction and matching that turn it off; their names depend on the version.
@@ -92,7 +92,7 @@ enum Gpu {
 }
 
 impl Gpu {
-    /// By what COLMAP's helps say.
+    /// Reads it from COLMAP's help texts.
     fn of(general: &str, extraction: &str) -> Self {
         match (general.contains("with CUDA"), extraction.contains("--FeatureExtraction.use_gpu")) {
             (true, _) => Self::AsItIs,
@@ -103,7 +103,7 @@ impl Gpu {
     }
 }
 
-/// What a person types who finds the poses by hand, and opens the result.
+/// Returns the commands for finding the poses by hand, and for opening the result.
 pub(crate) fn commands(photos: &Unposed) -> Vec<String> {
     let out = if photos.images == photos.folder {
         let name = photos.folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -133,8 +133,7 @@ pub(crate) fn commands(photos: &Unposed) -> Vec<String> {
     lines
 }
 
-/// Finds the poses of photos with these tools, in a folder of their own; returns that. What was done there before is
-/// taken over.
+/// Finds the poses of photos with these tools, in their own folder; returns that. Earlier work there is reused.
 ///
 /// # Errors
 /// If a tool fails or finds nothing, or the observer asks to stop.
@@ -152,7 +151,7 @@ pub(crate) fn find(
         let (from, to) = (photos.images.join(name), out.join("images").join(name));
         sizes.push(photo::size(&from)?);
         if !to.exists() {
-            // A second name where the disk is the same, so that nothing outside the folder is needed.
+            // A hard link on the same disk, so that nothing outside the folder is needed.
             fs::hard_link(&from, &to).or_else(|_| fs::copy(&from, &to).map(drop)).map_err(|e| write_error(&to, e))?;
         }
     }
@@ -166,7 +165,7 @@ pub(crate) fn find(
     if colmap::is_colmap(&out) { Ok(out) } else { Err(JobError::NoPosesFound(photos.folder.clone())) }
 }
 
-/// Photos that do not hang together become several reconstructions; the one of most photos is to be `0`.
+/// Makes the reconstruction of most photos `0`: photos without overlap become several reconstructions.
 fn largest_first(sparse: &Path) -> Result<(), JobError> {
     let size = |folder: &Path| fs::metadata(folder.join("images.bin")).map_or(0, |m| m.len());
     let all = fs::read_dir(sparse).into_iter().flatten().flatten().map(|e| e.path()).filter(|p| p.is_dir());

@@ -1,4 +1,4 @@
-//! A program that works for minutes: its lines become progress, and it ends when it is not wanted any more.
+//! A program that runs for minutes: its lines become progress, and it is killed once it is not needed.
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read};
@@ -12,25 +12,25 @@ use super::PoseStage;
 use crate::jobs::JobError;
 use crate::pipeline::observer::{Observer, Ticker};
 
-/// Lines that are kept to be quoted.
+/// Last lines that are kept for errors.
 const LAST_LINES: usize = 8;
 /// Longest line that is kept, in bytes.
 const LINE_BYTES: u64 = 2_000;
-/// How often it is asked whether to go on while the program says nothing.
+/// Time between checks of the observer while the program prints nothing.
 const PATIENCE: Duration = Duration::from_millis(100);
 
-/// A running program, ended when this is dropped.
+/// A running program, killed when this is dropped.
 struct Running(Child);
 
 impl Drop for Running {
     fn drop(&mut self) {
-        // Both fail where it has ended, which is as well.
+        // Both fail if it has ended, which is fine.
         let _ = self.0.kill();
         let _ = self.0.wait();
     }
 }
 
-/// All that a program says, nothing if it cannot be started.
+/// Returns all output of a program, nothing if it cannot be started.
 pub(super) fn output(program: &Path, args: &[&str]) -> String {
     let said = quiet(program).args(args).stdin(Stdio::null()).output();
     said.map_or_else(|_| String::new(), |o| String::from_utf8_lossy(&[o.stdout, o.stderr].concat()).into_owned())
@@ -51,7 +51,7 @@ pub(super) fn run(stage: &PoseStage, photos: usize, observer: &mut dyn Observer)
     let mut command = quiet(&stage.program);
     command.args(&stage.args).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut running = Running(command.spawn().map_err(|e| failed(e.to_string(), &said))?);
-    // Few lines wait: a program that says more than is read waits, too.
+    // Bounded: a program that prints faster than we read has to wait.
     let (sender, lines) = bounded(64);
     let listen = |from: Option<Box<dyn Read + Send>>| {
         let (sender, name) = (sender.clone(), "a program's words");
@@ -86,10 +86,10 @@ pub(super) fn run(stage: &PoseStage, photos: usize, observer: &mut dyn Observer)
     if status.success() { Ok(()) } else { Err(failed(status.to_string(), &said)) }
 }
 
-/// A command whose windows stay away and whose process does not outlive this one.
+/// Returns a command that opens no windows and whose process does not outlive this one.
 fn quiet(program: &Path) -> Command {
     let mut command = Command::new(program);
-    // Without a display COLMAP's options of Qt end it otherwise.
+    // Without a display, COLMAP's use of Qt would end it.
     command.env("QT_QPA_PLATFORM", "offscreen");
     #[cfg(target_os = "linux")]
     {
@@ -106,7 +106,7 @@ fn quiet(program: &Path) -> Command {
     command
 }
 
-/// Sends a program's lines, also those that it writes over one another.
+/// Sends a program's lines, including those that overwrite one another.
 fn pass_on(from: impl Read, to: &Sender<String>) {
     let mut reader = BufReader::new(from);
     loop {
@@ -123,8 +123,8 @@ fn pass_on(from: impl Read, to: &Sender<String>) {
     }
 }
 
-/// How many of `photos` are done by what a line of COLMAP or GLOMAP says: "Processed file [3/96]", "Matching block
-/// [1/2, 2/2]", "Registering image #7 (12)".
+/// Returns the number of `photos` done, by a line of COLMAP or GLOMAP: "Processed file [3/96]", "Matching block [1/2,
+/// 2/2]", "Registering image #7 (12)".
 pub(super) fn progress(line: &str, photos: usize, registered: &mut u64) -> Option<u64> {
     if line.contains("Registering image #") || line.contains("Registering initial") {
         *registered += 1 + u64::from(line.contains("initial"));

@@ -9,7 +9,7 @@ use super::*;
 use crate::io::OpenError;
 use crate::pipeline::observer::{Progress, Signal, Silent};
 
-/// Behaves like COLMAP: writes down what it is asked, says what COLMAP says, copies a reconstruction.
+/// Behaves like COLMAP: records its arguments, prints COLMAP's lines, copies a reconstruction.
 const SCRIPT: &str = r##"#!/bin/sh
 echo "$@" >> "HERE/asked"
 case "$1" in
@@ -30,7 +30,7 @@ struct Fake {
 }
 
 impl Fake {
-    /// Three photos, a reconstruction of them, and a program that finds it and does `matching` on its way.
+    /// Three photos, a reconstruction of them, and a program that finds it and runs `matching` on its way.
     fn new(matching: &str) -> Self {
         let guard = tempfile::tempdir().expect("folder");
         let here = guard.path();

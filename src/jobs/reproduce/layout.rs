@@ -1,4 +1,4 @@
-//! Where the scenes of each data set are, and what is missing of a folder that is not laid out like it.
+//! Layout of the scenes of each data set, and errors for folders with another layout.
 
 use std::path::{Path, PathBuf};
 
@@ -13,10 +13,10 @@ pub(super) struct SceneInput {
     pub(super) labels: PathBuf,
 }
 
-/// Folder of the labels of all scenes, where they do not lie beside the photos.
+/// Folder of the labels of all scenes, if they do not lie beside the photos.
 const LABELS: &str = "label";
 
-/// What a data set looks like, for errors.
+/// Describes the layout of a data set, for errors.
 fn expected(table: PaperTable) -> &'static str {
     match table {
         PaperTable::LerfOvs => {
@@ -33,7 +33,7 @@ fn expected(table: PaperTable) -> &'static str {
     }
 }
 
-/// The scenes below `data`, sorted; those of the names in `wanted`, if there are any.
+/// Returns the scenes below `data`, sorted; only those named in `wanted`, if any are.
 pub(super) fn find(table: PaperTable, data: &Path, wanted: &[String]) -> Result<Vec<SceneInput>, JobError> {
     let wrong = |path: &Path, what: &str| {
         JobError::Protocol(format!("{}: {what}. {}; give the folder DATA", path.display(), expected(table)))
@@ -86,7 +86,7 @@ fn has_spin_labels(scene: &Path) -> bool {
     folders(scene).iter().any(|f| f.starts_with("images") && scene.join(f).join("label").is_dir())
 }
 
-/// Names of the folders in a folder; none if it is none.
+/// Returns the names of the folders in a folder; none if it does not exist.
 fn folders(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
     entries.filter(|e| e.path().is_dir()).filter_map(|e| e.file_name().into_string().ok()).collect()

@@ -1,9 +1,9 @@
-//! The paper's tables, one call each: every scene of a data set is trained, its objects are found, and what is asked
-//! for is compared with its labels. Our rows stand beside the paper's as printed, and beside baselines that our own
-//! pieces can stand for.
+//! The paper's tables, one call each: every scene of a data set is trained, its objects are found, and answers to
+//! queries are compared with its labels. Our rows stand beside the paper's printed ones, and beside baselines made of
+//! our own components.
 //!
-//! Each scene has a folder, and each of its stages leaves a file when it is done: a run that was stopped goes on, and
-//! what is done is not done again. A folder holds the results of one set of settings only.
+//! Each scene has a folder, and each of its stages leaves a file at its end: a stopped run is resumed, and no finished
+//! stage is repeated. A folder holds the results of one set of settings only.
 
 mod layout;
 mod printed;
@@ -24,7 +24,7 @@ use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::build_map::REGIONS;
 use crate::pipeline::train::TrainConfig;
 
-/// Which table.
+/// A table of the paper.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum, strum::IntoStaticStr)]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
@@ -42,22 +42,22 @@ pub(crate) enum PaperTable {
     PartAblation,
 }
 
-/// Masks come from the labels themselves.
+/// Value of `masks` for masks from the labels themselves.
 pub(crate) const LABELS: &str = "labels";
-/// The encoder of the paper.
+/// Name of the paper's encoder.
 pub(crate) const PAPERS_ENCODER: &str = "clip-vit-b16";
 
-/// What the numbers depend on besides the data.
+/// Settings that the numbers depend on, besides the data.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct ReproduceSettings {
     pub(crate) table: PaperTable,
-    /// Where masks come from: [`LABELS`], [`REGIONS`], or a model that finds them.
+    /// Source of masks: [`LABELS`], [`REGIONS`], or a model that finds them.
     pub(crate) masks: String,
     pub(crate) encoder: String,
-    /// Whether labeled photos are trained on, as in the literature.
+    /// True if labeled photos are trained on, as in the literature.
     pub(crate) labeled_in_training: bool,
     pub(crate) train: TrainConfig,
-    /// What to ask for, by scene, where labels have no names; else the scene's name.
+    /// Query by scene, if labels have no names; else the scene's name.
     pub(crate) queries: BTreeMap<String, String>,
 }
 
@@ -67,14 +67,14 @@ pub(crate) struct ReproduceRequest {
     pub(crate) data: PathBuf,
     /// Folder of the results.
     pub(crate) out: PathBuf,
-    /// Scenes by name; none for all.
+    /// Names of scenes; empty for all.
     pub(crate) scenes: Vec<String>,
     pub(crate) settings: ReproduceSettings,
 }
 
 const SETTINGS_FILE: &str = "settings.json";
 
-/// The masks that are found where nobody says how: by the best network that is here.
+/// Returns the default source of masks: the best installed network.
 pub(crate) fn usual_masks(observer: &mut dyn Observer) -> Result<String, JobError> {
     let mut warn = |text: String| observer.note(Severity::Warning, text);
     let here = catalog::usable(ModelRole::Segmenter, &mut warn)?.into_iter().next();
@@ -86,7 +86,7 @@ pub(crate) fn usual_masks(observer: &mut dyn Observer) -> Result<String, JobErro
     })
 }
 
-/// Makes the table, and leaves it as `table.json` and `table.md` in the folder of the results.
+/// Makes the table, and writes it as `table.json` and `table.md` into the folder of the results.
 pub(crate) fn run(request: &ReproduceRequest, observer: &mut dyn Observer) -> Result<TableDocument, JobError> {
     let ReproduceRequest { data, out, settings, .. } = request;
     let scenes = layout::find(settings.table, data, &request.scenes)?;
@@ -107,7 +107,7 @@ pub(crate) fn run(request: &ReproduceRequest, observer: &mut dyn Observer) -> Re
     Ok(document)
 }
 
-/// Networks that are missing are told before hours of training, not after.
+/// Reports missing networks before hours of training, not after.
 fn check_models(settings: &ReproduceSettings) -> Result<(), JobError> {
     let told = |what: &str, e: crate::models::ModelError, instead: &str| {
         JobError::Protocol(format!("{what}: {e}; 'fmlgs models fetch' brings it, or {instead}"))
@@ -122,7 +122,7 @@ fn check_models(settings: &ReproduceSettings) -> Result<(), JobError> {
     Ok(())
 }
 
-/// Takes the folder for results of these settings, unless it holds anything else.
+/// Claims the folder for results of these settings, unless it holds anything else.
 fn claim(out: &Path, data: &Path, settings: &ReproduceSettings) -> Result<(), JobError> {
     export::check_folder(out, &[data])?;
     let file = out.join(SETTINGS_FILE);
@@ -142,7 +142,7 @@ fn claim(out: &Path, data: &Path, settings: &ReproduceSettings) -> Result<(), Jo
     Ok(export::json(&file, settings)?)
 }
 
-/// The first setting that differs, with both values.
+/// Returns the first setting that differs, with both values.
 pub(super) fn difference(there: &serde_json::Value, now: &serde_json::Value) -> Option<String> {
     let keys = now.as_object().into_iter().flatten();
     keys.filter(|(key, value)| there.get(key) != Some(value)).find_map(|(key, value)| match there.get(key) {

@@ -1,4 +1,4 @@
-//! What the paper prints: the rows of its tables, in percent and seconds, to stand beside ours.
+//! Printed values of the paper: the rows of its tables, in percent and seconds, to stand beside ours.
 
 use super::PaperTable;
 
@@ -7,12 +7,12 @@ pub(super) struct PrintedTable {
     pub(super) metric: &'static str,
     /// Title of the table in the paper.
     pub(super) title: &'static str,
-    /// Its columns by the names of the scenes' folders; the last is that of all scenes.
+    /// Its columns by the names of the scenes' folders; the last is for all scenes.
     pub(super) scenes: &'static [&'static str],
     pub(super) rows: &'static [(&'static str, &'static [f64])],
 }
 
-/// The metric of a printed table that has none of ours.
+/// Metric of a printed table without one of ours.
 pub(super) const TIME: &str = "query time, s";
 pub(super) const LOCALIZATION: &str = "localization accuracy, %";
 pub(super) const MIOU: &str = "mean IoU, %";
@@ -21,7 +21,7 @@ pub(super) const RECALL: &str = "recall of parts, %";
 
 const LERF_SCENES: &[&str] = &["ramen", "figurines", "teatime", "waldo_kitchen"];
 
-/// The tables of the paper that are made anew.
+/// Returns the paper's tables that are reproduced.
 pub(super) fn printed(table: PaperTable) -> Vec<PrintedTable> {
     match table {
         PaperTable::LerfOvs => vec![

@@ -1,5 +1,5 @@
-//! The rows of a table that are measured: this program's way, the paper's, and baselines that our own pieces can
-//! stand for. All ask by embedding alone, whatever labels call things, except for the one that says otherwise.
+//! The measured rows of a table: this program's method, the paper's, and baselines made of our own components. All
+//! query by embedding alone, whatever names labels have, except for the one that says otherwise.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
@@ -34,14 +34,14 @@ pub(super) const POOLED: &str = "running pooled IoU of FastLGS's evaluator, %";
 pub(super) const ARGMAX: &str = "mean IoU by arg-max over all classes, %";
 pub(super) const PART_IOU: &str = "mean IoU of parts, %";
 
-/// A row: by metric, the percentage of every query.
+/// A row: the percentage of every query, by metric.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct RowResult {
     pub(super) name: String,
     pub(super) scores: BTreeMap<String, Vec<f64>>,
 }
 
-/// Milliseconds of a query, from its text to its mask in a view that is drawn: median, and that of 95 %.
+/// Milliseconds of a query, from its text to its mask in a drawn view: median, and 95th percentile.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct QueryTimes {
     pub(super) whole_ms: [f64; 2],
@@ -56,8 +56,7 @@ pub(super) struct MeasuredRows {
     pub(super) unknown_phrases: Vec<String>,
 }
 
-/// How this program asks, and how the paper does: their recipes, by embedding alone, for objects that were found in
-/// this program's way.
+/// Returns the query recipes of this program and of the paper, by embedding alone, for objects that this program found.
 fn ways() -> [(&'static str, Recipe); 4] {
     let paper = Recipe::paper();
     let raw = Recipe { parts: PartFeatures::Raw, ..paper.clone() };
@@ -76,7 +75,7 @@ fn ours() -> Recipe {
 const SINGLE_LEVEL: &str = "single level without deviation";
 const BY_NAME: &str = "by name: labels in, labels out";
 
-/// The rows that a table's results have, from the `views` with labels.
+/// Measures the rows of a table, from the `views` with labels.
 pub(super) fn measure(
     settings: &ReproduceSettings,
     comparison: &PhotoComparison,
@@ -136,7 +135,7 @@ fn classes(views: &[LabeledView<'_>]) -> Vec<String> {
     all.into_iter().cloned().collect()
 }
 
-/// Asks by embedding; phrases are encoded once.
+/// Queries by embedding; phrases are encoded once.
 struct ByEmbedding {
     encoder: Box<dyn Encoder>,
     phrases: TextEmbeddings,
@@ -144,7 +143,7 @@ struct ByEmbedding {
 }
 
 impl ByEmbedding {
-    /// The answer; `None` where the encoder knows no word, which is noted.
+    /// Returns the answer; `None` if the encoder knows no word, which is noted.
     fn ask(
         &mut self,
         map: &SemanticMap,
@@ -161,14 +160,14 @@ impl ByEmbedding {
     }
 }
 
-/// Answers a phrase; `None` if nothing can be said.
+/// Answers a phrase; `None` if there is no answer.
 type Ask<'a> = &'a mut dyn FnMut(&str) -> Result<Option<QueryAnswer>, ModelError>;
-/// Relevancy of a view's pixels for a phrase, by the view's place.
+/// Relevancy of a view's pixels for a phrase, by the view's index.
 type Heat<'a> = &'a mut dyn FnMut(usize, &str) -> Result<Option<Vec<f32>>, JobError>;
 
 struct Table<'a> {
     which: PaperTable,
-    /// What is asked for where labels have no names.
+    /// Query if labels have no names.
     query: &'a str,
     classes: Vec<String>,
 }
@@ -178,7 +177,7 @@ fn percent(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
 }
 
 impl Table<'_> {
-    /// What is asked for in a view.
+    /// Returns the queries of a view.
     fn phrases<'b>(&'b self, view: &'b LabeledView<'_>) -> Vec<&'b str> {
         match self.which {
             PaperTable::SpinNerf => vec![self.query],
@@ -223,11 +222,11 @@ impl Table<'_> {
                 ])
             }
         };
-        // An encoder that fails is no answer that misses.
+        // A failing encoder is an error, not a wrong answer.
         failed.map_or(Ok(RowResult { name: name.into(), scores }), |e| Err(e.into()))
     }
 
-    /// A row of masks that LERF's rule cuts out of relevancy.
+    /// Returns a row of masks that LERF's rule cuts out of relevancy.
     fn ruled_row(&self, name: &str, views: &[LabeledView<'_>], heat: Heat<'_>) -> Result<RowResult, JobError> {
         let (mut ious, mut hits, mut found) = (Vec::new(), Vec::new(), Vec::new());
         for (k, view) in views.iter().enumerate() {
@@ -260,7 +259,7 @@ fn spin_scores(found: &[spin_nerf::Foreground]) -> BTreeMap<String, Vec<f64>> {
     BTreeMap::from([(MIOU.to_owned(), percent(ious)), (ACCURACY.to_owned(), percent(accuracies))])
 }
 
-/// Features that are matched by similarity instead of tracked identity.
+/// Returns a row of features that are matched by similarity instead of tracked identity.
 fn similarity_row(
     table: &Table<'_>,
     comparison: &PhotoComparison,
@@ -295,7 +294,7 @@ fn similarity_row(
     table.row(&name, joined, &views, &mut |text| by.ask(joined, (features, &recipe), text))
 }
 
-/// Rows with LERF's rule for masks: on identities, and on raw features per Gaussian.
+/// Returns rows with LERF's rule for masks: on identities, and on raw features per Gaussian.
 fn rule_rows(
     table: &Table<'_>,
     comparison: &PhotoComparison,
@@ -311,7 +310,7 @@ fn rule_rows(
     let PhotoComparison { cloud, settings, .. } = comparison;
     let mut renderer = Renderer::new();
     let raw = RawFeatures::new(language);
-    // Of one view at a time: weights of all would take gigabytes.
+    // One view at a time: weights of all would take gigabytes.
     let mut kept = None;
     let blended = table.ruled_row("raw features per Gaussian, LERF's mask rule", views, &mut |k, phrase| {
         let Some(parsed) = ParsedQuery::parse(phrase) else { return Ok(None) };
@@ -331,7 +330,7 @@ fn rule_rows(
     Ok([ruled, blended])
 }
 
-/// Times of this program's queries, every phrase encoded anew.
+/// Times this program's queries, every phrase encoded anew.
 fn times(
     table: &Table<'_>,
     (map, language): (&SemanticMap, &LanguageFeatures),

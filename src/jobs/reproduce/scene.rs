@@ -1,4 +1,4 @@
-//! One scene of a table: trained, its objects found, asked. Each stage leaves a file when it is done.
+//! One scene of a table: trained, its objects found, queried. Each stage leaves a file at its end.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,17 +18,17 @@ use crate::pipeline::observer::{Interrupted, Observer, Severity};
 use crate::pipeline::semantics::segmenter::FileMasks;
 use crate::scene::{Dataset, Level};
 
-/// Of photos that all have labels, every so manieth is held out.
+/// If all photos have labels, every n-th one is held out.
 const HOLDOUT_EVERY: usize = 8;
 
-/// What came of a scene.
+/// Result of a scene.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct SceneResult {
     pub(super) scene: String,
     pub(super) photos: usize,
     /// Labeled photos that were compared.
     pub(super) views: Vec<String>,
-    /// Whether those were trained on.
+    /// True if the compared photos were trained on.
     pub(super) trained_on: bool,
     /// Size of the compared views, px.
     pub(super) size_px: [u32; 2],
@@ -44,7 +44,7 @@ pub(crate) struct SceneResult {
 pub(super) struct TrainedFacts {
     pub(super) gaussians: usize,
     pub(super) secs: f64,
-    /// On held-out photos, if any are.
+    /// PSNR on held-out photos, if there are any.
     pub(super) psnr: Option<f64>,
 }
 
@@ -53,13 +53,13 @@ pub(super) struct FoundFacts {
     pub(super) objects: usize,
     pub(super) parts: usize,
     pub(super) secs: f64,
-    /// Size of the semantic map's file.
+    /// Size of the semantic map's file, bytes.
     pub(super) map_bytes: u64,
     /// Photos whose masks were used.
     pub(super) seeds: Vec<String>,
 }
 
-/// A stage's result: read where it is there, else made and stored.
+/// Returns a stage's result: reads it if it exists, else makes and stores it.
 fn once<T: Serialize + DeserializeOwned>(
     file: &Path,
     make: impl FnOnce() -> Result<T, JobError>,
@@ -96,7 +96,7 @@ pub(super) fn run(
     })
 }
 
-/// Which photos are compared.
+/// Photos that are compared.
 struct Split {
     compared: Vec<usize>,
     trained_on: bool,
@@ -119,7 +119,7 @@ impl Split {
             );
             return Err(JobError::Protocol(text));
         };
-        // The masks of the first labeled photo begin, where labels are the masks.
+        // If labels are the masks, those of the first labeled photo start the search.
         let seed = (settings.masks == LABELS).then_some(*first);
         let mut compared: Vec<usize> = labeled.iter().copied().filter(|i| Some(*i) != seed).collect();
         let trained_on = settings.labeled_in_training;
@@ -165,7 +165,7 @@ fn objects(
     let mut masks: Option<PathBuf> = None;
     if settings.masks == LABELS {
         masks = Some(input.labels.clone());
-        // Else none might be left to compare with.
+        // More seeds could leave no photo to compare with.
         with.max_seeds = if settings.labeled_in_training { 1 } else { with.max_seeds };
     } else {
         with.segmenter = Some(settings.masks.clone());
@@ -205,7 +205,7 @@ fn compare(
 ) -> Result<SceneResult, JobError> {
     let scene = open::scene(folder)?;
     let map = scene.semantics()?;
-    // A photo whose labels began is no test of them.
+    // A photo whose labels were used is no test of them.
     let is_seed = |i: &usize| settings.masks == LABELS && map.seeds.contains(&dataset.photos[*i].name);
     let compared: Vec<usize> = split.compared.into_iter().filter(|i| !is_seed(i)).collect();
     let comparison = PhotoComparison {

@@ -1,4 +1,4 @@
-//! The table of a data set: the paper's rows as printed, and ours, as JSON and as Markdown.
+//! The table of a data set: the paper's printed rows, and ours, as JSON and as Markdown.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -12,18 +12,18 @@ use super::{LABELS, PaperTable, REGIONS, ReproduceSettings};
 use crate::math::stats::mean;
 use crate::scene::text;
 
-/// What a semantic map may take on disk, bytes.
+/// Most bytes of a semantic map on disk.
 pub(crate) const MOST_MAP_BYTES: u64 = 3_000_000;
 
 /// A row of a metric.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct TableRow {
     pub(crate) name: String,
-    /// Whether it is the paper's, as printed.
+    /// True if it is the paper's, as printed.
     pub(crate) printed: bool,
-    /// By scene.
+    /// Values by scene.
     pub(crate) scenes: BTreeMap<String, f64>,
-    /// Mean of the scenes' means; in a printed row the paper's own figure for all.
+    /// Mean of the scenes' means; in a printed row the paper's own value for all.
     pub(crate) mean_of_scenes: Option<f64>,
     /// Mean of all queries.
     pub(crate) mean_of_queries: Option<f64>,
@@ -38,15 +38,15 @@ pub(crate) struct MetricTable {
     pub(crate) rows: Vec<TableRow>,
 }
 
-/// Everything that a table says.
+/// Contents of a table.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct TableDocument {
     pub(crate) settings: ReproduceSettings,
-    /// How answers are compared.
+    /// Protocol of the comparison.
     pub(crate) protocol: &'static str,
     pub(crate) metrics: Vec<MetricTable>,
     pub(crate) scenes: Vec<SceneResult>,
-    /// What a reader has to know to judge the numbers.
+    /// Notes that a reader needs to judge the numbers.
     pub(crate) notes: Vec<String>,
 }
 
@@ -80,7 +80,7 @@ impl TableDocument {
         Self { settings: settings.clone(), protocol: protocol(settings.table), metrics, scenes, notes }
     }
 
-    /// The table for readers.
+    /// Returns the table as Markdown.
     pub(crate) fn markdown(&self) -> String {
         let table: &str = self.settings.table.into();
         let mut out = format!("# {table}\n\n");
@@ -151,7 +151,7 @@ fn measured_rows(metric: &str, scenes: &[SceneResult]) -> Vec<TableRow> {
         let scores = |s: &SceneResult| s.rows.iter().find(|r| r.name == name)?.scores.get(metric).cloned();
         let scores: Vec<(String, Vec<f64>)> =
             scenes.iter().filter_map(|s| Some((s.scene.clone(), scores(s)?))).collect();
-        // A scene in which nothing is asked has no mean.
+        // A scene without queries has no mean.
         let asked = scores.into_iter().filter(|s| !s.1.is_empty()).collect::<Vec<_>>();
         let all: Vec<f64> = asked.iter().flat_map(|s| s.1.iter().copied()).collect();
         let scenes: BTreeMap<String, f64> = asked.into_iter().map(|(scene, values)| (scene, mean(&values))).collect();
@@ -163,7 +163,7 @@ fn measured_rows(metric: &str, scenes: &[SceneResult]) -> Vec<TableRow> {
     names.into_iter().map(of).collect()
 }
 
-/// Seconds of this program's queries, the text's encoding included, as the paper counts them.
+/// Returns the seconds of this program's queries, including the text's encoding, as the paper counts them.
 fn time_row(scenes: &[SceneResult]) -> TableRow {
     let scenes: BTreeMap<_, _> = scenes.iter().map(|s| (s.scene.clone(), 1e-3 * s.times.whole_ms[0])).collect();
     let all: Vec<f64> = scenes.values().copied().collect();
