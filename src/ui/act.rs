@@ -1,4 +1,4 @@
-//! What each action does.
+//! Dispatch of the user's actions.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -25,7 +25,7 @@ use crate::ui::actions::{Action, Pane};
 use crate::worker::{Command, JobId};
 
 impl App {
-    /// Does what a user asked for.
+    /// Carries out an action of the user.
     pub(super) fn act(&mut self, action: Action, ctx: &egui::Context) {
         if self.is_about_nothing(&action) {
             return;
@@ -169,9 +169,9 @@ impl App {
         }
     }
 
-    /// Opens something else; asks first if that ends a running job.
+    /// Opens another scene; asks first if that ends a running job.
     fn replace_scene(&mut self, action: Action) {
-        // What runs on another computer goes on there.
+        // A job on another computer continues there.
         let here = |id| !self.link.as_ref().is_some_and(|link| link.owns(id));
         match self.state.job.as_ref().filter(|j| here(j.id)).map(|j| j.title.clone()) {
             None => self.open(action),
@@ -187,7 +187,7 @@ impl App {
         }
     }
 
-    /// Cancels what runs and does the action next.
+    /// Cancels the running job, then opens what the action names.
     pub(super) fn give_up_and(&mut self, action: Action) {
         self.cancel_job();
         self.open(action);
@@ -238,7 +238,7 @@ impl App {
         }
     }
 
-    /// Explores where one can go in a scene, once, where the plan wants that before anybody asks.
+    /// Explores the free space of a scene once, if the plan asks for it in advance.
     pub(super) fn explore(&mut self) {
         let wanted = self.state.plan.navigation == When::Always && self.state.explored.is_none();
         if !wanted || self.explored_for == self.state.scene_number {
@@ -250,7 +250,7 @@ impl App {
         }
     }
 
-    /// Looks for the way to an identity; the flight begins when it is found.
+    /// Searches a flight to an identity; it begins when it is found.
     fn visit(&mut self, id: IdentityId, preference: ViewPreference) {
         let Some(SceneContext { cloud, map: Some(map), settings, cameras, up, eye, aspect, explored, .. }) =
             self.context()
@@ -264,7 +264,7 @@ impl App {
         self.submit(Command::Approach(Box::new(request)));
     }
 
-    /// Begins the flight that was found, or says why there is none.
+    /// Begins the flight that was found, or reports why there is none.
     pub(super) fn visited(&mut self) {
         let Some(Approached { name, flight, problem }) = self.state.visited.take() else { return };
         match (&problem, &flight) {
@@ -280,7 +280,7 @@ impl App {
         }
     }
 
-    /// Sends what was typed to the agent, with the scene as it is.
+    /// Sends the typed text to the agent, with a snapshot of the scene.
     pub(super) fn send_chat(&mut self) {
         let Some(text) = self.chat.wants() else { return };
         let Some(SceneContext { scene, cloud, map: Some(map), settings, cameras, up, eye, aspect, explored }) =
@@ -312,7 +312,7 @@ impl App {
         self.chat.send(text, snapshot, self.layout.chat.clone(), &self.repaint);
     }
 
-    /// Does to the window what the agent has done.
+    /// Applies an effect of the agent to the window.
     pub(super) fn effect(&mut self, effect: Effect) {
         match effect {
             Effect::Fly(flight, about) => {

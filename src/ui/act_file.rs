@@ -1,4 +1,4 @@
-//! What the actions around files do: dialogs, and what becomes of the path that is chosen.
+//! Actions on files: dialogs, and what is done with the chosen path.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,7 +15,7 @@ use crate::render::BackendChoice;
 use crate::worker::{Command, Failure};
 
 impl App {
-    /// Takes over settings for the next training.
+    /// Reads settings for the next training from a file.
     pub(super) fn read_preset(&mut self, path: &Path) {
         match presets::read(path) {
             Ok(config) => {
@@ -54,7 +54,7 @@ impl App {
         }
     }
 
-    /// Continues with what the file dialog brought.
+    /// Continues with the path from the file dialog.
     pub(super) fn chosen(&mut self, action: Action, path: PathBuf) {
         let folder = if path.is_dir() { Some(path.as_path()) } else { path.parent() };
         self.layout.folder = folder.map(Path::to_path_buf);
@@ -142,7 +142,7 @@ impl App {
         })));
     }
 
-    /// Exports a video of what is played.
+    /// Exports a video of the loaded flight or path.
     fn export_video(&mut self, out: PathBuf) {
         let Some(SceneContext { cloud, map, settings: draw, aspect, .. }) = self.context() else { return };
         let Some((cameras, settings)) = self.camera.video(&out, aspect) else {

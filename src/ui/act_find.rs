@@ -1,4 +1,4 @@
-//! Finding objects: asks with what where photos came without labels, downloads what that needs, and goes on by itself.
+//! Finding objects: asks for a method if the photos have no labels, downloads its models, then starts the search.
 
 use std::collections::{BTreeSet, VecDeque};
 use std::path::PathBuf;
@@ -18,18 +18,18 @@ use crate::scene::{Camera, SemanticMap};
 use crate::worker::{Command, Event, JobId};
 
 impl App {
-    /// Finds objects and parts with the labels that came with the photos; without, asks what is to look at them.
+    /// Finds objects and parts with the labels of the photos; without labels, opens the dialog with the methods.
     pub(super) fn find_objects(&mut self) {
         let has_labels = self.state.scene.as_ref().is_some_and(|s| s.masks.is_some() || s.dataset.is_none());
         if has_labels || !self.state.is_trained() {
             return self.find_objects_by(None);
         }
-        // Files may have been put there by hand since they were listed.
+        // The user may have added files since the list was made.
         self.models = Models::default();
         self.find_dialog.open();
     }
 
-    /// Shows the dialog if it is open, and goes on with what is decided there.
+    /// Shows the dialog if it is open, and continues with the user's decision.
     pub(super) fn ask_for_means(&mut self, ctx: &egui::Context) {
         let recipe = self.viewport.queries.recipe().preparation;
         self.find_dialog.follow_recipe(recipe, &mut self.layout.finding);
@@ -47,7 +47,7 @@ impl App {
         self.begin_search(PlannedSearch { masks: None, missing, replace_all: false });
     }
 
-    /// Begins a search, or first asks what is to become of objects and parts that somebody has worked on.
+    /// Begins a search; asks first if objects and parts were edited by the user.
     fn begin_search(&mut self, search: PlannedSearch) {
         let by_hand = self.state.semantics.as_deref().map_or_else(Vec::new, |map| find_objects::by_hand(map));
         match by_hand.is_empty() {
@@ -56,7 +56,7 @@ impl App {
         }
     }
 
-    /// Finds objects once the models for it are here: downloads the first that is missing, or finds if there is none.
+    /// Finds objects once their models are installed: downloads the first missing one, or starts the search.
     fn find_after(&mut self, mut search: PlannedSearch) {
         let Some(id) = search.missing.pop_front() else { return self.search_all(search) };
         let scene = self.state.scene_number;
@@ -72,7 +72,7 @@ impl App {
         self.finding = job.filter(|_| had_objects).map(step);
     }
 
-    /// Asks what is to be kept, while that is open.
+    /// Asks what to keep, while that dialog is open.
     pub(super) fn ask_what_to_keep(&mut self, ctx: &egui::Context) {
         let Some(answer) = self.keep_dialog.as_ref().and_then(|dialog| dialog.show(ctx)) else { return };
         let Some(KeepDialog { search, .. }) = self.keep_dialog.take() else { return };
@@ -83,7 +83,7 @@ impl App {
         }
     }
 
-    /// Takes note of what happens to the downloads that a search waits for.
+    /// Follows the downloads that a search waits for.
     pub(super) fn hear(&mut self, event: &Event) {
         let Some(awaited) = self.awaited.take_if(|a| event.is_end() && event.job() == a.job) else { return };
         if !matches!(event, Event::Finished(..)) {
@@ -91,24 +91,24 @@ impl App {
                         ended: find objects again.";
             return self.state.toast(Tone::Warning, text);
         }
-        // Another scene was opened meanwhile: nobody asked about that one.
+        // If another scene was opened meanwhile, the search no longer applies.
         if awaited.scene == self.state.scene_number {
             self.find_after(awaited.then);
         }
     }
 
-    /// Finds objects and parts with these masks, those that came with the photos, or none.
+    /// Finds objects and parts with the masks in `masks`, or with those of the photos, or without any.
     pub(super) fn find_objects_by(&mut self, masks: Option<PathBuf>) {
         self.begin_search(PlannedSearch { masks, missing: VecDeque::new(), replace_all: false });
     }
 
-    /// Adds what the photo that is looked through, or else the nearest that was trained on, shows that is nobody's.
+    /// Adds the unlabeled regions of one photo: the one looked through, or else the nearest training photo.
     pub(super) fn segment_photo(&mut self) {
         let Some(known) = self.state.semantics.as_deref().cloned() else {
             return self.state.toast(Tone::Warning, "Find objects first: what one more photo shows is added to them.");
         };
         if self.editing.is_some() || !self.edits.is_empty() {
-            // It would begin with what was before the change.
+            // The search would begin with the state before the edit.
             return self.state.toast(Tone::Warning, "Objects are being changed; segment the photo once that is done.");
         }
         let (scene, eye) = (self.state.scene.clone(), self.viewport.pose());
@@ -134,13 +134,13 @@ impl App {
         self.finding = job.map(|job| FoundStep { job, what, adds: true });
     }
 
-    /// Takes in that a search is over: what it changed can be undone.
+    /// Records the end of a search in the history, so that it can be undone.
     pub(super) fn found(&mut self, step: FoundStep) {
         let count = |map: Option<&Arc<SemanticMap>>| map.map_or(0, |map| map.identities.len());
         let before = self.state.changes.now().map_or(0, |now| count(now.map.as_ref()));
         let new = count(self.state.semantics.as_deref()).saturating_sub(before);
         if !step.adds && !self.state.changes.has(&self.snapshot()) {
-            // Numbers are of others now.
+            // The numbers now belong to other identities.
             self.viewport.visibility.set_hidden([]);
             self.viewport.picking.select(None);
         }
@@ -155,7 +155,7 @@ impl App {
         }
     }
 
-    /// Searches all photos, or the one of this name for what is not known yet.
+    /// Searches all photos, or only the unlabeled regions of the photo named in `add`.
     fn submit_search(
         &mut self,
         masks: Option<PathBuf>,

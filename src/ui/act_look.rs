@@ -1,4 +1,4 @@
-//! What the actions around how the view looks do.
+//! Actions on what the view shows.
 
 use super::actions::Action;
 use super::app::App;
@@ -7,12 +7,12 @@ use super::state::Tone;
 use crate::worker::{Command, ViewMode};
 
 impl App {
-    /// Changes what the view, or the one of two that is worked in, shows.
+    /// Changes what the view shows; of two views, the active one.
     pub(super) fn look(&mut self, action: Action, ctx: &egui::Context) {
         match action {
             Action::Show(mode) => {
                 *self.layout.mode_of(self.viewport.queries.is_second()) = mode;
-                // The picture is the picture.
+                // The rendered image is shown without a tint.
                 if mode == ViewMode::Rgb {
                     self.viewport.queries.tint(ColorBy::Masks);
                 }

@@ -1,4 +1,4 @@
-//! What the actions around phrases and true masks do.
+//! Actions on phrases and true masks.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -15,11 +15,11 @@ use crate::jobs::query::write_mask;
 use crate::scene::{Camera, LevelFilter};
 use crate::worker::{Command, Failure};
 
-/// Longer side of the views that are asked, px.
+/// Longer side of the views that are queried, px.
 const SIDE_PX: u32 = 1008;
 
 impl App {
-    /// Asks the list of phrases; its masks are written into `to`, if that is given.
+    /// Runs the list of phrases; writes the masks into `to`, if given.
     pub(super) fn run_phrases(&mut self, to: Option<PathBuf>) {
         self.layout.hidden.retain(|p| *p != Pane::Phrases);
         let phrases = match phrases::listed(&self.phrases.text) {
@@ -35,7 +35,7 @@ impl App {
             (None, Some(picture)) => vec![("this view".to_owned(), picture.camera.limited_to(SIDE_PX))],
             (None, None) => return,
         };
-        // A mask is of one view alone.
+        // A true mask belongs to one view only.
         let truth = self.viewport.queries.truth().filter(|_| photos.is_none()).map_or(TrueMasks::None, TrueMasks::Mask);
         let colors = self.viewport.queries.colors_of(&phrases);
         self.submit(Command::Phrases(Box::new(PhrasesRequest {
@@ -67,7 +67,7 @@ impl App {
         self.submit(Command::ExportAll(Box::new(request)));
     }
 
-    /// Compares the newest answer with a true mask of the present view, or with none.
+    /// Compares the newest answer with a true mask of the current view, or with none.
     pub(super) fn compare_with_mask(&mut self, path: Option<&Path>) {
         let Some(path) = path else { return self.viewport.queries.compare_with(None) };
         let read = phrases::true_mask(path).and_then(|mask| match self.viewport.queries.maps() {
@@ -83,7 +83,7 @@ impl App {
         }
     }
 
-    /// Writes the true mask of the present view.
+    /// Writes the true mask of the current view.
     pub(super) fn save_true_mask(&mut self, path: &Path) {
         let Some(mask) = self.viewport.queries.truth() else { return };
         match export::check(path, &[".png"], &[]).and_then(|()| write_mask(path, &mask)) {

@@ -1,4 +1,4 @@
-//! The key that opens the query field: always, though nothing may be there that could be asked for.
+//! The shortcut of the query field, which works even if there is nothing to query.
 
 use egui::{Key, Modifiers, Ui};
 
@@ -7,22 +7,22 @@ use super::keys;
 use super::viewport::query::closed;
 
 impl App {
-    /// Puts the keyboard into the query field. Where nothing can be asked it says why, and takes what is typed.
+    /// Focuses the query field. If queries are impossible, the field reports why and discards the text.
     pub(super) fn type_question(&mut self, ctx: &egui::Context) {
         self.asks_in_vain = self.state.why_no_query().is_some();
         keys::type_in_vain(ctx, self.asks_in_vain);
         if self.asks_in_vain {
             return;
         }
-        // Another scene in the second view is not asked.
+        // Queries do not go to another scene in the second view.
         if self.state.beside.is_some() {
             self.viewport.queries.work_in(false);
         }
         self.viewport.queries.start_typing();
     }
 
-    /// Closes the field that takes nothing once somebody leaves it, and opens the real one once there is something to
-    /// ask for. Before anybody else takes keys.
+    /// Closes the disabled field on Escape, Enter, a click or the focus of another field. Opens the query field once
+    /// queries are possible. Runs before other code takes keys.
     pub(super) fn follow_vain_query(&mut self, ctx: &egui::Context) {
         if !self.asks_in_vain {
             return;
@@ -38,7 +38,7 @@ impl App {
         keys::type_in_vain(ctx, self.asks_in_vain);
     }
 
-    /// Draws the field that takes nothing over the view in `rect`, if it is open.
+    /// Draws the disabled query field over the view in `rect`, if it is open.
     pub(super) fn show_vain_query(&self, ui: &Ui, rect: egui::Rect) {
         if let Some(why) = self.state.why_no_query().filter(|_| self.asks_in_vain) {
             closed::show(ui, rect, &why);

@@ -1,4 +1,4 @@
-//! Removing things: the result is a scene of its own, seen beside this one, which stays as it is.
+//! Removal of objects and parts: the result is a new scene, shown beside the unchanged one.
 
 use super::actions::Action;
 use super::app::App;
@@ -9,7 +9,7 @@ use crate::scene::IdentityId;
 use crate::worker::Command;
 
 impl App {
-    /// Makes a scene without these.
+    /// Makes a scene without these identities.
     pub(super) fn remove(&mut self, ids: &[IdentityId]) {
         let Some(folder) = self.state.scene.as_ref().filter(|_| self.state.is_trained()).map(|s| s.out.clone()) else {
             return self.state.toast(Tone::Warning, "Only from a trained scene can something be removed.");
@@ -17,7 +17,7 @@ impl App {
         self.submit_removal(RemoveRequest { folder, options: RemovalOptions::of(ids), retrain: false });
     }
 
-    /// Asks before the scene is deleted that was made by removing something and is shown beside this one.
+    /// Asks for confirmation before the scene made by a removal is deleted.
     pub(super) fn ask_to_delete_removed(&mut self) {
         let Some(removed) = &self.state.removed else {
             return self.state.toast(Tone::Warning, "No scene was made by removing something from this one.");
@@ -31,7 +31,7 @@ impl App {
             Some(Question { text, yes: "Delete it", other: None, no: "Keep it", action: Action::DeleteRemoved });
     }
 
-    /// Deletes that scene.
+    /// Deletes the scene made by a removal.
     pub(super) fn delete_removed(&mut self) {
         let Some(removed) = self.state.removed.take() else { return };
         match removed.delete() {
@@ -46,7 +46,7 @@ impl App {
         }
     }
 
-    /// Makes a scene without what the request says, from the one that is open.
+    /// Makes a scene without the identities of the request, from the open one.
     pub(super) fn submit_removal(&mut self, request: RemoveRequest) {
         if self.editing.is_some() || !self.edits.is_empty() {
             return self.state.toast(Tone::Warning, "Objects are being changed; remove it once that is done.");

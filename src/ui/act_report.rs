@@ -1,4 +1,4 @@
-//! What the actions around reports do.
+//! Actions on reports.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -18,7 +18,7 @@ impl App {
         self.submit(Command::ReadReport { path, second });
     }
 
-    /// Measures how the scene is drawn: from photos, or from where the eye is.
+    /// Measures the rendering of the scene, from photos or from the current camera.
     pub(super) fn measure_drawing(&mut self) {
         let scene = self.state.scene.clone();
         let cloud = self.viewport.cloud().cloned().filter(|_| self.state.is_trained());
@@ -48,7 +48,7 @@ impl App {
         self.submit(Command::Measure(Box::new(request)));
     }
 
-    /// Takes a measured setting over: into the next training, or into the view.
+    /// Applies a measured setting to the next training or to the view.
     pub(super) fn apply_setting(&mut self, stage: StageName, knobs: &Knobs) {
         let done = match stage {
             StageName::Train => turned(&self.layout.config, knobs).map(|config| {

@@ -1,4 +1,4 @@
-//! Edits of Gaussians: they are measured and deleted, objects and parts arranged.
+//! Edits of Gaussians: measuring, deleting, and arranging of objects and parts.
 
 use std::sync::Arc;
 
@@ -22,14 +22,14 @@ impl App {
         self.submit(Command::MeasureSplats(Box::new(MeasureRequest { path, cloud: Arc::clone(&cloud) })));
     }
 
-    /// Carries out what the view shows of a thing that is being arranged.
+    /// Applies the arrangement that the view previews.
     pub(super) fn keep_arranged(&mut self) {
         if let Some(tool) = self.viewport.arrange.take() {
             self.edit(EditStep::Rearrange(SplatEdit::Arrange(tool.arrangement())));
         }
     }
 
-    /// Deletes what is chosen.
+    /// Deletes the chosen Gaussians.
     pub(super) fn delete_chosen(&mut self) {
         match self.clean.take_chosen() {
             Some(gone) => self.edit(EditStep::Rearrange(SplatEdit::Delete(gone))),

@@ -1,4 +1,4 @@
-//! Training from the window: it goes on where the one on screen ended, or begins anew beside it.
+//! Training from the window: continues the current training, or begins a new one beside it.
 
 use super::actions::Action;
 use super::app::App;
@@ -9,7 +9,7 @@ use crate::jobs::train::{IfChanged, TrainStart};
 use crate::worker::Command;
 
 impl App {
-    /// Goes on with the training on screen where its settings allow it and it is not to begin `anew`.
+    /// Continues the current training if its settings allow it and `anew` is false; else begins a new one.
     pub(super) fn start_training(&mut self, anew: bool, if_changed: IfChanged) {
         let scene = self.state.scene.as_ref();
         let Some((dataset, out)) = scene.and_then(|s| Some((s.dataset.clone()?, s.out.clone()))) else {
@@ -30,7 +30,7 @@ impl App {
         self.submit(Command::Train { dataset, config, out, from });
     }
 
-    /// Asks whether a training goes on with other photos than it began with.
+    /// Asks whether to continue a training with photos that have changed since it began.
     pub(super) fn ask_how_to_train(&mut self, changes: &str) {
         let text = format!(
             "{}.\n\nTrain anew in a folder of its own, or go on with the photos as they are now? The training so \

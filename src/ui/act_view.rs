@@ -1,4 +1,4 @@
-//! What the actions about the view and what is selected in it do.
+//! Actions on the view and on the selection.
 
 use egui::Context;
 use glam::DVec2;
@@ -20,7 +20,7 @@ impl App {
         }
     }
 
-    /// Ends what was begun last: a tool, a selection, the running job.
+    /// Ends the first of these that is there: the tool, the selection, the full view, the running job.
     pub(super) fn dismiss(&mut self, ctx: &Context) {
         match self.viewport.tool() {
             Some(tool) => self.view(&tool, ctx),
@@ -30,7 +30,7 @@ impl App {
         }
     }
 
-    /// Whether an action is about the Gaussians of what has none, which is said then.
+    /// Returns true, with a message, if an action needs the Gaussians of an identity without any.
     pub(super) fn is_about_nothing(&mut self, action: &Action) -> bool {
         let (Action::GoToTarget(id, _)
         | Action::Isolate(Some(id))
@@ -46,19 +46,19 @@ impl App {
         true
     }
 
-    /// Looks into the pixel at a relative place of the view.
+    /// Inspects the pixel at a relative position of the view.
     pub(super) fn inspect(&mut self, at: DVec2) {
         if let Some(request) = self.viewport.inspect_request(at, &self.state) {
             self.submit(Command::Inspect(Box::new(request)));
         }
     }
 
-    /// What is selected, or else what was asked for.
+    /// Selected identity, or else the first answer to the query.
     fn chosen_identity(&self) -> Option<IdentityId> {
         self.viewport.picking.selected().or_else(|| self.viewport.queries.found().first().copied())
     }
 
-    /// Does what a key means for what is selected.
+    /// Applies a key's action to the selected identity.
     pub(super) fn act_on_selected(&mut self, action: &Action, ctx: &Context) {
         let Some(id) = self.chosen_identity() else {
             return self.state.toast(Tone::Info, "Nothing is selected: click an object in the view, or press N.");
@@ -71,8 +71,8 @@ impl App {
         self.act(action, ctx);
     }
 
-    /// Selects the next object, or the part next to the one that is selected; the one before; or the first part of
-    /// what is selected. The order is that of the list.
+    /// Selects, in the order of the list, the next or previous object or part among its siblings, the whole, or the
+    /// first part.
     pub(super) fn select_another(&mut self, action: &Action, ctx: &Context) {
         let Some(map) = self.state.semantics.clone() else {
             return self.state.toast(Tone::Info, "There are no objects yet: find them first (Objects pane).");
@@ -112,7 +112,7 @@ impl App {
         }
     }
 
-    /// Makes a text field of the name that was chosen last.
+    /// Turns the name of the selected identity into a text field.
     pub(super) fn start_renaming(&mut self) {
         match (self.chosen_identity(), self.state.semantics.clone()) {
             (Some(id), Some(map)) => {
@@ -126,7 +126,7 @@ impl App {
     }
 }
 
-/// The pieces of an identity, or the objects, as the list has them.
+/// Parts of an identity, or all objects, in the order of the list.
 fn listed(all: &Identities, sizes: &[usize], of: IdentityId) -> Vec<IdentityId> {
     let ids = all.iter().filter(|(_, i)| i.parent == of).map(|(id, _)| id).collect();
     let (mut shown, mut tiny) = labels::listed(all, sizes, ids);

@@ -1,4 +1,4 @@
-//! What the actions around the window itself do.
+//! Actions on the window itself.
 
 use super::app::App;
 use super::dock::Dock;
@@ -7,7 +7,7 @@ use super::state::Tone;
 use crate::ui::actions::Action;
 
 impl App {
-    /// Does what concerns the window alone: its theme, its panes and how much of it the view has.
+    /// Changes the window: its theme, its panes and the full view.
     pub(super) fn arrange(&mut self, action: &Action, ctx: &egui::Context) {
         match action {
             Action::FillWindow => {

@@ -1,5 +1,5 @@
-//! What a user can do in the window: one table from which menus, command palette, shortcut sheet and key
-//! bindings are made. A row holds an action's name, one sentence on what it does, and its key if it has one.
+//! Actions of the user: one table for menus, command palette, shortcut sheet and key bindings. A row holds an action's
+//! name, one sentence on its effect, and its key if it has one.
 
 use std::path::PathBuf;
 
@@ -18,7 +18,7 @@ use crate::scene::{CropBox, IdentityId, NOBODY};
 use crate::ui::color_by::ColorBy;
 use crate::worker::{Start, ViewMode};
 
-/// A part of the window that can be hidden; the order is that of the menu.
+/// A pane of the window that can be hidden, in the order of the menu.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize, VariantArray, IntoStaticStr)]
 pub enum Pane {
     /// Thumbnails and facts of the photos.
@@ -30,20 +30,20 @@ pub enum Pane {
     Training,
     /// Objects and parts.
     Objects,
-    /// The answer to the query in full, and how answers are found and drawn.
+    /// The answer to the query in full, with the settings of search and display.
     #[strum(serialize = "Query")]
     Query,
-    /// What is left out for this scene, and why.
+    /// Decisions on what is left out for this scene, with their reasons.
     #[strum(serialize = "Scene plan")]
     Plan,
-    /// Neural networks: which are installed, which are missing.
+    /// Neural networks, installed and missing.
     Models,
     /// A list of phrases with their answers.
     Phrases,
-    /// The camera's path.
+    /// The camera path.
     #[strum(serialize = "Camera path")]
     Camera,
-    /// Floaters and the like, found and deleted.
+    /// Detection and deletion of floaters and other artifacts.
     Clean,
     /// Error against run time.
     Report,
@@ -57,7 +57,7 @@ impl Pane {
     }
 }
 
-/// A direction of the world that can be upwards.
+/// A world direction that can be up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, VariantArray, IntoStaticStr)]
 pub enum Axis {
     /// Along x.
@@ -108,14 +108,14 @@ macro_rules! actions {
         None
     };
     ($($name:ident $(($($arg:ident: $ty:ty),+))?: $text:expr, $tip:literal $(, $key:literal)?;)*) => {
-        /// What a user wants.
+        /// An action of the user.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Action {
             $(#[doc = $tip] $name $(($($ty),+))?,)*
         }
 
         impl Action {
-            /// Its name in menus and in the palette.
+            /// Name in menus and in the palette.
             #[allow(unused_variables, clippy::useless_conversion)]
             pub(crate) fn text(&self) -> String {
                 match self {
@@ -130,7 +130,7 @@ macro_rules! actions {
                 }
             }
 
-            /// Those that need nothing else to be known, in the order of the table.
+            /// Actions without arguments that must be given, in the order of the table.
             fn plain() -> Vec<Self> {
                 [$(actions!(@plain $name $(($($ty),+))?)),*].into_iter().flatten().collect()
             }
@@ -314,7 +314,7 @@ actions! {
     Quit: "Quit", "Close the window. A running training keeps its last checkpoint.", "Ctrl+Q";
 }
 
-/// In the order of the menu.
+/// Themes in the order of the menu.
 pub(crate) const THEMES: [ThemePreference; 3] =
     [ThemePreference::Dark, ThemePreference::Light, ThemePreference::System];
 
@@ -322,7 +322,7 @@ impl Action {
     /// Every action that needs no further input, in the order of the palette.
     pub(crate) fn all() -> Vec<Self> {
         let mut all = Self::plain();
-        // Without a tool in use there is nothing to keep.
+        // These need a tool in use.
         all.retain(|a| !matches!(a, Self::AddPainted | Self::KeepArranged | Self::DeleteChosen));
         all.extend([Self::Isolate(None), Self::Paint(Some(NOBODY)), Self::SetCrop(None)]);
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
@@ -334,7 +334,7 @@ impl Action {
         all
     }
 
-    /// One sentence on what it does.
+    /// One sentence on its effect.
     pub(crate) fn tooltip(&self) -> &'static str {
         match self {
             Self::Isolate(Some(_)) => "Show nothing else.",

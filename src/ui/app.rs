@@ -1,4 +1,4 @@
-//! The application: takes events in, draws the window, sends commands out.
+//! The application: applies events, draws the window, sends commands.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -35,9 +35,9 @@ mod keyboard;
 
 /// The window's application.
 pub struct App {
-    /// What it knows.
+    /// State of the window, changed by events alone.
     pub state: AppState,
-    /// Choices that are kept.
+    /// Choices that are stored.
     pub layout: Layout,
     /// The view of the scene.
     pub viewport: Viewport,
@@ -49,7 +49,7 @@ pub struct App {
     pub(super) question: Option<Question>,
     pub(super) find_dialog: FindDialog,
     pub(super) awaited: Option<AwaitedModels>,
-    /// Whether the query field is open where nothing can be asked.
+    /// True if the query field is open although queries are impossible.
     pub(super) asks_in_vain: bool,
     pub(super) palette: Palette,
     pub(super) sheet: bool,
@@ -69,35 +69,35 @@ pub struct App {
     pub(crate) chat: Chat,
     toasts: Toasts,
     pub(super) actions: Vec<Action>,
-    /// Window time of the last frame.
+    /// Window time of the last frame, s.
     last_frame: f64,
-    /// Number of the scene that was looked at before anybody wanted to go anywhere.
+    /// Number of the scene that was explored in advance.
     pub(super) explored_for: u64,
     /// Lines of the trace that are in the log already.
     traced: usize,
-    /// Edits of objects and parts that wait for the one that is under way.
+    /// Edits of objects and parts that wait for the running one.
     pub(super) edits: VecDeque<EditStep>,
     pub(super) editing: Option<Editing>,
-    /// The search that is under way, where there were objects before.
+    /// The running search, if there were objects before.
     pub(super) finding: Option<FoundStep>,
     pub(super) keep_dialog: Option<KeepDialog>,
-    /// Whether the view takes the whole window.
+    /// True if the view fills the window.
     pub(super) full_view: bool,
-    /// Whether objects were known in the last frame.
+    /// True if objects were known in the last frame.
     had_objects: bool,
 }
 
 impl App {
-    /// Starts the worker and does `first`, one after the other. `jobs` does the work. Fails only if
-    /// the system gives no threads.
+    /// Starts the worker and carries out `first` in order. `jobs` does the work. Fails only if the system cannot start
+    /// threads.
     pub fn new(
         cc: &eframe::CreationContext<'_>,
         jobs: impl Jobs,
         first: impl IntoIterator<Item = Action>,
     ) -> std::io::Result<Self> {
         theme::install(&cc.egui_ctx);
-        // Frames answer a user's hand. Progress can be read no faster than it is written, and
-        // every frame takes from what it reports on.
+        // Frames answer input. Progress is read no faster than it is written, and every frame takes computing time from
+        // the job that reports it.
         let (repaint, unhurried) = (super::repainter(&cc.egui_ctx, 8), super::repainter(&cc.egui_ctx, 120));
         resource_log::record(ResourceKind::Window, "window", "the program was started", 0);
         let layout = Layout::load(cc.storage);
@@ -143,12 +143,12 @@ impl App {
         })
     }
 
-    /// Asks for an action, as a key or a button would.
+    /// Queues an action, as a key or a button does.
     pub fn ask(&mut self, action: Action) {
         self.actions.push(action);
     }
 
-    /// Whether a file is being chosen in a dialog of the window's own.
+    /// True if the window's own file dialog is open.
     pub fn chooses_file(&self) -> bool {
         self.dialogs.is_own_open()
     }
@@ -158,12 +158,12 @@ impl App {
         self.chat.transcript(false).filter(|_| self.chat.is_idle())
     }
 
-    /// Takes what a user wants of scene plans, for this run and, as it is kept, later ones.
+    /// Sets the user's overrides of scene plans, for this run and, as they are stored, for later ones.
     pub fn override_plan(&mut self, overrides: impl IntoIterator<Item = PlanOverride>) {
         overrides.into_iter().for_each(|one| self.layout.plan.set(one));
     }
 
-    /// Takes in everything that happened since.
+    /// Applies all events since the last call.
     fn take_events(&mut self, ctx: &egui::Context) {
         while let Some(event) = self.worker.next_event() {
             if self.is_of_earlier_server(&event) {
@@ -184,7 +184,7 @@ impl App {
             self.traced += 1;
             self.state.say_at(Some(load.at_secs), super::state::Tone::Info, load.text());
         }
-        // Once there are objects, they are what a user works with.
+        // New objects are the next thing to work with, so their pane comes to the front.
         let has_objects = self.state.semantics.is_some();
         let news = if has_objects { Pane::Objects } else { Pane::Training };
         if std::mem::replace(&mut self.had_objects, has_objects) != has_objects && self.layout.shows(news) {
@@ -211,7 +211,7 @@ impl App {
         self.object_thumbnails.update(ctx, &mut self.state, self.viewport.cloud().map(|c| &**c), &self.worker);
     }
 
-    /// Moves the eye along what is played.
+    /// Moves the camera along the flight or path that plays.
     fn play(&mut self, ctx: &egui::Context) {
         let now = ctx.input(|i| i.time);
         let step = now - std::mem::replace(&mut self.last_frame, now);
@@ -246,7 +246,7 @@ impl App {
         });
     }
 
-    /// Whether the view has the whole window.
+    /// True if the view fills the window.
     fn fills_window(&self) -> bool {
         self.full_view && self.state.scene.is_some()
     }

@@ -1,4 +1,4 @@
-//! Another scene beside the one on screen: its Gaussians in the second view, by the same camera.
+//! Another scene beside the current one: its Gaussians in the second view, from the same camera.
 
 use std::path::PathBuf;
 
@@ -7,19 +7,19 @@ use crate::render::RenderSettings;
 use crate::scene::GaussianCloud;
 use crate::worker::Versioned;
 
-/// What the second view shows of another scene.
+/// Another scene in the second view.
 #[derive(Clone, Debug)]
 pub struct Beside {
     pub name: String,
-    /// Where it lies.
+    /// Path of the scene.
     pub path: PathBuf,
     pub(crate) cloud: Versioned<GaussianCloud>,
-    /// How it is drawn: as it was trained.
+    /// Render settings that it was trained with.
     pub(crate) settings: RenderSettings,
 }
 
 impl Beside {
-    /// What there is to see of a scene; `None` if it has no Gaussians.
+    /// Content of a scene for the second view; `None` if it has no Gaussians.
     pub(crate) fn of(scene: OpenedScene) -> Option<Self> {
         let cloud = scene.cloud.map(Versioned::new)?;
         Some(Self { name: scene.name, path: scene.path, cloud, settings: scene.render })

@@ -1,5 +1,5 @@
-//! The chat: what is asked in plain sentences goes to the agent on a thread of its own, what it does
-//! comes back as effects. Below the box stands how a command can go on.
+//! The chat: sentences go to the agent on its own thread, its actions come back as effects. Completions stand below the
+//! box.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -24,29 +24,29 @@ use crate::scene::{Identities, IdentityId, text};
 use crate::ui::actions::Action;
 use crate::worker::Repaint;
 
-/// News that may wait for the window; the agent waits for it beyond that.
+/// Capacity of the queue to the window; the agent waits if it is full.
 const NEWS: usize = 1024;
 /// Lines that are kept.
 const MAX_LINES: usize = 400;
-/// Ways to continue that are shown at once.
+/// Completions shown at once.
 const CONTINUATIONS: usize = 4;
-/// Room for the box, its continuations and the buttons below the talk, points.
+/// Height of the box, its completions and the buttons below the conversation, points.
 const BELOW_PT: f32 = 130.0;
 
-/// What the agent is to work on, as the window has it now.
+/// State of the window that the agent works on.
 pub(crate) struct Snapshot {
     pub(crate) parts: Parts,
     /// Generation of its Gaussians.
     pub(crate) cloud: u64,
     /// Counts the scenes shown so far.
     pub(crate) scene: u64,
-    /// Where the eye is.
+    /// Current camera pose.
     pub(crate) eye: Pose,
-    /// Width by height of the frame.
+    /// Aspect ratio of the frame, width / height.
     pub(crate) aspect: f64,
-    /// What is left out of the frame.
+    /// Identities that are hidden.
     pub(crate) hidden: Vec<IdentityId>,
-    /// What was done last, which the window can undo.
+    /// Description of the last change that can be undone.
     pub(crate) undoable: Option<String>,
 }
 
@@ -57,7 +57,7 @@ struct Request {
     cancel: Arc<AtomicBool>,
 }
 
-/// What comes back from the agent's thread.
+/// Message from the agent's thread.
 enum News {
     Event(AgentEvent),
     Effect(Effect),
@@ -70,21 +70,21 @@ pub(crate) struct Chat {
     typed: String,
     lines: Vec<Line>,
     thread: Option<(Sender<Request>, Receiver<News>)>,
-    /// Set to end what is under way; there while something is.
+    /// Set to cancel the running request; `Some` while one runs.
     cancel: Option<Arc<AtomicBool>>,
-    /// The talk so far, as JSON and as Markdown.
+    /// The conversation so far, as JSON and as Markdown.
     transcript: Option<[String; 2]>,
-    /// Sentences to be sent, each with a snapshot of its own, when those before are answered.
+    /// Sentences that wait for the answers before them; each gets its own snapshot when it is sent.
     waiting: VecDeque<String>,
-    /// Set while the box is to take the keyboard.
+    /// Set until the box has the keyboard focus.
     focus: bool,
-    /// What was typed, and how it can go on.
+    /// Typed text and its completions.
     continuations: (String, Vec<String>),
     chooser: ModelChooser,
 }
 
 impl Chat {
-    /// Effects that came in since.
+    /// Effects since the last call.
     pub(crate) fn news(&mut self) -> Vec<Effect> {
         let mut effects = Vec::new();
         let Some((_, news)) = &self.thread else { return effects };
@@ -108,17 +108,17 @@ impl Chat {
         effects
     }
 
-    /// Whether everything that was said is answered.
+    /// True if every sentence is answered.
     pub fn is_idle(&self) -> bool {
         self.cancel.is_none() && self.waiting.is_empty()
     }
 
-    /// The talk as text: JSON if the file is called so, else Markdown.
+    /// The conversation as text: JSON if `json`, else Markdown.
     pub(crate) fn transcript(&self, json: bool) -> Option<&str> {
         self.transcript.as_ref().map(|t| t[usize::from(!json)].as_str())
     }
 
-    /// What is to be sent, once a snapshot of the scene is there.
+    /// The next sentence to send, for which a snapshot is then taken.
     pub(crate) fn wants(&mut self) -> Option<String> {
         if self.cancel.is_some() { None } else { self.waiting.pop_front() }
     }
@@ -139,13 +139,13 @@ impl Chat {
         }
     }
 
-    /// An answer of the window's own.
+    /// Adds an answer of the window itself.
     pub(crate) fn answer(&mut self, text: &str) {
         let text = text::lines(text).into_owned();
         self.lines.push(Line::Answer { text, candidates: Vec::new(), refused: None });
     }
 
-    /// Makes the box take the keyboard.
+    /// Moves the keyboard focus to the box.
     pub(crate) fn start_typing(&mut self) {
         self.focus = true;
     }
@@ -195,7 +195,7 @@ impl Chat {
             if std::mem::take(&mut self.focus) {
                 ui.memory_mut(|m| m.request_focus(field));
             }
-            // Where nothing can be done yet, that is the answer: keys are no commands meanwhile.
+            // Without a map the agent can only refuse, but the box still takes keys: here they are no shortcuts.
             let response = ui.add(edit.id(field).lock_focus(takes_tab)).accessible_name("Chat box");
             self.take_continuation(ui, &response);
             let enter = response.lost_focus() && ui.input(|i| i.key_pressed(Key::Enter));
@@ -210,7 +210,7 @@ impl Chat {
                 }
                 None => ui.add_enabled(some, Button::new("Send")).clicked(),
             };
-            // The next sentence goes into the box, too, whether this one is answered yet or not.
+            // The box keeps the focus for the next sentence, even before the answer.
             if enter || clicked {
                 response.request_focus();
             }
@@ -236,7 +236,7 @@ impl Chat {
 }
 
 impl Chat {
-    /// Below the box, how what is typed can go on.
+    /// Completions of the typed text, below the box.
     fn show_continuations(&mut self, ui: &mut Ui, identities: Option<&Identities>) {
         let known = identities.filter(|_| !self.typed.trim().is_empty());
         if self.continuations.0 != self.typed || known.is_none() {
@@ -249,7 +249,7 @@ impl Chat {
         }
     }
 
-    /// Tab in the box takes the first of them.
+    /// Takes the first completion on Tab.
     fn take_continuation(&mut self, ui: &Ui, response: &Response) {
         let pressed = || ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Tab));
         let Some(first) = self.continuations.1.first().filter(|_| response.has_focus() && pressed()) else { return };
@@ -272,11 +272,11 @@ fn start(repaint: Repaint) -> std::io::Result<(Sender<Request>, Receiver<News>)>
     Ok((sender, news))
 }
 
-/// What the thread holds.
+/// State of the agent's thread.
 struct Agent {
-    /// With the settings that it was started with.
+    /// Session with the settings that it was started with.
     session: Option<(ChatSettings, Session)>,
-    /// With the number of its scene and the generation of its Gaussians.
+    /// World with the number of its scene and the generation of its Gaussians.
     world: Option<((u64, u64), SceneWorld)>,
     news: Sender<News>,
     repaint: Repaint,
@@ -292,7 +292,7 @@ impl Agent {
         let (Some((_, session)), Some((_, world))) = (&mut self.session, &mut self.world) else { return };
         let (news, repaint) = (self.news.clone(), Arc::clone(&self.repaint));
         let mut on = |event: AgentEvent| {
-            // The window may be gone by now.
+            // The window may be closed by now.
             let _ = news.send(News::Event(event));
             repaint();
         };
@@ -326,7 +326,7 @@ impl Agent {
             });
             let world = SceneWorld::new(parts, eye, aspect, emit).map_err(|e| e.to_string())?;
             self.world = Some((key, world));
-            // What was spoken of belongs to another scene.
+            // References in the conversation belong to another scene.
             self.session = None;
         }
         if let Some((_, world)) = &mut self.world {

@@ -1,5 +1,5 @@
-//! The conversation as it is read: what was said, the steps that were taken, folded once they are answered, and the
-//! answers with their candidates.
+//! Display of the conversation: the user's sentences, the agent's steps, folded once they are answered, and the answers
+//! with their candidates.
 
 use egui::{Button, CollapsingHeader, RichText, Ui};
 
@@ -22,12 +22,12 @@ pub(super) enum Line {
     Answer { text: String, candidates: Vec<(IdentityId, String)>, refused: Option<Refusal> },
 }
 
-/// A step of the agent, in words that may be a model's.
+/// A step of the agent; its words may come from a model.
 pub(super) fn did(line: &str, done: Option<bool>) -> Line {
     Line::Did(text::line(line).into_owned(), done)
 }
 
-/// All lines; a candidate that was clicked.
+/// Draws all lines; returns the candidate that was clicked.
 pub(super) fn show(ui: &mut Ui, lines: &[Line], object_thumbnails: &ObjectThumbnails) -> Option<String> {
     let mut clicked = None;
     let mut rest = lines;
@@ -38,7 +38,7 @@ pub(super) fn show(ui: &mut Ui, lines: &[Line], object_thumbnails: &ObjectThumbn
                 clicked = show_line(ui, first, object_thumbnails).or(clicked);
                 rest = &rest[1..];
             }
-            // The answer says it again.
+            // The answer repeats the steps, so they are folded.
             (_, Some(Line::Answer { refused, .. })) => {
                 clicked = rest.get(steps).and_then(|line| show_line(ui, line, object_thumbnails)).or(clicked);
                 let calls = rest[..steps].iter().filter(|line| matches!(line, Line::Did(_, None))).count();
@@ -58,7 +58,7 @@ pub(super) fn show(ui: &mut Ui, lines: &[Line], object_thumbnails: &ObjectThumbn
     clicked
 }
 
-/// One line; a candidate that was clicked.
+/// Draws one line; returns the candidate that was clicked.
 fn show_line(ui: &mut Ui, line: &Line, object_thumbnails: &ObjectThumbnails) -> Option<String> {
     let mut clicked = None;
     match line {

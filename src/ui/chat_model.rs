@@ -1,5 +1,5 @@
-//! Choosing what plans in the chat: the built-in commands or a chat model, with the servers that are found on
-//! this machine and a test of the connection.
+//! Choice of the planner in the chat: the built-in commands or a chat model, with the servers that are found on this
+//! computer and a connection test.
 
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -12,16 +12,16 @@ use crate::agent::llm::SENT;
 use crate::agent::llm::discover::{self, LocalServer};
 use crate::agent::llm::settings::{LlmSettings, RequestPatience};
 
-/// Which planner is used; kept from one run to the next.
+/// Settings of the planner, stored between runs.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub(crate) struct ChatSettings {
-    /// Whether a chat model plans, instead of the built-in commands.
+    /// True if a chat model plans, instead of the built-in commands.
     pub(crate) use_model: bool,
     pub(crate) model: LlmSettings,
 }
 
-/// An answer that is waited for, or there.
+/// A request on another thread, or its answer.
 #[derive(Default)]
 enum Asked<T> {
     #[default]
@@ -31,7 +31,7 @@ enum Asked<T> {
 }
 
 impl<T: Send + 'static> Asked<T> {
-    /// Asks on a thread of its own, which ends by its own time limits.
+    /// Runs `work` on its own thread, which ends by its own time limits.
     fn ask(ui: &Ui, work: impl FnOnce() -> T + Send + 'static) -> Self {
         let (send, receive) = bounded(1);
         let context = ui.ctx().clone();
@@ -53,7 +53,7 @@ impl<T: Send + 'static> Asked<T> {
     }
 }
 
-/// What is known of chat models while their settings are open.
+/// Servers and connection test, while the settings are open.
 #[derive(Default)]
 pub(crate) struct ModelChooser {
     found: Asked<Vec<LocalServer>>,
@@ -72,7 +72,7 @@ impl ModelChooser {
         if settings.use_model {
             let open = ui.menu_button("Address\u{2026}", |ui| self.settings(ui, &mut settings.model));
             if open.inner.is_none() {
-                // Nothing is looked for unless the settings are open.
+                // Servers are searched only while the settings are open.
                 *self = Self::default();
             }
         }

@@ -1,8 +1,8 @@
-//! What colors the view besides the picture itself.
+//! Color overlays of the view.
 
 use strum::{IntoStaticStr, VariantArray};
 
-/// What tints the frame.
+/// Quantity that colors the frame.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, VariantArray, IntoStaticStr)]
 pub enum ColorBy {
     /// Only the masks of the answers.
@@ -11,16 +11,16 @@ pub enum ColorBy {
     /// Relevancy for the newest query.
     #[strum(serialize = "Relevancy")]
     Heat,
-    /// A color per object.
+    /// One color per object.
     Objects,
-    /// A color per part.
+    /// One color per part.
     Parts,
-    /// The codes of the pixels, blended or exact.
+    /// Identity codes of the pixels, blended or exact.
     Codes,
-    /// The three main directions of the language features.
+    /// The first three principal components of the language features.
     #[strum(serialize = "Embeddings")]
     Features,
-    /// Where blended codes mean something else than the winning identities.
+    /// Pixels whose blended codes differ from those of their identity by more than the tolerance.
     #[strum(serialize = "Blending errors")]
     Difference,
 }
@@ -30,7 +30,7 @@ impl ColorBy {
         self.into()
     }
 
-    /// Whether it shows whose things are, and so what of that is not known.
+    /// True if it colors by identity, so that unlabeled pixels are marked too.
     pub(crate) fn tells_unknown(self) -> bool {
         matches!(self, Self::Objects | Self::Parts)
     }

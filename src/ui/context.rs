@@ -1,4 +1,4 @@
-//! What jobs and the agent work on, collected from scene, state and viewport in one place.
+//! Inputs of jobs and of the agent, collected from scene, state and viewport.
 
 use std::sync::Arc;
 
@@ -12,29 +12,29 @@ use crate::render::RenderSettings;
 use crate::scene::{Camera, GaussianCloud, SemanticMap};
 use crate::worker::Versioned;
 
-/// The scene as it is now.
+/// The current scene.
 pub(super) struct SceneContext {
     pub(super) scene: Arc<OpenedScene>,
-    /// The Gaussians on screen, hidden ones too.
+    /// The Gaussians on screen, hidden ones included.
     pub(super) cloud: Versioned<GaussianCloud>,
     /// Objects and parts, if they were found.
     pub(super) map: Option<Versioned<SemanticMap>>,
-    /// How the Gaussians are drawn.
+    /// Render settings of the Gaussians.
     pub(super) settings: RenderSettings,
-    /// The photos' cameras.
+    /// Cameras of the photos.
     pub(super) cameras: Vec<Camera>,
-    /// Which way is up.
+    /// Up direction of the world.
     pub(super) up: DVec3,
-    /// Where the eye is.
+    /// Current camera pose.
     pub(super) eye: Pose,
-    /// Width by height of the view.
+    /// Aspect ratio of the view, width / height.
     pub(super) aspect: f64,
-    /// What is known of occupied space.
+    /// Occupied and free space, if explored.
     pub(super) explored: Option<Arc<Explored>>,
 }
 
 impl App {
-    /// The scene as it is now, if one is open and has Gaussians.
+    /// The current scene, if one is open and has Gaussians.
     pub(super) fn context(&self) -> Option<SceneContext> {
         let scene = Arc::clone(self.state.scene.as_ref()?);
         Some(SceneContext {

@@ -1,4 +1,4 @@
-//! Dialogs: errors, and questions before something is given up.
+//! Dialogs: errors, and questions before a loss.
 
 use egui::RichText;
 
@@ -7,19 +7,19 @@ use super::theme;
 use crate::scene::text;
 use crate::ui::actions::Action;
 
-/// A question before something is given up.
+/// A question before data or a running job is lost.
 pub(crate) struct Question {
     pub(crate) text: String,
-    /// The button that goes ahead.
+    /// Button to proceed.
     pub(crate) yes: &'static str,
-    /// A button that does something else.
+    /// Button of an alternative, with its action.
     pub(crate) other: Option<(&'static str, Action)>,
-    /// The button that does not.
+    /// Button to decline.
     pub(crate) no: &'static str,
     pub(crate) action: Action,
 }
 
-/// Shows an error until it is read. Returns whether it was; where something could not be opened, another may be.
+/// Shows an error until it is read. Returns whether it was; if a scene could not be opened, others are offered.
 pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox, has_scene: bool, actions: &mut Vec<Action>) -> bool {
     let response = theme::dialog("error").show(ctx, |ui| {
         ui.set_width(480.0);
@@ -56,7 +56,7 @@ pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox, has_scene: bool,
 }
 
 impl Question {
-    /// Asks it. `Some` once somebody has answered, with what is to be done.
+    /// Shows the question. `Some` once it is answered, with the action to carry out.
     pub(crate) fn show(&self, ctx: &egui::Context) -> Option<Option<Action>> {
         let response = theme::dialog("dialog question").show(ctx, |ui| {
             ui.set_width(420.0);
@@ -78,7 +78,7 @@ impl Question {
     }
 }
 
-/// Asks a question. `Some(true)` to go ahead, `Some(false)` not to, `None` while no one answered.
+/// Shows a question. `Some(true)` to proceed, `Some(false)` to decline, `None` without an answer.
 pub(crate) fn show_question(ctx: &egui::Context, text: &str, yes: &str, no: &str) -> Option<bool> {
     let response = theme::dialog("dialog question").show(ctx, |ui| {
         ui.set_width(420.0);
@@ -94,7 +94,7 @@ pub(crate) fn show_question(ctx: &egui::Context, text: &str, yes: &str, no: &str
     response.inner.or_else(|| response.should_close().then_some(false))
 }
 
-/// Says over everything that what is dragged can be dropped.
+/// Draws a hint over the window that the dragged files can be dropped.
 pub(super) fn drop_hint(ctx: &egui::Context) {
     let painter = ctx.layer_painter(egui::LayerId::new(egui::Order::Foreground, egui::Id::unique("drop")));
     let rect = ctx.content_rect();

@@ -1,4 +1,4 @@
-//! Where the panes stand around the view: tabs that can be dragged anywhere, hidden, or put into windows of their own.
+//! Arrangement of the panes around the view: tabs that can be dragged, hidden, or detached into windows.
 
 use egui::{Response, Ui, Vec2, ViewportBuilder, ViewportId, WidgetText};
 use egui_tiles::{
@@ -9,13 +9,13 @@ use strum::VariantArray;
 
 use crate::ui::actions::Pane;
 
-/// Windows of less width have one column beside the view.
+/// Width below which a window has one column beside the view, points.
 const NARROW_PT: f32 = 1000.0;
 
 /// Least share of a row or column that the view keeps.
 const VIEW_SHARE: f32 = 0.4;
 
-/// What stands at one place.
+/// Content of one tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Place {
     /// The view, or the first page.
@@ -28,13 +28,13 @@ pub(crate) enum Place {
 pub struct Dock {
     wide: Tree<Place>,
     narrow: Tree<Place>,
-    /// Panes in windows of their own.
+    /// Panes detached into windows.
     detached: Vec<Pane>,
 }
 
-/// What the dock shows in its places.
+/// Contents that the dock draws.
 pub(crate) trait DockContents {
-    /// Whether there is anything to show.
+    /// True if the place has content to show.
     fn has(&self, place: Place) -> bool;
     fn show(&mut self, ui: &mut Ui, place: Place);
     fn hide(&mut self, pane: Pane);
@@ -51,7 +51,7 @@ fn tabs(tiles: &mut Tiles<Place>, panes: &[Pane]) -> TileId {
     tiles.insert_tab_tile(panes)
 }
 
-/// The view with what is as wide as it below.
+/// The view, with the panes of its width below it.
 fn middle(tiles: &mut Tiles<Place>) -> TileId {
     let view = tiles.insert_pane(Place::View);
     let view = tiles.insert_tab_tile(vec![view]);
@@ -63,7 +63,7 @@ fn middle(tiles: &mut Tiles<Place>) -> TileId {
     middle
 }
 
-/// Photos, view, and two groups of tabs at the right.
+/// Photos, view, and two groups of tabs on the right.
 fn wide() -> Tree<Place> {
     let mut tiles = Tiles::default();
     let photos = tabs(&mut tiles, &[Pane::Dataset]);
@@ -78,7 +78,7 @@ fn wide() -> Tree<Place> {
     Tree::new(egui::Id::unique("dock"), root, tiles)
 }
 
-/// The view, and one group of tabs at the right.
+/// The view, and one group of tabs on the right.
 fn narrow() -> Tree<Place> {
     let mut tiles = Tiles::default();
     let middle = middle(&mut tiles);
@@ -97,7 +97,7 @@ fn share(tiles: &mut Tiles<Place>, of: TileId, child: TileId, share: f32) {
 }
 
 impl Dock {
-    /// Itself, if each place occurs once: a layout that another version stored may lack some.
+    /// Returns itself if each place occurs once, else the default: stored layouts of other versions may lack places.
     pub(crate) fn checked(self) -> Self {
         let is_whole = |tree: &Tree<Place>| {
             let places = || tree.tiles.tiles().filter_map(|t| if let Tile::Pane(p) = t { Some(*p) } else { None });
@@ -107,14 +107,14 @@ impl Dock {
         if is_whole(&self.wide) && is_whole(&self.narrow) { self } else { Self::default() }
     }
 
-    /// Brings a pane before the others of its group.
+    /// Brings a pane to the front of its group.
     pub(crate) fn activate(&mut self, pane: Pane) {
         for tree in [&mut self.wide, &mut self.narrow] {
             tree.make_active(|_, tile| *tile == Tile::Pane(Place::Pane(pane)));
         }
     }
 
-    /// Puts a pane into a window of its own, or back.
+    /// Detaches a pane into a window, or puts it back.
     pub(crate) fn detach(&mut self, pane: Pane, apart: bool) {
         self.detached.retain(|p| *p != pane);
         if apart {
@@ -122,7 +122,7 @@ impl Dock {
         }
     }
 
-    /// Draws everything that the contents have.
+    /// Draws all places that have content.
     pub(crate) fn show(&mut self, ui: &mut Ui, contents: &mut dyn DockContents) {
         self.show_windows(ui.ctx(), contents);
         let size = ui.available_size();
@@ -164,7 +164,7 @@ impl Dock {
     }
 }
 
-/// Columns and rows beside the view keep their size in points when the window changes; the view takes the rest.
+/// Keeps the size of columns and rows beside the view in points when the window changes; the view takes the rest.
 fn give_room(tree: &mut Tree<Place>, size: Vec2) {
     let Some(mut inner) = tree.tiles.find_pane(&Place::View) else { return };
     while let Some(outer) = tree.tiles.parent_of(inner) {
@@ -176,7 +176,7 @@ fn give_room(tree: &mut Tree<Place>, size: Vec2) {
             let extent = if linear.dir == LinearDir::Horizontal { extent.x } else { extent.y };
             let mut others = 0.0;
             for side in sides {
-                // The share of what was just dropped here is one.
+                // A tile that was just dropped here has the share 1.
                 let wanted = if linear.shares[side] > 1.0 { linear.shares[side] } else { 0.25 * extent };
                 linear.shares.set_share(side, wanted);
                 others += wanted;
@@ -220,7 +220,7 @@ impl Behavior<Place> for Shown<'_> {
     }
 
     fn is_tab_bar_visible(&self, _: TileId, tabs: &Tabs) -> bool {
-        // Alone, the view needs no title.
+        // The view needs no title if it is alone.
         tabs.children.len() > 1 || tabs.active.is_none_or(|id| self.view != Some(id))
     }
 
@@ -267,7 +267,7 @@ impl Behavior<Place> for Shown<'_> {
 mod tests {
     use super::*;
 
-    /// Everything is there to be shown; what was asked to be hidden is counted.
+    /// Contents with all panes except those of the lower groups; records the rectangles.
     #[derive(Default)]
     struct Rects(Vec<(Place, egui::Rect)>);
 
@@ -281,7 +281,7 @@ mod tests {
         fn hide(&mut self, _: Pane) {}
     }
 
-    /// The rectangles of what is in sight in a window of this size, once it is at rest.
+    /// Rectangles of the visible places in a window of this size, after layout has settled.
     fn shown(dock: &mut Dock, size: [f32; 2]) -> Vec<(Place, egui::Rect)> {
         let ctx = egui::Context::default();
         let mut rects = Rects::default();
@@ -307,7 +307,7 @@ mod tests {
             assert!((of(Pane::Dataset) - 250.0).abs() < 4.0 && (of(Pane::Training) - 350.0).abs() < 4.0, "{shown:?}");
             assert!(width(&shown, Place::View).expect("in sight") > size[0] - 620.0);
         }
-        // Less room than they want: the view keeps its share.
+        // With less room than all panes need, the view keeps its share.
         let shown = shown(&mut dock, [800.0, 600.0]);
         assert!(width(&shown, Place::View).expect("in sight") > 400.0, "{shown:?}");
         assert_eq!(width(&shown, Place::Pane(Pane::Dataset)), None, "behind a tab");

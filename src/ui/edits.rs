@@ -1,4 +1,4 @@
-//! Changes of objects and parts as they are asked for, undo and redo among them: each builds on the one before.
+//! Edits of objects and parts in the order of the requests, with undo and redo: each builds on the one before.
 
 use std::sync::Arc;
 
@@ -15,13 +15,13 @@ use crate::scene::Identities;
 use crate::worker::{Command, JobId};
 
 impl App {
-    /// Does a step after those that were asked for before.
+    /// Queues an edit after those requested before.
     pub(super) fn edit(&mut self, step: EditStep) {
         self.edits.push_back(step);
         self.next_edit();
     }
 
-    /// Begins the next steps, up to one that takes time.
+    /// Begins the next edits, up to one that runs as a job.
     pub(super) fn next_edit(&mut self) {
         loop {
             match self.editing.take() {
@@ -39,7 +39,7 @@ impl App {
                 EditStep::Rearrange(edit) => self.rearrange(edit),
                 EditStep::Undo => self.go_in_history(false),
                 EditStep::Redo => self.go_in_history(true),
-                // Where the user has done something since, what the agent did is undone alone.
+                // If the user has changed something since, only the agent's change is undone.
                 EditStep::UndoRename(id, name) if self.was(|s| s.is_called(id, &name)) => self.go_in_history(false),
                 EditStep::UndoRename(id, name) => self.request(EditRequest::Apply(Edit::Rename(id, name))),
                 EditStep::UndoHidden(ids) if self.was(|s| s.view.hidden.iter().eq(&ids)) => self.go_in_history(false),
@@ -48,12 +48,12 @@ impl App {
         }
     }
 
-    /// Whether undoing leads to a state like this.
+    /// True if the state that undo leads to satisfies `like`.
     fn was(&self, like: impl Fn(&EditSnapshot) -> bool) -> bool {
         self.state.changes.before().is_some_and(like)
     }
 
-    /// Hands the next click or stroke of the selection on, or has it made ready.
+    /// Submits the next click or stroke of the selection tool, or the preparation that it needs.
     pub(super) fn next_stroke(&mut self) {
         let (done, is_training) = (self.state.short_jobs_done, self.state.is_training());
         let Some((step, before)) = self.viewport.next_select_step(done, is_training) else { return };
@@ -83,7 +83,7 @@ impl App {
         self.submit(Command::EditObjects { cloud, map, request, out })
     }
 
-    /// Changes Gaussians.
+    /// Submits an edit of Gaussians.
     fn rearrange(&mut self, edit: SplatEdit) {
         let none = Identities::default();
         let all = self.state.semantics.as_ref().map_or(&none, |map| &map.identities);
@@ -105,14 +105,14 @@ impl App {
         self.submit(Command::Rearrange(Box::new(request)))
     }
 
-    /// Takes in that an edit is over.
+    /// Records the end of an edit in the history.
     fn edited(&mut self, editing: Editing) {
         if self.state.changes.now().is_none_or(|now| now.scene != self.state.scene_number) {
             return;
         }
         let map = self.state.semantics.as_deref().cloned();
         let Some(what) = editing.what else {
-            // One that could not be stored leaves all as it was.
+            // An edit that could not be stored leaves everything unchanged.
             if !self.state.changes.has(&self.snapshot())
                 && let Some((_, back)) = self.state.changes.go(!editing.redo)
             {
@@ -129,7 +129,7 @@ impl App {
                 emptied = edit::emptied(&old, &new);
             }
         }
-        // Where it was refused or failed that was said, and there is nothing to undo.
+        // A refused or failed edit was reported and leaves nothing to undo.
         if let Some(what) = self.state.changes.settle(&self.snapshot(), Some(&what)) {
             self.state.toast(Tone::Good, sentence(&what));
             for name in emptied {
@@ -197,8 +197,8 @@ impl App {
         EditSnapshot { scene: self.state.scene_number, map, cloud, view }
     }
 
-    /// Takes into the history what was done since, unless objects and parts are about to change. The path and
-    /// the crop box only `at_rest`, when no drag and no typing is under way.
+    /// Records changes since the last call in the history, unless objects and parts are about to change. Camera path
+    /// and crop box only `at_rest`: without a drag or typing in progress.
     pub(super) fn settle(&mut self, at_rest: bool) {
         if self.editing.is_some() {
             return;

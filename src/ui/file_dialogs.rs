@@ -1,4 +1,4 @@
-//! Choosing files and folders: with the system's dialog where there is one, else with one of the window's own.
+//! Choice of files and folders: by the system's dialog if there is one, else by the window's own.
 
 use std::path::{Path, PathBuf};
 use std::pin::Pin;
@@ -14,30 +14,30 @@ use super::dialogs::show_question;
 use crate::io::splat_format::SplatFormat;
 use crate::worker::Repaint;
 
-/// Nobody closes a dialog this soon: the system has none.
+/// Least time in which a user closes a dialog: one that ends sooner is missing on the system.
 const NO_DIALOG: Duration = Duration::from_millis(500);
 
-/// Endings of scenes.
+/// File endings of scenes.
 const SCENES: [&str; 13] =
     ["ply", "splat", "ksplat", "spz", "sog", "gltf", "glb", "json", "toml", "npy", "bin", "txt", "zip"];
 
-/// What is to be chosen.
+/// Kind of path to choose.
 #[derive(Clone, Debug, PartialEq)]
 enum Kind {
     Folder,
     /// A file of this kind, with these endings.
     File(&'static str, &'static [&'static str]),
-    /// Where to write a file, with the name that is proposed.
+    /// A file to write, with the proposed name.
     Save(String),
 }
 
-/// A path that is asked for.
+/// A request for a path.
 #[derive(Clone, Debug)]
 struct Request {
     action: Action,
     title: String,
     kind: Kind,
-    /// Where to begin.
+    /// Folder in which the dialog opens.
     folder: PathBuf,
 }
 
@@ -45,25 +45,25 @@ struct Request {
 struct Own {
     request: Request,
     dialog: FileDialog,
-    /// A file that may be replaced, if the user says so.
+    /// An existing file that is replaced if the user confirms.
     replaces: Option<PathBuf>,
 }
 
-/// What the system's dialog came to.
+/// Result of the system's dialog.
 enum Answer {
     Path(PathBuf),
     Closed,
     NoDialog,
 }
 
-/// Asks for paths, off the window's thread where that takes a dialog of the system.
+/// File dialogs; the system's runs off the window's thread.
 pub(crate) struct FileDialogs {
     sender: Sender<Answer>,
     answers: Receiver<Answer>,
-    /// What the system's dialog is asked for.
+    /// Request that the system's dialog is open for.
     asked: Option<Request>,
     own: Option<Own>,
-    /// Whether the system has shown that it has no dialog.
+    /// True if the system has turned out to have no dialog.
     own_only: bool,
 }
 
@@ -75,8 +75,8 @@ impl Default for FileDialogs {
 }
 
 impl FileDialogs {
-    /// Shows a dialog for an action that needs a path, unless one is open already. `name` is proposed for a file that
-    /// is written, `folder` is where to begin.
+    /// Shows a dialog for an action that needs a path, unless one is open already. `name` is proposed for a file to
+    /// write; the dialog opens in `folder`.
     pub(crate) fn ask(
         &mut self,
         action: Action,
@@ -95,7 +95,7 @@ impl FileDialogs {
             return Ok(());
         }
         let system = AsyncFileDialog::new().set_title(&request.title).set_directory(&request.folder);
-        // Some systems want the dialog made on the window's thread; waiting for it is what must not happen here.
+        // Some systems need the dialog made on the window's thread, but that thread must not wait for it.
         let answer: Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> = match &request.kind {
             Kind::Folder => Box::pin(system.pick_folder()),
             Kind::File(files, endings) => {
@@ -111,7 +111,7 @@ impl FileDialogs {
                 None if start.elapsed() < NO_DIALOG => Answer::NoDialog,
                 None => Answer::Closed,
             };
-            // The window may be gone by now.
+            // The window may be closed by now.
             let _ = sender.send(answer);
             repaint();
         })?;
@@ -119,12 +119,12 @@ impl FileDialogs {
         Ok(())
     }
 
-    /// Whether the window's own dialog is on screen, which has the keyboard then.
+    /// True if the window's own dialog is open, which then takes the keys.
     pub(crate) fn is_own_open(&self) -> bool {
         self.own.is_some()
     }
 
-    /// Draws the window's own dialog. What was chosen, there or in the system's, and what it is for.
+    /// Draws the window's own dialog. Returns the chosen path, from either dialog, with its action.
     pub(crate) fn show(&mut self, ctx: &Context) -> Option<(Action, PathBuf)> {
         if let Ok(answer) = self.answers.try_recv()
             && let Some(request) = self.asked.take()
@@ -175,7 +175,7 @@ impl Own {
         LayerId::new(Order::Middle, Id::unique("file dialog"))
     }
 
-    /// Draws it. `Some(None)` once it is closed without a path.
+    /// Draws the dialog. `Some(None)` once it is closed without a path.
     fn show(&mut self, ctx: &Context) -> Option<Option<PathBuf>> {
         if let Some(path) = &self.replaces {
             let text = format!("{} already exists. Replace it?", path.display());
@@ -204,7 +204,7 @@ impl Own {
     }
 }
 
-/// Gives the dialog's fields names, which its crate does not.
+/// Labels the dialog's fields for accessibility, which its crate does not.
 fn name_fields(ctx: &Context) {
     let all: Vec<Id> = ctx.viewport(|v| v.this_pass.widgets.get_layer(Own::layer()).map(|w| w.id).collect());
     let fields = all.into_iter().filter(|id| TextEdit::load_state(ctx, *id).is_some());
@@ -213,7 +213,7 @@ fn name_fields(ctx: &Context) {
     }
 }
 
-/// Title and kind of dialog of an action that needs a path; `name` is what is proposed for a new file.
+/// Title and kind of the dialog of an action that needs a path; `name` is proposed for a new file.
 fn dialog(action: &Action, name: &str) -> Option<(String, Kind)> {
     let save = |ending: &str| Kind::Save(format!("{name}{ending}"));
     let (title, kind) = match action {

@@ -1,5 +1,5 @@
-//! The way to objects and parts where photos came without labels: what each means can and cannot do, what it costs,
-//! what has to be downloaded first. Whoever agrees need not come back: downloads are followed by the search.
+//! The dialog on methods to find objects if photos have no labels: the abilities, costs and downloads of each.
+//! Downloads are followed by the search.
 
 use std::collections::VecDeque;
 
@@ -17,20 +17,20 @@ use crate::scene::Preparation;
 use crate::ui::actions::{Action, Pane};
 use crate::worker::JobId;
 
-/// What is chosen so far.
+/// Choices made so far.
 #[derive(Default)]
 pub(crate) struct FindDialog {
     open: bool,
-    /// Nothing = not chosen by a user: the best that is here.
+    /// Segmenter chosen by the user; `None` for the best installed.
     segmenter: Option<String>,
     encoder: Option<String>,
-    /// Whether the fast engine is left out where it is missing.
+    /// True if the fast engine is not to be downloaded.
     without_engine: bool,
-    /// What the recipe on screen said last of how objects are to be found.
+    /// Preparation in the recipe on screen, as last seen.
     recipe: Preparation,
 }
 
-/// What a user decided to look for objects with.
+/// Models that the user chose for the search.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Means {
     pub(crate) segmenter: String,
@@ -41,11 +41,11 @@ pub(crate) struct Means {
 
 /// A search that waits for downloads.
 pub(super) struct AwaitedModels {
-    /// The download under way.
+    /// The running download.
     pub(super) job: JobId,
-    /// The search that comes after it, with what is missing then.
+    /// The search after it, with the models still missing.
     pub(super) then: PlannedSearch,
-    /// The scene that is searched.
+    /// Number of the scene to search.
     pub(super) scene: u64,
 }
 
@@ -58,7 +58,7 @@ impl FindDialog {
         self.open
     }
 
-    /// Lets the next search follow what the recipe on screen says of it, once that has changed.
+    /// Updates the settings of the next search when the preparation in the recipe on screen changes.
     pub(crate) fn follow_recipe(&mut self, recipe: Preparation, finding: &mut FindSettings) {
         if std::mem::replace(&mut self.recipe, recipe) == recipe {
             return;
@@ -71,7 +71,7 @@ impl FindDialog {
         };
     }
 
-    /// Shows it if it is open; what was decided, once that is.
+    /// Draws the dialog if it is open; returns the decision, once there is one.
     pub(crate) fn show(
         &mut self,
         ctx: &egui::Context,
@@ -97,7 +97,7 @@ impl FindDialog {
             };
             let photos = state.scene.as_ref().and_then(|s| s.dataset.as_ref()).map_or(0, |d| d.photos.len());
             let means = self.means(known);
-            // A dialog offers little height before it knows what is in it.
+            // A dialog gets little height before the size of its content is known.
             let list_pt = (room.y - 230.0).max(120.0);
             ScrollArea::vertical().max_height(list_pt).min_scrolled_height(list_pt).show(ui, |ui| {
                 self.choices(ui, known, &means);
@@ -113,7 +113,7 @@ impl FindDialog {
         response.inner.inspect(|_| self.open = false)
     }
 
-    /// What is chosen, completed by the best that is here.
+    /// The chosen models, completed by the best installed ones.
     fn means(&self, known: &ModelList) -> Means {
         let best = |role: ModelRole| known.best(role).map(|e| e.id.clone());
         let segmenter = self.segmenter.clone().or_else(|| best(ModelRole::Segmenter)).unwrap_or_else(|| REGIONS.into());
@@ -126,7 +126,7 @@ impl FindDialog {
         Means { segmenter, encoder, missing }
     }
 
-    /// Whether the fast engine will run the networks.
+    /// True if the fast engine will run the networks.
     fn is_fast(&self, known: &ModelList) -> bool {
         known.is_fast || !known.is_settled && !self.without_engine && missing_engine(known).is_some()
     }
@@ -153,7 +153,7 @@ impl FindDialog {
         }
     }
 
-    /// Offers the fast engine where it is not there.
+    /// Offers the fast engine if it is missing.
     fn engine(&mut self, ui: &mut Ui, known: &ModelList, means: &Means) {
         let Some(entry) = missing_engine(known) else { return };
         ui.add_space(8.0);
@@ -193,7 +193,7 @@ impl FindDialog {
     }
 }
 
-/// The networks for one purpose: what is here, recommended or chosen, and all others folded away. The one that was clicked.
+/// Networks for one role: installed, recommended or chosen ones, the others folded. Returns the one that was clicked.
 fn networks(ui: &mut Ui, (known, is_fast): (&ModelList, bool), role: ModelRole, chosen: &str) -> Option<String> {
     let (first, others): (Vec<_>, Vec<_>) =
         known.of(role).partition(|(e, s)| s.is_usable() || e.recommended || e.id == chosen);
@@ -213,7 +213,7 @@ fn networks(ui: &mut Ui, (known, is_fast): (&ModelList, bool), role: ModelRole, 
     clicked
 }
 
-/// A model of the list as a choice; whether it was clicked.
+/// A model of the list as a choice; returns true if it was clicked.
 fn offered(
     ui: &mut Ui,
     chosen: bool,
@@ -230,7 +230,7 @@ fn offered(
     .inner
 }
 
-/// What is to be loaded of a model, and on which terms.
+/// Download size and license of a model.
 fn download(known: &ModelList, entry: &ModelEntry) -> String {
     match known.to_load(entry) {
         _ if !entry.is_hosted() => format!("not hosted anywhere; {} MB, {}", entry.megabytes(), entry.license),
@@ -239,13 +239,13 @@ fn download(known: &ModelList, entry: &ModelEntry) -> String {
     }
 }
 
-/// The fast engine, where it could be had and is not here.
+/// The fast engine, if it is hosted but not installed.
 fn missing_engine(known: &ModelList) -> Option<&ModelEntry> {
     let fast = known.of(ModelRole::Engine).find(|(e, s)| !known.is_fast && !s.is_usable() && e.is_hosted());
     fast.map(|(entry, _)| entry)
 }
 
-/// A radio button with what it means below it; whether it was clicked.
+/// A radio button with its explanation below; returns true if it was clicked.
 fn choice(ui: &mut Ui, chosen: bool, title: &str, means: &str, costs: &str) -> bool {
     let clicked = ui.radio(chosen, title).clicked();
     ui.indent(title, |ui| {
@@ -257,7 +257,7 @@ fn choice(ui: &mut Ui, chosen: bool, title: &str, means: &str, costs: &str) -> b
     clicked
 }
 
-/// What happens next: sizes, times, and what words will find.
+/// Summary of the next steps: sizes, times, and the effect of the encoder on queries.
 fn summary(ui: &mut Ui, known: &ModelList, means: &Means, most_photos: usize, is_fast: bool) {
     let missing = means.missing.iter().filter_map(|id| known.get(id));
     let megabytes: u64 = missing.map(|(e, _)| known.to_load(e)[0]).sum();

@@ -1,5 +1,5 @@
-//! Letters that the window's own fonts lack, such as Chinese: from the system's fonts, which are looked through once
-//! the first such letter is to be drawn.
+//! Glyphs that the window's own fonts lack, such as Chinese: from the system's fonts, which are listed when the first
+//! such glyph is drawn.
 
 use std::sync::{Arc, OnceLock};
 
@@ -7,7 +7,7 @@ use egui::epaint::text::{FallbackRequest, FontInsert, FontPriority, InsertFontFa
 use egui::{Context, FontData};
 use fontdb::{Database, FaceInfo, Style};
 
-/// Lets the window take letters from the system's fonts.
+/// Adds the system's fonts as a fallback.
 pub(super) fn install(ctx: &Context) {
     let faces = OnceLock::new();
     let font_for = move |request: &FallbackRequest<'_>| {
@@ -25,7 +25,7 @@ fn system_fonts() -> Database {
     fonts
 }
 
-/// A font that has this letter, upright and of medium weight if there is one.
+/// A font that has this glyph, upright and of medium weight if there is one.
 fn find(fonts: &Database, letter: char) -> Option<(String, FontData)> {
     let mut faces: Vec<&FaceInfo> = fonts.faces().collect();
     faces.sort_by_key(|face| (face.style != Style::Normal, face.weight.0.abs_diff(400)));

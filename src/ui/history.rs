@@ -1,8 +1,8 @@
-//! The one history of the window: what is done to objects, to what is shown and to the camera's path, by the user
-//! and by the agent, is undone and redone in the order in which it was done.
+//! The undo history of the window: changes of objects, of the view and of the camera path, by the user and by the
+//! agent, are undone and redone in the order in which they were made.
 //!
-//! Nobody reports a change: the window's state is compared with how it was, whenever nobody is about to change it
-//! further, so a drag or a name that is typed is one change.
+//! No code reports a change. The window's state is compared with the last snapshot whenever it is at rest, so a drag or
+//! a name that is typed is one change.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -16,46 +16,46 @@ use crate::scene::undo::UndoHistory;
 use crate::scene::{CameraPath, CropBox, GaussianCloud, Identities, IdentityId, NOBODY, SemanticMap};
 use crate::worker::{JobId, ViewMode};
 
-/// Bytes of Gaussians that are kept to go back to.
+/// Largest memory for Gaussians of earlier states, bytes.
 const MOST_BYTES: u64 = 1 << 30;
 
-/// What can be changed back beside objects and parts.
+/// State of the view that can be undone, beside objects and parts.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ViewState {
-    /// Whose own Gaussians are left out.
+    /// Identities whose own Gaussians are hidden.
     pub(crate) hidden: BTreeSet<IdentityId>,
     pub(crate) crop: Option<CropBox>,
-    /// What the two views show, and whether there are two.
+    /// Modes of the first and the second view, and whether there are two.
     pub(crate) modes: [ViewMode; 2],
     pub(crate) split: bool,
     pub(crate) dim: bool,
     pub(crate) cameras: bool,
     pub(crate) path: CameraPath,
-    /// Queries that are pinned, in the first and the second view.
+    /// Pinned queries in the first and the second view.
     pub(crate) pinned: [Vec<String>; 2],
-    /// How queries are answered there.
+    /// Recipes of the queries in both views.
     pub(crate) recipes: [Recipe; 2],
 }
 
-/// All that can be changed back.
+/// All state that can be undone.
 #[derive(Clone, Debug)]
 pub(crate) struct EditSnapshot {
-    /// Counts scenes: what was done to another is forgotten.
+    /// Number of the scene; changes of another scene are forgotten.
     pub(crate) scene: u64,
     pub(crate) map: Option<Arc<SemanticMap>>,
-    /// The Gaussians, where they are a result.
+    /// The Gaussians, if they are a result.
     pub(crate) cloud: Option<Arc<GaussianCloud>>,
     pub(crate) view: ViewState,
 }
 
-/// A change, in words, with the state on its other side.
+/// A change: its description, and the state on its other side.
 #[derive(Clone, Debug)]
 struct Change {
     what: String,
     other: EditSnapshot,
 }
 
-/// What was done, and how it is now.
+/// The changes so far, and the current state.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ChangeHistory {
     changes: UndoHistory<Change>,
@@ -63,12 +63,12 @@ pub(crate) struct ChangeHistory {
 }
 
 impl EditSnapshot {
-    /// Whether the other has other objects and parts, or other Gaussians.
+    /// True if the other has other objects and parts, or other Gaussians.
     fn is_edited(&self, other: &Self) -> bool {
         !is_same(&self.map, &other.map) || !is_same(&self.cloud, &other.cloud)
     }
 
-    /// Whether an identity has this name.
+    /// True if an identity has this name.
     pub(crate) fn is_called(&self, id: IdentityId, name: &str) -> bool {
         let identity = self.map.as_ref().and_then(|map| map.identities.get(id));
         identity.is_some_and(|i| i.names.first().map_or("", |n| n) == name)
@@ -76,18 +76,18 @@ impl EditSnapshot {
 }
 
 impl ChangeHistory {
-    /// How it was when it was looked at last.
+    /// The state at the last snapshot.
     pub(crate) fn now(&self) -> Option<&EditSnapshot> {
         self.now.as_ref()
     }
 
-    /// Whether these objects and parts, and these Gaussians, are those that it knows.
+    /// True if objects, parts and Gaussians equal those of the last snapshot.
     pub(crate) fn has(&self, other: &EditSnapshot) -> bool {
         self.now.as_ref().is_some_and(|now| !now.is_edited(other))
     }
 
-    /// Takes in how it is now. A change of objects, parts and Gaussians is called what `edit` says; without it they are others
-    /// than before, and what was done is forgotten. What has changed, in words.
+    /// Records the current state. `edit` describes a change of objects, parts and Gaussians; if they changed without
+    /// it, the history is cleared. Returns the description of the change.
     pub(crate) fn settle(&mut self, now: &EditSnapshot, edit: Option<&str>) -> Option<String> {
         let before = self.now.as_ref().filter(|before| before.scene == now.scene);
         let is_edited = before.is_some_and(|before| before.is_edited(now));
@@ -109,7 +109,7 @@ impl ChangeHistory {
         Some(what)
     }
 
-    /// Forgets the oldest changes where the Gaussians before and after them would take too much memory.
+    /// Forgets the oldest changes if the Gaussians of their states take too much memory.
     fn forget_the_farthest(&mut self) {
         let (mut last, mut bytes) = (self.now.as_ref().and_then(|now| now.cloud.clone()), 0);
         self.changes.keep_newest_while(|change| {
@@ -121,12 +121,12 @@ impl ChangeHistory {
         });
     }
 
-    /// What undoing takes back.
+    /// Description of the change that undo reverts.
     pub(crate) fn last(&self) -> Option<&str> {
         self.changes.last().map(|c| c.what.as_str())
     }
 
-    /// What redoing does again.
+    /// Description of the change that redo repeats.
     pub(crate) fn next(&self) -> Option<&str> {
         self.changes.next().map(|c| c.what.as_str())
     }
@@ -136,7 +136,7 @@ impl ChangeHistory {
         self.changes.last().map(|c| &c.other)
     }
 
-    /// Goes back by one change, or forth: what it was, and the state to be in then.
+    /// Goes back or forth by one change; returns its description and the state to restore.
     pub(crate) fn go(&mut self, redo: bool) -> Option<(String, EditSnapshot)> {
         let what = if redo { self.next() } else { self.last() }?.to_owned();
         let mut change = Change { what: what.clone(), other: self.now.clone()? };
@@ -157,7 +157,7 @@ fn is_same<T>(a: &Option<Arc<T>>, b: &Option<Arc<T>>) -> bool {
     }
 }
 
-/// What an edit does, in words.
+/// Description of an edit.
 pub(crate) fn edit_text(request: &EditRequest, all: &Identities) -> String {
     let added = |of: IdentityId, name: &str| match (name.trim(), of) {
         ("", NOBODY) => "added an object".to_owned(),
@@ -174,7 +174,7 @@ pub(crate) fn edit_text(request: &EditRequest, all: &Identities) -> String {
     }
 }
 
-/// What an edit of Gaussians does, in words.
+/// Description of an edit of Gaussians.
 pub(crate) fn splat_edit_text(edit: &SplatEdit, all: &Identities) -> String {
     match edit {
         SplatEdit::Delete(gone) => format!("deleted {}", things(gone.iter().filter(|g| **g).count(), "Gaussian")),
@@ -189,7 +189,7 @@ pub(crate) fn splat_edit_text(edit: &SplatEdit, all: &Identities) -> String {
     }
 }
 
-/// What became another, in words.
+/// Description of a change of the view.
 fn described(before: &ViewState, now: &ViewState, all: Option<&Identities>) -> String {
     if before.hidden != now.hidden {
         return all.map_or_else(String::new, |all| shown_text(&before.hidden, &now.hidden, all));
@@ -238,7 +238,7 @@ fn shown_text(before: &BTreeSet<IdentityId>, now: &BTreeSet<IdentityId>, all: &I
     if now.is_empty() {
         return "showed everything".to_owned();
     }
-    // Wholes stand for their pieces.
+    // A whole stands for its parts.
     let outermost = |ids: &BTreeSet<IdentityId>| -> Vec<IdentityId> {
         let whole = |id: &IdentityId| all.get(*id).is_some_and(|i| ids.contains(&i.parent));
         ids.iter().copied().filter(|id| all.get(*id).is_some() && !whole(id)).collect()
@@ -260,33 +260,33 @@ fn shown_text(before: &BTreeSet<IdentityId>, now: &BTreeSet<IdentityId>, all: &I
     }
 }
 
-/// A step that waits for those before it.
+/// An edit that waits for those before it.
 pub(super) enum EditStep {
     Request(EditRequest),
     Rearrange(SplatEdit),
     Undo,
     Redo,
-    /// The agent took a rename back, after which the identity is called this again.
+    /// The agent undid a rename; the identity gets this name again.
     UndoRename(IdentityId, String),
-    /// The agent took back what it hid or showed, after which these are left out again.
+    /// The agent undid hiding or showing; these identities are hidden again.
     UndoHidden(Vec<IdentityId>),
 }
 
-/// A change of objects and parts that is under way.
+/// A running change of objects and parts.
 pub(super) struct Editing {
     pub(super) job: JobId,
-    /// What it does, in words; `None` if it is the way back or forth to an earlier state.
+    /// Description; `None` if it restores an earlier or later state.
     pub(super) what: Option<String>,
-    /// Whether the way leads forth.
+    /// True if it is a redo.
     pub(super) redo: bool,
 }
 
-/// A search of objects and parts that is under way and becomes a step of the history.
+/// A running search of objects and parts that becomes a step of the history.
 pub(super) struct FoundStep {
     pub(super) job: JobId,
-    /// What it does, in words.
+    /// Description.
     pub(super) what: String,
-    /// Whether it adds to what is there.
+    /// True if it adds to the existing objects.
     pub(super) adds: bool,
 }
 

@@ -1,4 +1,4 @@
-//! The question what becomes of objects and parts that somebody has worked on, where objects are found anew.
+//! The question whether objects and parts that the user edited are kept when objects are found anew.
 
 use std::collections::VecDeque;
 use std::path::PathBuf;
@@ -6,24 +6,24 @@ use std::path::PathBuf;
 use super::theme;
 use crate::jobs::find_objects::listed;
 
-/// A search that is yet to begin.
+/// A search that has not begun.
 pub(super) struct PlannedSearch {
-    /// Where masks are, if others than those of the photos.
+    /// Path of masks to use in place of the photos' own.
     pub(super) masks: Option<PathBuf>,
     /// Models to download first.
     pub(super) missing: VecDeque<String>,
-    /// Whether what somebody has worked on is found anew, too.
+    /// True if objects and parts that the user edited are replaced, too.
     pub(super) replace_all: bool,
 }
 
 /// The question, and the search that waits for its answer.
 pub(super) struct KeepDialog {
-    /// Full names of what somebody has worked on.
+    /// Full names of the objects and parts that the user edited.
     pub(super) by_hand: Vec<String>,
     pub(super) search: PlannedSearch,
 }
 
-/// What was answered.
+/// The user's answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum KeepAnswer {
     Keep,
@@ -32,7 +32,7 @@ pub(super) enum KeepAnswer {
 }
 
 impl KeepDialog {
-    /// Shows it; the answer, once there is one.
+    /// Shows the dialog; returns the answer, once there is one.
     pub(super) fn show(&self, ctx: &egui::Context) -> Option<KeepAnswer> {
         let response = theme::dialog("keep").show(ctx, |ui| {
             ui.set_width(440.0);

@@ -1,4 +1,4 @@
-//! Key bindings, read off the actions.
+//! Key bindings, derived from the actions.
 
 use std::collections::BTreeSet;
 
@@ -6,7 +6,7 @@ use egui::{Event, Id, InputState, Key, KeyboardShortcut, Modifiers};
 
 use crate::ui::actions::{Action, Shortcut};
 
-/// Mouse gestures and held keys in the viewport, which are no actions: for the shortcut sheet.
+/// Mouse gestures and held keys in the viewport for the shortcut sheet; they are no actions.
 pub(crate) const GESTURES: [(&str, &str); 14] = [
     ("W A S D", "Fly forward, left, back, right"),
     ("Q  E", "Fly down, up"),
@@ -24,40 +24,40 @@ pub(crate) const GESTURES: [(&str, &str); 14] = [
     ("Space  Arrows", "Press it, change it"),
 ];
 
-/// The binding in the window toolkit's terms; `None` if it has no key of that name.
+/// The binding as egui's type; `None` if egui has no key of that name.
 pub(crate) fn binding(shortcut: Shortcut) -> Option<KeyboardShortcut> {
     let modifiers = if shortcut.ctrl { Modifiers::COMMAND } else { Modifiers::NONE };
     Some(KeyboardShortcut::new(modifiers, Key::from_name(shortcut.key)?))
 }
 
-/// The action's key for the user: "Ctrl+P"; empty if it has none.
+/// The action's key as text, "Ctrl+P"; empty if it has none.
 pub(crate) fn label(ctx: &egui::Context, action: &Action) -> String {
     let Some(shortcut) = action.shortcut() else { return String::new() };
-    // Symbols such as "[" read better as they stand on the key than by the toolkit's name.
+    // Symbols such as "[" read better than egui's names for them.
     if shortcut.key.len() == 1 && !shortcut.ctrl {
         return shortcut.key.to_owned();
     }
     binding(shortcut).map_or_else(String::new, |b| ctx.format_shortcut(&b))
 }
 
-/// How long keys belong to a text field that has lost the keyboard, seconds: whoever types on means no shortcuts.
+/// Time after a text field lost the focus in which letters are still typing and no shortcuts, s.
 const TYPING_SECS: f64 = 1.0;
 
-/// Who typed where, and when.
+/// State of typing.
 #[derive(Clone, Copy, Default)]
 struct Typing {
-    /// Until when letters are no shortcuts.
+    /// Window time until which letters are no shortcuts, s.
     until: f64,
-    /// The field with the keyboard, if something was typed into it since Enter: undo belongs to it then.
+    /// The focused field, if text was typed into it since Enter; undo and redo then belong to it.
     unsent: Option<Id>,
-    /// Whether a field has the keyboard, and whether it loses it by Escape now, which is then no shortcut.
+    /// True if a field has the focus; `leaves` if Escape now ends that, so Escape is no shortcut.
     in_field: bool,
     leaves: bool,
-    /// Whether a field is open that takes nothing, and what is typed goes nowhere.
+    /// True if a disabled field is open that discards typed text.
     in_vain: bool,
 }
 
-/// Looks who types; once per frame, before anybody takes keys.
+/// Updates the state of typing; once per frame, before other code takes keys.
 pub(crate) fn watch_typing(ctx: &egui::Context) {
     let field = ctx.memory(|m| m.focused()).filter(|_| ctx.text_edit_focused());
     let typing = typing(ctx);
@@ -68,7 +68,7 @@ pub(crate) fn watch_typing(ctx: &egui::Context) {
         let unsent = field.filter(|id| typed || typing.unsent == Some(*id)).filter(|_| !i.key_pressed(Key::Enter));
         let until = match goes_on {
             true => i.time + TYPING_SECS,
-            // Whoever clicks somewhere or cancels has ended typing.
+            // A click or Escape ends typing.
             false if i.pointer.any_pressed() || i.key_pressed(Key::Escape) => 0.0,
             false => typing.until,
         };
@@ -78,13 +78,13 @@ pub(crate) fn watch_typing(ctx: &egui::Context) {
     ctx.data_mut(|d| d.insert_temp(Id::NULL, typing));
 }
 
-/// Letters belong to a field that opens in this frame, before it is drawn.
+/// Reserves letters for a field that opens in this frame, before it is drawn.
 pub(crate) fn begin_typing(ctx: &egui::Context) {
     let until = ctx.input(|i| i.time) + TYPING_SECS;
     ctx.data_mut(|d| d.get_temp_mut_or_default::<Typing>(Id::NULL).until = until);
 }
 
-/// Sets whether letters go nowhere: a field is open in which nothing can be typed.
+/// Sets whether letters are discarded because a disabled field is open.
 pub(crate) fn type_in_vain(ctx: &egui::Context, in_vain: bool) {
     ctx.data_mut(|d| d.get_temp_mut_or_default::<Typing>(Id::NULL).in_vain = in_vain);
 }
@@ -93,18 +93,18 @@ fn typing(ctx: &egui::Context) -> Typing {
     ctx.data(|d| d.get_temp(Id::NULL)).unwrap_or_default()
 }
 
-/// Whether letters belong to a text field: it has the keyboard, or lost it while it was typed into.
+/// True if letters belong to a text field: one has the focus, or lost it during typing.
 pub(crate) fn is_typing(ctx: &egui::Context) -> bool {
     let typing = typing(ctx);
     ctx.text_edit_focused() || typing.in_vain || ctx.input(|i| i.time) < typing.until
 }
 
-/// Whether the action opens a text field, to which what is pressed after it belongs.
+/// True if the action opens a text field, which gets all later keys.
 pub(crate) fn opens_field(action: &Action) -> bool {
     matches!(action, Action::TypeQuery | Action::Palette | Action::StartChat | Action::Rename)
 }
 
-/// Follows which keys move the eye: those that were pressed without Control or Command, as long as they are held.
+/// Updates the held keys that move the camera: those pressed without Control or Command.
 pub(crate) fn follow_held(held: &mut BTreeSet<Key>, input: &InputState) {
     for event in &input.events {
         if let Event::Key { key, pressed: true, repeat: false, modifiers, .. } = event
@@ -117,17 +117,17 @@ pub(crate) fn follow_held(held: &mut BTreeSet<Key>, input: &InputState) {
     held.retain(|key| input.key_down(*key));
 }
 
-/// Takes every bound key that was pressed off the input, in order and as often as it was pressed, unless it belongs to
-/// a text field. It ends with what opens such a field: what was pressed later, in a slow frame, is for that.
+/// Takes the pressed bound keys off the input, in order and with repeats, unless they belong to a text field. Stops
+/// after an action that opens such a field: keys pressed later in a slow frame belong to it.
 pub(crate) fn pressed(ctx: &egui::Context) -> Vec<Action> {
     let (has_field, is_typing) = (ctx.text_edit_focused() || typing(ctx).in_vain, is_typing(ctx));
     let has_focus = ctx.memory(|m| m.focused()).is_some();
     let unsent = has_field && typing(ctx).unsent.is_some();
     let is_fields = |action: &Action, shortcut: Shortcut| match shortcut {
         Shortcut { ctrl: true, .. } => unsent && matches!(action, Action::Undo | Action::Redo),
-        // What a field does not take: F1 to F12.
+        // Text fields do not use F1 to F12.
         Shortcut { key, .. } if key.len() > 1 && key.starts_with('F') => false,
-        // Space presses the button that has the focus.
+        // Space presses the focused button.
         Shortcut { key: "Space", .. } => has_focus || is_typing,
         Shortcut { key: "Escape", .. } => has_field || typing(ctx).leaves,
         Shortcut { key, .. } => has_field || is_typing && key.len() == 1,
@@ -149,7 +149,7 @@ pub(crate) fn pressed(ctx: &egui::Context) -> Vec<Action> {
             found.push(action.clone());
             if opens {
                 left.retain(|e| !matches!(e, Event::Key { .. } | Event::Text(_)));
-                // The letter of the key itself is none of what is typed.
+                // The letter of the shortcut itself is not part of the typed text.
                 events.next_if(|e| matches!(e, Event::Text(text) if action.shortcut().is_some_and(|s| s.key == text)));
                 break;
             }
@@ -159,7 +159,7 @@ pub(crate) fn pressed(ctx: &egui::Context) -> Vec<Action> {
     })
 }
 
-/// The action whose key such an event presses.
+/// The action bound to the key of an event.
 fn bound_to<'a>(bound: &'a [(KeyboardShortcut, Action)], event: &Event) -> Option<&'a Action> {
     let Event::Key { key, pressed: true, modifiers, .. } = event else { return None };
     let is_pressed = |b: &KeyboardShortcut| b.logical_key == *key && modifiers.matches_logically(b.modifiers);

@@ -1,5 +1,5 @@
-//! What objects and parts are called on screen: by name, or, without one, by what they look like; and the answers
-//! to a list of phrases.
+//! Labels of objects and parts on screen: their names or, without one, their appearance; and the answers to a list of
+//! phrases.
 
 use std::path::PathBuf;
 
@@ -7,7 +7,7 @@ use crate::jobs::phrases::PhraseRow;
 use crate::scene::appearance::Appearance;
 use crate::scene::{Identities, IdentityId};
 
-/// Names for what has none, by number less one.
+/// Stand-in labels of unnamed identities, indexed by number - 1.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ScreenNames(Vec<Option<String>>);
 
@@ -16,29 +16,29 @@ impl ScreenNames {
         Self(appearances.iter().map(|a| a.map(|a| a.text(meters_per_unit))).collect())
     }
 
-    /// What stands in for a name, where there is none.
+    /// Stand-in label of an identity without a name.
     fn instead(&self, all: &Identities, id: IdentityId) -> Option<&str> {
         let unnamed = all.get(id).is_some_and(|i| i.names.is_empty());
         self.0.get((id as usize).checked_sub(1)?)?.as_deref().filter(|_| unnamed)
     }
 
-    /// "kettle", "pale blue region, 12 cm".
+    /// Label such as "kettle" or "pale blue region, 12 cm".
     pub(crate) fn name(&self, all: &Identities, id: IdentityId) -> String {
         self.instead(all, id).map_or_else(|| all.label(id), str::to_owned)
     }
 
-    /// "lid · kettle", "pale blue region, 12 cm".
+    /// Label with the whole, such as "lid · kettle" or "pale blue region, 12 cm".
     pub(crate) fn full_name(&self, all: &Identities, id: IdentityId) -> String {
         self.instead(all, id).map_or_else(|| all.full_name(id), str::to_owned)
     }
 }
 
-/// What a list of phrases came to last.
+/// Latest answers to a list of phrases.
 #[derive(Clone, Debug, Default)]
 pub struct PhraseTable {
-    /// A row for each phrase in each view.
+    /// One row per phrase and view.
     pub rows: Vec<PhraseRow>,
-    /// Where the masks were written, if they were.
+    /// Folder of the masks, if they were written.
     pub(crate) written: Option<PathBuf>,
 }
 
@@ -48,11 +48,11 @@ impl PhraseTable {
     }
 }
 
-/// Share of the largest region's Gaussians under which a region without a name is tiny.
+/// Share of the largest region's Gaussians below which an unnamed region is tiny.
 const TINY: f64 = 0.01;
 
-/// In which order identities are listed: those with names as they come, then those without by falling size; and
-/// apart from them the tiny ones without a name.
+/// Identities in the order of the list: named ones in their order, then unnamed ones by falling size. Tiny unnamed ones
+/// are returned separately.
 pub(crate) fn listed(all: &Identities, sizes: &[usize], ids: Vec<IdentityId>) -> (Vec<IdentityId>, Vec<IdentityId>) {
     let size = |id: &IdentityId| sizes.get(*id as usize).copied().unwrap_or(0);
     let is_named = |id: &IdentityId| all.get(*id).is_some_and(|i| !i.names.is_empty());
@@ -64,7 +64,7 @@ pub(crate) fn listed(all: &Identities, sizes: &[usize], ids: Vec<IdentityId>) ->
     (named, tiny)
 }
 
-/// With a capital letter.
+/// The text with a capital first letter.
 pub(super) fn sentence(what: &str) -> String {
     let mut letters = what.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())

@@ -1,4 +1,4 @@
-//! What the window remembers from one run to the next.
+//! Layout and settings that the window stores between runs.
 
 use std::path::PathBuf;
 
@@ -16,7 +16,7 @@ use crate::worker::ViewMode;
 /// Key of the layout in the storage.
 const KEY: &str = "layout";
 
-/// What the plots run over.
+/// Horizontal axis of the plots.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum PlotAxis {
     /// Seconds of training.
@@ -25,7 +25,7 @@ pub(crate) enum PlotAxis {
     Steps,
 }
 
-/// What the plot of training shows.
+/// Quantity in the plot of training.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum PlotQuantity {
     #[default]
@@ -33,15 +33,15 @@ pub(crate) enum PlotQuantity {
     Loss,
 }
 
-/// How the plots of training are drawn.
+/// Settings of the plots of training.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub(crate) struct PlotSettings {
     pub(crate) quantity: PlotQuantity,
     pub(crate) axis: PlotAxis,
-    /// Share of the points that a running mean goes over, in percent.
+    /// Window of the running mean, percent of the points.
     pub(crate) smoothing: f32,
-    /// Whether the loss has a logarithmic axis.
+    /// True if the loss has a logarithmic axis.
     pub(crate) log: bool,
 }
 
@@ -51,46 +51,46 @@ impl Default for PlotSettings {
     }
 }
 
-/// Choices of a user about the window, and the settings of the next training.
+/// Settings of the window and of the next training.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Layout {
-    /// Panes that are hidden.
+    /// Hidden panes.
     pub hidden: Vec<Pane>,
-    /// Where panes stand.
+    /// Arrangement of the panes.
     pub(crate) dock: Dock,
-    /// Dark, light, or as the system has it.
+    /// Dark, light, or the system's theme.
     pub(crate) theme: ThemePreference,
-    /// Size of everything in the window, 1 as designed.
+    /// Zoom factor of the window, 1 by default.
     pub(crate) zoom: f32,
-    /// Whether cameras are drawn into the view.
+    /// True if the photos' cameras are drawn into the view.
     pub cameras: bool,
-    /// Whether the photo is shown beside the frame.
+    /// True if the photo is shown beside the frame.
     pub compare: bool,
-    /// Where the split between frame and photo is, 0 to 1.
+    /// Position of the split between frame and photo, 0 to 1.
     pub(crate) split: f32,
-    /// What the viewport shows.
+    /// Mode of the first view.
     pub mode: ViewMode,
-    /// Whether there are two views of the scene, and what the second shows.
+    /// True if there are two views; the mode of the second.
     pub split_view: bool,
     pub second_mode: ViewMode,
-    /// Whether everything is dimmed but answers and the selection.
+    /// True if everything except answers and the selection is dimmed.
     pub dim: bool,
-    /// How the plots of training are drawn.
+    /// Settings of the plots of training.
     pub(crate) plots: PlotSettings,
-    /// Whether the times of a frame's stages are shown.
+    /// True if the times of a frame's stages are shown.
     pub times: bool,
     /// Settings of the next training.
     pub config: TrainConfig,
-    /// What of the scene plan is wanted otherwise.
+    /// The user's overrides of the scene plan.
     pub(crate) plan: Overrides,
     /// Models that find objects.
     pub finding: FindSettings,
-    /// What plans for the agent.
+    /// Planner of the agent.
     pub(crate) chat: ChatSettings,
-    /// Files and folders opened lately.
+    /// Recently opened files and folders.
     pub(crate) recent: Vec<PathBuf>,
-    /// Where a file was chosen last.
+    /// Folder of the last file dialog.
     pub folder: Option<PathBuf>,
 }
 
@@ -134,17 +134,17 @@ impl Layout {
         eframe::set_value(storage, KEY, self);
     }
 
-    /// What the first or the second view shows.
+    /// Mode of the first or the second view.
     pub(crate) fn mode_of(&mut self, second: bool) -> &mut ViewMode {
         if second { &mut self.second_mode } else { &mut self.mode }
     }
 
-    /// Whether a pane is shown.
+    /// True if a pane is shown.
     pub fn shows(&self, pane: Pane) -> bool {
         !self.hidden.contains(&pane)
     }
 
-    /// Shows a pane, before the others of its group.
+    /// Shows a pane, in front of its group.
     pub(crate) fn show(&mut self, pane: Pane) {
         self.hidden.retain(|p| *p != pane);
         self.dock.activate(pane);

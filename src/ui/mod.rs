@@ -1,8 +1,8 @@
 //! The window.
 //!
-//! [`state::AppState`] is what the window knows: a pure fold over the worker's events.
-//! [`app::App`] draws it and turns what a user does into [`Action`]s; an action
-//! changes the view or becomes a job. Nothing here computes for longer than a redraw may take.
+//! [`state::AppState`] is the window's state: a pure fold over the worker's events. [`app::App`] draws it and turns the
+//! user's input into [`Action`]s. An action changes the view or becomes a job. Nothing here computes for longer than a
+//! redraw may take.
 
 mod act;
 mod act_file;
@@ -58,7 +58,7 @@ use crate::scene::plan::PlanOverride;
 use crate::worker::Start;
 use crate::worker::jobs::PipelineJobs;
 
-/// Opens the window, takes what is wanted of plans, does `first` one after the other, and returns when it is closed.
+/// Opens the window with the user's overrides of plans, carries out `first` in order, and returns when it is closed.
 pub fn run(first: Vec<Start>, overrides: Vec<PlanOverride>) -> eframe::Result {
     let viewport = egui::ViewportBuilder::default()
         .with_title("FMLGS")
@@ -67,11 +67,11 @@ pub fn run(first: Vec<Start>, overrides: Vec<PlanOverride>) -> eframe::Result {
         .with_inner_size([1480.0, 920.0])
         .with_min_inner_size([640.0, 480.0])
         .with_drag_and_drop(true);
-    // An emulated adapter draws the window several times faster through OpenGL: its Vulkan side
-    // runs both branches of every condition in the toolkit's shader.
+    // On an emulated adapter OpenGL draws the window several times faster: its Vulkan side runs both branches of every
+    // condition in egui's shader.
     if crate::render::real_gpu().is_none() {
         match open(viewport.clone(), eframe::Renderer::Glow, first.clone(), overrides.clone()) {
-            // Not every system has it.
+            // Some systems lack OpenGL.
             Err(eframe::Error::OpenGL(_) | eframe::Error::Glutin(_) | eframe::Error::NoGlutinConfigs(..)) => {}
             result => return result,
         }
@@ -91,12 +91,12 @@ fn open(
     first: Vec<Start>,
     overrides: Vec<PlanOverride>,
 ) -> eframe::Result {
-    // Shades that dithering would smooth do not occur in a flat theme.
+    // A flat theme has no gradients that dithering would smooth.
     let mut options =
         eframe::NativeOptions { viewport, renderer, dithering: false, ..eframe::NativeOptions::default() };
-    // The theme brings them.
+    // The theme installs fallback fonts itself.
     options.system_font_fallback = false;
-    // A device that can draw and train too.
+    // The device also draws and trains.
     if let WgpuSetup::CreateNew(setup) = &mut options.wgpu_options.wgpu_setup {
         setup.power_preference = eframe::wgpu::PowerPreference::HighPerformance;
         setup.device_descriptor = Arc::new(Device::device_descriptor);
@@ -115,7 +115,7 @@ fn open(
     )
 }
 
-/// Something that asks the window to look at what is new, from any thread, at most so often.
+/// A callback that requests a redraw from any thread, delayed by `millis`.
 fn repainter(ctx: &egui::Context, millis: u64) -> crate::worker::Repaint {
     let ctx = ctx.clone();
     Arc::new(move || ctx.request_repaint_after(std::time::Duration::from_millis(millis)))

@@ -15,17 +15,17 @@ pub(crate) struct Palette {
 }
 
 impl Palette {
-    /// Opens it with an empty query, or closes it.
+    /// Opens the palette with an empty query, or closes it.
     pub(crate) fn toggle(&mut self) {
         *self = Self { open: !self.open, ..Self::default() };
     }
 
-    /// Whether it is on screen.
+    /// True if the palette is open.
     pub(crate) fn is_open(&self) -> bool {
         self.open
     }
 
-    /// Draws it, and returns the action that was chosen.
+    /// Draws the palette; returns the chosen action.
     pub(crate) fn show(&mut self, ctx: &egui::Context, layout: &Layout) -> Option<Action> {
         if !self.open {
             return None;
@@ -40,7 +40,7 @@ impl Palette {
         let entered = step(Key::Enter);
         let mut chosen = None;
         let field = egui::Id::unique("palette query");
-        // Before it is drawn: what is typed in this very frame is for it.
+        // Before drawing: text typed in this frame belongs to the field.
         ctx.memory_mut(|m| m.request_focus(field));
         let area = theme::dialog_area("palette").anchor(Align2::CENTER_TOP, [0.0, 90.0]);
         let response = theme::dialog("palette").area(area).show(ctx, |ui| {
@@ -88,7 +88,7 @@ fn step_keys(ui: &egui::Ui) -> bool {
     ui.input(|i| i.key_down(Key::ArrowDown) || i.key_down(Key::ArrowUp))
 }
 
-/// What an action does now: what is shown already can only be hidden by its switch.
+/// Title of an action; a switch of a visible pane can only hide it.
 fn title(action: &Action) -> String {
     match action {
         Action::TogglePane(pane) => format!("Hide the {} pane", pane.text().to_lowercase()),
@@ -96,8 +96,8 @@ fn title(action: &Action) -> String {
     }
 }
 
-/// Actions whose titles hold every word of the query, those that begin with it first. A query that
-/// looks like a path can also be opened.
+/// Actions whose titles hold every word of the query, those that begin with it first. A query that looks like a path
+/// gives only the action that opens it.
 fn matches(query: &str, layout: &Layout) -> Vec<Action> {
     let path = query.trim();
     if path.starts_with(['/', '.', '~']) || path.contains(":\\") {
@@ -112,7 +112,7 @@ fn matches(query: &str, layout: &Layout) -> Vec<Action> {
         words.iter().all(|w| title.contains(w))
     };
     let mut found: Vec<Action> = Action::all().into_iter().filter(|a| can_be_done(a) && is_asked_for(a)).collect();
-    // Whoever types a pane's name means the pane.
+    // The name of a pane is most likely a request for that pane.
     let is_pane = |a: &Action| match a {
         Action::ShowPane(pane) | Action::TogglePane(pane) => pane.text().to_lowercase().starts_with(&query),
         _ => false,
@@ -121,7 +121,7 @@ fn matches(query: &str, layout: &Layout) -> Vec<Action> {
     found
 }
 
-/// What else an action is called.
+/// Synonyms in an action's title.
 fn other_words(action: &Action) -> &'static str {
     match action {
         Action::ShowPane(_) => "open",
@@ -139,7 +139,7 @@ pub(crate) fn shortcut_sheet(ctx: &egui::Context, open: &mut bool) {
         ui.set_width((ctx.content_rect().width() - 80.0).min(760.0));
         ui.heading("Keyboard and mouse");
         ui.add_space(8.0);
-        // A small window has no room for all of them.
+        // A small window cannot fit all rows.
         let height = (ctx.content_rect().height() - 150.0).max(200.0);
         ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
             ui.columns_const(|[left, right]| {
@@ -149,7 +149,7 @@ pub(crate) fn shortcut_sheet(ctx: &egui::Context, open: &mut bool) {
                     .map(|a| (keys::label(left.ctx(), &a), a.text()))
                     .collect();
                 let gestures = keys::GESTURES.map(|(k, t)| (k.to_owned(), t.to_owned()));
-                // Both columns are of a height.
+                // Both columns get the same height.
                 let (first, second) = bound.split_at(bound.len().min((bound.len() + gestures.len()).div_ceil(2)));
                 sheet_grid(left, "Actions", first);
                 sheet_grid(right, "In the viewport", &gestures);
@@ -170,7 +170,7 @@ pub(crate) fn shortcut_sheet(ctx: &egui::Context, open: &mut bool) {
 
 fn sheet_grid(ui: &mut egui::Ui, title: &str, rows: &[(String, String)]) {
     theme::section(ui, title);
-    // What is wider than its column is wrapped.
+    // Text wider than its column wraps.
     let grid = egui::Grid::new(title).num_columns(2).spacing([16.0, 5.0]).min_col_width(70.0);
     grid.max_col_width(ui.available_width() - 110.0).show(ui, |ui| {
         for (key, text) in rows {

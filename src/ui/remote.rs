@@ -1,5 +1,5 @@
-//! A scene on another computer: the window looks at it as at its own; what needs that computer's files is asked of its
-//! server, or said to be impossible.
+//! A scene on another computer: the window shows it like a local one. Requests that need that computer's files go to
+//! its server, or are refused with a message.
 
 use super::app::App;
 use super::state::Tone;
@@ -9,7 +9,7 @@ use crate::remote::{Address, ServerLink};
 use crate::worker::{Command, Event, Failure, JobId, JobKind};
 
 impl App {
-    /// Looks at what a server shows from now on.
+    /// Connects to a server and shows its scene.
     pub(super) fn connect(&mut self, url: &str) {
         self.disconnect();
         let failed = |message: String| Failure { message, remedy: String::new() };
@@ -25,7 +25,7 @@ impl App {
         }
     }
 
-    /// Ends the connection; what runs there goes on.
+    /// Ends the connection; jobs on the server continue.
     pub(super) fn disconnect(&mut self) {
         self.worker.set_elsewhere(None);
         if let Some(link) = self.link.take() {
@@ -37,12 +37,12 @@ impl App {
         }
     }
 
-    /// Whether an event comes from a server that is no longer looked at.
+    /// True if an event comes from a server that is no longer connected.
     pub(super) fn is_of_earlier_server(&self, event: &Event) -> bool {
         event.job().is_remote() && !self.link.as_ref().is_some_and(|link| link.owns(event.job()))
     }
 
-    /// Asks a job to wait or to go on, wherever it runs.
+    /// Pauses or resumes a job, on this computer or on the server.
     pub(super) fn set_paused(&mut self, job: JobId, paused: bool) {
         match self.link.as_ref().filter(|link| link.owns(job)) {
             Some(link) if !link.status().connected || !link.set_paused(paused) => self.say_unreachable(),
@@ -51,11 +51,11 @@ impl App {
         }
     }
 
-    /// Asks the job on screen to end, wherever it runs.
+    /// Cancels the job on screen, on this computer or on the server.
     pub(super) fn cancel_job(&mut self) {
         let Some(job) = &mut self.state.job else { return };
         match self.link.as_ref().filter(|link| link.owns(job.id)) {
-            // What is not there yet is nothing to end there.
+            // A scene that is still being received has no job on the server to cancel.
             Some(_) if job.kind != JobKind::Train => self.disconnect(),
             Some(link) if !link.status().connected || !link.cancel() => self.say_unreachable(),
             Some(_) => job.canceling = true,
@@ -70,8 +70,8 @@ impl App {
         self.state.toast(Tone::Warning, "There is no connection at the moment, so that cannot be passed on.");
     }
 
-    /// Does with a scene on another computer what its server is asked for, or says that it cannot be done. Whether
-    /// that settles the command.
+    /// Sends a command about a scene on another computer to its server, or reports that it is impossible. Returns true
+    /// if the command is settled.
     pub(super) fn settled_remotely(&mut self, command: &Command) -> bool {
         let Some(origin) = self.state.scene.as_ref().and_then(|scene| scene.remote.clone()) else { return false };
         let host = origin.host;

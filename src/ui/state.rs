@@ -1,4 +1,4 @@
-//! Everything the window knows, changed by events alone: [`AppState::apply`] is a pure fold.
+//! State of the window, changed by events alone: [`AppState::apply`] is a pure fold.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
@@ -39,95 +39,95 @@ mod messages;
 mod opened;
 mod running;
 
-/// Files and folders kept in the recent list.
+/// Length of the recent list.
 const MAX_RECENT: usize = 8;
 
 /// A report on screen.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShownReport {
-    /// Where it was read from.
+    /// Path of the report.
     pub(crate) path: PathBuf,
     pub(crate) report: Arc<Report>,
 }
 
-/// Everything the window knows of the world.
+/// State of the window.
 #[derive(Clone, Debug, Default)]
 pub struct AppState {
     /// The scene on screen.
     pub scene: Option<Arc<OpenedScene>>,
-    /// What is seen of another one, in the second view.
+    /// Another scene in the second view.
     pub beside: Option<Beside>,
-    /// The scene without a thing that was made last.
+    /// The latest scene made by a removal.
     pub(crate) removed: Option<RemovedScene>,
     /// Counts the scenes shown so far; changes when `scene` does.
     pub(crate) scene_number: u64,
-    /// What is left out for the scene, and why.
+    /// Decisions on what is left out for the scene, with their reasons.
     pub(crate) plan: ScenePlan,
-    /// Whether the Gaussians on screen want the 2-D filter of Mip-Splatting.
+    /// True if the Gaussians on screen are drawn with the 2-D filter of Mip-Splatting.
     pub(crate) antialias: bool,
     /// Objects and parts of the Gaussians on screen.
     pub semantics: Option<Versioned<SemanticMap>>,
-    /// What was noticed of each of them by number, pieces included; their Gaussians; and what they are called on screen.
+    /// Evidence on each of them by number, parts included; their Gaussians; and their labels on screen.
     pub(crate) facts: Vec<IdentityEvidence>,
     pub(crate) sizes: Vec<usize>,
     pub(crate) labels: ScreenNames,
     pub phrases: PhraseTable,
     /// New thumbnails of objects and parts, until they are taken over.
     pub(crate) thumbnails: Option<(Arc<SemanticMap>, ThumbnailSet)>,
-    /// What is known of moving about in the scene.
+    /// Free space of the scene, if explored.
     pub explored: Option<Arc<Explored>>,
-    /// The way that was looked for last, until the window takes it.
+    /// The flight that was searched last, until the window takes it.
     pub(crate) visited: Option<Approached>,
-    /// The pixel that was looked into last, until the window takes it.
+    /// The pixel inspected last, until the window takes it.
     pub(crate) inspected: Option<Arc<InspectedPixel>>,
-    /// Gaussians that were edited, until the view takes them; what was measured of some, until the pane does.
+    /// Edited Gaussians, until the view takes them; measures of Gaussians, until the pane takes them.
     pub(crate) rearranged: Option<Arc<GaussianCloud>>,
     pub(crate) splats_measured: Option<Arc<MeasuredCloud>>,
-    /// What clicks and strokes select, until the tool takes it.
+    /// Result of the selection tool's clicks and strokes, until the tool takes it.
     pub(crate) selected: Option<(JobId, Arc<Selected>)>,
-    /// Models and the engine that runs them, once they were listed.
+    /// Models and the engine that runs them, once listed.
     pub(crate) models: Option<Arc<ModelList>>,
-    /// Models that were put in place so far.
+    /// Count of models installed so far.
     pub(crate) models_installed: u64,
-    /// What can be undone and redone, whoever did it.
+    /// Changes that can be undone and redone, by the user or the agent.
     pub(crate) changes: ChangeHistory,
-    /// The newest short job that is over; they end in order.
+    /// The newest short job that has ended; they end in order.
     pub(crate) short_jobs_done: JobId,
-    /// The long job that runs.
+    /// The running long job.
     pub job: Option<RunningJob>,
-    /// Training of the present scene.
+    /// History of the current scene's training.
     pub history: TrainHistory,
-    /// The training before, while another is shown.
+    /// History of the previous training, while another is shown.
     pub(crate) previous: TrainHistory,
-    /// Settings of the training that can go on, and the step that it has come to.
+    /// Settings of the training that can continue, and the training step that it has reached.
     pub(crate) resumable: Option<(TrainConfig, u64)>,
-    /// Job whose Gaussians are those of the present scene.
+    /// Job whose Gaussians are on screen.
     pub(crate) training_job: Option<JobId>,
     /// The log, oldest first.
     pub log: VecDeque<LogLine>,
-    /// What is wrong with what is open, with the job that told it.
+    /// Problems of the open scene, with the job that reported each.
     pub problems: Vec<(Option<JobId>, String)>,
     /// Messages on screen, oldest first.
     pub(crate) toasts: Vec<Toast>,
     /// The error on screen.
     pub error: Option<ErrorBox>,
-    /// Photos that were opened and have no camera poses, until a user has decided what to do.
+    /// Opened photos without camera poses, until the user has decided on them.
     pub(crate) unposed: Option<Box<Unposed>>,
-    /// Files and folders opened lately, newest first.
+    /// Recently opened files and folders, newest first.
     pub recent: Vec<PathBuf>,
-    /// All trainings of those of them that have several.
+    /// All trainings of recent folders with several.
     pub recent_runs: Vec<(PathBuf, Vec<RunSummary>)>,
-    /// Small pictures of them, until the window takes them.
+    /// Thumbnails of recent scenes, until the window takes them.
     pub(crate) recent_pictures: Vec<(PathBuf, PhotoPixels)>,
-    /// Photos loaded lately, by index and size limit; the window takes them out.
+    /// Recently loaded photos, by index and size limit, until the window takes them.
     pub(crate) photos: BTreeMap<(usize, u32), Arc<PhotoPixels>>,
-    /// Photos that could not be loaded, by job, for the window to mark; the window takes them out.
+    /// Jobs of photos that could not be loaded, until the window marks them.
     pub(crate) failed_photos: Vec<JobId>,
     /// Error against run time, if a report is open.
     pub report: Option<ShownReport>,
-    /// The report that it is compared with.
+    /// The report to compare with.
     pub second_report: Option<ShownReport>,
-    /// How the connection to the server is whose scene is on screen, if it is one's.
+    /// Status of the connection to the server of the current scene, if it has one.
     pub(crate) link: Option<LinkStatus>,
     short_jobs: BTreeMap<JobId, (JobKind, String)>,
     next_toast: u64,
@@ -139,7 +139,7 @@ impl AppState {
         Self { recent, ..Self::default() }
     }
 
-    /// Takes in one event; what the window is to do next because of it.
+    /// Applies one event; returns the actions that the window carries out next.
     pub(crate) fn apply(&mut self, event: Event) -> Vec<Action> {
         match event {
             Event::Started { job, kind, title } if kind.lane() == WorkerThread::Short => {
@@ -148,7 +148,7 @@ impl AppState {
             Event::Started { job, kind, title } => {
                 let title = text::line(&title).into_owned();
                 if kind == JobKind::Train {
-                    // They belong to Gaussians that are about to change.
+                    // Objects belong to Gaussians that are about to change.
                     self.set_semantics(None);
                     self.training_job = Some(job);
                 }
@@ -162,7 +162,7 @@ impl AppState {
             Event::Paused(job, paused) => self.with_job(job, |j| j.paused = paused),
             Event::Step(job, metrics) => {
                 if self.training_job == Some(job) {
-                    // One that starts over is another, to be compared with.
+                    // A training that starts over is another one; the previous is kept for comparison.
                     if self.history.steps.first().is_some_and(|first| metrics.step <= first.step) {
                         self.previous = std::mem::take(&mut self.history);
                     }
@@ -183,7 +183,7 @@ impl AppState {
                     let reached = ended.progress.as_ref().filter(|_| ended.kind == JobKind::Train).map(|p| p.done);
                     self.resumable.iter_mut().zip(reached).for_each(|((_, step), reached)| *step = reached);
                     self.toast(Tone::Info, format!("{}: canceled", ended.title));
-                    // What was measured before is worth seeing.
+                    // Results measured before the cancellation are shown.
                     let scene = self.scene.as_ref().filter(|_| ended.kind == JobKind::Measure);
                     return scene.map(|s| Action::OpenReport(s.report_out.clone())).into_iter().collect();
                 }
@@ -200,17 +200,17 @@ impl AppState {
         self.recent.truncate(MAX_RECENT);
     }
 
-    /// Whether the Gaussians on screen are a result.
+    /// True if the Gaussians on screen are a result.
     pub(crate) fn is_trained(&self) -> bool {
         !self.is_training() && (self.training_job.is_some() || self.scene.as_ref().is_some_and(|s| s.trained))
     }
 
-    /// Whether training runs or waits.
+    /// True if a training is running or paused.
     pub fn is_training(&self) -> bool {
         self.job.as_ref().is_some_and(|j| j.kind == JobKind::Train)
     }
 
-    /// Follows what a user wants otherwise, and the settings of the next training.
+    /// Updates the plan for the user's overrides and the settings of the next training.
     pub(crate) fn replan(&mut self, overrides: &Overrides, limits: Limits) {
         if self.plan.overrides != *overrides || self.plan.facts.limits != limits {
             let dataset = self.scene.as_ref().and_then(|s| s.dataset.as_deref());
@@ -219,25 +219,25 @@ impl AppState {
         }
     }
 
-    /// How the Gaussians on screen are drawn: as they were trained, without what the plan leaves out.
+    /// Render settings of the Gaussians on screen: those of their training, without what the plan leaves out.
     pub(crate) fn render_settings(&self) -> RenderSettings {
         let scene = self.scene.as_ref().map(|s| s.render.clone()).unwrap_or_default();
         let sh_degree = if self.is_training() { scene.sh_degree } else { self.plan.sh_degree };
         RenderSettings { sh_degree, antialias: self.antialias, ..scene }
     }
 
-    /// The settings that a training started now has.
+    /// The settings of a training started now.
     pub(crate) fn next_training(&self, config: &TrainConfig) -> TrainConfig {
         TrainConfig { max_side_px: self.plan.train_side_px, ..config.clone() }
     }
 
-    /// The step at which a training with these settings goes on, if it does: for as many steps or for more.
+    /// The step at which a training with these settings would continue; `None` if it cannot or has no steps left.
     pub(crate) fn continues_at(&self, config: &TrainConfig) -> Option<u64> {
         let (before, step) = self.resumable.as_ref()?;
         (before.is_same_but_for_steps(config) && (1..config.steps).contains(step)).then_some(*step)
     }
 
-    /// Whether a training is there beside which another could begin.
+    /// True if there is a training beside which another could begin.
     pub(crate) fn can_begin_anew(&self) -> bool {
         self.resumable.as_ref().is_some_and(|(_, step)| *step > 0)
     }
@@ -283,6 +283,7 @@ impl AppState {
     fn finished(&mut self, job: JobId, outcome: Outcome) -> Vec<Action> {
         let ended = self.end(job);
         if ended.as_ref().is_some_and(|j| j.kind.makes_scene()) {
+            // Problems of the scene before do not apply to the new one.
             self.problems.retain(|(of, _)| *of == Some(job));
         }
         let mut next = Vec::new();

@@ -1,9 +1,9 @@
-//! Where the cursor is in a text field that is filled by something else than typing.
+//! Cursor of a text field whose text is set by code.
 
 use egui::text::{CCursor, CCursorRange};
 use egui::{Context, Event, Id, TextEdit};
 
-/// Puts the cursor behind the last character of `text`, which the field now holds.
+/// Moves the cursor to the end of `text`, which the field now holds.
 pub(super) fn cursor_to_end(ctx: &Context, field: Id, text: &str) {
     set_range(ctx, field, CCursorRange::one(CCursor::new(text.chars().count())));
 }
@@ -13,11 +13,10 @@ pub(super) fn select_all(ctx: &Context, field: Id, text: &str) {
     set_range(ctx, field, CCursorRange::two(CCursor::new(0), CCursor::new(text.chars().count())));
 }
 
-/// Gives a field that is yet to be drawn the keyboard, all of its text selected: what is typed in this very frame takes
-/// its place.
+/// Focuses a field that is yet to be drawn, with all of its text selected: text typed in this frame replaces it.
 pub(super) fn take_keyboard(ctx: &Context, field: Id, text: &mut String) {
     ctx.memory_mut(|m| m.request_focus(field));
-    // A field that has just got the keyboard forgets its selection.
+    // A newly focused field loses its selection.
     if ctx.input(|i| i.events.iter().any(|e| matches!(e, Event::Text(_) | Event::Paste(_)))) {
         text.clear();
     }

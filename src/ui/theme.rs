@@ -12,26 +12,26 @@ use super::state::Tone;
 /// The colors of a theme.
 #[derive(Clone, Copy)]
 struct Colors {
-    /// The one color that asks for attention, and text on it.
+    /// Accent color, and text on it.
     accent: Color32,
     on_accent: Color32,
     panel: Color32,
     canvas: Color32,
-    /// Cards and fields on a pane, with the mouse over them, and pressed.
+    /// Cards and fields on a pane: normal, hovered, pressed.
     surface: Color32,
     hovered: Color32,
     pressed: Color32,
     line: Color32,
     text: Color32,
-    /// Text of the most weight.
+    /// Emphasized text.
     strong: Color32,
-    /// Text of less weight; at least 5 : 1 on a pane.
+    /// Secondary text; contrast of at least 5 : 1 on a pane.
     weak: Color32,
     good: Color32,
-    /// Left out or changed; also held-out photos.
+    /// Warnings; also held-out photos.
     warning: Color32,
     error: Color32,
-    /// Cards over the picture.
+    /// Cards over the view.
     overlay: Color32,
 }
 
@@ -72,9 +72,9 @@ const LIGHT: Colors = Colors {
 };
 
 thread_local! {
-    // Windows draw on one thread each, and a picture's overlays keep to the dark theme within a light window.
+    // Each window draws on one thread; overlays of a view keep the dark theme within a light window.
     static COLORS: Cell<&'static Colors> = const { Cell::new(&DARK) };
-    // The window's own.
+    // The theme of the window.
     static THEME: Cell<Theme> = const { Cell::new(Theme::Dark) };
 }
 
@@ -88,13 +88,13 @@ macro_rules! colors {
 
 colors!(accent, on_accent, panel, canvas, surface, line, text, weak, good, warning, error);
 
-/// Takes the colors of the window's theme, at the start of a frame.
+/// Sets the colors of the window's theme, at the start of a frame.
 pub(crate) fn begin_frame(ctx: &egui::Context) {
     THEME.set(ctx.theme());
     COLORS.set(colors_of(ctx.theme()));
 }
 
-/// Draws in the dark theme whatever the window's is: colors of a picture are judged on dark ground.
+/// Draws in the dark theme in any window: colors of images are judged on a dark background.
 pub(crate) fn dark<T>(ui: &mut Ui, add: impl FnOnce(&mut Ui) -> T) -> T {
     let ctx = ui.ctx().clone();
     ui.set_style(ctx.style_of(Theme::Dark));
@@ -127,7 +127,7 @@ pub(crate) fn tone_color(tone: Tone) -> Color32 {
     }
 }
 
-/// Puts the theme on the window.
+/// Installs the theme.
 pub(crate) fn install(ctx: &egui::Context) {
     super::fonts::install(ctx);
     for theme in [Theme::Dark, Theme::Light] {
@@ -163,7 +163,7 @@ fn spacing(style: &mut Style) {
 fn visuals(theme: Theme) -> Visuals {
     let c = colors_of(theme);
     let mut v = theme.default_visuals();
-    // A blinking one has the whole window drawn twice a second, for as long as a box has the keyboard.
+    // A blinking cursor would redraw the whole window twice a second while a field has the focus.
     v.text_cursor.blink = false;
     v.panel_fill = c.panel;
     v.window_fill = c.panel;
@@ -203,23 +203,23 @@ fn visuals(theme: Theme) -> Visuals {
     v
 }
 
-/// A dialog. It lies over tooltips of what is behind it, too: those stay until the mouse is moved.
+/// A dialog. It is above tooltips, too: those of the background stay until the pointer moves.
 pub(crate) fn dialog(name: &'static str) -> Modal {
     let frame = egui::Frame::new().fill(panel()).stroke(Stroke::new(1.0, line())).corner_radius(10).inner_margin(18);
     Modal::new(Id::unique(name)).frame(frame).area(dialog_area(name))
 }
 
-/// Where a dialog is.
+/// Area of a dialog.
 pub(crate) fn dialog_area(name: &'static str) -> Area {
     Modal::default_area(Id::unique(name)).order(Order::Tooltip)
 }
 
-/// The one button of a group that a user most likely wants.
+/// The main button of a group.
 pub(crate) fn primary_button(text: &str) -> egui::Button<'static> {
     egui::Button::new(RichText::new(text.to_owned()).color(on_accent()).strong()).fill(accent()).stroke(Stroke::NONE)
 }
 
-/// A small title over a group of things.
+/// A small title of a group.
 pub(crate) fn section(ui: &mut Ui, title: &str) {
     ui.add_space(6.0);
     ui.label(RichText::new(title).small().strong().color(weak()));
@@ -288,7 +288,7 @@ mod tests {
             }
             assert!(contrast(c.text, c.surface) >= 7.0 && contrast(c.on_accent, c.accent) >= 4.5);
         }
-        // The control: what cannot be read is told.
+        // Control: unreadable colors are detected.
         assert!(contrast(DARK.line, DARK.panel) < 2.0);
     }
 }

@@ -1,4 +1,4 @@
-//! Messages that go away by themselves.
+//! Messages that disappear by themselves.
 
 use std::collections::HashMap;
 
@@ -7,10 +7,10 @@ use egui::{Align2, Area, Id, Order};
 use super::state::{AppState, Tone};
 use super::theme;
 
-/// How long a message stays, in seconds; warnings and errors stay longer.
+/// Display time of a message, s; longer for warnings and errors.
 const STAY_SECS: f64 = 4.0;
 const STAY_LONG_SECS: f64 = 9.0;
-/// How many are on screen at once.
+/// Largest number of messages on screen.
 const MOST: usize = 4;
 
 #[derive(Default)]
@@ -19,7 +19,7 @@ pub(crate) struct Toasts {
 }
 
 impl Toasts {
-    /// Draws the newest messages at the lower right of `area` and drops those whose time is up.
+    /// Draws the newest messages at the lower right of `area` and drops expired ones.
     pub(crate) fn show(&mut self, ctx: &egui::Context, state: &mut AppState, area: egui::Rect) {
         let now = ctx.input(|i| i.time);
         let stay = |tone| if matches!(tone, Tone::Info | Tone::Good) { STAY_SECS } else { STAY_LONG_SECS };

@@ -1,23 +1,23 @@
-//! What training has shown so far, as the plots need it.
+//! Measurements of a training, for the plots.
 
 use crate::pipeline::observer::{Evaluation, StepMetrics};
 
 /// Measurements kept for the plots; beyond that every second one is dropped.
 pub(super) const MAX_STEPS: usize = 4_000;
 
-/// What training has shown so far.
+/// Measurements of a training so far.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct TrainHistory {
-    /// Measurements, oldest first, thinned out when there are many.
+    /// Measurements, oldest first, thinned out if there are many.
     pub steps: Vec<StepMetrics>,
     /// Held-out evaluations, oldest first.
     pub(crate) evaluations: Vec<Evaluation>,
 }
 
 impl TrainHistory {
-    /// Takes in a measurement.
+    /// Adds a measurement.
     pub(super) fn push(&mut self, metrics: StepMetrics) {
-        // A resumed run goes on from what was measured before; a new one starts over.
+        // A resumed run continues the earlier measurements; a new one starts over.
         self.steps.retain(|s| s.step < metrics.step);
         self.evaluations.retain(|e| e.step <= metrics.step);
         if self.steps.len() >= MAX_STEPS {

@@ -1,4 +1,4 @@
-//! Downloads before a search, with jobs that are made up.
+//! Downloads before a search, with mock jobs.
 
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -22,7 +22,7 @@ use crate::worker::Outcome;
 use crate::worker::{Command, Jobs};
 use crate::worker::{Failure, Stop};
 
-/// Jobs that only say what they were told, in order; one download fails if it is named.
+/// Jobs that only record their commands, in order; the download named in `fails` fails.
 #[derive(Clone, Default)]
 struct Told {
     said: Arc<Mutex<Vec<String>>>,
@@ -84,7 +84,7 @@ impl Jobs for Told {
     }
 }
 
-/// The window with photos that have no labels, at the question with what to look at them.
+/// The window with unlabeled photos and the dialog with the methods open.
 fn asked(told: Told) -> Harness<'static, App> {
     let mut harness = Harness::builder()
         .with_size([1200.0, 800.0])
@@ -104,7 +104,7 @@ fn asked(told: Told) -> Harness<'static, App> {
     until(&mut harness, &|a| a.state.scene.is_some() && a.viewport.cloud().is_some());
     harness.state_mut().ask(Action::FindObjects);
     until(&mut harness, &|a| a.find_dialog.is_open() && a.state.models.is_some());
-    // The dialog finds its place once it knows its size.
+    // The dialog is placed only after its size is known.
     harness.run_steps(10);
     harness
 }
@@ -122,7 +122,7 @@ fn what_is_missing_is_downloaded_one_after_the_other_and_then_the_search_begins(
     let told = Told::default();
     let mut harness = asked(told.clone());
     click(&mut harness, "Download, then find");
-    // A busy machine takes its time over each of the jobs.
+    // Jobs take longer on a loaded CPU.
     for _ in 0..2_000 {
         if told.so_far().len() >= 3 {
             break;

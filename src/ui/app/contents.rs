@@ -1,4 +1,4 @@
-//! What stands in the places of the dock.
+//! Contents of the dock's places.
 
 use egui::{Frame, Margin, ScrollArea, Ui};
 

@@ -1,4 +1,4 @@
-//! Keys and what is dropped onto the window, taken before anything is drawn.
+//! Keys and files dropped onto the window, taken before anything is drawn.
 
 use std::path::PathBuf;
 
@@ -16,7 +16,7 @@ impl App {
             || self.find_dialog.is_open()
             || self.keep_dialog.is_some()
             || self.dialogs.is_own_open();
-        // Keys are the open menu's; Escape closes it, and nothing else.
+        // An open menu takes the keys; Escape closes only the menu.
         let has_menu = egui::Popup::is_any_open(ctx);
         if has_menu && ctx.input_mut(|i| i.consume_key(egui::Modifiers::NONE, egui::Key::Escape)) {
             egui::Popup::close_all(ctx);
@@ -25,7 +25,7 @@ impl App {
         if !self.palette.is_open() && !has_dialog && !self.sheet && !has_menu {
             for action in keys::pressed(ctx) {
                 if keys::opens_field(&action) {
-                    // At once: what is typed in this very frame is for the field.
+                    // Before drawing: text typed in this frame belongs to the field.
                     keys::begin_typing(ctx);
                     self.settle(false);
                     self.act(action, ctx);

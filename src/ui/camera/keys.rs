@@ -1,4 +1,4 @@
-//! The table of a path's keys.
+//! The table of a path's keyframes.
 
 use egui::{Button, DragValue, Grid, ScrollArea, TextEdit, Ui};
 
@@ -6,7 +6,7 @@ use super::{CameraPane, caption};
 use crate::navigate::Pose;
 use crate::scene::PathKey;
 
-/// What a user wants of a key.
+/// Change of a keyframe by the user.
 enum KeyChange {
     Choose,
     Go,
@@ -17,7 +17,7 @@ enum KeyChange {
     Delete,
 }
 
-/// Draws it. The pose of the key that a user wants to see.
+/// Draws the table. Returns the pose of the keyframe to show.
 pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane, eye: &Pose) -> Option<Pose> {
     let mut wanted_change: Option<(usize, KeyChange)> = None;
     ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
@@ -60,7 +60,7 @@ pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane, eye: &Pose) -> Option<Pos
     None
 }
 
-/// Swaps two keys; their times stay where they are.
+/// Swaps two keyframes; their times stay in place.
 fn swap(keys: &mut [PathKey], a: usize, b: usize) {
     keys.swap(a, b);
     let times = (keys[a].time_secs, keys[b].time_secs);

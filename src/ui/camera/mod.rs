@@ -1,4 +1,4 @@
-//! The camera pane: the keys of a path, a timeline to play and retime them, and videos of it.
+//! The camera pane: keyframes of a path, a timeline to play and retime them, and videos of it.
 
 mod keys;
 pub(crate) mod player;
@@ -18,36 +18,36 @@ use crate::navigate::{CameraSpline, CameraTrajectory, Pose, Speed};
 use crate::scene::{Camera, CameraPath, PathKey};
 use crate::ui::actions::Action;
 
-/// The path that is being edited, and how it is played.
+/// The camera path under edit, and its playback.
 pub(crate) struct CameraPane {
     pub(crate) path: CameraPath,
-    /// How speed runs over it.
+    /// Speed profile along the path.
     pub(crate) speed: Speed,
     pub(crate) player: Player,
-    /// The key that was chosen.
+    /// Index of the chosen keyframe.
     selected: Option<usize>,
-    /// The path as it was last made a video of.
+    /// Path and speed that the player's spline was last made of.
     loaded: Option<(CameraPath, Speed)>,
     /// Height of videos, px.
     video_height: u32,
     /// Quality of videos, 0 to 100.
     quality: u8,
-    /// Whether what was found is marked in videos.
+    /// True if the found identities are marked in videos.
     pub(crate) mark: bool,
-    /// Whether the view shows where the camera can go.
+    /// True if the view shows the places that the camera can reach.
     pub(crate) show_reach: bool,
-    /// Flights that follow the one that is played, and where they lead.
+    /// Flights that wait for the one that plays, with the names of their targets.
     next: VecDeque<(CameraTrajectory, String)>,
-    /// Where the flight leads that is played.
+    /// Name of the target of the flight that plays.
     flight_to: String,
-    /// The scene that it belongs to.
+    /// Number of the scene that the path belongs to.
     scene: u64,
 }
 
 /// Width of the names of rows, points.
 const NAME_PT: f32 = 44.0;
 
-/// Why something cannot be done yet.
+/// Reason shown on tools that need keyframes.
 const NO_KEYS: &str = "Needs keyframes: add the current view (K).";
 
 impl Default for CameraPane {
@@ -81,13 +81,13 @@ impl CameraPane {
         }
     }
 
-    /// Plays a flight to what is called this, after those that were asked for before it.
+    /// Queues a flight to the target named `to`.
     pub(crate) fn play_flight(&mut self, flight: CameraTrajectory, to: String) {
         self.next.push_back((flight, to));
         self.go_on();
     }
 
-    /// Plays the next flight, if one waits and none is being played.
+    /// Plays the next queued flight, if none plays.
     fn go_on(&mut self) {
         if !self.player.playing
             && let Some((flight, to)) = self.next.pop_front()
@@ -98,18 +98,18 @@ impl CameraPane {
         }
     }
 
-    /// The pose to show after `step_secs` of window time, if something is played.
+    /// The pose to show after `step_secs` of window time, if a clip plays.
     pub(crate) fn tick(&mut self, step_secs: f64) -> Option<Pose> {
         self.go_on();
         self.player.tick(step_secs)
     }
 
-    /// Whether there is a flight or a path to play.
+    /// True if there is a flight or a path to play.
     pub(crate) fn has_clip(&self) -> bool {
         self.player.clip().is_some() || !self.path.keys.is_empty()
     }
 
-    /// What is played, in words, if it is a flight.
+    /// Title of the loaded flight, if the clip is one.
     fn flight(&self) -> Option<String> {
         matches!(self.player.clip(), Some(Clip::Flight(_))).then(|| match &*self.flight_to {
             "" => "Flight".to_owned(),
@@ -117,7 +117,7 @@ impl CameraPane {
         })
     }
 
-    /// Plays or stops; the path, if nothing else is in.
+    /// Starts or stops the clip; loads the path if there is none.
     pub(crate) fn toggle(&mut self) {
         if self.player.clip().is_none() {
             self.put_path_in();
@@ -125,13 +125,13 @@ impl CameraPane {
         self.player.toggle();
     }
 
-    /// One frame on or back; the pose there.
+    /// Steps by `pictures` frames; returns the pose there.
     pub(crate) fn step(&mut self, pictures: f64) -> Option<Pose> {
         let time = self.player.time + pictures / self.path.fps.max(1.0);
         self.player.seek(time)
     }
 
-    /// Records the present view as a key behind the chosen one.
+    /// Inserts the current view as a keyframe after the chosen one.
     pub(crate) fn record(&mut self, pose: &Pose) {
         let place = self.selected.map_or(self.path.keys.len(), |i| (i + 1).min(self.path.keys.len()));
         self.path.keys.insert(place, pose.key());
@@ -139,20 +139,20 @@ impl CameraPane {
         self.put_path_in();
     }
 
-    /// Takes over a path that was read.
+    /// Replaces the path by one read from a file.
     pub(crate) fn open(&mut self, path: CameraPath) {
         self.path = path;
         self.selected = None;
         self.put_path_in();
     }
 
-    /// Takes over an earlier or later state of the path.
+    /// Replaces the path by an earlier or later state.
     pub(crate) fn set_path(&mut self, path: CameraPath) {
         self.path = path;
         self.selected = self.selected.filter(|i| *i < self.path.keys.len());
     }
 
-    /// Makes the path what is played.
+    /// Loads the path into the player.
     fn put_path_in(&mut self) {
         self.loaded = Some((self.path.clone(), self.speed));
         match CameraSpline::new(&self.path, self.speed) {
@@ -164,7 +164,7 @@ impl CameraPane {
         }
     }
 
-    /// The video of the path as it is.
+    /// Reloads the path into the player if it has changed.
     fn keep_up(&mut self) {
         let is_path = matches!(self.player.clip(), Some(Clip::Path(_)) | None);
         let current = self.loaded.as_ref().is_some_and(|(path, speed)| *path == self.path && *speed == self.speed);
@@ -173,7 +173,7 @@ impl CameraPane {
         }
     }
 
-    /// The cameras of a video of what is played, and how it is written; `None` if there is nothing.
+    /// Cameras and settings of a video of the loaded clip; `None` without a clip.
     pub(crate) fn video(&self, out: &Path, aspect: f64) -> Option<(Vec<Camera>, VideoSettings)> {
         let height = self.video_height;
         let width = (((f64::from(height) * aspect) / 2.0).round().max(1.0) * 2.0) as u32;
@@ -182,25 +182,25 @@ impl CameraPane {
         let time = |i: usize| clip.seconds() * i as f64 / frames as f64;
         let cameras = (0..=frames).filter_map(|i| clip.at(time(i))).map(|p| p.camera(width, height)).collect();
         let mut settings = VideoSettings::new(width, height, self.path.fps);
-        // The dialog has asked whether it may be replaced.
+        // The dialog has asked whether the file may be replaced.
         (settings.quality, settings.overwrite) = (self.quality, out.exists());
         Some((cameras, settings))
     }
 
-    /// Points along what is played, for drawing its way.
+    /// Points along the loaded clip, for drawing it.
     pub(crate) fn way(&self) -> Vec<glam::DVec3> {
         let Some(clip) = self.player.clip() else { return Vec::new() };
         let last = 120;
         (0..=last).filter_map(|i| clip.at(clip.seconds() * f64::from(i) / f64::from(last))).map(|p| p.center).collect()
     }
 
-    /// Places of the path's keys, and which of them is chosen.
+    /// Positions of the keyframes, and whether each is chosen.
     pub(crate) fn key_places(&self) -> impl Iterator<Item = (glam::DVec3, bool)> + '_ {
         self.path.keys.iter().enumerate().map(|(i, k)| (k.center, self.selected == Some(i)))
     }
 
-    /// Draws the pane. `eye` is the present view. The pose to show, if a user moved in time or asked
-    /// for a key.
+    /// Draws the pane. `eye` is the current pose. Returns the pose to show, if the user moved in time or chose a
+    /// keyframe.
     pub(crate) fn show(
         &mut self,
         ui: &mut Ui,
@@ -276,7 +276,7 @@ impl CameraPane {
         }
     }
 
-    /// Makes keys of a flight: enough of them that the path follows it.
+    /// Replaces the path by keyframes of a flight, enough for the path to follow it.
     fn keep(&mut self, flight: &CameraTrajectory) {
         let last = flight.poses.len().saturating_sub(1);
         let count = last.min(8);
@@ -349,7 +349,7 @@ impl CameraPane {
     }
 }
 
-/// Reads a path's file; the error for the user.
+/// Reads a path's file; returns the error as text for the user.
 pub(crate) fn read(path: &Path) -> Result<CameraPath, String> {
     crate::jobs::video::camera_path(path).map_err(|e| e.to_string())
 }
@@ -359,7 +359,7 @@ pub(crate) fn write(file: &Path, path: &CameraPath, aspect: f64) -> Result<(), S
     crate::jobs::export::camera_path(file, path, aspect).map_err(|e| e.to_string())
 }
 
-/// A row of tools behind its name, on several lines where it is narrow.
+/// A row of tools after its name, wrapped if the pane is narrow.
 fn row(ui: &mut Ui, name: &str, add: impl FnOnce(&mut Ui)) {
     ui.horizontal_wrapped(|ui| {
         let size = vec2(NAME_PT, ui.spacing().interact_size.y);

@@ -1,20 +1,20 @@
-//! Plays a flight or a path, and counts the frames that are shown while it runs.
+//! Playback of a flight or a path, with its frame rate.
 
 use crate::navigate::{CameraSpline, CameraTrajectory, Pose};
 
-/// Seconds over which frames are counted.
+/// Window of the frame rate, s.
 const COUNTED_SECS: f64 = 1.0;
 
 #[derive(Clone, Debug)]
 pub(crate) enum Clip {
     /// A flight to a target.
     Flight(Box<CameraTrajectory>),
-    /// The path that is being edited.
+    /// The camera path under edit.
     Path(Box<CameraSpline>),
 }
 
 impl Clip {
-    /// How long it runs.
+    /// Duration in s.
     pub(crate) fn seconds(&self) -> f64 {
         match self {
             Self::Flight(flight) => flight.seconds,
@@ -22,7 +22,7 @@ impl Clip {
         }
     }
 
-    /// The pose at a time. Between the poses of a flight the nearest is taken.
+    /// The pose at a time; for a flight, the nearest of its poses.
     pub(crate) fn at(&self, time: f64) -> Option<Pose> {
         match self {
             Self::Path(spline) => Some(spline.at(time)),
@@ -35,18 +35,18 @@ impl Clip {
     }
 }
 
-/// The state of playing.
+/// The state of playback.
 #[derive(Debug)]
 pub(crate) struct Player {
     clip: Option<Clip>,
-    /// Seconds into it.
+    /// Position in the clip, s.
     pub(crate) time: f64,
     pub(crate) playing: bool,
-    /// Whether it begins again at its end.
+    /// True if the clip repeats at its end.
     pub(crate) looped: bool,
-    /// Speed as a multiple of the usual one.
+    /// Playback speed, 1 as recorded.
     pub(crate) rate: f64,
-    /// When frames were shown lately, window time.
+    /// Window times of recent frames, s.
     shown: Vec<f64>,
 }
 
@@ -57,7 +57,7 @@ impl Default for Player {
 }
 
 impl Player {
-    /// Puts a clip in, at its beginning; running if wanted.
+    /// Loads a clip at its beginning; plays it if `playing`.
     pub(crate) fn load(&mut self, clip: Clip, playing: bool) {
         self.clip = Some(clip);
         self.time = 0.0;
@@ -65,7 +65,7 @@ impl Player {
         self.shown.clear();
     }
 
-    /// The same path, changed: time and running stay.
+    /// Replaces the clip by a changed version; keeps time and playback state.
     pub(crate) fn replace(&mut self, clip: Option<Clip>) {
         self.time = self.time.min(clip.as_ref().map_or(0.0, Clip::seconds));
         self.playing &= clip.is_some();
@@ -76,7 +76,7 @@ impl Player {
         self.clip.as_ref()
     }
 
-    /// Starts or stops; begins anew at the end.
+    /// Starts or stops; restarts at the end.
     pub(crate) fn toggle(&mut self) {
         let Some(clip) = &self.clip else { return };
         if !self.playing && self.time >= clip.seconds() {
@@ -86,7 +86,7 @@ impl Player {
         self.shown.clear();
     }
 
-    /// Goes on by `step_secs` of window time; the pose to show, if it runs.
+    /// Advances by `step_secs` of window time; returns the pose to show while it plays.
     pub(crate) fn tick(&mut self, step_secs: f64) -> Option<Pose> {
         let clip = self.clip.as_ref().filter(|_| self.playing)?;
         let seconds = clip.seconds();
@@ -99,7 +99,7 @@ impl Player {
         clip.at(self.time)
     }
 
-    /// Stops and moves to a time; the pose there.
+    /// Stops and moves to a time; returns the pose there.
     pub(crate) fn seek(&mut self, time: f64) -> Option<Pose> {
         let clip = self.clip.as_ref()?;
         self.playing = false;
@@ -107,13 +107,13 @@ impl Player {
         clip.at(self.time)
     }
 
-    /// Counts a frame that was shown at this window time.
+    /// Counts a frame shown at this window time.
     pub(crate) fn count(&mut self, now: f64) {
         self.shown.push(now);
         self.shown.retain(|t| now - t <= COUNTED_SECS);
     }
 
-    /// Frames per second lately; `None` before anything is known.
+    /// Recent frames per second; `None` before enough frames were shown.
     pub(crate) fn rate_shown(&self) -> Option<f64> {
         let (first, last) = (self.shown.first()?, self.shown.last()?);
         (last - first > 0.2).then(|| (self.shown.len() - 1) as f64 / (last - first))

@@ -1,4 +1,4 @@
-//! The timeline: where in time one is, and keys that can be dragged to other times.
+//! The timeline: the current time, and keyframes that can be dragged to other times.
 
 use egui::{Align2, CursorIcon, FontId, Rect, Sense, Stroke, Ui, pos2, vec2};
 
@@ -9,10 +9,10 @@ use crate::navigate::Pose;
 
 /// Height of the timeline, points.
 const HEIGHT: f32 = 40.0;
-/// How near the pointer must come to a key, points.
+/// Largest distance of the pointer from a keyframe that it picks, points.
 const REACH: f32 = 7.0;
 
-/// Draws it. The pose of the time that a user chose.
+/// Draws the timeline. Returns the pose at the time that the user chose.
 pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
     let (rect, response) = ui.allocate_exact_size(vec2(ui.available_width(), HEIGHT), Sense::click_and_drag());
     response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Slider, true, "Timeline"));
@@ -20,7 +20,7 @@ pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
     let painter = ui.painter_at(rect);
     let track = rect.with_max_y(rect.top() + 24.0);
     painter.rect_filled(track.shrink2(vec2(0.0, 4.0)), 6.0, theme::canvas());
-    // A flight is none of the path below: it says what it is.
+    // A flight is separate from the path below, so its title replaces the keyframes.
     if let Some(flight) = pane.flight() {
         painter.rect_filled(track.shrink2(vec2(0.0, 4.0)), 6.0, theme::accent().gamma_multiply(0.2));
         painter.text(track.center(), Align2::CENTER_CENTER, flight, FontId::proportional(11.0), theme::text());
@@ -94,7 +94,7 @@ pub(crate) fn show(ui: &mut Ui, pane: &mut CameraPane) -> Option<Pose> {
     wanted
 }
 
-/// Ticks below the track, with seconds wherever there is room for a number.
+/// Ticks below the track, with seconds where they fit.
 fn ticks(painter: &egui::Painter, line: Rect, seconds: f64, x: impl Fn(f64) -> f32) {
     const ROOM: f32 = 44.0;
     let step = [0.1, 0.5, 1.0, 5.0, 10.0, 60.0, 300.0].into_iter().find(|s| seconds / s <= 24.0).unwrap_or(900.0);
@@ -106,7 +106,7 @@ fn ticks(painter: &egui::Painter, line: Rect, seconds: f64, x: impl Fn(f64) -> f
         painter.line_segment([pos2(at, line.top() + 24.0), pos2(at, line.top() + 28.0)], stroke);
         if has_number {
             let text = if step < 1.0 { format!("{time:.1} s") } else { format!("{time:.0} s") };
-            // The first and the last stay within the track.
+            // The first and the last number stay within the track.
             let galley = painter.layout_no_wrap(text, FontId::proportional(10.5), theme::weak());
             let half = 0.5 * galley.size().x;
             let left = at.clamp(line.left() - 8.0 + half, line.right() + 8.0 - half) - half;
@@ -115,7 +115,7 @@ fn ticks(painter: &egui::Painter, line: Rect, seconds: f64, x: impl Fn(f64) -> f
     }
 }
 
-/// The time, kept after the key before and before the key after.
+/// The time, kept between the neighboring keyframes.
 fn between_neighbors(pane: &CameraPane, key: usize, time: f64, times: &[[f64; 2]]) -> f64 {
     const GAP: f64 = 0.02;
     let lowest = times.get(key.wrapping_sub(1)).map_or(0.0, |t| t[1] + GAP);

@@ -16,13 +16,13 @@ use crate::ui::actions::{Action, Axis, Pane, THEMES};
 use crate::worker::ViewMode;
 use crate::worker::view::ViewPicture;
 
-/// Before the names of a menu that has switches.
+/// Indent of entries in a menu with switches.
 const INDENT: &str = "     ";
 
-/// Width of the button that pauses and resumes, pt.
+/// Width of the pause and resume button, points.
 const PAUSE_PT: f32 = 62.0;
 
-/// Draws the bar at the top; `second` is whether the second view is worked in.
+/// Draws the bar at the top; `second` is true if the second view is active.
 pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bool, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         let has_scene = state.scene.is_some();
@@ -155,7 +155,7 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
     });
 }
 
-/// A menu entry; `on` marks a switch, which is called by what it switches.
+/// A menu entry; `on` is the state of a switch, which is named by its target.
 fn item(ui: &mut Ui, enabled: bool, on: Option<bool>, action: Action, actions: &mut Vec<Action>) {
     let text = match &action {
         Action::ToggleCameras => "Cameras".to_owned(),
@@ -167,7 +167,7 @@ fn item(ui: &mut Ui, enabled: bool, on: Option<bool>, action: Action, actions: &
 }
 
 fn entry(ui: &mut Ui, enabled: bool, on: Option<bool>, text: &str, action: Action, actions: &mut Vec<Action>) {
-    // All of a menu with switches has room for the check.
+    // All entries of a menu with switches leave room for the check mark.
     let text = if on.is_some() { format!("{INDENT}{text}") } else { text.to_owned() };
     let button = Button::new(text).shortcut_text(keys::label(ui.ctx(), &action));
     let shown = ui.add_enabled(enabled, button).on_hover_text(action.tooltip());
@@ -193,7 +193,7 @@ pub(crate) fn status(
         match &state.job {
             Some(job) => {
                 dot(ui, if job.paused { theme::warning() } else { theme::accent() });
-                // Once is enough: the pane and the first page have their own.
+                // The training pane and the first page have their own buttons.
                 if !job.canceling && state.scene.is_some() && !(state.is_training() && layout.shows(Pane::Training)) {
                     job_buttons(ui, job, actions);
                 }
@@ -227,7 +227,7 @@ pub(crate) fn status(
     });
 }
 
-/// How the connection to another computer is.
+/// State of the connection to another computer.
 fn connection(ui: &mut Ui, link: &LinkStatus) {
     let host = &link.host;
     let (color, text) = match (link.connected, link.retry_at) {
@@ -249,7 +249,7 @@ fn connection(ui: &mut Ui, link: &LinkStatus) {
     });
 }
 
-/// Before all texts, which change: neither button ever comes to be where the other was.
+/// The buttons stand before all texts, which change width, so that neither moves under the pointer.
 fn job_buttons(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
     if job.kind.can_pause() {
         let pause = Button::new(if job.paused { "Resume" } else { "Pause" }).small();
@@ -262,7 +262,7 @@ fn job_buttons(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
     }
 }
 
-/// A small disc: something runs.
+/// A small disc as a sign of a running job.
 fn dot(ui: &mut Ui, color: egui::Color32) {
     let (rect, _) = ui.allocate_exact_size(egui::vec2(10.0, 10.0), egui::Sense::hover());
     ui.painter().circle_filled(rect.center(), 4.0, color);

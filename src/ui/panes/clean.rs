@@ -1,5 +1,5 @@
-//! Cleaning: what was measured of the Gaussians, a choice among them that is seen in the view, and a button that
-//! deletes it.
+//! Cleaning: measures of the Gaussians, a choice among them that the view shows, and a button that deletes the chosen
+//! ones.
 
 use std::sync::Arc;
 
@@ -19,42 +19,42 @@ use crate::scene::{CropBox, GaussianCloud, IdentityId};
 use crate::ui::actions::Action;
 use crate::worker::JobKind;
 
-/// Color that one begins with.
+/// Initial color.
 const FIRST_COLOR: [u8; 3] = [128; 3];
 
 /// The pane.
 #[derive(Default)]
 pub(crate) struct CleanPane {
     measured: Option<Arc<MeasuredCloud>>,
-    /// Rules without numbers, and how many Gaussians each means.
+    /// Rules without numbers, with the number of Gaussians that each chooses.
     counts: Vec<(CleanRule, usize)>,
     histogram: Histogram,
     choice: SplatChoice,
     chosen: Option<Arc<ChosenSplats>>,
-    /// What was deleted last, until the Gaussians without it are on screen.
+    /// The Gaussians deleted last, until the cloud without them is on screen.
     deleted: Option<Arc<ChosenSplats>>,
 }
 
-/// What is chosen, and how that is shown.
+/// Choice of Gaussians, and its display.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct SplatChoice {
     rules: Vec<CleanRule>,
-    /// The measure whose values are shown, and the range of them that is chosen.
+    /// The measure of the histogram, and its chosen range.
     measure: Option<SplatMeasure>,
     range: Option<[f32; 2]>,
-    /// A color, whose Gaussians are chosen.
+    /// Color of the Gaussians to choose.
     color: Option<[u8; 3]>,
-    /// The crop box, if what it leaves out is chosen; the selected object or part, if that is.
+    /// The crop box, if the Gaussians outside are chosen; the selected identity, if its Gaussians are.
     crop: Option<CropBox>,
     object: Option<IdentityId>,
-    /// Those that a brush has chosen (`true`) or taken out of the choice, whatever else is said of them; may be empty.
+    /// Gaussians that a brush has chosen (`true`) or removed from the choice, before all rules; may be empty.
     brushed: Arc<Vec<Option<bool>>>,
-    /// Whether what is chosen is left out of the view; else it is marked.
+    /// True if chosen Gaussians are hidden in the view; else they are marked.
     hide: bool,
 }
 
 impl CleanPane {
-    /// Takes over new measures, and follows the Gaussians on screen. What is to be seen as chosen.
+    /// Takes over new measures, and follows the cloud on screen. Returns the choice for the view.
     pub(crate) fn update(
         &mut self,
         state: &mut AppState,
@@ -67,7 +67,7 @@ impl CleanPane {
         }
         let is_of = |m: &Arc<MeasuredCloud>| cloud.is_some_and(|c| Arc::ptr_eq(c, &m.cloud));
         if let (Some(measured), Some(cloud)) = (self.measured.take_if(|m| !is_of(m)), cloud) {
-            // What is left of them is known; pieces and distances are as they were.
+            // The measures of the remaining Gaussians stay valid; pieces and distances are kept as before.
             let deleted = self.deleted.take().filter(|d| d.of.len() - d.count == cloud.len());
             (self.chosen, self.choice) = (None, SplatChoice::default());
             if let Some(deleted) = deleted {
@@ -82,7 +82,7 @@ impl CleanPane {
         self.chosen.clone().filter(|_| is_shown)
     }
 
-    /// What is chosen, to be deleted.
+    /// Takes the chosen Gaussians, to delete them.
     pub(crate) fn take_chosen(&mut self) -> Option<Vec<bool>> {
         self.deleted = self.chosen.clone().filter(|c| c.count > 0);
         self.deleted.as_ref().map(|c| c.of.clone())
@@ -206,7 +206,7 @@ impl SplatChoice {
                 self.rules.extend(on.then_some(rule));
             }
             ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
-                // Room for the bar that scrolls.
+                // Room for the scroll bar.
                 ui.add_space(8.0);
                 ui.label(RichText::new(format::count(count as u64)).color(theme::weak()));
             });
@@ -240,7 +240,7 @@ impl SplatChoice {
         self.object = selected.filter(|_| on);
     }
 
-    /// Whether each Gaussian is chosen; `None` if nothing is.
+    /// Mask of the chosen Gaussians; `None` without a choice.
     fn of(&self, measured: &MeasuredCloud, state: &AppState) -> Option<Vec<bool>> {
         let mut rules = self.rules.clone();
         rules.extend(self.measure.zip(self.range).map(|(m, [from, to])| CleanRule::Range(m, from, to)));
@@ -260,7 +260,7 @@ impl SplatChoice {
     }
 }
 
-/// Before anything is measured.
+/// Content of the pane before anything is measured.
 fn offer(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     let running = state.job.as_ref().is_some_and(|j| j.kind == JobKind::Clean);
     ui.label("Floaters, needles and haze are found by what the photos show of each Gaussian.");

@@ -1,4 +1,4 @@
-//! Facts about the photos, and their thumbnails, loaded as they come into view.
+//! Facts about the photos, and their thumbnails, loaded on demand.
 
 use std::collections::{BTreeMap, BTreeSet, HashMap};
 
@@ -16,11 +16,11 @@ use crate::worker::{Command, JobId, Worker};
 
 /// Longest side of a thumbnail in px.
 const SIDE_PX: u32 = 224;
-/// PhotoThumbnails that are loaded at once; more would keep a photo that is looked at waiting.
+/// Thumbnails that load at the same time; more would delay a photo that is being looked at.
 const AT_ONCE: usize = 2;
-/// PhotoThumbnails kept.
+/// Thumbnails kept in memory.
 const KEPT: usize = 400;
-/// Height of the text under a thumbnail.
+/// Height of the text under a thumbnail, points.
 const CAPTION: f32 = 18.0;
 
 /// The thumbnails of one scene.
@@ -33,7 +33,7 @@ pub(crate) struct PhotoThumbnails {
 }
 
 impl PhotoThumbnails {
-    /// Takes over what was loaded since.
+    /// Takes over newly loaded thumbnails.
     pub(crate) fn update(&mut self, ctx: &egui::Context, state: &mut AppState) {
         if self.scene != state.scene_number {
             *self = Self { scene: state.scene_number, ..Self::default() };
@@ -60,13 +60,13 @@ impl PhotoThumbnails {
         }
         let Some(photo) = dataset.photos.get(index) else { return };
         let command = Command::Photo { index, photo: Box::new(photo.clone()), max_side_px: SIDE_PX };
-        // With a full queue the request comes again with the next redraw.
+        // With a full queue the request is repeated at the next redraw.
         if let Ok(job) = worker.submit(command) {
             self.waiting.insert(job, index);
         }
     }
 
-    /// Forgets thumbnails far from those in view.
+    /// Forgets thumbnails far from the visible ones.
     fn forget_far(&mut self, visible: std::ops::Range<usize>) {
         while self.loaded.len() > KEPT {
             let (Some(first), Some(last)) =

@@ -1,4 +1,4 @@
-//! What the window shows before anything is open: the demo, recent scenes, a place to drop others.
+//! The page before any scene is open: the demo, recent scenes, a drop target for others.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -18,27 +18,27 @@ use crate::scene::text;
 use crate::ui::actions::Action;
 use crate::worker::{Command, JobKind, Worker};
 
-/// Widest that the page becomes, in points.
+/// Largest width of the page, points.
 const WIDTH: f32 = 760.0;
-/// Recent scenes on the page, and in a row.
+/// Recent scenes on the page.
 const RECENT: usize = 6;
 const COLUMNS: usize = 3;
 
-/// The first page and its pictures.
+/// The first page and its images.
 #[derive(Default)]
 pub(crate) struct FirstPage {
-    /// Whether its pictures were asked for.
+    /// True if its images were requested.
     asked: bool,
-    /// Recent scenes whose trainings were asked for.
+    /// Recent scenes whose trainings were requested.
     listed: Vec<PathBuf>,
     demo: Option<TextureHandle>,
     recent: BTreeMap<PathBuf, TextureHandle>,
-    /// Number of the scene whose picture was kept last.
+    /// Number of the scene whose image was stored last.
     kept_for: u64,
 }
 
 impl FirstPage {
-    /// Asks for the pictures once, takes them over, and keeps one of the scene on screen.
+    /// Requests the images once, takes them over, and stores one of the current scene.
     pub(crate) fn update(&mut self, ctx: &egui::Context, state: &mut AppState, viewport: &Viewport, worker: &Worker) {
         let texture = |name: &str, size: [u32; 2], rgb: &[u8]| {
             let image = ColorImage::from_rgb(size.map(|s| s as usize), rgb);
@@ -49,7 +49,7 @@ impl FirstPage {
             let picture = demo::picture().ok().and_then(|jpeg| image::load_from_memory(&jpeg).ok());
             self.demo = picture.map(|p| p.to_rgb8()).map(|p| texture("demo", p.dimensions().into(), p.as_raw()));
             if !state.recent.is_empty() {
-                // Without them the page is as useful.
+                // The page is usable without them.
                 let _ = worker.submit(Command::RecentPictures(state.recent.clone()));
             }
         }
@@ -166,7 +166,7 @@ impl FirstPage {
         }
     }
 
-    /// A recent scene: its picture, its name, where it lies. Whether it was clicked.
+    /// Draws a recent scene: image, name, path. Returns true if it was clicked.
     fn card(&self, ui: &mut Ui, path: &Path, size: Vec2) -> bool {
         let name = text::path(path.file_name().map_or(path, Path::new));
         let (rect, response) = ui.allocate_exact_size(size, Sense::click());
@@ -193,7 +193,7 @@ impl FirstPage {
     }
 }
 
-/// The middle of a picture of this size that fills a place of the other.
+/// UV rectangle of the centered part of an image that fills a place.
 fn filling(picture: Vec2, place: Vec2) -> Rect {
     let scale = (place.x / picture.x.max(1.0)).max(place.y / picture.y.max(1.0));
     Rect::from_center_size(egui::pos2(0.5, 0.5), place / (picture.max(Vec2::splat(1.0)) * scale))
@@ -212,14 +212,14 @@ fn drop_area(ui: &mut Ui, width: f32) {
     });
 }
 
-/// The first page while the first scene is being read or made.
+/// The first page while the first scene is read or trained.
 fn busy(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
     ui.vertical_centered(|ui| {
         ui.add_space((ui.available_height() * 0.4).max(20.0));
         ui.set_max_width(380.0);
         ui.label(RichText::new(job.text()).size(20.0));
         ui.add_space(10.0);
-        // The page has the color that a bar's track has elsewhere.
+        // The page has the color that a progress bar's track has elsewhere.
         ui.visuals_mut().extreme_bg_color = theme::surface();
         match job.progress.as_ref().and_then(|p| Some((p, p.counted()?))) {
             Some((p, counted)) => {

@@ -1,4 +1,4 @@
-//! A histogram over which a range is dragged.
+//! A histogram with a range that can be dragged.
 
 use egui::{Pos2, Rect, Sense, Stroke, Ui, pos2, vec2};
 
@@ -8,13 +8,13 @@ use crate::math::format;
 const BINS: usize = 60;
 const HEIGHT: f32 = 70.0;
 
-/// How often values occur.
+/// Counts of values in equal bins.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Histogram {
     counts: Vec<usize>,
-    /// The least and the largest value.
+    /// Minimum and maximum.
     ends: [f32; 2],
-    /// Whether steps along it are factors.
+    /// True if the axis is logarithmic.
     logarithmic: bool,
 }
 
@@ -38,17 +38,17 @@ impl Histogram {
         self.ends
     }
 
-    /// Where a value is, 0 to 1.
+    /// Position of a value on the axis, 0 to 1.
     fn along(&self, v: f32) -> f32 {
         let [a, b] = self.ends.map(|e| self.scaled(e));
         if b > a { ((self.scaled(v) - a) / (b - a)).clamp(0.0, 1.0) } else { 0.0 }
     }
 
-    /// The value at a place, 0 to 1.
+    /// The value at a position, 0 to 1.
     fn value(&self, along: f32) -> f32 {
         let [a, b] = self.ends.map(|e| self.scaled(e));
         match along {
-            // Exactly, so that what lies there is meant too.
+            // Exactly the end, so that values there are in the range.
             ..=0.0 => self.ends[0],
             1.0.. => self.ends[1],
             _ if self.logarithmic => (a + along * (b - a)).exp(),
@@ -60,7 +60,7 @@ impl Histogram {
         if self.logarithmic { v.max(f32::MIN_POSITIVE).ln() } else { v }
     }
 
-    /// Draws it; dragging over it sets the range.
+    /// Draws the histogram; dragging over it sets the range.
     pub(super) fn show(&self, ui: &mut Ui, range: &mut Option<[f32; 2]>) {
         let (whole, response) = ui.allocate_exact_size(vec2(ui.available_width(), HEIGHT), Sense::click_and_drag());
         let response = response.on_hover_text("Drag to choose a range; click to choose none. Heights are logarithmic.");

@@ -1,4 +1,4 @@
-//! The networks: which are here, which engine runs them, what the others would add.
+//! Neural networks: installed models, the engine that runs them, and the benefit of the missing ones.
 
 use egui::{Button, RichText, Ui};
 
@@ -11,18 +11,18 @@ use crate::scene::{Lifting, MaskPrompt};
 use crate::ui::actions::Action;
 use crate::worker::{Command, Worker};
 
-/// Which list of models was asked for.
+/// The latest request for the list of models.
 #[derive(Default)]
 pub(crate) struct Models {
-    /// Models that were installed when it was; asked for anew when that changes.
+    /// Count of installed models at the request; a change triggers a new one.
     asked: Option<u64>,
 }
 
 impl Models {
-    /// Asks for the list, and again whenever a model was installed.
+    /// Requests the list, and again after each installation.
     pub(crate) fn keep_listed(&mut self, state: &AppState, worker: &Worker) {
         let now = Some(state.models_installed);
-        // With a full queue the request comes again with the next redraw.
+        // With a full queue the request is repeated at the next redraw.
         if self.asked != now && worker.submit(Command::ListModels).is_ok() {
             self.asked = now;
         }
@@ -53,7 +53,7 @@ impl Models {
     }
 }
 
-/// The models that find objects, of those that are here.
+/// Choice among the installed models that find objects.
 fn choose(ui: &mut Ui, known: &ModelList, finding: &mut FindSettings) {
     let here = |role: ModelRole| {
         let usable = known.of(role).filter(|(_, s)| s.is_usable());
@@ -124,13 +124,13 @@ fn choose(ui: &mut Ui, known: &ModelList, finding: &mut FindSettings) {
     ui.add_space(4.0);
 }
 
-/// A choice among models; none = the best.
+/// A choice among models; `None` for the best.
 fn one_of(ui: &mut Ui, id: &str, chosen: &mut Option<String>, models: &[(String, String)]) -> egui::Response {
     const BEST: &str = "best installed";
     let title =
         |id: &str| models.iter().find(|(m, _)| m == id).map_or_else(|| format!("{id} (missing)"), |m| m.1.clone());
     let text = chosen.as_deref().map_or_else(|| BEST.to_owned(), title);
-    // A long title is cut, not the pane widened.
+    // A long title is truncated, so that the pane keeps its width.
     let combo = egui::ComboBox::from_id_salt(id).selected_text(&text).width(180.0).truncate();
     let shown = combo.show_ui(ui, |ui| {
         ui.selectable_value(chosen, None, BEST);

@@ -1,5 +1,4 @@
-//! What was noticed of objects and parts as they were found, in their list: its order, its numbers, and the doubts,
-//! each of which leads to its photo.
+//! Evidence on objects and parts in their list: its order, its numbers, and the doubts, each with a link to its photo.
 
 use std::cmp::Ordering;
 
@@ -15,7 +14,7 @@ use crate::scene::findings::{Doubt, Findings, IdentityEvidence};
 use crate::scene::{Dataset, Identities, IdentityId, SemanticMap, text};
 use crate::ui::actions::Action;
 
-/// What a list of objects and parts is sorted by.
+/// Sort key of the list of objects and parts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, VariantArray, IntoStaticStr)]
 pub(super) enum SortKey {
     #[default]
@@ -37,17 +36,17 @@ pub(super) enum SortKey {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct ListOrder {
     pub(super) key: SortKey,
-    /// The other way round: names from the end of the alphabet, numbers from the least.
+    /// True for the reverse order: names from Z to A, numbers from the smallest.
     pub(super) reversed: bool,
 }
 
 impl ListOrder {
-    /// What most doubts are about comes first.
+    /// Most doubts first.
     pub(super) fn by_doubts() -> Self {
         Self { key: SortKey::Doubts, reversed: false }
     }
 
-    /// The choice of it.
+    /// Draws the choice of the order.
     pub(super) fn show(&mut self, ui: &mut Ui) {
         let turn = match self.reversed {
             true => Button::new("\u{23f6}"),
@@ -73,11 +72,11 @@ impl ListOrder {
     }
 }
 
-/// What is told of the rows.
+/// Facts shown in the rows.
 pub(super) struct RowFacts<'a> {
     identities: &'a Identities,
     names: &'a ScreenNames,
-    /// By number.
+    /// Evidence by number.
     facts: &'a [IdentityEvidence],
     findings: Option<&'a Findings>,
     dataset: Option<&'a Dataset>,
@@ -95,7 +94,7 @@ impl<'a> RowFacts<'a> {
         self.facts.get(id as usize)
     }
 
-    /// Puts identities in order; those that nothing is known of stay last.
+    /// Sorts identities; those without evidence stay last.
     pub(super) fn sort(&self, ids: &mut [IdentityId]) {
         let ListOrder { key, reversed } = self.order;
         let turned = |order: Ordering| if reversed { order.reverse() } else { order };
@@ -121,7 +120,7 @@ impl<'a> RowFacts<'a> {
         }
     }
 
-    /// What stands at the end of a row, and what that is.
+    /// Text at the end of a row, with its explanation.
     pub(super) fn number(&self, id: IdentityId) -> (String, &'static str) {
         let Some(fact) = self.of(id) else { return (NONE.into(), "") };
         if fact.gaussians == 0 {
@@ -139,14 +138,14 @@ impl<'a> RowFacts<'a> {
         }
     }
 
-    /// One line on where it is seen; `None` if that is not known.
+    /// One line on the photos that show it; `None` if unknown.
     pub(super) fn line(&self, id: IdentityId) -> Option<String> {
         let fact = self.of(id)?;
         let (seen, of) = (fact.photos?, self.findings?.photos.len());
         Some(format!("Seen in {seen} of {}, {} of its pixels are its own.", things(of, "photo"), sure(fact)))
     }
 
-    /// A sign on a row with doubts. A click on one goes to its photo and selects what it is about.
+    /// Draws a sign on a row with doubts. A click on a doubt opens its photo and selects its identity.
     pub(super) fn doubts(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
         let (Some(fact), Some(findings)) = (self.of(id), self.findings) else { return };
         let doubts: Vec<&Doubt> = fact.doubts.iter().filter_map(|k| findings.doubts().get(*k)).collect();

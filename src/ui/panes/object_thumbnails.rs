@@ -1,4 +1,4 @@
-//! The thumbnails of objects and parts as one texture, asked for when they change.
+//! Thumbnails of objects and parts as one texture, requested when objects or parts change.
 
 use std::cell::Cell;
 use std::sync::Arc;
@@ -11,22 +11,22 @@ use crate::pipeline::semantics::thumbnails::SIDE_PX;
 use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
 use crate::worker::{Command, Worker};
 
-/// ObjectThumbnails in a row of the texture.
+/// Thumbnails in a row of the texture.
 const COLUMNS: usize = 16;
 
-/// ObjectThumbnails of what is on screen.
+/// Thumbnails of the identities on screen.
 #[derive(Default)]
 pub(crate) struct ObjectThumbnails {
-    /// Whether any was to be shown since they were last looked after.
+    /// True if any thumbnail was drawn since the last update.
     used: Cell<bool>,
-    /// What they were asked for.
+    /// Map of the latest request.
     asked: Option<Arc<SemanticMap>>,
-    /// What they are of, and how many rows of them there are.
+    /// Map of the thumbnails in the texture, the texture, and its number of rows.
     shown: Option<(Arc<SemanticMap>, TextureHandle, usize)>,
 }
 
 impl ObjectThumbnails {
-    /// Asks for them if objects and parts have changed, and takes them over once they are drawn.
+    /// Requests thumbnails if objects or parts have changed, and takes them over once they are drawn.
     pub(crate) fn update(
         &mut self,
         ctx: &egui::Context,
@@ -46,7 +46,7 @@ impl ObjectThumbnails {
                 settings: state.render_settings(),
                 home: scene.home.clone(),
             };
-            // With a full queue the request comes again with the next event.
+            // With a full queue the request is repeated at the next event.
             if worker.submit(command).is_ok() {
                 self.asked = Some(Arc::clone(map));
             }
@@ -61,7 +61,7 @@ impl ObjectThumbnails {
         }
     }
 
-    /// Draws the thumbnail of an identity, `side` points wide; an empty place while there is none.
+    /// Draws the thumbnail of an identity, `side` points wide; an empty place if there is none.
     pub(crate) fn show(&self, ui: &mut Ui, id: IdentityId, side: f32) {
         self.used.set(true);
         let (rect, _) = ui.allocate_exact_size(vec2(side, side), egui::Sense::hover());

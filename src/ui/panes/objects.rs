@@ -1,4 +1,4 @@
-//! The objects and parts of the scene, as a tree; a click asks for one.
+//! Objects and parts of the scene as a tree; a click selects one and queries it.
 
 use egui::collapsing_header::CollapsingState;
 use egui::{
@@ -21,25 +21,25 @@ use crate::ui::actions::Action;
 /// Side of a thumbnail, points.
 const THUMBNAIL_PX: f32 = 30.0;
 
-/// Width of the column of counts, points: "123,456".
+/// Width of the column of counts such as "123,456", points.
 const COUNT_PT: f32 = 48.0;
 
-/// The list, and the name in it that is being typed.
+/// The list, and the name that is edited in it.
 #[derive(Default)]
 pub(crate) struct ObjectsPane {
     renaming: Option<Renaming>,
-    /// Whose menu is open.
+    /// Identity whose menu is open.
     menu_of: Option<IdentityId>,
-    /// What was selected when it was drawn last.
+    /// Selected identity at the last redraw.
     selected: Option<IdentityId>,
     order: ListOrder,
 }
 
-/// A name that is being typed in its row.
+/// A name that is edited in its row.
 struct Renaming {
     id: IdentityId,
     name: String,
-    /// Frames that the field was drawn, until it has the keyboard.
+    /// Frames in which the field was drawn, until it has the focus.
     frames: u8,
 }
 
@@ -86,7 +86,7 @@ impl ObjectsPane {
                 self.order.show(ui);
             });
         });
-        // The list follows what is selected in the view.
+        // The list scrolls to a new selection in the view.
         let scroll_to = selected.filter(|_| self.selected != selected);
         self.selected = selected;
         let (renaming, menu_of) = (&mut self.renaming, &mut self.menu_of);
@@ -114,7 +114,7 @@ impl ObjectsPane {
 struct Tree<'a> {
     identities: &'a Identities,
     labels: &'a ScreenNames,
-    /// Gaussians by number.
+    /// Numbers of Gaussians, indexed by identity.
     sizes: &'a [usize],
     facts: RowFacts<'a>,
     object_thumbnails: &'a ObjectThumbnails,
@@ -122,12 +122,12 @@ struct Tree<'a> {
     renaming: &'a mut Option<Renaming>,
     menu_of: &'a mut Option<IdentityId>,
     selected: Option<IdentityId>,
-    /// What is to be brought into view.
+    /// Identity to scroll to.
     scroll_to: Option<IdentityId>,
 }
 
 impl Tree<'_> {
-    /// One branch each, the tiny ones without names folded away.
+    /// Draws one branch per identity, the tiny unnamed ones folded.
     fn branches(&mut self, ui: &mut Ui, of: Id, ids: Vec<IdentityId>, actions: &mut Vec<Action>) {
         let (mut shown, mut tiny) = labels::listed(self.identities, self.sizes, ids);
         self.facts.sort(&mut shown);
@@ -142,7 +142,7 @@ impl Tree<'_> {
     fn branch(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
         let pieces: Vec<IdentityId> = self.identities.children(id).collect();
         if pieces.is_empty() {
-            // In line with those that can be unfolded.
+            // Aligned with rows that can be unfolded.
             ui.horizontal(|ui| {
                 ui.add_space(ui.spacing().indent);
                 self.row(ui, id, actions);
@@ -160,7 +160,7 @@ impl Tree<'_> {
         body.0.accessible_name(format!("Parts of {}", self.identities.full_name(id)));
     }
 
-    /// Tick, thumbnail, color and name from the left; a number, doubts and menu from the right.
+    /// Draws a row: check box, thumbnail, color and name on the left; number, doubts and menu on the right.
     fn row(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
         ui.spacing_mut().item_spacing.x = 5.0;
         let row = Rect::from_min_size(ui.cursor().min, vec2(ui.available_width(), THUMBNAIL_PX));
@@ -179,7 +179,7 @@ impl Tree<'_> {
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             let (number, what) = self.facts.number(id);
             let number = RichText::new(number).small().monospace().color(theme::weak());
-            // One column, however many digits.
+            // One column, for any number of digits.
             let column = vec2(COUNT_PT, ui.available_height());
             ui.allocate_ui_with_layout(column, Layout::right_to_left(Align::Center), |ui| {
                 ui.set_min_width(COUNT_PT);
@@ -188,7 +188,7 @@ impl Tree<'_> {
             let padding = ui.spacing().button_padding.x;
             self.facts.doubts(ui, id, actions);
             ui.spacing_mut().button_padding.x = padding;
-            // Elsewhere the name has its room.
+            // In other rows the name uses that space.
             if is_hovered || self.selected == Some(id) || *self.menu_of == Some(id) {
                 ui.spacing_mut().button_padding.x = 4.0;
                 self.menu(ui, id, actions);
@@ -223,13 +223,13 @@ impl Tree<'_> {
         *self.renaming = Some(Renaming { id, name: self.identities.name(id), frames: 0 });
     }
 
-    /// The name as a field with all of it selected. Enter and leaving it take the new name over, Escape does not.
+    /// Draws the name as a field with all of it selected. Enter or losing the focus applies the name, Escape does not.
     fn name_field(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
         let Some(Renaming { id, name, frames }) = self.renaming.as_mut() else { return };
         let field = Id::unique("name").with(*id);
         let begins = *frames < 2;
         if begins {
-            // Twice: the first time, the selection does not last.
+            // Twice: the selection of the first frame does not last.
             take_keyboard(ui.ctx(), field, name);
             *frames += 1;
         }
@@ -247,7 +247,7 @@ impl Tree<'_> {
         }
     }
 
-    /// What can be corrected about an identity.
+    /// Draws the menu of corrections to an identity.
     fn menu(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
         let all = self.identities;
         let menu = ui.menu_button("\u{2026}", |ui| {
@@ -259,7 +259,7 @@ impl Tree<'_> {
             ui.menu_button("Merge into", |ui| {
                 ScrollArea::vertical().max_height(300.0).show(ui, |ui| {
                     for (other, identity) in all.iter().filter(|(other, i)| *other != id && Some(i.level) == level) {
-                        // Parts of one whole first matter; others are told by their whole's name.
+                        // Parts of the same whole have short labels; others need the name of their whole.
                         let same_whole = all.get(id).is_some_and(|i| i.parent == identity.parent);
                         let text = if same_whole { all.label(other) } else { all.full_name(other) };
                         if ui.button(text).clicked() {
@@ -285,7 +285,7 @@ impl Tree<'_> {
                 }
             }
         });
-        // It stays while its menu is open, wherever the mouse is.
+        // The button stays while its menu is open, wherever the pointer is.
         match menu.inner {
             Some(()) => *self.menu_of = Some(id),
             None if *self.menu_of == Some(id) => *self.menu_of = None,

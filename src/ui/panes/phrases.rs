@@ -1,4 +1,4 @@
-//! A list of phrases, asked of this view or of all photos, with their answers as a table.
+//! A list of phrases, queried in this view or in all photos, with a table of the answers.
 
 use egui::style::ScrollStyle;
 use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
@@ -10,16 +10,16 @@ use crate::math::format::{count, things};
 use crate::scene::text::elided;
 use crate::ui::actions::Action;
 
-/// Rows that are shown; files have all.
+/// Rows shown; files have all.
 const SHOWN: usize = 300;
 
-/// Letters of a phrase and of its answer that are shown.
+/// Largest number of characters of a phrase or an answer that is shown.
 const LETTERS: usize = 26;
 
-/// What is typed, and of which views it is asked.
+/// The typed phrases, and the views to query.
 #[derive(Default)]
 pub struct PhrasesPane {
-    /// One phrase a line.
+    /// Phrases, one per line.
     pub text: String,
     pub all_photos: bool,
 }
@@ -81,7 +81,7 @@ fn show_rows(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     let iou = if known.is_empty() { String::new() } else { format!(", mean IoU {mean:.3} of {}", known.len()) };
     let written = state.phrases.written.as_ref().map(|p| format!(", written to {}", p.display())).unwrap_or_default();
     ui.weak(format!("{found} of {} answered{iou}{written}", things(rows.len(), "question")));
-    // One view is not worth a column.
+    // A single view needs no column.
     let views = rows.iter().any(|row| row.view != rows[0].view);
     ui.spacing_mut().scroll = ScrollStyle::solid();
     ScrollArea::both().id_salt("answers").auto_shrink([false, false]).show(ui, |ui| {

@@ -1,4 +1,4 @@
-//! What is left out for this scene, why, what that saves, and what a user wants otherwise.
+//! Decisions on what is left out for this scene, their reasons and savings, and the user's overrides.
 
 use egui::{ComboBox, RichText, Ui};
 
@@ -6,7 +6,7 @@ use super::super::theme;
 use crate::scene::plan::{PlanLine, PlanOverride};
 use crate::scene::{Overrides, ScenePlan};
 
-/// What stands for the plan's own choice.
+/// Label of the plan's own choice.
 const AUTO: &str = "auto";
 
 /// Draws the plan, one decision after another; choices change `overrides`.
@@ -32,7 +32,7 @@ pub(crate) fn show(ui: &mut Ui, plan: &ScenePlan, overrides: &mut Overrides) {
     }
 }
 
-/// The choice between what the data suggest and the alternative, where there is one.
+/// The choice between the decision from the data and its alternative, if there is one.
 fn choose(ui: &mut Ui, line: &PlanLine, overrides: &mut Overrides) {
     let Some(alternative) = &line.alternative else { return };
     let mut instead = line.overridden;

@@ -11,8 +11,7 @@ use crate::pipeline::observer::{Evaluation, StepMetrics};
 /// PSNR over seconds of another training, with its name.
 pub(crate) type PsnrCurve = (String, Vec<[f64; 2]>);
 
-/// Draws the plot: this training and the one before. The `curves` are of others, and
-/// drawn over seconds only: how many steps they had does not matter to them.
+/// Draws the plot: this training and the previous one. `curves` are of other trainings, over seconds only.
 pub(crate) fn show(
     ui: &mut Ui,
     [history, previous]: [&TrainHistory; 2],

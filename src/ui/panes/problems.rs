@@ -1,14 +1,14 @@
-//! What is wrong with what is open, over the view: what is missing, why, and what to do.
+//! Problems of the open scene, over the view: each with its reason and remedy.
 
 use egui::{Button, Frame, Margin, Panel, RichText, Ui};
 
 use super::super::state::{AppState, Tone};
 use super::super::theme;
 
-/// Problems that are on screen at once; the log has all.
+/// Largest number of problems on screen; the log has all.
 const MOST: usize = 3;
 
-/// Draws a line for each, until it is dismissed.
+/// Draws a line for each problem, until it is dismissed.
 pub(crate) fn show(ui: &mut Ui, state: &mut AppState) {
     if state.problems.is_empty() {
         return;

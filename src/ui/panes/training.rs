@@ -13,8 +13,7 @@ use crate::scene::{AlphaUse, text};
 use crate::ui::actions::Action;
 use crate::worker::JobKind;
 
-/// Draws the pane.
-/// Curves of a report stand beside this training's.
+/// Draws the pane. `curves` of a report are drawn beside this training's.
 pub(crate) fn show(
     ui: &mut Ui,
     state: &AppState,
@@ -91,7 +90,7 @@ fn start(ui: &mut Ui, state: &AppState, config: &TrainConfig, actions: &mut Vec<
     });
 }
 
-/// The other trainings of these photos, each of which can be opened.
+/// Other trainings of these photos, each with a button to open it.
 fn other_runs(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     let Some(scene) = &state.scene else { return };
     for run in scene.runs.iter().filter(|run| run.folder != scene.out) {
@@ -113,7 +112,7 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
         ui.add(DragValue::new(&mut config.steps).range(100..=100_000).speed(50)).labelled_by(id);
         ui.end_row();
         let id = label(ui, "Longest side", "Size of the training images; photos are never enlarged.");
-        // Small photos limit what is shown here, not what a user chose for others.
+        // Small photos limit the range shown here, not the stored setting.
         let range = 64..=largest_px.clamp(65, 4096);
         let mut side = config.max_side_px.clamp(64, *range.end());
         if ui.add(Slider::new(&mut side, range).suffix(" px").step_by(8.0)).labelled_by(id).changed() {
@@ -208,7 +207,7 @@ fn running(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
     });
 }
 
-/// The figures: what it is now.
+/// Draws the current figures of the training.
 fn facts(ui: &mut Ui, state: &AppState, job: Option<&RunningJob>) {
     ui.add_space(4.0);
     let last = state.history.steps.last();

@@ -1,4 +1,4 @@
-//! What to do about photos without camera poses: run COLMAP where it is installed, else its commands to copy.
+//! Dialog on photos without camera poses: runs COLMAP if it is installed, else shows its commands to copy.
 
 use egui::{Button, RichText, ScrollArea, vec2};
 
@@ -8,7 +8,7 @@ use crate::jobs::poses::{self, PoseTools};
 use crate::scene::text;
 use crate::ui::actions::Action;
 
-/// Draws the dialog. Returns whether it stays.
+/// Draws the dialog. Returns whether it stays open.
 pub(crate) fn show(ctx: &egui::Context, photos: &Unposed, actions: &mut Vec<Action>) -> bool {
     let response = theme::dialog("unposed").show(ctx, |ui| {
         ui.set_width(620.0_f32.min(ui.ctx().content_rect().width() - 80.0));

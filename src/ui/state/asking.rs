@@ -1,16 +1,16 @@
-//! Whether anything can be asked for.
+//! Conditions for queries.
 
 use super::AppState;
 use crate::scene::IdentityId;
 use crate::worker::JobKind;
 
 impl AppState {
-    /// Whether an object or part has no Gaussian, nor has any of its pieces.
+    /// True if neither an object or part nor its parts have a Gaussian.
     pub(crate) fn is_empty(&self, id: IdentityId) -> bool {
         self.sizes.get(id as usize) == Some(&0)
     }
 
-    /// Why nothing can be asked for, in a sentence; `None` if something can.
+    /// Reason why queries are impossible, as a sentence; `None` if they are possible.
     pub(crate) fn why_no_query(&self) -> Option<String> {
         if self.semantics.is_some() {
             return None;

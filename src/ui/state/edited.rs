@@ -1,4 +1,4 @@
-//! Gaussians that were edited: the scene on screen goes on in another folder, as the same scene to the window.
+//! Edited Gaussians: the scene continues in another folder, as the same scene to the window.
 
 use std::sync::Arc;
 
@@ -7,7 +7,7 @@ use crate::jobs::OpenedScene;
 use crate::jobs::rearrange::RearrangedScene;
 
 impl AppState {
-    /// Takes in edited Gaussians.
+    /// Takes over edited Gaussians.
     pub(super) fn take_rearranged(&mut self, done: RearrangedScene) {
         let RearrangedScene { cloud, map, folder, name, state, facts } = done;
         let Some(before) = &self.scene else { return };
@@ -26,7 +26,7 @@ impl AppState {
             report_out: folder.join("report"),
             out: folder,
             state: Some(state),
-            // There is no training in that folder that could go on.
+            // The new folder has no training to continue.
             resumable: None,
             is_edited: true,
             ..(*before).clone()

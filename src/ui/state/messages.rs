@@ -1,4 +1,4 @@
-//! What the window says to the user: lines of the log, messages that go away, errors, and problems over the view.
+//! Messages to the user: lines of the log, toasts, errors, and problems over the view.
 
 use super::AppState;
 use crate::jobs::remove::{self, RemovedScene};
@@ -9,7 +9,7 @@ use crate::worker::{Failure, JobId, JobKind};
 /// Lines kept in the log.
 const MAX_LOG: usize = 1_000;
 
-/// How a message is meant.
+/// Kind of a message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Tone {
     Info,
@@ -22,35 +22,35 @@ pub(crate) enum Tone {
 /// A line of the log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LogLine {
-    /// Seconds since the program was started; set once the window has seen it.
+    /// Seconds since the program start; set once the window has seen the line.
     pub(crate) at_secs: Option<f64>,
-    /// How it is meant.
+    /// Kind of the message.
     pub(crate) tone: Tone,
-    /// What it says.
+    /// Text of the message.
     pub text: String,
 }
 
-/// A message that goes away by itself.
+/// A message that disappears by itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Toast {
-    /// Names it, so that the window can time it.
+    /// Identifier, for the window's timer.
     pub(crate) id: u64,
-    /// How it is meant.
+    /// Kind of the message.
     pub(crate) tone: Tone,
     pub(crate) text: String,
 }
 
-/// An error that is shown until a user has read it.
+/// An error that is shown until the user closes it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ErrorBox {
-    /// What was being done: "Opening fox".
+    /// The failed operation, such as "Opening fox".
     pub(crate) doing: String,
-    /// What went wrong, and what to do.
+    /// Description of the error, and its remedy.
     pub(crate) failure: Failure,
 }
 
 impl LogLine {
-    /// As it is shown and copied: "12.34 s  Trained".
+    /// The line as it is shown and copied: "12.34 s  Trained".
     pub(crate) fn dated(&self) -> String {
         let time = self.at_secs.map_or_else(String::new, |secs| format!("{secs:.2} s"));
         format!("{time:>10}  {}", self.text)
@@ -63,7 +63,7 @@ impl AppState {
         self.say_at(None, tone, text);
     }
 
-    /// The same with the time at which it was, if that is known.
+    /// Adds a line to the log, with its time if known.
     pub(crate) fn say_at(&mut self, at_secs: Option<f64>, tone: Tone, text: impl Into<String>) {
         if self.log.len() == MAX_LOG {
             self.log.pop_front();
@@ -71,12 +71,12 @@ impl AppState {
         self.log.push_back(LogLine { at_secs, tone, text: text::line(&text.into()).into_owned() });
     }
 
-    /// Says when lines of the log were written that have come since this was said last.
+    /// Sets the time of the log lines added since the last call.
     pub(crate) fn stamp_log(&mut self, now_secs: f64) {
         self.log.iter_mut().rev().take_while(|line| line.at_secs.is_none()).for_each(|l| l.at_secs = Some(now_secs));
     }
 
-    /// Shows over the view what is wrong with what is open, until it is dismissed or another job makes it anew.
+    /// Shows a problem of the open scene over the view, until it is dismissed or another job makes a scene.
     pub(crate) fn problem(&mut self, job: Option<JobId>, text: &str) {
         let text = text::line(text).into_owned();
         if self.problems.iter().all(|(_, known)| *known != text) {
@@ -84,7 +84,7 @@ impl AppState {
         }
     }
 
-    /// Shows a message that goes away by itself, and logs it.
+    /// Shows a message that disappears by itself, and logs it.
     pub(crate) fn toast(&mut self, tone: Tone, text: impl Into<String>) {
         let text = text::lines(&text.into()).into_owned();
         self.say(tone, text.clone());
@@ -92,7 +92,7 @@ impl AppState {
         self.next_toast += 1;
     }
 
-    /// Takes in a scene without a thing, which is to be seen beside the one that it was made of.
+    /// Takes over a scene made by a removal, to be shown beside its source.
     pub(super) fn take_removed(&mut self, removed: RemovedScene) -> Action {
         self.toast(Tone::Good, remove::told(&removed.name, &removed.report));
         self.say(Tone::Info, format!("Saved to {}", removed.folder.display()));
@@ -101,16 +101,16 @@ impl AppState {
         show
     }
 
-    /// " on HOST" where the scene is on another computer.
+    /// " on HOST" if the scene is on another computer.
     pub(super) fn elsewhere(&self) -> String {
         let origin = self.scene.as_ref().and_then(|scene| scene.remote.as_ref());
         origin.map_or_else(String::new, |origin| format!(" on {}", origin.host))
     }
 
-    /// Takes in that a job could not go on.
+    /// Handles the failure of a job.
     pub(super) fn failed(&mut self, job: JobId, failure: Failure) {
         let doing = match self.end_short(job) {
-            // A photo that cannot be read is no reason to stop a user.
+            // An unreadable photo does not interrupt the user.
             Some((JobKind::Photo, title)) => {
                 self.toast(Tone::Warning, format!("{title}: {}", failure.message));
                 self.failed_photos.push(job);

@@ -1,4 +1,4 @@
-//! What the window knows of a scene that was opened, and of its objects and parts.
+//! State of an opened scene, and of its objects and parts.
 
 use std::sync::Arc;
 
@@ -8,7 +8,7 @@ use crate::scene::SemanticMap;
 use crate::worker::Versioned;
 
 impl AppState {
-    /// Sets objects and parts, with what is counted of them.
+    /// Sets objects and parts, with their counts.
     pub(super) fn set_semantics(&mut self, map: Option<Arc<SemanticMap>>) {
         self.facts = map.as_ref().map_or_else(Vec::new, |m| m.facts());
         self.sizes = self.facts.iter().map(|f| f.gaussians).collect();

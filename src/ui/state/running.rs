@@ -1,23 +1,23 @@
-//! The job that runs, and how long it takes still.
+//! The running job and its remaining time.
 
 use crate::pipeline::observer::Progress;
 use crate::worker::{JobId, JobKind};
 
-/// Seconds over which forecasts are averaged.
+/// Time constant of the average over forecasts, s.
 const FORECAST_SECS: f64 = 30.0;
 
-/// The long job that runs now.
+/// The running long job.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunningJob {
     pub(crate) id: JobId,
     pub(crate) kind: JobKind,
     pub(crate) title: String,
     pub(crate) progress: Option<Progress>,
-    /// Seconds to go, as far as that is known: the mean of what rates have said lately, which jump.
+    /// Remaining time in s, if known: a moving average, as the forecasts from rates jump.
     pub(crate) left_secs: Option<f64>,
-    /// Whether it waits.
+    /// True if the job is paused.
     pub paused: bool,
-    /// Whether it was asked to end, and has not yet.
+    /// True if cancellation was requested.
     pub canceling: bool,
 }
 
@@ -26,7 +26,7 @@ impl RunningJob {
         Self { id, kind, title, progress: None, left_secs: None, paused: false, canceling: false }
     }
 
-    /// What it is called, and whether it waits or is about to end.
+    /// Title, with a note if the job is paused or being canceled.
     pub(crate) fn text(&self) -> String {
         match (self.canceling, self.paused) {
             (true, _) => format!("{}: canceling\u{2026}", self.title),
@@ -42,11 +42,11 @@ impl RunningJob {
             (Some(now), Some((step, left))) => {
                 let expected = left - step;
                 let smooth = expected + (now - expected) * (1.0 - (-step.max(0.0) / FORECAST_SECS).exp());
-                // A first forecast that was far too good is not believed until it has run out.
+                // At least half the forecast by the mean rate: a first rate may have been far too high.
                 let average = progress.elapsed_secs * progress.total as f64 / progress.done.max(1) as f64;
                 Some(smooth.max(0.5 * (average - progress.elapsed_secs).min(now)).max(0.0))
             }
-            // All is done of what is counted, or nothing is counted.
+            // All counted work is done, or nothing is counted.
             _ if progress.done >= progress.total => None,
             (now, before) => now.or(before.map(|(_, left)| left)),
         };
@@ -68,14 +68,14 @@ mod tests {
         assert_eq!(job.left_secs, None, "nothing is known yet");
         job.goes_on(at(10, 1.0, 10.0));
         assert_eq!(job.left_secs, Some(299.0));
-        // For a second it is ten times slower: alone that would say 2,990 s.
+        // One second at a tenth of the rate, which alone would forecast 2,990 s.
         job.goes_on(at(11, 2.0, 1.0));
         let left = job.left_secs.expect("known");
         assert!((299.0..400.0).contains(&left), "{left}");
-        // Where it stays slower, that is what counts.
+        // A lasting slowdown determines the forecast.
         (0..200).for_each(|i| job.goes_on(at(11 + i, 3.0 + i as f64, 1.0)));
         assert!((job.left_secs.expect("known") - 2_790.0).abs() < 60.0, "{:?}", job.left_secs);
-        // The first of 48 took a moment, each of the others a second.
+        // The first of 48 views took an instant, each later one a second.
         let mut job = RunningJob::begun(JobId::default(), JobKind::Train, "Removing".into());
         let view = |i: u64, rate| Progress { total: 48, ..at(i, i as f64, rate) };
         job.goes_on(view(1, 100.0));

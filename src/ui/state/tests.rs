@@ -1,4 +1,4 @@
-//! Tests of the fold.
+//! Tests of the fold over events.
 
 use super::*;
 use crate::pipeline::observer::StepMetrics;

@@ -1,4 +1,4 @@
-//! What the actions about the view do, and where they put the eye.
+//! Actions on the view and the viewer's camera.
 
 use glam::DVec3;
 
@@ -18,7 +18,7 @@ use crate::ui::actions::Action;
 use crate::worker::Worker;
 
 impl Viewport {
-    /// Does what a user asked of the view.
+    /// Carries out an action on the view.
     pub(crate) fn act(&mut self, action: &Action, state: &AppState, worker: &Worker, now: f64) {
         let Some(scene) = state.scene.clone() else { return };
         let photos = scene.dataset.as_ref().map_or(0, |d| d.photos.len());
@@ -75,7 +75,7 @@ impl Viewport {
         self.moved_at = now;
     }
 
-    /// Which action ends the tool that is in use.
+    /// Action that ends the tool in use.
     pub(crate) fn tool(&self) -> Option<Action> {
         let tools = [
             (self.has_brush() || self.arrange.is_some(), Action::Paint(None)),
@@ -86,17 +86,17 @@ impl Viewport {
         tools.into_iter().find(|(used, _)| *used).map(|(_, action)| action)
     }
 
-    /// Whether dragging marks or chooses something, and does not turn the view.
+    /// True if dragging paints or selects and does not orbit.
     pub(super) fn has_brush(&self) -> bool {
         self.brush.is_some() || self.select.is_some() || self.choose.is_some()
     }
 
-    /// Puts away what is painted, selected, chosen or moved with.
+    /// Ends painting, selecting, choosing and arranging.
     pub(super) fn drop_tools(&mut self) {
         (self.brush, self.select, self.choose, self.arrange) = (None, None, None, None);
     }
 
-    /// Takes up a tool in place of the one in use, or puts it away.
+    /// Switches to a tool, or ends it if it is in use.
     fn toggle_tool(&mut self, action: &Action, scene: &OpenedScene) {
         let begins = self.tool().as_ref() != Some(action);
         (self.ruler, self.cropping, self.inspector) = (None, false, None);
@@ -107,7 +107,7 @@ impl Viewport {
             _ => {
                 self.cropping = true;
                 let crop = self.visibility.crop();
-                // At first around what is worth seeing, with room: the box of the scene leaves out one in twenty.
+                // Initially around the main content, with a margin: the scene's box leaves out one in twenty.
                 let (center, half) = (scene.home.bounds.center(), 0.8 * scene.home.bounds.size());
                 let bounds = Bounds { min: center - half, max: center + half };
                 let all = CropBox { bounds, outside: false };
@@ -131,11 +131,11 @@ impl Viewport {
         self.eye.set_up(up);
     }
 
-    /// Puts the eye into a pose.
+    /// Moves the camera to a pose.
     pub(crate) fn stand(&mut self, pose: &Pose, state: &AppState, now: f64) {
         let Some(scene) = state.scene.clone() else { return };
         self.photo = None;
-        // What it turns about stays ahead, at the distance that it has.
+        // The pivot stays ahead, at its distance.
         let ahead = (self.eye.pivot - pose.center).dot(pose.forward());
         let distance = if ahead > 0.0 { ahead } else { 0.5 * scene.home.bounds.radius() };
         self.eye = Eye {
@@ -148,7 +148,7 @@ impl Viewport {
         self.moved_at = now;
     }
 
-    /// Goes on freely from the photo's place, at the scale that the frame had.
+    /// Leaves the photo's camera at its pose, with the scale of the frame.
     pub(super) fn leave_photo(&mut self) {
         if let Some(photo) = self.photo.take() {
             self.eye.fov_y_rad = photo.free_fov(self.eye.fov_y_rad);

@@ -1,4 +1,4 @@
-//! Moving, turning, scaling, duplicating and recoloring an object or a part: arrows in the view, numbers, a preview.
+//! Arranging an object or part: moving, rotating, scaling, duplicating, recoloring.
 
 use std::sync::Arc;
 
@@ -19,19 +19,19 @@ const ARROW: f32 = 80.0;
 const HANDLE: f32 = 7.0;
 const AXES: [Color32; 3] =
     [Color32::from_rgb(0xf0, 0x5a, 0x4b), Color32::from_rgb(0x5f, 0xc8, 0x4f), Color32::from_rgb(0x4d, 0x9d, 0xf5)];
-/// Color that one begins with.
+/// Initial color.
 const FIRST_COLOR: [f32; 3] = [0.8, 0.2, 0.15];
 
-/// What is being arranged.
+/// The arrangement of an object or part under edit.
 pub(crate) struct ArrangeTool {
     arrangement: Arrangement,
-    /// Turn about the up direction, degrees.
+    /// Rotation about the up direction, degrees.
     degrees: f64,
     up: DVec3,
-    /// Middle and half the diagonal of the thing before.
+    /// Center and half the diagonal of the object or part before the arrangement.
     middle: DVec3,
     radius: f64,
-    /// What is shown, and of which Gaussians and objects it was made.
+    /// The preview, with the Gaussians and objects that it was made from.
     shown: Option<Arranged>,
 }
 
@@ -49,7 +49,7 @@ impl ArrangeTool {
         Self { arrangement: Arrangement::of(id), degrees: 0.0, up, middle, radius, shown: None }
     }
 
-    /// What is to become of it.
+    /// The arrangement so far.
     pub(crate) fn arrangement(&self) -> Arrangement {
         self.arrangement
     }
@@ -58,7 +58,7 @@ impl ArrangeTool {
         self.arrangement != Arrangement::of(self.arrangement.id)
     }
 
-    /// The Gaussians as they would be, and what they belong to; `None` while nothing is changed.
+    /// Arranged Gaussians and their identities; `None` while nothing is changed.
     pub(super) fn preview(
         &mut self,
         cloud: &Versioned<GaussianCloud>,
@@ -77,13 +77,13 @@ impl ArrangeTool {
         self.shown.as_ref().map(|shown| (shown.cloud.clone(), shown.map.clone()))
     }
 
-    /// Arrows by which it is dragged along the axes.
+    /// Draws the arrows for dragging along the axes.
     fn show_arrows(&mut self, ui: &Ui, shown: Rect, eye: &Camera) {
         let painter = ui.painter_at(shown);
         for (axis, color) in AXES.into_iter().enumerate() {
             let middle = self.middle + self.arrangement.to.shift;
             let Some((at, along)) = on_screen(eye, shown, middle, axis) else { continue };
-            // An axis that points at the eye has no arrow.
+            // An axis along the line of sight has no arrow.
             if along.length() * (self.radius as f32) < 4.0 {
                 continue;
             }
@@ -101,7 +101,7 @@ impl ArrangeTool {
         }
     }
 
-    /// The card of the tool.
+    /// Draws the card of the tool.
     fn show_card(&mut self, ui: &Ui, rect: Rect, all: &Identities, actions: &mut Vec<Action>) {
         // Above the facts about the frame.
         let at = Align2::LEFT_BOTTOM.pos_in_rect(&rect.shrink(12.0)) - vec2(0.0, 40.0);
@@ -159,7 +159,7 @@ impl ArrangeTool {
 }
 
 impl Viewport {
-    /// Draws the tool and takes what is done to it.
+    /// Draws the tool and handles its input.
     pub(super) fn show_arranging(&mut self, ui: &Ui, shown: Rect, state: &AppState, actions: &mut Vec<Action>) {
         let eye = self.overlay_camera(shown);
         let Some(tool) = &mut self.arrange else { return };

@@ -1,4 +1,4 @@
-//! Painting the true mask of a view by hand: dragging paints, a click takes what has the same color around it.
+//! Painting the true mask of a view by hand: dragging paints, a click fills the connected region of similar color.
 
 use std::sync::Arc;
 
@@ -10,16 +10,16 @@ use crate::math::grid::neighbors;
 use crate::scene::{Camera, Mask};
 use crate::ui::actions::Action;
 
-/// Largest difference of color, per channel, over which a click spreads.
+/// Largest color difference per channel between neighbors in a fill.
 const SAME_COLOR: u8 = 14;
 
-/// Color of the paint: nothing in a scene is likely to have it.
+/// Color of the paint, unlikely to occur in a scene.
 const PAINT: [u8; 3] = [255, 60, 200];
 
-/// What is being marked.
+/// The true mask under edit.
 pub(crate) struct Brush {
     radius_px: f32,
-    /// The view that is painted on.
+    /// Camera of the painted view.
     camera: Option<Camera>,
     mask: Mask,
     changed: bool,
@@ -33,7 +33,7 @@ impl Brush {
         Self { radius_px: 12.0, camera: None, mask, changed: false, texture: None }
     }
 
-    /// Starts over if the view has changed, with what is known of it already: paint lies on one view.
+    /// Starts over with the known mask if the view has changed: paint belongs to one view.
     pub(crate) fn on_view(&mut self, camera: &Camera, known: Option<&Mask>) {
         if self.camera.as_ref() != Some(camera) {
             let (width_px, height_px) = (camera.width_px as usize, camera.height_px as usize);
@@ -69,7 +69,7 @@ impl Brush {
         self.changed = true;
     }
 
-    /// Marks what hangs together with a pixel in color, or erases it.
+    /// Paints or erases the connected region of similar color around a pixel.
     pub(crate) fn flood(&mut self, at: [usize; 2], rgb: &[[u8; 3]], erase: bool) {
         let (w, h) = (self.mask.width_px(), self.mask.height_px());
         if rgb.len() != w * h || at[0] >= w || at[1] >= h {
@@ -80,7 +80,7 @@ impl Brush {
         let mut seen = Mask::empty(w, h);
         let mut open = vec![first];
         while let Some(i) = open.pop() {
-            // Alike the neighbor it was reached from, and not too far from where it began.
+            // Similar to the neighbor it was reached from, and not too far from the first pixel.
             if seen.contains(i) || rgb[i].iter().zip(rgb[first]).any(|(a, b)| a.abs_diff(b) > 3 * SAME_COLOR) {
                 continue;
             }
@@ -90,7 +90,7 @@ impl Brush {
         self.take(&seen, erase);
     }
 
-    /// The paint, over the frame in `rect`; not `plainly`, hits and misses are drawn instead.
+    /// Draws the paint over the frame in `rect`; unless `plainly`, hits and misses are drawn instead.
     pub(crate) fn paint(&mut self, ui: &Ui, rect: Rect, plainly: bool) {
         if std::mem::take(&mut self.changed) {
             let size = [self.mask.width_px(), self.mask.height_px()];
@@ -146,11 +146,11 @@ impl Brush {
 }
 
 impl Viewport {
-    /// Paints where the pointer drags, floods where it clicks; erases with Shift.
+    /// Paints along drags, fills at clicks; erases with Shift.
     pub(super) fn use_brush(&mut self, response: &egui::Response, rect: Rect) {
         let (Some(brush), Some(picture)) = (&mut self.brush, self.display.picture()) else { return };
         let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
-        // Only a full frame has the pixels that the maps have, and one that is late is not what the eye sees.
+        // Only a full frame has the pixels of the maps, and a late one does not match the current view.
         if !picture.full || picture.ticket != self.requests.ticket() {
             return;
         }
@@ -189,7 +189,7 @@ mod tests {
         assert_eq!(brush.mask.area(), 40, "columns 4 to 7");
         brush.dab([1.0, 1.0], 0.1, false);
         assert!(brush.mask.contains(11) && brush.mask.area() < 50);
-        // Another view: the paint is gone.
+        // In another view the paint is cleared.
         brush.on_view(&camera.resized(12, 12), None);
         assert!(brush.mask.is_empty());
     }

@@ -1,5 +1,5 @@
-//! Choosing Gaussians by brushing over them: those whose centers lie under the brush, on what is seen or before it, or
-//! all along the line of sight.
+//! Choosing Gaussians with a brush: those with centers under the brush, on or before the visible surface, or all along
+//! the line of sight.
 
 use egui::{Align2, Area, Color32, Id, Order, PointerButton, Rect, Slider, Stroke, Ui};
 use glam::DVec2;
@@ -9,22 +9,22 @@ use super::Viewport;
 use crate::scene::{Camera, GaussianCloud};
 use crate::ui::actions::Action;
 
-/// How far behind the surface that is drawn a center may lie to be on it, as a share of its depth.
+/// Largest depth of a center behind the rendered surface to count as on it, as a share of its depth.
 const ON_SURFACE: f64 = 0.02;
 
-/// Gaussians that were brushed over since that was asked last.
+/// Gaussians brushed over since the last request.
 pub(crate) struct Brushed {
     pub(crate) numbers: Vec<usize>,
-    /// Whether they are taken out of the choice.
+    /// True if they are removed from the choice.
     pub(crate) erase: bool,
 }
 
 /// The brush.
 pub(crate) struct SplatBrush {
     radius_px: f32,
-    /// Whether what is hidden behind the surface is chosen, too.
+    /// True if Gaussians behind the surface are chosen, too.
     through: bool,
-    /// Where the centers of the Gaussians lie in the frame of this camera; `None` are those that cannot be chosen there.
+    /// Projected centers of the Gaussians in the frame of this camera; `None` for those that cannot be chosen there.
     centers: Option<(Camera, bool, Vec<Option<DVec2>>)>,
     brushed: Vec<Brushed>,
 }
@@ -41,7 +41,7 @@ impl SplatBrush {
         centers.enumerate().filter(|(_, c)| near(c)).map(|(i, _)| i).collect()
     }
 
-    /// The circle that is brushed with, where the pointer is.
+    /// Draws the circle of the brush at the pointer.
     pub(super) fn paint(&self, ui: &Ui, rect: Rect) {
         if let Some(pos) = ui.input(|i| i.pointer.hover_pos()).filter(|p| rect.contains(*p)) {
             ui.painter().circle_stroke(pos, self.radius_px, Stroke::new(3.0, Color32::from_black_alpha(160)));
@@ -68,8 +68,8 @@ impl SplatBrush {
     }
 }
 
-/// Where the centers of what is drawn lie in a frame of this camera: those that are no farther than `depth` of the
-/// surface there, if that is given.
+/// Projected centers of the drawn Gaussians in a frame of this camera; with `depth`, only those on or before the
+/// surface.
 fn centers(
     cloud: &GaussianCloud,
     numbers: Option<&[usize]>,
@@ -97,12 +97,12 @@ fn centers(
 }
 
 impl Viewport {
-    /// What was brushed over since this was asked last.
+    /// Takes the Gaussians brushed over since the last call.
     pub(crate) fn take_brushed(&mut self) -> Vec<Brushed> {
         self.choose.as_mut().map(|brush| std::mem::take(&mut brush.brushed)).unwrap_or_default()
     }
 
-    /// Chooses where the pointer drags or clicks; takes out of the choice with Shift.
+    /// Chooses Gaussians along drags and clicks; removes them from the choice with Shift.
     pub(super) fn use_splat_brush(&mut self, response: &egui::Response, rect: Rect) {
         let (Some(brush), Some(picture), Some(cloud)) = (&mut self.choose, self.display.picture(), &self.cloud) else {
             return;
@@ -114,13 +114,13 @@ impl Viewport {
         ) else {
             return;
         };
-        // Marks change while it is brushed, the view does not.
+        // Marks change during brushing, the view does not.
         let is_here = |c: &Camera| (c.center, c.world_from_camera) == (self.eye.center, self.eye.world_from_eye);
         let known = brush.centers.as_ref().is_some_and(|(camera, through, centers)| {
             is_here(camera) && (*through, centers.len()) == (brush.through, cloud.len())
         });
         if !known {
-            // A frame that is late is not what the eye sees, and a coarse one has no depth.
+            // A late frame does not match the current view, and a coarse one has no depth.
             if !picture.full || !is_here(&picture.camera) {
                 return;
             }
@@ -148,7 +148,7 @@ mod tests {
     #[test]
     fn what_is_before_the_surface_or_on_it_is_chosen_and_what_is_behind_only_through_it() {
         let camera = Camera::look_at(DVec3::new(0.0, -4.0, 0.0), DVec3::ZERO, DVec3::Z, 0.8, 40, 40).expect("valid");
-        // Before the surface, on it, behind it, beside it on it, and behind the eye.
+        // Before the surface, on it, behind it, beside it on it, and behind the camera.
         let positions = vec![[0.0, -2.0, 0.0], [0.0, 0.03, 0.0], [0.0, 2.0, 0.0], [1.0, 0.0, 0.0], [0.0, -9.0, 0.0]];
         let cloud = GaussianCloud::isotropic(positions, 0.0, 0.0);
         let depth = vec![4.0; 40 * 40];

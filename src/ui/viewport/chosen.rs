@@ -1,20 +1,20 @@
-//! Gaussians that are chosen to be deleted, as the view shows them: marked, or left out.
+//! Gaussians chosen for deletion, as the view shows them: marked or hidden.
 
 use crate::math::sh::SH_C0;
 use crate::scene::GaussianCloud;
 
-/// Magenta, which little in photos is.
+/// Magenta, which is rare in photos.
 const MARK: [f64; 3] = [1.0, 0.0, 0.8];
-/// Opacity that marked Gaussians have at least, before the sigmoid, so that faint ones are seen.
+/// Least opacity logit of marked Gaussians, so that faint ones are visible.
 const LEAST_OPACITY: f32 = -2.5;
 
 /// A choice of Gaussians.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct ChosenSplats {
-    /// Whether each is chosen.
+    /// True for each chosen Gaussian.
     pub(crate) of: Vec<bool>,
     pub(crate) count: usize,
-    /// Whether they are left out of the view.
+    /// True if they are hidden in the view.
     pub(super) hide: bool,
 }
 
@@ -24,12 +24,12 @@ impl ChosenSplats {
         Self { of, count, hide }
     }
 
-    /// Whether a Gaussian is drawn.
+    /// True if a Gaussian is drawn.
     pub(super) fn draws(&self, i: usize) -> bool {
         !self.hide || self.of.get(i) != Some(&true)
     }
 
-    /// Gives those that are chosen among `numbers` another color in `cloud`, which consists of these.
+    /// Recolors the chosen Gaussians in `cloud`, which consists of `numbers` of the whole.
     pub(super) fn mark(&self, cloud: &mut GaussianCloud, numbers: &[usize]) {
         let stride = cloud.sh_stride();
         for (k, _) in numbers.iter().enumerate().filter(|(_, i)| self.of.get(**i) == Some(&true)) {

@@ -1,4 +1,4 @@
-//! The crop box in the view: its edges, faces that are dragged, and a card with its corners as numbers.
+//! The crop box in the view: its edges, faces that can be dragged, and a card with its corners as numbers.
 
 use egui::{
     Align2, Area, Button, Color32, CursorIcon, DragValue, Grid, Id, Order, Pos2, Rect, Sense, Stroke, Ui, Vec2, vec2,
@@ -13,13 +13,13 @@ use crate::scene::{Bounds, Camera, CropBox};
 use crate::ui::actions::Action;
 use crate::ui::state::AppState;
 
-/// Radius of what a face is dragged by, points.
+/// Radius of a face's handle, points.
 const HANDLE: f32 = 6.0;
-/// Steps from one side of a scene to the other while a number is dragged.
+/// Steps across a scene while a number is dragged.
 const STEPS: f64 = 500.0;
 
 impl Viewport {
-    /// Draws the box and takes what is done to it.
+    /// Draws the box and handles its input.
     pub(super) fn show_crop(&mut self, ui: &Ui, shown: Rect, state: &AppState, actions: &mut Vec<Action>) {
         let Some(scene) = state.scene.as_ref().filter(|_| self.cropping) else { return };
         let before = self.visibility.crop();
@@ -79,7 +79,7 @@ impl Viewport {
     }
 }
 
-/// The corners, scene units, and whether what is outside is kept.
+/// Draws the corners, scene units, and the choice whether the outside is kept.
 fn numbers(ui: &mut Ui, crop: &mut CropBox, step: f64) {
     Grid::new("crop corners").num_columns(4).spacing([8.0, 4.0]).show(ui, |ui| {
         for high in [false, true] {
@@ -108,7 +108,7 @@ fn corner(bounds: &Bounds, i: usize) -> DVec3 {
     DVec3::from_array(std::array::from_fn(|axis| if i >> axis & 1 == 1 { max[axis] } else { min[axis] }))
 }
 
-/// The twelve edges.
+/// Draws the twelve edges.
 fn draw_edges(ui: &Ui, shown: Rect, eye: &Camera, bounds: &Bounds) {
     let painter = ui.painter_at(shown);
     let place = |p: glam::DVec2| shown.min + vec2(p.x as f32, p.y as f32);
@@ -122,13 +122,13 @@ fn draw_edges(ui: &Ui, shown: Rect, eye: &Camera, bounds: &Bounds) {
     }
 }
 
-/// The middle of a face, by which it is dragged along its axis.
+/// Draws the handle in the middle of a face, and drags the face along its axis.
 fn drag_face(ui: &Ui, shown: Rect, eye: &Camera, crop: &mut CropBox, axis: usize, high: bool) {
     let Bounds { min, max } = crop.bounds;
     let mut middle = crop.bounds.center();
     middle[axis] = if high { max[axis] } else { min[axis] };
     let Some((at, along)) = on_screen(eye, shown, middle, axis) else { return };
-    // Dragged only: what can be had by keys are the numbers.
+    // Drag only: for the keyboard there are the numbers.
     let id = Id::unique("crop face").with((axis, high));
     let handle = ui.interact(Rect::from_center_size(at, Vec2::splat(3.0 * HANDLE)), id, Sense::DRAG);
     if handle.dragged() {
@@ -142,7 +142,7 @@ fn drag_face(ui: &Ui, shown: Rect, eye: &Camera, crop: &mut CropBox, axis: usize
     }
 }
 
-/// Where a point is in the view, and how far it goes there by one unit along an axis.
+/// Position of a point in the view, and its motion there per unit along an axis.
 pub(super) fn on_screen(eye: &Camera, shown: Rect, p: DVec3, axis: usize) -> Option<(Pos2, Vec2)> {
     let step = 1e-3 * (p - eye.center).length();
     let mut beside = p;
@@ -153,9 +153,9 @@ pub(super) fn on_screen(eye: &Camera, shown: Rect, p: DVec3, axis: usize) -> Opt
     shown.contains(at).then_some((at, vec2(along.x as f32, along.y as f32)))
 }
 
-/// How far a face goes along its axis when the cursor moves so in the view, `along` being what one unit is there.
+/// Motion of a face along its axis for a drag in the view; `along` is the motion of one unit in the view.
 pub(super) fn travel(drag: Vec2, along: Vec2) -> f64 {
-    // An axis that points at the eye would carry it away.
+    // An axis along the line of sight would move the face very far.
     let length_sq = along.length_sq();
     if length_sq < 1.0 { 0.0 } else { f64::from(drag.dot(along) / length_sq) }
 }
@@ -170,7 +170,7 @@ mod tests {
         let shown = Rect::from_min_size(egui::pos2(20.0, 30.0), vec2(400.0, 300.0));
         let (at, along) = on_screen(&eye, shown, DVec3::X, 0).expect("in view");
         assert!(along.x > 1.0 && along.y.abs() < 1e-2, "{along:?}");
-        // Where the cursor goes, there the face is.
+        // The face follows the pointer.
         let moved = travel(vec2(40.0, 7.0), along);
         let (there, _) = on_screen(&eye, shown, DVec3::X + DVec3::X * moved, 0).expect("in view");
         assert!((there.x - at.x - 40.0).abs() < 0.1, "{there:?} {at:?}");

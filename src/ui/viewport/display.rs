@@ -1,4 +1,4 @@
-//! The newest frame on screen: taken from where it is published, uploaded, painted and picked from.
+//! The newest frame on screen: received, uploaded, painted, and read for picking.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -18,39 +18,39 @@ use crate::scene::resource_log::{self, ResourceKind};
 use crate::worker::view::{MappedView, ViewPicture, ViewResult};
 use crate::worker::{Failure, Slot, Versioned};
 
-/// Over so many seconds frames are counted.
+/// Window of the frame rate, s.
 const RATE_SECS: f64 = 2.0;
 
-/// Pictures that stay on the device that drew them, which is the window's.
+/// Frames that stay on the device that drew them, which is the window's.
 struct NativeTexture {
     window: RenderState,
-    /// The newest picture's; `None` while another kind is on screen.
+    /// Texture of the newest frame; `None` while another kind is on screen.
     id: Option<TextureId>,
 }
 
-/// What is on screen.
+/// The frame on screen.
 #[derive(Default)]
 pub(super) struct Display {
     picture: Option<Arc<ViewPicture>>,
     texture: Option<TextureHandle>,
-    /// Paints what lies on the window's device.
+    /// Painter of frames on the window's device.
     native: Option<NativeTexture>,
-    /// What the second view shows, where that is something else.
+    /// Frame of the second view, if it differs.
     second: Option<TextureHandle>,
     error: Option<String>,
-    /// Why it is not known what the pixels of this view belong to.
+    /// Reason why there is no identity map of this view.
     unmapped: Option<String>,
-    /// Why the CPU draws though there is a GPU, once that was reported.
+    /// Reason why the CPU draws although there is a GPU, once reported.
     instead_of_gpu: Option<String>,
     /// Generation of the newest frame.
     shown: u64,
-    /// The same, when it was asked for last.
+    /// Generation of the newest frame at the last call of `take_new`.
     counted: u64,
     /// Generation of the newest maps.
     mapped: u64,
-    /// Times of the newest frames, while they are shown.
+    /// Times of recent frames, while they are shown.
     times: Option<FrameTimes>,
-    /// When frames came lately, in window time.
+    /// Window times of recent frames, s.
     arrivals: VecDeque<f64>,
 }
 
@@ -59,22 +59,22 @@ impl Display {
         self.picture.as_deref()
     }
 
-    /// The times of the newest frames, while they are shown.
+    /// Times of recent frames, while they are shown.
     pub(super) fn times(&self) -> Option<&FrameTimes> {
         self.times.as_ref()
     }
 
-    /// The worker draws with the device of this window.
+    /// Lets the worker draw with the device of this window.
     pub(super) fn share(&mut self, window: RenderState) {
         self.native = Some(NativeTexture { window, id: None });
     }
 
-    /// Whether what lies on the device that draws can be painted.
+    /// True if frames on the drawing device can be painted.
     pub(super) fn shares_device(&self) -> bool {
         self.native.is_some()
     }
 
-    /// What could not be drawn, for the user.
+    /// Errors of rendering, for the user.
     pub(super) fn errors(&self) -> impl Iterator<Item = &String> {
         self.error.iter().chain(&self.unmapped)
     }
@@ -85,12 +85,12 @@ impl Display {
         self.native.iter_mut().for_each(|native| native.show(None));
     }
 
-    /// Forgets why there are no maps: the view is another.
+    /// Clears the error of the maps, as the view has changed.
     pub(super) fn forget_maps(&mut self) {
         self.unmapped = None;
     }
 
-    /// Collects the times of frames, or stops.
+    /// Starts or stops collecting the times of frames.
     pub(super) fn time_frames(&mut self, on: bool) {
         match on {
             true => drop(self.times.get_or_insert_default()),
@@ -98,12 +98,12 @@ impl Display {
         }
     }
 
-    /// Whether a frame has come since this was asked last.
+    /// True if a frame has arrived since the last call.
     pub(super) fn take_new(&mut self) -> bool {
         std::mem::replace(&mut self.counted, self.shown) != self.shown
     }
 
-    /// Why the CPU draws though there is a GPU, once for each reason.
+    /// Reason why the CPU draws although there is a GPU, once for each reason.
     pub(super) fn newly_instead_of_gpu(&mut self) -> Option<String> {
         let why = self.picture.as_ref()?.instead_of_gpu.clone()?;
         (self.instead_of_gpu.replace(why.clone()).as_ref() != Some(&why)).then_some(why)
@@ -122,7 +122,7 @@ impl Display {
         };
         let start = Instant::now();
         let size = [picture.camera.width_px as usize, picture.camera.height_px as usize];
-        // After a device was lost the worker may draw with another one than the window.
+        // After a device loss, worker and window may use different devices.
         let native = self.native.as_mut();
         let paints = |texture: &&DevicePicture| native.as_ref().is_some_and(|n| texture.lies_on(&n.window.device));
         let texture = picture.texture.as_ref().filter(paints);
@@ -151,7 +151,7 @@ impl Display {
         self.error = None;
     }
 
-    /// Frames per second lately, if there were enough.
+    /// Recent frames per second; `None` before enough frames.
     pub(super) fn rate(&self, now: f64) -> Option<f64> {
         let first = self.arrivals.iter().find(|at| now - **at < RATE_SECS)?;
         let frames = self.arrivals.iter().filter(|at| *at > first).count();
@@ -159,8 +159,8 @@ impl Display {
         (secs > 0.0).then(|| frames as f64 / secs)
     }
 
-    /// What the pixels belong to, if that has come since, and whether the view rests: then maps of an earlier request
-    /// than that with this ticket are of another view; maps of a moving view are those of its newest frame.
+    /// New identity maps, and whether the view is at rest. At rest, maps of a request before `ticket` belong to another
+    /// view; those of a moving view belong to its newest frame.
     pub(super) fn take_maps(&mut self, maps: &Slot<MappedView>, ticket: u64) -> Option<(Versioned<ViewMaps>, bool)> {
         let (generation, mapped) = maps.newer_than(self.mapped)?;
         self.mapped = generation;
@@ -177,9 +177,9 @@ impl Display {
         None
     }
 
-    /// Paints the frame into `shown`, a part of the view's `rect`; the first or the second view.
+    /// Paints the frame of the first or second view into `shown`, a part of the view's `rect`.
     pub(super) fn paint(&self, ui: &Ui, (rect, shown): (Rect, Rect), second: bool) {
-        // Filling what the frame covers anyway would be a fifth of a redraw on an emulated adapter.
+        // Filling the area under the frame would take a fifth of a redraw on an emulated adapter.
         let native = self.native.as_ref().and_then(|native| native.id);
         let first = native.or(self.texture.as_ref().map(TextureHandle::id));
         if first.is_none() || shown != rect {
@@ -191,10 +191,10 @@ impl Display {
         }
     }
 
-    /// The drawn surface at a relative position of the frame, if its depth was drawn from where the eye is.
+    /// The rendered surface at a relative position of the frame, if its depth was drawn from the current position.
     pub(super) fn picked(&self, at: DVec2, eye: &Eye) -> Option<DVec3> {
         let picture = self.picture()?;
-        // A frame from somewhere else says nothing about here.
+        // A frame from another position does not apply here.
         if picture.camera.center.distance(eye.center) > 1e-3 * eye.distance() {
             return None;
         }
@@ -207,7 +207,7 @@ impl Display {
 }
 
 impl NativeTexture {
-    /// Takes over a picture, or gives back what the last one had.
+    /// Shows a frame, or releases the texture of the last one.
     fn show(&mut self, picture: Option<&DevicePicture>) {
         let RenderState { renderer, device, .. } = &self.window;
         let mut renderer = renderer.write();
@@ -227,7 +227,7 @@ impl NativeTexture {
     }
 }
 
-/// Pixels as a texture.
+/// Uploads pixels as a texture.
 fn upload(ctx: &egui::Context, texture: &mut Option<TextureHandle>, size: [usize; 2], rgb: &[[u8; 3]]) {
     let pixels = rgb.iter().map(|&[r, g, b]| Color32::from_rgb(r, g, b)).collect();
     let image = ColorImage::new(size, pixels);
@@ -237,7 +237,7 @@ fn upload(ctx: &egui::Context, texture: &mut Option<TextureHandle>, size: [usize
     }
 }
 
-/// What went wrong and what can be done, in one line.
+/// Error and remedy in one line.
 fn report(failure: &Failure) -> String {
     format!("{} {}", failure.message, failure.remedy)
 }
@@ -247,7 +247,7 @@ mod tests {
     use super::*;
     use crate::scene::Bounds;
 
-    /// A frame of 4 x 4 px as `eye` sees it, at depth 2 but for its first pixel.
+    /// A frame of 4 x 4 px from `eye`, with depth 2 except at its first pixel.
     fn frame(ticket: u64, eye: &Eye) -> ViewPicture {
         let mut depth = vec![2.0; 16];
         depth[0] = 0.0;
@@ -348,7 +348,7 @@ mod tests {
         let of_bytes = painted(&rgb, None);
         let of_texture = painted(&[], Some(texture.clone()));
         assert_eq!(of_texture, of_bytes);
-        // Another one, and back: what is on screen is always the newest.
+        // To another frame and back: the newest is always on screen.
         let black = painted(&vec![[0; 3]; rgb.len()], None);
         assert_ne!(black, of_bytes);
         assert_eq!(painted(&[], Some(texture)), of_bytes);

@@ -1,10 +1,10 @@
-//! The viewer's own camera: orbits a pivot, flies, pans, and zooms toward what is under the cursor.
+//! The viewer's camera: orbits a pivot, flies, pans, and zooms toward the point under the cursor.
 
 use glam::{DMat3, DVec2, DVec3};
 
 use crate::scene::{Bounds, Camera, HomeView};
 
-/// How close the viewing direction may come to the up direction, in radians.
+/// Smallest angle between viewing and up direction, radians.
 const POLE_RAD: f64 = 0.03;
 
 /// The viewer's camera, without a frame size.
@@ -14,22 +14,22 @@ pub struct Eye {
     pub(crate) center: DVec3,
     /// Columns: right, down, forward in the world.
     pub(crate) world_from_eye: DMat3,
-    /// What orbiting turns about.
+    /// Pivot of orbiting.
     pub(crate) pivot: DVec3,
-    /// Upwards in the world, unit length.
+    /// Up direction of the world, unit length.
     pub(crate) up: DVec3,
     /// Vertical field of view in radians.
     pub(crate) fov_y_rad: f64,
 }
 
 impl Eye {
-    /// An eye that sees all of `bounds` from obliquely above.
+    /// A camera that sees all of `bounds` obliquely from above.
     pub fn framing(bounds: &Bounds, up: DVec3) -> Self {
-        // The size of the picture does not matter.
+        // The size of the image does not matter.
         Self::of_camera(&HomeView::overview(bounds, up, [1, 1]), bounds.center(), up)
     }
 
-    /// The eye of a photo's camera, with `pivot` to turn about.
+    /// The pose of a photo's camera, with `pivot` to orbit.
     pub(crate) fn of_camera(camera: &Camera, pivot: DVec3, up: DVec3) -> Self {
         Self {
             center: camera.center,
@@ -55,8 +55,8 @@ impl Eye {
         self.center.distance(self.pivot).max(1e-9)
     }
 
-    /// Turns about the pivot: `yaw_rad` about the up direction, `pitch_rad` about the eye's right
-    /// axis, stopping short of the poles.
+    /// Orbits the pivot: `yaw_rad` about the up direction, `pitch_rad` about the camera's right axis, stopping short of
+    /// the poles.
     pub(crate) fn orbit(&mut self, yaw_rad: f64, pitch_rad: f64) {
         let from_up = self.forward().dot(self.up).clamp(-1.0, 1.0).acos();
         // Positive pitch lifts the viewing direction toward up.
@@ -69,8 +69,7 @@ impl Eye {
         self.set_rotation(turn * self.world_from_eye);
     }
 
-    /// Moves eye and pivot in the frame plane so that what is at the pivot's depth follows the
-    /// cursor.
+    /// Moves camera and pivot in the image plane so that points at the pivot's depth follow the cursor.
     pub(crate) fn pan(&mut self, delta_px: DVec2, height_px: f64) {
         let depth = (self.pivot - self.center).dot(self.forward()).abs().max(0.05 * self.distance());
         let per_px = 2.0 * depth * (0.5 * self.fov_y_rad).tan() / height_px.max(1.0);
@@ -79,28 +78,27 @@ impl Eye {
         self.pivot += shift;
     }
 
-    /// Moves toward `target` so that its distance is multiplied by `factor` (under 1: nearer).
-    /// The target stays where it is in the frame.
+    /// Moves toward `target` so that its distance is multiplied by `factor` (below 1: nearer). The target keeps its
+    /// place in the frame.
     pub(crate) fn zoom(&mut self, target: DVec3, factor: f64) {
         self.center = target + (self.center - target) * factor.clamp(0.05, 20.0);
     }
 
-    /// Flies: `motion` is in eye axes (right, up, forward), in scene units. The pivot comes along.
+    /// Flies: `motion` is in camera axes (right, up, forward), in scene units. The pivot moves along.
     pub(crate) fn fly(&mut self, motion: DVec3) {
         let shift = self.world_from_eye * DVec3::new(motion.x, -motion.y, motion.z);
         self.center += shift;
         self.pivot += shift;
     }
 
-    /// Moves back or forth along the viewing direction until `bounds` fills the view, and turns
-    /// about its middle from then on.
+    /// Moves along the viewing direction until `bounds` fills the view, and sets the pivot to its center.
     pub(crate) fn frame(&mut self, bounds: &Bounds) {
         self.pivot = bounds.center();
         self.center = self.pivot - self.forward() * HomeView::distance(bounds, self.fov_y_rad);
     }
 
     /// The first view of a scene: from its first camera if it has one, else framed as a whole; upright if the user
-    /// chose what is up.
+    /// chose the up direction.
     pub(crate) fn home(home: &HomeView, up: Option<DVec3>) -> Self {
         let mut eye = match &home.camera {
             Some(c) => {
@@ -116,7 +114,7 @@ impl Eye {
         eye
     }
 
-    /// The point at a relative position of a view of this height by width, as far away as the pivot.
+    /// The point at a relative position of a view of this aspect ratio (height / width), at the depth of the pivot.
     pub(crate) fn point_at_pivot_depth(&self, at: DVec2, aspect: f64) -> DVec3 {
         let camera = self.camera(1000, (1000.0 * aspect).max(1.0) as u32);
         let ray = camera.ray(at * DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px)));
@@ -124,20 +122,20 @@ impl Eye {
         self.center + ray * depth
     }
 
-    /// Chooses another up direction and turns upright.
+    /// Sets another up direction and turns upright.
     pub(crate) fn set_up(&mut self, up: DVec3) {
         self.up = up;
         self.look_along(self.forward());
     }
 
-    /// Looks along `direction` with up upwards; keeps the old rotation where that has no answer.
+    /// Looks along `direction`, upright; keeps the old rotation if that is undefined.
     fn look_along(&mut self, direction: DVec3) {
         let Some(forward) = direction.try_normalize() else { return };
         let right = forward.cross(self.up).try_normalize().unwrap_or_else(|| forward.any_orthonormal_vector());
         self.world_from_eye = DMat3::from_cols(right, forward.cross(right), forward);
     }
 
-    /// Takes over a rotation, with the rounding errors of many products removed.
+    /// Sets a rotation, orthonormalized against rounding errors.
     fn set_rotation(&mut self, m: DMat3) {
         let Some(forward) = m.z_axis.try_normalize() else { return };
         let Some(right) = (m.x_axis - forward * m.x_axis.dot(forward)).try_normalize() else { return };

@@ -1,4 +1,4 @@
-//! How long each stage of a frame takes: the last one, and the median of the last few.
+//! Times of the stages of a frame: the last one, and the median of recent ones.
 
 use std::collections::VecDeque;
 
@@ -8,30 +8,30 @@ use super::super::theme;
 use crate::math::stats::median;
 use crate::worker::view::ViewPicture;
 
-/// Frames that medians are made of.
+/// Number of frames in the medians.
 const MOST: usize = 60;
 
 /// A stage of a frame.
 type Stage = (&'static str, f64);
 
-/// Times of the newest frames, kept while they are shown.
+/// Times of recent frames, kept while they are shown.
 #[derive(Default)]
 pub(crate) struct FrameTimes {
     frames: VecDeque<Vec<Stage>>,
-    /// Of the maps of what pixels belong to, drawn when the eye rests.
+    /// Times of the identity maps, drawn at rest, s.
     maps: VecDeque<f64>,
-    /// What draws, and whether it tells its stages.
+    /// Name of the renderer; whether it reports its stages.
     drawn_by: String,
     has_stages: bool,
 }
 
 impl FrameTimes {
-    /// Takes a frame in, whose pixels took `upload_secs` to become a texture.
+    /// Adds a frame that took `upload_secs` to upload.
     pub(crate) fn add(&mut self, picture: &ViewPicture, upload_secs: f64) {
         self.drawn_by.clone_from(&picture.drawn_by);
         self.has_stages = !picture.stages.is_empty();
         let mut stages = picture.stages.clone();
-        // Waiting for the device and copying are in the whole, but in no stage.
+        // Waiting for the device and copying are part of the total, but of no stage.
         let known: f64 = stages.iter().map(|s| s.1).sum();
         stages.push((if self.has_stages { "other rendering" } else { "draw" }, (picture.secs - known).max(0.0)));
         stages.extend([("8-bit conversion", picture.paint_secs), ("upload", upload_secs)]);
@@ -39,7 +39,7 @@ impl FrameTimes {
         push(&mut self.frames, stages);
     }
 
-    /// Takes in what drawing the maps took.
+    /// Adds the time of the identity maps.
     pub(crate) fn add_maps(&mut self, secs: f64) {
         push(&mut self.maps, secs);
     }

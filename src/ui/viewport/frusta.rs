@@ -1,4 +1,4 @@
-//! The cameras of the photos, drawn over the view.
+//! Cameras of the photos, drawn over the view.
 
 use egui::{Color32, Painter, Pos2, Rect, Response, Stroke, Ui};
 use glam::{DVec2, DVec3};
@@ -10,11 +10,11 @@ use crate::jobs::OpenedScene;
 use crate::scene::Camera;
 use crate::ui::actions::Action;
 
-/// How near the cursor must come to a camera to point at it, in points.
+/// Largest distance of the cursor from a camera that it picks, points.
 const REACH: f32 = 12.0;
 
 impl Viewport {
-    /// Draws every camera; a click on one looks through it. Whether the cursor points at one.
+    /// Draws every camera; a click on one looks through it. Returns true if the cursor is on one.
     pub(super) fn show_frusta(
         &self,
         ui: &Ui,
@@ -24,7 +24,7 @@ impl Viewport {
         layout: &Layout,
         actions: &mut Vec<Action>,
     ) -> bool {
-        // Around one thing alone they would be clutter.
+        // Around an isolated identity they would be clutter.
         let Some(dataset) = scene.dataset.as_ref().filter(|_| !self.visibility.is_isolated()) else { return false };
         let painter = ui.painter_at(rect);
         let eye = self.overlay_camera(rect);
@@ -40,7 +40,7 @@ impl Viewport {
             (at.distance(cursor) < REACH).then_some((i, at))
         });
         for (i, photo) in dataset.photos.iter().enumerate() {
-            // From inside, a camera is only lines along the border.
+            // From inside, a camera is only lines along the border of the view.
             let distance = photo.camera.center.distance(eye.center);
             if distance < size {
                 continue;
@@ -77,10 +77,10 @@ fn label(painter: &Painter, at: Pos2, text: &str) {
     painter.galley(corner, galley, theme::text());
 }
 
-/// One camera as a pyramid of depth `size`, with a mark on its upper side.
+/// Draws a camera as a pyramid with a base of `size` on its longer side, and a mark on its upper side.
 fn draw(painter: &Painter, eye: &Camera, camera: &Camera, size: f64, place: impl Fn(DVec2) -> Pos2, stroke: Stroke) {
     let (w, h) = (f64::from(camera.width_px), f64::from(camera.height_px));
-    // As deep as it is wide on a usual lens, whatever its focal length.
+    // The depth at which the base has that size; about `size` for a usual lens.
     let depth = size * camera.focal_px.x / w.max(h);
     let corner = |x: f64, y: f64| camera.center + camera.ray(DVec2::new(x, y)) * depth;
     let c = [corner(0.0, 0.0), corner(w, 0.0), corner(w, h), corner(0.0, h)];

@@ -11,11 +11,11 @@ use crate::jobs::OpenedScene;
 const ORBIT_RAD: f64 = 0.006;
 /// Scene radii flown per second.
 const FLY_RADII: f64 = 0.8;
-/// Distance left after one notch of the wheel, which scrolls about 50 points.
+/// Factor of the distance per point of scrolling; a notch of the wheel is about 50 points.
 const ZOOM_PER_POINT: f64 = 0.9976;
 
 impl Viewport {
-    /// Moves the eye. Returns whether it moved.
+    /// Moves the camera. Returns whether it moved.
     pub(super) fn handle_input(&mut self, ui: &Ui, response: &Response, rect: Rect, scene: &OpenedScene) -> bool {
         let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
         let by_drag = self.drag(response, rect);
@@ -36,7 +36,7 @@ impl Viewport {
         }
         let delta = DVec2::new(f64::from(delta.x), f64::from(delta.y));
         if response.dragged_by(PointerButton::Primary) {
-            // Whoever paints or selects has this gesture.
+            // Painting and selecting use this gesture.
             if self.has_brush() {
                 return false;
             }
@@ -50,7 +50,7 @@ impl Viewport {
     fn wheel(&mut self, ui: &Ui, response: &Response, shown: Rect) -> bool {
         let (scroll, cursor) = ui.input(|i| (i.smooth_scroll_delta().y, i.pointer.hover_pos()));
         let Some(cursor) = cursor.filter(|_| scroll != 0.0 && response.hovered()) else { return false };
-        // One gesture zooms to one point, even where depth is drawn anew on the way.
+        // One gesture zooms to one point, even if depth is redrawn meanwhile.
         let target = match self.zoom_anchor {
             Some((at, point)) if at.distance(cursor) < 3.0 && self.point_is_ahead(point) => point,
             _ => self.point_at(cursor, shown),
@@ -68,7 +68,7 @@ impl Viewport {
         let has_menu = egui::Popup::is_any_open(ui.ctx());
         let is_taken = keys::is_typing(ui.ctx()) || has_menu || ui.memory(|m| m.top_modal_layer().is_some());
         if is_taken || !ui.is_enabled() {
-            // What is held now was pressed for something else.
+            // The held keys were pressed for something else.
             self.flying.clear();
             return false;
         }
@@ -91,7 +91,7 @@ impl Viewport {
         true
     }
 
-    /// The world point under a window position: at the drawn depth, else at the pivot's.
+    /// The world point under a window position: at the rendered depth, else at the pivot's.
     pub(super) fn point_at(&self, pos: egui::Pos2, shown: Rect) -> DVec3 {
         let at = DVec2::new(
             f64::from((pos.x - shown.left()) / shown.width().max(1.0)),

@@ -1,4 +1,4 @@
-//! The inspector: what a pixel consists of, Gaussian by Gaussian, with every property of each.
+//! The inspector: the Gaussians that contribute to a pixel, with all properties of each.
 
 use egui::{
     Align2, Area, Button, Color32, Grid, Id, Order, Rect, Response, RichText, ScrollArea, Sense, Stroke, Ui, vec2,
@@ -16,23 +16,23 @@ use crate::math::format;
 use crate::scene::Camera;
 use crate::ui::actions::Action;
 
-/// Standard deviations at which a Gaussian is outlined.
+/// Outline of a Gaussian, standard deviations.
 const OUTLINE_SIGMA: f64 = 2.0;
 /// Corners of an outline.
 const CORNERS: usize = 48;
 
-/// The pixel that was looked into, and which of its Gaussians is shown.
+/// The inspected pixel, and which of its Gaussians is shown.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Inspector {
     pixel: Option<Arc<InspectedPixel>>,
-    /// Whether another is being looked into.
+    /// True while another pixel is being inspected.
     waits: bool,
     place: usize,
     record: Option<GaussianRecord>,
 }
 
 impl Inspector {
-    /// Shows a pixel from its largest Gaussian on.
+    /// Shows a pixel, beginning with its largest Gaussian.
     pub(crate) fn take(&mut self, pixel: Arc<InspectedPixel>) {
         self.record = pixel.record(0);
         (self.pixel, self.place, self.waits) = (Some(pixel), 0, false);
@@ -46,12 +46,12 @@ impl Inspector {
 }
 
 impl Viewport {
-    /// Whether Gaussians are being inspected.
+    /// True if the inspector is in use.
     pub(crate) fn is_inspecting(&self) -> bool {
         self.inspector.is_some()
     }
 
-    /// What there is to look into at a relative place of the view.
+    /// The request to inspect the pixel at a relative position of the view.
     pub(crate) fn inspect_request(&mut self, at: DVec2, state: &AppState) -> Option<InspectRequest> {
         let (cloud, camera) = (self.cloud.clone()?, self.picture()?.camera.clone());
         let VisibleCloud { cloud, semantics, numbers } = self.visibility.apply(&cloud, state.semantics.as_ref());
@@ -68,7 +68,7 @@ impl Viewport {
         })
     }
 
-    /// Takes clicks, outlines the Gaussian and tells all of it.
+    /// Handles clicks, outlines the Gaussian and lists its properties.
     pub(super) fn show_inspector(
         &mut self,
         ui: &Ui,
@@ -93,7 +93,7 @@ impl Viewport {
             ui.set_width((shown.width() - 44.0).clamp(120.0, 330.0));
             card(ui, inspector, (shown.height() - 300.0).clamp(90.0, 420.0), state, actions);
         });
-        // It has grown: the next frame puts it where it fits.
+        // The card has grown; the next frame places it correctly.
         if drawn.response.rect.bottom() > at.y + 1.0 {
             ui.ctx().request_repaint();
         }
@@ -209,7 +209,7 @@ fn properties(ui: &mut Ui, record: &GaussianRecord, state: &AppState) {
     });
 }
 
-/// A cross on the pixel, while the view is that of the picture, and the Gaussian's three ellipses.
+/// Draws a cross on the pixel, while the view is that of the frame, and the Gaussian's three ellipses.
 fn outline(ui: &Ui, shown: Rect, eye: &Camera, pixel: &InspectedPixel, record: &GaussianRecord) {
     let painter = ui.painter_at(shown);
     let strokes = [Stroke::new(3.0, Color32::from_black_alpha(140)), Stroke::new(1.2, theme::accent())];

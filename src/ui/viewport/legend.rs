@@ -1,4 +1,4 @@
-//! What the colors over the view mean, with the threshold and the opacity beside it.
+//! Legend of the colors over the view, with threshold and opacity.
 
 use egui::{Color32, FontId, Mesh, Rect, RichText, Sense, Slider, Stroke, Ui, vec2};
 
@@ -12,13 +12,13 @@ use crate::ui::theme;
 /// Steps of the color bar.
 const STEPS: usize = 32;
 
-/// Whether there is something to explain.
+/// True if the view needs a legend.
 pub(super) fn is_needed(settings: &OverlaySettings, depth: Option<(f32, f32)>) -> bool {
     settings.color_by != ColorBy::Masks || depth.is_some()
 }
 
-/// The legend of the tint, or of the depths that the frame shows. `shares` are those of the view of
-/// which nothing is known and that was invented, once the eye rests; `photo` what can be done about it with one.
+/// Draws the legend of the tint, or of the depths in the frame. `shares` are the shares of unlabeled and of invented
+/// pixels, at rest; `photo` is the label of a button that segments one more photo.
 pub(super) fn show(
     ui: &mut Ui,
     settings: &mut OverlaySettings,
@@ -57,7 +57,7 @@ pub(super) fn show(
     });
 }
 
-/// How much is unknown, and what can be done about it.
+/// Draws the share of unlabeled pixels, with a button to segment a photo.
 fn show_unknown(ui: &mut Ui, share: Option<f64>, photo: Option<&str>, actions: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         let (rect, _) = ui.allocate_exact_size(vec2(18.0, 11.0), Sense::hover());
@@ -83,7 +83,7 @@ fn show_unknown(ui: &mut Ui, share: Option<f64>, photo: Option<&str>, actions: &
     }
 }
 
-/// How much was made up where something was removed.
+/// Draws the share of pixels that a removal has filled.
 fn show_invented(ui: &mut Ui, share: f64) {
     ui.horizontal(|ui| {
         let (rect, _) = ui.allocate_exact_size(vec2(18.0, 11.0), Sense::hover());
@@ -97,7 +97,7 @@ fn show_invented(ui: &mut Ui, share: f64) {
     });
 }
 
-/// Stripes as they are drawn over the view; `falling` to the right or rising.
+/// Draws stripes as over the view; `falling` to the right or rising.
 fn hatch(ui: &Ui, rect: Rect, colors: [[u8; 3]; 2], falling: bool) {
     let [light, dark] = colors.map(|[r, g, b]| Color32::from_rgb(r, g, b));
     let painter = ui.painter().with_clip_rect(rect.intersect(ui.clip_rect()));
@@ -111,7 +111,7 @@ fn hatch(ui: &Ui, rect: Rect, colors: [[u8; 3]; 2], falling: bool) {
     }
 }
 
-/// A color map between what its ends stand for.
+/// Draws a color map between the labels of its ends.
 fn bar(ui: &mut Ui, map: Colormap, ends: [String; 2]) {
     let (all, _) = ui.allocate_exact_size(vec2(220.0, 12.0), Sense::hover());
     let [from, to] = ends.map(|text| ui.painter().layout_no_wrap(text, FontId::proportional(11.5), theme::weak()));

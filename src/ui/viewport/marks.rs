@@ -1,5 +1,5 @@
-//! Where something is that one does not see well: an arrow at the border of the view if it lies outside, a dashed
-//! outline if other things hide it, a ring if it is small. A click flies there.
+//! Marks of identities that are hard to see: an arrow at the border of the view if outside, a dashed outline if
+//! occluded, a ring if small. A click flies there.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -15,26 +15,26 @@ use crate::scene::{Bounds, Camera, GaussianCloud, IdentityId, SemanticMap, text}
 use crate::ui::actions::Action;
 use crate::worker::Versioned;
 
-/// Gaussians that stand for an identity.
+/// Gaussians sampled per identity.
 const POINTS: usize = 256;
-/// Masks no wider and no higher than this are hard to see, points.
+/// Masks up to this width and height are hard to see, points.
 const SMALL: f32 = 16.0;
-/// Share of the points in view from which something is in it.
+/// Least share of its points in view for an identity to count as in view.
 const IN_VIEW: f32 = 0.1;
-/// Identities that are marked at most.
+/// Largest number of marked identities.
 const MOST: usize = 6;
-/// Under every line.
+/// Halo under every line.
 const HALO: Stroke = Stroke { width: 4.0, color: Color32::from_black_alpha(150) };
 
-/// The shapes of the identities that were marked, by number.
+/// Sampled points of marked identities, by number.
 #[derive(Default)]
 pub(super) struct Marks {
-    /// Gaussians and objects that they are of.
+    /// Generations of their Gaussians and objects.
     of: (u64, u64),
     known: HashMap<IdentityId, Arc<[DVec3]>>,
 }
 
-/// How something is marked.
+/// Kind of mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mark {
     None,
@@ -44,7 +44,7 @@ enum Mark {
 }
 
 impl Marks {
-    /// Some of the Gaussians of an identity, strays left out.
+    /// Samples the Gaussians of an identity, without outliers.
     pub(super) fn points(
         &mut self,
         cloud: &Versioned<GaussianCloud>,
@@ -74,8 +74,8 @@ fn sample(cloud: &GaussianCloud, semantics: &SemanticMap, id: IdentityId) -> Arc
         .collect()
 }
 
-/// How something is marked of whose points a share is `in_view` and whose pixels are known to span `size`, points;
-/// `Some(None)` if it has none.
+/// Mark of an identity with a share of its points `in_view` and a span of `size` points, if known; `Some(None)` if it
+/// has no pixels.
 fn mark(in_view: f32, size: Option<Option<Vec2>>) -> Mark {
     match size {
         Some(Some(size)) if size.max_elem() <= SMALL => Mark::Ring,
@@ -87,7 +87,7 @@ fn mark(in_view: f32, size: Option<Option<Vec2>>) -> Mark {
 }
 
 impl Viewport {
-    /// Marks what was found and what is selected, where it is hard to see.
+    /// Marks found and selected identities that are hard to see.
     pub(super) fn show_marks(
         &mut self,
         ui: &Ui,
@@ -131,7 +131,7 @@ impl Viewport {
         }
     }
 
-    /// What the selected object or part spans, if anything is selected.
+    /// Bounds of the selected object or part, if any.
     pub(super) fn selected_bounds(&mut self, semantics: Option<&Versioned<SemanticMap>>) -> Option<Bounds> {
         let (id, cloud) = (self.picking.selected()?, self.cloud.clone()?);
         Bounds::of(self.marks.points(&cloud, semantics?, id).iter().copied())
@@ -147,14 +147,14 @@ fn middle(places: &[Pos2]) -> Pos2 {
     (sum / places.len().max(1) as f32).to_pos2()
 }
 
-/// Which way to turn to have the points in view: right and down of the view, length 1.
+/// Direction to turn for the points to come into view: right and down in the view, length 1.
 fn way(eye: &Camera, points: &[DVec3]) -> Vec2 {
     let sum: DVec3 = points.iter().map(|p| eye.camera_from_world(*p)).sum();
     let way = sum.truncate().normalize_or(glam::DVec2::Y);
     vec2(way.x as f32, way.y as f32)
 }
 
-/// An arrow at the border of the view, with a name beside it. Where it can be clicked.
+/// Draws an arrow at the border of the view, with a name beside it. Returns the clickable area.
 fn arrow(painter: &Painter, shown: Rect, way: Vec2, color: Color32, name: &str) -> Rect {
     let room = shown.shrink(26.0);
     let half = room.size() / 2.0;
@@ -171,7 +171,7 @@ fn arrow(painter: &Painter, shown: Rect, way: Vec2, color: Color32, name: &str) 
     label.union(Rect::from_center_size(tip - way * 10.0, Vec2::splat(26.0)))
 }
 
-/// A dashed outline with a name over it. Where it can be clicked: at its name.
+/// Draws a dashed outline with a name over it. Returns the clickable area, at the name.
 fn ghost(painter: &Painter, outline: &[Pos2], color: Color32, name: &str) -> Rect {
     let closed: Vec<Pos2> = outline.iter().chain(outline.first()).copied().collect();
     painter.add(Shape::line(closed.clone(), HALO));
@@ -187,14 +187,14 @@ fn ghost(painter: &Painter, outline: &[Pos2], color: Color32, name: &str) -> Rec
     label
 }
 
-/// A ring around something small. Where it can be clicked.
+/// Draws a ring around something small. Returns the clickable area.
 fn ring(painter: &Painter, at: Pos2, color: Color32) -> Rect {
     painter.circle_stroke(at, 17.0, HALO);
     painter.circle_stroke(at, 17.0, Stroke::new(2.0, color));
     Rect::from_center_size(at, Vec2::splat(36.0))
 }
 
-/// The convex hull of points, around once (Andrew's monotone chain).
+/// The convex hull of points, in order (Andrew's monotone chain).
 fn hull(mut points: Vec<Pos2>) -> Vec<Pos2> {
     points.retain(|p| p.is_finite());
     points.sort_by(|a, b| a.x.total_cmp(&b.x).then(a.y.total_cmp(&b.y)));
@@ -235,7 +235,7 @@ mod tests {
     #[test]
     fn arrows_point_where_one_has_to_turn() {
         let eye = Camera::look_at(DVec3::ZERO, DVec3::X, DVec3::Z, 0.8, 100, 100).expect("valid");
-        // Looking along x with z upwards, the right is -y.
+        // For a camera along x with z up, right is -y.
         let at = |x: f64, y: f64, z: f64| way(&eye, &[DVec3::new(x, y, z)]);
         assert!((at(1.0, -9.0, 0.0) - vec2(1.0, 0.0)).length() < 1e-6);
         assert!((at(-5.0, -1.0, 0.0) - vec2(1.0, 0.0)).length() < 1e-6, "behind, to the right");

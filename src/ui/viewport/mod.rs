@@ -1,4 +1,4 @@
-//! The viewport: shows what the drawing lane rendered, and moves the eye.
+//! The viewport: shows the frames of the view thread and moves the camera.
 
 mod act;
 pub(crate) mod arranging;
@@ -68,50 +68,50 @@ pub struct Viewport {
     requests: Requests,
     display: Display,
     eye: Eye,
-    /// Upwards, where a user chose it.
+    /// Up direction, if the user chose it.
     up: Option<DVec3>,
-    /// Number of the scene that eye and cloud belong to.
+    /// Number of the scene of camera and cloud.
     scene: u64,
     cloud: Option<Versioned<GaussianCloud>>,
     /// Generation of the newest snapshot taken from training.
     snapshot: u64,
-    /// The photo through whose camera the eye looks.
+    /// The photo whose camera the view looks through.
     photo: Option<PhotoView>,
-    /// When the eye last moved, in window time.
+    /// Window time of the last camera motion, s.
     moved_at: f64,
-    /// Keys that are held to move it.
+    /// Held keys that move the camera.
     flying: BTreeSet<egui::Key>,
-    /// What was asked, and where the answers are.
+    /// Queries and their answers.
     pub queries: Queries,
-    /// What is left out of the frame.
+    /// Hidden parts of the scene.
     pub(crate) visibility: Visibility,
-    /// What is under the cursor and what is selected.
+    /// Hovered and selected identity.
     pub picking: Picking,
     marks: Marks,
-    /// What is being measured.
+    /// The ruler in use.
     ruler: Option<Ruler>,
-    /// Whether the crop box is on screen, to be changed.
+    /// True if the crop box is shown for editing.
     cropping: bool,
-    /// What is being inspected.
+    /// The inspector in use.
     inspector: Option<Inspector>,
-    /// The true mask that is being painted.
+    /// The brush of the true mask.
     pub(crate) brush: Option<Brush>,
-    /// What is being selected by clicks and strokes.
+    /// The tool that selects by clicks and strokes.
     pub(crate) select: Option<SelectTool>,
-    /// What selections of this scene are made ready with.
+    /// Preparation for selections in this scene.
     ready: ReadySelection,
-    /// What chooses Gaussians that are brushed over.
+    /// The brush that chooses Gaussians.
     choose: Option<SplatBrush>,
-    /// What is being moved.
+    /// The tool that arranges an object or part.
     pub(crate) arrange: Option<ArrangeTool>,
     /// Render settings in place of the scene's own.
     pub overrides: RenderOverrides,
-    /// World point that the wheel zooms to, while the cursor stays.
+    /// Cursor position, and the world point that the wheel zooms to while the cursor stays.
     zoom_anchor: Option<(egui::Pos2, DVec3)>,
 }
 
 impl Viewport {
-    /// An empty viewport. Fails only if the system gives no thread.
+    /// An empty viewport. Fails only if the system cannot start a thread.
     pub(crate) fn new(repaint: Repaint) -> std::io::Result<Self> {
         let home = crate::scene::HomeView::default();
         Ok(Self {
@@ -143,7 +143,7 @@ impl Viewport {
         })
     }
 
-    /// The worker draws with the device of this window.
+    /// Lets the worker draw with the device of this window.
     pub(super) fn share(&mut self, window: eframe::egui_wgpu::RenderState) {
         self.display.share(window);
     }
@@ -158,15 +158,15 @@ impl Viewport {
         self.cloud.as_ref()
     }
 
-    /// Index of the photo through whose camera the eye looks.
+    /// Index of the photo whose camera the view looks through.
     pub fn photo_index(&self) -> Option<usize> {
         self.photo.as_ref().map(PhotoView::index)
     }
 
-    /// The frame as pixels, for saving: that of the view that is worked in.
+    /// The frame of the active view as pixels, for saving.
     ///
     /// # Errors
-    /// If they lie on a device that does not give them back.
+    /// If the frame is on a device that cannot be read back.
     pub(crate) fn pixels(&self) -> Result<Option<PhotoPixels>, GpuError> {
         self.picture().map(|picture| picture.pixels(self.queries.is_second())).transpose()
     }
@@ -222,7 +222,7 @@ impl Viewport {
         self.cloud = cloud.map(Versioned::new);
     }
 
-    /// The camera for what is drawn over the frame: the frame's own, so that both move together.
+    /// The camera for overlays of the frame: the frame's own, so that both move together.
     fn overlay_camera(&self, rect: Rect) -> Camera {
         match self.picture() {
             Some(p) => p.camera.resized(rect.width().max(1.0) as u32, rect.height().max(1.0) as u32),
@@ -230,7 +230,7 @@ impl Viewport {
         }
     }
 
-    /// Where the eye is.
+    /// Current camera pose.
     pub fn pose(&self) -> Pose {
         let (center, world_from_camera) = (self.eye.center, self.eye.world_from_eye);
         let fov_y_rad = match &self.photo {
@@ -240,32 +240,32 @@ impl Viewport {
         Pose { center, world_from_camera, fov_y_rad }
     }
 
-    /// The camera of the newest frame, or one of the eye.
+    /// The camera of the newest frame, or one at the current pose.
     pub(crate) fn camera(&self) -> Camera {
         self.picture().map_or_else(|| self.eye.camera(640, 480), |p| p.camera.clone())
     }
 
-    /// Width by height of the frame.
+    /// Aspect ratio of the frame, width / height.
     pub(crate) fn aspect(&self) -> f64 {
         self.picture().map_or(16.0 / 9.0, |p| f64::from(p.camera.width_px) / f64::from(p.camera.height_px))
     }
 
-    /// Which way is up in a scene.
+    /// Up direction of a scene.
     pub(crate) fn up(&self, scene: &OpenedScene) -> DVec3 {
         self.up.unwrap_or(scene.home.up)
     }
 
-    /// Turns about this point from now on.
+    /// Sets the pivot.
     pub(crate) fn turn_about(&mut self, point: DVec3) {
         self.eye.pivot = point;
     }
 
-    /// Whether a frame has come since this was asked last.
+    /// True if a frame has arrived since the last call.
     pub(crate) fn take_new_picture(&mut self) -> bool {
         self.display.take_new()
     }
 
-    /// Draws the viewport into all that is left of `ui`.
+    /// Draws the viewport into the rest of `ui`.
     pub(crate) fn show(
         &mut self,
         ui: &mut Ui,
@@ -292,7 +292,7 @@ impl Viewport {
             self.moved_at = now;
         }
         let shown = self.photo.as_mut().map_or(views.first, |p| p.fit(views.first));
-        // All views have the same size: what is at a place of one is at the same place of the others.
+        // All views have the same size, so positions carry over between them.
         let shown_in = |view: Rect| shown.translate(view.min - views.first.min);
         self.request(ui, shown, state, layout, now);
         if let Some(semantics) = &state.semantics {
@@ -304,7 +304,7 @@ impl Viewport {
         for (second, rect) in views.each() {
             self.queries.work_in(second);
             self.display.paint(ui, (rect, shown_in(rect)), second);
-            // Answers are of the scene, not of another one beside it.
+            // Answers belong to the scene, not to another one beside it.
             let is_other = second && state.beside.is_some();
             if let Some(semantics) = state.semantics.as_ref().filter(|_| !is_other) {
                 let lit = layout.dim.then(|| self.picking.selected().into_iter().collect());
@@ -379,7 +379,7 @@ impl Viewport {
         }
     }
 
-    /// Takes over the newest frame, and what its pixels belong to.
+    /// Takes over the newest frame and its identity maps.
     fn take_frame(&mut self, ctx: &egui::Context) {
         if let Some((maps, exact)) = self.display.take_maps(self.lane.maps(), self.requests.ticket()) {
             self.queries.set_maps(maps, exact);
@@ -387,7 +387,7 @@ impl Viewport {
         self.display.take(ctx, self.lane.pictures());
     }
 
-    /// Whether a GPU draws the view.
+    /// True if a GPU draws the view.
     pub(crate) fn on_gpu(&self) -> bool {
         self.display.picture().is_some_and(|p| p.on_gpu())
     }

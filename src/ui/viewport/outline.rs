@@ -1,5 +1,5 @@
-//! Outlines of masks: a line inside the mask's border with a dark halo around it, so that it stands out on any
-//! color, and a light fill that leaves the colors below readable.
+//! Outlines of masks: a line inside the mask's border with a dark halo around it, visible on any color, and a light
+//! fill that keeps the colors below readable.
 
 use egui::{Color32, ColorImage};
 use rayon::prelude::*;
@@ -9,15 +9,15 @@ use crate::scene::{Mask, PixelBox};
 
 /// Opacity of a mask's fill.
 const FILL: f32 = 0.16;
-/// Around outlines: whatever color is beside them, they stand out.
+/// Halo of outlines, for contrast to any color.
 const HALO: Color32 = Color32::from_black_alpha(170);
 
 /// Opacity of a contour.
 const CONTOUR: f32 = 0.75;
-/// Pieces this many times smaller than the largest are specks.
+/// Pieces smaller than the largest by this factor are specks.
 const SPECK: usize = 50;
 
-/// What a pixel is of an outlined mask.
+/// Class of a pixel in the outline of a mask.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Outline {
     /// Beside the mask.
@@ -29,7 +29,7 @@ pub(super) enum Outline {
 }
 
 impl Outline {
-    /// What pixel `i` is. The border of the picture is none of the mask.
+    /// Class of pixel `i`. The image's border is no border of the mask.
     pub(super) fn at(mask: &Mask, i: usize) -> Self {
         let (w, n) = (mask.width_px(), mask.width_px() * mask.height_px());
         let near = |i: usize| neighbors(i, w, n);
@@ -40,7 +40,7 @@ impl Outline {
         if line { Self::Line } else { Self::Fill }
     }
 
-    /// Its color in an outline of this one; `None` outside.
+    /// Color in an outline of the given color; `None` outside.
     pub(super) fn color(self, [r, g, b]: [u8; 3]) -> Option<Color32> {
         match self {
             Self::Halo => Some(HALO),
@@ -51,15 +51,14 @@ impl Outline {
     }
 }
 
-/// The outline of a mask in a picture that is no larger than it needs to be, and where in the mask's own that is;
-/// `None` if the mask is empty.
+/// The outline of a mask, cropped to it, and its place in the mask's image; `None` if the mask is empty.
 pub(super) fn image(mask: &Mask, color: [u8; 3]) -> Option<(ColorImage, PixelBox)> {
     let (mask, at) = cut(mask)?;
     let pixel = |i: usize| Outline::at(&mask, i).color(color).unwrap_or_default();
     Some((picture(&mask, pixel), at))
 }
 
-/// The same without fill, one pixel wide, around the mask's larger pieces alone and not around what stands before it.
+/// The outline without fill, one pixel wide, around the larger pieces of the mask only and not around occluders.
 pub(super) fn contour(mask: &Mask, color: [u8; 3]) -> Option<(ColorImage, PixelBox)> {
     let (mask, at) = cut(mask)?;
     let mask = tidied(&mask);
@@ -78,7 +77,7 @@ fn picture(mask: &Mask, pixel: impl Fn(usize) -> Color32 + Sync + Send) -> Color
     ColorImage::new(size, (0..size[0] * size[1]).into_par_iter().map(pixel).collect())
 }
 
-/// What a mask holds with a pixel around it, and where that is.
+/// The mask cropped to its pixels with a margin of one pixel, and the place of the crop.
 fn cut(mask: &Mask) -> Option<(Mask, PixelBox)> {
     let inner = mask.bounds()?;
     let (w, h) = (mask.width_px(), mask.height_px());
@@ -89,7 +88,7 @@ fn cut(mask: &Mask) -> Option<(Mask, PixelBox)> {
     Some((Mask::from_fn(width, y.len(), inside), PixelBox { x, y }))
 }
 
-/// A mask without specks and without holes.
+/// The mask without specks and holes.
 fn tidied(mask: &Mask) -> Mask {
     let (w, h) = (mask.width_px(), mask.height_px());
     let (pieces, sizes) = regions(w, w * h, |i| mask.contains(i));
@@ -115,7 +114,7 @@ mod tests {
 
     #[test]
     fn a_line_lies_inside_the_border_and_a_halo_around_it() {
-        // Columns 3 to 8 of a picture of 12 x 7, rows 0 to 6: cut by the picture above and below.
+        // Columns 3 to 8 of an image of 12 x 7, rows 0 to 6: cut by the image above and below.
         let mask = Mask::from_fn(12, 7, |i| (3..9).contains(&(i % 12)));
         let row: Vec<Outline> = (0..12).map(|x| Outline::at(&mask, 3 * 12 + x)).collect();
         use Outline::{Fill, Halo, Line, Outside};

@@ -1,4 +1,4 @@
-//! What lies over the frame: the choice of modes, the photo's name, and facts about the frame.
+//! Cards over the frame: the choice of modes, the photo's name, and facts about the frame.
 
 use egui::{Align2, Area, ComboBox, Id, Order, Rect, RichText, Ui, Vec2, vec2};
 use strum::VariantArray;
@@ -18,16 +18,16 @@ use crate::ui::color_by::ColorBy;
 use crate::worker::ViewMode;
 use crate::worker::view::ViewPicture;
 
-/// Views that are less wide than this have menus in place of buttons, points.
+/// Width below which a view has menus in place of buttons, points.
 const NARROW: f32 = 480.0;
 
-/// In views that are less wide than this the legend stands above the facts, points.
+/// Width below which the legend stands above the facts, points.
 const NARROW_BESIDE_FACTS: f32 = 760.0;
 
-/// In views that are lower than this are few cards, points.
+/// Height below which a view has few cards, points.
 const LOW: f32 = 330.0;
 
-/// A card over a view.
+/// Draws a card over a view.
 fn card(ui: &Ui, rect: Rect, name: &'static str, (align, down): (Align2, f32), add: impl FnOnce(&mut Ui)) {
     let at = align.pos_in_rect(&rect.shrink(12.0)) + vec2(0.0, down);
     let area = Area::new(Id::unique(name)).order(Order::Middle).pivot(align).fixed_pos(at).constrain_to(rect);
@@ -35,7 +35,7 @@ fn card(ui: &Ui, rect: Rect, name: &'static str, (align, down): (Align2, f32), a
 }
 
 impl Viewport {
-    /// What lies over the view of the queries that are worked in now.
+    /// Draws the cards over the active view.
     pub(super) fn show_overlay(
         &mut self,
         ui: &Ui,
@@ -59,7 +59,7 @@ impl Viewport {
             let shares = self.queries.maps().map(|m| [m.unknown_share(), m.invented_share()]);
             let has_photos = state.scene.as_ref().is_some_and(|s| s.dataset.is_some()) && state.is_trained();
             let segment = if self.photo.is_some() { "Segment this photo" } else { "Segment the nearest photo" };
-            // Above the facts where there is no room beside them.
+            // Above the facts if there is no room beside them.
             let up = if rect.width() < NARROW_BESIDE_FACTS { -46.0 } else { 0.0 };
             card(ui, rect, legend, (Align2::RIGHT_BOTTOM, up), |ui| {
                 legend::show(ui, self.queries.settings(), depth, shares, has_photos.then_some(segment), actions);
@@ -71,9 +71,9 @@ impl Viewport {
             }
             return;
         }
-        // In a low view it is worth its row only while it says which photo that is.
+        // In a low view the row is shown only with the name of the photo that the view looks through.
         if has_photos && (self.photo.is_some() || rect.height() > LOW) {
-            // Beside the modes where there is room and no query box, else below them.
+            // Beside the modes if there is room and no query box, else below them.
             let beside = rect.width() > 860.0 && state.semantics.is_none();
             let (align, down) = if beside { (Align2::RIGHT_TOP, 0.0) } else { (Align2::LEFT_TOP, 46.0) };
             card(ui, rect, "photo", (align, down), |ui| self.photo_bar(ui, scene, layout, actions));
@@ -82,7 +82,7 @@ impl Viewport {
         let rate = self.display.rate(now).filter(|_| self.moves(now)).map(rate_text);
         let size_px = rect.size() * ui.pixels_per_point();
         let facts = if rect.height() > LOW { self.facts(size_px, layout, state, rate) } else { rate };
-        // That it is drawn otherwise than the scene says must be seen in the smallest view.
+        // Overrides of the scene's render settings must be visible in the smallest view.
         let words = self.overrides.words();
         let is_cropped = self.visibility.crop().is_some();
         if facts.is_some() || words.is_some() || is_cropped {
@@ -120,7 +120,7 @@ impl Viewport {
         }
     }
 
-    /// Which scene is seen in the second view, and how well.
+    /// Draws the name of the scene in the second view, and its quality.
     fn beside_bar(&self, ui: &mut Ui, beside: &Beside, state: &AppState, actions: &mut Vec<Action>) {
         let removed = state.removed.as_ref().filter(|r| r.folder == beside.path);
         let name = removed.map_or_else(|| beside.name.clone(), |r| format!("without {}", r.name));
@@ -132,7 +132,7 @@ impl Viewport {
                 actions.push(Action::Open(removed.folder.clone()));
             }
             self.other_fills(ui, &removed.request, state, actions);
-            // A retrained one holds photos, too, which are not deleted.
+            // A retrained scene also holds photos, which are not deleted.
             let delete = Action::DeleteRemoved;
             if !removed.request.retrain && ui.button("Delete").on_hover_text(delete.tooltip()).clicked() {
                 actions.push(delete);
@@ -147,7 +147,7 @@ impl Viewport {
         }
     }
 
-    /// Removing a thing anew: each choice makes another scene.
+    /// Draws buttons for further removals; each makes another scene.
     fn other_fills(&self, ui: &mut Ui, last: &RemoveRequest, state: &AppState, actions: &mut Vec<Action>) {
         let options = RemovalOptions { seed: last.options.seed + 1, ..last.options.clone() };
         let mut next = RemoveRequest { options, retrain: false, ..last.clone() };
@@ -175,7 +175,7 @@ impl Viewport {
             let tip = "Trains the scene anew on its photos, in which it is replaced by what is behind it. Takes as long as \
                        the scene's training took.";
             if ui.button("Train anew without it").on_hover_text(tip).clicked() {
-                // As it is shown.
+                // With the options of the removal on screen.
                 next = RemoveRequest { retrain: true, ..last.clone() };
                 changed = true;
             }
@@ -189,7 +189,7 @@ impl Viewport {
         }
     }
 
-    /// The choice of what the view shows: menus where it is narrow or there is another one.
+    /// Draws the choice of the mode; as menus if the view is narrow or one of two.
     fn modes(
         &mut self,
         ui: &mut Ui,
@@ -276,7 +276,7 @@ impl Viewport {
         }
     }
 
-    /// One line about the frame.
+    /// One line of facts about the frame.
     fn facts(&self, view_px: Vec2, layout: &Layout, state: &AppState, rate: Option<String>) -> Option<String> {
         let p = self.picture()?;
         let drawn_px = vec2(p.camera.width_px as f32, p.camera.height_px as f32);

@@ -1,23 +1,23 @@
-//! Render settings that a user chose for the view, in place of the scene's own.
+//! The user's render settings of the view, in place of the scene's own.
 
 use serde::{Deserialize, Serialize};
 
 use crate::math::format::share;
 use crate::render::{Cutoffs, RenderSettings};
 
-/// What is drawn in another way than the scene says; its names are those of the settings.
+/// Overrides of render settings, with the names of the settings.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RenderOverrides {
     /// Highest spherical-harmonics degree.
     pub(crate) sh_degree: Option<u8>,
     /// The 2-D filter of Mip-Splatting.
     pub antialias: Option<bool>,
-    /// What counts as too little to be drawn.
+    /// Thresholds below which contributions are not drawn.
     pub(crate) cutoffs: Option<Cutoffs>,
 }
 
 impl RenderOverrides {
-    /// These settings over others. A GPU has its own cut-offs and keeps to them.
+    /// Applies the overrides to settings. A GPU keeps its own cut-offs.
     pub(crate) fn over(&self, settings: RenderSettings, on_gpu: bool) -> RenderSettings {
         RenderSettings {
             sh_degree: self.sh_degree.unwrap_or(settings.sh_degree),
@@ -27,7 +27,7 @@ impl RenderOverrides {
         }
     }
 
-    /// Why these settings make no frame, if they do not.
+    /// Reason why these settings are invalid, if they are.
     pub(crate) fn problem(&self) -> Option<&'static str> {
         let share = |v: f64| (1e-9..1.0).contains(&v);
         match self {
@@ -39,7 +39,7 @@ impl RenderOverrides {
         }
     }
 
-    /// What is different, for the user; `None` if nothing is.
+    /// Description of the overrides for the user; `None` if there are none.
     pub(crate) fn words(&self) -> Option<String> {
         let degree = self.sh_degree.map(|d| format!("SH degree {d}"));
         let filter = self.antialias.map(|on| format!("filter {}", if on { "on" } else { "off" }));

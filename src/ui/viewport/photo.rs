@@ -1,4 +1,4 @@
-//! Looking through a photo's camera, and the photo beside the frame.
+//! Looking through a photo's camera, with the photo beside the frame.
 
 use std::borrow::Cow;
 use std::sync::Arc;
@@ -10,13 +10,13 @@ use super::super::theme;
 use crate::scene::{Camera, Photo, PhotoPixels};
 use crate::worker::{Command, JobId, Worker};
 
-/// How far an arrow key moves the border between photo and rendering, as a share of the frame.
+/// Step of an arrow key at the split between photo and rendering, as a share of the frame.
 const KEY_STEP: f32 = 0.05;
 
-/// Longest side at which the photo beside the frame is loaded, in px.
+/// Longest side of the loaded photo, px.
 const SIDE_PX: u32 = 1600;
 
-/// A photo that the eye looks through.
+/// A photo whose camera the view looks through.
 pub(super) struct PhotoView {
     index: usize,
     photo: Photo,
@@ -24,7 +24,7 @@ pub(super) struct PhotoView {
     pixels: Option<Arc<PhotoPixels>>,
     texture: Option<TextureHandle>,
     failed: bool,
-    /// Height of the viewport over that of the frame in it.
+    /// Height of the viewport relative to the frame in it.
     margin: f64,
 }
 
@@ -64,11 +64,11 @@ impl PhotoView {
             state.failed_photos.retain(|j| *j != job);
             self.failed = true;
         }
-        // Photos of earlier visits that came too late are not kept.
+        // Late photos of earlier visits are not kept.
         state.photos.retain(|(_, side), _| *side != SIDE_PX);
     }
 
-    /// The largest rectangle of the photo's shape in `rect`.
+    /// The largest rectangle with the photo's aspect ratio in `rect`.
     pub(super) fn fit(&mut self, rect: Rect) -> Rect {
         let (w, h) = (self.photo.camera.width_px as f32, self.photo.camera.height_px as f32);
         let scale = (rect.width() / w).min(rect.height() / h);
@@ -76,12 +76,12 @@ impl PhotoView {
         Rect::from_center_size(rect.center(), vec2(w * scale, h * scale))
     }
 
-    /// The field of view with which the whole viewport shows what the photo's part of it showed.
+    /// The field of view of the whole viewport at the scale of the photo's frame.
     pub(super) fn free_fov(&self, fov_y_rad: f64) -> f64 {
         (2.0 * ((0.5 * fov_y_rad).tan() * self.margin).atan()).clamp(0.1, 2.2)
     }
 
-    /// Draws the photo right of the split, and the handle that moves the split.
+    /// Draws the photo right of the split, and the handle of the split.
     pub(super) fn show_split(&mut self, ui: &mut Ui, shown: Rect, split: &mut f32) {
         let Some(pixels) = &self.pixels else { return };
         let texture = self.texture.get_or_insert_with(|| {

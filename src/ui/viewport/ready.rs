@@ -1,4 +1,4 @@
-//! What selecting by clicks and strokes is made ready with: once for a scene as it is, for all selections in it.
+//! Preparation for selecting by clicks and strokes: once per state of a scene, for all selections in it.
 
 use std::sync::Arc;
 
@@ -7,24 +7,24 @@ use crate::jobs::select::{SelectStep, Selected};
 use crate::scene::GaussianCloud;
 use crate::worker::{JobId, Worker};
 
-/// What is made ready, and what is being made ready.
+/// The preparation, done or running.
 #[derive(Default)]
 pub(super) struct ReadySelection {
-    /// Nothing selected, with all that the next selection needs.
+    /// An empty selection, with all that the next selection needs.
     last: Option<Arc<Selected>>,
     preparing: Option<JobId>,
-    /// How often it was made ready in this scene.
+    /// Number of preparations in this scene.
     times: usize,
 }
 
 impl ReadySelection {
-    /// Forgets it: another scene.
+    /// Forgets the preparation of another scene.
     pub(super) fn forget(&mut self, worker: &Worker) {
         self.preparing.iter().for_each(|job| worker.cancel(*job));
         *self = Self::default();
     }
 
-    /// Keeps what a step of any selection was made ready with.
+    /// Keeps the preparation of a selection's step.
     pub(super) fn take(&mut self, job: JobId, found: &Selected) {
         self.preparing.take_if(|preparing| *preparing == job);
         self.times += usize::from(self.last.as_ref().is_none_or(|last| !last.shares(found)));
@@ -37,13 +37,13 @@ impl ReadySelection {
 }
 
 impl Viewport {
-    /// How often the scene was made ready for selections by clicks and strokes.
+    /// Number of preparations of the scene for selecting by clicks and strokes.
     pub fn times_prepared(&self) -> usize {
         self.ready.times
     }
 
-    /// The step of a selection that is to be done next, with what was before it. Preparing comes first, as soon as the
-    /// tool is there; Gaussians in training would have changed by then.
+    /// The next step of a selection, with the state before it. Preparation comes first, as soon as the tool is in use;
+    /// not during training, which would change the Gaussians meanwhile.
     pub(crate) fn next_select_step(
         &mut self,
         done: JobId,
@@ -55,7 +55,7 @@ impl Viewport {
         tool.is_prepared = before.is_some() || is_training;
         if !tool.is_prepared {
             if ended {
-                // Why it failed was said; the next stroke tries again.
+                // The failure was reported; the next stroke tries again.
                 tool.give_up();
             }
             let begins = self.ready.preparing.is_none() && (!tool.gave_up || tool.waits());
@@ -65,7 +65,7 @@ impl Viewport {
         tool.next().map(|step| (step, before))
     }
 
-    /// The step is done by this job.
+    /// Records the job that runs the step.
     pub(crate) fn select_step_runs(&mut self, job: Option<JobId>, step: &SelectStep) {
         match (step, &mut self.select) {
             (SelectStep::Prepare, tool) => {

@@ -1,4 +1,4 @@
-//! When a new frame is asked for: whenever anything that it shows has changed.
+//! Requests for new frames, sent after any change of their content.
 
 use std::sync::Arc;
 
@@ -16,35 +16,35 @@ use crate::ui::state::AppState;
 use crate::worker::view::{QualityBudget, SkipPasses, ViewRequest};
 use crate::worker::{Versioned, ViewMode};
 
-/// The eye counts as moving until it has rested this long.
+/// Rest after which the camera no longer counts as moving, s.
 const REST_SECS: f64 = 0.15;
-/// Longest side of a frame in px: beyond this the eye gains nothing and waiting costs.
+/// Longest side of a frame, px: more would add delay but no visible detail.
 const MAX_SIDE_PX: u32 = 1600;
 
-/// What the view is to show now.
+/// Content that the view shows now.
 pub(super) struct Wanted {
     pub(super) cloud: Versioned<GaussianCloud>,
     pub(super) camera: Camera,
     pub(super) mode: ViewMode,
-    /// What a second view shows, if it is something else.
+    /// Mode of the second view, if it differs.
     pub(super) second: Option<ViewMode>,
-    /// Whose Gaussians, if they are others.
+    /// Gaussians of the second view, if it shows another scene.
     pub(super) beside: Option<(Versioned<GaussianCloud>, RenderSettings)>,
     pub(super) settings: RenderSettings,
     pub(super) budget: QualityBudget,
     pub(super) photo: Option<Arc<PhotoPixels>>,
-    /// Objects and parts, if it is wanted what pixels belong to; with their blended codes or without.
+    /// Objects and parts, if identity maps are needed; with or without blended codes.
     pub(super) semantics: Option<Versioned<SemanticMap>>,
     pub(super) codes: bool,
-    /// Whether masks on screen follow the eye.
+    /// True if masks on screen follow the moving camera.
     pub(super) follow: bool,
     pub(super) skip: SkipPasses,
-    /// Whether the window can paint what lies on the device that draws.
+    /// True if the window can paint frames on the drawing device.
     pub(super) on_device: bool,
     pub(super) timed: bool,
 }
 
-/// What a frame was asked for: a change means that a new one is needed.
+/// Content of a requested frame: a change needs a new one.
 #[derive(Clone, PartialEq)]
 struct Key {
     camera: Camera,
@@ -62,17 +62,17 @@ struct Key {
     timed: bool,
 }
 
-/// What is new of what a frame's pixels belong to.
+/// Change of the identities of a frame's pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Moved {
     Nothing,
-    /// They are seen from elsewhere.
+    /// The camera has moved.
     Eye,
-    /// They are other Gaussians, or belong to something else.
+    /// Gaussians or identities have changed.
     Scene,
 }
 
-/// The requests so far.
+/// State of the requests.
 #[derive(Default)]
 pub(super) struct Requests {
     last: Option<Key>,
@@ -85,13 +85,12 @@ impl Requests {
         self.ticket
     }
 
-    /// Forgets what was asked for: the next frame is of another scene.
+    /// Forgets the last request, as the next frame is of another scene.
     pub(super) fn forget(&mut self) {
         self.last = None;
     }
 
-    /// The request for what is wanted, if it is not what was asked for last or wanted `again`; and what
-    /// of its pixels is new.
+    /// The request for `wanted`, unless it equals the last one and is not wanted `again`; and the change of its pixels.
     pub(super) fn next(&mut self, wanted: Wanted, again: bool) -> Option<(ViewRequest, Moved)> {
         let Wanted {
             cloud,
@@ -129,7 +128,7 @@ impl Requests {
         }
         let moved = match &self.last {
             Some(last) if last.cloud == key.cloud && last.semantics == key.semantics => {
-                // A change of resolution alone does not move what the pixels belong to.
+                // A change of resolution alone does not change the identities of pixels.
                 if last.camera == key.camera { Moved::Nothing } else { Moved::Eye }
             }
             _ => Moved::Scene,
@@ -160,12 +159,12 @@ impl Requests {
 }
 
 impl Viewport {
-    /// Whether the eye moves.
+    /// True if the camera moves.
     pub(super) fn moves(&self, now: f64) -> bool {
         now - self.moved_at < REST_SECS
     }
 
-    /// Asks for a new frame if anything changed.
+    /// Requests a new frame if anything has changed.
     pub(super) fn request(&mut self, ui: &Ui, shown: Rect, state: &AppState, layout: &Layout, now: f64) {
         let Some(cloud) = self.cloud.clone() else { return };
         let plan = &state.plan;
@@ -195,7 +194,7 @@ impl Viewport {
         if always {
             ui.ctx().request_repaint();
         }
-        // A newer request would keep what belongs to the last one from ever being drawn.
+        // A newer request would keep the identity maps of the last one from ever being drawn.
         let drawn = self.display.picture().is_some_and(|p| p.ticket == self.requests.ticket())
             && (semantics.is_none() || self.queries.maps().is_some());
         let beside = state.beside.as_ref().map(|b| (b.cloud.clone(), b.settings.clone()));
@@ -266,7 +265,7 @@ mod tests {
         assert_eq!(next(&|_| {}, false), Some((1, Moved::Scene)), "the first");
         assert_eq!(next(&|_| {}, false), None, "nothing has changed");
         assert_eq!(next(&|_| {}, true), Some((2, Moved::Nothing)));
-        // Each alone is a reason; the first three leave the pixels where they are.
+        // Each alone causes a request; the first three leave the pixels in place.
         assert_eq!(next(&|w| w.budget = QualityBudget::Moving, false), Some((3, Moved::Nothing)));
         assert_eq!(next(&|w| w.settings.sh_degree = 1, false), Some((4, Moved::Nothing)));
         assert_eq!(next(&|w| w.photo = Some(Arc::clone(&photo)), false), Some((5, Moved::Nothing)));
@@ -276,7 +275,7 @@ mod tests {
         assert_eq!(next(&beside, false), Some((7, Moved::Nothing)));
         assert_eq!(next(&|w| w.camera.center.x += 1.0, false), Some((8, Moved::Eye)));
         assert_eq!(next(&|_| {}, false), Some((9, Moved::Eye)), "and back");
-        // The same Gaussians, published anew.
+        // The same Gaussians in a new generation.
         let newer = Versioned::new(Arc::clone(&cloud));
         assert_eq!(next(&|w| w.cloud = newer.clone(), false), Some((10, Moved::Scene)));
         assert_eq!(next(&|w| w.cloud = newer.clone(), false), None);

@@ -1,4 +1,4 @@
-//! The way of the camera drawn over the view: where it leads, its keys, and where one could stand.
+//! The camera's route over the view: the loaded clip, its keyframes, and the reachable places.
 
 use egui::{Color32, Rect, Stroke, Ui, pos2};
 use glam::DVec3;
@@ -9,7 +9,7 @@ use super::Viewport;
 use crate::jobs::go_to::Explored;
 
 impl Viewport {
-    /// Draws the way that is played, the keys of the path, and the keypoints of the scene.
+    /// Draws the loaded clip, the keyframes of the path, and the keypoints of the scene.
     pub(crate) fn show_route(&self, ui: &Ui, rect: Rect, pane: &CameraPane, explored: Option<&Explored>) {
         let painter = ui.painter_at(rect);
         let eye = self.overlay_camera(rect);

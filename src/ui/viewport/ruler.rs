@@ -1,5 +1,5 @@
-//! Measuring in the view: clicks put points on surfaces; two are a distance, from which the scene's scale can be
-//! set, three are a plane, which can be made the floor.
+//! Measuring in the view: clicks put points on surfaces. Two give a distance, from which the scene's scale can be set;
+//! three give a plane, which can be made the floor.
 
 use egui::{Align2, Area, Color32, FontId, Id, Order, Pos2, Rect, Response, RichText, Stroke, TextEdit, Ui, vec2};
 use glam::{DVec2, DVec3};
@@ -9,14 +9,14 @@ use super::Viewport;
 use crate::math::format;
 use crate::ui::actions::Action;
 
-/// Points at most; the next click begins anew.
+/// Largest number of points; the next click begins anew.
 const MOST: usize = 3;
 
-/// The points that were put, and what is typed beside them.
+/// The points, and the text typed beside them.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Ruler {
     points: Vec<DVec3>,
-    /// The true length of the distance, as it is typed.
+    /// The true length of the distance, as typed.
     known: String,
 }
 
@@ -34,14 +34,14 @@ impl Ruler {
         Some(a.distance(*b)).filter(|d| *d > 0.0)
     }
 
-    /// The direction away from the plane of three points, towards where `eye` is.
+    /// Normal of the plane of three points, toward `eye`.
     fn normal(&self, eye: DVec3) -> Option<DVec3> {
         let [a, b, c] = self.points.as_slice() else { return None };
         let normal = (*b - *a).cross(*c - *a).try_normalize()?;
         Some(if normal.dot(eye - *a) < 0.0 { -normal } else { normal })
     }
 
-    /// Meters per unit, if what is typed is a length.
+    /// Meters per unit, if the typed text is a length.
     fn scale(&self) -> Option<f64> {
         let meters: f64 = self.known.trim().replace(',', ".").parse().ok()?;
         Some(meters / self.distance()?).filter(|s| s.is_finite() && *s > 0.0)
@@ -49,12 +49,12 @@ impl Ruler {
 }
 
 impl Viewport {
-    /// Whether distances are being measured.
+    /// True if the ruler is in use.
     pub(crate) fn is_measuring(&self) -> bool {
         self.ruler.is_some()
     }
 
-    /// Takes clicks in a view, draws the points and what lies between them.
+    /// Handles clicks in a view, draws the points and the lines between them.
     pub(super) fn show_ruler(&mut self, ui: &Ui, response: &Response, shown: Rect, meters_per_unit: Option<f64>) {
         let Some(mut ruler) = self.ruler.take() else { return };
         let surface = |pos: Pos2| {
@@ -90,7 +90,7 @@ impl Viewport {
         self.ruler = Some(ruler);
     }
 
-    /// Says what the points measure.
+    /// Draws the card with the measurements.
     pub(super) fn show_ruler_card(
         &mut self,
         ui: &Ui,
@@ -104,7 +104,7 @@ impl Viewport {
     }
 }
 
-/// What to do next and what the points measure; `None` once it is closed.
+/// Draws instructions and measurements; returns `None` once the card is closed.
 fn ruler_card(
     ui: &Ui,
     shown: Rect,

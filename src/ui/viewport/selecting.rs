@@ -1,5 +1,5 @@
-//! Selecting something by clicks and strokes in any view: to name what nobody has named, or to correct what was found.
-//! What is selected is outlined in every view, so that one sees what a correction elsewhere has done.
+//! Selecting Gaussians by clicks and strokes in any view: to name unlabeled ones, or to correct objects and parts. The
+//! selection is outlined in every view, which shows the effect of a correction elsewhere.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -21,35 +21,35 @@ use crate::scene::{Camera, Identities, Level, Mask, NOBODY, SemanticMap};
 use crate::ui::actions::Action;
 use crate::worker::{JobId, Versioned};
 
-/// Longer side of the view in which strokes are taken, px.
+/// Longer side of the view in which strokes are rasterized, px.
 const SIDE_PX: u32 = 512;
 
 const PLUS: Color32 = Color32::from_rgb(0x3c, 0xd0, 0x6e);
 const MINUS: Color32 = Color32::from_rgb(0xf0, 0x5a, 0x4b);
-/// Color of what is selected.
+/// Color of the selection.
 const SELECTED: [u8; 3] = [0x3c, 0xd0, 0x6e];
 
-/// What is being selected.
+/// The selection tool.
 pub(crate) struct SelectTool {
     pub(crate) purpose: SelectFor,
     name: String,
     radius_pt: f32,
-    /// Whether strokes take away.
+    /// True if strokes remove from the selection.
     takes_away: bool,
-    /// The stroke under way, and the view in which it was begun.
+    /// The current stroke, and the camera of the view in which it was begun.
     line: Option<(DrawnLine, Camera)>,
-    /// Lines that wait to be taken in, oldest first: they stay on screen.
+    /// Lines that wait to be processed, oldest first: they stay on screen.
     drawn_lines: VecDeque<DrawnLine>,
-    /// Steps that wait for their turn.
+    /// Steps that wait to be processed.
     waiting: VecDeque<SelectStep>,
-    /// The step that is being taken in, and whether it is a stroke: another selection's result is none of its own.
+    /// The running step, and whether it is a stroke; results of other jobs are ignored.
     running: Option<(JobId, bool)>,
-    /// Whether the scene is being made ready for strokes.
+    /// True if the scene is prepared for strokes.
     pub(super) is_prepared: bool,
-    /// Whether that has failed: it is tried again with the next stroke.
+    /// True if preparation has failed; the next stroke tries again.
     pub(super) gave_up: bool,
     pub(crate) selected: Option<Arc<Selected>>,
-    /// Objects and parts as they would be.
+    /// Objects and parts with the selection applied.
     preview: Option<Versioned<SemanticMap>>,
     drawn: DrawnOutline,
 }
@@ -73,12 +73,12 @@ impl SelectTool {
         }
     }
 
-    /// The next step to be taken in, if none is.
+    /// The next step to process, if none is running.
     pub(crate) fn next(&mut self) -> Option<SelectStep> {
         self.waiting.pop_front_if(|_| self.running.is_none())
     }
 
-    /// The step that was handed on is taken in by this job; `None` if nobody takes it.
+    /// Records the job of the step that was handed on; `None` if it was refused.
     pub(crate) fn runs(&mut self, job: Option<JobId>, is_stroke: bool) {
         self.running = job.map(|job| (job, is_stroke));
         if job.is_none() {
@@ -86,17 +86,17 @@ impl SelectTool {
         }
     }
 
-    /// Whether steps wait to be taken in.
+    /// True if steps wait to be processed.
     pub(crate) fn waits(&self) -> bool {
         !self.waiting.is_empty()
     }
 
-    /// Forgets what waits: nothing can be selected here.
+    /// Drops all waiting steps, as selection is impossible here.
     pub(crate) fn give_up(&mut self) {
         (self.waiting, self.drawn_lines, self.gave_up) = (VecDeque::new(), VecDeque::new(), true);
     }
 
-    /// Takes in what strokes select by now, if that is what it waits for.
+    /// Takes over the selection, if it comes from the running step.
     pub(crate) fn take(&mut self, job: JobId, selected: Arc<Selected>) {
         let Some((_, is_stroke)) = self.running.take_if(|(running, _)| *running == job) else { return };
         self.end_step(is_stroke);
@@ -110,7 +110,7 @@ impl SelectTool {
         }
     }
 
-    /// Takes back the last stroke: one that waits is not taken in at all.
+    /// Undoes the last stroke; one that waits is dropped.
     fn take_back(&mut self) {
         match self.waiting.pop_back_if(|step| matches!(step, SelectStep::Stroke(_))) {
             Some(_) => drop(self.drawn_lines.pop_back()),
@@ -118,7 +118,7 @@ impl SelectTool {
         }
     }
 
-    /// Whether there is a stroke that could be taken back.
+    /// True if there is a stroke to undo.
     fn has_strokes(&self) -> bool {
         !self.drawn_lines.is_empty() || self.selected.as_ref().is_some_and(|s| s.strokes() > 0)
     }
@@ -131,13 +131,13 @@ impl SelectTool {
         self.selected.as_ref().is_none_or(|s| s.id == NOBODY)
     }
 
-    /// The edit that keeps the selection; `None` if there is none.
+    /// The edit that applies the selection; `None` without one.
     pub(crate) fn edit(&self) -> Option<Edit> {
         let selected = self.selected.as_ref().filter(|s| s.id != NOBODY)?;
         Some(kept_as(&self.purpose, self.name.trim().to_owned(), selected.gaussians.clone()))
     }
 
-    /// The selection, the line under way, and the tip, over the frame in `shown`.
+    /// Draws the selection, the current line, and the brush tip over the frame in `shown`.
     pub(super) fn paint(&mut self, ui: &Ui, shown: Rect, maps: Option<&Versioned<ViewMaps>>) {
         if let (Some(maps), Some(preview), Some(selected)) = (maps, &self.preview, &self.selected)
             && selected.id != NOBODY
@@ -162,7 +162,7 @@ impl SelectTool {
         }
     }
 
-    /// The card of the tool.
+    /// Draws the card of the tool.
     pub(super) fn show(&mut self, ui: &Ui, rect: Rect, all: &Identities, actions: &mut Vec<Action>) {
         let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(52.0));
         let area =
@@ -236,17 +236,17 @@ impl SelectTool {
     }
 }
 
-/// A line through the view.
+/// A line across the view.
 #[derive(Clone, Debug)]
 struct DrawnLine {
-    /// Places of the window that it went through.
+    /// Window positions along the line.
     at: Vec<Pos2>,
     takes_away: bool,
     radius_pt: f32,
 }
 
 impl DrawnLine {
-    /// The pixels of a view, at most [`SIDE_PX`] large, that it went over.
+    /// The pixels under the line in a view of at most [`SIDE_PX`].
     fn pixels(&self, shown: Rect, camera: &Camera) -> Mask {
         let (w, h) = (camera.width_px as usize, camera.height_px as usize);
         let scale = w as f32 / shown.width().max(1.0);
@@ -266,22 +266,22 @@ impl DrawnLine {
 }
 
 impl Viewport {
-    /// How many Gaussians clicks and strokes select, once all of them are taken in.
+    /// Number of selected Gaussians, once all clicks and strokes are processed.
     pub fn selection(&self) -> Option<usize> {
         let tool = self.select.as_ref().filter(|tool| tool.running.is_none() && tool.waiting.is_empty())?;
         tool.selected.as_ref().map(|s| s.gaussians.len())
     }
 
-    /// How many lines are drawn that are not taken in yet.
+    /// Number of drawn lines that are not processed yet.
     pub fn lines_drawn(&self) -> usize {
         self.select.as_ref().map_or(0, |tool| tool.drawn_lines.len())
     }
 
-    /// Takes clicks and drags as strokes.
+    /// Handles clicks and drags as strokes.
     pub(super) fn use_select_tool(&mut self, response: &egui::Response, rect: Rect, state: &AppState) {
         let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
         let (Some(tool), Some(picture)) = (&mut self.select, self.display.picture()) else { return };
-        // What was refused or failed has no result.
+        // A refused or failed step has no result.
         if let Some((_, is_stroke)) = tool.running.take_if(|(job, _)| *job <= state.short_jobs_done) {
             tool.end_step(is_stroke);
         }
@@ -289,7 +289,7 @@ impl Viewport {
         if response.drag_started_by(PointerButton::Primary) || response.clicked() {
             let at = response.ctx.input(|i| i.pointer.press_origin()).into_iter().collect();
             let takes_away = tool.takes_away != response.ctx.input(|i| i.modifiers.shift);
-            // What the eye sees there, though a newer picture may be on its way.
+            // The camera of the visible frame, though a newer frame may be on its way.
             let camera = picture.camera.limited_to(SIDE_PX);
             tool.line = Some((DrawnLine { at, takes_away, radius_pt: tool.radius_pt }, camera));
         }

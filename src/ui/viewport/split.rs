@@ -1,15 +1,15 @@
-//! Two views of the scene side by side, seen by one camera: each has its own colors and its own queries. One of them
-//! is worked in: the one that was pressed last.
+//! Two views of the scene side by side, with the same camera, each with its own colors and queries. The active view is
+//! the one that was pressed last.
 
 use egui::{Order, Pos2, Rect, Stroke, StrokeKind, Ui, vec2};
 
 use super::super::theme;
 use super::Viewport;
 
-/// Between the views, points.
+/// Gap between the views, points.
 const GAP: f32 = 2.0;
 
-/// Where the views are.
+/// Rectangles of the views.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Views {
     pub(super) first: Rect,
@@ -34,25 +34,25 @@ impl Views {
         self.second.is_some()
     }
 
-    /// All of them, and whether it is the second.
+    /// All views, each with whether it is the second.
     pub(super) fn each(self) -> impl Iterator<Item = (bool, Rect)> {
         std::iter::once((false, self.first)).chain(self.second.map(|rect| (true, rect)))
     }
 
-    /// The view at a place, else the first.
+    /// The view at a position, else the first.
     fn at(&self, pos: Option<Pos2>) -> (bool, Rect) {
         let here = pos.and_then(|pos| self.each().find(|(_, rect)| rect.contains(pos)));
         here.unwrap_or((false, self.first))
     }
 
-    /// The view that the pointer is in; while a button is down, that in which it was pressed.
+    /// The view under the pointer; while a button is down, the one in which it was pressed.
     pub(super) fn under_pointer(&self, ui: &Ui) -> Rect {
         self.at(ui.input(|i| i.pointer.press_origin().or(i.pointer.latest_pos()))).1
     }
 }
 
 impl Viewport {
-    /// Works in the view that was just pressed, be it on a card over it.
+    /// Makes the view that was just pressed active, also through a card over it.
     pub(super) fn work_where_pressed(&mut self, ui: &Ui, views: &Views) {
         if !views.is_split() {
             return self.queries.work_in(false);
@@ -67,7 +67,7 @@ impl Viewport {
     }
 }
 
-/// Frames the view that is worked in.
+/// Frames the active view.
 pub(super) fn mark_worked_in(ui: &Ui, rect: Rect) {
     ui.painter().rect_stroke(rect, 0.0, Stroke::new(1.5, theme::accent()), StrokeKind::Inside);
 }

@@ -1,4 +1,4 @@
-//! What of a scene is drawn: hidden identities left out, or one alone, inside a crop box.
+//! The drawn part of a scene: hidden identities left out, or one isolated, inside a crop box.
 
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -7,76 +7,76 @@ use super::chosen::ChosenSplats;
 use crate::scene::{CropBox, GaussianCloud, Identities, IdentityId, NOBODY, SemanticMap};
 use crate::worker::Versioned;
 
-/// What of a scene is drawn.
+/// Visibility of the Gaussians of a scene.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Visibility {
-    /// Whose own Gaussians are left out; nobody's have the number of nobody.
+    /// Identities whose own Gaussians are hidden; `NOBODY` for unlabeled Gaussians.
     hidden: BTreeSet<IdentityId>,
-    /// What of the rest is kept.
+    /// Crop box of the rest.
     crop: Option<CropBox>,
-    /// What is chosen to be deleted.
+    /// Gaussians chosen for deletion.
     chosen: Option<Arc<ChosenSplats>>,
-    /// The Gaussians that are left, with the generations of what they were made from.
+    /// The drawn Gaussians, with the generations of their sources.
     left: Option<((u64, Option<u64>), VisibleCloud)>,
 }
 
-/// The Gaussians that are drawn.
+/// The drawn Gaussians.
 #[derive(Clone, Debug)]
 pub(crate) struct VisibleCloud {
     pub(crate) cloud: Versioned<GaussianCloud>,
     pub(crate) semantics: Option<Versioned<SemanticMap>>,
-    /// Their numbers in the whole cloud, if they are not all of it.
+    /// Their numbers in the whole cloud, if they are a part of it.
     pub(crate) numbers: Option<Arc<Vec<usize>>>,
 }
 
 impl Visibility {
-    /// Whether anything is hidden.
+    /// True if anything is hidden.
     pub(crate) fn is_partial(&self) -> bool {
         !self.hidden.is_empty()
     }
 
-    /// Whether what belongs to nobody is left out: only some objects or parts are shown.
+    /// True if unlabeled Gaussians are hidden: only some objects or parts are shown.
     pub(crate) fn is_isolated(&self) -> bool {
         self.hidden.contains(&NOBODY)
     }
 
-    /// Whether an identity is drawn with its pieces; `None` if only some of them are.
+    /// True if an identity is drawn with its parts; `None` if only some of them are.
     pub(crate) fn draws(&self, all: &Identities, id: IdentityId) -> Option<bool> {
         let mut drawn = pieces(all, id).map(|i| !self.hidden.contains(&i));
         let first = drawn.next().unwrap_or(true);
         drawn.all(|d| d == first).then_some(first)
     }
 
-    /// Identities whose own Gaussians are left out.
+    /// Identities whose own Gaussians are hidden.
     pub(crate) fn hidden(&self) -> &BTreeSet<IdentityId> {
         &self.hidden
     }
 
-    /// Leaves out these and no others.
+    /// Hides only these identities.
     pub(crate) fn set_hidden(&mut self, ids: impl IntoIterator<Item = IdentityId>) {
         (self.hidden, self.left) = (ids.into_iter().collect(), None);
     }
 
-    /// What is kept of all that is not hidden.
+    /// Crop box of all that is not hidden.
     pub(crate) fn crop(&self) -> Option<CropBox> {
         self.crop
     }
 
-    /// Keeps this of all that is not hidden.
+    /// Sets the crop box of all that is not hidden.
     pub(crate) fn set_crop(&mut self, crop: Option<CropBox>) {
         if self.crop != crop {
             (self.crop, self.left) = (crop, None);
         }
     }
 
-    /// Shows what is chosen to be deleted.
+    /// Sets the Gaussians chosen for deletion.
     pub(crate) fn set_chosen(&mut self, chosen: Option<Arc<ChosenSplats>>) {
         if self.chosen != chosen {
             (self.chosen, self.left) = (chosen, None);
         }
     }
 
-    /// Hides an identity with its pieces, or shows them again if none is drawn.
+    /// Hides an identity with its parts, or shows them again if none is drawn.
     pub(crate) fn toggle(&mut self, all: &Identities, id: IdentityId) {
         let hide = self.draws(all, id) != Some(false);
         for piece in pieces(all, id) {
@@ -89,13 +89,13 @@ impl Visibility {
         self.left = None;
     }
 
-    /// Shows one identity with its pieces alone; `None` shows all.
+    /// Shows only one identity with its parts; `None` shows all.
     pub(crate) fn isolate(&mut self, all: &Identities, only: Option<IdentityId>) {
         let inside = only.map_or_else(Vec::new, |id| all.descendants(id));
         self.set_hidden((0..).zip(inside).filter(|(_, inside)| !inside).map(|(id, _)| id));
     }
 
-    /// Follows identities to their new numbers: each keeps its code.
+    /// Maps hidden identities to their new numbers: each keeps its code.
     pub(crate) fn renumber(&mut self, old: &Identities, new: &Identities) {
         let now = |id: &IdentityId| match old.get(*id) {
             None => Some(NOBODY),
@@ -104,7 +104,7 @@ impl Visibility {
         self.set_hidden(self.hidden.iter().filter_map(now).collect::<Vec<_>>());
     }
 
-    /// Why nothing of an identity is drawn, for the user; `None` if something is.
+    /// Reason why no Gaussian of an identity is drawn, for the user; `None` if one is.
     pub(crate) fn why_not_drawn(&self, all: &Identities, id: IdentityId) -> Option<&'static str> {
         if self.draws(all, id) == Some(false) {
             return Some("hidden");
@@ -117,19 +117,19 @@ impl Visibility {
         (!is_left).then_some("outside the crop box")
     }
 
-    /// The numbers of the Gaussians that are drawn, if not all.
+    /// The numbers of the drawn Gaussians, if not all.
     pub(super) fn numbers(&self) -> Option<Arc<Vec<usize>>> {
         self.left.as_ref().and_then(|(_, visible)| visible.numbers.clone())
     }
 
-    /// How many Gaussians are drawn, if not all.
+    /// Number of drawn Gaussians, if not all.
     pub(crate) fn count(&self) -> Option<usize> {
         let hides = self.chosen.as_ref().is_none_or(|chosen| chosen.hide);
         let leaves_out = hides || self.crop.is_some() || !self.hidden.is_empty();
         self.left.as_ref().filter(|_| leaves_out).map(|(_, visible)| visible.cloud.len())
     }
 
-    /// The Gaussians to draw and what they belong to.
+    /// The Gaussians to draw and their identities.
     pub(crate) fn apply(
         &mut self,
         cloud: &Versioned<GaussianCloud>,
@@ -165,7 +165,7 @@ impl Visibility {
     }
 }
 
-/// An identity and all its pieces.
+/// An identity and all its parts.
 fn pieces(all: &Identities, id: IdentityId) -> impl Iterator<Item = IdentityId> {
     (0..).zip(all.descendants(id)).filter(|(_, inside)| *inside).map(|(id, _)| id)
 }

@@ -1,4 +1,4 @@
-//! What taking a measured setting over would change, or why it cannot be taken over.
+//! Changes that applying a measured setting would make, or the reason why it cannot be applied.
 
 use serde::Serialize;
 use serde_json::{Map, Value};
@@ -11,15 +11,15 @@ use crate::pipeline::train::TrainConfig;
 use crate::render::{Cutoffs, RenderSettings};
 use crate::ui::actions::Action;
 
-/// The settings that are active.
+/// The active settings.
 pub(crate) struct Now<'a> {
-    /// Of the next training.
+    /// Settings of the next training.
     pub(crate) config: &'a TrainConfig,
-    /// How the open scene says that it is drawn; none without a scene.
+    /// Render settings of the open scene; `None` without a scene.
     pub(crate) own: Option<&'a RenderSettings>,
-    /// What is drawn otherwise.
+    /// The user's overrides of the render settings.
     pub(crate) drawing: &'a RenderOverrides,
-    /// Whether a GPU draws.
+    /// True if a GPU draws.
     pub(crate) on_gpu: bool,
 }
 
@@ -31,17 +31,17 @@ pub(crate) struct Change {
     pub(crate) to: String,
 }
 
-/// What can be done with a measured setting.
+/// Result of a request to apply a measured setting.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Offer {
     Changes(Vec<Change>, Action),
-    /// It is active already.
+    /// The setting is active already.
     Active,
-    /// It cannot be taken over, because.
+    /// The setting cannot be applied, with the reason.
     Not(String),
 }
 
-/// What applying a point of a stage would do.
+/// The changes that applying a point of a stage would make.
 pub(crate) fn offer(stage: &Stage, point: &Point, now: &Now<'_>) -> Offer {
     let result = match stage.name {
         StageName::Train => training(stage, point, now),
@@ -59,7 +59,7 @@ pub(crate) fn offer(stage: &Stage, point: &Point, now: &Now<'_>) -> Offer {
 type Taken = Result<(Vec<Change>, Action), String>;
 
 fn training(stage: &Stage, point: &Point, now: &Now<'_>) -> Taken {
-    // The defaults are those of this window, for everything that the sweep turns.
+    // Defaults are those of this window, for every knob of the sweep.
     let standard = fields(&Layout::default().config);
     let knobs = resolved(stage, point, |name| standard.get(name).cloned().unwrap_or_default());
     let config = turned(now.config, &knobs).map_err(|e| format!("The report does not fit this version: {e}."))?;
@@ -88,7 +88,7 @@ fn drawing(stage: &Stage, point: &Point, now: &Now<'_>) -> Taken {
     Ok((changes(&before, &after, &knobs), Action::ApplySetting(stage.name, knobs)))
 }
 
-/// Why a knob of drawing is none of the view.
+/// Reason why a knob of rendering is no setting of the view.
 fn no_setting(name: &str) -> &'static str {
     match name {
         "precision" => "The view is rendered in single precision; the others are measured for comparison.",
@@ -99,7 +99,7 @@ fn no_setting(name: &str) -> &'static str {
     }
 }
 
-/// What a point turns; for the defaults, everything that the stage turns as `standard` has it.
+/// Knobs of a point; for the default point, all knobs of the stage with the values of `standard`.
 fn resolved(stage: &Stage, point: &Point, standard: impl Fn(&str) -> Value) -> Knobs {
     if !point.default {
         return point.knobs.clone();
@@ -121,7 +121,7 @@ fn changes<T: Serialize>(before: &T, after: &T, knobs: &Knobs) -> Vec<Change> {
     knobs.keys().filter(differs).map(change).collect()
 }
 
-/// A value for the user.
+/// A value as text for the user.
 fn words(value: &Value) -> String {
     match value {
         Value::Null => "automatic".into(),

@@ -1,4 +1,4 @@
-//! The Report pane without a report: what it is for, and how to come by one.
+//! The Report pane without a report: its purpose, and the ways to get one.
 
 use egui::{RichText, Ui, vec2};
 
@@ -68,7 +68,7 @@ pub(crate) fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
 /// The command that measures the open scene.
 fn command(state: &AppState) -> String {
     let trained = state.scene.as_ref().filter(|_| state.is_trained());
-    // A scene that was trained here lies in its own folder; a splat is its own.
+    // A scene that was trained here is its own folder; a splat is its own file.
     let scene = trained.map(|s| if s.out.as_os_str().is_empty() { &s.path } else { &s.out });
     let scene = scene.map_or_else(|| "SCENE".to_owned(), |path| text::shell_word(&path.display().to_string()));
     format!("fmlgs report {scene} --out report")

@@ -1,13 +1,13 @@
-//! Marks and numbers of the plot's axes: those of the report's own plots, in whatever part is in view.
+//! Marks and numbers of the plot's axes: those of the report's own plots, for the visible range.
 
 use egui_plot::{GridInput, GridMark};
 
 use crate::measure::axis::{LogAxis, ticks};
 
-/// Step sizes of marks without a number, and with one.
+/// Step sizes of marks without and with a number.
 const SIZES: [f64; 2] = [0.08, 1.0];
 
-/// Marks of an axis in the part of it that is in view, in decimal logarithms, and one in the band of zero.
+/// Marks of an axis in its visible range, in decimal logarithms, and one in the band of zero.
 pub(crate) fn marks(axis: &LogAxis, input: &GridInput) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     let low = axis.band_end().map_or(low, |end| low.max(end));
@@ -40,7 +40,7 @@ mod tests {
         let axis = LogAxis::of([0.0, 1e-3, 1.0]).expect("an axis");
         assert_eq!(texts(&axis, axis.bounds()), ["0.001", "0.01", "0.1", "1", "0"]);
         assert_eq!(texts(&axis, (0.030_f64.log10(), 0.0305_f64.log10())).len(), 6 + 1, "zoomed in");
-        // The control: without a zero there is no mark of one.
+        // Control: without a zero there is no mark of one.
         let above = LogAxis::of([1e-3, 1.0]).expect("an axis");
         assert_eq!(texts(&above, above.bounds()), ["0.001", "0.01", "0.1", "1"]);
     }

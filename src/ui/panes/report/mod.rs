@@ -1,5 +1,5 @@
-//! Error against run time: a report's measurements as a plot, what they say of the defaults, and the
-//! way from a measured setting to an active one.
+//! Error against run time: a report's measurements as a plot, its verdicts on the defaults, and a button that applies a
+//! measured setting.
 
 pub(crate) mod apply;
 mod empty;
@@ -19,14 +19,14 @@ use crate::measure::{Measure, Point, Report, Stage, StageName, table};
 use crate::scene::text;
 use crate::ui::actions::Action;
 
-/// What a user looks at in a report.
+/// The user's choices in a report.
 #[derive(Default)]
 pub(crate) struct ReportPane {
     stage: Option<StageName>,
     measure: Option<String>,
     /// Knob and setting of the chosen point.
     selected: Option<[String; 2]>,
-    /// Set once a point was chosen: what can be done with it stands on top.
+    /// Set after a point was chosen: the column scrolls to its facts at the top.
     to_top: bool,
 }
 
@@ -62,7 +62,7 @@ impl ReportPane {
         let now =
             Now { config: &layout.config, own: own.as_ref(), drawing: &viewport.overrides, on_gpu: viewport.on_gpu() };
         let size = ui.available_size();
-        // A column of its own where there is room, else on top of the tables.
+        // A column of its own if there is room, else above the tables.
         let wide = size.x > 1_100.0;
         let widths = if wide { [0.46, 0.23, 0.31] } else { [0.54, 0.0, 0.46] }.map(|share: f32| share * size.x - 8.0);
         let mut clicked = None;
@@ -104,7 +104,7 @@ impl ReportPane {
         self.selected = Some([method.to_owned(), setting.to_owned()]);
     }
 
-    /// PSNR over seconds of trainings in the report: of the default, and of the chosen setting.
+    /// PSNR over seconds of trainings in the report: of the default and of the chosen setting.
     pub(crate) fn curves(&self, state: &AppState) -> Vec<(String, Vec<[f64; 2]>)> {
         let Some(stage) = state.report.as_ref().and_then(|r| r.report.stage(StageName::Train)) else {
             return Vec::new();
@@ -118,7 +118,7 @@ impl ReportPane {
         stage.points.iter().filter(wanted).map(named).collect()
     }
 
-    /// The stage that is looked at, or the first.
+    /// The chosen stage, or the first.
     fn stage_of<'a>(&self, report: &'a Report) -> Option<&'a Stage> {
         self.stage.and_then(|name| report.stage(name)).or_else(|| report.stages.first())
     }
@@ -132,7 +132,7 @@ impl ReportPane {
         stage.points.iter().find(|p| p.method == *method && p.setting == *setting)
     }
 
-    /// Which report, stage and measure; where others come from.
+    /// Draws the choice of report, stage and measure, and buttons to open other reports.
     fn header(
         &mut self,
         ui: &mut Ui,
@@ -205,7 +205,7 @@ fn section<R>(ui: &mut Ui, title: &str, open: bool, add: impl FnOnce(&mut Ui) ->
     header.show(ui, add).body_returned
 }
 
-/// What must be known before numbers are believed.
+/// Draws warnings on the reliability of the numbers.
 fn warnings(ui: &mut Ui, stage: &Stage, report: &Report, second: Option<&Report>) {
     let warn = |ui: &mut Ui, text: String| ui.label(RichText::new(text).small().color(theme::warning()));
     if !stage.complete() {
@@ -228,7 +228,7 @@ fn warnings(ui: &mut Ui, stage: &Stage, report: &Report, second: Option<&Report>
     }
 }
 
-/// The chosen point, and what can be done with it.
+/// Draws the chosen point, with a button that applies its setting.
 fn chosen(ui: &mut Ui, stage: &Stage, selected: Option<&Point>, now: &Now<'_>, actions: &mut Vec<Action>) {
     let Some(point) = selected else {
         ui.weak("Click on a point, or on a row below, to see what it would change. Drag to move, Ctrl+wheel to zoom.");

@@ -1,5 +1,5 @@
-//! Error over seconds as the report's own plots have it: one look per knob, every point with its setting, the front,
-//! the repeats' spread, zero in a band of its own.
+//! Error over seconds as in the report's own plots: one style per knob, a label per point, the Pareto front, the spread
+//! of repeats, zero in a band of its own.
 
 use egui::{Color32, FontId, Response, Stroke, Ui, Vec2b};
 use egui_plot::{Corner, HLine, Legend, Line, MarkerShape, Plot, PlotPoint, PlotPoints, PlotTransform, Points, VLine};
@@ -12,23 +12,23 @@ use crate::measure::labels::{self, LabelBox};
 use crate::measure::look::{MarkShape, look};
 use crate::measure::{Measure, Point, Stage, table};
 
-/// How near the pointer must be to a point, in window points.
+/// Largest distance of the pointer from a point that it picks, window points.
 const NEAR: f32 = 14.0;
-/// Distance of a label from its point at which a line leads to it, in window points.
+/// Distance of a label from its point that needs a line, window points.
 const AWAY: f32 = 12.0;
 
 pub(crate) struct Scatter<'a> {
     pub(crate) stage: &'a Stage,
     /// The same stage of another report, drawn hollow.
     pub(crate) second: Option<&'a Stage>,
-    /// What is on the vertical axis.
+    /// The measure on the vertical axis.
     pub(crate) measure: &'a Measure,
-    /// The point that is chosen.
+    /// The chosen point.
     pub(crate) selected: Option<&'a Point>,
 }
 
 impl<'a> Scatter<'a> {
-    /// Draws it; returns the point that was clicked.
+    /// Draws the plot; returns the point that was clicked.
     pub(crate) fn show(&self, ui: &mut Ui, height: f32) -> Option<&'a Point> {
         let (stage, measure) = (self.stage, self.measure);
         let name = (stage.name.name(), measure.name.clone(), self.second.is_some());
@@ -60,7 +60,7 @@ impl<'a> Scatter<'a> {
             .label_formatter(|_| None)
             .legend(Legend::default().position(corner).text_style(egui::TextStyle::Small).background_alpha(0.6));
         let shown = plot.show(ui, |p| {
-            // Beyond these lines is zero, which has no logarithm.
+            // Beyond these lines is the band of zero, which has no logarithm.
             let style = Stroke::new(1.0, theme::weak());
             let lines = [axes.secs.band_end(), axes.error.band_end()];
             lines[0].into_iter().for_each(|at| p.vline(VLine::new("", at).stroke(style).allow_hover(false)));
@@ -81,13 +81,13 @@ impl<'a> Scatter<'a> {
         nearest.filter(|_| shown.response.clicked())
     }
 
-    /// Where the points are.
+    /// Positions of the points.
     fn places(&self, axes: &PlotAxes) -> Vec<[f64; 2]> {
         let both = self.stage.points.iter().chain(self.second.into_iter().flat_map(|s| &s.points));
         both.filter_map(|p| axes.place(p, self.measure)).collect()
     }
 
-    /// The setting beside every point that is in view, with a thin line to it where it had to go away.
+    /// Draws the setting beside every visible point, with a thin line to it if it is far.
     fn name_points(&self, ui: &Ui, axes: &PlotAxes, transform: &PlotTransform) {
         let (frame, methods) = (*transform.frame(), self.stage.methods());
         let painter = ui.painter_at(frame);
@@ -113,7 +113,7 @@ impl<'a> Scatter<'a> {
         }
     }
 
-    /// About how wide the legend is, points of the screen.
+    /// Approximate width of the legend, screen points.
     fn legend_width(&self) -> f32 {
         let longest = self.stage.methods().iter().map(|m| m.chars().count()).max().unwrap_or(0);
         30.0 + 6.0 * longest as f32
@@ -131,7 +131,7 @@ impl<'a> Scatter<'a> {
         near.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(p, _)| p)
     }
 
-    /// Everything in the plot, from back to front.
+    /// All items of the plot, from back to front.
     fn items(&self, axes: &PlotAxes) -> Vec<Item> {
         let mut items = vec![self.front(axes)];
         let methods = self.stage.methods();
@@ -139,7 +139,7 @@ impl<'a> Scatter<'a> {
             self.series(axes, method, k, &mut items);
         }
         for p in self.second.into_iter().flat_map(|s| &s.points) {
-            // Knobs that only the second has are gray.
+            // Knobs that only the second report has are gray.
             let k = methods.iter().position(|m| *m == p.method);
             let color = k.map_or(theme::weak(), color);
             let shape = k.map_or(MarkerShape::Circle, shape);
@@ -155,7 +155,7 @@ impl<'a> Scatter<'a> {
         items
     }
 
-    /// Rings around what nothing is better than by more than repeats differ.
+    /// Rings around points that no other beats by more than the spread of repeats.
     fn front(&self, axes: &PlotAxes) -> Item {
         let points = self.stage.front(self.measure).into_iter();
         let places: Vec<[f64; 2]> = points.filter_map(|i| axes.place(&self.stage.points[i], self.measure)).collect();
@@ -166,14 +166,14 @@ impl<'a> Scatter<'a> {
     fn series(&self, axes: &PlotAxes, method: &str, k: usize, items: &mut Vec<Item>) {
         let color = color(k);
         let points: Vec<&Point> = self.stage.points.iter().filter(|p| p.method == method).collect();
-        // What has the series' name has its color, too: the legend shows one.
+        // Only one item may have the series' name and color: the legend shows one.
         let line = |name: &str, places: Vec<[f64; 2]>, style: Stroke| {
             Item::Line(Line::new(name, PlotPoints::from(places)).stroke(style).allow_hover(false))
         };
         let ways = points.iter().map(|p| axes.way(self.stage, p, self.measure)).filter(|way| way.len() > 1);
         let faint = Stroke::new(1.0, color.gamma_multiply(0.4));
         items.extend(ways.map(|way| line("", way, faint)));
-        // In the order of the settings: times in the order of their noise would zigzag.
+        // In the order of the settings: an order by time would zigzag with its noise.
         let places: Vec<[f64; 2]> = points.iter().filter_map(|p| axes.place(p, self.measure)).collect();
         items.push(line(method, places.clone(), Stroke::new(0.8, color)));
         let whiskers = points.iter().flat_map(|p| axes.whiskers(p, self.measure));
@@ -184,8 +184,7 @@ impl<'a> Scatter<'a> {
     }
 }
 
-/// What the plot has to reach to along x, so that a legend in `corner`, as wide as this share of it, hides
-/// no place.
+/// Least extent of the plot along x, so that a legend in `corner`, as wide as this share of it, hides no place.
 fn beside_legend(places: &[[f64; 2]], corner: Corner, share: f32) -> f64 {
     let (least, most) = places.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), p| (l.min(p[0]), m.max(p[0])));
     if !(least < most) {
@@ -196,7 +195,7 @@ fn beside_legend(places: &[[f64; 2]], corner: Corner, share: f32) -> f64 {
     if matches!(corner, Corner::LeftTop | Corner::LeftBottom) { least - room } else { most + room }
 }
 
-/// The quarter of their range that has the fewest places.
+/// The corner of their range with the fewest places.
 fn free_corner(places: &[[f64; 2]]) -> Corner {
     let middle = |axis: usize| {
         let all = places.iter().map(|p| p[axis]);
@@ -214,7 +213,7 @@ fn free_corner(places: &[[f64; 2]]) -> Corner {
     free.map_or(Corner::RightTop, |c| c.0)
 }
 
-/// Something in the plot.
+/// An item of the plot.
 enum Item {
     Line(Line<'static>),
     Points(Points<'static>),
@@ -229,7 +228,7 @@ impl Item {
     }
 }
 
-/// Color of the knob with this number: that of the report's own plots, lighter on dark ground.
+/// Color of a knob by number: that of the report's own plots, lighter for a dark background.
 pub(crate) fn color(k: usize) -> Color32 {
     let [r, g, b] = look(k).color.map(|v| v + (255 - v) / 4);
     Color32::from_rgb(r, g, b)
@@ -247,7 +246,7 @@ fn shape(k: usize) -> MarkerShape {
     }
 }
 
-/// All that was measured of a point.
+/// Draws all measurements of a point.
 pub(crate) fn facts(ui: &mut Ui, point: &Point, measures: &[Measure], whose: &str) {
     ui.strong(format!("{}: {}", point.method, point.setting));
     let repeats = point.secs.each.len();
@@ -283,7 +282,7 @@ mod tests {
         let places = [[1.0, 0.0], [4.0, 2.0], [2.0, 1.0]];
         assert!((beside_legend(&places, Corner::RightTop, 0.25) - 5.0).abs() < 1e-6);
         assert!((beside_legend(&places, Corner::LeftBottom, 0.25) - 0.0).abs() < 1e-6);
-        // A narrow plot is half legend at most.
+        // In a narrow plot the legend takes half the width at most.
         assert!((beside_legend(&places, Corner::RightTop, 3.0) - 7.0).abs() < 1e-6);
         assert_eq!(
             (beside_legend(&places[..1], Corner::RightTop, 0.5), beside_legend(&[], Corner::LeftTop, 0.5)),

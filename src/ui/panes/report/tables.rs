@@ -8,10 +8,10 @@ use crate::math::format;
 use crate::measure::{Measure, Point, Report, Stage, StageComparison, table};
 use crate::scene::text;
 
-/// Letters of a setting that are shown in a table.
+/// Largest number of characters of a setting in a table.
 const MOST_LETTERS: usize = 34;
 
-/// The measured settings; returns the one that was clicked.
+/// Draws the measured settings; returns the one that was clicked.
 pub(crate) fn points<'a>(
     ui: &mut Ui,
     stage: &'a Stage,
@@ -48,7 +48,7 @@ fn value(p: &Point, measure: &Measure) -> String {
     p.values.get(&measure.name).map_or_else(|| "\u{2013}".into(), |s| table::spread(s, format::number))
 }
 
-/// What each knob's rule says of its default.
+/// Draws the verdict of each knob's rule on its default.
 pub(crate) fn choices(ui: &mut Ui, stage: &Stage) {
     let choices = stage.choices();
     ui.label(RichText::new(format!("Rule: {}.", stage.rule.words())).small().color(theme::weak()));
@@ -75,7 +75,7 @@ fn error(p: &Point, measure: &Measure) -> String {
     p.error(measure).map_or_else(|| "\u{2013}".into(), format::number)
 }
 
-/// Whether errors fall as fast as theory says.
+/// Draws observed orders of convergence against theory.
 pub(crate) fn orders(ui: &mut Ui, stage: &Stage) {
     Grid::new("orders").num_columns(4).striped(true).spacing([12.0, 1.0]).min_row_height(20.0).show(ui, |ui| {
         head(ui, &["refined", "order observed", "expected", "theory"]);
@@ -89,7 +89,7 @@ pub(crate) fn orders(ui: &mut Ui, stage: &Stage) {
     });
 }
 
-/// Two reports side by side.
+/// Draws two reports side by side.
 pub(crate) fn comparison(ui: &mut Ui, comparison: &StageComparison<'_>, measure: &Measure) {
     if comparison.pairs.is_empty() {
         ui.colored_label(theme::warning(), "The two reports have no setting in common.");
@@ -120,7 +120,7 @@ fn signed(v: f64) -> String {
     if v > 0.0 { format!("+{}", format::number(v)) } else { format::number(v) }
 }
 
-/// On what, by what, against what was measured.
+/// Draws the scene, computer, program, reference and commands of the measurements.
 pub(crate) fn about(ui: &mut Ui, report: &Report, stage: &Stage) {
     Grid::new("about").num_columns(2).spacing([12.0, 3.0]).show(ui, |ui| {
         let mut row = |name: &str, text: &str| {

@@ -1,4 +1,4 @@
-//! The menu of a right click: what can be done with what is under the cursor.
+//! The context menu of the identity under the cursor.
 
 use egui::{RichText, Ui};
 
@@ -7,7 +7,7 @@ use crate::scene::{Identities, IdentityId, NOBODY, text};
 use crate::ui::actions::Action;
 use crate::ui::labels::ScreenNames;
 
-/// The menu about an identity; about the view if there is none.
+/// Draws the menu of an identity, or of the view without one.
 pub(super) fn show(
     ui: &mut Ui,
     (all, names): (&Identities, &ScreenNames),

@@ -1,7 +1,7 @@
-//! What is under the cursor and what is selected: outlined in the view, named beside the cursor.
+//! Hovered and selected identity: outlined in the view, named beside the cursor.
 //!
-//! A click takes the part, or the object where it has none; a click on what is selected what it is a part of; with Alt
-//! the object at once.
+//! A click selects the part, or the object if it has no part there; a click on the selection selects its whole; with
+//! Alt, the object at once.
 
 mod menu;
 
@@ -16,19 +16,19 @@ use crate::scene::{Identities, IdentityId, Mask, PixelBox, SemanticMap, text};
 use crate::ui::actions::Action;
 use crate::worker::Versioned;
 
-/// Color of what a click would select.
+/// Color of the identity that a click would select.
 const HOVERED: [u8; 3] = [255, 255, 255];
-/// Color of what is selected.
+/// Color of the selection.
 const SELECTED: [u8; 3] = [0x6c, 0xb2, 0xf0];
 
-/// What is pointed at and what is selected.
+/// Hovered and selected identity.
 #[derive(Default)]
 pub struct Picking {
     hovered: Option<IdentityId>,
     selected: Option<IdentityId>,
-    /// Whether the cursor was in the view since the scene was opened: from then on it is needed what pixels are of.
+    /// True if the cursor was in the view since the scene was opened: identity maps are needed from then on.
     wanted: bool,
-    /// What the open menu is about.
+    /// Identity of the open menu.
     menu: Option<IdentityId>,
     outlines: [DrawnOutline; 2],
 }
@@ -36,35 +36,36 @@ pub struct Picking {
 /// An outline on screen.
 #[derive(Default)]
 pub(super) struct DrawnOutline {
-    /// View, objects and identity that it was drawn for.
+    /// Generations of view and objects, and the identity that it was drawn for.
     of: Option<(u64, u64, IdentityId)>,
-    /// Where it lies in the view, px; `None` if it has no pixel there.
+    /// Its place in the view, px; `None` without pixels there.
     at: Option<PixelBox>,
     texture: Option<TextureHandle>,
 }
 
 impl Picking {
-    /// What is selected.
+    /// Selected identity.
     pub fn selected(&self) -> Option<IdentityId> {
         self.selected
     }
 
-    /// What a click would select.
+    /// Identity that a click would select.
     pub fn hovered(&self) -> Option<IdentityId> {
         self.hovered
     }
 
-    /// Whether it is needed what pixels belong to.
+    /// True if identity maps are needed.
     pub(super) fn wanted(&self) -> bool {
         self.wanted
     }
 
-    /// Selects an identity, or nothing.
+    /// Selects an identity, or none.
     pub(crate) fn select(&mut self, id: Option<IdentityId>) {
         self.selected = id;
     }
 
-    /// Takes the cursor in, which is at a pixel of `maps` where they are known and it is not on a camera: what it points at, what was clicked, and the menu of a right click.
+    /// Handles the cursor: hover, click and context menu. `maps` are given if they are known and the cursor is not on a
+    /// camera.
     pub(super) fn update(
         &mut self,
         response: &Response,
@@ -78,7 +79,7 @@ impl Picking {
         self.wanted |= response.hovered();
         let alt = response.ctx.input(|i| i.modifiers.alt);
         let under = |pos: Pos2| innermost(&maps?.identities, shown, pos).filter(|id| all.get(*id).is_some());
-        // A menu that is open is about what was clicked.
+        // An open menu belongs to the clicked identity.
         let open = response.context_menu_opened();
         let cursor = response.hover_pos().filter(|_| !open && !response.dragged());
         self.hovered = cursor.and_then(under).map(|id| picked(all, id, self.selected, alt));
@@ -86,7 +87,7 @@ impl Picking {
             actions.push(Action::Select(self.hovered));
         }
         if response.secondary_clicked() {
-            // On what is selected the menu is about that, else about what a click would select.
+            // On the selection the menu is that of the selection, else of the identity that a click would select.
             let id = response.interact_pointer_pos().and_then(under);
             let within = |s: &IdentityId| id.is_some_and(|id| all.ancestors(id).any(|at| at == *s));
             self.menu = self.selected.filter(within).or_else(|| id.map(|id| picked(all, id, None, alt)));
@@ -97,7 +98,7 @@ impl Picking {
         response.context_menu(|ui| menu::show(ui, (all, names), self.menu, actions));
     }
 
-    /// Outlines over the frame in `shown`, and the name beside the cursor.
+    /// Draws outlines over the frame in `shown`, and the name beside the cursor.
     pub(super) fn paint(
         &mut self,
         ui: &Ui,
@@ -105,7 +106,7 @@ impl Picking {
         (semantics, names): (&Versioned<SemanticMap>, &ScreenNames),
         maps: &Versioned<ViewMaps>,
     ) {
-        // Whoever types is not about to click.
+        // While text is typed, a click is not expected.
         let hovered = self.hovered.filter(|_| !ui.ctx().text_edit_focused());
         let [selected, pointed_at] = &mut self.outlines;
         if let Some(id) = self.selected {
@@ -151,7 +152,7 @@ impl DrawnOutline {
     }
 }
 
-/// The innermost identity at a place of the window.
+/// The innermost identity at a window position.
 fn innermost(map: &ViewMap, shown: Rect, pos: Pos2) -> Option<IdentityId> {
     let at = (pos - shown.min) / shown.size();
     let inside = |v: f32, n: usize| (0.0..1.0).contains(&v).then_some((v * n as f32) as usize);
@@ -159,8 +160,8 @@ fn innermost(map: &ViewMap, shown: Rect, pos: Pos2) -> Option<IdentityId> {
     map.identity.get(y * map.width_px + x).copied()
 }
 
-/// What a click on a pixel of `innermost` selects: that, and on what is selected what it is a part of, up to the object
-/// and on from the part again; with Alt the object at once.
+/// Identity that a click on a pixel of `innermost` selects: itself; on the selection the next whole, up to the object
+/// and then the part again; with Alt the object at once.
 fn picked(all: &Identities, innermost: IdentityId, selected: Option<IdentityId>, alt: bool) -> IdentityId {
     if alt {
         return all.object_of(innermost);
@@ -170,12 +171,12 @@ fn picked(all: &Identities, innermost: IdentityId, selected: Option<IdentityId>,
     at.map_or(innermost, |at| line[(at + 1) % line.len()])
 }
 
-/// A name beside the cursor, inside the view.
+/// Draws a name beside the cursor, inside the view.
 fn label(ui: &Ui, shown: Rect, pos: Pos2, name: &str) {
     let galley = ui.painter().layout_no_wrap(name.to_owned(), FontId::proportional(13.0), theme::text());
     let size = galley.size() + vec2(12.0, 6.0);
     let mut back = Rect::from_min_size(pos + vec2(16.0, 14.0), size);
-    // At the right and the lower border it is on the other side of the cursor.
+    // At the right and the lower border the name is on the other side of the cursor.
     if back.right() > shown.right() {
         back = back.translate(vec2(-size.x - 24.0, 0.0));
     }

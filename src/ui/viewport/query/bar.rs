@@ -8,21 +8,21 @@ use crate::scene::SemanticMap;
 use crate::ui::text_field::{cursor_to_end, take_keyboard};
 use crate::ui::theme;
 
-/// Completions that are offered.
+/// Number of completions.
 const OFFERED: usize = 5;
 
-/// Nobody is told that nothing is found before a pause this long, nor for fewer letters.
+/// Pause and least number of characters before "not found" is shown.
 const PAUSE_SECS: f64 = 0.6;
 const SHORTEST: usize = 3;
 
 impl Queries {
-    /// The field. Whether it has the keyboard, and how what is typed can go on.
+    /// Draws the field. Returns whether it has the focus, and the completions of its text.
     pub(super) fn show_field(&mut self, ui: &mut Ui, width: f32, semantics: &SemanticMap) -> (bool, Vec<String>) {
-        // The same in a card that is folded and in one that is not.
+        // The same id in a folded and an unfolded card.
         let id = Id::unique(("query", self.is_second));
-        // Taken before the field sees them: it would move its cursor.
+        // Taken before the field, which would move its cursor.
         if self.side.focus > 0 {
-            // Twice: the first time, the selection does not last.
+            // Twice: the selection of the first frame does not last.
             self.side.focus -= 1;
             leave_out_slashes(ui);
             take_keyboard(ui.ctx(), id, &mut self.side.typed);
@@ -30,7 +30,7 @@ impl Queries {
         let focused = ui.memory(|m| m.has_focus(id));
         self.side.begun |= !focused;
         if focused && (!self.side.begun || self.side.typed.is_empty()) {
-            // The key that opened it types nothing, however often it is pressed.
+            // Repeats of the shortcut "/" that opened the field are not text.
             leave_out_slashes(ui);
         }
         self.wanted |= focused;
@@ -43,7 +43,7 @@ impl Queries {
             .id(id)
             .hint_text("Find an object or part, e.g. \u{201c}the button of the red controller\u{201d}  ( / )")
             .char_limit(2_000)
-            // Tab completes, as long as there is something to complete to.
+            // Tab completes, if there is a completion.
             .lock_focus(!offered.is_empty())
             .desired_width(width);
         let name = if self.is_second { "Query of the second view" } else { "Query" };
@@ -69,7 +69,7 @@ impl Queries {
         (focused, offered)
     }
 
-    /// Names that what is being typed may become.
+    /// Completions of the typed text from known names.
     fn offered(&self, semantics: &SemanticMap) -> Vec<String> {
         let typed = self.side.typed.trim();
         match typed.is_empty() || self.side.typed_at.is_none() {
@@ -78,7 +78,7 @@ impl Queries {
         }
     }
 
-    /// Buttons of these names, unless the first is typed already.
+    /// Draws buttons of the completions, unless the first is already typed.
     pub(super) fn show_offered(&mut self, ui: &mut Ui, offered: &[String], semantics: &SemanticMap) {
         if offered.first().is_none_or(|first| *first == self.side.typed) {
             return;
@@ -89,7 +89,7 @@ impl Queries {
         });
     }
 
-    /// Buttons that ask for these names.
+    /// Draws buttons that query these names.
     pub(super) fn show_names(&mut self, ui: &mut Ui, names: &[String], semantics: &SemanticMap) {
         for text in names {
             if ui.small_button(text).clicked() {
@@ -99,7 +99,7 @@ impl Queries {
         }
     }
 
-    /// Goes through what was asked before with the arrow keys.
+    /// Recalls earlier queries with the arrow keys.
     fn recall(&mut self, ui: &Ui, field: Id, semantics: &SemanticMap) {
         let pressed = |key| ui.input_mut(|i| i.consume_key(Modifiers::NONE, key));
         let n = self.history.len();
@@ -116,7 +116,7 @@ impl Queries {
         (self.side.recalled, self.side.focus) = (next, 0);
     }
 
-    /// What is typed is all of it: it is in the history, and its color is its own.
+    /// Marks the typed query as complete: it enters the history and keeps its color.
     pub(super) fn settle(&mut self) {
         self.side.typed_at = None;
         self.keep_color();
@@ -126,7 +126,7 @@ impl Queries {
         self.side.recalled = Some(self.history.len() - 1);
     }
 
-    /// Whether it is time to say that nothing is found: not while it is being typed.
+    /// True if "not found" may be shown: not while the user types.
     pub(super) fn is_settled(&self, ui: &Ui) -> bool {
         let Some(at) = self.side.typed_at else { return true };
         let wait = PAUSE_SECS - (ui.input(|i| i.time) - at);
@@ -138,7 +138,7 @@ impl Queries {
     }
 }
 
-/// Takes the slashes off that come before anything else is typed.
+/// Removes slashes before any other typed text.
 fn leave_out_slashes(ui: &Ui) {
     ui.input_mut(|i| {
         let mut has_begun = false;
@@ -152,7 +152,7 @@ fn leave_out_slashes(ui: &Ui) {
     });
 }
 
-/// Whether something else is done with the text that is selected than to type in its place.
+/// True if the input does not replace the selected text.
 fn goes_on(input: &InputState) -> bool {
     let is_key = |e: &Event| matches!(e, Event::Key { key, pressed: true, .. } if *key != Key::Slash);
     input.pointer.any_pressed() || input.events.iter().any(is_key)

@@ -1,5 +1,5 @@
-//! The answer to the query in the field: what is meant, how surely, how large it is, and the way there; in small views
-//! a word.
+//! The answer to the query in the field: its target, certainty and size, and a button to fly there; in small views one
+//! word.
 
 use egui::{Align, Button, Color32, Layout, RichText, Ui};
 
@@ -20,10 +20,10 @@ use crate::ui::state::AppState;
 use crate::ui::theme;
 use crate::worker::Versioned;
 
-/// Said of what has no Gaussian.
+/// Note on identities without Gaussians.
 const EMPTY: &str = "empty: no Gaussians belong to it";
 
-/// Things that fit equally and are named.
+/// Number of equal hits that are named.
 const NAMED: usize = 3;
 
 impl Queries {
@@ -61,7 +61,7 @@ impl Queries {
         }
     }
 
-    /// Which of several is meant.
+    /// Draws the choice among several hits.
     fn show_candidates(
         &mut self,
         ui: &mut Ui,
@@ -89,7 +89,7 @@ impl Queries {
         self.choose(chosen);
     }
 
-    /// What was found.
+    /// Draws the target.
     fn show_target(
         &mut self,
         ui: &mut Ui,
@@ -131,7 +131,7 @@ impl Queries {
         });
     }
 
-    /// Why nothing of an identity is seen, if nothing is.
+    /// Reason why no pixel of an identity is visible, if none is.
     fn why_unseen(
         &mut self,
         semantics: &Versioned<SemanticMap>,
@@ -153,7 +153,7 @@ impl Queries {
         Some("not in this view")
     }
 
-    /// The answer in a word or two, with its color and what else is to be said of it.
+    /// The answer in a word or two, its color, and further remarks.
     pub(super) fn answer_in_short(
         &mut self,
         ui: &Ui,
@@ -237,7 +237,7 @@ impl Queries {
     }
 }
 
-/// How sure the answer is, the color of that, and the numbers that say so.
+/// Certainty of the answer, its color, and the scores behind it.
 fn certainty(newest: &Asked) -> (&'static str, Color32, String) {
     let certainty = newest.answered.certainty(&newest.ignored);
     let color = match certainty {
@@ -255,23 +255,23 @@ fn certainty(newest: &Asked) -> (&'static str, Color32, String) {
     (certainty.into(), color, numbers)
 }
 
-/// The longest edge, in the scene's unit.
+/// The longest edge, with the scene's unit.
 fn size_text(bounds: Bounds, state: &AppState) -> String {
     format::length(bounds.size().max_element(), state.scene.as_ref().and_then(|s| s.meters_per_unit()))
 }
 
-/// The target in space.
+/// Facts about the target in space.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Facts {
-    /// What they were counted for.
+    /// Generation, identity and match that they were computed for.
     of: (u64, IdentityId, MatchMode, u32),
     pub(super) gaussians: usize,
-    /// In scene units, without stray Gaussians.
+    /// Bounds in scene units, without outlier Gaussians.
     pub(super) bounds: Option<Bounds>,
 }
 
 impl Queries {
-    /// Facts of the target; counted anew only when it or the match has changed.
+    /// Facts about the target; recomputed only when it or the match has changed.
     pub(super) fn facts_of(
         &mut self,
         target: IdentityId,

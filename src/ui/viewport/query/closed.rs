@@ -1,11 +1,11 @@
-//! The query field where nothing can be asked yet: disabled, with the reason.
+//! The disabled query field with the reason why queries are impossible.
 
 use egui::{Align2, Area, Id, Order, Rect, TextEdit, Ui};
 
 use super::panel::{MARGIN, width_in};
 use crate::ui::theme;
 
-/// Draws it in the view in `rect`.
+/// Draws the field in the view in `rect`.
 pub(crate) fn show(ui: &Ui, rect: Rect, why: &str) {
     let at = Align2::RIGHT_TOP.pos_in_rect(&rect.shrink(MARGIN));
     let area = Area::new(Id::unique("closed question")).order(Order::Middle).pivot(Align2::RIGHT_TOP).fixed_pos(at);

@@ -1,5 +1,5 @@
-//! The pane beside the view that says all of the newest answer: hits with their scores, the target in space, where
-//! the time went, and how answers are found and drawn.
+//! The pane with the full answer to the newest query: hits with their scores, the target in space, run times, and the
+//! settings of search and display.
 
 use egui::{RichText, Ui};
 use strum::VariantArray;
@@ -16,11 +16,11 @@ use crate::ui::state::AppState;
 use crate::ui::theme;
 use crate::worker::Versioned;
 
-/// Hits that are listed.
+/// Number of hits in the list.
 const LISTED: usize = 8;
 
 impl Viewport {
-    /// The pane of the query: its answer and the options.
+    /// Draws the pane of the query: its answer and the options.
     pub(crate) fn show_query(&mut self, ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
         let (Some(semantics), Some(cloud)) = (&state.semantics, &self.cloud) else {
             ui.weak("Find objects first: queries search among them.");
@@ -39,7 +39,7 @@ impl Queries {
         cloud: &GaussianCloud,
         actions: &mut Vec<Action>,
     ) {
-        // Settings are for looking at maps.
+        // The settings need the identity maps.
         self.wanted = true;
         match self.side.live.clone() {
             Some(newest) => {
@@ -93,7 +93,7 @@ impl Queries {
     }
 }
 
-/// The target in space, and what can be done with it.
+/// Draws the facts about the target in space, and its actions.
 fn show_target(ui: &mut Ui, target: IdentityId, facts: &Facts, state: &AppState, actions: &mut Vec<Action>) {
     let unit = state.scene.as_ref().and_then(|s| s.meters_per_unit());
     let edges = facts.bounds.map(|b| b.size().to_array().map(|edge| format::length(edge, unit)).join(" \u{00d7} "));

@@ -1,4 +1,4 @@
-//! Embeddings of the texts on screen: asked of the text encoder's thread while they are typed, taken over as they come.
+//! Embeddings of the texts on screen: requested from the text encoder's thread during typing.
 
 use std::sync::Arc;
 
@@ -6,22 +6,22 @@ use crate::pipeline::semantics::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::parse::ParsedQuery;
 use crate::worker::text_encoder::{Encoded, EncodedText, TextEncoder, TextRequest};
 
-/// What is known of the texts on screen.
+/// Embeddings of the texts on screen, as far as known.
 #[derive(Default)]
 pub(super) struct Embeddings {
-    /// Which encoder is wanted.
+    /// Name of the encoder in use.
     name: Option<String>,
     encoder: Option<TextEncoder>,
-    /// Generation of what was taken over last.
+    /// Generation of the last encoder result.
     seen: u64,
     known: Arc<Encoded>,
-    /// The texts that were asked for last.
+    /// The last request.
     requested: TextRequest,
 }
 
 impl Embeddings {
-    /// Loads the encoder of this name if it is another one than before, asks it for `texts`, and takes over what it
-    /// has encoded. Whether anything is new.
+    /// Loads the encoder `name` if it differs from the last one, requests `texts`, and takes over its results. Returns
+    /// true if there are new ones.
     pub(super) fn keep_up(&mut self, ctx: &egui::Context, name: Option<&str>, texts: TextRequest) -> bool {
         if self.name.as_deref() != name {
             *self = Self { name: name.map(str::to_owned), ..Self::default() };
@@ -33,7 +33,7 @@ impl Embeddings {
             }
         }
         let Some(encoder) = &self.encoder else { return false };
-        // With a full queue the request comes again with the next redraw.
+        // With a full queue the request is repeated at the next redraw.
         if self.requested != texts && encoder.request(texts.clone()) {
             self.requested = texts;
         }
@@ -42,7 +42,7 @@ impl Embeddings {
         true
     }
 
-    /// What is known of a text; `None` until the encoder has read it.
+    /// Result for a text; `None` until the encoder has read it.
     pub(super) fn of(&self, text: &ParsedQuery) -> Option<&EncodedText> {
         self.known.texts.get(text)
     }
@@ -52,12 +52,12 @@ impl Embeddings {
         self.of(text).filter(|t| t.known).map(|_| &self.known.phrases)
     }
 
-    /// Whether a text may yet be encoded.
+    /// True if a text may yet be encoded.
     pub(super) fn is_pending(&self, text: &ParsedQuery) -> bool {
         self.known.problem.is_none() && self.of(text).is_none()
     }
 
-    /// Why texts cannot be compared with embeddings of objects, if they cannot.
+    /// Reason why texts cannot be compared with embeddings of objects, if they cannot.
     pub(super) fn problem(&self) -> Option<&str> {
         let failed = || self.known.texts.values().find_map(|t| t.problem.as_ref());
         self.known.problem.as_ref().or_else(failed).map(String::as_str)

@@ -1,8 +1,7 @@
-//! Queries asked of the scene: the field to type them into, their answers, and what they draw over
-//! the frame. A query takes the place of the one before, unless that is pinned.
+//! Queries of the scene: the query field, the answers, and their overlay on the frame. A query replaces the one before,
+//! unless that is pinned.
 //!
-//! What the view's pixels belong to is drawn once, when the eye rests; every query then only
-//! reads it, while it is still being typed.
+//! Identity maps of the view are drawn once, at rest; every query then only reads them, even during typing.
 
 mod bar;
 mod card;
@@ -42,19 +41,19 @@ use crate::worker::Versioned;
 /// A query with its answer.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Asked {
-    /// As it was typed.
+    /// The text as typed.
     pub(crate) text: String,
-    /// What it comes to.
+    /// Answer to the query.
     pub answered: QueryAnswer,
-    /// Whether the text encoder has yet to read it: names alone have answered so far.
+    /// True if the text encoder has yet to read it: only names have been searched so far.
     pub pending: bool,
-    /// A hit that was chosen among the others; else the best are shown.
+    /// Hit chosen by the user; otherwise the best are shown.
     chosen: Option<IdentityId>,
-    /// How it was read.
+    /// Interpretation of the text.
     reading: QueryReading,
-    /// Words for want of which nothing was found.
+    /// Unknown words that prevented an answer.
     unexplained: Vec<String>,
-    /// Words that the answer does not rest on.
+    /// Words that the answer ignores.
     ignored: Vec<String>,
 }
 
@@ -68,26 +67,26 @@ impl Asked {
 /// The queries on screen.
 #[derive(Default)]
 pub struct Queries {
-    /// Of the view that is worked in, and of the other one.
+    /// Queries of the active view, and of the other one.
     side: QuerySide,
     other: QuerySide,
-    /// Whether the second of two views is the one that is worked in.
+    /// True if the second of two views is active.
     is_second: bool,
-    /// Whether anything was asked in this scene, or begun to be.
+    /// True if a query was typed or begun in this scene.
     wanted: bool,
-    /// What was asked, oldest first.
+    /// Earlier queries, oldest first.
     history: Vec<String>,
     colors: PhraseColors,
     maps: Option<Versioned<ViewMaps>>,
-    /// The same while the eye moves, at the resolution of the frame.
+    /// Identity maps of a moving view, at the resolution of the frame.
     moving: Option<Versioned<ViewMaps>>,
-    /// Generation of the objects and parts that were asked.
+    /// Generation of the objects and parts that were searched.
     answered_for: u64,
     /// Embeddings of the texts on screen.
     embeddings: Embeddings,
-    /// Why there are none, once that was reported.
+    /// Reason why embeddings are missing, once reported.
     reported: Option<String>,
-    /// What answers are compared with, and where the eye is.
+    /// True mask to compare answers with, and the current camera pose.
     truth: Option<truth::ViewTruth>,
     eye: Option<Pose>,
 }
@@ -98,19 +97,19 @@ impl Queries {
         self.side.all()
     }
 
-    /// Shows this hit of the query in the field alone, or the best again.
+    /// Shows only this hit of the query in the field, or the best ones again.
     fn choose(&mut self, chosen: Option<IdentityId>) {
         if let (Some(id), Some(newest)) = (chosen, self.side.live.as_mut()) {
             newest.chosen = (newest.chosen != Some(id)).then_some(id);
         }
     }
 
-    /// The identities that are found on screen.
+    /// The identities found on screen.
     pub fn found(&self) -> Vec<IdentityId> {
         self.all().flat_map(|asked| asked.shown(&self.side.settings)).collect()
     }
 
-    /// The same with the colors of their queries.
+    /// The found identities with the colors of their queries.
     pub(super) fn found_colors(&self) -> Vec<(IdentityId, Color32)> {
         let colored = |q: &Asked| {
             let [r, g, b] = self.colors.of(&q.text);
@@ -119,33 +118,33 @@ impl Queries {
         self.all().flat_map(colored).collect()
     }
 
-    /// What the present view's pixels belong to, once that is drawn.
+    /// Identity maps of the current view, once drawn.
     pub fn maps(&self) -> Option<&Versioned<ViewMaps>> {
         self.maps.as_ref()
     }
 
-    /// Whether anything was asked in this scene, or begun to be: what queries need is needed now.
+    /// True if a query was typed or begun in this scene: its resources are needed now.
     pub(crate) fn wanted(&self) -> bool {
         self.wanted
     }
 
-    /// Whether blended codes of the view are wanted.
+    /// True if blended codes of the view are needed.
     pub(crate) fn wants_codes(&self) -> bool {
         let needs = |s: &OverlaySettings| s.recipe.masks == MatchMode::Codes || s.color_by == ColorBy::Difference;
         self.sides().iter().any(|side| needs(&side.settings))
     }
 
-    /// Puts the cursor into the field.
+    /// Focuses the query field.
     pub(crate) fn start_typing(&mut self) {
         self.wanted = true;
         self.side.start_typing();
     }
 
-    /// Answers anew where objects and parts, or embeddings, have changed.
+    /// Answers again if objects, parts or embeddings have changed.
     pub(crate) fn keep_up(&mut self, ctx: &egui::Context, semantics: &Versioned<SemanticMap>, plan: &ScenePlan) {
         let encoder = semantics.language.as_ref().map(|l| l.encoder.as_str());
         let now = semantics.generation();
-        // One that is of no more use goes at once, one that is new waits for a query.
+        // An encoder no longer in use is dropped at once; a new one is loaded at the first query.
         let texts = self.sides().into_iter().flat_map(QuerySide::texts).collect();
         let encoded =
             (encoder.is_none() || plan.encoder.now(self.wanted)) && self.embeddings.keep_up(ctx, encoder, texts);
@@ -155,7 +154,7 @@ impl Queries {
         }
     }
 
-    /// Asks as if it had been typed.
+    /// Runs a query as if its text had been typed.
     pub(crate) fn ask(&mut self, text: &str, semantics: &SemanticMap) {
         (self.side.typed, self.side.typed_at) = (text.to_owned(), None);
         self.wanted = true;
@@ -163,14 +162,14 @@ impl Queries {
         self.keep_color();
     }
 
-    /// Gives the query in the field its color for good, if anything has it.
+    /// Fixes the color of the query in the field, if it has an answer.
     fn keep_color(&mut self) {
         if let Some(live) = self.side.live.as_ref().filter(|q| !q.shown(&self.side.settings).is_empty()) {
             self.colors.keep(&live.text);
         }
     }
 
-    /// Shows the answers to these queries, and no others.
+    /// Shows the answers to these queries only.
     pub(crate) fn mark(&mut self, texts: &[String], semantics: &SemanticMap) {
         self.colors.keep_all(texts);
         let (last, others) = texts.split_last().map_or(("", texts), |(last, others)| (last, others));
@@ -178,7 +177,7 @@ impl Queries {
         self.ask(last, semantics);
     }
 
-    /// Answers all queries anew: identities have changed.
+    /// Answers all queries again, as identities have changed.
     pub(crate) fn ask_again(&mut self, semantics: &SemanticMap) {
         for second in [false, true] {
             self.in_view(second, |all| {
@@ -189,7 +188,7 @@ impl Queries {
         }
     }
 
-    /// Forgets queries and answers: another scene.
+    /// Clears queries and answers for another scene.
     pub(crate) fn clear(&mut self) {
         let before = std::mem::take(self);
         let (side, other) = (before.side.cleared(), before.other.cleared());
@@ -197,41 +196,40 @@ impl Queries {
         *self = Self { side, other, is_second, history, colors, embeddings, ..Self::default() };
     }
 
-    /// Why only names are understood, once for each reason.
+    /// Reason why only names are searched, once for each reason.
     pub(crate) fn newly_failed(&mut self) -> Option<String> {
         let why = self.embeddings.problem()?.to_owned();
         (self.reported.replace(why.clone()).as_ref() != Some(&why)).then_some(why)
     }
 
-    /// Takes over what the present view's pixels belong to, exactly or as the eye moves.
+    /// Takes over identity maps of the current view: exact, or of a moving one.
     pub(crate) fn set_maps(&mut self, maps: Versioned<ViewMaps>, exact: bool) {
         (self.maps, self.moving) = if exact { (Some(maps), None) } else { (None, Some(maps)) };
     }
 
-    /// What the pixels belong to is not known any more. What was drawn stays on screen until it is, if only the
-    /// eye has moved.
+    /// Drops the identity maps. If only the camera has moved, the drawn ones stay on screen until new ones arrive.
     pub(crate) fn forget_maps(&mut self, only_moved: bool) {
         let before = self.maps.take().or(self.moving.take());
         self.moving = before.filter(|_| only_moved);
     }
 
-    /// What is on screen of it: exact, or of the newest frame of a moving view.
+    /// The identity maps on screen: exact, or of the newest frame of a moving view.
     pub fn shown_maps(&self) -> Option<&Versioned<ViewMaps>> {
         self.maps.as_ref().or(self.moving.as_ref())
     }
 
-    /// Colors the view by this; by nothing but masks if it is colored so.
+    /// Colors the view by this quantity; back to masks if it is in use already.
     pub(crate) fn tint(&mut self, by: ColorBy) {
         self.side.settings.color_by = if self.side.settings.color_by == by { ColorBy::Masks } else { by };
         self.wanted = true;
     }
 
-    /// How answers are drawn.
+    /// Display settings of the answers.
     pub(super) fn settings(&mut self) -> &mut OverlaySettings {
         &mut self.side.settings
     }
 
-    /// Whether anything is drawn over the frame that depends on what its pixels belong to.
+    /// True if an overlay from identity maps is drawn over the frame.
     pub(super) fn tints(&self) -> bool {
         self.sides().iter().any(|side| side.painted.is_some())
     }
@@ -255,24 +253,24 @@ impl Queries {
         Some(Asked { text: text.to_owned(), answered, pending, chosen: None, reading, unexplained, ignored })
     }
 
-    /// The target's pixels in the present view.
+    /// Mask of the target in the current view.
     fn mask_of(&self, maps: &ViewMaps, semantics: &SemanticMap, target: IdentityId) -> Mask {
         let Recipe { masks, tolerance, .. } = self.side.settings.recipe;
         maps.mask(semantics, target, masks, tolerance)
     }
 
-    /// Pixels of an identity in the present view, if that is drawn.
+    /// Number of pixels of an identity in the current view, if its maps are drawn.
     fn area_of(&mut self, semantics: &Versioned<SemanticMap>, id: IdentityId) -> Option<usize> {
         Some(self.measured(semantics, id)?.0)
     }
 
-    /// Shares of the present view's width and height that an identity spans, if that is drawn; `Some(None)` if it
+    /// Shares of the current view's width and height that an identity spans, if its maps are drawn; `Some(None)` if it
     /// has no pixel there.
     pub(super) fn span_of(&mut self, semantics: &Versioned<SemanticMap>, id: IdentityId) -> Option<Option<Vec2>> {
         Some(self.measured(semantics, id)?.1)
     }
 
-    /// Both, found once for a view.
+    /// Pixel count and span of an identity, computed once per view.
     fn measured(&mut self, semantics: &Versioned<SemanticMap>, id: IdentityId) -> Option<(usize, Option<Vec2>)> {
         let maps = self.maps.clone()?;
         let Recipe { masks, tolerance, .. } = self.side.settings.recipe;

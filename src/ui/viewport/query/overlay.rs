@@ -1,4 +1,4 @@
-//! The frame that lies over the view: outlines and fills of masks, and tints.
+//! The overlay of the view: outlines and fills of masks, and tints.
 
 use egui::{Color32, ColorImage};
 use rayon::prelude::*;
@@ -13,32 +13,32 @@ use crate::scene::semantic_map::CODE_CHANNELS;
 use crate::scene::{Identities, IdentityId, Level, Mask};
 use crate::ui::color_by::ColorBy;
 
-/// Over what is neither found nor selected.
+/// Dimming of everything neither found nor selected.
 const DIM: Color32 = Color32::from_black_alpha(165);
 
-/// Where blended codes differ.
+/// Color of pixels with different blended codes.
 const DIFFERENT: [u8; 3] = [255, 60, 160];
 
-/// The stripes of what is unknown, and their width in px.
+/// Stripe colors of unlabeled pixels, and stripe width in px.
 pub(crate) const HATCH: [[u8; 3]; 2] = [[205; 3], [70; 3]];
 const HATCH_PX: usize = 6;
-/// The stripes of what was invented.
+/// Stripe color of pixels that a removal has filled.
 pub(crate) const INVENTED: [u8; 3] = [255, 236, 150];
 
-/// What is drawn over the view.
+/// Layers of the overlay.
 pub(crate) struct Layers<'a> {
-    /// What the pixels belong to.
+    /// Identity map of the view.
     pub(crate) map: &'a ViewMap,
-    /// Their blended codes, where they are drawn.
+    /// Blended codes of the pixels, if drawn.
     pub(crate) codes: Option<&'a CodeMap>,
     pub(crate) identities: &'a Identities,
-    /// Where nothing is known, if that is drawn.
+    /// Mask of unlabeled pixels, if drawn.
     pub(crate) unknown: Option<&'a Mask>,
-    /// Where the scene was invented, if that is drawn.
+    /// Mask of pixels that a removal has filled, if drawn.
     pub(crate) invented: Option<&'a Mask>,
     /// Masks of the answers, with their colors; later ones on top.
     pub(crate) masks: &'a [([u8; 3], Mask)],
-    /// What stays bright while everything else is dimmed.
+    /// Mask that stays bright while everything else is dimmed.
     pub(crate) lit: Option<&'a Mask>,
     /// Relevancy of each identity by number.
     pub(crate) relevancy: &'a [f32],
@@ -61,7 +61,7 @@ impl Layers<'_> {
             }
             let outlines = self.masks.iter().rev().map(|(color, mask)| (color, Outline::at(mask, i)));
             let filled = self.settings.color_by == ColorBy::Masks;
-            // A mask over another's halo; where something tints the frame, masks are lines alone.
+            // A mask covers another's halo; with a tint, masks are outlines only.
             let topmost = outlines.filter(|o| o.1 != Outline::Outside).min_by_key(|o| o.1 == Outline::Halo);
             match topmost.filter(|o| filled || o.1 != Outline::Fill) {
                 Some((color, outline)) => outline.color(*color).unwrap_or_default(),
@@ -85,42 +85,42 @@ impl Layers<'_> {
         self.relevancy.get(id as usize).copied().unwrap_or(0.0)
     }
 
-    /// Color of a pixel in the codes view while codes are blended.
+    /// Color of a pixel in the codes view in blended mode.
     fn blended(&self, i: usize) -> Option<[u8; 3]> {
         let codes = self
             .codes
             .filter(|_| self.settings.color_by == ColorBy::Codes && self.settings.recipe.masks == MatchMode::Codes)?;
         let of = |level: Level| codes.level(level).iter().map(move |plane| plane.get(i).copied().unwrap_or(f32::NAN));
-        // A part where there is one, else the object.
+        // A part if there is one, else the object.
         let part: Vec<f32> = of(Level::Part).collect();
         let is_part = part.iter().any(|c| (c - 0.5).abs() > 0.1);
         let shown: Vec<f32> = if is_part { part } else { of(Level::Object).collect() };
         shown.iter().all(|c| c.is_finite()).then(|| std::array::from_fn(|c| (shown[c].clamp(0.0, 1.0) * 255.0) as u8))
     }
 
-    /// Color of a pixel whose blended codes are farther from those of its identity than matches may
-    /// be. Where nothing is, nothing differs.
+    /// Color of a pixel whose blended codes differ from those of its identity by more than the match tolerance; `None`
+    /// without Gaussians there.
     fn difference(&self, i: usize, own: &[f32; CODE_CHANNELS]) -> Option<[u8; 3]> {
         let blended = self.codes?.planes.iter().map(|plane| plane.get(i).copied().unwrap_or(f32::NAN));
         let far = blended.zip(own).any(|(b, o)| (b - o).abs() > self.settings.recipe.tolerance);
         far.then_some(DIFFERENT)
     }
 
-    /// Color of a pixel of which nothing is known: stripes, so that it is seen to be no object.
+    /// Stripes on an unlabeled pixel, so that it does not look like an object.
     fn hatch(&self, i: usize) -> Option<[u8; 3]> {
         self.unknown.filter(|m| m.contains(i))?;
         let across = (i % self.map.width_px + i / self.map.width_px) / HATCH_PX;
         Some(HATCH[across % 2])
     }
 
-    /// Stripes over what was invented, across those of what is unknown; its own color is between them.
+    /// Stripes over filled pixels, across those of unlabeled ones; the pixel's own color shows between them.
     fn striped(&self, i: usize) -> Option<[u8; 3]> {
         self.invented.filter(|m| m.contains(i))?;
         let across = (self.map.width_px + i / self.map.width_px - i % self.map.width_px) / HATCH_PX;
         across.is_multiple_of(2).then_some(INVENTED)
     }
 
-    /// Color of what has this identity; `None` leaves the frame as it is.
+    /// Color of an identity; `None` leaves the frame as it is.
     fn tint(&self, id: IdentityId) -> Option<[u8; 3]> {
         let code = |id: IdentityId| self.identities.get(id).map(|i| i.code.map(|c| (c * 255.0) as u8));
         match self.settings.color_by {
@@ -134,15 +134,14 @@ impl Layers<'_> {
     }
 }
 
-/// Colors of vectors by their three main directions (principal components), by number from 0; gray
-/// for those without one.
+/// Colors of vectors by their first three principal components, by number from 0; gray for those without a vector.
 pub(crate) fn main_directions(vectors: &[Option<&[f32]>]) -> Vec<[u8; 3]> {
     let some: Vec<&[f32]> = vectors.iter().flatten().copied().collect();
     let Some(dimension) = some.first().map(|v| v.len()) else { return vec![[128; 3]; vectors.len()] };
     let mean: Vec<f32> = (0..dimension).map(|c| some.iter().map(|v| v[c]).sum::<f32>() / some.len() as f32).collect();
     let mut centered: Vec<Vec<f32>> = some.iter().map(|v| v.iter().zip(&mean).map(|(a, m)| a - m).collect()).collect();
     let mut colors = vec![[128_u8; 3]; some.len()];
-    // One scale for all directions, or the least of them would shout.
+    // One scale for all components, or the least of them would look too strong.
     let mut widest = 1e-6_f32;
     for channel in 0..3 {
         let direction = main_direction(&centered);
@@ -157,7 +156,7 @@ pub(crate) fn main_directions(vectors: &[Option<&[f32]>]) -> Vec<[u8; 3]> {
     vectors.iter().map(|v| v.and_then(|_| next.next()).unwrap_or([128; 3])).collect()
 }
 
-/// Power iteration on the covariance, from the vector that differs most.
+/// Power iteration on the covariance, from the longest centered vector.
 fn main_direction(centered: &[Vec<f32>]) -> Vec<f32> {
     let longest = centered.iter().max_by(|a, b| dot(a, a).total_cmp(&dot(b, b)));
     let mut direction = longest.cloned().unwrap_or_default();
@@ -283,7 +282,7 @@ mod tests {
         for (c, plane) in codes.planes.iter_mut().enumerate() {
             *plane = map.identity.iter().map(|id| identities.codes(*id)[c]).collect();
         }
-        // One pixel of the shade is blended with something else; nothing is in the first.
+        // One pixel of the shade is blended with something else; the first is empty.
         codes.planes[4][12] += 0.1;
         codes.planes[0][0] = f32::NAN;
         let settings = OverlaySettings { color_by: ColorBy::Difference, opacity: 1.0, ..OverlaySettings::default() };

@@ -1,4 +1,4 @@
-//! Masks and tints of a view's queries, painted over its frame whenever anything about them has changed.
+//! Masks and tints of a view's queries, repainted over its frame after every change.
 
 use std::time::Instant;
 
@@ -12,21 +12,21 @@ use crate::scene::{IdentityId, Mask, SemanticMap};
 use crate::ui::color_by::ColorBy;
 use crate::worker::Versioned;
 
-/// What the overlay was painted for.
+/// State that the overlay was painted for.
 #[derive(Clone, PartialEq)]
 pub(super) struct Painted {
     maps: u64,
     semantics: u64,
-    /// What is found, with the colors of the queries.
+    /// Found identities, with the colors of the queries.
     shown: Vec<([u8; 3], Vec<IdentityId>)>,
     newest: Option<String>,
     settings: OverlaySettings,
-    /// What stays bright while the rest is dimmed, beside what is found.
+    /// Identities that stay bright, beside the found ones, while the rest is dimmed.
     lit: Option<Vec<IdentityId>>,
 }
 
 impl Queries {
-    /// Masks and tints over the frame in `rect`. If `lit` is given, everything is dimmed but what is found and that.
+    /// Paints masks and tints over the frame in `rect`. With `lit`, all else is dimmed except the found ones.
     pub(crate) fn paint(
         &mut self,
         ui: &Ui,
@@ -103,7 +103,7 @@ impl Queries {
                 .then_some(&maps.invented),
             identities: &semantics.identities,
             masks: &masks,
-            // Where nothing is found, there is no rest.
+            // Without found identities there is nothing to dim.
             lit: lit.as_ref().filter(|lit| !lit.is_empty()),
             relevancy: &relevancy,
             features: &features,

@@ -1,4 +1,4 @@
-//! The card over the view: what is typed, and how it is answered; in small views one line that unfolds.
+//! The card over the view: the query field and its answer; in small views one line that unfolds.
 
 use egui::{Align, Align2, Area, Context, Id, LayerId, Layout, Order, Rect, RichText, ScrollArea, Ui, Vec2, vec2};
 
@@ -11,17 +11,17 @@ use crate::ui::actions::{Action, Pane};
 use crate::ui::state::AppState;
 use crate::worker::Versioned;
 
-/// Around cards, points.
+/// Margin around cards, points.
 pub(super) const MARGIN: f32 = 12.0;
 
-/// Where a card of the view is on screen.
+/// Rectangle of a card on screen.
 fn on_screen(ctx: &Context, name: &'static str) -> Option<Rect> {
     let id = Id::unique(name);
     let is_shown = |m: &egui::Memory| m.areas().visible_last_frame(&LayerId::new(Order::Middle, id));
     ctx.memory(|m| m.area_rect(id).filter(|_| is_shown(m)))
 }
 
-/// Views that are smaller than this have the answer in a word, points.
+/// Size below which a view shows the answer as one word, points.
 const SMALL: Vec2 = vec2(540.0, 420.0);
 
 /// Width of the card in a view, points.
@@ -30,8 +30,8 @@ pub(super) fn width_in(view: Rect) -> f32 {
 }
 
 impl Queries {
-    /// The field, the answer, and the queries that are pinned. Whether the field has the keyboard. The card keeps
-    /// clear of the other cards of the `first` view: it is at the same place of the second.
+    /// Draws the field, the answer, and the pinned queries. Returns whether the field has the focus. The card avoids
+    /// the other cards of the `first` view, and has the same place in the second.
     pub(crate) fn show(
         &mut self,
         ui: &Ui,
@@ -42,12 +42,12 @@ impl Queries {
     ) -> bool {
         let is_small = rect.width() < SMALL.x || rect.height() < SMALL.y;
         let is_folded = is_small && !self.side.unfolded;
-        // In the corner: what is looked for is mostly in the middle.
+        // In the corner, as the target is mostly in the middle.
         let mut at = Align2::RIGHT_TOP.pos_in_rect(&rect.shrink(MARGIN));
         let width = width_in(rect);
         for card in ["modes", "photo"].into_iter().filter_map(|name| on_screen(ui.ctx(), name)) {
             let card = card.translate(rect.min - first.min);
-            // Below the view's own cards where they reach that far.
+            // Below the view's own cards if they reach that far.
             if rect.intersects(card) && card.right() + MARGIN > at.x - width - 2.0 * MARGIN {
                 at.y = at.y.max(card.bottom() + 0.5 * MARGIN);
             }
@@ -105,7 +105,7 @@ impl Queries {
         focused
     }
 
-    /// The answer in a word, and the colors of what is pinned, from the right.
+    /// Draws the answer in a word, and the colors of pinned queries, from the right.
     fn show_in_short(
         &mut self,
         ui: &mut Ui,

@@ -1,4 +1,4 @@
-//! Queries that are pinned: they stay on screen, each in its color, while others are asked.
+//! Pinned queries: they stay on screen, each in its color, beside new ones.
 
 use egui::{Button, Color32, Sense, Ui, vec2};
 
@@ -7,20 +7,20 @@ use crate::jobs::phrases::colors::PhraseColors;
 use crate::scene::{SemanticMap, text};
 use crate::ui::theme;
 
-/// Queries that are pinned at most.
+/// Largest number of pinned queries.
 const MOST: usize = 6;
 
-/// Letters of one that are shown.
+/// Largest number of characters shown of a query.
 const LETTERS: usize = 28;
 
 impl Queries {
-    /// The colors that these phrases have from now on, and all others that have one.
+    /// Fixes the colors of these phrases; returns all fixed colors.
     pub(crate) fn colors_of(&mut self, phrases: &[String]) -> PhraseColors {
         self.colors.keep_all(phrases);
         self.colors.clone()
     }
 
-    /// Pins these queries, and no others, in the first and the second view.
+    /// Pins only these queries in the first and the second view.
     pub(crate) fn pin_only(&mut self, texts: &[Vec<String>; 2], semantics: &SemanticMap) {
         for (second, texts) in [false, true].into_iter().zip(texts) {
             self.in_view(second, |all| {
@@ -31,7 +31,7 @@ impl Queries {
         }
     }
 
-    /// Pins the query in the field, or no longer.
+    /// Pins or unpins the query in the field.
     pub(super) fn pin(&mut self) {
         let Some(live) = self.side.live.clone() else { return };
         let before = self.side.pinned.len();
@@ -46,7 +46,7 @@ impl Queries {
         self.side.pinned.push(live);
     }
 
-    /// The switch that does so.
+    /// Draws the pin switch.
     pub(super) fn show_pin(&mut self, ui: &mut Ui) {
         let found = self.side.live.as_ref().filter(|q| !q.shown(&self.side.settings).is_empty());
         let is_pinned = found.is_some_and(|q| self.side.pinned.iter().any(|p| p.text == q.text));
@@ -57,7 +57,7 @@ impl Queries {
         }
     }
 
-    /// What is pinned: a click asks it again.
+    /// Draws the pinned queries: a click runs one again.
     pub(super) fn show_pinned(&mut self, ui: &mut Ui, semantics: &SemanticMap) {
         if self.side.pinned.is_empty() {
             return;
@@ -91,14 +91,14 @@ impl Queries {
         }
     }
 
-    /// The color of a query's outline; none where nothing is outlined.
+    /// The color of a query's outline; `None` if nothing is outlined.
     pub(super) fn color_of(&self, query: &Asked) -> Option<Color32> {
         let [r, g, b] = self.colors.of(&query.text);
         (!query.shown(&self.side.settings).is_empty()).then_some(Color32::from_rgb(r, g, b))
     }
 }
 
-/// A disc in the color of an outline; a ring where there is none.
+/// Draws a disc in the color of an outline; a ring without one.
 pub(super) fn swatch(ui: &mut Ui, color: Option<Color32>) -> egui::Response {
     let (rect, response) = ui.allocate_exact_size(vec2(10.0, 10.0), Sense::hover());
     match color {

@@ -1,4 +1,4 @@
-//! The recipe of a view's queries: this program's way, the paper's, or single choices of either.
+//! The recipe of a view's queries: this program's method, the paper's, or a mix of both.
 
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{PopupCloseBehavior, TextEdit, Ui};
@@ -11,17 +11,17 @@ use crate::pipeline::semantics::recipe::{
 use crate::scene::{Lifting, MaskGrid, MaskPrompt, SemanticMap};
 
 impl Queries {
-    /// How queries are answered in the view that is worked in.
+    /// Recipe of the active view.
     pub(crate) fn recipe(&self) -> &Recipe {
         &self.side.settings.recipe
     }
 
-    /// How they are answered in the first and the second view.
+    /// Recipes of the first and the second view.
     pub(crate) fn recipes(&self) -> [Recipe; 2] {
         self.in_order(|side| side.settings.recipe.clone())
     }
 
-    /// Answers by these recipes in the first and the second view.
+    /// Sets the recipes of the first and the second view and answers again.
     pub(crate) fn set_recipes(&mut self, recipes: &[Recipe; 2], semantics: &SemanticMap) {
         if self.recipes() != *recipes {
             for (second, recipe) in [false, true].into_iter().zip(recipes) {
@@ -32,7 +32,7 @@ impl Queries {
     }
 }
 
-/// The rows of the recipe in a grid of two columns.
+/// Draws the rows of the recipe in a grid of two columns.
 pub(super) fn show(ui: &mut Ui, recipe: &mut Recipe) {
     ui.weak("Recipe");
     ui.horizontal(|ui| {
@@ -46,12 +46,12 @@ pub(super) fn show(ui: &mut Ui, recipe: &mut Recipe) {
                 *recipe = other.recipe();
             }
         }
-        // A menu closes at the first click into it, unless it is told to stay for several choices.
+        // By default a menu closes at the first click into it; here it stays for several choices.
         let stays = MenuConfig::new().close_behavior(PopupCloseBehavior::CloseOnClickOutside);
         let menu = MenuButton::new("Choices\u{2026}").config(stays);
         let (button, _) = menu.ui(ui, |ui| choices(ui, recipe));
         button.on_hover_text(recipe.to_string());
-        // Last, so that the menu is the same one, and stays open, once this appears.
+        // Last, so that the menu keeps its id, and stays open, if this appears.
         if name.is_none() {
             ui.weak("own");
         }
@@ -98,7 +98,7 @@ fn choices(ui: &mut Ui, recipe: &mut Recipe) {
     });
 }
 
-/// The canonical phrases, taken over when the field is left.
+/// Draws the canonical phrases, applied when the field loses the focus.
 fn canonical(ui: &mut Ui, phrases: &mut CanonicalPhrases) {
     ui.weak("Canonical phrases");
     let id = ui.scope_id().with("canonical phrases");
@@ -118,7 +118,7 @@ fn canonical(ui: &mut Ui, phrases: &mut CanonicalPhrases) {
 
 fn one_of<T: Copy + PartialEq + ToString>(ui: &mut Ui, what: &str, all: &[T], chosen: &mut T) {
     ui.weak(what);
-    // No list that opens: a click into it would be one outside of the menu.
+    // No drop-down list: a click into it would close the menu.
     ui.horizontal(|ui| {
         for value in all {
             ui.selectable_value(chosen, *value, value.to_string());

@@ -1,4 +1,4 @@
-//! How answers are drawn: the settings below the query box, and the histogram of relevancy.
+//! Display of answers: the settings below the query box, and the histogram of relevancy.
 
 use egui::{Color32, ComboBox, Rect, Sense, Slider, Stroke, Ui, pos2, vec2};
 use strum::VariantArray;
@@ -12,21 +12,21 @@ use crate::pipeline::semantics::recipe::Recipe;
 use crate::scene::LevelFilter;
 use crate::ui::color_by::ColorBy;
 
-/// How answers are found and drawn.
+/// Settings of search and display of answers.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct OverlaySettings {
-    /// What tints the frame.
+    /// Quantity that colors the frame.
     pub(crate) color_by: ColorBy,
     pub(crate) colormap: Colormap,
     /// Opacity of the tint.
     pub(crate) opacity: f32,
-    /// Which level queries are about.
+    /// Level that queries search.
     pub(crate) kind: LevelFilter,
-    /// Answers whose pixels are shown at most.
+    /// Largest number of answers that are shown.
     pub(crate) top: usize,
-    /// How queries are answered.
+    /// Recipe of the queries.
     pub(crate) recipe: Recipe,
-    /// Relevancy that is outlined too; 0 = none.
+    /// Relevancy threshold that is outlined too; 0 for none.
     pub(crate) threshold: f32,
 }
 
@@ -44,8 +44,8 @@ impl Default for OverlaySettings {
     }
 }
 
-/// The settings. `heat` is the relevancy of the view's pixels, for the histogram. Whether the
-/// query has to be answered anew.
+/// Draws the settings. `heat` is the relevancy of the view's pixels, for the histogram. Returns whether the query must
+/// be answered again.
 pub(crate) fn show(ui: &mut Ui, settings: &mut OverlaySettings, heat: Option<&[f32]>) -> bool {
     let (kind, recipe) = (settings.kind, settings.recipe.clone());
     egui::Grid::new("overlay settings").num_columns(2).spacing(vec2(10.0, 5.0)).show(ui, |ui| {
@@ -116,7 +116,7 @@ pub(crate) fn show(ui: &mut Ui, settings: &mut OverlaySettings, heat: Option<&[f
 /// Bins of the histogram.
 const BINS: usize = 64;
 
-/// How many pixels have which relevancy, with the threshold as a line to drag.
+/// Draws the histogram of pixel relevancies, with the threshold as a line to drag.
 fn histogram(ui: &mut Ui, settings: &mut OverlaySettings, heat: &[f32]) {
     let mut counts = [0_u32; BINS];
     heat.iter().for_each(|h| counts[((h * BINS as f32) as usize).min(BINS - 1)] += 1);
@@ -133,7 +133,7 @@ fn histogram(ui: &mut Ui, settings: &mut OverlaySettings, heat: &[f32]) {
     let response = response.on_hover_text("Drag: outline pixels with at least this relevancy. Double-click: off");
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 3.0, theme::canvas());
-    // Logarithmic: most pixels have nothing to do with a query.
+    // Logarithmic: most pixels are not relevant to a query.
     let height = |n: u32| (1.0 + n as f32).ln() / (1.0 + heat.len() as f32).ln() * rect.height();
     let width = rect.width() / BINS as f32;
     for (i, &n) in counts.iter().enumerate() {

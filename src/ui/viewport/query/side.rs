@@ -1,4 +1,4 @@
-//! What is asked in one of two views of the same scene: maps, embeddings and the history are common to both.
+//! Queries of one of two views of the same scene: maps, embeddings and the history are common to both.
 
 use std::collections::BTreeMap;
 
@@ -12,40 +12,40 @@ use crate::pipeline::semantics::recipe::Recipe;
 use crate::pipeline::semantics::timing::StagesMs;
 use crate::scene::IdentityId;
 
-/// The queries of a view and what they draw.
+/// The queries of a view and their overlay.
 #[derive(Default)]
 pub(super) struct QuerySide {
     pub(super) typed: String,
-    /// Window time of the last letter, until Enter says that it was the last.
+    /// Window time of the last character; `None` once the query is complete.
     pub(super) typed_at: Option<f64>,
-    /// Frames in which the field is yet to take the keyboard, with all of its text selected.
+    /// Frames in which the field still takes the focus, with all of its text selected.
     pub(super) focus: u8,
-    /// Whether anything was typed since, or the cursor moved.
+    /// True if text was typed or the cursor moved since.
     pub(super) begun: bool,
-    /// Whether a small view shows the answer in full, too.
+    /// True if a small view shows the full answer.
     pub(super) unfolded: bool,
-    /// Place in the history while going through it.
+    /// Position in the history during recall.
     pub(super) recalled: Option<usize>,
     pub(super) settings: OverlaySettings,
-    /// The query in the field: it takes the place of the one before.
+    /// The query in the field; a new one replaces it.
     pub(super) live: Option<Asked>,
-    /// Those that were pinned, which stay.
+    /// Pinned queries.
     pub(super) pinned: Vec<Asked>,
     /// Relevancy of the pixels, for the histogram.
     pub(super) heat: Vec<f32>,
     pub(super) texture: Option<TextureHandle>,
     pub(super) painted: Option<Painted>,
-    /// What comparing with the true mask came to.
+    /// Comparison with the true mask.
     pub(super) comparison: Option<truth::TruthComparison>,
-    /// Of the target that is shown.
+    /// Facts about the shown target.
     pub(super) facts: Option<card::Facts>,
-    /// Pixels of identities in the present view, counted as they are listed.
+    /// Pixel counts of identities in the current view, filled as they are listed.
     pub(super) areas: Areas,
-    /// What finding the pixels and drawing them took, of all queries on screen.
+    /// Times of localization and drawing, of all queries on screen.
     pub(super) paint_ms: StagesMs,
 }
 
-/// Pixels of identities in a view, for one way of matching.
+/// Pixel counts of identities in a view, for one match mode.
 #[derive(Default)]
 pub(super) struct Areas {
     /// View, objects and match that they were counted for.
@@ -59,22 +59,22 @@ impl QuerySide {
         self.pinned.iter().filter(|q| !self.is_live(&q.text)).chain(&self.live)
     }
 
-    /// Whether this query is the one in the field.
+    /// True if this query is the one in the field.
     pub(super) fn is_live(&self, text: &str) -> bool {
         self.live.as_ref().is_some_and(|live| live.text == text)
     }
 
-    /// Puts the keyboard into the field, and what is typed next in place of its text.
+    /// Focuses the field; typed text then replaces its text.
     pub(super) fn start_typing(&mut self) {
         (self.focus, self.begun) = (2, false);
     }
 
-    /// What is asked, for the text encoder.
+    /// Texts of the queries, for the text encoder.
     pub(super) fn texts(&self) -> impl Iterator<Item = (ParsedQuery, Recipe)> {
         self.all().map(|q| (q.reading.phrase.clone(), self.settings.recipe.clone()))
     }
 
-    /// Without queries and answers.
+    /// Removes queries and answers.
     pub(super) fn cleared(self) -> Self {
         Self { settings: self.settings, ..Self::default() }
     }
@@ -85,17 +85,17 @@ impl QuerySide {
 }
 
 impl Queries {
-    /// The queries of the view that is worked in, and of the other one.
+    /// The queries of the active view, and of the other one.
     pub(super) fn sides(&self) -> [&QuerySide; 2] {
         [&self.side, &self.other]
     }
 
-    /// Whether the second of two views is the one that is worked in: what is asked, is asked there.
+    /// True if the second of two views is active, which gets new queries.
     pub fn is_second(&self) -> bool {
         self.is_second
     }
 
-    /// Works in the first or the second of two views from now on.
+    /// Makes the first or the second of two views active.
     pub(crate) fn work_in(&mut self, second: bool) {
         if self.is_second != second {
             std::mem::swap(&mut self.side, &mut self.other);
@@ -103,7 +103,7 @@ impl Queries {
         }
     }
 
-    /// Does something in the first or the second of two views.
+    /// Runs `act` with the first or the second of two views active.
     pub fn in_view<R>(&mut self, second: bool, act: impl FnOnce(&mut Self) -> R) -> R {
         let before = self.is_second;
         self.work_in(second);
@@ -112,7 +112,7 @@ impl Queries {
         result
     }
 
-    /// Something of the first and of the second view.
+    /// Values of the first and of the second view.
     pub(super) fn in_order<T>(&self, of: impl Fn(&QuerySide) -> T) -> [T; 2] {
         let [side, other] = self.sides().map(of);
         if self.is_second { [other, side] } else { [side, other] }
@@ -123,7 +123,7 @@ impl Queries {
         self.in_order(QuerySide::pinned_texts)
     }
 
-    /// Paints anew and compares anew, in both views.
+    /// Forces a new overlay and comparison in both views.
     pub(super) fn forget_painted(&mut self) {
         for side in [&mut self.side, &mut self.other] {
             (side.painted, side.comparison) = (None, None);

@@ -1,4 +1,4 @@
-//! Queries that are asked, pinned and asked again.
+//! Queries that are run, pinned and run again.
 
 use super::*;
 use crate::scene::{Identities, Level, NOBODY};
@@ -72,7 +72,7 @@ fn two_views_have_their_own_queries_and_the_same_colors() {
     let (first, second) = (colors(&mut queries, false), colors(&mut queries, true));
     assert_eq!((first[0].0, second[0].0), (1, 2));
     assert_ne!(first[0].1, second[0].1);
-    // The other way around, each has its color.
+    // In the other order, each keeps its color.
     queries.ask("the  Lamp's shade", &semantics);
     queries.in_view(true, |q| q.mark(&["lamp".into()], &semantics));
     assert_eq!((colors(&mut queries, false)[0].1, colors(&mut queries, true)[0].1), (second[0].1, first[0].1));
@@ -102,7 +102,7 @@ fn each_view_answers_by_its_own_recipe() {
     };
     let default = (Recipe::default(), vec![1]);
     assert_eq!(answers(&mut queries), [default.clone(), default.clone()]);
-    // By embedding alone nothing is found here: no encoder has looked at the scene.
+    // By embedding alone nothing is found here: the scene has no embeddings.
     queries.set_recipes(&[Recipe::default(), Recipe::paper()], &semantics);
     assert_eq!(answers(&mut queries), [default, (Recipe::paper(), vec![])]);
     assert_eq!(queries.recipes()[1], Recipe::paper());

@@ -1,4 +1,4 @@
-//! Where the time of a query went: a thin bar in the colors of its stages, with their numbers.
+//! Times of a query: a thin bar in the colors of its stages, with their numbers.
 
 use egui::{Color32, Rect, RichText, Sense, Ui, pos2, vec2};
 
@@ -15,7 +15,7 @@ const COLORS: [Color32; 5] = [
     Color32::from_rgb(0x9a, 0xa0, 0xac),
 ];
 
-/// What each stage is, for the user.
+/// Meaning of each stage, for the user.
 const MEANING: &str = "encode: text to embeddings (cached)\n\
     relevancy: score every object and part\n\
     localize: choose the matches\n\
@@ -41,7 +41,7 @@ pub(crate) fn show(ui: &mut Ui, basis: &str, stages: &StagesMs) {
     bar.union(numbers.response).on_hover_text(MEANING);
 }
 
-/// Where each stage begins and ends, as shares of the whole; nothing took nothing.
+/// Start and end of each stage, as shares of the total; zeros if the total is zero.
 fn shares(stages: &StagesMs) -> [[f64; 2]; 5] {
     let (whole, mut end) = (stages.whole().max(f64::MIN_POSITIVE), 0.0);
     stages.values().map(|ms| {

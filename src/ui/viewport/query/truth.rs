@@ -6,17 +6,17 @@ use super::Queries;
 use crate::navigate::Pose;
 use crate::scene::Mask;
 
-/// Hits, misses and false alarms, told apart by those who see no red or no green too.
+/// Colors of hits, misses and false alarms, distinct for red-green color blindness too.
 const COLORS: [[u8; 3]; 3] = [[40, 200, 120], [230, 60, 60], [250, 180, 30]];
 
-/// A true mask of the view from one place.
+/// A true mask of the view from one pose.
 #[derive(Clone, Debug)]
 pub(super) struct ViewTruth {
     mask: Arc<Mask>,
     at: Pose,
 }
 
-/// Pixels by how the answer has them.
+/// Pixel counts of hits, misses and false alarms, and the IoU.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct TruthComparison {
     pub(super) hits: usize,
@@ -26,13 +26,13 @@ pub(super) struct TruthComparison {
 }
 
 impl Queries {
-    /// Compares answers with a mask of the view from this pose; with none, shows them plainly again.
+    /// Compares answers with a mask of the view from this pose; `None` ends the comparison.
     pub(crate) fn compare_with(&mut self, truth: Option<(Arc<Mask>, Pose)>) {
         self.truth = truth.map(|(mask, at)| ViewTruth { mask, at });
         self.forget_painted();
     }
 
-    /// Says where the eye is: a mask is true of one view alone.
+    /// Sets the current pose: a mask is true of one view only.
     pub(crate) fn stand(&mut self, pose: Pose) {
         if self.eye != Some(pose) {
             self.eye = Some(pose);
@@ -42,18 +42,18 @@ impl Queries {
         }
     }
 
-    /// The mask that is true of the present view.
+    /// The true mask of the current view.
     pub(crate) fn truth(&self) -> Option<Arc<Mask>> {
         let here = |t: &&ViewTruth| self.eye.is_some_and(|eye| is_same(&eye, &t.at));
         self.truth.as_ref().filter(here).map(|t| Arc::clone(&t.mask))
     }
 
-    /// Whether the answer of the view is shown against the truth.
+    /// True if the answer of the view is compared with the true mask.
     pub(crate) fn compares(&self) -> bool {
         self.side.comparison.is_some()
     }
 
-    /// The masks as they are drawn: the newest against the truth of this view, where there is one.
+    /// The masks to draw: the newest against the true mask of this view, if there is one.
     pub(super) fn compared(&mut self, masks: Vec<([u8; 3], Mask)>) -> Vec<([u8; 3], Mask)> {
         let (Some(truth), Some((_, newest))) = (self.truth(), masks.last()) else { return masks };
         let truth = truth.resized(newest.width_px(), newest.height_px());
@@ -85,12 +85,12 @@ fn compare(answer: &Mask, truth: &Mask) -> (TruthComparison, [Mask; 3]) {
 }
 
 impl TruthComparison {
-    /// The figure alone.
+    /// The IoU as text.
     pub(super) fn figure(&self) -> String {
         format!("IoU {:.3}", self.iou)
     }
 
-    /// The figure, and what the colors mean.
+    /// Draws the IoU and the legend of the colors.
     pub(super) fn show(&self, ui: &mut egui::Ui) {
         let Self { hits, misses, false_alarms, .. } = self;
         ui.horizontal_wrapped(|ui| {
@@ -115,7 +115,7 @@ mod tests {
         let (told, masks) = compare(&answer, &truth);
         assert_eq!(told, TruthComparison { hits: 2, misses: 2, false_alarms: 4, iou: 0.25 });
         assert_eq!(masks.map(|m| m.pixels().collect::<Vec<_>>()), [vec![4, 5], vec![6, 7], vec![0, 1, 2, 3]]);
-        // The control: the truth itself is met in full.
+        // Control: the true mask matches itself.
         assert_eq!(compare(&truth, &truth).0, TruthComparison { hits: 4, misses: 0, false_alarms: 0, iou: 1.0 });
     }
 
