@@ -27,12 +27,12 @@ use crate::math::format;
 pub(crate) struct CleanArgs {
     /// Trained scene or splat file
     scene: PathBuf,
-    /// What is left out: Gaussians that any of these rules means [default: floaters faint]
+    /// Rules; a Gaussian is left out if it meets any of them [default: floaters faint]
     rules: Vec<CleanRule>,
     /// Folder for the new scene, or a file of splats (.ply, .sog, .spz, ...)
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Where the scene's photos are, if not where it says
+    /// Folder of the scene's photos, if it is not where the scene says
     #[arg(long)]
     photos: Option<PathBuf>,
     /// Print one JSON document

@@ -25,7 +25,7 @@ use crate::scene::LevelFilter;
 pub(crate) struct EditArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
-    /// What to edit
+    /// Text of the object or part to edit
     text: String,
     /// Folder for the new scene, or a file of splats (.ply, .sog, .spz, ...)
     #[arg(long)]
@@ -48,7 +48,7 @@ pub(crate) struct EditArgs {
     /// Give it another color; its shades stay
     #[arg(long, value_name = "#RRGGBB", value_parser = color, group = "what")]
     color: Option<[f32; 3]>,
-    /// Whether an object or a part is meant
+    /// Level of the answer: an object or a part
     #[arg(long, value_enum, default_value_t = LevelFilter::Auto)]
     kind: LevelFilter,
 }

@@ -1,4 +1,4 @@
-//! How a subcommand fails, and the exit code that says so to a script.
+//! Failures of a subcommand, and the exit codes that report them to a script.
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -12,7 +12,7 @@ use crate::pipeline::observer::Interrupted;
 use crate::pipeline::train::TrainError;
 use crate::pipeline::train::checkpoint::CheckpointError;
 
-/// Why a subcommand did not do what was asked.
+/// Reason for which a subcommand failed.
 #[derive(Debug)]
 pub(crate) enum CliError {
     /// The arguments make no sense together; exit code 2, as for arguments that do not parse.

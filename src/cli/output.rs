@@ -1,4 +1,4 @@
-//! What the subcommands write: results on standard output, notes on standard error.
+//! Output of the subcommands: results on standard output, notes on standard error.
 //! All text for a terminal goes through here, so that nothing foreign in it acts on one.
 
 use std::io::{ErrorKind, Write};

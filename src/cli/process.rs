@@ -1,5 +1,5 @@
-//! What the process asks of the system when it starts: threads, an allocator that gives freed
-//! memory back, so that an idle window holds what it shows, and libraries that are silent.
+//! Settings of the process at its start: threads, an allocator that gives freed memory back, so that an idle window
+//! holds only what it shows, and libraries that are silent.
 
 /// Most threads that share the work on a machine with fewer than half as many cores.
 const MOST_THREADS: usize = 64;

@@ -6,7 +6,7 @@ use super::{CliError, output};
 use crate::jobs::{Scene, open};
 use crate::scene::Axes;
 
-/// How a splat's numbers are to be read.
+/// Axes of a splat's numbers.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 pub(crate) struct AxesArgs {
     /// Axes of a splat file that says others or none, where x, y and z count to: rdf as in a .ply (right, down, front),

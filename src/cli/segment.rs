@@ -34,7 +34,7 @@ use crate::scene::{Camera, LevelFilter, SemanticMap};
 pub(crate) struct SegmentArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
-    /// What to look for
+    /// Text of the object or part to find
     #[arg(required_unless_present_any = ["all", "click"])]
     text: Option<String>,
     /// Write every object and part, and their masks in the photos, into the folder --out
@@ -61,7 +61,7 @@ pub(crate) struct SegmentArgs {
     /// Answers that are written at most
     #[arg(long, default_value_t = 1, value_parser = number::within(1..=100_000_usize))]
     top: usize,
-    /// Whether an object or a part is meant
+    /// Level of the answer: an object or a part
     #[arg(long, value_enum, default_value_t = LevelFilter::Auto)]
     kind: LevelFilter,
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! Which camera to draw from: a photo's, one from a file, or one that shows the whole splat.
+//! Choice of the camera to draw from: a photo's, one from a file, or one that shows the whole splat.
 
 use std::path::Path;
 
@@ -49,7 +49,7 @@ fn of_photo(wanted: &str, cameras: &[SceneCamera]) -> Result<Option<Camera>, Cli
     }
 }
 
-/// Whether `wanted` is the last part of the path `name`, with or without its extension.
+/// Returns whether `wanted` is the last part of the path `name`, with or without its extension.
 fn ends_with_path(name: &str, wanted: &str) -> bool {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     [name, stem].iter().any(|n| *n == wanted || n.strip_suffix(wanted).is_some_and(|front| front.ends_with('/')))

@@ -1,4 +1,4 @@
-//! What each command does: hands it to its job in [`crate::jobs`]. The only implementation of [`Jobs`] that ships.
+//! Dispatch of each command to its job in [`crate::jobs`]. The only implementation of [`Jobs`] that ships.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -54,7 +54,7 @@ impl PipelineJobs {
         let _ = self.folders.note_use(folder);
     }
 
-    /// What the machine offers, looked up once.
+    /// Resources of the machine, looked up once.
     fn machine(&self) -> &Machine {
         self.machine.get_or_init(plan::machine)
     }

@@ -1,4 +1,4 @@
-//! What the worker is told ([`Command`]) and what it tells ([`Event`]).
+//! Messages to the worker ([`Command`]) and from it ([`Event`]).
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Photo, PhotoPixels, SceneFacts, SemanticMap};
 
-/// What a job is to do.
+/// Work of a job.
 #[derive(Clone, Debug)]
 pub enum Command {
     /// Read a dataset, a splat or a trained scene.
@@ -54,11 +54,11 @@ pub enum Command {
     Train {
         /// The photos.
         dataset: Arc<Dataset>,
-        /// How.
+        /// Settings of the training.
         config: TrainConfig,
         /// Folder of the trained scene and its checkpoints; `None` = a new one.
         out: Option<PathBuf>,
-        /// What it begins with.
+        /// Gaussians that it begins with.
         from: TrainStart,
     },
     /// Measure PSNR and SSIM on the held-out photos.
@@ -69,7 +69,7 @@ pub enum Command {
         cloud: Arc<GaussianCloud>,
         /// Picture size, and the hold-out rule where the scene does not say which photos are.
         config: TrainConfig,
-        /// How the Gaussians are drawn.
+        /// Settings of drawing the Gaussians.
         settings: RenderSettings,
         /// Folder of the trained scene.
         out: PathBuf,
@@ -120,7 +120,7 @@ pub enum Command {
     },
     /// Keep a small picture of a scene for the first page.
     KeepPicture {
-        /// Where the scene lies.
+        /// Path of the scene.
         of: PathBuf,
         /// The picture.
         pixels: Arc<PhotoPixels>,
@@ -144,7 +144,7 @@ pub enum Command {
         cloud: Arc<GaussianCloud>,
         /// The photos' cameras.
         cameras: Vec<Camera>,
-        /// Which way is up.
+        /// Up direction.
         up: DVec3,
     },
     /// Find the way to where an identity is seen best.
@@ -166,7 +166,7 @@ pub enum Command {
     ReadReport {
         /// Its folder or file.
         path: PathBuf,
-        /// Whether it is to be compared with the one that is shown.
+        /// True if it is compared with the report on screen.
         second: bool,
     },
     /// Ask a list of phrases of some views.
@@ -181,15 +181,15 @@ pub enum Command {
         cloud: Arc<GaussianCloud>,
         /// Objects and parts.
         map: Arc<SemanticMap>,
-        /// How the Gaussians are drawn.
+        /// Settings of drawing the Gaussians.
         settings: RenderSettings,
-        /// From where.
+        /// Camera pose to draw from.
         home: HomeView,
     },
 }
 
 impl Command {
-    /// What sort of job this is.
+    /// Kind of the job.
     pub(crate) fn kind(&self) -> JobKind {
         match self {
             Self::Open { .. } => JobKind::Open,
@@ -227,7 +227,7 @@ impl Command {
     }
 }
 
-/// What a finished job brings.
+/// Outcome of a finished job.
 #[derive(Clone, Debug)]
 pub enum Outcome {
     /// A scene was read.
@@ -248,7 +248,7 @@ pub enum Outcome {
         runs: Vec<RunSummary>,
         /// The step at which it was canceled, if it was.
         stopped_at: Option<u64>,
-        /// What the plan of the result is computed from.
+        /// Facts that the plan of the result is computed from.
         facts: Box<SceneFacts>,
     },
     /// Nothing was done: the training to go on with began with other photos or poses, and how they differ.
@@ -267,7 +267,7 @@ pub enum Outcome {
     SplatsMeasured(Arc<MeasuredCloud>),
     /// The length of a unit in meters, and whether it was stored.
     Scale(f64, bool),
-    /// What clicks and strokes select by now.
+    /// Gaussians that clicks and strokes select by now.
     Selected(Arc<Selected>),
     /// Such a change makes no sense, and why.
     Refused(String),
@@ -283,11 +283,11 @@ pub enum Outcome {
     RecentRuns(Vec<(PathBuf, Vec<RunSummary>)>),
     /// A report was read or measured.
     Report {
-        /// Where it lies.
+        /// Path of the report.
         path: PathBuf,
-        /// What it holds.
+        /// The report.
         report: Arc<Report>,
-        /// Whether it is to be compared with the one that is shown.
+        /// True if it is compared with the report on screen.
         second: bool,
     },
     /// Thumbnails of objects and parts by number less one.
@@ -313,19 +313,19 @@ pub enum Outcome {
     },
 }
 
-/// What happened. For each job: first `Started`, at last one of `Finished`, `Cancelled`, `Failed`.
+/// Event of a job. Each sends `Started` first, and at last one of `Finished`, `Cancelled`, `Failed`.
 #[derive(Clone, Debug)]
 pub enum Event {
     /// The job has left the queue.
     Started {
-        /// Which job.
+        /// Number of the job.
         job: JobId,
-        /// Its sort.
+        /// Kind of the job.
         kind: JobKind,
-        /// What it does, for display.
+        /// Title, for display.
         title: String,
     },
-    /// Where it stands. May be dropped when events are not taken fast enough.
+    /// Progress of a job. May be dropped when events are not taken fast enough.
     Progress(JobId, Progress),
     /// Training measurements.
     Step(JobId, StepMetrics),
@@ -344,7 +344,7 @@ pub enum Event {
 }
 
 impl Event {
-    /// Which job it is about.
+    /// The job that the event is about.
     pub fn job(&self) -> JobId {
         match self {
             Self::Started { job, .. } => *job,
@@ -359,7 +359,7 @@ impl Event {
         }
     }
 
-    /// Whether the job is over.
+    /// Returns whether the job is over.
     pub fn is_end(&self) -> bool {
         matches!(self, Self::Finished(..) | Self::Cancelled(_) | Self::Failed(..))
     }

@@ -1,4 +1,4 @@
-//! What draws the viewport's frames: on the GPU or the CPU, at a resolution that keeps up with the eye.
+//! Renderer of the viewport's frames: on the GPU or the CPU, at a resolution that keeps up with the camera.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -19,27 +19,27 @@ const LEAST_SIDE_PX: f64 = 300.0;
 /// Draws requests, and learns how fast it can.
 pub(super) struct ViewRenderer {
     pub(super) renderer: Renderer,
-    /// Whether no GPU was to be used.
+    /// True if no GPU was to be used.
     pub(super) without_gpu: bool,
-    /// Why the CPU draws though there is a GPU.
+    /// Reason for which the CPU draws though there is a GPU.
     instead_of_gpu: Option<String>,
     /// Draws the Gaussians of a second view, if they are others.
     beside: Option<Box<Self>>,
-    /// What frames cost lately; `None` before the first.
+    /// Cost of recent frames; `None` before the first.
     cost: Option<Speed>,
     pub(super) levels: DetailLevels,
-    /// What was drawn of the last frame's Gaussians, if not all.
+    /// Cut of the last frame's Gaussians that was drawn, if not all.
     cut: Option<Arc<Cut>>,
 }
 
-/// What a frame costs: the part that every Gaussian has at any size, and that of each pixel.
+/// Cost of a frame: a fixed part of all Gaussians at any size, and a part per pixel.
 #[derive(Clone, Copy, Debug)]
 struct Speed {
     fixed_secs: f64,
     secs_per_px: f64,
 }
 
-/// What was drawn of a view.
+/// Result of drawing a view.
 enum Painting {
     Colors(Vec<[u8; 3]>),
     Texture(DevicePicture),
@@ -83,12 +83,12 @@ impl ViewRenderer {
         first.then(|| self.draw_seen(&request))
     }
 
-    /// What was drawn of the Gaussians of the last frame, if not all.
+    /// Cut of the last frame's Gaussians that was drawn, if not all.
     pub(super) fn cut(&self) -> Option<Arc<Cut>> {
         self.cut.clone()
     }
 
-    /// Whether levels of detail are for these Gaussians, and they are new and very many.
+    /// Returns whether levels of detail are of use for these Gaussians, which are new and very many.
     fn sees(&mut self, request: &ViewRequest) -> bool {
         if request.skip.levels || self.renderer.is_gpu() {
             self.levels.forget();
