@@ -27,7 +27,7 @@ impl Pair<'_> {
 pub(crate) struct StageComparison<'a> {
     /// Settings of both, in the order of the first.
     pub(crate) pairs: Vec<Pair<'a>>,
-    /// How many settings only the first has, and only the second.
+    /// Numbers of settings that only the first has, and only the second.
     pub(crate) alone: [usize; 2],
 }
 
@@ -48,7 +48,7 @@ impl Stage {
 }
 
 impl Point {
-    /// Whether both are the same setting of the same knob. Defaults are one setting, whatever words
+    /// Returns whether both are the same setting of the same knob. Defaults are one setting, whatever words
     /// describe them.
     pub(crate) fn is_setting(&self, other: &Point) -> bool {
         self.method == other.method && (self.setting == other.setting || self.default && other.default)

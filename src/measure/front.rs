@@ -78,7 +78,7 @@ impl Stage {
     }
 }
 
-/// What a rule makes of one knob.
+/// Choice of a rule for one knob.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct KnobChoice<'a> {
     pub(crate) method: &'a str,
@@ -87,8 +87,7 @@ pub(crate) struct KnobChoice<'a> {
     pub(crate) chosen: &'a Point,
     /// The one with the least error.
     pub(crate) best: &'a Point,
-    /// Whether the default is good enough, and as fast as the chosen one: within noise, or in one repeat or
-    /// another.
+    /// True if the default is good enough, and as fast as the chosen one: within noise, or in one repeat or another.
     pub(crate) holds: bool,
 }
 

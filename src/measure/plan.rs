@@ -1,4 +1,4 @@
-//! What a scene's plan saves, compared with everything on: times and memory of opening a scene and getting ready
+//! Savings by a scene's plan, compared with everything on: times and memory of opening a scene and getting ready
 //! for its user. `fmlgs bench --plan` measures each of the two in processes of its own, so that memory is its own.
 
 use std::path::Path;
@@ -41,7 +41,7 @@ pub(crate) struct OpenScene {
     pub(crate) facts: SceneFacts,
 }
 
-/// What one process has measured; medians where several have.
+/// Measurements of one process; medians over several.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PlanCost {
     /// Reading, until the scene can be drawn.
@@ -145,7 +145,7 @@ pub(crate) fn cost(
     })
 }
 
-/// What the pixels of the first view belong to.
+/// Draws the identities and codes of the pixels of the first view.
 fn maps(
     renderer: &mut Renderer,
     scene: &OpenScene,
@@ -226,7 +226,7 @@ impl Saving {
         Self { scene: super::bench::label(path), disk: disk(path), plan, everything }
     }
 
-    /// What its files take, in a line.
+    /// Size of its files, in a line.
     pub(crate) fn on_disk(&self) -> String {
         let parts: Vec<String> = self.disk.iter().map(|(what, n)| format!("{} {what}", bytes(*n))).collect();
         format!("{} on disk: {}", self.scene, parts.join(", "))

@@ -1,4 +1,4 @@
-//! How well flights do in a scene: random flights, ours beside the paper's, and times against the number of cameras
+//! Quality of flights in a scene: random flights, ours beside the paper's, and times against the number of cameras
 //! (`fmlgs path --survey`).
 
 use std::time::Instant;

@@ -21,7 +21,7 @@ type Tree = Arc<LodTree>;
 /// Levels of detail of the Gaussians that are drawn, which may change at any time.
 #[derive(Default)]
 pub(super) struct DetailLevels {
-    /// How many Gaussians there is time for.
+    /// Number of Gaussians that can be drawn in time.
     pub(super) pace: Pace,
     now: Option<Seen>,
 }
@@ -45,7 +45,7 @@ impl Drop for Seen {
 }
 
 impl DetailLevels {
-    /// Looks at these Gaussians; says whether they are so many and so new that a rough picture comes first.
+    /// Tracks these Gaussians; returns whether they are so many and so new that a rough picture comes first.
     pub(super) fn see(&mut self, cloud: &Versioned<GaussianCloud>) -> bool {
         if self.now.as_ref().is_some_and(|now| now.generation == cloud.generation()) {
             self.build();

@@ -88,7 +88,7 @@ impl ViewRenderer {
         self.cut.clone()
     }
 
-    /// Returns whether levels of detail are of use for these Gaussians, which are new and very many.
+    /// Returns whether levels of detail apply to these Gaussians, and a rough picture comes first: new and very many.
     fn sees(&mut self, request: &ViewRequest) -> bool {
         if request.skip.levels || self.renderer.is_gpu() {
             self.levels.forget();

@@ -34,7 +34,7 @@ use targets::{Door, Target};
 const ITERATIONS: u64 = 4000;
 /// Mutated inputs of all readers in the long run, unless the environment says otherwise.
 const TOTAL: u64 = 10_000_000;
-/// How often the long run goes around all readers.
+/// Number of rounds of the long run over all readers.
 const ROUNDS: u64 = 20;
 
 fn number(name: &str, default: u64) -> u64 {

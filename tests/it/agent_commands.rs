@@ -302,7 +302,7 @@ struct Sentence {
     tools: serde_json::Value,
 }
 
-/// What came of a sentence, and how it was judged by hand against what its writer expects.
+/// Calls and end of a sentence, and the verdict by hand against the expectation of its writer.
 #[derive(Clone, Debug, Serialize, Deserialize, PartialEq)]
 struct Verdict {
     say: String,

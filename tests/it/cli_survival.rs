@@ -1,4 +1,4 @@
-//! What survives: a kill, Ctrl-C, a second writer, an older version; ([`changed`]) other photos, a folder that goes away;
+//! Survival of: a kill, Ctrl-C, a second writer, an older version; ([`changed`]) other photos, a folder that goes away;
 //! ([`disk`]) a disk that is full; and ([`places`]) what lies where results are put.
 #![cfg(unix)]
 
@@ -194,7 +194,7 @@ fn a_download_that_stalls_ends_when_asked_and_is_gone_on_with() {
     }
 }
 
-/// What a process tells on standard error, line by line.
+/// Lines that a process prints on standard error.
 fn lines_of(child: &mut Child) -> Receiver<String> {
     let (told, lines) = sync_channel(10_000);
     let stderr = BufReader::new(child.stderr.take().unwrap());

@@ -49,7 +49,7 @@ fn kill_often(what: &str, longest: Duration, start: &mut dyn FnMut(u64) -> Comma
     assert!(killed > 0, "{what}: nothing was killed");
 }
 
-/// How long a command takes from start to end.
+/// Run time of a command from start to end.
 fn time(command: &mut Command) -> Duration {
     let start = Instant::now();
     Done::from(command.output().unwrap()).ok();

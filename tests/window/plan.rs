@@ -74,7 +74,7 @@ impl Window {
     }
 }
 
-/// What is loaded only once it is used.
+/// Resources that are loaded only once they are used.
 const LATER: [ResourceKind; 5] =
     [ResourceKind::Maps, ResourceKind::Thumbnails, ResourceKind::Model, ResourceKind::Paths, ResourceKind::Agent];
 

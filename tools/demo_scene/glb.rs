@@ -23,7 +23,7 @@ pub struct Look {
     pub picture: Option<Picture>,
     /// 0 for a mirror, 1 for chalk.
     pub roughness: f32,
-    /// Whether it is metal.
+    /// True if it is metal.
     pub metal: bool,
     /// Linear emitted light.
     pub glow: [f32; 3],
@@ -70,7 +70,7 @@ pub fn part(name: &'static str, mesh: Mesh, look: Look) -> Part {
 pub struct Object {
     /// Its name.
     pub name: &'static str,
-    /// Where its own origin stands, in metres.
+    /// Position of its own origin, in meters.
     pub position: DVec3,
     /// Turned about the vertical by this.
     pub turn_deg: f64,

@@ -25,7 +25,7 @@ use super::table::{Rows, rows};
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Verdict {
     Holds,
-    /// What came out is finite, but there is nothing to hold it against: no precision knows better.
+    /// The result is finite, but there is nothing to compare it with: no precision is more exact.
     NotCompared,
     Broken,
 }
@@ -71,7 +71,7 @@ impl Finding {
         Self { verdict, ..self }
     }
 
-    /// Whether the promise was seen to break.
+    /// Returns whether the promise was seen to break.
     pub(crate) fn is_broken(&self) -> bool {
         self.verdict == Verdict::Broken
     }

@@ -16,7 +16,7 @@ pub struct Numbers {
     rng: Pcg64Mcg,
     /// Share of numbers that are adversarial.
     share: f64,
-    /// Whether some may be NaN or infinite.
+    /// True if some may be NaN or infinite.
     poison: bool,
     /// Adversarial values so far, and the places among them that are made ordinary.
     given: Vec<f64>,
@@ -24,7 +24,7 @@ pub struct Numbers {
 }
 
 impl Numbers {
-    /// Those of one input of one area.
+    /// Numbers of one input of one area.
     pub fn new(seed: u64, area: &str) -> Self {
         let area = area.bytes().fold(0_u64, |h, b| h.wrapping_mul(31).wrapping_add(u64::from(b)));
         let mut rng = Pcg64Mcg::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(area));
@@ -43,7 +43,7 @@ impl Numbers {
         self.tamed.insert(place);
     }
 
-    /// How many adversarial values there were, tamed ones included.
+    /// Number of adversarial values so far, tamed ones included.
     pub fn adversarial(&self) -> usize {
         self.given.len()
     }

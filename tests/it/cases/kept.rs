@@ -1,4 +1,4 @@
-//! What a person has made is kept on the command line, too: objects found anew, trainings gone on with, things removed.
+//! Work of the user is kept on the command line, too: objects found anew, trainings resumed, things removed.
 
 use std::path::{Path, PathBuf};
 

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// What the server does with one request.
+/// Response of the server to one request.
 #[derive(Clone, Copy, Debug)]
 pub enum Turn {
     /// Serves it, or the range that was asked for.

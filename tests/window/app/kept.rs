@@ -1,5 +1,5 @@
-//! What a person has made is kept: where objects are found anew, where a data set is trained again, where a selection
-//! takes all Gaussians of something.
+//! Work of the user is kept: objects found anew, a data set trained again, a selection that takes all Gaussians of
+//! an object.
 
 use egui::accesskit::Role;
 use egui_kittest::kittest::{NodeT, Queryable};

@@ -128,7 +128,7 @@ fn all_of_a_session_is_done_by_keys_alone() {
     assert!(w.app().state.error.is_none());
 }
 
-/// Whether something can have the keyboard or be clicked, and has no name.
+/// Returns whether a node can have the keyboard or be clicked, and has no name.
 fn is_nameless(node: &egui_kittest::Node<'_>) -> bool {
     let it = node.accesskit_node();
     let reachable = [Ability::Click, Ability::Focus].into_iter().any(|ability| it.data().supports_action(ability));
