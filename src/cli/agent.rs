@@ -69,7 +69,7 @@ pub(crate) struct AgentArgs {
     /// Write the image at the end
     #[arg(long)]
     view: Option<PathBuf>,
-    /// Write everything that was said and done: .json, or .md to be read
+    /// Write the whole conversation: .json, or .md to be read
     #[arg(long)]
     transcript: Option<PathBuf>,
     /// Print one JSON document
@@ -257,7 +257,7 @@ struct Talk {
     told: Vec<serde_json::Value>,
     /// Reason for which the last request was refused, if it was.
     refused: Option<String>,
-    /// The question to which the last request has led, if nobody has answered it.
+    /// Open question of the last request, if it is not answered yet.
     open: Option<String>,
 }
 

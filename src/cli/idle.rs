@@ -12,7 +12,7 @@ use clap::{ArgMatches, Command};
 
 use rules::RULES;
 
-/// The arguments of one command, as far as somebody has given them.
+/// Arguments of one command that were given.
 struct Given<'a>(&'a ArgMatches);
 
 /// Options of commands that do nothing in some calls.

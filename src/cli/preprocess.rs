@@ -67,11 +67,11 @@ pub(crate) struct PreprocessArgs {
     /// Photo to begin with, by name [default: the first with masks]
     #[arg(long)]
     seed: Option<String>,
-    /// Add what this photo, by name, shows that is nobody's yet; objects and parts that are there stay as they are
+    /// Add the unlabeled objects and parts that this photo, by name, shows; those that are there stay as they are
     #[arg(long, value_name = "PHOTO", conflicts_with_all = ["seed", "max_seeds", "unknown", "recipe", "tracker", "prompt",
         "mask_grid", "part_weight", "lifting", "code_steps", "encoder"])]
     add: Option<String>,
-    /// Find anew what was named, selected or corrected by hand, too; without it, that stays as it is
+    /// Replace labels, selections and corrections made by hand, too; without it, they stay as they are
     #[arg(long, conflicts_with = "add")]
     replace_all: bool,
     /// Most photos whose masks are used

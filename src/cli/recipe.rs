@@ -63,8 +63,7 @@ impl RecipeArgs {
         }
     }
 
-    /// The recipe that was asked for, and what of it the scene was not prepared for; nothing of the default, which
-    /// nobody asked for.
+    /// Lines on the requested recipe, and on its parts that the scene was not prepared for; nothing for the default.
     pub(crate) fn lines(&self, map: &SemanticMap) -> Vec<String> {
         let recipe = self.recipe();
         if self.recipe.is_none() && recipe == Recipe::default() {

@@ -61,8 +61,8 @@ impl AccessArgs {
     }
 }
 
-/// Says how to look at what is served; to a log that wants results only it says what nobody could connect without, if
-/// `needed`.
+/// Prints how to connect: the address unless `quiet` and not `needed`, the SSH command unless `quiet`. Warns of an
+/// address that other computers can reach.
 pub(crate) fn announce(server: &Server, quiet: bool, needed: bool) {
     let address = server.address();
     let port = address.port();

@@ -206,7 +206,7 @@ impl TrainArgs {
     }
 }
 
-/// `first`, `first-2` and so on, as far as they exist, and one more.
+/// Folders `first`, `first-2` and so on that exist, and the next one.
 fn usual_folders(first: &Path) -> Vec<PathBuf> {
     let folder = |n: usize| if n == 1 { first.to_owned() } else { PathBuf::from(format!("{}-{n}", first.display())) };
     let there = (1..).take_while(|n| folder(*n).exists()).count();

@@ -8,7 +8,7 @@ use crate::jobs::{Scene, render};
 use crate::scene::Camera;
 
 /// The camera that `wanted` names: an index from 0, a photo's name (its end is enough where that
-/// is unambiguous), or a JSON file. Without a wish it is the scene's first view.
+/// is unambiguous), or a JSON file. Without it, the scene's first view.
 pub(crate) fn choose(wanted: Option<&str>, scene: &Scene) -> Result<Camera, CliError> {
     let Some(wanted) = wanted else {
         if scene.cameras.is_empty() && scene.cloud.is_empty() {

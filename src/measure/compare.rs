@@ -14,7 +14,7 @@ pub(crate) struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    /// Says if the times differ by more than repeats of the same do: usually, and here.
+    /// Returns whether the times differ by more than repeats of the same do: usually, and here.
     pub(crate) fn differs(&self) -> bool {
         let (one, other) = (&self.one.secs, &self.other.secs);
         let is_apart = one.most < other.least || other.most < one.least;

@@ -336,7 +336,7 @@ impl Stage {
 pub struct Computer {
     /// Name of the processor.
     pub processor: String,
-    /// Its cores, as far as this program may use them.
+    /// Number of cores that this program may use.
     pub cores: usize,
     /// Memory in bytes.
     pub memory_bytes: u64,
@@ -359,7 +359,7 @@ pub struct Report {
     pub scene: String,
     /// The machine.
     pub computer: Computer,
-    /// Commands that measured it, the first first. Earlier reports do not say.
+    /// Commands that measured it, oldest first; empty in earlier reports.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub commands: Vec<String>,
     /// The stages.

@@ -52,7 +52,7 @@ pub struct PlanCost {
     ready_secs: f64,
     /// Memory at rest beyond that of the process before it read anything.
     resident_bytes: f64,
-    /// The most that it was before, likewise; 0 where the system does not say.
+    /// Peak of that memory; 0 where the system does not report it.
     peak_bytes: f64,
     /// Buffers on the device for one image; 0 without any adapter.
     device_bytes: f64,
@@ -196,7 +196,7 @@ fn device_bytes(scene: &OpenScene, settings: &RenderSettings) -> Result<u64, Stu
     Ok(renderer.device_bytes())
 }
 
-/// Memory of this process now, bytes; 0 where the system does not say.
+/// Memory of this process now, bytes; 0 where the system does not report it.
 fn resident() -> u64 {
     let Ok(pid) = sysinfo::get_current_pid() else { return 0 };
     let Ok(mut system) = sysinfo::System::new() else { return 0 };
@@ -204,7 +204,7 @@ fn resident() -> u64 {
     system.process(pid).map_or(0, sysinfo::Process::memory)
 }
 
-/// The most memory that this process has had, bytes; 0 where the system does not say.
+/// Peak memory of this process, bytes; 0 where the system does not report it.
 fn peak() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));

@@ -24,9 +24,9 @@ impl Failure {
 /// End of a job without its outcome.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Stop {
-    /// It was asked to.
+    /// The job was canceled.
     Cancelled,
-    /// Something went wrong.
+    /// The job has failed.
     Failed(Failure),
 }
 

@@ -51,7 +51,7 @@ pub enum JobKind {
     Thumbnails,
     /// Lists models.
     Models,
-    /// Looks at where one can go.
+    /// Explores the free space of a scene.
     Explore,
     /// Puts a model in place.
     Model,

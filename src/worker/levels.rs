@@ -11,7 +11,7 @@ use crate::scene::resource_log::{self, ResourceKind};
 
 /// Gaussians that are looked at for so long are no step of a training.
 pub(super) const STAY: Duration = Duration::from_secs(2);
-/// From so many on a picture of all of them is too slow to be the first, or to move by until there is a tree.
+/// Number of Gaussians from which a picture of all is too slow as the first one, and for moving until there is a tree.
 const ROUGH_FROM: usize = 1_000_000;
 /// Gaussians of a rough picture.
 const ROUGH: usize = 150_000;
@@ -96,7 +96,7 @@ impl DetailLevels {
             if let Some(built) = built {
                 let what = format!("levels of detail of {} Gaussians", cloud.len());
                 resource_log::record(ResourceKind::Levels, what, "they are too many to draw in time", built.bytes());
-                // Nobody else sets it.
+                // No other code sets it.
                 let _ = tree.set(Arc::new(built));
             }
         };

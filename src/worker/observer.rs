@@ -40,7 +40,7 @@ pub(super) struct JobObserver {
     pub(super) last_cloud: Option<Instant>,
     /// True if the job was last reported as paused.
     pub(super) paused: AtomicBool,
-    /// Set when nobody takes events any more.
+    /// Set once the receiver of events is gone.
     pub(super) alone: AtomicBool,
 }
 

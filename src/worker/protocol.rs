@@ -129,7 +129,7 @@ pub enum Command {
     RecentPictures(Vec<PathBuf>),
     /// List the trainings of those of these photos that have several.
     RecentRuns(Vec<PathBuf>),
-    /// Fetch a model of the catalog, or take over files that somebody brings.
+    /// Fetch a model of the catalog, or install the user's files.
     InstallModel {
         /// Its name.
         id: String,
@@ -138,7 +138,7 @@ pub enum Command {
     },
     /// List the models and the engine that runs them.
     ListModels,
-    /// Look at where one can go, before anybody wants to.
+    /// Explore the free space of a scene ahead of the first flight.
     Explore {
         /// The Gaussians.
         cloud: Arc<GaussianCloud>,
@@ -232,11 +232,11 @@ impl Command {
 pub enum Outcome {
     /// A scene was read.
     Opened(Box<OpenedScene>),
-    /// One to be seen beside it was.
+    /// A scene to show beside it was read.
     Beside(Box<OpenedScene>),
-    /// There are photos, and nobody knows from where they were taken.
+    /// Photos were read, but their camera poses are unknown.
     Unposed(Box<Unposed>),
-    /// Training is done, or was canceled and is stored as far as it came; the Gaussians lie in the slot.
+    /// Training is done, or was canceled and its state is stored; the Gaussians are in the slot.
     Trained {
         /// Evaluations of the whole run, oldest first.
         evaluations: Vec<Evaluation>,
@@ -269,7 +269,7 @@ pub enum Outcome {
     Scale(f64, bool),
     /// Gaussians that clicks and strokes select by now.
     Selected(Arc<Selected>),
-    /// Such a change makes no sense, and why.
+    /// An edit was refused, and why.
     Refused(String),
     /// A file was written.
     Written(PathBuf),
@@ -296,7 +296,7 @@ pub enum Outcome {
     Models(Arc<ModelList>),
     /// A model can be used now.
     ModelInstalled(String),
-    /// The scene was looked at.
+    /// The free space of a scene was explored.
     Explored(Arc<Explored>),
     /// The way to an identity, or why there is none; and what was learned of the scene.
     Approached(Arc<Explored>, Approached),
@@ -335,11 +335,11 @@ pub enum Event {
     Note(JobId, Severity, String),
     /// The job now waits (`true`) or goes on (`false`).
     Paused(JobId, bool),
-    /// It did what it was to do.
+    /// The job has finished.
     Finished(JobId, Outcome),
-    /// It ended because it was asked to.
+    /// The job was canceled.
     Cancelled(JobId),
-    /// It could not go on.
+    /// The job has failed.
     Failed(JobId, Failure),
 }
 

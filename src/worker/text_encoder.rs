@@ -39,7 +39,7 @@ pub(crate) struct EncodedText {
     pub(crate) encode_ms: f64,
 }
 
-/// Texts, each with the recipe that it is answered by: that says which other phrases are needed.
+/// Texts, each with the recipe that answers it and decides which other phrases are needed.
 pub(crate) type TextRequest = Vec<(ParsedQuery, Recipe)>;
 
 /// Handle of the thread. Dropping it ends the thread.
@@ -91,7 +91,7 @@ impl TextEncoder {
     }
 }
 
-/// Encodes the phrases of these texts, as far as they are not `known` from before.
+/// Encodes the phrases of these texts that are not `known` yet.
 fn encode(encoder: &mut dyn Encoder, known: &mut TextEmbeddings, texts: TextRequest) -> Encoded {
     let mut encoded = Encoded::default();
     for (phrase, recipe) in texts {

@@ -80,7 +80,7 @@ impl Worker {
                 (Arc::clone(&jobs), event_sender.clone(), Arc::clone(&clouds), Arc::clone(&controls), repaint.clone());
             let work = move || {
                 for queued in queue {
-                    // A scene that is opened is waited for: it yields to nobody.
+                    // The user waits for a scene to open: the job runs at normal priority.
                     let yields = !matches!(queued.command.kind(), JobKind::Open | JobKind::Demo);
                     let run = || run_one(&*jobs, queued, &events, &clouds, &controls, &repaint);
                     match &pool {

@@ -1,4 +1,4 @@
-//! The drawing lane: a thread that renders what the eye sees, so that the window never waits for it.
+//! The drawing lane: a thread that renders the view, so that the window never waits for it.
 //!
 //! Only the latest request counts: one that was not begun yet is replaced.
 
@@ -70,7 +70,7 @@ impl ViewLane {
                 };
                 gives_back = request.skip.buffers;
                 patience = (gives_back || !request.skip.levels).then_some(REST);
-                // Looking for a GPU takes a moment; here no one waits for it.
+                // Looking for a GPU takes a moment; on this thread nothing waits for it.
                 let renderer = match renderer.take().filter(|p| p.without_gpu == request.skip.gpu) {
                     Some(known) => renderer.insert(known),
                     None => renderer.insert(ViewRenderer::without_gpu(request.skip.gpu)),
@@ -82,7 +82,7 @@ impl ViewLane {
                 let drawn = renderer.draw(&request);
                 let (exact, start) = (request.budget == QualityBudget::Full, Instant::now());
                 let camera = match &drawn {
-                    // While the eye moves both come together, or masks would trail behind.
+                    // While the camera moves both come together, or masks would trail behind.
                     Ok(picture) if !exact => picture.camera.clone(),
                     _ => {
                         out.publish(drawn.clone());

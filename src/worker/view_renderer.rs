@@ -13,7 +13,7 @@ use crate::render::lod::{Cut, LodTree};
 use crate::render::{self, BackendChoice, DevicePicture, Frame, RenderSettings, Renderer};
 use crate::scene::Camera;
 
-/// Moving frames are no smaller than this, px of their longer side: below, one does not see where one flies.
+/// Least longer side of moving frames in px: smaller ones are too coarse to navigate by.
 const LEAST_SIDE_PX: f64 = 300.0;
 
 /// Draws requests, and learns how fast it can.
@@ -63,7 +63,7 @@ impl ViewRenderer {
         }
     }
 
-    /// Goes on with the CPU: a GPU has failed, or buffers may be in any state.
+    /// Falls back to the CPU: a GPU has failed, or buffers may be in any state.
     fn fall_back(&mut self, why: &str) {
         if self.renderer.is_gpu() {
             self.instead_of_gpu = Some(render::instead_of_gpu(&why));
@@ -76,7 +76,7 @@ impl ViewRenderer {
         self.draw_seen(request)
     }
 
-    /// A rough picture of Gaussians that are so many that one of all of them takes long.
+    /// Draws a rough picture first if there are so many Gaussians that one of all of them takes long.
     pub(super) fn rough(&mut self, request: &ViewRequest) -> Option<ViewResult> {
         let first = self.sees(request) && request.budget == QualityBudget::Full;
         let request = ViewRequest { budget: QualityBudget::Moving, follow: false, ..request.clone() };

@@ -48,11 +48,11 @@ pub struct ViewRequest {
 /// Passes that the scene's plan skips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SkipPasses {
-    /// Depth of frames from which no one picks points.
+    /// Depth of frames that no points are picked from.
     pub(crate) depth: bool,
     pub(crate) parts: bool,
     pub(crate) gpu: bool,
-    /// Working memory, while the eye rests.
+    /// Working memory, while the camera rests.
     pub(crate) buffers: bool,
     /// Levels of detail.
     pub(crate) levels: bool,

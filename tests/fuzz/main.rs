@@ -65,7 +65,7 @@ fn chosen() -> Vec<Target> {
     targets::all().into_iter().filter(is_chosen).collect()
 }
 
-/// Writes an input that breaks a promise, and says what it does.
+/// Writes an input that breaks a promise, and prints the promise.
 fn report(target: &str, find: &Find) -> String {
     let file = watch::save(target, &find.input);
     format!("{target}: an input of {} bytes {}; see {}", find.input.len(), find.what, file.display())

@@ -1,4 +1,4 @@
-//! The search for an input that breaks a promise, and what is told about it.
+//! The search for an input that breaks a promise, and its report.
 
 use std::collections::HashSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -23,7 +23,7 @@ const SAMPLED: u64 = 16;
 /// Different finds that are kept of a reader.
 const MOST_FINDS: usize = 20;
 
-/// An input that did what it must not.
+/// An input that broke a promise.
 pub struct Find {
     /// The broken promise.
     pub what: String,

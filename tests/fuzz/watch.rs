@@ -35,7 +35,7 @@ pub fn begin_for(target: &'static str, input: &[u8], patience: Duration) {
     watched.input.extend_from_slice(input);
 }
 
-/// It has come to an end.
+/// The current input has ended.
 pub fn end() {
     WATCHED.lock().unwrap_or_else(PoisonError::into_inner).until = None;
 }

@@ -116,7 +116,7 @@ fn ctrl_c_saves_and_exits_with_130() {
 /// Generous: an end takes milliseconds, what it must not wait for takes minutes.
 const SOON: Duration = Duration::from_secs(10);
 
-/// Ends a child and returns what it said, and how long it took.
+/// Ends a child and returns its output and the time that took.
 fn end(child: Child, signal: &str) -> (Done, Duration) {
     let begin = Instant::now();
     send(&child, signal);

@@ -15,9 +15,9 @@ const SIZE: [u32; 2] = [480, 360];
 const HOSTILE: &str = "</script><img src=x onerror=\"window.broken = 1\"><b>kettle";
 /// Least PSNR of the page's picture against this program's, dB, and how much less another camera's must have.
 const PSNR_DB: (f64, f64) = (32.0, 10.0);
-/// Least IoU of what is highlighted with the mask that this program draws, and the most with that of another object.
+/// Least IoU of the highlighted pixels with the mask that this program draws, and the most with that of another object.
 const IOU: (f64, f64) = (0.85, 0.1);
-/// Channels of what is highlighted lie so far apart; the rest is gray.
+/// Least difference between channels of highlighted pixels; the rest is gray.
 const CHROMA: u8 = 36;
 
 /// The scene that ships with the program, its kettle called by something [`HOSTILE`].

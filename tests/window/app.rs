@@ -1,4 +1,4 @@
-//! The whole window, headless: what the user sees and does, with the software adapter.
+//! The whole window, headless: the user's view and actions, with the software adapter.
 
 mod crop;
 mod demo;

@@ -80,7 +80,7 @@ impl Finding {
 pub(crate) struct Case {
     pub(crate) area: &'static str,
     pub(crate) name: String,
-    /// Runs it, with a fault planted if told so.
+    /// Runs the case, with a planted fault if true.
     run: Box<dyn Fn(bool) -> Finding + Send + Sync>,
 }
 
@@ -93,7 +93,7 @@ pub(crate) struct Checked {
 }
 
 impl Case {
-    /// A case. What runs it plants a fault where it is told to.
+    /// A case. `run` plants a fault if its argument is true.
     pub(crate) fn new(
         area: &'static str,
         name: impl Into<String>,

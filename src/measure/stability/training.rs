@@ -61,8 +61,8 @@ pub(super) struct ShortTraining {
     pub(super) left: [usize; 2],
 }
 
-/// Trains for so many steps, and does something before each. No case here expects a training to stop: one
-/// that does is a broken promise, whatever its reason.
+/// Trains for `steps` steps, and calls `before` ahead of each. No case here expects a training to stop: one that does
+/// is a broken promise.
 pub(super) fn train(
     mut trainer: Trainer,
     view: TrainView,

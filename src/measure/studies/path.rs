@@ -135,7 +135,7 @@ struct Faults {
     steps: f64,
     /// Share of the places along it that are nearer to occupied space than wanted.
     near: f64,
-    /// By how much the way from pose to pose is shorter than the way itself, relative.
+    /// Share by which the path from pose to pose is shorter than the path itself.
     short: f64,
     /// Largest turn of a step, radians.
     turn: f64,

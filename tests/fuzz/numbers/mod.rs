@@ -1,5 +1,5 @@
-//! Fuzzing of numbers: random scenes, cameras, settings, embeddings and paths full of adversarial values, compared
-//! with what must be true of any of them.
+//! Fuzzing of numbers: random scenes, cameras, settings, embeddings and paths full of adversarial values, checked
+//! against properties that hold for all of them.
 //!
 //! The promise is that nothing panics, nothing hangs, and what comes out is finite, or a refusal by name; where single
 //! and double precision are both defined they agree as far as the input's own condition allows. Every input follows
@@ -29,7 +29,7 @@ const MANY_ROUNDS: u64 = 20_000;
 enum Verdict {
     /// All that was promised.
     Held,
-    /// It was refused by name.
+    /// The input was refused with a named error.
     Refused,
     /// The result is finite, but single and double precision are not both defined, or not of the same
     /// Gaussians: there is nothing to compare it with.

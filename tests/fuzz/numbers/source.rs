@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// Numbers that are special to somebody.
+/// Numbers that are special to some code.
 const SPECIAL: [f32; 12] =
     [0.0, -0.0, 1.0, -1.0, 0.5, 255.0, f32::EPSILON, f32::MIN_POSITIVE, 1e-45, f32::MAX, f32::MIN, 16_777_217.0];
 

@@ -1,5 +1,5 @@
-//! An encoder in the room to which everything looks like the piano: names come first, and what only looks so is never
-//! acted on without a question.
+//! An encoder in the room to which everything looks like the piano: names come first, and an answer by embedding alone
+//! is never acted on without a question.
 
 use super::{done, say, session};
 use crate::agent_common::room::Room;

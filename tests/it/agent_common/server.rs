@@ -1,4 +1,4 @@
-//! A chat model's server on this machine that says what a test wants, well or badly.
+//! A chat model's server on this machine that replies as a test wants, well or badly.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};

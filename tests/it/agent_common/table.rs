@@ -20,7 +20,7 @@ pub struct Dialog {
     pub turns: Vec<Turn>,
 }
 
-/// One request and what the user would want of it.
+/// One request and its expected outcome.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Turn {
@@ -72,7 +72,7 @@ pub struct Wording {
     pub after: Vec<String>,
 }
 
-/// Numbers of requests that went as wanted, of all, and of unsafe ones.
+/// Numbers of requests with the expected outcome, of all, and of unsafe ones.
 #[derive(Debug, Default)]
 pub struct Tally {
     pub right: usize,
@@ -107,7 +107,7 @@ fn matches_line(wanted: &str, got: &str) -> bool {
     })
 }
 
-/// One request in a session; `Err` says what is not as wanted. The second value is whether something
+/// Runs one request in a session; `Err` names the deviation from the table. The second value is true if something
 /// unsafe was done.
 pub fn ask(session: &mut Session, room: &mut Room, turn: &Turn) -> (Result<(), String>, bool) {
     let before = room.log.len();

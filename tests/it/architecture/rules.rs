@@ -1,4 +1,4 @@
-//! The rules: each takes the tree and returns what is wrong with it.
+//! The rules: each takes the tree and returns the violations.
 
 use super::source::{SourceFile, library_code, test_module_files};
 
@@ -335,7 +335,7 @@ pub fn used_paths(code: &str, place: &[String]) -> Vec<Vec<String>> {
     paths
 }
 
-/// The paths of `a::{b, c::d}` after `base`, as far as they are names.
+/// Paths of `a::{b, c::d}` after `base` that are names.
 fn expand(rest: &str, base: Vec<String>, paths: &mut Vec<Vec<String>>) {
     let rest = rest.trim_start();
     if let Some(group) = rest.strip_prefix('{') {

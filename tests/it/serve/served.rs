@@ -75,7 +75,7 @@ impl Served {
         serde_json::from_slice(&body).unwrap()
     }
 
-    /// Waits until its news are as wanted.
+    /// Waits until its news meet a condition.
     pub fn wait(&self, wanted: impl Fn(&serde_json::Value) -> bool) {
         let until = Instant::now() + Duration::from_secs(120);
         while !wanted(&self.news(0)) {

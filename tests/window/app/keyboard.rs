@@ -39,7 +39,7 @@ fn palette(w: &mut Window, text: &str) {
     w.harness.run_steps(2);
 }
 
-/// The role and the name of what has the keyboard.
+/// Role and name of the node that has the keyboard.
 fn focused(w: &Window) -> Option<(Role, String)> {
     let nodes = w.harness.root().children_recursive();
     let mut with = nodes.filter(|n| n.accesskit_node().is_focused());
