@@ -15,7 +15,8 @@ use crate::scene::LevelFilter;
 
 /// Move, turn, scale, duplicate or recolor an object or a part
 ///
-/// It turns and scales about its own middle. The scene is left as it is; the result is a scene of its own, or a file of splats.
+/// It turns and scales about its own middle. The scene is left as it is; the result is a scene of its own, or a file of
+/// splats.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs edit scene/ \"the mug\" --move 0.5,0,0 --turn 90 --out moved/\n  \

@@ -59,12 +59,12 @@ impl CliError {
         Self::failed(format!("{error}{remedy}"))
     }
 
-    /// Of work that may have been asked to stop; `saved` says what is left of it then.
+    /// Error of work that may have been canceled; `saved` names the results that are kept then.
     pub(crate) fn of_work(error: impl Error + Send + Sync + 'static, saved: &str) -> Self {
         if Interrupted::is_cause_of(&error) { Self::Cancelled(saved.into()) } else { error.into() }
     }
 
-    /// Of a measurement of views: without all of them there is no result.
+    /// Error of a measurement of views: without all of them there is no result.
     pub(crate) fn of_views(error: JobError) -> Self {
         Self::of_work(error, "not all views were measured")
     }

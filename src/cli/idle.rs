@@ -18,7 +18,7 @@ struct Given<'a>(&'a ArgMatches);
 /// Options of commands that do nothing in some calls.
 struct Rule {
     commands: &'static [&'static str],
-    /// By the names that clap has for them.
+    /// Names of the options in clap.
     options: &'static [&'static str],
     /// Returns why the options do nothing in this call, to follow "has no effect "; `None` if they do something.
     idle: fn(&Given<'_>) -> Option<&'static str>,

@@ -46,7 +46,7 @@ pub(crate) struct RemoveArgs {
     /// Leave its shadow where it is
     #[arg(long)]
     keep_shadow: bool,
-    /// Another number gives another fill
+    /// Seed of the fill; another number gives another fill
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Things that are removed at most, where several are meant

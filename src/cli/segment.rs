@@ -20,8 +20,9 @@ use crate::scene::{Camera, LevelFilter, SemanticMap};
 ///
 /// The same match as that of the mask, in space: by identities, or with --match codes by the codes of the
 /// Gaussians. The ending of --out chooses the format, as for 'fmlgs export'. Exit code 1 if nothing fits. With --all, a
-/// folder is written: a file for each object and part, and their masks in the photos as files that --masks of other commands, and other programs, read. A folder that holds
-/// anything but an earlier export, or something of it that was changed since, is refused.
+/// folder is written: a file for each object and part, and their masks in the photos as files that --masks of other
+/// commands, and other programs, read. A folder that holds anything but an earlier export, or an export that was
+/// changed since, is refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs segment scene/ \"the kettle\" --out kettle.ply\n  \

@@ -85,6 +85,7 @@ pub(crate) fn run(
         };
         selected = Some(Arc::new(select::run(&request, &mut console)?));
     }
+    // Clears the progress bar before the result is printed.
     drop(console);
     let selected = selected.filter(|s| !s.gaussians.is_empty());
     let selected = selected.ok_or_else(|| CliError::failed("nothing is at the places that were clicked on"))?;

@@ -4,8 +4,8 @@ use clap::{Arg, ArgAction, Args, Command};
 
 use super::idle;
 
-/// Reads `table` as the command `name` is given it; `left_out` are options that make no sense there, `given` what stands before them (positional
-/// arguments, for example).
+/// Reads `table` as the options of the command `name`, without those in `left_out`; the words `given` come before them
+/// (positional arguments, for example).
 ///
 /// # Errors
 /// The problem and the key that has it.

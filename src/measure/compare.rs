@@ -56,7 +56,7 @@ impl Point {
 }
 
 impl Report {
-    /// In what respects `other` was measured under other conditions, so that times do not compare.
+    /// Conditions of `other` that differ, so that times do not compare.
     pub(crate) fn differs_from(&self, other: &Report) -> Vec<String> {
         let (a, b) = (&self.computer, &other.computer);
         let name = |gpu: &Option<String>| gpu.clone().unwrap_or_else(|| "none".into());

@@ -78,7 +78,7 @@ pub enum ErrorKind {
     Decibels,
 }
 
-/// Something that was measured of every setting.
+/// A quantity that is measured of every setting.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Measure {
     pub(crate) name: String,
@@ -155,7 +155,7 @@ pub struct Point {
     pub method: String,
     /// Setting of the knob, in words.
     pub setting: String,
-    /// The same for the program: fields of the stage's settings.
+    /// The setting as fields of the stage's settings, for the program.
     pub knobs: Knobs,
     /// True if these are the program's defaults.
     pub default: bool,

@@ -5,7 +5,7 @@
 pub struct JobId(pub(crate) u64);
 
 impl JobId {
-    /// From here on jobs are of other computers: no worker counts so far.
+    /// First number of jobs on other computers: no worker counts so far.
     pub(crate) const REMOTE: Self = Self(1 << 63);
 
     /// Returns whether it runs on another computer.
@@ -128,8 +128,8 @@ impl JobKind {
 /// Thread of the worker that runs a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WorkerThread {
-    /// One after another, minutes each.
+    /// Jobs of minutes, one after another.
     Long,
-    /// Answered while a long job runs.
+    /// Short jobs, run beside a long one.
     Short,
 }

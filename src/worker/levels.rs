@@ -68,8 +68,7 @@ impl DetailLevels {
         self.now = None;
     }
 
-    /// The tree of the Gaussians that were seen last, if it is built. Of very many it is a `rough` one until then, where
-    /// that will do.
+    /// The tree of the Gaussians that were seen last, if it is built. Until then a rough one of very many, if `rough`.
     pub(super) fn tree(&mut self, rough: bool) -> Option<Tree> {
         let now = self.now.as_mut()?;
         if let Some(tree) = now.tree.get() {

@@ -147,7 +147,7 @@ impl Worker {
         &self.source.clouds
     }
 
-    /// From now on commands are offered to `elsewhere` first.
+    /// Offers later commands to `elsewhere` first.
     pub(crate) fn set_elsewhere(&mut self, elsewhere: Option<Elsewhere>) {
         self.elsewhere = elsewhere;
     }

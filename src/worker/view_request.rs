@@ -140,7 +140,7 @@ impl ViewPicture {
     /// Its pixels on the host; those of the second view, if that is wanted and there is one.
     ///
     /// # Errors
-    /// If they lie on a device that does not give them back.
+    /// If reading them back from a device fails.
     pub(crate) fn pixels(&self, second: bool) -> Result<PhotoPixels, GpuError> {
         let rgb = match (self.second.as_ref().filter(|_| second), &self.texture) {
             (Some(second), _) => second.rgb.clone(),

@@ -168,7 +168,7 @@ fn what_is_required_is_required_whatever_else_is_given() {
     assert!(pairs > 100 && alone > 100, "{pairs} lines with a companion, {alone} alone: clap tells less than it did");
 }
 
-/// Lines in which the option is refused, and the same with what it needs: accepted. `{}` stands for each of the options.
+/// Lines in which the option is refused, and accepted with what it needs. `{}` stands for each of the options.
 const LINES: &[(&str, &[&str], &str)] = &[
     ("query s lamp {}", &["--tolerance 3", "--export o", "--truth t", "--views all", "--relevancy raw"], ""),
     ("query s lamp --match identities {}", &["--tolerance 3"], "query s lamp --match codes --tolerance 3"),

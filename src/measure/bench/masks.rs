@@ -23,7 +23,7 @@ pub(crate) struct MasksTiming {
     /// Points through the decoder.
     pub(crate) prompts: usize,
     pub(crate) prompt_secs: f64,
-    /// With loading the networks and judging the masks.
+    /// Seconds in all, with loading the networks and judging the masks.
     pub(crate) whole_secs: f64,
     /// Number of masks that were kept.
     pub(crate) masks: usize,

@@ -12,7 +12,7 @@ use crate::scene::{Camera, GaussianCloud};
 /// Largest deviation of a color from double precision that an image may have.
 const BOUND: f64 = 1e-4;
 
-/// One Gaussian in the middle, of this shape.
+/// A Gaussian in the middle, of this shape.
 pub(crate) fn one(scales: [f64; 3], quaternion: [f64; 4], opacity_logit: f64) -> GaussianCloud<f64> {
     GaussianCloud {
         positions: vec![[0.0; 3]],

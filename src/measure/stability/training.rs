@@ -154,6 +154,7 @@ fn resumed(faulty: bool) -> Finding {
             (t.rng, t.round, t.step) = (saved.header.rng, saved.header.round, saved.header.step);
             Ok(t)
         };
+        // The control: without first moments of positions, a training has to end elsewhere.
         let mut forgetful = loaded()?;
         forgetful.moments[0].positions.fill([0.0; 3]);
         let mut again = loaded()?;

@@ -157,6 +157,7 @@ impl Drawing {
                 let mut once = |camera: &Camera, s: &RenderSettings| {
                     renderer.render(&self.cloud, Features::NONE, camera, s).map_err(failed)
                 };
+                // The first frame finds the order of splats that the timed one keeps.
                 once(&before, settings)?;
                 let start = Instant::now();
                 let frame = once(camera, &keep)?;
