@@ -42,7 +42,7 @@ pub(crate) struct AgentArgs {
     /// Photo to start from, by index or name, or a JSON camera file [default: the first photo]
     #[arg(long)]
     from: Option<String>,
-    /// What turns sentences into steps
+    /// Planner that turns sentences into steps
     #[arg(long, value_enum, default_value_t = PlannerArg::Commands)]
     planner: PlannerArg,
     /// Address of the chat model, up to and with its version
@@ -60,7 +60,7 @@ pub(crate) struct AgentArgs {
     /// Test the connection to --model at --url, and end
     #[arg(long, conflicts_with = "scene", requires_all = ["url", "model"])]
     test_model: bool,
-    /// What may be done: a policy file [default: FMLGS_POLICY, else the built-in one]
+    /// Policy file, which says what may be done [default: FMLGS_POLICY, else the built-in one]
     #[arg(long)]
     policy: Option<PathBuf>,
     /// Length of a scene unit in meters [default: the scene's own, if that is known]
@@ -69,7 +69,7 @@ pub(crate) struct AgentArgs {
     /// Write the image at the end
     #[arg(long)]
     view: Option<PathBuf>,
-    /// Write everything that was said and done: .json, or .md to be read
+    /// Write the whole conversation: .json, or .md to be read
     #[arg(long)]
     transcript: Option<PathBuf>,
     /// Print one JSON document
@@ -250,14 +250,14 @@ impl<R: BufRead> Requests<R> {
     }
 }
 
-/// What was said so far.
+/// State of the conversation so far.
 #[derive(Default)]
 struct Talk {
     json: bool,
     told: Vec<serde_json::Value>,
-    /// Why the last request was refused, if it was.
+    /// Reason for which the last request was refused, if it was.
     refused: Option<String>,
-    /// The question to which the last request has led, if nobody has answered it.
+    /// Open question of the last request, if it is not answered yet.
     open: Option<String>,
 }
 

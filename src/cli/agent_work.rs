@@ -22,7 +22,7 @@ pub(super) struct SceneWork {
     map: Arc<SemanticMap>,
     /// The maps before each new name that was not taken back.
     before: Vec<Arc<SemanticMap>>,
-    /// Lines on what was done since somebody took them.
+    /// Lines on the work done since they were last taken.
     pub(super) done: Vec<String>,
     /// The last error, if something could not be done.
     pub(super) failure: Option<CliError>,
@@ -42,7 +42,7 @@ impl SceneWork {
         }
     }
 
-    /// Does what the agent has decided, as far as that is more than a look.
+    /// Carries out a decision of the agent that changes more than the view.
     pub(super) fn carry_out(&mut self, effect: &Effect) {
         let line = match effect {
             Effect::Fly(flight, _) => {
@@ -81,7 +81,7 @@ impl SceneWork {
         self.stored(&format!("calls #{id} {name} again"))
     }
 
-    /// Stores the names as they are now, and says so.
+    /// Stores the current names, and returns a line that reports it.
     fn stored(&mut self, what: &str) -> String {
         let stored = match &self.folder {
             Some(folder) => edit::store(folder, self.state.as_deref(), &self.map, &self.cloud),
@@ -97,7 +97,7 @@ impl SceneWork {
         }
     }
 
-    /// Makes the scene in `folder` anew without these, and says where.
+    /// Makes a new scene from the one in `folder` without these, and returns a line with its path.
     fn removed(&mut self, folder: &Path, ids: &[IdentityId]) -> String {
         let request = RemoveRequest { folder: folder.into(), options: RemovalOptions::of(ids), retrain: false };
         match remove::beside(&request, &mut Silent) {

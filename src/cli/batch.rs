@@ -67,7 +67,7 @@ pub(crate) struct BatchArgs {
     json: bool,
 }
 
-/// What a table `[[setting]]` may have.
+/// Keys of a table `[[setting]]`.
 #[derive(Debug, clap::Args)]
 struct TrainingTable {
     #[command(flatten)]

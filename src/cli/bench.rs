@@ -51,10 +51,10 @@ pub(crate) struct BenchArgs {
     /// Time this network on the masks of everything in a photo: a model's name, or the path of its description
     #[arg(long, value_name = "MODEL")]
     masks: Option<String>,
-    /// At which points of the grid it is asked
+    /// Points of the grid at which it is asked
     #[arg(long, value_enum, default_value_t, requires = "masks")]
     mask_grid: MaskGrid,
-    /// That photo [default: one is made up]
+    /// Photo for --masks [default: one is made up]
     #[arg(long, value_name = "FILE", requires = "masks")]
     photo: Option<PathBuf>,
     /// Time this many strokes that select Gaussians, three for each selection
@@ -146,7 +146,7 @@ fn savings(args: &BenchArgs) -> Result<(), CliError> {
     ))
 }
 
-/// What a process of its own has measured.
+/// Runs `fmlgs bench --variant` in a process of its own, and returns its measurements.
 fn child(scene: &Path, variant: &str, repeats: u32) -> Result<PlanCost, CliError> {
     let program = std::env::current_exe().map_err(|e| CliError::failed(format!("the program's own path: {e}")))?;
     let mut process = Process::new(program);

@@ -13,11 +13,11 @@ use crate::math::format;
 
 /// Find floaters, needles and haze, and write the scene without them
 ///
-/// Without --out it only counts what each rule means. A rule is 'floaters' (small pieces in the air that the photos do
-/// without), 'faint', 'needles', 'oversized', 'unsupported' (no photo shows them), 'color=#RRGGBB' (and what is near), or
-/// a measure with a limit: size (scene units), elongation, opacity, spacing (1 is usual), piece (Gaussians that hang
-/// together), weight (largest share of a pixel in any photo), photos (that show it), error (difference from the photos,
-/// 0 to 1).
+/// Without --out it only counts the Gaussians of each rule. A rule is 'floaters' (small pieces in the air that the
+/// photos do without), 'faint', 'needles', 'oversized', 'unsupported' (no photo shows them), 'color=#RRGGBB' (and near
+/// colors), or a measure with a limit: size (scene units), elongation, opacity, spacing (1 is usual), piece (Gaussians
+/// that hang together), weight (largest share of a pixel in any photo), photos (that show it), error (difference from
+/// the photos, 0 to 1).
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs clean scene/                                     count what every rule means\n  \
@@ -27,12 +27,12 @@ use crate::math::format;
 pub(crate) struct CleanArgs {
     /// Trained scene or splat file
     scene: PathBuf,
-    /// What is left out: Gaussians that any of these rules means [default: floaters faint]
+    /// Rules; a Gaussian is left out if it meets any of them [default: floaters faint]
     rules: Vec<CleanRule>,
     /// Folder for the new scene, or a file of splats (.ply, .sog, .spz, ...)
     #[arg(long)]
     out: Option<PathBuf>,
-    /// Where the scene's photos are, if not where it says
+    /// Folder of the scene's photos, if it is not where the scene says
     #[arg(long)]
     photos: Option<PathBuf>,
     /// Print one JSON document

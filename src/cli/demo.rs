@@ -55,7 +55,7 @@ pub(crate) fn run(args: DemoArgs, quiet: bool) -> Result<(), CliError> {
     output::print(&format!("{}\nSee {}", report.summary(), args.out.join("report.md").display()))
 }
 
-/// Says what the trained demo answers, at once; without it the demo is trained all the same.
+/// Prints the answers of the trained demo at once; without it the demo is trained all the same.
 fn show_shipped(pictures: &Path, console: &mut Console) {
     match shipped::examine(&Folders::of_user(), pictures, console) {
         Ok(([psnr, ssim], queries)) => {

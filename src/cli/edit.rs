@@ -15,7 +15,8 @@ use crate::scene::LevelFilter;
 
 /// Move, turn, scale, duplicate or recolor an object or a part
 ///
-/// It turns and scales about its own middle. The scene is left as it is; the result is a scene of its own, or a file of splats.
+/// It turns and scales about its own middle. The scene is left as it is; the result is a scene of its own, or a file of
+/// splats.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs edit scene/ \"the mug\" --move 0.5,0,0 --turn 90 --out moved/\n  \
@@ -25,7 +26,7 @@ use crate::scene::LevelFilter;
 pub(crate) struct EditArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
-    /// What to edit
+    /// Text of the object or part to edit
     text: String,
     /// Folder for the new scene, or a file of splats (.ply, .sog, .spz, ...)
     #[arg(long)]
@@ -48,7 +49,7 @@ pub(crate) struct EditArgs {
     /// Give it another color; its shades stay
     #[arg(long, value_name = "#RRGGBB", value_parser = color, group = "what")]
     color: Option<[f32; 3]>,
-    /// Whether an object or a part is meant
+    /// Level of the answer: an object or a part
     #[arg(long, value_enum, default_value_t = LevelFilter::Auto)]
     kind: LevelFilter,
 }

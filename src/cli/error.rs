@@ -1,4 +1,4 @@
-//! How a subcommand fails, and the exit code that says so to a script.
+//! Failures of a subcommand, and the exit codes that report them to a script.
 
 use std::error::Error;
 use std::process::ExitCode;
@@ -12,7 +12,7 @@ use crate::pipeline::observer::Interrupted;
 use crate::pipeline::train::TrainError;
 use crate::pipeline::train::checkpoint::CheckpointError;
 
-/// Why a subcommand did not do what was asked.
+/// Reason for which a subcommand failed.
 #[derive(Debug)]
 pub(crate) enum CliError {
     /// The arguments make no sense together; exit code 2, as for arguments that do not parse.
@@ -59,12 +59,12 @@ impl CliError {
         Self::failed(format!("{error}{remedy}"))
     }
 
-    /// Of work that may have been asked to stop; `saved` says what is left of it then.
+    /// Error of work that may have been canceled; `saved` names the results that are kept then.
     pub(crate) fn of_work(error: impl Error + Send + Sync + 'static, saved: &str) -> Self {
         if Interrupted::is_cause_of(&error) { Self::Cancelled(saved.into()) } else { error.into() }
     }
 
-    /// Of a measurement of views: without all of them there is no result.
+    /// Error of a measurement of views: without all of them there is no result.
     pub(crate) fn of_views(error: JobError) -> Self {
         Self::of_work(error, "not all views were measured")
     }

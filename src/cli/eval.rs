@@ -38,7 +38,7 @@ pub(crate) struct EvalArgs {
     /// Longer side of the compared images in px [default: as in training, else 512]
     #[arg(long, value_parser = clap::value_parser!(u32).range(16..=16384))]
     max_side: Option<u32>,
-    /// Which photos count as held out: every n-th, 0 = all photos [default: as in training, else 8]
+    /// Photos that count as held out: every n-th, 0 = all photos [default: as in training, else 8]
     #[arg(long, value_parser = number::within(0..=1_000_000_usize))]
     holdout_every: Option<usize>,
     /// Compare the black borders of photos that were undistorted elsewhere, too
@@ -51,10 +51,10 @@ pub(crate) struct EvalArgs {
     /// is asked for by its name
     #[arg(long)]
     masks: Option<PathBuf>,
-    /// How objects and parts are compared
+    /// Protocol that compares objects and parts
     #[arg(long, value_enum, default_value_t = Protocol::Masks, requires = "masks")]
     protocol: Protocol,
-    /// What to ask for, where labels do not name it (spin-nerf)
+    /// Query to ask, where labels do not name it (spin-nerf)
     #[arg(long, requires = "masks")]
     query: Option<String>,
     /// Compare depth instead, with the true depths that came with synthetic photos

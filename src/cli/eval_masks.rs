@@ -57,7 +57,7 @@ pub(crate) fn run(
     ))
 }
 
-/// What the protocol counts, in words.
+/// Summary of the results of a protocol, in words.
 fn summary(summary: &ProtocolSummary) -> String {
     match summary {
         ProtocolSummary::Masks { object_miou, part_miou } => {

@@ -62,7 +62,7 @@ pub(crate) struct ExportArgs {
     json: bool,
 }
 
-/// Whether what was written is measured.
+/// Option to leave out measuring what was written.
 #[derive(Debug, clap::Args)]
 pub(crate) struct MeasureArgs {
     /// Do not draw what was written to measure what was lost

@@ -9,7 +9,7 @@ use crate::jobs::export;
 
 /// Write man pages and shell completions
 ///
-/// One page each for the program and its commands, and what bash, zsh, fish and PowerShell complete.
+/// One manual page each for the program and its commands, and completions for bash, zsh, fish and PowerShell.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Example:\n  fmlgs generate out/      writes out/man/*.1 and out/completions/*")]
 pub(crate) struct GenerateArgs {

@@ -12,20 +12,20 @@ use clap::{ArgMatches, Command};
 
 use rules::RULES;
 
-/// The arguments of one command, as far as somebody has given them.
+/// Arguments of one command that were given.
 struct Given<'a>(&'a ArgMatches);
 
 /// Options of commands that do nothing in some calls.
 struct Rule {
     commands: &'static [&'static str],
-    /// By the names that clap has for them.
+    /// Names of the options in clap.
     options: &'static [&'static str],
-    /// Why they do nothing in this call, to follow "has no effect "; `None` if they do something.
+    /// Returns why the options do nothing in this call, to follow "has no effect "; `None` if they do something.
     idle: fn(&Given<'_>) -> Option<&'static str>,
 }
 
 impl Given<'_> {
-    /// Whether somebody has given it; a default is not given.
+    /// Returns whether the option is on the command line; a default does not count.
     fn has(&self, id: &str) -> bool {
         self.0.try_contains_id(id).is_ok_and(|there| there) && self.0.value_source(id) == Some(ValueSource::CommandLine)
     }
@@ -40,7 +40,7 @@ impl Given<'_> {
         raw.into_iter().flatten().map(|value| value.to_string_lossy().into_owned()).collect()
     }
 
-    /// Whether an option has this value and no other.
+    /// Returns whether an option has this value and no other.
     fn is(&self, id: &str, value: &str) -> bool {
         matches!(self.texts(id).as_slice(), [only] if only == value)
     }

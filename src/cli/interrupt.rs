@@ -60,7 +60,7 @@ pub(crate) fn flag() -> &'static AtomicBool {
     &ASKED_TO_STOP
 }
 
-/// Whether the work should stop. Says so the first time that it should.
+/// Returns whether the work should stop. Reports it the first time.
 pub(crate) fn asked_to_stop() -> bool {
     let asked = ASKED_TO_STOP.load(Ordering::SeqCst);
     if asked && !TOLD.swap(true, Ordering::SeqCst) {

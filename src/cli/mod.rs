@@ -63,7 +63,7 @@ use crate::worker::Start;
 /// with it; the script for Slurm does so itself.
 const STOPPED: u8 = 99;
 
-/// What each exit code means; part of `--help`.
+/// Meanings of the exit codes; part of `--help`.
 const EXIT_CODES: &str = "\
 Exit codes:
   0    done
@@ -97,7 +97,7 @@ Examples:
 #[command(name = "fmlgs", version, about, max_term_width = 100)]
 #[command(after_help = format!("{EXAMPLES}\n\n{EXIT_CODES}"))]
 struct Cli {
-    /// What to open in the window: a dataset's folder, a splat file or a trained scene
+    /// Path to open in the window: a dataset's folder, a splat file or a trained scene
     path: Option<PathBuf>,
     #[command(flatten)]
     plan: PlanArgs,

@@ -1,4 +1,4 @@
-//! What the subcommands write: results on standard output, notes on standard error.
+//! Output of the subcommands: results on standard output, notes on standard error.
 //! All text for a terminal goes through here, so that nothing foreign in it acts on one.
 
 use std::io::{ErrorKind, Write};
@@ -18,7 +18,7 @@ pub(crate) fn print(text: &str) -> Result<(), CliError> {
     }
 }
 
-/// Tells on standard error what is not as it was meant, but no reason to stop.
+/// Prints a warning to standard error.
 pub(crate) fn warn(text: String) {
     note(&format!("warning: {text}"));
 }
@@ -28,12 +28,12 @@ pub(crate) fn print_json(value: &impl Serialize) -> Result<(), CliError> {
     print(&text::json(&serde_json::to_string_pretty(value)?))
 }
 
-/// Prints a message to standard error. One that nobody can read any more ends no work.
+/// Prints a message to standard error. Errors of writing are ignored: a closed reader ends no work.
 pub(crate) fn note(text: &str) {
     let _ = writeln!(std::io::stderr(), "{}", text::message(text));
 }
 
-/// The command line of this process, as it can be given to a shell again.
+/// Command line of this process, quoted for a shell.
 pub(crate) fn command_line() -> String {
     let words = std::env::args_os().skip(1).map(|word| text::shell_word(&word.to_string_lossy()));
     std::iter::once("fmlgs".to_owned()).chain(words).collect::<Vec<_>>().join(" ")

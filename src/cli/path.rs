@@ -33,13 +33,13 @@ pub(crate) struct PathArgs {
     /// Photo to start from, by index or name, or a JSON camera file [default: the first photo]
     #[arg(long)]
     from: Option<String>,
-    /// What to go to: an object or a part
+    /// Text of the object or part to go to
     #[arg(long, required_unless_present_any = ["to_photo", "survey"])]
     to: Option<String>,
     /// Photo to go to, by index or name, or a JSON camera file
     #[arg(long, conflicts_with = "to")]
     to_photo: Option<String>,
-    /// From which side the target is seen
+    /// Side from which the target is seen
     #[arg(long, value_enum, default_value_t = Side::Best)]
     side: Side,
     /// Distance to the target as a multiple of the usual one
@@ -69,7 +69,7 @@ pub(crate) struct PathArgs {
     json: bool,
 }
 
-/// What one knows of moving about in a scene that was opened.
+/// Returns the free space and camera poses of a scene, for planning flights in it.
 fn explored(scene: &Scene) -> Arc<Explored> {
     let home = scene.home();
     Arc::new(Explored::new(Arc::clone(&scene.cloud), &scene.views(), home.up))

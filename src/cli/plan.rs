@@ -3,7 +3,7 @@
 use crate::scene::Overrides;
 use crate::scene::plan::PlanOverride;
 
-/// What the user wants of a scene's plan.
+/// The user's overrides of a scene's plan.
 #[derive(Debug, Default, clap::Args)]
 pub(crate) struct PlanArgs {
     /// Decide otherwise than the scene plan; may be given several times. Items: color=full,

@@ -34,25 +34,25 @@ use crate::scene::{Findings, Identity, IdentityId, Lifting, MaskGrid, MaskPrompt
 pub(crate) struct PreprocessArgs {
     /// Trained scene
     scene: PathBuf,
-    /// Where the masks are: id maps of 'fmlgs synth', label files of ISAT (as in lerf_ovs), LabelMe, COCO or YOLO, the
+    /// Path of the masks: id maps of 'fmlgs synth', label files of ISAT (as in lerf_ovs), LabelMe, COCO or YOLO, the
     /// folders of SPIn-NeRF, 3D-OVS or LERF-Mask, or masklets as in SA-V
     #[arg(long)]
     masks: Option<PathBuf>,
-    /// Where masks come from: 'files', 'regions' (built in, no weights: rough and unnamed), a model of
+    /// Source of the masks: 'files', 'regions' (built in, no weights: rough and unnamed), a model of
     /// 'fmlgs models', or the path of a model's .json [default: files where --masks is given, else the
     /// best model that is here, else regions]
     #[arg(long)]
     segmenter: Option<String>,
-    /// What a scene is prepared for: lifting, tracker and prompt at once; what is given beside it differs from it
+    /// Recipe of lifting, tracker and prompt at once; options given beside it differ from it
     #[arg(long, value_enum, default_value_t = RecipeName::Default)]
     recipe: RecipeName,
-    /// How masks are carried to the other photos [default: geometry; recipe paper: sam2]
+    /// Tracker that carries masks to the other photos [default: geometry; recipe paper: sam2]
     #[arg(long, value_enum)]
     tracker: Option<Carry>,
-    /// What of a mask SAM 2 is given to follow [default: mask; recipe paper: points]
+    /// Prompt that SAM 2 gets of a mask to track [default: mask; recipe paper: points]
     #[arg(long, value_enum)]
     prompt: Option<MaskPrompt>,
-    /// At which points of its grid a network is asked for masks [default: sparing; recipe paper: all]
+    /// Points of its grid at which a network is asked for masks [default: sparing; recipe paper: all]
     #[arg(long, value_enum)]
     mask_grid: Option<MaskGrid>,
     /// Share of its own embedding that a part keeps in semantic deviation, the paper's w [default: 0.7]
@@ -67,11 +67,11 @@ pub(crate) struct PreprocessArgs {
     /// Photo to begin with, by name [default: the first with masks]
     #[arg(long)]
     seed: Option<String>,
-    /// Add what this photo, by name, shows that is nobody's yet; objects and parts that are there stay as they are
+    /// Add the unlabeled objects and parts that this photo, by name, shows; those that are there stay as they are
     #[arg(long, value_name = "PHOTO", conflicts_with_all = ["seed", "max_seeds", "unknown", "recipe", "tracker", "prompt",
         "mask_grid", "part_weight", "lifting", "code_steps", "encoder"])]
     add: Option<String>,
-    /// Find anew what was named, selected or corrected by hand, too; without it, that stays as it is
+    /// Replace labels, selections and corrections made by hand, too; without it, they stay as they are
     #[arg(long, conflicts_with = "add")]
     replace_all: bool,
     /// Most photos whose masks are used
@@ -80,7 +80,7 @@ pub(crate) struct PreprocessArgs {
     /// Share of a photo that may stay unknown before its masks are used too, in percent
     #[arg(long, default_value_t = 100.0 * TrackOptions::default().reseed_share, value_parser = number::within(0.0..=100.0))]
     unknown: f64,
-    /// How Gaussians get their codes [default: votes; recipe paper: paper]
+    /// Lifting that gives Gaussians their codes [default: votes; recipe paper: paper]
     #[arg(long, value_enum)]
     lifting: Option<Lifting>,
     /// Steps of training codes
@@ -107,7 +107,7 @@ pub(super) fn of_table(table: &toml::Table) -> Result<FindSettings, String> {
     }
 }
 
-/// Whether the arguments agree on where masks come from.
+/// Checks that the arguments agree on the source of the masks.
 fn check_segmenter(args: &PreprocessArgs) -> Result<(), CliError> {
     match (&args.masks, args.segmenter.as_deref()) {
         (None, Some("files")) => Err(CliError::Usage("--segmenter files needs --masks".into())),
@@ -217,7 +217,7 @@ pub(super) fn identities(map: &SemanticMap) -> Vec<Value> {
     map.identities.iter().map(row).collect()
 }
 
-/// Where photos disagreed, in the order in which that was noticed.
+/// Disagreements of photos, in the order in which they were noticed.
 fn disagreements(map: &SemanticMap) -> Vec<Value> {
     let Some(found) = &map.findings else { return Vec::new() };
     let text = |d: &Doubt| d.what.text(|id| map.identities.full_name(id));

@@ -1,5 +1,5 @@
-//! What the process asks of the system when it starts: threads, an allocator that gives freed
-//! memory back, so that an idle window holds what it shows, and libraries that are silent.
+//! Settings of the process at its start: threads, an allocator that gives freed memory back, so that an idle window
+//! holds only what it shows, and libraries that are silent.
 
 /// Most threads that share the work on a machine with fewer than half as many cores.
 const MOST_THREADS: usize = 64;
@@ -28,9 +28,9 @@ pub(crate) fn start_threads() -> Result<(), String> {
 
 /// Keeps a library from saying "error" where nothing is wrong. Has to be called before there are threads.
 ///
-/// Mesa's layer that chooses among GPUs asks the Wayland compositor each time that somebody looks for one, and its
-/// library complains where there is none to ask. The layer is left out then, by the variable that it has for that, unless
-/// the user chooses a GPU by it.
+/// Mesa's layer that chooses among GPUs asks the Wayland compositor at each search for a GPU, and its library complains
+/// where there is no compositor. The layer is left out then, by its own variable for that, unless the user chooses a
+/// GPU by it.
 pub(crate) fn quiet_libraries() {
     #[cfg(target_os = "linux")]
     {

@@ -7,20 +7,20 @@ use crate::pipeline::semantics::recipe::{
 };
 use crate::scene::SemanticMap;
 
-/// How questions are answered: this program's way, the paper's, or any mixture of them.
+/// Recipe of answering queries: this program's, the paper's, or any mixture of them.
 #[derive(Clone, Debug, Default, clap::Args)]
 #[command(next_help_heading = "How questions are answered")]
 pub(crate) struct RecipeArgs {
     /// All choices at once; what is given beside it differs from it
     #[arg(long, value_enum)]
     recipe: Option<RecipeName>,
-    /// What a question is compared with
+    /// Names or embeddings that a query is compared with
     #[arg(long, value_enum)]
     by: Option<Understanding>,
-    /// How a piece of a whole is looked for
+    /// Strategy for a query of a part of an object
     #[arg(long, value_enum)]
     strategy: Option<Strategy>,
-    /// Whether embeddings of parts are moved toward their wholes'
+    /// Semantic deviation: embeddings of parts are moved toward their objects'
     #[arg(long, value_enum)]
     deviation: Option<PartFeatures>,
     /// Phrases that mean anything: 'paper' (object, stuff, texture), 'lerf' (and things), or others, with commas
@@ -29,10 +29,10 @@ pub(crate) struct RecipeArgs {
     /// Spread of scores by embedding: 1 in the paper, 10 in LERF and by default
     #[arg(long, value_parser = number::within(1e-3..=1e3_f32))]
     temperature: Option<f32>,
-    /// How relevancy is shown
+    /// Scale of relevancy
     #[arg(long, value_enum)]
     relevancy: Option<RelevancyScale>,
-    /// What pixels and Gaussians belong to an answer
+    /// Rule that selects the pixels and Gaussians of an answer
     #[arg(long = "match", value_enum)]
     matching: Option<MatchMode>,
     /// The same as '--match codes'
@@ -41,7 +41,7 @@ pub(crate) struct RecipeArgs {
     /// Largest difference per channel of a match, in 255ths
     #[arg(long, value_parser = number::within(0.0..=255.0_f32))]
     tolerance: Option<f32>,
-    /// When nothing fits
+    /// Rule by which a query has no answer
     #[arg(long, value_enum)]
     not_found: Option<Rejection>,
 }
@@ -63,8 +63,7 @@ impl RecipeArgs {
         }
     }
 
-    /// The recipe that was asked for, and what of it the scene was not prepared for; nothing of the default, which
-    /// nobody asked for.
+    /// Lines on the requested recipe, and on its parts that the scene was not prepared for; nothing for the default.
     pub(crate) fn lines(&self, map: &SemanticMap) -> Vec<String> {
         let recipe = self.recipe();
         if self.recipe.is_none() && recipe == Recipe::default() {

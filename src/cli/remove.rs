@@ -14,7 +14,7 @@ use crate::scene::LevelFilter;
 
 /// Take an object or a part out of a scene and close the surface that it hid
 ///
-/// What was behind it and was seen in other photos is there already; what no photo saw is invented: the plane of the
+/// Gaussians behind it that other photos have seen are there already; what no photo saw is invented: the plane of the
 /// surface goes on below it, painted from what is seen around. Its shadow on flat surfaces goes, as far as what stands
 /// in the way of the light explains it; reflections stay. The scene is left as it is; the result is a scene of its own,
 /// in which what is invented has the property 'fmlgs_invented'.
@@ -28,16 +28,16 @@ use crate::scene::LevelFilter;
 pub(crate) struct RemoveArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
-    /// What to remove; several things go into one scene without all of them
+    /// Text of the object or part to remove; several go into one scene without all of them
     #[arg(required = true)]
     texts: Vec<String>,
     /// Folder for the new scene
     #[arg(long)]
     out: PathBuf,
-    /// How hidden surfaces are closed
+    /// Method that closes hidden surfaces
     #[arg(long, value_enum, default_value_t = Fill::Plane)]
     fill: Fill,
-    /// What a closed surface is painted with
+    /// Paint of a closed surface
     #[arg(long, value_enum, default_value_t = Paint::Patches)]
     paint: Paint,
     /// Remove exactly what is known to belong to it, without the unsure fringes within it
@@ -46,13 +46,13 @@ pub(crate) struct RemoveArgs {
     /// Leave its shadow where it is
     #[arg(long)]
     keep_shadow: bool,
-    /// Another number gives another fill
+    /// Seed of the fill; another number gives another fill
     #[arg(long, default_value_t = 0)]
     seed: u64,
     /// Things that are removed at most, where several are meant
     #[arg(long, default_value_t = 1, value_parser = number::within(1..=1_000_usize))]
     top: usize,
-    /// Whether an object or a part is meant
+    /// Level of the answers: an object or a part
     #[arg(long, value_enum, default_value_t = LevelFilter::Auto)]
     kind: LevelFilter,
     /// Print one JSON document

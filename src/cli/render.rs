@@ -47,7 +47,7 @@ pub(crate) struct RenderArgs {
     /// Shrink the image to at most this many px along its longer side
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16384))]
     max_side: Option<u32>,
-    /// What to draw
+    /// Quantity to draw
     #[arg(long, value_enum, default_value_t = Quantity::Picture)]
     what: Quantity,
     /// The file to write: .png, or .npy for depth and alpha
@@ -68,7 +68,7 @@ pub(crate) struct RenderArgs {
     /// Let this ffmpeg write the video
     #[arg(long, requires = "path")]
     ffmpeg: Option<PathBuf>,
-    /// Which renderer draws: auto takes a GPU if it is a real one
+    /// Renderer to draw with: auto takes a GPU if it is a real one
     #[arg(long, value_enum, default_value_t = BackendChoice::Auto)]
     backend: BackendChoice,
     #[command(flatten)]

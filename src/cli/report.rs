@@ -40,7 +40,7 @@ pub(crate) struct ReportArgs {
     /// Seconds for everything; what is not measured by then is left out
     #[arg(long, value_parser = number::within(1e-3..=1e9))]
     budget: Option<f64>,
-    /// How often every setting is measured; trainings take another seed each time
+    /// Number of times that every setting is measured; trainings take another seed each time
     #[arg(long, default_value_t = StudyOptions::default().repeats, value_parser = clap::value_parser!(u32).range(1..=100))]
     repeats: u32,
     /// Labels of the photos, for the stages 'features' and 'query'

@@ -25,7 +25,7 @@ const MAX_SIDE_PX: u32 = 1_008;
     fmlgs reproduce 3d-ovs 3dovs/ --scene bed --masks regions --out out/bed\n  \
     fmlgs reproduce part-ablation scenes/ --masks labels --encoder demo --steps 2000 --out out/parts")]
 pub(crate) struct ReproduceArgs {
-    /// Which table
+    /// Table of the paper
     #[arg(value_enum)]
     table: PaperTable,
     /// The data set's folder
@@ -36,7 +36,7 @@ pub(crate) struct ReproduceArgs {
     /// A scene by the name of its folder; may be given several times [default: all]
     #[arg(long = "scene")]
     scenes: Vec<String>,
-    /// Where masks come from: a model of 'fmlgs models', 'regions' (built in, rough), or 'labels' (those of
+    /// Source of the masks: a model of 'fmlgs models', 'regions' (built in, rough), or 'labels' (those of
     /// labeled photos that are not compared) [default: the best model that is here]
     #[arg(long)]
     masks: Option<String>,
@@ -46,7 +46,7 @@ pub(crate) struct ReproduceArgs {
     /// Train on labeled photos too, as the literature does
     #[arg(long)]
     labeled_in_training: bool,
-    /// What to ask for in a scene, as SCENE=TEXT, where labels have no names (spin-nerf) [default: the
+    /// Query to ask in a scene, as SCENE=TEXT, where labels have no names (spin-nerf) [default: the
     /// scene's name]
     #[arg(long = "query", value_parser = scene_and_text)]
     queries: Vec<(String, String)>,

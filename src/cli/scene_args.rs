@@ -1,4 +1,4 @@
-//! Scenes that commands open, and what is told of their files.
+//! Scenes that commands open, and the warnings of their files.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use super::{CliError, output};
 use crate::jobs::{Scene, open};
 use crate::scene::Axes;
 
-/// How a splat's numbers are to be read.
+/// Axes of a splat's numbers.
 #[derive(Clone, Copy, Debug, Default, clap::Args)]
 pub(crate) struct AxesArgs {
     /// Axes of a splat file that says others or none, where x, y and z count to: rdf as in a .ply (right, down, front),
@@ -16,7 +16,7 @@ pub(crate) struct AxesArgs {
 }
 
 impl AxesArgs {
-    /// Opens a trained scene or a splat, and tells what was noticed in its file.
+    /// Opens a trained scene or a splat, and prints the warnings of its file.
     pub(crate) fn open(self, path: &Path) -> Result<Scene, CliError> {
         let scene = open::scene_in(path, self.axes)?;
         scene.warnings.iter().for_each(|warning| output::warn(format!("{}: {warning}", path.display())));
@@ -24,7 +24,7 @@ impl AxesArgs {
     }
 }
 
-/// Opens a trained scene or a splat, and tells what was noticed in its file.
+/// Opens a trained scene or a splat, and prints the warnings of its file.
 pub(crate) fn open_scene(path: &Path) -> Result<Scene, CliError> {
     AxesArgs::default().open(path)
 }

@@ -20,8 +20,9 @@ use crate::scene::{Camera, LevelFilter, SemanticMap};
 ///
 /// The same match as that of the mask, in space: by identities, or with --match codes by the codes of the
 /// Gaussians. The ending of --out chooses the format, as for 'fmlgs export'. Exit code 1 if nothing fits. With --all, a
-/// folder is written: a file for each object and part, and their masks in the photos as files that --masks of other commands, and other programs, read. A folder that holds
-/// anything but an earlier export, or something of it that was changed since, is refused.
+/// folder is written: a file for each object and part, and their masks in the photos as files that --masks of other
+/// commands, and other programs, read. A folder that holds anything but an earlier export, or an export that was
+/// changed since, is refused.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs segment scene/ \"the kettle\" --out kettle.ply\n  \
@@ -34,7 +35,7 @@ use crate::scene::{Camera, LevelFilter, SemanticMap};
 pub(crate) struct SegmentArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
-    /// What to look for
+    /// Text of the object or part to find
     #[arg(required_unless_present_any = ["all", "click"])]
     text: Option<String>,
     /// Write every object and part, and their masks in the photos, into the folder --out
@@ -61,7 +62,7 @@ pub(crate) struct SegmentArgs {
     /// Answers that are written at most
     #[arg(long, default_value_t = 1, value_parser = number::within(1..=100_000_usize))]
     top: usize,
-    /// Whether an object or a part is meant
+    /// Level of the answer: an object or a part
     #[arg(long, value_enum, default_value_t = LevelFilter::Auto)]
     kind: LevelFilter,
     #[command(flatten)]

@@ -21,7 +21,7 @@ pub(crate) struct ClickArgs {
     /// Select what is at this place of the view instead of asking in words: x,y in px of the photo; may be given again
     #[arg(long, value_parser = place, value_name = "X,Y", conflicts_with_all = ["text", "all", "rest"])]
     pub(crate) click: Vec<[f32; 2]>,
-    /// What is at this place does not belong to it; may be given again
+    /// Place in the view that does not belong to it: x,y in px of the photo; may be given again
     #[arg(long, value_parser = place, value_name = "X,Y", requires = "click")]
     click_out: Vec<[f32; 2]>,
     /// The view that is clicked in: an index, a photo's name or a camera file [default: the scene's first view]
@@ -85,6 +85,7 @@ pub(crate) fn run(
         };
         selected = Some(Arc::new(select::run(&request, &mut console)?));
     }
+    // Clears the progress bar before the result is printed.
     drop(console);
     let selected = selected.filter(|s| !s.gaussians.is_empty());
     let selected = selected.ok_or_else(|| CliError::failed("nothing is at the places that were clicked on"))?;

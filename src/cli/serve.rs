@@ -21,7 +21,7 @@ use crate::remote::{ServeOptions, Server, bind_address, serve, token_of};
 pub(crate) struct ServeArgs {
     /// Trained scene or splat file
     scene: PathBuf,
-    /// Where to listen: an address, a port, or both
+    /// Address to listen at: an address, a port, or both
     #[arg(default_value = "127.0.0.1:7070", value_parser = bind_address)]
     address: SocketAddr,
     /// Clients may rename, merge and split objects and parts; that is stored with the scene
@@ -31,7 +31,7 @@ pub(crate) struct ServeArgs {
     access: AccessArgs,
 }
 
-/// Who may connect, and how.
+/// Options of access: the addresses that may connect, and the token.
 #[derive(Debug, Default, clap::Args)]
 pub(crate) struct AccessArgs {
     /// Listen at an address that other computers reach, unencrypted: whoever reads it on the way learns the token
@@ -46,7 +46,7 @@ pub(crate) struct AccessArgs {
 }
 
 impl AccessArgs {
-    /// Whether nobody knows the token but who is told.
+    /// Returns whether the token is new: only clients that are given it know it.
     pub(crate) fn has_new_token(&self) -> bool {
         self.token_file.is_none()
     }
@@ -61,8 +61,8 @@ impl AccessArgs {
     }
 }
 
-/// Says how to look at what is served; to a log that wants results only it says what nobody could connect without, if
-/// `needed`.
+/// Prints how to connect: the address unless `quiet` and not `needed`, the SSH command unless `quiet`. Warns of an
+/// address that other computers can reach.
 pub(crate) fn announce(server: &Server, quiet: bool, needed: bool) {
     let address = server.address();
     let port = address.port();
@@ -78,7 +78,7 @@ pub(crate) fn announce(server: &Server, quiet: bool, needed: bool) {
     output::note(&format!("From another computer, first:  ssh -L {port}:127.0.0.1:{port} {}", user_at_host()));
 }
 
-/// How SSH names this account, as far as that is known.
+/// Name of this account for SSH, as far as that is known.
 fn user_at_host() -> String {
     let user = std::env::var("USER").or_else(|_| std::env::var("USERNAME")).unwrap_or_else(|_| "user".into());
     format!("{user}@{}", sysinfo::System::host_name().unwrap_or_else(|_| "host".into()))

@@ -42,7 +42,7 @@ pub(crate) struct SynthArgs {
     /// Placement of the cameras
     #[arg(long, value_enum, default_value_t = SynthOptions::default().rig)]
     rig: Rig,
-    /// Which nodes are objects and which are parts
+    /// Rule that makes nodes objects or parts
     #[arg(long, value_enum, default_value_t = SynthOptions::default().levels)]
     levels: Levels,
     /// Sparse points, as from structure from motion, 0 = none
@@ -55,7 +55,7 @@ pub(crate) struct SynthArgs {
     /// really behind it, to judge its removal by
     #[arg(long, value_name = "NAME")]
     without: Option<String>,
-    /// What is left out still casts its shadow
+    /// Keep the shadow of the object or part that is left out
     #[arg(long, requires = "without")]
     keep_shadows: bool,
     /// Print one JSON document at the end

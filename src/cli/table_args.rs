@@ -4,11 +4,11 @@ use clap::{Arg, ArgAction, Args, Command};
 
 use super::idle;
 
-/// Reads `table` as the command `name` is given it; `left_out` are options that make no sense there, `given` what stands before them (positional
-/// arguments, for example).
+/// Reads `table` as the options of the command `name`, without those in `left_out`; the words `given` come before them
+/// (positional arguments, for example).
 ///
 /// # Errors
-/// What is wrong, and with which key.
+/// The problem and the key that has it.
 pub(crate) fn parse<A: Args>(name: &str, table: &toml::Table, given: &[&str], left_out: &[&str]) -> Result<A, String> {
     let command = A::augment_args(Command::new("fmlgs").no_binary_name(true).disable_help_flag(true));
     let known: Vec<(&str, &Arg)> = command.get_arguments().filter_map(|a| Some((a.get_long()?, a))).collect();
@@ -43,7 +43,7 @@ pub(crate) fn parse<A: Args>(name: &str, table: &toml::Table, given: &[&str], le
     A::from_arg_matches(&matches).map_err(|e| told(&e))
 }
 
-/// What clap says, without what is meant for a terminal.
+/// Message of an error of clap, without the parts that are meant for a terminal.
 fn told(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let text = text.trim_start_matches("error: ").split("\n\nUsage").next().unwrap_or_default();

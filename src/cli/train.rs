@@ -99,7 +99,7 @@ pub(crate) struct TrainOverrides {
     /// Gaussians to start from where the dataset has no sparse points [default: 20000]
     #[arg(long, value_parser = number::within(1..=10_000_000_usize))]
     pub(crate) random_points: Option<usize>,
-    /// What transparent pixels of the photos are taken for [default: by the photos, see 'fmlgs info']
+    /// Meaning of transparent pixels of the photos [default: by the photos, see 'fmlgs info']
     #[arg(long, value_enum)]
     pub(crate) alpha: Option<AlphaUse>,
     /// Train with the 2-D filter of Mip-Splatting, as new trainings are, where the scene or the preset says otherwise
@@ -117,7 +117,7 @@ pub(crate) struct TrainOverrides {
     /// Seconds between checkpoints, 0 = only at the end [default: 60]
     #[arg(long, value_parser = number::within(0.0..=1e9))]
     pub(crate) checkpoint_secs: Option<f64>,
-    /// Which renderer trains [default: auto]
+    /// Renderer that trains [default: auto]
     #[arg(long, value_enum)]
     pub(crate) backend: Option<BackendChoice>,
     /// Train surfels, flat disks that lie on surfaces (2D Gaussian Splatting), for better depth;
@@ -160,8 +160,8 @@ impl TrainOverrides {
 }
 
 impl TrainArgs {
-    /// What to train on, how, and in which folders: the one that is given, or else the first that holds no
-    /// training with other settings.
+    /// Returns the photos, the settings and the folders to try: the given one, or the usual ones in order, of which the
+    /// first without a training with other settings is taken.
     fn check(&self) -> Result<(Dataset, TrainConfig, Vec<PathBuf>), CliError> {
         let (dataset, base, own) = match open::contents(&self.data, None)? {
             Contents::Photos(dataset) => (dataset, TrainConfig::default(), None),
@@ -206,7 +206,7 @@ impl TrainArgs {
     }
 }
 
-/// `first`, `first-2` and so on, as far as they exist, and one more.
+/// Folders `first`, `first-2` and so on that exist, and the next one.
 fn usual_folders(first: &Path) -> Vec<PathBuf> {
     let folder = |n: usize| if n == 1 { first.to_owned() } else { PathBuf::from(format!("{}-{n}", first.display())) };
     let there = (1..).take_while(|n| folder(*n).exists()).count();

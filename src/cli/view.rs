@@ -1,4 +1,4 @@
-//! Which camera to draw from: a photo's, one from a file, or one that shows the whole splat.
+//! Choice of the camera to draw from: a photo's, one from a file, or one that shows the whole splat.
 
 use std::path::Path;
 
@@ -8,7 +8,7 @@ use crate::jobs::{Scene, render};
 use crate::scene::Camera;
 
 /// The camera that `wanted` names: an index from 0, a photo's name (its end is enough where that
-/// is unambiguous), or a JSON file. Without a wish it is the scene's first view.
+/// is unambiguous), or a JSON file. Without it, the scene's first view.
 pub(crate) fn choose(wanted: Option<&str>, scene: &Scene) -> Result<Camera, CliError> {
     let Some(wanted) = wanted else {
         if scene.cameras.is_empty() && scene.cloud.is_empty() {
@@ -49,7 +49,7 @@ fn of_photo(wanted: &str, cameras: &[SceneCamera]) -> Result<Option<Camera>, Cli
     }
 }
 
-/// Whether `wanted` is the last part of the path `name`, with or without its extension.
+/// Returns whether `wanted` is the last part of the path `name`, with or without its extension.
 fn ends_with_path(name: &str, wanted: &str) -> bool {
     let stem = name.rsplit_once('.').map_or(name, |(stem, _)| stem);
     [name, stem].iter().any(|n| *n == wanted || n.strip_suffix(wanted).is_some_and(|front| front.ends_with('/')))

@@ -15,8 +15,7 @@ pub(crate) struct PlotAxes {
 }
 
 impl PlotAxes {
-    /// Those that hold all points of these stages, their repeats, and the ways to them; `None` where nothing was
-    /// measured.
+    /// Axes that hold all points of these stages, their repeats and their curves; `None` where nothing was measured.
     pub(crate) fn of(stages: &[&Stage], measure: &Measure) -> Option<Self> {
         let (mut secs, mut errors) = (Vec::new(), Vec::new());
         for stage in stages {

@@ -62,7 +62,7 @@ impl LogAxis {
         if value > 0.0 { value.log10() } else { self.low - 0.5 * BAND * (self.high - self.low) }
     }
 
-    /// From where to where the axis goes, the band of zero included.
+    /// Ends of the axis, the band of zero included.
     pub(crate) fn bounds(&self) -> (f64, f64) {
         let band = if self.zero { BAND * (self.high - self.low) } else { 0.0 };
         (self.low - band, self.high)

@@ -14,7 +14,7 @@ pub(crate) struct Pair<'a> {
 }
 
 impl Pair<'_> {
-    /// Says if the times differ by more than repeats of the same do: usually, and here.
+    /// Returns whether the times differ by more than repeats of the same do: usually, and here.
     pub(crate) fn differs(&self) -> bool {
         let (one, other) = (&self.one.secs, &self.other.secs);
         let is_apart = one.most < other.least || other.most < one.least;
@@ -27,7 +27,7 @@ impl Pair<'_> {
 pub(crate) struct StageComparison<'a> {
     /// Settings of both, in the order of the first.
     pub(crate) pairs: Vec<Pair<'a>>,
-    /// How many settings only the first has, and only the second.
+    /// Numbers of settings that only the first has, and only the second.
     pub(crate) alone: [usize; 2],
 }
 
@@ -48,7 +48,7 @@ impl Stage {
 }
 
 impl Point {
-    /// Whether both are the same setting of the same knob. Defaults are one setting, whatever words
+    /// Returns whether both are the same setting of the same knob. Defaults are one setting, whatever words
     /// describe them.
     pub(crate) fn is_setting(&self, other: &Point) -> bool {
         self.method == other.method && (self.setting == other.setting || self.default && other.default)
@@ -56,7 +56,7 @@ impl Point {
 }
 
 impl Report {
-    /// In what respects `other` was measured under other conditions, so that times do not compare.
+    /// Conditions of `other` that differ, so that times do not compare.
     pub(crate) fn differs_from(&self, other: &Report) -> Vec<String> {
         let (a, b) = (&self.computer, &other.computer);
         let name = |gpu: &Option<String>| gpu.clone().unwrap_or_else(|| "none".into());

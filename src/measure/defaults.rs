@@ -6,7 +6,7 @@ use super::document::{Report, Stage, StageName};
 use super::front::{KnobChoice, NOISE};
 use super::table::{self, Rows};
 
-/// Why a default stays though the rule would choose another setting, by stage and knob.
+/// Reasons for which a default stays though the rule would choose another setting, by stage and knob.
 const STAYS: [(StageName, &str, &str); 11] = [
     (
         StageName::Render,
@@ -73,7 +73,7 @@ fn stage(stage: &Stage) -> String {
     out
 }
 
-/// What the rule says of each knob, and why its default stays where it does not hold.
+/// Table of the rule's choice for each knob, with the reason for which its default stays where the rule differs.
 fn with_reasons(stage: &Stage) -> Rows {
     let reason = |c: &KnobChoice<'_>| {
         let stays = STAYS.iter().find(|(name, knob, _)| (*name, *knob) == (stage.name, c.method));

@@ -66,11 +66,11 @@ impl StageName {
     }
 }
 
-/// How a measure becomes an error, which is what is plotted.
+/// Conversion of a measure to the error that is plotted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ErrorKind {
-    /// It is one.
+    /// The measure is an error itself.
     Error,
     /// A share that should be 1: the error is what is missing.
     Share,
@@ -78,7 +78,7 @@ pub enum ErrorKind {
     Decibels,
 }
 
-/// Something that was measured of every setting.
+/// A quantity that is measured of every setting.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Measure {
     pub(crate) name: String,
@@ -153,17 +153,17 @@ impl FromIterator<f64> for Sample {
 pub struct Point {
     /// The knob that was turned: "alpha cut-off". Points of one method make one series.
     pub method: String,
-    /// Where it was turned to, in words.
+    /// Setting of the knob, in words.
     pub setting: String,
-    /// The same for the program: fields of the stage's settings.
+    /// The setting as fields of the stage's settings, for the program.
     pub knobs: Knobs,
-    /// Whether these are the program's defaults.
+    /// True if these are the program's defaults.
     pub default: bool,
-    /// Seconds of it.
+    /// Run time in seconds.
     pub secs: Sample,
-    /// What came out, by name of the measure.
+    /// Values by name of the measure.
     pub values: BTreeMap<String, Sample>,
-    /// Seconds and first measure on the way there, where there is a way: a training.
+    /// Seconds and first measure in the course of a training; empty otherwise.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub curve: Vec<[f64; 2]>,
 }
@@ -179,19 +179,19 @@ impl Point {
 /// A check of how fast an error falls as work grows.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Order {
-    /// What was refined: "samples of a pixel's footprint".
+    /// Quantity that was refined: "samples of a pixel's footprint".
     pub(crate) what: String,
     /// Work (samples, pieces) and error.
     pub(crate) pairs: Vec<[f64; 2]>,
-    /// The order that theory gives: the error falls like `work^-order`.
+    /// Order in theory: the error falls like `work^-order`.
     pub(crate) expected: f64,
-    /// The order that was seen (see [`super::order`]).
+    /// Observed order (see [`super::order`]).
     pub(crate) observed: f64,
     pub(crate) agrees: bool,
     pub(crate) meaning: String,
 }
 
-/// When a cheaper setting is good enough.
+/// Rule that decides if a cheaper setting is good enough.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rule {
     /// The measure that decides.
@@ -237,21 +237,21 @@ impl Rule {
 /// Measurements of one stage on one input.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Stage {
-    /// Which.
+    /// Name of the stage.
     pub name: StageName,
-    /// What its seconds are seconds of: "one picture".
+    /// Unit of work that the seconds are for: "one picture".
     pub secs_of: String,
-    /// What errors are compared with, in a sentence.
+    /// Reference of the errors, in a sentence.
     pub reference: String,
-    /// On what: scene, sizes, views.
+    /// Input: scene, sizes, views.
     pub input: BTreeMap<String, String>,
     /// Seed of each repeat.
     pub seeds: Vec<u64>,
     /// Settings that the sweep consists of; fewer points mean that it was stopped.
     pub planned: usize,
-    /// What was measured; the first is what is looked at first.
+    /// Measures, the main one first.
     pub measures: Vec<Measure>,
-    /// How a default is chosen.
+    /// Rule that chooses a default.
     pub rule: Rule,
     /// The measurements.
     pub points: Vec<Point>,
@@ -325,7 +325,7 @@ impl Stage {
         (!self.complete()).then(|| format!("{measured} of {planned} measurements"))
     }
 
-    /// Whether every setting was measured at every seed.
+    /// Returns whether every setting was measured at every seed.
     pub(crate) fn complete(&self) -> bool {
         self.points.len() == self.planned && self.points.iter().all(|p| p.secs.each.len() >= self.seeds.len())
     }
@@ -336,7 +336,7 @@ impl Stage {
 pub struct Computer {
     /// Name of the processor.
     pub processor: String,
-    /// Its cores, as far as this program may use them.
+    /// Number of cores that this program may use.
     pub cores: usize,
     /// Memory in bytes.
     pub memory_bytes: u64,
@@ -359,7 +359,7 @@ pub struct Report {
     pub scene: String,
     /// The machine.
     pub computer: Computer,
-    /// Commands that measured it, the first first. Earlier reports do not say.
+    /// Commands that measured it, oldest first; empty in earlier reports.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub commands: Vec<String>,
     /// The stages.
@@ -371,8 +371,7 @@ impl Report {
         self.stages.iter().find(|s| s.name == name)
     }
 
-    /// What was measured of a sweep earlier, if it was the same sweep: on the same input, of the same
-    /// measures.
+    /// Measurements of an earlier run of the same sweep: the same input and measures.
     pub(crate) fn earlier(&self, fresh: &Stage) -> Option<Stage> {
         let measures =
             |s: &Stage| s.measures.iter().map(|m| (m.name.clone(), m.unit.clone(), m.kind)).collect::<Vec<_>>();

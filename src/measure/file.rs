@@ -10,7 +10,7 @@ pub const FILE: &str = "report.json";
 const PROGRAM: &str = env!("CARGO_PKG_VERSION");
 const MOST_BYTES: u64 = 256 << 20;
 
-/// Why a report cannot be used.
+/// Error of reading a report.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum ReportError {
@@ -22,7 +22,7 @@ pub enum ReportError {
     File(#[from] IoError),
 }
 
-/// Why a report cannot be resumed.
+/// Error of resuming a report.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum BeginError {
@@ -32,8 +32,7 @@ pub enum BeginError {
     Other(PathBuf, &'static str),
 }
 
-/// Whether a path is a report's folder or looks like its document: what else it may hold is left to
-/// whoever opens it.
+/// Returns whether a path is a report's folder or looks like its document. The content of the file is not checked.
 pub fn is_report(path: &Path) -> bool {
     let file = if path.is_dir() { path.join(FILE) } else { path.to_owned() };
     let is_scene = path.is_dir() && path.join(io::trained::SCENE_FILE).exists();

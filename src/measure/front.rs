@@ -3,7 +3,7 @@
 use super::document::{Measure, Point, Rule, Sample, Stage};
 use crate::math::stats::median;
 
-/// From where to where the repeats of a number go, and their middle.
+/// Range of the repeats of a number, and their median.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Span {
     least: f64,
@@ -13,7 +13,7 @@ struct Span {
 }
 
 impl Span {
-    /// Of a number that was measured; smaller is better. `None` of nothing, and of what is no number.
+    /// Span of a measured number; smaller is better. `None` without runs or if a value is not finite.
     fn of(sample: &Sample, error: impl Fn(f64) -> f64) -> Option<Self> {
         let (a, b) = (error(sample.least), error(sample.most));
         let found = Self { least: a.min(b), median: error(sample.median), most: a.max(b), runs: sample.each.len() };
@@ -25,8 +25,8 @@ impl Span {
         (self.runs > 1 && self.median > 0.0).then(|| (self.most - self.least) / self.median)
     }
 
-    /// Says if it is worse by more than repeats differ: no run of it is better than any of the other. `usual` is by what
-    /// share runs differ elsewhere, for what ran once.
+    /// Returns whether it is worse by more than repeats differ: no run of it is better than any of the other. `usual`
+    /// is the share by which runs differ elsewhere, for numbers of a single run.
     fn is_worse_than(&self, other: &Self, usual: f64) -> bool {
         let usual = if self.runs.min(other.runs) > 1 { 0.0 } else { usual };
         self.least >= other.most * (1.0 + usual) && self.most > other.least
@@ -78,7 +78,7 @@ impl Stage {
     }
 }
 
-/// What a rule makes of one knob.
+/// Choice of a rule for one knob.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct KnobChoice<'a> {
     pub(crate) method: &'a str,
@@ -87,8 +87,7 @@ pub(crate) struct KnobChoice<'a> {
     pub(crate) chosen: &'a Point,
     /// The one with the least error.
     pub(crate) best: &'a Point,
-    /// Whether the default is good enough, and as fast as the chosen one: within noise, or in one repeat or
-    /// another.
+    /// True if the default is good enough, and as fast as the chosen one: within noise, or in one repeat or another.
     pub(crate) holds: bool,
 }
 

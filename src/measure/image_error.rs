@@ -33,8 +33,8 @@ pub(crate) fn resized(p: &RgbPlanes, camera: &Camera, filter: Filter) -> RgbPlan
     RgbPlanes { width, height, color }
 }
 
-/// How far an image is from another: root mean square, largest, what one value in a thousand exceeds, mean of FLIP,
-/// what FLIP of one pixel in a hundred exceeds.
+/// Errors of an image against another: root mean square, largest, 99.9th percentile, mean of FLIP, 99th percentile of
+/// FLIP.
 pub(crate) type Errors = [f64; 5];
 
 /// Errors of `b` against `a`, of the same size.
@@ -78,7 +78,7 @@ fn flip(a: &RgbPlanes, b: &RgbPlanes) -> (f64, f64) {
     (mean(&errors), quantile(&errors, 0.99))
 }
 
-/// How fast the mean of `n` x `n` samples inside each pixel comes near the integral over the pixel:
+/// Order at which the mean of `n` x `n` samples inside each pixel converges to the integral over the pixel:
 /// the midpoint rule is of second order where the image is smooth. The blur of a splat does not
 /// change with the samples, as their cameras differ by parts of a pixel only.
 pub(crate) fn footprint_order(

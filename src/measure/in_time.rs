@@ -1,10 +1,10 @@
-//! A limit of time as a wish to stop: what is prepared for a measurement ends by it as by Ctrl-C.
+//! Time limit as a signal to stop: the preparation of a measurement ends by it as by Ctrl-C.
 
 use std::time::{Duration, Instant};
 
 use crate::pipeline::observer::{Observer, Signal};
 
-/// Passes the wish to stop on, has it itself once a time is over, and tells nothing.
+/// Observer that passes the signal to stop on, sends it itself after a time limit, and reports nothing.
 pub(crate) struct InTime<'a> {
     of: &'a mut dyn Observer,
     /// `None` for no limit.
@@ -12,7 +12,7 @@ pub(crate) struct InTime<'a> {
 }
 
 impl<'a> InTime<'a> {
-    /// For so many seconds from now on.
+    /// Limit of `secs` from now on.
     pub(crate) fn new(of: &'a mut dyn Observer, secs: f64) -> Self {
         let until = Duration::try_from_secs_f64(secs).ok().and_then(|time| Instant::now().checked_add(time));
         Self { of, until }

@@ -1,4 +1,4 @@
-//! How fast an error falls as work grows, and whether that is what theory says.
+//! Order of convergence: the rate at which an error falls as work grows, compared with theory.
 
 use super::document::Order;
 

@@ -43,7 +43,7 @@ pub fn html(report: &Report) -> String {
     out + "</body></html>\n"
 }
 
-/// On what machine, by what command, and how to read it.
+/// Paragraphs on the machine, the command, and reading the report.
 fn about(report: &Report) -> String {
     let commands = report.commands.iter().map(|c| format!("<code>{}</code>", escape_all_quotes(c)));
     let commands = match report.commands.is_empty() {

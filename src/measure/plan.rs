@@ -1,4 +1,4 @@
-//! What a scene's plan saves, compared with everything on: times and memory of opening a scene and getting ready
+//! Savings by a scene's plan, compared with everything on: times and memory of opening a scene and getting ready
 //! for its user. `fmlgs bench --plan` measures each of the two in processes of its own, so that memory is its own.
 
 use std::path::Path;
@@ -41,7 +41,7 @@ pub(crate) struct OpenScene {
     pub(crate) facts: SceneFacts,
 }
 
-/// What one process has measured; medians where several have.
+/// Measurements of one process; medians over several.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct PlanCost {
     /// Reading, until the scene can be drawn.
@@ -52,7 +52,7 @@ pub struct PlanCost {
     ready_secs: f64,
     /// Memory at rest beyond that of the process before it read anything.
     resident_bytes: f64,
-    /// The most that it was before, likewise; 0 where the system does not say.
+    /// Peak of that memory; 0 where the system does not report it.
     peak_bytes: f64,
     /// Buffers on the device for one image; 0 without any adapter.
     device_bytes: f64,
@@ -145,7 +145,7 @@ pub(crate) fn cost(
     })
 }
 
-/// What the pixels of the first view belong to.
+/// Draws the identities and codes of the pixels of the first view.
 fn maps(
     renderer: &mut Renderer,
     scene: &OpenScene,
@@ -196,7 +196,7 @@ fn device_bytes(scene: &OpenScene, settings: &RenderSettings) -> Result<u64, Stu
     Ok(renderer.device_bytes())
 }
 
-/// Memory of this process now, bytes; 0 where the system does not say.
+/// Memory of this process now, bytes; 0 where the system does not report it.
 fn resident() -> u64 {
     let Ok(pid) = sysinfo::get_current_pid() else { return 0 };
     let Ok(mut system) = sysinfo::System::new() else { return 0 };
@@ -204,7 +204,7 @@ fn resident() -> u64 {
     system.process(pid).map_or(0, sysinfo::Process::memory)
 }
 
-/// The most memory that this process has had, bytes; 0 where the system does not say.
+/// Peak memory of this process, bytes; 0 where the system does not report it.
 fn peak() -> u64 {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
     let line = status.lines().find_map(|l| l.strip_prefix("VmHWM:"));
@@ -226,7 +226,7 @@ impl Saving {
         Self { scene: super::bench::label(path), disk: disk(path), plan, everything }
     }
 
-    /// What its files take, in a line.
+    /// Size of its files, in a line.
     pub(crate) fn on_disk(&self) -> String {
         let parts: Vec<String> = self.disk.iter().map(|(what, n)| format!("{} {what}", bytes(*n))).collect();
         format!("{} on disk: {}", self.scene, parts.join(", "))

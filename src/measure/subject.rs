@@ -1,4 +1,4 @@
-//! What `fmlgs report` sweeps: the studies that a scene allows, each opened when its turn comes.
+//! Subject of `fmlgs report`: the studies that a scene allows, each opened at its turn.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ pub struct StudyOptions {
     /// Most views that are compared.
     pub(crate) views: usize,
     pub(crate) repeats: u32,
-    /// What queries differ from.
+    /// Recipe that the variants of queries differ from.
     pub(crate) recipe: Recipe,
 }
 
@@ -82,7 +82,7 @@ impl Subject {
         Ok((stages, missing))
     }
 
-    /// What a stage needs that is not here.
+    /// Input that a stage needs and the scene lacks.
     fn lacks(&self, name: StageName) -> Option<&'static str> {
         let photos = self.dataset.is_none().then_some("the scene's photos");
         let labels = self.options.masks.is_none().then_some("labels of the photos: --masks");
@@ -104,7 +104,7 @@ impl Subject {
         }
     }
 
-    /// What is to be measured of a stage; `None` if the observer asks to stop while that is prepared.
+    /// Study of a stage; `None` if the observer asks to stop while it is prepared.
     pub(crate) fn study(&self, name: StageName, observer: &mut dyn Observer) -> Result<Option<Study<'_>>, StudyError> {
         match name {
             StageName::Render => self.drawing(observer),
@@ -277,7 +277,7 @@ impl Subject {
     }
 }
 
-/// Whose each Gaussian is, by the numbers that identities of the same names have in `all`.
+/// Identity of each Gaussian, by the numbers that identities of the same names have in `all`.
 fn renumbered(tracked: &Tracked, all: &Identities) -> Vec<IdentityId> {
     let mut number = vec![NOBODY; tracked.identities.len() + 1];
     for (id, identity) in tracked.identities.iter() {

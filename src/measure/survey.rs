@@ -1,4 +1,4 @@
-//! How well flights do in a scene: random flights, ours beside the paper's, and times against the number of cameras
+//! Quality of flights in a scene: random flights, ours beside the paper's, and times against the number of cameras
 //! (`fmlgs path --survey`).
 
 use std::time::Instant;
@@ -31,9 +31,9 @@ pub(crate) struct Sum {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Survey {
     pub(crate) ours: Sum,
-    /// The paper's as it is printed, between the same ends.
+    /// The paper's flights as printed, between the same ends.
     pub(crate) paper: Sum,
-    /// The paper's through all keypoints of the route, between the same ends.
+    /// The paper's flights through all keypoints of the route, between the same ends.
     pub(crate) paper_through: Sum,
     /// Pairs of keypoints that are not connected.
     pub(crate) no_route: usize,
@@ -119,8 +119,8 @@ pub(crate) fn survey(navigator: &Navigator, which: Ends, count: usize, frames: u
     found
 }
 
-/// As many cameras as wanted: those that there are, and more of them close by, shifted by up to half
-/// of `spread` along each axis.
+/// Returns `count` cameras: the given ones, and more of them close by, shifted by up to half of `spread` along each
+/// axis.
 pub(crate) fn more_cameras(cameras: &[Camera], count: usize, spread: f64, seed: u64) -> Vec<Camera> {
     let mut rng = Pcg64::seed_from_u64(seed);
     let mut all: Vec<Camera> = cameras.iter().take(count).cloned().collect();
@@ -132,7 +132,7 @@ pub(crate) fn more_cameras(cameras: &[Camera], count: usize, spread: f64, seed: 
     all
 }
 
-/// Surveys of a scene with so many cameras, by what the flights were between.
+/// Surveys of a scene with a number of cameras, by the kind of the flights' ends.
 pub(crate) struct Surveyed {
     cameras: usize,
     navigator: Navigator,
@@ -142,7 +142,7 @@ pub(crate) struct Surveyed {
     found: [(&'static str, Survey); 2],
 }
 
-/// Surveys a scene with its own cameras, or with so many of them.
+/// Surveys a scene with `count` cameras: its own, and more if needed.
 pub(crate) fn surveyed(cloud: &GaussianCloud, own: &[Camera], count: usize, flights: usize, frames: usize) -> Surveyed {
     let cameras = more_cameras(own, count, 2.0 * spacing(own), SEED);
     let start = Instant::now();

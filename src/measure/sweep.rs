@@ -208,7 +208,7 @@ mod tests {
     use super::*;
     use crate::measure::tests::example;
 
-    /// What ran of three settings that are measured three times, until it stops; one may be broken.
+    /// Sweeps three settings with three repeats, until it stops; one may be broken. Returns the trials that ran, too.
     fn kept(stop_after: usize, broken: &str, before: Option<Stage>, budget: f64) -> (Stage, End, Vec<(String, u64)>) {
         let stage = Stage { points: vec![], orders: vec![], ..example().stages.remove(0) };
         let cases =

@@ -71,7 +71,7 @@ impl Stage {
         )
     }
 
-    /// What the rule says of each knob's default.
+    /// Table of the rule's choice for each knob, beside its default.
     pub(crate) fn choice_table(&self) -> Rows {
         let with = |p: &Point| {
             let value = p.values.get(&self.rule.measure).map_or_else(String::new, |v| spread(v, number));
@@ -87,7 +87,7 @@ impl Stage {
         )
     }
 
-    /// Whether errors fall as fast as theory says.
+    /// Table of the orders at which errors fall, compared with theory.
     pub(crate) fn order_table(&self) -> Rows {
         let row = |o: &Order| vec![o.what.clone(), o.expected.to_string(), format!("{:.2}", o.observed), yes(o.agrees)];
         rows(&["convergence", "expected order", "observed", "agrees"], self.orders.iter().map(row))

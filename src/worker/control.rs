@@ -1,4 +1,4 @@
-//! How a running job is paused and canceled: two flags that it looks at on every step.
+//! Pause and cancellation of a running job: two flags that it reads at every step.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -22,7 +22,7 @@ impl Control {
         self.pause.store(paused, Ordering::Release);
     }
 
-    /// What the job is to do now; canceling goes before pausing.
+    /// Signal to the job; canceling goes before pausing.
     pub(crate) fn signal(&self) -> Signal {
         if self.cancel.load(Ordering::Acquire) {
             Signal::Cancel

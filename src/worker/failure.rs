@@ -1,16 +1,16 @@
-//! How a job ends short of its outcome: it was asked to, or something went wrong.
+//! Ends of a job without its outcome: canceled, or failed.
 
 use crate::io::OpenError;
 use crate::jobs::JobError;
 use crate::jobs::error::chain;
 use crate::pipeline::observer::Interrupted;
 
-/// Why a job failed, for display: what went wrong where, and what to do.
+/// Failure of a job, for display: the problem, its place, and a remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
-    /// What went wrong, with file and place.
+    /// The problem, with file and place.
     pub message: String,
-    /// What the user can do about it; empty if the message already says so.
+    /// Remedy for the user; empty if the message already has one.
     pub remedy: String,
 }
 
@@ -21,12 +21,12 @@ impl Failure {
     }
 }
 
-/// How a job ends short of its outcome.
+/// End of a job without its outcome.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Stop {
-    /// It was asked to.
+    /// The job was canceled.
     Cancelled,
-    /// Something went wrong.
+    /// The job has failed.
     Failed(Failure),
 }
 
@@ -40,7 +40,7 @@ impl<E: std::error::Error + 'static> From<E> for Stop {
     }
 }
 
-/// What the user can do in the window, where the error does not say that itself.
+/// Remedy in the window, where the error itself does not name one.
 fn remedy(error: &JobError) -> &'static str {
     match error {
         JobError::Open(OpenError::NotFound { .. }) => "Check the path: the file may have been moved or renamed.",

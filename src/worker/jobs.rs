@@ -1,4 +1,4 @@
-//! What each command does: hands it to its job in [`crate::jobs`]. The only implementation of [`Jobs`] that ships.
+//! Dispatch of each command to its job in [`crate::jobs`]. The only implementation of [`Jobs`] that ships.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -27,8 +27,8 @@ use crate::scene::{Dataset, GaussianCloud, Machine};
 pub struct PipelineJobs {
     folders: Folders,
     machine: OnceLock<Machine>,
-    /// In which state the window knows the scene in a folder: what somebody else saved there since is
-    /// not written over.
+    /// State in which the window knows the scene in a folder; changes that another program saved since are not
+    /// overwritten.
     known: Mutex<HashMap<PathBuf, Option<String>>>,
 }
 
@@ -38,7 +38,7 @@ impl PipelineJobs {
         Self { folders, machine: OnceLock::new(), known: Mutex::default() }
     }
 
-    /// From now on the window knows the scene in `folder` in the state `state`.
+    /// Records that the window knows the scene in `folder` in the state `state`.
     fn knows(&self, folder: &Path, state: Option<String>) {
         self.known.lock().unwrap_or_else(PoisonError::into_inner).insert(folder.into(), state);
     }
@@ -48,13 +48,13 @@ impl PipelineJobs {
         self.known.lock().unwrap_or_else(PoisonError::into_inner).get(folder).cloned().flatten()
     }
 
-    /// The next time, the photos are opened with this training of them.
+    /// Records this training as the one that its photos are opened with next time.
     fn uses(&self, folder: &Path) {
-        // Nobody has asked for it, so nobody is stopped by a full disk.
+        // A full disk is no error here: the user did not ask for this record.
         let _ = self.folders.note_use(folder);
     }
 
-    /// What the machine offers, looked up once.
+    /// Resources of the machine, looked up once.
     fn machine(&self) -> &Machine {
         self.machine.get_or_init(plan::machine)
     }
@@ -170,7 +170,7 @@ impl Jobs for PipelineJobs {
                 Outcome::Written(path)
             }
             Command::KeepPicture { of, pixels } => {
-                // Nobody has asked for it, so nobody is stopped by a full disk.
+                // A full disk is no error here: the user did not ask for this record.
                 if let Err(e) = recent::keep(&self.folders, &of, &pixels) {
                     observer.note(Severity::Warning, e.to_string());
                 }

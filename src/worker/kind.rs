@@ -5,16 +5,16 @@
 pub struct JobId(pub(crate) u64);
 
 impl JobId {
-    /// From here on jobs are of other computers: no worker counts so far.
+    /// First number of jobs on other computers: no worker counts so far.
     pub(crate) const REMOTE: Self = Self(1 << 63);
 
-    /// Whether it runs on another computer.
+    /// Returns whether it runs on another computer.
     pub(crate) fn is_remote(self) -> bool {
         self >= Self::REMOTE
     }
 }
 
-/// What sort of job it is.
+/// Kind of a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum JobKind {
     /// Reads a file or folder.
@@ -51,7 +51,7 @@ pub enum JobKind {
     Thumbnails,
     /// Lists models.
     Models,
-    /// Looks at where one can go.
+    /// Explores the free space of a scene.
     Explore,
     /// Puts a model in place.
     Model,
@@ -76,12 +76,12 @@ pub enum JobKind {
 }
 
 impl JobKind {
-    /// Whether its outcome is what is on screen then: what it warns of is wrong with that.
+    /// Returns whether its outcome becomes the scene on screen: its warnings are about that scene.
     pub(crate) fn makes_scene(self) -> bool {
         matches!(self, Self::Open | Self::Demo | Self::DemoPhotos | Self::Poses | Self::Train | Self::Objects)
     }
 
-    /// Whether it waits where it is asked to.
+    /// Returns whether it can be paused.
     pub(crate) fn can_pause(self) -> bool {
         matches!(
             self,
@@ -97,7 +97,7 @@ impl JobKind {
         )
     }
 
-    /// Which thread runs it.
+    /// Thread that runs it.
     pub(crate) fn lane(self) -> WorkerThread {
         match self {
             Self::Open | Self::Demo | Self::Train | Self::Evaluate | Self::Objects => WorkerThread::Long,
@@ -125,11 +125,11 @@ impl JobKind {
     }
 }
 
-/// Which thread a job runs on.
+/// Thread of the worker that runs a job.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WorkerThread {
-    /// One after another, minutes each.
+    /// Jobs of minutes, one after another.
     Long,
-    /// Answered while a long job runs.
+    /// Short jobs, run beside a long one.
     Short,
 }

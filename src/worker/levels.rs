@@ -11,7 +11,7 @@ use crate::scene::resource_log::{self, ResourceKind};
 
 /// Gaussians that are looked at for so long are no step of a training.
 pub(super) const STAY: Duration = Duration::from_secs(2);
-/// From so many on a picture of all of them is too slow to be the first, or to move by until there is a tree.
+/// Number of Gaussians from which a picture of all is too slow as the first one, and for moving until there is a tree.
 const ROUGH_FROM: usize = 1_000_000;
 /// Gaussians of a rough picture.
 const ROUGH: usize = 150_000;
@@ -21,7 +21,7 @@ type Tree = Arc<LodTree>;
 /// Levels of detail of the Gaussians that are drawn, which may change at any time.
 #[derive(Default)]
 pub(super) struct DetailLevels {
-    /// How many Gaussians there is time for.
+    /// Number of Gaussians that can be drawn in time.
     pub(super) pace: Pace,
     now: Option<Seen>,
 }
@@ -45,7 +45,7 @@ impl Drop for Seen {
 }
 
 impl DetailLevels {
-    /// Looks at these Gaussians; says whether they are so many and so new that a rough picture comes first.
+    /// Tracks these Gaussians; returns whether they are so many and so new that a rough picture comes first.
     pub(super) fn see(&mut self, cloud: &Versioned<GaussianCloud>) -> bool {
         if self.now.as_ref().is_some_and(|now| now.generation == cloud.generation()) {
             self.build();
@@ -68,8 +68,7 @@ impl DetailLevels {
         self.now = None;
     }
 
-    /// The tree of the Gaussians that were seen last, if it is built. Of very many it is a `rough` one until then, where
-    /// that will do.
+    /// The tree of the Gaussians that were seen last, if it is built. Until then a rough one of very many, if `rough`.
     pub(super) fn tree(&mut self, rough: bool) -> Option<Tree> {
         let now = self.now.as_mut()?;
         if let Some(tree) = now.tree.get() {
@@ -96,7 +95,7 @@ impl DetailLevels {
             if let Some(built) = built {
                 let what = format!("levels of detail of {} Gaussians", cloud.len());
                 resource_log::record(ResourceKind::Levels, what, "they are too many to draw in time", built.bytes());
-                // Nobody else sets it.
+                // No other code sets it.
                 let _ = tree.set(Arc::new(built));
             }
         };

@@ -17,10 +17,10 @@ pub(crate) type Repaint = Arc<dyn Fn() + Send + Sync>;
 /// A copy of the Gaussians in training.
 #[derive(Clone, Debug)]
 pub struct CloudSnapshot {
-    /// Whose they are.
+    /// The training job.
     pub job: JobId,
     pub(crate) cloud: Arc<GaussianCloud>,
-    /// After how many steps.
+    /// Number of training steps so far.
     pub step: u64,
 }
 
@@ -38,9 +38,9 @@ pub(super) struct JobObserver {
     pub(super) clouds: Arc<Slot<CloudSnapshot>>,
     pub(super) repaint: Repaint,
     pub(super) last_cloud: Option<Instant>,
-    /// What was last reported as paused or not.
+    /// True if the job was last reported as paused.
     pub(super) paused: AtomicBool,
-    /// Set when nobody takes events any more.
+    /// Set once the receiver of events is gone.
     pub(super) alone: AtomicBool,
 }
 

@@ -1,4 +1,4 @@
-//! What the worker is told ([`Command`]) and what it tells ([`Event`]).
+//! Messages to the worker ([`Command`]) and from it ([`Event`]).
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -31,7 +31,7 @@ use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
 use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Photo, PhotoPixels, SceneFacts, SemanticMap};
 
-/// What a job is to do.
+/// Work of a job.
 #[derive(Clone, Debug)]
 pub enum Command {
     /// Read a dataset, a splat or a trained scene.
@@ -54,11 +54,11 @@ pub enum Command {
     Train {
         /// The photos.
         dataset: Arc<Dataset>,
-        /// How.
+        /// Settings of the training.
         config: TrainConfig,
         /// Folder of the trained scene and its checkpoints; `None` = a new one.
         out: Option<PathBuf>,
-        /// What it begins with.
+        /// Gaussians that it begins with.
         from: TrainStart,
     },
     /// Measure PSNR and SSIM on the held-out photos.
@@ -69,7 +69,7 @@ pub enum Command {
         cloud: Arc<GaussianCloud>,
         /// Picture size, and the hold-out rule where the scene does not say which photos are.
         config: TrainConfig,
-        /// How the Gaussians are drawn.
+        /// Settings of drawing the Gaussians.
         settings: RenderSettings,
         /// Folder of the trained scene.
         out: PathBuf,
@@ -120,7 +120,7 @@ pub enum Command {
     },
     /// Keep a small picture of a scene for the first page.
     KeepPicture {
-        /// Where the scene lies.
+        /// Path of the scene.
         of: PathBuf,
         /// The picture.
         pixels: Arc<PhotoPixels>,
@@ -129,7 +129,7 @@ pub enum Command {
     RecentPictures(Vec<PathBuf>),
     /// List the trainings of those of these photos that have several.
     RecentRuns(Vec<PathBuf>),
-    /// Fetch a model of the catalog, or take over files that somebody brings.
+    /// Fetch a model of the catalog, or install the user's files.
     InstallModel {
         /// Its name.
         id: String,
@@ -138,13 +138,13 @@ pub enum Command {
     },
     /// List the models and the engine that runs them.
     ListModels,
-    /// Look at where one can go, before anybody wants to.
+    /// Explore the free space of a scene ahead of the first flight.
     Explore {
         /// The Gaussians.
         cloud: Arc<GaussianCloud>,
         /// The photos' cameras.
         cameras: Vec<Camera>,
-        /// Which way is up.
+        /// Up direction.
         up: DVec3,
     },
     /// Find the way to where an identity is seen best.
@@ -166,7 +166,7 @@ pub enum Command {
     ReadReport {
         /// Its folder or file.
         path: PathBuf,
-        /// Whether it is to be compared with the one that is shown.
+        /// True if it is compared with the report on screen.
         second: bool,
     },
     /// Ask a list of phrases of some views.
@@ -181,15 +181,15 @@ pub enum Command {
         cloud: Arc<GaussianCloud>,
         /// Objects and parts.
         map: Arc<SemanticMap>,
-        /// How the Gaussians are drawn.
+        /// Settings of drawing the Gaussians.
         settings: RenderSettings,
-        /// From where.
+        /// Camera pose to draw from.
         home: HomeView,
     },
 }
 
 impl Command {
-    /// What sort of job this is.
+    /// Kind of the job.
     pub(crate) fn kind(&self) -> JobKind {
         match self {
             Self::Open { .. } => JobKind::Open,
@@ -227,16 +227,16 @@ impl Command {
     }
 }
 
-/// What a finished job brings.
+/// Outcome of a finished job.
 #[derive(Clone, Debug)]
 pub enum Outcome {
     /// A scene was read.
     Opened(Box<OpenedScene>),
-    /// One to be seen beside it was.
+    /// A scene to show beside it was read.
     Beside(Box<OpenedScene>),
-    /// There are photos, and nobody knows from where they were taken.
+    /// Photos were read, but their camera poses are unknown.
     Unposed(Box<Unposed>),
-    /// Training is done, or was canceled and is stored as far as it came; the Gaussians lie in the slot.
+    /// Training is done, or was canceled and its state is stored; the Gaussians are in the slot.
     Trained {
         /// Evaluations of the whole run, oldest first.
         evaluations: Vec<Evaluation>,
@@ -248,7 +248,7 @@ pub enum Outcome {
         runs: Vec<RunSummary>,
         /// The step at which it was canceled, if it was.
         stopped_at: Option<u64>,
-        /// What the plan of the result is computed from.
+        /// Facts that the plan of the result is computed from.
         facts: Box<SceneFacts>,
     },
     /// Nothing was done: the training to go on with began with other photos or poses, and how they differ.
@@ -267,9 +267,9 @@ pub enum Outcome {
     SplatsMeasured(Arc<MeasuredCloud>),
     /// The length of a unit in meters, and whether it was stored.
     Scale(f64, bool),
-    /// What clicks and strokes select by now.
+    /// Gaussians that clicks and strokes select by now.
     Selected(Arc<Selected>),
-    /// Such a change makes no sense, and why.
+    /// An edit was refused, and why.
     Refused(String),
     /// A file was written.
     Written(PathBuf),
@@ -283,11 +283,11 @@ pub enum Outcome {
     RecentRuns(Vec<(PathBuf, Vec<RunSummary>)>),
     /// A report was read or measured.
     Report {
-        /// Where it lies.
+        /// Path of the report.
         path: PathBuf,
-        /// What it holds.
+        /// The report.
         report: Arc<Report>,
-        /// Whether it is to be compared with the one that is shown.
+        /// True if it is compared with the report on screen.
         second: bool,
     },
     /// Thumbnails of objects and parts by number less one.
@@ -296,7 +296,7 @@ pub enum Outcome {
     Models(Arc<ModelList>),
     /// A model can be used now.
     ModelInstalled(String),
-    /// The scene was looked at.
+    /// The free space of a scene was explored.
     Explored(Arc<Explored>),
     /// The way to an identity, or why there is none; and what was learned of the scene.
     Approached(Arc<Explored>, Approached),
@@ -313,19 +313,19 @@ pub enum Outcome {
     },
 }
 
-/// What happened. For each job: first `Started`, at last one of `Finished`, `Cancelled`, `Failed`.
+/// Event of a job. Each sends `Started` first, and at last one of `Finished`, `Cancelled`, `Failed`.
 #[derive(Clone, Debug)]
 pub enum Event {
     /// The job has left the queue.
     Started {
-        /// Which job.
+        /// Number of the job.
         job: JobId,
-        /// Its sort.
+        /// Kind of the job.
         kind: JobKind,
-        /// What it does, for display.
+        /// Title, for display.
         title: String,
     },
-    /// Where it stands. May be dropped when events are not taken fast enough.
+    /// Progress of a job. May be dropped when events are not taken fast enough.
     Progress(JobId, Progress),
     /// Training measurements.
     Step(JobId, StepMetrics),
@@ -335,16 +335,16 @@ pub enum Event {
     Note(JobId, Severity, String),
     /// The job now waits (`true`) or goes on (`false`).
     Paused(JobId, bool),
-    /// It did what it was to do.
+    /// The job has finished.
     Finished(JobId, Outcome),
-    /// It ended because it was asked to.
+    /// The job was canceled.
     Cancelled(JobId),
-    /// It could not go on.
+    /// The job has failed.
     Failed(JobId, Failure),
 }
 
 impl Event {
-    /// Which job it is about.
+    /// The job that the event is about.
     pub fn job(&self) -> JobId {
         match self {
             Self::Started { job, .. } => *job,
@@ -359,7 +359,7 @@ impl Event {
         }
     }
 
-    /// Whether the job is over.
+    /// Returns whether the job is over.
     pub fn is_end(&self) -> bool {
         matches!(self, Self::Finished(..) | Self::Cancelled(_) | Self::Failed(..))
     }

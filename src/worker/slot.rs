@@ -48,8 +48,8 @@ impl<T> Slot<T> {
 /// Generation of the next [`Versioned`] value.
 static NEXT: AtomicU64 = AtomicU64::new(1);
 
-/// A shared value with a generation that no other value of this run has. Whether two are the same is told by
-/// generations, never by addresses, which a later value may be given again.
+/// A shared value with a generation that no other value of this run has. Values are compared by generation, never by
+/// address, which a later value may be given again.
 #[derive(Debug)]
 pub struct Versioned<T> {
     generation: u64,

@@ -1,8 +1,8 @@
-//! What the program was started with.
+//! Start of the program's window.
 
 use std::path::PathBuf;
 
-/// What the window does first.
+/// First action of the window.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Start {
     /// Opens the trained demo.

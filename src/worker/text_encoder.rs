@@ -16,30 +16,30 @@ use crate::pipeline::semantics::timing::ms_since;
 /// Requests that may wait; only the newest is read.
 const QUEUED: usize = 16;
 
-/// What is known of the texts that were asked for last.
+/// Results for the texts that were requested last.
 #[derive(Debug, Default)]
 pub(crate) struct Encoded {
     /// Embeddings of their phrases.
     pub(crate) phrases: TextEmbeddings,
     pub(crate) texts: BTreeMap<ParsedQuery, EncodedText>,
-    /// Why the encoder cannot be used, if it cannot.
+    /// Reason for which the encoder cannot be used, if it cannot.
     pub(crate) problem: Option<String>,
 }
 
-/// What is known of one text.
+/// Result for one text.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct EncodedText {
-    /// Whether its phrases have embeddings; not if the encoder knows none of its words.
+    /// True if its phrases have embeddings; not if the encoder knows none of its words.
     pub(crate) known: bool,
     /// The words that the encoder does not know.
     pub(crate) unknown: Vec<String>,
-    /// Why it could not be encoded, if the encoder failed.
+    /// Reason for which it could not be encoded, if the encoder failed.
     pub(crate) problem: Option<String>,
-    /// Milliseconds that this took.
+    /// Milliseconds that encoding took.
     pub(crate) encode_ms: f64,
 }
 
-/// Texts, each with the recipe that it is answered by: that says which other phrases are needed.
+/// Texts, each with the recipe that answers it and decides which other phrases are needed.
 pub(crate) type TextRequest = Vec<(ParsedQuery, Recipe)>;
 
 /// Handle of the thread. Dropping it ends the thread.
@@ -85,13 +85,13 @@ impl TextEncoder {
         self.texts.try_send(texts).is_ok()
     }
 
-    /// Where the embeddings are published, empty ones as soon as the encoder is loaded.
+    /// Slot in which the embeddings are published, empty ones as soon as the encoder is loaded.
     pub(crate) fn encoded(&self) -> &Slot<Encoded> {
         &self.encoded
     }
 }
 
-/// Encodes the phrases of these texts, as far as they are not `known` from before.
+/// Encodes the phrases of these texts that are not `known` yet.
 fn encode(encoder: &mut dyn Encoder, known: &mut TextEmbeddings, texts: TextRequest) -> Encoded {
     let mut encoded = Encoded::default();
     for (phrase, recipe) in texts {

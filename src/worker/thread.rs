@@ -20,7 +20,7 @@ use crate::pipeline::observer::{Observer, Signal};
 const EVENTS: usize = 1024;
 /// Jobs that may wait on each lane.
 const QUEUED: usize = 64;
-/// How long the end of the program waits for a job to reach a consistent state.
+/// Time that the end of the program waits for a job to reach a consistent state.
 const FAREWELL: Duration = Duration::from_secs(5);
 
 /// Does the work of a command. The program has one implementation ([`super::jobs::PipelineJobs`]);
@@ -43,7 +43,7 @@ struct Queued {
 
 type Controls = Arc<Mutex<HashMap<JobId, Arc<Control>>>>;
 
-/// Where jobs that run elsewhere tell what happens, as those of a worker do.
+/// Channels by which jobs that run elsewhere report events, as those of a worker do.
 #[derive(Clone)]
 pub(crate) struct EventSource {
     pub(crate) events: Sender<Event>,
@@ -80,7 +80,7 @@ impl Worker {
                 (Arc::clone(&jobs), event_sender.clone(), Arc::clone(&clouds), Arc::clone(&controls), repaint.clone());
             let work = move || {
                 for queued in queue {
-                    // A scene that is opened is waited for: it yields to nobody.
+                    // The user waits for a scene to open: the job runs at normal priority.
                     let yields = !matches!(queued.command.kind(), JobKind::Open | JobKind::Demo);
                     let run = || run_one(&*jobs, queued, &events, &clouds, &controls, &repaint);
                     match &pool {
@@ -142,17 +142,17 @@ impl Worker {
         self.events.as_ref()?.recv_timeout(limit).ok()
     }
 
-    /// Where the Gaussians in training are published.
+    /// Slot in which the Gaussians in training are published.
     pub fn clouds(&self) -> &Slot<CloudSnapshot> {
         &self.source.clouds
     }
 
-    /// From now on commands are offered to `elsewhere` first.
+    /// Offers later commands to `elsewhere` first.
     pub(crate) fn set_elsewhere(&mut self, elsewhere: Option<Elsewhere>) {
         self.elsewhere = elsewhere;
     }
 
-    /// Where others tell events beside those of the jobs.
+    /// Channels by which others report events beside those of the jobs.
     pub(crate) fn source(&self) -> EventSource {
         self.source.clone()
     }
@@ -212,7 +212,7 @@ fn run_one(
     });
 }
 
-/// What a panic says, for display.
+/// Failure with the message of a panic, for display.
 pub(super) fn panic_failure(payload: &(dyn Any + Send)) -> Failure {
     let text = payload
         .downcast_ref::<&str>()

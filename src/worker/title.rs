@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::protocol::Command;
 
 impl Command {
-    /// What it does, as a title: "Opening fox".
+    /// Title of the job, such as "Opening fox".
     pub(crate) fn title(&self) -> String {
         let name =
             |p: &PathBuf| p.file_name().map_or_else(|| p.display().to_string(), |n| n.to_string_lossy().into_owned());

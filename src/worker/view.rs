@@ -1,4 +1,4 @@
-//! The drawing lane: a thread that renders what the eye sees, so that the window never waits for it.
+//! The drawing lane: a thread that renders the view, so that the window never waits for it.
 //!
 //! Only the latest request counts: one that was not begun yet is replaced.
 
@@ -17,14 +17,14 @@ use crate::render::{DrawError, Renderer};
 use crate::scene::Camera;
 use crate::scene::resource_log::{self, ResourceKind};
 
-/// How long the eye rests before working memory is given back.
+/// Time that the camera rests before working memory is given back.
 const REST: Duration = levels::STAY;
 
-/// What the pixels of a view belong to.
+/// Identities of the pixels of a view.
 #[derive(Clone, Debug)]
 pub struct MappedView {
     pub(crate) ticket: u64,
-    /// Whether the eye rests; else they are of the resolution that keeps up with it.
+    /// True if drawn while the camera rests; otherwise at the lower resolution of moving frames.
     pub(crate) exact: bool,
     /// The pixels, or why they could not be drawn.
     pub(crate) maps: Result<Arc<ViewMaps>, Failure>,
@@ -70,7 +70,7 @@ impl ViewLane {
                 };
                 gives_back = request.skip.buffers;
                 patience = (gives_back || !request.skip.levels).then_some(REST);
-                // Looking for a GPU takes a moment; here no one waits for it.
+                // Looking for a GPU takes a moment; on this thread nothing waits for it.
                 let renderer = match renderer.take().filter(|p| p.without_gpu == request.skip.gpu) {
                     Some(known) => renderer.insert(known),
                     None => renderer.insert(ViewRenderer::without_gpu(request.skip.gpu)),
@@ -82,7 +82,7 @@ impl ViewLane {
                 let drawn = renderer.draw(&request);
                 let (exact, start) = (request.budget == QualityBudget::Full, Instant::now());
                 let camera = match &drawn {
-                    // While the eye moves both come together, or masks would trail behind.
+                    // While the camera moves both come together, or masks would trail behind.
                     Ok(picture) if !exact => picture.camera.clone(),
                     _ => {
                         out.publish(drawn.clone());
@@ -144,12 +144,12 @@ impl ViewLane {
         drop(old);
     }
 
-    /// Where the identities of views are published.
+    /// Slot in which the identities of views are published.
     pub fn maps(&self) -> &Slot<MappedView> {
         &self.maps
     }
 
-    /// Where frames are published.
+    /// Slot in which frames are published.
     pub fn pictures(&self) -> &Slot<ViewResult> {
         &self.pictures
     }
@@ -168,7 +168,7 @@ fn lock(mutex: &Mutex<Mailbox>) -> MutexGuard<'_, Mailbox> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// What waiting for a request has come to.
+/// Outcome of waiting for a request.
 enum Waited {
     Request(Box<ViewRequest>),
     /// None came in time.
@@ -197,7 +197,7 @@ fn next(mailbox: &(Mutex<Mailbox>, Condvar), patience: Option<Duration>) -> Wait
     }
 }
 
-/// What the pixels of a view belong to; `None` if no one wants to know.
+/// Draws the identities of the pixels of a view; `None` if the request does not ask for them.
 fn maps_of(renderer: &mut Renderer, request: &ViewRequest, camera: &Camera) -> Option<Result<ViewMaps, Failure>> {
     let semantics = request.semantics.as_ref().filter(|s| s.identity_of.len() == request.cloud.len())?;
     if request.budget != QualityBudget::Full && !request.follow {

@@ -1,4 +1,4 @@
-//! What the viewport shows, and how a rendered frame becomes its pixels.
+//! View modes of the viewport, and the conversion of a rendered frame to their pixels.
 
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
@@ -10,7 +10,7 @@ use crate::pipeline::metrics;
 use crate::render::Frame;
 use crate::scene::PhotoPixels;
 
-/// What the viewport shows, in the order of the toolbar.
+/// Quantity that the viewport shows, in the order of the toolbar.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, VariantArray, IntoStaticStr)]
 pub enum ViewMode {
     /// The rendered image; stored layouts of earlier versions call it a frame.
@@ -33,13 +33,13 @@ impl ViewMode {
         self.into()
     }
 
-    /// Whether it shows something only where a photo is looked through.
+    /// Returns whether it shows something only at the camera pose of a photo.
     pub(crate) fn needs_photo(self) -> bool {
         matches!(self, Self::Difference | Self::Photo)
     }
 }
 
-/// How many times the difference from the photo is amplified, so that an error of 1/4 is white.
+/// Factor that amplifies the difference from the photo, so that an error of 1/4 is white.
 pub(crate) const DIFFERENCE_GAIN: u16 = 4;
 
 /// A frame as pixels.

@@ -1,4 +1,4 @@
-//! What draws the viewport's frames: on the GPU or the CPU, at a resolution that keeps up with the eye.
+//! Renderer of the viewport's frames: on the GPU or the CPU, at a resolution that keeps up with the camera.
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -13,33 +13,33 @@ use crate::render::lod::{Cut, LodTree};
 use crate::render::{self, BackendChoice, DevicePicture, Frame, RenderSettings, Renderer};
 use crate::scene::Camera;
 
-/// Moving frames are no smaller than this, px of their longer side: below, one does not see where one flies.
+/// Least longer side of moving frames in px: smaller ones are too coarse to navigate by.
 const LEAST_SIDE_PX: f64 = 300.0;
 
 /// Draws requests, and learns how fast it can.
 pub(super) struct ViewRenderer {
     pub(super) renderer: Renderer,
-    /// Whether no GPU was to be used.
+    /// True if no GPU was to be used.
     pub(super) without_gpu: bool,
-    /// Why the CPU draws though there is a GPU.
+    /// Reason for which the CPU draws though there is a GPU.
     instead_of_gpu: Option<String>,
     /// Draws the Gaussians of a second view, if they are others.
     beside: Option<Box<Self>>,
-    /// What frames cost lately; `None` before the first.
+    /// Cost of recent frames; `None` before the first.
     cost: Option<Speed>,
     pub(super) levels: DetailLevels,
-    /// What was drawn of the last frame's Gaussians, if not all.
+    /// Cut of the last frame's Gaussians that was drawn, if not all.
     cut: Option<Arc<Cut>>,
 }
 
-/// What a frame costs: the part that every Gaussian has at any size, and that of each pixel.
+/// Cost of a frame: a fixed part of all Gaussians at any size, and a part per pixel.
 #[derive(Clone, Copy, Debug)]
 struct Speed {
     fixed_secs: f64,
     secs_per_px: f64,
 }
 
-/// What was drawn of a view.
+/// Result of drawing a view.
 enum Painting {
     Colors(Vec<[u8; 3]>),
     Texture(DevicePicture),
@@ -63,7 +63,7 @@ impl ViewRenderer {
         }
     }
 
-    /// Goes on with the CPU: a GPU has failed, or buffers may be in any state.
+    /// Falls back to the CPU: a GPU has failed, or buffers may be in any state.
     fn fall_back(&mut self, why: &str) {
         if self.renderer.is_gpu() {
             self.instead_of_gpu = Some(render::instead_of_gpu(&why));
@@ -76,19 +76,19 @@ impl ViewRenderer {
         self.draw_seen(request)
     }
 
-    /// A rough picture of Gaussians that are so many that one of all of them takes long.
+    /// Draws a rough picture first if there are so many Gaussians that one of all of them takes long.
     pub(super) fn rough(&mut self, request: &ViewRequest) -> Option<ViewResult> {
         let first = self.sees(request) && request.budget == QualityBudget::Full;
         let request = ViewRequest { budget: QualityBudget::Moving, follow: false, ..request.clone() };
         first.then(|| self.draw_seen(&request))
     }
 
-    /// What was drawn of the Gaussians of the last frame, if not all.
+    /// Cut of the last frame's Gaussians that was drawn, if not all.
     pub(super) fn cut(&self) -> Option<Arc<Cut>> {
         self.cut.clone()
     }
 
-    /// Whether levels of detail are for these Gaussians, and they are new and very many.
+    /// Returns whether levels of detail apply to these Gaussians, and a rough picture comes first: new and very many.
     fn sees(&mut self, request: &ViewRequest) -> bool {
         if request.skip.levels || self.renderer.is_gpu() {
             self.levels.forget();

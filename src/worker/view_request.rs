@@ -1,4 +1,4 @@
-//! What the drawing thread is asked for, and what it answers.
+//! Requests to the drawing thread, and its answers.
 
 use std::sync::Arc;
 
@@ -10,56 +10,56 @@ use crate::render::{DevicePicture, GpuError, RenderSettings, Renderer, StageTime
 use crate::scene::plan::When;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
 
-/// What to draw.
+/// Request to draw a view.
 #[derive(Clone, Debug)]
 pub struct ViewRequest {
     /// The Gaussians.
     pub cloud: Versioned<GaussianCloud>,
-    /// From where, at full resolution.
+    /// The camera at full resolution.
     pub camera: Camera,
-    /// What of it.
+    /// Quantity to draw.
     pub mode: ViewMode,
-    /// What of it beside that, in a second view.
+    /// Quantity of a second view beside it, if there is one.
     pub second: Option<ViewMode>,
-    /// Whose Gaussians the second view shows, if they are others, and how they are drawn.
+    /// Gaussians of the second view, if they are others, and the settings to draw them with.
     pub beside: Option<(Versioned<GaussianCloud>, RenderSettings)>,
-    /// How: degree of the colors, background, filter. Depth is drawn where it is needed.
+    /// Degree of the colors, background, filter. Depth is drawn where it is needed.
     pub settings: RenderSettings,
-    /// How long it may take.
+    /// Time that the frame may take.
     pub budget: QualityBudget,
     /// The photo taken from this camera, for the difference and for PSNR.
     pub photo: Option<Arc<PhotoPixels>>,
-    /// Objects and parts of the Gaussians, to be drawn too once the eye rests.
+    /// Objects and parts of the Gaussians, whose maps are drawn too once the camera rests.
     pub semantics: Option<Arc<SemanticMap>>,
-    /// Whether they are drawn while the eye moves too, at the frame's resolution: masks are on screen.
+    /// True if they are drawn while the camera moves too, at the frame's resolution: masks are on screen.
     pub follow: bool,
-    /// Whether blended codes are wanted too.
+    /// True if blended codes are drawn too.
     pub codes: bool,
-    /// What is left out.
+    /// Passes to leave out.
     pub skip: SkipPasses,
-    /// Whether the window can paint what lies on the device that draws: then the colors of moving frames stay there.
+    /// True if the window can paint from the memory of the drawing device: colors of moving frames then stay there.
     pub on_device: bool,
-    /// Whether the stages are to be timed, where that is not free.
+    /// True if the stages are timed where that is not free.
     pub timed: bool,
-    /// Comes back with the frame.
+    /// Number that comes back with the frame.
     pub ticket: u64,
 }
 
 /// Passes that the scene's plan skips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SkipPasses {
-    /// Depth of frames from which no one picks points.
+    /// Depth of frames that no points are picked from.
     pub(crate) depth: bool,
     pub(crate) parts: bool,
     pub(crate) gpu: bool,
-    /// Working memory, while the eye rests.
+    /// Working memory, while the camera rests.
     pub(crate) buffers: bool,
     /// Levels of detail.
     pub(crate) levels: bool,
 }
 
 impl SkipPasses {
-    /// What `plan` leaves out.
+    /// Passes that `plan` leaves out.
     pub fn of(plan: &ScenePlan) -> Self {
         Self {
             depth: plan.depth != When::Always,
@@ -71,14 +71,14 @@ impl SkipPasses {
     }
 }
 
-/// How much time a frame may take; decides its resolution.
+/// Time that a frame may take; decides its resolution.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum QualityBudget {
-    /// The eye moves: keep up with it.
+    /// The camera moves: keep up with it.
     Moving,
-    /// The eye rests while something else needs the processor.
+    /// The camera rests while something else needs the processor.
     Shared,
-    /// The eye rests: full resolution, and depth to pick from.
+    /// The camera rests: full resolution, and depth to pick from.
     Full,
 }
 
@@ -108,7 +108,7 @@ pub struct SecondPicture {
 pub struct ViewPicture {
     /// The request's.
     pub ticket: u64,
-    /// Whether this is the request's full resolution, with all Gaussians.
+    /// True at the request's full resolution, with all Gaussians.
     pub full: bool,
     /// The camera at the size that was drawn.
     pub camera: Camera,
@@ -130,9 +130,9 @@ pub struct ViewPicture {
     pub(crate) stages: StageTimes,
     /// Seconds from colors to bytes: depth scales, differences.
     pub(crate) paint_secs: f64,
-    /// What drew it: "CPU", or the name of the GPU.
+    /// Renderer: "CPU", or the name of the GPU.
     pub(crate) drawn_by: String,
-    /// Why the CPU drew it though there is a GPU.
+    /// Reason for which the CPU drew it though there is a GPU.
     pub(crate) instead_of_gpu: Option<String>,
 }
 
@@ -140,7 +140,7 @@ impl ViewPicture {
     /// Its pixels on the host; those of the second view, if that is wanted and there is one.
     ///
     /// # Errors
-    /// If they lie on a device that does not give them back.
+    /// If reading them back from a device fails.
     pub(crate) fn pixels(&self, second: bool) -> Result<PhotoPixels, GpuError> {
         let rgb = match (self.second.as_ref().filter(|_| second), &self.texture) {
             (Some(second), _) => second.rgb.clone(),
@@ -151,7 +151,7 @@ impl ViewPicture {
         Ok(PhotoPixels { width_px, height_px, rgb, coverage: None, alpha: None })
     }
 
-    /// Whether a GPU drew it.
+    /// Returns whether a GPU drew it.
     pub(crate) fn on_gpu(&self) -> bool {
         self.drawn_by != Renderer::CPU
     }

@@ -193,13 +193,13 @@ impl Server {
         Self { at, seen }
     }
 
-    /// How many requests came.
+    /// Number of requests so far.
     pub fn requests(&self) -> usize {
         self.seen.lock().expect("log").len()
     }
 }
 
-/// Whether a text holds a character that acts on a terminal, or on the order of letters.
+/// Returns whether a text holds a character that acts on a terminal, or on the order of letters.
 pub fn acts(text: &str) -> bool {
     let of_direction = |c| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
     text.chars().any(|c| (c.is_control() && c != '\n' && c != '\t') || of_direction(c))

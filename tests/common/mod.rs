@@ -1,4 +1,4 @@
-//! What several integration tests need: made-up scenes, cameras, and where real inputs lie.
+//! Shared inputs of several integration tests: made-up scenes, cameras, and the paths of real inputs.
 #![allow(dead_code, clippy::expect_used)]
 
 use std::path::PathBuf;

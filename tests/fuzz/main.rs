@@ -34,7 +34,7 @@ use targets::{Door, Target};
 const ITERATIONS: u64 = 4000;
 /// Mutated inputs of all readers in the long run, unless the environment says otherwise.
 const TOTAL: u64 = 10_000_000;
-/// How often the long run goes around all readers.
+/// Number of rounds of the long run over all readers.
 const ROUNDS: u64 = 20;
 
 fn number(name: &str, default: u64) -> u64 {
@@ -65,7 +65,7 @@ fn chosen() -> Vec<Target> {
     targets::all().into_iter().filter(is_chosen).collect()
 }
 
-/// Writes an input that breaks a promise, and says what it does.
+/// Writes an input that breaks a promise, and prints the promise.
 fn report(target: &str, find: &Find) -> String {
     let file = watch::save(target, &find.input);
     format!("{target}: an input of {} bytes {}; see {}", find.input.len(), find.what, file.display())

@@ -1,4 +1,4 @@
-//! The search for an input that breaks a promise, and what is told about it.
+//! The search for an input that breaks a promise, and its report.
 
 use std::collections::HashSet;
 use std::hash::{DefaultHasher, Hash, Hasher};
@@ -23,9 +23,9 @@ const SAMPLED: u64 = 16;
 /// Different finds that are kept of a reader.
 const MOST_FINDS: usize = 20;
 
-/// An input that did what it must not.
+/// An input that broke a promise.
 pub struct Find {
-    /// What it did.
+    /// The broken promise.
     pub what: String,
     /// The input.
     pub input: Vec<u8>,
@@ -103,7 +103,7 @@ impl Search {
         });
     }
 
-    /// What a reader says about an input; `None` if it broke a promise.
+    /// Outcome of a reader for an input; `None` if it broke a promise.
     fn try_one(&mut self, input: &[u8]) -> Option<Outcome> {
         watch::begin(self.target.name, input);
         let before = memory::start();
@@ -142,7 +142,7 @@ impl Search {
         }
     }
 
-    /// What was tried, in a line of [`table`].
+    /// Summary of the search, in a line of [`table`].
     pub fn line(&self) -> String {
         let share = |n: u64, of: u64| 100.0 * n as f64 / of.max(1) as f64;
         format!(
@@ -166,7 +166,7 @@ fn shape(message: &str) -> u64 {
     hasher.finish()
 }
 
-/// What was tried of each reader, and in all.
+/// Summary of the search in each reader, and in all.
 pub fn table(searches: &[Search]) -> String {
     let mut lines = vec![format!(
         "{:<24} {:>9} {:>10} {:>10} {:>9} {:>9} {:>8} {:>6}",

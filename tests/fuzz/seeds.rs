@@ -95,7 +95,7 @@ const RGB: [(&str, &str); 3] = [
     (".1 .2 .3", "300 .2 3"),
 ];
 
-/// What this program and others say in comments.
+/// Comments of this program and others.
 const COMMENTED: &str =
     "comment Vertical Axis: z\ncomment fmlgs shift 456789 5678901 312\ncomment antialiased 1\nelement";
 
@@ -317,7 +317,7 @@ pub fn scene() -> Vec<u8> {
     serde_json::to_vec(&info).expect("write")
 }
 
-/// What lists the objects and parts of the label targets' id maps.
+/// List of the objects and parts of the label targets' id maps.
 pub fn identities() -> serde_json::Value {
     json!({ "identities": [{ "id": 255, "name": "cup", "level": "object" },
         { "id": 1, "name": "handle", "level": "part", "parent": 255 }] })

@@ -67,7 +67,7 @@ pub fn mapped_cloud() -> GaussianCloud {
     cloud
 }
 
-/// What they are.
+/// Objects and parts of the scene.
 pub fn map() -> SemanticMap {
     let mut identities = Identities::default();
     let doll = identities.add(Level::Object, NOBODY, vec!["doll".into(), "人形".into()]);

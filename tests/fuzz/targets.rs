@@ -10,13 +10,13 @@ use fmlgs::scene::{Camera, Dataset, GaussianCloud, Photo};
 use glam::{DMat3, DVec2, DVec3};
 use image::{GrayImage, RgbImage};
 
-/// What a reader says about an input: nothing, or why it refuses it.
+/// Outcome of a reader for an input: nothing, or the reason of a refusal.
 pub type Outcome = Result<(), String>;
 
 /// Reads bytes.
 pub type Read = Box<dyn Fn(&[u8]) -> Outcome>;
 
-/// What an input must be for a reader to look any further.
+/// Condition that an input must meet for a reader to look any further.
 #[derive(Clone, Copy)]
 pub enum Door {
     /// Anything.
@@ -34,7 +34,7 @@ pub enum Door {
 }
 
 impl Door {
-    /// Whether a reader looks any further.
+    /// Returns whether a reader looks any further.
     pub fn lets_in(self, input: &[u8]) -> bool {
         let json = || serde_json::from_slice::<serde::de::IgnoredAny>(input).is_ok();
         match self {
@@ -52,11 +52,11 @@ impl Door {
 pub struct Target {
     /// Its name.
     pub name: &'static str,
-    /// What it looks at first.
+    /// Condition that it checks first.
     pub door: Door,
     /// Its folders in `tests/corpus`.
     pub corpora: Vec<&'static str>,
-    /// How many times slower it is than a quick reader: it gets so many times fewer inputs.
+    /// Run time as a multiple of a quick reader's: it gets so many times fewer inputs.
     pub cost: u64,
     /// Reads bytes.
     pub read: Read,
@@ -105,7 +105,7 @@ pub fn folder() -> tempfile::TempDir {
     builder.tempdir_in("/dev/shm").or_else(|_| builder.tempdir()).expect("folder")
 }
 
-/// What is read must keep its own invariants.
+/// Asserts that an accepted cloud keeps its own invariants.
 pub fn valid(cloud: Result<GaussianCloud, IoError>) -> Result<GaussianCloud, IoError> {
     cloud.inspect(|c| c.validate().expect("an accepted cloud is valid"))
 }

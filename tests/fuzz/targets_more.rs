@@ -163,7 +163,7 @@ fn answer(bytes: &[u8], is_stream: bool) -> Result<(), String> {
     Ok(())
 }
 
-/// What the user types.
+/// A query as the user types it.
 fn query(text: &str) -> Result<(), Infallible> {
     thread_local! {
         static TOKENS: fmlgs::models::clip::tokens::Tokens = fmlgs::models::clip::tokens::Tokens::new(77);

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, Once, PoisonError};
 use std::time::{Duration, Instant};
 
-/// What ends the process.
+/// Time after which a hanging input ends the process.
 const HANG: Duration = Duration::from_secs(10);
 
 struct Watched {
@@ -14,7 +14,7 @@ struct Watched {
 }
 
 static WATCHED: Mutex<Watched> = Mutex::new(Watched { until: None, target: "", input: Vec::new() });
-/// Where the last panic was, and its words.
+/// Place and message of the last panic.
 static PANIC: Mutex<String> = Mutex::new(String::new());
 
 /// From now on `input` is being tried.
@@ -35,7 +35,7 @@ pub fn begin_for(target: &'static str, input: &[u8], patience: Duration) {
     watched.input.extend_from_slice(input);
 }
 
-/// It has come to an end.
+/// The current input has ended.
 pub fn end() {
     WATCHED.lock().unwrap_or_else(PoisonError::into_inner).until = None;
 }

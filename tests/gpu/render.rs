@@ -41,7 +41,7 @@ impl Scene {
         renderer.render(&self.cloud.cast(), features, &self.camera, &self.settings).unwrap()
     }
 
-    /// What differs between a picture and the oracle's.
+    /// Compares a picture with the oracle's; the error names the difference.
     fn compare(&self, ours: &Frame<f32>, oracle: &Frame<f64>) -> Result<(), String> {
         let boundary = bands(&self.cloud, &self.camera, &self.settings, 1e-3).pixels;
         let planes = ours.color.iter().zip(&oracle.color).chain(ours.features.iter().zip(&oracle.features));

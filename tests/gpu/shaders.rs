@@ -14,7 +14,7 @@ fn variants() -> impl Iterator<Item = ShaderVariant> {
         .flat_map(|channels| [false, true].map(|float_atomics| ShaderVariant { channels, float_atomics }))
 }
 
-/// Why `source` is not valid, if it is not.
+/// Reason for which `source` is not valid; `None` if it is.
 fn fault(source: &str, float_atomics: bool) -> Option<String> {
     let module = match naga::front::wgsl::parse_str(source) {
         Ok(module) => module,

@@ -5,8 +5,7 @@ use fmlgs::render::gpu::sort::sort_pairs;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// Whether `(keys, values)` is what a stable sort by the low `bits` bits makes of `input` with the
-/// values 0, 1, 2, ...
+/// Returns whether `(keys, values)` is the stable sort of `input` by the low `bits` bits with the values 0, 1, 2, ...
 fn is_sorted(input: &[u32], keys: &[u32], values: &[u32], bits: u32) -> bool {
     let mask = if bits >= 32 { u32::MAX } else { (1 << bits) - 1 };
     let mut want: Vec<u32> = (0..input.len() as u32).collect();

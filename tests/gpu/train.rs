@@ -14,7 +14,7 @@ use rand::RngExt;
 
 const LAMBDA: f64 = 0.2;
 
-/// What another color behind everything adds where a photo is transparent.
+/// Color that another background adds where a photo is transparent.
 const SHIFT: [f32; 3] = [0.3, -0.2, 0.7];
 
 fn noise_photo(size: [u32; 2], covered: bool, seed: u64) -> PhotoPixels {

@@ -7,7 +7,7 @@ use fmlgs::render::cpu::project::{CameraView, compensation, geometry};
 use fmlgs::render::{ALPHA_MAX, ALPHA_MIN, RenderSettings, TRANSMITTANCE_MIN};
 use fmlgs::scene::{Camera, GaussianCloud};
 
-/// How far results may be apart.
+/// Bounds of the difference between results.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
     /// A value mismatches if it differs by more than `absolute * rms + relative * |value|`.
@@ -27,7 +27,7 @@ pub const INTERIOR: Bounds =
 /// For values near one.
 pub const BOUNDARY: Bounds = Bounds { absolute: 2e-2, relative: 2e-2, mismatches: 0.1, cosine: 0.999, bias: 1e-2 };
 
-/// Whether `ours` agrees with `oracle` at the places where `chosen`; else what is wrong.
+/// Returns an error with the deviation unless `ours` agrees with `oracle` at the places where `chosen`.
 pub fn agree(name: &str, ours: &[f32], oracle: &[f64], chosen: &[bool], bounds: Bounds) -> Result<(), String> {
     if ours.len() != oracle.len() || ours.len() != chosen.len() {
         return Err(format!("{name}: {} values, oracle {}, mask {}", ours.len(), oracle.len(), chosen.len()));
@@ -59,7 +59,7 @@ pub fn agree(name: &str, ours: &[f32], oracle: &[f64], chosen: &[bool], bounds: 
     Ok(())
 }
 
-/// Which pixels and which Gaussians lie near a cut-off.
+/// Pixels and Gaussians that lie near a cut-off.
 pub struct Bands {
     pub pixels: Vec<bool>,
     pub gaussians: Vec<bool>,

@@ -1,4 +1,4 @@
-//! What the GPU tests share: one device for all tests of a file, and what happens without one.
+//! Shared parts of the GPU tests: one device for all tests of a file, and their behavior without one.
 #![allow(dead_code)]
 
 pub mod adapter;

@@ -1,5 +1,5 @@
-//! The agent's command language in the made-up room: the documented commands in three wordings each; what is
-//! not understood, not there or ambiguous does nothing; 200 ordinary sentences against their verdicts.
+//! The agent's command language in the made-up room: the documented commands in three wordings each; requests that are
+//! not understood, not there or ambiguous do nothing; 200 ordinary sentences against their verdicts.
 
 mod looks;
 mod stored;
@@ -183,7 +183,7 @@ fn several_things_are_marked_together_and_the_next_request_marks_anew() {
     assert_eq!(room.log.last().map(String::as_str), Some("highlight lamp"));
 }
 
-/// Names of things that are in nobody's room, each with one of a part.
+/// Names of things that no room of the tests has, each with one of a part.
 const HARD: [[&str; 2]; 12] = [
     ["plush toy", "pink bow on the plush toy's hood"],
     ["left of the lamp", "button a of b"],
@@ -302,7 +302,7 @@ struct Sentence {
     tools: serde_json::Value,
 }
 
-/// What came of a sentence, and how it was judged by hand against what its writer expects.
+/// Calls and end of a sentence, and the verdict by hand against the expectation of its writer.
 #[derive(Clone, Debug, Serialize, Deserialize, PartialEq)]
 struct Verdict {
     say: String,

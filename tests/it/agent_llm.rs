@@ -41,7 +41,7 @@ fn session(server: &Server) -> Session {
     session_with(server, Policy::built_in().expect("policy"), RequestLimits::default())
 }
 
-/// What came of a talk.
+/// Result of a conversation.
 struct Talk {
     server: Server,
     session: Session,

@@ -1,4 +1,4 @@
-//! The real binary measures depth, trains surfels, and says what it cannot do.
+//! The real binary measures depth, trains surfels, and reports missing abilities.
 
 use crate::cli_support::{fmlgs, folder, tiny_dataset};
 

@@ -143,7 +143,7 @@ fn a_chat_model_is_asked(scene: &str) {
     }
 }
 
-/// Names of what is in a folder.
+/// Names of the files in a folder.
 fn names_in(folder: &Path) -> Vec<String> {
     let entries = std::fs::read_dir(folder).unwrap();
     let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().to_string_lossy().into_owned()).collect();

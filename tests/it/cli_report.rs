@@ -159,7 +159,7 @@ fn every_stage_is_measured_and_resumed() {
     run(&["report", "--defaults", &table, "--from", &at("nowhere")]).fails_with(1);
 }
 
-/// Every object and part comes out, and its masks are read back as what is seen.
+/// Every object and part is exported, and its masks are read back as drawn.
 fn everything_is_exported(run: &dyn Fn(&[&str]) -> Done, scene: &str, out: &str) {
     let told = run(&["segment", scene, "--all", "--out", out, "-q"]).ok().stdout;
     assert!(told.contains("objects and parts as .ply") && told.contains("masks of "), "{told}");

@@ -1,4 +1,4 @@
-//! What survives: a kill, Ctrl-C, a second writer, an older version; ([`changed`]) other photos, a folder that goes away;
+//! Survival of: a kill, Ctrl-C, a second writer, an older version; ([`changed`]) other photos, a folder that goes away;
 //! ([`disk`]) a disk that is full; and ([`places`]) what lies where results are put.
 #![cfg(unix)]
 
@@ -116,7 +116,7 @@ fn ctrl_c_saves_and_exits_with_130() {
 /// Generous: an end takes milliseconds, what it must not wait for takes minutes.
 const SOON: Duration = Duration::from_secs(10);
 
-/// Ends a child and returns what it said, and how long it took.
+/// Ends a child and returns its output and the time that took.
 fn end(child: Child, signal: &str) -> (Done, Duration) {
     let begin = Instant::now();
     send(&child, signal);
@@ -194,7 +194,7 @@ fn a_download_that_stalls_ends_when_asked_and_is_gone_on_with() {
     }
 }
 
-/// What a process tells on standard error, line by line.
+/// Lines that a process prints on standard error.
 fn lines_of(child: &mut Child) -> Receiver<String> {
     let (told, lines) = sync_channel(10_000);
     let stderr = BufReader::new(child.stderr.take().unwrap());

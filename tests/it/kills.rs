@@ -28,8 +28,7 @@ fn kills() -> u64 {
     std::env::var("FMLGS_KILLS").ok().and_then(|n| n.parse().ok()).unwrap_or(3)
 }
 
-/// Starts `start` again and again, kills it at a random moment of the first `longest`, and has `check`
-/// look at what is left.
+/// Starts `start` again and again, kills it at a random moment of the first `longest`, and calls `check` after each.
 fn kill_often(what: &str, longest: Duration, start: &mut dyn FnMut(u64) -> Command, check: &mut dyn FnMut()) {
     let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(what.bytes().map(u64::from).sum());
     let (mut killed, mut ended) = (0, 0);
@@ -49,7 +48,7 @@ fn kill_often(what: &str, longest: Duration, start: &mut dyn FnMut(u64) -> Comma
     assert!(killed > 0, "{what}: nothing was killed");
 }
 
-/// How long a command takes from start to end.
+/// Run time of a command from start to end.
 fn time(command: &mut Command) -> Duration {
     let start = Instant::now();
     Done::from(command.output().unwrap()).ok();

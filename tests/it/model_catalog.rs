@@ -277,7 +277,7 @@ fn the_fetched_engine_is_the_one_that_runs() {
     assert!(list["note"].as_str().is_some_and(|n| n.contains("refused") && n.contains("fetch it")), "{list}");
 }
 
-/// What `models bench` measures is what the models give; that the engines agree is a test of the library.
+/// `models bench` times the models themselves; a test of the library checks that the engines agree.
 #[test]
 fn the_shipped_models_are_timed() {
     let folder = crate::cli_support::folder();

@@ -11,13 +11,13 @@ use serde_json::{Value, json};
 
 /// Size of the window in px.
 const SIZE: [u32; 2] = [480, 360];
-/// What a name may try.
+/// Hostile name of an object.
 const HOSTILE: &str = "</script><img src=x onerror=\"window.broken = 1\"><b>kettle";
 /// Least PSNR of the page's picture against this program's, dB, and how much less another camera's must have.
 const PSNR_DB: (f64, f64) = (32.0, 10.0);
-/// Least IoU of what is highlighted with the mask that this program draws, and the most with that of another object.
+/// Least IoU of the highlighted pixels with the mask that this program draws, and the most with that of another object.
 const IOU: (f64, f64) = (0.85, 0.1);
-/// Channels of what is highlighted lie so far apart; the rest is gray.
+/// Least difference between channels of highlighted pixels; the rest is gray.
 const CHROMA: u8 = 36;
 
 /// The scene that ships with the program, its kettle called by something [`HOSTILE`].
@@ -53,7 +53,7 @@ impl Shown {
         self.at("camera.json")
     }
 
-    /// What this program draws from a camera.
+    /// Draws the scene with this program from a camera.
     fn drawn(&self, camera: &str) -> RgbImage {
         let (size, out) = (format!("{}x{}", SIZE[0], SIZE[1]), self.at("drawn.png"));
         fmlgs(&["render", &self.scene, "--camera", camera, "--size", &size, "--backend", "cpu", "--out", &out, "-q"])
@@ -68,7 +68,7 @@ impl Shown {
         image::open(out).unwrap().to_luma8()
     }
 
-    /// What the page's picture alone shows.
+    /// Picture of the page without its controls.
     fn alone(&self) -> RgbImage {
         self.browser.rest();
         self.browser.picture()
@@ -85,7 +85,7 @@ fn psnr(a: &RgbImage, b: &RgbImage) -> f64 {
     10.0 * (255.0 * 255.0 * a.len() as f64 / sum).log10()
 }
 
-/// How far the highlighted pixels are those of a mask.
+/// IoU of the highlighted pixels with a mask.
 fn iou(picture: &RgbImage, mask: &GrayImage) -> f64 {
     assert_eq!(picture.dimensions(), mask.dimensions());
     let chroma = |p: &image::Rgb<u8>| p.0.iter().max().unwrap() - p.0.iter().min().unwrap();
@@ -233,8 +233,8 @@ fn a_page_of_a_bare_splat_says_that_it_has_no_objects() {
     asks_nobody(&browser);
 }
 
-/// Whether the page was quiet so far and cannot be otherwise: it has asked for nothing but itself and what it made
-/// itself, names have run nothing, and what it would ask for is refused.
+/// Asserts that the page makes no outside request: it has requested only itself and what it made itself, names have run
+/// no script, and its policy refuses other requests.
 fn asks_nobody(browser: &Browser) {
     let (complaints, requests) = browser.complaints_and_requests();
     assert_eq!(complaints, Vec::<String>::new());

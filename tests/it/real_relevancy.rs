@@ -161,7 +161,7 @@ fn an_identity_counts_by_its_best_view() {
     assert!(over_first >= 7, "{over_first} of {compared}");
 }
 
-/// How many of the questions are answered, by this recipe.
+/// Number of the questions that this recipe answers.
 fn answered(scene: &Scene, recipe: &Recipe, questions: &[&str]) -> usize {
     let (identities, language) = scene.language(recipe.preparation.part_weight);
     let phrases = scene.phrases(questions.iter().copied(), recipe);

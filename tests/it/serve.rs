@@ -20,7 +20,7 @@ fn scene(folder: &Path) -> PathBuf {
     folder.join("scene")
 }
 
-/// Every file in a folder with what is in it.
+/// Every file in a folder with its content.
 fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
     let entries = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
     let mut all: Vec<_> = entries.filter(|p| p.is_file()).map(|p| (p.clone(), std::fs::read(p).unwrap())).collect();

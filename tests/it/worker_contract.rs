@@ -12,7 +12,7 @@ use fmlgs::worker::{Command, Event, Failure, JobId, Jobs, Outcome, QueueFull, St
 
 const LONG: Duration = Duration::from_secs(20);
 
-/// Does what the file name of an `Open` command says.
+/// Acts by the file name of an `Open` command.
 struct Script;
 
 impl Jobs for Script {

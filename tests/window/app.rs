@@ -1,4 +1,4 @@
-//! The whole window, headless: what the user sees and does, with the software adapter.
+//! The whole window, headless: the user's view and actions, with the software adapter.
 
 mod crop;
 mod demo;
@@ -100,7 +100,7 @@ impl Window {
         self.harness.query_all_by_label_contains(text).next().is_some()
     }
 
-    /// Whether a picture of the window has more than one color.
+    /// Returns whether a picture of the window has more than one color.
     fn is_drawn(&mut self) -> bool {
         let image = self.harness.render().expect("the software adapter draws");
         let first = *image.get_pixel(0, 0);

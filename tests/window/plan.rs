@@ -17,7 +17,7 @@ use fmlgs::scene::resource_log::{self, ResourceKind};
 use fmlgs::ui::actions::{Action, Pane};
 use fmlgs::ui::app::App;
 
-/// A window and what was traced since it was opened.
+/// A window and its trace since it was opened.
 struct Window {
     harness: Harness<'static, App>,
     traced: usize,
@@ -46,7 +46,7 @@ impl Window {
         crate::ui_common::ask(&mut self.harness, action);
     }
 
-    /// Lets time pass with nobody there.
+    /// Lets time pass without input.
     fn rest(&mut self) {
         for _ in 0..10 {
             self.harness.step();
@@ -63,7 +63,7 @@ impl Window {
         self.until(&format!("{sort:?} to be loaded"), |_| resource_log::since(traced).iter().any(|l| l.kind == sort));
     }
 
-    /// After how long the window wants to be drawn again by itself.
+    /// Time after which the window wants to be drawn again by itself.
     fn next_frame(&self) -> Duration {
         let windows = &self.harness.output().viewport_output;
         windows.get(&egui::ViewportId::ROOT).map_or(Duration::MAX, |window| window.repaint_delay)
@@ -74,7 +74,7 @@ impl Window {
     }
 }
 
-/// What is loaded only once it is used.
+/// Resources that are loaded only once they are used.
 const LATER: [ResourceKind; 5] =
     [ResourceKind::Maps, ResourceKind::Thumbnails, ResourceKind::Model, ResourceKind::Paths, ResourceKind::Agent];
 

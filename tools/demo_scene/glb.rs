@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use super::mesh::Mesh;
 use super::paint::Picture;
 
-/// Positions are rounded to this share of a metre: far finer than anything seen, and coarse enough
+/// Positions are rounded to this share of a meter: far finer than anything seen, and coarse enough
 /// that the last bits of a machine's sine do not reach the file.
 const POSITION_STEPS: f64 = 65_536.0;
 /// The same for unit normals and for texture coordinates.
@@ -17,29 +17,29 @@ const UNIT_STEPS: f64 = 4_096.0;
 /// A surface.
 #[derive(Clone, Debug)]
 pub struct Look {
-    /// sRGB colour, multiplied with the picture.
+    /// sRGB color, multiplied with the picture.
     pub color: [u8; 3],
     /// Painted on.
     pub picture: Option<Picture>,
     /// 0 for a mirror, 1 for chalk.
     pub roughness: f32,
-    /// Whether it is metal.
+    /// True if it is metal.
     pub metal: bool,
     /// Linear emitted light.
     pub glow: [f32; 3],
 }
 
-/// Smooth plastic or glaze of one colour.
+/// Smooth plastic or glaze of one color.
 pub fn glossy(color: [u8; 3]) -> Look {
     Look { color, picture: None, roughness: 0.4, metal: false, glow: [0.0; 3] }
 }
 
-/// Rubber, paper or paint of one colour.
+/// Rubber, paper or paint of one color.
 pub fn matt(color: [u8; 3]) -> Look {
     Look { roughness: 0.9, ..glossy(color) }
 }
 
-/// Metal of one colour.
+/// Metal of one color.
 pub fn metal(color: [u8; 3]) -> Look {
     Look { roughness: 0.45, metal: true, ..glossy(color) }
 }
@@ -70,7 +70,7 @@ pub fn part(name: &'static str, mesh: Mesh, look: Look) -> Part {
 pub struct Object {
     /// Its name.
     pub name: &'static str,
-    /// Where its own origin stands, in metres.
+    /// Position of its own origin, in meters.
     pub position: DVec3,
     /// Turned about the vertical by this.
     pub turn_deg: f64,

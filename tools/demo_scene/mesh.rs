@@ -2,7 +2,7 @@
 
 use glam::{DAffine3, DMat3, DQuat, DVec2, DVec3};
 
-/// Indexed triangles with smooth normals and texture coordinates, in metres, y up.
+/// Indexed triangles with smooth normals and texture coordinates, in meters, y up.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
     /// Positions.
@@ -118,7 +118,7 @@ impl Mesh {
         self.with(other)
     }
 
-    /// Texture coordinates replaced by the position seen from above, in units of `size` metres.
+    /// Texture coordinates replaced by the position seen from above, in units of `size` meters.
     pub fn uv_from_above(mut self, size: f64) -> Self {
         self.uvs = self.positions.iter().map(|p| DVec2::new(p.x, p.z) / size + 0.5).collect();
         self

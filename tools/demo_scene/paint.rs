@@ -94,7 +94,7 @@ pub fn wood(side_px: u32, planks: u32, light: [f32; 3], dark: [f32; 3], seed: u3
     })
 }
 
-/// Threads over and under each other, in two colours.
+/// Threads over and under each other, in two colors.
 pub fn weave(side_px: u32, threads: u32, warp: [f32; 3], weft: [f32; 3], seed: u32) -> Picture {
     Picture::paint(side_px, |u, v| {
         let (x, y) = (u * threads as f32, v * threads as f32);
@@ -155,7 +155,7 @@ pub fn leaf(side_px: u32, green: [f32; 3], vein: [f32; 3], seed: u32) -> Picture
     })
 }
 
-/// Bands of colour along v, with soft cloth shading.
+/// Bands of color along v, with soft cloth shading.
 pub fn bands(side_px: u32, colors: &[[f32; 3]], seed: u32) -> Picture {
     Picture::paint(side_px, |u, v| {
         let at = v * colors.len() as f32;

@@ -118,7 +118,7 @@ pub fn tube(path: &[DVec3], radii: &[f64], segments: usize, closed: bool) -> Mes
         side = (side - t * side.dot(t)).try_normalize().unwrap_or_else(|| t.any_orthonormal_vector());
         frames.push((path[i], t, side, radii[i.min(radii.len() - 1)]));
     }
-    // Rings: centre, tangent, side, radius, lean of the normal along the tangent.
+    // Rings: center, tangent, side, radius, lean of the normal along the tangent.
     let mut rings: Vec<(DVec3, DVec3, DVec3, f64, f64)> = Vec::new();
     let end = |i: usize, sign: f64| {
         let (p, t, s, r) = frames[i];

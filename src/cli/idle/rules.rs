@@ -16,7 +16,7 @@ pub(super) const RECIPE: &[&str] = &[
     "tolerance",
     "not_found",
 ];
-/// Those of training ([`crate::cli::train::TrainOverrides`]).
+/// Options of training ([`crate::cli::train::TrainOverrides`]).
 const TRAINING: &[&str] = &[
     "steps",
     "max_side",
@@ -51,7 +51,7 @@ fn when(is: bool, why: &'static str) -> Option<&'static str> {
     is.then_some(why)
 }
 
-/// Whether the recipe is the paper's.
+/// Returns whether the recipe is the paper's.
 fn is_paper(g: &Given<'_>) -> bool {
     g.is("recipe", "paper")
 }
@@ -60,7 +60,7 @@ fn matches_codes(g: &Given<'_>) -> bool {
     g.has("blend") || g.is("matching", "codes") || (is_paper(g) && !g.has("matching"))
 }
 
-/// Whether a model is asked to follow masks through the photos.
+/// Returns whether a model tracks masks through the photos.
 fn tracks(g: &Given<'_>) -> bool {
     if g.has("tracker") { !g.is("tracker", "geometry") } else { is_paper(g) }
 }
@@ -69,18 +69,18 @@ fn lifts_by_votes(g: &Given<'_>) -> bool {
     if g.has("lifting") { g.is("lifting", "votes") } else { !is_paper(g) }
 }
 
-/// Whether masks come from no network.
+/// Returns whether masks come from no network.
 fn without_network(g: &Given<'_>) -> bool {
     g.has("masks") || g.is("segmenter", "files") || g.is("segmenter", "regions")
 }
 
-/// Whether a video is written whose encoder asks for no quality: frames are stored as they are.
+/// Returns whether the output is a folder of frames, which are stored as they are: no encoder asks for a quality.
 fn frames(g: &Given<'_>) -> bool {
     let out = g.texts("out").concat().to_lowercase();
     !["mp4", "m4v", "gif", "webp"].iter().any(|ending| out.ends_with(&format!(".{ending}")))
 }
 
-/// Whether only some stages are measured, and none of `these`.
+/// Returns whether only some stages are measured, and none of `these`.
 fn without_stages(g: &Given<'_>, these: &[&str]) -> bool {
     g.has("stages") && !g.texts("stages").iter().flat_map(|s| s.split(',')).any(|s| these.contains(&s))
 }

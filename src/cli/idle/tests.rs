@@ -8,7 +8,7 @@ use super::rules::{RECIPE, RULES};
 use super::{Given, check_all};
 use crate::cli::Cli;
 
-/// What some option accepts, whichever it is.
+/// Sample values; every option accepts one of them.
 const SAMPLES: [&str; 15] = [
     "1",
     "x.ply",
@@ -46,7 +46,7 @@ fn parsed(words: &[String]) -> Result<ArgMatches, String> {
     Cli::command().try_get_matches_from(line).map_err(|e| e.to_string())
 }
 
-/// Why a line is refused, if it is, by clap or by the rules.
+/// Reason for which clap or the rules refuse a line; `None` if they accept it.
 fn refusal(words: &[String]) -> Option<String> {
     match parsed(words) {
         Err(e) => Some(e),
@@ -77,7 +77,7 @@ fn typed(argument: &Arg) -> Vec<String> {
     option(Some(&found.unwrap_or_else(|| panic!("no sample for {}", argument.get_id()))))
 }
 
-/// What an argument requires, which clap shows nowhere else.
+/// Arguments that an argument requires, which clap shows nowhere else.
 fn required_by(argument: &Arg) -> Vec<String> {
     let text = format!("{argument:?}");
     let list =
@@ -168,7 +168,7 @@ fn what_is_required_is_required_whatever_else_is_given() {
     assert!(pairs > 100 && alone > 100, "{pairs} lines with a companion, {alone} alone: clap tells less than it did");
 }
 
-/// Lines in which the option is refused, and the same with what it needs: accepted. `{}` stands for each of the options.
+/// Lines in which the option is refused, and accepted with what it needs. `{}` stands for each of the options.
 const LINES: &[(&str, &[&str], &str)] = &[
     ("query s lamp {}", &["--tolerance 3", "--export o", "--truth t", "--views all", "--relevancy raw"], ""),
     ("query s lamp --match identities {}", &["--tolerance 3"], "query s lamp --match codes --tolerance 3"),

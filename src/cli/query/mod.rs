@@ -36,7 +36,7 @@ const OFFERED: usize = 3;
 pub(crate) struct QueryArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
     scene: PathBuf,
-    /// What to look for
+    /// Text of the object or part to find
     #[arg(required_unless_present = "phrases", conflicts_with = "phrases")]
     text: Option<String>,
     /// Ask every phrase of a text file, one per line, instead of one
@@ -57,7 +57,7 @@ pub(crate) struct QueryArgs {
     /// Shrink the view to at most this many px along its longer side
     #[arg(long, default_value_t = 1008, value_parser = clap::value_parser!(u32).range(16..=16384))]
     max_side: u32,
-    /// Whether an object or a part is meant
+    /// Level of the answer: an object or a part
     #[arg(long, value_enum, default_value_t = LevelFilter::Auto)]
     kind: LevelFilter,
     /// Answers whose pixels go into the mask at most

@@ -15,7 +15,7 @@ use crate::render::{
 };
 use crate::scene::{Camera, Dataset, GaussianCloud, PhotoPixels};
 
-/// How long a GPU that rests may take to wake up.
+/// Time that a GPU at rest may take to wake up.
 const WAKING: Duration = Duration::from_millis(300);
 
 /// Medians over the repetitions.

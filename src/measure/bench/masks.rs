@@ -1,4 +1,4 @@
-//! How long a network takes for the masks of everything in one photo, stage by stage.
+//! Time that a network takes for the masks of everything in one photo, stage by stage.
 
 use std::time::Instant;
 
@@ -23,9 +23,9 @@ pub(crate) struct MasksTiming {
     /// Points through the decoder.
     pub(crate) prompts: usize,
     pub(crate) prompt_secs: f64,
-    /// With loading the networks and judging the masks.
+    /// Seconds in all, with loading the networks and judging the masks.
     pub(crate) whole_secs: f64,
-    /// How many were kept.
+    /// Number of masks that were kept.
     pub(crate) masks: usize,
 }
 

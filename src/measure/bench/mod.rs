@@ -44,7 +44,7 @@ pub(crate) struct Timings {
     pub(crate) gpu: Option<String>,
     pub(crate) gpu_render: Vec<Timing>,
     pub(crate) gpu_train: Vec<Timing>,
-    /// What one core could do at most (see [`one_core_limit`]).
+    /// Limit of one core (see [`one_core_limit`]).
     pub(crate) one_core_products_per_sec: f64,
     /// Typed queries, if they were asked for.
     pub(crate) queries: Option<QueryTiming>,

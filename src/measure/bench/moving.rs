@@ -1,4 +1,4 @@
-//! What is drawn of many Gaussians while the eye moves: how fast, and how close to the picture of all of them.
+//! Drawing of many Gaussians while the camera moves: its time, and its PSNR against the picture of all of them.
 
 use std::sync::Arc;
 use std::time::Instant;

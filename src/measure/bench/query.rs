@@ -1,4 +1,4 @@
-//! How long a typed query takes, stage by stage, on a made-up view with many identities.
+//! Time of a typed query, stage by stage, on a made-up view with many identities.
 
 use std::time::Instant;
 

@@ -1,4 +1,4 @@
-//! How long a stroke takes that selects Gaussians or corrects what is selected.
+//! Time of a stroke that selects Gaussians or corrects a selection.
 
 use serde::Serialize;
 

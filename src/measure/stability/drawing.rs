@@ -12,7 +12,7 @@ use crate::scene::{Camera, GaussianCloud};
 /// Largest deviation of a color from double precision that an image may have.
 const BOUND: f64 = 1e-4;
 
-/// One Gaussian in the middle, of this shape.
+/// A Gaussian in the middle, of this shape.
 pub(crate) fn one(scales: [f64; 3], quaternion: [f64; 4], opacity_logit: f64) -> GaussianCloud<f64> {
     GaussianCloud {
         positions: vec![[0.0; 3]],
@@ -56,7 +56,7 @@ pub(crate) fn deviation(exact: &Frame<f64>, single: &Frame<f32>) -> f64 {
     worst(color.chain([worst_difference(&exact.alpha, &single.alpha)]))
 }
 
-/// What a case is about to show.
+/// Expected image of a case.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Expected {
     /// Something is drawn, alike in both precisions.
@@ -71,8 +71,8 @@ enum Expected {
     TooLarge,
 }
 
-/// What a renderer might do wrong in such an image, as little of it as the promise allows to be seen: a
-/// color off by twice the bound, a speck where nothing is to be, a pixel that is NaN.
+/// Plants a fault of a renderer in such an image, the least that the promise rules out: a color off by twice
+/// the bound, a speck in an empty image, a pixel that is NaN.
 fn spoil(expected: Expected, exact: &Frame<f64>, single: &mut Frame<f32>) {
     let middle = single.alpha.len() / 2;
     match expected {

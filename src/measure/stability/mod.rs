@@ -25,7 +25,7 @@ use super::table::{Rows, rows};
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Verdict {
     Holds,
-    /// What came out is finite, but there is nothing to hold it against: no precision knows better.
+    /// The result is finite, but there is nothing to compare it with: no precision is more exact.
     NotCompared,
     Broken,
 }
@@ -71,7 +71,7 @@ impl Finding {
         Self { verdict, ..self }
     }
 
-    /// Whether the promise was seen to break.
+    /// Returns whether the promise was seen to break.
     pub(crate) fn is_broken(&self) -> bool {
         self.verdict == Verdict::Broken
     }
@@ -80,7 +80,7 @@ impl Finding {
 pub(crate) struct Case {
     pub(crate) area: &'static str,
     pub(crate) name: String,
-    /// Runs it, with a fault planted if told so.
+    /// Runs the case, with a planted fault if true.
     run: Box<dyn Fn(bool) -> Finding + Send + Sync>,
 }
 
@@ -93,7 +93,7 @@ pub(crate) struct Checked {
 }
 
 impl Case {
-    /// A case. What runs it plants a fault where it is told to.
+    /// A case. `run` plants a fault if its argument is true.
     pub(crate) fn new(
         area: &'static str,
         name: impl Into<String>,

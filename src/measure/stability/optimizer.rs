@@ -9,7 +9,7 @@ use crate::render::cpu::adam::AdamStep;
 use crate::render::{Features, RenderSettings};
 use crate::scene::GaussianCloud;
 
-/// What happens to one Gaussian at one step of a training.
+/// Disturbance of one Gaussian at one step of a training.
 #[derive(Clone, Copy, PartialEq)]
 enum Hit {
     Nothing,

@@ -61,8 +61,8 @@ pub(super) struct ShortTraining {
     pub(super) left: [usize; 2],
 }
 
-/// Trains for so many steps, and does something before each. No case here expects a training to stop: one
-/// that does is a broken promise, whatever its reason.
+/// Trains for `steps` steps, and calls `before` ahead of each. No case here expects a training to stop: one that does
+/// is a broken promise.
 pub(super) fn train(
     mut trainer: Trainer,
     view: TrainView,
@@ -154,6 +154,7 @@ fn resumed(faulty: bool) -> Finding {
             (t.rng, t.round, t.step) = (saved.header.rng, saved.header.round, saved.header.step);
             Ok(t)
         };
+        // The control: without first moments of positions, a training has to end elsewhere.
         let mut forgetful = loaded()?;
         forgetful.moments[0].positions.fill([0.0; 3]);
         let mut again = loaded()?;

@@ -11,7 +11,7 @@ use crate::render::{Cutoffs, Features, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud};
 
 struct Variant {
-    /// Whether the mean along the ray is taken, not the depth at which half of the light is spent.
+    /// True for the mean along the ray; false for the depth at which half of the light is spent.
     expected: bool,
     smaller: u32,
     settings: RenderSettings,

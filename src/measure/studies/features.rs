@@ -24,13 +24,13 @@ use crate::scene::semantic_map::CODE_CHANNELS;
 use crate::scene::{GaussianCloud, Identities, IdentityId, Level, Mask, NOBODY};
 
 struct Variant {
-    /// How the program finds them; else votes alone.
+    /// Options of tracking as the program does it; `None` for votes alone.
     track: Option<TrackOptions>,
     /// Views that vote; none vote for nothing.
     views: usize,
     /// Steps of gradients after that.
     steps: u64,
-    /// Whether blended codes within the tolerance of the target's are read, not the identity of largest weight.
+    /// True if an answer is blended codes within the tolerance of the target's, not the identity of largest weight.
     blend: bool,
 }
 

@@ -1,4 +1,4 @@
-//! What is swept, one file per stage of the program.
+//! Sweeps of the report, one file per stage of the program.
 
 pub(crate) mod depth;
 pub(crate) mod features;
@@ -14,7 +14,7 @@ use std::time::Instant;
 use super::document::{ErrorKind, Measure};
 use super::sweep::{StudyError, SweepCase};
 
-/// What a sweep is run on, in words: name and value.
+/// Input of a sweep in words: name and value.
 pub(crate) type StudyInput = BTreeMap<String, String>;
 
 /// Settings of a stage, each with what it means to the study: the default first.
@@ -30,7 +30,7 @@ impl<V> Variants<V> {
     }
 }
 
-/// What is drawn, and the seconds that took: the second time, as buffers are kept from image to image.
+/// Draws twice and returns the second result with its seconds, as buffers are kept from image to image.
 fn timed<F>(mut draw: impl FnMut() -> Result<F, StudyError>) -> Result<(F, f64), StudyError> {
     draw()?;
     let start = Instant::now();

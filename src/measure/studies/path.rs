@@ -135,7 +135,7 @@ struct Faults {
     steps: f64,
     /// Share of the places along it that are nearer to occupied space than wanted.
     near: f64,
-    /// By how much the way from pose to pose is shorter than the way itself, relative.
+    /// Share by which the path from pose to pose is shorter than the path itself.
     short: f64,
     /// Largest turn of a step, radians.
     turn: f64,
@@ -165,7 +165,7 @@ fn faults(flight: &CameraTrajectory, navigator: &Navigator) -> Faults {
     }
 }
 
-/// How fast the way over some places, corners rounded, comes near the curve that they were taken from, here a
+/// Order at which the length of a path over some places, corners rounded, converges to that of their curve, here a
 /// quarter of a circle: chords are of second order.
 fn length_order() -> Order {
     let exact = std::f64::consts::FRAC_PI_2;
@@ -180,7 +180,7 @@ fn length_order() -> Order {
     Order::fit("samples along a way", meaning, pairs.to_vec(), 2.0, 0.1, 1e-13)
 }
 
-/// How fast the pieces of a rounded corner come near the parabola's own length.
+/// Order at which the pieces of a rounded corner converge to the parabola's own length.
 fn corner_order() -> Order {
     // Of the parabola that touches two legs of length 1 at a right angle.
     let exact = 1.0 + (1.0 + 2.0_f64.sqrt()).ln() / 2.0_f64.sqrt();
@@ -193,7 +193,7 @@ fn corner_order() -> Order {
     Order::fit("pieces of a rounded corner", meaning, pairs.to_vec(), 2.0, 0.2, 1e-13)
 }
 
-/// How fast rotations between keys come near a smooth turn that the keys were taken from.
+/// Order at which rotations between keys converge to the smooth turn of the keys.
 fn turning_order() -> Order {
     let turn = |t: f64| -> DMat3 {
         DMat3::from_quat(DQuat::from_scaled_axis(DVec3::new(0.9 * t.sin(), 0.7 * t * t, 1.3 * t)))

@@ -231,7 +231,7 @@ fn ask(
     }
 }
 
-/// The pixels of the best answer, whatever its score: it is asked where, not whether.
+/// Pixels of the best answer at any score: the study measures its place, not its rejection.
 fn found(answered: &QueryAnswer, exact: &ViewMap, blended: &CodeMap, map: &SemanticMap, variant: &Variant) -> Mask {
     let Some(best) = answered.answer.hits().first().map(|h| h.identity) else {
         return Mask::empty(exact.width_px, exact.height_px);

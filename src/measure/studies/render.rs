@@ -19,7 +19,7 @@ use crate::scene::{Camera, GaussianCloud};
 
 /// Cut-offs of the exact image.
 const EXACT: Cutoffs = Cutoffs { alpha: 1e-6, transmittance: 1e-8 };
-/// How much smaller images are that are seen from afar.
+/// Factor by which images seen from afar are smaller.
 const AFAR: u32 = 4;
 /// Turn of the camera, degrees, since an order of splats was found that is used again.
 const TURNS: [f64; 3] = [0.5, 2.0, 8.0];
@@ -157,6 +157,7 @@ impl Drawing {
                 let mut once = |camera: &Camera, s: &RenderSettings| {
                     renderer.render(&self.cloud, Features::NONE, camera, s).map_err(failed)
                 };
+                // The first frame finds the order of splats that the timed one keeps.
                 once(&before, settings)?;
                 let start = Instant::now();
                 let frame = once(camera, &keep)?;

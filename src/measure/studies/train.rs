@@ -79,7 +79,7 @@ fn variants(base: &TrainConfig) -> Result<Variants<TrainConfig>, StudyError> {
     Ok(all)
 }
 
-/// Passes the wish to stop on, and nothing back.
+/// Observer that passes the signal to stop on, and reports nothing.
 struct Quiet<'a>(&'a mut dyn Observer);
 
 impl Observer for Quiet<'_> {

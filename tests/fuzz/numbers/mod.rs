@@ -1,5 +1,5 @@
-//! Fuzzing of numbers: random scenes, cameras, settings, embeddings and paths full of adversarial values, compared
-//! with what must be true of any of them.
+//! Fuzzing of numbers: random scenes, cameras, settings, embeddings and paths full of adversarial values, checked
+//! against properties that hold for all of them.
 //!
 //! The promise is that nothing panics, nothing hangs, and what comes out is finite, or a refusal by name; where single
 //! and double precision are both defined they agree as far as the input's own condition allows. Every input follows
@@ -24,14 +24,14 @@ const HANG: Duration = Duration::from_secs(120);
 const ROUNDS: u64 = 150;
 const MANY_ROUNDS: u64 = 20_000;
 
-/// How an input fared.
+/// Verdict on an input.
 #[derive(Clone, Debug, PartialEq)]
 enum Verdict {
     /// All that was promised.
     Held,
-    /// It was refused by name.
+    /// The input was refused with a named error.
     Refused,
-    /// What came out is finite, but single and double precision are not both defined, or not of the same
+    /// The result is finite, but single and double precision are not both defined, or not of the same
     /// Gaussians: there is nothing to compare it with.
     NotCompared,
     /// A promise was broken.
@@ -51,7 +51,7 @@ use promise;
 /// Makes an input and judges it.
 type Trial = fn(&mut Numbers) -> Verdict;
 
-/// What is fuzzed.
+/// Areas that are fuzzed.
 const AREAS: [(&str, Trial); 7] = [
     ("drawing", scenes::drawing),
     ("gradients", scenes::gradients),
@@ -62,7 +62,7 @@ const AREAS: [(&str, Trial); 7] = [
     ("moving", ways::moving),
 ];
 
-/// What was found in an area: how inputs fared, and broken promises.
+/// Result of an area: verdicts on inputs, and broken promises.
 #[derive(Debug, Default)]
 struct Found {
     held: u64,

@@ -122,7 +122,7 @@ fn planes<R>(frame: &Frame<R>) -> impl Iterator<Item = &Vec<R>> {
     color.iter().chain(features).chain([alpha, depth, median_depth, distortion]).chain(normals)
 }
 
-/// What both precisions drew, if the input was taken.
+/// Frames of both precisions, if the input was accepted.
 struct Drawn {
     wide: GaussianCloud<f64>,
     single: CpuRenderer<f32>,
@@ -140,7 +140,7 @@ fn draw(cloud: &GaussianCloud, camera: &Camera, settings: &RenderSettings) -> Op
 }
 
 impl Drawn {
-    /// Whether both precisions drew the same Gaussians.
+    /// Returns whether both precisions drew the same Gaussians.
     fn comparable(&self) -> bool {
         let (a, b) = (self.single.stats(), self.double.stats());
         (a.visible, a.degenerate) == (b.visible, b.degenerate)
@@ -204,7 +204,7 @@ fn brightness(exact: &Frame<f64>) -> f64 {
     exact.color.iter().flatten().fold(1.0, |m, v| m.max(*v))
 }
 
-/// How many pixels deviate by more than their bound, and the largest deviation in units of it.
+/// Number of pixels that deviate by more than their bound, and the largest deviation in units of it.
 fn off((frame, exact): &(Frame<f32>, Frame<f64>), spread: &[[f64; 4]], scale: f64, slack: f64) -> (usize, f64) {
     let each = spread.iter().enumerate().map(|(i, spread)| {
         let one = |c: usize| match c {

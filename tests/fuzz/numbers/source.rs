@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-/// Numbers that are special to somebody.
+/// Numbers that are special to some code.
 const SPECIAL: [f32; 12] =
     [0.0, -0.0, 1.0, -1.0, 0.5, 255.0, f32::EPSILON, f32::MIN_POSITIVE, 1e-45, f32::MAX, f32::MIN, 16_777_217.0];
 
@@ -16,7 +16,7 @@ pub struct Numbers {
     rng: Pcg64Mcg,
     /// Share of numbers that are adversarial.
     share: f64,
-    /// Whether some may be NaN or infinite.
+    /// True if some may be NaN or infinite.
     poison: bool,
     /// Adversarial values so far, and the places among them that are made ordinary.
     given: Vec<f64>,
@@ -24,7 +24,7 @@ pub struct Numbers {
 }
 
 impl Numbers {
-    /// Those of one input of one area.
+    /// Numbers of one input of one area.
     pub fn new(seed: u64, area: &str) -> Self {
         let area = area.bytes().fold(0_u64, |h, b| h.wrapping_mul(31).wrapping_add(u64::from(b)));
         let mut rng = Pcg64Mcg::seed_from_u64(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15).wrapping_add(area));
@@ -43,7 +43,7 @@ impl Numbers {
         self.tamed.insert(place);
     }
 
-    /// How many adversarial values there were, tamed ones included.
+    /// Number of adversarial values so far, tamed ones included.
     pub fn adversarial(&self) -> usize {
         self.given.len()
     }

@@ -1,14 +1,14 @@
-//! An encoder in the room to which everything looks like the piano: names come first, and what only looks so is never
-//! acted on without a question.
+//! An encoder in the room to which everything looks like the piano: names come first, and an answer by embedding alone
+//! is never acted on without a question.
 
 use super::{done, say, session};
 use crate::agent_common::room::Room;
 use crate::agent_common::table::outcome;
 
-/// What is said, what is done, and how it ends; to the encoder that comes with the program and to one of photos.
+/// Sentence, calls and end; to the encoder that comes with the program and to one of photos.
 struct Row(&'static str, &'static [&'static str], &'static str);
 
-/// What names answer, whichever encoder there is.
+/// Requests that names answer, with any encoder.
 const BY_NAME: [Row; 22] = [
     Row("hide everything except the two controllers", &["isolate(red controller)", "isolate(blue controller)"], "done"),
     Row("show only the mug and the lamp", &["isolate(mug)", "isolate(lamp)"], "done"),
@@ -38,7 +38,7 @@ const BY_NAME: [Row; 22] = [
     Row("hide it", &[], "unclear"),
 ];
 
-/// What no name knows, with an encoder that knows made-up things alone: it is not there.
+/// Requests for things of no name, with an encoder that knows made-up things alone: they are not found.
 const ABSENT: [Row; 12] = [
     Row("show me the banana", &[], "not_found"),
     Row("hide the robot", &[], "not_found"),

@@ -24,7 +24,7 @@ pub struct Room {
     eye: DVec3,
     forward: DVec3,
     undo: Vec<(Identities, Vec<bool>, Vec<bool>, String)>,
-    /// What was done to it, in order.
+    /// Actions in the room, in order.
     pub log: Vec<String>,
     /// Length of a unit in meters, if that is known.
     pub meters: Option<f64>,
@@ -114,7 +114,7 @@ impl Room {
         Self { encoder, ..Self::new() }
     }
 
-    /// What the encoder makes of everything: the piano is like any phrase, the rest a little less. Both are so near to
+    /// Embeddings of the encoder: the piano is like any phrase, the rest a little less. Both are so near to
     /// the canonical phrases as pictures are; scores of much more are all nearly 1, and alike.
     fn looks(&self, encoder: &str) -> LanguageFeatures {
         let view = |name: &[String]| if name == ["piano"] { vec![0.8, 0.6] } else { vec![0.75, 0.661_437_8] };

@@ -1,4 +1,4 @@
-//! A chat model's server on this machine that says what a test wants, well or badly.
+//! A chat model's server on this machine that replies as a test wants, well or badly.
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{TcpListener, TcpStream};
@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use serde_json::{Value, json};
 
-/// What the server does with one request.
+/// Response of the server to one request.
 #[derive(Clone, Debug)]
 pub enum Say {
     /// These calls: a tool's name and its arguments, as written.
@@ -83,7 +83,7 @@ impl Server {
         self.seen.lock().expect("log").len()
     }
 
-    /// Whether every call that went back to the model has its one result, in order.
+    /// Returns whether every call that went back to the model has its one result, in order.
     pub fn is_well_formed(&self) -> bool {
         self.seen.lock().expect("log").iter().all(|seen| {
             let body = seen.json();

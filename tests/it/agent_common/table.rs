@@ -20,16 +20,16 @@ pub struct Dialog {
     pub turns: Vec<Turn>,
 }
 
-/// One request and what the user would want of it.
+/// One request and its expected outcome.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Turn {
     pub say: String,
     /// The calls that are done.
     pub calls: Vec<String>,
-    /// How it ends; alternatives with '|'.
+    /// End of the request; alternatives with '|'.
     pub outcome: String,
-    /// What the reply must contain, each entry with alternatives.
+    /// Words that the reply must contain, each entry with alternatives.
     #[serde(default)]
     pub reply: Vec<String>,
 }
@@ -67,12 +67,12 @@ pub struct Wording {
     pub example: String,
     pub say: Vec<String>,
     pub calls: Vec<Vec<String>>,
-    /// What is said before, so that there is something to take up.
+    /// Sentences said before, so that there is something to refer to.
     #[serde(default)]
     pub after: Vec<String>,
 }
 
-/// How many requests went as wanted, and how many were unsafe.
+/// Numbers of requests with the expected outcome, of all, and of unsafe ones.
 #[derive(Debug, Default)]
 pub struct Tally {
     pub right: usize,
@@ -81,7 +81,7 @@ pub struct Tally {
     pub wrong: Vec<String>,
 }
 
-/// How a reply ends a request.
+/// End of a request by its reply.
 pub fn outcome(reply: &Reply) -> &'static str {
     match (&reply.refused, reply.pending) {
         (_, Some(Awaited::Confirmation)) => "confirm",
@@ -107,7 +107,7 @@ fn matches_line(wanted: &str, got: &str) -> bool {
     })
 }
 
-/// One request in a session; `Err` says what is not as wanted. The second value is whether something
+/// Runs one request in a session; `Err` names the deviation from the table. The second value is true if something
 /// unsafe was done.
 pub fn ask(session: &mut Session, room: &mut Room, turn: &Turn) -> (Result<(), String>, bool) {
     let before = room.log.len();

@@ -1,4 +1,4 @@
-//! Servers on this machine: found, tested, and told nothing of a scene.
+//! Servers on this machine: found and tested, without any data of a scene.
 
 use super::*;
 

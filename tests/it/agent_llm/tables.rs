@@ -48,8 +48,8 @@ fn as_call(line: &str) -> Option<(String, String)> {
     Some((name.into(), arguments.to_string()))
 }
 
-/// What a model would say in a dialog of the table to do what is wanted; `None` where the table leaves
-/// that open, or the words of the built-in planner are what counts.
+/// Replies of a model in a dialog of the table to do what is wanted; `None` where the table leaves that open, or the
+/// words of the built-in planner are what counts.
 fn script(turns: &[Turn]) -> Option<Vec<Say>> {
     let model_call = |line: &String| as_call(line).filter(|_| !line.contains(['*', '|'])).map(|c| Say::Calls(vec![c]));
     let mut says = Vec::new();

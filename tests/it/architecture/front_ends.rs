@@ -22,7 +22,7 @@ const AT_WORK: [&str; 10] = [
     "Trainer",
 ];
 
-/// What of them front ends may name nevertheless: paths or beginnings of paths.
+/// Exceptions that front ends may name: paths or beginnings of paths.
 const ALLOWED: [(&str, &str); 19] = [
     ("io::files::read", "a file of settings: the agent's policy"),
     ("io::http", "the way to a chat model is the agent's own"),

@@ -29,7 +29,7 @@ pub fn type_names(files: &[SourceFile]) -> Vec<Complaint> {
     complaints
 }
 
-/// What defines a type.
+/// Keywords that define a type.
 const KINDS: [&str; 5] = ["struct", "enum", "trait", "type", "union"];
 
 /// An item that others can see, without its visibility.
@@ -39,7 +39,7 @@ fn visible(line: &str) -> Option<&str> {
     rest.strip_prefix(' ')
 }
 
-/// Whether a name is written as types are: `Name`, not `NAME` or `name`.
+/// Returns whether a name is written as types are: `Name`, not `NAME` or `name`.
 fn is_type(name: &str) -> bool {
     let mut letters = name.chars();
     letters.next().is_some_and(char::is_uppercase) && letters.next().is_some_and(char::is_lowercase)

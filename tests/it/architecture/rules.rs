@@ -1,4 +1,4 @@
-//! The rules: each takes the tree and returns what is wrong with it.
+//! The rules: each takes the tree and returns the violations.
 
 use super::source::{SourceFile, library_code, test_module_files};
 
@@ -181,7 +181,7 @@ pub fn top_module(path: &str) -> Option<&str> {
     }
 }
 
-/// How many `super::` lead from the file to the crate's root.
+/// Number of `super::` from the file to the crate's root.
 fn depth(path: &str) -> usize {
     let inside = path.strip_prefix("src/").unwrap_or(path);
     inside.split('/').filter(|part| *part != "mod.rs").count()
@@ -264,7 +264,7 @@ pub fn habits(files: &[SourceFile]) -> Vec<Complaint> {
     complaints
 }
 
-/// Whether the braces after a type's name at `at` make a new value: no definition, no change of another one's fields.
+/// Returns whether the braces after a type's name at `at` make a new value: no definition, no struct update.
 fn is_literal(flat: &str, at: usize) -> bool {
     let before = flat[..at].trim_end();
     let inside = flat[at..].split('}').next().unwrap_or_default();
@@ -310,7 +310,7 @@ pub fn cycles(files: &[SourceFile]) -> Vec<Complaint> {
     complaints
 }
 
-/// Where a file of `src` stands below the crate's root.
+/// Module path of a file of `src` below the crate's root.
 pub fn place_of(path: &str) -> Vec<String> {
     let inside = path.strip_prefix("src/").unwrap_or(path).trim_end_matches(".rs").trim_end_matches("/mod");
     inside.split('/').map(str::to_owned).collect()
@@ -335,7 +335,7 @@ pub fn used_paths(code: &str, place: &[String]) -> Vec<Vec<String>> {
     paths
 }
 
-/// The paths of `a::{b, c::d}` after `base`, as far as they are names.
+/// Paths of `a::{b, c::d}` after `base` that are names.
 fn expand(rest: &str, base: Vec<String>, paths: &mut Vec<Vec<String>>) {
     let rest = rest.trim_start();
     if let Some(group) = rest.strip_prefix('{') {

@@ -1,4 +1,4 @@
-//! What is wrong is told before anything runs; what fails later is recorded.
+//! Invalid input is reported before anything runs; later failures are recorded.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! What a scene is compared with: photos before their own background, and whether training saw them.
+//! Photos that a scene is compared with: with their own background, seen in training or not.
 
 use std::path::{Path, PathBuf};
 
@@ -18,7 +18,7 @@ fn train(photos: &Path, out: &Path, steps: &str, more: &[&str]) {
     fmlgs(&[&all[..], &["--eval-every", "0", "-q"], more].concat()).ok();
 }
 
-/// What `fmlgs eval` measures.
+/// Measurements of `fmlgs eval`.
 fn eval(scene: &Path, more: &[&str]) -> Value {
     fmlgs(&[&["eval", text(scene), "--json"], more].concat()).ok().json()
 }

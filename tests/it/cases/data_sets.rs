@@ -68,7 +68,7 @@ fn copy_all(from: &Path, to: &Path) {
     }
 }
 
-/// What `fmlgs info --json` says.
+/// Output of `fmlgs info --json`.
 #[track_caller]
 pub fn info(path: &Path) -> Value {
     fmlgs(&["info", path.to_str().expect("a name"), "--json"]).ok().json()

@@ -1,4 +1,4 @@
-//! What a person has made is kept on the command line, too: objects found anew, trainings gone on with, things removed.
+//! Work of the user is kept on the command line, too: objects found anew, trainings resumed, things removed.
 
 use std::path::{Path, PathBuf};
 
@@ -23,7 +23,7 @@ fn map(scene: &Path) -> SemanticMap {
     semantic_map::load(scene, loaded.state.as_deref(), &loaded.cloud).expect("readable").expect("objects")
 }
 
-/// The Gaussians of what has this name first; none if nothing has.
+/// Gaussians of the first identity with this name; none if there is none.
 fn own(map: &SemanticMap, name: &str) -> Vec<usize> {
     let id = map.identities.iter().find(|(_, i)| i.names.first().is_some_and(|n| n == name)).map(|(id, _)| id);
     id.map_or_else(Vec::new, |id| (0..map.identity_of.len()).filter(|i| map.identity_of[*i] == id).collect())

@@ -53,7 +53,7 @@ fn a_panorama_is_named_and_what_to_do_with_it() {
     assert!(read.contains("lens that sees 120 x 90 degrees; undistorted to a pinhole, 93 x 76 degrees"), "{read}");
 }
 
-/// What a camera sees in a direction: stripes across and down.
+/// Color that a camera sees in a direction: stripes across and down.
 fn world(x: f64, y: f64) -> [f64; 3] {
     [128.0 + 100.0 * (9.0 * x).sin(), 128.0 + 100.0 * (7.0 * y).cos(), 90.0]
 }

@@ -12,14 +12,14 @@ pub const BALLS: [([f64; 3], f64); 2] = [([0.0, 0.0, 0.0], 1.0), ([0.9, 0.5, 0.7
 const FOV: f64 = 0.7;
 const DISTANCE: f64 = 4.0;
 
-/// What is photographed, and how.
+/// Settings of made-up photos of an object.
 #[derive(Clone, Copy)]
 pub struct ObjectPhotos {
     pub side_px: u32,
     pub views: usize,
     /// Every so many photos are for testing.
     pub test_every: usize,
-    /// What is behind the thing; `None` = transparent.
+    /// Color behind the object; `None` = transparent.
     pub backdrop: Option<[u8; 3]>,
     /// Scene units of the larger ball's radius.
     pub scale: f64,
@@ -61,7 +61,7 @@ impl ObjectPhotos {
         write(&folder.join("transforms.json"), &json!({ "camera_angle_x": FOV, "frames": frames }));
     }
 
-    /// Where the cameras are: all around, by the golden angle.
+    /// Camera positions: all around, by the golden angle.
     pub fn eye(&self, i: usize) -> DVec3 {
         let z = 1.0 - 1.6 * (i as f64 + 0.5) / self.views as f64;
         let (sin, cos) = (i as f64 * 2.399_963).sin_cos();
@@ -82,7 +82,7 @@ impl ObjectPhotos {
         DMat3::from_cols(right, back.cross(right), back)
     }
 
-    /// What photo `i` shows, the mean of nine samples a pixel.
+    /// Renders photo `i`, the mean of nine samples a pixel.
     pub fn photo(&self, i: usize) -> RgbaImage {
         let (axes, eye) = (self.axes(i), self.eye(i) / self.scale);
         let half = (0.5 * FOV).tan();

@@ -54,7 +54,7 @@ pub fn text(path: &Path) -> &str {
     path.to_str().unwrap()
 }
 
-/// The picture that `fmlgs render` draws of a file, and what it tells.
+/// Picture that `fmlgs render` draws of a file, and its warnings.
 fn picture(path: &Path, more: &[&str]) -> (RgbImage, String) {
     let folder = folder();
     let out = folder.path().join("a.png");

@@ -1,4 +1,4 @@
-//! What counts in training: transparent pixels, masks, scenes without points, one camera among others.
+//! Pixels and points that count in training: transparent pixels, masks, scenes without points, one camera among others.
 
 use std::fs;
 use std::path::Path;
@@ -171,7 +171,7 @@ fn transparent_holes_and_corners_are_passed_over() {
     assert!(info(folder.path())["alpha"].is_null());
 }
 
-/// What is under the black of the masks changes nothing.
+/// Pixels under the black of the masks change nothing.
 fn masked_pixels_do_not_count(data: &Path, masked: impl Fn(u32, u32) -> bool, photos: &Path) {
     let folder = folder();
     let clouds = [false, true].map(|change| {

@@ -1,4 +1,4 @@
-//! The table of docs/formats.md that says what is passed over, and with which words: the program has these words.
+//! The table of docs/formats.md of data that is passed over, and the words for it: the program has these words.
 //!
 //! Every phrase in double quotes in the table's last column is looked for among the texts of the program. `…` stands
 //! for whatever the program fills in.

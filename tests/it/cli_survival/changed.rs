@@ -1,4 +1,4 @@
-//! What changes under a training: its photos and poses while it rests, its folder while it runs.
+//! Changes under a training: its photos and poses while it rests, its folder while it runs.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! A disk that is full, a folder that cannot be written to, and nobody left who reads what is told.
+//! A disk that is full, a folder that cannot be written to, and standard error without a reader.
 
 use super::*;
 

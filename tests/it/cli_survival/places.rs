@@ -1,4 +1,4 @@
-//! Where no result may lie: among the files of any data set, also of one that the command does not read.
+//! Folders that no result may be written to: those of any data set, also of one that the command does not read.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! What is written file by file: all objects of a scene, and the demo as it is unpacked.
+//! Output written file by file: all objects of a scene, and the demo as it is unpacked.
 
 use super::*;
 

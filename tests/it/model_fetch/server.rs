@@ -1,4 +1,4 @@
-//! A server on this machine that does with each request what a test wants.
+//! A server on this machine that answers each request as a test wants.
 
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-/// What the server does with one request.
+/// Response of the server to one request.
 #[derive(Clone, Copy, Debug)]
 pub enum Turn {
     /// Serves it, or the range that was asked for.
@@ -21,11 +21,11 @@ pub enum Turn {
     Page,
     /// This status and nothing else.
     Status(u16),
-    /// Sends whoever asks to another address.
+    /// Redirects the client to another address.
     Redirect(&'static str),
     /// From now on another file.
     Change,
-    /// Serves all of it, whatever range was asked for.
+    /// Serves all of it, without regard to the requested range.
     IgnoreRange,
     /// A range that was not asked for.
     WrongRange,
@@ -147,7 +147,7 @@ fn answer(stream: &mut TcpStream, turn: Turn, version: u8, log: &Log) -> std::io
     }
 }
 
-/// Sends until nobody takes any more.
+/// Sends until the client closes the connection.
 fn pour(stream: &mut TcpStream, chunked: bool) -> std::io::Result<()> {
     let coding = if chunked { "Transfer-Encoding: chunked\r\n" } else { "" };
     stream.write_all(format!("HTTP/1.1 200 OK\r\n{coding}Connection: close\r\n\r\n").as_bytes())?;

@@ -87,7 +87,7 @@ pub fn error(got: &[f32], expected: &[f32]) -> f64 {
 /// Bound on [`error`].
 pub const TOLERANCE: f64 = 1e-3;
 
-/// Asserts that `got` agrees and that `wrong`, what a faulty program would give, does not.
+/// Asserts that `got` agrees and that `wrong`, the output of a faulty program, does not.
 pub fn agrees(what: &str, got: &[f32], wrong: &[f32], expected: &[f32]) {
     let (right, control) = (error(got, expected), error(wrong, expected));
     println!("{what}: relative error {right:.1e}, negative control {control:.1e}");

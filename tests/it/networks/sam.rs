@@ -127,7 +127,7 @@ fn options(settings: &Value, area: &Value, per_side: &Value) -> AutomaticOptions
     }
 }
 
-/// What is kept of the stored logits.
+/// Masks that are kept of the stored logits.
 fn kept(known: &Value, t: &Tensors, kind: &str, options: &AutomaticOptions) -> Vec<AutomaticMask> {
     let size = (known["width"].as_u64().expect("w") as usize, known["height"].as_u64().expect("h") as usize);
     let (step, shift) = (known["step"].as_f64().expect("step") as f32, known["shift"].as_f64().expect("shift") as f32);

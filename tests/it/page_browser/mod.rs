@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use image::RgbImage;
 use serde_json::{Value, json};
 
-/// How long anything may take: machines of tests are slow, and draw without a GPU.
+/// Time that anything may take: machines of tests are slow, and draw without a GPU.
 const PATIENCE: Duration = Duration::from_secs(300);
 /// The key that WebDriver calls elements by.
 const ELEMENT: &str = "element-6066-11e4-a52e-4f735466cecf";
@@ -101,7 +101,7 @@ impl Browser {
         }
     }
 
-    /// What a script returns.
+    /// Value that a script returns.
     pub fn run(&self, script: &str) -> Value {
         self.post("/execute/sync", &json!({ "script": script, "args": [] }))
     }
@@ -135,7 +135,7 @@ impl Browser {
         self.post("/actions", &json!({ "actions": [{ "type": "pointer", "id": "mouse", "actions": actions }] }));
     }
 
-    /// What the window shows.
+    /// Screenshot of the window.
     pub fn picture(&self) -> RgbImage {
         let mut answer = self.agent.get(format!("{}/screenshot", self.session)).call().unwrap();
         let text = answer.body_mut().with_config().limit(256 << 20).read_to_string().unwrap();
@@ -144,7 +144,7 @@ impl Browser {
         image::load_from_memory(&bytes).unwrap().to_rgb8()
     }
 
-    /// What its console complained about, and the addresses of all requests so far.
+    /// Complaints of its console, and the addresses of all requests so far.
     pub fn complaints_and_requests(&self) -> (Vec<String>, Vec<String>) {
         let log = |kind: &str| self.post("/se/log", &json!({ "type": kind }));
         let entries = log("browser");

@@ -1,11 +1,11 @@
-//! What semantic deviation does to parts, over all views of a part and of its whole.
+//! Effect of semantic deviation on parts, over all views of a part and of its whole.
 
 use fmlgs::pipeline::semantics::relevancy::{advantage, deviate};
 use fmlgs::scene::PART_WEIGHT;
 
 use super::{Scene, load};
 
-/// What semantic deviation does to a part, over all pairs of a view of the part and one of a whole.
+/// Effect of semantic deviation on a part, over all pairs of a view of the part and one of a whole.
 #[derive(Debug)]
 struct Deviated {
     /// Mean advantage of the part for its own query.
@@ -48,7 +48,7 @@ impl Scene {
     }
 }
 
-/// What docs/measured.md says of deviation on real features. The scene has two parts whose wholes are asked for too.
+/// Claims of docs/measured.md about deviation on real features. The scene has two parts whose wholes are asked for too.
 #[test]
 fn deviation_lifts_real_parts_over_other_things_and_hardly_over_their_wholes() {
     let Some(scene) = load() else { return };

@@ -1,4 +1,4 @@
-//! Whoever means no good: refused, nothing written, memory flat, and those who know the token are answered meanwhile.
+//! Hostile clients: refused, nothing written, memory flat; clients with the token are answered meanwhile.
 
 use std::io::Write;
 use std::net::TcpStream;

@@ -1,4 +1,4 @@
-//! Either side is killed at random moments: the other goes on, and what comes back is taken up again.
+//! Either side is killed at random moments: the other continues, and a client that reconnects is taken up again.
 
 use std::net::TcpListener;
 use std::process::Stdio;

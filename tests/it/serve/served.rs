@@ -11,7 +11,7 @@ use crate::cli_support::command;
 /// A server that runs; it is killed at the end.
 pub struct Served {
     pub child: Child,
-    /// What it printed to connect by.
+    /// Address with the token, as printed.
     pub url: String,
     pub at: String,
     pub token: String,
@@ -48,7 +48,7 @@ impl Served {
         format!("{line} HTTP/1.1\r\nHost: {at}\r\nAuthorization: Bearer {token}\r\nfmlgs-protocol: 1.0\r\n")
     }
 
-    /// What it answers to these bytes: status and the rest; 0 if it just ends the connection.
+    /// Answer to these bytes: status and the rest; 0 if it just ends the connection.
     pub fn answer(&self, bytes: &[u8]) -> (u16, Vec<u8>) {
         let mut stream = TcpStream::connect(&self.at).unwrap();
         stream.set_read_timeout(Some(Duration::from_secs(60))).unwrap();
@@ -57,25 +57,25 @@ impl Served {
         read_answer(&mut stream)
     }
 
-    /// What it answers to a request that is in order.
+    /// Answer to a valid request.
     pub fn get(&self, path: &str) -> (u16, Vec<u8>) {
         self.answer(format!("{}Connection: close\r\n\r\n", self.head(&format!("GET {path}"))).as_bytes())
     }
 
-    /// What it answers to a wish.
+    /// Answer to a request of a client for data or an edit.
     pub fn ask(&self, wish: &str) -> (u16, Vec<u8>) {
         let length = wish.len();
         self.answer(format!("{}Content-Length: {length}\r\n\r\n{wish}", self.head("POST /ask")).as_bytes())
     }
 
-    /// What it has to tell.
+    /// News since the number `since`.
     pub fn news(&self, since: u64) -> serde_json::Value {
         let (status, body) = self.get(&format!("/news?since={since}&have=0"));
         assert_eq!(status, 200);
         serde_json::from_slice(&body).unwrap()
     }
 
-    /// Waits until its news are as wanted.
+    /// Waits until its news meet a condition.
     pub fn wait(&self, wanted: impl Fn(&serde_json::Value) -> bool) {
         let until = Instant::now() + Duration::from_secs(120);
         while !wanted(&self.news(0)) {

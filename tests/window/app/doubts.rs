@@ -1,4 +1,4 @@
-//! What is told of how objects were found: doubts that lead to their photo, the order of the list, what is unknown.
+//! Reports about finding objects: doubts that lead to their photo, the order of the list, unlabeled Gaussians.
 
 use egui::accesskit::Role;
 use egui_kittest::kittest::Queryable;

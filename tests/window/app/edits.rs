@@ -1,4 +1,4 @@
-//! What a user does to objects, and how it is taken back.
+//! Edits of objects by the user, and undoing them.
 
 use std::path::{Path, PathBuf};
 
@@ -33,12 +33,12 @@ fn name(app: &App, id: u32) -> String {
     app.state.semantics.as_ref().expect("objects").identities.name(id)
 }
 
-/// Whether the window has said this: messages go away by themselves, the log has them all.
+/// Returns whether the window has shown this message: messages go away by themselves, the log has them all.
 fn said(app: &App, text: &str) -> bool {
     app.state.log.iter().any(|line| line.text.contains(text))
 }
 
-/// Whether the tick of a row is set; `None` if it stands between.
+/// Returns whether the check box of a row is set; `None` if it is in between.
 fn tick(w: &Window, name: &str) -> Option<bool> {
     let label = format!("{name} is visible");
     match w.harness.get_by_role_and_label(Role::CheckBox, &label).accesskit_node().toggled() {

@@ -73,7 +73,7 @@ fn the_query_box_has_tab_and_arrows() {
     assert_eq!(typed(&w), format!("{first}xs"), "the cursor is behind it after going back, too");
 }
 
-/// Where the area of this name is on screen.
+/// Rectangle of the area of this name on screen.
 pub(crate) fn area(w: &Window, name: &'static str) -> Rect {
     w.harness.ctx.memory(|m| m.area_rect(egui::Id::unique(name))).expect("on screen")
 }

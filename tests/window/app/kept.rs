@@ -1,5 +1,5 @@
-//! What a person has made is kept: where objects are found anew, where a data set is trained again, where a selection
-//! takes all Gaussians of something.
+//! Work of the user is kept: objects found anew, a data set trained again, a selection that takes all Gaussians of
+//! an object.
 
 use egui::accesskit::Role;
 use egui_kittest::kittest::{NodeT, Queryable};
@@ -15,7 +15,7 @@ fn map(app: &App) -> &SemanticMap {
     app.state.semantics.as_ref().expect("objects")
 }
 
-/// The Gaussians of what has this name; none if nothing has.
+/// Gaussians of the identity with this name; none if there is none.
 fn own(map: &SemanticMap, name: &str) -> Vec<usize> {
     let id = map.identities.iter().find(|(_, i)| i.names.first().is_some_and(|n| n == name)).map(|(id, _)| id);
     id.map_or_else(Vec::new, |id| (0..map.identity_of.len()).filter(|i| map.identity_of[*i] == id).collect())

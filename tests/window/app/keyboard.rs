@@ -39,7 +39,7 @@ fn palette(w: &mut Window, text: &str) {
     w.harness.run_steps(2);
 }
 
-/// The role and the name of what has the keyboard.
+/// Role and name of the node that has the keyboard.
 fn focused(w: &Window) -> Option<(Role, String)> {
     let nodes = w.harness.root().children_recursive();
     let mut with = nodes.filter(|n| n.accesskit_node().is_focused());
@@ -128,7 +128,7 @@ fn all_of_a_session_is_done_by_keys_alone() {
     assert!(w.app().state.error.is_none());
 }
 
-/// Whether something can have the keyboard or be clicked, and has no name.
+/// Returns whether a node can have the keyboard or be clicked, and has no name.
 fn is_nameless(node: &egui_kittest::Node<'_>) -> bool {
     let it = node.accesskit_node();
     let reachable = [Ability::Click, Ability::Focus].into_iter().any(|ability| it.data().supports_action(ability));

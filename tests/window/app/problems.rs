@@ -1,4 +1,4 @@
-//! What is broken in a scene is said where one looks.
+//! Problems of a scene are reported where the user looks.
 
 use fmlgs::scene::{LanguageFeatures, ViewFeatures};
 use fmlgs::ui::actions::Action;

@@ -1,4 +1,4 @@
-//! What is asked in the view: what stays on screen, what is said and when, and how much of the view that covers.
+//! Queries in the view: which stay on screen, their messages and their times, and how much of the view they cover.
 
 use egui::accesskit::Role;
 use egui::{Key, Rect};

@@ -52,7 +52,7 @@ fn at_rest(a: &App) -> bool {
     a.viewport.picture().is_some_and(|p| p.full) && a.viewport.queries.maps().is_some()
 }
 
-/// What is found in the first and in the second view.
+/// Identities found in the first and in the second view.
 fn found(w: &mut Window) -> [Vec<u32>; 2] {
     let queries = &mut w.harness.state_mut().viewport.queries;
     [false, true].map(|second| queries.in_view(second, |q| q.found()))

@@ -14,7 +14,7 @@ fn key(key: Key, pressed: bool, modifiers: Modifiers) -> Event {
     Event::Key { key, physical_key: None, pressed, repeat: false, modifiers }
 }
 
-/// What a keyboard sends for these letters.
+/// Events of a keyboard for these letters.
 fn letters(text: &str) -> Vec<Event> {
     let of = |letter: char| {
         let pressed = Key::from_name(&letter.to_uppercase().to_string());

@@ -5,7 +5,7 @@ use super::super::mesh::Mesh;
 use super::super::paint::{self, Picture, mix, step};
 use super::super::shapes::rounded_box;
 
-/// Thickness of a book in metres.
+/// Thickness of a book in meters.
 pub const THICKNESS: f64 = 0.030;
 const WIDTH: f64 = 0.150;
 const LENGTH: f64 = 0.205;

@@ -1,4 +1,4 @@
-//! Game controllers: same parts, same names, another colour.
+//! Game controllers: same parts, same names, another color.
 
 use glam::{DVec2, DVec3};
 

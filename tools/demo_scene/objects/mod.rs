@@ -18,7 +18,7 @@ use glam::DVec3;
 
 use super::glb::{Object, Part};
 
-/// Height of the table's upper face in metres.
+/// Height of the table's upper face in meters.
 const TABLE_TOP: f64 = 0.74;
 
 /// Everything, where it stands.

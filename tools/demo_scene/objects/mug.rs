@@ -4,7 +4,7 @@ use super::super::glb::{Part, glossy, painted, part};
 use super::super::paint;
 use super::super::shapes::{bent_tube, turned_profile};
 
-/// Body, handle and what is in it.
+/// Body, handle and content.
 pub fn parts() -> Vec<Part> {
     let body = turned_profile(
         &[

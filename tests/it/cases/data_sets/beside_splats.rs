@@ -1,4 +1,4 @@
-//! What 3D Gaussian Splatting leaves beside its splats: cameras, and where the photos were.
+//! Files that 3D Gaussian Splatting leaves beside its splats: cameras, and the path of the photos.
 
 use std::fs;
 use std::path::Path;

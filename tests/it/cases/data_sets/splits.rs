@@ -1,4 +1,4 @@
-//! Which photos are held out, and poses that are not quite ones.
+//! Held-out photos, and poses that are not quite ones.
 
 use std::fs;
 
