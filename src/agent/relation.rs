@@ -27,7 +27,7 @@ pub enum Relation {
     Above,
     /// Lower than it, within its footprint.
     Under,
-    /// Inside its box.
+    /// With its center inside its box, and smaller.
     In,
     /// Close to it.
     Near,

@@ -79,7 +79,7 @@ impl SceneWorld {
     pub(crate) fn keep_up(&mut self, eye: Pose, aspect: f64, hidden: &[IdentityId], map: &Arc<SemanticMap>) {
         (self.eye, self.aspect) = (eye, aspect);
         if !Arc::ptr_eq(map, &self.parts.map) {
-            // The agent's own edit returns from the window with equal identities; any other edit makes the undo history stale.
+            // The agent's own edit returns from the window with equal identities; any other makes the history stale.
             if map.identities != self.parts.map.identities {
                 self.done = UndoHistory::default();
             }

@@ -150,8 +150,8 @@ impl Resolver<'_> {
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
         let known = NameWords::new(self.world.identities());
         let mut nouns = readings(&words, &known, false);
-        // A name such as "left stick" goes before the left one of the sticks. With the encoder, superlatives and counts go
-        // first, as any words match something by embedding.
+        // A name such as "left stick" goes before the left one of the sticks. With the encoder, superlatives and counts
+        // go first, as any words match something by embedding.
         let may_look = self.may_look;
         let place = |noun: &Noun| match noun {
             Noun::Picked(Pick::Most(..), _) | Noun::Counted(..) if may_look => 0,

@@ -45,8 +45,8 @@ impl Resolver<'_> {
         };
         let exact: Vec<IdentityId> =
             everyone.iter().copied().filter(|id| own(*id).iter().any(|n| name_words(n) == words)).collect();
-        // The head of a name is its last word before "with" or "of", a single letter or number aside: a table lamp is not
-        // a table, a vase with water is a vase, "button a" is a button.
+        // The head of a name is its last word before "with" or "of", a single letter or number aside: a table lamp is
+        // not a table, a vase with water is a vase, "button a" is a button.
         let heads = |name: &[String]| {
             let thing = name.split(|w| w == "with" || w == "of").next().unwrap_or_default();
             let tells_apart = |w: &String| w.chars().count() == 1 || w.bytes().all(|b| b.is_ascii_digit());
@@ -85,8 +85,8 @@ impl Resolver<'_> {
         Lost::new(RefusalKind::NotFound, format!("There is no '{text}' in this scene.{said}"), near)
     }
 
-    /// Identities that "one" may stand for: the candidates of the last question, else all whose name ends in the same word
-    /// as the name of the last thing.
+    /// Identities that "one" may stand for: the candidates of the last question, else all whose name ends in the same
+    /// word as the name of the last thing.
     pub(super) fn kin(&self) -> Vec<IdentityId> {
         if !self.dialog.group.is_empty() {
             return self.dialog.group.clone();
