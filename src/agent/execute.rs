@@ -260,6 +260,7 @@ fn act(
     let it = if id == NOBODY { String::new() } else { the(world, id) };
     Ok(match call {
         ToolCall::Locate { .. } | ToolCall::Highlight { .. } => {
+            // Earlier targets of the same request stay marked.
             dialog.marked.push(id);
             world.highlight(&dialog.marked).map_err(failed)?;
             let place = describe::place(world, id);

@@ -18,7 +18,7 @@ const MOST_PX: u64 = 4096;
 #[derive(Debug, Default)]
 pub(super) struct ServedPhotos {
     photos: Vec<Option<Photo>>,
-    /// Lock held while a photo is loaded, so that only one is in memory.
+    /// Lock held while a photo is loaded: clients take turns.
     turn: Mutex<()>,
 }
 

@@ -1,5 +1,5 @@
 //! Limit of the number of connections. An authenticated connection keeps its seat. Of the others, the oldest is closed
-//! to make room for a new one: a client sends its token at once, a slow attacker does not.
+//! to make room for a new one: a client sends its token at once, a stalling attacker does not.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::{Shutdown, TcpStream};

@@ -218,7 +218,7 @@ impl FormRequest<'_> {
             FormSlot::Kind => {
                 slots.texts.push(self.said(words));
                 let words = if words[0] == "all" { &words[1..] } else { words };
-                // When names are matched as a whole, a kind must not swallow a relation such as "on the table".
+                // With complete names, a kind must not take in a relation such as "on the table".
                 let is_plain = self.things != Things::Whole || !words.iter().any(|w| language.is_no_name(w));
                 self.known.whole(words).is_some() || is_plain && is_thing(words, self.known, self.things != Things::Any)
             }

@@ -92,6 +92,7 @@ pub(crate) fn exchange(
                             return Ok(());
                         }
                     }
+                    // The body of a refusal holds the reason.
                     _ => refused.extend(piece),
                 }
             }

@@ -28,6 +28,7 @@ impl Resolver<'_> {
         for whole in wholes {
             all.descendants(*whole).iter().enumerate().for_each(|(i, is_in)| inside[i] |= *is_in);
         }
+        // A whole is not a part of itself.
         wholes.iter().for_each(|id| inside[*id as usize] = false);
         let is_in = |id: &IdentityId| inside.get(*id as usize) == Some(&true);
         let known: Vec<IdentityId> =

@@ -107,6 +107,7 @@ impl LinkThread {
                 true => format!("The connection to {host} is lost ({problem}); what is on screen stays"),
                 false => format!("{host} refuses: {problem}"),
             };
+            // A refusal ends the open job; a lost connection keeps it for the next attempt.
             let told = match (again, opening.take_if(|_| !again), self.training.take_if(|_| !again)) {
                 (false, Some(job), _) | (false, None, Some(job)) => {
                     self.out.tell(Event::Failed(job, Failure { message: text, remedy: String::new() }))
