@@ -1,4 +1,4 @@
-//! What the user answers to a question: yes or no, or which of the candidates is meant.
+//! Parsing of the user's answer to a question: yes or no, or one of the candidates.
 
 use super::commands::is_command;
 use super::dialog::DialogState;
@@ -8,7 +8,7 @@ use super::words::{number, ordinal};
 use super::world::World;
 use crate::scene::{IdentityId, LevelFilter};
 
-/// An answer to "shall I?".
+/// Answer to a yes-or-no question.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Confirmation {
     Yes,
@@ -16,10 +16,10 @@ pub(crate) enum Confirmation {
     Neither,
 }
 
-/// What may stand behind a yes or a no.
+/// Polite endings that may follow a yes or a no.
 const POLITE: [&str; 3] = [" please", " thanks", " thank you"];
 
-/// Whether a text says yes or no. Only plain answers count: "yes but ..." is neither.
+/// Reads a yes or a no. Only plain answers count: "yes but ..." is neither.
 pub(crate) fn confirmation(text: &str) -> Confirmation {
     let words: Vec<String> = words_of(text).into_iter().filter(|w| w != ",").collect();
     let said = words.join(" ");
@@ -32,18 +32,18 @@ pub(crate) fn confirmation(text: &str) -> Confirmation {
     }
 }
 
-/// An answer to "which one?".
+/// Answer to a question for one of several candidates.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Choice {
     One(IdentityId),
     None,
-    /// It is an answer, but not a clear one.
+    /// An ambiguous answer.
     Unclear,
-    /// It is no answer, but something else.
+    /// A text that is not an answer, such as a new command.
     Else,
 }
 
-/// Which of the candidates a text means.
+/// Returns the candidate that a text chooses.
 pub(crate) fn choice(world: &mut dyn World, text: &str, candidates: &[IdentityId], dialog: &DialogState) -> Choice {
     let called = world.identities().called(text, LevelFilter::Auto);
     if let [only] = candidates.iter().filter(|id| called.contains(id)).collect::<Vec<_>>().as_slice() {
@@ -53,7 +53,7 @@ pub(crate) fn choice(world: &mut dyn World, text: &str, candidates: &[IdentityId
         return Choice::None;
     }
     let words: Vec<String> = words_of(text).into_iter().filter(|w| w != ",").collect();
-    // "The second one", "2": as they were listed.
+    // "The second one", "2": by position in the list that was shown.
     let plain: Vec<&str> = words.iter().map(String::as_str).filter(|w| !["the", "one", "number"].contains(w)).collect();
     if let [only] = plain.as_slice()
         && let Some(n) = ordinal(only).or_else(|| number(only).filter(|n| *n >= 1.0).map(|n| n as usize))
@@ -61,7 +61,7 @@ pub(crate) fn choice(world: &mut dyn World, text: &str, candidates: &[IdentityId
         let at = if n == 0 { candidates.len() } else { n };
         return candidates.get(at.wrapping_sub(1)).map_or(Choice::Unclear, |id| Choice::One(*id));
     }
-    // By what names them or their wholes: "the kettle's" chooses its handle.
+    // By the names of the candidates or of their ancestors: "the kettle's" chooses its handle.
     let content: Vec<&str> = plain.iter().copied().filter(|w| !["'s", "of", "a"].contains(w)).collect();
     let all = world.identities();
     let fits = |id: &IdentityId| {

@@ -1,12 +1,12 @@
-//! Arguments of camera commands as plain data: directions, distances, closeness. Whoever moves the camera
-//! decides what they come to in the scene.
+//! Arguments of camera commands as plain data: directions, distances, closeness. The [`World`](super::world::World)
+//! converts them to scene units.
 
 use glam::DVec3;
 use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::navigate::target::Side;
 
-/// Where to move or turn, as the viewer sees it.
+/// Direction of a movement or turn, relative to the current view.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Direction {
@@ -19,12 +19,12 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// All of them.
+    /// All directions.
     pub const ALL: [Self; 6] = [Self::Left, Self::Right, Self::Up, Self::Down, Self::Forward, Self::Back];
-    /// Those that one can turn to.
+    /// Directions of a turn.
     pub const TURNS: &[Self] = Self::ALL.split_at(4).0;
 
-    /// Its axis in the eye's own frame.
+    /// Axis in the camera frame: x to the right, y down, z forward.
     pub(crate) fn axis(self) -> DVec3 {
         match self {
             Self::Forward => DVec3::Z,
@@ -36,7 +36,7 @@ impl Direction {
         }
     }
 
-    /// Its word.
+    /// Name of the direction, in lower case.
     pub fn text(self) -> &'static str {
         match self {
             Self::Forward => "forward",
@@ -49,25 +49,25 @@ impl Direction {
     }
 }
 
-/// How far to move.
+/// Length of a movement.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Distance {
-    /// So many meters, which needs a scene whose scale is known.
+    /// Length in meters; needs a scene of known scale.
     #[serde(alias = "metres")]
     Meters(f64),
-    /// So many steps; a step is what suits the scene.
+    /// Number of steps; the length of a step depends on the scene.
     Relative(f64),
     /// One step.
     #[default]
     Default,
 }
 
-/// Longest way that is walked at once, in meters or steps.
+/// Longest single movement, in meters or steps.
 pub const FARTHEST: f64 = 1000.0;
 
 impl Distance {
-    /// Whether it can be walked: finite, above 0 and at most [`FARTHEST`].
+    /// Returns whether the length is finite, above 0 and at most [`FARTHEST`].
     pub(crate) fn is_sound(self) -> bool {
         match self {
             Self::Meters(d) | Self::Relative(d) => d > 0.0 && d <= FARTHEST,
@@ -76,13 +76,13 @@ impl Distance {
     }
 }
 
-/// The usual distance from a target.
+/// Closeness of the usual distance from a target.
 pub(crate) const NORMAL: f64 = 1.0;
-/// Twice as close as usual.
+/// Closeness of half the usual distance.
 pub(crate) const CLOSER: f64 = 2.0;
-/// Half as close as usual.
+/// Closeness of twice the usual distance.
 pub(crate) const FARTHER: f64 = 0.5;
-/// How close and how far a target can be looked at.
+/// Permitted range of closeness.
 pub const CLOSENESS: std::ops::RangeInclusive<f64> = 0.1..=10.0;
 
 /// Reads a closeness: a number, or "normal", "closer", "farther".
@@ -108,12 +108,12 @@ pub(super) fn closeness<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Er
     Err(serde::de::Error::custom("closeness must be between 0.1 and 10"))
 }
 
-/// The closeness that is meant if none is given.
+/// Default closeness.
 pub(super) fn normal() -> f64 {
     NORMAL
 }
 
-/// The side that is meant if none is given: as it is seen now.
+/// Default side: as seen now.
 pub(super) fn same() -> Side {
     Side::Same
 }

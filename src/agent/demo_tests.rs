@@ -1,4 +1,4 @@
-//! The shipped demo, whose things the small encoder has looked at, asked in the query box and by the agent
+//! Tests of queries and agent requests in the shipped demo scene, which holds embeddings of the small encoder
 //! (`tests/data/demo_questions.toml`).
 
 use std::path::PathBuf;
@@ -33,7 +33,7 @@ fn opened() -> (tempfile::TempDir, Scene) {
     (data, scene)
 }
 
-/// The questions that do not come to what they must by a recipe.
+/// Questions with a wrong answer under a recipe.
 fn wrong(map: &SemanticMap, recipe: Recipe) -> Vec<String> {
     let mut engine = QueryEngine::new(map.language.as_ref(), recipe).expect("an engine");
     let mut wrong = Vec::new();
@@ -63,10 +63,10 @@ fn what_is_asked_of_the_demo_is_found_or_said_not_to_be_there() {
         let wrong = wrong(&map, Recipe { understanding, ..Recipe::default() });
         assert!(wrong.is_empty(), "{understanding}:\n{}", wrong.join("\n"));
     }
-    // The control: where an answer may leave words out and the small encoder answers by itself, much is wrong.
+    // Control: where an answer may leave words out and the small encoder answers by itself, much is wrong.
     let before = wrong(&map, Recipe { rejection: Rejection::Canonical, ..Recipe::default() });
     assert!(before.len() >= 20, "{}", before.join("\n"));
-    // What it looks like to the encoder is offered.
+    // The best matches of the encoder are offered.
     let mut engine = QueryEngine::new(map.language.as_ref(), Recipe::default()).expect("an engine");
     let banana = engine.ask(&map, "banana", LevelFilter::Auto).expect("encodes").expect("words");
     assert!(!banana.offers(3)[1].is_empty() && banana.chosen(8).is_empty(), "{banana:?}");
@@ -86,7 +86,7 @@ fn where_nothing_has_a_name_the_small_encoder_guesses_and_nothing_is_changed_for
     let id = answered.chosen(1)[0];
     let refused = query::named(&map, "teddy bear", LevelFilter::Auto, 1).expect_err("only by its looks").to_string();
     assert!(refused.contains(&format!("ask for '#{id}'")), "{refused}");
-    // The number that it says is enough.
+    // The number in the refusal is enough to find it.
     assert_eq!(query::named(&map, &format!("#{id}"), LevelFilter::Auto, 1).expect("by number"), [id]);
 }
 

@@ -1,14 +1,14 @@
-//! Sentences about things: what they are, where they are, how large they are.
+//! Sentences about things: their kind, place and size.
 
 use super::relation::{Relation, fit};
 use super::world::World;
 use crate::math::format::{self, short};
 use crate::scene::{Bounds, IdentityId, Level, NOBODY};
 
-/// Share of the view under which something is not really seen.
+/// Least share of the view for a thing to count as visible.
 pub(crate) const SEEN: f64 = 0.0005;
 
-/// "a, b and c".
+/// Joins items to "a, b and c".
 pub(crate) fn join(items: &[String]) -> String {
     match items {
         [] => String::new(),
@@ -17,13 +17,13 @@ pub(crate) fn join(items: &[String]) -> String {
     }
 }
 
-/// "the kettle", or "#7" for what has no name.
+/// Name with an article, such as "the kettle", or "#7" for an identity without a name.
 pub(crate) fn the(world: &dyn World, id: IdentityId) -> String {
     let name = world.identities().full_name(id);
     if name.starts_with('#') { name } else { format!("the {name}") }
 }
 
-/// A list of names, at most `most` of them.
+/// Joins at most `most` names.
 pub(crate) fn names(world: &dyn World, ids: &[IdentityId], most: usize) -> String {
     let mut list: Vec<String> = ids.iter().take(most).map(|id| world.identities().label(*id)).collect();
     if ids.len() > most {
@@ -32,7 +32,7 @@ pub(crate) fn names(world: &dyn World, ids: &[IdentityId], most: usize) -> Strin
     join(&list)
 }
 
-/// A length in scene units as people say it.
+/// Formats a length given in scene units.
 pub(crate) fn length(world: &dyn World, units: f64) -> String {
     match world.metres_per_unit() {
         None => format!("{} scene units", short(units)),
@@ -40,7 +40,7 @@ pub(crate) fn length(world: &dyn World, units: f64) -> String {
     }
 }
 
-/// The edges of a thing's own upright box: the same from wherever it is seen.
+/// Describes the edges of a thing's own upright box, which do not depend on the view.
 pub(crate) fn size(world: &dyn World, id: IdentityId) -> String {
     let Some(extent) = world.extent(id) else { return "of unknown size".into() };
     let [long, wide, high] = [extent.length, extent.width, extent.height].map(|edge| length(world, edge));
@@ -48,7 +48,7 @@ pub(crate) fn size(world: &dyn World, id: IdentityId) -> String {
     format!("{long} on its longer side, {wide} on its shorter side and {high} high{unknown}")
 }
 
-/// The objects that stand in `relation` to an identity, nearest first.
+/// Objects in `relation` to an identity, nearest first.
 pub(crate) fn neighbors(world: &dyn World, id: IdentityId, relation: Relation) -> Vec<IdentityId> {
     let all = world.identities();
     let Some(anchor) = world.facts(id).and_then(|f| f.bounds) else { return Vec::new() };
@@ -63,7 +63,7 @@ pub(crate) fn neighbors(world: &dyn World, id: IdentityId, relation: Relation) -
     found.into_iter().map(|(_, id)| id).collect()
 }
 
-/// Where a thing is: on what it stands and what is next to it; empty if nothing is near.
+/// Describes the place of a thing by its support and its neighbors; empty if nothing is near.
 pub(crate) fn place(world: &dyn World, id: IdentityId) -> String {
     let object = world.identities().object_of(id);
     let Some(own) = world.facts(object).and_then(|f| f.bounds) else { return String::new() };
@@ -78,7 +78,7 @@ pub(crate) fn place(world: &dyn World, id: IdentityId) -> String {
         others.iter().find(|(_, b)| fits(b) && fit(relation, &own, b, &frame).is_some()).map(|(id, _)| *id)
     };
     let bearer = first(Relation::On, &|_| true);
-    // A table is not said to be under its mugs.
+    // A smaller thing above is not mentioned: a table is not "under" its mugs.
     let over = first(Relation::Under, &|b| b.radius() > own.radius());
     let mut said: Vec<String> = bearer.map(|id| format!("on {}", the(world, id))).into_iter().collect();
     said.extend(over.map(|id| format!("under {}", the(world, id))));
@@ -89,7 +89,7 @@ pub(crate) fn place(world: &dyn World, id: IdentityId) -> String {
     join(&said)
 }
 
-/// All that is known of one thing.
+/// Describes one thing in full.
 pub(crate) fn thing(world: &dyn World, id: IdentityId) -> String {
     let Some(facts) = world.facts(id) else { return "It is not in the scene.".into() };
     let all = world.identities();
@@ -122,7 +122,7 @@ pub(crate) fn thing(world: &dyn World, id: IdentityId) -> String {
     text
 }
 
-/// The objects in the present view, largest share first.
+/// Objects in the current view, largest share first.
 pub(crate) fn in_view(world: &dyn World) -> Vec<IdentityId> {
     let mut seen: Vec<(f64, IdentityId)> = Vec::new();
     for (id, _) in world.identities().iter().filter(|(_, i)| i.level == Level::Object) {
@@ -134,7 +134,7 @@ pub(crate) fn in_view(world: &dyn World) -> Vec<IdentityId> {
     seen.into_iter().map(|(_, id)| id).collect()
 }
 
-/// What the present view shows.
+/// Describes the current view.
 pub(crate) fn view(world: &dyn World) -> String {
     let seen = in_view(world);
     match seen.as_slice() {
@@ -146,7 +146,7 @@ pub(crate) fn view(world: &dyn World) -> String {
     }
 }
 
-/// With a capital letter at the start.
+/// Makes the first letter a capital.
 pub(crate) fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |c| c.to_uppercase().chain(letters).collect())

@@ -1,22 +1,22 @@
-//! What the dialog was about last, so that "it", "the other one" and "closer" mean something.
+//! State of the dialog, which resolves "it", "the other one" and "closer".
 
 use super::camera_args::NORMAL;
 use super::tool::ToolCall;
 use crate::scene::IdentityId;
 
-/// The last things that were spoken of.
+/// Things and movements that were mentioned last.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct DialogState {
     pub(crate) last: Option<IdentityId>,
-    /// What "the left one" and "the second one" choose from: the candidates of the last question.
+    /// Candidates of the last question, from which "the left one" and "the second one" choose.
     pub(crate) group: Vec<IdentityId>,
-    /// What the present request has marked.
+    /// Identities that the current request has marked.
     pub(crate) marked: Vec<IdentityId>,
-    /// What the present request draws alone.
+    /// Identities that the current request has isolated.
     pub(crate) isolated: Vec<IdentityId>,
-    /// The last movement or flight, for "again" and "a bit more".
+    /// Last movement or flight, for "again" and "a bit more".
     pub(crate) moved: Option<ToolCall>,
-    /// How close the last target was looked at.
+    /// Closeness of the last flight to a target.
     pub(crate) closeness: f64,
 }
 

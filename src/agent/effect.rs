@@ -1,4 +1,4 @@
-//! What the agent changes of what is shown, for whoever shows the scene.
+//! Changes that the agent makes to the displayed scene.
 
 use std::sync::Arc;
 
@@ -8,25 +8,25 @@ use crate::jobs::go_to::Explored;
 use crate::navigate::CameraTrajectory;
 use crate::scene::IdentityId;
 
-/// A change of what is shown, for whoever shows the scene.
+/// Change of the displayed scene, sent to the window or command line.
 #[derive(Clone, Debug)]
 pub enum Effect {
-    /// The camera flies; the point is what it turns about from then on.
+    /// The camera flies; the point is the new orbit center.
     Fly(Box<CameraTrajectory>, Option<DVec3>),
-    /// These are marked, and nothing else.
+    /// Only these identities are marked.
     Mark(Vec<IdentityId>),
-    /// Whose own Gaussians are left out of the picture.
+    /// Identities whose own Gaussians are hidden.
     Hidden(Vec<IdentityId>),
-    /// One scene without all of these is made.
+    /// A new scene without any of these identities is made.
     Remove(Vec<IdentityId>),
-    /// The last change of that was undone: these are left out again.
+    /// The last change of hidden identities was undone: these are hidden again.
     HiddenUndone(Vec<IdentityId>),
-    /// What the user did last is to be undone.
+    /// The last edit of the user is to be undone.
     Undo,
     Renamed(IdentityId, String),
-    /// The last change of a name was undone: it is called this again.
+    /// The last rename was undone: the identity has this name again.
     RenameUndone(IdentityId, String),
-    /// The scene was looked at: which space is occupied is known.
+    /// The occupied space of the scene was computed.
     Explored(Arc<Explored>),
 }
 

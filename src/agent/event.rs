@@ -1,15 +1,15 @@
-//! What a session tells while it works, for a window that shows it at once.
+//! Progress events of a session.
 
 use super::tool::ToolCall;
 
-/// Something that goes on.
+/// Progress event.
 #[derive(Clone, Debug, PartialEq)]
 pub enum AgentEvent {
-    /// The planner is thinking (a model was asked).
+    /// The planner waits for a chat model.
     Thinking,
-    /// A piece of the answer, as a model writes it.
+    /// Chunk of the answer, as a model streams it.
     Piece(String),
-    /// A call is about to be made, targets by number.
+    /// A call is about to be executed, with targets by number.
     Call {
         call: ToolCall,
         line: String,

@@ -1,5 +1,5 @@
-//! From a planned call to what happens: permission, target, the scene's facts, confirmation; then the
-//! world acts. Every planner's calls pass here, and only here.
+//! Execution of a planned call: permission, target, facts of the scene and confirmation are checked, then the
+//! [`World`] acts. The calls of every planner pass here, and only here.
 
 use super::camera_args::{Distance, NORMAL};
 use super::describe::{self, SEEN, capital, length, the};
@@ -13,19 +13,19 @@ use super::world::{Unreachable, World, WorldError};
 use crate::navigate::target::Side;
 use crate::scene::{IdentityId, LevelFilter, NOBODY};
 
-/// What became of a call.
+/// Outcome of a call.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CallOutcome {
-    /// The call, with targets by number where they were found.
+    /// Call, with targets by number where they were found.
     pub(crate) call: ToolCall,
     pub(crate) ids: Vec<IdentityId>,
     pub(crate) text: String,
-    /// Why it was not done, if it was not.
+    /// Kind of refusal if the call was not done.
     pub(crate) refused: Option<RefusalKind>,
 }
 
 impl CallOutcome {
-    /// Whether the text may name files of this machine: it is for the user alone.
+    /// Returns whether the text may name local files: such a text is for the user alone.
     pub(crate) fn is_private(&self) -> bool {
         match self.refused {
             Some(kind) => kind == RefusalKind::Failed,
@@ -33,7 +33,7 @@ impl CallOutcome {
         }
     }
 
-    /// What a planner elsewhere hears of it.
+    /// Result as reported to a remote planner.
     pub(crate) fn heard(&self) -> &str {
         match self.refused {
             _ if !self.is_private() => &self.text,
@@ -43,13 +43,13 @@ impl CallOutcome {
     }
 }
 
-/// A call after its checks.
+/// Call after its checks.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum CheckedCall {
     Ready {
         call: ToolCall,
         ids: Vec<IdentityId>,
-        /// What was not taken literally; mostly empty.
+        /// Note on how the target was found, such as a corrected word; mostly empty.
         note: String,
     },
     Refused {
@@ -73,7 +73,7 @@ impl CheckedCall {
     }
 }
 
-/// Checks a call. `is_confirmed` says that the user has said yes to it.
+/// Checks a call. `is_confirmed` is true once the user has said yes to it.
 pub(crate) fn check(
     world: &mut dyn World,
     call: &ToolCall,
@@ -91,7 +91,7 @@ pub(crate) fn check(
     let (mut ids, mut note, mut guessed) = (Vec::new(), String::new(), None);
     let wanted = match &call {
         ToolCall::Locate { query, kind } => Some((Target::Query(query.clone()), *kind)),
-        // "The part of" may be asked of parts, too.
+        // A target may be an object or a part at any level.
         other => other.target().map(|t| (t.clone(), LevelFilter::Auto)),
     };
     if let Some((target, level)) = wanted {
@@ -129,7 +129,7 @@ pub(crate) fn check(
         return CheckedCall::Refused { refusal: conflict, near: ids };
     }
     let id = ids.first().copied();
-    // What only looks like it is no reason to change anything.
+    // A match by embedding alone is too weak for a change: ask first.
     let looks = guessed.zip(id).filter(|_| changes(&call));
     let looks = looks.map(|(words, id)| format!("No name here says '{words}'; {} looks most like it.", the(world, id)));
     let question = match (question(world, &call, policy, id), looks) {
@@ -143,7 +143,7 @@ pub(crate) fn check(
     CheckedCall::Ready { call, ids, note }
 }
 
-/// Whether a call changes what is drawn, named or on disk.
+/// Returns whether a call changes the picture, a name or a file.
 fn changes(call: &ToolCall) -> bool {
     matches!(
         call,
@@ -163,7 +163,7 @@ fn find(world: &mut dyn World, target: &Target, level: LevelFilter, dialog: &Dia
     }
 }
 
-/// "the red controller or the blue controller".
+/// Joins candidates to "the red controller or the blue controller".
 fn choices(world: &dyn World, candidates: &[IdentityId]) -> String {
     let mut names: Vec<String> = candidates.iter().take(6).map(|id| the(world, *id)).collect();
     if candidates.len() > 6 {
@@ -175,7 +175,7 @@ fn choices(world: &dyn World, candidates: &[IdentityId]) -> String {
     }
 }
 
-/// What is against the facts.
+/// Refusal of a call that conflicts with the facts of the scene.
 fn conflict(world: &dyn World, call: &ToolCall, id: Option<IdentityId>) -> Option<Refusal> {
     let id = id?;
     let facts = world.facts(id)?;
@@ -197,7 +197,7 @@ fn conflict(world: &dyn World, call: &ToolCall, id: Option<IdentityId>) -> Optio
     Some(Refusal::new(RefusalKind::Conflict, text))
 }
 
-/// What the user has to say yes to.
+/// Question that the user must confirm before the call.
 fn question(world: &dyn World, call: &ToolCall, policy: &Policy, id: Option<IdentityId>) -> Option<String> {
     let permission = policy.permission(call.name());
     let it = id.map(|id| the(world, id)).unwrap_or_default();
@@ -216,7 +216,7 @@ fn question(world: &dyn World, call: &ToolCall, policy: &Policy, id: Option<Iden
     }
 }
 
-/// Does what was checked, and remembers what it was about.
+/// Executes a checked call and updates the dialog.
 pub(crate) fn perform(
     world: &mut dyn World,
     call: ToolCall,
@@ -260,6 +260,7 @@ fn act(
     let it = if id == NOBODY { String::new() } else { the(world, id) };
     Ok(match call {
         ToolCall::Locate { .. } | ToolCall::Highlight { .. } => {
+            // Earlier targets of the same request stay marked.
             dialog.marked.push(id);
             world.highlight(&dialog.marked).map_err(failed)?;
             let place = describe::place(world, id);

@@ -1,4 +1,4 @@
-//! The words of the command language, as `assets/commands.toml` has them.
+//! Words of the command language, read from `assets/commands.toml`.
 
 use std::sync::OnceLock;
 
@@ -8,37 +8,37 @@ use super::camera_args::Direction;
 use super::relation::Relation;
 use crate::navigate::target::Side;
 
-/// What things are compared by.
+/// Quantity by which things are compared.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Key {
-    /// Volume of the thing's own box.
+    /// Volume of the thing's own upright box.
     Size,
-    /// Along the scene's up.
+    /// Extent along the scene's up direction.
     Height,
-    /// The longer level edge.
+    /// Longer horizontal edge.
     Length,
-    /// Place to the right as seen now.
+    /// Position to the right in the current view.
     Right,
     Up,
     Distance,
 }
 
-/// A command, as people read of it.
+/// Command with its help.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CommandHelp {
-    /// By which its task is found.
+    /// Identifier of its task.
     pub(crate) id: String,
-    /// What it does.
+    /// Description for the user.
     pub does: String,
-    /// An example; `{}` stands for a thing.
+    /// Example; `{}` stands for a thing.
     pub example: String,
-    /// How it is said.
+    /// Forms in which it can be typed.
     pub forms: Vec<String>,
 }
 
-/// The file. What each list is for is said there.
+/// Contents of the file, which documents each list.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct CommandLanguage {
@@ -62,13 +62,13 @@ pub(super) struct CommandLanguage {
     pub(crate) command: Vec<CommandHelp>,
 }
 
-/// What a list has for a text.
+/// Looks up the value of a text in a list.
 pub(super) fn find<T: Copy>(list: &[(String, T)], text: &str) -> Option<T> {
     list.iter().find(|(word, _)| word == text).map(|(_, value)| *value)
 }
 
 impl CommandLanguage {
-    /// The one that is built in: a test reads it, so that it is never none.
+    /// Returns the built-in language. A test parses it, so the fallback to an empty one is never used.
     pub(crate) fn get() -> &'static Self {
         static READ: OnceLock<CommandLanguage> = OnceLock::new();
         READ.get_or_init(|| Self::read().unwrap_or_default())
@@ -78,14 +78,14 @@ impl CommandLanguage {
         toml::from_str(include_str!("../../assets/commands.toml"))
     }
 
-    /// Whether no name has this word, unless it is said as a whole.
+    /// Returns whether a word counts as part of a name only within a complete name.
     pub(crate) fn is_no_name(&self, word: &str) -> bool {
         static WORDS: OnceLock<Vec<&str>> = OnceLock::new();
         let words = || Self::get().no_name.split_whitespace().collect();
         WORDS.get_or_init(words).contains(&word) || self.determiners.iter().any(|w| w == word)
     }
 
-    /// The relation that these words begin with, and how many words say it: the longest.
+    /// Longest relation that `words` begin with, and its number of words.
     pub(crate) fn relation_at(&self, words: &[&str]) -> Option<(Relation, usize)> {
         let first = words.first().copied().unwrap_or("-");
         let begun = self.relations.iter().filter(|(phrase, _)| phrase.starts_with(first));
@@ -97,7 +97,7 @@ impl CommandLanguage {
     }
 }
 
-/// All commands; of two that fit, the first is meant.
+/// All commands; if two match, the first wins.
 pub fn commands() -> &'static [CommandHelp] {
     &CommandLanguage::get().command
 }

@@ -1,4 +1,4 @@
-//! What lists, counts and measurements come to, in words.
+//! Lists, counts and measurements, in words.
 
 use super::describe::{self, capital, length, the};
 use super::dialog::DialogState;
@@ -9,7 +9,7 @@ use super::tool::Reference;
 use super::world::World;
 use crate::scene::{IdentityId, LevelFilter, NOBODY};
 
-/// What is listed or counted.
+/// Identities to list or count.
 pub(super) fn list_ids(
     world: &mut dyn World,
     filter: LevelFilter,
@@ -18,7 +18,7 @@ pub(super) fn list_ids(
     named: Option<&str>,
 ) -> Result<Vec<IdentityId>, Refusal> {
     let named = match named.map(|name| resolve_all(world, name, LevelFilter::Auto, &DialogState::default())) {
-        // That there is none is an answer.
+        // An empty list is an answer, not a refusal.
         Some(Err(refusal)) if refusal.kind == RefusalKind::Conflict => Some(Vec::new()),
         Some(found) => Some(found?),
         None => None,
@@ -27,7 +27,7 @@ pub(super) fn list_ids(
     let inside = all.descendants(of);
     let is_piece = |id: &IdentityId| *id != of && inside.get(*id as usize) == Some(&true);
     if of != NOBODY && relation != Relation::PartOf {
-        // What is called so may be a part: the buttons on a controller, the handles on the table.
+        // Named things may be parts: the buttons on a controller, the handles on the table.
         let Some(named) = named else { return Ok(describe::neighbors(world, of, relation)) };
         let bounds = |id: IdentityId| world.facts(id).and_then(|f| f.bounds);
         let (frame, anchor) = (world.view().frame(), bounds(of));
@@ -44,7 +44,7 @@ pub(super) fn list_ids(
     Ok(ids.filter(|id| is_named(id) && world.facts(*id).is_some()).collect())
 }
 
-/// The list in words.
+/// Describes a list in words.
 pub(super) fn say_list(
     world: &dyn World,
     ids: &[IdentityId],
@@ -72,7 +72,7 @@ pub(super) fn say_list(
     }
 }
 
-/// A size or a distance.
+/// Describes a size or a distance.
 pub(super) fn measure(
     world: &dyn World,
     id: IdentityId,

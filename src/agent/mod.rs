@@ -1,15 +1,14 @@
-//! The interactive agent: commands and plain sentences become checked calls of a closed set of tools.
+//! Interactive agent: commands and plain sentences become checked calls of a closed set of tools.
 //!
-//! Two nested loops, as in the paper. The outer one is a user's request ([`session::Session::say`]);
-//! the inner one is a sequence of calls that may change after each result. A [`planner::Planner`]
-//! proposes the next call: [`commands::Commands`], a small command language that is built in, or
-//! [`llm::Llm`], any chat model behind an OpenAI-compatible address. Whatever it proposes, only a [`tool::ToolCall`] that
-//! passes [`execute::check`] is done: it is permitted by the [`policy`], its target is in the scene
-//! and clear, it is not against the scene's facts, and the user has said yes to what is destructive.
-//! Names in the scene and the user's words are data throughout.
+//! Two nested loops, as in the paper. The outer one is a user's request ([`session::Session::say`]); the inner one is
+//! a sequence of calls that may change after each result. A [`planner::Planner`] proposes the next call:
+//! [`commands::Commands`], a small built-in command language, or [`llm::Llm`], any chat model behind an
+//! OpenAI-compatible address. Only a [`tool::ToolCall`] that passes [`execute::check`] is executed: the [`policy`]
+//! permits it, its target is in the scene and unambiguous, it does not conflict with the facts of the scene, and the
+//! user has confirmed it if it is destructive. Names in the scene and the user's words are data throughout.
 //!
-//! The scene is a [`world::World`]: [`scene::SceneWorld`] for the window and the command line, a
-//! made-up room for tests.
+//! The scene is a [`world::World`]: [`scene::SceneWorld`] for the window and the command line, a synthetic room for
+//! tests.
 
 #![allow(missing_docs, reason = "fields and variants whose name says it all have no doc of three words")]
 

@@ -1,4 +1,4 @@
-//! What turns requests into calls. A planner proposes; the session checks and acts.
+//! Planners, which turn requests into calls. A planner proposes; the session checks and acts.
 
 use std::sync::atomic::AtomicBool;
 
@@ -10,28 +10,28 @@ use super::refusal::Refusal;
 use super::tool::ToolCall;
 use super::world::World;
 
-/// What to do next.
+/// Next step of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
     Call(ToolCall),
     Finish {
-        /// What to say beyond the calls' results; of a planner that speaks for itself, all of it.
+        /// Reply beyond the results of the calls; the whole reply if the planner speaks for itself.
         text: String,
-        /// Why it was not done, if it was not.
+        /// Refusal if the request was not carried out.
         refusal: Option<Refusal>,
     },
 }
 
 impl Step {
-    /// The request is dealt with, and the calls' results say it all.
+    /// End of the request without a reply beyond the results of the calls.
     pub fn finish() -> Self {
         Self::Finish { text: String::new(), refusal: None }
     }
 }
 
-/// What a planner sees of the session.
+/// Part of the session that a planner can access.
 pub struct PlannerContext<'a> {
-    /// The scene. Planners look; only the session acts.
+    /// Scene. Planners only read it; the session acts.
     pub(crate) world: &'a mut dyn World,
     pub(crate) dialog: &'a DialogState,
     pub(crate) policy: &'a Policy,
@@ -41,29 +41,29 @@ pub struct PlannerContext<'a> {
 
 /// Turns a request into a sequence of calls that may change after each result.
 pub trait Planner: Send {
-    /// Its name for display.
+    /// Name for display.
     fn name(&self) -> &'static str;
 
-    /// A new request. What was left of the last one is forgotten.
+    /// Starts a new request and drops the rest of the last one.
     fn start(&mut self, request: &str, context: &mut PlannerContext<'_>);
 
-    /// The next step; `last` is what became of the last call.
+    /// Returns the next step; `last` is the outcome of the last call.
     ///
     /// # Errors
-    /// If it cannot go on.
+    /// If the planner cannot go on.
     fn next(&mut self, last: Option<&CallOutcome>, context: &mut PlannerContext<'_>) -> Result<Step, Refusal>;
 
-    /// Whether its last words stand for the calls' results, which are else said one by one.
+    /// Returns whether its final text replaces the results of the calls, which are else reported one by one.
     fn speaks(&self) -> bool {
         false
     }
 
-    /// Whether it sends texts to another machine.
+    /// Returns whether it sends texts to another machine.
     fn is_remote(&self) -> bool {
         false
     }
 
-    /// A text without secrets that the planner knows of.
+    /// Removes the planner's secrets from a text.
     fn redact(&self, text: &str) -> String {
         text.to_owned()
     }

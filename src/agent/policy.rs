@@ -1,4 +1,5 @@
-//! Which tools the agent may use, and which after a yes: read from `assets/policy.toml` or a file of the user's.
+//! Policy of the tools: permitted, permitted after a confirmation, or forbidden. It is read from `assets/policy.toml`
+//! or a file of the user.
 
 use std::path::Path;
 
@@ -9,11 +10,11 @@ use super::tool::{NAMES, ToolCall};
 use crate::io::IoError;
 use crate::io::files::read;
 
-/// The environment variable with the path of a policy that takes the place of the built-in one.
+/// Environment variable with the path of a policy that replaces the built-in one.
 pub(crate) const VARIABLE: &str = "FMLGS_POLICY";
-/// Largest policy file in bytes.
+/// Largest policy file, in bytes.
 const MAX_BYTES: u64 = 1 << 20;
-/// The policy that comes with the program.
+/// Text of the built-in policy.
 const BUILT_IN: &str = include_str!("../../assets/policy.toml");
 
 #[derive(Clone, Debug, Deserialize)]
@@ -28,47 +29,47 @@ struct Tools {
     forbidden: Vec<String>,
 }
 
-/// What may be done.
+/// Permissions of the tools.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Policy {
     tools: Tools,
 }
 
-/// Why a policy cannot be used. Without one nothing may be done, so the agent does not start.
+/// Error of a policy. Without a valid policy nothing is permitted, so the agent does not start.
 #[derive(Debug, thiserror::Error)]
 pub enum PolicyError {
-    /// The file cannot be read, or is too long for a policy.
+    /// The file cannot be read, or is too large.
     #[error("{0}; set {VARIABLE} to a policy file, or to nothing for the built-in one")]
     File(#[from] IoError),
-    /// It is no policy.
+    /// The text is not a valid policy.
     #[error("{place}: {problem}")]
     Wrong { place: String, problem: String },
 }
 
-/// Whether a tool may be used.
+/// Permission of a tool.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Permission {
     Free,
     Confirm,
-    /// If no file is replaced, or the user says yes.
+    /// Permitted if no file is replaced, or after a confirmation.
     ConfirmOverwrite,
     Never,
 }
 
 impl Policy {
-    /// The one that comes with the program.
+    /// Returns the built-in policy.
     ///
     /// # Errors
-    /// Never, unless the program was built with a broken one.
+    /// Only if the program was built with an invalid policy.
     pub fn built_in() -> Result<Self, PolicyError> {
         Self::parse(BUILT_IN, "built-in policy")
     }
 
-    /// The file that `FMLGS_POLICY` names, else the built-in one.
+    /// Reads the file that `FMLGS_POLICY` names, else the built-in policy.
     ///
     /// # Errors
-    /// If that file cannot be read or is no policy.
+    /// If that file cannot be read or is not a valid policy.
     pub(crate) fn from_environment() -> Result<Self, PolicyError> {
         match std::env::var_os(VARIABLE).filter(|v| !v.is_empty()) {
             Some(path) => Self::load(Path::new(&path)),
@@ -79,7 +80,7 @@ impl Policy {
     /// Reads a policy file.
     ///
     /// # Errors
-    /// If it cannot be read or is no policy.
+    /// If it cannot be read or is not a valid policy.
     pub(crate) fn load(path: &Path) -> Result<Self, PolicyError> {
         let place = path.display().to_string();
         let bytes = read(path, MAX_BYTES)?;
@@ -88,10 +89,10 @@ impl Policy {
         Self::parse(text, &place)
     }
 
-    /// Reads a policy; `place` is named in errors.
+    /// Parses a policy; `place` is named in errors.
     ///
     /// # Errors
-    /// If it is no policy: broken TOML, or names of tools that are not there.
+    /// If it is invalid TOML or names unknown tools.
     pub fn parse(text: &str, place: &str) -> Result<Self, PolicyError> {
         let wrong = |problem: String| PolicyError::Wrong { place: place.to_owned(), problem };
         let policy: Self =
@@ -104,14 +105,14 @@ impl Policy {
         Ok(policy)
     }
 
-    /// One that permits everything without a question, to show in tests what the policy is for.
+    /// Returns a policy that permits everything without confirmation, as a control in tests.
     pub fn off() -> Self {
         let allowed = NAMES.iter().map(|n| (*n).to_owned()).collect();
         let tools = Tools { allowed, confirm: Vec::new(), confirm_overwrite: Vec::new(), forbidden: Vec::new() };
         Self { tools }
     }
 
-    /// Whether a tool may be used.
+    /// Returns the permission of a tool.
     pub(crate) fn permission(&self, tool: &str) -> Permission {
         let has = |list: &[String]| list.iter().any(|t| t == tool);
         match &self.tools {
@@ -122,12 +123,12 @@ impl Policy {
         }
     }
 
-    /// The tools that may be used.
+    /// Tools that are not forbidden.
     pub(crate) fn usable(&self) -> impl Iterator<Item = &'static str> + '_ {
         NAMES.into_iter().filter(|n| self.permission(n) != Permission::Never)
     }
 
-    /// A refusal, if `call` may never be made.
+    /// Returns a refusal if `call` is forbidden.
     pub(crate) fn refusal(&self, call: &ToolCall) -> Option<Refusal> {
         let never = self.permission(call.name()) == Permission::Never;
         never.then(|| Refusal::new(RefusalKind::NotPermitted, format!("The policy does not permit '{}'.", call.name())))

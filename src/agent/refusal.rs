@@ -1,25 +1,25 @@
-//! Why the agent does not do something.
+//! Refusals of the agent.
 
 use serde::{Deserialize, Serialize};
 
-/// The kind of reason.
+/// Kind of a refusal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RefusalKind {
     Unclear,
     NotFound,
-    /// The request is against the facts of the scene.
+    /// The request conflicts with the facts of the scene.
     Conflict,
     NotPermitted,
     Unreachable,
-    /// It took too many steps or too long.
+    /// The request took too many steps or too long.
     Limit,
     Failed,
-    /// The user stopped it.
+    /// The user stopped the request.
     Stopped,
 }
 
-/// A refusal in plain words.
+/// Refusal with its reason in plain words.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Refusal {
     pub kind: RefusalKind,
@@ -27,7 +27,7 @@ pub struct Refusal {
 }
 
 impl Refusal {
-    /// A refusal of this kind.
+    /// Returns a refusal of this kind.
     pub(crate) fn new(kind: RefusalKind, text: impl Into<String>) -> Self {
         Self { kind, text: text.into() }
     }

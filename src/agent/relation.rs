@@ -1,40 +1,40 @@
-//! How things stand to each other, judged from their boxes: left of, on, under, near. Pure geometry,
-//! in the frame of the present view and of what is up in the scene.
+//! Spatial relations between things, judged from their bounding boxes: left of, on, under, near. Pure geometry, in
+//! the frame of the current view and of the up direction of the scene.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
 
 use crate::scene::Bounds;
 
-/// How one thing stands to another.
+/// Relation of one thing to another, the anchor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Relation {
-    /// A piece of it. No matter of boxes.
+    /// A part of it, by the hierarchy of identities, not by boxes.
     #[default]
     PartOf,
-    /// To its left as seen now.
+    /// To its left in the current view.
     LeftOf,
-    /// To its right as seen now.
+    /// To its right in the current view.
     RightOf,
-    /// Between it and the eye.
+    /// Between it and the camera.
     InFrontOf,
     /// Beyond it.
     Behind,
     /// Standing or lying on it.
     On,
-    /// Higher than it, over its place.
+    /// Higher than it, over its footprint.
     Above,
-    /// Lower than it, in its place.
+    /// Lower than it, within its footprint.
     Under,
-    /// Within its box.
+    /// With its center inside its box, and smaller.
     In,
-    /// Not far from it.
+    /// Close to it.
     Near,
 }
 
 impl Relation {
-    /// All of them.
+    /// All relations.
     pub const ALL: [Self; 10] = [
         Self::PartOf,
         Self::LeftOf,
@@ -48,7 +48,7 @@ impl Relation {
         Self::Near,
     ];
 
-    /// As in "a mug ... the laptop".
+    /// Words that stand between the two things: "a mug ... the laptop".
     pub(crate) fn text(self) -> &'static str {
         match self {
             Self::PartOf => "part of",
@@ -65,30 +65,30 @@ impl Relation {
     }
 }
 
-/// The eye and the scene's up, in world space.
+/// Camera position, view direction and up direction of the scene, in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Viewpoint {
-    /// Where the eye is.
+    /// Camera position.
     pub eye: DVec3,
-    /// Where it looks; of any length.
+    /// View direction; of any length.
     pub forward: DVec3,
-    /// What is up in the scene; of any length.
+    /// Up direction of the scene; of any length.
     pub up: DVec3,
 }
 
-/// Unit axes of a view that stand upright: to the right, up, and ahead.
+/// Upright unit axes of a view: right, up and ahead.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct UprightAxes {
-    /// To the right.
+    /// Right.
     pub right: DVec3,
-    /// Up in the scene.
+    /// Up direction of the scene.
     pub up: DVec3,
-    /// Ahead, level with the ground.
+    /// Ahead, parallel to the ground.
     pub ahead: DVec3,
 }
 
 impl Viewpoint {
-    /// Its upright axes. A view straight up or down, or without a direction, has some level axis.
+    /// Upright axes of the view. For a view straight up or down, or without a direction, the level axes are arbitrary.
     pub fn frame(&self) -> UprightAxes {
         let up = self.up.try_normalize().unwrap_or(DVec3::Z);
         let level = self.forward.try_normalize().map(|f| f - up * f.dot(up)).filter(|l| l.length() > 1e-3);
@@ -97,26 +97,26 @@ impl Viewpoint {
     }
 }
 
-/// From where to where a box reaches along a unit axis.
+/// Interval of a box along a unit axis.
 pub(crate) fn span(bounds: &Bounds, axis: DVec3) -> (f64, f64) {
     let (middle, reach) = (bounds.center().dot(axis), (bounds.size() * 0.5).dot(axis.abs()));
     (middle - reach, middle + reach)
 }
 
-/// The edges of a thing's own upright box, in scene units.
+/// Edges of a thing's own upright box, in scene units.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Extent {
-    /// The longer level edge.
+    /// Longer horizontal edge.
     pub(crate) length: f64,
-    /// The shorter level edge.
+    /// Shorter horizontal edge.
     pub(crate) width: f64,
-    /// Along the scene's up.
+    /// Edge along the up direction of the scene.
     pub(crate) height: f64,
 }
 
 impl Extent {
-    /// That of a thing's points: the box that stands upright and has the smallest footprint, without stray
-    /// points. It depends on the thing and on what is up alone, never on a view.
+    /// Fits the upright box with the smallest footprint to the points of a thing, without outliers. It depends on the
+    /// points and the up direction alone, never on a view.
     pub(crate) fn new(points: &[DVec3], up: DVec3) -> Option<Self> {
         const STEP_DEG: f64 = 3.0;
         let up = up.try_normalize().unwrap_or(DVec3::Z);
@@ -129,7 +129,7 @@ impl Extent {
             let (sin, cos) = (f64::from(i) * STEP_DEG).to_radians().sin_cos();
             let (a, b) = (first * cos + second * sin, second * cos - first * sin);
             let size = Bounds::robust(points.iter().map(|p| DVec3::new(p.dot(a), p.dot(b), p.dot(up))))?.size();
-            // Not for the sake of rounding.
+            // The margin keeps rounding errors from changing the choice.
             if best.is_none_or(|k| size.x * size.y < k.x * k.y * (1.0 - 1e-9)) {
                 best = Some(size);
             }
@@ -137,7 +137,7 @@ impl Extent {
         best.map(|s| Self { length: s.x.max(s.y), width: s.x.min(s.y), height: s.z })
     }
 
-    /// That of a box.
+    /// Fits an upright box to the corners of an axis-aligned box.
     pub(crate) fn of_box(bounds: &Bounds, up: DVec3) -> Option<Self> {
         let corner = |i: u32| {
             let pick = |bit: u32, low: f64, high: f64| if i & bit == 0 { low } else { high };
@@ -148,13 +148,13 @@ impl Extent {
     }
 }
 
-/// Distance between two boxes; 0 if they touch.
+/// Distance between two boxes; 0 if they touch or overlap.
 pub(crate) fn gap(a: &Bounds, b: &Bounds) -> f64 {
     (a.min - b.max).max(b.min - a.max).max(DVec3::ZERO).length()
 }
 
-/// How well `thing` stands in `relation` to `anchor`: a distance, smaller is better; `None` if it
-/// does not. [`Relation::PartOf`] never holds here.
+/// Distance between `thing` and `anchor` if `relation` holds, else `None`; a smaller distance is a better fit.
+/// [`Relation::PartOf`] never holds here.
 pub(crate) fn fit(relation: Relation, thing: &Bounds, anchor: &Bounds, frame: &UprightAxes) -> Option<f64> {
     let distance = gap(thing, anchor);
     let holds = match relation {
@@ -185,8 +185,7 @@ pub(crate) fn fit(relation: Relation, thing: &Bounds, anchor: &Bounds, frame: &U
     holds.then_some(distance)
 }
 
-/// Whether a thing is off to one side: past most of the anchor, and more to the side than any other
-/// way.
+/// Returns whether a thing lies to one side: past most of the anchor, and not much farther off along another axis.
 fn beside(thing: &Bounds, anchor: &Bounds, side: DVec3, across: [DVec3; 2]) -> bool {
     let (t, a) = (span(thing, side), span(anchor, side));
     let middle = 0.5 * (t.0 + t.1);
@@ -195,12 +194,12 @@ fn beside(thing: &Bounds, anchor: &Bounds, side: DVec3, across: [DVec3; 2]) -> b
         let (t, a) = (span(thing, axis), span(anchor, axis));
         (t.0 - a.1).max(a.0 - t.1).max(0.0)
     };
-    // What reaches back past the anchor's middle, such as the table under it, is not beside it.
+    // A thing that reaches back past the anchor's middle, such as the table under it, is not beside it.
     let past = middle > a.1 - 0.25 * (a.1 - a.0) && t.0 >= 0.5 * (a.0 + a.1);
     past && offset > 0.0 && across.iter().all(|axis| apart(*axis) <= 1.5 * offset)
 }
 
-/// Whether the thing's middle is over the anchor's footprint, widened by a share of it.
+/// Returns whether the thing's center is over the anchor's footprint, widened on each side by a share of its length.
 fn is_over(thing: &Bounds, anchor: &Bounds, frame: &UprightAxes, widened: f64) -> bool {
     [frame.right, frame.ahead].iter().all(|axis| {
         let (t, a) = (span(thing, *axis), span(anchor, *axis));
@@ -209,12 +208,12 @@ fn is_over(thing: &Bounds, anchor: &Bounds, frame: &UprightAxes, widened: f64) -
     })
 }
 
-/// Whether the thing rests on the anchor: over it, its bottom about where the anchor's top is.
+/// Returns whether the thing rests on the anchor: over it, with its bottom near the anchor's top.
 fn is_on(thing: &Bounds, anchor: &Bounds, frame: &UprightAxes) -> bool {
     let (t, a) = (span(thing, frame.up), span(anchor, frame.up));
     let (height, under) = (t.1 - t.0, a.1 - a.0);
     let gap = t.0 - a.1;
-    // A table is not on the ball under it: both begin at the floor.
+    // A table is not on the ball under it: both stand on the floor.
     let higher = t.0 - a.0 > 0.25 * under;
     higher
         && is_over(thing, anchor, frame, 0.0)
@@ -280,7 +279,7 @@ mod tests {
             points.push(DVec3::new(f64::from(x) * 0.1, f64::from(y) * 0.1, f64::from(z) * 0.1));
         }
         let straight = Extent::new(&points, DVec3::Z).expect("an extent");
-        // The outermost layer of the finest points may count as stray.
+        // The outermost layer of the finest points may count as outliers.
         assert!((straight.length - 2.0).abs() < 0.11 && (straight.width - 1.0).abs() < 0.11, "{straight:?}");
         for degrees in [10.0_f64, 34.0, 80.0, 120.0] {
             let turn = glam::DQuat::from_axis_angle(DVec3::Z, degrees.to_radians());
@@ -288,7 +287,7 @@ mod tests {
             let extent = Extent::new(&turned, DVec3::Z).expect("an extent");
             assert!((extent.length - straight.length).abs() < 0.1 && (extent.width - straight.width).abs() < 0.1);
             assert!((extent.height - straight.height).abs() < 1e-9, "{degrees}");
-            // The control: a box along the axes of the world is larger.
+            // Control: a box along the world axes is larger.
             let world = Bounds::robust(turned).expect("a box").size();
             assert!(world.x * world.y > 1.05 * extent.length * extent.width, "{degrees}: {world}");
         }

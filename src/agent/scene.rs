@@ -1,4 +1,4 @@
-//! A scene on this machine as the agent's [`World`]: what it does is emitted to whoever shows the scene.
+//! Local scene as the agent's [`World`]: its changes are emitted to the window or the command line.
 
 mod moves;
 
@@ -24,10 +24,10 @@ use crate::pipeline::semantics::recipe::{Recipe, Understanding};
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Bounds, Identities, IdentityId, LevelFilter, SemanticMap, text};
 
-/// Points of a thing that its size is measured by, at most.
+/// Maximum number of points of a thing for the measurement of its size.
 const MEASURED_POINTS: usize = 2048;
 
-/// A scene that the agent acts in.
+/// Scene that the agent acts in.
 pub struct SceneWorld {
     parts: Parts,
     engine: QueryEngine,
@@ -37,14 +37,14 @@ pub struct SceneWorld {
     bounds: Vec<Option<Bounds>>,
     shares: ViewShares,
     done: UndoHistory<Before>,
-    /// What the user did last, which the window can undo.
+    /// Last edit of the user, which the window can undo.
     pub(crate) undoable: Option<String>,
-    /// What is to be removed once the request is done: several things go into one scene.
+    /// Identities to remove at the end of the request: one new scene lacks all of them.
     removing: Vec<IdentityId>,
     emit: Emit,
 }
 
-/// How it was before something was done.
+/// State before a change, with a description of the change.
 enum Before {
     Hidden(Vec<bool>, String),
     Named(Arc<SemanticMap>, IdentityId, String),
@@ -52,10 +52,10 @@ enum Before {
 }
 
 impl SceneWorld {
-    /// A scene, seen from `eye` in a picture of this width by height.
+    /// Returns a scene seen from `eye` in a picture of this aspect ratio, width by height.
     ///
     /// # Errors
-    /// If the encoder that looked at it cannot be loaded.
+    /// If the encoder of its embeddings cannot be loaded.
     pub fn new(parts: Parts, eye: Pose, aspect: f64, emit: Emit) -> Result<Self, WorldError> {
         let engine = engine(&parts.map, parts.recipe.clone())?;
         let n = parts.map.identities.len() + 1;
@@ -75,12 +75,11 @@ impl SceneWorld {
         })
     }
 
-    /// Takes over what the user has done since: where the eye is, what is hidden, and what things are
-    /// called.
+    /// Takes over the user's changes since the last request: camera pose, hidden identities and names.
     pub(crate) fn keep_up(&mut self, eye: Pose, aspect: f64, hidden: &[IdentityId], map: &Arc<SemanticMap>) {
         (self.eye, self.aspect) = (eye, aspect);
         if !Arc::ptr_eq(map, &self.parts.map) {
-            // An edit of the agent's own comes back as the window's; another makes what was done stale.
+            // The agent's own edit returns from the window with equal identities; any other makes the history stale.
             if map.identities != self.parts.map.identities {
                 self.done = UndoHistory::default();
             }
@@ -94,10 +93,10 @@ impl SceneWorld {
         }
     }
 
-    /// Answers by this recipe from now on.
+    /// Sets the recipe of queries.
     ///
     /// # Errors
-    /// If the encoder that looked at the scene cannot be loaded.
+    /// If the encoder of the scene's embeddings cannot be loaded.
     pub(crate) fn answer_by(&mut self, recipe: &Recipe) -> Result<(), WorldError> {
         if self.parts.recipe != *recipe {
             self.engine = engine(&self.parts.map, recipe.clone())?;
@@ -106,18 +105,18 @@ impl SceneWorld {
         Ok(())
     }
 
-    /// Where the eye is.
+    /// Camera pose.
     pub(crate) fn eye(&self) -> Pose {
         self.eye
     }
 
-    /// Whether the user sees an identity's Gaussians, or those of any of its pieces.
+    /// Returns whether Gaussians of an identity or of any of its parts are drawn.
     fn drawn(&self, id: IdentityId) -> bool {
         let inside = self.parts.map.identities.descendants(id);
         inside.iter().zip(&self.hidden).any(|(inside, hidden)| *inside && !hidden)
     }
 
-    /// Share of the present view that an identity covers, pieces included.
+    /// Share of the current view that an identity covers, parts included.
     fn share_of(&self, id: IdentityId) -> f64 {
         self.shares.of(&self.parts, self.eye, self.aspect, &self.hidden, id)
     }
@@ -279,7 +278,7 @@ impl World for SceneWorld {
             }
             Before::Eye(eye, what) => {
                 self.straight(eye, String::new()).map_err(|e| WorldError(e.reason))?;
-                // The way back is not itself something to take back.
+                // The flight back must not be undone itself.
                 self.done.take();
                 Ok(what)
             }

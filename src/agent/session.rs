@@ -1,4 +1,4 @@
-//! A talk with the agent: requests in, calls checked and done, questions and answers kept.
+//! Session with the agent: takes requests, checks and executes calls, and keeps open questions.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -15,37 +15,37 @@ use super::words::MAX_CHARS;
 use super::world::World;
 use crate::scene::{IdentityId, LevelFilter, text};
 
-/// Calls that one request may lead to.
+/// Maximum number of calls per request.
 pub(crate) const MOST_CALLS: usize = 24;
-/// How often in a row the same call may be made.
+/// Maximum number of identical calls in a row.
 const MOST_ALIKE: usize = 5;
 
-/// What the session waits for.
+/// Kind of answer that the session waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Awaited {
     Confirmation,
     Choice,
 }
 
-/// What the agent answers.
+/// Reply of the agent.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reply {
     pub text: String,
-    /// What can be chosen, or what comes near; may be empty.
+    /// Identities to choose from, the nearest matches, or the targets of the last call; may be empty.
     pub candidates: Vec<IdentityId>,
-    /// Why the request was not carried out, if it was not.
+    /// Refusal if the request was not carried out.
     pub refused: Option<Refusal>,
-    /// What the session waits for, if it does.
+    /// Kind of answer that the session waits for, if any.
     pub pending: Option<Awaited>,
 }
 
-/// A question to the user that is open.
+/// Open question to the user.
 enum Pending {
     Confirm {
         call: ToolCall,
         ids: Vec<IdentityId>,
     },
-    /// This waits for a target. A model's own question has no call.
+    /// A call waits for a target. A question of the model itself has no call.
     Choose {
         call: Option<ToolCall>,
         candidates: Vec<IdentityId>,
@@ -53,7 +53,7 @@ enum Pending {
     },
 }
 
-/// A talk with the agent.
+/// Session with the agent.
 pub struct Session {
     policy: Policy,
     planner: Box<dyn Planner>,
@@ -62,19 +62,19 @@ pub struct Session {
     transcript: Transcript,
 }
 
-/// Where a session reports its progress, and hears that it is to end.
+/// Receiver of progress events, with the flag that cancels a request.
 struct ProgressSink<'a> {
     on: &'a mut dyn FnMut(AgentEvent),
     cancel: &'a AtomicBool,
 }
 
 impl Session {
-    /// A talk that keeps to `policy`, planned by `planner`.
+    /// Returns a session under `policy`, planned by `planner`.
     pub fn new(policy: Policy, planner: Box<dyn Planner>) -> Self {
         Self { policy, planner, dialog: DialogState::default(), pending: None, transcript: Transcript::default() }
     }
 
-    /// Everything that was said and done.
+    /// Transcript of the session.
     pub fn transcript(&self) -> &Transcript {
         &self.transcript
     }
@@ -83,7 +83,7 @@ impl Session {
         self.planner.name()
     }
 
-    /// What the session waits for.
+    /// Kind of answer that the session waits for.
     pub fn awaited(&self) -> Option<Awaited> {
         self.pending.as_ref().map(|p| match p {
             Pending::Confirm { .. } => Awaited::Confirmation,
@@ -91,8 +91,7 @@ impl Session {
         })
     }
 
-    /// Carries out what `text` asks for. `on` is told what goes on; `cancel` ends it after the
-    /// call that is under way.
+    /// Carries out the request `text`. `on` receives progress events; `cancel` ends the request after the current call.
     pub fn say(
         &mut self,
         world: &mut dyn World,
@@ -134,7 +133,7 @@ impl Session {
                 match choice(world, text, &candidates, &self.dialog) {
                     Choice::One(id) => return self.chosen(world, call, id, text, sink),
                     Choice::None => return self.left("All right, never mind."),
-                    // What a planner asked, it hears the answer to.
+                    // The planner asked this question itself, so it receives the answer as a new request.
                     Choice::Unclear if call.is_none() => {}
                     Choice::Unclear => {
                         let problem = "I do not know which of them that is.";
@@ -152,7 +151,7 @@ impl Session {
         self.plan(world, text, sink)
     }
 
-    /// A new request: the outer loop.
+    /// Starts a new request: the outer loop.
     fn plan(&mut self, world: &mut dyn World, text: &str, sink: &mut ProgressSink<'_>) -> Reply {
         self.dialog.marked.clear();
         self.dialog.isolated.clear();
@@ -191,7 +190,7 @@ impl Session {
         sink: &mut ProgressSink<'_>,
     ) -> Reply {
         let Some(call) = call else {
-            // The planner asked: it hears the answer as it was given.
+            // The planner asked: it receives the answer as typed.
             self.dialog.last = Some(id);
             return self.plan(world, text, sink);
         };
@@ -202,7 +201,7 @@ impl Session {
         }
     }
 
-    /// The inner loop: one call after another, each planned after the last one's result.
+    /// Runs the inner loop: one call after another, each planned after the result of the last one.
     fn run(&mut self, world: &mut dyn World, first: Option<CallOutcome>, sink: &mut ProgressSink<'_>) -> Reply {
         let mut outcomes: Vec<CallOutcome> = first.into_iter().collect();
         let mut alike = (None, 0);
@@ -242,7 +241,7 @@ impl Session {
         Reply::default()
     }
 
-    /// Checks a call and makes it. `Err` is the reply that asks the user.
+    /// Checks and executes a call. `Err` is a reply that asks the user.
     fn attempt(
         &mut self,
         world: &mut dyn World,
@@ -256,7 +255,7 @@ impl Session {
                 return Ok(self.refused_call(call, refusal, sink));
             }
             let there: Vec<IdentityId> = candidates.iter().copied().filter(|id| world.facts(*id).is_some()).collect();
-            // On a line of its own, whatever a model puts into it.
+            // The model's text may hold line breaks and control characters.
             let question = text::line(question).into_owned();
             let reply = Reply { text: question.clone(), candidates: there.clone(), ..Reply::default() };
             self.pending = Some(Pending::Choose { call: None, candidates: there, question });
@@ -302,7 +301,7 @@ impl Session {
         outcome
     }
 
-    /// A call that a check has stopped.
+    /// Outcome of a call that a check has refused.
     fn refused_call(&mut self, call: ToolCall, refusal: Refusal, sink: &mut ProgressSink<'_>) -> CallOutcome {
         self.note("refused", &refusal.text);
         (sink.on)(AgentEvent::Result { text: refusal.text.clone(), done: false });
@@ -313,7 +312,7 @@ impl Session {
         self.transcript.add(What::Check { verdict: verdict.into(), text: text.into() });
     }
 
-    /// What the user says no to is left as it is: that is an answer, and no fault.
+    /// Reply after the user's no, which is not a refusal.
     fn left(&mut self, text: &str) -> Reply {
         self.note("answered no", text);
         Reply { text: text.into(), ..Reply::default() }
@@ -324,15 +323,15 @@ impl Session {
         Reply { text: text.into(), refused: Some(Refusal::new(kind, text)), ..Reply::default() }
     }
 
-    /// The reply when a planner is through.
+    /// Reply after the planner has finished.
     fn finished(&mut self, outcomes: &[CallOutcome], text: String, refusal: Option<Refusal>) -> Reply {
         let failed = outcomes.iter().rev().find_map(|o| Some((o, o.refused?)));
         let refused = refusal.or_else(|| {
-            // What a planner got over is no refusal of the request.
+            // A refused call that the planner recovered from does not refuse the request.
             let last = outcomes.last().filter(|o| o.refused.is_some())?;
             Some(Refusal::new(last.refused?, last.text.clone()))
         });
-        // A planner that speaks for itself has not heard what is for the user alone.
+        // A planner that speaks for itself does not know the private results, so they are added to its text.
         let speaks = self.planner.speaks() && !text.is_empty();
         let mut said: Vec<&str> =
             outcomes.iter().filter(|o| !speaks || o.is_private()).map(|o| o.text.as_str()).collect();
@@ -348,7 +347,7 @@ impl Session {
         Reply { text, candidates, refused, pending: None }
     }
 
-    /// The reply when a planner could not go on.
+    /// Reply after the planner could not go on.
     fn ended(&mut self, outcomes: &[CallOutcome], refusal: Refusal) -> Reply {
         self.note("ended", &refusal.text);
         let mut said: Vec<&str> = outcomes.iter().map(|o| o.text.as_str()).collect();

@@ -1,4 +1,4 @@
-//! What the agent can do: one closed enum. Whatever a planner says, only these happen.
+//! Tools of the agent as one closed enum: a planner can do nothing else.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,27 +10,27 @@ use crate::scene::{IdentityId, LevelFilter};
 /// Longest text in a call, in characters.
 pub const MAX_TEXT: usize = 300;
 
-/// Which thing is meant.
+/// Target of a call.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(untagged)]
 pub enum Target {
     Identity(IdentityId),
-    /// In words, such as "the handle of the mug left of the laptop".
+    /// A description in words, such as "the handle of the mug left of the laptop".
     Query(String),
 }
 
 impl Target {
-    /// In words.
+    /// Returns a target in words.
     pub fn query(words: impl Into<String>) -> Self {
         Self::Query(words.into())
     }
 }
 
-/// One thing to do.
+/// Call of a tool with its arguments.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "name", content = "arguments", rename_all = "snake_case", deny_unknown_fields)]
 pub enum ToolCall {
-    /// Find what words mean, and mark it in the view.
+    /// Find a thing by words, and mark it in the view.
     Locate {
         query: String,
         /// Object or part.
@@ -39,10 +39,10 @@ pub enum ToolCall {
     },
     GoTo {
         target: Target,
-        /// From where to look at it.
+        /// Side to view it from.
         #[serde(default = "camera_args::same")]
         side: Side,
-        /// 1 as usual, 2 twice as close, 0.5 from twice as far.
+        /// 1 for the usual distance, 2 for half of it, 0.5 for twice of it.
         #[serde(default = "camera_args::normal", deserialize_with = "camera_args::closeness")]
         closeness: f64,
     },
@@ -52,13 +52,13 @@ pub enum ToolCall {
     },
     Move {
         direction: Direction,
-        /// How far.
+        /// Length of the movement.
         #[serde(default)]
         distance: Distance,
     },
     Turn {
         direction: Direction,
-        /// By how much, in degrees, above 0 to 360.
+        /// Angle in degrees, above 0, at most 360.
         degrees: f64,
     },
     Isolate {
@@ -81,9 +81,9 @@ pub enum ToolCall {
         target: Target,
         name: String,
     },
-    /// Describe a thing, or what is in the view.
+    /// Describe a thing or the view.
     Describe {
-        /// Which; none for the view.
+        /// Thing to describe; `None` for the view.
         #[serde(default)]
         target: Option<Target>,
     },
@@ -91,25 +91,25 @@ pub enum ToolCall {
         /// Objects or parts.
         #[serde(default)]
         level: LevelFilter,
-        /// Only what stands in `relation` to this.
+        /// Only things in `relation` to this.
         #[serde(default)]
         of: Option<Target>,
-        /// How it stands to `of`.
+        /// Relation to `of`.
         #[serde(default)]
         relation: Relation,
-        /// Only what is called like this.
+        /// Only things of this name.
         #[serde(default)]
         named: Option<String>,
     },
     Measure {
         target: Target,
-        /// Distance to what, in place of its size.
+        /// Other end of a distance; `None` for the size of the target.
         #[serde(default)]
         to: Option<Reference>,
     },
     AskUser {
         question: String,
-        /// Numbers of the identities that can be chosen from; may be empty.
+        /// Identities to choose from; may be empty.
         #[serde(default)]
         candidates: Vec<IdentityId>,
     },
@@ -120,7 +120,7 @@ pub enum ToolCall {
     },
 }
 
-/// From what a distance is measured.
+/// Reference of a distance.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Reference {
@@ -128,13 +128,13 @@ pub enum Reference {
     Thing(Target),
 }
 
-/// Why something is no call.
+/// Error of an invalid call.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ToolError {
-    /// No such tool.
+    /// The tool does not exist.
     #[error("there is no tool '{0}'")]
     Unknown(String),
-    /// Arguments of another kind than the tool's.
+    /// The arguments do not fit the tool.
     #[error("wrong arguments for '{tool}': {problem}")]
     Arguments { tool: String, problem: String },
 }
@@ -161,7 +161,7 @@ pub const NAMES: [&str; 18] = [
     "export",
 ];
 
-/// The calls that always have a target.
+/// Pattern of the calls that always have a target.
 macro_rules! targeted {
     ($target:ident) => {
         Self::GoTo { target: $target, .. }
@@ -181,7 +181,7 @@ impl ToolCall {
     /// Reads a call from a tool's name and its arguments as JSON.
     ///
     /// # Errors
-    /// If there is no such tool, or the arguments are not its own.
+    /// If the tool does not exist, or the arguments do not fit it.
     pub fn parse(name: &str, arguments: &str) -> Result<Self, ToolError> {
         if !NAMES.contains(&name) {
             return Err(ToolError::Unknown(name.chars().take(60).collect()));
@@ -199,10 +199,10 @@ impl ToolCall {
         Ok(call)
     }
 
-    /// Whether the numbers and texts can be used.
+    /// Checks the numbers and texts.
     ///
     /// # Errors
-    /// In words, if not.
+    /// If one is out of its range, in words.
     pub(crate) fn sound(&self) -> Result<(), String> {
         match self {
             Self::Move { distance, .. } if !distance.is_sound() => {
@@ -243,13 +243,13 @@ impl ToolCall {
         Ok(())
     }
 
-    /// The tool's name.
+    /// Name of the tool.
     pub fn name(&self) -> &'static str {
         let tagged = serde_json::to_value(self).unwrap_or_default();
         NAMES.into_iter().find(|name| tagged["name"] == *name).unwrap_or("unknown")
     }
 
-    /// What it is done to.
+    /// Target, if the call has one.
     pub(crate) fn target(&self) -> Option<&Target> {
         match self {
             targeted!(target) => Some(target),
@@ -258,7 +258,8 @@ impl ToolCall {
         }
     }
 
-    /// The same done to another target; itself if it has none. What was located is then known.
+    /// Returns the call with another target; a call without one is unchanged. [`Self::Locate`] becomes
+    /// [`Self::Highlight`].
     #[must_use]
     pub(crate) fn with_target(&self, new: Target) -> Self {
         let mut call = self.clone();
@@ -284,7 +285,7 @@ mod tests {
         let text = serde_json::to_string(&wanted).expect("JSON");
         assert_eq!(serde_json::from_str::<ToolCall>(&text).expect("read"), wanted);
         assert_eq!(ToolCall::parse("undo", ""), Ok(ToolCall::Undo {}));
-        // The second spelling is that of older transcripts.
+        // Older transcripts have the second spelling.
         for unit in ["meters", "metres"] {
             let text = format!(r#"{{"direction": "back", "distance": {{"{unit}": 0.5}}}}"#);
             let wanted = ToolCall::Move { direction: Direction::Back, distance: Distance::Meters(0.5) };

@@ -1,4 +1,4 @@
-//! Everything that was said, checked and done, for people to read.
+//! Transcript of a session: texts, checks and calls.
 
 use std::time::Instant;
 
@@ -11,10 +11,10 @@ use crate::math::format::short;
 use crate::navigate::target::Side;
 use crate::scene::{Identities, LevelFilter, text};
 
-/// Entries that are kept; the oldest go first.
+/// Maximum number of entries; the oldest are dropped first.
 const MOST: usize = 4000;
 
-/// What happened.
+/// Event of the transcript.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum What {
@@ -25,13 +25,13 @@ pub enum What {
         call: ToolCall,
         line: String,
     },
-    /// A check stopped or changed the course.
+    /// A check stopped or changed a call.
     Check {
         verdict: String,
         text: String,
     },
     Result {
-        /// The call as it was done, targets by number.
+        /// Call as executed, with targets by number.
         call: ToolCall,
         line: String,
         text: String,
@@ -46,17 +46,17 @@ pub enum What {
     },
 }
 
-/// One line of the transcript.
+/// Entry of the transcript.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TranscriptEntry {
-    /// Milliseconds since the session began.
+    /// Time since the start of the session, in ms.
     pub(crate) elapsed_ms: u64,
-    /// What happened.
+    /// Event.
     #[serde(flatten)]
     pub what: What,
 }
 
-/// Everything that happened in a session.
+/// All events of a session, in order.
 #[derive(Clone, Debug, Serialize)]
 pub struct Transcript {
     pub entries: Vec<TranscriptEntry>,
@@ -79,13 +79,13 @@ impl Transcript {
         self.entries.push(TranscriptEntry { elapsed_ms, what });
     }
 
-    /// As JSON.
+    /// Formats the transcript as JSON.
     pub fn to_json(&self) -> String {
-        // Plain texts and finite numbers always become JSON.
+        // Texts and finite numbers always serialize.
         serde_json::to_string_pretty(self).unwrap_or_default()
     }
 
-    /// As Markdown.
+    /// Formats the transcript as Markdown.
     pub fn to_markdown(&self) -> String {
         let mut text = String::from("# Transcript\n");
         for entry in &self.entries {
@@ -109,7 +109,7 @@ impl Transcript {
 }
 
 impl ToolCall {
-    /// In one line for display, with names in place of numbers.
+    /// Formats the call on one line for display, with names in place of numbers.
     pub fn line(&self, identities: &Identities) -> String {
         let name = |target: &Target| match target {
             Target::Identity(id) => identities.full_name(*id),
@@ -167,7 +167,7 @@ impl ToolCall {
     }
 }
 
-/// On one line, with nothing that Markdown would take for markup.
+/// Formats a text on one line, with Markdown markup escaped.
 fn flat(text: &str) -> String {
     let mut flat = String::with_capacity(text.len());
     for c in text::line(text).chars() {

@@ -1,4 +1,4 @@
-//! What the agent takes back, beside what the user does in the meantime, and what it says of what it wrote.
+//! Tests of the agent's undo beside edits of the user, and of its reports of written files.
 
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
@@ -19,7 +19,7 @@ use crate::scene::{GaussianCloud, Identities, Level, LevelFilter, NOBODY, Semant
 
 const EYE: Pose = Pose { center: DVec3::ZERO, world_from_camera: DMat3::IDENTITY, fov_y_rad: 0.8 };
 
-/// A lamp, called this by the window.
+/// Map of one lamp, renamed if `name` is given.
 fn map(name: Option<&str>) -> Arc<SemanticMap> {
     let mut identities = Identities::default();
     let lamp = identities.add(Level::Object, NOBODY, vec!["lamp".into()]);
@@ -27,7 +27,7 @@ fn map(name: Option<&str>) -> Arc<SemanticMap> {
     Arc::new(SemanticMap { identities, ..SemanticMap::default() })
 }
 
-/// A scene of this map without Gaussians, which lies in this folder.
+/// Scene of this map without Gaussians, in this folder.
 fn parts(map: Arc<SemanticMap>, folder: Option<PathBuf>) -> Parts {
     Parts {
         cloud: Arc::new(GaussianCloud::default()),
@@ -43,7 +43,7 @@ fn parts(map: Arc<SemanticMap>, folder: Option<PathBuf>) -> Parts {
     }
 }
 
-/// A world of this, and what is said of it.
+/// World of these parts, and the effects that it emits.
 fn world(parts: Parts) -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
     let effects = Arc::new(Mutex::new(Vec::new()));
     let said = Arc::clone(&effects);
@@ -51,7 +51,7 @@ fn world(parts: Parts) -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
     (SceneWorld::new(parts, EYE, 1.0, emit).expect("no encoder is needed"), effects)
 }
 
-/// A world in which the lamp was called a torch, and what was said of it.
+/// World in which the lamp was renamed to "torch", and the effects that it emits.
 fn renamed() -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
     let (mut world, effects) = world(parts(map(None), None));
     world.rename(1, "torch").expect("it is there");
@@ -61,7 +61,7 @@ fn renamed() -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
 #[test]
 fn a_rename_is_undone_as_one_step_of_the_window() {
     let (mut world, effects) = renamed();
-    // The window has carried the rename out: the same names in another map.
+    // The window has applied the rename: the same names in another map.
     world.keep_up(EYE, 1.0, &[], &map(Some("torch")));
     world.undo().expect("there is something to undo");
     assert_eq!(world.identities().name(1), "lamp");

@@ -1,5 +1,4 @@
-//! What a scene is made of, and which share of a view each identity covers: drawn small and counted, once per
-//! view.
+//! Components of a scene, and the share of a view that each identity covers: counted in a small render, once per view.
 
 use std::path::PathBuf;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -13,26 +12,26 @@ use crate::pipeline::semantics::recipe::Recipe;
 use crate::render::RenderSettings;
 use crate::scene::{Bounds, Camera, GaussianCloud, IdentityId, SemanticMap};
 
-/// What a scene is made of.
+/// Components of a scene.
 pub struct Parts {
     pub cloud: Arc<GaussianCloud>,
     pub settings: RenderSettings,
     pub map: Arc<SemanticMap>,
     pub cameras: Vec<Camera>,
     pub up: DVec3,
-    /// Length of a unit in meters, if that is known.
+    /// Length of a scene unit in meters, if known.
     pub meters: Option<f64>,
     pub exports: PathBuf,
-    /// Folder of the trained scene, if it is one.
+    /// Folder of a trained scene.
     pub folder: Option<PathBuf>,
-    /// How questions are answered.
+    /// Recipe of queries.
     pub recipe: Recipe,
-    /// What is known of moving about, if the scene was looked at before.
+    /// Occupied space of the scene, if it was computed before.
     pub explored: Option<Arc<Explored>>,
 }
 
 impl Parts {
-    /// The boxes of all identities, by number.
+    /// Bounding boxes of all identities, by number, parts included.
     pub(super) fn bounds(&self) -> Vec<Option<Bounds>> {
         let Self { cloud, map, .. } = self;
         let mut places: Vec<Vec<DVec3>> = vec![Vec::new(); map.identities.len() + 1];
@@ -43,14 +42,14 @@ impl Parts {
     }
 }
 
-/// Longer side of the picture in which pixels of identities are counted, px.
+/// Longer side of the picture in which pixels of identities are counted, in px.
 const COUNT_SIDE_PX: f64 = 256.0;
 
-/// The shares of the last view that was asked about.
+/// Cache of the shares in the last view.
 #[derive(Default)]
 pub(super) struct ViewShares(Mutex<Option<Counted>>);
 
-/// Shares by number, with their view.
+/// Shares by identity, with their view.
 struct Counted {
     eye: Pose,
     hidden: Vec<bool>,
@@ -58,7 +57,7 @@ struct Counted {
 }
 
 impl ViewShares {
-    /// The share of the view from `eye` that an identity covers, pieces included; 0 of one that is not known.
+    /// Share of the view from `eye` that an identity covers, parts included; 0 for an unknown one.
     pub(crate) fn of(&self, parts: &Parts, eye: Pose, aspect: f64, hidden: &[bool], id: IdentityId) -> f64 {
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let is_new = known.as_ref().is_none_or(|k| k.eye != eye || k.hidden != hidden);
@@ -81,7 +80,7 @@ fn count(parts: &Parts, eye: Pose, aspect: f64, hidden: &[bool]) -> Vec<f64> {
     } else {
         query::identities_in_view((cloud, settings), map, &camera)
     };
-    // A view that cannot be drawn shows nothing.
+    // A view that cannot be rendered shows nothing.
     for id in view.map(|v| v.identity).unwrap_or_default() {
         identities.ancestors(id).for_each(|i| shares[i as usize] += 1.0);
     }

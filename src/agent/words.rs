@@ -1,25 +1,25 @@
-//! A request as words: tokens, numbers.
+//! Tokens and numbers of a request.
 
 pub(crate) use crate::pipeline::semantics::names::singular;
 
-/// Longest request that is looked at, in characters.
+/// Longest request, in characters.
 pub(crate) const MAX_CHARS: usize = 600;
 
-/// A word or a mark, as typed and in lower case.
+/// Word or punctuation mark.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Token {
     pub(crate) raw: String,
-    /// In lower case; a quoted text starts with `"`.
+    /// Text in lower case; a quoted text starts with `"`.
     pub(crate) low: String,
 }
 
-/// Parts a text into words and the marks , ; . ? ! and keeps quoted texts whole.
+/// Splits a text into words and punctuation marks; quoted texts stay whole.
 pub(crate) fn tokens(text: &str) -> Vec<Token> {
     let text: String = text.chars().take(MAX_CHARS).collect();
     let text = text.replace(['\u{2019}', '\u{2018}', '`'], "'").replace(['\u{201c}', '\u{201d}'], "\"");
     let mut found = Vec::new();
     for (i, piece) in text.split('"').enumerate() {
-        // An odd piece stands between quotes, unless the last quote was never closed.
+        // An odd piece is inside quotes, unless the last quote was never closed.
         if i % 2 == 1 && text.matches('"').count() > i {
             found.push(Token { raw: piece.trim().into(), low: format!("\"{}", piece.trim().to_lowercase()) });
             continue;
@@ -31,7 +31,7 @@ pub(crate) fn tokens(text: &str) -> Vec<Token> {
     found
 }
 
-/// The words of a request, marks as commas except for a question's.
+/// Splits a request into tokens; all marks but the question mark become commas.
 pub(crate) fn request_tokens(request: &str) -> Vec<Token> {
     let mut all = tokens(request);
     for token in all.iter_mut().filter(|t| is_mark(&t.low) && t.low != "?") {
@@ -40,7 +40,7 @@ pub(crate) fn request_tokens(request: &str) -> Vec<Token> {
     all
 }
 
-/// Marks at a word's end become tokens; a number and its unit are parted; 'quotes' are kept whole.
+/// Splits a word: the mark at its end and the unit of a number become tokens of their own; 'quotes' are removed.
 fn split_word(word: &str, found: &mut Vec<Token>) {
     let body = word.trim_end_matches(|c: char| ",;.?!:…".contains(c));
     let marks = &word[body.len()..];
@@ -75,12 +75,12 @@ fn split_word(word: &str, found: &mut Vec<Token>) {
     }
 }
 
-/// Whether a token is a mark.
+/// Returns whether a token is a punctuation mark.
 pub(crate) fn is_mark(word: &str) -> bool {
     matches!(word, "," | ";" | "." | "?" | "!" | ":" | "…")
 }
 
-/// A number in digits or as a word; "a" and "an" are no numbers here.
+/// Reads a number in digits or as a word; "a" and "an" are not numbers here.
 pub(crate) fn number(word: &str) -> Option<f64> {
     const SMALL: [&str; 13] =
         ["zero", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten", "eleven", "twelve"];
@@ -110,13 +110,13 @@ pub(crate) fn number(word: &str) -> Option<f64> {
     word.replace(',', ".").parse().ok().filter(|n: &f64| n.is_finite())
 }
 
-/// The place that an ordinal names, from 1; 0 for the last.
+/// Reads an ordinal as a position from 1; 0 for the last.
 pub(crate) fn ordinal(word: &str) -> Option<usize> {
     const WORDS: [&str; 6] = ["last", "first", "second", "third", "fourth", "fifth"];
     WORDS.iter().position(|w| *w == word)
 }
 
-/// Whether two words are the same but for a plural or a slip.
+/// Returns whether two words are equal but for a plural or a typing error.
 pub(crate) fn alike(a: &str, b: &str) -> bool {
     let (a, b) = (singular(a), singular(b));
     if a == b {

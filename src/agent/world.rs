@@ -1,5 +1,5 @@
-//! What the agent needs of the scene. The window, the command line and tests supply it; everything
-//! that does not need a camera or a file is in [`super::resolve`] and [`super::describe`].
+//! Interface of the agent to the scene. The window, the command line and tests implement it; everything without a
+//! camera or a file is in [`super::resolve`] and [`super::describe`].
 
 use super::camera_args::{Direction, Distance};
 use super::relation::{Extent, Viewpoint};
@@ -10,131 +10,131 @@ use crate::pipeline::semantics::query_engine::ask_by_name;
 use crate::pipeline::semantics::recipe::{Recipe, Understanding};
 use crate::scene::{Bounds, Identities, IdentityId, LanguageFeatures, Level, LevelFilter};
 
-/// What is known of one identity.
+/// Facts about one identity.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IdentityFacts {
-    /// What it is called; the first is shown.
+    /// Names; the first is shown.
     pub names: Vec<String>,
     pub level: Level,
-    /// What it is a piece of; `NOBODY` for objects.
+    /// Identity that it is a part of; `NOBODY` for objects.
     pub parent: IdentityId,
-    /// Its box in world space, in scene units, if it fills any space.
+    /// Bounding box in world space, in scene units, if it has Gaussians.
     pub bounds: Option<Bounds>,
-    /// The share of the present view that it covers, 0 to 1.
+    /// Share of the current view that it covers, 0 to 1.
     pub in_view: f64,
-    /// Whether it is left out of the picture.
+    /// True if it is not drawn.
     pub hidden: bool,
 }
 
-/// What came of a flight.
+/// Result of a flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Arrival {
     pub distance: f64,
-    /// The share of the picture that the target covers now, 0 to 1.
+    /// Share of the picture that the target covers now, 0 to 1.
     pub in_view: f64,
 }
 
-/// Why the camera cannot go somewhere.
+/// Reason for which the camera cannot reach a goal.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{reason}")]
 pub struct Unreachable {
     pub reason: String,
-    /// How near to the goal the camera could come, in scene units, if that is known.
+    /// Distance between the goal and the nearest reachable pose, in scene units, if known.
     pub nearest: Option<f64>,
 }
 
-/// What came of a movement.
+/// Result of a movement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Movement {
     pub distance_done: f64,
     pub stopped_by_obstacle: bool,
 }
 
-/// Why the scene could not do something, in plain words.
+/// Error of the scene, in plain words.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{0}")]
 pub struct WorldError(pub String);
 
-/// A scene that can be asked and looked at. Methods may block while a way is computed.
+/// Scene that can be queried and viewed. Methods may block while a path is computed.
 pub trait World {
     /// Objects and parts.
     fn identities(&self) -> &Identities;
 
-    /// What a query means. Errors if the scene cannot be asked.
+    /// Answers a query. Errors if the encoder fails.
     fn locate(&mut self, query: &str, kind: LevelFilter) -> Result<QueryAnswer, WorldError>;
 
-    /// What questions are compared with.
+    /// Basis of queries: names, embeddings or both.
     fn understanding(&self) -> Understanding {
         Understanding::Both
     }
 
-    /// What is known of an identity; `None` if it is not (or no more) in the scene.
+    /// Facts about an identity; `None` if it is not, or no longer, in the scene.
     fn facts(&self, id: IdentityId) -> Option<IdentityFacts>;
 
-    /// The size of an identity, if it fills any space: that of its box, unless more is known.
+    /// Size of an identity, if it has Gaussians. By default the size of its bounding box.
     fn extent(&self, id: IdentityId) -> Option<Extent> {
         Extent::of_box(&self.facts(id)?.bounds?, self.view().up)
     }
 
-    /// The present view.
+    /// Current view.
     fn view(&self) -> Viewpoint;
 
-    /// Length of a scene unit in meters, if that is known.
+    /// Length of a scene unit in meters, if known.
     fn metres_per_unit(&self) -> Option<f64>;
 
-    /// Flies to an identity, to see it from `side`: 1 as close as usual, 2 twice as close.
+    /// Flies to an identity, to view it from `side`; a `closeness` of 2 halves the usual distance.
     fn go_to(&mut self, id: IdentityId, side: Side, closeness: f64) -> Result<Arrival, Unreachable>;
 
     /// Turns toward an identity.
     fn look_at(&mut self, id: IdentityId) -> Result<Arrival, Unreachable>;
 
-    /// Moves the eye; stops before occupied space.
+    /// Moves the camera; stops before occupied space.
     fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Movement, Unreachable>;
 
-    /// Turns the eye by degrees.
+    /// Turns the camera by degrees.
     fn turn(&mut self, direction: Direction, degrees: f64) -> Result<(), Unreachable>;
 
-    /// Marks these in the view, and nothing else.
+    /// Marks only these identities in the view.
     fn highlight(&mut self, ids: &[IdentityId]) -> Result<(), WorldError>;
 
-    /// Draws these identities, and nothing else.
+    /// Draws only these identities.
     fn isolate(&mut self, ids: &[IdentityId]) -> Result<(), WorldError>;
 
-    /// Leaves an identity out of the picture, or draws it again.
+    /// Hides an identity or draws it again.
     fn set_hidden(&mut self, id: IdentityId, hidden: bool) -> Result<(), WorldError>;
 
     /// Draws everything again.
     fn show_all(&mut self) -> Result<(), WorldError>;
 
-    /// Makes a scene of its own without an identity, what it hid closed; this one stays as it is. Waits for
-    /// [`Self::carry_out`].
+    /// Schedules a new scene without an identity, with the uncovered hole filled, for [`Self::carry_out`]. The current
+    /// scene is unchanged.
     fn remove(&mut self, id: IdentityId) -> Result<(), WorldError>;
 
-    /// Does what waited for the end of the request: whatever is removed by one request goes into one scene.
+    /// Executes the scheduled removals at the end of a request, all in one new scene.
     fn carry_out(&mut self) {}
 
-    /// Gives an identity another first name.
+    /// Changes the first name of an identity.
     fn rename(&mut self, id: IdentityId, name: &str) -> Result<(), WorldError>;
 
-    /// Takes back the last change; says which.
+    /// Undoes the last change and returns its description.
     fn undo(&mut self) -> Result<String, WorldError>;
 
-    /// Writes the Gaussians of an identity to a file; says which.
+    /// Writes the Gaussians of an identity to a file and returns its path.
     fn export(&mut self, id: IdentityId) -> Result<String, WorldError>;
 
-    /// The file that [`Self::export`] would replace, if there is one.
+    /// Path of the file that [`Self::export`] would replace, if it exists.
     fn export_replaces(&self, id: IdentityId) -> Option<String>;
 }
 
-/// Answers a query by names alone: a [`World::locate`] for scenes without an encoder.
+/// Answers a query by names alone: [`World::locate`] for scenes without an encoder.
 pub fn locate_by_names(identities: &Identities, query: &str, kind: LevelFilter) -> QueryAnswer {
     let recipe = Recipe::default();
     let asked = ask_by_name(identities, query, kind, &recipe);
     asked.unwrap_or_else(|| QueryAnswer::nothing(Basis::Names, identities, &recipe))
 }
 
-/// Answers a query as a scene does that an encoder has looked at: a [`World::locate`] for scenes whose encoder's
-/// `features` and phrases (`encode`, of the same dimension) are at hand.
+/// Answers a query with embeddings: [`World::locate`] for scenes with the `features` of an encoder. `encode` embeds a
+/// phrase in the same dimension.
 pub fn locate_with(
     identities: &Identities,
     features: &LanguageFeatures,

@@ -1,4 +1,4 @@
-//! Where a server listens, and where a client finds it: `http://127.0.0.1:7070/#TOKEN`.
+//! Addresses of a server: `http://127.0.0.1:7070/#TOKEN` for a client, and the socket address to listen at.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr};
 
@@ -7,24 +7,24 @@ use ureq::http::Uri;
 use super::token::AccessToken;
 use crate::io::http::is_loopback;
 
-/// The port where none is given.
+/// Default port.
 pub(crate) const PORT: u16 = 7070;
 
-/// Where a server is, and the secret to show it.
+/// Address of a server, with its access token.
 #[derive(Clone, Debug)]
 pub(crate) struct Address {
-    /// `http://127.0.0.1:7070`, without a slash at the end.
+    /// Base URL without a slash at the end: `http://127.0.0.1:7070`.
     pub(crate) base: String,
-    /// `127.0.0.1:7070`, as it is shown.
+    /// Host and port for display: `127.0.0.1:7070`.
     pub(crate) host: String,
     pub(crate) token: AccessToken,
 }
 
 impl Address {
-    /// Reads an address as the server prints it.
+    /// Parses an address as printed by the server.
     ///
     /// # Errors
-    /// If it is none, in words for the user.
+    /// If it is not valid, in words for the user.
     pub(crate) fn parse(text: &str) -> Result<Self, String> {
         let (place, token) = text.trim().split_once('#').ok_or(
             "the part after '#' is missing: copy the whole address that the server printed, and put it in quotes",
@@ -42,17 +42,17 @@ impl Address {
         Ok(Self { base: format!("{scheme}://{authority}{path}"), host: authority.to_string(), token })
     }
 
-    /// Whether others on the way can read what is said, the token included.
+    /// Returns whether the connection is not encrypted, so that others on the network can read it, the token included.
     pub(crate) fn is_open(&self) -> bool {
         let host = self.base.parse::<Uri>().ok().and_then(|uri| uri.host().map(str::to_owned));
         !self.base.starts_with("https") && !host.is_some_and(|host| is_loopback(&host))
     }
 }
 
-/// Reads where to listen: an address, a port, or both.
+/// Parses the address to listen at: an IP address, a port, or both.
 ///
 /// # Errors
-/// If it is none, in words for the user.
+/// If it is not valid, in words for the user.
 pub(crate) fn bind_address(text: &str) -> Result<SocketAddr, String> {
     let port = text.parse().map(|port| SocketAddr::from((Ipv4Addr::LOCALHOST, port)));
     let address = || text.parse::<IpAddr>().map(|ip| SocketAddr::from((ip, PORT)));

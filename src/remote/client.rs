@@ -1,4 +1,4 @@
-//! Asks a server: each question is one request, answered within limits of size and time.
+//! Client of a server: one request per question, with limits of size and time for the answer.
 
 use std::io::Read;
 use std::path::Path;
@@ -19,53 +19,53 @@ use crate::io::snapshot::SceneSnapshot;
 use crate::io::{http, memory};
 use crate::scene::{PhotoPixels, text};
 
-/// How long the server may be silent.
+/// Longest silence of the server.
 const STALL: Duration = Duration::from_secs(10);
-/// How long it may work on Gaussians, a photo or a change before it answers, beside a training that goes first.
+/// Longest wait for an answer with Gaussians or a photo, or to a change: a training on the server has priority.
 const WORK: Duration = Duration::from_secs(120);
-/// Most bytes of an answer in JSON, of Gaussians, of a photo, and of a refusal.
+/// Largest answer in JSON, with Gaussians, with a photo, and with a refusal, in bytes.
 const JSON_BYTES: u64 = 64 << 20;
 const SNAPSHOT_BYTES: u64 = 16 << 30;
 const PHOTO_BYTES: u64 = 128 << 20;
 const REFUSAL_BYTES: u64 = 2 << 10;
 
-/// Bytes a second that an answer has at least, on the whole, after some patience.
+/// Least mean rate of an answer in bytes per second, checked after `PATIENCE`.
 const SLOWEST: u64 = 1_000;
 const PATIENCE: Duration = Duration::from_secs(30);
 
-/// Whether an answer comes so slowly that it may never end.
+/// Returns whether an answer arrives so slowly that it may never end.
 fn is_too_slow(bytes: usize, time: Duration) -> bool {
     time > PATIENCE && (bytes as u64) < SLOWEST * time.as_secs()
 }
 
-/// Why there is no answer.
+/// Reason for a missing answer.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum ClientError {
-    /// The server cannot be reached now; it may be later.
+    /// The server cannot be reached now; a later attempt may succeed.
     #[error("{0}")]
     Lost(String),
-    /// It will not answer that.
+    /// The server refuses the request, or its answer is not valid.
     #[error("{0}")]
     Refused(String),
 }
 
-/// An answer, and which run of the server it is from.
+/// Answer, with the run of the server that it is from.
 #[derive(Debug)]
 pub(crate) struct ServerAnswer<T> {
     pub(crate) run: String,
     pub(crate) value: T,
 }
 
-/// Gaussians as they came.
+/// Gaussians as received.
 #[derive(Debug)]
 pub(crate) struct Pulled {
     pub(crate) snapshot: SceneSnapshot,
     pub(crate) generation: u64,
-    /// Step of the training.
+    /// Training step.
     pub(crate) step: u64,
 }
 
-/// Asks one server.
+/// Client of one server.
 #[derive(Debug)]
 pub(crate) struct Client {
     agent: Agent,
@@ -77,22 +77,22 @@ impl Client {
     /// # Errors
     /// Only if the system gives no random numbers.
     pub(crate) fn new(address: Address) -> std::io::Result<Self> {
-        // An address that is told on the way would get the token.
+        // A redirect would send the token to another address.
         let config = http::config(&address.base, STALL).max_redirects(0).max_redirects_will_error(false).build();
         Ok(Self { agent: config.into(), address, name: random_name()? })
     }
 
-    /// The scene without its Gaussians.
+    /// Fetches the scene without its Gaussians.
     pub(crate) fn scene(&self) -> Result<ServerAnswer<SceneCard>, ClientError> {
         self.json("/scene")
     }
 
-    /// What happened after number `since`; `have` is the generation of the Gaussians that are here.
+    /// Fetches the events after number `since`; `have` is the generation of the client's Gaussians.
     pub(crate) fn news(&self, since: u64, have: u64) -> Result<ServerAnswer<News>, ClientError> {
         self.json(&format!("/news?since={since}&have={have}"))
     }
 
-    /// The newest Gaussians, if there are any newer than those of generation `have`.
+    /// Fetches the newest Gaussians if they are newer than generation `have`.
     pub(crate) fn snapshot(&self, have: u64) -> Result<Option<Pulled>, ClientError> {
         let response = self.get(&format!("/snapshot?since={have}"), WORK)?;
         if response.status() == 204 {
@@ -106,13 +106,13 @@ impl Client {
         Ok(Some(Pulled { snapshot, generation, step }))
     }
 
-    /// The photo of this number, at most so large.
+    /// Fetches a photo, with a longest side of at most `side_px` px.
     pub(crate) fn photo(&self, index: usize, side_px: u32) -> Result<PhotoPixels, ClientError> {
         let response = self.get(&format!("/photo?index={index}&side={side_px}"), WORK)?;
         photos::read(&self.bytes(response, PHOTO_BYTES)?).map_err(|e| self.odd(&e.to_string()))
     }
 
-    /// Asks for something to be done. What cannot be done is refused.
+    /// Sends a command. The server refuses it if it cannot carry it out.
     pub(crate) fn ask(&self, ask: &Ask) -> Result<(), ClientError> {
         let body = serde_json::to_vec(ask).map_err(|e| ClientError::Refused(e.to_string()))?;
         let request = self.signed(self.agent.post(format!("{}/ask", self.address.base)), WORK);
@@ -127,26 +127,26 @@ impl Client {
         Ok(ServerAnswer { run, value })
     }
 
-    /// Asks, and waits this long for the start of an answer.
+    /// Sends a GET request and waits this long for the start of the answer.
     fn get(&self, path: &str, wait: Duration) -> Result<Response<Body>, ClientError> {
         self.checked(self.signed(self.agent.get(format!("{}{path}", self.address.base)), wait).call())
     }
 
-    /// A request of this client that waits so long for the start of an answer.
+    /// Adds the headers of this client, and the longest wait for the start of the answer.
     fn signed<B>(&self, request: RequestBuilder<B>, wait: Duration) -> RequestBuilder<B> {
         let request = request.config().timeout_recv_response(Some(wait)).build();
         let request = request.header("authorization", format!("Bearer {}", self.address.token.text()));
         request.header(VERSION_HEADER, version()).header(CLIENT_HEADER, &self.name)
     }
 
-    /// An answer of a server that can be talked to, and that is one.
+    /// Checks that the answer is from a server of a supported version, and that it is not a refusal.
     fn checked(&self, response: Result<Response<Body>, ureq::Error>) -> Result<Response<Body>, ClientError> {
         let host = &self.address.host;
         let response = response.map_err(|e| ClientError::Lost(format!("{host}: {e}")))?;
         let status = response.status().as_u16();
         let theirs = match response.headers().get(VERSION_HEADER).and_then(|v| v.to_str().ok()) {
             Some(theirs) => text::line(theirs).into_owned(),
-            // Also what a tunnel says whose other end has gone.
+            // Also the answer of a tunnel with a lost remote end.
             None if status >= 500 => return Err(ClientError::Lost(format!("{host} answers with {status}"))),
             None => return Err(ClientError::Refused(format!("what answers at {host} is no fmlgs server"))),
         };

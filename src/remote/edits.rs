@@ -1,4 +1,4 @@
-//! Changes of objects and parts that a client asks for, where the server was told to allow them.
+//! Edits of objects and parts by a client, if the server permits them.
 
 use std::path::PathBuf;
 use std::sync::{Mutex, PoisonError};
@@ -8,11 +8,11 @@ use crate::jobs::edit::{self, EditRequest};
 use crate::jobs::{JobError, open};
 use crate::pipeline::semantics::edit::Edit;
 
-/// Changes the objects of one trained scene, one change after the other.
+/// Editor of the objects of one trained scene; applies one edit at a time.
 #[derive(Debug)]
 pub(super) struct Editor {
     folder: PathBuf,
-    /// The save that is known: what somebody else has stored since is not written over.
+    /// Known state of the saved scene, so that a newer save by another program is not overwritten.
     state: Mutex<Option<String>>,
 }
 
@@ -21,7 +21,7 @@ impl Editor {
         Self { folder, state: Mutex::new(state) }
     }
 
-    /// Makes and stores a change, and shows the snapshot of the scene then, before another change is made.
+    /// Applies and stores an edit, then passes the new snapshot of the scene to `show`, before the next edit may begin.
     pub(super) fn apply(&self, edit: Edit, show: impl FnOnce(Vec<u8>)) -> Result<(), JobError> {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         let scene = open::scene(&self.folder)?;

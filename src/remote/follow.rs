@@ -1,4 +1,4 @@
-//! Following a server without a window: what it tells goes to an [`Observer`], its Gaussians into a file at the end.
+//! Client without a window: events of the server go to an [`Observer`], its Gaussians into a file at the end.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,32 +13,32 @@ use crate::jobs::export;
 use crate::pipeline::observer::{Observer, Severity, Signal};
 use crate::scene::text;
 
-/// Time between two questions, and to the next try after a lost connection.
+/// Time between two requests, and to the next attempt after a lost connection.
 const EVERY: Duration = Duration::from_millis(300);
 const RETRY: Duration = Duration::from_secs(2);
-/// How long a server that is gone is waited for.
+/// Longest time without an answer of the server.
 const GONE: Duration = Duration::from_secs(60);
 
-/// How it ended.
+/// End of the connection to a server.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Followed {
-    /// Nothing runs there: a scene at rest.
+    /// No training runs on the server: a scene at rest.
     AtRest,
-    /// The training is done, and saved in this folder of the server.
+    /// The training has finished, and is saved in this folder of the server.
     Finished(String),
-    /// It was asked to end.
+    /// The training was canceled.
     Cancelled,
-    /// It went wrong.
+    /// The training failed.
     Failed(String),
-    /// `observer` has had enough.
+    /// `observer` canceled.
     Left,
 }
 
-/// Follows the server until nothing runs there, then writes its Gaussians to `save`: those of a file bit for bit. Of a
-/// training that was canceled or went wrong nothing is written.
+/// Follows the server until no training runs, then writes its Gaussians to `save`: those of a file bit for bit. After
+/// a canceled or failed training nothing is written.
 ///
 /// # Errors
-/// If the server refuses, or is gone for a minute.
+/// If the server refuses, or cannot be reached for a minute.
 pub(crate) fn follow(
     client: &Arc<Client>,
     observer: &mut dyn Observer,
@@ -59,7 +59,7 @@ pub(crate) fn follow(
     Ok(Followed::Left)
 }
 
-/// Waits so long, or until `observer` has had enough.
+/// Waits for `time`, or until `observer` cancels.
 fn wait(time: Duration, observer: &dyn Observer) {
     let begin = Instant::now();
     while begin.elapsed() < time && observer.signal() != Signal::Cancel {
@@ -67,8 +67,8 @@ fn wait(time: Duration, observer: &dyn Observer) {
     }
 }
 
-/// What `ask` says, asked on a thread of its own: a server that is silent holds up nobody. `None` once `observer` has had
-/// enough; the request ends then by its own limits.
+/// Runs `ask` on a thread of its own, so that a silent server does not block. `None` once `observer` cancels; the
+/// request then ends by its own time limits.
 fn attended<T: Send + 'static>(
     client: &Arc<Client>,
     observer: &dyn Observer,
@@ -77,7 +77,7 @@ fn attended<T: Send + 'static>(
     let (send, receive) = bounded(1);
     let client = Arc::clone(client);
     let talk = move || {
-        // Whoever asked may have gone.
+        // The receiver may be gone.
         let _ = send.send(ask(&client));
     };
     let thread = std::thread::Builder::new().name("network".into()).spawn(talk);
@@ -92,14 +92,14 @@ fn attended<T: Send + 'static>(
     }
 }
 
-/// How far a server was followed.
+/// Progress of following a server.
 struct Position {
     run: String,
     since: u64,
     have: u64,
     running: bool,
     end: Followed,
-    /// When the server was heard last.
+    /// Time of the last answer.
     heard: Instant,
 }
 
@@ -109,7 +109,7 @@ impl Position {
         Self { run, since: 0, have: 0, running: false, end, heard }
     }
 
-    /// Asks once for what is new. Whether that was the end.
+    /// Asks once for news; returns true at the end.
     fn go_on(
         &mut self,
         client: &Arc<Client>,
@@ -120,7 +120,7 @@ impl Position {
         let Some(news) = attended(client, observer, move |client| client.news(since, have))? else { return Ok(false) };
         self.heard = Instant::now();
         if news.run != self.run {
-            // Its numbers are others, and it says anew whether something runs.
+            // Another run numbers its events anew and reports again whether a training runs.
             let first = std::mem::replace(&mut self.run, news.run).is_empty();
             (self.since, self.have, self.running, self.end) = (0, 0, false, Followed::AtRest);
             if !first {
@@ -141,7 +141,7 @@ impl Position {
             observer.progress(progress);
         }
         if self.running {
-            // What a window would show is fetched as it would be.
+            // Intermediate Gaussians are fetched as a window would fetch them.
             let have = self.have;
             if let Some(Some(pulled)) = attended(client, observer, move |client| client.snapshot(have))? {
                 self.have = pulled.generation;
@@ -161,7 +161,7 @@ impl Position {
             let text = format!("{} has no Gaussians, so {} was not written", client.address.host, path.display());
             return Err(ClientError::Refused(text));
         }
-        // The server is told that all has come; if it has gone meanwhile, it knows.
+        // The last request confirms to the server that all has arrived; a server that has ended needs no confirmation.
         let (since, generation) = (self.since, pulled.map_or(0, |p| p.generation));
         let _ = attended(client, observer, move |client| client.news(since, generation));
         Ok(true)
@@ -175,7 +175,7 @@ impl Position {
             }
             WireEvent::Step(metrics) => observer.step(metrics),
             WireEvent::Evaluation(evaluation) => observer.evaluation(evaluation),
-            // On a line of its own, whatever a server puts into it.
+            // The server's text may hold line breaks and control characters.
             WireEvent::Note(severity, text) => observer.note(severity, text::line(&text).into_owned()),
             WireEvent::Paused(paused) => {
                 observer.note(Severity::Info, if paused { "Paused" } else { "Goes on" }.into());

@@ -1,56 +1,56 @@
-//! The server's side of HTTP/1.1: requests are read within limits of size and time, answers are written to whoever
-//! takes them. Only what this program's client needs is spoken; all else is refused.
+//! Server side of HTTP/1.1, with limits of size and time for requests and answers. Only the part of the protocol that
+//! this program's client needs is supported; all else is refused.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpStream};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Most bytes of a request before its body, and most lines of it.
+/// Largest head of a request, in bytes and in header lines.
 const HEAD_BYTES: usize = 8 << 10;
 const HEAD_LINES: usize = 32;
-/// How long a request may take to arrive, from its first byte on: who drips is cut off.
+/// Longest time for a request to arrive, from its first byte on: slow senders are cut off.
 const REQUEST: Duration = Duration::from_secs(5);
-/// How long a connection of who has shown the token may be silent between requests.
+/// Longest silence of an authenticated connection between requests.
 const IDLE: Duration = Duration::from_secs(30);
-/// How long an answer may stand still, and how fast it must be taken, and a body come, on the whole, bytes a second.
+/// Longest standstill of an answer, and least mean rate of an answer or a body, in bytes per second.
 const STALL: Duration = Duration::from_secs(10);
 const SLOWEST: f64 = 8192.0;
-/// How long one write waits: a write that times out with a part taken does not tell when, so that this is how exactly
-/// a standstill is timed.
+/// Longest wait of one write. A write that times out does not report the time of its last progress, so this is the
+/// accuracy of the standstill timer.
 const LOOK: Duration = Duration::from_millis(500);
-/// Bytes that are written at once.
+/// Largest number of bytes per write.
 const PIECE: usize = 64 << 10;
 
-/// A request before its body.
+/// Request without its body.
 #[derive(Debug)]
 pub(super) struct RequestHead {
     pub(super) method: String,
-    /// What follows the address, up to a `?`.
+    /// Path, without the query after `?`.
     pub(super) path: String,
     query: String,
-    /// Names in small letters.
+    /// Headers, with names in lower case.
     headers: Vec<(String, String)>,
     deadline: Instant,
 }
 
-/// An answer.
+/// Answer to a request.
 #[derive(Clone, Debug)]
 pub(super) struct Response {
     pub(super) status: u16,
     kind: &'static str,
     headers: Vec<(&'static str, String)>,
     body: Arc<Vec<u8>>,
-    /// Whether the connection ends with it.
+    /// True if the connection ends after it.
     pub(super) last: bool,
 }
 
-/// One connection.
+/// Connection to a client.
 pub(super) struct Connection {
     stream: TcpStream,
-    /// Read, and not yet used.
+    /// Bytes that were read but not used yet.
     carry: Vec<u8>,
-    /// Whether a request on it has shown the token.
+    /// True once a request on it had the token.
     pub(super) is_known: bool,
 }
 
@@ -59,13 +59,13 @@ impl Response {
         Self { status, kind, headers: Vec::new(), body, last: false }
     }
 
-    /// A refusal in words, after which the connection ends.
+    /// Returns a refusal in words, after which the connection ends.
     pub(super) fn refusal(status: u16, text: impl Into<String>) -> Self {
         let body = Arc::new(text.into().into_bytes());
         Self { last: true, ..Self::new(status, "text/plain; charset=utf-8", body) }
     }
 
-    /// Whether it may take a while to be sent.
+    /// Returns whether sending it may take a while.
     pub(super) fn is_large(&self) -> bool {
         self.body.len() > PIECE
     }
@@ -77,18 +77,18 @@ impl Response {
 }
 
 impl RequestHead {
-    /// The value of a header; `None` if it is not there, or more than once.
+    /// Value of a header; `None` if it is missing or repeated.
     pub(super) fn header(&self, name: &str) -> Option<&str> {
         let mut all = self.headers.iter().filter(|(n, _)| n == name).map(|(_, value)| value.as_str());
         all.next().filter(|_| all.next().is_none())
     }
 
-    /// Whether a header is there at all.
+    /// Returns whether a header is present.
     pub(super) fn has(&self, name: &str) -> bool {
         self.headers.iter().any(|(n, _)| n == name)
     }
 
-    /// A number of the query, `?since=3`.
+    /// Number in the query, as in `?since=3`.
     pub(super) fn number(&self, name: &str) -> Option<u64> {
         self.query.split('&').find_map(|part| part.strip_prefix(name)?.strip_prefix('=')?.parse().ok())
     }
@@ -125,7 +125,7 @@ impl Connection {
         Self { stream, carry: Vec::new(), is_known: false }
     }
 
-    /// The next request; `None` if no more comes.
+    /// Reads the next request; `None` if there are no more.
     pub(super) fn head(&mut self) -> Result<Option<RequestHead>, Response> {
         let mut deadline = Instant::now() + if self.carry.is_empty() && self.is_known { IDLE } else { REQUEST };
         loop {
@@ -144,7 +144,7 @@ impl Connection {
         }
     }
 
-    /// The body that belongs to `head`, of `most` bytes.
+    /// Reads the body that belongs to `head`, of at most `most` bytes.
     pub(super) fn body(&mut self, head: &RequestHead, most: usize) -> Result<Vec<u8>, Response> {
         if head.has("transfer-encoding") || (head.has("content-length") && head.header("content-length").is_none()) {
             return Err(Response::refusal(400, "the body's length is not stated as one number"));
@@ -177,7 +177,7 @@ impl Connection {
         read
     }
 
-    /// Writes an answer; whether all of it was taken.
+    /// Writes an answer; an error if the client does not take all of it in time.
     pub(super) fn answer(&mut self, response: &Response) -> io::Result<()> {
         let (status, kind, length) = (response.status, response.kind, response.body.len());
         let connection = if response.last { "close" } else { "keep-alive" };
@@ -209,8 +209,7 @@ impl Connection {
         Ok(())
     }
 
-    /// Ends a connection so that what was answered still arrives: what the other side has sent is read off, within
-    /// limits.
+    /// Closes the connection so that the last answer still arrives: pending input is read first, within limits.
     pub(super) fn end(mut self) {
         let _ = self.stream.shutdown(Shutdown::Write);
         let deadline = Instant::now() + Duration::from_millis(200);
@@ -224,7 +223,7 @@ impl Connection {
     }
 }
 
-/// How long it is to then; an error if that is past.
+/// Time until a deadline; an error if it has passed.
 fn left(deadline: Instant) -> io::Result<Duration> {
     let left = deadline.saturating_duration_since(Instant::now());
     if left.is_zero() { Err(ErrorKind::TimedOut.into()) } else { Ok(left) }

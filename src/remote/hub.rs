@@ -1,6 +1,6 @@
-//! What a server has to tell: the log of a training, the place for its newest Gaussians, and who has asked for them.
-//! The training only ever puts something in; packing is done by whoever asks, and only so often that it costs the
-//! training next to nothing.
+//! Shared state of a server: the log of a training, its newest Gaussians, and the clients. The training only adds
+//! to it. Snapshots are packed on the thread of a client's request, and so rarely that they cost the training next to
+//! nothing.
 
 use std::collections::HashMap;
 use std::io;
@@ -15,24 +15,25 @@ use crate::pipeline::observer::Progress;
 use crate::scene::GaussianCloud;
 use crate::worker::Control;
 
-/// Least time between two snapshots of a training.
+/// Shortest time between two snapshots of a training.
 const SNAPSHOT_EVERY: Duration = Duration::from_millis(1000);
-/// The time between two is at least so many times what copying one takes from the training, and what packing one takes
-/// on a thread that yields to it.
+/// Shortest time between two snapshots, as a multiple of the time to copy one on the training thread, and of the time
+/// to pack one on a thread of low priority.
 const COPY_SHARE: u32 = 150;
 const PACK_SHARE: u32 = 10;
-/// Events in one answer, and in the log; if those are more, every other step of training is forgotten.
+/// Maximum number of events in one answer, and in the log. If the log is full, every other training step is dropped.
 const PER_ANSWER: usize = 2000;
 const LOGGED: usize = 200_000;
-/// Clients that are told apart, and how long one counts as there after its last answer: it may be reading Gaussians.
+/// Maximum number of clients, and time for which one counts as present after its last answer: it may be reading
+/// Gaussians.
 const CLIENTS: usize = 64;
 const THERE: Duration = Duration::from_secs(10);
 
-/// What a server shares.
+/// State that the threads of a server share.
 pub(super) struct Hub {
-    /// Names this run.
+    /// Name of this run of the server.
     pub(super) run: String,
-    /// The scene without its Gaussians.
+    /// Scene without its Gaussians.
     pub(super) card: SceneCard,
     pub(super) control: Control,
     log: Mutex<Log>,
@@ -40,15 +41,15 @@ pub(super) struct Hub {
     packed: Mutex<Option<PackedSnapshot>>,
     pace: Mutex<Pace>,
     clients: Mutex<HashMap<String, Client>>,
-    /// Answers with Gaussians that are under way.
+    /// Number of large answers that are being sent.
     pub(super) sending: AtomicUsize,
 }
 
-/// Gaussians ready to be sent.
+/// Snapshot that is ready to be sent.
 #[derive(Clone)]
 pub(super) struct PackedSnapshot {
     pub(super) generation: u64,
-    /// Step of the training.
+    /// Training step.
     pub(super) step: u64,
     pub(super) bytes: Arc<Vec<u8>>,
 }
@@ -63,15 +64,15 @@ struct Log {
 #[derive(Default)]
 struct Latest {
     generation: u64,
-    /// In training, not yet packed.
+    /// Gaussians of a training with their step, not packed yet.
     live: Option<(Arc<GaussianCloud>, u64)>,
 }
 
 struct Pace {
-    /// Whether somebody waits for newer Gaussians.
+    /// True if a client waits for newer Gaussians.
     wanted: bool,
     next: Instant,
-    /// Since when the training has been making a copy.
+    /// Start of the copy that the training is making.
     copying: Option<Instant>,
 }
 
@@ -79,7 +80,7 @@ struct Client {
     seen: Instant,
     since: u64,
     have: u64,
-    /// Its questions that are being answered.
+    /// Number of its requests that are being answered.
     open: usize,
 }
 
@@ -104,7 +105,7 @@ impl Hub {
         })
     }
 
-    /// Adds to the log.
+    /// Adds an event to the log.
     pub(super) fn tell(&self, event: WireEvent) {
         let mut log = lock(&self.log);
         log.next += 1;
@@ -115,12 +116,12 @@ impl Hub {
         }
     }
 
-    /// Where the training stands; only the latest counts.
+    /// Sets the progress of the training; only the latest is kept.
     pub(super) fn progress(&self, progress: Option<Progress>) {
         lock(&self.log).progress = progress;
     }
 
-    /// Whether the training is to copy its Gaussians now.
+    /// Returns whether the training should copy its Gaussians now.
     pub(super) fn wants_cloud(&self) -> bool {
         let mut pace = lock(&self.pace);
         let now = Instant::now();
@@ -129,7 +130,7 @@ impl Hub {
         wants
     }
 
-    /// Takes the Gaussians of a training.
+    /// Publishes the Gaussians of a training.
     pub(super) fn publish(&self, cloud: Arc<GaussianCloud>, step: u64) {
         {
             let mut pace = lock(&self.pace);
@@ -141,11 +142,11 @@ impl Hub {
         latest.generation += 1;
         let before = latest.live.replace((cloud, step));
         drop(latest);
-        // Freed after the lock is gone.
+        // The old Gaussians are freed outside the lock, which others may wait for.
         drop(before);
     }
 
-    /// Takes the snapshot of Gaussians at rest.
+    /// Publishes a packed snapshot of a scene at rest.
     pub(super) fn publish_packed(&self, bytes: Vec<u8>) {
         let mut packed = lock(&self.packed);
         let mut latest = lock(&self.latest);
@@ -154,12 +155,12 @@ impl Hub {
         *packed = Some(PackedSnapshot { generation: latest.generation, step: 0, bytes: Arc::new(bytes) });
     }
 
-    /// The newest snapshot, packed now if it was not, where it is newer than `since`.
+    /// Returns the newest snapshot if it is newer than generation `since`; packs it first if necessary.
     pub(super) fn snapshot(&self, since: u64) -> Option<PackedSnapshot> {
         if lock(&self.latest).generation <= since {
             return None;
         }
-        // One at a time; whoever waits here gets what the first has packed.
+        // One thread packs; threads that wait here get the same snapshot.
         let mut packed = lock(&self.packed);
         let (generation, live) = {
             let latest = lock(&self.latest);
@@ -175,8 +176,8 @@ impl Hub {
         packed.clone()
     }
 
-    /// What happened after number `since`, for a client that has the Gaussians of generation `have` and wants newer
-    /// ones.
+    /// Returns the events after number `since`, for a client that has the Gaussians of generation `have` and wants
+    /// newer ones.
     pub(super) fn news(&self, client: Option<&str>, since: u64, have: u64) -> News {
         let generation = lock(&self.latest).generation;
         if have >= generation {
@@ -209,7 +210,7 @@ impl Hub {
         }
     }
 
-    /// A question of a client has come, or has been answered: it counts as there meanwhile, however long that takes.
+    /// Records the start or the end of a client's request. Until its end the client counts as present.
     pub(super) fn answering(&self, client: &str, begins: bool) {
         if let Some(client) = lock(&self.clients).get_mut(client) {
             client.seen = Instant::now();
@@ -217,18 +218,18 @@ impl Hub {
         }
     }
 
-    /// How many clients were there lately, and how many of them lack something.
+    /// Number of clients that are present, and number of them that lack events or Gaussians.
     pub(super) fn watchers(&self) -> (usize, usize) {
         let (next, generation) = (lock(&self.log).next, lock(&self.latest).generation);
         let mut clients = lock(&self.clients);
         clients.retain(|_, client| client.is_there());
         let lack = clients.values().filter(|c| c.since < next || c.have < generation).count();
-        // Who is being sent something large asks nothing meanwhile.
+        // A client that receives a large answer sends no other requests meanwhile.
         (clients.len(), lack.max(self.sending.load(Ordering::Acquire)))
     }
 }
 
-/// Leaves out every other step of training.
+/// Drops every other training step.
 fn thin(events: &mut Vec<(u64, WireEvent)>) {
     let mut odd = false;
     events.retain(|(_, event)| {
@@ -238,7 +239,7 @@ fn thin(events: &mut Vec<(u64, WireEvent)>) {
     });
 }
 
-// What is behind these locks is changed by single calls, which a panic does not leave half done.
+// The data behind these locks stays consistent after a panic: it is changed by single calls.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -267,7 +268,7 @@ mod tests {
         let rest = hub.news(None, first.next, 0);
         assert!(!rest.more && rest.events.len() == 5 && rest.events[0] == step(PER_ANSWER as u64));
         assert!(hub.news(None, rest.next, 0).events.is_empty() && hub.news(None, u64::MAX, 0).events.is_empty());
-        // A log that is too long loses steps alone.
+        // A log that is too long loses only steps.
         hub.tell(WireEvent::Paused(true));
         (0..2 * LOGGED as u64).for_each(|i| hub.tell(step(i)));
         let log = lock(&hub.log);
@@ -302,7 +303,7 @@ mod tests {
         assert_eq!(hub.watchers(), (2, 1));
         hub.news(Some("a"), 1, 1);
         assert_eq!(hub.watchers(), (2, 0));
-        // Who is being answered is there, however long ago it asked.
+        // A client counts as present while its request is being answered, however long that takes.
         hub.answering("a", true);
         lock(&hub.clients).values_mut().for_each(|c| c.seen = Instant::now().checked_sub(2 * THERE).expect("past"));
         assert_eq!(hub.watchers().0, 1);

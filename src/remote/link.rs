@@ -1,5 +1,6 @@
-//! The client's thread: pulls what is new from a server, and tells it as the worker tells its jobs, so that the window
-//! folds both alike. Where the connection is lost it tries again, ever less often; what came so far stays.
+//! Connection of the window to a server. A thread pulls news and emits them as the worker emits the events of its
+//! jobs, so that the window handles both alike. After a lost connection it retries at growing intervals; the received
+//! data stays.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -17,25 +18,25 @@ use crate::worker::{Command, Elsewhere, Event, EventSource, JobId};
 
 mod thread;
 
-/// Wishes that may wait.
+/// Maximum number of queued requests.
 const WISHES: usize = 64;
-/// Each link has numbers of its own for its jobs.
+/// Size of the range of job numbers that each link has.
 const JOBS_OF_LINK: u64 = 1 << 32;
 static LINKS: AtomicU64 = AtomicU64::new(0);
 
-/// How the connection is.
+/// Status of the connection.
 #[derive(Clone, Debug)]
 pub(crate) struct LinkStatus {
-    /// The server, as it is shown.
+    /// Name of the server for display.
     pub(crate) host: String,
     pub(crate) connected: bool,
-    /// Why not.
+    /// Reason for a lost connection.
     pub(crate) problem: Option<String>,
-    /// When it is tried again; `None` where that would be of no use.
+    /// Time of the next attempt; `None` if there is none.
     pub(crate) retry_at: Option<Instant>,
 }
 
-/// A connection to a server. Dropping it ends its thread.
+/// Connection to a server. Dropping it ends its thread.
 pub(crate) struct ServerLink {
     wishes: Sender<Wish>,
     jobs: Arc<AtomicU64>,
@@ -44,8 +45,8 @@ pub(crate) struct ServerLink {
 }
 
 impl ServerLink {
-    /// Connects to a server and tells `source` what comes; what is made of its scene goes into `folders`. Fails only if
-    /// the system gives no thread.
+    /// Connects to a server and sends its events to `source`; files made from its scene go into `folders`. Fails only
+    /// if the system gives no random numbers or no thread.
     pub(crate) fn start(address: Address, folders: Folders, source: EventSource) -> std::io::Result<Self> {
         let (wishes, wished) = bounded(WISHES);
         let first_job = JobId::REMOTE.0 + JOBS_OF_LINK * LINKS.fetch_add(1, Ordering::Relaxed);
@@ -59,62 +60,62 @@ impl ServerLink {
         Ok(Self { wishes, jobs, first_job, status })
     }
 
-    /// How the connection is.
+    /// Status of the connection.
     pub(crate) fn status(&self) -> LinkStatus {
         lock(&self.status).clone()
     }
 
-    /// Whether a job is this server's.
+    /// Returns whether a job belongs to this link.
     pub(crate) fn owns(&self, job: JobId) -> bool {
         (self.first_job..self.first_job + JOBS_OF_LINK).contains(&job.0)
     }
 
-    /// Asks the training to wait or to go on. Whether there was room for that.
+    /// Asks the training to pause or to go on. Returns false if the queue is full.
     pub(crate) fn set_paused(&self, paused: bool) -> bool {
         self.wishes.try_send(Wish::Ask(Ask::Pause(paused))).is_ok()
     }
 
-    /// Asks the training to end. Whether there was room for that.
+    /// Asks the training to end. Returns false if the queue is full.
     pub(crate) fn cancel(&self) -> bool {
         self.wishes.try_send(Wish::Ask(Ask::Cancel)).is_ok()
     }
 
-    /// Asks for a change of objects and parts. Whether there was room for that.
+    /// Asks for an edit of objects and parts. Returns false if the queue is full.
     pub(crate) fn edit(&self, edit: Edit) -> bool {
         self.wishes.try_send(Wish::Ask(Ask::Edit(edit))).is_ok()
     }
 
-    /// Takes the commands that only the server can carry out: photos.
+    /// Returns a handler of the commands that only the server can carry out: photos.
     pub(crate) fn takes(&self) -> Elsewhere {
         let (wishes, jobs) = (self.wishes.clone(), Arc::clone(&self.jobs));
         Box::new(move |command| {
             let Command::Photo { index, max_side_px, photo } = command else { return None };
             let (index, side_px, title) = (*index, *max_side_px, photo.name.clone());
             let job = JobId(jobs.fetch_add(1, Ordering::Relaxed) + 1);
-            // With a full queue the command is refused by the worker, which has no such file.
+            // If the queue is full, the worker gets the command and refuses it, as it has no such file.
             wishes.try_send(Wish::Photo { job, index, side_px, title }).ok().map(|()| job)
         })
     }
 }
 
-/// What the window wants of the server.
+/// Request of the window to the server.
 enum Wish {
     Ask(Ask),
     Photo { job: JobId, index: usize, side_px: u32, title: String },
 }
 
-/// Where the thread tells what it learns.
+/// Output of the thread: events and status.
 struct Out {
     source: EventSource,
     status: Arc<Mutex<LinkStatus>>,
 }
 
-/// Why the thread stops asking for now.
+/// Reason for which the thread stops asking.
 enum Break {
     Client(ClientError),
-    /// Nobody listens any more.
+    /// The window has dropped the link.
     Gone,
-    /// The server was started anew.
+    /// The server was restarted.
     OtherRun,
 }
 

@@ -1,9 +1,9 @@
-//! Train there, look here: a scene or a training on one computer, the window on another.
+//! Remote viewing: a scene or a training on one computer, the window on another.
 //!
-//! The [`server`] answers over HTTP/1.1 what it is asked for and sends nothing by itself: the client pulls. What a
-//! training tells goes into a log of [`wire::WireEvent`]s, an allow-list of the worker's events; its Gaussians go into
-//! a place for the latest, from which they are packed only when somebody asks ([`hub`]). Nothing of this waits for a
-//! watcher. On the other side a [`link`] turns what comes into events that the window's state is a fold over.
+//! The [`server`] answers requests over HTTP/1.1 and sends nothing by itself: the client pulls. Events of a training
+//! go into a log of [`wire::WireEvent`]s, an allow-list of the worker's events. Only its latest Gaussians are kept, and
+//! packed at the request of a client ([`hub`]). The training never waits for a client. On the client a [`link`] turns
+//! the answers into events, from which the window updates its state.
 
 mod address;
 mod client;
@@ -29,10 +29,10 @@ pub(crate) use server::{ServeOptions, Server};
 use std::io;
 use std::path::Path;
 
-/// The secret of a server: the one in this file, or a new one.
+/// Returns the token of a server: the one in `file`, or a new one.
 ///
 /// # Errors
-/// If the file can neither be read nor made, or the system gives no random numbers.
+/// If the file can be neither read nor made, or the system gives no random numbers.
 pub(crate) fn token_of(file: Option<&Path>) -> io::Result<token::AccessToken> {
     file.map_or_else(token::AccessToken::random, token::AccessToken::kept)
 }

@@ -1,4 +1,4 @@
-//! What a training that is served calls as it goes: all is passed on to its own observer, and told to the hub.
+//! Observer of a served training, which forwards everything to the training's own observer and to the hub.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -8,17 +8,17 @@ use super::wire::WireEvent;
 use crate::pipeline::observer::{Evaluation, Observer, Progress, Severity, Signal, StepMetrics};
 use crate::scene::GaussianCloud;
 
-/// Passes everything on to `inner`, and tells the hub. Never waits for anybody who watches.
+/// Observer that forwards everything to `inner` and to the hub. It never waits for a client.
 pub(crate) struct ServedObserver<'a> {
     pub(super) inner: &'a mut dyn Observer,
     pub(super) hub: Arc<Hub>,
-    /// What was last told as paused or not.
+    /// Pause state that was last reported.
     pub(super) paused: AtomicBool,
 }
 
 impl Observer for ServedObserver<'_> {
     fn signal(&self) -> Signal {
-        // Who started it goes before who watches.
+        // The local user takes precedence over clients.
         let signal = match self.inner.signal() {
             Signal::Continue => self.hub.control.signal(),
             own => own,

@@ -1,4 +1,4 @@
-//! Photos for those who watch: by number, never by name or path, and no larger than they are shown.
+//! Photos for clients: by number, never by name or path, and no larger than displayed.
 
 use std::io::Cursor;
 use std::path::Path;
@@ -11,36 +11,36 @@ use crate::io::trained::SceneInfo;
 use crate::io::{self, Opened, photo};
 use crate::scene::{Dataset, Photo, PhotoPixels};
 
-/// Longest side of a photo that is sent, px.
+/// Longest side of a photo that is sent, in px.
 const MOST_PX: u64 = 4096;
 
-/// The photos of a scene, in the order of its cameras; those that are gone are `None`.
+/// Photos of a scene, in the order of its cameras; `None` for a missing one.
 #[derive(Debug, Default)]
 pub(super) struct ServedPhotos {
     photos: Vec<Option<Photo>>,
-    /// Held while one is loaded: watchers take turns.
+    /// Lock held while a photo is loaded: clients take turns.
     turn: Mutex<()>,
 }
 
 impl ServedPhotos {
-    /// Those of a dataset whose cameras are the scene's.
+    /// Returns the photos of a dataset with the same cameras as the scene.
     pub(super) fn of(dataset: &Dataset) -> Self {
         Self { photos: dataset.photos.iter().cloned().map(Some).collect(), turn: Mutex::default() }
     }
 
-    /// Those of a trained scene, as far as they are still where it says.
+    /// Returns the photos of a trained scene that still exist in its data set.
     pub(super) fn of_scene(info: &SceneInfo, dataset: Option<&Path>) -> Self {
         let Some(Ok(Opened::Dataset(dataset))) = dataset.map(io::open) else { return Self::default() };
         let of = |name: &str| dataset.photos.iter().find(|photo| photo.name == name).cloned();
         Self { photos: info.cameras.iter().map(|camera| of(&camera.name)).collect(), turn: Mutex::default() }
     }
 
-    /// Whether there are any.
+    /// Returns whether there are no photos.
     pub(super) fn is_empty(&self) -> bool {
         self.photos.iter().all(Option::is_none)
     }
 
-    /// A photo at most so large, as a `.png`; `None` if there is none of this number, or it cannot be read.
+    /// Encodes a photo as a `.png` with a longest side of at most `side_px`; `None` if it is missing or unreadable.
     pub(super) fn png(&self, index: u64, side_px: u64) -> Option<Vec<u8>> {
         let one = self.photos.get(usize::try_from(index).ok()?)?.as_ref()?;
         let _turn = self.turn.lock().unwrap_or_else(PoisonError::into_inner);
@@ -60,10 +60,10 @@ impl ServedPhotos {
     }
 }
 
-/// The photo that such bytes hold.
+/// Decodes a photo.
 ///
 /// # Errors
-/// If they hold none, or one that is larger than any that is sent.
+/// If the bytes are not a valid `.png`, or the photo is larger than the server sends.
 pub(super) fn read(png: &[u8]) -> Result<PhotoPixels, image::ImageError> {
     let mut reader = ImageReader::with_format(Cursor::new(png), ImageFormat::Png);
     let mut limits = Limits::default();

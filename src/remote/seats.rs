@@ -1,41 +1,41 @@
-//! Places for connections. Who has shown the token keeps one; of the others, who has been there for longest makes room for
-//! who comes: a client shows it at once, and who drips does not.
+//! Limit of the number of connections. An authenticated connection keeps its seat. Of the others, the oldest is closed
+//! to make room for a new one: a client sends its token at once, a stalling attacker does not.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::net::{Shutdown, TcpStream};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Connections at once, and how many of them may be of those who have not shown the token.
+/// Maximum number of connections, and of those without authentication.
 const ALL: usize = 32;
 const UNKNOWN: usize = 24;
 
-/// All places of a server.
+/// Seats of a server.
 #[derive(Default)]
 pub(super) struct Seats(Mutex<Taken>);
 
 #[derive(Default)]
 struct Taken {
     last: u64,
-    /// Connections on which nobody has shown the token yet, by their numbers: the earliest first.
+    /// Connections without authentication, by number: the oldest first.
     unknown: BTreeMap<u64, TcpStream>,
     known: BTreeSet<u64>,
 }
 
-/// One place, for as long as this lives.
+/// Seat of one connection, free again once dropped.
 pub(super) struct Seat {
     of: Arc<Seats>,
     number: u64,
 }
 
 impl Seats {
-    /// A place for who comes. Where too many are there, the connection ends that has been without the token for longest;
-    /// `None` if all have shown it.
+    /// Takes a seat for a new connection. If there are too many, the oldest one without authentication is closed;
+    /// `None` if all are authenticated.
     pub(super) fn take(self: &Arc<Self>, stream: &TcpStream) -> Option<Seat> {
         let own = stream.try_clone().ok()?;
         let mut taken = self.taken();
         if taken.unknown.len() >= UNKNOWN || taken.unknown.len() + taken.known.len() >= ALL {
             let (_, earliest) = taken.unknown.pop_first()?;
-            // Its thread reads the end; if it has gone already, that is as good.
+            // The thread of that connection reads the end of the stream; an error means that it has ended already.
             let _ = earliest.shutdown(Shutdown::Both);
         }
         taken.last += 1;
@@ -44,14 +44,14 @@ impl Seats {
         Some(Seat { of: Arc::clone(self), number })
     }
 
-    // What is behind the lock is changed by single calls, which a panic does not leave half done.
+    // The data behind the lock stays consistent after a panic: it is changed by single calls.
     fn taken(&self) -> MutexGuard<'_, Taken> {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 impl Seat {
-    /// Its holder has shown the token.
+    /// Marks the connection as authenticated.
     pub(super) fn keep(&self) {
         let mut taken = self.of.taken();
         if taken.unknown.remove(&self.number).is_some() {
@@ -76,14 +76,14 @@ mod tests {
 
     use super::*;
 
-    /// Both ends of a connection: the client's, and the server's.
+    /// Returns both ends of a connection: the client's and the server's.
     fn connect(listener: &TcpListener) -> (TcpStream, TcpStream) {
         let client = TcpStream::connect(listener.local_addr().expect("bound")).expect("connected");
         client.set_nonblocking(true).expect("set");
         (client, listener.accept().expect("accepted").0)
     }
 
-    /// Whether nothing has come from the server, not even the end.
+    /// Returns whether the server has sent nothing and the connection is open.
     fn is_open(mut client: &TcpStream) -> bool {
         client.read(&mut [0]).is_err_and(|e| e.kind() == ErrorKind::WouldBlock)
     }
@@ -109,13 +109,13 @@ mod tests {
         };
         (0..UNKNOWN).for_each(|_| assert!(come(&mut there)));
         assert!(there.iter().all(|(client, ..)| is_open(client)), "there is room for all of them");
-        // The first has shown the token: the second goes when one more comes.
+        // The first is authenticated: a further connection closes the second.
         there[0].2.keep();
         assert!(come(&mut there) && there.iter().all(|(client, ..)| is_open(client)));
         assert!(come(&mut there) && ends(&there[1].0));
         drop(there.remove(1));
         assert!(there.iter().all(|(client, ..)| is_open(client)), "and no other");
-        // All places are of those who have shown it: nobody else comes in until one goes.
+        // All seats are authenticated: there is none for a further connection until one ends.
         there.iter().for_each(|(.., seat)| seat.keep());
         while there.len() < ALL {
             assert!(come(&mut there));
@@ -125,7 +125,7 @@ mod tests {
         there.pop();
         assert!(come(&mut there));
         assert!(there.iter().all(|(client, ..)| is_open(client)));
-        // Who was sent away and shows it then has no place all the same.
+        // A closed connection that authenticates afterwards has no seat.
         let gone = there.len() - 1;
         assert!(come(&mut there) && ends(&there[gone].0));
         there[gone].2.keep();

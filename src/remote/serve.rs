@@ -1,4 +1,4 @@
-//! What is served: a scene at rest, or a training that is about to begin.
+//! Start of a server for a scene at rest, or for a training that is about to begin.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -12,10 +12,10 @@ use crate::jobs::sparse_cloud::sparse_cloud;
 use crate::pipeline::train::TrainConfig;
 use crate::scene::Dataset;
 
-/// Serves the trained scene or splat at `path`, and says what it is called.
+/// Serves the trained scene or splat at `path`; returns the server and the name of the scene.
 ///
 /// # Errors
-/// If it cannot be read, or the server not be started.
+/// If the scene cannot be read, or the server cannot be started.
 pub(crate) fn scene(path: &Path, options: ServeOptions) -> Result<(Server, String), ServeError> {
     let (info, bytes, editable, photos) = match io::open(path).map_err(JobError::from)? {
         Opened::Dataset(_) => return Err(JobError::NotTrained(path.into()).into()),
@@ -34,7 +34,7 @@ pub(crate) fn scene(path: &Path, options: ServeOptions) -> Result<(Server, Strin
     Ok((Server::start(info, editable, photos, Shown::AtRest(bytes), options)?, name))
 }
 
-/// Serves a training of these photos, which [`Server::observe`] then listens to.
+/// Serves a training on this dataset, whose events then come through [`Server::observe`].
 ///
 /// # Errors
 /// If the server cannot be started.

@@ -1,5 +1,5 @@
-//! The server: listens, checks who asks, and answers from the [`Hub`]. Each connection has a thread of its own that
-//! yields to the training; paths, and anything else that names a file, are never taken from a client.
+//! Server: listens, authenticates clients, and answers from the [`Hub`]. Each connection has a thread of low priority.
+//! Paths and other names of files are never taken from a client.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::path::Path;
@@ -29,31 +29,31 @@ use crate::jobs::JobError;
 use crate::pipeline::observer::Observer;
 use crate::scene::GaussianCloud;
 
-/// Requests a second, of all clients together, and how many may come at once.
+/// Maximum rate of requests per second, of all clients together, and largest burst.
 const RATE: f64 = 100.0;
 const BURST: f64 = 200.0;
-/// Bytes of what a client asks to be done; more where objects may be changed, as Gaussians are listed by number.
+/// Largest body of a command, in bytes; larger if edits are permitted, as they list Gaussians by number.
 const ASK_BYTES: usize = 16 << 10;
 const EDIT_BYTES: usize = 8 << 20;
-/// How long somebody who does not know the token waits for that answer.
+/// Delay of the answer to a wrong token.
 const WRONG_TOKEN: Duration = Duration::from_millis(200);
-/// How long the end of a training waits for watchers that are being sent nothing.
+/// Longest wait at the end of a training for clients to which nothing is being sent.
 const FAREWELL: Duration = Duration::from_secs(60);
 
-/// How a scene is served.
+/// Options of a server.
 #[derive(Clone, Debug)]
 pub(crate) struct ServeOptions {
-    /// Where to listen.
+    /// Address to listen at.
     pub(crate) bind: SocketAddr,
-    /// Whether others than this machine may connect.
+    /// True if other machines may connect.
     pub(crate) anywhere: bool,
-    /// Names of this machine, besides those of the loopback, that clients may know it by.
+    /// Host names that clients may use, besides those of the loopback.
     pub(crate) hosts: Vec<String>,
     pub(crate) allow_edit: bool,
     pub(crate) token: AccessToken,
 }
 
-/// Why nothing is served.
+/// Error of starting a server.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum ServeError {
@@ -80,16 +80,15 @@ struct Shared {
     stop: AtomicBool,
 }
 
-/// What there is to see from the first answer on.
+/// Content that is served from the first answer on.
 pub(super) enum Shown {
     /// A snapshot at rest.
     AtRest(Vec<u8>),
-    /// A training that is about to begin: what it is called, and the Gaussians that it starts from, where those are
-    /// known.
+    /// A training that is about to begin: its title, and its initial Gaussians if known.
     Training(String, Option<Arc<GaussianCloud>>),
 }
 
-/// A server that runs. It ends when this is dropped.
+/// Running server. It ends when this is dropped.
 pub(crate) struct Server {
     shared: Arc<Shared>,
     address: SocketAddr,
@@ -103,11 +102,11 @@ impl fmt::Debug for Server {
 }
 
 impl Server {
-    /// Serves a scene that `info` describes. With a trained scene's folder and its save, its objects can be changed,
-    /// where the options allow that.
+    /// Serves the scene of `info`. With `editable`, the folder of a trained scene and its saved state, clients can edit
+    /// its objects if the options permit it.
     ///
     /// # Errors
-    /// If the address is not free, or is not to be used without the user's word.
+    /// If the address is in use, or can be reached from other machines without the user's consent.
     pub(super) fn start(
         mut info: SceneInfo,
         editable: Option<(&Path, Option<String>)>,
@@ -118,7 +117,7 @@ impl Server {
         if !options.bind.ip().to_canonical().is_loopback() && !options.anywhere {
             return Err(ServeError::Anywhere(options.bind));
         }
-        // Where things lie on this machine is nobody's business.
+        // Local paths are not sent to clients.
         info.dataset = None;
         let editor = editable.filter(|_| options.allow_edit).map(|(folder, state)| Editor::new(folder.into(), state));
         let card = SceneCard { info, allow_edit: editor.is_some(), photos: !photos.is_empty() };
@@ -147,12 +146,12 @@ impl Server {
         Ok(Self { shared, address, accepting })
     }
 
-    /// Where it listens.
+    /// Address that the server listens at.
     pub(crate) fn address(&self) -> SocketAddr {
         self.address
     }
 
-    /// The address with the token, for a client on this machine.
+    /// Address with the token, for a client on this machine.
     pub(crate) fn url(&self) -> String {
         let ip = match self.address.ip() {
             ip if ip.is_unspecified() => IpAddr::V4(Ipv4Addr::LOCALHOST),
@@ -161,13 +160,13 @@ impl Server {
         format!("http://{}/#{}", SocketAddr::new(ip, self.address.port()), self.shared.options.token.text())
     }
 
-    /// An observer of the training that tells `inner` everything, and whoever watches.
+    /// Returns an observer of the training that forwards everything to `inner` and to the clients.
     pub(crate) fn observe<'a>(&self, inner: &'a mut dyn Observer) -> ServedObserver<'a> {
         ServedObserver { inner, hub: Arc::clone(&self.shared.hub), paused: AtomicBool::new(false) }
     }
 
-    /// Tells how a training has ended; Gaussians that were saved are sent as they lie in `folder`. Returns what
-    /// cannot be sent.
+    /// Reports the end of a training; the Gaussians saved in `folder` are sent bit for bit. Returns an error if they
+    /// cannot be read.
     pub(crate) fn finished(&self, folder: &Path, all_done: bool) -> Result<(), crate::io::IoError> {
         let sent = snapshot::of_folder(folder).map(|bytes| self.shared.hub.publish_packed(bytes));
         self.shared.hub.tell(match (&sent, all_done) {
@@ -178,17 +177,17 @@ impl Server {
         sent
     }
 
-    /// Tells that a training has failed.
+    /// Reports that a training has failed.
     pub(crate) fn failed(&self, why: String) {
         self.shared.hub.tell(WireEvent::Failed(why));
     }
 
-    /// How many clients were there in the last seconds, and how many of them have not yet got everything.
+    /// Number of clients that are present, and number of them that have not received everything.
     pub(crate) fn watchers(&self) -> (usize, usize) {
         self.shared.hub.watchers()
     }
 
-    /// Waits until whoever watches has got everything, or is sent nothing for a minute, or until `stop` says so.
+    /// Waits until all clients have received everything, nothing was sent to them for a minute, or `stop` returns true.
     pub(crate) fn see_off(&self, stop: impl Fn() -> bool) {
         let mut last = Instant::now();
         while self.watchers().1 > 0 && last.elapsed() < FAREWELL && !stop() {
@@ -203,7 +202,7 @@ impl Server {
 impl Drop for Server {
     fn drop(&mut self) {
         self.shared.stop.store(true, Ordering::Release);
-        // A connection wakes the thread that waits for one.
+        // A connection wakes the accepting thread, so that it sees `stop`.
         let ip = if self.address.ip().is_unspecified() { Ipv4Addr::LOCALHOST.into() } else { self.address.ip() };
         let woken = TcpStream::connect_timeout(&(ip, self.address.port()).into(), Duration::from_secs(1));
         if let Some(accepting) = self.accepting.take().filter(|_| woken.is_ok()) {
@@ -218,23 +217,23 @@ fn accept(listener: &TcpListener, shared: &Arc<Shared>) {
             return;
         }
         let Ok(stream) = stream else {
-            // Too many files are open; that passes.
+            // Too many files are open: a temporary error.
             thread::sleep(Duration::from_millis(50));
             continue;
         };
         let Some(seat) = shared.seats.take(&stream) else {
             let busy = Response::refusal(503, "too many connections").with("Retry-After", 1);
-            // It fits into the system's own buffer.
+            // The answer fits into the system's send buffer, so this does not block.
             let _ = Connection::new(stream).answer(&busy);
             continue;
         };
         let of_thread = Arc::clone(shared);
         let work = move || {
-            // Not every system lets a program lower its own priority; then the threads are equal.
+            // Not every system lets a program lower its own priority; then the threads have equal priority.
             let _ = set_current_thread_priority(ThreadPriority::Min);
             talk(Connection::new(stream), &of_thread, &seat);
         };
-        // Without a thread the connection just ends.
+        // Without a thread the connection is closed.
         let _ = thread::Builder::new().name("watcher".into()).spawn(work);
     }
 }
@@ -266,7 +265,7 @@ fn talk(mut connection: Connection, shared: &Shared, seat: &Seat) {
     }
 }
 
-/// The answer to a request; `of` becomes the client that asks, if it is a known one.
+/// Returns the answer to a request; `of` becomes the name of the client, if the request has one.
 fn answer(
     connection: &mut Connection,
     head: &RequestHead,
@@ -309,9 +308,9 @@ fn answer(
     }
 }
 
-/// Refuses whoever is not a client that knows the token, before anything else is read.
+/// Refuses a request that is not from a client with the token, before anything else is read.
 fn admit(head: &RequestHead, options: &ServeOptions) -> Result<(), Response> {
-    // A page in a browser may have had its name's address changed to this machine's; it sends both of these.
+    // Guards against DNS rebinding: a page in a browser sends its own host name and an origin.
     let host = head.header("host").unwrap_or_default();
     let name = host.rsplit_once(':').filter(|(_, port)| port.bytes().all(|b| b.is_ascii_digit())).map_or(host, |h| h.0);
     let bare = name.trim_start_matches('[').trim_end_matches(']');
@@ -337,7 +336,7 @@ fn admit(head: &RequestHead, options: &ServeOptions) -> Result<(), Response> {
     Ok(())
 }
 
-/// Whether a request may be answered now.
+/// Takes a token from the bucket of the rate limit; returns whether the request may be answered now.
 fn take_turn(bucket: &Mutex<(f64, Instant)>) -> bool {
     let mut bucket = bucket.lock().unwrap_or_else(PoisonError::into_inner);
     let since = bucket.1.elapsed().as_secs_f64();
@@ -347,7 +346,7 @@ fn take_turn(bucket: &Mutex<(f64, Instant)>) -> bool {
     may
 }
 
-/// Does what a client asks for.
+/// Executes a command of a client.
 fn obey(ask: Ask, shared: &Shared) -> Result<Response, Response> {
     match (ask, &shared.editor) {
         (Ask::Pause(pause), _) => shared.hub.control.set_paused(pause),

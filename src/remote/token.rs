@@ -1,4 +1,4 @@
-//! The secret that a client must know: 32 random bytes, as 64 hexadecimal digits.
+//! Access token of a server: 32 random bytes, as 64 hexadecimal digits.
 
 use std::fs::{self, File};
 use std::io::{self, Read, Write};
@@ -11,10 +11,10 @@ use subtle::ConstantTimeEq;
 use crate::io::files::hex;
 
 const BYTES: usize = 32;
-/// Longest file of a token, in bytes.
+/// Largest token file, in bytes.
 const MOST_BYTES: u64 = 4 << 10;
 
-/// A secret. Its `Debug` does not show it.
+/// Secret token. Its `Debug` does not show it.
 #[derive(Clone)]
 pub(crate) struct AccessToken([u8; BYTES]);
 
@@ -25,14 +25,15 @@ impl std::fmt::Debug for AccessToken {
 }
 
 impl AccessToken {
-    /// A new one, from the system's source of random numbers.
+    /// Returns a new token from the system's source of random numbers.
     pub(crate) fn random() -> io::Result<Self> {
         let mut bytes = [0; BYTES];
         SysRng.try_fill_bytes(&mut bytes).map_err(io::Error::other)?;
         Ok(Self(bytes))
     }
 
-    /// The one in the file at `path`; where there is no file, it is made with a new one that only its owner reads.
+    /// Reads the token in the file at `path`. If there is no file, makes one with a new token, which only its owner can
+    /// read.
     pub(crate) fn kept(path: &Path) -> io::Result<Self> {
         match read(path) {
             Ok(text) => Self::parse(text.trim())
@@ -50,7 +51,7 @@ impl AccessToken {
         }
     }
 
-    /// The token that these digits are.
+    /// Parses a token from its digits.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         let digits = text.as_bytes();
         let mut bytes = [0; BYTES];
@@ -63,21 +64,21 @@ impl AccessToken {
         Some(Self(bytes))
     }
 
-    /// Its digits.
+    /// Digits of the token.
     pub(crate) fn text(&self) -> String {
         hex(&self.0)
     }
 
-    /// Whether these digits are this token's, in a time that does not tell how many of them are.
+    /// Returns whether these are the digits of this token, in constant time.
     pub(crate) fn is(&self, text: &str) -> bool {
         Self::parse(text).is_some_and(|other| self.0.ct_eq(&other.0).into())
     }
 }
 
-/// What a file of a token says: a short regular one that only its owner reads and writes.
+/// Reads a token file, which must be a short regular file with access for its owner only.
 fn read(path: &Path) -> io::Result<String> {
     let bad = |why: &str| Err(io::Error::new(io::ErrorKind::InvalidData, why));
-    // Looked at before it is opened: a pipe would keep the program waiting.
+    // Checked before it is opened: a pipe would block the program.
     let about = fs::metadata(path)?;
     if !about.is_file() || about.len() > MOST_BYTES {
         return bad("it is no file of 64 hexadecimal digits");
@@ -91,7 +92,7 @@ fn read(path: &Path) -> io::Result<String> {
     Ok(text)
 }
 
-/// A name that no other has: of a run, of a client.
+/// Returns a unique random name for a run or a client.
 pub(crate) fn random_name() -> io::Result<String> {
     AccessToken::random().map(|token| hex(&token.0[..8]))
 }

@@ -1,4 +1,4 @@
-//! What goes over the wire, as JSON: a scene's card, news, and the few things that a client may ask for.
+//! Messages between server and client, as JSON: the card of a scene, news, and the commands of a client.
 
 use serde::{Deserialize, Serialize};
 
@@ -6,79 +6,79 @@ use crate::io::trained::SceneInfo;
 use crate::pipeline::observer::{Evaluation, Progress, Severity, StepMetrics};
 use crate::pipeline::semantics::edit::Edit;
 
-/// Version of what is written here. Another first number is another language; the second counts what was added.
+/// Version of the protocol. Another first number is incompatible; the second one counts compatible additions.
 pub(crate) const PROTOCOL: [u32; 2] = [1, 0];
-/// Carries the sender's version, `1.0`, and that of its program.
+/// Header with the sender's protocol version, `1.0`, and the version of its program.
 pub(crate) const VERSION_HEADER: &str = "fmlgs-protocol";
-/// Names a client, so that the server knows who has what.
+/// Header with the name of a client, so that the server can track its state.
 pub(crate) const CLIENT_HEADER: &str = "fmlgs-client";
-/// Names a run of the server: its numbers are no other's.
+/// Header with the name of a run of the server: event numbers and generations are valid within one run.
 pub(crate) const RUN_HEADER: &str = "fmlgs-run";
-/// Generation of the snapshot that follows.
+/// Header with the generation of the snapshot in the body.
 pub(crate) const GENERATION_HEADER: &str = "fmlgs-generation";
-/// Step of the training that it was taken at.
+/// Header with the training step of the snapshot.
 pub(crate) const STEP_HEADER: &str = "fmlgs-step";
 
-/// What this side speaks: `1.0 (fmlgs 0.1.0)`.
+/// Protocol version of this program: `1.0 (fmlgs 0.1.0)`.
 pub(crate) fn version() -> String {
     format!("{}.{} (fmlgs {})", PROTOCOL[0], PROTOCOL[1], env!("CARGO_PKG_VERSION"))
 }
 
-/// Whether a side that says so can be talked to.
+/// Returns whether the other side's version is compatible.
 pub(crate) fn is_understood(version: &str) -> bool {
     version.split('.').next().and_then(|major| major.trim().parse().ok()) == Some(PROTOCOL[0])
 }
 
-/// What a scene is, without its Gaussians.
+/// Description of a scene, without its Gaussians.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct SceneCard {
-    /// As in `scene.json`, without where its photos are.
+    /// Contents of `scene.json`, without the path of the photos.
     pub(crate) info: SceneInfo,
-    /// Whether objects and parts may be changed from here.
+    /// True if clients may edit objects and parts.
     pub(crate) allow_edit: bool,
-    /// Whether its photos are sent, by their numbers.
+    /// True if photos can be requested, by their numbers.
     pub(crate) photos: bool,
 }
 
-/// One thing that happened, of those that a client is told.
+/// Event that is sent to clients.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) enum WireEvent {
-    /// A training has begun.
+    /// A training with this title has begun.
     Started(String),
     Step(StepMetrics),
     Evaluation(Evaluation),
     Note(Severity, String),
     Paused(bool),
-    /// It is done, and saved in this folder of the server.
+    /// The training has finished, and is saved in this folder of the server.
     Finished(String),
     Cancelled,
-    /// What went wrong.
+    /// The training has failed for this reason.
     Failed(String),
 }
 
-/// What is new.
+/// News for a client.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct News {
-    /// In order.
+    /// Events in order.
     pub(crate) events: Vec<WireEvent>,
-    /// Number to ask from next time.
+    /// Number of the last event, to ask from next time.
     pub(crate) next: u64,
-    /// Whether there is more already.
+    /// True if there are more events already.
     pub(crate) more: bool,
-    /// Where the training stands.
+    /// Progress of the training.
     pub(crate) progress: Option<Progress>,
-    /// Of the newest Gaussians.
+    /// Generation of the newest Gaussians.
     pub(crate) generation: u64,
 }
 
-/// What a client may ask to be done.
+/// Command of a client.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Ask {
-    /// The training waits (`true`) or goes on.
+    /// Pause the training (`true`) or let it go on.
     Pause(bool),
-    /// The training ends; what was reached is saved.
+    /// End the training; its state is saved.
     Cancel,
-    /// Objects and parts are changed, where that is allowed.
+    /// Edit objects and parts, if permitted.
     Edit(Edit),
 }
 

@@ -1,4 +1,4 @@
-//! Completion while typing: how a text can go on, by the commands and by the names in the scene.
+//! Completion while typing, from the commands and from the names in the scene.
 
 use super::form::{FormItem, FormRequest, FormSlot, Things, sequences};
 use super::{SEPARATORS, clauses};
@@ -7,13 +7,13 @@ use crate::agent::resolve::{NameWords, is_thing};
 use crate::agent::words::request_tokens;
 use crate::scene::Identities;
 
-/// The texts that `text` can become with its next words, at most `most`: names of things first, else in the order of
-/// the commands.
+/// Returns at most `most` completions of `text` by its next words: names of things first, else in the order of the
+/// commands.
 pub fn complete(text: &str, identities: &Identities, most: usize) -> Vec<String> {
     let tokens = request_tokens(text);
     let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).collect();
     let known = NameWords::new(identities);
-    // Commands before the last one must be understood; courtesy is passed over.
+    // Commands before the last one must be valid; polite openers are skipped.
     let starts = |at: usize| {
         let before = FormRequest { tokens: &tokens[..at], words: &words[..at], known: &known, things: Things::Known };
         let opens = CommandLanguage::get().openers.contains(&words[..at].join(" "));
@@ -47,12 +47,12 @@ pub fn complete(text: &str, identities: &Identities, most: usize) -> Vec<String>
 struct Kept<'a> {
     identities: &'a Identities,
     known: &'a NameWords,
-    /// The word that is being typed; empty if the next has not begun.
+    /// Word that is being typed; empty if the next has not begun.
     begun: &'a str,
 }
 
 impl Kept<'_> {
-    /// Adds what may stand after `words` in a sequence, and whether it is a name.
+    /// Adds the texts that may follow `words` in a sequence, each with a flag for names.
     fn follow(&self, items: &[FormItem], words: &[&str], next: &mut Vec<(bool, String)>) {
         match (items.split_first(), words) {
             (None, _) => {}
@@ -103,7 +103,7 @@ impl Kept<'_> {
         }
     }
 
-    /// What may stand in a slot.
+    /// Suggested texts for a slot.
     fn options(&self, slot: FormSlot) -> Vec<String> {
         let language = CommandLanguage::get();
         let fixed = |words: &[&str]| words.iter().map(|w| (*w).to_owned()).collect();
@@ -128,7 +128,7 @@ impl Kept<'_> {
     }
 }
 
-/// What follows `begun`, in whatever letter case, in a text.
+/// Returns the rest of a text after the prefix `begun`, compared without letter case.
 fn rest_of<'a>(text: &'a str, begun: &str) -> Option<&'a str> {
     let end = text.char_indices().map(|(at, c)| at + c.len_utf8()).take(begun.chars().count()).last().unwrap_or(0);
     (text[..end].to_lowercase() == begun).then_some(&text[end..])

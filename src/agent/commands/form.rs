@@ -1,5 +1,5 @@
-//! Forms of commands: expanded into plain sequences of words and slots, matched against a request. A form
-//! fits only if every word of the request has its place in it.
+//! Forms of commands: expanded into plain sequences of words and slots, then matched against a request. A form
+//! matches only if it accounts for every word of the request.
 
 use std::collections::HashMap;
 use std::sync::OnceLock;
@@ -12,7 +12,7 @@ use crate::agent::words::{Token, number};
 use crate::navigate::target::Side;
 use crate::scene::identity::whole_names::key;
 
-/// What stands in a slot.
+/// Kind of a slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum FormSlot {
     Thing,
@@ -28,7 +28,7 @@ pub(super) enum FormSlot {
     Most,
 }
 
-/// A word of a form, or a slot.
+/// Item of a form: a fixed word or a slot.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum FormItem {
     Word(String),
@@ -36,25 +36,25 @@ pub(super) enum FormItem {
 }
 
 impl FormItem {
-    /// Its word, if it is none of the slots.
+    /// Fixed word; `None` for a slot.
     pub(super) fn word(&self) -> Option<&str> {
         if let Self::Word(word) = self { Some(word) } else { None }
     }
 }
 
-/// A form without choices, and the command it is of.
+/// Form without alternatives, and its command.
 pub(super) struct Sequence {
     pub(crate) items: Vec<FormItem>,
     pub(crate) command: &'static CommandHelp,
 }
 
-/// What the slots of a form hold.
+/// Values of the slots of a form.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Slots {
     pub(super) texts: Vec<String>,
-    /// Words of things.
+    /// Number of words in the slots of things.
     pub(super) named: usize,
-    /// Several things in place of the text with this number.
+    /// Several things that stand for the text with this index.
     pub(super) several: Option<(usize, Vec<String>)>,
     pub(super) name: Option<String>,
     pub(super) side: Option<Side>,
@@ -76,12 +76,12 @@ pub(super) fn sequences() -> &'static [Sequence] {
     })
 }
 
-/// The sequences that may begin with a word, in the order of the commands.
+/// Sequences that may begin with a word, in the order of the commands.
 pub(super) fn beginning_with(word: &str) -> impl Iterator<Item = &'static Sequence> {
     static FIRST: OnceLock<HashMap<&str, Vec<usize>>> = OnceLock::new();
     let first = |sequence: &'static Sequence| match sequence.items.first() {
         Some(FormItem::Word(word)) => word.as_str(),
-        // Any word may begin a slot.
+        // A slot may begin with any word.
         _ => "",
     };
     let table = FIRST.get_or_init(|| {
@@ -95,7 +95,7 @@ pub(super) fn beginning_with(word: &str) -> impl Iterator<Item = &'static Sequen
     all.into_iter().map(|i| &sequences()[i])
 }
 
-/// The sequences that a form stands for.
+/// Expands a form into its sequences.
 pub(super) fn expand(form: &str) -> Vec<Vec<FormItem>> {
     let spaced = ['(', ')', '[', ']', '|'].iter().fold(form.to_owned(), |f, c| f.replace(*c, &format!(" {c} ")));
     let words: Vec<&str> = spaced.split_whitespace().collect();
@@ -148,7 +148,7 @@ fn item(word: &str) -> FormItem {
     })
 }
 
-/// A request that is matched.
+/// Request to match against the sequences.
 pub(super) struct FormRequest<'a> {
     pub(crate) tokens: &'a [Token],
     pub(crate) words: &'a [&'a str],
@@ -156,19 +156,19 @@ pub(super) struct FormRequest<'a> {
     pub(crate) things: Things,
 }
 
-/// How things may be called.
+/// Rule for the words that may name a thing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Things {
-    /// By a name as a whole.
+    /// Complete names only.
     Whole,
-    /// By words that names in the scene have.
+    /// Words of names in the scene.
     Known,
-    /// By any words.
+    /// Any words.
     Any,
 }
 
 impl FormRequest<'_> {
-    /// What the slots hold if these words are said as a sequence has it.
+    /// Returns the values of the slots if the request matches a sequence.
     pub(super) fn fit(&self, items: &[FormItem]) -> Option<Slots> {
         let mut slots = Slots::default();
         self.rest(items, 0, &mut slots).then_some(slots)
@@ -178,7 +178,7 @@ impl FormRequest<'_> {
         let Some((first, items)) = items.split_first() else { return at == self.words.len() };
         match first {
             FormItem::Word(word) => self.words.get(at) == Some(&word.as_str()) && self.rest(items, at + 1, slots),
-            // The longest that fits: "left stick", not "left".
+            // Longest match first: "left stick", not "left".
             FormItem::Slot(slot) => (at + 1..=self.words.len()).rev().any(|end| {
                 let before = slots.clone();
                 let fits = self.take(*slot, at, end, slots) && self.rest(items, end, slots);
@@ -198,13 +198,13 @@ impl FormRequest<'_> {
         }
     }
 
-    /// Words as a phrase again: the name that they are, else as they were said.
+    /// Joins words to a phrase: the complete name that they match, else the words as typed.
     fn said(&self, words: &[&str]) -> String {
         let said = quoted(words);
         self.known.whole(words).filter(|name| key(name) != key(&said)).map_or(said, str::to_owned)
     }
 
-    /// Fills a slot with the words from `at` to `end`, if they can stand there.
+    /// Fills a slot with the words from `at` to `end`; returns whether they fit.
     fn take(&self, slot: FormSlot, at: usize, end: usize, slots: &mut Slots) -> bool {
         let words = &self.words[at..end];
         let text = words.join(" ");
@@ -218,7 +218,7 @@ impl FormRequest<'_> {
             FormSlot::Kind => {
                 slots.texts.push(self.said(words));
                 let words = if words[0] == "all" { &words[1..] } else { words };
-                // Beside whole names, a kind is no place at one of them.
+                // With complete names, a kind must not take in a relation such as "on the table".
                 let is_plain = self.things != Things::Whole || !words.iter().any(|w| language.is_no_name(w));
                 self.known.whole(words).is_some() || is_plain && is_thing(words, self.known, self.things != Things::Any)
             }
@@ -269,7 +269,8 @@ fn quoted(words: &[&str]) -> String {
     words.join(" ").replace(" 's", "'s").replace('"', "")
 }
 
-/// What follows "all", "both" and the like, or begins with a number: everything that it means is meant.
+/// Returns the words after "all", "both" and the like, or words that begin with a number. Such a phrase means every
+/// match.
 pub(super) fn many<'a, 'b>(words: &'b [&'a str]) -> Option<&'b [&'a str]> {
     let bare = |words: &'b [&'a str]| match words {
         [first, rest @ ..] if CommandLanguage::get().determiners.iter().any(|d| d == first) => rest,
@@ -283,7 +284,7 @@ pub(super) fn many<'a, 'b>(words: &'b [&'a str]) -> Option<&'b [&'a str]> {
     Some(bare(rest)).filter(|r| !r.is_empty())
 }
 
-/// "20", "half a", "thirty five".
+/// Reads an amount: "20", "half a", "thirty five".
 fn amount(words: &[&str]) -> Option<f64> {
     match words {
         [only] => number(only).or_else(|| find(&CommandLanguage::get().amounts, only)),
@@ -294,7 +295,7 @@ fn amount(words: &[&str]) -> Option<f64> {
     }
 }
 
-/// "20 cm", "half a meter", "two steps", "a bit".
+/// Reads a distance: "20 cm", "half a meter", "two steps", "a bit".
 fn distance(words: &[&str]) -> Option<Distance> {
     let (language, (unit, before)) = (CommandLanguage::get(), words.split_last()?);
     if let Some(steps) = find(&language.steps, &words.join(" ")) {
@@ -305,7 +306,7 @@ fn distance(words: &[&str]) -> Option<Distance> {
     meters.or_else(|| matches!(*unit, "step" | "steps").then_some(Distance::Relative(amount)))
 }
 
-/// "90 degrees".
+/// Reads an angle in degrees: "90 degrees".
 fn angle(words: &[&str]) -> Option<f64> {
     let (unit, before) = words.split_last()?;
     if matches!(*unit, "°" | "deg" | "degree" | "degrees") { amount(before) } else { None }

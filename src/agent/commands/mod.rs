@@ -1,5 +1,5 @@
-//! The planner that is built in: a small command language, without any network. A sentence is understood
-//! if every word of it has its place in a command; else nothing is done, and the nearest commands are shown.
+//! Built-in planner: a small command language that needs no network. A sentence is valid if a command accounts for
+//! every word of it; else nothing is done, and the nearest commands are shown.
 
 mod complete;
 mod form;
@@ -27,12 +27,12 @@ use crate::navigate::target::Side;
 use crate::pipeline::semantics::recipe::Understanding;
 use crate::scene::{Identities, LevelFilter};
 
-/// Most tasks of one request.
+/// Maximum number of tasks per request.
 const MOST_TASKS: usize = 16;
-/// Words that part one command from the next.
+/// Words that separate one command from the next.
 const SEPARATORS: [&str; 4] = [",", "and", "then", "?"];
 
-/// The commands' planner.
+/// Planner of the command language.
 #[derive(Default)]
 pub struct Commands {
     tasks: VecDeque<Task>,
@@ -59,7 +59,7 @@ impl Planner for Commands {
 
     fn next(&mut self, last: Option<&CallOutcome>, context: &mut PlannerContext<'_>) -> Result<Step, Refusal> {
         if last.is_some_and(|outcome| outcome.refused.is_some()) {
-            // What comes after may rest on what was not done.
+            // Later tasks may depend on the one that was refused.
             if !self.tasks.is_empty() {
                 self.said.push("The rest of the request was left out.".into());
                 self.tasks.clear();
@@ -119,9 +119,8 @@ impl Commands {
     }
 }
 
-/// The tasks that a request asks for; `None` unless all of it is understood. Things that are called by a name as a
-/// whole come first. Things that the scene's names do not know are accepted where nothing else fits: it is said
-/// then that they are not there.
+/// Parses a request into tasks; `None` unless every word is understood. Complete names are tried first, then words
+/// of names. Unknown things are accepted last, so that the reply can say that they are not in the scene.
 pub(crate) fn parse(request: &str, identities: &Identities) -> Option<Vec<Task>> {
     let (tokens, known) = (request_tokens(request), NameWords::new(identities));
     let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).collect();
@@ -130,20 +129,20 @@ pub(crate) fn parse(request: &str, identities: &Identities) -> Option<Vec<Task>>
     readings.find_map(with).filter(|tasks| tasks.len() <= MOST_TASKS)
 }
 
-/// Whether a text is a command and no mere name.
+/// Returns whether a text is a command and not only a name.
 pub(crate) fn is_command(text: &str, identities: &Identities) -> bool {
     let words = words_of(text);
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     !is_thing(&words, &NameWords::new(identities), false) && parse(text, identities).is_some()
 }
 
-/// A request as one command, or as several in a row.
+/// Parses a request as one command, or as several in a row.
 fn clauses(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
     if let Some(tasks) = command(request, is_first) {
         return Some(tasks);
     }
     let request = trimmed(request);
-    // What a question asks is asked without its mark, too; "the lamp?" wants to know, "the lamp" to go there.
+    // The mark is dropped only if no form with it matches: "the lamp?" asks about it, "the lamp" flies there.
     if let Some(("?", rest)) = request.words.split_last().map(|(last, rest)| (*last, rest)) {
         return clauses(&part(&request, 0, rest.len()), is_first);
     }
@@ -159,7 +158,7 @@ fn part<'a>(request: &FormRequest<'a>, from: usize, to: usize) -> FormRequest<'a
     FormRequest { tokens: &request.tokens[from..to], words: &request.words[from..to], ..*request }
 }
 
-/// Without separators and courtesy around it.
+/// Removes separators and polite words at both ends.
 fn trimmed<'a>(request: &FormRequest<'a>) -> FormRequest<'a> {
     let (mut from, mut to) = (0, request.words.len());
     loop {
@@ -176,23 +175,23 @@ fn trimmed<'a>(request: &FormRequest<'a>) -> FormRequest<'a> {
     }
 }
 
-/// The number of words of `phrase`, if these words begin with it.
+/// Number of words of `phrase` if `words` begin with it.
 fn opens(words: &[&str], phrase: &str) -> Option<usize> {
     let n = phrase.split(' ').count();
     (words.len() >= n && phrase.split(' ').eq(words[..n].iter().copied())).then_some(n)
 }
 
-/// One command, courtesy around it or not: a name may begin or end with what is courtesy elsewhere.
+/// Parses one command, first as typed, then without polite words: a name may begin or end with one of them.
 fn command(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
     let all = if request.things == Things::Whole { one(request, is_first) } else { None };
     all.or_else(|| one(&trimmed(request), is_first))
 }
 
-/// One command: the first that fits; of those whose things are called by whole names, that with the longest, as "the
-/// handle from above" may be a name. A command that is about no thing stays what it is.
+/// Parses one command: the first sequence that matches. With complete names the longest name wins, as "the handle
+/// from above" may be a name. If the first match is a command without a thing, it is kept.
 fn one(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
     let mut fits = beginning_with(request.words.first()?).filter_map(|sequence| {
-        // A name alone is a command only if it is one, and the first: "hide the lamp and the mug from above".
+        // A command may begin with a name only if the name is known and first: "hide the lamp and the mug from above".
         let begins_with_word = matches!(sequence.items.first(), Some(FormItem::Word(_)));
         if !(begins_with_word || request.things != Things::Any && is_first) {
             return None;
@@ -207,7 +206,7 @@ fn one(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
     Some(fits.reduce(|first, next| if next.0 > first.0 && next.0 < usize::MAX { next } else { first })?.1)
 }
 
-/// The tasks of a command, one for each of several things.
+/// Tasks of a command, one for each of several things.
 fn tasks(command: &str, mut slots: Slots) -> Option<Vec<Task>> {
     let Some((place, several)) = slots.several.take() else {
         return Some(vec![task(command, &slots)?]);
@@ -219,7 +218,7 @@ fn tasks(command: &str, mut slots: Slots) -> Option<Vec<Task>> {
     each.collect()
 }
 
-/// The phrases of a task that mean things.
+/// Phrases of a task that name things.
 fn phrases(task: &Task) -> Vec<String> {
     let Task::Call(call) = task else { return Vec::new() };
     let other = match call {
@@ -234,8 +233,8 @@ fn phrases(task: &Task) -> Vec<String> {
     own.into_iter().chain(other).cloned().collect()
 }
 
-/// Tasks with "all of them" taken apart. Of several tasks none is begun unless the things of all are there
-/// and clear.
+/// Splits tasks about all of several things into single ones. If there are several tasks, all their targets must be
+/// found and unambiguous before the first one starts.
 fn settled(tasks: Vec<Task>, context: &mut PlannerContext<'_>) -> Result<Vec<Task>, Refusal> {
     let mut dialog = context.dialog.clone();
     let mut done = Vec::new();
@@ -273,7 +272,7 @@ fn settled(tasks: Vec<Task>, context: &mut PlannerContext<'_>) -> Result<Vec<Tas
     Ok(done)
 }
 
-/// Whether a call can be made for one of several things after the other.
+/// Returns whether a call can be repeated for several things.
 fn is_done_to_several(call: &ToolCall) -> bool {
     !matches!(
         call,
@@ -284,7 +283,7 @@ fn is_done_to_several(call: &ToolCall) -> bool {
     )
 }
 
-/// What "all bottles", "both controllers" or "the two controllers" mean; `None` if one thing is meant.
+/// Identities of "all bottles", "both controllers" or "the two controllers"; `None` if the phrase means one thing.
 fn all_of(phrase: &str, world: &mut dyn World, dialog: &DialogState) -> Result<Option<Vec<u32>>, Refusal> {
     let words: Vec<&str> = phrase.split(' ').collect();
     let is_name = !world.identities().called(phrase, LevelFilter::Auto).is_empty();
@@ -302,7 +301,7 @@ fn all_of(phrase: &str, world: &mut dyn World, dialog: &DialogState) -> Result<O
     Ok(Some(ids))
 }
 
-/// An example of a command with a name of this scene.
+/// Example of a command with a name of this scene.
 fn example(command: &CommandHelp, identities: &Identities, request: &[&str]) -> String {
     let names = || identities.iter().filter_map(|(_, i)| i.names.first());
     let spoken = names().find(|n| name_words(n).iter().all(|w| request.iter().any(|r| name_words(r).contains(w))));
@@ -310,7 +309,7 @@ fn example(command: &CommandHelp, identities: &Identities, request: &[&str]) -> 
     command.example.replace("{}", name)
 }
 
-/// The commands that are nearest to a request: those that share its first word, then other words.
+/// Commands nearest to a request: the first word counts most, then other shared words.
 pub(crate) fn nearest(request: &str, identities: &Identities) -> Vec<String> {
     let tokens = request_tokens(request);
     let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).filter(|w| *w != ",").collect();
@@ -343,7 +342,7 @@ pub(crate) fn nearest(request: &str, identities: &Identities) -> Vec<String> {
     found
 }
 
-/// The request with slips of one letter mended, if that makes it a command. It is shown, never done.
+/// Request with typing errors corrected, if that makes it a command. It is only suggested, never executed.
 fn corrected(request: &str, identities: &Identities) -> Option<String> {
     let known = NameWords::new(identities);
     let mut words: Vec<&str> = sequences().iter().flat_map(|s| &s.items).filter_map(FormItem::word).collect();
@@ -375,7 +374,7 @@ fn not_understood(request: &str, identities: &Identities) -> Refusal {
     Refusal::new(RefusalKind::Unclear, text)
 }
 
-/// All commands, by their examples.
+/// Help text with an example of every command.
 pub(crate) fn help(identities: &Identities) -> String {
     let mut lines: Vec<String> = Vec::new();
     for command in commands() {

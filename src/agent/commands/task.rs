@@ -1,4 +1,4 @@
-//! What each command comes to: from its id in `assets/commands.toml` and what its slots hold to a task.
+//! Conversion of a command, by its id in `assets/commands.toml` and the values of its slots, into a task.
 
 use super::form::Slots;
 use crate::agent::camera_args::{CLOSER, Direction, FARTHER, NORMAL};
@@ -7,11 +7,11 @@ use crate::agent::tool::{Reference, Target, ToolCall};
 use crate::navigate::target::Side;
 use crate::scene::LevelFilter;
 
-/// One step of a plan.
+/// Step of a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Task {
     Call(ToolCall),
-    /// Look at the last target from so much closer; without one, step forward or back.
+    /// Multiply the closeness to the last target by this factor; without a target, step forward or back.
     Closer(f64),
     /// Look at the last target from another side.
     From(Side),
@@ -19,7 +19,7 @@ pub(crate) enum Task {
     Help,
 }
 
-/// The task of a command; `None` if it lacks something.
+/// Returns the task of a command; `None` if a slot is missing.
 pub(super) fn task(id: &str, slots: &Slots) -> Option<Task> {
     let text = |n: usize| slots.texts.get(n).map(String::as_str);
     let thing = |n: usize| slots.texts.get(n).map(Target::query);
@@ -76,7 +76,7 @@ pub(super) fn task(id: &str, slots: &Slots) -> Option<Task> {
     }))
 }
 
-/// What is listed: any object, any part, or what is called so.
+/// Builds a list call: of all objects, of all parts, or of the things of a name.
 fn list(kind: Option<&str>, of: Option<Target>, relation: Relation) -> ToolCall {
     let words: Vec<&str> = kind.unwrap_or("objects").split(' ').collect();
     let words = match words.as_slice() {

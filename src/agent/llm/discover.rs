@@ -1,5 +1,5 @@
-//! Chat models' servers on this machine, found on their usual ports, and a test of the connection to one. Asked
-//! only when the user wants it; nothing of the scene is sent.
+//! Discovery of chat model servers on this machine, by their usual ports, and a test of the connection to one. Both
+//! run only at the user's request; nothing of the scene is sent.
 
 use std::sync::atomic::AtomicBool;
 use std::time::Duration;
@@ -10,13 +10,13 @@ use super::http::{Broken, Head, exchange};
 use super::settings::{LlmSettings, RequestPatience};
 use super::wire::ReplyCollector;
 
-/// Servers of the usual kind and their ports.
+/// Common servers and their ports.
 pub(crate) const PORTS: [(&str, u16); 4] =
     [("Ollama", 11434), ("llama.cpp", 8080), ("LM Studio", 1234), ("vLLM", 8000)];
-/// Longest list of models that is read, in bytes.
+/// Largest list of models that is read, in bytes.
 const MAX_LIST_BYTES: usize = 1 << 20;
 
-/// A server that answers.
+/// Server that answers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct LocalServer {
     pub kind: &'static str,
@@ -24,7 +24,7 @@ pub struct LocalServer {
     pub models: Vec<String>,
 }
 
-/// The servers that answer on these ports of this machine.
+/// Finds the servers that answer on these ports of this machine.
 pub fn find(ports: &[(&'static str, u16)], cancel: &AtomicBool) -> Vec<LocalServer> {
     let patience =
         RequestPatience { stall: Duration::from_secs(1), answer: Duration::from_secs(2), ..RequestPatience::default() };
@@ -40,7 +40,7 @@ pub fn find(ports: &[(&'static str, u16)], cancel: &AtomicBool) -> Vec<LocalServ
     })
 }
 
-/// The names of a server's models.
+/// Reads the names of a server's models.
 fn models(settings: &LlmSettings, patience: &RequestPatience, cancel: &AtomicBool) -> Result<Vec<String>, Broken> {
     let url = format!("{}/models", settings.base_url.trim().trim_end_matches('/'));
     let key = settings.key().ok().flatten();
@@ -55,10 +55,10 @@ fn models(settings: &LlmSettings, patience: &RequestPatience, cancel: &AtomicBoo
     Ok(list.iter().filter_map(name).collect())
 }
 
-/// Whether the model of the settings answers and knows tools; the answer is for display.
+/// Tests that the model of the settings answers and accepts tools. Returns a text for display.
 ///
 /// # Errors
-/// What is wrong, and what helps.
+/// Describes the problem and its remedy.
 pub fn test(settings: &LlmSettings, patience: &RequestPatience, cancel: &AtomicBool) -> Result<String, String> {
     let key = settings.key().map_err(|e| e.to_string())?;
     let clean = |text: &str| key.as_ref().map_or_else(|| text.to_owned(), |k| k.redact(text));

@@ -1,5 +1,5 @@
-//! One question to a server and its answer: pieces as they arrive, stalls told from slowness, ended
-//! when the user wants.
+//! One request to a chat model server and its answer: chunks as they arrive, with a time limit for silence, and
+//! cancelable.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -11,7 +11,7 @@ use super::secret::Secret;
 use super::settings::RequestPatience;
 use crate::io::http::{self, ResponsePart, TICK};
 
-/// Why there is no answer.
+/// Reason for a missing answer.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) enum Broken {
     Connection(String),
@@ -19,7 +19,7 @@ pub(crate) enum Broken {
     TooLong,
     Status {
         code: u16,
-        /// How long it wants to be left alone.
+        /// Wait that the server asks for.
         retry_after: Option<Duration>,
         body: String,
     },
@@ -27,7 +27,7 @@ pub(crate) enum Broken {
 }
 
 impl Broken {
-    /// Whether another attempt may help.
+    /// Returns whether another attempt may help.
     pub(crate) fn is_passing(&self) -> bool {
         match self {
             Self::Connection(_) | Self::Stall => true,
@@ -37,13 +37,13 @@ impl Broken {
     }
 }
 
-/// What arrived: whether it is a stream of events.
+/// Head of an answer: true if a stream of events follows.
 pub(crate) struct Head {
     pub(crate) is_stream: bool,
 }
 
-/// Sends `body`, or asks without one, and hands each piece of the answer to `take`, which says whether it has all it
-/// wants. The address and the key go into the connection only.
+/// Sends `body`, or a request without one, and passes each chunk of the answer to `take`, which returns true once it
+/// needs no more. The address and the key go into the connection only.
 ///
 /// # Errors
 /// See [`Broken`].
@@ -92,6 +92,7 @@ pub(crate) fn exchange(
                             return Ok(());
                         }
                     }
+                    // The body of a refusal holds the reason.
                     _ => refused.extend(piece),
                 }
             }
@@ -113,7 +114,7 @@ fn ask(
     patience: &RequestPatience,
 ) -> std::io::Result<Receiver<ResponsePart>> {
     let config = http::config(url, 2 * patience.stall)
-        // Neither the key nor the user's words follow a server elsewhere.
+        // A redirect would send the key and the user's words to another server.
         .max_redirects(0)
         .max_redirects_will_error(false)
         .timeout_global(Some(patience.answer + patience.stall))
@@ -132,7 +133,7 @@ fn ask(
     }
 }
 
-/// Waits, unless the user wants it to end; says whether the wait was over.
+/// Waits, unless canceled; returns true if the full time has passed.
 pub(crate) fn wait(time: Duration, cancel: &AtomicBool) -> bool {
     let begin = Instant::now();
     while begin.elapsed() < time {

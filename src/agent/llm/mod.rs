@@ -1,6 +1,6 @@
-//! The planner that asks a chat model behind an OpenAI-compatible address, used only if the user
-//! chose it. What the model says is never executed: only its tool calls that are valid reach the
-//! session, whose checks are the same as for every planner. Its key leaves in one header only.
+//! Planner that asks a chat model behind an OpenAI-compatible address, used only if the user chose it. The text of
+//! the model is never executed: only its valid tool calls reach the session, which checks them as for every planner.
+//! The key is sent in one header only.
 
 pub mod discover;
 pub(crate) mod http;
@@ -29,12 +29,12 @@ use super::schema;
 use super::tool::ToolCall;
 use crate::scene::text;
 
-/// How often the same call may be asked for in one request.
+/// Maximum number of identical calls in one request.
 const MOST_ALIKE: usize = 3;
-/// Longest piece of a server's error that is shown, in characters.
+/// Longest excerpt of a server's error that is shown, in characters.
 const LONGEST_ERROR: usize = 200;
 
-/// Plans by a chat model.
+/// Planner that asks a chat model.
 pub struct Llm {
     settings: LlmSettings,
     url: String,
@@ -42,9 +42,9 @@ pub struct Llm {
     patience: RequestPatience,
     limits: RequestLimits,
     talk: Vec<Value>,
-    /// Calls of the last answer that are still to be made.
+    /// Calls of the last answer that are not made yet.
     waiting: VecDeque<RawCall>,
-    /// The call that the session is making.
+    /// Call that the session is executing.
     current: Option<RawCall>,
     stream: bool,
     begun: Instant,
@@ -52,12 +52,12 @@ pub struct Llm {
     wrong: u32,
     tokens: u64,
     asked: Vec<(String, String)>,
-    /// Why the model's last call was none, if no valid one followed.
+    /// Problem of the model's last call if it was invalid and no valid one followed.
     objection: Option<String>,
 }
 
 impl Llm {
-    /// A planner with the key that the named environment variable holds.
+    /// Returns a planner with the key from the environment variable that the settings name.
     ///
     /// # Errors
     /// If the settings cannot be used.
@@ -66,7 +66,7 @@ impl Llm {
         Self::with(settings, key, RequestPatience::default(), RequestLimits::default())
     }
 
-    /// A planner with this key and these limits.
+    /// Returns a planner with this key and these limits.
     ///
     /// # Errors
     /// If the settings cannot be used.
@@ -105,12 +105,12 @@ impl Llm {
         Refusal::new(RefusalKind::Failed, self.clean(text))
     }
 
-    /// The result of a call, as the model hears it.
+    /// Adds the result of a call to the messages for the model.
     fn push_result(&mut self, call: &RawCall, result: &Value) {
         self.talk.push(json!({ "role": "tool", "tool_call_id": call.id, "content": result.to_string() }));
     }
 
-    /// A call that is none: the model hears why, and may do so a few times.
+    /// Reports an invalid call to the model; an error once there were too many.
     fn object(&mut self, call: &RawCall, problem: &str, context: &mut PlannerContext<'_>) -> Result<(), Refusal> {
         self.push_result(call, &json!({ "done": false, "error": problem }));
         (context.on)(AgentEvent::Note(self.clean(&format!("The model's call was not valid: {problem}"))));
@@ -123,7 +123,7 @@ impl Llm {
         Ok(())
     }
 
-    /// The next call that is valid, of those that the model wants.
+    /// Returns the next valid call of the model's answer.
     fn next_call(&mut self, context: &mut PlannerContext<'_>) -> Result<Option<ToolCall>, Refusal> {
         while let Some(raw) = self.waiting.pop_front() {
             match ToolCall::parse(&raw.name, &raw.arguments) {
@@ -160,11 +160,11 @@ impl Llm {
             "temperature": 0,
             "stream": self.stream
         });
-        // Whatever a name or a server's word brought in, the key does not go into a text.
+        // A name or an error text of the server may contain the key: it must not enter the body.
         self.clean(&body.to_string())
     }
 
-    /// One answer of the model, asked for as often as patience has it.
+    /// Asks for one answer of the model, with as many attempts as permitted.
     fn ask(&mut self, context: &mut PlannerContext<'_>) -> Result<ModelReply, Refusal> {
         let mut pause = self.patience.pause;
         for attempt in 1.. {
@@ -177,7 +177,7 @@ impl Llm {
             if attempt >= self.patience.attempts {
                 return Err(self.failed(&format!("The chat model gave no answer: {problem}. Try again later.")));
             }
-            // Some chance in the wait keeps many askers from coming back at once.
+            // Random jitter keeps many clients from retrying at the same time.
             let own = pause.mul_f64(rand::random_range(0.5..1.0));
             let next = asked_wait.map_or(own, |w| w.max(own));
             if next > self.patience.longest_pause {
@@ -205,7 +205,7 @@ impl Llm {
         let mut is_stream = false;
         let mut told = 0;
         let key = self.key.as_ref();
-        // A key may be cut in two between pieces: its length is held back until the end.
+        // A key may be split between chunks: a tail longer than it is held back until the end.
         let held = key.map_or(0, Secret::len) * 3;
         let on = &mut *context.on;
         let mut take = |head: &http::Head, bytes: &[u8]| {
@@ -216,7 +216,7 @@ impl Llm {
             let keep =
                 |t: &str| (0..=t.len().saturating_sub(held)).rev().find(|at| t.is_char_boundary(*at)).unwrap_or(0);
             let (raw, shown) = (keep(fresh), keep(&clean));
-            // Where a key reaches into what is held back, nothing is shown yet.
+            // If a key reaches into the tail that is held back, nothing is shown yet.
             if shown > 0 && fresh[raw..] == clean[shown..] {
                 on(AgentEvent::Piece(clean[..shown].to_owned()));
                 told += raw;
@@ -238,7 +238,7 @@ impl Llm {
         let answer = match collector.finish(is_stream) {
             Ok(answer) => answer,
             Err(problem) => {
-                // What does not come well in pieces may come whole.
+                // The next attempt asks for the whole answer: the stream may be at fault.
                 self.stream = false;
                 return Err(Problem::Passing { text: problem, wait: None });
             }
@@ -253,7 +253,7 @@ impl Llm {
         Ok(answer)
     }
 
-    /// An answer without the key, whose calls all have numbers of their own.
+    /// Removes the key from an answer and gives each call without an id a new one.
     fn cleaned(&self, mut answer: ModelReply) -> ModelReply {
         answer.text = self.clean(&answer.text);
         for (i, call) in answer.calls.iter_mut().enumerate() {
@@ -273,7 +273,7 @@ impl Llm {
     fn problem(&mut self, broken: &Broken) -> Problem {
         let text = match broken {
             Broken::Connection(problem) => {
-                // A stream that broke off may come whole.
+                // The next attempt asks for the whole answer: the stream may have broken off.
                 self.stream = false;
                 format!("the connection failed ({})", self.clean(problem))
             }
@@ -295,7 +295,7 @@ impl Llm {
         if let Broken::Status { code: 400 | 404 | 405 | 406 | 415 | 422 | 501, .. } = broken
             && self.stream
         {
-            // Perhaps it cannot stream.
+            // The server may not support streaming.
             self.stream = false;
             return Problem::Passing { text, wait: None };
         }
@@ -311,7 +311,7 @@ impl Llm {
     }
 }
 
-/// Why an attempt gave no answer.
+/// Reason for an attempt without an answer.
 enum Problem {
     Passing { text: String, wait: Option<Duration> },
     Final(String),
@@ -324,7 +324,7 @@ impl Planner for Llm {
     }
 
     fn start(&mut self, request: &str, context: &mut PlannerContext<'_>) {
-        // Every call needs a result before the talk goes on.
+        // The protocol requires a result for every call before the next message.
         for call in self.current.take().into_iter().chain(std::mem::take(&mut self.waiting)) {
             let why = if call.name == "ask_user" {
                 "the user answers in the next message"

@@ -1,5 +1,5 @@
-//! What a chat model is told: its task once, the scene with every request. Names and the user's words
-//! are quoted as JSON, so that they stay data.
+//! Messages to a chat model: its task once, the scene with every request. Names and the user's words are quoted as
+//! JSON, so that they stay data.
 
 use serde_json::{Value, json};
 
@@ -8,14 +8,14 @@ use crate::agent::dialog::DialogState;
 use crate::agent::world::World;
 use crate::scene::{IdentityId, Level, NOBODY};
 
-/// Identities of the scene that the model hears of at most.
+/// Maximum number of identities in the scene data.
 const MOST: usize = 250;
-/// Letters of the talk that go back to the model; older turns are left out.
+/// Longest conversation that is sent to the model, in bytes of JSON; older turns are left out.
 const LONGEST_TALK: usize = 80_000;
-/// Longest name in characters.
+/// Longest name, in characters.
 const LONGEST_NAME: usize = 80;
 
-/// What goes to a chat model and what does not, for whoever chooses one. docs/guide.md says the same.
+/// Statement of the data that is sent to a chat model, shown to the user. docs/guide.md says the same.
 pub const SENT: &str = "Sent to the chat model: what you write; of the scene's objects and parts their numbers, names, \
     wholes, and whether they are hidden or in view, which of them was spoken of last, and whether the length of a meter \
     is known; what came of each step, with the sizes and distances that were asked for; the conversation so far; \
@@ -36,13 +36,13 @@ fn name(text: &str) -> String {
     text.chars().take(LONGEST_NAME).collect()
 }
 
-/// The scene as JSON.
+/// Scene as JSON.
 pub(crate) fn scene(world: &dyn World, dialog: &DialogState) -> Value {
     let all = world.identities();
     let seen = in_view(world);
     let here = |id: &IdentityId| world.facts(*id);
     let mut list = Vec::new();
-    // Objects first, those in view before the rest: what is cut off is least likely meant.
+    // Objects first, those in view before the rest: the least likely targets are cut off.
     let mut order: Vec<(bool, bool, IdentityId)> =
         all.iter().map(|(id, i)| (i.level == Level::Part, !seen.contains(&all.object_of(id)), id)).collect();
     order.sort_unstable();
@@ -69,19 +69,19 @@ pub(crate) fn scene(world: &dyn World, dialog: &DialogState) -> Value {
     })
 }
 
-/// A request with the scene, as the user's message.
+/// Message of the user: a request with the scene.
 pub(crate) fn request(world: &dyn World, dialog: &DialogState, text: &str) -> String {
     let scene = scene(world, dialog);
     format!("SCENE DATA (JSON, data only):\n{scene}\n\nREQUEST OF THE USER (JSON string):\n{}", json!(text))
 }
 
-/// The messages that go to the model: the task, and as much of the talk as fits, from a request on.
+/// Messages to the model: the task, and as much of the conversation as fits, beginning with a request.
 pub(crate) fn messages(talk: &[Value]) -> Vec<Value> {
     let mut length = 0;
     let mut start = talk.len();
     for (i, message) in talk.iter().enumerate().rev() {
         length += message.to_string().len();
-        // The present request always goes.
+        // The current request is always sent.
         if length > LONGEST_TALK && start < talk.len() {
             break;
         }

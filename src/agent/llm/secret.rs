@@ -1,17 +1,17 @@
-//! The key of a chat endpoint: it goes into one header, and nowhere else.
+//! Key of a chat model, which is sent in one header and nowhere else.
 
-/// What stands in the key's place.
+/// Replacement of the key in texts.
 pub(crate) const BLANK: &str = "[key]";
 
-/// Shortest key that is looked for in texts; what is shorter is no secret.
+/// Shortest key that is removed from texts, in bytes; a shorter one is not treated as a secret.
 const SHORTEST: usize = 6;
 
-/// A key. It cannot be printed or stored.
+/// Key that cannot be printed or stored.
 #[derive(Clone)]
 pub struct Secret(String);
 
 impl Secret {
-    /// This key; `None` if it is empty or cannot stand in a header.
+    /// Returns the key; `None` if it is empty or not valid in a header.
     pub fn new(key: &str) -> Option<Self> {
         let key = key.trim();
         let sound = !key.is_empty() && key.len() <= 4096 && key.bytes().all(|b| b.is_ascii_graphic());
@@ -27,7 +27,7 @@ impl Secret {
         self.0.len()
     }
 
-    /// A text without the key, in whatever case, as it is and as in addresses.
+    /// Removes the key from a text, in any letter case: plain, percent-encoded and escaped as in JSON.
     pub(crate) fn redact(&self, text: &str) -> String {
         if self.0.len() < SHORTEST {
             return text.to_owned();

@@ -1,4 +1,4 @@
-//! Where a chat model is, and how patient and generous the agent is with it.
+//! Settings of a chat model: its address, time limits and limits of a request.
 
 use std::time::Duration;
 
@@ -8,8 +8,8 @@ use ureq::http::Uri;
 use super::secret::Secret;
 use crate::io::http::is_loopback;
 
-/// A chat model behind an OpenAI-compatible address. The key itself is never part of settings: only
-/// the name of the environment variable that holds it.
+/// Settings of a chat model behind an OpenAI-compatible address. They never hold the key itself, only the name of its
+/// environment variable.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct LlmSettings {
@@ -18,7 +18,7 @@ pub struct LlmSettings {
     pub model: String,
     /// Name of the environment variable that holds the key; empty if none is needed.
     pub key_variable: String,
-    /// Whether answers are asked for piece by piece.
+    /// True if answers are streamed.
     pub stream: bool,
 }
 
@@ -28,18 +28,18 @@ impl Default for LlmSettings {
     }
 }
 
-/// How patient the agent is.
+/// Time limits and number of attempts.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RequestPatience {
-    /// How long the server may say nothing.
+    /// Longest silence of the server.
     pub stall: Duration,
     pub answer: Duration,
-    /// How long all answers to one request may take together.
+    /// Longest time for all answers to one request together.
     pub request: Duration,
     pub attempts: u32,
-    /// Wait before the second attempt; doubled before each further one, with some chance in it.
+    /// Wait before the second attempt; doubled before each further one, with random jitter.
     pub pause: Duration,
-    /// Longest wait, also where the server asks for one.
+    /// Longest wait, also if the server asks for one.
     pub longest_pause: Duration,
 }
 
@@ -56,15 +56,15 @@ impl Default for RequestPatience {
     }
 }
 
-/// How much one request may take.
+/// Limits of one request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct RequestLimits {
     pub(crate) answers: u32,
-    /// Calls in an answer that are looked at.
+    /// Maximum number of calls per answer; further ones are ignored.
     pub calls: usize,
-    /// Calls that are none: unknown tools, wrong arguments, the same again and again.
+    /// Maximum number of invalid calls: unknown tools, wrong arguments, too many repeats.
     pub(crate) wrong: u32,
-    /// Tokens, as the server counts them, or as a quarter of the letters.
+    /// Maximum number of tokens, as counted by the server, else estimated as a quarter of the bytes.
     pub(crate) tokens: u64,
     pub(crate) bytes: usize,
 }
@@ -75,28 +75,28 @@ impl Default for RequestLimits {
     }
 }
 
-/// Why a chat model cannot be used.
+/// Reason for which a chat model cannot be used.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum LlmError {
-    /// No address or one of another kind.
+    /// The address is missing or not supported.
     #[error("'{0}' is no address of a chat model; it should look like https://host/v1")]
     Address(String),
-    /// No model's name.
+    /// The name of the model is missing.
     #[error("no model is named: set the name that the server gives it")]
     NoModel,
-    /// The variable is not set, or what it holds is no key.
+    /// The variable is not set, or its value is not a valid key.
     #[error("the environment variable '{0}' holds no key; set it, or leave its name empty if the server needs none")]
     NoKey(String),
-    /// A key would travel in the open.
+    /// The key would be sent without encryption.
     #[error("the key would be sent to {0} without encryption; use https, or a server on this machine")]
     Unencrypted(String),
 }
 
 impl LlmSettings {
-    /// The key that the named environment variable holds; `None` if no variable is named.
+    /// Reads the key from the environment variable; `None` if no variable is named.
     ///
     /// # Errors
-    /// If the variable is not set or what it holds cannot be a key.
+    /// If the variable is not set or its value is not a valid key.
     pub(crate) fn key(&self) -> Result<Option<Secret>, LlmError> {
         if self.key_variable.is_empty() {
             return Ok(None);
@@ -105,16 +105,16 @@ impl LlmSettings {
         held.map(Some).ok_or_else(|| LlmError::NoKey(self.key_variable.clone()))
     }
 
-    /// The address that requests go to.
+    /// Returns the address of requests.
     ///
     /// # Errors
-    /// If the base address is none, no model is named, or a key would travel unencrypted.
+    /// If the base address is invalid, no model is named, or a key would be sent without encryption.
     pub(crate) fn endpoint(&self, has_key: bool) -> Result<String, LlmError> {
         let base = self.base_url.trim().trim_end_matches('/');
         let wrong = || LlmError::Address(base.chars().take(200).collect());
         let uri: Uri = base.parse().map_err(|_| wrong())?;
         let host = uri.host().filter(|h| !h.is_empty()).ok_or_else(wrong)?;
-        // A name and password in an address would end in logs.
+        // A name and password in an address would end up in logs.
         if uri.authority().is_none_or(|a| a.as_str().contains('@')) || base.contains(['?', '#']) {
             return Err(LlmError::Address(format!("{host} (with a name, password, question mark or number sign)")));
         }
@@ -146,7 +146,7 @@ mod tests {
         assert_eq!(at("http://127.0.0.1:80/v1", true).as_deref(), Ok("http://127.0.0.1:80/v1/chat/completions"));
         assert!(at("http://host/v1", false).is_ok());
         assert_eq!(at("http://LOCALHOST:1/v1", true).as_deref(), Ok("http://LOCALHOST:1/v1/chat/completions"));
-        // The key does not travel in the open, whatever a host's name begins with.
+        // The key is never sent without encryption, even to a host name that looks like a loopback address.
         for host in ["host", "127.evil.example", "127.0.0.1.evil.example", "localhost.evil.example", "2130706433"] {
             assert_eq!(at(&format!("http://{host}/v1"), true), Err(LlmError::Unencrypted(host.into())));
             assert!(at(&format!("http://{host}/v1"), false).is_ok(), "the control: without a key it may");

@@ -1,6 +1,6 @@
-//! Server-sent events, read piece by piece.
+//! Incremental parser of server-sent events.
 
-/// Reads events from bytes as they arrive.
+/// Parser that reads events from bytes as they arrive.
 #[derive(Default)]
 pub(crate) struct Events {
     line: Vec<u8>,
@@ -8,7 +8,7 @@ pub(crate) struct Events {
 }
 
 impl Events {
-    /// The data of the events that these bytes complete.
+    /// Returns the data of the events that these bytes complete.
     pub(crate) fn feed(&mut self, bytes: &[u8]) -> Vec<String> {
         let mut complete = Vec::new();
         for byte in bytes {
@@ -21,7 +21,7 @@ impl Events {
         complete
     }
 
-    /// The data of a last event that was not ended by an empty line.
+    /// Returns the data of a last event without an empty line after it.
     pub(crate) fn end(&mut self) -> Option<String> {
         let mut complete = Vec::new();
         self.end_of_line(&mut complete);
@@ -41,7 +41,7 @@ impl Events {
             }
             self.data.push_str(data.strip_prefix(' ').unwrap_or(data));
         }
-        // Comments, names and numbers of events carry nothing here.
+        // Comments and the other fields of events are ignored.
     }
 }
 

@@ -1,33 +1,33 @@
-//! Answers of a chat model, whole or in pieces, as text and tool calls.
+//! Answers of a chat model, whole or in chunks, as text and tool calls.
 
 use serde_json::{Value, json};
 
 use super::sse::Events;
 
-/// Calls that one answer can hold at all.
+/// Maximum number of calls in an answer; more make it invalid.
 const MOST_CALLS: usize = 64;
 
-/// A call as the model wrote it.
+/// Call as the model wrote it.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct RawCall {
     pub(crate) id: String,
     pub name: String,
-    /// Its arguments, JSON if the model kept to it.
+    /// Arguments, in JSON if the model followed the protocol.
     pub arguments: String,
 }
 
-/// An answer.
+/// Answer of a chat model.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ModelReply {
     pub(crate) text: String,
     pub calls: Vec<RawCall>,
-    /// Tokens, as the server counted them.
+    /// Number of tokens, as counted by the server.
     pub(crate) tokens: Option<u64>,
-    /// Whether the answer came to its end.
+    /// True if the answer is complete.
     pub(crate) is_whole: bool,
 }
 
-/// Arguments are JSON in a string; some servers send the object itself.
+/// Returns the arguments as JSON text. By the protocol they are a string; some servers send the object itself.
 fn arguments(given: &Value) -> String {
     match given {
         Value::String(text) => text.clone(),
@@ -36,7 +36,7 @@ fn arguments(given: &Value) -> String {
     }
 }
 
-/// Collects an answer from pieces.
+/// Collects an answer from chunks.
 #[derive(Default)]
 pub struct ReplyCollector {
     events: Events,
@@ -46,7 +46,7 @@ pub struct ReplyCollector {
 }
 
 impl ReplyCollector {
-    /// Takes a piece of a stream or of a whole answer; says whether the answer is complete.
+    /// Takes a chunk of a stream or of a whole answer; returns true if no more of the stream is needed.
     pub fn take(&mut self, is_stream: bool, bytes: &[u8]) -> bool {
         if !is_stream {
             self.whole.extend_from_slice(bytes);
@@ -60,12 +60,12 @@ impl ReplyCollector {
         self.problem.is_some()
     }
 
-    /// What has been said so far.
+    /// Text so far.
     pub(crate) fn text(&self) -> &str {
         &self.answer.text
     }
 
-    /// One event's data; says whether it was the last.
+    /// Takes the data of one event; returns true if it was the last.
     fn event(&mut self, data: &str) -> bool {
         if data.trim() == "[DONE]" {
             self.answer.is_whole = true;
@@ -78,7 +78,7 @@ impl ReplyCollector {
         false
     }
 
-    /// Takes over what a body has, whole (`message`) or a piece (`delta`).
+    /// Adds the contents of a body: a whole answer (`message`) or a chunk (`delta`).
     fn merge(&mut self, body: &Value) {
         if !body["error"].is_null() {
             self.problem = Some("the server reports an error in its answer".into());
@@ -106,10 +106,10 @@ impl ReplyCollector {
         }
     }
 
-    /// The answer.
+    /// Returns the answer.
     ///
     /// # Errors
-    /// In words, if it is none or broke off.
+    /// If the answer is invalid or incomplete, in words for the user.
     pub fn finish(mut self, is_stream: bool) -> Result<ModelReply, String> {
         if is_stream {
             if let Some(rest) = self.events.end() {
@@ -122,7 +122,7 @@ impl ReplyCollector {
                 self.problem = Some("the answer has no choices".into());
             }
             self.merge(&body);
-            // A whole body is a whole answer.
+            // Outside a stream some servers send no finish reason: a whole body is complete.
             self.answer.is_whole = true;
         }
         if let Some(problem) = self.problem {
@@ -131,13 +131,13 @@ impl ReplyCollector {
         if !self.answer.is_whole {
             return Err("the answer broke off".into());
         }
-        // Gaps in the numbering are no calls.
+        // Gaps in the indices are not calls.
         self.answer.calls.retain(|c| !c.name.is_empty() || !c.arguments.is_empty() || !c.id.is_empty());
         Ok(self.answer)
     }
 }
 
-/// The model's turn as it goes back to it.
+/// Message with the model's own answer, which is sent back to it.
 pub(crate) fn assistant(answer: &ModelReply) -> Value {
     let mut message = json!({ "role": "assistant", "content": answer.text });
     if !answer.calls.is_empty() {

@@ -1,11 +1,11 @@
-//! What is called so as a whole, whatever words its name consists of.
+//! Lookup of identities by a complete name, whatever words it consists of.
 
 use super::{Resolver, Set, name_words};
 use crate::pipeline::semantics::recipe::Understanding;
 use crate::scene::IdentityId;
 
 impl Resolver<'_> {
-    /// Candidates by a name as a whole. All that have its words as [`Self::named`] has it fit, too.
+    /// Candidates by a complete name. The matches of [`Self::named`] for its words are candidates, too.
     pub(super) fn called(&mut self, name: &str) -> Option<Set> {
         if self.world.understanding() == Understanding::Embedding {
             return None;

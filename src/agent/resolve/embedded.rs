@@ -1,4 +1,4 @@
-//! What no name says, asked of the scene's encoder.
+//! Lookup of identities by embedding, for phrases that no name matches.
 
 use super::{Lost, Resolver, Set};
 use crate::agent::describe::names;
@@ -8,18 +8,18 @@ use crate::pipeline::semantics::localize::Answer;
 use crate::pipeline::semantics::recipe::Understanding;
 use crate::scene::{IdentityId, LevelFilter};
 
-/// Things that are offered.
+/// Number of things that are offered.
 const OFFERED: usize = 3;
 
 impl Resolver<'_> {
-    /// What the words mean to the scene's encoder, where it may be asked.
+    /// Candidates by embedding; a refusal if there are none or the encoder may not be used.
     pub(super) fn embedded(&mut self, words: &[String]) -> Result<Set, Lost> {
         let text = words.join(" ");
         let found = self.by_embedding(&text, self.level)?;
         found.map(Set::new).ok_or_else(|| self.not_found(&text, words))
     }
 
-    /// What the scene's encoder says, where it may be asked and finds something.
+    /// Candidates by embedding; `None` if there are none or the encoder may not be used.
     pub(super) fn by_embedding(&mut self, text: &str, kind: LevelFilter) -> Result<Option<Vec<IdentityId>>, Lost> {
         if !self.may_look {
             return Ok(None);
@@ -35,7 +35,7 @@ impl Resolver<'_> {
         Ok(Some(ids).filter(|ids| !ids.is_empty()))
     }
 
-    /// The same refusal with what looks most like the phrase beneath.
+    /// Adds the best matches by embedding to a refusal.
     pub(super) fn with_offers(&mut self, mut lost: Lost, phrase: &str) -> Lost {
         if !lost.is_open || self.world.understanding() == Understanding::Names {
             return lost;

@@ -1,7 +1,6 @@
-//! From words to the thing that is meant: names, pieces of wholes, places at other things, superlatives,
-//! pronouns. What several things fit equally is said to be so, what nothing fits is not there; nothing is
-//! guessed. All readings are tried by names; only if none of them comes to anything, the scene's encoder is asked, if it
-//! has one, and what is found by it is said to be.
+//! Resolution of a phrase to an identity: names, parts of wholes, places relative to other things, superlatives,
+//! pronouns. Ambiguous and unmatched phrases are reported; nothing is guessed. All readings are tried by names; only if
+//! none of them matches, the scene's encoder is used, if it has one, and the reply says so.
 
 mod called;
 mod embedded;
@@ -21,14 +20,14 @@ use crate::pipeline::semantics::reading::{mend, mended_text};
 use crate::pipeline::semantics::recipe::Understanding;
 use crate::scene::{Bounds, IdentityId, LevelFilter};
 
-/// What words come to.
+/// Result of a resolution.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) enum Resolved {
-    /// This one is meant. The note says how it was found, if not by its name.
+    /// A single identity. The note says how it was found, if not by its name.
     One {
         id: IdentityId,
         note: String,
-        /// Whether the encoder says so and no name: what is changed is to be asked about first.
+        /// True if it was found by embedding, not by name: a change then needs a confirmation.
         by_looks: bool,
     },
     Several(Vec<IdentityId>),
@@ -38,9 +37,9 @@ pub(crate) enum Resolved {
     },
 }
 
-/// Finds what `phrase` means.
+/// Resolves `phrase` to one identity.
 pub(crate) fn resolve(world: &mut dyn World, phrase: &str, level: LevelFilter, dialog: &DialogState) -> Resolved {
-    // What is done to one thing is said of it by name, so a slip that was mended wrongly is seen.
+    // Correcting typing errors is safe here: the reply names the thing, so a wrong correction is noticed.
     let (phrase, mended) = match world.identities().called(phrase, level).as_slice() {
         [] => mend(world.identities(), phrase),
         _ => (phrase.to_owned(), Vec::new()),
@@ -60,8 +59,8 @@ pub(crate) fn resolve(world: &mut dyn World, phrase: &str, level: LevelFilter, d
     }
 }
 
-/// All identities that a phrase such as "buttons" or "bottles on the table" means, by names: what looks so is not
-/// counted, unless names are not looked at.
+/// Resolves a phrase such as "buttons" or "bottles on the table" to all its identities, by names. Matches by embedding
+/// count only if the scene is set to ignore names.
 pub(crate) fn resolve_all(
     world: &mut dyn World,
     phrase: &str,
@@ -74,11 +73,11 @@ pub(crate) fn resolve_all(
     meant.map(|set| set.ids).map_err(|lost| lost.refusal)
 }
 
-/// Why no set of candidates was found.
+/// Reason for which no candidates were found.
 struct Lost {
     refusal: Refusal,
     near: Vec<IdentityId>,
-    /// Whether the encoder may know more: names know no such thing. Facts are not overruled.
+    /// True if no name matches, so that the encoder may be tried; false if the facts of the scene rule the phrase out.
     is_open: bool,
 }
 
@@ -88,7 +87,7 @@ impl Lost {
     }
 }
 
-/// Candidates: all that fit, and those of them that are called exactly so. Never empty.
+/// Candidates: all matches, and the exact ones among them. Never empty.
 #[derive(Clone, Debug)]
 struct Set {
     ids: Vec<IdentityId>,
@@ -100,7 +99,7 @@ impl Set {
         Self { ids, exact: Vec::new() }
     }
 
-    /// Those that are meant when nothing more is said.
+    /// Exact matches if there are any, else all.
     fn settled(&self) -> &[IdentityId] {
         if self.exact.is_empty() { &self.ids } else { &self.exact }
     }
@@ -110,7 +109,7 @@ struct Resolver<'a> {
     world: &'a mut dyn World,
     dialog: &'a DialogState,
     level: LevelFilter,
-    /// Whether the encoder may be asked, and whether what was found rests on it.
+    /// True if the encoder may be used; `looked` is true once a match came from it.
     may_look: bool,
     looked: bool,
 }
@@ -123,8 +122,7 @@ impl<'a> Resolver<'a> {
 }
 
 impl Resolver<'_> {
-    /// What a phrase means by names, by all of its readings; else what it means if the encoder is asked for what names
-    /// do not know.
+    /// Resolves a phrase by names in all its readings; if none matches, again with the encoder for the unknown words.
     fn meant(&mut self, phrase: &str) -> Result<Set, Lost> {
         let lost = match self.phrase(phrase) {
             Err(lost) if lost.is_open && !self.may_look => lost,
@@ -142,8 +140,8 @@ impl Resolver<'_> {
         Err(self.with_offers(lost, phrase))
     }
 
-    /// What is called so as a whole, else what the readings come to: those that come to something must come to the
-    /// same.
+    /// Resolves a phrase by a complete name, else by its readings. If readings match different things, all of these are
+    /// candidates.
     fn phrase(&mut self, phrase: &str) -> Result<Set, Lost> {
         if let Some(set) = self.called(phrase) {
             return Ok(set);
@@ -152,7 +150,8 @@ impl Resolver<'_> {
         let words: Vec<&str> = words.iter().map(String::as_str).collect();
         let known = NameWords::new(self.world.identities());
         let mut nouns = readings(&words, &known, false);
-        // What is called "left stick" is not the left one of the sticks; but to an encoder anything looks like something.
+        // A name such as "left stick" goes before the left one of the sticks. With the encoder, superlatives and counts
+        // go first, as any words match something by embedding.
         let may_look = self.may_look;
         let place = |noun: &Noun| match noun {
             Noun::Picked(Pick::Most(..), _) | Noun::Counted(..) if may_look => 0,
@@ -174,7 +173,7 @@ impl Resolver<'_> {
                     *all = Set::new(all.settled().iter().copied().chain(new).collect());
                 }
                 (Ok(_), _) => {}
-                // Of reasons why nothing is found, one about the scene says more than an unknown word.
+                // A conflict with the scene explains more than an unknown word.
                 (Err(new), _) if lost.refusal.kind != RefusalKind::Conflict => lost = new,
                 (Err(new), _) if new.refusal.kind == RefusalKind::Conflict && lost.is_open => lost = new,
                 (Err(_), _) => {}
@@ -202,7 +201,7 @@ impl Resolver<'_> {
                 self.at(thing, anchor, &what, &|t, a| fit(*relation, t, a, &frame))
             }
             Noun::Nearest(thing, anchor) => {
-                // What it stands on, and what stands on it, touches it and is not meant.
+                // The support of a thing and things on it touch it and are not meant.
                 let frame = self.world.view().frame();
                 let rests = |t: &Bounds, a: &Bounds| fit(Relation::On, t, a, &frame).is_some();
                 let apart = |t: &Bounds, a: &Bounds| (!rests(t, a) && !rests(a, t)).then(|| gap(t, a));
@@ -213,7 +212,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// The one that was spoken of last.
+    /// Identity that was mentioned last.
     fn last(&self) -> Result<IdentityId, Lost> {
         let there = self.dialog.last.filter(|id| self.world.facts(*id).is_some());
         let unclear = "I do not know what you refer to: nothing was spoken of yet.";
@@ -224,7 +223,7 @@ impl Resolver<'_> {
         self.world.facts(id).and_then(|f| f.bounds)
     }
 
-    /// The one anchor of a place; several are none.
+    /// Resolves the anchor of a place, which must be unambiguous.
     fn anchor(&mut self, noun: &Noun) -> Result<IdentityId, Lost> {
         let set = self.set(noun)?;
         match set.settled() {

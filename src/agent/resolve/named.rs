@@ -1,4 +1,4 @@
-//! What names say: candidates by the words of names, and what is said where none fits.
+//! Lookup of identities by the words of their names, and the refusal if none matches.
 
 use super::noun::{ANYTHING, PARTS};
 use super::{Lost, Resolver, Set, name_words};
@@ -11,8 +11,8 @@ use crate::scene::colors::row;
 use crate::scene::{Identity, IdentityId, Level};
 
 impl Resolver<'_> {
-    /// Candidates by the words of their names: all words are in the names of a thing and its wholes, the
-    /// last one in its own. Slips are not taken for names.
+    /// Candidates by the words of their names: all words are in the names of a thing and its ancestors, the last one in
+    /// its own. Typing errors are not corrected here.
     pub(super) fn named(&mut self, words: &[String]) -> Result<Set, Lost> {
         let all = self.world.identities();
         let wished = all.iter().filter(|(_, i)| self.level.accepts(i.level)).map(|(id, _)| id);
@@ -36,7 +36,7 @@ impl Resolver<'_> {
             let fit: Vec<IdentityId> = ids.into_iter().filter(|id| rest.iter().all(|w| line_has(*id, w))).collect();
             return if fit.is_empty() { Err(self.not_found(&words.join(" "), words)) } else { Ok(Set::new(fit)) };
         }
-        // A color that no name says is seen.
+        // A color that no name has is looked up in the Gaussians.
         let is_seen =
             |id: IdentityId, word: &String| row(word).and_then(|color| color_of(all, id, color)) == Some(true);
         let fits = |id: &IdentityId, has_head: &dyn Fn(&[String]) -> bool| {
@@ -45,7 +45,8 @@ impl Resolver<'_> {
         };
         let exact: Vec<IdentityId> =
             everyone.iter().copied().filter(|id| own(*id).iter().any(|n| name_words(n) == words)).collect();
-        // A table lamp is no table; a vase with water is a vase, button a a button.
+        // The head of a name is its last word before "with" or "of", a single letter or number aside: a table lamp is
+        // not a table, a vase with water is a vase, "button a" is a button.
         let heads = |name: &[String]| {
             let thing = name.split(|w| w == "with" || w == "of").next().unwrap_or_default();
             let tells_apart = |w: &String| w.chars().count() == 1 || w.bytes().all(|b| b.is_ascii_digit());
@@ -62,7 +63,7 @@ impl Resolver<'_> {
         self.embedded(words)
     }
 
-    /// Nothing is called so: the nearest names, by words they share or slips of them.
+    /// Refusal of an unknown name with the nearest names, by shared or similar words.
     pub(super) fn not_found(&self, text: &str, words: &[String]) -> Lost {
         let all = self.world.identities();
         let here = |id: &IdentityId| self.world.facts(*id).is_some();
@@ -84,8 +85,8 @@ impl Resolver<'_> {
         Lost::new(RefusalKind::NotFound, format!("There is no '{text}' in this scene.{said}"), near)
     }
 
-    /// What "one" may stand for: the candidates of the last question, else what shares the last word of the
-    /// last thing's name.
+    /// Identities that "one" may stand for: the candidates of the last question, else all whose name ends in the same
+    /// word as the name of the last thing.
     pub(super) fn kin(&self) -> Vec<IdentityId> {
         if !self.dialog.group.is_empty() {
             return self.dialog.group.clone();

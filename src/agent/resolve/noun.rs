@@ -1,4 +1,4 @@
-//! How a phrase names a thing: its readings, by words alone. Every word must have a place in one.
+//! Readings of a phrase as a thing, by words alone. A reading accounts for every word.
 
 use std::collections::{HashMap, HashSet};
 
@@ -8,36 +8,36 @@ use crate::agent::words::{number, request_tokens, singular, tokens};
 use crate::scene::Identities;
 use crate::scene::identity::whole_names::key;
 
-/// A thing as a phrase has it.
+/// Thing as described by a phrase.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Noun {
     Last,
     Number(u32),
-    /// By a name as a whole.
+    /// By a complete name.
     Called(String),
-    /// By these words of its name, or a word for anything.
+    /// By words of its name, or by a generic word.
     Named(Vec<String>),
-    /// One among others: "the largest ...".
+    /// By comparison with others: "the largest ...".
     Picked(Pick, Box<Noun>),
-    /// All of them, if there are so many: "the two ...".
+    /// All of an exact number: "the two ...".
     Counted(usize, Box<Noun>),
     PieceOf(Box<Noun>, Box<Noun>),
-    /// Something that stands so to something else.
+    /// A thing in a relation to another.
     Placed(Box<Noun>, Relation, Box<Noun>),
-    /// The one of these that is nearest to something.
+    /// The nearest one to another thing.
     Nearest(Box<Noun>, Box<Noun>),
 }
 
-/// How a word chooses among things.
+/// Choice among several things.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Pick {
     Other,
-    /// The one with the most of this, or the least.
+    /// The one with the most (`true`) or the least (`false`) of a quantity.
     Most(Key, bool),
     More(Key, bool),
 }
 
-/// How a word chooses, if it does.
+/// Returns the choice that a word stands for.
 pub(super) fn pick(word: &str) -> Option<Pick> {
     let all = CommandLanguage::get();
     let most = || find(&all.most, word).map(|key| Pick::Most(key, true));
@@ -47,37 +47,37 @@ pub(super) fn pick(word: &str) -> Option<Pick> {
     if word == "other" { Some(Pick::Other) } else { most().or_else(least).or_else(more).or_else(less) }
 }
 
-/// The number that words begin with, two or more, and what there are so many of.
+/// Splits words into a leading number, two or more, and the rest.
 pub(crate) fn counted<'a, 'b>(words: &'b [&'a str]) -> Option<(usize, &'b [&'a str])> {
     let (first, rest) = words.split_first().filter(|(_, rest)| !rest.is_empty())?;
     let count = number(first).filter(|n| (2.0..=99.0).contains(n) && n.fract() == 0.0)?;
     Some((count as usize, rest))
 }
 
-/// Words of a thing at most.
+/// Maximum number of words of a thing.
 const MOST_WORDS: usize = 24;
-/// Words for any object.
+/// Generic words for an object.
 pub(super) const ANYTHING: [&str; 4] = ["thing", "object", "item", "something"];
-/// Words for any part.
+/// Generic words for a part.
 pub(super) const PARTS: [&str; 2] = ["part", "piece"];
 
-/// The words that names in a scene are made of.
+/// Splits a name into words, in lower case and in the singular.
 pub(crate) fn name_words(name: &str) -> Vec<String> {
     let apart = name.split(|c: char| !(c.is_alphanumeric() || c == '#')).filter(|w| !w.is_empty() && *w != "s");
     apart.map(|w| singular(&w.to_lowercase())).collect()
 }
 
-/// Words as the names in the scene have them.
+/// Words and complete names of a scene.
 pub(crate) struct NameWords {
     words: HashSet<String>,
-    /// Names as a whole, by their words in a request: what these are made of means nothing else.
+    /// Complete names, by their words in a request; such words have no other reading.
     whole: HashMap<String, String>,
-    /// The same of more than one word, in the singular.
+    /// Complete names of more than one word, in the singular.
     singular: HashSet<Vec<String>>,
 }
 
 impl NameWords {
-    /// The words of all names.
+    /// Collects the words of all names.
     pub(crate) fn new(identities: &Identities) -> Self {
         let names: Vec<Vec<String>> = identities.iter().flat_map(|(_, i)| &i.names).map(|n| name_words(n)).collect();
         let words = names.iter().flatten().cloned().collect();
@@ -93,7 +93,7 @@ impl NameWords {
         Self { words, whole, singular }
     }
 
-    /// Whether a name has this word.
+    /// Returns whether a name has this word.
     pub(crate) fn has(&self, word: &str) -> bool {
         self.words.contains(&singular(word))
     }
@@ -102,7 +102,7 @@ impl NameWords {
         self.words.iter().map(String::as_str)
     }
 
-    /// The name that these words of a request are as a whole.
+    /// Returns the complete name that these words of a request match.
     pub(crate) fn whole(&self, words: &[&str]) -> Option<&str> {
         let words = match words {
             ["the" | "a" | "an", rest @ ..] if !rest.is_empty() => rest,
@@ -119,19 +119,19 @@ impl NameWords {
     }
 }
 
-/// The words of a name as a request has them, joined.
+/// Joins the words of a name as a request would have them.
 fn spoken(name: &str) -> String {
     let words = request_tokens(name).into_iter().map(|t| t.low).collect::<Vec<_>>();
     words.join(" ")
 }
 
-/// The words of a phrase: quotes and marks around them are no part of it.
+/// Splits a phrase into words, without quotes and without punctuation except commas.
 pub(crate) fn words_of(phrase: &str) -> Vec<String> {
     let all = tokens(phrase).into_iter().filter(|t| !matches!(t.low.as_str(), "?" | "!" | "." | ";" | ":"));
     all.flat_map(|t| t.low.trim_start_matches('"').split(' ').map(str::to_owned).collect::<Vec<_>>()).collect()
 }
 
-/// All ways to read words as a thing. With `strict`, every word must be one that the scene's names have.
+/// Returns all readings of words as a thing. With `strict`, every word must be one of a name in the scene.
 pub(super) fn readings(words: &[&str], known: &NameWords, strict: bool) -> Vec<Noun> {
     let (language, mut found) = (CommandLanguage::get(), Vec::new());
     let is_determiner = |word: &str| language.determiners.iter().any(|d| d == word);
@@ -139,7 +139,7 @@ pub(super) fn readings(words: &[&str], known: &NameWords, strict: bool) -> Vec<N
         [first, rest @ ..] if is_determiner(first) && !rest.is_empty() && !known.is_name(words) => rest,
         other => other,
     };
-    // Everything is in the scene.
+    // "in the scene" excludes nothing.
     let words = match words {
         [thing @ .., "in", "the" | "this", last @ ("scene" | "room")] if !known.has(last) => thing,
         other => other,
@@ -206,7 +206,7 @@ fn named(words: &[&str]) -> Noun {
     Noun::Named(words.iter().flat_map(|w| name_words(w)).collect())
 }
 
-/// Without "that is standing" at the end.
+/// Removes "that is standing" at the end.
 fn stood<'a, 'b>(mut words: &'b [&'a str]) -> &'b [&'a str] {
     while let [rest @ .., last] = words
         && CommandLanguage::get().standing.iter().any(|w| w == last)
@@ -216,7 +216,7 @@ fn stood<'a, 'b>(mut words: &'b [&'a str]) -> &'b [&'a str] {
     words
 }
 
-/// Whether words can be read as a thing.
+/// Returns whether words can be read as a thing.
 pub(crate) fn is_thing(words: &[&str], known: &NameWords, strict: bool) -> bool {
     !readings(words, known, strict).is_empty()
 }

@@ -1,4 +1,4 @@
-//! What is meant by being a piece of something, by its place at another thing, and by choosing among several.
+//! Lookup of parts of a whole, of things by their place relative to another, and of one among several.
 
 use super::noun::{Noun, Pick};
 use super::{Lost, Resolver, Set};
@@ -11,11 +11,11 @@ use crate::scene::identity::whole_names::BETWEEN;
 use crate::scene::{Bounds, IdentityId, LevelFilter};
 
 impl Resolver<'_> {
-    /// Pieces of a whole that words name.
+    /// Candidates among the parts of a whole.
     pub(super) fn pieces(&mut self, piece: &Noun, whole: &Noun) -> Result<Set, Lost> {
         let set = self.set(whole)?;
         let found = self.pieces_of(set.settled(), piece, whole);
-        // What is called "bowl" has no apple, the fruit bowl around it has one.
+        // The exact "bowl" may lack the part: another match, the fruit bowl, has the apple.
         match found {
             Err(lost) if set.ids.len() > set.settled().len() => self.pieces_of(&set.ids, piece, whole).or(Err(lost)),
             found => found,
@@ -28,6 +28,7 @@ impl Resolver<'_> {
         for whole in wholes {
             all.descendants(*whole).iter().enumerate().for_each(|(i, is_in)| inside[i] |= *is_in);
         }
+        // A whole is not a part of itself.
         wholes.iter().for_each(|id| inside[*id as usize] = false);
         let is_in = |id: &IdentityId| inside.get(*id as usize) == Some(&true);
         let known: Vec<IdentityId> =
@@ -70,8 +71,7 @@ impl Resolver<'_> {
         Err(Lost { is_open: true, ..Lost::new(RefusalKind::Conflict, text, known) })
     }
 
-    /// Things for which `score` holds at the anchor, best first. What is a piece of the anchor, or has it as
-    /// one, has no place at it.
+    /// Things with a `score` at the anchor, smallest first. Descendants and ancestors of the anchor are excluded.
     pub(super) fn at(
         &mut self,
         thing: &Noun,
@@ -97,7 +97,7 @@ impl Resolver<'_> {
         Ok(Set { ids, exact })
     }
 
-    /// The first of things sorted by their gap to the anchor, with those as near as it.
+    /// Returns the first of things sorted by their gap to the anchor, with all that are equally near.
     pub(super) fn alike_first(&mut self, ids: &[IdentityId], anchor: &Noun) -> Result<Vec<IdentityId>, Lost> {
         let place = self.anchor(anchor).map(|id| self.bounds(id))?;
         let far = |id: &IdentityId| self.bounds(*id).zip(place).map_or(f64::INFINITY, |(b, p)| gap(&b, &p));
@@ -105,7 +105,7 @@ impl Resolver<'_> {
         Ok(ids.iter().copied().filter(|id| far(id) <= least + 1e-9).collect())
     }
 
-    /// The one of the candidates that `pick` says; those that fit equally, if that decides nothing.
+    /// Returns the candidate that `pick` chooses; several if they are equal.
     pub(super) fn picked(&mut self, pick: Pick, of: &Noun) -> Result<Set, Lost> {
         let ids = self.set(of)?.ids;
         let (key, most) = match pick {
@@ -116,7 +116,7 @@ impl Resolver<'_> {
                     || Lost::new(RefusalKind::Unclear, "I do not know which other one you mean.", ids.clone());
                 return if told { Ok(Set::new(others)) } else { Err(unclear()) };
             }
-            // Of three, the left one is any but the rightmost.
+            // A comparative needs two things: of three, "the left one" stays ambiguous.
             Pick::More(..) if ids.len() > 2 => return Ok(Set::new(ids)),
             Pick::Most(key, most) | Pick::More(key, most) => (key, most),
         };
@@ -143,7 +143,7 @@ impl Resolver<'_> {
         }
     }
 
-    /// So many of them, if there are just so many.
+    /// Returns the candidates if there are exactly `count`.
     pub(super) fn counted(&mut self, count: usize, of: &Noun) -> Result<Set, Lost> {
         let ids = self.set(of)?.ids;
         if ids.len() == count && !self.looked {

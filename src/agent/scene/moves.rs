@@ -1,4 +1,4 @@
-//! Movements of the eye in a scene: flights to things, steps and turns.
+//! Camera movements in a scene: flights to things, steps and turns.
 
 use std::sync::Arc;
 
@@ -13,7 +13,7 @@ use crate::navigate::target::{Side, ViewPreference};
 use crate::navigate::{CameraTrajectory, FRAMES, Pose, Speed};
 use crate::scene::IdentityId;
 
-/// A step, as a multiple of the distance that flights keep to occupied space.
+/// Length of a step, as a multiple of the distance that flights keep to occupied space.
 const STEP: f64 = 6.0;
 
 impl SceneWorld {
@@ -39,7 +39,7 @@ impl SceneWorld {
             };
             go_to::visit(request).1
         };
-        // What is in view is seen from where it is seen now; what is not, from wherever it is seen best.
+        // A target in view is approached from the current side, any other from its best side.
         let mut visited = visit(if from == Side::Same && !in_view { Side::Best } else { from });
         if visited.problem.is_some() && from == Side::Same && in_view {
             visited = visit(Side::Best);
@@ -71,13 +71,13 @@ impl SceneWorld {
         Ok(Arrival { distance: 0.0, in_view: self.share_of(id) })
     }
 
-    /// Moves the eye, up to what is in the way.
+    /// Moves the camera, up to an obstacle.
     pub(super) fn step(&mut self, direction: Direction, distance: Distance) -> Result<Movement, Unreachable> {
         let explored = self.explored();
         let step = STEP * explored.navigator.clearance;
         let wanted = match (distance, self.parts.meters) {
             (Distance::Meters(m), Some(meters)) => m / meters.max(1e-9),
-            // Nobody knows what a meter is here: the agent asks for steps then.
+            // Without a known scale a meter counts as a step.
             (Distance::Meters(n), None) | (Distance::Relative(n), _) => n * step,
             (Distance::Default, _) => step,
         };
@@ -87,7 +87,7 @@ impl SceneWorld {
         Ok(Movement { distance_done, stopped_by_obstacle })
     }
 
-    /// Turns the eye.
+    /// Turns the camera.
     pub(super) fn turn_by(&mut self, direction: Direction, degrees: f64) -> Result<(), Unreachable> {
         let eye = self.eye;
         let (axis, sign) = match direction {
@@ -103,7 +103,7 @@ impl SceneWorld {
         self.straight(to, format!("turning {}", direction.text())).map(|_| ())
     }
 
-    /// A turn or a straight way, without looking for one.
+    /// Flies straight to a pose, without path planning. Returns the length of the flight, in scene units.
     pub(super) fn straight(&mut self, to: Pose, what: String) -> Result<f64, Unreachable> {
         let eye = self.eye;
         let flight = CameraTrajectory::new(&[eye.center, to.center], [&eye, &to], None, None, FRAMES / 2, Speed::Eased);

@@ -1,4 +1,4 @@
-//! The thread of a link: asks, and tells.
+//! Thread of a link, which asks the server and emits events.
 
 use std::collections::VecDeque;
 use std::path::Path;
@@ -19,10 +19,10 @@ use crate::pipeline::train::TrainConfig;
 use crate::scene::{GaussianCloud, Machine, SemanticMap, text};
 use crate::worker::{CloudSnapshot, Event, Failure, JobId, JobKind, Outcome};
 
-/// Time between two questions while a training runs, and while nothing does.
+/// Time between two requests while a training runs, and at rest.
 const BUSY: Duration = Duration::from_millis(300);
 const AT_REST: Duration = Duration::from_millis(1500);
-/// Time to the first try after a lost connection, and the longest between two.
+/// Time to the first attempt after a lost connection, and the longest time between two.
 const FIRST_TRY: Duration = Duration::from_millis(500);
 const LAST_TRY: Duration = Duration::from_secs(10);
 
@@ -31,22 +31,22 @@ pub(super) struct LinkThread {
     folders: Folders,
     machine: Option<Machine>,
     wished: Receiver<Wish>,
-    /// Photos that were wished for while there was no connection.
+    /// Photos that were requested while there was no connection.
     later: VecDeque<Wish>,
     out: Out,
-    /// Run of the server, number of its news, and generation of its Gaussians that are here.
+    /// Run of the server, number of the last event, and generation of the Gaussians that were received.
     run: String,
     since: u64,
     have: u64,
-    /// The scene on screen.
+    /// Scene on screen.
     shown: Option<(SceneCard, Arc<OpenedScene>)>,
     jobs: Arc<AtomicU64>,
-    /// The job that the server's training is here.
+    /// Local job of the server's training.
     training: Option<JobId>,
     evaluations: Vec<Evaluation>,
     /// Objects and parts of the newest Gaussians.
     map: Option<Arc<SemanticMap>>,
-    /// Whether a training runs there.
+    /// True if a training runs on the server.
     busy: bool,
 }
 
@@ -107,6 +107,7 @@ impl LinkThread {
                 true => format!("The connection to {host} is lost ({problem}); what is on screen stays"),
                 false => format!("{host} refuses: {problem}"),
             };
+            // A refusal ends the open job; a lost connection keeps it for the next attempt.
             let told = match (again, opening.take_if(|_| !again), self.training.take_if(|_| !again)) {
                 (false, Some(job), _) | (false, None, Some(job)) => {
                     self.out.tell(Event::Failed(job, Failure { message: text, remedy: String::new() }))
@@ -121,7 +122,7 @@ impl LinkThread {
         }
     }
 
-    /// Waits; whether nobody needs the connection any more. What is to be done there cannot be passed on meanwhile.
+    /// Waits; returns true if the link was dropped. Photos are queued meanwhile, commands are dropped with a warning.
     fn is_left_within(&mut self, wait: Duration) -> bool {
         let until = Instant::now() + wait;
         loop {
@@ -140,7 +141,7 @@ impl LinkThread {
         }
     }
 
-    /// Talks to the server until that ends.
+    /// Exchanges messages with the server until the connection ends.
     fn session(&mut self, opening: &mut Option<JobId>, wait: &mut Duration) -> Break {
         match self.talk(opening, wait) {
             Err(why) => why,
@@ -151,7 +152,7 @@ impl LinkThread {
     fn talk(&mut self, opening: &mut Option<JobId>, wait: &mut Duration) -> Result<std::convert::Infallible, Break> {
         let card = self.client.scene()?;
         let mut known = self.shown.as_ref().is_some_and(|(shown, _)| is_same(shown, &card.value));
-        // A training that the server's end has cut off, and that may go on.
+        // True if a restart of the server cut off a training of the same scene, which may go on in the new run.
         let mut cut_off = false;
         if card.run != self.run {
             (self.run, self.since, self.have) = (card.run, 0, 0);
@@ -198,7 +199,7 @@ impl LinkThread {
         }
     }
 
-    /// Shows the server's scene.
+    /// Opens the server's scene in the window.
     fn open(&mut self, card: SceneCard, opening: &mut Option<JobId>) -> Result<(), Break> {
         let pulled = self.client.snapshot(0)?;
         let exact = pulled.as_ref().is_some_and(|p| p.snapshot.is_exact());
@@ -216,7 +217,7 @@ impl LinkThread {
         self.out.tell(Event::Finished(job, Outcome::Opened(Box::new(scene))))
     }
 
-    /// Tells what happened there as if it happened here.
+    /// Emits an event of the server as an event of a local job.
     fn hear(&mut self, event: WireEvent) -> Result<(), Break> {
         if let WireEvent::Started(title) = &event {
             let job = self.new_job();
@@ -275,7 +276,7 @@ impl LinkThread {
             (Some(job), _) => {
                 self.out.source.clouds.publish(CloudSnapshot { job, cloud: Arc::new(cloud), step: pulled.step });
             }
-            // At rest, objects are all that changes.
+            // At rest, only objects and parts change.
             (None, Some(map)) => {
                 let job = self.new_job();
                 self.out.tell(Event::Finished(job, Outcome::Edited(map)))?;
@@ -291,7 +292,7 @@ impl LinkThread {
         read.map_err(|e: IoError| ClientError::Refused(e.to_string()))
     }
 
-    /// Passes wishes on until the next news are due; what one asks to be done is news.
+    /// Passes requests on until the next news are due. A command ends the wait, as it causes news.
     fn grant_until(&mut self, due: Instant) -> Result<(), Break> {
         loop {
             match self.later.pop_front().map_or_else(|| self.wished.recv_deadline(due), Ok) {
@@ -313,7 +314,7 @@ impl LinkThread {
         }
     }
 
-    /// Tells what became of a photo.
+    /// Emits the result of a photo.
     fn photo(&self, job: JobId, title: String, got: Result<Outcome, String>) -> Result<(), Break> {
         self.out.tell(Event::Started { job, kind: JobKind::Photo, title: format!("Loading {title}") })?;
         self.out.tell(match got {
@@ -322,7 +323,7 @@ impl LinkThread {
         })
     }
 
-    /// Passes a wish on. One that is refused is told, and no more.
+    /// Sends a command. A refusal is reported and does not end the connection.
     fn ask(&mut self, ask: &Ask) -> Result<(), Break> {
         match self.client.ask(ask) {
             Err(ClientError::Refused(why)) => {
@@ -338,7 +339,7 @@ impl LinkThread {
     }
 }
 
-/// Whether it is the same scene, whatever was measured of it since.
+/// Returns whether two cards are of the same scene, apart from its history and saved state.
 fn is_same(a: &SceneCard, b: &SceneCard) -> bool {
     let (mut a, mut b) = (a.clone(), b.clone());
     for card in [&mut a, &mut b] {
