@@ -1,5 +1,5 @@
-//! Objects and their parts: found in photos, carried to every view by the Gaussians, named, asked
-//! for (the paper's Method).
+//! Objects and their parts: found in photos, carried to every view by the Gaussians, named and queried (the paper's
+//! Method).
 //!
 //! In the order of the data: [`segmenter`] finds masks ([`regions`] without any model; [`filters`]
 //! tell objects from parts), [`tracker`] makes them identities over all views, [`votes`] gives every Gaussian its

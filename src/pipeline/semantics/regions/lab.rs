@@ -1,4 +1,4 @@
-//! Colors as people tell them apart: CIELAB, D65.
+//! Perceptual colors: CIELAB, D65.
 
 use crate::math::srgb::linear as linear_light;
 
