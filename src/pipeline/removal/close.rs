@@ -56,6 +56,7 @@ impl Closing<'_> {
             let brightening = if self.options.lift_shadow { self.brightening(&wide, plane, gone) } else { None };
             if let Some(brightening) = &brightening {
                 for (i, gain) in gains.iter_mut().enumerate() {
+                    // Larger planes come first; at an edge, a Gaussian is brightened by one of them only.
                     if !gone[i] && *gain == [1.0; 3] && self.lies_on(plane, i) {
                         *gain = brightening.at(self.cloud.world_position(i), shown(self.cloud, i));
                     }

@@ -251,6 +251,7 @@ impl Picture {
                 }
             };
             for step in [1, width] {
+                // A pass spreads good matches along its direction, from the neighbor that it has just updated.
                 let step = if backward { -step } else { step };
                 let beside = (i as i64 - step) as usize;
                 if let Some(&other) = slot.get(beside).filter(|s| **s != usize::MAX) {

@@ -75,7 +75,7 @@ fn paint(masks: impl Iterator<Item = Kept>, options: &FilterOptions) -> Vec<Kept
 /// at the picture's border are not enclosed.
 pub(crate) fn hollowness(mask: &Mask) -> f64 {
     let Some(bounds) = mask.bounds() else { return 0.0 };
-    // Water from outside the box reaches everything that is not enclosed.
+    // A flood from outside the box reaches every pixel that is not enclosed.
     let (w, h) = (bounds.x.len() + 2, bounds.y.len() + 2);
     let own = |x: usize, y: usize| {
         let inside = (1..w - 1).contains(&x) && (1..h - 1).contains(&y);

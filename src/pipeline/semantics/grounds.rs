@@ -192,7 +192,7 @@ mod tests {
         ] {
             assert_eq!(grammar(&all, text).join(" "), found, "{text}");
         }
-        // What a name has is no grammar.
+        // Words of a name are no grammar.
         let mut twins = Identities::default();
         twins.add(Level::Object, NOBODY, vec!["the two sisters".into()]);
         assert!(grammar(&twins, "two sisters").is_empty());

@@ -32,9 +32,9 @@ pub(crate) fn is_glue(word: &str) -> bool {
 impl ParsedQuery {
     /// Parses a query; `None` if there is nothing in it.
     ///
-    /// Understood are "X of the Y" (and "on", "from", and the like in some other languages), "Y's
+    /// The grammar has "X of the Y" (and "on", "from", and the like in some other languages), "Y's
     /// X", and `Y的X`, `YのX`. The last such word parts the query, so that "the eye of the face of
-    /// the doll" is about the doll's. "X · Y" is what full names look like.
+    /// the doll" is about the doll's. "X · Y" is the form of full names.
     pub fn parse(query: &str) -> Option<Self> {
         Self::partings(query).into_iter().next()
     }

@@ -227,7 +227,7 @@ fn compound(identities: &Identities, phrase: &ParsedQuery) -> Option<ParsedQuery
                     continue;
                 }
                 let (by_whole, by_piece) = (explained(left, whole), explained(right, piece));
-                // The more of both names is said, the better; the first of equals has the longest piece.
+                // The query should have most of both names; the first of equals has the longest piece.
                 let said = by_whole as f64 / whole.len() as f64 + by_piece as f64 / piece.len() as f64;
                 let new = (by_whole + by_piece, said);
                 if new.0 > alone && (new.0 > best.0 || (new.0 == best.0 && new.1 > best.1)) {
@@ -263,7 +263,7 @@ mod tests {
     use super::*;
     use crate::scene::{Level, NOBODY};
 
-    /// The demo's scene, and the questions by their list.
+    /// Returns the demo's scene, and the lists of questions.
     fn data() -> (Identities, toml::Table) {
         let table: toml::Table =
             include_str!("../../../tests/data/compounds_and_slips.toml").parse().expect("sound TOML");
@@ -331,7 +331,7 @@ mod tests {
         assert!(lists[0].iter().filter(is_plain).count() * 4 < lists[0].len());
         let object = QueryReading::new(&all, "kettle spout", LevelFilter::Object, &Recipe::default()).expect("words");
         assert_eq!((object.phrase.target.as_str(), object.phrase.whole), ("kettle spout", None));
-        // By embedding, names are not looked at: neither compounds nor slips are read by them.
+        // By embedding, names are not used: they decide neither compounds nor slips.
         let paper = QueryReading::new(&all, "ketle spout", LevelFilter::Auto, &Recipe::paper()).expect("words");
         assert_eq!((paper.phrase.text.as_str(), paper.phrase.whole, paper.mended), ("ketle spout", None, vec![]));
     }

@@ -72,6 +72,7 @@ pub(crate) fn train_codes(
         let along = step as f64 / training.steps.max(1) as f64;
         let rate = (RATES[0].ln() * (1.0 - along) + RATES[1].ln() * along).exp() as f32;
         let renderer = &renderer;
+        // Adam's bias correction needs the steps of each Gaussian, which is in some of the views only.
         codes.par_iter_mut().zip(&mut moments).zip(&mut touched).enumerate().for_each(|(i, ((code, moments), t))| {
             let mut gradient = [0.0; CODE_CHANNELS];
             if !renderer.feature_gradient(i, &mut gradient) || gradient.iter().any(|g| !g.is_finite()) {

@@ -1,4 +1,4 @@
-//! `spin-nerf`: IoU of the foreground and share of pixels that are right, at 1008 x 567, plain means
+//! `spin-nerf`: IoU of the foreground and share of correct pixels, at 1008 x 567, plain means
 //! over labeled views.
 
 use super::{AskedScene, LabeledView, Unit};

@@ -138,7 +138,7 @@ fn scenes() -> (Vec<(String, Identities)>, Vec<&'static str>) {
     (scenes, missing)
 }
 
-/// A scene's identities as questions meet them.
+/// A scene's identities under one way of understanding.
 struct Asked<'a> {
     all: &'a Identities,
     features: LanguageFeatures,
@@ -346,11 +346,11 @@ fn only_a_whole_name_is_one_and_pieces_of_whole_names_are_parted_there() {
     assert_eq!((handles.len(), &read("the handle of the set of cups of the set of cups").called), (2, &handles));
     let door = read("a door of the doll's house of the doll's house").called;
     assert_eq!(door, all.called("door of the doll's house", LevelFilter::Auto));
-    // Where the whole is a name and the piece is none, the grammar parts there; slips are mended first.
+    // If the whole is a name and the piece is none, the grammar divides there; slips are mended first.
     let lid = read("lid of the doll's huose");
     assert_eq!((lid.phrase.target.as_str(), lid.phrase.whole.as_deref()), ("lid", Some("doll's house")));
     assert_eq!(read("pink bow on the plush doll's hodo").called, all.called(HARD[0].1[0], LevelFilter::Auto));
-    // Names are not looked at by embedding, and a level that is asked for is kept to.
+    // Names are not used by embedding, and the requested level is respected.
     let part = |level, recipe: &Recipe| QueryReading::new(&all, "hood", level, recipe).expect("words").called.len();
     let counts = [part(LevelFilter::Part, &Recipe::default()), part(LevelFilter::Object, &Recipe::default())];
     assert_eq!((counts, part(LevelFilter::Auto, &Recipe::paper())), ([2, 0], 0));

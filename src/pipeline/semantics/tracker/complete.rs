@@ -63,6 +63,7 @@ impl Tracker<'_> {
             let map = self.map(*photo, SIDE_PX)?;
             let known = sure(&map, options.share);
             let mut labels = grow(terrain, &known, &colors, &options);
+            // Known pixels come from earlier votes, so only the grown ones vote.
             labels.iter_mut().zip(&known).filter(|(_, k)| **k != UNKNOWN).for_each(|(l, _)| *l = UNKNOWN);
             forget(&mut labels, self.gone(*photo, SIDE_PX)?.as_ref());
             let photo = &self.photos[*photo];
