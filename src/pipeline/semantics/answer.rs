@@ -108,8 +108,8 @@ pub(crate) fn may_answer(identities: &Identities, features: &LanguageFeatures) -
     !identities.have_names() || !models::is_rough(&features.encoder)
 }
 
-/// Rejects an answer by embedding if a word is left out, if the query is about places, comparisons or numbers, which
-/// embeddings do not capture, or if the identity has another color than the query says.
+/// Rejects an answer by embedding if a word is left out or if the identity has another color than the query says.
+/// Queries about places, comparisons or numbers are rejected too: embeddings do not capture them.
 fn grounded(identities: &Identities, phrase: &ParsedQuery, language: Language<'_>, answer: Answer) -> Answer {
     let leaves_out = !grounds::telling(language.unknown).is_empty() || grounds::asks_for_more(identities, &phrase.text);
     match answer {

@@ -1,5 +1,5 @@
-//! LERF's rule for masks: relevancy is scaled from one half (no more relevant than a canonical phrase) to the
-//! largest of the view, and pixels over a fifth of that scale belong to the mask.
+//! LERF's rule for masks: relevancy is scaled from one half (no more relevant than a canonical phrase) to the largest
+//! of the view. Pixels over a fifth of that scale belong to the mask.
 
 use crate::pipeline::semantics::relevancy::{LERFS_SHARE, on_lerfs_scale};
 use crate::scene::Mask;

@@ -1,6 +1,6 @@
-//! `strokes`: a simulated user points at a thing in the view that shows most of it, corrects the selection there with
-//! a second and a third stroke, and is scored in all other views. `corrections`: a simulated user corrects the known
-//! Gaussians of a thing by three strokes, each in the view with most errors, and is scored in all views.
+//! `strokes`: a simulated user points at a thing in the view that shows most of it and corrects the selection there
+//! with a second and a third stroke; all other views are scored. `corrections`: a simulated user corrects the known
+//! Gaussians of a thing by three strokes, each in the view with most errors; all views are scored.
 
 use std::collections::{BTreeMap, VecDeque};
 

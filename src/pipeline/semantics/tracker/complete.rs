@@ -1,9 +1,9 @@
 //! Photos as evidence: known labels of a view, rendered into its photo, grow over unknown pixels up to the borders in
 //! the photo or in the shape of the scene.
 //!
-//! Growing is a race of all identities over the pixels. A pixel takes time if the photo or the depth changes there,
-//! or if its color is not among the known colors of the identity, compared with those of all others and of unseen
-//! things. The first identity to arrive keeps the pixel; a pixel that none reaches in time stays unknown.
+//! Growing is a race of all identities over the pixels. Changes of the photo or the depth cost a pixel time. So does a
+//! color that is not known of the identity, compared with those of all others and of unseen things. The first identity
+//! to arrive keeps the pixel; a pixel that none reaches in time stays unknown.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
