@@ -1,8 +1,8 @@
-//! Floaters: what hangs in the air and the photos do without.
+//! Floaters: Gaussians that hang in the air and that the photos do not need.
 //!
-//! Two sorts of groups are suspected: small pieces apart from all else, and Gaussians that hang together and whose color
-//! is not that of the photos. All are taken away at once, the photos are drawn with and without, and each group is
-//! judged by its pixels. Those that are missed come back, and the rest is judged again without them.
+//! Two kinds of groups are suspects: small pieces apart from all else, and connected Gaussians with colors that
+//! contradict the photos. All are removed at once, the photos' views are rendered with and without them, and each
+//! group is judged by its pixels. Missed groups come back, and the rest is judged again without them.
 
 use std::collections::HashMap;
 
@@ -14,23 +14,23 @@ use crate::pipeline::observer::{Observer, Ticker};
 use crate::render::{ContributionSink, Features, RenderSettings, Renderer, TILE_PX};
 use crate::scene::{GaussianCloud, PhotoPixels};
 
-/// A piece of fewer Gaussians is small, and one of fewer than this share of the cloud.
+/// Size of a small piece: fewer Gaussians than this, or than this share of the cloud.
 const SMALL: u32 = 30;
 const SMALL_SHARE: f64 = 1.0 / 2000.0;
-/// Photos that must show a piece before they can speak for it: what one alone shows may be anywhere.
+/// Least number of photos that must show a piece to keep it: a piece in one photo alone may be anywhere.
 const WITNESSES: f32 = 3.0;
-/// Difference of a color from the photos from which a Gaussian is suspected wherever it is.
+/// Difference of its color from the photos from which a Gaussian is a suspect anywhere.
 const SUSPECT: f32 = 0.2;
-/// Growth of the mean squared error of its pixels from which photos miss a piece: a color step of 2 %.
+/// Growth of the mean squared error of its pixels from which a piece is missed: a color step of 2 %.
 const NOTICED: f64 = 0.0004;
-/// Decrease from which they are better off without something on a surface: a color step of 10 %.
+/// Decrease of that error from which a group on a surface is better removed: a color step of 10 %.
 const CLEARLY: f64 = 0.01;
-/// Share of the photos that show a group on a surface which must be better off without it.
+/// Least share of the photos of a group on a surface that must be better without it.
 const AGREED: f64 = 0.8;
-/// Rounds at most; the last ones hardly bring anything back.
+/// Most rounds; the last ones bring hardly anything back.
 const ROUNDS: usize = 6;
 
-/// What lies where.
+/// Neighbors, sizes and pieces of the Gaussians.
 pub(super) struct Shape<'a> {
     pub(super) neighbors: &'a [Vec<(u32, f32)>],
     /// Largest standard deviations.
@@ -38,7 +38,7 @@ pub(super) struct Shape<'a> {
     pub(super) pieces: &'a Pieces,
 }
 
-/// Whether each Gaussian is of a floater.
+/// Returns whether each Gaussian belongs to a floater.
 pub(super) fn find(
     cloud: &GaussianCloud,
     shape: &Shape<'_>,
@@ -52,7 +52,7 @@ pub(super) fn find(
     let apart = |i: usize| shape.pieces.size(i) < least;
     let mut floating: Vec<bool> = (0..n).map(apart).collect();
     let Some(PhotoSupport { photos, error: Some(error), .. }) = support else {
-        // Cameras alone say what is seen by few.
+        // With cameras alone, only the number of views counts.
         let seen = |i: usize| support.is_some_and(|s| s.photos[i] >= WITNESSES);
         let mut kept = vec![false; n];
         (0..n).filter(|i| seen(*i)).for_each(|i| kept[shape.pieces.of(i) as usize] = true);
@@ -62,7 +62,7 @@ pub(super) fn find(
     let mut looking = Looking { cloud, views, settings, photos, observer };
     let of: Vec<usize> = (0..n).map(|i| shape.pieces.of(i) as usize).collect();
     looking.keep(&vec![false; n], &mut floating, &of, |verdict| !verdict.is_missed())?;
-    // What hangs in the air would be blamed on the surface behind it, so that is gone before surfaces are looked at.
+    // A floater's error would be blamed on the surface behind it, so floaters are removed before surfaces are judged.
     let gone = floating;
     let odd = |i: usize| !gone[i] && !apart(i) && error[i] > SUSPECT && photos[i] >= WITNESSES;
     let odd_pieces = pieces(shape.neighbors, shape.sizes, odd);
@@ -72,7 +72,7 @@ pub(super) fn find(
     Ok(gone.iter().zip(&on_surfaces).map(|(a, b)| a | b).collect())
 }
 
-/// What is looked at, and what through.
+/// Gaussians under judgment, and the views of them.
 struct Looking<'a> {
     cloud: &'a GaussianCloud,
     views: &'a [SmallView],
@@ -83,8 +83,8 @@ struct Looking<'a> {
 }
 
 impl Looking<'_> {
-    /// Keeps of what is `floating` the groups that `floats` says so of, and those that too few photos show, until all of
-    /// them are judged without each other; `gone` is not there at all.
+    /// Leaves `floating` only the groups that `floats` accepts and those in too few photos, until each is judged
+    /// without the others; `gone` Gaussians are absent.
     fn keep(
         &mut self,
         gone: &[bool],
@@ -114,13 +114,13 @@ impl Looking<'_> {
     }
 }
 
-/// What photos say of a group.
+/// Evidence of the photos about a group.
 #[derive(Clone, Copy, Default)]
 struct Verdict {
-    /// Shares of pixels, and growth of their squared errors when what floats is gone.
+    /// Shares of pixels, and growth of their squared errors without the floating groups.
     weight: f64,
     growth: f64,
-    /// Photos that show it, and those that are better off without it.
+    /// Photos that show it, and those that are better without it.
     photos: f64,
     better: f64,
 }
@@ -136,7 +136,7 @@ impl Verdict {
 }
 
 impl Looking<'_> {
-    /// What photos say of each group of what is `floating`, when all of that is gone.
+    /// Judges each group of the `floating` Gaussians, with all of them removed.
     fn judge(&mut self, gone: &[bool], floating: &[bool], group: &[usize]) -> Result<Vec<Verdict>, CleanError> {
         let there: Vec<usize> = (0..gone.len()).filter(|&i| !gone[i]).collect();
         let rest: Vec<usize> = there.iter().copied().filter(|&i| !floating[i]).collect();
@@ -180,18 +180,18 @@ impl Looking<'_> {
     }
 }
 
-/// Mean over the channels; 0 where the photo shows nothing.
+/// Mean over the channels; 0 for pixels that the photo does not cover.
 fn squared_error(drawn: &[Vec<f32>; 3], photo: &PhotoPixels, i: usize) -> f32 {
     let Some(there) = color(photo, i) else { return 0.0 };
     (0..3).map(|c| (drawn[c][i].clamp(0.0, 1.0) - there[c]).powi(2)).sum::<f32>() / 3.0
 }
 
 struct Row<'a> {
-    /// Growth of each pixel's error when what floats is gone.
+    /// Growth of each pixel's error without the floating groups.
     growth: &'a [f32],
     width: usize,
     floating: &'a [bool],
-    /// Gaussians, their shares of pixels and the growth there; one may stand there several times.
+    /// Gaussians, their shares of pixels and the growth there; one may be listed several times.
     sums: Vec<(u32, f32, f32)>,
 }
 

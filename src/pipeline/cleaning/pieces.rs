@@ -1,15 +1,15 @@
-//! What hangs together: Gaussians that reach their neighbors.
+//! Connected pieces: Gaussians that reach their neighbors.
 
 use crate::math::disjoint::root;
 
-/// Standard deviations that a Gaussian reaches.
+/// Reach of a Gaussian, in standard deviations.
 const REACH: f32 = 3.0;
 
 /// Pieces of a cloud.
 pub(super) struct Pieces {
-    /// The piece of each Gaussian: one of its Gaussians stands for it.
+    /// Piece of each Gaussian: the index of one of its Gaussians.
     of: Vec<u32>,
-    /// Gaussians of each piece, where that one stands.
+    /// Number of Gaussians of each piece, at that index.
     sizes: Vec<u32>,
 }
 
@@ -18,14 +18,13 @@ impl Pieces {
         self.of[i]
     }
 
-    /// Gaussians of the piece that Gaussian `i` is in.
+    /// Number of Gaussians in the piece of Gaussian `i`.
     pub(super) fn size(&self, i: usize) -> u32 {
         self.sizes[self.of[i] as usize]
     }
 }
 
-/// Joins neighbors of which one reaches the other, as far as both are `among` those that count; `sizes` are standard
-/// deviations.
+/// Joins neighbors if one reaches the other and both are `among` those that count; `sizes` are standard deviations.
 pub(super) fn pieces(neighbors: &[Vec<(u32, f32)>], sizes: &[f32], among: impl Fn(usize) -> bool) -> Pieces {
     let mut parent: Vec<u32> = (0..neighbors.len() as u32).collect();
     for (i, near) in neighbors.iter().enumerate() {

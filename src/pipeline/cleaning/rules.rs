@@ -1,4 +1,4 @@
-//! What is to be cleaned away, as it is typed and as it is carried out.
+//! Rules of cleaning, as typed and as applied.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 use super::{CloudMeasures, SplatMeasure};
 use crate::math::srgb;
 
-/// Opacity below which a Gaussian is hardly ever drawn.
+/// Opacity below which a Gaussian is hardly ever rendered.
 const FAINT: f32 = 0.005;
 /// Elongation from which a Gaussian is a needle.
 const NEEDLE: f32 = 30.0;
@@ -14,51 +14,51 @@ const NEEDLE: f32 = 30.0;
 const OVERSIZED: f64 = 0.5;
 /// Distance in red, green and blue, each 0 to 1, within which a color is near.
 const NEAR_COLOR: f32 = 0.12;
-/// Share of a pixel that what is supported has in some photo.
+/// Least share of a pixel, in any photo, of a supported Gaussian.
 const SUPPORTED: f32 = 0.01;
 
-/// Which Gaussians are meant.
+/// Rules that select Gaussians.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum CleanRule {
-    /// Small pieces that hang in the air and that the photos do without.
+    /// Small pieces that hang in the air and that the photos do not need.
     Floaters,
-    /// Those that are as good as transparent.
+    /// Nearly transparent Gaussians.
     Faint,
-    /// Those that are long and thin.
+    /// Long and thin Gaussians.
     Needles,
-    /// Those that are large beside the scene.
+    /// Gaussians that are large compared with the scene.
     Oversized,
-    /// Those that no photo shows.
+    /// Gaussians that no photo shows.
     Unsupported,
-    /// Those of this color or one that is near.
+    /// Gaussians of this color or a near one.
     Color([u8; 3]),
-    /// Those whose measure is less.
+    /// Gaussians with a smaller measure.
     Below(SplatMeasure, f32),
-    /// Those whose measure is more.
+    /// Gaussians with a larger measure.
     Above(SplatMeasure, f32),
-    /// Those whose measure lies between the two, both included.
+    /// Gaussians with a measure between the two, both included.
     Range(SplatMeasure, f32, f32),
 }
 
-/// What is wrong with a rule.
+/// Errors in a rule.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RuleError {
-    /// It is none.
+    /// The text is no rule.
     #[error(
         "'{0}' is no rule: floaters, faint, needles, oversized, unsupported, a color such as 'color=#3050c0', or a measure with a limit such as 'size>0.5' or 'photos<2'"
     )]
     Unknown(String),
-    /// Nothing is known of its measure.
+    /// The measure is unknown without photos.
     #[error("{0} is not known of this scene: its photos are not there")]
     NoPhotos(&'static str),
 }
 
 impl CleanRule {
-    /// The rules that need no number.
+    /// Rules without a number.
     pub(crate) const NAMED: [Self; 5] =
         [Self::Floaters, Self::Faint, Self::Needles, Self::Oversized, Self::Unsupported];
 
-    /// What it means, for the user.
+    /// Returns the meaning, for the user.
     pub(crate) fn meaning(&self) -> &'static str {
         match self {
             Self::Floaters => "small pieces in the air that the photos do without",
@@ -71,7 +71,7 @@ impl CleanRule {
         }
     }
 
-    /// Whether each Gaussian is meant, `[n]`.
+    /// Returns whether each Gaussian is selected, `[n]`.
     pub(crate) fn choose(&self, of: &CloudMeasures) -> Result<Vec<bool>, RuleError> {
         let (measure, is): (_, &dyn Fn(f32) -> bool) = match *self {
             Self::Floaters => return Ok(of.floaters.clone()),

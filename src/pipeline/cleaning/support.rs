@@ -1,4 +1,4 @@
-//! What photos show of each Gaussian, and how well its color fits them.
+//! Support of each Gaussian by photos, and the fit of its color to them.
 
 use super::{CleanError, SmallView};
 use crate::math::lanes::Lane;
@@ -6,16 +6,16 @@ use crate::pipeline::observer::{Observer, Ticker};
 use crate::render::{ContributionSink, RenderSettings, Renderer, TILE_PX};
 use crate::scene::{GaussianCloud, PhotoPixels};
 
-/// Share of a pixel from which a photo shows a Gaussian.
+/// Least share of a pixel for a photo to show a Gaussian.
 const SHOWN: f32 = 0.05;
 
-/// What photos say, Gaussian by Gaussian.
+/// Evidence of the photos for each Gaussian.
 pub(super) struct PhotoSupport {
     /// Largest share of a pixel in any photo.
     pub(super) largest: Vec<f32>,
-    /// Photos that show it.
+    /// Number of photos that show it.
     pub(super) photos: Vec<f32>,
-    /// Root mean square difference of its color from the photos; 0 where none shows it. `None` without photos.
+    /// Root mean square difference of its color from the photos; 0 if none shows it. `None` without photos.
     pub(super) error: Option<Vec<f32>>,
 }
 
@@ -54,7 +54,7 @@ pub(super) fn look(
     Ok(PhotoSupport { largest, photos, error: has_photos.then(|| weight.iter().zip(&difference).map(rms).collect()) })
 }
 
-/// What a row of tiles shows of a Gaussian.
+/// Share and color error of a Gaussian in a row of tiles.
 struct Seen {
     gaussian: u32,
     largest: f32,
@@ -92,7 +92,7 @@ impl ContributionSink<f32> for Row<'_> {
     }
 }
 
-/// Color of a pixel, 0 to 1, unless the photo does not cover it.
+/// Returns the color of a pixel, 0 to 1; `None` if the photo does not cover it.
 pub(super) fn color(photo: &PhotoPixels, pixel: usize) -> Option<[f32; 3]> {
     let covered = photo.coverage.as_ref().is_none_or(|c| c[pixel] > 0);
     covered.then(|| photo.rgb[pixel].map(|v| f32::from(v) / 255.0))

@@ -35,10 +35,10 @@ fn scene() -> GaussianCloud {
 }
 const WALL: usize = 3600;
 const RING: usize = 8;
-/// One in the middle of the wall.
+/// A Gaussian in the middle of the wall.
 const INNER: usize = 1830;
 
-/// Photos of a cloud, of which a file each is written.
+/// Writes photos of a cloud, one file each.
 fn photos(of: &GaussianCloud, folder: &Path) -> Vec<CleanView> {
     let view = |k: usize| {
         let eye = DVec3::new(-1.5 + 0.5 * k as f64, 0.4 * (k % 3) as f64, 4.0);
@@ -76,7 +76,7 @@ fn what_photos_do_not_show_in_the_air_is_a_floater_and_what_they_show_is_none() 
     // The wall's own edges are mixed with what is behind it.
     let (edges, floaters) = (off.iter().filter(|i| **i < WALL).count(), off.iter().filter(|i| **i >= first).count());
     assert!(edges < WALL / 20 && floaters >= 6, "{edges} {floaters}");
-    // Without the photos nothing speaks for the ring.
+    // Without photos there is no evidence for the ring.
     let of = measured(&cloud, &[]);
     assert_eq!(chosen("floaters", &of), (WALL..first + 8).collect::<Vec<_>>());
     assert_eq!(chosen("piece<20", &of), (WALL..first + 8).collect::<Vec<_>>());
@@ -122,7 +122,7 @@ fn measures_are_those_of_each_gaussian() {
     let again = left.grown(&only(INNER - 1)[..cloud.len() - 1]);
     assert_eq!(count(&again), 8, "one neighbor is gone");
     assert_eq!(left.get(SplatMeasure::Size).map(<[f32]>::len), Some(cloud.len() - 1));
-    // Nothing, and one alone.
+    // No Gaussian, and one alone.
     for n in [0, 1] {
         let few = cloud.select(&(0..n).collect::<Vec<_>>());
         let of = measured(&few, &views);

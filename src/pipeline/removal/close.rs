@@ -1,4 +1,4 @@
-//! Finding the surfaces near a thing, lifting its shadow off them, and closing what it hid of them.
+//! Search for the surfaces near a removed thing, removal of its shadow, and filling of the hidden areas.
 
 use std::collections::HashMap;
 
@@ -16,16 +16,16 @@ use crate::models::lama::Lama;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::scene::{GaussianCloud, IdentityId, NOBODY, SemanticMap};
 
-/// Surfaces that are closed at most.
+/// Most surfaces that are closed.
 const PLANES: usize = 4;
-/// How far around a thing surfaces are looked for, in its radii.
+/// Distance around a thing at which surfaces are searched, in its radii.
 const REACH: f64 = 3.0;
-/// How far away things are that stand in the way of light, in its radii.
+/// Distance up to which occluders of light are considered, in radii of the thing.
 const SHADING_REACH: f64 = 6.0;
-/// Radius of what blocks light, in standard deviations.
+/// Radius of an occluder of light, in standard deviations.
 const FOOTPRINT: f64 = 1.5;
 
-/// What the surfaces are found and closed by.
+/// Inputs for finding and closing the surfaces.
 pub(super) struct Closing<'a> {
     pub(super) cloud: &'a GaussianCloud,
     pub(super) map: &'a SemanticMap,
@@ -56,6 +56,7 @@ impl Closing<'_> {
             let brightening = if self.options.lift_shadow { self.brightening(&wide, plane, gone) } else { None };
             if let Some(brightening) = &brightening {
                 for (i, gain) in gains.iter_mut().enumerate() {
+                    // Larger planes come first; at an edge, a Gaussian is brightened by one of them only.
                     if !gone[i] && *gain == [1.0; 3] && self.lies_on(plane, i) {
                         *gain = brightening.at(self.cloud.world_position(i), shown(self.cloud, i));
                     }
@@ -96,7 +97,7 @@ impl Closing<'_> {
         Ok(new)
     }
 
-    /// How much brighter a surface is without the thing's shadow, if that is seen on it.
+    /// Returns the brightening of a surface without the thing's shadow, if a shadow is found on it.
     fn brightening<'s>(&self, wide: &'s SurfaceSheet<'s>, plane: &Plane, gone: &[bool]) -> Option<Brightening<'s>> {
         let cloud = self.cloud;
         let is_near = |at: DVec3| at.distance(self.ball.center) < SHADING_REACH * self.ball.radius;
@@ -118,21 +119,21 @@ impl Closing<'_> {
         Brightening::find(plane, wide, |i| object(i) == most, &occluders)
     }
 
-    /// Whether a Gaussian is a piece of a surface, which is seen where its near side is.
+    /// Returns whether a Gaussian is a piece of a surface, which is seen at its near side.
     fn lies_on(&self, plane: &Plane, i: usize) -> bool {
         let thickness = self.cloud.log_scales[i].iter().fold(f32::INFINITY, |a, b| a.min(*b)).exp();
         plane.height(self.cloud.world_position(i)).abs() <= plane.tolerance + f64::from(thickness)
     }
 
-    /// Whether a Gaussian is of the thing for where it is: on the hidden part of the surface, where nobody has seen it and
-    /// it would shine through, or between that and the thing's own surface, unless it is known to be of another object
-    /// than the surface, such as an apple in a bowl.
+    /// Returns whether a Gaussian belongs to the thing by its place: on the hidden part of the surface, where it is
+    /// unseen and would shine through, or between that and the thing's own surface. Gaussians of another object than
+    /// the surface's, such as an apple in a bowl, do not.
     fn is_left_over(&self, i: usize, plane: &Plane, sheet: &SurfaceSheet<'_>, owners: &[IdentityId]) -> bool {
         let at = self.cloud.world_position(i);
         let Some(texel) = sheet.texel(at).filter(|t| sheet.state[*t] == Texel::Hidden) else { return false };
         if self.lies_on(plane, i) {
             let largest = self.cloud.log_scales[i].iter().fold(f32::NEG_INFINITY, |a, b| a.max(*b)).exp();
-            // A large one at the border closes what is beside it.
+            // A large Gaussian at the border covers the area beside it.
             return sheet.is_deep(texel) || f64::from(largest) < sheet.step;
         }
         let object = |id: IdentityId| self.map.identities.object_of(id);
@@ -141,7 +142,7 @@ impl Closing<'_> {
         above && (of == NOBODY || of == object(owners[texel]))
     }
 
-    /// Whose each texel is: of the nearest Gaussian that lies on the surface.
+    /// Returns the identity of each texel: that of the nearest Gaussian on the surface.
     fn owners(&self, sheet: &SurfaceSheet, plane: &Plane, gone: &[bool]) -> Vec<IdentityId> {
         let on_it = (0..self.cloud.len()).filter(|i| !gone[*i]).filter_map(|i| {
             let texel = sheet.texel(self.cloud.world_position(i)).filter(|t| sheet.state[*t] == Texel::Seen)?;

@@ -1,11 +1,11 @@
-//! Where a thing is: a ball around it, and the space that it takes.
+//! Extent of a thing: a ball around it, and the space that it takes.
 
 use glam::DVec3;
 
 use crate::math::stats::quantile;
 use crate::scene::GaussianCloud;
 
-/// Where a thing is, a few stray Gaussians left out.
+/// Ball around a thing, without a few stray Gaussians.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ball {
     pub(super) center: DVec3,
@@ -25,7 +25,7 @@ impl Ball {
     }
 }
 
-/// How much farther a thing may reach than what is known of it, as a share.
+/// Margin around the known Gaussians of a thing, as a share of its size.
 pub(super) const MORE: f64 = 0.15;
 /// Directions along which the extent of a thing is measured: the axes, and the diagonals of faces and of the box.
 const DIRECTIONS: [[f64; 3]; 13] = [
@@ -44,8 +44,8 @@ const DIRECTIONS: [[f64; 3]; 13] = [
     [1.0, -1.0, -1.0],
 ];
 
-/// The space that a thing takes: between its ends along all of [`DIRECTIONS`], outliers by their quartiles left out, and
-/// a little more.
+/// Space of a thing: between its ends along all of [`DIRECTIONS`], without outliers by their quartiles, plus a
+/// margin.
 pub(super) struct ThingExtent([(DVec3, f64, f64); 13]);
 
 impl ThingExtent {

@@ -1,16 +1,16 @@
-//! How much light comes from where, told by the shadows on a surface: least squares with weights that are not negative.
+//! Light from each direction by the shadows on a surface: weighted least squares with non-negative weights.
 
 /// Sweeps over all unknowns.
 const SWEEPS: usize = 200;
-/// Rounds in which what does not fit counts less.
+/// Rounds of reweighting, in which outliers count less.
 const ROBUST_ROUNDS: usize = 4;
-/// Share of the diagonal that is added to it: of directions with nearly the same shadows, both get some.
+/// Ridge, as a share of the diagonal: directions with nearly the same shadows share the light.
 const RIDGE: f64 = 1e-3;
-/// Columns at the front whose weights may have any sign: brightness, and how it changes along the surface, up to squares.
+/// Leading columns with weights of any sign: brightness and its change along the surface, up to squares.
 pub(super) const FREE: usize = 6;
 
-/// Weights of `columns`, each with as many rows as `values`, that make up `values` best; the rows that do not fit count
-/// less, as patterns and spots do. Returns the weights of the columns and of the rows.
+/// Fits weights of `columns`, each with as many rows as `values`, to `values`; outlier rows, such as patterns and
+/// spots, count less. Returns the weights of the columns and of the rows.
 pub(super) fn fit(columns: &[Vec<f32>], values: &[f32]) -> (Vec<f64>, Vec<f64>) {
     let mut rows = vec![1.0; values.len()];
     let mut weights = solve(columns, values, &rows);
@@ -30,7 +30,7 @@ pub(super) fn fit(columns: &[Vec<f32>], values: &[f32]) -> (Vec<f64>, Vec<f64>) 
     (weights, rows)
 }
 
-/// The same with rows that count as they are told.
+/// The same with given weights of the rows.
 pub(super) fn solve(columns: &[Vec<f32>], values: &[f32], rows: &[f64]) -> Vec<f64> {
     let dot = |a: &[f32], b: &[f32]| -> f64 {
         a.iter().zip(b).zip(rows).map(|((a, b), w)| f64::from(*a) * f64::from(*b) * w).sum()
@@ -59,7 +59,7 @@ pub(super) fn solve(columns: &[Vec<f32>], values: &[f32], rows: &[f64]) -> Vec<f
     weights
 }
 
-/// What the weighted columns lack of the values.
+/// Returns the values minus the weighted columns.
 pub(super) fn residuals(columns: &[Vec<f32>], values: &[f32], weights: &[f64]) -> Vec<f64> {
     let made = |row: usize| -> f64 { columns.iter().zip(weights).map(|(c, w)| f64::from(c[row]) * w).sum() };
     values.iter().enumerate().map(|(row, v)| f64::from(*v) - made(row)).collect()
@@ -87,7 +87,7 @@ mod tests {
         let truth = [0.8, -0.2, 0.1, 0.0, 0.0, 0.0, 0.3, 0.15, 0.0];
         let mut values: Vec<f32> =
             (0..n).map(|i| columns.iter().zip(truth).map(|(c, w): (_, f32)| c[i] * w).sum()).collect();
-        // What would be light that comes from a shadow, and a few dark spots.
+        // A bright area that would need a negative weight, and a few dark spots.
         (300..320).for_each(|i| values[i] += 0.05);
         (0..n).step_by(17).for_each(|i| values[i] = 0.1);
         let (weights, rows) = fit(&columns, &values);

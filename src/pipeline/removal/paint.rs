@@ -1,8 +1,8 @@
-//! Colors for the hidden part of a surface, from what is seen of it.
+//! Colors for the hidden part of a surface, from its visible part.
 //!
-//! Brightness and texture are painted apart: what is smooth goes through the hole as a soap film would, which a wall in
-//! slanting light needs, and what is left, the texture, is put together of patches that are seen elsewhere
-//! (PatchMatch: Barnes et al. 2009; voting over scales: Wexler et al. 2007).
+//! Brightness and texture are painted separately. The smooth part fills the hole like a soap film, as a wall in
+//! slanting light needs. The rest, the texture, is composed of patches seen elsewhere (PatchMatch: Barnes et al.
+//! 2009; voting over scales: Wexler et al. 2007).
 
 mod telea;
 
@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::math::grid::{neighbors, spread};
 
-/// How a hidden surface is painted.
+/// Methods of painting a hidden surface.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub(crate) enum Paint {
@@ -21,9 +21,9 @@ pub(crate) enum Paint {
     Patches,
     /// The brightness of its rim alone.
     Smooth,
-    /// Every texel like the nearest that is seen.
+    /// Every texel like the nearest visible one.
     Nearest,
-    /// Fast marching, as image editors do.
+    /// Fast marching, as in image editors.
     Telea,
     /// A network.
     #[value(skip)]
@@ -37,12 +37,12 @@ const SMOOTH: usize = 6;
 /// Rounds of search and vote at each size, and passes of a search.
 const ROUNDS: usize = 4;
 const PASSES: usize = 3;
-/// Sheets of this side or smaller are where painting begins.
+/// Largest side of the sheets at which painting begins.
 const SMALLEST: usize = 24;
 /// Over-relaxation of the film.
 const RELAX: f32 = 1.9;
 
-/// Paints the texels of `hole`, of a sheet of this size, from the `known` ones; not by a network.
+/// Paints the texels of `hole`, of a sheet of this size, from the `known` ones, by any method but a network.
 pub(super) fn fill(color: &mut [[f32; 3]], size: [usize; 2], known: &[bool], hole: &[bool], how: Paint, seed: u64) {
     let n = color.len();
     let holes: Vec<usize> = (0..n).filter(|i| hole[*i]).collect();
@@ -63,14 +63,15 @@ pub(super) fn fill(color: &mut [[f32; 3]], size: [usize; 2], known: &[bool], hol
     holes.into_iter().for_each(|i| color[i] = std::array::from_fn(|c| smooth[i][c] + texture[i][c]));
 }
 
-/// The color of the nearest known texel for each.
+/// Returns the color of the nearest known texel for each.
 fn nearest(color: &[[f32; 3]], size: [usize; 2], known: &[bool]) -> Vec<[f32; 3]> {
     let n = color.len();
     let found = spread(size[0], n, (0..n).filter(|i| known[*i]).map(|i| (i, color[i])), |_| true);
     found.into_iter().map(|c| c.unwrap_or([0.5; 3])).collect()
 }
 
-/// What is smooth of a surface: means of what is known around each texel, and a film between them in the hole.
+/// Returns the smooth part of a surface: means of the known texels around each one, and a film between them in the
+/// hole.
 pub(super) fn smooth(color: &[[f32; 3]], size: [usize; 2], known: &[bool], hole: &[bool]) -> Vec<[f32; 3]> {
     let (mut smooth, nearest) = (blurred(color, size, known), nearest(color, size, known));
     let holes: Vec<usize> = (0..color.len()).filter(|i| hole[*i]).collect();
@@ -100,7 +101,7 @@ fn blurred(color: &[[f32; 3]], size: [usize; 2], known: &[bool]) -> Vec<[f32; 3]
     sums.iter().map(|s| if s[3] > 0.0 { [s[0] / s[3], s[1] / s[3], s[2] / s[3]] } else { [0.0; 3] }).collect()
 }
 
-/// Lets a film hang in the hole: every texel the mean of its neighbors.
+/// Fills the hole with a film: every texel is the mean of its neighbors.
 fn film(color: &mut [[f32; 3]], size: [usize; 2], known: &[bool], holes: &[usize]) {
     let mut inside = vec![false; color.len()];
     holes.iter().for_each(|i| inside[*i] = true);
@@ -128,7 +129,7 @@ struct Picture {
 }
 
 impl Picture {
-    /// The colors with the hole painted; zeros in it where nothing is large enough to paint from.
+    /// Returns the colors with the hole painted; zeros in it if no area is large enough to paint from.
     fn painted(mut self, rng: &mut Pcg32) -> Vec<[f32; 3]> {
         (0..self.color.len()).filter(|i| self.hole[*i]).for_each(|i| self.color[i] = [0.0; 3]);
         if self.size.iter().min().is_some_and(|s| *s > SMALLEST)
@@ -172,13 +173,13 @@ impl Picture {
         }
     }
 
-    /// Middles of patches that are known as a whole.
+    /// Returns the centers of fully known patches.
     fn sources(&self) -> Vec<usize> {
         let whole = |i: &usize| self.patch(*i).is_some_and(|mut patch| patch.all(|j| self.known[j]));
         (0..self.color.len()).filter(whole).collect()
     }
 
-    /// The texels of the patch around a texel, row by row; `None` where it reaches beyond the picture.
+    /// Returns the texels of the patch around a texel, row by row; `None` if it reaches beyond the picture.
     fn patch(&self, i: usize) -> Option<impl Iterator<Item = usize> + '_> {
         let (x, y) = (i % self.size[0], i / self.size[0]);
         let inside = |at: usize, end: usize| at >= HALF && at + HALF < end;
@@ -186,7 +187,7 @@ impl Picture {
             .then(|| (y - HALF..=y + HALF).flat_map(move |y| (x - HALF..=x + HALF).map(move |x| y * self.size[0] + x)))
     }
 
-    /// Mean squared difference of two patches, over what is known or painted; given up above `limit`.
+    /// Mean squared difference of two patches, over known or painted texels; given up above `limit`.
     fn distance(&self, target: usize, source: usize, limit: f32) -> f32 {
         let (Some(a), Some(b)) = (self.patch(target), self.patch(source)) else { return f32::INFINITY };
         let (mut sum, mut count) = (0.0, 0.0);
@@ -224,7 +225,7 @@ impl Picture {
         }
     }
 
-    /// One pass over all targets: what fits the neighbor fits here, shifted; and random places ever nearer.
+    /// One pass over all targets: the match of the neighbor, shifted, and random places ever nearer.
     #[expect(clippy::too_many_arguments, reason = "the state of one search")]
     fn search(
         &self,
@@ -250,6 +251,7 @@ impl Picture {
                 }
             };
             for step in [1, width] {
+                // A pass spreads good matches along its direction, from the neighbor that it has just updated.
                 let step = if backward { -step } else { step };
                 let beside = (i as i64 - step) as usize;
                 if let Some(&other) = slot.get(beside).filter(|s| **s != usize::MAX) {
@@ -268,7 +270,7 @@ impl Picture {
         }
     }
 
-    /// Every texel of the hole becomes the mean of what the patches over it have there, the better ones first.
+    /// Sets every texel of the hole to the weighted mean of the patches over it, in which better matches count more.
     fn vote(&mut self, targets: &[usize], from: &[usize], best: &[f32]) {
         let mut sorted: Vec<f32> = best.iter().copied().filter(|d| d.is_finite()).collect();
         sorted.sort_by(f32::total_cmp);
@@ -294,7 +296,7 @@ mod tests {
 
     const SIZE: [usize; 2] = [80, 64];
 
-    /// A sheet of these colors with a hole of 16 x 16 texels, painted; mean error in the hole.
+    /// Returns the mean error in the hole of a sheet of these colors, painted in a hole of 16 x 16 texels.
     fn error(color: impl Fn(usize, usize) -> [f32; 3], how: Paint) -> f32 {
         let truth: Vec<[f32; 3]> = (0..SIZE[0] * SIZE[1]).map(|i| color(i % SIZE[0], i / SIZE[0])).collect();
         let hole: Vec<bool> =

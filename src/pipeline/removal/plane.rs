@@ -10,24 +10,24 @@ use crate::math::stats::median;
 const TRIALS: usize = 600;
 /// Distance at which a point counts for a trial, in radii of the thing.
 const NEAR: f64 = 0.03;
-/// Share of all points that a plane must have.
+/// Least share of all points on a plane.
 const LEAST: f64 = 0.06;
-/// A point belongs to a plane within so many median distances, and within [`NEAR`] in any case.
+/// Median distances within which a point belongs to a plane; within [`NEAR`] it does in any case.
 const SPREAD: f64 = 4.0;
 
 /// A flat surface.
 #[derive(Clone, Debug)]
 pub(super) struct Plane {
-    /// A point of it.
+    /// A point of the plane.
     pub(super) origin: DVec3,
     /// Unit vectors along it; with [`Self::normal`] they are a rotation.
     pub(super) u: DVec3,
     pub(super) v: DVec3,
-    /// Toward the photos.
+    /// Unit normal, toward the photos.
     pub(super) normal: DVec3,
-    /// Median distance of the points that it goes through.
+    /// Median distance of its points.
     pub(super) residual: f64,
-    /// Up to this distance a point is on it.
+    /// Largest distance of a point on it.
     pub(super) tolerance: f64,
 }
 
@@ -45,7 +45,7 @@ impl Plane {
     }
 }
 
-/// The planes that go through most of the points beside a thing of this radius, the largest first.
+/// Returns the planes through most of the points beside a thing of this radius, the largest first.
 pub(super) fn planes(points: &[DVec3], toward: DVec3, radius: f64, most: usize, seed: u64) -> Vec<Plane> {
     let mut rng = Pcg32::seed_from_u64(seed);
     let (near, least) = (NEAR * radius, ((LEAST * points.len() as f64) as usize).max(12));
@@ -94,7 +94,7 @@ fn fitted(points: &[DVec3], plane: &Plane, toward: DVec3) -> Plane {
     }
     let m = DMat3::from_cols(DVec3::new(uu, uv, 0.0), DVec3::new(uv, vv, 0.0), DVec3::Z);
     if m.determinant() <= 1e-9 * uu * vv {
-        // All on a line: nothing better is known.
+        // All on a line: the trial's plane stays.
         return Plane { origin: middle, ..plane.clone() };
     }
     let slope = m.inverse() * DVec3::new(uh, vh, 0.0);

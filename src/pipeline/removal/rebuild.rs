@@ -6,10 +6,10 @@ use crate::math::sh::SH_C0;
 use crate::math::srgb::brighter;
 use crate::scene::{ExtraProperty, GaussianCloud, IdentityId};
 
-/// The extra property of Gaussians that were invented: 1, else 0.
+/// Extra property of Gaussians: 1 for invented ones, else 0.
 pub(crate) const INVENTED: &str = "fmlgs_invented";
 
-/// Which Gaussians were invented: 1, else 0; `None` if none was.
+/// Returns 1 for each invented Gaussian, else 0; `None` if there is none.
 pub(crate) fn invented_flags(cloud: &GaussianCloud) -> Option<&[f32]> {
     let flags = cloud.extras.iter().find(|e| e.name == INVENTED)?;
     flags.values.contains(&1.0).then_some(&flags.values)
@@ -22,7 +22,7 @@ const THICKNESS: f64 = 0.1;
 /// Opacity of 0.95, before the sigmoid.
 const OPACITY_LOGIT: f32 = 2.944;
 
-/// A Gaussian that closes a piece of a surface.
+/// Gaussian that closes a piece of a surface.
 pub(super) struct Invented {
     pub(super) position: DVec3,
     pub(super) rotation: DQuat,
@@ -32,7 +32,7 @@ pub(super) struct Invented {
     pub(super) identity: IdentityId,
 }
 
-/// The Gaussians at `kept`, and new ones.
+/// Returns the Gaussians at `kept`, and the new ones.
 pub(super) fn with_new(cloud: &GaussianCloud, kept: &[usize], new: &[Invented]) -> GaussianCloud {
     let mut all = cloud.select(kept);
     if !all.extras.iter().any(|e| e.name == INVENTED) {
@@ -55,12 +55,12 @@ pub(super) fn with_new(cloud: &GaussianCloud, kept: &[usize], new: &[Invented]) 
     all
 }
 
-/// The color of Gaussian `i`, mean over all directions.
+/// Returns the color of Gaussian `i`, mean over all directions.
 pub(super) fn shown(cloud: &GaussianCloud, i: usize) -> [f32; 3] {
     cloud.sh[i * cloud.sh_stride()].map(|v| 0.5 + SH_C0 as f32 * v)
 }
 
-/// Makes Gaussian `i` brighter from everywhere.
+/// Makes Gaussian `i` brighter from all directions.
 pub(super) fn brighten(cloud: &mut GaussianCloud, i: usize, gain: [f32; 3]) {
     let (stride, shown) = (cloud.sh_stride(), shown(cloud, i));
     let all = &mut cloud.sh[i * stride..(i + 1) * stride];

@@ -1,4 +1,4 @@
-//! A removal against the truth: where a thing was in a view, what it uncovered and what was invented there.
+//! Score of a removal against the truth: pixels of the thing in a view, uncovered ones and invented ones.
 
 use glam::DVec3;
 use serde::Serialize;
@@ -10,33 +10,33 @@ use crate::pipeline::depth::TrueDepth;
 use crate::render::{Frame, ssim};
 use crate::scene::Camera;
 
-/// Depths along one ray that differ by more than this share are those of two surfaces: rays are cast exactly.
+/// Relative difference from which depths along one ray are those of two surfaces: rays are cast exactly.
 const SAME_RAY: f32 = 1e-4;
 /// The same along two rays that meet a surface within a pixel of each other.
 const SAME_DEPTH: f32 = 0.005;
 
-/// A pixel of a view from which a thing was removed.
+/// Region of a pixel in a view from which a thing was removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum RemovalRegion {
-    /// The thing was not there.
+    /// No pixel of the thing.
     Outside,
-    /// Nor there, but its shadow or its light was.
+    /// No pixel of the thing, but with its shadow or its light.
     Shaded,
-    /// Beside it: the photo shows a little of both.
+    /// Beside the thing: the photo shows a little of both.
     Rim,
-    /// What was behind it is in another photo.
+    /// Hidden by the thing here, but visible in another photo.
     Uncovered,
-    /// It is in none.
+    /// Hidden by the thing in all photos.
     Invented,
 }
 
-/// Difference of a color from which a thing's shadow or light is seen there.
+/// Least difference of a color for a shadow or light of the thing.
 const SHADE: f64 = 3.0 / 255.0;
-/// Flat surfaces that are looked for behind a thing, and points that are looked at.
+/// Most flat surfaces behind a thing, and points sampled for them.
 const FLAT: usize = 3;
 const POINTS: usize = 4_000;
 
-/// Marks where colors with a thing and without differ though it was not there.
+/// Marks pixels outside the thing whose colors with and without it differ.
 pub(crate) fn mark_shaded(regions: &mut [RemovalRegion], with: &[Vec<f64>; 3], without: &[Vec<f64>; 3]) {
     for (i, region) in regions.iter_mut().enumerate().filter(|(_, r)| **r == RemovalRegion::Outside) {
         if (0..3).any(|c| (with[c][i] - without[c][i]).abs() > SHADE) {
@@ -45,8 +45,8 @@ pub(crate) fn mark_shaded(regions: &mut [RemovalRegion], with: &[Vec<f64>; 3], w
     }
 }
 
-/// The share of what is behind a thing in these views that lies on flat surfaces: cameras, regions, true depths with it
-/// and without.
+/// Returns the share of the scene behind a thing that lies on flat surfaces, by cameras, regions, and true depths
+/// with it and without.
 pub(crate) fn flat_share<'a>(
     views: impl Iterator<Item = (&'a Camera, &'a [RemovalRegion], &'a TrueDepth, &'a TrueDepth)>,
 ) -> f64 {
@@ -73,8 +73,8 @@ pub(crate) fn flat_share<'a>(
     on_one as f64 / points.len().max(1) as f64
 }
 
-/// Where the thing was in the view of `camera`, by true depths with it and without, and what of that the `photos` with
-/// it show. Depths have the cameras' sizes.
+/// Returns the regions of the view of `camera`: the thing's pixels by true depths with it and without, and those of
+/// them that the `photos` with it uncover. Depths have the cameras' sizes.
 pub(crate) fn regions(
     camera: &Camera,
     (with, without): (&TrueDepth, &TrueDepth),
@@ -88,7 +88,7 @@ pub(crate) fn regions(
             return RemovalRegion::Outside;
         }
         let at = glam::DVec2::new((i % with.width) as f64 + 0.5, (i / with.width) as f64 + 0.5);
-        // Nothing at all behind it is known to be nothing.
+        // An empty background is known to be empty.
         let point = camera.center + camera.ray(at) * f64::from(behind);
         let shows = |(photo, depth): &(Camera, TrueDepth)| {
             let Some(p) = photo.project(point) else { return false };
@@ -115,25 +115,25 @@ pub(crate) fn regions(
 pub(crate) struct Tally {
     pixels: usize,
     squares: f64,
-    /// SSIM of each view where only the region may differ, as that of the region, and its pixels.
+    /// SSIM of the region in each view, from images that may differ only there, and its pixels.
     ssim: Vec<(f64, usize)>,
-    /// Relative errors of depth; 1 where there is none.
+    /// Relative errors of depth; 1 for a missing depth.
     depth: Vec<f64>,
 }
 
-/// What a [`Tally`] says.
+/// Figures of a [`Tally`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub(crate) struct RegionScore {
     pub(crate) pixels: usize,
-    /// dB.
+    /// PSNR, dB.
     pub(crate) psnr: f64,
     pub(crate) ssim: f64,
-    /// Mean error of depth as a share of it.
+    /// Mean relative error of depth.
     pub(crate) depth: f64,
 }
 
 impl Tally {
-    /// Adds what a frame has where `regions` are `which`, against planes of the truth.
+    /// Adds the pixels of a frame in the region `which`, against planes of the truth.
     pub(crate) fn add(
         &mut self,
         frame: &Frame<f32>,
@@ -154,7 +154,7 @@ impl Tally {
             }
         }
         self.pixels += inside.len();
-        // Elsewhere nothing differs, so all that the mean lacks is the region's.
+        // Elsewhere nothing differs, so the whole loss of the mean is the region's.
         let lacks = (1.0 - ssim(&drawn, truth, frame.width_px)) * regions.len() as f64 / inside.len() as f64;
         self.ssim.push((1.0 - lacks, inside.len()));
         for (i, want) in inside.iter().filter_map(|&i| Some((i, depth?.values[i]))).filter(|(_, want)| *want > 0.0) {
@@ -163,7 +163,7 @@ impl Tally {
         }
     }
 
-    /// `None` where no view has the region.
+    /// Returns the score; `None` if no view has the region.
     pub(crate) fn score(&self) -> Option<RegionScore> {
         (self.pixels > 0).then(|| RegionScore {
             pixels: self.pixels,

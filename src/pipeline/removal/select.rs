@@ -1,4 +1,4 @@
-//! Which Gaussians go: those of the thing, its fringes, and what nobody ever saw and would be in sight then.
+//! Selection of the Gaussians to remove: those of the thing, its fringes, and unseen ones that would come in sight.
 
 use std::collections::HashMap;
 
@@ -11,24 +11,24 @@ use super::RemovalError;
 use super::extent::{Ball, MORE, ThingExtent};
 use super::views::TOUCHED;
 
-/// Share of a pixel from which a Gaussian is seen there.
+/// Least share of a pixel for a Gaussian to be seen there.
 const SEEN: f32 = 0.05;
-/// Side at which that is looked at, px.
+/// Longer side of the views in which that is measured, px.
 const SIDE_PX: u32 = 320;
-/// A Gaussian that is so many radii away from its object is not of it.
+/// Distance from its object at which a Gaussian is stray, in radii.
 const STRAY: f64 = 1.5;
-/// Identities that are less sure than this may be those of a neighbor.
+/// Margin below which a Gaussian may belong to a neighbor.
 const UNSURE: f32 = 0.3;
 
-/// The Gaussians of these identities and their pieces.
+/// Returns the Gaussians of these identities and their pieces.
 pub(crate) fn members(map: &SemanticMap, ids: &[IdentityId]) -> Vec<bool> {
     let mut inside = vec![false; map.identity_of.len()];
     ids.iter().flat_map(|id| map.members(*id)).for_each(|i| inside[i] = true);
     inside
 }
 
-/// Adds what lies within the thing and is nobody's for sure or nobody's at all, and what is near and said to be of an
-/// object that is elsewhere; how many those are.
+/// Adds Gaussians within the thing that are unlabeled or uncertain, and near ones with the label of a distant object;
+/// returns their number.
 pub(super) fn add_fringes(
     cloud: &GaussianCloud,
     map: &SemanticMap,
@@ -51,8 +51,8 @@ pub(super) fn add_fringes(
     found.len()
 }
 
-/// Gaussians that no photo has seen and that are in sight where the thing was once it is `gone` and the `new` ones are
-/// there: nothing says what they should look like.
+/// Returns Gaussians that no photo has seen and that come in sight in the thing's place without the `gone` ones and
+/// with the `new` ones: their looks are undefined.
 pub(super) fn unseen(
     cloud: &GaussianCloud,
     gone: &[bool],
@@ -83,18 +83,18 @@ pub(super) fn unseen(
     Ok(kept.into_iter().zip(after).filter(unseen).map(|f| f.0).collect())
 }
 
-/// Where weights are counted.
+/// Pixels at which weights are counted.
 enum Look<'a> {
-    /// Everywhere; how much of each pixel is `gone` is noted.
+    /// All pixels; the share of `gone` Gaussians in each is recorded.
     At { gone: &'a [bool], width: usize },
-    /// Where the thing had a share of the pixel.
+    /// Pixels in which the thing had a share.
     Behind { thing: &'a [f32], width: usize },
 }
 
 /// A row of tiles.
 struct Row<'a> {
     look: Look<'a>,
-    /// The largest share of a pixel of each Gaussian; one may stand there several times.
+    /// Largest share of a pixel of each Gaussian, which may be listed several times.
     largest: Vec<(u32, f32)>,
     /// The thing's share of each pixel.
     thing: Vec<f32>,

@@ -1,9 +1,9 @@
-//! The shadow that a thing casts on a flat surface, and how bright the surface is without it.
+//! Shadow of a thing on a flat surface, and the brightness of the surface without it.
 //!
-//! What a matt surface of one color shows is its light less what stands in the way of it. What stands in the way along a
-//! direction is known, for it is made of Gaussians; how much light comes along each is found from the brightness of
-//! the surface around ([`light`]), first from everywhere, then ever finer about where most comes from. So the shadow of
-//! the thing is told from those of others, and from stains. What cannot be explained by its shadow stays.
+//! A matt surface of one color shows its light minus the occluded light. The occlusion along a direction is known,
+//! because it is made of Gaussians. The light along each direction is fitted to the brightness of the surrounding
+//! surface ([`light`]), first from everywhere, then ever finer about the strongest directions. So the shadow of the
+//! thing is distinguished from those of others, and from stains. Differences that its shadow cannot explain stay.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -14,52 +14,52 @@ use super::sheet::{SurfaceSheet, Texel};
 use crate::math::srgb;
 use crate::math::stats::quantile;
 
-/// Directions of the first round, over the half of all that a surface sees.
+/// Directions of the first round, over the hemisphere above the surface.
 const DIRECTIONS: usize = 64;
 /// Least cosine to the normal: shadows of grazing light are long and faint.
 const LEAST_COSINE: f64 = 0.2;
 /// Rounds in which directions with much light are divided, and the share of the light that is much.
 const FINER_ROUNDS: usize = 3;
 const MUCH: f64 = 0.06;
-/// Texels of the surface that are needed.
+/// Least number of texels of the surface.
 const LEAST_TEXELS: usize = 200;
-/// Share of light from which a texel is in the thing's shadow.
+/// Least share of light that the thing blocks from a texel in its shadow.
 const SHADED: f64 = 0.03;
-/// The shadow is believed if with it less than this share of the squared differences in it, beyond what is usual beside
-/// it, is left.
+/// Largest share of the squared differences in the shadow, beyond the usual ones beside it, that a credible shadow
+/// leaves unexplained.
 const EXPLAINED: f64 = 0.7;
-/// How much brighter a surface may become at most, what is too little to be seen, and texels that a shadow has.
+/// Largest gain of a surface, least visible gain, and least texels of a shadow.
 const MOST: f32 = 6.0;
 const LEAST_GAIN: f32 = 1.03;
 const LEAST_SHADED: usize = 12;
-/// What counts as the brightest of a surface: this quantile of what it shows as a share of what was fitted, at most the
-/// second number.
+/// Brightest light of a surface: this quantile of its values as a share of the fitted ones, at most the second
+/// number.
 const BRIGHTEST: (f64, f64) = (0.95, 2.0);
 /// Linear light that counts as black.
 const DARK: f32 = 1e-4;
 
-/// Something opaque over the surface.
+/// Opaque Gaussian over the surface.
 pub(super) struct Occluder {
     pub(super) at: DVec3,
     pub(super) radius: f64,
-    /// Whether it is of the thing.
+    /// True if it belongs to the thing.
     pub(super) is_thing: bool,
 }
 
-/// Bits of what stands in the way.
+/// Bits of the occluders.
 const OTHERS: u8 = 1;
 const THING: u8 = 2;
 
-/// By how much each texel of a sheet is brighter without a thing, in linear light.
+/// Gain of each texel of a sheet without the thing, in linear light.
 pub(super) struct Brightening<'a> {
     sheet: &'a SurfaceSheet<'a>,
     gain: Vec<[f32; 3]>,
-    /// Linear light of the brightest that the surface shows without the shadow: what is brighter is something else.
+    /// Brightest linear light of the surface without the shadow: brighter texels are something else.
     bound: Vec<[f32; 3]>,
 }
 
 impl<'a> Brightening<'a> {
-    /// `None` where no shadow is found. `same` = texels that are of one material.
+    /// Finds the shadow; `None` if there is none. `same` = texels of one material.
     pub(super) fn find(
         plane: &Plane,
         sheet: &'a SurfaceSheet<'a>,
@@ -97,11 +97,11 @@ impl<'a> Brightening<'a> {
         let gain = |i: usize| Some([0, 1, 2].map(|c| found[c].0[i])).filter(|g| g.iter().any(|g| *g >= LEAST_GAIN));
         let gain: Vec<[f32; 3]> = (0..n).map(|i| gain(i).unwrap_or([1.0; 3])).collect();
         let bound = (0..n).map(|i| [0, 1, 2].map(|c| found[c].1[i])).collect();
-        // So few are noise.
+        // Fewer texels are noise.
         (gain.iter().filter(|g| **g != [1.0; 3]).count() >= LEAST_SHADED).then_some(Self { sheet, gain, bound })
     }
 
-    /// How much brighter what has this color is at a point of the surface; 1 beyond the sheet.
+    /// Gain of this color at a point of the surface; 1 beyond the sheet.
     pub(super) fn at(&self, point: DVec3, rgb: [f32; 3]) -> [f32; 3] {
         let sample = |of: &[[f32; 3]]| self.sheet.sample(point, |i| of[i]);
         let (Some(gain), Some(bound)) = (sample(&self.gain), sample(&self.bound)) else { return [1.0; 3] };
@@ -110,17 +110,17 @@ impl<'a> Brightening<'a> {
     }
 }
 
-/// A surface of one material, and what stands in the way of its light.
+/// A surface of one material, and the occluders of its light.
 struct LitSurface<'a> {
     plane: &'a Plane,
     sheet: &'a SurfaceSheet<'a>,
     occluders: &'a [Occluder],
-    /// Its texels that are fitted to.
+    /// Texels that the light is fitted to.
     rows: Vec<usize>,
 }
 
 impl LitSurface<'_> {
-    /// The directions along which light comes, and how much each row counts.
+    /// Returns the directions of the light, and the weight of each row.
     fn directions(&self, values: &[f32]) -> (Vec<Shadow>, Vec<f64>) {
         let mut about = self.shadows(&hemisphere(self.plane));
         let mut spacing = (std::f64::consts::TAU * (1.0 - LEAST_COSINE) / DIRECTIONS as f64).sqrt();
@@ -150,7 +150,7 @@ impl LitSurface<'_> {
         directions.par_iter().map(one).collect()
     }
 
-    /// What the brightness of the rows is made of, if `which` stand in the way.
+    /// Returns the columns that compose the brightness of the rows, with the occluders `which`.
     fn columns(&self, shadows: &[Shadow], which: u8) -> Vec<Vec<f32>> {
         let rows = &self.rows;
         let base = (0..light::FREE).map(|k| rows.iter().map(|&i| base(self.sheet, i)[k] as f32).collect());
@@ -158,7 +158,7 @@ impl LitSurface<'_> {
         base.chain(shadows.iter().map(shade)).collect()
     }
 
-    /// The brightness of each texel, if `which` stand in the way.
+    /// Returns the brightness of each texel, with the occluders `which`.
     fn brightness(&self, about: &[Shadow], weights: &[f64], which: u8) -> Vec<f64> {
         let at = |i: usize| {
             let base: f64 = base(self.sheet, i).iter().zip(weights).map(|(b, w)| b * w).sum();
@@ -168,7 +168,7 @@ impl LitSurface<'_> {
         (0..self.sheet.state.len()).map(at).collect()
     }
 
-    /// Whether the thing's shadow explains what is darker in it.
+    /// Returns whether the thing's shadow explains the darker texels in it.
     fn is_explained(&self, about: &[Shadow], values: &[f32], counts: &[f64]) -> bool {
         let [all, others] = [THING | OTHERS, OTHERS].map(|which| self.columns(about, which));
         let weights = light::solve(&all, values, counts);
@@ -178,13 +178,13 @@ impl LitSurface<'_> {
             without[i] - with[i] > SHADED * without[i].abs()
         };
         let inside: Vec<bool> = (0..self.rows.len()).map(|k| in_shadow(&k)).collect();
-        // Summed squares where `is` the shadow, and what they count.
+        // Sums the weighted squares of the rows inside the shadow, or outside of it, and their weights.
         let squares = |off: &[f64], is: bool| -> (f64, f64) {
             let of = (0..off.len()).filter(|k| inside[*k] == is);
             of.fold((0.0, 0.0), |(sum, n), k| (sum + counts[k] * off[k] * off[k], n + counts[k]))
         };
         let with = light::residuals(&all, values, &weights);
-        // Grain is there with a shadow and without.
+        // Grain exists in the shadow and beside it.
         let (beside, of) = squares(&with, false);
         let left = |off: &[f64]| -> f64 {
             let (sum, n) = squares(off, true);
@@ -196,14 +196,14 @@ impl LitSurface<'_> {
     }
 }
 
-/// What the brightness of an evenly lit surface is made of: as much everywhere, and changes along it.
+/// Terms of the brightness of an evenly lit surface: a constant, and changes along the surface up to squares.
 fn base(sheet: &SurfaceSheet<'_>, i: usize) -> [f64; light::FREE] {
     let part = |at: usize, length: usize| at as f64 / length.max(1) as f64 - 0.5;
     let (x, y) = (part(i % sheet.size[0], sheet.size[0]), part(i / sheet.size[0], sheet.size[1]));
     [1.0, x, y, x * x, x * y, y * y]
 }
 
-/// What stands in the way of light from one direction, for each texel.
+/// Occluders of the light from one direction, for each texel.
 struct Shadow {
     toward: DVec3,
     bits: Vec<u8>,
@@ -233,7 +233,7 @@ fn blocked(plane: &Plane, sheet: &SurfaceSheet<'_>, toward: DVec3, occluders: &[
                 }
             }
         }
-        // Smaller than a texel, it is in one all the same.
+        // An occluder smaller than a texel still lies in one.
         if (0.0..width).contains(&x) && (0.0..height).contains(&y) {
             bits[y as usize * sheet.size[0] + x as usize] |= bit;
         }
@@ -241,7 +241,7 @@ fn blocked(plane: &Plane, sheet: &SurfaceSheet<'_>, toward: DVec3, occluders: &[
     bits
 }
 
-/// Directions spread evenly over the half that the surface sees.
+/// Returns directions spread evenly over the hemisphere above the surface.
 fn hemisphere(plane: &Plane) -> Vec<DVec3> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let one = |k: usize| {
@@ -253,7 +253,7 @@ fn hemisphere(plane: &Plane) -> Vec<DVec3> {
     (0..DIRECTIONS).map(one).collect()
 }
 
-/// Six directions at an angle about one.
+/// Returns six directions at an angle about one.
 fn around(toward: DVec3, angle: f64) -> impl Iterator<Item = DVec3> {
     let (a, b) = toward.any_orthonormal_pair();
     (0..6).map(move |k| {
@@ -262,7 +262,7 @@ fn around(toward: DVec3, angle: f64) -> impl Iterator<Item = DVec3> {
     })
 }
 
-/// The mean with the neighbors, twice: shadows have soft edges.
+/// Averages with the neighbors along both axes: shadows have soft edges.
 fn blurred(values: Vec<f32>, size: [usize; 2]) -> Vec<f32> {
     let [width, height] = size;
     let pass = |values: &[f32], stride: usize, length: usize, at: fn(usize, usize) -> usize| -> Vec<f32> {

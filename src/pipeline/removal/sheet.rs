@@ -1,4 +1,4 @@
-//! A piece of a plane in texels, each of which asks the photos whether it is seen, hidden or empty space.
+//! A piece of a plane in texels, each of which is seen, hidden or empty by the photos.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -13,40 +13,39 @@ use crate::math::stats::median;
 use crate::models::ModelError;
 use crate::models::lama::Lama;
 
-/// Texels along a side: of the first look, and of a sheet at most.
+/// Texels along a side: of the coarse sheet, and of a fine sheet at most.
 const FIRST: usize = 96;
 const MOST: usize = 400;
-/// What is seen around a hole, to be painted from, as a share of its larger side.
+/// Visible margin around a hole to paint from, as a share of its larger side.
 const MARGIN: f64 = 0.75;
-/// Views that look along the surface say little: least cosine.
+/// Least cosine of a view: those along the surface say little.
 const LEAST_COSINE: f64 = 0.1;
-/// Photos that must agree that a texel is seen, or that they look through it.
+/// Least number of photos that see a texel, or see through it.
 const AGREE: u32 = 2;
-/// Holes below this many texels, or this share of the largest, are noise.
+/// Least texels of a hole, and least share of the largest one; smaller holes are noise.
 const SPECK: (usize, f64) = (12, 0.02);
-/// Texels around a hole whose color the thing's rim may have touched: they are painted, too.
+/// Texels around a hole that are painted, too, because the thing's rim may have touched their color.
 const RIM: usize = 2;
 
-/// How far around a hole the thing's foot and the shadow at it may reach, as a share of the hole's diameter.
+/// Reach of the thing's foot and its shadow around a hole, as a share of the hole's diameter.
 const FOOT: f64 = 0.25;
-/// What lies there and differs from the surface by more than this, and by more than so many times what the surface
-/// differs from itself, is not surface.
+/// Least difference of a foot's color from the surface, absolute and as a multiple of the surface's own variation.
 const DIFFERENT: (f32, f32) = (0.03, 4.0);
 
-/// What the photos say of a texel.
+/// State of a texel by the photos.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Texel {
-    /// Nothing, or that something else is in front of it.
+    /// Not seen, or hidden by something else.
     Unknown,
-    /// It is surface.
+    /// Surface is seen.
     Seen,
-    /// They look through it.
+    /// Empty: the photos look through it.
     Free,
-    /// The thing was in front of it in all of them.
+    /// Hidden by the thing in all of them.
     Hidden,
 }
 
-/// Texels row by row.
+/// Texels in row-major order.
 pub(super) struct SurfaceSheet<'a> {
     plane: &'a Plane,
     /// Place of the first texel's corner along the plane.
@@ -55,14 +54,14 @@ pub(super) struct SurfaceSheet<'a> {
     pub(super) step: f64,
     pub(super) size: [usize; 2],
     pub(super) state: Vec<Texel>,
-    /// Of what is seen; after painting, of what is hidden as well.
+    /// Colors of seen texels; after painting, of hidden ones as well.
     pub(super) color: Vec<[f32; 3]>,
-    /// Hidden texels that have none but hidden ones around them.
+    /// Hidden texels with none but hidden ones around them.
     deep: Vec<bool>,
 }
 
 impl<'a> SurfaceSheet<'a> {
-    /// The plane as far as `reach` radii around the thing, in coarse texels.
+    /// Samples the plane up to `reach` radii around the thing, in coarse texels.
     pub(super) fn around(plane: &'a Plane, ball: &Ball, seen: &[SeenView], reach: f64) -> Self {
         let middle = ball.center - plane.origin;
         let side = 2.0 * reach * ball.radius;
@@ -70,8 +69,8 @@ impl<'a> SurfaceSheet<'a> {
         Self::looked_at(plane, corner, side / FIRST as f64, [FIRST; 2], seen)
     }
 
-    /// The part of this sheet that the thing in `ball` hid from all views, in fine texels, with what is seen around it;
-    /// `None` if it hid nothing.
+    /// Returns the part of this sheet that the thing in `ball` hid from all views, in fine texels, with its visible
+    /// surroundings; `None` if it hid nothing.
     pub(super) fn hidden_part(&self, ball: &Ball, seen: &[SeenView]) -> Option<Self> {
         let (plane, step) = (self.plane, self.step);
         let hidden = || (0..self.state.len()).filter(|i| self.state[*i] == Texel::Hidden);
@@ -100,8 +99,8 @@ impl<'a> SurfaceSheet<'a> {
         sheet
     }
 
-    /// Opens what is hidden but nearer to empty space than to surface, as behind an edge; what has more empty space than
-    /// surface around it, as below a table that is removed, whose own surface it is; and specks.
+    /// Opens hidden areas nearer to empty space than to surface, as behind an edge; areas with more empty space than
+    /// surface around them, as below a removed table, whose own surface they are; and specks.
     fn clean(&mut self) {
         let (width, n) = (self.size[0], self.state.len());
         let known = (0..n).filter_map(|i| match self.state[i] {
@@ -121,7 +120,7 @@ impl<'a> SurfaceSheet<'a> {
             }
         }
         let count = |state: Texel| self.state.iter().filter(|s| **s == state).count();
-        // More is hidden than seen: below a table that is removed there are feet of what stood on it, and no surface.
+        // More is hidden than seen: below a removed table there are feet of things that stood on it, and no surface.
         let is_none = count(Texel::Hidden) > count(Texel::Seen);
         let is_open = |of: usize| is_none || of == 0 || areas[of - 1] < least || border[of][0] <= border[of][1];
         for i in 0..n {
@@ -141,8 +140,8 @@ impl<'a> SurfaceSheet<'a> {
         self.deep = grid::grown(self.size[0], open, RIM).iter().map(|open| !open).collect();
     }
 
-    /// Takes the thing's foot and the shadow at it, which are seen, for hidden: what is beside a hole and has another
-    /// color than the surface has farther away.
+    /// Marks the thing's foot and the shadow at it as hidden: seen texels beside a hole with another color than the
+    /// surface has farther away.
     pub(super) fn add_foot(&mut self) {
         let (width, n) = (self.size[0], self.state.len());
         let hidden = self.hidden();
@@ -156,13 +155,13 @@ impl<'a> SurfaceSheet<'a> {
             return;
         }
         let limit = DIFFERENT.0.max(DIFFERENT.1 * median(&usual) as f32);
-        // What stands low on the surface there hides it, too.
+        // Low parts of things hide the surface there, too.
         let is_foot = |i: usize| match self.state[i] {
             Texel::Seen => beside[i] && off(i) > limit,
             Texel::Unknown => beside[i],
             _ => false,
         };
-        // From the hole outward: what differs farther away is something else.
+        // From the hole outward: different colors farther away are something else.
         let from = (0..n).filter(|i| hidden[*i]).map(|i| (i, ()));
         let reached = grid::spread(width, n, from, is_foot);
         for i in (0..n).filter(|i| reached[*i].is_some()) {
@@ -171,19 +170,19 @@ impl<'a> SurfaceSheet<'a> {
         self.find_deep();
     }
 
-    /// The middle of texel `i` in the world.
+    /// Returns the center of texel `i` in the world.
     pub(super) fn center(&self, i: usize) -> DVec3 {
         let at = |axis: usize, t: usize| self.corner[axis] + (t as f64 + 0.5) * self.step;
         self.plane.origin + self.plane.u * at(0, i % self.size[0]) + self.plane.v * at(1, i / self.size[0])
     }
 
-    /// Where a point is along the sheet, in texels.
+    /// Returns the place of a point along the sheet, in texels.
     pub(super) fn place(&self, p: DVec3) -> [f64; 2] {
         let d = p - self.plane.origin;
         [(d.dot(self.plane.u) - self.corner[0]) / self.step, (d.dot(self.plane.v) - self.corner[1]) / self.step]
     }
 
-    /// What the four texels around a point have, mixed; `None` beyond the sheet.
+    /// Interpolates the values of the four texels around a point; `None` beyond the sheet.
     pub(super) fn sample(&self, p: DVec3, of: impl Fn(usize) -> [f32; 3]) -> Option<[f32; 3]> {
         self.texel(p)?;
         let [x, y] = self.place(p).map(|t| t - 0.5);
@@ -198,32 +197,32 @@ impl<'a> SurfaceSheet<'a> {
         Some(sum)
     }
 
-    /// Makes what is seen brighter.
+    /// Makes the seen texels brighter.
     pub(super) fn brighten(&mut self, gain: impl Fn(DVec3, [f32; 3]) -> [f32; 3]) {
         for i in (0..self.state.len()).filter(|i| self.state[*i] == Texel::Seen).collect::<Vec<_>>() {
             self.color[i] = brighter(self.color[i], gain(self.center(i), self.color[i]));
         }
     }
 
-    /// The texel below or above a point.
+    /// Returns the texel below or above a point.
     pub(super) fn texel(&self, p: DVec3) -> Option<usize> {
         let [x, y] = self.place(p).map(f64::floor);
         let inside = x >= 0.0 && y >= 0.0 && x < self.size[0] as f64 && y < self.size[1] as f64;
         inside.then(|| y as usize * self.size[0] + x as usize)
     }
 
-    /// Whether a texel and all around it are hidden.
+    /// Returns whether a texel and all around it are hidden.
     pub(super) fn is_deep(&self, texel: usize) -> bool {
         self.deep[texel]
     }
 
-    /// The texels that become Gaussians: what is hidden, and a seam around it.
+    /// Returns the texels that become Gaussians: the hidden ones, and a seam around them.
     pub(super) fn hole(&self) -> impl Iterator<Item = usize> + '_ {
         let grown = grid::grown(self.size[0], self.hidden(), 1);
         (0..grown.len()).filter(move |&i| grown[i] && matches!(self.state[i], Texel::Hidden | Texel::Seen))
     }
 
-    /// Gives what is hidden a color; by the network, if there is one.
+    /// Paints the hidden texels, by the network if there is one.
     pub(super) fn paint(&mut self, how: Paint, seed: u64, network: Option<&mut Lama>) -> Result<(), ModelError> {
         let hole = grid::grown(self.size[0], self.hidden(), RIM);
         let known: Vec<bool> = (0..hole.len()).map(|i| self.state[i] == Texel::Seen && !hole[i]).collect();
@@ -248,7 +247,7 @@ fn pixel_size(plane: &Plane, ball: &Ball, seen: &[SeenView]) -> f64 {
     if sizes.is_empty() { ball.radius / 64.0 } else { median(&sizes) }
 }
 
-/// What the views say of a point of the plane, and its color.
+/// Returns the state of a point of the plane by the views, and its color.
 fn asked(plane: &Plane, point: DVec3, seen: &[SeenView], agree: u32) -> (Texel, [f32; 3]) {
     let (mut shown, mut free, mut exposed) = (0, 0, false);
     let (mut color, mut total) = ([0.0_f64; 3], 0.0);
@@ -259,7 +258,7 @@ fn asked(plane: &Plane, point: DVec3, seen: &[SeenView], agree: u32) -> (Texel, 
         if !(cosine.abs() >= LEAST_COSINE) {
             continue;
         }
-        // On the side of the eye.
+        // Positive on the side of the camera.
         let height = |depth: f32| plane.height(view.point(i, depth)) * cosine.signum();
         let covered = view.thing[i] >= TOUCHED;
         let depth = if covered { view.after[i] } else { view.before[i] };

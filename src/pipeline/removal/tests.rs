@@ -12,8 +12,8 @@ use crate::scene::{Identities, Level, NOBODY};
 const TABLE: IdentityId = 1;
 const BOX: IdentityId = 2;
 
-/// A table of 4 x 4 units at height 0 whose color rises along x, and a dark box of 0.8 units on it, below which there
-/// is nothing: no photo saw that. Without the box the table is whole.
+/// A table of 4 x 4 units at height 0 whose color rises along x, and a dark box of 0.8 units on it. Below the box
+/// there is nothing, since no photo saw that area. Without the box the table is whole.
 fn scene(is_bare: bool) -> (GaussianCloud, SemanticMap, Vec<Camera>) {
     let spacing = 0.04;
     let (mut places, mut colors, mut of) = (Vec::new(), Vec::new(), Vec::new());
@@ -64,7 +64,7 @@ fn removed(paint: Option<Paint>) -> (SemanticMap, Removed) {
     (map, done)
 }
 
-/// Mean difference of color and depth from the bare table where the box stood on it, in views between the photos.
+/// Mean difference of color and depth from the bare table in the box's place, in views between the photos.
 fn off(cloud: &GaussianCloud) -> (f64, f64) {
     let settings = RenderSettings { depth: true, ..RenderSettings::default() };
     let (mut color, mut depth, mut n) = (0.0, 0.0, 0.0);

@@ -1,4 +1,4 @@
-//! What the photos' cameras see of a scene, with a thing and without.
+//! Views of the photos' cameras with a thing and without.
 
 use glam::{DVec2, DVec3};
 
@@ -9,21 +9,21 @@ use crate::pipeline::observer::{Observer, Ticker};
 use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud};
 
-/// Cameras that are asked at most, and the side of their pictures, px.
+/// Most cameras that are rendered, and the side of their pictures, px.
 const MOST: usize = 48;
 const SIDE_PX: u32 = 512;
-/// Share of a pixel from which the thing covers it, and up to which it has nothing to do with it.
+/// Least share of a pixel that the thing covers, and largest share of a pixel that it does not touch.
 pub(super) const COVERED: f32 = 0.5;
 pub(super) const TOUCHED: f32 = 0.05;
-/// Points around the thing that are taken of each view at most.
+/// Most points around the thing per view.
 const POINTS: usize = 400;
 
-/// Pixels row by row.
+/// Pixels in row-major order.
 pub(super) struct SeenView {
     pub(super) camera: Camera,
-    /// Share of each pixel that the thing has.
+    /// Share of the thing in each pixel.
     pub(super) thing: Vec<f32>,
-    /// Depth with it, along the camera's axis; 0 = nothing there.
+    /// Depth with it, along the camera's axis; 0 = empty.
     pub(super) before: Vec<f32>,
     /// Depth without it.
     pub(super) after: Vec<f32>,
@@ -32,7 +32,7 @@ pub(super) struct SeenView {
 }
 
 impl SeenView {
-    /// The pixel that shows a point in front of the camera.
+    /// Returns the pixel that shows a point in front of the camera.
     pub(super) fn pixel(&self, point: DVec3) -> Option<usize> {
         let DVec2 { x, y } = self.camera.project(point)?;
         let (w, h) = (f64::from(self.camera.width_px), f64::from(self.camera.height_px));
@@ -40,7 +40,7 @@ impl SeenView {
             .then(|| y as usize * self.camera.width_px as usize + x as usize)
     }
 
-    /// The point at this depth behind a pixel.
+    /// Returns the point at this depth behind a pixel.
     pub(super) fn point(&self, pixel: usize, depth: f32) -> DVec3 {
         let w = self.camera.width_px as usize;
         let at = DVec2::new((pixel % w) as f64 + 0.5, (pixel / w) as f64 + 0.5);
@@ -48,7 +48,7 @@ impl SeenView {
     }
 }
 
-/// The photos that look at a thing, spread over all.
+/// Returns the cameras that see a thing, spread over all of them.
 pub(super) fn choose(photos: &[Camera], ball: &Ball) -> Vec<Camera> {
     let sees = |camera: &&Camera| {
         let depth = camera.camera_from_world(ball.center).z;
@@ -64,7 +64,7 @@ pub(super) fn choose(photos: &[Camera], ball: &Ball) -> Vec<Camera> {
     (0..n).map(|k| all[k * all.len() / n].clone()).collect()
 }
 
-/// Looks at the scene with what is `gone` and without.
+/// Renders the scene with the `gone` Gaussians and without.
 pub(super) fn look(
     cloud: &GaussianCloud,
     gone: &[bool],
@@ -96,7 +96,7 @@ pub(super) fn look(
     Ok(seen)
 }
 
-/// Points of surfaces beside the thing in the photos, at most `reach` radii away from it.
+/// Returns points of surfaces beside the thing in the photos, at most `reach` radii away from it.
 pub(super) fn around(seen: &[SeenView], ball: &Ball, reach: f64) -> Vec<DVec3> {
     let of_view = |view: &SeenView| -> Vec<DVec3> {
         let width = view.camera.width_px as usize;

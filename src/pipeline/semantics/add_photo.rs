@@ -1,14 +1,14 @@
-//! What one more photo shows, added to objects and parts that are known: what is somebody's stays.
+//! Adds the objects and parts of one more photo to a known map; labeled Gaussians keep their labels.
 
 use super::edit::add;
 use super::tracker::Tracked;
 use super::votes::UNKNOWN;
 use crate::scene::{IdentityId, NOBODY, Photo, SemanticMap};
 
-/// Gaussians of which a new object or part consists at least.
+/// Least number of Gaussians of a new object or part.
 const LEAST: usize = 4;
 
-/// The map that is `known` with what was `tracked` beginning with it.
+/// Returns the map `known` with the identities of `tracked` added to it.
 pub(crate) fn joined(known: &SemanticMap, tracked: &Tracked, photos: &[Photo]) -> SemanticMap {
     let mut map = known.clone();
     let all = &tracked.identities;
@@ -18,7 +18,7 @@ pub(crate) fn joined(known: &SemanticMap, tracked: &Tracked, photos: &[Photo]) -
     for (i, assignment) in free.filter(|(_, a)| a.identity != UNKNOWN) {
         own[assignment.identity as usize].push(i);
     }
-    // New ones by their numbers in the map; wholes come before their pieces.
+    // New numbers in the map; wholes come before their pieces.
     let mut number: Vec<IdentityId> = (0..=old).collect();
     for (id, identity) in all.iter().skip(old as usize) {
         let inside = all.descendants(id);
@@ -51,7 +51,7 @@ pub(crate) fn joined(known: &SemanticMap, tracked: &Tracked, photos: &[Photo]) -
     map
 }
 
-/// In words, what came to a map.
+/// Describes in words the additions to a map.
 pub(crate) fn told(known: &SemanticMap, map: &SemanticMap) -> String {
     let new = map.identities.len() - known.identities.len();
     let count = |is: &dyn Fn(usize) -> bool| (0..map.identity_of.len()).filter(|i| is(*i)).count();

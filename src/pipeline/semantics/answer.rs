@@ -1,5 +1,5 @@
-//! One query, answered: by names where there are any, else by embedding. Where names decide, what looks alike is only
-//! offered, unless an encoder of photos (CLIP) says it.
+//! Answers to one query: by names if there are any, else by embedding. If names decide, identities that merely look
+//! alike are offered, unless the encoder knows photos (CLIP).
 
 use std::time::Instant;
 
@@ -22,9 +22,9 @@ use crate::scene::{Identities, IdentityId, LanguageFeatures, LevelFilter, Mask};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Basis {
-    /// Names that people or label files gave.
+    /// Names given by people or label files.
     Names,
-    /// What identities look like to an encoder.
+    /// Embeddings that an encoder made of the identities.
     Embedding,
 }
 
@@ -33,31 +33,31 @@ pub(crate) enum Basis {
 pub struct QueryAnswer {
     pub(crate) answer: Answer,
     pub(crate) basis: Basis,
-    /// What looks most like the question where names have no answer, best first: an offer, no answer.
+    /// Identities that look most like the query when names have no answer, best first; offers, not answers.
     pub(crate) alike: Vec<Hit>,
-    /// Whether the encoder is the small one that comes with the program, which is sure of nothing.
+    /// True if the encoder is the small one that comes with the program, whose answers are never certain.
     pub(crate) is_rough: bool,
     /// Relevancy of every identity by number, 0 to 1; a piece is at least as relevant as its whole
     /// where names decide.
     pub(crate) relevancy: Vec<f32>,
-    /// How long that took: relevancy and localization here, the other stages by those who go on.
+    /// Milliseconds of relevancy and localization; the caller adds the other stages.
     pub(crate) stages: StagesMs,
-    /// How it was answered.
+    /// Recipe of the answer.
     pub(crate) recipe: Recipe,
 }
 
-/// Features and encoded phrases for answers by meaning.
+/// Features and encoded phrases for answers by embedding.
 #[derive(Clone, Copy)]
 pub(crate) struct Language<'a> {
     pub(crate) features: &'a LanguageFeatures,
-    /// With the query's phrases learned.
+    /// Embeddings of phrases, those of the query included.
     pub(crate) phrases: &'a TextEmbeddings,
-    /// The words of the query that the encoder does not know and left out.
+    /// Words of the query that the encoder does not know and left out.
     pub(crate) unknown: &'a [String],
 }
 
-/// Answers as the recipe says: by names, by embedding where names have no answer and the encoder may give one, or by one
-/// of them alone.
+/// Answers by the recipe: by names, by embedding if names have no answer and the encoder may give one, or by one of
+/// the two alone.
 pub(crate) fn answer(
     identities: &Identities,
     reading: &QueryReading,
@@ -80,7 +80,7 @@ pub(crate) fn answer(
     if known && !nothing(&named.answer) {
         return named;
     }
-    // Something always looks most like it.
+    // By embedding, there is always an identity that looks most like the phrase.
     if nothing(&named.answer) && names::was_removed(identities, &phrase.text) {
         return named;
     }
@@ -91,7 +91,7 @@ pub(crate) fn answer(
     if is_strict {
         meant.answer = grounded(identities, phrase, language, meant.answer);
     }
-    // Both were looked at, whichever is taken.
+    // Both were computed, whichever is taken.
     let stages = named.stages.and(meant.stages);
     let taken = match (nothing(&meant.answer), nothing(&named.answer)) {
         (false, _) if is_strict && !may_answer(identities, language.features) => QueryAnswer { alike, ..named },
@@ -102,14 +102,14 @@ pub(crate) fn answer(
     QueryAnswer { stages, ..taken }
 }
 
-/// Whether an encoder answers by itself: where nothing has a name, or if it knows photos. To the small one that comes
-/// with the program, everything that it does not know looks like something that it knows (docs/measured.md).
+/// Returns whether an encoder may answer by itself: if nothing has a name, or if it knows photos. To the small
+/// encoder that comes with the program, everything unknown looks like something known (docs/measured.md).
 pub(crate) fn may_answer(identities: &Identities, features: &LanguageFeatures) -> bool {
     !identities.have_names() || !models::is_rough(&features.encoder)
 }
 
-/// An answer by embedding, unless a word is left out or is about places, comparisons or numbers, of which an embedding
-/// knows nothing, or what it found has another color than was said.
+/// Rejects an answer by embedding if a word is left out or if the identity has another color than the query says.
+/// Queries about places, comparisons or numbers are rejected too: embeddings do not capture them.
 fn grounded(identities: &Identities, phrase: &ParsedQuery, language: Language<'_>, answer: Answer) -> Answer {
     let leaves_out = !grounds::telling(language.unknown).is_empty() || grounds::asks_for_more(identities, &phrase.text);
     match answer {
@@ -122,7 +122,7 @@ fn grounded(identities: &Identities, phrase: &ParsedQuery, language: Language<'_
     }
 }
 
-/// What is answered by embedding where there are no embeddings.
+/// Returns the answer by embedding of a scene without embeddings: nothing is found.
 fn unanswered(identities: &Identities, recipe: &Recipe) -> QueryAnswer {
     QueryAnswer::nothing(Basis::Embedding, identities, recipe)
 }
@@ -157,8 +157,8 @@ impl<S: Scorer> Scorer for Timed<'_, S> {
     }
 }
 
-/// Localizes by `scorer`, unless `whole` are called so as a whole, then makes the relevancy of every identity by
-/// `relevancy`.
+/// Localizes by `scorer`, unless the whole query is the name of the identities `whole`; then computes the relevancy
+/// of every identity by `relevancy`.
 fn judged<S: Scorer>(
     (identities, phrase, level): (&Identities, &ParsedQuery, LevelFilter),
     whole: &[IdentityId],
@@ -178,7 +178,7 @@ fn judged<S: Scorer>(
         ids => called(identities, (ids, &phrase.text), level, &mut timed),
     };
     let answer = match answer {
-        // What comes near may be no piece of what was said.
+        // Near hits may be no pieces of the named whole.
         Answer::NotFound(hits) if basis == Basis::Names && hits.iter().all(|hit| hit.score <= 0.0) => {
             Answer::NotFound(nearest(identities, &phrase.text, level, &mut timed))
         }
@@ -207,7 +207,7 @@ pub(crate) fn by_name(
         let meant = if let Answer::NotFound(_) = answer { &[] } else { answer.hits() };
         for (id, identity) in identities.iter() {
             let hit = meant.iter().find(|h| h.identity == id);
-            // What shares the words but not the whole is related, not meant.
+            // An identity that shares words but not the whole query is related, not meant.
             let own = hit.map_or(0.5 * alone[id as usize - 1], |h| h.score);
             relevancy[id as usize] = f32::max(own, relevancy[identity.parent as usize]);
         }
@@ -215,7 +215,7 @@ pub(crate) fn by_name(
     })
 }
 
-/// Answers by meaning alone.
+/// Answers by embedding alone.
 pub(crate) fn by_embedding(
     identities: &Identities,
     phrase: &ParsedQuery,
@@ -235,19 +235,19 @@ pub(crate) fn by_embedding(
 }
 
 impl QueryAnswer {
-    /// An answer with nothing alike, found in no time.
+    /// Creates an answer without look-alikes, with times of zero.
     pub(crate) fn new(answer: Answer, basis: Basis, relevancy: Vec<f32>, recipe: &Recipe) -> Self {
         let (stages, recipe) = (StagesMs::default(), recipe.clone());
         Self { answer, basis, alike: Vec::new(), is_rough: false, relevancy, stages, recipe }
     }
 
-    /// Nothing is found.
+    /// Creates the answer "not found".
     pub(crate) fn nothing(basis: Basis, identities: &Identities, recipe: &Recipe) -> Self {
         Self::new(Answer::NotFound(Vec::new()), basis, vec![0.0; identities.len() + 1], recipe)
     }
 
-    /// The best identities: none if nothing was found, all that fit alike if the answer is
-    /// ambiguous, else up to `top` that fit.
+    /// Returns the best identities: none if nothing was found, all that fit equally well if the answer is ambiguous,
+    /// else up to `top` that fit.
     pub fn chosen(&self, top: usize) -> Vec<IdentityId> {
         let hits = self.answer.hits();
         let alike = |first: f32| hits.iter().take_while(|h| first - h.score < self.resolution()).count();
@@ -259,7 +259,7 @@ impl QueryAnswer {
         hits.iter().take(most).filter(|h| h.score >= threshold).map(|h| h.identity).collect()
     }
 
-    /// Score from which an identity is what was asked for.
+    /// Least score of an identity that answers the query.
     pub(crate) fn threshold(&self) -> f32 {
         self.recipe.rejection.threshold(match self.basis {
             Basis::Names => names::THRESHOLD,
@@ -274,14 +274,14 @@ impl QueryAnswer {
         }
     }
 
-    /// A score by embedding as it would be at this program's own temperature.
+    /// Converts a score by embedding to this program's default temperature.
     fn usual(&self, score: f32) -> f32 {
         let odds = score / (1.0 - score);
         let odds = odds.powf(Recipe::default().temperature / self.recipe.temperature);
         if odds.is_finite() { odds / (1.0 + odds) } else { 1.0 }
     }
 
-    /// Relevancy as the recipe shows it, by identity, in a view.
+    /// Relevancy by identity in a view, on the recipe's scale.
     pub(crate) fn shown_relevancy(&self, map: &ViewMap) -> Vec<f32> {
         match self.recipe.scale {
             RelevancyScale::Raw => self.relevancy.clone(),
@@ -289,19 +289,19 @@ impl QueryAnswer {
         }
     }
 
-    /// Relevancy of every identity on LERF's scale: from a half to the largest of those that are `seen`.
+    /// Relevancy of every identity on LERF's scale: from one half to the largest of the `seen` identities.
     fn lerfs_scale(&self, seen: impl Iterator<Item = IdentityId>) -> Vec<f32> {
         let of = |id: IdentityId| self.relevancy.get(id as usize).copied().unwrap_or(0.0);
         let most = seen.map(of).fold(0.0, f32::max);
         self.relevancy.iter().map(|r| on_lerfs_scale(*r, most).clamp(0.0, 1.0)).collect()
     }
 
-    /// Whether each identity is relevant enough on LERF's scale, among those that are `seen`.
+    /// Returns, for each identity, whether its relevancy is over the cut on LERF's scale, among those `seen`.
     pub(crate) fn relevant(&self, seen: impl Iterator<Item = IdentityId>) -> Vec<bool> {
         self.lerfs_scale(seen).into_iter().map(|r| r > LERFS_SHARE).collect()
     }
 
-    /// The pixels of what is meant, in a view.
+    /// Mask of the answer in a view.
     pub(crate) fn mask(&self, map: &ViewMap, codes: Option<&CodeMap>, identities: &Identities, top: usize) -> Mask {
         let Recipe { masks, tolerance, .. } = self.recipe;
         if masks == MatchMode::Relevancy {
@@ -317,7 +317,7 @@ impl QueryAnswer {
 
     /// Relevancy of every pixel of a view, row-major, 0 to 1.
     pub(crate) fn heat(&self, map: &ViewMap) -> Vec<f32> {
-        // One more entry for numbers that nobody has.
+        // One more entry for numbers without an identity.
         let mut table = self.shown_relevancy(map);
         table.push(0.0);
         let last = table.len() - 1;

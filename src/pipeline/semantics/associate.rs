@@ -1,4 +1,4 @@
-//! Which of the masks of a photo are identities that are known already.
+//! Association of the masks of a photo with known identities.
 
 use super::segmenter::FoundMask;
 use super::view_map::ViewMap;
@@ -6,24 +6,24 @@ use super::votes::UNKNOWN;
 use crate::scene::findings::Disagreement;
 use crate::scene::{Identities, IdentityId, Level, NOBODY};
 
-/// Share of an identity's visible pixels, and of a mask's known pixels, that must be the same.
+/// Least share of an identity's visible pixels, and of a mask's known pixels, that must agree.
 const SAME: f64 = 0.5;
-/// Pixels that must be the same at least.
+/// Least number of pixels that must agree.
 const LEAST_PX: usize = 12;
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Link {
     Known(IdentityId),
     New,
-    /// Another mask fits this identity, which this one would fit too, better.
+    /// Another mask fits this identity better.
     Split(IdentityId),
 }
 
-/// Pixels of a view, or of a piece of it, by what they belong to.
+/// Pixels of a view, or of a piece of it, by identity.
 struct PixelCounts {
-    /// Those of each identity and its pieces, by number.
+    /// Pixels of each identity and its pieces, by number.
     of: Vec<usize>,
-    /// Those of which something is known.
+    /// Pixels that are not unknown.
     known: usize,
 }
 
@@ -44,9 +44,9 @@ impl PixelCounts {
     }
 }
 
-/// Compares the masks of a photo with what is `known` of its view. A part can only be a piece of
-/// what its whole is. A mask with the name of an identity of the same whole is that identity, however
-/// little of it has been seen; others must overlap with theirs.
+/// Links the masks of a photo with the identities `known` in its view. A part can only be a piece of its linked
+/// whole. A mask with the name of an identity of the same whole is linked to it, however little of it has been seen;
+/// others must overlap.
 pub(crate) fn link(found: &[FoundMask], known: Option<&ViewMap>, identities: &Identities) -> Vec<Link> {
     let Some(map) = known else { return vec![Link::New; found.len()] };
     let visible = PixelCounts::new(map, identities, 0..map.identity.len());
@@ -78,7 +78,7 @@ pub(crate) fn link(found: &[FoundMask], known: Option<&ViewMap>, identities: &Id
             links.push(Link::Known(id));
             continue;
         }
-        // Who has another name is somebody else.
+        // Another name means another identity.
         let nameless = |id: &IdentityId| mask.name.is_none() || identities.get(*id).is_some_and(|i| i.names.is_empty());
         let fits = candidates.into_iter().filter(nameless);
         let inside = PixelCounts::new(map, identities, mask.mask.pixels());
@@ -104,7 +104,7 @@ pub(crate) fn link(found: &[FoundMask], known: Option<&ViewMap>, identities: &Id
     links
 }
 
-/// The disagreements between masks that were linked and what was known before.
+/// Returns the disagreements between the linked masks and the identities known before.
 pub(crate) fn disagreements(
     found: &[FoundMask],
     links: &[Link],
@@ -112,7 +112,7 @@ pub(crate) fn disagreements(
     identities: &Identities,
 ) -> Vec<Disagreement> {
     let mut list = Vec::new();
-    // What has a mask of its own in this photo is told apart, wherever it was thought to be.
+    // An identity with a mask of its own in this photo is told apart, wherever it was expected.
     let has_mask = |id: IdentityId| links.contains(&Link::Known(id));
     let visible = PixelCounts::new(known, identities, 0..known.identity.len());
     for (mask, link) in found.iter().zip(links) {
@@ -184,7 +184,7 @@ mod tests {
         identity[60..].fill(UNKNOWN);
         let map = ViewMap::certain(100, identity);
         let masks = [
-            // The pot with its far side, of which nothing is known yet.
+            // The pot with its far side, which is still unknown.
             found(Level::Object, None, Mask::from_fn(100, 1, |i| (22..55).contains(&i) || i >= 70)),
             found(Level::Object, None, mask(0, 19)),
             found(Level::Object, None, mask(60, 70)),
@@ -242,7 +242,7 @@ mod tests {
             ..found(level, parent, mask(from, to))
         };
         let masks = [
-            // Where the pot was thought to be, there is the cup, with its handle, never seen from here.
+            // The cup, with its handle, is where the pot was expected, never seen from here.
             named("cup", Level::Object, None, 0, 50),
             named("handle", Level::Part, Some(0), 0, 10),
             // Another thing where the pot is, and the pot's own handle.
@@ -272,7 +272,7 @@ mod tests {
         assert_eq!(one((0, 40), (20, 61)), Link::New, "less of the mask");
         assert_eq!(one((0, 12), (0, 12)), Link::Known(cup));
         assert_eq!(one((0, 11), (0, 11)), Link::New, "too small to say");
-        // Where nothing is known, the mask may be larger.
+        // Over unknown pixels, the mask may be larger.
         let mut map = view(0, 20);
         map.identity[20..].fill(UNKNOWN);
         assert_eq!(link(&[found(Level::Object, None, mask(0, 90))], Some(&map), &all), [Link::Known(cup)]);

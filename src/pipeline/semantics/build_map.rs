@@ -1,4 +1,4 @@
-//! The whole way from trained Gaussians and masks to a semantic map.
+//! Pipeline from trained Gaussians and masks to a semantic map.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -25,10 +25,10 @@ use crate::scene::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
 use crate::scene::{GaussianCloud, IdentityId, Lifting, MaskGrid, PART_WEIGHT, Photo, Preparation, SemanticMap};
 
 pub(crate) const CODE_STEPS: u64 = 1_000;
-/// Seed of the order in which views are trained on.
+/// Seed of the order of training views.
 const SEED: u64 = 0;
 
-/// How masks are carried to the other photos.
+/// Ways to carry masks to the other photos.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 pub enum Carry {
     /// By the trained Gaussians; no network
@@ -48,13 +48,13 @@ pub(crate) const REGIONS: &str = "regions";
 pub(crate) struct FindOptions {
     pub(crate) track: TrackOptions,
     pub(crate) lifting: Lifting,
-    /// Steps of training codes, where they are trained.
+    /// Training steps of the codes, if they are trained.
     pub(crate) code_steps: u64,
     /// Share of its own embedding that a part keeps in semantic deviation.
     pub(crate) part_weight: f32,
-    /// Where a network is asked for masks, if one is.
+    /// Grid of prompt points, if a network finds the masks.
     pub(crate) grid: Option<MaskGrid>,
-    /// Objects and parts that somebody has worked on, which stay beside what is found.
+    /// Objects and parts edited by the user, which are kept beside the new ones.
     pub(crate) keep: Option<Arc<SemanticMap>>,
 }
 
@@ -74,14 +74,14 @@ impl Default for FindOptions {
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Found {
     pub(crate) map: SemanticMap,
-    /// What masks of the first photos explain of each photo.
+    /// Share of each photo that the masks of the seed photos explain.
     pub(crate) views: Vec<ViewReport>,
-    /// Seconds that each stage took, in order.
+    /// Seconds of each stage, in order.
     pub(crate) secs: Vec<(&'static str, f64)>,
 }
 
-/// What finds the masks of photos that `cloud` was trained on: files, where there are any, else the
-/// network of this name, else regions of the photos. What a network finds is kept in `cache`.
+/// Returns the segmenter of the photos that `cloud` was trained on: label files if there are any, else the network of
+/// this name, else regions of the photos. Masks of a network are kept in `cache`.
 pub(crate) fn segmenter<'a>(
     files: Option<Labels>,
     cloud: &'a GaussianCloud,
@@ -96,17 +96,17 @@ pub(crate) fn segmenter<'a>(
     })
 }
 
-/// What finds masks, carries them on, and looks at what they are of.
+/// Segmenter, follower and encoder of a search.
 pub(crate) struct Tools<'a> {
     pub(crate) segmenter: &'a mut dyn Segmenter,
-    /// Follows them through the photos, besides what the Gaussians carry.
+    /// Follows masks through the photos, in addition to the Gaussians.
     pub(crate) follower: Option<&'a mut Sam2Tracker>,
-    /// Looks at the identities, so that they are found by their looks.
+    /// Embeds the identities, so that they are found by their looks.
     pub(crate) encoder: Option<&'a mut (dyn Encoder + 'static)>,
 }
 
-/// Finds the objects and parts of `cloud`, which was trained on `photos`, gives them codes, and lets
-/// an encoder look at them, if there is one.
+/// Finds the objects and parts of `cloud`, which was trained on `photos`, gives them codes, and embeds them if there
+/// is an encoder.
 pub(crate) fn find_objects(
     cloud: &GaussianCloud,
     photos: &[Photo],
@@ -166,7 +166,7 @@ pub(crate) fn find_objects(
     Ok(Found { map, views, secs })
 }
 
-/// Trains the codes of the Gaussians on the masks that were found and followed, never on what the votes make of them.
+/// Trains the codes of the Gaussians on the masks that were found and followed, never on the result of the votes.
 fn lift(
     map: &mut SemanticMap,
     cloud: &GaussianCloud,
@@ -188,7 +188,7 @@ fn lift(
     Ok(())
 }
 
-/// What to say about views that masks did not explain; `None` if there is no need.
+/// Reports views that the masks do not explain; `None` if there are none.
 fn unknown(views: &[ViewReport], photos: &[Photo], share: f64) -> Option<String> {
     let many: Vec<&ViewReport> = views.iter().filter(|v| v.unknown > share).collect();
     let worst = many.iter().max_by(|a, b| a.unknown.total_cmp(&b.unknown))?;

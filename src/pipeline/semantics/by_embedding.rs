@@ -1,4 +1,4 @@
-//! Identities found by what they look like: relevancy of their language features for a phrase.
+//! Identities found by their looks: relevancy of their language features for a phrase.
 
 use std::collections::HashMap;
 
@@ -18,11 +18,11 @@ use crate::scene::{Identities, IdentityId, LanguageFeatures, ViewFeatures};
 pub struct TextEmbeddings(HashMap<String, Option<Vec<f32>>>);
 
 impl TextEmbeddings {
-    /// Phrases that are kept at most.
+    /// Most phrases that are kept.
     const MOST: usize = 4_096;
 
-    /// Adds the embeddings that `encode` makes of the phrases that answering a question by this recipe needs, unless
-    /// they are there already. Only those of the question itself have to be understood.
+    /// Adds the embeddings of the phrases that this recipe needs for a question, encoded by `source`, unless they are
+    /// there already. Only the question's own phrases have to be understood.
     pub fn learn<S: TextSource + ?Sized>(
         &mut self,
         phrase: &ParsedQuery,
@@ -39,11 +39,12 @@ impl TextEmbeddings {
 
     /// Adds the embeddings of the canonical phrases of a recipe.
     pub(crate) fn learn_canonical<S: TextSource + ?Sized>(&mut self, recipe: &Recipe, source: &mut S) {
-        // Nothing that has to be understood is among them.
+        // None of these phrases has to be understood, so no error can occur.
         let _ = self.add(&[], recipe.canonical.iter(), source);
     }
 
-    /// Adds what is not known of these phrases, encoded together: those that have to be understood, and others.
+    /// Adds the missing embeddings of these phrases, encoded together: `own` ones must be understood, `helpful` ones
+    /// need not be.
     fn add<'p, S: TextSource + ?Sized>(
         &mut self,
         own: &[&'p str],
@@ -67,7 +68,7 @@ impl TextEmbeddings {
         Ok(())
     }
 
-    /// Whether the encoder was asked for a phrase in vain.
+    /// Returns whether the encoder could not read a phrase.
     pub(crate) fn is_unreadable(&self, phrase: &str) -> bool {
         matches!(self.0.get(phrase), Some(None))
     }
@@ -77,7 +78,7 @@ impl TextEmbeddings {
     }
 }
 
-/// Phrases that a question is answered with, besides its own.
+/// Additional phrases for answering a question.
 fn helpful(phrase: &ParsedQuery, recipe: &Recipe) -> Vec<String> {
     let mut all: Vec<String> = recipe.canonical.iter().map(str::to_owned).collect();
     if matches!(recipe.strategy, Strategy::TwoSteps | Strategy::Joint) {
@@ -95,7 +96,7 @@ fn helpful(phrase: &ParsedQuery, recipe: &Recipe) -> Vec<String> {
     all
 }
 
-/// The phrases of a question that say what color something has: its own, and the whole's.
+/// Phrases of a question that name a color: its own, and the whole's.
 fn colored(phrase: &ParsedQuery) -> impl Iterator<Item = &str> {
     let own = if phrase.whole.is_some() { &phrase.target } else { &phrase.text };
     std::iter::once(own).chain(&phrase.whole).map(String::as_str).filter(|said| !colors::said(said).is_empty())
@@ -104,26 +105,26 @@ fn colored(phrase: &ParsedQuery) -> impl Iterator<Item = &str> {
 /// Score above which an identity is nearer to the query than to any canonical phrase.
 pub(crate) const THRESHOLD: f32 = 0.5;
 
-/// Difference of scores under which two identities fit alike: that of an advantage of 0.005.
+/// Difference of scores under which two identities fit equally well: that of an advantage of 0.005.
 pub(crate) fn resolution(temperature: f32) -> f32 {
     score(0.0025, temperature) - score(-0.0025, temperature)
 }
 
-/// Identities that one thread scores at least: less is not worth handing over.
+/// Least number of identities per thread: fewer are not worth the handover.
 const IDENTITIES_PER_TASK: usize = 32;
 
 /// Scores by language features.
 pub struct EmbeddingScorer<'a> {
     pub(crate) identities: &'a Identities,
     pub(crate) features: &'a LanguageFeatures,
-    /// Embeddings of the phrases that will be asked for; others score nothing.
+    /// Embeddings of the phrases that will be asked for; other phrases score nothing.
     pub(crate) phrases: &'a TextEmbeddings,
     pub(crate) recipe: &'a Recipe,
     known: Vec<(String, Option<String>, Vec<f32>)>,
 }
 
 impl<'a> EmbeddingScorer<'a> {
-    /// Scores by these features and encoded phrases.
+    /// Creates a scorer from these features and encoded phrases.
     pub fn new(
         identities: &'a Identities,
         features: &'a LanguageFeatures,
@@ -133,8 +134,8 @@ impl<'a> EmbeddingScorer<'a> {
         Self { identities, features, phrases, recipe, known: Vec::new() }
     }
 
-    /// Advantage of every identity, by number less one: that of its best view. Negative infinity
-    /// without features.
+    /// Returns the advantage of every identity, by number less one: that of its best view. Negative infinity without
+    /// features.
     pub fn advantages(&self, phrase: &str, against: Option<&str>) -> Vec<f32> {
         let query = self.phrases.get(phrase);
         let canonical = self.embeddings(self.recipe.canonical.iter().chain(against));
@@ -151,7 +152,7 @@ impl<'a> EmbeddingScorer<'a> {
         views.iter().map(|v| advantage(v, query, canonical)).fold(f32::NEG_INFINITY, f32::max)
     }
 
-    /// Whether an identity is more like the phrase with another color than like the phrase.
+    /// Returns whether an identity is more like the phrase with another color than like the phrase.
     fn has_another_color(&self, phrase: &str, id: IdentityId) -> bool {
         let others = colors::alternatives(phrase);
         let others = self.embeddings(others.iter().map(String::as_str));
@@ -196,8 +197,8 @@ impl Scorer for EmbeddingScorer<'_> {
     }
 }
 
-/// How much more relevant than any canonical phrase an identity must be to be what was asked for: nearly everything is
-/// a little more like some phrase to the encoders of photos (docs/measured.md).
+/// Least advantage over the canonical phrases of an identity that answers: to the encoders of photos, nearly
+/// everything is a little more like some phrase (docs/measured.md).
 pub(crate) fn least_advantage(encoder: &str) -> f32 {
     if encoder == models::DEMO { 0.0 } else { 0.03 }
 }

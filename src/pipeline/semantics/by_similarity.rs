@@ -1,19 +1,19 @@
-//! Identities by feature similarity, the baseline of mapping features without tracking: what looks alike is taken
-//! for one thing, wherever it was seen (FastLGS's feature matching).
+//! Identities by feature similarity, the baseline of feature mapping without tracking: look-alikes are taken for one
+//! thing, wherever they were seen (FastLGS's feature matching).
 
 use super::codes;
 use crate::math::vector::{dot, unit};
 use crate::scene::language::MAX_VIEWS;
 use crate::scene::{GaussianCloud, Identities, IdentityId, LanguageFeatures, SemanticMap, ViewFeatures};
 
-/// Cosine from which two features count as those of one thing.
+/// Least cosine of two features of one thing.
 pub(crate) const ALIKE: f32 = 0.9;
 
-/// The mean look of what an identity is joined to, if it has any, and the looks of all that was joined.
+/// Mean feature of an identity, if it has any, and the features of all identities joined to it.
 type Looks = (Option<Vec<f32>>, Vec<Vec<f32>>);
 
-/// The map with identities joined that look alike and are of one level, each by the mean of its raw features. They
-/// keep raw features only, and have no names. `None` without features.
+/// Returns the map with look-alike identities of one level joined, each by the mean of its raw features. They keep
+/// raw features only, and have no names. `None` without features.
 pub(crate) fn rejoined(map: &SemanticMap, cloud: &GaussianCloud) -> Option<SemanticMap> {
     let language = map.language.as_ref()?;
     let mean = |f: &ViewFeatures| -> Option<Vec<f32>> {
@@ -32,7 +32,7 @@ pub(crate) fn rejoined(map: &SemanticMap, cloud: &GaussianCloud) -> Option<Seman
         let known = (1..=joined.len() as IdentityId).find(alike);
         let id = known.unwrap_or_else(|| {
             first.push((own.clone(), Vec::new()));
-            // A whole comes before its pieces, and so does what it was joined to.
+            // A whole comes before its pieces, and so does the identity that it was joined to.
             joined.add(identity.level, now.get(identity.parent as usize).copied().unwrap_or(0), Vec::new())
         });
         first[id as usize - 1].1.extend(features.raw.iter().cloned());

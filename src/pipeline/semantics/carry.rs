@@ -1,6 +1,6 @@
 //! Objects and parts carried from some Gaussians to others of the same scene, by place.
 //!
-//! For a training that goes on: its Gaussians have moved a little, some are gone, some are new.
+//! Used when training resumes: Gaussians have moved a little, some are gone, some are new.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -9,18 +9,18 @@ use rstar::primitives::GeomWithData;
 
 use crate::scene::{GaussianCloud, NOBODY, SemanticMap};
 
-/// How far a Gaussian reaches, in standard deviations along its longest axis: what lies farther from its
-/// center takes nothing from it.
+/// Reach of a Gaussian, in standard deviations along its longest axis: points farther from its center take nothing
+/// from it.
 const REACH: f64 = 2.0;
 
-/// The map of `from` for the Gaussians `to`, each of which takes identity and codes of the nearest one
-/// that reaches it, and the share of `to` that one does.
+/// Returns the map of `from` for the Gaussians `to`, and the share of `to` that is reached. Each takes identity and
+/// codes of the nearest Gaussian that reaches it.
 pub(crate) fn carry(map: &SemanticMap, from: &GaussianCloud, to: &GaussianCloud) -> (SemanticMap, f64) {
     let to: Vec<DVec3> = (0..to.len()).map(|i| to.world_position(i)).collect();
     carry_by(map, &nearest(from, &to))
 }
 
-/// The same, where the nearest ones are known.
+/// The same for known nearest Gaussians.
 pub(crate) fn carry_by(map: &SemanticMap, nearest: &[Option<usize>]) -> (SemanticMap, f64) {
     let of = nearest.iter().map(|n| n.map_or(NOBODY, |i| map.identity_of[i])).collect();
     let margin = nearest.iter().map(|n| n.map_or(0.0, |i| map.margin[i])).collect();
@@ -37,7 +37,7 @@ pub(crate) fn carry_by(map: &SemanticMap, nearest: &[Option<usize>]) -> (Semanti
     (carried, reached as f64 / nearest.len().max(1) as f64)
 }
 
-/// For each point, the Gaussian that is nearest, if it reaches so far.
+/// Returns, for each point, the nearest Gaussian if it reaches the point.
 pub(crate) fn nearest(from: &GaussianCloud, points: &[DVec3]) -> Vec<Option<usize>> {
     let all = (0..from.len()).map(|i| GeomWithData::new(from.world_position(i).to_array(), i)).collect();
     let tree = RTree::bulk_load(all);
@@ -69,7 +69,7 @@ mod tests {
         let mut map = SemanticMap::from_identities(identities, vec![a, b], vec![0.5, 1.0], vec!["photo".into()]);
         map.codes[1][0] = 0.125;
         let from = cloud(&[0.0, 1.0], DVec3::ZERO);
-        // Moved, cloned, exchanged, in another frame, and one that is nobody's: 0.3 off, three deviations.
+        // Moved, cloned, exchanged, in another frame, and one unlabeled: 0.3 off, three deviations.
         let to = cloud(&[-8.95, -9.99, -10.19, -8.7], DVec3::X * 10.0);
         let (carried, share) = carry(&map, &from, &to);
         assert_eq!(carried.identity_of, [b, a, a, NOBODY]);

@@ -1,10 +1,10 @@
-//! Codes of a view's pixels, blended as the paper does: both levels in one pass, divided by alpha.
+//! Codes of a view's pixels, blended as in the paper: both levels in one pass, divided by alpha.
 
 use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::semantic_map::CODE_CHANNELS;
 use crate::scene::{Camera, GaussianCloud, Level};
 
-/// Channels of an object's code, which come first.
+/// Channels of an object's code, the first ones.
 const OBJECT_CHANNELS: usize = CODE_CHANNELS / 2;
 
 /// Blended codes of a view.
@@ -12,13 +12,13 @@ const OBJECT_CHANNELS: usize = CODE_CHANNELS / 2;
 pub struct CodeMap {
     pub(crate) width_px: usize,
     pub(crate) height_px: usize,
-    /// Planes of the object's code, then of the part's, row-major. NaN, which nothing matches, where
-    /// less than half of the light is blocked. The part's are empty where they were left out.
+    /// Planes of the object's code, then of the part's, row-major. NaN, which matches nothing, if less than half of
+    /// the light is blocked. The part's planes are empty if they were left out.
     pub planes: [Vec<f32>; CODE_CHANNELS],
 }
 
 impl CodeMap {
-    /// Blends the `codes` of the Gaussians of `cloud`, those of parts only if there are `parts`.
+    /// Blends the `codes` of the Gaussians of `cloud`, those of parts only if `parts`.
     pub fn render(
         renderer: &mut Renderer,
         cloud: &GaussianCloud,

@@ -1,8 +1,8 @@
 //! Points in code space, one per identity, that stay apart when they are blended.
 //!
-//! Codes lie on the sphere around the middle of the unit cube, where the background's code is. A
-//! blend of two codes lies inside the sphere, so it cannot be mistaken for a third, and what is
-//! next to each other in the scene, and hence blended most, is put far apart on it.
+//! Codes lie on the sphere around the middle of the unit cube, the background's code. A blend of two codes lies
+//! inside the sphere, so it cannot be mistaken for a third. Neighbors in the scene, which are blended most, are put
+//! far apart on it.
 
 use glam::{DVec3, Vec3};
 
@@ -11,8 +11,7 @@ use crate::scene::{GaussianCloud, Identities, IdentityId};
 
 /// Radius of the sphere.
 pub const RADIUS: f32 = 0.5;
-/// Largest difference per channel at which a blended code still counts as a code: the paper's
-/// tolerance.
+/// Largest difference per channel at which a blended code still counts as a code: the paper's tolerance.
 pub(crate) const TOLERANCE: f32 = 5.0 / 255.0;
 
 const RELAXATIONS: usize = 30;
@@ -47,8 +46,8 @@ pub(crate) fn sphere(n: usize) -> Vec<Vec3> {
     points
 }
 
-/// Gives every identity a code. `centers` are where identities are, by number less one; those that
-/// are near each other get codes far apart.
+/// Gives every identity a code. `centers` are the places of identities, by number less one; identities near each
+/// other get codes far apart.
 pub fn assign(identities: &mut Identities, centers: &[DVec3]) {
     let n = identities.len();
     let mut free = sphere(n);
@@ -74,7 +73,7 @@ pub fn assign(identities: &mut Identities, centers: &[DVec3]) {
     }
 }
 
-/// Whether a code blended with alpha and divided by it is `code`, within `tolerance` per channel.
+/// Returns whether a code blended with alpha and divided by it is `code`, within `tolerance` per channel.
 pub fn matches(blended: [f32; 3], code: [f32; 3], tolerance: f32) -> bool {
     blended.iter().zip(code).all(|(b, c)| (b - c).abs() <= tolerance)
 }
@@ -110,7 +109,7 @@ mod tests {
                     let blend = std::array::from_fn(|c| codes[a][c] * share + codes[b][c] * (1.0 - share));
                     blends += 1;
                     let third = |(k, code): (usize, &[f32; 3])| k != a && k != b && matches(blend, *code, TOLERANCE);
-                    // Two opposite codes pass through the background's; that is nobody's mask.
+                    // Two opposite codes pass through the background's, which is in no mask.
                     wrong += usize::from(codes[..100].iter().enumerate().any(third));
                 }
             }

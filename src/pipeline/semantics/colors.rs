@@ -1,22 +1,22 @@
-//! Words for colors in questions and names: a thing of another color is another thing.
+//! Color words in questions and names: a thing of another color is another thing.
 
 use super::words::words;
 use crate::scene::colors::{COLORS, row};
 
-/// The colors that a phrase says something has, by row. A last word is the thing itself: an orange.
+/// Returns the colors that a phrase names, by row. A last word is the thing itself: an orange.
 pub(crate) fn said(phrase: &str) -> Vec<usize> {
     let words = words(phrase);
     words.iter().take(words.len().saturating_sub(1)).filter_map(|w| row(w)).collect()
 }
 
-/// The words of a phrase that are no colors of something.
+/// Returns the words of a phrase that are no colors.
 pub(crate) fn without(phrase: &str) -> Vec<String> {
     let words = words(phrase);
     let last = words.len().saturating_sub(1);
     words.into_iter().enumerate().filter(|(i, w)| *i == last || row(w).is_none()).map(|(_, w)| w).collect()
 }
 
-/// The phrase with its first color exchanged for each of the others; none if it has no color.
+/// Returns the phrase with its first color replaced by each of the others; none if it has no color.
 pub(crate) fn alternatives(phrase: &str) -> Vec<String> {
     let said: Vec<&str> = phrase.split(' ').collect();
     let last = said.len() - 1;

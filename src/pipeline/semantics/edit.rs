@@ -1,5 +1,5 @@
-//! Corrections by hand: names, merging, splitting, new parts. An edit makes a new map; the old one
-//! stays, so that it can be undone.
+//! Edits of a semantic map: names, merges, splits, new parts. An edit makes a new map; the old one stays, so that it
+//! can be undone.
 
 use glam::Vec3;
 use rstar::RTree;
@@ -10,36 +10,35 @@ use super::codes::{self, RADIUS};
 use crate::math::stats::median;
 use crate::scene::{Findings, GaussianCloud, Identities, IdentityId, Level, NOBODY, SemanticMap, ViewFeatures};
 
-/// A correction.
+/// An edit.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Edit {
-    /// Gives an identity another first name; the old one is still understood.
+    /// Gives an identity another first name; the old one still finds it.
     Rename(IdentityId, String),
     /// The first becomes the second, with all its pieces.
     Merge(IdentityId, IdentityId),
-    /// What does not hang together becomes identities of its own; what does is cut in two.
+    /// Splits an identity into its connected components; if there is only one, into two halves.
     Split(IdentityId),
-    /// These Gaussians, as far as they belong to the identity, become a new piece of it. Of nobody,
-    /// a new object, whosever they were.
+    /// Makes these Gaussians, as far as they belong to the identity, a new piece of it. Of nobody: a new object,
+    /// whatever their labels were.
     AddPiece {
-        /// Whose piece.
+        /// Identity that gets the piece.
         of: IdentityId,
-        /// What it is called; may be empty.
+        /// Name of the piece; may be empty.
         name: String,
         /// Indices of Gaussians.
         gaussians: Vec<u32>,
     },
-    /// The identity consists of these Gaussians: what it lacks becomes its own, what it has too much becomes its
-    /// whole's.
+    /// Gives the identity exactly these Gaussians: it takes missing ones, and surplus ones go to its whole.
     Reshape {
-        /// Which.
+        /// Identity to be reshaped.
         id: IdentityId,
         /// Indices of Gaussians.
         gaussians: Vec<u32>,
     },
 }
 
-/// Why an edit cannot be made.
+/// Reasons for which an edit is refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum EditError {
@@ -63,7 +62,7 @@ pub enum EditError {
     Empty(String),
 }
 
-/// The map after an edit.
+/// Returns the map after an edit.
 ///
 /// # Errors
 /// If the edit makes no sense; the map is as it was.
@@ -103,7 +102,7 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
                 let part = add(&mut new, level, parent, String::new(), part);
                 new.identities.mark_by_hand(part);
             }
-            // Which photos show which of the pieces was not noticed.
+            // The photos that show each of the pieces were not recorded.
             new.findings.iter_mut().for_each(|f| f.forget_seen(*id));
         }
         Edit::AddPiece { of, name, gaussians } => {
@@ -148,7 +147,7 @@ fn reshape(map: &mut SemanticMap, id: IdentityId, gaussians: &[u32]) {
     }
     for (i, is_listed) in listed.into_iter().enumerate() {
         let has = inside.get(map.identity_of[i] as usize) == Some(&true);
-        // Its parts keep theirs.
+        // Gaussians of its parts keep their labels.
         if has != is_listed {
             let now = if is_listed { id } else { whole };
             (map.identity_of[i], map.codes[i]) = (now, map.identities.codes(now));
@@ -156,7 +155,7 @@ fn reshape(map: &mut SemanticMap, id: IdentityId, gaussians: &[u32]) {
     }
 }
 
-/// Adds an identity of these Gaussians, whosever they were; its number.
+/// Adds an identity of these Gaussians, whatever their labels were; returns its number.
 pub(crate) fn add(
     map: &mut SemanticMap,
     level: Level,
@@ -180,7 +179,7 @@ pub(crate) fn add(
     id
 }
 
-/// The point of the code sphere that is farthest from all codes that are taken.
+/// Returns the point of the code sphere that is farthest from all codes in use.
 pub(super) fn free_code(identities: &Identities) -> [f32; 3] {
     let taken: Vec<Vec3> = identities.iter().map(|(_, i)| Vec3::from(i.code)).collect();
     let points = codes::sphere(2 * taken.len() + 8).into_iter().map(|p| p * RADIUS + Vec3::splat(0.5));
@@ -188,19 +187,20 @@ pub(super) fn free_code(identities: &Identities) -> [f32; 3] {
     points.max_by(|a, b| far(a).total_cmp(&far(b))).unwrap_or(Vec3::ONE).to_array()
 }
 
-/// `from` becomes `into`. Numbers change, because there is one identity less; that of `into`.
+/// Merges `from` into `into`; returns the number of `into`, which may change because there is one identity less.
 fn merge(map: &mut SemanticMap, from: IdentityId, into: IdentityId) -> IdentityId {
     renumber(map, |id| id == from, Some((from, into)))[into as usize]
 }
 
-/// What an edit left without a Gaussian that had some, where the edit changed no numbers.
+/// Returns the identities that an edit left without Gaussians, if the edit changed no numbers.
 pub(crate) fn emptied(before: &SemanticMap, after: &SemanticMap) -> Vec<IdentityId> {
     let (before, after) = (before.sizes(), after.sizes());
     let is_empty = |id: &usize| before[*id] > 0 && after.get(*id) == Some(&0);
     (1..before.len()).filter(is_empty).map(|id| id as IdentityId).collect()
 }
 
-/// The map without these identities and their pieces, whose Gaussians are nobody's then; and the new number of each.
+/// Returns the map without these identities and their pieces, whose Gaussians become unlabeled, and the new number of
+/// each identity.
 pub(crate) fn forget(map: &SemanticMap, ids: &[IdentityId]) -> (SemanticMap, Vec<IdentityId>) {
     let inside: Vec<Vec<bool>> = ids.iter().map(|id| map.identities.descendants(*id)).collect();
     let mut new = map.clone();
@@ -211,8 +211,8 @@ pub(crate) fn forget(map: &SemanticMap, ids: &[IdentityId]) -> (SemanticMap, Vec
     (new, number)
 }
 
-/// Leaves out the identities that are `gone`; where one became another (`merged`: from, into), its pieces and Gaussians
-/// are that one's. Returns the new number of each.
+/// Removes the identities that are `gone`; if one became another (`merged`: from, into), the latter gets its pieces
+/// and Gaussians. Returns the new number of each.
 pub(super) fn renumber(
     map: &mut SemanticMap,
     gone: impl Fn(IdentityId) -> bool,
@@ -257,7 +257,7 @@ pub(super) fn renumber(
         let before = *of as usize;
         *of = number.get(before).copied().unwrap_or(NOBODY);
         let now = map.identities.codes(*of);
-        // Trained codes of those that stay what they were are kept.
+        // Trained codes of unchanged identities are kept.
         if codes_before.get(before) != Some(&now) {
             *codes = now;
         }
@@ -265,11 +265,11 @@ pub(super) fn renumber(
     number
 }
 
-/// Gaussians of a component that count; smaller ones stay with the largest.
+/// Least number of Gaussians of a component; smaller ones stay with the largest.
 const LEAST: usize = 8;
 
-/// What hangs together among the Gaussians `own`, largest first; if all does, two halves. `None` if
-/// there are too few.
+/// Returns the connected components of the Gaussians `own`, largest first; two halves if there is one component.
+/// `None` if there are too few Gaussians.
 fn pieces(cloud: &GaussianCloud, own: &[usize]) -> Option<Vec<Vec<usize>>> {
     if own.len() < 2 * LEAST {
         return None;
@@ -308,7 +308,7 @@ fn pieces(cloud: &GaussianCloud, own: &[usize]) -> Option<Vec<Vec<usize>>> {
     Some(large)
 }
 
-/// Two halves of the Gaussians along the axis on which they spread most.
+/// Splits the Gaussians into two halves along the axis of largest spread.
 fn halves(own: &[usize], place: impl Fn(usize) -> [f64; 3]) -> Vec<Vec<usize>> {
     let spread = |axis: usize| {
         let v: Vec<f64> = own.iter().map(|&i| place(i)[axis]).collect();

@@ -1,4 +1,4 @@
-//! Language features of identities: an encoder looks at each in the photos that show it best.
+//! Language features of identities: an encoder embeds each in the photos that show it best.
 
 use std::collections::{BTreeSet, HashMap};
 use std::time::Instant;
@@ -20,13 +20,13 @@ use crate::scene::{
 const MAX_SIDE_PX: u32 = 1_024;
 /// Longer side of the views in which visibility is counted, px.
 const COUNT_SIDE_PX: u32 = 256;
-/// Tiles that are looked at between two looks at whether to go on.
+/// Tiles between two checks for cancellation.
 const TILES_AT_ONCE: usize = 8;
-/// Pixels of such a view that must show an identity for it to be looked at.
+/// Least number of pixels in such a view for an identity to be embedded.
 const LEAST_PX: usize = 12;
 
-/// Lets `encoder` look at every identity of `map` that it has not looked at, in up to [`MAX_VIEWS`] of the `photos`.
-/// Parts keep `part_weight` of their own embedding.
+/// Embeds every identity of `map` that `encoder` has not embedded yet, in up to [`MAX_VIEWS`] of the `photos`. Parts
+/// keep `part_weight` of their own embedding.
 pub(crate) fn embed(
     cloud: &GaussianCloud,
     map: &SemanticMap,
@@ -63,7 +63,7 @@ pub(crate) fn embed(
         let is_part = map.identities.get(id).is_some_and(|i| i.level == Level::Part);
         Some(whole).filter(|whole| is_part && *whole != id)
     };
-    // Parts are compared with what their whole looks like in the same photo.
+    // Parts are compared with the embedding of their whole in the same photo.
     let shown = |photo: &usize| -> BTreeSet<IdentityId> {
         wanted[photo].iter().flat_map(|id| [Some(*id), whole_of(*id)]).flatten().collect()
     };
@@ -78,7 +78,7 @@ pub(crate) fn embed(
             eye.look(ids, encoder)?;
             done += ids.len();
             ticker.tick(done, observer)?;
-            // The first tiles prepare the network; those after them tell what all will take.
+            // The first tiles include the network's start-up; the time of those after them predicts the total.
             let secs = start.elapsed().as_secs_f64() * ticker.total as f64 / done as f64;
             if !told && done > TILES_AT_ONCE {
                 told = true;
@@ -115,7 +115,7 @@ impl Looker<'_> {
     }
 }
 
-/// One photo, and what was made of its identities.
+/// One photo, and the embeddings of its identities.
 struct Eye<'a> {
     rgb: Vec<[f32; 3]>,
     view: ViewMap,
@@ -135,14 +135,13 @@ impl Eye<'_> {
         Ok(())
     }
 
-    /// What was made of one of them; `None` if nothing of it is seen.
+    /// Embedding of an identity; `None` if none of it is seen.
     fn seen(&self, id: IdentityId) -> Option<Vec<f32>> {
         self.looked.get(&id).cloned()
     }
 }
 
-/// How well each identity is seen, by number less one: its pixels, fewer where the picture's edge
-/// cuts it off.
+/// Visibility of each identity, by number less one: its pixels, fewer if the picture's edge cuts it off.
 fn counts(view: &ViewMap, identities: &Identities) -> Vec<f64> {
     let (w, h) = (view.width_px, view.height_px);
     let mut inside = vec![0_usize; identities.len() + 1];
@@ -249,7 +248,7 @@ mod tests {
         assert!(eye.raw.iter().all(|v| *v == [0.0, 1.0]), "{eye:?}");
         let far = |v: &Vec<f32>| (v[0] - 0.3 / length).abs().max((v[1] - 0.7 / length).abs());
         assert!(eye.deviated.iter().all(|v| far(v) < 1e-6), "{eye:?}");
-        // Tiles as large as what is seen, unless the encoder wants them otherwise.
+        // Tiles as large as the visible part, unless the encoder wants them otherwise.
         assert!(encoder.tiles.iter().all(|side| (10..=96).contains(side)), "{:?}", encoder.tiles);
         let mut encoder = Reddish { side_px: Some(7), tiles: vec![] };
         embed(&cloud, &map, &photos, &settings, PART_WEIGHT, &mut encoder, &mut Silent).expect("looks");

@@ -1,11 +1,11 @@
-//! Why objects and parts could not be found.
+//! Errors of the search for objects and parts.
 
 use crate::io::IoError;
 use crate::models::ModelError;
 use crate::pipeline::observer::Interrupted;
 use crate::render::{DrawError, RenderError};
 
-/// Why objects could not be found, looked at or given codes.
+/// Errors of finding objects, embedding them or giving them codes.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum FindError {

@@ -1,21 +1,19 @@
-//! The paper's filters: which of a segmenter's masks are objects, and which are their parts.
+//! The paper's filters, which sort a segmenter's masks into objects and their parts.
 //!
-//! Objects: largest first, each is painted on an empty canvas if its place is free. Parts of an
-//! object: smallest first, on a canvas of the object's own; hollow ones are background seen around
-//! other things, not parts.
+//! Objects: largest first, each is painted on an empty canvas if its place is free. Parts of an object: smallest
+//! first, on a canvas of the object's own; hollow masks are background seen around other things, not parts.
 
 use crate::scene::Mask;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct FilterOptions {
-    /// Share of a mask whose place may be taken already; it loses those pixels. 0 is the paper's
-    /// rule.
+    /// Share of a mask's pixels that may be taken already; it loses those pixels. 0 is the paper's rule.
     pub(crate) taken: f64,
     /// Share of a part that may lie outside its object; it loses those pixels.
     pub(crate) outside: f64,
-    /// Share of what a part's outline encloses that may be holes.
+    /// Largest share of holes in the area that a part's outline encloses.
     pub(crate) hollow: f64,
-    /// Share of its object from which a part is the object itself.
+    /// Least share of its object from which a part is the object itself.
     pub(crate) whole: f64,
 }
 
@@ -25,7 +23,7 @@ impl Default for FilterOptions {
     }
 }
 
-/// A mask that was kept, less what it lost.
+/// A mask that was kept, less the pixels it lost.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Kept {
     pub(crate) index: usize,
@@ -73,11 +71,11 @@ fn paint(masks: impl Iterator<Item = Kept>, options: &FilterOptions) -> Vec<Kept
     kept
 }
 
-/// Share of what a mask's outline encloses that is not the mask: 0 for a disc, near 1 for a thin
-/// ring. What touches the picture's border is not enclosed.
+/// Share of the area enclosed by a mask's outline that is not the mask: 0 for a disc, near 1 for a thin ring. Areas
+/// at the picture's border are not enclosed.
 pub(crate) fn hollowness(mask: &Mask) -> f64 {
     let Some(bounds) = mask.bounds() else { return 0.0 };
-    // Water from outside the box reaches everything that is not enclosed.
+    // A flood from outside the box reaches every pixel that is not enclosed.
     let (w, h) = (bounds.x.len() + 2, bounds.y.len() + 2);
     let own = |x: usize, y: usize| {
         let inside = (1..w - 1).contains(&x) && (1..h - 1).contains(&y);
@@ -155,7 +153,7 @@ mod tests {
             assert!(disjoint(&whole) && disjoint(&inner));
             assert!(whole.iter().all(|k| !k.mask.is_empty() && k.mask.overlap(&masks[k.index]) == k.mask.area()));
             assert!(inner.iter().all(|k| !k.mask.is_empty() && k.mask.overlap(&object) == k.mask.area()));
-            // The largest mask is always an object; what is not one is in the way of one.
+            // The largest mask is always an object; any other is an object unless an object is in its way.
             let largest = masks.iter().map(Mask::area).max();
             assert_eq!(whole.first().map(|k| k.mask.area()), largest);
             let free = |i: usize| whole.iter().all(|k| k.index != i && k.mask.overlap(&masks[i]) == 0);
@@ -164,7 +162,7 @@ mod tests {
             let raw: Vec<Kept> = masks.iter().cloned().enumerate().map(|(index, mask)| Kept { index, mask }).collect();
             seen[0] += usize::from(!disjoint(&raw));
             seen[1] += usize::from(raw.iter().any(|k| k.mask.overlap(&object) < k.mask.area()));
-            // The order they come in is nothing.
+            // The order of the masks does not matter.
             let mut turned = masks.clone();
             turned.reverse();
             turned.rotate_left(round % 12);

@@ -1,5 +1,5 @@
-//! Floaters carry no identity: where an object hangs together, the crumbs of it that hang in the air apart are unknown,
-//! whatever votes or their neighbors say.
+//! Floaters carry no identity: small pieces of a connected object that hang apart in the air become unknown, whatever
+//! votes or their neighbors say.
 
 use std::collections::HashMap;
 
@@ -9,18 +9,18 @@ use super::votes::Assignment;
 use crate::math::stats::median;
 use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY};
 
-/// Usual distances between Gaussians over which an object hangs together.
+/// Typical distances between Gaussians that connect an object.
 const REACH: f64 = 12.0;
-/// Neighbor whose distance is the usual one.
+/// Neighbor that gives the typical distance.
 const NEIGHBOR: usize = 3;
-/// Gaussians at which it is looked for that.
+/// Gaussians sampled for the typical distance.
 const SAMPLE: usize = 4_096;
-/// Share of its Gaussians from which an object hangs together: a pile of leaves does not.
+/// Least share of its Gaussians in the largest piece of a connected object: a pile of leaves has less.
 const WHOLE: f64 = 0.97;
-/// Share of its Gaussians under which a piece is a crumb.
+/// Share of its Gaussians under which a piece is a floater.
 const CRUMB: f64 = 0.005;
 
-/// Takes their identity from crumbs, so that nothing is known of them.
+/// Takes the identity from floaters, so that they become unknown.
 pub(crate) fn drop_floaters(cloud: &GaussianCloud, identities: &Identities, assignments: &mut [Assignment]) {
     let place = |i: usize| cloud.positions[i].map(f64::from);
     let tree = RTree::bulk_load((0..cloud.len()).map(place).collect());
@@ -49,10 +49,10 @@ pub(crate) fn drop_floaters(cloud: &GaussianCloud, identities: &Identities, assi
     }
 }
 
-/// What hangs together of `all` in steps of at most `reach`.
+/// Returns the connected components of `all` in steps of at most `reach`.
 fn pieces(all: &[usize], place: impl Fn(usize) -> [f64; 3], reach: f64) -> Vec<Vec<usize>> {
     let cell = |p: [f64; 3]| p.map(|v| (v / reach).floor() as i64);
-    // Those that are in no piece yet; none is looked at again once it is in one, however dense they lie.
+    // Gaussians in no piece yet; none is visited again once it is in one, however dense they lie.
     let mut left: HashMap<[i64; 3], Vec<usize>> = HashMap::new();
     all.iter().for_each(|&i| left.entry(cell(place(i))).or_default().push(i));
     let mut pieces = Vec::new();
@@ -111,7 +111,7 @@ mod tests {
         assert_eq!(dropped(&cloud, |_| 1), [1_001, 1_002, 1_003]);
         assert_eq!(dropped(&cloud, |i| if i % 2 == 0 { 1 } else { 2 }), [1_001, 1_002, 1_003], "parts hang together");
         assert_eq!(dropped(&cloud, |i| if i < 1_000 { 1 } else { NOBODY }), [0; 0]);
-        // As an object of their own they are what there is of it.
+        // As an object of their own they are all there is of it.
         assert_eq!(dropped(&cloud, |i| if i < 1_000 { 1 } else { 3 }), [0; 0]);
         assert!(dropped(&GaussianCloud::default(), |_| 1).is_empty());
     }

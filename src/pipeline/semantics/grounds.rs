@@ -1,5 +1,5 @@
-//! What an answer rests on. A word of a question that says something is in the names of what is meant or of its
-//! wholes, or it is its color; else something else is meant.
+//! Grounds of an answer. Each telling word of a question must be in the names of the answer or of its wholes, or be
+//! its color; else something else is meant.
 
 use std::collections::HashSet;
 
@@ -9,27 +9,27 @@ use super::words::{not_in, words};
 use crate::scene::colors::row;
 use crate::scene::{Identities, IdentityId};
 
-/// Courtesy and the like in front of what is asked for.
+/// Courtesy and the like in front of a question.
 const COURTESY: [&str; 15] =
     ["please", "show", "find", "locate", "where", "is", "are", "me", "my", "our", "your", "his", "her", "their", "its"];
 /// Words that only bind a piece to its whole.
 pub(crate) const BINDING: [&str; 3] = ["in", "inside", "at"];
 
-/// Words for places, comparisons, numbers and conditions, longer ones first: a question that names things knows none of
-/// them, unless a name has them.
+/// Words for places, comparisons, numbers and conditions, longer ones first: they mean nothing in a question that
+/// names things, unless a name has them.
 const GRAMMAR: &str = "on the left side of, on the right side of, to the left of, to the right of, on top of, in front of, left of, \
     right of, next to, close to, behind, under, underneath, below, beneath, above, over, beside, near, between, around, \
     nearest, closest, farthest, largest, biggest, smallest, tallest, shortest, longest, highest, lowest, leftmost, \
     rightmost, larger, bigger, smaller, two, three, four, five, six, seven, eight, nine, ten, both, all, every, each, other";
-/// Words that join things and deny them.
+/// Words that join and deny.
 const JOINING: [&str; 7] = ["and", "or", "but", "not", "without", "except", "with"];
 
-/// Whether a text asks for places, comparisons or numbers.
+/// Returns whether a text asks for places, comparisons or numbers.
 pub(crate) fn asks_for_more(identities: &Identities, text: &str) -> bool {
     grammar(identities, text).iter().any(|word| !JOINING.contains(&word.as_str()))
 }
 
-/// The places, comparisons and the like that a text names and no name of the scene has.
+/// Returns the places, comparisons and the like in a text that no name of the scene has.
 pub(crate) fn grammar(identities: &Identities, text: &str) -> Vec<String> {
     let said = words(text);
     let known: HashSet<String> = identities.iter().flat_map(|(_, i)| &i.names).flat_map(|name| words(name)).collect();
@@ -50,13 +50,13 @@ pub(crate) fn grammar(identities: &Identities, text: &str) -> Vec<String> {
     found.into_iter().map(|(_, phrase)| phrase).collect()
 }
 
-/// The words of these that say something.
+/// Returns the telling words among these: those that are neither courtesy nor binding words.
 pub(crate) fn telling(words: &[String]) -> Vec<String> {
     let says_nothing = |word: &str| COURTESY.contains(&word) || BINDING.contains(&word);
     words.iter().filter(|word| !says_nothing(word)).cloned().collect()
 }
 
-/// A question without courtesy in front and behind: "where is my mug, please" asks for "mug".
+/// Returns a question without courtesy in front and behind: "where is my mug, please" asks for "mug".
 pub(crate) fn without_courtesy(query: &str) -> &str {
     let is_courtesy = |word: &str| COURTESY.contains(&word.trim_matches(',').to_lowercase().as_str());
     let mut rest = query.trim();
@@ -68,7 +68,7 @@ pub(crate) fn without_courtesy(query: &str) -> &str {
     polite.map_or(rest, |(asked, _)| asked.trim_end_matches([',', ' ']))
 }
 
-/// The words of a phrase that say nothing about `id`: neither its names nor those of its wholes have them.
+/// Returns the words of a phrase that neither the names of `id` nor those of its wholes have.
 fn words_beside(identities: &Identities, id: IdentityId, phrase: &str) -> Vec<String> {
     let names = |i: IdentityId| match identities.get(i).map(|i| i.names.as_slice()) {
         Some([]) | None => vec![identities.name(i)],
@@ -77,28 +77,28 @@ fn words_beside(identities: &Identities, id: IdentityId, phrase: &str) -> Vec<St
     not_in(phrase, &identities.ancestors(id).flat_map(names).flat_map(|n| words(&n)).collect())
 }
 
-/// The words of a phrase that say something, and nothing about `id`.
+/// Returns the telling words of a phrase that do not describe `id`.
 pub(crate) fn unexplained(identities: &Identities, id: IdentityId, phrase: &ParsedQuery) -> Vec<String> {
     let mut left = telling(&words_beside(identities, id, &phrase.text));
     left.retain(|word| row(word).is_none_or(|color| has_color(identities, id, phrase, color) != Some(true)));
     left
 }
 
-/// Whether a phrase names a color that `id` does not have, as far as names or Gaussians tell.
+/// Returns whether a phrase names a color that `id` does not have, judged by names or Gaussians.
 pub(crate) fn is_of_another_color(identities: &Identities, id: IdentityId, phrase: &ParsedQuery) -> bool {
     let said = [Some(&phrase.target), phrase.whole.as_ref()].into_iter().flatten().flat_map(|p| colors::said(p));
     said.into_iter().any(|color| has_color(identities, id, phrase, color) == Some(false))
 }
 
-/// Whether an identity has a color: by a name of its own that says one, else by its Gaussians. `None` if nobody knows.
+/// Returns whether an identity has a color: by an own name with a color, else by its Gaussians. `None` if unknown.
 pub(crate) fn color_of(identities: &Identities, id: IdentityId, color: usize) -> Option<bool> {
     let names = identities.get(id).map(|i| i.names.as_slice()).unwrap_or_default();
     let named: Vec<usize> = names.iter().flat_map(|name| colors::said(name)).collect();
     if named.is_empty() { identities.colors.has(id, color) } else { Some(named.contains(&color)) }
 }
 
-/// Whether what a phrase says the color of has it, if `id` is meant. `None` if nobody knows, or it is said
-/// of nothing.
+/// Returns whether the thing that a phrase gives the color to has it, if `id` is the answer. `None` if unknown, or if
+/// the phrase gives the color to nothing.
 fn has_color(identities: &Identities, id: IdentityId, phrase: &ParsedQuery, color: usize) -> Option<bool> {
     let says = |text: &String| colors::said(text).contains(&color);
     let has = |id: IdentityId| color_of(identities, id, color);
@@ -192,14 +192,14 @@ mod tests {
         ] {
             assert_eq!(grammar(&all, text).join(" "), found, "{text}");
         }
-        // What a name has is no grammar.
+        // Words of a name are no grammar.
         let mut twins = Identities::default();
         twins.add(Level::Object, NOBODY, vec!["the two sisters".into()]);
         assert!(grammar(&twins, "two sisters").is_empty());
         let another = |id, text: &str| is_of_another_color(&all, id, &ParsedQuery::parse(text).expect("words"));
         assert!(another(1, "blue cup") && another(3, "red pot") && another(2, "lid of the blue cup"));
         assert!(!another(1, "white cup") && !another(1, "cup") && !another(3, "blue pot"));
-        // Where nobody has looked, nobody knows: no word is explained, and nothing speaks against it.
+        // Without observed colors nothing is known: no word is explained, and nothing speaks against it.
         let mut unseen = Identities::default();
         unseen.add(Level::Object, NOBODY, vec!["mug".into()]);
         let phrase = ParsedQuery::parse("white mug").expect("words");

@@ -1,7 +1,7 @@
-//! The whole way from photos to part recall on the scenes of `assets/eval`, small enough for a test: photos
-//! are made, Gaussians trained, objects found by both ways of lifting, and everything asked for in held-out
-//! photos, by names and by looks. The bars stand clear of the spread of seeds ([`spread`] prints it), and
-//! shuffled names, shuffled looks and a deviation with its weights exchanged must fail them.
+//! The whole pipeline from photos to part recall on the scenes of `assets/eval`, small enough for a test: photos are
+//! made, Gaussians trained, objects found by both ways of lifting, and everything queried in held-out photos, by
+//! names and by looks. The limits stand clear of the spread of seeds ([`spread`] prints it). Shuffled names, shuffled
+//! looks and a deviation with exchanged weights must fail them.
 
 mod controls;
 
@@ -33,13 +33,13 @@ use crate::pipeline::train::{self, TrainConfig};
 use crate::render::{BackendChoice, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, LanguageFeatures, Level, LevelFilter, Lifting, Photo, SemanticMap};
 
-/// What is measured on.
+/// Names of the scenes.
 const SCENES: [&str; 2] = ["desk", "kitchen"];
 /// Photos of a scene.
 const VIEWS: usize = 24;
-/// How many of them are held out.
+/// Number of held-out photos.
 const HELD_OUT: usize = 4;
-/// Their size, px; the encoder looks at that.
+/// Size of the photos, px; the encoder looks at that.
 const SIZE_PX: [u32; 2] = [400, 300];
 /// Longer side of the pictures that Gaussians are trained on, px.
 const TRAIN_PX: u32 = 160;
@@ -58,7 +58,7 @@ struct Scene {
     masks: FileMasks,
 }
 
-/// What was measured; shares and mean IoUs of all scenes.
+/// Measured shares and mean IoUs of all scenes.
 #[derive(Clone, Debug, Default)]
 struct Figures {
     /// Objects and parts asked for by name, lifted by votes.
@@ -69,9 +69,9 @@ struct Figures {
     recall: [f64; 5],
     /// Mean IoU of objects asked for by looks, whatever the score.
     objects: f64,
-    /// Share of names of things that are there that are answered at all, by looks.
+    /// Share of names of present things that are answered at all, by looks.
     answered: f64,
-    /// The same of what is not there, and of things in a wrong color.
+    /// The same for absent things, and for things in a wrong color.
     false_finds: [f64; 2],
     /// The same by names.
     false_names: [f64; 2],
@@ -132,7 +132,7 @@ impl Scene {
         found.expect("found").map
     }
 
-    /// What the held-out photos show by `map`, with their labels.
+    /// Views of the held-out photos by `map`, with their labels.
     fn drawn(&self, map: &SemanticMap) -> Vec<ViewMap> {
         let mut renderer = Renderer::new();
         let mut draw = |camera: &Camera| {
@@ -160,12 +160,12 @@ fn by_names(scene: &Scene, map: &SemanticMap) -> [f64; 2] {
     masks::by_level(&views.iter().flat_map(|v| masks::compare(&mut asked, v)).collect::<Vec<_>>())
 }
 
-/// Without the rules that reject more than the scores do: what is measured are scores.
+/// Recipe without the rules that reject more than the scores do: the test measures scores.
 fn plain() -> Recipe {
     Recipe { rejection: Rejection::Canonical, ..Recipe::default() }
 }
 
-/// Answers by looks alone; `None` where the encoder knows no word.
+/// Answers by looks alone; `None` if the encoder knows no word.
 fn by_looks(
     map: &SemanticMap,
     features: &LanguageFeatures,
@@ -211,7 +211,7 @@ fn over_scenes(each: &[Figures]) -> Figures {
     }
 }
 
-/// Phrases by an encoder, each read once.
+/// Phrases encoded once each.
 struct Known<'a> {
     encoder: &'a mut dyn Encoder,
     texts: &'a mut HashMap<String, Vec<f32>>,
@@ -277,8 +277,8 @@ fn figures(scene: &Scene, map: &SemanticMap, trained: &SemanticMap, encoder: &mu
 }
 
 impl Figures {
-    /// The bars that are missed. Floors are the least of three seeds less their spread, ceilings the most
-    /// and their spread, rounded away from what was measured.
+    /// Returns the limits that are missed. Floors are the least of three seeds less their spread, ceilings the most
+    /// plus their spread, rounded away from the measured values.
     fn missed(&self) -> Vec<String> {
         let floors = [
             ("objects by name, votes", self.votes[0], 0.71),
@@ -323,7 +323,7 @@ fn photos_become_parts_that_are_found() {
         let all = bars.iter().all(|bar| missed.iter().any(|m| m.starts_with(bar)));
         assert!(all, "{bars:?} among {missed:?}");
     };
-    // Controls: what is wrong must show where it is measured.
+    // Controls: each harm must show in the figures that measure it.
     fails(names, &["objects by name, votes", "parts by name, votes", "objects by name, g", "parts by name, g"]);
     fails(looks, &["objects by looks", "recall of parts, mul", "recall of parts, d", "recall of parts, t"]);
     fails(looks, &["recall of parts, joint", "order"]);
@@ -331,7 +331,7 @@ fn photos_become_parts_that_are_found() {
     fails(canonical, &["answers for what is absent, by looks", "answers in a wrong color, by looks"]);
 }
 
-/// Prints what the bars are made from.
+/// Prints the figures that the limits are derived from.
 #[test]
 #[ignore = "prints the spread of three seeds; about three minutes"]
 fn spread() {

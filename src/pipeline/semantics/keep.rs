@@ -1,15 +1,15 @@
-//! What somebody has worked on, kept where objects are found anew: its Gaussians stay its own, and what was found there
-//! is no second one beside it.
+//! Edited objects kept in a new search: their Gaussians stay theirs, and the search finds no second copy of them.
 
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::edit::{free_code, renumber};
 use crate::scene::{IdentityId, NOBODY, SemanticMap};
 
-/// Gaussians that are left of something found, of which it consists at least.
+/// Least number of Gaussians that must be left of a found object or part.
 const LEAST: usize = 4;
 
-/// The objects of a map that somebody has worked on, with all of their parts, and nothing else; `None` if there are none.
+/// Returns the objects of a map that the user has edited, with all of their parts, and nothing else; `None` if there
+/// are none.
 pub(crate) fn worked_on(map: &SemanticMap) -> Option<SemanticMap> {
     let all = &map.identities;
     let objects: BTreeSet<IdentityId> = map.by_hand().into_iter().map(|id| all.object_of(id)).collect();
@@ -18,16 +18,16 @@ pub(crate) fn worked_on(map: &SemanticMap) -> Option<SemanticMap> {
     (!objects.is_empty()).then_some(kept)
 }
 
-/// What was `found` among Gaussians, and beside it what is `kept` of them, which comes first and keeps its numbers. What
-/// was found mostly where something is kept is that; its remaining pieces become pieces of what is kept. Without
-/// language features: nobody has looked at the result.
+/// Joins the map that was `found` with the `kept` one, which comes first and keeps its numbers. A found identity that
+/// lies mostly in a kept one is that one; its remaining pieces become pieces of it. Without language features: the
+/// result has not been embedded.
 pub(crate) fn joined(found: &SemanticMap, kept: &SemanticMap) -> SemanticMap {
     let (all, old) = (&found.identities, &kept.identities);
     let twin = twins(found, kept);
     let is_gone = |id: IdentityId| twin[id as usize] != NOBODY;
     let mut identities = old.clone();
     identities.add_removed(all.removed.iter().cloned());
-    // New numbers of what was found; of what is gone, that of the next larger thing that is not.
+    // New numbers of the found identities; for one that is gone, that of the next larger one that is not.
     let mut number = vec![NOBODY; all.len() + 1];
     let mut stays = vec![false; all.len() + 1];
     for (id, identity) in all.iter() {
@@ -52,7 +52,7 @@ pub(crate) fn joined(found: &SemanticMap, kept: &SemanticMap) -> SemanticMap {
     let identity_of = (0..n).map(now).collect();
     let margin = (0..n).map(|i| if is_kept(i) { kept.margin[i] } else { found.margin[i] }).collect();
     let mut map = SemanticMap::from_identities(identities, identity_of, margin, found.seeds.clone());
-    // Codes may have been trained: those of what is as it was found stay.
+    // Codes may have been trained: those of unchanged identities stay.
     for i in (0..n).filter(|i| !is_kept(*i) && stays[found.identity_of[*i] as usize]) {
         map.codes[i] = found.codes[i];
     }
@@ -66,7 +66,7 @@ pub(crate) fn joined(found: &SemanticMap, kept: &SemanticMap) -> SemanticMap {
     map
 }
 
-/// What is kept where something was found, by the number of that; nobody where little of it is kept, or nothing.
+/// Returns the kept twin of each found identity, by number; nobody if little or nothing of it is kept.
 fn twins(found: &SemanticMap, kept: &SemanticMap) -> Vec<IdentityId> {
     let (sizes, kept_sizes) = (found.sizes(), kept.sizes());
     let mut shared: Vec<BTreeMap<IdentityId, usize>> = vec![BTreeMap::new(); sizes.len()];
@@ -82,7 +82,7 @@ fn twins(found: &SemanticMap, kept: &SemanticMap) -> Vec<IdentityId> {
     let twin = |id: usize| {
         let left = sizes[id] - taken[id];
         let is_gone = taken[id] > 0 && (taken[id] > left || left < LEAST);
-        // What is most alike; of a whole and its only piece the whole, which has the lower number.
+        // The most alike; of a whole and its only piece the whole, which has the lower number.
         let alike = |by: IdentityId, both: usize| both as f64 / (sizes[id] + kept_sizes[by as usize] - both) as f64;
         let shared = shared[id].iter().map(|(by, both)| (*by, alike(*by, *both)));
         let most = shared.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));

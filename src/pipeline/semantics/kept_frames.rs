@@ -1,4 +1,4 @@
-//! Photos as SAM 2's encoder sees them, looked at once and kept on disk.
+//! Frames encoded by SAM 2, computed once and kept on disk.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -13,11 +13,11 @@ use crate::models::sam2::{EncodedFrame, Sam2};
 use crate::models::tensor::Tensor;
 use crate::scene::Photo;
 
-/// Frames that are looked at once, then read from disk.
+/// Frames that are encoded once, then read from disk.
 pub(super) struct KeptFrames<'a> {
     pub(super) photos: &'a [Photo],
     pub(super) folder: Option<PathBuf>,
-    /// The frame that was used last: it is asked for by every object.
+    /// The frame that was used last, because every object asks for it.
     pub(super) kept: Option<(usize, EncodedFrame)>,
     pub(super) secs: &'a mut f64,
 }
@@ -41,7 +41,7 @@ impl FrameSource for KeptFrames<'_> {
                 let picture =
                     picture.map_err(|e| ModelError::Metadata { path: shown.path.clone(), problem: e.to_string() })?;
                 let frame = model.encode(&picture)?;
-                // A full disk costs time later, nothing else.
+                // A failed write (a full disk) only costs time later.
                 let _ = file.as_deref().map(|file| write(file, &frame));
                 frame
             }
@@ -52,14 +52,14 @@ impl FrameSource for KeptFrames<'_> {
     }
 }
 
-/// The file in `folder` for what the `model` of this name and digest makes of a photo; another version of either
-/// has another.
+/// Returns the file in `folder` for a photo as encoded by the `model` of this name and digest; another version of
+/// either has another file.
 fn kept_file(folder: &Path, model: (&str, &str), photo: &Photo) -> PathBuf {
     let [now, first] = [kept_name, first_name].map(|name| folder.join(name(model, photo, written(photo))));
     files::renamed(now, first)
 }
 
-/// When a photo was written, if that is known.
+/// Time of the last change of a photo's file, if known.
 pub(super) fn written(photo: &Photo) -> Option<SystemTime> {
     std::fs::metadata(&photo.path).and_then(|m| m.modified()).ok()
 }
@@ -75,7 +75,7 @@ pub(super) fn kept_name((model, digest): (&str, &str), photo: &Photo, written: O
     format!("{model}-{}.frame", files::hex(&sum.finalize()[..12]))
 }
 
-/// What the first version called the file, by a digest that the standard library does not promise to keep.
+/// File name of the first version, by a digest that the standard library does not promise to keep.
 fn first_name((model, digest): (&str, &str), photo: &Photo, written: Option<SystemTime>) -> String {
     use std::hash::{DefaultHasher, Hash, Hasher};
     let mut hasher = DefaultHasher::new();
@@ -97,12 +97,12 @@ fn write(path: &Path, frame: &EncodedFrame) -> io::Result<()> {
     .map_err(io::Error::other)
 }
 
-/// A frame that was kept; `None` if there is none, or it is damaged.
+/// Reads a kept frame; `None` if there is none, or it is damaged.
 fn read(path: &Path) -> Option<EncodedFrame> {
     parse(&files::read(path, files::MAX_PICTURE_BYTES).ok()?)
 }
 
-/// The frame in the bytes of a kept file; `None` if they are damaged.
+/// Reads a frame from the bytes of a kept file; `None` if they are damaged.
 pub fn parse(mut bytes: &[u8]) -> Option<EncodedFrame> {
     let frame = EncodedFrame { embeddings: take(&mut bytes)?, fine: take(&mut bytes)?, middle: take(&mut bytes)? };
     bytes.is_empty().then_some(frame)
@@ -163,7 +163,7 @@ mod tests {
     fn frames_of_the_first_version_are_used_on() {
         let folder = tempfile::tempdir().expect("folder");
         let camera = crate::scene::Camera::look_at(glam::DVec3::ONE, glam::DVec3::ZERO, glam::DVec3::Z, 0.8, 64, 48);
-        // It is not there, so nobody knows when it was written.
+        // The file does not exist, so its time is unknown.
         let photo = Photo::new("a.jpg", "/one/fox/a.jpg", camera.expect("valid"));
         let model = ("sam2.1-tiny", "00ff");
         let old = folder.path().join("sam2.1-tiny-7228bc543858c811.frame");

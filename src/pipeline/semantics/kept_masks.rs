@@ -1,5 +1,5 @@
-//! What a network found in a photo, kept on disk: a search that was stopped goes on photo by photo, and one more search
-//! does not look again.
+//! Masks that a network found in a photo, kept on disk: a canceled search resumes photo by photo, and the next search
+//! does not run the network again.
 
 use std::path::{Path, PathBuf};
 
@@ -17,11 +17,11 @@ use crate::scene::{Level, Photo};
 /// Largest file of kept masks, bytes.
 const MOST_BYTES: u64 = 64 << 20;
 
-/// Masks of a segmenter, looked for once.
+/// Masks of a segmenter, computed once.
 pub(crate) struct KeptMasks {
     inner: Box<dyn Segmenter>,
     folder: PathBuf,
-    /// Digest of the network and of how it is asked.
+    /// Digest of the network and of its options.
     digest: String,
 }
 
@@ -33,7 +33,7 @@ struct KeptMask {
 }
 
 impl KeptMasks {
-    /// Keeps in `folder` what `inner` finds. `with` is all that its answers depend on, besides the photo.
+    /// Keeps the masks of `inner` in `folder`. `with` is everything that they depend on, besides the photo.
     pub(crate) fn new(inner: Box<dyn Segmenter>, folder: PathBuf, with: &[&[u8]]) -> Self {
         let mut sum = Sha256::new();
         for part in with {
@@ -71,7 +71,7 @@ impl Segmenter for KeptMasks {
             return Ok(kept);
         }
         let found = self.inner.segment(photo, max_side_px, observer)?;
-        // A full disk costs time later, nothing else.
+        // A failed write (a full disk) only costs time later.
         let _ = write(&file, &found);
         Ok(found)
     }
@@ -87,7 +87,7 @@ fn write(file: &Path, found: &[FoundMask]) -> std::io::Result<()> {
     atomic::write(file, |w| w.write_all(&text)).map_err(std::io::Error::other)
 }
 
-/// Masks of this size that were kept; `None` if there are none, or they are damaged.
+/// Reads kept masks of this size; `None` if there are none, or they are damaged.
 fn read(file: &Path, size_px: (u32, u32)) -> Option<Vec<FoundMask>> {
     let kept: Vec<KeptMask> = serde_json::from_slice(&files::read(file, MOST_BYTES).ok()?).ok()?;
     let found = |(i, kept): (usize, KeptMask)| {
@@ -106,7 +106,7 @@ mod tests {
     use std::sync::Arc;
     use std::sync::atomic::{AtomicUsize, Ordering};
 
-    /// Finds two masks, and counts how often it looks.
+    /// Finds two masks, and counts its calls.
     struct Counting(Arc<AtomicUsize>);
 
     impl Segmenter for Counting {
@@ -148,7 +148,7 @@ mod tests {
         open("one").segment(&photos[0], 32, &mut Silent).expect("found");
         open("two").segment(&photos[0], 64, &mut Silent).expect("found");
         assert_eq!(looks.load(Ordering::Relaxed), 4);
-        // What is damaged is looked for again.
+        // Damaged masks are computed again.
         let file = open("one").file(&photos[0], 64);
         let bytes = std::fs::read(&file).expect("kept");
         std::fs::write(&file, &bytes[..bytes.len() / 2]).expect("written");

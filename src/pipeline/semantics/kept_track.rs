@@ -1,5 +1,5 @@
-//! What SAM 2 has followed of one mask, kept on disk: tracking that was stopped goes on with the photo that it was at,
-//! and one more search with the same masks does not track again.
+//! Tracks of one mask by SAM 2, kept on disk: tracking that was canceled resumes with its next photo, and the next
+//! search with the same masks does not track again.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
@@ -16,10 +16,11 @@ use crate::scene::Mask;
 
 /// Largest file of kept masks, and largest record of a frame, bytes.
 const MOST_BYTES: u64 = 64 << 20;
-/// Bytes of a record before what it holds: its object, frame and direction, its length and its checksum.
+/// Bytes of a record before its content: its object, frame and direction, its length and its checksum.
 const HEAD: usize = 40;
 
-/// The masks of a track that is complete, one of each photo; `None` if there are none of these sizes, or they are damaged.
+/// Reads the masks of a complete track, one of each photo; `None` if there are none of these sizes, or they are
+/// damaged.
 pub(super) fn read(file: &Path, sizes: &[(usize, usize)]) -> Option<Vec<Mask>> {
     let kept: Vec<Rle> = serde_json::from_slice(&files::read(file, MOST_BYTES).ok()?).ok()?;
     let fits = |(rle, size): (&Rle, &(usize, usize))| rle.size_px() == (size.0 as u32, size.1 as u32);
@@ -27,7 +28,7 @@ pub(super) fn read(file: &Path, sizes: &[(usize, usize)]) -> Option<Vec<Mask>> {
     kept.iter().filter(|_| all_fit).map(|rle| rle.mask().ok()).collect::<Option<Vec<Mask>>>().filter(|_| all_fit)
 }
 
-/// Keeps the masks of a track that is complete; its frames are not needed any more.
+/// Writes the masks of a complete track; its frames are not needed any more.
 pub(super) fn write(file: &Path, masks: &[Mask]) -> io::Result<()> {
     let text = serde_json::to_vec(&masks.iter().map(Rle::of).collect::<Vec<_>>())?;
     atomic::write(file, |w| w.write_all(&text)).map_err(io::Error::other)?;
@@ -38,18 +39,18 @@ fn part(file: &Path) -> PathBuf {
     file.with_extension("part")
 }
 
-/// The frames of a track that is under way, one record after another in the order in which they were followed.
+/// Frames of an unfinished track, one record after another in the order of tracking.
 pub(super) struct KeptTrack {
-    /// Where the next record begins; `None` once it cannot be kept.
+    /// File, at the start of the next record; `None` once it cannot be kept.
     file: Option<BufReader<File>>,
     /// End of the last record that was read or written, bytes.
     end: u64,
-    /// Whether there may be more to read.
+    /// True while there may be more records to read.
     resumes: bool,
 }
 
 impl KeptTrack {
-    /// That whose masks will be in `file`; none is kept without.
+    /// Opens the track whose masks will be in `file`; without a file nothing is kept.
     pub(super) fn open(file: Option<&Path>) -> Self {
         let opened = file.and_then(|file| {
             file.parent().map(fs::create_dir_all).transpose().ok()?;
@@ -88,7 +89,7 @@ impl KeptTrack {
         record.extend(checksum(&held));
         record.extend(held);
         let file = file.get_mut();
-        // What was cut off, or is of another track, ends here.
+        // A record that is cut off or of another track, and all after it, are dropped.
         file.set_len(self.end)?;
         file.seek(SeekFrom::Start(self.end))?;
         file.write_all(&record)?;
@@ -105,7 +106,7 @@ impl TrackHistory for KeptTrack {
     }
 
     fn keep(&mut self, step: TrackStep, out: &Output) {
-        // A full disk costs time later, nothing else.
+        // A failed write (a full disk) only costs time later.
         if self.append(step, out).is_err() {
             self.file = None;
         }

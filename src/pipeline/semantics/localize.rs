@@ -5,52 +5,51 @@ use super::parse::ParsedQuery;
 use super::recipe::Strategy;
 use crate::scene::{Identities, IdentityId, Level, LevelFilter};
 
-/// Answers that are given at most.
+/// Most candidates in an answer.
 const TOP: usize = 8;
 
 /// Scores identities for phrases, by number less one; higher is better.
 pub trait Scorer {
-    /// Scores of all identities for a phrase. Where `against` is given, it is the phrase of the
-    /// whole, which then counts as another thing that a piece must be more than (the paper's
-    /// second step).
+    /// Returns the scores of all identities for a phrase. `against` is the phrase of the whole, which then counts as
+    /// one more canonical phrase that a piece must exceed (the paper's second step).
     fn scores(&mut self, phrase: &str, against: Option<&str>) -> Vec<f32>;
 
-    /// Score under which an identity is not what was asked for.
+    /// Score under which an identity is no answer.
     fn threshold(&self) -> f32;
 
     /// Difference of scores under which two identities cannot be told apart.
     fn resolution(&self) -> f32;
 
-    /// Whether an identity can be meant at all, though its score would do.
+    /// Returns whether an identity may be an answer; called if its score suffices.
     fn admits(&mut self, _phrase: &ParsedQuery, _hit: &Hit) -> bool {
         true
     }
 
-    /// Whether what fits best is not what was asked for, though its score would do.
+    /// Returns whether the best identity is to be rejected although its score suffices.
     fn rejects(&mut self, _phrase: &ParsedQuery, _hit: &Hit) -> bool {
         false
     }
 }
 
-/// An identity that may be meant.
+/// Candidate of an answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Which.
+    /// Identity of the candidate.
     pub identity: IdentityId,
     /// Its score.
     pub score: f32,
-    /// How much more than the runner-up.
+    /// Margin of its score over the runner-up.
     pub(crate) margin: f32,
 }
 
-/// What a query comes to.
+/// Outcome of a query.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Answer {
-    /// The first is meant; runners-up follow.
+    /// The first is the answer; runners-up follow.
     Found(Vec<Hit>),
-    /// The first two or more could be meant.
+    /// The first two or more are equally good answers.
     Ambiguous(Vec<Hit>),
-    /// Nothing fits; what fits best follows.
+    /// Nothing fits; the best candidates follow.
     NotFound(Vec<Hit>),
 }
 
@@ -62,7 +61,7 @@ impl Answer {
         }
     }
 
-    /// The same with so many candidates at most.
+    /// The same with at most `most` candidates.
     fn cut(mut self, most: usize) -> Self {
         match &mut self {
             Self::Found(hits) | Self::Ambiguous(hits) | Self::NotFound(hits) => hits.truncate(most),
@@ -70,7 +69,7 @@ impl Answer {
         self
     }
 
-    /// In a word or two: "found", "ambiguous" or "not found".
+    /// Outcome in a word or two: "found", "ambiguous" or "not found".
     pub(crate) fn verdict(&self) -> &'static str {
         match self {
             Self::Found(_) => "found",
@@ -80,7 +79,7 @@ impl Answer {
     }
 }
 
-/// Finds what `phrase` means among the identities.
+/// Finds the identities that `phrase` means.
 pub fn localize(
     identities: &Identities,
     phrase: &ParsedQuery,
@@ -108,7 +107,7 @@ pub fn localize(
     answer.cut(TOP)
 }
 
-/// What shares most with a text, whatever is meant by it.
+/// Returns the identities that share most with a text, without regard to its grammar.
 pub(super) fn nearest(identities: &Identities, text: &str, level: LevelFilter, scorer: &mut dyn Scorer) -> Vec<Hit> {
     let mut hits = ranked(identities, &scorer.scores(text, None), level);
     hits.retain(|hit| hit.score > 0.0);
@@ -116,7 +115,7 @@ pub(super) fn nearest(identities: &Identities, text: &str, level: LevelFilter, s
     hits
 }
 
-/// What is meant where these are called so as a whole; the others only come near.
+/// Answers with identities whose name is the whole text; the others are only near.
 pub(super) fn called(
     identities: &Identities,
     (ids, text): (&[IdentityId], &str),
@@ -132,7 +131,7 @@ pub(super) fn called(
     judge_first(identities, rank(candidates, &scores), most, scorer).cut(most)
 }
 
-/// What is meant by scores alone.
+/// Answers by scores alone.
 fn meant(
     identities: &Identities,
     phrase: &ParsedQuery,
@@ -160,7 +159,7 @@ fn meant(
     }
 }
 
-/// One ranking of all identities of a level.
+/// Ranks all identities of a level once.
 fn once(identities: &Identities, text: &str, level: LevelFilter, scorer: &mut dyn Scorer) -> Answer {
     let scores = scorer.scores(text, None);
     judge(identities, ranked(identities, &scores, level), scorer)
@@ -175,8 +174,8 @@ fn winning_object(identities: &Identities, ranked: &[Hit]) -> Option<IdentityId>
     identities.get(first).filter(|i| i.level == Level::Object).map(|_| first)
 }
 
-/// The paper's steps: the whole query first; if an object wins, its parts compete, with the object's phrase among the
-/// canonical ones.
+/// Follows the paper's steps: the whole query first; if an object wins, its parts compete, with the object's phrase
+/// among the canonical ones.
 fn two_steps(identities: &Identities, phrase: &ParsedQuery, level: LevelFilter, scorer: &mut dyn Scorer) -> Answer {
     let text = phrase.text.as_str();
     let step1 = scorer.scores(text, None);
@@ -186,7 +185,7 @@ fn two_steps(identities: &Identities, phrase: &ParsedQuery, level: LevelFilter, 
     };
     let whole = phrase.whole.as_deref().or_else(|| implied(phrase, object, scorer));
     match (whole, &phrase.whole, level) {
-        // Without grammar, only what the object's phrase alone describes as well may be about a piece.
+        // Without grammar, a query is about a piece only if the object's phrase alone describes the object as well.
         (None, _, LevelFilter::Auto | LevelFilter::Object) => return judge(identities, hits, scorer),
         (Some(whole), None, LevelFilter::Auto) => return part_or_object(identities, text, whole, hits, scorer),
         _ => {}
@@ -197,7 +196,7 @@ fn two_steps(identities: &Identities, phrase: &ParsedQuery, level: LevelFilter, 
         return Answer::NotFound(hits);
     }
     if pieces.is_empty() {
-        // Where nothing is never the answer, what is most like the question is.
+        // If nothing is rejected, the identity most like the query is the answer.
         let never = scorer.threshold() <= 0.0;
         return if never { once(identities, text, level, scorer) } else { Answer::NotFound(hits) };
     }
@@ -207,8 +206,8 @@ fn two_steps(identities: &Identities, phrase: &ParsedQuery, level: LevelFilter, 
     judge(identities, rank(pieces.into_iter(), if usable { &against } else { &step1 }), scorer)
 }
 
-/// The phrase of the whole in a query that does not say what it is a piece of: all but its last word ("bear nose"),
-/// if that describes the object at least as well as all of it.
+/// Returns the phrase of the whole in a query without grammar: all but its last word ("bear nose"), if that describes
+/// the object at least as well as the entire query.
 fn implied<'a>(phrase: &'a ParsedQuery, object: IdentityId, scorer: &mut dyn Scorer) -> Option<&'a str> {
     let whole = phrase.implied_whole()?;
     let by = |text: &str, scorer: &mut dyn Scorer| scorer.scores(text, None)[object as usize - 1];
@@ -216,8 +215,8 @@ fn implied<'a>(phrase: &'a ParsedQuery, object: IdentityId, scorer: &mut dyn Sco
     (by_whole >= by_all && by_whole > 0.0).then_some(whole)
 }
 
-/// The part of the winning object that is more like the query than like the object's phrase, if there is one, else
-/// the object.
+/// Returns the part of the winning object that is more like the query than like the object's phrase, if there is one,
+/// else the object.
 fn part_or_object(identities: &Identities, text: &str, whole: &str, hits: Vec<Hit>, scorer: &mut dyn Scorer) -> Answer {
     let object = hits[0];
     let against = scorer.scores(text, Some(whole));
@@ -230,7 +229,7 @@ fn part_or_object(identities: &Identities, text: &str, whole: &str, hits: Vec<Hi
     }
 }
 
-/// Parts by both phrases at once: the mean of both scores on the logistic scale, on which they are
+/// Ranks parts by both phrases at once: by the mean of both scores on the logistic scale, on which they are
 /// differences of similarity.
 fn jointly(identities: &Identities, text: &str, whole: &str, scorer: &mut dyn Scorer) -> Answer {
     let (by_text, by_whole) = (scorer.scores(text, None), scorer.scores(whole, None));
@@ -241,7 +240,7 @@ fn jointly(identities: &Identities, text: &str, whole: &str, scorer: &mut dyn Sc
     let both: Vec<f32> = identities
         .iter()
         .map(|(id, _)| {
-            // The nearest thing around it that fits the whole best; parts may have parts.
+            // The enclosing identity that fits the whole best; parts may have parts.
             let around = identities.ancestors(id).skip(1).map(|i| by_whole[i as usize - 1]).fold(0.0, f32::max);
             1.0 / (1.0 + (-0.5 * (logit(by_text[id as usize - 1]) + logit(around))).exp())
         })
@@ -250,12 +249,12 @@ fn jointly(identities: &Identities, text: &str, whole: &str, scorer: &mut dyn Sc
     judge(identities, rank(pieces, &both), scorer)
 }
 
-/// Whether `id` is a piece of `whole`, directly or not.
+/// Returns whether `id` is a piece of `whole`, directly or not.
 fn is_piece(identities: &Identities, id: IdentityId, whole: IdentityId) -> bool {
     identities.ancestors(id).skip(1).any(|i| i == whole)
 }
 
-/// Step 1 finds the whole; in step 2 only its pieces compete.
+/// Finds the whole in step 1; in step 2 only its pieces compete.
 fn piece_of(identities: &Identities, piece: &str, whole: &str, scorer: &mut dyn Scorer) -> Answer {
     let step1 = scorer.scores(whole, None);
     // Wholes may be parts themselves: "the pupil of the eye".
@@ -277,7 +276,7 @@ fn piece_of(identities: &Identities, piece: &str, whole: &str, scorer: &mut dyn 
     judge(identities, hits, scorer)
 }
 
-/// Candidates by falling score; equal ones by number. A score that is no number is none.
+/// Ranks candidates by falling score; equal ones by number. NaN scores are left out.
 fn rank(candidates: impl Iterator<Item = IdentityId>, scores: &[f32]) -> Vec<Hit> {
     let hit = |id: IdentityId| Hit { identity: id, score: scores[id as usize - 1], margin: 0.0 };
     let mut hits: Vec<Hit> = candidates.map(hit).filter(|h| !h.score.is_nan()).collect();
@@ -292,12 +291,12 @@ fn with_margins(mut hits: Vec<Hit>) -> Vec<Hit> {
     hits
 }
 
-/// Whether the first hit is meant, nothing is, or others could be as well.
+/// Decides whether the first hit is the answer, nothing is, or others are equally good.
 fn judge(identities: &Identities, hits: Vec<Hit>, scorer: &dyn Scorer) -> Answer {
     judge_first(identities, hits, TOP, scorer)
 }
 
-/// The same, where so many of the first count.
+/// The same, with at most `most` equal hits.
 fn judge_first(identities: &Identities, hits: Vec<Hit>, most: usize, scorer: &dyn Scorer) -> Answer {
     let Some(first) = hits.first().filter(|h| h.score > 0.0 && h.score >= scorer.threshold()) else {
         return Answer::NotFound(hits);

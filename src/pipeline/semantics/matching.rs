@@ -1,5 +1,4 @@
-//! From a target to its pixels and its Gaussians: those whose code is within a tolerance per channel
-//! of the target's.
+//! Pixels and Gaussians of a target: those whose code is within a tolerance per channel of the target's.
 //!
 //! In `exact` mode a pixel has the code of the identity of largest weight, so at the usual tolerance
 //! the match is that identity; a wider one takes in what lies near it in code space. In `blend` mode
@@ -12,7 +11,7 @@ use super::codes::matches;
 use super::view_map::ViewMap;
 use crate::scene::{Identities, IdentityId, Level, Mask, SemanticMap};
 
-/// Where the codes of pixels come from.
+/// Source of the codes of pixels.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum, strum::Display)]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
@@ -26,8 +25,8 @@ pub enum MatchMode {
     Relevancy,
 }
 
-/// For each number from 0, whether what has that identity matches the target: its code, or that of
-/// something it is a piece of, is within `tolerance` of the target's.
+/// Returns, for each number from 0, whether the identity matches the target: its code, or that of one of its wholes,
+/// is within `tolerance` of the target's.
 pub(crate) fn matching(identities: &Identities, target: IdentityId, tolerance: f32) -> Vec<bool> {
     let mut found = vec![false; identities.len() + 1];
     let Some(wanted) = identities.get(target) else { return found };
@@ -38,7 +37,7 @@ pub(crate) fn matching(identities: &Identities, target: IdentityId, tolerance: f
     found
 }
 
-/// The target's pixels; without blended codes, by the winning identities.
+/// Pixels of the target; by the winning identities if there are no blended codes.
 pub(crate) fn pixels(
     (map, codes): (&ViewMap, Option<&CodeMap>),
     identities: &Identities,
@@ -52,17 +51,16 @@ pub(crate) fn pixels(
     }
 }
 
-/// The target's pixels by the winning identities.
+/// Pixels of the target by the winning identities.
 pub(crate) fn exact(map: &ViewMap, identities: &Identities, target: IdentityId, tolerance: f32) -> Mask {
     let mut found = matching(identities, target, tolerance);
-    // One more entry for numbers that nobody has.
+    // One more entry for numbers without an identity.
     found.push(false);
     let last = found.len() - 1;
     Mask::from_fn(map.width_px, map.height_px, |i| found[(map.identity[i] as usize).min(last)])
 }
 
-/// The target's pixels by blended codes. Pieces of the target that have codes of their own belong to
-/// it.
+/// Pixels of the target by blended codes. Pieces of the target that have codes of their own belong to it.
 pub fn blend(map: &CodeMap, identities: &Identities, target: IdentityId, tolerance: f32) -> Mask {
     let mut mask = Mask::empty(map.width_px, map.height_px);
     for (level, code) in codes_of(identities, target) {
@@ -79,7 +77,7 @@ pub fn blend(map: &CodeMap, identities: &Identities, target: IdentityId, toleran
     mask
 }
 
-/// The target's Gaussians, by the same match.
+/// Gaussians of the target, by the same match.
 pub(crate) fn gaussians(map: &SemanticMap, target: IdentityId, mode: MatchMode, tolerance: f32) -> Vec<bool> {
     match mode {
         MatchMode::Identities | MatchMode::Relevancy => {
@@ -98,7 +96,7 @@ pub(crate) fn gaussians(map: &SemanticMap, target: IdentityId, mode: MatchMode, 
     }
 }
 
-/// The codes that mean the target: its own, and for a part those of its pieces.
+/// Codes of the target: its own, and for a part those of its pieces.
 fn codes_of(identities: &Identities, target: IdentityId) -> Vec<(Level, [f32; 3])> {
     let Some(wanted) = identities.get(target) else { return Vec::new() };
     let inside = identities.descendants(target);
@@ -152,7 +150,7 @@ mod tests {
             assert_eq!(exact(&view, &map.identities, target, tolerance), wanted);
             assert_eq!(blend(&codes, &map.identities, target, tolerance), wanted);
         }
-        // Half the light of the doll, half of the background: nobody.
+        // Half the light of the doll, half of the background: neither.
         codes.planes[0][0] = 0.5 * (codes.planes[0][0] + BACKGROUND_CODE[0]);
         codes.planes[0][2] = f32::NAN;
         assert_eq!(blend(&codes, &map.identities, 1, 0.02).area(), 1);

@@ -1,12 +1,14 @@
-//! Objects and their parts: found in photos, carried to every view by the Gaussians, named, asked
-//! for (the paper's Method).
+//! Objects and their parts: found in photos, carried to every view by the Gaussians, named and queried (the paper's
+//! Method).
 //!
-//! In the order of the data: [`segmenter`] finds masks ([`regions`] without any model; [`filters`]
-//! tell objects from parts), [`tracker`] makes them identities over all views, [`votes`] gives every Gaussian its
-//! identity, [`codes`] every identity its point in code space, [`view_map`] draws identities into a view;
-//! [`parse`] takes a query apart, [`reading`] mends its slips and reads noun compounds, [`names`] and
-//! [`by_embedding`] score identities for it by name and by embedding, [`grounds`] say which words an answer rests
-//! on, [`localize`] picks those that are meant, and [`answer`] puts it together, with the time of each of the [`timing`] stages.
+//! In the order of the data: [`segmenter`] finds masks ([`regions`] without any model), and [`filters`] sort them into
+//! objects and parts. [`tracker`] makes them identities over all views. [`votes`] gives every Gaussian its identity,
+//! [`codes`] every identity its point in code space. [`view_map`] renders identities into a view.
+//!
+//! For a query: [`parse`] takes it apart, and [`reading`] mends its slips and reads noun compounds. [`names`] and
+//! [`by_embedding`] score identities by name and by embedding. [`grounds`] say which words an answer rests on, and
+//! [`localize`] picks the identities of the answer. [`answer`] puts it together, with the time of each of the
+//! [`timing`] stages.
 
 pub(crate) mod add_photo;
 pub mod answer;

@@ -1,5 +1,5 @@
-//! Identities found by their names: exactly, or by the words they share. Needs no network and knows
-//! no language; slips are mended before ([`super::reading`]).
+//! Identities found by their names: exactly, or by shared words. Needs no network and is independent of the language;
+//! slips are mended before ([`super::reading`]).
 
 use std::collections::HashSet;
 
@@ -12,9 +12,9 @@ use super::{colors, grounds};
 use crate::scene::identity::whole_names::key;
 use crate::scene::{Identities, IdentityId};
 
-/// Score under which a name is not what was asked for.
+/// Score under which a name is no answer.
 pub(crate) const THRESHOLD: f32 = 0.45;
-/// Difference of scores under which two names fit alike.
+/// Difference of scores under which two names fit equally well.
 pub(crate) const RESOLUTION: f32 = 0.02;
 
 /// Scores by names alone.
@@ -49,7 +49,7 @@ impl Scorer for ByName<'_> {
     }
 }
 
-/// Whether names say that none of `ids` is meant: another color or number, or nothing in common but a color.
+/// Returns whether names exclude all of `ids`: another color or number, or nothing in common but a color.
 fn is_another(identities: &Identities, phrase: &str, ids: impl Iterator<Item = IdentityId>) -> bool {
     let (asked, kind) = (colors::said(phrase), colors::without(phrase));
     let numbers = |text: &str| words(text).into_iter().filter(|w| w.bytes().all(|b| b.is_ascii_digit())).collect();
@@ -67,33 +67,33 @@ fn is_another(identities: &Identities, phrase: &str, ids: impl Iterator<Item = I
     named.peek().is_some() && !named.any(|i| i.names.iter().any(fits))
 }
 
-/// Score of every identity for a phrase, by number less one: 1 for the same name, 0 for nothing in
-/// common or no name.
+/// Returns the score of every identity for a phrase, by number less one: 1 for the same name, 0 for nothing in common
+/// or no name.
 pub(crate) fn scores(identities: &Identities, phrase: &str) -> Vec<f32> {
     let wanted = words(phrase);
     let score = |names: &[String]| names.iter().map(|n| similarity(&wanted, &words(n))).fold(0.0, f64::max);
-    // What has no name is called by its number, and by nothing that looks like it.
+    // An identity without a name is called by its exact number, not by similar text.
     let number = |id: IdentityId| f64::from(u8::from(identities.name(id) == phrase.trim()));
     let either = |id: IdentityId, names: &[String]| if names.is_empty() { number(id) } else { score(names) };
     identities.iter().map(|(id, i)| either(id, &i.names) as f32).collect()
 }
 
-/// The words of a phrase that neither names nor an encoder know: `to_encoder` are those that the
-/// encoder does not, if there is one.
+/// Returns the words of a phrase that neither names nor an encoder know: `to_encoder` are the words unknown to the
+/// encoder, if there is one.
 pub(crate) fn unknown_to_all(identities: &Identities, phrase: &str, to_encoder: Option<&[String]>) -> Vec<String> {
     let mut unknown = unknown_words(identities, phrase);
     unknown.retain(|w| to_encoder.is_none_or(|words| words.contains(w)));
     unknown
 }
 
-/// The words of a phrase that no name in the scene has; articles and the like left out.
+/// Returns the words of a phrase that no name in the scene has; articles and the like are left out.
 pub(crate) fn unknown_words(identities: &Identities, phrase: &str) -> Vec<String> {
     let known: HashSet<String> = identities.iter().flat_map(|(_, i)| &i.names).flat_map(|n| words(n)).collect();
     let numbers = identities.iter().filter(|(_, i)| i.names.is_empty()).map(|(id, _)| id.to_string());
     not_in(phrase, &known.into_iter().chain(numbers).collect())
 }
 
-/// Whether a phrase means what was taken out of the scene: it says a name of that, and nothing but such names.
+/// Returns whether a phrase means a removed thing: it has a removed name, and no words but those of such names.
 pub(crate) fn was_removed(identities: &Identities, phrase: &str) -> bool {
     let (said, names) = (words(phrase), identities.removed.iter().map(|name| words(name)));
     let known: HashSet<String> = names.clone().flatten().collect();
@@ -101,7 +101,7 @@ pub(crate) fn was_removed(identities: &Identities, phrase: &str) -> bool {
     not_in(phrase, &known).is_empty() && names.into_iter().any(is_said)
 }
 
-/// Full names for a phrase that is being typed, by any name, best first.
+/// Returns full names that complete a typed phrase, by any name, best first.
 pub(crate) fn completions(identities: &Identities, typed: &str, most: usize) -> Vec<String> {
     let typed = key(typed);
     let mut all = Vec::new();
@@ -115,7 +115,7 @@ pub(crate) fn completions(identities: &Identities, typed: &str, most: usize) -> 
     all.into_iter().map(|(.., full)| full).take(most).collect()
 }
 
-/// Harmonic mean of how much of the phrase is in the name and how much of the name in the phrase.
+/// Harmonic mean of the phrase's share in the name and the name's share in the phrase.
 fn similarity(phrase: &[String], name: &[String]) -> f64 {
     let covered =
         |of: &[String], by: &[String]| of.iter().filter(|w| by.contains(w)).count() as f64 / of.len().max(1) as f64;

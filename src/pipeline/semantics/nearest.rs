@@ -6,7 +6,7 @@ use rstar::primitives::GeomWithData;
 
 use crate::scene::GaussianCloud;
 
-/// Of every Gaussian, the `n` that are nearest to it, by index and squared distance, nearest first.
+/// Returns, for every Gaussian, its `n` nearest ones, by index and squared distance, nearest first.
 pub(super) fn nearest(cloud: &GaussianCloud, n: usize) -> Vec<Vec<(usize, f64)>> {
     let points: Vec<GeomWithData<[f64; 3], usize>> =
         cloud.positions.iter().enumerate().map(|(i, p)| GeomWithData::new(p.map(f64::from), i)).collect();

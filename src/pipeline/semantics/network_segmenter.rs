@@ -1,5 +1,5 @@
-//! Masks found by a network (SAM, SAM 2) that is asked for everything in a photo, sorted into objects
-//! and parts by the paper's filters.
+//! Masks of everything in a photo, found by a network (SAM, SAM 2) and sorted into objects and parts by the paper's
+//! filters.
 
 use std::path::PathBuf;
 
@@ -19,26 +19,26 @@ use crate::scene::{Level, Mask, MaskGrid, Photo, PhotoPixels};
 pub(crate) struct NetworkMasks {
     pub(crate) network: Box<dyn PromptedMasks>,
     pub(crate) options: AutomaticOptions,
-    /// Which of those are objects, and parts.
+    /// Filters that sort the masks into objects and parts.
     pub(crate) filters: FilterOptions,
-    /// Whether each object's own tile is segmented for its parts, as the paper does: finer, for the time
-    /// of one more look per object.
+    /// True if each object's own tile is segmented for its parts, as in the paper: finer, for one more network run
+    /// per object.
     pub(crate) tiles: bool,
-    /// Points along a side of the grid on those.
+    /// Points along a side of the grid on a tile.
     tile_points: usize,
 }
 
-/// Overlap from which the less sure of two masks is left out (LangSplat's).
+/// Overlap from which the less certain of two masks is left out (LangSplat's).
 const MASK_NMS: f64 = 0.8;
 /// Predicted IoU times stability from which a mask is taken (LangSplat's).
 const LEAST_SCORE: f32 = 0.7;
-/// Points along a side of the grid on a tile, for networks that are made for small machines.
+/// Points along a side of the grid on a tile, for small networks.
 const TILE_POINTS_OF_SMALL: usize = 16;
-/// Side of an object's box from which its tile is worth a look of its own, px.
+/// Side of an object's box from which its tile is segmented, px.
 const LEAST_TILE_PX: usize = 32;
 
 impl NetworkMasks {
-    /// The network of this name: a model of the catalog, or the path of a model's description.
+    /// Opens the network of this name: a model of the catalog, or the path of a model's description.
     pub(crate) fn open(name: &str, grid: MaskGrid) -> Result<Self, ModelError> {
         let path = catalog::find(name, ModelRole::Segmenter)?;
         let mut options = AutomaticOptions { sparing: grid == MaskGrid::Sparing, ..AutomaticOptions::default() };
@@ -47,7 +47,7 @@ impl NetworkMasks {
             "sam" => {
                 let sam = Sam::open(&path)?;
                 if sam.is_small() {
-                    // As its makers use it, so that a photo takes less than a minute.
+                    // The setting of its authors; a photo takes less than a minute.
                     options.crop_layers = 0;
                     tile_points = TILE_POINTS_OF_SMALL;
                 }
@@ -63,7 +63,7 @@ impl NetworkMasks {
         Ok(Self { network, options, filters: FilterOptions::default(), tiles: true, tile_points })
     }
 
-    /// The same, which looks at a photo once: its answers are kept in `folder`.
+    /// The same, with its masks kept in `folder`.
     pub(crate) fn open_kept(name: &str, grid: MaskGrid, folder: PathBuf) -> Result<KeptMasks, FindError> {
         let path = catalog::find(name, ModelRole::Segmenter)?;
         let open = Self::open(name, grid)?;
@@ -73,7 +73,7 @@ impl NetworkMasks {
         Ok(KeptMasks::new(Box::new(open), folder, &[&description, asked.as_bytes()]))
     }
 
-    /// What the network finds in a picture, told as a share of `of` looks of which `done` are done.
+    /// Finds masks in a picture and reports progress as a share of all runs.
     fn look(
         &mut self,
         picture: &PhotoPixels,
@@ -90,7 +90,7 @@ impl NetworkMasks {
         Ok(distinct(found))
     }
 
-    /// Masks inside an object's tile, in px of the whole picture.
+    /// Finds masks inside an object's tile, in px of the whole picture.
     fn look_closer(
         &mut self,
         picture: &PhotoPixels,
@@ -117,27 +117,27 @@ impl NetworkMasks {
     }
 }
 
-/// Passes progress on, and the wish to stop.
+/// Reports progress and passes on cancellation.
 struct Watch<'a> {
     observer: &'a mut dyn Observer,
     ticker: Ticker,
-    /// Looks that are done, and all of them.
+    /// Runs that are done, and all of them.
     done: f64,
     all: f64,
 }
 
 impl Watch<'_> {
-    /// Reports that this share of a look is done, and asks whether to go on.
+    /// Reports this share of a run, and returns an error on cancellation.
     fn tick(&mut self, share: f64) -> Result<(), Interrupted> {
-        // In hundredths of a look.
+        // In hundredths of a run.
         let [done, all] = [self.done + share, self.all].map(|looks| (100.0 * looks) as u64);
         self.ticker.total = all;
         self.ticker.tick(done as usize, self.observer)
     }
 }
 
-/// Masks that are sure enough, without those that all but repeat a surer one. Masks inside others
-/// stay, other than LangSplat's: they are what parts are made of.
+/// Returns masks that are certain enough, without near copies of more certain ones. Unlike in LangSplat, masks inside
+/// others stay: they become parts.
 fn distinct(mut found: Vec<AutomaticMask>) -> Vec<Mask> {
     let score = |f: &AutomaticMask| f.predicted_iou * f.stability;
     found.retain(|f| score(f) >= LEAST_SCORE);
@@ -182,7 +182,7 @@ impl Segmenter for NetworkMasks {
     }
 }
 
-/// Objects, largest first, then their parts among all masks; none has a name.
+/// Returns the objects, largest first, then their parts among all masks, without names.
 fn sorted(objects: Vec<filters::Kept>, masks: &[Mask], options: &FilterOptions) -> Vec<FoundMask> {
     let (mut found, mut parts) = (Vec::new(), Vec::new());
     for (parent, object) in objects.into_iter().enumerate() {
@@ -205,7 +205,7 @@ mod tests {
         let (options, masks) = (FilterOptions::default(), [mask(10, 20), mask(0, 50), mask(60, 90), mask(61, 90)]);
         let found = sorted(filters::objects(&masks, &options), &masks, &options);
         let list: Vec<_> = found.iter().map(|f| (f.level, f.parent, f.mask.area())).collect();
-        // What is nearly all of something is that thing.
+        // A mask of nearly all of an object is that object.
         assert_eq!(list, [(Level::Object, None, 50), (Level::Object, None, 30), (Level::Part, Some(0), 10)]);
     }
 

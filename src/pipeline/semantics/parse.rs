@@ -1,18 +1,18 @@
-//! What a typed query asks for: a thing, or a piece of a thing.
+//! Parser of typed queries: for a thing, or for a piece of a thing.
 
 use crate::scene::identity::whole_names::BETWEEN;
 
-/// Longest query that is looked at, in characters.
+/// Longest query, in characters; the rest is ignored.
 pub(crate) const MAX_CHARS: usize = 300;
 
-/// A query taken apart.
+/// Parsed query.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct ParsedQuery {
-    /// All of it, lower case, without what carries nothing.
+    /// The whole query in lower case, without words that carry nothing.
     pub text: String,
-    /// What is looked for.
+    /// Phrase of the queried thing or piece.
     pub target: String,
-    /// What it is a piece of, if the query says so.
+    /// Phrase of the whole, if the query is for a piece.
     pub whole: Option<String>,
 }
 
@@ -24,22 +24,22 @@ const ARTICLES: [&str; 14] =
 /// Characters between a whole and its piece where words are not spaced.
 const WHOLE_S: [char; 2] = ['的', 'の'];
 
-/// Whether a word carries nothing by itself: an article, or one between a piece and its whole.
+/// Returns whether a word carries nothing by itself: an article, or a word between a piece and its whole.
 pub(crate) fn is_glue(word: &str) -> bool {
     ARTICLES.contains(&word) || PIECE_OF.contains(&word)
 }
 
 impl ParsedQuery {
-    /// Takes a query apart; `None` if there is nothing in it.
+    /// Parses a query; `None` if there is nothing in it.
     ///
-    /// Understood are "X of the Y" (and "on", "from", and the like in some other languages), "Y's
+    /// The grammar has "X of the Y" (and "on", "from", and the like in some other languages), "Y's
     /// X", and `Y的X`, `YのX`. The last such word parts the query, so that "the eye of the face of
-    /// the doll" is about the doll's. "X · Y" is what full names look like.
+    /// the doll" is about the doll's. "X · Y" is the form of full names.
     pub fn parse(query: &str) -> Option<Self> {
         Self::partings(query).into_iter().next()
     }
 
-    /// All ways to take a query apart, the best first; as one phrase if there is none.
+    /// Returns all ways to divide a query, the best first; as one phrase if there is none.
     pub(crate) fn partings(query: &str) -> Vec<Self> {
         let text: String = query.chars().take(MAX_CHARS).collect::<String>().to_lowercase();
         let text = text.replace(['\u{2019}', '\u{2018}', '`'], "'");
@@ -71,19 +71,19 @@ impl ParsedQuery {
         vec![Self { text, target, whole }]
     }
 
-    /// All of a text as one phrase.
+    /// Returns a text as one phrase.
     pub(crate) fn undivided(text: String) -> Self {
         Self { target: text.clone(), text, whole: None }
     }
 
-    /// What "X Y" is a piece of, if it is one: all but the last word of a query that does not say so by its grammar.
+    /// Returns the whole of "X Y" without grammar: all words of the query but the last.
     pub(crate) fn implied_whole(&self) -> Option<&str> {
         let (whole, _) = self.text.rsplit_once(' ')?;
         self.whole.is_none().then_some(whole)
     }
 }
 
-/// The words of a text, without marks.
+/// Returns the words of a text, without punctuation.
 fn split(text: &str) -> Vec<&str> {
     let apart = text.split(|c: char| c.is_whitespace() || c.is_control() || "\"?!,;:()[]{}".contains(c));
     apart.map(|w| w.trim_end_matches('.')).filter(|w| !w.is_empty()).collect()
@@ -93,7 +93,7 @@ fn both(all: &[&str], piece: &[&str], whole: &[&str]) -> Option<ParsedQuery> {
     Some(ParsedQuery { text: phrase(all)?, target: phrase(piece)?, whole: Some(phrase(whole)?) })
 }
 
-/// The words without articles at the beginning; `None` if no letter or digit is left.
+/// Joins the words without articles at the beginning; `None` if no letter or digit is left.
 fn phrase(words: &[&str]) -> Option<String> {
     let start = words.iter().position(|w| !ARTICLES.contains(w)).unwrap_or(words.len());
     let text = words[start..].join(" ");

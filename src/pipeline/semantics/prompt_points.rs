@@ -1,9 +1,9 @@
-//! Points drawn from a mask (the paper's `GenPrompt`): where it is thickest, then wherever is far from its edge and from
-//! the points before. The middle of a mask may lie outside of it.
+//! Points drawn from a mask (the paper's `GenPrompt`): the first where it is thickest, the others far from its edge
+//! and from earlier points. The middle of a mask may lie outside of it.
 
 use crate::scene::Mask;
 
-/// Points at most.
+/// Most points.
 const MOST: usize = 5;
 
 /// Points inside a mask, px, each with `true`: the object is there. None of an empty mask.
@@ -28,7 +28,7 @@ pub(super) fn prompt_points(mask: &Mask) -> Vec<([f32; 2], bool)> {
     points.into_iter().map(|i| ([(i % width) as f32 + 0.5, (i / width) as f32 + 0.5], true)).collect()
 }
 
-/// How far each pixel of a mask is from what is outside of it, px: chamfer distances with steps of 1 and 1.41.
+/// Distance of each pixel of a mask to the outside, px: chamfer distances with steps of 1 and 1.41.
 fn depths(mask: &Mask) -> Vec<f32> {
     let (w, h) = (mask.width_px(), mask.height_px());
     let mut depth: Vec<f32> = (0..w * h).map(|i| if mask.contains(i) { f32::INFINITY } else { 0.0 }).collect();

@@ -1,5 +1,4 @@
-//! Identities of Gaussians that no labeled photo saw: those of the Gaussians they hang together
-//! with.
+//! Identities of Gaussians that no labeled photo saw, inherited from nearby Gaussians.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -12,12 +11,12 @@ use crate::scene::{GaussianCloud, NOBODY};
 
 /// Neighbors of a Gaussian.
 const NEIGHBORS: usize = 8;
-/// How many usual distances between neighbors a full step in color is as far as.
+/// Length of a full step in color, in typical distances between neighbors.
 const COLOR_WEIGHT: f64 = 12.0;
 
-/// Every Gaussian without a vote inherits from the one with a vote that is nearest along the
-/// graph of neighbors, where a step is longer the more the colors differ, if that is not farther than `farthest` usual
-/// distances between neighbors. What is nobody's is inherited like the rest, and is what is left where nothing is near.
+/// Labels every Gaussian without a vote like the nearest one with a vote along the graph of neighbors, up to
+/// `farthest` typical distances between neighbors. Steps are longer the more the colors differ. Unlabeled Gaussians
+/// are inherited from like the rest; without any near vote, a Gaussian becomes unlabeled.
 pub(crate) fn extend(cloud: &GaussianCloud, assignments: &mut [Assignment], farthest: f64) {
     if assignments.iter().all(|b| b.identity != UNKNOWN) {
         return;
@@ -33,7 +32,7 @@ pub(crate) fn extend(cloud: &GaussianCloud, assignments: &mut [Assignment], fart
         d / spacing + COLOR_WEIGHT * a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
     };
 
-    // Neighborship counts in both directions: lonely Gaussians know others that do not know them.
+    // Edges count in both directions: isolated Gaussians have neighbors that do not have them.
     let mut edges: Vec<Vec<(usize, f64)>> = vec![Vec::new(); near.len()];
     for (i, neighbors) in near.iter().enumerate() {
         for &(j, far2) in neighbors {

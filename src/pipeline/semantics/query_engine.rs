@@ -1,5 +1,5 @@
-//! Asking a scene: from a typed text to an answer, with the encoder that looked at the scene's identities,
-//! if one has, and the phrases that it has read so far.
+//! Queries to a scene: from a typed text to an answer, with the encoder of the scene's identities, if there is one,
+//! and the phrases that it has encoded.
 
 use std::time::Instant;
 
@@ -13,7 +13,7 @@ use super::timing::{StagesMs, ms_since};
 use crate::models::{self, Encoder, ModelError, TextSource};
 use crate::scene::{Identities, LanguageFeatures, LevelFilter, SemanticMap};
 
-/// What answers questions about a scene; without an encoder, by names alone.
+/// Answers questions about a scene; without an encoder, by names alone.
 #[derive(Default)]
 pub(crate) struct QueryEngine {
     encoder: Option<Box<dyn Encoder>>,
@@ -22,7 +22,7 @@ pub(crate) struct QueryEngine {
 }
 
 impl QueryEngine {
-    /// With the encoder that looked at the scene's identities, if one has.
+    /// Opens the encoder of the scene's identities, if there is one.
     pub(crate) fn new(language: Option<&LanguageFeatures>, recipe: Recipe) -> Result<Self, ModelError> {
         let language = language.filter(|_| recipe.understanding != Understanding::Names);
         let encoder = language.map(|language| models::encoder(&language.encoder)).transpose()?;
@@ -40,12 +40,12 @@ impl QueryEngine {
         reading.map(|reading| self.answer(map, &reading, level)).transpose()
     }
 
-    /// Answers by this recipe from now on, with the encoder that is there.
+    /// Answers by this recipe from now on, with the same encoder.
     pub(crate) fn answer_by(&mut self, recipe: Recipe) {
         self.recipe = recipe;
     }
 
-    /// The canonical phrases of the recipe that the encoder could not read.
+    /// Returns the canonical phrases of the recipe that the encoder could not read.
     pub(crate) fn unread(&self) -> Vec<String> {
         let missing = |p: &&str| self.phrases.is_unreadable(p);
         self.recipe.canonical.iter().filter(missing).map(str::to_owned).collect()
@@ -56,7 +56,7 @@ impl QueryEngine {
         QueryReading::new(identities, text, level, &self.recipe)
     }
 
-    /// Answers a question that was read.
+    /// Answers a question that was read before.
     ///
     /// # Errors
     /// If the encoder fails.
@@ -71,7 +71,7 @@ impl QueryEngine {
         let known = match self.encoder.as_mut().filter(|_| wanted) {
             Some(encoder) => match self.phrases.learn(&reading.phrase, &self.recipe, &mut **encoder) {
                 Ok(()) => true,
-                // Words that nobody knows are no failure: names may know them.
+                // Words that the encoder does not know are no failure: names may know them.
                 Err(ModelError::NoKnownWord { .. }) => false,
                 Err(other) => return Err(other),
             },
@@ -84,13 +84,13 @@ impl QueryEngine {
         Ok(QueryAnswer { stages: StagesMs { encode, ..answered.stages }, ..answered })
     }
 
-    /// The words of a question that nothing here knows.
+    /// Returns the words of a question that nothing here knows.
     pub(crate) fn unknown_words(&self, identities: &Identities, phrase: &ParsedQuery) -> Vec<String> {
         let to_encoder = self.encoder.as_ref().map(|e| e.unknown_words(&phrase.text));
         names::unknown_to_all(identities, &phrase.text, to_encoder.as_deref())
     }
 
-    /// What an answer did not rest on: the words that it ignored, and those for want of which there is none.
+    /// Returns the words that an answer ignored, and those that prevented an answer.
     pub(crate) fn left_out(
         &self,
         identities: &Identities,
@@ -103,8 +103,8 @@ impl QueryEngine {
     }
 }
 
-/// Answers a question whose phrases are among those that were `encoded`, with the words of it that the encoder does not
-/// know, or by names alone without them.
+/// Answers a question by its `encoded` phrases and the words of it that the encoder does not know, or by names alone
+/// without them.
 pub(crate) fn answer_encoded(
     map: &SemanticMap,
     reading: &QueryReading,
@@ -118,7 +118,7 @@ pub(crate) fn answer_encoded(
 }
 
 /// Answers a question by names and these `features`, as the recipe says; `None` if there is nothing in it. `source`
-/// gives the embeddings of phrases; without those of the question, names alone answer.
+/// encodes phrases; if it cannot encode the question's, names alone answer.
 pub(crate) fn ask_with<S: TextSource + ?Sized>(
     identities: &Identities,
     (features, recipe): (&LanguageFeatures, &Recipe),
@@ -143,8 +143,8 @@ pub(crate) fn ask_by_name(
     QueryReading::new(identities, text, level, recipe).map(|reading| by_name(identities, &reading, level, recipe))
 }
 
-/// Answers a question by these `features` alone, whatever identities are called; `None` if there is nothing in
-/// it. `source` gives the embeddings of phrases, and `phrases` keeps them.
+/// Answers a question by these `features` alone, without regard to names; `None` if there is nothing in it. `source`
+/// encodes phrases, and `phrases` keeps their embeddings.
 pub(crate) fn ask_by_embedding<S: TextSource + ?Sized>(
     identities: &Identities,
     (features, recipe): (&LanguageFeatures, &Recipe),

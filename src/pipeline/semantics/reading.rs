@@ -1,5 +1,5 @@
-//! What a typed query means in a scene. A name as a whole comes first; else slips are mended by the words of the scene's
-//! own names, and noun compounds ("kettle spout") are read as pieces of wholes where names say so.
+//! Reading of a typed query in a scene. A whole name comes first; else slips are mended by the words of the scene's
+//! own names, and noun compounds ("kettle spout") are read as pieces of wholes if names say so.
 
 use std::collections::BTreeMap;
 
@@ -11,34 +11,34 @@ use crate::models;
 use crate::scene::identity::whole_names::key;
 use crate::scene::{Identities, IdentityId, LevelFilter};
 
-/// Words as they were typed, each with another one.
+/// Pairs of a typed word and another one.
 pub(crate) type Pairs = Vec<(String, String)>;
 
 /// A query as it is answered.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct QueryReading {
     pub(crate) phrase: ParsedQuery,
-    /// What is called so as a whole; none where the grammar has to say what is meant.
+    /// Identities whose name is the whole text or piece; none if the grammar decides.
     pub(crate) called: Vec<IdentityId>,
-    /// Words that were taken for slips, each with the word that it was taken for.
+    /// Words taken for slips, each with its correction.
     pub(crate) mended: Pairs,
-    /// Words of their own that are near a word of the scene: what may have been meant if nothing fits.
+    /// Unknown words near a word of the scene: suggestions if nothing is found.
     pub(crate) near: Pairs,
 }
 
-/// Letters of a word that is mended, and of what it becomes, at least: short words differ by a letter and mean
+/// Least length of a mended word and of its correction, in letters: short words differ by one letter and mean
 /// something else.
 const SHORTEST: usize = 4;
-/// Letters from which two slips in one word are mended.
+/// Length of a word from which two slips are mended, in letters.
 const LONG: usize = 8;
-/// Words of a compound at most.
+/// Most words of a compound.
 const MOST_WORDS: usize = 10;
 
 impl QueryReading {
     /// Reads a query about these identities; `None` if there is nothing in it.
     pub(crate) fn new(identities: &Identities, query: &str, level: LevelFilter, recipe: &Recipe) -> Option<Self> {
         if recipe.understanding == Understanding::Embedding {
-            // Names are not looked at.
+            // Names are not used.
             let phrase = ParsedQuery::parse(query)?;
             return Some(Self { phrase, called: Vec::new(), mended: Vec::new(), near: Vec::new() });
         }
@@ -54,7 +54,7 @@ impl QueryReading {
         let partings = ParsedQuery::partings(&text);
         let (at, called) = by_whole_names(identities, &text, &partings, level);
         let parsed = partings.into_iter().nth(at)?;
-        // A level that is asked for is not overruled.
+        // The requested level is respected.
         let is_compound = called.is_empty() && level != LevelFilter::Object;
         let compound =
             if is_compound { bound(identities, &parsed).or_else(|| compound(identities, &parsed)) } else { None };
@@ -62,8 +62,8 @@ impl QueryReading {
     }
 }
 
-/// Which way to take a text apart is that by whole names, and what is called so: "lid of the doll's house" is about
-/// the doll's house, where there is one.
+/// Returns the index of the parting by whole names, and the identities with that name: "lid of the doll's house" is
+/// about the doll's house, if there is one.
 fn by_whole_names(
     identities: &Identities,
     text: &str,
@@ -90,7 +90,7 @@ fn by_whole_names(
     (of_whole.unwrap_or(0), Vec::new())
 }
 
-/// The text, in lower case, with slips of the scene's own words mended, and which those were.
+/// Returns the text in lower case with slips of the scene's own words mended, and the mended words.
 pub(crate) fn mend(identities: &Identities, text: &str) -> (String, Pairs) {
     let (text, mended, _) = mend_all(identities, text);
     (text, mended)
@@ -113,20 +113,20 @@ fn mend_all(identities: &Identities, text: &str) -> (String, Pairs, Pairs) {
     (text, mended, near)
 }
 
-/// What was mended, in a sentence; nothing if nothing was.
+/// Describes the mended words in a sentence; `None` if there are none.
 pub(crate) fn mended_text(mended: &[(String, String)]) -> Option<String> {
     let each: Vec<String> = mended.iter().map(|(typed, read)| format!("\"{typed}\" as \"{read}\"")).collect();
     (!each.is_empty()).then(|| format!("Read {}.", each.join(", ")))
 }
 
-/// The words of all names, as they are written, by their singular.
+/// Words of all names as they are written, by their singular.
 type SceneWords = BTreeMap<String, String>;
 
 fn vocabulary(identities: &Identities) -> SceneWords {
     identities.iter().flat_map(|(_, i)| &i.names).flat_map(|n| written(n)).map(|w| (singular(&w), w)).collect()
 }
 
-/// The text with every word for which `instead` gives another one exchanged.
+/// Returns the text with each word exchanged for which `instead` gives another one.
 fn by_words(text: &str, mut instead: impl FnMut(&str) -> Option<String>) -> String {
     let text: String = text.chars().take(MAX_CHARS).collect::<String>().to_lowercase();
     let mut all = String::with_capacity(text.len());
@@ -138,11 +138,11 @@ fn by_words(text: &str, mut instead: impl FnMut(&str) -> Option<String>) -> Stri
     all
 }
 
-/// What a word is to the words of the scene.
+/// Relation of a word to the words of the scene.
 enum Slip {
-    /// A slip of this one.
+    /// Slip of this word.
     Of(String),
-    /// A word of its own that is near this one.
+    /// Unknown word that is near this one.
     Near(String),
     None,
 }
@@ -165,7 +165,7 @@ fn slip(word: &str, known: &SceneWords) -> Slip {
     };
     let mut near = Vec::new();
     for (single, written) in known.iter().filter(|(_, w)| w.chars().count() >= SHORTEST) {
-        // Whoever slips at the first letter swaps it with the second, or leaves it out.
+        // A slip at the first letter swaps it with the second, or drops it.
         if !written.chars().take(2).any(|c| word.starts_with(c)) {
             continue;
         }
@@ -178,7 +178,7 @@ fn slip(word: &str, known: &SceneWords) -> Slip {
     }
     near.sort();
     match near.as_slice() {
-        // Two that are as near are a guess.
+        // Two words at the same distance are a guess.
         [a, b, ..] if a.0 == b.0 => Slip::None,
         [(_, other), ..] if models::is_word(word) => Slip::Near((*other).clone()),
         [(_, other), ..] => Slip::Of((*other).clone()),
@@ -186,7 +186,8 @@ fn slip(word: &str, known: &SceneWords) -> Slip {
     }
 }
 
-/// "B in the A" as "B of the A", where names say that B is a piece of A: both have the last words that are said.
+/// Reads "B in the A" as "B of the A" if names say that B is a piece of A: both must have the last words of their
+/// phrases.
 fn bound(identities: &Identities, phrase: &ParsedQuery) -> Option<ParsedQuery> {
     let raw: Vec<&str> = phrase.text.split_whitespace().collect();
     let at = raw.iter().position(|word| BINDING.contains(word)).filter(|_| phrase.whole.is_none())?;
@@ -202,8 +203,8 @@ fn bound(identities: &Identities, phrase: &ParsedQuery) -> Option<ParsedQuery> {
     identities.iter().any(|(id, _)| is_piece(id)).then_some(parted)
 }
 
-/// "A B" as "B of the A", where that explains more words by names than any single name does: A is in the name of
-/// something, B in that of one of its pieces, both with their last words, which say what is meant.
+/// Reads "A B" as "B of the A" if that explains more words by names than any single name does. A is in the name of a
+/// whole and B in that of one of its pieces, both with the last words of their phrases.
 fn compound(identities: &Identities, phrase: &ParsedQuery) -> Option<ParsedQuery> {
     let raw: Vec<&str> = phrase.text.split_whitespace().collect();
     if phrase.whole.is_some() || !(2..=MOST_WORDS).contains(&raw.len()) {
@@ -226,7 +227,7 @@ fn compound(identities: &Identities, phrase: &ParsedQuery) -> Option<ParsedQuery
                     continue;
                 }
                 let (by_whole, by_piece) = (explained(left, whole), explained(right, piece));
-                // The more of both names is said, the better; the first of equals has the longest piece.
+                // The query should have most of both names; the first of equals has the longest piece.
                 let said = by_whole as f64 / whole.len() as f64 + by_piece as f64 / piece.len() as f64;
                 let new = (by_whole + by_piece, said);
                 if new.0 > alone && (new.0 > best.0 || (new.0 == best.0 && new.1 > best.1)) {
@@ -240,7 +241,7 @@ fn compound(identities: &Identities, phrase: &ParsedQuery) -> Option<ParsedQuery
     Some(ParsedQuery { text: format!("{target} of the {whole}"), target, whole: Some(whole) })
 }
 
-/// How many of these words are in a name, each word of the name for one of them.
+/// Counts the words that are in a name, each word of the name used once.
 fn explained(asked: &[Vec<String>], name: &[String]) -> usize {
     let mut left: Vec<&String> = name.iter().collect();
     let mut take = |word: &String| left.iter().position(|n| *n == word).map(|at| left.swap_remove(at)).is_some();
@@ -262,7 +263,7 @@ mod tests {
     use super::*;
     use crate::scene::{Level, NOBODY};
 
-    /// The demo's scene, and the questions by their list.
+    /// Returns the demo's scene, and the lists of questions.
     fn data() -> (Identities, toml::Table) {
         let table: toml::Table =
             include_str!("../../../tests/data/compounds_and_slips.toml").parse().expect("sound TOML");
@@ -283,7 +284,7 @@ mod tests {
         table[list].as_array().expect("a list").iter().map(texts).collect()
     }
 
-    /// What a question comes to, in the words of the lists.
+    /// Describes a reading in the words of the lists.
     fn told(all: &Identities, reading: &QueryReading) -> String {
         told_by(all, reading, &Recipe::default())
     }
@@ -302,7 +303,7 @@ mod tests {
         QueryReading::new(all, text, LevelFilter::Auto, &Recipe::default()).expect("words")
     }
 
-    /// A question as its grammar alone has it.
+    /// Returns a question as read by its grammar alone.
     fn plain(text: &str) -> QueryReading {
         let phrase = ParsedQuery::parse(text).expect("words");
         QueryReading { phrase, called: vec![], mended: vec![], near: vec![] }
@@ -324,13 +325,13 @@ mod tests {
         for row in &lists[1] {
             assert_eq!(read(&all, row[0]).phrase.text, plain(row[0]).phrase.text, "{}", row[0]);
         }
-        // Without the reading most are wrong where words may be left over, and an object that is asked for is no piece.
+        // Without the reading most are wrong if words may be left over, and a requested object is no piece.
         let lax = Recipe { rejection: Rejection::Canonical, ..Recipe::default() };
         let is_plain = |row: &&Vec<&str>| told_by(&all, &plain(row[0]), &lax) == row[1];
         assert!(lists[0].iter().filter(is_plain).count() * 4 < lists[0].len());
         let object = QueryReading::new(&all, "kettle spout", LevelFilter::Object, &Recipe::default()).expect("words");
         assert_eq!((object.phrase.target.as_str(), object.phrase.whole), ("kettle spout", None));
-        // By embedding, names are not looked at: neither compounds nor slips are read by them.
+        // By embedding, names are not used: they decide neither compounds nor slips.
         let paper = QueryReading::new(&all, "ketle spout", LevelFilter::Auto, &Recipe::paper()).expect("words");
         assert_eq!((paper.phrase.text.as_str(), paper.phrase.whole, paper.mended), ("ketle spout", None, vec![]));
     }

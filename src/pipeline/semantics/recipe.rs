@@ -1,5 +1,5 @@
-//! A recipe: every choice in which this program's way differs from the paper's. One type, which the window, the
-//! command line, the agent and all measurements pass on as it is.
+//! Recipes: all choices in which this program differs from the paper. One type, which the window, the command line,
+//! the agent and all measurements share.
 
 use std::collections::HashSet;
 use std::fmt;
@@ -11,14 +11,14 @@ use super::codes::TOLERANCE;
 use super::matching::MatchMode;
 use crate::scene::{Lifting, MaskGrid, MaskPrompt, Preparation, SemanticMap};
 
-/// The canonical phrases of the paper, which mean anything.
+/// Canonical phrases of the paper, which fit anything.
 pub const PAPERS_PHRASES: [&str; 3] = ["object", "stuff", "texture"];
-/// Those of LERF.
+/// Canonical phrases of LERF.
 const LERFS_PHRASES: [&str; 4] = ["object", "things", "stuff", "texture"];
 /// Temperature that spreads scores over the unit interval, as in LERF.
 const TEMPERATURE: f32 = 10.0;
 
-/// What a question is compared with.
+/// Source of the scores of a query.
 #[derive(
     Clone,
     Copy,
@@ -44,7 +44,7 @@ pub enum Understanding {
     Both,
 }
 
-/// How a piece of a whole is looked for.
+/// Strategy for finding pieces of a whole.
 #[derive(
     Clone,
     Copy,
@@ -72,7 +72,7 @@ pub enum Strategy {
     WholeFirst,
 }
 
-/// Which embeddings of parts are compared.
+/// Embeddings of parts that are compared.
 #[derive(
     Clone,
     Copy,
@@ -101,7 +101,7 @@ pub enum PartFeatures {
     Raw,
 }
 
-/// How relevancy is shown.
+/// Scale on which relevancy is shown.
 #[derive(
     Clone,
     Copy,
@@ -125,7 +125,7 @@ pub enum RelevancyScale {
     Lerf,
 }
 
-/// When nothing fits.
+/// Rule for "not found".
 #[derive(
     Clone,
     Copy,
@@ -144,15 +144,16 @@ pub enum RelevancyScale {
 pub enum Rejection {
     /// Never: what fits best is the answer, as in the paper
     Never,
-    /// What is less relevant than a canonical phrase
+    /// Anything less relevant than a canonical phrase
     Canonical,
-    /// That, what is hardly more relevant for this encoder, what has another color, and what leaves a word unexplained
+    /// The same, and anything hardly more relevant for this encoder, of another color, or with a word left
+    /// unexplained
     #[default]
     Strict,
 }
 
 impl Rejection {
-    /// In words: "something is always found".
+    /// Describes the rule in words: "something is always found".
     pub(crate) fn told(self) -> &'static str {
         match self {
             Self::Never => "something is always found",
@@ -163,13 +164,13 @@ impl Rejection {
         }
     }
 
-    /// Score from which something may be the answer, where it usually is from `usual`.
+    /// Returns the least score of an answer, `usual` unless everything is accepted.
     pub(crate) fn threshold(self, usual: f32) -> f32 {
         if self == Self::Never { 0.0 } else { usual }
     }
 }
 
-/// The phrases that mean anything: what is asked for must be nearer than they are.
+/// Canonical phrases, which fit anything: an answer must be nearer to the query than they are.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CanonicalPhrases(Vec<String>);
 
@@ -191,7 +192,7 @@ impl Default for CanonicalPhrases {
 impl std::str::FromStr for CanonicalPhrases {
     type Err = String;
 
-    /// "paper", "lerf", or phrases with commas between.
+    /// Parses "paper", "lerf", or phrases with commas between.
     fn from_str(text: &str) -> Result<Self, String> {
         let named = Self::NAMED.iter().find(|(name, _)| *name == text.trim()).map(|(_, phrases)| phrases.join(","));
         let text = named.unwrap_or_else(|| text.to_lowercase());
@@ -213,33 +214,33 @@ impl fmt::Display for CanonicalPhrases {
     }
 }
 
-/// Every choice of a question, and those that were to be made before, when objects were found.
+/// All choices of a query, and those made earlier, when objects were found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Recipe {
-    /// What questions are compared with.
+    /// Source of the scores.
     pub understanding: Understanding,
-    /// How pieces are looked for.
+    /// Strategy for finding pieces.
     pub strategy: Strategy,
-    /// Whether parts are deviated.
+    /// Deviated or raw embeddings of parts.
     #[serde(rename = "deviation")]
     pub parts: PartFeatures,
-    /// Phrases that mean anything.
+    /// Canonical phrases.
     pub canonical: CanonicalPhrases,
     /// Spread of the scores; the order does not depend on it.
     pub temperature: f32,
-    /// How relevancy is shown.
+    /// Scale on which relevancy is shown.
     #[serde(rename = "relevancy")]
     pub scale: RelevancyScale,
-    /// What pixels and Gaussians belong to an answer.
+    /// Rule that selects the pixels and Gaussians of an answer.
     #[serde(rename = "match")]
     pub masks: MatchMode,
-    /// Largest difference per channel of a match.
+    /// Largest difference per channel of a matching code.
     pub tolerance: f32,
-    /// When nothing fits.
+    /// Rule for "not found".
     #[serde(rename = "not_found")]
     pub rejection: Rejection,
-    /// What was to be chosen when objects were found.
+    /// Choices made when objects were found.
     pub preparation: Preparation,
 }
 
@@ -271,7 +272,7 @@ pub enum RecipeName {
 }
 
 impl RecipeName {
-    /// All of its choices.
+    /// Returns all of its choices.
     pub fn recipe(self) -> Recipe {
         match self {
             Self::Default => Recipe::default(),
@@ -281,7 +282,7 @@ impl RecipeName {
 }
 
 impl Recipe {
-    /// All of the paper's choices.
+    /// Returns all of the paper's choices.
     pub fn paper() -> Self {
         Self {
             understanding: Understanding::Embedding,
@@ -300,12 +301,12 @@ impl Recipe {
         }
     }
 
-    /// The name of this recipe; `None` if it is one of nobody's making but the user's.
+    /// Returns the name of this recipe; `None` if it is the user's own.
     pub fn name(&self) -> Option<RecipeName> {
         RecipeName::VARIANTS.iter().copied().find(|name| *self == name.recipe())
     }
 
-    /// What of this recipe a scene was not prepared for: it answers otherwise than the recipe says.
+    /// Reports the choices that the scene was not prepared with; its answers differ from the recipe's.
     pub(crate) fn unmet(&self, map: &SemanticMap) -> Vec<String> {
         let mut unmet = Vec::new();
         if self.understanding == Understanding::Embedding && map.language.is_none() {
@@ -332,7 +333,7 @@ impl Recipe {
         if self.understanding != Understanding::Names && self.parts == PartFeatures::Deviated {
             differs("part weight", wanted.part_weight.to_string(), found.part_weight.to_string());
         }
-        // How masks were followed matters to those who ask for one way of following them.
+        // Only a recipe with a prompt depends on the way in which masks were followed.
         if let Some(prompt) = wanted.prompt {
             let found = found.prompt.map_or_else(|| "none (masks carried by the Gaussians)".into(), |p| p.to_string());
             differs("SAM 2's prompt", prompt.to_string(), found);

@@ -1,5 +1,5 @@
-//! Relevancy: how much better a phrase describes a picture than the canonical phrases do, and
-//! semantic deviation, which tells a part what it is a part of.
+//! Relevancy: the advantage of a phrase over the canonical phrases in describing a picture; and semantic deviation,
+//! which moves a part's feature toward its whole's.
 //!
 //! The paper's score `min_i exp(q) / (exp(q) + exp(c_i))` is `sigmoid(tau d)` with
 //! `d = q - max_i c_i` and temperature `tau = 1`; `q`, `c` are cosines. Order and the crossing at
@@ -7,19 +7,19 @@
 
 use crate::math::vector::{dot, unit};
 
-/// How much nearer a feature is to the query than to the nearest of the `canonical` phrases. Above
-/// zero, it is what was asked for rather than anything.
+/// Advantage of a feature's similarity to the query over that to the nearest `canonical` phrase. Positive for an
+/// identity that answers the query.
 pub fn advantage(feature: &[f32], query: &[f32], canonical: &[Vec<f32>]) -> f32 {
     dot(feature, query) - nearest(canonical.iter().map(|c| dot(feature, c)))
 }
 
-/// How near the nearest canonical phrase is; 0 without any.
+/// Similarity to the nearest canonical phrase; 0 without any.
 pub(crate) fn nearest(canonical: impl Iterator<Item = f32>) -> f32 {
     let nearest = canonical.fold(f32::NEG_INFINITY, f32::max);
     if nearest.is_finite() { nearest } else { 0.0 }
 }
 
-/// Share of LERF's scale from which a pixel belongs to what was asked for.
+/// Share of LERF's scale from which a pixel belongs to the answer.
 pub(crate) const LERFS_SHARE: f32 = 0.2;
 
 /// Relevancy on LERF's scale: from one half (no more relevant than a canonical phrase) to the largest of the view.
@@ -32,9 +32,8 @@ pub fn score(advantage: f32, temperature: f32) -> f32 {
     1.0 / (1.0 + (-temperature * advantage).exp())
 }
 
-/// A part's feature moved toward its whole's (the paper's semantic deviation), of unit length
-/// again: the sum of two unit vectors is shorter, which would penalize parts. `None` if the two
-/// cancel out.
+/// Moves a part's feature toward its whole's (the paper's semantic deviation) and normalizes it: the sum of two unit
+/// vectors is shorter, which would penalize parts. `None` if the two cancel out.
 pub fn deviate(part: &[f32], whole: &[f32], part_weight: f32) -> Option<Vec<f32>> {
     unit(&part.iter().zip(whole).map(|(p, o)| (1.0 - part_weight) * o + part_weight * p).collect::<Vec<_>>())
 }

@@ -1,18 +1,18 @@
-//! Where photos of a scene still show what was taken out of it for good.
+//! Pixels of photos that still show things removed from the scene.
 
 use crate::math::grid;
 use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud};
 
-/// Share of a pixel from which it shows what was removed, and what is left out around that, px.
+/// Least share of a pixel that shows a removed thing, and margin around such pixels, px.
 const TOUCHED: f32 = 0.05;
 const RIM_PX: usize = 2;
 
-/// A scene together with what was taken out of it.
+/// A scene together with the removed things.
 #[derive(Clone, Debug)]
 pub(crate) struct RemovedThings {
     cloud: GaussianCloud,
-    /// 1 for what was taken out.
+    /// 1 for removed Gaussians.
     is_removed: Vec<f32>,
 }
 
@@ -24,7 +24,7 @@ impl RemovedThings {
         Self { cloud, is_removed: [vec![0.0; n], vec![1.0; more]].concat() }
     }
 
-    /// The pixels of a view in whose photo it is seen.
+    /// Returns the pixels of a view whose photo shows removed things.
     pub(crate) fn shows(
         &self,
         renderer: &mut Renderer,

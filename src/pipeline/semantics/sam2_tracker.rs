@@ -1,6 +1,6 @@
-//! Masks of one photo followed to the others by SAM 2, photo by photo in their order: what the paper
-//! does. Needs no Gaussians; frames are looked at once, and what was followed of each mask is kept, so that a
-//! run that was stopped resumes with the photo and the mask that it was at.
+//! Masks of one photo followed to the others by SAM 2, photo by photo in their order, as in the paper. Needs no
+//! Gaussians. Frames are encoded once, and the track of each mask is kept, so that a canceled run resumes with its
+//! current photo and mask.
 
 use std::path::PathBuf;
 
@@ -25,20 +25,20 @@ pub(crate) const LABEL_SIDE_PX: u32 = 512;
 pub(crate) struct Sam2Tracker {
     model: Sam2,
     cache: Option<PathBuf>,
-    /// Seconds that looking at frames has taken, reading kept ones included.
+    /// Seconds of encoding frames, reading kept ones included.
     pub(crate) encode_secs: f64,
 }
 
 impl Sam2Tracker {
-    /// With the SAM 2 of this name: a model of the catalog, or the path of a description. Frames
-    /// are kept in `cache`.
+    /// Opens the SAM 2 of this name: a model of the catalog, or the path of a description. Frames are kept in
+    /// `cache`.
     pub(crate) fn open(name: &str, cache: Option<PathBuf>) -> Result<Self, ModelError> {
         Ok(Self { model: Sam2::open(&catalog::find(name, ModelRole::Segmenter)?)?, cache, encode_secs: 0.0 })
     }
 
-    /// The label of every pixel of every photo, scaled to at most [`LABEL_SIDE_PX`], row-major: the
-    /// number in `ids` of the innermost mask that was followed there; `UNKNOWN` elsewhere, because
-    /// what was not marked may be anything.
+    /// Returns the label of every pixel of every photo, scaled to at most [`LABEL_SIDE_PX`], row-major: the number in
+    /// `ids` of the innermost mask that was followed there. Other pixels are `UNKNOWN`, because an unmarked pixel may
+    /// be anything.
     pub(crate) fn follow(
         &mut self,
         photos: &[Photo],
@@ -66,7 +66,7 @@ impl Sam2Tracker {
                     let mut seen = |n: usize| ticker.tick(done + n, observer);
                     let mut history = KeptTrack::open(file.as_deref());
                     let masks = self.follow_one((photos, &sizes), (seed, &mask, prompt), &mut history, &mut seen)?;
-                    // A full disk costs time later, nothing else.
+                    // A failed write (a full disk) only costs time later.
                     let _ = file.map(|file| kept_track::write(&file, &masks));
                     masks
                 }
@@ -78,7 +78,7 @@ impl Sam2Tracker {
         }
         Ok(labels)
     }
-    /// A mask of the photo `seed` in all photos. `seen` is told how many are done.
+    /// Returns a mask of the photo `seed` in all photos. `seen` receives the number of finished photos.
     fn follow_one(
         &mut self,
         (photos, sizes): (&[Photo], &[(usize, usize)]),
@@ -110,7 +110,7 @@ impl Sam2Tracker {
     }
 }
 
-/// The file for what is followed of a mask: another for other photos, another mask or another way of asking.
+/// Returns the file name of a mask's track: another one for other photos, another mask or another prompt.
 fn track_name(of_photos: &[String], seed: usize, mask: &Mask, prompt: MaskPrompt) -> String {
     let mut sum = Sha256::new();
     of_photos.iter().for_each(|name| sum.update(name));

@@ -1,4 +1,4 @@
-//! Masks of one photo, and where they come from.
+//! Masks of one photo, and their sources.
 
 use super::error::FindError;
 use crate::io::labels::{Labels, Region};
@@ -9,9 +9,9 @@ use crate::scene::{Level, Mask, Photo};
 #[derive(Clone, Debug, PartialEq)]
 pub struct FoundMask {
     pub(crate) level: Level,
-    /// Index of the mask that it is a piece of; before its own.
+    /// Index of its whole's mask, which comes before it.
     pub(crate) parent: Option<usize>,
-    /// What it is called, if the segmenter knows.
+    /// Name, if the segmenter knows one.
     pub(crate) name: Option<String>,
     /// Its pixels.
     pub mask: Mask,
@@ -22,15 +22,15 @@ pub trait Segmenter {
     /// Name for display.
     fn name(&self) -> &str;
 
-    /// Whether it can say anything about a photo.
+    /// Returns whether the segmenter has masks of a photo.
     fn covers(&self, photo: &Photo) -> bool;
 
-    /// The photo to begin with, by index: the first that it can say something about.
+    /// Returns the photo to begin with, by index: the first that is covered.
     fn first(&self, photos: &[Photo], _: &mut dyn Observer) -> Result<Option<usize>, FindError> {
         Ok(photos.iter().position(|p| self.covers(p)))
     }
 
-    /// Names that somebody gave to what a photo shows; none where masks are found.
+    /// Returns the names that the user gave to things in a photo; none if masks are computed.
     ///
     /// # Errors
     /// If they cannot be read.
@@ -38,8 +38,8 @@ pub trait Segmenter {
         Ok(Vec::new())
     }
 
-    /// Masks of a photo, undistorted and scaled to at most `max_side_px`, wholes before pieces.
-    /// Empty where it finds nothing.
+    /// Returns the masks of a photo, undistorted and scaled to at most `max_side_px`, wholes before pieces. Empty if
+    /// it finds nothing.
     fn segment(
         &mut self,
         photo: &Photo,
@@ -48,18 +48,18 @@ pub trait Segmenter {
     ) -> Result<Vec<FoundMask>, FindError>;
 }
 
-/// Masks that come with the dataset. Regions that do not say what they are count as objects where
-/// no other contains them, and as parts of the smallest that does where one does.
+/// Masks that come with the dataset. Regions without a level count as objects if no other contains them, else as
+/// parts of the smallest that does.
 pub(crate) struct FileMasks(pub(crate) Labels);
 
-/// Most photos whose labels are counted, their longer side meanwhile, pixels from which a region counts then, and with
-/// which it is shown half as well as can be.
+/// Most photos whose labels are counted, their longer side meanwhile, least pixels of a counted region, and pixels at
+/// which a region is shown half as well as possible.
 const COUNTED: usize = 64;
 const COUNTED_SIDE_PX: u32 = 512;
 const COUNTED_PX: usize = 12;
 const HALF_PX: f64 = 50.0;
 
-/// Share of a region that must lie in another for it to be a piece of that.
+/// Least share of a region that lies in another one for it to be its piece.
 const INSIDE: f64 = 0.9;
 
 impl Segmenter for FileMasks {
@@ -71,7 +71,7 @@ impl Segmenter for FileMasks {
         self.0.has(photo)
     }
 
-    /// The photo whose labels tell most things apart; of equals, the one that shows them best.
+    /// The photo with most labeled things; of equals, the one that shows them best.
     fn first(&self, photos: &[Photo], observer: &mut dyn Observer) -> Result<Option<usize>, FindError> {
         let covered: Vec<usize> = (0..photos.len()).filter(|i| self.covers(&photos[*i])).collect();
         let counted: Vec<usize> = covered.iter().copied().step_by(covered.len().div_ceil(COUNTED).max(1)).collect();
@@ -81,7 +81,7 @@ impl Segmenter for FileMasks {
         let mut ticker = Ticker::new("Counting labels", counted.len());
         let mut most: Option<((usize, f64), usize)> = None;
         for (k, &i) in counted.iter().enumerate() {
-            // Labels that cannot be read are told where they are used.
+            // Unreadable labels are reported by the code that uses them.
             let regions = self.0.of(&photos[i], COUNTED_SIDE_PX).unwrap_or_default();
             let area = |r: &Region| r.mask.area() as f64;
             let count = regions.iter().filter(|r| r.mask.area() >= COUNTED_PX).count();
@@ -168,7 +168,7 @@ mod tests {
     fn the_photo_with_most_labels_is_the_first() {
         let folder = tempfile::tempdir().expect("folder");
         let square = |x: usize| [[x, 1], [x + 5, 1], [x + 5, 8], [x, 8]];
-        // Two crumbs are less than a thing; what cannot be read counts as nothing; of equals, the first.
+        // Two crumbs are less than a thing; unreadable labels count as nothing; of equals, the first.
         for (name, boxes, crumbs) in [("a", 1, 2), ("c", 2, 0), ("d", 2, 0)] {
             let object = |k: usize, place| serde_json::json!({ "category": format!("c{k}"), "segmentation": place });
             let things = (0..boxes).map(|k| object(k, serde_json::json!(square(6 * k))));

@@ -1,20 +1,19 @@
-//! Small pictures of objects and parts, each alone, for lists.
+//! Thumbnails of objects and parts, each rendered alone, for lists.
 
 use glam::DVec3;
 
 use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::{Bounds, Camera, GaussianCloud, SemanticMap};
 
-/// Width and height of a portrait, px.
+/// Width and height of a thumbnail, px.
 pub(crate) const SIDE_PX: usize = 64;
-/// Field of view; narrow, so that near and far are alike in size, radians.
+/// Field of view, radians; narrow, so that near and far Gaussians have similar sizes.
 const FOV_RAD: f64 = 0.5;
 
-/// A picture of each identity by number less one, SIDE_PX x SIDE_PX, row-major; `None` for those
-/// without Gaussians.
+/// Thumbnail of each identity by number less one, SIDE_PX x SIDE_PX, row-major; `None` for those without Gaussians.
 pub(crate) type Thumbnails = Vec<Option<Vec<[u8; 3]>>>;
 
-/// A picture of every identity as somebody at `from` sees it.
+/// Renders every identity as seen from `from`.
 pub(crate) fn draw_thumbnails(
     cloud: &GaussianCloud,
     map: &SemanticMap,
@@ -34,12 +33,12 @@ pub(crate) fn draw_thumbnails(
     Ok(list)
 }
 
-/// A camera in the direction of `from` that sees all of a cloud.
+/// Returns a camera in the direction of `from` that sees all of a cloud.
 fn camera(cloud: &GaussianCloud, from: DVec3, up: DVec3) -> Option<Camera> {
     let bounds = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i)))?;
     let center = bounds.center();
     let toward = (from - center).try_normalize().unwrap_or(up);
-    // Seen along the upward axis, any other is up.
+    // Along the up axis, any other axis is up.
     let up = if toward.dot(up).abs() > 0.99 { up.any_orthonormal_vector() } else { up };
     let radius = (0.5 * bounds.size().length()).max(1e-9);
     let distance = radius / (0.5 * FOV_RAD).sin();
@@ -98,7 +97,7 @@ mod tests {
         assert!((c.forward() + DVec3::X).length() < 1e-12 && (c.world_from_camera.y_axis + DVec3::Z).length() < 1e-12);
         assert_eq!((c.width_px, c.height_px), (64, 64));
         assert!((c.fov_y_rad() - FOV_RAD).abs() < 1e-12);
-        // From straight above there is another up; from its very middle, it is looked at from above.
+        // From straight above, up is another axis; from the center, the camera looks from above.
         for from in [DVec3::new(5.0, 5.0, 50.0), DVec3::splat(5.0)] {
             let c = camera(&cloud, from, DVec3::Z).expect("something");
             assert!((c.forward() + DVec3::Z).length() < 1e-9, "{}", c.forward());

@@ -1,21 +1,21 @@
-//! The stages of a query, by name: what is known of each of them stands side by side.
+//! Stages of a query by name, with one value for each.
 
 use std::time::Instant;
 
 use serde::Serialize;
 
-/// Something for each stage of a query: a time of one, or percentiles of many.
+/// One value for each stage of a query: times, or percentiles of them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct Stages<T> {
-    /// The text becomes vectors.
+    /// Encoding of the text.
     pub(crate) encode: T,
-    /// Identities are scored for its phrases.
+    /// Scoring of identities for its phrases.
     pub(crate) relevancy: T,
-    /// The identities that are meant are chosen.
+    /// Choice of the identities of the answer.
     pub(crate) localize: T,
-    /// Their pixels in the view are found.
+    /// Search for their pixels in the view.
     pub(crate) mask: T,
-    /// Mask and relevancy become a picture.
+    /// Rendering of mask and relevancy as a picture.
     pub(crate) draw: T,
 }
 
@@ -26,12 +26,12 @@ pub(crate) const STAGES: [&str; 5] = ["encode", "relevancy", "localize", "mask",
 pub(crate) type StagesMs = Stages<f64>;
 
 impl<T: Copy> Stages<T> {
-    /// The values, as [`STAGES`] names them.
+    /// Values in the order of [`STAGES`].
     pub(crate) fn values(&self) -> [T; 5] {
         [self.encode, self.relevancy, self.localize, self.mask, self.draw]
     }
 
-    /// The stages of these values.
+    /// Creates the stages from these values.
     pub(crate) fn of([encode, relevancy, localize, mask, draw]: [T; 5]) -> Self {
         Self { encode, relevancy, localize, mask, draw }
     }
@@ -42,14 +42,14 @@ impl StagesMs {
         self.values().iter().sum()
     }
 
-    /// Of both, one after the other.
+    /// Adds the values of both.
     pub(crate) fn and(self, other: Self) -> Self {
         let (a, b) = (self.values(), other.values());
         Self::of(std::array::from_fn(|k| a[k] + b[k]))
     }
 }
 
-/// Milliseconds since then.
+/// Milliseconds since `start`.
 pub(crate) fn ms_since(start: Instant) -> f64 {
     start.elapsed().as_secs_f64() * 1e3
 }

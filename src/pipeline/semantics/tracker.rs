@@ -1,6 +1,6 @@
-//! The same identity in every view, carried by the trained Gaussians: masks of a first photo vote,
-//! the votes are drawn into the other views, and photos of which too much is unknown are segmented
-//! too, their masks linked to what is known; the tree of what belongs together decides. No network is needed.
+//! Identities in every view, carried by the trained Gaussians. Masks of a first photo vote, and the votes are
+//! rendered into the other views. Photos with too many unknown pixels are segmented too, and their masks linked to
+//! known identities. The tree of Gaussians that belong together decides. No network is needed.
 
 mod complete;
 mod gone;
@@ -29,18 +29,18 @@ use crate::render::{RenderSettings, Renderer};
 use crate::scene::findings::{Disagreement, Doubt, Findings, PhotoFinding, Seen};
 use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY, Photo};
 
-/// Least weight of votes, in px of the photos voted on, that says something about a Gaussian.
+/// Least weight of votes for a Gaussian to have an identity, in px of the photos voted on.
 const LEAST_VOTES: f32 = 0.05;
 
-/// IoU under which a followed mask and the Gaussians' contradict each other.
+/// IoU under which a followed mask and that of the Gaussians contradict each other.
 const DRIFT: f64 = 0.2;
-/// Pixels from which each of them says something.
+/// Least number of pixels of each for a contradiction.
 const DRIFT_PX: usize = 30;
 
-/// Share of a mask that is nobody's yet, from which it shows something new.
+/// Least share of unlabeled pixels of a mask that shows something new.
 const NEWS: f64 = 0.5;
 
-/// Longer side of the views in which it is looked how well Gaussians are seen, px.
+/// Longer side of the views in which visibility is measured, px.
 const SEE_SIDE_PX: u32 = 256;
 
 #[derive(Clone, Debug, PartialEq)]
@@ -49,9 +49,9 @@ pub(crate) struct Tracked {
     pub(crate) assignments: Vec<Assignment>,
     /// The photos that were segmented, in order.
     pub(crate) seeds: Vec<usize>,
-    /// Every photo, with all that is known but what hidden Gaussians inherit from those around them.
+    /// Report of every photo, without the identities that hidden Gaussians inherit from those around them.
     pub(crate) views: Vec<ViewReport>,
-    /// Where masks and what was known disagreed, with the photo.
+    /// Disagreements of masks with the identities known before, with the photo.
     pub(crate) disagreements: Vec<(usize, Disagreement)>,
     /// The masks of the photos that were segmented and of those to which they were followed.
     pub(crate) masks: Vec<CodeView>,
@@ -60,7 +60,7 @@ pub(crate) struct Tracked {
 }
 
 impl Tracked {
-    /// What was noticed of identities and photos, to be kept with them.
+    /// Returns the findings about identities and photos, which are kept with the map.
     pub(crate) fn findings(&self, photos: &[Photo]) -> Findings {
         let mut seen = vec![Seen::default(); self.identities.len()];
         for (k, view) in self.views.iter().enumerate() {
@@ -81,8 +81,8 @@ impl Tracked {
     }
 }
 
-/// Finds the identities of `cloud` in `photos`. With a `follower`, the first photo's masks are followed
-/// to the others and vote there too.
+/// Finds the identities of `cloud` in `photos`. With a `follower`, the first photo's masks are followed to the others
+/// and vote there too.
 pub(crate) fn track(
     cloud: &GaussianCloud,
     photos: &[Photo],
@@ -160,7 +160,7 @@ pub(crate) fn track(
     drop_floaters(cloud, &t.identities, &mut assignments);
     if let Some(map) = &options.known {
         for (i, now) in assignments.iter_mut().enumerate() {
-            // What is nobody's may become something new, what is unknown anything: one more photo tells of things.
+            // Unlabeled Gaussians may become something new, unknown ones anything: one more photo only adds things.
             let is_new = now.identity != UNKNOWN && now.identity as usize > map.identities.len();
             if map.identity_of[i] != NOBODY || now.identity == NOBODY || !map.is_unknown(i) && !is_new {
                 *now = Assignment { identity: map.identity_of[i], margin: map.margin[i] };
@@ -187,7 +187,7 @@ pub(crate) fn track(
     })
 }
 
-/// Masks of a photo, and whose they are.
+/// Masks of a photo, and their identities.
 type Seeded = (Vec<FoundMask>, Vec<IdentityId>);
 
 struct Tracker<'a> {
@@ -205,12 +205,12 @@ struct Tracker<'a> {
 }
 
 impl Tracker<'_> {
-    /// Whose each Gaussian is by the votes so far.
+    /// Returns the identity of each Gaussian by the votes so far.
     fn decided(&self) -> Vec<IdentityId> {
         identities_of(&self.votes.decide(&self.identities, LEAST_VOTES))
     }
 
-    /// Looks how well each Gaussian is seen in every photo, before any votes.
+    /// Measures the visibility of each Gaussian in every photo, before any votes.
     fn see(&mut self, observer: &mut dyn Observer) -> Result<(), FindError> {
         let mut ticker = Ticker::new("Looking what each photo shows", self.photos.len());
         for (i, photo) in self.photos.iter().enumerate() {
@@ -223,8 +223,8 @@ impl Tracker<'_> {
         Ok(())
     }
 
-    /// Segments a photo, links its masks to known identities, and lets them vote. The masks and whose
-    /// they are; `None` if there was nothing in it.
+    /// Segments a photo, links its masks to known identities, and lets them vote. Returns the masks and their
+    /// identities; `None` if there are no masks.
     fn seed(
         &mut self,
         photo: usize,
@@ -244,7 +244,7 @@ impl Tracker<'_> {
         let known = if self.identities.is_empty() { None } else { Some(self.map(photo, self.options.max_side_px)?) };
         let links = link(&found, known.as_ref(), &self.identities);
         let stays = known.as_ref().filter(|_| self.options.known.is_some());
-        // Of which masks nothing becomes, because what they show is known.
+        // A mask of known pixels makes no new identity.
         let is_free = |id: IdentityId| id == UNKNOWN || id == NOBODY;
         let is_old = |mask: &FoundMask| {
             let new = |map: &ViewMap| mask.mask.pixels().filter(|i| is_free(map.identity[*i])).count();
@@ -281,8 +281,8 @@ impl Tracker<'_> {
         Ok(Some((found, ids)))
     }
 
-    /// The photos through which masks of `seed` are followed, in their order: those that it does not explain by
-    /// itself, or all if codes are to be trained on what is followed.
+    /// Returns the photos through which masks of `seed` are followed, in their order: those that it does not explain
+    /// by itself, or all if codes are trained on the followed masks.
     fn worth_following(&mut self, seed: usize, observer: &mut dyn Observer) -> Result<Vec<usize>, FindError> {
         let all = self.photos.len();
         if self.options.keep_masks {
@@ -300,7 +300,7 @@ impl Tracker<'_> {
         Ok(among)
     }
 
-    /// Follows the masks of the photo `seed` through those of `among`, where they vote.
+    /// Follows the masks of the photo `seed` through the photos `among`, and lets them vote there.
     fn follow(
         &mut self,
         follower: &mut Sam2Tracker,
@@ -311,7 +311,7 @@ impl Tracker<'_> {
         let photos: Vec<Photo> = among.iter().map(|i| self.photos[*i].clone()).collect();
         let first = among.iter().position(|i| *i == seed).unwrap_or_default();
         let followed = follower.follow(&photos, first, seeded, self.options.prompt, observer)?;
-        // What is known from the seed alone: it shall not be judged by what it is to judge.
+        // Labels from the seed alone, so that the follower's labels do not take part in their own check.
         let of = self.decided();
         for (&photo, mut labels) in among.iter().zip(followed).filter(|(photo, _)| **photo != seed) {
             if self.options.veto {
@@ -331,7 +331,7 @@ impl Tracker<'_> {
         Ok(())
     }
 
-    /// Keeps the labels of a photo, of this width and height, for codes to be trained on.
+    /// Keeps the labels of a photo, of this width and height, for the training of codes.
     fn keep(&mut self, photo: usize, (w, h): (u32, u32), labels: &[IdentityId]) {
         if !self.options.keep_masks {
             return;
@@ -345,7 +345,7 @@ impl Tracker<'_> {
         self.masks.push(CodeView { labels: (0..cw * ch).map(at).collect(), camera });
     }
 
-    /// What is known of a view by now.
+    /// Renders the identities known so far into a view.
     fn map(&mut self, photo: usize, max_side_px: u32) -> Result<ViewMap, FindError> {
         let of = self.decided();
         self.map_of(photo, max_side_px, &of)
@@ -363,8 +363,8 @@ fn identities_of(assignments: &[Assignment]) -> Vec<IdentityId> {
     assignments.iter().map(|a| a.identity).collect()
 }
 
-/// The identities that two label maps of one view put in different places: both show them, and they
-/// hardly overlap.
+/// Returns the identities that two label maps of one view put in different places: both show them, and they hardly
+/// overlap.
 fn contradicted(followed: &[IdentityId], known: &[IdentityId], identities: usize) -> Vec<IdentityId> {
     let mut counts = vec![[0_usize; 3]; identities + 1];
     for (&a, &b) in followed.iter().zip(known) {
@@ -380,7 +380,7 @@ fn contradicted(followed: &[IdentityId], known: &[IdentityId], identities: usize
     (1..counts.len()).filter(|id| apart(&counts[*id])).map(|id| id as IdentityId).collect()
 }
 
-/// The innermost identity of each pixel of a segmented photo; `NOBODY` where no mask is.
+/// Returns the innermost identity of each pixel of a segmented photo; `NOBODY` without a mask.
 pub(crate) fn labels_of(found: &[FoundMask], ids: &[IdentityId], pixels: usize) -> Vec<IdentityId> {
     let mut labels = vec![NOBODY; pixels];
     // Wholes come before pieces, so the innermost is painted last.

@@ -1,5 +1,5 @@
-//! The paper's lifting: codes of the Gaussians, both levels in one pass, trained until the rendered
-//! codes look like the masks' (L1 + 0.2 D-SSIM). The Gaussians themselves do not change.
+//! The paper's lifting: codes of the Gaussians, both levels in one pass, trained until the rendered codes match those
+//! of the masks (L1 + 0.2 D-SSIM). The Gaussians themselves do not change.
 
 use rand::SeedableRng;
 use rand::seq::SliceRandom;
@@ -24,7 +24,7 @@ const RATES: [f64; 2] = [0.02, 0.002];
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct CodeView {
     pub(crate) camera: Camera,
-    /// Innermost identity of each pixel, row-major; `UNKNOWN` says nothing.
+    /// Innermost identity of each pixel, row-major; `UNKNOWN` pixels are ignored.
     pub(crate) labels: Vec<IdentityId>,
 }
 
@@ -35,8 +35,8 @@ pub(crate) struct CodeTraining {
     pub(crate) seed: u64,
 }
 
-/// Trains `codes`, one set per Gaussian of `cloud`, from where they stand. Returns the loss of the
-/// last tenth of the steps. The observer may stop it; codes are then those of the last step.
+/// Trains `codes`, one set per Gaussian of `cloud`, from their current values. Returns the mean loss of the last
+/// tenth of the steps. The observer may cancel it; codes are then those of the last step.
 pub(crate) fn train_codes(
     cloud: &GaussianCloud,
     codes: &mut [[f32; CODE_CHANNELS]],
@@ -72,6 +72,7 @@ pub(crate) fn train_codes(
         let along = step as f64 / training.steps.max(1) as f64;
         let rate = (RATES[0].ln() * (1.0 - along) + RATES[1].ln() * along).exp() as f32;
         let renderer = &renderer;
+        // Adam's bias correction needs the steps of each Gaussian, which is in some of the views only.
         codes.par_iter_mut().zip(&mut moments).zip(&mut touched).enumerate().for_each(|(i, ((code, moments), t))| {
             let mut gradient = [0.0; CODE_CHANNELS];
             if !renderer.feature_gradient(i, &mut gradient) || gradient.iter().any(|g| !g.is_finite()) {
@@ -93,7 +94,7 @@ pub(crate) fn train_codes(
     Ok(last.iter().sum::<f64>() / last.len().max(1) as f64)
 }
 
-/// Draws a view and goes back; afterwards the renderer holds the gradient. Returns the loss.
+/// Renders a view and propagates backward; afterwards the renderer holds the gradient. Returns the loss.
 fn one_step(
     renderer: &mut DifferentiableRenderer,
     loss: &mut PhotoLoss<f32>,
@@ -110,7 +111,8 @@ fn one_step(
     let mut total = 0.0;
     for (c, plane) in gradient.features.iter_mut().enumerate() {
         let behind = BACKGROUND_CODE[c % 3];
-        // What lets light through shows the background's code; where nothing is known, it is right.
+        // Transparent pixels show the background's code; unknown pixels are set to it on both sides, so they have no
+        // error.
         let drawn = frame.features[c].iter().zip(&frame.alpha).zip(&target[c]);
         let drawn: Vec<f32> =
             drawn.map(|((f, a), t)| if t.is_nan() { behind } else { f + (1.0 - a) * behind }).collect();
@@ -126,7 +128,7 @@ fn one_step(
     Ok(total / CODE_CHANNELS as f64)
 }
 
-/// The codes that the view should show; NaN where nothing is known.
+/// Returns the target codes of a view; NaN for unknown pixels.
 fn target(view: &CodeView, identities: &Identities) -> [Vec<f32>; CODE_CHANNELS] {
     let by_id: Vec<_> = (0..=identities.len() as IdentityId).map(|id| identities.codes(id)).collect();
     let code = |id: IdentityId, c: usize| match by_id.get(id as usize) {
@@ -137,7 +139,7 @@ fn target(view: &CodeView, identities: &Identities) -> [Vec<f32>; CODE_CHANNELS]
     std::array::from_fn(|c| view.labels.iter().map(|id| code(*id, c)).collect())
 }
 
-/// Identity of each Gaussian by its codes: the part whose code is nearest, if it is nearer than the
+/// Returns the identity of each Gaussian by its codes: the part with the nearest code, if that is nearer than the
 /// background's, else the object.
 pub(crate) fn decode(codes: &[[f32; CODE_CHANNELS]], identities: &Identities) -> Vec<IdentityId> {
     let all: Vec<[f32; CODE_CHANNELS]> = (0..=identities.len() as IdentityId).map(|id| identities.codes(id)).collect();
@@ -157,8 +159,8 @@ mod tests {
     use crate::pipeline::observer::Silent;
     use crate::scene::{Level, NOBODY};
 
-    /// Two Gaussians side by side, one of them a part, with the masks that the user would draw: a disc of 4 px
-    /// around where each is seen, half a length to either side at 51.7 px a length and three lengths away.
+    /// Two Gaussians side by side, one of them a part, with the masks that the user would draw: a disc of 4 px around
+    /// the center of each, half a length to either side at 51.7 px a length and three lengths away.
     fn scene() -> (GaussianCloud, Identities, Vec<CodeView>) {
         let mut all = Identities::default();
         let doll = all.add(Level::Object, NOBODY, vec![]);
@@ -205,7 +207,7 @@ mod tests {
         }
         let (_, _, first) = train(1, |l| l);
         assert!(loss < 0.8 * first, "{loss} {first}");
-        // Without masks nothing is learned; with the wrong ones, the wrong thing.
+        // Without masks nothing is learned; with wrong ones, the wrong thing.
         let (codes, of, _) = train(100, |_| UNKNOWN);
         assert_eq!((codes[0], of), ([0.5; 6], vec![NOBODY; 2]));
         let (_, of, _) = train(400, |l| [0, 2, 1].get(l as usize).copied().unwrap_or(l));

@@ -1,6 +1,6 @@
-//! What every pixel of a view belongs to: the identity of largest accumulated weight, exactly.
+//! Identities of all pixels of a view, exactly: the one with the largest accumulated weight.
 //!
-//! Rendered once per view; every query then only reads it.
+//! Rendered once per view; queries only read it.
 
 use crate::render::{DrawError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Mask};
@@ -12,22 +12,21 @@ pub struct ViewMap {
     pub width_px: usize,
     /// Height in px.
     pub height_px: usize,
-    /// Innermost identity; `NOBODY` where none wins or nothing is, `UNKNOWN` where Gaussians win
-    /// that no vote reached.
+    /// Innermost identity; `NOBODY` if none wins or the pixel is empty, `UNKNOWN` if Gaussians without a vote win.
     pub identity: Vec<IdentityId>,
-    /// Share of the pixel's weight that belongs to the winner's object.
+    /// Share of the winner's object in the pixel's weight.
     pub(crate) share: Vec<f32>,
     pub(crate) alpha: Vec<f32>,
 }
 
 impl ViewMap {
-    /// Opaque pixels without a doubt, in rows of `width_px`.
+    /// Creates opaque pixels with shares of 1, in rows of `width_px`.
     pub(crate) fn certain(width_px: usize, identity: Vec<IdentityId>) -> Self {
         let n = identity.len();
         Self { width_px, height_px: n / width_px.max(1), identity, share: vec![1.0; n], alpha: vec![1.0; n] }
     }
 
-    /// Draws the identities `of` the Gaussians of `cloud`.
+    /// Renders the identities `of` the Gaussians of `cloud`.
     pub fn render(
         renderer: &mut Renderer,
         cloud: &GaussianCloud,
@@ -43,7 +42,7 @@ impl ViewMap {
         Ok(Self { width_px, height_px, identity, share, alpha })
     }
 
-    /// The pixels of an identity and its pieces.
+    /// Returns the pixels of an identity and its pieces.
     pub fn mask(&self, identities: &Identities, id: IdentityId) -> Mask {
         let inside = identities.descendants(id);
         Mask::from_fn(self.width_px, self.height_px, |i| {
@@ -79,7 +78,7 @@ mod tests {
         assert_eq!(map.identity[18 * 50 + 25], front);
         let (a, b) = (map.mask(&all, front), map.mask(&all, behind));
         assert!(b.area() > a.area() && a.overlap(&b) == 0 && !a.is_empty());
-        // Seen from the other side, the order is the other way round.
+        // From the other side, the order is reversed.
         let back = Camera::look_at(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 50, 37).expect("valid");
         let map = ViewMap::render(&mut renderer, &cloud, &[front, behind], &all, &back, &settings).expect("drawn");
         assert!(map.mask(&all, front).is_empty());

@@ -9,10 +9,10 @@ use crate::math::lanes::Lane;
 use crate::render::{self, ContributionSink, RenderError, RenderSettings, Renderer, TILE_PX};
 use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, NOBODY, SemanticMap};
 
-/// A pixel about which nothing is known.
+/// Label of an unknown pixel.
 pub(crate) const UNKNOWN: IdentityId = render::UNKNOWN;
 
-/// Most identities that a Gaussian keeps votes for.
+/// Most identities with votes per Gaussian.
 const KEPT: usize = 8;
 
 /// Votes of pixels for the identities of Gaussians.
@@ -20,30 +20,29 @@ const KEPT: usize = 8;
 pub(crate) struct Votes {
     /// Per Gaussian: identity and weight in px, any order, each identity once.
     by_gaussian: Vec<Vec<(IdentityId, f32)>>,
-    /// Per Gaussian: the largest area that it shows in any view that was looked at.
+    /// Per Gaussian: its largest area in any view.
     best: Vec<f32>,
-    /// Share of that which a Gaussian must show in a view to be voted on there.
+    /// Least share of its largest area for a Gaussian to be voted on in a view.
     least_seen: f32,
 }
 
-/// Votes of a Gaussian of which is known whose it is, and that it is nobody's, px: any mask says more than that.
+/// Votes of a Gaussian with a known identity, and of one known to be unlabeled, px: any mask outweighs the latter.
 const KNOWN: f32 = 10.0;
 const KNOWN_NOBODY: f32 = 0.1;
 
-/// The same where nobody says otherwise.
+/// Default least share of its largest area for a Gaussian to be voted on in a view.
 pub(crate) const LEAST_SEEN: f32 = 0.1;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Assignment {
-    /// The innermost identity; `NOBODY` if none claims it, `UNKNOWN` without a vote.
+    /// Innermost identity; `NOBODY` if unlabeled, `UNKNOWN` without a vote.
     pub(crate) identity: IdentityId,
-    /// Share of its votes that went to that identity's object minus the share of the runner-up;
-    /// 0 without a vote.
+    /// Share of votes for that identity's object minus the share of the runner-up; 0 without a vote.
     pub(crate) margin: f32,
 }
 
 impl Votes {
-    /// No votes for `n` Gaussians.
+    /// Creates empty votes for `n` Gaussians.
     pub(crate) fn new(n: usize) -> Self {
         Self::with_least_seen(n, LEAST_SEEN)
     }
@@ -52,7 +51,7 @@ impl Votes {
         Self { by_gaussian: vec![Vec::new(); n], best: vec![0.0; n], least_seen }
     }
 
-    /// One vote for whose each Gaussian is known to be.
+    /// Creates one vote for each Gaussian that is not unknown.
     pub(crate) fn known(map: &SemanticMap, least_seen: f32) -> Self {
         let mut votes = Self::with_least_seen(map.identity_of.len(), least_seen);
         let known = (0..map.identity_of.len()).filter(|i| !map.is_unknown(*i));
@@ -71,8 +70,8 @@ impl Votes {
         self.by_gaussian[i].iter().map(|v| v.1).sum()
     }
 
-    /// Takes note of how well each Gaussian is seen in a view: where it is seen much worse than elsewhere, it is
-    /// behind something, and what is there in the photo says nothing about it.
+    /// Records the area of each Gaussian in a view. If a Gaussian is seen much worse in a view than elsewhere, it is
+    /// occluded there, and the photo's labels do not apply to it.
     pub(crate) fn see(
         &mut self,
         renderer: &mut Renderer,
@@ -128,15 +127,15 @@ impl Votes {
         Ok(())
     }
 
-    /// What each Gaussian belongs to: the object with most votes, then within it the innermost
-    /// identity with most. Gaussians with less than `least` px of votes count as unseen.
+    /// Decides the identity of each Gaussian: the object with most votes, then the innermost identity in it with
+    /// most. Gaussians with less than `least` px of votes count as unseen.
     pub(crate) fn decide(&self, identities: &Identities, least: f32) -> Vec<Assignment> {
         let objects: Vec<IdentityId> = (0..=identities.len() as IdentityId).map(|i| identities.object_of(i)).collect();
         self.by_gaussian.par_iter().map(|votes| decide(votes, &objects, least)).collect()
     }
 }
 
-/// Weight of each Gaussian in a view as an area, so that near views and far ones compare: square units.
+/// Weight of each Gaussian in a view as an area in square units, so that near and far views compare.
 fn areas(cloud: &GaussianCloud, camera: &Camera, found: &[(u32, IdentityId, f32)]) -> Vec<f32> {
     let mut areas = vec![0.0; cloud.len()];
     found.iter().for_each(|f| areas[f.0 as usize] += f.2);
@@ -185,7 +184,7 @@ fn decide(votes: &[(IdentityId, f32)], objects: &[IdentityId], least: f32) -> As
 struct Row<'a> {
     labels: &'a [IdentityId],
     width: usize,
-    /// The Gaussian whose votes are being summed.
+    /// Gaussian whose votes are being summed.
     gaussian: u32,
     sums: Vec<(IdentityId, f32)>,
     found: Vec<(u32, IdentityId, f32)>,
@@ -312,7 +311,7 @@ mod tests {
         );
         assert_eq!(b[2], Assignment { identity: UNKNOWN, margin: 0.0 });
         assert_eq!(b[1].margin, 1.0);
-        // A row of tiles that ends within a vector: what hangs over is nobody's.
+        // A row of tiles that ends within a vector: the overhang is ignored.
         let labels = [1, 1, 2, UNKNOWN];
         let mut row = Row { labels: &labels, width: 4, gaussian: u32::MAX, sums: vec![], found: vec![] };
         row.add(7, 2, 0, &[0.5; 8]);

@@ -1,5 +1,5 @@
-//! Painting by fast marching (Telea: "An image inpainting technique based on the fast marching method", 2004), which
-//! others are compared with: colors go inward from the rim, nearest texels first, along the slopes they have there.
+//! Painting by fast marching (Telea: "An image inpainting technique based on the fast marching method", 2004), the
+//! baseline: colors go inward from the rim, nearest texels first, along their slopes there.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -18,7 +18,7 @@ pub(super) fn fill(color: &mut [[f32; 3]], size: [usize; 2], known: &[bool], hol
             let far = march.arrival(j);
             if !march.done[j] && far < march.far[j] {
                 march.far[j] = far;
-                // Not negative, so their bits are in their order.
+                // Non-negative floats order like their bits.
                 next.push(Reverse((far.to_bits(), j)));
             }
         }
@@ -35,13 +35,13 @@ pub(super) fn fill(color: &mut [[f32; 3]], size: [usize; 2], known: &[bool], hol
 
 struct March {
     size: [usize; 2],
-    /// When the front arrives at each texel.
+    /// Arrival time of the front at each texel.
     far: Vec<f32>,
     done: Vec<bool>,
 }
 
 impl March {
-    /// The texel beside one, if it is inside and done.
+    /// Returns the texel at this offset, if it is inside and done.
     fn beside(&self, i: usize, dx: i64, dy: i64) -> Option<usize> {
         let [w, h] = self.size.map(|s| s as i64);
         let (x, y) = (i as i64 % w + dx, i as i64 / w + dy);
@@ -49,7 +49,7 @@ impl March {
         j.then(|| (y * w + x) as usize).filter(|j| self.done[*j])
     }
 
-    /// When the front arrives, by what is done on either axis.
+    /// Arrival time of the front, by the done texels on either axis.
     fn arrival(&self, i: usize) -> f32 {
         let first = |a: (i64, i64), b: (i64, i64)| {
             let far = |(dx, dy)| self.beside(i, dx, dy).map_or(f32::INFINITY, |j| self.far[j]);
@@ -62,7 +62,7 @@ impl March {
         }
     }
 
-    /// Change per texel along both axes, over what is done.
+    /// Change per texel along both axes, over the done texels.
     fn slope(&self, i: usize, of: impl Fn(usize) -> f32) -> [f32; 2] {
         let here = of(i);
         [(1, 0), (0, 1)].map(|(dx, dy)| match (self.beside(i, -dx, -dy), self.beside(i, dx, dy)) {

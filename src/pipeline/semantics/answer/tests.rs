@@ -113,7 +113,7 @@ fn the_small_encoder_answers_only_where_nothing_has_a_name() {
     // Controls: an encoder of photos answers, and names that know the words come first to both.
     let photos = ask("clip-vit-b16", true, "cup");
     assert_eq!((photos.basis, photos.chosen(1), photos.certainty(&[])), (Basis::Embedding, vec![3], Certainty::Likely));
-    // A place is nothing that looks so, whatever the encoder makes of it; what it looks like is an offer.
+    // A place has no looks, whatever the encoder makes of it; the look-alike is an offer.
     let placed = ask("clip-vit-b16", true, "cup behind the lamp");
     assert!(placed.chosen(1).is_empty(), "{placed:?}");
     for encoder in ["demo", "clip-vit-b16", "/models/demo_vocab.json"] {
@@ -128,7 +128,7 @@ fn words_that_an_encoder_leaves_out_and_colors_that_are_not_so_find_nothing() {
         let (_, features) = scene();
         let all = Identities::objects(3);
         let mut phrases = TextEmbeddings::default();
-        // What is asked of the encoder is what was read: without courtesy.
+        // The encoder is asked for the query as it was read: without courtesy.
         let reading = read(&all, text, &Recipe::default());
         let is_asked = |p: &str| p == reading.phrase.text;
         let mut encode = |p: &str| Ok::<_, ()>(if is_asked(p) { vec![1.0, 0.0, 0.0] } else { vec![0.5, 0.5, 0.5] });
@@ -224,7 +224,7 @@ fn the_recipe_says_what_is_asked_and_when_nothing_fits() {
     assert_eq!(basis("mug", Understanding::Embedding), (Basis::Embedding, vec![]));
     let nothing = ask_by("mug", &by(Understanding::Embedding), false);
     assert_eq!((nothing.basis, nothing.chosen(1)), (Basis::Embedding, vec![]), "names are not looked at");
-    // What is hardly more relevant than a canonical phrase: by 0.0134, under the least of encoders of photos.
+    // Hardly more relevant than a canonical phrase: by 0.0134, under the least advantage of encoders of photos.
     let hardly = |rejection| {
         let (all, features) = scene();
         let recipe = Recipe { rejection, ..by(Understanding::Embedding) };

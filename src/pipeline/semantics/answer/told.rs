@@ -1,4 +1,4 @@
-//! What is told of an answer: how sure it is, the words that it leaves out, and what is offered where there is none.
+//! Report of an answer: its certainty, the words that it leaves out, and offers if nothing was found.
 
 use super::{Basis, QueryAnswer};
 use crate::pipeline::semantics::grounds;
@@ -7,23 +7,23 @@ use crate::pipeline::semantics::names;
 use crate::pipeline::semantics::reading::QueryReading;
 use crate::scene::{Identities, IdentityId};
 
-/// How sure an answer is, in a word.
+/// Certainty of an answer, in a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, strum::IntoStaticStr)]
 #[strum(serialize_all = "lowercase")]
 pub(crate) enum Certainty {
-    /// Every word is in its name or in those of its wholes, and every word of its name was said.
+    /// Every word is in its name or in those of its wholes, and the query has every word of its name.
     Certain,
-    /// A part of its name was said, or to an encoder of photos it looks like it far more than anything else.
+    /// The query has a part of its name, or an encoder of photos finds it far more similar than anything else.
     Likely,
     Guess,
 }
 
-/// Score from which, and margin by which, what looks like the query is likely meant.
+/// Least score, and least margin, of a likely answer by embedding.
 const LIKELY: (f32, f32) = (0.6, 0.05);
 
 impl QueryAnswer {
-    /// The words of a query that say something and that the answer does not rest on; `unknown` are those that nothing
-    /// here knows. What any of the shown answers rests on is none of them.
+    /// Returns the telling words of a query on which the answer does not rest; `unknown` are the words that nothing
+    /// here knows. Words on which any of the shown answers rests are left out.
     pub(crate) fn ignored_words(
         &self,
         identities: &Identities,
@@ -43,8 +43,8 @@ impl QueryAnswer {
         }
     }
 
-    /// The words of a query that say something and that nothing here explains, if that is why nothing was found;
-    /// `unknown` are those that nothing here knows.
+    /// Returns the telling words of a query that nothing here explains, if they are the reason for "not found";
+    /// `unknown` are the words that nothing here knows.
     pub(crate) fn unexplained(
         &self,
         identities: &Identities,
@@ -68,8 +68,8 @@ impl QueryAnswer {
         }
     }
 
-    /// What may have been meant, where nothing was found: what shares words with the question, then what looks most
-    /// like it; so many of each at most.
+    /// Returns offers if nothing was found: identities that share words with the query, then those that look most
+    /// like it; at most `most` of each.
     pub(crate) fn offers(&self, most: usize) -> [Vec<IdentityId>; 2] {
         let Answer::NotFound(hits) = &self.answer else { return [Vec::new(), Vec::new()] };
         let by_name = if self.basis == Basis::Names { hits.as_slice() } else { &[] };
@@ -82,7 +82,7 @@ impl QueryAnswer {
         [by_name, by_looks]
     }
 
-    /// How sure the first hit is, some words being `ignored`.
+    /// Returns the certainty of the first hit, with these words `ignored`.
     pub(crate) fn certainty(&self, ignored: &[String]) -> Certainty {
         let hits = self.answer.hits();
         match (&self.answer, hits.first(), self.basis) {

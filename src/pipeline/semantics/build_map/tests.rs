@@ -1,4 +1,4 @@
-//! The whole way on a scene of three things, with masks of which the truth is known.
+//! The whole pipeline on a scene of three things, with masks of known truth.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
 use crate::scene::{Camera, Identities, Level as Of, Mask, NOBODY};
 
-/// A doll with an eye on the left, a cat on the right: whose the Gaussians are.
+/// Identities of the Gaussians: a doll with an eye on the left, a cat on the right.
 const TRUTH: [IdentityId; 15] = [1, 1, 1, 1, 1, 1, 2, 2, 2, 3, 3, 3, 3, 3, 3];
 
 fn cloud() -> GaussianCloud {
@@ -46,7 +46,7 @@ fn photos() -> Vec<Photo> {
     vec![photo("near", -0.75, 1.6), photo("far", 0.0, 3.2)]
 }
 
-/// Keeps what it is told.
+/// Keeps the notes that it receives.
 struct Notes(Vec<String>);
 
 impl Observer for Notes {
@@ -55,7 +55,7 @@ impl Observer for Notes {
     }
 }
 
-/// Knows the truth, and says it with names or without.
+/// Segments by the truth, with names or without.
 struct Told {
     named: bool,
     covers: bool,
@@ -139,7 +139,7 @@ fn one_more_photo_adds_what_it_shows_of_the_unknown_and_nothing_that_is_known_ch
     // By hand: one Gaussian less of the eye, and another name of the doll.
     (known.identity_of[7], known.codes[7]) = (1, known.identities.codes(1));
     known.identities.rename(1, "puppet");
-    // Masks left one of the cat to nobody.
+    // One Gaussian of the cat was left unlabeled by the masks.
     known.margin[14] = 0.5;
     let known = Arc::new(known);
     let add = |photo: usize| {
@@ -160,7 +160,7 @@ fn one_more_photo_adds_what_it_shows_of_the_unknown_and_nothing_that_is_known_ch
     assert!(
         findings.is_valid(&map.identities) && findings.unknown() < known.findings.as_ref().expect("noticed").unknown()
     );
-    // The control: a photo of what is known adds nothing.
+    // The control: a photo without anything new adds nothing.
     let same = add(0);
     assert_eq!((&same.identity_of, &same.margin, &same.codes), (&known.identity_of, &known.margin, &known.codes));
     assert_eq!((&same.identities, &same.seeds), (&known.identities, &known.seeds));
@@ -172,7 +172,7 @@ fn what_no_mask_reached_is_nobodys_and_told() {
     let found = find(Told { named: true, covers: true }, (Lifting::Votes, 0), 1, &mut notes).expect("found");
     assert_eq!(found.map.identities.len(), 2);
     assert_eq!((&found.map.identity_of[..9], &found.map.identity_of[9..]), (&TRUTH[..9], &[NOBODY; 6][..]));
-    // The far photo shows the cat, too different in color to be taken for a piece of what is near.
+    // The far photo shows the cat, too different in color to be taken for a piece of the near things.
     assert!((0.01..0.3).contains(&found.views[1].unknown) && found.views[0].unknown == 0.0);
     assert!(
         notes.0.iter().any(|n| n.starts_with("1 of 2 photos have over 0.5 % unknown") && n.contains("far")),
@@ -206,7 +206,7 @@ fn codes_are_trained_on_masks_and_never_on_what_votes_make_of_them() {
         let told = Told { named: true, covers: true };
         let map = find(told, (Lifting::Paper, 60), max_seeds, &mut notes).expect("found").map;
         assert!(notes.0.iter().any(|n| n.contains(&format!("the masks of {masks} photos"))), "{:?}", notes.0);
-        // What no mask shows keeps the background's codes, though the Gaussians beside it had votes.
+        // Gaussians that no mask shows keep the background's codes, though the Gaussians beside them had votes.
         let untouched = map.codes[9..].iter().all(|c| c.iter().all(|v| (v - 0.5).abs() < 1e-6));
         assert_eq!(untouched, max_seeds == 1);
         let prepared = Preparation { lifting: Lifting::Paper, ..Preparation::default() };

@@ -1,4 +1,4 @@
-//! Corrections by hand, each on two dolls and a blob.
+//! Edits, each on two dolls and a blob.
 
 use super::*;
 use crate::scene::LanguageFeatures;
@@ -108,7 +108,7 @@ fn a_reshaped_identity_consists_of_what_was_selected() {
     check(&new);
     assert_eq!((new.sizes()[0], new.sizes()[1], new.sizes()[2], new.sizes()[3]), (5, 35, 10, 20));
     assert!(new.identity_of[..5].iter().all(|id| *id == NOBODY) && new.identity_of[35] == 1);
-    // What a part loses stays with its whole.
+    // Gaussians that a part loses stay with its whole.
     let new = reshape(2, 25..30).expect("reshaped");
     check(&new);
     assert_eq!((new.sizes()[1], new.sizes()[2]), (30, 5));

@@ -1,9 +1,9 @@
-//! What must fail the bars: scenes that were harmed before they are asked.
+//! Controls that must fail the limits: scenes that are harmed before they are queried.
 
 use crate::pipeline::semantics::relevancy::deviate;
 use crate::scene::{Identities, IdentityId, Level, PART_WEIGHT, SemanticMap};
 
-/// What is done to a scene before it is asked.
+/// Harm done to a scene before it is queried.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Harm {
     Nothing,
@@ -17,7 +17,7 @@ pub(super) enum Harm {
     Canonical,
 }
 
-/// The place of each identity after everything has gone on to the next of its level.
+/// Place of each identity after all have moved on to the next of their level.
 fn next_of_level(identities: &Identities) -> Vec<usize> {
     let of_level = |level: Level| identities.iter().filter(move |(_, i)| i.level == level).map(|(id, _)| id);
     let mut next: Vec<usize> = (0..identities.len()).collect();

@@ -1,4 +1,4 @@
-//! What somebody has worked on stays as it is beside what is found anew.
+//! Edited objects stay as they are beside the result of a new search.
 
 use super::super::edit::{Edit, apply};
 use super::*;
@@ -9,7 +9,7 @@ fn cloud() -> GaussianCloud {
     GaussianCloud::isotropic((0..40).map(|i| [i as f32, 0.0, 0.0]).collect(), -3.0, 2.0)
 }
 
-/// A doll (0 to 19) with a face (10 to 19), and a cat (20 to 29); the rest is nobody's.
+/// A doll (0 to 19) with a face (10 to 19), and a cat (20 to 29); the rest is unlabeled.
 fn found() -> SemanticMap {
     let mut all = Identities::default();
     let doll = all.add(Level::Object, NOBODY, vec!["doll".into()]);
@@ -87,7 +87,7 @@ fn an_object_stays_with_its_parts_and_gets_those_that_it_lacks() {
     let map = edited(&found(), &[Edit::Rename(2, "smile".into())]);
     let kept = worked_on(&map).expect("the doll");
     assert_eq!(kept.identities.len(), 2, "with its whole, not with the cat");
-    // The next search finds more of the doll, and its boots, which nobody had found.
+    // The next search finds more of the doll, and its boots, which are new.
     let mut again = found();
     let boots = again.identities.add(Level::Part, 1, vec!["boots".into()]);
     (30..36).for_each(|i| again.identity_of[i] = boots);

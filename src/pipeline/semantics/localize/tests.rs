@@ -227,7 +227,7 @@ fn a_compound_and_a_forced_kind_reach_the_second_step_without_grammar() {
     }
     assert_eq!(ask(LevelFilter::Auto, Strategy::OneStep, step1, fits, step2), ("found", 1));
     assert_eq!(ask(LevelFilter::Part, Strategy::TwoSteps, step1, fits, step2), ("found", 2));
-    // A part that is forced: without a phrase for the whole its parts compete by the question alone.
+    // A level of parts: without a phrase for the whole, its parts compete by the query alone.
     let phrase = ParsedQuery::parse("button").expect("a phrase");
     let rows = vec![("button", None, step1.to_vec())];
     let answer = by_table(&all, &phrase, LevelFilter::Part, Table(Strategy::TwoSteps, rows.clone()));
@@ -262,7 +262,7 @@ fn names_reject_other_colors_and_colors_alone() {
         verdict("brown", Rejection::Canonical),
         "a color alone is the kind"
     );
-    // What has no color in its name has the one that is seen; where nobody has looked, a color explains nothing.
+    // A thing without a color in its name has its observed color; without one, a color explains nothing.
     assert_eq!(verdict("green lamp", Rejection::Strict), "not found");
     let green = [0.2, 0.7, 0.2].map(|c: f64| ((c - 0.5) / SH_C0) as f32);
     let cloud = GaussianCloud { sh: vec![green], ..GaussianCloud::isotropic(vec![[0.0; 3]], -3.0, 4.0) };

@@ -1,4 +1,4 @@
-//! Every protocol on masks made by hand, compared with values worked out by hand in the comments.
+//! Every protocol on masks made by hand, compared with values calculated by hand in the comments.
 
 use std::convert::Infallible;
 
@@ -78,7 +78,7 @@ fn masks_are_intersection_over_union_by_level() {
         label("doll", Level::Object, [10, 1], |i| i < 5),
         // The eye is 4..6; the label has 5..8: pixel 5 of 4..8, 1 of 4.
         label("eye of the doll", Level::Part, [10, 1], |i| (5..8).contains(&i)),
-        // Nobody is called so: nothing of 3 pixels.
+        // No identity has this name: nothing of 3 pixels.
         label("giraffe", Level::Object, [10, 1], |i| i < 3),
     ];
     let view = LabeledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
@@ -117,7 +117,7 @@ fn langsplat_smooths_scales_and_cuts() {
     let units = langsplat::compare(&mut AskedScene { map: &map, ask: &mut ask }, &view);
     close(&ious(&units), &[67.0 / 170.0, 50.0 / 167.0]);
     assert_eq!(units.iter().map(|u| u.hit).collect::<Vec<_>>(), [Some(true), Some(false)]);
-    // What cannot be answered is a miss, even where the box begins at the first pixel.
+    // A category without an answer is a miss, even if the box begins at the first pixel.
     let units = langsplat::compare(&mut AskedScene { map: &map, ask: &mut |_| None }, &view);
     assert!(units.iter().all(|u| u.iou == 0.0 && u.hit == Some(false)), "{units:?}");
 }
@@ -141,7 +141,7 @@ fn fastlgs_ex_pools_over_categories_and_views() {
             label("cat", Level::Object, [10, 1], |i| (5..8).contains(&i)),
         ],
     );
-    // In the next view, nobody is called so, and 10 px are labeled: 0 of 10. Pool 5/20.
+    // In the next view, no identity has the name, and 10 px are labeled: 0 of 10. Pool 5/20.
     let second = labeled("b", vec![label("giraffe", Level::Object, [10, 1], |_| true)]);
     let mut ask = named(&map);
     let (mut scene, mut pool) = (AskedScene { map: &map, ask: &mut ask }, fastlgs_ex::Pool::default());
@@ -230,7 +230,7 @@ fn classes_have_their_own_masks_or_compete_for_pixels() {
     let mut asked = AskedScene { map: &map, ask: &mut ask };
     let classes = ["cat", "sofa", "toy"].map(str::to_owned);
     let [own, winner] = multi_class::compare(&mut asked, &view, &classes);
-    // Own masks: the cat is 6..10, 4 of 4; the toy is the doll with its eye, 6 of 6. Nobody labeled a sofa.
+    // Own masks: the cat is 6..10, 4 of 4; the toy is the doll with its eye, 6 of 6. No label is a sofa.
     close(&ious(&own), &[1.0, 1.0]);
     // Arg-max: "cat" wins the eye only, 4..6: 0 of 6. "toy" wins doll and cat, 0..4 and 6..10: 4 of 10.
     close(&ious(&winner), &[0.0, 0.4]);
@@ -335,7 +335,7 @@ fn part_recall_rises_with_every_component() {
         let hits = expected.iter().filter(|iou| **iou >= 0.5).count();
         close(&[row.recall, row.mean_iou], &[hits as f64 / 4.0, expected.iter().sum::<f64>() / 4.0]);
     }
-    // The paper's second step is not what the fourth row owes to deviation alone.
+    // The fourth row's gain is not due to deviation alone.
     let alone = Components { deviation: false, ..Components::ROWS[3] };
     close(&ious(&row(alone).units), &[0.0, 1.0, 1.0, 0.0]);
 }

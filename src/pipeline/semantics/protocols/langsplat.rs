@@ -13,7 +13,7 @@ use crate::scene::{Identities, IdentityId, Level, Mask};
 const BOX: usize = 30;
 /// Half the side of the majority filter, px.
 const MAJORITY: usize = 3;
-/// What is kept after normalization.
+/// Cut of the normalized relevancy.
 const CUT: f32 = 0.4;
 
 pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>) -> Vec<Unit> {

@@ -1,10 +1,10 @@
-//! LERF's rule for masks: relevancy is scaled from one half (no more relevant than a canonical phrase) to the
-//! largest of the view, and what is over a fifth of that belongs to the mask.
+//! LERF's rule for masks: relevancy is scaled from one half (no more relevant than a canonical phrase) to the largest
+//! of the view. Pixels over a fifth of that scale belong to the mask.
 
 use crate::pipeline::semantics::relevancy::{LERFS_SHARE, on_lerfs_scale};
 use crate::scene::Mask;
 
-/// The mask of a view's relevancy, row-major; empty where no pixel is more relevant than a canonical phrase.
+/// Returns the mask of a view's relevancy, row-major; empty if no pixel is more relevant than a canonical phrase.
 pub(crate) fn mask(relevancy: &[f32], width_px: usize) -> Mask {
     let height_px = relevancy.len() / width_px.max(1);
     let most = relevancy.iter().copied().fold(f32::NEG_INFINITY, f32::max);

@@ -1,4 +1,4 @@
-//! `masks`: the pixels of the answer to every name against the region, objects and parts apart.
+//! `masks`: the pixels of the answer to every name against the region, objects and parts separately.
 
 use super::{AskedScene, Category, LabeledView, Unit, means};
 use crate::scene::Level;

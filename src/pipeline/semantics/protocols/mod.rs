@@ -28,7 +28,7 @@ use crate::scene::{Camera, Level, Mask, PixelBox, SemanticMap};
 
 pub(crate) struct AskedScene<'a> {
     pub(crate) map: &'a SemanticMap,
-    /// Answers a phrase; `None` for one with nothing in it.
+    /// Answers a phrase; `None` for an empty one.
     pub(crate) ask: &'a mut dyn FnMut(&str) -> Option<QueryAnswer>,
 }
 
@@ -62,18 +62,18 @@ impl Category {
 pub(crate) struct Unit {
     pub(crate) view: String,
     pub(crate) query: String,
-    /// Whether that is an object or a part.
+    /// Level of the category.
     pub(crate) level: Level,
     pub(crate) iou: f64,
-    /// Whether the point of largest relevancy is on it, where the protocol asks that.
+    /// True if the point of largest relevancy is on it; `None` if the protocol does not measure that.
     pub(crate) hit: Option<bool>,
 }
 
-/// What labels without any name are of.
+/// Category of labels without any name.
 const FOREGROUND: &str = "foreground";
 
-/// The labels of a view by name: regions of one name together. A piece is called "X · Y". Where none has a name
-/// (SPIn-NeRF), all are the foreground.
+/// Returns the labels of a view by name, with regions of one name together. A piece is called "X · Y". If none has a
+/// name (SPIn-NeRF), all are the foreground.
 pub(crate) fn categories(labels: &[FoundMask]) -> Vec<Category> {
     let mut all: BTreeMap<String, Category> = BTreeMap::new();
     let (unnamed, is_named) = (FOREGROUND.to_owned(), labels.iter().any(|l| l.name.is_some()));

@@ -21,7 +21,7 @@ pub(crate) struct Components {
     pub(crate) deviation: bool,
     /// Localization in the paper's two steps.
     pub(crate) localization: bool,
-    /// Instead of those, part and whole at once, which is this program's default.
+    /// Part and whole at once, this program's default, instead of the two steps.
     pub(crate) joint: bool,
 }
 
@@ -88,7 +88,7 @@ pub(crate) fn row<S: TextSource + ?Sized>(
             let mut mask = Mask::empty(view.exact.width_px, view.exact.height_px);
             let answered =
                 ask_by_embedding(&map.identities, (features, &recipe), &category.name, &mut phrases, source)?;
-            // The best is the answer whatever its score: recall asks where, not whether.
+            // Recall asks for the place, so the best identity is the answer whatever its score.
             if let Some(best) = answered.iter().flat_map(|a| a.answer.hits()).next() {
                 mask = view.exact.mask(&map.identities, best.identity);
             }
@@ -102,7 +102,7 @@ pub(crate) fn row<S: TextSource + ?Sized>(
     Ok(Row { components, recall, mean_iou, mean_secs: mean(&secs), units })
 }
 
-/// The features of a scene of which only objects were extracted.
+/// Returns the features of a scene from which only objects were extracted.
 pub(crate) fn objects_alone(language: &LanguageFeatures, identities: &Identities) -> LanguageFeatures {
     let mut objects = language.clone();
     for ((_, identity), features) in identities.iter().zip(&mut objects.by_identity) {

@@ -1,8 +1,8 @@
-//! Raw features per Gaussian, the baseline without identities: every Gaussian carries the mean raw feature of
-//! what it belongs to, features are blended like colors, and every pixel is as relevant as its blend.
+//! Raw features per Gaussian, the baseline without identities: every Gaussian carries the mean raw feature of its
+//! identity. Features are blended like colors, and a pixel's relevancy is that of its blend.
 //!
-//! A blend is a sum over the few identities of a pixel's Gaussians, so it is exact without drawing hundreds of
-//! channels: what a pixel weighs by identity is enough, and products of features are made once.
+//! A blend is a sum over the few identities of a pixel's Gaussians. So it is exact from the pixel's weights by
+//! identity, without rendering hundreds of channels; products of features are computed once.
 
 use crate::math::vector::dot;
 use crate::pipeline::semantics::by_embedding::TextEmbeddings;
@@ -11,7 +11,7 @@ use crate::pipeline::semantics::relevancy::{nearest, score};
 use crate::render::PixelWeights;
 use crate::scene::LanguageFeatures;
 
-/// The mean raw feature of each identity by number; that of nobody is zero.
+/// Mean raw feature of each identity by number; zero for unlabeled Gaussians.
 pub(crate) struct RawFeatures {
     of: Vec<Vec<f32>>,
     /// Products of all pairs.

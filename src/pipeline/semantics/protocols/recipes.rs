@@ -1,4 +1,4 @@
-//! `recipes`: what is found and what is rightly not found, recipe by recipe: names, embeddings and both, each
+//! `recipes`: shares of questions found and rightly not found, recipe by recipe: names, embeddings and both, each
 //! strategy, with deviation and without, and the rules of "not found".
 
 use std::time::Instant;
@@ -16,19 +16,19 @@ use crate::pipeline::semantics::words::words;
 use crate::scene::identity::whole_names::BETWEEN;
 use crate::scene::{Identities, IdentityId, Level, LevelFilter, SemanticMap};
 
-/// Things that may be absent, and parts of them. Those whose words a scene knows are not asked for.
+/// Things that may be absent, and parts of them. Things with words that a scene knows are not asked for.
 const THINGS: &str = "toy car, rocket, house, boat, duck, pot plant, candle, umbrella, bag, teddy bear, alarm clock, smartphone, \
     headphones, green toy car, red rocket, brown house, white boat, yellow duck, turquoise bag, pink candle, \
     sail of the boat, hull of the boat, beak of the duck, wings of the duck, roof of the house, \
     chimney of the house, handle of the umbrella, canopy of the umbrella, buckle of the bag, flap of the bag, \
     wheels of the toy car, leaves of the pot plant";
 
-/// What is asked for that is not there.
+/// Questions for absent things.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Absent {
     /// Things of another kind, and parts of them.
     pub(crate) kinds: Vec<String>,
-    /// Things that are there, in colors that none of their kind has.
+    /// Present things, in colors that none of their kind has.
     pub(crate) colors: Vec<String>,
     /// Parts that other things have.
     pub(crate) parts: Vec<String>,
@@ -50,7 +50,7 @@ fn absent_kinds(identities: &Identities) -> Vec<String> {
     things.filter(absent).map(str::to_owned).collect()
 }
 
-/// Objects of the scene in colors that no object of their kind has.
+/// Returns the objects of the scene in colors that no object of their kind has.
 fn wrong_colors(identities: &Identities) -> Vec<String> {
     let objects = identities.iter().filter(|(_, i)| i.level == Level::Object).flat_map(|(_, i)| &i.names);
     let names: Vec<&String> = objects.collect();
@@ -63,7 +63,7 @@ fn wrong_colors(identities: &Identities) -> Vec<String> {
     wrong
 }
 
-/// Parts that a thing lacks and another one has, two of each thing.
+/// Returns parts that a thing lacks and another one has, two of each thing.
 fn absent_parts(identities: &Identities) -> Vec<String> {
     let name = |id: IdentityId| identities.get(id).and_then(|i| i.names.first());
     let parts_of = |id: IdentityId| {
@@ -85,7 +85,7 @@ fn absent_parts(identities: &Identities) -> Vec<String> {
     absent
 }
 
-/// A recipe, and what it comes to: shares of questions.
+/// A recipe with its results: shares of questions.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct RecipeRow {
     pub(crate) title: String,
@@ -121,7 +121,7 @@ pub(crate) fn compared(base: &Recipe) -> Vec<(String, Recipe)> {
     all
 }
 
-/// Asks for everything in the `views`, and for what is not there, by one recipe.
+/// Asks by one recipe for everything in the `views`, and for absent things.
 pub(crate) fn row(
     (title, recipe): (String, Recipe),
     map: &SemanticMap,

@@ -1,4 +1,4 @@
-//! `spin-nerf`: IoU of the foreground and share of pixels that are right, at 1008 x 567, plain means
+//! `spin-nerf`: IoU of the foreground and share of correct pixels, at 1008 x 567, plain means
 //! over labeled views.
 
 use super::{AskedScene, LabeledView, Unit};
@@ -10,13 +10,13 @@ pub(crate) const SIZE: [usize; 2] = [1_008, 567];
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct Foreground {
     pub(crate) unit: Unit,
-    /// Share of all pixels that are right.
+    /// Share of all pixels that are correct.
     pub(crate) accuracy: f64,
 }
 
 /// Compares the one category of a view with the answer to `query`; `None` if the view has no labels.
 pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>, query: &str) -> Option<Foreground> {
-    // Nothing is asked for nothing.
+    // A view without labels is not asked.
     view.categories.first()?;
     let answered = (scene.ask)(query);
     let mask = answered.map(|a| a.mask(view.exact, Some(view.blended), &scene.map.identities, 1));
@@ -24,7 +24,7 @@ pub(crate) fn compare(scene: &mut AskedScene<'_>, view: &LabeledView<'_>, query:
     of_mask(&mask, view, query)
 }
 
-/// Compares a `mask` that something else found for the query.
+/// Compares a `mask` from another source with the labels.
 pub(crate) fn of_mask(mask: &Mask, view: &LabeledView<'_>, query: &str) -> Option<Foreground> {
     let first = view.categories.first()?;
     let mut truth = Mask::empty(first.mask.width_px(), first.mask.height_px());

@@ -1,6 +1,6 @@
-//! `strokes`: somebody points at a thing in the view that shows most of it, corrects what is wrong there with a
-//! second and a third stroke, and is judged in all other views. `corrections`: somebody corrects what the scene knows of
-//! a thing by three strokes, each in the view where most is wrong then, and is judged in all views.
+//! `strokes`: a simulated user points at a thing in the view that shows most of it and corrects the selection there
+//! with a second and a third stroke; all other views are scored. `corrections`: a simulated user corrects the known
+//! Gaussians of a thing by three strokes, each in the view with most errors; all views are scored.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -17,37 +17,37 @@ use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, Level, Mask};
 pub(crate) const STROKES: usize = 3;
 /// Half of a stroke's width, px.
 const RADIUS_PX: usize = 3;
-/// Share of a thing that is wrong in one piece, from which somebody corrects it.
+/// Least share of a thing that is wrong in one piece for a correction.
 const SEEN: f64 = 0.02;
-/// Pixels of a thing from which it is asked for.
+/// Least number of pixels of a thing for a test.
 const LEAST_PX: usize = 60;
 
-/// A photo and what it shows.
+/// A photo with its labels.
 pub(crate) struct LabeledPhoto {
     pub(crate) name: String,
     pub(crate) camera: Camera,
     pub(crate) categories: Vec<Category>,
 }
 
-/// A thing and how well it was selected.
+/// A thing with the scores of its selection.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct StrokeRow {
     pub(crate) name: String,
     pub(crate) level: Level,
-    /// The view that was drawn in first.
+    /// Name of the view of the first stroke.
     pub(crate) drawn_in: String,
-    /// How many it is judged in.
+    /// Number of views that it is scored in.
     pub(crate) views: usize,
     /// Mean IoU in them, before any stroke and after each.
     pub(crate) iou: [f64; STROKES + 1],
-    /// Milliseconds from each stroke to the Gaussians.
+    /// Milliseconds from each stroke to the selected Gaussians.
     pub(crate) ms: [f64; STROKES],
 }
 
-/// The Gaussians that are known to be what is called so.
+/// Returns the known Gaussians of a name.
 pub(crate) type Known<'a> = &'a dyn Fn(&str) -> Vec<usize>;
 
-/// Selects every named thing of the views. Where it is asked for what is `known` of a name, that is corrected.
+/// Selects every named thing of the views; with `known`, corrects the known Gaussians of its name.
 pub(crate) fn rows(
     hierarchy: &Hierarchy,
     cloud: &GaussianCloud,
@@ -106,7 +106,7 @@ pub(crate) fn rows(
     Ok(rows)
 }
 
-/// The stroke that somebody draws who sees `now` and means `truth`: through the largest region that is wrong.
+/// Returns the stroke of a user who sees `now` and means `truth`: through the largest wrong region.
 fn correction(truth: &Mask, now: &Mask) -> Option<(Mask, bool)> {
     let largest = |a: &Mask, b: &Mask| {
         let mut wrong = a.clone();
@@ -125,7 +125,7 @@ fn correction(truth: &Mask, now: &Mask) -> Option<(Mask, bool)> {
     Some((stroke_through(&region), is_plus))
 }
 
-/// A stroke from the middle of a region to its far end, away from its borders.
+/// Returns a stroke from the middle of a region to its far end, away from its borders.
 fn stroke_through(region: &Mask) -> Mask {
     let (w, h) = (region.width_px(), region.height_px());
     let depth = walk(w, h, |i| !region.contains(i) || is_rim(i, w, h), |_| true);
@@ -157,7 +157,8 @@ fn is_rim(i: usize, w: usize, h: usize) -> bool {
     i % w == 0 || i % w + 1 == w || i / w == 0 || i / w + 1 == h
 }
 
-/// Steps from the nearest pixel that is a `start`, over pixels that are `open`, and the pixel before on that way.
+/// Returns, for each pixel, the steps from the nearest `start` over `open` pixels, and the previous pixel on that
+/// path.
 fn walk(w: usize, h: usize, start: impl Fn(usize) -> bool, open: impl Fn(usize) -> bool) -> Vec<(u32, usize)> {
     let mut way = vec![(u32::MAX, usize::MAX); w * h];
     let mut next: VecDeque<usize> = (0..w * h).filter(|&i| start(i)).collect();

@@ -1,4 +1,4 @@
-//! Every name in every scene, asked as it is written, finds its identity.
+//! Every name in every scene, asked verbatim, finds its identity.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -39,7 +39,7 @@ const HARD: [(&str, &[&str]); 16] = [
     ("bows of the plush dolls hood", &["end of tails", "hood on bow", "hood of bow on plush"]),
 ];
 
-/// The same words, twice; and a thing in whose name those of others are.
+/// The same words twice, and a thing whose name contains those of others.
 fn hard() -> Identities {
     let mut all = Identities::default();
     for _ in 0..2 {
@@ -96,7 +96,7 @@ fn files_in(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// Every scene that tests can have, and what there is none of.
+/// All scenes that tests can have, and the missing ones.
 fn scenes() -> (Vec<(String, Identities)>, Vec<&'static str>) {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let data = std::env::var_os("FMLGS_DATA").map(PathBuf::from);
@@ -138,7 +138,7 @@ fn scenes() -> (Vec<(String, Identities)>, Vec<&'static str>) {
     (scenes, missing)
 }
 
-/// A scene's identities as questions meet them.
+/// A scene's identities under one way of understanding.
 struct Asked<'a> {
     all: &'a Identities,
     features: LanguageFeatures,
@@ -173,7 +173,7 @@ impl<'a> Asked<'a> {
         self.tell(&QueryReading::new(self.all, text, LevelFilter::Auto, &self.recipe).expect("a question"))
     }
 
-    /// Whether `id` is meant by one of its names: it is found, or a whole of it that is called the same.
+    /// Returns whether one of its names finds `id`, or a whole of it with the same name.
     fn is_meant(&self, id: IdentityId, name: &str, chosen: &[IdentityId]) -> bool {
         chosen.contains(&id)
             || self
@@ -184,26 +184,27 @@ impl<'a> Asked<'a> {
     }
 }
 
-/// A question in any letter case, with and without "the".
+/// Returns a question in several letter cases, with and without "the".
 fn said(name: &str) -> Vec<String> {
     let cases = [name.to_owned(), name.to_uppercase(), name.to_lowercase(), format!(" {name}\t")];
     let with = |article: &str| cases.iter().map(|c| format!("{article}{c}")).collect::<Vec<_>>();
     ["", "the ", "THE  "].into_iter().flat_map(with).collect()
 }
 
-/// What is read by the grammar alone, as if no name were looked at as a whole.
+/// Reads by the grammar alone, as if no whole name were looked up.
 fn by_grammar(all: &Identities, text: &str) -> Option<QueryReading> {
     let (text, mended, near) = mend_all(all, text);
     let parsed = ParsedQuery::parse(&text)?;
     Some(QueryReading { phrase: compound(all, &parsed).unwrap_or(parsed), called: vec![], mended, near })
 }
 
-/// Asks every name of a scene; what was not found, and the names that the grammar alone does not find.
+/// Asks every name of a scene; returns the number of questions, the failures, and the names that the grammar alone
+/// does not find.
 fn ask_all(scene: &str, all: &Identities) -> (usize, Vec<String>, Vec<String>) {
     let (mut asked, mut wrong, mut by_grammar_wrong) = (0, Vec::new(), Vec::new());
     for understanding in [Understanding::Names, Understanding::Both] {
         let how = Asked::new(all, understanding);
-        // Every word of every name is compared: of long lists, some.
+        // Every word of every name is compared, so of long lists only some names are asked.
         let is_long = all.len() >= 200;
         for (id, identity) in
             all.iter().filter(|(id, _)| understanding == Understanding::Names || !is_long || id % 200 == 0)
@@ -345,11 +346,11 @@ fn only_a_whole_name_is_one_and_pieces_of_whole_names_are_parted_there() {
     assert_eq!((handles.len(), &read("the handle of the set of cups of the set of cups").called), (2, &handles));
     let door = read("a door of the doll's house of the doll's house").called;
     assert_eq!(door, all.called("door of the doll's house", LevelFilter::Auto));
-    // Where the whole is a name and the piece is none, the grammar parts there; slips are mended first.
+    // If the whole is a name and the piece is none, the grammar divides there; slips are mended first.
     let lid = read("lid of the doll's huose");
     assert_eq!((lid.phrase.target.as_str(), lid.phrase.whole.as_deref()), ("lid", Some("doll's house")));
     assert_eq!(read("pink bow on the plush doll's hodo").called, all.called(HARD[0].1[0], LevelFilter::Auto));
-    // Names are not looked at by embedding, and a level that is asked for is kept to.
+    // Names are not used by embedding, and the requested level is respected.
     let part = |level, recipe: &Recipe| QueryReading::new(&all, "hood", level, recipe).expect("words").called.len();
     let counts = [part(LevelFilter::Part, &Recipe::default()), part(LevelFilter::Object, &Recipe::default())];
     assert_eq!((counts, part(LevelFilter::Auto, &Recipe::paper())), ([2, 0], 0));

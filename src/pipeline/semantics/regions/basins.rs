@@ -1,20 +1,20 @@
-//! The smallest pieces: the basins of the edge map, as water would fill them (watershed).
+//! The smallest pieces: the basins of the edge map (watershed).
 
 use crate::math::grid::neighbors;
 
-/// The piece of pixels outside the domain.
+/// Label of pixels outside the domain.
 pub(crate) const OUTSIDE: u32 = u32::MAX;
 const DRY: u32 = u32::MAX - 1;
 
-/// Splits the domain into connected basins of `strength`, numbered from 0 in the order of their
-/// first pixels; the label of each pixel and the number of basins. Pixels outside the domain are
-/// [`OUTSIDE`]. Differences of strength under `step` do not make basins.
+/// Splits the domain into connected basins of `strength`, numbered from 0 in the order of their first pixels. Returns
+/// the label of each pixel and the number of basins. Pixels outside the domain are [`OUTSIDE`]. Differences of
+/// strength under `step` make no basins.
 pub(crate) fn basins(strength: &[f32], domain: &[bool], width: usize, step: f32) -> (Vec<u32>, u32) {
     let level = |v: f32| ((v / step) as usize).min(LEVELS - 1);
     let levels: Vec<u16> = strength.iter().map(|&v| level(v) as u16).collect();
     let mut label: Vec<u32> = domain.iter().map(|&d| if d { DRY } else { OUTSIDE }).collect();
     let mut count = minima(&levels, &mut label, width);
-    // Flooding: pixels leave the queue level by level, those of a level in the order they came.
+    // Flooding: pixels leave the queue level by level, those of a level in their order of arrival.
     let mut queue: Vec<std::collections::VecDeque<u32>> = vec![std::collections::VecDeque::new(); LEVELS];
     for i in 0..label.len() {
         if label[i] < DRY {
@@ -43,10 +43,10 @@ pub(crate) fn basins(strength: &[f32], domain: &[bool], width: usize, step: f32)
     (label, count)
 }
 
-/// Steps of strength told apart.
+/// Number of levels of strength.
 const LEVELS: usize = 1024;
 
-/// Gives every plateau without a lower neighbor a label; how many there are.
+/// Labels every plateau without a lower neighbor; returns their number.
 fn minima(levels: &[u16], label: &mut [u32], width: usize) -> u32 {
     let n = levels.len();
     let mut seen = vec![false; n];

@@ -1,5 +1,5 @@
-//! How strongly a picture changes at each pixel, over several scales: what changes at all of them
-//! is an edge, what changes at the finest only is texture.
+//! Edge strength of a picture at each pixel, over several scales: a change at all of them is an edge, a change at the
+//! finest only is texture.
 
 use rayon::prelude::*;
 
@@ -43,7 +43,7 @@ fn gradient_squared(plane: &[f32], width: usize) -> Vec<f32> {
     out
 }
 
-/// A Gaussian blur whose border repeats.
+/// Blurs a plane by a Gaussian; the border pixels repeat.
 pub(crate) fn blur(plane: &[f32], width: usize, sigma: f32) -> Vec<f32> {
     let reach = (3.0 * sigma).ceil() as isize;
     let mut weights: Vec<f32> = (-reach..=reach).map(|d| (-0.5 * (d as f32 / sigma).powi(2)).exp()).collect();

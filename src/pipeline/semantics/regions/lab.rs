@@ -1,4 +1,4 @@
-//! Colors as people tell them apart: CIELAB, D65.
+//! Perceptual colors: CIELAB, D65.
 
 use crate::math::srgb::linear as linear_light;
 
@@ -20,13 +20,13 @@ pub(crate) fn lab(rgb: &[[u8; 3]]) -> Vec<[f32; 3]> {
 /// Weight of lightness beside the two color axes: shadows change it within a thing.
 const LIGHTNESS: f32 = 0.7;
 
-/// The planes in which edges are looked for, lightness counting for less.
+/// Returns the planes for edge detection, in which lightness has less weight.
 pub(crate) fn planes(colors: &[[f32; 3]]) -> [Vec<f32>; 3] {
     let weights = [LIGHTNESS, 1.0, 1.0];
     [0, 1, 2].map(|c| colors.iter().map(|p| weights[c] * p[c]).collect())
 }
 
-/// The cube root, made straight near zero.
+/// Cube root, linear near zero.
 fn root(t: f32) -> f32 {
     if t > 0.008_856 { t.cbrt() } else { 7.787 * t + 16.0 / 116.0 }
 }

@@ -1,8 +1,7 @@
-//! Regions of one photo without any network: pieces of even color grow together into a tree, and
-//! what is still apart where only large differences are left is taken for an object; inside an
-//! object the same, once more, gives its parts. Where Gaussians are trained already, neighbors on
-//! one unbroken surface go together sooner. Nothing has a name, and borders are where colors
-//! change: rough, but there is no scene for which it says nothing.
+//! Regions of one photo without any network. Pieces of even color are merged into a tree. Pieces that are still apart
+//! at large differences are objects; the same inside an object gives its parts. With trained Gaussians, neighbors on
+//! one unbroken surface merge sooner. Nothing has a name, and borders are color changes: rough, but it works on every
+//! scene.
 //!
 //! [`lab`] colors, [`edges`] between them, [`shape`] of the scene, [`basins`] of the edges, the
 //! [`tree`] of the basins, and [`mod@segment`] from it.
@@ -23,10 +22,10 @@ use crate::pipeline::observer::Observer;
 use crate::render::RenderSettings;
 use crate::scene::{GaussianCloud, Level, Mask, Photo};
 
-/// The built-in segmenter. It can say something about every photo.
+/// The built-in segmenter. It covers every photo.
 #[derive(Clone, Debug, Default)]
 pub struct Regions<'a> {
-    /// Gaussians that were trained on the photos, and how they are drawn, for the scene's shape.
+    /// Gaussians trained on the photos, and render settings, for the shape of the scene.
     pub(crate) trained: Option<(&'a GaussianCloud, &'a RenderSettings)>,
     pub(crate) options: RegionOptions,
     pub(crate) filters: FilterOptions,

@@ -17,22 +17,22 @@ pub struct Picture<'a> {
     pub width: usize,
     /// sRGB, row-major.
     pub rgb: &'a [[u8; 3]],
-    /// Pixels with 0 show nothing.
+    /// Coverage of each pixel; pixels with 0 show nothing.
     pub coverage: Option<&'a [u8]>,
-    /// How clearly a surface ends at each pixel, 0 to 1, where the shape of the scene is known.
+    /// End of a surface at each pixel, 0 to 1, if the shape of the scene is known.
     pub ends: Option<&'a [f32]>,
 }
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RegionOptions {
-    /// Unlikeness, in steps of Lab color between pieces of a thousandth of the whole, from which
-    /// things are different things.
+    /// Unlikeness from which pieces are different objects, in steps of Lab color between pieces of a thousandth of
+    /// the whole.
     pub(crate) object_step: f64,
-    /// The same between the parts of an object; the whole is the object then.
+    /// The same between the parts of an object, with the object as the whole.
     pub(crate) part_step: f64,
-    /// Least pixels of an object and of a part.
+    /// Least number of pixels of an object and of a part.
     pub(crate) least_px: [usize; 2],
-    /// Most of the picture that an object may be; what is more is background.
+    /// Largest share of the picture for an object; larger regions are background.
     pub(crate) most_share: f64,
 }
 
@@ -42,18 +42,18 @@ impl Default for RegionOptions {
     }
 }
 
-/// Edge strength that basins are told apart by, Lab steps.
+/// Difference of edge strength that separates basins, Lab steps.
 const BASIN_STEP: f32 = 0.3;
 /// Weight of the edge along the border in unlikeness; the rest is the difference of the means.
 const EDGE: f64 = 0.2;
-/// Power of the smaller piece's size: how much longer large pieces stay apart.
+/// Power of the smaller piece's size: larger values keep large pieces apart longer.
 const SIZE_POWER: f64 = 0.25;
-/// What remains of the unlikeness of two neighbors on one unbroken surface, and how many steps the
-/// end of a surface between them adds.
+/// Factor of the unlikeness of two neighbors on one unbroken surface, and steps added for an end of the surface
+/// between them.
 const UNBROKEN: f64 = 0.3;
 const END: f64 = 3.0;
 
-/// An object and the regions inside it, as found and not yet filtered.
+/// An object and the regions inside it, before filtering.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Candidate {
     pub(crate) mask: Mask,
@@ -83,8 +83,8 @@ pub(crate) fn segment(picture: &Picture<'_>, options: &RegionOptions) -> Vec<Can
     kept.into_par_iter().map(candidate).collect()
 }
 
-/// How unlike two neighbors are, in steps of Lab color between pieces of area `unit`; with the `shape` of the scene or
-/// by their looks alone.
+/// Unlikeness of two neighbors, in steps of Lab color between pieces of area `unit`; with the `shape` of the scene or
+/// by their colors alone.
 pub(crate) fn unlike(a: &Piece, b: &Piece, border: &Border, shape: bool, unit: f64) -> f64 {
     let apart = a.sums.iter().zip(&b.sums).map(|(p, q)| (p / a.area - q / b.area).powi(2)).sum::<f64>().sqrt();
     let step = EDGE * border.strength / border.length + (1.0 - EDGE) * apart;
@@ -107,7 +107,7 @@ impl Mosaic {
         let channels = planes(&lab(picture.rgb));
         let strength = strength(&ImagePlanes { width, channels: &channels });
         let domain: Vec<bool> = (0..n).map(|i| picture.coverage.is_none_or(|c| c[i] > 0)).collect();
-        // Where a surface ends there is an edge, whatever the colors.
+        // The end of a surface is an edge, whatever the colors.
         let end = |i: usize| picture.ends.map_or(0.0, |e| e[i]);
         let walls: Vec<f32> = (0..n).map(|i| strength[i] + 10.0 * end(i)).collect();
         let (label, count) = basins(&walls, &domain, width, BASIN_STEP);
@@ -136,7 +136,7 @@ impl Mosaic {
         Self { size: (width, n / width), pieces, borders, pixels }
     }
 
-    /// The tree of some of the pieces; its leaves are numbered as listed.
+    /// Grows the tree of some of the pieces; its leaves are numbered as listed.
     fn grow(&self, leaves: &[u32], shape: bool) -> Tree {
         let mut place = vec![u32::MAX; self.pieces.len()];
         leaves.iter().enumerate().for_each(|(at, &l)| place[l as usize] = at as u32);

@@ -1,8 +1,8 @@
-//! Where surfaces end, as the trained Gaussians know: at jumps of depth, and in hollow folds, where
-//! one thing stands on or leans at another. Folds that bulge are within a thing.
+//! Ends of surfaces by the trained Gaussians: at jumps of depth, and in hollow folds, at which one thing stands on or
+//! leans at another. Bulging folds are within a thing.
 //!
-//! Inverse depth is linear in the picture on every plane, so that its second difference tells folds
-//! from slopes, and hollow from bulging by its sign.
+//! Inverse depth is linear in the picture on every plane. So its second difference distinguishes folds from slopes,
+//! and its sign hollow folds from bulging ones.
 
 use rayon::prelude::*;
 
@@ -14,15 +14,14 @@ use crate::scene::{Camera, GaussianCloud};
 const REACH: f64 = 1.0 / 205.0;
 /// Width of the blur of inverse depth, in reaches.
 const BLUR: f32 = 0.6;
-/// Opacity from which there is a surface.
+/// Least opacity of a surface.
 const SOLID: f32 = 0.3;
-/// Change of slope of a fold, in tangents, that certainly is the end of a surface.
+/// Change of slope of a fold that certainly ends a surface, in tangents.
 const FOLD: f32 = 1.4;
-/// Slopes, as relative depth per tangent, that may be and certainly are a jump from one surface to
-/// another behind it.
+/// Slopes, as relative depth per tangent, that may be and certainly are a jump to another surface behind.
 const JUMP: [f32; 2] = [12.0, 37.0];
 
-/// How clearly a surface ends at each pixel of a view, 0 to 1; `None` if it cannot be drawn.
+/// Returns the end of a surface at each pixel of a view, 0 to 1; `None` if the view cannot be rendered.
 pub(crate) fn ends_of(cloud: &GaussianCloud, settings: &RenderSettings, camera: &Camera) -> Option<Vec<f32>> {
     let settings = RenderSettings { depth: true, sh_degree: 0, ..settings.clone() };
     let frame = Renderer::new().render(cloud, Features::NONE, camera, &settings).ok()?;
@@ -31,13 +30,13 @@ pub(crate) fn ends_of(cloud: &GaussianCloud, settings: &RenderSettings, camera: 
     Some(ends(&depth, frame.width_px, 0.5 * (camera.focal_px.x + camera.focal_px.y)))
 }
 
-/// The same from depths along the camera's axis, 0 where nothing is, for a focal length in px.
+/// The same from depths along the camera's axis, 0 for empty pixels, for a focal length in px.
 pub(crate) fn ends(depth: &[f32], width: usize, focal_px: f64) -> Vec<f32> {
     let farthest = depth.iter().copied().filter(|d| d.is_finite()).fold(0.0, f32::max);
     if farthest <= 0.0 {
         return vec![0.0; depth.len()];
     }
-    // What is empty lies behind everything.
+    // Empty pixels lie behind everything.
     let inverse = |&d: &f32| if d > 0.0 && d.is_finite() { 1.0 / d } else { 0.66 / farthest };
     let reach = (focal_px * REACH).clamp(1.0, 16.0);
     let step = reach.round() as isize;

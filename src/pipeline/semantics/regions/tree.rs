@@ -1,5 +1,4 @@
-//! Pieces that grow together: the two neighbors that differ least become one, until one is left
-//! (a binary partition tree).
+//! Binary partition tree: the two least different neighbors are merged until one piece is left.
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
@@ -18,12 +17,12 @@ pub(crate) struct Border {
     pub(crate) length: f64,
     /// Sum of the edge strength over them.
     pub(crate) strength: f64,
-    /// Sum over them of how clearly a surface ends there, 0 to 1 each.
+    /// Sum of the surface ends over them, 0 to 1 each.
     pub(crate) ends: f64,
 }
 
 impl Border {
-    /// Takes up another stretch.
+    /// Adds another stretch of border.
     pub(crate) fn add(&mut self, other: &Self) {
         self.length += other.length;
         self.strength += other.strength;
@@ -33,16 +32,16 @@ impl Border {
 
 pub(crate) type Unlike = dyn Fn(&Piece, &Piece, &Border) -> f64 + Sync;
 
-/// A node: a leaf, or two nodes made one.
+/// Node of the tree: a leaf, or two merged nodes.
 #[derive(Clone, Debug)]
 pub(crate) struct Node {
-    /// What it is made of; none for a leaf.
+    /// Nodes that were merged into it; `None` for a leaf.
     pub(crate) children: Option<[u32; 2]>,
-    /// What it becomes part of; none for a root.
+    /// Node that it was merged into; `None` for a root.
     pub(crate) parent: Option<u32>,
-    /// Unlikeness at which it came to be; 0 for leaves.
+    /// Unlikeness at which it was created; 0 for leaves.
     pub(crate) birth: f64,
-    /// Unlikeness at which it was merged; that of the last merging for roots.
+    /// Unlikeness at which it was merged; for roots, that of the last merge.
     pub(crate) death: f64,
     pub(crate) area: f64,
 }
@@ -63,24 +62,24 @@ pub(crate) fn grow(pieces: Vec<Piece>, borders: BTreeMap<(u32, u32), Border>, un
     }
     while let Some(Reverse((bits, a, b))) = g.open.pop() {
         let Some(now) = g.unlikeness(a, b) else { continue };
-        // Pieces have grown since: this pair's turn comes later.
+        // The pieces have grown since; this pair's turn comes later.
         if now > f64::from_bits(bits) {
             g.open.push(Reverse((now.to_bits(), a, b)));
         } else {
             g.merge(a, b, f64::from_bits(bits));
         }
     }
-    // What was never merged lives on to the end.
+    // Nodes that were never merged live on to the end.
     g.nodes.iter_mut().filter(|n| n.parent.is_none()).for_each(|n| n.death = g.last);
     Tree { nodes: g.nodes }
 }
 
-/// Pieces that are merged in place: the one with more neighbors takes up the other.
+/// Pieces that are merged in place: the one with more neighbors absorbs the other.
 struct Growing<'a> {
     unlike: &'a Unlike,
     nodes: Vec<Node>,
     pieces: Vec<Piece>,
-    /// The node that a piece is by now.
+    /// Current node of each piece.
     node: Vec<u32>,
     near: Vec<BTreeMap<u32, Border>>,
     open: BinaryHeap<Reverse<(u64, u32, u32)>>,
@@ -103,7 +102,7 @@ impl<'a> Growing<'a> {
         }
     }
 
-    /// How unlike two pieces are now; `None` if they are no neighbors any more.
+    /// Unlikeness of two pieces now; `None` if they are no neighbors any more.
     fn unlikeness(&self, a: u32, b: u32) -> Option<f64> {
         let border = self.near[a as usize].get(&b)?;
         Some((self.unlike)(&self.pieces[a as usize], &self.pieces[b as usize], border).max(0.0))
@@ -148,7 +147,7 @@ impl<'a> Growing<'a> {
 }
 
 impl Tree {
-    /// The nodes that are whole where nothing is merged from `unlike` on: every leaf is in one.
+    /// Returns the nodes left if merging stops at `unlike`: every leaf is in one.
     pub(crate) fn cut(&self, unlike: f64) -> Vec<u32> {
         let whole = |n: &Node| n.birth < unlike && (n.death >= unlike || n.parent.is_none());
         (0..self.nodes.len() as u32).filter(|&i| whole(&self.nodes[i as usize])).collect()

@@ -1,4 +1,4 @@
-//! The tree of what belongs together, and what of it marks select.
+//! Tree of Gaussians that belong together, and the selection of its nodes by marks.
 
 use std::collections::BTreeMap;
 
@@ -12,11 +12,11 @@ use crate::pipeline::semantics::regions::tree::{Border, Node, Piece, Tree, grow}
 use crate::render::RenderSettings;
 use crate::scene::{Camera, GaussianCloud};
 
-/// Most Gaussians of a leaf, and how unlike they are at most, in Lab steps.
+/// Most Gaussians of a leaf, and their largest difference, in Lab steps.
 const LEAF: usize = 16;
 const LEAF_STEP: f64 = 3.0;
 
-/// Gaussians as a tree: its leaves are a few that look the same.
+/// Gaussians as a tree, whose leaves are a few that look the same.
 #[derive(Debug)]
 pub(crate) struct Hierarchy {
     /// The leaf of each Gaussian.
@@ -28,7 +28,7 @@ pub(crate) struct Hierarchy {
 }
 
 impl Hierarchy {
-    /// Of a cloud as it is seen by these cameras.
+    /// Builds the tree of a cloud as seen by these cameras.
     pub(crate) fn new(
         cloud: &GaussianCloud,
         cameras: &[Camera],
@@ -58,17 +58,18 @@ impl Hierarchy {
         Self { leaf, leaves: count, tree, area: surface.pieces.iter().map(|p| p.area).collect() }
     }
 
-    /// How many Gaussians it is of.
+    /// Number of Gaussians.
     pub(crate) fn gaussians(&self) -> usize {
         self.leaf.len()
     }
 
-    /// The Gaussians that marks select, beginning with those `from` which there is to correct (indices).
+    /// Returns the Gaussians that the marks select, starting from the Gaussians `from` if a selection is corrected
+    /// (indices).
     ///
-    /// Stroke by stroke, the labels of the tree's nodes that cost least: a mark that is not followed costs, and so does
-    /// each node that is not what it is a piece of, the less the longer it stood alone while the tree grew. Area that
-    /// changes costs by the square of the stroke's length, so that a stroke is about something of its own size: least
-    /// where a minus takes away, and little where a click adds, which says where and not how large.
+    /// Finds, stroke by stroke, the cheapest labels of the tree's nodes. A mark that is not followed has a cost. So
+    /// has each node with another label than its parent: less, the longer the node stood alone while the tree grew.
+    /// Changed area costs by the square of the stroke's length, so that a stroke is about something of its own size.
+    /// It costs least if a minus removes it, and little if a click adds it, since a click gives a place but no size.
     pub(crate) fn select(&self, marks: &StrokeMarks, from: &[usize]) -> Vec<bool> {
         let mut gaussians = vec![false; self.leaf.len()];
         from.iter().for_each(|&i| gaussians[i] = true);
@@ -80,7 +81,7 @@ impl Hierarchy {
         let mut now = before.clone();
         let mut alone: Vec<f64> = self.tree.nodes.iter().map(Self::price).collect();
         if !from.is_empty() {
-            // What there is to correct ends where it ends: that costs nothing, and nothing is won by smoothing it.
+            // The borders of the given selection are free, so that they stay and are not smoothed.
             let fixed =
                 |leaf: usize| [before[leaf], !before[leaf]].map(|other| if other { f64::INFINITY } else { 0.0 });
             let own = self.cheapest(&fixed, &alone);
@@ -98,12 +99,12 @@ impl Hierarchy {
                 *weights.entry(self.leaf[*gaussian as usize]).or_default() += f64::from(*weight);
             }
             let all: f64 = weights.values().sum();
-            // Not to be followed is what costs.
+            // The cost is for not following a mark.
             for (leaf, weight) in weights {
                 let [out, own] = &mut marked[leaf as usize];
                 let (against, follows) = if stroke.is_plus { (out, own) } else { (own, out) };
                 *against += MARK * weight / all;
-                // Where two say the opposite, the later one counts.
+                // Of two opposite marks, the later one counts.
                 *follows = 0.0;
             }
             let change = match stroke {
@@ -124,7 +125,7 @@ impl Hierarchy {
         }
         for (is_in, leaf) in gaussians.iter_mut().zip(&self.leaf) {
             let leaf = *leaf as usize;
-            // Leaves that stayed what they were keep what they had.
+            // Gaussians in leaves without a change stay as they were.
             if now[leaf] != before[leaf] {
                 *is_in = now[leaf];
             }
@@ -132,13 +133,13 @@ impl Hierarchy {
         gaussians
     }
 
-    /// What it costs a node not to be what it is a piece of.
+    /// Cost of another label than the parent's.
     pub(super) fn price(node: &Node) -> f64 {
         ((node.birth + LEAF_STEP) / (node.death + LEAF_STEP)).powi(2)
     }
 
-    /// The labels of all nodes that cost least: `leaf` says what being out and being in costs a leaf, `alone` what it
-    /// costs each node not to be what it is a piece of.
+    /// Returns the cheapest labels of all nodes: `leaf` gives the costs of a leaf for being out and in, `alone` the
+    /// cost of each node for another label than its parent's.
     fn cheapest(&self, leaf: &dyn Fn(usize) -> [f64; 2], alone: &[f64]) -> Vec<bool> {
         let nodes = &self.tree.nodes;
         let mut cost = vec![[0.0_f64; 2]; nodes.len()];
@@ -164,19 +165,19 @@ impl Hierarchy {
     }
 }
 
-/// What it costs not to follow a stroke at all, in nodes that were cut off though nothing tells them apart.
+/// Cost of ignoring a stroke entirely, in nodes that are cut off without any visible difference.
 const MARK: f64 = 10.0;
-/// The same for area of the square of a stroke's length that the first stroke selects, and that a later one changes.
+/// Cost of area, per square of a stroke's length: for the selection of the first stroke, and for a later change.
 const FIRST: f64 = 0.01;
 const CHANGE: f64 = 0.5;
-/// That a minus takes away, and that a click adds.
+/// Cost of area that a minus removes, and that a click adds.
 const REMOVE: f64 = 0.05;
 const ADD_BY_CLICK: f64 = 0.1;
-/// That a line and a click change of what is known.
+/// Cost of area of a given selection that a line changes, and that a click changes.
 const KNOWN: f64 = 16.0;
 const KNOWN_BY_CLICK: f64 = 0.1;
 
-/// Gaussians that look the same, a few together: the leaf of each, and how many there are.
+/// Groups Gaussians that look the same; returns the leaf of each, and the number of leaves.
 fn leaves(surface: &SplatSurface) -> (Vec<u32>, usize) {
     let mut order: Vec<(f64, usize)> = (surface.edges.iter().zip(&surface.borders).enumerate())
         .map(|(i, (&(a, b), border))| {
@@ -224,7 +225,7 @@ pub(super) mod tests {
     const W: usize = 128;
     const H: usize = 96;
 
-    /// A sheet of gray Gaussians with a square of 12 x 12 in it, red on the left, blue on the right. Whose each is:
+    /// A sheet of gray Gaussians with a square of 12 x 12 in it, red on the left, blue on the right. Their labels are
     /// 0, 1 and 2.
     pub(in super::super) fn sheet() -> (GaussianCloud, Vec<usize>) {
         let n = 32;
@@ -267,7 +268,7 @@ pub(super) mod tests {
         marks
     }
 
-    /// How many of each of the three are selected.
+    /// Counts the selected Gaussians of each of the three.
     fn counts(selected: &[bool], whose: &[usize]) -> [usize; 3] {
         [0, 1, 2].map(|k| selected.iter().zip(whose).filter(|(s, w)| **s && **w == k).count())
     }
@@ -286,7 +287,7 @@ pub(super) mod tests {
         let one = select(&[dot(left, true)], &[]);
         let both = select(&[dot(left, true), dot(right, true)], &[]);
         let back = select(&[dot(left, true), dot(right, true), dot(right, false)], &[]);
-        // What there is to correct stays but for what is marked.
+        // The corrected selection stays, except for the marked Gaussians.
         let from: Vec<usize> = (0..whose.len()).filter(|i| whose[*i] > 0).collect();
         let without = select(&[dot(left, false)], &from);
         let other = select(&[dot(gray, true)], &[]);
@@ -303,7 +304,7 @@ pub(super) mod tests {
     fn what_is_known_keeps_its_borders_and_a_line_corrects_what_it_covers() {
         let (cloud, whose) = sheet();
         let tree = hierarchy(&cloud);
-        // Known is something that ends where nothing can be seen: the upper gray, and all of the blue.
+        // The given selection ends without a visible border: the upper gray, and all of the blue.
         let from: Vec<usize> = (0..whose.len()).filter(|i| whose[*i] == 2 || whose[*i] == 0 && i / 32 < 9).collect();
         let line = |from: [f64; 2], to: [f64; 2], is_plus: bool| {
             let place = |t: f64| [0, 1].map(|c| from[c] + t * (to[c] - from[c]));
@@ -321,11 +322,11 @@ pub(super) mod tests {
         let with_red = select(&line([-0.15, -0.2], [-0.15, 0.2], true));
         let [gray, red, blue] = counts(&with_red, &whose);
         assert!((280..300).contains(&gray) && (8..40).contains(&red) && blue >= 64, "{gray} {red} {blue}");
-        // In the middle of what looks the same, hardly more than the line itself.
+        // In the middle of an even area, hardly more than the line itself.
         let lower = select(&line([-0.6, 0.6], [0.0, 0.6], true));
         let more = counts(&lower, &whose)[0] - 288;
         assert!((8..120).contains(&more), "{more} of the lower gray");
-        // The control: from nothing, the same line takes all that looks the same.
+        // The control: from nothing, the same line selects the whole even area.
         let alone = tree.select(&marks(&cloud, &[line([-0.6, 0.6], [0.0, 0.6], true)]), &[]);
         assert!(counts(&alone, &whose)[0] > 400);
     }

@@ -1,8 +1,9 @@
-//! Whose every Gaussian is: votes for some of them, and the tree of what belongs together.
+//! Labels of all Gaussians from votes for some of them, by the tree of Gaussians that belong together.
 //!
-//! Each node of the tree has one identity, or several by its pieces. To be something else than what it is a piece of
-//! costs a node the less the longer it stood alone while the tree grew (the price that selections pay, too), and not to
-//! be what was voted costs a leaf. The cheapest labels of all nodes are found exactly, from the leaves up and back.
+//! Each node of the tree has one identity, or several by its pieces. A node with another identity than its parent has
+//! a cost, less the longer it stood alone while the tree grew (the price of selections, too). A leaf with another
+//! identity than its votes has a cost. The cheapest labels of all nodes are found exactly, from the leaves up and
+//! back.
 
 use std::collections::BTreeMap;
 
@@ -10,24 +11,24 @@ use super::hierarchy::Hierarchy;
 use crate::pipeline::semantics::votes::{Assignment, UNKNOWN, Votes};
 use crate::scene::{Identities, IdentityId};
 
-/// What it costs a leaf not to be what masks say, in nodes that were cut off though nothing tells them apart.
+/// Cost of a leaf that contradicts the masks, in nodes that are cut off without any visible difference.
 const SAID: f64 = 3.0;
-/// The same for what colors and edges of photos suggest.
+/// The same for votes grown by colors and edges of photos.
 const SUGGESTED: f64 = 0.3;
-/// Margin from which a Gaussian is what masks say of itself, whatever those beside it are.
+/// Margin from which a Gaussian keeps the identity of its own masks, whatever its neighbors are.
 const CLEAR: f32 = 0.25;
-/// Margin of what only the tree says.
+/// Margin of an identity from the tree alone.
 const INHERITED: f32 = 0.1;
 
 /// Votes for the Gaussians of a leaf.
 #[derive(Clone, Debug, Default)]
 struct LeafVotes {
     by_identity: BTreeMap<IdentityId, f64>,
-    /// Area of the Gaussians that they are for, square units.
+    /// Area of the Gaussians with votes, square units.
     area: f64,
 }
 
-/// What a subtree costs with each identity at its top: some, by number, and all the others.
+/// Cost of a subtree for each identity at its top: some by number, and the rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Costs {
     of: Vec<(IdentityId, f64)>,
@@ -35,7 +36,7 @@ struct Costs {
 }
 
 impl Costs {
-    /// Of a leaf's votes: `all` is the price of what has none.
+    /// Costs of a leaf's votes: `all` is the cost of an identity without votes.
     fn new(votes: &LeafVotes, all: f64) -> Self {
         let total: f64 = votes.by_identity.values().sum();
         let of = votes.by_identity.iter().map(|(id, weight)| (*id, all * (1.0 - weight / total))).collect();
@@ -51,7 +52,7 @@ impl Costs {
         least.filter(|l| l.1 <= self.rest).unwrap_or((UNKNOWN, self.rest))
     }
 
-    /// The same where the subtree may be something else than its whole, for a price.
+    /// The same if the subtree may differ from its parent for a price.
     fn below(&self, price: f64) -> Self {
         let rest = self.rest.min(self.least().1 + price);
         Self { of: self.of.iter().copied().filter(|c| c.1 < rest).collect(), rest }
@@ -70,8 +71,8 @@ impl Costs {
 }
 
 impl Hierarchy {
-    /// The identity of every Gaussian: by what masks `said`, and by `all` votes where they said nothing. Leaves for
-    /// which nothing votes stay `UNKNOWN`, as do votes of less than `least` px.
+    /// Returns the identity of every Gaussian: by the votes of masks, `said`, and by `all` votes for the rest. Leaves
+    /// without votes stay `UNKNOWN`; votes of less than `least` px do not count.
     pub(crate) fn label(&self, said: &Votes, all: &Votes, identities: &Identities, least: f32) -> Vec<Assignment> {
         let nodes = &self.tree.nodes;
         let alone: Vec<f64> = nodes.iter().map(Self::price).collect();
@@ -147,7 +148,7 @@ mod tests {
         votes
     }
 
-    /// How many Gaussians of each of the three are of each identity; the last column is unknown.
+    /// Counts the Gaussians of each of the three by identity; the last column is unknown.
     fn table(labels: &[Assignment], whose: &[usize]) -> [[usize; 4]; 3] {
         let mut table = [[0; 4]; 3];
         for (label, whose) in labels.iter().zip(whose) {
@@ -168,12 +169,12 @@ mod tests {
         let found = table(&labels, &whose);
         assert!(found[1][1] >= 12 && found[1][2] == 0 && found[2][2] >= 12 && found[2][1] == 0, "{found:?}");
         assert!(found[0][0] >= 20 && found[0][1] + found[0][2] <= 8, "{found:?}");
-        // Only leaves with votes are known; the rest is left to be asked for.
+        // Only leaves with votes are known; the rest stays unknown.
         let leaves: Vec<u32> = (0..whose.len()).filter(voted).map(|i| tree.leaf[i]).collect();
         let known = |i: usize| leaves.contains(&tree.leaf[i]);
         assert!((0..whose.len()).all(|i| known(i) == (labels[i].identity != UNKNOWN)));
         assert!(labels.iter().all(|l| (l.margin > 0.0) == (l.identity != UNKNOWN)));
-        // The control: without votes nothing is known.
+        // The control: without votes everything is unknown.
         let none = Votes::new(cloud.len());
         assert!(tree.label(&none, &none, &all, 0.05).iter().all(|l| l.identity == UNKNOWN));
     }
@@ -196,7 +197,7 @@ mod tests {
         .expect("drawn");
         let found = table(&tree.label(&said, &both, &all, 0.05), &whose);
         assert!(found[1][1] > found[1][2], "{found:?}");
-        // The control: said as loudly as that, it is what is said most.
+        // The control: with equal weight, the identity with most votes wins.
         let found = table(&tree.label(&both, &both, &all, 0.05), &whose);
         assert!(found[1][2] > found[1][1], "{found:?}");
         let found = table(&tree.label(&Votes::new(cloud.len()), &suggested, &all, 0.05), &whose);

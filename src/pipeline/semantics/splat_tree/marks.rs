@@ -1,4 +1,4 @@
-//! Clicks and strokes: pixels of a view, and the Gaussians that they show.
+//! Clicks and strokes: pixels of a view, and the Gaussians seen there.
 
 use std::collections::BTreeMap;
 
@@ -8,51 +8,51 @@ use crate::math::lanes::Lane;
 use crate::render::{ContributionSink, RenderError, RenderSettings, Renderer, TILE_PX};
 use crate::scene::{Camera, GaussianCloud, Mask};
 
-/// A stroke is about something of so many times its own area, at least.
+/// Least size of a stroke's target, as a multiple of the stroke's own area.
 const CLICK: f64 = 16.0;
 
-/// The square of a line's length, in areas of it, at least; what is shorter is a click.
+/// Least square of a line's length, in areas of the line; shorter strokes are clicks.
 const LINE: f64 = 3.0;
 
-/// Pixels around a stroke that are drawn with it.
+/// Pixels around a stroke that are rendered with it.
 const ROOM_PX: usize = 32;
 
-/// Share of a pixel's light, from its foremost contributor on, that is what one points at.
+/// Share of a pixel's weight that counts as the target, from its largest contributor on.
 const POINTED_AT: f32 = 0.6;
 
-/// Pixels of a view that are marked, as being of it or as not being of it.
+/// Marked pixels of a view, as belonging to the target or not.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stroke {
     pub(crate) camera: Camera,
     pub(crate) pixels: Mask,
-    /// Whether this belongs to what is meant.
+    /// True if the pixels belong to the target.
     pub(crate) is_plus: bool,
 }
 
-/// What was marked.
+/// Marks of a selection.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct StrokeMarks {
     pub(super) strokes: Vec<StrokeMark>,
 }
 
-/// The Gaussians that a stroke shows, and how much of each, px.
+/// Gaussians seen in a stroke, and the weight of each, px.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct StrokeMark {
     pub(super) weights: BTreeMap<u32, f32>,
     pub(super) is_plus: bool,
-    /// Whether it is hardly longer than wide.
+    /// True if it is hardly longer than wide.
     pub(super) is_click: bool,
-    /// The square of its length at the depth of what it shows, at least some times its area: square units.
+    /// Square of its length at the depth of its Gaussians, at least a multiple of its area: square units.
     pub(super) size: f64,
 }
 
 impl StrokeMarks {
-    /// Strokes so far.
+    /// Number of strokes.
     pub(crate) fn len(&self) -> usize {
         self.strokes.len()
     }
 
-    /// Takes the last stroke back.
+    /// Removes the last stroke.
     pub(crate) fn remove_last(&mut self) {
         self.strokes.pop();
     }
@@ -66,7 +66,7 @@ impl StrokeMarks {
         stroke: &Stroke,
     ) -> Result<(), RenderError> {
         let Some(near) = stroke.pixels.bounds() else { return Ok(()) };
-        // What lies far from the stroke need not be drawn.
+        // Far from the stroke, nothing need be rendered.
         let from = [near.x.start, near.y.start].map(|v| v.saturating_sub(ROOM_PX));
         let to = |end: usize, most: u32| (end + ROOM_PX).min(most as usize);
         let (right, bottom) = (to(near.x.end, stroke.camera.width_px), to(near.y.end, stroke.camera.height_px));
@@ -105,7 +105,7 @@ impl StrokeMarks {
     }
 }
 
-/// The square of a stroke's length, square px.
+/// Square of a stroke's length, square px.
 fn length_px2(pixels: &Mask) -> f64 {
     let at = |i: usize| DVec2::new((i % pixels.width_px()) as f64, (i / pixels.width_px()) as f64);
     let area = pixels.area() as f64;
@@ -115,7 +115,7 @@ fn length_px2(pixels: &Mask) -> f64 {
     12.0 * variance
 }
 
-/// How large a pixel is where half of the weight lies in front.
+/// Size of a pixel at the median depth, by weight, of these Gaussians.
 fn units_per_px(cloud: &GaussianCloud, camera: &Camera, weights: &BTreeMap<u32, f32>) -> f64 {
     let axis = camera.world_from_camera * DVec3::Z;
     let depth = |i: &u32| (cloud.world_position(*i as usize) - camera.center).dot(axis);
@@ -130,10 +130,10 @@ fn units_per_px(cloud: &GaussianCloud, camera: &Camera, weights: &BTreeMap<u32, 
     reached.map_or(1.0, |(depth, _)| depth / (camera.focal_px.x * camera.focal_px.y).sqrt())
 }
 
-/// Collects who contributes to the marked pixels of one row of tiles.
+/// Collects the contributors of the marked pixels in one row of tiles.
 struct Row<'a> {
     pixels: &'a Mask,
-    /// The corner of what is drawn in the view.
+    /// The corner of the rendered part in the view.
     from: [usize; 2],
     width: usize,
     found: Vec<(u32, u32, f32)>,

@@ -1,5 +1,5 @@
-//! Gaussians as a surface: which lie side by side, what they look like, and how clearly the views of a scene show that
-//! something ends between them.
+//! Gaussians as a surface: their neighbors, their colors, and the visible borders between them in the views of a
+//! scene.
 
 use glam::{DVec2, DVec3};
 use rayon::prelude::*;
@@ -15,40 +15,40 @@ use crate::pipeline::observer::{Observer, Ticker};
 use crate::render::{ContributionSink, Features, RenderError, RenderSettings, Renderer, TILE_PX};
 use crate::scene::{Camera, GaussianCloud};
 
-/// Neighbors that each Gaussian looks for.
+/// Number of neighbors searched for each Gaussian.
 const NEIGHBORS: usize = 10;
-/// How many times as far as the neighbors of either a neighbor may be.
+/// Largest distance of two neighbors, as a multiple of the distance to the last neighbor of either.
 const FAR: f64 = 10.0;
 /// Longer side of the views, px.
 const SIDE_PX: u32 = 448;
-/// Most views that are looked at.
+/// Most views that are rendered.
 const MOST_VIEWS: usize = 32;
-/// Share of its area in the view that shows it best that a Gaussian must have in a view to be seen there.
+/// Least share of its area in its best view for a Gaussian to count as seen in a view.
 const LEAST_SEEN: f32 = 0.1;
-/// Opacity from which there is a surface.
+/// Least opacity of a surface.
 const SOLID: f32 = 0.3;
 
 /// A cloud's surface.
 pub(super) struct SplatSurface {
-    /// Of each Gaussian: area, square units, and the sum of its color's planes over that.
+    /// Area of each Gaussian, square units, and the sum of its color's planes over that.
     pub(super) pieces: Vec<Piece>,
     /// Neighbors, the smaller index first.
     pub(super) edges: Vec<(u32, u32)>,
-    /// What lies between the two of each edge.
+    /// Border between the two Gaussians of each edge.
     pub(super) borders: Vec<Border>,
 }
 
-/// A view as evidence.
+/// Evidence of one view.
 struct Look {
     camera: Camera,
     strength: Vec<f32>,
     ends: Vec<f32>,
-    /// Square units that each Gaussian fills.
+    /// Area of each Gaussian, square units.
     areas: Vec<f32>,
 }
 
 impl SplatSurface {
-    /// Looks at the Gaussians through some of these cameras.
+    /// Renders the Gaussians through some of these cameras.
     pub(super) fn new(
         cloud: &GaussianCloud,
         cameras: &[Camera],
@@ -81,7 +81,7 @@ impl SplatSurface {
     }
 }
 
-/// At most `most` of `n` indices, evenly spread.
+/// Returns at most `most` of `n` indices, evenly spread.
 fn spread(n: usize, most: usize) -> impl Iterator<Item = usize> {
     let taken = n.min(most);
     (0..taken).map(move |k| (2 * k + 1) * n / (2 * taken))
@@ -159,7 +159,7 @@ impl ContributionSink<f32> for Row<'_> {
     }
 }
 
-/// The color that each Gaussian has in the views; its own where none shows it.
+/// Returns the color of each Gaussian in the views; its own if no view shows it.
 fn own_colors(cloud: &GaussianCloud, seen: &[[f32; 4]]) -> Vec<[f32; 3]> {
     let stride = cloud.sh_stride();
     let own = |i: usize| -> [u8; 3] {
@@ -176,7 +176,7 @@ fn own_colors(cloud: &GaussianCloud, seen: &[[f32; 4]]) -> Vec<[f32; 3]> {
     seen.iter().enumerate().map(color).collect()
 }
 
-/// The nearest neighbors of all Gaussians, each pair once.
+/// Returns the nearest neighbors of all Gaussians, each pair once.
 fn neighbors(cloud: &GaussianCloud) -> Vec<(u32, u32)> {
     let around = nearest(cloud, NEIGHBORS);
     let reach: Vec<f64> = around.iter().map(|near| near.last().map_or(0.0, |(_, far2)| *far2)).collect();
@@ -212,7 +212,7 @@ fn border(cloud: &GaussianCloud, looks: &[Look], best: &[f32], colors: &[[f32; 3
 }
 
 impl Look {
-    /// The strongest edge and the clearest end of a surface on the way between two places, px.
+    /// Returns the strongest edge and the clearest end of a surface between two places, px.
     fn strongest_between(&self, from: DVec2, to: DVec2) -> [f32; 2] {
         let (w, h) = (self.camera.width_px as usize, self.camera.height_px as usize);
         let steps = (from.distance(to).ceil() as usize).clamp(1, 12);

@@ -1,9 +1,9 @@
-//! Photos as evidence: what is known of a view, drawn into its photo, grows over what is unknown until the photo or the
-//! shape of the scene says that something ends there.
+//! Photos as evidence: known labels of a view, rendered into its photo, grow over unknown pixels up to the borders in
+//! the photo or in the shape of the scene.
 //!
-//! Growing is a race of all identities over the pixels: a pixel takes time where the photo or the depth changes, and
-//! where its color is not one that the identity is known to have, compared with all others and with something never
-//! seen. Whoever comes first keeps a pixel; where nobody comes in time it stays unknown.
+//! Growing is a race of all identities over the pixels. Changes of the photo or the depth cost a pixel time. So does a
+//! color that is not known of the identity, compared with those of all others and of unseen things. The first identity
+//! to arrive keeps the pixel; a pixel that none reaches in time stays unknown.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -30,7 +30,7 @@ const CELLS: [usize; 3] = [13, 36, 36];
 const SIDE_PX: u32 = 320;
 
 impl Tracker<'_> {
-    /// Lets the photos complete what is known, those of which most is known first; what each adds is known to the next.
+    /// Completes the labels in the photos, those with most known pixels first; each completed photo helps the next.
     pub(super) fn complete(&mut self, views: &[ViewReport], observer: &mut dyn Observer) -> Result<(), FindError> {
         let options = GrowOptions::default();
         let mut order: Vec<&ViewReport> = views.iter().filter(|v| v.unknown > 0.0).collect();
@@ -63,6 +63,7 @@ impl Tracker<'_> {
             let map = self.map(*photo, SIDE_PX)?;
             let known = sure(&map, options.share);
             let mut labels = grow(terrain, &known, &colors, &options);
+            // Known pixels come from earlier votes, so only the grown ones vote.
             labels.iter_mut().zip(&known).filter(|(_, k)| **k != UNKNOWN).for_each(|(l, _)| *l = UNKNOWN);
             forget(&mut labels, self.gone(*photo, SIDE_PX)?.as_ref());
             let photo = &self.photos[*photo];
@@ -76,13 +77,13 @@ impl Tracker<'_> {
     }
 }
 
-/// What is known beyond doubt of a view; `UNKNOWN` elsewhere.
+/// Returns the certain labels of a view; `UNKNOWN` elsewhere.
 fn sure(map: &ViewMap, share: f32) -> Vec<IdentityId> {
     let sure = |i: usize| map.alpha[i] >= 0.5 && map.share[i] >= share;
     (0..map.identity.len()).map(|i| if sure(i) { map.identity[i] } else { UNKNOWN }).collect()
 }
 
-/// What a photo shows, in px of the view.
+/// Colors and edges of a photo, in px of the view.
 struct Terrain {
     width: usize,
     /// Cell of each pixel's color.
@@ -91,23 +92,23 @@ struct Terrain {
     wall: Vec<f32>,
 }
 
-/// How patient and how strict growing is.
+/// Limits and costs of growing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct GrowOptions {
-    /// Time after which nobody comes any more.
+    /// Time limit of growing.
     patience: f32,
-    /// Time of a pixel without edges in a color that only this identity has.
+    /// Time of a pixel without edges in a color of this identity alone.
     step: f32,
     /// Time per Lab step of an edge, and for the end of a surface.
     edge: f32,
     end: f32,
-    /// Time per nat that the color speaks against the identity.
+    /// Time per nat of evidence of the color against the identity.
     color: f32,
-    /// Nats from which a color is none of the identity's.
+    /// Nats from which a color is excluded for the identity.
     most: f32,
     /// Least share of a pixel's weight for its identity to be known.
     share: f32,
-    /// Share of colors that are of things never seen.
+    /// Share of colors of unseen things.
     unseen: f32,
 }
 
@@ -118,7 +119,7 @@ impl Default for GrowOptions {
 }
 
 impl Terrain {
-    /// Of sRGB pixels, and of how clearly surfaces end at them, 0 to 1.
+    /// Creates the terrain of sRGB pixels with surface ends, 0 to 1 each.
     fn new(width: usize, rgb: &[[u8; 3]], ends: Option<&[f32]>, options: &GrowOptions) -> Self {
         let colors = lab(rgb);
         let strength = strength(&ImagePlanes { width, channels: &planes(&colors) });
@@ -133,10 +134,10 @@ fn cell(lab: [f32; 3]) -> u32 {
     ((at(0, 0.0) * CELLS[1] + at(1, -126.0)) * CELLS[2] + at(2, -126.0)) as u32
 }
 
-/// How often each cell was seen, by identity, 0 = nobody.
+/// Number of pixels of each color cell, by identity, 0 = nobody.
 struct ColorCounts(Vec<Vec<f32>>);
 
-/// What each cell says against each identity, compared with all others and with things never seen, in nats.
+/// Evidence of each color cell against each identity, compared with all others and with unseen things, in nats.
 struct ColorModels(Vec<Vec<f32>>);
 
 impl ColorCounts {
@@ -144,7 +145,7 @@ impl ColorCounts {
         Self(vec![vec![0.0; CELLS.iter().product()]; identities + 1])
     }
 
-    /// Takes in what is known of a view.
+    /// Counts the colors of a view by its known labels.
     fn add(&mut self, terrain: &Terrain, known: &[IdentityId]) {
         for (cell, id) in terrain.cell.iter().zip(known) {
             if let Some(counts) = self.0.get_mut(*id as usize) {
@@ -153,11 +154,11 @@ impl ColorCounts {
         }
     }
 
-    /// Compares what was taken in; `unseen` is the share of colors that are of none.
+    /// Compares the counted colors; `unseen` is the share of colors of unseen things.
     fn compare(self, unseen: f32) -> ColorModels {
         let shares: Vec<Vec<f32>> = self.0.iter().map(|c| smooth_shares(c)).collect();
         let cells: usize = CELLS.iter().product();
-        // What nobody has seen may have any color of those that things have: about one in thirty cells.
+        // Unseen things may have any color that things have: about one in thirty cells.
         let anything = unseen * 30.0 / cells as f32;
         let all: Vec<f32> = (0..cells).map(|k| anything + shares.iter().map(|s| s[k]).sum::<f32>()).collect();
         let nats = |s: &f32, all: &f32| -(s / all).max(1e-3).ln();
@@ -171,7 +172,7 @@ impl ColorModels {
     }
 }
 
-/// Shares that add up to 1, spread to neighboring cells.
+/// Returns shares that add up to 1, spread to neighboring cells.
 fn smooth_shares(counts: &[f32]) -> Vec<f32> {
     let strides = [CELLS[1] * CELLS[2], CELLS[2], 1];
     let mut out = counts.to_vec();
@@ -190,7 +191,7 @@ fn smooth_shares(counts: &[f32]) -> Vec<f32> {
     out
 }
 
-/// Grows what is `known` (`UNKNOWN` where nothing is): the label of every pixel.
+/// Grows the `known` labels (`UNKNOWN` elsewhere); returns the label of every pixel.
 fn grow(terrain: &Terrain, known: &[IdentityId], colors: &ColorModels, options: &GrowOptions) -> Vec<IdentityId> {
     let n = known.len();
     let mut label = vec![UNKNOWN; n];
@@ -230,7 +231,7 @@ mod tests {
     const BLUE: [u8; 3] = [40, 60, 200];
     const GREEN: [u8; 3] = [40, 190, 60];
 
-    /// A picture of columns, what is known of it, and what grows.
+    /// Grows the known labels in a picture of columns.
     fn grown(
         color: impl Fn(usize) -> [u8; 3],
         known: impl Fn(usize) -> IdentityId,
@@ -260,7 +261,7 @@ mod tests {
             }
         };
         let row = grown(color, known, None);
-        // What is close to the border stays open: it belongs to both sides a little.
+        // The border stays open: it belongs to both sides a little.
         assert!(row[..16].iter().all(|id| *id == 1), "{row:?}");
         assert!(row[24..].iter().all(|id| *id == NOBODY), "{row:?}");
         assert!(row[16..20].iter().all(|id| *id != NOBODY) && row[20..24].iter().all(|id| *id != 1), "{row:?}");

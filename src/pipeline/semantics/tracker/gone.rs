@@ -1,4 +1,4 @@
-//! What was taken out of the scene for good and is still in the photos: nothing is learned from there.
+//! Removed things that the photos still show: their pixels are not used.
 
 use super::super::error::FindError;
 use super::super::segmenter::FoundMask;
@@ -6,11 +6,11 @@ use super::super::votes::UNKNOWN;
 use super::Tracker;
 use crate::scene::{IdentityId, Mask};
 
-/// Share of a mask that must be of what is still there.
+/// Least share of a mask that must be left without the removed things.
 const LEFT: f64 = 0.5;
 
 impl Tracker<'_> {
-    /// The pixels of a photo, at most so large, that show it; `None` if nothing was taken out.
+    /// Returns the pixels of a photo, of at most this size, that show removed things; `None` if nothing was removed.
     pub(super) fn gone(&mut self, photo: usize, max_side_px: u32) -> Result<Option<Vec<bool>>, FindError> {
         let Some(removed) = &self.removed else { return Ok(None) };
         let photo = &self.photos[photo];
@@ -19,14 +19,14 @@ impl Tracker<'_> {
         shown.map(Some).map_err(|e| FindError::Render(photo.name.clone(), e.into()))
     }
 
-    /// Masks of what is still there, without the pixels that show what is not; and all of those, if there are any.
+    /// Returns the masks without the pixels of removed things; and all of those pixels, if there are any.
     pub(super) fn without_gone(
         &mut self,
         photo: usize,
         found: Vec<FoundMask>,
     ) -> Result<(Vec<FoundMask>, Option<Vec<bool>>), FindError> {
         let mut gone = self.gone(photo, self.options.max_side_px)?;
-        // As an earlier version has taken it out: by name alone.
+        // Earlier versions recorded removed things by name alone.
         let is_gone = |m: &&FoundMask| m.name.as_ref().is_some_and(|name| self.options.removed_names.contains(name));
         for mask in found.iter().filter(is_gone) {
             let size = mask.mask.width_px() * mask.mask.height_px();
@@ -40,13 +40,13 @@ impl Tracker<'_> {
     }
 }
 
-/// Labels of pixels that show what is gone say nothing.
+/// Sets the labels of removed pixels to `UNKNOWN`.
 pub(super) fn forget(labels: &mut [IdentityId], gone: Option<&Vec<bool>>) {
     let gone = gone.into_iter().flatten();
     labels.iter_mut().zip(gone).filter(|(_, gone)| **gone).for_each(|(label, _)| *label = UNKNOWN);
 }
 
-/// Masks without the pixels that are `gone`; those of which most is gone are none any more.
+/// Returns the masks without the pixels that are `gone`; masks that lose most of their pixels are dropped.
 fn still_there(found: Vec<FoundMask>, gone: &[bool]) -> Vec<FoundMask> {
     let mut now: Vec<Option<usize>> = Vec::with_capacity(found.len());
     let mut left: Vec<FoundMask> = Vec::new();
@@ -56,7 +56,7 @@ fn still_there(found: Vec<FoundMask>, gone: &[bool]) -> Vec<FoundMask> {
         own.pixels().filter(|i| !gone[*i]).for_each(|i| is_left[i] = true);
         let rest = Mask::from_fn(own.width_px(), own.height_px(), |i| is_left[i]);
         if (rest.area() as f64) < LEFT * own.area() as f64 {
-            // Its pieces, if any are left, are of what it was a piece of.
+            // Its remaining pieces become pieces of its whole.
             now.push(mask.parent.and_then(|p| now[p]));
             continue;
         }

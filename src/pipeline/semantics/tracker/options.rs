@@ -1,4 +1,4 @@
-//! How identities are carried from photo to photo.
+//! Options of carrying identities from photo to photo.
 
 use std::sync::Arc;
 
@@ -7,34 +7,34 @@ use crate::scene::{GaussianCloud, MaskPrompt, SemanticMap};
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TrackOptions {
-    /// Photo to begin with; `None` = the segmenter's choice.
+    /// First photo to be segmented; `None` = the segmenter's choice.
     pub(crate) seed: Option<usize>,
     /// Longer side of the masks that vote, px.
     pub(crate) max_side_px: u32,
-    /// Share of a view that may stay unknown before it is segmented too.
+    /// Share of unknown pixels above which a view is segmented too.
     pub(crate) reseed_share: f64,
-    /// Most photos that are segmented.
+    /// Most photos to segment.
     pub(crate) max_seeds: usize,
-    /// Whether a mask that was followed counts only where the Gaussians do not contradict it.
+    /// True if a followed mask counts only if the Gaussians do not contradict it.
     pub(crate) veto: bool,
-    /// Whether all photos that have masks are segmented, up to `max_seeds`, be they explained or not: codes are to be
-    /// trained on them.
+    /// True if all photos with masks are segmented, up to `max_seeds`, even explained ones: codes are trained on
+    /// them.
     pub(crate) keep_masks: bool,
-    /// What of a mask SAM 2 is given to follow.
+    /// Kind of prompt by which SAM 2 gets a mask to follow.
     pub(crate) prompt: MaskPrompt,
-    /// Whether what masks say grows over the other photos, up to their edges.
+    /// True if the labels of masks grow over the other photos, up to their edges.
     pub(crate) by_photos: bool,
-    /// Whether Gaussians that look alike and lie side by side share what is said of some of them.
+    /// True if Gaussians that look alike and lie side by side share the votes for some of them.
     pub(crate) by_tree: bool,
-    /// Steps between Gaussians over which what no photo shows (the inside of things) belongs to what is around it.
+    /// Steps between Gaussians over which unseen ones (the inside of things) inherit from those around them.
     pub(crate) hidden_steps: f64,
-    /// Share of its area in the photo that shows it best that a Gaussian shows where a photo says whose it is.
+    /// Least share of its area in its best photo for a Gaussian to be voted on in a photo.
     pub(crate) least_seen: f32,
-    /// Objects and parts that are there and stay as they are: masks only tell of what is nobody's yet.
+    /// Objects and parts that stay as they are: masks only label Gaussians without a label.
     pub(crate) known: Option<Arc<SemanticMap>>,
-    /// Gaussians that are no more there, though photos show them.
+    /// Removed Gaussians that the photos still show.
     pub(crate) removed: Option<Arc<GaussianCloud>>,
-    /// Names of what is no more there, where its Gaussians were not kept.
+    /// Names of removed things whose Gaussians were not kept.
     pub(crate) removed_names: Vec<String>,
 }
 

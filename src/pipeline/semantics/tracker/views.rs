@@ -1,4 +1,4 @@
-//! Who is seen in each photo, and how much of it is unknown.
+//! Identities seen in each photo, and its share of unknown pixels.
 
 use super::super::error::FindError;
 use super::super::segmenter::Segmenter;
@@ -9,7 +9,7 @@ use crate::scene::IdentityId;
 
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct Sighting {
-    /// Whose pixels.
+    /// Identity of the pixels.
     pub(crate) identity: IdentityId,
     pub(crate) pixels: usize,
     /// Mean share of its object in them, 0 to 1.
@@ -21,12 +21,12 @@ pub(crate) struct ViewReport {
     pub(crate) photo: usize,
     /// Share of its pixels that only Gaussians without a vote cover.
     pub(crate) unknown: f64,
-    /// Who is seen in it, innermost identities.
+    /// Identities seen in it, innermost ones.
     pub(crate) seen: Vec<Sighting>,
 }
 
 impl Tracker<'_> {
-    /// Who is seen in the photos, where this is whose each Gaussian is.
+    /// Reports the identities seen in each photo, by the identity of each Gaussian.
     pub(super) fn look(
         &mut self,
         of: &[IdentityId],
@@ -42,8 +42,8 @@ impl Tracker<'_> {
         Ok(views)
     }
 
-    /// Segments the photos in which somebody named what is not found yet: where another photo said that there is
-    /// nothing, nothing looks unknown.
+    /// Segments the photos with user-given names that are not found yet. If another photo marks such a thing as
+    /// unlabeled, its pixels do not count as unknown.
     pub(super) fn seed_named(
         &mut self,
         seeds: &mut Vec<usize>,
@@ -68,13 +68,13 @@ impl Tracker<'_> {
     }
 
     fn look_at(&mut self, photo: usize, of: &[IdentityId]) -> Result<ViewReport, FindError> {
-        // To see how much is unknown, small pictures will do.
+        // A small picture suffices to measure the unknown share.
         let map = self.map_of(photo, self.options.max_side_px.min(256), of)?;
         Ok(report(photo, &map, self.identities.len()))
     }
 
-    /// Of the views that are open, the photo of which most is unknown by now. Masks make things known, hardly ever
-    /// unknown, so a view that was known better before than another one is now need not be looked at again.
+    /// Returns the photo with most unknown pixels among the open views. Masks make pixels known, hardly ever unknown.
+    /// So a view that was better known before than another one is now need not be rendered again.
     pub(super) fn most_unknown(
         &mut self,
         views: &mut [ViewReport],
