@@ -114,7 +114,8 @@ pub(crate) fn check(
     }
     if let ToolCall::Measure { to: Some(Reference::Thing(other)), .. } = &mut call {
         match find(world, &other.clone(), LevelFilter::Auto, dialog) {
-            Resolved::One { id, .. } => {
+            Resolved::One { id, note: said, .. } => {
+                note = [note, said].into_iter().filter(|n| !n.is_empty()).collect::<Vec<_>>().join(" ");
                 ids.push(id);
                 *other = Target::Identity(id);
             }
