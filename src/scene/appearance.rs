@@ -1,4 +1,4 @@
-//! What a thing without a name is called by: its color and its size.
+//! Descriptions of unnamed identities by color and size.
 
 use super::{Bounds, GaussianCloud, SemanticMap};
 use crate::math::Real;

@@ -32,7 +32,7 @@ impl Bounds {
         let ends = |axis: usize| {
             let mut v: Vec<f64> = points.iter().map(|p| p[axis]).collect();
             let min = *v.select_nth_unstable_by(lo, f64::total_cmp).1;
-            // What is before it is smaller.
+            // Values before `lo` are smaller already.
             [min, *v[lo..].select_nth_unstable_by(hi - lo, f64::total_cmp).1]
         };
         let (x, (y, z)) = rayon::join(|| ends(0), || rayon::join(|| ends(1), || ends(2)));

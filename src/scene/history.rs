@@ -1,4 +1,4 @@
-//! What a training run has measured so far; kept with the trained scene.
+//! Measurements of a training run, kept with the trained scene.
 
 use serde::{Deserialize, Serialize};
 
