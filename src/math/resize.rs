@@ -4,10 +4,10 @@
 
 use rayon::prelude::*;
 
-/// How pixels are mixed.
+/// Resampling filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Filter {
-    /// The exact mean of what a resized pixel covers.
+    /// Exact mean of the area that a resized pixel covers.
     Area,
     /// Between the two nearest pixel centers, also where the image shrinks (PyTorch without antialiasing).
     Linear,
@@ -28,7 +28,7 @@ impl Filter {
     }
 }
 
-/// What an image is made of.
+/// Pixel of an image.
 pub trait Pixel: Copy + Send + Sync {
     /// A share of a pixel.
     type Weight: Copy + Send + Sync;

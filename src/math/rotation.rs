@@ -40,8 +40,8 @@ pub(crate) fn scaled_to_unit<N: Number>([w, x, y, z]: [N; 4]) -> [N; 4] {
     [w / length, x / length, y / length, z / length]
 }
 
-/// How far `m` is from a proper rotation: the largest entry of `|m mᵀ - I|`, or infinity if its
-/// determinant is not positive or an entry is not finite.
+/// Deviation of `m` from a proper rotation: the largest entry of `|m mᵀ - I|`, or infinity if its determinant is not
+/// positive or an entry is not finite.
 pub fn rotation_error(m: &DMat3) -> f64 {
     if !m.is_finite() || m.determinant() <= 0.0 {
         return f64::INFINITY;

@@ -1,4 +1,4 @@
-//! A place, a direction and a field of view, and how directions are mixed.
+//! Poses of a viewer, and the interpolation of rotations.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -8,7 +8,7 @@ use crate::scene::{Camera, PathKey};
 /// A viewer's pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// Where, world.
+    /// Center in the world.
     pub center: DVec3,
     /// Columns are right, down and forward.
     pub world_from_camera: DMat3,

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 const STEPS: u32 = 4096;
 /// Largest distance from the axis, at a focal length of 1, in that search for a perspective lens.
 const FARTHEST: f64 = 32.0;
-/// Angle from the axis beyond which a wide lens is not made a pinhole's, rad: pixels would be stretched more than 8 times.
+/// Angle from the axis, rad, beyond which a wide lens is not made a pinhole's: pixels would be stretched over 8 times.
 const WIDEST: f64 = 70.0 * PI / 180.0;
 /// Newton's steps, and the distance at a focal length of 1 at which they are done.
 const MOST_STEPS: usize = 40;
