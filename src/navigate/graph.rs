@@ -42,7 +42,7 @@ pub struct Graph {
 pub(crate) struct Route {
     /// Keypoints by number, first to last.
     pub(crate) through: Vec<usize>,
-    /// Its length, scene units.
+    /// Its length between keypoints, scene units.
     pub(crate) length: f64,
 }
 

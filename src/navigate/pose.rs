@@ -98,7 +98,7 @@ pub(crate) struct RotationSpline {
 }
 
 impl RotationSpline {
-    /// Through `keys` (time, rotation); of keys at one time the last counts. Nothing for none.
+    /// Spline through `keys` (time, rotation); of keys at one time the last counts. `None` without keys.
     pub(crate) fn new(keys: &[(f64, DMat3)], closed: bool) -> Option<Self> {
         let mut times: Vec<f64> = Vec::with_capacity(keys.len());
         let mut at: Vec<DQuat> = Vec::with_capacity(keys.len());

@@ -50,7 +50,7 @@ impl AdamStep {
         Self { first_correction: correction(BETA1), second_correction: correction(BETA2) }
     }
 
-    /// Moves one parameter against its gradient, which must be finite. Whether that was an outlier.
+    /// Moves one parameter against its gradient, which must be finite. Returns whether that was an outlier.
     #[inline(always)]
     pub fn update(&self, parameter: &mut f32, gradient: f32, first: &mut f32, second: &mut f32, rate: f32) -> bool {
         let limit = if *second > 0.0 { (GROWTH * *second).sqrt().min(CLIP) } else { CLIP };

@@ -1,11 +1,11 @@
-//! Which label wins each pixel; `shaders/labels.wgsl`.
+//! Label of each pixel; `shaders/labels.wgsl`.
 
 use super::kernel::{Access, Kernel, Module, RecordedStage};
 use super::rasterizer::GpuRasterizer;
 use super::shader::ShaderVariant;
 use super::{Device, GpuError};
 
-/// The kernel, and room for what it finds.
+/// The kernel, and room for its results.
 #[derive(Debug)]
 pub(crate) struct LabelPass {
     kernel: Kernel,

@@ -93,13 +93,13 @@ twins! {
     struct Pass {
         /// Lowest bit of the digit.
         shift: u32,
-        /// Which counter holds the number of pairs.
+        /// Index of the counter of pairs.
         counter: u32,
         pad0: u32,
         pad1: u32,
     }
 
-    /// Which extra channels a blending pass draws.
+    /// Extra channels of a blending pass.
     struct Chunk {
         channels: u32,
         first: u32,

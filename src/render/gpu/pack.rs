@@ -92,7 +92,7 @@ impl DevicePicture {
         Ok(Self { device: device.clone(), texture })
     }
 
-    /// Whether a window of this device can paint it.
+    /// Returns whether a window of this device can paint it.
     pub(crate) fn lies_on(&self, device: &wgpu::Device) -> bool {
         self.device.wgpu() == device
     }

@@ -12,7 +12,7 @@ use crate::scene::GaussianCloud;
 const LEAST: usize = 4;
 /// Highest degree of the harmonics of nodes: what stands for many shines in no direction in particular.
 const DEGREE: u8 = 1;
-/// Voxels start where at least this share of the Gaussians is not alone.
+/// The smallest voxels are those in which at least this share of the Gaussians is not alone.
 const TOGETHER: f64 = 0.01;
 
 /// Nodes that are made at once.
@@ -24,11 +24,11 @@ const CONTRAST: f64 = 0.1;
 const FLAT: f64 = 0.1;
 const COLORFUL: f64 = 3.0;
 
-/// Something that is beneath nothing yet: its place on the curve and its number.
+/// A Gaussian or node without a parent so far: its place on the curve and its number.
 type Item = (u64, u32);
 
 impl<R: Real> LodTree<R> {
-    /// Of a cloud. `None` if `proceed` says so in between.
+    /// Builds the tree of a cloud. `None` as soon as `proceed` returns false.
     pub(crate) fn build(cloud: &GaussianCloud<R>, proceed: impl Fn() -> bool) -> Option<Self> {
         let degree = cloud.sh_degree.min(DEGREE);
         let merged = GaussianCloud { origin: cloud.origin, sh_degree: degree, ..GaussianCloud::default() };
@@ -110,7 +110,7 @@ impl<R: Real> LodTree<R> {
     }
 }
 
-/// By how much larger a node counts for the colors within it.
+/// Factor on the size of a node for the contrast of its colors.
 fn roughness(contrast: f64) -> f64 {
     (FLAT + contrast.sqrt() / CONTRAST).clamp(FLAT, COLORFUL).sqrt()
 }
@@ -134,7 +134,7 @@ fn along_the_curve<R: Real>(cloud: &GaussianCloud<R>) -> Vec<Item> {
 
 /// Bits by which the smallest voxels are coarser than the curve.
 fn first_shift(items: &[Item]) -> u32 {
-    // How many neighbors on the curve share a voxel of each size: from the highest bit in which they differ.
+    // Numbers of neighbors on the curve that share a voxel of each size: from the highest bit in which they differ.
     let mut alone = [0_usize; 65];
     for pair in items.windows(2) {
         alone[64 - (pair[0].0 ^ pair[1].0).leading_zeros() as usize] += 1;

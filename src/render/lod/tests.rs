@@ -1,4 +1,5 @@
-//! What a tree and its cuts must keep: every Gaussian, the picture, and whose it is; numbers, whatever comes in.
+//! Properties that a tree and its cuts must keep: every Gaussian, the picture, and the labels; finite numbers for any
+//! input.
 
 use glam::DVec3;
 
