@@ -166,8 +166,8 @@ fn cubic(x: f64) -> f64 {
     }
 }
 
-/// An image of `from` = (width, height) px, row by row, at the size `to`; empty if either has no pixels or the
-/// image not as many as it says.
+/// Resizes an image of `from` = (width, height) px, row by row, to `to`; empty if either has no pixels or the length of
+/// the image does not match `from`.
 pub fn resize<P: Pixel>(image: &[P], from: (usize, usize), to: (usize, usize), filter: Filter) -> Vec<P> {
     if from.0 * from.1 == 0 || to.0 * to.1 == 0 || image.len() != from.0 * from.1 {
         return Vec::new();

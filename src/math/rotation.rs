@@ -31,7 +31,7 @@ pub fn unit_quaternion<R: Real>(q: [R; 4]) -> Option<[R; 4]> {
     u.iter().all(|c| c.is_finite()).then_some(u)
 }
 
-/// The same; not finite where there is none.
+/// The same; not finite if the length is unusable.
 #[inline(always)]
 pub(crate) fn scaled_to_unit<N: Number>([w, x, y, z]: [N; 4]) -> [N; 4] {
     let largest = w.abs().max(x.abs()).max(y.abs().max(z.abs()));

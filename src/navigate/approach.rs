@@ -21,7 +21,7 @@ pub(crate) struct SceneRef<'a> {
     pub(crate) map: &'a SemanticMap,
 }
 
-/// A flight to a target, and what is seen there.
+/// A flight to a target, and the view at its end.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Approach {
     /// The view at its end.

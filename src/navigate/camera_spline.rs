@@ -98,7 +98,7 @@ impl CameraSpline {
         self.spline.at(knot)
     }
 
-    /// Its poses for a video with so many pictures a second, both ends included; at most `most` and one.
+    /// Its poses for a video of `fps` pictures a second, both ends included; at most `most` + 1.
     pub(crate) fn poses(&self, fps: f64, most: f64) -> Vec<Pose> {
         self.flight(steps_of(self.seconds, fps, most) + 1).poses
     }
@@ -112,7 +112,7 @@ impl CameraSpline {
     }
 }
 
-/// Steps from picture to picture in so many seconds: at least one, at most `most`.
+/// Steps from picture to picture in `seconds`: at least one, at most `most`.
 pub(crate) fn steps_of(seconds: f64, fps: f64, most: f64) -> usize {
     (seconds * fps).round().clamp(1.0, most) as usize
 }
@@ -142,7 +142,7 @@ fn times(keys: &[&PathKey], steps: &[f64], seconds: f64) -> Vec<[f64; 2]> {
         let leave = start + waits(at);
         let end = match next {
             Some(i) => keys[i].time_secs.unwrap_or(leave),
-            // What is left of the whole, the last wait taken off.
+            // The rest of the whole, less the last wait.
             None => seconds - waits(n - 1),
         };
         let moving = (end - leave - waiting).max(1e-3 * (last - at) as f64);

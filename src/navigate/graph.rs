@@ -248,7 +248,7 @@ mod tests {
     #[test]
     fn a_wall_parts_the_graph_and_a_hole_joins_it() {
         let cameras = lattice(0.5);
-        // A wall wide enough that nobody gets around it within the grid.
+        // A wall so wide that no route leads around it within the grid.
         let (closed, occupancy) = graph(&cloud_of_wall(0.0), &cameras);
         let parts = closed.parts(&occupancy);
         let side = |i: usize| closed.keypoints[i].center.z > 0.0;

@@ -1,4 +1,4 @@
-//! Routes of a camera through a scene, or the reason for which there is none.
+//! Routes of a camera through a scene.
 
 use glam::{DQuat, DVec3};
 

@@ -1,10 +1,9 @@
 //! Occupied space: the opacity of every voxel of a scene, and the distance of every point from occupied voxels.
 //!
-//! A Gaussian of opacity `a` is spread over space with the extinction whose integral along its
-//! thinnest axis is `-ln(1 - a)`, so that a ray through it loses what the renderer says it does. A
-//! voxel whose extinction over its own side takes half of the light (the renderer's median depth) is
-//! occupied space. Distances to it are exact between voxel centers (Felzenszwalb and Huttenlocher 2012) and
-//! interpolated between them.
+//! A Gaussian of opacity `a` is spread over space with the extinction whose integral along its thinnest axis is `-ln(1
+//! - a)`, so that a ray through it loses as much light as in the renderer. A voxel is occupied if the extinction over
+//! its side takes half of the light (the renderer's median depth). Distances to it are exact between voxel centers
+//! (Felzenszwalb and Huttenlocher 2012) and interpolated between them.
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -75,7 +74,7 @@ impl OccupancyGrid {
         let [nx, ny, nz] = self.size;
         let (corner, voxel) = (self.corner, self.voxel);
         let blobs: Vec<Blob> = (0..cloud.len()).into_par_iter().filter_map(|i| Blob::of(cloud, i, voxel)).collect();
-        // Every slab of z takes what reaches into it; no two threads write to one voxel.
+        // Every slab of z takes the Gaussians that reach into it; no two threads write to one voxel.
         let mut slabs: Vec<Vec<u32>> = vec![Vec::new(); nz];
         for (i, blob) in blobs.iter().enumerate() {
             let lo = ((blob.center.z - blob.reach.z - corner.z) / voxel - 0.5).ceil().max(0.0) as usize;
@@ -293,7 +292,7 @@ impl Blob {
         let rotation = DMat3::from_cols_array_2d(&rows).transpose();
         let scales = DVec3::from_array(g.log_scale.map(|s| f64::from(s).exp()));
         let thinnest = scales.min_element().max(1e-12);
-        // A voxel averages what is in it: the same as widening by its own variance.
+        // A voxel averages its content: the same as widening by its own variance.
         let wide = scales * scales + voxel * voxel / 12.0;
         let spread = DMat3::from_diagonal(wide);
         let covariance = rotation * spread * rotation.transpose();

@@ -14,7 +14,7 @@ use crate::scene::{Bounds, Camera, GaussianCloud};
 
 /// Directions that are tried.
 const DIRECTIONS: usize = 160;
-/// Points of the target that are looked for.
+/// Points of the target that are tested for visibility.
 const POINTS: usize = 96;
 /// Share of the picture's shorter side that the target fills.
 const FILL: f64 = 0.5;

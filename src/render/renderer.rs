@@ -126,7 +126,7 @@ impl Renderer {
         self.gpu.is_some()
     }
 
-    /// Name of what draws the pictures, for display.
+    /// Name of the renderer's device, for display.
     pub(crate) fn name(&self) -> &str {
         self.gpu.as_ref().map_or(Self::CPU, |gpu| &gpu.name)
     }
@@ -213,8 +213,8 @@ impl Renderer {
         Ok(weights.iter().map(|places| labels::winner(places, groups)).collect())
     }
 
-    /// The labels of largest weight at each pixel, row-major, of which `of` has one for each Gaussian of `cloud`; on the
-    /// CPU.
+    /// The labels of largest weight at each pixel, row-major, on the CPU; `of` has a label for each Gaussian of
+    /// `cloud`.
     pub(crate) fn label_weights(
         &mut self,
         cloud: &GaussianCloud,

@@ -25,7 +25,7 @@ pub struct GaussianCloud<R = f32> {
     pub sh: Vec<[R; 3]>,
     /// Mode in which they were trained and are to be drawn.
     pub render_mode: SplatRenderMode,
-    /// Upwards in the world, unit length, where a file says so and it is not `-y` as elsewhere.
+    /// World up direction, unit length, if a file states one that is not `-y`.
     pub up: Option<DVec3>,
     /// Per-Gaussian properties that the program does not interpret but keeps from a file.
     pub extras: Vec<ExtraProperty>,

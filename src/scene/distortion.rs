@@ -114,7 +114,7 @@ impl Distortion {
         above / (1.0 + s * (d1 + s * (d2 + s * d3)))
     }
 
-    /// Distance from the axis of a ray by its angle, before coefficients; not finite where there is none.
+    /// Distance of a ray from the axis by its angle, before the coefficients; not finite if the projection has none.
     fn projected(&self, angle: f64) -> f64 {
         let (sin, cos) = angle.sin_cos();
         let narrow = || if angle < FRAC_PI_2 { angle.tan() } else { f64::NAN };

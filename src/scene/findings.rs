@@ -146,7 +146,7 @@ impl Seen {
 /// Evidence from the search for objects and parts.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
-    /// The photos that were looked at.
+    /// The photos that were searched.
     pub(crate) photos: Vec<PhotoFinding>,
     /// Views of each identity, by number less one.
     seen: Vec<Seen>,

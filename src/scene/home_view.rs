@@ -9,7 +9,7 @@ use crate::math::stats::median;
 const FOV_Y_RAD: f64 = 0.85;
 /// Tangent of the elevation angle of such a view.
 const ABOVE: f64 = 0.45;
-/// Room around what is framed.
+/// Factor on the distance for room around the scene.
 const MARGIN: f64 = 1.15;
 
 /// Initial view of a scene.
@@ -17,7 +17,7 @@ const MARGIN: f64 = 1.15;
 pub struct HomeView {
     /// The part of the world that the scene fills.
     pub bounds: Bounds,
-    /// Upwards in the world, unit length.
+    /// World up direction, unit length.
     pub up: DVec3,
     /// A camera to start from, where the scene has one.
     pub(crate) camera: Option<Camera>,

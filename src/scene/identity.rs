@@ -18,7 +18,7 @@ use crate::math::format::things;
 pub enum Level {
     /// A thing.
     Object,
-    /// A piece of a thing.
+    /// A piece of an object.
     Part,
 }
 
@@ -198,7 +198,7 @@ impl Identities {
         self.whole_names.0.get_or_init(|| Arc::new(WholeNames::new(self)))
     }
 
-    /// An identity and what it is a piece of, inside out: itself first, its object last.
+    /// An identity and its parents, inside out: itself first, its object last.
     pub fn ancestors(&self, id: IdentityId) -> impl Iterator<Item = IdentityId> + '_ {
         let known = |id: IdentityId| self.get(id).map(|_| id);
         // Parents come before their parts, so numbers fall and the walk ends.

@@ -160,7 +160,7 @@ impl SemanticMap {
         Findings::facts(self.findings.as_ref(), &self.identities, &self.sizes())
     }
 
-    /// Bytes of what is stored by Gaussian and by identity.
+    /// Bytes of the values per Gaussian and per identity.
     pub(crate) fn bytes(&self) -> u64 {
         let each = size_of::<IdentityId>() + size_of::<f32>() * (1 + CODE_CHANNELS);
         let numbers = |l: &LanguageFeatures| {

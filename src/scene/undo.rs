@@ -26,7 +26,7 @@ impl<T> UndoHistory<T> {
         }
     }
 
-    /// Keeps past states, the newest first, as long as `keep` says so.
+    /// Keeps the newest past states as long as `keep` holds for them.
     pub(crate) fn keep_newest_while(&mut self, keep: impl FnMut(&T) -> bool) {
         let mut keep = keep;
         let kept = self.past.iter().rev().take_while(|state| keep(state)).count();

@@ -45,7 +45,7 @@ fn rectangle<R: Real>(s: &Splat<R>, size: [usize; 2]) -> Option<[usize; 4]> {
     Some(r)
 }
 
-/// Squared Mahalanobis distances from a splat, with what they have in common over all tiles.
+/// Squared Mahalanobis distances from a splat, with the terms that all tiles share.
 struct Distances<R> {
     conic: [R; 3],
     /// Slopes to the nearest point of an edge: for edges along y, y over x; for those along x, x over y.
@@ -182,7 +182,7 @@ impl Tiles {
         self.entries[k].load(Relaxed) as u32
     }
 
-    /// Finds the way back from splats, whose places are under `places`, to their entries.
+    /// Finds the entries of each splat; the splats' places are under `places`.
     pub(crate) fn find_ways_back(&mut self, places: usize) {
         self.span.clear();
         self.span.resize(places + 2, 0);

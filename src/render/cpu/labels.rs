@@ -141,7 +141,7 @@ mod tests {
         labels.sort_unstable();
         assert_eq!(labels, [3, 4, 5, 6, 7, 8, 9, 10], "the two lightest were dropped, and do not come back");
         assert!(row.pixels.iter().enumerate().all(|(i, p)| i == 21 || p.iter().all(|p| p.1 == 0.0)));
-        // What lies beyond the right edge is not the next row's.
+        // Weights beyond the right edge are not the next row's.
         row.add(0, 8, 4, &[1.0; 8]);
         let reached: Vec<usize> = (0..24).filter(|i| row.pixels[*i].iter().any(|p| p.0 == 1)).collect();
         assert_eq!(reached, [8, 9, 10, 11]);

@@ -1,8 +1,8 @@
 //! The CPU renderer: at `f64` the oracle that every kernel and gradient is compared with, at `f32`
 //! (tile-parallel, eight pixels a register) the fast path where there is no GPU.
 //!
-//! Stages, one file each: [`project`] ([`mod@project_chunk`]: of a whole cloud), [`bin`], [`sort`], [`blend`]; backward: [`blend_backward`],
-//! [`mod@project_backward`]; [`walk`] is the way through a tile that they share. What is drawn is a
+//! Stages, one file each: [`project`] ([`mod@project_chunk`]: of a whole cloud), [`bin`], [`sort`], [`blend`];
+//! backward: [`blend_backward`], [`mod@project_backward`]; [`walk`] is the loop over a tile that they share. It draws a
 //! [`walk::Primitive`]: [`splat`] or [`surfel`]. Results do not depend on the number of threads.
 
 pub mod adam;
@@ -178,8 +178,8 @@ impl<R: Real> CpuRenderer<R> {
         last!(self, r => r.gaussian_gradient(gaussian, i))
     }
 
-    /// Gradient with respect to the extra channels of Gaussian `i`, after [`Self::backward_tiles`].
-    /// Leaves `out`, one value per channel, alone if the Gaussian was not drawn, and says whether it was.
+    /// Gradient with respect to the extra channels of Gaussian `i`, after [`Self::backward_tiles`]. Returns whether the
+    /// Gaussian was drawn; if not, leaves `out`, one value per channel, alone.
     pub(crate) fn feature_gradient(&self, i: usize, out: &mut [R]) -> bool {
         last!(self, r => r.feature_gradient(i, out))
     }

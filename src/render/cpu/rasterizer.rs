@@ -314,8 +314,8 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
         )
     }
 
-    /// Gradient with respect to the extra channels of Gaussian `i`, after [`Self::backward_tiles`].
-    /// Leaves `out`, one value per channel, alone if the Gaussian was not drawn, and says whether it was.
+    /// Gradient with respect to the extra channels of Gaussian `i`, after [`Self::backward_tiles`]. Returns whether the
+    /// Gaussian was drawn; if not, leaves `out`, one value per channel, alone.
     pub(crate) fn feature_gradient(&self, i: usize, out: &mut [R]) -> bool {
         let Some(info) = &self.frame else { return false };
         let Some((_, record)) = self.record(i, info.stride()) else { return false };

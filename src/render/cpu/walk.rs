@@ -18,7 +18,7 @@ use crate::scene::Gaussian;
 pub(crate) const GROUPS: usize = TILE_PX / LANES;
 /// Lane groups per tile.
 pub(crate) const SLOTS: usize = TILE_PX * GROUPS;
-/// Splats between two looks at which pixels are still open.
+/// Splats between two checks of the open pixels.
 const CLOSED_CHECK: usize = 16;
 /// Splats between fetching one and needing it.
 const AHEAD: usize = 6;
@@ -43,7 +43,7 @@ pub(crate) type Planes<T> = [Vec<T>; 2];
 pub(crate) trait Primitive<R: Real>: Copy + Send + Sync {
     /// Numbers per splat in front of its channels.
     const SHAPE: usize;
-    /// Shape of a splat: these numbers.
+    /// Shape of a splat, [`Self::SHAPE`] numbers.
     type Shape: AsRef<[R]>;
     /// Channels of a splat that depth asks for.
     type Depth: AsRef<[R]>;
@@ -62,7 +62,7 @@ pub(crate) trait Primitive<R: Real>: Copy + Send + Sync {
     fn new(view: &CameraView<R>, settings: &RenderSettings) -> Self;
     /// A pixel is closed before its transmittance falls under this.
     fn least_transmittance(settings: &RenderSettings) -> f64;
-    /// Channels: color, extra channels, and what depth needs.
+    /// Number of channels: color, extra channels, and those that depth needs.
     fn channels(extra: usize, depth: bool) -> usize;
     /// The number of channels that the passes are compiled for.
     fn padded(channels: usize) -> usize;

@@ -1,4 +1,4 @@
-//! Front-to-back blending, `shaders/blend.wgsl`, and what it shares with its gradient.
+//! Front-to-back blending, `shaders/blend.wgsl`, and the parts that its gradient shares.
 
 use std::collections::BTreeMap;
 

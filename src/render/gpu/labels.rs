@@ -26,7 +26,7 @@ impl LabelPass {
         device.grow(&mut self.found, "labels of the picture", pixels * 12)
     }
 
-    /// Records the pass over the lists of a frame; `of` has a label for each Gaussian, `groups` the group of each label.
+    /// Records the pass over the lists of a frame; `of` has a label for each Gaussian, `groups` a group for each label.
     pub(crate) fn encode(
         &self,
         stage: &mut RecordedStage<'_>,

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 
 /// Bytes of a pixel of a packed picture.
 pub(super) const PACKED_BYTES: u32 = 4;
-/// Rows of a packed picture begin at multiples of so many pixels, as copies into textures want it.
+/// Rows of a packed picture begin at multiples of this number of pixels, as copies into textures require.
 pub(super) const ROW_PX: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT / PACKED_BYTES;
 
 /// A structure's memory layout.

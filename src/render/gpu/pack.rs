@@ -1,4 +1,4 @@
-//! A picture's colors as bytes, a quarter of what floats take to copy, for the host or for a texture that a window
+//! Packing of a picture's colors as bytes, a quarter of the floats' size, for the host or for a texture that a window
 //! paints; `shaders/pack.wgsl`.
 
 use super::kernel::{Access, Kernel, Module, RecordedStage, Recorder};

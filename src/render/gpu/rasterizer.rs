@@ -14,7 +14,7 @@ use crate::scene::Camera;
 
 /// Pairs per Gaussian that are assumed before the first frame counts them.
 const FIRST_GUESS: u32 = 4;
-/// Room that is left over what a frame needed, so that the next one fits too.
+/// Factor of the room over the last frame's need, so that the next one fits too.
 const HEADROOM: f64 = 1.5;
 
 /// The kernels of the forward pass with their buffers.

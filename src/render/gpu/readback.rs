@@ -133,7 +133,7 @@ mod tests {
         let again = device.read(&[(&many, 4000)]).expect("read");
         assert_eq!((kept(), again.values::<u32>(0)[999]), (1, 999));
         drop(again);
-        // A tiny copy does not hold on to a huge buffer, and what was not used for longest goes first.
+        // A tiny copy does not hold on to a huge buffer, and the buffer unused for longest goes first.
         let large = device.storage("much", 100 << 20).expect("fits");
         drop(device.read(&[(&large, 96 << 20)]).expect("read"));
         assert_eq!(device.read(&[(&few, 4)]).expect("read").staging.size(), 20);

@@ -330,6 +330,7 @@ impl GpuRenderer {
         if let Some(timer) = &mut self.timer {
             self.times.extend(timer.finish(&self.device)?);
         }
+        // Only the gradients of extra channels are read from the splats.
         let stride = GRADIENT_BASE + self.channels;
         let bytes = if self.channels > 0 { (n * stride * 4) as u64 } else { 0 };
         let splat_gradient: Vec<f32> = self.device.read(&[(&gradients.splats, bytes)])?.values(0);

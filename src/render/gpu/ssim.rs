@@ -41,7 +41,7 @@ impl DevicePhoto {
     }
 }
 
-/// Means over pixels and channels of one comparison, and what the frame's counters said.
+/// Means over pixels and channels of one comparison, and values of the frame's counters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LossSums {
     pub(crate) l1: f64,

@@ -179,7 +179,7 @@ impl GpuTrainer {
         self.device.check()
     }
 
-    /// The color behind everything from the next step on, and what it adds to photos where they are transparent.
+    /// Sets, from the next step on, the background color, and the color added to photos where they are transparent.
     pub fn set_background(&mut self, background: [f32; 3], shift: [f32; 3]) {
         self.settings.render.background = background;
         self.shift = shift;

@@ -10,7 +10,7 @@ use crate::scene::GaussianCloud;
 
 /// Gaussians and nodes that are merged into one, at least: fewer wait for a larger voxel.
 const LEAST: usize = 4;
-/// Highest degree of the harmonics of nodes: what stands for many shines in no direction in particular.
+/// Highest degree of the harmonics of nodes: merged Gaussians have little view dependence.
 const DEGREE: u8 = 1;
 /// The smallest voxels are those in which at least this share of the Gaussians is not alone.
 const TOGETHER: f64 = 0.01;
@@ -18,8 +18,8 @@ const TOGETHER: f64 = 0.01;
 /// Nodes that are made at once.
 const AT_ONCE: usize = 1 << 14;
 
-/// Standard deviation of colors at which a node counts with its true size; of one color it counts as a third of that,
-/// as nobody sees what it is made of.
+/// Standard deviation of colors at which a node counts with its true size. One of a single color counts as a third of
+/// that, as its grain is invisible.
 const CONTRAST: f64 = 0.1;
 const FLAT: f64 = 0.1;
 const COLORFUL: f64 = 3.0;
@@ -40,7 +40,7 @@ impl<R: Real> LodTree<R> {
                 return None;
             }
             let (groups, rest) = grouped(&items, shift, tree.leaves + tree.nodes.len());
-            // Bounded, as what is merged takes more memory than what comes out.
+            // Bounded, as merging takes more memory than its result.
             groups.chunks(AT_ONCE).for_each(|groups| tree.add(cloud, &mut known, &items, groups));
             items = rest;
         }
@@ -93,7 +93,7 @@ impl<R: Real> LodTree<R> {
         (number as usize).checked_sub(self.leaves).map_or(number, |node| self.nodes[node].heaviest)
     }
 
-    /// The mean color of what is merged.
+    /// Mean color of the merged Gaussians.
     fn color(&self, cloud: &GaussianCloud<R>, beneath: &[Item], merged: &Merged) -> [[R; 3]; sh::coefficients(DEGREE)] {
         let stride = self.merged.sh_stride();
         let mut sum = [[0.0; 3]; sh::coefficients(DEGREE)];

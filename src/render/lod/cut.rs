@@ -29,7 +29,7 @@ struct Eye {
     offset: DVec3,
     near: f64,
     focal_px: f64,
-    /// Normals of the four sides of what is seen, inwards.
+    /// Normals of the four sides of the view frustum, inwards.
     sides: [DVec3; 4],
     grain_px: f64,
 }
@@ -91,7 +91,7 @@ impl<R: Real> LodTree<R> {
         }
     }
 
-    /// Gaussians and nodes of which none looks coarser than the eye's grain, without what is outside the picture.
+    /// Gaussians and nodes in the picture, none of which looks coarser than the eye's grain.
     fn list(&self, eye: &Eye) -> Vec<u32> {
         let (mut list, mut open) = (Vec::new(), self.roots.clone());
         while open.len() < SEVERAL {

@@ -9,7 +9,7 @@ use crate::scene::Camera;
 /// First number, and the fewest that still show the way of a flight.
 const FIRST: usize = 60_000;
 const FEWEST: usize = 15_000;
-/// So many are enough for any picture.
+/// Most Gaussians: enough for any picture.
 const MOST: usize = 4_000_000;
 /// Seconds that a moving picture may take: thirty a second.
 pub(crate) const MOVING_SECS: f64 = 0.030;

@@ -26,7 +26,7 @@ pub struct Machine {
 pub struct Limits {
     /// Longer side of training pictures at most, px.
     pub train_side_px: u32,
-    /// Longer side of the pictures in which objects are looked for at most, px.
+    /// Longer side, at most, of the pictures in which objects are searched for, px.
     pub object_side_px: u32,
     /// Highest degree of a training's spherical harmonics.
     pub sh_degree: u8,
@@ -69,7 +69,7 @@ pub struct PhotoFacts {
 pub struct SemanticFacts {
     pub(crate) objects: usize,
     pub(crate) parts: usize,
-    /// The encoder that looked at them, if one has.
+    /// Encoder of their embeddings, if there are any.
     pub(crate) encoder: Option<String>,
     pub(crate) numbers: usize,
 }
@@ -217,7 +217,7 @@ fn band_bounds<R: Real>(cloud: &GaussianCloud<R>) -> [f64; 4] {
 /// Most cameras and Gaussians that are sampled for the resolved size.
 const CAMERAS: usize = 8;
 const GAUSSIANS: usize = 4_000;
-/// Share of the footprints that may be finer than what is resolved.
+/// Share of the footprints that may be finer than the resolved size.
 const FINER: f64 = 0.05;
 /// Opacity under which a Gaussian draws no detail.
 const FAINT: f64 = 0.1;

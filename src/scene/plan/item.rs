@@ -7,8 +7,8 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use strum::{EnumProperty, EnumString, IntoStaticStr, VariantArray};
 
-/// One thing that a plan decides: its name on the command line, the same in every version (with the name of earlier
-/// versions, where there was another), its subject for the user, and what can be had instead.
+/// An item that a plan decides: its name on the command line, the same in every version (with the name of earlier
+/// versions, if another), its subject for the user, and its alternative.
 #[derive(
     Clone,
     Copy,
@@ -62,7 +62,7 @@ pub enum Item {
     #[serde(alias = "held")]
     #[strum(to_string = "holdout", serialize = "held", props(subject = "Holdout"))]
     Holdout,
-    /// Size of the images in which objects are looked for.
+    /// Size of the images in which objects are searched for.
     #[strum(props(subject = "Object search", instead = "full"))]
     Objects,
     /// Most Gaussians of a training.

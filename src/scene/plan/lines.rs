@@ -1,4 +1,4 @@
-//! A plan's decisions in words: what was decided, why, and what it saves.
+//! A plan's decisions in words: choice, reason and saving.
 
 use strum::VariantArray;
 

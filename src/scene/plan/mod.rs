@@ -78,7 +78,7 @@ pub struct ScenePlan {
     pub(crate) train_side_px: u32,
     /// Interval of held-out photos; 0 = none.
     pub(crate) holdout_every: usize,
-    /// Longer side of the images in which objects are looked for, px.
+    /// Longer side of the images in which objects are searched for, px.
     pub object_side_px: u32,
     /// Most Gaussians that training may use on this machine.
     pub(crate) max_gaussians: usize,
@@ -144,7 +144,7 @@ impl ScenePlan {
     }
 }
 
-/// Objects are never looked for in images smaller than this along their longer side.
+/// Least longer side of the images in which objects are searched for.
 pub(crate) const LEAST_SIDE_PX: u32 = 256;
 
 /// Interval of held-out photos if every `wanted`-th is asked for; 0 for a single photo, which training needs.
