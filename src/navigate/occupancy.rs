@@ -1,8 +1,8 @@
 //! Occupied space: the opacity of every voxel of a scene, and the distance of every point from occupied voxels.
 //!
-//! A Gaussian of opacity `a` is spread over space with the extinction whose integral along its thinnest axis is `-ln(1
-//! - a)`, so that a ray through it loses as much light as in the renderer. A voxel is occupied if the extinction over
-//! its side takes half of the light (the renderer's median depth). Distances to it are exact between voxel centers
+//! A Gaussian of opacity `a` is spread over space with the extinction whose integral along its thinnest axis is
+//! `-ln(1 - a)`, so that a ray through it loses as much light as in the renderer. A voxel is occupied if the extinction
+//! over its side takes half of the light (the renderer's median depth). Distances to it are exact between voxel centers
 //! (Felzenszwalb and Huttenlocher 2012) and interpolated between them.
 
 use glam::{DMat3, DVec3};
