@@ -1,9 +1,9 @@
 //! Disjoint sets: numbers that are joined step by step.
 
-/// The number that stands for the set of `i`; each number names another one of its set, in the end that one itself.
+/// Representative of the set of `i`. Each number names another one of its set; the representative names itself.
 pub(crate) fn root(of: &mut [u32], mut i: u32) -> u32 {
     while of[i as usize] != i {
-        // Shorter for whoever comes next.
+        // Path halving: later searches are shorter.
         of[i as usize] = of[of[i as usize] as usize];
         i = of[i as usize];
     }

@@ -1,22 +1,22 @@
-//! Finiteness of what a stage leaves behind, asserted after every stage under `debug-validation`.
+//! Finiteness of the results of a stage, asserted after every stage under `debug-validation`.
 
 use super::Real;
 
-/// Whether stages are checked: the Cargo feature `debug-validation`. Constant, so that what stands
-/// behind it costs nothing without the feature.
+/// True if stages are checked: the Cargo feature `debug-validation`. Constant, so that checks cost nothing without the
+/// feature.
 pub(crate) const CHECKED: bool = cfg!(feature = "debug-validation");
 
-/// A number that is none, and where it was found.
+/// A number that is not finite, and its place.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("after {stage}: {field} {index} is not finite")]
 pub struct NotFinite {
     pub(crate) stage: &'static str,
     pub(crate) field: &'static str,
-    /// Which of these, from 0.
+    /// Index in the field, from 0.
     pub(crate) index: usize,
 }
 
-/// Looks for the first number that is none.
+/// Finds the first number that is not finite.
 pub(crate) fn all_finite<'a, R: Real>(
     stage: &'static str,
     field: &'static str,
@@ -28,8 +28,8 @@ pub(crate) fn all_finite<'a, R: Real>(
     }
 }
 
-/// For stages that cannot fail: under `debug-validation` a number that is none ends the job, as a panic
-/// that names it and that the worker reports.
+/// For stages that cannot fail: under `debug-validation` a number that is not finite ends the job with a panic that
+/// names it and that the worker reports.
 pub(crate) fn insist(found: impl FnOnce() -> Result<(), NotFinite>) {
     if CHECKED {
         let text = found().err().map(|e| e.to_string());

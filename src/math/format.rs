@@ -2,7 +2,7 @@
 
 use std::time::SystemTime;
 
-/// What stands where there is no number.
+/// Text in place of a missing number.
 pub(crate) const NONE: &str = "–";
 
 /// A whole number with thousands separators.

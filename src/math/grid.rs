@@ -44,8 +44,8 @@ pub(crate) fn regions(width: usize, n: usize, is: impl Fn(usize) -> bool) -> (Ve
     (label, areas)
 }
 
-/// What is nearest to each pixel of what is `known` at some, by steps to neighbors through pixels that are `open`; where
-/// several are as near, the first. `None` where nothing can be reached.
+/// Spreads the values `known` at some pixels to the pixels that are `open`: each takes the nearest by steps to
+/// neighbors, the first if several are as near; `None` if none can be reached.
 pub(crate) fn spread<T: Copy>(
     width: usize,
     n: usize,

@@ -102,7 +102,7 @@ pub trait Lanes<R: Real>: Copy + Send + Sync {
     }
 }
 
-/// Arrays: the definition of what every other implementation does.
+/// Arrays: the reference for every other implementation.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Plain;
 

@@ -10,7 +10,7 @@ use super::lanes::{LANES, Lane, Lanes};
 pub trait Number:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> + Neg<Output = Self>
 {
-    /// What it is made of.
+    /// Its scalar.
     type Of: Real;
     /// `x`, as many times as this has numbers.
     fn like(self, x: Self::Of) -> Self;

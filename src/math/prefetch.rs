@@ -1,6 +1,6 @@
-//! Telling the processor what will be read soon, where it cannot guess.
+//! Hints to the processor on memory that will be read soon, for accesses that it cannot predict.
 
-/// Begins to fetch what is read some steps later. Changes nothing but the time that takes.
+/// Starts to fetch a value that is read some steps later. Affects nothing but time.
 #[inline(always)]
 #[allow(unsafe_code, reason = "the instruction has no safe form")]
 pub(crate) fn prefetch<T>(value: &T) {

@@ -4,10 +4,10 @@
 
 use rayon::prelude::*;
 
-/// How pixels are mixed.
+/// Resampling filter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Filter {
-    /// The exact mean of what a resized pixel covers.
+    /// Exact mean of the area that a resized pixel covers.
     Area,
     /// Between the two nearest pixel centers, also where the image shrinks (PyTorch without antialiasing).
     Linear,
@@ -28,7 +28,7 @@ impl Filter {
     }
 }
 
-/// What an image is made of.
+/// Pixel of an image.
 pub trait Pixel: Copy + Send + Sync {
     /// A share of a pixel.
     type Weight: Copy + Send + Sync;
@@ -166,8 +166,8 @@ fn cubic(x: f64) -> f64 {
     }
 }
 
-/// An image of `from` = (width, height) px, row by row, at the size `to`; empty if either has no pixels or the
-/// image not as many as it says.
+/// Resizes an image of `from` = (width, height) px, row by row, to `to`; empty if either has no pixels or the length of
+/// the image does not match `from`.
 pub fn resize<P: Pixel>(image: &[P], from: (usize, usize), to: (usize, usize), filter: Filter) -> Vec<P> {
     if from.0 * from.1 == 0 || to.0 * to.1 == 0 || image.len() != from.0 * from.1 {
         return Vec::new();

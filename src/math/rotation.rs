@@ -31,7 +31,7 @@ pub fn unit_quaternion<R: Real>(q: [R; 4]) -> Option<[R; 4]> {
     u.iter().all(|c| c.is_finite()).then_some(u)
 }
 
-/// The same; not finite where there is none.
+/// The same; not finite if the length is unusable.
 #[inline(always)]
 pub(crate) fn scaled_to_unit<N: Number>([w, x, y, z]: [N; 4]) -> [N; 4] {
     let largest = w.abs().max(x.abs()).max(y.abs().max(z.abs()));
@@ -40,8 +40,8 @@ pub(crate) fn scaled_to_unit<N: Number>([w, x, y, z]: [N; 4]) -> [N; 4] {
     [w / length, x / length, y / length, z / length]
 }
 
-/// How far `m` is from a proper rotation: the largest entry of `|m mᵀ - I|`, or infinity if its
-/// determinant is not positive or an entry is not finite.
+/// Deviation of `m` from a proper rotation: the largest entry of `|m mᵀ - I|`, or infinity if its determinant is not
+/// positive or an entry is not finite.
 pub fn rotation_error(m: &DMat3) -> f64 {
     if !m.is_finite() || m.determinant() <= 0.0 {
         return f64::INFINITY;

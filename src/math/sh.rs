@@ -101,8 +101,8 @@ pub(crate) fn basis_gradient<R: Real>(degree: u8, [x, y, z]: [R; 3]) -> [[R; 3];
     g
 }
 
-/// How coefficients turn with what they belong to: `c'[m] = sum_n matrix[m][n] c[n]` is the function of before, seen
-/// along directions that `turn` (world_from_before) has turned. Bands do not mix.
+/// Rotation of the coefficients: `c'[m] = sum_n matrix[m][n] c[n]` is the same function after its directions were
+/// rotated by `turn` (world_from_before). Bands do not mix.
 pub(crate) fn rotation(turn: &DMat3) -> [[f64; 16]; 16] {
     // Gauss-Legendre along z and equal steps around it: exact for products of two harmonics up to degree 3.
     const NODES: [(f64, f64); 4] = [

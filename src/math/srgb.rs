@@ -25,7 +25,7 @@ pub fn encode(linear: f32) -> (f32, f32) {
     }
 }
 
-/// A color that is so much brighter in linear light.
+/// Scales a color in linear light by `gain`, a factor per channel.
 pub(crate) fn brighter(rgb: [f32; 3], gain: [f32; 3]) -> [f32; 3] {
     let one = |c: usize| {
         if gain[c] == 1.0 { rgb[c] } else { encode(linear(rgb[c].max(0.0)) * gain[c]).0.min(1.0) }

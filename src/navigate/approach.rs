@@ -1,4 +1,4 @@
-//! Going to see an identity: the best view of it that can be reached, and the flight there.
+//! Views of an identity: the best one that can be reached, and the flight to it.
 
 use glam::DVec3;
 
@@ -12,16 +12,16 @@ use crate::scene::{Bounds, GaussianCloud, IdentityId, SemanticMap};
 /// Share of a target that has to be seen for a view to be one of it.
 const LEAST_VISIBLE: f64 = 0.05;
 
-/// A scene with what is known of it.
+/// A scene with its identities.
 #[derive(Clone, Copy)]
 pub(crate) struct SceneRef<'a> {
     pub(crate) cloud: &'a GaussianCloud,
-    /// How they are drawn.
+    /// Settings that the Gaussians are drawn with.
     pub(crate) settings: &'a RenderSettings,
     pub(crate) map: &'a SemanticMap,
 }
 
-/// A flight to a target, and what is seen there.
+/// A flight to a target, and the view at its end.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Approach {
     /// The view at its end.
@@ -31,16 +31,16 @@ pub(crate) struct Approach {
     pub(crate) flight: CameraTrajectory,
 }
 
-/// Why a target cannot be visited.
+/// Error of a target that cannot be visited.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum ApproachError {
     /// It has no Gaussians.
     #[error("it has no Gaussians, so there is nothing to look at")]
     Nothing,
-    /// It is hidden from wherever one could stand.
+    /// It is hidden from every reachable viewpoint.
     #[error("it is not visible from any reachable viewpoint")]
     Unseen,
-    /// There is no way; the nearest view that can be reached is offered, if it is seen from there.
+    /// There is no route; the nearest view that can be reached is offered, if a flight leads there.
     #[error("{why}")]
     NoRoute {
         why: NoRoute,
@@ -67,7 +67,7 @@ pub(crate) fn target(place: SceneRef<'_>, id: IdentityId) -> Option<(TargetGauss
 }
 
 impl Navigator {
-    /// Flies from `eye` to where an identity is seen best; `aspect` is the picture's width by height.
+    /// Flies from `eye` to the best view of an identity; `aspect` is the picture's width by height.
     ///
     /// # Errors
     /// If it cannot be seen or reached.

@@ -1,5 +1,5 @@
-//! A camera path that the user has put together, as a pose at every time: through all its keys,
-//! smooth in place and rotation, at even speed between keys whose times are not fixed.
+//! A camera path of the user as a pose at every time: through all its keys, smooth in place and rotation, at even speed
+//! between keys whose times are not fixed.
 
 use glam::{DMat3, DVec3};
 
@@ -15,18 +15,18 @@ const TURN: f64 = 0.5;
 /// Most steps from picture to picture that a video is made of.
 pub(crate) const MOST_PICTURES: f64 = 1e6;
 
-/// A path that can be asked for the pose at any time.
+/// A camera path with a pose at any time.
 #[derive(Clone, Debug)]
 pub(crate) struct CameraSpline {
     stretches: Vec<Stretch>,
-    /// When the camera arrives at each key, and when it leaves.
+    /// Times of arrival at and departure from each key.
     pub(crate) times: Vec<[f64; 2]>,
     spline: Spline,
     seconds: f64,
     speed: Speed,
 }
 
-/// What lies between two stops: keys that are passed without a wait.
+/// Part between two stops: keys that are passed without a wait.
 #[derive(Clone, Debug)]
 struct Stretch {
     /// First and last time, seconds.
@@ -34,7 +34,7 @@ struct Stretch {
     to: f64,
     /// Knots of the spline at both ends.
     ends: [f64; 2],
-    /// How far has been gone at evenly spaced knots; empty where times are fixed.
+    /// Distance traveled at evenly spaced knots; empty if times are fixed.
     gone: Vec<f64>,
     /// Times and knots of its keys, where times are fixed.
     fixed: Vec<(f64, f64)>,
@@ -80,7 +80,7 @@ impl CameraSpline {
         Some(Self { stretches, times, spline, seconds, speed })
     }
 
-    /// How long it runs.
+    /// Duration in seconds.
     pub(crate) fn seconds(&self) -> f64 {
         self.seconds
     }
@@ -98,7 +98,7 @@ impl CameraSpline {
         self.spline.at(knot)
     }
 
-    /// Its poses for a video with so many pictures a second, both ends included; at most `most` and one.
+    /// Its poses for a video of `fps` pictures a second, both ends included; at most `most` + 1.
     pub(crate) fn poses(&self, fps: f64, most: f64) -> Vec<Pose> {
         self.flight(steps_of(self.seconds, fps, most) + 1).poses
     }
@@ -112,12 +112,12 @@ impl CameraSpline {
     }
 }
 
-/// Steps from picture to picture in so many seconds: at least one, at most `most`.
+/// Steps from picture to picture in `seconds`: at least one, at most `most`.
 pub(crate) fn steps_of(seconds: f64, fps: f64, most: f64) -> usize {
     (seconds * fps).round().clamp(1.0, most) as usize
 }
 
-/// How far apart neighboring keys are, turns counted in; never 0.
+/// Distances of neighboring keys, turns included; never 0.
 fn steps(keys: &[&PathKey]) -> Vec<f64> {
     let ways: Vec<f64> = keys.windows(2).map(|w| w[0].center.distance(w[1].center)).collect();
     let mean = ways.iter().sum::<f64>() / ways.len().max(1) as f64;
@@ -126,8 +126,8 @@ fn steps(keys: &[&PathKey]) -> Vec<f64> {
     keys.windows(2).zip(&ways).map(|(w, way)| (way + TURN * unit * turn(w)).max(1e-6 * unit)).collect()
 }
 
-/// When each key is reached and left. Keys without a time of their own share the time between those
-/// that have one, by distance.
+/// Times of arrival at and departure from each key. Keys without a time of their own share the time between those that
+/// have one, by distance.
 fn times(keys: &[&PathKey], steps: &[f64], seconds: f64) -> Vec<[f64; 2]> {
     let n = keys.len();
     let mut times = vec![[0.0; 2]; n];
@@ -142,7 +142,7 @@ fn times(keys: &[&PathKey], steps: &[f64], seconds: f64) -> Vec<[f64; 2]> {
         let leave = start + waits(at);
         let end = match next {
             Some(i) => keys[i].time_secs.unwrap_or(leave),
-            // What is left of the whole, the last wait taken off.
+            // The rest of the whole, less the last wait.
             None => seconds - waits(n - 1),
         };
         let moving = (end - leave - waiting).max(1e-3 * (last - at) as f64);
@@ -184,7 +184,7 @@ impl Stretch {
         Self { from, to, ends, gone, fixed }
     }
 
-    /// Where on the spline one is at a time.
+    /// Knot of the spline at a time.
     fn knot(&self, time: f64, speed: Speed) -> f64 {
         let share =
             if self.to > self.from { ((time - self.from) / (self.to - self.from)).clamp(0.0, 1.0) } else { 1.0 };

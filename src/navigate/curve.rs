@@ -1,5 +1,5 @@
-//! A smooth way along straight legs: corners are rounded as far as occupied space allows, and the way is
-//! measured, so that it can be gone at even speed.
+//! A smooth way along straight legs: corners are rounded as far as occupied space allows, and its length is measured,
+//! so that it can be followed at even speed.
 
 use glam::DVec3;
 
@@ -21,8 +21,7 @@ pub struct Curve {
     pub(crate) sharp: usize,
 }
 
-/// Legs without detours: every point is dropped that one can do without, going straight with this
-/// clearance. First and last stay.
+/// Legs without detours: drops every point that a straight line with this clearance can skip. First and last stay.
 pub(crate) fn shortened(legs: &[DVec3], occupancy: &OccupancyGrid, clearance: f64) -> Vec<DVec3> {
     let legs: Vec<DVec3> = distinct(legs);
     let mut out: Vec<DVec3> = Vec::new();
@@ -32,7 +31,7 @@ pub(crate) fn shortened(legs: &[DVec3], occupancy: &OccupancyGrid, clearance: f6
         if at + 1 == legs.len() {
             break;
         }
-        // The farthest that can be seen, looked for in growing, then in shrinking strides.
+        // The farthest visible point, searched in growing, then in shrinking strides.
         let (mut best, mut stride) = (at + 1, 1);
         while best + stride < legs.len() && occupancy.is_free(legs[at], legs[best + stride], clearance) {
             best += stride;

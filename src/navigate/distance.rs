@@ -45,7 +45,7 @@ pub(crate) fn squared_distances(marked: &[bool], size: [usize; 3]) -> Vec<f32> {
 /// Lower envelope of the parabolas over one line.
 struct Line {
     at: Vec<usize>,
-    /// Where each takes over from the one before.
+    /// Start of each parabola's part of the line.
     from: Vec<f32>,
     out: Vec<f32>,
 }

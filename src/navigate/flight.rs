@@ -1,5 +1,5 @@
-//! From a route to pictures' poses: along the rounded way at eased speed, turning on SO(3), every
-//! pose compared with occupied space. And the paper's formula, for comparison.
+//! Flights: poses along the rounded route at eased speed, turning on SO(3), every pose checked against occupied space.
+//! For comparison, the paper's formula.
 
 use glam::{DMat3, DVec3};
 
@@ -12,7 +12,7 @@ use crate::scene::{CameraPath, PathKey};
 /// Poses of a flight (the paper's M).
 pub const FRAMES: usize = 150;
 
-/// How speed runs over a flight.
+/// Speed profile of a flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Speed {
     /// The same all the way.
@@ -38,7 +38,7 @@ impl Speed {
 pub struct CameraTrajectory {
     /// At even times.
     pub poses: Vec<Pose>,
-    /// How long it takes.
+    /// Duration in seconds.
     pub seconds: f64,
     /// Length of its way, scene units.
     pub length: f64,
@@ -48,7 +48,7 @@ pub struct CameraTrajectory {
     pub(crate) repaired: usize,
 }
 
-/// How smooth a flight is, and how near it comes to occupied space.
+/// Smoothness of a flight, and its clearance to occupied space.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Smoothness {
     /// Longest step from one pose to the next, scene units.
@@ -74,8 +74,8 @@ impl CameraTrajectory {
         CameraPath { keys, closed: false, fps: last / self.seconds.max(1e-3), seconds: self.seconds }
     }
 
-    /// Along `legs` from one pose to another. On the way it looks at `look_at`, if there is such a
-    /// thing. `None` for no legs.
+    /// Flight along `legs` from one pose to another, looking at `look_at` (target, up) on the way, if given. `None`
+    /// without legs.
     pub fn new(
         legs: &[DVec3],
         ends: [&Pose; 2],
@@ -88,7 +88,7 @@ impl CameraTrajectory {
         let [from, to] = ends;
         let mut keys = vec![(0.0, from.world_from_camera)];
         if let Some((target, up)) = look_at.filter(|_| curve.length() > 0.0) {
-            // It turns to the target first, then keeps it in sight.
+            // Turns to the target first, then keeps it in sight.
             for share in [0.4, 0.6, 0.8] {
                 let here = curve.at(share);
                 let looking = Pose::looking_at(here, target, up, from.fov_y_rad, &to.world_from_camera);
@@ -106,7 +106,7 @@ impl CameraTrajectory {
         let mut poses: Vec<Pose> = (0..=last).map(pose).collect();
         let mut repaired = 0;
         if let Some((occupancy, clearance)) = occupancy {
-            // Both ends are where they were asked to be.
+            // Both ends stay as asked for.
             for pose in &mut poses[1..last] {
                 if occupancy.clearance(pose.center) < clearance
                     && let Some(out) = occupancy.pushed_out(pose.center, clearance)
@@ -142,7 +142,7 @@ impl CameraTrajectory {
         Some(Self { poses: (0..=m).map(pose).collect(), seconds: 3.0, length, sharp: 0, repaired: 0 })
     }
 
-    /// How smooth it is, and how it keeps `clearance` to occupied space.
+    /// Measures its smoothness, and its violations of `clearance` to occupied space.
     pub(crate) fn smoothness(&self, occupancy: &OccupancyGrid, clearance: f64) -> Smoothness {
         let mut s = Smoothness { least_clearance: f64::INFINITY, ..Smoothness::default() };
         for pose in &self.poses {
@@ -166,7 +166,7 @@ impl CameraTrajectory {
     }
 }
 
-/// Every number of two poses in this proportion.
+/// Mixes every number of two poses in this proportion.
 fn mixed(from: &Pose, to: &Pose, share: f64) -> Pose {
     let mix = |a: DVec3, b: DVec3| a + (b - a) * share;
     let [a, b] = [&from.world_from_camera, &to.world_from_camera];

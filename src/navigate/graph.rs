@@ -1,8 +1,7 @@
-//! Which keypoints are connected, and the shortest way from one to another.
+//! Graph of connected keypoints, and the shortest route from one to another.
 //!
-//! Every keypoint looks at its nearest neighbors; an edge is there if one can go straight along it
-//! with enough distance to all occupied space. Edges are looked at when a route first asks for them, and
-//! remembered.
+//! Every keypoint is tried with its nearest neighbors; an edge exists if the straight line keeps enough distance to all
+//! occupied space. Edges are tested when a route first asks for them, and remembered.
 
 use std::sync::atomic::{AtomicU8, Ordering};
 
@@ -13,8 +12,7 @@ use rayon::prelude::*;
 use super::keypoints::{Keypoint, Places, places};
 use super::occupancy::OccupancyGrid;
 
-/// Neighbors that a keypoint is tried to be connected with: more than the six of its own star, so
-/// that stars hang together.
+/// Neighbors that are tried per keypoint: more than the six of its own star, so that stars are connected to each other.
 const NEIGHBORS: usize = 14;
 /// Unit in which lengths are counted, as a share of a voxel: the search adds whole numbers, so that
 /// equal routes are equal.
@@ -26,14 +24,14 @@ const BLOCKED: u8 = 2;
 
 /// Keypoints and their connections.
 pub struct Graph {
-    /// Where the eye may stand.
+    /// Places that a camera may take.
     pub keypoints: Vec<Keypoint>,
     /// Distance to occupied space that every point of an edge has.
     pub(crate) clearance: f64,
     places: Places,
     /// Both ends of each edge that is tried; the lower one first.
     pairs: Vec<[u32; 2]>,
-    /// What is known of each.
+    /// State of each: `UNSEEN`, `FREE` or `BLOCKED`.
     state: Vec<AtomicU8>,
     /// Edges of each keypoint.
     of: Vec<Vec<u32>>,
@@ -44,12 +42,12 @@ pub struct Graph {
 pub(crate) struct Route {
     /// Keypoints by number, first to last.
     pub(crate) through: Vec<usize>,
-    /// Its length, scene units.
+    /// Its length between keypoints, scene units.
     pub(crate) length: f64,
 }
 
 impl Graph {
-    /// Keypoints with their neighbors, no edge looked at yet.
+    /// Keypoints with their neighbors, no edge tested yet.
     pub(crate) fn new(keypoints: Vec<Keypoint>, clearance: f64) -> Self {
         let places = places(&keypoints);
         let near = |i: usize| {
@@ -71,7 +69,7 @@ impl Graph {
         Self { keypoints, clearance, places, pairs, state, of }
     }
 
-    /// Whether one can go along edge `e`.
+    /// Returns whether edge `e` is free.
     fn is_free(&self, e: usize, occupancy: &OccupancyGrid) -> bool {
         let known = self.state[e].load(Ordering::Relaxed);
         if known != UNSEEN {
@@ -89,13 +87,13 @@ impl Graph {
         if a == from { b } else { a }
     }
 
-    /// Looks at all edges that were not looked at; how many edges are free and how many blocked.
+    /// Tests all edges not tested yet; returns the numbers of free and of blocked ones.
     pub(crate) fn look_at_all(&self, occupancy: &OccupancyGrid) -> (usize, usize) {
         let free = (0..self.pairs.len()).into_par_iter().filter(|e| self.is_free(*e, occupancy)).count();
         (free, self.pairs.len() - free)
     }
 
-    /// Edges that were looked at so far, and all that there are.
+    /// Numbers of edges tested so far, and of all.
     pub(crate) fn looked_at(&self) -> (usize, usize) {
         let seen = self.state.iter().filter(|s| s.load(Ordering::Relaxed) != UNSEEN).count();
         (seen, self.state.len())
@@ -145,8 +143,8 @@ impl Graph {
         self.route_between(&[(from, 0.0)], &[(to, 0.0)], occupancy)
     }
 
-    /// The shortest way from any of some keypoints to any of others, when it costs so much (scene
-    /// units) to come to each, and to go on from it. One search, however many there are.
+    /// Shortest way from any of `starts` to any of `goals`, each with the cost (scene units) of reaching it from
+    /// outside, or of going on from it. One search, however many there are.
     pub(crate) fn route_between(
         &self,
         starts: &[(usize, f64)],
@@ -250,7 +248,7 @@ mod tests {
     #[test]
     fn a_wall_parts_the_graph_and_a_hole_joins_it() {
         let cameras = lattice(0.5);
-        // A wall wide enough that nobody gets around it within the grid.
+        // A wall so wide that no route leads around it within the grid.
         let (closed, occupancy) = graph(&cloud_of_wall(0.0), &cameras);
         let parts = closed.parts(&occupancy);
         let side = |i: usize| closed.keypoints[i].center.z > 0.0;

@@ -1,4 +1,4 @@
-//! Where the eye may stand: the places of the photos' cameras, and six more around each, half of the
+//! Keypoints, the places that a camera may take: those of the photos' cameras, and six more around each, half of the
 //! cameras' spacing away (the paper's dilation).
 
 use glam::{DMat3, DVec3};
@@ -9,16 +9,16 @@ use super::is_place;
 use super::occupancy::OccupancyGrid;
 use crate::scene::Camera;
 
-/// A place where the eye may stand.
+/// A place that a camera may take.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Keypoint {
-    /// Where.
+    /// Center in the world.
     pub center: DVec3,
-    /// How the camera that it comes from looks: columns are right, down and forward.
+    /// Rotation of the camera that it comes from: columns are right, down and forward.
     pub(crate) world_from_camera: DMat3,
     /// Index of that camera.
     pub(crate) camera: usize,
-    /// Whether it is the camera's own place.
+    /// True if it is the camera's own center.
     pub(crate) original: bool,
     /// Distance to occupied space, scene units.
     pub(crate) clearance: f64,

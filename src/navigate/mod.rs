@@ -1,6 +1,5 @@
-//! Routes through a scene: which space is occupied, what is reachable, how to get from here to there, and
-//! from where a target is seen best (the paper's Interactive Agent; Scene Initialization and Visible
-//! Interaction).
+//! Routes through a scene: occupied space, reachable keypoints, paths between them, and the best views of a target (the
+//! paper's Interactive Agent; Scene Initialization and Visible Interaction).
 //!
 //! In the order of the data: [`occupancy`] from the Gaussians, [`keypoints`] from the cameras, [`graph`]
 //! of both; [`target`] chooses a view, [`navigator`] finds the way to it, [`curve`] rounds it, and
@@ -33,7 +32,7 @@ use glam::DVec3;
 /// single precision too.
 const FARTHEST: f64 = 1e18;
 
-/// Whether one can be there at all: a place with finite coordinates, not absurdly far.
+/// Returns whether a point is a place: finite coordinates, not absurdly far.
 fn is_place(p: DVec3) -> bool {
     p.is_finite() && p.abs().max_element() < FARTHEST
 }

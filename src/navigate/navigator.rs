@@ -1,4 +1,4 @@
-//! Goes places in a scene: a way from where the eye is to where it is wanted, or why there is none.
+//! Routes of a camera through a scene.
 
 use glam::{DQuat, DVec3};
 
@@ -11,18 +11,18 @@ use super::occupancy::OccupancyGrid;
 use super::pose::Pose;
 use crate::scene::{Bounds, Camera, GaussianCloud};
 
-/// Distance kept to occupied space, as a share of how far the cameras are spread.
+/// Distance kept to occupied space, as a share of the spread of the cameras.
 const CLEARANCE: f64 = 0.02;
-/// Keypoints that the eye and its goal are tried to be joined to.
+/// Nearest keypoints that are tried as entries for the camera and its goal.
 const ENTRIES: usize = 48;
-/// What edges keep more than flights must, so that corners can be rounded.
+/// Factor of the edges' clearance over that of flights, so that corners can be rounded.
 const SPARE: f64 = 1.05;
 
-/// All that is needed to move about in a scene.
+/// Data for moving through a scene.
 pub struct Navigator {
-    /// Which space is occupied.
+    /// Occupied space.
     pub(crate) occupancy: OccupancyGrid,
-    /// Where one can go.
+    /// Keypoints and their connections.
     pub graph: Graph,
     /// The photos' cameras.
     pub(crate) cameras: Vec<Camera>,
@@ -30,19 +30,19 @@ pub struct Navigator {
     pub(crate) spacing: f64,
     /// Distance that flights keep to occupied space, scene units.
     pub clearance: f64,
-    /// Which way is up.
+    /// World up direction.
     pub(crate) up: DVec3,
     /// Keypoints that were left out because they are in occupied space.
     pub(crate) in_occupied: usize,
 }
 
-/// Why there is no way.
+/// Error of a route that does not exist.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum NoRoute {
     /// There are no keypoints.
     #[error("no reachable viewpoint: the scene has no cameras, or all of them are inside occupied space")]
     NoKeypoints,
-    /// The eye cannot get away from where it is.
+    /// The camera cannot leave its place.
     #[error("the camera is enclosed by occupied space")]
     Enclosed,
     /// The goal lies in a part that cannot be reached.
@@ -53,13 +53,13 @@ pub enum NoRoute {
         /// Its distance from the goal, scene units.
         distance: f64,
     },
-    /// The goal is inside occupied space, or outside of what is known.
+    /// The goal is inside occupied space, or outside of the known space.
     #[error("that place is not reachable: it is inside occupied space or outside the scene")]
     Inside,
 }
 
 impl Navigator {
-    /// Looks at a scene. Takes about a second: once per scene, when somebody first wants to move.
+    /// Builds the occupancy grid and the graph. Takes about a second: once per scene, at the first flight.
     pub fn new(cloud: &GaussianCloud, cameras: &[Camera], up: DVec3) -> Self {
         let eyes: Vec<DVec3> = cameras.iter().map(|c| c.center).filter(|c| is_place(*c)).collect();
         let spread = Bounds::of(eyes.iter().copied()).map_or(0.0, |b| b.radius());
@@ -79,34 +79,34 @@ impl Navigator {
         self.occupancy.bytes()
     }
 
-    /// Keypoints that can be gone to straight from a place, nearest first. A place with less
-    /// clearance than wanted is left without losing any more of it.
+    /// Keypoints that can be reached straight from a place, nearest first. From a place with less clearance than
+    /// wanted, no more of it is lost.
     fn entries(&self, place: DVec3) -> Vec<usize> {
         let here = self.occupancy.clearance(place);
         let keep = self.clearance.min(here - 0.01 * self.occupancy.voxel());
         let near: Vec<usize> = self.graph.nearest(place).take(ENTRIES).collect();
         let all = near.iter().copied();
         if keep < 0.5 * self.occupancy.voxel() {
-            // Inside occupied space: any way out is better than none.
+            // Inside occupied space any way out is better than none.
             return all.take(4).collect();
         }
         all.filter(|i| self.occupancy.is_free(place, self.graph.keypoints[*i].center, keep)).take(8).collect()
     }
 
-    /// The keypoints of the shortest way through the graph from one pose to another, both ends with it: what
-    /// the paper's interpolation is given. `None` if there is none.
+    /// Keypoints of the shortest way through the graph from one pose to another, both ends included: the input of the
+    /// paper's interpolation. `None` if there is none.
     pub(crate) fn keys(&self, from: &Pose, to: &Pose) -> Option<Vec<Pose>> {
         let route = self.route([from.center, to.center], [&self.entries(from.center), &self.entries(to.center)])?;
         let keys = route.through.iter().map(|i| &self.graph.keypoints[*i]);
         let on_the_way =
             keys.map(|k| Pose { center: k.center, world_from_camera: k.world_from_camera, fov_y_rad: to.fov_y_rad });
-        // An end that is a keypoint is not gone to twice.
+        // An end that is a keypoint is visited once.
         let mut all: Vec<Pose> = std::iter::once(*from).chain(on_the_way).chain([*to]).collect();
         all.dedup_by(|a, b| a.center == b.center);
         Some(all)
     }
 
-    /// The shortest way between two places through keypoints that each of them can go to.
+    /// Shortest way between two places through keypoints that each of them can reach.
     fn route(&self, ends: [DVec3; 2], entries: [&[usize]; 2]) -> Option<Route> {
         let place = |i: usize| self.graph.keypoints[i].center;
         let with_way = |all: &[usize], end: DVec3| -> Vec<(usize, f64)> {
@@ -150,8 +150,8 @@ impl Navigator {
         Err(NoRoute::Parted { nearest, distance: place(nearest).distance(to) })
     }
 
-    /// A way around a target instead of over it, where there is room for that: it can be kept in sight
-    /// at even speed. `None` if the straight way does not turn much, or there is no room.
+    /// A way around a target instead of over it, if there is room: it can be kept in sight at even speed. `None` if the
+    /// straight way does not turn much, or there is no room.
     fn around(&self, from: DVec3, to: DVec3, target: DVec3) -> Option<Vec<DVec3>> {
         const PIECES: usize = 8;
         let level = |p: DVec3| (p - target) - self.up * (p - target).dot(self.up);
@@ -177,7 +177,7 @@ impl Navigator {
         free.then_some(legs)
     }
 
-    /// A flight from one pose to another. On the way it looks at `look_at`, if there is such a thing.
+    /// A flight from one pose to another that looks at `look_at` on the way, if given.
     ///
     /// # Errors
     /// If there is no way.
@@ -202,13 +202,13 @@ impl Navigator {
         flight.ok_or(NoRoute::Inside)
     }
 
-    /// How far one can go from a pose in a direction of its own (right, down, forward), at most
-    /// `distance` scene units, and whether occupied space ends it.
+    /// End of a step from a pose in a direction of its own (right, down, forward), of at most `distance` scene units,
+    /// and whether occupied space ends it.
     pub(crate) fn step(&self, from: &Pose, direction: DVec3, distance: f64) -> (DVec3, bool) {
         let Some(direction) = (from.world_from_camera * direction).try_normalize() else { return (from.center, false) };
         let goal = from.center + direction * distance.max(0.0);
         let here = self.occupancy.clearance(from.center);
-        // Who is too near already may go away from occupied space, not nearer.
+        // A camera that is too near already may move away from occupied space, not nearer.
         let keep = self.clearance.min(here - 0.01 * self.occupancy.voxel());
         if keep < 0.5 * self.occupancy.voxel() {
             let out = self.occupancy.clearance(goal) > here;

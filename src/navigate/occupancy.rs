@@ -1,10 +1,9 @@
-//! Which space is occupied: how opaque every voxel of a scene is, and how far every point is from what is.
+//! Occupied space: the opacity of every voxel of a scene, and the distance of every point from occupied voxels.
 //!
-//! A Gaussian of opacity `a` is spread over space with the extinction whose integral along its
-//! thinnest axis is `-ln(1 - a)`, so that a ray through it loses what the renderer says it does. A
-//! voxel whose extinction over its own side takes half of the light (the renderer's median depth) is
-//! occupied space. Distances to it are exact between voxel centers (Felzenszwalb and Huttenlocher 2012) and
-//! interpolated between them.
+//! A Gaussian of opacity `a` is spread over space with the extinction whose integral along its thinnest axis is
+//! `-ln(1 - a)`, so that a ray through it loses as much light as in the renderer. A voxel is occupied if the extinction
+//! over its side takes half of the light (the renderer's median depth). Distances to it are exact between voxel centers
+//! (Felzenszwalb and Huttenlocher 2012) and interpolated between them.
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -18,14 +17,14 @@ use crate::scene::{Bounds, GaussianCloud};
 const VOXELS: usize = 160;
 /// Optical depth over a voxel's side from which it is occupied space: half of the light is taken.
 const SOLID: f32 = std::f32::consts::LN_2;
-/// Opacity under which a Gaussian is not looked at.
+/// Opacity under which a Gaussian is left out.
 const FAINT: f64 = 0.02;
 /// Standard deviations out to which a Gaussian is spread.
 const REACH: f64 = 3.0;
 /// Optical depth that a Gaussian has at most.
 const MOST_DEPTH: f64 = 6.0;
 
-/// The matter of a scene, in a box around where cameras may go.
+/// Occupancy of a scene, in a box around all places for cameras.
 #[derive(Clone, Debug, PartialEq)]
 pub struct OccupancyGrid {
     /// Lower corner of the grid, world.
@@ -38,20 +37,20 @@ pub struct OccupancyGrid {
     depth: Vec<f32>,
     /// Distance from each voxel's center to the nearest occupied space, scene units, less half a voxel.
     distance: Vec<f32>,
-    /// Looks at so many places along every way, instead of at as many as the distances demand: to
-    /// measure what that would cost.
+    /// Samples along every way, instead of as many as the distances demand, to measure their cost; `None` for the
+    /// latter.
     pub(crate) samples: Option<u32>,
 }
 
 impl OccupancyGrid {
-    /// The matter of `cloud` in the box that `eyes` and the scene itself span. `eyes` are places
-    /// where cameras were: for `free` around each there is nothing, whatever the Gaussians say
-    /// (floaters in front of cameras are the commonest fault of trained scenes).
+    /// Occupancy of `cloud` in the box that `eyes` and the scene itself span. `eyes` are places of cameras: `free`
+    /// around each is empty, whatever the Gaussians say (floaters in front of cameras are the most common fault of
+    /// trained scenes).
     pub(crate) fn of(cloud: &GaussianCloud, eyes: &[DVec3], free: f64) -> Self {
         let scene = Bounds::robust((0..cloud.len()).map(|i| cloud.world_position(i)));
         let both = Bounds::of(eyes.iter().copied().chain(scene.into_iter().flat_map(|b| [b.min, b.max])));
         let around = both.unwrap_or(Bounds { min: DVec3::ZERO, max: DVec3::ZERO });
-        // One may step back from where the outermost photo was taken.
+        // Cameras may step back from the outermost photo.
         let margin = 0.2 * around.radius().max(1e-6) + free;
         let (min, max) = (around.min - margin, around.max + margin);
         let voxel = (max - min).max_element() / VOXELS as f64;
@@ -75,7 +74,7 @@ impl OccupancyGrid {
         let [nx, ny, nz] = self.size;
         let (corner, voxel) = (self.corner, self.voxel);
         let blobs: Vec<Blob> = (0..cloud.len()).into_par_iter().filter_map(|i| Blob::of(cloud, i, voxel)).collect();
-        // Every slab of z takes what reaches into it; no two threads write to one voxel.
+        // Every slab of z takes the Gaussians that reach into it; no two threads write to one voxel.
         let mut slabs: Vec<Vec<u32>> = vec![Vec::new(); nz];
         for (i, blob) in blobs.iter().enumerate() {
             let lo = ((blob.center.z - blob.reach.z - corner.z) / voxel - 0.5).ceil().max(0.0) as usize;
@@ -91,7 +90,7 @@ impl OccupancyGrid {
         });
     }
 
-    /// Takes away what is within `radius` of places where cameras were.
+    /// Empties the voxels within `radius` of places of cameras.
     fn clear(&mut self, eyes: &[DVec3], radius: f64) {
         for eye in eyes {
             let at = |axis: usize, offset: f64| {
@@ -137,8 +136,7 @@ impl OccupancyGrid {
         ((self.depth.len() + self.distance.len()) * size_of::<f32>()) as u64
     }
 
-    /// The nearest place to `p` with this clearance, as far as the field leads there; `None` if it does
-    /// not lead to one.
+    /// Nearest place to `p` with this clearance, by ascent of the distance field; `None` if it leads to none.
     pub(crate) fn pushed_out(&self, p: DVec3, clearance: f64) -> Option<DVec3> {
         const STEPS: usize = 8;
         let h = 0.5 * self.voxel;
@@ -155,24 +153,24 @@ impl OccupancyGrid {
         (self.clearance(at) >= clearance).then_some(at)
     }
 
-    /// Whether a point is inside occupied space, or outside of what is known, as far as voxels can tell.
+    /// Returns whether a point is inside occupied space or outside of the grid, as far as voxels can tell.
     pub(crate) fn is_inside(&self, p: DVec3) -> bool {
         self.clearance(p) < 0.5 * self.voxel
     }
 
-    /// The box outside of which nothing is known.
+    /// Box of the grid.
     pub(crate) fn bounds(&self) -> Bounds {
         let [x, y, z] = self.size.map(|n| n as f64);
         Bounds { min: self.corner, max: self.corner + DVec3::new(x, y, z) * self.voxel }
     }
 
-    /// Distance from a point to the nearest occupied space, scene units: 0 inside it, and outside of what is
-    /// known, where nobody should fly.
+    /// Distance from a point to the nearest occupied space, scene units: 0 inside it and outside of the grid, so that
+    /// no flight leads there.
     pub(crate) fn clearance(&self, p: DVec3) -> f64 {
         self.known_clearance(p).unwrap_or(0.0)
     }
 
-    /// The same; `None` outside of what is known.
+    /// The same; `None` outside of the grid.
     fn known_clearance(&self, p: DVec3) -> Option<f64> {
         let (base, f) = self.cell(p)?;
         let mut sum = 0.0;
@@ -187,7 +185,7 @@ impl OccupancyGrid {
         Some(sum)
     }
 
-    /// The voxel center below a point, and where between it and the next the point is, 0 to 1.
+    /// Voxel center below a point, and the point's position between it and the next, 0 to 1 per axis.
     fn cell(&self, p: DVec3) -> Option<([usize; 3], [f64; 3])> {
         let q = (p - self.corner) / self.voxel - 0.5;
         let mut base = [0; 3];
@@ -204,8 +202,8 @@ impl OccupancyGrid {
         Some((base, f))
     }
 
-    /// How far one can go from `a` toward `b` with at least `clearance` to all occupied space, within what is
-    /// known, as a share of the way, 0 to 1.
+    /// Share of the way from `a` toward `b`, 0 to 1, that keeps at least `clearance` to all occupied space and stays in
+    /// the grid.
     ///
     /// Steps are as long as the distance field allows, which changes by no more than the way that is
     /// gone: nothing thicker than a voxel can be stepped over.
@@ -238,13 +236,13 @@ impl OccupancyGrid {
         }
     }
 
-    /// Whether one can go straight from `a` to `b` with this clearance.
+    /// Returns whether the straight line from `a` to `b` keeps this clearance.
     pub(crate) fn is_free(&self, a: DVec3, b: DVec3, clearance: f64) -> bool {
         self.free_share(a, b, clearance) >= 1.0
     }
 
-    /// Share of the light that comes from `a` to `b`, 0 to 1. What lies within `skip` of `b` is left
-    /// out: the surface that is looked at does not hide itself.
+    /// Share of the light that comes from `a` to `b`, 0 to 1. Space within `skip` of `b` is left out: the target's
+    /// surface does not hide itself.
     pub(crate) fn transmittance(&self, a: DVec3, b: DVec3, skip: f64) -> f64 {
         let length = a.distance(b);
         let reach = length - skip;
@@ -294,7 +292,7 @@ impl Blob {
         let rotation = DMat3::from_cols_array_2d(&rows).transpose();
         let scales = DVec3::from_array(g.log_scale.map(|s| f64::from(s).exp()));
         let thinnest = scales.min_element().max(1e-12);
-        // A voxel averages what is in it: the same as widening by its own variance.
+        // A voxel averages its content: the same as widening by its own variance.
         let wide = scales * scales + voxel * voxel / 12.0;
         let spread = DMat3::from_diagonal(wide);
         let covariance = rotation * spread * rotation.transpose();

@@ -1,4 +1,4 @@
-//! A place, a direction and a field of view, and how directions are mixed.
+//! Poses of a viewer, and the interpolation of rotations.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -8,7 +8,7 @@ use crate::scene::{Camera, PathKey};
 /// A viewer's pose.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
-    /// Where, world.
+    /// Center in the world.
     pub center: DVec3,
     /// Columns are right, down and forward.
     pub world_from_camera: DMat3,
@@ -98,7 +98,7 @@ pub(crate) struct RotationSpline {
 }
 
 impl RotationSpline {
-    /// Through `keys` (time, rotation); of keys at one time the last counts. Nothing for none.
+    /// Spline through `keys` (time, rotation); of keys at one time the last counts. `None` without keys.
     pub(crate) fn new(keys: &[(f64, DMat3)], closed: bool) -> Option<Self> {
         let mut times: Vec<f64> = Vec::with_capacity(keys.len());
         let mut at: Vec<DQuat> = Vec::with_capacity(keys.len());

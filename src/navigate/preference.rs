@@ -1,4 +1,4 @@
-//! What is wanted of a view of a target: from which side and how far, and what that comes to as a direction.
+//! Preferred view of a target: side and distance, and the direction that follows from them.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -54,7 +54,7 @@ impl Side {
     }
 }
 
-/// What is wanted of a view.
+/// Preferences for a view.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct ViewPreference {
     pub(crate) side: Side,
@@ -68,7 +68,7 @@ impl Default for ViewPreference {
     }
 }
 
-/// The direction from the target in which the eye is wanted.
+/// Preferred direction from the target to the camera; `None` for any.
 pub(super) fn wanted(side: Side, now: DVec3, front: Option<DVec3>, up: DVec3) -> Option<DVec3> {
     let flat = (now - up * now.dot(up)).try_normalize();
     let flat = flat.unwrap_or_else(|| up.any_orthonormal_vector());
@@ -87,7 +87,7 @@ pub(super) fn wanted(side: Side, now: DVec3, front: Option<DVec3>, up: DVec3) ->
     }
 }
 
-/// How well a direction fits what is wanted, 0 to 1; `None` if it is not that side at all.
+/// Fit of a direction to the preference, 0 to 1; `None` if it is not that side at all.
 pub(super) fn fit(side: Side, wanted: Option<DVec3>, now: DVec3, direction: DVec3) -> Option<f64> {
     match wanted {
         // A little for staying near: a view that is as good from here is better from here.

@@ -1,5 +1,5 @@
-//! From where a target is seen best: much of it, large, from its front, from where photos were
-//! taken, with room around the eye, and from the side that was asked for.
+//! Best views of a target: much of it, large, from its front, from near photos, with room around the camera, and from
+//! the side that was asked for.
 
 use glam::DVec3;
 use rayon::prelude::*;
@@ -14,7 +14,7 @@ use crate::scene::{Bounds, Camera, GaussianCloud};
 
 /// Directions that are tried.
 const DIRECTIONS: usize = 160;
-/// Points of the target that are looked for.
+/// Points of the target that are tested for visibility.
 const POINTS: usize = 96;
 /// Share of the picture's shorter side that the target fills.
 const FILL: f64 = 0.5;
@@ -27,12 +27,12 @@ const DRAWN_PX: u32 = 128;
 /// Angle to the nearest photo at which a view is trusted half as much, radians.
 const PHOTO_ANGLE: f64 = 0.6;
 
-/// What is to be seen.
+/// Gaussians of a target.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TargetGaussians {
     /// Gaussians of it by number, rising.
     pub(crate) members: Vec<usize>,
-    /// The middle of what it is a part of, if it is one.
+    /// Middle of the object that it is a part of, if it is one.
     pub(crate) whole: Option<DVec3>,
 }
 
@@ -46,28 +46,28 @@ pub(crate) struct TargetView {
     pub(crate) covers: f64,
     /// Distance of the eye to occupied space, scene units.
     pub(crate) clearance: f64,
-    /// How good it is, all things taken together; comparable within one search.
+    /// Score of all criteria together; comparable within one search.
     pub(crate) score: f64,
 }
 
-/// What a search for views needs to know.
+/// Inputs of a search for views.
 pub(crate) struct Search<'a> {
     pub(crate) cloud: &'a GaussianCloud,
-    /// How they are drawn.
+    /// Settings that the Gaussians are drawn with.
     pub(crate) settings: &'a RenderSettings,
-    /// Which space is occupied.
+    /// Occupied space.
     pub(crate) occupancy: &'a OccupancyGrid,
     /// The photos' cameras.
     pub(crate) cameras: &'a [Camera],
-    /// Which way is up.
+    /// World up direction.
     pub(crate) up: DVec3,
     /// Distance to occupied space that the eye keeps.
     pub(crate) clearance: f64,
 }
 
 impl Search<'_> {
-    /// Views of a target, best first; none if nobody can stand where it is seen. `eye` is the present
-    /// pose, `aspect` width by height of the picture.
+    /// Views of a target, best first; none if it is visible from no free place. `eye` is the present pose, `aspect`
+    /// width by height of the picture.
     ///
     /// # Errors
     /// If a view cannot be drawn.
@@ -89,7 +89,7 @@ impl Search<'_> {
         let narrow = half.min((half.tan() * aspect).atan());
         let radius = bounds.radius().max(0.5 * self.occupancy.voxel());
         let usual = radius / (FILL * narrow.tan());
-        // Nobody can stand nearer than this.
+        // No camera may be nearer than this.
         let least = self.clearance + 0.5 * self.occupancy.voxel();
         let now = (eye.center - center).try_normalize().unwrap_or(-eye.forward());
         let front = self.front(target, center);
@@ -135,7 +135,7 @@ impl Search<'_> {
         for (score, at) in spread_out(&rough, center) {
             let pose = Pose::looking_at(at, center, self.up, eye.fov_y_rad, &eye.world_from_camera);
             let (visible, covers) = drawing.look(&pose.camera(width, height))?;
-            // What the grid is too coarse for, the picture knows.
+            // The picture shows what the grid is too coarse for.
             let score = score * (0.05 + visible);
             views.push(TargetView { pose, visible, covers, clearance: self.occupancy.clearance(at), score });
         }
@@ -153,7 +153,7 @@ impl Search<'_> {
         (sum.length() > 0.2 * self.cameras.len() as f64).then(|| sum.normalize_or_zero())
     }
 
-    /// How near a photo was taken to where `at` looks at `center` from, 0 to 1.
+    /// Nearness of a photo to the view of `center` from `at`, 0 to 1; 1 without photos.
     fn seen_by_photos(&self, center: DVec3, at: DVec3) -> f64 {
         if self.cameras.is_empty() {
             return 1.0;

@@ -50,7 +50,7 @@ pub(crate) const TANGENT_CLAMP: f64 = 1.3;
 /// Most channels that one pass composites, color and depth included.
 pub(crate) const MAX_CHANNELS: usize = 32;
 
-/// Why a picture could not be drawn.
+/// Error of a picture that could not be drawn.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum RenderError {
@@ -62,12 +62,12 @@ pub enum RenderError {
     Cutoffs,
     #[error("the feature array holds {have} values, expected {want}")]
     FeatureLength { have: usize, want: usize },
-    /// A stage left a number that is none; looked for under `debug-validation` only.
+    /// A stage left a number that is not finite; checked under `debug-validation` only.
     #[error(transparent)]
     NotFinite(#[from] NotFinite),
 }
 
-/// What counts as too little to be drawn: the first knob between accuracy and time.
+/// Cut-offs below which nothing is drawn: the first knob between accuracy and time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cutoffs {
     /// Smallest alpha that counts, above 0.
@@ -82,7 +82,7 @@ impl Default for Cutoffs {
     }
 }
 
-/// How to draw.
+/// Settings of a rendering.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct RenderSettings {
@@ -100,8 +100,8 @@ pub struct RenderSettings {
     /// Draw surfels: disks across the first two axes, whose third scale is ignored (2D Gaussian
     /// Splatting). On the CPU only; a GPU draws them as the flat Gaussians that they are stored as.
     pub surfels: bool,
-    /// Of Gaussians on the CPU. A GPU, whose shaders are made with the defaults, refuses others;
-    /// surfels are always drawn with the defaults.
+    /// Cut-offs for Gaussians on the CPU. A GPU, whose shaders are made with the defaults, refuses others; surfels are
+    /// always drawn with the defaults.
     pub cutoffs: Cutoffs,
     /// Draw in the order of the picture before, as far as it is known, instead of sorting anew: for
     /// Gaussians on the CPU.
@@ -124,7 +124,7 @@ impl Default for RenderSettings {
 }
 
 impl RenderSettings {
-    /// Whether Gaussians have the same weights at each pixel as with `other`.
+    /// Returns whether Gaussians have the same weights at each pixel as with `other`.
     pub(crate) fn sees_like(&self, other: &Self) -> bool {
         let shape = |s: &Self| (s.near, s.antialias, s.surfels, s.cutoffs);
         shape(self) == shape(other)
@@ -132,7 +132,7 @@ impl RenderSettings {
 }
 
 impl RenderSettings {
-    /// How Gaussians of this mode are drawn.
+    /// Settings for Gaussians of this mode.
     pub(crate) fn of_mode(mode: SplatRenderMode) -> Self {
         let (antialias, surfels) = (mode == SplatRenderMode::Mip, mode == SplatRenderMode::Surfels);
         Self { antialias, surfels, ..Self::default() }
@@ -174,8 +174,8 @@ pub struct Frame<R> {
     /// Normals of surfels, toward the camera in world axes, `sum(w n)`; empty for Gaussians and
     /// without depth.
     pub normals: [Vec<R>; 3],
-    /// How far surfels along a ray are apart: the sum over pairs of `w_i w_j (1/z_i - 1/z_j)²`;
-    /// empty for Gaussians and without depth.
+    /// Distortion of surfels along a ray: the sum over pairs of `w_i w_j (1/z_i - 1/z_j)²`; empty for Gaussians and
+    /// without depth.
     pub distortion: Vec<R>,
 }
 
@@ -216,7 +216,7 @@ pub struct CloudGradient<R> {
     pub screen: Vec<R>,
 }
 
-/// What density control knows of each Gaussian since it last ran.
+/// Statistics of each Gaussian for density control since it last ran.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct DensityStats {
     /// Sum of the screen gradients' lengths, loss per half picture side.
@@ -226,7 +226,7 @@ pub struct DensityStats {
 }
 
 impl DensityStats {
-    /// Nothing seen of `n` Gaussians.
+    /// Empty statistics of `n` Gaussians.
     pub(crate) fn new(n: usize) -> Self {
         Self { gradient: vec![0.0; n], seen: vec![0; n] }
     }

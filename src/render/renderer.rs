@@ -10,7 +10,7 @@ use super::lod::Cut;
 use super::{ContributionSink, Features, Frame, RenderError, RenderSettings, RenderStats, StageTimes, cpu};
 use crate::scene::{Camera, GaussianCloud};
 
-/// Which renderer is wanted.
+/// Renderer that is asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum BackendChoice {
@@ -24,8 +24,8 @@ pub enum BackendChoice {
 }
 
 impl BackendChoice {
-    /// The GPU to use; `None` = the CPU. `Auto` takes a GPU only if it is a real one: the CPU
-    /// renderer is faster than an emulated GPU. `told` hears why one that is there is not used.
+    /// GPU to use; `None` = the CPU. `Auto` takes a GPU only if it is a real one: the CPU renderer is faster than an
+    /// emulated GPU. `told` receives the reason if one that exists is not used.
     pub(crate) fn gpu(self, told: impl FnOnce(String)) -> Result<Option<Device>, GpuError> {
         match self {
             Self::Cpu => Ok(None),
@@ -35,17 +35,17 @@ impl BackendChoice {
     }
 }
 
-/// What a GPU gave, or `None` and a word on why the CPU does its work.
+/// Result of a GPU; on an error `None`, with the fallback to the CPU reported to `told`.
 fn or_told<T>(given: Result<T, GpuError>, told: impl FnOnce(String)) -> Option<T> {
     given.map_err(|e| told(instead_of_gpu(&e))).ok()
 }
 
-/// That the CPU does a GPU's work, and why.
+/// Warning that the CPU does a GPU's work, with the reason.
 pub fn instead_of_gpu(why: &impl std::fmt::Display) -> String {
     format!("The CPU does the work of the GPU, which failed: {why}")
 }
 
-/// Why a view could not be drawn.
+/// Error of a view that could not be drawn.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum DrawError {
@@ -67,14 +67,14 @@ pub struct FrameCost {
     pub(crate) pixels_secs: f64,
 }
 
-/// A renderer with its buffers, to be kept from frame to frame: where a GPU was chosen, it draws the pictures and finds
-/// what their pixels belong to; the CPU does everything else.
+/// A renderer with its buffers, to be kept from frame to frame: a chosen GPU draws the pictures and finds the labels of
+/// their pixels; the CPU does everything else.
 pub struct Renderer {
     cpu: cpu::CpuRenderer<f32>,
     gpu: Option<Box<Gpu>>,
 }
 
-/// The renderer with a way back, for training on the CPU.
+/// Renderer with a backward pass, for training on the CPU.
 pub type DifferentiableRenderer = cpu::CpuRenderer<f32>;
 
 /// The GPU renderer and the cloud that it holds.
@@ -94,7 +94,7 @@ impl Default for Renderer {
 }
 
 impl Renderer {
-    /// Name of the CPU among the names of what draws.
+    /// Name of the CPU as a renderer.
     pub(crate) const CPU: &str = "CPU";
 
     /// The CPU.
@@ -102,7 +102,7 @@ impl Renderer {
         Self::default()
     }
 
-    /// The renderer that `choice` asks for. `told` hears why a GPU that is there is not used.
+    /// Renderer that `choice` asks for. `told` receives the reason if a GPU that exists is not used.
     pub fn choose(choice: BackendChoice, mut told: impl FnMut(String)) -> Result<Self, GpuError> {
         match choice.gpu(&mut told)? {
             None => Ok(Self::new()),
@@ -121,12 +121,12 @@ impl Renderer {
         Ok(Self { cpu: cpu::CpuRenderer::forward_only(), gpu: Some(Box::new(gpu)) })
     }
 
-    /// Whether a GPU draws the pictures.
+    /// Returns whether a GPU draws the pictures.
     pub fn is_gpu(&self) -> bool {
         self.gpu.is_some()
     }
 
-    /// Name of what draws the pictures, for display.
+    /// Name of the renderer's device, for display.
     pub(crate) fn name(&self) -> &str {
         self.gpu.as_ref().map_or(Self::CPU, |gpu| &gpu.name)
     }
@@ -144,8 +144,7 @@ impl Renderer {
         }
     }
 
-    /// Draws on a GPU what was drawn from there before, and leaves the picture there; returns before it is drawn. For
-    /// measurements.
+    /// Redraws the uploaded cloud on a GPU and leaves the picture there; returns before it is drawn. For measurements.
     pub(crate) fn draw_on_device(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<(), DrawError> {
         self.gpu.as_mut().map_or(Ok(()), |gpu| Ok(gpu.renderer.draw_on_device(camera, settings)?))
     }
@@ -198,7 +197,7 @@ impl Renderer {
     /// label. A GPU finds them for the cloud that it drew last.
     ///
     /// # Panics
-    /// Where there are not as many labels as Gaussians.
+    /// If there are not as many labels as Gaussians.
     pub fn label_winners(
         &mut self,
         cloud: &GaussianCloud,
@@ -214,8 +213,8 @@ impl Renderer {
         Ok(weights.iter().map(|places| labels::winner(places, groups)).collect())
     }
 
-    /// The labels of largest weight at each pixel, row-major, of which `of` has one for each Gaussian of `cloud`; on the
-    /// CPU.
+    /// The labels of largest weight at each pixel, row-major, on the CPU; `of` has a label for each Gaussian of
+    /// `cloud`.
     pub(crate) fn label_weights(
         &mut self,
         cloud: &GaussianCloud,
@@ -249,12 +248,12 @@ impl Renderer {
         self.cpu.contributions(cloud, camera, settings, sinks)
     }
 
-    /// Draws only this of clouds that it fits, from now on, where the CPU draws; `None` draws all.
+    /// Limits later pictures to the cut, for clouds that it fits and where the CPU draws; `None` draws all.
     pub(crate) fn limit_to(&mut self, cut: Option<Arc<Cut>>) {
         self.cpu.limit_to(cut);
     }
 
-    /// What the last frame of [`Self::render`] cost.
+    /// Cost of the last frame of [`Self::render`].
     pub(crate) fn stats(&self) -> RenderStats {
         self.cpu.stats()
     }
@@ -264,8 +263,8 @@ impl Renderer {
         self.cpu.working_bytes()
     }
 
-    /// Gives back working memory that the next picture can make again: on the CPU all of it; a
-    /// device keeps its own, which nobody else needs.
+    /// Frees working memory that the next picture can make again: all of it on the CPU; a device keeps its own, which
+    /// no other program part needs.
     pub fn rest(&mut self) {
         self.cpu = cpu::CpuRenderer::forward_only();
     }
@@ -275,8 +274,8 @@ impl Renderer {
         self.gpu.as_ref().map_or(0, |gpu| gpu.renderer.device_bytes())
     }
 
-    /// Whether the stages of later pictures are timed. The CPU always does; a GPU does it only where
-    /// it is asked to, and can.
+    /// Sets whether the stages of later pictures are timed. The CPU always times them; a GPU does if asked to and able
+    /// to.
     pub fn time_stages(&mut self, timed: bool) -> Result<(), GpuError> {
         let Some(gpu) = &mut self.gpu else { return Ok(()) };
         if std::mem::replace(&mut gpu.timed, timed) != timed {
@@ -296,7 +295,7 @@ impl Renderer {
         }
     }
 
-    /// What the last picture cost, `secs` in all.
+    /// Cost of the last picture, `secs` in all.
     pub(crate) fn cost(&self, secs: f64) -> FrameCost {
         if self.is_gpu() {
             return FrameCost { fixed_secs: 0.0, pixels_secs: secs };

@@ -6,10 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use super::Dataset;
 
-/// What is drawn behind a scene that does not say.
+/// Background color of a dataset that states none.
 const BLACK: [f32; 3] = [0.0; 3];
 
-/// What training takes transparent pixels for.
+/// Meaning of transparent photo pixels in training.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum AlphaUse {
@@ -31,7 +31,7 @@ impl AlphaUse {
         }
     }
 
-    /// A few words for lists and notes.
+    /// Short description for lists and notes.
     pub(crate) fn title(self) -> &'static str {
         match self {
             Self::Ignore => "not counted, so anything may grow there",
@@ -42,7 +42,7 @@ impl AlphaUse {
 }
 
 impl Dataset {
-    /// Takes transparent pixels for this. `self.background` becomes what is behind everything.
+    /// Sets the meaning of transparent pixels, and `self.background` to the color behind the scene.
     pub(crate) fn use_alpha(&mut self, alpha: AlphaUse) {
         if alpha == AlphaUse::Ignore {
             // Photos without transparency may still show the color that the dataset states.
@@ -58,7 +58,7 @@ impl Dataset {
         self.alpha = Some(alpha);
     }
 
-    /// This dataset with transparent pixels taken for `alpha`, if that is asked for and there are any.
+    /// This dataset with transparent pixels used as `alpha`, if one is given and any photo has transparency.
     pub(crate) fn with_alpha(&self, alpha: Option<AlphaUse>) -> Cow<'_, Self> {
         match alpha.filter(|a| self.alpha.is_some_and(|own| own != *a)) {
             None => Cow::Borrowed(self),
@@ -70,12 +70,12 @@ impl Dataset {
         }
     }
 
-    /// Photos with a mask of the pixels that count.
+    /// Number of photos with a mask of the pixels that count.
     pub(crate) fn masked(&self) -> usize {
         self.photos.iter().filter(|p| p.mask.is_some()).count()
     }
 
-    /// What is told of pixels that do not count, or of which there is more to say than their color.
+    /// Notes for the user on transparent and masked pixels.
     pub(crate) fn pixel_notes(&self) -> Vec<String> {
         let alpha = self.alpha.map(|a| format!("Transparent pixels are {} (--alpha)", a.title()));
         let (masked, photos) = (self.masked(), self.photos.len());

@@ -1,4 +1,4 @@
-//! What a thing without a name is called by: its color and its size.
+//! Descriptions of unnamed identities by color and size.
 
 use super::{Bounds, GaussianCloud, SemanticMap};
 use crate::math::Real;
@@ -14,8 +14,7 @@ pub(crate) struct Appearance {
     length: f64,
 }
 
-/// The appearance of every identity without a name, by number less one; `None` for the others and for what has no
-/// Gaussians.
+/// Appearance of every unnamed identity, by number less one; `None` for named ones and those without Gaussians.
 pub(crate) fn of_unnamed(cloud: &GaussianCloud, map: &SemanticMap) -> Vec<Option<Appearance>> {
     map.identities.iter().map(|(id, i)| if i.names.is_empty() { of(cloud, &map.members(id)) } else { None }).collect()
 }

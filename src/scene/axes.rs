@@ -1,4 +1,4 @@
-//! Axes of files: where the numbers of a splat count to, and Gaussians turned from some to others.
+//! Axis conventions of splat files, and the conversion of Gaussians between them.
 
 use std::str::FromStr;
 
@@ -8,7 +8,7 @@ use rayon::prelude::*;
 use super::GaussianCloud;
 use crate::math::sh;
 
-/// Where x, y and z of a file count to: right or left, up or down, front or back, a letter for each.
+/// Directions in which x, y and z of a file increase, a letter for each: right or left, up or down, front or back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Axes([char; 3]);
 
@@ -68,8 +68,8 @@ impl FromStr for Axes {
 }
 
 impl GaussianCloud {
-    /// The same Gaussians in other axes: `turn` (to_from_these, orthogonal) may mirror. Those that are only counted the
-    /// other way turn the Gaussians' own axes too where `own`, as SPZ's readers do: the same Gaussians, with other signs.
+    /// The same Gaussians in other axes; `turn` (to_from_these, orthogonal) may mirror. With `own`, a `turn` that only
+    /// flips signs flips the Gaussians' local axes too, as SPZ's readers do: the same Gaussians, with other signs.
     pub(crate) fn turned(mut self, turn: &DMat3, own: bool) -> Self {
         if *turn == DMat3::IDENTITY {
             return self;
@@ -97,7 +97,7 @@ impl GaussianCloud {
     }
 
     fn turn_harmonics(&mut self, turn: &DMat3) {
-        // Quadrature leaves 1e-16 where axes change places: without it, values come back as they were.
+        // Quadrature leaves errors of 1e-16 where axes are permuted; rounding makes the values exact.
         let whole = |v: f64| if (v - v.round()).abs() < 1e-9 { v.round() } else { v };
         let matrix = sh::rotation(turn).map(|row| row.map(whole));
         for degree in 1..=usize::from(self.sh_degree) {
@@ -114,8 +114,8 @@ impl GaussianCloud {
         }
     }
 
-    /// The same Gaussians with `-y` upwards, as files have them that cannot say what is: turned around the line to the
-    /// right if a file said otherwise.
+    /// The same Gaussians with `-y` up, for formats that cannot state an up direction: turned about the right axis if
+    /// their file stated another one.
     pub(crate) fn upright(self) -> Self {
         let Some(up) = self.up else { return self };
         let right = DVec3::X.reject_from(up).try_normalize().unwrap_or(DVec3::Y);

@@ -20,8 +20,7 @@ impl Bounds {
         Some(finite.fold(start, |b, p| Self { min: b.min.min(p), max: b.max.max(p) }))
     }
 
-    /// The box from the 2nd to the 98th percentile on each axis: what the user would call the
-    /// scene, without its stray points.
+    /// The box from the 2nd to the 98th percentile on each axis: the scene without its stray points.
     pub fn robust(points: impl IntoIterator<Item = DVec3>) -> Option<Self> {
         let points: Vec<DVec3> = points.into_iter().filter(|p| p.is_finite()).collect();
         if points.is_empty() {
@@ -32,7 +31,7 @@ impl Bounds {
         let ends = |axis: usize| {
             let mut v: Vec<f64> = points.iter().map(|p| p[axis]).collect();
             let min = *v.select_nth_unstable_by(lo, f64::total_cmp).1;
-            // What is before it is smaller.
+            // Values before `lo` are smaller already.
             [min, *v[lo..].select_nth_unstable_by(hi - lo, f64::total_cmp).1]
         };
         let (x, (y, z)) = rayon::join(|| ends(0), || rayon::join(|| ends(1), || ends(2)));

@@ -28,7 +28,7 @@ pub struct Camera {
     pub center: DVec3,
 }
 
-/// What is wrong with a camera.
+/// Error of an invalid camera.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum CameraError {
@@ -58,17 +58,16 @@ impl Camera {
     /// Largest side of a picture that any part of the program accepts.
     pub(crate) const MAX_SIDE_PX: u32 = 16_384;
 
-    /// Focal lengths that are believed on reading, in sides of the picture along the same axis: from a
-    /// view that is a tenth of a degree short of half a turn to one of a few seconds of arc.
+    /// Focal lengths accepted on reading, in sides of the picture along the same axis: fields of view from two seconds
+    /// of arc to a quarter of a degree short of 180°.
     pub(crate) const FOCAL_SIDES: RangeInclusive<f64> = 1e-3..=1e5;
-    /// How many picture sides the principal point may be away on reading: pictures are cut out of larger ones.
+    /// Largest distance of the principal point on reading, in picture sides: pictures may be cut out of larger ones.
     pub(crate) const PRINCIPAL_SIDES: f64 = 1e4;
     /// Farthest from the origin that a camera or a point may be on reading, scene units.
     pub(crate) const FARTHEST: f64 = 1e12;
 
-    /// Whether a camera that a file describes can be one: all of [`Self::validate`], and no number
-    /// beyond what lenses and places are. Drawing takes any camera that is valid; what is read is
-    /// refused here, because a training would find out only when it is over.
+    /// Checks a camera read from a file: [`Self::validate`], and no number beyond those of real lenses and places.
+    /// Drawing takes any valid camera; implausible ones are refused on reading, before a training run is spent on them.
     pub(crate) fn believe(&self) -> Result<(), CameraError> {
         self.validate()?;
         let sides = [
@@ -151,15 +150,14 @@ impl Camera {
         2.0 * (0.5 * f64::from(self.height_px) / self.focal_px.y).atan()
     }
 
-    /// Upwards in the world for most of these cameras: against the mean of their down axes. `None` where
-    /// those cancel.
+    /// World up direction of these cameras: the negated mean of their down axes. `None` if they cancel.
     pub(crate) fn up_of<'a>(cameras: impl Iterator<Item = &'a Self>) -> Option<DVec3> {
         let (sum, count) = cameras.fold((DVec3::ZERO, 0), |(sum, n), c| (sum - c.world_from_camera.y_axis, n + 1));
         if sum.length() > 0.1 * f64::from(count) { sum.try_normalize() } else { None }
     }
 
-    /// The point nearest to the axes of these cameras: what they look at. `None` where the axes are
-    /// parallel. Cameras far from all others do not count.
+    /// Point nearest to the viewing axes of these cameras; `None` if the axes are parallel. Cameras far from all others
+    /// are left out.
     pub(crate) fn focus_of<'a>(cameras: impl Iterator<Item = &'a Self>) -> Option<DVec3> {
         let (mut a, mut b, mut n) = (DMat3::ZERO, DVec3::ZERO, 0.0);
         for c in rig::together(cameras) {

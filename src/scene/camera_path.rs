@@ -1,6 +1,6 @@
-//! A camera path: the key cameras that a flight passes, and how long it takes.
+//! A camera path: its key cameras and its duration.
 //!
-//! Pure data. How a camera moves between two keys is not said here.
+//! Pure data: `navigate::camera_spline` interpolates between keys.
 
 use glam::{DMat3, DVec3};
 
@@ -12,7 +12,7 @@ use crate::math::rotation::rotation_error;
 pub struct CameraPath {
     /// The keys; at most [`CameraPath::MAX_KEYS`].
     pub(crate) keys: Vec<PathKey>,
-    /// Whether the flight goes on from the last key to the first.
+    /// True if the path continues from the last key to the first.
     pub(crate) closed: bool,
     pub(crate) fps: f64,
     /// Seconds that the whole flight takes, waits included.
@@ -31,12 +31,12 @@ pub(crate) struct PathKey {
     pub(crate) roll_rad: f64,
     /// Seconds that the camera waits here.
     pub(crate) dwell_secs: f64,
-    /// When the camera arrives, in seconds from the start, where that is fixed.
+    /// Arrival time in seconds from the start, if fixed.
     pub(crate) time_secs: Option<f64>,
     pub(crate) name: Option<String>,
 }
 
-/// What is wrong with a camera path.
+/// Error of an invalid camera path.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum PathError {

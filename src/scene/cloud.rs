@@ -23,17 +23,17 @@ pub struct GaussianCloud<R = f32> {
     pub sh_degree: u8,
     /// RGB coefficients, `[n * (sh_degree + 1)²]`, those of one Gaussian together.
     pub sh: Vec<[R; 3]>,
-    /// How they were trained, and so are to be drawn.
+    /// Mode in which they were trained and are to be drawn.
     pub render_mode: SplatRenderMode,
-    /// Upwards in the world, unit length, where a file says so and it is not `-y` as elsewhere.
+    /// World up direction, unit length, if a file states one that is not `-y`.
     pub up: Option<DVec3>,
     /// Per-Gaussian properties that the program does not interpret but keeps from a file.
     pub extras: Vec<ExtraProperty>,
-    /// Things the user should know of the file that it was read from.
+    /// Warnings about the file that it was read from.
     pub warnings: Vec<String>,
 }
 
-/// How Gaussians are to be drawn: as those were that they were trained as.
+/// Render mode of Gaussians: the one that they were trained with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SplatRenderMode {
     /// As 3D Gaussian Splatting does.
@@ -69,7 +69,7 @@ pub struct Gaussian<'a, R = f32> {
     pub sh: &'a [[R; 3]],
 }
 
-/// What is wrong with a cloud.
+/// Error of an invalid cloud.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum CloudError {
@@ -102,7 +102,7 @@ impl<R: Real> GaussianCloud<R> {
         self.positions.len()
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no Gaussians.
     pub fn is_empty(&self) -> bool {
         self.positions.is_empty()
     }
@@ -149,7 +149,7 @@ impl<R: Real> GaussianCloud<R> {
         }
     }
 
-    /// Checks that all arrays are of as many Gaussians.
+    /// Checks that all arrays hold the same number of Gaussians.
     pub(super) fn lengths(&self) -> Result<(), CloudError> {
         let n = self.len();
         if self.sh_degree > 3 {
@@ -168,7 +168,7 @@ impl<R: Real> GaussianCloud<R> {
         }
     }
 
-    /// What of Gaussian `i` is not finite.
+    /// Name of the first parameter of Gaussian `i` that is not finite.
     pub(super) fn flaw(&self, i: usize) -> Option<&'static str> {
         let Gaussian { position, log_scale, quaternion, opacity_logit, sh } = self.gaussian(i);
         let fields = [

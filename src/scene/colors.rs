@@ -1,4 +1,4 @@
-//! Words for colors, and the colors that are seen of each identity: the mean and the spread of its Gaussians'.
+//! Color words, and the visible colors of each identity: mean and spread over its Gaussians.
 
 use std::sync::Arc;
 
@@ -6,7 +6,7 @@ use super::{GaussianCloud, IdentityId, SemanticMap};
 use crate::math::Real;
 use crate::math::sh::SH_C0;
 
-/// Words for colors, those that mean much the same in one row.
+/// Color words; near synonyms share a row.
 pub(crate) const COLORS: [&[&str]; 12] = [
     &["black"],
     &["blue"],
@@ -22,18 +22,18 @@ pub(crate) const COLORS: [&[&str]; 12] = [
     &["yellow"],
 ];
 
-/// The row of a word for a color.
+/// Row of a color word.
 pub(crate) fn row(word: &str) -> Option<usize> {
     COLORS.iter().position(|all| all.contains(&word))
 }
 
-/// Share of a thing from which it has a color, whatever its mean color is.
+/// Share of an identity from which it has a color, whatever its mean color.
 const MOSTLY: f64 = 0.5;
-/// Share of a thing that has its mean color at least: the mean of red and blue stripes is purple.
+/// Least share of an identity that has its mean color: the mean of red and blue stripes is purple.
 const LEAST: f64 = 0.15;
 
-/// Whether an sRGB color, 0..1, can be called by the words of each row. Neighboring words overlap: what one calls red,
-/// another calls brown.
+/// Returns for each row whether its words fit an sRGB color, 0..1. Neighboring words overlap: one person's red is
+/// another's brown.
 fn can_be_called(rgb: [f64; 3]) -> [bool; COLORS.len()] {
     let [r, g, b] = rgb;
     let (most, least) = (r.max(g).max(b), r.min(g).min(b));
@@ -68,7 +68,7 @@ fn can_be_called(rgb: [f64; 3]) -> [bool; COLORS.len()] {
 /// Colors of one identity, pieces included.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct ColorSums {
-    /// What is seen of its Gaussians: opacity by area.
+    /// Visible amount of its Gaussians: opacity times area.
     weight: f64,
     /// Color by weight, sRGB 0..1.
     color: [f64; 3],
@@ -84,26 +84,26 @@ impl ColorSums {
     }
 }
 
-/// The colors of all identities, by number; none where nobody has looked.
+/// Colors of all identities, by number; empty until computed.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct SeenColors(Arc<[ColorSums]>);
 
 impl PartialEq for SeenColors {
-    /// They follow from the Gaussians.
+    /// Always equal: colors follow from the Gaussians.
     fn eq(&self, _: &Self) -> bool {
         true
     }
 }
 
 impl SeenColors {
-    /// Those of a cloud's identities.
+    /// Colors of the identities of a cloud.
     pub(crate) fn of(cloud: &GaussianCloud, map: &SemanticMap) -> Self {
         let mut sums = vec![ColorSums::default(); map.identities.len() + 1];
         let stride = cloud.sh_stride();
         for (i, id) in map.identity_of.iter().enumerate().take(cloud.len()) {
             let Some((own, sh)) = sums.get_mut(*id as usize).zip(cloud.sh.get(i * stride)) else { continue };
             let [a, b, c] = cloud.log_scales[i].map(|s| f64::from(s).exp());
-            // The two larger extents are what is seen of it.
+            // The two larger extents are the visible ones.
             let weight = f64::from(cloud.opacity_logits[i].sigmoid()) * (a * b).max(b * c).max(a * c);
             let color = sh.map(|v| (0.5 + SH_C0 * f64::from(v)).clamp(0.0, 1.0));
             if weight.is_finite() && color.iter().all(|c| c.is_finite()) {
@@ -122,7 +122,7 @@ impl SeenColors {
         Self(sums.into())
     }
 
-    /// Whether an identity has the color of a row; `None` if nothing is known of it.
+    /// Returns whether an identity has the color of a row; `None` if its colors are unknown.
     pub(crate) fn has(&self, id: IdentityId, row: usize) -> Option<bool> {
         let of = self.0.get(id as usize).filter(|of| of.weight > 0.0)?;
         let share = of.called.get(row)? / of.weight;

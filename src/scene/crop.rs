@@ -4,17 +4,17 @@ use glam::DVec3;
 
 use super::{Bounds, GaussianCloud};
 
-/// What of a cloud is kept: what lies in a box, or everything else.
+/// Part of a cloud that is kept: inside a box, or outside it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CropBox {
     /// The box; its faces belong to it.
     pub bounds: Bounds,
-    /// Whether it is what lies outside that is kept.
+    /// True if the outside is kept.
     pub outside: bool,
 }
 
 impl CropBox {
-    /// Whether what is at this place is kept.
+    /// Returns whether a point is kept.
     pub(crate) fn keeps(&self, p: DVec3) -> bool {
         let inside = p.cmpge(self.bounds.min).all() && p.cmple(self.bounds.max).all();
         inside != self.outside

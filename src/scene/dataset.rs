@@ -13,9 +13,9 @@ pub struct Dataset {
     /// Short name for titles: the folder's.
     pub name: String,
     pub(crate) root: PathBuf,
-    /// What to open to get the same again, where that is not [`Self::root`]: one of several files or reconstructions.
+    /// Path to reopen it by, if that is not [`Self::root`]: one of several files or reconstructions.
     pub(crate) source: Option<PathBuf>,
-    /// Which layout it was read from, for display: "COLMAP binary", "transforms.json", ...
+    /// Layout that it was read from, for display: "COLMAP binary", "transforms.json", ...
     pub format: String,
     /// The photos that exist, sorted by name.
     pub photos: Vec<Photo>,
@@ -23,11 +23,11 @@ pub struct Dataset {
     pub points: Vec<SparsePoint>,
     /// The color behind everything (Blender's renders are composited over it); `None` = unknown.
     pub(crate) background: Option<[f32; 3]>,
-    /// What transparent pixels of its photos are taken for; `None` = there are none.
+    /// Meaning of transparent pixels of its photos; `None` = there are none.
     pub(crate) alpha: Option<AlphaUse>,
-    /// Length of a scene unit in meters, if that is known; photos alone do not tell.
+    /// Length of a scene unit in meters, if known; photos alone do not determine it.
     pub(crate) metres_per_unit: Option<f64>,
-    /// Things the user should know: photos that are listed but missing, and so on.
+    /// Warnings for the user: photos that are listed but missing, and so on.
     pub warnings: Vec<String>,
 }
 
@@ -53,12 +53,12 @@ impl Dataset {
         })
     }
 
-    /// What to open to get the same again.
+    /// Path to reopen it by.
     pub(crate) fn source(&self) -> &Path {
         self.source.as_deref().unwrap_or(&self.root)
     }
 
-    /// How many photos the data set itself marks as test.
+    /// Number of photos that the dataset marks as test.
     pub(crate) fn test_photos(&self) -> usize {
         self.photos.iter().filter(|p| p.test_split).count()
     }
@@ -100,13 +100,13 @@ impl Dataset {
         ))
     }
 
-    /// Upwards in the world: against the mean of the cameras' down axes, or `+z` if they cancel.
+    /// World up direction: the negated mean of the cameras' down axes, or `+z` if they cancel.
     pub(crate) fn up(&self) -> DVec3 {
         Camera::up_of(self.photos.iter().map(|p| &p.camera)).unwrap_or(DVec3::Z)
     }
 
-    /// The point nearest to all viewing axes: what the photos look at. Falls back to the mean of
-    /// the sparse points where the axes are parallel.
+    /// Point nearest to all viewing axes. If the axes are parallel: the center of the sparse points without stray ones,
+    /// or a point in front of the first camera.
     pub(crate) fn focus(&self) -> DVec3 {
         if let Some(focus) = Camera::focus_of(self.photos.iter().map(|p| &p.camera)) {
             return focus;

@@ -1,21 +1,21 @@
-//! How a lens deviates from a pinhole: the models of COLMAP, OpenCV and nerfstudio as one.
+//! Lens distortion relative to a pinhole: the models of COLMAP, OpenCV and nerfstudio as one.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 
-/// Places at which it is looked whether a lens still shows new things.
+/// Samples of the search for the field of a lens.
 const STEPS: u32 = 4096;
-/// Farthest from the axis, at a focal length of 1, that a lens of little field is followed.
+/// Largest distance from the axis, at a focal length of 1, in that search for a perspective lens.
 const FARTHEST: f64 = 32.0;
-/// Angle from the axis beyond which a wide lens is not made a pinhole's, rad: pixels would be stretched more than 8 times.
+/// Angle from the axis, rad, beyond which a wide lens is not made a pinhole's: pixels would be stretched over 8 times.
 const WIDEST: f64 = 70.0 * PI / 180.0;
 /// Newton's steps, and the distance at a focal length of 1 at which they are done.
 const MOST_STEPS: usize = 40;
 const CLOSE: f64 = 1e-12;
 
-/// How far from the axis a ray falls before coefficients bend it, by its angle θ and `r` = tan θ.
+/// Distance of a ray from the axis before the coefficients, by its angle θ and `r` = tan θ.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub enum Projection {
     /// `r`: a pinhole.
@@ -31,8 +31,8 @@ pub enum Projection {
     Unified(f64, f64),
 }
 
-/// How the picture on disk deviates from a pinhole's. With `(a, b)` the point after the [`Projection`], `s` its squared
-/// distance from the axis, `g = (1 + k1 s + k2 s² + ...) / (1 + d1 s + d2 s² + d3 s³)`:
+/// Distortion of the picture on disk relative to a pinhole's. With `(a, b)` the point after the [`Projection`], `s` its
+/// squared distance from the axis, `g = (1 + k1 s + k2 s² + ...) / (1 + d1 s + d2 s² + d3 s³)`:
 /// `x' = a g + 2 p1 a b + p2 (s + 2 a²) + s1 s + s2 s²`, `y' = b g + p1 (s + 2 b²) + 2 p2 a b + s3 s + s4 s²`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
@@ -48,18 +48,18 @@ pub struct Distortion {
     pub(crate) divisor: [f64; 3],
     /// s1 to s4: a thin prism.
     pub(crate) prism: [f64; 4],
-    /// Whether p1, p2 and the prism bend what the radial part has bent.
+    /// True if p1, p2 and the prism apply after the radial part.
     pub(crate) radial_first: bool,
     pub(crate) projection: Projection,
 }
 
 impl Distortion {
-    /// Whether k1, k2, p1 and p2 say all.
+    /// Returns whether k1, k2, p1 and p2 on a pinhole describe it completely.
     pub(crate) fn is_plain(&self) -> bool {
         *self == Self { k1: self.k1, k2: self.k2, p1: self.p1, p2: self.p2, ..Self::default() }
     }
 
-    /// Whether it is no pinhole even without coefficients.
+    /// Returns whether the projection is no pinhole's.
     pub(crate) fn is_wide(&self) -> bool {
         self.projection != Projection::Perspective
     }
@@ -82,7 +82,7 @@ impl Distortion {
         all.filter(|(_, value)| *value != 0.0).collect()
     }
 
-    /// Where the pinhole's point at `q`, at a focal length of 1, lies in the picture on disk; right within
+    /// Point of the picture on disk for the pinhole's point `q`, both at a focal length of 1; valid within
     /// [`reach`](Self::reach).
     pub(crate) fn bend(&self, q: DVec2) -> DVec2 {
         let r2 = q.length_squared();
@@ -96,7 +96,7 @@ impl Distortion {
         self.bend_projected(q * factor)
     }
 
-    /// What the coefficients make of a point after the projection.
+    /// Applies the coefficients to a point after the projection.
     fn bend_projected(&self, p: DVec2) -> DVec2 {
         let radial = p * self.radial(p.length_squared());
         let t = if self.radial_first { radial } else { p };
@@ -114,7 +114,7 @@ impl Distortion {
         above / (1.0 + s * (d1 + s * (d2 + s * d3)))
     }
 
-    /// Distance from the axis of a ray by its angle, before coefficients; not finite where there is none.
+    /// Distance of a ray from the axis by its angle, before the coefficients; not finite if the projection has none.
     fn projected(&self, angle: f64) -> f64 {
         let (sin, cos) = angle.sin_cos();
         let narrow = || if angle < FRAC_PI_2 { angle.tan() } else { f64::NAN };
@@ -157,13 +157,13 @@ impl Distortion {
         if self.is_wide() { grows_until(|angle| self.profile(angle), PI) } else { self.reach().min(1e6).atan() }
     }
 
-    /// What finds the rays of the lens.
+    /// Solver for the rays of the lens.
     pub(crate) fn rays(&self) -> Rays {
         Rays { lens: *self, most_angle: self.most_angle() }
     }
 }
 
-/// Finds which ray a place in the picture on disk shows.
+/// Solver for the ray that a point of the picture on disk shows.
 pub(crate) struct Rays {
     lens: Distortion,
     /// Largest angle from the axis that the lens shows, rad.
@@ -245,7 +245,7 @@ fn grows_until(f: impl Fn(f64) -> f64, most: f64) -> f64 {
         let now = f(at(i));
         // Written so that NaN is no growth.
         if !(now > before) {
-            // The peak of what rises and falls, or the end of where there is anything.
+            // The peak of a function that rises and falls, or the end of its domain.
             let [mut low, mut high] = [at(i.saturating_sub(2)), at(i)];
             for _ in 0..100 {
                 let [a, b] = [(2.0 * low + high) / 3.0, (low + 2.0 * high) / 3.0];

@@ -1,5 +1,5 @@
-//! What was noticed as objects and parts were found: which photos show each, how surely, where photos disagreed, and
-//! how much of each photo stayed unknown. Kept with the semantic map.
+//! Evidence from the search for objects and parts: the photos that show each, the confidence, disagreements of photos,
+//! and the unknown share of each photo. Kept with the semantic map.
 
 use std::collections::BTreeSet;
 
@@ -8,20 +8,20 @@ use serde::{Deserialize, Serialize};
 use super::{Identities, IdentityId, NOBODY, text};
 use crate::math::format::things;
 
-/// Most doubts that are kept: who has more needs other masks, not a longer list.
+/// Most disagreements that are kept: more of them call for other masks, not for a longer list.
 const MOST_DOUBTS: usize = 1_000;
 
-/// Where masks of a photo and what was known of its view disagree about who is who.
+/// Disagreement between the masks of a photo and the identities expected in its view.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(crate) enum Disagreement {
     /// Two masks fit the identity; one of them became an identity of its own.
     Split(IdentityId),
-    /// One mask covers several identities that were thought to be apart.
+    /// One mask covers several identities that were separate before.
     Merge(Vec<IdentityId>),
-    /// A mask is known to be the first, by its name, where the second was thought to be.
+    /// A mask is named as the first identity where the second was expected.
     Switch(IdentityId, IdentityId),
-    /// Masks that were followed and Gaussians that were voted for put the identity in different places.
+    /// Tracked masks and voted Gaussians place the identity differently.
     Drift(IdentityId),
 }
 
@@ -49,7 +49,7 @@ impl Disagreement {
         }
     }
 
-    /// A sentence for each kind among those of some photos: the first of them, and how many more there are.
+    /// One sentence per kind of disagreement: the first case, and the number of others.
     pub(crate) fn told(
         all: &[(usize, Self)],
         photo: impl Fn(usize) -> String,
@@ -76,7 +76,7 @@ impl Disagreement {
         kinds.into_iter().map(sentence).collect()
     }
 
-    /// The same under new numbers; `None` where those that it told apart are one now.
+    /// The same with new identity numbers; `None` if its identities are gone or merged into one.
     fn renumbered(&self, number: &[IdentityId]) -> Option<Self> {
         let new = |id: &IdentityId| number.get(*id as usize).copied().filter(|id| *id != NOBODY);
         Some(match self {
@@ -104,16 +104,16 @@ pub(crate) struct Doubt {
     pub(crate) what: Disagreement,
 }
 
-/// A photo that was looked at.
+/// A photo that was searched for objects.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct PhotoFinding {
     #[serde(deserialize_with = "text::read_name")]
     pub(crate) name: String,
-    /// Share of its pixels of which nothing is known.
+    /// Share of its pixels with an unknown label.
     pub(crate) unknown: f64,
 }
 
-/// Where an identity is seen, its pieces apart.
+/// Views of an identity, its parts not included.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Seen {
     /// One bit for each of [`Findings::photos`], 32 to a number, the lowest first.
@@ -125,7 +125,7 @@ pub(crate) struct Seen {
 }
 
 impl Seen {
-    /// Takes in that it has so many pixels in a photo.
+    /// Adds its pixels in a photo.
     pub(crate) fn add(&mut self, photo: usize, pixels: u64, confidence: f64) {
         let mut bits = vec![0; photo / 32 + 1];
         bits[photo / 32] = 1 << (photo % 32);
@@ -143,17 +143,17 @@ impl Seen {
     }
 }
 
-/// What was noticed as objects and parts were found.
+/// Evidence from the search for objects and parts.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Findings {
-    /// The photos that were looked at.
+    /// The photos that were searched.
     pub(crate) photos: Vec<PhotoFinding>,
-    /// Where each identity is seen, by number less one.
+    /// Views of each identity, by number less one.
     seen: Vec<Seen>,
     doubts: Vec<Doubt>,
 }
 
-/// What is told of an identity, its pieces included.
+/// Evidence for an identity, its parts included.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct IdentityEvidence {
     pub(crate) gaussians: usize,
@@ -180,13 +180,13 @@ impl Findings {
         self.photos.get(doubt.photo as usize).map_or("", |p| &p.name)
     }
 
-    /// Mean share of a photo of which nothing is known; `None` without photos.
+    /// Mean share of unknown pixels of a photo; `None` without photos.
     pub(crate) fn unknown(&self) -> Option<f64> {
         let sum: f64 = self.photos.iter().map(|p| p.unknown).sum();
         (!self.photos.is_empty()).then(|| sum / self.photos.len() as f64)
     }
 
-    /// Whether it speaks of nothing that is not there.
+    /// Returns whether its photos and identities exist and its shares lie between 0 and 1.
     pub(crate) fn is_valid(&self, identities: &Identities) -> bool {
         let share = |v: f64| (0.0..=1.0).contains(&v);
         let is_there = |id: &IdentityId| identities.get(*id).is_some();
@@ -197,7 +197,7 @@ impl Findings {
             && self.doubts.iter().all(|d| (d.photo as usize) < self.photos.len() && d.what.about().iter().all(is_there))
     }
 
-    /// Doubts of earlier findings about the same identities come before its own, as far as their photos are known.
+    /// Prepends the disagreements of earlier findings on the same identities, as far as their photos are known.
     pub(crate) fn keep_doubts(&mut self, before: &Self) {
         let place = |d: &Doubt| self.photos.iter().position(|p| p.name == before.photo(d));
         let kept = before.doubts.iter().filter_map(|d| Some(Doubt { photo: place(d)? as u32, what: d.what.clone() }));
@@ -207,19 +207,20 @@ impl Findings {
         self.doubts = doubts;
     }
 
-    /// One more identity, of which nothing was noticed.
+    /// Adds an identity without evidence.
     pub(crate) fn add_identity(&mut self) {
         self.seen.push(Seen::default());
     }
 
-    /// Where an identity is seen does not hold any more.
+    /// Clears the views of an identity, which no longer hold.
     pub(crate) fn forget_seen(&mut self, id: IdentityId) {
         if let Some(seen) = (id as usize).checked_sub(1).and_then(|i| self.seen.get_mut(i)) {
             *seen = Seen::default();
         }
     }
 
-    /// Identities have new numbers, by the old ones from 0, and some are one now; `len` are left.
+    /// Renumbers identities and merges those with one new number. `number` is indexed by the old numbers; `len` are
+    /// left.
     pub(crate) fn renumber(&mut self, number: &[IdentityId], len: usize) {
         let mut seen = vec![Seen::default(); len];
         for (old, new) in self.seen.iter().zip(number.iter().skip(1)) {
@@ -233,7 +234,7 @@ impl Findings {
         self.doubts = doubts.filter_map(renumbered).collect();
     }
 
-    /// What is told of every identity, by number; nobody first. `sizes` are their Gaussians.
+    /// Evidence for every identity, by number, unlabeled Gaussians first. `sizes` are their numbers of Gaussians.
     pub(crate) fn facts(findings: Option<&Self>, identities: &Identities, sizes: &[usize]) -> Vec<IdentityEvidence> {
         let of = |gaussians: &usize| IdentityEvidence { gaussians: *gaussians, ..IdentityEvidence::default() };
         let mut facts: Vec<IdentityEvidence> = sizes.iter().map(of).collect();
@@ -250,7 +251,7 @@ impl Findings {
             for id in doubt.what.about() {
                 for at in identities.ancestors(id) {
                     let doubts = &mut facts[at as usize].doubts;
-                    // Of several of its pieces it is still one doubt.
+                    // A disagreement on several of its parts counts once.
                     if doubts.last() != Some(&k) {
                         doubts.push(k);
                     }

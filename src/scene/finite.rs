@@ -1,4 +1,4 @@
-//! Gaussians of files with numbers that are not finite: left out, counted and told.
+//! Removal of Gaussians with numbers that are not finite, reported as a warning.
 
 use rayon::prelude::*;
 
@@ -35,7 +35,7 @@ impl GaussianCloud {
     }
 }
 
-/// Whether all numbers are. Without a way out early, so that it is fast where they are.
+/// Returns whether all numbers are finite. Without an early exit in a chunk, so that it is fast if they are.
 fn all_finite<const N: usize>(values: &[[f32; N]]) -> bool {
     let finite = |part: &[[f32; N]]| part.as_flattened().iter().fold(true, |all, x| all & x.is_finite());
     values.par_chunks(1 << 12).all(finite)

@@ -1,4 +1,4 @@
-//! What a training run has measured so far; kept with the trained scene.
+//! Measurements of a training run, kept with the trained scene.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ pub struct StepMetrics {
     pub step: u64,
     /// Seconds of training so far.
     pub secs: f64,
-    /// L1 + 0.2 D-SSIM, mean over the steps since the last report.
+    /// Loss `0.8 L1 + 0.2 (1 - SSIM)`, mean over the steps since the last report.
     #[serde(with = "or_null")]
     pub loss: f64,
     /// PSNR in dB of the training photos of those steps, mean.

@@ -1,4 +1,4 @@
-//! The first view of a scene, the same for the window, the command line and whatever else draws it.
+//! Initial view of a scene, the same for the window, the command line and every other output.
 
 use glam::{DMat3, DVec3};
 
@@ -7,17 +7,17 @@ use crate::math::stats::median;
 
 /// Vertical field of view of a scene that is framed as a whole, in radians.
 const FOV_Y_RAD: f64 = 0.85;
-/// How far over the horizon such a view is taken from: the tangent of the angle.
+/// Tangent of the elevation angle of such a view.
 const ABOVE: f64 = 0.45;
-/// Room around what is framed.
+/// Factor on the distance for room around the scene.
 const MARGIN: f64 = 1.15;
 
-/// How to look at a scene at first.
+/// Initial view of a scene.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HomeView {
     /// The part of the world that the scene fills.
     pub bounds: Bounds,
-    /// Upwards in the world, unit length.
+    /// World up direction, unit length.
     pub up: DVec3,
     /// A camera to start from, where the scene has one.
     pub(crate) camera: Option<Camera>,
@@ -33,11 +33,11 @@ impl Default for HomeView {
 }
 
 impl HomeView {
-    /// Of a scene with photos from these cameras and these Gaussians. Photos say where it is: around the
-    /// point that they look at, seen as the first shows it. A bare splat is framed as a whole, with `-y`
-    /// upwards as in the files that 3DGS writes, or what its file says.
+    /// Initial view of a scene with these cameras and Gaussians. With cameras: around the point that they look at, seen
+    /// from the first one. A bare splat is framed as a whole, with `-y` up as in the files that 3DGS writes, or as its
+    /// file states.
     pub(crate) fn new(cameras: &[Camera], cloud: Option<&GaussianCloud>) -> Self {
-        // Of millions, some say as well where they are, and sooner.
+        // A sample of millions gives the same bounds sooner.
         let whole = || {
             let some = |c: &GaussianCloud| c.len().div_ceil(FRAMED).max(1);
             cloud.and_then(|c| Bounds::robust((0..c.len()).step_by(some(c)).map(|i| c.world_position(i))))
@@ -64,7 +64,7 @@ impl HomeView {
         self.camera.clone().unwrap_or_else(|| Self::overview(&self.bounds, self.up, size_px))
     }
 
-    /// So many cameras that show all of its bounds from all sides, the first as [`Self::overview`] does.
+    /// `count` cameras that show all of its bounds from all sides, the first as [`Self::overview`] does.
     pub(crate) fn around(&self, size_px: [u32; 2], count: usize) -> Vec<Camera> {
         let (first, middle) = (Self::overview(&self.bounds, self.up, size_px), self.bounds.center());
         let turned = |k: usize| {
@@ -90,7 +90,7 @@ impl HomeView {
             .unwrap_or_else(|| Camera::of_pose(eye, DMat3::IDENTITY, FOV_Y_RAD, width_px, height_px))
     }
 
-    /// How far from their middle `bounds` fill the picture of a camera with this vertical field of view.
+    /// Distance from their middle at which `bounds` fill the picture of a camera with this vertical field of view.
     pub(crate) fn distance(bounds: &Bounds, fov_y_rad: f64) -> f64 {
         MARGIN * bounds.radius().max(1e-6) / (0.5 * fov_y_rad).sin()
     }

@@ -1,4 +1,4 @@
-//! What a scene consists of: objects, their parts, and which Gaussian is whose.
+//! Identities of a scene: objects and their parts.
 
 pub(crate) mod whole_names;
 
@@ -18,11 +18,11 @@ use crate::math::format::things;
 pub enum Level {
     /// A thing.
     Object,
-    /// A piece of a thing.
+    /// A piece of an object.
     Part,
 }
 
-/// Which level is asked for.
+/// Level of the identities asked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "snake_case")]
 pub enum LevelFilter {
@@ -37,7 +37,7 @@ pub enum LevelFilter {
 }
 
 impl LevelFilter {
-    /// Whether an identity of `level` is asked for.
+    /// Returns whether identities of `level` are asked for.
     pub(crate) fn accepts(self, level: Level) -> bool {
         match self {
             Self::Auto => true,
@@ -47,10 +47,10 @@ impl LevelFilter {
     }
 }
 
-/// Number of an identity: its place in the list plus one; 0 is nobody.
+/// Number of an identity: its place in the list plus one; 0 is [`NOBODY`].
 pub type IdentityId = u32;
 
-/// Nobody: a pixel or Gaussian that no identity claims.
+/// No identity: the number of unlabeled pixels and Gaussians.
 pub const NOBODY: IdentityId = 0;
 
 /// One object or part, the same in every view.
@@ -58,45 +58,45 @@ pub const NOBODY: IdentityId = 0;
 pub struct Identity {
     /// Object or part.
     pub level: Level,
-    /// What it is a piece of; `NOBODY` for objects.
+    /// Identity that it is a part of; `NOBODY` for objects.
     pub parent: IdentityId,
-    /// What people or a label file call it, bounded by [`text::name`]; the first is shown.
+    /// Names from the user or a label file, bounded by [`text::name`]; the first is shown.
     #[serde(deserialize_with = "text::read_names")]
     pub names: Vec<String>,
     /// Its point in code space, each coordinate in 0..1.
     pub code: [f32; 3],
-    /// Whether somebody named, selected, merged, split or corrected it, or had it added: finding objects anew keeps it.
+    /// True if the user named, selected, merged, split, corrected or added it: a new search for objects keeps it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub by_hand: bool,
 }
 
-/// All identities of a scene. Parents come before their pieces.
+/// All identities of a scene. Parents come before their parts.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Identities {
     list: Vec<Identity>,
-    /// Names of what was taken out of the scene for good.
+    /// Names of what was removed from the scene for good.
     #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "text::read_names")]
     pub(crate) removed: Vec<String>,
-    /// What color each is, where somebody has looked at its Gaussians.
+    /// Color of each, once computed from its Gaussians.
     #[serde(skip)]
     pub(crate) colors: SeenColors,
     #[serde(skip)]
     whole_names: Known,
 }
 
-/// Names, found out when they are first asked for.
+/// Names, computed at first use.
 #[derive(Clone, Debug, Default)]
 struct Known(OnceLock<Arc<WholeNames>>);
 
 impl PartialEq for Known {
-    /// They follow from the list.
+    /// Always equal: names follow from the list.
     fn eq(&self, _: &Self) -> bool {
         true
     }
 }
 
 impl Identities {
-    /// So many nameless objects.
+    /// `count` unnamed objects.
     pub fn objects(count: usize) -> Self {
         let mut all = Self::default();
         for _ in 0..count {
@@ -105,7 +105,7 @@ impl Identities {
         all
     }
 
-    /// Adds an identity. A parent that does not exist yet is nobody.
+    /// Adds an identity. A parent that does not exist yet becomes [`NOBODY`].
     pub fn add(&mut self, level: Level, parent: IdentityId, names: Vec<String>) -> IdentityId {
         let parent = if self.get(parent).is_some() { parent } else { NOBODY };
         let names = names.iter().map(|name| text::name(name)).collect();
@@ -114,23 +114,23 @@ impl Identities {
         self.list.len() as IdentityId
     }
 
-    /// Whether any of them has a name.
+    /// Returns whether any of them has a name.
     pub(crate) fn have_names(&self) -> bool {
         self.list.iter().any(|i| i.names.iter().any(|name| !key(name).is_empty()))
     }
 
-    /// How many there are.
+    /// Number of identities.
     pub fn len(&self) -> usize {
         self.list.len()
     }
 
-    /// How many of each level there are: "3 objects and 1 part".
+    /// Numbers of each level in words: "3 objects and 1 part".
     pub(crate) fn counted(&self) -> String {
         let count = |level: Level, what: &str| things(self.list.iter().filter(|i| i.level == level).count(), what);
         format!("{} and {}", count(Level::Object, "object"), count(Level::Part, "part"))
     }
 
-    /// Whether there are none.
+    /// Returns whether there are no identities.
     pub fn is_empty(&self) -> bool {
         self.list.is_empty()
     }
@@ -160,13 +160,13 @@ impl Identities {
         }
     }
 
-    /// Notes names of what was taken out for good, once each.
+    /// Records names of removed identities, once each.
     pub(crate) fn add_removed(&mut self, names: impl IntoIterator<Item = String>) {
         let new: Vec<String> = names.into_iter().filter(|name| !self.removed.contains(name)).collect();
         self.removed.extend(new);
     }
 
-    /// Marks an identity as one that somebody has worked on.
+    /// Marks an identity as edited by the user.
     pub(crate) fn mark_by_hand(&mut self, id: IdentityId) {
         self.get_mut(id).into_iter().for_each(|identity| identity.by_hand = true);
     }
@@ -189,7 +189,7 @@ impl Identities {
         full.unwrap_or_default()
     }
 
-    /// Who of these levels is called by a text as a whole: by a name, a label, or a full name.
+    /// Identities of these levels that a text as a whole names: by a name, a label, or a full name.
     pub fn called(&self, text: &str, level: LevelFilter) -> Vec<IdentityId> {
         self.whole_names().called(text, self, level)
     }
@@ -198,10 +198,10 @@ impl Identities {
         self.whole_names.0.get_or_init(|| Arc::new(WholeNames::new(self)))
     }
 
-    /// An identity and what it is a piece of, inside out: itself first, its object last.
+    /// An identity and its parents, inside out: itself first, its object last.
     pub fn ancestors(&self, id: IdentityId) -> impl Iterator<Item = IdentityId> + '_ {
         let known = |id: IdentityId| self.get(id).map(|_| id);
-        // Parents come before their pieces, so numbers fall and the walk ends.
+        // Parents come before their parts, so numbers fall and the walk ends.
         std::iter::successors(known(id), move |&at| self.get(at).and_then(|i| known(i.parent)).filter(|p| *p < at))
     }
 
@@ -218,8 +218,7 @@ impl Identities {
         inside
     }
 
-    /// The codes of an identity's object and of itself as a part. An object that is no part, and
-    /// nobody, have the background's code in their place.
+    /// Codes of an identity's object and of itself as a part. A missing object or part has the background's code.
     pub(crate) fn codes(&self, id: IdentityId) -> [f32; CODE_CHANNELS] {
         let code = |id: IdentityId, level: Level| {
             self.get(id).filter(|i| i.level == level).map_or(BACKGROUND_CODE, |i| i.code)

@@ -1,4 +1,4 @@
-//! Language features of a scene's identities: what an encoder makes of their pictures.
+//! Language features of a scene's identities: embeddings of their pictures.
 
 use super::Identities;
 
@@ -27,7 +27,7 @@ pub struct ViewFeatures {
 }
 
 impl LanguageFeatures {
-    /// Whether the numbers fit together, and fit these identities.
+    /// Returns whether the lengths fit together and fit these identities, and all numbers are finite.
     pub fn is_valid(&self, identities: &Identities) -> bool {
         let good = |v: &Vec<f32>| v.len() == self.dimension && v.iter().all(|x| x.is_finite());
         self.by_identity.len() == identities.len()

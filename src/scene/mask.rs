@@ -95,7 +95,7 @@ impl Mask {
         self.words.iter().map(|w| w.count_ones() as usize).sum()
     }
 
-    /// Whether it has no pixel.
+    /// Returns whether it has no pixels.
     pub fn is_empty(&self) -> bool {
         self.words.iter().all(|w| *w == 0)
     }

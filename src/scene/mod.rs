@@ -1,4 +1,4 @@
-//! What a scene is made of. Pure data: nothing here reads or writes files.
+//! Data of a scene: nothing here reads or writes files.
 
 pub(crate) mod alpha;
 pub(crate) mod appearance;

@@ -1,4 +1,4 @@
-//! Photos: where they are, and their pixels once loaded.
+//! Photos: their paths and cameras, and their pixels once loaded.
 
 use std::borrow::Cow;
 use std::path::PathBuf;
@@ -10,22 +10,22 @@ use super::{Camera, Distortion, text};
 pub struct Photo {
     /// File name as the dataset writes it, for example `images/0001.jpg`.
     pub name: String,
-    /// Where the file is.
+    /// Path of the file; empty if only the camera is known.
     pub path: PathBuf,
     /// The pinhole camera of the undistorted photo at full resolution.
     pub camera: Camera,
-    /// How the file on disk deviates from that pinhole; `None` for none.
+    /// Distortion of the file on disk relative to that pinhole; `None` for none.
     pub distortion: Option<Distortion>,
-    /// Whether the dataset itself says that this photo is for testing (Blender's `test` split).
+    /// True if the dataset marks the photo as test (Blender's `test` split).
     pub test_split: bool,
     /// Color that the file's transparent pixels are composited over; `None` = they count for
     /// nothing (coverage 0).
     pub background: Option<[f32; 3]>,
-    /// Whether nothing is where the file is transparent, which training then asks for; see [`AlphaUse`].
+    /// True if training keeps the scene empty where the file is transparent; see [`AlphaUse`].
     ///
     /// [`AlphaUse`]: super::AlphaUse
     pub(crate) cut_out: bool,
-    /// A picture of which pixels count: those that are not black.
+    /// Picture of the pixels that count: those that are not black.
     pub(crate) mask: Option<PathBuf>,
 }
 
@@ -36,7 +36,7 @@ impl Photo {
         Self { name, path, camera, distortion: None, test_split: false, background: None, cut_out: false, mask: None }
     }
 
-    /// Whether it can be had: of some photos on other computers only the cameras are known.
+    /// Returns whether it has a file: of some photos on other computers only the cameras are known.
     pub(crate) fn has_pixels(&self) -> bool {
         !self.path.as_os_str().is_empty()
     }

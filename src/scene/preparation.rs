@@ -1,8 +1,8 @@
-//! What was chosen when the objects and parts of a scene were found: queries cannot change it afterwards.
+//! Choices made when the objects and parts of a scene were found; queries cannot change them.
 
 use serde::{Deserialize, Serialize};
 
-/// How Gaussians get their codes.
+/// Source of the codes of Gaussians.
 #[derive(
     Clone,
     Copy,
@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 )]
 #[strum(serialize_all = "kebab-case")]
 pub enum Lifting {
-    /// Those of the identities they voted for
+    /// Codes of the identities they voted for
     #[default]
     Votes,
     /// The same, refined by training
@@ -27,7 +27,7 @@ pub enum Lifting {
     Paper,
 }
 
-/// What of a mask SAM 2 is given to follow.
+/// Prompt with which SAM 2 tracks a mask.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum, strum::Display)]
 #[serde(rename_all = "lowercase")]
 #[strum(serialize_all = "kebab-case")]
@@ -39,7 +39,7 @@ pub enum MaskPrompt {
     Points,
 }
 
-/// Which points of its grid a network is asked at for the masks of everything in a picture.
+/// Grid points at which a network is prompted for all masks of a picture.
 #[derive(
     Clone,
     Copy,
@@ -80,13 +80,13 @@ pub const PART_WEIGHT: f32 = 0.7;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Preparation {
-    /// How Gaussians got their codes.
+    /// Source of the codes.
     pub lifting: Lifting,
     /// Share of its own embedding that a part kept in semantic deviation.
     pub part_weight: f32,
-    /// What of each mask SAM 2 followed; `None` if the Gaussians alone carried masks on.
+    /// Prompt with which SAM 2 tracked masks; `None` if the Gaussians alone carried masks on.
     pub prompt: Option<MaskPrompt>,
-    /// Where a network was asked for masks; `None` if none was.
+    /// Grid points at which a network was prompted; `None` if none was.
     pub grid: Option<MaskGrid>,
 }
 

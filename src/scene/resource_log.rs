@@ -1,13 +1,13 @@
-//! What this process has loaded or built, when and why.
+//! Log of the resources that this process has loaded or built, with times and reasons.
 //!
-//! Only the rare and the large is logged: networks, graphs, maps; nothing that happens every frame.
+//! Only rare and large resources are logged: networks, graphs, maps; nothing that happens every frame.
 
 use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 
 use crate::math::format::bytes;
 
-/// What sort of thing was loaded or built.
+/// Kind of a resource.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[allow(missing_docs, reason = "each name says what it is")]
 pub enum ResourceKind {
@@ -24,12 +24,12 @@ pub enum ResourceKind {
     Picture,
 }
 
-/// Something that was loaded or built.
+/// A resource that was loaded or built.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ResourceEntry {
     /// Seconds since the log began.
     pub(crate) at_secs: f64,
-    /// What sort of thing.
+    /// Its kind.
     pub kind: ResourceKind,
     /// Its name, with how it was made.
     pub(crate) what: String,
@@ -84,13 +84,13 @@ pub(crate) fn record(kind: ResourceKind, what: impl Into<String>, why: &'static 
     log.entries.push(entry);
 }
 
-/// Begins the clock, and has `listener` called with everything that is logged.
+/// Starts the clock, and calls `listener` with every entry from now on.
 pub(crate) fn listen(listener: Listener) {
     START.get_or_init(Instant::now);
     lock().listener = Some(listener);
 }
 
-/// What was logged, the first `from` left out.
+/// Entries of the log without the first `from`.
 pub fn since(from: usize) -> Vec<ResourceEntry> {
     lock().entries.get(from..).map_or_else(Vec::new, <[ResourceEntry]>::to_vec)
 }

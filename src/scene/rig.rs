@@ -1,20 +1,20 @@
-//! Cameras that were held together, and those far away from them, as wrong poses are.
+//! Outliers among camera centers, as wrong poses are.
 
 use glam::DVec3;
 
 use super::Camera;
 use crate::math::stats::median;
 
-/// A camera is far if it is so many times as far from the middle as most are.
+/// Multiple of the median distance from the middle beyond which a camera is far.
 const FAR: f64 = 5.0;
-/// Of so many cameras one may be far; where more are, they were meant to be.
+/// One in so many cameras may be an outlier; if more are far, they were meant to be.
 const FEW: usize = 10;
-/// Fewest cameras of which one can be told to be the far one.
+/// Fewest cameras among which outliers are looked for.
 const LEAST: usize = 5;
 /// Distance of the near plane, as a share of the extent of the cameras.
 const NEAR: f64 = 0.003;
 
-/// Which of these camera centers are far from all others.
+/// Flags of the camera centers that are far from all others.
 pub(super) fn strays(centers: &[DVec3]) -> Vec<bool> {
     let none = vec![false; centers.len()];
     if centers.len() < LEAST {

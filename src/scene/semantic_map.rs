@@ -9,7 +9,7 @@ use super::{ExtraProperty, Findings, GaussianCloud, Identities, IdentityId, Lang
 /// Channels of a Gaussian's codes: those of its object, then those of its part.
 pub(crate) const CODE_CHANNELS: usize = 6;
 
-/// The code of what is nobody's: the middle of code space.
+/// Code of unlabeled Gaussians: the middle of code space.
 pub(crate) const BACKGROUND_CODE: [f32; 3] = [0.5; 3];
 
 /// Per-Gaussian properties that carry the map in a `.ply`: identity, margin of its votes, codes.
@@ -24,26 +24,26 @@ const CODES: [&str; CODE_CHANNELS] = [
     "fmlgs_part_code_2",
 ];
 
-/// What a scene consists of.
+/// Identities of a scene, and the label of each Gaussian.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SemanticMap {
     /// Objects and parts.
     pub identities: Identities,
     /// The innermost identity of each Gaussian; `NOBODY` for none.
     pub identity_of: Vec<IdentityId>,
-    /// How clearly each Gaussian belongs there, 0 (a guess) to 1. Nobody's with 0 is unknown: see [`Self::is_unknown`].
+    /// Margin of each Gaussian's label, 0 (a guess) to 1. An unlabeled one with 0 is unknown: see [`Self::is_unknown`].
     pub margin: Vec<f32>,
     /// Codes of each Gaussian, of its object and its part: those of its identity, or trained ones.
     pub codes: Vec<[f32; CODE_CHANNELS]>,
-    /// What an encoder makes of the identities, if one has looked.
+    /// Language features of the identities, once computed.
     pub language: Option<LanguageFeatures>,
     /// Names of the photos whose masks it comes from.
     pub seeds: Vec<String>,
-    /// How it was prepared, if that is known.
+    /// Choices of its preparation, if known.
     pub prepared: Option<Preparation>,
-    /// What was noticed as it was found, if that is known.
+    /// Evidence from the search for objects and parts, if known.
     pub findings: Option<Findings>,
-    /// The Gaussians that were taken out of the scene for good, as they were: photos still show them.
+    /// Gaussians that were removed from the scene for good, as they were: photos still show them.
     pub removed: Option<Arc<GaussianCloud>>,
 }
 
@@ -97,19 +97,19 @@ impl SemanticMap {
         Some(map)
     }
 
-    /// Looks at the colors of the Gaussians `cloud`, for questions that name one.
+    /// Computes the colors of the identities in `cloud`, for queries that name one.
     pub(crate) fn see_colors(&mut self, cloud: &GaussianCloud) {
         self.identities.colors = SeenColors::of(cloud, self);
     }
 
-    /// Notes Gaussians that are taken out of the scene for good, beside those that were before.
+    /// Records Gaussians that are removed from the scene for good, beside earlier ones.
     pub(crate) fn add_removed(&mut self, gone: GaussianCloud) {
         let bare = GaussianCloud { extras: Vec::new(), ..gone };
         let before = self.removed.take().map(Arc::unwrap_or_clone);
         self.removed = Some(Arc::new(GaussianCloud::joined(before.into_iter().chain([bare]).collect())));
     }
 
-    /// Indices of the Gaussians of an identity and its pieces, rising.
+    /// Indices of the Gaussians of an identity and its parts, rising.
     pub(crate) fn members(&self, id: IdentityId) -> Vec<usize> {
         let inside = self.identities.descendants(id);
         let is_in = |i: &usize| inside.get(self.identity_of[*i] as usize) == Some(&true);
@@ -132,7 +132,7 @@ impl SemanticMap {
         }
     }
 
-    /// The same with all that is known of its identities.
+    /// As [`Self::select`], with language features, findings and removed Gaussians.
     pub(crate) fn select_fully(&self, gaussians: &[usize]) -> Self {
         Self {
             language: self.language.clone(),
@@ -142,25 +142,25 @@ impl SemanticMap {
         }
     }
 
-    /// What somebody named, selected, merged, split or corrected, or had added, by rising number. Versions that did not
-    /// note it left a second name where one was given, and no photo where all was selected by clicks.
+    /// Identities that the user edited, by rising number. In files of versions without the mark they are those with a
+    /// second name, or all if no photo was a seed, as all were selected by clicks.
     pub(crate) fn by_hand(&self) -> Vec<IdentityId> {
         let by_clicks = self.seeds.is_empty();
         let is = |i: &super::Identity| i.by_hand || by_clicks || i.names.len() > 1;
         self.identities.iter().filter(|(_, i)| is(i)).map(|(id, _)| id).collect()
     }
 
-    /// Whether nothing is known of a Gaussian: no mask and no photo says whose it is, nor that it is nobody's.
+    /// Returns whether the label of a Gaussian is unknown: no mask and no photo assigns it to an identity or to none.
     pub(crate) fn is_unknown(&self, i: usize) -> bool {
         self.identity_of.get(i) == Some(&NOBODY) && self.margin.get(i) == Some(&0.0)
     }
 
-    /// What is told of every identity, by number; nobody first.
+    /// Evidence for every identity, by number; unlabeled Gaussians first.
     pub(crate) fn facts(&self) -> Vec<IdentityEvidence> {
         Findings::facts(self.findings.as_ref(), &self.identities, &self.sizes())
     }
 
-    /// Bytes of what is stored by Gaussian and by identity.
+    /// Bytes of the values per Gaussian and per identity.
     pub(crate) fn bytes(&self) -> u64 {
         let each = size_of::<IdentityId>() + size_of::<f32>() * (1 + CODE_CHANNELS);
         let numbers = |l: &LanguageFeatures| {
@@ -173,7 +173,7 @@ impl SemanticMap {
         self.identities.iter().any(|(_, i)| i.level == super::Level::Part)
     }
 
-    /// Number of Gaussians of each identity, pieces included, by number; those of nobody first.
+    /// Number of Gaussians of each identity, parts included, by number; unlabeled ones first.
     pub(crate) fn sizes(&self) -> Vec<usize> {
         let mut sizes = vec![0; self.identities.len() + 1];
         for &id in &self.identity_of {

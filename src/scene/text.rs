@@ -5,16 +5,15 @@ use std::borrow::Cow;
 
 use serde::{Deserialize, Deserializer};
 
-/// Longest name of an identity or a scene, in letters; what is longer is cut, with an ellipsis. A label
-/// is shown in lists and typed in questions, and one absurd label is no reason to refuse an afternoon's
-/// work.
+/// Longest name of an identity or a scene, in characters; longer ones are cut, with an ellipsis: one absurd label is no
+/// reason to refuse a file.
 pub(crate) const LONGEST_NAME: usize = 256;
 
-/// Longest name of a photo, in letters; what is longer is refused. It is a path that files and labels are
-/// matched by, so it cannot be cut.
+/// Longest name of a photo, in characters; longer ones are refused. It is a path that files and labels are matched by,
+/// so it cannot be cut.
 pub(crate) const LONGEST_PHOTO_NAME: usize = 1024;
 
-/// What a character of foreign text is replaced by; `None` if it stays.
+/// Replacement of a character of foreign text; `None` if it stays.
 fn instead(c: char, one_line: bool) -> Option<&'static str> {
     match c {
         '\n' | '\t' if !one_line => None,
@@ -94,7 +93,7 @@ pub(crate) fn path(path: &std::path::Path) -> String {
 
 /// The name of an identity or a scene as it is kept: one line of at most [`LONGEST_NAME`] letters.
 pub(crate) fn name(text: &str) -> String {
-    // The rest of an endless name need not be looked at.
+    // The rest of an endless name is not read.
     let start = shortened(text, 2 * LONGEST_NAME);
     shortened(line(&start).trim(), LONGEST_NAME).into_owned()
 }

@@ -17,7 +17,7 @@ impl<T> Default for UndoHistory<T> {
 }
 
 impl<T> UndoHistory<T> {
-    /// Takes in how it was before a change. What could be redone is gone.
+    /// Records the state before a change. Clears the states to redo.
     pub(crate) fn record(&mut self, before: T) {
         self.future.clear();
         self.past.push(before);
@@ -26,7 +26,7 @@ impl<T> UndoHistory<T> {
         }
     }
 
-    /// Keeps past states, the newest first, as long as `keep` says so.
+    /// Keeps the newest past states as long as `keep` holds for them.
     pub(crate) fn keep_newest_while(&mut self, keep: impl FnMut(&T) -> bool) {
         let mut keep = keep;
         let kept = self.past.iter().rev().take_while(|state| keep(state)).count();
@@ -41,17 +41,17 @@ impl<T> UndoHistory<T> {
         self.future.last()
     }
 
-    /// Exchanges `now` for the state before it. Whether there is one.
+    /// Exchanges `now` for the state before it. Returns whether there is one.
     pub(crate) fn undo(&mut self, now: &mut T) -> bool {
         Self::step(&mut self.past, &mut self.future, now)
     }
 
-    /// Exchanges `now` for the state that was undone last. Whether there is one.
+    /// Exchanges `now` for the state that was undone last. Returns whether there is one.
     pub(crate) fn redo(&mut self, now: &mut T) -> bool {
         Self::step(&mut self.future, &mut self.past, now)
     }
 
-    /// Takes the state before out: what is undone cannot be redone.
+    /// Removes and returns the state before; it cannot be redone.
     pub(crate) fn take(&mut self) -> Option<T> {
         self.past.pop()
     }

@@ -61,7 +61,7 @@ impl Lanes<f32> for V3 {
     }
     #[inline(always)]
     fn sums(self, v: [f32x8; LANES]) -> f32x8 {
-        // Neighbors are added three times over; what is left are two halves.
+        // Neighbors are added twice; two halves are left.
         let pairs = |a: f32x8, b: f32x8| -> f32x8 {
             bytemuck::cast(self.avx._mm256_hadd_ps(bytemuck::cast(a), bytemuck::cast(b)))
         };

@@ -2,10 +2,10 @@
 //! `shaders/adam.wgsl` has the same rule.
 //!
 //! Plain Adam remembers the square of a gradient for some 1,000 steps per power of e: one that is 1e15
-//! times too large would hold its parameter still for 70,000. Here no gradient counts for more than what
-//! doubles its parameter's second moment, so the parameter keeps at least 0.7 of its speed. What grows
-//! for good is caught up with, because doubling is fast. A parameter without a second moment, new or
-//! just reset, has nothing to compare with: its first gradient counts as it is.
+//! times too large would hold its parameter still for 70,000. Here no gradient counts for more than the one that
+//! doubles its parameter's second moment, so the parameter keeps at least 0.7 of its speed. Lasting growth is followed,
+//! because doubling is fast. A parameter without a second moment, new or just reset, has nothing to compare with: its
+//! first gradient counts as it is.
 
 /// Learning rates of one step, in units of the parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -39,8 +39,8 @@ pub(crate) const EPSILON: f32 = 1e-15;
 pub(crate) const CLIP: f32 = 1e15;
 /// Square of the largest gradient, in units of the second moment: the one that doubles it.
 pub(crate) const GROWTH: f32 = 1.0 / (1.0 - BETA2);
-/// A gradient this many times too large is an outlier, which is counted. Gradients of Gaussians that
-/// come into sight for the first time may be 1e10 times what was seen of them before.
+/// A gradient this many times too large is an outlier, which is counted. Gradients of Gaussians that become visible for
+/// the first time may be 1e10 times those before.
 pub(crate) const OUTLIER: f32 = 1e12;
 
 impl AdamStep {
@@ -50,7 +50,7 @@ impl AdamStep {
         Self { first_correction: correction(BETA1), second_correction: correction(BETA2) }
     }
 
-    /// Moves one parameter against its gradient, which must be finite. Whether that was an outlier.
+    /// Moves one parameter against its gradient, which must be finite. Returns whether that was an outlier.
     #[inline(always)]
     pub fn update(&self, parameter: &mut f32, gradient: f32, first: &mut f32, second: &mut f32, rate: f32) -> bool {
         let limit = if *second > 0.0 { (GROWTH * *second).sqrt().min(CLIP) } else { CLIP };

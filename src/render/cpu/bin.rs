@@ -1,4 +1,4 @@
-//! Tile binning: which splats reach which tile, each tile's list in depth order.
+//! Tile binning: the list of splats that reach each tile, in depth order.
 
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
@@ -45,10 +45,10 @@ fn rectangle<R: Real>(s: &Splat<R>, size: [usize; 2]) -> Option<[usize; 4]> {
     Some(r)
 }
 
-/// Squared Mahalanobis distances from a splat, with what they have in common over all tiles.
+/// Squared Mahalanobis distances from a splat, with the terms that all tiles share.
 struct Distances<R> {
     conic: [R; 3],
-    /// Where an edge is nearest: for edges along y, y over x; for those along x, x over y.
+    /// Slopes to the nearest point of an edge: for edges along y, y over x; for those along x, x over y.
     slopes: [R; 2],
 }
 
@@ -135,8 +135,7 @@ fn share_of<R: Real>(parts: &[Chunk<R>], size: [usize; 2], grid: [usize; 2]) -> 
     s
 }
 
-/// Builds the lists of all splats, in the cloud's order; with their depths, or the order that is `kept`, to be sorted
-/// by.
+/// Builds the lists of all splats, in the cloud's order, with keys to sort by: depths, or the order that is `kept`.
 pub(crate) fn bin<R: Real>(out: &mut Tiles, parts: &[Chunk<R>], kept: Option<&KeptOrder>, size: [usize; 2]) {
     let grid = [size[0].div_ceil(TILE_PX), size[1].div_ceil(TILE_PX)];
     let tiles = grid[0] * grid[1];
@@ -183,7 +182,7 @@ impl Tiles {
         self.entries[k].load(Relaxed) as u32
     }
 
-    /// Finds the way back from splats, whose places are under `places`, to their entries.
+    /// Finds the entries of each splat; the splats' places are under `places`.
     pub(crate) fn find_ways_back(&mut self, places: usize) {
         self.span.clear();
         self.span.resize(places + 2, 0);
@@ -194,7 +193,7 @@ impl Tiles {
         (1..places + 2).for_each(|p| self.span[p] += self.span[p - 1]);
         self.ways_back.resize(self.entries.len(), 0);
         for k in 0..self.entries.len() {
-            // What becomes the end of this splat's, once all are there.
+            // Becomes the end of this splat's span, once all are there.
             let next = &mut self.span[self.entries[k].load(Relaxed) as u32 as usize + 1];
             self.ways_back[*next as usize] = k as u32;
             *next += 1;

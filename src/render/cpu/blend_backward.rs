@@ -8,7 +8,7 @@ use crate::math::Real;
 use crate::math::lanes::{LANES, Lanes};
 use crate::render::ALPHA_MAX;
 
-/// What the backward pass reads of one row of tiles, `width * rows` values each.
+/// Inputs of the backward pass for one row of tiles, `width * rows` values each.
 pub(crate) struct RowIn<'a, R> {
     /// `dL/dplane` for each channel; missing or empty = zero.
     pub(crate) planes: Vec<&'a [R]>,

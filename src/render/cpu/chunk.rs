@@ -1,4 +1,4 @@
-//! What goes into the projection and what comes out of it: Gaussians in groups, splats in chunks.
+//! Input and output of the projection: Gaussians in groups, splats in chunks.
 
 use super::project::Splat;
 use crate::math::Real;
@@ -22,18 +22,18 @@ pub(crate) struct Chunk<R> {
     pub(crate) degenerate: usize,
 }
 
-/// What is to be drawn, and how.
+/// Cloud to draw, with its settings.
 #[derive(Clone, Copy)]
 pub(crate) struct DrawInput<'a, R> {
     pub(crate) cloud: &'a GaussianCloud<R>,
     pub(crate) features: Features<'a, R>,
     pub(crate) settings: &'a RenderSettings,
-    /// What is drawn instead of all of it.
+    /// Cut that is drawn instead of the whole cloud.
     pub(crate) cut: Option<&'a Cut<R>>,
 }
 
 impl<'a, R: Real> DrawInput<'a, R> {
-    /// How many Gaussians are to be drawn.
+    /// Number of Gaussians to draw.
     pub(crate) fn len(&self) -> usize {
         self.cut.map_or(self.cloud.len(), Cut::len)
     }
@@ -87,7 +87,7 @@ impl<'a, R: Real> Group<'a, R> {
         [Eight::new(l, l.load(x)), Eight::new(l, l.load(y)), Eight::new(l, l.load(z))]
     }
 
-    /// A number of each. Places that are not taken have one, too, which means nothing.
+    /// One number per Gaussian. Unused lanes hold one without meaning.
     #[inline(always)]
     pub(crate) fn each<L: Lanes<R>>(&self, l: L, one: impl Fn(&Gaussian<'a, R>) -> R) -> Eight<R, L> {
         Eight::of(l, |i| one(&self.gaussians[i]))

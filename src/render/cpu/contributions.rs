@@ -1,5 +1,5 @@
-//! Which Gaussian contributes how much to which pixel: the weights `alpha * transmittance` that
-//! [`super::blend`] composites with, handed to whoever counts them.
+//! Contributions of Gaussians to pixels: the weights `alpha * transmittance` that [`super::blend`] composites with,
+//! handed to a sink.
 
 use super::walk::{Primitive, RowPass, Sink, Tile, TileRow};
 use crate::math::Real;

@@ -1,5 +1,5 @@
-//! Which label wins each pixel, and which have how much of it: sums of the weights `alpha * transmittance` of the
-//! Gaussians that carry them.
+//! Label of each pixel, and the weights of competing labels: sums of `alpha * transmittance` over the Gaussians that
+//! carry them.
 
 use super::CpuRenderer;
 use crate::math::lanes::Lane;
@@ -8,13 +8,13 @@ use crate::scene::{Camera, GaussianCloud};
 
 /// Labels that compete for one pixel at most; the least is dropped.
 pub(crate) const COMPETITORS: usize = 8;
-/// Stands for a label of which nothing is known, a group of its own.
+/// Unknown label, a group of its own.
 pub(crate) const UNKNOWN: u32 = u32::MAX;
 
 /// The label that wins a pixel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LabelWinner {
-    /// Of the group of most weight that of most weight; 0 where less than half of the light is blocked.
+    /// Heaviest label of the heaviest group; 0 where less than half of the light is blocked.
     pub label: u32,
     /// Share of the pixel's weight that belongs to its group.
     pub share: f32,
@@ -22,7 +22,7 @@ pub struct LabelWinner {
     pub alpha: f32,
 }
 
-/// What a pixel's light belongs to: labels with their accumulated weights. Free places weigh nothing.
+/// Labels of a pixel with their accumulated weights. Unused places have weight 0.
 pub type PixelWeights = [(u32, f32); COMPETITORS];
 
 /// The weights of a view's pixels, row-major, by the label `of` each Gaussian of `cloud`.
@@ -42,8 +42,8 @@ pub(crate) fn label_weights(
     Ok(rows.into_iter().flat_map(|r| r.pixels).collect())
 }
 
-/// The winner of a pixel. `groups` has the group of each label; one that is not there is nobody's, 0, but for
-/// [`UNKNOWN`], which is a group of its own.
+/// Winner of a pixel. `groups` has the group of each label; a missing one is 0, unlabeled, but for [`UNKNOWN`], which
+/// is a group of its own.
 pub(crate) fn winner(places: &PixelWeights, groups: &[u32]) -> LabelWinner {
     let alpha: f32 = places.iter().map(|p| p.1).sum();
     if alpha < 0.5 {
@@ -141,7 +141,7 @@ mod tests {
         labels.sort_unstable();
         assert_eq!(labels, [3, 4, 5, 6, 7, 8, 9, 10], "the two lightest were dropped, and do not come back");
         assert!(row.pixels.iter().enumerate().all(|(i, p)| i == 21 || p.iter().all(|p| p.1 == 0.0)));
-        // What lies beyond the right edge is not the next row's.
+        // Weights beyond the right edge are not the next row's.
         row.add(0, 8, 4, &[1.0; 8]);
         let reached: Vec<usize> = (0..24).filter(|i| row.pixels[*i].iter().any(|p| p.0 == 1)).collect();
         assert_eq!(reached, [8, 9, 10, 11]);

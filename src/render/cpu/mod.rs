@@ -1,8 +1,8 @@
 //! The CPU renderer: at `f64` the oracle that every kernel and gradient is compared with, at `f32`
 //! (tile-parallel, eight pixels a register) the fast path where there is no GPU.
 //!
-//! Stages, one file each: [`project`] ([`mod@project_chunk`]: of a whole cloud), [`bin`], [`sort`], [`blend`]; backward: [`blend_backward`],
-//! [`mod@project_backward`]; [`walk`] is the way through a tile that they share. What is drawn is a
+//! Stages, one file each: [`project`] ([`mod@project_chunk`]: of a whole cloud), [`bin`], [`sort`], [`blend`];
+//! backward: [`blend_backward`], [`mod@project_backward`]; [`walk`] is the loop over a tile that they share. It draws a
 //! [`walk::Primitive`]: [`splat`] or [`surfel`]. Results do not depend on the number of threads.
 
 pub mod adam;
@@ -39,7 +39,7 @@ use crate::math::Real;
 use crate::math::finite::{NotFinite, all_finite};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
-/// What the last frame cost.
+/// Cost of the last frame.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct RenderStats {
     /// Gaussians that reach at least one pixel.
@@ -58,7 +58,7 @@ pub struct RenderStats {
 #[derive(Debug)]
 pub struct CpuRenderer<R> {
     splats: CpuRasterizer<R, Splats<R>>,
-    /// What drew the last frame, if that was of surfels.
+    /// Rasterizer of the last frame, if that was of surfels.
     surfels: Option<Box<CpuRasterizer<R, Surfels<R>>>>,
 }
 
@@ -87,14 +87,14 @@ impl<R: Real> CpuRenderer<R> {
         Self::default()
     }
 
-    /// One without a way back, which keeps nothing for it.
+    /// A renderer without a backward pass, which keeps nothing for it.
     pub(crate) fn forward_only() -> Self {
         let mut renderer = Self::default();
         renderer.splats.forward_only = true;
         renderer
     }
 
-    /// Draws only this of clouds that it fits, from now on; `None` draws all. No gradients go back through a cut.
+    /// Limits later pictures to the cut, for clouds that it fits; `None` draws all. No gradients pass through a cut.
     pub(crate) fn limit_to(&mut self, cut: Option<Arc<Cut<R>>>) {
         self.splats.cut = cut;
     }
@@ -109,7 +109,7 @@ impl<R: Real> CpuRenderer<R> {
         last!(self, r => r.splats()).into_iter().map(|s| (s.gaussian as usize, s.depth))
     }
 
-    /// What the last frame cost.
+    /// Cost of the last frame.
     pub fn stats(&self) -> RenderStats {
         last!(self, r => r.stats)
     }
@@ -166,7 +166,7 @@ impl<R: Real> CpuRenderer<R> {
         }
     }
 
-    /// Whether the backward pass over the tiles left finite numbers.
+    /// Checks that the backward pass over the tiles left finite numbers.
     pub(crate) fn check_backward(&self) -> Result<(), NotFinite> {
         all_finite("blending backward", "record", last!(self, r => &r.records))
     }
@@ -178,8 +178,8 @@ impl<R: Real> CpuRenderer<R> {
         last!(self, r => r.gaussian_gradient(gaussian, i))
     }
 
-    /// Gradient with respect to the extra channels of Gaussian `i`, after [`Self::backward_tiles`].
-    /// Leaves `out`, one value per channel, alone if the Gaussian was not drawn, and says whether it was.
+    /// Gradient with respect to the extra channels of Gaussian `i`, after [`Self::backward_tiles`]. Returns whether the
+    /// Gaussian was drawn; if not, leaves `out`, one value per channel, alone.
     pub(crate) fn feature_gradient(&self, i: usize, out: &mut [R]) -> bool {
         last!(self, r => r.feature_gradient(i, out))
     }

@@ -12,7 +12,7 @@ use crate::math::{Real, rotation};
 use crate::render::{Frame, FrameGradient};
 use crate::scene::{Camera, Gaussian, GaussianCloud};
 
-/// Which depth describes the surface.
+/// Depth that describes the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SurfaceDepth {
     /// `sum(w z) / alpha`.
@@ -55,7 +55,7 @@ pub fn of_gaussians<R: Real>(cloud: &GaussianCloud<R>, camera: &Camera, out: &mu
     });
 }
 
-/// What the gradient of a Gaussian's normal adds to that of its raw quaternion.
+/// Gradient of a Gaussian's raw quaternion from that of its normal.
 #[inline(always)]
 pub fn backward<R: Real>(gaussian: &Gaussian<'_, R>, eye: [R; 3], d_normal: [R; 3]) -> [R; 4] {
     let Some((_, k, sign)) = facing(gaussian, eye) else { return [R::ZERO; 4] };

@@ -49,7 +49,7 @@ impl<R: Real> CameraView<R> {
         [R::of(p[0].f64() + self.offset[0]), R::of(p[1].f64() + self.offset[1]), R::of(p[2].f64() + self.offset[2])]
     }
 
-    /// Whether a box around `mean` has a pixel center of the picture in it.
+    /// Returns whether a box around `mean` contains a pixel center of the picture.
     #[inline(always)]
     pub(crate) fn meets(&self, mean: [R; 2], half: [R; 2]) -> bool {
         let last = |axis: usize| R::of(self.size[axis] as f64) - R::HALF;
@@ -174,10 +174,10 @@ pub fn direction<R: Real>(relative: [R; 3]) -> [R; 3] {
     if relative.iter().any(|c| c.abs() > R::ZERO) { toward(relative) } else { [R::ZERO, R::ZERO, R::ONE] }
 }
 
-/// The same of what does not coincide.
+/// The same for centers that do not coincide with the camera.
 #[inline(always)]
 pub(crate) fn toward<N: Number>([x, y, z]: [N; 3]) -> [N; 3] {
-    // Scaled first: the square of what is far away overflows.
+    // Scaled first: squares of far distances overflow.
     let largest = x.abs().max(y.abs()).max(z.abs());
     let [x, y, z] = [x / largest, y / largest, z / largest];
     let length = dot([x, y, z], [x, y, z]).sqrt();
@@ -188,7 +188,7 @@ pub(crate) fn toward<N: Number>([x, y, z]: [N; 3]) -> [N; 3] {
 #[inline(always)]
 pub fn raw_color<R: Real>(coefficients: &[[R; 3]], basis: &[R; 16], degree: u8) -> [R; 3] {
     let stored = coefficients.len().min(sh::coefficients(degree));
-    // Each degree for itself: loops whose lengths are known are none.
+    // One loop per degree: loops of known length are unrolled.
     match stored {
         16.. => sum::<R, 16>(coefficients, basis),
         9.. => sum::<R, 9>(coefficients, basis),
@@ -208,8 +208,7 @@ fn sum<R: Real, const N: usize>(coefficients: &[[R; 3]], basis: &[R; 16]) -> [R;
     c
 }
 
-/// The color as it is composited, between black and `COLOR_MAX`. Coefficients whose sum is no number
-/// give black.
+/// The color as it is composited, between black and `COLOR_MAX`. Coefficients whose sum is NaN give black.
 #[inline(always)]
 pub(crate) fn color<R: Real>(coefficients: &[[R; 3]], basis: &[R; 16], degree: u8) -> [R; 3] {
     raw_color(coefficients, basis, degree).map(|c| c.max(R::ZERO).min(R::of(COLOR_MAX)))
@@ -221,9 +220,9 @@ pub fn compensation<N: Number>(g: &SplatGeometry<N>) -> N {
     (g.determinants[0] / g.determinants[1]).sqrt()
 }
 
-/// What becomes of a Gaussian in front of the near plane.
+/// Result of projecting a Gaussian in front of the near plane.
 pub(crate) enum Projected<R, S, D> {
-    /// It reaches a pixel center: its splat, its shape, and what depth composites.
+    /// It reaches a pixel center: its splat, its shape, and its depth channels.
     Splat(Splat<R>, S, D),
     Outside,
     /// Its shape is not usable.

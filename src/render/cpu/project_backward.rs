@@ -98,7 +98,7 @@ pub(crate) fn project_backward<R: Real>(
     })
 }
 
-/// What the gradient of a Gaussian's color comes to.
+/// Gradients that follow from that of a Gaussian's color.
 pub(super) struct ColorGradient<R> {
     /// With respect to the color before the clamp.
     pub(crate) color: [R; 3],

@@ -13,8 +13,8 @@ use crate::math::{Real, sh};
 /// Gaussians of a cut between fetching one and needing it.
 const AHEAD: usize = 8;
 
-/// Projects the whole cloud, in parts of [`CHUNK`] Gaussians: `P::SHAPE + channels` values per splat, the channels
-/// being color, extra channels, what depth needs, padding zeros.
+/// Projects the whole cloud, in parts of [`CHUNK`] Gaussians: `P::SHAPE + channels` values per splat. Channels are
+/// color, extra channels, those that depth needs, and padding zeros.
 pub(crate) fn project<R: Real, P: Primitive<R>>(
     parts: &mut Vec<Chunk<R>>,
     scene: DrawInput<'_, R>,

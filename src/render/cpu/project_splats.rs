@@ -7,7 +7,7 @@ use crate::math::lanes::{LANES, Lanes};
 use crate::math::number::{Eight, Number};
 use crate::render::RenderSettings;
 
-/// What becomes of Gaussians of these opacities, alpha under `alpha_min` not counting.
+/// Projects Gaussians of these opacities; alpha below `alpha_min` does not count.
 #[inline(always)]
 pub(crate) fn splats<R: Real, L: Lanes<R>>(
     l: L,
@@ -77,10 +77,10 @@ pub(crate) fn splats<R: Real, L: Lanes<R>>(
     all
 }
 
-/// Which of them are.
+/// Mask of the lanes that are finite.
 #[inline(always)]
 fn finite<R: Real, L: Lanes<R>>(l: L, x: Eight<R, L>) -> L::M {
-    // Nothing times what is not is no number.
+    // Zero times infinity or NaN is NaN, which fails every comparison.
     let zero = l.splat(R::ZERO);
     l.ge(l.mul(x.v, zero), zero)
 }

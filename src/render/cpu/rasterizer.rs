@@ -36,11 +36,11 @@ pub(crate) struct CpuRasterizer<R, P> {
     /// Sums of the backward pass, for each tile entry.
     pub(crate) records: Vec<R>,
     frame: Option<FrameInfo<R, P>>,
-    /// What is drawn of clouds that it fits, instead of all of them.
+    /// Cut that is drawn instead of clouds that it fits.
     pub(crate) cut: Option<Arc<Cut<R>>>,
-    /// Whether nothing is kept for a backward pass, which then does nothing.
+    /// True if nothing is kept for a backward pass, which then does nothing.
     pub(crate) forward_only: bool,
-    /// What the last frame cost.
+    /// Cost of the last frame.
     pub(crate) stats: RenderStats,
 }
 
@@ -67,7 +67,7 @@ impl<R: Real> Lists<R> {
     }
 }
 
-/// What the forward pass leaves of each pixel for the backward pass.
+/// State of each pixel that the forward pass keeps for the backward pass.
 #[derive(Debug, Default)]
 struct Pixels<R> {
     transmittance: Vec<R>,
@@ -75,7 +75,7 @@ struct Pixels<R> {
     kept: [Vec<R>; 3],
 }
 
-/// What the backward pass must know of the forward pass.
+/// State of the forward pass that the backward pass needs.
 #[derive(Debug, Clone)]
 struct FrameInfo<R, P> {
     primitive: P,
@@ -134,7 +134,7 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
         all
     }
 
-    /// Projects, sorts and bins; returns what the later stages must know, and the seconds of each.
+    /// Projects, sorts and bins; returns the state for the later stages, and the seconds of each.
     fn prepare(
         &mut self,
         cloud: &GaussianCloud<R>,
@@ -314,8 +314,8 @@ impl<R: Real, P: Primitive<R>> CpuRasterizer<R, P> {
         )
     }
 
-    /// Gradient with respect to the extra channels of Gaussian `i`, after [`Self::backward_tiles`].
-    /// Leaves `out`, one value per channel, alone if the Gaussian was not drawn, and says whether it was.
+    /// Gradient with respect to the extra channels of Gaussian `i`, after [`Self::backward_tiles`]. Returns whether the
+    /// Gaussian was drawn; if not, leaves `out`, one value per channel, alone.
     pub(crate) fn feature_gradient(&self, i: usize, out: &mut [R]) -> bool {
         let Some(info) = &self.frame else { return false };
         let Some((_, record)) = self.record(i, info.stride()) else { return false };

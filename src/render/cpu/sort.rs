@@ -12,7 +12,7 @@ use crate::math::Real;
 /// The order of splats that were not in the frame before.
 const LAST: u32 = u32::MAX;
 
-/// Where a splat is among the parts, as one number.
+/// Place of a splat among the parts, as one number.
 pub(crate) fn place(part: usize, i: usize) -> u32 {
     (part * CHUNK + i) as u32
 }
@@ -23,8 +23,7 @@ pub(crate) fn part_of(place: u32) -> (usize, usize) {
     (place as usize / CHUNK, place as usize % CHUNK)
 }
 
-/// What entries are sorted by: order first, equal ones as in the cloud. Unique, so that an unstable sort is
-/// deterministic.
+/// Sort key of an entry: order first, equal ones as in the cloud. Unique, so that an unstable sort is deterministic.
 #[inline(always)]
 pub(crate) fn key(order: u32, place: u32) -> u64 {
     u64::from(order) << 32 | u64::from(place)
@@ -41,7 +40,7 @@ pub(crate) fn by_depth<R: Real>(splat: &Splat<R>) -> u32 {
 pub(crate) struct KeptOrder(Vec<u32>);
 
 impl KeptOrder {
-    /// That of the last frame's splats, which may have kept one, too.
+    /// Order of the last frame's splats, which may itself have been kept.
     pub(crate) fn of<R: Real>(parts: &[Chunk<R>], before: Option<&Self>) -> Self {
         let splats = || parts.iter().flat_map(|p| &p.splats);
         let most = splats().map(|s| s.gaussian as usize + 1).max().unwrap_or(0);

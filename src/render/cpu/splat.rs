@@ -27,7 +27,7 @@ pub(crate) struct Constants<R: Real, L: Lanes<R>> {
     dx: [L::V; GROUPS],
 }
 
-/// What a splat gives eight pixels.
+/// Contribution of a splat to eight pixels.
 #[derive(Clone, Copy)]
 pub(crate) struct SplatHit<V> {
     offset: [V; 2],

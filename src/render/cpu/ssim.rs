@@ -75,6 +75,7 @@ impl<R: Real> PhotoLoss<R> {
             .zip(y.par_chunks(width))
             .for_each(|((out, x), y)| filter_products(out, x, y, &taps));
         let per_row = if wanted { width * PARTIALS } else { 1 };
+        // Sums per row, added in order: the loss does not depend on the number of threads.
         let sums: Vec<[f64; 3]> = self
             .partials
             .par_chunks_mut(per_row)

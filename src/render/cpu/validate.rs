@@ -1,5 +1,4 @@
-//! What `debug-validation` asserts of the renderer's stages: finite numbers, indices in range, depths in
-//! order.
+//! Assertions of `debug-validation` on the renderer's stages: finite numbers, indices in range, depths in order.
 
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -23,7 +22,7 @@ fn splats<R: Real>(stage: &'static str, splats: &[Splat<R>], values: &[R]) -> Re
     all_finite(stage, "value", values)
 }
 
-/// After the projection. Like all of this module, it names the first number that is none.
+/// After the projection. Like all of this module, it names the first number that is not finite.
 pub(crate) fn projected<R: Real>(parts: &[Chunk<R>]) -> Result<(), NotFinite> {
     parts.iter().try_for_each(|p| splats("projection", &p.splats, &p.values))
 }

@@ -1,5 +1,5 @@
-//! The walk over a tile: what is drawn ([`Primitive`]), which of a tile's pixels it can touch ([`Reach`]), and
-//! the front-to-back loop itself ([`TileRow::front_to_back`]) with what becomes of the weights ([`Sink`]).
+//! The walk over a tile: the [`Primitive`] that is drawn, its [`Reach`] over the tile's pixels, and the front-to-back
+//! loop ([`TileRow::front_to_back`]) that hands weights to a [`Sink`].
 //!
 //! Pixels are taken in lanes of eight; lane group `g` of row `row` of a tile is its slot `g * TILE_PX + row`.
 
@@ -18,7 +18,7 @@ use crate::scene::Gaussian;
 pub(crate) const GROUPS: usize = TILE_PX / LANES;
 /// Lane groups per tile.
 pub(crate) const SLOTS: usize = TILE_PX * GROUPS;
-/// Splats between two looks at which pixels are still open.
+/// Splats between two checks of the open pixels.
 const CLOSED_CHECK: usize = 16;
 /// Splats between fetching one and needing it.
 const AHEAD: usize = 6;
@@ -39,31 +39,30 @@ impl<V: Copy, const N: usize> Values<V> for [V; N] {
 /// Channel planes, and those that only this kind of primitive has.
 pub(crate) type Planes<T> = [Vec<T>; 2];
 
-/// What is drawn: Gaussians as splats, or surfels. All that the passes over tiles and the bookkeeping around
-/// them do not share.
+/// Kind of primitive: Gaussians as splats, or surfels. Holds all that the passes over tiles do not share.
 pub(crate) trait Primitive<R: Real>: Copy + Send + Sync {
     /// Numbers per splat in front of its channels.
     const SHAPE: usize;
-    /// Those numbers.
+    /// Shape of a splat, [`Self::SHAPE`] numbers.
     type Shape: AsRef<[R]>;
     /// Channels of a splat that depth asks for.
     type Depth: AsRef<[R]>;
     /// Values of a pixel besides its channels, composited where depth is asked for.
     type Extra<V: Copy>: Values<V>;
-    /// What the backward pass reads of a pixel besides gradients of its channels.
+    /// Inputs of the backward pass per pixel, besides gradients of its channels.
     type State<V: Copy>: Values<V>;
     /// Sums in front of the channels in a tile entry's record.
     type Sums<V: Copy>: Values<V>;
     /// A splat's constants in vector registers.
     type Constants<L: Lanes<R>>;
-    /// What a splat gives eight pixels.
+    /// Contribution of a splat to eight pixels.
     type Hit<L: Lanes<R>>: Copy;
 
     /// The kind as these settings draw it.
     fn new(view: &CameraView<R>, settings: &RenderSettings) -> Self;
     /// A pixel is closed before its transmittance falls under this.
     fn least_transmittance(settings: &RenderSettings) -> f64;
-    /// Channels: color, extra channels, and what depth needs.
+    /// Number of channels: color, extra channels, and those that depth needs.
     fn channels(extra: usize, depth: bool) -> usize;
     /// The number of channels that the passes are compiled for.
     fn padded(channels: usize) -> usize;
@@ -106,12 +105,12 @@ pub(crate) trait Primitive<R: Real>: Copy + Send + Sync {
 
     /// The constants of `s`; `dx` are the horizontal offsets of each group's pixel centers from it.
     fn constants<L: Lanes<R>>(self, l: L, s: &Splat<R>, shape: &[R], dx: [L::V; GROUPS]) -> Self::Constants<L>;
-    /// What the pixels of a slot get.
+    /// Contribution to the pixels of a slot.
     fn hit<L: Lanes<R>>(l: L, constants: &Self::Constants<L>, reach: &Reach<R>, slot: usize) -> Self::Hit<L>;
     /// Alpha, 0 where it does not count.
     fn alpha<L: Lanes<R>>(hit: &Self::Hit<L>) -> L::V;
-    /// Adds to the extra values; `crossed` is where transmittance falls to one half, `place` the splat's place in
-    /// the tile's list, from 1.
+    /// Adds to the extra values; in the lanes of `crossed` transmittance falls to one half, `place` is the splat's
+    /// place in the tile's list, from 1.
     fn gather<L: Lanes<R>>(
         l: L,
         extra: &mut Self::Extra<L::V>,
@@ -245,7 +244,7 @@ pub(crate) struct TileRow<'a, R, P> {
     pub(crate) tiles: &'a Tiles,
     /// Picture size in px.
     pub(crate) size: [usize; 2],
-    /// Which row of tiles.
+    /// Index of the row of tiles.
     pub(crate) ty: usize,
     /// A pixel is closed before its transmittance falls under this.
     pub(crate) least: R,
@@ -274,7 +273,7 @@ impl Tile {
 
 /// Takes the weights of a tile, front to back.
 pub(crate) trait Sink<R: Real, P: Primitive<R>, L: Lanes<R>> {
-    /// What is needed of one splat.
+    /// Values of one splat that the sink needs.
     type Own;
     /// The splat `id`, at this place of the tile's list, counted from 1.
     fn own(&self, l: L, id: u32, place: usize) -> Self::Own;
@@ -309,7 +308,7 @@ impl<R: Real, P: Primitive<R>> TileRow<'_, R, P> {
         self.parts[part].values[i * stride..][..stride].split_at(P::SHAPE)
     }
 
-    /// Has what splat `id` needs fetched.
+    /// Prefetches the data of splat `id`.
     #[inline(always)]
     fn fetch<const C: usize>(&self, id: u32) {
         let s = self.splat(id);

@@ -1,4 +1,4 @@
-//! Front-to-back blending, `shaders/blend.wgsl`, and what it shares with its gradient.
+//! Front-to-back blending, `shaders/blend.wgsl`, and the parts that its gradient shares.
 
 use std::collections::BTreeMap;
 
@@ -12,7 +12,7 @@ use super::{Device, GpuError};
 pub(crate) struct TileKernel {
     shader: &'static str,
     float_atomics: bool,
-    /// How the kernel's own buffers are used, which follow those that every tile kernel reads.
+    /// Accesses to the kernel's own buffers, which follow those that every tile kernel reads.
     own: [Access; 4],
     /// Workgroups for each tile.
     parts: u32,
@@ -29,7 +29,7 @@ impl TileKernel {
         Self { shader, float_atomics, own, parts, kernels: BTreeMap::new() }
     }
 
-    /// Compiles what passes of `channels` extra channels need, if that has not been done.
+    /// Compiles the pipeline for passes of `channels` extra channels, if it is missing.
     pub(crate) fn prepare(&mut self, device: &Device, channels: usize) -> Result<(), GpuError> {
         use Access::{Read, Uniform};
         if self.kernels.contains_key(&channels) {

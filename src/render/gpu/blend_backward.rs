@@ -41,7 +41,7 @@ impl BlendGradients {
             splats: device.storage("gradient of splats", (capacity * (GRADIENT_BASE + channels) * 4) as u64)?,
         })
     }
-    /// What the kernel reads and writes of a picture; `splats` must be zero.
+    /// Buffers that the kernel reads and writes of a picture; `splats` must be zero.
     pub(crate) fn buffers<'a>(&'a self, picture: &'a PerPicture) -> [&'a wgpu::Buffer; 4] {
         [&picture.ends, &self.pixels, &self.features, &self.splats]
     }

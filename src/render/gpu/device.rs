@@ -1,4 +1,4 @@
-//! The adapter and its device: what they are, what they can do, and how their faults are told.
+//! The adapter and its device: their identity, abilities and faults.
 
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -16,7 +16,7 @@ pub struct Device {
     device: wgpu::Device,
     queue: wgpu::Queue,
     info: Arc<wgpu::AdapterInfo>,
-    /// The first fault that no call was there to return.
+    /// First fault that no call has returned yet.
     fault: Arc<Mutex<Option<GpuError>>>,
     staging: StagingPool,
 }
@@ -35,7 +35,7 @@ fn adapter(software: bool) -> Result<wgpu::Adapter, wgpu::RequestAdapterError> {
 /// The device that everything in the process draws and trains on.
 static SHARED: Mutex<Option<Device>> = Mutex::new(None);
 
-/// What `open` gives, kept in `held` for who asks next; what is held and was lost is no longer given.
+/// Device in `held`, opened with `open` at first use and again after it was lost.
 fn held_or(
     held: &Mutex<Option<Device>>,
     open: impl FnOnce() -> Result<Option<Device>, GpuError>,
@@ -48,8 +48,8 @@ fn held_or(
 }
 
 impl Device {
-    /// The process's device: the best adapter's, a real GPU's before a software one's. Opened when first asked for,
-    /// and again after it was lost.
+    /// The process's device: the best adapter's, a real GPU's before a software one's. Opened at first use, and again
+    /// after it was lost.
     pub(crate) fn shared() -> Result<Self, GpuError> {
         let shared = held_or(&SHARED, || Self::new().map(Some))?;
         shared.ok_or_else(|| GpuError::NoAdapter("none was opened".to_owned()))
@@ -60,7 +60,7 @@ impl Device {
         Ok(held_or(&SHARED, Self::real)?.filter(|device| !device.is_software()))
     }
 
-    /// Makes a window's device the process's, and says whether it does: one of a real GPU that has all that
+    /// Shares a window's device with the process, and returns whether it did: only one of a real GPU that has all that
     /// [`Self::device_descriptor`] asks for, before another was opened.
     pub(crate) fn adopt(adapter: &wgpu::Adapter, device: &wgpu::Device, queue: &wgpu::Queue) -> bool {
         let (info, wanted) = (adapter.get_info(), Self::device_descriptor(adapter));
@@ -127,7 +127,7 @@ impl Device {
         device.on_uncaptured_error(Arc::new(move |error| keep_first(&slot, told(error, "a command", 0))));
         let slot = Arc::clone(&fault);
         device.set_device_lost_callback(move |reason, text| {
-            // Dropping the last handle of a device also ends it; nobody is left to be told then.
+            // Dropping the last handle of a device also ends it; then there is no one to report to.
             if reason != wgpu::DeviceLostReason::Destroyed {
                 keep_first(&slot, GpuError::Lost(text));
             }
@@ -154,17 +154,17 @@ impl Device {
         self.device.limits()
     }
 
-    /// Whether the "GPU" is a program on the CPU, slower than the CPU backend.
+    /// Returns whether the "GPU" is a program on the CPU, slower than the CPU backend.
     pub fn is_software(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu
     }
 
-    /// Whether floats can be added atomically; sums go through compare-and-exchange if not.
+    /// Returns whether floats can be added atomically; otherwise sums use compare-and-exchange.
     pub fn has_float_atomics(&self) -> bool {
         self.device.features().contains(wgpu::Features::SHADER_FLOAT32_ATOMIC)
     }
 
-    /// Whether passes can be timed on the device.
+    /// Returns whether passes can be timed on the device.
     pub fn has_timestamps(&self) -> bool {
         self.device.features().contains(wgpu::Features::TIMESTAMP_QUERY)
     }
@@ -183,7 +183,7 @@ impl Device {
         format!("{} ({kind}, {:?}, {atomics}, {binding} MiB per binding)", self.info.name, self.info.backend)
     }
 
-    /// The first fault since the last call that nobody was told of: device lost, out of memory.
+    /// Returns the first fault not reported before: device lost, out of memory.
     pub fn check(&self) -> Result<(), GpuError> {
         let taken = self.fault.lock().unwrap_or_else(PoisonError::into_inner).take();
         match taken {
@@ -284,8 +284,8 @@ impl Device {
         self.wait_for(None)
     }
 
-    /// Waits for a submission and what came before it, whoever made it, but for nothing that came later; without one
-    /// for everything so far.
+    /// Waits for a submission and all earlier ones, from any thread, but for no later ones; without one for everything
+    /// so far.
     pub(super) fn wait_for(&self, submission_index: Option<wgpu::SubmissionIndex>) -> Result<(), GpuError> {
         let until = wgpu::PollType::Wait { submission_index, timeout: None };
         self.device.poll(until).map_err(|e| GpuError::Lost(e.to_string()))?;

@@ -1,9 +1,9 @@
-//! What can go wrong on a GPU, each with its numbers and what to do about it.
+//! Errors of a GPU, each with its numbers and a remedy.
 
 use crate::render::RenderError;
 use crate::scene::CloudError;
 
-/// Why the GPU could not do what it was asked.
+/// Error of work on a GPU.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum GpuError {

@@ -4,7 +4,7 @@ use super::shader::{self, ShaderVariant};
 use super::timing::Timer;
 use super::{Device, GpuError};
 
-/// How a kernel uses a buffer.
+/// Access of a kernel to a buffer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Access {
     Uniform,

@@ -1,11 +1,11 @@
-//! Which label wins each pixel; `shaders/labels.wgsl`.
+//! Label of each pixel; `shaders/labels.wgsl`.
 
 use super::kernel::{Access, Kernel, Module, RecordedStage};
 use super::rasterizer::GpuRasterizer;
 use super::shader::ShaderVariant;
 use super::{Device, GpuError};
 
-/// The kernel, and room for what it finds.
+/// The kernel, and room for its results.
 #[derive(Debug)]
 pub(crate) struct LabelPass {
     kernel: Kernel,
@@ -26,7 +26,7 @@ impl LabelPass {
         device.grow(&mut self.found, "labels of the picture", pixels * 12)
     }
 
-    /// Records the pass over the lists of a frame; `of` has a label for each Gaussian, `groups` the group of each label.
+    /// Records the pass over the lists of a frame; `of` has a label for each Gaussian, `groups` a group for each label.
     pub(crate) fn encode(
         &self,
         stage: &mut RecordedStage<'_>,

@@ -5,7 +5,7 @@ use bytemuck::{Pod, Zeroable};
 
 /// Bytes of a pixel of a packed picture.
 pub(super) const PACKED_BYTES: u32 = 4;
-/// Rows of a packed picture begin at multiples of so many pixels, as copies into textures want it.
+/// Rows of a packed picture begin at multiples of this number of pixels, as copies into textures require.
 pub(super) const ROW_PX: u32 = wgpu::COPY_BYTES_PER_ROW_ALIGNMENT / PACKED_BYTES;
 
 /// A structure's memory layout.
@@ -93,13 +93,13 @@ twins! {
     struct Pass {
         /// Lowest bit of the digit.
         shift: u32,
-        /// Which counter holds the number of pairs.
+        /// Index of the counter of pairs.
         counter: u32,
         pad0: u32,
         pad1: u32,
     }
 
-    /// Which extra channels a blending pass draws.
+    /// Extra channels of a blending pass.
     struct Chunk {
         channels: u32,
         first: u32,

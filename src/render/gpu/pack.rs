@@ -1,4 +1,4 @@
-//! A picture's colors as bytes, a quarter of what floats take to copy, for the host or for a texture that a window
+//! Packing of a picture's colors as bytes, a quarter of the floats' size, for the host or for a texture that a window
 //! paints; `shaders/pack.wgsl`.
 
 use super::kernel::{Access, Kernel, Module, RecordedStage, Recorder};
@@ -92,7 +92,7 @@ impl DevicePicture {
         Ok(Self { device: device.clone(), texture })
     }
 
-    /// Whether a window of this device can paint it.
+    /// Returns whether a window of this device can paint it.
     pub(crate) fn lies_on(&self, device: &wgpu::Device) -> bool {
         self.device.wgpu() == device
     }

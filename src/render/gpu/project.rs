@@ -46,8 +46,8 @@ impl Project {
     }
 }
 
-/// What the kernels need to know of a camera. `capacity` is the number of (splat, tile) pairs that
-/// fit, `channels` the extra channels per Gaussian.
+/// Camera data for the kernels. `capacity` is the number of (splat, tile) pairs that fit, `channels` the extra channels
+/// per Gaussian.
 pub(crate) fn view(
     camera: &Camera,
     settings: &RenderSettings,
@@ -88,7 +88,7 @@ pub(crate) fn view(
     }
 }
 
-/// What a view must know of a cloud on the device.
+/// Data of a cloud on the device that a view needs.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct CloudShape {
     /// World position that the Gaussians are relative to.

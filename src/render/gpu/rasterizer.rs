@@ -12,9 +12,9 @@ use super::{Device, GpuError, Parameters};
 use crate::render::{Cutoffs, Frame, RenderError, RenderSettings};
 use crate::scene::Camera;
 
-/// Pairs per Gaussian that are assumed before a frame has told.
+/// Pairs per Gaussian that are assumed before the first frame counts them.
 const FIRST_GUESS: u32 = 4;
-/// Room that is left over what a frame needed, so that the next one fits too.
+/// Factor of the room over the last frame's need, so that the next one fits too.
 const HEADROOM: f64 = 1.5;
 
 /// The kernels of the forward pass with their buffers.
@@ -49,7 +49,7 @@ impl GpuRasterizer {
         })
     }
 
-    /// Makes room for a frame, tells the device what to draw, and resets the counters.
+    /// Makes room for a frame, uploads its view, and resets the counters.
     pub(crate) fn prepare(
         &mut self,
         device: &Device,
@@ -87,7 +87,7 @@ impl GpuRasterizer {
         Ok(())
     }
 
-    /// What the kernels of the prepared frame are told.
+    /// Bindings of the kernels for the prepared frame.
     pub(crate) fn bindings(&self) -> FrameBindings<'_> {
         FrameBindings { view: &self.view, counters: &self.counters, gaussians: self.extent.0, tiles: self.extent.1 }
     }

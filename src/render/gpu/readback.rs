@@ -11,7 +11,7 @@ const KEPT_BYTES: u64 = 256 << 20;
 /// Longer than any driver takes to hand over memory that it has written.
 const PATIENCE: Duration = Duration::from_secs(10);
 
-/// Memory for copies that nobody uses, in the order in which it was given back.
+/// Unused memory for copies, in the order in which it was returned.
 #[derive(Clone, Debug, Default)]
 pub(super) struct StagingPool(Arc<Mutex<Vec<wgpu::Buffer>>>);
 
@@ -24,7 +24,7 @@ impl StagingPool {
         Some(kept.remove(at))
     }
 
-    /// Keeps a buffer unless it is huge; those that were not used for longest go where they are too many.
+    /// Keeps a buffer unless it is huge; drops those unused for longest if there are too many.
     fn give(&self, buffer: wgpu::Buffer) {
         if buffer.size() > KEPT_BYTES {
             return;
@@ -42,7 +42,7 @@ pub(super) struct Copies {
     pool: StagingPool,
     staging: wgpu::Buffer,
     view: Option<wgpu::BufferView>,
-    /// Where each begins and ends.
+    /// Start and end of each.
     spans: Vec<[usize; 2]>,
 }
 
@@ -133,7 +133,7 @@ mod tests {
         let again = device.read(&[(&many, 4000)]).expect("read");
         assert_eq!((kept(), again.values::<u32>(0)[999]), (1, 999));
         drop(again);
-        // A tiny copy does not hold on to a huge buffer, and what was not used for longest goes first.
+        // A tiny copy does not hold on to a huge buffer, and the buffer unused for longest goes first.
         let large = device.storage("much", 100 << 20).expect("fits");
         drop(device.read(&[(&large, 96 << 20)]).expect("read"));
         assert_eq!(device.read(&[(&few, 4)]).expect("read").staging.size(), 20);

@@ -45,7 +45,7 @@ pub struct Inspection {
     pub list: Vec<u32>,
 }
 
-/// What passes over the lists of the last frame must know of it.
+/// State of the last frame for passes over its lists.
 #[derive(Debug, Clone)]
 struct Drawn {
     camera: Camera,
@@ -53,7 +53,7 @@ struct Drawn {
     counters: Counters,
 }
 
-/// What follows blending in the work of a frame.
+/// Work that follows the blending of a frame.
 #[derive(Debug, Clone, Copy)]
 enum After<'a> {
     Nothing,
@@ -260,7 +260,7 @@ impl GpuRenderer {
         Ok(())
     }
 
-    /// Whether the frame that was handed over was drawn; else there is room for it now.
+    /// Returns whether the submitted frame was drawn; if not, makes room for it.
     fn settle(&mut self, camera: &Camera, settings: &RenderSettings, counters: Counters) -> Result<bool, GpuError> {
         if let Some(timer) = &mut self.timer {
             self.times = timer.finish(&self.device)?;
@@ -273,8 +273,7 @@ impl GpuRenderer {
         Ok(false)
     }
 
-    /// What stands between the kernels of the last frame, for tests and for looking into faults;
-    /// `None` before the first frame.
+    /// Intermediate results of the last frame, for tests and debugging; `None` before the first frame.
     pub fn inspect(&self) -> Result<Option<Inspection>, GpuError> {
         let Some(drawn) = &self.drawn else { return Ok(None) };
         let r = &self.rasterizer;
@@ -331,6 +330,7 @@ impl GpuRenderer {
         if let Some(timer) = &mut self.timer {
             self.times.extend(timer.finish(&self.device)?);
         }
+        // Only the gradients of extra channels are read from the splats.
         let stride = GRADIENT_BASE + self.channels;
         let bytes = if self.channels > 0 { (n * stride * 4) as u64 } else { 0 };
         let splat_gradient: Vec<f32> = self.device.read(&[(&gradients.splats, bytes)])?.values(0);

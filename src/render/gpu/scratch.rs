@@ -1,5 +1,5 @@
-//! Buffers that live between kernels, in three groups by what their size depends on. A group grows
-//! when it must and never shrinks.
+//! Buffers between kernels, in three groups by the quantity that sets their size. A group grows when it must and never
+//! shrinks.
 
 use super::layout::{Chunk, Splat};
 use super::sort::SortBuffers;

@@ -40,12 +40,12 @@ pub(crate) const FILES: &[(&str, &str)] = files![
     "shared/view.wgsl",
 ];
 
-/// What differs between pipelines made from one file.
+/// Variant of a shader file for a pipeline.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub struct ShaderVariant {
     /// Extra channels that a blending pass carries.
     pub channels: usize,
-    /// Whether sums use the adapter's float atomics.
+    /// True if sums use the adapter's float atomics.
     pub float_atomics: bool,
 }
 

@@ -58,7 +58,7 @@ impl SortBuffers {
         all.map(wgpu::Buffer::size).sum()
     }
 
-    /// Which of the two sets holds the result.
+    /// Index of the set that holds the result.
     pub(crate) fn result(&self) -> usize {
         self.passes.len() % 2
     }

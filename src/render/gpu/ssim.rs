@@ -18,7 +18,7 @@ const SLOT_BYTES: u64 = 32;
 #[derive(Clone, Debug)]
 pub struct DevicePhoto {
     pixels: wgpu::Buffer,
-    /// Whether behind all pixels there is the alpha of each.
+    /// True if the alpha of each pixel follows the pixels.
     pub(crate) has_alpha: bool,
     pub(crate) size_px: [u32; 2],
 }
@@ -41,7 +41,7 @@ impl DevicePhoto {
     }
 }
 
-/// Means over pixels and channels of one comparison, and what the frame's counters said.
+/// Means over pixels and channels of one comparison, and values of the frame's counters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LossSums {
     pub(crate) l1: f64,
@@ -98,8 +98,8 @@ impl Ssim {
         })
     }
 
-    /// Makes room for pictures of this size and says where the sums go. `lambda` is the share of
-    /// D-SSIM in the loss, `shift` what is added where the photo, which then has an alpha, is transparent.
+    /// Makes room for pictures of this size and sets the slot for the sums. `lambda` is the weight of D-SSIM in the
+    /// loss, `shift` is added where the photo, which then has an alpha, is transparent.
     pub(crate) fn prepare(
         &mut self,
         device: &Device,

@@ -36,7 +36,7 @@ impl Timer {
         Ok(Some(Self { queries, resolved, names: Vec::new(), secs_per_tick }))
     }
 
-    /// Where the next pass writes its start and end; `None` past the last slot.
+    /// Timestamps for the start and end of the next pass; `None` past the last slot.
     pub(super) fn stage(&mut self, name: &'static str) -> Option<wgpu::ComputePassTimestampWrites<'_>> {
         let at = 2 * self.names.len() as u32;
         if at >= 2 * STAGES {

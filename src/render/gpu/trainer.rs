@@ -19,11 +19,11 @@ use crate::render::cpu::adam::Rates;
 use crate::render::{DensityStats, Frame, RenderSettings};
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
 
-/// Steps that wait on the device while it works on one: enough that it never waits for the host, and so few that
-/// what else is drawn on it, such as the window, need not wait for many.
+/// Steps queued on the device while it works on one: enough that it never waits for the host, and few enough that other
+/// work on it, such as the window's, need not wait for many.
 const AHEAD: usize = 2;
 
-/// What stays the same over a run.
+/// Settings of a training run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TrainerSettings {
     /// Background, near plane and anti-aliasing; degree and depth are set per step.
@@ -41,7 +41,7 @@ impl Default for TrainerSettings {
 /// Measurements of one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepLoss {
-    /// Which step, counted from 1.
+    /// Number of the step, from 1.
     pub step: u64,
     /// Its sums.
     pub sums: LossSums,
@@ -71,13 +71,13 @@ pub struct GpuTrainer {
     gradient_capacity: [usize; 2],
     features: wgpu::Buffer,
     step: u64,
-    /// Whether a frame of this cloud has told how many pairs it needs.
+    /// True if a frame of this cloud has counted the pairs it needs.
     sized: bool,
     /// Steps in the ring: number and pixels.
     pending: Vec<(u64, usize)>,
     /// Steps fetched but not asked for yet.
     fetched: Vec<StepLoss>,
-    /// Steps handed to the device that nobody has waited for.
+    /// Steps submitted to the device and not yet waited for.
     ahead: VecDeque<wgpu::SubmissionIndex>,
     timer: Option<Timer>,
     times: StageTimes,
@@ -179,7 +179,7 @@ impl GpuTrainer {
         self.device.check()
     }
 
-    /// The color behind everything from the next step on, and what it adds to photos where they are transparent.
+    /// Sets, from the next step on, the background color, and the color added to photos where they are transparent.
     pub fn set_background(&mut self, background: [f32; 3], shift: [f32; 3]) {
         self.settings.render.background = background;
         self.shift = shift;

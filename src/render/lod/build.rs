@@ -10,25 +10,25 @@ use crate::scene::GaussianCloud;
 
 /// Gaussians and nodes that are merged into one, at least: fewer wait for a larger voxel.
 const LEAST: usize = 4;
-/// Highest degree of the harmonics of nodes: what stands for many shines in no direction in particular.
+/// Highest degree of the harmonics of nodes: merged Gaussians have little view dependence.
 const DEGREE: u8 = 1;
-/// Voxels start where at least this share of the Gaussians is not alone.
+/// The smallest voxels are those in which at least this share of the Gaussians is not alone.
 const TOGETHER: f64 = 0.01;
 
 /// Nodes that are made at once.
 const AT_ONCE: usize = 1 << 14;
 
-/// Standard deviation of colors at which a node counts with its true size; of one color it counts as a third of that,
-/// as nobody sees what it is made of.
+/// Standard deviation of colors at which a node counts with its true size. One of a single color counts as a third of
+/// that, as its grain is invisible.
 const CONTRAST: f64 = 0.1;
 const FLAT: f64 = 0.1;
 const COLORFUL: f64 = 3.0;
 
-/// Something that is beneath nothing yet: its place on the curve and its number.
+/// A Gaussian or node without a parent so far: its place on the curve and its number.
 type Item = (u64, u32);
 
 impl<R: Real> LodTree<R> {
-    /// Of a cloud. `None` if `proceed` says so in between.
+    /// Builds the tree of a cloud. `None` as soon as `proceed` returns false.
     pub(crate) fn build(cloud: &GaussianCloud<R>, proceed: impl Fn() -> bool) -> Option<Self> {
         let degree = cloud.sh_degree.min(DEGREE);
         let merged = GaussianCloud { origin: cloud.origin, sh_degree: degree, ..GaussianCloud::default() };
@@ -40,7 +40,7 @@ impl<R: Real> LodTree<R> {
                 return None;
             }
             let (groups, rest) = grouped(&items, shift, tree.leaves + tree.nodes.len());
-            // Bounded, as what is merged takes more memory than what comes out.
+            // Bounded, as merging takes more memory than its result.
             groups.chunks(AT_ONCE).for_each(|groups| tree.add(cloud, &mut known, &items, groups));
             items = rest;
         }
@@ -93,7 +93,7 @@ impl<R: Real> LodTree<R> {
         (number as usize).checked_sub(self.leaves).map_or(number, |node| self.nodes[node].heaviest)
     }
 
-    /// The mean color of what is merged.
+    /// Mean color of the merged Gaussians.
     fn color(&self, cloud: &GaussianCloud<R>, beneath: &[Item], merged: &Merged) -> [[R; 3]; sh::coefficients(DEGREE)] {
         let stride = self.merged.sh_stride();
         let mut sum = [[0.0; 3]; sh::coefficients(DEGREE)];
@@ -110,7 +110,7 @@ impl<R: Real> LodTree<R> {
     }
 }
 
-/// By how much larger a node counts for the colors within it.
+/// Factor on the size of a node for the contrast of its colors.
 fn roughness(contrast: f64) -> f64 {
     (FLAT + contrast.sqrt() / CONTRAST).clamp(FLAT, COLORFUL).sqrt()
 }
@@ -134,7 +134,7 @@ fn along_the_curve<R: Real>(cloud: &GaussianCloud<R>) -> Vec<Item> {
 
 /// Bits by which the smallest voxels are coarser than the curve.
 fn first_shift(items: &[Item]) -> u32 {
-    // How many neighbors on the curve share a voxel of each size: from the highest bit in which they differ.
+    // Numbers of neighbors on the curve that share a voxel of each size: from the highest bit in which they differ.
     let mut alone = [0_usize; 65];
     for pair in items.windows(2) {
         alone[64 - (pair[0].0 ^ pair[1].0).leading_zeros() as usize] += 1;

@@ -19,7 +19,7 @@ const FULL: f64 = 0.85;
 const TRIES: usize = 5;
 /// Nodes from which on a cut is made by several threads.
 const SEVERAL: usize = 64;
-/// How far outside the picture the low-pass filter lets a Gaussian be seen, px.
+/// Margin outside the picture in which the low-pass filter lets a Gaussian be seen, px.
 const FILTER_PX: f64 = 2.0;
 
 /// A camera as cuts need it, relative to a cloud's origin.
@@ -29,7 +29,7 @@ struct Eye {
     offset: DVec3,
     near: f64,
     focal_px: f64,
-    /// Normals of the four sides of what is seen, inwards.
+    /// Normals of the four sides of the view frustum, inwards.
     sides: [DVec3; 4],
     grain_px: f64,
 }
@@ -57,12 +57,12 @@ impl Eye {
     }
 }
 
-/// What becomes of a node.
+/// Visibility of a node in a view.
 enum Seen {
     Outside,
     /// It is fine enough.
     Fine,
-    /// What is beneath it is drawn.
+    /// Its children are drawn instead.
     Coarse,
 }
 
@@ -74,14 +74,14 @@ impl<R: Real> LodTree<R> {
         if local.z + reach < eye.near || eye.sides.iter().any(|side| side.dot(local) + reach < 0.0) {
             return Seen::Outside;
         }
-        // What reaches behind the camera is never drawn as one.
+        // A node that reaches behind the camera is never drawn as one.
         match size * eye.focal_px <= eye.grain_px * (local.z - size).max(eye.near) {
             true => Seen::Fine,
             false => Seen::Coarse,
         }
     }
 
-    /// Puts what is drawn of `number` onto the list, or what is beneath it onto `open`.
+    /// Puts `number` onto `list` if it is drawn, or its children onto `open`.
     fn visit(&self, number: u32, eye: &Eye, open: &mut Vec<u32>, list: &mut Vec<u32>) {
         let Some(node) = (number as usize).checked_sub(self.leaves) else { return list.push(number) };
         match self.see(node, eye) {
@@ -91,7 +91,7 @@ impl<R: Real> LodTree<R> {
         }
     }
 
-    /// Gaussians and nodes of which none looks coarser than the eye's grain, without what is outside the picture.
+    /// Gaussians and nodes in the picture, none of which looks coarser than the eye's grain.
     fn list(&self, eye: &Eye) -> Vec<u32> {
         let (mut list, mut open) = (Vec::new(), self.roots.clone());
         while open.len() < SEVERAL {
@@ -121,8 +121,8 @@ impl<R: Real> Cut<R> {
         Self { tree: Arc::clone(tree), list: tree.list(&eye) }
     }
 
-    /// The finest cut for a view of about `most` Gaussians, or the finest that is any use. `grain_px` is where it
-    /// starts to look, and then what was found.
+    /// The finest cut for a view of about `most` Gaussians, or the finest of any use. `grain_px` is the start of the
+    /// search, and then its result.
     pub(crate) fn of_budget(
         tree: &Arc<LodTree<R>>,
         camera: &Camera,

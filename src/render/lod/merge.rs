@@ -9,31 +9,31 @@ use crate::scene::GaussianCloud;
 
 /// Standard deviations at which the faintest visible alpha of an opaque Gaussian lies: `sqrt(2 ln 255)`.
 const VISIBLE: f64 = 3.33;
-/// Scales beyond e to these are drawn by nobody; within them no square overflows.
+/// Logarithms of scales are clamped to these: no picture shows scales beyond, and no square overflows within.
 const LOG_SCALES: [f64; 2] = [-60.0, 60.0];
 /// Opacities that logits of single precision hold.
 const OPACITIES: [f64; 2] = [1e-6, 1.0 - 1e-6];
 
-/// By how much the area of what is merged grows at most, where it was covered more than once: at its edges a Gaussian
-/// lets light through that the many did not.
+/// Largest growth of the area of merged Gaussians that covered it more than once: at its edges one Gaussian lets light
+/// through that the many did not.
 const WIDEST: f64 = 1.7;
 
-/// What is merged.
+/// Moments of a Gaussian, or of several.
 #[derive(Clone, Copy)]
 pub(super) struct GaussianMoments {
     pub(super) mean: DVec3,
     pub(super) covariance: DMat3,
     /// Opacity times area.
     pub(super) weight: f64,
-    /// How far from the mean it can be seen.
+    /// Distance from the mean within which it can be seen.
     pub(super) reach: f64,
-    /// Its color without what depends on the direction, as it is shown.
+    /// Its displayed color without view dependence.
     pub(super) color: DVec3,
     /// Variance of such colors within it, mean over the channels.
     pub(super) contrast: f64,
 }
 
-/// How large a Gaussian looks from a direction nobody knows: for a disk its area, for a ball nearly twice that.
+/// Size of a Gaussian as seen from an unknown direction: for a disk its area, for a ball nearly twice that.
 fn area(covariance: &DMat3) -> f64 {
     let trace = covariance.x_axis.x + covariance.y_axis.y + covariance.z_axis.z;
     let squares: f64 = covariance.to_cols_array().iter().map(|v| v * v).sum();
@@ -69,7 +69,7 @@ pub(super) struct Merged {
     pub(super) shares: Vec<f64>,
 }
 
-/// Merges parts, of which some cannot be drawn; if none can, what comes out cannot be seen.
+/// Merges parts, of which some cannot be drawn; if none can, the result is invisible.
 pub(super) fn merge(parts: &[Option<GaussianMoments>]) -> Merged {
     let usable = parts.iter().flatten();
     let total: f64 = usable.clone().map(|p| p.weight).sum();

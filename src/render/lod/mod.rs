@@ -2,8 +2,8 @@
 //! it, and cuts through it that are fine enough for a view.
 //!
 //! Nodes are Gaussians of a second cloud. They are named by numbers that go on where those of the cloud end, so that
-//! a cut is a list of numbers, of Gaussians and of nodes. Whatever asks whose a splat is hears of the heaviest
-//! Gaussian beneath a node, so objects, masks and picks are the same at every level.
+//! a cut is a list of numbers, of Gaussians and of nodes. A splat of a node has the index of the heaviest Gaussian
+//! beneath it, so objects, masks and picks are the same at every level.
 
 mod build;
 mod cut;
@@ -29,13 +29,13 @@ pub(crate) struct LodTree<R = f32> {
     /// A Gaussian for each node, those beneath it before it.
     merged: GaussianCloud<R>,
     nodes: Vec<Node>,
-    /// Numbers of what is beneath the nodes, node after node.
+    /// Numbers of the children, node after node.
     children: Vec<u32>,
-    /// What is beneath nothing else.
+    /// Numbers of the nodes and Gaussians without a parent.
     roots: Vec<u32>,
 }
 
-/// What a cut asks of a node.
+/// Node of the tree, as cuts need it.
 #[derive(Clone, Copy, Debug)]
 struct Node {
     /// Standard deviation of its Gaussian along the longest axis, scene units, more for many colors and less for one.
@@ -49,7 +49,7 @@ struct Node {
     heaviest: u32,
 }
 
-/// What of a cloud is drawn instead of all of it.
+/// Gaussians and nodes that are drawn instead of a whole cloud.
 #[derive(Clone, Debug)]
 pub(crate) struct Cut<R = f32> {
     tree: Arc<LodTree<R>>,
@@ -74,17 +74,17 @@ impl<R: Real> LodTree<R> {
 }
 
 impl<R: Real> Cut<R> {
-    /// How many Gaussians it draws.
+    /// Number of Gaussians that it draws.
     pub(crate) fn len(&self) -> usize {
         self.list.len()
     }
 
-    /// Whether it is one of `cloud`.
+    /// Returns whether `cloud` has as many Gaussians as the cloud of its tree.
     pub(crate) fn fits(&self, cloud: &GaussianCloud<R>) -> bool {
         self.tree.leaves == cloud.len()
     }
 
-    /// Has what `of(cloud, k)` leads to fetched, if there is such a one.
+    /// Prefetches the result of `of(cloud, k)`, if there is one.
     #[inline(always)]
     pub(crate) fn fetch(&self, cloud: &GaussianCloud<R>, k: usize) {
         let Some(&number) = self.list.get(k) else { return };

@@ -1,4 +1,4 @@
-//! How many Gaussians there is time for, learned from how long pictures took.
+//! Number of Gaussians that fit into a time budget, learned from the times of pictures.
 
 use std::sync::Arc;
 
@@ -6,10 +6,10 @@ use super::cut::FINEST_PX;
 use super::{Cut, LodTree};
 use crate::scene::Camera;
 
-/// Where learning starts, and the fewest in which one still sees where one flies.
+/// First number, and the fewest that still show the way of a flight.
 const FIRST: usize = 60_000;
 const FEWEST: usize = 15_000;
-/// So many are enough for any picture.
+/// Most Gaussians: enough for any picture.
 const MOST: usize = 4_000_000;
 /// Seconds that a moving picture may take: thirty a second.
 pub(crate) const MOVING_SECS: f64 = 0.030;
@@ -24,9 +24,9 @@ const AIM: f64 = 0.9;
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Pace {
     most: usize,
-    /// Where the next cut starts to look.
+    /// Grain at which the next cut starts its search.
     grain_px: f64,
-    /// Whether the last cut used up the number.
+    /// True if the last cut used up the number.
     full: bool,
 }
 
@@ -37,15 +37,15 @@ impl Default for Pace {
 }
 
 impl Pace {
-    /// What is drawn of a view.
+    /// Cut for a view.
     pub(crate) fn cut(&mut self, tree: &Arc<LodTree>, camera: &Camera, near: f64) -> Cut {
         let cut = Cut::of_budget(tree, camera, near, self.most, &mut self.grain_px);
-        // Not back and forth where there is just about time for all.
+        // Hysteresis where there is just enough time for all.
         self.full = self.grain_px > if self.full { FINEST_PX } else { 2.0 * FINEST_PX };
         cut
     }
 
-    /// Whether there are Gaussians that would be seen and for which there is no time.
+    /// Returns whether visible Gaussians are left out for lack of time.
     pub(crate) fn leaves_out(&self) -> bool {
         self.full
     }
@@ -59,10 +59,10 @@ impl Pace {
         camera.resized(side(camera.width_px), side(camera.height_px))
     }
 
-    /// Takes in how long the last cut took, of the time that there was.
+    /// Learns from the time that the last cut took, given its budget.
     pub(crate) fn learn(&mut self, secs: f64, budget_secs: f64) {
         let factor = (AIM * budget_secs / secs.max(1e-6)).clamp(1.0 / STEP, STEP);
-        // Where all was drawn, it says nothing about more.
+        // A picture of all Gaussians says nothing about more of them.
         if self.full || factor < 1.0 {
             self.most = ((self.most as f64 * factor.sqrt()) as usize).clamp(FEWEST, MOST);
         }
@@ -89,7 +89,7 @@ mod tests {
             assert!((found / (AIM * budget) - 1.0).abs() < 0.05, "{found} of {budget}");
         }
         assert_eq!(settle(1e-3).most, FEWEST, "never less");
-        // What is all drawn in less time does not raise the number without end.
+        // A cloud that is drawn whole in less time does not raise the number without end.
         let mut pace = Pace::default();
         (0..60).for_each(|_| pace.learn(1e-3, 0.03));
         assert_eq!(pace.most, FIRST);

@@ -1,4 +1,5 @@
-//! What a tree and its cuts must keep: every Gaussian, the picture, and whose it is; numbers, whatever comes in.
+//! Properties that a tree and its cuts must keep: every Gaussian, the picture, and the labels; finite numbers for any
+//! input.
 
 use glam::DVec3;
 
@@ -9,7 +10,7 @@ use crate::render::cpu::CpuRenderer;
 use crate::render::{ContributionSink, Features, Frame, RenderSettings, TILE_PX};
 use crate::scene::Camera;
 
-/// Small Gaussians on a ball's surface, in bands of two colors; the band is what they belong to.
+/// Small Gaussians on a ball's surface, in bands of two colors; the band is their label.
 fn ball(n: usize) -> (GaussianCloud, Vec<u32>) {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let point = |i: usize| {
@@ -43,7 +44,7 @@ fn psnr(a: &Frame<f32>, b: &Frame<f32>) -> f64 {
     psnr_of(squares / (3 * a.alpha.len()) as f64)
 }
 
-/// The Gaussian of each pixel that has most of its light, as what it belongs to.
+/// Label of the Gaussian that gives each pixel most of its light.
 fn owners(cloud: &GaussianCloud, of: &[u32], camera: &Camera, cut: Option<Cut>) -> Vec<u32> {
     struct Row<'a>(&'a [u32], Vec<[f32; 3]>, usize);
     impl ContributionSink<f32> for Row<'_> {

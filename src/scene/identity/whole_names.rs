@@ -1,4 +1,4 @@
-//! By which texts an identity can be called, and the one that is shown: the only place where that is decided.
+//! Texts that name an identity, and the one that is shown: the only place that decides this.
 
 use std::collections::HashMap;
 
@@ -7,9 +7,9 @@ use super::{Identities, IdentityId, LevelFilter};
 
 /// Between the names of a piece and of its wholes.
 pub(crate) const BETWEEN: &str = " \u{b7} ";
-/// Pieces within pieces that a full name tells of.
+/// Most levels in a full name.
 const DEEPEST: usize = 8;
-/// What is longer, in bytes, is nobody's name.
+/// Longest text, in bytes, that can be a name.
 const LONGEST: usize = DEEPEST * text::LONGEST_NAME * 4;
 /// Marks around a name that are no part of it.
 const MARKS: &str = "?!.,;:\u{2026}\"'()[]{}«»“”„、。！？";
@@ -35,7 +35,7 @@ fn bare(name: &str) -> &str {
     loop {
         key = without_articles(key);
         match key.trim_matches(|c| c == ' ' || MARKS.contains(c)) {
-            // What consists of marks is called by them.
+            // A name of nothing but marks keeps them.
             "" => return key,
             bare if bare == key => return key,
             bare => key = bare,
@@ -49,9 +49,9 @@ pub(super) struct WholeNames {
     /// By number less one.
     pub(super) labels: Vec<String>,
     pub(super) full: Vec<String>,
-    /// Who is called so, by number.
+    /// Numbers of the identities that a compared text names.
     called: HashMap<String, Vec<IdentityId>>,
-    /// The same by full names as they were written before: "lid of the kettle".
+    /// The same for full names as earlier versions wrote them: "lid of the kettle".
     formerly: HashMap<String, Vec<IdentityId>>,
 }
 
@@ -75,7 +75,7 @@ impl WholeNames {
             let wholes: Vec<&str> = wholes.collect();
             let full = |label: &str| [&[label][..], &wholes].concat().join(BETWEEN);
             let mut label = all.name(id);
-            // A number more tells even what is called like another one's name and number.
+            // One more number sets apart even a name that equals another one's name and number.
             for _ in 0..3 {
                 let others = names.called.get(&key(&full(&label))).into_iter().flatten();
                 if others.copied().all(|other| all.ancestors(other).any(|i| i == id)) {
@@ -91,7 +91,7 @@ impl WholeNames {
         names
     }
 
-    /// Who of these levels is called so, by number.
+    /// Numbers of the identities of these levels that a text names.
     pub(super) fn called(&self, text: &str, all: &Identities, level: LevelFilter) -> Vec<IdentityId> {
         if text.len() > LONGEST {
             return Vec::new();

@@ -1,4 +1,4 @@
-//! What a plan is computed from: facts about a scene's data and the machine, gathered once.
+//! Facts about a scene's data and the machine, gathered once; a plan is computed from them.
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -8,12 +8,12 @@ use crate::math::rotation::matrix_from_quaternion;
 use crate::math::{Real, sh};
 use crate::scene::{Camera, Dataset, GaussianCloud, LanguageFeatures, Level, SemanticMap};
 
-/// What the machine offers, as far as a plan depends on it.
+/// Resources of the machine that a plan depends on.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Machine {
     /// Memory that programs may still use, in bytes.
     pub(crate) free_memory_bytes: u64,
-    /// Most Gaussians that training may use of it.
+    /// Most Gaussians of a training run in that memory.
     pub(crate) max_gaussians: usize,
     pub(crate) cores: usize,
     /// Name of the graphics adapter if it is a real one; `None` where there is none or it is
@@ -21,16 +21,16 @@ pub struct Machine {
     pub(crate) gpu: Option<String>,
 }
 
-/// What the user has set that a plan starts from.
+/// Settings of the user that a plan starts from.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Limits {
     /// Longer side of training pictures at most, px.
     pub train_side_px: u32,
-    /// Longer side of the pictures in which objects are looked for at most, px.
+    /// Longer side, at most, of the pictures in which objects are searched for, px.
     pub object_side_px: u32,
     /// Highest degree of a training's spherical harmonics.
     pub sh_degree: u8,
-    /// Every how-manieth photo is to be held out.
+    /// Interval of held-out photos; 0 = none.
     pub holdout_every: usize,
 }
 
@@ -53,7 +53,7 @@ pub struct CloudFacts {
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PhotoFacts {
     pub(crate) photos: usize,
-    /// Those that the data set itself marks as test.
+    /// Photos that the dataset marks as test.
     pub(crate) test_photos: usize,
     /// Width and height of the first, px.
     pub(crate) size_px: [u32; 2],
@@ -69,7 +69,7 @@ pub struct PhotoFacts {
 pub struct SemanticFacts {
     pub(crate) objects: usize,
     pub(crate) parts: usize,
-    /// The encoder that looked at them, if one has.
+    /// Encoder of their embeddings, if there are any.
     pub(crate) encoder: Option<String>,
     pub(crate) numbers: usize,
 }
@@ -98,7 +98,7 @@ impl SceneFacts {
         self
     }
 
-    /// With so many photos that the data set itself marks as test.
+    /// With this number of photos that the dataset marks as test.
     pub(crate) fn with_test_photos(mut self, test_photos: usize) -> Self {
         self.photos = self.photos.map(|photos| PhotoFacts { test_photos, ..photos });
         self
@@ -122,7 +122,7 @@ impl SceneFacts {
         self.with_cloud(cloud, sh_stored, cameras)
     }
 
-    /// Whether there are more Gaussians than a CPU, if one draws, can draw in time.
+    /// Returns whether a CPU draws, and there are more Gaussians than it can draw in time.
     pub(crate) fn is_large(&self, on_cpu: bool) -> bool {
         (on_cpu || self.machine.gpu.is_none()) && self.cloud.as_ref().is_some_and(|c| c.gaussians >= LARGE)
     }
@@ -197,7 +197,7 @@ pub fn used_degree<R: Real>(cloud: &GaussianCloud<R>) -> u8 {
     (1..=cloud.sh_degree).rev().find(|&d| bound[usize::from(d)] > 0.0).unwrap_or(0)
 }
 
-/// What each band can change at most, by degree.
+/// Largest change of a color by each band, by degree.
 fn band_bounds<R: Real>(cloud: &GaussianCloud<R>) -> [f64; 4] {
     let of = |gaussian: &[[R; 3]]| {
         let mut energies = [0.0_f64; 4];
@@ -214,10 +214,10 @@ fn band_bounds<R: Real>(cloud: &GaussianCloud<R>) -> [f64; 4] {
     [0, 1, 2, 3].map(|degree| energies[degree].sqrt() * reach(degree))
 }
 
-/// Cameras and Gaussians that are looked at to tell what is resolved.
+/// Most cameras and Gaussians that are sampled for the resolved size.
 const CAMERAS: usize = 8;
 const GAUSSIANS: usize = 4_000;
-/// Share of the footprints that may be finer than what is resolved.
+/// Share of the footprints that may be finer than the resolved size.
 const FINER: f64 = 0.05;
 /// Opacity under which a Gaussian draws no detail.
 const FAINT: f64 = 0.1;
@@ -288,7 +288,7 @@ mod tests {
         let mut camera =
             Camera::look_at(DVec3::new(1.0, -0.5, -4.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 640, 480).expect("valid");
         camera.focal_px.x *= 1.3;
-        // How the picture moves along each axis of the Gaussian, by differences; the narrower side is the
+        // Motion of the picture along each axis of the Gaussian, by differences; the narrower side is the
         // least over all directions in the picture.
         let [w, x, y, z] = [0.7, -0.2, 0.4, 0.5];
         let turn = glam::DQuat::from_vec4(glam::DVec4::new(x, y, z, w).try_normalize().expect("turns"));

@@ -1,4 +1,4 @@
-//! What can be decided about a scene, by stable names, and what the user wants instead.
+//! Items that a plan decides, by stable names, and the user's overrides.
 
 use std::collections::BTreeSet;
 use std::fmt;
@@ -7,8 +7,8 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 use strum::{EnumProperty, EnumString, IntoStaticStr, VariantArray};
 
-/// One thing that a plan decides: its name on the command line, the same in every version (with the name of earlier
-/// versions, where there was another), its subject for the user, and what can be had instead.
+/// An item that a plan decides: its name on the command line, the same in every version (with the name of earlier
+/// versions, if another), its subject for the user, and its alternative.
 #[derive(
     Clone,
     Copy,
@@ -32,27 +32,27 @@ pub enum Item {
     #[serde(alias = "colour")]
     #[strum(to_string = "color", serialize = "colour", props(subject = "Color", instead = "full"))]
     Color,
-    /// When the maps of a view's identities are drawn.
+    /// Time at which identity maps of a view are drawn.
     #[serde(alias = "maps")]
     #[strum(to_string = "feature-maps", serialize = "maps", props(subject = "Feature maps", instead = "always"))]
     FeatureMaps,
-    /// Whether they have a level for parts.
+    /// Part level of these maps.
     #[strum(props(subject = "Part level", instead = "on"))]
     Parts,
-    /// When objects and parts are drawn alone.
+    /// Time at which objects and parts are drawn alone.
     #[serde(alias = "portraits")]
     #[strum(to_string = "thumbnails", serialize = "portraits", props(subject = "Thumbnails", instead = "eager"))]
     Thumbnails,
-    /// When the encoder that understands phrases is loaded.
+    /// Time at which the text encoder is loaded.
     #[strum(props(subject = "Text encoder", instead = "eager"))]
     Encoder,
     /// Precision of the features that are stored.
     #[strum(props(subject = "Precision"))]
     Precision,
-    /// When the navigation graph is built.
+    /// Time at which the navigation graph is built.
     #[strum(props(subject = "Navigation graph", instead = "eager"))]
     Navigation,
-    /// When depth is drawn.
+    /// Time at which depth is drawn.
     #[strum(props(subject = "Depth", instead = "always"))]
     Depth,
     /// Size of the images to train on.
@@ -62,29 +62,29 @@ pub enum Item {
     #[serde(alias = "held")]
     #[strum(to_string = "holdout", serialize = "held", props(subject = "Holdout"))]
     Holdout,
-    /// Size of the images in which objects are looked for.
+    /// Size of the images in which objects are searched for.
     #[strum(props(subject = "Object search", instead = "full"))]
     Objects,
     /// Most Gaussians of a training.
     #[strum(props(subject = "Gaussians"))]
     Gaussians,
-    /// Which renderer draws.
+    /// Renderer that draws.
     #[strum(props(subject = "Backend", instead = "cpu"))]
     Backend,
-    /// When the window is drawn.
+    /// Time at which the window is drawn.
     #[strum(props(subject = "Redraw", instead = "always"))]
     Redraw,
-    /// How long the renderer keeps its working memory.
+    /// Lifetime of the renderer's working memory.
     #[strum(props(subject = "Render buffers", instead = "keep"))]
     Buffers,
-    /// Whether levels of detail are built, to move by.
+    /// Levels of detail for moving cameras.
     #[strum(props(subject = "Levels of detail", instead = "always"))]
     Levels,
 }
 
 /// The only word besides an item's alternative.
 const AUTO: &str = "auto";
-/// What "eager" was called in earlier versions.
+/// Name of "eager" in earlier versions.
 const FORMER_EAGER: &str = "open";
 
 impl Item {
@@ -96,7 +96,7 @@ impl Item {
         self.get_str("subject").unwrap_or_default()
     }
 
-    /// What can be had instead of what the data suggest.
+    /// Alternative to the automatic choice.
     pub(crate) fn alternative(self) -> Option<&'static str> {
         self.get_str("instead")
     }
@@ -114,11 +114,11 @@ impl fmt::Display for Item {
     }
 }
 
-/// What the user wants of one item: "color=full".
+/// The user's choice for one item: "color=full".
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct PlanOverride {
     pub(crate) item: Item,
-    /// The alternative instead of what the data suggest.
+    /// True for the alternative, false for the automatic choice.
     pub(crate) instead: bool,
 }
 
@@ -144,7 +144,7 @@ impl FromStr for PlanOverride {
     }
 }
 
-/// The items of which the user wants the alternative.
+/// Items for which the user chose the alternative.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct Overrides(BTreeSet<Item>);
@@ -160,7 +160,7 @@ impl Overrides {
         self.0.contains(&item)
     }
 
-    /// Takes one; a later one of the same item wins.
+    /// Applies an override; a later one of the same item wins.
     pub(crate) fn set(&mut self, one: PlanOverride) {
         if one.instead {
             self.0.insert(one.item);

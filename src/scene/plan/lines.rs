@@ -1,4 +1,4 @@
-//! A plan's decisions in words: what was decided, why, and what it saves.
+//! A plan's decisions in words: choice, reason and saving.
 
 use strum::VariantArray;
 
@@ -33,7 +33,7 @@ fn line(item: Item, plan: &ScenePlan) -> Option<PlanLine> {
     })
 }
 
-/// What is said of an item as the data suggest it.
+/// Texts on an item before overrides.
 struct Said {
     choice: String,
     reason: String,

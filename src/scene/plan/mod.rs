@@ -1,7 +1,7 @@
-//! What a scene needs and what is left out, each with its reason and what it saves.
+//! Decisions on what a scene needs, each with its reason and its saving.
 //!
-//! [`SceneFacts`] are gathered from the data once; [`ScenePlan::new`] is a pure function of them and of
-//! what the user wants instead. The program reads its decisions here and makes none of them itself.
+//! [`SceneFacts`] are gathered from the data once; [`ScenePlan::new`] is a pure function of them and of the user's
+//! overrides. The program reads its decisions here and makes none of them itself.
 
 mod facts;
 mod item;
@@ -17,21 +17,21 @@ pub use facts::{
 };
 pub use item::{Item, Overrides, PlanOverride};
 
-/// When something is made or loaded.
+/// Time at which something is made or loaded.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum When {
-    /// There is nothing that it could be for.
+    /// Never: nothing in the scene can need it.
     #[default]
     Never,
-    /// When it is used first.
+    /// At first use.
     Used,
-    /// As soon as there is something that it could be for.
+    /// As soon as something in the scene can need it.
     Always,
 }
 
 impl When {
-    /// Whether it is to be made now, where it is `used` or not.
+    /// Returns whether it is to be made now, given whether it is `used`.
     pub fn now(self, used: bool) -> bool {
         match self {
             Self::Never => false,
@@ -49,11 +49,11 @@ pub struct PlanLine {
     pub(crate) subject: String,
     pub(crate) choice: String,
     pub(crate) reason: String,
-    /// What it saves, or what it costs where the user wants it otherwise; empty for nothing.
+    /// Saving, or the cost if the user overrides it; empty for nothing.
     pub(crate) saving: String,
-    /// What the user can have instead, where that makes a difference.
+    /// Alternative for the user, if it makes a difference.
     pub(crate) alternative: Option<String>,
-    /// Whether the user wants it otherwise.
+    /// True if the user chose the alternative.
     pub overridden: bool,
 }
 
@@ -64,36 +64,36 @@ pub struct ScenePlan {
     pub(crate) overrides: Overrides,
     /// Highest spherical-harmonics degree that is drawn.
     pub sh_degree: u8,
-    /// When maps of a view's identities are drawn.
+    /// Time at which identity maps of a view are drawn.
     pub maps: When,
-    /// Whether these maps have a level for parts.
+    /// True if these maps have a level for parts.
     pub parts: bool,
     pub(crate) thumbnails: When,
-    /// When the encoder of typed phrases is loaded.
+    /// Time at which the text encoder is loaded.
     pub(crate) encoder: When,
     pub(crate) navigation: When,
-    /// When depth is drawn: as it is used, or with every picture.
+    /// Time at which depth is drawn: at use, or with every picture.
     pub(crate) depth: When,
     /// Longer side of the images to train on, px.
     pub(crate) train_side_px: u32,
-    /// Every how-manieth photo is held out; 0 = none.
+    /// Interval of held-out photos; 0 = none.
     pub(crate) holdout_every: usize,
-    /// Longer side of the images in which objects are looked for, px.
+    /// Longer side of the images in which objects are searched for, px.
     pub object_side_px: u32,
     /// Most Gaussians that training may use on this machine.
     pub(crate) max_gaussians: usize,
-    /// Whether the CPU is to draw even where there is a GPU.
+    /// True if the CPU is to draw even on a machine with a GPU.
     pub(crate) on_cpu: bool,
-    /// When the window is drawn: as something changes, or all the time.
+    /// Time at which the window is drawn: on change, or continuously.
     pub(crate) redraw: When,
     pub(crate) buffers: When,
-    /// Whether levels of detail are built to move by.
+    /// True if levels of detail are built, for moving cameras.
     pub(crate) levels: bool,
     pub(crate) lines: Vec<PlanLine>,
 }
 
 impl ScenePlan {
-    /// The plan for these facts, except for what the user wants otherwise.
+    /// Plan for these facts and the user's overrides.
     pub fn new(facts: SceneFacts, overrides: &Overrides) -> Self {
         let wants = |item: Item| overrides.has(item);
         let when = |there: bool, item: Item| match (there, wants(item)) {
@@ -138,17 +138,16 @@ impl ScenePlan {
         plan
     }
 
-    /// The line about this.
+    /// Line about an item.
     pub fn line(&self, item: Item) -> Option<&PlanLine> {
         self.lines.iter().find(|l| l.item == item)
     }
 }
 
-/// Objects are never looked for in images smaller than this along their longer side.
+/// Least longer side of the images in which objects are searched for.
 pub(crate) const LEAST_SIDE_PX: u32 = 256;
 
-/// Every how-manieth of `photos` is held out where every `wanted`-th was asked for: a single one is
-/// all there is to train on.
+/// Interval of held-out photos if every `wanted`-th is asked for; 0 for a single photo, which training needs.
 pub(crate) fn holdout(photos: usize, wanted: usize) -> usize {
     if photos > 1 { wanted } else { 0 }
 }

@@ -1,4 +1,4 @@
-//! What is decided from which facts, with a scene beside each that needs what is left out.
+//! Decisions by facts, each beside a scene that needs the part left out.
 
 use glam::DVec3;
 use strum::VariantArray;

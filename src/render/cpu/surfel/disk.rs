@@ -1,4 +1,4 @@
-//! Where the rays of eight pixels meet a surfel's plane, and what the surfel gives them.
+//! Intersections of eight pixels' rays with a surfel's plane, and the contribution of the surfel to them.
 //!
 //! A point `(u, v)` of the disk has the depth `Z + a u + b v` and lies `(A u + A' v) / depth` px to
 //! the right of the projected center and `(B u + B' v) / depth` px below it. Solved for the point
@@ -37,7 +37,7 @@ pub(crate) struct Disk<R: Real, L: Lanes<R>> {
     down: R,
 }
 
-/// What a surfel gives eight pixels.
+/// Contribution of a surfel to eight pixels.
 #[derive(Clone, Copy)]
 pub(crate) struct SurfelHit<R: Real, L: Lanes<R>> {
     /// Offsets of the pixel centers from the projected center.
@@ -48,7 +48,7 @@ pub(crate) struct SurfelHit<R: Real, L: Lanes<R>> {
     pub(crate) at: [L::V; 2],
     /// `1 / w`; 0 where the picture's distance counts.
     pub(crate) inverse: L::V,
-    /// Where the distance in the plane counts.
+    /// Lanes in which the distance in the plane counts.
     pub(crate) through: L::M,
     /// Depth along the camera's axis.
     pub(crate) depth: L::V,
@@ -76,7 +76,7 @@ impl<R: Real, L: Lanes<R>> Disk<R, L> {
         }
     }
 
-    /// What the pixels of a slot get.
+    /// Contribution to the pixels of a slot.
     #[inline(always)]
     pub(crate) fn hit(&self, l: L, reach: &Reach<R>, slot: usize) -> SurfelHit<R, L> {
         let (dx, dy) = (self.dx[slot / TILE_PX], l.splat(reach.dy[slot % TILE_PX] + self.down));

@@ -1,14 +1,14 @@
 //! Surfels: Gaussians without thickness, met by each pixel's ray (2D Gaussian Splatting, Huang et
 //! al. 2024).
 //!
-//! A surfel is a Gaussian whose third scale is ignored: a disk across its first two axes. Where the
-//! ray through a pixel meets the disk's plane gives the Gaussian's value there, the depth, and so a
-//! surface that does not move with the view. As in the paper, a surfel is never drawn smaller than a
-//! pixel: the squared distance is the smaller of that in the plane and that in the picture.
+//! A surfel is a Gaussian whose third scale is ignored: a disk across its first two axes. The intersection of a pixel's
+//! ray with the disk's plane gives the Gaussian's value there, the depth, and so a surface that does not move with the
+//! view. As in the paper, a surfel is never drawn smaller than a pixel: the squared distance is the smaller of that in
+//! the plane and that in the picture.
 //!
 //! Own are projection ([`project`]), alpha ([`disk`]) and the way back ([`mod@project_backward`]). With
 //! depth asked for, frames also hold normals and the distortion `sum over pairs (w_i w_j (1/z_i -
-//! 1/z_j)²)`, which is in inverse depth because that is what a picture can resolve.
+//! 1/z_j)²)`, in inverse depth because that is the quantity that a picture can resolve.
 
 pub(crate) mod disk;
 pub(crate) mod project;

@@ -1,4 +1,4 @@
-//! Projection of surfels: what the compositing needs of each, and an ellipse around what it touches.
+//! Projection of surfels: constants for compositing, and an ellipse around all pixels that each touches.
 
 use super::super::project::{CameraView, Projected, Splat};
 use crate::math::{Real, rotation};
@@ -100,7 +100,7 @@ pub(crate) struct Bound<R> {
 #[inline(always)]
 pub(crate) fn bound<R: Real>(g: &SurfelGeometry<R>, reach: R) -> Option<Bound<R>> {
     let (along, z) = ([g.axes[0][2], g.axes[1][2]], g.local[2]);
-    // How far depth changes across the disk, as a share of the center's depth, squared.
+    // Change of depth across the disk, as a share of the center's depth, squared.
     let slope = reach * (along[0] * along[0] + along[1] * along[1]) / (z * z);
     let rest = R::ONE - slope;
     if !(rest > R::of(1e-6)) {
@@ -125,7 +125,7 @@ pub(crate) fn bound<R: Real>(g: &SurfelGeometry<R>, reach: R) -> Option<Bound<R>
     usable.then_some(Bound { offset, squared, determinant })
 }
 
-/// A Gaussian as a surfel: the ellipse around what it touches, which binning and the walk over a tile see, its
+/// Projects a Gaussian as a surfel: the ellipse around the pixels it touches, for binning and the walk over a tile, its
 /// shape, and its normal.
 #[inline(always)]
 pub(crate) fn surfel<R: Real>(

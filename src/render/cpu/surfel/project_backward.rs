@@ -57,8 +57,7 @@ pub(crate) fn project_backward<R: Real>(
     for k in 0..3 {
         position[k] += turned[k];
     }
-    // How far the picture of the center moves per px is how far the center does, whatever the
-    // gradient came through.
+    // The projected center moves per px as the center does, whatever path the gradient took.
     let half = [R::of(view.size[0] as f64 * 0.5), R::of(view.size[1] as f64 * 0.5)];
     let on_screen = [d_local[0] * z / focal[0] * half[0], d_local[1] * z / focal[1] * half[1]];
     Some(GaussianGradient {

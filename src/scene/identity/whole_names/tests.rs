@@ -97,7 +97,7 @@ fn names_that_look_like_full_names_and_numbers_are_told_apart_too() {
     }
     assert_eq!((called(&all, "eye · doll"), called(&all, "eye of the doll")), (vec![eye, odd[0]], vec![odd[2]]));
     assert_eq!((all.full_name(odd[5]), called(&all, "#8")), ("#8".into(), vec![8]), "what has no name has a number");
-    // A whole and its piece of the same name are not two things.
+    // An object and its part of the same name are not two things.
     assert_eq!((all.full_name(lamp), called(&all, "lamp")), ("lamp · lamp".into(), vec![odd[6], lamp]));
 }
 
