@@ -83,6 +83,7 @@ impl<'a> Template<'a> {
         let root = self.root(&weights);
         self.check(&weights, root).map_err(refused)?;
         std::fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
+        // Written to a temporary folder first, so that a failure or a cancel leaves nothing behind.
         let held = temporary_folder(folder, description).map_err(|e| failed(folder, e))?;
         let draft = held.folder.path();
         let all = self.table.weights.values().map(|w| w.len() as u64).sum();

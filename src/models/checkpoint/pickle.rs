@@ -49,6 +49,7 @@ impl Machine<'_> {
                 0x95 => drop(self.take::<8>()?),
                 b'.' => return self.pop(),
                 b'(' => self.marks.push(self.stack.len()),
+                // Tensors need no booleans and floats: they are read as nothing.
                 b'N' | 0x88 | 0x89 => self.push(Value::Nothing)?,
                 b'J' => self.integer::<4>()?,
                 b'K' => self.integer::<1>()?,

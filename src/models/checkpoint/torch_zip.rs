@@ -102,6 +102,7 @@ fn records(pickle: &Pickle) -> Result<Vec<(String, TensorRecord)>> {
     let mut found = Vec::new();
     let mut open = vec![(String::new(), pickle.root.clone(), 0)];
     let mut visits = 0;
+    // Limits on depth and visits, because a small pickle can describe a cyclic or a huge graph.
     while let Some((name, value, depth)) = open.pop() {
         let Value::Node(node) = value else { continue };
         if depth > MOST_DEPTH {

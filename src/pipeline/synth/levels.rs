@@ -84,6 +84,7 @@ pub(crate) fn identities(scene: &MeshScene, levels: Levels, file: &str) -> Resul
         };
         list.push(identity(object, name, Level::Object, None, path)?);
         let top_part = |t: usize| (levels == Levels::File && named(t)).then_some(t);
+        // Pushed in reverse, so that nodes are visited in the order of the file.
         let mut stack: Vec<(usize, Option<usize>)> = tops.iter().rev().map(|&t| (t, top_part(t))).collect();
         let first = surfaces.len();
         while let Some((node, part)) = stack.pop() {
@@ -94,6 +95,7 @@ pub(crate) fn identities(scene: &MeshScene, levels: Levels, file: &str) -> Resul
             stack.extend(children.map(|&c| (c, if named(c) { Some(c) } else { part })));
         }
         let own = &mut surfaces[first..];
+        // Rule 3: a single part is the object itself.
         if own.iter().all(|s| s.part == own[0].part) {
             own.iter_mut().for_each(|s| s.part = None);
         }

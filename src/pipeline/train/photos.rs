@@ -77,6 +77,7 @@ pub(crate) fn load_views(
     observer: &mut dyn Observer,
 ) -> Result<Option<Vec<TrainView>>, TrainError> {
     let mut ticker = Ticker::new(stage, indices.len());
+    // Borders come from the training photos alone, also those of held-out photos.
     let (training, _) = dataset.split(config.holdout_every);
     let borders = Borders::of(dataset, &training, config.max_side_px).map_err(TrainError::Photo)?;
     if borders.share() > 0.0 {
