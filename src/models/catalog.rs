@@ -1,5 +1,5 @@
-//! The networks that the program can use (`assets/models.toml`), and which of them are on this machine. They lie in one
-//! folder: `FMLGS_MODELS`, else `models` in the user's data folder. Each model has a description (JSON) that holds the
+//! List of the networks that the program can use (`assets/models.toml`), and their state on this machine. They lie in
+//! one folder: `FMLGS_MODELS`, else `models` in the user's data folder. Each model has a description (JSON) with the
 //! SHA-256 of its graphs; a graph that differs is refused.
 
 use std::fs;
@@ -13,7 +13,7 @@ use crate::io::files;
 
 const LIST: &str = include_str!("../../assets/models.toml");
 
-/// Name of the model that follows masks.
+/// Name of the model that tracks masks.
 pub(crate) const SAM2: &str = "sam2.1-tiny";
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -22,7 +22,7 @@ pub(crate) enum ModelRole {
     /// Compares pictures with phrases.
     Encoder,
     Segmenter,
-    /// Paints what is missing of a picture.
+    /// Fills in missing pixels of a picture.
     Inpainter,
     /// Runs networks.
     Engine,
@@ -32,50 +32,50 @@ pub(crate) enum ModelRole {
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModelEntry {
-    /// Its name in commands.
+    /// Name in commands.
     pub id: String,
     pub(crate) role: ModelRole,
-    /// Its name for display.
+    /// Display name.
     pub title: String,
-    /// What it adds, in plain words.
+    /// Purpose, in plain words.
     pub adds: String,
     /// License of its weights.
     #[serde(alias = "licence")]
     pub license: String,
     pub(crate) source: String,
-    /// The command that makes its files, of those in `tools/export`.
+    /// Command of `tools/export` that makes its files.
     #[serde(default)]
     pub export: String,
-    /// Whether it is part of the program.
+    /// True if it is part of the program.
     #[serde(default)]
     pub built_in: bool,
     /// Name of the file that describes it; empty if it is built in.
     #[serde(default)]
     pub description: String,
-    /// Address of the folder with its files, where there is one.
+    /// Address of the folder with its files, if there is one.
     #[serde(default)]
     pub(crate) url: Option<String>,
     /// Its graphs.
     #[serde(default)]
     pub file: Vec<ListedFile>,
-    /// The official file that it can be made of.
+    /// Official file that it can be made from.
     #[serde(default)]
     pub checkpoint: Option<OfficialFile>,
-    /// The same by system, for what is a program: that of this one becomes `checkpoint`.
+    /// Archives of an engine, by system: the one for this system becomes `checkpoint`.
     #[serde(default)]
     pub(crate) archive: Vec<SystemArchive>,
-    /// How fast it is without a GPU.
+    /// Speed without a GPU, in words.
     #[serde(default)]
     pub speed: String,
-    /// What it is known to answer with the official weights.
+    /// Published answer of the official weights.
     #[serde(default)]
     pub(crate) known: Option<KnownAnswer>,
-    /// Whether it is what to begin with, of those with its role.
+    /// True if it is the first choice for its role.
     #[serde(default)]
     pub(crate) recommended: bool,
-    /// How long a segmenter looks for everything in a photo, an encoder at one picture of an object.
+    /// Time in which a segmenter segments everything in a photo, or an encoder embeds one picture of an object.
     pub(crate) photo_seconds: Option<PhotoSeconds>,
-    /// How long one that follows masks looks at a frame with ONNX Runtime, and follows one mask into it.
+    /// Seconds in which a tracker encodes a frame with ONNX Runtime, and tracks one mask into it.
     pub(crate) track_seconds: Option<[f64; 2]>,
 }
 
@@ -85,37 +85,37 @@ pub struct ModelEntry {
 pub(crate) struct PhotoSeconds {
     /// With ONNX Runtime.
     pub(crate) onnx_runtime: f64,
-    /// With the engine that is built in.
+    /// With the built-in engine.
     pub(crate) built_in: Option<f64>,
-    /// With ONNX Runtime, for each object in the photo besides: its own tile is searched for parts.
+    /// With ONNX Runtime, for each object besides: its own tile is searched for parts.
     pub(crate) each_object: Option<f64>,
 }
 
-/// An archive with a program for one kind of machine.
+/// Archive with an engine for one system and architecture.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct SystemArchive {
-    /// As Rust names it.
+    /// Operating system, as Rust names it.
     system: String,
     architecture: String,
-    /// What is taken out of it.
+    /// Library that is extracted from the archive.
     library: ListedFile,
     file: OfficialFile,
 }
 
-/// A file with the weights of a model, as its makers publish it.
+/// File with the weights of a model, as its authors publish it.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct OfficialFile {
-    /// Its address.
+    /// Address.
     pub url: String,
-    /// About how large it is, MB.
+    /// Approximate size, MB.
     pub megabytes: u64,
-    /// Its checksum, if its makers publish one.
+    /// Published checksum, if there is one.
     #[serde(default)]
     pub sha256: Option<String>,
 }
 
-/// A graph of a listed model.
+/// Graph of a listed model.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ListedFile {
@@ -130,17 +130,17 @@ struct List {
     model: Vec<ModelEntry>,
 }
 
-/// Whether a model can be used.
+/// State of a model on this machine.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ModelState {
     /// Part of the program.
     BuiltIn,
-    /// All files are here.
+    /// All files are present.
     Here,
-    /// These files are not.
+    /// These files are missing.
     Missing(Vec<String>),
-    /// Something is wrong with a file.
+    /// A file is damaged, or its description cannot be read.
     Broken(String),
 }
 
@@ -150,7 +150,7 @@ impl ModelState {
     }
 }
 
-/// Why a model could not be put in place.
+/// Reasons for which a model could not be installed.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum InstallError {
@@ -173,7 +173,7 @@ pub enum InstallError {
     Model(#[from] ModelError),
 }
 
-/// All models of the list, in its order.
+/// Returns all listed models, in the order of the list.
 pub fn entries() -> Result<Vec<ModelEntry>, ModelError> {
     let damaged =
         |e: toml::de::Error| ModelError::Metadata { path: "assets/models.toml".into(), problem: e.to_string() };
@@ -185,23 +185,23 @@ pub fn entries() -> Result<Vec<ModelEntry>, ModelError> {
             entry.file = vec![archive.library.clone()];
         }
     }
-    // A program without an archive for this machine is nothing that could be had.
+    // An engine without an archive for this system cannot be installed.
     all.retain(|entry| entry.archive.is_empty() || entry.checkpoint.is_some());
     Ok(all)
 }
 
-/// The model with this name.
+/// Returns the model with this name.
 pub fn entry(id: &str) -> Result<ModelEntry, InstallError> {
     entries()?.into_iter().find(|e| e.id == id).ok_or_else(|| InstallError::Unknown(id.to_owned()))
 }
 
 impl ModelEntry {
-    /// The file that describes it, if it were in `folder`.
+    /// Path of its description in `folder`.
     pub(crate) fn description_in(&self, folder: &Path) -> PathBuf {
         folder.join(&self.description)
     }
 
-    /// Names of all its files: the description first.
+    /// Names of all its files, the description first.
     fn files(&self) -> Vec<&str> {
         std::iter::once(self.description.as_str()).chain(self.file.iter().map(|f| f.name.as_str())).collect()
     }
@@ -212,22 +212,22 @@ impl ModelEntry {
         self.files().into_iter().filter(is_missing).map(str::to_owned).collect()
     }
 
-    /// About how large it is, MB.
+    /// Approximate size, MB.
     pub fn megabytes(&self) -> u64 {
         self.file.iter().map(|f| f.megabytes).sum()
     }
 
-    /// Whether there is an address that it can be fetched from.
+    /// True if there is an address to fetch it from.
     pub(crate) fn is_hosted(&self) -> bool {
         self.url.is_some() || self.checkpoint.is_some()
     }
 
-    /// About how much is fetched, MB.
+    /// Approximate size of the download, MB.
     pub(crate) fn download_megabytes(&self) -> u64 {
         self.checkpoint.as_ref().map_or_else(|| self.megabytes(), |c| c.megabytes)
     }
 
-    /// Where it comes from and what it becomes, of one that is not here.
+    /// Describes the source and the size of a model that is not installed.
     pub(crate) fn origin(&self) -> String {
         let (license, megabytes) = (&self.license, self.megabytes());
         match &self.checkpoint {
@@ -243,8 +243,7 @@ impl ModelEntry {
         }
     }
 
-    /// Whether it can be used from `folder`. Sizes are compared, contents are not: see
-    /// [`Self::verify`].
+    /// Returns its state in `folder`. Compares sizes, not contents: see [`Self::verify`].
     pub fn state(&self, folder: &Path) -> ModelState {
         if self.built_in {
             return ModelState::BuiltIn;
@@ -278,9 +277,8 @@ impl ModelEntry {
         Ok(())
     }
 
-    /// Fetches what is not here yet from its address, or from that of another `from` folder, into
-    /// `folder`, and checks it. `progress` is told the file, its bytes that are there and those that
-    /// there will be, and says whether to go on.
+    /// Fetches missing files into `folder`, from its address or from the folder address `from`, and checks them.
+    /// `progress` receives the file, the bytes so far and the total, and returns false to cancel.
     pub(super) fn fetch_files(
         &self,
         folder: &Path,
@@ -303,7 +301,7 @@ impl ModelEntry {
             let wanted = FileToFetch { url: &address(name), to: &to, bytes, most, sha256 };
             fetch::fetch(&wanted, patience, &mut |there, all| progress(name, there, all))
         };
-        // The description says what the graphs must be; fetched anew, it is that of these graphs.
+        // The description fixes the graphs' checksums, so it is fetched first.
         let description = self.description_in(folder);
         if manifest::graphs(&description).is_err() {
             get(&self.description, None, None)?;
@@ -316,8 +314,7 @@ impl ModelEntry {
         self.verify(folder)
     }
 
-    /// Takes over its files from a folder that somebody brings. They are checked there before
-    /// anything here changes.
+    /// Copies its files from a folder of the user. They are checked there before anything is changed.
     pub fn add(&self, folder: &Path, brought: &Path) -> Result<(), InstallError> {
         if self.built_in {
             return Err(InstallError::BuiltIn(self.id.clone()));
@@ -335,7 +332,7 @@ impl ModelEntry {
         let failed = |path: &Path, source| FetchError::File { path: path.into(), source };
         fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
         let graphs = manifest::graphs(&self.description_in(brought))?;
-        // The description last: without it, the model is not here.
+        // The description last: without it, the model counts as missing.
         let names = graphs.iter().map(|g| g.file.as_str()).chain([self.description.as_str()]);
         for name in names {
             let (from, to) = (brought.join(name), folder.join(name));
@@ -348,8 +345,7 @@ impl ModelEntry {
     }
 }
 
-/// The description of a model that is here, by its name in the list; of any other, by the path of
-/// its description.
+/// Returns the description of an installed model by its name, or of an unlisted one by the path of its description.
 pub(crate) fn find(name: &str, role: ModelRole) -> Result<PathBuf, ModelError> {
     let listed = entries()?.into_iter().find(|e| e.id == name && e.role == role && !e.built_in);
     if let Some(entry) = listed {
@@ -368,8 +364,8 @@ pub(crate) fn find(name: &str, role: ModelRole) -> Result<PathBuf, ModelError> {
     }
 }
 
-/// Names of the models of a role that can be used now, best first; the built-in ones last. `told` hears of
-/// each that is here and cannot be used.
+/// Names of the usable models of a role, best first; the built-in ones last. `told` receives a warning for each
+/// broken model.
 pub(crate) fn usable(role: ModelRole, told: &mut dyn FnMut(String)) -> Result<Vec<String>, ModelError> {
     Ok(usable_of(&entries()?, role, &folder(), told))
 }

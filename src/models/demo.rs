@@ -1,5 +1,5 @@
-//! The encoder that comes with the program: two small networks that this project trained on its own
-//! renders (`tools/encoder`), so that queries work with nothing to download.
+//! Built-in encoder: two small networks that this project trained on its own renders (`tools/encoder`), so that
+//! queries work without a download.
 
 use std::borrow::Cow;
 use std::path::Path;
@@ -13,14 +13,13 @@ use crate::io::{IoError, files};
 
 const IMAGE: (&str, &[u8]) = ("demo_image.onnx", include_bytes!("../../assets/models/demo_image.onnx"));
 const TEXT: (&str, &[u8]) = ("demo_text.onnx", include_bytes!("../../assets/models/demo_text.onnx"));
-/// The word list, by which another encoder of this make is named too.
+/// Word list. Its file name also identifies another encoder made by `tools/encoder`.
 pub(super) const WORDS: (&str, &str) = ("demo_vocab.json", include_str!("../../assets/models/demo_vocab.json"));
 
-/// Largest network of this make that is read, bytes.
+/// Largest accepted network file, bytes.
 const MAX_BYTES: u64 = 64 << 20;
 
-/// The `demo` encoder, or another one that `tools/encoder` made. Its networks are prepared when they are first
-/// needed.
+/// The `demo` encoder, or another one that `tools/encoder` made. Its networks are loaded at first use.
 pub(crate) struct DemoEncoder {
     name: String,
     words: Vocabulary,
@@ -28,7 +27,7 @@ pub(crate) struct DemoEncoder {
     text: Half,
 }
 
-/// A network, and what it is made of.
+/// Network and the bytes of its file.
 struct Half {
     name: &'static str,
     bytes: Cow<'static, [u8]>,
@@ -36,14 +35,14 @@ struct Half {
 }
 
 impl DemoEncoder {
-    /// The one that comes with the program.
+    /// Opens the built-in encoder.
     pub(crate) fn new() -> Result<Self, ModelError> {
         let half = |(name, bytes)| Half { name, bytes: Cow::Borrowed(bytes), network: None };
         let words = Vocabulary::parse(WORDS.1, WORDS.0)?;
         Ok(Self { name: super::DEMO.into(), words, image: half(IMAGE), text: half(TEXT) })
     }
 
-    /// The one whose word list is in the file `path`, its networks beside it.
+    /// Opens the encoder with the word list in the file `path`, its networks beside it.
     pub(super) fn open(path: &Path) -> Result<Self, ModelError> {
         let damaged = |path: &Path, e: IoError| ModelError::Vocabulary {
             file: path.display().to_string(),
@@ -61,7 +60,7 @@ impl DemoEncoder {
 }
 
 impl Half {
-    /// The network, prepared if it is not yet.
+    /// Returns the network, loading it at first use.
     fn ready(&mut self) -> Result<&mut Network, ModelError> {
         let loaded = match self.network.take() {
             Some(network) => network,

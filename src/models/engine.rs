@@ -1,11 +1,11 @@
-//! What runs networks: an ONNX Runtime library where there is one, the built-in engine (RTen)
-//! otherwise. Chosen once, at the first use of a network.
+//! Inference engine: an ONNX Runtime library if one is found, otherwise the built-in engine (RTen). Chosen once, at
+//! the first use of a network.
 //!
-//! A library is taken from the path in `FMLGS_ONNXRUNTIME` or `ORT_DYLIB_PATH`, else from the
-//! models' folder if it was fetched, the program's own folder, the active Python environment's
-//! `onnxruntime` wheel, or the system's library folders. One that cannot be loaded, or is older than version 1.24, is left aside, and
-//! [`Engine::note`] says so. `FMLGS_DEVICE` chooses what it computes on (`cpu`, `cuda`, `tensorrt`,
-//! `coreml`, `directml`); otherwise the first of CUDA, Core ML and DirectML that it offers.
+//! The library is taken from the path in `FMLGS_ONNXRUNTIME` or `ORT_DYLIB_PATH`, else from the models' folder if it
+//! was fetched, the program's own folder, the active Python environment's `onnxruntime` wheel, or the system's
+//! library folders. A library that cannot be loaded, or is older than version 1.24, is skipped, and
+//! [`Engine::note`] reports it. `FMLGS_DEVICE` chooses the device (`cpu`, `cuda`, `tensorrt`, `coreml`, `directml`);
+//! otherwise it is the first of CUDA, Core ML and DirectML that the library offers.
 
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
@@ -20,20 +20,20 @@ use super::open_network::{OpenNetwork, guarded};
 use super::{ModelError, folder, session_cache};
 use crate::scene::resource_log::{self, ResourceKind};
 
-/// The description of the library that was fetched.
+/// Description of the fetched library.
 const LIBRARY: &str = "onnxruntime.json";
 
 const MODEL_USE: &str = "its first use";
 
 pub(crate) struct Engine {
-    /// Of ONNX Runtime; the built-in engine needs none.
+    /// Environment of ONNX Runtime; the built-in engine needs none.
     environment: Option<Environment>,
     name: String,
     device: Option<Device>,
     note: Option<String>,
 }
 
-/// What ONNX Runtime computes on other than the processor.
+/// Devices of ONNX Runtime other than the processor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Device {
     Cuda,
@@ -43,8 +43,7 @@ enum Device {
 }
 
 impl Device {
-    /// In the order in which they are tried; TensorRT only on request, because it takes minutes to
-    /// prepare a network.
+    /// Devices in the order of trial; TensorRT only on request, because preparing a network takes minutes.
     const TRIED: [Self; 3] = [Self::Cuda, Self::CoreMl, Self::DirectMl];
 
     fn named(name: &str) -> Option<Self> {
@@ -84,24 +83,24 @@ impl Device {
 
 static CHOSEN: OnceLock<Result<Engine, (String, String)>> = OnceLock::new();
 
-/// Name of the engine that is built in.
+/// Name of the built-in engine.
 const BUILT_IN: &str = "RTen (built in)";
 
-/// What runs networks, or would if one were used now.
+/// Engine that runs networks, or would if one were used now.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct EngineFacts {
     pub(crate) name: String,
-    /// What it computes on.
+    /// Device, for display.
     pub(crate) device: &'static str,
-    /// What was asked for but is not so.
+    /// Warning about a requested library or device that is not used.
     pub(crate) note: Option<String>,
-    /// Whether it is ONNX Runtime.
+    /// True if it is ONNX Runtime.
     pub(crate) is_fast: bool,
-    /// Whether a network was used already, so that it stays until the program ends.
+    /// True if the choice is final: it stays until the program ends.
     pub(crate) is_settled: bool,
 }
 
-/// Looks at it without choosing the built-in one: a library that is fetched before the first use of a network is used.
+/// Returns the engine without settling on the built-in one: a library fetched before the first use still counts.
 pub(crate) fn facts() -> Result<EngineFacts, ModelError> {
     if CHOSEN.get().is_none() && library().is_none() {
         let name = BUILT_IN.to_owned();
@@ -113,15 +112,15 @@ pub(crate) fn facts() -> Result<EngineFacts, ModelError> {
     Ok(EngineFacts { name, device, note, is_fast: engine.is_fast(), is_settled: true })
 }
 
-/// The engine of this process; the first call chooses it.
+/// Returns the engine of this process; the first call chooses it.
 pub(crate) fn engine() -> Result<&'static Engine, ModelError> {
     let chosen = CHOSEN.get_or_init(|| Engine::choose(library()));
     chosen.as_ref().map_err(|(engine, problem)| ModelError::Engine { engine: engine.clone(), problem: problem.clone() })
 }
 
 impl GraphFile {
-    /// The network in the slot; loaded from a folder if it is not there yet, and only if the file is
-    /// what its description says.
+    /// Returns the network in the slot. Loads it from a folder at first use, after checking the file against its
+    /// description.
     pub(crate) fn ready<'a>(
         &self,
         slot: &'a mut Option<Network>,
@@ -138,10 +137,10 @@ impl GraphFile {
     }
 }
 
-/// A library that was chosen, or why one that was to be chosen cannot be.
+/// Chosen library, or the file that cannot be used with the reason.
 type Library = Result<PathBuf, (PathBuf, String)>;
 
-/// Where an ONNX Runtime library is, or is said to be.
+/// Finds the path of an ONNX Runtime library; an explicitly set path is not checked.
 fn library() -> Option<Library> {
     let var = |name: &str| std::env::var_os(name).filter(|p| !p.is_empty()).map(PathBuf::from);
     if let Some(path) = var("FMLGS_ONNXRUNTIME").or_else(|| var("ORT_DYLIB_PATH")) {
@@ -159,7 +158,7 @@ fn library() -> Option<Library> {
     folders.filter_map(|folder| library_in(&folder)).next().map(Ok)
 }
 
-/// The library that was fetched into the models' folder, if it is what its description says.
+/// Returns the library that was fetched into the models' folder, if it matches its description.
 fn fetched(folder: &Path) -> Option<Library> {
     let description = folder.join(LIBRARY);
     if !description.is_file() {
@@ -172,7 +171,7 @@ fn fetched(folder: &Path) -> Option<Library> {
     library.map_err(|e| (description, e.to_string())).transpose()
 }
 
-/// Where a Python environment keeps the library of its `onnxruntime` package.
+/// Folders of a Python environment that may hold the library of its `onnxruntime` package.
 fn wheel_folders(environment: &Path) -> Vec<PathBuf> {
     let inside = |site: PathBuf| site.join("site-packages").join("onnxruntime").join("capi");
     let pythons = std::fs::read_dir(environment.join("lib")).into_iter().flatten().flatten().map(|e| e.path());
@@ -180,7 +179,7 @@ fn wheel_folders(environment: &Path) -> Vec<PathBuf> {
     pythons.map(inside).chain([inside(environment.join("Lib"))]).collect()
 }
 
-/// The library in a folder: by its plain name, or with a version as in wheels.
+/// Finds the library in a folder: by its plain name, or with a version as in wheels.
 pub(super) fn library_in(folder: &Path) -> Option<PathBuf> {
     let plain = format!("{}onnxruntime{}", std::env::consts::DLL_PREFIX, std::env::consts::DLL_SUFFIX);
     let exact = folder.join(&plain);
@@ -242,7 +241,7 @@ impl Engine {
         &self.name
     }
 
-    /// Whether it is ONNX Runtime.
+    /// True if it is ONNX Runtime.
     pub(crate) fn is_fast(&self) -> bool {
         self.environment.is_some()
     }
@@ -251,7 +250,7 @@ impl Engine {
         self.device.map_or("processor", Device::text)
     }
 
-    /// What was asked for but is not so.
+    /// Warning about a requested library or device that is not used.
     pub(crate) fn note(&self) -> Option<&str> {
         self.note.as_deref()
     }
@@ -271,7 +270,7 @@ impl Engine {
         Ok(network.in_file(move || engine()?.session(&file)))
     }
 
-    /// A session of a network in a file, for which room is made.
+    /// Opens a session of a network file, closing idle networks if memory is short.
     pub(super) fn session(&self, path: &Path) -> Result<OpenNetwork, ModelError> {
         let bytes = std::fs::metadata(path).map_or(0, |m| m.len());
         let name = path.display().to_string();
@@ -303,7 +302,7 @@ impl Engine {
             }
             commit(&mut builder)
         };
-        // A device that refuses a network is no reason to do without it, but is told among what was loaded.
+        // If a device refuses a network, the processor runs it, and the resource log says so.
         let refused = |device: Device, e: ort::Error| {
             let what = format!("network {name}, on the processor, because {} refused it: {e}", device.text());
             resource_log::record(ResourceKind::Model, what, MODEL_USE, 0);
@@ -318,7 +317,7 @@ impl Engine {
 }
 
 fn loaded(path: &Path) -> Result<ort::environment::EnvironmentBuilder, String> {
-    // A missing file would make the loader's own message a riddle.
+    // The loader's own message about a missing file is unclear.
     if path.is_absolute() && !path.is_file() {
         return Err("there is no such file".into());
     }

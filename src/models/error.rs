@@ -1,6 +1,6 @@
-//! What can go wrong with networks.
+//! Errors of networks.
 
-/// A network that could not be used, or an input that it cannot take.
+/// Network that could not be used, or an input that it cannot take.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum ModelError {

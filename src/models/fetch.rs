@@ -1,5 +1,4 @@
-//! Downloads of model files: resumed, checked, cancellable. Nothing is fetched that nobody has
-//! asked for.
+//! Downloads of model files: resumed, checked, cancellable. Nothing is fetched without a request of the user.
 
 mod answer;
 
@@ -19,38 +18,37 @@ use crate::scene::text;
 
 use answer::{content_range, elsewhere};
 
-/// Least that has to arrive within the patience for a stall: a server that sends a byte now and then is
-/// as good as silent.
+/// Least number of bytes within the time of a stall: a server that sends a byte now and then counts as stalled.
 const LEAST_BYTES: u64 = 1024;
 
-/// How often a server may send on to another address, and letters of one that are shown.
+/// Most redirects of a server, and characters of an address that are shown.
 const MOST_HOPS: usize = 10;
 const SHOWN: usize = 200;
 
-/// Largest file whose size nobody has promised: a description.
+/// Largest file of unknown size, bytes: a description.
 pub const MOST_UNPROMISED: u64 = 16 << 20;
 
-/// A file to fetch.
+/// File to fetch.
 #[derive(Clone, Copy, Debug)]
 pub struct FileToFetch<'a> {
-    /// From where.
+    /// Address.
     pub url: &'a str,
-    /// The file that it becomes, once it is complete and right.
+    /// Path of the complete and checked file.
     pub to: &'a Path,
-    /// Its size, if that is known.
+    /// Size in bytes, if known.
     pub bytes: Option<u64>,
-    /// Its largest size, if that is not known.
+    /// Largest size in bytes, if the size is not known.
     pub most: u64,
-    /// Its SHA-256 in hexadecimal digits, if that is known.
+    /// SHA-256 in hexadecimal digits, if known.
     pub sha256: Option<&'a str>,
 }
 
-/// How patient a download is.
+/// Timeouts and retries of a download.
 #[derive(Clone, Copy, Debug)]
 pub struct Patience {
-    /// How long a server may say nothing.
+    /// Longest silence of a server.
     pub stall: Duration,
-    /// How often a download that broke off is resumed.
+    /// Number of attempts before an interrupted download fails.
     pub attempts: u32,
     /// Wait before the second attempt; doubled before each further one.
     pub pause: Duration,
@@ -62,8 +60,7 @@ impl Default for Patience {
     }
 }
 
-/// Why a file could not be fetched. What arrived before stays, and is resumed the next time,
-/// unless it was wrong.
+/// Reasons for which a file could not be fetched. A valid partial download stays and is resumed the next time.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum FetchError {
@@ -101,8 +98,7 @@ impl FetchError {
     }
 }
 
-/// Fetches a file. `progress` is told the bytes that are there and those that there will be, and
-/// whether to go on.
+/// Fetches a file. `progress` receives the bytes so far and the total, and returns false to cancel.
 pub fn fetch(
     wanted: &FileToFetch<'_>,
     patience: Patience,
@@ -111,7 +107,7 @@ pub fn fetch(
     if let Some(folder) = wanted.to.parent() {
         fs::create_dir_all(folder).map_err(|source| FetchError::File { path: folder.into(), source })?;
     }
-    // Where a server sends on to is looked at before it is asked.
+    // Redirects are followed by hand, so that each address is checked before it is requested.
     let config = http::config(wanted.url, 2 * patience.stall).max_redirects(0).max_redirects_will_error(false);
     let agent = Agent::from(config.build());
     let part = Part::of(wanted);
@@ -140,12 +136,12 @@ pub fn fetch(
         }
         checked?;
     }
-    // The tag first: ended between the two, nothing is left beside a whole file.
+    // The tag first: if the program ends between the two, no tag is left beside a whole file.
     let _ = fs::remove_file(&part.tag);
     fs::rename(&part.path, wanted.to).map_err(|source| FetchError::File { path: wanted.to.into(), source })
 }
 
-/// Compares a file with its SHA-256.
+/// Compares a file with its expected SHA-256.
 pub(crate) fn check(path: &Path, expected: &str) -> Result<(), FetchError> {
     let got = sha256(path).map_err(|source| FetchError::File { path: path.into(), source })?;
     if got.eq_ignore_ascii_case(expected) {
@@ -168,12 +164,12 @@ pub fn sha256(path: &Path) -> io::Result<String> {
     Ok(files::hex(&hasher.finalize()))
 }
 
-/// What has arrived so far, beside the file that it will become.
+/// Partial download, beside the final file.
 pub(super) struct Part {
     path: PathBuf,
-    /// Holds the tag that the server gave this version of the file.
+    /// File with the server's tag of this version of the file.
     tag: PathBuf,
-    /// Whether what arrived can be resumed if the server gives no tag: a checksum will tell.
+    /// True if it can be resumed without a tag of the server, because a checksum verifies the result.
     is_checked: bool,
 }
 
@@ -187,14 +183,14 @@ impl Part {
         Self { path: beside(".part"), tag: beside(".part.tag"), is_checked: wanted.sha256.is_some() }
     }
 
-    /// Bytes that can be gone on from, and the tag of their version.
+    /// Number of bytes to resume from, and the tag of their version.
     pub(super) fn there(&self) -> (u64, Option<String>) {
         let tag = fs::read_to_string(&self.tag).ok().filter(|t| !t.is_empty());
         let bytes = fs::metadata(&self.path).map_or(0, |m| m.len());
         if tag.is_some() || self.is_checked { (bytes, tag) } else { (0, None) }
     }
 
-    /// The file with the first `there` bytes of it, to be resumed, for this process alone.
+    /// Opens the file, cut to its first `there` bytes, and locks it for this process.
     fn open(&self, there: u64) -> Result<File, FetchError> {
         let mut file =
             OpenOptions::new().create(true).write(true).truncate(false).open(&self.path).map_err(|e| self.failed(e))?;
@@ -204,7 +200,7 @@ impl Part {
                 let busy = "another program is fetching it; wait for that, or end it";
                 return Err(self.failed(io::Error::other(busy)));
             }
-            // Some file systems know no locks.
+            // Some file systems do not support locks.
             Err(TryLockError::Error(_)) => {}
         }
         file.set_len(there).and_then(|()| file.seek(SeekFrom::End(0))).map_err(|e| self.failed(e))?;
@@ -212,7 +208,7 @@ impl Part {
     }
 
     fn forget(&self) {
-        // That they are gone already is as good.
+        // The files may be gone already.
         let _ = fs::remove_file(&self.path);
         let _ = fs::remove_file(&self.tag);
     }
@@ -222,7 +218,7 @@ impl Part {
     }
 }
 
-/// One connection: goes on from what is there.
+/// Makes one connection and resumes from the bytes on disk.
 fn receive(
     agent: &Agent,
     wanted: &FileToFetch<'_>,
@@ -271,7 +267,7 @@ fn receive(
         StatusCode::PARTIAL_CONTENT => {
             let (start, total) = header("content-range").as_deref().and_then(content_range).unwrap_or((u64::MAX, None));
             if start != there {
-                // Another piece than was asked for.
+                // The server sent another range than the requested one.
                 part.forget();
                 return Err(FetchError::Truncated { url, got: 0, expected: wanted.bytes.or(total).unwrap_or(0) });
             }
@@ -305,14 +301,14 @@ fn receive(
         match wait.next(there, expected, progress) {
             Ok(Some(ResponsePart::Bytes(piece))) => {
                 if there + piece.len() as u64 > most {
-                    // What is longer than it should be is another file from its start.
+                    // A file that is too long is another file, so its first bytes are useless too.
                     part.forget();
                     return Err(too_large(there + piece.len() as u64));
                 }
                 there += piece.len() as u64;
                 file.write_all(&piece).map_err(|e| part.failed(e))?;
             }
-            // Where no size is known, only a whole answer is a whole file.
+            // Without a known size, an interrupted answer cannot be told from a whole file.
             Ok(Some(ResponsePart::Failed(problem))) if expected.is_none() => {
                 return Err(FetchError::Unreachable { url, problem });
             }
@@ -327,7 +323,7 @@ fn receive(
     }
 }
 
-/// Why a wait ended without a piece.
+/// Reason for which a wait ended without a piece.
 enum Ended {
     Stalled,
     Cancelled,
@@ -342,18 +338,18 @@ impl Ended {
     }
 }
 
-/// Waits for pieces, for as long as enough of them come and nobody wants it to end.
+/// Waits for pieces until the server stalls or the user cancels.
 struct Wait {
     pieces: Receiver<ResponsePart>,
     stall: Duration,
-    /// When enough came last.
+    /// Time at which at least [`LEAST_BYTES`] had last arrived.
     since: Instant,
-    /// Bytes that came after.
+    /// Bytes that arrived since then.
     got: u64,
 }
 
 impl Wait {
-    /// The next piece; `None` at the end.
+    /// Returns the next piece; `None` at the end.
     fn next(
         &mut self,
         there: u64,
@@ -365,7 +361,7 @@ impl Wait {
             if !progress(there, expected) {
                 return Err(Ended::Cancelled);
             }
-            // It may have waited out a pause, which is not the server's silence.
+            // `progress` may have waited while the user paused; this is not a stall of the server.
             self.since += asked.elapsed();
             let piece = match self.pieces.recv_timeout(TICK) {
                 Ok(piece) => piece,

@@ -1,5 +1,4 @@
-//! Answers that were published for a network with its official weights: whoever has those can tell whether this
-//! installation gives the same.
+//! Published answers of networks with their official weights, to check that an installation reproduces them.
 
 use std::path::{Path, PathBuf};
 
@@ -13,29 +12,29 @@ use super::{Encoder, ModelError, manifest};
 use crate::math::vector::dot;
 use crate::scene::PhotoPixels;
 
-/// What CLIP multiplies cosines with before it compares texts.
+/// Factor by which CLIP multiplies cosines before its softmax over texts.
 const CLIP_SCALE: f64 = 100.0;
 
-/// A question with the answer that was published.
+/// Question with its published answer.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct KnownAnswer {
-    /// Address of the picture that is asked about.
+    /// Address of the picture.
     pub(crate) picture: String,
-    /// Who published the answer, and what may differ.
+    /// Source of the answer, and permitted differences.
     pub(crate) published: String,
-    /// Texts of which each has its probability.
+    /// Texts; the answer has the probability of each.
     #[serde(default)]
     texts: Vec<String>,
-    /// A click, px; the three candidates have their predicted IoU, the greatest first.
+    /// Click, px; the answer has the predicted IoU of the three candidates, the greatest first.
     #[serde(default)]
     click: [f64; 2],
     numbers: Vec<f64>,
-    /// Largest difference that is no matter.
+    /// Largest accepted difference.
     tolerance: f64,
 }
 
-/// A question, asked here.
+/// Result of a question on this machine.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct KnownResult {
     pub(crate) published: String,
@@ -46,12 +45,12 @@ pub(crate) struct KnownResult {
 }
 
 impl KnownAnswer {
-    /// Where its picture lies, once it was fetched.
+    /// Path of its fetched picture.
     pub(crate) fn picture_in(&self, folder: &Path) -> PathBuf {
         folder.join(self.picture.rsplit('/').next().unwrap_or_default())
     }
 
-    /// Asks the model that `description` describes.
+    /// Runs the model of `description` on the question.
     pub(crate) fn ask(&self, description: &Path, picture: &PhotoPixels) -> Result<KnownResult, ModelError> {
         let got = match manifest::kind(description)?.as_str() {
             "clip" => probabilities(ClipEncoder::open(description)?, picture, &self.texts)?,
@@ -65,7 +64,7 @@ impl KnownAnswer {
     }
 }
 
-/// How probable each text is for the picture, among them.
+/// Probability of each text for the picture, among these texts.
 fn probabilities(mut clip: ClipEncoder, picture: &PhotoPixels, texts: &[String]) -> Result<Vec<f64>, ModelError> {
     let pixels = clip.prepare().picture(picture).ok_or(ModelError::NoPicture)?;
     let picture = clip.embed_pixels(pixels)?.concat();

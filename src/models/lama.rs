@@ -1,7 +1,7 @@
-//! LaMa (Suvorov et al. 2022): paints what is missing of a picture.
+//! LaMa (Suvorov et al. 2022): inpaints missing pixels of a picture.
 //!
-//! The graph that others have made of its weights takes `image` `[1, 3, S, S]` (0 to 1) and `mask` `[1, 1, S, S]`
-//! (1 = missing) and gives `output` `[1, 3, S, S]` (0 to 255).
+//! The published ONNX graph takes `image` `[1, 3, S, S]` (0 to 1) and `mask` `[1, 1, S, S]` (1 = missing) and gives
+//! `output` `[1, 3, S, S]` (0 to 255).
 
 use std::path::{Path, PathBuf};
 
@@ -13,9 +13,9 @@ use super::tensor::Tensor;
 use super::{ModelError, manifest};
 use crate::math::resize::nearest;
 
-/// Its name in the list of models, and what its description calls it.
+/// Name in the list of models, and kind in its description.
 pub(crate) const LAMA: &str = "lama";
-/// Side of its pictures, px, of the graph that is listed.
+/// Side of the pictures of the listed graph, px.
 const SIDE_PX: usize = 512;
 
 #[derive(Debug, Deserialize)]
@@ -29,7 +29,7 @@ struct Graphs {
     network: manifest::GraphFile,
 }
 
-/// The network; its graph is loaded when it is first needed.
+/// The network; its graph is loaded at first use.
 pub(crate) struct Lama {
     folder: PathBuf,
     about: Metadata,
@@ -37,15 +37,15 @@ pub(crate) struct Lama {
 }
 
 impl Lama {
-    /// The model that a description is about; its graph lies beside it.
+    /// Opens the model of a description; its graph lies beside it.
     pub(crate) fn open(path: &Path) -> Result<Self, ModelError> {
         let about: Metadata = manifest::read(path, LAMA)?;
         manifest::check_pictures(path, about.image_size, [0.0; 3], [1.0; 3])?;
         Ok(Self { folder: path.parent().map(Path::to_path_buf).unwrap_or_default(), about, network: None })
     }
 
-    /// Colors (0 to 1, row by row) of a picture of which those that are `known` are right. It sees the picture squeezed
-    /// into its square.
+    /// Returns the colors (0 to 1, row by row) of a picture, of which only the `known` pixels are given. The network
+    /// sees the picture squeezed into its square.
     pub(crate) fn paint(
         &mut self,
         color: &[[f32; 3]],
@@ -74,7 +74,7 @@ impl Lama {
     }
 }
 
-/// The description of a graph of LaMa in a file.
+/// Description of a graph of LaMa in a file.
 pub(super) fn description(file: &str, bytes: u64, sha256: &str) -> serde_json::Value {
     json!({
         "version": 1, "kind": LAMA, "image_size": SIDE_PX, "checkpoint_sha256": sha256,
@@ -86,7 +86,7 @@ pub(super) fn description(file: &str, bytes: u64, sha256: &str) -> serde_json::V
 pub(crate) mod tests {
     use super::*;
 
-    /// A folder with the description of a network that makes what is missing the mean of the rest.
+    /// Folder with a network that fills missing pixels with the mean of the rest.
     pub(crate) fn fixture() -> tempfile::TempDir {
         let folder = tempfile::tempdir().expect("folder");
         let graph = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/networks/lama.onnx");

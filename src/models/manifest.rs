@@ -1,4 +1,4 @@
-//! The JSON file that describes an exported model, beside its graphs.
+//! Description of an exported model: a JSON file beside its graphs.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -8,11 +8,11 @@ use serde::de::DeserializeOwned;
 
 use super::ModelError;
 
-/// Version of the file that this program reads.
+/// Version of the description that this program reads.
 const VERSION: u64 = 1;
 pub(crate) const MAX_BYTES: u64 = super::fetch::MOST_UNPROMISED;
 
-/// A graph of a model.
+/// Graph of a model.
 #[derive(Clone, Debug, Deserialize)]
 pub struct GraphFile {
     pub(crate) file: String,
@@ -21,7 +21,7 @@ pub struct GraphFile {
 }
 
 impl GraphFile {
-    /// Compares its size with what the description says.
+    /// Compares the file's size with the description.
     pub fn check_size(&self, folder: &Path) -> Result<(), ModelError> {
         let path = folder.join(&self.file);
         let refused = |problem: String| ModelError::Metadata { path: path.clone(), problem };
@@ -37,7 +37,7 @@ impl GraphFile {
         Ok(())
     }
 
-    /// Compares its content with what the description says.
+    /// Compares the file's size and SHA-256 with the description.
     pub(crate) fn check(&self, folder: &Path) -> Result<(), ModelError> {
         self.check_size(folder)?;
         let path = folder.join(&self.file);
@@ -46,10 +46,10 @@ impl GraphFile {
     }
 }
 
-/// Largest side of a picture that a network takes, px: four times that of the largest there are.
+/// Largest side of a network's pictures, px: four times that of the largest known network.
 const MAX_SIDE_PX: usize = 4096;
 
-/// Checks what a description says of the pictures that a network takes.
+/// Checks the input settings in a description: side, mean and standard deviation.
 pub(crate) fn check_pictures(path: &Path, side_px: usize, mean: [f32; 3], std: [f32; 3]) -> Result<(), ModelError> {
     let refused = |problem: String| Err(ModelError::Metadata { path: path.into(), problem });
     if !(1..=MAX_SIDE_PX).contains(&side_px) {
@@ -76,12 +76,12 @@ struct AnyModel {
     graphs: BTreeMap<String, GraphFile>,
 }
 
-/// The files that a description names.
+/// Reads the graphs that a description names.
 pub fn graphs(path: &Path) -> Result<Vec<GraphFile>, ModelError> {
     let kind = kind(path)?;
     let graphs: AnyModel = read(path, &kind)?;
     let all: Vec<GraphFile> = graphs.graphs.into_values().collect();
-    // A name with a path in it would reach out of the folder.
+    // A name with a path in it could lead out of the folder.
     match all.iter().find(|g| Path::new(&g.file).file_name() != Some(std::ffi::OsStr::new(&g.file))) {
         Some(g) => Err(ModelError::Metadata { path: path.into(), problem: format!("'{}' is no file name", g.file) }),
         None => Ok(all),
@@ -108,7 +108,7 @@ pub(crate) fn read<T: DeserializeOwned>(path: &Path, kind: &str) -> Result<T, Mo
     crate::io::files::json(&bytes, path).map_err(|e| refused(e.to_string()))
 }
 
-/// The kind of model that a metadata file describes.
+/// Reads the kind of model that a description is for.
 pub fn kind(path: &Path) -> Result<String, ModelError> {
     let refused = |problem: String| ModelError::Metadata { path: path.into(), problem };
     let bytes = crate::io::files::read(path, MAX_BYTES).map_err(|e| refused(e.to_string()))?;

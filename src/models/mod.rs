@@ -1,10 +1,9 @@
-//! Neural networks: what turns a picture of a thing, and a phrase, into vectors that can be compared.
+//! Neural networks: encoders that embed pictures and phrases in one space, and segmenters.
 //!
 //! A network is an ONNX file, run by [`engine`]. [`Encoder`] compares pictures with phrases:
 //! [`DemoEncoder`] is the small one that comes with the program (made by `tools/encoder`),
-//! [`ClipEncoder`] the one of the paper. [`sam`] and [`sam2`] find masks. [`catalog`] knows which
-//! there are, and [`fetch`] brings them; `template` makes them of
-//! official checkpoints.
+//! [`ClipEncoder`] the one of the paper. [`sam`] and [`sam2`] find masks. [`catalog`] lists the models, [`fetch`]
+//! downloads them, and `template` makes them from official checkpoints.
 
 use std::path::{Path, PathBuf};
 
@@ -43,13 +42,13 @@ pub use error::ModelError;
 pub(crate) use known::{KnownAnswer, KnownResult};
 pub(crate) use words::is_word;
 
-/// Where models lie.
+/// Folder of the models.
 pub(crate) fn folder() -> PathBuf {
     let set = std::env::var_os("FMLGS_MODELS").filter(|p| !p.is_empty());
     set.map_or_else(|| data_folder().join("models"), PathBuf::from)
 }
 
-/// A picture of one identity: mask on black, padded to a square, side x side, sRGB 0..1, row-major.
+/// Picture of one identity: its mask on black, padded to a square, side x side, sRGB 0..1, row-major.
 #[derive(Clone, Debug, PartialEq)]
 pub struct IdentityCrop {
     /// Side in px.
@@ -58,9 +57,9 @@ pub struct IdentityCrop {
     pub rgb: Vec<[f32; 3]>,
 }
 
-/// Pictures and phrases as unit vectors of one space: the nearer, the better they fit.
+/// Encoder of pictures and phrases as unit vectors in one space: the closer, the better they fit.
 pub trait Encoder: Send {
-    /// What it is called, for example "demo".
+    /// Name, for example "demo".
     fn name(&self) -> &str;
 
     /// Length of its vectors.
@@ -69,35 +68,35 @@ pub trait Encoder: Send {
     /// Side of the tiles it takes, px; `None` if it resizes them itself.
     fn tile_side_px(&self) -> Option<usize>;
 
-    /// The vectors of pictures; of unit length.
+    /// Returns the unit vectors of pictures.
     fn images(&mut self, tiles: &[IdentityCrop]) -> Result<Vec<Vec<f32>>, ModelError>;
 
-    /// The vector of one picture.
+    /// Returns the unit vector of one picture.
     fn image(&mut self, tile: &IdentityCrop) -> Result<Vec<f32>, ModelError> {
         let mut one = self.images(std::slice::from_ref(tile))?;
         one.pop().ok_or_else(|| ModelError::NoOutput { model: self.name().to_owned(), output: "embedding".into() })
     }
 
-    /// The vectors of phrases; of unit length. Words it does not know are left out; a phrase with no other words is
-    /// an error ([`ModelError::NoKnownWord`]). Fewer if the encoder itself fails: the last says why.
+    /// Returns the unit vectors of phrases. Unknown words are left out; a phrase with no other words is an error
+    /// ([`ModelError::NoKnownWord`]). If the encoder itself fails, there are fewer results, and the last is the error.
     fn texts(&mut self, phrases: &[&str]) -> Vec<Result<Vec<f32>, ModelError>>;
 
-    /// The vector of one phrase.
+    /// Returns the unit vector of one phrase.
     fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
         let one = self.texts(&[phrase]).pop();
         one.ok_or_else(|| ModelError::NoOutput { model: self.name().to_owned(), output: "embedding".into() })?
     }
 
-    /// The words of a phrase that it does not know, each once, the first few of them.
+    /// Returns the first few unknown words of a phrase, each once.
     fn unknown_words(&self, phrase: &str) -> Vec<String>;
 }
 
-/// What gives the vectors of phrases: an encoder, or a function that knows one at a time.
+/// Source of the vectors of phrases: an encoder, or a function that embeds one at a time.
 pub trait TextSource {
-    /// Why it has none of a phrase.
+    /// Reason for which a phrase has no vector.
     type Error;
 
-    /// The vectors of these phrases, in their order; fewer if it fails itself: the last says why.
+    /// Returns the vectors of these phrases, in order. If the source fails, there are fewer, and the last is the error.
     fn texts(&mut self, phrases: &[&str]) -> Vec<Result<Vec<f32>, Self::Error>>;
 }
 
@@ -117,23 +116,23 @@ impl<E, F: FnMut(&str) -> Result<Vec<f32>, E>> TextSource for F {
     }
 }
 
-/// Name of the encoder that comes with the program.
+/// Name of the built-in encoder.
 pub(crate) const DEMO: &str = "demo";
 
-/// Whether an encoder is the one that comes with the program, or made like it: it knows a few hundred made-up things,
-/// and takes all others for one of them.
+/// Returns whether an encoder is the built-in one, or made like it: it knows a few hundred synthetic objects and
+/// takes all others for one of them.
 pub(crate) fn is_rough(name: &str) -> bool {
     name == DEMO || Path::new(name).ends_with(demo::WORDS.0)
 }
 
-/// The best encoder that can be used on this machine. `told` hears of better ones that are broken.
+/// Opens the best usable encoder. `told` receives a warning for each better one that is broken.
 pub(crate) fn best_encoder(told: &mut dyn FnMut(String)) -> Result<Box<dyn Encoder>, ModelError> {
     let best = catalog::usable(ModelRole::Encoder, told)?.into_iter().next();
     encoder(best.as_deref().unwrap_or(DEMO))
 }
 
-/// The encoder of this name: 'demo', a model of the catalog, or the path of a model's description; that of one made
-/// like 'demo' is its word list.
+/// Opens an encoder by name: 'demo', a model of the catalog, or the path of a description; an encoder made like
+/// 'demo' is named by its word list.
 pub fn encoder(name: &str) -> Result<Box<dyn Encoder>, ModelError> {
     match name {
         DEMO => Ok(Box::new(DemoEncoder::new()?)),

@@ -1,4 +1,4 @@
-//! A network: named arrays in, named arrays out.
+//! Network with named input and output arrays.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -9,7 +9,7 @@ use super::open_network::OpenNetwork;
 use super::session_cache::{self, CachedSession};
 use super::tensor::{NetworkInput, Tensor};
 
-/// What comes out of a network, by name.
+/// Outputs of a network, by name.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Outputs {
     model: String,
@@ -27,25 +27,25 @@ type Reopen = Box<dyn Fn() -> Result<OpenNetwork, ModelError> + Send + Sync>;
 pub(crate) struct Network {
     place: Arc<Mutex<CachedSession>>,
     name: String,
-    /// What opens its file again, if it has one; without, it stays open.
+    /// Opens its file again. A network without a file stays open.
     reopen: Option<Reopen>,
 }
 
 impl Network {
-    /// Of a session, with the file name for messages.
+    /// Wraps a session; `name` is its file name for messages.
     pub(super) fn new(session: OpenNetwork, name: &str) -> Self {
         Self { place: CachedSession::of(session), name: name.into(), reopen: None }
     }
 
-    /// The same, known to lie in a file that `reopen` opens: it may be closed where memory is short.
+    /// Registers a network in a file that `reopen` opens: it may be closed if memory is short.
     pub(super) fn in_file(self, reopen: impl Fn() -> Result<OpenNetwork, ModelError> + Send + Sync + 'static) -> Self {
         session_cache::register(&self.place);
         Self { reopen: Some(Box::new(reopen)), ..self }
     }
 
-    /// Its session, opened again if it was closed.
+    /// Returns its session, opened again if it was closed.
     fn opened(&self) -> Result<MutexGuard<'_, CachedSession>, ModelError> {
-        // A panic while it ran leaves a session that runs again.
+        // A session stays usable after a panic during a run.
         let mut place = self.place.lock().unwrap_or_else(PoisonError::into_inner);
         if let (None, Some(reopen)) = (&place.session, &self.reopen) {
             place.session = Some(reopen()?);
@@ -54,13 +54,13 @@ impl Network {
         Ok(place)
     }
 
-    /// Which axes of an input may be of any length; none if that cannot be told.
+    /// Marks the axes of an input that may have any length; empty if unknown.
     pub(super) fn free_axes(&self, input: &str) -> Vec<bool> {
         let shape = self.opened().ok().and_then(|place| place.session.as_ref()?.wanted_shape(input));
         shape.unwrap_or_default().iter().map(Option::is_none).collect()
     }
 
-    /// Runs it. Every number that comes out is finite.
+    /// Runs it. Every output value is finite.
     pub(crate) fn run(&mut self, inputs: Vec<(&'static str, NetworkInput)>) -> Result<Outputs, ModelError> {
         let name = self.name.clone();
         let mut place = self.opened()?;
@@ -69,7 +69,7 @@ impl Network {
         };
         for (input, value) in &inputs {
             let shape = value.shape();
-            // An engine may do worse than fail on another shape.
+            // An engine may crash or compute garbage on another shape.
             let differs = |w: &Vec<Option<usize>>| {
                 w.len() != shape.len() || w.iter().zip(shape).any(|(w, got)| w.is_some_and(|w| w != *got))
             };
@@ -89,7 +89,7 @@ impl Network {
         Ok(Outputs { model: name, arrays })
     }
 
-    /// The rows of an output, each scaled to unit length; `length` numbers in each are expected.
+    /// Runs it and returns the rows of an output, of `length` numbers, each scaled to unit length.
     pub(crate) fn unit_rows(
         &mut self,
         inputs: Vec<(&'static str, NetworkInput)>,
@@ -105,9 +105,9 @@ impl Network {
     }
 }
 
-/// A row scaled to unit length, if it has a direction.
+/// Scales a row to unit length, if it has a direction.
 fn unit(values: &[f32], name: &str) -> Result<Vec<f32>, ModelError> {
-    // A vector this short has no direction but that of rounding.
+    // The direction of such a short vector is rounding noise.
     let zero = values.iter().all(|v| v.abs() < 1e-7);
     let unit = crate::math::vector::unit(values).filter(|_| !zero);
     unit.ok_or(ModelError::NotFinite { model: name.into(), index: 0, value: 0.0 })

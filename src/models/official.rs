@@ -1,4 +1,4 @@
-//! Models made here of the files that their makers publish.
+//! Models made from the official files of their authors.
 
 use std::path::Path;
 
@@ -9,13 +9,13 @@ use super::fetch::{self, FetchError, FileToFetch, Part, Patience};
 use super::template::Template;
 use super::{ModelError, manifest, unpack};
 
-/// What `progress` is told instead of a file while the weights of a checkpoint are written.
+/// Name that `progress` receives instead of a file while the weights of a checkpoint are written.
 pub(crate) const WEIGHTS: &str = "weights";
 
-/// Endings of checkpoints, and of archives with programs.
+/// Endings of checkpoints, and of archives with an engine.
 const ENDINGS: [&str; 7] = [".pt", ".pth", ".bin", ".safetensors", ".onnx", ".tgz", ".zip"];
 
-/// The template of a model, where there is one.
+/// Template of a model, if there is one.
 fn template(id: &str) -> Option<&'static [u8]> {
     Some(match id {
         "clip-vit-b16" => include_bytes!("../../assets/models/clip-vit-b16.zip"),
@@ -34,31 +34,31 @@ fn template(id: &str) -> Option<&'static [u8]> {
     })
 }
 
-/// Whether an address is that of a checkpoint, not that of a folder.
+/// Returns whether an address is of a checkpoint, not of a folder.
 fn is_checkpoint(address: &str) -> bool {
     ENDINGS.iter().any(|ending| address.ends_with(ending))
 }
 
-/// The folder that official files are fetched from instead of from their makers, if somebody says so.
+/// Folder address that replaces the official ones, if `FMLGS_MODELS_FROM` is set.
 fn mirror() -> Option<String> {
     std::env::var("FMLGS_MODELS_FROM").ok().filter(|url| !url.is_empty())
 }
 
-/// Where an official file is fetched from.
+/// Address of an official file, in the mirror if there is one.
 fn in_mirror(url: &str, mirror: Option<&str>) -> String {
     let name = url.rsplit('/').next().unwrap_or_default();
     mirror.map_or_else(|| url.to_owned(), |folder| format!("{}/{name}", folder.trim_end_matches('/')))
 }
 
-/// What a description says of the checkpoint that a model was made of.
+/// Source checkpoint in the description of a model.
 #[derive(Deserialize)]
 struct Origin {
     checkpoint_sha256: Option<String>,
 }
 
 impl ModelEntry {
-    /// Makes it of an official checkpoint or archive that somebody brings, and checks it. `progress` is told the weights that are
-    /// written and all of them, and says whether to go on.
+    /// Makes it from an official checkpoint or archive of the user, and checks it. `progress` receives the number of
+    /// weights written and their total, and returns false to cancel.
     pub fn add_checkpoint(
         &self,
         folder: &Path,
@@ -85,11 +85,10 @@ impl ModelEntry {
         self.verify(folder)
     }
 
-    /// Fetches it into `folder` and checks it: its files, or, of a model that can be made of its official checkpoint,
-    /// that. `from` is the address of a folder of such files, of a folder with such a checkpoint, or of one itself, instead
-    /// of the listed one.
-    /// `progress` is told the file, its bytes that are there and those that there will be, and says whether to go on;
-    /// of a checkpoint that is here, [`WEIGHTS`], those that are written and all of them.
+    /// Fetches it into `folder` and checks it: its files, or its official checkpoint if it can be made from that.
+    /// `from` replaces the listed address: a folder of such files, a folder with such a checkpoint, or a checkpoint.
+    /// `progress` receives the file, the bytes so far and the total, and returns false to cancel. While weights are
+    /// written it receives [`WEIGHTS`], the number written and their total.
     pub fn fetch(
         &self,
         folder: &Path,
@@ -107,7 +106,7 @@ impl ModelEntry {
                 self.fetch_checkpoint(official, folder, url, patience, progress)?;
             }
             (Some(official), Some(_)) => match self.fetch_files(folder, from, patience, progress) {
-                // A folder may hold what the makers publish, under its own name.
+                // A folder may hold the official file instead, under its own name.
                 Err(InstallError::Fetch(FetchError::Refused { status: 404, .. })) => {
                     let address = in_mirror(&official.url, from);
                     self.fetch_checkpoint(official, folder, &address, patience, progress)?;
@@ -122,7 +121,7 @@ impl ModelEntry {
             let wanted = FileToFetch { url: &url, to: &to, bytes: None, most: fetch::MOST_UNPROMISED, sha256: None };
             if !to.is_file() {
                 let once = Patience { attempts: 1, ..patience };
-                // The model is as good without; who checks it is told that the picture is missing.
+                // The model works without it; the check reports the missing picture.
                 let got = fetch::fetch(&wanted, once, &mut |there, all| progress("picture", there, all));
                 if let Err(e @ FetchError::Cancelled { .. }) = got {
                     return Err(e.into());
@@ -132,7 +131,7 @@ impl ModelEntry {
         Ok(())
     }
 
-    /// About how much of its download is here already, because it was cut off, MB.
+    /// Approximate size of its interrupted download on disk, MB.
     pub(crate) fn arrived_megabytes(&self, folder: &Path) -> u64 {
         let Some(official) = &self.checkpoint else { return 0 };
         let to = folder.join(self.checkpoint_name());
@@ -146,8 +145,7 @@ impl ModelEntry {
         format!("{}.checkpoint", self.id)
     }
 
-    /// What its checkpoint must be: without a published checksum, the first file that was taken is the right one from
-    /// then on.
+    /// Expected SHA-256 of its checkpoint. Without a published checksum, the first file that was used sets it.
     fn checkpoint_sha256(&self, official: &OfficialFile, folder: &Path) -> Option<String> {
         let description = self.description_in(folder);
         let kind = manifest::kind(&description).ok();
@@ -155,7 +153,7 @@ impl ModelEntry {
         official.sha256.clone().or_else(|| origin?.checkpoint_sha256)
     }
 
-    /// Fetches its checkpoint, makes it of that, and removes the checkpoint.
+    /// Fetches its checkpoint, makes the model from it, and removes the checkpoint.
     fn fetch_checkpoint(
         &self,
         official: &OfficialFile,
@@ -171,9 +169,9 @@ impl ModelEntry {
         let sha256 = self.checkpoint_sha256(official, folder);
         let most = official.megabytes * 1_100_000;
         let wanted = FileToFetch { url, to: &to, bytes: None, most, sha256: sha256.as_deref() };
-        // It has its name only once it is whole.
+        // The file has its final name only once it is whole.
         if !sha256.as_deref().map_or(to.is_file(), |sha256| fetch::check(&to, sha256).is_ok()) {
-            // About as large as listed, as long as no server says more.
+            // The listed size serves until the server states one.
             let mut bytes = official.megabytes * 1_000_000;
             fetch::fetch(&wanted, patience, &mut |there, all| {
                 bytes = all.unwrap_or(bytes).max(there);
@@ -181,9 +179,9 @@ impl ModelEntry {
             })?;
         }
         let made = self.add_checkpoint(folder, &to, &mut |done, all| progress(WEIGHTS, done, Some(all)));
-        // Whoever stops it does not want to fetch it again.
+        // After a cancel, the checkpoint stays so that it need not be fetched again.
         if !matches!(made, Err(InstallError::Model(ModelError::Cancelled))) {
-            // One that stays is in nobody's way.
+            // A checkpoint that cannot be removed does no harm.
             let _ = std::fs::remove_file(&to);
         }
         made
@@ -204,7 +202,7 @@ mod tests {
         Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/networks").join(name)
     }
 
-    /// The reduced CLIP as if it were listed, with its checkpoint at an address.
+    /// Entry of the reduced CLIP, with its checkpoint at an address.
     fn reduced(url: &str) -> ModelEntry {
         let file = |name: &str| serde_json::json!({ "name": name, "megabytes": 1 });
         serde_json::from_value(serde_json::json!({
@@ -222,7 +220,7 @@ mod tests {
         assert_eq!(in_mirror(url, Some("http://lab.example/nets/")), "http://lab.example/nets/net.pt");
     }
 
-    /// Serves one file after another, whatever is asked for; nothing where the name is empty.
+    /// Serves one file after another, whatever the request; status 404 for an empty name.
     fn server(files: &[&str]) -> String {
         let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
         let url = format!("http://{}/clip.pt", listener.local_addr().expect("bound"));
@@ -234,7 +232,7 @@ mod tests {
                 let _ = lines.map_while(Result::ok).take_while(|line| !line.is_empty()).count();
                 let status = if bytes.is_empty() { "404 Not Found" } else { "200 OK" };
                 let head = format!("HTTP/1.1 {status}\r\nContent-Length: {}\r\nConnection: close\r\n\r\n", bytes.len());
-                // Whoever called may have gone.
+                // The client may have closed the connection.
                 let _ = stream.write_all(&[head.as_bytes(), &bytes].concat());
             }
         };
@@ -256,15 +254,15 @@ mod tests {
         fetch().expect("fetched");
         assert_eq!(names(), ["clip.json", "clip_image.onnx", "clip_text.onnx"]);
         assert_eq!(entry.state(folder.path()), ModelState::Here);
-        // What is here is not fetched again.
+        // A complete model is not fetched again.
         fetch().expect("here");
-        // Broken, it is; another file than the first time is not taken.
+        // A broken one is fetched again; a file other than the first is refused.
         std::fs::write(folder.path().join("clip_text.onnx"), "broken").expect("written");
         assert!(matches!(fetch(), Err(InstallError::Fetch(FetchError::Checksum { .. }))));
         assert_eq!(names(), ["clip.json", "clip_image.onnx", "clip_text.onnx"]);
         fetch().expect("mended");
         entry.verify(folder.path()).expect("right");
-        // Of a new folder, the fourth answer is the first that it hears of: that of another model.
+        // In a new folder, the fourth answer is the first one: a checkpoint of another model.
         let fresh = tempfile::tempdir().expect("folder");
         let error = entry.fetch(fresh.path(), None, Patience::default(), &mut |_, _, _| true);
         assert!(error.expect_err("another model").to_string().contains("missing"));
@@ -296,7 +294,7 @@ mod tests {
             assert!(bytes.len() < 1 << 20, "{}: {} bytes", entry.id, bytes.len());
             let template = Template::read(bytes).expect("reads");
             assert_eq!(template.files().expect("graphs"), entry.file.iter().map(|f| f.name.clone()).collect());
-            // Checkpoints of other models are told by their tensors, and nothing is left behind.
+            // Checkpoints of other models are recognized by their tensors, and nothing is left behind.
             let folder = tempfile::tempdir().expect("folder");
             let error = entry.add_checkpoint(&folder.path().join("models"), &fixture("clip.pt"), &mut |_, _| true);
             let error = error.expect_err("the reduced one").to_string();

@@ -1,5 +1,5 @@
-//! ONNX files as the built-in engine needs them: with one graph. Templates that were filled have many, which stand one
-//! after another and are one by the rules of protocol buffers (see [`super::template`]).
+//! ONNX files with one graph, as the built-in engine needs them. Filled templates have many `graph` fields one after
+//! another, which are one graph by the rules of protocol buffers (see [`super::template`]).
 
 use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
@@ -7,15 +7,15 @@ use std::path::Path;
 
 /// `ModelProto.graph` of ONNX.
 const GRAPH: u64 = 7;
-/// How an attribute says that pictures are resized by cubic curves.
+/// Bytes of an attribute that requests cubic resizing.
 const CUBIC: &[u8] = b"\x22\x05cubic";
 /// Graphs that are longer hold weights, not operations.
 const SEARCHED_BYTES: u64 = 16 << 20;
 
-/// The bytes of a network with all of its graphs in one.
+/// Reads a network file and merges its graphs into one.
 ///
 /// # Errors
-/// If it cannot be read, is no message of protocol buffers, or does what the built-in engine would do wrongly.
+/// If it cannot be read, is no protocol buffers message, or has an operation that the built-in engine gets wrong.
 pub(super) fn with_one_graph(path: &Path) -> Result<Vec<u8>, String> {
     let mut file = File::open(path).map_err(|e| e.to_string())?;
     let length = file.metadata().map_err(|e| e.to_string())?.len();
@@ -25,7 +25,7 @@ pub(super) fn with_one_graph(path: &Path) -> Result<Vec<u8>, String> {
     })
 }
 
-/// Refuses what the built-in engine would do otherwise than is written: it resizes linearly, whatever is asked for.
+/// Refuses graphs with cubic resizing: the built-in engine would resize linearly instead.
 pub(super) fn refuse_cubic(graph: &[u8]) -> Result<(), String> {
     match graph.windows(CUBIC.len()).any(|w| w == CUBIC) {
         true => Err("it resizes by cubic curves, which this engine cannot".into()),
@@ -34,7 +34,7 @@ pub(super) fn refuse_cubic(graph: &[u8]) -> Result<(), String> {
 }
 
 fn join(file: &mut (impl Read + Seek), length: u64) -> io::Result<Vec<u8>> {
-    // Where fields begin and end: those that are no graph as they are, of graphs what is in them.
+    // Ranges of the file: other fields are copied whole, of graphs only the content.
     let (mut others, mut graphs) = (Vec::new(), Vec::new());
     let mut at = 0;
     while at < length {
@@ -87,7 +87,7 @@ fn join(file: &mut (impl Read + Seek), length: u64) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// A number of one to ten bytes, which are put behind `read`.
+/// Reads a variable-length number of one to ten bytes, which are appended to `read`.
 fn varint(file: &mut impl Read, read: &mut Vec<u8>) -> io::Result<u64> {
     let mut number = 0;
     for shift in (0..64).step_by(7) {

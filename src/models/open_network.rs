@@ -1,4 +1,4 @@
-//! A network opened by an engine: what it asks for and what comes out, the same for both engines.
+//! Network opened by an engine: one interface to its inputs and outputs for both engines.
 
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -9,34 +9,33 @@ use rten_tensor::Layout;
 use super::onnx_file;
 use super::tensor::{NetworkInput, Tensor};
 
-/// An open network.
+/// Open network.
 pub(super) enum OpenNetwork {
-    /// Of an ONNX Runtime library.
+    /// Session of an ONNX Runtime library.
     Runtime(ort::session::Session),
-    /// Of the engine that is built in.
+    /// Model of the built-in engine.
     BuiltIn(Box<rten::Model>),
 }
 
 impl OpenNetwork {
-    /// Opened by the built-in engine out of a file's bytes.
+    /// Opens a network with the built-in engine from the bytes of a file.
     pub(super) fn built_in(bytes: &[u8]) -> Result<Self, String> {
         onnx_file::refuse_cubic(bytes)?;
         Self::of_one_graph(bytes.to_vec())
     }
 
-    /// Opened by the built-in engine out of a file.
+    /// Opens a network file with the built-in engine.
     pub(super) fn built_in_file(path: &std::path::Path) -> Result<Self, String> {
         Self::of_one_graph(onnx_file::with_one_graph(path)?)
     }
 
-    /// Weights are not packed ahead: that would keep them twice.
+    /// Loads a network with one graph. Weights are not prepacked: that would keep them twice.
     fn of_one_graph(bytes: Vec<u8>) -> Result<Self, String> {
         let model = rten::ModelOptions::with_all_ops().load(bytes).map_err(|e| e.to_string())?;
         Ok(Self::BuiltIn(Box::new(model)))
     }
 
-    /// Lengths of an input's axes; those that are left open are `None`. Nothing if it has no such input, or says
-    /// nothing about it.
+    /// Lengths of an input's axes, `None` for free ones. `None` if there is no such input, or its shape is not stated.
     pub(super) fn wanted_shape(&self, input: &str) -> Option<Vec<Option<usize>>> {
         match self {
             Self::Runtime(session) => {
@@ -55,7 +54,7 @@ impl OpenNetwork {
         }
     }
 
-    /// Every output by its name; a panic of the engine is an error as any other.
+    /// Runs the network and returns its outputs by name. A panic of the engine becomes an error.
     pub(super) fn run(
         &mut self,
         inputs: Vec<(&'static str, NetworkInput)>,
@@ -128,7 +127,7 @@ fn run_built_in(
     Ok(arrays)
 }
 
-/// What an engine makes of a network; a panic in it is an error as any other.
+/// Runs `work` and turns a panic of the engine into an error.
 pub(super) fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(done) => done,

@@ -1,38 +1,37 @@
-//! Pictures as networks take them: resized as Pillow does, which the networks were trained with,
-//! then normalized.
+//! Preprocessing of pictures: resized as Pillow does, which the networks were trained with, then normalized.
 
 use super::tensor::Tensor;
 use crate::math::resize::{Filter, resize};
 use crate::scene::PhotoPixels;
 
-/// What of a picture becomes the side of the network's square.
+/// Side of a picture that is fitted to the network's square.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FitSide {
-    /// The shorter; the rest is cut off around the middle.
+    /// Shorter side; the picture is center-cropped.
     Shorter,
-    /// The longer; zeros fill up to the right and below, after normalizing.
+    /// Longer side; padded with zeros to the right and below, after normalizing.
     Longer,
-    /// Both: the picture is squashed.
+    /// Both sides: the picture is squeezed.
     Both,
 }
 
-/// How pictures become inputs.
+/// Preprocessing settings of a network.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Prepare {
     /// Side of the square, px.
     pub side_px: usize,
-    /// How pixels are mixed.
+    /// Resampling filter.
     pub filter: Filter,
-    /// What is fitted.
+    /// Side that is fitted.
     pub side: FitSide,
     /// Subtracted from colors in 0..1.
     pub mean: [f32; 3],
-    /// Divides what is left.
+    /// Divides the difference.
     pub std: [f32; 3],
 }
 
 impl Prepare {
-    /// A picture as `[1, 3, S, S]`; `None` for one without pixels.
+    /// Returns a picture as `[1, 3, S, S]`; `None` for one without pixels.
     pub fn picture(&self, picture: &PhotoPixels) -> Option<Tensor> {
         let (w, h) = (picture.width_px as usize, picture.height_px as usize);
         let (to_w, to_h) = self.resized(w, h)?;
@@ -41,7 +40,7 @@ impl Prepare {
             return None;
         }
         let s = self.side_px;
-        // Where the square's first pixel is in what was resized; halves are rounded to even.
+        // Position of the square's first pixel in the resized picture; halves are rounded to even.
         let offset = |n: usize| ((n as f64 - s as f64) / 2.0).round_ties_even() as i64;
         let (left, top) = if self.side == FitSide::Shorter { (offset(to_w), offset(to_h)) } else { (0, 0) };
         let mut values = vec![0.0; 3 * s * s];
@@ -62,7 +61,7 @@ impl Prepare {
         Some(Tensor::new(&[1, 3, s, s], values))
     }
 
-    /// The size to which a picture is resized.
+    /// Size to which a picture is resized, px.
     pub(crate) fn resized(&self, w: usize, h: usize) -> Option<(usize, usize)> {
         if w == 0 || h == 0 {
             return None;
@@ -82,13 +81,13 @@ impl Prepare {
     }
 }
 
-/// A network's plane of logits, `low` px a side, at the size of the picture that lies in its square
-/// of `square` px as `side` says: as the official code enlarges it.
+/// Enlarges a network's plane of logits, `low` px a side, to the size of the picture, as the official code does. The
+/// picture lies in the network's square of `square` px as `side` says.
 pub fn enlarge(plane: &[f32], low: usize, square: usize, side: FitSide, to: (usize, usize)) -> Vec<f32> {
     if side != FitSide::Longer {
         return resize(plane, (low, low), to, Filter::Linear);
     }
-    // The rest of the square is empty.
+    // The rest of the square is padding.
     let scale = square as f64 / to.0.max(to.1) as f64;
     let used = |n: usize| ((n as f64 * scale + 0.5) as usize).clamp(1, square);
     let (w, h) = (used(to.0), used(to.1));
@@ -103,7 +102,7 @@ mod tests {
 
     #[test]
     fn a_wide_picture_uses_the_upper_part_of_the_square() {
-        // 8 x 4 px in a square of 8: the lower half of the logits is of nothing.
+        // 8 x 4 px in a square of 8: the lower half of the logits is padding.
         let plane: Vec<f32> = (0..16).map(|i| if i / 4 < 2 { 1.0 } else { -9.0 }).collect();
         let out = enlarge(&plane, 4, 8, FitSide::Longer, (8, 4));
         assert!(out[..24].iter().all(|v| *v == 1.0), "{out:?}");

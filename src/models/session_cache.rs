@@ -1,5 +1,4 @@
-//! Room for networks: those that lie idle are closed where memory is short, and opened again when
-//! they are asked.
+//! Cache of open networks: idle ones are closed if memory is short, and opened again when they are used.
 
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Instant;
@@ -7,22 +6,21 @@ use std::time::Instant;
 use super::open_network::OpenNetwork;
 use crate::io::memory;
 
-/// Memory that an open network takes, as a multiple of its file's size: weights, their packed copies,
-/// and what lies between the layers.
+/// Memory of an open network, as a multiple of its file's size: weights, their packed copies, and activations.
 const PER_FILE_BYTE: u64 = 4;
-/// Memory that is left to everything else, bytes.
+/// Memory that is left for everything else, bytes.
 const SPARE: u64 = 512 << 20;
 
-/// An open network, or the place of one that was closed.
+/// Open network, or the place of a closed one.
 pub(super) struct CachedSession {
     /// `None` while it is closed.
     pub(crate) session: Option<OpenNetwork>,
-    /// When it was last asked.
+    /// Time of its last use.
     pub(crate) used: Instant,
 }
 
 impl CachedSession {
-    /// The place of a network that was opened just now.
+    /// Wraps a network that was just opened.
     pub(crate) fn of(session: OpenNetwork) -> Arc<Mutex<Self>> {
         Arc::new(Mutex::new(Self { session: Some(session), used: Instant::now() }))
     }
@@ -30,7 +28,7 @@ impl CachedSession {
 
 static PLACES: Mutex<Vec<Weak<Mutex<CachedSession>>>> = Mutex::new(Vec::new());
 
-/// Makes a network known that can be opened again.
+/// Registers a network that can be opened again.
 pub(super) fn register(place: &Arc<Mutex<CachedSession>>) {
     if let Ok(mut places) = PLACES.lock() {
         places.retain(|p| p.strong_count() > 0);
@@ -38,19 +36,18 @@ pub(super) fn register(place: &Arc<Mutex<CachedSession>>) {
     }
 }
 
-/// Closes networks, the one that was idle longest first, until one of `bytes` bytes fits into memory.
-/// How many were closed.
+/// Closes networks, the longest idle first, until one of `bytes` bytes fits into memory. Returns the number closed.
 pub(super) fn make(bytes: u64) -> usize {
     let wanted = bytes.saturating_mul(PER_FILE_BYTE).saturating_add(SPARE);
     close_until(|| memory::free() >= wanted)
 }
 
-/// Closes networks, the one that was idle longest first, until there is room or none is left.
+/// Closes networks, the longest idle first, until there is room or none is left. Returns the number closed.
 fn close_until(there_is_room: impl Fn() -> bool) -> usize {
     let Ok(places) = PLACES.lock() else { return 0 };
     let mut idle: Vec<(Instant, Arc<Mutex<CachedSession>>)> = Vec::new();
     for place in places.iter().filter_map(Weak::upgrade) {
-        // One that cannot be locked is at work.
+        // A network that cannot be locked is in use.
         let used = place.try_lock().ok().filter(|p| p.session.is_some()).map(|p| p.used);
         idle.extend(used.map(|used| (used, place)));
     }
@@ -68,7 +65,7 @@ fn close_until(there_is_room: impl Fn() -> bool) -> usize {
     closed
 }
 
-/// Closes all that lie idle; how many that were.
+/// Closes all idle networks and returns their number.
 pub fn close_idle() -> usize {
     close_until(|| false)
 }

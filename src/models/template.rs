@@ -1,8 +1,8 @@
 //! Templates: the graphs of a model without their weights, which an official checkpoint fills.
 //!
-//! `tools/export/template.py` makes one: an archive of graphs and of `template.json`, which says which tensor each
-//! weight is. Messages of protocol buffers merge when they stand one after another, so a filled graph is its
-//! template followed by the weights, and no graph has to be understood here.
+//! `tools/export/template.py` makes one: an archive of graphs and of `template.json`, which maps each weight to a
+//! tensor of the checkpoint. Concatenated messages of protocol buffers merge, so a filled graph is its template
+//! followed by the weights, and no graph has to be parsed.
 
 #[cfg(test)]
 mod mask_tests;
@@ -25,34 +25,34 @@ use crate::io::error::write_error;
 use crate::io::files::hex;
 use crate::io::temporary::temporary_folder;
 
-/// Folders of a checkpoint in which its tensors may lie.
+/// Prefixes that the tensors of a checkpoint may have.
 const ROOTS: [&str; 4] = ["", "model.", "state_dict.", "module."];
-/// Last names of numbers that official files have beside the weights: settings, and what follows from the settings.
+/// Last names of tensors in official files that are no weights: settings, and values derived from them.
 const SETTINGS: [&str; 5] = ["attn_mask", "context_length", "input_resolution", "position_ids", "vocab_size"];
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Table {
-    /// What describes the model, less what follows from the weights.
+    /// Description of the model, without the fields that depend on the weights.
     description: serde_json::Map<String, Value>,
-    /// By role of a graph: name of a weight, tensor, and shape.
+    /// By role of a graph: name of a weight, its tensor, and its shape.
     weights: BTreeMap<String, Vec<(String, String, Vec<u64>)>>,
     /// Fields of the description that are tensors.
     values: BTreeMap<String, String>,
     /// Shapes of the tensors.
     tensors: BTreeMap<String, Vec<usize>>,
-    /// Tensors that official checkpoints have and no graph needs.
+    /// Tensors of official checkpoints that no graph needs.
     unused: Vec<String>,
 }
 
-/// A template that was read.
+/// Template in memory.
 pub(crate) struct Template<'a> {
     table: Table,
     archive: ZipArchive<Cursor<&'a [u8]>>,
 }
 
 impl<'a> Template<'a> {
-    /// Reads a template that comes with the program.
+    /// Reads a template of the program.
     pub(crate) fn read(bytes: &'a [u8]) -> Result<Self, ModelError> {
         let broken =
             |e: &dyn std::fmt::Display| ModelError::Metadata { path: "template.json".into(), problem: e.to_string() };
@@ -68,9 +68,9 @@ impl<'a> Template<'a> {
         Ok(self.archive.file_names().flatten().map(|n| n.into_owned()).filter(|n| n != "template.json").collect())
     }
 
-    /// Fills the graphs with the weights of a checkpoint and writes them into `folder`, with the `description`, the
-    /// last of all. Everything is there then, or nothing. `progress` is told the weights that are written and all
-    /// of them, and says whether to go on.
+    /// Fills the graphs with the weights of a checkpoint and writes them into `folder`, the `description` last. Writes
+    /// all files or none. `progress` receives the number of weights written and their total, and returns false to
+    /// cancel.
     pub(crate) fn fill(
         &mut self,
         checkpoint: &Path,
@@ -83,6 +83,7 @@ impl<'a> Template<'a> {
         let root = self.root(&weights);
         self.check(&weights, root).map_err(refused)?;
         std::fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
+        // Written to a temporary folder first, so that a failure or a cancel leaves nothing behind.
         let held = temporary_folder(folder, description).map_err(|e| failed(folder, e))?;
         let draft = held.folder.path();
         let all = self.table.weights.values().map(|w| w.len() as u64).sum();
@@ -118,16 +119,16 @@ impl<'a> Template<'a> {
         put_in_place(draft, folder, files, description, &Value::Object(about))
     }
 
-    /// The folder of the checkpoint in which most of the tensors lie.
+    /// Finds the prefix of the checkpoint under which most of the tensors lie.
     fn root(&self, weights: &WeightFile) -> &'static str {
         let found = |root: &&str| {
             self.table.tensors.keys().filter(|t| weights.tensors.contains_key(&format!("{root}{t}"))).count()
         };
-        // Of equals the last one counts.
+        // `max_by_key` returns the last of equals, so the order is reversed.
         ROOTS.into_iter().rev().max_by_key(found).unwrap_or_default()
     }
 
-    /// Whether the checkpoint has the tensors that are wanted, as they are wanted, and no others.
+    /// Checks that the checkpoint has the expected tensors, with their shapes, and no others.
     fn check(&self, weights: &WeightFile, root: &str) -> Result<(), WeightFileError> {
         let refused = |name: &str, problem: String| Err(WeightFileError::Tensor { name: name.into(), problem });
         for (tensor, shape) in &self.table.tensors {
@@ -159,7 +160,7 @@ impl<'a> Template<'a> {
     }
 }
 
-/// Moves files out of their `draft` folder and describes them; the description last: without it, they are not here.
+/// Moves files out of their `draft` folder, then writes their description: without it, they count as missing.
 pub(super) fn put_in_place(
     draft: &Path,
     folder: &Path,
@@ -181,7 +182,7 @@ pub(super) fn failed(path: &Path, e: io::Error) -> ModelError {
     ModelError::File(write_error(path, e))
 }
 
-/// A file, with the checksum of what was written.
+/// File writer that hashes and counts the written bytes.
 struct Sink {
     file: BufWriter<File>,
     hash: Sha256,
@@ -201,9 +202,9 @@ impl Write for Sink {
     }
 }
 
-/// A model that has nothing but one weight: `ModelProto.graph.initializer` of ONNX.
+/// Writes a model with a single weight: `ModelProto.graph.initializer` of ONNX.
 fn write_weight(out: &mut dyn Write, name: &str, shape: &[u64], numbers: &[f32]) -> io::Result<()> {
-    // Numbers of fields, with the kind of what follows: a number, or so many bytes.
+    // Field numbers with their wire type: a number, or a length and so many bytes.
     const GRAPH: u8 = 7 << 3 | 2;
     const INITIALIZER: u8 = 5 << 3 | 2;
     const DIMS: u8 = 1 << 3;
@@ -236,7 +237,7 @@ fn write_weight(out: &mut dyn Write, name: &str, shape: &[u64], numbers: &[f32])
     Ok(())
 }
 
-/// Seven bits a byte, the lowest first; all but the last have the highest bit set.
+/// Appends a number, seven bits a byte, the lowest first; all bytes but the last have the highest bit set.
 fn push_varint(bytes: &mut Vec<u8>, mut value: u64) {
     while value >= 0x80 {
         bytes.push(value as u8 | 0x80);

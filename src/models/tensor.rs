@@ -1,27 +1,27 @@
-//! Arrays that go into networks and come out of them.
+//! Input and output arrays of networks.
 
-/// Numbers with a shape, row-major.
+/// Array with a shape, row-major.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Tensor<T = f32> {
     /// Length of each axis.
     pub shape: Vec<usize>,
-    /// As many numbers as the axes' product.
+    /// Values; as many as the product of the axes.
     pub values: Vec<T>,
 }
 
 impl<T: Clone> Tensor<T> {
-    /// An array; its numbers have to fill its shape.
+    /// Builds an array; its values have to fill its shape.
     pub fn new(shape: &[usize], values: Vec<T>) -> Self {
         debug_assert_eq!(shape.iter().product::<usize>(), values.len(), "{shape:?}");
         Self { shape: shape.to_vec(), values }
     }
 
-    /// The same number everywhere.
+    /// Builds an array with the same value everywhere.
     pub fn filled(shape: &[usize], value: T) -> Self {
         Self { shape: shape.to_vec(), values: vec![value; shape.iter().product()] }
     }
 
-    /// Arrays of one shape one after another along their first axis.
+    /// Concatenates arrays of one shape along their first axis.
     pub fn joined<'a>(parts: impl IntoIterator<Item = &'a Self>) -> Self
     where
         T: 'a,
@@ -39,7 +39,7 @@ impl<T: Clone> Tensor<T> {
         joined.unwrap_or_else(|| Self { shape: vec![0], values: Vec::new() })
     }
 
-    /// The `i`-th piece along the first axis, which stays, with length 1.
+    /// Returns the `i`-th slice along the first axis, which stays, with length 1.
     pub fn row(&self, i: usize) -> Self {
         let n = self.values.len() / self.shape[0].max(1);
         let mut shape = self.shape.clone();

@@ -1,12 +1,12 @@
-//! Cutting a tile: the same arithmetic as `tools/encoder/tiles.py`, held equal by a test.
+//! Crops of identities: the same arithmetic as `tools/encoder/tiles.py`, held equal by a test.
 
 use super::IdentityCrop;
 use crate::math::resize::{Filter, resize};
 use crate::scene::Mask;
 
 impl IdentityCrop {
-    /// The region of a picture on black: its bounding box, padded to a square, resized. `None` for
-    /// an empty mask, and for a picture that does not have the mask's size.
+    /// Cuts the masked region of a picture on black: its bounding box, padded to a square, resized. `None` for an empty
+    /// mask, and for a picture that does not have the mask's size.
     pub(crate) fn cut(rgb: &[[f32; 3]], mask: &Mask, side_px: usize) -> Option<Self> {
         let bounds = mask.bounds()?;
         let width_px = mask.width_px();

@@ -1,14 +1,14 @@
-//! Phrases' tokens through a text network: together, and no longer than the longest of them, as far as it takes that.
+//! Batches of token rows for a text network, cut to the longest phrase where the network's input shape allows it.
 
 use super::ModelError;
 use super::network::Network;
 use super::tensor::Tensor;
 
 const INPUT: &str = "tokens";
-/// Rows that go through at once, at most.
+/// Most rows in one batch.
 const BATCH: usize = 32;
 
-/// The unit vectors, of `length` numbers, of rows of tokens that are all as long and end with zeros, which say nothing.
+/// Embeds rows of tokens as unit vectors of `length` numbers. All rows are equally long and padded with zeros.
 pub(super) fn embed(network: &mut Network, rows: &[Vec<i64>], length: usize) -> Vec<Result<Vec<f32>, ModelError>> {
     let free = network.free_axes(INPUT);
     let mut all = Vec::with_capacity(rows.len());
@@ -24,14 +24,14 @@ pub(super) fn embed(network: &mut Network, rows: &[Vec<i64>], length: usize) -> 
         match embedded(batch) {
             Ok(vectors) => all.extend(vectors.into_iter().map(Ok)),
             Err(e) if batch.len() == 1 => all.push(Err(e)),
-            // Each for itself, so that a phrase that fails is no harm to others.
+            // One by one, so that a phrase that fails does not affect the others.
             Err(_) => all.extend(batch.iter().map(|row| embedded(std::slice::from_ref(row)).map(|mut v| v.remove(0)))),
         }
     }
     all
 }
 
-/// What `embed` makes of the rows that are there, in the place of each; if it fails as a whole, that is the last.
+/// Embeds the valid rows and keeps the errors of the others in place. If `embed` itself fails, its error is the last.
 pub(super) fn each(
     rows: Vec<Result<Vec<i64>, ModelError>>,
     embed: impl FnOnce(&[Vec<i64>]) -> Result<Vec<Result<Vec<f32>, ModelError>>, ModelError>,

@@ -1,4 +1,4 @@
-//! What is used as its makers publish it: the library of ONNX Runtime, out of their archive, and graphs.
+//! Installs official files as published: the ONNX Runtime library from its archive, and ready graphs.
 
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom, Write};
@@ -16,13 +16,13 @@ use super::{ModelError, lama};
 use crate::io::files::hex;
 use crate::io::temporary::temporary_folder;
 
-/// Largest library, bytes; those of the processor's releases have some 20 to 40 MB.
+/// Largest library, bytes; the CPU releases have 20 to 40 MB.
 const MOST: u64 = 512 << 20;
-/// Most bytes of an archive that are looked through for it.
+/// Most unpacked bytes of an archive that are searched for it.
 const MOST_UNPACKED: u64 = 4 << 30;
 
-/// Takes the library out of an archive, as the file `name` in `folder`, and describes it. Both are there then, or
-/// nothing. Names inside the archive decide nothing but which entry it is.
+/// Extracts the library from an archive to the file `name` in `folder`, and writes its description: both or neither.
+/// Names inside the archive only select the entry, never the output path.
 pub(super) fn library(archive: &Path, name: &str, folder: &Path, description: &str) -> Result<(), ModelError> {
     let refused = |problem: String| ModelError::Metadata { path: archive.into(), problem };
     let mut file = crate::io::files::open(archive).map_err(|e| refused(e.to_string()))?;
@@ -41,7 +41,7 @@ pub(super) fn library(archive: &Path, name: &str, folder: &Path, description: &s
     put_in_place(draft, folder, vec![name.to_owned()], description, &about)
 }
 
-/// Takes over a graph that is ready, as the file `name` in `folder`, and describes it. Both are there then, or nothing.
+/// Copies a ready graph to the file `name` in `folder`, and writes its description: both or neither.
 pub(super) fn graph(graph: &Path, name: &str, folder: &Path, description: &str) -> Result<(), ModelError> {
     engine()?.load_file(graph)?;
     std::fs::create_dir_all(folder).map_err(|e| failed(folder, e))?;
@@ -52,7 +52,7 @@ pub(super) fn graph(graph: &Path, name: &str, folder: &Path, description: &str) 
     put_in_place(draft, folder, vec![name.to_owned()], description, &lama::description(name, bytes, &sha256))
 }
 
-/// Whether a file in an archive is the library, which may have its version in its name.
+/// Returns whether a file in an archive is the library, which may have its version in its name.
 fn is_library(path: &Path, name: &str) -> bool {
     let Some(file) = path.file_name().and_then(|n| n.to_str()) else { return false };
     // libonnxruntime.so.1.24.4, libonnxruntime.1.24.4.dylib
@@ -62,7 +62,7 @@ fn is_library(path: &Path, name: &str) -> bool {
         || file.strip_prefix(stem).and_then(|rest| rest.strip_suffix(ending)).is_some_and(version)
 }
 
-/// The library's bytes.
+/// Finds the library in an archive and returns its bytes.
 fn found(file: &mut File, name: &str) -> Result<Vec<u8>, String> {
     let mut start = [0; 2];
     let read = file.read_exact(&mut start).and_then(|()| file.seek(SeekFrom::Start(0)));
@@ -70,7 +70,7 @@ fn found(file: &mut File, name: &str) -> Result<Vec<u8>, String> {
     read.map_err(|e| broken(&e))?;
     match &start {
         [0x1f, 0x8b] => {
-            // Whatever it says of itself, no more than this is unpacked.
+            // Whatever size the archive states, no more than this is unpacked.
             let mut archive = Archive::new(GzDecoder::new(BufReader::new(file)).take(MOST_UNPACKED));
             for entry in archive.entries().map_err(|e| broken(&e))? {
                 let entry = entry.map_err(|e| broken(&e))?;
@@ -97,13 +97,13 @@ fn found(file: &mut File, name: &str) -> Result<Vec<u8>, String> {
     Err(format!("no '{name}' is in it; it is another archive"))
 }
 
-/// All bytes of an entry that states so many.
+/// Reads an entry whole; its length must be the stated one.
 fn whole(entry: impl Read, stated: u64) -> Result<Vec<u8>, String> {
     if stated > MOST {
         return Err(format!("its library has {stated} bytes, more than the {MOST} that are possible"));
     }
     let mut bytes = Vec::new();
-    // One more shows an entry that is longer than it states.
+    // One more byte reveals an entry that is longer than stated.
     entry.take(stated + 1).read_to_end(&mut bytes).map_err(|e| format!("its library cannot be read: {e}"))?;
     if bytes.len() as u64 != stated || bytes.is_empty() {
         return Err(format!("its library has {} of the {stated} bytes that are stated", bytes.len()));
@@ -119,7 +119,7 @@ mod tests {
         let mut archive = tar::Builder::new(flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast()));
         for (name, kind, bytes) in entries {
             let mut header = tar::Header::new_gnu();
-            // Written as it is, even where the crate would refuse it.
+            // Written directly, because the crate refuses such a name.
             header.as_old_mut().name[..name.len()].copy_from_slice(name.as_bytes());
             header.set_entry_type(*kind);
             header.set_size(bytes.len() as u64);

@@ -1,5 +1,4 @@
-//! Words of a phrase as the numbers that a text encoder takes; the same rules as
-//! `tools/encoder/texts.py`.
+//! Tokens of a phrase for the demo text encoder; the same rules as `tools/encoder/texts.py`.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -7,22 +6,22 @@ use serde::Deserialize;
 
 use super::ModelError;
 
-/// Unknown words that are told at most.
+/// Most unknown words that are reported.
 const UNKNOWN_MOST: usize = 16;
-/// Characters of an unknown word that are told at most.
+/// Most characters of an unknown word that are reported.
 const UNKNOWN_CHARS: usize = 40;
 
-/// What a text encoder knows, and what else it says of itself.
+/// Word list and dimensions of a text encoder.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Vocabulary {
     pub(crate) version: u32,
     pub(crate) dimension: usize,
     pub(crate) tile_side_px: usize,
-    /// Words that are looked at.
+    /// Number of words of a phrase that are encoded.
     pub(crate) tokens: usize,
-    /// Words that carry nothing alone ("the", "of").
+    /// Words without content of their own ("the", "of").
     pub(crate) glue: BTreeSet<String>,
-    /// Number of each word, from 1.
+    /// Token of each word, from 1.
     pub(crate) words: BTreeMap<String, i64>,
 }
 
@@ -44,7 +43,7 @@ impl Vocabulary {
         Ok(list)
     }
 
-    /// The numbers of a phrase's known words, followed by zeros.
+    /// Returns the tokens of a phrase's known words, padded with zeros.
     pub(crate) fn encode(&self, phrase: &str) -> Result<Vec<i64>, ModelError> {
         let mut numbers = Vec::with_capacity(self.tokens);
         let mut content = false;
@@ -64,7 +63,7 @@ impl Vocabulary {
         Ok(numbers)
     }
 
-    /// The words that are not known, each once.
+    /// Returns the unknown words of a phrase, each once.
     pub(crate) fn unknown(&self, phrase: &str) -> Vec<String> {
         let mut found: Vec<String> = Vec::new();
         for word in split(phrase) {
@@ -79,7 +78,7 @@ impl Vocabulary {
         found
     }
 
-    /// A word, or the singular or plural of it that is known.
+    /// Finds a word, or its singular or plural, in the list.
     fn find(&self, word: &str) -> Option<(&str, i64)> {
         let get = |w: &str| self.words.get_key_value(w).map(|(w, n)| (w.as_str(), *n));
         get(word)
@@ -89,7 +88,7 @@ impl Vocabulary {
     }
 }
 
-/// Lower-case runs of letters and digits.
+/// Splits a phrase into lower-case runs of letters and digits.
 fn split(phrase: &str) -> impl Iterator<Item = String> + '_ {
     phrase.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty()).map(str::to_lowercase)
 }

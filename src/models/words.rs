@@ -1,4 +1,4 @@
-//! Whether a word is one of the language, for telling slips of the keys from words that are meant.
+//! Check for known words, to tell typing errors from intended words.
 
 use std::sync::OnceLock;
 
@@ -6,8 +6,8 @@ use instant_clip_tokenizer::Tokenizer;
 
 use super::demo::DemoEncoder;
 
-/// Whether an encoder knows a word by itself: the vocabulary of CLIP's tokens, which has what 400 million captions
-/// say often, or that of the encoder that comes with the program.
+/// Returns whether an encoder knows a word as a whole: as one token of CLIP, from frequent words of 400 million
+/// captions, or in the word list of the built-in encoder.
 pub(crate) fn is_word(word: &str) -> bool {
     static KNOWN: OnceLock<(Tokenizer, Option<DemoEncoder>)> = OnceLock::new();
     let (tokenizer, demo) = KNOWN.get_or_init(|| (Tokenizer::new(), DemoEncoder::new().ok()));

@@ -1,6 +1,6 @@
-//! Cleaning: what can be measured of each Gaussian that tells floaters, needles and haze from what photos support.
+//! Cleaning: measures of each Gaussian that distinguish floaters, needles and haze from Gaussians that photos support.
 //!
-//! Nothing is deleted here: measures become choices ([`CleanRule`]), which somebody looks at before they are carried out.
+//! Nothing is deleted here: measures become selections ([`CleanRule`]), which the user reviews before they are applied.
 
 mod floaters;
 mod pieces;
@@ -20,51 +20,51 @@ use crate::pipeline::observer::{Interrupted, Observer, Ticker};
 use crate::render::{RenderError, RenderSettings};
 use crate::scene::{Bounds, Camera, GaussianCloud, Photo, PhotoPixels};
 
-/// Neighbors of each Gaussian that are looked at.
+/// Nearest neighbors of each Gaussian.
 const NEIGHBORS: usize = 8;
-/// Stands where a Gaussian has fewer.
+/// Placeholder for a missing neighbor.
 const NONE: u32 = u32::MAX;
-/// The one whose distance tells how lonely a Gaussian is.
+/// Rank of the neighbor whose distance measures the isolation of a Gaussian.
 const LONELY: usize = 4;
-/// Gaussians whose neighbors are looked for between two reports.
+/// Gaussians in the neighbor search between two progress reports.
 const BLOCK: usize = 1 << 14;
-/// Side of the pictures in which support is looked for, px.
+/// Side of the pictures in which support is measured, px.
 const SIDE_PX: u32 = 320;
 
-/// What can be measured of a Gaussian.
+/// Measure of a Gaussian.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, strum::VariantArray, strum::IntoStaticStr, strum::EnumString)]
 #[strum(serialize_all = "lowercase")]
 pub enum SplatMeasure {
     /// Largest standard deviation, scene units.
     Size,
-    /// Largest standard deviation over the second: 1 is a disc or a ball, more a needle.
+    /// Ratio of the largest standard deviation to the second: 1 for a disc or a ball, more for a needle.
     Elongation,
     /// 0 to 1.
     Opacity,
-    /// Distance of its fourth neighbor, 1 being usual in the scene.
+    /// Distance to its fourth neighbor; 1 is typical of the scene.
     Spacing,
-    /// Gaussians of the piece that it hangs together with.
+    /// Number of Gaussians in its connected piece.
     Piece,
-    /// Largest share of a pixel that it has in any photo.
+    /// Largest blending weight in a pixel of any photo.
     Weight,
-    /// Photos that show it.
+    /// Number of photos that show it.
     Photos,
-    /// Root mean square difference of its color from the photos where they show it, 0 to 1.
+    /// Root mean square difference of its color from the photos that show it, 0 to 1.
     Error,
 }
 
 impl SplatMeasure {
-    /// Its word on the command line and on screen.
+    /// Name on the command line and on screen.
     pub(crate) fn word(self) -> &'static str {
         self.into()
     }
 
-    /// Whether its values differ by factors.
+    /// True if its values span orders of magnitude.
     pub(crate) fn is_logarithmic(self) -> bool {
         matches!(self, Self::Size | Self::Elongation | Self::Spacing | Self::Piece)
     }
 
-    /// What it is.
+    /// Description for display.
     pub(crate) fn meaning(self) -> &'static str {
         match self {
             Self::Size => "largest standard deviation, in scene units",
@@ -79,18 +79,18 @@ impl SplatMeasure {
     }
 }
 
-/// A photo that may speak for Gaussians.
+/// Camera, with its photo if available, that may support Gaussians.
 #[derive(Clone, Debug)]
 pub(crate) struct CleanView {
     pub(crate) camera: Camera,
-    /// The photo itself, where it is at hand.
+    /// The photo, if available.
     pub(crate) photo: Option<Photo>,
 }
 
-/// The camera of a small picture, and the photo as that where it is at hand.
+/// Camera of a small picture, and the photo at that size, if available.
 type SmallView = (Camera, Option<PhotoPixels>);
 
-/// Loads every photo, once: each is looked at several times.
+/// Loads every photo once, because each is used several times.
 fn small(views: &[CleanView], observer: &mut dyn Observer) -> Result<Vec<SmallView>, CleanError> {
     let mut ticker = Ticker::new("Loading photos", views.len());
     let mut all = Vec::new();
@@ -107,7 +107,7 @@ fn small(views: &[CleanView], observer: &mut dyn Observer) -> Result<Vec<SmallVi
     Ok(all)
 }
 
-/// Why a scene cannot be measured.
+/// Reasons for which a scene cannot be measured.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum CleanError {
@@ -119,22 +119,22 @@ pub enum CleanError {
     Interrupted(#[from] Interrupted),
 }
 
-/// What was measured of a cloud, Gaussian by Gaussian.
+/// Measures of all Gaussians of a cloud.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct CloudMeasures {
     values: Vec<(SplatMeasure, Vec<f32>)>,
-    /// Whether each Gaussian is part of a floater.
+    /// True for each Gaussian of a floater.
     floaters: Vec<bool>,
-    /// Colors without what depends on the direction, 0 to 1 as displayed.
+    /// View-independent colors, 0 to 1 as displayed.
     colors: Vec<[f32; 3]>,
-    /// Nearest neighbors; `NONE` where there are fewer.
+    /// Nearest neighbors; `NONE` for missing ones.
     near: Vec<[u32; NEIGHBORS]>,
-    /// Half the diagonal of the scene without its strays, scene units.
+    /// Half the diagonal of the scene without stray Gaussians, scene units.
     radius: f64,
 }
 
 impl CloudMeasures {
-    /// Those of the Gaussians that are not `gone`, as they were measured with them.
+    /// Returns the measures of the Gaussians that are not `gone`, without measuring again.
     pub(crate) fn without(&self, gone: &[bool]) -> Self {
         fn left<T: Copy>(of: &[T], gone: &[bool]) -> Vec<T> {
             of.iter().zip(gone).filter(|(_, gone)| !**gone).map(|(v, _)| *v).collect()
@@ -152,7 +152,7 @@ impl CloudMeasures {
         Self { values, floaters, colors, near, radius: self.radius }
     }
 
-    /// A choice with all neighbors of what is chosen.
+    /// Adds all neighbors of the selected Gaussians to a selection.
     pub(crate) fn grown(&self, chosen: &[bool]) -> Vec<bool> {
         let mut grown = chosen.to_vec();
         for near in self.near.iter().zip(chosen).filter(|(_, chosen)| **chosen).map(|(near, _)| near) {
@@ -161,22 +161,22 @@ impl CloudMeasures {
         grown
     }
 
-    /// A choice without what has a neighbor that is not chosen.
+    /// Removes Gaussians with an unselected neighbor from a selection.
     pub(crate) fn shrunk(&self, chosen: &[bool]) -> Vec<bool> {
         let is_inner = |near: &[u32; NEIGHBORS]| near.iter().all(|j| *j == NONE || chosen[*j as usize]);
         self.near.iter().zip(chosen).map(|(near, chosen)| *chosen && is_inner(near)).collect()
     }
 
-    /// The values of a measure, `[n]`; `None` without the photos that it needs.
+    /// Values of a measure, `[n]`; `None` without the photos that it needs.
     pub(crate) fn get(&self, measure: SplatMeasure) -> Option<&[f32]> {
         self.values.iter().find(|(of, _)| *of == measure).map(|(_, values)| values.as_slice())
     }
 }
 
-/// Measures all Gaussians; `views` are the photos that the scene was trained on, as far as they are known.
+/// Measures all Gaussians; `views` are the training photos, as far as they are known.
 ///
 /// # Errors
-/// If a photo cannot be read or drawn, or the observer ends it.
+/// If a photo cannot be read, a view cannot be rendered, or the observer cancels.
 pub(crate) fn measure(
     cloud: &GaussianCloud,
     views: &[CleanView],
@@ -220,13 +220,13 @@ pub(crate) fn measure(
     Ok(CloudMeasures { values, floaters, colors: colors(cloud), near, radius })
 }
 
-/// Colors without what depends on the direction, 0 to 1 as displayed.
+/// View-independent colors, 0 to 1 as displayed.
 fn colors(cloud: &GaussianCloud) -> Vec<[f32; 3]> {
     let shown = |v: f32| (0.5 + SH_C0 as f32 * v).clamp(0.0, 1.0);
     (0..cloud.len()).map(|i| cloud.sh[i * cloud.sh_stride()].map(shown)).collect()
 }
 
-/// The nearest neighbors of each Gaussian with their distances, the nearest first.
+/// Finds the nearest neighbors of each Gaussian with their distances, the nearest first.
 fn neighbors(cloud: &GaussianCloud, observer: &mut dyn Observer) -> Result<Vec<Vec<(u32, f32)>>, Interrupted> {
     let place = |i: usize| cloud.positions[i].map(f64::from);
     let tree = RTree::bulk_load((0..cloud.len()).map(|i| GeomWithData::new(place(i), i as u32)).collect());

@@ -1,4 +1,4 @@
-//! Quality on photos that training did not see.
+//! Image quality on held-out views.
 
 use super::metrics;
 use super::observer::ViewScore;
@@ -6,7 +6,7 @@ use super::train::TrainView;
 use crate::render::Frame;
 use crate::scene::Camera;
 
-/// PSNR and SSIM of each view, as `draw` draws it.
+/// PSNR and SSIM of each view, rendered by `draw`.
 pub(crate) fn scores<E>(
     views: &[TrainView],
     mut draw: impl FnMut(&Camera) -> Result<Frame<f32>, E>,

@@ -1,4 +1,4 @@
-//! How close a picture is to a photo.
+//! Image metrics of renders against photos.
 
 use crate::math::Real;
 use crate::math::resize::nearest;
@@ -6,13 +6,12 @@ use crate::math::stats::psnr_of;
 use crate::render::{Frame, ssim};
 use crate::scene::PhotoPixels;
 
-/// The color planes of a photo, 0 to 1.
+/// Color planes of a photo, 0 to 1.
 pub(crate) fn planes<R: Real>(photo: &PhotoPixels) -> [Vec<R>; 3] {
     std::array::from_fn(|c| photo.rgb.iter().map(|p| R::of(f64::from(p[c]) / 255.0)).collect())
 }
 
-/// The color planes of a photo of a thing that was cut out, in front of a color that differs by `shift` from the one that
-/// it is stored with; of other photos as [`planes`].
+/// Color planes of a photo. A photo with alpha is put in front of its stored background color plus `shift`.
 pub(crate) fn planes_before<R: Real>(photo: &PhotoPixels, shift: [f32; 3]) -> [Vec<R>; 3] {
     let mut planes = planes::<R>(photo);
     if let Some(alpha) = photo.alpha.as_ref().filter(|_| shift != [0.0; 3]) {
@@ -25,8 +24,8 @@ pub(crate) fn planes_before<R: Real>(photo: &PhotoPixels, shift: [f32; 3]) -> [V
     planes
 }
 
-/// PSNR in dB of a picture of (width, height) px, clamped to 0..1, against a photo; infinite for an exact match. Pixels
-/// that the photo does not cover do not count; of a photo of another size the nearest pixels are compared.
+/// PSNR in dB of a picture of (width, height) px, clamped to 0..1, against a photo; infinite for an exact match.
+/// Pixels that the photo does not cover do not count. For a photo of another size, the nearest pixels are compared.
 pub(crate) fn psnr<R: Real>(color: &[Vec<R>; 3], (width, height): (usize, usize), photo: &PhotoPixels) -> f64 {
     let (w, h) = (photo.width_px as usize, photo.height_px as usize);
     let (mut squared, mut covered) = (0.0, 0_usize);
@@ -45,8 +44,8 @@ pub(crate) fn psnr<R: Real>(color: &[Vec<R>; 3], (width, height): (usize, usize)
     psnr_of(squared / (3 * covered.max(1)) as f64)
 }
 
-/// PSNR and SSIM of a rendered frame, clamped to 0..1, against a photo of the same size. Pixels
-/// that the photo does not cover count as equal in SSIM and do not count in PSNR. Computed in f64.
+/// PSNR and SSIM of a rendered frame, clamped to 0..1, against a photo of the same size. Pixels that the photo does
+/// not cover count as equal in SSIM and do not count in PSNR. Computed in f64.
 pub(crate) fn score(frame: &Frame<f32>, photo: &PhotoPixels) -> (f64, f64) {
     let target = planes::<f64>(photo);
     let mut rendered: [Vec<f64>; 3] =

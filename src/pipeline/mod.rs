@@ -1,5 +1,5 @@
-//! What the program does with scenes: training, evaluation, synthetic data.
-//! Everything here talks to the outside through an [`observer::Observer`] and nothing else.
+//! Work on scenes: training, evaluation, synthetic data, semantics, edits. All of it reports only through an
+//! [`observer::Observer`].
 
 pub(crate) mod cleaning;
 pub(crate) mod depth;

@@ -1,4 +1,4 @@
-//! How long work reports what it does, and learns whether to go on.
+//! Progress reports of long work, and signals to pause or cancel it.
 
 use std::collections::VecDeque;
 use std::error::Error;
@@ -11,25 +11,25 @@ use crate::math::format;
 use crate::scene::GaussianCloud;
 pub use crate::scene::{Evaluation, StepMetrics, ViewScore};
 
-/// What the work should do next; asked at every step.
+/// Signal to the work; queried at every step.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Signal {
     /// Go on.
     Continue,
-    /// Wait, and ask again.
+    /// Wait, and query again.
     Pause,
     /// Stop at a consistent state and return.
     Cancel,
 }
 
-/// Where a piece of long work stands.
+/// Progress of long work.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Progress {
-    /// What is being done, for display: "Training", "Loading photos".
+    /// Stage, for display: "Training", "Loading photos".
     pub stage: String,
     /// Units done so far.
     pub done: u64,
-    /// Units in all; 0 where they are not counted.
+    /// Total units; 0 if not counted.
     pub total: u64,
     /// Seconds of work so far, pauses left out, earlier runs of a resumed job included.
     pub elapsed_secs: f64,
@@ -43,7 +43,7 @@ pub struct Progress {
 pub struct Interrupted;
 
 impl Interrupted {
-    /// Whether `error`, or what caused it, is that the observer asked to stop.
+    /// Returns whether `error` or one of its sources is [`Interrupted`].
     pub(crate) fn is_cause_of(error: &(dyn Error + 'static)) -> bool {
         error.is::<Self>() || error.source().is_some_and(Self::is_cause_of)
     }
@@ -52,15 +52,15 @@ impl Interrupted {
 /// Seconds over which a rate is measured.
 const RATE_SECS: f64 = 3.0;
 
-/// Reports the progress of one stage, and asks whether to go on. Pauses do not count as time.
+/// Progress reporter of one stage, which also handles pause and cancel. Pauses do not count as time.
 pub(crate) struct Ticker {
     stage: String,
-    /// Units in all.
+    /// Total units.
     pub(crate) total: u64,
     start: Instant,
     /// Seconds of earlier runs.
     before_secs: f64,
-    /// Units that were done at a time in seconds: those of the last few seconds.
+    /// Units done and the time in seconds, over the last few seconds.
     marks: VecDeque<(u64, f64)>,
 }
 
@@ -70,13 +70,13 @@ impl Ticker {
         Self::resumed(stage, total as u64, 0, 0.0)
     }
 
-    /// The same where earlier runs did `done` units in `secs` seconds.
+    /// Starts the clock of a stage of which earlier runs did `done` units in `secs` seconds.
     pub(crate) fn resumed(stage: impl Into<String>, total: u64, done: u64, secs: f64) -> Self {
         let marks = VecDeque::from([(done, secs)]);
         Self { stage: stage.into(), total, start: Instant::now(), before_secs: secs, marks }
     }
 
-    /// Goes on with `stage`: its clock starts if it is another than before, and what is `done` by then took no time.
+    /// Continues with `stage`. A new stage starts its clock, with `done` units at time zero.
     pub(crate) fn enter(&mut self, stage: &str, done: u64, total: u64) {
         if self.stage != stage {
             *self = Self::resumed(stage, total, done, 0.0);
@@ -116,24 +116,24 @@ impl Ticker {
     }
 }
 
-/// Says that a `stage` has begun whose steps are not counted, and waits out a pause.
+/// Reports the begin of a `stage` without counted steps, and waits out a pause.
 pub(crate) fn begin(stage: impl Into<String>, observer: &mut dyn Observer) -> Result<(), Interrupted> {
     Ticker::new(stage, 0).tick(0, observer)
 }
 
 impl Progress {
-    /// How far it is, "3 of 84"; `None` where its steps are not counted.
+    /// Count for display, "3 of 84"; `None` if steps are not counted.
     pub(crate) fn counted(&self) -> Option<String> {
         (self.total > 0).then(|| format!("{} of {}", format::count(self.done), format::count(self.total)))
     }
 
-    /// Seconds to go at the present rate; `None` if not known, and where all is done.
+    /// Remaining seconds at the present rate; `None` if unknown or done.
     pub(crate) fn eta_secs(&self) -> Option<f64> {
         (self.rate > 0.0 && self.done < self.total).then(|| self.total.saturating_sub(self.done) as f64 / self.rate)
     }
 }
 
-/// Something the user should see in a log.
+/// Severity of a line in the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub enum Severity {
     /// For the record.
@@ -142,9 +142,9 @@ pub enum Severity {
     Warning,
 }
 
-/// What long work calls as it goes. Every method but `signal` may be ignored.
+/// Receiver of the reports of long work. Every method but `signal` may be ignored.
 pub trait Observer: Send {
-    /// Asked at every step.
+    /// Returns the signal to the work; called at every step.
     fn signal(&self) -> Signal {
         Signal::Continue
     }
@@ -158,23 +158,23 @@ pub trait Observer: Send {
             }
         }
     }
-    /// Now and then, at least ten times a second where steps are short.
+    /// Receives the progress, at least ten times a second if steps are short.
     fn progress(&mut self, _progress: Progress) {}
-    /// Training measurements.
+    /// Receives training measurements.
     fn step(&mut self, _metrics: StepMetrics) {}
-    /// A held-out evaluation.
+    /// Receives a held-out evaluation.
     fn evaluation(&mut self, _evaluation: Evaluation) {}
-    /// A line for the log.
+    /// Receives a line for the log.
     fn note(&mut self, _severity: Severity, _text: String) {}
-    /// Whether a copy of the cloud is wanted now. Copies cost time, so the observer limits them.
+    /// Returns whether a copy of the cloud is requested now. Copies cost time, so the observer limits them.
     fn wants_cloud(&self) -> bool {
         false
     }
-    /// The cloud as it is.
+    /// Receives the present cloud.
     fn cloud(&mut self, _cloud: Arc<GaussianCloud>, _step: u64) {}
 }
 
-/// An observer that looks at nothing.
+/// Observer that ignores all reports.
 pub struct Silent;
 
 impl Observer for Silent {}

@@ -1,14 +1,14 @@
-//! Takes objects or parts out of a scene and closes the surface that they hid.
+//! Removal of objects or parts from a scene, and completion of the surfaces that they hid.
 //!
-//! What was behind a thing and was seen in other photos is there already: taking its Gaussians away *uncovers* it. What
-//! no photo ever saw has to be *invented*, and only that is. Where that is, is a matter of geometry: the point of a
-//! surface is hidden if it lies behind the thing in every photo, seen if one shows it, and empty space if one looks
-//! through it. So a surface near the thing is found as a plane ([`plane`]), divided into texels, each of which asks all
-//! photos ([`sheet`]); hidden texels are painted from those that are seen ([`paint`]) and become flat Gaussians of
-//! their own. The picture is painted on the surface, not in a view, so all views agree.
+//! Background behind the object that other photos show is in the scene already: removing the object's Gaussians
+//! *uncovers* it. Only regions that no photo shows are *invented*. Geometry decides: a point of a surface is hidden if
+//! it lies behind the object in every photo, seen if one photo shows it, and empty space if one looks through it. So a
+//! surface near the object is fitted as a plane ([`plane`]) and divided into texels, each tested in all photos
+//! ([`sheet`]). Hidden texels are painted from the seen ones ([`paint`]) and become flat Gaussians of their own. The
+//! texture is painted on the surface, not in a view, so all views agree.
 //!
-//! The shadow of the thing on a flat surface is lifted, as far as what blocks the light explains it ([`shade`]). Other
-//! shadows of it, reflections, and light that it throws back are part of what the photos show, and stay.
+//! The object's shadow on a flat surface is lifted, as far as its blocking of the light explains it ([`shade`]). Its
+//! other shadows, reflections, and light that it reflects stay.
 
 mod close;
 mod extent;
@@ -38,61 +38,61 @@ use crate::pipeline::observer::{Interrupted, Observer};
 use crate::render::{RenderError, RenderSettings};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
-/// What is to be removed, and how.
+/// Settings of a removal.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct RemovalOptions {
     /// Objects and parts.
     pub(crate) ids: Vec<IdentityId>,
-    /// Whether its fringes go too: what is nobody's for sure within it, its foot on the surface and the shadow there.
+    /// True if fringes go too: unlabeled Gaussians within the object, and its foot and shadow on the surface.
     pub(crate) halo: bool,
-    /// Whether its shadow on flat surfaces is lifted.
+    /// True if its shadow on flat surfaces is lifted.
     pub(crate) lift_shadow: bool,
-    /// How hidden surfaces are painted; `None` = they stay open.
+    /// Inpainting method of hidden surfaces; `None` = they stay open.
     pub(crate) paint: Option<Paint>,
-    /// Seed of every random choice: another one gives another fill.
+    /// Random seed; another seed gives another fill.
     pub(crate) seed: u64,
 }
 
 impl RemovalOptions {
-    /// Identities with their fringes and shadows, painted as usual.
+    /// Default settings for these identities: with fringes and shadows, and default inpainting.
     pub(crate) fn of(ids: &[IdentityId]) -> Self {
         Self { ids: ids.to_vec(), halo: true, lift_shadow: true, paint: Some(Paint::default()), seed: 0 }
     }
 }
 
-/// A surface that was closed.
+/// Completed surface.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct ClosedSurface {
     /// New Gaussians.
     pub(crate) gaussians: usize,
     /// Their area, square scene units.
     pub(crate) area: f64,
-    /// Distance of what is seen of the surface from the plane, median, scene units.
+    /// Median distance of the seen surface from the plane, scene units.
     pub(crate) unevenness: f64,
-    /// The same as a share of the hole's diameter: from a tenth on the fill is a guess.
+    /// Unevenness as a fraction of the hole's diameter; from a tenth on the fill is a guess.
     pub(crate) roughness: f64,
 }
 
-/// What was done.
+/// Report of a removal.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct RemovalReport {
-    /// Gaussians of the thing.
+    /// Gaussians of the removed identities.
     pub(crate) removed: usize,
-    /// Gaussians of its fringes.
+    /// Gaussians of their fringes.
     pub(crate) fringes: usize,
-    /// Gaussians that no photo has seen and that would be in sight now.
+    /// Gaussians that no photo shows and that would be visible now.
     pub(crate) unseen: usize,
-    /// Gaussians that were of the thing for where they are: on the closed surfaces, and between them and the thing.
+    /// Gaussians counted to the object by position: on the closed surfaces, and between them and the object.
     pub(crate) left_over: usize,
-    /// Gaussians that became brighter, for its shadow is gone.
+    /// Gaussians that were brightened to lift the shadow.
     pub(crate) brightened: usize,
     pub(crate) surfaces: Vec<ClosedSurface>,
-    /// Seconds of each stage, in their order.
+    /// Seconds of each stage, in order.
     pub(crate) secs: Vec<(String, f64)>,
 }
 
 impl RemovalReport {
-    /// Gaussians that are not there any more.
+    /// Number of removed Gaussians.
     pub(crate) fn taken(&self) -> usize {
         self.removed + self.fringes + self.unseen + self.left_over
     }
@@ -103,19 +103,19 @@ impl RemovalReport {
     }
 }
 
-/// A scene without a thing.
+/// Scene after a removal.
 #[derive(Clone, Debug)]
 pub(crate) struct Removed {
-    /// The Gaussians that stay, in their order, then those that were invented.
+    /// Kept Gaussians in their order, then the new ones.
     pub(crate) cloud: GaussianCloud,
-    /// Indices of those that stay.
+    /// Indices of the kept Gaussians.
     pub(crate) kept: Vec<usize>,
-    /// Whose each Gaussian is.
+    /// Identity of each Gaussian.
     pub(crate) identity_of: Vec<IdentityId>,
     pub(crate) report: RemovalReport,
 }
 
-/// Why nothing was removed.
+/// Reasons for which nothing was removed.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum RemovalError {
@@ -133,13 +133,12 @@ pub enum RemovalError {
     Interrupted(#[from] Interrupted),
 }
 
-/// The full names of identities, one after the other.
+/// Full names of identities, separated by commas.
 pub(crate) fn names(map: &SemanticMap, ids: &[IdentityId]) -> String {
     ids.iter().map(|id| map.identities.full_name(*id)).collect::<Vec<_>>().join(", ")
 }
 
-/// Takes `options.ids` out of the scene that `photos` were taken of. `network` = what paints where that is
-/// [`Paint::Lama`].
+/// Removes `options.ids` from a scene with the camera poses `photos`. `network` is the inpainter for [`Paint::Lama`].
 pub(crate) fn remove(
     cloud: &GaussianCloud,
     map: &SemanticMap,
@@ -169,7 +168,7 @@ pub(crate) fn remove(
             return Err(RemovalError::Unseen(name()));
         }
         let mut unseen = select::unseen(cloud, &gone, None, &cameras, settings, observer)?;
-        // What is inside it would be taken for what is behind it.
+        // Unseen Gaussians inside the object would be taken for background.
         let inside: Vec<usize> = unseen.extract_if(.., |i| extent.contains(cloud.world_position(*i))).collect();
         inside.iter().for_each(|i| gone[*i] = true);
         report.unseen = inside.len();
@@ -205,7 +204,7 @@ pub(crate) fn remove(
     Ok(Removed { cloud: left, kept, identity_of, report })
 }
 
-/// Seconds of stages, one after the other.
+/// Timer of successive stages, seconds.
 struct Clock(Vec<(String, f64)>, std::time::Instant);
 
 impl Default for Clock {

@@ -1,6 +1,6 @@
-//! Edits of Gaussians: objects and parts are moved, duplicated and recolored, chosen Gaussians deleted.
+//! Edits of Gaussians: move, duplicate and recolor objects and parts, and delete selected Gaussians.
 //!
-//! An edit makes new Gaussians; the old ones stay as they are, so that it can be undone.
+//! An edit returns new Gaussians and leaves the old ones unchanged, so that it can be undone.
 
 use glam::{DMat3, DQuat, DVec3};
 
@@ -9,42 +9,42 @@ use crate::math::{Real, rotation};
 use crate::pipeline::semantics::edit;
 use crate::scene::{Bounds, GaussianCloud, IdentityId, NOBODY, SemanticMap};
 
-/// Brightness of red, green and blue in a color as displayed (ITU-R BT.709).
+/// Luma weights of red, green and blue (ITU-R BT.709).
 const BRIGHTNESS: [f64; 3] = [0.2126, 0.7152, 0.0722];
-/// Brightness that a thing has at least when it gets another color: shades of black are noise.
+/// Least mean brightness of an object when it is recolored: shades of black are noise.
 const DARKEST: f64 = 0.1;
 
-/// Sine of half the angle that is left of whole turns by rounding.
+/// Sine of half the angle up to which a rotation counts as whole turns, for rounding.
 const WHOLE_TURN: f64 = 1e-9;
 
-/// A change of Gaussians.
+/// Edit of Gaussians.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SplatEdit {
-    /// Leaves out the Gaussians that are `true`.
+    /// Deletes the Gaussians that are `true`.
     Delete(Vec<bool>),
     /// Changes an object or a part.
     Arrange(Arrangement),
 }
 
-/// What becomes of an object or a part.
+/// Edit of an object or a part.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Arrangement {
     pub(crate) id: IdentityId,
-    /// Whether it stays as it is and all this is done to another one like it.
+    /// True if a copy is edited and the original stays.
     pub(crate) duplicate: bool,
     pub(crate) to: Placement,
-    /// Another color (red, green, blue, 0 to 1, as displayed), in which its shades stay.
+    /// New color (red, green, blue, 0 to 1, as displayed), which keeps its shades.
     pub(crate) color: Option<[f32; 3]>,
 }
 
 impl Arrangement {
-    /// The one that changes nothing.
+    /// Edit that changes nothing.
     pub(crate) fn of(id: IdentityId) -> Self {
         Self { id, duplicate: false, to: Placement::default(), color: None }
     }
 }
 
-/// Where something is put: turned and scaled about its own middle, then shifted.
+/// Placement of an object: rotated and scaled about its own middle, then shifted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Placement {
     /// Scene units.
@@ -54,7 +54,7 @@ pub struct Placement {
 }
 
 impl Placement {
-    /// Whether it leaves everything where it is, whole turns included.
+    /// True if it moves nothing; whole turns count as no rotation.
     fn is_nothing(&self) -> bool {
         let axis = DVec3::new(self.turn.x, self.turn.y, self.turn.z);
         let is_whole = axis.length() < WHOLE_TURN * self.turn.length();
@@ -68,7 +68,7 @@ impl Default for Placement {
     }
 }
 
-/// Why an edit cannot be made.
+/// Reasons for which an edit cannot be made.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum SplatEditError {
@@ -94,10 +94,10 @@ pub enum SplatEditError {
 
 type Result<T> = std::result::Result<T, SplatEditError>;
 
-/// The Gaussians and their objects and parts after an edit.
+/// Returns the Gaussians and the semantic map after an edit.
 ///
 /// # Errors
-/// If it makes no sense; nothing has changed then.
+/// If the edit is invalid; nothing has changed then.
 pub(crate) fn apply(
     cloud: &GaussianCloud,
     map: Option<&SemanticMap>,
@@ -132,7 +132,7 @@ pub(crate) fn apply(
     }
 }
 
-/// The Gaussians of an identity, of which there are some.
+/// Returns the Gaussians of an identity; an error if it has none.
 fn thing(map: Option<&SemanticMap>, id: IdentityId) -> Result<(&SemanticMap, Vec<usize>)> {
     let map = map.ok_or(SplatEditError::NoObjects)?;
     if map.identities.get(id).is_none() {
@@ -157,7 +157,7 @@ fn delete(
     Ok((cloud.select(&kept), map.map(|map| map.select_fully(&kept))))
 }
 
-/// What a thing turns about: the middle of it, without its stray Gaussians.
+/// Center of rotation of an object: the middle of its bounds, without stray Gaussians.
 pub(crate) fn middle(cloud: &GaussianCloud, thing: &[usize]) -> DVec3 {
     Bounds::robust(thing.iter().map(|&i| cloud.world_position(i))).map_or(DVec3::ZERO, |b| b.center())
 }
@@ -175,7 +175,7 @@ fn place(cloud: &mut GaussianCloud, thing: &[usize], to: &Placement, map: &Seman
         cloud.positions[i] = (p - origin).as_vec3().to_array();
         cloud.log_scales[i] = cloud.log_scales[i].map(|s| (f64::from(s) + to.scale.ln()) as f32);
         if turn != DQuat::IDENTITY {
-            // Those that are no rotation are drawn as nothing, wherever they are.
+            // Gaussians with an invalid rotation are not drawn, so they stay as they are.
             if let Some([w, x, y, z]) = rotation::unit_quaternion(cloud.quaternions[i].map(f64::from)) {
                 let q = turn * DQuat::from_xyzw(x, y, z, w);
                 cloud.quaternions[i] = [q.w, q.x, q.y, q.z].map(|v| v as f32);
@@ -191,13 +191,13 @@ fn place(cloud: &mut GaussianCloud, thing: &[usize], to: &Placement, map: &Seman
     if thing.iter().all(is_good) { Ok(()) } else { Err(SplatEditError::OutOfRange(map.identities.full_name(id))) }
 }
 
-/// The map of the Gaussians `all`, of which those that stand there again are of a second thing like `id`.
+/// Semantic map of the Gaussians `all`, whose repeated ones belong to a copy of `id`.
 fn doubled(map: &SemanticMap, all: &[usize], id: IdentityId) -> SemanticMap {
     let mut new = map.select_fully(all);
     let inside = map.identities.descendants(id);
     let first_copy = map.identity_of.len();
     let mut number: Vec<IdentityId> = (0..=map.identities.len() as IdentityId).collect();
-    // Wholes have smaller numbers than their pieces.
+    // Parents have smaller numbers than their parts.
     for old in (1..=map.identities.len() as IdentityId).filter(|i| inside[*i as usize]) {
         let Some(identity) = map.identities.get(old) else { continue };
         let parent = if old == id { identity.parent } else { number[identity.parent as usize] };
@@ -219,14 +219,14 @@ fn doubled(map: &SemanticMap, all: &[usize], id: IdentityId) -> SemanticMap {
     new
 }
 
-/// Multiplies a thing's shades of gray by a color, in which its mean brightness becomes that color.
+/// Colors an object's shades of gray, so that its mean brightness becomes `color`.
 fn recolor(cloud: &mut GaussianCloud, thing: &[usize], color: [f64; 3]) {
     let stride = cloud.sh_stride();
     let brightness = |rgb: [f64; 3]| BRIGHTNESS.iter().zip(rgb).map(|(b, v)| b * v).sum::<f64>();
     let shown = |c: [f32; 3]| c.map(|v| 0.5 + SH_C0 * f64::from(v));
     let (sum, weight) = thing.iter().fold((0.0, 0.0), |(sum, weight), &i| {
         let [a, b, c] = cloud.log_scales[i].map(|s| f64::from(s).exp());
-        // The two larger extents are what is seen of it.
+        // The area of the two larger extents is the visible one.
         let w = f64::from(cloud.opacity_logits[i].sigmoid()) * (a * b).max(b * c).max(a * c);
         (sum + w * brightness(shown(cloud.sh[i * stride])).clamp(0.0, 1.0), weight + w)
     });

@@ -1,4 +1,4 @@
-//! Videos: a scene drawn from one camera after another, with what was asked for marked if wanted.
+//! Videos: a scene rendered from one camera after another, optionally with highlighted identities.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use crate::io::video::{VideoFileError, VideoSettings, VideoSummary, VideoWriter}
 use crate::render::{DrawError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
-/// How much of a marked pixel is the mark, of 8.
+/// Weight of the highlight color in a pixel, of 8.
 const MARK: u32 = 3;
 
 #[derive(Clone, Copy)]
@@ -20,7 +20,7 @@ pub(crate) struct Marked<'a> {
     pub(crate) color: [u8; 3],
 }
 
-/// Why a video could not be made.
+/// Reasons for which a video could not be made.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum VideoError {
@@ -33,7 +33,7 @@ pub enum VideoError {
     Interrupted(#[from] Interrupted),
 }
 
-/// Draws the scene from every camera into a video at `out`.
+/// Renders the scene from every camera into a video at `out`.
 pub(crate) fn write(
     cloud: &Arc<GaussianCloud>,
     draw: &RenderSettings,

@@ -1,4 +1,4 @@
-//! What is said of models that are broken, or not brought whole.
+//! Messages about broken models and incomplete folders.
 
 use super::*;
 
@@ -31,14 +31,14 @@ fn a_folder_without_its_files_is_named_with_what_is_missing() {
     let said = told();
     assert!(said.starts_with(&format!("{place} lacks {}", entry.files().join(", "))), "{said}");
     assert!(said.contains(&fetch), "{said}");
-    // What is there is not said to be missing; with all of it there, another error is.
+    // Present files are not reported as missing; with all files present, the error is another one.
     fs::write(brought.path().join(&entry.description), "{}").expect("written");
     let said = told();
     assert!(said.starts_with(&format!("{place} lacks {}", entry.files()[1..].join(", "))), "{said}");
     entry.files().iter().for_each(|name| fs::write(brought.path().join(name), "{}").expect("written"));
     assert!(!told().contains("lacks"));
     assert!(matches!(entry.state(folder.path()), ModelState::Missing(_)), "nothing was taken over");
-    // One that nobody hosts is made, not fetched.
+    // A model without an address is exported, not fetched.
     let alone = ModelEntry { url: None, checkpoint: None, ..entry.clone() };
     let said = alone.add(folder.path(), folder.path()).expect_err("incomplete").to_string();
     assert!(said.contains(&format!("tools/export/{}", alone.export)) && !said.contains(&fetch), "{said}");

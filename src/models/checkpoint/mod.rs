@@ -1,7 +1,7 @@
-//! Checkpoints as PyTorch and safetensors store them: names and tensors, read one at a time.
+//! Reader of PyTorch and safetensors checkpoints: named tensors, read one at a time.
 //!
-//! There are crates for this. `pytorch-reader` (Burn's) is sound, but it reads no TorchScript archive, and passes
-//! over names that it does not know, where this program is to refuse them; hence `pickle`.
+//! The crate `pytorch-reader` (Burn's) is sound, but it reads no TorchScript archive, and it skips unknown names,
+//! which this program must refuse; hence `pickle`.
 
 mod parts;
 mod pickle;
@@ -21,7 +21,7 @@ use zip::ZipArchive;
 
 use super::ModelError;
 
-/// Why a checkpoint cannot be read.
+/// Reasons for which a checkpoint cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub(crate) enum WeightFileError {
     #[error("{0}")]
@@ -48,14 +48,14 @@ pub(crate) enum WeightFileError {
     Tensor { name: String, problem: String },
 }
 
-/// Type of numbers.
+/// Element type of a tensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Dtype {
     F64,
     F32,
     F16,
     Bf16,
-    /// Whole numbers of so many bytes.
+    /// Integers of so many bytes.
     Whole(usize),
 }
 
@@ -83,7 +83,7 @@ impl Dtype {
         }
     }
 
-    /// Whether it has fractions.
+    /// True for floating-point types.
     pub(crate) fn is_float(self) -> bool {
         !matches!(self, Self::Whole(_))
     }
@@ -100,27 +100,27 @@ impl Dtype {
     }
 }
 
-/// Where bytes lie in a file: an entry of an archive, or a range.
+/// Location of bytes in a file: an entry of an archive, or a range.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Place {
     Entry(usize),
     Range(u64, u64),
 }
 
-/// A tensor that was not read yet.
+/// Tensor in a file, not read yet.
 #[derive(Clone, Debug)]
 pub(crate) struct StoredTensor {
     pub(crate) dtype: Dtype,
     pub(crate) shape: Vec<usize>,
-    /// Elements from one to the next along each axis.
+    /// Stride along each axis, elements.
     strides: Vec<usize>,
-    /// Elements before the first.
+    /// Offset of the first element, elements.
     offset: usize,
     place: Place,
 }
 
 impl StoredTensor {
-    /// A tensor that lies within `elements` of a storage.
+    /// Builds a tensor, checking that it lies within a storage of `elements`.
     fn new(
         dtype: Dtype,
         (shape, strides, offset): (Vec<usize>, Vec<usize>, usize),
@@ -140,13 +140,13 @@ impl StoredTensor {
         }
     }
 
-    /// Bytes of its storage that it needs.
+    /// Number of bytes that its storage must have.
     fn end(&self) -> usize {
         let far: usize = self.shape.iter().zip(&self.strides).map(|(n, stride)| n.saturating_sub(1) * stride).sum();
         (self.offset + far + 1) * self.dtype.bytes()
     }
 
-    /// Its numbers, row-major, out of the bytes of its storage.
+    /// Gathers its values, row-major, from the bytes of its storage.
     fn gather(&self, stored: &[u8]) -> Vec<f32> {
         let count: usize = self.shape.iter().product();
         let (mut dense, mut is_dense) = (1, true);
@@ -176,16 +176,16 @@ enum Source {
     Flat(File),
 }
 
-/// An open checkpoint.
+/// Open checkpoint.
 pub(crate) struct WeightFile {
     source: Source,
     pub(crate) tensors: BTreeMap<String, StoredTensor>,
-    /// The storage that was read last: tensors may share one.
+    /// Storage that was read last: tensors may share one.
     last: Option<(Place, Vec<u8>)>,
 }
 
 impl WeightFile {
-    /// Opens a file and reads what it is about, but no numbers.
+    /// Opens a file and reads its list of tensors, but no values.
     pub(crate) fn open(path: &Path) -> Result<Self, ModelError> {
         let failed = |problem: String| ModelError::Metadata { path: path.into(), problem };
         let file = crate::io::files::open(path).map_err(|e| failed(e.to_string()))?;
@@ -208,7 +208,7 @@ impl WeightFile {
         Ok(Self { source, tensors, last: None })
     }
 
-    /// The numbers of a tensor, row-major.
+    /// Reads the values of a tensor, row-major.
     pub(crate) fn floats(&mut self, name: &str) -> Result<Vec<f32>, WeightFileError> {
         let failed = |problem: String| WeightFileError::Tensor { name: name.into(), problem };
         let tensor = self.tensors.get(name).ok_or_else(|| failed("is not there".into()))?.clone();
@@ -216,7 +216,7 @@ impl WeightFile {
             return Err(failed("has whole numbers where fractions are expected".into()));
         }
         if self.last.as_ref().is_none_or(|(place, _)| *place != tensor.place) {
-            // Only one of them at a time.
+            // Freed first, so that only one storage is in memory.
             self.last = None;
             let bytes = match &mut self.source {
                 Source::Archive(archive) => torch_zip::storage(archive, tensor.place)?,

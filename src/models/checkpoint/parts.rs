@@ -1,10 +1,10 @@
-//! What a pickle of tensors is made of, and which names may occur in it.
+//! Values of a pickle of tensors, and the global names that it may contain.
 
 use std::rc::Rc;
 
 use super::Dtype;
 
-/// A value; lists, tuples, dictionaries and so on lie among the nodes, because they may be shared.
+/// Value; containers such as lists, tuples and dictionaries are nodes, because they may be shared.
 #[derive(Clone, Debug)]
 pub(super) enum Value {
     Nothing,
@@ -21,16 +21,16 @@ pub(super) enum PickleNode {
     Global(Global),
     Storage(Storage),
     Tensor(TensorRecord),
-    /// A module of TorchScript, with its attributes once they are known.
+    /// TorchScript module, with its attributes once they are known.
     Module(Option<Value>),
 }
 
-/// A name that may occur.
+/// Global name that is accepted.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Global {
     OrderedDict,
     Tensor,
-    /// A function whose value is its first argument: a parameter, a list with its type.
+    /// Function that returns its first argument: a parameter, a list with its type.
     First,
     Storage(Dtype),
     Module,
@@ -53,7 +53,7 @@ impl Global {
     }
 }
 
-/// The bytes that tensors look at.
+/// Storage of tensors.
 #[derive(Clone, Debug)]
 pub(super) struct Storage {
     pub(super) key: Rc<str>,
@@ -65,7 +65,7 @@ pub(super) struct Storage {
 pub(super) struct TensorRecord {
     pub(super) storage: Rc<str>,
     pub(super) dtype: Dtype,
-    /// As many elements does its storage have.
+    /// Number of elements in its storage.
     pub(super) elements: usize,
     pub(super) offset: usize,
     pub(super) shape: Vec<usize>,

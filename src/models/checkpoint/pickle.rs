@@ -1,5 +1,5 @@
-//! Reads the pickles inside PyTorch's files: the few opcodes and names that tensors need. Nothing is ever
-//! executed; a name that is not listed here is an error that says it.
+//! Reader of the pickles in PyTorch files: the few opcodes and names that tensors need. Nothing is ever executed; an
+//! unlisted name is an error that contains it.
 
 use std::collections::HashMap;
 use std::rc::Rc;
@@ -7,14 +7,14 @@ use std::rc::Rc;
 use super::WeightFileError;
 use super::parts::{Global, PickleNode, Storage, TensorRecord, Value};
 
-/// Most objects of a pickle; the official files have some thousands.
+/// Most objects of a pickle; official files have some thousands.
 const MOST_OBJECTS: usize = 1 << 20;
 /// Most axes of a tensor.
 const MOST_AXES: usize = 8;
 
 type Result<T> = std::result::Result<T, WeightFileError>;
 
-/// What a pickle says.
+/// Parsed pickle.
 #[derive(Debug)]
 pub(super) struct Pickle {
     pub(super) nodes: Vec<PickleNode>,
@@ -49,6 +49,7 @@ impl Machine<'_> {
                 0x95 => drop(self.take::<8>()?),
                 b'.' => return self.pop(),
                 b'(' => self.marks.push(self.stack.len()),
+                // Tensors need no booleans and floats: they are read as nothing.
                 b'N' | 0x88 | 0x89 => self.push(Value::Nothing)?,
                 b'J' => self.integer::<4>()?,
                 b'K' => self.integer::<1>()?,
@@ -155,7 +156,7 @@ impl Machine<'_> {
         Ok(taken)
     }
 
-    /// An integer of `N` bytes; those of 4 and 8 have a sign.
+    /// Reads an integer of `N` bytes; those of 4 and 8 have a sign.
     fn integer<const N: usize>(&mut self) -> Result<()> {
         let mut bytes = [0; 8];
         bytes[..N].copy_from_slice(&self.take::<N>()?);
@@ -217,7 +218,7 @@ impl Machine<'_> {
         value.ok_or_else(|| self.malformed("a value that is not there"))
     }
 
-    /// The node on top of the stack, which stays.
+    /// Returns the node on top of the stack, which stays.
     fn top(&mut self) -> Result<&mut PickleNode> {
         let top = self.stack.last().cloned();
         match top {
@@ -280,7 +281,7 @@ impl Machine<'_> {
         }
     }
 
-    /// `("storage", type, key, device, elements)`.
+    /// Pops `("storage", type, key, device, elements)` and pushes the storage.
     fn storage(&mut self) -> Result<()> {
         let id = self.pop()?;
         let storage = match self.items(&id) {
@@ -319,7 +320,7 @@ impl Machine<'_> {
         }
     }
 
-    /// `(storage, offset, shape, strides, ...)`.
+    /// Parses a tensor: `(storage, offset, shape, strides, ...)`.
     fn tensor(&self, arguments: &Value) -> Option<TensorRecord> {
         let [storage, Value::Int(offset), shape, strides, ..] = self.items(arguments) else { return None };
         let Some(PickleNode::Storage(storage)) = self.of(storage) else { return None };
@@ -345,7 +346,7 @@ impl Machine<'_> {
         let state = self.pop()?;
         match self.top()? {
             PickleNode::Module(attributes) => *attributes = Some(state),
-            // What hangs on a dictionary of tensors: versions of modules.
+            // A dictionary of tensors may have attributes: versions of modules.
             PickleNode::Dict(_) => {}
             _ => return Err(self.malformed("attributes of what has none")),
         }

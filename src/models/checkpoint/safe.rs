@@ -1,4 +1,4 @@
-//! Files of safetensors, tensor by tensor.
+//! Reader of safetensors files, tensor by tensor.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -8,12 +8,12 @@ use safetensors::tensor::Metadata;
 
 use super::{Dtype, Place, StoredTensor, WeightFileError};
 
-/// Largest header; those of official files have some 100 kB.
+/// Largest header, bytes; those of official files have about 100 kB.
 const MOST_HEADER: u64 = 16 << 20;
 
 type Result<T> = std::result::Result<T, WeightFileError>;
 
-/// The tensors of a file.
+/// Reads the header: the tensors of a file.
 pub(super) fn open(file: &mut File) -> Result<BTreeMap<String, StoredTensor>> {
     let broken = |problem: String| WeightFileError::Safetensors(problem);
     let bytes = file.metadata()?.len();
@@ -24,7 +24,7 @@ pub(super) fn open(file: &mut File) -> Result<BTreeMap<String, StoredTensor>> {
         return Err(broken(format!("it states {stated} bytes, in a file of {bytes}")));
     }
     file.take(stated).read_to_end(&mut header)?;
-    // The crate's own check wants the whole file in memory.
+    // The crate's own check needs the whole file in memory.
     let metadata: Metadata = serde_json::from_slice(&header[8..]).map_err(|e| broken(e.to_string()))?;
     let (start, bytes) = (8 + stated, bytes - 8 - stated);
     let covered = metadata.tensors().values().map(|info| info.data_offsets.1 as u64).max().unwrap_or(0);
@@ -56,7 +56,7 @@ pub(super) fn open(file: &mut File) -> Result<BTreeMap<String, StoredTensor>> {
     Ok(tensors)
 }
 
-/// The bytes of a tensor.
+/// Reads the bytes of a tensor.
 pub(super) fn storage(file: &mut File, place: Place) -> Result<Vec<u8>> {
     let Place::Range(start, length) = place else { return Ok(Vec::new()) };
     file.seek(SeekFrom::Start(start))?;

@@ -1,4 +1,4 @@
-//! Files as the official code wrote them (`tools/export/fixture_checkpoints.py`), and hostile ones.
+//! Files written by the official code (`tools/export/fixture_checkpoints.py`), and hostile ones.
 
 use std::io::{Cursor, Write};
 
@@ -19,7 +19,7 @@ fn open(bytes: &[u8]) -> Result<WeightFile, WeightFileError> {
     WeightFile::of(file)
 }
 
-/// The k-th number is k / 8.
+/// Returns `n` numbers; the k-th is k / 8.
 fn counted(n: u16) -> Vec<f32> {
     (0..n).map(|k| f32::from(k) / 8.0).collect()
 }
@@ -38,7 +38,7 @@ fn every_kind_of_number_and_layout_is_read() {
         assert_eq!(file.tensors[&name].shape, shape, "{name}");
         assert_eq!(file.floats(&name).expect("numbers"), counted(n), "{name}");
     }
-    // A table of 4 x 6, turned, and a piece of it: both look at one storage.
+    // A transposed 4 x 6 table, and a slice of the table: both share one storage.
     let whole = counted(24);
     let turned: Vec<f32> = (0..24).map(|i| whole[i % 4 * 6 + i / 4]).collect();
     let piece: Vec<f32> = (0..6).map(|i| whole[(1 + i / 3) * 6 + 2 + i % 3]).collect();
@@ -70,7 +70,7 @@ fn torch_script_and_safetensors_are_read() {
     assert!(file.floats("count").is_err() && file.floats("none").is_err());
 }
 
-/// Reads all that can be read.
+/// Reads every float tensor.
 fn all(bytes: &[u8]) -> Result<usize, WeightFileError> {
     let mut file = open(bytes)?;
     let floats: Vec<String> = file.tensors.iter().filter(|(_, t)| t.dtype.is_float()).map(|(n, _)| n.clone()).collect();
@@ -114,7 +114,7 @@ fn archive(entries: &[(&str, &[u8])], method: CompressionMethod) -> Vec<u8> {
     zip.finish().expect("finished").into_inner()
 }
 
-/// What a pickle of these opcodes is refused for.
+/// Error for a pickle of these opcodes.
 fn refused(pickle: &[u8]) -> String {
     let bytes = archive(&[("x/data.pkl", pickle), ("x/data/0", &[0; 16])], CompressionMethod::Stored);
     all(&bytes).expect_err("refused").to_string()
@@ -146,7 +146,7 @@ fn what_grows_or_never_ends_is_refused() {
     let deep = [&b"\x80\x02"[..], &[b']'; 200_000], &[b'a'; 199_999], b"."].concat();
     assert!(refused(&deep).contains("levels"));
     assert!(refused(b"\x80\x02]q\0h\0a.").contains("levels"), "a list in itself");
-    // Every list has the one before it twenty times.
+    // Every list contains the previous one twenty times.
     let mut laughs = b"\x80\x02]q\0".to_vec();
     for i in 1..60_u8 {
         laughs.extend([b']', b'q', i, b'(']);
@@ -208,13 +208,13 @@ fn sizes_in_an_archive_are_not_believed() {
             assert!(all(&lying).is_err(), "{stated} at {fields:?}");
         }
     }
-    // Two entries of one name, and many that are nothing.
+    // Two entries of one name, and many empty ones.
     let names: Vec<String> = (0..2_000).map(|i| format!("x/{i}")).collect();
     let many: Vec<(&str, &[u8])> = names.iter().map(|n| (&**n, &b""[..])).collect();
     assert!(matches!(all(&archive(&many, CompressionMethod::Stored)), Err(WeightFileError::Kind)));
 }
 
-/// A pickle of one tensor 't' of `shape` in the entry `key`.
+/// Pickle of one tensor 't' of `shape` in the entry `key`.
 fn tensor(key: &str, elements: u8, offset: u8, shape: &[u8], strides: &[u8]) -> Vec<u8> {
     let text = |s: &str| [&[b'X'][..], &(s.len() as u32).to_le_bytes(), s.as_bytes()].concat();
     let tuple = |n: &[u8]| [&b"("[..], &n.iter().flat_map(|n| [b'K', *n]).collect::<Vec<_>>(), b"t"].concat();

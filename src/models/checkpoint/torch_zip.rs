@@ -1,4 +1,4 @@
-//! The zip archives of `torch.save` and of TorchScript: a pickle of tensors, and an entry of bytes for each storage.
+//! Zip archives of `torch.save` and of TorchScript: a pickle of tensors, and an entry of bytes for each storage.
 
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -10,24 +10,24 @@ use super::parts::{PickleNode, TensorRecord, Value};
 use super::pickle::{self, Pickle};
 use super::{Place, StoredTensor, WeightFileError};
 
-/// Largest pickle; those of official files have some 100 kB.
+/// Largest pickle, bytes; those of official files have about 100 kB.
 const MOST_PICKLE: u64 = 8 << 20;
-/// How deep dictionaries and modules may nest.
+/// Most levels of nested dictionaries and modules.
 const MOST_DEPTH: usize = 64;
 const MOST_TENSORS: usize = 1 << 16;
 /// Longest name of a tensor, bytes.
 const MOST_NAME: usize = 1 << 10;
-/// Most values that are looked at in search of tensors: shared ones count as often as they are met.
+/// Most values that are visited in the search for tensors; shared ones count at each visit.
 const MOST_VISITS: usize = 1 << 20;
 
 type Archive = ZipArchive<BufReader<File>>;
 type Result<T> = std::result::Result<T, WeightFileError>;
 
-/// The archive and its tensors.
+/// Opens the archive and reads its list of tensors.
 pub(super) fn open(file: File) -> Result<(Archive, BTreeMap<String, StoredTensor>)> {
     let mut archive = ZipArchive::new(BufReader::new(file))?;
     let names = archive.file_names().map(|n| Ok(n?.into_owned())).collect::<Result<Vec<String>>>()?;
-    // The folder has the name under which the file was saved first.
+    // The folder is named after the file as it was first saved.
     let is_pickle = |name: &&String| name.strip_suffix("/data.pkl").is_some_and(|root| !root.contains('/'));
     let pickled = names.iter().find(is_pickle).ok_or(WeightFileError::Kind)?;
     let root = pickled.trim_end_matches("data.pkl");
@@ -49,7 +49,7 @@ pub(super) fn open(file: File) -> Result<(Archive, BTreeMap<String, StoredTensor
     Ok((archive, tensors))
 }
 
-/// The bytes of a storage, compared with their checksum.
+/// Reads the bytes of a storage and verifies their checksum.
 pub(super) fn storage(archive: &mut Archive, place: Place) -> Result<Vec<u8>> {
     match place {
         Place::Entry(i) => entry(archive, i, u64::MAX),
@@ -57,7 +57,7 @@ pub(super) fn storage(archive: &mut Archive, place: Place) -> Result<Vec<u8>> {
     }
 }
 
-/// An entry of at most `most` bytes. PyTorch compresses none that is read here, so that none is larger than its file.
+/// Reads an entry of at most `most` bytes. PyTorch does not compress such entries, so none is larger than its file.
 fn entry(archive: &mut Archive, index: usize, most: u64) -> Result<Vec<u8>> {
     let mut file = archive.by_index(index)?;
     let entry = file.name().map(|n| n.into_owned()).unwrap_or_default();
@@ -71,7 +71,7 @@ fn entry(archive: &mut Archive, index: usize, most: u64) -> Result<Vec<u8>> {
     }
     let mut bytes = Vec::new();
     (&mut file).take(size).read_to_end(&mut bytes).map_err(|e| refused(format!("cannot be read: {e}")))?;
-    // One read more, at the end, compares the checksum.
+    // One more read at the end verifies the checksum.
     let more = file.read(&mut [0; 1]).map_err(|e| refused(format!("is damaged: {e}")))?;
     if bytes.len() as u64 != size || more > 0 {
         return Err(refused(format!("has another size than the {size} bytes that it states")));
@@ -97,11 +97,12 @@ fn stored(archive: &mut Archive, root: &str, name: &str, record: TensorRecord) -
     StoredTensor::new(record.dtype, view, record.elements, Place::Entry(index)).map_err(failed)
 }
 
-/// All tensors of a pickle, with the keys that lead to them joined by dots.
+/// Lists all tensors of a pickle by their path of keys, joined by dots.
 fn records(pickle: &Pickle) -> Result<Vec<(String, TensorRecord)>> {
     let mut found = Vec::new();
     let mut open = vec![(String::new(), pickle.root.clone(), 0)];
     let mut visits = 0;
+    // Limits on depth and visits, because a small pickle can describe a cyclic or a huge graph.
     while let Some((name, value, depth)) = open.pop() {
         let Value::Node(node) = value else { continue };
         if depth > MOST_DEPTH {

@@ -1,5 +1,5 @@
-//! CLIP and its relatives: pictures and phrases as vectors of one space, by two networks that
-//! `tools/export/export_clip.py` makes of an official checkpoint.
+//! CLIP and its variants: embeddings of pictures and phrases in one space, by two networks that
+//! `tools/export/export_clip.py` exports from an official checkpoint.
 
 mod repair;
 pub mod tokens;
@@ -46,7 +46,7 @@ struct Graphs {
 
 const VOCABULARY: usize = 49_408;
 
-/// A CLIP with its networks, each prepared when it is first needed.
+/// CLIP encoder; each of its networks is loaded at first use.
 pub struct ClipEncoder {
     folder: PathBuf,
     about: Metadata,
@@ -57,7 +57,7 @@ pub struct ClipEncoder {
 }
 
 impl ClipEncoder {
-    /// The model that a metadata file describes; its graphs lie beside it.
+    /// Opens the model of a description; its graphs lie beside it.
     pub fn open(path: &Path) -> Result<Self, ModelError> {
         let about: Metadata = manifest::read(path, "clip")?;
         let refused = |problem: String| ModelError::Metadata { path: path.into(), problem };
@@ -87,30 +87,30 @@ impl ClipEncoder {
         Ok(Self { folder, about, prepare, tokens, image: None, text: None })
     }
 
-    /// The same under the name by which it is found again.
+    /// Renames it to the name by which it is looked up.
     pub(crate) fn called(mut self, name: &str) -> Self {
         name.clone_into(&mut self.about.name);
         self
     }
 
-    /// How pictures are prepared for it.
+    /// Preprocessing of its pictures.
     pub fn prepare(&self) -> &Prepare {
         &self.prepare
     }
 
-    /// Embeddings of prepared pictures `[n, 3, S, S]`, of unit length.
+    /// Embeds prepared pictures `[n, 3, S, S]` as unit vectors.
     pub fn embed_pixels(&mut self, pixels: Tensor) -> Result<Vec<Vec<f32>>, ModelError> {
         let network = self.about.graphs.image.ready(&mut self.image, &self.folder)?;
         network.unit_rows(vec![("pixels", pixels.into())], "embedding", self.about.embed_dim)
     }
 
-    /// The tokens of a phrase.
+    /// Tokens of a phrase.
     fn row(&self, phrase: &str) -> Result<Vec<i64>, ModelError> {
         if !phrase.chars().any(char::is_alphanumeric) {
             return Err(ModelError::NoKnownWord { unknown: Vec::new() });
         }
         let row = self.tokens.row(phrase);
-        // Looking up a token that is not in its table would end some engines' process.
+        // Some engines crash the process on a token outside the table.
         if let Some(token) = row.iter().find(|t| **t >= self.about.vocab_size as i64) {
             let (model, tokens) = (self.about.name.clone(), self.about.vocab_size);
             return Err(ModelError::Token { model, token: *token, tokens });
@@ -118,7 +118,7 @@ impl ClipEncoder {
         Ok(row)
     }
 
-    /// Embeddings of rows of tokens, of unit length.
+    /// Embeds rows of tokens as unit vectors.
     pub fn embed_tokens(&mut self, tokens: Tensor<i64>) -> Result<Vec<Vec<f32>>, ModelError> {
         let network = self.about.graphs.text.ready(&mut self.text, &self.folder)?;
         network.unit_rows(vec![("tokens", tokens.into())], "embedding", self.about.embed_dim)
@@ -157,7 +157,7 @@ impl Encoder for ClipEncoder {
     }
 
     fn unknown_words(&self, _: &str) -> Vec<String> {
-        // Its tokens spell every word.
+        // Its subword tokens can spell every word.
         Vec::new()
     }
 }

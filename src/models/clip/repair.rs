@@ -1,12 +1,12 @@
-//! Text as ftfy leaves it for what people type and paste, which OpenCLIP's tokens are made of: characters that were
-//! read in the wrong encoding, curly quotes, wide letters, ligatures and control characters.
+//! Text repair as in ftfy, which OpenCLIP applies before its tokenizer: characters read in the wrong encoding, curly
+//! quotes, wide letters, ligatures and control characters.
 
 use unicode_normalization::UnicodeNormalization;
 
-/// The text, repaired. Of wrong encodings one is known, UTF-8 that was read as Windows-1252.
+/// Repairs a text. The only wrong encoding that is recognized is UTF-8 read as Windows-1252.
 pub(super) fn repaired(text: &str) -> String {
     let mut text = text.to_owned();
-    // What went through the wrong encoding twice is mended twice.
+    // A text may have gone through the wrong encoding more than once.
     while let Some(better) = decoded(&text) {
         text = better;
     }
@@ -16,7 +16,7 @@ pub(super) fn repaired(text: &str) -> String {
     kept.flat_map(|c| plain(c).chars().collect::<Vec<char>>()).nfc().collect()
 }
 
-/// With every character whose UTF-8 was read as Windows-1252; `None` if there is none.
+/// Restores every character whose UTF-8 was read as Windows-1252; `None` if there is none.
 fn decoded(text: &str) -> Option<String> {
     let chars: Vec<char> = text.chars().collect();
     let mut better = String::with_capacity(text.len());
@@ -36,10 +36,10 @@ fn decoded(text: &str) -> Option<String> {
     (better != text).then_some(better)
 }
 
-/// The character whose UTF-8 stands at the beginning, one byte a character, and how many those are.
+/// Decodes the character whose UTF-8 bytes are the first characters, and returns their number.
 fn sequence(chars: &[char]) -> Option<(char, usize)> {
     let first = byte(*chars.first()?)?;
-    // Of two bytes, only what is not likely to be meant: a capital with a quote after it is.
+    // Of two-byte sequences, only those that are unlikely to be intended; a capital before a quote is likely.
     let n = match first {
         0xc2 | 0xc3 => 2,
         0xe0..=0xef => 3,
@@ -50,18 +50,18 @@ fn sequence(chars: &[char]) -> Option<(char, usize)> {
     Some((std::str::from_utf8(&bytes).ok()?.chars().next()?, n))
 }
 
-/// What Windows-1252 has at 0x80 and after; what it leaves open stands for itself.
+/// Characters of Windows-1252 from 0x80 on; undefined bytes stand for themselves.
 const HIGH: [char; 32] = [
     '€', '\u{81}', '‚', 'ƒ', '„', '…', '†', '‡', 'ˆ', '‰', 'Š', '‹', 'Œ', '\u{8d}', 'Ž', '\u{8f}', '\u{90}', '‘', '’',
     '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{9d}', 'ž', 'Ÿ',
 ];
 
-/// What a control character at 0x80 and after is if its number is a byte of Windows-1252.
+/// Decodes a control character from 0x80 on as a byte of Windows-1252.
 fn windows_1252(c: char) -> Option<char> {
     HIGH.get((c as usize).checked_sub(0x80)?).copied()
 }
 
-/// The byte of a character in Windows-1252.
+/// Byte of a character in Windows-1252.
 fn byte(c: char) -> Option<u8> {
     match HIGH.iter().position(|h| *h == c) {
         Some(at) => u8::try_from(0x80 + at).ok(),
@@ -69,12 +69,12 @@ fn byte(c: char) -> Option<u8> {
     }
 }
 
-/// Control characters that stand for nothing.
+/// Returns whether a control character is to be removed.
 fn is_control(c: char) -> bool {
     matches!(c, '\0'..='\u{8}' | '\u{b}' | '\u{e}'..='\u{1f}' | '\u{7f}' | '\u{206a}'..='\u{206f}' | '\u{feff}' | '\u{fff9}'..='\u{fffc}')
 }
 
-/// A character as it is written plainly.
+/// Plain form of a character.
 fn plain(c: char) -> String {
     match c {
         '\u{2bc}' | '\u{2018}'..='\u{201b}' => "'".into(),

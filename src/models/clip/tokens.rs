@@ -1,4 +1,4 @@
-//! Text as CLIP's tokens, cleaned as OpenCLIP cleans it.
+//! CLIP's tokenizer, with the text cleaning of OpenCLIP.
 
 use instant_clip_tokenizer::Tokenizer;
 
@@ -11,12 +11,12 @@ pub struct Tokens {
 }
 
 impl Tokens {
-    /// With CLIP's own vocabulary; `context` tokens a row.
+    /// Tokenizer with CLIP's own vocabulary; `context` tokens a row.
     pub fn new(context: usize) -> Self {
         Self { tokenizer: Tokenizer::new(), context: context.max(3) }
     }
 
-    /// The row of a phrase: start, its tokens, end, zeros. What is too long is cut before the end.
+    /// Returns the row of a phrase: start, its tokens, end, zeros. A long phrase is cut before the end token.
     pub fn row(&self, text: &str) -> Vec<i64> {
         let mut tokens = vec![self.tokenizer.start_of_text()];
         self.tokenizer.encode(&single_spaced(&clean(text)), &mut tokens);
@@ -28,15 +28,15 @@ impl Tokens {
     }
 }
 
-/// A text with its encoding repaired and its entities resolved.
+/// Repairs the encoding of a text and resolves its HTML entities.
 pub fn clean(text: &str) -> String {
-    // ftfy takes a text without tags for one whose entities were to be shown.
+    // As in ftfy, entities are resolved first only in a text without tags.
     let text = if text.contains('<') { text.into() } else { htmlize::unescape(text) };
     let once = htmlize::unescape(repaired(&without_escapes(&text))).into_owned();
     htmlize::unescape(once.as_str()).trim_matches(is_space).to_owned()
 }
 
-/// Without the escape sequences of terminals (`ESC [ 31 m`).
+/// Removes the escape sequences of terminals (`ESC [ 31 m`).
 fn without_escapes(text: &str) -> String {
     let mut kept = String::with_capacity(text.len());
     let mut rest = text;
@@ -56,12 +56,12 @@ fn without_escapes(text: &str) -> String {
     kept
 }
 
-/// Runs of white space as one space each.
+/// Replaces each run of white space with one space.
 fn single_spaced(text: &str) -> String {
     text.split(is_space).filter(|w| !w.is_empty()).collect::<Vec<_>>().join(" ")
 }
 
-/// White space as OpenCLIP's language counts it: separators of files and records too.
+/// Returns whether Python counts a character as white space: separators of files and records too.
 fn is_space(c: char) -> bool {
     c.is_whitespace() || ('\u{1c}'..='\u{1f}').contains(&c)
 }

@@ -1,4 +1,4 @@
-//! The shipped networks do what they did in training, on either engine.
+//! The built-in networks give the outputs that they had after training, on either engine.
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
@@ -11,7 +11,7 @@ use crate::math::stats::{worst, worst_difference};
 use crate::models::engine::library_in;
 use crate::scene::Mask;
 
-/// What `tools/encoder/export.py` wrote beside the networks.
+/// Expected embeddings, written by `tools/encoder/export.py`.
 #[derive(Deserialize)]
 struct Golden {
     text: BTreeMap<String, Vec<f32>>,
@@ -32,7 +32,7 @@ struct HeldOut {
 #[derive(Deserialize)]
 struct Entry {
     query: String,
-    /// For a part, the place of its thing.
+    /// Index of a part's object.
     thing: Option<usize>,
 }
 
@@ -95,7 +95,7 @@ fn another_of_its_make_is_named_by_its_word_list() {
     std::fs::write(at(IMAGE.0), IMAGE.1).unwrap();
     let missing = crate::models::encoder(path).err().unwrap().to_string();
     assert!(missing.contains(TEXT.0), "{missing}");
-    // Two words exchanged: it is this list that counts.
+    // Two words exchanged, to see that this list is used.
     let swapped = WORDS.1.replace("\"mug\"", "\"_\"").replace("\"lamp\"", "\"mug\"").replace("\"_\"", "\"lamp\"");
     assert_ne!(swapped, WORDS.1);
     std::fs::write(&list, swapped).unwrap();
@@ -151,8 +151,8 @@ fn what_cannot_be_encoded_is_refused() {
     assert!(matches!(encoder.image(&poisoned), Err(ModelError::TileColor { pixel: 7 })));
 }
 
-/// Share of the tiles whose query finds a tile with the same query: things among things, parts
-/// (deviated toward their things) among parts.
+/// Share of the tiles whose query finds a tile with the same query: objects among objects, parts (their queries
+/// shifted toward their objects) among parts.
 fn top_1(list: &HeldOut, features: &[Vec<f32>], queries: &[Vec<f32>], parts: bool) -> f64 {
     let among: Vec<usize> = (0..list.tiles.len()).filter(|&k| list.tiles[k].thing.is_some() == parts).collect();
     let right = among.iter().filter(|&&k| {
@@ -181,7 +181,7 @@ fn combinations_that_training_never_saw_are_found() {
     shuffled.rotate_left(29);
     let control = top_1(&list, &features, &shuffled, true).max(top_1(&list, &features, &shuffled, false));
     assert!(things > THINGS && parts > PARTS && control < 0.15, "things {things}, parts {parts}, control {control}");
-    // More than a canonical phrase.
+    // The query scores more than every canonical phrase.
     let canonical = ["object", "stuff", "texture", "things"].map(|c| encoder.text(c).unwrap());
     let margin = |q: &[f32], f: &[f32]| cos(q, f) - canonical.iter().map(|c| cos(c, f)).fold(-1.0, f32::max);
     let share = |q: &[Vec<f32>]| {
@@ -208,7 +208,7 @@ fn phrases_together_are_as_alone() {
         }
     }
     assert!(encoder.texts(&["giraffe"])[0].is_err() && encoder.texts(&[]).is_empty());
-    // Longer than needed, as networks of fixed shapes ask for, is the same.
+    // Extra padding, as for networks of fixed shapes, changes nothing.
     let row = encoder.words.encode("red mug").unwrap();
     let tokens = Tensor::new(&[1, row.len()], row);
     let network = encoder.text.ready().unwrap();
@@ -216,7 +216,7 @@ fn phrases_together_are_as_alone() {
     assert!(worst_difference(together[0].as_ref().unwrap(), &whole[0]) < 1e-6);
 }
 
-/// What this process's engine makes of the golden phrases and tiles.
+/// Embeddings of the golden phrases and tiles by this process's engine.
 fn embeddings() -> Vec<Vec<f32>> {
     let mut encoder = DemoEncoder::new().unwrap();
     let (_, tiles) = held_out();
@@ -224,14 +224,14 @@ fn embeddings() -> Vec<Vec<f32>> {
     texts.into_iter().chain(tiles[..12].iter().map(|t| encoder.image(t).unwrap())).collect()
 }
 
-/// An ONNX Runtime library: the one that is named, or that of the wheel which `tools/setup.sh test` fetches.
+/// Path of an ONNX Runtime library: the one that is set, or that of the wheel that `tools/setup.sh test` fetches.
 fn runtime_library() -> Option<PathBuf> {
     let mut named = ["FMLGS_ONNXRUNTIME", "ORT_DYLIB_PATH"].into_iter().filter_map(std::env::var_os).map(PathBuf::from);
     let fetched = Path::new(env!("CARGO_MANIFEST_DIR")).join("target/onnxruntime/onnxruntime/capi");
     named.find(|p| p.is_file()).or_else(|| library_in(&fetched))
 }
 
-/// A process has one engine, so each runs in one of its own: this test again, told to print.
+/// A process has one engine, so each engine runs in a process of its own: this test again, which then prints.
 #[test]
 fn both_engines_agree() {
     const PRINTS: &str = "FMLGS_TEST_PRINTS_EMBEDDINGS";
@@ -257,13 +257,13 @@ fn both_engines_agree() {
     let largest = |b: &[Vec<f32>]| worst(a.iter().zip(b).map(|(a, b)| worst_difference(a, b)));
     println!("{runtime} against {built_in}: {:e}", largest(&b));
     assert!(a.len() == b.len() && largest(&b) < 1e-4, "{:e}", largest(&b));
-    // Control: the vectors of others.
+    // Control: vectors of other inputs.
     let mut others = b;
     others.rotate_left(1);
     assert!(largest(&others) > 1e-2);
 }
 
-/// Bars, a little under what was measured when the networks were made.
+/// Thresholds, a little below the values measured after training.
 const THINGS: f64 = 0.75;
 const PARTS: f64 = 0.68;
 const FOUND: f64 = 0.5;

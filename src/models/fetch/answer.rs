@@ -1,8 +1,8 @@
-//! What the headers of an answer say: where to ask instead, and which part of a file follows.
+//! Parses headers of an HTTP response: the address of a redirect, and the range of the content.
 
 use url::Url;
 
-/// The address that a server means by `location` where somebody has asked for `url`; `None` where that is of no server.
+/// Resolves the `location` of a redirect from `url`; `None` if the scheme is not http or https.
 pub(super) fn elsewhere(url: &str, location: &str) -> Option<String> {
     let to = Url::parse(url).ok()?.join(location).ok()?;
     matches!(to.scheme(), "http" | "https").then(|| to.into())

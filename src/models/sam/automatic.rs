@@ -1,6 +1,5 @@
-//! Masks of everything in a picture: a grid of points, on the whole picture and on crops of it, and
-//! of what the network answers that which it is sure of, which is stable, and which is not there
-//! already. As the official generators do it.
+//! Masks of everything in a picture, as the official mask generators find them: a grid of points on the picture and
+//! on crops of it. Masks are kept that have a high predicted IoU, are stable, and are not duplicates.
 
 use rayon::prelude::*;
 
@@ -17,25 +16,24 @@ use crate::scene::{Mask, PhotoPixels};
 pub struct AutomaticOptions {
     /// Points along a side of the grid.
     pub points_per_side: usize,
-    /// Points that go through the network together.
+    /// Points in one batch of the network.
     pub batch: usize,
     /// Least predicted IoU; 0 = any.
     pub predicted_iou: f32,
     /// Least stability: IoU of the masks at logits of 1 and of -1; 0 = any.
     pub stability: f32,
-    /// Overlap of boxes from which the worse of two masks is left out.
+    /// IoU of boxes above which the worse of two masks is left out.
     pub box_nms: f64,
     /// Layers of crops besides the whole picture.
     pub crop_layers: u32,
     /// Points along a side of the grid are divided by this once per layer.
     pub crop_point_divisor: usize,
-    /// Overlap of boxes from which masks of larger crops are left out.
+    /// IoU of boxes above which masks of larger crops are left out.
     pub crop_nms: f64,
     /// Holes and islands smaller than this are filled and removed; 0 = none. In px of the picture
     /// for SAM, of the low-resolution masks for SAM 2.
     pub least_region_px: usize,
-    /// Whether points of the grid are left out between others that lie in one mask with them; the official
-    /// generators ask all.
+    /// True if points are skipped between others that lie in one mask with them; the official generators prompt all.
     pub sparing: bool,
 }
 
@@ -56,31 +54,31 @@ impl Default for AutomaticOptions {
     }
 }
 
-/// Shift of the threshold that stability is measured with, logits.
+/// Shift of the threshold in the measure of stability, logits.
 const OFFSET: f32 = 1.0;
-/// How near to a crop's edge a box must be to be cut off by it, px.
+/// Distance to a crop's edge within which a box counts as cut off by it, px.
 const EDGE_PX: f64 = 20.0;
 /// Overlap of crops, as a share of the shorter side.
 const CROP_OVERLAP: f64 = 512.0 / 1500.0;
 
-/// A mask of something in the picture.
+/// Mask that was found in the picture.
 #[derive(Clone, Debug, PartialEq)]
 pub struct AutomaticMask {
-    /// Its pixels.
+    /// Pixels.
     pub mask: Mask,
     /// Left, top, right and bottom pixel.
     pub bounds: [f64; 4],
-    /// The network's estimate of its IoU.
+    /// Predicted IoU.
     pub predicted_iou: f32,
-    /// How little it depends on the threshold, 0 to 1.
+    /// Stability against shifts of the threshold, 0 to 1.
     pub stability: f32,
-    /// The point that found it, px.
+    /// Point prompt that found it, px.
     pub point: [f64; 2],
-    /// The crop in which it was found: left, top, right, bottom.
+    /// Crop in which it was found: left, top, right, bottom.
     pub(crate) crop: [usize; 4],
 }
 
-/// The crops of a picture: the whole, then those of each layer.
+/// Returns the crops of a picture with their layers: the whole picture, then the crops of each layer.
 pub fn crops(width: usize, height: usize, layers: u32) -> Vec<([usize; 4], u32)> {
     let mut boxes = vec![([0, 0, width, height], 0)];
     for layer in 1..=layers {
@@ -98,8 +96,8 @@ pub fn crops(width: usize, height: usize, layers: u32) -> Vec<([usize; 4], u32)>
     boxes
 }
 
-/// Masks of everything in a picture, best first. `go_on` is told the share that is done, and says
-/// whether to go on; what was found until then is returned.
+/// Finds the masks of everything in a picture, best first. `go_on` receives the fraction done and returns false to
+/// stop; the masks found until then are returned.
 pub fn everything(
     network: &mut dyn PromptedMasks,
     picture: &PhotoPixels,
@@ -135,7 +133,7 @@ pub fn everything(
                     return Ok(collector.finish(boxes.len() > 1));
                 }
                 asked += batch.len();
-                // The point, and the empty one that marks the absence of a box.
+                // The point, and a padding point (label -1) that marks the absence of a box.
                 let coords = batch.iter().map(|k| points.at(*k));
                 let coords = coords
                     .flat_map(|[x, y]| [(x * w as f64 * scale[0]) as f32, (y * h as f64 * scale[1]) as f32, 0.0, 0.0]);
@@ -157,7 +155,7 @@ pub fn everything(
 }
 
 impl Prompted {
-    /// The three masks for ambiguous prompts of a point, which lies at these px of the picture.
+    /// Returns the three masks of a point as an ambiguous prompt; `at_px` is its position in the picture.
     fn of(&self, point: usize, at_px: [f64; 2]) -> PointMasks<'_> {
         let (low, first) = (self.masks.shape[3], 4 * point + 1);
         let plane = |j: usize| &self.masks.values[(first + j) * low * low..(first + j + 1) * low * low];
@@ -165,25 +163,25 @@ impl Prompted {
     }
 }
 
-/// A point's three planes of logits, their predicted IoU, and the point.
+/// Three planes of logits of a point, their predicted IoU, and the point, px.
 pub type PointMasks<'a> = ([&'a [f32]; 3], [f32; 3], [f64; 2]);
 
-/// Keeps the good ones of what a network answers.
+/// Collects the masks that pass the thresholds.
 pub struct MaskCollector<'a> {
     /// Size of the picture, px.
     pub size: (usize, usize),
     /// Side of the network's square, px.
     pub side: usize,
-    /// How the picture lies in it.
+    /// Fit of the picture in that square.
     pub fit: FitSide,
     /// Settings.
     pub options: &'a AutomaticOptions,
-    /// What is kept so far.
+    /// Masks so far.
     pub found: Vec<AutomaticMask>,
 }
 
 impl MaskCollector<'_> {
-    /// The good ones of the answers to each point of a crop.
+    /// Returns the masks of each point of a crop that pass the thresholds.
     pub fn judge(&self, answers: &[PointMasks<'_>], crop: [usize; 4]) -> Vec<Vec<AutomaticMask>> {
         let of_point = |(planes, iou, point): &PointMasks<'_>| {
             planes.iter().zip(iou).filter_map(|(plane, iou)| self.judge_one(plane, *iou, *point, crop)).collect()
@@ -191,7 +189,7 @@ impl MaskCollector<'_> {
         answers.par_iter().map(of_point).collect()
     }
 
-    /// Takes what was found in a crop, without what repeats something better there.
+    /// Adds the masks of a crop, without duplicates of better ones there.
     pub fn keep(&mut self, found: Vec<AutomaticMask>) {
         let boxes: Vec<[f64; 4]> = found.iter().map(|f| f.bounds).collect();
         let scores: Vec<f32> = found.iter().map(|f| f.predicted_iou).collect();
@@ -206,7 +204,7 @@ impl MaskCollector<'_> {
         }
         let low = plane.len().isqrt();
         let (w, h) = (crop[2] - crop[0], crop[3] - crop[1]);
-        // SAM 2 cleans before it enlarges.
+        // SAM 2 cleans the low-resolution mask, SAM the enlarged one.
         let full = if self.fit == FitSide::Longer || options.least_region_px == 0 {
             enlarge(plane, low, self.side, self.fit, (w, h))
         } else {
@@ -223,7 +221,7 @@ impl MaskCollector<'_> {
         let [l, t, r, b] = corners(&inside);
         let bounds = [l + x0 as f64, t + y0 as f64, r + x0 as f64, b + y0 as f64];
         let ends = [0, 0, self.size.0, self.size.1];
-        // Cut off by the crop, but not by the picture.
+        // A box at an edge of the crop that is no edge of the picture is cut off.
         let cut_off =
             |k: usize| (bounds[k] - crop[k] as f64).abs() <= EDGE_PX && (bounds[k] - ends[k] as f64).abs() > EDGE_PX;
         if (0..4).any(cut_off) {
@@ -234,12 +232,12 @@ impl MaskCollector<'_> {
         Some(AutomaticMask { mask, bounds, predicted_iou: iou, stability, point, crop })
     }
 
-    /// What is left when crops are compared with one another and small regions are cleaned.
+    /// Returns the masks after suppressing duplicates between crops and cleaning small regions.
     pub fn finish(self, with_crops: bool) -> Vec<AutomaticMask> {
         let Self { options, mut found, fit, .. } = self;
         let boxes = |found: &[AutomaticMask]| found.iter().map(|f| f.bounds).collect::<Vec<_>>();
         if with_crops {
-            // Smaller crops see more.
+            // Smaller crops show more detail.
             let area = |f: &AutomaticMask| ((f.crop[2] - f.crop[0]) * (f.crop[3] - f.crop[1])) as f32;
             let scores: Vec<f32> = found.iter().map(|f| 1.0 / area(f)).collect();
             found = suppress(&boxes(&found), &scores, options.crop_nms).into_iter().map(|i| found[i].clone()).collect();
@@ -260,13 +258,13 @@ impl MaskCollector<'_> {
     }
 }
 
-/// Left, top, right and bottom pixel of a mask; zeros without any.
+/// Left, top, right and bottom pixel of a mask; zeros for an empty one.
 fn corners(mask: &Mask) -> [f64; 4] {
     mask.bounds().map_or([0.0; 4], |b| [b.x.start, b.y.start, b.x.end - 1, b.y.end - 1].map(|v| v as f64))
 }
 
-/// Indices of the boxes that are kept, best first (equal ones in their order): those that overlap
-/// with no better one by more than `threshold`.
+/// Non-maximum suppression: indices of the boxes whose IoU with no better one exceeds `threshold`, best first (equal
+/// ones in their order).
 fn suppress(boxes: &[[f64; 4]], scores: &[f32], threshold: f64) -> Vec<usize> {
     let mut order: Vec<usize> = (0..boxes.len()).collect();
     order.sort_by(|&a, &b| scores[b].total_cmp(&scores[a]));
@@ -285,15 +283,15 @@ fn suppress(boxes: &[[f64; 4]], scores: &[f32], threshold: f64) -> Vec<usize> {
     kept
 }
 
-/// A mask with its small holes filled, or its small islands removed; whether anything changed. The
-/// largest island stays, however small.
+/// Fills small holes of a mask, or removes its small islands, and returns whether anything changed. The largest
+/// island stays, however small.
 fn cleaned(mask: &Mask, least: usize, holes: bool) -> (Mask, bool) {
     let (w, h) = (mask.width_px(), mask.height_px());
     let (label, areas) = regions(w, w * h, |i| mask.contains(i) != holes);
     if areas.iter().all(|a| *a >= least) {
         return (mask.clone(), false);
     }
-    // The first of the largest.
+    // `max_by_key` returns the last of equals; reversed, it is the first.
     let largest = (0..areas.len()).rev().max_by_key(|k| areas[*k]);
     let any_large = areas.iter().any(|a| *a >= least);
     let stays = |k: usize| areas[k] >= least || (!holes && !any_large && Some(k) == largest);
@@ -305,7 +303,7 @@ fn cleaned(mask: &Mask, least: usize, holes: bool) -> (Mask, bool) {
     (Mask::from_fn(w, h, inside), true)
 }
 
-/// Logits whose holes of at most `most` px are inside, and whose islands of at most that are outside.
+/// Fills holes of at most `most` px in a plane of logits, and removes islands of at most that size.
 fn cleaned_logits(plane: &[f32], low: usize, most: usize) -> Vec<f32> {
     let mut out = plane.to_vec();
     for (background, value) in [(true, 10.0), (false, -10.0)] {

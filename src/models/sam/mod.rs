@@ -1,7 +1,7 @@
 //! Segment Anything: masks of a picture from points, boxes and masks, and of everything in it.
 //!
-//! [`PromptedMasks`] is what SAM and SAM 2 have in common once a picture is encoded; [`automatic`]
-//! asks it for a grid of points and keeps what is good.
+//! [`PromptedMasks`] is the common interface of SAM and SAM 2 for an encoded picture; [`automatic`] prompts it with a
+//! grid of points and keeps the good masks.
 
 pub mod automatic;
 mod grid_points;
@@ -26,30 +26,30 @@ pub struct Prompted {
     pub iou: Tensor,
 }
 
-/// A network that gives masks for prompts on the picture that it has looked at last.
+/// Network that returns masks for prompts on the picture that it encoded last.
 pub trait PromptedMasks {
-    /// Its name.
+    /// Name.
     fn name(&self) -> &str;
 
-    /// Looks at a picture.
+    /// Encodes a picture.
     fn look(&mut self, picture: &PhotoPixels) -> Result<(), ModelError>;
 
-    /// Masks for points `[prompts, points, 2]` in px of the network's square, with labels
-    /// `[prompts, points]` (-1 none, 0 background, 1 foreground, 2 and 3 a box's corners).
+    /// Returns masks for points `[prompts, points, 2]` in px of the network's square, with labels `[prompts, points]`
+    /// (-1 none, 0 background, 1 foreground, 2 and 3 a box's corners). `earlier` holds logits to refine.
     fn masks(&mut self, points: Tensor, labels: Tensor, earlier: Option<Tensor>) -> Result<Prompted, ModelError>;
 
     /// Side of the network's square, px.
     fn side_px(&self) -> usize;
 
-    /// How a picture lies in that square.
+    /// Fit of a picture in that square.
     fn fit(&self) -> FitSide;
 }
 
-/// Lengths in the network's square of a px of a picture of this size, along each axis.
+/// Scale from px of a picture of this size to px of the network's square, along each axis.
 pub(super) fn in_square(network: &dyn PromptedMasks, size: [usize; 2]) -> [f64; 2] {
     let side = network.side_px() as f64;
     match network.fit() {
-        // Whole pixels of the square, as the picture itself is resized.
+        // Rounded to whole pixels, as the picture itself is resized.
         FitSide::Longer => size.map(|n| (n as f64 * side / size[0].max(size[1]) as f64 + 0.5).floor() / n as f64),
         _ => size.map(|n| side / n as f64),
     }
@@ -62,7 +62,7 @@ struct Metadata {
     mean: [f32; 3],
     std: [f32; 3],
     graphs: Graphs,
-    /// Whether it is made for small machines.
+    /// True if it is a reduced model for slow machines.
     #[serde(default)]
     small: bool,
 }
@@ -70,7 +70,7 @@ struct Metadata {
 #[derive(Clone, Debug, Deserialize)]
 struct Graphs {
     encoder: manifest::GraphFile,
-    /// Its second half, of one that is too large for one file.
+    /// Second half of an encoder that is too large for one file.
     encoder_rest: Option<manifest::GraphFile>,
     decoder: manifest::GraphFile,
 }
@@ -87,7 +87,7 @@ pub struct Sam {
 }
 
 impl Sam {
-    /// The model that a metadata file describes; its graphs lie beside it.
+    /// Opens the model of a description; its graphs lie beside it.
     pub fn open(path: &Path) -> Result<Self, ModelError> {
         let about: Metadata = manifest::read(path, "sam")?;
         let Metadata { image_size, mean, std, .. } = about;
@@ -97,12 +97,12 @@ impl Sam {
         Ok(Self { folder, about, prepare, encoder: None, encoder_rest: None, decoder: None, embeddings: None })
     }
 
-    /// Whether it is made for small machines, and to be asked sparingly.
+    /// True if it is a reduced model for slow machines, to be prompted sparingly.
     pub(crate) fn is_small(&self) -> bool {
         self.about.small
     }
 
-    /// What the network made of the picture it looked at.
+    /// Embeddings of the picture that was encoded last.
     pub fn embeddings(&self) -> Option<&Tensor> {
         self.embeddings.as_ref()
     }

@@ -1,8 +1,7 @@
-//! SAM 2: masks of a picture as SAM gives them, and the same objects followed through a sequence of
-//! pictures by what is remembered of them.
+//! SAM 2: masks of a picture as in SAM, and tracking of objects through a sequence of pictures by a memory.
 //!
-//! [`Sam2`] holds the five networks; [`track`] is the memory: which earlier frames an object is
-//! compared with, forward and backward.
+//! [`Sam2`] holds the five networks; [`track`] holds the memory and selects the earlier frames that condition an
+//! object's mask, forward and backward.
 
 pub mod sequence;
 pub mod track;
@@ -25,33 +24,33 @@ pub(crate) struct Metadata {
     pub(crate) image_size: usize,
     mean: [f32; 3],
     std: [f32; 3],
-    /// Memories that a frame sees: the prompted ones, and one less of those before it.
+    /// Memory slots: one for all prompted frames, the others for the frames just before.
     pub(crate) memories: usize,
-    /// Object pointers that a frame sees.
+    /// Most object pointers that condition a frame.
     pub(crate) pointers: usize,
-    /// Whether pointers carry their distance in time.
+    /// True if pointers carry their distance in time.
     pub(crate) pointer_time: bool,
-    /// Whether that distance has a sign.
+    /// True if that distance has a sign.
     pub(crate) pointer_time_signed: bool,
-    /// Whether pointers of later frames are left out.
+    /// True if pointers of later frames are left out.
     pub(crate) pointers_only_from_past: bool,
-    /// Most prompted frames that a frame sees; -1 = all.
+    /// Most prompted frames that condition a frame; -1 = all.
     pub(crate) max_conditioning_frames: i64,
-    /// Fewest and most points for which three masks are tried.
+    /// Fewest and most points for which three masks are decoded.
     pub(crate) multimask_points: [usize; 2],
-    /// Whether three masks are tried while following.
+    /// True if three masks are decoded while tracking.
     pub(crate) multimask_when_tracking: bool,
     pub(crate) pointer_of_best_mask: bool,
-    /// Shift of the threshold that stability is measured with, logits.
+    /// Shift of the threshold in the measure of stability, logits.
     pub(crate) stability_delta: f32,
-    /// Stability under which the single mask gives way to the best of three.
+    /// Stability below which the best of three masks replaces the single mask.
     pub(crate) stability_threshold: f32,
     pub(crate) single_mask_falls_back: bool,
-    /// Whether masks of prompted frames are remembered as yes or no.
+    /// True if masks of prompted frames enter the memory in binary form.
     pub(crate) binarise_prompted: bool,
     /// Holes of at most this many low-resolution pixels are filled.
     pub(crate) fill_hole_area: usize,
-    /// Logit of an object that is not there.
+    /// Mask logit of an absent object.
     pub(crate) absent_score: f32,
     no_memory_embedding: Vec<f32>,
     no_object_pointer: Vec<f32>,
@@ -67,7 +66,7 @@ struct Graphs {
     memory_attention: manifest::GraphFile,
 }
 
-/// What the encoder makes of a frame.
+/// Features of a frame from the image encoder.
 #[derive(Clone, Debug, PartialEq)]
 pub struct EncodedFrame {
     /// `[1, C, S/16, S/16]`.
@@ -78,20 +77,20 @@ pub struct EncodedFrame {
     pub middle: Tensor,
 }
 
-/// What the decoder says about one object in a frame.
+/// Output of the decoder for one object in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Decoded {
     /// Low-resolution logits of four masks, `[1, 4, S/4, S/4]`.
     pub(crate) masks: Tensor,
     /// Predicted IoU of each, `[1, 4]`.
     pub(crate) iou: Tensor,
-    /// Logit of the object being there at all.
+    /// Logit of the object's presence.
     pub(crate) score: f32,
     /// Pointer of each mask, `[1, 4, C]`.
     pub(crate) pointers: Tensor,
 }
 
-/// SAM 2's networks, each loaded when it is first needed.
+/// Networks of SAM 2, each loaded at first use.
 pub struct Sam2 {
     folder: PathBuf,
     pub(crate) about: Metadata,
@@ -101,12 +100,12 @@ pub struct Sam2 {
     mask_prompt: Option<Network>,
     memory_encoder: Option<Network>,
     memory_attention: Option<Network>,
-    /// The picture that [`PromptedMasks`] is about.
+    /// Encoded picture for [`PromptedMasks`].
     looked: Option<EncodedFrame>,
 }
 
 impl Sam2 {
-    /// The model that a metadata file describes; its graphs lie beside it.
+    /// Opens the model of a description; its graphs lie beside it.
     pub fn open(path: &Path) -> Result<Self, ModelError> {
         let about: Metadata = manifest::read(path, "sam2")?;
         let Metadata { image_size, mean, std, .. } = about;
@@ -132,19 +131,19 @@ impl Sam2 {
         })
     }
 
-    /// What tells its encoder from others: frames that another one encoded are not its own.
+    /// SHA-256 of its encoder, to recognize frames that this encoder encoded.
     pub(crate) fn digest(&self) -> &str {
         &self.about.graphs.encoder.sha256
     }
 
-    /// Looks at a frame of a sequence.
+    /// Encodes a frame of a sequence.
     pub(crate) fn encode(&mut self, picture: &PhotoPixels) -> Result<EncodedFrame, ModelError> {
         let image = self.prepare.picture(picture).ok_or(ModelError::NoPicture)?;
         self.encode_pixels(image)
     }
 
-    /// A picture that is no frame of a sequence, `[1, 3, S, S]`: the official code resizes it in
-    /// floating point, where it resizes frames in bytes.
+    /// Prepares a single picture, `[1, 3, S, S]`: the official code resizes it in floating point, but frames of a
+    /// sequence in bytes.
     fn single_picture(&self, picture: &PhotoPixels) -> Option<Tensor> {
         let (w, h) = (picture.width_px as usize, picture.height_px as usize);
         if w == 0 || h == 0 || picture.rgb.len() != w * h {
@@ -160,7 +159,7 @@ impl Sam2 {
         Some(Tensor::new(&[1, 3, image_size, image_size], (0..3).flat_map(plane).collect()))
     }
 
-    /// Looks at a prepared picture, `[1, 3, S, S]`.
+    /// Encodes a prepared picture, `[1, 3, S, S]`.
     pub fn encode_pixels(&mut self, image: Tensor) -> Result<EncodedFrame, ModelError> {
         let encoder = self.about.graphs.encoder.ready(&mut self.encoder, &self.folder)?;
         let mut out = encoder.run(vec![("image", image.into())])?;
@@ -171,7 +170,7 @@ impl Sam2 {
         })
     }
 
-    /// The embeddings of a frame of which nothing is remembered.
+    /// Returns the embeddings of a frame without memory.
     pub fn without_memory(&self, frame: &EncodedFrame) -> Tensor {
         let mut embeddings = frame.embeddings.clone();
         let plane = embeddings.values.len() / self.about.no_memory_embedding.len().max(1);
@@ -181,12 +180,12 @@ impl Sam2 {
         embeddings
     }
 
-    /// The pointer of an object that is not there, `[1, C]`.
+    /// Pointer of an absent object, `[1, C]`.
     pub(crate) fn no_pointer(&self) -> Tensor {
         Tensor::new(&[1, self.about.no_object_pointer.len()], self.about.no_object_pointer.clone())
     }
 
-    /// Masks for prompts on a frame whose embeddings may be conditioned on memories.
+    /// Decodes masks for prompts on a frame; its embeddings may be conditioned on memories.
     pub(crate) fn decode(
         &mut self,
         frame: &EncodedFrame,
@@ -207,15 +206,15 @@ impl Sam2 {
         Ok(Decoded { masks: out.take("masks")?, iou: out.take("iou")?, score, pointers: out.take("object_pointers")? })
     }
 
-    /// A mask of the square's size, `[1, 1, S, S]` of 0 and 1, as the decoder's prompt and as
-    /// low-resolution logits.
+    /// Converts a mask of the square's size, `[1, 1, S, S]` of 0 and 1, to the decoder's prompt and to low-resolution
+    /// logits.
     fn mask_prompt(&mut self, mask: Tensor) -> Result<(Tensor, Tensor), ModelError> {
         let network = self.about.graphs.mask_prompt.ready(&mut self.mask_prompt, &self.folder)?;
         let mut out = network.run(vec![("mask", mask.into())])?;
         Ok((out.take("mask_input")?, out.take("low_res_mask")?))
     }
 
-    /// What is remembered of an object's mask in a frame.
+    /// Encodes an object's mask in a frame into a memory.
     fn remember(
         &mut self,
         frame: &EncodedFrame,
@@ -235,8 +234,8 @@ impl Sam2 {
         Ok(memory)
     }
 
-    /// A frame's embeddings, conditioned on memories with their rows of the time table, and on
-    /// pointers with their distances in time.
+    /// Conditions a frame's embeddings on memories with their rows of the time table, and on pointers with their
+    /// distances in time.
     fn condition(
         &mut self,
         frame: &EncodedFrame,
@@ -252,7 +251,7 @@ impl Sam2 {
             ("memory_time", Tensor::new(&[n], memories.iter().map(|m| m.0).collect::<Vec<i64>>()).into()),
             ("memory_valid", Tensor::filled(&[n], 1.0).into()),
         ];
-        // No engine likes empty arrays: one row that counts for nothing.
+        // Engines may fail on empty arrays, so there is one row that is marked invalid.
         let (rows, offsets, valid) = match pointers {
             [] => (nothing, vec![0.0], 0.0),
             some => (Tensor::joined(some.iter().map(|p| p.1)), some.iter().map(|p| p.0).collect(), 1.0),

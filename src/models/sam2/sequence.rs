@@ -1,46 +1,46 @@
-//! What a track goes through: the frames of a sequence, and what was followed of it before it was stopped.
+//! Inputs of a track: the frames of a sequence, and the outputs of an interrupted track.
 
 use super::{EncodedFrame, Sam2};
 use crate::models::ModelError;
 use crate::models::tensor::Tensor;
 use crate::scene::PhotoPixels;
 
-/// The caller's number of an object.
+/// Object number of the caller.
 pub type ObjectId = u32;
 
-/// An object in a frame.
+/// Object in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Output {
     /// Low-resolution logits, `[1, 1, S/4, S/4]`; the object is where they are positive.
     pub logits: Tensor,
-    /// What points to it, `[1, C]`.
+    /// Object pointer, `[1, C]`.
     pub pointer: Tensor,
-    /// Logit of it being there at all.
+    /// Logit of its presence.
     pub score: f32,
-    /// What is remembered of it.
+    /// Memory features.
     pub memory: Option<Tensor>,
 }
 
-/// The frames of a sequence, as the encoder sees them: all in memory, or from a cache on disk.
+/// Encoded frames of a sequence: all in memory, or from a cache on disk.
 pub trait FrameSource {
-    /// How many there are.
+    /// Number of frames.
     fn len(&self) -> usize;
 
-    /// Whether there are none.
+    /// True if there are no frames.
     fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// One of them.
+    /// Returns one frame.
     fn get(&mut self, model: &mut Sam2, index: usize) -> Result<EncodedFrame, ModelError>;
 }
 
-/// Frames that are kept in memory.
+/// Frames in memory.
 #[derive(Clone, Debug, Default)]
 pub struct InMemory(pub Vec<EncodedFrame>);
 
 impl InMemory {
-    /// Looks at all pictures.
+    /// Encodes all pictures.
     pub fn of(model: &mut Sam2, pictures: &[PhotoPixels]) -> Result<Self, ModelError> {
         pictures.iter().map(|p| model.encode(p)).collect::<Result<_, _>>().map(Self)
     }
@@ -56,25 +56,25 @@ impl FrameSource for InMemory {
     }
 }
 
-/// One object in one frame of one pass.
+/// Step of a track: one object in one frame of one pass.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct TrackStep {
     pub(crate) object: ObjectId,
     pub(crate) frame: usize,
-    /// Whether the pass goes back from the first frame that was marked.
+    /// True if the pass goes back from the first prompted frame.
     pub(crate) backward: bool,
 }
 
-/// What was followed before a track was stopped; keeps what is followed now.
+/// Record of the outputs of a track, to resume it after an interruption.
 pub trait TrackHistory {
-    /// What was found there, if the track got that far. Asked in the order in which objects are followed.
+    /// Returns the earlier output of a step, if there is one. Called in the order of tracking.
     fn earlier(&mut self, step: TrackStep) -> Option<Output>;
 
-    /// Keeps what was found.
+    /// Records the output of a step.
     fn keep(&mut self, step: TrackStep, out: &Output);
 }
 
-/// A track that begins anew and is not kept.
+/// Empty history: the track starts anew and is not recorded.
 pub(super) struct Afresh;
 
 impl TrackHistory for Afresh {

@@ -1,5 +1,5 @@
-//! Objects followed through a sequence of pictures: prompts on some frames, masks on all, forward
-//! and backward. Frames are looked at once; each object is remembered on its own.
+//! Video tracking of objects: prompts on some frames, masks on all, forward and backward. Frames are encoded once;
+//! each object has a memory of its own.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -11,34 +11,34 @@ use crate::models::ModelError;
 use crate::models::tensor::Tensor;
 use crate::scene::Mask;
 
-/// What marks an object in a frame.
+/// Prompt for an object in a frame.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Prompt {
-    /// Points in px of the picture, `true` where the object is; a box (left, top, right, bottom).
+    /// Points in px of the picture, `true` for foreground, and a box (left, top, right, bottom).
     Points {
         /// Points.
         points: Vec<([f32; 2], bool)>,
-        /// A box around it.
+        /// Box around the object.
         around: Option<[f32; 4]>,
     },
-    /// Its mask, of the picture's size.
+    /// Mask of the object, of the picture's size.
     Mask(Mask),
 }
 
-/// What is known of one object, by frame.
+/// State of one object, by frame.
 #[derive(Clone, Debug, Default)]
 struct Known {
-    /// Prompted, not yet taken into account.
+    /// Prompted, not yet encoded into memory.
     pending: BTreeMap<usize, Output>,
     prompted: BTreeMap<usize, Output>,
     followed: BTreeMap<usize, Output>,
-    /// Frames that a pass went over, and whether that was backward.
+    /// Tracked frames; true if the pass went backward.
     passed: BTreeMap<usize, bool>,
-    /// Prompted frames that a pass had gone over before.
+    /// Prompted frames that had been tracked before.
     corrections: BTreeSet<usize>,
 }
 
-/// A sequence and the objects in it.
+/// Sequence with its tracked objects.
 pub struct Track<'a> {
     model: &'a mut Sam2,
     frames: &'a mut dyn FrameSource,
@@ -47,20 +47,20 @@ pub struct Track<'a> {
     objects: BTreeMap<ObjectId, Known>,
 }
 
-/// Logits that a refined mask is clamped to.
+/// Bound of the logits of a mask that is refined.
 const CLAMP: f32 = 32.0;
 /// Logit of a filled hole.
 const FILLED: f32 = 0.1;
-/// Score of an object whose mask was given.
+/// Score of an object whose mask is the prompt.
 const GIVEN: f32 = 10.0;
 
 impl<'a> Track<'a> {
-    /// A sequence of pictures of one size (width, height), in which nothing is marked yet.
+    /// Starts a sequence of pictures of one size (width, height), without prompts.
     pub fn new(model: &'a mut Sam2, frames: &'a mut dyn FrameSource, size: (usize, usize)) -> Self {
         Self { model, frames, size, objects: BTreeMap::new() }
     }
 
-    /// Marks an object in a frame.
+    /// Prompts an object in a frame.
     pub fn prompt(&mut self, frame: usize, object: ObjectId, prompt: &Prompt) -> Result<(), ModelError> {
         self.objects.entry(object).or_default();
         let out = match prompt {
@@ -114,8 +114,8 @@ impl<'a> Track<'a> {
         let square: Vec<f32> = square.into_iter().map(|v| f32::from(u8::from(v >= 0.5))).collect();
         let is_there = square.contains(&1.0);
         let (as_prompt, logits) = self.model.mask_prompt(Tensor::new(&[1, 1, side, side], square))?;
-        // The pointer comes from the decoder, prompted with the mask and without memory; the mask
-        // itself is taken as it is.
+        // The pointer comes from the decoder, prompted with the mask and without memory; the mask itself is kept
+        // unchanged.
         let image = self.frames.get(self.model, frame)?;
         let embeddings = image.embeddings.clone();
         let mut out = self.decode(&image, &embeddings, &[], Some(as_prompt), false)?;
@@ -133,7 +133,7 @@ impl<'a> Track<'a> {
         (conditioning || self.model.about.multimask_when_tracking) && (fewest..=most).contains(&points)
     }
 
-    /// The best mask of one object in a frame, its pointer, and whether it is there.
+    /// Decodes the best mask of one object in a frame, its pointer, and its presence score.
     fn decode(
         &mut self,
         frame: &EncodedFrame,
@@ -142,7 +142,7 @@ impl<'a> Track<'a> {
         mask: Option<Tensor>,
         three: bool,
     ) -> Result<Output, ModelError> {
-        // Without points there is one that is none; and one more always ends the list.
+        // The decoder expects a padding point (label -1) at the end, and another one if there are no points.
         let none = ([0.0; 2], -1.0);
         let padding = if points.is_empty() { 2 } else { 1 };
         let all: Vec<([f32; 2], f32)> = points.iter().copied().chain(std::iter::repeat_n(none, padding)).collect();
@@ -164,10 +164,10 @@ impl<'a> Track<'a> {
         })
     }
 
-    /// Which of the four masks it is, and whose pointer is kept.
+    /// Selects one of the four masks, and the mask whose pointer is kept.
     fn choose(&self, decoded: &Decoded, three: bool) -> (usize, usize) {
         let about = &self.model.about;
-        // The first of the best.
+        // `max_by` returns the last of equals; reversed, it is the first.
         let best = (1..4).rev().max_by(|&a, &b| decoded.iou.values[a].total_cmp(&decoded.iou.values[b])).unwrap_or(1);
         if three {
             return (best, if about.pointer_of_best_mask { best } else { 0 });
@@ -198,7 +198,7 @@ impl<'a> Track<'a> {
         }
     }
 
-    /// A frame's embeddings, conditioned on what is known of an object.
+    /// Returns a frame's embeddings, conditioned on the memory of an object.
     fn recall(
         &mut self,
         image: &EncodedFrame,
@@ -238,7 +238,7 @@ impl<'a> Track<'a> {
         self.model.condition(image, &memories, &pointers)
     }
 
-    /// Takes new prompts into account.
+    /// Encodes new prompts into memory.
     fn settle(&mut self) -> Result<(), ModelError> {
         let ids: Vec<ObjectId> = self.objects.keys().copied().collect();
         for id in ids {
@@ -257,8 +257,8 @@ impl<'a> Track<'a> {
         Ok(())
     }
 
-    /// Follows all objects from the first prompted frame on, or back from it. `seen` is told every
-    /// frame with its objects, and says whether to go on.
+    /// Tracks all objects from the first prompted frame on, or back from it. `seen` receives every frame with its
+    /// objects, and returns false to stop.
     pub fn run(
         &mut self,
         backward: bool,
@@ -267,7 +267,7 @@ impl<'a> Track<'a> {
         self.resume(backward, &mut Afresh, seen)
     }
 
-    /// The same with what was followed before it was stopped.
+    /// Tracks as [`Self::run`] does, reusing the outputs of an interrupted track in `history`.
     pub fn resume(
         &mut self,
         backward: bool,
@@ -319,7 +319,7 @@ impl<'a> Track<'a> {
     }
 }
 
-/// An object's pixels in a picture of `size` px.
+/// Mask of an object in a picture of `size` px.
 pub fn mask_of(out: &Output, size: (usize, usize)) -> Mask {
     let low = out.logits.shape[3];
     let full = resize(&out.logits.values, (low, low), size, Filter::Linear);
@@ -328,8 +328,8 @@ pub fn mask_of(out: &Output, size: (usize, usize)) -> Mask {
 
 type Chosen<'a> = BTreeMap<usize, &'a Output>;
 
-/// The prompted frames that take part, and the rest: the nearest before, the nearest from here on,
-/// then by distance.
+/// Splits the prompted frames into the `most` that condition a frame and the rest: first the nearest before, then
+/// the nearest from here on, then by distance.
 fn closest(prompted: &BTreeMap<usize, Output>, frame: usize, most: i64) -> (Chosen<'_>, Chosen<'_>) {
     let all = || prompted.iter().map(|(t, out)| (*t, out));
     let Some(most) = usize::try_from(most).ok().filter(|most| prompted.len() > *most) else {

@@ -1,5 +1,5 @@
-//! The reduced SAM, SAM 2 and MobileSAM from their official files, against the graphs that Python exported of the same
-//! weights.
+//! The reduced SAM, SAM 2 and MobileSAM from their official files, compared with the graphs that Python exported from
+//! the same weights.
 
 use safetensors::tensor::{Dtype, TensorView};
 
@@ -14,12 +14,12 @@ use crate::models::sam2::track::{Prompt, Track};
 use crate::models::tensor::Tensor;
 use crate::scene::PhotoPixels;
 
-/// An official file, the template that it fills, and what both describe.
+/// Official file, the template that it fills, and their description.
 struct Family {
     checkpoint: &'static str,
     template: &'static str,
     description: &'static str,
-    /// Tensors of one shape; a square one; one that is taken away.
+    /// Tensors of one shape; a square one; one that is removed.
     alike: [&'static str; 2],
     square: &'static str,
     gone: &'static str,
@@ -37,7 +37,7 @@ const FAMILIES: [Family; 4] = [
         square: QUERY,
         gone: "image_encoder.blocks.1.attn.rel_pos_h",
     },
-    // As ViT-H, whose encoder is two graphs.
+    // As for ViT-H, the encoder has two graphs.
     Family {
         checkpoint: "sam.pth",
         template: "sam_parts_template.zip",
@@ -79,7 +79,7 @@ fn picture(turn: u32) -> PhotoPixels {
     PhotoPixels { width_px: 96, height_px: 72, rgb: (0..96 * 72).map(color).collect(), coverage: None, alpha: None }
 }
 
-/// What the networks of a description say, group by group: every graph takes part.
+/// Outputs of the networks of a description, by group; every graph takes part.
 fn answers(description: &Path) -> Vec<Vec<f32>> {
     let clicks = || Tensor::new(&[2, 2, 2], vec![40.0, 50.0, 0.0, 0.0, 80.0, 30.0, 0.0, 0.0]);
     let labels = || Tensor::new(&[2, 2], vec![1.0, -1.0, 1.0, -1.0]);
@@ -113,7 +113,7 @@ fn answers(description: &Path) -> Vec<Vec<f32>> {
     said
 }
 
-/// The largest difference of a group, relative to the largest number in it.
+/// Largest difference of a group, relative to the largest number in it.
 fn difference(got: &[Vec<f32>], expected: &[Vec<f32>]) -> f64 {
     assert_eq!(got.len(), expected.len());
     let of = |(got, expected): (&Vec<f32>, &Vec<f32>)| {
@@ -132,7 +132,7 @@ fn official_files_give_what_the_exports_give() {
         let worst = difference(&answers(&models.join(family.description)), &expected);
         println!("{}: relative difference {worst:.1e}", family.template);
         assert!(worst < 1e-6, "{}: {worst:e}", family.template);
-        // Weights in the wrong places that nobody can tell by their shape are seen in the answers.
+        // Swapped weights of equal shape change the outputs.
         type Change = fn(&Family, &mut Weights);
         let changes: [Change; 2] = [|f, w| swap(w, f.alike[0], f.alike[1]), |f, w| transpose(w, f.square)];
         let root = if family.checkpoint == "sam2.pt" { "model." } else { "" };

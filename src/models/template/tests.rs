@@ -1,4 +1,4 @@
-//! The reduced CLIP from its official file, against the graphs that Python exported of the same weights.
+//! The reduced CLIP from its official file, compared with the graphs that Python exported from the same weights.
 
 use std::path::PathBuf;
 
@@ -39,7 +39,7 @@ fn weights() -> Weights {
     weights_of("clip.pt")
 }
 
-/// The official weights, to be changed; those with fractions.
+/// Floating-point weights of an official file, to be changed.
 pub(super) fn weights_of(checkpoint: &str) -> Weights {
     let mut file = WeightFile::open(&fixture(checkpoint)).expect("opens");
     let floats = file.tensors.iter().filter(|(_, t)| t.dtype.is_float());
@@ -93,7 +93,7 @@ fn an_official_file_gives_what_the_export_gives() {
         let of = |folder: &Path| std::fs::read(folder.join(name)).expect("a graph");
         assert!(of(&models) == of(&again), "{name}");
     }
-    // Weights in the wrong places that nobody can tell by their shape are seen in the answers.
+    // Swapped weights of equal shape change the outputs.
     for change in [
         |w: &mut Weights| swap(w, "transformer.resblocks.0.mlp.c_fc.weight", "transformer.resblocks.1.mlp.c_fc.weight"),
         |w: &mut Weights| swap(w, "visual.ln_pre.weight", "visual.ln_pre.bias"),
@@ -131,7 +131,7 @@ fn another_checkpoint_is_refused_by_the_name_of_its_tensor() {
     }
     let error = filled(&fixture("tiny.pt"), &models).expect_err("another model").to_string();
     assert!(error.contains("tiny.pt") && error.contains("missing"), "{error}");
-    // Settings that official files have beside the weights are no weights.
+    // Settings in official files are not taken for weights.
     let mut more = weights();
     more.insert("input_resolution".into(), (vec![], vec![224.0]));
     store(&more, &file);

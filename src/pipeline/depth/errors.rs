@@ -1,4 +1,4 @@
-//! Errors of depths, counted pixel by pixel.
+//! Depth errors over pixels.
 
 use serde::Serialize;
 
@@ -6,9 +6,9 @@ use crate::math::stats::{mean, median};
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct DepthErrors {
-    /// Pixels that truly show something.
+    /// Pixels with a true depth.
     pub(crate) pixels: usize,
-    /// Share of them without a drawn depth. The other pixels alone are averaged below.
+    /// Share of them without a rendered depth. The means below are over the other pixels.
     pub(crate) missing: f64,
     /// Mean of the absolute errors, scene units.
     pub(crate) mean_abs: f64,
@@ -46,7 +46,7 @@ impl Samples {
         self.rel.push(error / f64::from(truth));
     }
 
-    /// The errors of all pixels added; those of none are NaN.
+    /// Errors over all added pixels; NaN without any.
     pub(crate) fn errors(&self) -> DepthErrors {
         let pixels = self.abs.len() + self.missing;
         let share = |n: usize| n as f64 / pixels as f64;

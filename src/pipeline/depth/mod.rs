@@ -1,9 +1,8 @@
-//! How far drawn depth is from true depth, on the views of a synthetic data set.
+//! Errors of rendered depth against true depth, on the views of a synthetic data set.
 //!
-//! The true depths are what `fmlgs synth` wrote beside its photos: distances along the camera's
-//! axis at pixel centers, found by casting rays. A drawn pixel has a depth where at least half of
-//! its light comes from the scene: the expected depth `sum(w z) / sum(w)`, and the median depth,
-//! at which half of the light is spent.
+//! The true depths lie beside the photos of `fmlgs synth`: distances along the camera's axis at pixel centers, found
+//! by ray casting. A rendered pixel has a depth if its accumulated alpha is at least one half: the expected depth
+//! `sum(w z) / sum(w)`, and the median depth, at which the transmittance falls to one half.
 //!
 //! # Measured
 //!
@@ -50,10 +49,10 @@ use crate::io::IoError;
 use crate::render::{Features, RenderError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, Photo};
 
-/// The folder of true depths in a synthetic data set.
+/// Folder of true depths in a synthetic data set.
 pub(crate) const FOLDER: &str = "depth";
 
-/// Why depths could not be compared.
+/// Reasons for which depths could not be compared.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum DepthError {
@@ -71,27 +70,27 @@ pub enum DepthError {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct Split {
     pub(crate) all: DepthErrors,
-    /// Of those within [`EDGE_PX`] of a jump of the true depth.
+    /// Errors of pixels within [`EDGE_PX`] of a jump of the true depth.
     pub(crate) edges: DepthErrors,
 }
 
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(crate) struct DepthScores {
-    /// Of `sum(w z) / sum(w)`.
+    /// Errors of `sum(w z) / sum(w)`.
     pub(crate) expected: Split,
-    /// Of the depth at which half of the light is spent.
+    /// Errors of the depth at which the transmittance falls to one half.
     pub(crate) median: Split,
 }
 
 #[derive(Clone, Debug, Default)]
 pub(crate) struct DepthCounter {
-    /// Of expected depth: all pixels, edges.
+    /// Expected depth: all pixels, edges.
     expected: [Samples; 2],
     median: [Samples; 2],
 }
 
 impl DepthCounter {
-    /// Adds one view: depths row by row, 0 where there is none, of the size of `truth`.
+    /// Adds one view: depths row by row, 0 = none, of the size of `truth`.
     pub(crate) fn add(&mut self, truth: &TrueDepth, expected: &[f32], median: &[f32]) {
         let edges = truth.edges();
         for (i, (&want, &edge)) in truth.values.iter().zip(&edges).enumerate() {
@@ -105,7 +104,7 @@ impl DepthCounter {
         }
     }
 
-    /// Draws `cloud` as `camera` sees it and adds its depths.
+    /// Renders `cloud` from `camera` and adds its depths.
     pub(crate) fn draw(
         &mut self,
         renderer: &mut Renderer,
@@ -127,7 +126,7 @@ impl DepthCounter {
     }
 }
 
-/// The true depth of `photo`, in the folder `depth` of the data set at `root`, at full size.
+/// Reads the true depth of `photo`, in the folder `depth` of the data set at `root`, at full size.
 pub(crate) fn of_photo(root: &Path, photo: &Photo) -> Result<TrueDepth, DepthError> {
     let stem = Path::new(&photo.name).file_stem().unwrap_or_default();
     let path = root.join(FOLDER).join(stem).with_extension("npy");
@@ -144,7 +143,7 @@ pub(crate) fn of_photo(root: &Path, photo: &Photo) -> Result<TrueDepth, DepthErr
 mod tests {
     use super::*;
 
-    /// A wall that recedes to the right, with a box in front of it.
+    /// Depths of a wall that recedes to the right, with a box in front of it.
     fn truth() -> TrueDepth {
         let (width, height) = (40, 30);
         let at = |x: usize, y: usize| if x > 10 && x < 20 && y > 8 && y < 22 { 1.0 } else { 3.0 + x as f32 * 0.02 };
@@ -164,7 +163,7 @@ mod tests {
         for e in [&s.expected.all, &s.expected.edges] {
             assert_eq!((e.mean_abs, e.rmse, e.mean_rel, e.missing, e.within_1), (0.0, 0.0, 0.0, 0.0, 1.0));
         }
-        // What was not drawn is missing, not right.
+        // Pixels without a rendered depth are missing, not correct.
         assert_eq!((s.median.all.missing, s.median.all.within_5), (1.0, 0.0));
         assert!(s.median.all.mean_abs.is_nan());
     }

@@ -11,7 +11,7 @@ pub(crate) const EDGE_JUMP: f32 = 1.05;
 /// Pixels within this distance of a jump, along rows and columns, are edges.
 pub(crate) const EDGE_PX: usize = 2;
 
-/// Depths along the camera's axis at pixel centers, row by row; 0 where nothing is.
+/// Depths along the camera's axis at pixel centers, row by row; 0 = empty.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct TrueDepth {
     pub(crate) width: usize,
@@ -27,9 +27,8 @@ impl TrueDepth {
         Ok(Self { width, height, values })
     }
 
-    /// The depths at the pixel centers of a smaller (or larger) picture. Between four pixels of one
-    /// surface inverse depth is interpolated, which is exact on planes; next to a jump the nearest
-    /// pixel counts.
+    /// Resamples the depths at the pixel centers of a smaller (or larger) picture. Inverse depth is interpolated
+    /// between four pixels of one surface, which is exact on planes; next to a jump the nearest pixel counts.
     pub(crate) fn resampled(&self, width: usize, height: usize) -> Self {
         if (width, height) == (self.width, self.height) {
             return self.clone();
@@ -50,7 +49,7 @@ impl TrueDepth {
         Self { width, height, values }
     }
 
-    /// Which pixels are within [`EDGE_PX`] of a jump, that between something and nothing included.
+    /// Marks the pixels within [`EDGE_PX`] of a jump, including a jump to empty pixels.
     pub(crate) fn edges(&self) -> Vec<bool> {
         let n = self.values.len();
         let jump = |a: f32, b: f32| a.max(b) > a.min(b) * EDGE_JUMP;
@@ -66,7 +65,7 @@ mod tests {
 
     #[test]
     fn planes_survive_resampling_and_jumps_stay_sharp() {
-        // 1 / z = 0.2 + 0.01 x, seen at pixel centers; from column 12 on something far.
+        // 1 / z = 0.2 + 0.01 x, seen at pixel centers; from column 12 on a far surface.
         let inverse = |x: f32| 0.2 + 0.01 * x;
         let depth = |x: f32| if x < 12.0 { inverse(x).recip() } else { 90.0 };
         let map = |width: usize| {

@@ -1,4 +1,4 @@
-//! A mug with a handle on a table, moved, duplicated, recolored and deleted.
+//! Edits of a mug with a handle on a table: moved, duplicated, recolored and deleted.
 
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
@@ -70,7 +70,7 @@ fn placement() -> Placement {
     }
 }
 
-/// What a camera sees of these Gaussians alone.
+/// Renders these Gaussians alone.
 fn drawn(cloud: &GaussianCloud, of: &[usize], camera: &Camera) -> Vec<f32> {
     let settings = RenderSettings { sh_degree: 3, ..RenderSettings::default() };
     let frame = Renderer::new().render(&cloud.select(of), Features::NONE, camera, &settings).expect("a frame");
@@ -93,7 +93,7 @@ fn what_is_moved_looks_as_it_did_from_where_the_camera_moves_with_it() {
     let worst = crate::math::stats::worst_difference(&a, &b);
     assert!(worst < 2e-3, "{worst}");
     assert!(a.iter().any(|v| *v > 0.3), "something is seen");
-    // The control: with the harmonics left as they were it looks otherwise.
+    // The control: without rotated harmonics it looks different.
     let mut wrong = after.clone();
     wrong.sh.clone_from(&before.sh);
     assert!(crate::math::stats::worst_difference(&a, &drawn(&wrong, &thing, &second)) > 0.02);
@@ -172,7 +172,7 @@ fn what_changes_nothing_is_refused() {
         assert!(apply(&cloud, Some(&map), &SplatEdit::Arrange(colored)).is_ok(), "the color changes");
     }
     assert_eq!(refused(SplatEdit::Delete(vec![false; 100])), SplatEditError::NothingChosen);
-    // The controls: little is something.
+    // The controls: small edits are accepted.
     for little in [turned(0.001), turned(359.9), shifted] {
         assert!(apply(&cloud, Some(&map), &moved(MUG, little)).is_ok(), "{little:?}");
         assert!(apply(&cloud, Some(&map), &doubled(MUG, little)).is_ok(), "{little:?}");

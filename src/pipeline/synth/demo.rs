@@ -1,4 +1,4 @@
-//! The scene that ships with the program.
+//! Built-in demo scene.
 
 use std::path::Path;
 
@@ -10,12 +10,12 @@ use super::{SynthError, SynthReport, render_scene};
 use crate::io::{files, gltf_mesh};
 use crate::pipeline::observer::Observer;
 
-/// The demo scene: a table-top of things with parts, made by `tools/demo_scene`.
+/// Demo scene (glTF): objects with parts on a table, made by `tools/demo_scene`.
 pub fn demo_glb() -> &'static [u8] {
     include_bytes!("../../../assets/demo.glb")
 }
 
-/// Settings for the demo's photos: small enough that two cores train on them live.
+/// Settings of the demo's photos: small enough for live training on two cores.
 pub(crate) fn demo_options() -> SynthOptions {
     SynthOptions {
         views: 64,
@@ -31,7 +31,7 @@ pub(crate) fn demo_options() -> SynthOptions {
     }
 }
 
-/// Whether `out` already holds the photos that [`write_demo`] would write.
+/// Returns whether `out` already holds the photos that [`write_demo`] would write.
 pub(crate) fn demo_is_written(out: &Path, options: &SynthOptions) -> bool {
     let expected = serde_json::json!({ "version": 1, "scene": fingerprint(), "options": options });
     let settings = files::read(&out.join(SETTINGS), files::MAX_TEXT_BYTES).ok();

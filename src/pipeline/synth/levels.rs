@@ -25,7 +25,7 @@ use super::options::Levels;
 use crate::io::gltf_mesh::MeshScene;
 use crate::scene::Level;
 
-/// A thing or a piece of one that the id maps show.
+/// Object or part in the id maps.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TrueIdentity {
     /// Value in the id maps, from 1.
@@ -36,11 +36,11 @@ pub struct TrueIdentity {
     pub(crate) parent: Option<u16>,
     /// Names from the root to the node, joined by `/`.
     pub(crate) path: String,
-    /// A color of its own for showing id maps, sRGB.
+    /// Color for the display of id maps, sRGB.
     pub(crate) color: [u8; 3],
-    /// Pixels of all photos together whose center shows it (for an object: with its parts).
+    /// Number of pixels in all photos whose center shows it (for an object: with its parts).
     pub(crate) pixels: u64,
-    /// Photos that show it.
+    /// Number of photos that show it.
     pub(crate) views: u32,
 }
 
@@ -52,14 +52,14 @@ pub(crate) struct NodeIds {
     pub(crate) part: u16,
 }
 
-/// All identities of a scene, and whose each node is.
+/// All identities of a scene, and the ids of each node.
 pub struct TrueIdentities {
     /// In order of their ids, from 1.
     pub(crate) list: Vec<TrueIdentity>,
     pub(crate) of_node: Vec<NodeIds>,
 }
 
-/// A node with a mesh, its object's index, and the node that names its part.
+/// Node with a mesh, its object's index, and the node that names its part.
 struct Surface {
     node: usize,
     object: usize,
@@ -84,6 +84,7 @@ pub(crate) fn identities(scene: &MeshScene, levels: Levels, file: &str) -> Resul
         };
         list.push(identity(object, name, Level::Object, None, path)?);
         let top_part = |t: usize| (levels == Levels::File && named(t)).then_some(t);
+        // Pushed in reverse, so that nodes are visited in the order of the file.
         let mut stack: Vec<(usize, Option<usize>)> = tops.iter().rev().map(|&t| (t, top_part(t))).collect();
         let first = surfaces.len();
         while let Some((node, part)) = stack.pop() {
@@ -94,6 +95,7 @@ pub(crate) fn identities(scene: &MeshScene, levels: Levels, file: &str) -> Resul
             stack.extend(children.map(|&c| (c, if named(c) { Some(c) } else { part })));
         }
         let own = &mut surfaces[first..];
+        // Rule 3: a single part is the object itself.
         if own.iter().all(|s| s.part == own[0].part) {
             own.iter_mut().for_each(|s| s.part = None);
         }
@@ -123,7 +125,7 @@ fn has_mesh(scene: &MeshScene, node: usize) -> bool {
     scene.nodes[node].mesh.is_some_and(|m| scene.meshes[m].primitives.iter().any(|p| !p.triangles.is_empty()))
 }
 
-/// Whether each node or one below it has a mesh.
+/// Marks each node that has a mesh, itself or below it.
 fn bearing(scene: &MeshScene) -> Vec<bool> {
     let mut bearing: Vec<bool> = (0..scene.nodes.len()).map(|n| has_mesh(scene, n)).collect();
     // Parents come before children, so backwards every child is known before its parent.
@@ -135,7 +137,7 @@ fn bearing(scene: &MeshScene) -> Vec<bool> {
     bearing
 }
 
-/// Rule 1.
+/// Finds the object nodes by rule 1.
 fn object_nodes(scene: &MeshScene, bearing: &[bool]) -> Vec<usize> {
     let below = |n: &usize| bearing[*n];
     let mut nodes: Vec<usize> = scene.roots.iter().copied().filter(below).collect();
@@ -161,7 +163,7 @@ fn identity(
     Ok(TrueIdentity { id, name, level, parent, path, color: color(index), pixels: 0, views: 0 })
 }
 
-/// The node's name, else its mesh's, else its number.
+/// Name of the node, else of its mesh, else its number.
 fn label(scene: &MeshScene, node: usize) -> String {
     let n = &scene.nodes[node];
     let mesh = n.mesh.and_then(|m| scene.meshes[m].name.clone());
@@ -180,7 +182,7 @@ fn path(scene: &MeshScene, node: usize) -> String {
     names.join("/")
 }
 
-/// Hues a golden angle apart, in three brightnesses: neighbors in number differ most.
+/// Display color: hues a golden angle apart in three brightnesses, so that consecutive ids differ most.
 fn color(index: usize) -> [u8; 3] {
     let hue = (index as f64 * 0.618_033_988_75).fract() * 6.0;
     let value = [0.95, 0.7, 0.85][index % 3];
@@ -192,7 +194,7 @@ fn color(index: usize) -> [u8; 3] {
     [channel(5.0), channel(3.0), channel(1.0)]
 }
 
-/// Ids that the maps of one photo hold, each with its number of pixels.
+/// Counts the pixels of each id in the maps of one photo.
 pub(crate) fn counts(object: &[u16], part: &[u16]) -> Vec<(u16, u64)> {
     let mut counts: HashMap<u16, u64> = HashMap::new();
     for &id in object.iter().chain(part).filter(|id| **id != 0) {

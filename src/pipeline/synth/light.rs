@@ -1,9 +1,7 @@
-//! Light on the surface: a sky, a soft key light with shadows, and one bounce of light off what
-//! hides the sky.
+//! Light on the surface: a sky, a soft key light with shadows, and one bounce of light off surfaces that hide the sky.
 //!
-//! All of it but the highlights is the same from every side, so it is computed once per vertex and
-//! face, when a photo first shows it, and interpolated. Directions are the same for all vertices: no
-//! noise between them.
+//! All but the highlights is view-independent, so it is computed once per vertex and face, when a photo first shows
+//! it, and interpolated. Directions are the same for all vertices, so there is no noise between them.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -13,14 +11,13 @@ use super::material::Materials;
 use super::surface::{Surface, Triangle, Vertex, blend};
 use super::trace::Tracer;
 
-/// Directions from which light is gathered, over the whole sphere: fewer where there are many
-/// vertices.
+/// Number of directions from which light is gathered, over the whole sphere: fewer for many vertices.
 const SKY_DIRECTIONS: std::ops::RangeInclusive<usize> = 40..=96;
-/// Rays toward the sky in all, as far as the least number of directions allows.
+/// Total rays toward the sky, as far as the least number of directions allows.
 const SKY_RAYS: usize = 10_000_000;
 /// Points on the key light.
 const KEY_POINTS: usize = 9;
-/// Toward the middle of the key light (y is up).
+/// Direction to the middle of the key light (y is up).
 const KEY: Vec3A = Vec3A::new(-0.48, 0.79, 0.38);
 /// Tangent of the key light's angular radius.
 const KEY_SPREAD: f32 = 0.09;
@@ -28,32 +25,32 @@ const KEY_SPREAD: f32 = 0.09;
 const KEY_COLOR: Vec3A = Vec3A::new(0.60, 0.56, 0.49);
 /// Brightness of the sky straight up, at the horizon, and of the unseen ground.
 const SKY: [Vec3A; 3] = [Vec3A::new(0.56, 0.60, 0.66), Vec3A::new(0.44, 0.45, 0.46), Vec3A::new(0.20, 0.18, 0.165)];
-/// Light on a surface that hides the sky, when its own color is white.
+/// Light from a white surface that hides the sky.
 const BOUNCE: f32 = 0.42;
-/// Rays start this far above the surface, in the frame's units.
+/// Distance of ray starts above the surface, in the frame's units.
 const LIFT: f32 = 2e-4;
 
 #[derive(Clone, Copy, Debug, Default)]
 struct Face {
-    /// Irradiance over pi: what a white surface shows.
+    /// Irradiance over pi: the radiance of a white surface.
     diffuse: Vec3A,
-    /// How much of the key light is visible, 0 to 1.
+    /// Visible fraction of the key light, 0 to 1.
     key: f32,
 }
 
 impl Face {
-    /// First word of a face that is not known yet: no color is this NaN.
+    /// First word of a face that is not computed yet: no color is this NaN.
     const UNKNOWN: u32 = u32::MAX;
 }
 
-/// Light on every vertex, as far as it has been asked for.
+/// Light on the vertices, computed on demand.
 pub(crate) struct Light {
     /// Mean color of each triangle.
     albedo: Vec<Vec3A>,
     sky: Vec<Vec3A>,
     key: Vec<Vec3A>,
-    /// Bits of each face: color and visibility of the key light. Whoever needs an unknown one
-    /// computes it; two threads that do so at once store the same bits.
+    /// Bits of each face: color and visibility of the key light. Computed on demand; two threads that do so at once
+    /// store the same bits.
     faces: Vec<[[AtomicU32; 4]; 2]>,
 }
 
@@ -70,8 +67,8 @@ impl Light {
         }
     }
 
-    /// What a white diffuse surface shows, and how much of the key light is visible, at a point of
-    /// a triangle on its outer (`front`) or inner face.
+    /// Radiance of a white diffuse surface, and visible fraction of the key light, at a point of a triangle on its
+    /// outer (`front`) or inner face.
     pub(crate) fn at(&self, scene: Lit<'_>, triangle: &Triangle, weights: glam::Vec3, front: bool) -> (Vec3A, f32) {
         let face = triangle.vertices.map(|v| self.face(scene, v as usize, front));
         (blend(face.map(|f| f.diffuse), weights), blend(face.map(|f| f.key), weights))
@@ -85,7 +82,7 @@ impl Light {
             return Face { diffuse: Vec3A::new(f32::from_bits(first), rest[0], rest[1]), key: rest[2] };
         }
         let face = self.gather(scene, &scene.surface.vertices[vertex], front);
-        // The first word goes last: whoever sees it sees the others.
+        // The first word is stored last: a thread that reads it also sees the others.
         y.store(face.diffuse.y.to_bits(), Ordering::Relaxed);
         z.store(face.diffuse.z.to_bits(), Ordering::Relaxed);
         key.store(face.key.to_bits(), Ordering::Relaxed);

@@ -1,4 +1,4 @@
-//! Color of the surface at a point.
+//! Materials: color of the surface at a point.
 
 use glam::{Vec2, Vec3, Vec3A, Vec4};
 
@@ -6,12 +6,12 @@ use super::surface::{Surface, Triangle, blend};
 use super::texture::Texture;
 use crate::io::gltf_mesh::{AlphaMode, Material, MeshScene, TextureUse};
 
-/// The look of a point, linear.
+/// Appearance of a point, linear.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Look {
     pub(crate) albedo: Vec3A,
     pub(crate) emission: Vec3A,
-    /// How much of what is behind it the point covers.
+    /// Opacity of the point.
     pub(crate) alpha: f32,
 }
 
@@ -19,7 +19,7 @@ pub(crate) struct Look {
 pub(crate) struct Materials {
     list: Vec<Material>,
     textures: Vec<Texture>,
-    /// Whether light always stops at a surface.
+    /// True if all materials are opaque.
     opaque: bool,
 }
 
@@ -42,7 +42,7 @@ impl Materials {
         m.base_color * m.base_texture.as_ref().map_or(Vec4::ONE, |t| self.textures[t.image].mean())
     }
 
-    /// The look of a point of a triangle where one sample covers `width` of the frame's units.
+    /// Appearance of a point of a triangle, filtered over `width` in the frame's units.
     pub(crate) fn look(&self, surface: &Surface, triangle: &Triangle, weights: Vec3, width: f32) -> Look {
         let m = self.get(triangle.material);
         let corners = triangle.vertices.map(|v| &surface.vertices[v as usize]);
@@ -70,7 +70,7 @@ impl Materials {
         Look { albedo: Vec3A::from_vec4(base).max(Vec3A::ZERO), emission, alpha }
     }
 
-    /// Whether light goes through the point: masked out, or covering less than half.
+    /// Returns whether light passes the point: masked out, or with an opacity below one half.
     pub(crate) fn passes(&self, surface: &Surface, triangle: &Triangle, weights: Vec3) -> bool {
         !self.opaque
             && self.get(triangle.material).alpha != AlphaMode::Opaque

@@ -1,15 +1,14 @@
 //! Posed photos of any glTF scene, with ground truth.
 //!
-//! A scene of triangles is rendered by ray casting, which shares nothing with the splat renderer:
-//! what training makes of the photos can be checked against what was really there. [`run`] writes a
-//! folder that opens as a data set:
+//! A scene of triangles is rendered by ray casting, which shares nothing with the splat renderer, so that the results
+//! of training can be compared with the ground truth. [`run`] writes a folder that opens as a data set:
 //!
 //! | file | content |
 //! |---|---|
 //! | `transforms.json` | nerfstudio layout, OpenGL camera axes, world axes of the glTF (y up); `train_filenames` and `test_filenames` list the split |
 //! | `images/NNNN.png` | photos, sRGB |
 //! | `object_ids/NNNN.png`, `part_ids/NNNN.png` | 16-bit ids at the pixels' centers, 0 = background (or, for parts, none) |
-//! | `identities.json` | what each id is: name, level, parent, path in the node tree, color, pixels, views |
+//! | `identities.json` | the identities by id: name, level, parent, path in the node tree, color, pixels, views |
 //! | `depth/NNNN.npy` | f32 depth along the camera's axis at the pixels' centers, scene units, 0 = background |
 //! | `points3D.ply` | sparse points on surfaces that training photos see, with a reconstruction's noise |
 //! | `synth.json` | the settings, and a fingerprint of the scene |
@@ -51,11 +50,10 @@ use crate::io::gltf_mesh::{self, MeshScene};
 use crate::io::memory;
 use crate::pipeline::observer::{self, Interrupted, Observer, Ticker};
 
-/// Bytes that a pixel of a photo takes while it is rendered and written: color, depth and ids, and
-/// their copies in files' formats.
+/// Bytes per pixel of a photo during rendering and writing: color, depth and ids, and their copies in file formats.
 const BYTES_PER_PX: u64 = 48;
 
-/// Why no data set was made.
+/// Reasons for which no data set was made.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum SynthError {
@@ -81,7 +79,7 @@ pub enum SynthError {
     Interrupted(#[from] Interrupted),
 }
 
-/// What was made.
+/// Report of a written data set.
 #[derive(Clone, Debug)]
 pub struct SynthReport {
     pub(crate) out: PathBuf,
@@ -93,12 +91,12 @@ pub struct SynthReport {
     /// Triangles of the scene after splitting for light.
     pub(crate) triangles: usize,
     pub(crate) secs: f64,
-    /// What was left out of the scene.
+    /// Warnings about omitted content of the scene.
     pub(crate) warnings: Vec<String>,
 }
 
 impl SynthReport {
-    /// What was made, as one line.
+    /// Summary in one line.
     pub(crate) fn summary(&self) -> String {
         format!(
             "{}: {} photos to train on, {} held out, {} objects and parts, {} sparse points, in {:.1} s",
@@ -126,7 +124,7 @@ pub fn run(
     render_scene(&scene, &name, None, options, out, observer)
 }
 
-/// The same for a scene in memory; `fingerprint` goes into `synth.json`.
+/// Renders a scene in memory; `fingerprint` goes into `synth.json`.
 fn render_scene(
     scene: &MeshScene,
     name: &str,
@@ -206,7 +204,7 @@ fn stage(scene: &MeshScene, identities: &levels::TrueIdentities) -> Result<view:
     Ok(view::SynthScene { surface, tracer, seen: None, materials, light })
 }
 
-/// The id of what is called so, by name or by path.
+/// Finds the id of an identity by its name or path.
 fn called(all: &[TrueIdentity], name: &str) -> Result<u16, SynthError> {
     let found = all.iter().find(|i| i.path == name).or_else(|| all.iter().find(|i| i.name == name));
     found.map(|i| i.id).ok_or_else(|| {
@@ -215,7 +213,7 @@ fn called(all: &[TrueIdentity], name: &str) -> Result<u16, SynthError> {
     })
 }
 
-/// Which photos are held out: one at random from each of as many equal stretches of the list.
+/// Selects the held-out photos: one at random from each of as many equal stretches of the list.
 fn held_out(options: &SynthOptions) -> Vec<bool> {
     let mut rng = Pcg32::seed_from_u64(options.seed ^ 0x7e57);
     let (views, held) = (options.views, options.held_out);

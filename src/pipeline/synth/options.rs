@@ -1,4 +1,4 @@
-//! What to render.
+//! Settings of a synthetic data set.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::SynthError;
 use crate::scene::Camera;
 
-/// How the cameras are placed.
+/// Placement of the cameras.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Rig {
@@ -21,7 +21,7 @@ pub enum Rig {
     Survey,
 }
 
-/// Which nodes of a glTF tree are objects and which are parts; see [`super::levels`].
+/// Assignment of the nodes of a glTF tree to objects and parts; see [`super::levels`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
 #[serde(rename_all = "lowercase")]
 pub enum Levels {
@@ -35,9 +35,9 @@ pub enum Levels {
 /// Settings of a synthetic data set.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SynthOptions {
-    /// Photos in all.
+    /// Number of photos.
     pub views: usize,
-    /// How many of them are held out for testing, spread over all.
+    /// Number of photos that are held out for testing, spread over all.
     pub held_out: usize,
     /// Width of a photo in px.
     pub width_px: u32,
@@ -49,7 +49,7 @@ pub struct SynthOptions {
     pub fov_y_deg: f64,
     /// Placement of the cameras.
     pub rig: Rig,
-    /// What the cameras look at, in scene units; `None` = found from the objects.
+    /// Point that the cameras look at, in scene units; `None` = found from the objects.
     pub focus: Option<DVec3>,
     /// Radius around the focus that fills the picture, in scene units; `None` = found.
     pub radius: Option<f64>,
@@ -65,11 +65,11 @@ pub struct SynthOptions {
     pub point_noise_px: f64,
     /// Seed of every random choice.
     pub seed: u64,
-    /// An object or part, by its name or path, that is left out once the cameras are placed: what is behind it is
-    /// the truth about removing it. Only the held-out views are rendered then.
+    /// Object or part, by its name or path, that is left out once the cameras are placed, as ground truth for its
+    /// removal. Only the held-out views are rendered then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub without: Option<String>,
-    /// What is left out still shades the rest.
+    /// True if the left-out object or part still shades the rest.
     #[serde(default)]
     pub keep_shadows: bool,
 }

@@ -8,8 +8,8 @@ use super::options::SynthOptions;
 use super::view::SynthView;
 use crate::scene::{Camera, SparsePoint};
 
-/// `count` points on surfaces that the photo shows, in its colors, each off by
-/// `point_noise_px` pixels of it in every direction. None if the photo shows no surface.
+/// Samples `count` points on surfaces that the photo shows, in its colors, with noise of `point_noise_px` pixels in
+/// every direction. Empty if the photo shows no surface.
 pub(crate) fn sample(
     view: &SynthView,
     camera: &Camera,
@@ -35,7 +35,7 @@ pub(crate) fn sample(
     (0..count).map(point).collect()
 }
 
-/// A normally distributed number (Box and Muller).
+/// Draws a normally distributed number (Box and Muller).
 fn normal(rng: &mut Pcg32) -> f64 {
     let u = 1.0 - rng.random::<f64>();
     let v = rng.random::<f64>();

@@ -1,4 +1,4 @@
-//! Where the cameras stand.
+//! Camera placement.
 
 use std::f64::consts::TAU;
 
@@ -21,11 +21,11 @@ const ATTEMPTS: usize = 24;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RigSubject {
     pub(crate) focus: DVec3,
-    /// Radius around it that should fill a picture.
+    /// Radius around the focus that should fill a picture.
     pub(crate) radius: f64,
 }
 
-/// The cameras of a data set, in the order of the photos.
+/// Places the cameras of a data set, in the order of the photos.
 pub(crate) fn cameras(surface: &Surface, tracer: &Tracer, options: &SynthOptions) -> Vec<Camera> {
     let objects = &surface.objects;
     let supports = supports(objects);
@@ -72,13 +72,13 @@ struct Placer<'a> {
 }
 
 impl Placer<'_> {
-    /// From 12 to 70 degrees of elevation, evenly over the dome's area, steeper as `share` grows.
+    /// Camera at 12 to 70 degrees of elevation, evenly over the dome's area, steeper as `share` grows.
     fn dome(&self, subject: RigSubject, share: f64, azimuth: f64) -> Camera {
         let (low, high) = (12.0_f64.to_radians().sin(), 70.0_f64.to_radians().sin());
         self.around(subject, (low + (high - low) * share).asin(), azimuth, 1.0)
     }
 
-    /// A camera that sees the subject whole from the given direction, `away` times as far as needed.
+    /// Camera that sees the whole subject from the given direction, `away` times as far as needed.
     fn around(&self, subject: RigSubject, elevation: f64, azimuth: f64, away: f64) -> Camera {
         let o = self.options;
         let (e, a) = (elevation.sin_cos(), azimuth.sin_cos());
@@ -99,7 +99,7 @@ impl Placer<'_> {
         })
     }
 
-    /// A near view of one object, from where nothing stands between.
+    /// Close-up of one object with a free line of sight.
     fn close_up(&self, scene: RigSubject, object: &Bounds, k: usize, rng: &mut Pcg32) -> Camera {
         // Nearer than a third of the whole scene's radius would show a spoon and nothing else.
         let radius = (object.radius() * 1.5).clamp(0.3 * scene.radius, scene.radius);
@@ -116,7 +116,7 @@ impl Placer<'_> {
         best.unwrap_or_else(|| self.around(aim, 1.0, GOLDEN * k as f64, 1.0))
     }
 
-    /// Whether the first surface toward the object's middle is near the object.
+    /// Returns whether the first surface toward the object's middle is near the object.
     fn sees(&self, camera: &Camera, object: &Bounds) -> bool {
         let target = self.surface.local(object.center());
         let origin = self.surface.local(camera.center);

@@ -1,8 +1,8 @@
-//! A node tree flattened to triangles in one frame.
+//! Node tree flattened to triangles in one frame.
 //!
-//! The frame has its origin in the middle of the scene and unit radius, so that single precision
-//! serves a scene of any size anywhere. Triangles are split until their edges are short enough for
-//! light that is stored at vertices (see [`super::light`]).
+//! The frame has its origin in the middle of the scene and unit radius, so that single precision suffices for a scene
+//! of any size and position. Triangles are split until their edges are short enough for light stored at vertices (see
+//! [`super::light`]).
 
 use std::collections::HashMap;
 
@@ -13,7 +13,7 @@ use super::levels::{NodeIds, TrueIdentities};
 use crate::io::gltf_mesh::{Material, MeshPrimitive, MeshScene};
 use crate::scene::Bounds;
 
-/// Most triangles that are drawn, before splitting.
+/// Most triangles before splitting.
 const MAX_TRIANGLES: usize = 8_000_000;
 /// Most triangles that splitting adds.
 const MOST_PIECES: usize = 400_000;
@@ -22,7 +22,7 @@ const THIN: f64 = 2e-5;
 /// Flat faces are split to about this many squares over the whole scene.
 const LIGHT_CELLS: f64 = 24_000.0;
 
-/// A vertex in the scene's frame.
+/// Vertex in the scene's frame.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Vertex {
     pub(crate) position: Vec3A,
@@ -33,7 +33,7 @@ pub(crate) struct Vertex {
     pub(crate) color: Vec4,
 }
 
-/// A triangle: vertices, material, whose it is.
+/// Triangle: vertices, material, ids.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Triangle {
     /// Indices into [`Surface::vertices`].
@@ -47,7 +47,7 @@ pub(crate) struct Triangle {
 pub(crate) struct Surface {
     pub(crate) vertices: Vec<Vertex>,
     pub(crate) triangles: Vec<Triangle>,
-    /// The frame's origin in the world.
+    /// Origin of the frame in the world.
     pub(crate) origin: DVec3,
     /// Length of the frame's unit in scene units.
     pub(crate) unit: f64,
@@ -165,14 +165,14 @@ impl Surface {
         self.triangles.extend(triangles);
     }
 
-    /// Splits every edge that is too long for light that is stored at vertices. Whether an edge is
-    /// split depends on the edge alone, so neighbors agree and no gaps open.
+    /// Splits every edge that is too long for light stored at vertices. The decision depends on the edge alone, so
+    /// neighbors agree and no gaps open.
     fn split_for_light(&mut self) {
         let area: f64 = self.triangles.iter().map(|t| self.area(t)).sum();
         // An edge of length 2 becomes shorter than any useful limit in 14 halvings.
         let mut longest = ((2.0 * area / LIGHT_CELLS).sqrt() as f32).max(2e-4);
         let (whole, corners) = (self.triangles.clone(), self.vertices.len());
-        // Slivers fall into far more pieces than their area asks for: then coarser ones have to do.
+        // Slivers give far more pieces than their area suggests; then the edges may be longer.
         while !self.split(longest, whole.len() + MOST_PIECES) {
             self.triangles.clone_from(&whole);
             self.vertices.truncate(corners);
@@ -180,8 +180,8 @@ impl Surface {
         }
     }
 
-    /// Splits edges that are longer than `longest`; whether that made no more than `most` triangles. If
-    /// not, it is left undone half way.
+    /// Splits edges that are longer than `longest`. Returns false if that makes more than `most` triangles; the surface
+    /// is then incomplete.
     fn split(&mut self, longest: f32, most: usize) -> bool {
         let mut middles: HashMap<(u32, u32), u32> = HashMap::new();
         let mut pending = std::mem::take(&mut self.triangles);
@@ -223,8 +223,8 @@ impl Surface {
         true
     }
 
-    /// Whether a triangle is so thin that nobody sees how light changes along it. Its neighbors' new
-    /// corners lie on its edges, so no gap opens.
+    /// Returns whether a triangle is too thin for visible changes of light along it. Its neighbors' new corners lie on
+    /// its edges, so no gap opens.
     fn is_thin(&self, t: &Triangle) -> bool {
         let [a, b, c] = self.corners(t);
         let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
@@ -250,7 +250,7 @@ struct Instance<'a> {
     ids: NodeIds,
 }
 
-/// The vertex half way along an edge.
+/// Vertex in the middle of an edge.
 fn between(p: &Vertex, q: &Vertex) -> Vertex {
     let normal = (p.normal + q.normal).normalize_or_zero();
     Vertex {
@@ -261,7 +261,7 @@ fn between(p: &Vertex, q: &Vertex) -> Vertex {
     }
 }
 
-/// Mean of the three corners' values, weighted.
+/// Weighted mean of the values of the three corners.
 pub(crate) fn blend<T: std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(values: [T; 3], weights: Vec3) -> T {
     let [a, b, c] = values;
     a * weights.x + b * weights.y + c * weights.z

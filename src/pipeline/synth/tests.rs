@@ -1,4 +1,4 @@
-//! Photos, ids and depth against exact geometry.
+//! Photos, ids and depth compared with exact geometry.
 
 mod dataset;
 mod node_levels;
@@ -16,7 +16,7 @@ use crate::pipeline::observer::{Signal, Silent};
 use crate::scene::Camera;
 use crate::scene::Level;
 
-/// Two cubes: a small one in front of a larger one, as two objects.
+/// Scene of two cubes: a small one in front of a larger one, as two objects.
 fn two_cubes() -> MeshScene {
     let nodes = json!([
         { "name": "large", "mesh": 0, "translation": [0.3, 0.2, -0.4] },
@@ -36,8 +36,8 @@ fn small() -> SynthOptions {
     SynthOptions { views: 6, held_out: 2, width_px: 64, height_px: 48, samples: 2, points: 300, ..Default::default() }
 }
 
-/// Id and depth of the nearest box along a ray of unit depth, by slabs, and how far the ray stays
-/// from any edge of an outline.
+/// Id and depth of the nearest box along a ray of unit depth, by slabs, and the ray's distance from any edge of an
+/// outline.
 fn exact(camera: &Camera, direction: DVec3, shift: DVec3) -> (u16, f64, f64) {
     let (mut best, mut margin) = ((0, f64::INFINITY), f64::INFINITY);
     for (i, (middle, half)) in BOXES.iter().enumerate() {
@@ -52,7 +52,7 @@ fn exact(camera: &Camera, direction: DVec3, shift: DVec3) -> (u16, f64, f64) {
     if best.0 == 0 { (0, 0.0, margin) } else { (best.0, best.1, margin) }
 }
 
-/// Pixels whose id or depth is not that of the exact scene shifted by `shift`, and pixels compared.
+/// Counts the pixels whose id or depth differs from the exact scene shifted by `shift`, and all compared pixels.
 fn mismatches(shift: DVec3) -> (usize, usize) {
     let stage = stage_of(&two_cubes());
     let (mut wrong, mut compared) = (0, 0);

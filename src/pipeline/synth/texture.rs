@@ -50,8 +50,7 @@ impl Texture {
         self.texel(self.levels.len() - 1, 0, 0)
     }
 
-    /// Linear color and alpha at `uv`, seen so that one sample covers `footprint` texels of the
-    /// full resolution along a side.
+    /// Linear color and alpha at `uv`, filtered over `footprint` texels of the full resolution along a side.
     pub(crate) fn sample(&self, usage: &TextureUse, uv: Vec2, footprint: f32) -> Vec4 {
         if !uv.is_finite() {
             return self.mean();
@@ -93,7 +92,7 @@ impl Texture {
     }
 }
 
-/// The texel that stands for position `i` along a side of `n` texels.
+/// Texel index of position `i` along a side of `n` texels.
 fn wrapped(i: f32, n: u32, wrap: Wrap) -> u32 {
     let i = i as i64;
     let n = i64::from(n);

@@ -1,4 +1,4 @@
-//! Rays against the triangles, through a bounding volume hierarchy.
+//! Ray casting against the triangles, with a bounding volume hierarchy.
 
 use std::time::Duration;
 
@@ -12,15 +12,15 @@ use obvhs::rt_triangle::RtTriangle;
 
 use super::surface::{Surface, Triangle};
 
-/// How far triangles and boxes reach beyond their edges, in the frame's units: more than the rounding
-/// errors of a ray across the scene, far less than a pixel.
+/// Margin of triangles and boxes beyond their edges, in the frame's units: more than the rounding errors of a ray
+/// across the scene, far less than a pixel.
 const REACH: f32 = 1e-6;
-/// The same as a share of a triangle's size, for slivers at most.
+/// Largest margin as a fraction of a triangle's least height, which limits it for slivers.
 const MAX_SHARE: f32 = 0.02;
 
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SurfaceHit {
-    /// Distance in lengths of the ray's direction.
+    /// Distance, in lengths of the ray's direction.
     pub(crate) t: f32,
     /// Index of the triangle.
     pub(crate) triangle: usize,
@@ -28,13 +28,13 @@ pub(crate) struct SurfaceHit {
     pub(crate) weights: Vec3,
 }
 
-/// The hierarchy over a surface: a binary one, because the compressed wide one loses rays that are
-/// nearly parallel to an axis (its box test subtracts large products).
+/// Hierarchy over a surface: binary, because the compressed wide one loses rays that are nearly parallel to an axis
+/// (its box test subtracts large products).
 pub(crate) struct Tracer {
     bvh: Bvh2,
-    /// In the order of the hierarchy's leaves, each with [`REACH`] as a share of its least height.
+    /// Triangles in the order of the hierarchy's leaves, each with [`REACH`] as a fraction of its least height.
     triangles: Vec<(RtTriangle, f32)>,
-    /// Index in the surface of each.
+    /// Index of each in the surface.
     original: Vec<u32>,
 }
 
@@ -43,7 +43,7 @@ impl Tracer {
         Self::of(surface, |_| true)
     }
 
-    /// Over those triangles for which `is_there` holds.
+    /// Builds the hierarchy over the triangles for which `is_there` holds.
     pub(crate) fn of(surface: &Surface, is_there: impl Fn(&Triangle) -> bool) -> Self {
         let there: Vec<u32> =
             (0..surface.triangles.len()).filter(|&i| is_there(&surface.triangles[i])).map(|i| i as u32).collect();
@@ -65,7 +65,7 @@ impl Tracer {
         Self { bvh, triangles, original }
     }
 
-    /// The nearest surface from `origin` along `direction`, from `t_min` on.
+    /// Finds the nearest surface from `origin` along `direction`, from `t_min` on.
     pub(crate) fn nearest(&self, origin: Vec3A, direction: Vec3A, t_min: f32) -> Option<SurfaceHit> {
         let ray = Ray::new(origin, direction, t_min, f32::INFINITY);
         let mut hit = RayHit::none();
@@ -78,8 +78,8 @@ impl Tracer {
         Some(SurfaceHit { t: hit.t, triangle: self.original[i] as usize, weights })
     }
 
-    /// Whether the way from `origin` to `origin + direction` is free of surfaces, those left out
-    /// for which `passes` holds.
+    /// Returns whether the segment from `origin` to `origin + direction` is free of surfaces, ignoring hits for which
+    /// `passes` holds.
     pub(crate) fn free(&self, origin: Vec3A, direction: Vec3A, passes: impl Fn(usize, Vec3) -> bool) -> bool {
         let ray = Ray::new(origin, direction, 0.0, 1.0);
         self.bvh.ray_traverse_miss(ray, |ray, i| {
@@ -96,8 +96,8 @@ impl Tracer {
     }
 }
 
-/// Distance at which a ray meets a triangle, infinity if it does not (Möller and Trumbore). Edges
-/// belong to both triangles that share them, so that no ray slips through between two.
+/// Distance at which a ray hits a triangle, infinity for a miss (Möller and Trumbore). Edges belong to both triangles
+/// that share them, so that no ray passes between two.
 fn distance((triangle, share): &(RtTriangle, f32), ray: &Ray) -> f32 {
     let c = triangle.v0 - ray.origin;
     let r = ray.direction.cross(c);

@@ -1,4 +1,4 @@
-//! One photo: colors, depth and ids.
+//! Rendering of one photo: colors, depth and ids.
 
 use glam::{DVec2, Vec3A};
 use rayon::prelude::*;
@@ -12,18 +12,18 @@ use super::trace::{SurfaceHit, Tracer};
 use crate::math::srgb;
 use crate::scene::Camera;
 
-/// Surfaces that one sample looks through at most.
+/// Most surfaces along one sample ray.
 const MAX_LAYERS: usize = 16;
-/// A sample stops when less than this of it is left uncovered.
+/// Transmittance below which a sample ray stops.
 const MIN_TRANSMITTANCE: f32 = 1.0 / 512.0;
-/// Samples of a pixel that differ by more than this in linear light call for more samples.
+/// Largest difference of a pixel's samples, in linear light, that needs no further samples.
 const MAX_DIFFERENCE: f32 = 0.02;
 
 /// A rendered photo; all lists are row-major.
 pub(crate) struct SynthView {
     /// sRGB.
     pub(crate) rgb: Vec<[u8; 3]>,
-    /// Depth along the camera's axis at the pixel's center in scene units; 0 = nothing there.
+    /// Depth along the camera's axis at the pixel's center, scene units; 0 = none.
     pub(crate) depth: Vec<f32>,
     /// Object at the pixel's center; 0 = none.
     pub(crate) object: Vec<u16>,
@@ -31,18 +31,18 @@ pub(crate) struct SynthView {
     pub(crate) part: Vec<u16>,
 }
 
-/// Everything that rendering needs.
+/// Scene that is ready for rendering.
 pub struct SynthScene {
     pub(crate) surface: Surface,
     pub(crate) tracer: Tracer,
-    /// What is seen, where that is less than what casts shadows.
+    /// Visible surfaces, if fewer than those that cast shadows.
     pub(crate) seen: Option<Tracer>,
     pub(crate) materials: Materials,
     pub(crate) light: Light,
 }
 
 impl SynthScene {
-    /// Renders the scene from `camera`; `view` is the photo's number, for its random numbers.
+    /// Renders the scene from `camera`; `view` is the photo's number and seeds its random numbers.
     pub(crate) fn render(&self, camera: &Camera, view: usize, options: &SynthOptions) -> SynthView {
         let (w, h) = (camera.width_px as usize, camera.height_px as usize);
         let rows: Vec<Vec<Pixel>> =
@@ -56,8 +56,8 @@ impl SynthScene {
         }
     }
 
-    /// Takes away an object or part. With `keep_shadows` it still shades what is left, as it does where somebody
-    /// removes it from a scene that was photographed with it.
+    /// Removes an object or part. With `keep_shadows` it still shades the rest, as in a scene from which it was removed
+    /// after it was photographed.
     pub(crate) fn take_away(&mut self, id: u16, keep_shadows: bool) {
         let rest = Tracer::of(&self.surface, |t| t.ids.object != id && t.ids.part != id);
         if keep_shadows {
@@ -67,13 +67,13 @@ impl SynthScene {
         }
     }
 
-    /// The scene as the light needs it.
+    /// Scene data for the light.
     pub(crate) fn lit(&self) -> Lit<'_> {
         Lit { surface: &self.surface, tracer: &self.tracer, materials: &self.materials }
     }
 
-    /// Ids and depth at the center; color as the mean of `samples` x `samples` stratified samples,
-    /// of five where those are alike.
+    /// Renders a pixel: ids and depth at its center; color as the mean of `samples` x `samples` stratified samples, or
+    /// of five if those are alike.
     fn pixel(&self, camera: &Camera, x: usize, y: usize, view: usize, options: &SynthOptions) -> Pixel {
         let origin = self.surface.local(camera.center);
         let (px, py) = (x as f64, y as f64);
@@ -105,8 +105,7 @@ impl SynthScene {
         Pixel { rgb, depth: center.depth, object: center.ids.object, part: center.ids.part }
     }
 
-    /// What arrives along a ray of unit depth: linear light, through whatever lets it through, and
-    /// the first surface that does not.
+    /// Traces a ray of unit depth: linear light through transparent surfaces, up to the first opaque one.
     fn sample(&self, origin: Vec3A, direction: Vec3A, step: f32, background: Vec3A, specular: f32) -> Sample {
         let (mut out, mut left, mut t_min) = (Sample::default(), 1.0_f32, 0.0_f32);
         for _ in 0..MAX_LAYERS {
@@ -131,7 +130,7 @@ impl SynthScene {
         out
     }
 
-    /// Color and cover of a point.
+    /// Color and coverage of a point.
     fn shade(&self, hit: &SurfaceHit, direction: Vec3A, step: f32, specular: f32) -> (Vec3A, f32) {
         let triangle = &self.surface.triangles[hit.triangle];
         let material = self.materials.get(triangle.material);
@@ -143,8 +142,8 @@ impl SynthScene {
         let [a, b, c] = corners.map(|v| v.position);
         let smooth = super::surface::blend(corners.map(|v| v.normal), hit.weights).normalize_or_zero();
         let flat = (b - a).cross(c - a);
-        // Which face is seen is decided by the triangle, not by its interpolated normal, which may
-        // already look away at an outline.
+        // The triangle decides which face is visible, not its interpolated normal, which may already point away at an
+        // outline.
         let outward = if flat.dot(smooth) < 0.0 { -flat } else { flat };
         let front = outward.dot(direction) <= 0.0;
         let (diffuse, key) = self.light.at(self.lit(), triangle, hit.weights, front);
@@ -163,14 +162,14 @@ impl SynthScene {
 struct Sample {
     /// Linear, 0 to 1.
     color: Vec3A,
-    /// In scene units, 0 for none.
+    /// Scene units, 0 = none.
     depth: f32,
     ids: NodeIds,
     material: u32,
 }
 
 impl Sample {
-    /// Whether two samples of a pixel lie on the same smooth piece of surface.
+    /// Returns whether two samples of a pixel lie on the same smooth piece of surface.
     fn is_like(&self, other: &Self) -> bool {
         let same = self.ids == other.ids && self.material == other.material;
         let differs = (self.color - other.color).abs().max_element() > MAX_DIFFERENCE;
@@ -186,7 +185,7 @@ struct Pixel {
     part: u16,
 }
 
-/// The next start of a ray that goes on behind a surface at `t`.
+/// Start of a ray that continues behind a surface at `t`.
 fn behind(t: f32) -> f32 {
     t * (1.0 + 4.0 * f32::EPSILON) + 1e-6
 }

@@ -1,4 +1,4 @@
-//! Files of a synthetic data set.
+//! Writer of the files of a synthetic data set.
 
 use std::fs::{self, File};
 use std::io::{BufWriter, Write};
@@ -17,20 +17,20 @@ use crate::io::transforms::opengl_pose;
 use crate::io::{IoError, atomic, files, points_ply};
 use crate::scene::{Camera, SparsePoint};
 
-/// The file whose presence makes the folder a data set; written last.
+/// File that marks the folder as a complete data set; written last.
 pub(crate) const TRANSFORMS: &str = "transforms.json";
 pub(crate) const SETTINGS: &str = "synth.json";
 
 pub(crate) struct Writer {
     out: PathBuf,
     _lock: FolderLock,
-    /// Digits of a photo's number.
+    /// Number of digits in a photo's file name.
     digits: usize,
 }
 
 impl Writer {
-    /// Makes the folders. Takes away what marks an earlier data set as complete, if this program has
-    /// written that; refuses a folder that holds anything else.
+    /// Makes the folders. Removes the mark of an earlier complete data set of this program; refuses a folder that holds
+    /// anything else.
     pub(crate) fn new(out: &Path, views: usize) -> Result<Self, SynthError> {
         fs::create_dir_all(out).map_err(|source| SynthError::Write { path: out.into(), source })?;
         let lock = FolderLock::take(out, "making photos")?;
@@ -51,7 +51,7 @@ impl Writer {
         }
         let digits = views.saturating_sub(1).to_string().len().max(4);
         let writer = Self { out: out.to_owned(), _lock: lock, digits };
-        // Says whose folder it is, also where this does not come to its end.
+        // Marks the folder as this program's, even if writing is interrupted.
         writer.json(SETTINGS, &json!({ "version": 1, "complete": false }))?;
         Ok(writer)
     }
@@ -73,7 +73,7 @@ impl Writer {
         })
     }
 
-    /// Writes the other files. `views` are all cameras, which of them there are photos of, and which are held out.
+    /// Writes the other files. `views` holds all cameras, the indices of those with a photo, and the held-out flags.
     pub(crate) fn finish(
         &self,
         scene: &str,

@@ -1,7 +1,7 @@
-//! The black border that photos carry when another program has undistorted them.
+//! Black borders of photos that another program has undistorted.
 //!
-//! No scene can explain it: it moves with the camera. Left in, training builds dark floaters in
-//! front of every camera, and no reconstruction scores better than the border lets it.
+//! No scene can explain a border, because it moves with the camera. Left in, training builds dark floaters in front of
+//! every camera, and the border limits every score.
 
 use std::collections::{BTreeMap, VecDeque};
 
@@ -12,10 +12,10 @@ use crate::math::grid::neighbors;
 use crate::math::stats::median;
 use crate::scene::{Camera, Dataset, Photo, PhotoPixels};
 
-/// Most photos of a camera that are looked at; a border is the same in all.
+/// Most photos of a camera that are searched; a border is the same in all.
 const SAMPLE: usize = 24;
 
-/// Fewest photos from which a border can be told from a dark wall.
+/// Fewest photos that distinguish a border from a dark wall.
 const MIN_PHOTOS: usize = 8;
 /// Brightest value of a border pixel in any photo, as a share of the pictures' usual brightest.
 /// Below one half, because resampling blends the border's last row with the picture.
@@ -27,15 +27,14 @@ const SHARP: f64 = 0.95;
 /// Largest share of the picture that a border may take.
 const MAX_SHARE: f64 = 0.4;
 
-/// The borders of a dataset's photos at one size, by camera.
+/// Borders of a dataset's photos at one size, by camera.
 pub(crate) struct Borders {
     max_side_px: u32,
     by_camera: BTreeMap<[u64; 6], Vec<bool>>,
 }
 
 impl Borders {
-    /// Looks for borders in a sample of the photos with these indices, which should be those of
-    /// training, scaled to `max_side_px`.
+    /// Finds borders in a sample of the photos with these indices (the training photos), scaled to `max_side_px`.
     pub(crate) fn of(dataset: &Dataset, photos: &[usize], max_side_px: u32) -> Result<Self, IoError> {
         let mut cameras: BTreeMap<[u64; 6], Vec<&Photo>> = BTreeMap::new();
         for photo in photos.iter().map(|&i| &dataset.photos[i]).filter(|p| may_have_border(p)) {
@@ -54,7 +53,7 @@ impl Borders {
         Ok(Self { max_side_px, by_camera })
     }
 
-    /// The photo's pixels, without the border of its camera.
+    /// Loads the photo's pixels, without the border of its camera.
     pub(crate) fn load(&self, photo: &Photo) -> Result<PhotoPixels, IoError> {
         let mut pixels = photo::load(photo, self.max_side_px)?;
         if let Some(border) = self.by_camera.get(&intrinsics(&photo.camera)).filter(|_| may_have_border(photo)) {
@@ -63,14 +62,14 @@ impl Borders {
         Ok(pixels)
     }
 
-    /// The largest share of a picture that a border takes; 0 without any.
+    /// Largest share of a picture that a border takes; 0 without any.
     pub(crate) fn share(&self) -> f64 {
         let share = |b: &Vec<bool>| b.iter().filter(|b| **b).count() as f64 / b.len().max(1) as f64;
         self.by_camera.values().map(share).fold(0.0, f64::max)
     }
 }
 
-/// Pixels that were loaded of a photo; `None` of one that shows nothing.
+/// Turns the error of a blank photo into `None`.
 pub(super) fn unless_blank<T>(loaded: Result<T, IoError>) -> Result<Option<T>, IoError> {
     match loaded {
         Err(IoError::NothingShown { .. }) => Ok(None),
@@ -78,20 +77,20 @@ pub(super) fn unless_blank<T>(loaded: Result<T, IoError>) -> Result<Option<T>, I
     }
 }
 
-/// Photos that are undistorted here have no border, and a background is meant to be seen.
+/// Returns whether a photo may have a border: not if it is undistorted here, or has a background of its own.
 fn may_have_border(photo: &Photo) -> bool {
     photo.distortion.is_none() && photo.background.is_none()
 }
 
-/// What photos of the same camera share.
+/// Key of the camera intrinsics.
 fn intrinsics(camera: &Camera) -> [u64; 6] {
     let (focal, principal) = (camera.focal_px, camera.principal_px);
     let size = [u64::from(camera.width_px), u64::from(camera.height_px)];
     [size[0], size[1], focal.x.to_bits(), focal.y.to_bits(), principal.x.to_bits(), principal.y.to_bits()]
 }
 
-/// Which pixels (row-major) of these equally large photos of one camera belong to a border: dark
-/// in every photo, connected to the picture's edge, and ending sharply. `None` if there is none.
+/// Finds the border pixels (row-major) of equally large photos of one camera: dark in every photo, connected to the
+/// picture's edge, and ending sharply. `None` if there is no border.
 fn find(photos: &[&PhotoPixels]) -> Option<Vec<bool>> {
     let first = photos.first().filter(|_| photos.len() >= MIN_PHOTOS)?;
     let (width, height) = (first.width_px as usize, first.height_px as usize);
@@ -122,7 +121,7 @@ fn leave_out(border: &[bool], photo: &mut PhotoPixels) {
     }
 }
 
-/// The pixels for which `is` holds and that such pixels join to the picture's edge.
+/// Marks the pixels with `is` that are connected to the picture's edge through such pixels.
 fn connected_to_edge(width: usize, height: usize, is: impl Fn(usize) -> bool) -> Vec<bool> {
     let mut reached = vec![false; width * height];
     let edge = |i: usize| i % width == 0 || i % width == width - 1 || i < width || i >= width * (height - 1);
@@ -139,7 +138,7 @@ fn connected_to_edge(width: usize, height: usize, is: impl Fn(usize) -> bool) ->
     reached
 }
 
-/// The set and all pixels within `by` px of it, along rows, columns and diagonals.
+/// Dilates a set of pixels by `by` px, along rows, columns and diagonals.
 fn grown(set: &[bool], width: usize, by: usize) -> Vec<bool> {
     let height = set.len() / width.max(1);
     let along = |set: &[bool], x_by: usize, y_by: usize| -> Vec<bool> {
@@ -158,7 +157,7 @@ fn grown(set: &[bool], width: usize, by: usize) -> Vec<bool> {
 mod tests {
     use super::*;
 
-    /// Photos of a bright, changing scene with `frame` black pixels around it.
+    /// Photos of a bright, varying scene with `frame` black pixels around it.
     fn photos(n: usize, frame: u32) -> Vec<PhotoPixels> {
         let (w, h) = (60, 40);
         let inside = |x: u32, y: u32| x >= frame && y >= frame && x < w - frame && y < h - frame;
@@ -175,7 +174,7 @@ mod tests {
     fn a_black_frame_is_left_out_of_every_photo() {
         let mut photos = photos(10, 2);
         let border = find(&photos.iter().collect::<Vec<_>>()).expect("a border");
-        // Two black rows and two that resampling may have touched.
+        // Two black rows and two that resampling may have darkened.
         assert_eq!(border.iter().filter(|b| **b).count(), 60 * 40 - 52 * 32);
         leave_out(&border, &mut photos[0]);
         let coverage = photos[0].coverage.as_ref().expect("partial");

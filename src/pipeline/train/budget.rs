@@ -1,25 +1,24 @@
-//! How many Gaussians this machine can train.
+//! Budget of Gaussians for the memory of this machine.
 
 use crate::io::memory;
 
-/// Bytes that one trained Gaussian takes: parameters, two moments, a snapshot and a copy to roll
-/// back to (59 floats each), its statistics, and the renderer's records of about four tiles.
+/// Bytes per trained Gaussian: parameters, two moments, a snapshot and a copy to roll back to (59 floats each), its
+/// statistics, and the renderer's records of about four tiles.
 pub(crate) const BYTES_PER_GAUSSIAN: u64 = 59 * 4 * 5 + 12 + 64 + 4 * 60;
 
-/// Share of the memory that is free now which the Gaussians may take.
+/// Share of the free memory that the Gaussians may take.
 const SHARE: f64 = 0.4;
 
-/// As many Gaussians are cheap, and small pictures may show a large place.
+/// Number of Gaussians up to which one per pixel is allowed: small pictures may show a large scene.
 const CHEAP: usize = 100_000;
 
-/// Most Gaussians that are worth having and fit: one for each pixel of a training picture up to [`CHEAP`], one for two
-/// beyond that, at least `start` (those there are to begin with) and a half more, at most what the memory holds
-/// (docs/measured.md).
+/// Largest useful number of Gaussians: one for each pixel of a training picture up to [`CHEAP`], one for two pixels
+/// beyond that, at least 1.5 times the initial number `start`, at most as many as fit into memory (docs/measured.md).
 pub(crate) fn worthwhile(pixels: usize, start: usize) -> usize {
     pixels.min(CHEAP).max(pixels / 2).max(start + start / 2).min(gaussians())
 }
 
-/// Most Gaussians that the memory holds, between ten thousand and ten million.
+/// Most Gaussians that fit into memory, between ten thousand and ten million.
 pub(crate) fn gaussians() -> usize {
     fitting(memory::free())
 }

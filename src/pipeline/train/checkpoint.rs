@@ -1,4 +1,4 @@
-//! A run's whole state in one file, so that a killed run goes on along the same trajectory.
+//! Checkpoint: the whole state of a run in one file, so that a killed run resumes along the same trajectory.
 //!
 //! Layout: the magic bytes, the header's length (u64), a JSON header, then little-endian f32
 //! arrays: the cloud, both moments (positions, log-scales, quaternions, opacity logits, SH each)
@@ -26,20 +26,20 @@ use crate::scene::GaussianCloud;
 pub use crate::io::scene_files::CHECKPOINT_FILE as FILE;
 
 const MAGIC: &[u8; 8] = b"FMLGSCP4";
-/// How files of the first version begin, which end without a checksum, and of the second; both have another array behind
-/// the others, which nobody reads. Those of the third do not say what was trained on.
+/// Magic bytes of earlier versions. Files of the first end without a checksum; the first and the second have one more
+/// array at the end, which is ignored. Files of the third do not record the training inputs.
 const MAGIC_1: &[u8; 8] = b"FMLGSCP1";
 const MAGIC_2: &[u8; 8] = b"FMLGSCP2";
 const MAGIC_3: &[u8; 8] = b"FMLGSCP3";
 
-/// Everything about a run but its arrays.
+/// State of a run without its arrays.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs, reason = "each name says what it is")]
 pub struct Header {
     pub config: TrainConfig,
     /// Names of the photos trained on.
     pub photos: Vec<String>,
-    /// What was trained on; files of earlier versions do not say.
+    /// Training inputs; absent in files of earlier versions.
     #[serde(default)]
     pub inputs: Option<TrainInputs>,
     pub step: u64,
@@ -56,12 +56,12 @@ pub struct Header {
     /// Factor on the learning rates.
     pub damping: f64,
     pub history: History,
-    /// What was measured since its last row; files of earlier versions do not say.
+    /// Measurements since the last row of `history`; absent in files of earlier versions.
     #[serde(default)]
     pub unreported: StepWindow,
 }
 
-/// Why a checkpoint cannot be used.
+/// Reasons for which a checkpoint cannot be used.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum CheckpointError {
@@ -80,7 +80,7 @@ pub enum CheckpointError {
 /// Writes the state atomically.
 ///
 /// # Errors
-/// If it cannot be written; the checkpoint before is then unchanged.
+/// If it cannot be written; the earlier checkpoint is then unchanged.
 pub(crate) fn save(scene: &SceneFolder, trainer: &Trainer, header: &Header) -> Result<(), IoError> {
     scene.save_checkpoint(|w| {
         let mut w = Summed { to: w, sum: Sha256::new() };
@@ -98,7 +98,7 @@ pub(crate) fn save(scene: &SceneFolder, trainer: &Trainer, header: &Header) -> R
     })
 }
 
-/// Passes bytes on and sums them up.
+/// Writer that also computes the SHA-256 of its bytes.
 struct Summed<'a> {
     to: &'a mut dyn Write,
     sum: Sha256,
@@ -124,9 +124,9 @@ fn write_cloud(w: &mut dyn Write, c: &GaussianCloud) -> io::Result<()> {
     w.write_all(cast_slice(&c.sh))
 }
 
-/// A checkpoint as read.
+/// Checkpoint in memory.
 pub struct Checkpoint {
-    /// The run.
+    /// State of the run.
     pub header: Header,
     pub(crate) cloud: GaussianCloud,
     pub(crate) moments: [GaussianCloud; 2],
@@ -171,7 +171,7 @@ pub fn load(path: &Path) -> Result<Option<Checkpoint>, CheckpointError> {
     Ok(Some(Checkpoint { header, cloud, moments, stats: DensityStats { gradient, seen } }))
 }
 
-/// Takes arrays off a buffer whose length has been checked.
+/// Reader of arrays from a buffer whose length has been checked.
 struct Floats<'a>(&'a [u8]);
 
 impl Floats<'_> {

@@ -1,12 +1,12 @@
-//! Photos at half their size, for the first steps: what is large is found at a quarter of the cost.
+//! Half-size photos for the first steps: coarse structure is trained at a quarter of the cost.
 
 use super::{TrainConfig, TrainView};
 use crate::io::photo;
 
-/// Halves have at least this many px along their sides.
+/// Least side of a half-size photo, px.
 const LEAST_PX: u32 = 16;
 
-/// Steps that see the photos at half their size.
+/// Number of steps with half-size photos.
 pub(super) fn steps(config: &TrainConfig) -> u64 {
     (config.coarse_share * config.steps as f64).round() as u64
 }

@@ -1,4 +1,4 @@
-//! What a training run is asked to do.
+//! Settings of a training run.
 
 use std::path::Path;
 
@@ -9,35 +9,35 @@ use crate::pipeline::semantics::tracker::TrackOptions;
 use crate::render::{BackendChoice, RenderSettings};
 use crate::scene::{AlphaUse, Camera, Limits, SplatRenderMode};
 
-/// Weight of the normals' term where surfels are trained (2DGS's).
+/// Weight of the normal loss for surfels (2DGS's).
 const SURFEL_NORMALS: f64 = 0.05;
-/// Weight of the distortion term where surfels are trained: of 0, 0.1 and 1 the one with the least
-/// error of median depth on the demo scene, see [`crate::pipeline::depth`].
+/// Weight of the distortion loss for surfels: of 0, 0.1 and 1 the one with the least error of median depth on the
+/// demo scene, see [`crate::pipeline::depth`].
 const SURFEL_DISTORTION: f64 = 0.1;
 
-/// Settings of a run. Everything that a schedule depends on scales with `steps`.
+/// Settings of a training run. The schedule scales with `steps`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct TrainConfig {
-    /// Optimizer steps in all.
+    /// Total number of training steps.
     pub steps: u64,
     /// Longest side of the training pictures in px; photos are never enlarged.
     pub max_side_px: u32,
-    /// Every how-manieth photo is held out; 0 = none.
+    /// Interval of held-out photos: every n-th is held out; 0 = none.
     pub holdout_every: usize,
     /// Highest spherical-harmonics degree, 0 to 3.
     pub sh_degree: u8,
-    /// Open all bands of color from the first step on instead of one after the other.
+    /// True if all SH bands are active from the first step on, instead of one after the other.
     pub sh_at_once: bool,
-    /// Share of the steps, from the first on, that see the photos at half their size; 0 = none.
+    /// Fraction of the steps, from the first on, with half-size photos; 0 = none.
     pub coarse_share: f64,
-    /// Whether Gaussians are added and removed on the way.
+    /// True if Gaussians are added and removed during training.
     pub densify: bool,
-    /// Upper limit of Gaussians; `None` = from the size of the photos and the machine's memory.
+    /// Most Gaussians; `None` = from the size of the photos and the machine's memory.
     pub max_gaussians: Option<usize>,
-    /// Gaussians to start from where the dataset has no sparse points.
+    /// Initial Gaussians if the dataset has no sparse points.
     pub random_points: usize,
-    /// What transparent pixels are taken for; `None` = what the photos make likely.
+    /// Interpretation of transparent pixels; `None` = inferred from the photos.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub alpha: Option<AlphaUse>,
     /// Mip-Splatting's 2-D filter.
@@ -48,18 +48,17 @@ pub struct TrainConfig {
     pub eval_every: u64,
     /// Seconds between checkpoints; 0 = only at the end.
     pub checkpoint_secs: f64,
-    /// Which renderer trains.
+    /// Renderer for training.
     pub backend: BackendChoice,
-    /// Train surfels (2D Gaussian Splatting) instead of Gaussians; on the CPU.
+    /// True to train surfels (2D Gaussian Splatting) instead of Gaussians; on the CPU.
     pub surfels: bool,
-    /// Weight of the term that holds normals and depth together, on the CPU; `None` = 0 for
-    /// Gaussians, 2DGS's for surfels.
+    /// Weight of the normal-consistency loss, on the CPU; `None` = 0 for Gaussians, 2DGS's for surfels.
     pub normal_weight: Option<f64>,
-    /// Weight of the term that pulls surfels together along rays; `None` = the default.
+    /// Weight of the distortion loss, which concentrates surfels along rays; `None` = the default.
     pub distortion_weight: Option<f64>,
 }
 
-/// Stored settings that cannot be read: defaults in their place would train or draw something else.
+/// Stored settings that cannot be read: defaults in their place would train or render something else.
 #[derive(Debug, thiserror::Error)]
 #[error(
     "{path}: the settings of the training ('config') cannot be read: {cause}; fix them, or remove the entry to use the defaults"
@@ -70,8 +69,8 @@ pub struct UnreadableConfig {
 }
 
 impl TrainConfig {
-    /// The settings that the scene in `folder` stores; the defaults for what it does not say, or if it says
-    /// nothing, but for the filter, which scenes say they were trained with.
+    /// Reads the settings stored in the scene in `folder`. Missing entries are [`Self::unknown`]: defaults without the
+    /// filter, because a scene records the filter if it was trained with it.
     pub(crate) fn stored(folder: &Path, config: serde_json::Value) -> Result<Self, UnreadableConfig> {
         let read = match config {
             serde_json::Value::Null => Ok(Self::unknown()),
@@ -79,18 +78,18 @@ impl TrainConfig {
                 named.entry("antialias").or_insert(false.into());
                 serde_json::from_value(named.into())
             }
-            // A list would be taken for the settings in their order.
+            // serde would accept a list as the settings in order.
             _ => Err(serde::de::Error::custom("they have no names")),
         };
         read.map_err(|cause| UnreadableConfig { path: folder.join(SCENE_FILE).display().to_string(), cause })
     }
 
-    /// For a scene that does not say how it was trained.
+    /// Settings for a scene without a record of its training.
     pub(crate) fn unknown() -> Self {
         Self { antialias: false, ..Self::default() }
     }
 
-    /// Whether these settings make sense.
+    /// Checks that these settings are valid.
     pub(super) fn check(&self) -> Result<(), String> {
         let bad = |text: &str| Err(text.to_owned());
         if self.steps == 0 {
@@ -115,13 +114,13 @@ impl TrainConfig {
         Ok(())
     }
 
-    /// Weights of the terms for normals and distortion.
+    /// Weights of the normal and the distortion loss.
     pub(crate) fn geometry_weights(&self) -> (f64, f64) {
         let or = |weight: Option<f64>, surfels: f64| weight.unwrap_or(if self.surfels { surfels } else { 0.0 });
         (or(self.normal_weight, SURFEL_NORMALS), or(self.distortion_weight, SURFEL_DISTORTION))
     }
 
-    /// What of these settings a scene's plan starts from.
+    /// Limits in these settings from which a scene's plan starts.
     pub(crate) fn limits(&self) -> Limits {
         Limits {
             train_side_px: self.max_side_px,
@@ -131,25 +130,25 @@ impl TrainConfig {
         }
     }
 
-    /// Whether a training with these settings goes on where one with the others stopped: how often to look and save
-    /// does not change the trajectory.
+    /// Returns whether a run with these settings can resume one with the others: intervals of evaluations and
+    /// checkpoints do not change the trajectory.
     pub(crate) fn is_same_run(&self, other: &Self) -> bool {
         let own = Self { eval_every: other.eval_every, checkpoint_secs: other.checkpoint_secs, ..self.clone() };
         // Surfels are never filtered.
         *other == Self { antialias: if self.surfels { other.antialias } else { self.antialias }, ..own }
     }
 
-    /// Whether a training with these settings is that with the others, for another number of steps.
+    /// Returns whether the settings differ from the others at most in the number of steps.
     pub(crate) fn is_same_but_for_steps(&self, other: &Self) -> bool {
         Self { steps: other.steps, ..self.clone() }.is_same_run(other)
     }
 
-    /// Whether only the CPU can do what is asked.
+    /// True if only the CPU supports these settings.
     pub(crate) fn needs_cpu(&self) -> bool {
         self.surfels || self.geometry_weights().0 > 0.0
     }
 
-    /// How what was trained is drawn in front of `background`, black if unknown, in a scene of this extent (see
+    /// Render settings of the trained scene in front of `background`, black if unknown, at this scene extent (see
     /// [`Camera::extent_of`]).
     pub(crate) fn render_settings(&self, background: Option<[f32; 3]>, extent: f64) -> RenderSettings {
         RenderSettings {
@@ -161,7 +160,7 @@ impl TrainConfig {
         }
     }
 
-    /// What is told of it in files for other programs.
+    /// Render mode in files for other programs.
     pub(crate) fn render_mode(&self) -> SplatRenderMode {
         match (self.surfels, self.antialias) {
             (true, _) => SplatRenderMode::Surfels,

@@ -1,9 +1,9 @@
-//! Adaptive density control: where Gaussians are added and removed.
+//! Adaptive density control: adds and removes Gaussians.
 //!
-//! Until control ends, the number of Gaussians grows by equal shares to the budget; those that moved most on screen since
-//! the last round, summed over all pictures, are divided (3DGS takes the mean over pictures and everything above a
-//! threshold, and is through with its budget early). Each is replaced by two that together look like it (3DGS-MCMC,
-//! arXiv 2404.09591, equation 9), apart by a sample of it, so that nothing flares up when it is divided.
+//! Until control ends, the number of Gaussians grows to the budget by equal shares. The Gaussians with the largest
+//! screen gradients since the last round, summed over all pictures, are split. (3DGS takes the mean over pictures and
+//! everything above a threshold, and uses up its budget early.) Each is replaced by two that together look like it
+//! (3DGS-MCMC, arXiv 2404.09591, equation 9), offset by samples of it, so that a split causes no flicker.
 
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
@@ -12,18 +12,18 @@ use crate::math::Real;
 pub use crate::render::DensityStats;
 use crate::scene::GaussianCloud;
 
-/// Mean screen gradient (loss per half picture side) under which a region is reconstructed well enough.
+/// Mean screen gradient (loss per half picture side) below which a region is reconstructed well enough.
 const LEAST_GRADIENT: f32 = 2e-5;
-/// Opacity under which a Gaussian is removed.
+/// Opacity below which a Gaussian is removed.
 const PRUNE_OPACITY: f32 = 0.005;
-/// Opacities are lowered to this by a reset.
+/// Largest opacity after a reset.
 const RESET_OPACITY: f64 = 0.01;
-/// Halves are apart by a sample of what they replace, times this.
+/// Factor on the sample of a Gaussian by which each half is offset.
 const APART: f32 = 0.5;
-/// What is more opaque is divided as if it were this opaque.
+/// Largest opacity in the formula of a split.
 const MOST_OPAQUE: f32 = 0.999;
 
-/// What a round of density control may do.
+/// Limits of a round of density control.
 #[derive(Clone, Copy, Debug)]
 pub struct DensityRound {
     /// Most Gaussians when control ends.
@@ -32,10 +32,10 @@ pub struct DensityRound {
     pub rounds: u64,
 }
 
-/// What a round of density control did.
+/// Report of a round of density control.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DensityReport {
-    /// Gaussians replaced by two.
+    /// Gaussians that were split in two.
     pub(crate) divided: usize,
     pub(crate) pruned: usize,
 }
@@ -49,7 +49,7 @@ pub fn control(
     rng: &mut Pcg64Mcg,
 ) -> DensityReport {
     let n = cloud.len();
-    // 3DGS removes large ones too, after the first reset. That took what is behind everything (docs/measured.md).
+    // 3DGS also removes large ones after the first reset. This removed the background (docs/measured.md).
     let stays: Vec<bool> = cloud.opacity_logits.iter().map(|o| o.sigmoid() >= PRUNE_OPACITY).collect();
     let left = stays.iter().filter(|s| **s).count();
     let room = round.budget.saturating_sub(left).div_ceil(round.rounds.max(1) as usize);
@@ -76,7 +76,7 @@ pub fn control(
     DensityReport { divided: dividing.len(), pruned: n - left }
 }
 
-/// Zeroes moments from Gaussian `from` on.
+/// Clears the moments from Gaussian `from` on.
 fn forget(m: &mut GaussianCloud, from: usize) {
     let stride = m.sh_stride();
     m.positions[from..].fill([0.0; 3]);
@@ -86,7 +86,7 @@ fn forget(m: &mut GaussianCloud, from: usize) {
     m.sh[from * stride..].fill([0.0; 3]);
 }
 
-/// Makes one of two out of a Gaussian that they replace.
+/// Turns a Gaussian into one of the two that replace it.
 fn make_half(cloud: &mut GaussianCloud, i: usize, rng: &mut Pcg64Mcg) {
     let opacity = cloud.opacity_logits[i].sigmoid().min(MOST_OPAQUE);
     let through_one = (1.0 - opacity).sqrt();
@@ -100,20 +100,20 @@ fn make_half(cloud: &mut GaussianCloud, i: usize, rng: &mut Pcg64Mcg) {
     for (p, row) in place.iter_mut().zip(rotation) {
         *p += row[0] * local[0] + row[1] * local[1] + row[2] * local[2];
     }
-    // One so large that a sample of it is nowhere stays where it is.
+    // The sample of a huge Gaussian may overflow; such a one keeps its position.
     if place.iter().all(|p| p.is_finite()) {
         cloud.positions[i] = place;
     }
 }
 
-/// A standard normal sample (Box-Muller).
+/// Draws a standard normal sample (Box-Muller).
 pub(super) fn gaussian(rng: &mut Pcg64Mcg) -> f32 {
     let u: f64 = rng.random_range(f64::MIN_POSITIVE..1.0);
     let v: f64 = rng.random_range(0.0..std::f64::consts::TAU);
     ((-2.0 * u.ln()).sqrt() * v.cos()) as f32
 }
 
-/// Lowers every opacity to at most 0.01 and forgets the opacities' moments.
+/// Lowers every opacity to at most 0.01 and clears the moments of the opacities.
 pub(crate) fn reset_opacity(cloud: &mut GaussianCloud, moments: &mut [GaussianCloud; 2]) {
     let ceiling = (RESET_OPACITY / (1.0 - RESET_OPACITY)).ln() as f32;
     for o in &mut cloud.opacity_logits {
@@ -157,7 +157,7 @@ mod tests {
         assert!(moments[1].sh[2..].iter().all(|v| *v == [0.0; 3]));
     }
 
-    /// Both halves at one place let through what the one let through, and weigh as much in the mean.
+    /// Both halves at one position have the transmittance and the integrated alpha of the original.
     #[test]
     fn two_halves_look_like_the_one() {
         for opacity in [0.004_f64, 0.3, 0.9, 0.998] {
@@ -166,7 +166,7 @@ mod tests {
             make_half(&mut cloud, 0, &mut rng);
             let half = f64::from(cloud.opacity_logits[0].sigmoid());
             assert!(((1.0 - half).powi(2) - (1.0 - opacity)).abs() < 1e-5, "{opacity}: {half}");
-            // Summed along a line through the center: of one Gaussian, and of two over each other.
+            // Summed along a line through the center: one Gaussian, and two overlaid.
             let line = |alpha: &dyn Fn(f64) -> f64| (-8_000..=8_000).map(|x| alpha(f64::from(x) * 1e-3)).sum::<f64>();
             let width = f64::from(cloud.log_scales[0][0] + 9.0).exp();
             let one = line(&|x| opacity * (-0.5 * x * x).exp());
@@ -183,7 +183,7 @@ mod tests {
         let round = DensityRound { budget: 16, rounds: 3 };
         assert_eq!(control(&mut cloud, &mut moments, &stats, &round, &mut rng).divided, 2);
         assert_eq!((cloud.len(), cloud.positions[7]), (12, [7.0, 0.0, 0.0]));
-        // A sum counts, not a mean: one that few pictures show is less needy than one that many show.
+        // The sum counts, not the mean: a Gaussian in few pictures ranks below one in many.
         let (mut cloud, mut moments, mut stats, mut rng) = setup(2);
         (stats.gradient, stats.seen) = (vec![2.0, 3.0], vec![1, 10]);
         control(&mut cloud, &mut moments, &stats, &DensityRound { budget: 3, ..ROUND }, &mut rng);

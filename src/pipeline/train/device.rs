@@ -1,5 +1,5 @@
-//! The part of a run's state that lives on a GPU: cloud, moments, statistics and photos stay
-//! there from step to step; the host sees them when it asks.
+//! Training state on a GPU: cloud, moments, statistics and photos stay there from step to step; the host downloads
+//! them on request.
 
 use super::TrainView;
 use crate::render::{
@@ -10,16 +10,16 @@ use crate::scene::{Camera, GaussianCloud};
 /// Weight of D-SSIM in the loss.
 pub(crate) const LAMBDA: f64 = 0.2;
 
-/// What one step measured.
+/// Measurements of one training step.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct StepResult {
     /// Loss of the photo before the step.
     pub(crate) loss: f64,
     /// PSNR of the photo before the step, dB.
     pub(crate) psnr: f64,
-    /// Gaussians whose gradient was not finite and that were left as they are.
+    /// Gaussians that were not updated, because their gradient was not finite.
     pub(crate) skipped: usize,
-    /// Gradients that were cut because they were far above what their parameters had seen.
+    /// Gradients that were clipped because they were far above the earlier ones of their parameter.
     pub(crate) outliers: usize,
 }
 
@@ -54,8 +54,8 @@ impl DeviceRun {
         self.trainer.upload(cloud, Some([&moments[0], &moments[1]]), step)
     }
 
-    /// One step on photo `i`, which `view` is of, with harmonics up to a degree, in front of a color, and with what
-    /// that changes where the photo is transparent. Does not wait for the device.
+    /// Runs one step on photo `i` with the camera of `view`, SH up to a degree, a background color, and its difference
+    /// to the stored one for a photo with transparency. Does not wait for the device.
     pub(crate) fn step(
         &mut self,
         i: usize,
@@ -69,8 +69,8 @@ impl DeviceRun {
         self.trainer.step(&view.camera, photo, rates, sh_degree)
     }
 
-    /// What the steps since the last call measured; steps that did not fit into the device's
-    /// buffers, which have been enlarged since, moved nothing and are left out. Waits.
+    /// Results of the steps since the last call. Steps that did not fit into the device's buffers, which have been
+    /// enlarged since, updated nothing and are left out. Waits for the device.
     pub(crate) fn results(&mut self) -> Result<Vec<StepResult>, GpuError> {
         let done = self.trainer.metrics()?;
         let result = |s: &StepLoss| StepResult {
@@ -82,17 +82,17 @@ impl DeviceRun {
         Ok(done.iter().filter(|s| !s.sums.overflow).map(result).collect())
     }
 
-    /// A view of the cloud as it is. Waits.
+    /// Renders the present cloud. Waits for the device.
     pub(crate) fn draw(&mut self, camera: &Camera, settings: &RenderSettings) -> Result<Frame<f32>, GpuError> {
         self.trainer.draw(camera, settings)
     }
 
-    /// The cloud as it is. Waits.
+    /// Downloads the present cloud. Waits for the device.
     pub(crate) fn cloud(&self) -> Result<GaussianCloud, GpuError> {
         self.trainer.cloud()
     }
 
-    /// Cloud, moments, and statistics since the last upload. Waits.
+    /// Downloads cloud, moments, and statistics since the last upload. Waits for the device.
     pub(crate) fn download(&self) -> Result<(GaussianCloud, [GaussianCloud; 2], DensityStats), GpuError> {
         let (cloud, moments) = self.trainer.download()?;
         Ok((cloud, moments, self.trainer.stats()?))

@@ -1,4 +1,4 @@
-//! The folder for a training's result: what is there already is resumed, carried over or left alone.
+//! Output folder of a training run: earlier content is resumed, transferred or left alone.
 
 use std::path::Path;
 use std::sync::Arc;
@@ -13,24 +13,25 @@ use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::carry;
 use crate::scene::{Dataset, GaussianCloud, SemanticMap};
 
-/// What a training may do with the folder of its result.
+/// Permissions of a training run in its output folder.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct FolderUse {
-    /// A checkpoint is continued also where photos, poses or sparse points are not those that its run began with.
+    /// True if a checkpoint is resumed even if photos, poses or sparse points have changed.
     pub(crate) anyway: bool,
-    /// The folder is made again where it goes away meanwhile. Not where it was taken away by who went on.
+    /// True if the folder is made again when it vanishes during training; false if the program may have moved it
+    /// itself.
     pub(crate) remake: bool,
-    /// A checkpoint of the same settings with fewer steps is continued.
+    /// True if a checkpoint of the same settings with fewer steps is resumed.
     pub(crate) more_steps: bool,
 }
 
-/// Holds the folder again if it went away, and says so.
+/// Makes and locks the folder again if it has vanished, with a warning.
 pub(super) fn remade(scene: SceneFolder, observer: &mut dyn Observer) -> Result<SceneFolder, TrainError> {
     let folder = scene.path().to_path_buf();
     if folder.is_dir() {
         return Ok(scene);
     }
-    // Else it would take away the lock of the new one.
+    // Dropped first: otherwise it would remove the lock of the new folder.
     drop(scene);
     let held = SceneFolder::hold(&folder, "training").map_err(TrainError::Save)?;
     let text = format!("{} went away during the training and is made again; what was in it is gone", folder.display());
@@ -38,7 +39,7 @@ pub(super) fn remade(scene: SceneFolder, observer: &mut dyn Observer) -> Result<
     Ok(held)
 }
 
-/// Holds the folder for the result, which must not hold anything that would be lost.
+/// Locks the output folder, which must not contain anything that would be lost.
 pub(super) fn claim(folder: &Path, dataset: &Dataset) -> Result<SceneFolder, TrainError> {
     let occupied = |what| Err(TrainError::Save(IoError::Occupied { folder: folder.into(), what }));
     let real = |p: &Path| std::fs::canonicalize(p).ok();
@@ -57,7 +58,7 @@ pub(super) fn claim(folder: &Path, dataset: &Dataset) -> Result<SceneFolder, Tra
     SceneFolder::hold(folder, "training").map_err(TrainError::Save)
 }
 
-/// The result of a run that was finished and saved before.
+/// Returns the result of a run that was finished and saved before.
 pub(super) fn finished(
     folder: &Path,
     saved: &Checkpoint,
@@ -78,8 +79,8 @@ pub(super) fn finished(
     }))
 }
 
-/// The checkpoint in `folder`, if there is one and it is of this run. What was trained on has to be what it is `now`,
-/// unless the run goes on `anyway`.
+/// Returns the checkpoint in `folder`, if there is one. It must be of this run, with inputs equal to those `now`,
+/// unless the run may go on `anyway`.
 pub(super) fn resumable(
     folder: &Path,
     dataset: &Dataset,
@@ -114,7 +115,7 @@ pub(super) fn resumable(
     Ok(Some(saved))
 }
 
-/// The objects and parts of the scene that is about to be replaced, for the Gaussians as they are now.
+/// Transfers the objects and parts of the scene that is about to be replaced to the present Gaussians.
 pub(super) fn objects_for(
     scene: &SceneFolder,
     cloud: &GaussianCloud,

@@ -1,24 +1,23 @@
-//! What training asks of the scene's geometry beside its colors: normals that agree with depth,
-//! and surfels that lie together along each ray.
+//! Geometry losses: consistency of normals with depth, and distortion of surfels along each ray (2DGS).
 
 use super::{TrainConfig, TrainView};
 use crate::render::normals::{self, SurfaceDepth};
 use crate::render::{Features, Frame, FrameGradient};
 use crate::scene::GaussianCloud;
 
-/// Share of a run after which distortion counts (2DGS: step 3,000 of 30,000).
+/// Fraction of a run after which the distortion loss is active (2DGS: step 3,000 of 30,000).
 const DISTORTION_FROM: f64 = 0.1;
-/// Share of a run after which normals count (2DGS: step 7,000 of 30,000).
+/// Fraction of a run after which the normal loss is active (2DGS: step 7,000 of 30,000).
 const NORMALS_FROM: f64 = 7.0 / 30.0;
-/// Standard deviation of a surfel across its disk, as a share of the scene's extent: drawn as an
-/// ordinary Gaussian, by other programs or on a GPU, it is as good as flat.
+/// Standard deviation of a surfel along its normal, as a fraction of the scene's extent: rendered as an ordinary
+/// Gaussian, by other programs or on a GPU, it is practically flat.
 const THICKNESS: f64 = 1e-7;
 
 #[derive(Debug, Default)]
 pub(crate) struct GeometryLoss {
     surfels: bool,
     normal_weight: f64,
-    /// Of distortion in inverse depth times the scene's extent, so that units cancel.
+    /// Weight of distortion in inverse depth times the scene's extent, so that units cancel.
     distortion_weight: f64,
     steps: u64,
     values: Vec<f32>,
@@ -26,7 +25,7 @@ pub(crate) struct GeometryLoss {
 }
 
 impl GeometryLoss {
-    /// The terms of a run in a scene of this extent.
+    /// Losses of a run in a scene of this extent.
     pub(crate) fn new(config: &TrainConfig, extent: f64) -> Self {
         let (normal_weight, distortion) = config.geometry_weights();
         let distortion_weight = distortion * extent * extent;
@@ -41,17 +40,17 @@ impl GeometryLoss {
         self.surfels && self.distortion_weight > 0.0 && step as f64 >= DISTORTION_FROM * self.steps as f64
     }
 
-    /// Whether depth must be drawn at `step`.
+    /// Returns whether depth must be rendered at `step`.
     pub(crate) fn counts(&self, step: u64) -> bool {
         self.normals_count(step) || self.distortion_counts(step)
     }
 
-    /// Whether Gaussians carry their normals as extra channels at `step`.
+    /// Returns whether Gaussians carry their normals as extra channels at `step`.
     pub(crate) fn draws_normals(&self, step: u64) -> bool {
         !self.surfels && self.normals_count(step)
     }
 
-    /// The extra channels to draw at `step`.
+    /// Extra channels to render at `step`.
     pub(crate) fn features(&mut self, cloud: &GaussianCloud, view: &TrainView, step: u64) -> Features<'_, f32> {
         if !self.draws_normals(step) {
             return Features::NONE;
@@ -60,7 +59,7 @@ impl GeometryLoss {
         Features { channels: 3, values: &self.values }
     }
 
-    /// Sets the gradient of everything but colors for a frame drawn at `step`; returns the loss.
+    /// Sets the gradient of everything but colors for a frame rendered at `step`; returns the loss.
     pub(crate) fn compare(
         &mut self,
         frame: &Frame<f32>,
@@ -98,8 +97,7 @@ impl GeometryLoss {
     }
 }
 
-/// Makes Gaussians that training starts from into surfels: flat, and turned at random by `angle`,
-/// which gives numbers around 0.
+/// Turns initial Gaussians into surfels: flat, with random rotations from `angle`, which returns numbers around 0.
 pub(crate) fn flatten(cloud: &mut GaussianCloud, extent: f64, mut angle: impl FnMut() -> f32) {
     let thin = (THICKNESS * extent).ln() as f32;
     for (scale, quaternion) in cloud.log_scales.iter_mut().zip(&mut cloud.quaternions) {

@@ -1,4 +1,4 @@
-//! The Gaussians a run starts from.
+//! Initialization of the Gaussians.
 
 use glam::{DVec2, DVec3};
 use rand_pcg::Pcg64Mcg;
@@ -13,17 +13,16 @@ use crate::scene::{Bounds, Camera, Dataset, GaussianCloud, SparsePoint};
 
 /// Opacity of a new Gaussian.
 const OPACITY: f64 = 0.1;
-/// Longer side of the pictures in which holes are looked for, px.
+/// Longer side of the pictures in which holes are detected, px.
 const HOLE_SIDE_PX: u32 = 128;
-/// Side of the squares that are found empty or covered, px.
+/// Side of the squares that are tested for coverage, px.
 const HOLE_CELL_PX: usize = 8;
 /// Fewest sparse points that training starts from.
 const FEWEST_POINTS: usize = 100;
-/// How much farther than nearly everything else in a view its holes are filled.
+/// Depth of filled holes, relative to nearly the farthest depth of the view.
 const HOLE_DEPTH: f64 = 1.3;
 
-/// A cloud at the dataset's sparse points or, where it lacks these, at `random` points
-/// where the photos agree.
+/// Initializes a cloud at the dataset's sparse points, or, without these, at `random` points where the photos agree.
 pub(crate) fn initial_cloud(
     dataset: &Dataset,
     views: &[TrainView],
@@ -43,20 +42,20 @@ pub(crate) fn initial_cloud(
     cloud
 }
 
-/// Whether there are too few sparse points to start from.
+/// Returns whether there are too few sparse points to start from.
 pub(super) fn lacks_points(dataset: &Dataset) -> bool {
     dataset.points.iter().filter(|p| p.position.is_finite()).count() < FEWEST_POINTS
 }
 
-/// Puts Gaussians where photos show something but no sparse point is: walls, sky, the rest of the
-/// room. They stand a little behind what the view shows otherwise, in its photo's colors, and
-/// training moves them from there. Views that already see such a Gaussian add none.
+/// Adds Gaussians where photos show a region without sparse points: walls, sky, the rest of the room. They lie a
+/// little behind the rest of the view, in the colors of its photo, and training moves them from there. Views that
+/// already see such a Gaussian add none.
 fn fill_holes(cloud: &mut GaussianCloud, dataset: &Dataset, views: &[&TrainView]) {
     let stride = cloud.sh_stride();
     let near = Camera::near_plane(dataset.camera_extent().1);
     let settings = RenderSettings { sh_degree: 0, depth: true, near, ..RenderSettings::default() };
     let mut renderer = Renderer::new();
-    // The same cloud all but opaque, so that its alpha says where it covers the picture.
+    // The cloud made nearly opaque, so that its alpha shows the coverage of the picture.
     let mut solid = cloud.clone();
     solid.opacity_logits.fill(3.0);
     for view in views {
@@ -107,7 +106,7 @@ fn constant_color(rgb: [u8; 3]) -> [f32; 3] {
     rgb.map(|c| ((f64::from(c) / 255.0 - 0.5) / SH_C0) as f32)
 }
 
-/// One Gaussian per point, as wide as the mean distance to its three nearest neighbors.
+/// Makes one Gaussian per point, as wide as the root mean square distance to its three nearest neighbors.
 pub(crate) fn from_points(points: &[SparsePoint], degree: u8) -> GaussianCloud {
     let origin = Bounds::robust(points.iter().map(|p| p.position)).map_or(DVec3::ZERO, |b| b.center());
     let local: Vec<[f64; 3]> = points.iter().map(|p| (p.position - origin).to_array()).collect();
@@ -121,7 +120,7 @@ pub(crate) fn from_points(points: &[SparsePoint], degree: u8) -> GaussianCloud {
             (near.iter().sum::<f64>() / near.len().max(1) as f64).sqrt()
         })
         .collect();
-    // Coincident points get a small size instead of none; lonely ones no more than their share.
+    // Coincident points get a small size instead of zero; the size of isolated ones is limited.
     let typical = crate::math::stats::median(&spacing.iter().copied().filter(|s| *s > 0.0).collect::<Vec<_>>());
     let typical = if typical.is_finite() { typical } else { 1.0 };
     let stride = coefficients(degree);
@@ -185,7 +184,7 @@ mod tests {
         cloud.validate().expect("valid");
         let one = initial_cloud(&dataset, &views[..1], 1, 0, &mut rng);
         assert!(one.len() > 200 + 100, "a picture of 16 x 12 squares is mostly empty: {}", one.len());
-        // The second view stands where the first one did and finds nothing left to fill.
+        // The second view has the pose of the first one and finds nothing left to fill.
         assert!(cloud.len() - one.len() < 20, "{} {}", one.len(), cloud.len());
     }
 

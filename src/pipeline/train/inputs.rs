@@ -1,4 +1,4 @@
-//! Inputs of a training as they were when it began, so that others are noticed when it goes on.
+//! Inputs of a training run at its start, so that changes are detected when it is resumed.
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -11,19 +11,19 @@ use crate::io::{IoError, files, files::hex};
 use crate::math::format::{number, things};
 use crate::scene::{Camera, Dataset, Distortion, Photo};
 
-/// Differences of positions and rotations, relative, that are rounding of a text file.
+/// Relative difference of positions and rotations up to which it is rounding of a text file.
 const ROUNDING: f64 = 1e-9;
-/// Names that are told of each sort of change.
+/// Most names that are listed for each kind of change.
 const NAMED: usize = 3;
 
-/// Whether files are read through, or told apart by their sizes alone.
+/// Comparison of files: by contents or by size alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Compare {
     Contents,
     Sizes,
 }
 
-/// What a training reads: cameras, files and sparse points.
+/// Inputs of a training run: cameras, files and sparse points.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct TrainInputs {
     photos: Vec<PhotoInput>,
@@ -52,7 +52,7 @@ struct FileInput {
 }
 
 impl TrainInputs {
-    /// Of `dataset`. Reads every file where contents are compared.
+    /// Records the inputs in `dataset`. Reads every file if contents are compared.
     ///
     /// # Errors
     /// If a file cannot be read.
@@ -68,12 +68,12 @@ impl TrainInputs {
         Ok(Self { photos: photos?, points, points_sha256, background: dataset.background })
     }
 
-    /// One checksum of all.
+    /// Checksum of all inputs.
     pub(crate) fn digest(&self) -> String {
         hex(&Sha256::digest(serde_json::to_vec(self).unwrap_or_default()))
     }
 
-    /// Names of what is not as it was, one sentence part for each sort of change; nothing if all is.
+    /// Describes the changes, one phrase for each kind; empty if nothing changed.
     pub(crate) fn changes(&self, now: &Self) -> Vec<String> {
         let by_name =
             |all: &'_ Self| all.photos.iter().map(|p| (p.name.clone(), p.clone())).collect::<BTreeMap<_, _>>();
@@ -154,7 +154,7 @@ fn same_lens(before: &Camera, now: &Camera) -> bool {
         && near(before.principal_px, now.principal_px)
 }
 
-/// A number without needless zeros.
+/// Number without trailing zeros.
 fn amount(v: f64) -> String {
     let text = number(v);
     if text.contains('.') && !text.contains('e') {
@@ -164,7 +164,7 @@ fn amount(v: f64) -> String {
     }
 }
 
-/// The first few names.
+/// Joins the first few names.
 fn listed(names: &[String]) -> String {
     let more = if names.len() > NAMED { ", ..." } else { "" };
     format!("{}{more}", names[..names.len().min(NAMED)].join(", "))
@@ -177,7 +177,7 @@ mod tests {
     use super::*;
     use crate::scene::SparsePoint;
 
-    /// Three photos on disk, two points.
+    /// Dataset with three photos on disk and two points.
     fn dataset(folder: &Path) -> Dataset {
         let photo = |k: usize| {
             let path = folder.join(format!("{k}.png"));

@@ -1,7 +1,7 @@
-//! Training Gaussians from posed photos.
+//! Training of Gaussians from posed photos.
 //!
-//! [`run()`] is the whole job; [`trainer`] the state and its step; [`init`], [`schedule`] and
-//! [`density`] what the step consults; [`checkpoint`] what survives a kill.
+//! [`run()`] is the whole job; [`trainer`] holds the state and its step; [`init`], [`schedule`] and [`density`] serve
+//! the step; [`checkpoint`] stores the state on disk.
 
 pub(crate) mod border;
 pub(crate) mod budget;
@@ -32,13 +32,13 @@ pub(crate) use run::{run, run_on};
 
 use crate::scene::{Camera, PhotoPixels};
 
-/// A photo ready for comparison: undistorted, scaled, with its camera.
+/// Photo for training: undistorted, scaled, with its camera.
 #[derive(Clone, Debug)]
 pub struct TrainView {
-    /// The photo's name.
+    /// Name of the photo.
     pub name: String,
     /// Camera of the scaled picture.
     pub camera: Camera,
-    /// Its pixels, of the camera's size.
+    /// Pixels, of the camera's size.
     pub pixels: PhotoPixels,
 }

@@ -1,5 +1,5 @@
-//! Backward of the projection and Adam on the CPU, fused per Gaussian: gradients never reach memory, and Gaussians
-//! that were not drawn cost nothing.
+//! Backward pass of the projection and Adam on the CPU, fused per Gaussian: gradients never reach memory, and
+//! Gaussians that were not drawn cost nothing.
 
 use rayon::prelude::*;
 
@@ -10,14 +10,14 @@ use crate::scene::{Gaussian, GaussianCloud};
 /// Gaussians that one task updates.
 const BLOCK: usize = 512;
 
-/// What a step left out.
+/// Statistics of skipped updates in a step.
 #[derive(Clone, Copy, Default)]
 pub(super) struct StepStats {
     /// Gaussians whose gradient was not finite.
     pub(super) skipped: usize,
     /// The first of them.
     pub(super) first: Option<usize>,
-    /// Gradients that were cut as outliers.
+    /// Gradients that were clipped as outliers.
     pub(super) outliers: usize,
 }
 
@@ -37,13 +37,12 @@ pub(super) struct Update {
     pub(super) adam: AdamStep,
     pub(super) stride: usize,
     pub(super) active: usize,
-    /// Center of the camera relative to the cloud's origin, where Gaussians carry their normals as
-    /// extra channels.
+    /// Center of the camera relative to the cloud's origin, if Gaussians carry their normals as extra channels.
     pub(super) eye: Option<[f32; 3]>,
 }
 
 impl Update {
-    /// Moves the Gaussians that were drawn, and counts what density control asks for.
+    /// Updates the Gaussians that were drawn, and the statistics of density control.
     pub(super) fn apply(
         &self,
         renderer: &DifferentiableRenderer,
@@ -66,7 +65,7 @@ impl Update {
     }
 }
 
-/// The arrays of some consecutive Gaussians.
+/// Parameters of a block of consecutive Gaussians.
 struct Slices<'a> {
     positions: &'a mut [[f32; 3]],
     log_scales: &'a mut [[f32; 3]],
@@ -75,7 +74,7 @@ struct Slices<'a> {
     sh: &'a mut [[f32; 3]],
 }
 
-/// Everything that the update of some consecutive Gaussians touches.
+/// Data of the update of a block of consecutive Gaussians.
 struct Block<'a> {
     first: usize,
     p: Slices<'a>,
@@ -103,8 +102,8 @@ fn blocks(cloud: &mut GaussianCloud) -> impl Iterator<Item = Slices<'_>> {
         })
 }
 
-/// Updates numbers with their moments; how many gradients were outliers. A plain loop: closures are calls for a few
-/// numbers each, and then not in the vectors of the caller.
+/// Updates parameters with their moments and returns the number of outlier gradients. A plain loop: closures would be
+/// calls for a few numbers each, and would not be vectorized with the caller.
 #[inline(always)]
 fn update_all(adam: &AdamStep, [p, m, v]: [&mut [f32]; 3], g: &[f32], rate: f32) -> usize {
     let (p, m, v) = (&mut p[..g.len()], &mut m[..g.len()], &mut v[..g.len()]);
@@ -115,7 +114,7 @@ fn update_all(adam: &AdamStep, [p, m, v]: [&mut [f32]; 3], g: &[f32], rate: f32)
     outliers as usize
 }
 
-/// Updates a block and returns what it left out.
+/// Updates a block and returns its statistics.
 #[multiversion::multiversion(targets("x86_64+avx2+fma"))]
 fn step_block(renderer: &DifferentiableRenderer, block: &mut Block<'_>, update: &Update) -> StepStats {
     let Update { rates, adam, stride, active, eye } = update;
@@ -155,7 +154,7 @@ fn step_block(renderer: &DifferentiableRenderer, block: &mut Block<'_>, update: 
             + update_all(adam, scale, &g.log_scale, rates.log_scale)
             + update_all(adam, turn.map(<[f32; 4]>::as_mut_slice), &g.quaternion, rates.quaternion)
             + update_all(adam, opacity.map(std::slice::from_mut), &[g.opacity_logit], rates.opacity_logit);
-        // All SH coefficients in one loop, which then runs in vectors.
+        // All SH coefficients in one loop, so that it is vectorized.
         let mut d_sh = [0.0; 48];
         for (d, (k, c)) in d_sh.iter_mut().zip((0..*active).flat_map(|k| (0..3).map(move |c| (k, c)))) {
             *d = g.color[c] * g.basis[k];

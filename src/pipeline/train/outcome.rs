@@ -1,4 +1,4 @@
-//! How a training ends: with Gaussians, or with an error.
+//! Outcome of a training run: Gaussians, or an error.
 
 use std::sync::Arc;
 
@@ -27,13 +27,13 @@ pub(crate) struct TrainOutcome {
 }
 
 impl TrainOutcome {
-    /// Of a run that was asked to stop before its first step.
+    /// Outcome of a run that was stopped before its first step.
     pub(super) fn stopped_early() -> Self {
         Self { cloud: Arc::default(), evaluations: Vec::new(), end: TrainEnd::Cancelled, steps: 0, secs: 0.0 }
     }
 }
 
-/// Why a run failed.
+/// Reasons for which a run failed.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum TrainError {
@@ -52,7 +52,7 @@ pub enum TrainError {
     Save(IoError),
     #[error("the training diverged {0} times even with lowered rates; the photos' poses may be wrong")]
     Diverged(u32),
-    /// A stage left a number that is none; looked for under `debug-validation` only.
+    /// A stage left a value that is not finite; checked under `debug-validation` only.
     #[error(transparent)]
     NotFinite(#[from] NotFinite),
     #[error("{0}")]

@@ -1,4 +1,4 @@
-//! Photos ready for comparison: loaded, undistorted, scaled, without borders.
+//! Loading of training photos: undistorted, scaled, without borders.
 
 use std::borrow::Cow;
 
@@ -11,10 +11,10 @@ use crate::io::IoError;
 use crate::pipeline::observer::{Observer, Severity, Ticker};
 use crate::scene::Dataset;
 
-/// Names of photos that a warning gives.
+/// Most photo names in a warning.
 const NAMED: usize = 5;
 
-/// Says so where others are held out than the settings ask for, because the data set marks them.
+/// Reports that the data set's own held-out photos replace those of the settings.
 pub(super) fn tell_marks(dataset: &Dataset, config: &TrainConfig, observer: &mut dyn Observer) {
     let (marked, every) = (dataset.test_photos(), config.holdout_every);
     if marked > 0 && every > 0 && every != TrainConfig::default().holdout_every {
@@ -24,7 +24,7 @@ pub(super) fn tell_marks(dataset: &Dataset, config: &TrainConfig, observer: &mut
     }
 }
 
-/// Says what transparent pixels and masks are taken for.
+/// Reports the interpretation of transparent pixels and masks.
 pub(super) fn tell_of_pixels(dataset: &Dataset, config: &TrainConfig, observer: &mut dyn Observer) {
     for note in dataset.pixel_notes() {
         observer.note(Severity::Info, note);
@@ -35,8 +35,8 @@ pub(super) fn tell_of_pixels(dataset: &Dataset, config: &TrainConfig, observer: 
     }
 }
 
-/// The dataset with the color that the edges of nearly all photos have as its background, where it states none and has
-/// no points: made-up scenes are rendered like that. Fog of that color would else have to be trained around the thing.
+/// Returns the dataset with the common edge color of its photos as background, if it states none and has no points:
+/// synthetic scenes are rendered so. Otherwise training would build fog of that color around the object.
 pub(super) fn before_backdrop<'a>(
     dataset: &'a Dataset,
     views: &[TrainView],
@@ -51,7 +51,7 @@ pub(super) fn before_backdrop<'a>(
     Cow::Owned(Dataset { background, ..dataset.clone() })
 }
 
-/// The photos to train on, as [`load_views`] loads them; an error if none of them shows anything.
+/// Loads the training photos by [`load_views`]; an error if all are blank.
 pub(super) fn load_training(
     dataset: &Dataset,
     indices: &[usize],
@@ -67,8 +67,8 @@ pub(super) fn load_training(
     Ok(Some(views))
 }
 
-/// Loads and scales photos, several at a time; `None` if the observer cancels. Those that show nothing are left out,
-/// with a warning that names them.
+/// Loads and scales photos, several at a time; `None` if the observer cancels. Blank photos are left out, with a
+/// warning that names them.
 pub(crate) fn load_views(
     dataset: &Dataset,
     indices: &[usize],
@@ -77,6 +77,7 @@ pub(crate) fn load_views(
     observer: &mut dyn Observer,
 ) -> Result<Option<Vec<TrainView>>, TrainError> {
     let mut ticker = Ticker::new(stage, indices.len());
+    // Borders come from the training photos alone, also those of held-out photos.
     let (training, _) = dataset.split(config.holdout_every);
     let borders = Borders::of(dataset, &training, config.max_side_px).map_err(TrainError::Photo)?;
     if borders.share() > 0.0 {

@@ -1,4 +1,4 @@
-//! The whole job: photos in, a trained scene out, with progress, checkpoints and held-out scores.
+//! Training job: from photos to a trained scene, with progress, checkpoints and held-out scores.
 
 use std::collections::VecDeque;
 use std::path::Path;
@@ -25,20 +25,19 @@ use crate::pipeline::observer::{Evaluation, Observer, Severity, Ticker};
 use crate::render::Device;
 use crate::scene::{Dataset, GaussianCloud};
 
-/// Steps between copies of the cloud to roll back to.
+/// Training steps between copies of the cloud for a rollback.
 const SAFE_STEPS: u64 = 500;
-/// A loss this many times its running median means that the run diverges.
+/// Multiple of the running median from which a loss counts as divergence.
 const DIVERGED: f64 = 10.0;
-/// How often a run may diverge before it gives up.
+/// Most rollbacks of a run before it fails.
 const MAX_ROLLBACKS: u32 = 4;
 
-/// Trains on `dataset` and saves into the folder `out`, if given. A checkpoint of the same run in
-/// that folder is continued; where that run is finished, nothing is done. Objects and parts that the
-/// scene there has are carried over, and kept as they were beside it. Blocks until done; all contact
-/// is through `observer`.
+/// Trains on `dataset` and saves into the folder `out`, if given. A checkpoint of the same run in that folder is
+/// resumed; a finished run is returned as it is. Objects and parts of the scene there are transferred, and the earlier
+/// scene is kept beside it. Blocks until done; all interaction is through `observer`.
 ///
 /// # Errors
-/// See [`TrainError`]. A checkpoint that cannot be saved on the way ends nothing; at the end it does.
+/// See [`TrainError`]. A checkpoint that cannot be saved during training is a warning; at the end it is an error.
 pub(crate) fn run(
     dataset: &Dataset,
     config: &TrainConfig,
@@ -48,7 +47,7 @@ pub(crate) fn run(
     run_on(dataset, config, out, FolderUse::default(), observer)
 }
 
-/// The same, with what may be done with the folder.
+/// Trains as [`run`] does, with permissions for the folder.
 pub(crate) fn run_on(
     dataset: &Dataset,
     config: &TrainConfig,
@@ -104,26 +103,26 @@ struct Job<'a> {
     scene: Option<SceneFolder>,
     info: SceneInfo,
     photos: Vec<String>,
-    /// What is trained on, for who goes on.
+    /// Training inputs, for a later resume.
     inputs: Option<TrainInputs>,
-    /// Whether the folder is made again where it goes away.
+    /// True if the folder is made again when it vanishes.
     remake: bool,
     views: Vec<TrainView>,
-    /// The same at half their size, while those are trained on.
+    /// Half-size views, during the steps that use them.
     coarse: Option<Vec<TrainView>>,
     tests: Vec<TrainView>,
     device: Option<Device>,
     trainer: Trainer,
     secs: f64,
     history: History,
-    /// What was measured since the last row of it.
+    /// Measurements since the last row of `history`.
     unreported: StepWindow,
     safe: GaussianCloud,
     rollbacks: u32,
     recent: VecDeque<f64>,
-    /// Gradients cut since that was last told.
+    /// Gradients clipped since the last report of them.
     outliers: u64,
-    /// Whether the last checkpoint could not be saved.
+    /// True if the last checkpoint could not be saved.
     unsaved: bool,
 }
 
@@ -139,7 +138,7 @@ impl<'a> Job<'a> {
         let (extent, background) = (dataset.camera_extent().1, dataset.background.unwrap_or([0.0; 3]));
         let mut rng = Pcg64Mcg::seed_from_u64(config.seed);
         let (mut secs, mut history, mut unreported) = (0.0, History::default(), StepWindow::default());
-        // What was seen in full is not seen coarsely again, where more steps make those for that more.
+        // More steps mean more coarse steps; a run that already trained at full size does not go back.
         let was_coarse = saved.as_ref().is_none_or(|s| s.header.step < coarse::steps(&s.header.config));
         let mut trainer = match saved {
             Some(s) => {
@@ -238,7 +237,7 @@ impl<'a> Job<'a> {
             let due = self.config.checkpoint_secs;
             if due > 0.0 && saved_at.elapsed().as_secs_f64() >= due {
                 match self.checkpoint(observer) {
-                    // A full disk now is no reason to lose what is in memory.
+                    // A full disk must not end the run: its state in memory would be lost.
                     Err(TrainError::Save(e)) if !std::mem::replace(&mut self.unsaved, true) => {
                         observer.note(Severity::Warning, format!("Checkpoint not saved, training continues: {e}"));
                     }
@@ -255,7 +254,7 @@ impl<'a> Job<'a> {
         Ok(TrainEnd::Finished)
     }
 
-    /// One step with its guard against divergence, and density control.
+    /// Runs one training step with its guard against divergence, and density control.
     fn step(&mut self, observer: &mut dyn Observer) -> Result<Vec<StepResult>, TrainError> {
         if self.coarse.is_some() && self.trainer.step >= coarse::steps(self.config) {
             self.coarse = None;
@@ -299,7 +298,7 @@ impl<'a> Job<'a> {
         }
     }
 
-    /// Whether this loss is not finite or far above what losses were recently.
+    /// Returns whether this loss is not finite or far above the recent losses.
     fn diverges(&mut self, loss: f64) -> bool {
         self.recent.push_back(loss);
         if self.recent.len() > 200 {
@@ -374,7 +373,7 @@ impl<'a> Job<'a> {
         self.trainer.fetch_cloud()?;
         let checkpoint = self.checkpoint(observer);
         let scored = self.history.evaluations.last().is_some_and(|e| e.step == self.trainer.step);
-        // What fails here is told when the scene is saved.
+        // An error of the evaluation is returned after the scene is saved.
         let evaluated = if end == TrainEnd::Finished && !scored { self.evaluate(observer) } else { Ok(()) };
         if let Some(scene) = &self.scene {
             self.info.history = self.history.clone();

@@ -1,14 +1,14 @@
 //! Learning rates and milestones of a run, scaled to its number of steps.
 //!
-//! 3DGS's values are made for 30,000 steps; a run of `n` steps goes through the same phases.
+//! The values of 3DGS are for 30,000 steps; a run of `n` steps goes through the same phases.
 
 use super::TrainConfig;
 use crate::render::{AdamStep, Rates};
 
-/// Steps that 3DGS's milestones are written for.
+/// Number of steps of 3DGS's milestones.
 const REFERENCE_STEPS: f64 = 30_000.0;
 
-/// When what happens.
+/// Learning rates and milestones of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Schedule {
     steps: u64,
@@ -16,7 +16,7 @@ pub struct Schedule {
     extent: f64,
     /// Factor on every rate, lowered after a divergence.
     pub damping: f64,
-    /// Steps between openings of SH bands; 0 = all are open.
+    /// Steps between activations of SH bands; 0 = all are active.
     pub(crate) sh_interval: u64,
     /// First step at which Gaussians may be added.
     pub(crate) densify_from: u64,
@@ -27,7 +27,7 @@ pub struct Schedule {
 }
 
 impl Schedule {
-    /// The schedule of a run in a scene of this extent (see `Dataset::camera_extent`).
+    /// Schedule of a run in a scene of this extent (see `Dataset::camera_extent`).
     pub(crate) fn new(config: &TrainConfig, extent: f64) -> Self {
         let n = config.steps as f64;
         let scaled = |reference: f64| (reference * n / REFERENCE_STEPS).round() as u64;
@@ -56,7 +56,7 @@ impl Schedule {
             quaternion: rate(1e-3),
             opacity_logit: rate(5e-2),
             sh_constant: rate(2.5e-3),
-            // 3DGS has a twentieth, with which short runs hardly learn them (docs/measured.md).
+            // 3DGS divides by 20, with which short runs hardly learn them (docs/measured.md).
             sh_rest: rate(2.5e-3 / 8.0),
         }
     }
@@ -66,18 +66,18 @@ impl Schedule {
         step.checked_div(self.sh_interval).map_or(self.sh_degree, |open| open.min(u64::from(self.sh_degree)) as u8)
     }
 
-    /// Whether Gaussians are added and removed after `done` steps.
+    /// Returns whether Gaussians are added and removed after `done` steps.
     pub(crate) fn densifies(&self, done: u64) -> bool {
         done >= self.densify_from && done <= self.densify_until && done % self.densify_interval == 0
     }
 
-    /// Rounds of density control that are left after `done` steps, with the one then.
+    /// Rounds of density control left after `done` steps, including the present one.
     pub(crate) fn rounds_left(&self, done: u64) -> u64 {
         self.densify_until.saturating_sub(done) / self.densify_interval + 1
     }
 
-    /// Whether opacities are reset after `done` steps. Never near the end of density control, so
-    /// that what the reset hides can come back or be removed.
+    /// Returns whether opacities are reset after `done` steps. Never near the end of density control, so that Gaussians
+    /// can recover or be removed after a reset.
     pub(crate) fn resets(&self, done: u64) -> bool {
         done > 0 && done % self.reset_interval == 0 && done + self.densify_interval * 5 <= self.densify_until
     }

@@ -1,9 +1,9 @@
-//! Where Gaussians start in scenes without sparse points: places that photos agree on.
+//! Initial points for scenes without sparse points, by a plane sweep.
 //!
-//! Along the ray of a pixel many depths are tried (a plane sweep). A depth at which a photo shows nothing, because it is
-//! transparent there or has the background's color, is out: what is left lies in the hull of what was photographed. Of
-//! the others the one counts at which neighboring photos have the colors of this one. Points strewn along rays without
-//! that become fog before a light background, which looks right in the few photos that see through it, and stays.
+//! Many depths are tried along the ray of a pixel. A depth is rejected if photos show background there, because they
+//! are transparent or have the background's color: the rest lies in the visual hull. Of the remaining depths, the one
+//! is taken at which neighboring photos have the same colors. Points at random depths would become fog before a light
+//! background, which looks right in the few photos that see through it, and stays.
 
 use glam::{DVec2, DVec3};
 use rand::{RngExt, SeedableRng};
@@ -18,24 +18,24 @@ use crate::scene::SparsePoint;
 /// Depths tried along a ray, from the distance of the focus divided by `REACH` to that times `REACH`, by equal factors.
 const DEPTHS: usize = 96;
 const REACH: f64 = 4.0;
-/// Views that are asked whether a place is empty.
+/// Most views in the test for empty space.
 const ASKED: usize = 40;
-/// Share of the views that show a place which may show nothing there: silhouettes are not exact.
+/// Share of the views of a point that may show background there: silhouettes are not exact.
 const MAY_MISS: f64 = 0.06;
-/// Share of the asked views that must show a place of a thing that was cut out, or two of them.
+/// Share of the tested views that must show a point of a cut-out object; at least two views.
 const SEEN: f64 = 0.25;
-/// Places that are compared around a pixel, px.
+/// Offsets that are compared around a pixel, px.
 const AROUND: [[f64; 2]; 5] = [[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0], [0.0, 1.0], [0.0, -1.0]];
-/// Mean difference of colors, of 1, up to which photos agree.
+/// Largest mean color difference (0 to 1) at which photos agree.
 const AGREES: f32 = 0.06;
-/// Depths nearly as good as the best, by the mean difference: which of them is right cannot be told.
+/// Margin of the mean difference within which depths are as good as the best.
 const AS_GOOD: f32 = 0.012;
-/// Rays that are tried for each point that is wanted.
+/// Rays that are tried for each requested point.
 const TRIES: usize = 4;
 /// Points that one task makes.
 const BLOCK: usize = 250;
 
-/// At most `n` points in the colors of the photos. `background` is what is behind everything, if that is known.
+/// Returns at most `n` points in the colors of the photos. `background` is the background color, if known.
 pub(super) fn points(
     focus: DVec3,
     views: &[&TrainView],
@@ -62,9 +62,9 @@ struct Sweep<'a> {
     views: &'a [SmallView],
     neighbors: Vec<Vec<ViewPair>>,
     focus: DVec3,
-    /// View and pixel of everything that is shown.
+    /// View and index of every pixel that is not background.
     pixels: Vec<(u32, u32)>,
-    /// Whether some photo shows a background.
+    /// True if some photo shows background.
     carves: bool,
 }
 
@@ -83,7 +83,7 @@ impl<'a> Sweep<'a> {
         }
     }
 
-    /// So many points, or fewer if most rays have none.
+    /// Returns `n` points, or fewer if most rays have none.
     fn some(&self, n: usize, rng: &mut Pcg64Mcg) -> Vec<SparsePoint> {
         let tries = (0..n * TRIES).filter_map(|_| {
             let (view, pixel) = self.pixels[rng.random_range(0..self.pixels.len())];
@@ -92,7 +92,7 @@ impl<'a> Sweep<'a> {
         tries.take(n).collect()
     }
 
-    /// A point along the ray of a pixel.
+    /// Finds a point along the ray of a pixel.
     fn point(&self, v: usize, pixel: usize, rng: &mut Pcg64Mcg) -> Option<SparsePoint> {
         let view = &self.views[v];
         let place = view.place(pixel);
@@ -116,13 +116,13 @@ impl<'a> Sweep<'a> {
         Some(SparsePoint { position: at(k), rgb })
     }
 
-    /// The ray of a place in a picture, in camera axes with depth 1.
+    /// Ray of an image position, in camera axes with depth 1.
     fn camera_ray(&self, v: usize, place: DVec2) -> DVec3 {
         let camera = &self.views[v].camera;
         ((place - camera.principal_px) / camera.focal_px).extend(1.0)
     }
 
-    /// Whether something can be at a place: nearly all photos that see it show something there.
+    /// Returns whether a point may be occupied: nearly all photos that see it show foreground there.
     fn may_be(&self, point: DVec3) -> bool {
         let step = self.views.len().div_ceil(ASKED).max(1);
         let asked = self.views.len().div_ceil(step);
@@ -135,7 +135,7 @@ impl<'a> Sweep<'a> {
         seen as f64 >= enough && nothing as f64 <= MAY_MISS * seen as f64
     }
 
-    /// Mean difference of colors in the better half of the neighboring photos; `None` where too few see the place.
+    /// Mean color difference in the better half of the neighboring photos; `None` if too few see the point.
     fn disagreement(&self, v: usize, rays: &[DVec3; 5], colors: &[Option<[f32; 3]>; 5], depth: f64) -> Option<f32> {
         let pairs = &self.neighbors[v];
         let mut of_views: Vec<f64> = Vec::with_capacity(pairs.len());

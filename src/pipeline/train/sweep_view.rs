@@ -1,4 +1,4 @@
-//! The small pictures that a plane sweep compares, and where they show nothing.
+//! Small pictures for the plane sweep, with their background pixels.
 
 use glam::{DMat3, DVec2, DVec3};
 
@@ -7,30 +7,30 @@ use crate::io::photo;
 use crate::math::stats::median;
 use crate::scene::Camera;
 
-/// Pictures are halved until they are no larger than this, px.
+/// Largest side of the small pictures, px; photos are halved until they fit.
 const SIDE_PX: u32 = 200;
-/// Alpha or coverage of 255 under which a pixel shows nothing, or nothing that is known.
+/// Alpha (of 255) below which a pixel is background, and coverage (of 255) below which it is unknown.
 const LEAST: u8 = 6;
-/// Distance of 255 up to which a pixel has the color of the background.
+/// Largest difference (of 255) to the background color at which a pixel is background.
 const LIKE_BACKGROUND: u8 = 4;
-/// Photos of which so much of the edge has one color stand before a backdrop of that color.
+/// Share of the edge pixels with one color from which that color is the backdrop.
 const BACKDROP_SHARE: f64 = 0.8;
 /// Views that each view is compared with.
 const NEIGHBORS: usize = 6;
 /// Best angle between two views of a point, and the range of useful ones, degrees.
 const ANGLES: [f64; 3] = [3.0, 12.0, 50.0];
 
-/// What a pixel of a photo shows.
+/// Content of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Shows {
     Something,
-    /// The background: nothing is along its ray.
+    /// Background: its ray meets no surface.
     Nothing,
-    /// The photo does not say.
+    /// Not covered by the photo.
     Unknown,
 }
 
-/// A photo at a small size.
+/// Photo at a small size.
 pub(super) struct SmallView {
     pub(super) camera: Camera,
     width: usize,
@@ -64,19 +64,19 @@ impl SmallView {
         }
     }
 
-    /// The pixel at a place of the picture.
+    /// Index of the pixel at an image position; `None` outside.
     pub(super) fn pixel(&self, at: DVec2) -> Option<usize> {
-        // Written so that NaN is outside.
+        // These comparisons put NaN outside.
         let inside = at.x >= 0.0 && at.y >= 0.0 && at.x < self.width as f64 && at.y < self.height as f64;
         inside.then(|| at.y as usize * self.width + at.x as usize)
     }
 
-    /// The middle of a pixel.
+    /// Center of a pixel.
     pub(super) fn place(&self, pixel: usize) -> DVec2 {
         DVec2::new((pixel % self.width) as f64 + 0.5, (pixel / self.width) as f64 + 0.5)
     }
 
-    /// What is at a point of the world in this picture; `None` beyond its edges.
+    /// Content of the pixel at a world point; `None` outside the picture.
     pub(super) fn at(&self, point: DVec3) -> Option<Shows> {
         self.camera.project(point).and_then(|p| self.pixel(p)).map(|i| self.shows[i])
     }
@@ -86,7 +86,7 @@ fn alike(a: &[u8; 3], b: &[u8; 3]) -> bool {
     a.iter().zip(b).all(|(a, b)| a.abs_diff(*b) <= LIKE_BACKGROUND)
 }
 
-/// The color that the edges of nearly all photos have: that of a backdrop, which no photo states.
+/// Color of an undeclared backdrop: that of nearly all edge pixels of the photos.
 pub(super) fn common_backdrop(views: &[TrainView]) -> Option<[u8; 3]> {
     let edge = |view: &TrainView| -> Vec<[u8; 3]> {
         let (w, h) = (view.pixels.width_px as usize, view.pixels.height_px as usize);
@@ -101,7 +101,7 @@ pub(super) fn common_backdrop(views: &[TrainView]) -> Option<[u8; 3]> {
     (!edges.is_empty() && same as f64 >= BACKDROP_SHARE * edges.len() as f64).then_some(middle)
 }
 
-/// From the rays of one view to the pixels of another.
+/// Map from the rays of one view to the pixels of another.
 pub(super) struct ViewPair {
     /// The other view.
     pub(super) other: usize,
@@ -118,14 +118,14 @@ impl ViewPair {
         Self { other, turn: lens * into * from.world_from_camera, shift: lens * (into * (from.center - to.center)) }
     }
 
-    /// Where the point at `depth` along a ray, in camera axes with depth 1, lies in the other picture.
+    /// Projects the point at `depth` along a ray, in camera axes with depth 1, into the other picture.
     pub(super) fn place(&self, ray: DVec3, depth: f64) -> Option<DVec2> {
         let q = self.turn * ray * depth + self.shift;
         (q.z > 0.0).then(|| DVec2::new(q.x, q.y) / q.z)
     }
 }
 
-/// The views that show what each view shows, from a little beside it.
+/// Neighboring views of each view, at a useful angle to it as seen from the focus.
 pub(super) fn neighbors(views: &[SmallView], focus: DVec3) -> Vec<Vec<ViewPair>> {
     let [least, best, most] = ANGLES;
     let toward: Vec<DVec3> = views.iter().map(|v| (v.camera.center - focus).normalize_or_zero()).collect();

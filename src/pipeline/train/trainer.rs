@@ -1,5 +1,4 @@
-//! The state of a run and its single step: draw, compare, go back, move; on the CPU, or handed to
-//! a device.
+//! State of a run and its training step: render, loss, backward pass, update; on the CPU or on a device.
 
 use rand::seq::SliceRandom;
 use rand::{RngExt, SeedableRng};
@@ -24,7 +23,7 @@ use crate::scene::{Camera, GaussianCloud};
 /// Steps between measurements that are reported.
 pub(crate) const REPORT_STEPS: u64 = 10;
 
-/// Why a step failed.
+/// Reasons for which a step failed.
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum StepError {
@@ -32,35 +31,34 @@ pub enum StepError {
     Render(#[from] RenderError),
     #[error(transparent)]
     Gpu(#[from] GpuError),
-    /// A stage left a number that is none; looked for under `debug-validation` only.
+    /// A stage left a value that is not finite; checked under `debug-validation` only.
     #[error(transparent)]
     NotFinite(#[from] NotFinite),
 }
 
-/// Everything that a step reads and writes. Deterministic on the CPU: the same state and photos
-/// give the same next state, whatever the number of threads.
+/// State of a training run. Deterministic on the CPU: the same state and photos give the same next state, whatever
+/// the number of threads.
 pub struct Trainer {
-    /// The Gaussians. While a GPU trains, `cloud`, `moments` and `stats` are those of the last
-    /// [`Self::fetch`].
+    /// The Gaussians. While a GPU trains, `cloud`, `moments` and `stats` are those of the last [`Self::fetch`].
     pub cloud: GaussianCloud,
-    /// Adam's first and second moments, laid out like the cloud.
+    /// First and second moments of Adam, laid out like the cloud.
     pub moments: [GaussianCloud; 2],
-    /// Input of density control.
+    /// Statistics for density control.
     pub(crate) stats: DensityStats,
     /// Rates and milestones.
     pub schedule: Schedule,
-    /// Source of all randomness.
+    /// Random number generator.
     pub(crate) rng: Pcg64Mcg,
     /// Photos left in this round, in reverse order.
     pub(crate) round: Vec<u32>,
-    /// Steps done.
+    /// Number of steps done.
     pub step: u64,
     pub(crate) budget: usize,
     settings: RenderSettings,
-    /// Seed of a color behind everything for each step.
+    /// Seed of the background color of each step.
     seed: u64,
-    /// Whether the photos do not say what is behind everything, so that each step has a color of its own. What is black
-    /// in them would else stay empty, as nothing looks the same.
+    /// True if the background of the photos is unknown, so that each step has a random one. Otherwise black regions
+    /// would stay empty, because empty space looks the same.
     unknown_backdrop: bool,
     densify: bool,
     renderer: DifferentiableRenderer,
@@ -71,7 +69,7 @@ pub struct Trainer {
 }
 
 impl Trainer {
-    /// A run's first state.
+    /// Initial state of a run.
     pub fn new(cloud: GaussianCloud, config: &TrainConfig, background: [f32; 3], extent: f64, rng: Pcg64Mcg) -> Self {
         let zero = zeros_like(&cloud);
         Self {
@@ -95,13 +93,13 @@ impl Trainer {
         }
     }
 
-    /// Trains in front of another color in every step, the same for a seed and a step.
+    /// Switches to a random background color in each step, determined by the seed and the step.
     pub(crate) fn before_random_colors(&mut self) {
         self.unknown_backdrop = true;
     }
 
-    /// The color behind everything in this step, and what that changes where the photo is transparent. In front of one
-    /// color alone, fog of that color would look like nothing.
+    /// Background color of this step, and its difference to the stored one for a photo with transparency. With one
+    /// color alone, fog of that color would be invisible.
     fn backdrop(&self, view: &TrainView) -> ([f32; 3], [f32; 3]) {
         let usual = self.settings.background;
         let cut_out = view.pixels.alpha.is_some();
@@ -118,7 +116,7 @@ impl Trainer {
         Ok(())
     }
 
-    /// Brings cloud, moments and statistics up to date, where a GPU has them.
+    /// Copies cloud, moments and statistics from the GPU, if one trains.
     pub(crate) fn fetch(&mut self) -> Result<(), GpuError> {
         if let Some(device) = &self.device {
             (self.cloud, self.moments, self.stats) = device.download()?;
@@ -126,7 +124,7 @@ impl Trainer {
         Ok(())
     }
 
-    /// Brings the cloud up to date, where a GPU has it.
+    /// Copies the cloud from the GPU, if one trains.
     pub(crate) fn fetch_cloud(&mut self) -> Result<(), GpuError> {
         if let Some(device) = &self.device {
             self.cloud = GaussianCloud { render_mode: self.cloud.render_mode, ..device.cloud()? };
@@ -141,12 +139,12 @@ impl Trainer {
         }
     }
 
-    /// How the cloud is meant to be drawn.
+    /// Settings for rendering the cloud.
     pub(crate) fn render_settings(&self) -> RenderSettings {
         RenderSettings { sh_degree: self.cloud.sh_degree, ..self.settings.clone() }
     }
 
-    /// A view of the Gaussians as they are, by what trains them; by the CPU where a GPU has no room for it.
+    /// Renders the present Gaussians on the training device, or on the CPU if the GPU fails to.
     pub(crate) fn draw(&mut self, camera: &Camera) -> Result<Frame<f32>, StepError> {
         let settings = self.render_settings();
         if let Some(device) = &mut self.device {
@@ -158,9 +156,8 @@ impl Trainer {
         Ok(self.renderer.render(&self.cloud, Features::NONE, camera, &settings)?)
     }
 
-    /// One step on the next photo of the round. Returns what is known by now and was not returned
-    /// before: of this step on the CPU; on a GPU of none, or, every `REPORT_STEPS` steps, of
-    /// those since.
+    /// Runs one step on the next photo of the round. Returns new results: of this step on the CPU; on a GPU none, or,
+    /// every `REPORT_STEPS` steps, those since the last ones.
     pub fn advance(&mut self, views: &[TrainView]) -> Result<Vec<StepResult>, StepError> {
         if self.round.is_empty() {
             self.round = (0..views.len() as u32).collect();
@@ -201,7 +198,7 @@ impl Trainer {
         Ok(vec![StepResult { loss: parts.total(LAMBDA), psnr: psnr_of(parts.mse), skipped, outliers }])
     }
 
-    /// Density control and opacity reset where they are due. Returns what was done.
+    /// Runs density control and the opacity reset when due. Returns a report.
     pub(crate) fn control_density(&mut self) -> Result<Option<DensityReport>, StepError> {
         let (densifies, resets) = (self.schedule.densifies(self.step), self.schedule.resets(self.step));
         if !self.densify || !(densifies || resets) {
@@ -223,7 +220,7 @@ impl Trainer {
         Ok(report)
     }
 
-    /// Under `debug-validation`: whether cloud and moments are finite after a stage.
+    /// Checks that cloud and moments are finite after a stage, under `debug-validation`.
     fn check(&self, stage: &'static str) -> Result<(), NotFinite> {
         if CHECKED {
             validate::cloud(stage, &self.cloud)?;
@@ -232,7 +229,7 @@ impl Trainer {
         Ok(())
     }
 
-    /// Replaces the cloud by an earlier one and forgets the moments; rates are halved.
+    /// Replaces the cloud with an earlier one, clears the moments and halves the learning rates.
     pub(crate) fn roll_back(&mut self, cloud: GaussianCloud) -> Result<(), GpuError> {
         let zero = zeros_like(&cloud);
         self.stats = DensityStats::new(cloud.len());
@@ -242,7 +239,8 @@ impl Trainer {
         self.send()
     }
 
-    /// Fills the picture gradient and returns the loss, with the photo in front of another color than it is stored with.
+    /// Fills the image gradient and returns the loss. `shift` changes the background color of a photo with
+    /// transparency.
     fn compare(&mut self, mut rendered: [Vec<f32>; 3], view: &TrainView, shift: [f32; 3]) -> LossParts {
         let target = metrics::planes_before::<f32>(&view.pixels, shift);
         let coverage = view.pixels.coverage.as_deref();
@@ -281,7 +279,7 @@ impl Trainer {
     }
 }
 
-/// A cloud of the same shape with every parameter zero.
+/// Cloud of the same shape with every parameter zero.
 fn zeros_like(cloud: &GaussianCloud) -> GaussianCloud {
     GaussianCloud {
         origin: cloud.origin,

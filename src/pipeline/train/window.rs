@@ -1,5 +1,5 @@
-//! Measurements between two reports of a training. A checkpoint keeps those that were not reported yet, so that the next
-//! report is of as many steps as any.
+//! Measurements between two training reports. A checkpoint keeps the unreported ones, so that every report covers
+//! equally many steps.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use crate::pipeline::observer::StepMetrics;
 /// Losses and PSNRs since the last report.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StepWindow {
-    /// Those that are no finite numbers, which JSON does not have, are `None`.
+    /// Losses; `None` for values that are not finite, which JSON lacks.
     losses: Vec<Option<f64>>,
     psnrs: Vec<f64>,
 }
@@ -22,7 +22,7 @@ impl StepWindow {
         }
     }
 
-    /// The report after `step`: means of what was measured since the last one.
+    /// Report after `step`: means of the measurements since the last one.
     pub(super) fn metrics(&self, step: u64, secs: f64, gaussians: usize) -> StepMetrics {
         let losses: Vec<f64> = self.losses.iter().map(|loss| loss.unwrap_or(f64::NAN)).collect();
         StepMetrics { step, secs, loss: mean(&losses), train_psnr: mean(&self.psnrs), gaussians }
@@ -48,7 +48,7 @@ mod tests {
         assert_eq!(added(half, 4..10).metrics(10, 1.0, 7), through);
         // The control: without the first half it is another report.
         assert!(added(StepWindow::default(), 4..10).metrics(10, 1.0, 7) != through);
-        // A loss that is none stays none, and makes no checkpoint unreadable.
+        // A loss that is not finite stays so, and the checkpoint stays readable.
         let mut broken = StepWindow::default();
         broken.add(f64::INFINITY, f64::NAN);
         assert!(stored(&broken) == broken && broken.metrics(1, 0.0, 1).loss.is_nan());

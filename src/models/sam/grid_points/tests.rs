@@ -1,4 +1,4 @@
-//! A network that knows what is there: things within things, each point answered with those that it lies in.
+//! Simulated network over nested rectangles: each point prompt returns the rectangles that contain it.
 
 use crate::models::ModelError;
 use crate::models::preprocess::FitSide;
@@ -11,7 +11,7 @@ use crate::scene::{Mask, PhotoPixels};
 const SIDE: usize = 256;
 const LOW: usize = SIDE / 4;
 
-/// Things by left, top, right and bottom px, each within those before it that it lies in.
+/// Rectangles by left, top, right and bottom px; outer ones come before inner ones.
 struct Knowing {
     things: Vec<[usize; 4]>,
     asked: usize,
@@ -59,7 +59,7 @@ impl PromptedMasks for Knowing {
     }
 }
 
-/// The masks of everything there, and the points that were asked.
+/// Masks of everything, and the number of points that were prompted.
 fn found(things: &[[usize; 4]], sparing: bool) -> (Vec<Mask>, usize) {
     let mut network = Knowing { things: things.to_vec(), asked: 0 };
     let rgb = vec![[0; 3]; SIDE * SIDE];
@@ -71,7 +71,7 @@ fn found(things: &[[usize; 4]], sparing: bool) -> (Vec<Mask>, usize) {
     (masks, network.asked)
 }
 
-/// A table with things on it, which have parts, of which some have parts of their own.
+/// Table with objects on it, their parts, and parts of these.
 const THINGS: [[usize; 4]; 8] = [
     [12, 20, 240, 244],
     [32, 40, 128, 152],
@@ -94,7 +94,7 @@ fn what_is_larger_than_two_steps_of_the_grid_is_found_with_fewer_points() {
 
 #[test]
 fn what_is_smaller_than_two_steps_may_be_missed_amid_something_else() {
-    // Between the points that are asked first, amid the table.
+    // Between the points that are prompted first, in the middle of the table.
     let mut things = THINGS.to_vec();
     things.push([136, 216, 148, 228]);
     let ((all, _), (sparing, _)) = (found(&things, false), found(&things, true));

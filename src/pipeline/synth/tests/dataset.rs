@@ -1,5 +1,4 @@
-//! The data set that is written: complete, the same for a seed, what its reader gets back, and none at all where
-//! something is wrong.
+//! Written data sets: complete, reproducible for a seed, readable again, and none at all after an error.
 
 use super::*;
 

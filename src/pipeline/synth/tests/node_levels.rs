@@ -1,4 +1,4 @@
-//! Objects and parts from trees of nodes.
+//! Objects and parts of node trees.
 
 use super::*;
 
