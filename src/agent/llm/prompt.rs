@@ -16,11 +16,12 @@ const LONGEST_TALK: usize = 80_000;
 const LONGEST_NAME: usize = 80;
 
 /// Statement of the data that is sent to a chat model, shown to the user. docs/guide.md says the same.
-pub const SENT: &str = "Sent to the chat model: what you write; of the scene's objects and parts their numbers, names, \
-    wholes, and whether they are hidden or in view, which of them was spoken of last, and whether the length of a meter \
-    is known; what came of each step, with the sizes and distances that were asked for; the conversation so far; \
-    the tools that the policy permits; the model's name. Not sent: images, Gaussians, cameras, paths and names of files, \
-    why something failed on this machine. The key goes into one header of the request and nowhere else.";
+pub const SENT: &str = "Sent to the chat model: what you write, the conversation so far, the model's name, and \
+    the tools that the policy permits. Of the scene's objects and parts it gets their numbers, names, wholes, \
+    and whether they are hidden or in view. It also learns which of them was spoken of last, and whether the \
+    length of a meter is known. Of each step it gets the outcome, with the sizes and distances that were asked \
+    for. Not sent: images, Gaussians, cameras, paths and names of files, why something failed on this machine. \
+    The key goes into one header of the request and nowhere else.";
 
 pub(crate) const TASK: &str = "You help a person look around in a 3D scene in a viewer, by calling the tools. Rules: \
     Call tools for everything you do; never claim to have done what no tool result confirms. \
