@@ -1,5 +1,8 @@
 //! Downloads of model files: resumed, checked, cancellable. Nothing is fetched that nobody has
 //! asked for.
+//!
+//! No more is read than the size in a description, else [`FileToFetch::most`]: 16 MiB for a description itself, a
+//! tenth more than the list says for a checkpoint.
 
 mod answer;
 

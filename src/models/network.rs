@@ -1,4 +1,6 @@
 //! A network: named arrays in, named arrays out.
+//!
+//! An output with a number that is not finite is an error.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

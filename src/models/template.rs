@@ -3,6 +3,8 @@
 //! `tools/export/template.py` makes one: an archive of graphs and of `template.json`, which says which tensor each
 //! weight is. Messages of protocol buffers merge when they stand one after another, so a filled graph is its
 //! template followed by the weights, and no graph has to be understood here.
+//!
+//! A model is made of a checkpoint whole or not at all.
 
 #[cfg(test)]
 mod mask_tests;

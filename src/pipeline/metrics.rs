@@ -1,4 +1,6 @@
 //! How close a picture is to a photo.
+//!
+//! PSNR is measured here only.
 
 use crate::math::Real;
 use crate::math::resize::nearest;

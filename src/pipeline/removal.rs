@@ -9,6 +9,8 @@
 //!
 //! The shadow of the thing on a flat surface is lifted, as far as what blocks the light explains it ([`shade`]). Other
 //! shadows of it, reflections, and light that it throws back are part of what the photos show, and stay.
+//!
+//! New Gaussians are marked as invented in the cloud. The scene from which a thing is removed is never written to.
 
 mod close;
 mod extent;

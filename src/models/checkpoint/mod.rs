@@ -2,6 +2,9 @@
 //!
 //! There are crates for this. `pytorch-reader` (Burn's) is sound, but it reads no TorchScript archive, and passes
 //! over names that it does not know, where this program is to refuse them; hence `pickle`.
+//!
+//! A checkpoint is data: opcodes and names that tensors do not need are refused by name. Sizes are compared with the
+//! file before memory is allocated.
 
 mod parts;
 mod pickle;

@@ -2,6 +2,8 @@
 //!
 //! [`run()`] is the whole job; [`trainer`] the state and its step; [`init`], [`schedule`] and
 //! [`density`] what the step consults; [`checkpoint`] what survives a kill.
+//!
+//! On the CPU a seed determines the result, and a resumed run ends where an uninterrupted one does.
 
 pub(crate) mod border;
 pub(crate) mod budget;
