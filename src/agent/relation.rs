@@ -1,5 +1,7 @@
 //! Spatial relations between things, judged from their bounding boxes: left of, on, under, near. Pure geometry, in
 //! the frame of the current view and of the up direction of the scene.
+//!
+//! The size of a thing is that of its own upright box, whatever the view.
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};

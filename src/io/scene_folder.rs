@@ -2,6 +2,8 @@
 //!
 //! The files of a scene that belong together carry the id of the save that wrote them: `scene.json`
 //! as `state`, `point_cloud.ply` in a comment, `semantic_map.safetensors` in its header.
+//!
+//! A replaced scene that has objects and parts is kept in `earlier/`.
 
 use std::fs;
 use std::io::{self, Write};

@@ -1,4 +1,6 @@
 //! The demo: the trained scene that ships with the program, its recipe, and the photos to train it anew.
+//!
+//! `assets/demo/demo.zip` is what the recipe makes, and the recipe always makes the same (`demo/tests.rs`).
 
 use std::io::Cursor;
 use std::path::Path;

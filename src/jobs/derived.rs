@@ -1,4 +1,7 @@
 //! A scene that is derived from another: it goes into its own folder, and the other one stays unchanged.
+//!
+//! Removal, cleaning and edits never change the Gaussians of an opened scene. The window's first edit derives a scene;
+//! later ones are stored in it ([`super::rearrange`]).
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

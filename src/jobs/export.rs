@@ -1,4 +1,6 @@
 //! Writes results for users: Gaussians for other viewers, pictures, arrays.
+//!
+//! An output is never an input or a file of a scene.
 
 use std::io::Write;
 use std::path::Path;

@@ -1,4 +1,6 @@
 //! Exports a whole scene to files: the Gaussians of every object and part, and their masks in photos.
+//!
+//! Tests read exported masks back and compare them pixel by pixel.
 
 mod folder;
 mod labels;

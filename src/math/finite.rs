@@ -1,4 +1,7 @@
 //! Finiteness of the results of a stage, asserted after every stage under `debug-validation`.
+//!
+//! Stages that can fail return an error with stage, field and index. Others panic with the same text, and the worker
+//! reports it.
 
 use super::Real;
 

@@ -1,6 +1,8 @@
 //! Changing the size of images: one separable filter over any kind of pixel.
 //!
 //! Columns are resized first, then rows, as Pillow and PyTorch do it; a pass that changes nothing is left out.
+//!
+//! Images are resized here only.
 
 use rayon::prelude::*;
 

@@ -1,4 +1,6 @@
 //! Order statistics of small samples, and the largest of errors.
+//!
+//! [`worst`] fails on NaN and on empty input, so tests judge errors by it.
 
 use super::Real;
 

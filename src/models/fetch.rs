@@ -1,4 +1,7 @@
 //! Downloads of model files: resumed, checked, cancellable. Nothing is fetched without a request of the user.
+//!
+//! No more is read than the size in a description, else [`FileToFetch::most`]: 16 MiB for a description itself, a
+//! tenth more than the list says for a checkpoint.
 
 mod answer;
 

@@ -1,4 +1,6 @@
 //! Network with named input and output arrays.
+//!
+//! An output with a number that is not finite is an error.
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};

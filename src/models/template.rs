@@ -3,6 +3,8 @@
 //! `tools/export/template.py` makes one: an archive of graphs and of `template.json`, which maps each weight to a
 //! tensor of the checkpoint. Concatenated messages of protocol buffers merge, so a filled graph is its template
 //! followed by the weights, and no graph has to be parsed.
+//!
+//! A model is made of a checkpoint whole or not at all.
 
 #[cfg(test)]
 mod mask_tests;

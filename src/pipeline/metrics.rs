@@ -1,4 +1,6 @@
 //! Image metrics of renders against photos.
+//!
+//! PSNR is measured here only.
 
 use crate::math::Real;
 use crate::math::resize::nearest;

@@ -9,6 +9,8 @@
 //!
 //! The object's shadow on a flat surface is lifted, as far as its blocking of the light explains it ([`shade`]). Its
 //! other shadows, reflections, and light that it reflects stay.
+//!
+//! New Gaussians are marked as invented in the cloud. The scene from which a thing is removed is never written to.
 
 mod close;
 mod extent;

@@ -1,5 +1,8 @@
 //! Server: listens, authenticates clients, and answers from the [`Hub`]. Each connection has a thread of low priority.
 //! Paths and other names of files are never taken from a client.
+//!
+//! A client must know the token, use a host name of the server, and not be a page in a browser. Requests are limited
+//! in size and time. Only edits write anything, and only with `--allow-edit`.
 
 use std::net::{IpAddr, Ipv4Addr, SocketAddr, TcpListener, TcpStream};
 use std::path::Path;

@@ -7,6 +7,9 @@
 //! * it reaches a tile if the smallest `q` over the tile's pixel centers allows that;
 //! * a pixel is closed before the splat that would bring its transmittance under
 //!   `TRANSMITTANCE_MIN`.
+//!
+//! Positions are made relative to the camera in `f64` before they become `f32`. Losses and metrics accumulate in
+//! `f64`.
 
 pub mod cpu;
 pub mod gpu;

@@ -1,4 +1,6 @@
 //! Identities of a scene: objects and their parts.
+//!
+//! A parent's number is smaller than its pieces', so every walk up the tree ends.
 
 pub(crate) mod whole_names;
 

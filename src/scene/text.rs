@@ -1,5 +1,8 @@
 //! Foreign text (names, paths, headers of files, words of servers and models) as it may be shown: nothing in
 //! it moves a cursor, recolors a terminal, reverses a line or makes a line of its own.
+//!
+//! Names of identities and scenes are only shown, so they are cut at 256 letters. Names of photos find files, so those
+//! over 1,024 letters are refused.
 
 use std::borrow::Cow;
 

@@ -1,4 +1,6 @@
 //! Earlier and later states of something that a user changes: undo and redo.
+//!
+//! States are kept, not inverse steps: undo restores the earlier state bit for bit.
 
 /// States that are kept at most.
 const MOST: usize = 200;

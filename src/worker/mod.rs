@@ -2,6 +2,8 @@
 //!
 //! Control runs in closed enums: the window's actions become [`Command`]s (what a job is to do), which end in
 //! [`Event`]s (what happened). Bulk data never queues: it is published in a [`Slot`].
+//!
+//! A job ends in exactly one of finished, canceled or failed, panics included.
 
 pub(crate) mod control;
 pub(crate) mod failure;

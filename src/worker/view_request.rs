@@ -1,4 +1,6 @@
 //! Requests to the drawing thread, and its answers.
+//!
+//! Two views of a scene are two images of one frame and share its maps.
 
 use std::sync::Arc;
 

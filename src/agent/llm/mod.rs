@@ -1,6 +1,9 @@
 //! Planner that asks a chat model behind an OpenAI-compatible address, used only if the user chose it. The text of
 //! the model is never executed: only its valid tool calls reach the session, which checks them as for every planner.
 //! The key is sent in one header only.
+//!
+//! [`SENT`] lists everything that is sent; docs/guide.md has the same list. Texts that may name local files
+//! ([`CallOutcome::is_private`]) are not sent. The key goes to `https` and loopback addresses only.
 
 pub mod discover;
 pub(crate) mod http;

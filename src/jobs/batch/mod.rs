@@ -1,6 +1,9 @@
 //! Many scenes, with many settings and seeds, on many machines: each combination is a unit with its own folder and one
 //! atomic result. Machines share nothing but the folder of the results; the cluster's own scheduler decides which of
 //! them runs a unit, and at what time.
+//!
+//! A unit is claimed by creating a file ([`crate::io::claim`]). Killed shards end with the same results, bit for bit,
+//! as an uninterrupted run (`tests/it/batch.rs`).
 
 mod file;
 mod merge;

@@ -1,4 +1,6 @@
 //! A program that runs for minutes: its lines become progress, and it is killed once it is not needed.
+//!
+//! The program ends with its job. On Linux it also ends with this process, however that ends.
 
 use std::collections::VecDeque;
 use std::io::{BufRead, BufReader, Read};

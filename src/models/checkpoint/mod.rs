@@ -2,6 +2,9 @@
 //!
 //! The crate `pytorch-reader` (Burn's) is sound, but it reads no TorchScript archive, and it skips unknown names,
 //! which this program must refuse; hence `pickle`.
+//!
+//! A checkpoint is data: opcodes and names that tensors do not need are refused by name. Sizes are compared with the
+//! file before memory is allocated.
 
 mod parts;
 mod pickle;

@@ -2,6 +2,8 @@
 //!
 //! [`run()`] is the whole job; [`trainer`] holds the state and its step; [`init`], [`schedule`] and [`density`] serve
 //! the step; [`checkpoint`] stores the state on disk.
+//!
+//! On the CPU a seed determines the result, and a resumed run ends where an uninterrupted one does.
 
 pub(crate) mod border;
 pub(crate) mod budget;

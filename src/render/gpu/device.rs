@@ -1,4 +1,7 @@
 //! The adapter and its device: their identity, abilities and faults.
+//!
+//! A process has one device: the window's own if a real GPU draws the window. Training keeps few steps ahead of it, so
+//! that other drawing need not wait for many.
 
 use std::sync::{Arc, Mutex, PoisonError};
 

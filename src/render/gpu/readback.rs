@@ -1,4 +1,7 @@
 //! Copies from the device to the host, through memory that is kept from one to the next.
+//!
+//! All copies to the host go through this file. A moving view's colors stay on the device if the window uses the same
+//! one ([`super::pack`]).
 
 use std::borrow::Cow;
 use std::sync::{Arc, Mutex, PoisonError, mpsc};

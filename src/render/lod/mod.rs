@@ -4,6 +4,8 @@
 //! Nodes are Gaussians of a second cloud. They are named by numbers that go on where those of the cloud end, so that
 //! a cut is a list of numbers, of Gaussians and of nodes. A splat of a node has the index of the heaviest Gaussian
 //! beneath it, so objects, masks and picks are the same at every level.
+//!
+//! Levels are for moving views only: at rest every Gaussian is drawn, bit for bit as without a tree.
 
 mod build;
 mod cut;

@@ -129,33 +129,40 @@ pub fn printing(files: &[SourceFile]) -> Vec<Complaint> {
     complaints
 }
 
-/// Every dependency in `manifest` (Cargo.toml) is named in a table row of `document`, and every
-/// crate named in that table is a dependency.
-pub fn dependencies(manifest: &str, document: &str) -> Vec<Complaint> {
-    let wanted = dependency_names(manifest);
-    let table = document.split("## Why each dependency").nth(1).unwrap_or_default();
-    let first_cells = table.lines().filter_map(|l| l.strip_prefix("| ")?.split(" | ").next());
-    let named: Vec<&str> = first_cells.flat_map(|cell| cell.split('`').skip(1).step_by(2)).collect();
-    let missing = wanted.iter().filter(|w| !named.contains(&w.as_str()));
-    let stale = named.iter().filter(|n| !wanted.iter().any(|w| w == *n));
-    missing
-        .map(|w| format!("ARCHITECTURE.md: dependency '{w}' is not in the table 'Why each dependency'"))
-        .chain(stale.map(|n| format!("ARCHITECTURE.md: '{n}' is in the table of dependencies but not in Cargo.toml")))
-        .collect()
+/// Fewest words of a comment that says what a dependency is for.
+const REASON_WORDS: usize = 3;
+
+/// Every dependency in `manifest` (Cargo.toml) has a comment that says what it is for: at the end of its line, or on
+/// the lines directly above it.
+pub fn dependencies(manifest: &str) -> Vec<Complaint> {
+    let (mut inside, mut above, mut complaints) = (false, 0, Vec::new());
+    for line in manifest.lines().map(str::trim) {
+        let (code, comment) = line.split_at(start_of_comment(line));
+        let words = comment.split_whitespace().filter(|word| word.contains(char::is_alphabetic)).count();
+        if code.is_empty() && !comment.is_empty() {
+            above += words;
+            continue;
+        }
+        let name = match code.trim().strip_prefix('[').and_then(|table| table.strip_suffix(']')) {
+            Some(table) => {
+                inside = table.ends_with("dependencies");
+                // `[dependencies.name]`
+                table.split_once("dependencies.").map(|(_, name)| name)
+            }
+            None => code.split_once('=').filter(|_| inside).map(|(name, _)| name.trim()),
+        };
+        if let Some(name) = name.filter(|_| words.max(above) < REASON_WORDS) {
+            complaints.push(format!("Cargo.toml: dependency '{name}' has no comment that says what it is for"));
+        }
+        above = 0;
+    }
+    complaints
 }
 
-/// Names in the sections `[dependencies]` and `[dev-dependencies]` (and those of targets).
-fn dependency_names(manifest: &str) -> Vec<String> {
-    let mut inside = false;
-    let mut names = Vec::new();
-    for line in manifest.lines().map(str::trim) {
-        if line.starts_with('[') {
-            inside = line.ends_with("dependencies]");
-        } else if inside && !line.starts_with('#') {
-            names.extend(line.split_once('=').map(|(name, _)| name.trim().to_owned()));
-        }
-    }
-    names
+/// Where the comment of a line of TOML starts, at its first `#` outside quotes; its length if it has none.
+fn start_of_comment(line: &str) -> usize {
+    let outside = |at: usize| line[..at].matches('"').count() % 2 == 0;
+    line.match_indices('#').map(|(at, _)| at).find(|at| outside(*at)).unwrap_or(line.len())
 }
 
 /// The files of the library, without those declared as `#[cfg(test)] mod name;` and what is

@@ -5,6 +5,9 @@
 //! most alike first, as regions of a photo are. Votes of pixels become [`labels`] of leaves, from which those of all
 //! others follow. Clicks and strokes are [`marks`]: a selection grows from each over connected Gaussians, but not
 //! over those marked as outside. So an answer takes no rendering and little time, however many corrections come.
+//!
+//! Labels minimize a cost over the tree: votes of masks weigh more than photo edges (`tracker/complete.rs`). A click
+//! or stroke renders only the Gaussians near it.
 
 pub(crate) mod hierarchy;
 mod labels;

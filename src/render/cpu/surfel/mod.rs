@@ -9,6 +9,8 @@
 //! Own are projection ([`project`]), alpha ([`disk`]) and the way back ([`mod@project_backward`]). With
 //! depth asked for, frames also hold normals and the distortion `sum over pairs (w_i w_j (1/z_i -
 //! 1/z_j)²)`, in inverse depth because that is the quantity that a picture can resolve.
+//!
+//! Tests compare surfels with rays cast in world space, and their gradients with central differences.
 
 pub(crate) mod disk;
 pub(crate) mod project;
