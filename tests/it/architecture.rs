@@ -7,6 +7,7 @@
 // The generator of a committed asset: its own test compares the two.
 #[path = "../../tools/demo_scene/mod.rs"]
 mod demo_scene;
+mod english;
 mod front_ends;
 mod names;
 mod rules;
@@ -87,6 +88,23 @@ fn every_dependency_has_its_reason() {
     check(dependencies(manifest));
     let without_comments: Vec<&str> = manifest.lines().map(|line| line.split('#').next().unwrap_or_default()).collect();
     assert!(dependencies(&without_comments.join("\n")).len() > 50, "the dependencies were not found");
+}
+
+#[test]
+fn comments_begin_with_a_noun_or_a_verb_and_sentences_are_short() {
+    check(english::doc_lines(&tree()));
+    let riddles = "/// What is taken.\n".repeat(30) + &"    //! Whether it is.\n".repeat(30);
+    assert_eq!(complaints(english::doc_lines, "src/a.rs", &riddles), 60);
+    assert_eq!(complaints(english::doc_lines, "src/a.rs", &"/// Whatever it is.\n// What for.\n".repeat(60)), 0);
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let documents = english::documents(root);
+    assert!(documents.iter().any(|d| d.path == "README.md") && documents.iter().any(|d| d.path == "docs/guide.md"));
+    check(english::sentences(&documents));
+    let words = |n: usize| "word ".repeat(n);
+    let (short, long) = (format!("{}end. ", words(39)), format!("- {}\n  {}end.\n\n", words(20), words(20)));
+    assert_eq!(complaints(english::sentences, "a.md", &long.repeat(11)), 11);
+    let unseen = format!("```\n{}\n```\n| {} |\n", words(60), words(60));
+    assert_eq!(complaints(english::sentences, "a.md", &(short.repeat(30) + "\n" + &unseen.repeat(11))), 0);
 }
 
 /// One made-up file.
