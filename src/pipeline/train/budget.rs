@@ -14,7 +14,7 @@ const CHEAP: usize = 100_000;
 
 /// Most Gaussians that are worth having and fit: one for each pixel of a training picture up to [`CHEAP`], one for two
 /// beyond that, at least `start` (those there are to begin with) and a half more, at most what the memory holds
-/// (docs/measured.md).
+/// (docs/notes/density-control.md).
 pub(crate) fn worthwhile(pixels: usize, start: usize) -> usize {
     pixels.min(CHEAP).max(pixels / 2).max(start + start / 2).min(gaussians())
 }
