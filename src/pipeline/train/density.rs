@@ -49,7 +49,7 @@ pub fn control(
     rng: &mut Pcg64Mcg,
 ) -> DensityReport {
     let n = cloud.len();
-    // 3DGS removes large ones too, after the first reset. That took what is behind everything (docs/notes/density-control.md).
+    // 3DGS removes large ones too, after the first reset. That took the background (docs/notes/density-control.md).
     let stays: Vec<bool> = cloud.opacity_logits.iter().map(|o| o.sigmoid() >= PRUNE_OPACITY).collect();
     let left = stays.iter().filter(|s| **s).count();
     let room = round.budget.saturating_sub(left).div_ceil(round.rounds.max(1) as usize);
