@@ -46,6 +46,8 @@ documents=$share/doc/fmlgs
 install -D -m 644 packaging/debian/copyright "$documents/copyright"
 install -D -m 644 -t "$documents" README.md
 install -D -m 644 -t "$documents/docs" docs/*.md
+install -D -m 644 -t "$documents/docs/notes" docs/notes/*.md
+install -D -m 644 -t "$documents/docs/results" docs/results/*.csv
 tools/third_party.py "$documents/THIRD_PARTY.md" >/dev/null
 {
     echo "fmlgs ($version) unstable; urgency=medium"

@@ -56,6 +56,7 @@ run_tests() {
 mkdir -p target
 log=target/test.log
 check "formatting" cargo fmt --all --check
+check "tables of docs/results" tools/results.py --check
 # Clippy compiles what is tested, and pages are made of what was compiled: to check everything once more for each of
 # them would take as long again.
 export RUSTC_WORKSPACE_WRAPPER=clippy-driver CLIPPY_ARGS=-Dwarnings__CLIPPY_HACKERY__

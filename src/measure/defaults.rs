@@ -4,7 +4,7 @@
 
 use super::document::{Report, Stage, StageName};
 use super::front::{KnobChoice, NOISE};
-use super::table::{self, Rows};
+use super::table;
 
 /// Reasons for which a default stays though the rule would choose another setting, by stage and knob.
 const STAYS: [(StageName, &str, &str); 11] = [
@@ -29,61 +29,66 @@ const STAYS: [(StageName, &str, &str); 11] = [
     (StageName::Query, "encoder", "names alone know no words but the labels'"),
 ];
 
-/// The tables of all stages of these reports.
+/// The choices of all stages of these reports as one table, how each stage was measured, and orders of convergence.
 pub fn markdown(reports: &[Report]) -> String {
     let mut out = format!(
         "# Defaults and their evidence\n\n\
-         Written by `fmlgs report --defaults`; do not edit. Each row is one knob of a stage. A rule, stated above \
-         the table, is applied to the measurements of that knob's settings and of the default: *chosen* is what \
-         it picks, *least error* the best setting whatever it costs. The default *holds* if it is good enough by \
-         the rule and not more than {:.0} % slower than what is chosen, or slower by less than repeats \
-         differ; where it does not, the last column says why it stays. Numbers are medians of the runs, with the least and \
-         the most of them in brackets; compare times within a table only.\n",
+         Written by `fmlgs report --defaults`; do not edit. One row is one knob. *Chosen* is what the stage's rule picks \
+         from the measurements, *least error* the best setting at any cost. The default *holds* if the rule accepts its \
+         error and it is at most {:.0} % slower than the chosen setting, or as fast within repeats; otherwise the last \
+         column says why it stays. Numbers are medians of the runs, with the range in brackets where there are several. \
+         Compare times within a stage of one scene only.\n",
         100.0 * NOISE
     );
-    for report in reports {
-        out += &format!(
-            "\n## {}\n\nProgram {}, measured on: {}.\n",
-            report.scene,
-            report.program,
-            report.computer.words()
-        );
-        report.stages.iter().for_each(|s| out += &stage(s));
+    let stages = || reports.iter().flat_map(|r| r.stages.iter().map(move |s| (r, s)));
+    let choices = stages().flat_map(|(r, s)| with_reasons(r, s));
+    let head = ["scene", "stage", "knob", "chosen", "least error", "holds", "why it stays"];
+    out += &format!("\n{}", table::markdown(&table::rows(&head, choices)));
+    let measured = stages().filter(|(_, s)| !s.choices().is_empty()).map(|(r, s)| measurement(r, s));
+    let head = ["scene", "stage", "default", "seconds of", "errors against", "measured on", "chosen is"];
+    out += &format!("\n## How each stage was measured\n\n{}", table::markdown(&table::rows(&head, measured)));
+    let orders = stages().flat_map(|(r, s)| {
+        let named = move |row: Vec<String>| place(r, s).into_iter().chain(row).collect::<Vec<_>>();
+        s.order_table().into_iter().skip(1).map(named)
+    });
+    let head = ["scene", "stage", "convergence", "expected order", "observed", "agrees"];
+    out += &format!("\n## Convergence\n\n{}", table::markdown(&table::rows(&head, orders)));
+    out += "\n## Scenes\n\n";
+    for r in reports {
+        out += &format!("- {}: program {}, {}\n", r.scene, r.program, r.computer.words());
     }
     out
 }
 
-fn stage(stage: &Stage) -> String {
-    let choices = stage.choices();
-    if choices.is_empty() && stage.orders.is_empty() {
-        return String::new();
-    }
+/// The first cells of a row: the scene up to its first comma, and the stage.
+fn place(report: &Report, stage: &Stage) -> [String; 2] {
+    let scene = report.scene.split(',').next().unwrap_or_default();
+    [scene.to_owned(), stage.name.title().to_owned()]
+}
+
+/// Row that says what a stage's default costs, on what it was measured, and by which rule a setting is chosen.
+fn measurement(report: &Report, stage: &Stage) -> Vec<String> {
     let input: Vec<String> = stage.input.iter().map(|(k, v)| format!("{k} {v}")).collect();
-    let mut out = format!("\n### {}\n\nSeconds of {}; {}", stage.name.title(), stage.secs_of, stage.reference);
-    out += &format!(" ({}; {}). ", input.join(", "), stage.runs());
-    if let Some(far) = stage.stopped_at() {
-        out += &format!("Stopped early: {far}. ");
-    }
-    if !choices.is_empty() {
-        out += &format!("Chosen is {}.\n\n{}", stage.rule.words(), table::markdown(&with_reasons(stage)));
-    }
-    if !stage.orders.is_empty() {
-        out += &format!("\n{}", table::markdown(&stage.order_table()));
-    }
-    out
+    let stopped = stage.stopped_at().map_or_else(String::new, |far| format!("; stopped early: {far}"));
+    let default = stage.choice_table().get(1).and_then(|row| row.get(1)).cloned().unwrap_or_default();
+    let input = format!("{}; {}{stopped}", input.join(", "), stage.runs());
+    let cells = [default, stage.secs_of.clone(), stage.reference.clone(), input, stage.rule.words()];
+    place(report, stage).into_iter().chain(cells).collect()
 }
 
-/// Table of the rule's choice for each knob, with the reason for which its default stays where the rule differs.
-fn with_reasons(stage: &Stage) -> Rows {
+/// Rows of the rule's choice for each knob, with the reason for which its default stays where the rule differs.
+fn with_reasons(report: &Report, stage: &Stage) -> Vec<Vec<String>> {
     let reason = |c: &KnobChoice<'_>| {
         let stays = STAYS.iter().find(|(name, knob, _)| (*name, *knob) == (stage.name, c.method));
-        stays.filter(|_| !c.holds).map_or("", |s| s.2)
+        stays.filter(|_| !c.holds).map_or("", |s| s.2).to_owned()
     };
-    let choices = stage.choices();
-    let column = std::iter::once("why it stays").chain(choices.iter().map(reason));
-    let mut rows = stage.choice_table();
-    rows.iter_mut().zip(column).for_each(|(row, cell)| row.push(cell.to_owned()));
-    rows
+    let rows = stage.choice_table().into_iter().skip(1).zip(stage.choices());
+    let named = rows.map(|(mut row, choice)| {
+        // All rows of a stage have the same default, which the second table names.
+        row.remove(1);
+        place(report, stage).into_iter().chain(row).chain([reason(&choice)]).collect::<Vec<_>>()
+    });
+    named.collect()
 }
 
 #[cfg(test)]
@@ -94,13 +99,13 @@ mod tests {
     #[test]
     fn every_knob_has_its_row() {
         let text = markdown(&[example()]);
-        let row = text.lines().find(|l| l.starts_with("| cut-off")).expect("a row");
+        let row = text.lines().find(|l| l.contains("| cut-off |")).expect("a row");
         assert!(
             row.contains("1/64: 0.004000 (0.003600 to 0.004400) in 10.00 ms (9.000 ms to 11.00 ms)")
                 && row.ends_with("| **no** |  |"),
             "{row}"
         );
-        assert!(text.contains("; each setting 3 times). ") && text.contains("| samples | 2 | 2.00 | yes |"));
+        assert!(text.contains("; each setting 3 times") && text.contains("| samples | 2 | 2.00 | yes |"));
         assert!(text.contains("at most 1.0e-2 or 10 % over the least"));
     }
 }

@@ -256,7 +256,7 @@ fn what_is_not_in_view_is_marked_and_masks_follow_the_eye() {
     assert!(!w.shows("One color per object"), "again for the RGB image");
 }
 
-/// Prints how long it takes from the cursor, and from a click, to the outline (docs/measured.md).
+/// Prints how long it takes from the cursor, and from a click, to the outline.
 #[test]
 #[ignore = "prints timings"]
 fn times_of_hover_and_click() {

@@ -3,7 +3,7 @@ measured on assets/eval/unseen.glb is not the recognition of a shape family that
 
     python unseen.py ../../assets/eval
 
-Written and rendered after the encoders were trained, scored once (docs/measured.md), and never to be trained on.
+Written and rendered after the encoders were trained, scored once (docs/notes/queries.md), and never to be trained on.
 """
 
 import argparse

@@ -103,7 +103,7 @@ pub(crate) fn answer(
 }
 
 /// Returns whether an encoder may answer by itself: if nothing has a name, or if it knows photos. To the small
-/// encoder that comes with the program, everything unknown looks like something known (docs/measured.md).
+/// encoder that comes with the program, everything unknown looks like something known (docs/notes/queries.md).
 pub(crate) fn may_answer(identities: &Identities, features: &LanguageFeatures) -> bool {
     !identities.have_names() || !models::is_rough(&features.encoder)
 }

@@ -198,7 +198,7 @@ impl Scorer for EmbeddingScorer<'_> {
 }
 
 /// Least advantage over the canonical phrases of an identity that answers: to the encoders of photos, nearly
-/// everything is a little more like some phrase (docs/measured.md).
+/// everything is a little more like some phrase (docs/notes/queries.md).
 pub(crate) fn least_advantage(encoder: &str) -> f32 {
     if encoder == models::DEMO { 0.0 } else { 0.03 }
 }

@@ -13,7 +13,8 @@ const SHARE: f64 = 0.4;
 const CHEAP: usize = 100_000;
 
 /// Largest useful number of Gaussians: one for each pixel of a training picture up to [`CHEAP`], one for two pixels
-/// beyond that, at least 1.5 times the initial number `start`, at most as many as fit into memory (docs/measured.md).
+/// beyond that, at least 1.5 times the initial number `start`, at most as many as fit into memory
+/// (docs/notes/density-control.md).
 pub(crate) fn worthwhile(pixels: usize, start: usize) -> usize {
     pixels.min(CHEAP).max(pixels / 2).max(start + start / 2).min(gaussians())
 }

@@ -49,7 +49,7 @@ pub fn control(
     rng: &mut Pcg64Mcg,
 ) -> DensityReport {
     let n = cloud.len();
-    // 3DGS also removes large ones after the first reset. This removed the background (docs/measured.md).
+    // 3DGS also removes large ones after the first reset. This removed the background (docs/notes/density-control.md).
     let stays: Vec<bool> = cloud.opacity_logits.iter().map(|o| o.sigmoid() >= PRUNE_OPACITY).collect();
     let left = stays.iter().filter(|s| **s).count();
     let room = round.budget.saturating_sub(left).div_ceil(round.rounds.max(1) as usize);

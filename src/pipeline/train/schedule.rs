@@ -56,7 +56,7 @@ impl Schedule {
             quaternion: rate(1e-3),
             opacity_logit: rate(5e-2),
             sh_constant: rate(2.5e-3),
-            // 3DGS divides by 20, with which short runs hardly learn them (docs/measured.md).
+            // 3DGS divides by 20, with which short runs hardly learn them (docs/notes/density-control.md).
             sh_rest: rate(2.5e-3 / 8.0),
         }
     }

@@ -170,7 +170,7 @@ impl SemanticFacts {
     }
 }
 
-/// Gaussians from which on a moving picture of all of them is too slow (docs/measured.md, "Large scenes").
+/// Gaussians from which on a moving picture of all of them is too slow (docs/notes/speed.md).
 pub(crate) const LARGE: usize = 100_000;
 
 /// Half a step of an 8-bit picture: smaller changes cannot be seen.

@@ -48,7 +48,7 @@ impl Scene {
     }
 }
 
-/// Claims of docs/measured.md about deviation on real features. The scene has two parts whose wholes are asked for too.
+/// Claims of docs/notes/queries.md about deviation on real features. Two parts of the scene have wholes that are queried.
 #[test]
 fn deviation_lifts_real_parts_over_other_things_and_hardly_over_their_wholes() {
     let Some(scene) = load() else { return };
