@@ -24,6 +24,18 @@ pub struct Browser {
     session: String,
 }
 
+/// A driver, what it says, and the port at which it listens; `None` if it ended before.
+fn start(driver: &Path) -> Option<(Child, Lines<BufReader<ChildStdout>>, u16)> {
+    let mut driver = Command::new(driver).arg("--port=0").stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    let mut said = BufReader::new(driver.stdout.take().unwrap()).lines();
+    let port = |l: String| l.split("successfully on port ").nth(1)?.trim_end_matches('.').parse::<u16>().ok();
+    let Some(port) = said.by_ref().map_while(Result::ok).find_map(port) else {
+        driver.wait().unwrap();
+        return None;
+    };
+    Some((driver, said, port))
+}
+
 impl Browser {
     /// Opens one whose pages have this size in px. Where it is not installed, this prints the line that the count of
     /// skipped tests looks for and returns `None`.
@@ -32,15 +44,10 @@ impl Browser {
             println!("skipped: no chromium with its chromedriver here");
             return None;
         };
-        let mut driver =
-            Command::new(driver).arg("--port=0").stdout(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
-        let mut said = BufReader::new(driver.stdout.take().unwrap()).lines();
-        let mut told = said.by_ref().map_while(Result::ok);
-        let port =
-            told.find_map(|l| l.split("successfully on port ").nth(1)?.trim_end_matches('.').parse::<u16>().ok());
+        // The port that a driver chooses may be taken by another program before the driver has it; it ends then.
+        let (driver, said, port) = (0..5).find_map(|_| start(&driver)).expect("a driver that listens");
         let agent = ureq::Agent::config_builder().http_status_as_error(false).proxy(None).build().new_agent();
-        let mut browser =
-            Self { driver, _said: said, agent, session: format!("http://127.0.0.1:{}/session", port.unwrap()) };
+        let mut browser = Self { driver, _said: said, agent, session: format!("http://127.0.0.1:{port}/session") };
         let arguments = [
             "--headless=new",
             "--no-sandbox",
