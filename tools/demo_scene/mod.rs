@@ -1,6 +1,6 @@
 //! The demo scene, made from formulas: a table with things on it, each of several named parts.
 //!
-//! [`build`] gives the bytes of `assets/demo.glb`; `tests/it/architecture.rs` includes it and compares the two. After a
+//! [`build`] gives the bytes of `assets/demo.glb`; `tests/it/architecture/mod.rs` includes it and compares the two. After a
 //! change here, `cargo test --test it write_the_demo_scene -- --ignored` writes the file anew. Units are
 //! meters, y is up, the table's middle stands on the origin.
 

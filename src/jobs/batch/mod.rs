@@ -3,7 +3,7 @@
 //! them runs a unit, and at what time.
 //!
 //! A unit is claimed by creating a file ([`crate::io::claim`]). Killed shards end with the same results, bit for bit,
-//! as an uninterrupted run (`tests/it/batch.rs`).
+//! as an uninterrupted run (`tests/it/batch/mod.rs`).
 
 mod file;
 mod merge;

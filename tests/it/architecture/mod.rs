@@ -5,7 +5,7 @@
 //! an offender, so a rule that has gone blind fails here.
 
 // The generator of a committed asset: its own test compares the two.
-#[path = "../../tools/demo_scene/mod.rs"]
+#[path = "../../../tools/demo_scene/mod.rs"]
 mod demo_scene;
 mod english;
 mod front_ends;
@@ -84,7 +84,7 @@ fn a_types_name_stands_for_one_thing() {
 
 #[test]
 fn every_dependency_has_its_reason() {
-    let manifest = include_str!("../../Cargo.toml");
+    let manifest = include_str!("../../../Cargo.toml");
     check(dependencies(manifest));
     let without_comments: Vec<&str> = manifest.lines().map(|line| line.split('#').next().unwrap_or_default()).collect();
     assert!(dependencies(&without_comments.join("\n")).len() > 50, "the dependencies were not found");
@@ -130,7 +130,7 @@ fn module_order_catches_violations() {
     assert_eq!(n("src/io/ply/mod.rs", "use super::render::Frame;"), 0);
     assert_eq!(n("src/io/ply.rs", "use super::render::Frame;"), 0);
     assert_eq!(n("src/cli/train.rs", "use crate::ui::run;"), 1);
-    assert_eq!(n("src/ui/app.rs", "use crate::cli::train;"), 1);
+    assert_eq!(n("src/ui/app/mod.rs", "use crate::cli::train;"), 1);
     assert_eq!(n("src/shiny/mod.rs", "//! A module that the table lacks."), 1);
 }
 

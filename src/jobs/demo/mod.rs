@@ -23,7 +23,7 @@ use crate::render::{BackendChoice, Features, Renderer};
 use crate::scene::{GaussianCloud, Machine};
 
 /// The trained demo.
-const BUNDLE: &[u8] = include_bytes!("../../assets/demo/demo.zip");
+const BUNDLE: &[u8] = include_bytes!("../../../assets/demo/demo.zip");
 /// Name of the demo in errors.
 const NAME: &str = "demo.zip";
 /// Query that is asked at once.

@@ -266,7 +266,7 @@ mod tests {
     /// Returns the demo's scene, and the lists of questions.
     fn data() -> (Identities, toml::Table) {
         let table: toml::Table =
-            include_str!("../../../tests/data/compounds_and_slips.toml").parse().expect("sound TOML");
+            include_str!("../../../../tests/data/compounds_and_slips.toml").parse().expect("sound TOML");
         let mut all = Identities::default();
         for (object, parts) in table["scene"].as_table().expect("a table") {
             let id = all.add(Level::Object, NOBODY, vec![object.clone()]);

@@ -11,10 +11,10 @@ use super::vocabulary::Vocabulary;
 use super::{Encoder, IdentityCrop, ModelError, token_rows};
 use crate::io::{IoError, files};
 
-const IMAGE: (&str, &[u8]) = ("demo_image.onnx", include_bytes!("../../assets/models/demo_image.onnx"));
-const TEXT: (&str, &[u8]) = ("demo_text.onnx", include_bytes!("../../assets/models/demo_text.onnx"));
+const IMAGE: (&str, &[u8]) = ("demo_image.onnx", include_bytes!("../../../assets/models/demo_image.onnx"));
+const TEXT: (&str, &[u8]) = ("demo_text.onnx", include_bytes!("../../../assets/models/demo_text.onnx"));
 /// Word list. Its file name also identifies another encoder made by `tools/encoder`.
-pub(super) const WORDS: (&str, &str) = ("demo_vocab.json", include_str!("../../assets/models/demo_vocab.json"));
+pub(super) const WORDS: (&str, &str) = ("demo_vocab.json", include_str!("../../../assets/models/demo_vocab.json"));
 
 /// Largest accepted network file, bytes.
 const MAX_BYTES: u64 = 64 << 20;

@@ -18,20 +18,20 @@ use sha2::{Digest, Sha256};
 use super::{IoError, atomic};
 use crate::scene::IdentityId;
 
-const TEMPLATE: &str = include_str!("../../assets/page/page.html");
-const STYLE: &str = include_str!("../../assets/page/page.css");
-const RENDERER: &[u8] = include_bytes!("../../assets/page/renderer.js");
-const LICENSE: &str = include_str!("../../assets/page/renderer.LICENSE.txt");
+const TEMPLATE: &str = include_str!("../../../assets/page/page.html");
+const STYLE: &str = include_str!("../../../assets/page/page.css");
+const RENDERER: &[u8] = include_bytes!("../../../assets/page/renderer.js");
+const LICENSE: &str = include_str!("../../../assets/page/renderer.LICENSE.txt");
 /// Scripts, joined into one in this order.
 const SCRIPTS: [&str; 8] = [
-    include_str!("../../assets/page/decode.js"),
-    include_str!("../../assets/page/pose.js"),
-    include_str!("../../assets/page/draw.js"),
-    include_str!("../../assets/page/pick.js"),
-    include_str!("../../assets/page/orbit.js"),
-    include_str!("../../assets/page/list.js"),
-    include_str!("../../assets/page/flight.js"),
-    include_str!("../../assets/page/page.js"),
+    include_str!("../../../assets/page/decode.js"),
+    include_str!("../../../assets/page/pose.js"),
+    include_str!("../../../assets/page/draw.js"),
+    include_str!("../../../assets/page/pick.js"),
+    include_str!("../../../assets/page/orbit.js"),
+    include_str!("../../../assets/page/list.js"),
+    include_str!("../../../assets/page/flight.js"),
+    include_str!("../../../assets/page/page.js"),
 ];
 
 /// An object or part on a page. Places are relative to the page's origin.

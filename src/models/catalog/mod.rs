@@ -11,7 +11,7 @@ use super::fetch::{self, FetchError, FileToFetch, Patience};
 use super::{KnownAnswer, ModelError, folder, manifest};
 use crate::io::files;
 
-const LIST: &str = include_str!("../../assets/models.toml");
+const LIST: &str = include_str!("../../../assets/models.toml");
 
 /// Name of the model that tracks masks.
 pub(crate) const SAM2: &str = "sam2.1-tiny";

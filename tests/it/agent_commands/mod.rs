@@ -19,11 +19,11 @@ use fmlgs::navigate::target::Side;
 use fmlgs::scene::NOBODY;
 use serde::{Deserialize, Serialize};
 
-const WORDINGS: &str = include_str!("../data/agent_commands.toml");
-const DIALOGS: &str = include_str!("../data/agent_dialogs.toml");
-const SENTENCES: &str = include_str!("../data/ordinary_sentences.jsonl");
-const VERDICTS: &str = include_str!("../data/ordinary_verdicts.jsonl");
-const PAGE: &str = include_str!("../../docs/commands.md");
+const WORDINGS: &str = include_str!("../../data/agent_commands.toml");
+const DIALOGS: &str = include_str!("../../data/agent_dialogs.toml");
+const SENTENCES: &str = include_str!("../../data/ordinary_sentences.jsonl");
+const VERDICTS: &str = include_str!("../../data/ordinary_verdicts.jsonl");
+const PAGE: &str = include_str!("../../../docs/commands.md");
 
 fn session() -> Session {
     Session::new(Policy::built_in().expect("policy"), Box::new(Commands::default()))
