@@ -209,7 +209,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Render(args) => render::run(args, quiet),
         Command::Eval(args) => eval::run(args, quiet),
         Command::Preprocess(args) => preprocess::run(args, quiet),
-        Command::Query(args) => query::run(args),
+        Command::Query(args) => query::run(args, quiet),
         Command::Segment(args) => segment::run(args, quiet),
         Command::Remove(args) => remove::run(args, quiet),
         Command::Clean(args) => clean::run(args, quiet),

@@ -76,14 +76,14 @@ pub(crate) struct QueryArgs {
     recipe: RecipeArgs,
 }
 
-pub(crate) fn run(args: QueryArgs) -> Result<(), CliError> {
+pub(crate) fn run(args: QueryArgs, quiet: bool) -> Result<(), CliError> {
     let scene = open_scene(&args.scene)?;
     for out in args.mask.iter().chain(&args.heat) {
         export::check(out, &query::MAP_ENDINGS, &scene.reads())?;
     }
     let map = scene.semantics()?;
     if let Some(list) = &args.phrases {
-        return phrases::run(&args, list, &scene, map);
+        return phrases::run(&args, list, &scene, map, quiet);
     }
     let text = args.text.as_deref().unwrap_or_default();
     let camera = view::choose(args.camera.as_deref(), &scene)?.limited_to(args.max_side);

@@ -16,7 +16,7 @@ use crate::scene::{Camera, SemanticMap};
 /// Rows of the printed table at most; files have all.
 const ROWS: usize = 60;
 
-pub(super) fn run(args: &QueryArgs, list: &Path, scene: &Scene, map: SemanticMap) -> Result<(), CliError> {
+pub(super) fn run(args: &QueryArgs, list: &Path, scene: &Scene, map: SemanticMap, quiet: bool) -> Result<(), CliError> {
     if let Some(folder) = &args.export {
         export::check_folder(folder, &scene.reads())?;
         export::make_folder(folder)?;
@@ -35,7 +35,7 @@ pub(super) fn run(args: &QueryArgs, list: &Path, scene: &Scene, map: SemanticMap
         truth: args.truth.clone().map_or(TrueMasks::None, TrueMasks::Folder),
         export: args.export.clone(),
     };
-    let rows = phrases::run(&request, &mut Console::new(args.json))?;
+    let rows = phrases::run(&request, &mut Console::new(quiet || args.json))?;
     if args.json {
         return output::print_json(&json!({ "rows": rows, "mean_iou": mean_iou(&rows), "recipe": request.recipe }));
     }
