@@ -99,7 +99,10 @@ fn values_claimed(text: &str) -> u64 {
     let tuple = |text: &str| Some(text.split_once("shape")?.1.split_once('(')?.1.split_once(')')?.0.to_owned());
     let shape = tuple(text).unwrap_or_else(|| "?".into());
     let entries = shape.split(',').map(str::trim).filter(|e| !e.is_empty());
-    entries.map(|e| e.parse().unwrap_or(u64::MAX)).fold(1, u64::saturating_mul)
+    let entries: Vec<u64> = entries.map(|e| e.parse().unwrap_or(u64::MAX)).collect();
+    // The library multiplies in order: a zero at the end does not help where it has overflowed before.
+    let largest = entries.iter().map(|e| (*e).max(1)).fold(1, u64::saturating_mul);
+    if largest == u64::MAX { largest } else { entries.into_iter().product() }
 }
 
 #[cfg(test)]
