@@ -1,6 +1,7 @@
 //! Runs the real binary, and makes small inputs for it.
 #![allow(dead_code)]
 
+use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
@@ -159,6 +160,21 @@ pub fn copy(from: &Path, to: &Path) {
             std::fs::copy(&path, &to).unwrap();
         }
     }
+}
+
+/// All files below a folder, by their paths from it, with their contents.
+pub fn files_in(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = Path::new(path.file_name().unwrap());
+        if path.is_dir() {
+            all.extend(files_in(&path).into_iter().map(|(inner, bytes)| (name.join(inner), bytes)));
+        } else {
+            all.insert(name.to_path_buf(), std::fs::read(&path).unwrap());
+        }
+    }
+    all
 }
 
 /// A server on this machine.

@@ -5,7 +5,6 @@ mod beside;
 mod packed;
 
 use std::fs;
-use std::ops::Range;
 use std::path::Path;
 
 use super::trained::{self, TrainedScene};
@@ -36,11 +35,13 @@ type Result<T> = std::result::Result<T, OpenError>;
 const FOLDERS: [Layout; 7] = [
     Layout {
         name: "a trained scene (scene.json)",
+        is_of_photos: false,
         is: trained::is_scene,
         open: |p| Ok(Opened::Trained(trained::load(p)?)),
     },
     Layout {
         name: "nerfstudio or instant-ngp photos (transforms.json)",
+        is_of_photos: true,
         is: |p| files::called(p, transforms::USUAL).is_some(),
         open: |p| {
             let list = files::called(p, transforms::USUAL).unwrap_or_else(|| p.join(transforms::USUAL));
@@ -49,43 +50,47 @@ const FOLDERS: [Layout; 7] = [
     },
     Layout {
         name: "Blender photos (transforms_train.json)",
+        is_of_photos: true,
         is: |p| p.join("transforms_train.json").is_file(),
         open: |p| Ok(Opened::Dataset(transforms::read_blender(p)?)),
     },
     Layout {
         name: "a COLMAP reconstruction ({cameras,images}.{bin,txt} in sparse/0, colmap/sparse/0, distorted/sparse/0, \
                another folder or the folder itself)",
+        is_of_photos: true,
         is: colmap::is_colmap,
         open: |p| Ok(Opened::Dataset(colmap::read(p)?)),
     },
     Layout {
         name: "LLFF photos (poses_bounds.npy)",
+        is_of_photos: true,
         is: |p| p.join(llff::POSES_FILE).is_file(),
         open: |p| Ok(Opened::Dataset(llff::read(p)?)),
     },
     Layout {
         name: "a folder of 3D Gaussian Splatting (point_cloud/iteration_<n>/point_cloud.ply)",
+        is_of_photos: false,
         is: |p| gs_output::latest(p).is_some(),
         open: |p| Ok(Opened::Cloud(splat_ply::read(&gs_output::latest(p).unwrap_or_else(|| p.into()))?)),
     },
     Layout {
         name: "a SOG splat (meta.json)",
+        is_of_photos: false,
         is: |p| p.join(sog::META_FILE).is_file(),
         open: |p| Ok(Opened::Cloud(sog::read_folder(&p.join(sog::META_FILE))?)),
     },
 ];
 
-/// Range in [`FOLDERS`] of the layouts of posed photos.
-const OF_PHOTOS: Range<usize> = 1..5;
-
 /// Returns whether a folder holds posed photos, and no trained scene.
 fn is_data_set(folder: &Path) -> bool {
-    !trained::is_scene(folder) && FOLDERS[OF_PHOTOS].iter().any(|layout| (layout.is)(folder))
+    !trained::is_scene(folder) && FOLDERS.iter().any(|layout| layout.is_of_photos && (layout.is)(folder))
 }
 
 /// Layout of a scene in a folder.
 struct Layout {
     name: &'static str,
+    /// True if it is one of posed photos.
+    is_of_photos: bool,
     is: fn(&Path) -> bool,
     open: fn(&Path) -> std::result::Result<Opened, IoError>,
 }

@@ -32,12 +32,12 @@ fn a_stopped_training_goes_on_with_what_it_began_with() {
     crate::cli_support::copy(&out, &other);
 
     let refused = |what: &[&str]| {
-        let before = contents(&out);
+        let before = files_in(&out);
         let done = fmlgs(&arguments).fails_with(2);
         for word in [what, &["began with other photos or poses", "--anyway", "--out"]].concat() {
             assert!(done.stderr.contains(word), "'{word}' is not said: {}", done.stderr);
         }
-        assert!(contents(&out) == before, "a refused training changed files");
+        assert!(files_in(&out) == before, "a refused training changed files");
     };
     let (list, first) = (photos.join("transforms.json"), photos.join("images/0001.png"));
     let [list_before, first_before] = [&list, &first].map(|path| std::fs::read(path).unwrap());

@@ -9,7 +9,7 @@ fn a_read_only_folder_is_named_and_left_alone() {
     let photos = tiny_dataset(folder.path());
     let out = folder.path().join("scene");
     fmlgs(&train_arguments(photos.to_str().unwrap(), out.to_str().unwrap(), "20")).ok();
-    let before = contents(&out);
+    let before = files_in(&out);
     std::fs::set_permissions(&out, std::fs::Permissions::from_mode(0o555)).unwrap();
     // The superuser may write anywhere, so the check needs another way to be locked out.
     if std::fs::write(out.join("probe"), "x").is_ok() {
@@ -21,7 +21,7 @@ fn a_read_only_folder_is_named_and_left_alone() {
         refused(&photos, &out, "ermission");
     }
     std::fs::set_permissions(&out, std::fs::Permissions::from_mode(0o755)).unwrap();
-    assert!(contents(&out) == before, "a failed save changed files");
+    assert!(files_in(&out) == before, "a failed save changed files");
 }
 
 /// Exports into `out` and goes on training there; both must fail and name the reason.
@@ -72,7 +72,7 @@ fn a_full_disk_is_named_and_ends_nothing() {
     assert_eq!(child.wait().unwrap().code(), Some(1));
     let error = wait_for_line(&told, "error: ");
     assert!(error.contains("the disk is full"), "{error}");
-    let names: Vec<String> = contents(&out).into_iter().map(|(name, _)| name).collect();
+    let names: Vec<String> = files_in(&out).into_keys().map(|name| name.display().to_string()).collect();
     assert!(names.iter().all(|n| !n.starts_with('.')), "left behind: {names:?}");
     std::fs::remove_file(&filler).unwrap();
     let mut child = start(&arguments);

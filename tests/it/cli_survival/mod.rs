@@ -7,12 +7,12 @@ mod disk;
 mod places;
 
 use std::io::{BufRead, BufReader, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::{Duration, Instant};
 
-use crate::cli_support::{Done, Server, command, first_version, fmlgs, folder, tiny_dataset};
+use crate::cli_support::{Done, Server, command, files_in, first_version, fmlgs, folder, tiny_dataset};
 
 /// Training that saves at every opportunity and takes long enough to be interrupted.
 fn train_arguments<'a>(photos: &'a str, out: &'a str, steps: &'a str) -> Vec<&'a str> {
@@ -42,17 +42,6 @@ fn wait_for_checkpoints(child: &mut Child, path: &Path, times: usize) {
 
 fn send(child: &Child, signal: &str) {
     assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
-}
-
-/// Every file in `folder` with its contents.
-fn contents(folder: &Path) -> Vec<(String, Vec<u8>)> {
-    let entry = |e: std::io::Result<std::fs::DirEntry>| {
-        let e = e.unwrap();
-        (e.file_name().to_string_lossy().into_owned(), std::fs::read(e.path()).unwrap())
-    };
-    let mut all: Vec<_> = std::fs::read_dir(folder).unwrap().map(entry).collect();
-    all.sort();
-    all
 }
 
 #[test]
@@ -167,7 +156,7 @@ fn a_download_that_stalls_ends_when_asked_and_is_gone_on_with() {
         fetch.env("FMLGS_MODELS", models).stdout(Stdio::piped()).stderr(Stdio::piped());
         fetch
     };
-    let names = |models: &Path| contents(models).into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+    let names = |models: &Path| files_in(models).into_keys().map(|name| name.display().to_string()).collect::<Vec<_>>();
     for signal in ["-INT", "-TERM", "-KILL"] {
         let models = folder.path().join(signal);
         if signal != "-KILL" {
@@ -311,21 +300,6 @@ fn no_result_replaces_what_was_read_or_what_somebody_else_made() {
     std::fs::write(&checkpoint, bytes).unwrap();
     let done = fmlgs(&train_arguments(photos, scene, "20")).fails_with(1);
     assert!(done.stderr.contains("checkpoint.bin") && done.stderr.contains("checksum"), "{}", done.stderr);
-}
-
-/// All files below `folder`, with their contents.
-fn files_in(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    let mut all = Vec::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            all.extend(files_in(&path));
-        } else {
-            all.push((path.clone(), std::fs::read(&path).unwrap()));
-        }
-    }
-    all.sort();
-    all
 }
 
 #[test]

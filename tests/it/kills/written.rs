@@ -1,21 +1,7 @@
 //! Output written file by file: all objects of a scene, and the demo as it is unpacked.
 
 use super::*;
-
-/// All files below `folder` with their contents, but for the list that says when they were written.
-fn contents(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
-    let mut all = BTreeMap::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.is_dir() {
-            let inner = contents(&path).into_iter();
-            all.extend(inner.map(|(name, bytes)| (Path::new(path.file_name().unwrap()).join(name), bytes)));
-        } else {
-            all.insert(path.file_name().unwrap().into(), std::fs::read(&path).unwrap());
-        }
-    }
-    all
-}
+use crate::cli_support::files_in;
 
 #[test]
 fn all_objects_being_exported() {
@@ -27,7 +13,7 @@ fn all_objects_being_exported() {
     kill_often("segment --all", longest, &mut |_| export("out"), &mut || ());
     Done::from(export("out").output().unwrap()).ok();
     assert_tidy(&folder.path().join("out"));
-    let [whole, out] = ["whole", "out"].map(|name| contents(&folder.path().join(name)));
+    let [whole, out] = ["whole", "out"].map(|name| files_in(&folder.path().join(name)));
     assert!(out == whole, "{:?} instead of {:?}", out.keys(), whole.keys());
 }
 

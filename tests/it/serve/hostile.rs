@@ -7,14 +7,15 @@ use std::time::{Duration, Instant};
 use rand::{Rng, RngExt, SeedableRng};
 
 use super::served::{Served, read_answer};
-use super::{contents, scene, text};
+use super::{scene, text};
+use crate::cli_support::files_in;
 use crate::cli_support::folder;
 
 #[test]
 fn whoever_is_no_client_with_the_token_is_refused() {
     let folder = folder();
     let scene = scene(folder.path());
-    let before = contents(&scene);
+    let before = files_in(&scene);
     let server = Served::scene(text(&scene), &[]);
     let good = server.head("GET /scene");
     let refused = |request: String, status: u16| {
@@ -48,14 +49,14 @@ fn whoever_is_no_client_with_the_token_is_refused() {
     }
     let versions = refused(with("fmlgs-protocol: 1.0", "fmlgs-protocol: 2.3 (fmlgs 9.9.9)"), 426);
     assert!(versions.contains("1.0 (fmlgs") && versions.contains("2.3 (fmlgs 9.9.9)"), "{versions}");
-    assert!(contents(&scene) == before);
+    assert!(files_in(&scene) == before);
 }
 
 #[test]
 fn paths_methods_and_sizes_lead_nowhere() {
     let folder = folder();
     let scene = scene(folder.path());
-    let before = contents(&scene);
+    let before = files_in(&scene);
     let server = Served::scene(text(&scene), &["--allow-edit"]);
     for path in [
         "/",
@@ -95,14 +96,14 @@ fn paths_methods_and_sizes_lead_nowhere() {
     assert_eq!(server.answer(format!("GET /{} HTTP/1.1\r\n", "x".repeat(1 << 20)).as_bytes()).0, 431);
     assert_eq!(server.answer(format!("{}{}\r\n", server.head("GET /scene"), "A: b\r\n".repeat(99)).as_bytes()).0, 431);
     assert_eq!(server.get("/news?since=99999999999999999999&have=-1").0, 200, "a number that is none counts as 0");
-    assert!(contents(&scene) == before);
+    assert!(files_in(&scene) == before);
 }
 
 #[test]
 fn ten_thousand_random_messages_change_nothing() {
     let folder = folder();
     let scene = scene(folder.path());
-    let before = contents(&scene);
+    let before = files_in(&scene);
     let server = Served::scene(text(&scene), &["--allow-edit"]);
     let mut random = rand_pcg::Pcg64Mcg::seed_from_u64(7);
     let good = format!("{}Content-Length: 16\r\n\r\n{{\"Pause\": false }}", server.head("POST /ask")).into_bytes();
@@ -143,7 +144,7 @@ fn ten_thousand_random_messages_change_nothing() {
         println!("10,000 random messages: {memory} MiB before, {after} MiB after");
         assert!(after < memory + 24, "{memory} MiB became {after} MiB");
     }
-    assert!(contents(&scene) == before);
+    assert!(files_in(&scene) == before);
 }
 
 #[test]

@@ -10,7 +10,7 @@ mod served;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-use crate::cli_support::{Server, first_version, fmlgs, folder, tiny_dataset, tiny_splat};
+use crate::cli_support::{Server, files_in, first_version, fmlgs, folder, tiny_dataset, tiny_splat};
 use fmlgs::io::{semantic_map, trained};
 use served::Served;
 
@@ -18,14 +18,6 @@ use served::Served;
 fn scene(folder: &Path) -> PathBuf {
     first_version(folder);
     folder.join("scene")
-}
-
-/// Every file in a folder with its content.
-fn contents(folder: &Path) -> Vec<(PathBuf, Vec<u8>)> {
-    let entries = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().path());
-    let mut all: Vec<_> = entries.filter(|p| p.is_file()).map(|p| (p.clone(), std::fs::read(p).unwrap())).collect();
-    all.sort();
-    all
 }
 
 /// Arguments of a training that takes some seconds, served at a free port.
@@ -43,12 +35,12 @@ fn text(path: &Path) -> &str {
 fn a_scene_at_rest_arrives_bit_for_bit() {
     let folder = folder();
     let (scene, got) = (scene(folder.path()), folder.path().join("got.ply"));
-    let before = contents(&scene);
+    let before = files_in(&scene);
     let server = Served::scene(text(&scene), &[]);
     let done = fmlgs(&["connect", &server.url, "--headless", "--save", text(&got), "--json"]).ok();
     assert_eq!(done.json()["end"], "at rest");
     let file = std::fs::read(scene.join(trained::CLOUD_FILE)).unwrap();
-    assert!(std::fs::read(&got).unwrap() == file && contents(&scene) == before);
+    assert!(std::fs::read(&got).unwrap() == file && files_in(&scene) == before);
     // Another scene is another.
     let splat = tiny_splat(&folder.path().join("three.ply"));
     let other = Served::scene(text(&splat), &[]);
@@ -127,7 +119,7 @@ fn a_training_is_paused_and_canceled_from_afar() {
 fn objects_are_changed_only_where_that_is_allowed() {
     let folder = folder();
     let scene = scene(folder.path());
-    let before = contents(&scene);
+    let before = files_in(&scene);
     let name = || {
         let loaded = trained::load(&scene).unwrap();
         let map = semantic_map::load(&scene, loaded.state.as_deref(), &loaded.cloud).unwrap().unwrap();
@@ -136,12 +128,12 @@ fn objects_are_changed_only_where_that_is_allowed() {
     let rename = r#"{"Edit":{"Rename":[1,"the samovar"]}}"#;
     let server = Served::scene(text(&scene), &[]);
     assert_eq!(server.ask(rename).0, 403);
-    assert!(contents(&scene) == before);
+    assert!(files_in(&scene) == before);
     drop(server);
     let server = Served::scene(text(&scene), &["--allow-edit"]);
     let generation = server.news(0)["generation"].as_u64().unwrap();
     assert_eq!(server.ask(r#"{"Edit":{"Rename":[99,"nobody"]}}"#).0, 422, "there is no such object");
-    assert!(contents(&scene) == before && name() != "the samovar");
+    assert!(files_in(&scene) == before && name() != "the samovar");
     assert_eq!(server.ask(rename).0, 204);
     assert_eq!(name(), "the samovar");
     assert_eq!(server.news(0)["generation"].as_u64().unwrap(), generation + 1);
