@@ -25,6 +25,7 @@ mod chat_lines;
 mod chat_model;
 pub mod color_by;
 mod context;
+mod ctx;
 pub(crate) mod dialogs;
 mod dock;
 mod edits;

@@ -12,12 +12,19 @@ pub struct Failure {
     pub message: String,
     /// Remedy for the user; empty if the message already has one.
     pub remedy: String,
+    /// True if the request made no sense and nothing is broken: a passing message tells it.
+    pub is_refusal: bool,
 }
 
 impl Failure {
     /// The failure of an error and all its causes.
     pub(crate) fn of(error: &dyn std::error::Error, remedy: impl Into<String>) -> Self {
-        Self { message: chain(error), remedy: remedy.into() }
+        Self::new(chain(error), remedy)
+    }
+
+    /// A failure with this message and remedy.
+    pub fn new(message: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self { message: message.into(), remedy: remedy.into(), is_refusal: false }
     }
 }
 
@@ -30,13 +37,26 @@ pub enum Stop {
     Failed(Failure),
 }
 
+impl Stop {
+    /// The same with a remedy, if it has none.
+    pub(crate) fn or_remedy(mut self, remedy: &str) -> Self {
+        if let Self::Failed(failure) = &mut self
+            && failure.remedy.is_empty()
+        {
+            failure.remedy = remedy.into();
+        }
+        self
+    }
+}
+
 impl<E: std::error::Error + 'static> From<E> for Stop {
     fn from(error: E) -> Self {
         let job = (&error as &dyn std::error::Error).downcast_ref::<JobError>();
         if job.map_or_else(|| Interrupted::is_cause_of(&error), JobError::is_cancelled) {
             return Self::Cancelled;
         }
-        Self::Failed(Failure::of(&error, job.map_or("", remedy)))
+        let is_refusal = matches!(job, Some(JobError::Edit(_) | JobError::SplatEdit(_)));
+        Self::Failed(Failure { is_refusal, ..Failure::of(&error, job.map_or("", remedy)) })
     }
 }
 

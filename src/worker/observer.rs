@@ -6,7 +6,8 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::Sender;
 
-use super::protocol::{Event, JobId};
+use super::event::Event;
+use super::task::JobId;
 use super::{Control, Slot};
 use crate::pipeline::observer::{Evaluation, Observer, Progress, Severity, Signal, StepMetrics};
 use crate::scene::GaussianCloud;

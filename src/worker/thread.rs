@@ -10,10 +10,11 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
 
+use super::event::{Event, JobEnd};
 use super::failure::{Failure, Stop};
 use super::observer::{CloudSnapshot, JobObserver, Repaint};
-use super::protocol::{Command, Event, JobId, JobKind, Outcome, WorkerThread};
-use super::{Control, Slot};
+use super::task::{JobId, JobInfo, Lane, Task};
+use super::{Control, RemotePhotos, Slot};
 use crate::pipeline::observer::{Observer, Signal};
 
 /// Events that may wait to be taken.
@@ -23,66 +24,57 @@ const QUEUED: usize = 64;
 /// Time that the end of the program waits for a job to reach a consistent state.
 const FAREWELL: Duration = Duration::from_secs(5);
 
-/// Does the work of a command. The program has one implementation ([`super::jobs::PipelineJobs`]);
-/// tests of the contract have others.
-pub trait Jobs: Send + Sync + 'static {
-    /// Runs `command` to its end. Called from both lanes at once.
-    fn run(&self, command: Command, observer: &mut dyn Observer) -> Result<Outcome, Stop>;
-}
-
 /// Too many jobs wait already.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{QUEUED} jobs are waiting already; try again when some are done")]
 pub struct QueueFull;
 
+/// The closure of a job, which gives the result to its task.
+type Work = Box<dyn FnOnce(&mut JobObserver) -> JobEnd + Send>;
+
 struct Queued {
     job: JobId,
-    command: Command,
+    info: JobInfo,
+    work: Work,
     control: Arc<Control>,
 }
 
 type Controls = Arc<Mutex<HashMap<JobId, Arc<Control>>>>;
 
-/// Channels by which jobs that run elsewhere report events, as those of a worker do.
-#[derive(Clone)]
-pub(crate) struct EventSource {
-    pub(crate) events: Sender<Event>,
-    pub(crate) clouds: Arc<Slot<CloudSnapshot>>,
-    pub(crate) repaint: Repaint,
-}
-
-/// Takes a command that is carried out elsewhere; its events come through an [`EventSource`].
-pub(crate) type Elsewhere = Box<dyn Fn(&Command) -> Option<JobId> + Send>;
+/// A test's results in place of those of the jobs; `None` runs the job.
+#[cfg(test)]
+pub(crate) type Script = Box<dyn Fn(&JobInfo) -> Option<Result<Box<dyn Any + Send>, Stop>>>;
 
 /// Runs jobs in the background. Dropping it cancels all of them and waits a few seconds.
-pub struct Worker {
+pub struct Tasks {
     long: Option<Sender<Queued>>,
     short: Option<Sender<Queued>>,
     events: Option<Receiver<Event>>,
-    source: EventSource,
-    elsewhere: Option<Elsewhere>,
+    clouds: Arc<Slot<CloudSnapshot>>,
+    repaint: Repaint,
+    remote_photos: Option<RemotePhotos>,
     controls: Controls,
     next: AtomicU64,
     threads: Vec<JoinHandle<()>>,
+    #[cfg(test)]
+    pub(crate) script: Option<Script>,
 }
 
-impl Worker {
+impl Tasks {
     /// Starts the threads. Fails only if the system gives none.
-    pub fn start(jobs: impl Jobs, repaint: Repaint) -> std::io::Result<Self> {
-        let jobs = Arc::new(jobs);
+    pub fn start(repaint: Repaint) -> std::io::Result<Self> {
         let (event_sender, events) = bounded(EVENTS);
         let clouds = Arc::new(Slot::default());
         let controls = Controls::default();
         let mut threads = Vec::new();
         let mut lane = |name: &str, pool: Option<rayon::ThreadPool>| {
             let (sender, queue) = bounded::<Queued>(QUEUED);
-            let (jobs, events, clouds, controls, repaint) =
-                (Arc::clone(&jobs), event_sender.clone(), Arc::clone(&clouds), Arc::clone(&controls), repaint.clone());
+            let (events, clouds, controls, repaint) =
+                (event_sender.clone(), Arc::clone(&clouds), Arc::clone(&controls), repaint.clone());
             let work = move || {
                 for queued in queue {
-                    // The user waits for a scene to open: the job runs at normal priority.
-                    let yields = !matches!(queued.command.kind(), JobKind::Open | JobKind::Demo);
-                    let run = || run_one(&*jobs, queued, &events, &clouds, &controls, &repaint);
+                    let yields = queued.info.lane == Lane::Long;
+                    let run = || run_one(queued, &events, &clouds, &controls, &repaint);
                     match &pool {
                         Some(pool) if yields => pool.install(run),
                         _ => run(),
@@ -93,29 +85,64 @@ impl Worker {
             Ok::<_, std::io::Error>(Some(sender))
         };
         let (long, short) = (lane("long jobs", super::low_priority_pool::pool())?, lane("short jobs", None)?);
-        let source = EventSource { events: event_sender, clouds, repaint };
-        let elsewhere = None;
-        Ok(Self { long, short, events: Some(events), source, elsewhere, controls, next: AtomicU64::new(1), threads })
+        let (events, next) = (Some(events), AtomicU64::new(1));
+        Ok(Self {
+            long,
+            short,
+            events,
+            clouds,
+            repaint,
+            remote_photos: None,
+            controls,
+            next,
+            threads,
+            #[cfg(test)]
+            script: None,
+        })
     }
 
-    /// Queues a job on its lane.
-    pub fn submit(&self, command: Command) -> Result<JobId, QueueFull> {
-        if let Some(job) = self.elsewhere.as_ref().and_then(|takes| takes(&command)) {
-            return Ok(job);
-        }
-        let job = JobId(self.next.fetch_add(1, Ordering::Relaxed));
+    /// Queues a job on its lane. The closure gets the job's observer; its result goes to the task.
+    pub fn spawn<T, E>(
+        &self,
+        info: JobInfo,
+        work: impl FnOnce(&mut dyn Observer) -> Result<T, E> + Send + 'static,
+    ) -> Result<Task<T>, QueueFull>
+    where
+        T: Send + 'static,
+        E: Into<Stop>,
+    {
+        let job = JobId::Local(self.next.fetch_add(1, Ordering::Relaxed));
+        let (task, result) = Task::pair(job);
+        #[cfg(test)]
+        let scripted = self.scripted::<T>(&info);
+        let work = Box::new(move |observer: &mut JobObserver| {
+            #[cfg(test)]
+            if let Some(scripted) = scripted {
+                return result.give(scripted);
+            }
+            let done = catch_unwind(AssertUnwindSafe(|| work(observer).map_err(Into::into)))
+                .unwrap_or_else(|payload| Err(Stop::Failed(panic_failure(payload.as_ref()))));
+            result.give(done)
+        });
         let control = Arc::new(Control::default());
         lock(&self.controls).insert(job, Arc::clone(&control));
-        let lane = match command.kind().lane() {
-            WorkerThread::Long => &self.long,
-            WorkerThread::Short => &self.short,
+        let lane = match info.lane {
+            Lane::Long | Lane::Urgent => &self.long,
+            Lane::Short => &self.short,
         };
-        let queued = Queued { job, command, control };
+        let queued = Queued { job, info, work, control };
         if lane.as_ref().is_some_and(|l| l.try_send(queued).is_ok()) {
-            return Ok(job);
+            return Ok(task);
         }
         lock(&self.controls).remove(&job);
         Err(QueueFull)
+    }
+
+    /// The result that the test's script has for a job.
+    #[cfg(test)]
+    fn scripted<T: 'static>(&self, info: &JobInfo) -> Option<Result<T, Stop>> {
+        let result = self.script.as_ref()?(info)?;
+        Some(result.map(|value| *value.downcast::<T>().unwrap_or_else(|_| panic!("{}: another type", info.title))))
     }
 
     /// Asks a job to end, whether it runs or waits. Does nothing if it is over.
@@ -144,21 +171,25 @@ impl Worker {
 
     /// Slot in which the Gaussians in training are published.
     pub fn clouds(&self) -> &Slot<CloudSnapshot> {
-        &self.source.clouds
+        &self.clouds
     }
 
-    /// Offers later commands to `elsewhere` first.
-    pub(crate) fn set_elsewhere(&mut self, elsewhere: Option<Elsewhere>) {
-        self.elsewhere = elsewhere;
+    /// Slot in which a training on another computer publishes its Gaussians, and the request of a redraw.
+    pub(crate) fn shared_clouds(&self) -> (Arc<Slot<CloudSnapshot>>, Repaint) {
+        (Arc::clone(&self.clouds), Arc::clone(&self.repaint))
     }
 
-    /// Channels by which others report events beside those of the jobs.
-    pub(crate) fn source(&self) -> EventSource {
-        self.source.clone()
+    /// Loads later photos from another computer, or from this one again.
+    pub(crate) fn set_remote_photos(&mut self, photos: Option<RemotePhotos>) {
+        self.remote_photos = photos;
+    }
+
+    pub(super) fn remote_photos(&self) -> Option<&RemotePhotos> {
+        self.remote_photos.as_ref()
     }
 }
 
-impl Drop for Worker {
+impl Drop for Tasks {
     fn drop(&mut self) {
         for control in lock(&self.controls).values() {
             control.cancel();
@@ -179,14 +210,13 @@ fn lock(controls: &Controls) -> MutexGuard<'_, HashMap<JobId, Arc<Control>>> {
 }
 
 fn run_one(
-    jobs: &dyn Jobs,
     queued: Queued,
     events: &Sender<Event>,
     clouds: &Arc<Slot<CloudSnapshot>>,
     controls: &Controls,
     repaint: &Repaint,
 ) {
-    let Queued { job, command, control } = queued;
+    let Queued { job, info, work, control } = queued;
     let mut observer = JobObserver {
         job,
         control,
@@ -197,19 +227,11 @@ fn run_one(
         paused: AtomicBool::new(false),
         alone: AtomicBool::new(false),
     };
-    observer.send(Event::Started { job, kind: command.kind(), title: command.title() });
-    let result = if observer.control.signal() == Signal::Cancel {
-        Err(Stop::Cancelled)
-    } else {
-        catch_unwind(AssertUnwindSafe(|| jobs.run(command, &mut observer)))
-            .unwrap_or_else(|payload| Err(Stop::Failed(panic_failure(payload.as_ref()))))
-    };
+    observer.send(Event::Started(job, info));
+    let is_canceled = observer.control.signal() == Signal::Cancel;
+    let end = if is_canceled { JobEnd::Cancelled } else { work(&mut observer) };
     lock(controls).remove(&job);
-    observer.send(match result {
-        Ok(outcome) => Event::Finished(job, outcome),
-        Err(Stop::Cancelled) => Event::Cancelled(job),
-        Err(Stop::Failed(failure)) => Event::Failed(job, failure),
-    });
+    observer.send(Event::Ended(job, end));
 }
 
 /// Failure with the message of a panic, for display.
@@ -219,8 +241,6 @@ pub(super) fn panic_failure(payload: &(dyn Any + Send)) -> Failure {
         .map(|s| (*s).to_owned())
         .or_else(|| payload.downcast_ref::<String>().cloned())
         .unwrap_or_else(|| "no message".into());
-    Failure {
-        message: format!("Internal error: {text}"),
-        remedy: "The scene on screen is unharmed. Please report this with the log.".into(),
-    }
+    let remedy = "The scene on screen is unharmed. Please report this with the log.";
+    Failure::new(format!("Internal error: {text}"), remedy)
 }

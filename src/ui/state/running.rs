@@ -1,7 +1,7 @@
 //! The running job and its remaining time.
 
 use crate::pipeline::observer::Progress;
-use crate::worker::{JobId, JobKind};
+use crate::worker::{JobId, JobInfo};
 
 /// Time constant of the average over forecasts, s.
 const FORECAST_SECS: f64 = 30.0;
@@ -10,8 +10,7 @@ const FORECAST_SECS: f64 = 30.0;
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunningJob {
     pub(crate) id: JobId,
-    pub(crate) kind: JobKind,
-    pub(crate) title: String,
+    pub(crate) info: JobInfo,
     pub(crate) progress: Option<Progress>,
     /// Remaining time in s, if known: a moving average, as the forecasts from rates jump.
     pub(crate) left_secs: Option<f64>,
@@ -22,16 +21,16 @@ pub struct RunningJob {
 }
 
 impl RunningJob {
-    pub(super) fn begun(id: JobId, kind: JobKind, title: String) -> Self {
-        Self { id, kind, title, progress: None, left_secs: None, paused: false, canceling: false }
+    pub(super) fn begun(id: JobId, info: JobInfo) -> Self {
+        Self { id, info, progress: None, left_secs: None, paused: false, canceling: false }
     }
 
     /// Title, with a note if the job is paused or being canceled.
     pub(crate) fn text(&self) -> String {
         match (self.canceling, self.paused) {
-            (true, _) => format!("{}: canceling\u{2026}", self.title),
-            (_, true) => format!("{} (paused)", self.title),
-            _ => self.title.clone(),
+            (true, _) => format!("{}: canceling\u{2026}", self.info.title),
+            (_, true) => format!("{} (paused)", self.info.title),
+            _ => self.info.title.clone(),
         }
     }
 
@@ -63,7 +62,7 @@ mod tests {
 
     #[test]
     fn a_forecast_does_not_follow_every_jump_of_the_rate() {
-        let mut job = RunningJob::begun(JobId::default(), JobKind::Train, "Training".into());
+        let mut job = RunningJob::begun(JobId::Local(1), JobInfo::long("Training"));
         job.goes_on(at(0, 0.0, 0.0));
         assert_eq!(job.left_secs, None, "nothing is known yet");
         job.goes_on(at(10, 1.0, 10.0));
@@ -76,7 +75,7 @@ mod tests {
         (0..200).for_each(|i| job.goes_on(at(11 + i, 3.0 + i as f64, 1.0)));
         assert!((job.left_secs.expect("known") - 2_790.0).abs() < 60.0, "{:?}", job.left_secs);
         // The first of 48 views took an instant, each later one a second.
-        let mut job = RunningJob::begun(JobId::default(), JobKind::Train, "Removing".into());
+        let mut job = RunningJob::begun(JobId::Local(1), JobInfo::long("Removing"));
         let view = |i: u64, rate| Progress { total: 48, ..at(i, i as f64, rate) };
         job.goes_on(view(1, 100.0));
         (2..20).for_each(|i| job.goes_on(view(i, 1.0)));
