@@ -48,6 +48,7 @@ pub(crate) mod synth;
 pub(crate) mod thumbnails;
 pub(crate) mod train;
 pub(crate) mod video;
+pub mod workspace;
 
 pub(crate) use error::JobError;
 pub use folders::Folders;

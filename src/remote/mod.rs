@@ -23,7 +23,7 @@ mod wire;
 pub(crate) use address::{Address, bind_address};
 pub(crate) use client::Client;
 pub(crate) use follow::{Followed, follow};
-pub(crate) use link::{LinkStatus, ServerLink};
+pub(crate) use link::{LinkStatus, LinkUpdate, ServerLink};
 pub(crate) use server::{ServeOptions, Server};
 
 use std::io;

@@ -33,19 +33,20 @@ pub(super) struct SceneContext {
     pub(super) explored: Option<Arc<Explored>>,
 }
 
-impl App {
+impl SceneContext {
     /// The current scene, if one is open and has Gaussians.
-    pub(super) fn context(&self) -> Option<SceneContext> {
-        let scene = Arc::clone(self.state.scene.as_ref()?);
-        Some(SceneContext {
-            cloud: self.viewport.cloud()?.clone(),
-            map: self.state.semantics.clone(),
-            settings: self.state.render_settings(),
+    pub(super) fn new(app: &App) -> Option<Self> {
+        let (state, viewport) = (&app.state, &app.viewport);
+        let scene = Arc::clone(state.scene.as_ref()?);
+        Some(Self {
+            cloud: viewport.cloud()?.clone(),
+            map: state.semantics.clone(),
+            settings: state.render_settings(),
             cameras: scene.dataset.as_ref().map(|d| d.cameras()).unwrap_or_default(),
-            up: self.viewport.up(&scene),
-            eye: self.viewport.pose(),
-            aspect: self.viewport.aspect(),
-            explored: self.state.explored.clone(),
+            up: viewport.up(&scene),
+            eye: viewport.pose(),
+            aspect: viewport.aspect(),
+            explored: state.explored.clone(),
             scene,
         })
     }

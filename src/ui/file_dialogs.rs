@@ -9,20 +9,14 @@ use egui::{Align2, Context, Id, LayerId, Order, TextEdit};
 use egui_file::FileDialog;
 use rfd::{AsyncFileDialog, FileHandle};
 
-use super::actions::Action;
+use super::app::App;
 use super::dialogs::show_question;
-use crate::io::splat_format::SplatFormat;
 use crate::worker::Repaint;
 
 /// Least time in which a user closes a dialog: one that ends sooner is missing on the system.
 const NO_DIALOG: Duration = Duration::from_millis(500);
 
-/// File endings of scenes.
-const SCENES: [&str; 13] =
-    ["ply", "splat", "ksplat", "spz", "sog", "gltf", "glb", "json", "toml", "npy", "bin", "txt", "zip"];
-
 /// Kind of path to choose.
-#[derive(Clone, Debug, PartialEq)]
 enum Kind {
     Folder,
     /// A file of this kind, with these endings.
@@ -31,19 +25,43 @@ enum Kind {
     Save(String),
 }
 
+/// What is done with the chosen path.
+pub(super) type Then = Box<dyn FnOnce(&mut App, PathBuf)>;
+
 /// A request for a path.
-#[derive(Clone, Debug)]
-struct Request {
-    action: Action,
+pub(super) struct FileRequest {
     title: String,
     kind: Kind,
+}
+
+impl FileRequest {
+    /// A folder.
+    pub(super) fn folder(title: impl Into<String>) -> Self {
+        Self { title: title.into(), kind: Kind::Folder }
+    }
+
+    /// A file of the kind `files`, with one of these endings.
+    pub(super) fn file(title: impl Into<String>, files: &'static str, endings: &'static [&'static str]) -> Self {
+        Self { title: title.into(), kind: Kind::File(files, endings) }
+    }
+
+    /// A file to write, with the proposed name.
+    pub(super) fn save(title: impl Into<String>, name: String) -> Self {
+        Self { title: title.into(), kind: Kind::Save(name) }
+    }
+}
+
+/// A request whose dialog is open.
+struct Open {
+    request: FileRequest,
+    then: Then,
     /// Folder in which the dialog opens.
     folder: PathBuf,
 }
 
 /// The window's own dialog.
 struct Own {
-    request: Request,
+    open: Open,
     dialog: FileDialog,
     /// An existing file that is replaced if the user confirms.
     replaces: Option<PathBuf>,
@@ -61,7 +79,7 @@ pub(crate) struct FileDialogs {
     sender: Sender<Answer>,
     answers: Receiver<Answer>,
     /// Request that the system's dialog is open for.
-    asked: Option<Request>,
+    asked: Option<Open>,
     own: Option<Own>,
     /// True if the system has turned out to have no dialog.
     own_only: bool,
@@ -75,26 +93,26 @@ impl Default for FileDialogs {
 }
 
 impl FileDialogs {
-    /// Shows a dialog for an action that needs a path, unless one is open already. `name` is proposed for a file to
-    /// write; the dialog opens in `folder`.
-    pub(crate) fn ask(
+    /// Shows a dialog that opens in `folder`, unless one is open already.
+    pub(super) fn ask(
         &mut self,
-        action: Action,
-        name: &str,
+        request: FileRequest,
         folder: Option<&Path>,
         repaint: Repaint,
+        then: Then,
     ) -> std::io::Result<()> {
-        let Some((title, kind)) = dialog(&action, name).filter(|_| self.asked.is_none() && self.own.is_none()) else {
-            return Ok(());
-        };
-        let folder = folder.filter(|f| f.is_dir()).map(Path::to_path_buf);
-        let folder = folder.or_else(std::env::home_dir).unwrap_or_else(|| "/".into());
-        let request = Request { action, title, kind, folder };
-        if self.own_only {
-            self.own = Some(Own::new(request));
+        if self.asked.is_some() || self.own.is_some() {
             return Ok(());
         }
-        let system = AsyncFileDialog::new().set_title(&request.title).set_directory(&request.folder);
+        let folder = folder.filter(|f| f.is_dir()).map(Path::to_path_buf);
+        let folder = folder.or_else(std::env::home_dir).unwrap_or_else(|| "/".into());
+        let open = Open { request, then, folder };
+        if self.own_only {
+            self.own = Some(Own::new(open));
+            return Ok(());
+        }
+        let request = &open.request;
+        let system = AsyncFileDialog::new().set_title(&request.title).set_directory(&open.folder);
         // Some systems need the dialog made on the window's thread, but that thread must not wait for it.
         let answer: Pin<Box<dyn Future<Output = Option<FileHandle>> + Send>> = match &request.kind {
             Kind::Folder => Box::pin(system.pick_folder()),
@@ -115,7 +133,7 @@ impl FileDialogs {
             let _ = sender.send(answer);
             repaint();
         })?;
-        self.asked = Some(request);
+        self.asked = Some(open);
         Ok(())
     }
 
@@ -124,29 +142,29 @@ impl FileDialogs {
         self.own.is_some()
     }
 
-    /// Draws the window's own dialog. Returns the chosen path, from either dialog, with its action.
-    pub(crate) fn show(&mut self, ctx: &Context) -> Option<(Action, PathBuf)> {
+    /// Draws the window's own dialog. Returns the path chosen in either dialog, with what is done with it.
+    pub(super) fn show(&mut self, ctx: &Context) -> Option<(Then, PathBuf)> {
         if let Ok(answer) = self.answers.try_recv()
-            && let Some(request) = self.asked.take()
+            && let Some(open) = self.asked.take()
         {
             match answer {
-                Answer::Path(path) => return Some((request.action, path)),
+                Answer::Path(path) => return Some((open.then, path)),
                 Answer::Closed => {}
                 Answer::NoDialog => {
                     self.own_only = true;
-                    self.own = Some(Own::new(request));
+                    self.own = Some(Own::new(open));
                 }
             }
         }
-        let own = self.own.as_mut()?;
-        let chosen = own.show(ctx)?;
-        let Own { request, .. } = self.own.take()?;
-        chosen.map(|path| (request.action, path))
+        let chosen = self.own.as_mut()?.show(ctx)?;
+        let Own { open, .. } = self.own.take()?;
+        chosen.map(|path| (open.then, path))
     }
 }
 
 impl Own {
-    fn new(request: Request) -> Self {
+    fn new(open: Open) -> Self {
+        let request = &open.request;
         let dialog = match &request.kind {
             Kind::Folder => FileDialog::select_folder(),
             Kind::File(_, endings) => {
@@ -161,14 +179,14 @@ impl Own {
         let mut dialog = dialog
             .id(Self::layer().id)
             .title(&request.title)
-            .initial_path(&request.folder)
+            .initial_path(&open.folder)
             .show_rename(false)
             .show_new_folder(matches!(request.kind, Kind::Save(_)))
             .anchor(Align2::CENTER_CENTER, [0.0, 0.0])
             .default_size([560.0, 380.0])
             .keep_on_top(true);
         dialog.open();
-        Self { request, dialog, replaces: None }
+        Self { open, dialog, replaces: None }
     }
 
     fn layer() -> LayerId {
@@ -193,7 +211,7 @@ impl Own {
             egui_file::State::Open => None,
             egui_file::State::Selected => {
                 let path = self.dialog.path().map(Path::to_path_buf)?;
-                if matches!(self.request.kind, Kind::Save(_)) && path.exists() {
+                if matches!(self.open.request.kind, Kind::Save(_)) && path.exists() {
                     self.replaces = Some(path);
                     return None;
                 }
@@ -211,38 +229,4 @@ fn name_fields(ctx: &Context) {
     for (field, name) in fields.zip(["Folder", "File name"]) {
         ctx.accesskit_node_builder(field, |node| node.set_label(name));
     }
-}
-
-/// Title and kind of the dialog of an action that needs a path; `name` is proposed for a new file.
-fn dialog(action: &Action, name: &str) -> Option<(String, Kind)> {
-    let save = |ending: &str| Kind::Save(format!("{name}{ending}"));
-    let (title, kind) = match action {
-        Action::OpenFolder => ("Open a folder of photos or a trained scene", Kind::Folder),
-        Action::OpenFile => ("Open a scene", Kind::File("Scenes", &SCENES)),
-        Action::AddModel(id) => {
-            let title = format!("Choose the checkpoint of {id}, or the description (.json) of its exported files");
-            return Some((title, Kind::File("Networks", &["pt", "pth", "bin", "safetensors", "json"])));
-        }
-        Action::ExportAll => ("Choose an empty folder for all objects and parts", Kind::Folder),
-        Action::ExportPhrases => ("Choose a folder for the masks", Kind::Folder),
-        Action::ChooseTrueMask => {
-            ("Choose the true mask of this view", Kind::File("Masks", &["png", "bmp", "tif", "tiff"]))
-        }
-        Action::ChooseMasks => ("Choose the folder with the masks", Kind::Folder),
-        Action::ExportPly | Action::ExportTarget(_) | Action::ExportCrop => {
-            let title = format!("Export Gaussians: the ending chooses among {}", SplatFormat::endings());
-            return Some((title, save(".ply")));
-        }
-        Action::ExportPage => ("Export page", save(".html")),
-        Action::OpenPath => ("Open a camera path", Kind::File("Camera paths", &["json"])),
-        Action::ChooseBeside => ("Open the folder of another scene", Kind::Folder),
-        Action::ChooseReport | Action::ChooseSecondReport => ("Open a report", Kind::File("Reports", &["json"])),
-        Action::SavePath => ("Save the camera path", save("-path.json")),
-        Action::SaveChat => ("Save the conversation", save("-conversation.md")),
-        Action::ExportVideo => ("Export video", save(".mp4")),
-        Action::SaveTrueMask => ("Save the true mask", save("-true-mask.png")),
-        Action::Screenshot => ("Save the view", save(".png")),
-        _ => return None,
-    };
-    Some((title.to_owned(), kind))
 }

@@ -14,7 +14,7 @@ use crate::pipeline::semantics::edit::Edit;
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::scene::undo::UndoHistory;
 use crate::scene::{CameraPath, CropBox, GaussianCloud, Identities, IdentityId, NOBODY, SemanticMap};
-use crate::worker::{JobId, ViewMode};
+use crate::worker::ViewMode;
 
 /// Largest memory for Gaussians of earlier states, bytes.
 const MOST_BYTES: u64 = 1 << 30;
@@ -274,7 +274,6 @@ pub(super) enum EditStep {
 
 /// A running change of objects and parts.
 pub(super) struct Editing {
-    pub(super) job: JobId,
     /// Description; `None` if it restores an earlier or later state.
     pub(super) what: Option<String>,
     /// True if it is a redo.
@@ -283,7 +282,6 @@ pub(super) struct Editing {
 
 /// A running search of objects and parts that becomes a step of the history.
 pub(super) struct FoundStep {
-    pub(super) job: JobId,
     /// Description.
     pub(super) what: String,
     /// True if it adds to the existing objects.

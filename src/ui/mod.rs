@@ -1,21 +1,10 @@
 //! The window.
 //!
-//! [`state::AppState`] is the window's state: a pure fold over the worker's events. [`app::App`] draws it and turns the
-//! user's input into [`Action`]s. An action changes the view or becomes a job. Nothing here computes for longer than a
-//! redraw may take.
+//! [`app::App`] draws [`state::AppState`] and turns the user's input into [`Action`]s; what each does stands in its row
+//! and in [`act`]. An action changes the window at once or starts a job. Panes and tools get one [`ctx::Ctx`]. Nothing
+//! here computes for longer than a redraw may take.
 
 mod act;
-mod act_file;
-mod act_find;
-mod act_look;
-mod act_phrases;
-mod act_query;
-mod act_remove;
-mod act_report;
-mod act_splats;
-mod act_train;
-mod act_view;
-mod act_window;
 pub mod actions;
 pub mod app;
 pub(crate) mod beside;
@@ -28,7 +17,6 @@ mod context;
 mod ctx;
 pub(crate) mod dialogs;
 mod dock;
-mod edits;
 mod file_dialogs;
 mod find_dialog;
 mod fonts;
@@ -39,7 +27,6 @@ pub(crate) mod labels;
 pub(crate) mod layout;
 pub(crate) mod palette;
 pub(crate) mod panes;
-mod remote;
 pub(crate) mod state;
 mod text_field;
 pub(crate) mod theme;
@@ -57,7 +44,6 @@ use crate::jobs::Folders;
 use crate::render::Device;
 use crate::scene::plan::PlanOverride;
 use crate::worker::Start;
-use crate::worker::jobs::PipelineJobs;
 
 /// Opens the window with the user's overrides of plans, carries out `first` in order, and returns when it is closed.
 pub fn run(first: Vec<Start>, overrides: Vec<PlanOverride>) -> eframe::Result {
@@ -108,7 +94,7 @@ fn open(
         Box::new(|cc| {
             let shared = cc.wgpu_render_state.clone().filter(|w| Device::adopt(&w.adapter, &w.device, &w.queue));
             let first = first.into_iter().map(Action::from);
-            let mut app = app::App::new(cc, PipelineJobs::new(Folders::of_user()), first)?;
+            let mut app = app::App::new(cc, Folders::of_user(), first)?;
             shared.into_iter().for_each(|window| app.viewport.share(window));
             app.override_plan(overrides);
             Ok(Box::new(app))

@@ -5,8 +5,8 @@
 
 use crossbeam_channel::{Receiver, Sender, TryRecvError, bounded};
 
-use super::failure::Stop;
 use super::event::JobEnd;
+use super::failure::Stop;
 
 /// Identifier of a job: local to one worker, or of a job on another computer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]

@@ -174,9 +174,14 @@ impl Tasks {
         &self.clouds
     }
 
-    /// Slot in which a training on another computer publishes its Gaussians, and the request of a redraw.
-    pub(crate) fn shared_clouds(&self) -> (Arc<Slot<CloudSnapshot>>, Repaint) {
-        (Arc::clone(&self.clouds), Arc::clone(&self.repaint))
+    /// The same slot, for a training on another computer.
+    pub(crate) fn shared_clouds(&self) -> Arc<Slot<CloudSnapshot>> {
+        Arc::clone(&self.clouds)
+    }
+
+    /// The request of a redraw after each event.
+    pub(crate) fn repaint(&self) -> Repaint {
+        Arc::clone(&self.repaint)
     }
 
     /// Loads later photos from another computer, or from this one again.

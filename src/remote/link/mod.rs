@@ -6,23 +6,26 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use crossbeam_channel::{Sender, bounded};
+use crossbeam_channel::{Receiver, Sender, bounded};
 
 use self::thread::LinkThread;
 use super::Address;
 use super::client::{Client, ClientError};
 use super::wire::Ask;
-use crate::jobs::Folders;
+use crate::jobs::workspace::TrainedRun;
+use crate::jobs::{Folders, OpenedScene};
 use crate::pipeline::semantics::edit::Edit;
-use crate::worker::{Command, Elsewhere, Event, EventSource, JobId};
+use crate::scene::{PhotoPixels, SemanticMap};
+use crate::worker::{CloudSnapshot, Event, JobId, RemotePhotos, Repaint, Slot, Task, TaskResult};
 
 mod thread;
 
 /// Maximum number of queued requests.
 const WISHES: usize = 64;
-/// Size of the range of job numbers that each link has.
-const JOBS_OF_LINK: u64 = 1 << 32;
-static LINKS: AtomicU64 = AtomicU64::new(0);
+/// Updates that may wait for the window; the thread waits when there are more.
+const UPDATES: usize = 1024;
+/// Number of the next job on another computer.
+static NEXT_JOB: AtomicU64 = AtomicU64::new(1);
 
 /// Status of the connection.
 #[derive(Clone, Debug)]
@@ -36,38 +39,55 @@ pub(crate) struct LinkStatus {
     pub(crate) retry_at: Option<Instant>,
 }
 
+/// Update of the window by its server.
+pub(crate) enum LinkUpdate {
+    /// An event of a job on the server.
+    Event(Event),
+    /// The server's scene.
+    Opened(Box<OpenedScene>),
+    /// The server's training has ended.
+    Trained(JobId, Box<TrainedRun>),
+    /// Objects and parts were changed.
+    Objects(Arc<SemanticMap>),
+    /// The server refused a request, and why.
+    Refused(String),
+}
+
 /// Connection to a server. Dropping it ends its thread.
 pub(crate) struct ServerLink {
     wishes: Sender<Wish>,
-    jobs: Arc<AtomicU64>,
-    first_job: u64,
+    updates: Receiver<LinkUpdate>,
     status: Arc<Mutex<LinkStatus>>,
 }
 
 impl ServerLink {
-    /// Connects to a server and sends its events to `source`; files made from its scene go into `folders`. Fails only
+    /// Connects to a server; Gaussians in training go into the slot, files made from its scene into `folders`. Fails only
     /// if the system gives no random numbers or no thread.
-    pub(crate) fn start(address: Address, folders: Folders, source: EventSource) -> std::io::Result<Self> {
+    pub(crate) fn start(
+        address: Address,
+        folders: Folders,
+        clouds: Arc<Slot<CloudSnapshot>>,
+        repaint: Repaint,
+    ) -> std::io::Result<Self> {
         let (wishes, wished) = bounded(WISHES);
-        let first_job = JobId::REMOTE.0 + JOBS_OF_LINK * LINKS.fetch_add(1, Ordering::Relaxed);
-        let jobs = Arc::new(AtomicU64::new(first_job));
+        let (sender, updates) = bounded(UPDATES);
         let host = address.host.clone();
         let status = LinkStatus { host, connected: false, problem: None, retry_at: None };
         let status = Arc::new(Mutex::new(status));
-        let out = Out { source, status: Arc::clone(&status) };
-        let thread = LinkThread::new(Client::new(address)?, folders, wished, out, Arc::clone(&jobs));
+        let out = Out { updates: sender, clouds, repaint, status: Arc::clone(&status) };
+        let thread = LinkThread::new(Client::new(address)?, folders, wished, out);
         std::thread::Builder::new().name("remote scene".into()).spawn(move || thread.work())?;
-        Ok(Self { wishes, jobs, first_job, status })
+        Ok(Self { wishes, updates, status })
+    }
+
+    /// The next update, if one waits.
+    pub(crate) fn next_update(&self) -> Option<LinkUpdate> {
+        self.updates.try_recv().ok()
     }
 
     /// Status of the connection.
     pub(crate) fn status(&self) -> LinkStatus {
         lock(&self.status).clone()
-    }
-
-    /// Returns whether a job belongs to this link.
-    pub(crate) fn owns(&self, job: JobId) -> bool {
-        (self.first_job..self.first_job + JOBS_OF_LINK).contains(&job.0)
     }
 
     /// Asks the training to pause or to go on. Returns false if the queue is full.
@@ -85,28 +105,33 @@ impl ServerLink {
         self.wishes.try_send(Wish::Ask(Ask::Edit(edit))).is_ok()
     }
 
-    /// Returns a handler of the commands that only the server can carry out: photos.
-    pub(crate) fn takes(&self) -> Elsewhere {
-        let (wishes, jobs) = (self.wishes.clone(), Arc::clone(&self.jobs));
-        Box::new(move |command| {
-            let Command::Photo { index, max_side_px, photo } = command else { return None };
-            let (index, side_px, title) = (*index, *max_side_px, photo.name.clone());
-            let job = JobId(jobs.fetch_add(1, Ordering::Relaxed) + 1);
-            // If the queue is full, the worker gets the command and refuses it, as it has no such file.
-            wishes.try_send(Wish::Photo { job, index, side_px, title }).ok().map(|()| job)
+    /// Returns the loader of the server's photos.
+    pub(crate) fn photos(&self) -> RemotePhotos {
+        let wishes = self.wishes.clone();
+        Box::new(move |index, photo, side_px| {
+            let (task, result) = Task::pair(new_job());
+            let title = photo.name.clone();
+            wishes.try_send(Wish::Photo { job: task.job(), index, side_px, title, result }).ok().map(|()| task)
         })
     }
+}
+
+/// Number of a new job on another computer.
+fn new_job() -> JobId {
+    JobId::Remote(NEXT_JOB.fetch_add(1, Ordering::Relaxed))
 }
 
 /// Request of the window to the server.
 enum Wish {
     Ask(Ask),
-    Photo { job: JobId, index: usize, side_px: u32, title: String },
+    Photo { job: JobId, index: usize, side_px: u32, title: String, result: TaskResult<PhotoPixels> },
 }
 
-/// Output of the thread: events and status.
+/// Output of the thread: updates, Gaussians and status.
 struct Out {
-    source: EventSource,
+    updates: Sender<LinkUpdate>,
+    clouds: Arc<Slot<CloudSnapshot>>,
+    repaint: Repaint,
     status: Arc<Mutex<LinkStatus>>,
 }
 
@@ -127,14 +152,18 @@ impl From<ClientError> for Break {
 
 impl Out {
     fn tell(&self, event: Event) -> Result<(), Break> {
-        let told = self.source.events.send(event).map_err(|_| Break::Gone);
-        (self.source.repaint)();
+        self.update(LinkUpdate::Event(event))
+    }
+
+    fn update(&self, update: LinkUpdate) -> Result<(), Break> {
+        let told = self.updates.send(update).map_err(|_| Break::Gone);
+        (self.repaint)();
         told
     }
 
     fn status(&self, change: impl FnOnce(&mut LinkStatus)) {
         change(&mut lock(&self.status));
-        (self.source.repaint)();
+        (self.repaint)();
     }
 }
 

@@ -3,21 +3,21 @@
 use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, RecvTimeoutError};
 
 use super::super::client::{Client, ClientError, Pulled};
 use super::super::wire::{Ask, SceneCard, WireEvent};
-use super::{Break, Out, Wish, lock};
+use super::{Break, LinkUpdate, Out, Wish, lock, new_job};
 use crate::io::IoError;
 use crate::jobs::open::{Origin, received};
+use crate::jobs::workspace::TrainedRun;
 use crate::jobs::{Folders, OpenedScene, plan};
 use crate::pipeline::observer::{Evaluation, Severity};
 use crate::pipeline::train::TrainConfig;
 use crate::scene::{GaussianCloud, Machine, SemanticMap, text};
-use crate::worker::{CloudSnapshot, Event, Failure, JobId, JobKind, Outcome};
+use crate::worker::{CloudSnapshot, Event, Failure, JobEnd, JobId, JobInfo, Makes, Stop};
 
 /// Time between two requests while a training runs, and at rest.
 const BUSY: Duration = Duration::from_millis(300);
@@ -40,7 +40,6 @@ pub(super) struct LinkThread {
     have: u64,
     /// Scene on screen.
     shown: Option<(SceneCard, Arc<OpenedScene>)>,
-    jobs: Arc<AtomicU64>,
     /// Local job of the server's training.
     training: Option<JobId>,
     evaluations: Vec<Evaluation>,
@@ -51,13 +50,7 @@ pub(super) struct LinkThread {
 }
 
 impl LinkThread {
-    pub(super) fn new(
-        client: Client,
-        folders: Folders,
-        wished: Receiver<Wish>,
-        out: Out,
-        jobs: Arc<AtomicU64>,
-    ) -> Self {
+    pub(super) fn new(client: Client, folders: Folders, wished: Receiver<Wish>, out: Out) -> Self {
         Self {
             client,
             folders,
@@ -69,7 +62,6 @@ impl LinkThread {
             since: 0,
             have: 0,
             shown: None,
-            jobs,
             training: None,
             evaluations: Vec::new(),
             map: None,
@@ -78,9 +70,9 @@ impl LinkThread {
     }
 
     pub(super) fn work(mut self) {
-        let job = self.new_job();
+        let job = new_job();
         let title = format!("Connecting to {}", self.client.address.host);
-        if self.out.tell(Event::Started { job, kind: JobKind::Open, title }).is_err() {
+        if self.out.tell(Event::Started(job, JobInfo::long(title).makes(Makes::Scene))).is_err() {
             return;
         }
         if self.client.address.is_open() {
@@ -110,7 +102,7 @@ impl LinkThread {
             // A refusal ends the open job; a lost connection keeps it for the next attempt.
             let told = match (again, opening.take_if(|_| !again), self.training.take_if(|_| !again)) {
                 (false, Some(job), _) | (false, None, Some(job)) => {
-                    self.out.tell(Event::Failed(job, Failure { message: text, remedy: String::new() }))
+                    self.out.tell(Event::Ended(job, JobEnd::Failed(Failure::new(text, ""))))
                 }
                 _ if was_connected || !again => self.out.tell(Event::Note(job, Severity::Warning, text)),
                 _ => Ok(()),
@@ -130,7 +122,7 @@ impl LinkThread {
                 Ok(photo @ Wish::Photo { .. }) => self.later.push_back(photo),
                 Ok(Wish::Ask(_)) => {
                     let text = "There is no connection at the moment, so that was not passed on";
-                    let note = Event::Note(self.new_job(), Severity::Warning, text.into());
+                    let note = Event::Note(new_job(), Severity::Warning, text.into());
                     if self.out.tell(note).is_err() {
                         return true;
                     }
@@ -159,7 +151,7 @@ impl LinkThread {
             cut_off = known && self.training.is_some();
             known = cut_off;
             if let Some(job) = self.training.take() {
-                self.ends(Event::Cancelled(job))?;
+                self.ends(job, JobEnd::Cancelled)?;
             }
         }
         let card = card.value;
@@ -170,7 +162,7 @@ impl LinkThread {
         if !lock(&self.out.status).connected {
             self.out.status(|s| (s.connected, s.problem, s.retry_at) = (true, None, None));
             let text = format!("Connected to {}", self.client.address.host);
-            let job = self.new_job();
+            let job = new_job();
             self.out.tell(Event::Note(job, Severity::Info, text))?;
         }
         loop {
@@ -213,18 +205,19 @@ impl LinkThread {
         self.have = have;
         self.map = scene.semantics.clone();
         self.shown = Some((card, Arc::new(scene.clone())));
-        let job = opening.take().unwrap_or_else(|| self.new_job());
-        self.out.tell(Event::Finished(job, Outcome::Opened(Box::new(scene))))
+        let job = opening.take().unwrap_or_else(|| new_job());
+        self.out.tell(Event::Ended(job, JobEnd::Finished))?;
+        self.out.update(LinkUpdate::Opened(Box::new(scene)))
     }
 
     /// Emits an event of the server as an event of a local job.
     fn hear(&mut self, event: WireEvent) -> Result<(), Break> {
         if let WireEvent::Started(title) = &event {
-            let job = self.new_job();
+            let job = new_job();
             let title = format!("{} on {}", text::line(title), self.client.address.host);
             (self.training, self.busy) = (Some(job), true);
             self.evaluations.clear();
-            return self.out.tell(Event::Started { job, kind: JobKind::Train, title });
+            return self.out.tell(Event::Started(job, JobInfo::long(title).makes(Makes::Gaussians).pausable()));
         }
         let Some(job) = self.training else { return Ok(()) };
         match event {
@@ -238,32 +231,33 @@ impl LinkThread {
             WireEvent::Paused(paused) => self.out.tell(Event::Paused(job, paused)),
             WireEvent::Finished(folder) => {
                 self.pull()?;
-                let outcome = self.trained(folder);
-                self.ends(Event::Finished(job, outcome))
+                let run = Box::new(self.trained(folder));
+                self.ends(job, JobEnd::Finished)?;
+                self.out.update(LinkUpdate::Trained(job, run))
             }
             WireEvent::Cancelled => {
                 self.pull()?;
-                self.ends(Event::Cancelled(job))
+                self.ends(job, JobEnd::Cancelled)
             }
-            WireEvent::Failed(message) => self.ends(Event::Failed(job, Failure { message, remedy: String::new() })),
+            WireEvent::Failed(message) => self.ends(job, JobEnd::Failed(Failure::new(message, ""))),
         }
     }
 
-    fn ends(&mut self, event: Event) -> Result<(), Break> {
+    fn ends(&mut self, job: JobId, end: JobEnd) -> Result<(), Break> {
         (self.training, self.busy) = (None, false);
-        self.out.tell(event)
+        self.out.tell(Event::Ended(job, end))
     }
 
-    fn trained(&mut self, folder: String) -> Outcome {
+    fn trained(&mut self, folder: String) -> TrainedRun {
         let semantics = self.map.clone();
-        let latest = self.out.source.clouds.newer_than(0);
+        let latest = self.out.clouds.newer_than(0);
         let cloud = latest.as_ref().map(|(_, snapshot)| (&*snapshot.cloud, snapshot.cloud.sh_degree));
         let dataset = self.shown.as_ref().and_then(|(_, scene)| scene.dataset.as_deref());
         let machine = self.machine.get_or_insert_with(plan::machine);
         let facts = plan::facts(machine, dataset, cloud, &TrainConfig::default());
-        let facts = Box::new(facts.with_semantics(semantics.as_deref()));
+        let facts = facts.with_semantics(semantics.as_deref());
         let evaluations = std::mem::take(&mut self.evaluations);
-        Outcome::Trained { evaluations, out: folder.into(), semantics, runs: Vec::new(), stopped_at: None, facts }
+        TrainedRun { evaluations, out: folder.into(), semantics, runs: Vec::new(), stopped_at: None, facts }
     }
 
     /// Fetches the newest Gaussians and publishes them.
@@ -274,16 +268,13 @@ impl LinkThread {
         self.map = map.map(Arc::new);
         match (self.training, self.map.clone()) {
             (Some(job), _) => {
-                self.out.source.clouds.publish(CloudSnapshot { job, cloud: Arc::new(cloud), step: pulled.step });
+                self.out.clouds.publish(CloudSnapshot { job, cloud: Arc::new(cloud), step: pulled.step });
             }
             // At rest, only objects and parts change.
-            (None, Some(map)) => {
-                let job = self.new_job();
-                self.out.tell(Event::Finished(job, Outcome::Edited(map)))?;
-            }
+            (None, Some(map)) => self.out.update(LinkUpdate::Objects(map))?,
             (None, None) => {}
         }
-        (self.out.source.repaint)();
+        (self.out.repaint)();
         Ok(())
     }
 
@@ -297,15 +288,14 @@ impl LinkThread {
         loop {
             match self.later.pop_front().map_or_else(|| self.wished.recv_deadline(due), Ok) {
                 Ok(Wish::Ask(ask)) => return self.ask(&ask),
-                Ok(Wish::Photo { job, index, side_px, title }) => match self.client.photo(index, side_px) {
-                    Ok(pixels) => {
-                        let pixels = Arc::new(pixels);
-                        self.photo(job, title, Ok(Outcome::Photo { index, max_side_px: side_px, pixels }))?;
+                Ok(Wish::Photo { job, index, side_px, title, result }) => match self.client.photo(index, side_px) {
+                    Err(ClientError::Lost(why)) => {
+                        self.later.push_back(Wish::Photo { job, index, side_px, title, result });
+                        return Err(ClientError::Lost(why).into());
                     }
-                    Err(ClientError::Refused(why)) => self.photo(job, title, Err(why))?,
-                    Err(lost) => {
-                        self.later.push_back(Wish::Photo { job, index, side_px, title });
-                        return Err(lost.into());
+                    got => {
+                        let failed = |e: ClientError| Stop::Failed(Failure::new(e.to_string(), ""));
+                        self.photo(job, &title, result.give(got.map_err(failed)))?;
                     }
                 },
                 Err(RecvTimeoutError::Timeout) => return Ok(()),
@@ -314,28 +304,18 @@ impl LinkThread {
         }
     }
 
-    /// Emits the result of a photo.
-    fn photo(&self, job: JobId, title: String, got: Result<Outcome, String>) -> Result<(), Break> {
-        self.out.tell(Event::Started { job, kind: JobKind::Photo, title: format!("Loading {title}") })?;
-        self.out.tell(match got {
-            Ok(outcome) => Event::Finished(job, outcome),
-            Err(message) => Event::Failed(job, Failure { message, remedy: String::new() }),
-        })
+    /// Emits the events of a photo.
+    fn photo(&self, job: JobId, title: &str, end: JobEnd) -> Result<(), Break> {
+        self.out.tell(Event::Started(job, JobInfo::short(format!("Loading {title}")).aside()))?;
+        self.out.tell(Event::Ended(job, end))
     }
 
     /// Sends a command. A refusal is reported and does not end the connection.
     fn ask(&mut self, ask: &Ask) -> Result<(), Break> {
         match self.client.ask(ask) {
-            Err(ClientError::Refused(why)) => {
-                let job = self.new_job();
-                self.out.tell(Event::Finished(job, Outcome::Refused(why)))
-            }
+            Err(ClientError::Refused(why)) => self.out.update(LinkUpdate::Refused(why)),
             done => Ok(done?),
         }
-    }
-
-    fn new_job(&self) -> JobId {
-        JobId(self.jobs.fetch_add(1, Ordering::Relaxed) + 1)
     }
 }
 

@@ -1,65 +1,76 @@
-//! The application: applies events, draws the window, sends commands.
+//! The application: takes events and results of jobs, draws the window, carries out actions.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
+use std::path::PathBuf;
 use std::sync::Arc;
 
-use egui::{CentralPanel, Frame, Margin, Panel, Ui};
+use egui::Ui;
 
+use super::act::{edits, query, remote, view, window};
+use super::actions::{Action, Pane};
 use super::camera::CameraPane;
 use super::chat::Chat;
-use super::dialogs::{self, Question};
-use super::dock::{DockContents, Place};
-use super::file_dialogs::FileDialogs;
-use super::find_dialog::{AwaitedModels, FindDialog};
-use super::history::{EditStep, Editing, FoundStep};
+use super::dialogs::{Answer, Question};
+use super::file_dialogs::{FileDialogs, FileRequest};
+use super::find_dialog::FindDialog;
+use super::history::{EditStep, Editing};
 use super::keep_dialog::KeepDialog;
 use super::layout::Layout;
-use super::palette::{Palette, shortcut_sheet};
+use super::palette::Palette;
 use super::panes::{
-    bars, clean::CleanPane, dataset::PhotoThumbnails, empty::FirstPage, log, models::Models,
-    object_thumbnails::ObjectThumbnails, objects::ObjectsPane, phrases::PhrasesPane, plan, problems,
-    report::ReportPane, training, unposed,
+    clean::CleanPane, empty::FirstPage, models::ModelsPane, object_thumbnails::ObjectThumbnails, objects::ObjectsPane,
+    photos::PhotosPane, phrases::PhrasesPane, report::ReportPane, training::TrainingPane,
 };
-use super::state::AppState;
+use super::state::{AppState, Tone};
 use super::theme;
 use super::toasts::Toasts;
 use super::viewport::Viewport;
+use crate::jobs::Folders;
+use crate::jobs::workspace::Workspace;
+use crate::pipeline::observer::Observer;
 use crate::remote::ServerLink;
 use crate::scene::plan::PlanOverride;
 use crate::scene::resource_log::{self, ResourceKind};
-use crate::ui::actions::{Action, Pane};
-use crate::worker::{Event, JobKind, Jobs, Repaint, Worker};
+use crate::worker::{Event, Failure, JobId, JobInfo, Repaint, Stop, Tasks};
 
-mod contents;
-mod keyboard;
+mod draw;
+
+pub(super) use draw::context;
+
+/// What is done once a job has ended.
+type Then = Box<dyn FnOnce(&mut App)>;
 
 /// The window's application.
 pub struct App {
-    /// State of the window, changed by events alone.
+    /// State of the window.
     pub state: AppState,
     /// Choices that are stored.
     pub layout: Layout,
     /// The view of the scene.
     pub viewport: Viewport,
-    pub(super) worker: Worker,
+    pub(super) workspace: Arc<Workspace>,
+    pub(super) tasks: Tasks,
+    /// What is done with the results of running jobs.
+    pending: BTreeMap<JobId, Then>,
     /// The server whose scene is on screen.
     pub(super) link: Option<ServerLink>,
     pub(super) repaint: Repaint,
     pub(super) dialogs: FileDialogs,
-    pub(super) question: Option<Question>,
+    pub(super) question: Option<(Question, Box<dyn FnOnce(&mut App, Answer)>)>,
     pub(super) find_dialog: FindDialog,
-    pub(super) awaited: Option<AwaitedModels>,
+    pub(super) keep_dialog: Option<KeepDialog>,
     /// True if the query field is open although queries are impossible.
     pub(super) asks_in_vain: bool,
     pub(super) palette: Palette,
     pub(super) sheet: bool,
     first_page: FirstPage,
-    photo_thumbnails: PhotoThumbnails,
-    object_thumbnails: ObjectThumbnails,
+    photos: PhotosPane,
+    thumbnails: ObjectThumbnails,
+    training: TrainingPane,
     /// The list of phrases.
     pub phrases: PhrasesPane,
     pub(super) objects: ObjectsPane,
-    pub(super) models: Models,
+    pub(super) models: ModelsPane,
     pub(super) clean: CleanPane,
     /// Error against run time.
     pub(crate) report: ReportPane,
@@ -70,7 +81,7 @@ pub struct App {
     toasts: Toasts,
     pub(super) actions: Vec<Action>,
     /// Window time of the last frame, s.
-    last_frame: f64,
+    pub(super) last_frame: f64,
     /// Number of the scene that was explored in advance.
     pub(super) explored_for: u64,
     /// Lines of the trace that are in the log already.
@@ -78,9 +89,6 @@ pub struct App {
     /// Edits of objects and parts that wait for the running one.
     pub(super) edits: VecDeque<EditStep>,
     pub(super) editing: Option<Editing>,
-    /// The running search, if there were objects before.
-    pub(super) finding: Option<FoundStep>,
-    pub(super) keep_dialog: Option<KeepDialog>,
     /// True if the view fills the window.
     pub(super) full_view: bool,
     /// True if objects were known in the last frame.
@@ -88,11 +96,11 @@ pub struct App {
 }
 
 impl App {
-    /// Starts the worker and carries out `first` in order. `jobs` does the work. Fails only if the system cannot start
-    /// threads.
+    /// Starts the worker and carries out `first` in order; files go into `folders`. Fails only if the system cannot
+    /// start threads.
     pub fn new(
         cc: &eframe::CreationContext<'_>,
-        jobs: impl Jobs,
+        folders: Folders,
         first: impl IntoIterator<Item = Action>,
     ) -> std::io::Result<Self> {
         theme::install(&cc.egui_ctx);
@@ -104,9 +112,11 @@ impl App {
         cc.egui_ctx.set_theme(layout.theme);
         cc.egui_ctx.set_zoom_factor(layout.zoom);
         let mut state = AppState::new(layout.recent.clone());
-        state.say(super::state::Tone::Info, format!("FMLGS {}", env!("CARGO_PKG_VERSION")));
+        state.say(Tone::Info, format!("FMLGS {}", env!("CARGO_PKG_VERSION")));
         Ok(Self {
-            worker: Worker::start(jobs, unhurried)?,
+            workspace: Arc::new(Workspace::new(folders)),
+            tasks: Tasks::start(unhurried)?,
+            pending: BTreeMap::new(),
             link: None,
             viewport: Viewport::new(Arc::clone(&repaint))?,
             state,
@@ -115,16 +125,17 @@ impl App {
             dialogs: FileDialogs::default(),
             question: None,
             find_dialog: FindDialog::default(),
-            awaited: None,
+            keep_dialog: None,
             asks_in_vain: false,
             palette: Palette::default(),
             sheet: false,
             first_page: FirstPage::default(),
-            photo_thumbnails: PhotoThumbnails::default(),
-            object_thumbnails: ObjectThumbnails::default(),
+            photos: PhotosPane::default(),
+            thumbnails: ObjectThumbnails::default(),
+            training: TrainingPane::default(),
             phrases: PhrasesPane::default(),
             objects: ObjectsPane::default(),
-            models: Models::default(),
+            models: ModelsPane::default(),
             clean: CleanPane::default(),
             report: ReportPane::default(),
             camera: CameraPane::default(),
@@ -135,8 +146,6 @@ impl App {
             traced: 0,
             edits: VecDeque::new(),
             editing: None,
-            finding: None,
-            keep_dialog: None,
             full_view: false,
             had_objects: false,
             actions: first.into_iter().collect(),
@@ -163,26 +172,87 @@ impl App {
         overrides.into_iter().for_each(|one| self.layout.plan.set(one));
     }
 
-    /// Applies all events since the last call.
-    fn take_events(&mut self, ctx: &egui::Context) {
-        while let Some(event) = self.worker.next_event() {
-            if self.is_of_earlier_server(&event) {
-                continue;
+    /// Starts a job; `then` gets its result if it finishes. Returns false, with a message, if too many jobs wait.
+    pub(super) fn start<T, E>(
+        &mut self,
+        info: JobInfo,
+        work: impl FnOnce(&mut dyn Observer) -> Result<T, E> + Send + 'static,
+        then: impl FnOnce(&mut Self, T) + 'static,
+    ) -> bool
+    where
+        T: Send + 'static,
+        E: Into<Stop> + 'static,
+    {
+        self.start_to_end(info, work, |app, _, result| result.into_iter().for_each(|value| then(app, value)))
+    }
+
+    /// Starts a job; `then` gets its number and its result, or how it ended without one.
+    pub(super) fn start_to_end<T, E>(
+        &mut self,
+        info: JobInfo,
+        work: impl FnOnce(&mut dyn Observer) -> Result<T, E> + Send + 'static,
+        then: impl FnOnce(&mut Self, JobId, Result<T, Stop>) + 'static,
+    ) -> bool
+    where
+        T: Send + 'static,
+        E: Into<Stop> + 'static,
+    {
+        let title = info.title.clone();
+        match self.tasks.spawn(info, work) {
+            Ok(task) => {
+                let then = move |app: &mut Self| {
+                    // The result is there before the event of the end.
+                    let result = task.poll().unwrap_or(Err(Stop::Cancelled));
+                    then(app, task.job(), result);
+                };
+                self.pending.insert(task.job(), Box::new(then));
+                true
             }
-            self.hear(&event);
-            if matches!(event, Event::Started { job, kind: JobKind::Train, .. } if job.is_remote()) {
-                self.layout.dock.activate(Pane::Training);
+            Err(e) => {
+                self.state.toast(Tone::Warning, format!("{title}: {e}"));
+                false
             }
-            let found = self.finding.take_if(|s| event.is_end() && event.job() == s.job);
-            self.actions.extend(self.state.apply(event));
-            found.into_iter().for_each(|step| self.found(step));
         }
-        self.state.link = self.link.as_ref().map(ServerLink::status);
+    }
+
+    /// Asks for a path; `then` continues with it.
+    pub(super) fn choose(&mut self, request: FileRequest, then: impl FnOnce(&mut Self, PathBuf) + 'static) {
+        let (folder, repaint) = (self.layout.folder.as_deref(), Arc::clone(&self.repaint));
+        if let Err(e) = self.dialogs.ask(request, folder, repaint, Box::new(then)) {
+            self.state.fail("Opening the file dialog", Failure::of(&e, "Close other programs and try again."));
+        }
+    }
+
+    /// Shows a question; `then` gets the answer.
+    pub(super) fn put_question(&mut self, question: Question, then: impl FnOnce(&mut Self, Answer) + 'static) {
+        self.question = Some((question, Box::new(then)));
+    }
+
+    /// True if objects, parts or Gaussians are being changed, or wait for it.
+    pub(super) fn is_editing(&self) -> bool {
+        self.editing.is_some() || !self.edits.is_empty()
+    }
+
+    /// Applies an event, and continues after the end of a job.
+    fn hear(&mut self, event: Event) {
+        let ended = event.is_end().then(|| event.job());
+        self.state.apply(event);
+        if let Some(then) = ended.and_then(|job| self.pending.remove(&job)) {
+            then(self);
+        }
+    }
+
+    /// Takes over all events, results and updates since the last call.
+    fn take_events(&mut self, ctx: &egui::Context) {
+        while let Some(event) = self.tasks.next_event() {
+            self.hear(event);
+        }
+        remote::take_updates(self);
         self.state.replan(&self.layout.plan, self.layout.config.limits());
         self.state.stamp_log(resource_log::now_secs());
         for load in resource_log::since(self.traced) {
             self.traced += 1;
-            self.state.say_at(Some(load.at_secs), super::state::Tone::Info, load.text());
+            self.state.say_at(Some(load.at_secs), Tone::Info, load.text());
         }
         // New objects are the next thing to work with, so their pane comes to the front.
         let has_objects = self.state.semantics.is_some();
@@ -190,149 +260,26 @@ impl App {
         if std::mem::replace(&mut self.had_objects, has_objects) != has_objects && self.layout.shows(news) {
             self.layout.dock.activate(news);
         }
-        self.explore();
-        self.viewport.update(&mut self.state, &self.worker);
+        view::explore(self);
+        self.viewport.update(&mut self.state, &self.tasks);
         let brushed = self.viewport.take_brushed();
         let cloud = self.viewport.cloud().map(|cloud| &**cloud);
         let chosen = self.clean.update(&mut self.state, cloud, brushed, self.layout.shows(Pane::Clean));
         self.viewport.visibility.set_chosen(chosen);
         self.camera.on_scene(self.state.scene_number);
-        self.visited();
         for effect in self.chat.news() {
-            self.settle(false);
-            self.effect(effect);
+            edits::settle(self, false);
+            query::effect(self, effect);
         }
-        self.next_edit();
-        self.next_stroke();
-        self.send_chat();
-        self.play(ctx);
-        self.first_page.update(ctx, &mut self.state, &self.viewport, &self.worker);
-        self.photo_thumbnails.update(ctx, &mut self.state);
-        self.object_thumbnails.update(ctx, &mut self.state, self.viewport.cloud().map(|c| &**c), &self.worker);
-    }
-
-    /// Moves the camera along the flight or path that plays.
-    fn play(&mut self, ctx: &egui::Context) {
-        let now = ctx.input(|i| i.time);
-        let step = now - std::mem::replace(&mut self.last_frame, now);
-        if let Some(pose) = self.camera.tick(step) {
-            self.viewport.stand(&pose, &self.state, now);
-            ctx.request_repaint();
-        }
-        if self.viewport.take_new_picture() && self.camera.player.playing {
-            self.camera.player.count(now);
-        }
-    }
-
-    fn panes(&mut self, ui: &mut Ui) {
-        let bar = Frame::new().fill(theme::panel()).inner_margin(Margin::symmetric(10, 6));
-        if !self.fills_window() {
-            let Self { state, layout, actions, viewport, .. } = self;
-            Panel::top("menus")
-                .frame(bar)
-                .show(ui, |ui| bars::top(ui, state, layout, viewport.queries.is_second(), actions));
-            Panel::bottom("status")
-                .frame(bar)
-                .show(ui, |ui| bars::status(ui, state, layout, viewport.picture(), actions));
-        }
-        problems::show(ui, &mut self.state);
-        CentralPanel::no_frame().frame(Frame::new().fill(theme::canvas())).show(ui, |ui| {
-            if self.fills_window() {
-                return DockContents::show(self, ui, Place::View);
-            }
-            let mut dock = std::mem::take(&mut self.layout.dock);
-            dock.show(ui, self);
-            self.layout.dock = dock;
-        });
-    }
-
-    /// True if the view fills the window.
-    fn fills_window(&self) -> bool {
-        self.full_view && self.state.scene.is_some()
-    }
-
-    fn show_view(&mut self, ui: &mut Ui) {
-        let rect = ui.available_rect_before_wrap();
-        let Self { state, layout, actions, viewport, .. } = self;
-        if state.scene.is_none() {
-            self.first_page.show(ui, state, actions);
-            return self.show_vain_query(ui, rect);
-        }
-        let route = layout.shows(Pane::Camera).then_some(&self.camera);
-        theme::dark(ui, |ui| viewport.show(ui, state, layout, route, actions));
-        theme::dark(ui, |ui| self.show_vain_query(ui, rect));
-    }
-
-    fn show_pane(&mut self, ui: &mut Ui, pane: Pane) {
-        let Self { state, layout, actions, viewport, .. } = self;
-        match pane {
-            Pane::Dataset => {
-                self.photo_thumbnails.show(ui, state, layout, viewport.photo_index(), &self.worker, actions);
-            }
-            Pane::Chat => {
-                let map = state.semantics.clone();
-                let identities = map.as_deref().map(|map| &map.identities);
-                self.chat.show(ui, &mut layout.chat, &self.object_thumbnails, identities, actions);
-            }
-            Pane::Training => training::show(ui, state, layout, &self.report.curves(state), actions),
-            Pane::Objects => {
-                let (thumbnails, visibility) = (&self.object_thumbnails, &viewport.visibility);
-                let selected = viewport.picking.selected();
-                self.objects.show(ui, state, thumbnails, visibility, selected, actions);
-            }
-            Pane::Query => viewport.show_query(ui, state, actions),
-            Pane::Plan => plan::show(ui, &state.plan, &mut layout.plan),
-            Pane::Models => self.models.show(ui, state, &mut layout.finding, &self.worker, actions),
-            Pane::Phrases => {
-                let comparing = viewport.queries.truth().is_some();
-                self.phrases.show(ui, state, comparing, actions);
-            }
-            Pane::Clean => self.clean.show(ui, state, viewport, actions),
-            Pane::Camera => {
-                let eye = viewport.pose();
-                if let Some(pose) = self.camera.show(ui, state, &eye, actions) {
-                    viewport.stand(&pose, state, ui.input(|i| i.time));
-                }
-            }
-            Pane::Report => self.report.show(ui, state, layout, viewport, actions),
-            Pane::Log => log::show(ui, state),
-        }
-    }
-
-    fn over_everything(&mut self, ctx: &egui::Context) {
-        if ctx.input(|i| !i.raw.hovered_files.is_empty()) {
-            dialogs::drop_hint(ctx);
-        }
-        if let Some(action) = self.palette.show(ctx, &self.layout) {
-            self.actions.push(action);
-        }
-        shortcut_sheet(ctx, &mut self.sheet);
-        if let Some(question) = &self.question
-            && let Some(answer) = question.show(ctx)
-        {
-            self.question = None;
-            match answer {
-                Some(Action::DeleteRemoved) => self.delete_removed(),
-                Some(action @ Action::TrainChanged(_)) => self.actions.push(action),
-                Some(action) => self.give_up_and(action),
-                None => {}
-            }
-        }
-        self.ask_for_means(ctx);
-        self.ask_what_to_keep(ctx);
-        if let Some(photos) = &self.state.unposed
-            && !unposed::show(ctx, photos, &mut self.actions)
-        {
-            self.state.unposed = None;
-        }
-        let Self { state, actions, .. } = self;
-        if state.error.as_ref().is_some_and(|e| dialogs::show_error(ctx, e, state.scene.is_some(), actions)) {
-            state.error = None;
-        }
-        if let Some((action, path)) = self.dialogs.show(ctx) {
-            self.chosen(action, path);
-        }
-        self.toasts.show(ctx, &mut self.state, ctx.content_rect().shrink2(egui::vec2(0.0, 44.0)));
+        edits::next(self);
+        query::send_chat(self);
+        view::play(self, ctx);
+        let Self { state, viewport, tasks, workspace, .. } = self;
+        self.first_page.update(ctx, state, viewport, tasks, workspace);
+        self.photos.update(ctx, state);
+        self.thumbnails.update(ctx, state, viewport.cloud().map(|c| &**c), tasks);
+        self.models.update(state);
+        self.training.curves = self.report.curves(state);
     }
 }
 
@@ -345,15 +292,15 @@ impl eframe::App for App {
         let ctx = ui.ctx().clone();
         theme::begin_frame(&ctx);
         self.layout.zoom = ctx.zoom_factor();
-        self.keys_and_drops(&ctx);
-        self.panes(ui);
-        self.over_everything(&ctx);
+        window::take_input(self, &ctx);
+        draw::panes(self, ui);
+        draw::over_everything(self, &ctx);
         for action in std::mem::take(&mut self.actions) {
-            self.settle(false);
-            self.act(action, &ctx);
+            edits::settle(self, false);
+            action.act(self, &ctx);
             ctx.request_repaint();
         }
-        self.settle(!ctx.input(|i| i.pointer.any_down()) && !ctx.text_edit_focused());
+        edits::settle(self, !ctx.input(|i| i.pointer.any_down()) && !ctx.text_edit_focused());
     }
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {

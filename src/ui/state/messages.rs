@@ -1,10 +1,8 @@
 //! Messages to the user: lines of the log, toasts, errors, and problems over the view.
 
 use super::AppState;
-use crate::jobs::remove::{self, RemovedScene};
 use crate::scene::text;
-use crate::ui::actions::Action;
-use crate::worker::{Failure, JobId, JobKind};
+use crate::worker::{Failure, JobId};
 
 /// Lines kept in the log.
 const MAX_LOG: usize = 1_000;
@@ -92,41 +90,11 @@ impl AppState {
         self.next_toast += 1;
     }
 
-    /// Takes over a scene made by a removal, to be shown beside its source.
-    pub(super) fn take_removed(&mut self, removed: RemovedScene) -> Action {
-        self.toast(Tone::Good, remove::told(&removed.name, &removed.report));
-        self.say(Tone::Info, format!("Saved to {}", removed.folder.display()));
-        let show = Action::OpenBeside(Some(removed.folder.clone()));
-        self.removed = Some(removed);
-        show
-    }
-
-    /// " on HOST" if the scene is on another computer.
-    pub(super) fn elsewhere(&self) -> String {
-        let origin = self.scene.as_ref().and_then(|scene| scene.remote.as_ref());
-        origin.map_or_else(String::new, |origin| format!(" on {}", origin.host))
-    }
-
-    /// Handles the failure of a job.
-    pub(super) fn failed(&mut self, job: JobId, failure: Failure) {
-        let doing = match self.end_short(job) {
-            // An unreadable photo does not interrupt the user.
-            Some((JobKind::Photo, title)) => {
-                self.toast(Tone::Warning, format!("{title}: {}", failure.message));
-                self.failed_photos.push(job);
-                return;
-            }
-            Some((_, title)) => title,
-            None => self.end(job).map_or_else(|| "Working".to_owned(), |j| j.title),
-        };
-        self.fail(doing, failure);
-    }
-
     /// Shows an error until it is dismissed, and logs it.
     pub(crate) fn fail(&mut self, doing: impl Into<String>, failure: Failure) {
         let doing = text::line(&doing.into()).into_owned();
         let [message, remedy] = [&failure.message, &failure.remedy].map(|t| text::lines(t).into_owned());
-        let failure = Failure { message, remedy };
+        let failure = Failure::new(message, remedy);
         self.say(Tone::Error, format!("{doing}: {}", failure.message));
         self.error = Some(ErrorBox { doing, failure });
     }

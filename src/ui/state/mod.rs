@@ -7,22 +7,18 @@ use std::sync::Arc;
 pub use self::messages::{ErrorBox, LogLine};
 pub(crate) use self::messages::{Toast, Tone};
 pub use self::running::RunningJob;
-use super::actions::Action;
 use super::beside::Beside;
 use super::history::ChangeHistory;
 use super::labels::{PhraseTable, ScreenNames};
 pub(crate) use super::train_history::TrainHistory;
 use crate::io::unposed::Unposed;
 use crate::jobs::OpenedScene;
-use crate::jobs::clean::MeasuredCloud;
-use crate::jobs::demo::QUESTION;
-use crate::jobs::go_to::{Approached, Explored};
-use crate::jobs::inspect::InspectedPixel;
+use crate::jobs::go_to::Explored;
 use crate::jobs::models::ModelList;
+use crate::jobs::rearrange::RearrangedScene;
 use crate::jobs::recent::RunSummary;
 use crate::jobs::remove::RemovedScene;
-use crate::jobs::select::Selected;
-use crate::jobs::thumbnails::ThumbnailSet;
+use crate::jobs::workspace::TrainedRun;
 use crate::math::format;
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
@@ -30,13 +26,10 @@ use crate::pipeline::train::TrainConfig;
 use crate::remote::LinkStatus;
 use crate::render::RenderSettings;
 use crate::scene::findings::IdentityEvidence;
-use crate::scene::{GaussianCloud, Limits, Overrides, PhotoPixels, SceneFacts, ScenePlan, SemanticMap, text};
-use crate::worker::{Event, JobId, JobKind, Outcome, Versioned, WorkerThread};
+use crate::scene::{GaussianCloud, IdentityId, Limits, Overrides, SceneFacts, ScenePlan, SemanticMap, text};
+use crate::worker::{Event, JobEnd, JobId, JobInfo, Lane, Makes, Versioned};
 
-mod asking;
-mod edited;
 mod messages;
-mod opened;
 mod running;
 
 /// Length of the recent list.
@@ -72,27 +65,14 @@ pub struct AppState {
     pub(crate) sizes: Vec<usize>,
     pub(crate) labels: ScreenNames,
     pub phrases: PhraseTable,
-    /// New thumbnails of objects and parts, until they are taken over.
-    pub(crate) thumbnails: Option<(Arc<SemanticMap>, ThumbnailSet)>,
     /// Free space of the scene, if explored.
     pub explored: Option<Arc<Explored>>,
-    /// The flight that was searched last, until the window takes it.
-    pub(crate) visited: Option<Approached>,
-    /// The pixel inspected last, until the window takes it.
-    pub(crate) inspected: Option<Arc<InspectedPixel>>,
-    /// Edited Gaussians, until the view takes them; measures of Gaussians, until the pane takes them.
-    pub(crate) rearranged: Option<Arc<GaussianCloud>>,
-    pub(crate) splats_measured: Option<Arc<MeasuredCloud>>,
-    /// Result of the selection tool's clicks and strokes, until the tool takes it.
-    pub(crate) selected: Option<(JobId, Arc<Selected>)>,
     /// Models and the engine that runs them, once listed.
     pub(crate) models: Option<Arc<ModelList>>,
     /// Count of models installed so far.
     pub(crate) models_installed: u64,
     /// Changes that can be undone and redone, by the user or the agent.
     pub(crate) changes: ChangeHistory,
-    /// The newest short job that has ended; they end in order.
-    pub(crate) short_jobs_done: JobId,
     /// The running long job.
     pub job: Option<RunningJob>,
     /// History of the current scene's training.
@@ -117,19 +97,13 @@ pub struct AppState {
     pub recent: Vec<PathBuf>,
     /// All trainings of recent folders with several.
     pub recent_runs: Vec<(PathBuf, Vec<RunSummary>)>,
-    /// Thumbnails of recent scenes, until the window takes them.
-    pub(crate) recent_pictures: Vec<(PathBuf, PhotoPixels)>,
-    /// Recently loaded photos, by index and size limit, until the window takes them.
-    pub(crate) photos: BTreeMap<(usize, u32), Arc<PhotoPixels>>,
-    /// Jobs of photos that could not be loaded, until the window marks them.
-    pub(crate) failed_photos: Vec<JobId>,
     /// Error against run time, if a report is open.
     pub report: Option<ShownReport>,
     /// The report to compare with.
     pub second_report: Option<ShownReport>,
     /// Status of the connection to the server of the current scene, if it has one.
     pub(crate) link: Option<LinkStatus>,
-    short_jobs: BTreeMap<JobId, (JobKind, String)>,
+    short_jobs: BTreeMap<JobId, JobInfo>,
     next_toast: u64,
 }
 
@@ -139,21 +113,22 @@ impl AppState {
         Self { recent, ..Self::default() }
     }
 
-    /// Applies one event; returns the actions that the window carries out next.
-    pub(crate) fn apply(&mut self, event: Event) -> Vec<Action> {
+    /// Applies one event.
+    pub(crate) fn apply(&mut self, event: Event) {
         match event {
-            Event::Started { job, kind, title } if kind.lane() == WorkerThread::Short => {
-                self.short_jobs.insert(job, (kind, text::line(&title).into_owned()));
-            }
-            Event::Started { job, kind, title } => {
-                let title = text::line(&title).into_owned();
-                if kind == JobKind::Train {
+            Event::Started(job, info) => {
+                let info = JobInfo { title: text::line(&info.title).into_owned(), ..info };
+                if info.lane == Lane::Short {
+                    self.short_jobs.insert(job, info);
+                    return;
+                }
+                if info.makes == Makes::Gaussians {
                     // Objects belong to Gaussians that are about to change.
                     self.set_semantics(None);
                     self.training_job = Some(job);
                 }
-                self.say(Tone::Info, title.clone());
-                self.job = Some(RunningJob::begun(job, kind, title));
+                self.say(Tone::Info, info.title.clone());
+                self.job = Some(RunningJob::begun(job, info));
             }
             Event::Progress(job, progress) => {
                 let stage = text::line(&progress.stage).into_owned();
@@ -169,28 +144,45 @@ impl AppState {
                     self.history.push(metrics);
                 }
             }
-            Event::Evaluation(job, evaluation) => self.evaluated(job, evaluation),
+            Event::Evaluation(job, evaluation) => self.evaluated_in_training(job, evaluation),
             Event::Note(_, Severity::Info, text) => self.say(Tone::Info, text),
             Event::Note(job, Severity::Warning, text) => {
-                if self.job.as_ref().is_some_and(|j| j.id == job && j.kind.makes_scene()) {
+                if self.job.as_ref().is_some_and(|j| j.id == job && j.info.makes != Makes::Nothing) {
                     self.problem(Some(job), &text);
                 }
                 self.say(Tone::Warning, text);
             }
-            Event::Finished(job, outcome) => return self.finished(job, outcome),
-            Event::Cancelled(job) => {
-                if let Some(ended) = self.end(job) {
-                    let reached = ended.progress.as_ref().filter(|_| ended.kind == JobKind::Train).map(|p| p.done);
-                    self.resumable.iter_mut().zip(reached).for_each(|((_, step), reached)| *step = reached);
-                    self.toast(Tone::Info, format!("{}: canceled", ended.title));
-                    // Results measured before the cancellation are shown.
-                    let scene = self.scene.as_ref().filter(|_| ended.kind == JobKind::Measure);
-                    return scene.map(|s| Action::OpenReport(s.report_out.clone())).into_iter().collect();
+            Event::Ended(job, end) => self.ended(job, end),
+        }
+    }
+
+    /// Takes a job that has ended off the screen.
+    fn ended(&mut self, job: JobId, end: JobEnd) {
+        let short = self.short_jobs.remove(&job);
+        let long = self.job.take_if(|j| j.id == job);
+        match end {
+            JobEnd::Finished => {
+                if long.is_some_and(|j| j.info.makes != Makes::Nothing) {
+                    // Problems of the scene before do not apply to the new one.
+                    self.problems.retain(|(of, _)| *of == Some(job));
                 }
             }
-            Event::Failed(job, failure) => self.failed(job, failure),
+            JobEnd::Cancelled => {
+                if let Some(long) = long {
+                    let reached = long.progress.filter(|_| long.info.makes == Makes::Gaussians).map(|p| p.done);
+                    self.resumable.iter_mut().zip(reached).for_each(|((_, step), reached)| *step = reached);
+                    self.toast(Tone::Info, format!("{}: canceled", long.info.title));
+                }
+            }
+            JobEnd::Failed(failure) => {
+                let info = short.or(long.map(|j| j.info)).unwrap_or_else(|| JobInfo::long("Working"));
+                match (failure.is_refusal, info.is_aside) {
+                    (true, _) => self.toast(Tone::Warning, failure.message),
+                    (false, true) => self.toast(Tone::Warning, format!("{}: {}", info.title, failure.message)),
+                    (false, false) => self.fail(info.title, failure),
+                }
+            }
         }
-        Vec::new()
     }
 
     /// Puts a path on top of the recent list.
@@ -207,7 +199,12 @@ impl AppState {
 
     /// True if a training is running or paused.
     pub fn is_training(&self) -> bool {
-        self.job.as_ref().is_some_and(|j| j.kind == JobKind::Train)
+        self.is_running(Makes::Gaussians)
+    }
+
+    /// True if a job that makes this is running or paused.
+    fn is_running(&self, makes: Makes) -> bool {
+        self.job.as_ref().is_some_and(|j| j.info.makes == makes)
     }
 
     /// Updates the plan for the user's overrides and the settings of the next training.
@@ -252,131 +249,139 @@ impl AppState {
         }
     }
 
-    /// Takes the long job off the screen if it is `job`.
-    fn end(&mut self, job: JobId) -> Option<RunningJob> {
-        self.end_short(job);
-        self.job.take_if(|j| j.id == job)
-    }
-
-    /// Takes a short job off the list if it is `job`.
-    fn end_short(&mut self, job: JobId) -> Option<(JobKind, String)> {
-        let ended = self.short_jobs.remove(&job)?;
-        if !job.is_remote() {
-            self.short_jobs_done = self.short_jobs_done.max(job);
-        }
-        Some(ended)
-    }
-
-    fn evaluated(&mut self, job: JobId, evaluation: Evaluation) {
+    fn evaluated_in_training(&mut self, job: JobId, evaluation: Evaluation) {
         if self.training_job == Some(job) {
-            self.say(
-                Tone::Info,
-                format!(
-                    "Step {}: held-out PSNR {:.2} dB, SSIM {:.3}",
-                    evaluation.step, evaluation.psnr, evaluation.ssim
-                ),
-            );
+            let Evaluation { step, psnr, ssim, .. } = &evaluation;
+            self.say(Tone::Info, format!("Step {step}: held-out PSNR {psnr:.2} dB, SSIM {ssim:.3}"));
             self.history.evaluations.push(evaluation);
         }
     }
 
-    fn finished(&mut self, job: JobId, outcome: Outcome) -> Vec<Action> {
-        let ended = self.end(job);
-        if ended.as_ref().is_some_and(|j| j.kind.makes_scene()) {
-            // Problems of the scene before do not apply to the new one.
-            self.problems.retain(|(of, _)| *of == Some(job));
+    /// Sets objects and parts, with their counts.
+    pub(crate) fn set_semantics(&mut self, map: Option<Arc<SemanticMap>>) {
+        self.facts = map.as_ref().map_or_else(Vec::new, |m| m.facts());
+        self.sizes = self.facts.iter().map(|f| f.gaussians).collect();
+        self.set_facts(self.plan.facts.clone().with_semantics(map.as_deref()));
+        self.semantics = map.map(Versioned::new);
+    }
+
+    /// Shows an opened scene.
+    pub(crate) fn opened(&mut self, scene: OpenedScene, is_demo: bool) {
+        for warning in scene.dataset.iter().flat_map(|d| d.warnings.clone()) {
+            self.toast(Tone::Warning, warning);
         }
-        let mut next = Vec::new();
-        match outcome {
-            Outcome::Opened(scene) => {
-                let kind = ended.map(|j| j.kind);
-                self.opened(*scene, matches!(kind, Some(JobKind::Demo | JobKind::DemoPhotos)));
-                next.extend(match kind {
-                    Some(JobKind::Demo) => Some(Action::Ask(QUESTION.into())),
-                    Some(JobKind::DemoPhotos) => Some(Action::StartTraining),
-                    _ => None,
-                });
-            }
-            Outcome::Beside(scene) => {
-                self.beside = Beside::of(*scene);
-                if self.beside.is_none() {
-                    self.toast(Tone::Warning, "There is nothing to compare with: it has no Gaussians.");
-                }
-            }
-            Outcome::Removed(removed) => next.push(self.take_removed(*removed)),
-            Outcome::Rearranged(done) => self.take_rearranged(*done),
-            Outcome::SplatsMeasured(measured) => {
-                self.say(Tone::Info, format!("{} measured", format::things(measured.cloud.len(), "Gaussian")));
-                self.splats_measured = Some(measured);
-            }
-            Outcome::Trained { evaluations, out, semantics, runs, stopped_at, facts } => {
-                let carried = semantics.is_some();
-                if self.training_job == Some(job) {
-                    self.history.evaluations = evaluations;
-                    self.set_facts(*facts);
-                    self.set_semantics(semantics);
-                    self.scene = self.scene.take().map(|s| Arc::new(OpenedScene { runs, ..s.trained_in(&out) }));
-                    let reached = stopped_at.or(self.history.steps.last().map(|s| s.step));
-                    self.resumable.iter_mut().zip(reached).for_each(|((_, step), reached)| *step = reached);
-                }
-                self.say(Tone::Info, format!("Saved to {}{}", out.display(), self.elsewhere()));
-                if let Some(ended) = ended.filter(|_| stopped_at.is_some()) {
-                    self.toast(Tone::Info, format!("{}: canceled", ended.title));
-                    return next;
-                }
-                let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));
-                self.toast(Tone::Good, format!("Training finished{}", quality.unwrap_or_default()));
-                let has_masks = self.scene.as_ref().is_some_and(|s| s.masks.is_some());
-                next.extend((has_masks && !carried).then_some(Action::FindObjects));
-            }
-            Outcome::InputsChanged(how) => next.push(Action::AskHowToTrain(how)),
-            Outcome::Evaluated(mut e) => {
-                if let Some(last) = self.history.steps.last() {
-                    (e.step, e.secs) = (last.step, last.secs);
-                }
-                self.history.evaluations.retain(|old| old.step < e.step);
-                self.toast(Tone::Good, format!("Held-out PSNR {:.2} dB, SSIM {:.3}", e.psnr, e.ssim));
-                self.history.evaluations.push(e);
-            }
-            Outcome::Objects(map) => {
-                self.toast(Tone::Good, format!("{} found", map.identities.counted()));
-                self.set_semantics(Some(map));
-            }
-            Outcome::Edited(map) => self.set_semantics(Some(map)),
-            Outcome::Refused(why) => self.toast(Tone::Warning, why),
-            Outcome::Scale(meters, stored) => {
-                let scaled = |s: &Arc<OpenedScene>| OpenedScene { metres_per_unit: Some(meters), ..(**s).clone() };
-                self.scene = self.scene.as_ref().map(scaled).map(Arc::new);
-                let kept = if stored { "saved with the scene" } else { "not saved: save or train the scene first" };
-                self.toast(Tone::Good, format!("1 unit is {}, {kept}", format::length(1.0, Some(meters))));
-            }
-            Outcome::Models(models) => self.models = Some(models),
-            Outcome::ModelInstalled(id) => {
-                self.models_installed += 1;
-                self.toast(Tone::Good, format!("Model {id} is ready"));
-            }
-            Outcome::Approached(explored, visited) => {
-                self.explored = Some(explored);
-                self.visited = Some(visited);
-            }
-            Outcome::Inspected(pixel) => self.inspected = Some(pixel),
-            Outcome::Selected(selected) => self.selected = Some((job, selected)),
-            Outcome::Explored(explored) => self.explored = Some(explored),
-            Outcome::Report { path, report, second } => {
-                *(if second { &mut self.second_report } else { &mut self.report }) = Some(ShownReport { path, report });
-            }
-            Outcome::Thumbnails(map, drawn) => self.thumbnails = Some((map, drawn)),
-            Outcome::Phrases(rows, to) => self.phrases.finished(rows, to),
-            Outcome::Written(path) => self.toast(Tone::Good, format!("Saved to {}", path.display())),
-            Outcome::Unposed(photos) => self.unposed = Some(photos),
-            Outcome::Kept => {}
-            Outcome::RecentRuns(runs) => self.recent_runs = runs,
-            Outcome::RecentPictures(pictures) => self.recent_pictures = pictures,
-            Outcome::Photo { index, max_side_px, pixels } => {
-                self.photos.insert((index, max_side_px), pixels);
-            }
+        self.history =
+            TrainHistory { steps: scene.history.steps.clone(), evaluations: scene.history.evaluations.clone() };
+        self.training_job = None;
+        self.previous = TrainHistory::default();
+        let reached = self.history.steps.last().map(|s| s.step);
+        self.resumable = scene.resumable.clone().zip(reached);
+        if !is_demo && scene.remote.is_none() {
+            self.remember(scene.path.clone());
         }
-        next
+        self.scene_number += 1;
+        (self.explored, self.beside, self.removed) = (None, None, None);
+        self.set_facts(scene.facts.clone());
+        self.antialias = scene.render.antialias;
+        self.set_semantics(scene.semantics.clone());
+        (self.labels, self.phrases) = Default::default();
+        self.scene = Some(Arc::new(scene));
+    }
+
+    /// Shows the end of a training. Returns true if its objects are to be found next.
+    pub(crate) fn trained(&mut self, job: JobId, run: TrainedRun) -> bool {
+        let TrainedRun { evaluations, out, semantics, runs, stopped_at, facts } = run;
+        let carried = semantics.is_some();
+        if self.training_job == Some(job) {
+            self.history.evaluations = evaluations;
+            self.set_facts(facts);
+            self.set_semantics(semantics);
+            self.scene = self.scene.take().map(|s| Arc::new(OpenedScene { runs, ..s.trained_in(&out) }));
+            let reached = stopped_at.or(self.history.steps.last().map(|s| s.step));
+            self.resumable.iter_mut().zip(reached).for_each(|((_, step), reached)| *step = reached);
+        }
+        let origin = self.scene.as_ref().and_then(|scene| scene.remote.as_ref());
+        let host = origin.map_or_else(String::new, |origin| format!(" on {}", origin.host));
+        self.say(Tone::Info, format!("Saved to {}{host}", out.display()));
+        if stopped_at.is_some() {
+            self.toast(Tone::Info, "Training: canceled");
+            return false;
+        }
+        let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));
+        self.toast(Tone::Good, format!("Training finished{}", quality.unwrap_or_default()));
+        !carried && self.scene.as_ref().is_some_and(|s| s.masks.is_some())
+    }
+
+    /// Shows a held-out evaluation of the Gaussians on screen.
+    pub(crate) fn evaluated(&mut self, mut e: Evaluation) {
+        if let Some(last) = self.history.steps.last() {
+            (e.step, e.secs) = (last.step, last.secs);
+        }
+        self.history.evaluations.retain(|old| old.step < e.step);
+        self.toast(Tone::Good, format!("Held-out PSNR {:.2} dB, SSIM {:.3}", e.psnr, e.ssim));
+        self.history.evaluations.push(e);
+    }
+
+    /// Shows edited Gaussians, which continue in another folder as the same scene; returns them.
+    pub(crate) fn rearranged(&mut self, done: RearrangedScene) -> Option<Arc<GaussianCloud>> {
+        let RearrangedScene { cloud, map, folder, name, state, facts } = done;
+        let before = self.scene.take()?;
+        if !before.is_edited {
+            let text = format!("Edits go into {}; {} stays as it is.", folder.display(), before.name);
+            self.toast(Tone::Info, text);
+            self.remember(folder.clone());
+        }
+        self.scene = Some(Arc::new(OpenedScene {
+            path: folder.clone(),
+            name,
+            trained: true,
+            cloud: Some(Arc::clone(&cloud)),
+            semantics: map.clone(),
+            report_out: folder.join("report"),
+            out: folder,
+            state: Some(state),
+            // The new folder has no training to continue.
+            resumable: None,
+            is_edited: true,
+            ..(*before).clone()
+        }));
+        self.resumable = None;
+        self.explored = None;
+        self.set_facts(facts);
+        self.set_semantics(map);
+        Some(cloud)
+    }
+
+    /// Sets the length of a unit, and reports it.
+    pub(crate) fn scaled(&mut self, meters: f64, is_stored: bool) {
+        let scaled = |s: &Arc<OpenedScene>| OpenedScene { metres_per_unit: Some(meters), ..(**s).clone() };
+        self.scene = self.scene.as_ref().map(scaled).map(Arc::new);
+        let kept = if is_stored { "saved with the scene" } else { "not saved: save or train the scene first" };
+        self.toast(Tone::Good, format!("1 unit is {}, {kept}", format::length(1.0, Some(meters))));
+    }
+
+    /// True if neither an object or part nor its parts have a Gaussian.
+    pub(crate) fn is_empty(&self, id: IdentityId) -> bool {
+        self.sizes.get(id as usize) == Some(&0)
+    }
+
+    /// Reason why queries are impossible, as a sentence; `None` if they are possible.
+    pub(crate) fn why_no_query(&self) -> Option<String> {
+        if self.semantics.is_some() {
+            return None;
+        }
+        let Some(scene) = &self.scene else { return Some("Nothing to query yet: open a scene first.".into()) };
+        let why = match &scene.remote {
+            Some(origin) => return Some(format!("Nothing to query yet: no objects are known on {}.", origin.host)),
+            None if self.is_training() => "Nothing to query while training runs: objects come after it.",
+            None if self.is_running(Makes::Objects) => "Nothing to query yet: objects are being found.",
+            None if !self.is_trained() => "Nothing to query yet: train, then find objects first (Objects pane).",
+            None if scene.dataset.is_some() => "Nothing to query yet: find objects first (Objects pane).",
+            None => {
+                "Nothing to query yet: select an object by clicks first (Ctrl+P, \u{201c}select a new object\u{201d})."
+            }
+        };
+        Some(why.into())
     }
 }
 

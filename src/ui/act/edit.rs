@@ -1,0 +1,108 @@
+//! Changes of objects, parts and Gaussians, and the tools that make them.
+
+use std::sync::Arc;
+
+use super::{edits, remote, view};
+use crate::jobs::clean::{self, MeasureRequest};
+use crate::jobs::edit::EditRequest;
+use crate::jobs::rearrange::SplatEdit;
+use crate::jobs::select::SelectFor;
+use crate::math::format;
+use crate::pipeline::observer::Observer;
+use crate::pipeline::semantics::edit::Edit;
+use crate::scene::IdentityId;
+use crate::ui::actions::Pane;
+use crate::ui::app::App;
+use crate::ui::history::EditStep;
+use crate::ui::state::Tone;
+use crate::worker::JobInfo;
+
+/// Corrects objects and parts.
+pub(in crate::ui) fn apply(app: &mut App, edit: Edit) {
+    edits::queue(app, EditStep::Request(EditRequest::Apply(edit)));
+}
+
+/// Begins selecting a new object or a part of one; `None` ends the tool.
+pub(in crate::ui) fn segment(app: &mut App, of: Option<IdentityId>) {
+    app.viewport.segment(of.map(SelectFor::New), &app.state);
+}
+
+/// Begins correcting the extent of an identity.
+pub(in crate::ui) fn correct(app: &mut App, id: IdentityId) {
+    app.viewport.segment(Some(SelectFor::Extent(id)), &app.state);
+}
+
+/// Adds or corrects what is selected.
+pub(in crate::ui) fn add_segment(app: &mut App) {
+    if let Some(edit) = app.viewport.take_edit() {
+        apply(app, edit);
+    }
+}
+
+/// Begins moving, turning or recoloring an identity.
+pub(in crate::ui) fn transform(app: &mut App, id: IdentityId) {
+    if !view::is_empty(app, id) {
+        app.viewport.transform(id, &app.state);
+    }
+}
+
+/// Applies the transform that the view previews.
+pub(in crate::ui) fn apply_transform(app: &mut App) {
+    if let Some(arrangement) = app.viewport.take_transform() {
+        edits::queue(app, EditStep::Rearrange(SplatEdit::Arrange(arrangement)));
+    }
+}
+
+/// Measures the Gaussians on screen, to clean them.
+pub(in crate::ui) fn measure_splats(app: &mut App) {
+    let Some((scene, cloud)) = app.state.scene.clone().zip(app.viewport.cloud().cloned()) else { return };
+    if !app.state.is_trained() {
+        return app.state.toast(Tone::Warning, "Only trained Gaussians can be cleaned.");
+    }
+    app.layout.show(Pane::Clean);
+    let request = MeasureRequest { path: scene.stored().to_path_buf(), cloud: Arc::clone(&cloud) };
+    let measure = move |observer: &mut dyn Observer| clean::measured(request, observer);
+    let info = JobInfo::long("Measuring Gaussians").pausable();
+    app.clean.measuring = app.start_to_end(info, measure, |app, _, measured| {
+        app.clean.measuring = false;
+        if let Ok(measured) = measured {
+            app.state.say(Tone::Info, format!("{} measured", format::things(measured.cloud.len(), "Gaussian")));
+            app.clean.take(Arc::new(measured));
+        }
+    });
+}
+
+/// Deletes the chosen Gaussians.
+pub(in crate::ui) fn delete_chosen(app: &mut App) {
+    match app.clean.take_chosen() {
+        Some(gone) => edits::queue(app, EditStep::Rearrange(SplatEdit::Delete(gone))),
+        None => app.state.toast(Tone::Info, "No Gaussians are chosen: measure them in the Clean pane."),
+    }
+}
+
+/// Turns the name of the selected identity into a text field.
+pub(in crate::ui) fn start_renaming(app: &mut App) {
+    match (view::chosen_identity(app), app.state.semantics.clone()) {
+        (Some(id), Some(map)) => {
+            app.layout.show(Pane::Objects);
+            app.objects.rename(id, &map.identities);
+        }
+        _ => {
+            let text = "Choose what to rename first: click it in the view or its name in the list.";
+            app.state.toast(Tone::Info, text);
+        }
+    }
+}
+
+/// Sets the length of a unit of the scene, in meters.
+pub(in crate::ui) fn set_scale(app: &mut App, meters_per_unit: f64) {
+    let Some(out) = app.state.scene.as_ref().map(|scene| scene.out.clone()) else { return };
+    if remote::refuses(app, "Saving the scale", "its scale is stored with the scene there") {
+        return;
+    }
+    let workspace = Arc::clone(&app.workspace);
+    let store = move |_: &mut dyn Observer| workspace.set_scale(&out, meters_per_unit);
+    app.start(JobInfo::short("Saving the scale"), store, move |app, is_stored| {
+        app.state.scaled(meters_per_unit, is_stored);
+    });
+}

@@ -1,0 +1,238 @@
+//! Edits of objects and parts in the order of the requests, with undo and redo: each builds on the one before.
+
+use std::sync::Arc;
+
+use super::remote;
+use crate::jobs::JobError;
+use crate::jobs::edit::{self, EditRequest};
+use crate::jobs::rearrange::{RearrangeRequest, SplatChange, SplatEdit};
+use crate::jobs::select::empty_map;
+use crate::pipeline::observer::Observer;
+use crate::pipeline::semantics::edit::Edit;
+use crate::scene::Identities;
+use crate::ui::app::App;
+use crate::ui::context::SceneContext;
+use crate::ui::history::{EditSnapshot, EditStep, Editing, ViewState, edit_text, splat_edit_text};
+use crate::ui::labels::sentence;
+use crate::ui::state::Tone;
+use crate::worker::{JobInfo, Stop};
+
+/// Remedy of a change that failed.
+const UNCHANGED: &str = "Nothing has changed.";
+
+/// Queues an edit after those requested before.
+pub(in crate::ui) fn queue(app: &mut App, step: EditStep) {
+    app.edits.push_back(step);
+    next(app);
+}
+
+/// Begins the next edits, up to one that runs as a job.
+pub(in crate::ui) fn next(app: &mut App) {
+    while app.editing.is_none() {
+        let Some(step) = app.edits.pop_front() else { return };
+        settle(app, true);
+        match step {
+            EditStep::Request(request) => apply(app, request),
+            EditStep::Rearrange(edit) => rearrange(app, edit),
+            EditStep::Undo => go_in_history(app, false),
+            EditStep::Redo => go_in_history(app, true),
+            // If the user has changed something since, only the agent's change is undone.
+            EditStep::UndoRename(id, name) if was(app, |s| s.is_called(id, &name)) => go_in_history(app, false),
+            EditStep::UndoRename(id, name) => apply(app, EditRequest::Apply(Edit::Rename(id, name))),
+            EditStep::UndoHidden(ids) if was(app, |s| s.view.hidden.iter().eq(&ids)) => go_in_history(app, false),
+            EditStep::UndoHidden(ids) => app.viewport.visibility.set_hidden(ids),
+        }
+    }
+}
+
+/// True if the state that undo leads to satisfies `like`.
+fn was(app: &App, like: impl Fn(&EditSnapshot) -> bool) -> bool {
+    app.state.changes.before().is_some_and(like)
+}
+
+fn apply(app: &mut App, request: EditRequest) {
+    let none = Identities::default();
+    let all = app.state.semantics.as_ref().map_or(&none, |map| &map.identities);
+    let what = Some(edit_text(&request, all));
+    start_edit(app, request, Editing { what, redo: false });
+}
+
+/// Starts a change of objects and parts. Returns false if it is impossible.
+fn start_edit(app: &mut App, request: EditRequest, editing: Editing) -> bool {
+    let Some(SceneContext { scene, cloud, map, .. }) = SceneContext::new(app) else { return false };
+    if remote::takes_edit(app, &request) {
+        return false;
+    }
+    let map = map.map_or_else(|| Arc::new(empty_map(&cloud)), |map| Arc::clone(&map));
+    let (cloud, out, workspace) = (Arc::clone(&cloud), scene.out.clone(), Arc::clone(&app.workspace));
+    let change = move |_: &mut dyn Observer| {
+        workspace.edit_objects(&cloud, &map, &request, &out).map_err(|e| Stop::from(e).or_remedy(UNCHANGED))
+    };
+    app.editing = Some(editing);
+    let started = app.start_to_end(JobInfo::short("Editing objects"), change, |app, _, map| {
+        if let Ok(map) = map {
+            app.state.set_semantics(Some(map));
+        }
+        ended(app);
+    });
+    app.editing.take_if(|_| !started);
+    started
+}
+
+fn rearrange(app: &mut App, edit: SplatEdit) {
+    let none = Identities::default();
+    let all = app.state.semantics.as_ref().map_or(&none, |map| &map.identities);
+    let what = Some(splat_edit_text(&edit, all));
+    start_rearrangement(app, SplatChange::Apply(edit), Editing { what, redo: false });
+}
+
+/// Starts a change of Gaussians. Returns false if it is impossible.
+fn start_rearrangement(app: &mut App, change: SplatChange, editing: Editing) -> bool {
+    if !app.state.is_trained() {
+        app.state.toast(Tone::Warning, "Only trained Gaussians can be edited.");
+        return false;
+    }
+    let Some(SceneContext { scene, cloud, map, cameras, .. }) = SceneContext::new(app) else { return false };
+    let title = "Editing Gaussians";
+    if remote::refuses(app, title, "run 'fmlgs edit' or 'fmlgs clean' there, or export the Gaussians here first") {
+        return false;
+    }
+    let (cloud, map) = (Arc::clone(&cloud), map.map(|map| Arc::clone(&map)));
+    let (facts, path, is_edited) = (app.state.plan.facts.clone(), scene.stored().to_path_buf(), scene.is_edited);
+    let request = RearrangeRequest { path, name: scene.name.clone(), is_edited, cloud, map, change, facts, cameras };
+    let workspace = Arc::clone(&app.workspace);
+    let change = move |_: &mut dyn Observer| {
+        workspace.rearrange(&request).map_err(|e: JobError| Stop::from(e).or_remedy(UNCHANGED))
+    };
+    app.editing = Some(editing);
+    let started = app.start_to_end(JobInfo::short(title), change, |app, _, done| {
+        if let Ok(done) = done {
+            let cloud = app.state.rearranged(done);
+            app.viewport.set_cloud(cloud);
+        }
+        ended(app);
+    });
+    app.editing.take_if(|_| !started);
+    started
+}
+
+/// Ends the running edit, and begins the next ones.
+fn ended(app: &mut App) {
+    if let Some(editing) = app.editing.take() {
+        record(app, editing);
+    }
+    next(app);
+}
+
+/// Records the end of an edit in the history.
+fn record(app: &mut App, editing: Editing) {
+    if app.state.changes.now().is_none_or(|now| now.scene != app.state.scene_number) {
+        return;
+    }
+    let map = app.state.semantics.as_deref().cloned();
+    let Some(what) = editing.what else {
+        // An edit that could not be stored leaves everything unchanged.
+        if !app.state.changes.has(&snapshot(app))
+            && let Some((_, back)) = app.state.changes.go(!editing.redo)
+        {
+            show_state(app, back.view);
+        }
+        return;
+    };
+    let before = app.state.changes.now().and_then(|now| now.map.clone());
+    let mut emptied = Vec::new();
+    if let (Some(old), Some(new)) = (before, map) {
+        if old.identities.len() > new.identities.len() {
+            app.viewport.visibility.renumber(&old.identities, &new.identities);
+        } else {
+            emptied = edit::emptied(&old, &new);
+        }
+    }
+    // A refused or failed edit was reported and leaves nothing to undo.
+    if let Some(what) = app.state.changes.settle(&snapshot(app), Some(&what)) {
+        app.state.toast(Tone::Good, sentence(&what));
+        for name in emptied {
+            let text = format!("{name} is empty now: all of its Gaussians became others'. Undo brings them back.");
+            app.state.toast(Tone::Warning, text);
+        }
+    }
+}
+
+/// Undoes the last change, or redoes the next.
+fn go_in_history(app: &mut App, redo: bool) {
+    let Some((what, to)) = app.state.changes.go(redo) else {
+        app.state.toast(Tone::Info, if redo { "Nothing to redo." } else { "Nothing to undo." });
+        return;
+    };
+    if !app.state.changes.has(&snapshot(app)) {
+        let now = app.viewport.cloud().map(|cloud| Arc::clone(cloud));
+        let editing = Editing { what: None, redo };
+        let started = match (to.cloud, to.map) {
+            (Some(cloud), map) if now.is_none_or(|now| !Arc::ptr_eq(&now, &cloud)) => {
+                start_rearrangement(app, SplatChange::Restore(cloud, map), editing)
+            }
+            (_, Some(map)) => start_edit(app, EditRequest::Restore(map), editing),
+            (_, None) => false,
+        };
+        if !started {
+            app.state.changes.go(!redo);
+            return;
+        }
+    }
+    show_state(app, to.view);
+    app.state.toast(Tone::Info, format!("{}: {what}", if redo { "Redone" } else { "Undone" }));
+}
+
+/// Shows an earlier or later state of the view.
+fn show_state(app: &mut App, view: ViewState) {
+    let ViewState { hidden, crop, modes, split, dim, cameras, path, pinned, recipes } = view;
+    if app.viewport.visibility.hidden() != &hidden {
+        app.viewport.visibility.set_hidden(hidden);
+    }
+    app.viewport.visibility.set_crop(crop);
+    ([app.layout.mode, app.layout.second_mode], app.layout.cameras) = (modes, cameras);
+    (app.layout.split_view, app.layout.dim) = (split, dim);
+    app.camera.set_path(path);
+    if let Some(map) = app.state.semantics.clone() {
+        app.viewport.queries.set_recipes(&recipes, &map);
+        app.viewport.queries.pin_only(&pinned, &map);
+    }
+}
+
+/// State of the window that can be undone.
+pub(in crate::ui) fn snapshot(app: &App) -> EditSnapshot {
+    let (layout, viewport) = (&app.layout, &app.viewport);
+    let view = ViewState {
+        hidden: viewport.visibility.hidden().clone(),
+        crop: viewport.visibility.crop(),
+        modes: [layout.mode, layout.second_mode],
+        split: layout.split_view,
+        dim: layout.dim,
+        cameras: layout.cameras,
+        path: app.camera.path.clone(),
+        pinned: viewport.queries.pinned_texts(),
+        recipes: viewport.queries.recipes(),
+    };
+    let map = app.state.semantics.as_deref().cloned();
+    let cloud = viewport.cloud().filter(|_| app.state.is_trained()).map(|cloud| Arc::clone(cloud));
+    EditSnapshot { scene: app.state.scene_number, map, cloud, view }
+}
+
+/// Records changes since the last call in the history, unless objects and parts are about to change. Camera path
+/// and crop box only `at_rest`: without a drag or typing in progress.
+pub(in crate::ui) fn settle(app: &mut App, at_rest: bool) {
+    if app.editing.is_some() {
+        return;
+    }
+    let mut now = snapshot(app);
+    let before = app.state.changes.now().filter(|before| before.scene == now.scene);
+    if let Some(before) = before.filter(|_| !at_rest) {
+        (now.view.path, now.view.crop) = (before.view.path.clone(), before.view.crop);
+    }
+    let shown = before.is_some_and(|before| before.view.hidden != now.view.hidden);
+    let Some(what) = app.state.changes.settle(&now, None) else { return };
+    match shown {
+        true => app.state.toast(Tone::Info, sentence(&what)),
+        false => app.state.say(Tone::Info, sentence(&what)),
+    }
+}

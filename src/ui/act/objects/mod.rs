@@ -1,0 +1,305 @@
+//! Finding objects and parts, with the downloads that it needs, and removing them.
+
+use std::collections::BTreeSet;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use glam::DVec3;
+
+use super::{edits, remote};
+use crate::jobs::find_objects::{self, FindRequest, FindSettings};
+use crate::jobs::models::{self, Source};
+use crate::jobs::remove::{self as removal, RemovalOptions, RemoveRequest};
+use crate::pipeline::observer::Observer;
+use crate::scene::{Camera, IdentityId, SemanticMap};
+use crate::ui::app::{App, context};
+use crate::ui::dialogs::{Answer, Question};
+use crate::ui::file_dialogs::FileRequest;
+use crate::ui::find_dialog::Means;
+use crate::ui::history::FoundStep;
+use crate::ui::keep_dialog::{KeepAnswer, KeepDialog, PlannedSearch};
+use crate::ui::labels::sentence;
+use crate::ui::panes::models::ModelsPane;
+use crate::ui::state::Tone;
+use crate::worker::{JobInfo, Makes};
+
+/// Finds objects and parts with the labels of the photos; without labels, opens the dialog with the methods.
+pub(in crate::ui) fn find(app: &mut App) {
+    let has_labels = app.state.scene.as_ref().is_some_and(|s| s.masks.is_some() || s.dataset.is_none());
+    if has_labels || !app.state.is_trained() {
+        return begin_search(app, PlannedSearch::default());
+    }
+    // The user may have added files since the list was made.
+    app.models = ModelsPane::default();
+    app.find_dialog.open();
+}
+
+pub(in crate::ui) fn choose_masks(app: &mut App) {
+    app.choose(FileRequest::folder("Choose the folder with the masks"), |app, masks| {
+        begin_search(app, PlannedSearch { masks: Some(masks), ..PlannedSearch::default() });
+    });
+}
+
+/// Shows the open dialogs of a search, and continues with the user's decisions.
+pub(in crate::ui) fn show_dialogs(app: &mut App, ctx: &egui::Context) {
+    let recipe = app.viewport.queries.recipe().preparation;
+    app.find_dialog.follow_recipe(recipe, &mut app.layout.finding);
+    if app.find_dialog.is_open() {
+        app.models.keep_listed(&app.state, &app.tasks);
+    }
+    let max_seeds = app.layout.finding.max_seeds;
+    let mut dialog = std::mem::take(&mut app.find_dialog);
+    let means = dialog.show(ctx, max_seeds, &mut context(app).0);
+    app.find_dialog = dialog;
+    if let Some(Means { segmenter, encoder, missing }) = means {
+        (app.layout.finding.segmenter, app.layout.finding.encoder) = (Some(segmenter), Some(encoder));
+        begin_search(app, PlannedSearch { missing, ..PlannedSearch::default() });
+    }
+    let Some(answer) = app.keep_dialog.as_ref().and_then(|dialog| dialog.show(ctx)) else { return };
+    let Some(KeepDialog { search, .. }) = app.keep_dialog.take() else { return };
+    match answer {
+        KeepAnswer::Keep => find_after(app, search),
+        KeepAnswer::ReplaceAll => find_after(app, PlannedSearch { replace_all: true, ..search }),
+        KeepAnswer::Cancel => {}
+    }
+}
+
+/// Begins a search; asks first if objects and parts were edited by the user.
+fn begin_search(app: &mut App, search: PlannedSearch) {
+    let by_hand = app.state.semantics.as_deref().map_or_else(Vec::new, |map| find_objects::by_hand(map));
+    match by_hand.is_empty() {
+        true => find_after(app, search),
+        false => app.keep_dialog = Some(KeepDialog { by_hand, search }),
+    }
+}
+
+/// Finds objects once their models are installed: downloads the first missing one, or starts the search.
+fn find_after(app: &mut App, mut search: PlannedSearch) {
+    let Some(id) = search.missing.pop_front() else { return search_all(app, search) };
+    let scene = app.state.scene_number;
+    install(app, id, None, move |app, is_installed| {
+        if !is_installed {
+            let text = "Objects are not looked for: a model is missing. A download that was cut off goes on where it \
+                        ended: find objects again.";
+            return app.state.toast(Tone::Warning, text);
+        }
+        // If another scene was opened meanwhile, the search no longer applies.
+        if scene == app.state.scene_number {
+            find_after(app, search);
+        }
+    });
+}
+
+pub(in crate::ui) fn choose_model_files(app: &mut App, id: String) {
+    let title = format!("Choose the checkpoint of {id}, or the description (.json) of its exported files");
+    let request = FileRequest::file(title, "Networks", &["pt", "pth", "bin", "safetensors", "json"]);
+    app.choose(request, |app, path| install_model(app, id, Some(path)));
+}
+
+/// Downloads a model, or installs the user's files.
+pub(in crate::ui) fn install_model(app: &mut App, id: String, brought: Option<PathBuf>) {
+    install(app, id, brought, |_, _| ());
+}
+
+/// Installs a model; `then` learns whether it can be used.
+fn install(app: &mut App, id: String, brought: Option<PathBuf>, then: impl FnOnce(&mut App, bool) + 'static) {
+    let info = JobInfo::long(format!("Installing the model {id}")).pausable();
+    let install = move |observer: &mut dyn Observer| {
+        let source = brought.as_deref().map_or(Source::Fetch(None), Source::Brought);
+        models::install(&id, source, observer).map(|_| id)
+    };
+    app.start_to_end(info, install, |app, _, installed| {
+        if let Ok(id) = &installed {
+            app.state.models_installed += 1;
+            app.state.toast(Tone::Good, format!("Model {id} is ready"));
+        }
+        then(app, installed.is_ok());
+    });
+}
+
+fn search_all(app: &mut App, search: PlannedSearch) {
+    let PlannedSearch { masks, replace_all, .. } = search;
+    let had_objects = app.state.semantics.is_some();
+    let step = had_objects.then(|| FoundStep { what: "found objects anew".into(), adds: false });
+    start_search(app, SearchScope { masks, replace_all, ..SearchScope::default() }, step);
+}
+
+/// Adds the unlabeled regions of one photo: the one looked through, or else the nearest training photo.
+pub(in crate::ui) fn segment_photo(app: &mut App) {
+    let Some(known) = app.state.semantics.as_deref().cloned() else {
+        return app.state.toast(Tone::Warning, "Find objects first: what one more photo shows is added to them.");
+    };
+    if app.is_editing() {
+        // The search would begin with the state before the edit.
+        return app.state.toast(Tone::Warning, "Objects are being changed; segment the photo once that is done.");
+    }
+    let (scene, eye) = (app.state.scene.clone(), app.viewport.pose());
+    let Some(dataset) = scene.as_ref().and_then(|s| s.dataset.as_ref()) else {
+        return app.state.toast(Tone::Warning, "This scene has no photos.");
+    };
+    let held: BTreeSet<usize> =
+        scene.as_ref().map(|s| s.held_out(app.layout.config.holdout_every)).into_iter().flatten().collect();
+    let trained_on = (0..dataset.photos.len()).filter(|i| !held.contains(i));
+    let size = scene.as_ref().map_or(1.0, |s| s.home.bounds.radius());
+    let away = |camera: &Camera| {
+        let turn = 1.0 - (camera.world_from_camera * DVec3::Z).dot(eye.world_from_camera * DVec3::Z);
+        camera.center.distance(eye.center) / size + turn
+    };
+    let nearest = || {
+        let away = |i: &usize| away(&dataset.photos[*i].camera);
+        trained_on.min_by(|a, b| away(a).total_cmp(&away(b)))
+    };
+    let Some(photo) = app.viewport.photo_index().or_else(nearest) else { return };
+    let seed = dataset.photos[photo].name.clone();
+    let step = FoundStep { what: format!("segmented {seed}"), adds: true };
+    start_search(app, SearchScope { add: Some((known, seed)), ..SearchScope::default() }, Some(step));
+}
+
+/// Photos and regions to search.
+#[derive(Default)]
+struct SearchScope {
+    /// Folder of masks to use in place of the photos' own.
+    masks: Option<PathBuf>,
+    /// Known objects and parts, and the photo whose unlabeled regions are added to them; all photos without it.
+    add: Option<(Arc<SemanticMap>, String)>,
+    /// True if objects and parts that the user edited are replaced, too.
+    replace_all: bool,
+}
+
+/// Starts a search. Its end becomes `step` in the history.
+fn start_search(app: &mut App, scope: SearchScope, step: Option<FoundStep>) {
+    let SearchScope { masks, add, replace_all } = scope;
+    let scene = app.state.scene.clone();
+    let Some((scene, dataset)) = scene.as_ref().and_then(|s| Some((s, s.dataset.clone()?))) else {
+        return app.state.toast(Tone::Warning, "Open a folder of posed photos first: masks refer to photos.");
+    };
+    let Some(cloud) = app.viewport.cloud().cloned().filter(|_| app.state.is_trained()) else {
+        return app.state.toast(Tone::Warning, "Train first: objects are found among trained Gaussians.");
+    };
+    let (known, seed) = add.unzip();
+    let mut with = FindSettings { replace_all, ..app.layout.finding.clone() };
+    with.seed = seed.or(with.seed);
+    let title = match &known {
+        Some(_) => format!("Segmenting {}", with.seed.as_deref().unwrap_or("a photo")),
+        None => format!("Finding objects in {}", dataset.name),
+    };
+    if remote::refuses(app, &title, "run 'fmlgs preprocess' there") {
+        return;
+    }
+    let is_new = known.is_none();
+    let request = FindRequest {
+        known,
+        folder: scene.out.clone(),
+        cloud: Arc::clone(&cloud),
+        settings: app.state.render_settings(),
+        dataset,
+        holdout_every: app.layout.config.holdout_every,
+        masks: masks.or_else(|| scene.masks.clone()),
+        side_px: app.state.plan.object_side_px,
+        with,
+    };
+    let (workspace, info) = (Arc::clone(&app.workspace), JobInfo::long(title).makes(Makes::Objects).pausable());
+    let find = move |observer: &mut dyn Observer| workspace.find_objects(&request, observer);
+    app.start_to_end(info, find, move |app, _, found| {
+        if let Ok(map) = found {
+            if is_new {
+                app.state.toast(Tone::Good, format!("{} found", map.identities.counted()));
+            }
+            app.state.set_semantics(Some(map));
+        }
+        if let Some(step) = step {
+            record(app, &step);
+        }
+    });
+}
+
+/// Records the end of a search in the history, so that it can be undone.
+fn record(app: &mut App, step: &FoundStep) {
+    let count = |map: Option<&Arc<SemanticMap>>| map.map_or(0, |map| map.identities.len());
+    let before = app.state.changes.now().map_or(0, |now| count(now.map.as_ref()));
+    let new = count(app.state.semantics.as_deref()).saturating_sub(before);
+    if !step.adds && !app.state.changes.has(&edits::snapshot(app)) {
+        // The numbers now belong to other identities.
+        app.viewport.visibility.set_hidden([]);
+        app.viewport.picking.select(None);
+    }
+    let now = edits::snapshot(app);
+    let settled = app.state.changes.settle(&now, Some(&step.what));
+    if let Some(what) = settled.filter(|_| step.adds) {
+        let new = match new {
+            0 => "nothing new".to_owned(),
+            1 => "one new object or part".to_owned(),
+            n => format!("{n} new objects and parts"),
+        };
+        app.state.toast(Tone::Good, format!("{}: {new}", sentence(&what)));
+    }
+}
+
+/// Makes a scene without these identities, shown beside the unchanged one.
+pub(in crate::ui) fn remove(app: &mut App, ids: &[IdentityId]) {
+    if let [id] = ids
+        && super::view::is_empty(app, *id)
+    {
+        return;
+    }
+    let Some(folder) = app.state.scene.as_ref().filter(|_| app.state.is_trained()).map(|s| s.out.clone()) else {
+        return app.state.toast(Tone::Warning, "Only from a trained scene can something be removed.");
+    };
+    submit_removal(app, RemoveRequest { folder, options: RemovalOptions::of(ids), retrain: false });
+}
+
+/// Makes a scene without the identities of the request, from the open one.
+pub(in crate::ui) fn submit_removal(app: &mut App, request: RemoveRequest) {
+    if app.is_editing() {
+        return app.state.toast(Tone::Warning, "Objects are being changed; remove it once that is done.");
+    }
+    if app.state.scene.as_ref().is_none_or(|s| s.out != request.folder) {
+        let text = "Another scene is open now; open that one first to remove from it.";
+        return app.state.toast(Tone::Warning, text);
+    }
+    if remote::refuses(app, "Removing", "run 'fmlgs remove' there") {
+        return;
+    }
+    let remove = move |observer: &mut dyn Observer| removal::beside(&request, observer);
+    app.start(JobInfo::long("Removing").pausable(), remove, |app, removed| {
+        app.state.toast(Tone::Good, removal::told(&removed.name, &removed.report));
+        app.state.say(Tone::Info, format!("Saved to {}", removed.folder.display()));
+        super::open::compare_scene(app, Some(removed.folder.clone()));
+        app.state.removed = Some(removed);
+    });
+}
+
+/// Asks for confirmation, and deletes the scene made by a removal.
+pub(in crate::ui) fn ask_to_delete_removed(app: &mut App) {
+    let Some(removed) = &app.state.removed else {
+        return app.state.toast(Tone::Warning, "No scene was made by removing something from this one.");
+    };
+    let text = format!(
+        "Delete {}, the scene without {}? This cannot be undone; the scene that it was made of stays.",
+        removed.folder.display(),
+        removed.name
+    );
+    let question = Question { text, yes: "Delete it", other: None, no: "Keep it" };
+    app.put_question(question, |app, answer| {
+        if answer == Answer::Yes {
+            delete_removed(app);
+        }
+    });
+}
+
+fn delete_removed(app: &mut App) {
+    let Some(removed) = app.state.removed.take() else { return };
+    match removed.delete() {
+        Ok(()) => {
+            app.state.beside = app.state.beside.take().filter(|beside| beside.path != removed.folder);
+            app.state.toast(Tone::Good, format!("Deleted {}", removed.folder.display()));
+        }
+        Err(e) => {
+            app.state.toast(Tone::Error, e.to_string());
+            app.state.removed = Some(removed);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

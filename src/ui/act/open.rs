@@ -1,0 +1,197 @@
+//! Opening scenes, reports, camera paths and training settings.
+
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use crate::io::unposed::Unposed;
+use crate::jobs::demo::QUESTION;
+use crate::jobs::workspace::OpenedPath;
+use crate::jobs::{JobError, OpenedScene, presets};
+use crate::measure::{Report, is_report};
+use crate::pipeline::observer::Observer;
+use crate::ui::act::remote;
+use crate::ui::actions::{Action, Pane};
+use crate::ui::app::App;
+use crate::ui::beside::Beside;
+use crate::ui::camera;
+use crate::ui::dialogs::{Answer, Question};
+use crate::ui::file_dialogs::FileRequest;
+use crate::ui::state::{ShownReport, Tone};
+use crate::worker::{Failure, JobInfo, Makes};
+
+/// File endings of scenes.
+const SCENES: [&str; 13] =
+    ["ply", "splat", "ksplat", "spz", "sog", "gltf", "glb", "json", "toml", "npy", "bin", "txt", "zip"];
+
+pub(in crate::ui) fn choose_folder(app: &mut App) {
+    let request = FileRequest::folder("Open a folder of photos or a trained scene");
+    app.choose(request, |app, path| app.ask(Action::Open(path)));
+}
+
+pub(in crate::ui) fn choose_file(app: &mut App) {
+    app.choose(FileRequest::file("Open a scene", "Scenes", &SCENES), |app, path| app.ask(Action::Open(path)));
+}
+
+/// Opens a report, a file of training settings, or another scene.
+pub(in crate::ui) fn open(app: &mut App, path: PathBuf) {
+    if is_report(&path) {
+        return report(app, path, false);
+    }
+    if path.extension().is_some_and(|e| e == "toml") {
+        return preset(app, &path);
+    }
+    replace_scene(app, move |app| {
+        let (workspace, title) = (Arc::clone(&app.workspace), format!("Opening {}", file_name(&path)));
+        let info = JobInfo::urgent(title).makes(Makes::Scene);
+        app.start(
+            info,
+            move |observer| workspace.open(&path, observer),
+            |app, opened| match opened {
+                OpenedPath::Scene(scene) => app.state.opened(*scene, false),
+                OpenedPath::Unposed(photos) => app.state.unposed = Some(photos),
+            },
+        );
+    });
+}
+
+/// Finds the camera poses of photos, and opens the result.
+pub(in crate::ui) fn find_poses(app: &mut App, photos: Box<Unposed>) {
+    let info = JobInfo::long(format!("Finding camera poses of {}", file_name(&photos.folder))).makes(Makes::Scene);
+    let workspace = Arc::clone(&app.workspace);
+    open_by(
+        app,
+        info,
+        move |observer| workspace.find_poses(&photos, observer),
+        |app, scene| {
+            app.state.opened(scene, false);
+        },
+    );
+}
+
+/// Opens the trained demo and asks it a question.
+pub(in crate::ui) fn demo(app: &mut App) {
+    let (info, workspace) = (JobInfo::urgent("Opening the demo").makes(Makes::Scene), Arc::clone(&app.workspace));
+    open_by(
+        app,
+        info,
+        move |observer| workspace.open_demo(observer),
+        |app, scene| {
+            app.state.opened(scene, true);
+            app.ask(Action::Ask(QUESTION.into()));
+        },
+    );
+}
+
+/// Renders the photos of the demo, opens them and trains on them.
+pub(in crate::ui) fn demo_photos(app: &mut App) {
+    let info = JobInfo::long("Rendering the demo scene").makes(Makes::Scene);
+    let info = info.hint("The photos are rendered once; training then starts automatically.");
+    let workspace = Arc::clone(&app.workspace);
+    open_by(
+        app,
+        info,
+        move |observer| workspace.open_demo_photos(observer),
+        |app, scene| {
+            app.state.opened(scene, true);
+            app.ask(Action::StartTraining);
+        },
+    );
+}
+
+/// Opens another scene by this job.
+fn open_by(
+    app: &mut App,
+    info: JobInfo,
+    work: impl FnOnce(&mut dyn Observer) -> Result<OpenedScene, JobError> + Send + 'static,
+    then: impl FnOnce(&mut App, OpenedScene) + 'static,
+) {
+    replace_scene(app, move |app| {
+        app.start(info, work, then);
+    });
+}
+
+/// Opens another scene by `open`; asks first if that ends a running job.
+fn replace_scene(app: &mut App, open: impl FnOnce(&mut App) + 'static) {
+    // A job on another computer continues there.
+    let running = app.state.job.as_ref().filter(|job| !remote::is_remote(job.id)).map(|job| job.info.title.clone());
+    let Some(title) = running else {
+        remote::disconnect(app);
+        return open(app);
+    };
+    let text = format!("{title} is still running. Cancel it and continue? Saved progress is kept.");
+    let question = Question { text, yes: "Cancel and continue", other: None, no: "Keep running" };
+    app.put_question(question, |app, answer| {
+        if answer == Answer::Yes {
+            remote::cancel_job(app);
+            remote::disconnect(app);
+            open(app);
+        }
+    });
+}
+
+pub(in crate::ui) fn choose_comparison(app: &mut App) {
+    let request = FileRequest::folder("Open the folder of another scene");
+    app.choose(request, |app, path| compare_scene(app, Some(path)));
+}
+
+/// Shows another scene in the second view, or none.
+pub(in crate::ui) fn compare_scene(app: &mut App, path: Option<PathBuf>) {
+    let Some(path) = path else {
+        app.state.beside = None;
+        return;
+    };
+    app.layout.split_view = true;
+    let (workspace, title) = (Arc::clone(&app.workspace), format!("Opening {} beside", file_name(&path)));
+    let open = move |observer: &mut dyn Observer| workspace.open_comparison(&path, observer);
+    app.start(JobInfo::short(title), open, |app, scene| {
+        app.state.beside = Beside::of(scene);
+        if app.state.beside.is_none() {
+            app.state.toast(Tone::Warning, "There is nothing to compare with: it has no Gaussians.");
+        }
+    });
+}
+
+pub(in crate::ui) fn choose_report(app: &mut App, second: bool) {
+    let request = FileRequest::file("Open a report", "Reports", &["json"]);
+    app.choose(request, move |app, path| report(app, path, second));
+}
+
+/// Reads a report and shows its pane; `second` compares it with the one on screen.
+pub(in crate::ui) fn report(app: &mut App, path: PathBuf, second: bool) {
+    app.layout.show(Pane::Report);
+    let info = JobInfo::short(format!("Opening the report {}", file_name(&path)));
+    let read =
+        move |_: &mut dyn Observer| Report::read(&path).map(|report| ShownReport { path, report: Arc::new(report) });
+    app.start(info, read, move |app, shown| {
+        let place = if second { &mut app.state.second_report } else { &mut app.state.report };
+        *place = Some(shown);
+    });
+}
+
+/// Reads settings for the next training from a file.
+fn preset(app: &mut App, path: &Path) {
+    match presets::read(path) {
+        Ok(config) => {
+            app.layout.config = config;
+            app.state.toast(Tone::Good, format!("The next training uses the settings of {}", path.display()));
+        }
+        Err(e) => app.state.fail("Reading training settings", Failure::of(&e, "")),
+    }
+}
+
+pub(in crate::ui) fn choose_path(app: &mut App) {
+    app.choose(FileRequest::file("Open a camera path", "Camera paths", &["json"]), |app, path| {
+        match camera::read(&path) {
+            Ok(read) => {
+                app.camera.open(read);
+                app.layout.show(Pane::Camera);
+            }
+            Err(message) => app.state.fail("Opening the camera path", Failure::new(message, "")),
+        }
+    });
+}
+
+/// Last component of a path, for titles.
+pub(super) fn file_name(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
+}

@@ -1,0 +1,303 @@
+//! The view: its camera, its colors, and the selection.
+
+use std::sync::Arc;
+
+use egui::Context;
+use glam::DVec3;
+
+use super::{remote, window};
+use crate::jobs::JobError;
+use crate::jobs::go_to::{self, ApproachRequest, Approached};
+use crate::navigate::FRAMES;
+use crate::navigate::target::{Side, ViewPreference};
+use crate::pipeline::observer::Observer;
+use crate::scene::plan::When;
+use crate::scene::{CropBox, Identities, IdentityId, NOBODY, SemanticMap};
+use crate::ui::actions::Pane;
+use crate::ui::app::App;
+use crate::ui::color_by::ColorBy;
+use crate::ui::context::SceneContext;
+use crate::ui::labels;
+use crate::ui::state::Tone;
+use crate::worker::{JobInfo, Versioned, ViewMode};
+
+fn now(ctx: &Context) -> f64 {
+    ctx.input(|i| i.time)
+}
+
+pub(in crate::ui) fn frame(app: &mut App, ctx: &Context) {
+    app.viewport.frame(&app.state, now(ctx));
+}
+
+pub(in crate::ui) fn reset(app: &mut App, ctx: &Context) {
+    app.viewport.reset_view(&app.state, now(ctx));
+}
+
+pub(in crate::ui) fn turn_up(app: &mut App, ctx: &Context, up: DVec3) {
+    if app.state.scene.is_some() {
+        app.viewport.turn_up(up, now(ctx));
+    }
+}
+
+pub(in crate::ui) fn set_crop(app: &mut App, crop: Option<CropBox>) {
+    if app.state.scene.is_some() {
+        app.viewport.set_crop(crop);
+    }
+}
+
+/// Looks through the next photo's camera, or through the one `by` photos on.
+pub(in crate::ui) fn step_photo(app: &mut App, ctx: &Context, by: isize) {
+    app.viewport.step_photo(by, &app.state, &app.tasks, now(ctx));
+}
+
+pub(in crate::ui) fn go_to_photo(app: &mut App, ctx: &Context, index: usize) {
+    app.viewport.look_through(index, &app.state, &app.tasks, now(ctx));
+}
+
+/// Chooses what the active view shows.
+pub(in crate::ui) fn show(app: &mut App, mode: ViewMode) {
+    *app.layout.mode_of(app.viewport.queries.is_second()) = mode;
+    // The rendered image is shown without a tint.
+    if mode == ViewMode::Rgb {
+        app.viewport.queries.tint(ColorBy::Masks);
+    }
+}
+
+/// Shows the photo beside the rendering, or not.
+pub(in crate::ui) fn toggle_compare(app: &mut App, ctx: &Context) {
+    app.layout.compare = !app.layout.compare;
+    if app.layout.compare && app.viewport.photo_index().is_none() {
+        step_photo(app, ctx, 1);
+    }
+}
+
+/// Splits the view in two, or ends that.
+pub(in crate::ui) fn toggle_split(app: &mut App) {
+    app.layout.split_view = !app.layout.split_view;
+    app.viewport.queries.work_in(app.layout.split_view);
+}
+
+/// Makes the other one of two views active.
+pub(in crate::ui) fn other_view(app: &mut App) {
+    match app.layout.split_view {
+        true => app.viewport.queries.work_in(!app.viewport.queries.is_second()),
+        false => app.state.toast(Tone::Info, "There is one view: split it first (8)."),
+    }
+}
+
+/// Ends the first of these that is there: the tool, the selection, the full view, the running job.
+pub(in crate::ui) fn dismiss(app: &mut App, ctx: &Context) {
+    if app.viewport.has_tool() {
+        app.viewport.end_tool();
+    } else if app.viewport.picking.selected().is_some() {
+        app.viewport.picking.select(None);
+    } else if app.full_view {
+        window::fill(app, ctx);
+    } else {
+        remote::cancel_job(app);
+    }
+}
+
+/// Returns true, with a message, if an identity has no Gaussians.
+pub(super) fn is_empty(app: &mut App, id: IdentityId) -> bool {
+    let Some(map) = app.state.semantics.as_ref().filter(|_| app.state.is_empty(id)) else { return false };
+    let name = app.state.labels.full_name(&map.identities, id);
+    app.state.toast(Tone::Warning, format!("{name} is empty: no Gaussians belong to it."));
+    true
+}
+
+/// Selected identity, or else the first answer to the query.
+pub(super) fn chosen_identity(app: &App) -> Option<IdentityId> {
+    app.viewport.picking.selected().or_else(|| app.viewport.queries.found().first().copied())
+}
+
+/// Does this to the selected identity, if there is one.
+fn with_selected(app: &mut App, act: impl FnOnce(&mut App, IdentityId)) {
+    match chosen_identity(app) {
+        Some(id) => act(app, id),
+        None => app.state.toast(Tone::Info, "Nothing is selected: click an object in the view, or press N."),
+    }
+}
+
+pub(in crate::ui) fn isolate_selected(app: &mut App) {
+    with_selected(app, |app, id| {
+        let only = Some(id).filter(|_| !app.viewport.visibility.is_isolated());
+        isolate(app, only);
+    });
+}
+
+pub(in crate::ui) fn hide_selected(app: &mut App) {
+    with_selected(app, hide);
+}
+
+pub(in crate::ui) fn go_to_selected(app: &mut App) {
+    with_selected(app, |app, id| go_to(app, id, Side::Best));
+}
+
+/// Shows only an identity, or everything.
+pub(in crate::ui) fn isolate(app: &mut App, only: Option<IdentityId>) {
+    if only.is_some_and(|id| is_empty(app, id)) {
+        return;
+    }
+    if let Some(map) = &app.state.semantics {
+        app.viewport.visibility.isolate(&map.identities, only);
+    }
+}
+
+/// Hides an identity, or shows it again.
+pub(in crate::ui) fn hide(app: &mut App, id: IdentityId) {
+    if let Some(map) = &app.state.semantics {
+        app.viewport.visibility.toggle(&map.identities, id);
+    }
+}
+
+/// The objects and parts, or a message that there are none.
+fn objects(app: &mut App) -> Option<Versioned<SemanticMap>> {
+    let map = app.state.semantics.clone();
+    if map.is_none() {
+        app.state.toast(Tone::Info, "There are no objects yet: find them first (Objects pane).");
+    }
+    map
+}
+
+/// Selects the next object or part among its siblings, in the order of the list, or the previous one.
+pub(in crate::ui) fn select_sibling(app: &mut App, back: bool) {
+    let Some(map) = objects(app) else { return };
+    let selected = app.viewport.picking.selected();
+    let parent = selected.and_then(|id| map.identities.get(id)).map_or(NOBODY, |i| i.parent);
+    let list = listed(&map.identities, &app.state.sizes, parent);
+    let at = selected.and_then(|id| list.iter().position(|i| *i == id));
+    let step = if back { list.len().saturating_sub(1) } else { 1 };
+    let first = if back { list.last() } else { list.first() };
+    if let Some(next) = at.map_or(first, |at| list.get((at + step) % list.len())) {
+        app.viewport.picking.select(Some(*next));
+    }
+}
+
+/// Selects the first part of the selection.
+pub(in crate::ui) fn select_part(app: &mut App) {
+    let Some(map) = objects(app) else { return };
+    let Some(whole) = chosen_identity(app) else {
+        return app.state.toast(Tone::Info, "Nothing is selected: press N first.");
+    };
+    match listed(&map.identities, &app.state.sizes, whole).first() {
+        Some(part) => app.viewport.picking.select(Some(*part)),
+        None => {
+            let name = app.state.labels.full_name(&map.identities, whole);
+            app.state.toast(Tone::Info, format!("{name} has no parts."));
+        }
+    }
+}
+
+/// Selects the whole that the selection is a part of.
+pub(in crate::ui) fn select_whole(app: &mut App) {
+    let Some(map) = objects(app) else { return };
+    match chosen_identity(app) {
+        Some(part) => app.viewport.picking.select(map.identities.ancestors(part).nth(1).or(Some(part))),
+        None => app.state.toast(Tone::Info, "Nothing is selected: press N first."),
+    }
+}
+
+/// Parts of an identity, or all objects, in the order of the list.
+fn listed(all: &Identities, sizes: &[usize], of: IdentityId) -> Vec<IdentityId> {
+    let ids = all.iter().filter(|(_, i)| i.parent == of).map(|(id, _)| id).collect();
+    let (mut shown, mut tiny) = labels::listed(all, sizes, ids);
+    shown.append(&mut tiny);
+    shown
+}
+
+/// Searches a flight to an identity, and begins it when it is found.
+pub(in crate::ui) fn go_to(app: &mut App, id: IdentityId, side: Side) {
+    if is_empty(app, id) {
+        return;
+    }
+    let Some(SceneContext { cloud, map: Some(map), settings, cameras, up, eye, aspect, explored, .. }) =
+        SceneContext::new(app)
+    else {
+        return;
+    };
+    let title = format!("Planning the flight to {}", map.identities.full_name(id));
+    let (cloud, map, from, frames) = (Arc::clone(&cloud), Arc::clone(&map), eye, FRAMES);
+    let preference = ViewPreference { side, ..ViewPreference::default() };
+    let request = ApproachRequest { explored, cloud, cameras, up, settings, map, id, preference, from, aspect, frames };
+    let search = move |_: &mut dyn Observer| Ok::<_, JobError>(go_to::visit(request));
+    app.start(JobInfo::short(title), search, |app, (explored, approached)| {
+        app.state.explored = Some(explored);
+        begin_flight(app, approached);
+    });
+}
+
+/// Begins the flight that was found, or reports why there is none.
+fn begin_flight(app: &mut App, Approached { name, flight, problem }: Approached) {
+    match (&problem, &flight) {
+        (Some(problem), Some(_)) => {
+            app.state.toast(Tone::Warning, format!("{name}: {problem}. Going to the nearest place instead."));
+        }
+        (Some(problem), None) => app.state.toast(Tone::Warning, format!("{name}: {problem}.")),
+        (None, _) => {}
+    }
+    if let Some(visit) = flight {
+        app.viewport.turn_about(visit.target);
+        app.camera.play_flight(visit.flight, name);
+    }
+}
+
+/// Explores the free space of a scene once, if the plan asks for it in advance.
+pub(in crate::ui) fn explore(app: &mut App) {
+    let wanted = app.state.plan.navigation == When::Always && app.state.explored.is_none();
+    if !wanted || app.explored_for == app.state.scene_number {
+        return;
+    }
+    if let Some(SceneContext { cloud, cameras, up, .. }) = SceneContext::new(app) {
+        app.explored_for = app.state.scene_number;
+        let cloud = Arc::clone(&cloud);
+        let explore = move |_: &mut dyn Observer| Ok::<_, JobError>(go_to::Explored::new(cloud, &cameras, up));
+        let scene = app.state.scene_number;
+        app.start(JobInfo::short("Building the navigation graph"), explore, move |app, explored| {
+            if app.state.scene_number == scene {
+                app.state.explored = Some(Arc::new(explored));
+            }
+        });
+    }
+}
+
+/// True if there is a flight or a path to play; else tells the user.
+fn has_clip(app: &mut App) -> bool {
+    let has_clip = app.camera.has_clip();
+    if !has_clip {
+        app.state.toast(Tone::Info, "Nothing to play: add keyframes (K), or go to an object first.");
+    }
+    has_clip
+}
+
+pub(in crate::ui) fn play_path(app: &mut App) {
+    if has_clip(app) {
+        app.camera.toggle();
+    }
+}
+
+/// Moves along the camera path by some frames.
+pub(in crate::ui) fn step_in_time(app: &mut App, ctx: &Context, frames: f64) {
+    if has_clip(app)
+        && let Some(pose) = app.camera.step(frames)
+    {
+        app.viewport.stand(&pose, &app.state, now(ctx));
+    }
+}
+
+pub(in crate::ui) fn add_key(app: &mut App) {
+    app.camera.record(&app.viewport.pose());
+    app.layout.show(Pane::Camera);
+}
+
+/// Moves the camera along the flight or path that plays.
+pub(in crate::ui) fn play(app: &mut App, ctx: &Context) {
+    let step = now(ctx) - std::mem::replace(&mut app.last_frame, now(ctx));
+    if let Some(pose) = app.camera.tick(step) {
+        app.viewport.stand(&pose, &app.state, now(ctx));
+        ctx.request_repaint();
+    }
+    if app.viewport.take_new_picture() && app.camera.player.playing {
+        app.camera.player.count(now(ctx));
+    }
+}
