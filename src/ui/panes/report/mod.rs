@@ -244,8 +244,8 @@ fn chosen(ui: &mut Ui, stage: &Stage, selected: Option<&Point>, now: &Now<'_>) -
                     StageName::Train => "Apply to the next training",
                     _ => "Apply to the view",
                 };
-                let apply = ui.add(theme::primary_button(what)).on_hover_text(action.tooltip());
-                apply.clicked().then_some(action)
+                let clicked = ui.add(theme::primary_button(what)).on_hover_text(action.tooltip()).clicked();
+                clicked.then_some(action)
             }
             Offer::Active => {
                 ui.colored_label(theme::good(), "Already active.");
