@@ -125,8 +125,8 @@ impl FindDialog {
         }
         ui.add_space(8.0);
         ui.label(RichText::new("Text encoder").strong());
-        let text = "Objects have numbers instead of names. Those that you name (double-click one in Objects) are found by \
-                    name.";
+        let text = "Objects have numbers instead of names. Those that you name (double-click one in Objects) are found \
+                    by name.";
         if choice(ui, means.encoder == NO_ENCODER, "Only names that you give", text, "") {
             self.encoder = Some(NO_ENCODER.into());
         }

@@ -43,8 +43,8 @@ impl KeepDialog {
             ui.add_space(6.0);
             ui.label(listed(&self.by_hand));
             ui.add_space(6.0);
-            let text = "The search replaces all others. Those that you keep stay as they are, with their parts and their \
-                        wholes. Undo restores the present objects and parts either way.";
+            let text = "The search replaces all others. Those that you keep stay as they are, with their parts and \
+                        their wholes. Undo restores the present objects and parts either way.";
             ui.label(egui::RichText::new(text).color(theme::weak()));
             ui.add_space(12.0);
             let buttons = |ui: &mut egui::Ui| {

@@ -170,7 +170,7 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
             if let Some(n) = &mut config.max_gaussians {
                 ui.add(DragValue::new(n).range(1_000..=6_000_000).speed(1000)).accessible_name("Maximum Gaussians");
             } else {
-                ui.weak("by the photos' size and free memory");
+                ui.weak("automatic: by photo size and free memory");
             }
         });
         ui.horizontal(|ui| {
