@@ -51,11 +51,8 @@ impl KeepDialog {
                 let keeps = ui.add(theme::primary_button("Keep them")).clicked();
                 let replaces = ui.button("Replace all").clicked();
                 let cancels = ui.button("Cancel").clicked();
-                let answers = [
-                    (keeps, KeepAnswer::Keep),
-                    (replaces, KeepAnswer::ReplaceAll),
-                    (cancels, KeepAnswer::Cancel),
-                ];
+                let answers =
+                    [(keeps, KeepAnswer::Keep), (replaces, KeepAnswer::ReplaceAll), (cancels, KeepAnswer::Cancel)];
                 answers.into_iter().find(|(clicked, _)| *clicked).map(|(_, answer)| answer)
             };
             ui.horizontal(buttons).inner
