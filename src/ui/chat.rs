@@ -11,9 +11,11 @@ use egui::{Button, Id, Key, Modifiers, Response, RichText, ScrollArea, TextEdit,
 use super::chat_lines::{self, Line};
 pub(crate) use super::chat_model::ChatSettings;
 use super::chat_model::ModelChooser;
-use super::panes::object_thumbnails::ObjectThumbnails;
+use super::ctx::Ctx;
+use super::panes::PaneContents;
 use super::text_field::cursor_to_end;
 use super::theme;
+use super::viewport::Viewport;
 use crate::agent::commands::{Commands, complete};
 use crate::agent::llm::Llm;
 use crate::agent::scene::{Effect, Parts, SceneWorld};
@@ -150,14 +152,32 @@ impl Chat {
         self.focus = true;
     }
 
-    pub(crate) fn show(
-        &mut self,
-        ui: &mut Ui,
-        settings: &mut ChatSettings,
-        object_thumbnails: &ObjectThumbnails,
-        identities: Option<&Identities>,
-        actions: &mut Vec<Action>,
-    ) {
+    /// Completions of the typed text, below the box.
+    fn show_continuations(&mut self, ui: &mut Ui, identities: Option<&Identities>) {
+        let known = identities.filter(|_| !self.typed.trim().is_empty());
+        if self.continuations.0 != self.typed || known.is_none() {
+            let next = known.map(|all| complete(&self.typed, all, CONTINUATIONS)).unwrap_or_default();
+            self.continuations = (self.typed.clone(), next);
+        }
+        for (i, text) in self.continuations.1.iter().enumerate() {
+            let tab = if i == 0 { "  (Tab)" } else { "" };
+            ui.label(RichText::new(format!("{text}{tab}")).small().color(theme::weak()));
+        }
+    }
+
+    /// Takes the first completion on Tab.
+    fn take_continuation(&mut self, ui: &Ui, response: &Response) {
+        let pressed = || ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Tab));
+        let Some(first) = self.continuations.1.first().filter(|_| response.has_focus() && pressed()) else { return };
+        self.typed = format!("{first} ");
+        cursor_to_end(ui.ctx(), response.id, &self.typed);
+    }
+}
+
+impl PaneContents for Chat {
+    fn ui(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, _: &mut Viewport) {
+        let object_thumbnails = cx.thumbnails;
+        let identities = cx.state.semantics.as_ref().map(|map| &map.identities);
         let (ready, mut say) = (identities.is_some(), None);
         if self.lines.is_empty() {
             ui.label(
@@ -218,11 +238,11 @@ impl Chat {
                 say = Some(std::mem::take(&mut self.typed));
             }
         });
-        self.show_continuations(ui, identities.filter(|_| !settings.use_model));
+        self.show_continuations(ui, identities.filter(|_| !cx.layout.chat.use_model));
         ui.horizontal_wrapped(|ui| {
-            self.chooser.show(ui, settings);
+            self.chooser.show(ui, &mut cx.layout.chat);
             if ui.add_enabled(self.transcript.is_some(), Button::new("Save conversation\u{2026}").small()).clicked() {
-                actions.push(Action::SaveChat);
+                cx.ask(Action::SaveChat);
             }
             if ui
                 .add_enabled(self.cancel.is_none() && !self.lines.is_empty(), Button::new("New conversation").small())
@@ -232,29 +252,6 @@ impl Chat {
             }
         });
         self.waiting.extend(say);
-    }
-}
-
-impl Chat {
-    /// Completions of the typed text, below the box.
-    fn show_continuations(&mut self, ui: &mut Ui, identities: Option<&Identities>) {
-        let known = identities.filter(|_| !self.typed.trim().is_empty());
-        if self.continuations.0 != self.typed || known.is_none() {
-            let next = known.map(|all| complete(&self.typed, all, CONTINUATIONS)).unwrap_or_default();
-            self.continuations = (self.typed.clone(), next);
-        }
-        for (i, text) in self.continuations.1.iter().enumerate() {
-            let tab = if i == 0 { "  (Tab)" } else { "" };
-            ui.label(RichText::new(format!("{text}{tab}")).small().color(theme::weak()));
-        }
-    }
-
-    /// Takes the first completion on Tab.
-    fn take_continuation(&mut self, ui: &Ui, response: &Response) {
-        let pressed = || ui.input_mut(|i| i.consume_key(Modifiers::NONE, Key::Tab));
-        let Some(first) = self.continuations.1.first().filter(|_| response.has_focus() && pressed()) else { return };
-        self.typed = format!("{first} ");
-        cursor_to_end(ui.ctx(), response.id, &self.typed);
     }
 }
 

@@ -2,6 +2,7 @@
 
 use egui::RichText;
 
+use super::ctx::Ctx;
 use super::state::{ErrorBox, Tone};
 use super::theme;
 use crate::scene::text;
@@ -12,15 +13,22 @@ pub(crate) struct Question {
     pub(crate) text: String,
     /// Button to proceed.
     pub(crate) yes: &'static str,
-    /// Button of an alternative, with its action.
-    pub(crate) other: Option<(&'static str, Action)>,
+    /// Button of an alternative.
+    pub(crate) other: Option<&'static str>,
     /// Button to decline.
     pub(crate) no: &'static str,
-    pub(crate) action: Action,
 }
 
-/// Shows an error until it is read. Returns whether it was; if a scene could not be opened, others are offered.
-pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox, has_scene: bool, actions: &mut Vec<Action>) -> bool {
+/// Answer to a [`Question`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum DialogAnswer {
+    Yes,
+    Other,
+    No,
+}
+
+/// Shows an error; returns true once it is closed. If a scene could not be opened, others are offered.
+pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox, cx: &mut Ctx<'_>) -> bool {
     let response = theme::dialog("error").show(ctx, |ui| {
         ui.set_width(480.0);
         ui.horizontal(|ui| {
@@ -34,14 +42,14 @@ pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox, has_scene: bool,
             ui.label(RichText::new(&error.failure.remedy).color(theme::text()).strong());
         }
         ui.add_space(6.0);
-        if has_scene {
+        if cx.state.scene.is_some() {
             ui.weak("The open scene is unchanged.");
         }
         ui.add_space(12.0);
         ui.horizontal(|ui| {
             let mut close = ui.add(theme::primary_button("Close")).clicked();
             if error.doing.starts_with("Opening") && ui.button("Open another\u{2026}").clicked() {
-                actions.push(Action::OpenFile);
+                cx.ask(Action::OpenFile);
                 close = true;
             }
             if ui.button("Copy message").clicked() {
@@ -56,42 +64,30 @@ pub(crate) fn show_error(ctx: &egui::Context, error: &ErrorBox, has_scene: bool,
 }
 
 impl Question {
-    /// Shows the question. `Some` once it is answered, with the action to carry out.
-    pub(crate) fn show(&self, ctx: &egui::Context) -> Option<Option<Action>> {
+    /// Shows the question; returns the answer, once there is one.
+    pub(crate) fn show(&self, ctx: &egui::Context) -> Option<DialogAnswer> {
         let response = theme::dialog("dialog question").show(ctx, |ui| {
             ui.set_width(420.0);
             egui::ScrollArea::vertical().max_height(260.0).show(ui, |ui| ui.label(text::lines(&self.text)));
             ui.add_space(12.0);
             ui.horizontal(|ui| {
-                let mut answer = ui.add(theme::primary_button(self.yes)).clicked().then(|| Some(self.action.clone()));
-                if let Some((other, action)) = &self.other
-                    && ui.button(*other).clicked()
-                {
-                    answer = Some(Some(action.clone()));
-                }
-                if ui.button(self.no).clicked() { Some(None) } else { answer }
+                let answers = [
+                    (ui.add(theme::primary_button(self.yes)).clicked(), DialogAnswer::Yes),
+                    (self.other.is_some_and(|other| ui.button(other).clicked()), DialogAnswer::Other),
+                    (ui.button(self.no).clicked(), DialogAnswer::No),
+                ];
+                answers.into_iter().find(|(is_clicked, _)| *is_clicked).map(|(_, answer)| answer)
             })
             .inner
         });
-        let closed = response.should_close();
-        response.inner.or_else(|| closed.then_some(None))
+        response.inner.or_else(|| response.should_close().then_some(DialogAnswer::No))
     }
 }
 
-/// Shows a question. `Some(true)` to proceed, `Some(false)` to decline, `None` without an answer.
-pub(crate) fn show_question(ctx: &egui::Context, text: &str, yes: &str, no: &str) -> Option<bool> {
-    let response = theme::dialog("dialog question").show(ctx, |ui| {
-        ui.set_width(420.0);
-        ui.label(text);
-        ui.add_space(12.0);
-        ui.horizontal(|ui| {
-            let yes = ui.add(theme::primary_button(yes)).clicked();
-            let no = ui.button(no).clicked();
-            if yes { Some(true) } else { no.then_some(false) }
-        })
-        .inner
-    });
-    response.inner.or_else(|| response.should_close().then_some(false))
+/// Shows a question of two answers. `Some(true)` to proceed, `Some(false)` to decline, `None` without an answer.
+pub(crate) fn show_question(ctx: &egui::Context, text: &str, yes: &'static str, no: &'static str) -> Option<bool> {
+    let question = Question { text: text.to_owned(), yes, other: None, no };
+    question.show(ctx).map(|answer| answer == DialogAnswer::Yes)
 }
 
 /// Draws a hint over the window that the dragged files can be dropped.

@@ -1,12 +1,10 @@
-//! The dialog on methods to find objects if photos have no labels: the abilities, costs and downloads of each.
-//! Downloads are followed by the search.
+//! Choice of the models that find objects if photos have no labels: the abilities, costs and downloads of each.
 
 use std::collections::VecDeque;
 
 use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
 
-use super::keep_dialog::PlannedSearch;
-use super::state::AppState;
+use super::ctx::Ctx;
 use super::theme;
 use crate::jobs::find_objects::forecast::{self, LookTime};
 use crate::jobs::find_objects::{FindSettings, NO_ENCODER};
@@ -15,7 +13,6 @@ use crate::math::format::things;
 use crate::pipeline::semantics::build_map::{Carry, REGIONS};
 use crate::scene::Preparation;
 use crate::ui::actions::{Action, Pane};
-use crate::worker::JobId;
 
 /// Choices made so far.
 #[derive(Default)]
@@ -37,16 +34,6 @@ pub(crate) struct Means {
     pub(crate) encoder: String,
     /// Models to download first.
     pub(crate) missing: VecDeque<String>,
-}
-
-/// A search that waits for downloads.
-pub(super) struct AwaitedModels {
-    /// The running download.
-    pub(super) job: JobId,
-    /// The search after it, with the models still missing.
-    pub(super) then: PlannedSearch,
-    /// Number of the scene to search.
-    pub(super) scene: u64,
 }
 
 impl FindDialog {
@@ -72,28 +59,23 @@ impl FindDialog {
     }
 
     /// Draws the dialog if it is open; returns the decision, once there is one.
-    pub(crate) fn show(
-        &mut self,
-        ctx: &egui::Context,
-        state: &AppState,
-        max_seeds: usize,
-        actions: &mut Vec<Action>,
-    ) -> Option<Means> {
+    pub(crate) fn show(&mut self, ctx: &egui::Context, max_seeds: usize, cx: &mut Ctx<'_>) -> Option<Means> {
         if !self.open {
             return None;
         }
+        let state = cx.state;
         let response = theme::dialog("find objects").show(ctx, |ui| {
             let room = ctx.content_rect().size();
             ui.set_width((room.x - 80.0).min(600.0));
             ui.heading("Find objects and parts");
             ui.add_space(4.0);
-            let text = "These photos came without labels. What looks at them decides what can be found, and what can \
-                        be asked for in words.";
+            let text = "These photos have no labels. The segmenter decides which objects are found, the text encoder \
+                        which words find them.";
             ui.label(RichText::new(text).color(theme::weak()));
             let Some(known) = &state.models else {
                 ui.add_space(8.0);
                 ui.weak("Looking for models\u{2026}");
-                return self.buttons(ui, None, actions);
+                return self.buttons(ui, None, cx);
             };
             let photos = state.scene.as_ref().and_then(|s| s.dataset.as_ref()).map_or(0, |d| d.photos.len());
             let means = self.means(known);
@@ -105,7 +87,7 @@ impl FindDialog {
             });
             ui.add_space(6.0);
             summary(ui, known, &means, photos.min(max_seeds), self.is_fast(known));
-            self.buttons(ui, Some(means), actions)
+            self.buttons(ui, Some(means), cx)
         });
         if response.should_close() {
             self.open = false;
@@ -133,22 +115,22 @@ impl FindDialog {
 
     fn choices(&mut self, ui: &mut Ui, known: &ModelList, means: &Means) {
         ui.add_space(6.0);
-        ui.label(RichText::new("What finds the masks of objects and parts").strong());
-        let text = "Rough: a thing of two colors becomes two, neighbors of one color become one.";
+        ui.label(RichText::new("Segmenter").strong());
+        let text = "Rough: an object of two colors is split, neighbors of one color are merged.";
         if choice(ui, means.segmenter == REGIONS, "Uniform color regions (built in)", text, "") {
             self.segmenter = Some(REGIONS.into());
         }
-        if let Some(id) = networks(ui, (known, self.is_fast(known)), ModelRole::Segmenter, &means.segmenter) {
+        if let Some(id) = networks(ui, known, self.is_fast(known), ModelRole::Segmenter, &means.segmenter) {
             self.segmenter = Some(id);
         }
         ui.add_space(8.0);
-        ui.label(RichText::new("What understands words").strong());
-        let text = "Things have numbers, no names. Whatever you name yourself (double-click it in Objects) is found by \
-                    that name.";
+        ui.label(RichText::new("Text encoder").strong());
+        let text = "Objects have numbers instead of names. Those that you name (double-click one in Objects) are found \
+                    by name.";
         if choice(ui, means.encoder == NO_ENCODER, "Only names that you give", text, "") {
             self.encoder = Some(NO_ENCODER.into());
         }
-        if let Some(id) = networks(ui, (known, self.is_fast(known)), ModelRole::Encoder, &means.encoder) {
+        if let Some(id) = networks(ui, known, self.is_fast(known), ModelRole::Encoder, &means.encoder) {
             self.encoder = Some(id);
         }
     }
@@ -157,7 +139,7 @@ impl FindDialog {
     fn engine(&mut self, ui: &mut Ui, known: &ModelList, means: &Means) {
         let Some(entry) = missing_engine(known) else { return };
         ui.add_space(8.0);
-        ui.label(RichText::new("What runs them").strong());
+        ui.label(RichText::new("Inference engine").strong());
         let (mut is_wanted, is_needed) =
             (means.missing.contains(&entry.id), self.without_engine || !means.missing.is_empty());
         if ui.add_enabled(is_needed, egui::Checkbox::new(&mut is_wanted, &entry.title)).changed() {
@@ -167,13 +149,13 @@ impl FindDialog {
             ui.label(RichText::new(&entry.adds).small().color(theme::weak()));
             ui.label(RichText::new(download(known, entry)).small().color(theme::text()));
             if known.is_settled {
-                let text = "A network was used already, so it is used from the next start of this program on.";
+                let text = "Used from the next start of the program: another engine is in use already.";
                 ui.label(RichText::new(text).small().color(theme::warning()));
             }
         });
     }
 
-    fn buttons(&mut self, ui: &mut Ui, means: Option<Means>, actions: &mut Vec<Action>) -> Option<Means> {
+    fn buttons(&mut self, ui: &mut Ui, means: Option<Means>, cx: &mut Ctx<'_>) -> Option<Means> {
         ui.add_space(10.0);
         ui.horizontal(|ui| {
             let text = match &means {
@@ -184,7 +166,7 @@ impl FindDialog {
             let cancels = ui.button("Cancel").clicked();
             let files = ui.button("I have the files\u{2026}").on_hover_text("Add downloaded files in the Models pane.");
             if files.clicked() {
-                actions.push(Action::ShowPane(Pane::Models));
+                cx.ask(Action::ShowPane(Pane::Models));
             }
             self.open &= !cancels && !files.clicked();
             means.filter(|_| goes)
@@ -194,13 +176,13 @@ impl FindDialog {
 }
 
 /// Networks for one role: installed, recommended or chosen ones, the others folded. Returns the one that was clicked.
-fn networks(ui: &mut Ui, (known, is_fast): (&ModelList, bool), role: ModelRole, chosen: &str) -> Option<String> {
+fn networks(ui: &mut Ui, known: &ModelList, is_fast: bool, role: ModelRole, chosen: &str) -> Option<String> {
     let (first, others): (Vec<_>, Vec<_>) =
         known.of(role).partition(|(e, s)| s.is_usable() || e.recommended || e.id == chosen);
     let mut clicked = None;
     let mut list = |ui: &mut Ui, all: Vec<(&ModelEntry, &ModelState)>| {
         for (entry, model) in all {
-            if offered(ui, chosen == entry.id, (entry, model), (known, is_fast)) {
+            if offered(ui, chosen == entry.id, entry, model, known, is_fast) {
                 clicked = Some(entry.id.clone());
             }
         }
@@ -217,8 +199,10 @@ fn networks(ui: &mut Ui, (known, is_fast): (&ModelList, bool), role: ModelRole, 
 fn offered(
     ui: &mut Ui,
     chosen: bool,
-    (entry, model): (&ModelEntry, &ModelState),
-    (known, is_fast): (&ModelList, bool),
+    entry: &ModelEntry,
+    model: &ModelState,
+    known: &ModelList,
+    is_fast: bool,
 ) -> bool {
     let to_load = (!model.is_usable()).then(|| download(known, entry));
     let what = if entry.role == ModelRole::Encoder { "a picture of an object" } else { "a photo" };
@@ -270,7 +254,7 @@ fn summary(ui: &mut Ui, known: &ModelList, means: &Means, most_photos: usize, is
     let warning = match means.encoder.as_str() {
         NO_ENCODER => Some("Words find nothing until you name things."),
         id if known.get(id).is_some_and(|(e, _)| e.built_in) => {
-            Some("The built-in encoder was trained on made-up scenes: on real photos words find next to nothing.")
+            Some("The built-in encoder was trained on synthetic scenes: on real photos, words find almost nothing.")
         }
         _ => None,
     };

@@ -43,19 +43,16 @@ impl KeepDialog {
             ui.add_space(6.0);
             ui.label(listed(&self.by_hand));
             ui.add_space(6.0);
-            let text = "Objects are about to be found anew. What you keep stays as it is, with its parts and its whole. \
-                        Undo brings back what is there now, either way.";
+            let text = "The search replaces all others. Those that you keep stay as they are, with their parts and \
+                        their wholes. Undo restores the present objects and parts either way.";
             ui.label(egui::RichText::new(text).color(theme::weak()));
             ui.add_space(12.0);
             let buttons = |ui: &mut egui::Ui| {
                 let keeps = ui.add(theme::primary_button("Keep them")).clicked();
                 let replaces = ui.button("Replace all").clicked();
                 let cancels = ui.button("Cancel").clicked();
-                let answers = [
-                    (keeps, KeepAnswer::Keep),
-                    (replaces, KeepAnswer::ReplaceAll),
-                    (cancels, KeepAnswer::Cancel),
-                ];
+                let answers =
+                    [(keeps, KeepAnswer::Keep), (replaces, KeepAnswer::ReplaceAll), (cancels, KeepAnswer::Cancel)];
                 answers.into_iter().find(|(clicked, _)| *clicked).map(|(_, answer)| answer)
             };
             ui.horizontal(buttons).inner

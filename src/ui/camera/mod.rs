@@ -10,8 +10,10 @@ use std::path::Path;
 use egui::{Align, Button, Checkbox, ComboBox, DragValue, Layout, RichText, Slider, Ui, vec2};
 
 use self::player::{Clip, Player};
-use super::state::AppState;
+use super::ctx::Ctx;
+use super::panes::PaneContents;
 use super::theme;
+use super::viewport::Viewport;
 use crate::io::video::VideoSettings;
 use crate::navigate::camera_spline::{MOST_PICTURES, steps_of};
 use crate::navigate::{CameraSpline, CameraTrajectory, Pose, Speed};
@@ -199,37 +201,7 @@ impl CameraPane {
         self.path.keys.iter().enumerate().map(|(i, k)| (k.center, self.selected == Some(i)))
     }
 
-    /// Draws the pane. `eye` is the current pose. Returns the pose to show, if the user moved in time or chose a
-    /// keyframe.
-    pub(crate) fn show(
-        &mut self,
-        ui: &mut Ui,
-        state: &AppState,
-        eye: &Pose,
-        actions: &mut Vec<Action>,
-    ) -> Option<Pose> {
-        self.keep_up();
-        let mut wanted = None;
-        ui.horizontal_wrapped(|ui| self.controls(ui, actions));
-        ui.add_space(2.0);
-        wanted = timeline::show(ui, self).or(wanted);
-        ui.add_space(2.0);
-        row(ui, "Path", |ui| self.path_tools(ui, state, eye, actions));
-        row(ui, "Timing", |ui| self.timing(ui));
-        row(ui, "Video", |ui| self.video_tools(ui, state, actions));
-        if self.path.keys.is_empty() {
-            ui.add_space(4.0);
-            ui.weak(
-                "No keyframes yet. Add the current view (K), open a path, or go to an object and convert the \
-                 flight.",
-            );
-        } else {
-            wanted = keys::show(ui, self, eye).or(wanted);
-        }
-        wanted
-    }
-
-    fn controls(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
+    fn controls(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>) {
         let has_clip = self.player.clip().is_some();
         let tip = |a: &Action| format!("{}  {}", a.tooltip(), super::keys::label(ui.ctx(), a));
         let play = if self.player.playing { "Pause" } else { "Play" };
@@ -239,7 +211,7 @@ impl CameraPane {
             let button = Button::new(symbol).min_size(egui::vec2(28.0, 24.0));
             let button = ui.add_enabled(has_clip, button).on_hover_text(tip);
             if button.accessible_name(action.text()).clicked() {
-                actions.push(action);
+                cx.ask(action);
             }
         }
         ui.checkbox(&mut self.player.looped, "Loop");
@@ -290,7 +262,7 @@ impl CameraPane {
         self.put_path_in();
     }
 
-    fn path_tools(&mut self, ui: &mut Ui, state: &AppState, eye: &Pose, actions: &mut Vec<Action>) {
+    fn path_tools(&mut self, ui: &mut Ui, eye: &Pose, cx: &mut Ctx<'_>) {
         let tip = format!("{}  {}", Action::AddKey.tooltip(), super::keys::label(ui.ctx(), &Action::AddKey));
         if ui.button("Add keyframe").on_hover_text(tip).clicked() {
             self.record(eye);
@@ -300,10 +272,10 @@ impl CameraPane {
         {
             let button = ui.add_enabled(enabled, Button::new(text)).on_disabled_hover_text(NO_KEYS);
             if button.on_hover_text(action.tooltip()).clicked() {
-                actions.push(action);
+                cx.ask(action);
             }
         }
-        ui.add_enabled(state.explored.is_some(), Checkbox::new(&mut self.show_reach, "Show reach"))
+        ui.add_enabled(cx.state.explored.is_some(), Checkbox::new(&mut self.show_reach, "Show reach"))
             .on_hover_text("Mark the places that the camera can go to: green; red ones cannot be reached from here.")
             .on_disabled_hover_text("Known once the camera has gone to an object.");
     }
@@ -322,14 +294,15 @@ impl CameraPane {
         self.speed = if eased { Speed::Eased } else { Speed::Constant };
     }
 
-    fn video_tools(&mut self, ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
-        let idle = state.job.is_none() && self.player.clip().is_some();
+    fn video_tools(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>) {
+        let is_busy = cx.state.job.is_some();
+        let idle = !is_busy && self.player.clip().is_some();
         let flight = self.flight().is_some();
         let text = if flight { "Export flight as video\u{2026}" } else { "Export video\u{2026}" };
         let button = ui.add_enabled(idle, Button::new(text));
-        let why = if state.job.is_some() { "Another job is running." } else { NO_KEYS };
+        let why = if is_busy { "Another job is running." } else { NO_KEYS };
         if button.on_hover_text(Action::ExportVideo.tooltip()).on_disabled_hover_text(why).clicked() {
-            actions.push(Action::ExportVideo);
+            cx.ask(Action::ExportVideo);
         }
         let height = ComboBox::from_id_salt("video height")
             .selected_text(format!("{} px", self.video_height))
@@ -345,7 +318,34 @@ impl CameraPane {
         let quality = ui.label("Quality").id;
         ui.add(Slider::new(&mut self.quality, 0..=100)).labelled_by(quality);
         ui.checkbox(&mut self.mark, "Highlight")
-            .on_hover_text("Highlight what the query found in every frame of the video.");
+            .on_hover_text("Highlight the answer to the query in every frame of the video.");
+    }
+}
+
+impl PaneContents for CameraPane {
+    /// Draws the pane, and moves the view when the user moves in time or chooses a keyframe.
+    fn ui(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, view: &mut Viewport) {
+        let eye = view.pose();
+        self.keep_up();
+        ui.horizontal_wrapped(|ui| self.controls(ui, cx));
+        ui.add_space(2.0);
+        let mut wanted = timeline::show(ui, self);
+        ui.add_space(2.0);
+        row(ui, "Path", |ui| self.path_tools(ui, &eye, cx));
+        row(ui, "Timing", |ui| self.timing(ui));
+        row(ui, "Video", |ui| self.video_tools(ui, cx));
+        if self.path.keys.is_empty() {
+            ui.add_space(4.0);
+            ui.weak(
+                "No keyframes yet. Add the current view (K), open a path, or go to an object and convert the \
+                 flight.",
+            );
+        } else {
+            wanted = keys::show(ui, self, &eye).or(wanted);
+        }
+        if let Some(pose) = wanted {
+            view.stand(&pose, cx.state, ui.input(|i| i.time));
+        }
     }
 }
 

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use egui::{Align, Button, RichText, Stroke, Ui, vec2};
 use strum::VariantArray;
 
-use super::super::layout::Layout;
-use super::super::state::{AppState, RunningJob};
+use super::super::ctx::Ctx;
+use super::super::state::RunningJob;
 use super::super::{keys, theme};
 use crate::math::format;
 use crate::pipeline::observer::Progress;
@@ -23,7 +23,8 @@ const INDENT: &str = "     ";
 const PAUSE_PT: f32 = 62.0;
 
 /// Draws the bar at the top; `second` is true if the second view is active.
-pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bool, actions: &mut Vec<Action>) {
+pub(crate) fn top(ui: &mut Ui, cx: &mut Ctx<'_>, second: bool) {
+    let state = cx.state;
     ui.horizontal(|ui| {
         let has_scene = state.scene.is_some();
         let has_photos = state.scene.as_ref().is_some_and(|s| s.dataset.is_some());
@@ -32,7 +33,7 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
             for action in
                 [Action::OpenDemo, Action::TrainDemo, Action::OpenFolder, Action::OpenFile, Action::ChooseReport]
             {
-                item(ui, true, None, action, actions);
+                item(ui, true, None, action, cx);
             }
             ui.menu_button("Open recent", |ui| {
                 if state.recent.is_empty() {
@@ -41,102 +42,102 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
                 for path in &state.recent {
                     let text = text::elided(&path.to_string_lossy(), 60);
                     if ui.button(text).clicked() {
-                        actions.push(Action::Open(path.clone()));
+                        cx.ask(Action::Open(path.clone()));
                     }
                     let runs = state.recent_runs.iter().find(|(of, _)| of == path);
                     for run in runs.into_iter().flat_map(|(_, runs)| runs) {
                         if ui.button(format!("{INDENT}{}", run.text())).clicked() {
-                            actions.push(Action::Open(run.folder.clone()));
+                            cx.ask(Action::Open(run.folder.clone()));
                         }
                     }
                 }
             });
             ui.separator();
-            item(ui, has_scene, None, Action::ExportPly, actions);
-            item(ui, has_scene, None, Action::ExportCrop, actions);
-            item(ui, state.semantics.is_some(), None, Action::ExportAll, actions);
-            item(ui, has_scene, None, Action::ExportPage, actions);
-            item(ui, has_scene, None, Action::Screenshot, actions);
+            item(ui, has_scene, None, Action::ExportPly, cx);
+            item(ui, has_scene, None, Action::ExportCrop, cx);
+            item(ui, state.semantics.is_some(), None, Action::ExportAll, cx);
+            item(ui, has_scene, None, Action::ExportPage, cx);
+            item(ui, has_scene, None, Action::Screenshot, cx);
             ui.separator();
-            item(ui, true, None, Action::Quit, actions);
+            item(ui, true, None, Action::Quit, cx);
         });
         ui.menu_button("Edit", |ui| {
             ui.set_min_width(260.0);
             for (action, what) in [(Action::Undo, state.changes.last()), (Action::Redo, state.changes.next())] {
                 let text = what.map_or_else(|| action.text(), |what| format!("{}: {what}", action.text()));
-                entry(ui, what.is_some(), None, &text, action, actions);
+                entry(ui, what.is_some(), None, &text, action, cx);
             }
             ui.separator();
-            item(ui, state.semantics.is_some(), None, Action::Rename, actions);
-            item(ui, state.semantics.is_some(), None, Action::Isolate(None), actions);
+            item(ui, state.semantics.is_some(), None, Action::Rename, cx);
+            item(ui, state.semantics.is_some(), None, Action::Isolate(None), cx);
         });
         ui.menu_button("View", |ui| {
             ui.set_min_width(280.0);
             ui.menu_button(format!("{INDENT}Show"), |ui| {
                 for &mode in ViewMode::VARIANTS {
-                    item(ui, has_scene, Some(*layout.mode_of(second) == mode), Action::Show(mode), actions);
+                    item(ui, has_scene, Some(*cx.layout.mode_of(second) == mode), Action::Show(mode), cx);
                 }
             });
             ui.separator();
-            item(ui, has_photos, Some(layout.cameras), Action::ToggleCameras, actions);
-            item(ui, has_photos, Some(layout.compare), Action::ToggleCompare, actions);
-            item(ui, has_scene, Some(layout.split_view), Action::ToggleSplit, actions);
-            item(ui, layout.split_view, Some(false), Action::OtherView, actions);
+            item(ui, has_photos, Some(cx.layout.cameras), Action::ToggleCameras, cx);
+            item(ui, has_photos, Some(cx.layout.compare), Action::ToggleCompare, cx);
+            item(ui, has_scene, Some(cx.layout.split_view), Action::ToggleSplit, cx);
+            item(ui, cx.layout.split_view, Some(false), Action::OtherView, cx);
             let beside = state.beside.as_ref().map_or(Action::ChooseBeside, |_| Action::OpenBeside(None));
-            item(ui, has_scene, Some(false), beside, actions);
-            item(ui, state.semantics.is_some(), Some(layout.dim), Action::ToggleDim, actions);
-            item(ui, has_scene, Some(layout.times), Action::ToggleTimes, actions);
+            item(ui, has_scene, Some(false), beside, cx);
+            item(ui, state.semantics.is_some(), Some(cx.layout.dim), Action::ToggleDim, cx);
+            item(ui, has_scene, Some(cx.layout.times), Action::ToggleTimes, cx);
             ui.separator();
             for action in [Action::FrameScene, Action::ResetView] {
-                item(ui, has_scene, Some(false), action, actions);
+                item(ui, has_scene, Some(false), action, cx);
             }
             ui.menu_button(format!("{INDENT}Up direction"), |ui| {
                 for &axis in Axis::VARIANTS {
-                    item(ui, has_scene, Some(false), Action::TurnUp(axis), actions);
+                    item(ui, has_scene, Some(false), Action::TurnUp(axis), cx);
                 }
             });
             for action in [Action::PreviousPhoto, Action::NextPhoto] {
-                item(ui, has_photos, Some(false), action, actions);
+                item(ui, has_photos, Some(false), action, cx);
             }
             ui.separator();
-            item(ui, has_scene, Some(false), Action::FillWindow, actions);
+            item(ui, has_scene, Some(false), Action::FillWindow, cx);
             ui.menu_button(format!("{INDENT}Panes"), |ui| {
                 for &pane in Pane::VARIANTS {
-                    item(ui, true, Some(layout.shows(pane)), Action::TogglePane(pane), actions);
+                    item(ui, true, Some(cx.layout.shows(pane)), Action::TogglePane(pane), cx);
                 }
                 ui.separator();
-                item(ui, true, Some(false), Action::ResetPanes, actions);
+                item(ui, true, Some(false), Action::ResetPanes, cx);
             });
             ui.menu_button(format!("{INDENT}Theme and text size"), |ui| {
                 for theme in THEMES {
-                    item(ui, true, Some(layout.theme == theme), Action::UseTheme(theme), actions);
+                    item(ui, true, Some(cx.layout.theme == theme), Action::UseTheme(theme), cx);
                 }
                 ui.separator();
                 for action in [Action::LargerText, Action::SmallerText, Action::NormalText] {
-                    item(ui, true, Some(false), action, actions);
+                    item(ui, true, Some(false), action, cx);
                 }
             });
         });
         ui.menu_button("Tools", |ui| {
             ui.set_min_width(220.0);
             for action in [Action::Measure, Action::Crop, Action::Inspect] {
-                item(ui, has_scene, None, action, actions);
+                item(ui, has_scene, None, action, cx);
             }
-            item(ui, state.is_trained() && state.job.is_none(), None, Action::MeasureSplats, actions);
+            item(ui, state.is_trained() && state.job.is_none(), None, Action::MeasureSplats, cx);
         });
         ui.menu_button("Train", |ui| {
             ui.set_min_width(260.0);
             let trains_here = has_photos && state.scene.as_ref().is_some_and(|s| s.remote.is_none());
-            item(ui, trains_here && state.job.is_none(), None, Action::StartTraining, actions);
-            item(ui, trains_here && state.job.is_none() && state.can_begin_anew(), None, Action::TrainAnew, actions);
-            item(ui, state.job.as_ref().is_some_and(|j| j.kind.can_pause()), None, Action::PauseJob, actions);
-            item(ui, state.job.is_some(), None, Action::Cancel, actions);
-            item(ui, trains_here && state.job.is_none(), None, Action::Evaluate, actions);
+            item(ui, trains_here && state.job.is_none(), None, Action::StartTraining, cx);
+            item(ui, trains_here && state.job.is_none() && state.can_begin_anew(), None, Action::TrainAnew, cx);
+            item(ui, state.job.as_ref().is_some_and(|j| j.info.can_pause), None, Action::PauseJob, cx);
+            item(ui, state.job.is_some(), None, Action::Cancel, cx);
+            item(ui, trains_here && state.job.is_none(), None, Action::Evaluate, cx);
         });
         ui.menu_button("Help", |ui| {
             ui.set_min_width(240.0);
-            item(ui, true, None, Action::Palette, actions);
-            item(ui, true, None, Action::Shortcuts, actions);
+            item(ui, true, None, Action::Palette, cx);
+            item(ui, true, None, Action::Shortcuts, cx);
         });
         if let Some(scene) = &state.scene {
             ui.separator();
@@ -149,24 +150,24 @@ pub(crate) fn top(ui: &mut Ui, state: &AppState, layout: &mut Layout, second: bo
             let search = Button::new(RichText::new("Search actions").color(theme::weak()))
                 .shortcut_text(keys::label(ui.ctx(), &Action::Palette));
             if ui.add(search).on_hover_text(Action::Palette.tooltip()).clicked() {
-                actions.push(Action::Palette);
+                cx.ask(Action::Palette);
             }
         });
     });
 }
 
 /// A menu entry; `on` is the state of a switch, which is named by its target.
-fn item(ui: &mut Ui, enabled: bool, on: Option<bool>, action: Action, actions: &mut Vec<Action>) {
+fn item(ui: &mut Ui, enabled: bool, on: Option<bool>, action: Action, cx: &mut Ctx<'_>) {
     let text = match &action {
         Action::ToggleCameras => "Cameras".to_owned(),
         Action::ToggleTimes => "Frame times".to_owned(),
         Action::TogglePane(pane) => pane.text().to_owned(),
         other => other.text(),
     };
-    entry(ui, enabled, on, &text, action, actions);
+    entry(ui, enabled, on, &text, action, cx);
 }
 
-fn entry(ui: &mut Ui, enabled: bool, on: Option<bool>, text: &str, action: Action, actions: &mut Vec<Action>) {
+fn entry(ui: &mut Ui, enabled: bool, on: Option<bool>, text: &str, action: Action, cx: &mut Ctx<'_>) {
     // All entries of a menu with switches leave room for the check mark.
     let text = if on.is_some() { format!("{INDENT}{text}") } else { text.to_owned() };
     let button = Button::new(text).shortcut_text(keys::label(ui.ctx(), &action));
@@ -177,25 +178,21 @@ fn entry(ui: &mut Ui, enabled: bool, on: Option<bool>, text: &str, action: Actio
         ui.painter().line(check.to_vec(), Stroke::new(1.8, theme::accent()));
     }
     if shown.clicked() {
-        actions.push(action);
+        cx.ask(action);
     }
 }
 
 /// Draws the bar at the bottom.
-pub(crate) fn status(
-    ui: &mut Ui,
-    state: &AppState,
-    layout: &Layout,
-    picture: Option<&ViewPicture>,
-    actions: &mut Vec<Action>,
-) {
+pub(crate) fn status(ui: &mut Ui, cx: &mut Ctx<'_>, picture: Option<&ViewPicture>) {
+    let state = cx.state;
     ui.horizontal(|ui| {
         match &state.job {
             Some(job) => {
                 dot(ui, if job.paused { theme::warning() } else { theme::accent() });
                 // The training pane and the first page have their own buttons.
-                if !job.canceling && state.scene.is_some() && !(state.is_training() && layout.shows(Pane::Training)) {
-                    job_buttons(ui, job, actions);
+                if !job.canceling && state.scene.is_some() && !(state.is_training() && cx.layout.shows(Pane::Training))
+                {
+                    job_buttons(ui, job, cx);
                 }
                 ui.label(RichText::new(job.text()).strong());
                 if let Some(p) = job.progress.as_ref().filter(|_| state.scene.is_some() && !job.canceling) {
@@ -212,9 +209,9 @@ pub(crate) fn status(
             connection(ui, link);
         }
         ui.with_layout(egui::Layout::right_to_left(Align::Center), |ui| {
-            let log = ui.selectable_label(layout.shows(Pane::Log), "Log");
+            let log = ui.selectable_label(cx.layout.shows(Pane::Log), "Log");
             if log.on_hover_text("Show or hide the log").clicked() {
-                actions.push(Action::TogglePane(Pane::Log));
+                cx.ask(Action::TogglePane(Pane::Log));
             }
             if let Some(p) = picture {
                 let text = RichText::new(format!("Rendered on {}", p.drawn_by)).small();
@@ -244,21 +241,21 @@ fn connection(ui: &mut Ui, link: &LinkStatus) {
     dot(ui, color);
     let shown = ui.label(RichText::new(text).color(if link.connected { theme::weak() } else { color }));
     shown.on_hover_text(match &link.problem {
-        Some(problem) => format!("{problem}\nWhat is on screen stays."),
-        None => "What is drawn and asked is drawn and asked here; the scene comes from there.".into(),
+        Some(problem) => format!("{problem}\nThe scene on screen stays."),
+        None => "The scene comes from there; it is rendered and queried here.".into(),
     });
 }
 
 /// The buttons stand before all texts, which change width, so that neither moves under the pointer.
-fn job_buttons(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
-    if job.kind.can_pause() {
+fn job_buttons(ui: &mut Ui, job: &RunningJob, cx: &mut Ctx<'_>) {
+    if job.info.can_pause {
         let pause = Button::new(if job.paused { "Resume" } else { "Pause" }).small();
         if ui.add(pause.min_size(vec2(PAUSE_PT, 0.0))).on_hover_text("T").clicked() {
-            actions.push(Action::PauseJob);
+            cx.ask(Action::PauseJob);
         }
     }
     if ui.small_button("Cancel").on_hover_text("Esc").clicked() {
-        actions.push(Action::Cancel);
+        cx.ask(Action::Cancel);
     }
 }
 

@@ -6,18 +6,19 @@ use std::sync::Arc;
 use egui::{Button, Checkbox, ComboBox, DragValue, RichText, Ui};
 use strum::VariantArray;
 
+use super::super::ctx::Ctx;
 use super::super::labels::sentence;
 use super::super::state::AppState;
 use super::super::theme;
 use super::super::viewport::Viewport;
 use super::super::viewport::choosing::Brushed;
 use super::super::viewport::chosen::ChosenSplats;
+use super::PaneContents;
 use super::histogram::Histogram;
 use crate::jobs::clean::{self, CleanRule, CloudMeasures, MeasuredCloud, SplatMeasure};
 use crate::math::format;
 use crate::scene::{CropBox, GaussianCloud, IdentityId};
 use crate::ui::actions::Action;
-use crate::worker::JobKind;
 
 /// Initial color.
 const FIRST_COLOR: [u8; 3] = [128; 3];
@@ -25,6 +26,8 @@ const FIRST_COLOR: [u8; 3] = [128; 3];
 /// The pane.
 #[derive(Default)]
 pub(crate) struct CleanPane {
+    /// True while Gaussians are measured; set by the window.
+    pub(crate) measuring: bool,
     measured: Option<Arc<MeasuredCloud>>,
     /// Rules without numbers, with the number of Gaussians that each chooses.
     counts: Vec<(CleanRule, usize)>,
@@ -54,17 +57,14 @@ struct SplatChoice {
 }
 
 impl CleanPane {
-    /// Takes over new measures, and follows the cloud on screen. Returns the choice for the view.
+    /// Follows the cloud on screen. Returns the choice for the view.
     pub(crate) fn update(
         &mut self,
-        state: &mut AppState,
+        state: &AppState,
         cloud: Option<&Arc<GaussianCloud>>,
         brushed: Vec<Brushed>,
         is_shown: bool,
     ) -> Option<Arc<ChosenSplats>> {
-        if let Some(measured) = state.splats_measured.take() {
-            self.take(measured);
-        }
         let is_of = |m: &Arc<MeasuredCloud>| cloud.is_some_and(|c| Arc::ptr_eq(c, &m.cloud));
         if let (Some(measured), Some(cloud)) = (self.measured.take_if(|m| !is_of(m)), cloud) {
             // The measures of the remaining Gaussians stay valid; pieces and distances are kept as before.
@@ -88,7 +88,8 @@ impl CleanPane {
         self.deleted.as_ref().map(|c| c.of.clone())
     }
 
-    fn take(&mut self, measured: Arc<MeasuredCloud>) {
+    /// Takes over new measures.
+    pub(crate) fn take(&mut self, measured: Arc<MeasuredCloud>) {
         let count = |rule: CleanRule| {
             let chosen = rule.choose(&measured.measures).ok()?;
             Some((rule, chosen.iter().filter(|c| **c).count()))
@@ -97,41 +98,12 @@ impl CleanPane {
         (self.measured, self.choice, self.chosen) = (Some(measured), SplatChoice::default(), None);
     }
 
-    /// Draws the pane.
-    pub(crate) fn show(&mut self, ui: &mut Ui, state: &AppState, view: &Viewport, actions: &mut Vec<Action>) {
-        if !state.is_trained() {
-            ui.weak("Trained Gaussians can be cleaned: open a trained scene or a splat, or train one.");
-            return;
-        }
-        let Some(measured) = self.measured.clone() else { return offer(ui, state, actions) };
-        let before = self.choice.clone();
-        self.show_chosen(ui, &measured, actions);
-        theme::section(ui, "Suspects");
-        for (rule, count) in &self.counts {
-            self.choice.show_rule(ui, *rule, *count);
-        }
-        if measured.measures.get(SplatMeasure::Weight).is_none() {
-            ui.weak("The photos are not known, so nothing is known of what they show.");
-        }
-        theme::section(ui, "By a measure");
-        self.show_measure(ui, &measured.measures);
-        theme::section(ui, "By color and place");
-        self.choice.show_places(ui, view.picking.selected(), view.visibility.crop());
-        let brush = Action::BrushSplats;
-        if ui.button("Brush\u{2026}").on_hover_text(brush.tooltip()).clicked() {
-            actions.push(brush);
-        }
-        if before != self.choice {
-            self.choose(&measured, state);
-        }
-    }
-
     fn choose(&mut self, measured: &MeasuredCloud, state: &AppState) {
         let of = self.choice.of(measured, state);
         self.chosen = of.map(|of| Arc::new(ChosenSplats::new(of, self.choice.hide)));
     }
 
-    fn show_chosen(&mut self, ui: &mut Ui, measured: &MeasuredCloud, actions: &mut Vec<Action>) {
+    fn show_chosen(&mut self, ui: &mut Ui, measured: &MeasuredCloud, cx: &mut Ctx<'_>) {
         theme::section(ui, "Chosen");
         let (count, all) = (self.chosen.as_ref().map_or(0, |c| c.count), measured.cloud.len());
         let share = format::number(100.0 * count as f64 / all.max(1) as f64);
@@ -145,20 +117,30 @@ impl CleanPane {
                     *chosen = Arc::new(ChosenSplats::new(change(&measured.measures, &chosen.of), self.choice.hide));
                 }
             };
-            other(ui, "Grow", "Choose the neighbors of what is chosen, too.", CloudMeasures::grown);
-            other(ui, "Shrink", "Leave out what has a neighbor that is not chosen.", CloudMeasures::shrunk);
+            other(ui, "Grow", "Also choose the neighbors of the chosen Gaussians.", CloudMeasures::grown);
+            other(ui, "Shrink", "Leave out Gaussians with a neighbor that is not chosen.", CloudMeasures::shrunk);
         });
         ui.horizontal(|ui| {
             let delete = Action::DeleteChosen;
             let button = ui.add_enabled(count > 0 && count < all, theme::primary_button("Delete"));
             if button.on_hover_text(delete.tooltip()).clicked() {
-                actions.push(delete);
+                cx.ask(delete);
             }
             if ui.add_enabled(count > 0, Button::new("Choose none")).clicked() {
                 let SplatChoice { measure, hide, .. } = self.choice;
                 (self.choice, self.chosen) = (SplatChoice { measure, hide, ..SplatChoice::default() }, None);
             }
         });
+    }
+
+    /// Content of the pane before anything is measured.
+    fn offer(&self, ui: &mut Ui, cx: &mut Ctx<'_>) {
+        ui.label("Floaters, needles and haze are found by what the photos show of each Gaussian.");
+        ui.add_space(6.0);
+        let button = theme::primary_button(if self.measuring { "Measuring\u{2026}" } else { "Measure Gaussians" });
+        if ui.add_enabled(cx.state.job.is_none(), button).on_hover_text(Action::MeasureSplats.tooltip()).clicked() {
+            cx.ask(Action::MeasureSplats);
+        }
     }
 
     fn show_measure(&mut self, ui: &mut Ui, of: &CloudMeasures) {
@@ -196,6 +178,41 @@ impl CleanPane {
     }
 }
 
+impl PaneContents for CleanPane {
+    fn ui(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, view: &mut Viewport) {
+        let state = cx.state;
+        if !state.is_trained() {
+            ui.weak("Trained Gaussians can be cleaned: open a trained scene or a splat, or train one.");
+            return;
+        }
+        let Some(measured) = self.measured.clone() else { return self.offer(ui, cx) };
+        let before = self.choice.clone();
+        self.show_chosen(ui, &measured, cx);
+        theme::section(ui, "Suspects");
+        for (rule, count) in &self.counts {
+            self.choice.show_rule(ui, *rule, *count);
+        }
+        if measured.measures.get(SplatMeasure::Weight).is_none() {
+            ui.weak("The photos are missing: measures that need them are left out.");
+        }
+        theme::section(ui, "By a measure");
+        self.show_measure(ui, &measured.measures);
+        theme::section(ui, "By color and place");
+        self.choice.show_places(ui, view.picking.selected(), view.visibility.crop());
+        let brush = Action::BrushSplats;
+        if ui.button("Brush\u{2026}").on_hover_text(brush.tooltip()).clicked() {
+            cx.ask(brush);
+        }
+        if before != self.choice {
+            self.choose(&measured, state);
+        }
+    }
+
+    fn scrolls(&self) -> bool {
+        true
+    }
+}
+
 impl SplatChoice {
     fn show_rule(&mut self, ui: &mut Ui, rule: CleanRule, count: usize) {
         ui.horizontal(|ui| {
@@ -222,8 +239,7 @@ impl SplatChoice {
     fn show_places(&mut self, ui: &mut Ui, selected: Option<IdentityId>, crop: Option<CropBox>) {
         ui.horizontal(|ui| {
             let mut on = self.color.is_some();
-            if ui.checkbox(&mut on, "A color").on_hover_text("Gaussians of this color, or one that is near.").changed()
-            {
+            if ui.checkbox(&mut on, "A color").on_hover_text("Gaussians of this color or a similar one.").changed() {
                 self.color = on.then_some(FIRST_COLOR);
             }
             if let Some(color) = &mut self.color {
@@ -232,11 +248,11 @@ impl SplatChoice {
         });
         let mut on = self.crop.is_some();
         let row = ui.add_enabled(crop.is_some(), Checkbox::new(&mut on, "Outside the crop box"));
-        row.on_hover_text("What the crop box leaves out (B shows it).");
+        row.on_hover_text("Gaussians outside the crop box (B shows it).");
         self.crop = crop.filter(|_| on);
         let mut on = self.object.is_some();
         let row = ui.add_enabled(selected.is_some(), Checkbox::new(&mut on, "The selected object or part"));
-        row.on_hover_text("Click one in the view, or mark one by clicks and lines first.");
+        row.on_hover_text("Select one in the view first.");
         self.object = selected.filter(|_| on);
     }
 
@@ -257,16 +273,5 @@ impl SplatChoice {
             *of = brushed.unwrap_or(*of);
         }
         of.contains(&true).then_some(of)
-    }
-}
-
-/// Content of the pane before anything is measured.
-fn offer(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
-    let running = state.job.as_ref().is_some_and(|j| j.kind == JobKind::Clean);
-    ui.label("Floaters, needles and haze are found by what the photos show of each Gaussian.");
-    ui.add_space(6.0);
-    let button = theme::primary_button(if running { "Measuring\u{2026}" } else { "Measure Gaussians" });
-    if ui.add_enabled(state.job.is_none(), button).on_hover_text(Action::MeasureSplats.tooltip()).clicked() {
-        actions.push(Action::MeasureSplats);
     }
 }

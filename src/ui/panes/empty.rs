@@ -9,14 +9,18 @@ use egui::{
     TextureHandle, TextureOptions, Ui, Vec2, vec2,
 };
 
+use super::super::ctx::Ctx;
 use super::super::state::{AppState, RunningJob};
 use super::super::viewport::Viewport;
 use super::super::{keys, theme};
 use crate::jobs::demo;
+use crate::jobs::recent::{self, RunSummary};
+use crate::jobs::workspace::Workspace;
 use crate::math::format;
-use crate::scene::text;
+use crate::pipeline::observer::Severity;
+use crate::scene::{PhotoPixels, text};
 use crate::ui::actions::Action;
-use crate::worker::{Command, JobKind, Worker};
+use crate::worker::{JobInfo, Stop, Task, Tasks};
 
 /// Largest width of the page, points.
 const WIDTH: f32 = 760.0;
@@ -24,13 +28,19 @@ const WIDTH: f32 = 760.0;
 const RECENT: usize = 6;
 const COLUMNS: usize = 3;
 
+/// Trainings of recent photos.
+type RecentRuns = Vec<(PathBuf, Vec<RunSummary>)>;
+
 /// The first page and its images.
 #[derive(Default)]
 pub(crate) struct FirstPage {
     /// True if its images were requested.
     asked: bool,
-    /// Recent scenes whose trainings were requested.
+    /// Request for images of recent scenes.
+    pictures: Option<Task<Vec<(PathBuf, PhotoPixels)>>>,
+    /// Recent scenes whose trainings were requested, and the request.
     listed: Vec<PathBuf>,
+    runs: Option<Task<RecentRuns>>,
     demo: Option<TextureHandle>,
     recent: BTreeMap<PathBuf, TextureHandle>,
     /// Number of the scene whose image was stored last.
@@ -39,7 +49,14 @@ pub(crate) struct FirstPage {
 
 impl FirstPage {
     /// Requests the images once, takes them over, and stores one of the current scene.
-    pub(crate) fn update(&mut self, ctx: &egui::Context, state: &mut AppState, viewport: &Viewport, worker: &Worker) {
+    pub(crate) fn update(
+        &mut self,
+        ctx: &egui::Context,
+        state: &mut AppState,
+        viewport: &Viewport,
+        tasks: &Tasks,
+        workspace: &Arc<Workspace>,
+    ) {
         let texture = |name: &str, size: [u32; 2], rgb: &[u8]| {
             let image = ColorImage::from_rgb(size.map(|s| s as usize), rgb);
             ctx.load_texture(name, image, TextureOptions::LINEAR)
@@ -49,15 +66,22 @@ impl FirstPage {
             let picture = demo::picture().ok().and_then(|jpeg| image::load_from_memory(&jpeg).ok());
             self.demo = picture.map(|p| p.to_rgb8()).map(|p| texture("demo", p.dimensions().into(), p.as_raw()));
             if !state.recent.is_empty() {
+                let (workspace, of) = (Arc::clone(workspace), state.recent.clone());
+                let info = JobInfo::short("Loading thumbnails of recent scenes");
                 // The page is usable without them.
-                let _ = worker.submit(Command::RecentPictures(state.recent.clone()));
+                self.pictures = tasks.spawn(info, move |_| Ok::<_, Stop>(recent::load(workspace.folders(), of))).ok();
             }
         }
         if self.listed != state.recent {
             self.listed.clone_from(&state.recent);
-            let _ = worker.submit(Command::RecentRuns(state.recent.clone()));
+            let (workspace, of) = (Arc::clone(workspace), state.recent.clone());
+            let info = JobInfo::short("Listing trainings of recent photos");
+            self.runs = tasks.spawn(info, move |_| Ok::<_, Stop>(recent::several(workspace.folders(), of))).ok();
         }
-        for (path, p) in std::mem::take(&mut state.recent_pictures) {
+        if let Some(Ok(runs)) = Task::take(&mut self.runs) {
+            state.recent_runs = runs;
+        }
+        for (path, p) in Task::take(&mut self.pictures).and_then(Result::ok).into_iter().flatten() {
             let shown = texture(&path.to_string_lossy(), [p.width_px, p.height_px], p.rgb.as_flattened());
             self.recent.insert(path, shown);
         }
@@ -67,15 +91,16 @@ impl FirstPage {
         {
             self.kept_for = state.scene_number;
             if state.recent.contains(&scene.path) {
-                let _ = worker.submit(Command::KeepPicture { of: scene.path.clone(), pixels: Arc::new(pixels) });
+                keep_picture(scene.path.clone(), pixels, tasks, workspace);
             }
         }
     }
 
     /// Draws the page.
-    pub(crate) fn show(&self, ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+    pub(crate) fn show(&self, ui: &mut Ui, cx: &mut Ctx<'_>) {
+        let state = cx.state;
         if let Some(job) = &state.job {
-            return busy(ui, job, actions);
+            return busy(ui, job, cx);
         }
         let room = ui.available_size();
         let width = (room.x - 48.0).clamp(260.0, WIDTH);
@@ -91,8 +116,8 @@ impl FirstPage {
                     let what = "3D Gaussians with objects and parts, from posed photos";
                     ui.label(RichText::new(what).size(15.0).color(theme::weak()));
                     ui.add_space(16.0);
-                    self.start(ui, width, actions);
-                    self.recent(ui, width, state, actions);
+                    self.start(ui, width, cx);
+                    self.recent(ui, width, cx);
                     ui.add_space(16.0);
                     drop_area(ui, width);
                 });
@@ -100,7 +125,7 @@ impl FirstPage {
         });
     }
 
-    fn start(&self, ui: &mut Ui, width: f32, actions: &mut Vec<Action>) {
+    fn start(&self, ui: &mut Ui, width: f32, cx: &mut Ctx<'_>) {
         ui.horizontal_top(|ui| {
             ui.spacing_mut().item_spacing = vec2(20.0, 8.0);
             if let Some(texture) = &self.demo {
@@ -109,7 +134,7 @@ impl FirstPage {
                 let tip = Action::OpenDemo.tooltip();
                 let shown = ui.add(picture.alt_text("Demo image")).on_hover_text_at_pointer(tip);
                 if shown.on_hover_cursor(egui::CursorIcon::PointingHand).clicked() {
-                    actions.push(Action::OpenDemo);
+                    cx.ask(Action::OpenDemo);
                 }
             }
             ui.vertical(|ui| {
@@ -117,7 +142,7 @@ impl FirstPage {
                 let mut button = |ui: &mut Ui, button: Button<'_>, action: Action| {
                     let tip = format!("{}  {}", action.tooltip(), keys::label(ui.ctx(), &action));
                     if ui.add_sized(wide, button).on_hover_text(tip).clicked() {
-                        actions.push(action);
+                        cx.ask(action);
                     }
                 };
                 let note = |ui: &mut Ui, text: &str| ui.label(RichText::new(text).small().color(theme::weak()));
@@ -132,7 +157,8 @@ impl FirstPage {
         });
     }
 
-    fn recent(&self, ui: &mut Ui, width: f32, state: &AppState, actions: &mut Vec<Action>) {
+    fn recent(&self, ui: &mut Ui, width: f32, cx: &mut Ctx<'_>) {
+        let state = cx.state;
         if state.recent.is_empty() {
             return;
         }
@@ -145,7 +171,7 @@ impl FirstPage {
                 ui.spacing_mut().item_spacing = vec2(gap, gap);
                 for path in row {
                     if self.card(ui, path, size) {
-                        actions.push(Action::Open((*path).clone()));
+                        cx.ask(Action::Open((*path).clone()));
                     }
                 }
             });
@@ -159,7 +185,7 @@ impl FirstPage {
                 );
                 for run in runs {
                     if ui.link(RichText::new(run.text()).small()).clicked() {
-                        actions.push(Action::Open(run.folder.clone()));
+                        cx.ask(Action::Open(run.folder.clone()));
                     }
                 }
             });
@@ -193,6 +219,20 @@ impl FirstPage {
     }
 }
 
+/// Stores a small image of the scene at `of` for the next start.
+fn keep_picture(of: PathBuf, pixels: PhotoPixels, tasks: &Tasks, workspace: &Arc<Workspace>) {
+    let workspace = Arc::clone(workspace);
+    let title = format!("Saving the thumbnail of {}", text::path(of.file_name().map_or(of.as_path(), Path::new)));
+    // Nobody waits for it.
+    let _ = tasks.spawn(JobInfo::short(title).aside(), move |observer| {
+        // A full disk is no error here: the user did not ask for this record.
+        if let Err(e) = recent::keep(workspace.folders(), &of, &pixels) {
+            observer.note(Severity::Warning, e.to_string());
+        }
+        Ok::<_, Stop>(())
+    });
+}
+
 /// UV rectangle of the centered part of an image that fills a place.
 fn filling(picture: Vec2, place: Vec2) -> Rect {
     let scale = (place.x / picture.x.max(1.0)).max(place.y / picture.y.max(1.0));
@@ -213,7 +253,7 @@ fn drop_area(ui: &mut Ui, width: f32) {
 }
 
 /// The first page while the first scene is read or trained.
-fn busy(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
+fn busy(ui: &mut Ui, job: &RunningJob, cx: &mut Ctx<'_>) {
     ui.vertical_centered(|ui| {
         ui.add_space((ui.available_height() * 0.4).max(20.0));
         ui.set_max_width(380.0);
@@ -233,15 +273,13 @@ fn busy(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
                 ui.spinner();
             }
         }
-        if job.kind == JobKind::DemoPhotos {
+        if !job.info.hint.is_empty() {
             ui.add_space(6.0);
-            ui.label(
-                RichText::new("The photos are rendered once; training then starts automatically.").color(theme::weak()),
-            );
+            ui.label(RichText::new(job.info.hint).color(theme::weak()));
         }
         ui.add_space(14.0);
         if ui.add(Button::new("Cancel").min_size(vec2(110.0, 30.0))).clicked() {
-            actions.push(Action::Cancel);
+            cx.ask(Action::Cancel);
         }
     });
 }

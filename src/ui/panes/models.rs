@@ -1,55 +1,71 @@
 //! Neural networks: installed models, the engine that runs them, and the benefit of the missing ones.
 
+use std::sync::Arc;
+
 use egui::{Button, RichText, Ui};
 
+use super::super::ctx::Ctx;
 use super::super::state::AppState;
 use super::super::theme;
+use super::super::viewport::Viewport;
+use super::PaneContents;
 use crate::jobs::find_objects::FindSettings;
-use crate::jobs::models::{ModelEntry, ModelList, ModelRole, ModelState, SAM2};
+use crate::jobs::models::{self, ModelEntry, ModelList, ModelRole, ModelState, SAM2};
 use crate::pipeline::semantics::build_map::{Carry, REGIONS};
 use crate::scene::{Lifting, MaskPrompt};
 use crate::ui::actions::Action;
-use crate::worker::{Command, Worker};
+use crate::worker::{JobInfo, Stop, Task, Tasks};
 
-/// The latest request for the list of models.
+/// The pane, with the latest request for the list of models.
 #[derive(Default)]
-pub(crate) struct Models {
+pub(crate) struct ModelsPane {
     /// Count of installed models at the request; a change triggers a new one.
     asked: Option<u64>,
+    list: Option<Task<ModelList>>,
 }
 
-impl Models {
+impl ModelsPane {
     /// Requests the list, and again after each installation.
-    pub(crate) fn keep_listed(&mut self, state: &AppState, worker: &Worker) {
+    pub(crate) fn keep_listed(&mut self, state: &AppState, tasks: &Tasks) {
         let now = Some(state.models_installed);
+        if self.asked == now {
+            return;
+        }
         // With a full queue the request is repeated at the next redraw.
-        if self.asked != now && worker.submit(Command::ListModels).is_ok() {
-            self.asked = now;
+        if let Ok(task) = tasks.spawn(JobInfo::short("Listing models"), |_| Ok::<_, Stop>(models::list())) {
+            (self.asked, self.list) = (now, Some(task));
         }
     }
 
-    pub(crate) fn show(
-        &mut self,
-        ui: &mut Ui,
-        state: &AppState,
-        finding: &mut FindSettings,
-        worker: &Worker,
-        actions: &mut Vec<Action>,
-    ) {
-        self.keep_listed(state, worker);
+    /// Takes over the list once it is made.
+    pub(crate) fn update(&mut self, state: &mut AppState) {
+        if let Some(Ok(list)) = Task::take(&mut self.list) {
+            state.models = Some(Arc::new(list));
+        }
+    }
+}
+
+impl PaneContents for ModelsPane {
+    fn ui(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, _: &mut Viewport) {
+        let state = cx.state;
+        self.keep_listed(state, cx.tasks);
         let Some(known) = &state.models else {
             ui.weak("Looking for models\u{2026}");
             return;
         };
         for (entry, model) in &known.models {
-            one(ui, entry, model, state.job.is_none(), actions);
+            one(ui, entry, model, cx);
         }
-        choose(ui, known, finding);
+        choose(ui, known, &mut cx.layout.finding);
         let engine = known.engine.as_ref().map_or_else(|| "none".to_owned(), |names| names.join(", "));
         ui.label(RichText::new(format!("Inference engine: {engine}")).small().color(theme::weak()));
         if let Some(note) = &known.note {
             ui.label(RichText::new(note).small().color(theme::warning()));
         }
+    }
+
+    fn scrolls(&self) -> bool {
+        true
     }
 }
 
@@ -141,7 +157,8 @@ fn one_of(ui: &mut Ui, id: &str, chosen: &mut Option<String>, models: &[(String,
     shown.response.on_hover_text(text)
 }
 
-fn one(ui: &mut Ui, entry: &ModelEntry, model: &ModelState, idle: bool, actions: &mut Vec<Action>) {
+fn one(ui: &mut Ui, entry: &ModelEntry, model: &ModelState, cx: &mut Ctx<'_>) {
+    let idle = cx.state.job.is_none();
     ui.horizontal(|ui| {
         ui.label(RichText::new(&entry.title).strong());
         let (text, color) = match model {
@@ -163,12 +180,12 @@ fn one(ui: &mut Ui, entry: &ModelEntry, model: &ModelState, idle: bool, actions:
                 let fetch = Action::FetchModel(entry.id.clone());
                 let text = format!("Download {} MB", entry.download_megabytes());
                 if ui.add_enabled(idle, button(&text)).on_hover_text(fetch.tooltip()).clicked() {
-                    actions.push(fetch);
+                    cx.ask(fetch);
                 }
             }
             let add = Action::AddModel(entry.id.clone());
             if ui.add_enabled(idle, button("Add files\u{2026}")).on_hover_text(add.tooltip()).clicked() {
-                actions.push(add);
+                cx.ask(add);
             }
         });
         let origin = entry.origin();

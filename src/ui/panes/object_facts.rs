@@ -6,6 +6,7 @@ use egui::containers::menu::MenuButton;
 use egui::{Button, ComboBox, RichText, Ui};
 use strum::{IntoStaticStr, VariantArray};
 
+use super::super::ctx::Ctx;
 use super::super::labels::ScreenNames;
 use super::super::state::AppState;
 use super::super::theme;
@@ -126,7 +127,7 @@ impl<'a> RowFacts<'a> {
         if fact.gaussians == 0 {
             return (
                 "empty".into(),
-                "No Gaussians belong to it: undo what took them, correct it by clicks, or merge it",
+                "It has no Gaussians: undo the change that took them, correct it by clicks, or merge it",
             );
         }
         let known = |n: Option<usize>| n.map_or_else(|| NONE.into(), |n| format::count(n as u64));
@@ -146,7 +147,7 @@ impl<'a> RowFacts<'a> {
     }
 
     /// Draws a sign on a row with doubts. A click on a doubt opens its photo and selects its identity.
-    pub(super) fn doubts(&self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
+    pub(super) fn doubts(&self, ui: &mut Ui, id: IdentityId, cx: &mut Ctx<'_>) {
         let (Some(fact), Some(findings)) = (self.of(id), self.findings) else { return };
         let doubts: Vec<&Doubt> = fact.doubts.iter().filter_map(|k| findings.doubts().get(*k)).collect();
         let Some(first) = doubts.first() else { return };
@@ -160,7 +161,7 @@ impl<'a> RowFacts<'a> {
         let sign = Button::new(sign).frame_when_inactive(false);
         if doubts.len() == 1 {
             if ui.add(sign).on_hover_text(told(1)).accessible_name(name).clicked() {
-                self.go(findings, first, id, actions);
+                self.go(findings, first, id, cx);
             }
             return;
         }
@@ -169,7 +170,7 @@ impl<'a> RowFacts<'a> {
             egui::ScrollArea::vertical().max_height(300.0).show(ui, |ui| {
                 for doubt in &doubts {
                     if ui.add(Button::new(self.sentence(findings, doubt)).wrap()).clicked() {
-                        self.go(findings, doubt, id, actions);
+                        self.go(findings, doubt, id, cx);
                         ui.close();
                     }
                 }
@@ -184,13 +185,13 @@ impl<'a> RowFacts<'a> {
         format!("In {photo} {}.", doubt.what.text(name))
     }
 
-    fn go(&self, findings: &Findings, doubt: &Doubt, row: IdentityId, actions: &mut Vec<Action>) {
+    fn go(&self, findings: &Findings, doubt: &Doubt, row: IdentityId, cx: &mut Ctx<'_>) {
         let is_within = |id: &IdentityId| self.identities.ancestors(*id).any(|at| at == row);
         let about = doubt.what.about().into_iter().find(is_within);
         let photo = findings.photo(doubt);
         let place = self.dataset.and_then(|d| d.photos.iter().position(|p| p.name == photo));
-        actions.extend(place.map(Action::GoToPhoto));
-        actions.push(Action::Select(about));
+        place.into_iter().for_each(|photo| cx.ask(Action::GoToPhoto(photo)));
+        cx.ask(Action::Select(about));
     }
 }
 

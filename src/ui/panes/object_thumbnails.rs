@@ -7,9 +7,10 @@ use egui::{ColorImage, Rect, TextureHandle, TextureOptions, Ui, pos2, vec2};
 
 use super::super::labels::ScreenNames;
 use super::super::state::AppState;
+use crate::jobs::thumbnails::{self, ThumbnailSet};
 use crate::pipeline::semantics::thumbnails::SIDE_PX;
 use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
-use crate::worker::{Command, Worker};
+use crate::worker::{JobInfo, Task, Tasks};
 
 /// Thumbnails in a row of the texture.
 const COLUMNS: usize = 16;
@@ -19,8 +20,8 @@ const COLUMNS: usize = 16;
 pub(crate) struct ObjectThumbnails {
     /// True if any thumbnail was drawn since the last update.
     used: Cell<bool>,
-    /// Map of the latest request.
-    asked: Option<Arc<SemanticMap>>,
+    /// Map of the latest request, and its task until the result is taken.
+    asked: Option<(Arc<SemanticMap>, Option<Task<ThumbnailSet>>)>,
     /// Map of the thumbnails in the texture, the texture, and its number of rows.
     shown: Option<(Arc<SemanticMap>, TextureHandle, usize)>,
 }
@@ -32,32 +33,35 @@ impl ObjectThumbnails {
         ctx: &egui::Context,
         state: &mut AppState,
         cloud: Option<&Arc<GaussianCloud>>,
-        worker: &Worker,
+        tasks: &Tasks,
     ) {
         let (Some(map), Some(cloud), Some(scene)) = (&state.semantics, cloud, &state.scene) else {
             *self = Self::default();
             return;
         };
         let wanted = state.plan.thumbnails.now(self.used.take());
-        if wanted && self.asked.as_ref().is_none_or(|a| !Arc::ptr_eq(a, map)) && map.identity_of.len() == cloud.len() {
-            let command = Command::Thumbnails {
-                cloud: Arc::clone(cloud),
-                map: Arc::clone(map),
-                settings: state.render_settings(),
-                home: scene.home.clone(),
-            };
+        if wanted
+            && self.asked.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, map))
+            && map.identity_of.len() == cloud.len()
+        {
+            let of: Arc<SemanticMap> = Arc::clone(map);
+            let (map, cloud) = (Arc::clone(&of), Arc::clone(cloud));
+            let (settings, home) = (state.render_settings(), scene.home.clone());
+            let task = tasks.spawn(JobInfo::short("Rendering thumbnails"), move |_| {
+                thumbnails::draw(&cloud, &map, &settings, &home)
+            });
             // With a full queue the request is repeated at the next event.
-            if worker.submit(command).is_ok() {
-                self.asked = Some(Arc::clone(map));
-            }
+            self.asked = task.ok().map(|task| (of, Some(task))).or(self.asked.take());
         }
-        if let Some((of, drawn)) = state.thumbnails.take() {
+        if let Some((of, drawing)) = &mut self.asked
+            && let Some(Ok(drawn)) = Task::take(drawing)
+        {
             let unit = state.scene.as_ref().and_then(|s| s.meters_per_unit());
             state.labels = ScreenNames::new(&drawn.appearances, unit);
             let pictures = drawn.pictures;
             let rows = pictures.len().div_ceil(COLUMNS).max(1);
             let texture = ctx.load_texture("object_thumbnails", atlas(&pictures, rows), TextureOptions::LINEAR);
-            self.shown = Some((of, texture, rows));
+            self.shown = Some((Arc::clone(of), texture, rows));
         }
     }
 

@@ -5,11 +5,13 @@ use egui::{
     Align, Button, Checkbox, CollapsingHeader, Color32, Id, Key, Layout, Rect, RichText, ScrollArea, TextEdit, Ui, vec2,
 };
 
+use super::super::ctx::Ctx;
 use super::super::labels::{self, ScreenNames};
-use super::super::state::AppState;
 use super::super::text_field::take_keyboard;
 use super::super::theme;
+use super::super::viewport::Viewport;
 use super::super::viewport::visible::Visibility;
+use super::PaneContents;
 use super::object_facts::{ListOrder, RowFacts};
 use super::object_thumbnails::ObjectThumbnails;
 use crate::math::format::things;
@@ -48,25 +50,21 @@ impl ObjectsPane {
     pub(crate) fn rename(&mut self, id: IdentityId, all: &Identities) {
         self.renaming = Some(Renaming { id, name: all.name(id), frames: 0 });
     }
+}
 
-    pub(crate) fn show(
-        &mut self,
-        ui: &mut Ui,
-        state: &AppState,
-        object_thumbnails: &ObjectThumbnails,
-        visibility: &Visibility,
-        selected: Option<IdentityId>,
-        actions: &mut Vec<Action>,
-    ) {
+impl PaneContents for ObjectsPane {
+    fn ui(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, view: &mut Viewport) {
+        let (state, object_thumbnails) = (cx.state, cx.thumbnails);
+        let (visibility, selected) = (&view.visibility, view.picking.selected());
         let Some(map) = &state.semantics else {
-            return show_how_to_begin(ui, state, actions);
+            return show_how_to_begin(ui, cx);
         };
         let identities = &map.identities;
         let doubts = map.findings.as_ref().map_or(0, |f| f.doubts().len());
         ui.weak(format!("{}, from the masks of {}", identities.counted(), things(map.seeds.len(), "photo")));
         if doubts > 0 {
             let link = ui.link(RichText::new(format!("{} where photos disagreed", things(doubts, "doubt"))));
-            if link.on_hover_text("Put what they are about first in the list").clicked() {
+            if link.on_hover_text("List the affected objects and parts first").clicked() {
                 self.order = ListOrder::by_doubts();
             }
         }
@@ -76,11 +74,11 @@ impl ObjectsPane {
         ui.add_space(4.0);
         ui.horizontal(|ui| {
             if visibility.is_partial() && ui.button("Show all").clicked() {
-                actions.push(Action::Isolate(None));
+                cx.ask(Action::Isolate(None));
             }
             let new = Action::Paint(Some(NOBODY));
             if ui.button("Select an object\u{2026}").on_hover_text(new.tooltip()).clicked() {
-                actions.push(new);
+                cx.ask(new);
             }
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 self.order.show(ui);
@@ -106,7 +104,7 @@ impl ObjectsPane {
         };
         let roots = identities.iter().filter(|(_, i)| i.parent == NOBODY).map(|(id, _)| id).collect();
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            tree.branches(ui, Id::unique("objects"), roots, actions);
+            tree.branches(ui, Id::unique("objects"), roots, cx);
         });
     }
 }
@@ -128,24 +126,24 @@ struct Tree<'a> {
 
 impl Tree<'_> {
     /// Draws one branch per identity, the tiny unnamed ones folded.
-    fn branches(&mut self, ui: &mut Ui, of: Id, ids: Vec<IdentityId>, actions: &mut Vec<Action>) {
+    fn branches(&mut self, ui: &mut Ui, of: Id, ids: Vec<IdentityId>, cx: &mut Ctx<'_>) {
         let (mut shown, mut tiny) = labels::listed(self.identities, self.sizes, ids);
         self.facts.sort(&mut shown);
         self.facts.sort(&mut tiny);
-        shown.into_iter().for_each(|id| self.branch(ui, id, actions));
+        shown.into_iter().for_each(|id| self.branch(ui, id, cx));
         if !tiny.is_empty() {
             let header = CollapsingHeader::new(things(tiny.len(), "tiny region")).id_salt(of.with("tiny"));
-            header.show(ui, |ui| tiny.into_iter().for_each(|id| self.branch(ui, id, actions)));
+            header.show(ui, |ui| tiny.into_iter().for_each(|id| self.branch(ui, id, cx)));
         }
     }
 
-    fn branch(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
+    fn branch(&mut self, ui: &mut Ui, id: IdentityId, cx: &mut Ctx<'_>) {
         let pieces: Vec<IdentityId> = self.identities.children(id).collect();
         if pieces.is_empty() {
             // Aligned with rows that can be unfolded.
             ui.horizontal(|ui| {
                 ui.add_space(ui.spacing().indent);
-                self.row(ui, id, actions);
+                self.row(ui, id, cx);
             });
             return;
         }
@@ -155,13 +153,13 @@ impl Tree<'_> {
         if renamed.into_iter().chain(self.scroll_to).any(is_within) {
             state.set_open(true);
         }
-        let header = state.show_header(ui, |ui| self.row(ui, id, actions));
-        let body = header.body(|ui| self.branches(ui, Id::unique("pieces").with(id), pieces, actions));
+        let header = state.show_header(ui, |ui| self.row(ui, id, cx));
+        let body = header.body(|ui| self.branches(ui, Id::unique("pieces").with(id), pieces, cx));
         body.0.accessible_name(format!("Parts of {}", self.identities.full_name(id)));
     }
 
     /// Draws a row: check box, thumbnail, color and name on the left; number, doubts and menu on the right.
-    fn row(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
+    fn row(&mut self, ui: &mut Ui, id: IdentityId, cx: &mut Ctx<'_>) {
         ui.spacing_mut().item_spacing.x = 5.0;
         let row = Rect::from_min_size(ui.cursor().min, vec2(ui.available_width(), THUMBNAIL_PX));
         let is_hovered = ui.rect_contains_pointer(row);
@@ -170,7 +168,7 @@ impl Tree<'_> {
         let tick = Checkbox::new(&mut ticked, "").indeterminate(drawn.is_none());
         let tick = ui.add(tick).on_hover_text("Visible");
         if tick.accessible_name(format!("{} is visible", self.identities.full_name(id))).changed() {
-            actions.push(Action::Hide(id));
+            cx.ask(Action::Hide(id));
         }
         self.object_thumbnails.show(ui, id, THUMBNAIL_PX);
         let code = self.identities.get(id).map_or([0.5; 3], |i| i.code).map(|c| (c * 255.0) as u8);
@@ -186,20 +184,20 @@ impl Tree<'_> {
                 ui.label(number).on_hover_text(what);
             });
             let padding = ui.spacing().button_padding.x;
-            self.facts.doubts(ui, id, actions);
+            self.facts.doubts(ui, id, cx);
             ui.spacing_mut().button_padding.x = padding;
             // In other rows the name uses that space.
             if is_hovered || self.selected == Some(id) || *self.menu_of == Some(id) {
                 ui.spacing_mut().button_padding.x = 4.0;
-                self.menu(ui, id, actions);
+                self.menu(ui, id, cx);
             }
-            ui.with_layout(Layout::left_to_right(Align::Center), |ui| self.name(ui, id, actions));
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| self.name(ui, id, cx));
         });
     }
 
-    fn name(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
+    fn name(&mut self, ui: &mut Ui, id: IdentityId, cx: &mut Ctx<'_>) {
         if self.renaming.as_ref().is_some_and(|r| r.id == id) {
-            return self.name_field(ui, actions);
+            return self.name_field(ui, cx);
         }
         let is_selected = self.selected == Some(id);
         let name = Button::new(self.labels.name(self.identities, id)).selected(is_selected).truncate();
@@ -212,7 +210,8 @@ impl Tree<'_> {
             self.facts.line(id).into_iter().for_each(|line| drop(ui.weak(line)));
         });
         if name.clicked() {
-            actions.extend([Action::Select(Some(id)), Action::Ask(self.identities.full_name(id))]);
+            cx.ask(Action::Select(Some(id)));
+            cx.ask(Action::Ask(self.identities.full_name(id)));
         }
         if name.double_clicked() {
             self.start_renaming(id);
@@ -224,7 +223,7 @@ impl Tree<'_> {
     }
 
     /// Draws the name as a field with all of it selected. Enter or losing the focus applies the name, Escape does not.
-    fn name_field(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
+    fn name_field(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>) {
         let Some(Renaming { id, name, frames }) = self.renaming.as_mut() else { return };
         let field = Id::unique("name").with(*id);
         let begins = *frames < 2;
@@ -242,13 +241,15 @@ impl Tree<'_> {
             edit.scroll_to_me(None);
         } else if !edit.has_focus() {
             let is_new = name.trim() != self.identities.name(*id) && !ui.input(|i| i.key_pressed(Key::Escape));
-            actions.extend(is_new.then(|| Action::Change(Edit::Rename(*id, name.clone()))));
+            if is_new {
+                cx.ask(Action::Change(Edit::Rename(*id, name.clone())));
+            }
             *self.renaming = None;
         }
     }
 
     /// Draws the menu of corrections to an identity.
-    fn menu(&mut self, ui: &mut Ui, id: IdentityId, actions: &mut Vec<Action>) {
+    fn menu(&mut self, ui: &mut Ui, id: IdentityId, cx: &mut Ctx<'_>) {
         let all = self.identities;
         let menu = ui.menu_button("\u{2026}", |ui| {
             if ui.add(Button::new("Rename").shortcut_text("F2")).clicked() {
@@ -263,7 +264,7 @@ impl Tree<'_> {
                         let same_whole = all.get(id).is_some_and(|i| i.parent == identity.parent);
                         let text = if same_whole { all.label(other) } else { all.full_name(other) };
                         if ui.button(text).clicked() {
-                            actions.push(Action::Change(Edit::Merge(id, other)));
+                            cx.ask(Action::Change(Edit::Merge(id, other)));
                             ui.close();
                         }
                     }
@@ -280,7 +281,7 @@ impl Tree<'_> {
                 (Action::ExportTarget(id), "Export Gaussians\u{2026}"),
             ] {
                 if ui.button(text).on_hover_text(action.tooltip()).clicked() {
-                    actions.push(action);
+                    cx.ask(action);
                     ui.close();
                 }
             }
@@ -294,7 +295,8 @@ impl Tree<'_> {
     }
 }
 
-fn show_how_to_begin(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+fn show_how_to_begin(ui: &mut Ui, cx: &mut Ctx<'_>) {
+    let state = cx.state;
     if let Some(origin) = state.scene.as_ref().and_then(|s| s.remote.as_ref()) {
         let text = format!("No objects are known yet. They are found on {}: fmlgs preprocess SCENE", origin.host);
         ui.label(RichText::new(text).color(theme::weak()));
@@ -312,7 +314,7 @@ fn show_how_to_begin(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     let why = if state.is_trained() { "Another job is running." } else { "Train the scene first." };
     let button = |text: &str| Button::new(text.to_owned()).min_size(vec2(170.0, 28.0));
     if !has_masks {
-        let text = "These photos came without labels: choose what looks at them.";
+        let text = "The photos have no labels: choose the models that find objects.";
         ui.label(RichText::new(text).color(theme::weak()));
     }
     let action = Action::FindObjects;
@@ -320,15 +322,15 @@ fn show_how_to_begin(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
         .add_enabled(idle, button(if has_masks { "Find objects" } else { "Find objects\u{2026}" }))
         .on_disabled_hover_text(why);
     if found.on_hover_text(action.tooltip()).clicked() {
-        actions.push(action);
+        cx.ask(action);
     }
     let other = ui.add_enabled(idle, button("Choose masks\u{2026}")).on_disabled_hover_text(why);
     if other.on_hover_text(Action::ChooseMasks.tooltip()).clicked() {
-        actions.push(Action::ChooseMasks);
+        cx.ask(Action::ChooseMasks);
     }
     let by_clicks = Action::Paint(Some(NOBODY));
     let selects = ui.add_enabled(idle, button("Select by clicks\u{2026}")).on_disabled_hover_text(why);
     if selects.on_hover_text(by_clicks.tooltip()).clicked() {
-        actions.push(by_clicks);
+        cx.ask(by_clicks);
     }
 }

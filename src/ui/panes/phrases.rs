@@ -3,8 +3,10 @@
 use egui::style::ScrollStyle;
 use egui::{Button, Grid, RichText, ScrollArea, TextEdit, Ui};
 
-use super::super::state::AppState;
+use super::super::ctx::Ctx;
 use super::super::theme;
+use super::super::viewport::Viewport;
+use super::PaneContents;
 use crate::jobs::phrases::PhraseRow;
 use crate::math::format::{count, things};
 use crate::scene::text::elided;
@@ -24,8 +26,9 @@ pub struct PhrasesPane {
     pub all_photos: bool,
 }
 
-impl PhrasesPane {
-    pub(crate) fn show(&mut self, ui: &mut Ui, state: &AppState, comparing: bool, actions: &mut Vec<Action>) {
+impl PaneContents for PhrasesPane {
+    fn ui(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, view: &mut Viewport) {
+        let comparing = view.queries.truth().is_some();
         ui.horizontal_top(|ui| {
             ui.vertical(|ui| {
                 ui.set_width(230.0);
@@ -47,7 +50,7 @@ impl PhrasesPane {
                     {
                         let button = ui.add_enabled(some, Button::new(text)).on_hover_text(action.tooltip());
                         if button.on_disabled_hover_text("Enter phrases first.").clicked() {
-                            actions.push(action);
+                            cx.ask(action);
                         }
                     }
                 });
@@ -58,18 +61,19 @@ impl PhrasesPane {
                     for (action, text) in [(mask, text), (Action::PaintTrueMask, "Paint")] {
                         let button = ui.small_button(text).on_hover_text(action.tooltip());
                         if button.accessible_name(action.text()).clicked() {
-                            actions.push(action);
+                            cx.ask(action);
                         }
                     }
                 });
             });
             ui.separator();
-            ui.vertical(|ui| show_rows(ui, state, actions));
+            ui.vertical(|ui| show_rows(ui, cx));
         });
     }
 }
 
-fn show_rows(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+fn show_rows(ui: &mut Ui, cx: &mut Ctx<'_>) {
+    let state = cx.state;
     let rows = &state.phrases.rows;
     if rows.is_empty() {
         ui.weak("Enter phrases and run them: answers, areas and IoU with a true mask appear here.");
@@ -90,7 +94,7 @@ fn show_rows(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
                 ui.label(RichText::new(head).small().color(theme::weak()));
             }
             ui.end_row();
-            rows.iter().take(SHOWN).for_each(|row| show_row(ui, row, views, actions));
+            rows.iter().take(SHOWN).for_each(|row| show_row(ui, row, views, cx));
         });
         if rows.len() > SHOWN {
             ui.weak(format!("{} more rows in the export", count((rows.len() - SHOWN) as u64)));
@@ -98,13 +102,13 @@ fn show_rows(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
     });
 }
 
-fn show_row(ui: &mut Ui, row: &PhraseRow, views: bool, actions: &mut Vec<Action>) {
+fn show_row(ui: &mut Ui, row: &PhraseRow, views: bool, cx: &mut Ctx<'_>) {
     let [red, green, blue] = row.color;
     let found = !row.answer.is_empty();
     let color = if found { egui::Color32::from_rgb(red, green, blue) } else { theme::weak() };
     let phrase = RichText::new(elided(&row.phrase, LETTERS)).color(color);
     if ui.link(phrase).on_hover_text(format!("Query \u{201c}{}\u{201d} in the view", row.phrase)).clicked() {
-        actions.push(Action::Ask(row.phrase.clone()));
+        cx.ask(Action::Ask(row.phrase.clone()));
     }
     let answer = if found { &row.answer } else { row.verdict };
     ui.label(elided(answer, LETTERS)).on_hover_text(answer);

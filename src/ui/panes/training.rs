@@ -2,61 +2,74 @@
 
 use egui::{ComboBox, DragValue, Grid, RichText, Slider, Ui};
 
+use super::super::ctx::Ctx;
 use super::super::layout::Layout;
 use super::super::state::{AppState, RunningJob};
+use super::super::viewport::Viewport;
 use super::super::{keys, theme};
+use super::PaneContents;
 use super::plots::{self, PsnrCurve};
 use crate::jobs::presets;
 use crate::math::format;
 use crate::pipeline::train::TrainConfig;
 use crate::scene::{AlphaUse, text};
 use crate::ui::actions::Action;
-use crate::worker::JobKind;
 
-/// Draws the pane. `curves` of a report are drawn beside this training's.
-pub(crate) fn show(
-    ui: &mut Ui,
-    state: &AppState,
-    layout: &mut Layout,
-    curves: &[PsnrCurve],
-    actions: &mut Vec<Action>,
-) {
-    let Some(scene) = &state.scene else { return };
-    let Some(dataset) = &scene.dataset else {
-        ui.add_space(6.0);
-        ui.weak("This scene has no photos, so there is nothing to train on. Open a folder of posed photos to train.");
-        return;
-    };
-    let job = state.job.as_ref().filter(|j| j.kind == JobKind::Train);
-    match job {
-        Some(job) => running(ui, job, actions),
-        None if scene.remote.is_some() => {
-            let host = scene.remote.as_ref().map_or("", |origin| &origin.host);
-            ui.weak(format!("The scene is on {host}. To train there: fmlgs train PHOTOS --serve"));
+/// The pane.
+#[derive(Default)]
+pub(crate) struct TrainingPane {
+    /// Curves of a report, drawn beside those of this training.
+    pub(crate) curves: Vec<PsnrCurve>,
+}
+
+impl PaneContents for TrainingPane {
+    fn ui(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, _: &mut Viewport) {
+        let state = cx.state;
+        let Some(scene) = &state.scene else { return };
+        let Some(dataset) = &scene.dataset else {
+            ui.add_space(6.0);
+            ui.weak(
+                "This scene has no photos, so there is nothing to train on. Open a folder of posed photos to train.",
+            );
+            return;
+        };
+        let job = state.job.as_ref().filter(|_| state.is_training());
+        match job {
+            Some(job) => running(ui, job, cx),
+            None if scene.remote.is_some() => {
+                let host = scene.remote.as_ref().map_or("", |origin| &origin.host);
+                ui.weak(format!("The scene is on {host}. To train there: fmlgs train PHOTOS --serve"));
+            }
+            None => {
+                let largest =
+                    dataset.photos.iter().map(|p| p.camera.width_px.max(p.camera.height_px)).max().unwrap_or(1);
+                settings(ui, &mut cx.layout.config, largest);
+                start(ui, cx);
+                other_runs(ui, cx);
+            }
         }
-        None => {
-            let largest = dataset.photos.iter().map(|p| p.camera.width_px.max(p.camera.height_px)).max().unwrap_or(1);
-            settings(ui, &mut layout.config, largest);
-            start(ui, state, &layout.config, actions);
-            other_runs(ui, state, actions);
+        if !state.history.steps.is_empty() || !state.history.evaluations.is_empty() {
+            facts(ui, state, job);
+            plots::show(ui, [&state.history, &state.previous], &self.curves, &mut cx.layout.plots);
+        } else if job.is_none() {
+            ui.add_space(4.0);
+            ui.weak("Loss and PSNR appear here once training runs.");
         }
     }
-    if !state.history.steps.is_empty() || !state.history.evaluations.is_empty() {
-        facts(ui, state, job);
-        plots::show(ui, [&state.history, &state.previous], curves, &mut layout.plots);
-    } else if job.is_none() {
-        ui.add_space(4.0);
-        ui.weak("Loss and PSNR appear here once training runs.");
+
+    fn scrolls(&self) -> bool {
+        true
     }
 }
 
-fn start(ui: &mut Ui, state: &AppState, config: &TrainConfig, actions: &mut Vec<Action>) {
+fn start(ui: &mut Ui, cx: &mut Ctx<'_>) {
+    let state = cx.state;
     ui.add_space(2.0);
     let busy = state.job.is_some();
     ui.horizontal_wrapped(|ui| {
         let tip = format!("{}  {}", Action::StartTraining.tooltip(), keys::label(ui.ctx(), &Action::StartTraining));
-        let steps = format::count(config.steps);
-        let next = state.next_training(config);
+        let next = state.next_training(&cx.layout.config);
+        let steps = format::count(next.steps);
         let before = state.resumable.as_ref().map(|(before, _)| before);
         let text = match state.continues_at(&next) {
             Some(step) if before.is_some_and(|before| before.steps == next.steps) => {
@@ -69,12 +82,12 @@ fn start(ui: &mut Ui, state: &AppState, config: &TrainConfig, actions: &mut Vec<
         let response =
             ui.add_enabled(!busy, button).on_hover_text(tip).on_disabled_hover_text("Another job is running.");
         if response.clicked() {
-            actions.push(Action::StartTraining);
+            cx.ask(Action::StartTraining);
         }
         if state.can_begin_anew() {
             let anew = ui.add_enabled(!busy, egui::Button::new("Begin anew").min_size(egui::vec2(90.0, 30.0)));
             if anew.on_hover_text(Action::TrainAnew.tooltip()).clicked() {
-                actions.push(Action::TrainAnew);
+                cx.ask(Action::TrainAnew);
             }
         }
         let trained = state.training_job.is_some() || state.scene.as_ref().is_some_and(|s| s.trained);
@@ -85,20 +98,21 @@ fn start(ui: &mut Ui, state: &AppState, config: &TrainConfig, actions: &mut Vec<
             .on_disabled_hover_text("Needs trained Gaussians.")
             .clicked()
         {
-            actions.push(Action::Evaluate);
+            cx.ask(Action::Evaluate);
         }
     });
 }
 
 /// Other trainings of these photos, each with a button to open it.
-fn other_runs(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+fn other_runs(ui: &mut Ui, cx: &mut Ctx<'_>) {
+    let state = cx.state;
     let Some(scene) = &state.scene else { return };
     for run in scene.runs.iter().filter(|run| run.folder != scene.out) {
         ui.horizontal(|ui| {
             let open = ui.add_enabled(state.job.is_none(), egui::Button::new("Open").small());
             let open = open.on_hover_text(text::path(&run.folder)).on_disabled_hover_text("Another job is running.");
             if open.accessible_name(format!("Open {}", run.text())).clicked() {
-                actions.push(Action::Open(run.folder.clone()));
+                cx.ask(Action::Open(run.folder.clone()));
             }
             ui.label(RichText::new(run.text()).small().color(theme::weak()));
         });
@@ -137,8 +151,8 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
     ui.collapsing("Advanced", |ui| {
         ui.checkbox(&mut config.antialias, "Anti-aliasing (2-D filter of Mip-Splatting)");
         ui.horizontal(|ui| {
-            let tip = "What the photos' transparent pixels are taken for: pixels that do not count, empty space around a thing \
-                       that was cut out, or the background's color.";
+            let tip = "Meaning of the photos' transparent pixels: ignored, empty space around a cut-out object, or the \
+                       background's color.";
             let id = ui.label("Transparent pixels").on_hover_text(tip).id;
             let all = [None, Some(AlphaUse::Ignore), Some(AlphaUse::Empty), Some(AlphaUse::Background)];
             let name = |alpha: Option<AlphaUse>| alpha.map_or("by the photos", AlphaUse::word);
@@ -156,7 +170,7 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
             if let Some(n) = &mut config.max_gaussians {
                 ui.add(DragValue::new(n).range(1_000..=6_000_000).speed(1000)).accessible_name("Maximum Gaussians");
             } else {
-                ui.weak("by the photos' size and free memory");
+                ui.weak("automatic: by photo size and free memory");
             }
         });
         ui.horizontal(|ui| {
@@ -180,7 +194,7 @@ fn settings(ui: &mut Ui, config: &mut TrainConfig, largest_px: u32) {
     });
 }
 
-fn running(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
+fn running(ui: &mut Ui, job: &RunningJob, cx: &mut Ctx<'_>) {
     let done = job.progress.as_ref().map_or(0.0, |p| p.done as f32 / p.total.max(1) as f32);
     let text = job.progress.as_ref().map_or_else(
         || "starting".to_owned(),
@@ -198,11 +212,11 @@ fn running(ui: &mut Ui, job: &RunningJob, actions: &mut Vec<Action>) {
         let tip = format!("{}  T", Action::PauseJob.tooltip());
         let button = if job.paused { theme::primary_button(pause) } else { egui::Button::new(pause) };
         if ui.add(button.min_size(size)).on_hover_text(tip).clicked() {
-            actions.push(Action::PauseJob);
+            cx.ask(Action::PauseJob);
         }
         let tip = format!("{}  Esc", Action::Cancel.tooltip());
         if ui.add(egui::Button::new("Cancel").min_size(size)).on_hover_text(tip).clicked() {
-            actions.push(Action::Cancel);
+            cx.ask(Action::Cancel);
         }
     });
 }

@@ -2,14 +2,15 @@
 
 use egui::{Button, RichText, ScrollArea, vec2};
 
+use super::super::ctx::Ctx;
 use super::super::theme;
 use crate::io::unposed::Unposed;
 use crate::jobs::poses::{self, PoseTools};
 use crate::scene::text;
 use crate::ui::actions::Action;
 
-/// Draws the dialog. Returns whether it stays open.
-pub(crate) fn show(ctx: &egui::Context, photos: &Unposed, actions: &mut Vec<Action>) -> bool {
+/// Draws the dialog; returns true if it stays open.
+pub(crate) fn show(ctx: &egui::Context, photos: &Unposed, cx: &mut Ctx<'_>) -> bool {
     let response = theme::dialog("unposed").show(ctx, |ui| {
         ui.set_width(620.0_f32.min(ui.ctx().content_rect().width() - 80.0));
         ui.heading(format!("{} photos, no camera poses", photos.photos.len()));
@@ -25,7 +26,7 @@ pub(crate) fn show(ctx: &egui::Context, photos: &Unposed, actions: &mut Vec<Acti
         if let Some(tools) = &tools {
             let find = theme::primary_button(&format!("Find the poses with {}", tools.name()));
             if ui.add(find.min_size(vec2(240.0, 32.0))).clicked() {
-                actions.push(Action::FindPoses(Box::new(photos.clone())));
+                cx.ask(Action::FindPoses(Box::new(photos.clone())));
                 stays = false;
             }
             ui.weak("Takes minutes per hundred photos; can be canceled and resumed. The photos are not changed.");

@@ -46,7 +46,7 @@ pub(crate) fn offer(stage: &Stage, point: &Point, now: &Now<'_>) -> Offer {
     let result = match stage.name {
         StageName::Train => training(stage, point, now),
         StageName::Render => drawing(stage, point, now),
-        StageName::Features => Err("Objects are found by the default; this compares alternatives.".into()),
+        StageName::Features => Err("Objects are found with the default; this stage compares alternatives.".into()),
         _ => Err("The window has no such setting.".into()),
     };
     match result {

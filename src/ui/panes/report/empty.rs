@@ -2,21 +2,23 @@
 
 use egui::{RichText, Ui, vec2};
 
-use super::super::super::state::AppState;
+use super::super::super::ctx::Ctx;
+use super::super::super::state::{AppState, RunningJob};
 use super::super::super::theme;
 use crate::scene::text;
 use crate::ui::actions::Action;
-use crate::worker::JobKind;
 
-pub(crate) fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
+/// Draws the pane without a report; `job` is the running benchmark, if there is one.
+pub(crate) fn show(ui: &mut Ui, job: Option<&RunningJob>, cx: &mut Ctx<'_>) {
+    let state = cx.state;
     ui.label(RichText::new("Error vs. run time").strong());
     ui.label(
         "A report holds measurements of every setting that trades accuracy for time. Click a point to apply its \
          setting.",
     );
     ui.add_space(6.0);
-    if let Some(job) = state.job.as_ref().filter(|j| j.kind == JobKind::Measure) {
-        ui.strong(&job.title);
+    if let Some(job) = job {
+        ui.strong(&job.info.title);
         if let Some(p) = &job.progress {
             let share = p.done as f32 / p.total.max(1) as f32;
             ui.add(egui::ProgressBar::new(share).desired_width(320.0).desired_height(6.0).fill(theme::accent()));
@@ -28,7 +30,7 @@ pub(crate) fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
             ui.weak("Rendering the exact reference images.");
         }
         if ui.add(egui::Button::new("Cancel").min_size(vec2(92.0, 28.0))).clicked() {
-            actions.push(Action::Cancel);
+            cx.ask(Action::Cancel);
         }
         return;
     }
@@ -39,17 +41,17 @@ pub(crate) fn show(ui: &mut Ui, state: &AppState, actions: &mut Vec<Action>) {
             let response = ui.add_enabled(state.job.is_none(), button);
             let disabled = "Another job is running; it would distort the times.";
             if response.on_hover_text(Action::BenchmarkRendering.tooltip()).on_disabled_hover_text(disabled).clicked() {
-                actions.push(Action::BenchmarkRendering);
+                cx.ask(Action::BenchmarkRendering);
             }
         }
         let open = ui.add(egui::Button::new("Open a report\u{2026}").min_size(size));
         if open.on_hover_text(Action::ChooseReport.tooltip()).clicked() {
-            actions.push(Action::ChooseReport);
+            cx.ask(Action::ChooseReport);
         }
         for path in state.scene.iter().flat_map(|s| &s.reports) {
             let found = ui.add(egui::Button::new(format!("Open {}", text::path(path))).min_size(size));
             if found.on_hover_text("This report was found with the scene.").clicked() {
-                actions.push(Action::OpenReport(path.clone()));
+                cx.ask(Action::OpenReport(path.clone()));
             }
         }
     });

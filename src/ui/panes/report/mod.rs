@@ -11,10 +11,12 @@ use egui::{CollapsingHeader, ComboBox, RichText, ScrollArea, Ui};
 
 use self::apply::{Now, Offer};
 use self::scatter::Scatter;
-use super::super::layout::Layout;
+use super::super::ctx::Ctx;
 use super::super::state::{AppState, ShownReport};
 use super::super::theme;
 use super::super::viewport::Viewport;
+use super::PaneContents;
+use super::plots::PsnrCurve;
 use crate::measure::{Measure, Point, Report, Stage, StageName, table};
 use crate::scene::text;
 use crate::ui::actions::Action;
@@ -22,6 +24,8 @@ use crate::ui::actions::Action;
 /// The user's choices in a report.
 #[derive(Default)]
 pub(crate) struct ReportPane {
+    /// True while rendering is benchmarked; set by the window.
+    pub(crate) measuring: bool,
     stage: Option<StageName>,
     measure: Option<String>,
     /// Knob and setting of the chosen point.
@@ -31,81 +35,13 @@ pub(crate) struct ReportPane {
 }
 
 impl ReportPane {
-    pub(crate) fn show(
-        &mut self,
-        ui: &mut Ui,
-        state: &AppState,
-        layout: &Layout,
-        viewport: &Viewport,
-        actions: &mut Vec<Action>,
-    ) {
-        let Some(shown) = state.report.clone() else {
-            ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| empty::show(ui, state, actions));
-            return;
-        };
-        let second = state.second_report.clone();
-        let report = &*shown.report;
-        self.header(ui, &shown, second.as_ref(), state, actions);
-        let Some(stage) = self.stage_of(report) else {
-            ui.weak("Nothing was measured yet: the report has no stage. Run the same command again to continue.");
-            return;
-        };
-        let Some(measure) = self.measure_of(stage) else {
-            ui.weak("This stage has no metric.");
-            return;
-        };
-        let second_report = second.as_ref().map(|s| &*s.report);
-        warnings(ui, stage, report, second_report);
-        let other = second_report.and_then(|r| r.stage(stage.name));
-        let selected = self.selected_of(stage);
-        let own = state.scene.as_ref().map(|_| state.render_settings());
-        let now =
-            Now { config: &layout.config, own: own.as_ref(), drawing: &viewport.overrides, on_gpu: viewport.on_gpu() };
-        let size = ui.available_size();
-        // A column of its own if there is room, else above the tables.
-        let wide = size.x > 1_100.0;
-        let widths = if wide { [0.46, 0.23, 0.31] } else { [0.54, 0.0, 0.46] }.map(|share: f32| share * size.x - 8.0);
-        let mut clicked = None;
-        ui.horizontal_top(|ui| {
-            ui.allocate_ui(egui::vec2(widths[0], size.y), |ui| {
-                let scatter = Scatter { stage, second: other, measure, selected };
-                clicked = scatter.show(ui, size.y.max(120.0));
-            });
-            if wide {
-                column(ui, "chosen", widths[1], false, |ui| chosen(ui, stage, selected, &now, actions));
-            }
-            column(ui, "tables", widths[2], self.to_top && !wide, |ui| {
-                if !wide {
-                    chosen(ui, stage, selected, &now, actions);
-                }
-                if let Some(other) = other {
-                    section(ui, "Both reports", true, |ui| {
-                        tables::comparison(ui, &stage.beside(other, measure), measure);
-                    });
-                }
-                let title = format!("Measurements ({})", stage.points.len());
-                let in_table = section(ui, &title, true, |ui| tables::points(ui, stage, measure, selected));
-                clicked = clicked.or(in_table.flatten());
-                section(ui, "Defaults check", true, |ui| tables::choices(ui, stage));
-                if !stage.orders.is_empty() {
-                    section(ui, "Orders of convergence", true, |ui| tables::orders(ui, stage));
-                }
-                section(ui, "About this report", false, |ui| tables::about(ui, report, stage));
-            });
-        });
-        self.to_top = clicked.is_some();
-        if let Some(point) = clicked {
-            self.select(&point.method, &point.setting);
-        }
-    }
-
     /// Chooses the setting of a knob, as a click on its point does.
     pub(crate) fn select(&mut self, method: &str, setting: &str) {
         self.selected = Some([method.to_owned(), setting.to_owned()]);
     }
 
     /// PSNR over seconds of trainings in the report: of the default and of the chosen setting.
-    pub(crate) fn curves(&self, state: &AppState) -> Vec<(String, Vec<[f64; 2]>)> {
+    pub(crate) fn curves(&self, state: &AppState) -> Vec<PsnrCurve> {
         let Some(stage) = state.report.as_ref().and_then(|r| r.report.stage(StageName::Train)) else {
             return Vec::new();
         };
@@ -133,21 +69,15 @@ impl ReportPane {
     }
 
     /// Draws the choice of report, stage and measure, and buttons to open other reports.
-    fn header(
-        &mut self,
-        ui: &mut Ui,
-        shown: &ShownReport,
-        second: Option<&ShownReport>,
-        state: &AppState,
-        actions: &mut Vec<Action>,
-    ) {
+    fn header(&mut self, ui: &mut Ui, shown: &ShownReport, second: Option<&ShownReport>, cx: &mut Ctx<'_>) {
+        let state = cx.state;
         ui.horizontal_wrapped(|ui| {
             ui.label(RichText::new("Error vs. run time").strong());
             ui.label(RichText::new(name(shown)).color(theme::weak())).on_hover_text(text::path(&shown.path));
             if let Some(second) = second {
                 ui.label(RichText::new(format!("compared with {} (hollow)", name(second))).color(theme::accent()))
                     .on_hover_text(text::path(&second.path));
-                button(ui, "End comparison", &Action::EndComparison, true, actions);
+                button(ui, "End comparison", &Action::EndComparison, true, cx);
             }
             ui.separator();
             let stage = self.stage_of(&shown.report);
@@ -169,11 +99,76 @@ impl ReportPane {
                 names.response.on_hover_text(&measure.meaning).accessible_name("Metric");
             }
             ui.separator();
-            button(ui, "Open\u{2026}", &Action::ChooseReport, true, actions);
-            button(ui, "Compare\u{2026}", &Action::ChooseSecondReport, true, actions);
+            button(ui, "Open\u{2026}", &Action::ChooseReport, true, cx);
+            button(ui, "Compare\u{2026}", &Action::ChooseSecondReport, true, cx);
             let can_measure = state.is_trained() && state.job.is_none();
-            button(ui, "Benchmark rendering", &Action::BenchmarkRendering, can_measure, actions);
+            button(ui, "Benchmark rendering", &Action::BenchmarkRendering, can_measure, cx);
         });
+    }
+}
+
+impl PaneContents for ReportPane {
+    fn ui(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, view: &mut Viewport) {
+        let state = cx.state;
+        let Some(shown) = state.report.clone() else {
+            let job = state.job.as_ref().filter(|_| self.measuring);
+            ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| empty::show(ui, job, cx));
+            return;
+        };
+        let second = state.second_report.clone();
+        let report = &*shown.report;
+        self.header(ui, &shown, second.as_ref(), cx);
+        let Some(stage) = self.stage_of(report) else {
+            ui.weak("Nothing was measured yet: the report has no stage. Run the same command again to continue.");
+            return;
+        };
+        let Some(measure) = self.measure_of(stage) else {
+            ui.weak("This stage has no metric.");
+            return;
+        };
+        let second_report = second.as_ref().map(|s| &*s.report);
+        warnings(ui, stage, report, second_report);
+        let other = second_report.and_then(|r| r.stage(stage.name));
+        let selected = self.selected_of(stage);
+        let own = state.scene.as_ref().map(|_| state.render_settings());
+        let now = Now { config: &cx.layout.config, own: own.as_ref(), drawing: &view.overrides, on_gpu: view.on_gpu() };
+        let size = ui.available_size();
+        // A column of its own if there is room, else above the tables.
+        let wide = size.x > 1_100.0;
+        let widths = if wide { [0.46, 0.23, 0.31] } else { [0.54, 0.0, 0.46] }.map(|share: f32| share * size.x - 8.0);
+        let (mut clicked, mut applied) = (None, None);
+        ui.horizontal_top(|ui| {
+            ui.allocate_ui(egui::vec2(widths[0], size.y), |ui| {
+                let scatter = Scatter { stage, second: other, measure, selected };
+                clicked = scatter.show(ui, size.y.max(120.0));
+            });
+            if wide {
+                column(ui, "chosen", widths[1], false, |ui| applied = chosen(ui, stage, selected, &now));
+            }
+            column(ui, "tables", widths[2], self.to_top && !wide, |ui| {
+                if !wide {
+                    applied = chosen(ui, stage, selected, &now);
+                }
+                if let Some(other) = other {
+                    section(ui, "Both reports", true, |ui| {
+                        tables::comparison(ui, &stage.beside(other, measure), measure);
+                    });
+                }
+                let title = format!("Measurements ({})", stage.points.len());
+                let in_table = section(ui, &title, true, |ui| tables::points(ui, stage, measure, selected));
+                clicked = clicked.or(in_table.flatten());
+                section(ui, "Defaults check", true, |ui| tables::choices(ui, stage));
+                if !stage.orders.is_empty() {
+                    section(ui, "Orders of convergence", true, |ui| tables::orders(ui, stage));
+                }
+                section(ui, "About this report", false, |ui| tables::about(ui, report, stage));
+            });
+        });
+        applied.into_iter().for_each(|action| cx.ask(action));
+        self.to_top = clicked.is_some();
+        if let Some(point) = clicked {
+            self.select(&point.method, &point.setting);
+        }
     }
 }
 
@@ -183,11 +178,11 @@ fn name(shown: &ShownReport) -> String {
     text::elided(&name.unwrap_or_else(|| shown.path.display().to_string()), 32)
 }
 
-fn button(ui: &mut Ui, text: &str, action: &Action, enabled: bool, actions: &mut Vec<Action>) {
+fn button(ui: &mut Ui, text: &str, action: &Action, enabled: bool, cx: &mut Ctx<'_>) {
     let response = ui.add_enabled(enabled, egui::Button::new(text).small());
     let disabled = "Needs a trained scene, and no other job.";
     if response.on_hover_text(action.tooltip()).on_disabled_hover_text(disabled).clicked() {
-        actions.push(action.clone());
+        cx.ask(action.clone());
     }
 }
 
@@ -228,13 +223,15 @@ fn warnings(ui: &mut Ui, stage: &Stage, report: &Report, second: Option<&Report>
     }
 }
 
-/// Draws the chosen point, with a button that applies its setting.
-fn chosen(ui: &mut Ui, stage: &Stage, selected: Option<&Point>, now: &Now<'_>, actions: &mut Vec<Action>) {
+/// Draws the chosen point, with a button that applies its setting; returns the action of the button if it was clicked.
+fn chosen(ui: &mut Ui, stage: &Stage, selected: Option<&Point>, now: &Now<'_>) -> Option<Action> {
     let Some(point) = selected else {
-        ui.weak("Click on a point, or on a row below, to see what it would change. Drag to move, Ctrl+wheel to zoom.");
-        return;
+        ui.weak(
+            "Click on a point, or on a row below, to see the changes it would make. Drag to move, Ctrl+wheel to zoom.",
+        );
+        return None;
     };
-    egui::Frame::new().fill(theme::surface()).corner_radius(8).inner_margin(10).show(ui, |ui| {
+    let shown = egui::Frame::new().fill(theme::surface()).corner_radius(8).inner_margin(10).show(ui, |ui| {
         ui.set_width(ui.available_width());
         scatter::facts(ui, point, &stage.measures, "");
         ui.add_space(4.0);
@@ -247,18 +244,20 @@ fn chosen(ui: &mut Ui, stage: &Stage, selected: Option<&Point>, now: &Now<'_>, a
                     StageName::Train => "Apply to the next training",
                     _ => "Apply to the view",
                 };
-                if ui.add(theme::primary_button(what)).on_hover_text(action.tooltip()).clicked() {
-                    actions.push(action);
-                }
+                let clicked = ui.add(theme::primary_button(what)).on_hover_text(action.tooltip()).clicked();
+                clicked.then_some(action)
             }
             Offer::Active => {
                 ui.colored_label(theme::good(), "Already active.");
+                None
             }
             Offer::Not(why) => {
                 ui.label(RichText::new(why).color(theme::weak()));
+                None
             }
         }
     });
+    shown.inner
 }
 
 #[cfg(test)]

@@ -6,13 +6,15 @@ use egui::{
     Color32, ColorImage, Rect, RichText, ScrollArea, Sense, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2,
 };
 
-use super::super::layout::Layout;
+use super::super::ctx::Ctx;
 use super::super::state::AppState;
 use super::super::theme;
+use super::super::viewport::Viewport;
+use super::PaneContents;
 use crate::math::format;
 use crate::scene::{Dataset, PhotoPixels, text};
 use crate::ui::actions::Action;
-use crate::worker::{Command, JobId, Worker};
+use crate::worker::{Task, Tasks};
 
 /// Longest side of a thumbnail in px.
 const SIDE_PX: u32 = 224;
@@ -23,46 +25,46 @@ const KEPT: usize = 400;
 /// Height of the text under a thumbnail, points.
 const CAPTION: f32 = 18.0;
 
-/// The thumbnails of one scene.
+/// The pane, with the thumbnails of one scene.
 #[derive(Default)]
-pub(crate) struct PhotoThumbnails {
+pub(crate) struct PhotosPane {
     scene: u64,
     loaded: BTreeMap<usize, TextureHandle>,
-    waiting: HashMap<JobId, usize>,
+    loading: HashMap<usize, Task<PhotoPixels>>,
     failed: BTreeSet<usize>,
 }
 
-impl PhotoThumbnails {
+impl PhotosPane {
     /// Takes over newly loaded thumbnails.
-    pub(crate) fn update(&mut self, ctx: &egui::Context, state: &mut AppState) {
+    pub(crate) fn update(&mut self, ctx: &egui::Context, state: &AppState) {
         if self.scene != state.scene_number {
             *self = Self { scene: state.scene_number, ..Self::default() };
         }
-        let ready: Vec<usize> = state.photos.keys().filter(|k| k.1 == SIDE_PX).map(|k| k.0).collect();
-        for index in ready {
-            if let Some(pixels) = state.photos.remove(&(index, SIDE_PX)) {
-                self.waiting.retain(|_, i| *i != index);
-                self.loaded.insert(index, upload(ctx, index, &pixels));
+        let (loaded, failed) = (&mut self.loaded, &mut self.failed);
+        self.loading.retain(|&index, task| {
+            match task.poll() {
+                None => return true,
+                Some(Ok(pixels)) => {
+                    loaded.insert(index, upload(ctx, index, &pixels));
+                }
+                Some(Err(_)) => {
+                    failed.insert(index);
+                }
             }
-        }
-        let waiting = &mut self.waiting;
-        let failed = &mut self.failed;
-        state.failed_photos.retain(|job| waiting.remove(job).map(|i| failed.insert(i)).is_none());
+            false
+        });
     }
 
-    fn request(&mut self, index: usize, dataset: &Dataset, worker: &Worker) {
-        let known = dataset.photos.get(index).is_none_or(|photo| !photo.has_pixels())
-            || self.loaded.contains_key(&index)
-            || self.failed.contains(&index)
-            || self.waiting.values().any(|i| *i == index);
-        if known || self.waiting.len() >= AT_ONCE {
+    fn request(&mut self, index: usize, dataset: &Dataset, tasks: &Tasks) {
+        let Some(photo) = dataset.photos.get(index).filter(|photo| photo.has_pixels()) else { return };
+        let is_known =
+            self.loaded.contains_key(&index) || self.failed.contains(&index) || self.loading.contains_key(&index);
+        if is_known || self.loading.len() >= AT_ONCE {
             return;
         }
-        let Some(photo) = dataset.photos.get(index) else { return };
-        let command = Command::Photo { index, photo: Box::new(photo.clone()), max_side_px: SIDE_PX };
         // With a full queue the request is repeated at the next redraw.
-        if let Ok(job) = worker.submit(command) {
-            self.waiting.insert(job, index);
+        if let Ok(task) = tasks.photo(index, photo, SIDE_PX) {
+            self.loading.insert(index, task);
         }
     }
 
@@ -78,56 +80,6 @@ impl PhotoThumbnails {
             let after = last.saturating_sub(visible.end);
             self.loaded.remove(if before > after { &first } else { &last });
         }
-    }
-
-    pub(crate) fn show(
-        &mut self,
-        ui: &mut Ui,
-        state: &AppState,
-        layout: &Layout,
-        current: Option<usize>,
-        worker: &Worker,
-        actions: &mut Vec<Action>,
-    ) {
-        let Some((scene, dataset)) = state.scene.as_ref().and_then(|s| Some((s, s.dataset.as_ref()?))) else {
-            ui.weak("This scene has no photos.");
-            return;
-        };
-        let test: BTreeSet<usize> = scene.held_out(layout.config.holdout_every).into_iter().collect();
-        facts(ui, dataset, dataset.photos.len() - test.len(), test.len());
-        if scene.remote.as_ref().is_some_and(|origin| !origin.photos) {
-            ui.weak("Its photos are no longer there; these are their cameras.");
-        }
-        let scores: HashMap<&str, f64> = state
-            .history
-            .evaluations
-            .last()
-            .map(|e| e.views.iter().map(|v| (v.name.as_str(), v.psnr)).collect())
-            .unwrap_or_default();
-        ui.add_space(4.0);
-        let columns = ((ui.available_width() / 120.0) as usize).max(2);
-        let gap = 6.0;
-        let width = (ui.available_width() - gap * (columns - 1) as f32 - 4.0) / columns as f32;
-        let cell = vec2(width, width * 0.75 + CAPTION);
-        let rows = dataset.photos.len().div_ceil(columns);
-        ui.spacing_mut().item_spacing.y = gap;
-        ScrollArea::vertical().auto_shrink([false, false]).show_rows(ui, cell.y, rows, |ui, visible| {
-            for row in visible.clone() {
-                ui.horizontal(|ui| {
-                    ui.spacing_mut().item_spacing.x = gap;
-                    for index in (row * columns..(row + 1) * columns).take_while(|i| *i < dataset.photos.len()) {
-                        self.request(index, dataset, worker);
-                        let photo = &dataset.photos[index];
-                        let (name, held) = (&*photo.title(), test.contains(&index));
-                        let caption = Caption { name, held, psnr: scores.get(photo.name.as_str()).copied() };
-                        if self.cell(ui, cell, index, &caption, current == Some(index)) {
-                            actions.push(Action::GoToPhoto(index));
-                        }
-                    }
-                });
-            }
-            self.forget_far(visible.start * columns..visible.end * columns);
-        });
     }
 
     fn cell(&self, ui: &mut Ui, size: egui::Vec2, index: usize, caption: &Caption<'_>, selected: bool) -> bool {
@@ -167,6 +119,51 @@ impl PhotoThumbnails {
         }
         let use_ = if caption.held { "held out for evaluation" } else { "used for training" };
         response.on_hover_text(format!("{}\n{use_}\nClick to look through its camera", caption.name)).clicked()
+    }
+}
+
+impl PaneContents for PhotosPane {
+    fn ui(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, view: &mut Viewport) {
+        let (state, current) = (cx.state, view.photo_index());
+        let Some((scene, dataset)) = state.scene.as_ref().and_then(|s| Some((s, s.dataset.as_ref()?))) else {
+            ui.weak("This scene has no photos.");
+            return;
+        };
+        let test: BTreeSet<usize> = scene.held_out(cx.layout.config.holdout_every).into_iter().collect();
+        facts(ui, dataset, dataset.photos.len() - test.len(), test.len());
+        if scene.remote.as_ref().is_some_and(|origin| !origin.photos) {
+            ui.weak("The photos are missing there; only their cameras are known.");
+        }
+        let scores: HashMap<&str, f64> = state
+            .history
+            .evaluations
+            .last()
+            .map(|e| e.views.iter().map(|v| (v.name.as_str(), v.psnr)).collect())
+            .unwrap_or_default();
+        ui.add_space(4.0);
+        let columns = ((ui.available_width() / 120.0) as usize).max(2);
+        let gap = 6.0;
+        let width = (ui.available_width() - gap * (columns - 1) as f32 - 4.0) / columns as f32;
+        let cell = vec2(width, width * 0.75 + CAPTION);
+        let rows = dataset.photos.len().div_ceil(columns);
+        ui.spacing_mut().item_spacing.y = gap;
+        ScrollArea::vertical().auto_shrink([false, false]).show_rows(ui, cell.y, rows, |ui, visible| {
+            for row in visible.clone() {
+                ui.horizontal(|ui| {
+                    ui.spacing_mut().item_spacing.x = gap;
+                    for index in (row * columns..(row + 1) * columns).take_while(|i| *i < dataset.photos.len()) {
+                        self.request(index, dataset, cx.tasks);
+                        let photo = &dataset.photos[index];
+                        let (name, held) = (&*photo.title(), test.contains(&index));
+                        let caption = Caption { name, held, psnr: scores.get(photo.name.as_str()).copied() };
+                        if self.cell(ui, cell, index, &caption, current == Some(index)) {
+                            cx.ask(Action::GoToPhoto(index));
+                        }
+                    }
+                });
+            }
+            self.forget_far(visible.start * columns..visible.end * columns);
+        });
     }
 }
 
