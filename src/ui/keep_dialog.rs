@@ -7,6 +7,7 @@ use super::theme;
 use crate::jobs::find_objects::listed;
 
 /// A search that has not begun.
+#[derive(Default)]
 pub(super) struct PlannedSearch {
     /// Path of masks to use in place of the photos' own.
     pub(super) masks: Option<PathBuf>,

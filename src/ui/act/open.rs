@@ -14,7 +14,7 @@ use crate::ui::actions::{Action, Pane};
 use crate::ui::app::App;
 use crate::ui::beside::Beside;
 use crate::ui::camera;
-use crate::ui::dialogs::{Answer, Question};
+use crate::ui::dialogs::{DialogAnswer, Question};
 use crate::ui::file_dialogs::FileRequest;
 use crate::ui::state::{ShownReport, Tone};
 use crate::worker::{Failure, JobInfo, Makes};
@@ -121,7 +121,7 @@ fn replace_scene(app: &mut App, open: impl FnOnce(&mut App) + 'static) {
     let text = format!("{title} is still running. Cancel it and continue? Saved progress is kept.");
     let question = Question { text, yes: "Cancel and continue", other: None, no: "Keep running" };
     app.put_question(question, |app, answer| {
-        if answer == Answer::Yes {
+        if answer == DialogAnswer::Yes {
             remote::cancel_job(app);
             remote::disconnect(app);
             open(app);

@@ -11,7 +11,7 @@ use crate::measure::{End, FILE, Knobs, StageName, turned};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::ui::actions::{Action, Pane};
 use crate::ui::app::App;
-use crate::ui::dialogs::{Answer, Question};
+use crate::ui::dialogs::{DialogAnswer, Question};
 use crate::ui::labels::sentence;
 use crate::ui::state::{ShownReport, Tone};
 use crate::worker::{JobInfo, Makes, Stop};
@@ -59,9 +59,9 @@ fn ask_how_to_train(app: &mut App, changes: &str) {
     );
     let question = Question { text, yes: "Train anew", other: Some("Go on"), no: "Leave it" };
     app.put_question(question, |app, answer| match answer {
-        Answer::Yes => start(app, false, IfChanged::Anew),
-        Answer::Other => start(app, false, IfChanged::GoOn),
-        Answer::No => {}
+        DialogAnswer::Yes => start(app, false, IfChanged::Anew),
+        DialogAnswer::Other => start(app, false, IfChanged::GoOn),
+        DialogAnswer::No => {}
     });
 }
 
@@ -126,11 +126,14 @@ pub(in crate::ui) fn benchmark_rendering(app: &mut App) {
         }
         Ok(ShownReport { path: request.out, report: Arc::new(done.report) })
     };
-    app.start_to_end(JobInfo::long("Benchmarking rendering"), measure, move |app, _, end| match end {
-        Ok(shown) => app.state.report = Some(shown),
-        // Results measured before the cancellation are shown.
-        Err(Stop::Cancelled) => app.ask(Action::OpenReport(scene.report_out.clone())),
-        Err(Stop::Failed(_)) => {}
+    app.report.measuring = app.start_to_end(JobInfo::long("Benchmarking rendering"), measure, move |app, _, end| {
+        app.report.measuring = false;
+        match end {
+            Ok(shown) => app.state.report = Some(shown),
+            // Results measured before the cancellation are shown.
+            Err(Stop::Cancelled) => app.ask(Action::OpenReport(scene.report_out.clone())),
+            Err(Stop::Failed(_)) => {}
+        }
     });
 }
 

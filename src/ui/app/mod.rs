@@ -10,7 +10,7 @@ use super::act::{edits, query, remote, view, window};
 use super::actions::{Action, Pane};
 use super::camera::CameraPane;
 use super::chat::Chat;
-use super::dialogs::{Answer, Question};
+use super::dialogs::{DialogAnswer, Question};
 use super::file_dialogs::{FileDialogs, FileRequest};
 use super::find_dialog::FindDialog;
 use super::history::{EditStep, Editing};
@@ -56,7 +56,7 @@ pub struct App {
     pub(super) link: Option<ServerLink>,
     pub(super) repaint: Repaint,
     pub(super) dialogs: FileDialogs,
-    pub(super) question: Option<(Question, Box<dyn FnOnce(&mut App, Answer)>)>,
+    pub(super) question: Option<(Question, Box<dyn FnOnce(&mut App, DialogAnswer)>)>,
     pub(super) find_dialog: FindDialog,
     pub(super) keep_dialog: Option<KeepDialog>,
     /// True if the query field is open although queries are impossible.
@@ -224,7 +224,7 @@ impl App {
     }
 
     /// Shows a question; `then` gets the answer.
-    pub(super) fn put_question(&mut self, question: Question, then: impl FnOnce(&mut Self, Answer) + 'static) {
+    pub(super) fn put_question(&mut self, question: Question, then: impl FnOnce(&mut Self, DialogAnswer) + 'static) {
         self.question = Some((question, Box::new(then)));
     }
 

@@ -13,7 +13,7 @@ use crate::jobs::remove::{self as removal, RemovalOptions, RemoveRequest};
 use crate::pipeline::observer::Observer;
 use crate::scene::{Camera, IdentityId, SemanticMap};
 use crate::ui::app::{App, context};
-use crate::ui::dialogs::{Answer, Question};
+use crate::ui::dialogs::{DialogAnswer, Question};
 use crate::ui::file_dialogs::FileRequest;
 use crate::ui::find_dialog::Means;
 use crate::ui::history::FoundStep;
@@ -281,7 +281,7 @@ pub(in crate::ui) fn ask_to_delete_removed(app: &mut App) {
     );
     let question = Question { text, yes: "Delete it", other: None, no: "Keep it" };
     app.put_question(question, |app, answer| {
-        if answer == Answer::Yes {
+        if answer == DialogAnswer::Yes {
             delete_removed(app);
         }
     });
