@@ -4,16 +4,13 @@ use std::path::Path;
 
 use crate::cli_support::{first_version, fmlgs, folder, tiny_dataset, tiny_splat};
 use fmlgs::io::splat_ply;
-use fmlgs::jobs::{
-    self, Folders,
-    find_objects::{FindRequest, FindSettings},
-};
+use fmlgs::jobs::find_objects::{FindRequest, FindSettings};
+use fmlgs::jobs::workspace::{OpenedPath, Workspace};
+use fmlgs::jobs::{self, Folders};
 use fmlgs::pipeline::observer::Silent;
 use fmlgs::pipeline::train::TrainConfig;
 use fmlgs::scene::Camera;
 use fmlgs::ui::viewport::eye::Eye;
-use fmlgs::worker::jobs::PipelineJobs;
-use fmlgs::worker::{Command as Job, Jobs, Outcome};
 use glam::DVec3;
 
 #[test]
@@ -117,10 +114,9 @@ fn a_run_on_the_gpu_follows_the_one_on_the_cpu() {
 fn the_window_and_the_command_line_do_the_same() {
     let folder = folder();
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
-    let worker = PipelineJobs::new(Folders { data: folder.path().join("data") });
-    let window = |command: Job| worker.run(command, &mut Silent).unwrap_or_else(|e| panic!("{e:?}"));
-    let open = |path: &str| match window(Job::Open { path: path.into() }) {
-        Outcome::Opened(scene) => scene,
+    let workspace = Workspace::new(Folders { data: folder.path().join("data") });
+    let open = |path: &str| match workspace.open(path.as_ref(), &mut Silent).unwrap() {
+        OpenedPath::Scene(scene) => scene,
         other => panic!("{other:?}"),
     };
     let near = |a: &Camera, b: &Camera| {
@@ -153,14 +149,8 @@ fn the_window_and_the_command_line_do_the_same() {
     // Whatever is set for the next training: the scene knows what it has not seen.
     let config = TrainConfig { holdout_every: 3, ..config };
     let (out, settings) = (scene.out.clone(), scene.render.clone());
-    let command = Job::Evaluate {
-        dataset: dataset.clone(),
-        cloud: cloud.clone(),
-        config: config.clone(),
-        settings: settings.clone(),
-        out: out.clone(),
-    };
-    let Outcome::Evaluated(evaluation) = window(command) else { panic!("no evaluation") };
+    let (d, c) = (dataset.clone(), cloud.clone());
+    let evaluation = workspace.evaluate(d, c, config.clone(), settings.clone(), &out, &mut Silent).unwrap();
     let eval = fmlgs(&["eval", &trained, "--json"]).ok().json();
     assert_eq!(eval["views"].as_array().unwrap().len(), evaluation.views.len());
     assert!((eval["psnr"].as_f64().unwrap() - evaluation.psnr).abs() < 1e-9, "{eval}");
@@ -171,8 +161,7 @@ fn the_window_and_the_command_line_do_the_same() {
     let folder = out.clone();
     let request =
         FindRequest { folder, cloud, settings, dataset, holdout_every, masks, side_px: 64, known: None, with };
-    let command = Job::FindObjects(Box::new(request));
-    let Outcome::Objects(found) = window(command) else { panic!("no objects") };
+    let found = workspace.find_objects(&request, &mut Silent).unwrap();
     let told = fmlgs(&["preprocess", &trained, "--masks", photos, "--encoder", "none"]).ok();
     let stored = jobs::open::scene(&out).unwrap().semantics().unwrap();
     assert_eq!((&stored.identity_of, &stored.seeds), (&found.identity_of, &found.seeds), "{}", told.stderr);

@@ -1,78 +1,68 @@
 //! The worker's contract: every job ends exactly once, whatever happens in it, and nothing but
 //! progress is ever lost.
 
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use fmlgs::pipeline::observer::{Observer, Progress, Severity, Signal, StepMetrics};
 use fmlgs::scene::GaussianCloud;
-use fmlgs::worker::{Command, Event, Failure, JobId, Jobs, Outcome, QueueFull, Stop, Worker};
+use fmlgs::worker::{Event, Failure, JobEnd, JobId, JobInfo, QueueFull, Stop, Task, Tasks};
 
 const LONG: Duration = Duration::from_secs(20);
 
-/// Acts by the file name of an `Open` command.
-struct Script;
-
-impl Jobs for Script {
-    fn run(&self, command: Command, observer: &mut dyn Observer) -> Result<Outcome, Stop> {
-        let (Command::Open { path } | Command::Export { path, .. }) = command else {
-            return Err(Stop::Failed(Failure { message: "not in the script".into(), remedy: String::new() }));
-        };
-        let script = path.to_string_lossy().into_owned();
-        match script.as_str() {
-            "panic" => panic!("the script says so"),
-            "panic in a pool" => {
-                rayon::join(|| (), || assert!(path.as_os_str().is_empty(), "deep down"));
-                Ok(Outcome::Written(path))
-            }
-            "fail" => Err(Stop::Failed(Failure { message: "no".into(), remedy: "never".into() })),
-            "until cancelled" => loop {
-                match observer.signal() {
-                    Signal::Cancel => return Err(Stop::Cancelled),
-                    Signal::Pause | Signal::Continue => std::thread::sleep(Duration::from_millis(1)),
-                }
-            },
-            "talk" => {
-                for i in 0..5_000 {
-                    observer.progress(progress(i));
-                    observer.step(StepMetrics { step: i, ..StepMetrics::default() });
-                    observer.note(Severity::Info, i.to_string());
-                }
-                Ok(Outcome::Written(path))
-            }
-            "clouds" => {
-                let start = Instant::now();
-                let mut given = 0;
-                while start.elapsed() < Duration::from_millis(1_000) {
-                    if observer.wants_cloud() {
-                        observer.cloud(Arc::new(GaussianCloud::default()), given);
-                        given += 1;
-                    }
-                }
-                observer.note(Severity::Info, given.to_string());
-                Ok(Outcome::Written(path))
-            }
-            _ => Ok(Outcome::Written(path)),
+/// Job that acts by its name.
+fn script(name: &'static str, observer: &mut dyn Observer) -> Result<&'static str, Stop> {
+    match name {
+        "panic" => panic!("the script says so"),
+        "panic in a pool" => {
+            rayon::join(|| (), || assert!(name.is_empty(), "deep down"));
         }
+        "fail" => return Err(Stop::Failed(Failure::new("no", "never"))),
+        "until cancelled" => loop {
+            match observer.signal() {
+                Signal::Cancel => return Err(Stop::Cancelled),
+                Signal::Pause | Signal::Continue => std::thread::sleep(Duration::from_millis(1)),
+            }
+        },
+        "talk" => {
+            for i in 0..5_000 {
+                observer.progress(progress(i));
+                observer.step(StepMetrics { step: i, ..StepMetrics::default() });
+                observer.note(Severity::Info, i.to_string());
+            }
+        }
+        "clouds" => {
+            let start = Instant::now();
+            let mut given = 0;
+            while start.elapsed() < Duration::from_millis(1_000) {
+                if observer.wants_cloud() {
+                    observer.cloud(Arc::new(GaussianCloud::default()), given);
+                    given += 1;
+                }
+            }
+            observer.note(Severity::Info, given.to_string());
+        }
+        _ => {}
     }
+    Ok(name)
 }
 
 fn progress(done: u64) -> Progress {
     Progress { stage: "Talking".into(), done, total: 5_000, elapsed_secs: 0.0, rate: 0.0 }
 }
 
-fn worker() -> Worker {
-    Worker::start(Script, Arc::new(|| ())).expect("threads")
+fn worker() -> Tasks {
+    Tasks::start(Arc::new(|| ())).expect("threads")
 }
 
-fn open(script: &str) -> Command {
-    Command::Open { path: PathBuf::from(script) }
+/// Starts a long job.
+fn start(worker: &Tasks, name: &'static str) -> Task<&'static str> {
+    worker.spawn(JobInfo::long(name), move |observer| script(name, observer)).expect("room")
 }
 
 /// Events of `job` up to its end.
-fn run(worker: &Worker, job: JobId) -> Vec<Event> {
+fn run(worker: &Tasks, job: JobId) -> Vec<Event> {
     let mut events = Vec::new();
     loop {
         let event = worker.wait_event(LONG).expect("the job ends");
@@ -89,64 +79,66 @@ fn run(worker: &Worker, job: JobId) -> Vec<Event> {
 fn every_job_starts_once_and_ends_once() {
     let worker = worker();
     let scripts = ["fine", "panic", "fail", "panic in a pool", "fine"];
-    let jobs: Vec<JobId> = scripts.iter().map(|s| worker.submit(open(s)).expect("room")).collect();
+    let tasks: Vec<_> = scripts.iter().map(|s| start(&worker, s)).collect();
     let mut events = Vec::new();
-    while events.iter().filter(|e: &&Event| e.is_end()).count() < jobs.len() {
+    while events.iter().filter(|e: &&Event| e.is_end()).count() < tasks.len() {
         events.push(worker.wait_event(LONG).expect("they end"));
     }
     assert!(worker.wait_event(Duration::from_millis(100)).is_none(), "nothing comes after the ends");
-    for (job, script) in jobs.iter().zip(scripts) {
-        let own: Vec<&Event> = events.iter().filter(|e| e.job() == *job).collect();
-        assert!(matches!(own.first(), Some(Event::Started { .. })), "{script}");
+    for (task, script) in tasks.iter().zip(scripts) {
+        let own: Vec<&Event> = events.iter().filter(|e| e.job() == task.job()).collect();
+        assert!(matches!(own.first(), Some(Event::Started(..))), "{script}");
         assert_eq!(own.len(), 2, "{script}: {own:?}");
+        let result = task.poll().expect("it has ended");
         let right = match script {
-            "fine" => matches!(own[1], Event::Finished(..)),
-            _ => matches!(own[1], Event::Failed(..)),
+            "fine" => matches!(own[1], Event::Ended(_, JobEnd::Finished)) && result == Ok("fine"),
+            _ => matches!(own[1], Event::Ended(_, JobEnd::Failed(_))) && matches!(result, Err(Stop::Failed(_))),
         };
-        assert!(right, "{script}: {:?}", own[1]);
+        assert!(right, "{script}: {:?} {result:?}", own[1]);
     }
 }
 
 #[test]
 fn a_panic_says_what_happened_and_the_worker_lives_on() {
     let worker = worker();
-    let job = worker.submit(open("panic")).expect("room");
-    let Some(Event::Failed(_, failure)) = run(&worker, job).pop() else { panic!("it must fail") };
+    let job = start(&worker, "panic").job();
+    let Some(Event::Ended(_, JobEnd::Failed(failure))) = run(&worker, job).pop() else { panic!("it must fail") };
     assert!(failure.message.contains("the script says so"), "{failure:?}");
-    let job = worker.submit(open("fine")).expect("room");
-    assert!(matches!(run(&worker, job).pop(), Some(Event::Finished(..))));
+    let job = start(&worker, "fine").job();
+    assert!(matches!(run(&worker, job).pop(), Some(Event::Ended(_, JobEnd::Finished))));
 }
 
 #[test]
 fn running_and_waiting_jobs_can_be_cancelled() {
     let worker = worker();
-    let running = worker.submit(open("until cancelled")).expect("room");
-    let waiting = worker.submit(open("fine")).expect("room");
-    worker.cancel(waiting);
+    let (running, waiting) = (start(&worker, "until cancelled"), start(&worker, "fine"));
+    worker.cancel(waiting.job());
     std::thread::sleep(Duration::from_millis(20));
-    worker.cancel(running);
-    assert!(matches!(run(&worker, running).pop(), Some(Event::Cancelled(_))));
-    assert!(matches!(run(&worker, waiting).pop(), Some(Event::Cancelled(_))));
+    worker.cancel(running.job());
+    for task in [running, waiting] {
+        assert!(matches!(run(&worker, task.job()).pop(), Some(Event::Ended(_, JobEnd::Cancelled))));
+        assert_eq!(task.poll(), Some(Err(Stop::Cancelled)));
+    }
 }
 
 #[test]
 fn pausing_is_reported_when_it_takes_hold() {
     let worker = worker();
-    let job = worker.submit(open("until cancelled")).expect("room");
+    let job = start(&worker, "until cancelled").job();
     worker.set_paused(job, true);
     let next = || worker.wait_event(LONG).expect("an event");
-    assert!(matches!(next(), Event::Started { .. }));
+    assert!(matches!(next(), Event::Started(..)));
     assert!(matches!(next(), Event::Paused(_, true)));
     worker.set_paused(job, false);
     assert!(matches!(next(), Event::Paused(_, false)));
     worker.cancel(job);
-    assert!(matches!(next(), Event::Cancelled(_)));
+    assert!(matches!(next(), Event::Ended(_, JobEnd::Cancelled)));
 }
 
 #[test]
 fn a_slow_window_loses_progress_and_nothing_else() {
     let worker = worker();
-    let job = worker.submit(open("talk")).expect("room");
+    let job = start(&worker, "talk").job();
     // Nobody takes events for a while: the channel fills up, and the job waits.
     std::thread::sleep(Duration::from_millis(200));
     let events = run(&worker, job);
@@ -161,18 +153,17 @@ fn a_slow_window_loses_progress_and_nothing_else() {
 #[test]
 fn short_jobs_are_answered_while_a_long_one_runs() {
     let worker = worker();
-    let long = worker.submit(open("until cancelled")).expect("room");
-    let cloud = Arc::new(GaussianCloud::default());
-    let short = worker.submit(Command::Export { cloud, path: "fine".into() }).expect("room");
-    assert!(matches!(run(&worker, short).pop(), Some(Event::Finished(..))));
+    let long = start(&worker, "until cancelled").job();
+    let short = worker.spawn(JobInfo::short("fine"), |observer| script("fine", observer)).expect("room").job();
+    assert!(matches!(run(&worker, short).pop(), Some(Event::Ended(_, JobEnd::Finished))));
     worker.cancel(long);
-    assert!(matches!(run(&worker, long).pop(), Some(Event::Cancelled(_))));
+    assert!(matches!(run(&worker, long).pop(), Some(Event::Ended(_, JobEnd::Cancelled))));
 }
 
 #[test]
 fn clouds_are_wanted_about_three_times_a_second_and_only_the_latest_is_kept() {
     let worker = worker();
-    let job = worker.submit(open("clouds")).expect("room");
+    let job = start(&worker, "clouds").job();
     let events = run(&worker, job);
     let given: u64 = events
         .iter()
@@ -187,11 +178,11 @@ fn clouds_are_wanted_about_three_times_a_second_and_only_the_latest_is_kept() {
 #[test]
 fn a_full_queue_is_refused() {
     let worker = worker();
-    let first = worker.submit(open("until cancelled")).expect("room");
+    let first = start(&worker, "until cancelled").job();
     let mut jobs = vec![first];
     let refusal = loop {
-        match worker.submit(open("fine")) {
-            Ok(job) => jobs.push(job),
+        match worker.spawn(JobInfo::long("fine"), |observer| script("fine", observer)) {
+            Ok(task) => jobs.push(task.job()),
             Err(e) => break e,
         }
         assert!(jobs.len() < 1_000, "the queue is bounded");
@@ -211,8 +202,8 @@ fn every_event_asks_for_a_redraw() {
     let repaint = Arc::new(move || {
         counter.fetch_add(1, Ordering::Relaxed);
     });
-    let worker = Worker::start(Script, repaint).expect("threads");
-    let job = worker.submit(open("fine")).expect("room");
+    let worker = Tasks::start(repaint).expect("threads");
+    let job = start(&worker, "fine").job();
     let events = run(&worker, job).len();
     // The last call comes right after its event.
     std::thread::sleep(Duration::from_millis(50));
@@ -222,8 +213,8 @@ fn every_event_asks_for_a_redraw() {
 #[test]
 fn the_end_of_the_program_ends_running_jobs() {
     let worker = worker();
-    worker.submit(open("until cancelled")).expect("room");
-    worker.submit(open("talk")).expect("room");
+    start(&worker, "until cancelled").job();
+    start(&worker, "talk").job();
     let start = Instant::now();
     drop(worker);
     assert!(start.elapsed() < Duration::from_secs(3), "{:?}", start.elapsed());

@@ -7,7 +7,6 @@ use egui_kittest::Harness;
 use fmlgs::jobs::Folders;
 use fmlgs::ui::actions::Action;
 use fmlgs::ui::app::App;
-use fmlgs::worker::jobs::PipelineJobs;
 
 /// Only a test that hangs takes this long: making the demo's photos is the longest step.
 const LONG: Duration = Duration::from_secs(600);
@@ -18,7 +17,7 @@ pub fn window(places: Folders, first: Option<Action>) -> Harness<'static, App> {
         .with_size([1200.0, 800.0])
         .with_max_steps(20)
         .wgpu()
-        .build_eframe(|cc| App::new(cc, PipelineJobs::new(places), first).expect("threads"))
+        .build_eframe(|cc| App::new(cc, places, first).expect("threads"))
 }
 
 /// Lets the window run until `done`, as the worker gets on.

@@ -304,7 +304,8 @@ impl AppState {
         let host = origin.map_or_else(String::new, |origin| format!(" on {}", origin.host));
         self.say(Tone::Info, format!("Saved to {}{host}", out.display()));
         if stopped_at.is_some() {
-            self.toast(Tone::Info, "Training: canceled");
+            let name = self.scene.as_ref().map_or("", |s| &s.name);
+            self.toast(Tone::Info, format!("Training {name}: canceled"));
             return false;
         }
         let quality = self.history.evaluations.last().map(|e| format!(", held-out PSNR {:.2} dB", e.psnr));

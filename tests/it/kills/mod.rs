@@ -16,10 +16,10 @@ use crate::cli_support::{Done, Server, command, first_version, fmlgs, folder, ti
 use fmlgs::io::{SceneFolder, semantic_map, trained};
 use fmlgs::jobs::Folders;
 use fmlgs::jobs::edit::EditRequest;
+use fmlgs::jobs::workspace::{OpenedPath, Workspace};
+use fmlgs::pipeline::observer::Silent;
 use fmlgs::pipeline::train::checkpoint;
 use fmlgs::scene::SemanticMap;
-use fmlgs::worker::jobs::PipelineJobs;
-use fmlgs::worker::{Command as Job, Event, Outcome, Worker};
 use rand::{RngExt, SeedableRng};
 
 /// Kills of each command.
@@ -203,18 +203,9 @@ const EDITED: &str = "FMLGS_EDITED_SCENE";
 
 /// Changes the objects of a scene to and fro.
 fn edit_for_ever(scene: PathBuf) {
-    let worker = Worker::start(PipelineJobs::new(Folders { data: scene.join("data") }), Arc::new(|| ())).unwrap();
-    let outcome = |command: Job| {
-        worker.submit(command).unwrap();
-        loop {
-            match worker.wait_event(Duration::from_secs(60)).expect("an event") {
-                Event::Finished(_, outcome) => return outcome,
-                Event::Failed(_, e) => panic!("{}", e.message),
-                _ => {}
-            }
-        }
-    };
-    let Outcome::Opened(opened) = outcome(Job::Open { path: scene.clone() }) else { panic!("not opened") };
+    let workspace = Workspace::new(Folders { data: scene.join("data") });
+    let opened = workspace.open(&scene, &mut Silent).expect("a scene");
+    let OpenedPath::Scene(opened) = opened else { panic!("not opened") };
     let (cloud, map) = (opened.cloud.clone().unwrap(), opened.semantics.clone().unwrap());
     let mut other = (*map).clone();
     other.identity_of.reverse();
@@ -225,9 +216,7 @@ fn edit_for_ever(scene: PathBuf) {
     for round in 0.. {
         let to = if round % 2 == 0 { &other } else { &map };
         let request = EditRequest::Restore(Arc::clone(to));
-        let (cloud, map) = (Arc::clone(&cloud), Arc::clone(&map));
-        let edit = Job::EditObjects { cloud, map, request, out: scene.clone() };
-        assert!(matches!(outcome(edit), Outcome::Edited(_)));
+        workspace.edit_objects(&cloud, &map, &request, &scene).expect("edited");
     }
 }
 

@@ -1,5 +1,6 @@
 //! Downloads before a search, with mock jobs.
 
+use std::any::Any;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -7,22 +8,20 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
 use super::*;
-use crate::jobs::OpenedScene;
 use crate::jobs::find_objects::FindSettings;
 use crate::jobs::models::{ModelList, ModelState};
+use crate::jobs::workspace::OpenedPath;
+use crate::jobs::{Folders, OpenedScene};
 use crate::models::catalog;
 use crate::navigate::testing::cloud_of_wall;
-use crate::pipeline::observer::Observer;
 use crate::pipeline::semantics::build_map::Carry;
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::scene::{Dataset, Preparation, SemanticMap};
 use crate::ui::actions::Action;
 use crate::ui::find_dialog::FindDialog;
-use crate::worker::Outcome;
-use crate::worker::{Command, Jobs};
 use crate::worker::{Failure, Stop};
 
-/// Jobs that only record their commands, in order; the download named in `fails` fails.
+/// Jobs that only record their titles, in order; the download named in `fails` fails.
 #[derive(Clone, Default)]
 struct Told {
     said: Arc<Mutex<Vec<String>>>,
@@ -33,55 +32,60 @@ impl Told {
     fn so_far(&self) -> Vec<String> {
         self.said.lock().expect("not poisoned").clone()
     }
-}
 
-impl Jobs for Told {
-    fn run(&self, command: Command, _: &mut dyn Observer) -> Result<Outcome, Stop> {
-        let say = |text: String| self.said.lock().expect("not poisoned").push(text);
-        Ok(match command {
-            Command::Open { path } => Outcome::Opened(Box::new(OpenedScene {
+    /// Result in place of that of the job with this title.
+    fn result(&self, info: &JobInfo) -> Result<Box<dyn Any + Send>, Stop> {
+        let say = |text: &str| self.said.lock().expect("not poisoned").push(text.to_owned());
+        if let Some(id) = info.title.strip_prefix("Installing the model ") {
+            say(&format!("download {id}"));
+            return match self.fails == Some(id) {
+                true => Err(Stop::Failed(Failure::new("no network", ""))),
+                false => Ok(Box::new(id.to_owned())),
+            };
+        }
+        match info.title.as_str() {
+            "Opening photos" => Ok(Box::new(OpenedPath::Scene(Box::new(OpenedScene {
                 name: "photos".into(),
-                out: path.clone(),
-                path,
+                out: "photos".into(),
+                path: "photos".into(),
                 dataset: Some(Arc::new(Dataset::default())),
                 cloud: Some(Arc::new(cloud_of_wall(2.0))),
                 trained: true,
                 ..OpenedScene::default()
-            })),
-            Command::ListModels => {
-                let state = |e: &catalog::ModelEntry| match e.built_in {
-                    true => ModelState::BuiltIn,
-                    false => ModelState::Missing(Vec::new()),
-                };
-                let models = catalog::entries().expect("the list").into_iter().map(|e| (e.clone(), state(&e)));
-                let models = models.collect();
-                Outcome::Models(Arc::new(ModelList {
-                    engine: None,
-                    is_fast: true,
-                    is_settled: true,
-                    cores: 2,
-                    note: None,
-                    folder: "models".into(),
-                    models,
-                    arrived: [("clip-vit-b16".to_owned(), 200)].into(),
-                }))
+            })))),
+            "Listing models" => Ok(Box::new(list())),
+            title if title.starts_with("Finding objects in") => {
+                say("find");
+                Ok(Box::new(Arc::new(SemanticMap::default())))
             }
-            Command::InstallModel { id, .. } => {
-                say(format!("download {id}"));
-                if self.fails == Some(id.as_str()) {
-                    let message = "no network".into();
-                    return Err(Stop::Failed(Failure { message, remedy: String::new() }));
-                }
-                Outcome::ModelInstalled(id)
-            }
-            Command::FindObjects(request) => {
-                let named = |of: Option<String>| of.unwrap_or_default();
-                say(format!("find by {} and {}", named(request.with.segmenter), named(request.with.encoder)));
-                Outcome::Objects(Arc::new(SemanticMap::default()))
-            }
-            _ => return Err(Stop::Cancelled),
-        })
+            _ => Err(Stop::Cancelled),
+        }
     }
+}
+
+/// All models of the catalog, none of them installed.
+fn list() -> ModelList {
+    let state = |e: &catalog::ModelEntry| match e.built_in {
+        true => ModelState::BuiltIn,
+        false => ModelState::Missing(Vec::new()),
+    };
+    let models = catalog::entries().expect("the list").into_iter().map(|e| (e.clone(), state(&e))).collect();
+    ModelList {
+        engine: None,
+        is_fast: true,
+        is_settled: true,
+        cores: 2,
+        note: None,
+        folder: "models".into(),
+        models,
+        arrived: [("clip-vit-b16".to_owned(), 200)].into(),
+    }
+}
+
+/// The chosen segmenter and encoder.
+fn chosen(harness: &Harness<'static, App>) -> [String; 2] {
+    let finding = &harness.state().layout.finding;
+    [&finding.segmenter, &finding.encoder].map(|of| of.clone().unwrap_or_default())
 }
 
 /// The window with unlabeled photos and the dialog with the methods open.
@@ -90,7 +94,12 @@ fn asked(told: Told) -> Harness<'static, App> {
         .with_size([1200.0, 800.0])
         .with_max_steps(20)
         .wgpu()
-        .build_eframe(|cc| App::new(cc, told, Some(Action::Open("photos".into()))).expect("threads"));
+        .build_eframe(|cc| {
+            let folders = Folders { data: "nowhere".into() };
+            let mut app = App::new(cc, folders, Some(Action::Open("photos".into()))).expect("threads");
+            app.tasks.script = Some(Box::new(move |info| Some(told.result(info))));
+            app
+        });
     let until = |harness: &mut Harness<'static, App>, done: &dyn Fn(&App) -> bool| {
         for _ in 0..2_000 {
             if done(harness.state()) {
@@ -133,7 +142,8 @@ fn what_is_missing_is_downloaded_one_after_the_other_and_then_the_search_begins(
     let said = told.so_far();
     assert_eq!(said.len(), 3, "{said:?}");
     let [first, second] = [0, 1].map(|i| said[i].strip_prefix("download ").expect("a download"));
-    assert_eq!(said[2], format!("find by {first} and {second}"), "with what was proposed and nothing else");
+    assert_eq!(said[2], "find");
+    assert_eq!(chosen(&harness), [first, second], "with what was proposed and nothing else");
 }
 
 #[test]
@@ -166,7 +176,6 @@ fn a_download_that_fails_ends_it_and_nothing_else_takes_its_place() {
     click(&mut harness, "Download, then find");
     assert!(told.so_far().iter().all(|s| s.starts_with("download")), "{:?}", told.so_far());
     assert!(harness.state().state.error.is_some());
-    assert!(harness.state().awaited.is_none());
 }
 
 #[test]
@@ -177,5 +186,6 @@ fn built_in_means_need_no_download_and_say_what_they_cannot() {
     click(&mut harness, "Only names that you give");
     assert!(harness.query_by_label_contains("Words find nothing until you name things").is_some());
     click(&mut harness, "Find objects");
-    assert_eq!(told.so_far(), ["find by regions and none"]);
+    assert_eq!(told.so_far(), ["find"]);
+    assert_eq!(chosen(&harness), ["regions", "none"]);
 }
