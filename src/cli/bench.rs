@@ -106,13 +106,10 @@ pub(crate) fn run(args: BenchArgs, quiet: bool) -> Result<(), CliError> {
     let timings = bench::run(&request, &mut console).map_err(|e| CliError::of_work(e, "nothing was printed"))?;
     drop(console);
     if args.json {
-        return output::print_json(&json!(timings));
+        return output::print_json(&timings);
     }
-    let part = |(rows, about): &(Vec<Vec<String>>, String)| match rows.is_empty() {
-        true => about.clone(),
-        false => format!("{}\n{about}", output::table(rows)).trim_end().to_owned(),
-    };
-    output::print(&timings.tables().iter().map(part).collect::<Vec<_>>().join("\n\n"))
+    let gpu = timings.gpu.as_ref().map(|gpu| format!("\n\nGPU: {gpu}")).unwrap_or_default();
+    output::print(&format!("{}{gpu}", output::table(&timings.table())))
 }
 
 /// Measures each scene with its plan and with everything on, each in processes of its own.
