@@ -16,7 +16,8 @@ use crate::scene::MaskGrid;
 ///
 /// Splats and trained scenes are drawn from three views at each size; posed photos are trained on
 /// for a few steps. Products are pairs of a splat and a pixel that it may touch; their rate stands
-/// beside what one core could do at most. Times are medians; compare those of one run only.
+/// beside what one core could do at most. A row is one stage: the number of its values, their median
+/// and 95th percentile. Compare those of one run only.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs bench splat.ply\n  \

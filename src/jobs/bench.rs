@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 use super::select::{self, SelectFor, SelectRequest, SelectStep, Stroke};
 use super::{Folders, JobError, open, plan};
@@ -10,14 +9,11 @@ use crate::io::scene_files::is_scene;
 use crate::io::splat_format::SplatFormat;
 use crate::io::{self, Opened};
 use crate::measure::StudyError;
-use crate::measure::bench::{
-    StageSample, StageValues, Timings, draw, label, masks, moving, one_core, query, train,
-};
+use crate::measure::bench::{StageSample, StageValues, Timings, draw, label, masks, moving, one_core, query, train};
 use crate::measure::plan::{OpenScene, PlanCost, PlanVariant, SIZE, cost};
 use crate::models;
 use crate::pipeline::observer::{Interrupted, Observer, Severity, Silent};
 use crate::pipeline::semantics::network_segmenter::NetworkMasks;
-use crate::pipeline::semantics::timing::ms_since;
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
 use crate::render::{Device, RenderSettings, Renderer};
 use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Mask, MaskGrid, NOBODY, PhotoPixels};
@@ -138,10 +134,9 @@ fn strokes(
             before,
             step: SelectStep::Stroke(Stroke { camera: camera.clone(), pixels, is_plus: k % 3 != 2 }),
         };
-        let start = Instant::now();
-        let selected = select::run(&request, observer)?;
         // The first one makes everything ready.
-        values.add(if k == 0 { "first stroke" } else { "stroke" }, "ms", [ms_since(start)]);
+        let stage = if k == 0 { "first stroke" } else { "stroke" };
+        let selected = values.time(stage, || select::run(&request, observer))?;
         before = Some(Arc::new(if k % 3 == 2 { selected.begun_anew() } else { selected }));
     }
     Ok(values.samples())

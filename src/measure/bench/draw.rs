@@ -79,9 +79,7 @@ fn on_gpu(
         values.add("image as bytes, GPU", "ms", [many(1)?]);
     }
     for _ in 0..repeats {
-        let start = Instant::now();
-        renderer.draw_texture(cloud, camera, settings)?;
-        values.add("image for a window, GPU", "ms", [ms_since(start)]);
+        values.time("image for a window, GPU", || renderer.draw_texture(cloud, camera, settings))?;
     }
     Ok(())
 }
@@ -107,9 +105,7 @@ pub(crate) fn render(
         renderer.draw_rgb8(cloud, &camera, &settings)?;
         for (renderer, stage) in [(&mut renderer, "labels, GPU"), (&mut Renderer::new(), "labels, CPU")] {
             for _ in 0..repeats.min(5) {
-                let start = Instant::now();
-                renderer.label_winners(cloud, (&of, &groups), &camera, &settings)?;
-                values.add(stage, "ms", [ms_since(start)]);
+                values.time(stage, || renderer.label_winners(cloud, (&of, &groups), &camera, &settings))?;
             }
         }
     }

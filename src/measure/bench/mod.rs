@@ -9,6 +9,7 @@ pub(crate) mod query;
 pub mod train;
 
 use std::path::Path;
+use std::time::Instant;
 
 use glam::DVec3;
 use serde::Serialize;
@@ -17,6 +18,7 @@ use super::table::{Rows, rows};
 use crate::math::Real;
 use crate::math::format::number;
 use crate::math::stats::quantile;
+use crate::pipeline::semantics::timing::ms_since;
 use crate::scene::{Bounds, Camera, GaussianCloud};
 
 /// Three cameras around a cloud, at different heights and distances, y downwards.
@@ -77,6 +79,14 @@ impl StageValues {
             self.stages.len() - 1
         });
         self.stages[at].2.extend(values);
+    }
+
+    /// Does some work, and adds its milliseconds.
+    pub(crate) fn time<T>(&mut self, stage: &str, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let done = work();
+        self.add(stage, "ms", [ms_since(start)]);
+        done
     }
 
     /// A sample of each stage.

@@ -7,7 +7,6 @@ use super::super::image_error::{planes, resized};
 use super::{StageSample, StageValues, views_of};
 use crate::math::resize::Filter;
 use crate::math::stats::{mean, psnr_of};
-use crate::pipeline::semantics::timing::ms_since;
 use crate::render::lod::{LodTree, MOVING_SECS, Pace};
 use crate::render::{DrawError, RenderSettings, Renderer};
 use crate::scene::GaussianCloud;
@@ -35,9 +34,7 @@ pub(crate) fn time(
     let mut pace = Pace::default();
     for (view, camera) in views_of(cloud, size[0], size[1]).iter().enumerate() {
         renderer.limit_to(None);
-        let start = Instant::now();
-        let all = planes(&renderer.draw(cloud, camera, &settings)?);
-        values.add("image at rest", "ms", [ms_since(start)]);
+        let all = values.time("image at rest", || renderer.draw(cloud, camera, &settings).map(|f| planes(&f)))?;
         for k in 0..SETTLE + repeats.max(1) {
             let start = Instant::now();
             let smaller = pace.camera(camera);
