@@ -59,15 +59,8 @@ pub fn training_step(
     let mut trainer = GpuTrainer::new(device, cloud, TrainerSettings::default())?;
     let photo = trainer.photo(photo)?;
     // Steps of no length, so that every repetition does the same work.
-    let still = 1e-30;
-    let rates = Rates {
-        position: still,
-        log_scale: still,
-        quaternion: still,
-        opacity_logit: still,
-        sh_constant: still,
-        sh_rest: still,
-    };
+    let r = 1e-30;
+    let rates = Rates { position: r, log_scale: r, quaternion: r, opacity_logit: r, sh_constant: r, sh_rest: r };
     let degree = cloud.sh_degree;
     let woken = Instant::now();
     loop {
