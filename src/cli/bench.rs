@@ -16,7 +16,8 @@ use crate::scene::MaskGrid;
 ///
 /// Splats and trained scenes are drawn from three views at each size; posed photos are trained on
 /// for a few steps. Products are pairs of a splat and a pixel that it may touch; their rate stands
-/// beside what one core could do at most. Times are medians; compare those of one run only.
+/// beside what one core could do at most. A row is one stage: the number of its values, their median
+/// and 95th percentile. Compare those of one run only.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs bench splat.ply\n  \
@@ -106,13 +107,10 @@ pub(crate) fn run(args: BenchArgs, quiet: bool) -> Result<(), CliError> {
     let timings = bench::run(&request, &mut console).map_err(|e| CliError::of_work(e, "nothing was printed"))?;
     drop(console);
     if args.json {
-        return output::print_json(&json!(timings));
+        return output::print_json(&timings);
     }
-    let part = |(rows, about): &(Vec<Vec<String>>, String)| match rows.is_empty() {
-        true => about.clone(),
-        false => format!("{}\n{about}", output::table(rows)).trim_end().to_owned(),
-    };
-    output::print(&timings.tables().iter().map(part).collect::<Vec<_>>().join("\n\n"))
+    let gpu = timings.gpu.as_ref().map(|gpu| format!("\n\nGPU: {gpu}")).unwrap_or_default();
+    output::print(&format!("{}{gpu}", output::table(&timings.table())))
 }
 
 /// Measures each scene with its plan and with everything on, each in processes of its own.

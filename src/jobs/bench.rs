@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::time::Instant;
 
 use super::select::{self, SelectFor, SelectRequest, SelectStep, Stroke};
 use super::{Folders, JobError, open, plan};
@@ -10,20 +9,21 @@ use crate::io::scene_files::is_scene;
 use crate::io::splat_format::SplatFormat;
 use crate::io::{self, Opened};
 use crate::measure::StudyError;
-use crate::measure::bench::strokes::{StrokesTiming, stroke};
-use crate::measure::bench::{self, Timings, cpu, gpu, masks, moving, query};
+use crate::measure::bench::{StageSample, StageValues, Timings, draw, label, masks, moving, one_core, query, train};
 use crate::measure::plan::{OpenScene, PlanCost, PlanVariant, SIZE, cost};
 use crate::models;
 use crate::pipeline::observer::{Interrupted, Observer, Severity, Silent};
 use crate::pipeline::semantics::network_segmenter::NetworkMasks;
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
-use crate::render::{Device, RenderSettings};
-use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, MaskGrid, NOBODY, PhotoPixels};
+use crate::render::{Device, RenderSettings, Renderer};
+use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Mask, MaskGrid, NOBODY, PhotoPixels};
 
 /// Size in px of the queried view.
 const QUERY_SIZE: [usize; 2] = [1_008, 567];
 /// Size in px of the view in which strokes are drawn.
 const STROKES_SIZE: [u32; 2] = [640, 480];
+/// Half of a stroke's width, px.
+const STROKE_RADIUS_PX: usize = 3;
 /// Size in px of the views of a moving camera.
 const MOVING_SIZE: [u32; 2] = [1_008, 567];
 /// Size in px of a synthetic photo.
@@ -58,12 +58,10 @@ pub(crate) fn may_be_photos(path: &Path) -> bool {
 pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result<Timings, JobError> {
     let repeats = request.repeats;
     let device = request.gpu.then(Device::shared).transpose()?;
-    let gpu_name = device.as_ref().map(Device::describe);
-    let one_core_products_per_sec = bench::one_core_limit();
-    let mut timings = Timings { gpu: gpu_name, one_core_products_per_sec, ..Timings::default() };
+    let mut samples = one_core::limit();
     if let Some((count, identities)) = request.queries {
         let mut encoder = models::encoder(models::DEMO)?;
-        timings.queries = Some(query::time(encoder.as_mut(), identities, QUERY_SIZE, count)?);
+        samples.extend(query::time(encoder.as_mut(), identities, QUERY_SIZE, count)?);
     }
     if let Some((model, grid, photo)) = &request.masks {
         observer.note(Severity::Info, format!("Finding everything in a photo with {model}"));
@@ -72,17 +70,14 @@ pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result
         let options = network.options;
         let timed = masks::time(&mut *network.network, &options, &photo, &mut || observer.proceed().is_ok())?;
         observer.proceed()?;
-        timings.masks = Some(timed);
+        samples.extend(timed);
     }
     for path in &request.paths {
-        let name = bench::label(path);
+        let name = label(path);
         let (cloud, cameras) = match io::open(path)? {
             Opened::Dataset(dataset) => {
                 let (config, views) = photos(&dataset, request.max_side_px, observer)?;
-                timings.train.push(cpu::train_steps(&dataset, &views, &config, repeats)?);
-                if let Some(context) = &device {
-                    timings.gpu_train.push(gpu::train_steps(context, &dataset, &views, &config, repeats)?);
-                }
+                samples.extend(train::steps(&dataset, &views, &config, repeats, device.as_ref())?);
                 continue;
             }
             Opened::Cloud(cloud) => (Arc::new(cloud), Vec::new()),
@@ -91,24 +86,24 @@ pub(crate) fn run(request: &BenchRequest, observer: &mut dyn Observer) -> Result
             }
         };
         if let Some(count) = request.strokes {
-            timings.strokes.push(strokes(&name, &cloud, cameras, count, observer)?);
+            samples.extend(strokes(&name, &cloud, cameras, count, observer)?);
         }
         if request.moving {
             observer.note(Severity::Info, format!("Moving in {name}"));
-            timings.moving.push(moving::time(&name, &cloud, MOVING_SIZE, repeats)?);
+            samples.extend(moving::time(&name, &cloud, MOVING_SIZE, repeats)?);
             observer.proceed()?;
             continue;
         }
         for &size in &request.sizes {
             observer.proceed()?;
             observer.note(Severity::Info, format!("Drawing {name} at {} x {}", size[0], size[1]));
-            timings.render.push(cpu::render(&name, &cloud, size, repeats)?);
-            if let Some(context) = &device {
-                timings.gpu_render.push(gpu::render(context, &name, &cloud, size, repeats)?);
+            samples.extend(draw::render(Renderer::new(), &name, &cloud, size, repeats)?);
+            if let Some(device) = &device {
+                samples.extend(draw::render(Renderer::on_gpu(device)?, &name, &cloud, size, repeats)?);
             }
         }
     }
-    Ok(timings)
+    Ok(Timings { gpu: device.as_ref().map(Device::describe), samples })
 }
 
 /// Times selections by strokes in the first view, three strokes each.
@@ -118,12 +113,12 @@ fn strokes(
     cameras: Vec<Camera>,
     count: usize,
     observer: &mut dyn Observer,
-) -> Result<StrokesTiming, JobError> {
+) -> Result<Vec<StageSample>, JobError> {
     observer.note(Severity::Info, format!("Selecting in {name} by strokes"));
     let home = HomeView::new(&cameras, Some(cloud));
     let camera = home.camera(STROKES_SIZE).limited_to(STROKES_SIZE[0]);
     let map = Arc::new(select::empty_map(cloud));
-    let (mut secs, mut before) = (Vec::with_capacity(count + 1), None);
+    let (mut values, mut before) = (StageValues::on_scene(name, cloud.len(), STROKES_SIZE), None);
     for k in 0..=count {
         observer.proceed()?;
         let size = [camera.width_px as usize, camera.height_px as usize];
@@ -139,12 +134,22 @@ fn strokes(
             before,
             step: SelectStep::Stroke(Stroke { camera: camera.clone(), pixels, is_plus: k % 3 != 2 }),
         };
-        let start = Instant::now();
-        let selected = select::run(&request, observer)?;
-        secs.push(start.elapsed().as_secs_f64());
+        // The first one makes everything ready.
+        let stage = if k == 0 { "first stroke" } else { "stroke" };
+        let selected = values.time(stage, || select::run(&request, observer))?;
         before = Some(Arc::new(if k % 3 == 2 { selected.begun_anew() } else { selected }));
     }
-    Ok(StrokesTiming::new(name, cloud.len(), &secs))
+    Ok(values.samples())
+}
+
+/// The stroke number `k` in a view: level lines at changing places and of changing lengths.
+fn stroke(k: usize, [w, h]: [usize; 2]) -> Mask {
+    // Steps of the golden ratio spread evenly.
+    let part = |step: f64| ((k + 1) as f64 * step).fract();
+    let y = ((0.2 + 0.6 * part(0.618_034)) * h as f64) as usize;
+    let x = ((0.2 + 0.5 * part(0.754_878)) * w as f64) as usize;
+    let end = x + ((0.02 + 0.13 * part(0.569_84)) * w as f64) as usize;
+    Mask::from_fn(w, h, |i| (x..=end).contains(&(i % w)) && (i / w).abs_diff(y) <= STROKE_RADIUS_PX)
 }
 
 /// Returns a synthetic photo of squares in many colors.
@@ -198,4 +203,16 @@ fn as_the_window(path: &Path) -> Result<OpenScene, StudyError> {
 /// Name of this machine's GPU, if there is one.
 pub(crate) fn adapter() -> Option<String> {
     Device::shared().ok().map(|device| device.describe())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strokes_lie_inside_and_apart() {
+        let all: Vec<Mask> = (0..50).map(|k| stroke(k, [640, 480])).collect();
+        assert!(all.iter().all(|m| (7 * 12..7 * 100).contains(&m.area())), "{:?}", all[0].area());
+        assert!(all.windows(2).all(|two| two[0].iou(&two[1]) < 0.5));
+    }
 }

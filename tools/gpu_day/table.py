@@ -17,11 +17,14 @@ def read(path):
         return text[-2000:] or None
 
 
-def stages(timing):
-    """Where the time goes: pairs of the GPU, four numbers of the CPU."""
-    told = timing.get("stages_ms") or []
-    pairs = told if told and isinstance(told[0], list) else zip(["project", "sort", "bin", "blend"], told)
-    return ", ".join(f"{name} {ms:.2f}" for name, ms in pairs)
+def stages(samples):
+    """Rows of what `fmlgs bench` measured; the parts of a stage stand beside it."""
+    for whole in samples:
+        if ": " in whole["stage"]:
+            continue
+        mine = [s for s in samples if s["on"] == whole["on"] and s["stage"].startswith(whole["stage"] + ": ")]
+        parts = [f"{s['stage'].split(': ')[1]} {s['median']:.2f}" for s in mine if s["unit"] == "ms"]
+        yield [whole["stage"], whole["on"], f"{whole['median']:.4g} {whole['unit']}", ", ".join(parts)]
 
 
 def rows(steps):
@@ -33,21 +36,7 @@ def rows(steps):
         results = [line for line in steps["kernels"].splitlines() if line.startswith("test result")]
         yield ["tests of kernels", f"{len(results)} files", "; ".join(sorted(set(r.split(".")[0] for r in results))), ""]
     for step in ["images", "steps"]:
-        found = steps.get(step) or {}
-        for where, key in [("GPU", "gpu_render"), ("CPU", "render"), ("GPU", "gpu_train"), ("CPU", "train")]:
-            for t in found.get(key, []):
-                size = "x".join(str(n) for n in t["size"])
-                what = "image" if "render" in key else "training step"
-                on = f"{t['name']}, {t['gaussians']}, {size}"
-                yield [f"{what}, {where}", on, f"{t.get('total_ms', t.get('step_ms')):.2f} ms", stages(t)]
-                if t.get("bytes_ms"):
-                    yield [f"{what} as bytes", on, f"{t['bytes_ms']:.2f} ms", ""]
-                if t.get("staying_ms"):
-                    yield [f"{what} that stays on the GPU", on, f"{t['staying_ms']:.2f} ms", ""]
-                if t.get("texture_ms"):
-                    yield [f"{what} that a window paints", on, f"{t['texture_ms']:.2f} ms", ""]
-                if t.get("labels_ms"):
-                    yield ["what its pixels belong to", on, "{:.2f} ms, on the CPU {:.2f} ms".format(*t["labels_ms"]), ""]
+        yield from stages((steps.get(step) or {}).get("samples", []))
     for name, found in steps.items():
         if not isinstance(found, dict):
             continue

@@ -1,26 +1,24 @@
-//! Timings of drawing, training and queries, stage by stage: what `fmlgs bench` prints. Every number is a median
-//! over repeats in one process; compare only numbers of one run.
+//! Timings of drawing, training and queries, stage by stage: what `fmlgs bench` prints. A stage is measured several
+//! times in one process; compare only numbers of one run.
 
-pub(crate) mod cpu;
-pub mod gpu;
+pub mod draw;
 pub(crate) mod masks;
 pub(crate) mod moving;
+pub(crate) mod one_core;
 pub(crate) mod query;
-pub(crate) mod strokes;
+pub mod train;
 
-pub(crate) use cpu::{label, one_core_limit};
+use std::path::Path;
+use std::time::Instant;
 
 use glam::DVec3;
 use serde::Serialize;
 
-use self::cpu::{RenderTiming, StepTiming};
-use self::gpu::Timing;
-use self::masks::MasksTiming;
-use self::moving::MovingTiming;
-use self::query::QueryTiming;
-use self::strokes::StrokesTiming;
 use super::table::{Rows, rows};
 use crate::math::Real;
+use crate::math::format::number;
+use crate::math::stats::quantile;
+use crate::pipeline::semantics::timing::ms_since;
 use crate::scene::{Bounds, Camera, GaussianCloud};
 
 /// Three cameras around a cloud, at different heights and distances, y downwards.
@@ -36,61 +34,103 @@ pub fn views_of<R: Real>(cloud: &GaussianCloud<R>, width: u32, height: u32) -> V
         .collect()
 }
 
-#[derive(Debug, Default, Serialize)]
+/// A readable name for a path: its last part.
+pub(crate) fn label(path: &Path) -> String {
+    path.file_name().map_or_else(|| path.display().to_string(), |n| n.to_string_lossy().into_owned())
+}
+
+/// A stage on one input, measured several times.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct StageSample {
+    /// Name of the stage; a part of it is called "stage: part".
+    pub stage: String,
+    /// The input: a scene with its size, a network.
+    pub on: String,
+    /// Unit of the values; empty for plain numbers.
+    pub unit: &'static str,
+    /// Median of the values.
+    pub median: f64,
+    /// Their 95th percentile.
+    pub p95: f64,
+    /// Number of values.
+    pub n: usize,
+}
+
+/// Values of stages on one input, in the order of each stage's first.
+#[derive(Debug)]
+pub struct StageValues {
+    on: String,
+    stages: Vec<(String, &'static str, Vec<f64>)>,
+}
+
+impl StageValues {
+    /// No values yet on an input.
+    pub fn new(on: String) -> Self {
+        Self { on, stages: Vec::new() }
+    }
+
+    pub(crate) fn on_scene(name: &str, gaussians: usize, [width, height]: [u32; 2]) -> Self {
+        Self::new(format!("{name}, {gaussians} Gaussians, {width}x{height}"))
+    }
+
+    pub(crate) fn add(&mut self, stage: &str, unit: &'static str, values: impl IntoIterator<Item = f64>) {
+        let at = self.stages.iter().position(|known| known.0 == stage).unwrap_or_else(|| {
+            self.stages.push((stage.to_owned(), unit, Vec::new()));
+            self.stages.len() - 1
+        });
+        self.stages[at].2.extend(values);
+    }
+
+    /// Does some work, and adds its milliseconds.
+    pub(crate) fn time<T>(&mut self, stage: &str, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let done = work();
+        self.add(stage, "ms", [ms_since(start)]);
+        done
+    }
+
+    /// A sample of each stage.
+    pub fn samples(self) -> Vec<StageSample> {
+        let Self { on, stages } = self;
+        let sample = |(stage, unit, values): (String, &'static str, Vec<f64>)| {
+            let [median, p95] = [0.5, 0.95].map(|q| quantile(&values, q));
+            StageSample { stage, on: on.clone(), unit, median, p95, n: values.len() }
+        };
+        stages.into_iter().map(sample).collect()
+    }
+}
+
+#[derive(Debug, Serialize)]
 pub(crate) struct Timings {
-    pub(crate) render: Vec<RenderTiming>,
-    pub(crate) train: Vec<StepTiming>,
     /// Name and features of the GPU, if it was asked for.
     pub(crate) gpu: Option<String>,
-    pub(crate) gpu_render: Vec<Timing>,
-    pub(crate) gpu_train: Vec<Timing>,
-    /// Limit of one core (see [`one_core_limit`]).
-    pub(crate) one_core_products_per_sec: f64,
-    /// Typed queries, if they were asked for.
-    pub(crate) queries: Option<QueryTiming>,
-    /// Masks of everything in a photo, if they were asked for.
-    pub(crate) masks: Option<MasksTiming>,
-    /// Selecting by strokes, if it was asked for.
-    pub(crate) strokes: Vec<StrokesTiming>,
-    /// Moving among many Gaussians, if it was asked for.
-    pub(crate) moving: Vec<MovingTiming>,
+    pub(crate) samples: Vec<StageSample>,
 }
 
 impl Timings {
-    /// A table of each kind, with a line about it.
-    pub(crate) fn tables(&self) -> Vec<(Rows, String)> {
-        let size = |[w, h]: [u32; 2]| format!("{w}x{h}");
-        let mut all: Vec<(Rows, String)> = self.queries.iter().map(QueryTiming::table).collect();
-        all.extend(self.masks.iter().map(MasksTiming::table));
-        let head = ["drawing, CPU", "Gaussians", "size", "ms", "project", "sort", "bin", "blend", "products", "per s"];
-        let drawn = self.render.iter().map(|t| {
-            let mut row = vec![t.name.clone(), t.gaussians.to_string(), size(t.size), format!("{:.1}", t.total_ms)];
-            row.extend(t.stages_ms.iter().map(|ms| format!("{ms:.1}")));
-            row.extend([format!("{:.1e}", t.products), format!("{:.2e}", t.products_per_sec)]);
-            row
-        });
-        all.push((rows(&head, drawn), String::new()));
-        let head = ["training step, CPU", "Gaussians", "size", "ms", "steps per s"];
-        let trained = self.train.iter().map(|t| {
-            let speed = [format!("{:.1}", t.step_ms), format!("{:.2}", t.steps_per_sec)];
-            [vec![t.name.clone(), t.gaussians.to_string(), size(t.size)], speed.to_vec()].concat()
-        });
-        all.push((rows(&head, trained), String::new()));
-        for (what, timings) in [("drawing, GPU", &self.gpu_render), ("training step, GPU", &self.gpu_train)] {
-            let head = [what, "Gaussians", "size", "ms", "stages, ms"];
-            let timed = timings.iter().map(|t| {
-                let stages: Vec<String> = t.stages_ms.iter().map(|(name, ms)| format!("{name} {ms:.2}")).collect();
-                let row = [t.name.clone(), t.gaussians.to_string(), size(t.size), format!("{:.2}", t.total_ms)];
-                [row.to_vec(), vec![stages.join(", ")]].concat()
-            });
-            all.push((rows(&head, timed), String::new()));
-        }
-        all.push((StrokesTiming::table(&self.strokes), String::new()));
-        all.push((MovingTiming::table(&self.moving), String::new()));
-        all.retain(|(rows, _)| rows.len() > 1);
-        let limit = format!("one core at most: {:.2e} products per s", self.one_core_products_per_sec);
-        all.extend(self.gpu.iter().map(|gpu| (Rows::new(), format!("GPU: {gpu}"))));
-        all.push((Rows::new(), limit));
-        all
+    pub(crate) fn table(&self) -> Rows {
+        let row = |s: &StageSample| {
+            let [median, p95] = [s.median, s.p95].map(number);
+            vec![s.stage.clone(), s.on.clone(), s.n.to_string(), median, p95, s.unit.to_owned()]
+        };
+        rows(&["stage", "on", "n", "median", "p95", "unit"], self.samples.iter().map(row))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_of_a_stage_become_one_row() {
+        let mut values = StageValues::on_scene("a", 5, [4, 3]);
+        values.add("whole", "ms", [3.0, 2.0]);
+        values.add("whole: part", "ms", [0.5]);
+        values.add("whole", "ms", [4.0]);
+        let timings = Timings { gpu: None, samples: values.samples() };
+        let cells: Vec<String> = timings.table().iter().map(|row| row.join(" | ")).collect();
+        assert_eq!(cells[1], "whole | a, 5 Gaussians, 4x3 | 3 | 3.000 | 3.900 | ms");
+        assert_eq!(cells[2], "whole: part | a, 5 Gaussians, 4x3 | 1 | 0.5000 | 0.5000 | ms");
+        assert_eq!((cells.len(), cells[0].as_str()), (3, "stage | on | n | median | p95 | unit"));
     }
 }

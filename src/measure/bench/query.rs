@@ -5,10 +5,8 @@ use std::time::Instant;
 use rand::seq::IndexedRandom;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
-use serde::Serialize;
 
-use super::super::table::{Rows, rows};
-use crate::math::stats::quantile;
+use super::{StageSample, StageValues};
 use crate::math::vector::unit;
 use crate::models::{Encoder, ModelError};
 use crate::pipeline::semantics::by_embedding::TextEmbeddings;
@@ -16,72 +14,29 @@ use crate::pipeline::semantics::codes::{self, TOLERANCE};
 use crate::pipeline::semantics::matching;
 use crate::pipeline::semantics::query_engine::ask_by_embedding;
 use crate::pipeline::semantics::recipe::Recipe;
-use crate::pipeline::semantics::timing::{Stages, StagesMs, ms_since};
+use crate::pipeline::semantics::timing::{STAGES, StagesMs, ms_since};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::language::MAX_VIEWS;
 use crate::scene::{Identities, IdentityId, LanguageFeatures, Level, NOBODY, ViewFeatures};
-
-/// Median and 95th percentile, ms.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub(crate) struct Percentiles {
-    pub(crate) p50_ms: f64,
-    pub(crate) p95_ms: f64,
-}
-
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub(crate) struct QueryTiming {
-    pub(crate) encoder: String,
-    pub(crate) identities: usize,
-    /// Size of the view, px.
-    pub(crate) size: [usize; 2],
-    pub(crate) queries: usize,
-    /// Each stage; what is drawn is the heat map.
-    #[serde(flatten)]
-    pub(crate) stages: Stages<Percentiles>,
-    pub(crate) without_encoding: Percentiles,
-    pub(crate) whole: Percentiles,
-}
-
-impl QueryTiming {
-    /// A row for each stage, and what was asked.
-    pub(super) fn table(&self) -> (Rows, String) {
-        let stages = [
-            ("text encoding", self.stages.encode),
-            ("relevancy", self.stages.relevancy),
-            ("localization", self.stages.localize),
-            ("mask", self.stages.mask),
-            ("heat map", self.stages.draw),
-            ("without text encoding", self.without_encoding),
-            ("whole", self.whole),
-        ];
-        let row =
-            |(name, p): (&str, Percentiles)| vec![name.into(), format!("{:.3}", p.p50_ms), format!("{:.3}", p.p95_ms)];
-        let [w, h] = self.size;
-        let what = format!(
-            "{} queries, {} identities, {w} x {h} px, encoder '{}'",
-            self.queries, self.identities, self.encoder
-        );
-        (rows(&["query stage", "p50 ms", "p95 ms"], stages.into_iter().map(row)), what)
-    }
-}
 
 const COLORS: [&str; 6] = ["red", "blue", "green", "yellow", "white", "black"];
 const THINGS: [&str; 8] = ["controller", "mug", "kettle", "lamp", "camera", "book", "car", "jar"];
 const PARTS: [&str; 6] = ["button", "handle", "lid", "shade", "lens", "wheel"];
 
 /// Asks `queries` questions of a view of `size` px with `identities` objects and parts. Every text is
-/// another one, so none is encoded already.
+/// another one, so none is encoded already. The heat map is drawn.
 pub(crate) fn time(
     encoder: &mut dyn Encoder,
     identities: usize,
     size: [usize; 2],
     queries: usize,
-) -> Result<QueryTiming, ModelError> {
+) -> Result<Vec<StageSample>, ModelError> {
     let mut rng = Pcg64Mcg::seed_from_u64(1);
     let all = scene(identities);
     let features = features(&mut rng, &all, encoder);
     let map = view(&mut rng, identities, size);
-    let mut each: Vec<StagesMs> = Vec::with_capacity(queries);
+    let [w, h] = size;
+    let mut values = StageValues::new(format!("{identities} identities, {w}x{h}, encoder '{}'", encoder.name()));
     // Canonical phrases are encoded when a scene opens, once.
     let mut canonical = TextEmbeddings::default();
     let recipe = Recipe::default();
@@ -104,21 +59,14 @@ pub(crate) fn time(
         let heat = answered.heat(&map);
         let draw = ms_since(start);
         std::hint::black_box((pixels, heat));
-        each.push(StagesMs { mask, draw, ..answered.stages });
+        let stages = StagesMs { mask, draw, ..answered.stages };
+        values.add("query", "ms", [stages.whole()]);
+        values.add("query: without encoding", "ms", [stages.whole() - stages.encode]);
+        for (name, ms) in STAGES.into_iter().zip(stages.values()) {
+            values.add(&format!("query: {name}"), "ms", [ms]);
+        }
     }
-    let percentiles = |of: &dyn Fn(&StagesMs) -> f64| {
-        let ms: Vec<f64> = each.iter().map(of).collect();
-        Percentiles { p50_ms: quantile(&ms, 0.5), p95_ms: quantile(&ms, 0.95) }
-    };
-    Ok(QueryTiming {
-        encoder: encoder.name().into(),
-        identities,
-        size,
-        queries: each.len(),
-        stages: Stages::of(std::array::from_fn(|k| percentiles(&|s| s.values()[k]))),
-        without_encoding: percentiles(&|s| s.whole() - s.encode),
-        whole: percentiles(&StagesMs::whole),
-    })
+    Ok(values.samples())
 }
 
 fn scene(identities: usize) -> Identities {

@@ -4,40 +4,35 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-/// One value for each stage of a query: times, or percentiles of them.
+/// Milliseconds of each stage of a query.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub(crate) struct Stages<T> {
+pub(crate) struct StagesMs {
     /// Encoding of the text.
-    pub(crate) encode: T,
+    pub(crate) encode: f64,
     /// Scoring of identities for its phrases.
-    pub(crate) relevancy: T,
+    pub(crate) relevancy: f64,
     /// Choice of the identities of the answer.
-    pub(crate) localize: T,
+    pub(crate) localize: f64,
     /// Search for their pixels in the view.
-    pub(crate) mask: T,
+    pub(crate) mask: f64,
     /// Rendering of mask and relevancy as a picture.
-    pub(crate) draw: T,
+    pub(crate) draw: f64,
 }
 
 /// Names of the stages, in their order.
 pub(crate) const STAGES: [&str; 5] = ["encode", "relevancy", "localize", "mask", "draw"];
 
-/// Milliseconds of one query.
-pub(crate) type StagesMs = Stages<f64>;
-
-impl<T: Copy> Stages<T> {
+impl StagesMs {
     /// Values in the order of [`STAGES`].
-    pub(crate) fn values(&self) -> [T; 5] {
+    pub(crate) fn values(&self) -> [f64; 5] {
         [self.encode, self.relevancy, self.localize, self.mask, self.draw]
     }
 
     /// Creates the stages from these values.
-    pub(crate) fn of([encode, relevancy, localize, mask, draw]: [T; 5]) -> Self {
+    pub(crate) fn of([encode, relevancy, localize, mask, draw]: [f64; 5]) -> Self {
         Self { encode, relevancy, localize, mask, draw }
     }
-}
 
-impl StagesMs {
     pub(crate) fn whole(&self) -> f64 {
         self.values().iter().sum()
     }
