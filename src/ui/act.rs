@@ -20,7 +20,6 @@ use crate::navigate::FRAMES;
 use crate::navigate::target::ViewPreference;
 use crate::pipeline::semantics::edit::Edit;
 use crate::scene::IdentityId;
-use crate::scene::plan::When;
 use crate::ui::actions::{Action, Pane};
 use crate::worker::{Command, JobId};
 
@@ -235,18 +234,6 @@ impl App {
     fn step_in_time(&mut self, pictures: f64, ctx: &egui::Context) {
         if let Some(pose) = self.camera.step(pictures) {
             self.viewport.stand(&pose, &self.state, ctx.input(|i| i.time));
-        }
-    }
-
-    /// Explores the free space of a scene once, if the plan asks for it in advance.
-    pub(super) fn explore(&mut self) {
-        let wanted = self.state.plan.navigation == When::Always && self.state.explored.is_none();
-        if !wanted || self.explored_for == self.state.scene_number {
-            return;
-        }
-        if let Some(SceneContext { cloud, cameras, up, .. }) = self.context() {
-            self.explored_for = self.state.scene_number;
-            self.submit(Command::Explore { cloud: Arc::clone(&cloud), cameras, up });
         }
     }
 

@@ -38,7 +38,7 @@ impl ObjectThumbnails {
             *self = Self::default();
             return;
         };
-        let wanted = state.plan.thumbnails.now(self.used.take());
+        let wanted = self.used.take();
         if wanted && self.asked.as_ref().is_none_or(|a| !Arc::ptr_eq(a, map)) && map.identity_of.len() == cloud.len() {
             let command = Command::Thumbnails {
                 cloud: Arc::clone(cloud),
