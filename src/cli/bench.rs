@@ -63,7 +63,7 @@ pub(crate) struct BenchArgs {
     /// Time moving by levels of detail, at 1008 x 567 px, and compare its pictures with those of all Gaussians
     #[arg(long, conflicts_with_all = ["gpu", "size"])]
     moving: bool,
-    /// Compare each scene's plan with everything enabled, each in processes of its own
+    /// Compare each scene's plan with feature maps, encoder and levels at opening, each in processes of its own
     #[arg(long, conflicts_with_all = ["queries", "masks", "strokes", "gpu", "size"])]
     plan: bool,
     /// Processes for each of the two
@@ -81,7 +81,7 @@ pub(crate) fn run(args: BenchArgs, quiet: bool) -> Result<(), CliError> {
     if let (Some(variant), Some(scene)) = (args.variant, args.paths.first()) {
         // As the window has it.
         process::settle();
-        return output::print_json(&bench::cost_of(scene, variant, args.repeats as usize)?);
+        return output::print_json(&bench::cost_of(scene, variant)?);
     }
     if args.plan {
         return savings(&args);
@@ -123,34 +123,25 @@ fn savings(args: &BenchArgs) -> Result<(), CliError> {
         let mut costs = [Vec::new(), Vec::new()];
         for _ in 0..args.runs {
             for (costs, variant) in costs.iter_mut().zip(["plan", "everything"]) {
-                costs.push(child(scene, variant, args.repeats)?);
+                costs.push(child(scene, variant)?);
             }
         }
-        if let [Some(plan), Some(everything)] = costs.map(|c| PlanCost::median(&c)) {
-            scenes.push(Saving::new(scene, plan, everything));
-        }
+        let [plan, everything] = costs.map(|c| PlanCost::median(&c));
+        scenes.push(Saving::new(scene, plan, everything));
     }
-    let adapter = bench::adapter();
     if args.json {
-        let document = json!({ "size_px": SIZE, "runs": args.runs, "adapter": adapter, "scenes": scenes });
-        return output::print_json(&document);
+        return output::print_json(&json!({ "size_px": SIZE, "runs": args.runs, "scenes": scenes }));
     }
-    let disks: Vec<String> = scenes.iter().map(Saving::on_disk).collect();
-    output::print(&format!(
-        "{}\n\n{}\n\nImages of {} x {} px; memory beyond the process before it read anything; buffers counted on: {}",
-        output::table(&table(&scenes)),
-        disks.join("\n"),
-        SIZE[0],
-        SIZE[1],
-        adapter.as_deref().unwrap_or("none, so no GPU memory is given")
-    ))
+    let [width, height] = SIZE;
+    let about = format!("Images of {width} x {height} px; memory beyond the process before it read anything");
+    output::print(&format!("{}\n\n{about}", output::table(&table(&scenes))))
 }
 
 /// Runs `fmlgs bench --variant` in a process of its own, and returns its measurements.
-fn child(scene: &Path, variant: &str, repeats: u32) -> Result<PlanCost, CliError> {
+fn child(scene: &Path, variant: &str) -> Result<PlanCost, CliError> {
     let program = std::env::current_exe().map_err(|e| CliError::failed(format!("the program's own path: {e}")))?;
     let mut process = Process::new(program);
-    process.args(["bench", "--variant", variant, "--repeats", &repeats.to_string()]).arg(scene);
+    process.args(["bench", "--variant", variant]).arg(scene);
     let done = process.output();
     let done = done.map_err(|e| CliError::failed(format!("a process for {}: {e}", scene.display())))?;
     if !done.status.success() {

@@ -180,8 +180,8 @@ fn photos(
 }
 
 /// Measures the cost to this process of opening and drawing a scene as the window does.
-pub(crate) fn cost_of(scene: &Path, variant: PlanVariant, repeats: usize) -> Result<PlanCost, JobError> {
-    Ok(cost(|| as_the_window(scene), variant, repeats)?)
+pub(crate) fn cost_of(scene: &Path, variant: PlanVariant) -> Result<PlanCost, JobError> {
+    Ok(cost(|| as_the_window(scene), variant)?)
 }
 
 /// Opens a scene as the window does, with the window's first view.
@@ -190,12 +190,6 @@ fn as_the_window(path: &Path) -> Result<OpenScene, StudyError> {
     let scene = opened.map_err(|e| StudyError(e.to_string()))?;
     let cloud = scene.cloud.clone().ok_or_else(|| StudyError("there is nothing to draw".into()))?;
     let first = scene.home.camera(SIZE).with_size(SIZE[0], SIZE[1]);
-    let cameras = scene.dataset.as_ref().map(|d| d.cameras()).unwrap_or_default();
     let (settings, map) = (scene.render.clone(), scene.semantics.clone());
-    Ok(OpenScene { cloud, settings, map, cameras, up: scene.home.up, first, facts: scene.facts.clone() })
-}
-
-/// Name of this machine's GPU, if there is one.
-pub(crate) fn adapter() -> Option<String> {
-    Device::shared().ok().map(|device| device.describe())
+    Ok(OpenScene { cloud, settings, map, first, facts: scene.facts.clone() })
 }

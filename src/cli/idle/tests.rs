@@ -272,7 +272,7 @@ const LINES: &[(&str, &[&str], &str)] = &[
         "batch j.toml --retry-failed --takeover-secs 9",
     ),
     ("bench s {}", &["--runs 2", "--identities 5", "--mask-grid all", "--photo f"], "bench s --plan --runs 2"),
-    ("bench s --plan {}", &["--max-side 64"], "bench s --max-side 64"),
+    ("bench s --plan {}", &["--max-side 64", "--repeats 2"], "bench s --max-side 64 --repeats 2"),
     ("bench --queries 5 {}", &["--size 64x48", "--max-side 64", "--gpu"], "bench --queries 5 --identities 9"),
     ("models fetch m {}", &["--json"], "models check --json"),
     ("models add m f {}", &["--json"], "models --json"),
