@@ -320,7 +320,6 @@ fn options_that_do_nothing_are_refused_by_name() {
         "\"from\"",
         "\"cameras\"",
         "[\"distortion_weight\"]",
-        "[\"runs\"]",
         "[\"identities\"]",
         "[\"mask_grid\", \"photo\"]",
     ];
