@@ -1,14 +1,12 @@
 //! `fmlgs bench`: how long drawing and training take on this machine, stage by stage.
 
-use std::path::{Path, PathBuf};
-use std::process::Command as Process;
+use std::path::PathBuf;
 
 use serde_json::json;
 
 use super::progress::Console;
-use super::{CliError, number, output, process, view};
+use super::{CliError, number, output, view};
 use crate::jobs::bench::{self, BenchRequest};
-use crate::measure::plan::{PlanCost, PlanVariant, SIZE, Saving, table};
 use crate::pipeline::train::TrainConfig;
 use crate::scene::MaskGrid;
 
@@ -25,7 +23,6 @@ use crate::scene::MaskGrid;
     fmlgs bench --masks mobile-sam --photo photo.jpg\n  \
     fmlgs bench --strokes 60 scene/ splat.ply\n  \
     fmlgs bench --moving splat.ply\n  \
-    fmlgs bench --plan scene/ splat.ply\n  \
     fmlgs bench splats/*.ply photos/ --size 640x480 --size 1280x720 --max-side 504 --gpu --json")]
 pub(crate) struct BenchArgs {
     /// Splats or trained scenes to draw, posed photos to train on
@@ -64,29 +61,12 @@ pub(crate) struct BenchArgs {
     /// Time moving by levels of detail, at 1008 x 567 px, and compare its pictures with those of all Gaussians
     #[arg(long, conflicts_with_all = ["gpu", "size"])]
     moving: bool,
-    /// Compare each scene's plan with everything enabled, each in processes of its own
-    #[arg(long, conflicts_with_all = ["queries", "masks", "strokes", "gpu", "size"])]
-    plan: bool,
-    /// Processes for each of the two
-    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=100), requires = "plan")]
-    runs: u32,
-    /// Measure one of the two in this process
-    #[arg(long, value_enum, hide = true, conflicts_with = "plan")]
-    variant: Option<PlanVariant>,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
 }
 
 pub(crate) fn run(args: BenchArgs, quiet: bool) -> Result<(), CliError> {
-    if let (Some(variant), Some(scene)) = (args.variant, args.paths.first()) {
-        // As the window has it.
-        process::settle();
-        return output::print_json(&bench::cost_of(scene, variant, args.repeats as usize)?);
-    }
-    if args.plan {
-        return savings(&args);
-    }
     if args.max_side.is_some() && !args.paths.iter().any(|path| bench::may_be_photos(path)) {
         let text =
             "--max-side has no effect here: splats and trained scenes are drawn (--size), posed photos trained on";
@@ -111,49 +91,4 @@ pub(crate) fn run(args: BenchArgs, quiet: bool) -> Result<(), CliError> {
     }
     let gpu = timings.gpu.as_ref().map(|gpu| format!("\n\nGPU: {gpu}")).unwrap_or_default();
     output::print(&format!("{}{gpu}", output::table(&timings.table())))
-}
-
-/// Measures each scene with its plan and with everything on, each in processes of its own.
-fn savings(args: &BenchArgs) -> Result<(), CliError> {
-    let mut scenes = Vec::new();
-    for scene in &args.paths {
-        // In turns, so that what else the machine does meets both alike.
-        let mut costs = [Vec::new(), Vec::new()];
-        for _ in 0..args.runs {
-            for (costs, variant) in costs.iter_mut().zip(["plan", "everything"]) {
-                costs.push(child(scene, variant, args.repeats)?);
-            }
-        }
-        if let [Some(plan), Some(everything)] = costs.map(|c| PlanCost::median(&c)) {
-            scenes.push(Saving::new(scene, plan, everything));
-        }
-    }
-    let adapter = bench::adapter();
-    if args.json {
-        let document = json!({ "size_px": SIZE, "runs": args.runs, "adapter": adapter, "scenes": scenes });
-        return output::print_json(&document);
-    }
-    let disks: Vec<String> = scenes.iter().map(Saving::on_disk).collect();
-    output::print(&format!(
-        "{}\n\n{}\n\nImages of {} x {} px; memory beyond the process before it read anything; buffers counted on: {}",
-        output::table(&table(&scenes)),
-        disks.join("\n"),
-        SIZE[0],
-        SIZE[1],
-        adapter.as_deref().unwrap_or("none, so no GPU memory is given")
-    ))
-}
-
-/// Runs `fmlgs bench --variant` in a process of its own, and returns its measurements.
-fn child(scene: &Path, variant: &str, repeats: u32) -> Result<PlanCost, CliError> {
-    let program = std::env::current_exe().map_err(|e| CliError::failed(format!("the program's own path: {e}")))?;
-    let mut process = Process::new(program);
-    process.args(["bench", "--variant", variant, "--repeats", &repeats.to_string()]).arg(scene);
-    let done = process.output();
-    let done = done.map_err(|e| CliError::failed(format!("a process for {}: {e}", scene.display())))?;
-    if !done.status.success() {
-        let why = String::from_utf8_lossy(&done.stderr);
-        return Err(CliError::failed(format!("{}: {}", scene.display(), why.trim())));
-    }
-    Ok(serde_json::from_slice(&done.stdout)?)
 }

@@ -14,7 +14,7 @@ use crate::io::trained::CLOUD_FILE;
 use crate::jobs::open::{self, Contents};
 use crate::jobs::{Scene, plan};
 use crate::pipeline::train::TrainConfig;
-use crate::scene::{Bounds, Dataset, ScenePlan, SemanticMap};
+use crate::scene::{Bounds, Dataset, PlanLine, ScenePlan, SemanticMap};
 
 /// Say what a folder or file holds, and the plan for it
 ///
@@ -23,7 +23,7 @@ use crate::scene::{Bounds, Dataset, ScenePlan, SemanticMap};
 /// this machine, why, and what that saves.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  fmlgs info photos/\n  fmlgs info scene.ply --json | jq .gaussians\n  \
-    fmlgs info scene/ --plan color=full --plan feature-maps=always")]
+    fmlgs info photos/ --plan photos=full")]
 pub(crate) struct InfoArgs {
     /// Dataset folder, transforms.json, splat file or trained scene
     path: PathBuf,
@@ -92,8 +92,8 @@ fn text(path: &Path, facts: &Facts, plan: &ScenePlan) -> String {
     for line in &plan.lines {
         let word = if line.overridden { "costs" } else { "saves" };
         let saving = if line.saving.is_empty() { String::new() } else { format!(" ({word} {})", line.saving) };
-        let id = line.item.id();
-        out.push_str(&format!("  {:<16} {id:<11} {}: {}{saving}\n", line.subject, line.choice, line.reason));
+        let PlanLine { subject, item, choice, reason, .. } = line;
+        out.push_str(&format!("  {subject:<16} {item:<12} {choice}: {reason}{saving}\n"));
     }
     out.trim_end().to_owned()
 }

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use serde_json::{Value, json};
 
-use super::plan::PlanArgs;
 use super::progress::Console;
 use super::scene_args::open_scene;
 use super::{CliError, number, output, table_args};
@@ -90,8 +89,6 @@ pub(crate) struct PreprocessArgs {
     /// 'none' [default: the best that is here]
     #[arg(long)]
     encoder: Option<String>,
-    #[command(flatten)]
-    plan: PlanArgs,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -100,7 +97,7 @@ pub(crate) struct PreprocessArgs {
 /// The table `[objects]` of a batch.
 pub(super) fn of_table(table: &toml::Table) -> Result<FindSettings, String> {
     let args: PreprocessArgs =
-        table_args::parse("preprocess", table, &["scene"], &["masks", "photos", "add", "replace-all", "plan", "json"])?;
+        table_args::parse("preprocess", table, &["scene"], &["masks", "photos", "add", "replace-all", "json"])?;
     match args.segmenter.as_deref() {
         Some("files") => Err("'segmenter': leave it out: the masks of a scene are used where it has some".into()),
         _ => Ok(args.settings()),
@@ -158,7 +155,7 @@ pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
         holdout_every: scene.config.holdout_every,
         masks: args.masks.clone(),
         known,
-        side_px: plan::of_scene(&scene, &args.plan.overrides()).object_side_px,
+        side_px: plan::of_scene(&scene).object_side_px,
         with: args.settings(),
     };
     let done = find_objects::run(&request, scene.state.as_deref(), &mut observer);

@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use serde_json::json;
 
-use super::plan::PlanArgs;
 use super::progress::Console;
 use super::scene_args::AxesArgs;
 use super::{CliError, number, output, view};
@@ -73,8 +72,6 @@ pub(crate) struct RenderArgs {
     backend: BackendChoice,
     #[command(flatten)]
     axes: AxesArgs,
-    #[command(flatten)]
-    plan: PlanArgs,
     /// Print one JSON document about what was drawn
     #[arg(long)]
     json: bool,
@@ -111,8 +108,7 @@ pub(crate) fn run(args: RenderArgs, quiet: bool) -> Result<(), CliError> {
         return video(&args, &path, quiet);
     }
     let (scene, camera) = args.check()?;
-    let overrides = args.plan.overrides();
-    let drawn = render::run(&scene, &camera, args.what, args.backend, &overrides, &mut Console::new(quiet))?;
+    let drawn = render::run(&scene, &camera, args.what, args.backend, &mut Console::new(quiet))?;
     let far = render::write(&args.out, &drawn.frame, &camera, args.what)?;
     let (size, millis) = ([camera.width_px, camera.height_px], drawn.millis);
     if args.json {
@@ -154,8 +150,7 @@ fn video(args: &RenderArgs, path: &Path, quiet: bool) -> Result<(), CliError> {
     } else {
         export::check(&args.out, &[], &reads)?;
     }
-    let plan = plan::of_scene(&scene, &args.plan.overrides());
-    let draw = RenderSettings { sh_degree: plan.sh_degree, ..scene.settings.clone() };
+    let draw = RenderSettings { sh_degree: plan::of_scene(&scene).sh_degree, ..scene.settings.clone() };
     let fps = args.fps.unwrap_or(keys.fps);
     let [width, height] = args.size.unwrap_or_else(|| {
         let limit = args.max_side.unwrap_or(1280);
@@ -176,8 +171,7 @@ fn video(args: &RenderArgs, path: &Path, quiet: bool) -> Result<(), CliError> {
         }
         None => None,
     };
-    let backend = video::backend(args.backend, &draw, plan.on_cpu);
-    let (cloud, out) = (Arc::clone(&scene.cloud), args.out.clone());
+    let (cloud, out, backend) = (Arc::clone(&scene.cloud), args.out.clone(), args.backend);
     let request = VideoRequest { cloud, draw, cameras, marked, out, settings, backend };
     let Video { summary, backend, secs } =
         video::run(request, &mut Console::new(quiet)).map_err(|e| CliError::of_work(e, "no video was written"))?;

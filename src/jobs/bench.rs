@@ -1,18 +1,17 @@
-//! Times of drawing, training and queries on this machine, and the costs of opening a scene as the window does.
+//! Times of drawing, training and queries on this machine.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use super::JobError;
 use super::select::{self, SelectFor, SelectRequest, SelectStep, Stroke};
-use super::{Folders, JobError, open, plan};
 use crate::io::scene_files::is_scene;
 use crate::io::splat_format::SplatFormat;
 use crate::io::{self, Opened};
 use crate::measure::StudyError;
 use crate::measure::bench::{StageSample, StageValues, Timings, draw, label, masks, moving, one_core, query, train};
-use crate::measure::plan::{OpenScene, PlanCost, PlanVariant, SIZE, cost};
 use crate::models;
-use crate::pipeline::observer::{Interrupted, Observer, Severity, Silent};
+use crate::pipeline::observer::{Interrupted, Observer, Severity};
 use crate::pipeline::semantics::network_segmenter::NetworkMasks;
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
 use crate::render::{Device, RenderSettings, Renderer};
@@ -183,28 +182,6 @@ fn photos(
     observer.note(Severity::Info, format!("Training on {}", dataset.name));
     Ok((config, views))
 }
-
-/// Measures the cost to this process of opening and drawing a scene as the window does.
-pub(crate) fn cost_of(scene: &Path, variant: PlanVariant, repeats: usize) -> Result<PlanCost, JobError> {
-    Ok(cost(|| as_the_window(scene), variant, repeats)?)
-}
-
-/// Opens a scene as the window does, with the window's first view.
-fn as_the_window(path: &Path) -> Result<OpenScene, StudyError> {
-    let opened = open::open(path, &Folders::of_user(), &plan::machine(), &mut Silent);
-    let scene = opened.map_err(|e| StudyError(e.to_string()))?;
-    let cloud = scene.cloud.clone().ok_or_else(|| StudyError("there is nothing to draw".into()))?;
-    let first = scene.home.camera(SIZE).with_size(SIZE[0], SIZE[1]);
-    let cameras = scene.dataset.as_ref().map(|d| d.cameras()).unwrap_or_default();
-    let (settings, map) = (scene.render.clone(), scene.semantics.clone());
-    Ok(OpenScene { cloud, settings, map, cameras, up: scene.home.up, first, facts: scene.facts.clone() })
-}
-
-/// Name of this machine's GPU, if there is one.
-pub(crate) fn adapter() -> Option<String> {
-    Device::shared().ok().map(|device| device.describe())
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -40,19 +40,14 @@ pub(crate) fn scene_facts(machine: &Machine, scene: &Scene, config: &TrainConfig
     facts.with_cloud(&scene.cloud, scene.sh_stored, &cameras)
 }
 
-/// Returns the plan for drawing a scene; nothing in it depends on the machine.
-pub(crate) fn of_scene(scene: &Scene, overrides: &Overrides) -> ScenePlan {
-    ScenePlan::new(scene_facts(&Machine::default(), scene, &scene.config), overrides)
+/// Returns the automatic plan for drawing a scene; nothing in it depends on the machine.
+pub(crate) fn of_scene(scene: &Scene) -> ScenePlan {
+    ScenePlan::new(scene_facts(&Machine::default(), scene, &scene.config), &Overrides::default())
 }
 
 /// Returns the settings of training on photos, with its plan applied.
 pub(crate) fn planned(dataset: &Dataset, config: TrainConfig, overrides: &Overrides) -> TrainConfig {
-    let plan = of_photos(dataset, &config, overrides);
+    let plan = ScenePlan::new(facts(&Machine::default(), Some(dataset), None, &config), overrides);
     let backend = if plan.on_cpu { BackendChoice::Cpu } else { config.backend };
     TrainConfig { max_side_px: plan.train_side_px, backend, ..config }
-}
-
-/// Returns the plan for training on photos; nothing in it depends on the machine.
-pub(crate) fn of_photos(dataset: &Dataset, config: &TrainConfig, overrides: &Overrides) -> ScenePlan {
-    ScenePlan::new(facts(&Machine::default(), Some(dataset), None, config), overrides)
 }

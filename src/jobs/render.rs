@@ -10,7 +10,7 @@ use super::{JobError, Scene, export, plan, video};
 use crate::io::{IoError, camera_file, memory};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::render::{BackendChoice, Frame, RenderSettings, Renderer, normals};
-use crate::scene::{Camera, GaussianCloud, Overrides};
+use crate::scene::{Camera, GaussianCloud};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Quantity {
@@ -53,13 +53,11 @@ pub(crate) fn run(
     camera: &Camera,
     what: Quantity,
     wanted: BackendChoice,
-    overrides: &Overrides,
     observer: &mut dyn Observer,
 ) -> Result<Rendered, JobError> {
-    let plan = plan::of_scene(scene, overrides);
     let depth = matches!(what, Quantity::Depth | Quantity::ExpectedDepth | Quantity::Normals);
-    let settings = RenderSettings { depth, sh_degree: plan.sh_degree, ..scene.settings.clone() };
-    let choice = video::backend(wanted, &settings, plan.on_cpu);
+    let settings = RenderSettings { depth, sh_degree: plan::of_scene(scene).sh_degree, ..scene.settings.clone() };
+    let choice = video::backend(wanted, &settings);
     let mut renderer = Renderer::choose(choice, |why| observer.note(Severity::Warning, why))?;
     let flat = settings.surfels && renderer.is_gpu();
     let start = Instant::now();

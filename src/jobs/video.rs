@@ -35,11 +35,10 @@ pub(crate) struct Video {
     pub(crate) secs: f64,
 }
 
-/// Returns the renderer for these settings. Only the CPU draws surfels as such, so they get the CPU, as does a plan
-/// that wants it, unless the user demands another.
-pub(crate) fn backend(wanted: BackendChoice, settings: &RenderSettings, on_cpu: bool) -> BackendChoice {
-    let cpu = (settings.surfels || on_cpu) && wanted == BackendChoice::Auto;
-    if cpu { BackendChoice::Cpu } else { wanted }
+/// Returns the renderer for these settings. Only the CPU draws surfels as such, so they get the CPU, unless the user
+/// demands another.
+pub(crate) fn backend(wanted: BackendChoice, settings: &RenderSettings) -> BackendChoice {
+    if settings.surfels && wanted == BackendChoice::Auto { BackendChoice::Cpu } else { wanted }
 }
 
 /// Draws a video.
@@ -50,7 +49,7 @@ pub(crate) fn backend(wanted: BackendChoice, settings: &RenderSettings, on_cpu: 
 pub(crate) fn run(request: VideoRequest, observer: &mut dyn Observer) -> Result<Video, JobError> {
     let VideoRequest { cloud, draw, cameras, marked, out, settings, backend } = request;
     let marked = marked.as_ref().map(|(map, ids)| Marked { map, ids, color: MARK });
-    let choice = self::backend(backend, &draw, false);
+    let choice = self::backend(backend, &draw);
     let mut renderer = Renderer::choose(choice, |why| observer.note(Severity::Warning, why))?;
     let start = Instant::now();
     export::make_parent(&out)?;

@@ -4,9 +4,9 @@
 //! [`document`] is what a report holds, [`mod@file`] reads and writes it; [`studies`] measure the stages of the program,
 //! [`subject`] opens those that a scene allows, [`sweep`] goes through their settings; [`front`] says which are worth
 //! having, [`order`] how errors fall, [`compare`] what another report has of the same. [`mod@bench`] times drawing,
-//! training and queries, [`plan`] what a scene's plan saves, [`survey`] how well flights do; [`stability`] is the
-//! catalog of extreme cases. [`table`], [`plot`] and [`page`] show all of it, by [`look`], [`axis`], [`axes`] and
-//! [`labels`], as the window's pane does; [`defaults`] justifies the program's defaults.
+//! training and queries, [`survey`] how well flights do; [`stability`] is the catalog of extreme cases. [`table`],
+//! [`plot`] and [`page`] show all of it, by [`look`], [`axis`], [`axes`] and [`labels`], as the window's pane does;
+//! [`defaults`] justifies the program's defaults.
 
 pub(crate) mod axes;
 pub(crate) mod axis;
@@ -24,7 +24,6 @@ pub(crate) mod labels;
 pub(crate) mod look;
 mod order;
 pub mod page;
-pub(crate) mod plan;
 pub(crate) mod plot;
 pub(crate) mod stability;
 pub(crate) mod studies;

@@ -54,22 +54,19 @@ impl ViewLane {
         let (mut mapper, mut mapped_before) = (Renderer::new(), false);
         let work = move || {
             let mut renderer: Option<ViewRenderer> = None;
-            let (mut patience, mut gives_back) = (None, false);
+            let mut patience = None;
             loop {
                 let request = match next(&box_, patience.take()) {
                     Waited::Request(request) => request,
                     Waited::InVain => {
                         renderer.iter_mut().for_each(|p| p.levels.build());
-                        if gives_back {
-                            renderer.iter_mut().for_each(|p| p.renderer.rest());
-                            mapper = Renderer::new();
-                        }
+                        renderer.iter_mut().for_each(|p| p.renderer.rest());
+                        mapper = Renderer::new();
                         continue;
                     }
                     Waited::Closed => return,
                 };
-                gives_back = request.skip.buffers;
-                patience = (gives_back || !request.skip.levels).then_some(REST);
+                patience = Some(REST);
                 // Looking for a GPU takes a moment; on this thread nothing waits for it.
                 let renderer = match renderer.take().filter(|p| p.without_gpu == request.skip.gpu) {
                     Some(known) => renderer.insert(known),
@@ -248,7 +245,7 @@ mod tests {
                 semantics: Some(Arc::new(map.clone())),
                 follow: false,
                 codes: true,
-                skip: SkipPasses { depth: false, parts: false, gpu: true, buffers: false, levels: true },
+                skip: SkipPasses { parts: false, gpu: true, levels: true },
                 on_device: false,
                 timed: false,
                 ticket,

@@ -190,7 +190,7 @@ impl ViewRenderer {
 
     fn try_render(&mut self, request: &ViewRequest, camera: &Camera) -> Result<Painting, Failure> {
         let shows_depth = [Some(request.mode), request.second].contains(&Some(ViewMode::Depth));
-        let depth = request.budget == QualityBudget::Full || shows_depth || !request.skip.depth;
+        let depth = request.budget == QualityBudget::Full || shows_depth;
         let settings = RenderSettings { depth, ..request.settings.clone() };
         let (renderer, cloud) = (&mut self.renderer, &request.cloud);
         // Of a moving view colors are enough, of which there is less to copy from a GPU.
@@ -291,7 +291,7 @@ mod tests {
             semantics: None,
             follow: false,
             codes: false,
-            skip: SkipPasses { depth: true, parts: true, gpu: false, buffers: false, levels: true },
+            skip: SkipPasses { parts: true, gpu: false, levels: true },
             on_device: true,
             timed: false,
             ticket: 1,

@@ -9,7 +9,6 @@ use super::failure::Failure;
 use super::view_modes::ViewMode;
 use crate::render::lod::MOVING_SECS;
 use crate::render::{DevicePicture, GpuError, RenderSettings, Renderer, StageTimes};
-use crate::scene::plan::When;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels, ScenePlan, SemanticMap};
 
 /// Request to draw a view.
@@ -50,12 +49,8 @@ pub struct ViewRequest {
 /// Passes that the scene's plan skips.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SkipPasses {
-    /// Depth of frames that no points are picked from.
-    pub(crate) depth: bool,
     pub(crate) parts: bool,
     pub(crate) gpu: bool,
-    /// Working memory, while the camera rests.
-    pub(crate) buffers: bool,
     /// Levels of detail.
     pub(crate) levels: bool,
 }
@@ -63,13 +58,7 @@ pub struct SkipPasses {
 impl SkipPasses {
     /// Passes that `plan` leaves out.
     pub fn of(plan: &ScenePlan) -> Self {
-        Self {
-            depth: plan.depth != When::Always,
-            parts: !plan.parts,
-            gpu: plan.on_cpu,
-            buffers: plan.buffers != When::Always,
-            levels: !plan.levels,
-        }
+        Self { parts: !plan.parts, gpu: plan.on_cpu, levels: !plan.levels }
     }
 }
 

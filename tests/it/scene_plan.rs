@@ -14,7 +14,7 @@ use fmlgs::pipeline::semantics::matching;
 use fmlgs::pipeline::semantics::view_map::ViewMap;
 use fmlgs::render::gpu::cloud::Packed;
 use fmlgs::render::{BackendChoice, Features, Frame, RenderSettings, Renderer};
-use fmlgs::scene::plan::{Item, NOISE_FLOOR, PlanOverride, When};
+use fmlgs::scene::plan::{NOISE_FLOOR, When};
 use fmlgs::scene::resource_log::{self, ResourceKind};
 use fmlgs::scene::{
     Camera, GaussianCloud, Identities, Level, Limits, Machine, NOBODY, Overrides, SceneFacts, ScenePlan, SemanticMap,
@@ -60,10 +60,13 @@ fn objects(cloud: &GaussianCloud, with_part: bool) -> SemanticMap {
     SemanticMap::from_identities(all, of, vec![1.0; cloud.len()], vec![])
 }
 
-fn plan(cloud: &GaussianCloud, map: Option<&SemanticMap>, cameras: &[Camera], overrides: &Overrides) -> ScenePlan {
-    let facts =
-        SceneFacts::of(Machine::default(), LIMITS).with_photos(cameras).with_cloud(cloud, cloud.sh_degree, cameras);
-    ScenePlan::new(facts.with_semantics(map), overrides)
+fn facts(cloud: &GaussianCloud, map: Option<&SemanticMap>, cameras: &[Camera]) -> SceneFacts {
+    let facts = SceneFacts::of(Machine::default(), LIMITS).with_photos(cameras);
+    facts.with_cloud(cloud, cloud.sh_degree, cameras).with_semantics(map)
+}
+
+fn plan(cloud: &GaussianCloud, map: Option<&SemanticMap>, cameras: &[Camera]) -> ScenePlan {
+    ScenePlan::new(facts(cloud, map, cameras), &Overrides::default())
 }
 
 fn draw(cloud: &GaussianCloud, camera: &Camera, sh_degree: u8) -> Frame<f32> {
@@ -79,7 +82,7 @@ fn worst(a: &Frame<f32>, b: &Frame<f32>) -> f64 {
 #[test]
 fn a_diffuse_scene_is_drawn_without_its_bands() {
     let (diffuse, shiny) = (ball(400, -2.5, 2e-4), ball(400, -2.5, 0.2));
-    let degree = |cloud: &GaussianCloud| plan(cloud, None, &[], &Overrides::default()).sh_degree;
+    let degree = |cloud: &GaussianCloud| plan(cloud, None, &[]).sh_degree;
     let view = camera(160);
     let (full, planned) = (draw(&diffuse, &view, 3), draw(&diffuse, &view, degree(&diffuse)));
     assert!(worst(&full, &planned) < NOISE_FLOOR, "{}", worst(&full, &planned));
@@ -100,7 +103,7 @@ fn objects_without_parts_are_matched_with_half_the_channels() {
     };
     let mask = |map: &SemanticMap, codes: &CodeMap, id| matching::blend(codes, &map.identities, id, 0.2);
     let whole = objects(&cloud, false);
-    let planned = plan(&cloud, Some(&whole), &[], &Overrides::default());
+    let planned = plan(&cloud, Some(&whole), &[]);
     assert!(!planned.parts);
     let (all, half) = (codes(&whole, true), codes(&whole, planned.parts));
     for id in [1, 2] {
@@ -111,7 +114,7 @@ fn objects_without_parts_are_matched_with_half_the_channels() {
     assert_eq!(values(&all), 2 * values(&half));
     // The control: with a part the level is there, and without it the part would not be found.
     let parted = objects(&cloud, true);
-    assert!(plan(&cloud, Some(&parted), &[], &Overrides::default()).parts);
+    assert!(plan(&cloud, Some(&parted), &[]).parts);
     assert!(!mask(&parted, &codes(&parted, true), 3).is_empty());
     assert!(mask(&parted, &codes(&parted, false), 3).is_empty());
 }
@@ -132,7 +135,7 @@ fn a_far_larger_photo_than_the_gaussians_resolve_is_looked_at_smaller() {
     let photo = camera(1_600);
     let side = |cloud: &GaussianCloud| {
         let map = objects(cloud, false);
-        plan(cloud, Some(&map), std::slice::from_ref(&photo), &Overrides::default()).object_side_px
+        plan(cloud, Some(&map), std::slice::from_ref(&photo)).object_side_px
     };
     let maps = |cloud: &GaussianCloud, side_px: u32| {
         let (map, view) = (objects(cloud, false), photo.limited_to(side_px));
@@ -194,14 +197,13 @@ fn maps_and_depth_are_drawn_only_where_the_plan_says_so() {
     let cloud = ball(200, -2.5, 0.0);
     let map = objects(&cloud, true);
     let of = |map: Option<&SemanticMap>, overrides: &Overrides, budget| {
-        looked_at(&cloud, map, &plan(&cloud, map, &[camera(160)], overrides), budget)
+        looked_at(&cloud, map, &ScenePlan::new(facts(&cloud, map, &[camera(160)]), overrides), budget)
     };
     let (auto, all) = (Overrides::default(), Overrides::everything());
     assert_eq!(of(None, &all, QualityBudget::Full), [true, false], "no semantics, no maps");
     assert_eq!(of(Some(&map), &auto, QualityBudget::Full), [true, false], "nobody has asked");
     assert_eq!(of(Some(&map), &all, QualityBudget::Full), [true, true], "the control: always wanted");
     assert_eq!(of(None, &auto, QualityBudget::Moving), [false, false], "the eye moves");
-    assert_eq!(of(None, &all, QualityBudget::Moving), [true, false], "the control: always wanted");
 }
 
 #[test]
@@ -277,13 +279,4 @@ fn rounding_stored_features_keeps_cosines() {
     };
     assert!(worst(0) < 1e-3, "{}", worst(0));
     assert!(worst(4) > 1e-3, "the control: four bits are too few");
-}
-
-#[test]
-fn overrides_on_the_command_line_are_those_of_the_plan() {
-    let cloud = ball(50, -2.5, 2e-4);
-    let one: PlanOverride = "color=full".parse().expect("an override");
-    let planned = plan(&cloud, None, &[], &[one].into_iter().collect());
-    assert_eq!(planned.sh_degree, 3);
-    assert!(planned.line(Item::Color).is_some_and(|l| l.overridden));
 }

@@ -189,8 +189,6 @@ pub(super) const RULES: &[Rule] = &[
     rule(&["batch"], &["retry_failed", "takeover_secs"], |g| {
         when(g.has("dry_run"), "with --dry-run, which runs nothing")
     }),
-    rule(&["bench"], &["runs"], |g| when(!g.has("plan"), "without --plan")),
-    rule(&["bench"], &["max_side"], |g| when(g.has("plan"), "with --plan, which trains on nothing")),
     rule(&["bench"], &["identities"], |g| when(!g.has("queries"), "without --queries")),
     rule(&["bench"], &["mask_grid", "photo"], |g| when(!g.has("masks"), "without --masks")),
     rule(&["bench"], &["size", "max_side", "gpu"], |g| when(!g.has("paths"), "without scenes, splats or photos")),

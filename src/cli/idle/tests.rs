@@ -271,8 +271,7 @@ const LINES: &[(&str, &[&str], &str)] = &[
         &["--retry-failed", "--takeover-secs 9"],
         "batch j.toml --retry-failed --takeover-secs 9",
     ),
-    ("bench s {}", &["--runs 2", "--identities 5", "--mask-grid all", "--photo f"], "bench s --plan --runs 2"),
-    ("bench s --plan {}", &["--max-side 64"], "bench s --max-side 64"),
+    ("bench s {}", &["--identities 5", "--mask-grid all", "--photo f"], "bench s --queries 5 --identities 5"),
     ("bench --queries 5 {}", &["--size 64x48", "--max-side 64", "--gpu"], "bench --queries 5 --identities 9"),
     ("models fetch m {}", &["--json"], "models check --json"),
     ("models add m f {}", &["--json"], "models --json"),
@@ -321,7 +320,6 @@ fn options_that_do_nothing_are_refused_by_name() {
         "\"from\"",
         "\"cameras\"",
         "[\"distortion_weight\"]",
-        "[\"runs\"]",
         "[\"identities\"]",
         "[\"mask_grid\", \"photo\"]",
     ];

@@ -194,7 +194,6 @@ fn objects(
     if let Some(before) = before.filter(|b| b.state.is_some() && b.state == scene.state) {
         return Ok((before.objects, before.secs));
     }
-    let overrides = &request.batch.settings[unit.setting].train.plan;
     let find = FindRequest {
         folder: folder.into(),
         cloud: Arc::clone(&scene.cloud),
@@ -203,7 +202,7 @@ fn objects(
         holdout_every: scene.config.holdout_every,
         masks: unit.scene(&request.batch).masks.clone().filter(|_| with.segmenter.is_none()),
         known: None,
-        side_px: plan::of_scene(&scene, overrides).object_side_px,
+        side_px: plan::of_scene(&scene).object_side_px,
         with: with.clone(),
     };
     let done = find_objects::run(&find, scene.state.as_deref(), observer)?;

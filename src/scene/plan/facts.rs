@@ -2,14 +2,14 @@
 
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use crate::math::rotation::matrix_from_quaternion;
 use crate::math::{Real, sh};
 use crate::scene::{Camera, Dataset, GaussianCloud, LanguageFeatures, Level, SemanticMap};
 
 /// Resources of the machine that a plan depends on.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Machine {
     /// Memory that programs may still use, in bytes.
     pub(crate) free_memory_bytes: u64,
@@ -22,7 +22,7 @@ pub struct Machine {
 }
 
 /// Settings of the user that a plan starts from.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Limits {
     /// Longer side of training pictures at most, px.
     pub train_side_px: u32,
@@ -35,7 +35,7 @@ pub struct Limits {
 }
 
 /// The Gaussians of a scene.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct CloudFacts {
     pub(crate) gaussians: usize,
     /// Degree of the spherical harmonics in the file.
@@ -50,7 +50,7 @@ pub struct CloudFacts {
 }
 
 /// The photos of a scene.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct PhotoFacts {
     pub(crate) photos: usize,
     /// Photos that the dataset marks as test.
@@ -65,7 +65,7 @@ pub struct PhotoFacts {
 }
 
 /// Objects and parts of a scene.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct SemanticFacts {
     pub(crate) objects: usize,
     pub(crate) parts: usize,
@@ -75,7 +75,7 @@ pub struct SemanticFacts {
 }
 
 /// All that a plan depends on.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct SceneFacts {
     /// The Gaussians, if they are a result.
     pub(crate) cloud: Option<CloudFacts>,

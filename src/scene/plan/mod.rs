@@ -9,7 +9,7 @@ mod lines;
 #[cfg(test)]
 mod tests;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 pub use facts::{
     CloudFacts, Limits, Machine, NOISE_FLOOR, PhotoFacts, SceneFacts, SemanticFacts, resolved_side_px, used_degree,
@@ -18,7 +18,7 @@ pub use facts::{
 pub use item::{Item, Overrides, PlanOverride};
 
 /// Time at which something is made or loaded.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum When {
     /// Never: nothing in the scene can need it.
@@ -42,23 +42,24 @@ impl When {
 }
 
 /// One decision about a scene, for the user.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct PlanLine {
-    pub(crate) item: Item,
-    /// Its name: "Color", "Feature maps", ...
-    pub(crate) subject: String,
+    /// Its stable name: "color", "feature-maps", ...
+    pub(crate) item: &'static str,
+    /// Its name for the user: "Color", "Feature maps", ...
+    pub(crate) subject: &'static str,
     pub(crate) choice: String,
     pub(crate) reason: String,
     /// Saving, or the cost if the user overrides it; empty for nothing.
     pub(crate) saving: String,
-    /// Alternative for the user, if it makes a difference.
-    pub(crate) alternative: Option<String>,
+    /// Item that the user may override, if that makes a difference.
+    pub(crate) overridable: Option<Item>,
     /// True if the user chose the alternative.
     pub overridden: bool,
 }
 
 /// The decisions for a scene.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct ScenePlan {
     pub(crate) facts: SceneFacts,
     pub(crate) overrides: Overrides,
@@ -68,25 +69,16 @@ pub struct ScenePlan {
     pub maps: When,
     /// True if these maps have a level for parts.
     pub parts: bool,
-    pub(crate) thumbnails: When,
     /// Time at which the text encoder is loaded.
     pub(crate) encoder: When,
-    pub(crate) navigation: When,
-    /// Time at which depth is drawn: at use, or with every picture.
-    pub(crate) depth: When,
     /// Longer side of the images to train on, px.
     pub(crate) train_side_px: u32,
     /// Interval of held-out photos; 0 = none.
     pub(crate) holdout_every: usize,
     /// Longer side of the images in which objects are searched for, px.
     pub object_side_px: u32,
-    /// Most Gaussians that training may use on this machine.
-    pub(crate) max_gaussians: usize,
     /// True if the CPU is to draw even on a machine with a GPU.
     pub(crate) on_cpu: bool,
-    /// Time at which the window is drawn: on change, or continuously.
-    pub(crate) redraw: When,
-    pub(crate) buffers: When,
     /// True if levels of detail are built, for moving cameras.
     pub(crate) levels: bool,
     pub(crate) lines: Vec<PlanLine>,
@@ -95,41 +87,25 @@ pub struct ScenePlan {
 impl ScenePlan {
     /// Plan for these facts and the user's overrides.
     pub fn new(facts: SceneFacts, overrides: &Overrides) -> Self {
-        let wants = |item: Item| overrides.has(item);
-        let when = |there: bool, item: Item| match (there, wants(item)) {
+        let when = |needed: bool, item: Item| match (needed, overrides.has(item)) {
             (false, _) => When::Never,
             (true, false) => When::Used,
             (true, true) => When::Always,
         };
-        let semantics = facts.semantics.as_ref();
-        let limits = facts.limits;
-        let cameras = facts.photos.as_ref().map_or(0, |p| p.photos);
-        let longest = facts.photos.as_ref().map_or(0, |p| p.longest_px);
+        let (limits, semantics, photos) = (facts.limits, facts.semantics.as_ref(), facts.photos.as_ref());
         let resolved = facts.cloud.as_ref().and_then(|c| c.resolved_side_px).unwrap_or(u32::MAX);
+        let full_side = photos.filter(|_| overrides.has(Item::Photos)).map_or(0, |p| p.longest_px);
+        let on_cpu = overrides.has(Item::Backend);
         let mut plan = Self {
-            sh_degree: match &facts.cloud {
-                Some(c) if wants(Item::Color) => c.sh_used,
-                Some(c) => c.sh_visible,
-                None => limits.sh_degree,
-            },
+            sh_degree: facts.cloud.as_ref().map_or(limits.sh_degree, |c| c.sh_visible),
             maps: when(semantics.is_some(), Item::FeatureMaps),
-            parts: semantics.is_some_and(|s| s.parts > 0 || wants(Item::Parts)),
-            thumbnails: when(semantics.is_some(), Item::Thumbnails),
+            parts: semantics.is_some_and(|s| s.parts > 0),
             encoder: when(semantics.is_some_and(|s| s.encoder.is_some()), Item::Encoder),
-            navigation: when(semantics.is_some() && cameras > 0, Item::Navigation),
-            depth: when(true, Item::Depth),
-            train_side_px: if wants(Item::Photos) { longest.max(limits.train_side_px) } else { limits.train_side_px },
-            holdout_every: holdout(cameras, limits.holdout_every),
-            object_side_px: if wants(Item::Objects) {
-                limits.object_side_px
-            } else {
-                limits.object_side_px.min(resolved.max(LEAST_SIDE_PX))
-            },
-            max_gaussians: facts.machine.max_gaussians,
-            on_cpu: wants(Item::Backend),
-            redraw: when(true, Item::Redraw),
-            buffers: when(true, Item::Buffers),
-            levels: facts.is_large(wants(Item::Backend)) || wants(Item::Levels),
+            train_side_px: limits.train_side_px.max(full_side),
+            holdout_every: holdout(photos.map_or(0, |p| p.photos), limits.holdout_every),
+            object_side_px: limits.object_side_px.min(resolved.max(LEAST_SIDE_PX)),
+            on_cpu,
+            levels: facts.is_large(on_cpu) || overrides.has(Item::Levels),
             overrides: overrides.clone(),
             facts,
             lines: Vec::new(),
@@ -138,8 +114,8 @@ impl ScenePlan {
         plan
     }
 
-    /// Line about an item.
-    pub fn line(&self, item: Item) -> Option<&PlanLine> {
+    /// Line about an item, by its stable name.
+    pub fn line(&self, item: &str) -> Option<&PlanLine> {
         self.lines.iter().find(|l| l.item == item)
     }
 }

@@ -1,5 +1,7 @@
 //! Decisions by facts, each beside a scene that needs the part left out.
 
+use std::collections::BTreeSet;
+
 use glam::DVec3;
 use strum::VariantArray;
 
@@ -96,22 +98,23 @@ fn what_the_gaussians_resolve_follows_their_size_and_not_the_photos() {
 fn a_scene_that_needs_everything_has_everything() {
     let p = plan(|facts| facts);
     assert_eq!((p.sh_degree, p.parts, p.holdout_every), (2, true, 8));
-    assert_eq!([p.maps, p.thumbnails, p.encoder, p.navigation], [When::Used; 4]);
+    assert_eq!([p.maps, p.encoder], [When::Used; 2]);
     assert!(p.lines.iter().all(|l| !l.reason.is_empty() && !l.choice.is_empty()));
-    let line = |item: Item| p.line(item).expect("a line");
-    assert_eq!(line(Item::Photos).choice, "500 x 250 px");
-    assert_eq!(line(Item::Photos).saving, "10 MB");
-    assert_eq!(line(Item::Gaussians).choice, "at most 1,234,567");
-    assert_eq!(p.lines.len(), Item::VARIANTS.len());
+    let line = |item: &str| p.line(item).expect("a line");
+    assert_eq!((line("photos").choice.as_str(), line("photos").saving.as_str()), ("500 x 250 px", "10 MB"));
+    assert_eq!(line("gaussians").choice, "at most 1,234,567");
+    assert_eq!(line("navigation").choice, "at the first flight");
+    assert_eq!(p.lines.iter().map(|l| l.item).collect::<BTreeSet<_>>().len(), 16, "each is told once");
 }
 
 #[test]
 fn without_semantics_nothing_is_kept_for_them() {
     let p = plan(|facts| facts.with_semantics(None));
-    assert_eq!([p.maps, p.thumbnails, p.encoder, p.navigation], [When::Never; 4]);
+    assert_eq!([p.maps, p.encoder], [When::Never; 2]);
+    assert!(p.line("navigation").expect("said").choice == "off" && p.line("thumbnails").is_none());
     let all = ScenePlan::new(p.facts, &Overrides::everything());
     assert_eq!(all.maps, When::Never, "nobody can want maps of nothing");
-    assert!(!all.line(Item::FeatureMaps).expect("said").overridden);
+    assert!(!all.line("feature-maps").expect("said").overridden);
 }
 
 #[test]
@@ -125,9 +128,9 @@ fn objects_without_parts_or_looks_have_no_level_and_no_encoder_for_them() {
 #[test]
 fn a_finished_splat_has_nothing_to_train_or_to_fly_between() {
     let p = plan(|facts| SceneFacts { photos: None, ..facts });
-    assert_eq!((p.navigation, p.holdout_every), (When::Never, 0));
-    assert_eq!(p.line(Item::Photos).expect("said").choice, "none");
-    assert!([Item::Holdout, Item::Objects, Item::Gaussians].iter().all(|i| p.line(*i).is_none()));
+    assert_eq!(p.holdout_every, 0);
+    assert_eq!(["navigation", "photos"].map(|i| p.line(i).expect("said").choice.as_str()), ["off", "none"]);
+    assert!(["holdout", "objects", "gaussians"].iter().all(|i| p.line(i).is_none()));
 }
 
 #[test]
@@ -144,20 +147,23 @@ fn a_single_photo_is_trained_on() {
 
 #[test]
 fn a_person_can_have_it_otherwise_and_is_told_what_it_costs() {
-    let faint = colored(0.2, 1e-4);
-    let facts = plan(|facts| facts.with_cloud(&faint, 3, &[camera(4_000)])).facts;
-    let auto = ScenePlan::new(facts.clone(), &Overrides::default());
-    let all = ScenePlan::new(facts, &Overrides::everything());
-    assert_eq!((auto.sh_degree, all.sh_degree), (1, 2));
-    assert_eq!((auto.maps, all.maps, all.navigation), (When::Used, When::Always, When::Always));
-    assert!(auto.train_side_px < all.train_side_px && auto.object_side_px < all.object_side_px);
-    for item in [Item::Color, Item::FeatureMaps, Item::Photos, Item::Objects, Item::Redraw] {
-        let (before, after) = (auto.line(item).expect("said"), all.line(item).expect("said"));
-        assert!(!before.overridden && after.overridden, "{item}");
-        assert_eq!(Some(after.choice.as_str()), item.alternative());
-        assert!(!after.saving.is_empty() && after.reason.starts_with("Set by the user"), "{item}");
+    let gpu =
+        |facts: SceneFacts| SceneFacts { machine: Machine { gpu: Some("a GPU".into()), ..facts.machine }, ..facts };
+    let auto = plan(gpu);
+    let every = Overrides::from_iter(Item::VARIANTS.iter().map(|&item| PlanOverride { item, instead: true }));
+    let all = ScenePlan::new(auto.facts.clone(), &every);
+    assert_eq!([auto.maps, auto.encoder, all.maps, all.encoder], [When::Used, When::Used, When::Always, When::Always]);
+    assert_eq!(((auto.on_cpu, auto.levels), (all.on_cpu, all.levels)), ((false, false), (true, true)));
+    assert_eq!((auto.train_side_px, all.train_side_px), (500, 1_000));
+    assert_eq!((auto.sh_degree, auto.object_side_px), (all.sh_degree, all.object_side_px), "nobody can choose these");
+    let overridden = all.lines.iter().filter_map(|line| Some((line, line.overridable?)));
+    assert_eq!(overridden.clone().count(), Item::VARIANTS.len());
+    for (line, item) in overridden {
+        assert_eq!((line.item, line.choice.as_str(), line.overridden), (item.id(), item.alternative(), true));
+        let before = auto.line(line.item).expect("said");
+        assert!(!before.overridden && before.saving == line.saving, "{item:?}");
+        assert!(line.reason.starts_with("Set by the user. Automatic choice: "), "{item:?}");
     }
-    assert!(all.line(Item::Parts).is_some_and(|l| l.alternative.is_none()), "there are parts anyway");
 }
 
 #[test]
@@ -169,33 +175,33 @@ fn other_settings_of_a_person_change_the_plan() {
 #[test]
 fn lines_say_what_is_left_out_and_how_much_that_is() {
     let p = plan(|facts| facts.with_cloud(&colored(0.2, 1e-4), 3, &[camera(4_000)]));
-    let line = |p: &ScenePlan, item: Item| {
+    let line = |p: &ScenePlan, item: &str| {
         let l = p.line(item).expect("said").clone();
         (l.choice, l.reason, l.saving)
     };
     // Three bands are stored, the third is zero, the second too faint: 9 - 4 coefficients of 12 bytes are read.
-    let (choice, _, saving) = line(&p, Item::Color);
+    let (choice, _, saving) = line(&p, "color");
     assert_eq!((choice.as_str(), saving), ("SH degree 1 of 3", format!("{} read for every frame", bytes(60))));
     // Only zero bands: they leave memory, 16 - 9 coefficients.
     let zero = plan(|facts| facts.with_cloud(&colored(0.2, 0.1), 3, &[camera(4_000)]));
-    assert_eq!(line(&zero, Item::Color).2, format!("{} of memory", bytes(84)));
+    assert_eq!(line(&zero, "color").2, format!("{} of memory", bytes(84)));
     let training = plan(|facts| SceneFacts { cloud: None, ..facts });
-    assert_eq!(line(&training, Item::Color).2, "15 of 16 coefficients at the start");
+    assert_eq!(line(&training, "color").2, "15 of 16 coefficients at the start");
     let all = ScenePlan::new(p.facts.clone(), &Overrides::everything());
-    let (auto, wanted) = (line(&p, Item::Photos).1, line(&all, Item::Photos).1);
+    let (auto, wanted) = (line(&p, "photos").1, line(&all, "photos").1);
     assert!(auto.starts_with("Training is"), "{auto}");
     assert_eq!(wanted, format!("Set by the user. Automatic choice: {auto}"));
     let none = plan(|facts| facts.with_semantics(Some(&objects(false, false))));
-    assert_eq!(line(&none, Item::Parts).0, "off");
-    assert_eq!(line(&none, Item::Parts).2, "3 of 6 channels of blended codes");
-    assert_eq!(line(&p, Item::Parts).0, "on");
-    assert_eq!(line(&p, Item::Thumbnails).2, "2 renderings at opening");
+    assert_eq!(line(&none, "parts").0, "off");
+    assert_eq!(line(&none, "parts").2, "3 of 6 channels of blended codes");
+    assert_eq!(line(&p, "parts").0, "on");
+    assert_eq!(line(&p, "thumbnails").2, "2 renderings at opening");
     let lost = plan(|facts| SceneFacts { photos: None, ..facts });
-    assert!(line(&lost, Item::Navigation).1.contains("no reachable viewpoint"));
+    assert!(line(&lost, "navigation").1.contains("no reachable viewpoint"));
     // The narrower Gaussians resolve a share of the pixels; the rest is saved.
     let coarse = plan(|facts| facts.with_cloud(&blobs(40, -2.0), 3, &[camera(1_000)]));
     let share = 1.0 - (f64::from(coarse.object_side_px) / 1_000.0).powi(2);
-    assert_eq!(line(&coarse, Item::Objects).2, format!("{:.0} % of the pixels of every view", 100.0 * share));
+    assert_eq!(line(&coarse, "objects").2, format!("{:.0} % of the pixels of every view", 100.0 * share));
     assert_eq!(
         [When::Never, When::Used, When::Always].map(|w| [w.now(false), w.now(true)]),
         [[false, false], [false, true], [true, true]]
@@ -210,13 +216,13 @@ fn levels_of_detail_are_for_more_gaussians_than_a_cpu_draws_in_time() {
         let facts = SceneFacts { cloud: Some(cloud), machine, limits: limits(), ..SceneFacts::default() };
         let overrides = overrides.split_whitespace().map(|o| o.parse().expect("an override")).collect();
         let plan = ScenePlan::new(facts, &overrides);
-        let line = plan.line(Item::Levels).expect("a line").clone();
+        let line = plan.line("levels").expect("a line").clone();
         (plan.levels, line)
     };
     let (levels, line) = of(99_999, false, "");
     assert!(!levels && line.choice == "off" && line.saving.contains("4 MB"), "{line:?}");
     let (levels, line) = of(100_000, false, "");
-    assert!(levels && line.choice == "while the camera moves" && line.alternative.is_none(), "{line:?}");
+    assert!(levels && line.choice == "while the camera moves" && line.overridable.is_none(), "{line:?}");
     assert!(!of(100_000, true, "").0, "a GPU draws them");
     assert!(of(100_000, true, "backend=cpu").0, "but not where it is not to be used");
     assert!(of(10, false, "levels=always").0);

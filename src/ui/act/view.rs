@@ -11,7 +11,6 @@ use crate::jobs::go_to::{self, ApproachRequest, Approached};
 use crate::navigate::FRAMES;
 use crate::navigate::target::{Side, ViewPreference};
 use crate::pipeline::observer::Observer;
-use crate::scene::plan::When;
 use crate::scene::{CropBox, Identities, IdentityId, NOBODY, SemanticMap};
 use crate::ui::actions::Pane;
 use crate::ui::app::App;
@@ -239,25 +238,6 @@ fn begin_flight(app: &mut App, Approached { name, flight, problem }: Approached)
     if let Some(visit) = flight {
         app.viewport.turn_about(visit.target);
         app.camera.play_flight(visit.flight, name);
-    }
-}
-
-/// Explores the free space of a scene once, if the plan asks for it in advance.
-pub(in crate::ui) fn explore(app: &mut App) {
-    let wanted = app.state.plan.navigation == When::Always && app.state.explored.is_none();
-    if !wanted || app.explored_for == app.state.scene_number {
-        return;
-    }
-    if let Some(SceneContext { cloud, cameras, up, .. }) = SceneContext::new(app) {
-        app.explored_for = app.state.scene_number;
-        let cloud = Arc::clone(&cloud);
-        let explore = move |_: &mut dyn Observer| Ok::<_, JobError>(go_to::Explored::new(cloud, &cameras, up));
-        let scene = app.state.scene_number;
-        app.start(JobInfo::short("Building the navigation graph"), explore, move |app, explored| {
-            if app.state.scene_number == scene {
-                app.state.explored = Some(Arc::new(explored));
-            }
-        });
     }
 }
 

@@ -82,8 +82,6 @@ pub struct App {
     pub(super) actions: Vec<Action>,
     /// Window time of the last frame, s.
     pub(super) last_frame: f64,
-    /// Number of the scene that was explored in advance.
-    pub(super) explored_for: u64,
     /// Lines of the trace that are in the log already.
     traced: usize,
     /// Edits of objects and parts that wait for the running one.
@@ -142,7 +140,6 @@ impl App {
             chat: Chat::default(),
             toasts: Toasts::default(),
             last_frame: 0.0,
-            explored_for: 0,
             traced: 0,
             edits: VecDeque::new(),
             editing: None,
@@ -260,7 +257,6 @@ impl App {
         if std::mem::replace(&mut self.had_objects, has_objects) != has_objects && self.layout.shows(news) {
             self.layout.dock.activate(news);
         }
-        view::explore(self);
         self.viewport.update(&mut self.state, &self.tasks);
         let brushed = self.viewport.take_brushed();
         let cloud = self.viewport.cloud().map(|cloud| &**cloud);

@@ -39,7 +39,7 @@ impl ObjectThumbnails {
             *self = Self::default();
             return;
         };
-        let wanted = state.plan.thumbnails.now(self.used.take());
+        let wanted = self.used.take();
         if wanted
             && self.asked.as_ref().is_none_or(|(of, _)| !Arc::ptr_eq(of, map))
             && map.identity_of.len() == cloud.len()

@@ -9,7 +9,6 @@ use super::photo::PhotoView;
 use super::selecting::SelectTool;
 use super::visible::VisibleCloud;
 use crate::render::RenderSettings;
-use crate::scene::plan::When;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels, SemanticMap};
 use crate::ui::layout::Layout;
 use crate::ui::state::AppState;
@@ -190,13 +189,6 @@ impl Viewport {
             Some(p) => p.camera().resized(w, h),
             None => self.eye.camera(w, h),
         };
-        let always = plan.redraw == When::Always;
-        if always {
-            ui.ctx().request_repaint();
-        }
-        // A newer request would keep the identity maps of the last one from ever being drawn.
-        let drawn = self.display.picture().is_some_and(|p| p.ticket == self.requests.ticket())
-            && (semantics.is_none() || self.queries.maps().is_some());
         let beside = state.beside.as_ref().map(|b| (b.cloud.clone(), b.settings.clone()));
         let wanted = Wanted {
             cloud,
@@ -218,7 +210,7 @@ impl Viewport {
             on_device: self.display.shares_device(),
             timed: layout.times,
         };
-        if let Some((request, moved)) = self.requests.next(wanted, always && drawn) {
+        if let Some((request, moved)) = self.requests.next(wanted, false) {
             self.lane.request(request);
             if moved != Moved::Nothing {
                 self.queries.forget_maps(moved == Moved::Eye);
@@ -250,7 +242,7 @@ mod tests {
                 semantics: None,
                 codes: false,
                 follow: false,
-                skip: SkipPasses { depth: true, parts: true, gpu: true, buffers: true, levels: true },
+                skip: SkipPasses { parts: true, gpu: true, levels: true },
                 on_device: false,
                 timed: false,
             };

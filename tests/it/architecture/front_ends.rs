@@ -23,7 +23,7 @@ const AT_WORK: [&str; 10] = [
 ];
 
 /// Exceptions that front ends may name: paths or beginnings of paths.
-const ALLOWED: [(&str, &str); 19] = [
+const ALLOWED: [(&str, &str); 18] = [
     ("io::files::read", "a file of settings: the agent's policy"),
     ("io::http", "the way to a chat model is the agent's own"),
     ("measure::axis::ticks", "how reports are drawn"),
@@ -31,7 +31,6 @@ const ALLOWED: [(&str, &str); 19] = [
     ("measure::is_report", "the name of a file"),
     ("measure::labels", "how reports are drawn"),
     ("measure::look", "how reports are drawn"),
-    ("measure::plan::table", "the text of reports"),
     ("measure::stability", "the program checks itself; no scene is opened"),
     ("measure::survey", "the text of a survey"),
     ("measure::table", "the text of reports"),
