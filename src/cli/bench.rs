@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-use serde_json::json;
 
 use super::progress::Console;
 use super::{CliError, number, output, view};
