@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serde_json::json;
 
-use super::state::{FAILURE, RESULT, UnitFailure, UnitResult, VERSION, is_done, read};
+use super::state::{FAILURE, RESULT, UnitFailure, UnitResult, VERSION, is_done};
 use super::unit::{self, UnitRequest};
 use crate::io::IoError;
 use crate::jobs::JobError;
+use crate::jobs::experiment::{difference, stored};
 use crate::math::stats::mean;
 use crate::pipeline::observer::{Observer, Severity};
 
@@ -38,21 +39,21 @@ pub(crate) struct MergedRow {
     pub(crate) scene: Option<String>,
     /// Units in it.
     pub(crate) units: usize,
-    pub(crate) psnr: Spread,
-    pub(crate) ssim: Spread,
-    pub(crate) gaussians: Spread,
-    pub(crate) training_secs: Spread,
-    pub(crate) miou: Spread,
+    pub(crate) psnr: MeanStd,
+    pub(crate) ssim: MeanStd,
+    pub(crate) gaussians: MeanStd,
+    pub(crate) training_secs: MeanStd,
+    pub(crate) miou: MeanStd,
 }
 
 /// Mean and sample standard deviation of the known values; `None` where too few are known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub(crate) struct Spread {
+pub(crate) struct MeanStd {
     pub(crate) mean: Option<f64>,
     pub(crate) deviation: Option<f64>,
 }
 
-impl Spread {
+impl MeanStd {
     fn of(values: impl Iterator<Item = Option<f64>>) -> Self {
         let values: Vec<f64> = values.flatten().filter(|v| v.is_finite()).collect();
         let mean = (!values.is_empty()).then(|| mean(&values));
@@ -145,13 +146,13 @@ fn same(one: Found, other: Found, observer: &mut dyn Observer) -> Found {
 fn find(folder: &Path, deepest: usize, found: &mut Vec<Found>) -> Result<(), IoError> {
     let file = folder.join(unit::FILE);
     if file.is_file() {
-        if let Some(asked) = read(&file)? {
-            let result: Option<UnitResult> = if is_done(folder) { read(&folder.join(RESULT))? } else { None };
+        if let Some(asked) = stored(&file)? {
+            let result: Option<UnitResult> = if is_done(folder) { stored(&folder.join(RESULT))? } else { None };
             if let Some(found) = result.as_ref().map(|r| u64::from(r.version)).filter(|v| *v > u64::from(VERSION)) {
                 return Err(IoError::Version { path: folder.join(RESULT), found, supported: u64::from(VERSION) });
             }
             let asked = result.as_ref().map_or(asked, |r| r.asked.clone());
-            found.push(Found { folder: folder.into(), asked, result, failure: read(&folder.join(FAILURE))? });
+            found.push(Found { folder: folder.into(), asked, result, failure: stored(&folder.join(FAILURE))? });
         }
         return Ok(());
     }
@@ -181,7 +182,7 @@ fn check(found: &[Found]) -> Result<(), JobError> {
             let before = if kind == "scene" { of_scene(&first.asked) } else { of_setting(&first.asked) };
             let photos = || "other photos".to_owned();
             let others = (kind == "scene" && !first.asked.may_have_photos_of(asked)).then(photos);
-            if let Some(what) = others.or_else(|| crate::jobs::reproduce::difference(&before, &now)) {
+            if let Some(what) = others.or_else(|| difference(&before, &now)) {
                 let (a, b) = (first.folder.display(), unit.folder.display());
                 return Err(JobError::Batch(format!(
                     "{a} and {b}: the {kind} '{name}' of one is not that of the other ({what}); merge them apart"
@@ -198,7 +199,7 @@ fn rows(units: &[UnitResult]) -> Vec<MergedRow> {
         groups.entry((&unit.asked.setting, &unit.asked.scene)).or_default().push(unit);
     }
     let row = |((setting, scene), units): (&(&str, &str), &Vec<&UnitResult>)| {
-        let of = |value: fn(&UnitResult) -> Option<f64>| Spread::of(units.iter().map(|u| value(u)));
+        let of = |value: fn(&UnitResult) -> Option<f64>| MeanStd::of(units.iter().map(|u| value(u)));
         MergedRow {
             setting: (*setting).into(),
             scene: Some((*scene).into()),
@@ -215,7 +216,7 @@ fn rows(units: &[UnitResult]) -> Vec<MergedRow> {
     settings.dedup();
     for setting in settings {
         let own: Vec<&MergedRow> = rows.iter().filter(|r| r.setting == setting).collect();
-        let over = |value: fn(&MergedRow) -> Spread| Spread::of(own.iter().map(|r| value(r).mean));
+        let over = |value: fn(&MergedRow) -> MeanStd| MeanStd::of(own.iter().map(|r| value(r).mean));
         let all = MergedRow {
             scene: None,
             units: own.iter().map(|r| r.units).sum(),
@@ -268,9 +269,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_spread_is_of_what_is_known() {
+    fn a_mean_is_of_what_is_known() {
         let of = |values: &[Option<f64>]| {
-            let Spread { mean, deviation } = Spread::of(values.iter().copied());
+            let MeanStd { mean, deviation } = MeanStd::of(values.iter().copied());
             (mean, deviation)
         };
         assert_eq!(of(&[]), (None, None));

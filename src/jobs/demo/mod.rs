@@ -130,7 +130,7 @@ pub(crate) fn examine(
     let folder = unpacked(folders, observer)?;
     let (scene, photos) = (open::scene(&folder.join("scene"))?, folder.join("photos"));
     let map = scene.semantics()?;
-    let job = PhotoComparison::new(scene, &photos, EvaluateOptions::default())?;
+    let job = PhotoComparison::new(&scene, &photos, EvaluateOptions::default())?;
     let quality = evaluate::photometric(&job, observer)?;
     Ok(([quality.psnr, quality.ssim], demo_questions::ask(&map, &photos, &job, Some(pictures))?))
 }
