@@ -20,7 +20,7 @@ use crate::pipeline::observer::{Evaluation, Observer};
 use crate::pipeline::train::{TrainConfig, TrainOutcome};
 use crate::scene::{Dataset, Level, SemanticMap};
 
-/// The three stages. Each needs the scene in `folder` as the stage before has left it.
+/// Posed photos, and the folder of the scene that is trained on them. The methods are the three stages, in their order.
 pub(crate) struct Experiment<'a> {
     pub(crate) dataset: Arc<Dataset>,
     /// Folder of the trained scene.

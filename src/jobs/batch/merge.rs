@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::state::{FAILURE, RESULT, UnitFailure, UnitResult, VERSION, is_done};
 use super::unit::{self, UnitRequest};
@@ -13,6 +13,7 @@ use crate::jobs::JobError;
 use crate::jobs::experiment::{difference, stored};
 use crate::math::stats::mean;
 use crate::pipeline::observer::{Observer, Severity};
+use crate::pipeline::train::TrainConfig;
 
 /// Levels of folders that are searched; units are three below the folder of their batch.
 const DEEPEST: usize = 6;
@@ -167,22 +168,18 @@ fn find(folder: &Path, deepest: usize, found: &mut Vec<Found>) -> Result<(), IoE
 
 /// Refuses units that have the same name and differ.
 fn check(found: &[Found]) -> Result<(), JobError> {
-    let mut seen: BTreeMap<[&str; 2], &Found> = BTreeMap::new();
-    // Two results of one name must agree in these values.
-    let of_setting = |a: &UnitRequest| {
-        let config = crate::pipeline::train::TrainConfig { seed: 0, ..a.config.clone() };
-        json!({ "config": config, "plan": a.plan, "objects": a.objects, "eval": a.eval })
-    };
-    let of_scene = |a: &UnitRequest| json!({ "masks": a.masks, "query": a.query });
+    let mut seen: BTreeMap<[&str; 2], (&Found, Value)> = BTreeMap::new();
     for unit in found {
+        // Two results of one name must agree in these values.
         let asked = &unit.asked;
-        let kinds = [("settings", &asked.setting, of_setting(asked)), ("scene", &asked.scene, of_scene(asked))];
-        for (kind, name, now) in kinds {
-            let Some(first) = seen.insert([kind, name], unit) else { continue };
-            let before = if kind == "scene" { of_scene(&first.asked) } else { of_setting(&first.asked) };
-            let photos = || "other photos".to_owned();
-            let others = (kind == "scene" && !first.asked.may_have_photos_of(asked)).then(photos);
-            if let Some(what) = others.or_else(|| difference(&before, &now)) {
+        let config = TrainConfig { seed: 0, ..asked.config.clone() };
+        let setting = json!({ "config": config, "plan": asked.plan, "objects": asked.objects, "eval": asked.eval });
+        let scene = json!({ "masks": asked.masks, "query": asked.query });
+        for (kind, name, now) in [("settings", &asked.setting, setting), ("scene", &asked.scene, scene)] {
+            let Some((first, before)) = seen.insert([kind, name], (unit, now.clone())) else { continue };
+            let others = kind == "scene" && !first.asked.may_have_photos_of(asked);
+            let what = if others { Some("other photos".to_owned()) } else { difference(&before, &now) };
+            if let Some(what) = what {
                 let (a, b) = (first.folder.display(), unit.folder.display());
                 return Err(JobError::Batch(format!(
                     "{a} and {b}: the {kind} '{name}' of one is not that of the other ({what}); merge them apart"

@@ -59,7 +59,8 @@ pub(super) fn run(
         for warning in dataset.warnings.iter().chain(labels.notes()) {
             observer.note(Severity::Warning, warning.clone());
         }
-        let experiment = Experiment { dataset: Arc::new(dataset), folder: &out.join("scene") };
+        let (dataset, folder) = (Arc::new(dataset), out.join("scene"));
+        let experiment = Experiment { dataset, folder: &folder };
         let trained = once(&trained, stored(&trained)?, || {
             let done = experiment.train(&settings.train, IfChanged::Ask, observer)?;
             Ok(TrainedFacts::of(&done.finished()?))
