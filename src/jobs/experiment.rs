@@ -1,9 +1,9 @@
-//! An experiment: Gaussians are trained on photos, their objects are found, and the result is compared with photos that
-//! were held out. Batches, the paper's tables and the demo's tour run experiments. They differ in their comparison with
-//! labels and in the form of their results.
+//! An experiment: Gaussians are trained on photos, their objects are found, and both are compared with held-out photos.
+//! Batches, the paper's tables and the demo are experiments; each compares objects with labels in its own way, and
+//! stores its results in its own form.
 //!
-//! A stopped experiment is resumed: training at its checkpoint, a later stage by the file that an earlier run left at its
-//! end ([`once`]).
+//! A stopped experiment is resumed: training at its checkpoint, a later stage at the file that it leaves at its end
+//! ([`once`]).
 
 use std::path::Path;
 use std::sync::Arc;
@@ -38,7 +38,7 @@ impl Experiment<'_> {
         train::run(&self.dataset, config, [self.folder.to_path_buf()], &if_changed.into(), observer)
     }
 
-    /// Finds the objects of the trained `scene`, and stores them with it. Masks are those in the folder `masks`, if given.
+    /// Finds the objects of the trained `scene`, from the masks in a folder if one is given, and stores them with it.
     pub(crate) fn find(
         &self,
         scene: &Scene,
