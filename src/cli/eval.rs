@@ -93,7 +93,7 @@ impl EvalArgs {
             keep_borders: self.keep_borders,
             pictures: self.pictures.clone(),
         };
-        Ok(PhotoComparison::new(scene, &photos, options)?)
+        Ok(PhotoComparison::new(&scene, &photos, options)?)
     }
 }
 

@@ -48,6 +48,32 @@ pub(crate) fn sha256(path: &Path) -> Result<String, IoError> {
     }
 }
 
+/// Writer that also counts its bytes and computes their SHA-256.
+pub(crate) struct Summed<W> {
+    pub(crate) to: W,
+    pub(crate) sum: Sha256,
+    pub(crate) bytes: u64,
+}
+
+impl<W: Write> Summed<W> {
+    pub(crate) fn new(to: W) -> Self {
+        Self { to, sum: Sha256::new(), bytes: 0 }
+    }
+}
+
+impl<W: Write> Write for Summed<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let n = self.to.write(bytes)?;
+        self.sum.update(&bytes[..n]);
+        self.bytes += n as u64;
+        Ok(n)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.to.flush()
+    }
+}
+
 /// Bytes as hexadecimal digits.
 pub(crate) fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()

@@ -1,22 +1,27 @@
 //! The whole pipeline on the scene that ships with the program: photos, training, scores, queries, a flight, a report.
 
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Instant;
 
 use glam::DVec3;
 use image::ColorType;
 use serde::Serialize;
 
+use super::demo::photograph;
 use super::demo_questions::{self, DemoQueries};
-use super::evaluate::{self, EvaluateOptions, PhotoComparison};
+use super::evaluate::EvaluateOptions;
+use super::experiment::Experiment;
+use super::train::IfChanged;
 use super::{JobError, export, open, plan};
 use crate::math::stats::median;
 use crate::measure::studies::StudyInput;
 use crate::measure::table::{markdown, rows};
 use crate::measure::{ErrorKind, Measure, Report, Rule, Stage, StageName, SweepCase, Trial, computer};
-use crate::pipeline::observer::{Evaluation, Interrupted, Observer, Severity, ViewScore};
-use crate::pipeline::synth::demo;
-use crate::pipeline::train::{self, TrainConfig, TrainEnd, TrainOutcome};
+use crate::pipeline::observer::{Evaluation, Observer, Severity, ViewScore};
+use crate::pipeline::synth::SynthReport;
+use crate::pipeline::synth::demo::demo_options;
+use crate::pipeline::train::{TrainConfig, TrainOutcome};
 use crate::render::{Features, RenderSettings, Renderer};
 use crate::scene::{Camera, Dataset, GaussianCloud, Machine};
 
@@ -65,27 +70,29 @@ pub(crate) fn run(
     let [photos, scene, compare, queries, flight] =
         ["photos", "scene", "compare", "queries", "flight"].map(|f| out.join(f));
 
-    let synth_secs = make_photos(&photos, observer)?;
-    let dataset = open::dataset(&photos)?;
-    let outcome = train::run(&dataset, &config, Some(&scene), observer)?;
-    if outcome.end == TrainEnd::Cancelled {
-        observer.note(Severity::Info, format!("{} of {} steps are saved", outcome.steps, config.steps));
-        return Err(Interrupted.into());
+    let made = photograph(&photos, &demo_options(), observer)?;
+    let reused = || format!("Using the photos in {}", photos.display());
+    observer.note(Severity::Info, made.as_ref().map_or_else(reused, SynthReport::summary));
+    let experiment = Experiment { dataset: Arc::new(open::dataset(&photos)?), folder: &scene };
+    let done = experiment.train(&config, IfChanged::Ask, observer)?;
+    if !done.is_finished() {
+        observer.note(Severity::Info, format!("{} of {} steps are saved", done.outcome.steps, config.steps));
     }
+    let outcome = done.finished()?;
     let options = EvaluateOptions { pictures: Some(compare), ..EvaluateOptions::default() };
-    let job = PhotoComparison::new(open::scene(&scene)?, &photos, options)?;
-    let Evaluation { psnr, ssim, views, .. } = evaluate::photometric(&job, observer)?;
+    let (job, evaluation) = experiment.compare(&open::scene(&scene)?, options, observer)?;
+    let Evaluation { psnr, ssim, views, .. } = evaluation;
     let queries = demo_questions::find_and_ask(&scene, &photos, &job, &queries, observer)?;
-    let millis = fly(&job.cloud, &job.settings, &dataset, &flight, observer)?;
+    let millis = fly(&job.cloud, &job.settings, &experiment.dataset, &flight, observer)?;
 
     let mut document = document(out, &outcome, [psnr, ssim], &queries);
     document.commands = vec![command];
     let report = DemoReport {
         document,
         machine: plan::machine(),
-        photos: dataset.photos.len(),
+        photos: experiment.dataset.photos.len(),
         held_out: views.len(),
-        synth_secs,
+        synth_secs: made.map(|report| report.secs),
         train_secs: outcome.secs,
         steps: outcome.steps,
         gaussians: outcome.cloud.len(),
@@ -125,17 +132,6 @@ fn document(out: &Path, outcome: &TrainOutcome, [psnr, ssim]: [f64; 2], queries:
     let overlaps = vec![share("object mIoU", "mean overlap of objects"), share("part mIoU", "mean overlap of parts")];
     report.put(stage(StageName::Query, ["one query, from the text to the mask", labels], overlaps, &asked));
     report
-}
-
-/// Renders the photos unless they are there; returns the seconds it took.
-fn make_photos(folder: &Path, observer: &mut dyn Observer) -> Result<Option<f64>, JobError> {
-    if demo::demo_is_written(folder, &demo::demo_options()) {
-        observer.note(Severity::Info, format!("Using the photos in {}", folder.display()));
-        return Ok(None);
-    }
-    let report = demo::write_demo(folder, &demo::demo_options(), observer)?;
-    observer.note(Severity::Info, report.summary());
-    Ok(Some(report.secs))
 }
 
 /// Draws a circle around the photos' focus; returns the median milliseconds per image.

@@ -56,11 +56,8 @@ pub(crate) struct PhotoComparison {
 
 impl PhotoComparison {
     /// Prepares the comparison of `scene` with the data set at `photos`.
-    pub(crate) fn new(scene: Scene, photos: &Path, options: EvaluateOptions) -> Result<Self, JobError> {
-        let dataset = Arc::new(open::dataset(photos)?);
-        let mut comparison = Self::of(&scene, dataset, options)?;
-        comparison.state = scene.state;
-        Ok(comparison)
+    pub(crate) fn new(scene: &Scene, photos: &Path, options: EvaluateOptions) -> Result<Self, JobError> {
+        Self::of(scene, Arc::new(open::dataset(photos)?), options)
     }
 
     /// Prepares the comparison of `scene` with the photos of `dataset`.
@@ -91,8 +88,8 @@ impl PhotoComparison {
             scene.cameras.iter().any(|c| !c.held_out && is_of(&c.name, name))
         };
         let trained_on = views.iter().map(seen).collect();
-        let changed = ChangedScene::of(scene, &dataset);
-        Ok(Self { cloud, settings, dataset, views, trained_on, max_side_px, borders, pictures, state: None, changed })
+        let (state, changed) = (scene.state.clone(), ChangedScene::of(scene, &dataset));
+        Ok(Self { cloud, settings, dataset, views, trained_on, max_side_px, borders, pictures, state, changed })
     }
 
     pub(crate) fn view(&self, index: usize) -> Result<TrainView, JobError> {

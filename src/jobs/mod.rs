@@ -17,6 +17,7 @@ pub(crate) mod error;
 pub(crate) mod evaluate;
 pub(crate) mod evaluate_masks;
 pub(crate) mod evaluate_removal;
+mod experiment;
 pub(crate) mod export;
 pub(crate) mod export_all;
 pub(crate) mod export_splat;

@@ -7,7 +7,7 @@ use super::presets;
 use super::{JobError, Scene, open};
 use crate::io::{IoError, SceneFolder, semantic_map, splat_ply, trained};
 use crate::math::format::things;
-use crate::pipeline::observer::{Observer, Severity};
+use crate::pipeline::observer::{Interrupted, Observer, Severity};
 use crate::pipeline::semantics::carry;
 use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{self, FolderUse, TrainConfig, TrainEnd, TrainError, TrainOutcome};
@@ -27,6 +27,11 @@ impl Trained {
     /// Returns whether all steps are done; else the observer has stopped it.
     pub(crate) fn is_finished(&self) -> bool {
         self.outcome.end == TrainEnd::Finished
+    }
+
+    /// Returns the outcome if all steps are done.
+    pub(crate) fn finished(self) -> Result<TrainOutcome, Interrupted> {
+        if self.is_finished() { Ok(self.outcome) } else { Err(Interrupted) }
     }
 }
 

@@ -4,14 +4,16 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use serde_json::json;
+use serde_json::{Value, json};
 
-use super::state::{FAILURE, RESULT, UnitFailure, UnitResult, VERSION, is_done, read};
+use super::state::{FAILURE, RESULT, UnitFailure, UnitResult, VERSION, is_done};
 use super::unit::{self, UnitRequest};
 use crate::io::IoError;
 use crate::jobs::JobError;
+use crate::jobs::experiment::{difference, stored};
 use crate::math::stats::mean;
 use crate::pipeline::observer::{Observer, Severity};
+use crate::pipeline::train::TrainConfig;
 
 /// Levels of folders that are searched; units are three below the folder of their batch.
 const DEEPEST: usize = 6;
@@ -38,21 +40,21 @@ pub(crate) struct MergedRow {
     pub(crate) scene: Option<String>,
     /// Units in it.
     pub(crate) units: usize,
-    pub(crate) psnr: Spread,
-    pub(crate) ssim: Spread,
-    pub(crate) gaussians: Spread,
-    pub(crate) training_secs: Spread,
-    pub(crate) miou: Spread,
+    pub(crate) psnr: MeanStd,
+    pub(crate) ssim: MeanStd,
+    pub(crate) gaussians: MeanStd,
+    pub(crate) training_secs: MeanStd,
+    pub(crate) miou: MeanStd,
 }
 
 /// Mean and sample standard deviation of the known values; `None` where too few are known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
-pub(crate) struct Spread {
+pub(crate) struct MeanStd {
     pub(crate) mean: Option<f64>,
     pub(crate) deviation: Option<f64>,
 }
 
-impl Spread {
+impl MeanStd {
     fn of(values: impl Iterator<Item = Option<f64>>) -> Self {
         let values: Vec<f64> = values.flatten().filter(|v| v.is_finite()).collect();
         let mean = (!values.is_empty()).then(|| mean(&values));
@@ -145,13 +147,13 @@ fn same(one: Found, other: Found, observer: &mut dyn Observer) -> Found {
 fn find(folder: &Path, deepest: usize, found: &mut Vec<Found>) -> Result<(), IoError> {
     let file = folder.join(unit::FILE);
     if file.is_file() {
-        if let Some(asked) = read(&file)? {
-            let result: Option<UnitResult> = if is_done(folder) { read(&folder.join(RESULT))? } else { None };
+        if let Some(asked) = stored(&file)? {
+            let result: Option<UnitResult> = if is_done(folder) { stored(&folder.join(RESULT))? } else { None };
             if let Some(found) = result.as_ref().map(|r| u64::from(r.version)).filter(|v| *v > u64::from(VERSION)) {
                 return Err(IoError::Version { path: folder.join(RESULT), found, supported: u64::from(VERSION) });
             }
             let asked = result.as_ref().map_or(asked, |r| r.asked.clone());
-            found.push(Found { folder: folder.into(), asked, result, failure: read(&folder.join(FAILURE))? });
+            found.push(Found { folder: folder.into(), asked, result, failure: stored(&folder.join(FAILURE))? });
         }
         return Ok(());
     }
@@ -166,22 +168,18 @@ fn find(folder: &Path, deepest: usize, found: &mut Vec<Found>) -> Result<(), IoE
 
 /// Refuses units that have the same name and differ.
 fn check(found: &[Found]) -> Result<(), JobError> {
-    let mut seen: BTreeMap<[&str; 2], &Found> = BTreeMap::new();
-    // Two results of one name must agree in these values.
-    let of_setting = |a: &UnitRequest| {
-        let config = crate::pipeline::train::TrainConfig { seed: 0, ..a.config.clone() };
-        json!({ "config": config, "plan": a.plan, "objects": a.objects, "eval": a.eval })
-    };
-    let of_scene = |a: &UnitRequest| json!({ "masks": a.masks, "query": a.query });
+    let mut seen: BTreeMap<[&str; 2], (&Found, Value)> = BTreeMap::new();
     for unit in found {
+        // Two results of one name must agree in these values.
         let asked = &unit.asked;
-        let kinds = [("settings", &asked.setting, of_setting(asked)), ("scene", &asked.scene, of_scene(asked))];
-        for (kind, name, now) in kinds {
-            let Some(first) = seen.insert([kind, name], unit) else { continue };
-            let before = if kind == "scene" { of_scene(&first.asked) } else { of_setting(&first.asked) };
-            let photos = || "other photos".to_owned();
-            let others = (kind == "scene" && !first.asked.may_have_photos_of(asked)).then(photos);
-            if let Some(what) = others.or_else(|| crate::jobs::reproduce::difference(&before, &now)) {
+        let config = TrainConfig { seed: 0, ..asked.config.clone() };
+        let setting = json!({ "config": config, "plan": asked.plan, "objects": asked.objects, "eval": asked.eval });
+        let scene = json!({ "masks": asked.masks, "query": asked.query });
+        for (kind, name, now) in [("settings", &asked.setting, setting), ("scene", &asked.scene, scene)] {
+            let Some((first, before)) = seen.insert([kind, name], (unit, now.clone())) else { continue };
+            let others = kind == "scene" && !first.asked.may_have_photos_of(asked);
+            let what = if others { Some("other photos".to_owned()) } else { difference(&before, &now) };
+            if let Some(what) = what {
                 let (a, b) = (first.folder.display(), unit.folder.display());
                 return Err(JobError::Batch(format!(
                     "{a} and {b}: the {kind} '{name}' of one is not that of the other ({what}); merge them apart"
@@ -198,7 +196,7 @@ fn rows(units: &[UnitResult]) -> Vec<MergedRow> {
         groups.entry((&unit.asked.setting, &unit.asked.scene)).or_default().push(unit);
     }
     let row = |((setting, scene), units): (&(&str, &str), &Vec<&UnitResult>)| {
-        let of = |value: fn(&UnitResult) -> Option<f64>| Spread::of(units.iter().map(|u| value(u)));
+        let of = |value: fn(&UnitResult) -> Option<f64>| MeanStd::of(units.iter().map(|u| value(u)));
         MergedRow {
             setting: (*setting).into(),
             scene: Some((*scene).into()),
@@ -215,7 +213,7 @@ fn rows(units: &[UnitResult]) -> Vec<MergedRow> {
     settings.dedup();
     for setting in settings {
         let own: Vec<&MergedRow> = rows.iter().filter(|r| r.setting == setting).collect();
-        let over = |value: fn(&MergedRow) -> Spread| Spread::of(own.iter().map(|r| value(r).mean));
+        let over = |value: fn(&MergedRow) -> MeanStd| MeanStd::of(own.iter().map(|r| value(r).mean));
         let all = MergedRow {
             scene: None,
             units: own.iter().map(|r| r.units).sum(),
@@ -268,9 +266,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_spread_is_of_what_is_known() {
+    fn a_mean_is_of_what_is_known() {
         let of = |values: &[Option<f64>]| {
-            let Spread { mean, deviation } = Spread::of(values.iter().copied());
+            let MeanStd { mean, deviation } = MeanStd::of(values.iter().copied());
             (mean, deviation)
         };
         assert_eq!(of(&[]), (None, None));

@@ -14,7 +14,8 @@ mod state;
 mod unit;
 mod work;
 
-use std::collections::VecDeque;
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, VecDeque};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -25,8 +26,9 @@ pub(crate) use self::sbatch::{ArrayScript, script};
 pub(crate) use self::shard::Shard;
 pub(crate) use self::state::UnitState;
 use self::unit::{BatchUnit, SceneInputs, UnitRequest};
-use self::work::{Worked, work};
+use self::work::work;
 use super::{JobError, export};
+use crate::io::IoError;
 use crate::io::claim::{self, Taken, Watch};
 use crate::models::catalog::{self, ModelRole};
 use crate::pipeline::observer::{Observer, Severity, Signal};
@@ -64,17 +66,37 @@ pub(crate) struct BatchOutcome {
 }
 
 /// A unit of the shard that can be run.
-struct Planned {
-    unit: BatchUnit,
-    name: String,
+struct PlannedUnit<'a> {
+    unit: BatchUnit<'a>,
     folder: PathBuf,
     asked: UnitRequest,
 }
 
+impl PlannedUnit<'_> {
+    fn state(&self) -> Result<UnitState, IoError> {
+        UnitState::of(&self.folder, &self.asked)
+    }
+}
+
+/// End of an attempt to run a unit.
+enum UnitOutcome {
+    Done,
+    Failed(String),
+    /// Another process took over.
+    Lost,
+    /// The observer asked to stop; finished work is saved.
+    Stopped,
+    /// Another process works on it.
+    Held {
+        by: String,
+        /// True if its heartbeat was seen to change.
+        beating: bool,
+    },
+}
+
 /// Lists the units of a shard and their states.
 pub(crate) fn list(request: &BatchRequest) -> Result<Vec<(String, UnitState)>, JobError> {
-    let state = |p: Planned| Ok((p.name, UnitState::of(&p.folder, &p.asked)?));
-    plan(request)?.into_iter().map(state).collect()
+    plan(request)?.iter().map(|p| Ok((p.asked.name(), p.state()?))).collect()
 }
 
 /// Number of units in a batch.
@@ -90,7 +112,7 @@ pub(crate) fn count(batch: &BatchFile) -> usize {
 pub(crate) fn run(request: &BatchRequest, observer: &mut dyn Observer) -> Result<BatchOutcome, JobError> {
     let mut planned = plan(request)?;
     for p in &planned {
-        if let UnitState::Changed(what) = UnitState::of(&p.folder, &p.asked)? {
+        if let UnitState::Changed(what) = p.state()? {
             return Err(changed(&p.folder, &what));
         }
     }
@@ -98,7 +120,7 @@ pub(crate) fn run(request: &BatchRequest, observer: &mut dyn Observer) -> Result
     let mut outcome = BatchOutcome { units: planned.len(), ..BatchOutcome::default() };
     // A unit may have killed the process that worked on it: it comes last, so that it delays no other.
     planned.sort_by_key(|p| claim::was_left(&p.folder));
-    let mut waiting: VecDeque<(Planned, Watch)> = planned.into_iter().map(|p| (p, Watch::default())).collect();
+    let mut waiting: VecDeque<(PlannedUnit<'_>, Watch)> = planned.into_iter().map(|p| (p, Watch::default())).collect();
     // Number of held units in a row: if all are held, there is nothing to do but to wait.
     let mut held = 0;
     while let Some((p, mut watch)) = waiting.pop_front() {
@@ -106,20 +128,19 @@ pub(crate) fn run(request: &BatchRequest, observer: &mut dyn Observer) -> Result
             outcome.stopped = true;
             break;
         }
+        let name = p.asked.name();
         match attempt(request, &p, &mut watch, observer)? {
-            Attempt::Worked(Worked::Done) => outcome.done += 1,
-            Attempt::Worked(Worked::Failed(why)) => outcome.failed.push((p.name, why)),
-            Attempt::Worked(Worked::Stopped) => {
+            UnitOutcome::Done => outcome.done += 1,
+            UnitOutcome::Failed(why) => outcome.failed.push((name, why)),
+            UnitOutcome::Stopped => {
                 outcome.stopped = true;
                 break;
             }
-            Attempt::Worked(Worked::Lost) => {
-                outcome.elsewhere.push((p.name, "another process, which took over".into()));
-            }
-            Attempt::Held { by, beating: true } => outcome.elsewhere.push((p.name, by)),
-            Attempt::Held { by, beating: false } => {
+            UnitOutcome::Lost => outcome.elsewhere.push((name, "another process, which took over".into())),
+            UnitOutcome::Held { by, beating: true } => outcome.elsewhere.push((name, by)),
+            UnitOutcome::Held { by, beating: false } => {
                 if held == 0 {
-                    let text = format!("{} is {by}'s, unless that has ended: its heartbeat is watched", p.name);
+                    let text = format!("{name} is {by}'s, unless that has ended: its heartbeat is watched");
                     observer.note(Severity::Info, text);
                 }
                 waiting.push_back((p, watch));
@@ -135,50 +156,43 @@ pub(crate) fn run(request: &BatchRequest, observer: &mut dyn Observer) -> Result
     Ok(outcome)
 }
 
-enum Attempt {
-    Worked(Worked),
-    Held { by: String, beating: bool },
-}
-
 fn attempt(
     request: &BatchRequest,
-    planned: &Planned,
+    planned: &PlannedUnit<'_>,
     watch: &mut Watch,
     observer: &mut dyn Observer,
-) -> Result<Attempt, JobError> {
-    let Planned { unit, name, folder, asked } = planned;
+) -> Result<UnitOutcome, JobError> {
+    let folder = &planned.folder;
     // A finished unit is not claimed.
-    match UnitState::of(folder, asked)? {
-        UnitState::Done => return Ok(Attempt::Worked(Worked::Done)),
-        UnitState::Failed(why) if !request.retry_failed => return Ok(Attempt::Worked(Worked::Failed(why))),
+    match planned.state()? {
+        UnitState::Done => return Ok(UnitOutcome::Done),
+        UnitState::Failed(why) if !request.retry_failed => return Ok(UnitOutcome::Failed(why)),
         UnitState::Changed(what) => return Err(changed(folder, &what)),
         _ => {}
     }
     export::make_folder(folder)?;
     match claim::take(folder, request.takeover, watch)? {
-        Taken::Held { by, beating } => Ok(Attempt::Held { by, beating }),
+        Taken::Held { by, beating } => Ok(UnitOutcome::Held { by, beating }),
         Taken::Mine(claim) => {
-            observer.note(Severity::Info, format!("Unit {name}"));
-            work(request, *unit, asked, (folder, &claim), observer).map(Attempt::Worked)
+            observer.note(Severity::Info, format!("Unit {}", planned.asked.name()));
+            work(request, planned, &claim, observer)
         }
     }
 }
 
 /// Returns the shard's units, once all their inputs are known to exist.
-fn plan(request: &BatchRequest) -> Result<Vec<Planned>, JobError> {
-    let batch = &request.batch;
-    let all = unit::units(batch);
+fn plan(request: &BatchRequest) -> Result<Vec<PlannedUnit<'_>>, JobError> {
+    let all = unit::units(&request.batch);
     unit::check_places(request, &all)?;
-    let mut inputs: Vec<Option<SceneInputs>> = vec![None; batch.scenes.len()];
+    let mut inputs: BTreeMap<&str, SceneInputs> = BTreeMap::new();
     let own = all.into_iter().enumerate().filter(|(k, _)| request.shard.has(*k));
     let planned = own.map(|(_, unit)| {
-        let scene = unit.scene(batch);
-        let inputs = match &mut inputs[unit.scene] {
-            Some(known) => known,
-            unknown => unknown.insert(SceneInputs::of(scene)?),
+        let inputs = match inputs.entry(&unit.scene.name) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(unknown) => unknown.insert(SceneInputs::of(unit.scene)?),
         };
-        let name = unit.name(batch);
-        Ok(Planned { unit, folder: request.out.join(&name), name, asked: unit.asked(batch, inputs) })
+        let asked = unit.asked(&request.batch, inputs);
+        Ok(PlannedUnit { unit, folder: request.out.join(unit.name()), asked })
     });
     planned.collect()
 }

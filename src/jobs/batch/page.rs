@@ -2,12 +2,12 @@
 
 use htmlize::escape_all_quotes;
 
-use super::merge::{MergedResults, MergedRow, Spread};
+use super::merge::{MeanStd, MergedResults, MergedRow};
 use super::state::UnitResult;
 use crate::math::format;
 use crate::measure::page::STYLE;
 
-impl Spread {
+impl MeanStd {
     /// Returns text such as "27.41 ± 0.12".
     pub(crate) fn text(&self, digits: usize) -> String {
         match (self.mean, self.deviation) {
@@ -18,13 +18,10 @@ impl Spread {
     }
 }
 
-/// Headings of [`MergedRow::cells`].
-pub(super) const HEAD: [&str; 8] =
-    ["settings", "scene", "units", "PSNR dB", "SSIM", "Gaussians", "training s", "mean IoU"];
-
 impl MergedRow {
-    /// Headings of the cells of a row.
-    pub(crate) const HEAD: [&str; 8] = HEAD;
+    /// Headings of [`Self::cells`].
+    pub(crate) const HEAD: [&str; 8] =
+        ["settings", "scene", "units", "PSNR dB", "SSIM", "Gaussians", "training s", "mean IoU"];
 
     /// The row as text.
     pub(crate) fn cells(&self) -> [String; 8] {
@@ -53,7 +50,7 @@ pub(super) fn html(merged: &MergedResults) -> String {
         failed.len(),
         unfinished.len()
     );
-    out += &table(&HEAD, rows.iter().map(|r| (r.scene.is_none(), r.cells().to_vec())));
+    out += &table(&MergedRow::HEAD, rows.iter().map(|r| (r.scene.is_none(), r.cells().to_vec())));
     out += "<h2>Units</h2>\n";
     let head = ["scene", "settings", "seed", "PSNR dB", "SSIM", "Gaussians", "training s", "mean IoU", "machine"];
     out += &table(&head, units.iter().map(|u| (false, cells(u))));

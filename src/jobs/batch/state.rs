@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use super::unit::{self, UnitRequest};
-use crate::io::{IoError, claim, files, trained};
+use crate::io::{IoError, claim, trained};
+use crate::jobs::experiment::{ObjectCounts, stored};
 use crate::measure::Computer;
 use crate::pipeline::observer::Evaluation;
 
@@ -38,14 +39,6 @@ pub(crate) struct UnitResult {
     pub(crate) secs: UnitSeconds,
     pub(super) host: String,
     pub(super) computer: Computer,
-}
-
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct ObjectCounts {
-    pub(crate) objects: usize,
-    pub(crate) parts: usize,
-    /// Photos whose masks were used.
-    pub(crate) seeds: Vec<String>,
 }
 
 /// Seconds of work, those of interrupted runs included if they are known.
@@ -87,8 +80,8 @@ impl UnitState {
     /// # Errors
     /// If a file there cannot be read.
     pub(super) fn of(folder: &Path, asked: &UnitRequest) -> Result<Self, IoError> {
-        let there: Option<UnitRequest> = read(&folder.join(unit::FILE))?;
-        let failure: Option<UnitFailure> = read(&folder.join(FAILURE))?;
+        let there: Option<UnitRequest> = stored(&folder.join(unit::FILE))?;
+        let failure: Option<UnitFailure> = stored(&folder.join(FAILURE))?;
         if let Some(failure) = failure {
             return Ok(Self::Failed(failure.error));
         }
@@ -108,14 +101,6 @@ impl UnitState {
 /// Returns whether the unit in `folder` has its result and its scene.
 pub(super) fn is_done(folder: &Path) -> bool {
     folder.join(RESULT).is_file() && trained::is_scene(&folder.join(SCENE))
-}
-
-/// Reads a document, if it exists.
-pub(super) fn read<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>, IoError> {
-    match files::read_json(path) {
-        Err(IoError::Read { cause, .. }) if cause.kind() == std::io::ErrorKind::NotFound => Ok(None),
-        read => read.map(Some),
-    }
 }
 
 /// Returns the folders of the unit's scene, each with the number of the claim that worked in it; 0 is the finished one.

@@ -7,9 +7,10 @@ use serde_json::{Value, json};
 use sha2::{Digest, Sha256};
 
 use super::BatchRequest;
-use super::file::{BatchFile, BatchScene};
+use super::file::{BatchFile, BatchScene, BatchSetting};
 use crate::io::IoError;
 use crate::io::files::{self, hex};
+use crate::jobs::experiment::difference;
 use crate::jobs::{JobError, open};
 use crate::pipeline::train::TrainConfig;
 use crate::pipeline::train::inputs::{Compare, TrainInputs};
@@ -22,10 +23,9 @@ const DEEPEST: usize = 16;
 const OWN: &str = "2:";
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct BatchUnit {
-    /// Indices in the file of its scene and of its settings.
-    pub(super) scene: usize,
-    pub(super) setting: usize,
+pub(super) struct BatchUnit<'a> {
+    pub(super) scene: &'a BatchScene,
+    pub(super) setting: &'a BatchSetting,
     pub(super) seed: u64,
 }
 
@@ -64,7 +64,7 @@ impl UnitRequest {
             return Some("the photos' names, sizes or cameras, or the sparse points, were others".into());
         }
         let there = Self { photos: now.photos.clone(), ..self.clone() };
-        let told = || crate::jobs::reproduce::difference(&json!(there), &json!(now));
+        let told = || difference(&json!(there), &json!(now));
         (there != *now).then(|| told().unwrap_or_else(|| "of another version of the program".into()))
     }
 }
@@ -74,46 +74,40 @@ fn name(scene: &str, setting: &str, seed: u64) -> String {
 }
 
 /// Returns all units in the order of shards: scenes, in each its settings, in each the seeds.
-pub(super) fn units(batch: &BatchFile) -> Vec<BatchUnit> {
-    let scenes = 0..batch.scenes.len();
-    let of_scene = |scene| (0..batch.settings.len()).map(move |setting| (scene, setting));
+pub(super) fn units(batch: &BatchFile) -> Vec<BatchUnit<'_>> {
+    let of_scene = |scene| batch.settings.iter().map(move |setting| (scene, setting));
     let of_setting = |(scene, setting)| batch.seeds.iter().map(move |&seed| BatchUnit { scene, setting, seed });
-    scenes.flat_map(of_scene).flat_map(of_setting).collect()
+    batch.scenes.iter().flat_map(of_scene).flat_map(of_setting).collect()
 }
 
-impl BatchUnit {
-    pub(super) fn scene(self, batch: &BatchFile) -> &BatchScene {
-        &batch.scenes[self.scene]
-    }
-
+impl BatchUnit<'_> {
     /// Returns its name, which is its folder below that of the results.
-    pub(super) fn name(self, batch: &BatchFile) -> String {
-        name(&self.scene(batch).name, &batch.settings[self.setting].name, self.seed)
+    pub(super) fn name(self) -> String {
+        name(&self.scene.name, &self.setting.name, self.seed)
     }
 
     /// Returns the settings of its training, before the scene's plan.
-    pub(super) fn config(self, batch: &BatchFile) -> TrainConfig {
-        TrainConfig { seed: self.seed, ..batch.settings[self.setting].train.config.clone() }
+    pub(super) fn config(self) -> TrainConfig {
+        TrainConfig { seed: self.seed, ..self.setting.train.config.clone() }
     }
 
     /// Returns its request, if its scene's files are `inputs`.
     pub(super) fn asked(self, batch: &BatchFile, inputs: &SceneInputs) -> UnitRequest {
-        let usual = TrainConfig::default();
-        let (setting, eval) = (&batch.settings[self.setting], &batch.eval);
+        let (usual, eval) = (TrainConfig::default(), &batch.eval);
         UnitRequest {
-            scene: self.scene(batch).name.clone(),
-            setting: setting.name.clone(),
+            scene: self.scene.name.clone(),
+            setting: self.setting.name.clone(),
             seed: self.seed,
             photos: inputs.photos.clone(),
             // Evaluations and checkpoints in between do not change the result.
             config: TrainConfig {
                 eval_every: usual.eval_every,
                 checkpoint_secs: usual.checkpoint_secs,
-                ..self.config(batch)
+                ..self.config()
             },
-            plan: json!(setting.train.plan),
+            plan: json!(self.setting.train.plan),
             masks: inputs.masks.clone(),
-            query: self.scene(batch).query.clone(),
+            query: self.scene.query.clone(),
             objects: json!(batch.objects),
             eval: json!({
                 "max_side_px": eval.max_side_px,
@@ -149,48 +143,36 @@ impl SceneInputs {
 
 /// Adds the names and sizes of the files in `folder`, or of the one file that it is.
 fn list(folder: &Path, name: &str, all: &mut Vec<(String, u64)>, deepest: usize) -> Result<(), IoError> {
+    let unread = |cause| IoError::Read { path: folder.into(), cause };
     if !folder.is_dir() {
-        all.push((name.into(), size(folder)?));
+        all.push((name.into(), folder.metadata().map_err(unread)?.len()));
         return Ok(());
     }
-    let entries = std::fs::read_dir(folder).map_err(|cause| IoError::Read { path: folder.into(), cause })?;
+    let entries = std::fs::read_dir(folder).map_err(unread)?;
     for entry in entries.flatten().filter(|_| deepest > 0) {
         list(&entry.path(), &format!("{name}/{}", entry.file_name().to_string_lossy()), all, deepest - 1)?;
     }
     Ok(())
 }
 
-fn size(path: &Path) -> Result<u64, IoError> {
-    let size = std::fs::metadata(path).map(|m| m.len());
-    size.map_err(|cause| IoError::Read { path: path.into(), cause })
-}
-
 /// Refuses results inside the inputs, and inputs inside the results.
-pub(super) fn check_places(request: &BatchRequest, units: &[BatchUnit]) -> Result<(), JobError> {
+pub(super) fn check_places(request: &BatchRequest, units: &[BatchUnit<'_>]) -> Result<(), JobError> {
+    let file = request.batch.path.display();
     for unit in units {
-        let (scene, folder) = (unit.scene(&request.batch), request.out.join(unit.name(&request.batch)));
+        let (scene, folder) = (unit.scene, request.out.join(unit.name()));
+        let refuse = |why: String| Err(JobError::Batch(format!("{file}, [[scene]] '{}': {why}", scene.name)));
         let real_folder = real(&folder);
         for input in std::iter::once(&scene.path).chain(&scene.masks) {
-            let place = |why: &str| {
-                let (file, input, folder) = (request.batch.path.display(), input.display(), folder.display());
-                let text = format!(
-                    "{file}, [[scene]] '{}': {why} ({folder} of {input}); give another folder with --out",
-                    scene.name
-                );
-                JobError::Batch(text)
-            };
+            let places = format!("({} of {}); give another folder with --out", folder.display(), input.display());
             if !input.exists() {
-                let (file, input) = (request.batch.path.display(), input.display());
-                let text =
-                    format!("{file}, [[scene]] '{}': {input} does not exist; paths are relative to {file}", scene.name);
-                return Err(JobError::Batch(text));
+                return refuse(format!("{} does not exist; paths are relative to {file}", input.display()));
             }
             let read = real(if input.is_dir() { input } else { files::folder_of(input) });
             if real_folder.starts_with(&read) {
-                return Err(place("its results would lie among what is read"));
+                return refuse(format!("its results would lie among what is read {places}"));
             }
             if read.starts_with(&real_folder) {
-                return Err(place("what is read lies in the folder of its results"));
+                return refuse(format!("what is read lies in the folder of its results {places}"));
             }
         }
     }

@@ -13,12 +13,14 @@ use sha2::{Digest, Sha256};
 
 use super::demo_questions::{self, DemoQueries};
 use super::evaluate::{self, EvaluateOptions, PhotoComparison};
+use super::experiment::Experiment;
+use super::train::IfChanged;
 use super::{Folders, JobError, OpenedScene, Scene, open};
 use crate::io::trained::{self, DatasetReference, History};
 use crate::io::{IoError, bundle, files, semantic_map, splat_ply};
-use crate::pipeline::observer::{Interrupted, Observer};
-use crate::pipeline::synth::{SynthOptions, demo};
-use crate::pipeline::train::{self, TrainConfig, TrainEnd};
+use crate::pipeline::observer::Observer;
+use crate::pipeline::synth::{SynthOptions, SynthReport, demo};
+use crate::pipeline::train::TrainConfig;
 use crate::render::{BackendChoice, Features, Renderer};
 use crate::scene::{GaussianCloud, Machine};
 
@@ -130,7 +132,7 @@ pub(crate) fn examine(
     let folder = unpacked(folders, observer)?;
     let (scene, photos) = (open::scene(&folder.join("scene"))?, folder.join("photos"));
     let map = scene.semantics()?;
-    let job = PhotoComparison::new(scene, &photos, EvaluateOptions::default())?;
+    let job = PhotoComparison::new(&scene, &photos, EvaluateOptions::default())?;
     let quality = evaluate::photometric(&job, observer)?;
     Ok(([quality.psnr, quality.ssim], demo_questions::ask(&map, &photos, &job, Some(pictures))?))
 }
@@ -148,10 +150,8 @@ pub(crate) fn make(
     let (photos, scene) = (work.join("photos"), work.join("scene"));
     photograph(&photos, &recipe.photos, observer)?;
     let dataset = Arc::new(open::dataset(&photos)?);
-    let outcome = train::run(&dataset, &recipe.training, Some(&scene), observer)?;
-    if outcome.end == TrainEnd::Cancelled {
-        return Err(Interrupted.into());
-    }
+    let experiment = Experiment { dataset: Arc::clone(&dataset), folder: &scene };
+    let outcome = experiment.train(&recipe.training, IfChanged::Ask, observer)?.finished()?;
     let mut info = trained::load_info(&scene)?;
     let cloud = Arc::new(rounded(&outcome.cloud));
     let settings = recipe.training.render_settings(dataset.background, dataset.camera_extent().1);
@@ -221,11 +221,14 @@ pub(crate) fn make(
     Ok((bundle::pack(&all).map_err(unwritten)?, record))
 }
 
-fn photograph(out: &Path, options: &SynthOptions, observer: &mut dyn Observer) -> Result<(), JobError> {
-    if !demo::demo_is_written(out, options) {
-        demo::write_demo(out, options, observer)?;
-    }
-    Ok(())
+/// Renders the demo's photos, unless they exist.
+pub(super) fn photograph(
+    out: &Path,
+    options: &SynthOptions,
+    observer: &mut dyn Observer,
+) -> Result<Option<SynthReport>, JobError> {
+    let written = demo::demo_is_written(out, options);
+    Ok(if written { None } else { Some(demo::write_demo(out, options, observer)?) })
 }
 
 /// Returns the photos as JPEG, their poses and sparse points, and the labels of some of them.

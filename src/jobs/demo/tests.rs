@@ -47,7 +47,7 @@ fn the_record_is_of_the_photos_that_ship() {
     bundle::unpack(&bytes, &folder).expect("unpacked");
     let psnr = |photos: &Path| {
         let scene = open::scene(&folder.join("scene")).expect("opened");
-        let job = PhotoComparison::new(scene, photos, EvaluateOptions::default()).expect("photos");
+        let job = PhotoComparison::new(&scene, photos, EvaluateOptions::default()).expect("photos");
         evaluate::photometric(&job, &mut Silent).expect("measured").psnr
     };
     let shipped = psnr(&folder.join("photos"));
@@ -77,7 +77,7 @@ fn what_ships_is_as_good_as_its_record_says() {
     let record: DemoRecord = files::read_json(&folder.join(RECORD)).expect("read");
     assert_eq!(scene.cloud.len(), record.gaussians);
     let mut map = scene.semantics().expect("objects");
-    let mut job = PhotoComparison::new(scene, &folder.join("photos"), EvaluateOptions::default()).expect("photos");
+    let mut job = PhotoComparison::new(&scene, &folder.join("photos"), EvaluateOptions::default()).expect("photos");
     assert_eq!(job.views.len(), 8);
     let quality = evaluate::photometric(&job, &mut Silent).expect("measured");
     // The same on every machine but for the last bits, which differ between processors.

@@ -17,6 +17,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 pub(crate) use self::table::TableDocument;
+use super::experiment::difference;
 use super::{JobError, export};
 use crate::io::files;
 use crate::models::catalog::{self, ModelRole};
@@ -140,14 +141,4 @@ fn claim(out: &Path, data: &Path, settings: &ReproduceSettings) -> Result<(), Jo
     }
     export::make_folder(out)?;
     Ok(export::json(&file, settings)?)
-}
-
-/// Returns the first setting that differs, with both values.
-pub(super) fn difference(there: &serde_json::Value, now: &serde_json::Value) -> Option<String> {
-    let keys = now.as_object().into_iter().flatten();
-    keys.filter(|(key, value)| there.get(key) != Some(value)).find_map(|(key, value)| match there.get(key) {
-        Some(old) if old.is_object() && value.is_object() => difference(old, value),
-        Some(old) => Some(format!("{key}: {old} there, {value} now")),
-        None => Some(format!("{key} is not among them")),
-    })
 }

@@ -1,22 +1,23 @@
 //! One scene of a table: trained, its objects found, queried. Each stage leaves a file at its end.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::Arc;
 
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize};
 
 use super::layout::SceneInput;
 use super::rows::{self, QueryTimes, RowResult};
 use super::{LABELS, ReproduceSettings};
 use crate::io::labels::Labels;
-use crate::io::semantic_map;
 use crate::jobs::changed::ChangedScene;
 use crate::jobs::evaluate::PhotoComparison;
-use crate::jobs::find_objects::{self, FindRequest, FindSettings};
-use crate::jobs::{JobError, evaluate_masks, export, open, train};
-use crate::pipeline::observer::{Interrupted, Observer, Severity};
+use crate::jobs::experiment::{Experiment, FoundFacts, TrainedFacts, once, stored};
+use crate::jobs::find_objects::FindSettings;
+use crate::jobs::train::IfChanged;
+use crate::jobs::{JobError, evaluate_masks, export, open};
+use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::segmenter::FileMasks;
-use crate::scene::{Dataset, Level};
+use crate::scene::Dataset;
 
 /// If all photos have labels, every n-th one is held out.
 const HOLDOUT_EVERY: usize = 8;
@@ -40,45 +41,14 @@ pub(crate) struct SceneResult {
     pub(super) unknown_phrases: Vec<String>,
 }
 
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct TrainedFacts {
-    pub(super) gaussians: usize,
-    pub(super) secs: f64,
-    /// PSNR on held-out photos, if there are any.
-    pub(super) psnr: Option<f64>,
-}
-
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct FoundFacts {
-    pub(super) objects: usize,
-    pub(super) parts: usize,
-    pub(super) secs: f64,
-    /// Size of the semantic map's file, bytes.
-    pub(super) map_bytes: u64,
-    /// Photos whose masks were used.
-    pub(super) seeds: Vec<String>,
-}
-
-/// Returns a stage's result: reads it if it exists, else makes and stores it.
-fn once<T: Serialize + DeserializeOwned>(
-    file: &Path,
-    make: impl FnOnce() -> Result<T, JobError>,
-) -> Result<T, JobError> {
-    if file.exists() {
-        return Ok(crate::io::files::read_json(file)?);
-    }
-    let made = make()?;
-    export::json(file, &made)?;
-    Ok(made)
-}
-
 pub(super) fn run(
     input: &SceneInput,
     out: &Path,
     settings: &ReproduceSettings,
     observer: &mut dyn Observer,
 ) -> Result<SceneResult, JobError> {
-    once(&out.join("result.json"), || {
+    let [result, trained, found] = ["result.json", "trained.json", "objects.json"].map(|name| out.join(name));
+    once(&result, stored(&result)?, || {
         export::make_folder(out)?;
         let mut dataset = open::dataset(&input.photos)?;
         let labels = Labels::of_photos(&input.labels, &dataset.photos)?;
@@ -90,9 +60,13 @@ pub(super) fn run(
             observer.note(Severity::Warning, warning.clone());
         }
         let (dataset, folder) = (Arc::new(dataset), out.join("scene"));
-        let trained = once(&out.join("trained.json"), || gaussians(&dataset, &folder, settings, observer))?;
-        let found = once(&out.join("objects.json"), || objects(&dataset, &folder, input, settings, observer))?;
-        compare(input, &dataset, &folder, split, settings, (trained, found))
+        let experiment = Experiment { dataset, folder: &folder };
+        let trained = once(&trained, stored(&trained)?, || {
+            let done = experiment.train(&settings.train, IfChanged::Ask, observer)?;
+            Ok(TrainedFacts::of(&done.finished()?))
+        })?;
+        let found = once(&found, stored(&found)?, || find(&experiment, input, settings, observer))?;
+        compare(input, &experiment, split, settings, (trained, found))
     })
 }
 
@@ -138,72 +112,33 @@ impl Split {
     }
 }
 
-fn gaussians(
-    dataset: &Dataset,
-    folder: &Path,
-    settings: &ReproduceSettings,
-    observer: &mut dyn Observer,
-) -> Result<TrainedFacts, JobError> {
-    let done = train::run(dataset, &settings.train, [folder.to_path_buf()], &train::IfChanged::Ask.into(), observer)?;
-    if !done.is_finished() {
-        return Err(Interrupted.into());
-    }
-    let outcome = &done.outcome;
-    let psnr = outcome.evaluations.last().map(|e| e.psnr).filter(|v| v.is_finite());
-    Ok(TrainedFacts { gaussians: outcome.cloud.len(), secs: outcome.secs, psnr })
-}
-
-fn objects(
-    dataset: &Arc<Dataset>,
-    folder: &Path,
+fn find(
+    experiment: &Experiment<'_>,
     input: &SceneInput,
     settings: &ReproduceSettings,
     observer: &mut dyn Observer,
 ) -> Result<FoundFacts, JobError> {
-    let scene = open::scene(folder)?;
     let mut with = FindSettings { encoder: Some(settings.encoder.clone()), ..FindSettings::default() };
-    let mut masks: Option<PathBuf> = None;
+    let mut masks = None;
     if settings.masks == LABELS {
-        masks = Some(input.labels.clone());
+        masks = Some(&*input.labels);
         // More seeds could leave no photo to compare with.
         with.max_seeds = if settings.labeled_in_training { 1 } else { with.max_seeds };
     } else {
         with.segmenter = Some(settings.masks.clone());
     }
-    let request = FindRequest {
-        folder: folder.into(),
-        cloud: Arc::clone(&scene.cloud),
-        settings: scene.settings.clone(),
-        dataset: Arc::clone(dataset),
-        holdout_every: 0,
-        masks,
-        known: None,
-        side_px: settings.train.max_side_px,
-        with,
-    };
-    let done = find_objects::run(&request, scene.state.as_deref(), observer)?;
-    let map = &done.found.map;
-    let count = |level: Level| map.identities.iter().filter(|(_, i)| i.level == level).count();
-    let file = folder.join(semantic_map::FILE);
-    let size = std::fs::metadata(&file).map_err(|cause| crate::io::IoError::Read { path: file, cause })?;
-    Ok(FoundFacts {
-        objects: count(Level::Object),
-        parts: count(Level::Part),
-        secs: done.secs,
-        map_bytes: size.len(),
-        seeds: map.seeds.clone(),
-    })
+    let scene = open::scene(experiment.folder)?;
+    experiment.find(&scene, masks, settings.train.max_side_px, with, observer)
 }
 
 fn compare(
     input: &SceneInput,
-    dataset: &Arc<Dataset>,
-    folder: &Path,
+    experiment: &Experiment<'_>,
     split: Split,
     settings: &ReproduceSettings,
     (trained, found): (TrainedFacts, FoundFacts),
 ) -> Result<SceneResult, JobError> {
-    let scene = open::scene(folder)?;
+    let (dataset, scene) = (&experiment.dataset, open::scene(experiment.folder)?);
     let map = scene.semantics()?;
     // A photo whose labels were used is no test of them.
     let is_seed = |i: &usize| settings.masks == LABELS && map.seeds.contains(&dataset.photos[*i].name);

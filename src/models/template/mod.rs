@@ -18,13 +18,13 @@ use std::path::Path;
 
 use serde::Deserialize;
 use serde_json::{Value, json};
-use sha2::{Digest, Sha256};
+use sha2::Digest;
 use zip::ZipArchive;
 
 use super::ModelError;
 use super::checkpoint::{WeightFile, WeightFileError};
 use crate::io::error::write_error;
-use crate::io::files::hex;
+use crate::io::files::{Summed, hex};
 use crate::io::temporary::temporary_folder;
 
 /// Prefixes that the tensors of a checkpoint may have.
@@ -98,7 +98,7 @@ impl<'a> Template<'a> {
             let mut found = self.archive.by_name(&name).map_err(io::Error::other).map_err(|e| failed(&path, e))?;
             found.read_to_end(&mut graph).map_err(|e| failed(&path, e))?;
             let file = File::create(&path).map_err(|e| failed(&path, e))?;
-            let mut out = Sink { file: BufWriter::new(file), hash: Sha256::new(), bytes: 0 };
+            let mut out = Summed::new(BufWriter::new(file));
             out.write_all(&graph).map_err(|e| failed(&path, e))?;
             for (weight, tensor, shape) in rows {
                 let numbers = weights.floats(&format!("{root}{tensor}")).map_err(refused)?;
@@ -108,9 +108,9 @@ impl<'a> Template<'a> {
                     return Err(ModelError::Cancelled);
                 }
             }
-            out.flush().and_then(|()| out.file.get_ref().sync_all()).map_err(|e| failed(&path, e))?;
+            out.flush().and_then(|()| out.to.get_ref().sync_all()).map_err(|e| failed(&path, e))?;
             about["graphs"][role]["bytes"] = out.bytes.into();
-            about["graphs"][role]["sha256"] = hex(&out.hash.finalize()).into();
+            about["graphs"][role]["sha256"] = hex(&out.sum.finalize()).into();
             files.push(name);
         }
         for (field, tensor) in &self.table.values {
@@ -182,26 +182,6 @@ pub(super) fn put_in_place(
 
 pub(super) fn failed(path: &Path, e: io::Error) -> ModelError {
     ModelError::File(write_error(path, e))
-}
-
-/// File writer that hashes and counts the written bytes.
-struct Sink {
-    file: BufWriter<File>,
-    hash: Sha256,
-    bytes: u64,
-}
-
-impl Write for Sink {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.file.write_all(bytes)?;
-        self.hash.update(bytes);
-        self.bytes += bytes.len() as u64;
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.file.flush()
-    }
 }
 
 /// Writes a model with a single weight: `ModelProto.graph.initializer` of ONNX.

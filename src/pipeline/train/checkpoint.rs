@@ -18,8 +18,9 @@ use super::density::DensityStats;
 use super::inputs::TrainInputs;
 use super::trainer::Trainer;
 use super::window::StepWindow;
+use crate::io::files::{self, Summed};
 use crate::io::trained::History;
-use crate::io::{IoError, SceneFolder, files};
+use crate::io::{IoError, SceneFolder};
 use crate::math::sh::coefficients;
 use crate::scene::GaussianCloud;
 
@@ -83,7 +84,7 @@ pub enum CheckpointError {
 /// If it cannot be written; the earlier checkpoint is then unchanged.
 pub(crate) fn save(scene: &SceneFolder, trainer: &Trainer, header: &Header) -> Result<(), IoError> {
     scene.save_checkpoint(|w| {
-        let mut w = Summed { to: w, sum: Sha256::new() };
+        let mut w = Summed::new(w);
         let text = serde_json::to_vec(header)?;
         w.write_all(MAGIC)?;
         w.write_all(&(text.len() as u64).to_le_bytes())?;
@@ -96,24 +97,6 @@ pub(crate) fn save(scene: &SceneFolder, trainer: &Trainer, header: &Header) -> R
         let sum = w.sum.finalize();
         w.to.write_all(&sum)
     })
-}
-
-/// Writer that also computes the SHA-256 of its bytes.
-struct Summed<'a> {
-    to: &'a mut dyn Write,
-    sum: Sha256,
-}
-
-impl Write for Summed<'_> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let n = self.to.write(bytes)?;
-        self.sum.update(&bytes[..n]);
-        Ok(n)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.to.flush()
-    }
 }
 
 fn write_cloud(w: &mut dyn Write, c: &GaussianCloud) -> io::Result<()> {

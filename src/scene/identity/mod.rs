@@ -126,10 +126,15 @@ impl Identities {
         self.list.len()
     }
 
+    /// Number of identities of a level.
+    pub(crate) fn count(&self, level: Level) -> usize {
+        self.list.iter().filter(|i| i.level == level).count()
+    }
+
     /// Numbers of each level in words: "3 objects and 1 part".
     pub(crate) fn counted(&self) -> String {
-        let count = |level: Level, what: &str| things(self.list.iter().filter(|i| i.level == level).count(), what);
-        format!("{} and {}", count(Level::Object, "object"), count(Level::Part, "part"))
+        let [objects, parts] = [Level::Object, Level::Part].map(|level| self.count(level));
+        format!("{} and {}", things(objects, "object"), things(parts, "part"))
     }
 
     /// Returns whether there are no identities.
