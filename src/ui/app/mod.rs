@@ -180,7 +180,11 @@ impl App {
         T: Send + 'static,
         E: Into<Stop> + 'static,
     {
-        self.start_to_end(info, work, |app, _, result| result.into_iter().for_each(|value| then(app, value)))
+        self.start_to_end(info, work, |app, _, result| {
+            if let Ok(value) = result {
+                then(app, value);
+            }
+        })
     }
 
     /// Starts a job; `then` gets its number and its result, or how it ended without one.
@@ -197,12 +201,13 @@ impl App {
         let title = info.title.clone();
         match self.tasks.spawn(info, work) {
             Ok(task) => {
+                let job = task.job();
                 let then = move |app: &mut Self| {
                     // The result is there before the event of the end.
                     let result = task.poll().unwrap_or(Err(Stop::Cancelled));
-                    then(app, task.job(), result);
+                    then(app, job, result);
                 };
-                self.pending.insert(task.job(), Box::new(then));
+                self.pending.insert(job, Box::new(then));
                 true
             }
             Err(e) => {
