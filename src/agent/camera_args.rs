@@ -54,7 +54,6 @@ impl Direction {
 #[serde(rename_all = "snake_case")]
 pub enum Distance {
     /// Length in meters; needs a scene of known scale.
-    #[serde(alias = "metres")]
     Meters(f64),
     /// Number of steps; the length of a step depends on the scene.
     Relative(f64),

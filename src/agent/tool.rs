@@ -285,12 +285,8 @@ mod tests {
         let text = serde_json::to_string(&wanted).expect("JSON");
         assert_eq!(serde_json::from_str::<ToolCall>(&text).expect("read"), wanted);
         assert_eq!(ToolCall::parse("undo", ""), Ok(ToolCall::Undo {}));
-        // Older transcripts have the second spelling.
-        for unit in ["meters", "metres"] {
-            let text = format!(r#"{{"direction": "back", "distance": {{"{unit}": 0.5}}}}"#);
-            let wanted = ToolCall::Move { direction: Direction::Back, distance: Distance::Meters(0.5) };
-            assert_eq!(ToolCall::parse("move", &text), Ok(wanted));
-        }
+        let wanted = ToolCall::Move { direction: Direction::Back, distance: Distance::Meters(0.5) };
+        assert_eq!(ToolCall::parse("move", r#"{"direction": "back", "distance": {"meters": 0.5}}"#), Ok(wanted));
     }
 
     #[test]

@@ -64,7 +64,7 @@ pub(crate) struct AgentArgs {
     #[arg(long)]
     policy: Option<PathBuf>,
     /// Length of a scene unit in meters [default: the scene's own, if that is known]
-    #[arg(long, alias = "metres", value_parser = number::within(1e-9..=1e9))]
+    #[arg(long, value_parser = number::within(1e-9..=1e9))]
     meters: Option<f64>,
     /// Write the image at the end
     #[arg(long)]
@@ -82,7 +82,6 @@ pub(crate) struct AgentArgs {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 enum PlannerArg {
     /// The built-in commands ('help' lists them); no network
-    #[value(alias = "rules")]
     Commands,
     /// A chat model
     Llm,

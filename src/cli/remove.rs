@@ -64,9 +64,7 @@ pub(crate) struct RemoveArgs {
 enum Fill {
     /// Planes beside it go on where it hid them
     Plane,
-    /// The same, painted by the network LaMa ('fmlgs models fetch lama')
-    Lama,
-    /// Planes, and then the scene is trained anew on its photos, which have that in them instead; takes as long as it
+    /// The same, and then the scene is trained anew on its photos, which have that in them instead; takes as long as it
     /// took, and goes on where it was stopped
     Photos,
     /// They stay open
@@ -84,11 +82,7 @@ pub(crate) fn run(args: RemoveArgs, quiet: bool) -> Result<(), CliError> {
     ids.dedup();
     let names: Vec<String> = ids.iter().map(|id| map.identities.full_name(*id)).collect();
     let name = names.join(", ");
-    let paint = match args.fill {
-        Fill::Plane | Fill::Photos => Some(args.paint),
-        Fill::Lama => Some(Paint::Lama),
-        Fill::None => None,
-    };
+    let paint = (args.fill != Fill::None).then_some(args.paint);
     let options = RemovalOptions { ids, halo: !args.tight, lift_shadow: !args.keep_shadow, paint, seed: args.seed };
     match args.fill {
         Fill::Photos => photos_without::check(&scene, (&options, &name), &args.out)?,

@@ -13,9 +13,8 @@ use crate::scene::PhotoPixels;
 /// Quantity that the viewport shows, in the order of the toolbar.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash, Serialize, Deserialize, VariantArray, IntoStaticStr)]
 pub enum ViewMode {
-    /// The rendered image; stored layouts of earlier versions call it a frame.
+    /// The rendered image.
     #[default]
-    #[serde(alias = "Picture")]
     #[strum(serialize = "RGB")]
     Rgb,
     /// Expected depth, turbo colors from near to far.

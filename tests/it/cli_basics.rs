@@ -51,7 +51,7 @@ fn arguments_that_make_no_sense_exit_with_2() {
         &["path", splat, "--survey", "18446744073709551615"],
         &["path", splat, "--to", "x", "--distance", "inf"],
         &["report", splat, "--budget", "nan"],
-        &["agent", splat, "--metres", "0"],
+        &["agent", splat, "--meters", "0"],
         &["no-such-command"],
         &["--no-such-option"],
     ] {

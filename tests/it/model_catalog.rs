@@ -20,7 +20,7 @@ fn fixtures() -> PathBuf {
 fn reduced() -> ModelEntry {
     let file = |name: &str| serde_json::json!({ "name": name, "megabytes": 1 });
     serde_json::from_value(serde_json::json!({
-        "id": "reduced", "role": "encoder", "title": "Reduced", "adds": "Nothing.", "licence": "MIT", "source": "here",
+        "id": "reduced", "role": "encoder", "title": "Reduced", "adds": "Nothing.", "license": "MIT", "source": "here",
         "description": "clip.json", "file": [file("clip_image.onnx"), file("clip_text.onnx")],
     }))
     .expect("an entry")

@@ -144,11 +144,7 @@ pub(super) const RULES: &[Rule] = &[
     rule(&["preprocess"], &["code_steps"], |g| when(lifts_by_votes(g), "with --lifting votes, which trains no codes")),
     rule(&["preprocess"], &["part_weight"], |g| when(g.is("encoder", "none"), "with --encoder none")),
     rule(&["remove"], &["paint", "seed"], |g| when(g.is("fill", "none"), "with --fill none")),
-    rule(&["remove"], &["paint"], |g| when(g.is("fill", "lama"), "with --fill lama, which paints itself")),
-    rule(&["remove"], &["seed"], |g| {
-        let random = g.is("paint", "patches") && !g.is("fill", "lama");
-        when(!random, "here: only --paint patches chooses at random")
-    }),
+    rule(&["remove"], &["seed"], |g| when(!g.is("paint", "patches"), "here: only --paint patches chooses at random")),
     // Pictures and flights.
     rule(&["render"], &["quality", "fps", "mark", "ffmpeg"], |g| when(!g.has("path"), "without --path")),
     rule(&["render"], &["quality"], |g| when(frames(g) && !g.has("ffmpeg"), "on frames, which lose nothing")),

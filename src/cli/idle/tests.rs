@@ -228,7 +228,7 @@ const LINES: &[(&str, &[&str], &str)] = &[
     ("preprocess s --segmenter regions {}", &["--mask-grid all"], "preprocess s --segmenter m --mask-grid all"),
     ("preprocess s --encoder none {}", &["--part-weight 0.5"], "preprocess s --encoder demo --part-weight 0.5"),
     ("remove s lamp --out o --fill none {}", &["--paint smooth", "--seed 2"], "remove s lamp --out o --seed 2"),
-    ("remove s lamp --out o --fill lama {}", &["--paint smooth", "--seed 2"], "remove s lamp --out o --fill lama"),
+    ("remove s lamp --out o --paint lama {}", &["--seed 2"], "remove s lamp --out o --fill photos --paint lama"),
     ("remove s lamp --out o --paint smooth {}", &["--seed 2"], "remove s lamp --out o --paint patches --seed 2"),
     ("render s --out a.png {}", &["--quality 50", "--fps 9", "--mark lamp", "--ffmpeg f"], ""),
     ("render s --path p.json --out frames/ {}", &["--quality 50"], "render s --path p.json --out v.webp --quality 50"),

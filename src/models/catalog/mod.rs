@@ -40,7 +40,6 @@ pub struct ModelEntry {
     /// Purpose, in plain words.
     pub adds: String,
     /// License of its weights.
-    #[serde(alias = "licence")]
     pub license: String,
     pub(crate) source: String,
     /// Command of `tools/export` that makes its files.

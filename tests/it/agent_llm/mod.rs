@@ -124,7 +124,7 @@ fn what_is_no_valid_call_is_told_to_the_model_and_never_done() {
         ("go_to", "{\"target\": {\"$ne\": null}}"),
         ("go_to", "{\"target\": \"kettle\", \"speed\": 9}"),
         ("turn", "{\"direction\": \"left\", \"degrees\": \"ninety\"}"),
-        ("move", "{\"direction\": \"back\", \"distance\": {\"metres\": -1}}"),
+        ("move", "{\"direction\": \"back\", \"distance\": {\"meters\": -1}}"),
         ("remove", "[1]"),
         ("", "{}"),
     ];

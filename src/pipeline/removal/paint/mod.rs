@@ -25,8 +25,7 @@ pub(crate) enum Paint {
     Nearest,
     /// Fast marching, as in image editors.
     Telea,
-    /// A network.
-    #[value(skip)]
+    /// The network LaMa ('fmlgs models fetch lama').
     Lama,
 }
 
