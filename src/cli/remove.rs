@@ -7,8 +7,8 @@ use serde_json::json;
 use super::progress::Console;
 use super::scene_args::open_scene;
 use super::{CliError, number, output};
+use crate::jobs::query;
 use crate::jobs::remove::{self, Paint, RemovalOptions};
-use crate::jobs::{derived, photos_without, query};
 use crate::math::format;
 use crate::scene::LevelFilter;
 
@@ -81,31 +81,21 @@ pub(crate) fn run(args: RemoveArgs, quiet: bool) -> Result<(), CliError> {
     ids.sort_unstable();
     ids.dedup();
     let names: Vec<String> = ids.iter().map(|id| map.identities.full_name(*id)).collect();
-    let name = names.join(", ");
     let paint = (args.fill != Fill::None).then_some(args.paint);
     let options = RemovalOptions { ids, halo: !args.tight, lift_shadow: !args.keep_shadow, paint, seed: args.seed };
-    match args.fill {
-        Fill::Photos => photos_without::check(&scene, (&options, &name), &args.out)?,
-        _ => derived::check(&args.out)?,
-    }
+    let retrain = args.fill == Fill::Photos;
+    let kept = match retrain {
+        true => "the photos and the training so far are kept; do the same again to go on",
+        false => "nothing was written",
+    };
     let console = &mut Console::new(quiet);
-    let done = remove::run(&scene, &map, &options, console).map_err(|e| CliError::of_work(e, "nothing was written"))?;
-    if args.fill == Fill::Photos {
-        let finished =
-            photos_without::retrain(&scene, &map, (&options, &name), (&done.cloud, &done.map), &args.out, console)
-                .map_err(|e| CliError::of_work(e, "what is done is kept"))?;
-        if !finished {
-            let kept = "the photos and the training so far are kept; do the same again to go on";
-            return Err(CliError::Cancelled(kept.into()));
-        }
-    } else {
-        remove::store(&scene, &name, &done, &args.out)?;
-    }
+    let done = remove::into_new_scene(&scene, &options, retrain, Some(&args.out), console)
+        .map_err(|e| CliError::of_work(e, kept))?;
     if args.json {
         return output::print_json(&json!({
-            "scene": args.out, "names": names, "gaussians": done.cloud.len(), "report": done.report,
+            "scene": args.out, "names": names, "gaussians": done.gaussians, "report": done.report,
         }));
     }
-    let told = remove::told(&name, &done.report);
-    output::print(&format!("{told}\n{}: {}", args.out.display(), format::things(done.cloud.len(), "Gaussian")))
+    let told = remove::told(&done.name, &done.report);
+    output::print(&format!("{told}\n{}: {}", args.out.display(), format::things(done.gaussians, "Gaussian")))
 }

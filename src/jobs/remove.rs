@@ -85,27 +85,57 @@ impl RemovedScene {
 /// Removes things from the scene in a folder and stores the result beside it.
 pub(crate) fn beside(request: &RemoveRequest, observer: &mut dyn Observer) -> Result<RemovedScene, JobError> {
     let scene = open::scene(&request.folder)?;
-    let map = scene.semantics()?;
-    let ids = &request.options.ids;
-    let name = removal::names(&map, ids);
-    let done = run(&scene, &map, &request.options, observer)?;
-    let words: Vec<String> = ids.iter().map(|id| export::identity_name(&map.identities, *id)).collect();
-    let how = format!("without-{}", words.join("-"));
-    let folder = if request.retrain {
-        let without = (&request.options, name.as_str());
-        let begun = |folder: &Path| photos_without::is_begun(&scene, without, folder);
-        let folder = derived::folder_beside(&request.folder, &format!("{how}-retrained"), begun);
-        if !photos_without::retrain(&scene, &map, without, (&done.cloud, &done.map), &folder, observer)? {
-            return Err(Interrupted.into());
-        }
-        folder
-    } else {
-        let folder = derived::free_folder(&request.folder, &how);
-        store(&scene, &name, &done, &folder)?;
-        folder
-    };
+    let done = into_new_scene(&scene, &request.options, request.retrain, None, observer)?;
+    let NewScene { folder, name, report, .. } = done;
     let state = scene_info::load_info(&folder)?.state;
-    Ok(RemovedScene { folder, name, request: request.clone(), report: done.report, state })
+    Ok(RemovedScene { folder, name, request: request.clone(), report, state })
+}
+
+/// A scene that was just made without some things.
+pub(crate) struct NewScene {
+    pub(crate) folder: PathBuf,
+    /// Names of the removed things.
+    pub(crate) name: String,
+    pub(crate) gaussians: usize,
+    pub(crate) report: RemovalReport,
+}
+
+/// Removes things from `scene` and stores the result in `out`, or in a new folder beside the scene. With `retrain` the
+/// new scene is trained on photos without the things; a run that was stopped is resumed.
+pub(crate) fn into_new_scene(
+    scene: &Scene,
+    options: &RemovalOptions,
+    retrain: bool,
+    out: Option<&Path>,
+    observer: &mut dyn Observer,
+) -> Result<NewScene, JobError> {
+    let map = scene.semantics()?;
+    let name = removal::names(&map, &options.ids);
+    let without = (options, name.as_str());
+    let folder = out.map_or_else(|| new_folder(scene, &map, without, retrain), Path::to_path_buf);
+    match retrain {
+        true => photos_without::check(scene, without, &folder)?,
+        false => derived::check(&folder)?,
+    }
+    let done = run(scene, &map, options, observer)?;
+    if !retrain {
+        store(scene, &name, &done, &folder)?;
+    } else if !photos_without::retrain(scene, &map, without, (&done.cloud, &done.map), &folder, observer)? {
+        return Err(Interrupted.into());
+    }
+    Ok(NewScene { folder, name, gaussians: done.cloud.len(), report: done.report })
+}
+
+/// Returns the folder beside the scene for a scene without these things, or one in which that was begun.
+fn new_folder(scene: &Scene, map: &SemanticMap, without: (&RemovalOptions, &str), retrain: bool) -> PathBuf {
+    let words: Vec<String> = without.0.ids.iter().map(|id| export::identity_name(&map.identities, *id)).collect();
+    let how = format!("without-{}", words.join("-"));
+    let place = scene.folder.as_ref().unwrap_or(&scene.path);
+    let begun = |folder: &Path| photos_without::is_begun(scene, without, folder);
+    match retrain {
+        true => derived::folder_beside(place, &format!("{how}-retrained"), begun),
+        false => derived::free_folder(place, &how),
+    }
 }
 
 /// Returns a report in words.
@@ -135,7 +165,7 @@ const ROUGH: f64 = 0.1;
 const GUESSED: f32 = 0.5;
 
 /// Stores the result, which is without `name`, as a scene in the folder `out`; the one in `from` is unchanged.
-pub(crate) fn store(from: &Scene, name: &str, reduced: &Reduced, out: &Path) -> Result<(), JobError> {
+fn store(from: &Scene, name: &str, reduced: &Reduced, out: &Path) -> Result<(), JobError> {
     if from.folder.is_none() {
         return Err(JobError::NoScene(from.path.clone()));
     }
