@@ -26,7 +26,7 @@ use crate::pipeline::observer::{Observer, Severity};
     fmlgs report scene/ --out report/                          all stages that the scene allows\n  \
     fmlgs report scene/ --masks photos/ --budget 600\n  \
     fmlgs report scene/ --stages render,path --repeats 5\n  \
-    fmlgs report --defaults DEFAULTS.md --from report/ --from other/\n  \
+    fmlgs report --defaults defaults.md --from report/ --from other/\n  \
     fmlgs report merge runs/ --out merged/                     one page of all results of a batch")]
 pub(crate) struct ReportArgs {
     #[command(subcommand)]
