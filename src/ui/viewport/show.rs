@@ -12,7 +12,7 @@ use super::split::{self, ViewArea, Views};
 use super::tools::segment::SegmentTool;
 use super::tools::{CardPlaces, Tool};
 use super::visible::VisibleCloud;
-use super::{Viewport, frusta, route};
+use super::{Viewport, frusta, query, route};
 use crate::scene::plan::When;
 use crate::ui::camera::CameraPane;
 use crate::ui::ctx::Ctx;
@@ -81,7 +81,7 @@ impl Viewport {
             ui.weak("Find objects first: queries search among them.");
             return;
         };
-        self.queries.show_details(ui, semantics, cloud, cx);
+        query::details::show(ui, &mut self.queries, semantics, cloud, cx);
     }
 
     /// The frame in a view: all of it, or what the photo's aspect ratio leaves.
@@ -174,7 +174,7 @@ impl Viewport {
             cards.show(ui, area.rect, cx);
             if let Some((semantics, cloud)) = searched {
                 let scene = SearchedScene { semantics, cloud, visibility: &self.visibility };
-                if self.queries.show(ui, area.rect, first, scene, cx) {
+                if query::panel::show(ui, &mut self.queries, area.rect, first, scene, cx) {
                     works_in = area.second;
                 }
             }
