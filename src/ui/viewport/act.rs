@@ -6,7 +6,6 @@ use super::eye::Eye;
 use super::photo::PhotoView;
 use super::tools::Tool;
 use super::tools::crop::CropTool;
-use super::tools::inspect::Inspector;
 use super::tools::mask_brush::MaskBrush;
 use super::tools::ruler::Ruler;
 use super::tools::segment::SegmentTool;
@@ -129,7 +128,7 @@ impl Viewport {
     /// Begins or ends inspecting; it begins in the middle of the view.
     pub(crate) fn inspect(&mut self, state: &AppState, tasks: &Tasks) {
         let in_use = matches!(self.tool, Some(Tool::Inspect(_)));
-        self.toggle(in_use, state, |_, _| Tool::Inspect(Inspector::default()));
+        self.toggle(in_use, state, |_, _| Tool::Inspect(Box::default()));
         self.inspect_at(DVec2::splat(0.5), state, tasks);
     }
 

@@ -3,6 +3,7 @@
 //!
 //! Identity maps of the view are drawn once, at rest; every query then only reads them, even during typing.
 
+mod asked;
 mod bar;
 mod card;
 pub(crate) mod closed;
@@ -17,12 +18,12 @@ mod settings;
 mod side;
 mod times;
 mod truth;
-mod two_views;
 
 use std::sync::Arc;
 
 use egui::{Color32, Rect, Ui, Vec2};
 
+pub use self::asked::Asked;
 use self::embeddings::Embeddings;
 pub(crate) use self::overlay::{HATCH, INVENTED};
 use self::paint::PaintedQueries;
@@ -33,7 +34,6 @@ use super::visible::Visibility;
 use crate::jobs::phrases::colors::PhraseColors;
 use crate::jobs::query::{ViewMaps, answer_encoded};
 use crate::navigate::Pose;
-use crate::pipeline::semantics::answer::QueryAnswer;
 use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::names;
 use crate::pipeline::semantics::reading::QueryReading;
@@ -44,32 +44,6 @@ use crate::worker::Versioned;
 
 /// Largest number of pinned queries.
 const MOST_PINNED: usize = 6;
-
-/// A query with its answer.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Asked {
-    /// The text as typed.
-    pub(crate) text: String,
-    /// Answer to the query.
-    pub answered: QueryAnswer,
-    /// True if the text encoder has yet to read it: only names have been searched so far.
-    pub pending: bool,
-    /// Hit chosen by the user; otherwise the best are shown.
-    chosen: Option<IdentityId>,
-    /// Interpretation of the text.
-    reading: QueryReading,
-    /// Unknown words that prevented an answer.
-    unexplained: Vec<String>,
-    /// Words that the answer ignores.
-    ignored: Vec<String>,
-}
-
-impl Asked {
-    /// The identities that are shown.
-    pub(crate) fn shown(&self, settings: &OverlaySettings) -> Vec<IdentityId> {
-        self.chosen.map_or_else(|| self.answered.chosen(settings.top), |id| vec![id])
-    }
-}
 
 /// The scene that is queried.
 #[derive(Clone, Copy)]
@@ -111,6 +85,66 @@ impl Queries {
 
     fn side_mut(&mut self) -> &mut QuerySide {
         &mut self.sides[self.active]
+    }
+
+    /// True if the second of two views is active, which gets new queries.
+    pub fn is_second(&self) -> bool {
+        self.active == 1
+    }
+
+    /// Makes the first or the second of two views active.
+    pub(crate) fn work_in(&mut self, second: bool) {
+        self.active = usize::from(second);
+    }
+
+    /// Runs `act` with the first or the second of two views active.
+    pub fn in_view<R>(&mut self, second: bool, act: impl FnOnce(&mut Self) -> R) -> R {
+        let before = self.is_second();
+        self.work_in(second);
+        let result = act(self);
+        self.work_in(before);
+        result
+    }
+
+    /// Values of the first and of the second view.
+    fn in_order<T>(&self, of: impl Fn(&QuerySide) -> T) -> [T; 2] {
+        self.sides.each_ref().map(of)
+    }
+
+    /// The queries that are pinned in the first and the second view.
+    pub(crate) fn pinned_texts(&self) -> [Vec<String>; 2] {
+        self.in_order(QuerySide::pinned_texts)
+    }
+
+    /// Pins only these queries in the first and the second view.
+    pub(crate) fn pin_only(&mut self, texts: &[Vec<String>; 2], semantics: &SemanticMap) {
+        for (second, texts) in [false, true].into_iter().zip(texts) {
+            self.in_view(second, |all| {
+                if all.side().pinned.iter().map(|q| &q.text).ne(texts) {
+                    all.side_mut().pinned = all.answers(texts, semantics);
+                }
+            });
+        }
+    }
+
+    /// Recipe of the active view.
+    pub(crate) fn recipe(&self) -> &Recipe {
+        &self.side().settings.recipe
+    }
+
+    /// Recipes of the first and the second view.
+    pub(crate) fn recipes(&self) -> [Recipe; 2] {
+        self.in_order(|side| side.settings.recipe.clone())
+    }
+
+    /// Sets the recipes of the first and the second view and answers again.
+    pub(crate) fn set_recipes(&mut self, recipes: &[Recipe; 2], semantics: &SemanticMap) {
+        if self.recipes() != *recipes {
+            for (side, recipe) in self.sides.iter_mut().zip(recipes) {
+                side.settings.recipe = recipe.clone();
+            }
+            self.ask_again(semantics);
+        }
     }
 
     /// All queries, the one in the field last.

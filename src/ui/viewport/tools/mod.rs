@@ -37,7 +37,7 @@ use crate::worker::{Tasks, Versioned};
 pub(super) enum Tool {
     Ruler(Ruler),
     Crop(CropTool),
-    Inspect(Inspector),
+    Inspect(Box<Inspector>),
     MaskBrush(MaskBrush),
     SplatBrush(SplatBrush),
     Segment(Box<SegmentTool>),
@@ -49,7 +49,7 @@ impl Tool {
         match self {
             Self::Ruler(tool) => tool,
             Self::Crop(tool) => tool,
-            Self::Inspect(tool) => tool,
+            Self::Inspect(tool) => &mut **tool,
             Self::MaskBrush(tool) => tool,
             Self::SplatBrush(tool) => tool,
             Self::Segment(tool) => &mut **tool,
