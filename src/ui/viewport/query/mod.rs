@@ -32,11 +32,9 @@ use self::side::{QuerySide, all_of};
 use self::truth::TrueMask;
 use super::visible::Visibility;
 use crate::jobs::phrases::colors::PhraseColors;
-use crate::jobs::query::{ViewMaps, answer_encoded};
+use crate::jobs::query::ViewMaps;
 use crate::navigate::Pose;
 use crate::pipeline::semantics::matching::MatchMode;
-use crate::pipeline::semantics::names;
-use crate::pipeline::semantics::reading::QueryReading;
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::scene::{GaussianCloud, IdentityId, Mask, ScenePlan, SemanticMap};
 use crate::ui::color_by::ColorBy;
@@ -106,14 +104,9 @@ impl Queries {
         result
     }
 
-    /// Values of the first and of the second view.
-    fn in_order<T>(&self, of: impl Fn(&QuerySide) -> T) -> [T; 2] {
-        self.sides.each_ref().map(of)
-    }
-
     /// The queries that are pinned in the first and the second view.
     pub(crate) fn pinned_texts(&self) -> [Vec<String>; 2] {
-        self.in_order(QuerySide::pinned_texts)
+        self.sides.each_ref().map(QuerySide::pinned_texts)
     }
 
     /// Pins only these queries in the first and the second view.
@@ -134,7 +127,7 @@ impl Queries {
 
     /// Recipes of the first and the second view.
     pub(crate) fn recipes(&self) -> [Recipe; 2] {
-        self.in_order(|side| side.settings.recipe.clone())
+        self.sides.each_ref().map(|side| side.settings.recipe.clone())
     }
 
     /// Sets the recipes of the first and the second view and answers again.
@@ -380,21 +373,7 @@ impl Queries {
     }
 
     fn asked(&self, text: &str, semantics: &SemanticMap) -> Option<Asked> {
-        let text = text.trim();
-        let OverlaySettings { kind, recipe, .. } = &self.side().settings;
-        let reading = QueryReading::new(&semantics.identities, text, *kind, recipe)?;
-        let phrase = &reading.phrase;
-        let encoded = self.embeddings.of(phrase);
-        let unread = encoded.map(|t| t.unknown.as_slice()).unwrap_or_default();
-        let phrases = self.embeddings.phrases(phrase).map(|phrases| (phrases, unread));
-        let mut answered = answer_encoded(semantics, &reading, *kind, recipe, phrases);
-        answered.stages.encode = encoded.map_or(0.0, |t| t.encode_ms);
-        let to_encoder = encoded.map(|t| t.unknown.as_slice());
-        let unknown = names::unknown_to_all(&semantics.identities, &phrase.text, to_encoder);
-        let ignored = answered.ignored_words(&semantics.identities, &reading, &unknown);
-        let unexplained = answered.unexplained(&semantics.identities, &reading, &unknown);
-        let pending = semantics.language.is_some() && self.embeddings.is_pending(phrase);
-        Some(Asked { text: text.to_owned(), answered, pending, chosen: None, reading, unexplained, ignored })
+        Asked::new(text, semantics, &self.side().settings, &self.embeddings)
     }
 
     /// Number of pixels of an identity in the current view, if its maps are drawn.
