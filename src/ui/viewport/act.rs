@@ -158,7 +158,7 @@ impl Viewport {
         }
         match purpose {
             None => drop(self.tool.take_if(|tool| tool.is_edit())),
-            // What is corrected is known.
+            // Only known objects and parts can be corrected.
             Some(SelectFor::Extent(_)) if state.semantics.is_none() => self.tool = None,
             Some(purpose) => self.tool = Some(Tool::Segment(Box::new(SegmentTool::new(purpose)))),
         }
