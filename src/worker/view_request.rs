@@ -31,7 +31,7 @@ pub struct ViewRequest {
     /// The photo taken from this camera, for the difference and for PSNR.
     pub photo: Option<Arc<PhotoPixels>>,
     /// Objects and parts of the Gaussians, whose maps are drawn too once the camera rests.
-    pub semantics: Option<Arc<SemanticMap>>,
+    pub semantics: Option<Versioned<SemanticMap>>,
     /// True if they are drawn while the camera moves too, at the frame's resolution: masks are on screen.
     pub follow: bool,
     /// True if blended codes are drawn too.
@@ -44,6 +44,29 @@ pub struct ViewRequest {
     pub timed: bool,
     /// Number that comes back with the frame.
     pub ticket: u64,
+}
+
+impl ViewRequest {
+    /// Returns whether both ask for the same frame. Tickets do not count, nor does the device, which is the same as
+    /// long as the window is.
+    pub(crate) fn is_same_picture(&self, other: &Self) -> bool {
+        let beside = |request: &Self| request.beside.as_ref().map(|(cloud, _)| cloud.generation());
+        self.shows_same_scene(other)
+            && self.camera == other.camera
+            && (self.mode, self.second) == (other.mode, other.second)
+            && beside(self) == beside(other)
+            && self.settings == other.settings
+            && (self.budget, self.skip, self.timed) == (other.budget, other.skip, other.timed)
+            && self.photo.is_some() == other.photo.is_some()
+            && (self.codes, self.follow) == (other.codes, other.follow)
+    }
+
+    /// Returns whether both show the same Gaussians with the same objects and parts.
+    pub(crate) fn shows_same_scene(&self, other: &Self) -> bool {
+        let generations =
+            |request: &Self| (request.cloud.generation(), request.semantics.as_ref().map(Versioned::generation));
+        generations(self) == generations(other)
+    }
 }
 
 /// Passes that the scene's plan skips.

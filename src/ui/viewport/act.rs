@@ -1,150 +1,84 @@
-//! Actions on the view and the viewer's camera.
+//! The user's actions on the view: its camera, its photo and its tool.
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 
-use super::arranging::ArrangeTool;
-use super::brush::Brush;
-use super::choosing::SplatBrush;
 use super::eye::Eye;
-use super::inspector::Inspector;
 use super::photo::PhotoView;
-use super::ruler::Ruler;
-use super::selecting::SelectTool;
-use super::{AppState, OpenedScene, Viewport};
+use super::tools::Tool;
+use super::tools::crop::CropTool;
+use super::tools::mask_brush::MaskBrush;
+use super::tools::ruler::Ruler;
+use super::tools::segment::SegmentTool;
+use super::tools::splat_brush::{Brushed, SplatBrush};
+use super::tools::transform::TransformTool;
+use super::visible::VisibleCloud;
+use super::{AppState, Viewport};
+use crate::jobs::OpenedScene;
+use crate::jobs::inspect::InspectRequest;
+use crate::jobs::rearrange::Arrangement;
 use crate::jobs::select::SelectFor;
 use crate::navigate::Pose;
-use crate::scene::{Bounds, CropBox};
-use crate::ui::actions::Action;
-use crate::worker::Worker;
+use crate::pipeline::semantics::edit::Edit;
+use crate::scene::{CropBox, IdentityId};
+use crate::worker::Tasks;
 
+/// The camera.
 impl Viewport {
-    /// Carries out an action on the view.
-    pub(crate) fn act(&mut self, action: &Action, state: &AppState, worker: &Worker, now: f64) {
-        let Some(scene) = state.scene.clone() else { return };
-        let photos = scene.dataset.as_ref().map_or(0, |d| d.photos.len());
-        let (here, all) = (self.photo_index(), state.semantics.as_ref().map(|map| &map.identities));
-        match action {
-            Action::FrameScene => {
-                self.leave_photo();
-                let selected = self.selected_bounds(state.semantics.as_ref());
-                self.eye.frame(selected.as_ref().unwrap_or(&scene.home.bounds));
-            }
-            Action::Paint(of) => {
-                self.drop_tools();
-                self.select = of.map(|of| SelectTool::new(SelectFor::New(of)));
-            }
-            Action::Arrange(id) => {
-                self.drop_tools();
-                let up = self.up(&scene);
-                self.arrange = self
-                    .cloud
-                    .as_ref()
-                    .zip(state.semantics.as_ref().filter(|_| state.is_trained()))
-                    .map(|(cloud, map)| ArrangeTool::new(*id, cloud, map, up));
-            }
-            Action::Correct(id) => {
-                self.drop_tools();
-                self.select = all.map(|_| SelectTool::new(SelectFor::Extent(*id)));
-            }
-            Action::PaintTrueMask => {
-                self.drop_tools();
-                self.brush = all.map(|_| Brush::new());
-            }
-            Action::BrushSplats => {
-                self.drop_tools();
-                self.choose = state.is_trained().then(SplatBrush::new);
-            }
-            Action::Select(id) => return self.picking.select(*id),
-            Action::Isolate(only) => return all.map_or((), |all| self.visibility.isolate(all, *only)),
-            Action::Hide(id) => return all.map_or((), |all| self.visibility.toggle(all, *id)),
-            Action::ResetView => {
-                self.photo = None;
-                self.eye = Eye::home(&scene.home, self.up);
-            }
-            Action::Measure | Action::Crop | Action::Inspect => return self.toggle_tool(action, &scene),
-            Action::SetCrop(crop) => return self.visibility.set_crop(*crop),
-            Action::TurnUp(axis) => self.turn_up(axis.vector()),
-            Action::SetUp(up) => self.turn_up(*up),
-            Action::NextPhoto if photos > 0 => self.look_through(here.map_or(0, |i| (i + 1) % photos), &scene, worker),
-            Action::PreviousPhoto if photos > 0 => {
-                self.look_through(here.map_or(photos - 1, |i| (i + photos - 1) % photos), &scene, worker);
-            }
-            Action::GoToPhoto(i) if *i < photos => self.look_through(*i, &scene, worker),
-            _ => return,
-        }
+    /// Frames the selected identity, or else the scene.
+    pub(crate) fn frame(&mut self, state: &AppState, now: f64) {
+        let Some(scene) = &state.scene else { return };
+        self.leave_photo();
+        let selected = self.parts().1.selected_bounds(state.semantics.as_ref());
+        self.eye.frame(selected.as_ref().unwrap_or(&scene.home.bounds));
         self.moved_at = now;
     }
 
-    /// Action that ends the tool in use.
-    pub(crate) fn tool(&self) -> Option<Action> {
-        let tools = [
-            (self.has_brush() || self.arrange.is_some(), Action::Paint(None)),
-            (self.ruler.is_some(), Action::Measure),
-            (self.cropping, Action::Crop),
-            (self.inspector.is_some(), Action::Inspect),
-        ];
-        tools.into_iter().find(|(used, _)| *used).map(|(_, action)| action)
+    /// Goes to the first view of the scene.
+    pub(crate) fn reset_view(&mut self, state: &AppState, now: f64) {
+        let Some(scene) = &state.scene else { return };
+        self.photo = None;
+        self.eye = Eye::home(&scene.home, self.up);
+        self.moved_at = now;
     }
 
-    /// True if dragging paints or selects and does not orbit.
-    pub(super) fn has_brush(&self) -> bool {
-        self.brush.is_some() || self.select.is_some() || self.choose.is_some()
-    }
-
-    /// Ends painting, selecting, choosing and arranging.
-    pub(super) fn drop_tools(&mut self) {
-        (self.brush, self.select, self.choose, self.arrange) = (None, None, None, None);
-    }
-
-    /// Switches to a tool, or ends it if it is in use.
-    fn toggle_tool(&mut self, action: &Action, scene: &OpenedScene) {
-        let begins = self.tool().as_ref() != Some(action);
-        (self.ruler, self.cropping, self.inspector) = (None, false, None);
-        match action {
-            _ if !begins => {}
-            Action::Measure => self.ruler = Some(Ruler::default()),
-            Action::Inspect => self.inspector = Some(Inspector::default()),
-            _ => {
-                self.cropping = true;
-                let crop = self.visibility.crop();
-                // Initially around the main content, with a margin: the scene's box leaves out one in twenty.
-                let (center, half) = (scene.home.bounds.center(), 0.8 * scene.home.bounds.size());
-                let bounds = Bounds { min: center - half, max: center + half };
-                let all = CropBox { bounds, outside: false };
-                self.visibility.set_crop(Some(crop.unwrap_or(all)));
-            }
+    /// Sets the up direction and turns upright.
+    pub(crate) fn turn_up(&mut self, up: DVec3, now: f64) {
+        if !self.has_scene() {
+            return;
         }
-    }
-
-    fn look_through(&mut self, index: usize, scene: &OpenedScene, worker: &Worker) {
-        let Some(photo) = scene.dataset.as_ref().and_then(|d| d.photos.get(index)) else { return };
-        let c = &photo.camera;
-        let ahead = (scene.home.bounds.center() - c.center).dot(c.forward());
-        let pivot = c.center + c.forward() * ahead.max(0.1 * scene.home.bounds.radius());
-        self.eye = Eye::of_camera(c, pivot, self.up.unwrap_or(scene.home.up));
-        self.photo = Some(PhotoView::new(index, photo, worker));
-    }
-
-    fn turn_up(&mut self, up: DVec3) {
         self.leave_photo();
         self.up = Some(up);
         self.eye.set_up(up);
+        self.moved_at = now;
+    }
+
+    /// Looks through the photo `by` places after the current one, around the end of the list; from a free view,
+    /// through the first or the last.
+    pub(crate) fn step_photo(&mut self, by: isize, state: &AppState, tasks: &Tasks, now: f64) {
+        let photos = state.scene.as_ref().and_then(|s| s.dataset.as_ref()).map_or(0, |d| d.photos.len());
+        if photos == 0 {
+            return;
+        }
+        let first = if by > 0 { 0 } else { photos - 1 };
+        let next = self.photo_index().map_or(first, |i| (i as isize + by).rem_euclid(photos as isize) as usize);
+        self.look_through(next, state, tasks, now);
+    }
+
+    /// Looks through the camera of a photo.
+    pub(crate) fn look_through(&mut self, index: usize, state: &AppState, tasks: &Tasks, now: f64) {
+        let Some(scene) = &state.scene else { return };
+        let Some(photo) = scene.dataset.as_ref().and_then(|d| d.photos.get(index)) else { return };
+        self.eye = Eye::of_photo(&photo.camera, &scene.home, self.up(scene));
+        self.photo = Some(PhotoView::new(index, photo, tasks));
+        self.moved_at = now;
     }
 
     /// Moves the camera to a pose.
     pub(crate) fn stand(&mut self, pose: &Pose, state: &AppState, now: f64) {
-        let Some(scene) = state.scene.clone() else { return };
+        let Some(scene) = &state.scene else { return };
         self.photo = None;
-        // The pivot stays ahead, at its distance.
-        let ahead = (self.eye.pivot - pose.center).dot(pose.forward());
-        let distance = if ahead > 0.0 { ahead } else { 0.5 * scene.home.bounds.radius() };
-        self.eye = Eye {
-            center: pose.center,
-            world_from_eye: pose.world_from_camera,
-            pivot: pose.center + pose.forward() * distance,
-            up: self.up(&scene),
-            fov_y_rad: pose.fov_y_rad,
-        };
+        let up = self.up(scene);
+        self.eye.stand(pose, scene.home.bounds.radius(), up);
         self.moved_at = now;
     }
 
@@ -152,6 +86,153 @@ impl Viewport {
     pub(super) fn leave_photo(&mut self) {
         if let Some(photo) = self.photo.take() {
             self.eye.fov_y_rad = photo.free_fov(self.eye.fov_y_rad);
+        }
+    }
+
+    /// Sets the crop box.
+    pub(crate) fn set_crop(&mut self, crop: Option<CropBox>) {
+        if self.has_scene() {
+            self.visibility.set_crop(crop);
+        }
+    }
+}
+
+/// The tools.
+impl Viewport {
+    /// True if a tool is in use.
+    pub(crate) fn has_tool(&self) -> bool {
+        self.tool.is_some()
+    }
+
+    /// Ends the tool in use. A crop box stays.
+    pub(crate) fn end_tool(&mut self) {
+        self.tool = None;
+    }
+
+    /// Begins or ends measuring.
+    pub(crate) fn measure(&mut self, state: &AppState) {
+        let in_use = matches!(self.tool, Some(Tool::Ruler(_)));
+        self.toggle(in_use, state, |_, _| Tool::Ruler(Ruler::default()));
+    }
+
+    /// Begins or ends the edit of the crop box; there is one from then on.
+    pub(crate) fn crop(&mut self, state: &AppState) {
+        let in_use = matches!(self.tool, Some(Tool::Crop(_)));
+        self.toggle(in_use, state, |view, scene| {
+            let crop = view.visibility.crop().unwrap_or_else(|| CropTool::first_box(&scene.home.bounds));
+            view.visibility.set_crop(Some(crop));
+            Tool::Crop(CropTool)
+        });
+    }
+
+    /// Begins or ends inspecting; it begins in the middle of the view.
+    pub(crate) fn inspect(&mut self, state: &AppState, tasks: &Tasks) {
+        let in_use = matches!(self.tool, Some(Tool::Inspect(_)));
+        self.toggle(in_use, state, |_, _| Tool::Inspect(Box::default()));
+        self.inspect_at(DVec2::splat(0.5), state, tasks);
+    }
+
+    /// Inspects the pixel at a relative position of the view, if the inspector is in use.
+    pub(crate) fn inspect_at(&mut self, at: DVec2, state: &AppState, tasks: &Tasks) {
+        let Some(Tool::Inspect(inspector)) = &mut self.tool else { return };
+        let (Some(cloud), Some(picture)) = (&self.cloud, self.display.picture()) else { return };
+        let camera = picture.camera.clone();
+        let VisibleCloud { cloud, semantics, numbers } = self.visibility.apply(cloud, state.semantics.as_ref());
+        let size = DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px));
+        let pixel = (at * size).clamp(DVec2::ZERO, size - 1.0);
+        let request = InspectRequest {
+            cloud: (*cloud).clone(),
+            map: semantics.as_deref().cloned(),
+            numbers,
+            settings: self.overrides.over(state.render_settings(), self.display.on_gpu()),
+            camera,
+            pixel: [pixel.x as u32, pixel.y as u32],
+        };
+        inspector.inspect(request, tasks);
+    }
+
+    /// Selects by clicks and strokes, for `purpose`; `None` ends painting, selecting and transforming.
+    pub(crate) fn segment(&mut self, purpose: Option<SelectFor>, state: &AppState) {
+        if state.scene.is_none() {
+            return;
+        }
+        match purpose {
+            None => drop(self.tool.take_if(|tool| tool.is_edit())),
+            // Only known objects and parts can be corrected.
+            Some(SelectFor::Extent(_)) if state.semantics.is_none() => self.tool = None,
+            Some(purpose) => self.tool = Some(Tool::Segment(Box::new(SegmentTool::new(purpose)))),
+        }
+    }
+
+    /// Transforms an object or part.
+    pub(crate) fn transform(&mut self, id: IdentityId, state: &AppState) {
+        let Some(scene) = &state.scene else { return };
+        let up = self.up(scene);
+        let map = state.semantics.as_ref().filter(|_| state.is_trained());
+        let known = self.cloud.as_ref().zip(map);
+        self.tool = known.map(|(cloud, map)| Tool::Transform(TransformTool::new(id, cloud, map, up)));
+    }
+
+    /// Paints the true mask of the view.
+    pub(crate) fn paint_true_mask(&mut self, state: &AppState) {
+        if state.scene.is_some() {
+            self.tool = state.semantics.as_ref().map(|_| Tool::MaskBrush(MaskBrush::new()));
+        }
+    }
+
+    /// Chooses Gaussians with a brush.
+    pub(crate) fn brush_splats(&mut self, state: &AppState) {
+        if state.scene.is_some() {
+            self.tool = state.is_trained().then(|| Tool::SplatBrush(SplatBrush::new()));
+        }
+    }
+
+    /// Ends selecting; returns the edit that applies the selection, if there is one.
+    pub(crate) fn take_edit(&mut self) -> Option<Edit> {
+        let edit = self.segment_tool()?.edit();
+        self.tool = None;
+        edit
+    }
+
+    /// Ends transforming; returns the arrangement that the view previews.
+    pub(crate) fn take_transform(&mut self) -> Option<Arrangement> {
+        let Some(Tool::Transform(tool)) = &self.tool else { return None };
+        let arrangement = tool.arrangement();
+        self.tool = None;
+        Some(arrangement)
+    }
+
+    /// Takes the Gaussians brushed over since the last call.
+    pub(crate) fn take_brushed(&mut self) -> Vec<Brushed> {
+        match &mut self.tool {
+            Some(Tool::SplatBrush(brush)) => brush.take_brushed(),
+            _ => Vec::new(),
+        }
+    }
+
+    /// Number of selected Gaussians, once all clicks and strokes are processed.
+    pub fn selection(&self) -> Option<usize> {
+        self.segment_tool()?.count()
+    }
+
+    /// Number of drawn lines that are not processed yet.
+    pub fn lines_drawn(&self) -> usize {
+        self.segment_tool().map_or(0, SegmentTool::lines_drawn)
+    }
+
+    pub(super) fn segment_tool(&self) -> Option<&SegmentTool> {
+        match &self.tool {
+            Some(Tool::Segment(tool)) => Some(tool),
+            _ => None,
+        }
+    }
+
+    /// Ends the tool if it is in use, or else begins it in place of another.
+    fn toggle(&mut self, in_use: bool, state: &AppState, begin: impl FnOnce(&mut Self, &OpenedScene) -> Tool) {
+        let Some(scene) = &state.scene else { return };
+        self.tool = None;
+        if !in_use {
+            self.tool = Some(begin(self, scene));
         }
     }
 }

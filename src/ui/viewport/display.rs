@@ -9,12 +9,13 @@ use eframe::wgpu::FilterMode;
 use egui::{Color32, ColorImage, Rect, TextureHandle, TextureId, TextureOptions, Ui, pos2};
 use glam::{DVec2, DVec3};
 
-use super::super::theme;
 use super::eye::Eye;
 use super::frame_times::FrameTimes;
 use crate::jobs::query::ViewMaps;
 use crate::render::DevicePicture;
+use crate::scene::Camera;
 use crate::scene::resource_log::{self, ResourceKind};
+use crate::ui::theme;
 use crate::worker::view::{MappedView, ViewPicture, ViewResult};
 use crate::worker::{Failure, Slot, Versioned};
 
@@ -57,6 +58,19 @@ pub(super) struct Display {
 impl Display {
     pub(super) fn picture(&self) -> Option<&ViewPicture> {
         self.picture.as_deref()
+    }
+
+    /// The camera for overlays of a frame in `rect`: the frame's own, so that both move together.
+    pub(super) fn overlay_camera(&self, eye: &Eye, rect: Rect) -> Camera {
+        match self.picture() {
+            Some(p) => p.camera.resized(rect.width().max(1.0) as u32, rect.height().max(1.0) as u32),
+            None => eye.camera(rect.width() as u32, rect.height() as u32),
+        }
+    }
+
+    /// True if a GPU draws the view.
+    pub(super) fn on_gpu(&self) -> bool {
+        self.picture().is_some_and(ViewPicture::on_gpu)
     }
 
     /// Times of recent frames, while they are shown.
@@ -178,7 +192,7 @@ impl Display {
     }
 
     /// Paints the frame of the first or second view into `shown`, a part of the view's `rect`.
-    pub(super) fn paint(&self, ui: &Ui, (rect, shown): (Rect, Rect), second: bool) {
+    pub(super) fn paint(&self, ui: &Ui, rect: Rect, shown: Rect, second: bool) {
         // Filling the area under the frame would take a fifth of a redraw on an emulated adapter.
         let native = self.native.as_ref().and_then(|native| native.id);
         let first = native.or(self.texture.as_ref().map(TextureHandle::id));
@@ -337,7 +351,7 @@ mod tests {
             .build_ui(|ui| {
                 let rect = Rect::from_min_size(egui::Pos2::ZERO, size);
                 display.borrow_mut().take(ui.ctx(), &pictures);
-                display.borrow().paint(ui, (rect, rect), false);
+                display.borrow().paint(ui, rect, rect, false);
             });
         let mut painted = |rgb: &[[u8; 3]], texture: Option<DevicePicture>| {
             let picture = ViewPicture { camera: camera.clone(), rgb: rgb.to_vec(), texture, ..frame(1, &eye) };

@@ -2,6 +2,7 @@
 
 use glam::{DMat3, DVec2, DVec3};
 
+use crate::navigate::Pose;
 use crate::scene::{Bounds, Camera, HomeView};
 
 /// Smallest angle between viewing and up direction, radians.
@@ -40,6 +41,13 @@ impl Eye {
         }
     }
 
+    /// A photo's camera, with a pivot ahead in the scene.
+    pub(crate) fn of_photo(camera: &Camera, home: &HomeView, up: DVec3) -> Self {
+        let ahead = (home.bounds.center() - camera.center).dot(camera.forward());
+        let pivot = camera.center + camera.forward() * ahead.max(0.1 * home.bounds.radius());
+        Self::of_camera(camera, pivot, up)
+    }
+
     /// The camera for a frame of this size.
     pub fn camera(&self, width_px: u32, height_px: u32) -> Camera {
         Camera::of_pose(self.center, self.world_from_eye, self.fov_y_rad, width_px.max(1), height_px.max(1))
@@ -48,6 +56,11 @@ impl Eye {
     /// Unit vector of the viewing direction.
     pub(crate) fn forward(&self) -> DVec3 {
         self.world_from_eye.z_axis
+    }
+
+    /// True if a point is in front of the camera.
+    pub(crate) fn has_ahead(&self, point: DVec3) -> bool {
+        (point - self.center).dot(self.forward()) > 0.0
     }
 
     /// Distance to the pivot, never 0.
@@ -112,6 +125,19 @@ impl Eye {
             eye.set_up(up);
         }
         eye
+    }
+
+    /// Moves to a pose. The pivot stays ahead at its distance, or is half the `radius` of the scene ahead.
+    pub(crate) fn stand(&mut self, pose: &Pose, radius: f64, up: DVec3) {
+        let ahead = (self.pivot - pose.center).dot(pose.forward());
+        let distance = if ahead > 0.0 { ahead } else { 0.5 * radius };
+        *self = Self {
+            center: pose.center,
+            world_from_eye: pose.world_from_camera,
+            pivot: pose.center + pose.forward() * distance,
+            up,
+            fov_y_rad: pose.fov_y_rad,
+        };
     }
 
     /// The point at a relative position of a view of this aspect ratio (height / width), at the depth of the pivot.

@@ -3,70 +3,59 @@
 use egui::{Color32, Painter, Pos2, Rect, Response, Stroke, Ui};
 use glam::{DVec2, DVec3};
 
-use super::super::layout::Layout;
-use super::super::theme;
-use super::Viewport;
-use crate::jobs::OpenedScene;
 use crate::scene::Camera;
 use crate::ui::actions::Action;
+use crate::ui::ctx::Ctx;
+use crate::ui::theme;
 
 /// Largest distance of the cursor from a camera that it picks, points.
 const REACH: f32 = 12.0;
 
-impl Viewport {
-    /// Draws every camera; a click on one looks through it. Returns true if the cursor is on one.
-    pub(super) fn show_frusta(
-        &self,
-        ui: &Ui,
-        rect: Rect,
-        scene: &OpenedScene,
-        response: &Response,
-        layout: &Layout,
-        actions: &mut Vec<Action>,
-    ) -> bool {
-        // Around an isolated identity they would be clutter.
-        let Some(dataset) = scene.dataset.as_ref().filter(|_| !self.visibility.is_isolated()) else { return false };
-        let painter = ui.painter_at(rect);
-        let eye = self.overlay_camera(rect);
-        let size = 0.09 * scene.home.bounds.radius();
-        let held_out: std::collections::HashSet<usize> =
-            scene.held_out(layout.config.holdout_every).into_iter().collect();
-        let cursor = response.hover_pos().filter(|pos| rect.contains(*pos));
-        let place = |p: DVec2| rect.min + egui::vec2(p.x as f32, p.y as f32);
-        let nearest = cursor.and_then(|cursor| {
-            let apexes = dataset.photos.iter().enumerate();
-            let seen = apexes.filter_map(|(i, p)| Some((i, place(eye.project(p.camera.center)?))));
-            let (i, at) = seen.min_by(|a, b| a.1.distance(cursor).total_cmp(&b.1.distance(cursor)))?;
-            (at.distance(cursor) < REACH).then_some((i, at))
-        });
-        for (i, photo) in dataset.photos.iter().enumerate() {
-            // From inside, a camera is only lines along the border of the view.
-            let distance = photo.camera.center.distance(eye.center);
-            if distance < size {
-                continue;
-            }
-            let near = (1.5 * scene.home.bounds.radius() / distance).clamp(0.25, 1.0) as f32;
-            let pointed = nearest.is_some_and(|n| n.0 == i);
-            let color = match (pointed, held_out.contains(&i)) {
-                (true, _) => theme::accent(),
-                (false, true) => theme::warning().gamma_multiply(0.75 * near),
-                (false, false) => Color32::from_white_alpha(130).gamma_multiply(near),
-            };
-            let width = if pointed { 2.0 } else { 0.8 };
-            let rim = Color32::from_black_alpha(70).gamma_multiply(near);
-            // A dark rim keeps the lines visible on bright scenes.
-            for stroke in [Stroke::new(width + 1.5, rim), Stroke::new(width, color)] {
-                draw(&painter, &eye, &photo.camera, size, place, stroke);
-            }
+/// Draws every camera into the view in `rect`, which `eye` sees; a click on one looks through it. Returns true if the
+/// cursor is on one.
+pub(super) fn show(ui: &Ui, rect: Rect, eye: &Camera, response: &Response, cx: &mut Ctx<'_>) -> bool {
+    let state = cx.state;
+    let Some(scene) = &state.scene else { return false };
+    let Some(dataset) = &scene.dataset else { return false };
+    let painter = ui.painter_at(rect);
+    let size = 0.09 * scene.home.bounds.radius();
+    let held_out: std::collections::HashSet<usize> =
+        scene.held_out(cx.layout.config.holdout_every).into_iter().collect();
+    let cursor = response.hover_pos().filter(|pos| rect.contains(*pos));
+    let place = |p: DVec2| rect.min + egui::vec2(p.x as f32, p.y as f32);
+    let nearest = cursor.and_then(|cursor| {
+        let apexes = dataset.photos.iter().enumerate();
+        let seen = apexes.filter_map(|(i, p)| Some((i, place(eye.project(p.camera.center)?))));
+        let (i, at) = seen.min_by(|a, b| a.1.distance(cursor).total_cmp(&b.1.distance(cursor)))?;
+        (at.distance(cursor) < REACH).then_some((i, at))
+    });
+    for (i, photo) in dataset.photos.iter().enumerate() {
+        // From inside, a camera is only lines along the border of the view.
+        let distance = photo.camera.center.distance(eye.center);
+        if distance < size {
+            continue;
         }
-        if let Some((i, at)) = nearest {
-            label(&painter, at, &format!("{}  (click to look through)", dataset.photos[i].title()));
-            if response.clicked() {
-                actions.push(Action::GoToPhoto(i));
-            }
+        let near = (1.5 * scene.home.bounds.radius() / distance).clamp(0.25, 1.0) as f32;
+        let pointed = nearest.is_some_and(|n| n.0 == i);
+        let color = match (pointed, held_out.contains(&i)) {
+            (true, _) => theme::accent(),
+            (false, true) => theme::warning().gamma_multiply(0.75 * near),
+            (false, false) => Color32::from_white_alpha(130).gamma_multiply(near),
+        };
+        let width = if pointed { 2.0 } else { 0.8 };
+        let rim = Color32::from_black_alpha(70).gamma_multiply(near);
+        // A dark rim keeps the lines visible on bright scenes.
+        for stroke in [Stroke::new(width + 1.5, rim), Stroke::new(width, color)] {
+            draw(&painter, eye, &photo.camera, size, place, stroke);
         }
-        nearest.is_some()
     }
+    if let Some((i, at)) = nearest {
+        label(&painter, at, &format!("{}  (click to look through)", dataset.photos[i].title()));
+        if response.clicked() {
+            cx.ask(Action::GoToPhoto(i));
+        }
+    }
+    nearest.is_some()
 }
 
 fn label(painter: &Painter, at: Pos2, text: &str) {

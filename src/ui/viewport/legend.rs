@@ -7,6 +7,7 @@ use crate::math::colormap::Colormap;
 use crate::scene::NOBODY;
 use crate::ui::actions::Action;
 use crate::ui::color_by::ColorBy;
+use crate::ui::ctx::Ctx;
 use crate::ui::theme;
 
 /// Steps of the color bar.
@@ -25,7 +26,7 @@ pub(super) fn show(
     depth: Option<(f32, f32)>,
     shares: Option<[f64; 2]>,
     photo: Option<&str>,
-    actions: &mut Vec<Action>,
+    cx: &mut Ctx<'_>,
 ) {
     ui.vertical(|ui| {
         if let Some((near, far)) = depth {
@@ -43,7 +44,7 @@ pub(super) fn show(
         };
         ui.label(RichText::new(meaning).small());
         if settings.color_by.tells_unknown() {
-            show_unknown(ui, shares.map(|s| s[0]), photo, actions);
+            show_unknown(ui, shares.map(|s| s[0]), photo, cx);
             if let Some([_, invented]) = shares.filter(|s| s[1] > 0.0) {
                 show_invented(ui, invented);
             }
@@ -58,7 +59,7 @@ pub(super) fn show(
 }
 
 /// Draws the share of unlabeled pixels, with a button to segment a photo.
-fn show_unknown(ui: &mut Ui, share: Option<f64>, photo: Option<&str>, actions: &mut Vec<Action>) {
+fn show_unknown(ui: &mut Ui, share: Option<f64>, photo: Option<&str>, cx: &mut Ctx<'_>) {
     ui.horizontal(|ui| {
         let (rect, _) = ui.allocate_exact_size(vec2(18.0, 11.0), Sense::hover());
         hatch(ui, rect, HATCH, false);
@@ -76,7 +77,7 @@ fn show_unknown(ui: &mut Ui, share: Option<f64>, photo: Option<&str>, actions: &
         ui.horizontal(|ui| {
             for (text, action) in mark.into_iter().chain(segment) {
                 if ui.small_button(text).on_hover_text(action.tooltip()).clicked() {
-                    actions.push(action);
+                    cx.ask(action);
                 }
             }
         });

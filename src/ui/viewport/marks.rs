@@ -7,12 +7,13 @@ use std::sync::Arc;
 use egui::{Color32, FontId, Painter, Pos2, Rect, Sense, Shape, Stroke, Ui, Vec2, pos2, vec2};
 use glam::DVec3;
 
-use super::super::labels::ScreenNames;
-use super::super::theme;
-use super::Viewport;
+use super::query::Queries;
+use super::visible::Visibility;
 use crate::navigate::target::Side;
 use crate::scene::{Bounds, Camera, GaussianCloud, IdentityId, SemanticMap, text};
 use crate::ui::actions::Action;
+use crate::ui::ctx::Ctx;
+use crate::ui::theme;
 use crate::worker::Versioned;
 
 /// Gaussians sampled per identity.
@@ -34,6 +35,16 @@ pub(super) struct Marks {
     known: HashMap<IdentityId, Arc<[DVec3]>>,
 }
 
+/// The scene whose identities are marked.
+pub(super) struct MarkedScene<'a> {
+    pub(super) cloud: &'a Versioned<GaussianCloud>,
+    pub(super) semantics: &'a Versioned<SemanticMap>,
+    pub(super) visibility: &'a Visibility,
+    pub(super) selected: Option<IdentityId>,
+    /// Camera of the frame.
+    pub(super) eye: Camera,
+}
+
 /// Kind of mark.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mark {
@@ -44,8 +55,60 @@ enum Mark {
 }
 
 impl Marks {
+    /// Marks found and selected identities that are hard to see in the frame in `shown`.
+    pub(super) fn show(
+        &mut self,
+        ui: &Ui,
+        shown: Rect,
+        scene: &MarkedScene<'_>,
+        queries: &mut Queries,
+        cx: &mut Ctx<'_>,
+    ) {
+        let MarkedScene { cloud, semantics, visibility, selected, eye } = scene;
+        let mut targets = queries.found_colors();
+        targets.extend(selected.map(|id| (id, theme::accent())).filter(|t| targets.iter().all(|f| f.0 != t.0)));
+        targets.retain(|(id, _)| {
+            semantics.identities.get(*id).is_some() && visibility.draws(&semantics.identities, *id) != Some(false)
+        });
+        for (id, color) in targets.into_iter().take(MOST) {
+            let points = self.points(cloud, semantics, id);
+            if points.is_empty() {
+                continue;
+            }
+            let places: Vec<Pos2> = points.iter().filter_map(|p| eye.project(*p)).map(|p| place(shown, p)).collect();
+            let inside = places.iter().filter(|p| shown.contains(**p)).count();
+            let size = queries.span_of(semantics, id).map(|span| span.map(|span| span * shown.size()));
+            let painter = ui.painter_at(shown);
+            let name = text::elided(&cx.state.labels.full_name(&semantics.identities, id), 40);
+            let at = match mark(inside as f32 / points.len() as f32, size) {
+                Mark::None => continue,
+                Mark::Arrow => arrow(&painter, shown, way(eye, &points), color, &name),
+                Mark::Ghost => {
+                    let why = visibility.why_not_drawn(&semantics.identities, id).unwrap_or("occluded");
+                    ghost(&painter, &hull(places), color, &format!("{name} ({why})"))
+                }
+                Mark::Ring => ring(&painter, middle(&places), color),
+            };
+            let button = ui.interact(at, ui.scope_id().with(("mark", id, queries.is_second())), Sense::click());
+            button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Fly to {name}")));
+            if button.on_hover_text("Click to fly there").on_hover_cursor(egui::CursorIcon::PointingHand).clicked() {
+                cx.ask(Action::GoToTarget(id, Side::Best));
+            }
+        }
+    }
+
+    /// Bounds of an identity without outliers, if it has Gaussians.
+    pub(super) fn bounds(
+        &mut self,
+        cloud: &Versioned<GaussianCloud>,
+        semantics: &Versioned<SemanticMap>,
+        id: IdentityId,
+    ) -> Option<Bounds> {
+        Bounds::of(self.points(cloud, semantics, id).iter().copied())
+    }
+
     /// Samples the Gaussians of an identity, without outliers.
-    pub(super) fn points(
+    fn points(
         &mut self,
         cloud: &Versioned<GaussianCloud>,
         semantics: &Versioned<SemanticMap>,
@@ -83,58 +146,6 @@ fn mark(in_view: f32, size: Option<Option<Vec2>>) -> Mark {
         _ if in_view < IN_VIEW => Mark::Arrow,
         Some(None) => Mark::Ghost,
         None => Mark::None,
-    }
-}
-
-impl Viewport {
-    /// Marks found and selected identities that are hard to see.
-    pub(super) fn show_marks(
-        &mut self,
-        ui: &Ui,
-        shown: Rect,
-        cloud: &Versioned<GaussianCloud>,
-        (semantics, names): (&Versioned<SemanticMap>, &ScreenNames),
-        actions: &mut Vec<Action>,
-    ) {
-        let mut targets = self.queries.found_colors();
-        targets.extend(
-            self.picking.selected().map(|id| (id, theme::accent())).filter(|t| targets.iter().all(|f| f.0 != t.0)),
-        );
-        targets.retain(|(id, _)| {
-            semantics.identities.get(*id).is_some() && self.visibility.draws(&semantics.identities, *id) != Some(false)
-        });
-        let eye = self.overlay_camera(shown);
-        for (id, color) in targets.into_iter().take(MOST) {
-            let points = self.marks.points(cloud, semantics, id);
-            if points.is_empty() {
-                continue;
-            }
-            let places: Vec<Pos2> = points.iter().filter_map(|p| eye.project(*p)).map(|p| place(shown, p)).collect();
-            let inside = places.iter().filter(|p| shown.contains(**p)).count();
-            let size = self.queries.span_of(semantics, id).map(|span| span.map(|span| span * shown.size()));
-            let painter = ui.painter_at(shown);
-            let name = text::elided(&names.full_name(&semantics.identities, id), 40);
-            let at = match mark(inside as f32 / points.len() as f32, size) {
-                Mark::None => continue,
-                Mark::Arrow => arrow(&painter, shown, way(&eye, &points), color, &name),
-                Mark::Ghost => {
-                    let why = self.visibility.why_not_drawn(&semantics.identities, id).unwrap_or("occluded");
-                    ghost(&painter, &hull(places), color, &format!("{name} ({why})"))
-                }
-                Mark::Ring => ring(&painter, middle(&places), color),
-            };
-            let button = ui.interact(at, ui.scope_id().with(("mark", id, self.queries.is_second())), Sense::click());
-            button.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Button, true, format!("Fly to {name}")));
-            if button.on_hover_text("Click to fly there").on_hover_cursor(egui::CursorIcon::PointingHand).clicked() {
-                actions.push(Action::GoToTarget(id, Side::Best));
-            }
-        }
-    }
-
-    /// Bounds of the selected object or part, if any.
-    pub(super) fn selected_bounds(&mut self, semantics: Option<&Versioned<SemanticMap>>) -> Option<Bounds> {
-        let (id, cloud) = (self.picking.selected()?, self.cloud.clone()?);
-        Bounds::of(self.marks.points(&cloud, semantics?, id).iter().copied())
     }
 }
 

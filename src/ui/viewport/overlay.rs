@@ -3,18 +3,21 @@
 use egui::{Align2, Area, ComboBox, Id, Order, Rect, RichText, Ui, Vec2, vec2};
 use strum::VariantArray;
 
-use super::super::beside::Beside;
-use super::super::layout::Layout;
-use super::super::state::AppState;
-use super::super::{keys, theme};
-use super::{Viewport, legend};
-use crate::jobs::OpenedScene;
+use super::display::Display;
+use super::legend;
+use super::overrides::RenderOverrides;
+use super::photo::PhotoView;
+use super::query::Queries;
+use super::visible::Visibility;
 use crate::jobs::remove::{Paint, RemovalOptions, RemoveRequest};
 use crate::math::format;
 use crate::models::lama::LAMA;
 use crate::scene::text;
 use crate::ui::actions::Action;
+use crate::ui::beside::Beside;
 use crate::ui::color_by::ColorBy;
+use crate::ui::ctx::Ctx;
+use crate::ui::{keys, theme};
 use crate::worker::ViewMode;
 use crate::worker::view::ViewPicture;
 
@@ -27,66 +30,74 @@ const NARROW_BESIDE_FACTS: f32 = 760.0;
 /// Height below which a view has few cards, points.
 const LOW: f32 = 330.0;
 
-/// Draws a card over a view.
-fn card(ui: &Ui, rect: Rect, name: &'static str, (align, down): (Align2, f32), add: impl FnOnce(&mut Ui)) {
+/// Draws a card over a view, moved down by `down` points.
+fn card(ui: &Ui, rect: Rect, name: &'static str, align: Align2, down: f32, add: impl FnOnce(&mut Ui)) {
     let at = align.pos_in_rect(&rect.shrink(12.0)) + vec2(0.0, down);
     let area = Area::new(Id::unique(name)).order(Order::Middle).pivot(align).fixed_pos(at).constrain_to(rect);
     theme::card(ui.ctx(), area, |ui| ui.horizontal(|ui| add(ui)));
 }
 
-impl Viewport {
+/// Content of the cards over a view.
+pub(super) struct ViewCards<'a> {
+    pub(super) display: &'a Display,
+    /// The photo whose camera the view looks through.
+    pub(super) photo: Option<&'a PhotoView>,
+    /// Number of Gaussians, hidden ones included.
+    pub(super) gaussians: usize,
+    pub(super) visibility: &'a Visibility,
+    pub(super) overrides: &'a RenderOverrides,
+    pub(super) queries: &'a mut Queries,
+    /// True if the camera moves.
+    pub(super) moves: bool,
+}
+
+impl ViewCards<'_> {
     /// Draws the cards over the active view.
-    pub(super) fn show_overlay(
-        &mut self,
-        ui: &Ui,
-        rect: Rect,
-        scene: &OpenedScene,
-        state: &AppState,
-        layout: &mut Layout,
-        actions: &mut Vec<Action>,
-    ) {
+    pub(super) fn show(&mut self, ui: &Ui, rect: Rect, cx: &mut Ctx<'_>) {
+        let state = cx.state;
         let second = self.queries.is_second();
-        let has_photos = scene.dataset.as_ref().is_some_and(|d| !d.photos.is_empty());
+        let dataset = state.scene.as_ref().and_then(|scene| scene.dataset.as_ref());
+        let photos = dataset.map_or(0, |d| d.photos.len());
         let (modes, legend) = if second { ("second modes", "second legend") } else { ("modes", "legend") };
-        let menus = layout.split_view || rect.width() < NARROW;
+        let menus = cx.layout.split_view || rect.width() < NARROW;
         let is_other = second && state.beside.is_some();
-        card(ui, rect, modes, (Align2::LEFT_TOP, 0.0), |ui| {
-            self.modes(ui, layout, (menus, is_other), has_photos, actions);
+        card(ui, rect, modes, Align2::LEFT_TOP, 0.0, |ui| {
+            self.modes(ui, menus, is_other, photos > 0, cx);
         });
         let beside = |p: &ViewPicture| p.second.as_ref().filter(|_| second).map(|other| other.depth_range);
-        let depth = self.picture().and_then(|p| beside(p).unwrap_or(p.depth_range));
+        let depth = self.display.picture().and_then(|p| beside(p).unwrap_or(p.depth_range));
         if legend::is_needed(self.queries.settings(), depth) && rect.height() > LOW && !is_other {
             let shares = self.queries.maps().map(|m| [m.unknown_share(), m.invented_share()]);
-            let has_photos = state.scene.as_ref().is_some_and(|s| s.dataset.is_some()) && state.is_trained();
+            let can_segment = dataset.is_some() && state.is_trained();
             let segment = if self.photo.is_some() { "Segment this photo" } else { "Segment the nearest photo" };
             // Above the facts if there is no room beside them.
             let up = if rect.width() < NARROW_BESIDE_FACTS { -46.0 } else { 0.0 };
-            card(ui, rect, legend, (Align2::RIGHT_BOTTOM, up), |ui| {
-                legend::show(ui, self.queries.settings(), depth, shares, has_photos.then_some(segment), actions);
+            card(ui, rect, legend, Align2::RIGHT_BOTTOM, up, |ui| {
+                legend::show(ui, self.queries.settings(), depth, shares, can_segment.then_some(segment), cx);
             });
         }
         if second {
             if let Some(beside) = &state.beside {
-                card(ui, rect, "beside", (Align2::RIGHT_TOP, 0.0), |ui| self.beside_bar(ui, beside, state, actions));
+                card(ui, rect, "beside", Align2::RIGHT_TOP, 0.0, |ui| self.beside_bar(ui, beside, cx));
             }
             return;
         }
         // In a low view the row is shown only with the name of the photo that the view looks through.
-        if has_photos && (self.photo.is_some() || rect.height() > LOW) {
+        if photos > 0 && (self.photo.is_some() || rect.height() > LOW) {
             // Beside the modes if there is room and no query box, else below them.
             let beside = rect.width() > 860.0 && state.semantics.is_none();
             let (align, down) = if beside { (Align2::RIGHT_TOP, 0.0) } else { (Align2::LEFT_TOP, 46.0) };
-            card(ui, rect, "photo", (align, down), |ui| self.photo_bar(ui, scene, layout, actions));
+            card(ui, rect, "photo", align, down, |ui| self.photo_bar(ui, photos, cx));
         }
         let now = ui.input(|i| i.time);
-        let rate = self.display.rate(now).filter(|_| self.moves(now)).map(rate_text);
+        let rate = self.display.rate(now).filter(|_| self.moves).map(rate_text);
         let size_px = rect.size() * ui.pixels_per_point();
-        let facts = if rect.height() > LOW { self.facts(size_px, layout, state, rate) } else { rate };
+        let facts = if rect.height() > LOW { self.facts(size_px, rate, cx) } else { rate };
         // Overrides of the scene's render settings must be visible in the smallest view.
         let words = self.overrides.words();
         let is_cropped = self.visibility.crop().is_some();
         if facts.is_some() || words.is_some() || is_cropped {
-            card(ui, rect, "facts", (Align2::LEFT_BOTTOM, 0.0), |ui| {
+            card(ui, rect, "facts", Align2::LEFT_BOTTOM, 0.0, |ui| {
                 if let Some(facts) = &facts {
                     ui.label(RichText::new(facts).small().color(theme::weak()));
                 }
@@ -95,24 +106,24 @@ impl Viewport {
                     let all = Action::SetCrop(None);
                     let show = ui.small_button("Show all").on_hover_text("Remove the crop box.");
                     if show.accessible_name(all.text()).clicked() {
-                        actions.push(all);
+                        cx.ask(all);
                     }
                 }
                 if let Some(words) = words {
                     ui.label(RichText::new(format!("rendered with {words}")).small().color(theme::warning()));
                     let reset = ui.small_button("Reset").on_hover_text(Action::ResetRenderSettings.tooltip());
                     if reset.accessible_name(Action::ResetRenderSettings.text()).clicked() {
-                        actions.push(Action::ResetRenderSettings);
+                        cx.ask(Action::ResetRenderSettings);
                     }
                 }
             });
         }
         // A small view is for the frame.
         if let Some(times) = self.display.times().filter(|_| rect.height() > LOW) {
-            card(ui, rect, "times", (Align2::LEFT_BOTTOM, -46.0), |ui| times.show(ui));
+            card(ui, rect, "times", Align2::LEFT_BOTTOM, -46.0, |ui| times.show(ui));
         }
         if self.display.errors().next().is_some() {
-            card(ui, rect, "view error", (Align2::CENTER_CENTER, 0.0), |ui| {
+            card(ui, rect, "view error", Align2::CENTER_CENTER, 0.0, |ui| {
                 for error in self.display.errors() {
                     ui.colored_label(theme::error(), error);
                 }
@@ -121,7 +132,8 @@ impl Viewport {
     }
 
     /// Draws the name of the scene in the second view, and its quality.
-    fn beside_bar(&self, ui: &mut Ui, beside: &Beside, state: &AppState, actions: &mut Vec<Action>) {
+    fn beside_bar(&self, ui: &mut Ui, beside: &Beside, cx: &mut Ctx<'_>) {
+        let state = cx.state;
         let removed = state.removed.as_ref().filter(|r| r.folder == beside.path);
         let name = removed.map_or_else(|| beside.name.clone(), |r| format!("without {}", r.name));
         let place = format!("{name}\n{}", beside.path.display());
@@ -129,83 +141,34 @@ impl Viewport {
         if let Some(removed) = removed {
             let open = ui.button("Open").on_hover_text("Go on with this scene. The other one stays where it is.");
             if open.clicked() {
-                actions.push(Action::Open(removed.folder.clone()));
+                cx.ask(Action::Open(removed.folder.clone()));
             }
-            self.other_fills(ui, &removed.request, state, actions);
+            other_fills(ui, &removed.request, cx);
             // A retrained scene also holds photos, which are not deleted.
             let delete = Action::DeleteRemoved;
             if !removed.request.retrain && ui.button("Delete").on_hover_text(delete.tooltip()).clicked() {
-                actions.push(delete);
+                cx.ask(delete);
             }
         }
-        if let Some(psnr) = self.picture().and_then(|p| p.second.as_ref()?.psnr) {
+        if let Some(psnr) = self.display.picture().and_then(|p| p.second.as_ref()?.psnr) {
             ui.colored_label(theme::accent(), format!("preview {}", format::decibel(psnr)));
         }
         let close = ui.button("\u{d7}").on_hover_text(Action::OpenBeside(None).text());
         if close.accessible_name(Action::OpenBeside(None).text()).clicked() {
-            actions.push(Action::OpenBeside(None));
-        }
-    }
-
-    /// Draws buttons for further removals; each makes another scene.
-    fn other_fills(&self, ui: &mut Ui, last: &RemoveRequest, state: &AppState, actions: &mut Vec<Action>) {
-        let options = RemovalOptions { seed: last.options.seed + 1, ..last.options.clone() };
-        let mut next = RemoveRequest { options, retrain: false, ..last.clone() };
-        let again = Action::AnotherFill(Box::new(next.clone()));
-        if ui.button(again.text()).on_hover_text(again.tooltip()).clicked() {
-            actions.push(again);
-        }
-        let changed = ui.menu_button("Options", |ui| {
-            let options = &mut next.options;
-            let mut changed = ui
-                .checkbox(&mut options.halo, "With its fringes")
-                .on_hover_text("Unsure Gaussians within it are removed, too.")
-                .changed();
-            let tip = "The shadow that it casts on flat surfaces is lifted, as far as what blocks the light explains it.";
-            changed |= ui.checkbox(&mut options.lift_shadow, "With its shadow").on_hover_text(tip).changed();
-            if state.models.as_ref().and_then(|m| m.get(LAMA)).is_some_and(|(_, s)| s.is_usable()) {
-                let mut by_network = options.paint == Some(Paint::Lama);
-                let tip = "The network paints the surfaces that it hid.";
-                if ui.checkbox(&mut by_network, "Painted by LaMa").on_hover_text(tip).changed() {
-                    options.paint = Some(if by_network { Paint::Lama } else { Paint::default() });
-                    changed = true;
-                }
-            }
-            ui.separator();
-            let tip = "Trains the scene anew on its photos, in which it is replaced by what is behind it. Takes as long as \
-                       the scene's training took.";
-            if ui.button("Train anew without it").on_hover_text(tip).clicked() {
-                // With the options of the removal on screen.
-                next = RemoveRequest { retrain: true, ..last.clone() };
-                changed = true;
-            }
-            if changed {
-                ui.close();
-            }
-            changed
-        });
-        if changed.inner == Some(true) {
-            actions.push(Action::AnotherFill(Box::new(next)));
+            cx.ask(Action::OpenBeside(None));
         }
     }
 
     /// Draws the choice of the mode; as menus if the view is narrow or one of two.
-    fn modes(
-        &mut self,
-        ui: &mut Ui,
-        layout: &mut Layout,
-        (menus, is_other): (bool, bool),
-        has_photos: bool,
-        actions: &mut Vec<Action>,
-    ) {
+    fn modes(&mut self, ui: &mut Ui, menus: bool, is_other: bool, has_photos: bool, cx: &mut Ctx<'_>) {
         ui.spacing_mut().item_spacing.x = 2.0;
-        let shown = *layout.mode_of(self.queries.is_second());
+        let shown = *cx.layout.mode_of(self.queries.is_second());
         let mut buttons = |ui: &mut Ui| {
             for &mode in ViewMode::VARIANTS.iter().filter(|mode| has_photos || !mode.needs_photo()) {
                 let action = Action::Show(mode);
                 let tip = format!("{}  {}", action.tooltip(), keys::label(ui.ctx(), &action));
                 if ui.selectable_label(shown == mode, mode.text()).on_hover_text(tip).clicked() {
-                    actions.push(action);
+                    cx.ask(action);
                 }
             }
         };
@@ -231,27 +194,26 @@ impl Viewport {
         if has_photos {
             ui.separator();
             let tip = format!("{}  {}", Action::ToggleCameras.tooltip(), keys::label(ui.ctx(), &Action::ToggleCameras));
-            if ui.selectable_label(layout.cameras, "Cameras").on_hover_text(tip).clicked() {
-                actions.push(Action::ToggleCameras);
+            if ui.selectable_label(cx.layout.cameras, "Cameras").on_hover_text(tip).clicked() {
+                cx.ask(Action::ToggleCameras);
             }
         }
     }
 
-    fn photo_bar(&self, ui: &mut Ui, scene: &OpenedScene, layout: &Layout, actions: &mut Vec<Action>) {
-        let total = scene.dataset.as_ref().map_or(0, |d| d.photos.len());
-        let step = |ui: &mut Ui, symbol: &str, action: Action, actions: &mut Vec<Action>| {
+    fn photo_bar(&self, ui: &mut Ui, total: usize, cx: &mut Ctx<'_>) {
+        let step = |ui: &mut Ui, symbol: &str, action: Action, cx: &mut Ctx<'_>| {
             let tip = format!("{}  {}", action.text(), keys::label(ui.ctx(), &action));
             let button = ui.button(symbol).on_hover_text(tip).accessible_name(action.text());
             if button.clicked() {
-                actions.push(action);
+                cx.ask(action);
             }
         };
-        step(ui, "‹", Action::PreviousPhoto, actions);
-        match &self.photo {
+        step(ui, "‹", Action::PreviousPhoto, cx);
+        match self.photo {
             Some(p) => {
                 ui.label(RichText::new(text::elided(&p.name(), 28)).strong()).on_hover_text(&*p.name());
                 ui.weak(format!("{} of {total}", p.index() + 1));
-                if let Some(psnr) = self.picture().and_then(|p| p.psnr) {
+                if let Some(psnr) = self.display.picture().and_then(|p| p.psnr) {
                     ui.label(RichText::new(format!("preview {}", format::decibel(psnr))).color(theme::accent()))
                         .on_hover_text(
                             "PSNR of the view at screen resolution. Evaluation uses the training resolution.",
@@ -265,27 +227,27 @@ impl Viewport {
                 ui.weak("Free view");
             }
         }
-        step(ui, "›", Action::NextPhoto, actions);
+        step(ui, "›", Action::NextPhoto, cx);
         // Half a view is too narrow for the slider's button, and shows the photo otherwise.
-        if self.photo.is_some() && (!layout.split_view || layout.compare) {
+        if self.photo.is_some() && (!cx.layout.split_view || cx.layout.compare) {
             ui.separator();
             let tip = format!("{}  {}", Action::ToggleCompare.tooltip(), keys::label(ui.ctx(), &Action::ToggleCompare));
-            if ui.selectable_label(layout.compare, "Compare").on_hover_text(tip).clicked() {
-                actions.push(Action::ToggleCompare);
+            if ui.selectable_label(cx.layout.compare, "Compare").on_hover_text(tip).clicked() {
+                cx.ask(Action::ToggleCompare);
             }
         }
     }
 
     /// One line of facts about the frame.
-    fn facts(&self, view_px: Vec2, layout: &Layout, state: &AppState, rate: Option<String>) -> Option<String> {
-        let p = self.picture()?;
+    fn facts(&self, view_px: Vec2, rate: Option<String>, cx: &Ctx<'_>) -> Option<String> {
+        let (p, state, layout) = (self.display.picture()?, cx.state, &*cx.layout);
         let drawn_px = vec2(p.camera.width_px as f32, p.camera.height_px as f32);
         let enlarged = (view_px / drawn_px).min_elem();
         let mut parts = vec![
             format!("{} \u{d7} {} px", p.camera.width_px, p.camera.height_px)
                 + if p.full && enlarged > 1.05 { ", enlarged" } else { "" },
             format::millis(p.secs),
-            match (self.visibility.count(), self.cloud.as_ref().map_or(0, |c| c.len()) as u64) {
+            match (self.visibility.count(), self.gaussians as u64) {
                 (Some(drawn), all) => format!("{} of {} Gaussians", format::count(drawn as u64), format::count(all)),
                 (None, all) => format!("{} Gaussians", format::count(all)),
             },
@@ -294,7 +256,7 @@ impl Viewport {
             parts.push(format!("depth {near:.2} to {far:.2}, blue to red"));
         }
         let modes = [Some(layout.mode), layout.split_view.then_some(layout.second_mode)];
-        match &self.photo {
+        match self.photo {
             None if modes.iter().flatten().any(|mode| mode.needs_photo()) => {
                 parts.push("choose a photo ( [ or ] )".into())
             }
@@ -307,6 +269,49 @@ impl Viewport {
         }
         parts.extend(rate);
         Some(parts.join("  ·  "))
+    }
+}
+
+/// Draws buttons for further removals; each makes another scene.
+fn other_fills(ui: &mut Ui, last: &RemoveRequest, cx: &mut Ctx<'_>) {
+    let state = cx.state;
+    let options = RemovalOptions { seed: last.options.seed + 1, ..last.options.clone() };
+    let mut next = RemoveRequest { options, retrain: false, ..last.clone() };
+    let again = Action::AnotherFill(Box::new(next.clone()));
+    if ui.button(again.text()).on_hover_text(again.tooltip()).clicked() {
+        cx.ask(again);
+    }
+    let changed = ui.menu_button("Options", |ui| {
+        let options = &mut next.options;
+        let mut changed = ui
+            .checkbox(&mut options.halo, "With its fringes")
+            .on_hover_text("Unsure Gaussians within it are removed, too.")
+            .changed();
+        let tip = "The shadow that it casts on flat surfaces is lifted, as far as what blocks the light explains it.";
+        changed |= ui.checkbox(&mut options.lift_shadow, "With its shadow").on_hover_text(tip).changed();
+        if state.models.as_ref().and_then(|m| m.get(LAMA)).is_some_and(|(_, s)| s.is_usable()) {
+            let mut by_network = options.paint == Some(Paint::Lama);
+            let tip = "The network paints the surfaces that it hid.";
+            if ui.checkbox(&mut by_network, "Painted by LaMa").on_hover_text(tip).changed() {
+                options.paint = Some(if by_network { Paint::Lama } else { Paint::default() });
+                changed = true;
+            }
+        }
+        ui.separator();
+        let tip = "Trains the scene anew on its photos, in which it is replaced by what is behind it. Takes as long as \
+                       the scene's training took.";
+        if ui.button("Train anew without it").on_hover_text(tip).clicked() {
+            // With the options of the removal on screen.
+            next = RemoveRequest { retrain: true, ..last.clone() };
+            changed = true;
+        }
+        if changed {
+            ui.close();
+        }
+        changed
+    });
+    if changed.inner == Some(true) {
+        cx.ask(Action::AnotherFill(Box::new(next)));
     }
 }
 

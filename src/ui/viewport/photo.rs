@@ -5,10 +5,9 @@ use std::sync::Arc;
 
 use egui::{Color32, ColorImage, CursorIcon, Rect, Sense, Stroke, TextureHandle, TextureOptions, Ui, pos2, vec2};
 
-use super::super::state::AppState;
-use super::super::theme;
 use crate::scene::{Camera, Photo, PhotoPixels};
-use crate::worker::{Command, JobId, Worker};
+use crate::ui::theme;
+use crate::worker::{Task, Tasks};
 
 /// Step of an arrow key at the split between photo and rendering, as a share of the frame.
 const KEY_STEP: f32 = 0.05;
@@ -20,7 +19,8 @@ const SIDE_PX: u32 = 1600;
 pub(super) struct PhotoView {
     index: usize,
     photo: Photo,
-    job: Option<JobId>,
+    /// The job that loads the photo.
+    task: Option<Task<PhotoPixels>>,
     pixels: Option<Arc<PhotoPixels>>,
     texture: Option<TextureHandle>,
     failed: bool,
@@ -29,11 +29,11 @@ pub(super) struct PhotoView {
 }
 
 impl PhotoView {
-    pub(super) fn new(index: usize, photo: &Photo, worker: &Worker) -> Self {
-        let command = Command::Photo { index, photo: Box::new(photo.clone()), max_side_px: SIDE_PX };
+    pub(super) fn new(index: usize, photo: &Photo, tasks: &Tasks) -> Self {
         // With a full queue there is no photo to compare with until the next visit.
-        let job = if photo.has_pixels() { worker.submit(command).ok() } else { None };
-        Self { index, photo: photo.clone(), job, pixels: None, texture: None, failed: job.is_none(), margin: 1.0 }
+        let task = if photo.has_pixels() { tasks.photo(index, photo, SIDE_PX).ok() } else { None };
+        let failed = task.is_none();
+        Self { index, photo: photo.clone(), task, pixels: None, texture: None, failed, margin: 1.0 }
     }
 
     pub(super) fn index(&self) -> usize {
@@ -56,16 +56,13 @@ impl PhotoView {
         self.failed
     }
 
-    pub(super) fn take_loaded(&mut self, state: &mut AppState) {
-        if let Some(pixels) = state.photos.remove(&(self.index, SIDE_PX)) {
-            self.pixels = Some(pixels);
+    /// Takes over the photo once it is loaded.
+    pub(super) fn update(&mut self) {
+        match Task::take(&mut self.task) {
+            Some(Ok(pixels)) => self.pixels = Some(Arc::new(pixels)),
+            Some(Err(_)) => self.failed = true,
+            None => {}
         }
-        if let Some(job) = self.job.filter(|j| state.failed_photos.contains(j)) {
-            state.failed_photos.retain(|j| *j != job);
-            self.failed = true;
-        }
-        // Late photos of earlier visits are not kept.
-        state.photos.retain(|(_, side), _| *side != SIDE_PX);
     }
 
     /// The largest rectangle with the photo's aspect ratio in `rect`.

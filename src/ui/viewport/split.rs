@@ -3,8 +3,7 @@
 
 use egui::{Order, Pos2, Rect, Stroke, StrokeKind, Ui, vec2};
 
-use super::super::theme;
-use super::Viewport;
+use crate::ui::theme;
 
 /// Gap between the views, points.
 const GAP: f32 = 2.0;
@@ -14,6 +13,19 @@ const GAP: f32 = 2.0;
 pub(super) struct Views {
     pub(super) first: Rect,
     second: Option<Rect>,
+}
+
+/// A view, and the frame in it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct ViewArea {
+    /// Rectangle of the view.
+    pub(super) rect: Rect,
+    /// Rectangle of the frame in it.
+    pub(super) shown: Rect,
+    /// True for the second of two views.
+    pub(super) second: bool,
+    /// True if it shows another scene.
+    pub(super) is_other: bool,
 }
 
 impl Views {
@@ -39,31 +51,37 @@ impl Views {
         std::iter::once((false, self.first)).chain(self.second.map(|rect| (true, rect)))
     }
 
+    /// All views, with their frames: `shown` is that of the first. With `has_other`, the second shows another scene.
+    pub(super) fn areas(self, shown: Rect, has_other: bool) -> impl Iterator<Item = ViewArea> {
+        self.each().map(move |(second, rect)| self.area(second, rect, shown, has_other))
+    }
+
+    /// The view under the pointer; while a button is down, the one in which it was pressed.
+    pub(super) fn area_under_pointer(self, ui: &Ui, shown: Rect, has_other: bool) -> ViewArea {
+        let (second, rect) = self.at(ui.input(|i| i.pointer.press_origin().or(i.pointer.latest_pos())));
+        self.area(second, rect, shown, has_other)
+    }
+
+    /// All views have the same size, so positions in the first carry over.
+    fn area(self, second: bool, rect: Rect, shown: Rect, has_other: bool) -> ViewArea {
+        ViewArea { rect, shown: shown.translate(rect.min - self.first.min), second, is_other: second && has_other }
+    }
+
+    /// The view to work in after a press, also one through a card over it: `true` for the second.
+    pub(super) fn pressed(self, ui: &Ui) -> Option<bool> {
+        if !self.is_split() {
+            return Some(false);
+        }
+        let pressed = ui.input(|i| i.pointer.interact_pos().filter(|_| i.pointer.any_pressed()))?;
+        let is_ours = ui.layer_id_at(pressed).is_none_or(|layer| layer.order <= Order::Middle);
+        let (second, rect) = self.at(Some(pressed));
+        (is_ours && rect.contains(pressed)).then_some(second)
+    }
+
     /// The view at a position, else the first.
     fn at(&self, pos: Option<Pos2>) -> (bool, Rect) {
         let here = pos.and_then(|pos| self.each().find(|(_, rect)| rect.contains(pos)));
         here.unwrap_or((false, self.first))
-    }
-
-    /// The view under the pointer; while a button is down, the one in which it was pressed.
-    pub(super) fn under_pointer(&self, ui: &Ui) -> Rect {
-        self.at(ui.input(|i| i.pointer.press_origin().or(i.pointer.latest_pos()))).1
-    }
-}
-
-impl Viewport {
-    /// Makes the view that was just pressed active, also through a card over it.
-    pub(super) fn work_where_pressed(&mut self, ui: &Ui, views: &Views) {
-        if !views.is_split() {
-            return self.queries.work_in(false);
-        }
-        let pressed = ui.input(|i| i.pointer.interact_pos().filter(|_| i.pointer.any_pressed()));
-        let is_ours = |pos: &Pos2| ui.layer_id_at(*pos).is_none_or(|layer| layer.order <= Order::Middle);
-        if let Some((second, rect)) = pressed.filter(is_ours).map(|pos| views.at(Some(pos)))
-            && pressed.is_some_and(|pos| rect.contains(pos))
-        {
-            self.queries.work_in(second);
-        }
     }
 }
 

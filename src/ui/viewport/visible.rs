@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use super::chosen::ChosenSplats;
+use super::splat_selection::SplatSelection;
 use crate::scene::{CropBox, GaussianCloud, Identities, IdentityId, NOBODY, SemanticMap};
 use crate::worker::Versioned;
 
@@ -15,7 +15,7 @@ pub(crate) struct Visibility {
     /// Crop box of the rest.
     crop: Option<CropBox>,
     /// Gaussians chosen for deletion.
-    chosen: Option<Arc<ChosenSplats>>,
+    chosen: Option<Arc<SplatSelection>>,
     /// The drawn Gaussians, with the generations of their sources.
     left: Option<((u64, Option<u64>), VisibleCloud)>,
 }
@@ -70,7 +70,7 @@ impl Visibility {
     }
 
     /// Sets the Gaussians chosen for deletion.
-    pub(crate) fn set_chosen(&mut self, chosen: Option<Arc<ChosenSplats>>) {
+    pub(crate) fn set_chosen(&mut self, chosen: Option<Arc<SplatSelection>>) {
         if self.chosen != chosen {
             (self.chosen, self.left) = (chosen, None);
         }

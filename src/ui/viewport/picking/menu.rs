@@ -5,18 +5,14 @@ use egui::{RichText, Ui};
 use crate::navigate::target::Side;
 use crate::scene::{Identities, IdentityId, NOBODY, text};
 use crate::ui::actions::Action;
-use crate::ui::labels::ScreenNames;
+use crate::ui::ctx::Ctx;
 
 /// Draws the menu of an identity, or of the view without one.
-pub(super) fn show(
-    ui: &mut Ui,
-    (all, names): (&Identities, &ScreenNames),
-    id: Option<IdentityId>,
-    actions: &mut Vec<Action>,
-) {
+pub(super) fn show(ui: &mut Ui, all: &Identities, id: Option<IdentityId>, cx: &mut Ctx<'_>) {
+    let state = cx.state;
     let mut row = |ui: &mut Ui, action: Action, name: &str| {
         if ui.button(name).on_hover_text(action.tooltip()).clicked() {
-            actions.push(action);
+            cx.ask(action);
             ui.close();
         }
     };
@@ -27,7 +23,7 @@ pub(super) fn show(
         row(ui, Action::Isolate(None), "Show all objects");
         return;
     };
-    ui.label(RichText::new(text::elided(&names.full_name(all, id), 48)).strong());
+    ui.label(RichText::new(text::elided(&state.labels.full_name(all, id), 48)).strong());
     ui.separator();
     row(ui, Action::GoToTarget(id, Side::Best), "Go there");
     row(ui, Action::Ask(all.full_name(id)), "Query this");

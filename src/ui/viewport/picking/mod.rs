@@ -7,13 +7,14 @@ mod menu;
 
 use egui::{Color32, ColorImage, FontId, Pos2, Rect, Response, TextureHandle, TextureOptions, Ui, pos2, vec2};
 
-use super::super::labels::ScreenNames;
-use super::super::theme;
 use super::outline;
 use crate::jobs::query::ViewMaps;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{Identities, IdentityId, Mask, PixelBox, SemanticMap, text};
 use crate::ui::actions::Action;
+use crate::ui::ctx::Ctx;
+use crate::ui::labels::ScreenNames;
+use crate::ui::theme;
 use crate::worker::Versioned;
 
 /// Color of the identity that a click would select.
@@ -70,9 +71,9 @@ impl Picking {
         &mut self,
         response: &Response,
         shown: Rect,
-        (semantics, names): (&SemanticMap, &ScreenNames),
+        semantics: &SemanticMap,
         maps: Option<&ViewMaps>,
-        actions: &mut Vec<Action>,
+        cx: &mut Ctx<'_>,
     ) {
         let all = &semantics.identities;
         self.selected = self.selected.filter(|id| all.get(*id).is_some());
@@ -84,7 +85,7 @@ impl Picking {
         let cursor = response.hover_pos().filter(|_| !open && !response.dragged());
         self.hovered = cursor.and_then(under).map(|id| picked(all, id, self.selected, alt));
         if response.clicked() && maps.is_some() && self.selected != self.hovered {
-            actions.push(Action::Select(self.hovered));
+            cx.ask(Action::Select(self.hovered));
         }
         if response.secondary_clicked() {
             // On the selection the menu is that of the selection, else of the identity that a click would select.
@@ -92,10 +93,10 @@ impl Picking {
             let within = |s: &IdentityId| id.is_some_and(|id| all.ancestors(id).any(|at| at == *s));
             self.menu = self.selected.filter(within).or_else(|| id.map(|id| picked(all, id, None, alt)));
             if self.menu.is_some() && self.menu != self.selected {
-                actions.push(Action::Select(self.menu));
+                cx.ask(Action::Select(self.menu));
             }
         }
-        response.context_menu(|ui| menu::show(ui, (all, names), self.menu, actions));
+        response.context_menu(|ui| menu::show(ui, all, self.menu, cx));
     }
 
     /// Draws outlines over the frame in `shown`, and the name beside the cursor.
@@ -103,8 +104,9 @@ impl Picking {
         &mut self,
         ui: &Ui,
         shown: Rect,
-        (semantics, names): (&Versioned<SemanticMap>, &ScreenNames),
+        semantics: &Versioned<SemanticMap>,
         maps: &Versioned<ViewMaps>,
+        names: &ScreenNames,
     ) {
         // While text is typed, a click is not expected.
         let hovered = self.hovered.filter(|_| !ui.ctx().text_edit_focused());

@@ -4,33 +4,10 @@ use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{PopupCloseBehavior, TextEdit, Ui};
 use strum::VariantArray;
 
-use super::Queries;
 use crate::pipeline::semantics::recipe::{
     CanonicalPhrases, PartFeatures, Recipe, RecipeName, Rejection, RelevancyScale, Strategy, Understanding,
 };
-use crate::scene::{Lifting, MaskGrid, MaskPrompt, SemanticMap};
-
-impl Queries {
-    /// Recipe of the active view.
-    pub(crate) fn recipe(&self) -> &Recipe {
-        &self.side.settings.recipe
-    }
-
-    /// Recipes of the first and the second view.
-    pub(crate) fn recipes(&self) -> [Recipe; 2] {
-        self.in_order(|side| side.settings.recipe.clone())
-    }
-
-    /// Sets the recipes of the first and the second view and answers again.
-    pub(crate) fn set_recipes(&mut self, recipes: &[Recipe; 2], semantics: &SemanticMap) {
-        if self.recipes() != *recipes {
-            for (second, recipe) in [false, true].into_iter().zip(recipes) {
-                self.in_view(second, |all| all.side.settings.recipe = recipe.clone());
-            }
-            self.ask_again(semantics);
-        }
-    }
-}
+use crate::scene::{Lifting, MaskGrid, MaskPrompt};
 
 /// Draws the rows of the recipe in a grid of two columns.
 pub(super) fn show(ui: &mut Ui, recipe: &mut Recipe) {

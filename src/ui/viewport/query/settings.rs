@@ -3,7 +3,6 @@
 use egui::{Color32, ComboBox, Rect, Sense, Slider, Stroke, Ui, pos2, vec2};
 use strum::VariantArray;
 
-use super::super::super::theme;
 use super::recipe;
 use crate::math::colormap::Colormap;
 use crate::math::format;
@@ -11,6 +10,7 @@ use crate::pipeline::semantics::matching::MatchMode;
 use crate::pipeline::semantics::recipe::Recipe;
 use crate::scene::LevelFilter;
 use crate::ui::color_by::ColorBy;
+use crate::ui::theme;
 
 /// Settings of search and display of answers.
 #[derive(Clone, Debug, PartialEq)]

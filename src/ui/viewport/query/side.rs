@@ -2,15 +2,25 @@
 
 use std::collections::BTreeMap;
 
-use egui::{TextureHandle, Vec2};
+use egui::{Ui, Vec2, vec2};
 
-use super::paint::Painted;
-use super::{Asked, OverlaySettings, Queries, card, truth};
+use super::card::Facts;
+use super::paint::QueryOverlay;
+use super::{Asked, OverlaySettings};
+use crate::jobs::query::ViewMaps;
 use crate::pipeline::semantics::matching::MatchMode;
+use crate::pipeline::semantics::names;
 use crate::pipeline::semantics::parse::ParsedQuery;
 use crate::pipeline::semantics::recipe::Recipe;
-use crate::pipeline::semantics::timing::StagesMs;
-use crate::scene::IdentityId;
+use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
+use crate::worker::Versioned;
+
+/// Number of completions.
+const OFFERED: usize = 5;
+
+/// Pause and least number of characters before "not found" is shown.
+const PAUSE_SECS: f64 = 0.6;
+const SHORTEST: usize = 3;
 
 /// The queries of a view and their overlay.
 #[derive(Default)]
@@ -31,32 +41,30 @@ pub(super) struct QuerySide {
     pub(super) live: Option<Asked>,
     /// Pinned queries.
     pub(super) pinned: Vec<Asked>,
-    /// Relevancy of the pixels, for the histogram.
-    pub(super) heat: Vec<f32>,
-    pub(super) texture: Option<TextureHandle>,
-    pub(super) painted: Option<Painted>,
-    /// Comparison with the true mask.
-    pub(super) comparison: Option<truth::TruthComparison>,
+    pub(super) overlay: QueryOverlay,
     /// Facts about the shown target.
-    pub(super) facts: Option<card::Facts>,
+    facts: Option<Facts>,
     /// Pixel counts of identities in the current view, filled as they are listed.
-    pub(super) areas: Areas,
-    /// Times of localization and drawing, of all queries on screen.
-    pub(super) paint_ms: StagesMs,
+    areas: Areas,
 }
 
 /// Pixel counts of identities in a view, for one match mode.
 #[derive(Default)]
-pub(super) struct Areas {
+struct Areas {
     /// View, objects and match that they were counted for.
-    pub(super) of: (u64, u64, MatchMode, u32),
-    pub(super) known: BTreeMap<IdentityId, (usize, Option<Vec2>)>,
+    of: (u64, u64, MatchMode, u32),
+    known: BTreeMap<IdentityId, (usize, Option<Vec2>)>,
+}
+
+/// All queries, each once, the one in the field last.
+pub(super) fn all_of<'a>(pinned: &'a [Asked], live: Option<&'a Asked>) -> impl Iterator<Item = &'a Asked> {
+    pinned.iter().filter(move |q| live.is_none_or(|live| live.text != q.text)).chain(live)
 }
 
 impl QuerySide {
     /// All queries, each once, the one in the field last.
     pub(super) fn all(&self) -> impl Iterator<Item = &Asked> {
-        self.pinned.iter().filter(|q| !self.is_live(&q.text)).chain(&self.live)
+        all_of(&self.pinned, self.live.as_ref())
     }
 
     /// True if this query is the one in the field.
@@ -69,9 +77,40 @@ impl QuerySide {
         (self.focus, self.begun) = (2, false);
     }
 
+    /// Shows only this hit of the query in the field, or the best ones again.
+    pub(super) fn choose(&mut self, chosen: Option<IdentityId>) {
+        if let (Some(id), Some(newest)) = (chosen, self.live.as_mut()) {
+            newest.chosen = (newest.chosen != Some(id)).then_some(id);
+        }
+    }
+
+    /// Completions of the typed text from known names.
+    pub(super) fn offered(&self, semantics: &SemanticMap) -> Vec<String> {
+        let typed = self.typed.trim();
+        match typed.is_empty() || self.typed_at.is_none() {
+            true => Vec::new(),
+            false => names::completions(&semantics.identities, typed, OFFERED),
+        }
+    }
+
+    /// True if "not found" may be shown: not while the user types.
+    pub(super) fn is_settled(&self, ui: &Ui) -> bool {
+        let Some(at) = self.typed_at else { return true };
+        let wait = PAUSE_SECS - (ui.input(|i| i.time) - at);
+        let is_word = self.typed.trim().chars().count() >= SHORTEST;
+        if is_word && wait > 0.0 {
+            ui.ctx().request_repaint_after_secs(wait as f32);
+        }
+        is_word && wait <= 0.0
+    }
+
     /// Texts of the queries, for the text encoder.
     pub(super) fn texts(&self) -> impl Iterator<Item = (ParsedQuery, Recipe)> {
         self.all().map(|q| (q.reading.phrase.clone(), self.settings.recipe.clone()))
+    }
+
+    pub(super) fn pinned_texts(&self) -> Vec<String> {
+        self.pinned.iter().map(|q| q.text.clone()).collect()
     }
 
     /// Removes queries and answers.
@@ -79,54 +118,36 @@ impl QuerySide {
         Self { settings: self.settings, ..Self::default() }
     }
 
-    fn pinned_texts(&self) -> Vec<String> {
-        self.pinned.iter().map(|q| q.text.clone()).collect()
-    }
-}
-
-impl Queries {
-    /// The queries of the active view, and of the other one.
-    pub(super) fn sides(&self) -> [&QuerySide; 2] {
-        [&self.side, &self.other]
-    }
-
-    /// True if the second of two views is active, which gets new queries.
-    pub fn is_second(&self) -> bool {
-        self.is_second
+    /// Facts about the target; recomputed only when it or the match has changed.
+    pub(super) fn facts_of(
+        &mut self,
+        target: IdentityId,
+        semantics: &Versioned<SemanticMap>,
+        cloud: &GaussianCloud,
+    ) -> Facts {
+        let known = self.facts.take().filter(|facts| facts.is_of(target, semantics, &self.settings.recipe));
+        let facts = known.unwrap_or_else(|| Facts::new(target, semantics, cloud, &self.settings.recipe));
+        self.facts = Some(facts.clone());
+        facts
     }
 
-    /// Makes the first or the second of two views active.
-    pub(crate) fn work_in(&mut self, second: bool) {
-        if self.is_second != second {
-            std::mem::swap(&mut self.side, &mut self.other);
-            self.is_second = second;
+    /// Pixel count and span of an identity, as shares of the view's width and height, computed once per view.
+    pub(super) fn measured(
+        &mut self,
+        maps: &Versioned<ViewMaps>,
+        semantics: &Versioned<SemanticMap>,
+        id: IdentityId,
+    ) -> (usize, Option<Vec2>) {
+        let Recipe { masks, tolerance, .. } = self.settings.recipe;
+        let of = (maps.generation(), semantics.generation(), masks, tolerance.to_bits());
+        if self.areas.of != of {
+            self.areas = Areas { of, known: BTreeMap::new() };
         }
-    }
-
-    /// Runs `act` with the first or the second of two views active.
-    pub fn in_view<R>(&mut self, second: bool, act: impl FnOnce(&mut Self) -> R) -> R {
-        let before = self.is_second;
-        self.work_in(second);
-        let result = act(self);
-        self.work_in(before);
-        result
-    }
-
-    /// Values of the first and of the second view.
-    pub(super) fn in_order<T>(&self, of: impl Fn(&QuerySide) -> T) -> [T; 2] {
-        let [side, other] = self.sides().map(of);
-        if self.is_second { [other, side] } else { [side, other] }
-    }
-
-    /// The queries that are pinned in the first and the second view.
-    pub(crate) fn pinned_texts(&self) -> [Vec<String>; 2] {
-        self.in_order(QuerySide::pinned_texts)
-    }
-
-    /// Forces a new overlay and comparison in both views.
-    pub(super) fn forget_painted(&mut self) {
-        for side in [&mut self.side, &mut self.other] {
-            (side.painted, side.comparison) = (None, None);
-        }
+        *self.areas.known.entry(id).or_insert_with(|| {
+            let mask = maps.mask(semantics, id, masks, tolerance);
+            let of = vec2(mask.width_px() as f32, mask.height_px() as f32);
+            let span = mask.bounds().map(|b| vec2(b.x.len() as f32, b.y.len() as f32) / of);
+            (mask.area(), span)
+        })
     }
 }

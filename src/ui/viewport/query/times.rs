@@ -2,9 +2,9 @@
 
 use egui::{Color32, Rect, RichText, Sense, Ui, pos2, vec2};
 
-use super::super::super::theme;
 use crate::math::format::millis;
 use crate::pipeline::semantics::timing::{STAGES, StagesMs};
+use crate::ui::theme;
 
 /// Colors of the stages, in their order.
 const COLORS: [Color32; 5] = [

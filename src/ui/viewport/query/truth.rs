@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 
-use super::Queries;
 use crate::navigate::Pose;
 use crate::scene::Mask;
 
@@ -11,7 +10,7 @@ const COLORS: [[u8; 3]; 3] = [[40, 200, 120], [230, 60, 60], [250, 180, 30]];
 
 /// A true mask of the view from one pose.
 #[derive(Clone, Debug)]
-pub(super) struct ViewTruth {
+struct ViewTruth {
     mask: Arc<Mask>,
     at: Pose,
 }
@@ -25,42 +24,40 @@ pub(super) struct TruthComparison {
     pub(super) iou: f64,
 }
 
-impl Queries {
-    /// Compares answers with a mask of the view from this pose; `None` ends the comparison.
-    pub(crate) fn compare_with(&mut self, truth: Option<(Arc<Mask>, Pose)>) {
+/// A true mask to compare answers with, and the current camera pose.
+#[derive(Default)]
+pub(super) struct TrueMask {
+    truth: Option<ViewTruth>,
+    eye: Option<Pose>,
+}
+
+impl TrueMask {
+    /// Sets or removes the mask of the view from a pose.
+    pub(super) fn set(&mut self, truth: Option<(Arc<Mask>, Pose)>) {
         self.truth = truth.map(|(mask, at)| ViewTruth { mask, at });
-        self.forget_painted();
     }
 
-    /// Sets the current pose: a mask is true of one view only.
-    pub(crate) fn stand(&mut self, pose: Pose) {
-        if self.eye != Some(pose) {
-            self.eye = Some(pose);
-            if self.truth.is_some() {
-                self.forget_painted();
-            }
-        }
+    /// Sets the current pose: a mask is true of one view only. Returns true if comparisons change.
+    pub(super) fn stand(&mut self, pose: Pose) -> bool {
+        self.eye.replace(pose) != Some(pose) && self.truth.is_some()
     }
 
     /// The true mask of the current view.
-    pub(crate) fn truth(&self) -> Option<Arc<Mask>> {
+    pub(super) fn here(&self) -> Option<Arc<Mask>> {
         let here = |t: &&ViewTruth| self.eye.is_some_and(|eye| is_same(&eye, &t.at));
         self.truth.as_ref().filter(here).map(|t| Arc::clone(&t.mask))
     }
+}
 
-    /// True if the answer of the view is compared with the true mask.
-    pub(crate) fn compares(&self) -> bool {
-        self.side.comparison.is_some()
-    }
-
-    /// The masks to draw: the newest against the true mask of this view, if there is one.
-    pub(super) fn compared(&mut self, masks: Vec<([u8; 3], Mask)>) -> Vec<([u8; 3], Mask)> {
-        let (Some(truth), Some((_, newest))) = (self.truth(), masks.last()) else { return masks };
-        let truth = truth.resized(newest.width_px(), newest.height_px());
-        let (comparison, masks) = compare(newest, &truth);
-        self.side.comparison = Some(comparison);
-        COLORS.into_iter().zip(masks).collect()
-    }
+/// The masks to draw: the newest against the true mask, if there is one.
+pub(super) fn compared(
+    truth: Option<&Mask>,
+    masks: Vec<([u8; 3], Mask)>,
+) -> (Option<TruthComparison>, Vec<([u8; 3], Mask)>) {
+    let (Some(truth), Some((_, newest))) = (truth, masks.last()) else { return (None, masks) };
+    let truth = truth.resized(newest.width_px(), newest.height_px());
+    let (comparison, masks) = compare(newest, &truth);
+    (Some(comparison), COLORS.into_iter().zip(masks).collect())
 }
 
 fn is_same(a: &Pose, b: &Pose) -> bool {
@@ -106,6 +103,7 @@ impl TruthComparison {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::ui::viewport::query::Queries;
     use glam::{DMat3, DVec3};
 
     #[test]
@@ -130,10 +128,11 @@ mod tests {
         assert!(queries.truth().is_none(), "seen from elsewhere");
         queries.stand(pose(0.0));
         assert!(queries.truth().is_some(), "back again");
-        let masks = queries.compared(vec![([1; 3], Mask::from_fn(2, 2, |i| i == 0))]);
+        let masks = vec![([1; 3], Mask::from_fn(2, 2, |i| i == 0))];
+        let (comparison, masks) = compared(queries.truth().as_deref(), masks);
         assert_eq!(masks.iter().map(|m| m.1.area()).collect::<Vec<_>>(), [1, 3, 0]);
-        assert_eq!(queries.side.comparison.as_ref().map(|c| c.iou), Some(0.25));
+        assert_eq!(comparison.map(|c| c.iou), Some(0.25));
         queries.compare_with(None);
-        assert!(queries.truth().is_none() && queries.side.comparison.is_none());
+        assert!(queries.truth().is_none() && !queries.compares());
     }
 }

@@ -2,13 +2,18 @@
 
 use std::sync::Arc;
 
-use egui::{Align2, Area, Color32, ColorImage, Id, Order, Rect, Slider, TextureHandle, TextureOptions, Ui};
+use egui::{
+    Align2, Area, Color32, ColorImage, Id, Order, PointerButton, Rect, Response, Slider, TextureHandle, TextureOptions,
+    Ui,
+};
 
-use super::super::theme;
-use super::Viewport;
+use super::super::split::ViewArea;
+use super::{CardPlaces, ToolScene, ViewTool};
 use crate::math::grid::neighbors;
 use crate::scene::{Camera, Mask};
 use crate::ui::actions::Action;
+use crate::ui::ctx::Ctx;
+use crate::ui::theme;
 
 /// Largest color difference per channel between neighbors in a fill.
 const SAME_COLOR: u8 = 14;
@@ -17,7 +22,7 @@ const SAME_COLOR: u8 = 14;
 const PAINT: [u8; 3] = [255, 60, 200];
 
 /// The true mask under edit.
-pub(crate) struct Brush {
+pub(crate) struct MaskBrush {
     radius_px: f32,
     /// Camera of the painted view.
     camera: Option<Camera>,
@@ -26,7 +31,7 @@ pub(crate) struct Brush {
     texture: Option<TextureHandle>,
 }
 
-impl Brush {
+impl MaskBrush {
     /// An empty brush.
     pub(crate) fn new() -> Self {
         let mask = Mask::empty(0, 0);
@@ -34,7 +39,7 @@ impl Brush {
     }
 
     /// Starts over with the known mask if the view has changed: paint belongs to one view.
-    pub(crate) fn on_view(&mut self, camera: &Camera, known: Option<&Mask>) {
+    fn on_view(&mut self, camera: &Camera, known: Option<&Mask>) {
         if self.camera.as_ref() != Some(camera) {
             let (width_px, height_px) = (camera.width_px as usize, camera.height_px as usize);
             self.mask = known.map_or_else(|| Mask::empty(width_px, height_px), |m| m.resized(width_px, height_px));
@@ -44,7 +49,7 @@ impl Brush {
     }
 
     /// Paints a dab around a pixel, or erases one.
-    pub(crate) fn dab(&mut self, at: [f32; 2], scale: f32, erase: bool) {
+    fn dab(&mut self, at: [f32; 2], scale: f32, erase: bool) {
         let mut dab = Mask::empty(self.mask.width_px(), self.mask.height_px());
         let (w, h) = (self.mask.width_px() as i64, self.mask.height_px() as i64);
         let r = (self.radius_px * scale).max(1.0);
@@ -70,7 +75,7 @@ impl Brush {
     }
 
     /// Paints or erases the connected region of similar color around a pixel.
-    pub(crate) fn flood(&mut self, at: [usize; 2], rgb: &[[u8; 3]], erase: bool) {
+    fn flood(&mut self, at: [usize; 2], rgb: &[[u8; 3]], erase: bool) {
         let (w, h) = (self.mask.width_px(), self.mask.height_px());
         if rgb.len() != w * h || at[0] >= w || at[1] >= h {
             return;
@@ -90,8 +95,50 @@ impl Brush {
         self.take(&seen, erase);
     }
 
-    /// Draws the paint over the frame in `rect`; unless `plainly`, hits and misses are drawn instead.
-    pub(crate) fn paint(&mut self, ui: &Ui, rect: Rect, plainly: bool) {
+    fn true_mask_buttons(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>) {
+        let ready = !self.mask.is_empty();
+        if ui.add_enabled(ready, egui::Button::new("Save\u{2026}")).clicked() {
+            cx.ask(Action::SaveTrueMask);
+        }
+        if ui.button("Clear").clicked() {
+            self.camera = None;
+            cx.ask(Action::TrueMask(None));
+        }
+        if ui.button("Done").clicked() {
+            cx.ask(Action::Paint(None));
+        }
+    }
+}
+
+impl ViewTool for MaskBrush {
+    fn takes_drags(&self) -> bool {
+        true
+    }
+
+    /// Paints along drags, fills at clicks; erases with Shift.
+    fn pointer(&mut self, response: &Response, area: ViewArea, scene: &mut ToolScene<'_>, _cx: &mut Ctx<'_>) {
+        let Some(picture) = scene.display.picture() else { return };
+        // Only a full frame has the pixels of the maps, and a late one does not match the current view.
+        if !picture.full || picture.ticket != scene.ticket {
+            return;
+        }
+        self.on_view(&picture.camera, scene.queries.truth().as_deref());
+        let Some(pos) = response.interact_pointer_pos() else { return };
+        let scale = picture.camera.width_px as f32 / area.shown.width();
+        let at = [(pos.x - area.shown.left()) * scale, (pos.y - area.shown.top()) * scale];
+        let erase = response.ctx.input(|i| i.modifiers.shift);
+        if response.dragged_by(PointerButton::Primary) {
+            self.dab(at, scale, erase);
+        } else if response.clicked() && at.iter().all(|v| *v >= 0.0) {
+            self.flood([at[0] as usize, at[1] as usize], &picture.rgb, erase);
+        } else {
+            return;
+        }
+        scene.queries.compare_with(Some((Arc::new(self.mask.clone()), scene.pose)));
+    }
+
+    /// Draws the paint over the frame; in a comparison with an answer, hits and misses are drawn instead.
+    fn paint(&mut self, ui: &Ui, area: ViewArea, scene: &mut ToolScene<'_>, _cx: &mut Ctx<'_>) {
         if std::mem::take(&mut self.changed) {
             let size = [self.mask.width_px(), self.mask.height_px()];
             let pixel = |i| {
@@ -107,16 +154,18 @@ impl Brush {
                 None => self.texture = Some(ui.ctx().load_texture("paint", image, TextureOptions::LINEAR)),
             }
         }
-        if let Some(texture) = self.texture.as_ref().filter(|_| !self.mask.is_empty() && plainly) {
+        let is_plain = !scene.queries.compares();
+        if let Some(texture) = self.texture.as_ref().filter(|_| !self.mask.is_empty() && is_plain) {
             let uv = Rect::from_min_max(egui::pos2(0.0, 0.0), egui::pos2(1.0, 1.0));
-            ui.painter().image(texture.id(), rect, uv, Color32::WHITE);
+            ui.painter().image(texture.id(), area.shown, uv, Color32::WHITE);
         }
-        if let Some(pos) = ui.input(|i| i.pointer.hover_pos()).filter(|p| rect.contains(*p)) {
+        if let Some(pos) = ui.input(|i| i.pointer.hover_pos()).filter(|p| area.shown.contains(*p)) {
             ui.painter().circle_stroke(pos, self.radius_px, egui::Stroke::new(1.0, Color32::WHITE));
         }
     }
 
-    pub(crate) fn show(&mut self, ui: &Ui, rect: Rect, actions: &mut Vec<Action>) {
+    fn card(&mut self, ui: &Ui, places: CardPlaces, _scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
+        let rect = places.active_view;
         let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(52.0));
         let area = Area::new(Id::unique("brush")).order(Order::Foreground).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
         theme::card(ui.ctx(), area.constrain_to(rect), |ui| {
@@ -125,50 +174,9 @@ impl Brush {
             ui.weak("Shift erases. Right-drag and wheel move the view; the paint belongs to this one.");
             ui.horizontal(|ui| {
                 ui.add(Slider::new(&mut self.radius_px, 2.0..=60.0).show_value(false).text("brush"));
-                self.true_mask_buttons(ui, actions);
+                self.true_mask_buttons(ui, cx);
             });
         });
-    }
-
-    fn true_mask_buttons(&mut self, ui: &mut Ui, actions: &mut Vec<Action>) {
-        let ready = !self.mask.is_empty();
-        if ui.add_enabled(ready, egui::Button::new("Save\u{2026}")).clicked() {
-            actions.push(Action::SaveTrueMask);
-        }
-        if ui.button("Clear").clicked() {
-            self.camera = None;
-            actions.push(Action::TrueMask(None));
-        }
-        if ui.button("Done").clicked() {
-            actions.push(Action::Paint(None));
-        }
-    }
-}
-
-impl Viewport {
-    /// Paints along drags, fills at clicks; erases with Shift.
-    pub(super) fn use_brush(&mut self, response: &egui::Response, rect: Rect) {
-        let (Some(brush), Some(picture)) = (&mut self.brush, self.display.picture()) else { return };
-        let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
-        // Only a full frame has the pixels of the maps, and a late one does not match the current view.
-        if !picture.full || picture.ticket != self.requests.ticket() {
-            return;
-        }
-        brush.on_view(&picture.camera, self.queries.truth().as_deref());
-        let Some(pos) = response.interact_pointer_pos() else { return };
-        let scale = picture.camera.width_px as f32 / shown.width();
-        let at = [(pos.x - shown.left()) * scale, (pos.y - shown.top()) * scale];
-        let erase = response.ctx.input(|i| i.modifiers.shift);
-        if response.dragged_by(egui::PointerButton::Primary) {
-            brush.dab(at, scale, erase);
-        } else if response.clicked() && at.iter().all(|v| *v >= 0.0) {
-            brush.flood([at[0] as usize, at[1] as usize], &picture.rgb, erase);
-        } else {
-            return;
-        }
-        let mask = Arc::new(brush.mask.clone());
-        let pose = self.pose();
-        self.queries.compare_with(Some((mask, pose)));
     }
 }
 
@@ -183,7 +191,7 @@ mod tests {
         // Red columns 4 to 7, and another one apart.
         let red = |x: usize| (4..8).contains(&x) || x == 9;
         let rgb: Vec<[u8; 3]> = (0..100).map(|i| if red(i % 10) { [200, 0, 0] } else { [0, 0, 200] }).collect();
-        let mut brush = Brush::new();
+        let mut brush = MaskBrush::new();
         brush.on_view(&camera, None);
         brush.flood([5, 5], &rgb, false);
         assert_eq!(brush.mask.area(), 40, "columns 4 to 7");
@@ -198,7 +206,7 @@ mod tests {
     fn a_true_mask_is_erased_and_taken_up_again() {
         let camera = Camera::look_at(DVec3::ONE, DVec3::ZERO, DVec3::Z, 0.8, 10, 10).expect("valid");
         let rgb: Vec<[u8; 3]> = (0..100).map(|i| if i % 10 >= 4 { [200, 0, 0] } else { [0, 0, 200] }).collect();
-        let mut brush = Brush::new();
+        let mut brush = MaskBrush::new();
         brush.on_view(&camera, None);
         brush.flood([5, 5], &rgb, false);
         let before = brush.mask.area();

@@ -5,37 +5,51 @@ use egui::{
 };
 use glam::{DQuat, DVec2, DVec3};
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
-use super::super::{keys, theme};
-use super::frusta::clipped;
-use super::visible::VisibleCloud;
-use super::{AppState, Viewport};
-use crate::jobs::inspect::{GaussianRecord, InspectRequest, InspectedPixel, PixelRecord};
+use super::super::frusta::clipped;
+use super::super::split::ViewArea;
+use super::{CardPlaces, ToolScene, ViewTool};
+use crate::jobs::inspect::{self, GaussianRecord, InspectRequest, InspectedPixel, PixelRecord};
 use crate::math::format;
 use crate::scene::Camera;
 use crate::ui::actions::Action;
+use crate::ui::ctx::Ctx;
+use crate::ui::state::{AppState, Tone};
+use crate::ui::{keys, theme};
+use crate::worker::{JobInfo, QueueFull, Task, Tasks};
 
+/// Title of the job.
+const TITLE: &str = "Inspecting a pixel";
 /// Outline of a Gaussian, standard deviations.
 const OUTLINE_SIGMA: f64 = 2.0;
 /// Corners of an outline.
 const CORNERS: usize = 48;
 
 /// The inspected pixel, and which of its Gaussians is shown.
-#[derive(Clone, Debug, Default)]
+#[derive(Debug, Default)]
 pub(crate) struct Inspector {
-    pixel: Option<Arc<InspectedPixel>>,
-    /// True while another pixel is being inspected.
-    waits: bool,
+    pixel: Option<InspectedPixel>,
+    /// The job that inspects another pixel.
+    task: Option<Task<InspectedPixel>>,
+    /// Reason why a pixel could not be inspected, until it is reported.
+    refused: Option<QueueFull>,
     place: usize,
     record: Option<GaussianRecord>,
 }
 
 impl Inspector {
+    /// Inspects another pixel, in place of one that is being inspected.
+    pub(crate) fn inspect(&mut self, request: InspectRequest, tasks: &Tasks) {
+        match tasks.spawn(JobInfo::short(TITLE), move |_| inspect::run(request)) {
+            Ok(task) => self.task = Some(task),
+            Err(refused) => self.refused = Some(refused),
+        }
+    }
+
     /// Shows a pixel, beginning with its largest Gaussian.
-    pub(crate) fn take(&mut self, pixel: Arc<InspectedPixel>) {
+    fn take(&mut self, pixel: InspectedPixel) {
         self.record = pixel.record(0);
-        (self.pixel, self.place, self.waits) = (Some(pixel), 0, false);
+        (self.pixel, self.place) = (Some(pixel), 0);
     }
 
     fn go(&mut self, place: usize) {
@@ -45,53 +59,46 @@ impl Inspector {
     }
 }
 
-impl Viewport {
-    /// True if the inspector is in use.
-    pub(crate) fn is_inspecting(&self) -> bool {
-        self.inspector.is_some()
+impl ViewTool for Inspector {
+    fn takes_clicks(&self) -> bool {
+        true
     }
 
-    /// The request to inspect the pixel at a relative position of the view.
-    pub(crate) fn inspect_request(&mut self, at: DVec2, state: &AppState) -> Option<InspectRequest> {
-        let (cloud, camera) = (self.cloud.clone()?, self.picture()?.camera.clone());
-        let VisibleCloud { cloud, semantics, numbers } = self.visibility.apply(&cloud, state.semantics.as_ref());
-        let size = DVec2::new(f64::from(camera.width_px), f64::from(camera.height_px));
-        let pixel = (at * size).clamp(DVec2::ZERO, size - 1.0);
-        self.inspector.iter_mut().for_each(|inspector| inspector.waits = true);
-        Some(InspectRequest {
-            cloud: Arc::clone(&cloud),
-            map: semantics.as_deref().cloned(),
-            numbers,
-            settings: self.overrides.over(state.render_settings(), self.on_gpu()),
-            camera,
-            pixel: [pixel.x as u32, pixel.y as u32],
-        })
+    fn update(&mut self, _scene: &mut ToolScene<'_>, state: &mut AppState, _tasks: &Tasks) {
+        if let Some(refused) = self.refused.take() {
+            state.toast(Tone::Warning, format!("{TITLE}: {refused}"));
+        }
+        // A failure was reported; the pixel before stays.
+        if let Some(Ok(pixel)) = Task::take(&mut self.task) {
+            self.take(pixel);
+        }
     }
 
-    /// Handles clicks, outlines the Gaussian and lists its properties.
-    pub(super) fn show_inspector(
-        &mut self,
-        ui: &Ui,
-        response: &Response,
-        shown: Rect,
-        state: &AppState,
-        actions: &mut Vec<Action>,
-    ) {
-        let eye = self.overlay_camera(shown);
-        let Some(inspector) = &mut self.inspector else { return };
-        if let Some(pos) = response.interact_pointer_pos().filter(|pos| response.clicked() && shown.contains(*pos)) {
-            let at = (pos - shown.min) / shown.size();
-            actions.push(Action::InspectAt(DVec2::new(f64::from(at.x), f64::from(at.y))));
+    /// Inspects the pixel under a click in the first view.
+    fn pointer(&mut self, response: &Response, area: ViewArea, _scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
+        let clicked = response.interact_pointer_pos().filter(|pos| response.clicked() && area.shown.contains(*pos));
+        if let Some(pos) = clicked.filter(|_| !area.second) {
+            let at = (pos - area.shown.min) / area.shown.size();
+            cx.ask(Action::InspectAt(DVec2::new(f64::from(at.x), f64::from(at.y))));
         }
-        if let (Some(pixel), Some(record)) = (&inspector.pixel, &inspector.record) {
-            outline(ui, shown, &eye, pixel, record);
+    }
+
+    /// Outlines the Gaussian in the first view.
+    fn paint(&mut self, ui: &Ui, area: ViewArea, scene: &mut ToolScene<'_>, _cx: &mut Ctx<'_>) {
+        if let (Some(pixel), Some(record), false) = (&self.pixel, &self.record, area.second) {
+            outline(ui, area.shown, &scene.camera(area.shown), pixel, record);
         }
+    }
+
+    /// Lists the properties of the Gaussian.
+    fn card(&mut self, ui: &Ui, places: CardPlaces, _scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
+        let shown = places.first_frame;
         // Above the facts about the frame.
         let at = Align2::LEFT_BOTTOM.pos_in_rect(&shown.shrink(12.0)) - vec2(0.0, 40.0);
         let area = Area::new(Id::unique("inspector")).order(Order::Middle).pivot(Align2::LEFT_BOTTOM).fixed_pos(at);
         let drawn = theme::card(ui.ctx(), area.constrain_to(shown), |ui| {
             ui.set_width((shown.width() - 44.0).clamp(120.0, 330.0));
-            card(ui, inspector, (shown.height() - 300.0).clamp(90.0, 420.0), state, actions);
+            card(ui, self, (shown.height() - 300.0).clamp(90.0, 420.0), cx);
         });
         // The card has grown; the next frame places it correctly.
         if drawn.response.rect.bottom() > at.y + 1.0 {
@@ -100,7 +107,7 @@ impl Viewport {
     }
 }
 
-fn card(ui: &mut Ui, inspector: &mut Inspector, height: f32, state: &AppState, actions: &mut Vec<Action>) {
+fn card(ui: &mut Ui, inspector: &mut Inspector, height: f32, cx: &mut Ctx<'_>) {
     ui.horizontal(|ui| {
         ui.label(RichText::new("Gaussian").strong());
         let of = inspector.pixel.as_ref().map_or(0, |pixel| pixel.weights.len());
@@ -120,10 +127,10 @@ fn card(ui: &mut Ui, inspector: &mut Inspector, height: f32, state: &AppState, a
             inspector.go(place);
         }
     });
-    match (&inspector.record, inspector.waits) {
+    match (&inspector.record, inspector.task.is_some()) {
         (Some(record), _) => {
             ScrollArea::vertical().max_height(height).auto_shrink([false, true]).show(ui, |ui| {
-                properties(ui, record, state);
+                properties(ui, record, cx.state);
             });
         }
         (None, true) => {
@@ -141,7 +148,7 @@ fn card(ui: &mut Ui, inspector: &mut Inspector, height: f32, state: &AppState, a
         }
         let close = ui.button("Close").on_hover_text(keys::label(ui.ctx(), &Action::Inspect));
         if close.clicked() {
-            actions.push(Action::Inspect);
+            cx.ask(Action::Inspect);
         }
     });
 }

@@ -1,17 +1,18 @@
-//! Arranging an object or part: moving, rotating, scaling, duplicating, recoloring.
+//! Transforming an object or part: moving, rotating, scaling, duplicating, recoloring.
 
 use std::sync::Arc;
 
 use egui::{Align2, Area, Color32, DragValue, Id, Order, Rect, Sense, Stroke, Ui, Vec2, vec2};
 use glam::{DQuat, DVec3};
 
-use super::super::theme;
-use super::Viewport;
+use super::super::split::ViewArea;
 use super::crop::{on_screen, travel};
+use super::{CardPlaces, ToolScene, ViewTool};
 use crate::jobs::rearrange::{Arrangement, SplatEdit, apply};
 use crate::scene::{Bounds, Camera, GaussianCloud, Identities, NOBODY, SemanticMap};
 use crate::ui::actions::Action;
-use crate::ui::state::AppState;
+use crate::ui::ctx::Ctx;
+use crate::ui::theme;
 use crate::worker::Versioned;
 
 /// Length of the arrows, points.
@@ -23,7 +24,7 @@ const AXES: [Color32; 3] =
 const FIRST_COLOR: [f32; 3] = [0.8, 0.2, 0.15];
 
 /// The arrangement of an object or part under edit.
-pub(crate) struct ArrangeTool {
+pub(crate) struct TransformTool {
     arrangement: Arrangement,
     /// Rotation about the up direction, degrees.
     degrees: f64,
@@ -41,8 +42,8 @@ struct Arranged {
     map: Option<Versioned<SemanticMap>>,
 }
 
-impl ArrangeTool {
-    pub(super) fn new(id: u32, cloud: &GaussianCloud, map: &SemanticMap, up: DVec3) -> Self {
+impl TransformTool {
+    pub(crate) fn new(id: u32, cloud: &GaussianCloud, map: &SemanticMap, up: DVec3) -> Self {
         let places = map.members(id).into_iter().filter(|i| *i < cloud.len()).map(|i| cloud.world_position(i));
         let bounds = Bounds::robust(places);
         let (middle, radius) = bounds.map_or((DVec3::ZERO, 1.0), |b| (b.center(), b.radius()));
@@ -59,7 +60,7 @@ impl ArrangeTool {
     }
 
     /// Arranged Gaussians and their identities; `None` while nothing is changed.
-    pub(super) fn preview(
+    pub(crate) fn preview(
         &mut self,
         cloud: &Versioned<GaussianCloud>,
         map: Option<&Versioned<SemanticMap>>,
@@ -102,7 +103,7 @@ impl ArrangeTool {
     }
 
     /// Draws the card of the tool.
-    fn show_card(&mut self, ui: &Ui, rect: Rect, all: &Identities, actions: &mut Vec<Action>) {
+    fn show_card(&mut self, ui: &Ui, rect: Rect, all: &Identities, cx: &mut Ctx<'_>) {
         // Above the facts about the frame.
         let at = Align2::LEFT_BOTTOM.pos_in_rect(&rect.shrink(12.0)) - vec2(0.0, 40.0);
         let area = Area::new(Id::unique("arranging")).order(Order::Foreground).pivot(Align2::LEFT_BOTTOM);
@@ -141,33 +142,41 @@ impl ArrangeTool {
                 let keep = Action::KeepArranged;
                 let button = ui.add_enabled(self.is_something(), theme::primary_button("Apply"));
                 if button.on_hover_text(keep.tooltip()).clicked() {
-                    actions.push(keep);
+                    cx.ask(keep);
                 }
                 if ui.add_enabled(self.is_something(), egui::Button::new("Reset")).clicked() {
                     (self.arrangement, self.degrees) = (Arrangement::of(self.arrangement.id), 0.0);
                 }
                 let whole = all.get(self.arrangement.id).map_or(NOBODY, |i| i.parent);
                 if whole != NOBODY && ui.button("All of it").on_hover_text(all.full_name(whole)).clicked() {
-                    actions.push(Action::Arrange(whole));
+                    cx.ask(Action::Arrange(whole));
                 }
                 if ui.button("Cancel").clicked() {
-                    actions.push(Action::Paint(None));
+                    cx.ask(Action::Paint(None));
                 }
             });
         });
     }
 }
 
-impl Viewport {
-    /// Draws the tool and handles its input.
-    pub(super) fn show_arranging(&mut self, ui: &Ui, shown: Rect, state: &AppState, actions: &mut Vec<Action>) {
-        let eye = self.overlay_camera(shown);
-        let Some(tool) = &mut self.arrange else { return };
-        let before = tool.arrangement;
-        tool.show_arrows(ui, shown, &eye);
-        let none = Identities::default();
-        tool.show_card(ui, shown, state.semantics.as_ref().map_or(&none, |map| &map.identities), actions);
-        if tool.arrangement != before {
+impl ViewTool for TransformTool {
+    /// Draws the arrows in the first view.
+    fn paint(&mut self, ui: &Ui, area: ViewArea, scene: &mut ToolScene<'_>, _cx: &mut Ctx<'_>) {
+        if area.second {
+            return;
+        }
+        let before = self.arrangement;
+        self.show_arrows(ui, area.shown, &scene.camera(area.shown));
+        if self.arrangement != before {
+            ui.ctx().request_repaint();
+        }
+    }
+
+    fn card(&mut self, ui: &Ui, places: CardPlaces, _scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
+        let (before, none, state) = (self.arrangement, Identities::default(), cx.state);
+        let all = state.semantics.as_ref().map_or(&none, |map| &map.identities);
+        self.show_card(ui, places.first_frame, all, cx);
+        if self.arrangement != before {
             ui.ctx().request_repaint();
         }
     }
@@ -185,7 +194,7 @@ mod tests {
         let mut all = Identities::default();
         all.add(Level::Object, NOBODY, vec!["mug".into()]);
         let map = SemanticMap::from_identities(all, vec![1, 1, 1, 0, 0, 0], vec![1.0; 6], vec![]);
-        let mut tool = ArrangeTool::new(1, &cloud, &map, DVec3::Y);
+        let mut tool = TransformTool::new(1, &cloud, &map, DVec3::Y);
         let (cloud, map) = (Versioned::new(Arc::new(cloud)), Versioned::new(Arc::new(map)));
         assert!(tool.preview(&cloud, Some(&map)).is_none());
         tool.arrangement.to = Placement { shift: DVec3::new(0.0, 2.0, 0.0), ..Placement::default() };

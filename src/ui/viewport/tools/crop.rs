@@ -5,41 +5,61 @@ use egui::{
 };
 use glam::DVec3;
 
-use super::super::{keys, theme};
-use super::Viewport;
-use super::frusta::clipped;
+use super::super::frusta::clipped;
+use super::super::split::ViewArea;
+use super::{CardPlaces, ToolScene, ViewTool};
 use crate::math::format;
 use crate::scene::{Bounds, Camera, CropBox};
 use crate::ui::actions::Action;
-use crate::ui::state::AppState;
+use crate::ui::ctx::Ctx;
+use crate::ui::{keys, theme};
 
 /// Radius of a face's handle, points.
 const HANDLE: f32 = 6.0;
 /// Steps across a scene while a number is dragged.
 const STEPS: f64 = 500.0;
 
-impl Viewport {
-    /// Draws the box and handles its input.
-    pub(super) fn show_crop(&mut self, ui: &Ui, shown: Rect, state: &AppState, actions: &mut Vec<Action>) {
-        let Some(scene) = state.scene.as_ref().filter(|_| self.cropping) else { return };
-        let before = self.visibility.crop();
-        let mut crop = before;
-        if let Some(crop) = &mut crop {
-            let eye = self.overlay_camera(shown);
-            draw_edges(ui, shown, &eye, &crop.bounds);
-            for axis in 0..3 {
-                for high in [false, true] {
-                    drag_face(ui, shown, &eye, crop, axis, high);
-                }
+/// The crop box under edit. The box itself is part of what is visible, and outlives the tool.
+pub(crate) struct CropTool;
+
+impl CropTool {
+    /// A box around the main content, with a margin: the scene's own box leaves out one in twenty.
+    pub(crate) fn first_box(content: &Bounds) -> CropBox {
+        let (center, half) = (content.center(), 0.8 * content.size());
+        CropBox { bounds: Bounds { min: center - half, max: center + half }, outside: false }
+    }
+}
+
+impl ViewTool for CropTool {
+    /// Draws the box in the first view; its faces can be dragged.
+    fn paint(&mut self, ui: &Ui, area: ViewArea, scene: &mut ToolScene<'_>, _cx: &mut Ctx<'_>) {
+        let Some(before) = scene.visibility.crop().filter(|_| !area.second) else { return };
+        let (mut crop, eye) = (before, scene.camera(area.shown));
+        draw_edges(ui, area.shown, &eye, &crop.bounds);
+        for axis in 0..3 {
+            for high in [false, true] {
+                drag_face(ui, area.shown, &eye, &mut crop, axis, high);
             }
         }
-        let selected = self.selected_bounds(state.semantics.as_ref());
+        if crop != before {
+            scene.visibility.set_crop(Some(crop));
+            ui.ctx().request_repaint();
+        }
+    }
+
+    fn card(&mut self, ui: &Ui, places: CardPlaces, scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
+        let state = cx.state;
+        let Some(content) = state.scene.as_ref().map(|opened| opened.home.bounds) else { return };
+        let before = scene.visibility.crop();
+        let mut crop = before;
+        let selected = scene.selected_bounds(state.semantics.as_ref());
+        let shown = places.first_frame;
         // Above the facts about the frame.
         let at = Align2::LEFT_BOTTOM.pos_in_rect(&shown.shrink(12.0)) - vec2(0.0, 40.0);
         let area = Area::new(Id::unique("crop")).order(Order::Middle).pivot(Align2::LEFT_BOTTOM).fixed_pos(at);
         theme::card(ui.ctx(), area.constrain_to(shown), |ui| {
             if let Some(crop) = &mut crop {
-                numbers(ui, crop, 2.0 * scene.home.bounds.radius() / STEPS);
+                numbers(ui, crop, 2.0 * content.radius() / STEPS);
             }
             ui.horizontal(|ui| {
                 let mut fit = |ui: &mut Ui, text: &str, tip: &str, to: Option<Bounds>| {
@@ -48,7 +68,7 @@ impl Viewport {
                         crop = Some(CropBox { bounds, outside: crop.is_some_and(|c| c.outside) });
                     }
                 };
-                fit(ui, "Fit scene", "The box of the scene without its stray points.", Some(scene.home.bounds));
+                fit(ui, "Fit scene", "The box of the scene without its stray points.", Some(content));
                 fit(ui, "Fit selection", "The box of what is selected.", selected);
                 if ui.add_enabled(crop.is_some(), Button::new("Remove box")).on_hover_text("Show all again.").clicked()
                 {
@@ -59,21 +79,21 @@ impl Viewport {
                 let export = Action::ExportCrop;
                 let button = ui.add_enabled(crop.is_some(), Button::new("Export\u{2026}"));
                 if button.on_hover_text(export.text()).clicked() {
-                    actions.push(export);
+                    cx.ask(export);
                 }
                 let close = ui
                     .button("Close")
                     .on_hover_text(format!("What is cropped stays so.  {}", keys::label(ui.ctx(), &Action::Crop)));
                 if close.clicked() {
-                    actions.push(Action::Crop);
+                    cx.ask(Action::Crop);
                 }
-                if let Some(count) = self.visibility.count() {
+                if let Some(count) = scene.visibility.count() {
                     ui.weak(format!("{} Gaussians", format::count(count as u64)));
                 }
             });
         });
         if crop != before {
-            self.visibility.set_crop(crop);
+            scene.visibility.set_crop(crop);
             ui.ctx().request_repaint();
         }
     }

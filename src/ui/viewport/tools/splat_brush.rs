@@ -1,13 +1,15 @@
 //! Choosing Gaussians with a brush: those with centers under the brush, on or before the visible surface, or all along
 //! the line of sight.
 
-use egui::{Align2, Area, Color32, Id, Order, PointerButton, Rect, Slider, Stroke, Ui};
+use egui::{Align2, Area, Color32, Id, Order, PointerButton, Response, Slider, Stroke, Ui};
 use glam::DVec2;
 
-use super::super::theme;
-use super::Viewport;
+use super::super::split::ViewArea;
+use super::{CardPlaces, ToolScene, ViewTool};
 use crate::scene::{Camera, GaussianCloud};
 use crate::ui::actions::Action;
+use crate::ui::ctx::Ctx;
+use crate::ui::theme;
 
 /// Largest depth of a center behind the rendered surface to count as on it, as a share of its depth.
 const ON_SURFACE: f64 = 0.02;
@@ -41,15 +43,61 @@ impl SplatBrush {
         centers.enumerate().filter(|(_, c)| near(c)).map(|(i, _)| i).collect()
     }
 
+    /// Takes the Gaussians brushed over since the last call.
+    pub(crate) fn take_brushed(&mut self) -> Vec<Brushed> {
+        std::mem::take(&mut self.brushed)
+    }
+}
+
+impl ViewTool for SplatBrush {
+    fn takes_drags(&self) -> bool {
+        true
+    }
+
+    /// Chooses Gaussians along drags and clicks; removes them from the choice with Shift.
+    fn pointer(&mut self, response: &Response, area: ViewArea, scene: &mut ToolScene<'_>, _cx: &mut Ctx<'_>) {
+        let (Some(picture), Some(cloud)) = (scene.display.picture(), scene.cloud) else { return };
+        let (Some(pos), true) = (
+            response.interact_pointer_pos(),
+            response.dragged_by(PointerButton::Primary) || response.clicked_by(PointerButton::Primary),
+        ) else {
+            return;
+        };
+        // Marks change during brushing, the view does not.
+        let is_here = |c: &Camera| (c.center, c.world_from_camera) == (scene.eye.center, scene.eye.world_from_eye);
+        let known = self.centers.as_ref().is_some_and(|(camera, through, centers)| {
+            is_here(camera) && (*through, centers.len()) == (self.through, cloud.len())
+        });
+        if !known {
+            // A late frame does not match the current view, and a coarse one has no depth.
+            if !picture.full || !is_here(&picture.camera) {
+                return;
+            }
+            let depth = picture.median_depth.as_deref().filter(|_| !self.through);
+            let numbers = scene.visibility.numbers();
+            let centers = centers(cloud, numbers.as_deref().map(Vec::as_slice), &picture.camera, depth);
+            self.centers = Some((picture.camera.clone(), self.through, centers));
+        }
+        let Some((camera, ..)) = &self.centers else { return };
+        let scale = f64::from(camera.width_px) / f64::from(area.shown.width());
+        let at = DVec2::new(f64::from(pos.x - area.shown.left()), f64::from(pos.y - area.shown.top())) * scale;
+        let erase = response.ctx.input(|i| i.modifiers.shift);
+        let numbers = self.under(at, f64::from(self.radius_px) * scale);
+        if !numbers.is_empty() {
+            self.brushed.push(Brushed { numbers, erase });
+        }
+    }
+
     /// Draws the circle of the brush at the pointer.
-    pub(super) fn paint(&self, ui: &Ui, rect: Rect) {
-        if let Some(pos) = ui.input(|i| i.pointer.hover_pos()).filter(|p| rect.contains(*p)) {
+    fn paint(&mut self, ui: &Ui, area: ViewArea, _scene: &mut ToolScene<'_>, _cx: &mut Ctx<'_>) {
+        if let Some(pos) = ui.input(|i| i.pointer.hover_pos()).filter(|p| area.shown.contains(*p)) {
             ui.painter().circle_stroke(pos, self.radius_px, Stroke::new(3.0, Color32::from_black_alpha(160)));
             ui.painter().circle_stroke(pos, self.radius_px, Stroke::new(1.0, Color32::WHITE));
         }
     }
 
-    pub(super) fn show(&mut self, ui: &Ui, rect: Rect, actions: &mut Vec<Action>) {
+    fn card(&mut self, ui: &Ui, places: CardPlaces, _scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
+        let rect = places.active_view;
         let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(52.0));
         let area = Area::new(Id::unique("splat brush")).order(Order::Foreground);
         let area = area.pivot(Align2::CENTER_BOTTOM).fixed_pos(at).constrain_to(rect);
@@ -61,7 +109,7 @@ impl SplatBrush {
                 ui.add(Slider::new(&mut self.radius_px, 2.0..=120.0).show_value(false).text("brush"));
                 ui.checkbox(&mut self.through, "Through").on_hover_text("Choose what lies behind the surface, too.");
                 if ui.button("Done").clicked() {
-                    actions.push(Action::Paint(None));
+                    cx.ask(Action::Paint(None));
                 }
             });
         });
@@ -94,50 +142,6 @@ fn centers(
         None => centers.iter_mut().enumerate().for_each(|(i, c)| *c = center(i)),
     }
     centers
-}
-
-impl Viewport {
-    /// Takes the Gaussians brushed over since the last call.
-    pub(crate) fn take_brushed(&mut self) -> Vec<Brushed> {
-        self.choose.as_mut().map(|brush| std::mem::take(&mut brush.brushed)).unwrap_or_default()
-    }
-
-    /// Chooses Gaussians along drags and clicks; removes them from the choice with Shift.
-    pub(super) fn use_splat_brush(&mut self, response: &egui::Response, rect: Rect) {
-        let (Some(brush), Some(picture), Some(cloud)) = (&mut self.choose, self.display.picture(), &self.cloud) else {
-            return;
-        };
-        let shown = self.photo.as_mut().map_or(rect, |p| p.fit(rect));
-        let (Some(pos), true) = (
-            response.interact_pointer_pos(),
-            response.dragged_by(PointerButton::Primary) || response.clicked_by(PointerButton::Primary),
-        ) else {
-            return;
-        };
-        // Marks change during brushing, the view does not.
-        let is_here = |c: &Camera| (c.center, c.world_from_camera) == (self.eye.center, self.eye.world_from_eye);
-        let known = brush.centers.as_ref().is_some_and(|(camera, through, centers)| {
-            is_here(camera) && (*through, centers.len()) == (brush.through, cloud.len())
-        });
-        if !known {
-            // A late frame does not match the current view, and a coarse one has no depth.
-            if !picture.full || !is_here(&picture.camera) {
-                return;
-            }
-            let depth = picture.median_depth.as_deref().filter(|_| !brush.through);
-            let numbers = self.visibility.numbers();
-            let centers = centers(cloud, numbers.as_deref().map(Vec::as_slice), &picture.camera, depth);
-            brush.centers = Some((picture.camera.clone(), brush.through, centers));
-        }
-        let Some((camera, ..)) = &brush.centers else { return };
-        let scale = f64::from(camera.width_px) / f64::from(shown.width());
-        let at = DVec2::new(f64::from(pos.x - shown.left()), f64::from(pos.y - shown.top())) * scale;
-        let erase = response.ctx.input(|i| i.modifiers.shift);
-        let numbers = brush.under(at, f64::from(brush.radius_px) * scale);
-        if !numbers.is_empty() {
-            brush.brushed.push(Brushed { numbers, erase });
-        }
-    }
 }
 
 #[cfg(test)]

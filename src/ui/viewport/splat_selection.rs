@@ -10,7 +10,7 @@ const LEAST_OPACITY: f32 = -2.5;
 
 /// A choice of Gaussians.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct ChosenSplats {
+pub(crate) struct SplatSelection {
     /// True for each chosen Gaussian.
     pub(crate) of: Vec<bool>,
     pub(crate) count: usize,
@@ -18,7 +18,7 @@ pub(crate) struct ChosenSplats {
     pub(super) hide: bool,
 }
 
-impl ChosenSplats {
+impl SplatSelection {
     pub(crate) fn new(of: Vec<bool>, hide: bool) -> Self {
         let count = of.iter().filter(|c| **c).count();
         Self { of, count, hide }

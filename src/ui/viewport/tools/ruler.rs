@@ -4,10 +4,12 @@
 use egui::{Align2, Area, Color32, FontId, Id, Order, Pos2, Rect, Response, RichText, Stroke, TextEdit, Ui, vec2};
 use glam::{DVec2, DVec3};
 
-use super::super::theme;
-use super::Viewport;
+use super::super::split::ViewArea;
+use super::{CardPlaces, ToolScene, ViewTool};
 use crate::math::format;
 use crate::ui::actions::Action;
+use crate::ui::ctx::Ctx;
+use crate::ui::theme;
 
 /// Largest number of points; the next click begins anew.
 const MOST: usize = 3;
@@ -48,33 +50,37 @@ impl Ruler {
     }
 }
 
-impl Viewport {
-    /// True if the ruler is in use.
-    pub(crate) fn is_measuring(&self) -> bool {
-        self.ruler.is_some()
+impl ViewTool for Ruler {
+    fn takes_clicks(&self) -> bool {
+        true
     }
 
-    /// Handles clicks in a view, draws the points and the lines between them.
-    pub(super) fn show_ruler(&mut self, ui: &Ui, response: &Response, shown: Rect, meters_per_unit: Option<f64>) {
-        let Some(mut ruler) = self.ruler.take() else { return };
+    /// Puts a point on the surface under a click.
+    fn pointer(&mut self, response: &Response, area: ViewArea, scene: &mut ToolScene<'_>, _cx: &mut Ctx<'_>) {
         let surface = |pos: Pos2| {
-            let at = (pos - shown.min) / shown.size();
-            self.display.picked(DVec2::new(f64::from(at.x), f64::from(at.y)), &self.eye)
+            let at = (pos - area.shown.min) / area.shown.size();
+            scene.display.picked(DVec2::new(f64::from(at.x), f64::from(at.y)), scene.eye)
         };
-        let clicked = response.interact_pointer_pos().filter(|pos| response.clicked() && shown.contains(*pos));
+        let clicked = response.interact_pointer_pos().filter(|pos| response.clicked() && area.shown.contains(*pos));
         if let Some(point) = clicked.and_then(surface) {
-            ruler.put(point);
+            self.put(point);
         }
-        let eye = self.overlay_camera(shown);
+    }
+
+    /// Draws the points and the lines between them.
+    fn paint(&mut self, ui: &Ui, area: ViewArea, scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
+        let shown = area.shown;
+        let meters_per_unit = meters_per_unit(cx);
+        let eye = scene.camera(shown);
         let painter = ui.painter_at(shown);
         let place = |p: DVec3| eye.project(p).map(|q| shown.min + vec2(q.x as f32, q.y as f32));
-        let places: Vec<Option<Pos2>> = ruler.points.iter().map(|p| place(*p)).collect();
+        let places: Vec<Option<Pos2>> = self.points.iter().map(|p| place(*p)).collect();
         for (i, pair) in places.windows(2).enumerate() {
             let [Some(a), Some(b)] = pair else { continue };
             for stroke in [Stroke::new(4.5, Color32::from_black_alpha(150)), Stroke::new(2.0, theme::warning())] {
                 painter.line_segment([*a, *b], stroke);
             }
-            let length = format::length(ruler.points[i].distance(ruler.points[i + 1]), meters_per_unit);
+            let length = format::length(self.points[i].distance(self.points[i + 1]), meters_per_unit);
             let galley = painter.layout_no_wrap(length, FontId::proportional(14.0), theme::text());
             let at = a.lerp(*b, 0.5) + vec2(10.0, -0.5 * galley.size().y);
             painter.rect_filled(
@@ -87,78 +93,63 @@ impl Viewport {
         for at in places.iter().flatten() {
             painter.circle(*at, 5.0, theme::warning(), Stroke::new(1.5, Color32::from_black_alpha(200)));
         }
-        self.ruler = Some(ruler);
     }
 
-    /// Draws the card with the measurements.
-    pub(super) fn show_ruler_card(
-        &mut self,
-        ui: &Ui,
-        rect: Rect,
-        meters_per_unit: Option<f64>,
-        actions: &mut Vec<Action>,
-    ) {
-        if let Some(ruler) = self.ruler.take() {
-            self.ruler = ruler_card(ui, rect, ruler, self.eye.center, meters_per_unit, actions);
-        }
+    /// Draws instructions and measurements.
+    fn card(&mut self, ui: &Ui, places: CardPlaces, scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
+        let meters_per_unit = meters_per_unit(cx);
+        let at = Align2::CENTER_BOTTOM.pos_in_rect(&places.active_view.shrink(12.0));
+        let area = Area::new(Id::unique("ruler")).order(Order::Middle).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
+        theme::card(ui.ctx(), area.constrain_to(places.active_view), |ui| {
+            ui.horizontal(|ui| {
+                let next = match self.points.len() {
+                    0 => "Click the first point on a surface".to_owned(),
+                    1 => "Click the second point".to_owned(),
+                    _ => self.distance().map_or_else(
+                        || "The points coincide: click again".to_owned(),
+                        |d| match meters_per_unit {
+                            Some(_) => format!("{}, {}", format::length(d, meters_per_unit), format::length(d, None)),
+                            None => format!("{} (scale unknown)", format::length(d, None)),
+                        },
+                    ),
+                };
+                ui.label(RichText::new(next).strong());
+                if ui.button("Clear").clicked() {
+                    self.points.clear();
+                }
+                if ui.button("Close").on_hover_text(Action::Measure.tooltip()).clicked() {
+                    cx.ask(Action::Measure);
+                }
+            });
+            if self.distance().is_some() {
+                ui.horizontal(|ui| {
+                    ui.label("True length");
+                    ui.add(TextEdit::singleline(&mut self.known).hint_text("0.30").desired_width(60.0)).widget_info(
+                        || egui::WidgetInfo::labeled(egui::Role::TextInput, true, "True length in meters"),
+                    );
+                    ui.label("m");
+                    let scale = self.scale();
+                    let set = ui.add_enabled(scale.is_some(), egui::Button::new("Set scale"));
+                    if let Some(scale) = scale.filter(|_| set.clicked()) {
+                        cx.ask(Action::SetScale(scale));
+                    }
+                });
+            }
+            match self.normal(scene.eye.center) {
+                Some(normal) if ui.button("Use these three points as the floor").clicked() => {
+                    cx.ask(Action::SetUp(normal));
+                }
+                None if self.points.len() == 2 => {
+                    ui.weak("Click a third point to define the floor.");
+                }
+                _ => {}
+            }
+        });
     }
 }
 
-/// Draws instructions and measurements; returns `None` once the card is closed.
-fn ruler_card(
-    ui: &Ui,
-    shown: Rect,
-    mut ruler: Ruler,
-    eye: DVec3,
-    meters_per_unit: Option<f64>,
-    actions: &mut Vec<Action>,
-) -> Option<Ruler> {
-    let mut open = true;
-    let at = Align2::CENTER_BOTTOM.pos_in_rect(&shown.shrink(12.0));
-    let area = Area::new(Id::unique("ruler")).order(Order::Middle).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
-    theme::card(ui.ctx(), area.constrain_to(shown), |ui| {
-        ui.horizontal(|ui| {
-            let next = match ruler.points.len() {
-                0 => "Click the first point on a surface".to_owned(),
-                1 => "Click the second point".to_owned(),
-                _ => ruler.distance().map_or_else(
-                    || "The points coincide: click again".to_owned(),
-                    |d| match meters_per_unit {
-                        Some(_) => format!("{}, {}", format::length(d, meters_per_unit), format::length(d, None)),
-                        None => format!("{} (scale unknown)", format::length(d, None)),
-                    },
-                ),
-            };
-            ui.label(RichText::new(next).strong());
-            if ui.button("Clear").clicked() {
-                ruler.points.clear();
-            }
-            open = !ui.button("Close").on_hover_text(Action::Measure.tooltip()).clicked();
-        });
-        if ruler.distance().is_some() {
-            ui.horizontal(|ui| {
-                ui.label("True length");
-                ui.add(TextEdit::singleline(&mut ruler.known).hint_text("0.30").desired_width(60.0))
-                    .widget_info(|| egui::WidgetInfo::labeled(egui::Role::TextInput, true, "True length in meters"));
-                ui.label("m");
-                let scale = ruler.scale();
-                let set = ui.add_enabled(scale.is_some(), egui::Button::new("Set scale"));
-                if let Some(scale) = scale.filter(|_| set.clicked()) {
-                    actions.push(Action::SetScale(scale));
-                }
-            });
-        }
-        match ruler.normal(eye) {
-            Some(normal) if ui.button("Use these three points as the floor").clicked() => {
-                actions.push(Action::SetUp(normal));
-            }
-            None if ruler.points.len() == 2 => {
-                ui.weak("Click a third point to define the floor.");
-            }
-            _ => {}
-        }
-    });
-    open.then_some(ruler)
+fn meters_per_unit(cx: &Ctx<'_>) -> Option<f64> {
+    cx.state.scene.as_ref().and_then(|scene| scene.meters_per_unit())
 }
 
 #[cfg(test)]

@@ -1,0 +1,253 @@
+//! One pass of the viewport: its views, their frames, and all that is drawn over them.
+
+use egui::{Rect, Response, Sense, Ui};
+
+use super::input::SteeredView;
+use super::marks::MarkedScene;
+use super::overlay::ViewCards;
+use super::photo::PhotoView;
+use super::query::SearchedScene;
+use super::request::Moved;
+use super::split::{self, ViewArea, Views};
+use super::tools::segment::SegmentTool;
+use super::tools::{CardPlaces, Tool};
+use super::visible::VisibleCloud;
+use super::{Viewport, frusta, query, route};
+use crate::scene::plan::When;
+use crate::ui::camera::CameraPane;
+use crate::ui::ctx::Ctx;
+use crate::worker::ViewMode;
+use crate::worker::view::{QualityBudget, SkipPasses, ViewRequest};
+
+/// Rest after which the camera no longer counts as moving, s.
+const REST_SECS: f64 = 0.15;
+/// Longest side of a frame, px: more would add delay but no visible detail.
+const MAX_SIDE_PX: u32 = 1600;
+
+impl Viewport {
+    /// Draws the viewport into the rest of `ui`.
+    pub(crate) fn show(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, route: Option<&CameraPane>) {
+        let state = cx.state;
+        let Some(scene) = &state.scene else { return };
+        let whole = ui.available_rect_before_wrap();
+        let response = ui.allocate_rect(whole, Sense::click_and_drag());
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Viewport"));
+        let views = Views::of(whole, cx.layout.split_view);
+        if let Some(second) = views.pressed(ui) {
+            self.queries.work_in(second);
+        }
+        self.display.time_frames(cx.layout.times);
+        self.take_frame(ui.ctx());
+        let (now, has_other) = (ui.input(|i| i.time), state.beside.is_some());
+        let under = views.area_under_pointer(ui, self.fit(views.first), has_other);
+        if let Some((tool, mut rest)) = self.tool_in_use() {
+            tool.pointer(&response, under, &mut rest, cx);
+        }
+        let tool = self.tool.as_mut().map(Tool::as_dyn);
+        let (takes_drags, takes_clicks) = tool.map_or((false, false), |t| (t.takes_drags(), t.takes_clicks()));
+        let radius = scene.home.bounds.radius();
+        let steered = SteeredView { display: &self.display, area: under, radius, tool_takes_drags: takes_drags };
+        if self.steering.steer(ui, &response, &mut self.eye, &steered) {
+            self.leave_photo();
+            self.moved_at = now;
+        }
+        let shown = self.fit(views.first);
+        self.request(ui, shown, now, cx);
+        if let Some(semantics) = &state.semantics {
+            self.queries.keep_up(ui.ctx(), semantics, &state.plan);
+            self.queries.stand(self.pose());
+        }
+        let areas: Vec<ViewArea> = views.areas(shown, has_other).collect();
+        let is_second = self.queries.is_second();
+        let on_camera = self.show_frames(ui, &areas, &response, !takes_clicks, cx);
+        let picks = !takes_drags && !takes_clicks;
+        if let Some(semantics) = state.semantics.as_ref().filter(|_| picks) {
+            let under = views.area_under_pointer(ui, shown, has_other);
+            let maps = self.queries.maps().map(|m| &***m).filter(|_| !on_camera && !under.is_other);
+            self.picking.update(&response, under.shown, semantics, maps, cx);
+        }
+        let works_in = self.show_over_frames(ui, &areas, is_second, picks, route, cx);
+        self.queries.work_in(works_in);
+        let active_view = areas.last().filter(|_| works_in).map_or(views.first, |area| area.rect);
+        if let Some((tool, mut rest)) = self.tool_in_use() {
+            tool.card(ui, CardPlaces { first_frame: shown, active_view }, &mut rest, cx);
+        }
+    }
+
+    /// Draws the pane of the query: its answer and the options.
+    pub(crate) fn show_query(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>) {
+        let state = cx.state;
+        let (Some(semantics), Some(cloud)) = (&state.semantics, &self.cloud) else {
+            ui.weak("Find objects first: queries search among them.");
+            return;
+        };
+        query::details::show(ui, &mut self.queries, semantics, cloud, cx);
+    }
+
+    /// The frame in a view: all of it, or what the photo's aspect ratio leaves.
+    fn fit(&mut self, view: Rect) -> Rect {
+        self.photo.as_mut().map_or(view, |photo| photo.fit(view))
+    }
+
+    /// Takes over the newest frame and its identity maps.
+    fn take_frame(&mut self, ctx: &egui::Context) {
+        if let Some((maps, exact)) = self.display.take_maps(self.lane.maps(), self.requests.ticket()) {
+            self.queries.set_maps(maps, exact);
+        }
+        self.display.take(ctx, self.lane.pictures());
+    }
+
+    /// Draws the frames with masks and tints, the photo beside them, and the photos' cameras. Returns true if the
+    /// cursor is on a camera.
+    fn show_frames(
+        &mut self,
+        ui: &mut Ui,
+        areas: &[ViewArea],
+        response: &Response,
+        with_cameras: bool,
+        cx: &mut Ctx<'_>,
+    ) -> bool {
+        let state = cx.state;
+        // Around an isolated identity, cameras would be clutter.
+        let with_cameras = with_cameras && cx.layout.cameras && self.photo.is_none() && !self.visibility.is_isolated();
+        let mut on_camera = false;
+        for area in areas {
+            self.queries.work_in(area.second);
+            self.display.paint(ui, area.rect, area.shown, area.second);
+            // Answers belong to the scene, not to another one beside it.
+            if let Some(semantics) = state.semantics.as_ref().filter(|_| !area.is_other) {
+                let lit = cx.layout.dim.then(|| self.picking.selected().into_iter().collect());
+                self.queries.paint(ui, area.shown, semantics, lit);
+            }
+            if let Some(photo) = self.photo.as_mut().filter(|_| cx.layout.compare && !area.second) {
+                photo.show_split(ui, area.shown, &mut cx.layout.split);
+            }
+            if with_cameras {
+                let eye = self.display.overlay_camera(&self.eye, area.rect);
+                on_camera |= frusta::show(ui, area.rect, &eye, response, cx);
+            }
+        }
+        on_camera
+    }
+
+    /// Draws over the frames: the tool, outlines and marks, the route, the cards and the query. Returns true if the
+    /// second view is active then.
+    fn show_over_frames(
+        &mut self,
+        ui: &mut Ui,
+        areas: &[ViewArea],
+        is_second: bool,
+        picks: bool,
+        route: Option<&CameraPane>,
+        cx: &mut Ctx<'_>,
+    ) -> bool {
+        let (state, now) = (cx.state, ui.input(|i| i.time));
+        let (first, mut works_in) = (areas.first().map_or(Rect::NOTHING, |area| area.rect), is_second);
+        for &area in areas {
+            self.queries.work_in(area.second);
+            if let Some((tool, mut rest)) = self.tool_in_use() {
+                tool.paint(ui, area, &mut rest, cx);
+            }
+            let searched = state.semantics.as_ref().zip(self.cloud.as_ref()).filter(|_| !area.is_other);
+            if let Some((semantics, cloud)) = searched.filter(|_| picks) {
+                if let Some(maps) = self.queries.shown_maps() {
+                    self.picking.paint(ui, area.shown, semantics, maps, &state.labels);
+                }
+                let (visibility, selected) = (&self.visibility, self.picking.selected());
+                let eye = self.display.overlay_camera(&self.eye, area.shown);
+                let marked = MarkedScene { cloud, semantics, visibility, selected, eye };
+                self.marks.show(ui, area.shown, &marked, &mut self.queries, cx);
+            }
+            if let Some(pane) = route {
+                let eye = self.display.overlay_camera(&self.eye, area.rect);
+                route::show(ui, area.rect, &eye, pane, state.explored.as_deref());
+            }
+            let mut cards = ViewCards {
+                moves: now - self.moved_at < REST_SECS,
+                display: &self.display,
+                photo: self.photo.as_ref(),
+                gaussians: self.cloud.as_ref().map_or(0, |cloud| cloud.len()),
+                visibility: &self.visibility,
+                overrides: &self.overrides,
+                queries: &mut self.queries,
+            };
+            cards.show(ui, area.rect, cx);
+            if let Some((semantics, cloud)) = searched {
+                let scene = SearchedScene { semantics, cloud, visibility: &self.visibility };
+                if query::panel::show(ui, &mut self.queries, area.rect, first, scene, cx) {
+                    works_in = area.second;
+                }
+            }
+            if areas.len() > 1 && works_in == area.second {
+                split::mark_worked_in(ui, area.rect);
+            }
+        }
+        works_in
+    }
+
+    /// Requests a new frame if anything has changed.
+    pub(super) fn request(&mut self, ui: &Ui, shown: Rect, now: f64, cx: &Ctx<'_>) {
+        let (state, layout) = (cx.state, &*cx.layout);
+        let Some(cloud) = self.cloud.clone() else { return };
+        let plan = &state.plan;
+        let transformed = match &mut self.tool {
+            Some(Tool::Transform(tool)) => tool.preview(&cloud, state.semantics.as_ref()),
+            _ => None,
+        };
+        let (cloud, map) = transformed.unwrap_or_else(|| (cloud, state.semantics.clone()));
+        let preview = self.segment_tool().and_then(SegmentTool::preview).cloned();
+        let VisibleCloud { cloud, semantics, .. } = self.visibility.apply(&cloud, preview.as_ref().or(map.as_ref()));
+        let with_maps = plan.maps.now(self.queries.wanted() || self.picking.wanted()) || preview.is_some();
+        let semantics = semantics.filter(|_| with_maps);
+        let rests = now - self.moved_at - REST_SECS;
+        if rests < 0.0 {
+            ui.ctx().request_repaint_after_secs((-rests + 0.01) as f32);
+        }
+        let busy = state.job.as_ref().is_some_and(|j| !j.paused);
+        let budget = match (rests < 0.0, busy) {
+            (true, _) => QualityBudget::Moving,
+            (false, true) => QualityBudget::Shared,
+            (false, false) => QualityBudget::Full,
+        };
+        let size = shown.size() * ui.pixels_per_point();
+        let (w, h) = ((size.x.round() as u32).max(1), (size.y.round() as u32).max(1));
+        let camera = match &self.photo {
+            Some(p) => p.camera().resized(w, h),
+            None => self.eye.camera(w, h),
+        };
+        let always = plan.redraw == When::Always;
+        if always {
+            ui.ctx().request_repaint();
+        }
+        // A newer request would keep the identity maps of the last one from ever being drawn.
+        let drawn = self.display.picture().is_some_and(|p| p.ticket == self.requests.ticket())
+            && (semantics.is_none() || self.queries.maps().is_some());
+        let differs = |mode: &ViewMode| *mode != layout.mode || state.beside.is_some();
+        let beside = state.beside.as_ref().filter(|_| layout.split_view);
+        let wanted = ViewRequest {
+            cloud,
+            camera: camera.limited_to(MAX_SIDE_PX),
+            mode: layout.mode,
+            second: Some(layout.second_mode).filter(|_| layout.split_view).filter(differs),
+            beside: beside.map(|b| (b.cloud.clone(), b.settings.clone())),
+            settings: self.overrides.over(state.render_settings(), self.on_gpu()),
+            budget,
+            photo: self.photo.as_ref().and_then(PhotoView::pixels),
+            codes: semantics.is_some() && self.queries.wants_codes(),
+            follow: budget == QualityBudget::Moving
+                && (self.queries.tints() || self.picking.selected().is_some() || preview.is_some()),
+            semantics,
+            skip: SkipPasses::of(plan),
+            on_device: self.display.shares_device(),
+            timed: layout.times,
+            ticket: 0,
+        };
+        if let Some((request, moved)) = self.requests.next(wanted, always && drawn) {
+            self.lane.request(request);
+            if moved != Moved::Nothing {
+                self.queries.forget_maps(moved == Moved::Eye);
+                self.display.forget_maps();
+            }
+        }
+    }
+}
