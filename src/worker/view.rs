@@ -242,7 +242,7 @@ mod tests {
                 settings: RenderSettings::default(),
                 budget: QualityBudget::Full,
                 photo: None,
-                semantics: Some(Arc::new(map.clone())),
+                semantics: Some(Versioned::new(Arc::new(map.clone()))),
                 follow: false,
                 codes: true,
                 skip: SkipPasses { parts: false, gpu: true, levels: true },

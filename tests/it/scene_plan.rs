@@ -158,7 +158,7 @@ fn a_far_larger_photo_than_the_gaussians_resolve_is_looked_at_smaller() {
 /// Outputs of the drawing thread for a request: true if there is a median depth, and true if there are maps.
 fn looked_at(cloud: &GaussianCloud, map: Option<&SemanticMap>, plan: &ScenePlan, budget: QualityBudget) -> [bool; 2] {
     let lane = ViewLane::start(Arc::new(|| {})).expect("a thread");
-    let semantics = map.filter(|_| plan.maps.now(false)).map(|m| Arc::new(m.clone()));
+    let semantics = map.filter(|_| plan.maps.now(false)).map(|m| Versioned::new(Arc::new(m.clone())));
     lane.request(ViewRequest {
         cloud: Versioned::new(Arc::new(cloud.clone())),
         camera: camera(160),

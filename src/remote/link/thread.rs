@@ -205,7 +205,7 @@ impl LinkThread {
         self.have = have;
         self.map = scene.semantics.clone();
         self.shown = Some((card, Arc::new(scene.clone())));
-        let job = opening.take().unwrap_or_else(|| new_job());
+        let job = opening.take().unwrap_or_else(new_job);
         self.out.tell(Event::Ended(job, JobEnd::Finished))?;
         self.out.update(LinkUpdate::Opened(Box::new(scene)))
     }

@@ -40,6 +40,9 @@ pub(super) use draw::context;
 /// What is done once a job has ended.
 type Then = Box<dyn FnOnce(&mut App)>;
 
+/// What is done with the answer to a question.
+type ThenAnswer = Box<dyn FnOnce(&mut App, DialogAnswer)>;
+
 /// The window's application.
 pub struct App {
     /// State of the window.
@@ -56,7 +59,7 @@ pub struct App {
     pub(super) link: Option<ServerLink>,
     pub(super) repaint: Repaint,
     pub(super) dialogs: FileDialogs,
-    pub(super) question: Option<(Question, Box<dyn FnOnce(&mut App, DialogAnswer)>)>,
+    pub(super) question: Option<(Question, ThenAnswer)>,
     pub(super) find_dialog: FindDialog,
     pub(super) keep_dialog: Option<KeepDialog>,
     /// True if the query field is open although queries are impossible.
@@ -265,7 +268,7 @@ impl App {
         self.viewport.update(&mut self.state, &self.tasks);
         let brushed = self.viewport.take_brushed();
         let cloud = self.viewport.cloud().map(|cloud| &**cloud);
-        let chosen = self.clean.update(&mut self.state, cloud, brushed, self.layout.shows(Pane::Clean));
+        let chosen = self.clean.update(&self.state, cloud, brushed, self.layout.shows(Pane::Clean));
         self.viewport.visibility.set_chosen(chosen);
         self.camera.on_scene(self.state.scene_number);
         for effect in self.chat.news() {

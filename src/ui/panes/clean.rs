@@ -11,8 +11,8 @@ use super::super::labels::sentence;
 use super::super::state::AppState;
 use super::super::theme;
 use super::super::viewport::Viewport;
-use super::super::viewport::choosing::Brushed;
-use super::super::viewport::chosen::ChosenSplats;
+use super::super::viewport::splat_selection::SplatSelection;
+use super::super::viewport::tools::splat_brush::Brushed;
 use super::PaneContents;
 use super::histogram::Histogram;
 use crate::jobs::clean::{self, CleanRule, CloudMeasures, MeasuredCloud, SplatMeasure};
@@ -33,9 +33,9 @@ pub(crate) struct CleanPane {
     counts: Vec<(CleanRule, usize)>,
     histogram: Histogram,
     choice: SplatChoice,
-    chosen: Option<Arc<ChosenSplats>>,
+    chosen: Option<Arc<SplatSelection>>,
     /// The Gaussians deleted last, until the cloud without them is on screen.
-    deleted: Option<Arc<ChosenSplats>>,
+    deleted: Option<Arc<SplatSelection>>,
 }
 
 /// Choice of Gaussians, and its display.
@@ -64,7 +64,7 @@ impl CleanPane {
         cloud: Option<&Arc<GaussianCloud>>,
         brushed: Vec<Brushed>,
         is_shown: bool,
-    ) -> Option<Arc<ChosenSplats>> {
+    ) -> Option<Arc<SplatSelection>> {
         let is_of = |m: &Arc<MeasuredCloud>| cloud.is_some_and(|c| Arc::ptr_eq(c, &m.cloud));
         if let (Some(measured), Some(cloud)) = (self.measured.take_if(|m| !is_of(m)), cloud) {
             // The measures of the remaining Gaussians stay valid; pieces and distances are kept as before.
@@ -100,7 +100,7 @@ impl CleanPane {
 
     fn choose(&mut self, measured: &MeasuredCloud, state: &AppState) {
         let of = self.choice.of(measured, state);
-        self.chosen = of.map(|of| Arc::new(ChosenSplats::new(of, self.choice.hide)));
+        self.chosen = of.map(|of| Arc::new(SplatSelection::new(of, self.choice.hide)));
     }
 
     fn show_chosen(&mut self, ui: &mut Ui, measured: &MeasuredCloud, cx: &mut Ctx<'_>) {
@@ -114,7 +114,7 @@ impl CleanPane {
             let mut other = |ui: &mut Ui, text: &str, tip: &str, change: fn(&CloudMeasures, &[bool]) -> Vec<bool>| {
                 let button = ui.add_enabled(count > 0, Button::new(text)).on_hover_text(tip);
                 if let Some(chosen) = self.chosen.as_mut().filter(|_| button.clicked()) {
-                    *chosen = Arc::new(ChosenSplats::new(change(&measured.measures, &chosen.of), self.choice.hide));
+                    *chosen = Arc::new(SplatSelection::new(change(&measured.measures, &chosen.of), self.choice.hide));
                 }
             };
             other(ui, "Grow", "Also choose the neighbors of the chosen Gaussians.", CloudMeasures::grown);

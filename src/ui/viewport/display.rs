@@ -284,7 +284,7 @@ mod tests {
     }
 
     fn failure() -> Failure {
-        Failure { message: "no".into(), remedy: "wait".into() }
+        Failure::new("no", "wait")
     }
 
     #[test]

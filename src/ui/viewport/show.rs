@@ -13,7 +13,6 @@ use super::tools::segment::SegmentTool;
 use super::tools::{CardPlaces, Tool};
 use super::visible::VisibleCloud;
 use super::{Viewport, frusta, query, route};
-use crate::scene::plan::When;
 use crate::ui::camera::CameraPane;
 use crate::ui::ctx::Ctx;
 use crate::worker::ViewMode;
@@ -215,13 +214,6 @@ impl Viewport {
             Some(p) => p.camera().resized(w, h),
             None => self.eye.camera(w, h),
         };
-        let always = plan.redraw == When::Always;
-        if always {
-            ui.ctx().request_repaint();
-        }
-        // A newer request would keep the identity maps of the last one from ever being drawn.
-        let drawn = self.display.picture().is_some_and(|p| p.ticket == self.requests.ticket())
-            && (semantics.is_none() || self.queries.maps().is_some());
         let differs = |mode: &ViewMode| *mode != layout.mode || state.beside.is_some();
         let beside = state.beside.as_ref().filter(|_| layout.split_view);
         let wanted = ViewRequest {
@@ -242,7 +234,7 @@ impl Viewport {
             timed: layout.times,
             ticket: 0,
         };
-        if let Some((request, moved)) = self.requests.next(wanted, always && drawn) {
+        if let Some((request, moved)) = self.requests.next(wanted) {
             self.lane.request(request);
             if moved != Moved::Nothing {
                 self.queries.forget_maps(moved == Moved::Eye);
