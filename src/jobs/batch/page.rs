@@ -2,44 +2,10 @@
 
 use htmlize::escape_all_quotes;
 
-use super::merge::{MergedResults, MergedRow, Spread};
+use super::merge::{MergedResults, MergedRow};
 use super::state::UnitResult;
 use crate::math::format;
 use crate::measure::page::STYLE;
-
-impl Spread {
-    /// Returns text such as "27.41 ± 0.12".
-    pub(crate) fn text(&self, digits: usize) -> String {
-        match (self.mean, self.deviation) {
-            (None, _) => "-".into(),
-            (Some(mean), None) => format!("{mean:.digits$}"),
-            (Some(mean), Some(deviation)) => format!("{mean:.digits$} ± {deviation:.digits$}"),
-        }
-    }
-}
-
-/// Headings of [`MergedRow::cells`].
-pub(super) const HEAD: [&str; 8] =
-    ["settings", "scene", "units", "PSNR dB", "SSIM", "Gaussians", "training s", "mean IoU"];
-
-impl MergedRow {
-    /// Headings of the cells of a row.
-    pub(crate) const HEAD: [&str; 8] = HEAD;
-
-    /// The row as text.
-    pub(crate) fn cells(&self) -> [String; 8] {
-        [
-            self.setting.clone(),
-            self.scene.clone().unwrap_or_else(|| "mean of scenes".into()),
-            self.units.to_string(),
-            self.psnr.text(2),
-            self.ssim.text(4),
-            self.gaussians.text(0),
-            self.training_secs.text(1),
-            self.miou.text(4),
-        ]
-    }
-}
 
 pub(super) fn html(merged: &MergedResults) -> String {
     let MergedResults { rows, units, failed, unfinished, program, .. } = merged;
@@ -53,7 +19,7 @@ pub(super) fn html(merged: &MergedResults) -> String {
         failed.len(),
         unfinished.len()
     );
-    out += &table(&HEAD, rows.iter().map(|r| (r.scene.is_none(), r.cells().to_vec())));
+    out += &table(&MergedRow::HEAD, rows.iter().map(|r| (r.scene.is_none(), r.cells().to_vec())));
     out += "<h2>Units</h2>\n";
     let head = ["scene", "settings", "seed", "PSNR dB", "SSIM", "Gaussians", "training s", "mean IoU", "machine"];
     out += &table(&head, units.iter().map(|u| (false, cells(u))));
