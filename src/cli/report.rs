@@ -9,7 +9,7 @@ use super::{CliError, number, output};
 use crate::jobs::export;
 use crate::jobs::report::{self, Measured, ReportRequest};
 use crate::measure::subject::StudyOptions;
-use crate::measure::{End, FILE, Report, Stage, StageName, defaults};
+use crate::measure::{End, FILE, Report, Stage, StageName, defaults, table};
 use crate::pipeline::observer::{Observer, Severity};
 
 /// Measure error against run time, knob by knob
@@ -125,5 +125,5 @@ fn printed(stage: &Stage) -> String {
         format!("{}: order {:.2} seen, {} expected: {agrees}\n", o.what, o.observed, o.expected)
     });
     let left_out = stage.left_out.iter().map(|text| format!("left out: {text}\n"));
-    format!("{head}\n{}\n{}", output::table(&stage.table()), orders.chain(left_out).collect::<String>())
+    format!("{head}\n{}\n{}", output::table(&table::of_stage(stage)), orders.chain(left_out).collect::<String>())
 }

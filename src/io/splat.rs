@@ -9,6 +9,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::atomic::Told;
+use super::finite::finite_only;
 use super::quantized::{color, constant, log_scale, logit, opacity_byte, to_byte, unit, unorm};
 use super::{IoError, files, shift};
 use crate::scene::GaussianCloud;
@@ -46,7 +47,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
         sh: rows.par_iter().map(|row| [24, 25, 26].map(|k| constant(unorm(row[k].into(), 8)))).collect(),
         ..GaussianCloud::default()
     };
-    cloud.finite().map_err(|cause| IoError::Cloud { path: path.into(), cause })
+    finite_only(cloud, path)
 }
 
 /// Writes the bytes of a `.splat` of a valid cloud, in its order.

@@ -8,7 +8,7 @@ use super::{JobError, export, open};
 use crate::measure::in_time::InTime;
 use crate::measure::subject::{StudyOptions, Subject};
 use crate::measure::sweep::failed;
-use crate::measure::{End, FILE, Report, StageName, computer, is_report, page, plot};
+use crate::measure::{End, FILE, Report, StageName, computer, is_report, page, plot, table};
 use crate::pipeline::observer::{Observer, Severity};
 
 /// Request of a report: its subject, stages and folder.
@@ -99,7 +99,7 @@ pub(crate) fn subject(path: &Path, options: StudyOptions) -> Result<Subject, Job
 
 /// Writes everything but the JSON, which is there already.
 fn write(folder: &Path, report: &Report) -> Result<(), JobError> {
-    export::text(&folder.join("report.csv"), &report.csv())?;
+    export::text(&folder.join("report.csv"), &table::csv(report))?;
     export::text(&folder.join("report.html"), &page::html(report))?;
     for stage in &report.stages {
         if let Some(plot) = stage.measures.first().and_then(|m| plot::svg(report, stage, m)) {

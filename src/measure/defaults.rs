@@ -49,7 +49,7 @@ pub fn markdown(reports: &[Report]) -> String {
     out += &format!("\n## How each stage was measured\n\n{}", table::markdown(&table::rows(&head, measured)));
     let orders = stages().flat_map(|(r, s)| {
         let named = move |row: Vec<String>| place(r, s).into_iter().chain(row).collect::<Vec<_>>();
-        s.order_table().into_iter().skip(1).map(named)
+        table::orders(s).into_iter().skip(1).map(named)
     });
     let head = ["scene", "stage", "convergence", "expected order", "observed", "agrees"];
     out += &format!("\n## Convergence\n\n{}", table::markdown(&table::rows(&head, orders)));
@@ -70,7 +70,7 @@ fn place(report: &Report, stage: &Stage) -> [String; 2] {
 fn measurement(report: &Report, stage: &Stage) -> Vec<String> {
     let input: Vec<String> = stage.input.iter().map(|(k, v)| format!("{k} {v}")).collect();
     let stopped = stage.stopped_at().map_or_else(String::new, |far| format!("; stopped early: {far}"));
-    let default = stage.choice_table().get(1).and_then(|row| row.get(1)).cloned().unwrap_or_default();
+    let default = table::choices(stage).get(1).and_then(|row| row.get(1)).cloned().unwrap_or_default();
     let input = format!("{}; {}{stopped}", input.join(", "), stage.runs());
     let cells = [default, stage.secs_of.clone(), stage.reference.clone(), input, stage.rule.words()];
     place(report, stage).into_iter().chain(cells).collect()
@@ -82,7 +82,7 @@ fn with_reasons(report: &Report, stage: &Stage) -> Vec<Vec<String>> {
         let stays = STAYS.iter().find(|(name, knob, _)| (*name, *knob) == (stage.name, c.method));
         stays.filter(|_| !c.holds).map_or("", |s| s.2).to_owned()
     };
-    let rows = stage.choice_table().into_iter().skip(1).zip(stage.choices());
+    let rows = table::choices(stage).into_iter().skip(1).zip(stage.choices());
     let named = rows.map(|(mut row, choice)| {
         // All rows of a stage have the same default, which the second table names.
         row.remove(1);

@@ -5,7 +5,9 @@ use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
+use super::computer::Computer;
 use super::knobs::Knobs;
+use super::order::Order;
 use crate::math::format::things;
 use crate::math::stats::median;
 
@@ -176,21 +178,6 @@ impl Point {
     }
 }
 
-/// A check of how fast an error falls as work grows.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Order {
-    /// Quantity that was refined: "samples of a pixel's footprint".
-    pub(crate) what: String,
-    /// Work (samples, pieces) and error.
-    pub(crate) pairs: Vec<[f64; 2]>,
-    /// Order in theory: the error falls like `work^-order`.
-    pub(crate) expected: f64,
-    /// Observed order (see [`super::order`]).
-    pub(crate) observed: f64,
-    pub(crate) agrees: bool,
-    pub(crate) meaning: String,
-}
-
 /// Rule that decides if a cheaper setting is good enough.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Rule {
@@ -329,23 +316,6 @@ impl Stage {
     pub(crate) fn complete(&self) -> bool {
         self.points.len() == self.planned && self.points.iter().all(|p| p.secs.each.len() >= self.seeds.len())
     }
-}
-
-/// The machine that was measured on.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Computer {
-    /// Name of the processor.
-    pub processor: String,
-    /// Number of cores that this program may use.
-    pub cores: usize,
-    /// Memory in bytes.
-    pub memory_bytes: u64,
-    /// The graphics adapter, if there is a real one.
-    pub gpu: Option<String>,
-    /// Operating system.
-    pub system: String,
-    /// "optimized" or "for development".
-    pub build: String,
 }
 
 /// All stages that were measured on one scene.

@@ -2,7 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
-use super::document::{Computer, Report, VERSION};
+use super::computer::Computer;
+use super::document::{Report, VERSION};
 use crate::io::{self, IoError};
 
 /// Name of the document in a report's folder.

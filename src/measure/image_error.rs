@@ -3,7 +3,8 @@
 
 use nv_flip::{DEFAULT_PIXELS_PER_DEGREE, FlipImageRgb8};
 
-use super::document::{MOST_PSNR, Order};
+use super::document::MOST_PSNR;
+use super::order::Order;
 use crate::math::Real;
 use crate::math::resize::{Filter, resize};
 use crate::math::stats::{mean, psnr_of, quantile, worst};

@@ -34,10 +34,12 @@ pub(crate) mod sweep;
 pub(crate) mod table;
 
 pub(crate) use compare::StageComparison;
-pub use document::{Computer, ErrorKind, Measure, Order, Point, Report, Rule, Sample, Stage, StageName, VERSION};
+pub use computer::Computer;
+pub use document::{ErrorKind, Measure, Point, Report, Rule, Sample, Stage, StageName, VERSION};
 pub use file::{BeginError, FILE, ReportError, is_report};
 pub use knobs::Knobs;
 pub(crate) use knobs::turned;
+pub use order::Order;
 pub(crate) use sweep::{End, Study, StudyError, SweepCase, Trial};
 
 #[cfg(test)]

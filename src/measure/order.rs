@@ -1,21 +1,20 @@
 //! Order of convergence: the rate at which an error falls as work grows, compared with theory.
 
-use super::document::Order;
+use serde::{Deserialize, Serialize};
 
-/// The slope of `-log(error)` over `log(work)`, a straight line fitted by least squares. Errors below
-/// `noise` say nothing and are left out; NaN with fewer than two points left.
-pub(crate) fn observed(pairs: &[[f64; 2]], noise: f64) -> f64 {
-    let usable = |p: &&[f64; 2]| p[0] > 0.0 && p[1] > noise && p[0].is_finite() && p[1].is_finite();
-    let logs: Vec<[f64; 2]> = pairs.iter().filter(usable).map(|p| [p[0].ln(), p[1].ln()]).collect();
-    let n = logs.len() as f64;
-    let mean = |axis: usize| logs.iter().map(|p| p[axis]).sum::<f64>() / n;
-    let (x, y) = (mean(0), mean(1));
-    let (mut xy, mut xx) = (0.0, 0.0);
-    for p in &logs {
-        xy += (p[0] - x) * (p[1] - y);
-        xx += (p[0] - x).powi(2);
-    }
-    if logs.len() < 2 || xx == 0.0 { f64::NAN } else { -xy / xx }
+/// A check of how fast an error falls as work grows.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Order {
+    /// Quantity that was refined: "samples of a pixel's footprint".
+    pub(crate) what: String,
+    /// Work (samples, pieces) and error.
+    pub(crate) pairs: Vec<[f64; 2]>,
+    /// Order in theory: the error falls like `work^-order`.
+    pub(crate) expected: f64,
+    /// Observed order (see [`observed`]).
+    pub(crate) observed: f64,
+    pub(crate) agrees: bool,
+    pub(crate) meaning: String,
 }
 
 impl Order {
@@ -28,6 +27,22 @@ impl Order {
         let observed = if observed.is_finite() { observed } else { 0.0 };
         Self { what: what.into(), pairs, expected, observed, agrees, meaning: meaning.into() }
     }
+}
+
+/// The slope of `-log(error)` over `log(work)`, a straight line fitted by least squares. Errors below
+/// `noise` say nothing and are left out; NaN with fewer than two points left.
+fn observed(pairs: &[[f64; 2]], noise: f64) -> f64 {
+    let usable = |p: &&[f64; 2]| p[0] > 0.0 && p[1] > noise && p[0].is_finite() && p[1].is_finite();
+    let logs: Vec<[f64; 2]> = pairs.iter().filter(usable).map(|p| [p[0].ln(), p[1].ln()]).collect();
+    let n = logs.len() as f64;
+    let mean = |axis: usize| logs.iter().map(|p| p[axis]).sum::<f64>() / n;
+    let (x, y) = (mean(0), mean(1));
+    let (mut xy, mut xx) = (0.0, 0.0);
+    for p in &logs {
+        xy += (p[0] - x) * (p[1] - y);
+        xx += (p[0] - x).powi(2);
+    }
+    if logs.len() < 2 || xx == 0.0 { f64::NAN } else { -xy / xx }
 }
 
 #[cfg(test)]

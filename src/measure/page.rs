@@ -5,7 +5,7 @@ use htmlize::escape_all_quotes;
 
 use super::document::{Measure, Point, Report, Sample, Stage};
 use super::plot::{order_svg, svg};
-use super::table::{html as html_table, range, title};
+use super::table::{self, html as html_table, range, title};
 use crate::math::format::{number, seconds};
 
 /// Looks of pages of results: light, for paper too.
@@ -149,7 +149,7 @@ fn row(stage: &Stage, p: &Point, is_on_front: bool) -> String {
 }
 
 fn choices(stage: &Stage) -> String {
-    let choices = stage.choice_table();
+    let choices = table::choices(stage);
     if choices.len() < 2 {
         return String::new();
     }

@@ -205,7 +205,7 @@ fn legend(svg: &mut Svg, axes: &PlotAxes, (stage, measure): (&Stage, &Measure), 
 }
 
 /// An order of convergence: error over work, with the slope that theory gives.
-pub(crate) fn order_svg(order: &super::document::Order) -> Option<String> {
+pub(crate) fn order_svg(order: &super::order::Order) -> Option<String> {
     let pairs: Vec<[f64; 2]> = order.pairs.iter().filter(|p| p[0] > 0.0 && p[1].is_finite()).copied().collect();
     let first = pairs.iter().find(|p| p[1] > 0.0)?;
     let axes =

@@ -4,9 +4,10 @@
 use std::path::Path;
 use std::time::Instant;
 
-use super::document::{Order, Point, Report, Stage};
+use super::document::{Point, Report, Stage};
 use super::file::FILE;
 use super::knobs::Knobs;
+use super::order::Order;
 use crate::pipeline::observer::{Observer, Severity, Ticker};
 
 #[derive(Clone, Debug, PartialEq)]

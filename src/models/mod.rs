@@ -40,21 +40,13 @@ pub use clip::ClipEncoder;
 pub(crate) use demo::DemoEncoder;
 pub use error::ModelError;
 pub(crate) use known::{KnownAnswer, KnownResult};
+pub use tile::IdentityCrop;
 pub(crate) use words::is_word;
 
 /// Folder of the models.
 pub(crate) fn folder() -> PathBuf {
     let set = std::env::var_os("FMLGS_MODELS").filter(|p| !p.is_empty());
     set.map_or_else(|| data_folder().join("models"), PathBuf::from)
-}
-
-/// Picture of one identity: its mask on black, padded to a square, side x side, sRGB 0..1, row-major.
-#[derive(Clone, Debug, PartialEq)]
-pub struct IdentityCrop {
-    /// Side in px.
-    pub side_px: usize,
-    /// Colors.
-    pub rgb: Vec<[f32; 3]>,
 }
 
 /// Encoder of pictures and phrases as unit vectors in one space: the closer, the better they fit.

@@ -1,8 +1,16 @@
 //! Crops of identities: the same arithmetic as `tools/encoder/tiles.py`, held equal by a test.
 
-use super::IdentityCrop;
 use crate::math::resize::{Filter, resize};
 use crate::scene::Mask;
+
+/// Picture of one identity: its mask on black, padded to a square, side x side, sRGB 0..1, row-major.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IdentityCrop {
+    /// Side in px.
+    pub side_px: usize,
+    /// Colors.
+    pub rgb: Vec<[f32; 3]>,
+}
 
 impl IdentityCrop {
     /// Cuts the masked region of a picture on black: its bounding box, padded to a square, resized. `None` for an empty

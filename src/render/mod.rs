@@ -189,6 +189,11 @@ impl<R: Real> Frame<R> {
         let one = |(d, a): (&R, &R)| if *a >= R::HALF { *d / *a } else { R::ZERO };
         self.depth.iter().zip(&self.alpha).map(one).collect()
     }
+
+    /// Its colors as interleaved 8-bit RGB, clamped and rounded.
+    pub fn to_rgb8(&self) -> Vec<[u8; 3]> {
+        cpu::pack::rgb8(&self.color)
+    }
 }
 
 /// Gradient of a loss with respect to a [`Frame`]; empty vectors mean zero.

@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 use super::rig;
 use crate::math::rotation::rotation_error;
 
+/// Distance of the near plane, as a share of the extent of the cameras.
+const NEAR: f64 = 0.003;
+
 /// A pinhole camera: size, intrinsics (px) and pose.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Camera {
@@ -168,6 +171,20 @@ impl Camera {
             n += 1.0_f64;
         }
         (n > 1.0 && a.determinant() > 1e-4 * n.powi(3)).then(|| a.inverse() * b)
+    }
+
+    /// Mean center, and 1.1 times the largest distance from it, of cameras that are not far from all others; 1 where
+    /// they are at one place.
+    pub(crate) fn extent_of<'a>(cameras: impl Iterator<Item = &'a Self>) -> (DVec3, f64) {
+        let centers: Vec<DVec3> = rig::together(cameras).map(|c| c.center).collect();
+        let mean = centers.iter().sum::<DVec3>() / centers.len().max(1) as f64;
+        let far = centers.iter().map(|c| c.distance(mean)).fold(0.0, f64::max);
+        (mean, if far > 0.0 { far * 1.1 } else { 1.0 })
+    }
+
+    /// Distance of the near plane in scenes with cameras of this extent, scene units.
+    pub(crate) fn near_plane(extent: f64) -> f64 {
+        NEAR * extent
     }
 
     /// The same camera with a picture of another size: intrinsics scaled per axis.

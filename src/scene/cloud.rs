@@ -152,7 +152,7 @@ impl<R: Real> GaussianCloud<R> {
     }
 
     /// Checks that all arrays hold the same number of Gaussians.
-    pub(super) fn lengths(&self) -> Result<(), CloudError> {
+    pub(crate) fn lengths(&self) -> Result<(), CloudError> {
         let n = self.len();
         if self.sh_degree > 3 {
             return Err(CloudError::Degree(self.sh_degree));
@@ -171,7 +171,7 @@ impl<R: Real> GaussianCloud<R> {
     }
 
     /// Name of the first parameter of Gaussian `i` that is not finite.
-    pub(super) fn flaw(&self, i: usize) -> Option<&'static str> {
+    pub(crate) fn flaw(&self, i: usize) -> Option<&'static str> {
         let Gaussian { position, log_scale, quaternion, opacity_logit, sh } = self.gaussian(i);
         let fields = [
             ("position", position.iter().all(|v| v.is_finite())),

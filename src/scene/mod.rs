@@ -12,7 +12,6 @@ pub(crate) mod crop;
 pub(crate) mod dataset;
 pub(crate) mod distortion;
 pub(crate) mod findings;
-mod finite;
 pub(crate) mod history;
 pub(crate) mod home_view;
 pub(crate) mod identity;

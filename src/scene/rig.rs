@@ -11,8 +11,6 @@ const FAR: f64 = 5.0;
 const FEW: usize = 10;
 /// Fewest cameras among which outliers are looked for.
 const LEAST: usize = 5;
-/// Distance of the near plane, as a share of the extent of the cameras.
-const NEAR: f64 = 0.003;
 
 /// Flags of the camera centers that are far from all others.
 pub(super) fn strays(centers: &[DVec3]) -> Vec<bool> {
@@ -34,22 +32,6 @@ pub(super) fn together<'a>(cameras: impl Iterator<Item = &'a Camera>) -> impl It
     let cameras: Vec<&Camera> = cameras.collect();
     let far = strays(&cameras.iter().map(|c| c.center).collect::<Vec<_>>());
     cameras.into_iter().zip(far).filter(|(_, far)| !far).map(|(c, _)| c)
-}
-
-impl Camera {
-    /// Mean center, and 1.1 times the largest distance from it, of cameras that are not far from all others; 1 where
-    /// they are at one place.
-    pub(crate) fn extent_of<'a>(cameras: impl Iterator<Item = &'a Self>) -> (DVec3, f64) {
-        let centers: Vec<DVec3> = together(cameras).map(|c| c.center).collect();
-        let mean = centers.iter().sum::<DVec3>() / centers.len().max(1) as f64;
-        let far = centers.iter().map(|c| c.distance(mean)).fold(0.0, f64::max);
-        (mean, if far > 0.0 { far * 1.1 } else { 1.0 })
-    }
-
-    /// Distance of the near plane in scenes with cameras of this extent, scene units.
-    pub(crate) fn near_plane(extent: f64) -> f64 {
-        NEAR * extent
-    }
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock, Weak};
 use std::time::{Duration, Instant};
 
 use super::{Versioned, low_priority_pool};
-use crate::render::lod::{LodTree, Pace};
+use crate::render::lod::{self, LodTree, Pace};
 use crate::scene::GaussianCloud;
 use crate::scene::resource_log::{self, ResourceKind};
 
@@ -90,7 +90,7 @@ impl DetailLevels {
         let (tree, stop) = (Arc::clone(&now.tree), Arc::clone(&now.stop));
         let work = move || {
             let proceed = || !stop.load(Ordering::Relaxed);
-            let build = || LodTree::build(&cloud, proceed);
+            let build = || lod::build(&cloud, proceed);
             let built = low_priority_pool::pool().map_or_else(build, |pool| pool.install(build));
             if let Some(built) = built {
                 let what = format!("levels of detail of {} Gaussians", cloud.len());

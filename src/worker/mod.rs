@@ -26,7 +26,7 @@ pub(crate) use control::Control;
 pub use event::{Event, JobEnd};
 pub use failure::{Failure, Stop};
 pub(crate) use observer::{CloudSnapshot, Repaint};
-pub(crate) use photos::RemotePhotos;
+pub(crate) use photos::{RemotePhotos, load_photo};
 pub(crate) use slot::Slot;
 pub use slot::Versioned;
 pub use start::Start;

@@ -8,14 +8,17 @@ use crate::scene::{Photo, PhotoPixels};
 /// requests wait.
 pub(crate) type RemotePhotos = Box<dyn Fn(usize, &Photo, u32) -> Option<Task<PhotoPixels>> + Send>;
 
-impl Tasks {
-    /// Loads a photo, undistorted and at most `max_side_px` along its longer side. `index` is its place in the data set.
-    pub(crate) fn photo(&self, index: usize, photo: &Photo, max_side_px: u32) -> Result<Task<PhotoPixels>, QueueFull> {
-        if let Some(remote) = self.remote_photos() {
-            return remote(index, photo, max_side_px).ok_or(QueueFull);
-        }
-        let photo = photo.clone();
-        let info = JobInfo::short(format!("Loading {}", photo.name)).aside();
-        self.spawn(info, move |_| io::photo::load(&photo, max_side_px))
+/// Loads a photo, undistorted and at most `max_side_px` along its longer side. `index` is its place in the data set.
+pub(crate) fn load_photo(
+    tasks: &Tasks,
+    index: usize,
+    photo: &Photo,
+    max_side_px: u32,
+) -> Result<Task<PhotoPixels>, QueueFull> {
+    if let Some(remote) = tasks.remote_photos() {
+        return remote(index, photo, max_side_px).ok_or(QueueFull);
     }
+    let photo = photo.clone();
+    let info = JobInfo::short(format!("Loading {}", photo.name)).aside();
+    tasks.spawn(info, move |_| io::photo::load(&photo, max_side_px))
 }

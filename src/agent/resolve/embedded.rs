@@ -1,6 +1,6 @@
 //! Lookup of identities by embedding, for phrases that no name matches.
 
-use super::{Lost, Resolver, Set};
+use super::{Lost, Resolver};
 use crate::agent::describe::names;
 use crate::agent::refusal::RefusalKind;
 use crate::pipeline::semantics::answer::{Basis, QueryAnswer};
@@ -11,48 +11,44 @@ use crate::scene::{IdentityId, LevelFilter};
 /// Number of things that are offered.
 const OFFERED: usize = 3;
 
-impl Resolver<'_> {
-    /// Candidates by embedding; a refusal if there are none or the encoder may not be used.
-    pub(super) fn embedded(&mut self, words: &[String]) -> Result<Set, Lost> {
-        let text = words.join(" ");
-        let found = self.by_embedding(&text, self.level)?;
-        found.map(Set::new).ok_or_else(|| self.not_found(&text, words))
+/// Candidates by embedding; `None` if there are none or the encoder may not be used.
+pub(super) fn candidates(
+    resolver: &mut Resolver<'_>,
+    text: &str,
+    kind: LevelFilter,
+) -> Result<Option<Vec<IdentityId>>, Lost> {
+    if !resolver.may_look {
+        return Ok(None);
     }
+    let found = located(resolver, text, kind)?;
+    let ids = match (&found.basis, &found.answer) {
+        (Basis::Embedding, Answer::Found(_)) => found.chosen(1),
+        (Basis::Embedding, Answer::Ambiguous(_)) => found.chosen(2),
+        _ => Vec::new(),
+    };
+    let ids: Vec<IdentityId> = ids.into_iter().filter(|id| resolver.world.facts(*id).is_some()).take(12).collect();
+    resolver.looked |= !ids.is_empty();
+    Ok(Some(ids).filter(|ids| !ids.is_empty()))
+}
 
-    /// Candidates by embedding; `None` if there are none or the encoder may not be used.
-    pub(super) fn by_embedding(&mut self, text: &str, kind: LevelFilter) -> Result<Option<Vec<IdentityId>>, Lost> {
-        if !self.may_look {
-            return Ok(None);
-        }
-        let found = self.located(text, kind)?;
-        let ids = match (&found.basis, &found.answer) {
-            (Basis::Embedding, Answer::Found(_)) => found.chosen(1),
-            (Basis::Embedding, Answer::Ambiguous(_)) => found.chosen(2),
-            _ => Vec::new(),
-        };
-        let ids: Vec<IdentityId> = ids.into_iter().filter(|id| self.world.facts(*id).is_some()).take(12).collect();
-        self.looked |= !ids.is_empty();
-        Ok(Some(ids).filter(|ids| !ids.is_empty()))
+/// Adds the best matches by embedding to a refusal.
+pub(super) fn with_offers(resolver: &mut Resolver<'_>, mut lost: Lost, phrase: &str) -> Lost {
+    if !lost.is_open || resolver.world.understanding() == Understanding::Names {
+        return lost;
     }
+    let level = resolver.level;
+    let Ok(found) = located(resolver, phrase, level) else { return lost };
+    let [_, offered] = found.offers(OFFERED);
+    let answered = if found.basis == Basis::Embedding { found.chosen(1) } else { Vec::new() };
+    let alike: Vec<IdentityId> =
+        offered.into_iter().chain(answered).filter(|id| resolver.world.facts(*id).is_some()).collect();
+    if !alike.is_empty() {
+        lost.refusal.text += &format!(" Looks most like: {}.", names(resolver.world, &alike, OFFERED));
+        lost.near.extend(alike.into_iter().filter(|id| !lost.near.contains(id)).collect::<Vec<_>>());
+    }
+    lost
+}
 
-    /// Adds the best matches by embedding to a refusal.
-    pub(super) fn with_offers(&mut self, mut lost: Lost, phrase: &str) -> Lost {
-        if !lost.is_open || self.world.understanding() == Understanding::Names {
-            return lost;
-        }
-        let Ok(found) = self.located(phrase, self.level) else { return lost };
-        let [_, offered] = found.offers(OFFERED);
-        let answered = if found.basis == Basis::Embedding { found.chosen(1) } else { Vec::new() };
-        let alike: Vec<IdentityId> =
-            offered.into_iter().chain(answered).filter(|id| self.world.facts(*id).is_some()).collect();
-        if !alike.is_empty() {
-            lost.refusal.text += &format!(" Looks most like: {}.", names(self.world, &alike, OFFERED));
-            lost.near.extend(alike.into_iter().filter(|id| !lost.near.contains(id)).collect::<Vec<_>>());
-        }
-        lost
-    }
-
-    fn located(&mut self, text: &str, kind: LevelFilter) -> Result<QueryAnswer, Lost> {
-        self.world.locate(text, kind).map_err(|e| Lost::new(RefusalKind::Failed, e.0, Vec::new()))
-    }
+fn located(resolver: &mut Resolver<'_>, text: &str, kind: LevelFilter) -> Result<QueryAnswer, Lost> {
+    resolver.world.locate(text, kind).map_err(|e| Lost::new(RefusalKind::Failed, e.0, Vec::new()))
 }

@@ -2,7 +2,6 @@
 //! pronouns. Ambiguous and unmatched phrases are reported; nothing is guessed. All readings are tried by names; only if
 //! none of them matches, the scene's encoder is used, if it has one, and the reply says so.
 
-mod called;
 mod embedded;
 mod named;
 mod noun;
@@ -69,7 +68,7 @@ pub(crate) fn resolve_all(
 ) -> Result<Vec<IdentityId>, Refusal> {
     let mut resolver = Resolver::new(world, dialog, level);
     let by_names = resolver.phrase(phrase);
-    let meant = by_names.map_err(|lost| resolver.with_offers(lost, phrase));
+    let meant = by_names.map_err(|lost| embedded::with_offers(&mut resolver, lost, phrase));
     meant.map(|set| set.ids).map_err(|lost| lost.refusal)
 }
 
@@ -137,13 +136,13 @@ impl Resolver<'_> {
                 done => return done,
             }
         }
-        Err(self.with_offers(lost, phrase))
+        Err(embedded::with_offers(self, lost, phrase))
     }
 
     /// Resolves a phrase by a complete name, else by its readings. If readings match different things, all of these are
     /// candidates.
     fn phrase(&mut self, phrase: &str) -> Result<Set, Lost> {
-        if let Some(set) = self.called(phrase) {
+        if let Some(set) = named::called(self, phrase) {
             return Ok(set);
         }
         let words = words_of(phrase);
@@ -190,23 +189,25 @@ impl Resolver<'_> {
                 let text = format!("There is nothing with the number {id} here.");
                 Err(Lost { is_open: false, ..Lost::new(RefusalKind::NotFound, text, Vec::new()) })
             }
-            Noun::Called(name) => self.called(name).map_or_else(|| self.named(&name_words(name)), Ok),
-            Noun::Named(words) => self.named(words),
-            Noun::Picked(pick, of) => self.picked(*pick, of),
-            Noun::Counted(count, of) => self.counted(*count, of),
-            Noun::PieceOf(piece, whole) => self.pieces(piece, whole),
+            Noun::Called(name) => {
+                named::called(self, name).map_or_else(|| named::by_words(self, &name_words(name)), Ok)
+            }
+            Noun::Named(words) => named::by_words(self, words),
+            Noun::Picked(pick, of) => places::picked(self, *pick, of),
+            Noun::Counted(count, of) => places::counted(self, *count, of),
+            Noun::PieceOf(piece, whole) => places::pieces(self, piece, whole),
             Noun::Placed(thing, relation, anchor) => {
                 let frame = self.world.view().frame();
                 let what = format!("is {} it", relation.text());
-                self.at(thing, anchor, &what, &|t, a| fit(*relation, t, a, &frame))
+                places::at(self, thing, anchor, &what, &|t, a| fit(*relation, t, a, &frame))
             }
             Noun::Nearest(thing, anchor) => {
                 // The support of a thing and things on it touch it and are not meant.
                 let frame = self.world.view().frame();
                 let rests = |t: &Bounds, a: &Bounds| fit(Relation::On, t, a, &frame).is_some();
                 let apart = |t: &Bounds, a: &Bounds| (!rests(t, a) && !rests(a, t)).then(|| gap(t, a));
-                let set = self.at(thing, anchor, "is near it", &apart)?;
-                let nearest = self.alike_first(&set.ids, anchor)?;
+                let set = places::at(self, thing, anchor, "is near it", &apart)?;
+                let nearest = places::alike_first(self, &set.ids, anchor)?;
                 Ok(Set::new(nearest))
             }
         }

@@ -189,19 +189,19 @@ impl World for SceneWorld {
     }
 
     fn go_to(&mut self, id: IdentityId, from: Side, closeness: f64) -> Result<Arrival, Unreachable> {
-        self.fly_to(id, from, closeness)
+        moves::fly_to(self, id, from, closeness)
     }
 
     fn look_at(&mut self, id: IdentityId) -> Result<Arrival, Unreachable> {
-        self.turn_to(id)
+        moves::turn_to(self, id)
     }
 
     fn move_eye(&mut self, direction: Direction, distance: Distance) -> Result<Movement, Unreachable> {
-        self.step(direction, distance)
+        moves::step(self, direction, distance)
     }
 
     fn turn(&mut self, direction: Direction, degrees: f64) -> Result<(), Unreachable> {
-        self.turn_by(direction, degrees)
+        moves::turn_by(self, direction, degrees)
     }
 
     fn highlight(&mut self, ids: &[IdentityId]) -> Result<(), WorldError> {
@@ -277,7 +277,7 @@ impl World for SceneWorld {
                 Ok(format!("calling it {new}"))
             }
             Before::Eye(eye, what) => {
-                self.straight(eye, String::new()).map_err(|e| WorldError(e.reason))?;
+                moves::straight(self, eye, String::new()).map_err(|e| WorldError(e.reason))?;
                 // The flight back must not be undone itself.
                 self.done.take();
                 Ok(what)

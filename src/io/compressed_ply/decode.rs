@@ -3,6 +3,7 @@
 use rayon::prelude::*;
 
 use super::{BOUNDS, CHUNK, HARMONICS, PACKED};
+use crate::io::finite::finite_only;
 use crate::io::ply::{Column, Ply, Table};
 use crate::io::quantized::{constant, logit, unit_quaternion, unorm};
 use crate::io::{IoError, render_mode, shift, vertical};
@@ -50,7 +51,7 @@ pub(in crate::io) fn decode(ply: &Ply<'_>) -> Result<GaussianCloud, IoError> {
         ..GaussianCloud::default()
     };
     // Bounds are finite, but their difference may not be.
-    cloud.finite().map_err(|cause| IoError::Cloud { path: ply.path.into(), cause })
+    finite_only(cloud, ply.path)
 }
 
 /// Bounds of a chunk: minimum and extent of position, log-scale and color.

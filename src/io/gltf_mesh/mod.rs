@@ -69,7 +69,7 @@ fn read_bytes(bytes: &[u8], path: &Path, folder: Option<&Path>) -> Result<MeshSc
     let mut file = File::open_packed(&root, path, folder, blob, [MAX_FILE_BYTES, MAX_VALUES], packed)?;
     let (nodes, roots) = file.nodes()?;
     let (materials, images) = file.materials()?;
-    let meshes = file.meshes(&nodes, &materials)?;
+    let meshes = geometry::meshes(&mut file, &nodes, &materials)?;
     Ok(MeshScene { nodes, roots, meshes, materials, images, warnings: file.warnings })
 }
 

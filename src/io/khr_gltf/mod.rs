@@ -16,6 +16,7 @@ use std::path::Path;
 pub(crate) use container::is_gltf;
 pub(super) use write::{encode_binary, encode_text};
 
+use super::finite::finite_only;
 use super::gltf_mesh::resource::split_container;
 use super::{IoError, files};
 use crate::scene::{Axes, GaussianCloud};
@@ -64,7 +65,7 @@ fn parse_in(bytes: &[u8], path: &Path, axes: Option<Axes>) -> Result<GaussianClo
     let cloud = GaussianCloud { warnings, ..GaussianCloud::joined(parts) };
     let unturned = json.0.asset.generator.as_deref() == Some(UNTURNED);
     let axes = axes.unwrap_or(if unturned { Axes::PLY } else { Axes::GLTF });
-    let cloud = cloud.finite().map_err(|cause| IoError::Cloud { path: path.into(), cause })?;
+    let cloud = finite_only(cloud, path)?;
     Ok(cloud.turned(&axes.scene_from_file(), false))
 }
 

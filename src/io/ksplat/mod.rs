@@ -9,6 +9,7 @@ use std::path::Path;
 
 use half::f16;
 
+use super::finite::finite_only;
 use super::quantized::{constant, log_scale, logit, unorm};
 use super::reader::Reader;
 use super::{IoError, files};
@@ -69,7 +70,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
     if cloud.is_empty() {
         return Err(IoError::syntax(path, "the header", "no section holds a Gaussian"));
     }
-    cloud.finite().map_err(|cause| IoError::Cloud { path: path.into(), cause })
+    finite_only(cloud, path)
 }
 
 fn count(path: &Path, what: &str, claimed: u32, possible: usize) -> IoError {

@@ -6,6 +6,7 @@ use rayon::prelude::*;
 
 use super::meta::{Meta, Opacity, Rest};
 use super::{FIRST_TAG, PALETTE_ROW};
+use crate::io::finite::finite_only;
 use crate::io::quantized::{logit, unit_quaternion};
 use crate::io::{IoError, photo};
 use crate::math::sh::coefficients;
@@ -70,7 +71,7 @@ pub(super) fn cloud(
         ..GaussianCloud::default()
     };
     // Bounds and codebooks are finite, but a position's exponential may not be.
-    cloud.finite().map_err(|cause| IoError::Cloud { path: path.into(), cause })
+    finite_only(cloud, path)
 }
 
 fn position(meta: &Meta, low: [u8; 4], high: [u8; 4]) -> [f32; 3] {

@@ -6,6 +6,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{ORIGIN, is_standard};
+use crate::io::finite::finite_only;
 use crate::io::ply::{Colors, Column, Ply, Scalar, Table};
 use crate::io::quantized::{constant, logit};
 use crate::io::{IoError, compressed_ply, render_mode, shift, vertical};
@@ -21,12 +22,7 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
     let Some(table) = ply.table("vertex")? else {
         return Err(ply.syntax("vertex", "missing".into()));
     };
-    finite(Reading { ply: &ply, table: &table }.cloud()?, path)
-}
-
-/// Removes Gaussians that are not finite.
-pub(super) fn finite(cloud: GaussianCloud, path: &Path) -> Result<GaussianCloud, IoError> {
-    cloud.finite().map_err(|cause| IoError::Cloud { path: path.into(), cause })
+    finite_only(Reading { ply: &ply, table: &table }.cloud()?, path)
 }
 
 /// Logarithm of the third standard deviation of 2D Gaussian Splatting's disks, which have none; as in other viewers.

@@ -5,7 +5,8 @@ use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
 use super::STATE;
-use super::read::{Reading, finite};
+use super::read::Reading;
+use crate::io::finite::finite_only;
 use crate::io::ply::{Encoding, Ply, Table};
 use crate::io::{IoError, files, memory};
 use crate::scene::GaussianCloud;
@@ -70,5 +71,5 @@ pub(crate) fn read(path: &Path) -> Result<Option<GaussianCloud>, IoError> {
         appended.and(was_read)?;
         std::mem::swap(&mut block, &mut next);
     }
-    cloud.map(|cloud| finite(cloud, path)).transpose()
+    cloud.map(|cloud| finite_only(cloud, path)).transpose()
 }

@@ -6,6 +6,7 @@
 
 mod axes;
 mod decode;
+mod header;
 mod read;
 mod write;
 

@@ -7,9 +7,10 @@ use flate2::read::GzDecoder;
 use ruzstd::decoding::FrameDecoder;
 
 use super::axes::{AxisMarks, SpzAxes};
-use super::{EXTENSIONS, MAGIC, columns};
+use super::header::SpzHeader;
+use super::{EXTENSIONS, MAGIC, decode};
 use crate::io::reader::Reader;
-use crate::io::{IoError, files, memory};
+use crate::io::{IoError, files};
 use crate::scene::{Axes, GaussianCloud};
 
 /// Bytes of the header up to version 3, and of the addition in version 4.
@@ -17,12 +18,6 @@ const HEADER: usize = 16;
 const MORE_HEADER: usize = 16;
 /// First bytes of a gzip stream.
 const GZIP: &[u8; 2] = &[0x1f, 0x8b];
-/// Most bytes unpacked from one byte: gzip's own limit, which real files never approach.
-const MAX_RATIO: u64 = 1032;
-/// Most fractional bits of a coordinate: all of its bits.
-const MAX_FRACTION: u8 = 24;
-/// Highest degree of harmonics in a file.
-const MAX_DEGREE: u8 = 4;
 /// Bytes of extension records that are read, at the end of a gzip stream.
 const MAX_RECORDS: u64 = 1 << 16;
 
@@ -54,7 +49,8 @@ pub(crate) fn parse_in(bytes: &[u8], path: &Path, known: SpzAxes) -> Result<Gaus
         let toc = u32::from_le_bytes([more[0], more[1], more[2], more[3]]) as usize;
         let records = bytes.get(HEADER + MORE_HEADER..toc).unwrap_or_default();
         let marks = AxisMarks::default().with_records(header.flags, records);
-        return header.cloud(&streams(&header, per_gaussian, toc, bytes, path)?, &marks, known, path);
+        let all = streams(&header, per_gaussian, toc, bytes, path)?;
+        return decode::cloud(&header, &all, &marks, known, path);
     }
     let mut unpacked = GzDecoder::new(bytes);
     let mut next = |n: usize, place: &str| {
@@ -80,7 +76,7 @@ pub(crate) fn parse_in(bytes: &[u8], path: &Path, known: SpzAxes) -> Result<Gaus
         (&mut unpacked).take(MAX_RECORDS).read_to_end(&mut records).map_err(broken)?;
     }
     let marks = AxisMarks::of_gzip(unpacked.header()).with_records(header.flags, &records);
-    header.cloud(&all, &marks, known, path)
+    decode::cloud(&header, &all, &marks, known, path)
 }
 
 /// Names of the columns in errors.
@@ -123,55 +119,4 @@ fn streams(
     }
     all.resize(per_gaussian.len(), Vec::new());
     Ok(all)
-}
-
-/// Fields of the header common to all versions.
-pub(super) struct SpzHeader {
-    pub(crate) version: u32,
-    pub(crate) count: usize,
-    pub(crate) degree: u8,
-    pub(crate) fraction: u8,
-    pub(crate) flags: u8,
-    /// Number of streams, in version 4.
-    streams: u8,
-}
-
-impl SpzHeader {
-    fn parse(bytes: &[u8], path: &Path) -> Result<Self, IoError> {
-        let mut fields = Reader::new(bytes, path);
-        let bad = |reason: String| IoError::syntax(path, "the header", reason);
-        if fields.take(MAGIC.len(), "the header")? != MAGIC {
-            return Err(bad("what is packed there is no SPZ".into()));
-        }
-        let [version, count] = [fields.u32("the header")?, fields.u32("the header")?];
-        let [degree, fraction, flags, streams] = fields.array("the header")?;
-        if !(1..=4).contains(&version) {
-            return Err(IoError::Version { path: path.into(), found: version.into(), supported: 4 });
-        }
-        if degree > MAX_DEGREE {
-            let what = format!("harmonics of degree {degree}");
-            return Err(IoError::Unsupported { path: path.into(), what, remedy: "up to degree 3 can be drawn" });
-        }
-        if fraction > MAX_FRACTION {
-            return Err(bad(format!("{fraction} bits behind the point, of {MAX_FRACTION} in all")));
-        }
-        Ok(Self { version, count: count as usize, degree, fraction, flags, streams })
-    }
-
-    /// Returns bytes per Gaussian in each column, after checking that a file of so many bytes may hold them.
-    fn checked(&self, file_bytes: usize, path: &Path) -> Result<[usize; 6], IoError> {
-        let columns = columns(self.version, self.degree);
-        let each = columns.iter().sum::<usize>() as u64;
-        let possible = (file_bytes as u64).saturating_mul(MAX_RATIO) / each;
-        if self.count as u64 > possible {
-            let what = "Gaussians".into();
-            return Err(IoError::Count { path: path.into(), what, claimed: self.count as u64, possible });
-        }
-        let (bytes, limit) = (self.count as u64 * each, memory::budget());
-        if bytes > limit {
-            let remedy = "free some memory or use a smaller file";
-            return Err(IoError::OverBudget { path: path.into(), what: "unpacking the file", bytes, limit, remedy });
-        }
-        Ok(columns)
-    }
 }

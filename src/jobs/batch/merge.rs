@@ -47,6 +47,26 @@ pub(crate) struct MergedRow {
     pub(crate) miou: MeanStd,
 }
 
+impl MergedRow {
+    /// Headings of its cells.
+    pub(crate) const HEAD: [&str; 8] =
+        ["settings", "scene", "units", "PSNR dB", "SSIM", "Gaussians", "training s", "mean IoU"];
+
+    /// The row as text.
+    pub(crate) fn cells(&self) -> [String; 8] {
+        [
+            self.setting.clone(),
+            self.scene.clone().unwrap_or_else(|| "mean of scenes".into()),
+            self.units.to_string(),
+            self.psnr.text(2),
+            self.ssim.text(4),
+            self.gaussians.text(0),
+            self.training_secs.text(1),
+            self.miou.text(4),
+        ]
+    }
+}
+
 /// Mean and sample standard deviation of the known values; `None` where too few are known.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub(crate) struct MeanStd {
@@ -63,6 +83,15 @@ impl MeanStd {
             (sum / (values.len() - 1) as f64).sqrt()
         });
         Self { mean, deviation }
+    }
+
+    /// Returns text such as "27.41 ± 0.12".
+    fn text(&self, digits: usize) -> String {
+        match (self.mean, self.deviation) {
+            (None, _) => "-".into(),
+            (Some(mean), None) => format!("{mean:.digits$}"),
+            (Some(mean), Some(deviation)) => format!("{mean:.digits$} ± {deviation:.digits$}"),
+        }
     }
 }
 

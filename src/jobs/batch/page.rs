@@ -2,41 +2,10 @@
 
 use htmlize::escape_all_quotes;
 
-use super::merge::{MeanStd, MergedResults, MergedRow};
+use super::merge::{MergedResults, MergedRow};
 use super::state::UnitResult;
 use crate::math::format;
 use crate::measure::page::STYLE;
-
-impl MeanStd {
-    /// Returns text such as "27.41 ± 0.12".
-    pub(crate) fn text(&self, digits: usize) -> String {
-        match (self.mean, self.deviation) {
-            (None, _) => "-".into(),
-            (Some(mean), None) => format!("{mean:.digits$}"),
-            (Some(mean), Some(deviation)) => format!("{mean:.digits$} ± {deviation:.digits$}"),
-        }
-    }
-}
-
-impl MergedRow {
-    /// Headings of [`Self::cells`].
-    pub(crate) const HEAD: [&str; 8] =
-        ["settings", "scene", "units", "PSNR dB", "SSIM", "Gaussians", "training s", "mean IoU"];
-
-    /// The row as text.
-    pub(crate) fn cells(&self) -> [String; 8] {
-        [
-            self.setting.clone(),
-            self.scene.clone().unwrap_or_else(|| "mean of scenes".into()),
-            self.units.to_string(),
-            self.psnr.text(2),
-            self.ssim.text(4),
-            self.gaussians.text(0),
-            self.training_secs.text(1),
-            self.miou.text(4),
-        ]
-    }
-}
 
 pub(super) fn html(merged: &MergedResults) -> String {
     let MergedResults { rows, units, failed, unfinished, program, .. } = merged;

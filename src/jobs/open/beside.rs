@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::Scene;
 use crate::io::gs_output::{self, GsOutput};
+use crate::io::trained::SceneCamera;
 use crate::scene::{Dataset, Photo};
 
 /// Returns the splat of a folder that 3D Gaussian Splatting wrote, else the path itself.
@@ -13,34 +14,30 @@ pub(super) fn splat_of(path: &Path) -> PathBuf {
     latest.filter(|_| !is_dataset()).unwrap_or_else(|| path.into())
 }
 
-impl Scene {
-    /// Adds the files beside the scene's file.
-    pub(super) fn with_what_lies_beside(mut self) -> Self {
-        let Some(GsOutput { folder, cameras, source, white_background, warnings }) = gs_output::beside(&self.path)
-        else {
-            return self;
-        };
-        self.dataset_path = source.clone().filter(|source| source.is_dir());
-        self.warnings.extend(warnings);
-        if let Some(gone) = source.as_ref().filter(|_| self.dataset_path.is_none()) {
-            self.warnings.push(format!("its photos were in {}, which is not here", gone.display()));
-        }
-        self.photos = source;
-        self.cameras = cameras;
-        self.cameras_from = Some(folder);
-        if white_background {
-            self.settings.background = [1.0; 3];
-            self.says_background = true;
-        }
-        self
+/// Adds the files beside the scene's file.
+pub(super) fn add_to(scene: &mut Scene) {
+    let Some(GsOutput { folder, cameras, source, white_background, warnings }) = gs_output::beside(&scene.path) else {
+        return;
+    };
+    scene.dataset_path = source.clone().filter(|source| source.is_dir());
+    scene.warnings.extend(warnings);
+    if let Some(gone) = source.as_ref().filter(|_| scene.dataset_path.is_none()) {
+        scene.warnings.push(format!("its photos were in {}, which is not here", gone.display()));
     }
+    scene.photos = source;
+    scene.cameras = cameras;
+    scene.cameras_from = Some(folder);
+    if white_background {
+        scene.settings.background = [1.0; 3];
+        scene.says_background = true;
+    }
+}
 
-    /// Returns its cameras as photos without files, if it has cameras beside it.
-    pub(super) fn photos_unseen(&self) -> Option<Dataset> {
-        let root = self.cameras_from.clone()?;
-        let photo = |c: &crate::io::trained::SceneCamera| Photo::new(&*c.name, PathBuf::new(), c.camera.clone());
-        let photos: Vec<Photo> = self.cameras.iter().map(photo).collect();
-        let (name, format) = (self.name.clone(), "cameras.json of 3D Gaussian Splatting".into());
-        (!photos.is_empty()).then(|| Dataset { name, root, format, photos, ..Dataset::default() })
-    }
+/// Returns the cameras beside a scene as photos without files, if there are any.
+pub(super) fn photos_unseen(scene: &Scene) -> Option<Dataset> {
+    let root = scene.cameras_from.clone()?;
+    let photo = |c: &SceneCamera| Photo::new(&*c.name, PathBuf::new(), c.camera.clone());
+    let photos: Vec<Photo> = scene.cameras.iter().map(photo).collect();
+    let (name, format) = (scene.name.clone(), "cameras.json of 3D Gaussian Splatting".into());
+    (!photos.is_empty()).then(|| Dataset { name, root, format, photos, ..Dataset::default() })
 }

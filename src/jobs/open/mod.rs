@@ -111,8 +111,9 @@ impl Scene {
         let near = near_without_cameras(&cloud);
         let settings = RenderSettings { near, ..RenderSettings::of_mode(cloud.render_mode) };
         let (cloud, sh_stored) = compact(cloud);
-        Self { path: path.into(), name, cloud, sh_stored, settings, warnings, ..Self::default() }
-            .with_what_lies_beside()
+        let mut scene = Self { path: path.into(), name, cloud, sh_stored, settings, warnings, ..Self::default() };
+        beside::add_to(&mut scene);
+        scene
     }
 
     fn trained(path: &Path, scene: TrainedScene, config: TrainConfig) -> Self {
@@ -309,7 +310,7 @@ pub(crate) fn open(
         Opened::Cloud(cloud) => {
             let scene = Scene::bare(path, cloud);
             let seen = scene.dataset_path.is_some().then(|| photos_of(&scene, observer)).flatten();
-            let dataset = seen.or_else(|| scene.photos_unseen().map(Arc::new));
+            let dataset = seen.or_else(|| beside::photos_unseen(&scene).map(Arc::new));
             OpenedScene::of(scene, dataset, observer)
         }
         Opened::Trained(trained) => {

@@ -7,7 +7,7 @@ use super::super::image_error::{planes, resized};
 use super::{StageSample, StageValues, views_of};
 use crate::math::resize::Filter;
 use crate::math::stats::{mean, psnr_of};
-use crate::render::lod::{LodTree, MOVING_SECS, Pace};
+use crate::render::lod::{self, MOVING_SECS, Pace};
 use crate::render::{DrawError, RenderSettings, Renderer};
 use crate::scene::GaussianCloud;
 
@@ -25,7 +25,7 @@ pub(crate) fn time(
     let each = 1.0 / cloud.len().max(1) as f64;
     let start = Instant::now();
     // Nobody stops it.
-    let tree = Arc::new(LodTree::build(cloud, || true).unwrap_or_default());
+    let tree = Arc::new(lod::build(cloud, || true).unwrap_or_default());
     values.add("tree, for a million Gaussians", "s", [1e6 * each * start.elapsed().as_secs_f64()]);
     values.add("tree, for each Gaussian", "B", [each * tree.bytes() as f64]);
     values.add("Gaussian", "B", [each * cloud.bytes() as f64]);

@@ -27,80 +27,88 @@ const COLORFUL: f64 = 3.0;
 /// A Gaussian or node without a parent so far: its place on the curve and its number.
 type Item = (u64, u32);
 
-impl<R: Real> LodTree<R> {
-    /// Builds the tree of a cloud. `None` as soon as `proceed` returns false.
-    pub(crate) fn build(cloud: &GaussianCloud<R>, proceed: impl Fn() -> bool) -> Option<Self> {
-        let degree = cloud.sh_degree.min(DEGREE);
-        let merged = GaussianCloud { origin: cloud.origin, sh_degree: degree, ..GaussianCloud::default() };
-        let mut tree = Self { leaves: cloud.len(), merged, ..Self::default() };
-        let mut items = along_the_curve(cloud);
-        let mut known = Vec::new();
-        for shift in first_shift(&items)..=3 * BITS {
-            if !proceed() {
-                return None;
-            }
-            let (groups, rest) = grouped(&items, shift, tree.leaves + tree.nodes.len());
-            // Bounded, as merging takes more memory than its result.
-            groups.chunks(AT_ONCE).for_each(|groups| tree.add(cloud, &mut known, &items, groups));
-            items = rest;
+/// Builds the tree of a cloud. `None` as soon as `proceed` returns false.
+pub(crate) fn build<R: Real>(cloud: &GaussianCloud<R>, proceed: impl Fn() -> bool) -> Option<LodTree<R>> {
+    let degree = cloud.sh_degree.min(DEGREE);
+    let merged = GaussianCloud { origin: cloud.origin, sh_degree: degree, ..GaussianCloud::default() };
+    let tree = LodTree { leaves: cloud.len(), merged, ..LodTree::default() };
+    let mut builder = TreeBuilder { cloud, tree, weighed: Vec::new() };
+    let mut items = along_the_curve(cloud);
+    for shift in first_shift(&items)..=3 * BITS {
+        if !proceed() {
+            return None;
         }
-        tree.roots = items.into_iter().map(|(_, number)| number).collect();
-        Some(tree)
+        let (groups, rest) = grouped(&items, shift, builder.tree.leaves + builder.tree.nodes.len());
+        // Bounded, as merging takes more memory than its result.
+        groups.chunks(AT_ONCE).for_each(|groups| builder.add(&items, groups));
+        items = rest;
     }
+    builder.tree.roots = items.into_iter().map(|(_, number)| number).collect();
+    Some(builder.tree)
+}
 
+/// A tree to which nodes are added.
+struct TreeBuilder<'a, R> {
+    cloud: &'a GaussianCloud<R>,
+    tree: LodTree<R>,
+    /// Weight and contrast of each node.
+    weighed: Vec<(f64, f64)>,
+}
+
+impl<R: Real> TreeBuilder<'_, R> {
     /// Adds a node for each group of items.
-    fn add(
-        &mut self,
-        cloud: &GaussianCloud<R>,
-        weighed: &mut Vec<(f64, f64)>,
-        items: &[Item],
-        groups: &[std::ops::Range<usize>],
-    ) {
+    fn add(&mut self, items: &[Item], groups: &[std::ops::Range<usize>]) {
         let known = &*self;
-        let of = |number: u32| match (number as usize).checked_sub(known.leaves) {
-            None => GaussianMoments::of(cloud, number as usize),
-            Some(node) => {
-                let ((weight, contrast), reach) = (weighed[node], f64::from(known.nodes[node].reach));
-                GaussianMoments::of(&known.merged, node).map(|part| GaussianMoments { weight, reach, contrast, ..part })
-            }
-        };
         let made = |group: &std::ops::Range<usize>| {
             let beneath = &items[group.clone()];
-            let merged = merge(&beneath.iter().map(|item| of(item.1)).collect::<Vec<_>>());
-            let color = known.color(cloud, beneath, &merged);
+            let merged = merge(&beneath.iter().map(|item| known.moments(item.1)).collect::<Vec<_>>());
+            let color = known.color(beneath, &merged);
             let heaviest = merged.shares.iter().enumerate().max_by(|a, b| a.1.total_cmp(b.1)).map_or(0, |(k, _)| k);
             (merged, color, known.heaviest(beneath[heaviest].1))
         };
         let made: Vec<_> = groups.par_iter().map(made).collect();
+        let tree = &mut self.tree;
         for ((merged, color, heaviest), group) in made.into_iter().zip(groups) {
             let Merged { part, log_scale, quaternion, opacity_logit, .. } = merged;
             let size = (log_scale.x.exp() * roughness(part.contrast)) as f32;
             let reach = part.reach.min(f64::from(f32::MAX)) as f32;
-            let (first, count) = (self.children.len() as u32, group.len() as u32);
-            self.nodes.push(Node { size, reach, first, count, heaviest });
-            self.children.extend(items[group.clone()].iter().map(|item| item.1));
-            self.merged.positions.push(part.mean.to_array().map(R::of));
-            self.merged.log_scales.push(log_scale.to_array().map(R::of));
-            self.merged.quaternions.push(quaternion.map(R::of));
-            self.merged.opacity_logits.push(R::of(opacity_logit));
-            self.merged.sh.extend(&color[..self.merged.sh_stride()]);
-            weighed.push((part.weight, part.contrast));
+            let (first, count) = (tree.children.len() as u32, group.len() as u32);
+            tree.nodes.push(Node { size, reach, first, count, heaviest });
+            tree.children.extend(items[group.clone()].iter().map(|item| item.1));
+            tree.merged.positions.push(part.mean.to_array().map(R::of));
+            tree.merged.log_scales.push(log_scale.to_array().map(R::of));
+            tree.merged.quaternions.push(quaternion.map(R::of));
+            tree.merged.opacity_logits.push(R::of(opacity_logit));
+            tree.merged.sh.extend(&color[..tree.merged.sh_stride()]);
+            self.weighed.push((part.weight, part.contrast));
         }
+    }
+
+    /// The node of a number; `None` if it is that of a Gaussian.
+    fn node(&self, number: u32) -> Option<usize> {
+        (number as usize).checked_sub(self.tree.leaves)
+    }
+
+    /// Moments of a Gaussian or node; `None` if it cannot be drawn.
+    fn moments(&self, number: u32) -> Option<GaussianMoments> {
+        let Some(node) = self.node(number) else { return GaussianMoments::of(self.cloud, number as usize) };
+        let ((weight, contrast), reach) = (self.weighed[node], f64::from(self.tree.nodes[node].reach));
+        GaussianMoments::of(&self.tree.merged, node).map(|part| GaussianMoments { weight, reach, contrast, ..part })
     }
 
     /// The heaviest Gaussian of a Gaussian or node.
     fn heaviest(&self, number: u32) -> u32 {
-        (number as usize).checked_sub(self.leaves).map_or(number, |node| self.nodes[node].heaviest)
+        self.node(number).map_or(number, |node| self.tree.nodes[node].heaviest)
     }
 
     /// Mean color of the merged Gaussians.
-    fn color(&self, cloud: &GaussianCloud<R>, beneath: &[Item], merged: &Merged) -> [[R; 3]; sh::coefficients(DEGREE)] {
-        let stride = self.merged.sh_stride();
+    fn color(&self, beneath: &[Item], merged: &Merged) -> [[R; 3]; sh::coefficients(DEGREE)] {
+        let stride = self.tree.merged.sh_stride();
         let mut sum = [[0.0; 3]; sh::coefficients(DEGREE)];
         for (&(_, number), share) in beneath.iter().zip(&merged.shares) {
-            let own = match (number as usize).checked_sub(self.leaves) {
-                None => cloud.gaussian(number as usize).sh,
-                Some(node) => self.merged.gaussian(node).sh,
+            let own = match self.node(number) {
+                None => self.cloud.gaussian(number as usize).sh,
+                Some(node) => self.tree.merged.gaussian(node).sh,
             };
             for (sum, own) in sum.iter_mut().zip(&own[..stride]) {
                 [0, 1, 2].into_iter().for_each(|k| sum[k] += share * own[k].f64());

@@ -65,7 +65,7 @@ fn owners(cloud: &GaussianCloud, of: &[u32], camera: &Camera, cut: Option<Cut>) 
 }
 
 fn tree(cloud: &GaussianCloud) -> Arc<LodTree> {
-    Arc::new(LodTree::build(cloud, || true).expect("nobody stops it"))
+    Arc::new(build(cloud, || true).expect("nobody stops it"))
 }
 
 /// Gaussians beneath a number.
@@ -87,7 +87,7 @@ fn every_gaussian_is_beneath_the_root_once() {
         assert!(tree.roots.len() <= 1 && tree.nodes() <= n / 3 + 1, "{} nodes of {n}", tree.nodes());
         tree.merged.validate().expect("finite");
     }
-    assert!(LodTree::build(&ball(100).0, || false).is_none(), "it stops when asked to");
+    assert!(build(&ball(100).0, || false).is_none(), "it stops when asked to");
 }
 
 #[test]
@@ -140,7 +140,7 @@ fn nodes_belong_to_what_is_beneath_them() {
     };
     let same = agree(cut.clone());
     assert!(same > 0.98, "{same}");
-    let mut shuffled = LodTree::build(&cloud, || true).expect("built");
+    let mut shuffled = build(&cloud, || true).expect("built");
     let n = shuffled.leaves as u32;
     shuffled.nodes.iter_mut().for_each(|node| node.heaviest = (node.heaviest + n / 17) % n);
     let wrong = agree(Cut { tree: Arc::new(shuffled), ..cut });

@@ -14,7 +14,7 @@ use super::PaneContents;
 use crate::math::format;
 use crate::scene::{Dataset, PhotoPixels, text};
 use crate::ui::actions::Action;
-use crate::worker::{Task, Tasks};
+use crate::worker::{Task, Tasks, load_photo};
 
 /// Longest side of a thumbnail in px.
 const SIDE_PX: u32 = 224;
@@ -63,7 +63,7 @@ impl PhotosPane {
             return;
         }
         // With a full queue the request is repeated at the next redraw.
-        if let Ok(task) = tasks.photo(index, photo, SIDE_PX) {
+        if let Ok(task) = load_photo(tasks, index, photo, SIDE_PX) {
             self.loading.insert(index, task);
         }
     }

@@ -7,7 +7,7 @@ use egui::{Color32, ColorImage, CursorIcon, Rect, Sense, Stroke, TextureHandle, 
 
 use crate::scene::{Camera, Photo, PhotoPixels};
 use crate::ui::theme;
-use crate::worker::{Task, Tasks};
+use crate::worker::{Task, Tasks, load_photo};
 
 /// Step of an arrow key at the split between photo and rendering, as a share of the frame.
 const KEY_STEP: f32 = 0.05;
@@ -31,7 +31,7 @@ pub(super) struct PhotoView {
 impl PhotoView {
     pub(super) fn new(index: usize, photo: &Photo, tasks: &Tasks) -> Self {
         // With a full queue there is no photo to compare with until the next visit.
-        let task = if photo.has_pixels() { tasks.photo(index, photo, SIDE_PX).ok() } else { None };
+        let task = if photo.has_pixels() { load_photo(tasks, index, photo, SIDE_PX).ok() } else { None };
         let failed = task.is_none();
         Self { index, photo: photo.clone(), task, pixels: None, texture: None, failed, margin: 1.0 }
     }

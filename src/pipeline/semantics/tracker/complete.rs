@@ -14,8 +14,7 @@ use super::super::regions::lab::{lab, planes};
 use super::super::regions::shape::ends_of;
 use super::super::view_map::ViewMap;
 use super::super::votes::UNKNOWN;
-use super::gone::forget;
-use super::{Tracker, ViewReport};
+use super::{Tracker, ViewReport, gone};
 use crate::io;
 use crate::math::grid::neighbors;
 use crate::pipeline::observer::{Observer, Severity, Ticker};
@@ -53,7 +52,7 @@ impl Tracker<'_> {
             let terrain = Terrain::new(pixels.width_px as usize, &pixels.rgb, ends.as_deref(), &options);
             let map = self.map_of(view.photo, SIDE_PX, &of)?;
             let mut known = sure(&map, options.share);
-            forget(&mut known, self.gone(view.photo, SIDE_PX)?.as_ref());
+            gone::forget(&mut known, gone::pixels(self, view.photo, SIDE_PX)?.as_ref());
             counts.add(&terrain, &known);
             terrains.push((view.photo, terrain));
             ticker.tick(i + 1, observer)?;
@@ -65,7 +64,7 @@ impl Tracker<'_> {
             let mut labels = grow(terrain, &known, &colors, &options);
             // Known pixels come from earlier votes, so only the grown ones vote.
             labels.iter_mut().zip(&known).filter(|(_, k)| **k != UNKNOWN).for_each(|(l, _)| *l = UNKNOWN);
-            forget(&mut labels, self.gone(*photo, SIDE_PX)?.as_ref());
+            gone::forget(&mut labels, gone::pixels(self, *photo, SIDE_PX)?.as_ref());
             let photo = &self.photos[*photo];
             let camera = photo.camera.limited_to(SIDE_PX);
             self.votes

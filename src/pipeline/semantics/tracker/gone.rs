@@ -9,34 +9,37 @@ use crate::scene::{IdentityId, Mask};
 /// Least share of a mask that must be left without the removed things.
 const LEFT: f64 = 0.5;
 
-impl Tracker<'_> {
-    /// Returns the pixels of a photo, of at most this size, that show removed things; `None` if nothing was removed.
-    pub(super) fn gone(&mut self, photo: usize, max_side_px: u32) -> Result<Option<Vec<bool>>, FindError> {
-        let Some(removed) = &self.removed else { return Ok(None) };
-        let photo = &self.photos[photo];
-        let camera = photo.camera.limited_to(max_side_px);
-        let shown = removed.shows(&mut self.renderer, &camera, self.settings);
-        shown.map(Some).map_err(|e| FindError::Render(photo.name.clone(), e.into()))
-    }
+/// Returns the pixels of a photo, of at most this size, that show removed things; `None` if nothing was removed.
+pub(super) fn pixels(
+    tracker: &mut Tracker<'_>,
+    photo: usize,
+    max_side_px: u32,
+) -> Result<Option<Vec<bool>>, FindError> {
+    let Some(removed) = &tracker.removed else { return Ok(None) };
+    let photo = &tracker.photos[photo];
+    let camera = photo.camera.limited_to(max_side_px);
+    let shown = removed.shows(&mut tracker.renderer, &camera, tracker.settings);
+    shown.map(Some).map_err(|e| FindError::Render(photo.name.clone(), e.into()))
+}
 
-    /// Returns the masks without the pixels of removed things; and all of those pixels, if there are any.
-    pub(super) fn without_gone(
-        &mut self,
-        photo: usize,
-        found: Vec<FoundMask>,
-    ) -> Result<(Vec<FoundMask>, Option<Vec<bool>>), FindError> {
-        let mut gone = self.gone(photo, self.options.max_side_px)?;
-        // Earlier versions recorded removed things by name alone.
-        let is_gone = |m: &&FoundMask| m.name.as_ref().is_some_and(|name| self.options.removed_names.contains(name));
-        for mask in found.iter().filter(is_gone) {
-            let size = mask.mask.width_px() * mask.mask.height_px();
-            let all = gone.get_or_insert_with(|| vec![false; size]);
-            mask.mask.pixels().for_each(|i| all[i] = true);
-        }
-        match gone {
-            Some(gone) => Ok((still_there(found, &gone), Some(gone))),
-            None => Ok((found, None)),
-        }
+/// Returns the masks without the pixels of removed things; and all of those pixels, if there are any.
+pub(super) fn masks_left(
+    tracker: &mut Tracker<'_>,
+    photo: usize,
+    found: Vec<FoundMask>,
+) -> Result<(Vec<FoundMask>, Option<Vec<bool>>), FindError> {
+    let max_side_px = tracker.options.max_side_px;
+    let mut gone = pixels(tracker, photo, max_side_px)?;
+    // Earlier versions recorded removed things by name alone.
+    let is_gone = |m: &&FoundMask| m.name.as_ref().is_some_and(|name| tracker.options.removed_names.contains(name));
+    for mask in found.iter().filter(is_gone) {
+        let size = mask.mask.width_px() * mask.mask.height_px();
+        let all = gone.get_or_insert_with(|| vec![false; size]);
+        mask.mask.pixels().for_each(|i| all[i] = true);
+    }
+    match gone {
+        Some(gone) => Ok((still_there(found, &gone), Some(gone))),
+        None => Ok((found, None)),
     }
 }
 

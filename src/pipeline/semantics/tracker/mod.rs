@@ -236,7 +236,7 @@ impl Tracker<'_> {
         begin(format!("Finding masks in {name}"), observer)?;
         let found = segmenter.segment(&self.photos[photo], self.options.max_side_px, observer);
         self.segment_secs += start.elapsed().as_secs_f64();
-        let (found, gone) = self.without_gone(photo, found?)?;
+        let (found, gone) = gone::masks_left(self, photo, found?)?;
         if found.is_empty() {
             return Ok(None);
         }
@@ -321,7 +321,7 @@ impl Tracker<'_> {
                     self.disagreements.push((photo, Disagreement::Drift(id)));
                 }
             }
-            gone::forget(&mut labels, self.gone(photo, LABEL_SIDE_PX)?.as_ref());
+            gone::forget(&mut labels, gone::pixels(self, photo, LABEL_SIDE_PX)?.as_ref());
             let camera = self.photos[photo].camera.limited_to(LABEL_SIDE_PX);
             self.votes
                 .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
