@@ -1,6 +1,7 @@
 //! A report as tables: rows of text, comma-separated values.
 
-use super::document::{Measure, Order, Point, Report, Sample, Stage};
+use super::document::{Measure, Point, Report, Sample, Stage};
+use super::order::Order;
 use crate::math::format::{number, seconds};
 
 /// Rows of cells, the header first.
