@@ -14,10 +14,10 @@ use super::session::{Awaited, Reply, Session};
 use crate::jobs::{Folders, Scene, demo, open, query};
 use crate::navigate::Pose;
 use crate::pipeline::observer::Silent;
-use crate::pipeline::semantics::answer::{Basis, Certainty};
-use crate::pipeline::semantics::localize::Answer;
-use crate::pipeline::semantics::query_engine::QueryEngine;
-use crate::pipeline::semantics::recipe::{Recipe, Rejection, Understanding};
+use crate::pipeline::semantics::query::answer::{Basis, Certainty};
+use crate::pipeline::semantics::query::localize::Answer;
+use crate::pipeline::semantics::query::query_engine::QueryEngine;
+use crate::pipeline::semantics::query::recipe::{Recipe, Rejection, Understanding};
 use crate::scene::{IdentityId, LevelFilter, SemanticMap};
 
 fn rows(list: &str) -> Vec<[String; 3]> {

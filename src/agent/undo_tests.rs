@@ -12,8 +12,8 @@ use super::scene::{Effect, Parts, SceneWorld};
 use super::session::Session;
 use super::world::World;
 use crate::navigate::Pose;
-use crate::pipeline::semantics::answer::Basis;
-use crate::pipeline::semantics::recipe::Recipe;
+use crate::pipeline::semantics::query::answer::Basis;
+use crate::pipeline::semantics::query::recipe::Recipe;
 use crate::render::RenderSettings;
 use crate::scene::{GaussianCloud, Identities, Level, LevelFilter, NOBODY, SemanticMap};
 

@@ -8,7 +8,7 @@ use glam::DVec3;
 use crate::jobs::go_to::Explored;
 use crate::jobs::query;
 use crate::navigate::Pose;
-use crate::pipeline::semantics::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::Recipe;
 use crate::render::RenderSettings;
 use crate::scene::{Bounds, Camera, GaussianCloud, IdentityId, SemanticMap};
 

@@ -1,6 +1,6 @@
 //! Tokens and numbers of a request.
 
-pub(crate) use crate::pipeline::semantics::names::singular;
+pub(crate) use crate::pipeline::semantics::query::names::singular;
 
 /// Longest request, in characters.
 pub(crate) const MAX_CHARS: usize = 600;

@@ -5,9 +5,9 @@ use super::camera_args::{Direction, Distance};
 use super::relation::{Extent, Viewpoint};
 use crate::jobs::query::ask_with;
 use crate::navigate::target::Side;
-use crate::pipeline::semantics::answer::{Basis, QueryAnswer};
-use crate::pipeline::semantics::query_engine::ask_by_name;
-use crate::pipeline::semantics::recipe::{Recipe, Understanding};
+use crate::pipeline::semantics::query::answer::{Basis, QueryAnswer};
+use crate::pipeline::semantics::query::query_engine::ask_by_name;
+use crate::pipeline::semantics::query::recipe::{Recipe, Understanding};
 use crate::scene::{Bounds, Identities, IdentityId, LanguageFeatures, Level, LevelFilter};
 
 /// Facts about one identity.

@@ -10,7 +10,7 @@ use crate::jobs::edit::{self, EditRequest};
 use crate::jobs::error::chain;
 use crate::jobs::remove::{self, RemovalOptions, RemoveRequest};
 use crate::pipeline::observer::Silent;
-use crate::pipeline::semantics::edit::Edit;
+use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
 
 /// A scene whose changes are stored as they are made, as the window stores them.

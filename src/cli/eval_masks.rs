@@ -8,11 +8,11 @@ use super::{CliError, output};
 use crate::jobs::evaluate::PhotoComparison;
 use crate::jobs::evaluate_masks::{self, Protocol, ProtocolSummary};
 use crate::math::stats::mean;
-use crate::pipeline::semantics::protocols::Unit;
-use crate::pipeline::semantics::protocols::part_recall::{HIT_IOU, Row};
-use crate::pipeline::semantics::protocols::recipes::RecipeRow;
-use crate::pipeline::semantics::protocols::strokes::{STROKES, StrokeRow};
-use crate::pipeline::semantics::recipe::Recipe;
+use crate::pipeline::semantics::evaluation::Unit;
+use crate::pipeline::semantics::evaluation::part_recall::{HIT_IOU, Row};
+use crate::pipeline::semantics::evaluation::recipes::RecipeRow;
+use crate::pipeline::semantics::evaluation::strokes::{STROKES, StrokeRow};
+use crate::pipeline::semantics::query::recipe::Recipe;
 use crate::scene::Level;
 
 /// Rows of the table at most; the worst come first.

@@ -12,9 +12,9 @@ use crate::jobs::find_objects::{self, FindRequest, FindSettings, FoundObjects};
 use crate::jobs::models::SAM2;
 use crate::jobs::{JobError, open, plan};
 use crate::math::format::things;
-use crate::pipeline::semantics::build_map::{CODE_STEPS, Carry, Found};
-use crate::pipeline::semantics::recipe::RecipeName;
-use crate::pipeline::semantics::tracker::TrackOptions;
+use crate::pipeline::semantics::lifting::build_map::{CODE_STEPS, Carry, Found};
+use crate::pipeline::semantics::lifting::tracker::TrackOptions;
+use crate::pipeline::semantics::query::recipe::RecipeName;
 use crate::scene::findings::Doubt;
 use crate::scene::{Findings, Identity, IdentityId, Lifting, MaskGrid, MaskPrompt, Preparation, SemanticMap};
 

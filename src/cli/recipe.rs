@@ -1,8 +1,8 @@
 //! The recipe on the command line: one by its name, then single choices.
 
 use super::number;
-use crate::pipeline::semantics::matching::MatchMode;
-use crate::pipeline::semantics::recipe::{
+use crate::pipeline::semantics::query::matching::MatchMode;
+use crate::pipeline::semantics::query::recipe::{
     CanonicalPhrases, PartFeatures, Recipe, RecipeName, Rejection, RelevancyScale, Strategy, Understanding,
 };
 use crate::scene::SemanticMap;

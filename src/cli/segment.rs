@@ -13,7 +13,7 @@ use crate::io::splat_format::SplatFormat;
 use crate::jobs::export_all::{self, ExportAllRequest, ExportedAll, MaskFormat};
 use crate::jobs::{Scene, export, export_splat, query, render, segment};
 use crate::math::format::things;
-use crate::pipeline::semantics::answer::Basis;
+use crate::pipeline::semantics::query::answer::Basis;
 use crate::scene::{Camera, LevelFilter, SemanticMap};
 
 /// Write the Gaussians of an object or a part, or of all of them, with masks of the photos

@@ -12,7 +12,7 @@ use crate::measure::StudyError;
 use crate::measure::bench::{StageSample, StageValues, Timings, draw, label, masks, moving, one_core, query, train};
 use crate::models;
 use crate::pipeline::observer::{Interrupted, Observer, Severity};
-use crate::pipeline::semantics::network_segmenter::NetworkMasks;
+use crate::pipeline::semantics::lifting::network_segmenter::NetworkMasks;
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
 use crate::render::{Device, RenderSettings, Renderer};
 use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Mask, MaskGrid, NOBODY, PhotoPixels};

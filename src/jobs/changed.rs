@@ -5,7 +5,7 @@ use super::{JobError, Scene};
 use crate::io::semantic_map;
 use crate::jobs::find_objects::removed_names;
 use crate::pipeline::observer::Severity;
-use crate::pipeline::semantics::removed::RemovedThings;
+use crate::pipeline::semantics::lifting::removed::RemovedThings;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, Dataset, PhotoPixels};
 

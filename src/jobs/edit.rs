@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use super::JobError;
 use crate::io::{SceneFolder, trained};
-use crate::pipeline::semantics::edit::{self, Edit};
+use crate::pipeline::semantics::lifting::edit::{self, Edit};
 use crate::scene::{GaussianCloud, SemanticMap};
 
 /// A change of the map.

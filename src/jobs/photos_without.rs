@@ -15,7 +15,7 @@ use crate::math::grid;
 use crate::math::sh::SH_C0;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::pipeline::removal::{INVENTED, RemovalOptions, invented_flags, members};
-use crate::pipeline::semantics::carry::{carry_by, nearest};
+use crate::pipeline::semantics::lifting::carry::{carry_by, nearest};
 use crate::render::{Features, Renderer};
 use crate::scene::{Camera, Dataset, ExtraProperty, GaussianCloud, PhotoPixels, SemanticMap, SparsePoint};
 

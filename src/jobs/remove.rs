@@ -11,7 +11,7 @@ use crate::models::lama::{LAMA, Lama};
 use crate::pipeline::observer::{Interrupted, Observer};
 use crate::pipeline::removal;
 pub(crate) use crate::pipeline::removal::{Paint, RemovalOptions, RemovalReport};
-use crate::pipeline::semantics::edit;
+use crate::pipeline::semantics::lifting::edit;
 use crate::scene::{Camera, GaussianCloud, SemanticMap};
 
 /// A scene without some of its things.

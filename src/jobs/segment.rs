@@ -1,9 +1,9 @@
 //! The Gaussians of identities.
 
 use super::JobError;
-use crate::pipeline::semantics::answer::QueryAnswer;
-use crate::pipeline::semantics::matching::{MatchMode, gaussians};
-use crate::pipeline::semantics::recipe::Recipe;
+use crate::pipeline::semantics::query::answer::QueryAnswer;
+use crate::pipeline::semantics::query::matching::{MatchMode, gaussians};
+use crate::pipeline::semantics::query::recipe::Recipe;
 use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
 
 /// Returns the Gaussians of an answer, of at most `top` identities, or all others.

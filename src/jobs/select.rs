@@ -7,11 +7,11 @@ use glam::DMat3;
 
 use super::JobError;
 use crate::pipeline::observer::Observer;
-use crate::pipeline::semantics::edit::{self, Edit};
-use crate::pipeline::semantics::splat_tree::hierarchy::Hierarchy;
-pub use crate::pipeline::semantics::splat_tree::marks::Stroke;
-use crate::pipeline::semantics::splat_tree::marks::StrokeMarks;
-use crate::pipeline::semantics::timing::ms_since;
+use crate::pipeline::semantics::lifting::edit::{self, Edit};
+use crate::pipeline::semantics::lifting::splat_tree::hierarchy::Hierarchy;
+pub use crate::pipeline::semantics::lifting::splat_tree::marks::Stroke;
+use crate::pipeline::semantics::lifting::splat_tree::marks::StrokeMarks;
+use crate::pipeline::semantics::query::timing::ms_since;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, HomeView, Identities, IdentityId, NOBODY, SemanticMap};
 

@@ -8,7 +8,7 @@ use super::{JobError, Scene, open};
 use crate::io::{IoError, SceneFolder, semantic_map, splat_ply, trained};
 use crate::math::format::things;
 use crate::pipeline::observer::{Interrupted, Observer, Severity};
-use crate::pipeline::semantics::carry;
+use crate::pipeline::semantics::lifting::carry;
 use crate::pipeline::train::checkpoint::CheckpointError;
 use crate::pipeline::train::{self, FolderUse, TrainConfig, TrainEnd, TrainError, TrainOutcome};
 use crate::scene::{Dataset, SemanticMap};

@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use crate::io::snapshot;
 use crate::jobs::edit::{self, EditRequest};
 use crate::jobs::{JobError, open};
-use crate::pipeline::semantics::edit::Edit;
+use crate::pipeline::semantics::lifting::edit::Edit;
 
 /// Editor of the objects of one trained scene; applies one edit at a time.
 #[derive(Debug)]

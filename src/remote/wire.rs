@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::io::trained::SceneInfo;
 use crate::pipeline::observer::{Evaluation, Progress, Severity, StepMetrics};
-use crate::pipeline::semantics::edit::Edit;
+use crate::pipeline::semantics::lifting::edit::Edit;
 
 /// Version of the protocol. Another first number is incompatible; the second one counts compatible additions.
 pub(crate) const PROTOCOL: [u32; 2] = [1, 0];

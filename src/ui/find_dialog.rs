@@ -10,7 +10,7 @@ use crate::jobs::find_objects::forecast::{self, LookTime};
 use crate::jobs::find_objects::{FindSettings, NO_ENCODER};
 use crate::jobs::models::{ModelEntry, ModelList, ModelRole, ModelState};
 use crate::math::format::things;
-use crate::pipeline::semantics::build_map::{Carry, REGIONS};
+use crate::pipeline::semantics::lifting::build_map::{Carry, REGIONS};
 use crate::scene::Preparation;
 use crate::ui::actions::{Action, Pane};
 

@@ -8,10 +8,10 @@ use crossbeam_channel::{Sender, bounded};
 
 use super::{Repaint, Slot};
 use crate::models::{self, Encoder, ModelError};
-use crate::pipeline::semantics::by_embedding::TextEmbeddings;
-use crate::pipeline::semantics::parse::ParsedQuery;
-use crate::pipeline::semantics::recipe::{PAPERS_PHRASES, Recipe};
-use crate::pipeline::semantics::timing::ms_since;
+use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
+use crate::pipeline::semantics::query::parse::ParsedQuery;
+use crate::pipeline::semantics::query::recipe::{PAPERS_PHRASES, Recipe};
+use crate::pipeline::semantics::query::timing::ms_since;
 
 /// Requests that may wait; only the newest is read.
 const QUEUED: usize = 16;

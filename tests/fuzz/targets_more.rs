@@ -11,8 +11,8 @@ use fmlgs::measure::{self, Report};
 use fmlgs::models::sam::Sam;
 use fmlgs::models::sam2::Sam2;
 use fmlgs::models::{ClipEncoder, ModelError, manifest};
-use fmlgs::pipeline::semantics::kept_frames;
-use fmlgs::pipeline::semantics::parse::ParsedQuery;
+use fmlgs::pipeline::semantics::lifting::kept_frames;
+use fmlgs::pipeline::semantics::query::parse::ParsedQuery;
 use fmlgs::pipeline::train::checkpoint;
 
 use super::seeds_more as seeds;

@@ -7,9 +7,9 @@ use crate::common::data;
 use fmlgs::io::labels::{Labels, Region};
 use fmlgs::io::{self, Opened};
 use fmlgs::pipeline::observer::Silent;
-use fmlgs::pipeline::semantics::regions::Regions;
-use fmlgs::pipeline::semantics::regions::segment::Picture;
-use fmlgs::pipeline::semantics::segmenter::{FoundMask, Segmenter};
+use fmlgs::pipeline::semantics::lifting::regions::Regions;
+use fmlgs::pipeline::semantics::lifting::regions::segment::Picture;
+use fmlgs::pipeline::semantics::lifting::segmenter::{FoundMask, Segmenter};
 use fmlgs::pipeline::synth::{self, SynthOptions};
 use fmlgs::scene::{Dataset, Level};
 

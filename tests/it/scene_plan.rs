@@ -10,7 +10,7 @@ use glam::DVec3;
 
 use fmlgs::math::stats;
 use fmlgs::pipeline::semantics::code_map::CodeMap;
-use fmlgs::pipeline::semantics::matching;
+use fmlgs::pipeline::semantics::query::matching;
 use fmlgs::pipeline::semantics::view_map::ViewMap;
 use fmlgs::render::gpu::cloud::Packed;
 use fmlgs::render::{BackendChoice, Features, Frame, RenderSettings, Renderer};

@@ -12,7 +12,7 @@ use crate::served_scene::Served;
 use crate::ui_common::{ask, until};
 use fmlgs::io::trained;
 use fmlgs::jobs::Folders;
-use fmlgs::pipeline::semantics::edit::Edit;
+use fmlgs::pipeline::semantics::lifting::edit::Edit;
 use fmlgs::ui::actions::Action;
 use fmlgs::ui::app::App;
 

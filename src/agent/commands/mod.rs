@@ -24,7 +24,7 @@ use super::tool::{Reference, Target, ToolCall};
 use super::words::{Token, alike, request_tokens};
 use super::world::World;
 use crate::navigate::target::Side;
-use crate::pipeline::semantics::recipe::Understanding;
+use crate::pipeline::semantics::query::recipe::Understanding;
 use crate::scene::{Identities, LevelFilter};
 
 /// Maximum number of tasks per request.

@@ -3,9 +3,9 @@
 use super::{Lost, Resolver};
 use crate::agent::describe::names;
 use crate::agent::refusal::RefusalKind;
-use crate::pipeline::semantics::answer::{Basis, QueryAnswer};
-use crate::pipeline::semantics::localize::Answer;
-use crate::pipeline::semantics::recipe::Understanding;
+use crate::pipeline::semantics::query::answer::{Basis, QueryAnswer};
+use crate::pipeline::semantics::query::localize::Answer;
+use crate::pipeline::semantics::query::recipe::Understanding;
 use crate::scene::{IdentityId, LevelFilter};
 
 /// Number of things that are offered.

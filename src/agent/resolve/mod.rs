@@ -15,8 +15,8 @@ use super::dialog::DialogState;
 use super::refusal::{Refusal, RefusalKind};
 use super::relation::{Relation, fit, gap};
 use super::world::World;
-use crate::pipeline::semantics::reading::{mend, mended_text};
-use crate::pipeline::semantics::recipe::Understanding;
+use crate::pipeline::semantics::query::reading::{mend, mended_text};
+use crate::pipeline::semantics::query::recipe::Understanding;
 use crate::scene::{Bounds, IdentityId, LevelFilter};
 
 /// Result of a resolution.

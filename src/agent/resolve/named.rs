@@ -6,7 +6,7 @@ use crate::agent::describe::join;
 use crate::agent::refusal::RefusalKind;
 use crate::agent::words::{alike, singular};
 use crate::jobs::query::color_of;
-use crate::pipeline::semantics::recipe::Understanding;
+use crate::pipeline::semantics::query::recipe::Understanding;
 use crate::scene::colors::row;
 use crate::scene::{Identity, IdentityId, Level};
 

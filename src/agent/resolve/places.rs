@@ -6,7 +6,7 @@ use crate::agent::describe::{self, join, the};
 use crate::agent::language::Key;
 use crate::agent::refusal::RefusalKind;
 use crate::agent::relation::gap;
-use crate::pipeline::semantics::recipe::Understanding;
+use crate::pipeline::semantics::query::recipe::Understanding;
 use crate::scene::identity::whole_names::BETWEEN;
 use crate::scene::{Bounds, IdentityId, LevelFilter};
 

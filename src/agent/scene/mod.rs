@@ -19,8 +19,8 @@ use crate::jobs::{export, export_splat};
 use crate::navigate::Pose;
 use crate::navigate::target::Side;
 use crate::pipeline::observer::Silent;
-use crate::pipeline::semantics::answer::QueryAnswer;
-use crate::pipeline::semantics::recipe::{Recipe, Understanding};
+use crate::pipeline::semantics::query::answer::QueryAnswer;
+use crate::pipeline::semantics::query::recipe::{Recipe, Understanding};
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Bounds, Identities, IdentityId, LevelFilter, SemanticMap, text};
 

@@ -12,10 +12,10 @@ use super::scene_args::open_scene;
 use super::{CliError, number, output, view};
 use crate::jobs::query::{self, QueryRequest, QueryResult};
 use crate::jobs::{export, render};
-use crate::pipeline::semantics::answer::Basis;
-use crate::pipeline::semantics::localize::{Answer, Hit};
-use crate::pipeline::semantics::reading::mended_text;
-use crate::pipeline::semantics::timing::ms_since;
+use crate::pipeline::semantics::query::answer::Basis;
+use crate::pipeline::semantics::query::localize::{Answer, Hit};
+use crate::pipeline::semantics::query::reading::mended_text;
+use crate::pipeline::semantics::query::timing::ms_since;
 use crate::scene::{IdentityId, LevelFilter, SemanticMap};
 
 /// Things that are offered where nothing fits, at most, by name and by embedding.

@@ -8,7 +8,7 @@ use serde::Deserialize;
 use crate::io::{IoError, files};
 use crate::jobs::evaluate_masks::Protocol;
 use crate::jobs::find_objects::FindSettings;
-use crate::pipeline::semantics::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::Recipe;
 use crate::pipeline::train::TrainConfig;
 use crate::scene::Overrides;
 

@@ -32,7 +32,7 @@ use crate::io::IoError;
 use crate::io::claim::{self, Taken, Watch};
 use crate::models::catalog::{self, ModelRole};
 use crate::pipeline::observer::{Observer, Severity, Signal};
-use crate::pipeline::semantics::build_map::{Carry, REGIONS};
+use crate::pipeline::semantics::lifting::build_map::{Carry, REGIONS};
 
 /// Time between looks at a unit that another process holds.
 const LOOK: Duration = Duration::from_millis(250);

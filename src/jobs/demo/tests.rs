@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use super::*;
 use crate::pipeline::observer::Silent;
-use crate::pipeline::semantics::query_engine::QueryEngine;
-use crate::pipeline::semantics::recipe::Recipe;
+use crate::pipeline::semantics::query::query_engine::QueryEngine;
+use crate::pipeline::semantics::query::recipe::Recipe;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{LevelFilter, SemanticMap};
 

@@ -15,14 +15,14 @@ use crate::io::{self, labels::Labels};
 use crate::math::stats::mean;
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::code_map::CodeMap;
-use crate::pipeline::semantics::protocols::{
+use crate::pipeline::semantics::evaluation::{
     AskedScene, Category, LabeledView, Unit, categories, fastlgs_ex, langsplat, masks, means, multi_class, part_recall,
     recipes, selection_3d, spin_nerf, strokes,
 };
-use crate::pipeline::semantics::query_engine::QueryEngine;
-use crate::pipeline::semantics::recipe::Recipe;
-use crate::pipeline::semantics::segmenter::{FileMasks, Segmenter};
-use crate::pipeline::semantics::splat_tree::hierarchy::Hierarchy;
+use crate::pipeline::semantics::lifting::segmenter::{FileMasks, Segmenter};
+use crate::pipeline::semantics::lifting::splat_tree::hierarchy::Hierarchy;
+use crate::pipeline::semantics::query::query_engine::QueryEngine;
+use crate::pipeline::semantics::query::recipe::Recipe;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
 use crate::scene::{Camera, Identities, IdentityId, LevelFilter, NOBODY, Photo, SemanticMap};

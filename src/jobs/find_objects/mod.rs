@@ -19,13 +19,13 @@ use crate::math::format::things;
 use crate::models;
 use crate::models::catalog::{self, ModelRole, SAM2};
 use crate::pipeline::observer::{Observer, Severity};
-use crate::pipeline::semantics::build_map::{
+use crate::pipeline::semantics::lifting::build_map::{
     CODE_STEPS, Carry, FindOptions, Found, REGIONS, Tools, find_objects, segmenter,
 };
-use crate::pipeline::semantics::keep;
-use crate::pipeline::semantics::recipe::RecipeName;
-use crate::pipeline::semantics::sam2_tracker::Sam2Tracker;
-use crate::pipeline::semantics::tracker::TrackOptions;
+use crate::pipeline::semantics::lifting::keep;
+use crate::pipeline::semantics::lifting::sam2_tracker::Sam2Tracker;
+use crate::pipeline::semantics::lifting::tracker::TrackOptions;
+use crate::pipeline::semantics::query::recipe::RecipeName;
 use crate::render::RenderSettings;
 use crate::scene::{Dataset, GaussianCloud, Photo, Preparation, SemanticMap};
 

@@ -22,7 +22,7 @@ use super::{JobError, export};
 use crate::io::files;
 use crate::models::catalog::{self, ModelRole};
 use crate::pipeline::observer::{Observer, Severity};
-use crate::pipeline::semantics::build_map::REGIONS;
+use crate::pipeline::semantics::lifting::build_map::REGIONS;
 use crate::pipeline::train::TrainConfig;
 
 /// A table of the paper.

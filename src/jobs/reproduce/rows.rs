@@ -13,19 +13,19 @@ use crate::jobs::evaluate::PhotoComparison;
 use crate::jobs::evaluate_masks::DrawnView;
 use crate::math::stats::quantile;
 use crate::models::{Encoder, ModelError};
-use crate::pipeline::semantics::answer::QueryAnswer;
-use crate::pipeline::semantics::by_embedding::TextEmbeddings;
-use crate::pipeline::semantics::by_similarity::{ALIKE, rejoined};
 use crate::pipeline::semantics::code_map::CodeMap;
-use crate::pipeline::semantics::parse::ParsedQuery;
-use crate::pipeline::semantics::protocols::part_recall::{self, Components, objects_alone};
-use crate::pipeline::semantics::protocols::raw_features::RawFeatures;
-use crate::pipeline::semantics::protocols::{
+use crate::pipeline::semantics::evaluation::by_similarity::{ALIKE, rejoined};
+use crate::pipeline::semantics::evaluation::part_recall::{self, Components, objects_alone};
+use crate::pipeline::semantics::evaluation::raw_features::RawFeatures;
+use crate::pipeline::semantics::evaluation::{
     AskedScene, LabeledView, Unit, fastlgs_ex, langsplat, lerf_rule, multi_class, spin_nerf,
 };
-use crate::pipeline::semantics::query_engine::{ask_by_embedding, ask_by_name};
-use crate::pipeline::semantics::recipe::{PartFeatures, Recipe, RelevancyScale, Strategy, Understanding};
-use crate::pipeline::semantics::timing::ms_since;
+use crate::pipeline::semantics::query::answer::QueryAnswer;
+use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
+use crate::pipeline::semantics::query::parse::ParsedQuery;
+use crate::pipeline::semantics::query::query_engine::{ask_by_embedding, ask_by_name};
+use crate::pipeline::semantics::query::recipe::{PartFeatures, Recipe, RelevancyScale, Strategy, Understanding};
+use crate::pipeline::semantics::query::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
 use crate::scene::{LanguageFeatures, LevelFilter, SemanticMap};

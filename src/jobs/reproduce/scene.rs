@@ -16,7 +16,7 @@ use crate::jobs::find_objects::FindSettings;
 use crate::jobs::train::IfChanged;
 use crate::jobs::{JobError, evaluate_masks, export, open};
 use crate::pipeline::observer::{Observer, Severity};
-use crate::pipeline::semantics::segmenter::FileMasks;
+use crate::pipeline::semantics::lifting::segmenter::FileMasks;
 use crate::scene::Dataset;
 
 /// If all photos have labels, every n-th one is held out.

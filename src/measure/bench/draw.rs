@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::{StageSample, StageValues, views_of};
-use crate::pipeline::semantics::timing::ms_since;
+use crate::pipeline::semantics::query::timing::ms_since;
 use crate::render::{DrawError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud};
 

@@ -18,7 +18,7 @@ use super::table::{Rows, rows};
 use crate::math::Real;
 use crate::math::format::number;
 use crate::math::stats::quantile;
-use crate::pipeline::semantics::timing::ms_since;
+use crate::pipeline::semantics::query::timing::ms_since;
 use crate::scene::{Bounds, Camera, GaussianCloud};
 
 /// Three cameras around a cloud, at different heights and distances, y downwards.

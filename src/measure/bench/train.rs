@@ -7,7 +7,7 @@ use rand_pcg::Pcg64Mcg;
 
 use super::draw::WAKING;
 use super::{StageSample, StageValues};
-use crate::pipeline::semantics::timing::ms_since;
+use crate::pipeline::semantics::query::timing::ms_since;
 use crate::pipeline::train::trainer::{StepError, Trainer};
 use crate::pipeline::train::{TrainConfig, TrainView, init};
 use crate::render::{Device, GpuError, GpuTrainer, Rates, TrainerSettings};

@@ -5,10 +5,10 @@ use glam::DVec3;
 use super::{Case, Finding};
 use crate::math::stats::worst;
 use crate::math::vector::unit;
-use crate::pipeline::semantics::codes::{self, TOLERANCE};
-use crate::pipeline::semantics::localize::{Scorer, localize};
-use crate::pipeline::semantics::parse::ParsedQuery;
-use crate::pipeline::semantics::recipe::Strategy;
+use crate::pipeline::semantics::lifting::codes::{self, TOLERANCE};
+use crate::pipeline::semantics::query::localize::{Scorer, localize};
+use crate::pipeline::semantics::query::parse::ParsedQuery;
+use crate::pipeline::semantics::query::recipe::Strategy;
 use crate::pipeline::semantics::relevancy::{advantage, deviate, score};
 use crate::scene::{Identities, LevelFilter};
 

@@ -6,7 +6,7 @@ use glam::{DMat3, DQuat, DVec3};
 
 use crate::math::sh::{self, SH_C0};
 use crate::math::{Real, rotation};
-use crate::pipeline::semantics::edit;
+use crate::pipeline::semantics::lifting::edit;
 use crate::scene::{Bounds, GaussianCloud, IdentityId, NOBODY, SemanticMap};
 
 /// Luma weights of red, green and blue (ITU-R BT.709).

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use crate::io::trained::SCENE_FILE;
-use crate::pipeline::semantics::tracker::TrackOptions;
+use crate::pipeline::semantics::lifting::tracker::TrackOptions;
 use crate::render::{BackendChoice, RenderSettings};
 use crate::scene::{AlphaUse, Camera, Limits, SplatRenderMode};
 

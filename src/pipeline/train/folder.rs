@@ -10,7 +10,7 @@ use super::outcome::{TrainEnd, TrainError, TrainOutcome};
 use crate::io::trained::{self, CLOUD_FILE};
 use crate::io::{IoError, SceneFolder, semantic_map};
 use crate::pipeline::observer::{Observer, Severity};
-use crate::pipeline::semantics::carry;
+use crate::pipeline::semantics::lifting::carry;
 use crate::scene::{Dataset, GaussianCloud, SemanticMap};
 
 /// Permissions of a training run in its output folder.

@@ -14,7 +14,7 @@ use super::client::{Client, ClientError};
 use super::wire::Ask;
 use crate::jobs::workspace::TrainedRun;
 use crate::jobs::{Folders, OpenedScene};
-use crate::pipeline::semantics::edit::Edit;
+use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::{PhotoPixels, SemanticMap};
 use crate::worker::{CloudSnapshot, Event, JobId, RemotePhotos, Repaint, Slot, Task, TaskResult};
 

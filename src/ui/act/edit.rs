@@ -9,7 +9,7 @@ use crate::jobs::rearrange::SplatEdit;
 use crate::jobs::select::SelectFor;
 use crate::math::format;
 use crate::pipeline::observer::Observer;
-use crate::pipeline::semantics::edit::Edit;
+use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::IdentityId;
 use crate::ui::actions::Pane;
 use crate::ui::app::App;

@@ -8,7 +8,7 @@ use crate::jobs::edit::{self, EditRequest};
 use crate::jobs::rearrange::{RearrangeRequest, SplatChange, SplatEdit};
 use crate::jobs::select::empty_map;
 use crate::pipeline::observer::Observer;
-use crate::pipeline::semantics::edit::Edit;
+use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::Identities;
 use crate::ui::app::App;
 use crate::ui::context::SceneContext;

@@ -12,7 +12,7 @@ use crate::jobs::export;
 use crate::jobs::phrases::{self, PhrasesRequest, TrueMasks};
 use crate::jobs::query::write_mask;
 use crate::pipeline::observer::Observer;
-use crate::pipeline::semantics::edit::Edit;
+use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::{Camera, LevelFilter};
 use crate::ui::actions::Pane;
 use crate::ui::app::App;

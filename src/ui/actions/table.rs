@@ -11,7 +11,7 @@ use crate::jobs::remove::RemoveRequest;
 use crate::jobs::train::IfChanged;
 use crate::measure::{Knobs, StageName};
 use crate::navigate::target::Side;
-use crate::pipeline::semantics::edit::Edit;
+use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::{CropBox, IdentityId, NOBODY};
 use crate::ui::act::{edit, edits, export, objects, open, query, remote, train, view, window};
 use crate::ui::color_by::ColorBy;

@@ -11,7 +11,7 @@ use super::super::viewport::Viewport;
 use super::PaneContents;
 use crate::jobs::find_objects::FindSettings;
 use crate::jobs::models::{self, ModelEntry, ModelList, ModelRole, ModelState, SAM2};
-use crate::pipeline::semantics::build_map::{Carry, REGIONS};
+use crate::pipeline::semantics::lifting::build_map::{Carry, REGIONS};
 use crate::scene::{Lifting, MaskPrompt};
 use crate::ui::actions::Action;
 use crate::worker::{JobInfo, Stop, Task, Tasks};

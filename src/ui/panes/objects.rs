@@ -16,7 +16,7 @@ use super::object_facts::{ListOrder, RowFacts};
 use super::object_thumbnails::ObjectThumbnails;
 use crate::math::format::things;
 use crate::navigate::target::Side;
-use crate::pipeline::semantics::edit::Edit;
+use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::{Identities, IdentityId, NOBODY};
 use crate::ui::actions::Action;
 

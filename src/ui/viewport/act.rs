@@ -18,7 +18,7 @@ use crate::jobs::inspect::InspectRequest;
 use crate::jobs::rearrange::Arrangement;
 use crate::jobs::select::SelectFor;
 use crate::navigate::Pose;
-use crate::pipeline::semantics::edit::Edit;
+use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::{CropBox, IdentityId};
 use crate::worker::Tasks;
 

@@ -5,10 +5,10 @@ use glam::DVec3;
 use super::source::Numbers;
 use super::{Verdict, promise};
 use fmlgs::math::vector::{dot, unit};
-use fmlgs::pipeline::semantics::codes::{RADIUS, assign, matches};
-use fmlgs::pipeline::semantics::localize::{Answer, Scorer, localize};
-use fmlgs::pipeline::semantics::parse::ParsedQuery;
-use fmlgs::pipeline::semantics::recipe::Strategy;
+use fmlgs::pipeline::semantics::lifting::codes::{RADIUS, assign, matches};
+use fmlgs::pipeline::semantics::query::localize::{Answer, Scorer, localize};
+use fmlgs::pipeline::semantics::query::parse::ParsedQuery;
+use fmlgs::pipeline::semantics::query::recipe::Strategy;
 use fmlgs::pipeline::semantics::relevancy::{advantage, deviate, score};
 use fmlgs::scene::{Identities, Level, LevelFilter};
 

@@ -5,7 +5,7 @@ use fmlgs::agent::relation::Viewpoint;
 use fmlgs::agent::world::{Arrival, IdentityFacts, Movement, Unreachable, World, WorldError};
 use fmlgs::agent::world::{locate_by_names, locate_with};
 use fmlgs::navigate::target::Side;
-use fmlgs::pipeline::semantics::answer::QueryAnswer;
+use fmlgs::pipeline::semantics::query::answer::QueryAnswer;
 use fmlgs::scene::LevelFilter;
 use fmlgs::scene::{Bounds, Identities, IdentityId, LanguageFeatures, Level, NOBODY, ViewFeatures};
 use glam::{DQuat, DVec3};

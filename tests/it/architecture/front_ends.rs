@@ -36,11 +36,11 @@ const ALLOWED: [(&str, &str); 18] = [
     ("measure::table", "the text of reports"),
     ("measure::turned", "settings with a knob turned"),
     ("navigate::camera_spline::steps_of", "frames of so many seconds"),
-    ("pipeline::semantics::query_engine::ask_by_name", "names are compared in a scene that was opened"),
-    ("pipeline::semantics::matching", "the Gaussians of an answer"),
-    ("pipeline::semantics::names", "names are compared in a scene that was opened"),
-    ("pipeline::semantics::reading", "words are compared with the names in a scene that was opened"),
-    ("pipeline::semantics::timing::ms_since", "a clock"),
+    ("pipeline::semantics::query::query_engine::ask_by_name", "names are compared in a scene that was opened"),
+    ("pipeline::semantics::query::matching", "the Gaussians of an answer"),
+    ("pipeline::semantics::query::names", "names are compared in a scene that was opened"),
+    ("pipeline::semantics::query::reading", "words are compared with the names in a scene that was opened"),
+    ("pipeline::semantics::query::timing::ms_since", "a clock"),
     ("render::real_gpu", "what the window itself is drawn by"),
 ];
 

@@ -6,10 +6,10 @@ mod teatime;
 
 use fmlgs::math::stats;
 use fmlgs::math::vector::{dot, unit};
-use fmlgs::pipeline::semantics::by_embedding::EmbeddingScorer;
-use fmlgs::pipeline::semantics::localize::{Answer, localize};
-use fmlgs::pipeline::semantics::parse::ParsedQuery;
-use fmlgs::pipeline::semantics::recipe::{Recipe, Rejection, Strategy};
+use fmlgs::pipeline::semantics::query::by_embedding::EmbeddingScorer;
+use fmlgs::pipeline::semantics::query::localize::{Answer, localize};
+use fmlgs::pipeline::semantics::query::parse::ParsedQuery;
+use fmlgs::pipeline::semantics::query::recipe::{Recipe, Rejection, Strategy};
 use fmlgs::pipeline::semantics::relevancy::{deviate, score};
 use fmlgs::scene::{Identities, IdentityId, LanguageFeatures, Level, LevelFilter, NOBODY, PART_WEIGHT, ViewFeatures};
 

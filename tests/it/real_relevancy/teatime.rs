@@ -1,8 +1,8 @@
 //! The real embeddings of the LERF scene teatime: its identities, further views of them, its queries and those of others.
 
-use fmlgs::pipeline::semantics::by_embedding::TextEmbeddings;
-use fmlgs::pipeline::semantics::parse::ParsedQuery;
-use fmlgs::pipeline::semantics::recipe::{PAPERS_PHRASES, Recipe};
+use fmlgs::pipeline::semantics::query::by_embedding::TextEmbeddings;
+use fmlgs::pipeline::semantics::query::parse::ParsedQuery;
+use fmlgs::pipeline::semantics::query::recipe::{PAPERS_PHRASES, Recipe};
 use fmlgs::pipeline::semantics::relevancy::{advantage, deviate};
 use fmlgs::scene::{Identities, LanguageFeatures, Level, NOBODY, ViewFeatures};
 

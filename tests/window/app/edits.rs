@@ -6,7 +6,7 @@ use egui::accesskit::{Role, Toggled};
 use egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT, Queryable};
 
-use fmlgs::pipeline::semantics::edit::Edit;
+use fmlgs::pipeline::semantics::lifting::edit::Edit;
 use fmlgs::ui::actions::{Action, Pane};
 use fmlgs::ui::app::App;
 use fmlgs::worker::ViewMode;

@@ -4,7 +4,7 @@
 use egui::accesskit::Role;
 use egui_kittest::kittest::{NodeT, Queryable};
 
-use fmlgs::pipeline::semantics::edit::Edit;
+use fmlgs::pipeline::semantics::lifting::edit::Edit;
 use fmlgs::scene::SemanticMap;
 use fmlgs::ui::actions::Action;
 use fmlgs::ui::app::App;

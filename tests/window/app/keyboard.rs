@@ -7,7 +7,7 @@ use egui::{Key, Modifiers};
 use egui_kittest::kittest::NodeT;
 use strum::VariantArray;
 
-use fmlgs::pipeline::semantics::edit::Edit;
+use fmlgs::pipeline::semantics::lifting::edit::Edit;
 use fmlgs::ui::actions::{Action, Pane};
 use fmlgs::ui::app::App;
 

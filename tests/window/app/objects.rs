@@ -1,6 +1,6 @@
 //! From photos to objects that are asked for, renamed, hidden and stored, in one window.
 
-use fmlgs::pipeline::semantics::edit::Edit;
+use fmlgs::pipeline::semantics::lifting::edit::Edit;
 use fmlgs::ui::actions::{Action, Pane};
 use fmlgs::ui::app::App;
 

@@ -78,7 +78,7 @@ fn what_no_photo_shows_is_measured_seen_deleted_and_brought_back() {
     w.until("all is back", |a| a.viewport.cloud().is_some_and(|c| c.len() == before.len()));
     assert!(cloud(w.app()) == before && stored(&edited) == before.len());
     // Objects are edited in the same place.
-    w.ask(Action::Change(fmlgs::pipeline::semantics::edit::Edit::Rename(1, "crate".into())));
+    w.ask(Action::Change(fmlgs::pipeline::semantics::lifting::edit::Edit::Rename(1, "crate".into())));
     w.until("a name", |a| a.state.semantics.as_ref().is_some_and(|m| m.identities.name(1) == "crate"));
     assert!(!scene.parent().expect("a folder").join("scene-edited-2").exists());
 }

@@ -14,8 +14,8 @@ use crate::jobs::workspace::OpenedPath;
 use crate::jobs::{Folders, OpenedScene};
 use crate::models::catalog;
 use crate::navigate::testing::cloud_of_wall;
-use crate::pipeline::semantics::build_map::Carry;
-use crate::pipeline::semantics::recipe::Recipe;
+use crate::pipeline::semantics::lifting::build_map::Carry;
+use crate::pipeline::semantics::query::recipe::Recipe;
 use crate::scene::{Dataset, Preparation, SemanticMap};
 use crate::ui::actions::Action;
 use crate::ui::find_dialog::FindDialog;
@@ -90,16 +90,12 @@ fn chosen(harness: &Harness<'static, App>) -> [String; 2] {
 
 /// The window with unlabeled photos and the dialog with the methods open.
 fn asked(told: Told) -> Harness<'static, App> {
-    let mut harness = Harness::builder()
-        .with_size([1200.0, 800.0])
-        .with_max_steps(20)
-        .wgpu()
-        .build_eframe(|cc| {
-            let folders = Folders { data: "nowhere".into() };
-            let mut app = App::new(cc, folders, Some(Action::Open("photos".into()))).expect("threads");
-            app.tasks.script = Some(Box::new(move |info| Some(told.result(info))));
-            app
-        });
+    let mut harness = Harness::builder().with_size([1200.0, 800.0]).with_max_steps(20).wgpu().build_eframe(|cc| {
+        let folders = Folders { data: "nowhere".into() };
+        let mut app = App::new(cc, folders, Some(Action::Open("photos".into()))).expect("threads");
+        app.tasks.script = Some(Box::new(move |info| Some(told.result(info))));
+        app
+    });
     let until = |harness: &mut Harness<'static, App>, done: &dyn Fn(&App) -> bool| {
         for _ in 0..2_000 {
             if done(harness.state()) {

@@ -3,9 +3,9 @@
 use super::OverlaySettings;
 use super::embeddings::Embeddings;
 use crate::jobs::query::answer_encoded;
-use crate::pipeline::semantics::answer::QueryAnswer;
-use crate::pipeline::semantics::names;
-use crate::pipeline::semantics::reading::QueryReading;
+use crate::pipeline::semantics::query::answer::QueryAnswer;
+use crate::pipeline::semantics::query::names;
+use crate::pipeline::semantics::query::reading::QueryReading;
 use crate::scene::{IdentityId, SemanticMap};
 
 /// A query with its answer.

@@ -8,7 +8,7 @@ use super::card::Facts;
 use super::{Asked, Queries, settings, times};
 use crate::math::format;
 use crate::navigate::target::Side;
-use crate::pipeline::semantics::answer::Basis;
+use crate::pipeline::semantics::query::answer::Basis;
 use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;

@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use crate::pipeline::semantics::by_embedding::TextEmbeddings;
-use crate::pipeline::semantics::parse::ParsedQuery;
+use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
+use crate::pipeline::semantics::query::parse::ParsedQuery;
 use crate::worker::text_encoder::{Encoded, EncodedText, TextEncoder, TextRequest};
 
 /// Embeddings of the texts on screen, as far as known.

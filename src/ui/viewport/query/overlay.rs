@@ -7,7 +7,7 @@ use super::super::outline::{Outline, with_alpha};
 use super::settings::OverlaySettings;
 use crate::math::vector::dot;
 use crate::pipeline::semantics::code_map::CodeMap;
-use crate::pipeline::semantics::matching::MatchMode;
+use crate::pipeline::semantics::query::matching::MatchMode;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::semantic_map::CODE_CHANNELS;
 use crate::scene::{Identities, IdentityId, Level, Mask};

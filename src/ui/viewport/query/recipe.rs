@@ -4,7 +4,7 @@ use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{PopupCloseBehavior, TextEdit, Ui};
 use strum::VariantArray;
 
-use crate::pipeline::semantics::recipe::{
+use crate::pipeline::semantics::query::recipe::{
     CanonicalPhrases, PartFeatures, Recipe, RecipeName, Rejection, RelevancyScale, Strategy, Understanding,
 };
 use crate::scene::{Lifting, MaskGrid, MaskPrompt};

@@ -8,10 +8,10 @@ use super::card::Facts;
 use super::paint::QueryOverlay;
 use super::{Asked, OverlaySettings};
 use crate::jobs::query::ViewMaps;
-use crate::pipeline::semantics::matching::MatchMode;
-use crate::pipeline::semantics::names;
-use crate::pipeline::semantics::parse::ParsedQuery;
-use crate::pipeline::semantics::recipe::Recipe;
+use crate::pipeline::semantics::query::matching::MatchMode;
+use crate::pipeline::semantics::query::names;
+use crate::pipeline::semantics::query::parse::ParsedQuery;
+use crate::pipeline::semantics::query::recipe::Recipe;
 use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
 use crate::worker::Versioned;
 

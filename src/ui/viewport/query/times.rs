@@ -3,7 +3,7 @@
 use egui::{Color32, Rect, RichText, Sense, Ui, pos2, vec2};
 
 use crate::math::format::millis;
-use crate::pipeline::semantics::timing::{STAGES, StagesMs};
+use crate::pipeline::semantics::query::timing::{STAGES, StagesMs};
 use crate::ui::theme;
 
 /// Colors of the stages, in their order.

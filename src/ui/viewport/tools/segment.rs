@@ -16,7 +16,7 @@ use super::preparation::SelectionPreparation;
 use super::{CardPlaces, ToolScene, ViewTool};
 use crate::jobs::select::{self, SelectFor, SelectRequest, SelectStep, Selected, Stroke, kept_as};
 use crate::math::format;
-use crate::pipeline::semantics::edit::Edit;
+use crate::pipeline::semantics::lifting::edit::Edit;
 use crate::scene::{Camera, GaussianCloud, Identities, Level, Mask, NOBODY, SemanticMap};
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;

@@ -1,0 +1,394 @@
+//! Identities in every view, carried by the trained Gaussians. Masks of a first photo vote, and the votes are
+//! rendered into the other views. Photos with too many unknown pixels are segmented too, and their masks linked to
+//! known identities. The tree of Gaussians that belong together decides. No network is needed.
+
+mod complete;
+mod gone;
+mod options;
+mod views;
+
+use std::time::Instant;
+
+pub(crate) use options::TrackOptions;
+pub(crate) use views::ViewReport;
+
+use super::associate::{Link, disagreements, link};
+use super::error::FindError;
+use super::floaters::drop_floaters;
+use super::propagate::extend;
+use super::removed::RemovedThings;
+use super::sam2_tracker::{LABEL_SIDE_PX, Sam2Tracker};
+use super::segmenter::{FoundMask, Segmenter};
+use super::splat_tree::hierarchy::Hierarchy;
+use super::train_codes::{CODE_SIDE_PX, CodeView};
+use super::votes::{Assignment, UNKNOWN, Votes};
+use crate::math::format::things;
+use crate::pipeline::observer::{Observer, Severity, Ticker, begin};
+use crate::pipeline::semantics::view_map::ViewMap;
+use crate::render::{RenderSettings, Renderer};
+use crate::scene::findings::{Disagreement, Doubt, Findings, PhotoFinding, Seen};
+use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY, Photo};
+
+/// Least weight of votes for a Gaussian to have an identity, in px of the photos voted on.
+const LEAST_VOTES: f32 = 0.05;
+
+/// IoU under which a followed mask and that of the Gaussians contradict each other.
+const DRIFT: f64 = 0.2;
+/// Least number of pixels of each for a contradiction.
+const DRIFT_PX: usize = 30;
+
+/// Least share of unlabeled pixels of a mask that shows something new.
+const NEWS: f64 = 0.5;
+
+/// Longer side of the views in which visibility is measured, px.
+const SEE_SIDE_PX: u32 = 256;
+
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Tracked {
+    pub(crate) identities: Identities,
+    pub(crate) assignments: Vec<Assignment>,
+    /// The photos that were segmented, in order.
+    pub(crate) seeds: Vec<usize>,
+    /// Report of every photo, without the identities that hidden Gaussians inherit from those around them.
+    pub(crate) views: Vec<ViewReport>,
+    /// Disagreements of masks with the identities known before, with the photo.
+    pub(crate) disagreements: Vec<(usize, Disagreement)>,
+    /// The masks of the photos that were segmented and of those to which they were followed.
+    pub(crate) masks: Vec<CodeView>,
+    /// Seconds that each stage took, in order.
+    pub(crate) secs: Vec<(&'static str, f64)>,
+}
+
+impl Tracked {
+    /// Returns the findings about identities and photos, which are kept with the map.
+    pub(crate) fn findings(&self, photos: &[Photo]) -> Findings {
+        let mut seen = vec![Seen::default(); self.identities.len()];
+        for (k, view) in self.views.iter().enumerate() {
+            for s in &view.seen {
+                seen[s.identity as usize - 1].add(k, s.pixels as u64, s.confidence);
+            }
+        }
+        let place = |photo: usize| self.views.iter().position(|v| v.photo == photo);
+        let doubt = |(photo, what): &(usize, Disagreement)| {
+            place(*photo).map(|k| Doubt { photo: k as u32, what: what.clone() })
+        };
+        let name = |v: &ViewReport| PhotoFinding { name: photos[v.photo].name.clone(), unknown: v.unknown };
+        Findings::new(
+            self.views.iter().map(name).collect(),
+            seen,
+            self.disagreements.iter().filter_map(doubt).collect(),
+        )
+    }
+}
+
+/// Finds the identities of `cloud` in `photos`. With a `follower`, the first photo's masks are followed to the others
+/// and vote there too.
+pub(crate) fn track(
+    cloud: &GaussianCloud,
+    photos: &[Photo],
+    settings: &RenderSettings,
+    segmenter: &mut dyn Segmenter,
+    follower: Option<&mut Sam2Tracker>,
+    options: &TrackOptions,
+    observer: &mut dyn Observer,
+) -> Result<Tracked, FindError> {
+    let usable = |i: &usize| segmenter.covers(&photos[*i]);
+    let first = match options.seed {
+        Some(seed) => Some(seed).filter(|s| *s < photos.len()).filter(usable),
+        None => segmenter.first(photos, observer)?,
+    };
+    let first = first.ok_or(FindError::NoSeed(segmenter.name().to_owned()))?;
+    let mut t = Tracker {
+        cloud,
+        photos,
+        settings,
+        options,
+        renderer: Renderer::new(),
+        removed: options.removed.as_deref().map(|gone| RemovedThings::new(cloud, gone)),
+        identities: options.known.as_ref().map_or_else(Identities::default, |map| map.identities.clone()),
+        votes: match &options.known {
+            Some(map) => Votes::known(map, options.least_seen),
+            None => Votes::with_least_seen(cloud.len(), options.least_seen),
+        },
+        disagreements: Vec::new(),
+        masks: Vec::new(),
+        segment_secs: 0.0,
+    };
+    let (start, mut follow_secs, mut encode_secs) = (Instant::now(), 0.0, 0.0);
+    t.see(observer)?;
+    let mut seeds = vec![first];
+    let mut tried = vec![false; photos.len()];
+    let seeded = t.seed(first, segmenter, observer)?;
+    tried[first] = true;
+    if let (Some(follower), Some((found, ids))) = (follower, seeded) {
+        let among = t.worth_following(first, observer)?;
+        let start = Instant::now();
+        t.follow(follower, (&among, first), (&found, &ids), observer)?;
+        encode_secs = follower.encode_secs;
+        follow_secs = start.elapsed().as_secs_f64() - encode_secs;
+    }
+    let mut views = t.look(&t.decided(), observer)?;
+    while seeds.len() < options.max_seeds {
+        let is_open = |v: &ViewReport| {
+            let is_needy = options.keep_masks || v.unknown > options.reseed_share;
+            !tried[v.photo] && is_needy && segmenter.covers(&photos[v.photo])
+        };
+        let Some(next) = t.most_unknown(&mut views, is_open, observer)? else { break };
+        tried[next] = true;
+        if t.seed(next, segmenter, observer)?.is_some() {
+            seeds.push(next);
+        }
+    }
+    t.seed_named(&mut seeds, segmenter, observer)?;
+    if seeds.len() > 1 {
+        views = t.look(&t.decided(), observer)?;
+    }
+    let said = t.votes.clone();
+    if options.by_photos {
+        t.complete(&views, observer)?;
+    }
+    let mut assignments = if options.by_tree {
+        begin("Grouping Gaussians", observer)?;
+        let cameras: Vec<_> = photos.iter().map(|p| p.camera.clone()).collect();
+        let tree = Hierarchy::new(cloud, &cameras, settings, observer)?;
+        tree.label(&said, &t.votes, &t.identities, LEAST_VOTES)
+    } else {
+        t.votes.decide(&t.identities, LEAST_VOTES)
+    };
+    let views = t.look(&identities_of(&assignments), observer)?;
+    extend(cloud, &mut assignments, options.hidden_steps);
+    drop_floaters(cloud, &t.identities, &mut assignments);
+    if let Some(map) = &options.known {
+        for (i, now) in assignments.iter_mut().enumerate() {
+            // Unlabeled Gaussians may become something new, unknown ones anything: one more photo only adds things.
+            let is_new = now.identity != UNKNOWN && now.identity as usize > map.identities.len();
+            if map.identity_of[i] != NOBODY || now.identity == NOBODY || !map.is_unknown(i) && !is_new {
+                *now = Assignment { identity: map.identity_of[i], margin: map.margin[i] };
+            }
+        }
+    }
+    let told = Disagreement::told(&t.disagreements, |i| photos[i].name.clone(), |id| t.identities.full_name(id));
+    told.into_iter().for_each(|text| observer.note(Severity::Warning, text));
+    let carry_secs = start.elapsed().as_secs_f64() - t.segment_secs - encode_secs - follow_secs;
+    let secs = vec![
+        ("segment", t.segment_secs),
+        ("encode frames", encode_secs),
+        ("follow masks", follow_secs),
+        ("carry by Gaussians", carry_secs),
+    ];
+    Ok(Tracked {
+        identities: t.identities,
+        assignments,
+        seeds,
+        views,
+        disagreements: t.disagreements,
+        masks: t.masks,
+        secs,
+    })
+}
+
+/// Masks of a photo, and their identities.
+type Seeded = (Vec<FoundMask>, Vec<IdentityId>);
+
+struct Tracker<'a> {
+    cloud: &'a GaussianCloud,
+    photos: &'a [Photo],
+    settings: &'a RenderSettings,
+    options: &'a TrackOptions,
+    renderer: Renderer,
+    removed: Option<RemovedThings>,
+    identities: Identities,
+    votes: Votes,
+    disagreements: Vec<(usize, Disagreement)>,
+    masks: Vec<CodeView>,
+    segment_secs: f64,
+}
+
+impl Tracker<'_> {
+    /// Returns the identity of each Gaussian by the votes so far.
+    fn decided(&self) -> Vec<IdentityId> {
+        identities_of(&self.votes.decide(&self.identities, LEAST_VOTES))
+    }
+
+    /// Measures the visibility of each Gaussian in every photo, before any votes.
+    fn see(&mut self, observer: &mut dyn Observer) -> Result<(), FindError> {
+        let mut ticker = Ticker::new("Looking what each photo shows", self.photos.len());
+        for (i, photo) in self.photos.iter().enumerate() {
+            let camera = photo.camera.limited_to(SEE_SIDE_PX);
+            self.votes
+                .see(&mut self.renderer, self.cloud, &camera, self.settings)
+                .map_err(|e| FindError::Render(photo.name.clone(), e.into()))?;
+            ticker.tick(i + 1, observer)?;
+        }
+        Ok(())
+    }
+
+    /// Segments a photo, links its masks to known identities, and lets them vote. Returns the masks and their
+    /// identities; `None` if there are no masks.
+    fn seed(
+        &mut self,
+        photo: usize,
+        segmenter: &mut dyn Segmenter,
+        observer: &mut dyn Observer,
+    ) -> Result<Option<Seeded>, FindError> {
+        let start = Instant::now();
+        let name = &self.photos[photo].name;
+        begin(format!("Finding masks in {name}"), observer)?;
+        let found = segmenter.segment(&self.photos[photo], self.options.max_side_px, observer);
+        self.segment_secs += start.elapsed().as_secs_f64();
+        let (found, gone) = gone::masks_left(self, photo, found?)?;
+        if found.is_empty() {
+            return Ok(None);
+        }
+        begin(format!("Comparing the {} of {name} with what is known", things(found.len(), "mask")), observer)?;
+        let known = if self.identities.is_empty() { None } else { Some(self.map(photo, self.options.max_side_px)?) };
+        let links = link(&found, known.as_ref(), &self.identities);
+        let stays = known.as_ref().filter(|_| self.options.known.is_some());
+        // A mask of known pixels makes no new identity.
+        let is_free = |id: IdentityId| id == UNKNOWN || id == NOBODY;
+        let is_old = |mask: &FoundMask| {
+            let new = |map: &ViewMap| mask.mask.pixels().filter(|i| is_free(map.identity[*i])).count();
+            stays.is_some_and(|map| (new(map) as f64) < NEWS * mask.mask.area() as f64)
+        };
+        if let Some(known) = &known {
+            let told = disagreements(&found, &links, known, &self.identities);
+            for what in told.into_iter().filter(|d| stays.is_none() || !matches!(d, Disagreement::Split(_))) {
+                self.disagreements.push((photo, what));
+            }
+        }
+        let mut ids = Vec::with_capacity(found.len());
+        for (mask, link) in found.iter().zip(&links) {
+            let parent = mask.parent.map_or(NOBODY, |p| ids[p]);
+            ids.push(match link {
+                Link::Known(id) => *id,
+                _ if parent == UNKNOWN || is_old(mask) => UNKNOWN,
+                Link::New | Link::Split(_) => {
+                    self.identities.add(mask.level, parent, mask.name.iter().cloned().collect())
+                }
+            });
+        }
+        let camera = self.photos[photo].camera.limited_to(self.options.max_side_px);
+        let mut labels = labels_of(&found, &ids, camera.width_px as usize * camera.height_px as usize);
+        if let Some(map) = stays {
+            let known = labels.iter_mut().zip(&map.identity).filter(|(_, known)| !is_free(**known));
+            known.for_each(|(label, _)| *label = UNKNOWN);
+        }
+        gone::forget(&mut labels, gone.as_ref());
+        self.votes
+            .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
+            .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e.into()))?;
+        self.keep(photo, (camera.width_px, camera.height_px), &labels);
+        Ok(Some((found, ids)))
+    }
+
+    /// Returns the photos through which masks of `seed` are followed, in their order: those that it does not explain
+    /// by itself, or all if codes are trained on the followed masks.
+    fn worth_following(&mut self, seed: usize, observer: &mut dyn Observer) -> Result<Vec<usize>, FindError> {
+        let all = self.photos.len();
+        if self.options.keep_masks {
+            return Ok((0..all).collect());
+        }
+        let views = self.look(&self.decided(), observer)?;
+        let open = views.iter().filter(|v| v.photo == seed || v.unknown > self.options.reseed_share);
+        let mut among: Vec<usize> = open.map(|v| v.photo).collect();
+        among.sort_unstable();
+        if among.len() < all {
+            let text =
+                format!("Masks are followed through {} of {all} photos; the Gaussians explain the rest", among.len());
+            observer.note(Severity::Info, text);
+        }
+        Ok(among)
+    }
+
+    /// Follows the masks of the photo `seed` through the photos `among`, and lets them vote there.
+    fn follow(
+        &mut self,
+        follower: &mut Sam2Tracker,
+        (among, seed): (&[usize], usize),
+        seeded: (&[FoundMask], &[IdentityId]),
+        observer: &mut dyn Observer,
+    ) -> Result<(), FindError> {
+        let photos: Vec<Photo> = among.iter().map(|i| self.photos[*i].clone()).collect();
+        let first = among.iter().position(|i| *i == seed).unwrap_or_default();
+        let followed = follower.follow(&photos, first, seeded, self.options.prompt, observer)?;
+        // Labels from the seed alone, so that the follower's labels do not take part in their own check.
+        let of = self.decided();
+        for (&photo, mut labels) in among.iter().zip(followed).filter(|(photo, _)| **photo != seed) {
+            if self.options.veto {
+                let known = self.map_of(photo, LABEL_SIDE_PX, &of)?;
+                for id in contradicted(&labels, &known.identity, self.identities.len()) {
+                    labels.iter_mut().filter(|l| **l == id).for_each(|l| *l = UNKNOWN);
+                    self.disagreements.push((photo, Disagreement::Drift(id)));
+                }
+            }
+            gone::forget(&mut labels, gone::pixels(self, photo, LABEL_SIDE_PX)?.as_ref());
+            let camera = self.photos[photo].camera.limited_to(LABEL_SIDE_PX);
+            self.votes
+                .add_view(&mut self.renderer, self.cloud, &camera, self.settings, &labels)
+                .map_err(|e| FindError::Render(self.photos[photo].name.clone(), e.into()))?;
+            self.keep(photo, (camera.width_px, camera.height_px), &labels);
+        }
+        Ok(())
+    }
+
+    /// Keeps the labels of a photo, of this width and height, for the training of codes.
+    fn keep(&mut self, photo: usize, (w, h): (u32, u32), labels: &[IdentityId]) {
+        if !self.options.keep_masks {
+            return;
+        }
+        let camera = self.photos[photo].camera.limited_to(CODE_SIDE_PX);
+        let (cw, ch) = (camera.width_px, camera.height_px);
+        let at = |i: u32| {
+            let (x, y) = ((i % cw * 2 + 1) * w / (2 * cw), (i / cw * 2 + 1) * h / (2 * ch));
+            labels[(y * w + x) as usize]
+        };
+        self.masks.push(CodeView { labels: (0..cw * ch).map(at).collect(), camera });
+    }
+
+    /// Renders the identities known so far into a view.
+    fn map(&mut self, photo: usize, max_side_px: u32) -> Result<ViewMap, FindError> {
+        let of = self.decided();
+        self.map_of(photo, max_side_px, &of)
+    }
+
+    fn map_of(&mut self, photo: usize, max_side_px: u32, of: &[IdentityId]) -> Result<ViewMap, FindError> {
+        let photo = &self.photos[photo];
+        let camera = photo.camera.limited_to(max_side_px);
+        ViewMap::render(&mut self.renderer, self.cloud, of, &self.identities, &camera, self.settings)
+            .map_err(|e| FindError::Render(photo.name.clone(), e))
+    }
+}
+
+fn identities_of(assignments: &[Assignment]) -> Vec<IdentityId> {
+    assignments.iter().map(|a| a.identity).collect()
+}
+
+/// Returns the identities that two label maps of one view put in different places: both show them, and they hardly
+/// overlap.
+fn contradicted(followed: &[IdentityId], known: &[IdentityId], identities: usize) -> Vec<IdentityId> {
+    let mut counts = vec![[0_usize; 3]; identities + 1];
+    for (&a, &b) in followed.iter().zip(known) {
+        for (at, id) in [(0, a), (1, b)] {
+            if let Some(count) = counts.get_mut(id as usize) {
+                count[at] += 1;
+                count[2] += usize::from(a == b && at == 0);
+            }
+        }
+    }
+    let apart =
+        |c: &[usize; 3]| c[0] >= DRIFT_PX && c[1] >= DRIFT_PX && (c[2] as f64) < DRIFT * (c[0] + c[1] - c[2]) as f64;
+    (1..counts.len()).filter(|id| apart(&counts[*id])).map(|id| id as IdentityId).collect()
+}
+
+/// Returns the innermost identity of each pixel of a segmented photo; `NOBODY` without a mask.
+pub(crate) fn labels_of(found: &[FoundMask], ids: &[IdentityId], pixels: usize) -> Vec<IdentityId> {
+    let mut labels = vec![NOBODY; pixels];
+    // Wholes come before pieces, so the innermost is painted last.
+    for (mask, id) in found.iter().zip(ids) {
+        mask.mask.pixels().for_each(|i| labels[i] = *id);
+    }
+    labels
+}
+
+#[cfg(test)]
+mod tests;

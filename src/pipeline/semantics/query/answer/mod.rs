@@ -1,0 +1,333 @@
+//! Answers to one query: by names if there are any, else by embedding. If names decide, identities that merely look
+//! alike are offered, unless the encoder knows photos (CLIP).
+
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use super::by_embedding::{EmbeddingScorer, TextEmbeddings};
+use super::grounds;
+use super::localize::{Answer, Hit, Scorer, called, localize, nearest};
+use super::matching::{self, MatchMode};
+use super::names::{self, ByName};
+use super::parse::ParsedQuery;
+use super::reading::QueryReading;
+use super::recipe::{Recipe, Rejection, RelevancyScale, Strategy, Understanding};
+use super::timing::{StagesMs, ms_since};
+use crate::models;
+use crate::pipeline::semantics::code_map::CodeMap;
+use crate::pipeline::semantics::relevancy::{LERFS_SHARE, on_lerfs_scale};
+use crate::pipeline::semantics::view_map::ViewMap;
+use crate::scene::{Identities, IdentityId, LanguageFeatures, LevelFilter, Mask};
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Basis {
+    /// Names given by people or label files.
+    Names,
+    /// Embeddings that an encoder made of the identities.
+    Embedding,
+}
+
+/// An answered query.
+#[derive(Clone, Debug, PartialEq)]
+pub struct QueryAnswer {
+    pub(crate) answer: Answer,
+    pub(crate) basis: Basis,
+    /// Identities that look most like the query when names have no answer, best first; offers, not answers.
+    pub(crate) alike: Vec<Hit>,
+    /// True if the encoder is the small one that comes with the program, whose answers are never certain.
+    pub(crate) is_rough: bool,
+    /// Relevancy of every identity by number, 0 to 1; a piece is at least as relevant as its whole
+    /// where names decide.
+    pub(crate) relevancy: Vec<f32>,
+    /// Milliseconds of relevancy and localization; the caller adds the other stages.
+    pub(crate) stages: StagesMs,
+    /// Recipe of the answer.
+    pub(crate) recipe: Recipe,
+}
+
+/// Features and encoded phrases for answers by embedding.
+#[derive(Clone, Copy)]
+pub(crate) struct Language<'a> {
+    pub(crate) features: &'a LanguageFeatures,
+    /// Embeddings of phrases, those of the query included.
+    pub(crate) phrases: &'a TextEmbeddings,
+    /// Words of the query that the encoder does not know and left out.
+    pub(crate) unknown: &'a [String],
+}
+
+/// Answers by the recipe: by names, by embedding if names have no answer and the encoder may give one, or by one of
+/// the two alone.
+pub(crate) fn answer(
+    identities: &Identities,
+    reading: &QueryReading,
+    level: LevelFilter,
+    recipe: &Recipe,
+    language: Option<Language<'_>>,
+) -> QueryAnswer {
+    let phrase = &reading.phrase;
+    let nothing = |a: &Answer| matches!(a, Answer::NotFound(_));
+    let language = match (recipe.understanding, language) {
+        (Understanding::Names, _) | (Understanding::Both, None) => return by_name(identities, reading, level, recipe),
+        (Understanding::Embedding, None) => return unanswered(identities, recipe),
+        (Understanding::Embedding, Some(language)) => return by_embedding(identities, phrase, level, recipe, language),
+        (Understanding::Both, Some(language)) => language,
+    };
+    let named = by_name(identities, reading, level, recipe);
+    let is_strict = recipe.rejection == Rejection::Strict;
+    // Under other rules, an answer by name may leave words out; then the encoder comes first.
+    let known = is_strict || !reading.called.is_empty() || names::unknown_words(identities, &phrase.text).is_empty();
+    if known && !nothing(&named.answer) {
+        return named;
+    }
+    // By embedding, there is always an identity that looks most like the phrase.
+    if nothing(&named.answer) && names::was_removed(identities, &phrase.text) {
+        return named;
+    }
+    let mut meant = by_embedding(identities, phrase, level, recipe, language);
+    let first = meant.chosen(1);
+    let alike = || meant.answer.hits().iter().filter(|hit| first.contains(&hit.identity)).copied().collect();
+    let alike: Vec<Hit> = if is_strict { alike() } else { Vec::new() };
+    if is_strict {
+        meant.answer = grounded(identities, phrase, language, meant.answer);
+    }
+    // Both were computed, whichever is taken.
+    let stages = named.stages.and(meant.stages);
+    let taken = match (nothing(&meant.answer), nothing(&named.answer)) {
+        (false, _) if is_strict && !may_answer(identities, language.features) => QueryAnswer { alike, ..named },
+        (true, _) if is_strict && identities.have_names() => QueryAnswer { alike, ..named },
+        (true, false) => named,
+        _ => meant,
+    };
+    QueryAnswer { stages, ..taken }
+}
+
+/// Returns whether an encoder may answer by itself: if nothing has a name, or if it knows photos. To the small
+/// encoder that comes with the program, everything unknown looks like something known (docs/notes/queries.md).
+pub(crate) fn may_answer(identities: &Identities, features: &LanguageFeatures) -> bool {
+    !identities.have_names() || !models::is_rough(&features.encoder)
+}
+
+/// Rejects an answer by embedding if a word is left out or if the identity has another color than the query says.
+/// Queries about places, comparisons or numbers are rejected too: embeddings do not capture them.
+fn grounded(identities: &Identities, phrase: &ParsedQuery, language: Language<'_>, answer: Answer) -> Answer {
+    let leaves_out = !grounds::telling(language.unknown).is_empty() || grounds::asks_for_more(identities, &phrase.text);
+    match answer {
+        Answer::Found(hits) | Answer::Ambiguous(hits)
+            if leaves_out || grounds::is_of_another_color(identities, hits[0].identity, phrase) =>
+        {
+            Answer::NotFound(hits)
+        }
+        other => other,
+    }
+}
+
+/// Returns the answer by embedding of a scene without embeddings: nothing is found.
+fn unanswered(identities: &Identities, recipe: &Recipe) -> QueryAnswer {
+    QueryAnswer::nothing(Basis::Embedding, identities, recipe)
+}
+
+struct Timed<'a, S> {
+    scorer: &'a mut S,
+    ms: f64,
+}
+
+impl<S: Scorer> Scorer for Timed<'_, S> {
+    fn scores(&mut self, phrase: &str, against: Option<&str>) -> Vec<f32> {
+        let start = Instant::now();
+        let scores = self.scorer.scores(phrase, against);
+        self.ms += ms_since(start);
+        scores
+    }
+
+    fn threshold(&self) -> f32 {
+        self.scorer.threshold()
+    }
+
+    fn resolution(&self) -> f32 {
+        self.scorer.resolution()
+    }
+
+    fn admits(&mut self, phrase: &ParsedQuery, hit: &Hit) -> bool {
+        self.scorer.admits(phrase, hit)
+    }
+
+    fn rejects(&mut self, phrase: &ParsedQuery, hit: &Hit) -> bool {
+        self.scorer.rejects(phrase, hit)
+    }
+}
+
+/// Localizes by `scorer`, unless the whole query is the name of the identities `whole`; then computes the relevancy
+/// of every identity by `relevancy`.
+fn judged<S: Scorer>(
+    (identities, phrase, level): (&Identities, &ParsedQuery, LevelFilter),
+    whole: &[IdentityId],
+    (basis, recipe): (Basis, &Recipe),
+    scorer: &mut S,
+    relevancy: impl FnOnce(&Answer, &mut S) -> Vec<f32>,
+) -> QueryAnswer {
+    let start = Instant::now();
+    let mut timed = Timed { scorer, ms: 0.0 };
+    // Names are words, which are compared one by one.
+    let strategy = match (basis, recipe.strategy) {
+        (Basis::Names, Strategy::Joint) => Strategy::WholeFirst,
+        (_, strategy) => strategy,
+    };
+    let answer = match whole {
+        [] => localize(identities, phrase, level, strategy, &mut timed),
+        ids => called(identities, (ids, &phrase.text), level, &mut timed),
+    };
+    let answer = match answer {
+        // Near hits may be no pieces of the named whole.
+        Answer::NotFound(hits) if basis == Basis::Names && hits.iter().all(|hit| hit.score <= 0.0) => {
+            Answer::NotFound(nearest(identities, &phrase.text, level, &mut timed))
+        }
+        other => other,
+    };
+    let (scored_ms, localized_ms) = (timed.ms, ms_since(start));
+    let relevancy = relevancy(&answer, scorer);
+    let stages = StagesMs {
+        relevancy: scored_ms + ms_since(start) - localized_ms,
+        localize: localized_ms - scored_ms,
+        ..StagesMs::default()
+    };
+    QueryAnswer { stages, ..QueryAnswer::new(answer, basis, relevancy, recipe) }
+}
+
+pub(crate) fn by_name(
+    identities: &Identities,
+    QueryReading { phrase, called, .. }: &QueryReading,
+    level: LevelFilter,
+    recipe: &Recipe,
+) -> QueryAnswer {
+    let mut scorer = ByName { identities, rejection: recipe.rejection };
+    judged((identities, phrase, level), called, (Basis::Names, recipe), &mut scorer, |answer, _| {
+        let alone = names::scores(identities, &phrase.target);
+        let mut relevancy = vec![0.0; identities.len() + 1];
+        let meant = if let Answer::NotFound(_) = answer { &[] } else { answer.hits() };
+        for (id, identity) in identities.iter() {
+            let hit = meant.iter().find(|h| h.identity == id);
+            // An identity that shares words but not the whole query is related, not meant.
+            let own = hit.map_or(0.5 * alone[id as usize - 1], |h| h.score);
+            relevancy[id as usize] = f32::max(own, relevancy[identity.parent as usize]);
+        }
+        relevancy
+    })
+}
+
+/// Answers by embedding alone.
+pub(crate) fn by_embedding(
+    identities: &Identities,
+    phrase: &ParsedQuery,
+    level: LevelFilter,
+    recipe: &Recipe,
+    language: Language<'_>,
+) -> QueryAnswer {
+    let Language { features, phrases, .. } = language;
+    let mut scorer = EmbeddingScorer::new(identities, features, phrases, recipe);
+    let found = judged((identities, phrase, level), &[], (Basis::Embedding, recipe), &mut scorer, |_, scorer| {
+        let mut relevancy = vec![0.0];
+        relevancy.extend(scorer.scores(&phrase.text, None));
+        relevancy.resize(identities.len() + 1, 0.0);
+        relevancy
+    });
+    QueryAnswer { is_rough: models::is_rough(&features.encoder), ..found }
+}
+
+impl QueryAnswer {
+    /// Creates an answer without look-alikes, with times of zero.
+    pub(crate) fn new(answer: Answer, basis: Basis, relevancy: Vec<f32>, recipe: &Recipe) -> Self {
+        let (stages, recipe) = (StagesMs::default(), recipe.clone());
+        Self { answer, basis, alike: Vec::new(), is_rough: false, relevancy, stages, recipe }
+    }
+
+    /// Creates the answer "not found".
+    pub(crate) fn nothing(basis: Basis, identities: &Identities, recipe: &Recipe) -> Self {
+        Self::new(Answer::NotFound(Vec::new()), basis, vec![0.0; identities.len() + 1], recipe)
+    }
+
+    /// Returns the best identities: none if nothing was found, all that fit equally well if the answer is ambiguous,
+    /// else up to `top` that fit.
+    pub fn chosen(&self, top: usize) -> Vec<IdentityId> {
+        let hits = self.answer.hits();
+        let alike = |first: f32| hits.iter().take_while(|h| first - h.score < self.resolution()).count();
+        let (most, threshold) = match &self.answer {
+            Answer::Found(_) => (top.max(1), self.threshold()),
+            Answer::Ambiguous(hits) => (top.max(alike(hits[0].score)), self.threshold()),
+            Answer::NotFound(_) => (0, self.threshold()),
+        };
+        hits.iter().take(most).filter(|h| h.score >= threshold).map(|h| h.identity).collect()
+    }
+
+    /// Least score of an identity that answers the query.
+    pub(crate) fn threshold(&self) -> f32 {
+        self.recipe.rejection.threshold(match self.basis {
+            Basis::Names => names::THRESHOLD,
+            Basis::Embedding => super::by_embedding::THRESHOLD,
+        })
+    }
+
+    fn resolution(&self) -> f32 {
+        match self.basis {
+            Basis::Names => names::RESOLUTION,
+            Basis::Embedding => super::by_embedding::resolution(self.recipe.temperature),
+        }
+    }
+
+    /// Converts a score by embedding to this program's default temperature.
+    fn usual(&self, score: f32) -> f32 {
+        let odds = score / (1.0 - score);
+        let odds = odds.powf(Recipe::default().temperature / self.recipe.temperature);
+        if odds.is_finite() { odds / (1.0 + odds) } else { 1.0 }
+    }
+
+    /// Relevancy by identity in a view, on the recipe's scale.
+    pub(crate) fn shown_relevancy(&self, map: &ViewMap) -> Vec<f32> {
+        match self.recipe.scale {
+            RelevancyScale::Raw => self.relevancy.clone(),
+            RelevancyScale::Lerf => self.lerfs_scale(map.identity.iter().copied()),
+        }
+    }
+
+    /// Relevancy of every identity on LERF's scale: from one half to the largest of the `seen` identities.
+    fn lerfs_scale(&self, seen: impl Iterator<Item = IdentityId>) -> Vec<f32> {
+        let of = |id: IdentityId| self.relevancy.get(id as usize).copied().unwrap_or(0.0);
+        let most = seen.map(of).fold(0.0, f32::max);
+        self.relevancy.iter().map(|r| on_lerfs_scale(*r, most).clamp(0.0, 1.0)).collect()
+    }
+
+    /// Returns, for each identity, whether its relevancy is over the cut on LERF's scale, among those `seen`.
+    pub(crate) fn relevant(&self, seen: impl Iterator<Item = IdentityId>) -> Vec<bool> {
+        self.lerfs_scale(seen).into_iter().map(|r| r > LERFS_SHARE).collect()
+    }
+
+    /// Mask of the answer in a view.
+    pub(crate) fn mask(&self, map: &ViewMap, codes: Option<&CodeMap>, identities: &Identities, top: usize) -> Mask {
+        let Recipe { masks, tolerance, .. } = self.recipe;
+        if masks == MatchMode::Relevancy {
+            let relevant = self.relevant(map.identity.iter().copied());
+            let is = |id: IdentityId| relevant.get(id as usize).copied().unwrap_or(false);
+            return Mask::from_fn(map.width_px, map.height_px, |i| is(map.identity[i]));
+        }
+        let mut mask = Mask::empty(map.width_px, map.height_px);
+        let of = |id: IdentityId| matching::pixels((map, codes), identities, id, masks, tolerance);
+        self.chosen(top).into_iter().for_each(|id| mask.add(&of(id)));
+        mask
+    }
+
+    /// Relevancy of every pixel of a view, row-major, 0 to 1.
+    pub(crate) fn heat(&self, map: &ViewMap) -> Vec<f32> {
+        // One more entry for numbers without an identity.
+        let mut table = self.shown_relevancy(map);
+        table.push(0.0);
+        let last = table.len() - 1;
+        map.identity.par_iter().with_min_len(1 << 16).map(|id| table[(*id as usize).min(last)]).collect()
+    }
+}
+
+mod told;
+
+pub(crate) use told::Certainty;
+
+#[cfg(test)]
+mod tests;
