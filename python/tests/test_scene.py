@@ -49,7 +49,7 @@ class SceneTest(unittest.TestCase):
         names = {i.name for i in scene.identities.values() if i.level == "object"}
         self.assertEqual(names, {"box 0", "box 1", "box 2"})
         [box] = scene.named("Box 1")
-        self.assertIn(box, scene.children(fmlgs.NOBODY))
+        self.assertIn(box, scene.children(fmlgs.NO_IDENTITY))
         members = scene.members(box)
         self.assertTrue(set(scene.assignment[members]) <= set(scene.descendants(box)))
         self.assertEqual(len(scene.members(99)), 0)

@@ -9,7 +9,7 @@ use super::commands::Commands;
 use super::event::AgentEvent;
 use super::policy::Policy;
 use super::refusal::RefusalKind;
-use super::scene::{Parts, SceneWorld};
+use super::scene::{AgentScene, SceneWorld};
 use super::session::{Awaited, Reply, Session};
 use crate::jobs::{Folders, Scene, demo, open, query};
 use crate::navigate::Pose;
@@ -17,7 +17,7 @@ use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::query::answer::{Basis, Certainty};
 use crate::pipeline::semantics::query::localize::Answer;
 use crate::pipeline::semantics::query::query_engine::QueryEngine;
-use crate::pipeline::semantics::query::recipe::{Recipe, Rejection, Understanding};
+use crate::pipeline::semantics::query::recipe::{MatchBy, QueryConfig, Rejection};
 use crate::scene::{IdentityId, LevelFilter, SemanticMap};
 
 fn rows(list: &str) -> Vec<[String; 3]> {
@@ -34,7 +34,7 @@ fn opened() -> (tempfile::TempDir, Scene) {
 }
 
 /// Questions with a wrong answer under a recipe.
-fn wrong(map: &SemanticMap, recipe: Recipe) -> Vec<String> {
+fn wrong(map: &SemanticMap, recipe: QueryConfig) -> Vec<String> {
     let mut engine = QueryEngine::new(map.language.as_ref(), recipe).expect("an engine");
     let mut wrong = Vec::new();
     for [text, verdict, what] in rows("questions") {
@@ -59,15 +59,15 @@ fn what_is_asked_of_the_demo_is_found_or_said_not_to_be_there() {
     let (_data, scene) = opened();
     let map = scene.semantics().expect("objects");
     assert!(map.language.is_some(), "an encoder has looked at it");
-    for understanding in [Understanding::Both, Understanding::Names] {
-        let wrong = wrong(&map, Recipe { understanding, ..Recipe::default() });
-        assert!(wrong.is_empty(), "{understanding}:\n{}", wrong.join("\n"));
+    for match_by in [MatchBy::Both, MatchBy::Names] {
+        let wrong = wrong(&map, QueryConfig { match_by, ..QueryConfig::default() });
+        assert!(wrong.is_empty(), "{match_by}:\n{}", wrong.join("\n"));
     }
     // Control: where an answer may leave words out and the small encoder answers by itself, much is wrong.
-    let before = wrong(&map, Recipe { rejection: Rejection::Canonical, ..Recipe::default() });
+    let before = wrong(&map, QueryConfig { rejection: Rejection::Canonical, ..QueryConfig::default() });
     assert!(before.len() >= 20, "{}", before.join("\n"));
     // The best matches of the encoder are offered.
-    let mut engine = QueryEngine::new(map.language.as_ref(), Recipe::default()).expect("an engine");
+    let mut engine = QueryEngine::new(map.language.as_ref(), QueryConfig::default()).expect("an engine");
     let banana = engine.ask(&map, "banana", LevelFilter::Auto).expect("encodes").expect("words");
     assert!(!banana.offers(3)[1].is_empty() && banana.chosen(8).is_empty(), "{banana:?}");
 }
@@ -80,7 +80,7 @@ fn where_nothing_has_a_name_the_small_encoder_guesses_and_nothing_is_changed_for
     for id in 1..=map.identities.len() as IdentityId {
         map.identities.get_mut(id).expect("there").names.clear();
     }
-    let mut engine = QueryEngine::new(map.language.as_ref(), Recipe::default()).expect("an engine");
+    let mut engine = QueryEngine::new(map.language.as_ref(), QueryConfig::default()).expect("an engine");
     let answered = engine.ask(&map, "teddy bear", LevelFilter::Auto).expect("encodes").expect("words");
     assert_eq!((answered.basis, answered.certainty(&[])), (Basis::Embedding, Certainty::Guess), "{answered:?}");
     let id = answered.chosen(1)[0];
@@ -106,17 +106,17 @@ fn ends(reply: &Reply) -> &'static str {
 fn what_is_said_of_the_demo_is_done_or_refused() {
     let (_data, scene) = opened();
     let map = Arc::new(scene.semantics().expect("objects"));
-    for understanding in [Understanding::Both, Understanding::Names] {
-        let parts = Parts {
+    for match_by in [MatchBy::Both, MatchBy::Names] {
+        let parts = AgentScene {
             cameras: scene.views(),
             up: scene.home().up,
             cloud: Arc::clone(&scene.cloud),
             settings: scene.settings.clone(),
             map: Arc::clone(&map),
-            meters: scene.metres_per_unit,
+            meters: scene.meters_per_unit,
             exports: PathBuf::new(),
             folder: scene.folder.clone(),
-            recipe: Recipe { understanding, ..Recipe::default() },
+            recipe: QueryConfig { match_by, ..QueryConfig::default() },
             explored: None,
         };
         let eye = Pose::of(&scene.views()[0]);
@@ -136,6 +136,6 @@ fn what_is_said_of_the_demo_is_done_or_refused() {
                 wrong.push(format!("'{text}': {done:?}, {}: {}", ends(&reply), reply.text));
             }
         }
-        assert!(wrong.is_empty(), "{understanding}:\n{}", wrong.join("\n"));
+        assert!(wrong.is_empty(), "{match_by}:\n{}", wrong.join("\n"));
     }
 }

@@ -3,7 +3,7 @@
 use super::relation::{Relation, fit};
 use super::world::World;
 use crate::math::format::{self, short};
-use crate::scene::{Bounds, IdentityId, Level, NOBODY};
+use crate::scene::{Bounds, IdentityId, Level, NO_IDENTITY};
 
 /// Least share of the view for a thing to count as visible.
 pub(crate) const SEEN: f64 = 0.0005;
@@ -34,7 +34,7 @@ pub(crate) fn names(world: &dyn World, ids: &[IdentityId], most: usize) -> Strin
 
 /// Formats a length given in scene units.
 pub(crate) fn length(world: &dyn World, units: f64) -> String {
-    match world.metres_per_unit() {
+    match world.meters_per_unit() {
         None => format!("{} scene units", short(units)),
         known => format::length(units, known),
     }
@@ -44,7 +44,7 @@ pub(crate) fn length(world: &dyn World, units: f64) -> String {
 pub(crate) fn size(world: &dyn World, id: IdentityId) -> String {
     let Some(extent) = world.extent(id) else { return "of unknown size".into() };
     let [long, wide, high] = [extent.length, extent.width, extent.height].map(|edge| length(world, edge));
-    let unknown = if world.metres_per_unit().is_none() { " (the scene's scale in meters is not known)" } else { "" };
+    let unknown = if world.meters_per_unit().is_none() { " (the scene's scale in meters is not known)" } else { "" };
     format!("{long} on its longer side, {wide} on its shorter side and {high} high{unknown}")
 }
 
@@ -55,7 +55,7 @@ pub(crate) fn neighbors(world: &dyn World, id: IdentityId, relation: Relation) -
     let frame = world.view().frame();
     let mut found: Vec<(f64, IdentityId)> = Vec::new();
     for (other, identity) in all.iter().filter(|(_, i)| i.level == Level::Object) {
-        let related = all.ancestors(id).any(|l| l == other) || identity.parent != NOBODY;
+        let related = all.ancestors(id).any(|l| l == other) || identity.parent != NO_IDENTITY;
         let bounds = if related { None } else { world.facts(other).and_then(|f| f.bounds) };
         found.extend(bounds.and_then(|b| fit(relation, &b, &anchor, &frame)).map(|d| (d, other)));
     }
@@ -71,7 +71,7 @@ pub(crate) fn place(world: &dyn World, id: IdentityId) -> String {
     let others: Vec<(IdentityId, Bounds)> = world
         .identities()
         .iter()
-        .filter(|(i, o)| o.parent == NOBODY && *i != object)
+        .filter(|(i, o)| o.parent == NO_IDENTITY && *i != object)
         .filter_map(|(i, _)| Some((i, world.facts(i)?.bounds?)))
         .collect();
     let first = |relation, fits: &dyn Fn(&Bounds) -> bool| {

@@ -11,7 +11,7 @@ use super::resolve::{Resolved, resolve};
 use super::tool::{Reference, Target, ToolCall};
 use super::world::{Unreachable, World, WorldError};
 use crate::navigate::target::Side;
-use crate::scene::{IdentityId, LevelFilter, NOBODY};
+use crate::scene::{IdentityId, LevelFilter, NO_IDENTITY};
 
 /// Outcome of a call.
 #[derive(Clone, Debug, PartialEq)]
@@ -225,7 +225,7 @@ pub(crate) fn perform(
     note: &str,
     dialog: &mut DialogState,
 ) -> CallOutcome {
-    let id = ids.first().copied().unwrap_or(NOBODY);
+    let id = ids.first().copied().unwrap_or(NO_IDENTITY);
     let mut listed = Vec::new();
     let done = act(world, &call, id, ids.get(1).copied(), dialog, &mut listed);
     if done.is_ok() && matches!(call, ToolCall::Move { .. } | ToolCall::Turn { .. } | ToolCall::GoTo { .. }) {
@@ -235,7 +235,7 @@ pub(crate) fn perform(
         Ok(text) => (if note.is_empty() { text } else { format!("{text} {note}") }, None),
         Err(refusal) => (refusal.text, Some(refusal.kind)),
     };
-    if id != NOBODY {
+    if id != NO_IDENTITY {
         dialog.last = Some(id);
         dialog.group.clear();
     }
@@ -258,7 +258,7 @@ fn act(
     listed: &mut Vec<IdentityId>,
 ) -> Result<String, Refusal> {
     let failed = |e: WorldError| Refusal::new(RefusalKind::Failed, capital(&e.0));
-    let it = if id == NOBODY { String::new() } else { the(world, id) };
+    let it = if id == NO_IDENTITY { String::new() } else { the(world, id) };
     Ok(match call {
         ToolCall::Locate { .. } | ToolCall::Highlight { .. } => {
             // Earlier targets of the same request stay marked.
@@ -298,7 +298,7 @@ fn act(
         }
         ToolCall::Move { direction, distance } => {
             let (distance, note) = match distance {
-                Distance::Meters(m) if world.metres_per_unit().is_none() => {
+                Distance::Meters(m) if world.meters_per_unit().is_none() => {
                     let note = " This scene's scale in meters is not known, so I took a step for a meter.";
                     (Distance::Relative(*m), note)
                 }
@@ -347,7 +347,7 @@ fn act(
             world.rename(id, name).map_err(failed)?;
             format!("{} is now called '{name}'.", capital(&it))
         }
-        ToolCall::Describe { .. } if id == NOBODY => describe::view(world),
+        ToolCall::Describe { .. } if id == NO_IDENTITY => describe::view(world),
         ToolCall::Describe { .. } => describe::thing(world, id),
         ToolCall::List { level, relation, named, .. } => {
             *listed = list_ids(world, *level, id, *relation, named.as_deref())?;

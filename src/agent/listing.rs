@@ -7,7 +7,7 @@ use super::relation::{Relation, fit, gap};
 use super::resolve::resolve_all;
 use super::tool::Reference;
 use super::world::World;
-use crate::scene::{IdentityId, LevelFilter, NOBODY};
+use crate::scene::{IdentityId, LevelFilter, NO_IDENTITY};
 
 /// Identities to list or count.
 pub(super) fn list_ids(
@@ -26,7 +26,7 @@ pub(super) fn list_ids(
     let all = world.identities();
     let inside = all.descendants(of);
     let is_piece = |id: &IdentityId| *id != of && inside.get(*id as usize) == Some(&true);
-    if of != NOBODY && relation != Relation::PartOf {
+    if of != NO_IDENTITY && relation != Relation::PartOf {
         // Named things may be parts: the buttons on a controller, the handles on the table.
         let Some(named) = named else { return Ok(describe::neighbors(world, of, relation)) };
         let bounds = |id: IdentityId| world.facts(id).and_then(|f| f.bounds);
@@ -38,7 +38,7 @@ pub(super) fn list_ids(
         };
         return Ok(named.into_iter().filter(stands).collect());
     }
-    let is_listed = |id: &IdentityId, level| if of == NOBODY { filter.accepts(level) } else { is_piece(id) };
+    let is_listed = |id: &IdentityId, level| if of == NO_IDENTITY { filter.accepts(level) } else { is_piece(id) };
     let ids = all.iter().filter(|(id, i)| is_listed(id, i.level)).map(|(id, _)| id);
     let is_named = |id: &IdentityId| named.as_ref().is_none_or(|named| named.contains(id));
     Ok(ids.filter(|id| is_named(id) && world.facts(*id).is_some()).collect())
@@ -54,13 +54,13 @@ pub(super) fn say_list(
     named: Option<&str>,
 ) -> String {
     let here = match (of, relation) {
-        (NOBODY, _) => "in the scene".into(),
+        (NO_IDENTITY, _) => "in the scene".into(),
         (of, Relation::PartOf) => format!("of {}", the(world, of)),
         (of, relation) => format!("{} {}", relation.text(), the(world, of)),
     };
     let what = named.unwrap_or(match (level, relation) {
         (LevelFilter::Object, _) => "objects",
-        (LevelFilter::Part, _) | (_, Relation::PartOf) if of != NOBODY => "parts",
+        (LevelFilter::Part, _) | (_, Relation::PartOf) if of != NO_IDENTITY => "parts",
         (LevelFilter::Part, _) => "parts",
         _ => "things",
     });

@@ -8,28 +8,28 @@ use glam::{DMat3, DVec3};
 
 use super::commands::Commands;
 use super::policy::Policy;
-use super::scene::{Effect, Parts, SceneWorld};
+use super::scene::{AgentScene, Effect, SceneWorld};
 use super::session::Session;
 use super::world::World;
 use crate::navigate::Pose;
 use crate::pipeline::semantics::query::answer::Basis;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::render::RenderSettings;
-use crate::scene::{GaussianCloud, Identities, Level, LevelFilter, NOBODY, SemanticMap};
+use crate::scene::{GaussianCloud, Identities, Level, LevelFilter, NO_IDENTITY, SemanticMap};
 
 const EYE: Pose = Pose { center: DVec3::ZERO, world_from_camera: DMat3::IDENTITY, fov_y_rad: 0.8 };
 
 /// Map of one lamp, renamed if `name` is given.
 fn map(name: Option<&str>) -> Arc<SemanticMap> {
     let mut identities = Identities::default();
-    let lamp = identities.add(Level::Object, NOBODY, vec!["lamp".into()]);
+    let lamp = identities.add(Level::Object, NO_IDENTITY, vec!["lamp".into()]);
     name.into_iter().for_each(|name| identities.rename(lamp, name));
     Arc::new(SemanticMap { identities, ..SemanticMap::default() })
 }
 
 /// Scene of this map without Gaussians, in this folder.
-fn parts(map: Arc<SemanticMap>, folder: Option<PathBuf>) -> Parts {
-    Parts {
+fn parts(map: Arc<SemanticMap>, folder: Option<PathBuf>) -> AgentScene {
+    AgentScene {
         cloud: Arc::new(GaussianCloud::default()),
         settings: RenderSettings::default(),
         map,
@@ -44,7 +44,7 @@ fn parts(map: Arc<SemanticMap>, folder: Option<PathBuf>) -> Parts {
 }
 
 /// World of these parts, and the effects that it emits.
-fn world(parts: Parts) -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
+fn world(parts: AgentScene) -> (SceneWorld, Arc<Mutex<Vec<Effect>>>) {
     let effects = Arc::new(Mutex::new(Vec::new()));
     let said = Arc::clone(&effects);
     let emit = Box::new(move |effect| said.lock().expect("no panic").push(effect));
@@ -93,7 +93,7 @@ fn what_the_user_did_last_is_undone_by_the_window() {
 fn things_that_one_request_removes_go_into_one_scene() {
     let mut identities = Identities::default();
     for name in ["lamp", "chair", "table"] {
-        identities.add(Level::Object, NOBODY, vec![name.into()]);
+        identities.add(Level::Object, NO_IDENTITY, vec![name.into()]);
     }
     let map = Arc::new(SemanticMap { identities, ..SemanticMap::default() });
     let (mut world, effects) = world(parts(map, Some(PathBuf::from("scene"))));
@@ -118,7 +118,7 @@ fn what_is_exported_far_from_zero_says_what_it_is_relative_to() {
     {
         let cloud = Arc::new(GaussianCloud { origin, ..GaussianCloud::isotropic(positions.clone(), -3.0, 1.0) });
         let exports = folder.path().to_path_buf();
-        let (mut world, _) = world(Parts { cloud, exports, ..parts(Arc::new(lamp.clone()), None) });
+        let (mut world, _) = world(AgentScene { cloud, exports, ..parts(Arc::new(lamp.clone()), None) });
         let said = world.export(1).expect("written");
         assert!(said.starts_with(&folder.path().join("1-lamp.ply").display().to_string()), "{said}");
         assert_eq!(said.contains("shifted: places are relative to"), shift.is_some(), "{said}");
@@ -129,11 +129,11 @@ fn what_is_exported_far_from_zero_says_what_it_is_relative_to() {
 #[test]
 fn the_agent_answers_by_the_recipe_of_its_scene() {
     let (mut world, _) = renamed();
-    let mut basis = |recipe: Option<Recipe>| {
+    let mut basis = |recipe: Option<QueryConfig>| {
         recipe.iter().for_each(|recipe| world.answer_by(recipe).expect("no encoder is needed"));
         let answered = world.locate("torch", LevelFilter::Auto).expect("asked");
         (answered.basis, answered.chosen(1), answered.recipe)
     };
-    assert_eq!(basis(None), (Basis::Names, vec![1], Recipe::default()));
-    assert_eq!(basis(Some(Recipe::paper())), (Basis::Embedding, vec![], Recipe::paper()));
+    assert_eq!(basis(None), (Basis::Names, vec![1], QueryConfig::default()));
+    assert_eq!(basis(Some(QueryConfig::paper())), (Basis::Embedding, vec![], QueryConfig::paper()));
 }

@@ -8,12 +8,12 @@ use glam::DVec3;
 use crate::jobs::go_to::Explored;
 use crate::jobs::query;
 use crate::navigate::Pose;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::render::RenderSettings;
 use crate::scene::{Bounds, Camera, GaussianCloud, IdentityId, SemanticMap};
 
 /// Components of a scene.
-pub struct Parts {
+pub struct AgentScene {
     pub cloud: Arc<GaussianCloud>,
     pub settings: RenderSettings,
     pub map: Arc<SemanticMap>,
@@ -25,12 +25,12 @@ pub struct Parts {
     /// Folder of a trained scene.
     pub folder: Option<PathBuf>,
     /// Recipe of queries.
-    pub recipe: Recipe,
+    pub recipe: QueryConfig,
     /// Occupied space of the scene, if it was computed before.
     pub explored: Option<Arc<Explored>>,
 }
 
-impl Parts {
+impl AgentScene {
     /// Bounding boxes of all identities, by number, parts included.
     pub(super) fn bounds(&self) -> Vec<Option<Bounds>> {
         let Self { cloud, map, .. } = self;
@@ -58,7 +58,7 @@ struct Counted {
 
 impl ViewShares {
     /// Share of the view from `eye` that an identity covers, parts included; 0 for an unknown one.
-    pub(crate) fn of(&self, parts: &Parts, eye: Pose, aspect: f64, hidden: &[bool], id: IdentityId) -> f64 {
+    pub(crate) fn of(&self, parts: &AgentScene, eye: Pose, aspect: f64, hidden: &[bool], id: IdentityId) -> f64 {
         let mut known = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         let is_new = known.as_ref().is_none_or(|k| k.eye != eye || k.hidden != hidden);
         if is_new {
@@ -68,8 +68,8 @@ impl ViewShares {
     }
 }
 
-fn count(parts: &Parts, eye: Pose, aspect: f64, hidden: &[bool]) -> Vec<f64> {
-    let Parts { cloud, settings, map, .. } = parts;
+fn count(parts: &AgentScene, eye: Pose, aspect: f64, hidden: &[bool]) -> Vec<f64> {
+    let AgentScene { cloud, settings, map, .. } = parts;
     let [w, h] = [aspect.min(1.0), 1.0 / aspect.max(1.0)].map(|s| (COUNT_SIDE_PX * s).max(1.0) as u32);
     let (camera, identities) = (eye.camera(w, h), &map.identities);
     let mut shares = vec![0.0; identities.len() + 1];

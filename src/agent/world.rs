@@ -7,7 +7,7 @@ use crate::jobs::query::ask_with;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::query::answer::{Basis, QueryAnswer};
 use crate::pipeline::semantics::query::query_engine::ask_by_name;
-use crate::pipeline::semantics::query::recipe::{Recipe, Understanding};
+use crate::pipeline::semantics::query::recipe::{MatchBy, QueryConfig};
 use crate::scene::{Bounds, Identities, IdentityId, LanguageFeatures, Level, LevelFilter};
 
 /// Facts about one identity.
@@ -16,7 +16,7 @@ pub struct IdentityFacts {
     /// Names; the first is shown.
     pub names: Vec<String>,
     pub level: Level,
-    /// Identity that it is a part of; `NOBODY` for objects.
+    /// Identity that it is a part of; `NO_IDENTITY` for objects.
     pub parent: IdentityId,
     /// Bounding box in world space, in scene units, if it has Gaussians.
     pub bounds: Option<Bounds>,
@@ -64,8 +64,8 @@ pub trait World {
     fn locate(&mut self, query: &str, kind: LevelFilter) -> Result<QueryAnswer, WorldError>;
 
     /// Basis of queries: names, embeddings or both.
-    fn understanding(&self) -> Understanding {
-        Understanding::Both
+    fn match_by(&self) -> MatchBy {
+        MatchBy::Both
     }
 
     /// Facts about an identity; `None` if it is not, or no longer, in the scene.
@@ -80,7 +80,7 @@ pub trait World {
     fn view(&self) -> Viewpoint;
 
     /// Length of a scene unit in meters, if known.
-    fn metres_per_unit(&self) -> Option<f64>;
+    fn meters_per_unit(&self) -> Option<f64>;
 
     /// Flies to an identity, to view it from `side`; a `closeness` of 2 halves the usual distance.
     fn go_to(&mut self, id: IdentityId, side: Side, closeness: f64) -> Result<Arrival, Unreachable>;
@@ -128,7 +128,7 @@ pub trait World {
 
 /// Answers a query by names alone: [`World::locate`] for scenes without an encoder.
 pub fn locate_by_names(identities: &Identities, query: &str, kind: LevelFilter) -> QueryAnswer {
-    let recipe = Recipe::default();
+    let recipe = QueryConfig::default();
     let asked = ask_by_name(identities, query, kind, &recipe);
     asked.unwrap_or_else(|| QueryAnswer::nothing(Basis::Names, identities, &recipe))
 }
@@ -142,7 +142,7 @@ pub fn locate_with(
     kind: LevelFilter,
     encode: &mut dyn FnMut(&str) -> Vec<f32>,
 ) -> QueryAnswer {
-    let recipe = Recipe::default();
+    let recipe = QueryConfig::default();
     let asked = ask_with(identities, (features, &recipe), query, kind, &mut |phrase: &str| Ok::<_, ()>(encode(phrase)));
     asked.unwrap_or_else(|| QueryAnswer::nothing(Basis::Names, identities, &recipe))
 }

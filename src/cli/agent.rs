@@ -11,9 +11,9 @@ use super::recipe::RecipeArgs;
 use super::scene_args::open_scene;
 use super::{CliError, interrupt, number, output, view};
 use crate::agent::commands::Commands;
-use crate::agent::llm::settings::{LlmSettings, RequestPatience};
+use crate::agent::llm::settings::{LlmSettings, RequestTimeouts};
 use crate::agent::llm::{Llm, SENT, discover};
-use crate::agent::scene::{Effect, Parts, SceneWorld};
+use crate::agent::scene::{AgentScene, Effect, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Session};
 use crate::jobs::{export, render};
 use crate::navigate::Pose;
@@ -136,7 +136,7 @@ pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
         return find_model(args.json);
     }
     if args.test_model {
-        let text = discover::test(&args.settings(), &RequestPatience::default(), interrupt::flag());
+        let text = discover::test(&args.settings(), &RequestTimeouts::default(), interrupt::flag());
         return output::print(&text.map_err(CliError::failed)?);
     }
     let (planner, policy) = (args.planner()?, args.policy()?);
@@ -154,13 +154,13 @@ pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
         output::print(&lines.join("\n"))?;
     }
     let camera = view::choose(args.from.as_deref(), &scene)?;
-    let parts = Parts {
+    let parts = AgentScene {
         cameras: scene.views(),
         up: scene.home().up,
         cloud: scene.cloud,
         settings: scene.settings,
         map: Arc::new(map),
-        meters: args.meters.or(scene.metres_per_unit),
+        meters: args.meters.or(scene.meters_per_unit),
         exports: folder.join("exports"),
         folder: scene.folder.clone(),
         recipe: args.recipe.recipe(),

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use super::CliError;
-use crate::agent::scene::{Effect, Parts};
+use crate::agent::scene::{AgentScene, Effect};
 use crate::jobs::JobError;
 use crate::jobs::edit::{self, EditRequest};
 use crate::jobs::error::chain;
@@ -30,7 +30,7 @@ pub(super) struct SceneWork {
 
 impl SceneWork {
     /// The scene of `parts`, which lies in its folder in the state `state`.
-    pub(super) fn new(parts: &Parts, state: Option<String>) -> Self {
+    pub(super) fn new(parts: &AgentScene, state: Option<String>) -> Self {
         Self {
             folder: parts.folder.clone(),
             state,
@@ -100,8 +100,8 @@ impl SceneWork {
     /// Makes a new scene from the one in `folder` without these, and returns a line with its path.
     fn removed(&mut self, folder: &Path, ids: &[IdentityId]) -> String {
         let request = RemoveRequest { folder: folder.into(), options: RemovalOptions::of(ids), retrain: false };
-        match remove::beside(&request, &mut Silent) {
-            Ok(done) => format!("{}: {}", done.folder.display(), remove::told(&done.name, &done.report)),
+        match remove::run_request(&request, &mut Silent) {
+            Ok(done) => format!("{}: {}", done.folder.display(), remove::summary(&done.name, &done.report)),
             Err(e) => self.failed(e),
         }
     }

@@ -43,14 +43,14 @@ impl CliError {
                 format!(". COLMAP finds them, and the window runs it where it is installed; by hand:{commands}")
             }
             JobError::TestPhotos { .. } => {
-                return Self::Usage(format!("--holdout-every has no effect here: {error}. Leave the option out"));
+                return Self::Usage(format!("--held-out-every has no effect here: {error}. Leave the option out"));
             }
             JobError::Train(TrainError::Checkpoint(CheckpointError::OtherInputs { .. })) => {
                 return Self::Usage(format!("{error}. Choose another folder to train anew"));
             }
             JobError::Output(_) => return Self::Usage(error.to_string()),
             JobError::Report(BeginError::Other(..)) => " (--out); --fresh forgets it".into(),
-            JobError::NothingHeldOut(_) => "; --holdout-every 0 compares with all photos".into(),
+            JobError::NothingHeldOut(_) => "; --held-out-every 0 compares with all photos".into(),
             JobError::NoObjects(path) => format!("; find them with 'fmlgs preprocess {}'", path.display()),
             JobError::UnknownPhoto(_) => "; see 'fmlgs info'".into(),
             JobError::NoMatch(_) => "; see 'fmlgs query'".into(),

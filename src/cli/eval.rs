@@ -40,7 +40,7 @@ pub(crate) struct EvalArgs {
     max_side: Option<u32>,
     /// Photos that count as held out: every n-th, 0 = all photos [default: as in training, else 8]
     #[arg(long, value_parser = number::within(0..=1_000_000_usize))]
-    holdout_every: Option<usize>,
+    held_out_every: Option<usize>,
     /// Compare the black borders of photos that were undistorted elsewhere, too
     #[arg(long)]
     keep_borders: bool,
@@ -73,7 +73,7 @@ pub(crate) struct EvalArgs {
 
 /// The table `[eval]` of a batch.
 pub(super) fn of_table(table: &toml::Table) -> Result<BatchEvaluation, String> {
-    const LEFT_OUT: [&str; 8] = ["photos", "holdout-every", "pictures", "masks", "query", "depth", "removal", "json"];
+    const LEFT_OUT: [&str; 8] = ["photos", "held-out-every", "pictures", "masks", "query", "depth", "removal", "json"];
     // Labels are those of each scene.
     let args: EvalArgs = table_args::parse("batch eval", table, &["scene", "--masks=labels"], &LEFT_OUT)?;
     let EvalArgs { max_side, keep_borders, protocol, recipe, .. } = args;
@@ -89,7 +89,7 @@ impl EvalArgs {
         }
         let options = EvaluateOptions {
             max_side_px: self.max_side,
-            holdout_every: self.holdout_every,
+            holdout_every: self.held_out_every,
             keep_borders: self.keep_borders,
             pictures: self.pictures.clone(),
         };

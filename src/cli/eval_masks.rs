@@ -12,7 +12,7 @@ use crate::pipeline::semantics::evaluation::Unit;
 use crate::pipeline::semantics::evaluation::part_recall::{HIT_IOU, Row};
 use crate::pipeline::semantics::evaluation::recipes::RecipeRow;
 use crate::pipeline::semantics::evaluation::strokes::{STROKES, StrokeRow};
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::scene::Level;
 
 /// Rows of the table at most; the worst come first.
@@ -21,7 +21,7 @@ const ROWS: usize = 12;
 pub(crate) fn run(
     scene: &Path,
     labels: &Path,
-    (protocol, query, recipe): (Protocol, Option<&str>, &Recipe),
+    (protocol, query, recipe): (Protocol, Option<&str>, &QueryConfig),
     comparison: &PhotoComparison,
     as_json: bool,
 ) -> Result<(), CliError> {

@@ -12,11 +12,11 @@ use crate::jobs::find_objects::{self, FindRequest, FindSettings, FoundObjects};
 use crate::jobs::models::SAM2;
 use crate::jobs::{JobError, open, plan};
 use crate::math::format::things;
-use crate::pipeline::semantics::lifting::build_map::{CODE_STEPS, Carry, Found};
+use crate::pipeline::semantics::lifting::build_map::{CODE_STEPS, Found, MaskPropagation};
 use crate::pipeline::semantics::lifting::tracker::TrackOptions;
 use crate::pipeline::semantics::query::recipe::RecipeName;
-use crate::scene::findings::Doubt;
-use crate::scene::{Findings, Identity, IdentityId, Lifting, MaskGrid, MaskPrompt, Preparation, SemanticMap};
+use crate::scene::findings::MaskConflict;
+use crate::scene::{Identity, IdentityId, Lifting, MaskGrid, MaskPrompt, Preparation, SegmentationReport, SemanticMap};
 
 /// Find the objects and parts of a trained scene
 ///
@@ -47,11 +47,11 @@ pub(crate) struct PreprocessArgs {
     recipe: RecipeName,
     /// Tracker that carries masks to the other photos [default: geometry; recipe paper: sam2]
     #[arg(long, value_enum)]
-    tracker: Option<Carry>,
+    tracker: Option<MaskPropagation>,
     /// Prompt that SAM 2 gets of a mask to track [default: mask; recipe paper: points]
     #[arg(long, value_enum)]
     prompt: Option<MaskPrompt>,
-    /// Points of its grid at which a network is asked for masks [default: sparing; recipe paper: all]
+    /// Points of its grid at which a network is asked for masks [default: adaptive; recipe paper: all]
     #[arg(long, value_enum)]
     mask_grid: Option<MaskGrid>,
     /// Share of its own embedding that a part keeps in semantic deviation, the paper's w [default: 0.7]
@@ -118,7 +118,7 @@ fn check_segmenter(args: &PreprocessArgs) -> Result<(), CliError> {
 impl PreprocessArgs {
     fn settings(&self) -> FindSettings {
         let base = self.recipe.recipe().preparation;
-        let by_recipe = if base.prompt.is_some() { Carry::Sam2 } else { Carry::Gaussians };
+        let by_recipe = if base.prompt.is_some() { MaskPropagation::Sam2 } else { MaskPropagation::Gaussians };
         let carry = self.tracker.unwrap_or(by_recipe);
         FindSettings {
             segmenter: self.segmenter.clone().filter(|s| s != "files"),
@@ -128,7 +128,7 @@ impl PreprocessArgs {
             preparation: Preparation {
                 lifting: self.lifting.unwrap_or(base.lifting),
                 part_weight: self.part_weight.unwrap_or(base.part_weight),
-                prompt: self.prompt.or(base.prompt).filter(|_| carry != Carry::Gaussians),
+                prompt: self.prompt.or(base.prompt).filter(|_| carry != MaskPropagation::Gaussians),
                 grid: self.mask_grid.or(base.grid),
             },
             code_steps: self.code_steps,
@@ -162,7 +162,7 @@ pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
     let FoundObjects { found, photos, kept, secs, warnings, .. } =
         done.map_err(|e| CliError::of_work(e, "nothing was stored"))?;
     let Found { map, views, secs: stages } = found;
-    let unknown = map.findings.as_ref().and_then(Findings::unknown);
+    let unknown = map.findings.as_ref().and_then(SegmentationReport::unknown);
     if args.json {
         return output::print_json(&json!({
             "scene": args.scene,
@@ -180,7 +180,7 @@ pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
             "disagreements": disagreements(&map),
         }));
     }
-    let doubts = map.findings.as_ref().map_or(0, |f| f.doubts().len());
+    let conflicts = map.findings.as_ref().map_or(0, |f| f.conflicts().len());
     let kept = match kept.as_slice() {
         [] => String::new(),
         names => format!("\nkept by hand: {}; --replace-all finds them anew", names.join(", ")),
@@ -190,7 +190,7 @@ pub(crate) fn run(args: PreprocessArgs, quiet: bool) -> Result<(), CliError> {
         map.identities.counted(),
         things(map.seeds.len(), "photo"),
         100.0 * unknown.unwrap_or(0.0),
-        things(doubts, "doubt"),
+        things(conflicts, "doubt"),
         args.scene.display()
     ))
 }
@@ -208,7 +208,7 @@ pub(super) fn identities(map: &SemanticMap) -> Vec<Value> {
             "gaussians": fact.gaussians,
             "photos": fact.photos,
             "confidence": fact.confidence,
-            "doubts": fact.doubts.iter().map(|k| &found[*k]).collect::<Vec<_>>(),
+            "doubts": fact.conflicts.iter().map(|k| &found[*k]).collect::<Vec<_>>(),
         })
     };
     map.identities.iter().map(row).collect()
@@ -217,7 +217,7 @@ pub(super) fn identities(map: &SemanticMap) -> Vec<Value> {
 /// Disagreements of photos, in the order in which they were noticed.
 fn disagreements(map: &SemanticMap) -> Vec<Value> {
     let Some(found) = &map.findings else { return Vec::new() };
-    let text = |d: &Doubt| d.what.text(|id| map.identities.full_name(id));
-    let told = |d: &Doubt| json!({ "photo": found.photo(d), "what": d.what, "text": text(d) });
-    found.doubts().iter().map(told).collect()
+    let text = |d: &MaskConflict| d.what.text(|id| map.identities.full_name(id));
+    let told = |d: &MaskConflict| json!({ "photo": found.photo(d), "what": d.what, "text": text(d) });
+    found.conflicts().iter().map(told).collect()
 }

@@ -3,7 +3,7 @@
 use super::number;
 use crate::pipeline::semantics::query::matching::MatchMode;
 use crate::pipeline::semantics::query::recipe::{
-    CanonicalPhrases, PartFeatures, Recipe, RecipeName, Rejection, RelevancyScale, Strategy, Understanding,
+    CanonicalPhrases, MatchBy, PartEmbedding, QueryConfig, RecipeName, Rejection, RelevancyScale, Strategy,
 };
 use crate::scene::SemanticMap;
 
@@ -16,13 +16,13 @@ pub(crate) struct RecipeArgs {
     recipe: Option<RecipeName>,
     /// Names or embeddings that a query is compared with
     #[arg(long, value_enum)]
-    by: Option<Understanding>,
+    by: Option<MatchBy>,
     /// Strategy for a query of a part of an object
     #[arg(long, value_enum)]
     strategy: Option<Strategy>,
     /// Semantic deviation: embeddings of parts are moved toward their objects'
     #[arg(long, value_enum)]
-    deviation: Option<PartFeatures>,
+    deviation: Option<PartEmbedding>,
     /// Phrases that mean anything: 'paper' (object, stuff, texture), 'lerf' (and things), or others, with commas
     #[arg(long, value_name = "PHRASES")]
     canonical: Option<CanonicalPhrases>,
@@ -47,10 +47,10 @@ pub(crate) struct RecipeArgs {
 }
 
 impl RecipeArgs {
-    pub(crate) fn recipe(&self) -> Recipe {
+    pub(crate) fn recipe(&self) -> QueryConfig {
         let base = self.recipe.unwrap_or(RecipeName::Default).recipe();
-        Recipe {
-            understanding: self.by.unwrap_or(base.understanding),
+        QueryConfig {
+            match_by: self.by.unwrap_or(base.match_by),
             strategy: self.strategy.unwrap_or(base.strategy),
             parts: self.deviation.unwrap_or(base.parts),
             canonical: self.canonical.clone().unwrap_or(base.canonical),
@@ -66,7 +66,7 @@ impl RecipeArgs {
     /// Lines on the requested recipe, and on its parts that the scene was not prepared for; nothing for the default.
     pub(crate) fn lines(&self, map: &SemanticMap) -> Vec<String> {
         let recipe = self.recipe();
-        if self.recipe.is_none() && recipe == Recipe::default() {
+        if self.recipe.is_none() && recipe == QueryConfig::default() {
             return Vec::new();
         }
         let unmet = recipe.unmet(map).into_iter().map(|text| format!("note: {text}"));
@@ -87,26 +87,29 @@ mod tests {
         args: RecipeArgs,
     }
 
-    fn recipe(line: &str) -> Recipe {
+    fn recipe(line: &str) -> QueryConfig {
         Line::try_parse_from(std::iter::once("x").chain(line.split_whitespace())).expect(line).args.recipe()
     }
 
     #[test]
     fn every_flag_changes_its_choice_and_no_other() {
-        assert_eq!((recipe(""), recipe("--recipe default")), (Recipe::default(), Recipe::default()));
-        assert_eq!(recipe("--recipe paper"), Recipe::paper());
-        let paper = Recipe::paper;
+        assert_eq!((recipe(""), recipe("--recipe default")), (QueryConfig::default(), QueryConfig::default()));
+        assert_eq!(recipe("--recipe paper"), QueryConfig::paper());
+        let paper = QueryConfig::paper;
         let phrases: CanonicalPhrases = "a thing,it".parse().expect("phrases");
         let cases = [
-            ("--by names", Recipe { understanding: Understanding::Names, ..paper() }),
-            ("--strategy joint", Recipe { strategy: Strategy::Joint, ..paper() }),
-            ("--deviation off", Recipe { parts: PartFeatures::Raw, ..paper() }),
-            ("--canonical lerf", Recipe { canonical: "object,things,stuff,texture".parse().expect("four"), ..paper() }),
-            ("--temperature 4", Recipe { temperature: 4.0, ..paper() }),
-            ("--relevancy raw", Recipe { scale: RelevancyScale::Raw, ..paper() }),
-            ("--match relevancy", Recipe { masks: MatchMode::Relevancy, ..paper() }),
-            ("--tolerance 51", Recipe { tolerance: 0.2, ..paper() }),
-            ("--not-found strict", Recipe { rejection: Rejection::Strict, ..paper() }),
+            ("--by names", QueryConfig { match_by: MatchBy::Names, ..paper() }),
+            ("--strategy joint", QueryConfig { strategy: Strategy::Joint, ..paper() }),
+            ("--deviation off", QueryConfig { parts: PartEmbedding::Raw, ..paper() }),
+            (
+                "--canonical lerf",
+                QueryConfig { canonical: "object,things,stuff,texture".parse().expect("four"), ..paper() },
+            ),
+            ("--temperature 4", QueryConfig { temperature: 4.0, ..paper() }),
+            ("--relevancy raw", QueryConfig { scale: RelevancyScale::Raw, ..paper() }),
+            ("--match relevancy", QueryConfig { masks: MatchMode::Relevancy, ..paper() }),
+            ("--tolerance 51", QueryConfig { tolerance: 0.2, ..paper() }),
+            ("--not-found strict", QueryConfig { rejection: Rejection::Strict, ..paper() }),
         ];
         for (flag, wanted) in cases {
             assert_eq!(recipe(&format!("--recipe paper {flag}")), wanted, "{flag}");
@@ -136,7 +139,7 @@ mod tests {
         assert!(paper[0].starts_with("recipe paper: by embedding, strategy two-steps, deviation on"), "{paper:?}");
         assert!(paper[0].contains("temperature 1,") && paper[0].contains("lifting paper, SAM 2 prompted by points"));
         assert!(paper.len() == 2 && paper[1].contains("does not say"), "{paper:?}");
-        map.prepared = Some(Recipe::paper().preparation);
+        map.prepared = Some(QueryConfig::paper().preparation);
         assert_eq!(lines("--recipe paper", &map).len(), 1, "it was prepared so");
         map.prepared = Some(Preparation { part_weight: 0.5, ..Preparation::default() });
         let notes = lines("--recipe paper", &map)[1..].join("\n");
@@ -144,8 +147,8 @@ mod tests {
             assert!(notes.contains(wanted), "{wanted}: {notes}");
         }
         assert!(!lines("--recipe paper --deviation off", &map).join("\n").contains("part weight 0.5"));
-        assert_eq!(Recipe::paper().preparation.lifting, Lifting::Paper);
-        assert_eq!(Recipe::paper().preparation.prompt, Some(MaskPrompt::Points));
+        assert_eq!(QueryConfig::paper().preparation.lifting, Lifting::Paper);
+        assert_eq!(QueryConfig::paper().preparation.prompt, Some(MaskPrompt::Points));
         map.language = None;
         assert!(lines("--by embedding", &map).join("\n").contains("no encoder has looked at this scene"));
     }

@@ -96,6 +96,6 @@ pub(crate) fn run(args: RemoveArgs, quiet: bool) -> Result<(), CliError> {
             "scene": args.out, "names": names, "gaussians": done.gaussians, "report": done.report,
         }));
     }
-    let told = remove::told(&done.name, &done.report);
+    let told = remove::summary(&done.name, &done.report);
     output::print(&format!("{told}\n{}: {}", args.out.display(), format::things(done.gaussians, "Gaussian")))
 }

@@ -26,7 +26,7 @@ use crate::scene::{Camera, CameraPath, LevelFilter};
 #[command(after_help = "Examples:\n  \
     fmlgs render scene/ --camera 12 --out view.png\n  \
     fmlgs render scene/ --camera IMG_0041 --size 1280x720 --out view.png\n  \
-    fmlgs render scene/ --what depth --out depth.npy\n  \
+    fmlgs render scene/ --channel depth --out depth.npy\n  \
     fmlgs render splat.ply --camera camera.json --out view.png\n  \
     fmlgs render splat.ply --photos photos/ --camera 0 --out view.png\n  \
     fmlgs render scene/ --path path.json --size 1280x720 --out video.mp4\n\n\
@@ -46,14 +46,14 @@ pub(crate) struct RenderArgs {
     /// Shrink the image to at most this many px along its longer side
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=16384))]
     max_side: Option<u32>,
-    /// Quantity to draw
+    /// Channel to draw
     #[arg(long, value_enum, default_value_t = Quantity::Picture)]
-    what: Quantity,
+    channel: Quantity,
     /// The file to write: .png, or .npy for depth and alpha
     #[arg(long, default_value = "render.png")]
     out: PathBuf,
     /// Draw a video along this camera path instead: .mp4, .gif, .webp, or a folder of frames
-    #[arg(long, conflicts_with_all = ["camera", "what"])]
+    #[arg(long, conflicts_with_all = ["camera", "channel"])]
     path: Option<PathBuf>,
     /// Frames per second of the video [default: the path's own]
     #[arg(long, requires = "path", value_parser = number::within(0.01..=CameraPath::MAX_FPS))]
@@ -80,7 +80,7 @@ pub(crate) struct RenderArgs {
 impl RenderArgs {
     fn check(&self) -> Result<(Scene, Camera), CliError> {
         let name = self.out.to_string_lossy().to_lowercase();
-        if !self.what.endings().iter().any(|e| name.ends_with(e)) {
+        if !self.channel.endings().iter().any(|e| name.ends_with(e)) {
             let file = self.out.display();
             return Err(CliError::Usage(format!("'{file}' must end in .png, or in .npy for depth and alpha")));
         }
@@ -108,8 +108,8 @@ pub(crate) fn run(args: RenderArgs, quiet: bool) -> Result<(), CliError> {
         return video(&args, &path, quiet);
     }
     let (scene, camera) = args.check()?;
-    let drawn = render::run(&scene, &camera, args.what, args.backend, &mut Console::new(quiet))?;
-    let far = render::write(&args.out, &drawn.frame, &camera, args.what)?;
+    let drawn = render::run(&scene, &camera, args.channel, args.backend, &mut Console::new(quiet))?;
+    let far = render::write(&args.out, &drawn.frame, &camera, args.channel)?;
     let (size, millis) = ([camera.width_px, camera.height_px], drawn.millis);
     if args.json {
         return output::print_json(&json!({

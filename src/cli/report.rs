@@ -57,7 +57,7 @@ pub(crate) struct ReportArgs {
     max_side: u32,
     /// Most views that are compared
     #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=1000))]
-    views: u32,
+    view_count: u32,
     /// Folder for the report
     #[arg(long, default_value = "out/report")]
     out: PathBuf,
@@ -95,7 +95,7 @@ pub(crate) fn run(args: ReportArgs, quiet: bool) -> Result<(), CliError> {
         steps: args.steps,
         train_steps: args.train_steps,
         max_side_px: args.max_side,
-        views: args.views as usize,
+        views: args.view_count as usize,
         repeats: args.repeats,
         recipe: args.recipe.recipe(),
     };

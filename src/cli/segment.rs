@@ -29,8 +29,8 @@ use crate::scene::{Camera, LevelFilter, SemanticMap};
     fmlgs segment scene/ \"lid of the kettle\" --out lid.ply\n  \
     fmlgs segment scene/ \"the kettle\" --rest --out without_kettle.ply\n  \
     fmlgs segment scene/ \"the kettle\" --out kettle.spz\n  \
-    fmlgs segment scene/ --all --out everything/ --masks isat,coco --photos 0,12\n  \
-    fmlgs segment scene/ --all --out everything/ --format sog --photos none\n  \
+    fmlgs segment scene/ --all --out everything/ --masks isat,coco --views 0,12\n  \
+    fmlgs segment scene/ --all --out everything/ --format sog --views none\n  \
     fmlgs segment scene/ --click 320,200 --view 0003.png --keep \"kettle\"")]
 pub(crate) struct SegmentArgs {
     /// Trained scene with objects and parts ('fmlgs preprocess')
@@ -52,7 +52,7 @@ pub(crate) struct SegmentArgs {
     masks: Vec<MaskFormat>,
     /// Photos whose masks --all writes: 'all', 'none', or some by index or name, with commas between
     #[arg(long, requires = "all", default_value = "all")]
-    photos: String,
+    views: String,
     /// Shrink the masks of --all to at most this many px along their longer side [default: as the photos]
     #[arg(long, requires = "all", value_parser = clap::value_parser!(u32).range(16..=16384))]
     max_side: Option<u32>,
@@ -117,10 +117,10 @@ fn all(args: &SegmentArgs, out: &Path, scene: &Scene, map: SemanticMap, quiet: b
     };
     let done = export_all::run(&request, &mut Console::new(quiet));
     let kept = "what was written by then stays; the same command goes over it";
-    output::print(&told(&done.map_err(|e| CliError::of_work(e, kept))?, args.format, out))
+    output::print(&summary(&done.map_err(|e| CliError::of_work(e, kept))?, args.format, out))
 }
 
-fn told(done: &ExportedAll, format: SplatFormat, folder: &Path) -> String {
+fn summary(done: &ExportedAll, format: SplatFormat, folder: &Path) -> String {
     let mut text = format!("{} objects and parts as {}", done.written, format.ending());
     if done.left_out > 0 {
         text += &format!(", {} without Gaussians left out", done.left_out);
@@ -136,7 +136,7 @@ fn told(done: &ExportedAll, format: SplatFormat, folder: &Path) -> String {
 fn photos(args: &SegmentArgs, scene: &Scene) -> Result<Vec<(String, Camera)>, CliError> {
     let limited = |camera: &Camera| args.max_side.map_or_else(|| camera.clone(), |side| camera.limited_to(side));
     let all = || scene.cameras.iter().map(|c| (c.name.clone(), limited(&c.camera)));
-    let views: Vec<(String, Camera)> = match args.photos.as_str() {
+    let views: Vec<(String, Camera)> = match args.views.as_str() {
         "all" => all().collect(),
         "none" => Vec::new(),
         list => {

@@ -9,7 +9,7 @@ use super::{CliError, output, view};
 use crate::jobs::edit::{self, EditRequest};
 use crate::jobs::select::{self, SelectFor, SelectRequest, SelectStep, Selected, Stroke, kept_as};
 use crate::jobs::{Scene, query};
-use crate::scene::{LevelFilter, Mask, NOBODY};
+use crate::scene::{LevelFilter, Mask, NO_IDENTITY};
 
 /// Radius of a click as a share of the view's width.
 const CLICK: f32 = 0.006;
@@ -51,8 +51,8 @@ pub(crate) fn run(
 ) -> Result<(), CliError> {
     let map = Arc::new(scene.known_semantics()?.unwrap_or_else(|| select::empty_map(&scene.cloud)));
     let whole = match &args.part_of {
-        Some(text) => query::identities(&map, text, LevelFilter::Auto, 1)?.first().copied().unwrap_or(NOBODY),
-        None => NOBODY,
+        Some(text) => query::identities(&map, text, LevelFilter::Auto, 1)?.first().copied().unwrap_or(NO_IDENTITY),
+        None => NO_IDENTITY,
     };
     let purpose = SelectFor::New(whole);
     let full = view::choose(args.view.as_deref(), scene)?;

@@ -16,7 +16,7 @@ use crate::jobs::synth::{self, Levels, Rig, SynthOptions, SynthReport};
 #[derive(Debug, clap::Args)]
 #[command(after_help = "Examples:\n  \
     fmlgs synth table.glb --out photos/\n  \
-    fmlgs synth table.glb --views 200 --held-out 25 --size 1280x960 --rig survey --out photos/\n  \
+    fmlgs synth table.glb --view-count 200 --held-out 25 --size 1280x960 --rig survey --out photos/\n  \
     fmlgs synth table.glb --without \"teddy bear\" --out behind-the-bear/")]
 pub(crate) struct SynthArgs {
     /// The scene: .glb or .gltf with named nodes
@@ -26,7 +26,7 @@ pub(crate) struct SynthArgs {
     out: PathBuf,
     /// Photos in all
     #[arg(long, default_value_t = SynthOptions::default().views)]
-    views: usize,
+    view_count: usize,
     /// Photos marked as held out, spread over all [default: every eighth]
     #[arg(long)]
     held_out: Option<usize>,
@@ -57,7 +57,7 @@ pub(crate) struct SynthArgs {
     without: Option<String>,
     /// Keep the shadow of the object or part that is left out
     #[arg(long, requires = "without")]
-    keep_shadows: bool,
+    keep_shadow: bool,
     /// Print one JSON document at the end
     #[arg(long)]
     json: bool,
@@ -68,8 +68,8 @@ impl SynthArgs {
         let base = SynthOptions::default();
         let [width_px, height_px] = self.size.unwrap_or([base.width_px, base.height_px]);
         let options = SynthOptions {
-            views: self.views,
-            held_out: self.held_out.unwrap_or(self.views / 8),
+            views: self.view_count,
+            held_out: self.held_out.unwrap_or(self.view_count / 8),
             width_px,
             height_px,
             samples: self.samples,
@@ -79,7 +79,7 @@ impl SynthArgs {
             points: self.points,
             seed: self.seed,
             without: self.without.clone(),
-            keep_shadows: self.keep_shadows,
+            keep_shadows: self.keep_shadow,
             ..base
         };
         options.validate().map_err(|error| CliError::Usage(error.to_string()))?;

@@ -38,13 +38,13 @@ pub(crate) fn parse<A: Args>(name: &str, table: &toml::Table, given: &[&str], le
             line.push(format!("--{key}={text}"));
         }
     }
-    let matches = command.clone().try_get_matches_from(line).map_err(|e| told(&e))?;
+    let matches = command.clone().try_get_matches_from(line).map_err(|e| message(&e))?;
     idle::check(name, &command, &matches)?;
-    A::from_arg_matches(&matches).map_err(|e| told(&e))
+    A::from_arg_matches(&matches).map_err(|e| message(&e))
 }
 
 /// Message of an error of clap, without the parts that are meant for a terminal.
-fn told(error: &clap::Error) -> String {
+fn message(error: &clap::Error) -> String {
     let text = error.render().to_string();
     let text = text.trim_start_matches("error: ").split("\n\nUsage").next().unwrap_or_default();
     let text = text.split("\n\nFor more information").next().unwrap_or_default();

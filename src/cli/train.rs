@@ -79,7 +79,7 @@ pub(crate) struct TrainOverrides {
     pub(crate) max_side: Option<u32>,
     /// Hold out every n-th photo, 0 = none [default: 8]
     #[arg(long, value_parser = number::within(0..=1_000_000_usize))]
-    pub(crate) holdout_every: Option<usize>,
+    pub(crate) held_out_every: Option<usize>,
     /// Highest degree of the spherical harmonics [default: 3]
     #[arg(long, value_parser = clap::value_parser!(u8).range(0..=3))]
     pub(crate) sh_degree: Option<u8>,
@@ -139,7 +139,7 @@ impl TrainOverrides {
         TrainConfig {
             steps: self.steps.unwrap_or(base.steps),
             max_side_px: self.max_side.unwrap_or(base.max_side_px),
-            holdout_every: self.holdout_every.unwrap_or(base.holdout_every),
+            holdout_every: self.held_out_every.unwrap_or(base.holdout_every),
             sh_degree: self.sh_degree.unwrap_or(base.sh_degree),
             sh_at_once: base.sh_at_once || self.sh_at_once,
             coarse_share: self.coarse_share.unwrap_or(base.coarse_share),
@@ -181,7 +181,7 @@ impl TrainArgs {
                 )));
             }
         };
-        if self.settings.holdout_every.is_some() {
+        if self.settings.held_out_every.is_some() {
             held_out::refuse_holdout(&dataset)?;
         }
         if self.settings.random_points.is_some() && !dataset.points.is_empty() {
@@ -326,7 +326,7 @@ mod tests {
         };
         assert_eq!(stated("steps"), d.steps.to_string());
         assert_eq!(stated("max_side"), d.max_side_px.to_string());
-        assert_eq!(stated("holdout_every"), d.holdout_every.to_string());
+        assert_eq!(stated("held_out_every"), d.holdout_every.to_string());
         assert_eq!(stated("sh_degree"), d.sh_degree.to_string());
         assert_eq!(stated("random_points"), d.random_points.to_string());
         assert_eq!(stated("seed"), d.seed.to_string());

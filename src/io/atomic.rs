@@ -13,7 +13,7 @@ use super::scene_files::refuse_scene_file;
 use super::temporary::temporary_file;
 
 /// Progress callback with the number of Gaussians written; an error ends the writing.
-pub(crate) type Told<'a> = dyn FnMut(usize) -> io::Result<()> + 'a;
+pub(crate) type WriteProgress<'a> = dyn FnMut(usize) -> io::Result<()> + 'a;
 
 /// Replaces `path` by the output of `fill`: a temporary file in the same folder is filled, synced and renamed over it,
 /// and the folder is synced. On any failure the temporary file is removed and the old content of `path` stays. Links

@@ -54,7 +54,7 @@ pub(super) fn readable<T>(
 }
 
 /// Reports the field of view and the pixels that remain after undistortion, a sentence for each lens that loses much.
-pub(super) fn told(photos: &[Photo]) -> Vec<String> {
+pub(super) fn warnings(photos: &[Photo]) -> Vec<String> {
     let mut lenses: Vec<(&Camera, Distortion, usize)> = Vec::new();
     let same = |a: &Camera, b: &Camera| {
         let [a, b] = [a, b].map(|c| (c.width_px, c.height_px, c.focal_px, c.principal_px));
@@ -146,7 +146,7 @@ mod tests {
         let fisheye = Distortion { projection: Projection::Fisheye, ..Distortion::default() };
         // 180 degrees across, 90 down: 57.5 and 38.1 to each side remain.
         let half = photo(fisheye, [600, 300], 600.0 / std::f64::consts::PI);
-        let told = told(&[half.clone(), half, photo(Distortion::default(), [600, 300], 500.0)]);
+        let told = warnings(&[half.clone(), half, photo(Distortion::default(), [600, 300], 500.0)]);
         assert_eq!(told.len(), 1, "{told:?}");
         assert!(told[0].starts_with("2 photos were taken through a lens that sees 180 x 90 degrees"), "{told:?}");
         assert!(told[0].contains("115 x 76 degrees and "), "{told:?}");
@@ -178,10 +178,10 @@ mod tests {
     #[test]
     fn a_lens_that_loses_little_is_not_told() {
         let slight = Distortion { k1: -0.05, ..Distortion::default() };
-        assert!(told(&[photo(slight, [600, 400], 500.0)]).is_empty());
+        assert!(warnings(&[photo(slight, [600, 400], 500.0)]).is_empty());
         // A pincushion's corners that are not in the photo cost none of its pixels; a barrel's are cut off.
         let strong = Distortion { k1: -0.3, ..Distortion::default() };
-        let cut = told(&[photo(strong, [600, 400], 300.0)]);
+        let cut = warnings(&[photo(strong, [600, 400], 300.0)]);
         assert!(cut.len() == 1 && cut[0].starts_with("1 photo was"), "{cut:?}");
     }
 }

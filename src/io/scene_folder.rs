@@ -115,7 +115,7 @@ impl SceneFolder {
     /// # Errors
     /// If it cannot be written; [`IoError::Changed`] if the scene is not in the state `known` any more.
     pub(crate) fn save_scale(&self, known: Option<&str>, meters_per_unit: f64) -> Result<(), IoError> {
-        let info = SceneInfo { metres_per_unit: Some(meters_per_unit), ..load_info(self.path())? };
+        let info = SceneInfo { meters_per_unit: Some(meters_per_unit), ..load_info(self.path())? };
         if info.state.as_deref() != known {
             return Err(IoError::Changed { folder: self.path().into() });
         }
@@ -235,7 +235,7 @@ mod tests {
     use super::*;
     use crate::io::scene_files::FILES;
     use crate::io::{atomic, trained};
-    use crate::scene::{Identities, Level, NOBODY};
+    use crate::scene::{Identities, Level, NO_IDENTITY};
 
     fn cloud(x: f32) -> GaussianCloud {
         GaussianCloud::isotropic(vec![[x; 3]], 0.0, 0.0)
@@ -243,7 +243,7 @@ mod tests {
 
     fn named(name: &str) -> SemanticMap {
         let mut identities = Identities::default();
-        let id = identities.add(Level::Object, NOBODY, vec![name.into()]);
+        let id = identities.add(Level::Object, NO_IDENTITY, vec![name.into()]);
         SemanticMap::from_identities(identities, vec![id], vec![1.0], vec![])
     }
 

@@ -27,8 +27,8 @@ pub struct SceneInfo {
     #[serde(default)]
     pub cameras: Vec<SceneCamera>,
     /// Length of a scene unit in meters, if known.
-    #[serde(default)]
-    pub metres_per_unit: Option<f64>,
+    #[serde(default, rename = "metres_per_unit")]
+    pub meters_per_unit: Option<f64>,
     /// Color behind everything.
     #[serde(default)]
     pub background: Option<[f32; 3]>,
@@ -102,7 +102,7 @@ impl SceneInfo {
             }),
             cameras: dataset.photos.iter().enumerate().map(camera).collect(),
             background: dataset.background,
-            metres_per_unit: dataset.metres_per_unit,
+            meters_per_unit: dataset.meters_per_unit,
             ..Self::default()
         }
     }

@@ -22,7 +22,9 @@ use serde::{Deserialize, Serialize};
 
 use super::{IoError, files, removed};
 use crate::scene::language::MAX_VIEWS;
-use crate::scene::{Findings, GaussianCloud, Identities, LanguageFeatures, Preparation, SemanticMap, ViewFeatures};
+use crate::scene::{
+    GaussianCloud, Identities, LanguageFeatures, Preparation, SegmentationReport, SemanticMap, ViewFeatures,
+};
 
 /// The file's name in a trained scene's folder.
 pub use super::scene_files::MAP_FILE as FILE;
@@ -46,7 +48,7 @@ struct Header {
     prepared: Option<Preparation>,
     identities: Identities,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    findings: Option<Findings>,
+    findings: Option<SegmentationReport>,
 }
 
 /// Encodes a map that belongs to a scene's state; `path` is for errors.
@@ -216,14 +218,15 @@ fn header(path: &Path, bytes: &[u8]) -> Result<Header, IoError> {
 mod tests {
     use super::*;
     use crate::io::trained::{self, SceneInfo};
-    use crate::scene::{Level, NOBODY};
+    use crate::scene::{Level, NO_IDENTITY};
 
     fn map() -> (SemanticMap, GaussianCloud) {
         let mut identities = Identities::default();
-        let doll = identities.add(Level::Object, NOBODY, vec!["doll".into(), "人形".into()]);
+        let doll = identities.add(Level::Object, NO_IDENTITY, vec!["doll".into(), "人形".into()]);
         let eye = identities.add(Level::Part, doll, vec![]);
         let cloud = GaussianCloud::isotropic(vec![[0.0; 3]; 2], 0.0, 0.0);
-        let mut map = SemanticMap::from_identities(identities, vec![eye, NOBODY], vec![0.25, 0.0], vec!["a".into()]);
+        let mut map =
+            SemanticMap::from_identities(identities, vec![eye, NO_IDENTITY], vec![0.25, 0.0], vec!["a".into()]);
         let views = |raw: [f32; 2], deviated: [f32; 2]| ViewFeatures {
             raw: vec![raw.to_vec(); 2],
             deviated: vec![deviated.to_vec(); 2],

@@ -167,7 +167,7 @@ mod tests {
 
     use super::*;
     use crate::io::trained::{self, SceneInfo};
-    use crate::scene::{Identities, Level, NOBODY};
+    use crate::scene::{Identities, Level, NO_IDENTITY};
 
     fn cloud(shift: f32) -> GaussianCloud {
         let at = |i: usize| [i as f32 * 0.37 + shift, (i as f32).sin(), 0.1];
@@ -178,7 +178,7 @@ mod tests {
     fn a_scene_at_rest_arrives_bit_for_bit() {
         let folder = tempfile::tempdir().expect("folder");
         let mut identities = Identities::default();
-        let doll = identities.add(Level::Object, NOBODY, vec!["doll".into()]);
+        let doll = identities.add(Level::Object, NO_IDENTITY, vec!["doll".into()]);
         let map = SemanticMap::from_identities(identities, vec![doll; 50], vec![1.0; 50], vec!["a".into()]);
         trained::save(folder.path(), &SceneInfo::default(), &cloud(0.0), Some(&map)).expect("save");
         let sent = SceneSnapshot::parse(&of_folder(folder.path()).expect("packed"), folder.path()).expect("sections");

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::atomic::Told;
+use super::atomic::WriteProgress;
 use super::finite::finite_only;
 use super::quantized::{color, constant, log_scale, logit, opacity_byte, to_byte, unit, unorm};
 use super::{IoError, files, shift};
@@ -51,12 +51,12 @@ pub fn parse(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError> {
 }
 
 /// Writes the bytes of a `.splat` of a valid cloud, in its order.
-pub(super) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
+pub(super) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, progress: &mut WriteProgress<'_>) -> io::Result<()> {
     let (near, _) = shift::near_zero(cloud);
     let cloud = &*near;
     let stride = cloud.sh_stride();
     for first in (0..cloud.len()).step_by(BLOCK) {
-        told(first)?;
+        progress(first)?;
         let last = cloud.len().min(first + BLOCK);
         let rows: Vec<[u8; ROW]> = (first..last)
             .into_par_iter()

@@ -7,7 +7,7 @@ use std::path::Path;
 use glam::DVec3;
 use strum::VariantArray;
 
-use super::atomic::{self, Told};
+use super::atomic::{self, WriteProgress};
 use super::{IoError, compressed_ply, khr_gltf, shift, sog, splat, splat_ply, spz};
 use crate::scene::{GaussianCloud, SplatRenderMode};
 
@@ -124,11 +124,16 @@ impl SplatFormat {
         }
     }
 
-    /// Writes the cloud, replacing the file atomically. `told` gets the progress.
+    /// Writes the cloud, replacing the file atomically. `progress` gets the number of Gaussians written.
     ///
     /// # Errors
-    /// If the cloud is not valid, the format cannot hold it, `told` asks to stop or the file cannot be written.
-    pub(crate) fn write(self, path: &Path, cloud: &GaussianCloud, told: &mut Told<'_>) -> Result<(), IoError> {
+    /// If the cloud is not valid, the format cannot hold it, `progress` asks to stop or the file cannot be written.
+    pub(crate) fn write(
+        self,
+        path: &Path,
+        cloud: &GaussianCloud,
+        progress: &mut WriteProgress<'_>,
+    ) -> Result<(), IoError> {
         if self == Self::Ply {
             splat_ply::check(path, cloud)?;
         } else {
@@ -140,20 +145,20 @@ impl SplatFormat {
         }
         let cloud = &*self.prepared(cloud);
         match self {
-            Self::SogFolder => sog::write_folder(path, cloud, told),
-            _ => atomic::write(path, |w| self.encode(w, cloud, told)),
+            Self::SogFolder => sog::write_folder(path, cloud, progress),
+            _ => atomic::write(path, |w| self.encode(w, cloud, progress)),
         }
     }
 
-    fn encode(self, out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
+    fn encode(self, out: &mut dyn Write, cloud: &GaussianCloud, progress: &mut WriteProgress<'_>) -> io::Result<()> {
         match self {
-            Self::Ply => splat_ply::encode_near_zero(out, cloud, told),
-            Self::CompressedPly => compressed_ply::encode(out, cloud, told),
-            Self::Spz => spz::encode(out, cloud, told),
-            Self::Sog | Self::SogFolder => sog::encode(out, cloud, told),
-            Self::Splat => splat::encode(out, cloud, told),
-            Self::Glb => khr_gltf::encode_binary(out, cloud, told),
-            Self::Gltf => khr_gltf::encode_text(out, cloud, told),
+            Self::Ply => splat_ply::encode_near_zero(out, cloud, progress),
+            Self::CompressedPly => compressed_ply::encode(out, cloud, progress),
+            Self::Spz => spz::encode(out, cloud, progress),
+            Self::Sog | Self::SogFolder => sog::encode(out, cloud, progress),
+            Self::Splat => splat::encode(out, cloud, progress),
+            Self::Glb => khr_gltf::encode_binary(out, cloud, progress),
+            Self::Gltf => khr_gltf::encode_text(out, cloud, progress),
         }
     }
 }

@@ -15,7 +15,7 @@ use crate::pipeline::observer::{Interrupted, Observer, Severity};
 use crate::pipeline::semantics::lifting::network_segmenter::NetworkMasks;
 use crate::pipeline::train::{TrainConfig, TrainView, load_views};
 use crate::render::{Device, RenderSettings, Renderer};
-use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Mask, MaskGrid, NOBODY, PhotoPixels};
+use crate::scene::{Camera, Dataset, GaussianCloud, HomeView, Mask, MaskGrid, NO_IDENTITY, PhotoPixels};
 
 /// Size in px of the queried view.
 const QUERY_SIZE: [usize; 2] = [1_008, 567];
@@ -129,7 +129,7 @@ fn strokes(
             cameras: cameras.clone(),
             home: home.clone(),
             map: Arc::clone(&map),
-            purpose: SelectFor::New(NOBODY),
+            purpose: SelectFor::New(NO_IDENTITY),
             before,
             step: SelectStep::Stroke(Stroke { camera: camera.clone(), pixels, is_plus: k % 3 != 2 }),
         };

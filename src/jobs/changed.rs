@@ -30,7 +30,7 @@ impl ChangedScene {
     }
 
     /// Returns a report in words, if anything differs.
-    pub(crate) fn told(&self) -> Option<(Severity, String)> {
+    pub(crate) fn notice(&self) -> Option<(Severity, String)> {
         let names = removed_names(&self.names);
         let removed = match (self.names.is_empty(), &self.removed) {
             (true, None) => None,

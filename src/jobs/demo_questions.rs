@@ -14,10 +14,10 @@ use crate::models;
 use crate::pipeline::observer::{Observer, Severity, Silent};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::evaluation::{AskedScene, LabeledView, categories, masks};
-use crate::pipeline::semantics::lifting::build_map::{FindOptions, Tools, find_objects};
+use crate::pipeline::semantics::lifting::build_map::{FindOptions, SearchModels, find_objects};
 use crate::pipeline::semantics::lifting::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::lifting::tracker::TrackOptions;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
 use crate::scene::{LevelFilter, Photo, SemanticMap};
@@ -78,8 +78,8 @@ pub(crate) fn find(
     let mut encoder = models::encoder(models::DEMO)?;
     let options =
         FindOptions { track: TrackOptions { max_seeds, ..TrackOptions::default() }, ..FindOptions::default() };
-    let tools = Tools { segmenter: &mut segmenter, follower: None, encoder: Some(&mut *encoder) };
-    Ok(find_objects(&job.cloud, &training, &job.settings, tools, &options, observer)?.map)
+    let models = SearchModels { segmenter: &mut segmenter, follower: None, encoder: Some(&mut *encoder) };
+    Ok(find_objects(&job.cloud, &training, &job.settings, models, &options, observer)?.map)
 }
 
 /// Runs [`find`], stores the result in the folder `scene`, and runs [`ask`].
@@ -116,7 +116,7 @@ pub(crate) fn ask(
     pictures: Option<&Path>,
 ) -> Result<DemoQueries, JobError> {
     let mut segmenter = FileMasks(Labels::of_photos(photos, &job.dataset.photos)?);
-    let mut engine = QueryEngine::new(map.language.as_ref(), Recipe::default())?;
+    let mut engine = QueryEngine::new(map.language.as_ref(), QueryConfig::default())?;
     let (mut units, mut asked) = (Vec::new(), Vec::new());
     let mut renderer = Renderer::new();
     for (k, &i) in job.views.iter().enumerate() {

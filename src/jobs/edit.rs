@@ -55,13 +55,13 @@ pub(crate) fn store(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Identities, NOBODY};
+    use crate::scene::{Identities, NO_IDENTITY};
 
     #[test]
     fn an_edit_that_makes_no_sense_is_refused() {
         let cloud = GaussianCloud::isotropic(vec![[0.0; 3]; 3], -3.2, 3.0);
-        let map = SemanticMap::from_identities(Identities::default(), vec![NOBODY; 3], vec![1.0; 3], vec![]);
-        let add = Edit::AddPiece { of: NOBODY, name: "left".into(), gaussians: vec![0, 2] };
+        let map = SemanticMap::from_identities(Identities::default(), vec![NO_IDENTITY; 3], vec![1.0; 3], vec![]);
+        let add = Edit::AddPiece { of: NO_IDENTITY, name: "left".into(), gaussians: vec![0, 2] };
         let new = apply(&cloud, &map, &EditRequest::Apply(add)).expect("edited");
         assert_eq!((new.identities.name(1), new.sizes()[1]), ("left".into(), 2));
         let wrong = EditRequest::Apply(Edit::Split(7));

@@ -125,7 +125,7 @@ pub(crate) fn photometric(comparison: &PhotoComparison, observer: &mut dyn Obser
     for warning in &comparison.dataset.warnings {
         observer.note(Severity::Warning, warning.clone());
     }
-    if let Some((severity, text)) = comparison.changed.told() {
+    if let Some((severity, text)) = comparison.changed.notice() {
         observer.note(severity, text);
     }
     let PhotoComparison { cloud, settings, .. } = comparison;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::evaluate::PhotoComparison;
-use super::remove::{self, Paint, Reduced, RemovalOptions};
+use super::remove::{self, Paint, ReducedScene, RemovalOptions};
 use super::{JobError, Scene, export, query};
 use crate::io::files;
 use crate::models::catalog::{self, ModelRole};
@@ -174,7 +174,7 @@ fn one(
     let ids = query::identities(map, name, LevelFilter::Auto, 1)?;
     let start = std::time::Instant::now();
     let options = RemovalOptions { ids, halo: true, lift_shadow, paint, seed: 0 };
-    let Reduced { cloud, map: left, report } = remove::run(scene, map, &options, observer)?;
+    let ReducedScene { cloud, map: left, report } = remove::run(scene, map, &options, observer)?;
     let secs = start.elapsed().as_secs_f64();
     let found_again = match query::identities(&left, name, LevelFilter::Auto, 1) {
         Err(JobError::NoMatch(_)) => false,

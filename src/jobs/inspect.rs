@@ -9,7 +9,7 @@ use super::JobError;
 use crate::math::lanes::Lane;
 use crate::math::{Real, rotation, sh};
 use crate::render::{COLOR_MAX, ContributionSink, RenderSettings, Renderer, TILE_PX};
-use crate::scene::{Camera, GaussianCloud, IdentityId, Level, NOBODY, SemanticMap};
+use crate::scene::{Camera, GaussianCloud, IdentityId, Level, NO_IDENTITY, SemanticMap};
 
 /// Request to inspect a pixel.
 #[derive(Clone, Debug)]
@@ -115,7 +115,7 @@ impl InspectedPixel {
             })
         };
         let map = map.as_ref();
-        let id = map.map_or(NOBODY, |map| map.identity_of[i]);
+        let id = map.map_or(NO_IDENTITY, |map| map.identity_of[i]);
         let identities = map.map_or_else(Vec::new, |map| {
             let all = map.identities.ancestors(id).filter_map(|id| Some((id, map.identities.get(id)?)));
             let records = all.map(|(number, identity)| IdentityRecord {
@@ -192,9 +192,10 @@ mod tests {
         cloud.sh_degree = 1;
         cloud.sh = (0..12).map(|i| [0.1 * i as f32, 0.2, -0.3]).collect();
         let mut identities = Identities::default();
-        let kettle = identities.add(Level::Object, NOBODY, vec!["kettle".into()]);
+        let kettle = identities.add(Level::Object, NO_IDENTITY, vec!["kettle".into()]);
         let lid = identities.add(Level::Part, kettle, vec!["lid".into()]);
-        let map = SemanticMap::from_identities(identities, vec![kettle, lid, NOBODY], vec![1.0, 0.25, 0.0], vec![]);
+        let map =
+            SemanticMap::from_identities(identities, vec![kettle, lid, NO_IDENTITY], vec![1.0, 0.25, 0.0], vec![]);
         let camera = Camera::look_at(DVec3::new(-4.0, 0.0, 0.0), DVec3::X, DVec3::Z, 0.9, 65, 49).expect("valid");
         InspectRequest {
             cloud: Arc::new(cloud),

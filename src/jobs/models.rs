@@ -10,7 +10,7 @@ use crate::math::stats::median;
 use crate::models::catalog;
 pub(crate) use crate::models::catalog::{ModelEntry, ModelRole, ModelState, SAM2};
 use crate::models::engine;
-use crate::models::fetch::Patience;
+use crate::models::fetch::Timeouts;
 use crate::models::official::WEIGHTS;
 use crate::models::{self, IdentityCrop, KnownResult, ModelError};
 use crate::pipeline::observer::{Observer, Ticker};
@@ -106,7 +106,7 @@ pub(crate) fn install(id: &str, source: Source<'_>, observer: &mut dyn Observer)
             ticker.tick(done as usize, observer).is_ok()
         })?,
         Source::Brought(brought) => entry.add(&folder, brought)?,
-        Source::Fetch(from) => entry.fetch(&folder, from, Patience::default(), &mut |what, there, all| {
+        Source::Fetch(from) => entry.fetch(&folder, from, Timeouts::default(), &mut |what, there, all| {
             let (stage, unit) = match what {
                 WEIGHTS => (WRITING.to_owned(), 1),
                 name => (format!("Downloading {name} (MB)"), 1_000_000),
@@ -162,9 +162,9 @@ pub(crate) struct EncoderTimes {
     pub(crate) phrase: Vec<f32>,
 }
 
-/// Times every installed encoder on a picture and a phrase: medians over `runs`. `told` receives a report of each that
-/// cannot be used.
-pub(crate) fn time_encoders(runs: usize, told: &mut dyn FnMut(String)) -> Result<Vec<EncoderTimes>, JobError> {
+/// Times every installed encoder on a picture and a phrase: medians over `runs`. `on_warning` receives a
+/// report of each that cannot be used.
+pub(crate) fn time_encoders(runs: usize, on_warning: &mut dyn FnMut(String)) -> Result<Vec<EncoderTimes>, JobError> {
     const PHRASE: &str = "a red wooden chair";
     let times = |run: &mut dyn FnMut() -> Result<(), ModelError>| -> Result<f64, ModelError> {
         let mut ms = Vec::with_capacity(runs);
@@ -176,7 +176,7 @@ pub(crate) fn time_encoders(runs: usize, told: &mut dyn FnMut(String)) -> Result
         Ok(median(&ms))
     };
     let mut list = Vec::new();
-    for id in catalog::usable(ModelRole::Encoder, told)? {
+    for id in catalog::usable(ModelRole::Encoder, on_warning)? {
         let start = Instant::now();
         let mut encoder = models::encoder(&id)?;
         let side_px = encoder.tile_side_px().unwrap_or(224);

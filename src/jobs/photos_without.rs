@@ -129,7 +129,7 @@ fn write(
     points_ply::write(&out.join("points3D.ply"), &points(&dataset, from, &thing, reduced))?;
     let about = json!({
         "camera_model": "PINHOLE", "ply_file_path": "points3D.ply", "test_filenames": test, "frames": frames,
-        "fmlgs": { "background": dataset.background, "metres_per_unit": dataset.metres_per_unit },
+        "fmlgs": { "background": dataset.background, "metres_per_unit": dataset.meters_per_unit },
     });
     // Last: with it, the photos are complete.
     Ok(json(TRANSFORMS, &about)?)

@@ -15,11 +15,11 @@ pub(crate) use crate::pipeline::semantics::query::grounds::color_of;
 use crate::pipeline::semantics::query::matching::{self, MatchMode};
 pub(crate) use crate::pipeline::semantics::query::query_engine::{QueryEngine, answer_encoded, ask_with};
 use crate::pipeline::semantics::query::reading::QueryReading;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::pipeline::semantics::query::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{DrawError, Features, RenderError, RenderSettings, Renderer};
-use crate::scene::{Camera, GaussianCloud, IdentityId, LevelFilter, Mask, NOBODY, SemanticMap};
+use crate::scene::{Camera, GaussianCloud, IdentityId, LevelFilter, Mask, NO_IDENTITY, SemanticMap};
 
 /// Identities of a view's pixels, drawn once for all queries.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -53,7 +53,7 @@ impl ViewMaps {
         let mut identities = ViewMap::render(renderer, cloud, &of, &map.identities, camera, settings)?;
         let drawn = &identities.identity;
         let unknown = Mask::from_fn(identities.width_px, identities.height_px, |i| drawn[i] == UNSEEN);
-        unknown.pixels().for_each(|i| identities.identity[i] = NOBODY);
+        unknown.pixels().for_each(|i| identities.identity[i] = NO_IDENTITY);
         let codes = match wanted {
             true => Some(CodeMap::render(renderer, cloud, &map.codes, parts, camera, settings)?),
             false => None,
@@ -111,7 +111,7 @@ pub(crate) struct QueryRequest<'a> {
     pub(crate) text: &'a str,
     pub(crate) level: LevelFilter,
     pub(crate) camera: &'a Camera,
-    pub(crate) recipe: &'a Recipe,
+    pub(crate) recipe: &'a QueryConfig,
     /// Most answers whose pixels go into the mask.
     pub(crate) top: usize,
 }
@@ -158,7 +158,7 @@ pub(crate) fn identities(
     level: LevelFilter,
     top: usize,
 ) -> Result<Vec<IdentityId>, JobError> {
-    Ok(answered(map, text, level, &Recipe::default())?.chosen(top))
+    Ok(answered(map, text, level, &QueryConfig::default())?.chosen(top))
 }
 
 /// Returns the same for edits: by names alone.
@@ -171,7 +171,7 @@ pub(crate) fn named(
     level: LevelFilter,
     top: usize,
 ) -> Result<Vec<IdentityId>, JobError> {
-    let answered = answered(map, text, level, &Recipe::default())?;
+    let answered = answered(map, text, level, &QueryConfig::default())?;
     match (answered.basis, answered.chosen(top)) {
         (Basis::Embedding, ids) => {
             let name = ids.first().map(|id| map.identities.full_name(*id)).unwrap_or_default();
@@ -189,7 +189,7 @@ pub(crate) fn answered(
     map: &SemanticMap,
     text: &str,
     level: LevelFilter,
-    recipe: &Recipe,
+    recipe: &QueryConfig,
 ) -> Result<QueryAnswer, JobError> {
     let answered = QueryEngine::new(map.language.as_ref(), recipe.clone())?.ask(map, text, level)?;
     answered.filter(|a| !a.chosen(1).is_empty()).ok_or_else(|| JobError::NoMatch(text.to_owned()))
@@ -250,15 +250,19 @@ mod tests {
         let camera =
             Camera::look_at(DVec3::new(0.0, 0.0, -4.0), DVec3::ZERO, DVec3::NEG_Y, 0.6, 96, 48).expect("valid");
         let draw = |margin: [f32; 4]| {
-            let map =
-                SemanticMap::from_identities(Identities::objects(1), vec![1, NOBODY, NOBODY, 1], margin.into(), vec![]);
+            let map = SemanticMap::from_identities(
+                Identities::objects(1),
+                vec![1, NO_IDENTITY, NO_IDENTITY, 1],
+                margin.into(),
+                vec![],
+            );
             let settings = RenderSettings::default();
             ViewMaps::draw(&mut Renderer::new(), (&cloud, &settings), &map, &camera, false, false).expect("drawn")
         };
         let maps = draw([1.0, 0.5, 0.0, 0.0]);
         let px = |x: f64| camera.project(DVec3::new(x, 0.0, 0.0)).map(|p| 24 * 96 + p.x as usize).expect("in front");
         let at = [-0.9, -0.3, 0.3, 0.9].map(|x| (maps.identities.identity[px(x)], maps.unknown.contains(px(x))));
-        assert_eq!(at, [(1, false), (NOBODY, false), (NOBODY, true), (1, false)]);
+        assert_eq!(at, [(1, false), (NO_IDENTITY, false), (NO_IDENTITY, true), (1, false)]);
         assert!((0.002..0.05).contains(&maps.unknown_share()), "{}", maps.unknown_share());
         // The control: if none is unknown, no pixel is, and every pixel has the same identity as before.
         let known = draw([1.0; 4]);

@@ -16,7 +16,7 @@ use crate::scene::{Camera, GaussianCloud, SemanticMap};
 
 /// A scene without some of its things.
 #[derive(Clone, Debug)]
-pub(crate) struct Reduced {
+pub(crate) struct ReducedScene {
     pub(crate) cloud: Arc<GaussianCloud>,
     pub(crate) map: Arc<SemanticMap>,
     pub(crate) report: RemovalReport,
@@ -28,7 +28,7 @@ pub(crate) fn run(
     map: &SemanticMap,
     options: &RemovalOptions,
     observer: &mut dyn Observer,
-) -> Result<Reduced, JobError> {
+) -> Result<ReducedScene, JobError> {
     let photos: Vec<Camera> = scene.cameras.iter().filter(|c| !c.held_out).map(|c| c.camera.clone()).collect();
     let mut network = match options.paint {
         Some(Paint::Lama) => Some(Lama::open(&catalog::find(LAMA, ModelRole::Inpainter)?)?),
@@ -49,7 +49,7 @@ pub(crate) fn run(
     let gone: Vec<usize> = (0..stays.len()).filter(|i| !stays[*i]).collect();
     // Photos still show the removed things.
     new.add_removed(scene.cloud.select(&gone));
-    Ok(Reduced { cloud: done.cloud.into(), map: new.into(), report: done.report })
+    Ok(ReducedScene { cloud: done.cloud.into(), map: new.into(), report: done.report })
 }
 
 /// Request of the window and the agent: the result goes into a folder beside the scene's.
@@ -64,7 +64,7 @@ pub struct RemoveRequest {
 
 /// A stored scene without some things.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RemovedScene {
+pub struct StoredRemoval {
     /// Folder of the new scene.
     pub(crate) folder: PathBuf,
     /// Names of the removed things.
@@ -75,7 +75,7 @@ pub struct RemovedScene {
     state: Option<String>,
 }
 
-impl RemovedScene {
+impl StoredRemoval {
     /// Deletes it with its folder, if it is unchanged since it was stored, and nothing else is there.
     pub(crate) fn delete(&self) -> Result<(), IoError> {
         SceneFolder::delete(&self.folder, self.state.as_deref())
@@ -83,12 +83,12 @@ impl RemovedScene {
 }
 
 /// Removes things from the scene in a folder and stores the result beside it.
-pub(crate) fn beside(request: &RemoveRequest, observer: &mut dyn Observer) -> Result<RemovedScene, JobError> {
+pub(crate) fn run_request(request: &RemoveRequest, observer: &mut dyn Observer) -> Result<StoredRemoval, JobError> {
     let scene = open::scene(&request.folder)?;
     let done = into_new_scene(&scene, &request.options, request.retrain, None, observer)?;
     let NewScene { folder, name, report, .. } = done;
     let state = scene_info::load_info(&folder)?.state;
-    Ok(RemovedScene { folder, name, request: request.clone(), report, state })
+    Ok(StoredRemoval { folder, name, request: request.clone(), report, state })
 }
 
 /// A scene that was just made without some things.
@@ -139,7 +139,7 @@ fn new_folder(scene: &Scene, map: &SemanticMap, without: (&RemovalOptions, &str)
 }
 
 /// Returns a report in words.
-pub(crate) fn told(name: &str, report: &RemovalReport) -> String {
+pub(crate) fn summary(name: &str, report: &RemovalReport) -> String {
     let count = |n: usize| format::things(n, "Gaussian");
     let mut text = format!("{name}: {} removed", count(report.taken()));
     match report.surfaces.iter().map(|s| s.roughness).reduce(f64::max) {
@@ -165,7 +165,7 @@ const ROUGH: f64 = 0.1;
 const GUESSED: f32 = 0.5;
 
 /// Stores the result, which is without `name`, as a scene in the folder `out`; the one in `from` is unchanged.
-fn store(from: &Scene, name: &str, reduced: &Reduced, out: &Path) -> Result<(), JobError> {
+fn store(from: &Scene, name: &str, reduced: &ReducedScene, out: &Path) -> Result<(), JobError> {
     if from.folder.is_none() {
         return Err(JobError::NoScene(from.path.clone()));
     }

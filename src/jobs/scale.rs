@@ -33,9 +33,9 @@ mod tests {
         let state = trained::save(&scene, &SceneInfo::default(), &cloud, None).expect("saved");
         assert!(store(&scene, Some(&state), 0.25).expect("stored"));
         let loaded = trained::load(&scene).expect("whole");
-        assert_eq!((loaded.info.metres_per_unit, loaded.info.state.as_deref()), (Some(0.25), Some(state.as_str())));
+        assert_eq!((loaded.info.meters_per_unit, loaded.info.state.as_deref()), (Some(0.25), Some(state.as_str())));
         let changed = store(&scene, Some("another"), 0.5).expect_err("refused");
         assert!(matches!(changed, JobError::Io(IoError::Changed { .. })), "{changed}");
-        assert_eq!(trained::load(&scene).expect("whole").info.metres_per_unit, Some(0.25));
+        assert_eq!(trained::load(&scene).expect("whole").info.meters_per_unit, Some(0.25));
     }
 }

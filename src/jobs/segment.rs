@@ -3,7 +3,7 @@
 use super::JobError;
 use crate::pipeline::semantics::query::answer::QueryAnswer;
 use crate::pipeline::semantics::query::matching::{MatchMode, gaussians};
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
 
 /// Returns the Gaussians of an answer, of at most `top` identities, or all others.
@@ -15,7 +15,7 @@ pub(crate) fn select(
     rest: bool,
 ) -> Result<GaussianCloud, JobError> {
     let mut inside = vec![false; cloud.len()];
-    let Recipe { masks, tolerance, .. } = answered.recipe;
+    let QueryConfig { masks, tolerance, .. } = answered.recipe;
     if masks == MatchMode::Relevancy {
         let relevant = answered.relevant(map.identity_of.iter().copied());
         let is = |id: &IdentityId| relevant.get(*id as usize).copied().unwrap_or(false);

@@ -13,12 +13,12 @@ pub use crate::pipeline::semantics::lifting::splat_tree::marks::Stroke;
 use crate::pipeline::semantics::lifting::splat_tree::marks::StrokeMarks;
 use crate::pipeline::semantics::query::timing::ms_since;
 use crate::render::{RenderSettings, Renderer};
-use crate::scene::{Camera, GaussianCloud, HomeView, Identities, IdentityId, NOBODY, SemanticMap};
+use crate::scene::{Camera, GaussianCloud, HomeView, Identities, IdentityId, NO_IDENTITY, SemanticMap};
 
 /// Purpose of a selection.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum SelectFor {
-    /// A new part of this identity; for `NOBODY`, a new object.
+    /// A new part of this identity; for `NO_IDENTITY`, a new object.
     New(IdentityId),
     /// The extent of this identity, which is the initial selection.
     Extent(IdentityId),
@@ -60,7 +60,7 @@ pub struct Selected {
     marks: StrokeMarks,
     /// Indices of the selected Gaussians, ascending.
     pub(crate) gaussians: Vec<u32>,
-    /// Objects and parts with the selection, and its identity among them; `NOBODY` if nothing is selected.
+    /// Objects and parts with the selection, and its identity among them; `NO_IDENTITY` if nothing is selected.
     pub(crate) preview: Arc<SemanticMap>,
     pub(crate) id: IdentityId,
     /// Milliseconds from the stroke to the Gaussians, once all is prepared.
@@ -75,7 +75,7 @@ impl Selected {
 
     /// Returns an empty selection with all preparations.
     pub(crate) fn begun_anew(&self) -> Self {
-        Self { marks: StrokeMarks::default(), gaussians: Vec::new(), id: NOBODY, ..self.clone() }
+        Self { marks: StrokeMarks::default(), gaussians: Vec::new(), id: NO_IDENTITY, ..self.clone() }
     }
 
     /// Returns whether it was prepared for these Gaussians.
@@ -104,7 +104,7 @@ pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Resul
     match step {
         SelectStep::Prepare => {
             let (cloud, preview) = (Arc::clone(cloud), Arc::clone(map));
-            return Ok(Selected { hierarchy, cloud, marks, gaussians: Vec::new(), preview, id: NOBODY, ms: 0.0 });
+            return Ok(Selected { hierarchy, cloud, marks, gaussians: Vec::new(), preview, id: NO_IDENTITY, ms: 0.0 });
         }
         SelectStep::Stroke(stroke) => marks.add(&mut Renderer::new(), cloud, settings, stroke)?,
         SelectStep::TakeBack => marks.remove_last(),
@@ -117,7 +117,7 @@ pub(crate) fn run(request: &SelectRequest, observer: &mut dyn Observer) -> Resul
     let gaussians: Vec<u32> = (0..cloud.len() as u32).filter(|i| selected[*i as usize]).collect();
     let ms = ms_since(start);
     let (preview, id) = if gaussians.is_empty() {
-        (Arc::clone(map), NOBODY)
+        (Arc::clone(map), NO_IDENTITY)
     } else {
         let preview = edit::apply(map, cloud, &kept_as(purpose, String::new(), gaussians.clone()))?;
         let id = match purpose {
@@ -140,7 +140,7 @@ pub(crate) fn kept_as(purpose: &SelectFor, name: String, gaussians: Vec<u32>) ->
 /// Returns a map of a scene without objects and parts.
 pub(crate) fn empty_map(cloud: &GaussianCloud) -> SemanticMap {
     let n = cloud.len();
-    SemanticMap::from_identities(Identities::default(), vec![NOBODY; n], vec![0.0; n], Vec::new())
+    SemanticMap::from_identities(Identities::default(), vec![NO_IDENTITY; n], vec![0.0; n], Vec::new())
 }
 
 /// Number of views all around, if there are no photos.

@@ -17,10 +17,10 @@ use crate::pipeline::semantics::evaluation::categories;
 use crate::pipeline::semantics::lifting::segmenter::{FileMasks, FoundMask, Segmenter};
 use crate::pipeline::semantics::lifting::tracker::{TrackOptions, Tracked, labels_of, track};
 use crate::pipeline::semantics::lifting::train_codes::CodeView;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::pipeline::train::TrainConfig;
 use crate::render::RenderSettings;
-use crate::scene::{Camera, Dataset, GaussianCloud, Identities, Identity, IdentityId, NOBODY, Photo, SemanticMap};
+use crate::scene::{Camera, Dataset, GaussianCloud, Identities, Identity, IdentityId, NO_IDENTITY, Photo, SemanticMap};
 
 #[derive(Clone, Debug)]
 pub struct StudyOptions {
@@ -32,7 +32,7 @@ pub struct StudyOptions {
     pub(crate) views: usize,
     pub(crate) repeats: u32,
     /// Recipe that the variants of queries differ from.
-    pub(crate) recipe: Recipe,
+    pub(crate) recipe: QueryConfig,
 }
 
 #[derive(Clone, Debug)]
@@ -57,7 +57,7 @@ impl Default for StudyOptions {
             max_side_px: 256,
             views: 4,
             repeats: 3,
-            recipe: Recipe::default(),
+            recipe: QueryConfig::default(),
         }
     }
 }
@@ -279,14 +279,14 @@ impl Subject {
 
 /// Identity of each Gaussian, by the numbers that identities of the same names have in `all`.
 fn renumbered(tracked: &Tracked, all: &Identities) -> Vec<IdentityId> {
-    let mut number = vec![NOBODY; tracked.identities.len() + 1];
+    let mut number = vec![NO_IDENTITY; tracked.identities.len() + 1];
     for (id, identity) in tracked.identities.iter() {
         let parent = number[identity.parent as usize];
         let same = |i: &Identity| i.level == identity.level && i.parent == parent && i.names == identity.names;
-        number[id as usize] = all.iter().find(|(_, i)| same(i)).map_or(NOBODY, |(id, _)| id);
+        number[id as usize] = all.iter().find(|(_, i)| same(i)).map_or(NO_IDENTITY, |(id, _)| id);
     }
     let of = tracked.assignments.iter().map(|a| number.get(a.identity as usize).copied());
-    of.map(|id| id.unwrap_or(NOBODY)).collect()
+    of.map(|id| id.unwrap_or(NO_IDENTITY)).collect()
 }
 
 /// The labels of a photo that has some, its regions matched with known identities by their names.
@@ -299,7 +299,7 @@ fn view(
     let found: Vec<FoundMask> = segmenter.segment(photo, max_side_px, &mut Silent).map_err(failed)?;
     let mut ids: Vec<IdentityId> = Vec::with_capacity(found.len());
     for mask in &found {
-        let parent = mask.parent.map_or(NOBODY, |p| ids[p]);
+        let parent = mask.parent.map_or(NO_IDENTITY, |p| ids[p]);
         let names: Vec<String> = mask.name.iter().cloned().collect();
         let known = identities.iter().find(|(_, i)| i.level == mask.level && i.parent == parent && i.names == names);
         let known = known.map(|(id, _)| id);

@@ -117,9 +117,9 @@ pub(crate) fn is_rough(name: &str) -> bool {
     name == DEMO || Path::new(name).ends_with(demo::WORDS.0)
 }
 
-/// Opens the best usable encoder. `told` receives a warning for each better one that is broken.
-pub(crate) fn best_encoder(told: &mut dyn FnMut(String)) -> Result<Box<dyn Encoder>, ModelError> {
-    let best = catalog::usable(ModelRole::Encoder, told)?.into_iter().next();
+/// Opens the best usable encoder. `on_warning` receives a warning for each better one that is broken.
+pub(crate) fn best_encoder(on_warning: &mut dyn FnMut(String)) -> Result<Box<dyn Encoder>, ModelError> {
+    let best = catalog::usable(ModelRole::Encoder, on_warning)?.into_iter().next();
     encoder(best.as_deref().unwrap_or(DEMO))
 }
 

@@ -5,7 +5,7 @@ use std::path::Path;
 use serde::Deserialize;
 
 use super::catalog::{InstallError, ModelEntry, ModelRole, OfficialFile};
-use super::fetch::{self, FetchError, FileToFetch, Part, Patience};
+use super::fetch::{self, FetchError, FileToFetch, Part, Timeouts};
 use super::template::Template;
 use super::{ModelError, manifest, unpack};
 
@@ -93,34 +93,34 @@ impl ModelEntry {
         &self,
         folder: &Path,
         from: Option<&str>,
-        patience: Patience,
+        timeouts: Timeouts,
         progress: &mut dyn FnMut(&str, u64, Option<u64>) -> bool,
     ) -> Result<(), InstallError> {
         let mirror = mirror();
         match (&self.checkpoint, from) {
             (Some(official), None) => {
                 let address = in_mirror(&official.url, mirror.as_deref());
-                self.fetch_checkpoint(official, folder, &address, patience, progress)?;
+                self.fetch_checkpoint(official, folder, &address, timeouts, progress)?;
             }
             (Some(official), Some(url)) if is_checkpoint(url) => {
-                self.fetch_checkpoint(official, folder, url, patience, progress)?;
+                self.fetch_checkpoint(official, folder, url, timeouts, progress)?;
             }
-            (Some(official), Some(_)) => match self.fetch_files(folder, from, patience, progress) {
+            (Some(official), Some(_)) => match self.fetch_files(folder, from, timeouts, progress) {
                 // A folder may hold the official file instead, under its own name.
                 Err(InstallError::Fetch(FetchError::Refused { status: 404, .. })) => {
                     let address = in_mirror(&official.url, from);
-                    self.fetch_checkpoint(official, folder, &address, patience, progress)?;
+                    self.fetch_checkpoint(official, folder, &address, timeouts, progress)?;
                 }
                 done => done?,
             },
-            _ => self.fetch_files(folder, from, patience, progress)?,
+            _ => self.fetch_files(folder, from, timeouts, progress)?,
         }
         if let (Some(known), None) = (&self.known, from) {
             let to = known.picture_in(folder);
             let url = in_mirror(&known.picture, mirror.as_deref());
             let wanted = FileToFetch { url: &url, to: &to, bytes: None, most: fetch::MOST_UNPROMISED, sha256: None };
             if !to.is_file() {
-                let once = Patience { attempts: 1, ..patience };
+                let once = Timeouts { attempts: 1, ..timeouts };
                 // The model works without it; the check reports the missing picture.
                 let got = fetch::fetch(&wanted, once, &mut |there, all| progress("picture", there, all));
                 if let Err(e @ FetchError::Cancelled { .. }) = got {
@@ -159,7 +159,7 @@ impl ModelEntry {
         official: &OfficialFile,
         folder: &Path,
         url: &str,
-        patience: Patience,
+        timeouts: Timeouts,
         progress: &mut dyn FnMut(&str, u64, Option<u64>) -> bool,
     ) -> Result<(), InstallError> {
         if self.verify(folder).is_ok() {
@@ -173,7 +173,7 @@ impl ModelEntry {
         if !sha256.as_deref().map_or(to.is_file(), |sha256| fetch::check(&to, sha256).is_ok()) {
             // The listed size serves until the server states one.
             let mut bytes = official.megabytes * 1_000_000;
-            fetch::fetch(&wanted, patience, &mut |there, all| {
+            fetch::fetch(&wanted, timeouts, &mut |there, all| {
                 bytes = all.unwrap_or(bytes).max(there);
                 progress(&name, there, Some(bytes))
             })?;
@@ -244,7 +244,7 @@ mod tests {
     fn a_checkpoint_is_fetched_and_made_into_a_model() {
         let folder = tempfile::tempdir().expect("folder");
         let entry = reduced(&server(&["clip.pt", "tiny.pt", "clip.pt", "tiny.pt"]));
-        let fetch = || entry.fetch(folder.path(), None, Patience::default(), &mut |_, _, _| true);
+        let fetch = || entry.fetch(folder.path(), None, Timeouts::default(), &mut |_, _, _| true);
         let names = || {
             let names = std::fs::read_dir(folder.path()).expect("a folder").map(|e| e.expect("a file").file_name());
             let mut names: Vec<String> = names.map(|n| n.to_string_lossy().into_owned()).collect();
@@ -264,7 +264,7 @@ mod tests {
         entry.verify(folder.path()).expect("right");
         // In a new folder, the fourth answer is the first one: a checkpoint of another model.
         let fresh = tempfile::tempdir().expect("folder");
-        let error = entry.fetch(fresh.path(), None, Patience::default(), &mut |_, _, _| true);
+        let error = entry.fetch(fresh.path(), None, Timeouts::default(), &mut |_, _, _| true);
         assert!(error.expect_err("another model").to_string().contains("missing"));
         assert_eq!(std::fs::read_dir(fresh.path()).expect("a folder").count(), 0);
     }
@@ -274,7 +274,7 @@ mod tests {
         let (folder, url) = (tempfile::tempdir().expect("folder"), server(&["", "clip.pt", "", ""]));
         let entry = reduced("https://makers.example/clip.pt");
         let from = url.strip_suffix("/clip.pt").expect("a folder");
-        let fetch = |folder: &Path| entry.fetch(folder, Some(from), Patience::default(), &mut |_, _, _| true);
+        let fetch = |folder: &Path| entry.fetch(folder, Some(from), Timeouts::default(), &mut |_, _, _| true);
         fetch(folder.path()).expect("fetched");
         assert_eq!(entry.state(folder.path()), ModelState::Here);
         // The control: neither is there.

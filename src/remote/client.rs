@@ -12,8 +12,8 @@ use super::address::Address;
 use super::photos;
 use super::token::random_name;
 use super::wire::{
-    Ask, CLIENT_HEADER, GENERATION_HEADER, News, RUN_HEADER, STEP_HEADER, SceneCard, VERSION_HEADER, is_understood,
-    version,
+    CLIENT_HEADER, ClientRequest, GENERATION_HEADER, RUN_HEADER, STEP_HEADER, SceneSummary, ServerUpdate,
+    VERSION_HEADER, is_understood, version,
 };
 use crate::io::snapshot::SceneSnapshot;
 use crate::io::{http, memory};
@@ -83,12 +83,12 @@ impl Client {
     }
 
     /// Fetches the scene without its Gaussians.
-    pub(crate) fn scene(&self) -> Result<ServerAnswer<SceneCard>, ClientError> {
+    pub(crate) fn scene(&self) -> Result<ServerAnswer<SceneSummary>, ClientError> {
         self.json("/scene")
     }
 
     /// Fetches the events after number `since`; `have` is the generation of the client's Gaussians.
-    pub(crate) fn news(&self, since: u64, have: u64) -> Result<ServerAnswer<News>, ClientError> {
+    pub(crate) fn news(&self, since: u64, have: u64) -> Result<ServerAnswer<ServerUpdate>, ClientError> {
         self.json(&format!("/news?since={since}&have={have}"))
     }
 
@@ -113,7 +113,7 @@ impl Client {
     }
 
     /// Sends a command. The server refuses it if it cannot carry it out.
-    pub(crate) fn ask(&self, ask: &Ask) -> Result<(), ClientError> {
+    pub(crate) fn ask(&self, ask: &ClientRequest) -> Result<(), ClientError> {
         let body = serde_json::to_vec(ask).map_err(|e| ClientError::Refused(e.to_string()))?;
         let request = self.signed(self.agent.post(format!("{}/ask", self.address.base)), WORK);
         self.checked(request.content_type("application/json").send(&body)).map(drop)

@@ -9,7 +9,7 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use super::token::random_name;
-use super::wire::{News, SceneCard, WireEvent};
+use super::wire::{SceneSummary, ServerUpdate, WireEvent};
 use crate::io::snapshot;
 use crate::pipeline::observer::Progress;
 use crate::scene::GaussianCloud;
@@ -34,7 +34,7 @@ pub(super) struct Hub {
     /// Name of this run of the server.
     pub(super) run: String,
     /// Scene without its Gaussians.
-    pub(super) card: SceneCard,
+    pub(super) summary: SceneSummary,
     pub(super) control: Control,
     log: Mutex<Log>,
     latest: Mutex<Latest>,
@@ -91,10 +91,10 @@ impl Client {
 }
 
 impl Hub {
-    pub(super) fn new(card: SceneCard) -> io::Result<Self> {
+    pub(super) fn new(summary: SceneSummary) -> io::Result<Self> {
         Ok(Self {
             run: random_name()?,
-            card,
+            summary,
             control: Control::default(),
             log: Mutex::default(),
             latest: Mutex::default(),
@@ -106,7 +106,7 @@ impl Hub {
     }
 
     /// Adds an event to the log.
-    pub(super) fn tell(&self, event: WireEvent) {
+    pub(super) fn report(&self, event: WireEvent) {
         let mut log = lock(&self.log);
         log.next += 1;
         let number = log.next;
@@ -178,7 +178,7 @@ impl Hub {
 
     /// Returns the events after number `since`, for a client that has the Gaussians of generation `have` and wants
     /// newer ones.
-    pub(super) fn news(&self, client: Option<&str>, since: u64, have: u64) -> News {
+    pub(super) fn news(&self, client: Option<&str>, since: u64, have: u64) -> ServerUpdate {
         let generation = lock(&self.latest).generation;
         if have >= generation {
             lock(&self.pace).wanted = true;
@@ -190,7 +190,7 @@ impl Hub {
         let first = log.events.partition_point(|(number, _)| *number <= since);
         let rest = &log.events[first..];
         let told = &rest[..rest.len().min(PER_ANSWER)];
-        News {
+        ServerUpdate {
             events: told.iter().map(|(_, event)| event.clone()).collect(),
             next: told.last().map_or(log.next, |(number, _)| *number),
             more: told.len() < rest.len(),
@@ -251,7 +251,7 @@ mod tests {
     use crate::pipeline::observer::StepMetrics;
 
     fn hub() -> Hub {
-        Hub::new(SceneCard { info: SceneInfo::default(), allow_edit: false, photos: false }).expect("random numbers")
+        Hub::new(SceneSummary { info: SceneInfo::default(), allow_edit: false, photos: false }).expect("random numbers")
     }
 
     fn cloud(n: usize) -> Arc<GaussianCloud> {
@@ -262,15 +262,15 @@ mod tests {
     fn the_log_is_told_in_order_and_in_pieces() {
         let hub = hub();
         let step = |step| WireEvent::Step(StepMetrics { step, ..StepMetrics::default() });
-        (0..PER_ANSWER as u64 + 5).for_each(|i| hub.tell(step(i)));
+        (0..PER_ANSWER as u64 + 5).for_each(|i| hub.report(step(i)));
         let first = hub.news(None, 0, 0);
         assert!(first.more && first.events.len() == PER_ANSWER && first.events[0] == step(0));
         let rest = hub.news(None, first.next, 0);
         assert!(!rest.more && rest.events.len() == 5 && rest.events[0] == step(PER_ANSWER as u64));
         assert!(hub.news(None, rest.next, 0).events.is_empty() && hub.news(None, u64::MAX, 0).events.is_empty());
         // A log that is too long loses only steps.
-        hub.tell(WireEvent::Paused(true));
-        (0..2 * LOGGED as u64).for_each(|i| hub.tell(step(i)));
+        hub.report(WireEvent::Paused(true));
+        (0..2 * LOGGED as u64).for_each(|i| hub.report(step(i)));
         let log = lock(&hub.log);
         assert!(log.events.len() <= LOGGED && log.events.iter().any(|(_, e)| *e == WireEvent::Paused(true)));
     }
@@ -295,7 +295,7 @@ mod tests {
     #[test]
     fn who_lacks_something_is_known() {
         let hub = hub();
-        hub.tell(WireEvent::Cancelled);
+        hub.report(WireEvent::Cancelled);
         hub.publish(cloud(1), 1);
         assert_eq!(hub.watchers(), (0, 0));
         hub.news(Some("a"), 0, 0);

@@ -25,7 +25,7 @@ impl Observer for ServedObserver<'_> {
         };
         let paused = signal == Signal::Pause;
         if self.paused.swap(paused, Ordering::AcqRel) != paused {
-            self.hub.tell(WireEvent::Paused(paused));
+            self.hub.report(WireEvent::Paused(paused));
         }
         signal
     }
@@ -36,17 +36,17 @@ impl Observer for ServedObserver<'_> {
     }
 
     fn step(&mut self, metrics: StepMetrics) {
-        self.hub.tell(WireEvent::Step(metrics));
+        self.hub.report(WireEvent::Step(metrics));
         self.inner.step(metrics);
     }
 
     fn evaluation(&mut self, evaluation: Evaluation) {
-        self.hub.tell(WireEvent::Evaluation(evaluation.clone()));
+        self.hub.report(WireEvent::Evaluation(evaluation.clone()));
         self.inner.evaluation(evaluation);
     }
 
     fn note(&mut self, severity: Severity, text: String) {
-        self.hub.tell(WireEvent::Note(severity, text.clone()));
+        self.hub.report(WireEvent::Note(severity, text.clone()));
         self.inner.note(severity, text);
     }
 

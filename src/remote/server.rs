@@ -22,7 +22,7 @@ use super::photos::ServedPhotos;
 use super::seats::{Seat, Seats};
 use super::token::AccessToken;
 use super::wire::{
-    Ask, CLIENT_HEADER, GENERATION_HEADER, RUN_HEADER, STEP_HEADER, SceneCard, VERSION_HEADER, WireEvent,
+    CLIENT_HEADER, ClientRequest, GENERATION_HEADER, RUN_HEADER, STEP_HEADER, SceneSummary, VERSION_HEADER, WireEvent,
     is_understood, version,
 };
 use crate::io::http::is_loopback;
@@ -123,12 +123,12 @@ impl Server {
         // Local paths are not sent to clients.
         info.dataset = None;
         let editor = editable.filter(|_| options.allow_edit).map(|(folder, state)| Editor::new(folder.into(), state));
-        let card = SceneCard { info, allow_edit: editor.is_some(), photos: !photos.is_empty() };
-        let hub = Hub::new(card)?;
+        let summary = SceneSummary { info, allow_edit: editor.is_some(), photos: !photos.is_empty() };
+        let hub = Hub::new(summary)?;
         match shown {
             Shown::AtRest(snapshot) => hub.publish_packed(snapshot),
             Shown::Training(title, points) => {
-                hub.tell(WireEvent::Started(title));
+                hub.report(WireEvent::Started(title));
                 points.into_iter().for_each(|points| hub.publish(points, 0));
             }
         }
@@ -172,7 +172,7 @@ impl Server {
     /// cannot be read.
     pub(crate) fn finished(&self, folder: &Path, all_done: bool) -> Result<(), crate::io::IoError> {
         let sent = snapshot::of_folder(folder).map(|bytes| self.shared.hub.publish_packed(bytes));
-        self.shared.hub.tell(match (&sent, all_done) {
+        self.shared.hub.report(match (&sent, all_done) {
             (Ok(()), true) => WireEvent::Finished(folder.display().to_string()),
             (Err(e), true) => WireEvent::Failed(format!("it is saved there, but cannot be sent: {e}")),
             (_, false) => WireEvent::Cancelled,
@@ -182,7 +182,7 @@ impl Server {
 
     /// Reports that a training has failed.
     pub(crate) fn failed(&self, why: String) {
-        self.shared.hub.tell(WireEvent::Failed(why));
+        self.shared.hub.report(WireEvent::Failed(why));
     }
 
     /// Number of clients that are present, and number of them that have not received everything.
@@ -289,7 +289,7 @@ fn answer(
     let body = connection.body(head, if shared.editor.is_some() { EDIT_BYTES } else { ASK_BYTES })?;
     let since = head.number("since").unwrap_or(0);
     match (head.method.as_str(), head.path.as_str()) {
-        ("GET", "/scene") => json(&hub.card),
+        ("GET", "/scene") => json(&hub.summary),
         ("GET", "/news") => json(&hub.news(head.header(CLIENT_HEADER), since, head.number("have").unwrap_or(0))),
         ("GET", "/snapshot") => Ok(match hub.snapshot(since) {
             Some(packed) => Response::new(200, "application/octet-stream", packed.bytes)
@@ -350,15 +350,17 @@ fn take_turn(bucket: &Mutex<(f64, Instant)>) -> bool {
 }
 
 /// Executes a command of a client.
-fn obey(ask: Ask, shared: &Shared) -> Result<Response, Response> {
+fn obey(ask: ClientRequest, shared: &Shared) -> Result<Response, Response> {
     match (ask, &shared.editor) {
-        (Ask::Pause(pause), _) => shared.hub.control.set_paused(pause),
-        (Ask::Cancel, _) => shared.hub.control.cancel(),
-        (Ask::Edit(edit), Some(editor)) => match editor.apply(edit, |snapshot| shared.hub.publish_packed(snapshot)) {
+        (ClientRequest::Pause(pause), _) => shared.hub.control.set_paused(pause),
+        (ClientRequest::Cancel, _) => shared.hub.control.cancel(),
+        (ClientRequest::Edit(edit), Some(editor)) => match editor
+            .apply(edit, |snapshot| shared.hub.publish_packed(snapshot))
+        {
             Ok(()) => {}
             Err(e) => return Ok(Response::new(422, "text/plain; charset=utf-8", Arc::new(e.to_string().into_bytes()))),
         },
-        (Ask::Edit(_), None) => {
+        (ClientRequest::Edit(_), None) => {
             return Err(Response::refusal(403, "changes are not allowed here (fmlgs serve --allow-edit, at rest)"));
         }
     }

@@ -31,7 +31,7 @@ pub(crate) fn is_understood(version: &str) -> bool {
 
 /// Description of a scene, without its Gaussians.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) struct SceneCard {
+pub(crate) struct SceneSummary {
     /// Contents of `scene.json`, without the path of the photos.
     pub(crate) info: SceneInfo,
     /// True if clients may edit objects and parts.
@@ -56,9 +56,9 @@ pub(crate) enum WireEvent {
     Failed(String),
 }
 
-/// News for a client.
+/// Update for a client.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub(crate) struct News {
+pub(crate) struct ServerUpdate {
     /// Events in order.
     pub(crate) events: Vec<WireEvent>,
     /// Number of the last event, to ask from next time.
@@ -73,7 +73,7 @@ pub(crate) struct News {
 
 /// Command of a client.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) enum Ask {
+pub(crate) enum ClientRequest {
     /// Pause the training (`true`) or let it go on.
     Pause(bool),
     /// End the training; its state is saved.

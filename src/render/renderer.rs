@@ -25,19 +25,19 @@ pub enum BackendChoice {
 
 impl BackendChoice {
     /// GPU to use; `None` = the CPU. `Auto` takes a GPU only if it is a real one: the CPU renderer is faster than an
-    /// emulated GPU. `told` receives the reason if one that exists is not used.
-    pub(crate) fn gpu(self, told: impl FnOnce(String)) -> Result<Option<Device>, GpuError> {
+    /// emulated GPU. `on_warning` receives the reason if one that exists is not used.
+    pub(crate) fn gpu(self, on_warning: impl FnOnce(String)) -> Result<Option<Device>, GpuError> {
         match self {
             Self::Cpu => Ok(None),
             Self::Gpu => Device::shared().map(Some),
-            Self::Auto => Ok(or_told(Device::shared_real(), told).flatten()),
+            Self::Auto => Ok(or_warn(Device::shared_real(), on_warning).flatten()),
         }
     }
 }
 
-/// Result of a GPU; on an error `None`, with the fallback to the CPU reported to `told`.
-fn or_told<T>(given: Result<T, GpuError>, told: impl FnOnce(String)) -> Option<T> {
-    given.map_err(|e| told(instead_of_gpu(&e))).ok()
+/// Result of a GPU; on an error `None`, with the fallback to the CPU reported to `on_warning`.
+fn or_warn<T>(given: Result<T, GpuError>, on_warning: impl FnOnce(String)) -> Option<T> {
+    given.map_err(|e| on_warning(instead_of_gpu(&e))).ok()
 }
 
 /// Warning that the CPU does a GPU's work, with the reason.
@@ -102,12 +102,12 @@ impl Renderer {
         Self::default()
     }
 
-    /// Renderer that `choice` asks for. `told` receives the reason if a GPU that exists is not used.
-    pub fn choose(choice: BackendChoice, mut told: impl FnMut(String)) -> Result<Self, GpuError> {
-        match choice.gpu(&mut told)? {
+    /// Renderer that `choice` asks for. `on_warning` receives the reason if a GPU that exists is not used.
+    pub fn choose(choice: BackendChoice, mut on_warning: impl FnMut(String)) -> Result<Self, GpuError> {
+        match choice.gpu(&mut on_warning)? {
             None => Ok(Self::new()),
             Some(device) if choice == BackendChoice::Auto => {
-                Ok(or_told(Self::on_gpu(&device), told).unwrap_or_default())
+                Ok(or_warn(Self::on_gpu(&device), on_warning).unwrap_or_default())
             }
             Some(device) => Self::on_gpu(&device),
         }
@@ -265,7 +265,7 @@ impl Renderer {
 
     /// Frees working memory that the next picture can make again: all of it on the CPU; a device keeps its own, which
     /// no other program part needs.
-    pub fn rest(&mut self) {
+    pub fn release_buffers(&mut self) {
         self.cpu = cpu::CpuRenderer::forward_only();
     }
 
@@ -313,9 +313,9 @@ mod tests {
     fn a_gpu_that_fails_is_told() {
         let mut heard = Vec::new();
         let lost: Result<(), GpuError> = Err(GpuError::Lost("unplugged".into()));
-        assert_eq!(or_told(lost, |why| heard.push(why)), None);
+        assert_eq!(or_warn(lost, |why| heard.push(why)), None);
         assert!(heard[0].contains("CPU") && heard[0].contains("unplugged"), "{heard:?}");
-        assert_eq!(or_told(Ok(3), |why| heard.push(why)), Some(3));
+        assert_eq!(or_warn(Ok(3), |why| heard.push(why)), Some(3));
         assert_eq!(heard.len(), 1);
     }
 }

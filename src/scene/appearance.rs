@@ -82,7 +82,7 @@ fn color_word(rgb: [f64; 3]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Identities, Level, NOBODY};
+    use crate::scene::{Identities, Level, NO_IDENTITY};
 
     #[test]
     fn colors_have_the_words_that_people_use() {
@@ -110,9 +110,9 @@ mod tests {
     #[test]
     fn what_has_no_name_is_called_by_color_and_size() {
         let mut all = Identities::default();
-        let region = all.add(Level::Object, NOBODY, vec![]);
-        let lamp = all.add(Level::Object, NOBODY, vec!["lamp".into()]);
-        all.add(Level::Object, NOBODY, vec![]);
+        let region = all.add(Level::Object, NO_IDENTITY, vec![]);
+        let lamp = all.add(Level::Object, NO_IDENTITY, vec!["lamp".into()]);
+        all.add(Level::Object, NO_IDENTITY, vec![]);
         let n = 21;
         let dc = |c: f64| ((c - 0.5) / SH_C0) as f32;
         let cloud = GaussianCloud {

@@ -134,7 +134,7 @@ impl SeenColors {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Identities, Level, NOBODY};
+    use crate::scene::{Identities, Level, NO_IDENTITY};
 
     #[test]
     fn colors_can_be_called_by_the_words_that_people_use() {
@@ -164,9 +164,9 @@ mod tests {
     #[test]
     fn a_thing_has_the_colors_of_its_gaussians_and_pieces() {
         let mut all = Identities::default();
-        let mug = all.add(Level::Object, NOBODY, vec![]);
+        let mug = all.add(Level::Object, NO_IDENTITY, vec![]);
         let handle = all.add(Level::Part, mug, vec![]);
-        let lamp = all.add(Level::Object, NOBODY, vec![]);
+        let lamp = all.add(Level::Object, NO_IDENTITY, vec![]);
         let dc = |rgb: [f64; 3]| rgb.map(|c| ((c - 0.5) / SH_C0) as f32);
         let (red, blue) = ([0.8, 0.1, 0.1], [0.1, 0.1, 0.8]);
         let colors = [red, red, red, blue, [1.0; 3], blue];

@@ -26,7 +26,7 @@ pub struct Dataset {
     /// Meaning of transparent pixels of its photos; `None` = there are none.
     pub(crate) alpha: Option<AlphaUse>,
     /// Length of a scene unit in meters, if known; photos alone do not determine it.
-    pub(crate) metres_per_unit: Option<f64>,
+    pub(crate) meters_per_unit: Option<f64>,
     /// Warnings for the user: photos that are listed but missing, and so on.
     pub warnings: Vec<String>,
 }

@@ -5,16 +5,16 @@ use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
 
-use super::{Identities, IdentityId, NOBODY, text};
+use super::{Identities, IdentityId, NO_IDENTITY, text};
 use crate::math::format::things;
 
 /// Most disagreements that are kept: more of them call for other masks, not for a longer list.
-const MOST_DOUBTS: usize = 1_000;
+const MAX_CONFLICTS: usize = 1_000;
 
 /// Disagreement between the masks of a photo and the identities expected in its view.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub(crate) enum Disagreement {
+pub(crate) enum ConflictKind {
     /// Two masks fit the identity; one of them became an identity of its own.
     Split(IdentityId),
     /// One mask covers several identities that were separate before.
@@ -25,7 +25,7 @@ pub(crate) enum Disagreement {
     Drift(IdentityId),
 }
 
-impl Disagreement {
+impl ConflictKind {
     /// The identities that it is about.
     pub(crate) fn about(&self) -> Vec<IdentityId> {
         match self {
@@ -50,17 +50,17 @@ impl Disagreement {
     }
 
     /// One sentence per kind of disagreement: the first case, and the number of others.
-    pub(crate) fn told(
+    pub(crate) fn summary(
         all: &[(usize, Self)],
         photo: impl Fn(usize) -> String,
         name: impl Fn(IdentityId) -> String,
     ) -> Vec<String> {
         let mut kinds: Vec<Vec<&(usize, Self)>> = Vec::new();
-        for doubt in all {
-            let kind = std::mem::discriminant(&doubt.1);
+        for conflict in all {
+            let kind = std::mem::discriminant(&conflict.1);
             match kinds.iter_mut().find(|k| std::mem::discriminant(&k[0].1) == kind) {
-                Some(same) => same.push(doubt),
-                None => kinds.push(vec![doubt]),
+                Some(same) => same.push(conflict),
+                None => kinds.push(vec![conflict]),
             }
         }
         let sentence = |same: Vec<&(usize, Self)>| {
@@ -78,7 +78,7 @@ impl Disagreement {
 
     /// The same with new identity numbers; `None` if its identities are gone or merged into one.
     fn renumbered(&self, number: &[IdentityId]) -> Option<Self> {
-        let new = |id: &IdentityId| number.get(*id as usize).copied().filter(|id| *id != NOBODY);
+        let new = |id: &IdentityId| number.get(*id as usize).copied().filter(|id| *id != NO_IDENTITY);
         Some(match self {
             Self::Split(id) => Self::Split(new(id)?),
             Self::Drift(id) => Self::Drift(new(id)?),
@@ -98,10 +98,10 @@ impl Disagreement {
 
 /// A disagreement, and the photo in which it was seen.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Doubt {
-    /// Its place in [`Findings::photos`].
+pub(crate) struct MaskConflict {
+    /// Its place in [`SegmentationReport::photos`].
     pub(crate) photo: u32,
-    pub(crate) what: Disagreement,
+    pub(crate) what: ConflictKind,
 }
 
 /// A photo that was searched for objects.
@@ -116,7 +116,7 @@ pub(crate) struct PhotoFinding {
 /// Views of an identity, its parts not included.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Seen {
-    /// One bit for each of [`Findings::photos`], 32 to a number, the lowest first.
+    /// One bit for each of [`SegmentationReport::photos`], 32 to a number, the lowest first.
     photos: Vec<u32>,
     /// Pixels in the small views that were looked at.
     pixels: u64,
@@ -145,12 +145,13 @@ impl Seen {
 
 /// Evidence from the search for objects and parts.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Findings {
+pub struct SegmentationReport {
     /// The photos that were searched.
     pub(crate) photos: Vec<PhotoFinding>,
     /// Views of each identity, by number less one.
     seen: Vec<Seen>,
-    doubts: Vec<Doubt>,
+    #[serde(rename = "doubts")]
+    conflicts: Vec<MaskConflict>,
 }
 
 /// Evidence for an identity, its parts included.
@@ -161,23 +162,23 @@ pub(crate) struct IdentityEvidence {
     pub(crate) photos: Option<usize>,
     /// Mean share of its object in its pixels, if that is known.
     pub(crate) confidence: Option<f64>,
-    /// Places in [`Findings::doubts`].
-    pub(crate) doubts: Vec<usize>,
+    /// Places in [`SegmentationReport::conflicts`].
+    pub(crate) conflicts: Vec<usize>,
 }
 
-impl Findings {
-    pub(crate) fn new(photos: Vec<PhotoFinding>, seen: Vec<Seen>, mut doubts: Vec<Doubt>) -> Self {
-        doubts.truncate(MOST_DOUBTS);
-        Self { photos, seen, doubts }
+impl SegmentationReport {
+    pub(crate) fn new(photos: Vec<PhotoFinding>, seen: Vec<Seen>, mut conflicts: Vec<MaskConflict>) -> Self {
+        conflicts.truncate(MAX_CONFLICTS);
+        Self { photos, seen, conflicts }
     }
 
-    pub(crate) fn doubts(&self) -> &[Doubt] {
-        &self.doubts
+    pub(crate) fn conflicts(&self) -> &[MaskConflict] {
+        &self.conflicts
     }
 
     /// The photo of a doubt.
-    pub(crate) fn photo(&self, doubt: &Doubt) -> &str {
-        self.photos.get(doubt.photo as usize).map_or("", |p| &p.name)
+    pub(crate) fn photo(&self, conflict: &MaskConflict) -> &str {
+        self.photos.get(conflict.photo as usize).map_or("", |p| &p.name)
     }
 
     /// Mean share of unknown pixels of a photo; `None` without photos.
@@ -193,18 +194,24 @@ impl Findings {
         self.photos.iter().all(|p| share(p.unknown))
             && self.seen.len() == identities.len()
             && self.seen.iter().all(|s| share(s.confidence) && s.photos.len() <= self.photos.len().div_ceil(32))
-            && self.doubts.len() <= MOST_DOUBTS
-            && self.doubts.iter().all(|d| (d.photo as usize) < self.photos.len() && d.what.about().iter().all(is_there))
+            && self.conflicts.len() <= MAX_CONFLICTS
+            && self
+                .conflicts
+                .iter()
+                .all(|d| (d.photo as usize) < self.photos.len() && d.what.about().iter().all(is_there))
     }
 
     /// Prepends the disagreements of earlier findings on the same identities, as far as their photos are known.
-    pub(crate) fn keep_doubts(&mut self, before: &Self) {
-        let place = |d: &Doubt| self.photos.iter().position(|p| p.name == before.photo(d));
-        let kept = before.doubts.iter().filter_map(|d| Some(Doubt { photo: place(d)? as u32, what: d.what.clone() }));
-        let mut doubts: Vec<Doubt> = kept.collect();
-        doubts.append(&mut self.doubts);
-        doubts.truncate(MOST_DOUBTS);
-        self.doubts = doubts;
+    pub(crate) fn keep_conflicts(&mut self, before: &Self) {
+        let place = |d: &MaskConflict| self.photos.iter().position(|p| p.name == before.photo(d));
+        let kept = before
+            .conflicts
+            .iter()
+            .filter_map(|d| Some(MaskConflict { photo: place(d)? as u32, what: d.what.clone() }));
+        let mut conflicts: Vec<MaskConflict> = kept.collect();
+        conflicts.append(&mut self.conflicts);
+        conflicts.truncate(MAX_CONFLICTS);
+        self.conflicts = conflicts;
     }
 
     /// Adds an identity without evidence.
@@ -229,9 +236,9 @@ impl Findings {
             }
         }
         self.seen = seen;
-        let doubts = self.doubts.iter();
-        let renumbered = |d: &Doubt| Some(Doubt { photo: d.photo, what: d.what.renumbered(number)? });
-        self.doubts = doubts.filter_map(renumbered).collect();
+        let conflicts = self.conflicts.iter();
+        let renumbered = |d: &MaskConflict| Some(MaskConflict { photo: d.photo, what: d.what.renumbered(number)? });
+        self.conflicts = conflicts.filter_map(renumbered).collect();
     }
 
     /// Evidence for every identity, by number, unlabeled Gaussians first. `sizes` are their numbers of Gaussians.
@@ -247,13 +254,13 @@ impl Findings {
             fact.photos = Some(seen.photos.iter().map(|bits| bits.count_ones() as usize).sum());
             fact.confidence = Some(seen.confidence);
         }
-        for (k, doubt) in findings.doubts.iter().enumerate() {
-            for id in doubt.what.about() {
+        for (k, conflict) in findings.conflicts.iter().enumerate() {
+            for id in conflict.what.about() {
                 for at in identities.ancestors(id) {
-                    let doubts = &mut facts[at as usize].doubts;
+                    let conflicts = &mut facts[at as usize].conflicts;
                     // A disagreement on several of its parts counts once.
-                    if doubts.last() != Some(&k) {
-                        doubts.push(k);
+                    if conflicts.last() != Some(&k) {
+                        conflicts.push(k);
                     }
                 }
             }
@@ -268,22 +275,22 @@ mod tests {
     use crate::scene::Level;
 
     /// A doll with an eye, a cat; two photos.
-    fn scene() -> (Identities, Findings) {
+    fn scene() -> (Identities, SegmentationReport) {
         let mut all = Identities::default();
-        let doll = all.add(Level::Object, NOBODY, vec!["doll".into()]);
+        let doll = all.add(Level::Object, NO_IDENTITY, vec!["doll".into()]);
         all.add(Level::Part, doll, vec!["eye".into()]);
-        all.add(Level::Object, NOBODY, vec!["cat".into()]);
+        all.add(Level::Object, NO_IDENTITY, vec!["cat".into()]);
         let mut seen = vec![Seen::default(); 3];
         seen[0].add(0, 30, 0.5);
         seen[1].add(0, 10, 0.9);
         seen[1].add(40, 10, 0.7);
         let photo = |k: usize| PhotoFinding { name: format!("{k}.jpg"), unknown: if k == 0 { 0.41 } else { 0.0 } };
-        let doubts = vec![
-            Doubt { photo: 40, what: Disagreement::Merge(vec![2, 3]) },
-            Doubt { photo: 0, what: Disagreement::Switch(1, 3) },
-            Doubt { photo: 1, what: Disagreement::Split(3) },
+        let conflicts = vec![
+            MaskConflict { photo: 40, what: ConflictKind::Merge(vec![2, 3]) },
+            MaskConflict { photo: 0, what: ConflictKind::Switch(1, 3) },
+            MaskConflict { photo: 1, what: ConflictKind::Split(3) },
         ];
-        let found = Findings::new((0..41).map(photo).collect(), seen, doubts);
+        let found = SegmentationReport::new((0..41).map(photo).collect(), seen, conflicts);
         assert!(found.is_valid(&all) && (found.unknown().expect("photos") - 0.01).abs() < 1e-9);
         (all, found)
     }
@@ -291,26 +298,26 @@ mod tests {
     #[test]
     fn what_is_told_of_an_object_includes_its_pieces() {
         let (all, found) = scene();
-        let facts = Findings::facts(Some(&found), &all, &[5, 7, 2, 1]);
+        let facts = SegmentationReport::facts(Some(&found), &all, &[5, 7, 2, 1]);
         let photos: Vec<_> = facts.iter().map(|f| f.photos).collect();
         assert_eq!(photos, [None, Some(2), Some(2), None], "a photo counts once, and nothing is known of the cat");
         let sure = facts[1].confidence.expect("seen");
         assert!((sure - (30.0 * 0.5 + 10.0 * 0.9 + 10.0 * 0.7) / 50.0).abs() < 1e-9, "{sure}");
-        let doubts: Vec<_> = facts.iter().map(|f| f.doubts.clone()).collect();
-        assert_eq!(doubts, [vec![], vec![0, 1], vec![0], vec![0, 1, 2]]);
+        let conflicts: Vec<_> = facts.iter().map(|f| f.conflicts.clone()).collect();
+        assert_eq!(conflicts, [vec![], vec![0, 1], vec![0], vec![0, 1, 2]]);
         assert_eq!(facts[1].gaussians, 7);
-        let nothing = Findings::facts(None, &all, &[5, 7, 2, 1]);
-        assert!(nothing.iter().all(|f| f.photos.is_none() && f.doubts.is_empty()), "old scenes have none");
-        let told = found.doubts()[0].what.text(|id| all.full_name(id));
+        let nothing = SegmentationReport::facts(None, &all, &[5, 7, 2, 1]);
+        assert!(nothing.iter().all(|f| f.photos.is_none() && f.conflicts.is_empty()), "old scenes have none");
+        let told = found.conflicts()[0].what.text(|id| all.full_name(id));
         assert!(told.starts_with("one mask covers ") && told.contains("cat") && told.ends_with("kept apart"), "{told}");
-        assert_eq!(found.photo(&found.doubts()[0]), "40.jpg");
+        assert_eq!(found.photo(&found.conflicts()[0]), "40.jpg");
     }
 
     #[test]
     fn doubts_of_one_kind_are_told_in_one_sentence() {
-        let merge = |photo: usize| (photo, Disagreement::Merge(vec![1, 3]));
-        let all = [merge(4), (2, Disagreement::Drift(2)), merge(4), merge(7)];
-        let told = Disagreement::told(&all, |photo| format!("{photo}.jpg"), |id| id.to_string());
+        let merge = |photo: usize| (photo, ConflictKind::Merge(vec![1, 3]));
+        let all = [merge(4), (2, ConflictKind::Drift(2)), merge(4), merge(7)];
+        let told = ConflictKind::summary(&all, |photo| format!("{photo}.jpg"), |id| id.to_string());
         assert_eq!(
             told,
             [
@@ -325,16 +332,16 @@ mod tests {
         let (all, mut found) = scene();
         // The cat becomes the doll: what told them apart is settled, that there were two is not.
         found.renumber(&[0, 1, 2, 1], 2);
-        let merged = [Disagreement::Merge(vec![1, 2]), Disagreement::Split(1)];
-        assert_eq!(found.doubts().iter().map(|d| d.what.clone()).collect::<Vec<_>>(), merged);
+        let merged = [ConflictKind::Merge(vec![1, 2]), ConflictKind::Split(1)];
+        assert_eq!(found.conflicts().iter().map(|d| d.what.clone()).collect::<Vec<_>>(), merged);
         let mut left = Identities::default();
-        left.add(Level::Object, NOBODY, vec![]);
+        left.add(Level::Object, NO_IDENTITY, vec![]);
         left.add(Level::Part, 1, vec![]);
         assert!(found.is_valid(&left) && !found.is_valid(&all), "one identity less");
         found.add_identity();
         assert!(found.is_valid(&all));
         found.forget_seen(2);
-        let facts = Findings::facts(Some(&found), &all, &[0; 4]);
+        let facts = SegmentationReport::facts(Some(&found), &all, &[0; 4]);
         assert_eq!([facts[1].photos, facts[2].photos, facts[3].photos], [Some(1), None, None]);
     }
 
@@ -342,18 +349,18 @@ mod tests {
     fn what_speaks_of_nothing_that_is_there_is_refused() {
         let (all, found) = scene();
         for spoil in [
-            |f: &mut Findings| f.doubts[0].photo = 41,
-            |f: &mut Findings| f.doubts[0].what = Disagreement::Drift(4),
-            |f: &mut Findings| f.photos[0].unknown = f64::NAN,
-            |f: &mut Findings| f.seen[1].photos.push(1),
-            |f: &mut Findings| f.seen[1].confidence = 2.0,
+            |f: &mut SegmentationReport| f.conflicts[0].photo = 41,
+            |f: &mut SegmentationReport| f.conflicts[0].what = ConflictKind::Drift(4),
+            |f: &mut SegmentationReport| f.photos[0].unknown = f64::NAN,
+            |f: &mut SegmentationReport| f.seen[1].photos.push(1),
+            |f: &mut SegmentationReport| f.seen[1].confidence = 2.0,
         ] {
             let mut spoiled = found.clone();
             spoil(&mut spoiled);
             assert!(!spoiled.is_valid(&all));
         }
-        let doubts = vec![Doubt { photo: 0, what: Disagreement::Split(1) }; MOST_DOUBTS + 5];
-        let many = Findings::new(found.photos.clone(), found.seen.clone(), doubts);
-        assert!(many.is_valid(&all) && many.doubts().len() == MOST_DOUBTS);
+        let conflicts = vec![MaskConflict { photo: 0, what: ConflictKind::Split(1) }; MAX_CONFLICTS + 5];
+        let many = SegmentationReport::new(found.photos.clone(), found.seen.clone(), conflicts);
+        assert!(many.is_valid(&all) && many.conflicts().len() == MAX_CONFLICTS);
     }
 }

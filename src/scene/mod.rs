@@ -35,10 +35,10 @@ pub use cloud::{CloudError, ExtraProperty, Gaussian, GaussianCloud, SplatRenderM
 pub use crop::CropBox;
 pub use dataset::{Dataset, SparsePoint};
 pub use distortion::{Distortion, Projection};
-pub use findings::Findings;
+pub use findings::SegmentationReport;
 pub use history::{Evaluation, StepMetrics, ViewScore};
 pub(crate) use home_view::HomeView;
-pub use identity::{Identities, Identity, IdentityId, Level, LevelFilter, NOBODY};
+pub use identity::{Identities, Identity, IdentityId, Level, LevelFilter, NO_IDENTITY};
 pub use language::{LanguageFeatures, ViewFeatures};
 pub use mask::{Mask, PixelBox};
 pub use photo::{Photo, PhotoPixels};

@@ -36,16 +36,16 @@ pub enum MaskPrompt {
 pub enum MaskGrid {
     /// Every second one, and of the others those between which something changes
     #[default]
-    Sparing,
+    Adaptive,
     /// All of them, as the official generators (and the paper)
     All,
 }
 
 impl MaskGrid {
     /// In words: "all" points.
-    pub(crate) fn told(self) -> &'static str {
+    pub(crate) fn text(self) -> &'static str {
         match self {
-            Self::Sparing => "half-spaced, then needed,",
+            Self::Adaptive => "half-spaced, then needed,",
             Self::All => "all",
         }
     }

@@ -4,7 +4,10 @@ use std::sync::Arc;
 
 use super::colors::SeenColors;
 use super::findings::IdentityEvidence;
-use super::{ExtraProperty, Findings, GaussianCloud, Identities, IdentityId, LanguageFeatures, NOBODY, Preparation};
+use super::{
+    ExtraProperty, GaussianCloud, Identities, IdentityId, LanguageFeatures, NO_IDENTITY, Preparation,
+    SegmentationReport,
+};
 
 /// Channels of a Gaussian's codes: those of its object, then those of its part.
 pub(crate) const CODE_CHANNELS: usize = 6;
@@ -29,7 +32,7 @@ const CODES: [&str; CODE_CHANNELS] = [
 pub struct SemanticMap {
     /// Objects and parts.
     pub identities: Identities,
-    /// The innermost identity of each Gaussian; `NOBODY` for none.
+    /// The innermost identity of each Gaussian; `NO_IDENTITY` for none.
     pub identity_of: Vec<IdentityId>,
     /// Margin of each Gaussian's label, 0 (a guess) to 1. An unlabeled one with 0 is unknown: see [`Self::is_unknown`].
     pub margin: Vec<f32>,
@@ -42,7 +45,7 @@ pub struct SemanticMap {
     /// Choices of its preparation, if known.
     pub prepared: Option<Preparation>,
     /// Evidence from the search for objects and parts, if known.
-    pub findings: Option<Findings>,
+    pub findings: Option<SegmentationReport>,
     /// Gaussians that were removed from the scene for good, as they were: photos still show them.
     pub removed: Option<Arc<GaussianCloud>>,
 }
@@ -152,12 +155,12 @@ impl SemanticMap {
 
     /// Returns whether the label of a Gaussian is unknown: no mask and no photo assigns it to an identity or to none.
     pub(crate) fn is_unknown(&self, i: usize) -> bool {
-        self.identity_of.get(i) == Some(&NOBODY) && self.margin.get(i) == Some(&0.0)
+        self.identity_of.get(i) == Some(&NO_IDENTITY) && self.margin.get(i) == Some(&0.0)
     }
 
     /// Evidence for every identity, by number; unlabeled Gaussians first.
     pub(crate) fn facts(&self) -> Vec<IdentityEvidence> {
-        Findings::facts(self.findings.as_ref(), &self.identities, &self.sizes())
+        SegmentationReport::facts(self.findings.as_ref(), &self.identities, &self.sizes())
     }
 
     /// Bytes of the values per Gaussian and per identity.
@@ -177,7 +180,7 @@ impl SemanticMap {
     pub(crate) fn sizes(&self) -> Vec<usize> {
         let mut sizes = vec![0; self.identities.len() + 1];
         for &id in &self.identity_of {
-            if id == NOBODY {
+            if id == NO_IDENTITY {
                 sizes[0] += 1;
             }
             for i in self.identities.ancestors(id) {
@@ -196,9 +199,9 @@ mod tests {
     #[test]
     fn a_cloud_carries_its_map() {
         let mut identities = Identities::default();
-        let doll = identities.add(Level::Object, NOBODY, vec!["doll".into()]);
+        let doll = identities.add(Level::Object, NO_IDENTITY, vec!["doll".into()]);
         let eye = identities.add(Level::Part, doll, vec!["eye".into()]);
-        let (of, margin) = (vec![eye, NOBODY, doll], vec![0.5, 0.0, 1.0]);
+        let (of, margin) = (vec![eye, NO_IDENTITY, doll], vec![0.5, 0.0, 1.0]);
         let mut map = SemanticMap::from_identities(identities.clone(), of, margin, vec!["a.jpg".into()]);
         map.codes[2][4] = 0.25;
         let mut cloud = GaussianCloud { positions: vec![[0.0; 3]; 3], ..GaussianCloud::default() };
@@ -222,12 +225,12 @@ mod tests {
     #[test]
     fn maps_are_counted_and_codes_are_those_of_object_and_part() {
         let mut all = Identities::default();
-        let doll = all.add(Level::Object, NOBODY, vec![]);
+        let doll = all.add(Level::Object, NO_IDENTITY, vec![]);
         assert!(!SemanticMap { identities: all.clone(), ..SemanticMap::default() }.has_parts());
         let eye = all.add(Level::Part, doll, vec![]);
         all.get_mut(doll).expect("there").code = [0.1, 0.2, 0.3];
         all.get_mut(eye).expect("there").code = [0.7, 0.8, 0.9];
-        let mut map = SemanticMap::from_identities(all, vec![doll, eye, NOBODY, 99], vec![1.0; 4], vec![]);
+        let mut map = SemanticMap::from_identities(all, vec![doll, eye, NO_IDENTITY, 99], vec![1.0; 4], vec![]);
         assert!(map.has_parts());
         let codes = [[0.1, 0.2, 0.3, 0.5, 0.5, 0.5], [0.1, 0.2, 0.3, 0.7, 0.8, 0.9], [0.5; 6], [0.5; 6]];
         assert_eq!(map.codes, codes);

@@ -18,7 +18,7 @@ use super::theme;
 use super::viewport::Viewport;
 use crate::agent::commands::{Commands, complete};
 use crate::agent::llm::Llm;
-use crate::agent::scene::{Effect, Parts, SceneWorld};
+use crate::agent::scene::{AgentScene, Effect, SceneWorld};
 use crate::agent::{AgentEvent, Planner, Policy, Refusal, Session};
 use crate::navigate::Pose;
 use crate::scene::resource_log::{self, ResourceKind};
@@ -37,7 +37,7 @@ const BELOW_PT: f32 = 130.0;
 
 /// State of the window that the agent works on.
 pub(crate) struct Snapshot {
-    pub(crate) parts: Parts,
+    pub(crate) parts: AgentScene,
     /// Generation of its Gaussians.
     pub(crate) cloud: u64,
     /// Counts the scenes shown so far.

@@ -10,7 +10,7 @@ use egui::{Button, ComboBox, RichText, TextEdit, Ui};
 use super::theme;
 use crate::agent::llm::SENT;
 use crate::agent::llm::discover::{self, LocalServer};
-use crate::agent::llm::settings::{LlmSettings, RequestPatience};
+use crate::agent::llm::settings::{LlmSettings, RequestTimeouts};
 
 /// Settings of the planner, stored between runs.
 #[derive(Clone, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -113,7 +113,7 @@ impl ModelChooser {
             if ui.add_enabled(!is_waiting, Button::new("Test connection").small()).clicked() {
                 let settings = model.clone();
                 self.tested = Asked::ask(ui, move || {
-                    discover::test(&settings, &RequestPatience::default(), &Arc::new(AtomicBool::new(false)))
+                    discover::test(&settings, &RequestTimeouts::default(), &Arc::new(AtomicBool::new(false)))
                 });
             }
             match self.tested.answer() {

@@ -6,11 +6,11 @@ use egui::{CollapsingHeader, RichText, ScrollArea, Ui};
 
 use super::ctx::Ctx;
 use super::theme;
-use crate::jobs::find_objects::forecast::{self, LookTime};
+use crate::jobs::find_objects::forecast::{self, InferenceEstimate};
 use crate::jobs::find_objects::{FindSettings, NO_ENCODER};
 use crate::jobs::models::{ModelEntry, ModelList, ModelRole, ModelState};
 use crate::math::format::things;
-use crate::pipeline::semantics::lifting::build_map::{Carry, REGIONS};
+use crate::pipeline::semantics::lifting::build_map::{MaskPropagation, REGIONS};
 use crate::scene::Preparation;
 use crate::ui::actions::{Action, Pane};
 
@@ -52,8 +52,8 @@ impl FindDialog {
         }
         finding.preparation = recipe;
         finding.carry = match (recipe.prompt, finding.carry) {
-            (None, _) => Carry::Gaussians,
-            (Some(_), Carry::Gaussians) => Carry::Sam2,
+            (None, _) => MaskPropagation::Gaussians,
+            (Some(_), MaskPropagation::Gaussians) => MaskPropagation::Sam2,
             (Some(_), chosen) => chosen,
         };
     }
@@ -206,7 +206,7 @@ fn offered(
 ) -> bool {
     let to_load = (!model.is_usable()).then(|| download(known, entry));
     let what = if entry.role == ModelRole::Encoder { "a picture of an object" } else { "a photo" };
-    let look = LookTime::of(&entry.id, known, is_fast).map(|look| look.text(what));
+    let look = InferenceEstimate::of(&entry.id, known, is_fast).map(|look| look.text(what));
     ui.add_enabled_ui(model.is_usable() || entry.is_hosted(), |ui| {
         let costs: Vec<String> = [to_load, look].into_iter().flatten().collect();
         choice(ui, chosen, &entry.title, &entry.adds, &costs.join("  \u{b7}  "))
@@ -249,7 +249,9 @@ fn summary(ui: &mut Ui, known: &ModelList, means: &Means, most_photos: usize, is
     if megabytes > 0 {
         parts.push(format!("Download {megabytes} MB."));
     }
-    parts.extend(LookTime::of(&means.segmenter, known, is_fast).map(|look| forecast::sentence(look, most_photos)));
+    parts.extend(
+        InferenceEstimate::of(&means.segmenter, known, is_fast).map(|look| forecast::sentence(look, most_photos)),
+    );
     ui.label(parts.join(" "));
     let warning = match means.encoder.as_str() {
         NO_ENCODER => Some("Words find nothing until you name things."),

@@ -11,9 +11,9 @@ use crate::jobs::edit::EditRequest;
 use crate::jobs::rearrange::{Placement, SplatEdit};
 use crate::math::format::things;
 use crate::pipeline::semantics::lifting::edit::Edit;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::scene::undo::UndoHistory;
-use crate::scene::{CameraPath, CropBox, GaussianCloud, Identities, IdentityId, NOBODY, SemanticMap};
+use crate::scene::{CameraPath, CropBox, GaussianCloud, Identities, IdentityId, NO_IDENTITY, SemanticMap};
 use crate::worker::ViewMode;
 
 /// Largest memory for Gaussians of earlier states, bytes.
@@ -34,7 +34,7 @@ pub(crate) struct ViewState {
     /// Pinned queries in the first and the second view.
     pub(crate) pinned: [Vec<String>; 2],
     /// Recipes of the queries in both views.
-    pub(crate) recipes: [Recipe; 2],
+    pub(crate) recipes: [QueryConfig; 2],
 }
 
 /// All state that can be undone.
@@ -160,7 +160,7 @@ fn is_same<T>(a: &Option<Arc<T>>, b: &Option<Arc<T>>) -> bool {
 /// Description of an edit.
 pub(crate) fn edit_text(request: &EditRequest, all: &Identities) -> String {
     let added = |of: IdentityId, name: &str| match (name.trim(), of) {
-        ("", NOBODY) => "added an object".to_owned(),
+        ("", NO_IDENTITY) => "added an object".to_owned(),
         ("", of) => format!("added a part of {}", all.label(of)),
         (name, _) => format!("added {name}"),
     };
@@ -244,7 +244,7 @@ fn shown_text(before: &BTreeSet<IdentityId>, now: &BTreeSet<IdentityId>, all: &I
         ids.iter().copied().filter(|id| all.get(*id).is_some() && !whole(id)).collect()
     };
     let drawn: BTreeSet<IdentityId> = all.iter().map(|(id, _)| id).filter(|id| !now.contains(id)).collect();
-    if let (true, [only]) = (now.contains(&NOBODY), outermost(&drawn).as_slice()) {
+    if let (true, [only]) = (now.contains(&NO_IDENTITY), outermost(&drawn).as_slice()) {
         return format!("showed only {}", all.full_name(*only));
     }
     let named = |ids: BTreeSet<IdentityId>| match outermost(&ids).as_slice() {
@@ -297,9 +297,9 @@ mod tests {
 
     fn lamp() -> Arc<SemanticMap> {
         let mut identities = Identities::default();
-        let lamp = identities.add(Level::Object, NOBODY, vec!["lamp".into()]);
+        let lamp = identities.add(Level::Object, NO_IDENTITY, vec!["lamp".into()]);
         identities.add(Level::Part, lamp, vec!["shade".into()]);
-        identities.add(Level::Object, NOBODY, vec!["table".into()]);
+        identities.add(Level::Object, NO_IDENTITY, vec!["table".into()]);
         Arc::new(SemanticMap { identities, ..SemanticMap::default() })
     }
 
@@ -336,7 +336,7 @@ mod tests {
         assert_eq!(done(&mut history, &now, None), "showed depth");
         now.view.split = true;
         assert_eq!(done(&mut history, &now, None), "split the view");
-        now.view.recipes[1] = Recipe::paper();
+        now.view.recipes[1] = QueryConfig::paper();
         assert_eq!(done(&mut history, &now, None), "changed the recipe");
         assert_eq!(history.settle(&now, None), None, "nothing has changed");
         let back: Vec<String> = std::iter::from_fn(|| history.go(false)).map(|(what, _)| what).collect();

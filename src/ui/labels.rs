@@ -73,13 +73,13 @@ pub(super) fn sentence(what: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Level, NOBODY};
+    use crate::scene::{Level, NO_IDENTITY};
 
     #[test]
     fn the_large_come_first_the_tiny_apart_and_names_as_they_were() {
         let mut all = Identities::default();
         for name in ["", "mug", "", "", "lamp"] {
-            all.add(Level::Object, NOBODY, if name.is_empty() { vec![] } else { vec![name.into()] });
+            all.add(Level::Object, NO_IDENTITY, if name.is_empty() { vec![] } else { vec![name.into()] });
         }
         let sizes = [0, 20, 1, 19, 2_000, 3];
         let ids: Vec<IdentityId> = (1..=5).collect();
@@ -90,13 +90,13 @@ mod tests {
     #[test]
     fn a_name_comes_before_what_something_looks_like() {
         let mut all = Identities::default();
-        let region = all.add(Level::Object, NOBODY, vec![]);
+        let region = all.add(Level::Object, NO_IDENTITY, vec![]);
         let part = all.add(Level::Part, region, vec![]);
         let labels = ScreenNames(vec![Some("red region, 2 cm".into()), None]);
         assert_eq!(labels.name(&all, region), "red region, 2 cm");
         assert_eq!((labels.name(&all, part), labels.full_name(&all, part)), ("#2".into(), "#2 · #1".into()));
         all.rename(region, "apple");
         assert_eq!((labels.name(&all, region), labels.full_name(&all, part)), ("apple".into(), "#2 · apple".into()));
-        assert_eq!(labels.name(&all, NOBODY), "nothing");
+        assert_eq!(labels.name(&all, NO_IDENTITY), "nothing");
     }
 }

@@ -7,12 +7,12 @@
 mod act;
 pub mod actions;
 pub mod app;
-pub(crate) mod beside;
 pub(crate) mod camera;
 pub(crate) mod chat;
 mod chat_lines;
 mod chat_model;
 pub mod color_by;
+pub(crate) mod comparison;
 mod context;
 mod ctx;
 pub(crate) mod dialogs;

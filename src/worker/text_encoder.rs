@@ -10,7 +10,7 @@ use super::{Repaint, Slot};
 use crate::models::{self, Encoder, ModelError};
 use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::query::parse::ParsedQuery;
-use crate::pipeline::semantics::query::recipe::{PAPERS_PHRASES, Recipe};
+use crate::pipeline::semantics::query::recipe::{PAPERS_PHRASES, QueryConfig};
 use crate::pipeline::semantics::query::timing::ms_since;
 
 /// Requests that may wait; only the newest is read.
@@ -40,7 +40,7 @@ pub(crate) struct EncodedText {
 }
 
 /// Texts, each with the recipe that answers it and decides which other phrases are needed.
-pub(crate) type TextRequest = Vec<(ParsedQuery, Recipe)>;
+pub(crate) type TextRequest = Vec<(ParsedQuery, QueryConfig)>;
 
 /// Handle of the thread. Dropping it ends the thread.
 pub(crate) struct TextEncoder {
@@ -160,7 +160,7 @@ mod tests {
     fn texts_are_encoded_once_and_failures_are_reported() {
         let (mut script, mut known) = (Script::default(), TextEmbeddings::default());
         let parsed = |text: &str| ParsedQuery::parse(text).expect("words");
-        let texts = || ["lamp", "giraffe", "broken"].map(|t| (parsed(t), Recipe::default())).to_vec();
+        let texts = || ["lamp", "giraffe", "broken"].map(|t| (parsed(t), QueryConfig::default())).to_vec();
         let encoded = encode(&mut script, &mut known, texts());
         let of = |text: &str| encoded.texts[&parsed(text)].clone();
         assert!(of("lamp").known && of("lamp").problem.is_none() && encoded.phrases.get("lamp").is_some());

@@ -1,4 +1,4 @@
-//! The drawing lane: a thread that renders the view, so that the window never waits for it.
+//! Render thread: it draws the view, so that the window never waits for it.
 //!
 //! Only the latest request counts: one that was not begun yet is replaced.
 
@@ -39,13 +39,13 @@ struct Mailbox {
 }
 
 /// Handle of the drawing thread. Dropping it ends the thread.
-pub struct ViewLane {
+pub struct RenderThread {
     mailbox: Arc<(Mutex<Mailbox>, Condvar)>,
     pictures: Arc<Slot<ViewResult>>,
     maps: Arc<Slot<MappedView>>,
 }
 
-impl ViewLane {
+impl RenderThread {
     /// Starts the thread. Fails only if the system gives none.
     pub fn start(repaint: Repaint) -> std::io::Result<Self> {
         let mailbox = Arc::new((Mutex::new(Mailbox::default()), Condvar::new()));
@@ -54,19 +54,19 @@ impl ViewLane {
         let (mut mapper, mut mapped_before) = (Renderer::new(), false);
         let work = move || {
             let mut renderer: Option<ViewRenderer> = None;
-            let mut patience = None;
+            let mut timeout = None;
             loop {
-                let request = match next(&box_, patience.take()) {
+                let request = match next(&box_, timeout.take()) {
                     Waited::Request(request) => request,
-                    Waited::InVain => {
+                    Waited::Timeout => {
                         renderer.iter_mut().for_each(|p| p.levels.build());
-                        renderer.iter_mut().for_each(|p| p.renderer.rest());
+                        renderer.iter_mut().for_each(|p| p.renderer.release_buffers());
                         mapper = Renderer::new();
                         continue;
                     }
                     Waited::Closed => return,
                 };
-                patience = Some(REST);
+                timeout = Some(REST);
                 // Looking for a GPU takes a moment; on this thread nothing waits for it.
                 let renderer = match renderer.take().filter(|p| p.without_gpu == request.skip.gpu) {
                     Some(known) => renderer.insert(known),
@@ -93,7 +93,7 @@ impl ViewLane {
                     match by_gpu.flatten() {
                         Some(Err(_)) => {
                             // Buffers may be in any state. The CPU says why, if it cannot either.
-                            renderer.renderer.rest();
+                            renderer.renderer.release_buffers();
                             maps_of(&mut mapper, &request, &camera)
                         }
                         Some(drawn) => Some(drawn),
@@ -152,7 +152,7 @@ impl ViewLane {
     }
 }
 
-impl Drop for ViewLane {
+impl Drop for RenderThread {
     fn drop(&mut self) {
         let (mutex, wake) = &*self.mailbox;
         lock(mutex).closed = true;
@@ -169,13 +169,13 @@ fn lock(mutex: &Mutex<Mailbox>) -> MutexGuard<'_, Mailbox> {
 enum Waited {
     Request(Box<ViewRequest>),
     /// None came in time.
-    InVain,
+    Timeout,
     /// The handle is gone.
     Closed,
 }
 
-/// Waits for a request, at most for `patience` if there is a limit.
-fn next(mailbox: &(Mutex<Mailbox>, Condvar), patience: Option<Duration>) -> Waited {
+/// Waits for a request, at most for `timeout` if there is a limit.
+fn next(mailbox: &(Mutex<Mailbox>, Condvar), timeout: Option<Duration>) -> Waited {
     let (mutex, wake) = mailbox;
     let start = Instant::now();
     let mut guard = lock(mutex);
@@ -186,9 +186,9 @@ fn next(mailbox: &(Mutex<Mailbox>, Condvar), patience: Option<Duration>) -> Wait
         if let Some(r) = guard.request.take() {
             return Waited::Request(Box::new(r));
         }
-        guard = match patience.map(|p| p.saturating_sub(start.elapsed())) {
+        guard = match timeout.map(|p| p.saturating_sub(start.elapsed())) {
             None => wake.wait(guard).unwrap_or_else(PoisonError::into_inner),
-            Some(Duration::ZERO) => return Waited::InVain,
+            Some(Duration::ZERO) => return Waited::Timeout,
             Some(left) => wake.wait_timeout(guard, left).unwrap_or_else(PoisonError::into_inner).0,
         };
     }
@@ -219,7 +219,7 @@ mod tests {
     use super::*;
     use crate::render::RenderSettings;
     use crate::scene::{GaussianCloud, SemanticMap};
-    use crate::scene::{Identities, Level, NOBODY};
+    use crate::scene::{Identities, Level, NO_IDENTITY};
     use crate::worker::Versioned;
     use crate::worker::view_modes::ViewMode;
     use glam::DVec3;
@@ -228,17 +228,17 @@ mod tests {
     fn maps_that_cannot_be_drawn_are_told() {
         let cloud = GaussianCloud { sh: vec![[0.5; 3]], ..GaussianCloud::isotropic(vec![[0.0; 3]], -1.0, 2.0) };
         let mut all = Identities::default();
-        all.add(Level::Object, NOBODY, Vec::new());
+        all.add(Level::Object, NO_IDENTITY, Vec::new());
         let mut map = SemanticMap::from_identities(all, vec![1], vec![1.0], vec![]);
-        let lane = ViewLane::start(Arc::new(|| {})).expect("a thread");
+        let render_thread = RenderThread::start(Arc::new(|| {})).expect("a thread");
         let mapped = |ticket: u64, map: &SemanticMap| {
-            lane.request(ViewRequest {
+            render_thread.request(ViewRequest {
                 cloud: Versioned::new(Arc::new(cloud.clone())),
                 camera: Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 32, 24)
                     .expect("valid"),
                 mode: ViewMode::Rgb,
                 second: None,
-                beside: None,
+                comparison: None,
                 settings: RenderSettings::default(),
                 budget: QualityBudget::Full,
                 photo: None,
@@ -253,7 +253,7 @@ mod tests {
             let start = Instant::now();
             loop {
                 assert!(start.elapsed() < Duration::from_secs(60), "maps, or why there are none");
-                if let Some((_, found)) = lane.maps().newer_than(ticket - 1) {
+                if let Some((_, found)) = render_thread.maps().newer_than(ticket - 1) {
                     return found;
                 }
                 std::thread::sleep(Duration::from_millis(2));
@@ -264,7 +264,7 @@ mod tests {
         map.codes.pop();
         let failure = mapped(2, &map).maps.clone().expect_err("told");
         assert!(failure.message.contains("cannot be drawn") && !failure.remedy.is_empty(), "{failure:?}");
-        // The lane goes on.
+        // The thread goes on.
         map.codes.push(Default::default());
         assert!(mapped(3, &map).maps.is_ok());
     }

@@ -24,7 +24,7 @@ pub(super) struct ViewRenderer {
     /// Reason for which the CPU draws though there is a GPU.
     instead_of_gpu: Option<String>,
     /// Draws the Gaussians of a second view, if they are others.
-    beside: Option<Box<Self>>,
+    comparison: Option<Box<Self>>,
     /// Cost of recent frames; `None` before the first.
     cost: Option<Speed>,
     pub(super) levels: DetailLevels,
@@ -56,7 +56,7 @@ impl ViewRenderer {
             renderer,
             without_gpu,
             instead_of_gpu,
-            beside: None,
+            comparison: None,
             cost: None,
             levels: DetailLevels::default(),
             cut: None,
@@ -106,19 +106,19 @@ impl ViewRenderer {
     }
 
     fn draw_seen(&mut self, request: &ViewRequest) -> ViewResult {
-        let shares = 1 + u8::from(request.follow) + u8::from(request.beside.is_some());
+        let shares = 1 + u8::from(request.follow) + u8::from(request.comparison.is_some());
         let camera = match self.tree(request).filter(|_| self.levels.pace.leaves_out()) {
             Some(_) => self.levels.pace.camera(&request.camera),
             None => self.fitting_camera(&request.camera, request.budget, shares),
         };
         let drawn = self.draw_at(request, camera.clone(), shares)?;
-        let Some((cloud, settings)) = request.beside.clone() else {
-            self.beside = None;
+        let Some((cloud, settings)) = request.comparison.clone() else {
+            self.comparison = None;
             return Ok(Arc::new(drawn));
         };
         let mode = request.second.unwrap_or(request.mode);
         let other = ViewRequest { cloud, settings, mode, second: None, on_device: false, ..request.clone() };
-        let painter = self.beside.get_or_insert_with(|| Box::new(Self::without_gpu(self.without_gpu)));
+        let painter = self.comparison.get_or_insert_with(|| Box::new(Self::without_gpu(self.without_gpu)));
         let _ = painter.sees(&other);
         let ViewPicture { rgb, depth_range, psnr, .. } = painter.draw_at(&other, camera, shares)?;
         Ok(Arc::new(ViewPicture { second: Some(SecondPicture { rgb, depth_range, psnr }), ..drawn }))
@@ -267,7 +267,7 @@ mod tests {
             renderer,
             without_gpu: true,
             instead_of_gpu: None,
-            beside: None,
+            comparison: None,
             cost,
             levels: DetailLevels::default(),
             cut: None,
@@ -284,7 +284,7 @@ mod tests {
             camera: Camera::look_at(DVec3::new(0.0, 0.0, -3.0), DVec3::ZERO, DVec3::NEG_Y, 0.8, 32, 24).expect("valid"),
             mode: ViewMode::Rgb,
             second: None,
-            beside: None,
+            comparison: None,
             settings: RenderSettings::default(),
             budget: QualityBudget::Moving,
             photo: None,
@@ -314,8 +314,8 @@ mod tests {
         }
         assert!(cpu.draw(&moving).expect("drawn").texture.is_none());
         // So are other Gaussians beside.
-        let beside = Some((cloud, RenderSettings::default()));
-        let both = gpu.draw(&ViewRequest { beside, ..moving }).expect("drawn");
+        let comparison = Some((cloud, RenderSettings::default()));
+        let both = gpu.draw(&ViewRequest { comparison, ..moving }).expect("drawn");
         assert!(!both.second.as_ref().expect("two").rgb.is_empty());
     }
 

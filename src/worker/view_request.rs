@@ -23,7 +23,7 @@ pub struct ViewRequest {
     /// Quantity of a second view beside it, if there is one.
     pub second: Option<ViewMode>,
     /// Gaussians of the second view, if they are others, and the settings to draw them with.
-    pub beside: Option<(Versioned<GaussianCloud>, RenderSettings)>,
+    pub comparison: Option<(Versioned<GaussianCloud>, RenderSettings)>,
     /// Degree of the colors, background, filter. Depth is drawn where it is needed.
     pub settings: RenderSettings,
     /// Time that the frame may take.
@@ -50,11 +50,11 @@ impl ViewRequest {
     /// Returns whether both ask for the same frame. Tickets do not count, nor does the device, which is the same as
     /// long as the window is.
     pub(crate) fn is_same_picture(&self, other: &Self) -> bool {
-        let beside = |request: &Self| request.beside.as_ref().map(|(cloud, _)| cloud.generation());
+        let comparison = |request: &Self| request.comparison.as_ref().map(|(cloud, _)| cloud.generation());
         self.shows_same_scene(other)
             && self.camera == other.camera
             && (self.mode, self.second) == (other.mode, other.second)
-            && beside(self) == beside(other)
+            && comparison(self) == comparison(other)
             && self.settings == other.settings
             && (self.budget, self.skip, self.timed) == (other.budget, other.skip, other.timed)
             && self.photo.is_some() == other.photo.is_some()

@@ -137,8 +137,22 @@ pub fn tiny_dataset(folder: &Path) -> PathBuf {
     let glb = tiny_glb(&folder.join("boxes.glb"));
     let photos = folder.join("photos");
     let (glb, out) = (glb.to_str().unwrap(), photos.to_str().unwrap());
-    fmlgs(&["synth", glb, "--out", out, "--views", "16", "--size", "64x48", "--samples", "1", "--points", "500", "-q"])
-        .ok();
+    fmlgs(&[
+        "synth",
+        glb,
+        "--out",
+        out,
+        "--view-count",
+        "16",
+        "--size",
+        "64x48",
+        "--samples",
+        "1",
+        "--points",
+        "500",
+        "-q",
+    ])
+    .ok();
     photos
 }
 

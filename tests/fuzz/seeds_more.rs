@@ -6,7 +6,9 @@ use std::path::Path;
 use fmlgs::io::{semantic_map, splat_ply, trained};
 use fmlgs::pipeline::train::TrainConfig;
 use fmlgs::pipeline::train::checkpoint::Header;
-use fmlgs::scene::{Camera, GaussianCloud, Identities, LanguageFeatures, Level, NOBODY, SemanticMap, ViewFeatures};
+use fmlgs::scene::{
+    Camera, GaussianCloud, Identities, LanguageFeatures, Level, NO_IDENTITY, SemanticMap, ViewFeatures,
+};
 use glam::DVec3;
 use image::{ImageFormat, Rgba, RgbaImage};
 use rand::SeedableRng;
@@ -70,11 +72,11 @@ pub fn mapped_cloud() -> GaussianCloud {
 /// Objects and parts of the scene.
 pub fn map() -> SemanticMap {
     let mut identities = Identities::default();
-    let doll = identities.add(Level::Object, NOBODY, vec!["doll".into(), "人形".into()]);
+    let doll = identities.add(Level::Object, NO_IDENTITY, vec!["doll".into(), "人形".into()]);
     let eye = identities.add(Level::Part, doll, vec![]);
     let views = |raw: [f32; 2]| ViewFeatures { raw: vec![raw.to_vec(); 2], deviated: vec![raw.to_vec(); 2] };
     let of = vec![views([1.0, 0.0]), views([0.0, 1.0])];
-    let mut map = SemanticMap::from_identities(identities, vec![eye, NOBODY], vec![0.25, 0.0], vec!["a".into()]);
+    let mut map = SemanticMap::from_identities(identities, vec![eye, NO_IDENTITY], vec![0.25, 0.0], vec!["a".into()]);
     map.language = Some(LanguageFeatures { encoder: "test".into(), dimension: 2, by_identity: of });
     map
 }

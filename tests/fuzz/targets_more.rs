@@ -11,7 +11,7 @@ use fmlgs::measure::{self, Report};
 use fmlgs::models::sam::Sam;
 use fmlgs::models::sam2::Sam2;
 use fmlgs::models::{ClipEncoder, ModelError, manifest};
-use fmlgs::pipeline::semantics::lifting::kept_frames;
+use fmlgs::pipeline::semantics::lifting::frame_cache;
 use fmlgs::pipeline::semantics::query::parse::ParsedQuery;
 use fmlgs::pipeline::train::checkpoint;
 
@@ -91,7 +91,7 @@ pub fn all() -> Vec<Target> {
             |_| {},
             |f| checkpoint::load(&f.join(checkpoint::FILE)),
         ),
-        Target::new("followed_frame", Door::Any, |b| kept_frames::parse(b).ok_or("damaged")),
+        Target::new("followed_frame", Door::Any, |b| frame_cache::parse(b).ok_or("damaged")),
     ]
 }
 

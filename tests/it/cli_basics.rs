@@ -40,12 +40,12 @@ fn arguments_that_make_no_sense_exit_with_2() {
         &["train", "x", "--sh-degree", "4"],
         &["render", splat, "--size", "0x3"],
         &["render", splat, "--out", "a.jpg"],
-        &["render", splat, "--what", "picture", "--out", "a.npy"],
+        &["render", splat, "--channel", "picture", "--out", "a.npy"],
         &["export", splat, "--out", "a.obj"],
         &["export", splat, "--out", "a.ply", "--crop", "0,0,0,1,1"],
         &["export", splat, "--out", "a.ply", "--crop", "1,0,0,0,1,1"],
         &["export", splat, "--out", "a.ply", "--outside"],
-        &["synth", "a.glb", "--out", "x", "--views", "2", "--held-out", "2"],
+        &["synth", "a.glb", "--out", "x", "--view-count", "2", "--held-out", "2"],
         &["query", splat, "x", "--tolerance", "nan"],
         &["query", splat, "x", "--top", "0"],
         &["path", splat, "--survey", "18446744073709551615"],
@@ -224,30 +224,30 @@ fn a_splat_is_drawn_and_exported_again() {
     let brightest = picture.pixels().map(|p| p.0.into_iter().max().unwrap()).max().unwrap();
     assert!(brightest > 100, "the picture is black");
 
-    fmlgs(&["render", splat, "--size", "64x48", "--what", "depth", "--out", &at("d.npy")]).ok();
+    fmlgs(&["render", splat, "--size", "64x48", "--channel", "depth", "--out", &at("d.npy")]).ok();
     let bytes = std::fs::read(at("d.npy")).unwrap();
     let depth = npyz::NpyFile::new(&bytes[..]).unwrap();
     assert_eq!(depth.shape(), [48, 64]);
     let depth: Vec<f32> = depth.into_vec().unwrap();
-    fmlgs(&["render", splat, "--size", "64x48", "--what", "depth", "--out", &at("d.png"), "--json"]).ok();
+    fmlgs(&["render", splat, "--size", "64x48", "--channel", "depth", "--out", &at("d.png"), "--json"]).ok();
     let coded = image::open(at("d.png")).unwrap().to_luma16().into_raw();
     let far = depth.iter().copied().fold(0.0, f32::max);
     assert!(far > 0.0);
     for (d, c) in depth.iter().zip(&coded) {
         assert!((d / far - f32::from(*c) / 65535.0).abs() < 1e-4);
     }
-    fmlgs(&["render", splat, "--size", "64x48", "--what", "expected-depth", "--out", &at("e.npy")]).ok();
+    fmlgs(&["render", splat, "--size", "64x48", "--channel", "expected-depth", "--out", &at("e.npy")]).ok();
     let bytes = std::fs::read(at("e.npy")).unwrap();
     let expected: Vec<f32> = npyz::NpyFile::new(&bytes[..]).unwrap().into_vec().unwrap();
     // Both have a depth at the same pixels, at nearly the same distance.
     assert!(depth.iter().zip(&expected).all(|(d, e)| (*d > 0.0) == (*e > 0.0) && (d - e).abs() < 0.5 * far));
-    fmlgs(&["render", splat, "--size", "64x48", "--what", "normals", "--out", &at("n.png")]).ok();
+    fmlgs(&["render", splat, "--size", "64x48", "--channel", "normals", "--out", &at("n.png")]).ok();
     let normals = image::open(at("n.png")).unwrap().to_rgb8();
     let length = |p: &image::Rgb<u8>| p.0.iter().map(|c| (f32::from(*c) / 127.5 - 1.0).powi(2)).sum::<f32>();
     let turned: Vec<f32> = normals.pixels().map(length).filter(|l| *l > 0.1).collect();
     assert!(!turned.is_empty() && turned.iter().all(|l| (l - 1.0).abs() < 0.05));
-    fmlgs(&["render", splat, "--size", "64x48", "--what", "normals", "--out", &at("n.npy")]).fails_with(2);
-    fmlgs(&["render", splat, "--size", "64x48", "--what", "alpha", "--out", &at("alpha.png")]).ok();
+    fmlgs(&["render", splat, "--size", "64x48", "--channel", "normals", "--out", &at("n.npy")]).fails_with(2);
+    fmlgs(&["render", splat, "--size", "64x48", "--channel", "alpha", "--out", &at("alpha.png")]).ok();
     assert!(image::open(at("alpha.png")).unwrap().to_luma8().pixels().any(|p| p.0[0] > 100));
 
     fmlgs(&["export", splat, "--out", &at("new/b.ply")]).ok();

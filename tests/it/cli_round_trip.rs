@@ -249,12 +249,13 @@ fn what_is_behind_a_thing_is_rendered_without_it_from_the_same_cameras() {
     let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
     let glb = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/eval/desk.glb");
     let synth = |out: &str, more: &[&str]| {
-        let all = ["synth", glb, "--out", out, "--views", "6", "--held-out", "2", "--size", "48x36", "--points", "0"];
+        let all =
+            ["synth", glb, "--out", out, "--view-count", "6", "--held-out", "2", "--size", "48x36", "--points", "0"];
         fmlgs(&[&all[..], more].concat())
     };
     synth(&at("with"), &[]).ok();
     synth(&at("without"), &["--without", "green lamp"]).ok();
-    synth(&at("shadow"), &["--without", "green lamp", "--keep-shadows"]).ok();
+    synth(&at("shadow"), &["--without", "green lamp", "--keep-shadow"]).ok();
     assert!(synth(&at("x"), &["--without", "giraffe"]).fails_with(1).stderr.contains("'green lamp'"));
     let pictures = |of: &str| {
         let mut all: Vec<_> = std::fs::read_dir(at(of) + "/images").unwrap().map(|e| e.unwrap().path()).collect();

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use fmlgs::math::stats;
 use fmlgs::models::catalog::{self, InstallError, ModelEntry, ModelState};
-use fmlgs::models::fetch::{FetchError, Patience};
+use fmlgs::models::fetch::{FetchError, Timeouts};
 
 fn fixtures() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/fixtures/networks")
@@ -51,8 +51,8 @@ fn server(folder: &Path) -> String {
     url
 }
 
-fn impatient() -> Patience {
-    Patience { stall: Duration::from_secs(5), attempts: 2, pause: Duration::from_millis(5) }
+fn impatient() -> Timeouts {
+    Timeouts { stall: Duration::from_secs(5), attempts: 2, pause: Duration::from_millis(5) }
 }
 
 #[test]

@@ -17,9 +17,10 @@ use fmlgs::render::{BackendChoice, Features, Frame, RenderSettings, Renderer};
 use fmlgs::scene::plan::{NOISE_FLOOR, When};
 use fmlgs::scene::resource_log::{self, ResourceKind};
 use fmlgs::scene::{
-    Camera, GaussianCloud, Identities, Level, Limits, Machine, NOBODY, Overrides, SceneFacts, ScenePlan, SemanticMap,
+    Camera, GaussianCloud, Identities, Level, Limits, Machine, NO_IDENTITY, Overrides, SceneFacts, ScenePlan,
+    SemanticMap,
 };
-use fmlgs::worker::view::{QualityBudget, SkipPasses, ViewLane, ViewRequest};
+use fmlgs::worker::view::{QualityBudget, RenderThread, SkipPasses, ViewRequest};
 use fmlgs::worker::{Versioned, ViewMode};
 
 const LIMITS: Limits = Limits { train_side_px: 512, object_side_px: 1_024, sh_degree: 3, holdout_every: 8 };
@@ -45,7 +46,7 @@ fn ball(n: usize, log_scale: f32, shine: f32) -> GaussianCloud {
 /// Two objects beside each other, the left one with a part if wanted.
 fn objects(cloud: &GaussianCloud, with_part: bool) -> SemanticMap {
     let mut all = Identities::default();
-    let (left, right) = (all.add(Level::Object, NOBODY, vec![]), all.add(Level::Object, NOBODY, vec![]));
+    let (left, right) = (all.add(Level::Object, NO_IDENTITY, vec![]), all.add(Level::Object, NO_IDENTITY, vec![]));
     (all.get_mut(left).unwrap().code, all.get_mut(right).unwrap().code) = ([0.1, 0.9, 0.3], [0.9, 0.1, 0.7]);
     let part = if with_part { all.add(Level::Part, left, vec![]) } else { left };
     if with_part {
@@ -157,14 +158,14 @@ fn a_far_larger_photo_than_the_gaussians_resolve_is_looked_at_smaller() {
 
 /// Outputs of the drawing thread for a request: true if there is a median depth, and true if there are maps.
 fn looked_at(cloud: &GaussianCloud, map: Option<&SemanticMap>, plan: &ScenePlan, budget: QualityBudget) -> [bool; 2] {
-    let lane = ViewLane::start(Arc::new(|| {})).expect("a thread");
+    let render_thread = RenderThread::start(Arc::new(|| {})).expect("a thread");
     let semantics = map.filter(|_| plan.maps.now(false)).map(|m| Versioned::new(Arc::new(m.clone())));
-    lane.request(ViewRequest {
+    render_thread.request(ViewRequest {
         cloud: Versioned::new(Arc::new(cloud.clone())),
         camera: camera(160),
         mode: ViewMode::Rgb,
         second: None,
-        beside: None,
+        comparison: None,
         settings: RenderSettings::default(),
         budget,
         photo: None,
@@ -183,13 +184,13 @@ fn looked_at(cloud: &GaussianCloud, map: Option<&SemanticMap>, plan: &ScenePlan,
         }
         done()
     };
-    assert!(until(&|| lane.pictures().newer_than(0).is_some(), Duration::from_secs(60)), "a picture");
-    let (_, picture) = lane.pictures().newer_than(0).expect("a picture");
+    assert!(until(&|| render_thread.pictures().newer_than(0).is_some(), Duration::from_secs(60)), "a picture");
+    let (_, picture) = render_thread.pictures().newer_than(0).expect("a picture");
     let depth = picture.as_ref().as_ref().expect("drawn").median_depth.is_some();
     // Maps come after the picture; that none do can only be seen by waiting a little.
     let wanted = map.is_some() && plan.maps == When::Always;
     let patience = if wanted { Duration::from_secs(60) } else { Duration::from_millis(300) };
-    [depth, until(&|| lane.maps().newer_than(0).is_some(), patience)]
+    [depth, until(&|| render_thread.maps().newer_than(0).is_some(), patience)]
 }
 
 #[test]
@@ -214,7 +215,7 @@ fn working_memory_is_given_back_and_the_next_picture_is_the_same() {
     let held = Renderer::working_bytes;
     let before = backend.draw(&cloud, &view, &settings).expect("drawn");
     assert!(held(&backend) > cloud.len() * 48, "the control: it does hold something, {}", held(&backend));
-    backend.rest();
+    backend.release_buffers();
     assert_eq!(held(&backend), 0);
     assert_eq!(backend.draw(&cloud, &view, &settings).expect("drawn"), before);
 }

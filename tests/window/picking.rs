@@ -11,7 +11,7 @@ use egui_kittest::kittest::Queryable;
 use fmlgs::io::SceneFolder;
 use fmlgs::io::trained::SceneInfo;
 use fmlgs::jobs::Folders;
-use fmlgs::scene::{GaussianCloud, Identities, IdentityId, Level, NOBODY, SemanticMap};
+use fmlgs::scene::{GaussianCloud, Identities, IdentityId, Level, NO_IDENTITY, SemanticMap};
 use fmlgs::ui::actions::Action;
 use fmlgs::ui::app::App;
 use fmlgs::ui::color_by::ColorBy;
@@ -48,10 +48,10 @@ fn write_scene(folder: &Path, n: usize) -> PathBuf {
         fill(&mut cloud, &mut of, n, id, room);
     }
     let mut all = Identities::default();
-    all.add(Level::Object, NOBODY, vec!["table".into()]);
-    all.add(Level::Object, NOBODY, vec!["lamp".into()]);
+    all.add(Level::Object, NO_IDENTITY, vec!["table".into()]);
+    all.add(Level::Object, NO_IDENTITY, vec!["lamp".into()]);
     all.add(Level::Part, LAMP, vec!["shade".into()]);
-    all.add(Level::Object, NOBODY, vec!["box".into()]);
+    all.add(Level::Object, NO_IDENTITY, vec!["box".into()]);
     for id in [TABLE, LAMP, SHADE, BOX] {
         let code = 0.2 * id as f32;
         all.get_mut(id).expect("there").code = [code, 1.0 - code, code];

@@ -20,7 +20,7 @@ from ._answer import Answer, Hit
 from ._camera import Camera, Photo
 from ._errors import CommandError, FileError, FmlgsError, ProgramNotFound
 from ._gaussians import Gaussians
-from ._identities import NOBODY, Features, Identity
+from ._identities import NO_IDENTITY, Features, Identity
 from ._ply import read_ply
 from ._program import find_program, run, run_json
 from ._scene import Scene, open_scene
@@ -28,7 +28,7 @@ from ._scene import Scene, open_scene
 __version__ = "0.1.0"
 
 __all__ = [
-    "NOBODY",
+    "NO_IDENTITY",
     "Answer",
     "Camera",
     "CommandError",

@@ -15,7 +15,7 @@ from ._errors import FileError
 from ._files import Fields, open_file, parse_json
 
 #: The number of no identity: what no object claims.
-NOBODY = 0
+NO_IDENTITY = 0
 
 _KEY = "fmlgs"
 _VERSION = 1
@@ -33,7 +33,7 @@ class Identity:
     number: int
     #: ``"object"`` or ``"part"``.
     level: str
-    #: The number of what it is a part of; `NOBODY` for objects. Smaller than its own number.
+    #: The number of what it is a part of; `NO_IDENTITY` for objects. Smaller than its own number.
     parent: int
     #: What people or labels call it.
     names: tuple[str, ...]

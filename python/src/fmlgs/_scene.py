@@ -18,7 +18,7 @@ from ._camera import Camera, Photo, read_photos
 from ._errors import FileError
 from ._files import Fields, read_json
 from ._gaussians import Gaussians
-from ._identities import NOBODY, Features, Identity, read_semantic_map
+from ._identities import NO_IDENTITY, Features, Identity, read_semantic_map
 from ._ply import read_ply
 
 _SCENE, _CLOUD, _MAP, _JOURNAL = "scene.json", "point_cloud.ply", "semantic_map.safetensors", ".fmlgs_commit.json"
@@ -42,7 +42,7 @@ class Scene:
     photos: tuple[Photo, ...]
     #: Objects and parts by their numbers, parents before their parts; empty where none were found yet.
     identities: Mapping[int, Identity]
-    #: `[N]` uint32, the number of the innermost identity of each Gaussian; `NOBODY` for none.
+    #: `[N]` uint32, the number of the innermost identity of each Gaussian; `NO_IDENTITY` for none.
     assignment: npt.NDArray[np.uint32]
     #: `[N]` float32, how clearly each Gaussian belongs there, 0 to 1. Nobody's with 0: nothing is known of it.
     margins: npt.NDArray[np.float32]
@@ -58,14 +58,14 @@ class Scene:
         return f"<scene {self.name!r}: {counts}>"
 
     def children(self, number: int) -> list[int]:
-        """Numbers of the parts of an identity; of `NOBODY`, those of the objects."""
+        """Numbers of the parts of an identity; of `NO_IDENTITY`, those of the objects."""
         return [i.number for i in self.identities.values() if i.parent == number]
 
     def descendants(self, number: int) -> list[int]:
         """Its own number, those of its parts, of their parts, and so on, rising."""
         inside = {number} if number in self.identities else set[int]()
         for i in self.identities.values():
-            if i.parent in inside and i.parent != NOBODY:
+            if i.parent in inside and i.parent != NO_IDENTITY:
                 inside.add(i.number)
         return sorted(inside)
 

@@ -199,7 +199,7 @@ impl FormRequest<'_> {
     }
 
     /// Joins words to a phrase: the complete name that they match, else the words as typed.
-    fn said(&self, words: &[&str]) -> String {
+    fn joined(&self, words: &[&str]) -> String {
         let said = quoted(words);
         self.known.whole(words).filter(|name| key(name) != key(&said)).map_or(said, str::to_owned)
     }
@@ -212,11 +212,11 @@ impl FormRequest<'_> {
         match slot {
             FormSlot::Thing => {
                 slots.named += words.len();
-                slots.texts.push(self.said(words));
+                slots.texts.push(self.joined(words));
                 self.is_thing(words)
             }
             FormSlot::Kind => {
-                slots.texts.push(self.said(words));
+                slots.texts.push(self.joined(words));
                 let words = if words[0] == "all" { &words[1..] } else { words };
                 // With complete names, a kind must not take in a relation such as "on the table".
                 let is_plain = self.things != Things::Whole || !words.iter().any(|w| language.is_no_name(w));
@@ -227,7 +227,7 @@ impl FormRequest<'_> {
                     words.split(|w| matches!(*w, "," | "and")).filter(|p| !p.is_empty()).collect();
                 let parts = if self.is_thing(words) { vec![words] } else { parts };
                 slots.named += words.len();
-                slots.several = Some((slots.texts.len(), parts.iter().map(|p| self.said(p)).collect()));
+                slots.several = Some((slots.texts.len(), parts.iter().map(|p| self.joined(p)).collect()));
                 slots.texts.push(text);
                 !parts.is_empty() && parts.iter().all(|p| self.is_thing(p) || many(p).is_some_and(|p| self.is_thing(p)))
             }

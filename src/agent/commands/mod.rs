@@ -24,7 +24,7 @@ use super::tool::{Reference, Target, ToolCall};
 use super::words::{Token, alike, request_tokens};
 use super::world::World;
 use crate::navigate::target::Side;
-use crate::pipeline::semantics::query::recipe::Understanding;
+use crate::pipeline::semantics::query::recipe::MatchBy;
 use crate::scene::{Identities, LevelFilter};
 
 /// Maximum number of tasks per request.
@@ -289,7 +289,7 @@ fn all_of(phrase: &str, world: &mut dyn World, dialog: &DialogState) -> Result<O
     let is_name = !world.identities().called(phrase, LevelFilter::Auto).is_empty();
     let Some(rest) = many(&words).filter(|_| !is_name) else { return Ok(None) };
     let ids = resolve_all(world, &rest.join(" "), LevelFilter::Auto, dialog)?;
-    if world.understanding() == Understanding::Embedding {
+    if world.match_by() == MatchBy::Embedding {
         let text = "What is found by embedding is no count: ask for one thing at a time.";
         return Err(Refusal::new(RefusalKind::Unclear, text));
     }

@@ -7,7 +7,7 @@ use std::time::Duration;
 use serde_json::{Value, json};
 
 use super::http::{Broken, Head, exchange};
-use super::settings::{LlmSettings, RequestPatience};
+use super::settings::{LlmSettings, RequestTimeouts};
 use super::wire::ReplyCollector;
 
 /// Common servers and their ports.
@@ -26,12 +26,12 @@ pub struct LocalServer {
 
 /// Finds the servers that answer on these ports of this machine.
 pub fn find(ports: &[(&'static str, u16)], cancel: &AtomicBool) -> Vec<LocalServer> {
-    let patience =
-        RequestPatience { stall: Duration::from_secs(1), answer: Duration::from_secs(2), ..RequestPatience::default() };
+    let timeouts =
+        RequestTimeouts { stall: Duration::from_secs(1), answer: Duration::from_secs(2), ..RequestTimeouts::default() };
     let ask = |(kind, port): (&'static str, u16)| {
         let base_url = format!("http://127.0.0.1:{port}/v1");
         let settings = LlmSettings { base_url: base_url.clone(), ..LlmSettings::default() };
-        let models = models(&settings, &patience, cancel).ok()?;
+        let models = models(&settings, &timeouts, cancel).ok()?;
         Some(LocalServer { kind, base_url, models })
     };
     std::thread::scope(|scope| {
@@ -41,11 +41,11 @@ pub fn find(ports: &[(&'static str, u16)], cancel: &AtomicBool) -> Vec<LocalServ
 }
 
 /// Reads the names of a server's models.
-fn models(settings: &LlmSettings, patience: &RequestPatience, cancel: &AtomicBool) -> Result<Vec<String>, Broken> {
+fn models(settings: &LlmSettings, timeouts: &RequestTimeouts, cancel: &AtomicBool) -> Result<Vec<String>, Broken> {
     let url = format!("{}/models", settings.base_url.trim().trim_end_matches('/'));
     let key = settings.key().ok().flatten();
     let mut bytes = Vec::new();
-    exchange(&url, key.as_ref(), None, patience, MAX_LIST_BYTES, cancel, &mut |_, piece| {
+    exchange(&url, key.as_ref(), None, timeouts, MAX_LIST_BYTES, cancel, &mut |_, piece| {
         bytes.extend_from_slice(piece);
         false
     })?;
@@ -59,11 +59,11 @@ fn models(settings: &LlmSettings, patience: &RequestPatience, cancel: &AtomicBoo
 ///
 /// # Errors
 /// Describes the problem and its remedy.
-pub fn test(settings: &LlmSettings, patience: &RequestPatience, cancel: &AtomicBool) -> Result<String, String> {
+pub fn test(settings: &LlmSettings, timeouts: &RequestTimeouts, cancel: &AtomicBool) -> Result<String, String> {
     let key = settings.key().map_err(|e| e.to_string())?;
     let clean = |text: &str| key.as_ref().map_or_else(|| text.to_owned(), |k| k.redact(text));
     let url = settings.endpoint(key.is_some()).map_err(|e| e.to_string())?;
-    match models(settings, patience, cancel) {
+    match models(settings, timeouts, cancel) {
         Ok(list) if !list.contains(&settings.model) => {
             let known = if list.is_empty() { "none".into() } else { list.join(", ") };
             return Err(clean(&format!("the server has no model '{}'; it has: {known}", settings.model)));
@@ -80,7 +80,7 @@ pub fn test(settings: &LlmSettings, patience: &RequestPatience, cancel: &AtomicB
     });
     let mut collector = ReplyCollector::default();
     let mut take = |_: &Head, piece: &[u8]| collector.take(false, piece);
-    exchange(&url, key.as_ref(), Some(body.to_string()), patience, MAX_LIST_BYTES, cancel, &mut take)
+    exchange(&url, key.as_ref(), Some(body.to_string()), timeouts, MAX_LIST_BYTES, cancel, &mut take)
         .map_err(|broken| clean(&problem(settings, &broken)))?;
     collector.finish(false).map_err(|e| format!("the model was asked, but {e}"))?;
     Ok(format!("{} answers at {}.", settings.model, settings.base_url))

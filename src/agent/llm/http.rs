@@ -8,7 +8,7 @@ use crossbeam_channel::{Receiver, RecvTimeoutError};
 use ureq::Agent;
 
 use super::secret::Secret;
-use super::settings::RequestPatience;
+use super::settings::RequestTimeouts;
 use crate::io::http::{self, ResponsePart, TICK};
 
 /// Reason for a missing answer.
@@ -51,12 +51,12 @@ pub(crate) fn exchange(
     url: &str,
     key: Option<&Secret>,
     body: Option<String>,
-    patience: &RequestPatience,
+    timeouts: &RequestTimeouts,
     most_bytes: usize,
     cancel: &AtomicBool,
     take: &mut dyn FnMut(&Head, &[u8]) -> bool,
 ) -> Result<(), Broken> {
-    let pieces = ask(url, key, body, patience).map_err(|e| Broken::Connection(e.to_string()))?;
+    let pieces = ask(url, key, body, timeouts).map_err(|e| Broken::Connection(e.to_string()))?;
     let begin = Instant::now();
     let mut heard = Instant::now();
     let mut head: Option<(Head, u16, Option<Duration>)> = None;
@@ -65,7 +65,7 @@ pub(crate) fn exchange(
         if cancel.load(Ordering::Relaxed) {
             return Err(Broken::Cancelled);
         }
-        if heard.elapsed() > patience.stall || begin.elapsed() > patience.answer {
+        if heard.elapsed() > timeouts.stall || begin.elapsed() > timeouts.answer {
             return Err(Broken::Stall);
         }
         match pieces.recv_timeout(TICK) {
@@ -111,13 +111,13 @@ fn ask(
     url: &str,
     key: Option<&Secret>,
     body: Option<String>,
-    patience: &RequestPatience,
+    timeouts: &RequestTimeouts,
 ) -> std::io::Result<Receiver<ResponsePart>> {
-    let config = http::config(url, 2 * patience.stall)
+    let config = http::config(url, 2 * timeouts.stall)
         // A redirect would send the key and the user's words to another server.
         .max_redirects(0)
         .max_redirects_will_error(false)
-        .timeout_global(Some(patience.answer + patience.stall))
+        .timeout_global(Some(timeouts.answer + timeouts.stall))
         .build();
     let (agent, bearer) = (Agent::from(config), key.map(Secret::bearer));
     match body {

@@ -22,7 +22,7 @@ use serde_json::{Value, json};
 
 use self::http::{Broken, exchange, wait};
 use self::secret::Secret;
-use self::settings::{LlmError, LlmSettings, RequestLimits, RequestPatience};
+use self::settings::{LlmError, LlmSettings, RequestLimits, RequestTimeouts};
 use self::wire::{ModelReply, RawCall, ReplyCollector, assistant};
 use super::event::AgentEvent;
 use super::execute::CallOutcome;
@@ -42,7 +42,7 @@ pub struct Llm {
     settings: LlmSettings,
     url: String,
     key: Option<Secret>,
-    patience: RequestPatience,
+    timeouts: RequestTimeouts,
     limits: RequestLimits,
     talk: Vec<Value>,
     /// Calls of the last answer that are not made yet.
@@ -66,7 +66,7 @@ impl Llm {
     /// If the settings cannot be used.
     pub fn new(settings: LlmSettings) -> Result<Self, LlmError> {
         let key = settings.key()?;
-        Self::with(settings, key, RequestPatience::default(), RequestLimits::default())
+        Self::with(settings, key, RequestTimeouts::default(), RequestLimits::default())
     }
 
     /// Returns a planner with this key and these limits.
@@ -76,7 +76,7 @@ impl Llm {
     pub fn with(
         settings: LlmSettings,
         key: Option<Secret>,
-        patience: RequestPatience,
+        timeouts: RequestTimeouts,
         limits: RequestLimits,
     ) -> Result<Self, LlmError> {
         let url = settings.endpoint(key.is_some())?;
@@ -85,7 +85,7 @@ impl Llm {
             settings,
             url,
             key,
-            patience,
+            timeouts,
             limits,
             talk: Vec::new(),
             waiting: VecDeque::new(),
@@ -169,7 +169,7 @@ impl Llm {
 
     /// Asks for one answer of the model, with as many attempts as permitted.
     fn ask(&mut self, context: &mut PlannerContext<'_>) -> Result<ModelReply, Refusal> {
-        let mut pause = self.patience.pause;
+        let mut pause = self.timeouts.pause;
         for attempt in 1.. {
             let (problem, asked_wait) = match self.attempt(context) {
                 Ok(answer) => return Ok(answer),
@@ -177,24 +177,24 @@ impl Llm {
                 Err(Problem::Cancelled) => return Err(Refusal::new(RefusalKind::Stopped, "Stopped.")),
                 Err(Problem::Passing { text, wait }) => (text, wait),
             };
-            if attempt >= self.patience.attempts {
+            if attempt >= self.timeouts.attempts {
                 return Err(self.failed(&format!("The chat model gave no answer: {problem}. Try again later.")));
             }
             // Random jitter keeps many clients from retrying at the same time.
             let own = pause.mul_f64(rand::random_range(0.5..1.0));
             let next = asked_wait.map_or(own, |w| w.max(own));
-            if next > self.patience.longest_pause {
+            if next > self.timeouts.longest_pause {
                 let secs = next.as_secs();
                 return Err(self.failed(&format!("The chat model is rate-limited ({problem}); try again in {secs} s.")));
             }
-            if self.begun.elapsed() + next > self.patience.request {
+            if self.begun.elapsed() + next > self.timeouts.request {
                 return Err(self.failed(&format!("The chat model gave no answer in time: {problem}.")));
             }
             (context.on)(AgentEvent::Note(self.clean(&format!("Asking again: {problem}."))));
             if !wait(next, context.cancel) {
                 return Err(Refusal::new(RefusalKind::Stopped, "Stopped."));
             }
-            pause = (pause * 2).min(self.patience.longest_pause);
+            pause = (pause * 2).min(self.timeouts.longest_pause);
         }
         Err(self.failed("The chat model gave no answer."))
     }
@@ -202,8 +202,8 @@ impl Llm {
     fn attempt(&mut self, context: &mut PlannerContext<'_>) -> Result<ModelReply, Problem> {
         let body = self.body(context);
         let sent = body.len() as u64;
-        let left = self.patience.request.saturating_sub(self.begun.elapsed());
-        let patience = RequestPatience { answer: self.patience.answer.min(left), ..self.patience };
+        let left = self.timeouts.request.saturating_sub(self.begun.elapsed());
+        let timeouts = RequestTimeouts { answer: self.timeouts.answer.min(left), ..self.timeouts };
         let mut collector = ReplyCollector::default();
         let mut is_stream = false;
         let mut told = 0;
@@ -226,7 +226,7 @@ impl Llm {
             }
             ended
         };
-        let sent_to = exchange(&self.url, key, Some(body), &patience, self.limits.bytes, context.cancel, &mut take);
+        let sent_to = exchange(&self.url, key, Some(body), &timeouts, self.limits.bytes, context.cancel, &mut take);
         match sent_to {
             Ok(()) => {}
             Err(Broken::Cancelled) => return Err(Problem::Cancelled),
@@ -280,7 +280,7 @@ impl Llm {
                 self.stream = false;
                 format!("the connection failed ({})", self.clean(problem))
             }
-            Broken::Stall => format!("it said nothing for {:.0} s", self.patience.stall.as_secs_f64().ceil()),
+            Broken::Stall => format!("it said nothing for {:.0} s", self.timeouts.stall.as_secs_f64().ceil()),
             Broken::Status { code, body, .. } => {
                 let body = self.clean(body);
                 let said: String = text::line(&body).trim().chars().take(LONGEST_ERROR).collect();
@@ -360,7 +360,7 @@ impl Planner for Llm {
             if self.tokens > self.limits.tokens {
                 return Err(Refusal::new(RefusalKind::Limit, "I stopped: the request used up its tokens."));
             }
-            if self.begun.elapsed() >= self.patience.request {
+            if self.begun.elapsed() >= self.timeouts.request {
                 return Err(Refusal::new(RefusalKind::Limit, "I stopped: the request took too long."));
             }
             self.answers += 1;

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 use crate::agent::describe::{SEEN, in_view};
 use crate::agent::dialog::DialogState;
 use crate::agent::world::World;
-use crate::scene::{IdentityId, Level, NOBODY};
+use crate::scene::{IdentityId, Level, NO_IDENTITY};
 
 /// Maximum number of identities in the scene data.
 const MOST: usize = 250;
@@ -51,7 +51,7 @@ pub(crate) fn scene(world: &dyn World, dialog: &DialogState) -> Value {
         let Some(facts) = here(id) else { continue };
         let names: Vec<String> = facts.names.iter().take(4).map(|n| name(n)).collect();
         let mut entry = json!({ "id": id, "names": names });
-        if facts.parent != NOBODY {
+        if facts.parent != NO_IDENTITY {
             entry["part_of"] = json!(facts.parent);
         }
         if facts.hidden {
@@ -66,7 +66,7 @@ pub(crate) fn scene(world: &dyn World, dialog: &DialogState) -> Value {
         "identities": list,
         "left_out": all.len().saturating_sub(MOST),
         "spoken_of_last": dialog.last,
-        "metres_are_known": world.metres_per_unit().is_some()
+        "meters_are_known": world.meters_per_unit().is_some()
     })
 }
 

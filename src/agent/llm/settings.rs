@@ -30,7 +30,7 @@ impl Default for LlmSettings {
 
 /// Time limits and number of attempts.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RequestPatience {
+pub struct RequestTimeouts {
     /// Longest silence of the server.
     pub stall: Duration,
     pub answer: Duration,
@@ -43,7 +43,7 @@ pub struct RequestPatience {
     pub longest_pause: Duration,
 }
 
-impl Default for RequestPatience {
+impl Default for RequestTimeouts {
     fn default() -> Self {
         Self {
             stall: Duration::from_secs(45),

@@ -1,11 +1,11 @@
 //! Lookup of identities by embedding, for phrases that no name matches.
 
-use super::{Lost, Resolver};
+use super::{Resolver, Unresolved};
 use crate::agent::describe::names;
 use crate::agent::refusal::RefusalKind;
 use crate::pipeline::semantics::query::answer::{Basis, QueryAnswer};
 use crate::pipeline::semantics::query::localize::Answer;
-use crate::pipeline::semantics::query::recipe::Understanding;
+use crate::pipeline::semantics::query::recipe::MatchBy;
 use crate::scene::{IdentityId, LevelFilter};
 
 /// Number of things that are offered.
@@ -16,7 +16,7 @@ pub(super) fn candidates(
     resolver: &mut Resolver<'_>,
     text: &str,
     kind: LevelFilter,
-) -> Result<Option<Vec<IdentityId>>, Lost> {
+) -> Result<Option<Vec<IdentityId>>, Unresolved> {
     if !resolver.may_look {
         return Ok(None);
     }
@@ -32,23 +32,23 @@ pub(super) fn candidates(
 }
 
 /// Adds the best matches by embedding to a refusal.
-pub(super) fn with_offers(resolver: &mut Resolver<'_>, mut lost: Lost, phrase: &str) -> Lost {
-    if !lost.is_open || resolver.world.understanding() == Understanding::Names {
-        return lost;
+pub(super) fn with_offers(resolver: &mut Resolver<'_>, mut unresolved: Unresolved, phrase: &str) -> Unresolved {
+    if !unresolved.is_open || resolver.world.match_by() == MatchBy::Names {
+        return unresolved;
     }
     let level = resolver.level;
-    let Ok(found) = located(resolver, phrase, level) else { return lost };
+    let Ok(found) = located(resolver, phrase, level) else { return unresolved };
     let [_, offered] = found.offers(OFFERED);
     let answered = if found.basis == Basis::Embedding { found.chosen(1) } else { Vec::new() };
     let alike: Vec<IdentityId> =
         offered.into_iter().chain(answered).filter(|id| resolver.world.facts(*id).is_some()).collect();
     if !alike.is_empty() {
-        lost.refusal.text += &format!(" Looks most like: {}.", names(resolver.world, &alike, OFFERED));
-        lost.near.extend(alike.into_iter().filter(|id| !lost.near.contains(id)).collect::<Vec<_>>());
+        unresolved.refusal.text += &format!(" Looks most like: {}.", names(resolver.world, &alike, OFFERED));
+        unresolved.near.extend(alike.into_iter().filter(|id| !unresolved.near.contains(id)).collect::<Vec<_>>());
     }
-    lost
+    unresolved
 }
 
-fn located(resolver: &mut Resolver<'_>, text: &str, kind: LevelFilter) -> Result<QueryAnswer, Lost> {
-    resolver.world.locate(text, kind).map_err(|e| Lost::new(RefusalKind::Failed, e.0, Vec::new()))
+fn located(resolver: &mut Resolver<'_>, text: &str, kind: LevelFilter) -> Result<QueryAnswer, Unresolved> {
+    resolver.world.locate(text, kind).map_err(|e| Unresolved::new(RefusalKind::Failed, e.0, Vec::new()))
 }

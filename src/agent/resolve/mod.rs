@@ -16,7 +16,7 @@ use super::refusal::{Refusal, RefusalKind};
 use super::relation::{Relation, fit, gap};
 use super::world::World;
 use crate::pipeline::semantics::query::reading::{mend, mended_text};
-use crate::pipeline::semantics::query::recipe::Understanding;
+use crate::pipeline::semantics::query::recipe::MatchBy;
 use crate::scene::{Bounds, IdentityId, LevelFilter};
 
 /// Result of a resolution.
@@ -54,7 +54,7 @@ pub(crate) fn resolve(world: &mut dyn World, phrase: &str, level: LevelFilter, d
             }
             several => Resolved::Several(several.to_vec()),
         },
-        Err(Lost { refusal, near, .. }) => Resolved::Missing { refusal, near },
+        Err(Unresolved { refusal, near, .. }) => Resolved::Missing { refusal, near },
     }
 }
 
@@ -68,19 +68,19 @@ pub(crate) fn resolve_all(
 ) -> Result<Vec<IdentityId>, Refusal> {
     let mut resolver = Resolver::new(world, dialog, level);
     let by_names = resolver.phrase(phrase);
-    let meant = by_names.map_err(|lost| embedded::with_offers(&mut resolver, lost, phrase));
-    meant.map(|set| set.ids).map_err(|lost| lost.refusal)
+    let meant = by_names.map_err(|unresolved| embedded::with_offers(&mut resolver, unresolved, phrase));
+    meant.map(|set| set.ids).map_err(|unresolved| unresolved.refusal)
 }
 
 /// Reason for which no candidates were found.
-struct Lost {
+struct Unresolved {
     refusal: Refusal,
     near: Vec<IdentityId>,
     /// True if no name matches, so that the encoder may be tried; false if the facts of the scene rule the phrase out.
     is_open: bool,
 }
 
-impl Lost {
+impl Unresolved {
     fn new(kind: RefusalKind, text: impl Into<String>, near: Vec<IdentityId>) -> Self {
         Self { refusal: Refusal::new(kind, text), near, is_open: kind == RefusalKind::NotFound }
     }
@@ -88,12 +88,12 @@ impl Lost {
 
 /// Candidates: all matches, and the exact ones among them. Never empty.
 #[derive(Clone, Debug)]
-struct Set {
+struct Candidates {
     ids: Vec<IdentityId>,
     exact: Vec<IdentityId>,
 }
 
-impl Set {
+impl Candidates {
     fn new(ids: Vec<IdentityId>) -> Self {
         Self { ids, exact: Vec::new() }
     }
@@ -115,33 +115,33 @@ struct Resolver<'a> {
 
 impl<'a> Resolver<'a> {
     fn new(world: &'a mut dyn World, dialog: &'a DialogState, level: LevelFilter) -> Self {
-        let may_look = world.understanding() == Understanding::Embedding;
+        let may_look = world.match_by() == MatchBy::Embedding;
         Self { world, dialog, level, may_look, looked: false }
     }
 }
 
 impl Resolver<'_> {
     /// Resolves a phrase by names in all its readings; if none matches, again with the encoder for the unknown words.
-    fn meant(&mut self, phrase: &str) -> Result<Set, Lost> {
-        let lost = match self.phrase(phrase) {
-            Err(lost) if lost.is_open && !self.may_look => lost,
+    fn meant(&mut self, phrase: &str) -> Result<Candidates, Unresolved> {
+        let unresolved = match self.phrase(phrase) {
+            Err(unresolved) if unresolved.is_open && !self.may_look => unresolved,
             done => return done,
         };
-        if self.world.understanding() != Understanding::Names {
+        if self.world.match_by() != MatchBy::Names {
             self.may_look = true;
             let found = self.phrase(phrase);
             self.may_look = false;
             match found {
-                Err(Lost { refusal, .. }) if refusal.kind != RefusalKind::Failed => {}
+                Err(Unresolved { refusal, .. }) if refusal.kind != RefusalKind::Failed => {}
                 done => return done,
             }
         }
-        Err(embedded::with_offers(self, lost, phrase))
+        Err(embedded::with_offers(self, unresolved, phrase))
     }
 
     /// Resolves a phrase by a complete name, else by its readings. If readings match different things, all of these are
     /// candidates.
-    fn phrase(&mut self, phrase: &str) -> Result<Set, Lost> {
+    fn phrase(&mut self, phrase: &str) -> Result<Candidates, Unresolved> {
         if let Some(set) = named::called(self, phrase) {
             return Ok(set);
         }
@@ -159,8 +159,8 @@ impl Resolver<'_> {
         };
         nouns.sort_by_key(place);
         let mut last = 2;
-        let mut found: Option<Set> = None;
-        let mut lost = Lost::new(RefusalKind::Unclear, "I am not sure which thing you mean.", Vec::new());
+        let mut found: Option<Candidates> = None;
+        let mut unresolved = Unresolved::new(RefusalKind::Unclear, "I am not sure which thing you mean.", Vec::new());
         for noun in &nouns {
             if place(noun) > last {
                 break;
@@ -169,25 +169,25 @@ impl Resolver<'_> {
                 (Ok(set), None) => (found, last) = (Some(set), place(noun)),
                 (Ok(set), Some(all)) if set.settled() != all.settled() => {
                     let new: Vec<IdentityId> = set.ids.into_iter().filter(|id| !all.ids.contains(id)).collect();
-                    *all = Set::new(all.settled().iter().copied().chain(new).collect());
+                    *all = Candidates::new(all.settled().iter().copied().chain(new).collect());
                 }
                 (Ok(_), _) => {}
                 // A conflict with the scene explains more than an unknown word.
-                (Err(new), _) if lost.refusal.kind != RefusalKind::Conflict => lost = new,
-                (Err(new), _) if new.refusal.kind == RefusalKind::Conflict && lost.is_open => lost = new,
+                (Err(new), _) if unresolved.refusal.kind != RefusalKind::Conflict => unresolved = new,
+                (Err(new), _) if new.refusal.kind == RefusalKind::Conflict && unresolved.is_open => unresolved = new,
                 (Err(_), _) => {}
             }
         }
-        found.ok_or(lost)
+        found.ok_or(unresolved)
     }
 
-    fn set(&mut self, noun: &Noun) -> Result<Set, Lost> {
+    fn set(&mut self, noun: &Noun) -> Result<Candidates, Unresolved> {
         match noun {
-            Noun::Last => self.last().map(|id| Set::new(vec![id])),
-            Noun::Number(id) if self.world.facts(*id).is_some() => Ok(Set::new(vec![*id])),
+            Noun::Last => self.last().map(|id| Candidates::new(vec![id])),
+            Noun::Number(id) if self.world.facts(*id).is_some() => Ok(Candidates::new(vec![*id])),
             Noun::Number(id) => {
                 let text = format!("There is nothing with the number {id} here.");
-                Err(Lost { is_open: false, ..Lost::new(RefusalKind::NotFound, text, Vec::new()) })
+                Err(Unresolved { is_open: false, ..Unresolved::new(RefusalKind::NotFound, text, Vec::new()) })
             }
             Noun::Called(name) => {
                 named::called(self, name).map_or_else(|| named::by_words(self, &name_words(name)), Ok)
@@ -208,16 +208,16 @@ impl Resolver<'_> {
                 let apart = |t: &Bounds, a: &Bounds| (!rests(t, a) && !rests(a, t)).then(|| gap(t, a));
                 let set = places::at(self, thing, anchor, "is near it", &apart)?;
                 let nearest = places::alike_first(self, &set.ids, anchor)?;
-                Ok(Set::new(nearest))
+                Ok(Candidates::new(nearest))
             }
         }
     }
 
     /// Identity that was mentioned last.
-    fn last(&self) -> Result<IdentityId, Lost> {
+    fn last(&self) -> Result<IdentityId, Unresolved> {
         let there = self.dialog.last.filter(|id| self.world.facts(*id).is_some());
         let unclear = "I do not know what you refer to: nothing was spoken of yet.";
-        there.ok_or_else(|| Lost::new(RefusalKind::Unclear, unclear, Vec::new()))
+        there.ok_or_else(|| Unresolved::new(RefusalKind::Unclear, unclear, Vec::new()))
     }
 
     fn bounds(&self, id: IdentityId) -> Option<Bounds> {
@@ -225,14 +225,14 @@ impl Resolver<'_> {
     }
 
     /// Resolves the anchor of a place, which must be unambiguous.
-    fn anchor(&mut self, noun: &Noun) -> Result<IdentityId, Lost> {
+    fn anchor(&mut self, noun: &Noun) -> Result<IdentityId, Unresolved> {
         let set = self.set(noun)?;
         match set.settled() {
             [only] => Ok(*only),
             several => {
                 let names: Vec<String> = several.iter().take(6).map(|id| the(self.world, *id)).collect();
                 let text = format!("Several things match equally: {}. Please say which one in full.", join(&names));
-                Err(Lost::new(RefusalKind::Unclear, text, several.to_vec()))
+                Err(Unresolved::new(RefusalKind::Unclear, text, several.to_vec()))
             }
         }
     }

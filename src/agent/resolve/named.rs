@@ -1,18 +1,18 @@
 //! Lookup of identities by a complete name or by words of their names, and the refusal if none matches.
 
 use super::noun::{ANYTHING, PARTS};
-use super::{Lost, Resolver, Set, embedded, name_words};
+use super::{Candidates, Resolver, Unresolved, embedded, name_words};
 use crate::agent::describe::join;
 use crate::agent::refusal::RefusalKind;
 use crate::agent::words::{alike, singular};
 use crate::jobs::query::color_of;
-use crate::pipeline::semantics::query::recipe::Understanding;
+use crate::pipeline::semantics::query::recipe::MatchBy;
 use crate::scene::colors::row;
 use crate::scene::{Identity, IdentityId, Level};
 
 /// Candidates by a complete name, whatever words it consists of. The matches of [`by_words`] are candidates, too.
-pub(super) fn called(resolver: &mut Resolver<'_>, name: &str) -> Option<Set> {
-    if resolver.world.understanding() == Understanding::Embedding {
+pub(super) fn called(resolver: &mut Resolver<'_>, name: &str) -> Option<Candidates> {
+    if resolver.world.match_by() == MatchBy::Embedding {
         return None;
     }
     let all = resolver.world.identities();
@@ -24,17 +24,17 @@ pub(super) fn called(resolver: &mut Resolver<'_>, name: &str) -> Option<Set> {
     let mut ids =
         if is_any_own { by_words(resolver, &words).map_or_else(|_| Vec::new(), |set| set.ids) } else { Vec::new() };
     ids.extend(exact.iter().copied().filter(|id| !ids.contains(id)).collect::<Vec<_>>());
-    Some(Set { ids, exact })
+    Some(Candidates { ids, exact })
 }
 
 /// Candidates by the words of their names: all words are in the names of a thing and its ancestors, the last one in
 /// its own. Typing errors are not corrected here.
-pub(super) fn by_words(resolver: &mut Resolver<'_>, words: &[String]) -> Result<Set, Lost> {
+pub(super) fn by_words(resolver: &mut Resolver<'_>, words: &[String]) -> Result<Candidates, Unresolved> {
     let all = resolver.world.identities();
     let wished = all.iter().filter(|(_, i)| resolver.level.accepts(i.level)).map(|(id, _)| id);
     let everyone: Vec<IdentityId> = wished.filter(|id| resolver.world.facts(*id).is_some()).collect();
     let Some((head, rest)) = words.split_last() else { return Err(not_found(resolver, "that", &[])) };
-    if resolver.world.understanding() == Understanding::Embedding {
+    if resolver.world.match_by() == MatchBy::Embedding {
         return by_embedding(resolver, words);
     }
     let own = |id: IdentityId| all.get(id).map(|i| i.names.as_slice()).unwrap_or_default();
@@ -50,7 +50,11 @@ pub(super) fn by_words(resolver: &mut Resolver<'_>, words: &[String]) -> Result<
     };
     if let Some(ids) = generic {
         let fit: Vec<IdentityId> = ids.into_iter().filter(|id| rest.iter().all(|w| line_has(*id, w))).collect();
-        return if fit.is_empty() { Err(not_found(resolver, &words.join(" "), words)) } else { Ok(Set::new(fit)) };
+        return if fit.is_empty() {
+            Err(not_found(resolver, &words.join(" "), words))
+        } else {
+            Ok(Candidates::new(fit))
+        };
     }
     // A color that no name has is looked up in the Gaussians.
     let is_seen = |id: IdentityId, word: &String| row(word).and_then(|color| color_of(all, id, color)) == Some(true);
@@ -72,20 +76,20 @@ pub(super) fn by_words(resolver: &mut Resolver<'_>, words: &[String]) -> Result<
         ids = everyone.iter().copied().filter(|id| fits(id, &|name| name.contains(head))).collect();
     }
     if !ids.is_empty() {
-        return Ok(Set { ids, exact });
+        return Ok(Candidates { ids, exact });
     }
     by_embedding(resolver, words)
 }
 
 /// Candidates by embedding, if it may be used; else, and without any, a refusal.
-fn by_embedding(resolver: &mut Resolver<'_>, words: &[String]) -> Result<Set, Lost> {
+fn by_embedding(resolver: &mut Resolver<'_>, words: &[String]) -> Result<Candidates, Unresolved> {
     let (text, level) = (words.join(" "), resolver.level);
     let found = embedded::candidates(resolver, &text, level)?;
-    found.map(Set::new).ok_or_else(|| not_found(resolver, &text, words))
+    found.map(Candidates::new).ok_or_else(|| not_found(resolver, &text, words))
 }
 
 /// Refusal of an unknown name with the nearest names, by shared or similar words.
-fn not_found(resolver: &Resolver<'_>, text: &str, words: &[String]) -> Lost {
+fn not_found(resolver: &Resolver<'_>, text: &str, words: &[String]) -> Unresolved {
     let all = resolver.world.identities();
     let here = |id: &IdentityId| resolver.world.facts(*id).is_some();
     let shares = |id: &IdentityId| {
@@ -102,7 +106,7 @@ fn not_found(resolver: &Resolver<'_>, text: &str, words: &[String]) -> Lost {
     } else {
         format!(" The nearest names: {}.", listed(&near))
     };
-    Lost::new(RefusalKind::NotFound, format!("There is no '{text}' in this scene.{said}"), near)
+    Unresolved::new(RefusalKind::NotFound, format!("There is no '{text}' in this scene.{said}"), near)
 }
 
 /// Identities that "one" may stand for: the candidates of the last question, else all whose name ends in the same

@@ -1,27 +1,34 @@
 //! Lookup of parts of a whole, of things by their place relative to another, and of one among several.
 
 use super::noun::{Noun, Pick};
-use super::{Lost, Resolver, Set, embedded};
+use super::{Candidates, Resolver, Unresolved, embedded};
 use crate::agent::describe::{self, join, the};
 use crate::agent::language::Key;
 use crate::agent::refusal::RefusalKind;
 use crate::agent::relation::gap;
-use crate::pipeline::semantics::query::recipe::Understanding;
+use crate::pipeline::semantics::query::recipe::MatchBy;
 use crate::scene::identity::whole_names::BETWEEN;
 use crate::scene::{Bounds, IdentityId, LevelFilter};
 
 /// Candidates among the parts of a whole.
-pub(super) fn pieces(resolver: &mut Resolver<'_>, piece: &Noun, whole: &Noun) -> Result<Set, Lost> {
+pub(super) fn pieces(resolver: &mut Resolver<'_>, piece: &Noun, whole: &Noun) -> Result<Candidates, Unresolved> {
     let set = resolver.set(whole)?;
     let found = pieces_of(resolver, set.settled(), piece, whole);
     // The exact "bowl" may lack the part: another match, the fruit bowl, has the apple.
     match found {
-        Err(lost) if set.ids.len() > set.settled().len() => pieces_of(resolver, &set.ids, piece, whole).or(Err(lost)),
+        Err(unresolved) if set.ids.len() > set.settled().len() => {
+            pieces_of(resolver, &set.ids, piece, whole).or(Err(unresolved))
+        }
         found => found,
     }
 }
 
-fn pieces_of(resolver: &mut Resolver<'_>, wholes: &[IdentityId], piece: &Noun, whole: &Noun) -> Result<Set, Lost> {
+fn pieces_of(
+    resolver: &mut Resolver<'_>,
+    wholes: &[IdentityId],
+    piece: &Noun,
+    whole: &Noun,
+) -> Result<Candidates, Unresolved> {
     let all = resolver.world.identities();
     let mut inside = vec![false; all.len() + 1];
     for whole in wholes {
@@ -41,20 +48,20 @@ fn pieces_of(resolver: &mut Resolver<'_>, wholes: &[IdentityId], piece: &Noun, w
     let level = std::mem::replace(&mut resolver.level, LevelFilter::Auto);
     let set = resolver.set(piece);
     resolver.level = level;
-    if let Err(lost) = &set
-        && lost.refusal.kind == RefusalKind::Failed
+    if let Err(unresolved) = &set
+        && unresolved.refusal.kind == RefusalKind::Failed
     {
         return set;
     }
     if let Ok(set) = set {
         let keep = |ids: Vec<IdentityId>| ids.into_iter().filter(is_in).collect::<Vec<_>>();
-        let set = Set { ids: keep(set.ids), exact: keep(set.exact) };
+        let set = Candidates { ids: keep(set.ids), exact: keep(set.exact) };
         if !set.ids.is_empty() {
             return Ok(set);
         }
     }
     let of = match whole {
-        Noun::Named(words) if resolver.world.understanding() == Understanding::Embedding => words.join(" "),
+        Noun::Named(words) if resolver.world.match_by() == MatchBy::Embedding => words.join(" "),
         Noun::Called(name) => name.clone(),
         _ => name.clone(),
     };
@@ -62,13 +69,13 @@ fn pieces_of(resolver: &mut Resolver<'_>, wholes: &[IdentityId], piece: &Noun, w
     let meant = embedded::candidates(resolver, &text, LevelFilter::Part)?.unwrap_or_default();
     let meant: Vec<IdentityId> = meant.into_iter().filter(is_in).collect();
     if !meant.is_empty() {
-        return Ok(Set::new(meant));
+        return Ok(Candidates::new(meant));
     }
     let names: Vec<String> = known.iter().take(12).map(|id| resolver.world.identities().label(*id)).collect();
     let parts =
         if names.is_empty() { "no parts are known of it".into() } else { format!("its parts: {}", join(&names)) };
     let text = format!("The {name} has no '{said}' here; {parts}.");
-    Err(Lost { is_open: true, ..Lost::new(RefusalKind::Conflict, text, known) })
+    Err(Unresolved { is_open: true, ..Unresolved::new(RefusalKind::Conflict, text, known) })
 }
 
 /// Things with a `score` at the anchor, smallest first. Descendants and ancestors of the anchor are excluded.
@@ -78,7 +85,7 @@ pub(super) fn at(
     anchor: &Noun,
     what: &str,
     score: &dyn Fn(&Bounds, &Bounds) -> Option<f64>,
-) -> Result<Set, Lost> {
+) -> Result<Candidates, Unresolved> {
     let anchor = resolver.anchor(anchor)?;
     let set = resolver.set(thing)?;
     let all = resolver.world.identities();
@@ -89,11 +96,11 @@ pub(super) fn at(
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     if found.is_empty() {
         let text = format!("I find nothing like that {what}: I looked at {}.", the(resolver.world, anchor));
-        return Err(Lost::new(RefusalKind::Conflict, text, Vec::new()));
+        return Err(Unresolved::new(RefusalKind::Conflict, text, Vec::new()));
     }
     let ids: Vec<IdentityId> = found.into_iter().map(|(_, id)| id).collect();
     let exact = set.exact.into_iter().filter(|id| ids.contains(id)).collect();
-    Ok(Set { ids, exact })
+    Ok(Candidates { ids, exact })
 }
 
 /// Returns the first of things sorted by their gap to the anchor, with all that are equally near.
@@ -101,7 +108,7 @@ pub(super) fn alike_first(
     resolver: &mut Resolver<'_>,
     ids: &[IdentityId],
     anchor: &Noun,
-) -> Result<Vec<IdentityId>, Lost> {
+) -> Result<Vec<IdentityId>, Unresolved> {
     let place = resolver.anchor(anchor).map(|id| resolver.bounds(id))?;
     let far = |id: &IdentityId| resolver.bounds(*id).zip(place).map_or(f64::INFINITY, |(b, p)| gap(&b, &p));
     let least = ids.first().map_or(0.0, far);
@@ -109,26 +116,27 @@ pub(super) fn alike_first(
 }
 
 /// Returns the candidate that `pick` chooses; several if they are equal.
-pub(super) fn picked(resolver: &mut Resolver<'_>, pick: Pick, of: &Noun) -> Result<Set, Lost> {
+pub(super) fn picked(resolver: &mut Resolver<'_>, pick: Pick, of: &Noun) -> Result<Candidates, Unresolved> {
     let ids = resolver.set(of)?.ids;
     let (key, most) = match pick {
         Pick::Other => {
             let others: Vec<IdentityId> = ids.iter().copied().filter(|id| Some(*id) != resolver.dialog.last).collect();
             let told = others.len() < ids.len() && !others.is_empty();
-            let unclear = || Lost::new(RefusalKind::Unclear, "I do not know which other one you mean.", ids.clone());
-            return if told { Ok(Set::new(others)) } else { Err(unclear()) };
+            let unclear =
+                || Unresolved::new(RefusalKind::Unclear, "I do not know which other one you mean.", ids.clone());
+            return if told { Ok(Candidates::new(others)) } else { Err(unclear()) };
         }
         // A comparative needs two things: of three, "the left one" stays ambiguous.
-        Pick::More(..) if ids.len() > 2 => return Ok(Set::new(ids)),
+        Pick::More(..) if ids.len() > 2 => return Ok(Candidates::new(ids)),
         Pick::Most(key, most) | Pick::More(key, most) => (key, most),
     };
     let values: Vec<(f64, IdentityId)> = ids.iter().filter_map(|id| Some((value(resolver, *id, key)?, *id))).collect();
     let sign = if most { -1.0 } else { 1.0 };
     let Some(best) = values.iter().map(|(v, _)| sign * v).min_by(f64::total_cmp) else {
-        return Err(Lost::new(RefusalKind::Conflict, "Nothing here has a size or place to compare.", ids));
+        return Err(Unresolved::new(RefusalKind::Conflict, "Nothing here has a size or place to compare.", ids));
     };
     let slack = 1e-6 * best.abs().max(1e-6);
-    Ok(Set::new(values.iter().filter(|(v, _)| sign * v <= best + slack).map(|(_, id)| *id).collect()))
+    Ok(Candidates::new(values.iter().filter(|(v, _)| sign * v <= best + slack).map(|(_, id)| *id).collect()))
 }
 
 fn value(resolver: &Resolver<'_>, id: IdentityId, key: Key) -> Option<f64> {
@@ -146,10 +154,10 @@ fn value(resolver: &Resolver<'_>, id: IdentityId, key: Key) -> Option<f64> {
 }
 
 /// Returns the candidates if there are exactly `count`.
-pub(super) fn counted(resolver: &mut Resolver<'_>, count: usize, of: &Noun) -> Result<Set, Lost> {
+pub(super) fn counted(resolver: &mut Resolver<'_>, count: usize, of: &Noun) -> Result<Candidates, Unresolved> {
     let ids = resolver.set(of)?.ids;
     if ids.len() == count && !resolver.looked {
-        return Ok(Set::new(ids));
+        return Ok(Candidates::new(ids));
     }
     let listed = describe::names(resolver.world, &ids, 6);
     let text = match ids.len() {
@@ -157,5 +165,5 @@ pub(super) fn counted(resolver: &mut Resolver<'_>, count: usize, of: &Noun) -> R
         1 => format!("There is 1 of them here, not {count}: {listed}."),
         n => format!("There are {n} of them here, not {count}: {listed}."),
     };
-    Err(Lost::new(RefusalKind::Conflict, text, ids))
+    Err(Unresolved::new(RefusalKind::Conflict, text, ids))
 }

@@ -11,7 +11,7 @@ use super::camera_args::{Direction, Distance};
 pub use super::effect::Effect;
 use super::effect::Emit;
 use super::relation::{Extent, Viewpoint};
-pub use super::view_shares::Parts;
+pub use super::view_shares::AgentScene;
 use super::view_shares::ViewShares;
 use super::world::{Arrival, IdentityFacts, Movement, Unreachable, World, WorldError};
 use crate::jobs::query::QueryEngine;
@@ -20,7 +20,7 @@ use crate::navigate::Pose;
 use crate::navigate::target::Side;
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::query::answer::QueryAnswer;
-use crate::pipeline::semantics::query::recipe::{Recipe, Understanding};
+use crate::pipeline::semantics::query::recipe::{MatchBy, QueryConfig};
 use crate::scene::undo::UndoHistory;
 use crate::scene::{Bounds, Identities, IdentityId, LevelFilter, SemanticMap, text};
 
@@ -29,7 +29,7 @@ const MEASURED_POINTS: usize = 2048;
 
 /// Scene that the agent acts in.
 pub struct SceneWorld {
-    parts: Parts,
+    parts: AgentScene,
     engine: QueryEngine,
     eye: Pose,
     aspect: f64,
@@ -56,7 +56,7 @@ impl SceneWorld {
     ///
     /// # Errors
     /// If the encoder of its embeddings cannot be loaded.
-    pub fn new(parts: Parts, eye: Pose, aspect: f64, emit: Emit) -> Result<Self, WorldError> {
+    pub fn new(parts: AgentScene, eye: Pose, aspect: f64, emit: Emit) -> Result<Self, WorldError> {
         let engine = engine(&parts.map, parts.recipe.clone())?;
         let n = parts.map.identities.len() + 1;
         let bounds = parts.bounds();
@@ -97,7 +97,7 @@ impl SceneWorld {
     ///
     /// # Errors
     /// If the encoder of the scene's embeddings cannot be loaded.
-    pub(crate) fn answer_by(&mut self, recipe: &Recipe) -> Result<(), WorldError> {
+    pub(crate) fn answer_by(&mut self, recipe: &QueryConfig) -> Result<(), WorldError> {
         if self.parts.recipe != *recipe {
             self.engine = engine(&self.parts.map, recipe.clone())?;
             self.parts.recipe = recipe.clone();
@@ -141,13 +141,13 @@ impl SceneWorld {
     }
 }
 
-fn engine(map: &SemanticMap, recipe: Recipe) -> Result<QueryEngine, WorldError> {
+fn engine(map: &SemanticMap, recipe: QueryConfig) -> Result<QueryEngine, WorldError> {
     QueryEngine::new(map.language.as_ref(), recipe).map_err(|e| WorldError(e.to_string()))
 }
 
 impl World for SceneWorld {
-    fn understanding(&self) -> Understanding {
-        self.parts.recipe.understanding
+    fn match_by(&self) -> MatchBy {
+        self.parts.recipe.match_by
     }
 
     fn identities(&self) -> &Identities {
@@ -184,7 +184,7 @@ impl World for SceneWorld {
         Viewpoint { eye: self.eye.center, forward: self.eye.forward(), up: self.parts.up }
     }
 
-    fn metres_per_unit(&self) -> Option<f64> {
+    fn meters_per_unit(&self) -> Option<f64> {
         self.parts.meters
     }
 

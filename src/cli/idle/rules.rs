@@ -20,7 +20,7 @@ pub(super) const RECIPE: &[&str] = &[
 const TRAINING: &[&str] = &[
     "steps",
     "max_side",
-    "holdout_every",
+    "held_out_every",
     "sh_degree",
     "sh_at_once",
     "coarse_share",
@@ -100,7 +100,7 @@ pub(super) const RULES: &[Rule] = &[
         when(g.path("heat") == g.path("mask"), "on the file of --mask: give it a file of its own")
     }),
     // Objects as Gaussians.
-    rule(&["segment"], &["format", "masks", "photos", "max_side"], |g| when(!g.has("all"), "without --all")),
+    rule(&["segment"], &["format", "masks", "views", "max_side"], |g| when(!g.has("all"), "without --all")),
     rule(&["segment"], &["click_out", "view", "keep", "part_of"], |g| when(!g.has("click"), "without --click")),
     rule(&["segment"], &["top", "kind"], |g| when(g.has("click"), "with --click, which asks for nothing")),
     rule(&["segment"], RECIPE, |g| when(g.has("click"), "with --click, which asks for nothing")),
@@ -126,7 +126,7 @@ pub(super) const RULES: &[Rule] = &[
     rule(&["demo"], &["json"], |g| when(g.has("make"), "with --make")),
     rule(&["demo"], TRAINING, |g| when(!g.has("headless"), "without --headless: the window has its own settings")),
     rule(&["demo"], &["out", "json"], |g| when(!g.has_any(&["headless", "make"]), "without --headless")),
-    rule(&["demo"], &["holdout_every"], |_| Some("here: the demo's photos say which of them are held out")),
+    rule(&["demo"], &["held_out_every"], |_| Some("here: the demo's photos say which of them are held out")),
     rule(&["train", "demo"], &["max_gaussians"], |g| when(g.has("no_densify"), "with --no-densify, which adds none")),
     rule(&["train", "demo"], &["sh_at_once"], |g| {
         when(g.is("sh_degree", "0"), "with --sh-degree 0, which has one band only")
@@ -167,7 +167,7 @@ pub(super) const RULES: &[Rule] = &[
     rule(&["report"], &["from"], |g| when(!g.has("defaults"), "without --defaults")),
     rule(
         &["report"],
-        &["stages", "budget", "repeats", "masks", "steps", "train_steps", "max_side", "views", "out", "fresh"],
+        &["stages", "budget", "repeats", "masks", "steps", "train_steps", "max_side", "view_count", "out", "fresh"],
         |g| when(g.has("defaults"), "with --defaults, which measures nothing"),
     ),
     rule(&["report"], RECIPE, |g| when(g.has("defaults"), "with --defaults, which measures nothing")),
@@ -179,7 +179,7 @@ pub(super) const RULES: &[Rule] = &[
     rule(&["report"], RECIPE, |g| when(without_stages(g, &["query"]), "without the stage 'query'")),
     rule(&["report"], &["steps"], |g| when(!g.has("masks"), "without --masks, which the stage 'features' needs")),
     rule(&["report"], RECIPE, |g| when(!g.has("masks"), "without --masks, which the stage 'query' needs")),
-    rule(&["report"], &["views"], |g| {
+    rule(&["report"], &["view_count"], |g| {
         when(without_stages(g, &["render", "train", "features", "query", "depth"]), "with these stages")
     }),
     rule(&["batch"], &["retry_failed", "takeover_secs"], |g| {
@@ -189,7 +189,7 @@ pub(super) const RULES: &[Rule] = &[
     rule(&["bench"], &["mask_grid", "photo"], |g| when(!g.has("masks"), "without --masks")),
     rule(&["bench"], &["size", "max_side", "gpu"], |g| when(!g.has("paths"), "without scenes, splats or photos")),
     rule(&["models fetch", "models add"], &["json"], |_| Some("here: what comes of it is one line")),
-    rule(&["synth"], &["keep_shadows"], |g| when(!g.has("without"), "without --without")),
+    rule(&["synth"], &["keep_shadow"], |g| when(!g.has("without"), "without --without")),
     rule(&["edit"], &["axis"], |g| when(!g.has("turn"), "without --turn")),
     rule(&["connect"], &["save", "json"], |g| when(!g.has("headless"), "without --headless")),
 ];

@@ -103,7 +103,7 @@ fn with_required<'a>(command: &'a Command, argument: &'a Arg) -> Vec<&'a Arg> {
 /// All ways to give some of what a command needs besides: positional arguments and where the result goes.
 fn besides(command: &Command, without: &[&Arg]) -> Vec<Vec<String>> {
     let is_free = |a: &&Arg| !without.iter().any(|w| w.get_id() == a.get_id());
-    let needed = |a: &&Arg| a.is_positional() || a.is_required_set() || a.get_id() == "out" || a.get_id() == "what";
+    let needed = |a: &&Arg| a.is_positional() || a.is_required_set() || a.get_id() == "out" || a.get_id() == "channel";
     let mut all = vec![Vec::new()];
     for argument in command.get_arguments().filter(needed).filter(is_free) {
         let more: Vec<Vec<String>> = all.iter().map(|line| [line.clone(), typed(argument)].concat()).collect();
@@ -180,7 +180,7 @@ const LINES: &[(&str, &[&str], &str)] = &[
     ("query s lamp --by names {}", &["--temperature 2", "--canonical lerf", "--deviation off"], ""),
     ("query s lamp --mask a.png {}", &["--heat a.png", "--heat ./a.png"], "query s lamp --mask a.png --heat b.png"),
     ("query s --phrases f {}", &["--relevancy raw"], "query s --phrases f --top 2 --kind part --views all --export o"),
-    ("segment s lamp --out o.ply {}", &["--format spz", "--masks isat", "--photos none", "--max-side 64"], ""),
+    ("segment s lamp --out o.ply {}", &["--format spz", "--masks isat", "--views none", "--max-side 64"], ""),
     ("segment s lamp --out o.ply {}", &["--click-out 1,1", "--view 0", "--keep lamp", "--relevancy raw"], ""),
     (
         "segment s --click 1,1 --out o.ply {}",
@@ -189,7 +189,7 @@ const LINES: &[(&str, &[&str], &str)] = &[
     ),
     ("segment s --click 1,1 --out o.ply {}", RECIPE, "segment s lamp --out o.ply --by names --top 2"),
     ("segment s --click 1,1 --keep x {}", &["--no-measure"], "segment s --click 1,1 --out o.ply --no-measure"),
-    ("segment s --all --out o {}", &["--no-measure"], "segment s --all --out o --format spz --photos none"),
+    ("segment s --all --out o {}", &["--no-measure"], "segment s --all --out o --format spz --views none"),
     ("segment s lamp {}", &["--keep x"], ""),
     ("eval s {}", RECIPE, "eval s --masks m --by names"),
     ("eval s {}", &["--protocol masks", "--query lamp"], "eval s --masks m --protocol spin-nerf --query lamp"),
@@ -208,7 +208,7 @@ const LINES: &[(&str, &[&str], &str)] = &[
         &["--steps 9", "--max-side 64", "--seed 2", "--surfels", "--json", "--out o"],
         "demo --headless --steps 9",
     ),
-    ("demo --headless {}", &["--holdout-every 4"], "demo --headless --json --out o"),
+    ("demo --headless {}", &["--held-out-every 4"], "demo --headless --json --out o"),
     ("demo --headless --no-densify {}", &["--max-gaussians 9"], ""),
     ("demo --headless --sh-degree 0 {}", &["--sh-at-once"], ""),
     ("demo --headless --surfels {}", &["--antialias", "--no-antialias"], ""),
@@ -264,7 +264,7 @@ const LINES: &[(&str, &[&str], &str)] = &[
         "report s --train-steps 50",
     ),
     ("report s --masks m --stages query {}", &["--steps 9"], "report s --masks m --stages features,query --steps 9"),
-    ("report s --stages path {}", &["--views 2"], "report s --stages path,render --views 2"),
+    ("report s --stages path {}", &["--view-count 2"], "report s --stages path,render --view-count 2"),
     ("report --defaults d.md --from f {}", &["--budget 9", "--out o", "--fresh", "--repeats 2", "--by names"], ""),
     (
         "batch j.toml --dry-run {}",
@@ -275,7 +275,7 @@ const LINES: &[(&str, &[&str], &str)] = &[
     ("bench --queries 5 {}", &["--size 64x48", "--max-side 64", "--gpu"], "bench --queries 5 --identities 9"),
     ("models fetch m {}", &["--json"], "models check --json"),
     ("models add m f {}", &["--json"], "models --json"),
-    ("synth g --out o {}", &["--keep-shadows"], "synth g --out o --without x --keep-shadows"),
+    ("synth g --out o {}", &["--keep-shadow"], "synth g --out o --without x --keep-shadow"),
     ("edit s lamp --out o --scale 2 {}", &["--axis 0,0,1"], "edit s lamp --out o --turn 9 --axis 0,0,1"),
     ("connect u {}", &["--save a.ply", "--json"], "connect u --headless --save a.ply --json"),
 ];

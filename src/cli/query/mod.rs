@@ -102,10 +102,10 @@ pub(crate) fn run(args: QueryArgs, quiet: bool) -> Result<(), CliError> {
     if args.mask.is_some() || args.heat.is_some() {
         result.answered.stages.draw = ms_since(drawing_since);
     }
-    tell(&args, text, &map, &result)
+    print_answer(&args, text, &map, &result)
 }
 
-fn tell(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -> Result<(), CliError> {
+fn print_answer(args: &QueryArgs, text: &str, map: &SemanticMap, result: &QueryResult) -> Result<(), CliError> {
     let QueryResult { answered, reading, mask, ignored_words: ignored, unexplained_words, query_ms, .. } = result;
     let full_name = |hit: &Hit| map.identities.full_name(hit.identity);
     let basis = if answered.basis == Basis::Names { "names" } else { "looks" };

@@ -7,7 +7,7 @@ use glam::DVec3;
 use rayon::prelude::*;
 
 use super::{BOUNDS, CHUNK, HARMONICS, PACKED};
-use crate::io::atomic::Told;
+use crate::io::atomic::WriteProgress;
 use crate::io::quantized::{color, opacity_byte, to_unorm, without_largest};
 use crate::io::{morton, render_mode, shift};
 use crate::scene::GaussianCloud;
@@ -16,7 +16,11 @@ use crate::scene::GaussianCloud;
 type Bounds3 = [[f32; 3]; 2];
 
 /// Writes the bytes of a compressed `.ply` of a valid cloud, in Morton order, which keeps the chunks small.
-pub(in crate::io) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
+pub(in crate::io) fn encode(
+    out: &mut dyn Write,
+    cloud: &GaussianCloud,
+    progress: &mut WriteProgress<'_>,
+) -> io::Result<()> {
     let (near, shift) = shift::near_zero(cloud);
     let cloud = &*near;
     let order = morton::order(cloud);
@@ -24,7 +28,7 @@ pub(in crate::io) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &m
     out.write_all(header(cloud, shift).as_bytes())?;
     chunks.iter().try_for_each(|(bounds, _)| out.write_all(bounds))?;
     for (k, (_, rows)) in chunks.iter().enumerate() {
-        told(k * CHUNK)?;
+        progress(k * CHUNK)?;
         out.write_all(rows)?;
     }
     let stride = cloud.sh_stride();

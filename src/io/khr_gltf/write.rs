@@ -6,7 +6,7 @@ use base64::write::EncoderWriter;
 use serde_json::{Map, Value, json};
 
 use super::{EXTENSION, EXTRA};
-use crate::io::atomic::Told;
+use crate::io::atomic::WriteProgress;
 use crate::io::quantized::unit;
 use crate::math::Real;
 use crate::scene::{Axes, GaussianCloud};
@@ -28,7 +28,11 @@ struct Attribute<'a> {
 }
 
 /// Writes the bytes of a `.glb` of a valid cloud that is not empty.
-pub(in crate::io) fn encode_binary(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
+pub(in crate::io) fn encode_binary(
+    out: &mut dyn Write,
+    cloud: &GaussianCloud,
+    progress: &mut WriteProgress<'_>,
+) -> io::Result<()> {
     let cloud = &turned(cloud);
     let attributes = attributes(cloud);
     let (mut text, bytes) = (document(cloud, &attributes, None).to_string(), buffer_bytes(cloud, &attributes));
@@ -44,11 +48,15 @@ pub(in crate::io) fn encode_binary(out: &mut dyn Write, cloud: &GaussianCloud, t
     out.write_all(&[&size(text.len())?, &b"JSON"[..]].concat())?;
     out.write_all(text.as_bytes())?;
     out.write_all(&[&size(bytes)?, &b"BIN\0"[..]].concat())?;
-    buffer(cloud, &attributes, out, told)
+    buffer(cloud, &attributes, out, progress)
 }
 
 /// Writes the text of a `.gltf` of a valid cloud that is not empty, its buffer within.
-pub(in crate::io) fn encode_text(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
+pub(in crate::io) fn encode_text(
+    out: &mut dyn Write,
+    cloud: &GaussianCloud,
+    progress: &mut WriteProgress<'_>,
+) -> io::Result<()> {
     const HERE: &str = "data:application/octet-stream;base64,";
     let cloud = &turned(cloud);
     let attributes = attributes(cloud);
@@ -56,7 +64,7 @@ pub(in crate::io) fn encode_text(out: &mut dyn Write, cloud: &GaussianCloud, tol
     let (before, after) = text.split_once(HERE).unwrap_or((&text, ""));
     write!(out, "{before}{HERE}")?;
     let mut encoded = EncoderWriter::new(&mut *out, base64::STANDARD);
-    buffer(cloud, &attributes, &mut encoded, told)?;
+    buffer(cloud, &attributes, &mut encoded, progress)?;
     encoded.finish()?;
     drop(encoded);
     out.write_all(after.as_bytes())
@@ -103,12 +111,12 @@ fn buffer(
     cloud: &GaussianCloud,
     attributes: &[Attribute<'_>],
     out: &mut dyn Write,
-    told: &mut Told<'_>,
+    progress: &mut WriteProgress<'_>,
 ) -> io::Result<()> {
     let mut block = Vec::new();
     for (k, attribute) in attributes.iter().enumerate() {
         for first in (0..cloud.len()).step_by(BLOCK) {
-            told((k * cloud.len() + first) / attributes.len())?;
+            progress((k * cloud.len() + first) / attributes.len())?;
             block.clear();
             (first..cloud.len().min(first + BLOCK)).for_each(|i| (attribute.put)(i, &mut block));
             out.write_all(&block)?;

@@ -26,7 +26,7 @@ impl LabelAddress {
     }
 
     /// Name of the file for messages, and the photo that it names if that is another name.
-    fn told(&self) -> String {
+    fn text(&self) -> String {
         let file = self.file.file_name().unwrap_or(self.file.as_os_str()).to_string_lossy();
         match self.names.last().map(|name| parts(name)) {
             Some((_, name)) if stem(name) != stem(&file) => format!("{file}, of '{name}'"),
@@ -129,13 +129,13 @@ pub(super) fn bound(addresses: &[LabelAddress], photos: &PhotoNames<'_>) -> Resu
             "{} of {} labeled pictures are none of the photos, and are not used (first: {})",
             unused.len(),
             addresses.len(),
-            addresses[*first].told()
+            addresses[*first].text()
         ));
     }
     let mut joined: Vec<(&String, &Vec<usize>)> = of.iter().filter(|(_, labels)| labels.len() > 1).collect();
     joined.sort();
     if let Some((photo, labels)) = joined.first() {
-        let files: Vec<String> = labels.iter().map(|i| addresses[*i].told()).collect();
+        let files: Vec<String> = labels.iter().map(|i| addresses[*i].text()).collect();
         notes.push(format!(
             "{} of the photos have several label files, which are joined (first: {photo}, of {})",
             joined.len(),

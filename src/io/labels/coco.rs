@@ -128,7 +128,7 @@ impl CocoFile {
                 }
             }
             if annotation.iscrowd.as_i64() == Some(1) || annotation.iscrowd.as_bool() == Some(true) {
-                passed.told("annotations are marked as crowds (iscrowd); each is read as one thing", path);
+                passed.report("annotations are marked as crowds (iscrowd); each is read as one thing", path);
             }
             images[*at].annotations.push((i, annotation));
         }

@@ -74,7 +74,7 @@ pub(super) fn find(path: &Path) -> Result<FoundLabels, IoError> {
             if names.is_empty() {
                 let what = "label files of YOLO's have no names of classes by them (classes.txt, data.yaml): what they show \
                             is nameless";
-                found.passed.told(what, &file);
+                found.passed.report(what, &file);
             }
             found.files.push(LabelFile { address: LabelAddress::of_file(file, "", ""), form: Form::Yolo(names) });
         }

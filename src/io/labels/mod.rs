@@ -209,11 +209,11 @@ pub(crate) struct Passed(BTreeMap<String, (usize, PathBuf)>);
 impl Passed {
     /// Counts skipped content.
     fn add(&mut self, what: &str, path: &Path) {
-        self.told(&format!("{what} are passed over"), path);
+        self.report(&format!("{what} are passed over"), path);
     }
 
     /// Counts content to be reported.
-    fn told(&mut self, what: &str, path: &Path) {
+    fn report(&mut self, what: &str, path: &Path) {
         self.0.entry(what.to_owned()).or_insert_with(|| (0, path.to_owned())).0 += 1;
     }
 

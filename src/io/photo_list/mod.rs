@@ -149,7 +149,7 @@ pub(super) fn photos(
         return Err(IoError::Duplicate { path: source.into(), photo: pair[0].name.clone() });
     }
     warnings.extend(tally.warnings(source));
-    warnings.extend(lenses::told(&photos));
+    warnings.extend(lenses::warnings(&photos));
     Ok(photos)
 }
 

@@ -9,7 +9,7 @@ use serde_json::json;
 
 use super::palette::{codebook, palette};
 use super::{FIRST_TAG, META_FILE, PALETTE_ROW};
-use crate::io::atomic::Told;
+use crate::io::atomic::WriteProgress;
 use crate::io::quantized::{opacity_byte, to_byte, to_unorm, without_largest};
 use crate::io::{morton, render_mode, shift};
 use crate::scene::GaussianCloud;
@@ -30,7 +30,7 @@ struct Picture {
 ///
 /// # Errors
 /// If there are more Gaussians than a picture has pixels.
-pub(super) fn files(cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<Vec<(String, Vec<u8>)>> {
+pub(super) fn files(cloud: &GaussianCloud, progress: &mut WriteProgress<'_>) -> io::Result<Vec<(String, Vec<u8>)>> {
     let (near, shift) = shift::near_zero(cloud);
     let cloud = &*near;
     let order = morton::order(cloud);
@@ -55,7 +55,7 @@ pub(super) fn files(cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<Ve
             }),
         ),
     ];
-    told(n / 4)?;
+    progress(n / 4)?;
     let stride = cloud.sh_stride();
     let (scales, labels) = codebook(cloud.log_scales.as_flattened());
     pictures.push(picture("scales.webp", in_order(&|i| with([0, 1, 2].map(|k| labels[3 * i + k]), 255))));
@@ -63,7 +63,7 @@ pub(super) fn files(cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<Ve
     let (colors, labels) = codebook(&constant);
     let opacity = |i: usize| opacity_byte(cloud.opacity_logits[i]);
     pictures.push(picture("sh0.webp", in_order(&|i| with([0, 1, 2].map(|k| labels[3 * i + k]), opacity(i)))));
-    told(n / 2)?;
+    progress(n / 2)?;
     let part = |codebook: &[f32], name: &str| json!({ "codebook": codebook, "files": [name] });
     let mut meta = json!({
         "version": 2,
@@ -95,11 +95,11 @@ pub(super) fn files(cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<Ve
             "files": ["shN_centroids.webp", "shN_labels.webp"],
         });
     }
-    told(3 * (n / 4))?;
+    progress(3 * (n / 4))?;
     let written: io::Result<Vec<_>> = pictures.into_par_iter().map(webp).collect();
     let mut files = written?;
     files.push((META_FILE.to_owned(), serde_json::to_vec(&meta)?));
-    told(n)?;
+    progress(n)?;
     Ok(files)
 }
 

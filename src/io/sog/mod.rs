@@ -14,7 +14,7 @@ mod palette;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-use super::atomic::{Draft, Told};
+use super::atomic::{Draft, WriteProgress};
 use super::error::write_error;
 use super::{IoError, bundle, files};
 use crate::scene::GaussianCloud;
@@ -53,15 +53,19 @@ pub fn parse_archive(bytes: &[u8], path: &Path) -> Result<GaussianCloud, IoError
 }
 
 /// Writes the bytes of a bundled SOG of a valid cloud that is not empty.
-pub(super) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
-    out.write_all(&bundle::pack(&encode::files(cloud, told)?)?)
+pub(super) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, progress: &mut WriteProgress<'_>) -> io::Result<()> {
+    out.write_all(&bundle::pack(&encode::files(cloud, progress)?)?)
 }
 
 /// Writes an unbundled SOG: its pictures first, then `meta_file`, without which they are not used.
 ///
 /// # Errors
 /// If `meta_file` exists already: all files could not be replaced at once.
-pub(super) fn write_folder(meta_file: &Path, cloud: &GaussianCloud, told: &mut Told<'_>) -> Result<(), IoError> {
+pub(super) fn write_folder(
+    meta_file: &Path,
+    cloud: &GaussianCloud,
+    progress: &mut WriteProgress<'_>,
+) -> Result<(), IoError> {
     let folder = files::folder_of(meta_file);
     if meta_file.exists() {
         return Err(IoError::Occupied { folder: folder.into(), what: "holds a meta.json already" });
@@ -72,7 +76,7 @@ pub(super) fn write_folder(meta_file: &Path, cloud: &GaussianCloud, told: &mut T
         draft.write_all(bytes).map_err(|cause| write_error(&path, cause))?;
         Ok(draft)
     };
-    let all = encode::files(cloud, told).map_err(|cause| write_error(meta_file, cause))?;
+    let all = encode::files(cloud, progress).map_err(|cause| write_error(meta_file, cause))?;
     let drafts = all.iter().map(write).collect::<Result<Vec<_>, IoError>>()?;
     drafts.into_iter().try_for_each(|draft| draft.commit().map(drop))
 }

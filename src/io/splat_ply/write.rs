@@ -7,7 +7,7 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::{ORIGIN, STATE, is_standard};
-use crate::io::atomic::{self, Told};
+use crate::io::atomic::{self, WriteProgress};
 use crate::io::{IoError, render_mode, shift, vertical};
 use crate::scene::GaussianCloud;
 
@@ -40,18 +40,27 @@ pub(crate) fn may_be_extra(name: &str) -> bool {
 
 /// Writes the bytes of a splat `.ply` of a valid cloud, with the id of the scene's state that it belongs to.
 pub fn encode(out: &mut dyn Write, cloud: &GaussianCloud, state: Option<&str>) -> io::Result<()> {
-    encode_told(out, cloud, state.map(|state| format!("{STATE}{state}")).as_slice(), &mut |_| Ok(()))
+    encode_with_progress(out, cloud, state.map(|state| format!("{STATE}{state}")).as_slice(), &mut |_| Ok(()))
 }
 
 /// As [`encode`], for other programs and with progress: a cloud far from zero is written near zero, with a comment that
 /// states the shift.
-pub(crate) fn encode_near_zero(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
+pub(crate) fn encode_near_zero(
+    out: &mut dyn Write,
+    cloud: &GaussianCloud,
+    progress: &mut WriteProgress<'_>,
+) -> io::Result<()> {
     let (near, shift) = shift::near_zero(cloud);
-    encode_told(out, &near, shift.map(shift::comment).as_slice(), told)
+    encode_with_progress(out, &near, shift.map(shift::comment).as_slice(), progress)
 }
 
-fn encode_told(out: &mut dyn Write, cloud: &GaussianCloud, comments: &[String], told: &mut Told<'_>) -> io::Result<()> {
-    told(0)?;
+fn encode_with_progress(
+    out: &mut dyn Write,
+    cloud: &GaussianCloud,
+    comments: &[String],
+    progress: &mut WriteProgress<'_>,
+) -> io::Result<()> {
+    progress(0)?;
     let shifted = cloud.origin != DVec3::ZERO;
     out.write_all(header(cloud, shifted, comments).as_bytes())?;
     let stride = cloud.sh_stride();
@@ -77,7 +86,7 @@ fn encode_told(out: &mut dyn Write, cloud: &GaussianCloud, comments: &[String], 
         if (i + 1) % BLOCK == 0 {
             out.write_all(&block)?;
             block.clear();
-            told(i)?;
+            progress(i)?;
         }
     }
     out.write_all(&block)

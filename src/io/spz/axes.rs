@@ -63,7 +63,7 @@ impl AxisMarks {
 
     /// Returns the axes by a record or by marks of this program; `farthest` is the largest coordinate, in steps of
     /// `bits` fractional bits.
-    fn said(&self, version: u32, bits: u8, farthest: i32) -> Option<Axes> {
+    fn stated(&self, version: u32, bits: u8, farthest: i32) -> Option<Axes> {
         let record = self.records.iter().find(|(kind, _)| *kind == COORDINATE_SYSTEM);
         let number = record.and_then(|(_, body)| body.first_chunk::<4>()).map(|b| u32::from_le_bytes(*b) as usize);
         // 0 is "unspecified", which Adobe's reader treats as the format's own.
@@ -97,7 +97,7 @@ impl AxisMarks {
             (*kind != COORDINATE_SYSTEM).then_some(text)
         };
         let mut told: Vec<String> = self.records.iter().filter_map(passed).collect();
-        let axes = match (known, self.said(version, bits, farthest)) {
+        let axes = match (known, self.stated(version, bits, farthest)) {
             (SpzAxes::Given(axes), _) => axes,
             (_, Some(axes)) => axes,
             (SpzAxes::Documented, None) => Axes::SPZ,

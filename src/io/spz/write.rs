@@ -6,7 +6,7 @@ use flate2::{Compression, GzBuilder};
 
 use super::{ANTIALIASED, COLOR_SCALE, COMPONENT_MOST, HARMONIC_MIDDLE, MAGIC, MOST_STEPS, SCALE_FIRST, SCALE_STEP};
 use super::{SHIFT, TURNED, columns};
-use crate::io::atomic::Told;
+use crate::io::atomic::WriteProgress;
 use crate::io::quantized::{opacity_byte, to_byte, without_largest};
 use crate::io::shift;
 use crate::scene::{Axes, GaussianCloud, SplatRenderMode};
@@ -21,24 +21,28 @@ const HARMONIC_STEPS: [i32; 2] = [8, 16];
 ///
 /// # Errors
 /// If the cloud exceeds the range of 24 bits, or cannot be written.
-pub(in crate::io) fn encode(out: &mut dyn Write, cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<()> {
+pub(in crate::io) fn encode(
+    out: &mut dyn Write,
+    cloud: &GaussianCloud,
+    progress: &mut WriteProgress<'_>,
+) -> io::Result<()> {
     let (near, shift) = shift::near_zero(cloud);
     let comment = shift.map_or_else(|| TURNED.to_owned(), |shift| format!("{TURNED}{SHIFT}{}", shift::text(shift)));
     let mut gzip = GzBuilder::new().comment(comment).write(out, Compression::default());
     let turned = near.into_owned().turned(&Axes::SPZ.scene_from_file().transpose(), true);
-    gzip.write_all(&unpacked(&turned, told)?)?;
+    gzip.write_all(&unpacked(&turned, progress)?)?;
     gzip.finish().map(drop)
 }
 
 /// Returns the uncompressed content of such a file, without a change of axes.
-pub(in crate::io) fn unpacked(cloud: &GaussianCloud, told: &mut Told<'_>) -> io::Result<Vec<u8>> {
+pub(in crate::io) fn unpacked(cloud: &GaussianCloud, progress: &mut WriteProgress<'_>) -> io::Result<Vec<u8>> {
     let fraction = fraction(cloud)?;
     let steps = f64::from(fraction).exp2();
     let stride = cloud.sh_stride();
     let mut all = columns(VERSION, cloud.sh_degree).map(|bytes| Vec::with_capacity(bytes * cloud.len()));
     for i in 0..cloud.len() {
         if i % BLOCK == 0 {
-            told(i)?;
+            progress(i)?;
         }
         let [positions, opacities, colors, scales, rotations, harmonics] = &mut all;
         for v in (cloud.world_position(i) * steps).round().to_array() {

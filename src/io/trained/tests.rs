@@ -28,7 +28,7 @@ fn cloud(n: usize) -> GaussianCloud {
 
 fn info() -> SceneInfo {
     SceneInfo {
-        metres_per_unit: Some(0.5),
+        meters_per_unit: Some(0.5),
         state: None,
         version: VERSION,
         name: "plush".into(),

@@ -43,7 +43,8 @@ struct File {
 struct Own {
     /// sRGB color behind everything, 0 to 1.
     background: Option<[f32; 3]>,
-    metres_per_unit: Option<f64>,
+    #[serde(rename = "metres_per_unit")]
+    meters_per_unit: Option<f64>,
 }
 
 #[derive(Deserialize)]
@@ -127,7 +128,7 @@ pub fn read(file: &Path) -> Result<Dataset, IoError> {
         photos,
         points,
         background: parsed.fmlgs.background.filter(|b| b.iter().all(|c| (0.0..=1.0).contains(c))),
-        metres_per_unit: parsed.fmlgs.metres_per_unit.filter(|m| m.is_finite() && *m > 0.0),
+        meters_per_unit: parsed.fmlgs.meters_per_unit.filter(|m| m.is_finite() && *m > 0.0),
         warnings,
         alpha: None,
     })

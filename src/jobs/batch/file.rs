@@ -8,7 +8,7 @@ use serde::Deserialize;
 use crate::io::{IoError, files};
 use crate::jobs::evaluate_masks::Protocol;
 use crate::jobs::find_objects::FindSettings;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::pipeline::train::TrainConfig;
 use crate::scene::Overrides;
 
@@ -58,7 +58,7 @@ pub(crate) struct BatchEvaluation {
     pub(crate) max_side_px: Option<u32>,
     pub(crate) keep_borders: bool,
     pub(crate) protocol: Protocol,
-    pub(crate) recipe: Recipe,
+    pub(crate) recipe: QueryConfig,
 }
 
 /// Readers of the file's tables, by the names and rules of the command line, which stands above this module. Each error

@@ -32,7 +32,7 @@ use crate::io::IoError;
 use crate::io::claim::{self, Taken, Watch};
 use crate::models::catalog::{self, ModelRole};
 use crate::pipeline::observer::{Observer, Severity, Signal};
-use crate::pipeline::semantics::lifting::build_map::{Carry, REGIONS};
+use crate::pipeline::semantics::lifting::build_map::{MaskPropagation, REGIONS};
 
 /// Time between looks at a unit that another process holds.
 const LOOK: Duration = Duration::from_millis(250);
@@ -210,7 +210,7 @@ fn check_networks(batch: &BatchFile) -> Result<(), JobError> {
     if let Some(name) = with.segmenter.as_deref().filter(|name| *name != REGIONS) {
         catalog::find(name, ModelRole::Segmenter).map_err(|e| told("segmenter", e))?;
     }
-    if with.carry != Carry::Gaussians {
+    if with.carry != MaskPropagation::Gaussians {
         catalog::find(&with.tracker, ModelRole::Segmenter).map_err(|e| told("tracker-model", e))?;
     }
     Ok(())

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use super::*;
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::query::query_engine::QueryEngine;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{LevelFilter, SemanticMap};
 
@@ -110,7 +110,7 @@ fn the_first_question_is_answered_by_buttons_that_are_seen() {
     let view =
         ViewMap::render(&mut renderer, &scene.cloud, &map.identity_of, &map.identities, &camera, &scene.settings);
     let view = view.expect("drawn");
-    let mut engine = QueryEngine::new(map.language.as_ref(), Recipe::default()).expect("an engine");
+    let mut engine = QueryEngine::new(map.language.as_ref(), QueryConfig::default()).expect("an engine");
     let answered = engine.ask(&map, QUESTION, LevelFilter::Auto).expect("asked").expect("words");
     let names: Vec<String> = answered.chosen(1).iter().map(|id| map.identities.full_name(*id)).collect();
     assert!(!names.is_empty(), "{QUESTION}");

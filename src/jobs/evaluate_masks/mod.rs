@@ -22,10 +22,10 @@ use crate::pipeline::semantics::evaluation::{
 use crate::pipeline::semantics::lifting::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::lifting::splat_tree::hierarchy::Hierarchy;
 use crate::pipeline::semantics::query::query_engine::QueryEngine;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
-use crate::scene::{Camera, Identities, IdentityId, LevelFilter, NOBODY, Photo, SemanticMap};
+use crate::scene::{Camera, Identities, IdentityId, LevelFilter, NO_IDENTITY, Photo, SemanticMap};
 
 /// Scores of the [`Protocol`] of the same name besides the IoU of each query.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -90,7 +90,7 @@ impl MaskScores {
     }
 
     /// Returns everything but the single queries, with stable names for scripts.
-    pub(crate) fn json(&self, protocol: Protocol, recipe: &Recipe) -> serde_json::Value {
+    pub(crate) fn json(&self, protocol: Protocol, recipe: &QueryConfig) -> serde_json::Value {
         let mut value = json!({
             "protocol": protocol.name(), "views": self.views, "views_trained_on": self.trained_on, "recipe": recipe,
             "unmet": self.unmet,
@@ -122,7 +122,7 @@ pub(crate) fn run(
     labels: &Path,
     protocol: Protocol,
     query: Option<&str>,
-    recipe: &Recipe,
+    recipe: &QueryConfig,
 ) -> Result<MaskScores, JobError> {
     let opened = || Labels::of_photos(labels, &comparison.dataset.photos).map(FileMasks);
     if protocol == Protocol::Strokes {
@@ -257,7 +257,7 @@ fn by_strokes(
 
 fn recall(
     map: &SemanticMap,
-    recipe: &Recipe,
+    recipe: &QueryConfig,
     views: &[LabeledView<'_>],
 ) -> Result<(Vec<Unit>, ProtocolSummary), JobError> {
     let language = map.language.as_ref().ok_or_else(|| {
@@ -274,9 +274,13 @@ fn recall(
     Ok((units, ProtocolSummary::PartRecall { encoder: language.encoder.clone(), rows }))
 }
 
-fn compare_recipes(map: &SemanticMap, recipe: &Recipe, views: &[LabeledView<'_>]) -> Result<ProtocolSummary, JobError> {
+fn compare_recipes(
+    map: &SemanticMap,
+    recipe: &QueryConfig,
+    views: &[LabeledView<'_>],
+) -> Result<ProtocolSummary, JobError> {
     let absent = recipes::Absent::of(&map.identities);
-    let mut engine = QueryEngine::new(map.language.as_ref(), Recipe::default())?;
+    let mut engine = QueryEngine::new(map.language.as_ref(), QueryConfig::default())?;
     let mut rows = Vec::new();
     for recipe in recipes::compared(recipe) {
         rows.push(recipes::row(recipe, map, &mut engine, views, &absent)?);
@@ -364,7 +368,7 @@ fn pictures(
 /// Returns the photo with every identity's code as a tint.
 fn tinted(rgb: &[[u8; 3]], of: &[IdentityId], identities: &Identities) -> Vec<[u8; 3]> {
     let tint = |(rgb, id): (&[u8; 3], &IdentityId)| match identities.get(*id) {
-        Some(identity) if *id != NOBODY => {
+        Some(identity) if *id != NO_IDENTITY => {
             std::array::from_fn(|c| (0.4 * f32::from(rgb[c]) + 0.6 * 255.0 * identity.code[c]) as u8)
         }
         _ => *rgb,

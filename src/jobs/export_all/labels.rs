@@ -14,7 +14,7 @@ use crate::jobs::coco::Coco;
 use crate::jobs::{JobError, export};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::identity::whole_names::BETWEEN;
-use crate::scene::{Camera, Identities, Identity, IdentityId, Level, NOBODY};
+use crate::scene::{Camera, Identities, Identity, IdentityId, Level, NO_IDENTITY};
 
 pub(super) use crate::io::labels::stem;
 
@@ -91,7 +91,7 @@ impl<'a> LabelWriter<'a> {
     /// Returns the object and the part that a pixel of an identity shows.
     fn numbers(&self, id: IdentityId) -> [u16; 2] {
         let is = |id: IdentityId, level: Level| self.all.get(id).is_some_and(|i| i.level == level);
-        let number = |id: IdentityId, level: Level| if is(id, level) { id as u16 } else { NOBODY as u16 };
+        let number = |id: IdentityId, level: Level| if is(id, level) { id as u16 } else { NO_IDENTITY as u16 };
         [number(self.all.object_of(id), Level::Object), number(id, Level::Part)]
     }
 
@@ -99,7 +99,7 @@ impl<'a> LabelWriter<'a> {
     pub(super) fn finish(self, folder: &mut ExportFolder) -> Result<(), JobError> {
         let ids = || self.all.iter().map(|(id, i)| (id, i, self.all.full_name(id)));
         if self.masks.contains(&MaskFormat::Ids) {
-            let parent = |id: IdentityId| Some(id).filter(|id| *id != NOBODY);
+            let parent = |id: IdentityId| Some(id).filter(|id| *id != NO_IDENTITY);
             let list: Vec<Value> = ids()
                 .map(|(id, i, full)| {
                     json!({ "id": id, "name": self.all.name(id), "full_name": full, "level": i.level, "parent": parent(i.parent) })
@@ -110,7 +110,7 @@ impl<'a> LabelWriter<'a> {
         }
         if self.masks.contains(&MaskFormat::Coco) {
             let category = |(id, i, full): (IdentityId, &Identity, String)| {
-                let parent = Some(i.parent).filter(|id| *id != NOBODY);
+                let parent = Some(i.parent).filter(|id| *id != NO_IDENTITY);
                 json!({ "id": id, "name": full, "supercategory": i.level, "parent": parent })
             };
             let categories = ids().map(category).collect();

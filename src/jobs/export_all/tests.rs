@@ -13,7 +13,7 @@ use crate::io::labels::Labels;
 use crate::io::labels::rle::Rle;
 use crate::io::splat_format::SplatFormat;
 use crate::pipeline::observer::{Signal, Silent};
-use crate::scene::{Identities, IdentityId, Level, Mask, NOBODY, Photo};
+use crate::scene::{Identities, IdentityId, Level, Mask, NO_IDENTITY, Photo};
 
 const SIZE: [u32; 2] = [96, 72];
 
@@ -21,15 +21,15 @@ const SIZE: [u32; 2] = [96, 72];
 fn request(folder: &Path, masks: &[MaskFormat]) -> ExportAllRequest {
     let mut all = Identities::default();
     let mut add = |whole: IdentityId, name: &str| {
-        let level = if whole == NOBODY { Level::Object } else { Level::Part };
+        let level = if whole == NO_IDENTITY { Level::Object } else { Level::Part };
         all.add(level, whole, if name.is_empty() { vec![] } else { vec![name.into()] })
     };
-    let ring = add(NOBODY, "ring of the \"hob\" / ..");
-    let pan = add(NOBODY, "");
-    let mugs = [add(NOBODY, "mug"), add(NOBODY, "mug")];
+    let ring = add(NO_IDENTITY, "ring of the \"hob\" / ..");
+    let pan = add(NO_IDENTITY, "");
+    let mugs = [add(NO_IDENTITY, "mug"), add(NO_IDENTITY, "mug")];
     let handles = mugs.map(|mug| add(mug, "handle"));
     let rivet = add(handles[0], "rivet");
-    add(NOBODY, "ghost");
+    add(NO_IDENTITY, "ghost");
     let (mut positions, mut of) = (Vec::new(), Vec::new());
     let mut blob = |at: [f32; 2], id: IdentityId| {
         positions.push([at[0], at[1], 0.0]);

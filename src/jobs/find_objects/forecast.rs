@@ -13,13 +13,13 @@ const MOST_CORES: usize = 8;
 /// Estimated time of a segmenter on one photo here, or of an encoder on one picture of an object, from times measured
 /// elsewhere.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct LookTime {
+pub(crate) struct InferenceEstimate {
     secs: f64,
     /// Seconds for each object in it besides.
     object_secs: Option<f64>,
 }
 
-impl LookTime {
+impl InferenceEstimate {
     /// Returns the time of a model of the list, if it was measured, by this machine's engine or by the fast one.
     pub(crate) fn of(model: &str, known: &ModelList, is_fast: bool) -> Option<Self> {
         Self::estimated(&known.get(model)?.0, is_fast, known.cores)
@@ -66,7 +66,7 @@ fn on_cores(secs: f64, cores: usize) -> f64 {
 }
 
 /// Returns the time of finding objects in up to `most_photos` photos, in words.
-pub(crate) fn sentence(look: LookTime, most_photos: usize) -> String {
+pub(crate) fn sentence(look: InferenceEstimate, most_photos: usize) -> String {
     let more = look.object_secs.map(|secs| format!(", and {} more for each object in it", format::about(secs)));
     let (each, more) = (format::about(look.secs), more.unwrap_or_default());
     match most_photos {
@@ -92,20 +92,20 @@ mod tests {
         let measured = Some(PhotoSeconds { onnx_runtime: 60.0, built_in: Some(90.0), each_object: None });
         let mut entry = entry();
         entry.photo_seconds = measured;
-        let secs = |fast, cores| LookTime::estimated(&entry, fast, cores).expect("a time").secs;
+        let secs = |fast, cores| InferenceEstimate::estimated(&entry, fast, cores).expect("a time").secs;
         assert_eq!(secs(true, 4) * 2.0, secs(true, 2));
         assert_eq!(secs(true, 64), secs(true, 8));
         assert!(secs(false, 2) > secs(true, 2));
         entry.photo_seconds = None;
-        assert_eq!(LookTime::estimated(&entry, true, 2), None);
+        assert_eq!(InferenceEstimate::estimated(&entry, true, 2), None);
     }
 
     #[test]
     fn sentences_name_the_most() {
-        let look = LookTime { secs: 60.0, object_secs: None };
+        let look = InferenceEstimate { secs: 60.0, object_secs: None };
         assert!(sentence(look, 12).contains("up to 12"));
         assert!(!sentence(look, 1).contains("up to") && !sentence(look, 1).contains("object"));
-        let with_objects = LookTime { object_secs: Some(42.0), ..look };
+        let with_objects = InferenceEstimate { object_secs: Some(42.0), ..look };
         assert!(sentence(with_objects, 1).contains("50 s more for each object"));
     }
 }

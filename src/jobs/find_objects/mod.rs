@@ -9,7 +9,7 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 use strum::VariantArray;
 
-use self::forecast::LookTime;
+use self::forecast::InferenceEstimate;
 use super::JobError;
 use super::held_out::held_out;
 use crate::io::labels::Labels;
@@ -20,7 +20,7 @@ use crate::models;
 use crate::models::catalog::{self, ModelRole, SAM2};
 use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::lifting::build_map::{
-    CODE_STEPS, Carry, FindOptions, Found, REGIONS, Tools, find_objects, segmenter,
+    CODE_STEPS, FindOptions, Found, MaskPropagation, REGIONS, SearchModels, find_objects, segmenter,
 };
 use crate::pipeline::semantics::lifting::keep;
 use crate::pipeline::semantics::lifting::sam2_tracker::Sam2Tracker;
@@ -39,7 +39,7 @@ pub struct FindSettings {
     /// Segmenter of photos that came without masks.
     pub segmenter: Option<String>,
     /// Method that carries masks to the other photos.
-    pub carry: Carry,
+    pub carry: MaskPropagation,
     /// Name of the SAM 2 that tracks masks.
     pub tracker: String,
     /// The encoder for open-vocabulary queries, or [`NO_ENCODER`].
@@ -64,7 +64,7 @@ impl Default for FindSettings {
         let TrackOptions { max_seeds, reseed_share, .. } = TrackOptions::default();
         Self {
             segmenter: None,
-            carry: Carry::default(),
+            carry: MaskPropagation::default(),
             tracker: SAM2.into(),
             encoder: None,
             preparation: Preparation::default(),
@@ -115,15 +115,17 @@ pub(crate) struct FoundObjects {
 }
 
 /// Describes the search: the recipe's name, if it has one, and its choices.
-fn told(with: &FindSettings, preparation: Preparation, masks: &str, encoder: Option<&str>) -> String {
+fn summary(with: &FindSettings, preparation: Preparation, masks: &str, encoder: Option<&str>) -> String {
     let Preparation { lifting, part_weight, prompt, .. } = preparation;
     let named = |name: &&RecipeName| name.recipe().preparation == preparation;
     let name = RecipeName::VARIANTS.iter().find(named).map_or_else(|| "own".to_owned(), RecipeName::to_string);
     let prompt = prompt.unwrap_or_default();
     let carried = match with.carry {
-        Carry::Gaussians => "the Gaussians".to_owned(),
-        Carry::Sam2 => format!("{} (prompted by {prompt}) and the Gaussians", with.tracker),
-        Carry::Both => format!("{} (prompted by {prompt}) and the Gaussians, each correcting the other", with.tracker),
+        MaskPropagation::Gaussians => "the Gaussians".to_owned(),
+        MaskPropagation::Sam2 => format!("{} (prompted by {prompt}) and the Gaussians", with.tracker),
+        MaskPropagation::Both => {
+            format!("{} (prompted by {prompt}) and the Gaussians, each correcting the other", with.tracker)
+        }
     };
     format!(
         "recipe {name}: masks by {masks}, carried to the other photos by {carried}, lifting {lifting}, embeddings by {} \
@@ -174,7 +176,7 @@ pub(crate) fn run(
             seed: with.seed.as_ref().map(place).transpose()?,
             max_seeds: if request.known.is_some() { 1 } else { with.max_seeds.max(1) },
             reseed_share: with.unknown_share,
-            veto: with.carry == Carry::Both,
+            veto: with.carry == MaskPropagation::Both,
             max_side_px: request.side_px,
             prompt: preparation.prompt.unwrap_or_default(),
             known: request.known.clone(),
@@ -232,23 +234,24 @@ pub(crate) fn run(
             .ok(),
     };
     let by = network.map(|(name, _)| name).or(by_files).unwrap_or(REGIONS);
-    observer.note(Severity::Info, told(with, preparation, by, encoder.as_ref().map(|e| e.name())));
-    if let Some(look) = network.and_then(|(name, _)| LookTime::of_installed(name)) {
+    observer.note(Severity::Info, summary(with, preparation, by, encoder.as_ref().map(|e| e.name())));
+    if let Some(look) = network.and_then(|(name, _)| InferenceEstimate::of_installed(name)) {
         let most = photos.len().min(options.track.max_seeds);
         observer.note(Severity::Info, forecast::sentence(look, most));
     }
-    if with.carry != Carry::Gaussians && request.known.is_none() {
+    if with.carry != MaskPropagation::Gaussians && request.known.is_none() {
         let text = forecast::tracking(&with.tracker, photos.len());
         text.into_iter().for_each(|text| observer.note(Severity::Info, text));
     }
     let mut follower = match with.carry {
         _ if request.known.is_some() => None,
-        Carry::Gaussians => None,
+        MaskPropagation::Gaussians => None,
         _ => Some(Sam2Tracker::open(&with.tracker, Some(folder.join("cache")))?),
     };
     let start = Instant::now();
-    let tools = Tools { segmenter: &mut *segmenter, follower: follower.as_mut(), encoder: encoder.as_deref_mut() };
-    let mut found = find_objects(cloud, &photos, settings, tools, &options, observer)?;
+    let models =
+        SearchModels { segmenter: &mut *segmenter, follower: follower.as_mut(), encoder: encoder.as_deref_mut() };
+    let mut found = find_objects(cloud, &photos, settings, models, &options, observer)?;
     let names = before.map(|map| map.identities.removed).unwrap_or_default();
     found.map.identities.add_removed(names);
     found.map.removed = removed;

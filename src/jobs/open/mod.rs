@@ -50,7 +50,7 @@ pub struct Scene {
     pub(crate) photos: Option<PathBuf>,
     /// Path of its photos, if they still exist.
     pub(crate) dataset_path: Option<PathBuf>,
-    pub(crate) metres_per_unit: Option<f64>,
+    pub(crate) meters_per_unit: Option<f64>,
     /// Id of the save that its files belong to, if it has one.
     pub(crate) state: Option<String>,
     /// Folder beside a splat that its cameras are from.
@@ -141,7 +141,7 @@ impl Scene {
             history: info.history,
             photos: info.dataset.map(|d| d.path),
             dataset_path,
-            metres_per_unit: info.metres_per_unit.filter(|m| m.is_finite() && *m > 0.0),
+            meters_per_unit: info.meters_per_unit.filter(|m| m.is_finite() && *m > 0.0),
             edited: info.edited,
             state,
             warnings,
@@ -219,7 +219,7 @@ pub struct OpenedScene {
     /// Folder in which training keeps its results and checkpoints.
     pub out: PathBuf,
     pub(crate) history: History,
-    pub(crate) metres_per_unit: Option<f64>,
+    pub(crate) meters_per_unit: Option<f64>,
     /// The first view.
     pub home: HomeView,
     /// Render settings: background and filter.
@@ -255,7 +255,7 @@ impl OpenedScene {
 
     /// Length of a unit in meters, if it is known of the scene or of its photos.
     pub(crate) fn meters_per_unit(&self) -> Option<f64> {
-        self.metres_per_unit.or_else(|| self.dataset.as_ref().and_then(|d| d.metres_per_unit))
+        self.meters_per_unit.or_else(|| self.dataset.as_ref().and_then(|d| d.meters_per_unit))
     }
 
     /// Returns the indices of its held-out photos; if they are unknown, every `every`-th.
@@ -284,7 +284,7 @@ impl OpenedScene {
             semantics,
             out: scene.folder.unwrap_or_default(),
             history: scene.history,
-            metres_per_unit: scene.metres_per_unit,
+            meters_per_unit: scene.meters_per_unit,
             home,
             render: scene.settings,
             sh_stored: scene.sh_stored,

@@ -62,7 +62,7 @@ pub(crate) fn received(
         settings,
         config,
         history: info.history,
-        metres_per_unit: info.metres_per_unit.filter(|m| m.is_finite() && *m > 0.0),
+        meters_per_unit: info.meters_per_unit.filter(|m| m.is_finite() && *m > 0.0),
         ..Scene::default()
     };
     let known = is_result.then_some((&*cloud, sh_stored));
@@ -88,7 +88,7 @@ fn photos(info: &SceneInfo, origin: &Origin) -> Dataset {
         format: "another computer".into(),
         photos: info.cameras.iter().map(|c| Photo::new(&*c.name, place, c.camera.clone())).collect(),
         background: info.background,
-        metres_per_unit: info.metres_per_unit,
+        meters_per_unit: info.meters_per_unit,
         ..Dataset::default()
     }
 }

@@ -17,7 +17,8 @@ use crate::pipeline::observer::{Observer, Ticker};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{
-    Bounds, Camera, CameraPath, CropBox, GaussianCloud, HomeView, Identities, IdentityId, NOBODY, SemanticMap, text,
+    Bounds, Camera, CameraPath, CropBox, GaussianCloud, HomeView, Identities, IdentityId, NO_IDENTITY, SemanticMap,
+    text,
 };
 
 /// Endings of the page's file name.
@@ -68,7 +69,7 @@ impl PageRequest {
     pub(crate) fn facts(&self) -> String {
         let mut facts = things(self.cloud.len(), "Gaussian");
         if let Some(all) = self.map.as_ref().map(|map| &map.identities).filter(|all| !all.is_empty()) {
-            let objects = all.iter().filter(|(_, i)| i.parent == NOBODY).count();
+            let objects = all.iter().filter(|(_, i)| i.parent == NO_IDENTITY).count();
             facts += &format!(" · {}", things(objects, "object"));
             if objects < all.len() {
                 facts += &format!(" · {}", things(all.len() - objects, "part"));
@@ -131,7 +132,7 @@ fn page(request: &PageRequest, observer: &mut dyn Observer) -> Result<Page, JobE
     // A camera that looks away from the scene's middle orbits a point before it.
     let distance = if around > 0.0 { around } else { home.bounds.radius() };
     let order = packed::order(cloud);
-    let identity_of = map.as_ref().map_or_else(|| vec![NOBODY; cloud.len()], |map| map.identity_of.clone());
+    let identity_of = map.as_ref().map_or_else(|| vec![NO_IDENTITY; cloud.len()], |map| map.identity_of.clone());
     Ok(Page {
         title: text::name(title),
         facts: request.facts(),

@@ -11,12 +11,12 @@ use crate::scene::{Level, PathKey};
 fn request(out: &Path) -> PageRequest {
     let (mut positions, mut of) = (Vec::new(), Vec::new());
     let mut all = Identities::default();
-    let mug = all.add(Level::Object, NOBODY, vec!["</script><b>mug".into()]);
+    let mug = all.add(Level::Object, NO_IDENTITY, vec!["</script><b>mug".into()]);
     let handle = all.add(Level::Part, mug, vec!["handle".into()]);
-    all.add(Level::Object, NOBODY, vec!["nowhere".into()]);
+    all.add(Level::Object, NO_IDENTITY, vec!["nowhere".into()]);
     all.get_mut(handle).expect("there").code = [1.0, 0.5, 0.0];
     for i in 0..60_usize {
-        let (x, id) = [(-1.0, mug), (1.0, handle), (3.0, NOBODY)][i / 20];
+        let (x, id) = [(-1.0, mug), (1.0, handle), (3.0, NO_IDENTITY)][i / 20];
         positions.push([x + (i % 5) as f32 * 0.02, (i % 4) as f32 * 0.03, (i % 3) as f32 * 0.05]);
         of.push(id);
     }

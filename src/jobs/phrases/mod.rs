@@ -20,7 +20,7 @@ use crate::pipeline::observer::{Observer, Ticker};
 use crate::pipeline::semantics::query::answer::{Certainty, QueryAnswer};
 use crate::pipeline::semantics::query::matching::MatchMode;
 use crate::pipeline::semantics::query::query_engine::QueryEngine;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::text;
 use crate::scene::{Camera, GaussianCloud, LevelFilter, Mask, SemanticMap};
@@ -53,7 +53,7 @@ pub struct PhrasesRequest {
     /// Colors that phrases have already.
     pub(crate) colors: PhraseColors,
     pub(crate) level: LevelFilter,
-    pub(crate) recipe: Recipe,
+    pub(crate) recipe: QueryConfig,
     /// Most answers whose pixels go into a mask.
     pub(crate) top: usize,
     pub(crate) truth: TrueMasks,

@@ -6,13 +6,13 @@ use serde_json::Value;
 use super::*;
 use crate::io::labels::rle::Rle;
 use crate::pipeline::observer::Silent;
-use crate::scene::{Identities, Level, NOBODY};
+use crate::scene::{Identities, Level, NO_IDENTITY};
 
 /// A lamp on the left with its shade above, a mug on the right, seen from the front.
 fn request(phrases: &[&str]) -> PhrasesRequest {
     let mut all = Identities::default();
-    let lamp = all.add(Level::Object, NOBODY, vec!["lamp".into()]);
-    let mug = all.add(Level::Object, NOBODY, vec!["mug".into()]);
+    let lamp = all.add(Level::Object, NO_IDENTITY, vec!["lamp".into()]);
+    let mug = all.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
     let shade = all.add(Level::Part, lamp, vec!["shade".into()]);
     for (id, code) in [(lamp, [0.1, 0.5, 0.5]), (mug, [0.9, 0.5, 0.5]), (shade, [0.5, 0.9, 0.1])] {
         all.get_mut(id).expect("there").code = code;
@@ -37,7 +37,7 @@ fn request(phrases: &[&str]) -> PhrasesRequest {
         phrases: phrases.iter().map(|p| (*p).to_owned()).collect(),
         colors: PhraseColors::default(),
         level: LevelFilter::Auto,
-        recipe: Recipe::default(),
+        recipe: QueryConfig::default(),
         top: 1,
         truth: TrueMasks::None,
         export: None,

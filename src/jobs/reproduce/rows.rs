@@ -24,7 +24,7 @@ use crate::pipeline::semantics::query::answer::QueryAnswer;
 use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::query::parse::ParsedQuery;
 use crate::pipeline::semantics::query::query_engine::{ask_by_embedding, ask_by_name};
-use crate::pipeline::semantics::query::recipe::{PartFeatures, Recipe, RelevancyScale, Strategy, Understanding};
+use crate::pipeline::semantics::query::recipe::{MatchBy, PartEmbedding, QueryConfig, RelevancyScale, Strategy};
 use crate::pipeline::semantics::query::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
@@ -57,19 +57,19 @@ pub(super) struct MeasuredRows {
 }
 
 /// Returns the query recipes of this program and of the paper, by embedding alone, for objects that this program found.
-fn ways() -> [(&'static str, Recipe); 4] {
-    let paper = Recipe::paper();
-    let raw = Recipe { parts: PartFeatures::Raw, ..paper.clone() };
+fn ways() -> [(&'static str, QueryConfig); 4] {
+    let paper = QueryConfig::paper();
+    let raw = QueryConfig { parts: PartEmbedding::Raw, ..paper.clone() };
     [
         ("this program", ours()),
         ("the paper's two steps", paper),
         ("the paper's two steps, parts not deviated", raw.clone()),
-        (SINGLE_LEVEL, Recipe { strategy: Strategy::OneStep, ..raw }),
+        (SINGLE_LEVEL, QueryConfig { strategy: Strategy::OneStep, ..raw }),
     ]
 }
 
-fn ours() -> Recipe {
-    Recipe { understanding: Understanding::Embedding, ..Recipe::default() }
+fn ours() -> QueryConfig {
+    QueryConfig { match_by: MatchBy::Embedding, ..QueryConfig::default() }
 }
 
 const SINGLE_LEVEL: &str = "single level without deviation";
@@ -111,7 +111,7 @@ pub(super) fn measure(
         }
         rows.extend(rule_rows(&table, comparison, (map, language), &views, &mut by)?);
         if map.identities.iter().any(|(_, i)| !i.names.is_empty()) {
-            let recipe = Recipe::default();
+            let recipe = QueryConfig::default();
             let mut ask = |text: &str| Ok(ask_by_name(&map.identities, text, LevelFilter::Auto, &recipe));
             rows.push(table.row(BY_NAME, map, &views, &mut ask)?);
         }
@@ -147,7 +147,7 @@ impl ByEmbedding {
     fn ask(
         &mut self,
         map: &SemanticMap,
-        how: (&LanguageFeatures, &Recipe),
+        how: (&LanguageFeatures, &QueryConfig),
         text: &str,
     ) -> Result<Option<QueryAnswer>, ModelError> {
         match ask_by_embedding(&map.identities, how, text, &mut self.phrases, &mut *self.encoder) {
@@ -290,7 +290,7 @@ fn similarity_row(
         return Err(JobError::Protocol("the scene has no embeddings".into()));
     };
     let name = format!("features mapped by similarity (cosine {ALIKE}) instead of identity");
-    let recipe = Recipe { strategy: Strategy::OneStep, parts: PartFeatures::Raw, ..Recipe::paper() };
+    let recipe = QueryConfig { strategy: Strategy::OneStep, parts: PartEmbedding::Raw, ..QueryConfig::paper() };
     table.row(&name, joined, &views, &mut |text| by.ask(joined, (features, &recipe), text))
 }
 
@@ -303,7 +303,7 @@ fn rule_rows(
     by: &mut ByEmbedding,
 ) -> Result<[RowResult; 2], JobError> {
     // The rule scales relevancy itself.
-    let recipe = Recipe { scale: RelevancyScale::Raw, ..Recipe::paper() };
+    let recipe = QueryConfig { scale: RelevancyScale::Raw, ..QueryConfig::paper() };
     let ruled = table.ruled_row("the paper's two steps, LERF's mask rule", views, &mut |k, phrase| {
         Ok(by.ask(map, (language, &recipe), phrase)?.map(|a| a.heat(views[k].exact)))
     })?;

@@ -13,11 +13,11 @@ use crate::pipeline::semantics::lifting::codes::{self, TOLERANCE};
 use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::query::matching;
 use crate::pipeline::semantics::query::query_engine::ask_by_embedding;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::pipeline::semantics::query::timing::{STAGES, StagesMs, ms_since};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::language::MAX_VIEWS;
-use crate::scene::{Identities, IdentityId, LanguageFeatures, Level, NOBODY, ViewFeatures};
+use crate::scene::{Identities, IdentityId, LanguageFeatures, Level, NO_IDENTITY, ViewFeatures};
 
 const COLORS: [&str; 6] = ["red", "blue", "green", "yellow", "white", "black"];
 const THINGS: [&str; 8] = ["controller", "mug", "kettle", "lamp", "camera", "book", "car", "jar"];
@@ -39,7 +39,7 @@ pub(crate) fn time(
     let mut values = StageValues::new(format!("{identities} identities, {w}x{h}, encoder '{}'", encoder.name()));
     // Canonical phrases are encoded when a scene opens, once.
     let mut canonical = TextEmbeddings::default();
-    let recipe = Recipe::default();
+    let recipe = QueryConfig::default();
     canonical.learn_canonical(&recipe, encoder);
     for _ in 0..queries {
         let word = |list: &[&str], rng: &mut Pcg64Mcg| list.choose(rng).copied().unwrap_or("mug").to_owned();
@@ -51,7 +51,7 @@ pub(crate) fn time(
         let mut phrases = canonical.clone();
         let how = (&features, &recipe);
         let Some(answered) = ask_by_embedding(&all, how, &text, &mut phrases, encoder)? else { continue };
-        let target = answered.answer.hits().first().map_or(NOBODY, |h| h.identity);
+        let target = answered.answer.hits().first().map_or(NO_IDENTITY, |h| h.identity);
         let start = Instant::now();
         let pixels = matching::exact(&map, &all, target, TOLERANCE);
         let mask = ms_since(start);
@@ -71,10 +71,10 @@ pub(crate) fn time(
 
 fn scene(identities: usize) -> Identities {
     let mut all = Identities::default();
-    let mut object = NOBODY;
+    let mut object = NO_IDENTITY;
     for i in 0..identities {
         if i % 5 == 0 {
-            object = all.add(Level::Object, NOBODY, Vec::new());
+            object = all.add(Level::Object, NO_IDENTITY, Vec::new());
         } else {
             all.add(Level::Part, object, Vec::new());
         }
@@ -101,7 +101,7 @@ fn view(rng: &mut Pcg64Mcg, identities: usize, [w, h]: [usize; 2]) -> ViewMap {
     let nearest = |i: usize| -> IdentityId {
         let (x, y) = ((i % w) as i64, (i / w) as i64);
         let far = |k: &usize| (points[*k][0] - x).pow(2) + (points[*k][1] - y).pow(2);
-        (0..points.len()).min_by_key(far).map_or(NOBODY, |k| k as IdentityId + 1)
+        (0..points.len()).min_by_key(far).map_or(NO_IDENTITY, |k| k as IdentityId + 1)
     };
     ViewMap::certain(w, (0..w * h).map(nearest).collect())
 }

@@ -21,7 +21,7 @@ use crate::pipeline::semantics::query::matching;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{DrawError, RenderSettings, Renderer};
 use crate::scene::semantic_map::CODE_CHANNELS;
-use crate::scene::{GaussianCloud, Identities, IdentityId, Level, Mask, NOBODY};
+use crate::scene::{GaussianCloud, Identities, IdentityId, Level, Mask, NO_IDENTITY};
 
 struct Variant {
     /// Options of tracking as the program does it; `None` for votes alone.
@@ -69,7 +69,7 @@ pub(crate) fn study<'a>(
                 Some(of) => of,
                 None => return Ok(None),
             },
-            None if variant.views == 0 => vec![NOBODY; drawn.0.len()],
+            None if variant.views == 0 => vec![NO_IDENTITY; drawn.0.len()],
             None => vote(drawn, &identities, &voting).map_err(failed)?,
         };
         let by_id: Vec<_> = (0..=identities.len() as IdentityId).map(|id| identities.codes(id)).collect();
@@ -186,5 +186,5 @@ fn vote(
         votes.add_view(&mut renderer, cloud, &view.camera, settings, &view.labels)?;
     }
     let decided = votes.decide(identities, 0.0);
-    Ok(decided.iter().map(|b| if b.identity == UNKNOWN { NOBODY } else { b.identity }).collect())
+    Ok(decided.iter().map(|b| if b.identity == UNKNOWN { NO_IDENTITY } else { b.identity }).collect())
 }

@@ -17,7 +17,7 @@ use crate::pipeline::semantics::query::answer::QueryAnswer;
 use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::query::matching::{self, MatchMode};
 use crate::pipeline::semantics::query::query_engine::{ask_by_embedding, ask_by_name};
-use crate::pipeline::semantics::query::recipe::{PartFeatures, Recipe, Strategy, Understanding};
+use crate::pipeline::semantics::query::recipe::{MatchBy, PartEmbedding, QueryConfig, Strategy};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, LanguageFeatures, Level, LevelFilter, Mask, SemanticMap};
@@ -37,7 +37,7 @@ enum Precision {
 
 #[derive(Clone)]
 struct Variant {
-    recipe: Recipe,
+    recipe: QueryConfig,
     /// Maps of the view are smaller by this factor.
     smaller: u32,
     precision: Precision,
@@ -51,7 +51,7 @@ pub(crate) fn study<'a>(
     map: &'a SemanticMap,
     mut encoder: Box<dyn Encoder>,
     views: Vec<LabeledScene>,
-    (repeats, recipe): (u32, &Recipe),
+    (repeats, recipe): (u32, &QueryConfig),
     mut input: StudyInput,
 ) -> Result<Study<'a>, StudyError> {
     let language = map.language.as_ref().ok_or_else(|| failed("this scene has no embeddings"))?;
@@ -166,30 +166,30 @@ fn round(v: &mut [f32], precision: Precision) {
     }
 }
 
-fn variants(recipe: &Recipe) -> Variants<Variant> {
-    let recipe = Recipe { understanding: Understanding::Embedding, ..recipe.clone() };
+fn variants(recipe: &QueryConfig) -> Variants<Variant> {
+    let recipe = QueryConfig { match_by: MatchBy::Embedding, ..recipe.clone() };
     let base = Variant { recipe: recipe.clone(), smaller: 1, precision: Precision::Stored, share: 1.0 };
     let mut all = Variants::new(format!("{}, {}", words(recipe.strategy), recipe.masks), base.clone());
     let mut add = |method: &str, setting: &str, knob: (&str, Value), variant: Variant| {
         all.add(method, setting, &[knob], variant);
     };
-    let other = |recipe: Recipe| Variant { recipe, ..base.clone() };
+    let other = |recipe: QueryConfig| Variant { recipe, ..base.clone() };
     for &strategy in Strategy::VARIANTS.iter().filter(|s| **s != recipe.strategy) {
         let words = words(strategy);
-        add("localization", words, ("strategy", json!(words)), other(Recipe { strategy, ..recipe.clone() }));
+        add("localization", words, ("strategy", json!(words)), other(QueryConfig { strategy, ..recipe.clone() }));
     }
     let (parts, knob, setting) = match recipe.parts {
-        PartFeatures::Deviated => (PartFeatures::Raw, "raw", "without deviation"),
-        PartFeatures::Raw => (PartFeatures::Deviated, "deviated", "with deviation"),
+        PartEmbedding::Deviated => (PartEmbedding::Raw, "raw", "without deviation"),
+        PartEmbedding::Raw => (PartEmbedding::Deviated, "deviated", "with deviation"),
     };
-    add("part features", setting, ("parts", json!(knob)), other(Recipe { parts, ..recipe.clone() }));
-    let names = Recipe { understanding: Understanding::Names, ..recipe.clone() };
+    add("part features", setting, ("parts", json!(knob)), other(QueryConfig { parts, ..recipe.clone() }));
+    let names = QueryConfig { match_by: MatchBy::Names, ..recipe.clone() };
     add("encoder", "none: names alone", ("encoder", json!("names")), other(names));
     for (smaller, words) in [(2, "1/2 of the size"), (4, "1/4 of the size")] {
         let variant = Variant { smaller, ..base.clone() };
         add("map resolution", words, ("scale", json!(1.0 / f64::from(smaller))), variant);
     }
-    let codes = Recipe { masks: MatchMode::Codes, ..recipe.clone() };
+    let codes = QueryConfig { masks: MatchMode::Codes, ..recipe.clone() };
     if codes != recipe {
         add("decoding", "blended codes", ("read", json!("blend")), other(codes));
     }
@@ -222,7 +222,7 @@ fn ask(
     encoder: &mut dyn Encoder,
 ) -> Result<Option<QueryAnswer>, StudyError> {
     let recipe = &variant.recipe;
-    if recipe.understanding == Understanding::Names {
+    if recipe.match_by == MatchBy::Names {
         return Ok(ask_by_name(&map.identities, text, LevelFilter::Auto, recipe));
     }
     match ask_by_embedding(&map.identities, (features, recipe), text, &mut phrases, encoder) {
@@ -236,7 +236,7 @@ fn found(answered: &QueryAnswer, exact: &ViewMap, blended: &CodeMap, map: &Seman
     let Some(best) = answered.answer.hits().first().map(|h| h.identity) else {
         return Mask::empty(exact.width_px, exact.height_px);
     };
-    let Recipe { masks, tolerance, .. } = variant.recipe;
+    let QueryConfig { masks, tolerance, .. } = variant.recipe;
     matching::pixels((exact, Some(blended)), &map.identities, best, masks, tolerance)
 }
 

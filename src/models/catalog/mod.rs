@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use super::fetch::{self, FetchError, FileToFetch, Patience};
+use super::fetch::{self, FetchError, FileToFetch, Timeouts};
 use super::{KnownAnswer, ModelError, folder, manifest};
 use crate::io::files;
 
@@ -282,7 +282,7 @@ impl ModelEntry {
         &self,
         folder: &Path,
         from: Option<&str>,
-        patience: Patience,
+        timeouts: Timeouts,
         progress: &mut dyn FnMut(&str, u64, Option<u64>) -> bool,
     ) -> Result<(), InstallError> {
         if self.built_in {
@@ -298,7 +298,7 @@ impl ModelEntry {
             let to = folder.join(name);
             let most = fetch::MOST_UNPROMISED;
             let wanted = FileToFetch { url: &address(name), to: &to, bytes, most, sha256 };
-            fetch::fetch(&wanted, patience, &mut |there, all| progress(name, there, all))
+            fetch::fetch(&wanted, timeouts, &mut |there, all| progress(name, there, all))
         };
         // The description fixes the graphs' checksums, so it is fetched first.
         let description = self.description_in(folder);
@@ -363,13 +363,13 @@ pub(crate) fn find(name: &str, role: ModelRole) -> Result<PathBuf, ModelError> {
     }
 }
 
-/// Names of the usable models of a role, best first; the built-in ones last. `told` receives a warning for each
+/// Names of the usable models of a role, best first; the built-in ones last. `on_warning` receives a warning for each
 /// broken model.
-pub(crate) fn usable(role: ModelRole, told: &mut dyn FnMut(String)) -> Result<Vec<String>, ModelError> {
-    Ok(usable_of(&entries()?, role, &folder(), told))
+pub(crate) fn usable(role: ModelRole, on_warning: &mut dyn FnMut(String)) -> Result<Vec<String>, ModelError> {
+    Ok(usable_of(&entries()?, role, &folder(), on_warning))
 }
 
-fn usable_of(all: &[ModelEntry], role: ModelRole, folder: &Path, told: &mut dyn FnMut(String)) -> Vec<String> {
+fn usable_of(all: &[ModelEntry], role: ModelRole, folder: &Path, on_warning: &mut dyn FnMut(String)) -> Vec<String> {
     let (mut here, mut built_in) = (Vec::new(), Vec::new());
     for entry in all.iter().filter(|e| e.role == role) {
         match entry.state(folder) {
@@ -378,7 +378,9 @@ fn usable_of(all: &[ModelEntry], role: ModelRole, folder: &Path, told: &mut dyn 
             ModelState::Missing(_) => {}
             ModelState::Broken(problem) => {
                 let id = &entry.id;
-                told(format!("the model '{id}' is here but broken and is not used: {problem}; fetch or add it again"));
+                on_warning(format!(
+                    "the model '{id}' is here but broken and is not used: {problem}; fetch or add it again"
+                ));
             }
         }
     }

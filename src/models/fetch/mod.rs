@@ -48,7 +48,7 @@ pub struct FileToFetch<'a> {
 
 /// Timeouts and retries of a download.
 #[derive(Clone, Copy, Debug)]
-pub struct Patience {
+pub struct Timeouts {
     /// Longest silence of a server.
     pub stall: Duration,
     /// Number of attempts before an interrupted download fails.
@@ -57,7 +57,7 @@ pub struct Patience {
     pub pause: Duration,
 }
 
-impl Default for Patience {
+impl Default for Timeouts {
     fn default() -> Self {
         Self { stall: Duration::from_secs(30), attempts: 5, pause: Duration::from_secs(1) }
     }
@@ -104,21 +104,21 @@ impl FetchError {
 /// Fetches a file. `progress` receives the bytes so far and the total, and returns false to cancel.
 pub fn fetch(
     wanted: &FileToFetch<'_>,
-    patience: Patience,
+    timeouts: Timeouts,
     progress: &mut dyn FnMut(u64, Option<u64>) -> bool,
 ) -> Result<(), FetchError> {
     if let Some(folder) = wanted.to.parent() {
         fs::create_dir_all(folder).map_err(|source| FetchError::File { path: folder.into(), source })?;
     }
     // Redirects are followed by hand, so that each address is checked before it is requested.
-    let config = http::config(wanted.url, 2 * patience.stall).max_redirects(0).max_redirects_will_error(false);
+    let config = http::config(wanted.url, 2 * timeouts.stall).max_redirects(0).max_redirects_will_error(false);
     let agent = Agent::from(config.build());
     let part = Part::of(wanted);
-    let mut pause = patience.pause;
+    let mut pause = timeouts.pause;
     for attempt in 1.. {
-        match receive(&agent, wanted, &part, patience.stall, progress) {
+        match receive(&agent, wanted, &part, timeouts.stall, progress) {
             Ok(()) => break,
-            Err(e) if e.is_passing() && attempt < patience.attempts => {
+            Err(e) if e.is_passing() && attempt < timeouts.attempts => {
                 let begin = Instant::now();
                 while begin.elapsed() < pause {
                     let (there, _) = part.there();

@@ -34,7 +34,7 @@ pub struct AutomaticOptions {
     /// for SAM, of the low-resolution masks for SAM 2.
     pub least_region_px: usize,
     /// True if points are skipped between others that lie in one mask with them; the official generators prompt all.
-    pub sparing: bool,
+    pub adaptive: bool,
 }
 
 impl Default for AutomaticOptions {
@@ -49,7 +49,7 @@ impl Default for AutomaticOptions {
             crop_point_divisor: 1,
             crop_nms: 0.7,
             least_region_px: 100,
-            sparing: false,
+            adaptive: false,
         }
     }
 }
@@ -120,7 +120,7 @@ pub fn everything(
         let at_px = |[x, y]: [f64; 2]| [x * w as f64 + crop[0] as f64, y * h as f64 + crop[1] as f64];
         let mut points = GridPoints::new(per_side);
         let (mut of_crop, mut asked) = (Vec::new(), 0);
-        for stage in points.stages(options.sparing) {
+        for stage in points.stages(options.adaptive) {
             let holds = |i: usize, at| {
                 let [x, y] = at_px(at);
                 let mask: &AutomaticMask = &of_crop[i];

@@ -8,13 +8,13 @@ use super::extent::{Ball, ThingExtent};
 use super::plane::{self, Plane};
 use super::rebuild::{Invented, SPREAD, shown};
 use super::shade::{Brightening, Occluder};
-use super::sheet::{SurfaceSheet, Texel};
+use super::sheet::{SurfaceTexture, Texel};
 use super::views::{self, SeenView};
 use super::{ClosedSurface, Paint, RemovalError, RemovalOptions, RemovalReport};
 use crate::math::grid;
 use crate::models::lama::Lama;
 use crate::pipeline::observer::{Observer, Ticker};
-use crate::scene::{GaussianCloud, IdentityId, NOBODY, SemanticMap};
+use crate::scene::{GaussianCloud, IdentityId, NO_IDENTITY, SemanticMap};
 
 /// Most surfaces that are closed.
 const PLANES: usize = 4;
@@ -26,7 +26,7 @@ const SHADING_REACH: f64 = 6.0;
 const FOOTPRINT: f64 = 1.5;
 
 /// Inputs for finding and closing the surfaces.
-pub(super) struct Closing<'a> {
+pub(super) struct HoleFilling<'a> {
     pub(super) cloud: &'a GaussianCloud,
     pub(super) map: &'a SemanticMap,
     pub(super) ball: Ball,
@@ -36,7 +36,7 @@ pub(super) struct Closing<'a> {
     pub(super) options: &'a RemovalOptions,
 }
 
-impl Closing<'_> {
+impl HoleFilling<'_> {
     pub(super) fn run(
         &self,
         gone: &mut [bool],
@@ -52,7 +52,7 @@ impl Closing<'_> {
         let mut new = Vec::new();
         for (k, plane) in planes.iter().enumerate() {
             ticker.tick(k, observer)?;
-            let wide = SurfaceSheet::around(plane, &self.ball, self.seen, REACH);
+            let wide = SurfaceTexture::around(plane, &self.ball, self.seen, REACH);
             let brightening = if self.options.lift_shadow { self.brightening(&wide, plane, gone) } else { None };
             if let Some(brightening) = &brightening {
                 for (i, gain) in gains.iter_mut().enumerate() {
@@ -98,7 +98,7 @@ impl Closing<'_> {
     }
 
     /// Returns the brightening of a surface without the thing's shadow, if a shadow is found on it.
-    fn brightening<'s>(&self, wide: &'s SurfaceSheet<'s>, plane: &Plane, gone: &[bool]) -> Option<Brightening<'s>> {
+    fn brightening<'s>(&self, wide: &'s SurfaceTexture<'s>, plane: &Plane, gone: &[bool]) -> Option<Brightening<'s>> {
         let cloud = self.cloud;
         let is_near = |at: DVec3| at.distance(self.ball.center) < SHADING_REACH * self.ball.radius;
         let occluder = |i: usize| {
@@ -128,7 +128,7 @@ impl Closing<'_> {
     /// Returns whether a Gaussian belongs to the thing by its place: on the hidden part of the surface, where it is
     /// unseen and would shine through, or between that and the thing's own surface. Gaussians of another object than
     /// the surface's, such as an apple in a bowl, do not.
-    fn is_left_over(&self, i: usize, plane: &Plane, sheet: &SurfaceSheet<'_>, owners: &[IdentityId]) -> bool {
+    fn is_left_over(&self, i: usize, plane: &Plane, sheet: &SurfaceTexture<'_>, owners: &[IdentityId]) -> bool {
         let at = self.cloud.world_position(i);
         let Some(texel) = sheet.texel(at).filter(|t| sheet.state[*t] == Texel::Hidden) else { return false };
         if self.lies_on(plane, i) {
@@ -139,11 +139,11 @@ impl Closing<'_> {
         let object = |id: IdentityId| self.map.identities.object_of(id);
         let of = object(self.map.identity_of[i]);
         let above = plane.height(at) > 0.0 && self.extent.contains(at);
-        above && (of == NOBODY || of == object(owners[texel]))
+        above && (of == NO_IDENTITY || of == object(owners[texel]))
     }
 
     /// Returns the identity of each texel: that of the nearest Gaussian on the surface.
-    fn owners(&self, sheet: &SurfaceSheet, plane: &Plane, gone: &[bool]) -> Vec<IdentityId> {
+    fn owners(&self, sheet: &SurfaceTexture, plane: &Plane, gone: &[bool]) -> Vec<IdentityId> {
         let on_it = (0..self.cloud.len()).filter(|i| !gone[*i]).filter_map(|i| {
             let texel = sheet.texel(self.cloud.world_position(i)).filter(|t| sheet.state[*t] == Texel::Seen)?;
             self.lies_on(plane, i).then_some((texel, self.map.identity_of[i]))

@@ -32,7 +32,7 @@ pub(crate) use paint::Paint;
 pub(crate) use rebuild::{INVENTED, invented_flags};
 pub(crate) use select::members;
 
-use self::close::Closing;
+use self::close::HoleFilling;
 use self::rebuild::{brighten, with_new};
 use crate::models::ModelError;
 use crate::models::lama::Lama;
@@ -107,7 +107,7 @@ impl RemovalReport {
 
 /// Scene after a removal.
 #[derive(Clone, Debug)]
-pub(crate) struct Removed {
+pub(crate) struct RemovalResult {
     /// Kept Gaussians in their order, then the new ones.
     pub(crate) cloud: GaussianCloud,
     /// Indices of the kept Gaussians.
@@ -149,7 +149,7 @@ pub(crate) fn remove(
     options: &RemovalOptions,
     network: Option<&mut Lama>,
     observer: &mut dyn Observer,
-) -> Result<Removed, RemovalError> {
+) -> Result<RemovalResult, RemovalError> {
     let name = || names(map, &options.ids);
     let mut clock = Clock::default();
     let thing = select::members(map, &options.ids);
@@ -178,7 +178,7 @@ pub(crate) fn remove(
         if let Some(paint) = options.paint {
             let seen = views::look(cloud, &gone, &cameras, settings, observer)?;
             clock.stop("look");
-            let work = Closing { cloud, map, ball, extent: &extent, seen: &seen, paint, options };
+            let work = HoleFilling { cloud, map, ball, extent: &extent, seen: &seen, paint, options };
             new = work.run(&mut gone, &mut gains, &mut report, network, observer)?;
             clock.stop("close");
         }
@@ -203,7 +203,7 @@ pub(crate) fn remove(
         report.brightened += 1;
         brighten(&mut left, k, gain);
     }
-    Ok(Removed { cloud: left, kept, identity_of, report })
+    Ok(RemovalResult { cloud: left, kept, identity_of, report })
 }
 
 /// Timer of successive stages, seconds.

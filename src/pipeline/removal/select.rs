@@ -5,7 +5,7 @@ use std::collections::HashMap;
 use crate::math::lanes::Lane;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::render::{ContributionSink, RenderSettings, Renderer, TILE_PX};
-use crate::scene::{Camera, GaussianCloud, IdentityId, NOBODY, SemanticMap};
+use crate::scene::{Camera, GaussianCloud, IdentityId, NO_IDENTITY, SemanticMap};
 
 use super::RemovalError;
 use super::extent::{Ball, MORE, ThingExtent};
@@ -35,7 +35,8 @@ pub(super) fn add_fringes(
     (ball, extent): (&Ball, &ThingExtent),
     gone: &mut [bool],
 ) -> usize {
-    let unsure = |i: usize| map.margin[i] < UNSURE && (map.identity_of[i] == NOBODY || map.margin[i] < 0.5 * UNSURE);
+    let unsure =
+        |i: usize| map.margin[i] < UNSURE && (map.identity_of[i] == NO_IDENTITY || map.margin[i] < 0.5 * UNSURE);
     let near = |i: &usize| !gone[*i] && cloud.world_position(*i).distance(ball.center) < (1.0 + MORE) * ball.radius;
     let near: Vec<usize> = (0..cloud.len()).filter(near).collect();
     let mut own: HashMap<IdentityId, Ball> = HashMap::new();
@@ -43,7 +44,7 @@ pub(super) fn add_fringes(
         let object = map.identities.object_of(map.identity_of[i]);
         let of = || Ball::of(cloud, &members(map, &[object]));
         let far = |of: &Ball| cloud.world_position(i).distance(of.center) > STRAY * of.radius;
-        object != NOBODY && far(own.entry(object).or_insert_with(of))
+        object != NO_IDENTITY && far(own.entry(object).or_insert_with(of))
     };
     let within = |i: usize| extent.contains(cloud.world_position(i));
     let found: Vec<usize> = near.into_iter().filter(|&i| unsure(i) && within(i) || astray(i)).collect();

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::light;
 use super::plane::Plane;
-use super::sheet::{SurfaceSheet, Texel};
+use super::sheet::{SurfaceTexture, Texel};
 use crate::math::srgb;
 use crate::math::stats::quantile;
 
@@ -52,7 +52,7 @@ const THING: u8 = 2;
 
 /// Gain of each texel of a sheet without the thing, in linear light.
 pub(super) struct Brightening<'a> {
-    sheet: &'a SurfaceSheet<'a>,
+    sheet: &'a SurfaceTexture<'a>,
     gain: Vec<[f32; 3]>,
     /// Brightest linear light of the surface without the shadow: brighter texels are something else.
     bound: Vec<[f32; 3]>,
@@ -62,7 +62,7 @@ impl<'a> Brightening<'a> {
     /// Finds the shadow; `None` if there is none. `same` = texels of one material.
     pub(super) fn find(
         plane: &Plane,
-        sheet: &'a SurfaceSheet<'a>,
+        sheet: &'a SurfaceTexture<'a>,
         same: impl Fn(usize) -> bool,
         occluders: &[Occluder],
     ) -> Option<Self> {
@@ -113,7 +113,7 @@ impl<'a> Brightening<'a> {
 /// A surface of one material, and the occluders of its light.
 struct LitSurface<'a> {
     plane: &'a Plane,
-    sheet: &'a SurfaceSheet<'a>,
+    sheet: &'a SurfaceTexture<'a>,
     occluders: &'a [Occluder],
     /// Texels that the light is fitted to.
     rows: Vec<usize>,
@@ -197,7 +197,7 @@ impl LitSurface<'_> {
 }
 
 /// Terms of the brightness of an evenly lit surface: a constant, and changes along the surface up to squares.
-fn base(sheet: &SurfaceSheet<'_>, i: usize) -> [f64; light::FREE] {
+fn base(sheet: &SurfaceTexture<'_>, i: usize) -> [f64; light::FREE] {
     let part = |at: usize, length: usize| at as f64 / length.max(1) as f64 - 0.5;
     let (x, y) = (part(i % sheet.size[0], sheet.size[0]), part(i / sheet.size[0], sheet.size[1]));
     [1.0, x, y, x * x, x * y, y * y]
@@ -209,7 +209,7 @@ struct Shadow {
     bits: Vec<u8>,
 }
 
-fn blocked(plane: &Plane, sheet: &SurfaceSheet<'_>, toward: DVec3, occluders: &[Occluder]) -> Vec<u8> {
+fn blocked(plane: &Plane, sheet: &SurfaceTexture<'_>, toward: DVec3, occluders: &[Occluder]) -> Vec<u8> {
     let mut bits = vec![0; sheet.state.len()];
     let [width, height] = sheet.size.map(|s| s as f64);
     for o in occluders {

@@ -46,7 +46,7 @@ pub(super) enum Texel {
 }
 
 /// Texels in row-major order.
-pub(super) struct SurfaceSheet<'a> {
+pub(super) struct SurfaceTexture<'a> {
     plane: &'a Plane,
     /// Place of the first texel's corner along the plane.
     corner: [f64; 2],
@@ -60,7 +60,7 @@ pub(super) struct SurfaceSheet<'a> {
     deep: Vec<bool>,
 }
 
-impl<'a> SurfaceSheet<'a> {
+impl<'a> SurfaceTexture<'a> {
     /// Samples the plane up to `reach` radii around the thing, in coarse texels.
     pub(super) fn around(plane: &'a Plane, ball: &Ball, seen: &[SeenView], reach: f64) -> Self {
         let middle = ball.center - plane.origin;

@@ -7,7 +7,7 @@ use crate::math::sh::SH_C0;
 use crate::math::srgb;
 use crate::pipeline::observer::Silent;
 use crate::render::{Features, Renderer};
-use crate::scene::{Identities, Level, NOBODY};
+use crate::scene::{Identities, Level, NO_IDENTITY};
 
 const TABLE: IdentityId = 1;
 const BOX: IdentityId = 2;
@@ -38,8 +38,8 @@ fn scene(is_bare: bool) -> (GaussianCloud, SemanticMap, Vec<Camera>) {
     let mut cloud = GaussianCloud::isotropic(positions, (0.6 * spacing as f32).ln(), 3.0);
     cloud.sh = colors.iter().map(|c| c.map(|c| ((c - 0.5) / SH_C0) as f32)).collect();
     let mut identities = Identities::default();
-    identities.add(Level::Object, NOBODY, vec!["table".into()]);
-    identities.add(Level::Object, NOBODY, vec!["box".into()]);
+    identities.add(Level::Object, NO_IDENTITY, vec!["table".into()]);
+    identities.add(Level::Object, NO_IDENTITY, vec!["box".into()]);
     let margin = vec![1.0; of.len()];
     (cloud, SemanticMap::from_identities(identities, of, margin, vec![]), cameras(16, 0.0))
 }
@@ -57,7 +57,7 @@ fn options(paint: Option<Paint>) -> RemovalOptions {
     RemovalOptions { ids: vec![BOX], halo: true, lift_shadow: false, paint, seed: 3 }
 }
 
-fn removed(paint: Option<Paint>) -> (SemanticMap, Removed) {
+fn removed(paint: Option<Paint>) -> (SemanticMap, RemovalResult) {
     let (cloud, map, photos) = scene(false);
     let done =
         remove(&cloud, &map, &photos, &RenderSettings::default(), &options(paint), None, &mut Silent).expect("removed");
@@ -102,7 +102,7 @@ fn what_a_box_hid_of_a_table_is_closed_with_its_color_and_depth() {
             assert!(at.x.abs() < 0.55 && at.z.abs() < 0.55 && at.y.abs() < 0.05, "{at}");
         }
         let count = |id| done.identity_of.iter().filter(|of| **of == id).count();
-        assert_eq!((count(NOBODY), count(BOX)), (0, 0), "of {}", done.cloud.len());
+        assert_eq!((count(NO_IDENTITY), count(BOX)), (0, 0), "of {}", done.cloud.len());
         let flags = &done.cloud.extras.iter().find(|e| e.name == INVENTED).expect("flags").values;
         assert_eq!(flags.iter().filter(|v| **v == 1.0).count(), new);
         done.cloud.validate().expect("a valid cloud");

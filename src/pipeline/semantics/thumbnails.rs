@@ -49,14 +49,14 @@ fn camera(cloud: &GaussianCloud, from: DVec3, up: DVec3) -> Option<Camera> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Identities, Level, NOBODY};
+    use crate::scene::{Identities, Level, NO_IDENTITY};
 
     #[test]
     fn everything_is_drawn_alone_and_fills_its_picture() {
         let mut all = Identities::default();
-        let doll = all.add(Level::Object, NOBODY, vec![]);
-        let cat = all.add(Level::Object, NOBODY, vec![]);
-        all.add(Level::Object, NOBODY, vec!["nothing".into()]);
+        let doll = all.add(Level::Object, NO_IDENTITY, vec![]);
+        let cat = all.add(Level::Object, NO_IDENTITY, vec![]);
+        all.add(Level::Object, NO_IDENTITY, vec!["nothing".into()]);
         // A white blob and one a hundred times as large around it.
         let n = 40;
         let place = |i: usize| {

@@ -12,7 +12,7 @@ pub struct ViewMap {
     pub width_px: usize,
     /// Height in px.
     pub height_px: usize,
-    /// Innermost identity; `NOBODY` if none wins or the pixel is empty, `UNKNOWN` if Gaussians without a vote win.
+    /// Innermost identity; `NO_IDENTITY` if none wins or the pixel is empty, `UNKNOWN` if Gaussians without a vote win.
     pub identity: Vec<IdentityId>,
     /// Share of the winner's object in the pixel's weight.
     pub(crate) share: Vec<f32>,
@@ -56,12 +56,13 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::scene::{Level, NOBODY};
+    use crate::scene::{Level, NO_IDENTITY};
 
     #[test]
     fn what_stands_in_front_hides_what_is_behind() {
         let mut all = Identities::default();
-        let (front, behind) = (all.add(Level::Object, NOBODY, vec![]), all.add(Level::Object, NOBODY, vec![]));
+        let (front, behind) =
+            (all.add(Level::Object, NO_IDENTITY, vec![]), all.add(Level::Object, NO_IDENTITY, vec![]));
         let cloud = GaussianCloud {
             log_scales: vec![[-1.8; 3], [-0.9; 3]],
             ..GaussianCloud::isotropic(vec![[0.0, 0.0, -0.5], [0.0, 0.0, 0.5]], 0.0, 4.0)

@@ -7,7 +7,7 @@ use glam::{DMat3, DQuat, DVec3};
 use crate::math::sh::{self, SH_C0};
 use crate::math::{Real, rotation};
 use crate::pipeline::semantics::lifting::edit;
-use crate::scene::{Bounds, GaussianCloud, IdentityId, NOBODY, SemanticMap};
+use crate::scene::{Bounds, GaussianCloud, IdentityId, NO_IDENTITY, SemanticMap};
 
 /// Luma weights of red, green and blue (ITU-R BT.709).
 const BRIGHTNESS: [f64; 3] = [0.2126, 0.7152, 0.0722];
@@ -215,7 +215,7 @@ fn doubled(map: &SemanticMap, all: &[usize], id: IdentityId) -> SemanticMap {
             *copy = seen;
         }
     }
-    debug_assert!(number[id as usize] != NOBODY);
+    debug_assert!(number[id as usize] != NO_IDENTITY);
     new
 }
 

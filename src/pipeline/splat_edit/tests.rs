@@ -33,9 +33,9 @@ fn scene() -> (GaussianCloud, SemanticMap) {
         of.push(id);
     }
     let mut all = Identities::default();
-    let mug = all.add(Level::Object, NOBODY, vec!["mug".into(), "cup".into()]);
+    let mug = all.add(Level::Object, NO_IDENTITY, vec!["mug".into(), "cup".into()]);
     all.add(Level::Part, mug, vec!["handle".into()]);
-    all.add(Level::Object, NOBODY, vec!["table".into()]);
+    all.add(Level::Object, NO_IDENTITY, vec!["table".into()]);
     let mut map = SemanticMap::from_identities(all, of, vec![0.8; 100], vec!["photo".into()]);
     let seen = |k: usize| ViewFeatures { raw: vec![vec![k as f32; 2]], deviated: vec![vec![-(k as f32); 2]] };
     let by_identity = (1..=3).map(seen).collect();

@@ -37,7 +37,7 @@ impl TrainOutcome {
 #[derive(Debug, thiserror::Error)]
 #[allow(missing_docs, reason = "each text says what its variant is")]
 pub enum TrainError {
-    #[error("{0} has no photo to train on: {1} photos, all held out; lower --holdout or add photos")]
+    #[error("{0} has no photo to train on: {1} photos, all held out; raise --held-out-every or add photos")]
     NoPhotos(String, usize),
     #[error(transparent)]
     Photo(IoError),

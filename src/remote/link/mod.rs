@@ -11,7 +11,7 @@ use crossbeam_channel::{Receiver, Sender, bounded};
 use self::thread::LinkThread;
 use super::Address;
 use super::client::{Client, ClientError};
-use super::wire::Ask;
+use super::wire::ClientRequest;
 use crate::jobs::workspace::TrainedRun;
 use crate::jobs::{Folders, OpenedScene};
 use crate::pipeline::semantics::lifting::edit::Edit;
@@ -21,7 +21,7 @@ use crate::worker::{CloudSnapshot, Event, JobId, RemotePhotos, Repaint, Slot, Ta
 mod thread;
 
 /// Maximum number of queued requests.
-const WISHES: usize = 64;
+const MAX_COMMANDS: usize = 64;
 /// Updates that may wait for the window; the thread waits when there are more.
 const UPDATES: usize = 1024;
 /// Number of the next job on another computer.
@@ -55,7 +55,7 @@ pub(crate) enum LinkUpdate {
 
 /// Connection to a server. Dropping it ends its thread.
 pub(crate) struct ServerLink {
-    wishes: Sender<Wish>,
+    command_sender: Sender<LinkCommand>,
     updates: Receiver<LinkUpdate>,
     status: Arc<Mutex<LinkStatus>>,
 }
@@ -69,15 +69,15 @@ impl ServerLink {
         clouds: Arc<Slot<CloudSnapshot>>,
         repaint: Repaint,
     ) -> std::io::Result<Self> {
-        let (wishes, wished) = bounded(WISHES);
+        let (command_sender, command_receiver) = bounded(MAX_COMMANDS);
         let (sender, updates) = bounded(UPDATES);
         let host = address.host.clone();
         let status = LinkStatus { host, connected: false, problem: None, retry_at: None };
         let status = Arc::new(Mutex::new(status));
-        let out = Out { updates: sender, clouds, repaint, status: Arc::clone(&status) };
-        let thread = LinkThread::new(Client::new(address)?, folders, wished, out);
+        let out = EventSink { updates: sender, clouds, repaint, status: Arc::clone(&status) };
+        let thread = LinkThread::new(Client::new(address)?, folders, command_receiver, out);
         std::thread::Builder::new().name("remote scene".into()).spawn(move || thread.work())?;
-        Ok(Self { wishes, updates, status })
+        Ok(Self { command_sender, updates, status })
     }
 
     /// The next update, if one waits.
@@ -92,26 +92,29 @@ impl ServerLink {
 
     /// Asks the training to pause or to go on. Returns false if the queue is full.
     pub(crate) fn set_paused(&self, paused: bool) -> bool {
-        self.wishes.try_send(Wish::Ask(Ask::Pause(paused))).is_ok()
+        self.command_sender.try_send(LinkCommand::Ask(ClientRequest::Pause(paused))).is_ok()
     }
 
     /// Asks the training to end. Returns false if the queue is full.
     pub(crate) fn cancel(&self) -> bool {
-        self.wishes.try_send(Wish::Ask(Ask::Cancel)).is_ok()
+        self.command_sender.try_send(LinkCommand::Ask(ClientRequest::Cancel)).is_ok()
     }
 
     /// Asks for an edit of objects and parts. Returns false if the queue is full.
     pub(crate) fn edit(&self, edit: Edit) -> bool {
-        self.wishes.try_send(Wish::Ask(Ask::Edit(edit))).is_ok()
+        self.command_sender.try_send(LinkCommand::Ask(ClientRequest::Edit(edit))).is_ok()
     }
 
     /// Returns the loader of the server's photos.
     pub(crate) fn photos(&self) -> RemotePhotos {
-        let wishes = self.wishes.clone();
+        let command_sender = self.command_sender.clone();
         Box::new(move |index, photo, side_px| {
             let (task, result) = Task::pair(new_job());
             let title = photo.name.clone();
-            wishes.try_send(Wish::Photo { job: task.job(), index, side_px, title, result }).ok().map(|()| task)
+            command_sender
+                .try_send(LinkCommand::Photo { job: task.job(), index, side_px, title, result })
+                .ok()
+                .map(|()| task)
         })
     }
 }
@@ -122,13 +125,13 @@ fn new_job() -> JobId {
 }
 
 /// Request of the window to the server.
-enum Wish {
-    Ask(Ask),
+enum LinkCommand {
+    Ask(ClientRequest),
     Photo { job: JobId, index: usize, side_px: u32, title: String, result: TaskResult<PhotoPixels> },
 }
 
 /// Output of the thread: updates, Gaussians and status.
-struct Out {
+struct EventSink {
     updates: Sender<LinkUpdate>,
     clouds: Arc<Slot<CloudSnapshot>>,
     repaint: Repaint,
@@ -136,7 +139,7 @@ struct Out {
 }
 
 /// Reason for which the thread stops asking.
-enum Break {
+enum SessionEnd {
     Client(ClientError),
     /// The window has dropped the link.
     Gone,
@@ -144,19 +147,19 @@ enum Break {
     OtherRun,
 }
 
-impl From<ClientError> for Break {
+impl From<ClientError> for SessionEnd {
     fn from(e: ClientError) -> Self {
         Self::Client(e)
     }
 }
 
-impl Out {
-    fn tell(&self, event: Event) -> Result<(), Break> {
+impl EventSink {
+    fn send(&self, event: Event) -> Result<(), SessionEnd> {
         self.update(LinkUpdate::Event(event))
     }
 
-    fn update(&self, update: LinkUpdate) -> Result<(), Break> {
-        let told = self.updates.send(update).map_err(|_| Break::Gone);
+    fn update(&self, update: LinkUpdate) -> Result<(), SessionEnd> {
+        let told = self.updates.send(update).map_err(|_| SessionEnd::Gone);
         (self.repaint)();
         told
     }

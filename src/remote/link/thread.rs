@@ -8,8 +8,8 @@ use std::time::{Duration, Instant};
 use crossbeam_channel::{Receiver, RecvTimeoutError};
 
 use super::super::client::{Client, ClientError, Pulled};
-use super::super::wire::{Ask, SceneCard, WireEvent};
-use super::{Break, LinkUpdate, Out, Wish, lock, new_job};
+use super::super::wire::{ClientRequest, SceneSummary, WireEvent};
+use super::{EventSink, LinkCommand, LinkUpdate, SessionEnd, lock, new_job};
 use crate::io::IoError;
 use crate::jobs::open::{Origin, received};
 use crate::jobs::workspace::TrainedRun;
@@ -30,16 +30,16 @@ pub(super) struct LinkThread {
     client: Client,
     folders: Folders,
     machine: Option<Machine>,
-    wished: Receiver<Wish>,
+    command_receiver: Receiver<LinkCommand>,
     /// Photos that were requested while there was no connection.
-    later: VecDeque<Wish>,
-    out: Out,
+    later: VecDeque<LinkCommand>,
+    out: EventSink,
     /// Run of the server, number of the last event, and generation of the Gaussians that were received.
     run: String,
     since: u64,
     have: u64,
     /// Scene on screen.
-    shown: Option<(SceneCard, Arc<OpenedScene>)>,
+    shown: Option<(SceneSummary, Arc<OpenedScene>)>,
     /// Local job of the server's training.
     training: Option<JobId>,
     evaluations: Vec<Evaluation>,
@@ -50,12 +50,17 @@ pub(super) struct LinkThread {
 }
 
 impl LinkThread {
-    pub(super) fn new(client: Client, folders: Folders, wished: Receiver<Wish>, out: Out) -> Self {
+    pub(super) fn new(
+        client: Client,
+        folders: Folders,
+        command_receiver: Receiver<LinkCommand>,
+        out: EventSink,
+    ) -> Self {
         Self {
             client,
             folders,
             machine: None,
-            wished,
+            command_receiver,
             later: VecDeque::new(),
             out,
             run: String::new(),
@@ -72,20 +77,20 @@ impl LinkThread {
     pub(super) fn work(mut self) {
         let job = new_job();
         let title = format!("Connecting to {}", self.client.address.host);
-        if self.out.tell(Event::Started(job, JobInfo::long(title).makes(Makes::Scene))).is_err() {
+        if self.out.send(Event::Started(job, JobInfo::long(title).makes(Makes::Scene))).is_err() {
             return;
         }
         if self.client.address.is_open() {
             let text = "The connection is not encrypted: others on the way can read it, the token included.";
-            let _ = self.out.tell(Event::Note(job, Severity::Warning, text.into()));
+            let _ = self.out.send(Event::Note(job, Severity::Warning, text.into()));
         }
         let mut opening = Some(job);
         let mut wait = FIRST_TRY;
         loop {
             let why = match self.session(&mut opening, &mut wait) {
-                Break::Gone => return,
-                Break::OtherRun => continue,
-                Break::Client(why) => why,
+                SessionEnd::Gone => return,
+                SessionEnd::OtherRun => continue,
+                SessionEnd::Client(why) => why,
             };
             let (problem, again) = match why {
                 ClientError::Lost(problem) => (problem, true),
@@ -102,9 +107,9 @@ impl LinkThread {
             // A refusal ends the open job; a lost connection keeps it for the next attempt.
             let told = match (again, opening.take_if(|_| !again), self.training.take_if(|_| !again)) {
                 (false, Some(job), _) | (false, None, Some(job)) => {
-                    self.out.tell(Event::Ended(job, JobEnd::Failed(Failure::new(text, ""))))
+                    self.out.send(Event::Ended(job, JobEnd::Failed(Failure::new(text, ""))))
                 }
-                _ if was_connected || !again => self.out.tell(Event::Note(job, Severity::Warning, text)),
+                _ if was_connected || !again => self.out.send(Event::Note(job, Severity::Warning, text)),
                 _ => Ok(()),
             };
             if told.is_err() || !again || self.is_left_within(wait) {
@@ -118,12 +123,12 @@ impl LinkThread {
     fn is_left_within(&mut self, wait: Duration) -> bool {
         let until = Instant::now() + wait;
         loop {
-            match self.wished.recv_deadline(until) {
-                Ok(photo @ Wish::Photo { .. }) => self.later.push_back(photo),
-                Ok(Wish::Ask(_)) => {
+            match self.command_receiver.recv_deadline(until) {
+                Ok(photo @ LinkCommand::Photo { .. }) => self.later.push_back(photo),
+                Ok(LinkCommand::Ask(_)) => {
                     let text = "There is no connection at the moment, so that was not passed on";
                     let note = Event::Note(new_job(), Severity::Warning, text.into());
-                    if self.out.tell(note).is_err() {
+                    if self.out.send(note).is_err() {
                         return true;
                     }
                 }
@@ -134,41 +139,45 @@ impl LinkThread {
     }
 
     /// Exchanges messages with the server until the connection ends.
-    fn session(&mut self, opening: &mut Option<JobId>, wait: &mut Duration) -> Break {
+    fn session(&mut self, opening: &mut Option<JobId>, wait: &mut Duration) -> SessionEnd {
         match self.talk(opening, wait) {
             Err(why) => why,
             Ok(never) => match never {},
         }
     }
 
-    fn talk(&mut self, opening: &mut Option<JobId>, wait: &mut Duration) -> Result<std::convert::Infallible, Break> {
-        let card = self.client.scene()?;
-        let mut known = self.shown.as_ref().is_some_and(|(shown, _)| is_same(shown, &card.value));
+    fn talk(
+        &mut self,
+        opening: &mut Option<JobId>,
+        wait: &mut Duration,
+    ) -> Result<std::convert::Infallible, SessionEnd> {
+        let summary = self.client.scene()?;
+        let mut known = self.shown.as_ref().is_some_and(|(shown, _)| is_same(shown, &summary.value));
         // True if a restart of the server cut off a training of the same scene, which may go on in the new run.
         let mut cut_off = false;
-        if card.run != self.run {
-            (self.run, self.since, self.have) = (card.run, 0, 0);
+        if summary.run != self.run {
+            (self.run, self.since, self.have) = (summary.run, 0, 0);
             cut_off = known && self.training.is_some();
             known = cut_off;
             if let Some(job) = self.training.take() {
                 self.ends(job, JobEnd::Cancelled)?;
             }
         }
-        let card = card.value;
+        let summary = summary.value;
         if !known || opening.is_some() {
-            self.open(card.clone(), opening)?;
+            self.open(summary.clone(), opening)?;
         }
         *wait = FIRST_TRY;
         if !lock(&self.out.status).connected {
             self.out.status(|s| (s.connected, s.problem, s.retry_at) = (true, None, None));
             let text = format!("Connected to {}", self.client.address.host);
             let job = new_job();
-            self.out.tell(Event::Note(job, Severity::Info, text))?;
+            self.out.send(Event::Note(job, Severity::Info, text))?;
         }
         loop {
             let news = self.client.news(self.since, self.have)?;
             if news.run != self.run {
-                return Err(Break::OtherRun);
+                return Err(SessionEnd::OtherRun);
             }
             let mut news = news.value;
             for event in news.events.drain(..) {
@@ -176,13 +185,13 @@ impl LinkThread {
             }
             self.since = news.next;
             if std::mem::take(&mut cut_off) && self.training.is_none() {
-                self.open(card.clone(), opening)?;
+                self.open(summary.clone(), opening)?;
             }
             if news.generation > self.have {
                 self.pull()?;
             }
             if let (Some(job), Some(progress)) = (self.training, news.progress) {
-                self.out.tell(Event::Progress(job, progress))?;
+                self.out.send(Event::Progress(job, progress))?;
             }
             if news.more {
                 continue;
@@ -192,43 +201,43 @@ impl LinkThread {
     }
 
     /// Opens the server's scene in the window.
-    fn open(&mut self, card: SceneCard, opening: &mut Option<JobId>) -> Result<(), Break> {
+    fn open(&mut self, summary: SceneSummary, opening: &mut Option<JobId>) -> Result<(), SessionEnd> {
         let pulled = self.client.snapshot(0)?;
         let exact = pulled.as_ref().is_some_and(|p| p.snapshot.is_exact());
         let have = pulled.as_ref().map_or(0, |p| p.generation);
         let sent = pulled.map(|p| self.read(&p)).transpose()?;
         let machine = self.machine.get_or_insert_with(plan::machine);
         let host = self.client.address.host.clone();
-        let origin = Origin { host, allow_edit: card.allow_edit, photos: card.photos };
-        let scene = received(card.info.clone(), sent, exact, origin, &self.folders, machine);
+        let origin = Origin { host, allow_edit: summary.allow_edit, photos: summary.photos };
+        let scene = received(summary.info.clone(), sent, exact, origin, &self.folders, machine);
         let scene = scene.map_err(|e| ClientError::Refused(e.to_string()))?;
         self.have = have;
         self.map = scene.semantics.clone();
-        self.shown = Some((card, Arc::new(scene.clone())));
+        self.shown = Some((summary, Arc::new(scene.clone())));
         let job = opening.take().unwrap_or_else(new_job);
-        self.out.tell(Event::Ended(job, JobEnd::Finished))?;
+        self.out.send(Event::Ended(job, JobEnd::Finished))?;
         self.out.update(LinkUpdate::Opened(Box::new(scene)))
     }
 
     /// Emits an event of the server as an event of a local job.
-    fn hear(&mut self, event: WireEvent) -> Result<(), Break> {
+    fn hear(&mut self, event: WireEvent) -> Result<(), SessionEnd> {
         if let WireEvent::Started(title) = &event {
             let job = new_job();
             let title = format!("{} on {}", text::line(title), self.client.address.host);
             (self.training, self.busy) = (Some(job), true);
             self.evaluations.clear();
-            return self.out.tell(Event::Started(job, JobInfo::long(title).makes(Makes::Gaussians).pausable()));
+            return self.out.send(Event::Started(job, JobInfo::long(title).makes(Makes::Gaussians).pausable()));
         }
         let Some(job) = self.training else { return Ok(()) };
         match event {
             WireEvent::Started(_) => Ok(()),
-            WireEvent::Step(metrics) => self.out.tell(Event::Step(job, metrics)),
+            WireEvent::Step(metrics) => self.out.send(Event::Step(job, metrics)),
             WireEvent::Evaluation(evaluation) => {
                 self.evaluations.push(evaluation.clone());
-                self.out.tell(Event::Evaluation(job, evaluation))
+                self.out.send(Event::Evaluation(job, evaluation))
             }
-            WireEvent::Note(severity, text) => self.out.tell(Event::Note(job, severity, text)),
-            WireEvent::Paused(paused) => self.out.tell(Event::Paused(job, paused)),
+            WireEvent::Note(severity, text) => self.out.send(Event::Note(job, severity, text)),
+            WireEvent::Paused(paused) => self.out.send(Event::Paused(job, paused)),
             WireEvent::Finished(folder) => {
                 self.pull()?;
                 let run = Box::new(self.trained(folder));
@@ -243,9 +252,9 @@ impl LinkThread {
         }
     }
 
-    fn ends(&mut self, job: JobId, end: JobEnd) -> Result<(), Break> {
+    fn ends(&mut self, job: JobId, end: JobEnd) -> Result<(), SessionEnd> {
         (self.training, self.busy) = (None, false);
-        self.out.tell(Event::Ended(job, end))
+        self.out.send(Event::Ended(job, end))
     }
 
     fn trained(&mut self, folder: String) -> TrainedRun {
@@ -261,7 +270,7 @@ impl LinkThread {
     }
 
     /// Fetches the newest Gaussians and publishes them.
-    fn pull(&mut self) -> Result<(), Break> {
+    fn pull(&mut self) -> Result<(), SessionEnd> {
         let Some(pulled) = self.client.snapshot(self.have)? else { return Ok(()) };
         let (cloud, map) = self.read(&pulled)?;
         self.have = pulled.generation;
@@ -284,34 +293,36 @@ impl LinkThread {
     }
 
     /// Passes requests on until the next news are due. A command ends the wait, as it causes news.
-    fn grant_until(&mut self, due: Instant) -> Result<(), Break> {
+    fn grant_until(&mut self, due: Instant) -> Result<(), SessionEnd> {
         loop {
-            match self.later.pop_front().map_or_else(|| self.wished.recv_deadline(due), Ok) {
-                Ok(Wish::Ask(ask)) => return self.ask(&ask),
-                Ok(Wish::Photo { job, index, side_px, title, result }) => match self.client.photo(index, side_px) {
-                    Err(ClientError::Lost(why)) => {
-                        self.later.push_back(Wish::Photo { job, index, side_px, title, result });
-                        return Err(ClientError::Lost(why).into());
+            match self.later.pop_front().map_or_else(|| self.command_receiver.recv_deadline(due), Ok) {
+                Ok(LinkCommand::Ask(ask)) => return self.ask(&ask),
+                Ok(LinkCommand::Photo { job, index, side_px, title, result }) => {
+                    match self.client.photo(index, side_px) {
+                        Err(ClientError::Lost(why)) => {
+                            self.later.push_back(LinkCommand::Photo { job, index, side_px, title, result });
+                            return Err(ClientError::Lost(why).into());
+                        }
+                        got => {
+                            let failed = |e: ClientError| Stop::Failed(Failure::new(e.to_string(), ""));
+                            self.photo(job, &title, result.give(got.map_err(failed)))?;
+                        }
                     }
-                    got => {
-                        let failed = |e: ClientError| Stop::Failed(Failure::new(e.to_string(), ""));
-                        self.photo(job, &title, result.give(got.map_err(failed)))?;
-                    }
-                },
+                }
                 Err(RecvTimeoutError::Timeout) => return Ok(()),
-                Err(RecvTimeoutError::Disconnected) => return Err(Break::Gone),
+                Err(RecvTimeoutError::Disconnected) => return Err(SessionEnd::Gone),
             }
         }
     }
 
     /// Emits the events of a photo.
-    fn photo(&self, job: JobId, title: &str, end: JobEnd) -> Result<(), Break> {
-        self.out.tell(Event::Started(job, JobInfo::short(format!("Loading {title}")).aside()))?;
-        self.out.tell(Event::Ended(job, end))
+    fn photo(&self, job: JobId, title: &str, end: JobEnd) -> Result<(), SessionEnd> {
+        self.out.send(Event::Started(job, JobInfo::short(format!("Loading {title}")).aside()))?;
+        self.out.send(Event::Ended(job, end))
     }
 
     /// Sends a command. A refusal is reported and does not end the connection.
-    fn ask(&mut self, ask: &Ask) -> Result<(), Break> {
+    fn ask(&mut self, ask: &ClientRequest) -> Result<(), SessionEnd> {
         match self.client.ask(ask) {
             Err(ClientError::Refused(why)) => self.out.update(LinkUpdate::Refused(why)),
             done => Ok(done?),
@@ -320,11 +331,11 @@ impl LinkThread {
 }
 
 /// Returns whether two cards are of the same scene, apart from its history and saved state.
-fn is_same(a: &SceneCard, b: &SceneCard) -> bool {
+fn is_same(a: &SceneSummary, b: &SceneSummary) -> bool {
     let (mut a, mut b) = (a.clone(), b.clone());
-    for card in [&mut a, &mut b] {
-        card.info.history = Default::default();
-        card.info.state = None;
+    for summary in [&mut a, &mut b] {
+        summary.info.history = Default::default();
+        summary.info.state = None;
     }
     a == b
 }

@@ -127,7 +127,7 @@ impl Device {
     pub(crate) fn from_parts(info: wgpu::AdapterInfo, device: wgpu::Device, queue: wgpu::Queue) -> Self {
         let fault = Arc::new(Mutex::new(None));
         let slot = Arc::clone(&fault);
-        device.on_uncaptured_error(Arc::new(move |error| keep_first(&slot, told(error, "a command", 0))));
+        device.on_uncaptured_error(Arc::new(move |error| keep_first(&slot, gpu_error(error, "a command", 0))));
         let slot = Arc::clone(&fault);
         device.set_device_lost_callback(move |reason, text| {
             // Dropping the last handle of a device also ends it; then there is no one to report to.
@@ -276,7 +276,7 @@ impl Device {
         let mut fault = None;
         for scope in scopes.into_iter().rev() {
             if let Some(error) = pollster::block_on(scope.pop()) {
-                fault = Some(told(error, what, bytes));
+                fault = Some(gpu_error(error, what, bytes));
             }
         }
         fault.map_or(Ok(made), Err)
@@ -305,7 +305,7 @@ fn keep_first(slot: &Mutex<Option<GpuError>>, error: GpuError) {
     slot.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
 }
 
-fn told(error: wgpu::Error, what: &str, bytes: u64) -> GpuError {
+fn gpu_error(error: wgpu::Error, what: &str, bytes: u64) -> GpuError {
     match error {
         wgpu::Error::OutOfMemory { .. } => GpuError::OutOfMemory { what: what.to_owned(), bytes },
         wgpu::Error::Validation { description, .. } | wgpu::Error::Internal { description, .. } => {

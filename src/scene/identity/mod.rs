@@ -49,18 +49,18 @@ impl LevelFilter {
     }
 }
 
-/// Number of an identity: its place in the list plus one; 0 is [`NOBODY`].
+/// Number of an identity: its place in the list plus one; 0 is [`NO_IDENTITY`].
 pub type IdentityId = u32;
 
 /// No identity: the number of unlabeled pixels and Gaussians.
-pub const NOBODY: IdentityId = 0;
+pub const NO_IDENTITY: IdentityId = 0;
 
 /// One object or part, the same in every view.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Identity {
     /// Object or part.
     pub level: Level,
-    /// Identity that it is a part of; `NOBODY` for objects.
+    /// Identity that it is a part of; `NO_IDENTITY` for objects.
     pub parent: IdentityId,
     /// Names from the user or a label file, bounded by [`text::name`]; the first is shown.
     #[serde(deserialize_with = "text::read_names")]
@@ -102,14 +102,14 @@ impl Identities {
     pub fn objects(count: usize) -> Self {
         let mut all = Self::default();
         for _ in 0..count {
-            all.add(Level::Object, NOBODY, Vec::new());
+            all.add(Level::Object, NO_IDENTITY, Vec::new());
         }
         all
     }
 
-    /// Adds an identity. A parent that does not exist yet becomes [`NOBODY`].
+    /// Adds an identity. A parent that does not exist yet becomes [`NO_IDENTITY`].
     pub fn add(&mut self, level: Level, parent: IdentityId, names: Vec<String>) -> IdentityId {
-        let parent = if self.get(parent).is_some() { parent } else { NOBODY };
+        let parent = if self.get(parent).is_some() { parent } else { NO_IDENTITY };
         let names = names.iter().map(|name| text::name(name)).collect();
         self.whole_names = Known::default();
         self.list.push(Identity { level, parent, names, code: [0.5; 3], by_hand: false });
@@ -181,7 +181,7 @@ impl Identities {
     /// Its own name: the first, or its number.
     pub fn name(&self, id: IdentityId) -> String {
         let named = self.get(id).and_then(|i| i.names.iter().find(|name| !key(name).is_empty())).cloned();
-        named.unwrap_or_else(|| if id == NOBODY { "nothing".into() } else { format!("#{id}") })
+        named.unwrap_or_else(|| if id == NO_IDENTITY { "nothing".into() } else { format!("#{id}") })
     }
 
     /// Its own name as it is shown, with its number where others are called the same: "mug #3".
@@ -213,7 +213,7 @@ impl Identities {
     }
 
     pub(crate) fn object_of(&self, id: IdentityId) -> IdentityId {
-        self.ancestors(id).last().unwrap_or(NOBODY)
+        self.ancestors(id).last().unwrap_or(NO_IDENTITY)
     }
 
     /// For each number from 0, whether it is `id` or a piece of it.
@@ -235,7 +235,7 @@ impl Identities {
     }
 
     pub(crate) fn children(&self, id: IdentityId) -> impl Iterator<Item = IdentityId> + '_ {
-        self.iter().filter(move |(_, i)| i.parent == id && id != NOBODY).map(|(i, _)| i)
+        self.iter().filter(move |(_, i)| i.parent == id && id != NO_IDENTITY).map(|(i, _)| i)
     }
 }
 
@@ -246,18 +246,18 @@ mod tests {
     #[test]
     fn lines_and_pieces_follow_the_tree() {
         let mut all = Identities::default();
-        let doll = all.add(Level::Object, NOBODY, vec!["doll".into()]);
-        let piano = all.add(Level::Object, NOBODY, vec![]);
+        let doll = all.add(Level::Object, NO_IDENTITY, vec!["doll".into()]);
+        let piano = all.add(Level::Object, NO_IDENTITY, vec![]);
         let face = all.add(Level::Part, doll, vec!["face".into()]);
         let eye = all.add(Level::Part, face, vec!["eye".into()]);
         assert_eq!(all.ancestors(eye).collect::<Vec<_>>(), [eye, face, doll]);
-        assert_eq!((all.object_of(eye), all.object_of(piano), all.object_of(99)), (doll, piano, NOBODY));
+        assert_eq!((all.object_of(eye), all.object_of(piano), all.object_of(99)), (doll, piano, NO_IDENTITY));
         assert_eq!(all.descendants(doll), [false, true, false, true, true]);
         assert_eq!(all.descendants(face), [false, false, false, true, true]);
         assert_eq!(all.children(doll).collect::<Vec<_>>(), [face]);
         assert_eq!((all.name(piano), all.name(eye), all.name(0)), ("#2".into(), "eye".into(), "nothing".into()));
         assert_eq!(all.add(Level::Part, 77, vec![]), 5);
-        assert_eq!(all.get(5).map(|i| i.parent), Some(NOBODY));
+        assert_eq!(all.get(5).map(|i| i.parent), Some(NO_IDENTITY));
     }
 
     #[test]
@@ -265,18 +265,21 @@ mod tests {
         let mut all = Identities::default();
         assert!(all.is_empty());
         assert_eq!(all.len(), 0);
-        let doll = all.add(Level::Object, NOBODY, vec!["red doll".into(), "rosa".into()]);
+        let doll = all.add(Level::Object, NO_IDENTITY, vec!["red doll".into(), "rosa".into()]);
         let face = all.add(Level::Part, doll, vec![]);
         let eye = all.add(Level::Part, face, vec!["eye".into()]);
         assert!(!all.is_empty() && all.len() == 3);
         assert_eq!(all.full_name(eye), "eye · #2 · red doll");
-        assert_eq!((all.children(NOBODY).count(), all.ancestors(NOBODY).count(), all.ancestors(9).count()), (0, 0, 0));
+        assert_eq!(
+            (all.children(NO_IDENTITY).count(), all.ancestors(NO_IDENTITY).count(), all.ancestors(9).count()),
+            (0, 0, 0)
+        );
         // An object's own code and none of a part; a part's both.
         all.get_mut(doll).expect("there").code = [0.1; 3];
         all.get_mut(eye).expect("there").code = [0.9; 3];
         assert_eq!(all.codes(doll), [0.1, 0.1, 0.1, 0.5, 0.5, 0.5]);
         assert_eq!(all.codes(eye), [0.1, 0.1, 0.1, 0.9, 0.9, 0.9]);
-        assert_eq!(all.codes(NOBODY), [0.5; 6]);
-        assert!(all.get_mut(NOBODY).is_none() && all.get_mut(4).is_none());
+        assert_eq!(all.codes(NO_IDENTITY), [0.5; 6]);
+        assert!(all.get_mut(NO_IDENTITY).is_none() && all.get_mut(4).is_none());
     }
 }

@@ -8,7 +8,9 @@ use strum::VariantArray;
 use super::*;
 use crate::math::format::bytes;
 use crate::math::{sh, stats};
-use crate::scene::{Camera, GaussianCloud, Identities, LanguageFeatures, Level, NOBODY, SemanticMap, ViewFeatures};
+use crate::scene::{
+    Camera, GaussianCloud, Identities, LanguageFeatures, Level, NO_IDENTITY, SemanticMap, ViewFeatures,
+};
 
 /// One Gaussian whose second and third bands have one coefficient each.
 fn colored(band_one: f32, band_two: f32) -> GaussianCloud {
@@ -32,7 +34,7 @@ fn limits() -> Limits {
 
 fn objects(with_part: bool, with_looks: bool) -> SemanticMap {
     let mut identities = Identities::default();
-    let doll = identities.add(Level::Object, NOBODY, vec!["doll".into()]);
+    let doll = identities.add(Level::Object, NO_IDENTITY, vec!["doll".into()]);
     if with_part {
         identities.add(Level::Part, doll, vec!["eye".into()]);
     }

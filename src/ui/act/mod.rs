@@ -12,4 +12,3 @@ pub(super) mod remote;
 pub(super) mod train;
 pub(super) mod view;
 pub(super) mod window;
-

@@ -12,8 +12,8 @@ use crate::pipeline::observer::Observer;
 use crate::ui::act::remote;
 use crate::ui::actions::{Action, Pane};
 use crate::ui::app::App;
-use crate::ui::beside::Beside;
 use crate::ui::camera;
+use crate::ui::comparison::ComparedScene;
 use crate::ui::dialogs::{DialogAnswer, Question};
 use crate::ui::file_dialogs::FileRequest;
 use crate::ui::state::{ShownReport, Tone};
@@ -137,15 +137,15 @@ pub(in crate::ui) fn choose_comparison(app: &mut App) {
 /// Shows another scene in the second view, or none.
 pub(in crate::ui) fn compare_scene(app: &mut App, path: Option<PathBuf>) {
     let Some(path) = path else {
-        app.state.beside = None;
+        app.state.comparison = None;
         return;
     };
     app.layout.split_view = true;
     let (workspace, title) = (Arc::clone(&app.workspace), format!("Opening {} beside", file_name(&path)));
     let open = move |observer: &mut dyn Observer| workspace.open_comparison(&path, observer);
     app.start(JobInfo::short(title), open, |app, scene| {
-        app.state.beside = Beside::of(scene);
-        if app.state.beside.is_none() {
+        app.state.comparison = ComparedScene::of(scene);
+        if app.state.comparison.is_none() {
             app.state.toast(Tone::Warning, "There is nothing to compare with: it has no Gaussians.");
         }
     });

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use egui::{Key, Modifiers};
 
 use super::{edits, objects};
-use crate::agent::scene::{Effect, Parts};
+use crate::agent::scene::{AgentScene, Effect};
 use crate::jobs::edit::EditRequest;
 use crate::jobs::export;
 use crate::jobs::phrases::{self, PhrasesRequest, TrueMasks};
@@ -35,7 +35,7 @@ pub(in crate::ui) fn type_query(app: &mut App, ctx: &egui::Context) {
         return;
     }
     // Queries do not go to another scene in the second view.
-    if app.state.beside.is_some() {
+    if app.state.comparison.is_some() {
         app.viewport.queries.work_in(false);
     }
     app.viewport.queries.start_typing();
@@ -159,7 +159,7 @@ pub(in crate::ui) fn send_chat(app: &mut App) {
     };
     let snapshot = Snapshot {
         cloud: cloud.generation(),
-        parts: Parts {
+        parts: AgentScene {
             cloud: Arc::clone(&cloud),
             settings,
             map: Arc::clone(&map),

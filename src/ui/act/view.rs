@@ -11,7 +11,7 @@ use crate::jobs::go_to::{self, ApproachRequest, Approached};
 use crate::navigate::FRAMES;
 use crate::navigate::target::{Side, ViewPreference};
 use crate::pipeline::observer::Observer;
-use crate::scene::{CropBox, Identities, IdentityId, NOBODY, SemanticMap};
+use crate::scene::{CropBox, Identities, IdentityId, NO_IDENTITY, SemanticMap};
 use crate::ui::actions::Pane;
 use crate::ui::app::App;
 use crate::ui::color_by::ColorBy;
@@ -163,7 +163,7 @@ fn objects(app: &mut App) -> Option<Versioned<SemanticMap>> {
 pub(in crate::ui) fn select_sibling(app: &mut App, back: bool) {
     let Some(map) = objects(app) else { return };
     let selected = app.viewport.picking.selected();
-    let parent = selected.and_then(|id| map.identities.get(id)).map_or(NOBODY, |i| i.parent);
+    let parent = selected.and_then(|id| map.identities.get(id)).map_or(NO_IDENTITY, |i| i.parent);
     let list = listed(&map.identities, &app.state.sizes, parent);
     let at = selected.and_then(|id| list.iter().position(|i| *i == id));
     let step = if back { list.len().saturating_sub(1) } else { 1 };

@@ -5,7 +5,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
-use crate::scene::NOBODY;
+use crate::scene::NO_IDENTITY;
 use crate::ui::color_by::ColorBy;
 use crate::worker::{Start, ViewMode};
 
@@ -151,8 +151,8 @@ impl Action {
     pub(crate) fn all() -> Vec<Self> {
         let mut all = Self::plain();
         // These need a tool in use.
-        all.retain(|a| !matches!(a, Self::AddPainted | Self::KeepArranged | Self::DeleteChosen));
-        all.extend([Self::Isolate(None), Self::Paint(Some(NOBODY)), Self::SetCrop(None)]);
+        all.retain(|a| !matches!(a, Self::AddPainted | Self::ApplyTransform | Self::DeleteChosen));
+        all.extend([Self::Isolate(None), Self::SegmentNew(Some(NO_IDENTITY)), Self::SetCrop(None)]);
         all.extend(ViewMode::VARIANTS.iter().map(|mode| Self::Show(*mode)));
         all.extend(Pane::VARIANTS.iter().map(|pane| Self::ShowPane(*pane)));
         all.extend(THEMES.map(Self::UseTheme));

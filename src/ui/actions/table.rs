@@ -12,7 +12,7 @@ use crate::jobs::train::IfChanged;
 use crate::measure::{Knobs, StageName};
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::lifting::edit::Edit;
-use crate::scene::{CropBox, IdentityId, NOBODY};
+use crate::scene::{CropBox, IdentityId, NO_IDENTITY};
 use crate::ui::act::{edit, edits, export, objects, open, query, remote, train, view, window};
 use crate::ui::color_by::ColorBy;
 use crate::ui::history::EditStep;
@@ -139,9 +139,9 @@ actions! {
     DeleteRemoved: "Delete this scene\u{2026}",
         "Delete the scene that was made by removing something, which is shown beside this one. This one stays."
         => objects::ask_to_delete_removed(app);
-    Arrange(id: IdentityId): format!("Move, turn or recolor #{id}"),
+    Transform(id: IdentityId): format!("Transform #{id}"),
         "Drag it along the axes, turn, scale, duplicate or recolor it; can be undone." => edit::transform(app, id);
-    KeepArranged: "Keep the arrangement", "Carry out what the view shows of a moved, duplicated or recolored thing."
+    ApplyTransform: "Apply the transform", "Carry out what the view shows of a moved, duplicated or recolored thing."
         => edit::apply_transform(app);
     MeasureSplats: "Clean: measure Gaussians",
         "Size, shape, opacity and neighbors of each, and what the photos show of it: finds floaters and the like."
@@ -161,9 +161,9 @@ actions! {
             Edit::AddPiece { name, .. } => format!("Add {name}"),
             Edit::Reshape { id, .. } => format!("Correct the extent of #{id}"),
         }, "Correct the segmentation; can be undone." => edit::apply(app, edit);
-    Paint(of: Option<IdentityId>): match *of {
+    SegmentNew(of: Option<IdentityId>): match *of {
             None => "Stop selecting".into(),
-            Some(NOBODY) => "Select a new object".to_owned(),
+            Some(NO_IDENTITY) => "Select a new object".to_owned(),
             Some(id) => format!("Select a new part of #{id}"),
         }, "Click on it or draw a line through it, in any view; name it, and it can be asked for everywhere."
         => edit::segment(app, of);
@@ -212,10 +212,10 @@ actions! {
         => view::toggle_split(app);
     OtherView: "Work in the other view", "Keys, queries and colors act on it from now on.", "0"
         => view::other_view(app);
-    ChooseBeside: "Compare with another scene\u{2026}",
+    ChooseComparison: "Compare with another scene\u{2026}",
         "Show its Gaussians in the second view by the same camera: two trainings of the same photos."
         => open::choose_comparison(app);
-    OpenBeside(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison with another scene".into(),
+    OpenComparison(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison with another scene".into(),
             |p| format!("Compare with the scene {}", p.display())), "Show its Gaussians in the second view."
         => open::compare_scene(app, path);
     ToggleDim: "Dim the rest", "Darken everything except answers and the selection.", "9"

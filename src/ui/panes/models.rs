@@ -11,7 +11,7 @@ use super::super::viewport::Viewport;
 use super::PaneContents;
 use crate::jobs::find_objects::FindSettings;
 use crate::jobs::models::{self, ModelEntry, ModelList, ModelRole, ModelState, SAM2};
-use crate::pipeline::semantics::lifting::build_map::{Carry, REGIONS};
+use crate::pipeline::semantics::lifting::build_map::{MaskPropagation, REGIONS};
 use crate::scene::{Lifting, MaskPrompt};
 use crate::ui::actions::Action;
 use crate::worker::{JobInfo, Stop, Task, Tasks};
@@ -85,9 +85,13 @@ fn choose(ui: &mut Ui, known: &ModelList, finding: &mut FindSettings) {
             .on_hover_text("Used if the photos came without masks and none were chosen.");
         ui.end_row();
         ui.weak("Tracker");
-        let names = [(Carry::Gaussians, "Gaussians"), (Carry::Sam2, "SAM 2"), (Carry::Both, "Gaussians + SAM 2")];
+        let names = [
+            (MaskPropagation::Gaussians, "Gaussians"),
+            (MaskPropagation::Sam2, "SAM 2"),
+            (MaskPropagation::Both, "Gaussians + SAM 2"),
+        ];
         let chosen = names.iter().find(|(c, _)| *c == finding.carry).map_or("", |(_, name)| *name);
-        ui.add_enabled_ui(follows || finding.carry != Carry::Gaussians, |ui| {
+        ui.add_enabled_ui(follows || finding.carry != MaskPropagation::Gaussians, |ui| {
             let combo = egui::ComboBox::from_id_salt("carry").selected_text(chosen).width(180.0).show_ui(ui, |ui| {
                 for (carry, name) in names {
                     ui.selectable_value(&mut finding.carry, carry, name);
@@ -118,7 +122,7 @@ fn choose(ui: &mut Ui, known: &ModelList, finding: &mut FindSettings) {
         ui.end_row();
         let prepared = &mut finding.preparation;
         ui.weak("SAM 2 prompt");
-        ui.add_enabled_ui(finding.carry != Carry::Gaussians, |ui| {
+        ui.add_enabled_ui(finding.carry != MaskPropagation::Gaussians, |ui| {
             ui.horizontal(|ui| {
                 let prompt = prepared.prompt.get_or_insert_default();
                 ui.selectable_value(prompt, MaskPrompt::Mask, "mask");

@@ -11,7 +11,7 @@ use super::super::labels::ScreenNames;
 use super::super::state::AppState;
 use super::super::theme;
 use crate::math::format::{self, NONE, things};
-use crate::scene::findings::{Doubt, Findings, IdentityEvidence};
+use crate::scene::findings::{IdentityEvidence, MaskConflict, SegmentationReport};
 use crate::scene::{Dataset, Identities, IdentityId, SemanticMap, text};
 use crate::ui::actions::Action;
 
@@ -79,7 +79,7 @@ pub(super) struct RowFacts<'a> {
     names: &'a ScreenNames,
     /// Evidence by number.
     facts: &'a [IdentityEvidence],
-    findings: Option<&'a Findings>,
+    findings: Option<&'a SegmentationReport>,
     dataset: Option<&'a Dataset>,
     order: ListOrder,
 }
@@ -104,7 +104,7 @@ impl<'a> RowFacts<'a> {
             match key {
                 SortKey::Photos => fact.photos.map(|n| n as f64),
                 SortKey::Confidence => fact.confidence,
-                SortKey::Doubts => Some(fact.doubts.len() as f64),
+                SortKey::Doubts => Some(fact.conflicts.len() as f64),
                 _ => Some(fact.gaussians as f64),
             }
         };
@@ -134,7 +134,7 @@ impl<'a> RowFacts<'a> {
         match self.order.key {
             SortKey::Photos => (known(fact.photos), "Photos in which it is seen"),
             SortKey::Confidence => (sure(fact), "Mean share of its pixels that is its own"),
-            SortKey::Doubts => (known(Some(fact.doubts.len())), "Photos that disagreed"),
+            SortKey::Doubts => (known(Some(fact.conflicts.len())), "Photos that disagreed"),
             _ => (known(Some(fact.gaussians)), "Gaussians"),
         }
     }
@@ -147,19 +147,20 @@ impl<'a> RowFacts<'a> {
     }
 
     /// Draws a sign on a row with doubts. A click on a doubt opens its photo and selects its identity.
-    pub(super) fn doubts(&self, ui: &mut Ui, id: IdentityId, cx: &mut Ctx<'_>) {
+    pub(super) fn conflicts(&self, ui: &mut Ui, id: IdentityId, cx: &mut Ctx<'_>) {
         let (Some(fact), Some(findings)) = (self.of(id), self.findings) else { return };
-        let doubts: Vec<&Doubt> = fact.doubts.iter().filter_map(|k| findings.doubts().get(*k)).collect();
-        let Some(first) = doubts.first() else { return };
-        let sign = RichText::new(things(doubts.len(), "doubt")).small().color(theme::warning());
-        let name = format!("{} about {}", things(doubts.len(), "doubt"), self.names.full_name(self.identities, id));
+        let conflicts: Vec<&MaskConflict> =
+            fact.conflicts.iter().filter_map(|k| findings.conflicts().get(*k)).collect();
+        let Some(first) = conflicts.first() else { return };
+        let sign = RichText::new(things(conflicts.len(), "doubt")).small().color(theme::warning());
+        let name = format!("{} about {}", things(conflicts.len(), "doubt"), self.names.full_name(self.identities, id));
         let told = |most: usize| {
-            let lines = doubts.iter().take(most).map(|d| self.sentence(findings, d));
+            let lines = conflicts.iter().take(most).map(|d| self.sentence(findings, d));
             lines.collect::<Vec<_>>().join("\n")
         };
         ui.spacing_mut().button_padding.x = 4.0;
         let sign = Button::new(sign).frame_when_inactive(false);
-        if doubts.len() == 1 {
+        if conflicts.len() == 1 {
             if ui.add(sign).on_hover_text(told(1)).accessible_name(name).clicked() {
                 self.go(findings, first, id, cx);
             }
@@ -168,9 +169,9 @@ impl<'a> RowFacts<'a> {
         let (menu, _) = MenuButton::from_button(sign).ui(ui, |ui| {
             ui.set_max_width(340.0);
             egui::ScrollArea::vertical().max_height(300.0).show(ui, |ui| {
-                for doubt in &doubts {
-                    if ui.add(Button::new(self.sentence(findings, doubt)).wrap()).clicked() {
-                        self.go(findings, doubt, id, cx);
+                for conflict in &conflicts {
+                    if ui.add(Button::new(self.sentence(findings, conflict)).wrap()).clicked() {
+                        self.go(findings, conflict, id, cx);
                         ui.close();
                     }
                 }
@@ -179,16 +180,16 @@ impl<'a> RowFacts<'a> {
         menu.on_hover_text(told(5)).accessible_name(name);
     }
 
-    fn sentence(&self, findings: &Findings, doubt: &Doubt) -> String {
+    fn sentence(&self, findings: &SegmentationReport, conflict: &MaskConflict) -> String {
         let name = |id: IdentityId| self.names.full_name(self.identities, id);
-        let photo = text::elided(findings.photo(doubt).rsplit('/').next().unwrap_or_default(), 40);
-        format!("In {photo} {}.", doubt.what.text(name))
+        let photo = text::elided(findings.photo(conflict).rsplit('/').next().unwrap_or_default(), 40);
+        format!("In {photo} {}.", conflict.what.text(name))
     }
 
-    fn go(&self, findings: &Findings, doubt: &Doubt, row: IdentityId, cx: &mut Ctx<'_>) {
+    fn go(&self, findings: &SegmentationReport, conflict: &MaskConflict, row: IdentityId, cx: &mut Ctx<'_>) {
         let is_within = |id: &IdentityId| self.identities.ancestors(*id).any(|at| at == row);
-        let about = doubt.what.about().into_iter().find(is_within);
-        let photo = findings.photo(doubt);
+        let about = conflict.what.about().into_iter().find(is_within);
+        let photo = findings.photo(conflict);
         let place = self.dataset.and_then(|d| d.photos.iter().position(|p| p.name == photo));
         place.into_iter().for_each(|photo| cx.ask(Action::GoToPhoto(photo)));
         cx.ask(Action::Select(about));
@@ -202,22 +203,22 @@ fn sure(fact: &IdentityEvidence) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Level, NOBODY};
+    use crate::scene::{Level, NO_IDENTITY};
 
     #[test]
     fn rows_are_sorted_by_what_is_told_of_them_and_the_unknown_comes_last() {
         let mut all = Identities::default();
         for name in ["mug", "Lamp", "apple"] {
-            all.add(Level::Object, NOBODY, vec![name.into()]);
+            all.add(Level::Object, NO_IDENTITY, vec![name.into()]);
         }
-        let fact = |gaussians, photos, doubts: usize| IdentityEvidence {
+        let fact = |gaussians, photos, conflicts: usize| IdentityEvidence {
             gaussians,
             photos,
             confidence: photos.map(|n| 0.1 * n as f64),
-            doubts: (0..doubts).collect(),
+            conflicts: (0..conflicts).collect(),
         };
         let facts = [fact(9, None, 0), fact(5, Some(3), 0), fact(7, None, 2), fact(6, Some(8), 1)];
-        let (names, findings) = (ScreenNames::default(), Findings::default());
+        let (names, findings) = (ScreenNames::default(), SegmentationReport::default());
         let sorted = |key, reversed| {
             let order = ListOrder { key, reversed };
             let rows = RowFacts {

@@ -17,7 +17,7 @@ use super::object_thumbnails::ObjectThumbnails;
 use crate::math::format::things;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::lifting::edit::Edit;
-use crate::scene::{Identities, IdentityId, NOBODY};
+use crate::scene::{Identities, IdentityId, NO_IDENTITY};
 use crate::ui::actions::Action;
 
 /// Side of a thumbnail, points.
@@ -60,10 +60,10 @@ impl PaneContents for ObjectsPane {
             return show_how_to_begin(ui, cx);
         };
         let identities = &map.identities;
-        let doubts = map.findings.as_ref().map_or(0, |f| f.doubts().len());
+        let conflicts = map.findings.as_ref().map_or(0, |f| f.conflicts().len());
         ui.weak(format!("{}, from the masks of {}", identities.counted(), things(map.seeds.len(), "photo")));
-        if doubts > 0 {
-            let link = ui.link(RichText::new(format!("{} where photos disagreed", things(doubts, "doubt"))));
+        if conflicts > 0 {
+            let link = ui.link(RichText::new(format!("{} where photos disagreed", things(conflicts, "doubt"))));
             if link.on_hover_text("List the affected objects and parts first").clicked() {
                 self.order = ListOrder::by_doubts();
             }
@@ -76,7 +76,7 @@ impl PaneContents for ObjectsPane {
             if visibility.is_partial() && ui.button("Show all").clicked() {
                 cx.ask(Action::Isolate(None));
             }
-            let new = Action::Paint(Some(NOBODY));
+            let new = Action::SegmentNew(Some(NO_IDENTITY));
             if ui.button("Select an object\u{2026}").on_hover_text(new.tooltip()).clicked() {
                 cx.ask(new);
             }
@@ -102,7 +102,7 @@ impl PaneContents for ObjectsPane {
             selected,
             scroll_to,
         };
-        let roots = identities.iter().filter(|(_, i)| i.parent == NOBODY).map(|(id, _)| id).collect();
+        let roots = identities.iter().filter(|(_, i)| i.parent == NO_IDENTITY).map(|(id, _)| id).collect();
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             tree.branches(ui, Id::unique("objects"), roots, cx);
         });
@@ -184,7 +184,7 @@ impl Tree<'_> {
                 ui.label(number).on_hover_text(what);
             });
             let padding = ui.spacing().button_padding.x;
-            self.facts.doubts(ui, id, cx);
+            self.facts.conflicts(ui, id, cx);
             ui.spacing_mut().button_padding.x = padding;
             // In other rows the name uses that space.
             if is_hovered || self.selected == Some(id) || *self.menu_of == Some(id) {
@@ -273,10 +273,10 @@ impl Tree<'_> {
             for (action, text) in [
                 (Action::Change(Edit::Split(id)), "Split"),
                 (Action::Correct(id), "Correct by clicks\u{2026}"),
-                (Action::Paint(Some(id)), "Select a new part\u{2026}"),
+                (Action::SegmentNew(Some(id)), "Select a new part\u{2026}"),
                 (Action::GoToTarget(id, Side::Best), "Go there"),
                 (Action::Isolate(Some(id)), "Isolate"),
-                (Action::Arrange(id), "Move, turn or recolor\u{2026}"),
+                (Action::Transform(id), "Transform\u{2026}"),
                 (Action::Remove(id), "Remove and fill"),
                 (Action::ExportTarget(id), "Export Gaussians\u{2026}"),
             ] {
@@ -328,7 +328,7 @@ fn show_how_to_begin(ui: &mut Ui, cx: &mut Ctx<'_>) {
     if other.on_hover_text(Action::ChooseMasks.tooltip()).clicked() {
         cx.ask(Action::ChooseMasks);
     }
-    let by_clicks = Action::Paint(Some(NOBODY));
+    let by_clicks = Action::SegmentNew(Some(NO_IDENTITY));
     let selects = ui.add_enabled(idle, button("Select by clicks\u{2026}")).on_disabled_hover_text(why);
     if selects.on_hover_text(by_clicks.tooltip()).clicked() {
         cx.ask(by_clicks);

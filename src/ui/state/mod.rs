@@ -7,7 +7,7 @@ use std::sync::Arc;
 pub use self::messages::{ErrorBox, LogLine};
 pub(crate) use self::messages::{Toast, Tone};
 pub use self::running::RunningJob;
-use super::beside::Beside;
+use super::comparison::ComparedScene;
 use super::history::ChangeHistory;
 use super::labels::{PhraseTable, ScreenNames};
 pub(crate) use super::train_history::TrainHistory;
@@ -17,7 +17,7 @@ use crate::jobs::go_to::Explored;
 use crate::jobs::models::ModelList;
 use crate::jobs::rearrange::RearrangedScene;
 use crate::jobs::recent::RunSummary;
-use crate::jobs::remove::RemovedScene;
+use crate::jobs::remove::StoredRemoval;
 use crate::jobs::workspace::TrainedRun;
 use crate::math::format;
 use crate::measure::Report;
@@ -49,9 +49,9 @@ pub struct AppState {
     /// The scene on screen.
     pub scene: Option<Arc<OpenedScene>>,
     /// Another scene in the second view.
-    pub beside: Option<Beside>,
+    pub comparison: Option<ComparedScene>,
     /// The latest scene made by a removal.
-    pub(crate) removed: Option<RemovedScene>,
+    pub(crate) removed: Option<StoredRemoval>,
     /// Counts the scenes shown so far; changes when `scene` does.
     pub(crate) scene_number: u64,
     /// Decisions on what is left out for the scene, with their reasons.
@@ -280,7 +280,7 @@ impl AppState {
             self.remember(scene.path.clone());
         }
         self.scene_number += 1;
-        (self.explored, self.beside, self.removed) = (None, None, None);
+        (self.explored, self.comparison, self.removed) = (None, None, None);
         self.set_facts(scene.facts.clone());
         self.antialias = scene.render.antialias;
         self.set_semantics(scene.semantics.clone());
@@ -355,7 +355,7 @@ impl AppState {
 
     /// Sets the length of a unit, and reports it.
     pub(crate) fn scaled(&mut self, meters: f64, is_stored: bool) {
-        let scaled = |s: &Arc<OpenedScene>| OpenedScene { metres_per_unit: Some(meters), ..(**s).clone() };
+        let scaled = |s: &Arc<OpenedScene>| OpenedScene { meters_per_unit: Some(meters), ..(**s).clone() };
         self.scene = self.scene.as_ref().map(scaled).map(Arc::new);
         let kept = if is_stored { "saved with the scene" } else { "not saved: save or train the scene first" };
         self.toast(Tone::Good, format!("1 unit is {}, {kept}", format::length(1.0, Some(meters))));

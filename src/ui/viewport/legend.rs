@@ -4,7 +4,7 @@ use egui::{Color32, FontId, Mesh, Rect, RichText, Sense, Slider, Stroke, Ui, vec
 
 use super::query::{HATCH, INVENTED, OverlaySettings};
 use crate::math::colormap::Colormap;
-use crate::scene::NOBODY;
+use crate::scene::NO_IDENTITY;
 use crate::ui::actions::Action;
 use crate::ui::color_by::ColorBy;
 use crate::ui::ctx::Ctx;
@@ -71,7 +71,7 @@ fn show_unknown(ui: &mut Ui, share: Option<f64>, photo: Option<&str>, cx: &mut C
         let why = "No mask and no photo says whose it is. Without a color: masks say that it is nobody's.";
         ui.label(RichText::new(text).small()).on_hover_text(why);
     });
-    let mark = share.filter(|s| *s > 0.0).map(|_| ("Mark it\u{2026}", Action::Paint(Some(NOBODY))));
+    let mark = share.filter(|s| *s > 0.0).map(|_| ("Mark it\u{2026}", Action::SegmentNew(Some(NO_IDENTITY))));
     let segment = photo.map(|text| (text, Action::SegmentPhoto));
     if mark.is_some() || segment.is_some() {
         ui.horizontal(|ui| {

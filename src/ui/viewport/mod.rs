@@ -43,12 +43,12 @@ use crate::jobs::OpenedScene;
 use crate::navigate::Pose;
 use crate::render::GpuError;
 use crate::scene::{Camera, GaussianCloud, PhotoPixels};
-use crate::worker::view::{ViewLane, ViewPicture};
+use crate::worker::view::{RenderThread, ViewPicture};
 use crate::worker::{CloudSnapshot, Repaint, Tasks, Versioned};
 
 /// State of the viewport.
 pub struct Viewport {
-    lane: ViewLane,
+    render_thread: RenderThread,
     requests: Requests,
     display: Display,
     eye: Eye,
@@ -84,7 +84,7 @@ impl Viewport {
     pub(crate) fn new(repaint: Repaint) -> std::io::Result<Self> {
         let home = crate::scene::HomeView::default();
         Ok(Self {
-            lane: ViewLane::start(repaint)?,
+            render_thread: RenderThread::start(repaint)?,
             requests: Requests::default(),
             display: Display::default(),
             eye: Eye::framing(&home.bounds, home.up),

@@ -14,8 +14,8 @@ use crate::math::format;
 use crate::models::lama::LAMA;
 use crate::scene::text;
 use crate::ui::actions::Action;
-use crate::ui::beside::Beside;
 use crate::ui::color_by::ColorBy;
+use crate::ui::comparison::ComparedScene;
 use crate::ui::ctx::Ctx;
 use crate::ui::{keys, theme};
 use crate::worker::ViewMode;
@@ -60,12 +60,12 @@ impl ViewCards<'_> {
         let photos = dataset.map_or(0, |d| d.photos.len());
         let (modes, legend) = if second { ("second modes", "second legend") } else { ("modes", "legend") };
         let menus = cx.layout.split_view || rect.width() < NARROW;
-        let is_other = second && state.beside.is_some();
+        let is_other = second && state.comparison.is_some();
         card(ui, rect, modes, Align2::LEFT_TOP, 0.0, |ui| {
             self.modes(ui, menus, is_other, photos > 0, cx);
         });
-        let beside = |p: &ViewPicture| p.second.as_ref().filter(|_| second).map(|other| other.depth_range);
-        let depth = self.display.picture().and_then(|p| beside(p).unwrap_or(p.depth_range));
+        let other_depth = |p: &ViewPicture| p.second.as_ref().filter(|_| second).map(|other| other.depth_range);
+        let depth = self.display.picture().and_then(|p| other_depth(p).unwrap_or(p.depth_range));
         if legend::is_needed(self.queries.settings(), depth) && rect.height() > LOW && !is_other {
             let shares = self.queries.maps().map(|m| [m.unknown_share(), m.invented_share()]);
             let can_segment = dataset.is_some() && state.is_trained();
@@ -77,16 +77,16 @@ impl ViewCards<'_> {
             });
         }
         if second {
-            if let Some(beside) = &state.beside {
-                card(ui, rect, "beside", Align2::RIGHT_TOP, 0.0, |ui| self.beside_bar(ui, beside, cx));
+            if let Some(comparison) = &state.comparison {
+                card(ui, rect, "beside", Align2::RIGHT_TOP, 0.0, |ui| self.comparison_bar(ui, comparison, cx));
             }
             return;
         }
         // In a low view the row is shown only with the name of the photo that the view looks through.
         if photos > 0 && (self.photo.is_some() || rect.height() > LOW) {
             // Beside the modes if there is room and no query box, else below them.
-            let beside = rect.width() > 860.0 && state.semantics.is_none();
-            let (align, down) = if beside { (Align2::RIGHT_TOP, 0.0) } else { (Align2::LEFT_TOP, 46.0) };
+            let has_room = rect.width() > 860.0 && state.semantics.is_none();
+            let (align, down) = if has_room { (Align2::RIGHT_TOP, 0.0) } else { (Align2::LEFT_TOP, 46.0) };
             card(ui, rect, "photo", align, down, |ui| self.photo_bar(ui, photos, cx));
         }
         let now = ui.input(|i| i.time);
@@ -132,11 +132,11 @@ impl ViewCards<'_> {
     }
 
     /// Draws the name of the scene in the second view, and its quality.
-    fn beside_bar(&self, ui: &mut Ui, beside: &Beside, cx: &mut Ctx<'_>) {
+    fn comparison_bar(&self, ui: &mut Ui, comparison: &ComparedScene, cx: &mut Ctx<'_>) {
         let state = cx.state;
-        let removed = state.removed.as_ref().filter(|r| r.folder == beside.path);
-        let name = removed.map_or_else(|| beside.name.clone(), |r| format!("without {}", r.name));
-        let place = format!("{name}\n{}", beside.path.display());
+        let removed = state.removed.as_ref().filter(|r| r.folder == comparison.path);
+        let name = removed.map_or_else(|| comparison.name.clone(), |r| format!("without {}", r.name));
+        let place = format!("{name}\n{}", comparison.path.display());
         ui.label(RichText::new(text::elided(&name, 40)).strong()).on_hover_text(text::lines(&place));
         if let Some(removed) = removed {
             let open = ui.button("Open").on_hover_text("Go on with this scene. The other one stays where it is.");
@@ -153,9 +153,9 @@ impl ViewCards<'_> {
         if let Some(psnr) = self.display.picture().and_then(|p| p.second.as_ref()?.psnr) {
             ui.colored_label(theme::accent(), format!("preview {}", format::decibel(psnr)));
         }
-        let close = ui.button("\u{d7}").on_hover_text(Action::OpenBeside(None).text());
-        if close.accessible_name(Action::OpenBeside(None).text()).clicked() {
-            cx.ask(Action::OpenBeside(None));
+        let close = ui.button("\u{d7}").on_hover_text(Action::OpenComparison(None).text());
+        if close.accessible_name(Action::OpenComparison(None).text()).clicked() {
+            cx.ask(Action::OpenComparison(None));
         }
     }
 
@@ -187,7 +187,7 @@ impl ViewCards<'_> {
                     }
                 }
             });
-            tints.response.on_hover_text("What colors it beside that").accessible_name("Color by");
+            tints.response.on_hover_text("Overlay").accessible_name("Color by");
         } else {
             buttons(ui);
         }

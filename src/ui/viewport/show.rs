@@ -37,7 +37,7 @@ impl Viewport {
         }
         self.display.time_frames(cx.layout.times);
         self.take_frame(ui.ctx());
-        let (now, has_other) = (ui.input(|i| i.time), state.beside.is_some());
+        let (now, has_other) = (ui.input(|i| i.time), state.comparison.is_some());
         let under = views.area_under_pointer(ui, self.fit(views.first), has_other);
         if let Some((tool, mut rest)) = self.tool_in_use() {
             tool.pointer(&response, under, &mut rest, cx);
@@ -90,10 +90,10 @@ impl Viewport {
 
     /// Takes over the newest frame and its identity maps.
     fn take_frame(&mut self, ctx: &egui::Context) {
-        if let Some((maps, exact)) = self.display.take_maps(self.lane.maps(), self.requests.ticket()) {
+        if let Some((maps, exact)) = self.display.take_maps(self.render_thread.maps(), self.requests.ticket()) {
             self.queries.set_maps(maps, exact);
         }
-        self.display.take(ctx, self.lane.pictures());
+        self.display.take(ctx, self.render_thread.pictures());
     }
 
     /// Draws the frames with masks and tints, the photo beside them, and the photos' cameras. Returns true if the
@@ -214,14 +214,14 @@ impl Viewport {
             Some(p) => p.camera().resized(w, h),
             None => self.eye.camera(w, h),
         };
-        let differs = |mode: &ViewMode| *mode != layout.mode || state.beside.is_some();
-        let beside = state.beside.as_ref().filter(|_| layout.split_view);
+        let differs = |mode: &ViewMode| *mode != layout.mode || state.comparison.is_some();
+        let comparison = state.comparison.as_ref().filter(|_| layout.split_view);
         let wanted = ViewRequest {
             cloud,
             camera: camera.limited_to(MAX_SIDE_PX),
             mode: layout.mode,
             second: Some(layout.second_mode).filter(|_| layout.split_view).filter(differs),
-            beside: beside.map(|b| (b.cloud.clone(), b.settings.clone())),
+            comparison: comparison.map(|b| (b.cloud.clone(), b.settings.clone())),
             settings: self.overrides.over(state.render_settings(), self.on_gpu()),
             budget,
             photo: self.photo.as_ref().and_then(PhotoView::pixels),
@@ -235,7 +235,7 @@ impl Viewport {
             ticket: 0,
         };
         if let Some((request, moved)) = self.requests.next(wanted) {
-            self.lane.request(request);
+            self.render_thread.request(request);
             if moved != Moved::Nothing {
                 self.queries.forget_maps(moved == Moved::Eye);
                 self.display.forget_maps();

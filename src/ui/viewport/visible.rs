@@ -4,13 +4,13 @@ use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use super::splat_selection::SplatSelection;
-use crate::scene::{CropBox, GaussianCloud, Identities, IdentityId, NOBODY, SemanticMap};
+use crate::scene::{CropBox, GaussianCloud, Identities, IdentityId, NO_IDENTITY, SemanticMap};
 use crate::worker::Versioned;
 
 /// Visibility of the Gaussians of a scene.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Visibility {
-    /// Identities whose own Gaussians are hidden; `NOBODY` for unlabeled Gaussians.
+    /// Identities whose own Gaussians are hidden; `NO_IDENTITY` for unlabeled Gaussians.
     hidden: BTreeSet<IdentityId>,
     /// Crop box of the rest.
     crop: Option<CropBox>,
@@ -37,7 +37,7 @@ impl Visibility {
 
     /// True if unlabeled Gaussians are hidden: only some objects or parts are shown.
     pub(crate) fn is_isolated(&self) -> bool {
-        self.hidden.contains(&NOBODY)
+        self.hidden.contains(&NO_IDENTITY)
     }
 
     /// True if an identity is drawn with its parts; `None` if only some of them are.
@@ -98,7 +98,7 @@ impl Visibility {
     /// Maps hidden identities to their new numbers: each keeps its code.
     pub(crate) fn renumber(&mut self, old: &Identities, new: &Identities) {
         let now = |id: &IdentityId| match old.get(*id) {
-            None => Some(NOBODY),
+            None => Some(NO_IDENTITY),
             Some(identity) => new.iter().find(|(_, i)| i.code == identity.code).map(|(id, _)| id),
         };
         self.set_hidden(self.hidden.iter().filter_map(now).collect::<Vec<_>>());
@@ -180,10 +180,10 @@ mod tests {
     #[test]
     fn what_is_hidden_is_not_drawn() {
         let mut all = Identities::default();
-        let doll = all.add(Level::Object, NOBODY, vec![]);
+        let doll = all.add(Level::Object, NO_IDENTITY, vec![]);
         let eye = all.add(Level::Part, doll, vec![]);
-        let cat = all.add(Level::Object, NOBODY, vec![]);
-        let map = SemanticMap::from_identities(all, vec![doll, eye, cat, NOBODY], vec![1.0; 4], vec![]);
+        let cat = all.add(Level::Object, NO_IDENTITY, vec![]);
+        let map = SemanticMap::from_identities(all, vec![doll, eye, cat, NO_IDENTITY], vec![1.0; 4], vec![]);
         let map = Versioned::new(Arc::new(map));
         let n = 4;
         let cloud = GaussianCloud::isotropic((0..n).map(|i| [i as f32, 0.0, 0.0]).collect(), 0.0, 0.0);
@@ -231,15 +231,15 @@ mod tests {
         let named = |codes: &[f32]| {
             let mut all = Identities::default();
             for code in codes {
-                let id = all.add(Level::Object, NOBODY, vec![]);
+                let id = all.add(Level::Object, NO_IDENTITY, vec![]);
                 all.get_mut(id).expect("there").code = [*code; 3];
             }
             all
         };
         let (old, new) = (named(&[0.1, 0.2, 0.3]), named(&[0.2, 0.3]));
         let mut v = Visibility::default();
-        v.set_hidden([NOBODY, 1, 3]);
+        v.set_hidden([NO_IDENTITY, 1, 3]);
         v.renumber(&old, &new);
-        assert_eq!(v.hidden().iter().copied().collect::<Vec<_>>(), [NOBODY, 2], "the first is gone");
+        assert_eq!(v.hidden().iter().copied().collect::<Vec<_>>(), [NO_IDENTITY, 2], "the first is gone");
     }
 }

@@ -16,7 +16,7 @@ use fmlgs::agent::tool::{Target, ToolCall};
 use fmlgs::agent::transcript::What;
 use fmlgs::agent::{Planner, Policy, Refusal, Reply, Session, World};
 use fmlgs::navigate::target::Side;
-use fmlgs::scene::NOBODY;
+use fmlgs::scene::NO_IDENTITY;
 use serde::{Deserialize, Serialize};
 
 const WORDINGS: &str = include_str!("../../data/agent_commands.toml");
@@ -204,7 +204,7 @@ fn things_are_called_by_their_names_as_a_whole() {
     let mut room = Room::new();
     let mut ids = Vec::new();
     for [thing, part] in HARD {
-        let whole = room.put(NOBODY, thing);
+        let whole = room.put(NO_IDENTITY, thing);
         ids.extend([(whole, thing), (room.put(whole, part), part)]);
     }
     let mut wrong = String::new();
@@ -229,7 +229,7 @@ fn things_are_called_by_their_names_as_a_whole() {
     // The control: what is nobody's name is no one's, and two of the same name are asked about and told apart.
     let reply = say(&mut session(), &mut room, "show me the pink bow on the plush toy's foot");
     assert!(reply.refused.is_some(), "{}", reply.text);
-    let twins = [room.put(NOBODY, "bow on the hat"), room.put(NOBODY, "bow on the hat")];
+    let twins = [room.put(NO_IDENTITY, "bow on the hat"), room.put(NO_IDENTITY, "bow on the hat")];
     let mut session = session();
     assert_eq!(say(&mut session, &mut room, "show me the bow on the hat").candidates, twins);
     let second = room.identities().full_name(twins[1]);
@@ -241,7 +241,7 @@ fn things_are_called_by_their_names_as_a_whole() {
 fn a_completion_that_is_taken_finds_what_it_names() {
     let mut room = Room::new();
     HARD.iter().for_each(|[thing, part]| {
-        let whole = room.put(NOBODY, thing);
+        let whole = room.put(NO_IDENTITY, thing);
         room.put(whole, part);
     });
     for (begun, full) in [

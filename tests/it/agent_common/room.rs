@@ -7,7 +7,7 @@ use fmlgs::agent::world::{locate_by_names, locate_with};
 use fmlgs::navigate::target::Side;
 use fmlgs::pipeline::semantics::query::answer::QueryAnswer;
 use fmlgs::scene::LevelFilter;
-use fmlgs::scene::{Bounds, Identities, IdentityId, LanguageFeatures, Level, NOBODY, ViewFeatures};
+use fmlgs::scene::{Bounds, Identities, IdentityId, LanguageFeatures, Level, NO_IDENTITY, ViewFeatures};
 use glam::{DQuat, DVec3};
 
 /// A name that tries to give orders.
@@ -35,7 +35,7 @@ pub struct Room {
 impl Room {
     /// Adds a thing: its middle's x and y, its bottom, and its size.
     fn add(&mut self, whole: IdentityId, names: &[&str], at: [f64; 3], size: [f64; 3]) -> IdentityId {
-        let level = if whole == NOBODY { Level::Object } else { Level::Part };
+        let level = if whole == NO_IDENTITY { Level::Object } else { Level::Part };
         let id = self.identities.add(level, whole, names.iter().map(|n| (*n).to_owned()).collect());
         let (at, size) = (DVec3::from(at), DVec3::from(size));
         let half = DVec3::new(size.x * 0.5, size.y * 0.5, 0.0);
@@ -58,50 +58,50 @@ impl Room {
             encoder: Some("demo"),
         };
         let top = 0.75;
-        let table = r.add(NOBODY, &["table"], [0.0, 0.0, 0.0], [2.2, 0.9, top]);
+        let table = r.add(NO_IDENTITY, &["table"], [0.0, 0.0, 0.0], [2.2, 0.9, top]);
         r.add(table, &["drawer"], [0.0, -0.4, 0.55], [0.5, 0.1, 0.15]);
-        let kettle = r.add(NOBODY, &["kettle"], [-0.75, 0.1, top], [0.2, 0.2, 0.25]);
+        let kettle = r.add(NO_IDENTITY, &["kettle"], [-0.75, 0.1, top], [0.2, 0.2, 0.25]);
         r.add(kettle, &["handle"], [-0.83, 0.1, top + 0.05], [0.04, 0.04, 0.15]);
         r.add(kettle, &["lid"], [-0.75, 0.1, top + 0.22], [0.12, 0.12, 0.03]);
         r.add(kettle, &["spout"], [-0.67, 0.1, top + 0.1], [0.05, 0.04, 0.08]);
-        let mug = r.add(NOBODY, &["mug"], [-0.38, 0.0, top], [0.1, 0.08, 0.1]);
+        let mug = r.add(NO_IDENTITY, &["mug"], [-0.38, 0.0, top], [0.1, 0.08, 0.1]);
         r.add(mug, &["handle"], [-0.34, 0.0, top + 0.02], [0.02, 0.02, 0.06]);
-        let laptop = r.add(NOBODY, &["laptop"], [0.05, 0.15, top], [0.35, 0.25, 0.24]);
+        let laptop = r.add(NO_IDENTITY, &["laptop"], [0.05, 0.15, top], [0.35, 0.25, 0.24]);
         r.add(laptop, &["screen"], [0.05, 0.26, top + 0.02], [0.33, 0.03, 0.22]);
         r.add(laptop, &["keyboard"], [0.05, 0.1, top], [0.33, 0.2, 0.02]);
-        let red = r.add(NOBODY, &["red controller"], [0.48, -0.2, top], [0.15, 0.1, 0.05]);
+        let red = r.add(NO_IDENTITY, &["red controller"], [0.48, -0.2, top], [0.15, 0.1, 0.05]);
         r.add(red, &["button a"], [0.52, -0.2, top + 0.04], [0.01, 0.01, 0.01]);
         r.add(red, &["button b"], [0.54, -0.18, top + 0.04], [0.01, 0.01, 0.01]);
         r.add(red, &["left stick"], [0.44, -0.2, top + 0.04], [0.02, 0.02, 0.02]);
-        let blue = r.add(NOBODY, &["blue controller"], [0.85, -0.2, top], [0.15, 0.1, 0.05]);
+        let blue = r.add(NO_IDENTITY, &["blue controller"], [0.85, -0.2, top], [0.15, 0.1, 0.05]);
         r.add(blue, &["button a"], [0.89, -0.2, top + 0.04], [0.01, 0.01, 0.01]);
         r.add(blue, &["left stick"], [0.81, -0.2, top + 0.04], [0.02, 0.02, 0.02]);
-        let vase = r.add(NOBODY, &["vase", "vase with water"], [0.5, 0.25, top], [0.12, 0.12, 0.3]);
+        let vase = r.add(NO_IDENTITY, &["vase", "vase with water"], [0.5, 0.25, top], [0.12, 0.12, 0.3]);
         r.add(vase, &["water"], [0.5, 0.25, top + 0.02], [0.1, 0.1, 0.2]);
-        let knife = r.add(NOBODY, &["knife"], [-0.1, -0.3, top], [0.25, 0.03, 0.02]);
+        let knife = r.add(NO_IDENTITY, &["knife"], [-0.1, -0.3, top], [0.25, 0.03, 0.02]);
         r.add(knife, &["blade"], [-0.02, -0.3, top], [0.14, 0.03, 0.02]);
-        let candle = r.add(NOBODY, &["candle"], [0.9, 0.25, top], [0.06, 0.06, 0.15]);
+        let candle = r.add(NO_IDENTITY, &["candle"], [0.9, 0.25, top], [0.06, 0.06, 0.15]);
         r.add(candle, &["flame"], [0.9, 0.25, top + 0.13], [0.01, 0.01, 0.02]);
-        r.add(NOBODY, &["chair"], [-2.0, 0.5, 0.0], [0.5, 0.5, 0.5]);
-        let doll = r.add(NOBODY, &["doll"], [-2.0, 0.5, 0.5], [0.2, 0.15, 0.4]);
+        r.add(NO_IDENTITY, &["chair"], [-2.0, 0.5, 0.0], [0.5, 0.5, 0.5]);
+        let doll = r.add(NO_IDENTITY, &["doll"], [-2.0, 0.5, 0.5], [0.2, 0.15, 0.4]);
         let face = r.add(doll, &["face"], [-2.0, 0.44, 0.75], [0.1, 0.02, 0.1]);
         r.add(face, &["left eye"], [-1.97, 0.43, 0.8], [0.02, 0.01, 0.02]);
         r.add(face, &["right eye"], [-2.03, 0.43, 0.8], [0.02, 0.01, 0.02]);
         r.add(doll, &["dress"], [-2.0, 0.5, 0.52], [0.2, 0.15, 0.2]);
-        let lamp = r.add(NOBODY, &["lamp"], [1.6, 0.5, 0.0], [0.4, 0.4, 1.6]);
+        let lamp = r.add(NO_IDENTITY, &["lamp"], [1.6, 0.5, 0.0], [0.4, 0.4, 1.6]);
         r.add(lamp, &["shade"], [1.6, 0.5, 1.3], [0.4, 0.4, 0.3]);
         r.add(lamp, &["switch"], [1.6, 0.3, 1.0], [0.02, 0.02, 0.04]);
-        r.add(NOBODY, &["curtain"], [0.0, 3.0, 0.0], [2.0, 0.1, 2.2]);
-        r.add(NOBODY, &["green bottle"], [-0.55, -0.25, top], [0.07, 0.07, 0.18]);
-        r.add(NOBODY, &["brown bottle"], [0.28, -0.25, top], [0.08, 0.08, 0.3]);
-        r.add(NOBODY, &["ball"], [0.1, 0.0, 0.0], [0.2, 0.2, 0.2]);
-        let shelf = r.add(NOBODY, &["bookshelf"], [2.3, 1.8, 0.0], [0.8, 0.3, 1.8]);
+        r.add(NO_IDENTITY, &["curtain"], [0.0, 3.0, 0.0], [2.0, 0.1, 2.2]);
+        r.add(NO_IDENTITY, &["green bottle"], [-0.55, -0.25, top], [0.07, 0.07, 0.18]);
+        r.add(NO_IDENTITY, &["brown bottle"], [0.28, -0.25, top], [0.08, 0.08, 0.3]);
+        r.add(NO_IDENTITY, &["ball"], [0.1, 0.0, 0.0], [0.2, 0.2, 0.2]);
+        let shelf = r.add(NO_IDENTITY, &["bookshelf"], [2.3, 1.8, 0.0], [0.8, 0.3, 1.8]);
         let _ = shelf;
-        r.add(NOBODY, &["book"], [2.3, 1.8, 1.0], [0.05, 0.2, 0.3]);
-        r.add(NOBODY, &[ATTACK], [-1.0, 3.0, 1.2], [0.6, 0.02, 0.8]);
-        let piano = r.add(NOBODY, &["piano"], [0.0, -5.0, 0.0], [1.5, 0.6, 1.2]);
+        r.add(NO_IDENTITY, &["book"], [2.3, 1.8, 1.0], [0.05, 0.2, 0.3]);
+        r.add(NO_IDENTITY, &[ATTACK], [-1.0, 3.0, 1.2], [0.6, 0.02, 0.8]);
+        let piano = r.add(NO_IDENTITY, &["piano"], [0.0, -5.0, 0.0], [1.5, 0.6, 1.2]);
         r.add(piano, &["keys"], [0.0, -4.7, 0.7], [1.2, 0.15, 0.05]);
-        r.add(NOBODY, &[], [1.3, -0.6, 0.0], [0.2, 0.2, 0.2]);
+        r.add(NO_IDENTITY, &[], [1.3, -0.6, 0.0], [0.2, 0.2, 0.2]);
         let count = r.boxes.len();
         r.hidden = vec![false; count];
         r.removed = vec![false; count];
@@ -178,7 +178,7 @@ impl World for Room {
         Viewpoint { eye: self.eye, forward: self.forward, up: DVec3::Z }
     }
 
-    fn metres_per_unit(&self) -> Option<f64> {
+    fn meters_per_unit(&self) -> Option<f64> {
         self.meters
     }
 

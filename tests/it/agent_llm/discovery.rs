@@ -17,7 +17,7 @@ fn servers_on_this_machine_are_found_and_tested_and_nothing_of_a_scene_is_sent()
     let tried = |script: Vec<Say>, model: &str| {
         let server = Server::new(script);
         let settings = LlmSettings { base_url: server.url.clone(), model: model.into(), ..LlmSettings::default() };
-        (test(&settings, &patience(), &never), server)
+        (test(&settings, &timeouts(), &never), server)
     };
     let (well, server) = tried(vec![list(), text("OK")], "qwen3");
     assert!(well.is_ok_and(|t| t.contains("qwen3 answers")));
@@ -33,5 +33,5 @@ fn servers_on_this_machine_are_found_and_tested_and_nothing_of_a_scene_is_sent()
         assert!(problem.contains(says), "{says}: {problem}");
     }
     let nobody = LlmSettings { base_url: "http://127.0.0.1:9/v1".into(), model: "m".into(), ..LlmSettings::default() };
-    assert!(test(&nobody, &patience(), &never).expect_err("nobody there").contains("start the server"));
+    assert!(test(&nobody, &timeouts(), &never).expect_err("nobody there").contains("start the server"));
 }

@@ -14,14 +14,14 @@ use crate::agent_common::server::{Say, Server};
 use crate::agent_common::table::{Table, Turn, ask, outcome};
 use fmlgs::agent::llm::Llm;
 use fmlgs::agent::llm::secret::Secret;
-use fmlgs::agent::llm::settings::{LlmSettings, RequestLimits, RequestPatience};
+use fmlgs::agent::llm::settings::{LlmSettings, RequestLimits, RequestTimeouts};
 use fmlgs::agent::{AgentEvent, Policy, RefusalKind, Reply, Session, World};
 use serde_json::{Value, json};
 
 const KEY: &str = "sk-test/0123456789abcdef+Q";
 
-fn patience() -> RequestPatience {
-    RequestPatience {
+fn timeouts() -> RequestTimeouts {
+    RequestTimeouts {
         stall: Duration::from_millis(300),
         answer: Duration::from_secs(3),
         request: Duration::from_secs(10),
@@ -33,7 +33,7 @@ fn patience() -> RequestPatience {
 
 fn session_with(server: &Server, policy: Policy, limits: RequestLimits) -> Session {
     let settings = LlmSettings { base_url: server.url.clone(), model: "test".into(), ..LlmSettings::default() };
-    let planner = Llm::with(settings, Secret::new(KEY), patience(), limits).expect("settings");
+    let planner = Llm::with(settings, Secret::new(KEY), timeouts(), limits).expect("settings");
     Session::new(policy, Box::new(planner))
 }
 
@@ -295,7 +295,7 @@ fn the_key_goes_into_the_header_and_nowhere_else() {
     // The control: without the key's own redaction the same talk shows it.
     let server = Server::new(vec![Say::EchoKey]);
     let settings = LlmSettings { base_url: server.url.clone(), model: "m".into(), ..LlmSettings::default() };
-    let planner = Llm::with(settings, None, patience(), RequestLimits::default()).expect("settings");
+    let planner = Llm::with(settings, None, timeouts(), RequestLimits::default()).expect("settings");
     let mut open = Session::new(Policy::built_in().expect("policy"), Box::new(planner));
     let reply = open.say(&mut Room::new(), &format!("my key is {KEY}"), &mut |_| {}, &AtomicBool::new(false));
     assert!(reply.text.contains("none") && open.transcript().to_json().contains(KEY));
@@ -358,7 +358,7 @@ fn a_question_of_the_model_stays_on_one_line() {
 fn a_request_can_be_ended_while_the_server_is_silent() {
     let server = Server::new(vec![Say::Silence]);
     let settings = LlmSettings { base_url: server.url.clone(), model: "m".into(), ..LlmSettings::default() };
-    let slow = RequestPatience { stall: Duration::from_secs(15), answer: Duration::from_secs(15), ..patience() };
+    let slow = RequestTimeouts { stall: Duration::from_secs(15), answer: Duration::from_secs(15), ..timeouts() };
     let planner = Llm::with(settings, None, slow, RequestLimits::default()).expect("settings");
     let mut session = Session::new(Policy::built_in().expect("policy"), Box::new(planner));
     let cancel = Arc::new(AtomicBool::new(false));

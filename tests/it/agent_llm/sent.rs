@@ -6,10 +6,10 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
 use fmlgs::agent::llm::SENT;
-use fmlgs::agent::scene::{Parts, SceneWorld};
+use fmlgs::agent::scene::{AgentScene, SceneWorld};
 use fmlgs::navigate::Pose;
 use fmlgs::render::RenderSettings;
-use fmlgs::scene::{Camera, GaussianCloud, Identities, Level, NOBODY, SemanticMap};
+use fmlgs::scene::{Camera, GaussianCloud, Identities, Level, NO_IDENTITY, SemanticMap};
 use glam::{DMat3, DVec2, DVec3};
 use serde_json::{Value, json};
 
@@ -19,7 +19,7 @@ use crate::agent_common::server::Server;
 /// A kettle with a handle before a camera, in a scene whose exports go to `exports`.
 fn kettle(exports: &Path) -> SceneWorld {
     let mut identities = Identities::default();
-    let kettle = identities.add(Level::Object, NOBODY, vec!["kettle".into(), "pot".into()]);
+    let kettle = identities.add(Level::Object, NO_IDENTITY, vec!["kettle".into(), "pot".into()]);
     let handle = identities.add(Level::Part, kettle, vec!["handle".into()]);
     let of: Vec<u32> = (0..64).map(|i| if i % 4 == 0 { handle } else { kettle }).collect();
     let place = |i: usize| [(i % 4) as f32 * 0.1, (i / 4 % 4) as f32 * 0.1, 3.0 + (i / 16) as f32 * 0.1];
@@ -33,7 +33,7 @@ fn kettle(exports: &Path) -> SceneWorld {
         world_from_camera: DMat3::IDENTITY,
         center: DVec3::ZERO,
     };
-    let parts = Parts {
+    let parts = AgentScene {
         cloud: Arc::new(cloud),
         settings: RenderSettings::default(),
         map: Arc::new(SemanticMap::from_identities(identities, of, vec![1.0; 64], Vec::new())),
@@ -132,7 +132,7 @@ fn what_is_sent_is_what_the_readme_says() {
                     "identities",
                     "in_view",
                     "left_out",
-                    "metres_are_known",
+                    "meters_are_known",
                     "names",
                     "part_of",
                     "spoken_of_last",

@@ -75,23 +75,23 @@ fn photos_that_training_saw_are_marked() {
     let folder = folder();
     let (photos, scene) = (folder.path().join("photos"), folder.path().join("scene"));
     ObjectPhotos { backdrop: Some([90, 120, 60]), views: 12, ..ObjectPhotos::default() }.nerfstudio(&photos, |_, _| {});
-    train(&photos, &scene, "20", &["--holdout-every", "4", "--random-points", "500"]);
+    train(&photos, &scene, "20", &["--held-out-every", "4", "--random-points", "500"]);
     let rows = |more: &[&str]| fmlgs(&[&["eval", text(&scene)], more].concat()).ok().stdout;
 
     let own = rows(&[]);
     assert!(own.contains("mean of 3") && !own.contains("trained on"), "{own}");
     // Photo 0 was held out then, too; photo 6 was not.
-    let others = rows(&["--holdout-every", "6"]);
+    let others = rows(&["--held-out-every", "6"]);
     assert!(others.contains("06.png (trained on)") && !others.contains("00.png (trained on)"), "{others}");
     assert!(others.contains("mean of 1 held out") && others.contains("mean of 1 trained on"), "{others}");
 
-    let measured = eval(&scene, &["--holdout-every", "6"]);
+    let measured = eval(&scene, &["--held-out-every", "6"]);
     let (held_out, trained_on) = (&measured["held_out"], &measured["trained_on"]);
     assert_eq!((&held_out["views"], &trained_on["views"]), (&json!(1), &json!(1)));
     assert_eq!(held_out["psnr"], measured["views"][0]["psnr"]);
     assert_eq!(trained_on["psnr"], measured["views"][1]["psnr"]);
     assert_eq!([0_usize, 1].map(|i| &measured["views"][i]["trained_on"]), [&json!(false), &json!(true)]);
-    let all = eval(&scene, &["--holdout-every", "0"]);
+    let all = eval(&scene, &["--held-out-every", "0"]);
     assert_eq!((&all["held_out"]["views"], &all["trained_on"]["views"]), (&json!(3), &json!(9)));
     let own = eval(&scene, &[]);
     assert_eq!((&own["held_out"]["views"], &own["trained_on"]), (&json!(3), &Value::Null));
@@ -102,19 +102,19 @@ fn a_set_that_marks_its_test_photos_is_split_in_no_other_way() {
     let folder = folder();
     let photos = tiny_dataset(folder.path());
     let (out, scene) = (folder.path().join("out"), folder.path().join("scene"));
-    let why = ["--holdout-every has no effect here", "marks 2 of its 16 photos as test", "Leave the option out"];
+    let why = ["--held-out-every has no effect here", "marks 2 of its 16 photos as test", "Leave the option out"];
     let refused = |arguments: &[&str]| {
         let said = fmlgs(arguments).fails_with(2).stderr;
         why.iter().for_each(|words| assert!(said.contains(words), "{arguments:?}: {said}"));
     };
     for every in ["0", "2"] {
-        refused(&["train", text(&photos), "--out", text(&out), "--steps", "5", "--holdout-every", every]);
+        refused(&["train", text(&photos), "--out", text(&out), "--steps", "5", "--held-out-every", every]);
         assert!(!out.exists());
     }
     train(&photos, &scene, "5", &[]);
-    refused(&["eval", text(&scene), "--holdout-every", "2"]);
+    refused(&["eval", text(&scene), "--held-out-every", "2"]);
     // All photos, however they are marked.
-    let all = eval(&scene, &["--holdout-every", "0"]);
+    let all = eval(&scene, &["--held-out-every", "0"]);
     assert_eq!((&all["held_out"]["views"], &all["trained_on"]["views"]), (&json!(2), &json!(14)));
 
     // The control: without marks it is every second one.
@@ -123,6 +123,6 @@ fn a_set_that_marks_its_test_photos_is_split_in_no_other_way() {
             all.as_object_mut().expect("an object").remove(name);
         }
     });
-    train(&photos, &out, "5", &["--holdout-every", "2"]);
+    train(&photos, &out, "5", &["--held-out-every", "2"]);
     assert_eq!(eval(&out, &[])["held_out"]["views"], 8);
 }

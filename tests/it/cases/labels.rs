@@ -31,7 +31,7 @@ fn found(out: &Path, photos: &Path, labels: &Path) -> (PathBuf, Value) {
         "60",
         "--backend",
         "cpu",
-        "--holdout-every",
+        "--held-out-every",
         "0",
         "--max-side",
         "84",

@@ -49,7 +49,7 @@ fn outside(scene: &Path, scale: f64) -> usize {
 fn drawn_alpha(scene: &Path, camera: &str, photo: &image::RgbaImage) -> [f64; 2] {
     let picture = scene.join("alpha.png");
     let (scene, out) = (scene.to_str().expect("UTF-8"), picture.to_str().expect("UTF-8"));
-    fmlgs(&["render", scene, "--camera", camera, "--what", "alpha", "--out", out]).ok();
+    fmlgs(&["render", scene, "--camera", camera, "--channel", "alpha", "--out", out]).ok();
     let drawn = image::open(&picture).expect("picture").to_luma8();
     assert_eq!(drawn.dimensions(), photo.dimensions());
     [0_u8, 255].map(|value| {
@@ -117,14 +117,14 @@ fn the_cut_out_thing_of_a_report_stands_alone() {
     assert_eq!(info(&data)["alpha"], "empty");
     let folder = folder();
     let out = folder.path().join("scene");
-    let done = train(&data, &out, 1000, &["--holdout-every", "0"]);
+    let done = train(&data, &out, 1000, &["--held-out-every", "0"]);
     assert!(done.stderr.contains("Transparent pixels are kept empty"), "{}", done.stderr);
     let photo = image::open(data.join("images/img_05.png")).expect("photo").to_rgba8();
     let [outside, inside] = drawn_alpha(&out, "5", &photo);
     assert!(outside < 0.05 && inside > 0.9, "{outside} {inside}");
     // Negative control, and the option: what is passed over is filled with anything.
     let out = folder.path().join("ignored");
-    train(&data, &out, 400, &["--holdout-every", "0", "--alpha", "ignore"]);
+    train(&data, &out, 400, &["--held-out-every", "0", "--alpha", "ignore"]);
     let [outside, _] = drawn_alpha(&out, "5", &photo);
     assert!(outside > 0.3, "{outside}");
 }
@@ -250,7 +250,7 @@ fn photos_whose_masks_are_all_black_are_left_out_and_named() {
         GrayImage::from_pixel(24, 24, Luma([value])).save(path).expect("save");
     };
     let out = |name: &str| folder.path().join(name);
-    let said = |name: &str, every: &str| train(&data, &out(name), 20, &["--holdout-every", every]).stderr;
+    let said = |name: &str, every: &str| train(&data, &out(name), 20, &["--held-out-every", every]).stderr;
     (0..10).for_each(|i| mask(i, 255));
     assert!(!said("all", "0").contains("show nothing"), "the control");
     mask(3, 0);
@@ -258,7 +258,7 @@ fn photos_whose_masks_are_all_black_are_left_out_and_named() {
     assert!(one.contains("1 of 10 photos show nothing and are left out") && one.contains("03.png"), "{one}");
     assert_eq!(one.matches("show nothing").count(), 1, "{one}");
     // The same run goes on: it is the same photo that is left out.
-    train(&data, &out("one"), 40, &["--holdout-every", "0", "--go-on"]);
+    train(&data, &out("one"), 40, &["--held-out-every", "0", "--go-on"]);
     // One that is held out is no reason to stop either.
     (0..10).for_each(|i| mask(i, 255));
     mask(0, 0);

@@ -39,7 +39,7 @@ impl Rendered {
             "2",
             "--points",
             "16000",
-            "--views",
+            "--view-count",
             &views,
             "--size",
             &size,

@@ -14,7 +14,7 @@ fn a_start_at_half_the_size_ends_nearly_as_well() {
     let photos = photos.to_str().unwrap();
     // A scene with detail: plain boxes are nearly as good at half the size.
     let shelf = concat!(env!("CARGO_MANIFEST_DIR"), "/assets/eval/shelf.glb");
-    let size = ["--views", "16", "--size", "64x48", "--samples", "1", "--points", "500", "-q"];
+    let size = ["--view-count", "16", "--size", "64x48", "--samples", "1", "--points", "500", "-q"];
     Done::from(command(&[&["synth", shelf, "--out", photos][..], &size[..]].concat()).output().unwrap()).ok();
     let psnr = |name: &str, more: &[&str]| -> f64 {
         let scene = folder.path().join(name);
@@ -91,7 +91,7 @@ fn every_stage_is_measured_and_resumed() {
     everything_is_exported(&run, &scene, &at("everything"));
 
     let wanted = ["report", &scene, "--masks", photos, "--max-side", "64", "--steps", "20", "--train-steps", "20"];
-    let rest = ["--views", "1", "--stages", "render,train,features,query,path", "--out", &out, "-q"];
+    let rest = ["--view-count", "1", "--stages", "render,train,features,query,path", "--out", &out, "-q"];
     let read = || -> Value { serde_json::from_slice(&std::fs::read(format!("{out}/report.json")).unwrap()).unwrap() };
 
     // No time at all still leaves a whole report behind, which says that it is not complete.
@@ -169,12 +169,12 @@ fn everything_is_exported(run: &dyn Fn(&[&str]) -> Done, scene: &str, out: &str)
         assert!(scores["views"].as_u64() > Some(0) && scores["miou"].as_f64() > Some(0.9), "{labels}: {scores}");
     }
     let packed =
-        ["segment", scene, "--all", "--out", &format!("{out}_spz"), "--format", "spz", "--photos", "none", "-q"];
+        ["segment", scene, "--all", "--out", &format!("{out}_spz"), "--format", "spz", "--views", "none", "-q"];
     assert!(run(&packed).ok().stdout.contains("objects and parts as .spz"));
     let files = std::fs::read_dir(format!("{out}_spz/gaussians")).unwrap();
     assert!(files.map(|f| f.unwrap().file_name()).all(|name| name.to_string_lossy().ends_with(".spz")));
     // Again over itself, not over what is somebody's.
-    run(&["segment", scene, "--all", "--out", out, "--masks", "coco", "--photos", "none", "-q"]).ok();
+    run(&["segment", scene, "--all", "--out", out, "--masks", "coco", "--views", "none", "-q"]).ok();
     assert_eq!(std::fs::read_dir(format!("{out}/isat")).unwrap().count(), 0, "of the export before");
     std::fs::write(format!("{out}/coco.json"), "mine").unwrap();
     run(&["segment", scene, "--all", "--out", out, "-q"]).fails_with(2);

@@ -287,7 +287,7 @@ fn no_result_replaces_what_was_read_or_what_somebody_else_made() {
     std::fs::create_dir(&mine).unwrap();
     std::fs::write(mine.join("transforms.json"), "{}").unwrap();
     let glb = folder.path().join("boxes.glb");
-    let synth = ["synth", glb.to_str().unwrap(), "--views", "2", "--size", "16x16", "-q", "--out"];
+    let synth = ["synth", glb.to_str().unwrap(), "--view-count", "2", "--size", "16x16", "-q", "--out"];
     let done = fmlgs(&[&synth[..], &[mine.to_str().unwrap()]].concat()).fails_with(1);
     assert!(done.stderr.contains("choose another folder"), "{}", done.stderr);
     assert_eq!(std::fs::read_dir(&mine).unwrap().count(), 1);

@@ -173,7 +173,7 @@ fn a_scene_trained_anew_without_a_thing() {
     fmlgs(&["query", &whole, "box 2"]).ok();
     // It trained on photos of its own, in which other things are as they were and the box is not.
     let eval = |scene: &str, photos: &str| {
-        let all = ["eval", scene, "--photos", photos, "--holdout-every", "0", "--json"];
+        let all = ["eval", scene, "--photos", photos, "--held-out-every", "0", "--json"];
         fmlgs(&all).ok().json()["psnr"].as_f64().unwrap()
     };
     let own = at("whole/photos");
@@ -293,7 +293,7 @@ fn photos_being_made() {
     let glb = folder.path().join("boxes.glb");
     let (glb, out) = (glb.to_str().unwrap(), photos.to_str().unwrap());
     let arguments = |views: &str| {
-        let all = ["synth", glb, "--out", out, "--views", views, "--size", "64x48", "--samples", "2", "-q"];
+        let all = ["synth", glb, "--out", out, "--view-count", views, "--size", "64x48", "--samples", "2", "-q"];
         command(&all)
     };
     let longest = time(&mut arguments("24"));

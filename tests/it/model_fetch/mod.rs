@@ -10,12 +10,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
-use fmlgs::models::fetch::{FetchError, FileToFetch, MOST_UNPROMISED, Patience, fetch, sha256};
+use fmlgs::models::fetch::{FetchError, FileToFetch, MOST_UNPROMISED, Timeouts, fetch, sha256};
 
 use self::server::{ENDLESS, Server, Turn, content, server};
 
-fn impatient() -> Patience {
-    Patience { stall: Duration::from_millis(300), attempts: 3, pause: Duration::from_millis(5) }
+fn impatient() -> Timeouts {
+    Timeouts { stall: Duration::from_millis(300), attempts: 3, pause: Duration::from_millis(5) }
 }
 
 struct Place {
@@ -249,7 +249,7 @@ fn what_dribbles_is_as_good_as_silent() {
 fn a_silent_download_ends_when_somebody_asks() {
     // Generous, yet shorter than the server's silence and the download's patience.
     const SOON: Duration = Duration::from_secs(10);
-    let patient = Patience { stall: Duration::from_secs(60), ..impatient() };
+    let patient = Timeouts { stall: Duration::from_secs(60), ..impatient() };
     for (turn, kept) in [(Turn::Silent, 0), (Turn::StallAfter(10_000), 10_000), (Turn::DribbleAfter(10_000), 10_000)] {
         let (s, p) = (server(&[turn]), place());
         let wanted = FileToFetch { url: &s.url, to: &p.to, bytes: Some(200_000), most: MOST_UNPROMISED, sha256: None };
@@ -269,7 +269,7 @@ fn a_silent_download_ends_when_somebody_asks() {
     }
     // The pause before another attempt, too.
     let (s, p) = (server(&[Turn::Status(503)]), place());
-    let slow = Patience { pause: Duration::from_secs(60), ..impatient() };
+    let slow = Timeouts { pause: Duration::from_secs(60), ..impatient() };
     let begin = Instant::now();
     let wanted = FileToFetch { url: &s.url, to: &p.to, bytes: None, most: MOST_UNPROMISED, sha256: None };
     let error = fetch(&wanted, slow, &mut |_, _| s.log.lock().expect("log").is_empty()).expect_err("ended");

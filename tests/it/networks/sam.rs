@@ -123,7 +123,7 @@ fn options(settings: &Value, area: &Value, per_side: &Value) -> AutomaticOptions
         crop_point_divisor: 1,
         crop_nms: number("crop_nms_thresh"),
         least_region_px: area.as_u64().expect("an area") as usize,
-        sparing: false,
+        adaptive: false,
     }
 }
 

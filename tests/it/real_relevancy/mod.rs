@@ -9,9 +9,11 @@ use fmlgs::math::vector::{dot, unit};
 use fmlgs::pipeline::semantics::query::by_embedding::EmbeddingScorer;
 use fmlgs::pipeline::semantics::query::localize::{Answer, localize};
 use fmlgs::pipeline::semantics::query::parse::ParsedQuery;
-use fmlgs::pipeline::semantics::query::recipe::{Recipe, Rejection, Strategy};
+use fmlgs::pipeline::semantics::query::recipe::{QueryConfig, Rejection, Strategy};
 use fmlgs::pipeline::semantics::relevancy::{deviate, score};
-use fmlgs::scene::{Identities, IdentityId, LanguageFeatures, Level, LevelFilter, NOBODY, PART_WEIGHT, ViewFeatures};
+use fmlgs::scene::{
+    Identities, IdentityId, LanguageFeatures, Level, LevelFilter, NO_IDENTITY, PART_WEIGHT, ViewFeatures,
+};
 
 use teatime::{ABSENT, QUERIES, Scene, load, plain};
 
@@ -85,9 +87,9 @@ fn answers_say_when_nothing_or_several_fit() {
     let features = scene.single.iter().map(|f| ViewFeatures { raw: vec![f.clone()], deviated: vec![f.clone()] });
     let language = LanguageFeatures { encoder: "clip".into(), dimension: 512, by_identity: features.collect() };
     language.by_identity.iter().for_each(|_| {
-        identities.add(Level::Object, NOBODY, Vec::new());
+        identities.add(Level::Object, NO_IDENTITY, Vec::new());
     });
-    let recipe = Recipe { rejection: Rejection::Canonical, ..Recipe::default() };
+    let recipe = QueryConfig { rejection: Rejection::Canonical, ..QueryConfig::default() };
     let phrases = scene.phrases(QUERIES, &recipe);
     let ask = |query: &str| {
         let mut scorer = EmbeddingScorer::new(&identities, &language, &phrases, &recipe);
@@ -126,7 +128,7 @@ fn parts_are_moved_toward_their_whole_and_made_unit_again() {
 #[test]
 fn an_identity_counts_by_its_best_view() {
     let Some(scene) = load() else { return };
-    let recipe = Recipe::default();
+    let recipe = QueryConfig::default();
     let phrases = scene.phrases(QUERIES, &recipe);
     let identities = Identities::objects(scene.single.len());
     type Views = Vec<Vec<f32>>;
@@ -162,7 +164,7 @@ fn an_identity_counts_by_its_best_view() {
 }
 
 /// Number of the questions that this recipe answers.
-fn answered(scene: &Scene, recipe: &Recipe, questions: &[&str]) -> usize {
+fn answered(scene: &Scene, recipe: &QueryConfig, questions: &[&str]) -> usize {
     let (identities, language) = scene.language(recipe.preparation.part_weight);
     let phrases = scene.phrases(questions.iter().copied(), recipe);
     let is_found = |question: &&&str| {
@@ -177,9 +179,9 @@ fn answered(scene: &Scene, recipe: &Recipe, questions: &[&str]) -> usize {
 fn most_of_what_is_absent_is_rejected_by_confidence_and_little_by_canonical_phrases() {
     let Some(scene) = load() else { return };
     let absent: Vec<&str> = ABSENT.split(", ").map(str::trim).collect();
-    let of = |recipe: &Recipe| [answered(&scene, recipe, &QUERIES), answered(&scene, recipe, &absent)];
-    let by = |rejection| of(&Recipe { rejection, ..Recipe::default() });
-    let paper = of(&Recipe::paper());
+    let of = |recipe: &QueryConfig| [answered(&scene, recipe, &QUERIES), answered(&scene, recipe, &absent)];
+    let by = |rejection| of(&QueryConfig { rejection, ..QueryConfig::default() });
+    let paper = of(&QueryConfig::paper());
     let [never, canonical, strict] = [Rejection::Never, Rejection::Canonical, Rejection::Strict].map(by);
     println!("answered of {} there and {} absent: paper {paper:?}, never {never:?}", QUERIES.len(), absent.len());
     println!("canonical {canonical:?}, strict {strict:?}");
@@ -193,7 +195,7 @@ fn deviation_helps_a_part_that_is_asked_for_with_its_whole_and_the_second_step_f
     let Some(scene) = load() else { return };
     let advantage = |question: &str, weight: f32, id: usize| {
         let (identities, language) = scene.language(weight);
-        let recipe = Recipe::paper();
+        let recipe = QueryConfig::paper();
         let phrases = scene.phrases([question], &recipe);
         EmbeddingScorer::new(&identities, &language, &phrases, &recipe).advantages(question, None)[id - 1]
     };
@@ -211,7 +213,7 @@ fn deviation_helps_a_part_that_is_asked_for_with_its_whole_and_the_second_step_f
     assert!(hooves(PART_WEIGHT) < hooves(1.0));
     // The bear wins the first step; the second one finds its nose, by grammar or because a part is asked for.
     let ask = |strategy, whole: Option<&str>, level| {
-        let recipe = Recipe { strategy, ..Recipe::paper() };
+        let recipe = QueryConfig { strategy, ..QueryConfig::paper() };
         let (identities, language) = scene.language(PART_WEIGHT);
         let phrases = scene.phrases(["bear nose", "stuffed bear"], &recipe);
         let question = ParsedQuery { whole: whole.map(str::to_owned), ..plain("bear nose") };

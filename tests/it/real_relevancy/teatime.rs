@@ -2,9 +2,9 @@
 
 use fmlgs::pipeline::semantics::query::by_embedding::TextEmbeddings;
 use fmlgs::pipeline::semantics::query::parse::ParsedQuery;
-use fmlgs::pipeline::semantics::query::recipe::{PAPERS_PHRASES, Recipe};
+use fmlgs::pipeline::semantics::query::recipe::{PAPERS_PHRASES, QueryConfig};
 use fmlgs::pipeline::semantics::relevancy::{advantage, deviate};
-use fmlgs::scene::{Identities, LanguageFeatures, Level, NOBODY, ViewFeatures};
+use fmlgs::scene::{Identities, LanguageFeatures, Level, NO_IDENTITY, ViewFeatures};
 
 /// Queries of the LERF evaluation that have an embedding.
 pub const QUERIES: [&str; 17] = [
@@ -72,7 +72,7 @@ impl Scene {
     }
 
     /// Embeddings of questions and of all phrases that answering them by `recipe` needs, as far as there are any.
-    pub fn phrases<'q>(&self, questions: impl IntoIterator<Item = &'q str>, recipe: &Recipe) -> TextEmbeddings {
+    pub fn phrases<'q>(&self, questions: impl IntoIterator<Item = &'q str>, recipe: &QueryConfig) -> TextEmbeddings {
         let mut phrases = TextEmbeddings::default();
         let mut known =
             |p: &str| self.texts.iter().find(|t| t.0.eq_ignore_ascii_case(p)).map(|t| t.1.clone()).ok_or(());
@@ -90,7 +90,7 @@ impl Scene {
         let mut identities = Identities::default();
         let mut by_identity = Vec::new();
         for (id, k) in order.into_iter().enumerate() {
-            let (level, parent) = if id == 1 { (Level::Part, 1) } else { (Level::Object, NOBODY) };
+            let (level, parent) = if id == 1 { (Level::Part, 1) } else { (Level::Object, NO_IDENTITY) };
             identities.add(level, parent, Vec::new());
             let raw: Vec<Vec<f32>> =
                 std::iter::once(&self.single[k]).chain(self.many[k].iter().take(3)).cloned().collect();

@@ -5,7 +5,7 @@ use egui_kittest::kittest::Queryable;
 use serde_json::json;
 
 use fmlgs::io::{SceneFolder, semantic_map, trained};
-use fmlgs::scene::Findings;
+use fmlgs::scene::SegmentationReport;
 use fmlgs::ui::actions::{Action, Pane};
 use fmlgs::ui::app::App;
 use fmlgs::ui::color_by::ColorBy;
@@ -21,7 +21,7 @@ fn window(folder: &std::path::Path, with_findings: bool) -> Window {
     assert_eq!((map.identities.len(), &map.findings), (3, &None), "the first version kept none");
     // Of what is nobody's, nothing is known.
     map.margin.iter_mut().zip(&map.identity_of).filter(|(_, id)| **id == 0).for_each(|(m, _)| *m = 0.0);
-    let findings: Findings = serde_json::from_value(json!({
+    let findings: SegmentationReport = serde_json::from_value(json!({
         "photos": [{ "name": scene.info.cameras[2].name, "unknown": 0.25 }, { "name": "gone.png", "unknown": 0.0 }],
         "seen": [
             { "photos": [3], "pixels": 100, "confidence": 0.5 },

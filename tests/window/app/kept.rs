@@ -233,7 +233,7 @@ fn what_is_left_without_gaussians_says_so_and_undo_brings_it_back() {
             "'box 0' is empty: ",
         ),
         (Action::Isolate(Some(1)), "box 0 is empty: no Gaussians belong to it."),
-        (Action::Arrange(1), "box 0 is empty: no Gaussians belong to it."),
+        (Action::Transform(1), "box 0 is empty: no Gaussians belong to it."),
         (Action::ExportTarget(1), "box 0 is empty: no Gaussians belong to it."),
     ] {
         let before = said(w.app(), reason);

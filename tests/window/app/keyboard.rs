@@ -191,7 +191,7 @@ fn everything_that_can_be_reached_has_a_name() {
         named(&mut w, &format!("{pane:?}"));
     }
     w.harness.state_mut().layout.hidden = Pane::VARIANTS.iter().copied().filter(|p| *p != Pane::Objects).collect();
-    for tool in [Action::Measure, Action::Crop, Action::Inspect, Action::Paint(Some(0))] {
+    for tool in [Action::Measure, Action::Crop, Action::Inspect, Action::SegmentNew(Some(0))] {
         w.ask(tool.clone());
         named(&mut w, &format!("{tool:?}"));
         w.press(Key::Escape);

@@ -89,7 +89,7 @@ fn a_box_is_recolored_and_doubled_and_a_hundred_steps_back_and_forth_lose_nothin
     let mut w = window(folder.path());
     let mut states = vec![cloud(w.app())];
     for (id, doubled) in [(1, false), (2, true), (3, false), (1, true)] {
-        w.ask(Action::Arrange(id));
+        w.ask(Action::Transform(id));
         assert!(w.shows("Apply"));
         tick(&mut w, "Color");
         if doubled {

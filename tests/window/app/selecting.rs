@@ -66,7 +66,7 @@ fn a_click_selects_and_a_name_is_kept_and_asked_for() {
     let mut w = asked(folder.path());
     let before = w.app().state.semantics.as_ref().expect("objects").identities.len();
     let box_1 = middle_of(&w, 2);
-    w.ask(Action::Paint(Some(0)));
+    w.ask(Action::SegmentNew(Some(0)));
     assert!(w.shows("Select a new object: click on it"), "the tool says what to do");
     w.until("a picture for it", |a| a.viewport.picture().is_some_and(|p| p.full));
     click(&mut w, box_1, Modifiers::NONE);
@@ -119,11 +119,13 @@ fn a_scene_is_prepared_once_and_as_soon_as_the_tool_opens() {
     let mut w = asked(folder.path());
     let box_1 = middle_of(&w, 2);
     assert_eq!(w.app().viewport.times_prepared(), 0);
-    w.ask(Action::Paint(Some(0)));
+    w.ask(Action::SegmentNew(Some(0)));
     w.until("prepared before anybody clicks", |a| a.viewport.times_prepared() == 1);
     assert_eq!(w.app().viewport.selection(), None);
-    for action in [Action::Paint(Some(0)), Action::Correct(1), Action::Paint(Some(1)), Action::Paint(Some(0))] {
-        w.ask(Action::Paint(None));
+    for action in
+        [Action::SegmentNew(Some(0)), Action::Correct(1), Action::SegmentNew(Some(1)), Action::SegmentNew(Some(0))]
+    {
+        w.ask(Action::SegmentNew(None));
         w.ask(action);
         w.until("a picture for it", |a| a.viewport.picture().is_some_and(|p| p.full));
         click(&mut w, box_1, Modifiers::NONE);
@@ -132,7 +134,7 @@ fn a_scene_is_prepared_once_and_as_soon_as_the_tool_opens() {
     w.until("an answer", |a| a.viewport.selection().is_some_and(|n| n > 0));
     w.harness.get_by_label("Keep").click();
     w.until("kept", |a| a.state.semantics.as_ref().is_some_and(|m| m.identities.len() == 4));
-    w.ask(Action::Paint(Some(0)));
+    w.ask(Action::SegmentNew(Some(0)));
     click(&mut w, box_1, Modifiers::NONE);
     w.until("an answer", |a| a.viewport.selection().is_some_and(|n| n > 0));
     assert_eq!(w.app().viewport.times_prepared(), 1, "once for all of them");
@@ -146,17 +148,17 @@ fn strokes_drawn_while_it_is_prepared_are_all_taken_in() {
     // What one click selects, each for itself.
     let mut each = Vec::new();
     for at in places {
-        w.ask(Action::Paint(Some(0)));
+        w.ask(Action::SegmentNew(Some(0)));
         click(&mut w, at, Modifiers::NONE);
         w.until("an answer", |a| a.viewport.selection().is_some_and(|n| n > 0));
         each.push(w.app().viewport.selection().expect("something"));
-        w.ask(Action::Paint(None));
+        w.ask(Action::SegmentNew(None));
     }
     drop(w);
     let folder = tempfile::tempdir().expect("folder");
     let mut w = asked(folder.path());
     // Both in the frame after the tool opened, before anything can be ready.
-    w.harness.state_mut().ask(Action::Paint(Some(0)));
+    w.harness.state_mut().ask(Action::SegmentNew(Some(0)));
     w.harness.step();
     for at in places {
         let button = |pressed| Event::PointerButton {
@@ -183,7 +185,7 @@ fn the_result_of_a_canceled_selection_is_not_that_of_the_next() {
     let folder = tempfile::tempdir().expect("folder");
     let mut w = asked(folder.path());
     let places = [middle_of(&w, 2), middle_of(&w, 3)];
-    w.ask(Action::Paint(Some(0)));
+    w.ask(Action::SegmentNew(Some(0)));
     w.until("prepared", |a| a.viewport.times_prepared() == 1);
     let button = |pos, pressed| Event::PointerButton {
         pos,
@@ -198,8 +200,8 @@ fn the_result_of_a_canceled_selection_is_not_that_of_the_next() {
     w.harness.event(button(places[0], false));
     w.harness.step();
     // It is handed on in the frame in which the tool is canceled and another one opens.
-    w.harness.state_mut().ask(Action::Paint(None));
-    w.harness.state_mut().ask(Action::Paint(Some(0)));
+    w.harness.state_mut().ask(Action::SegmentNew(None));
+    w.harness.state_mut().ask(Action::SegmentNew(Some(0)));
     w.harness.step();
     std::thread::sleep(std::time::Duration::from_millis(300));
     w.harness.run_steps(20);

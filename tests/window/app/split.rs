@@ -223,10 +223,10 @@ fn another_scene_is_seen_beside_by_the_same_camera() {
     fmlgs::io::splat_ply::write(&path, &other).expect("write");
     let mut w = Window::new(Some(Action::Open(splat.clone())));
     w.until("a picture", |a| a.viewport.picture().is_some_and(|p| p.full));
-    w.ask(Action::OpenBeside(Some(path)));
+    w.ask(Action::OpenComparison(Some(path)));
     w.until("both", |a| a.viewport.picture().is_some_and(|p| p.full && p.second.is_some()));
     w.harness.run_steps(3);
-    let name = w.app().state.beside.as_ref().expect("open").name.clone();
+    let name = w.app().state.comparison.as_ref().expect("open").name.clone();
     assert!(w.app().layout.split_view && name.starts_with("other") && w.shows(&name));
     let swapped = |a: &App| {
         let p = a.viewport.picture().expect("drawn");
@@ -242,13 +242,13 @@ fn another_scene_is_seen_beside_by_the_same_camera() {
     w.until("both from elsewhere", |a| a.viewport.picture().is_some_and(|p| p.full && p.camera.center != before));
     assert!(swapped(w.app()));
     // The control: beside itself it looks the same, so nothing is exchanged.
-    w.ask(Action::OpenBeside(Some(splat)));
+    w.ask(Action::OpenComparison(Some(splat)));
     w.until("itself", |a| a.viewport.picture().is_some_and(|p| p.second.as_ref().is_some_and(|s| s.rgb == p.rgb)));
     assert!(!swapped(w.app()));
-    w.ask(Action::OpenBeside(Some(folder.path().join("nothing.ply"))));
+    w.ask(Action::OpenComparison(Some(folder.path().join("nothing.ply"))));
     w.until("an error", |a| a.state.error.is_some());
-    assert!(w.app().state.beside.is_some() && w.app().state.scene.is_some(), "nothing is lost");
+    assert!(w.app().state.comparison.is_some() && w.app().state.scene.is_some(), "nothing is lost");
     w.harness.state_mut().state.error = None;
-    w.ask(Action::OpenBeside(None));
+    w.ask(Action::OpenComparison(None));
     w.until("one scene", |a| a.viewport.picture().is_some_and(|p| p.full && p.second.is_none()));
 }

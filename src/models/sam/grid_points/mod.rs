@@ -29,9 +29,9 @@ impl GridPoints {
     }
 
     /// Points by stage: all at once, or those that are prompted first, then the others.
-    pub(super) fn stages(&self, sparing: bool) -> Vec<Vec<usize>> {
+    pub(super) fn stages(&self, adaptive: bool) -> Vec<Vec<usize>> {
         let all: Vec<usize> = (0..self.len()).collect();
-        if !sparing || self.per_side < FEW {
+        if !adaptive || self.per_side < FEW {
             return vec![all];
         }
         let (first, rest) = all.into_iter().partition(|k| self.is_first(*k));

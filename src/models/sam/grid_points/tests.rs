@@ -60,11 +60,11 @@ impl PromptedMasks for Knowing {
 }
 
 /// Masks of everything, and the number of points that were prompted.
-fn found(things: &[[usize; 4]], sparing: bool) -> (Vec<Mask>, usize) {
+fn found(things: &[[usize; 4]], adaptive: bool) -> (Vec<Mask>, usize) {
     let mut network = Knowing { things: things.to_vec(), asked: 0 };
     let rgb = vec![[0; 3]; SIDE * SIDE];
     let picture = PhotoPixels { width_px: SIDE as u32, height_px: SIDE as u32, rgb, coverage: None, alpha: None };
-    let options = AutomaticOptions { crop_layers: 0, sparing, ..AutomaticOptions::default() };
+    let options = AutomaticOptions { crop_layers: 0, adaptive, ..AutomaticOptions::default() };
     let masks = everything(&mut network, &picture, &options, &mut |_| true).expect("masks");
     let mut masks: Vec<Mask> = masks.into_iter().map(|m| m.mask).collect();
     masks.sort_by_key(|m| (m.area(), m.pixels().next()));
@@ -87,8 +87,8 @@ const THINGS: [[usize; 4]; 8] = [
 fn what_is_larger_than_two_steps_of_the_grid_is_found_with_fewer_points() {
     let (all, asked) = found(&THINGS, false);
     assert_eq!((all.len(), asked), (THINGS.len(), 32 * 32));
-    let (sparing, fewer) = found(&THINGS, true);
-    assert_eq!(sparing, all);
+    let (adaptive, fewer) = found(&THINGS, true);
+    assert_eq!(adaptive, all);
     assert!(fewer < asked * 6 / 10, "{fewer} of {asked}");
 }
 
@@ -97,8 +97,8 @@ fn what_is_smaller_than_two_steps_may_be_missed_amid_something_else() {
     // Between the points that are prompted first, in the middle of the table.
     let mut things = THINGS.to_vec();
     things.push([136, 216, 148, 228]);
-    let ((all, _), (sparing, _)) = (found(&things, false), found(&things, true));
-    assert_eq!((all.len(), sparing.len()), (things.len(), THINGS.len()));
+    let ((all, _), (adaptive, _)) = (found(&things, false), found(&things, true));
+    assert_eq!((all.len(), adaptive.len()), (things.len(), THINGS.len()));
 }
 
 #[test]

@@ -54,17 +54,17 @@ pub(crate) fn rejoined(map: &SemanticMap, cloud: &GaussianCloud) -> Option<Seman
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Level, NOBODY};
+    use crate::scene::{Level, NO_IDENTITY};
 
     #[test]
     fn what_looks_alike_becomes_one() {
         let mut all = Identities::default();
-        let mug = all.add(Level::Object, NOBODY, vec!["mug".into()]);
+        let mug = all.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
         let lid = all.add(Level::Part, mug, vec![]);
-        let other = all.add(Level::Object, NOBODY, vec!["red mug".into()]);
-        let lamp = all.add(Level::Object, NOBODY, vec![]);
+        let other = all.add(Level::Object, NO_IDENTITY, vec!["red mug".into()]);
+        let lamp = all.add(Level::Object, NO_IDENTITY, vec![]);
         let handle = all.add(Level::Part, other, vec![]);
-        let of = vec![mug, lid, other, lamp, handle, NOBODY];
+        let of = vec![mug, lid, other, lamp, handle, NO_IDENTITY];
         let cloud = GaussianCloud::isotropic((0..6).map(|i| [i as f32, 0.0, 0.0]).collect(), -2.0, 4.0);
         let mut map = SemanticMap::from_identities(all, of, vec![1.0; 6], vec![]);
         let seen = |v: [f32; 2]| ViewFeatures { raw: vec![v.to_vec()], deviated: vec![v.to_vec()] };
@@ -72,7 +72,7 @@ mod tests {
         let by_identity = [[1.0, 0.0], [1.0, 0.0], [0.96, 0.28], [0.0, 1.0], [0.6, 0.8]].map(seen).to_vec();
         map.language = Some(LanguageFeatures { encoder: "t".into(), dimension: 2, by_identity });
         let joined = rejoined(&map, &cloud).expect("features");
-        assert_eq!(joined.identity_of, [1, 2, 1, 3, 4, NOBODY]);
+        assert_eq!(joined.identity_of, [1, 2, 1, 3, 4, NO_IDENTITY]);
         assert_eq!(joined.identities.len(), 4);
         assert_eq!(joined.identities.object_of(4), 1, "the handle is a piece of what its mug was joined to");
         let language = joined.language.as_ref().expect("kept");

@@ -9,11 +9,11 @@ use super::*;
 use crate::pipeline::semantics::query::answer::Basis;
 use crate::pipeline::semantics::query::localize::{Answer, Hit};
 use crate::pipeline::semantics::query::query_engine::ask_by_name;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::pipeline::semantics::relevancy::deviate;
 use crate::render::RenderSettings;
 use crate::scene::{
-    GaussianCloud, Identities, IdentityId, LanguageFeatures, LevelFilter, NOBODY, PART_WEIGHT, ViewFeatures,
+    GaussianCloud, Identities, IdentityId, LanguageFeatures, LevelFilter, NO_IDENTITY, PART_WEIGHT, ViewFeatures,
 };
 
 const DOLL: IdentityId = 1;
@@ -23,9 +23,9 @@ const CAT: IdentityId = 3;
 /// A doll with an eye, and a cat; codes far apart.
 fn scene(of: Vec<IdentityId>) -> SemanticMap {
     let mut all = Identities::default();
-    let doll = all.add(Level::Object, NOBODY, vec!["doll".into()]);
+    let doll = all.add(Level::Object, NO_IDENTITY, vec!["doll".into()]);
     all.add(Level::Part, doll, vec!["eye".into()]);
-    all.add(Level::Object, NOBODY, vec!["cat".into()]);
+    all.add(Level::Object, NO_IDENTITY, vec!["cat".into()]);
     for (id, code) in [(DOLL, [0.1, 0.5, 0.5]), (EYE, [0.5, 0.9, 0.9]), (CAT, [0.9, 0.5, 0.5])] {
         all.get_mut(id).expect("there").code = code;
     }
@@ -49,13 +49,13 @@ fn label(name: &str, level: Level, size: [usize; 2], inside: impl Fn(usize) -> b
 
 /// Asks a scene by the names of its identities.
 fn named(map: &SemanticMap) -> impl FnMut(&str) -> Option<QueryAnswer> + '_ {
-    |text| ask_by_name(&map.identities, text, LevelFilter::Auto, &Recipe::default())
+    |text| ask_by_name(&map.identities, text, LevelFilter::Auto, &QueryConfig::default())
 }
 
 /// An answer whose relevancies are given, best identity first.
 fn answered(best: IdentityId, relevancy: &[f32]) -> QueryAnswer {
     let hit = Hit { identity: best, score: relevancy[best as usize], margin: 0.5 };
-    QueryAnswer::new(Answer::Found(vec![hit]), Basis::Embedding, relevancy.to_vec(), &Recipe::default())
+    QueryAnswer::new(Answer::Found(vec![hit]), Basis::Embedding, relevancy.to_vec(), &QueryConfig::default())
 }
 
 fn close(found: &[f64], worked_out: &[f64]) {
@@ -254,8 +254,8 @@ fn mixed(of: &[(usize, f32)]) -> Vec<f32> {
 /// A mug with handle, lid and knob, and a pan with handle and knob, each looked at once.
 fn kitchen() -> (SemanticMap, LanguageFeatures) {
     let mut all = Identities::default();
-    let mug = all.add(Level::Object, NOBODY, vec![]);
-    let pan = all.add(Level::Object, NOBODY, vec![]);
+    let mug = all.add(Level::Object, NO_IDENTITY, vec![]);
+    let pan = all.add(Level::Object, NO_IDENTITY, vec![]);
     (0..3).for_each(|_| {
         all.add(Level::Part, mug, vec![]);
     });
@@ -311,7 +311,7 @@ fn part_recall_rises_with_every_component() {
         })
     };
     let mut row = |c: Components| {
-        part_recall::row((c, &Recipe::default()), &map, &language, &views, &mut encode).expect("encodes")
+        part_recall::row((c, &QueryConfig::default()), &map, &language, &views, &mut encode).expect("encodes")
     };
     let worked_out = [
         // Objects alone: the whole mug (10 px) for its handle and lid, the whole pan (10 px) for its own.
@@ -356,8 +356,9 @@ fn an_overlap_of_a_half_is_a_hit_and_less_is_none() {
     for (from, recall, iou) in [(0, 1.0, 0.5), (1, 0.0, 0.25)] {
         let categories = vec![label("handle of the mug", Level::Part, [4, 1], move |i| i >= from)];
         let view = LabeledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
-        let row = part_recall::row((Components::ROWS[4], &Recipe::default()), &map, &language, &[view], &mut encode)
-            .expect("encodes");
+        let row =
+            part_recall::row((Components::ROWS[4], &QueryConfig::default()), &map, &language, &[view], &mut encode)
+                .expect("encodes");
         close(&[row.recall, row.mean_iou], &[recall, iou]);
     }
 }

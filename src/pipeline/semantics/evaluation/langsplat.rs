@@ -114,8 +114,8 @@ mod tests {
     use crate::pipeline::semantics::code_map::CodeMap;
     use crate::pipeline::semantics::query::answer::Basis;
     use crate::pipeline::semantics::query::localize::Answer;
-    use crate::pipeline::semantics::query::recipe::Recipe;
-    use crate::scene::{Camera, NOBODY, SemanticMap};
+    use crate::pipeline::semantics::query::recipe::QueryConfig;
+    use crate::scene::{Camera, NO_IDENTITY, SemanticMap};
     use glam::DVec3;
 
     #[test]
@@ -143,7 +143,7 @@ mod tests {
     fn the_most_relevant_identity_is_cut_out() {
         let (w, h) = (80, 60);
         let mut all = Identities::default();
-        let doll = all.add(Level::Object, NOBODY, vec![]);
+        let doll = all.add(Level::Object, NO_IDENTITY, vec![]);
         let eye = all.add(Level::Part, doll, vec![]);
         let in_box = |i: usize, x: std::ops::Range<usize>, y: std::ops::Range<usize>| {
             x.contains(&(i % w)) && y.contains(&(i / w))
@@ -155,7 +155,7 @@ mod tests {
                 } else if in_box(i, 10..70, 10..55) {
                     doll
                 } else {
-                    NOBODY
+                    NO_IDENTITY
                 }
             })
             .collect();
@@ -167,7 +167,7 @@ mod tests {
         let compare_with = |relevancy: Vec<f32>| {
             let mut ask = |_: &str| {
                 let nothing = Answer::NotFound(vec![]);
-                Some(QueryAnswer::new(nothing, Basis::Embedding, relevancy.clone(), &Recipe::default()))
+                Some(QueryAnswer::new(nothing, Basis::Embedding, relevancy.clone(), &QueryConfig::default()))
             };
             let boxes = truth.bounds().into_iter().collect();
             let categories = vec![Category { name: "eye".into(), level: Level::Object, mask: truth.clone(), boxes }];

@@ -7,7 +7,7 @@ use crate::math::stats::mean;
 use crate::models::TextSource;
 use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::query::query_engine::ask_by_embedding;
-use crate::pipeline::semantics::query::recipe::{PartFeatures, Recipe, Strategy, Understanding};
+use crate::pipeline::semantics::query::recipe::{MatchBy, PartEmbedding, QueryConfig, Strategy};
 use crate::scene::{Identities, LanguageFeatures, Level, Mask, SemanticMap};
 
 /// IoU from which a query counts as answered.
@@ -40,10 +40,10 @@ impl Components {
     }
 
     /// The rows differ in these; all else is as the recipe says.
-    fn recipe(self, recipe: &Recipe) -> Recipe {
-        Recipe {
-            understanding: Understanding::Embedding,
-            parts: if self.deviation { PartFeatures::Deviated } else { PartFeatures::Raw },
+    fn recipe(self, recipe: &QueryConfig) -> QueryConfig {
+        QueryConfig {
+            match_by: MatchBy::Embedding,
+            parts: if self.deviation { PartEmbedding::Deviated } else { PartEmbedding::Raw },
             strategy: match self {
                 Self { joint: true, .. } => Strategy::Joint,
                 Self { localization: true, .. } => Strategy::TwoSteps,
@@ -69,7 +69,7 @@ pub(crate) struct Row {
 /// Asks for every part of the `views` by its phrase and compares, for one row of the table. `source`
 /// gives the embeddings of phrases.
 pub(crate) fn row<S: TextSource + ?Sized>(
-    (components, recipe): (Components, &Recipe),
+    (components, recipe): (Components, &QueryConfig),
     map: &SemanticMap,
     language: &LanguageFeatures,
     views: &[LabeledView<'_>],

@@ -6,7 +6,7 @@
 
 use crate::math::vector::dot;
 use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::pipeline::semantics::relevancy::{nearest, score};
 use crate::render::PixelWeights;
 use crate::scene::LanguageFeatures;
@@ -36,7 +36,7 @@ impl RawFeatures {
         view: &[PixelWeights],
         phrase: &str,
         phrases: &TextEmbeddings,
-        recipe: &Recipe,
+        recipe: &QueryConfig,
     ) -> Option<Vec<f32>> {
         let toward = |phrase: &str| {
             let phrase = phrases.get(phrase)?;
@@ -60,7 +60,7 @@ mod tests {
     use super::*;
     use crate::pipeline::semantics::query::parse::ParsedQuery;
     use crate::pipeline::semantics::relevancy::advantage;
-    use crate::scene::{NOBODY, ViewFeatures};
+    use crate::scene::{NO_IDENTITY, ViewFeatures};
 
     #[test]
     fn a_blend_is_as_relevant_as_the_unit_vector_of_its_sum() {
@@ -76,13 +76,13 @@ mod tests {
                 _ => vec![0.0, 1.0, 0.0],
             })
         };
-        let recipe = Recipe::default();
+        let recipe = QueryConfig::default();
         phrases.learn(&ParsedQuery::parse("mug").expect("a phrase"), &recipe, &mut encode).expect("encodes");
-        let mut mixed: PixelWeights = [(NOBODY, 0.0); 8];
-        mixed[..3].copy_from_slice(&[(1, 0.3), (2, 0.5), (NOBODY, 0.1)]);
+        let mut mixed: PixelWeights = [(NO_IDENTITY, 0.0); 8];
+        mixed[..3].copy_from_slice(&[(1, 0.3), (2, 0.5), (NO_IDENTITY, 0.1)]);
         let mut alone = mixed;
         alone[1].1 = 0.0;
-        let nothing = [(NOBODY, 0.0); 8];
+        let nothing = [(NO_IDENTITY, 0.0); 8];
         let got = raw.relevancy(&[mixed, alone, nothing], "mug", &phrases, &recipe).expect("learned");
         let canonical: Vec<Vec<f32>> = recipe.canonical.iter().map(|c| encode(c).expect("encodes")).collect();
         let expected = |sum: [f32; 3]| {

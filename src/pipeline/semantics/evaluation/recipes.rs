@@ -10,7 +10,7 @@ use crate::pipeline::semantics::evaluation::part_recall::HIT_IOU;
 use crate::pipeline::semantics::query::colors;
 use crate::pipeline::semantics::query::localize::Answer;
 use crate::pipeline::semantics::query::query_engine::QueryEngine;
-use crate::pipeline::semantics::query::recipe::{PartFeatures, Recipe, Rejection, Strategy, Understanding};
+use crate::pipeline::semantics::query::recipe::{MatchBy, PartEmbedding, QueryConfig, Rejection, Strategy};
 use crate::pipeline::semantics::query::timing::ms_since;
 use crate::pipeline::semantics::query::words::words;
 use crate::scene::identity::whole_names::BETWEEN;
@@ -89,7 +89,7 @@ fn absent_parts(identities: &Identities) -> Vec<String> {
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub(crate) struct RecipeRow {
     pub(crate) title: String,
-    pub(crate) recipe: Recipe,
+    pub(crate) recipe: QueryConfig,
     /// Answered with a mask of an IoU of a half or more: objects, parts, parts asked for as compounds ("mug handle").
     pub(crate) recall: [f64; 3],
     /// Rightly not found: other kinds, other colors, parts that a thing lacks.
@@ -99,23 +99,23 @@ pub(crate) struct RecipeRow {
 }
 
 /// The recipes that are compared, with their titles; all else is as `base` says.
-pub(crate) fn compared(base: &Recipe) -> Vec<(String, Recipe)> {
+pub(crate) fn compared(base: &QueryConfig) -> Vec<(String, QueryConfig)> {
     let mut all = Vec::new();
     let strategies = [Strategy::TwoSteps, Strategy::Joint, Strategy::OneStep];
     for strategy in strategies {
-        let recipe = Recipe { understanding: Understanding::Names, strategy, ..base.clone() };
+        let recipe = QueryConfig { match_by: MatchBy::Names, strategy, ..base.clone() };
         all.push((format!("names, {strategy}"), recipe));
     }
     for strategy in strategies {
-        for parts in [PartFeatures::Deviated, PartFeatures::Raw] {
-            let understanding = Understanding::Embedding;
-            let recipe = Recipe { understanding, strategy, parts, ..base.clone() };
+        for parts in [PartEmbedding::Deviated, PartEmbedding::Raw] {
+            let match_by = MatchBy::Embedding;
+            let recipe = QueryConfig { match_by, strategy, parts, ..base.clone() };
             all.push((format!("embedding, {strategy}, deviation {parts}"), recipe));
         }
     }
     for rejection in [Rejection::Never, Rejection::Canonical, Rejection::Strict] {
-        for (title, recipe) in [("default", Recipe::default()), ("paper", Recipe::paper())] {
-            all.push((format!("recipe {title}, rejects {rejection}"), Recipe { rejection, ..recipe }));
+        for (title, recipe) in [("default", QueryConfig::default()), ("paper", QueryConfig::paper())] {
+            all.push((format!("recipe {title}, rejects {rejection}"), QueryConfig { rejection, ..recipe }));
         }
     }
     all
@@ -123,7 +123,7 @@ pub(crate) fn compared(base: &Recipe) -> Vec<(String, Recipe)> {
 
 /// Asks by one recipe for everything in the `views`, and for absent things.
 pub(crate) fn row(
-    (title, recipe): (String, Recipe),
+    (title, recipe): (String, QueryConfig),
     map: &SemanticMap,
     engine: &mut QueryEngine,
     views: &[LabeledView<'_>],
@@ -171,14 +171,14 @@ mod tests {
     use super::*;
     use crate::pipeline::semantics::code_map::CodeMap;
     use crate::pipeline::semantics::view_map::ViewMap;
-    use crate::scene::{Camera, NOBODY};
+    use crate::scene::{Camera, NO_IDENTITY};
     use glam::DVec3;
 
     fn scene() -> SemanticMap {
         let mut all = Identities::default();
-        let mug = all.add(Level::Object, NOBODY, vec!["red mug".into()]);
+        let mug = all.add(Level::Object, NO_IDENTITY, vec!["red mug".into()]);
         all.add(Level::Part, mug, vec!["handle".into()]);
-        let lamp = all.add(Level::Object, NOBODY, vec!["white lamp".into()]);
+        let lamp = all.add(Level::Object, NO_IDENTITY, vec!["white lamp".into()]);
         all.add(Level::Part, lamp, vec!["shade".into()]);
         SemanticMap::from_identities(all, vec![1, 2, 3, 4], vec![1.0; 4], vec![])
     }
@@ -195,7 +195,7 @@ mod tests {
         parts.dedup();
         assert_eq!(parts, ["shade of the red mug", "handle of the white lamp"]);
         let mut ducks = Identities::default();
-        ducks.add(Level::Object, NOBODY, vec!["white duck".into()]);
+        ducks.add(Level::Object, NO_IDENTITY, vec!["white duck".into()]);
         assert!(!absent_kinds(&ducks).iter().any(|k| k.contains("duck")));
     }
 
@@ -219,14 +219,14 @@ mod tests {
         let views = [LabeledView { name: "v", camera: &camera, exact: &exact, blended: &blended, categories }];
         let absent = Absent::of(&map.identities);
         let mut engine = QueryEngine::default();
-        let mut row_of = |recipe: Recipe| {
+        let mut row_of = |recipe: QueryConfig| {
             row((String::new(), recipe), &map, &mut engine, &views, &absent).expect("names need no encoder")
         };
-        let names = |strategy, rejection| Recipe {
-            understanding: Understanding::Names,
+        let names = |strategy, rejection| QueryConfig {
+            match_by: MatchBy::Names,
             strategy,
             rejection,
-            ..Recipe::default()
+            ..QueryConfig::default()
         };
         let strict = row_of(names(Strategy::Joint, Rejection::Strict));
         assert_eq!((strict.recall, strict.rejected), ([1.0, 0.5, 0.5], [1.0; 3]));
@@ -235,7 +235,7 @@ mod tests {
         assert_eq!(row_of(names(Strategy::OneStep, Rejection::Strict)).recall, [1.0, 0.5, 0.0]);
         let canonical = row_of(names(Strategy::Joint, Rejection::Canonical));
         assert_eq!((canonical.recall, canonical.rejected[1]), ([1.0, 0.5, 0.5], 0.0));
-        let titles: Vec<String> = compared(&Recipe::default()).into_iter().map(|r| r.0).collect();
+        let titles: Vec<String> = compared(&QueryConfig::default()).into_iter().map(|r| r.0).collect();
         let mut different = titles.clone();
         different.sort();
         different.dedup();

@@ -3,7 +3,7 @@
 use super::edit::add;
 use super::tracker::Tracked;
 use super::votes::UNKNOWN;
-use crate::scene::{IdentityId, NOBODY, Photo, SemanticMap};
+use crate::scene::{IdentityId, NO_IDENTITY, Photo, SemanticMap};
 
 /// Least number of Gaussians of a new object or part.
 const LEAST: usize = 4;
@@ -14,7 +14,7 @@ pub(crate) fn joined(known: &SemanticMap, tracked: &Tracked, photos: &[Photo]) -
     let all = &tracked.identities;
     let old = known.identities.len() as IdentityId;
     let mut own: Vec<Vec<usize>> = vec![Vec::new(); all.len() + 1];
-    let free = tracked.assignments.iter().enumerate().filter(|(i, _)| known.identity_of[*i] == NOBODY);
+    let free = tracked.assignments.iter().enumerate().filter(|(i, _)| known.identity_of[*i] == NO_IDENTITY);
     for (i, assignment) in free.filter(|(_, a)| a.identity != UNKNOWN) {
         own[assignment.identity as usize].push(i);
     }
@@ -24,15 +24,15 @@ pub(crate) fn joined(known: &SemanticMap, tracked: &Tracked, photos: &[Photo]) -
         let inside = all.descendants(id);
         let size: usize = own.iter().zip(&inside).filter(|(_, is_in)| **is_in).map(|(own, _)| own.len()).sum();
         let whole = number[identity.parent as usize];
-        let is_one = size >= LEAST && (identity.parent == NOBODY || whole != NOBODY);
+        let is_one = size >= LEAST && (identity.parent == NO_IDENTITY || whole != NO_IDENTITY);
         let name = identity.names.first().cloned().unwrap_or_default();
-        let new = if is_one { add(&mut map, identity.level, whole, name, &[]) } else { NOBODY };
+        let new = if is_one { add(&mut map, identity.level, whole, name, &[]) } else { NO_IDENTITY };
         map.identities.mark_by_hand(new);
         number.push(new);
     }
     for (id, gaussians) in own.iter().enumerate() {
         let now = number[id];
-        if now == NOBODY && id != NOBODY as usize {
+        if now == NO_IDENTITY && id != NO_IDENTITY as usize {
             continue;
         }
         let codes = map.identities.codes(now);
@@ -45,17 +45,17 @@ pub(crate) fn joined(known: &SemanticMap, tracked: &Tracked, photos: &[Photo]) -
     let mut findings = tracked.findings(photos);
     findings.renumber(&number, map.identities.len());
     if let Some(before) = &known.findings {
-        findings.keep_doubts(before);
+        findings.keep_conflicts(before);
     }
     map.findings = Some(findings);
     map
 }
 
 /// Describes in words the additions to a map.
-pub(crate) fn told(known: &SemanticMap, map: &SemanticMap) -> String {
+pub(crate) fn summary(known: &SemanticMap, map: &SemanticMap) -> String {
     let new = map.identities.len() - known.identities.len();
     let count = |is: &dyn Fn(usize) -> bool| (0..map.identity_of.len()).filter(|i| is(*i)).count();
-    let taken = count(&|i| known.identity_of[i] == NOBODY && map.identity_of[i] != NOBODY);
+    let taken = count(&|i| known.identity_of[i] == NO_IDENTITY && map.identity_of[i] != NO_IDENTITY);
     let unknown = count(&|i| map.is_unknown(i));
     format!("{new} new objects and parts; {taken} Gaussians were nobody's before, {unknown} are unknown")
 }

@@ -3,8 +3,8 @@
 use super::segmenter::FoundMask;
 use super::votes::UNKNOWN;
 use crate::pipeline::semantics::view_map::ViewMap;
-use crate::scene::findings::Disagreement;
-use crate::scene::{Identities, IdentityId, Level, NOBODY};
+use crate::scene::findings::ConflictKind;
+use crate::scene::{Identities, IdentityId, Level, NO_IDENTITY};
 
 /// Least share of an identity's visible pixels, and of a mask's known pixels, that must agree.
 const SAME: f64 = 0.5;
@@ -36,7 +36,7 @@ impl PixelCounts {
         }
         // A whole's number is smaller than its pieces'.
         for (id, identity) in (1..of.len()).rev().filter_map(|id| Some((id, identities.get(id as IdentityId)?))) {
-            if identity.parent != NOBODY {
+            if identity.parent != NO_IDENTITY {
                 of[identity.parent as usize] += of[id];
             }
         }
@@ -105,19 +105,19 @@ pub(crate) fn link(found: &[FoundMask], known: Option<&ViewMap>, identities: &Id
 }
 
 /// Returns the disagreements between the linked masks and the identities known before.
-pub(crate) fn disagreements(
+pub(crate) fn conflicts(
     found: &[FoundMask],
     links: &[Link],
     known: &ViewMap,
     identities: &Identities,
-) -> Vec<Disagreement> {
+) -> Vec<ConflictKind> {
     let mut list = Vec::new();
     // An identity with a mask of its own in this photo is told apart, wherever it was expected.
     let has_mask = |id: IdentityId| links.contains(&Link::Known(id));
     let visible = PixelCounts::new(known, identities, 0..known.identity.len());
     for (mask, link) in found.iter().zip(links) {
         if let Link::Split(of) = link {
-            list.push(Disagreement::Split(*of));
+            list.push(ConflictKind::Split(*of));
         }
         let peers = identities.iter().filter(|(_, i)| i.level == mask.level);
         let within = PixelCounts::new(known, identities, mask.mask.pixels());
@@ -129,12 +129,12 @@ pub(crate) fn disagreements(
         // A part of a part is no peer of its whole.
         let apart = |id: &IdentityId| covered.iter().all(|o| o == id || !identities.ancestors(*id).any(|i| i == *o));
         let covered: Vec<IdentityId> = covered.iter().copied().filter(apart).collect();
-        let own = if let Link::Known(id) = link { *id } else { NOBODY };
+        let own = if let Link::Known(id) = link { *id } else { NO_IDENTITY };
         let merged: Vec<IdentityId> = covered.iter().copied().filter(|id| *id == own || !has_mask(*id)).collect();
         match (link, covered.as_slice()) {
-            (_, [_, _, ..]) if merged.len() > 1 => list.push(Disagreement::Merge(merged)),
+            (_, [_, _, ..]) if merged.len() > 1 => list.push(ConflictKind::Merge(merged)),
             (Link::Known(is), [other]) if is != other && !identities.ancestors(*other).any(|i| i == *is) => {
-                list.push(Disagreement::Switch(*is, *other));
+                list.push(ConflictKind::Switch(*is, *other));
             }
             _ => {}
         }
@@ -158,7 +158,7 @@ mod tests {
     #[test]
     fn a_whole_counts_the_pixels_of_its_pieces_and_the_unknown_count_for_nobody() {
         let mut all = Identities::default();
-        let pot = all.add(Level::Object, NOBODY, vec![]);
+        let pot = all.add(Level::Object, NO_IDENTITY, vec![]);
         let lid = all.add(Level::Part, pot, vec![]);
         all.add(Level::Part, lid, vec![]);
         let map = ViewMap::certain(10, vec![0, 1, 2, 2, 3, 3, 3, UNKNOWN, UNKNOWN, 9]);
@@ -174,10 +174,10 @@ mod tests {
     #[test]
     fn masks_find_their_identity_where_something_is_known() {
         let mut all = Identities::default();
-        let cup = all.add(Level::Object, NOBODY, vec![]);
-        let pot = all.add(Level::Object, NOBODY, vec![]);
+        let cup = all.add(Level::Object, NO_IDENTITY, vec![]);
+        let pot = all.add(Level::Object, NO_IDENTITY, vec![]);
         let lid = all.add(Level::Part, pot, vec![]);
-        let mut identity = vec![NOBODY; 100];
+        let mut identity = vec![NO_IDENTITY; 100];
         identity[..20].fill(cup);
         identity[20..40].fill(pot);
         identity[40..55].fill(lid);
@@ -201,19 +201,19 @@ mod tests {
     #[test]
     fn two_masks_cannot_be_the_same_identity() {
         let mut all = Identities::default();
-        let cup = all.add(Level::Object, NOBODY, vec![]);
+        let cup = all.add(Level::Object, NO_IDENTITY, vec![]);
         let map = ViewMap::certain(100, vec![cup; 100]);
         let masks = [found(Level::Object, None, mask(0, 55)), found(Level::Object, None, mask(40, 100))];
         let links = link(&masks, Some(&map), &all);
         assert_eq!(links, [Link::Split(cup), Link::Known(cup)]);
-        assert_eq!(disagreements(&masks, &links, &map, &all), [Disagreement::Split(cup)]);
+        assert_eq!(conflicts(&masks, &links, &map, &all), [ConflictKind::Split(cup)]);
     }
 
     #[test]
     fn one_mask_over_two_identities_is_told() {
         let mut all = Identities::default();
-        let cup = all.add(Level::Object, NOBODY, vec![]);
-        let pot = all.add(Level::Object, NOBODY, vec![]);
+        let cup = all.add(Level::Object, NO_IDENTITY, vec![]);
+        let pot = all.add(Level::Object, NO_IDENTITY, vec![]);
         let lid = all.add(Level::Part, pot, vec![]);
         let mut identity = vec![cup; 50];
         identity.extend(vec![pot; 30]);
@@ -221,20 +221,20 @@ mod tests {
         let map = ViewMap::certain(100, identity);
         let both = [found(Level::Object, None, mask(5, 100))];
         let links = link(&both, Some(&map), &all);
-        assert_eq!(disagreements(&both, &links, &map, &all), [Disagreement::Merge(vec![cup, pot])]);
+        assert_eq!(conflicts(&both, &links, &map, &all), [ConflictKind::Merge(vec![cup, pot])]);
         // One mask for one identity, and one for its part, agree with what is known.
         let each = [found(Level::Object, None, mask(50, 100)), found(Level::Part, Some(0), mask(80, 100))];
         let links = link(&each, Some(&map), &all);
-        assert_eq!(disagreements(&each, &links, &map, &all), []);
+        assert_eq!(conflicts(&each, &links, &map, &all), []);
     }
 
     #[test]
     fn names_say_more_than_overlap() {
         let mut all = Identities::default();
-        let cup = all.add(Level::Object, NOBODY, vec!["cup".into()]);
+        let cup = all.add(Level::Object, NO_IDENTITY, vec!["cup".into()]);
         let handle = all.add(Level::Part, cup, vec!["handle".into()]);
-        let pot = all.add(Level::Object, NOBODY, vec!["pot".into()]);
-        let mut identity = vec![NOBODY; 100];
+        let pot = all.add(Level::Object, NO_IDENTITY, vec!["pot".into()]);
+        let mut identity = vec![NO_IDENTITY; 100];
         identity[..50].fill(pot);
         let map = ViewMap::certain(100, identity);
         let named = |name: &str, level, parent, from, to| FoundMask {
@@ -253,15 +253,15 @@ mod tests {
         let links = link(&masks, Some(&map), &all);
         assert_eq!(links, [Link::Known(cup), Link::Known(handle), Link::New, Link::Known(pot), Link::New]);
         // The cup is where the pot was; the jug there is new, and says nothing about the pot.
-        assert_eq!(disagreements(&masks, &links, &map, &all), [Disagreement::Switch(cup, pot)]);
+        assert_eq!(conflicts(&masks, &links, &map, &all), [ConflictKind::Switch(cup, pot)]);
     }
 
     #[test]
     fn half_of_both_is_needed_and_a_dozen_pixels() {
         let mut all = Identities::default();
-        let cup = all.add(Level::Object, NOBODY, vec![]);
+        let cup = all.add(Level::Object, NO_IDENTITY, vec![]);
         let view = |from: usize, to: usize| {
-            let identity = (0..100).map(|i| if (from..to).contains(&i) { cup } else { NOBODY }).collect();
+            let identity = (0..100).map(|i| if (from..to).contains(&i) { cup } else { NO_IDENTITY }).collect();
             ViewMap::certain(100, identity)
         };
         let one = |known: (usize, usize), seen: (usize, usize)| {

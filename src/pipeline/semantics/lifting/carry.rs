@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use rstar::RTree;
 use rstar::primitives::GeomWithData;
 
-use crate::scene::{GaussianCloud, NOBODY, SemanticMap};
+use crate::scene::{GaussianCloud, NO_IDENTITY, SemanticMap};
 
 /// Reach of a Gaussian, in standard deviations along its longest axis: points farther from its center take nothing
 /// from it.
@@ -22,7 +22,7 @@ pub(crate) fn carry(map: &SemanticMap, from: &GaussianCloud, to: &GaussianCloud)
 
 /// The same for known nearest Gaussians.
 pub(crate) fn carry_by(map: &SemanticMap, nearest: &[Option<usize>]) -> (SemanticMap, f64) {
-    let of = nearest.iter().map(|n| n.map_or(NOBODY, |i| map.identity_of[i])).collect();
+    let of = nearest.iter().map(|n| n.map_or(NO_IDENTITY, |i| map.identity_of[i])).collect();
     let margin = nearest.iter().map(|n| n.map_or(0.0, |i| map.margin[i])).collect();
     let mut carried = SemanticMap::from_identities(map.identities.clone(), of, margin, map.seeds.clone());
     // Codes may have been trained, so that they are not those of the identities.
@@ -65,14 +65,15 @@ mod tests {
     #[test]
     fn gaussians_take_what_reaches_them() {
         let mut identities = Identities::default();
-        let (a, b) = (identities.add(Level::Object, NOBODY, vec![]), identities.add(Level::Object, NOBODY, vec![]));
+        let (a, b) =
+            (identities.add(Level::Object, NO_IDENTITY, vec![]), identities.add(Level::Object, NO_IDENTITY, vec![]));
         let mut map = SemanticMap::from_identities(identities, vec![a, b], vec![0.5, 1.0], vec!["photo".into()]);
         map.codes[1][0] = 0.125;
         let from = cloud(&[0.0, 1.0], DVec3::ZERO);
         // Moved, cloned, exchanged, in another frame, and one unlabeled: 0.3 off, three deviations.
         let to = cloud(&[-8.95, -9.99, -10.19, -8.7], DVec3::X * 10.0);
         let (carried, share) = carry(&map, &from, &to);
-        assert_eq!(carried.identity_of, [b, a, a, NOBODY]);
+        assert_eq!(carried.identity_of, [b, a, a, NO_IDENTITY]);
         assert_eq!(carried.margin, [1.0, 0.5, 0.5, 0.0]);
         assert_eq!((carried.codes[0], carried.codes[1]), (map.codes[1], map.codes[0]));
         assert_eq!(

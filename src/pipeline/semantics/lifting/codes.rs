@@ -93,7 +93,7 @@ pub(crate) fn centers(cloud: &GaussianCloud, of: &[IdentityId], identities: &Ide
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Level, NOBODY};
+    use crate::scene::{Level, NO_IDENTITY};
 
     #[test]
     fn no_blend_of_two_codes_is_a_third() {
@@ -183,15 +183,15 @@ mod tests {
     #[test]
     fn centers_are_means_and_wholes_count_their_pieces() {
         let mut all = Identities::default();
-        let doll = all.add(Level::Object, NOBODY, vec![]);
+        let doll = all.add(Level::Object, NO_IDENTITY, vec![]);
         let eye = all.add(Level::Part, doll, vec![]);
-        all.add(Level::Object, NOBODY, vec![]);
+        all.add(Level::Object, NO_IDENTITY, vec![]);
         let cloud = GaussianCloud {
             origin: DVec3::new(10.0, 0.0, 0.0),
             positions: vec![[1.0, 0.0, 0.0], [3.0, 6.0, 0.0], [5.0, 0.0, 3.0], [9.0; 3]],
             ..GaussianCloud::default()
         };
-        let found = centers(&cloud, &[doll, eye, eye, NOBODY], &all);
+        let found = centers(&cloud, &[doll, eye, eye, NO_IDENTITY], &all);
         assert_eq!(found, [DVec3::new(13.0, 2.0, 1.0), DVec3::new(14.0, 3.0, 1.5), DVec3::ZERO]);
     }
 }

@@ -36,12 +36,12 @@ pub(crate) fn embed(
     encoder: &mut dyn Encoder,
     observer: &mut dyn Observer,
 ) -> Result<LanguageFeatures, FindError> {
-    let mut looker = Looker { cloud, map, settings, renderer: Renderer::new() };
+    let mut crop_renderer = CropRenderer { cloud, map, settings, renderer: Renderer::new() };
     let mut ticker = Ticker::new("Choosing views of the objects", photos.len());
     let n = map.identities.len();
     let mut seen: Vec<Vec<(f64, usize)>> = vec![Vec::new(); n];
     for (i, photo) in photos.iter().enumerate() {
-        let view = looker.draw(photo, COUNT_SIDE_PX)?;
+        let view = crop_renderer.draw(photo, COUNT_SIDE_PX)?;
         for (found, seen) in counts(&view, &map.identities).into_iter().zip(&mut seen) {
             seen.extend((found >= LEAST_PX as f64).then_some((found, i)));
         }
@@ -71,11 +71,12 @@ pub(crate) fn embed(
     let (mut done, mut told, start) = (0, false, Instant::now());
     for photo in &order {
         let pixels = io::photo::load(&photos[*photo], MAX_SIDE_PX)?;
-        let view = looker.draw(&photos[*photo], MAX_SIDE_PX)?;
-        let mut eye = Eye { rgb: to_float(&pixels), view, identities: &map.identities, looked: HashMap::new() };
+        let view = crop_renderer.draw(&photos[*photo], MAX_SIDE_PX)?;
+        let mut crops =
+            PhotoCrops { rgb: to_float(&pixels), view, identities: &map.identities, looked: HashMap::new() };
         let shown: Vec<IdentityId> = shown(photo).into_iter().collect();
         for ids in shown.chunks(TILES_AT_ONCE) {
-            eye.look(ids, encoder)?;
+            crops.look(ids, encoder)?;
             done += ids.len();
             ticker.tick(done, observer)?;
             // The first tiles include the network's start-up; the time of those after them predicts the total.
@@ -88,8 +89,8 @@ pub(crate) fn embed(
             }
         }
         for &id in &wanted[photo] {
-            let Some(raw) = eye.seen(id) else { continue };
-            let whole = whole_of(id).and_then(|whole| eye.seen(whole));
+            let Some(raw) = crops.seen(id) else { continue };
+            let whole = whole_of(id).and_then(|whole| crops.seen(whole));
             let deviated = whole.and_then(|whole| deviate(&raw, &whole, part_weight)).unwrap_or_else(|| raw.clone());
             let features = &mut of[id as usize - 1];
             features.raw.push(raw);
@@ -99,14 +100,14 @@ pub(crate) fn embed(
     Ok(LanguageFeatures { encoder: name, dimension, by_identity: of })
 }
 
-struct Looker<'a> {
+struct CropRenderer<'a> {
     cloud: &'a GaussianCloud,
     map: &'a SemanticMap,
     settings: &'a RenderSettings,
     renderer: Renderer,
 }
 
-impl Looker<'_> {
+impl CropRenderer<'_> {
     fn draw(&mut self, photo: &Photo, max_side_px: u32) -> Result<ViewMap, FindError> {
         let camera = photo.camera.limited_to(max_side_px);
         let Self { cloud, map, settings, renderer } = self;
@@ -116,14 +117,14 @@ impl Looker<'_> {
 }
 
 /// One photo, and the embeddings of its identities.
-struct Eye<'a> {
+struct PhotoCrops<'a> {
     rgb: Vec<[f32; 3]>,
     view: ViewMap,
     identities: &'a Identities,
     looked: HashMap<IdentityId, Vec<f32>>,
 }
 
-impl Eye<'_> {
+impl PhotoCrops<'_> {
     fn look(&mut self, ids: &[IdentityId], encoder: &mut dyn Encoder) -> Result<(), ModelError> {
         let tile = |id: &IdentityId| {
             let mask: Mask = self.view.mask(self.identities, *id);
@@ -171,7 +172,7 @@ mod tests {
 
     use super::*;
     use crate::pipeline::observer::{Signal, Silent};
-    use crate::scene::{Camera, NOBODY, PART_WEIGHT};
+    use crate::scene::{Camera, NO_IDENTITY, PART_WEIGHT};
 
     /// Sees whether there is red in a picture, and nothing else.
     struct Reddish {
@@ -211,9 +212,9 @@ mod tests {
     /// of the doll alone.
     fn doll(folder: &std::path::Path) -> (GaussianCloud, SemanticMap, Vec<Photo>) {
         let mut all = Identities::default();
-        let doll = all.add(Level::Object, NOBODY, vec![]);
+        let doll = all.add(Level::Object, NO_IDENTITY, vec![]);
         let eye = all.add(Level::Part, doll, vec![]);
-        let nowhere = all.add(Level::Object, NOBODY, vec![]);
+        let nowhere = all.add(Level::Object, NO_IDENTITY, vec![]);
         assert_eq!((doll, eye, nowhere), (1, 2, 3));
         let cloud = GaussianCloud::isotropic(vec![[-0.5, 0.0, 0.0], [0.5, 0.0, 0.0]], -1.4, 4.0);
         let photo = |k: usize, eye: DVec3| {
@@ -273,10 +274,10 @@ mod tests {
     #[test]
     fn a_whole_counts_its_pieces_and_a_cut_one_counts_less() {
         let mut all = Identities::default();
-        let doll = all.add(Level::Object, NOBODY, vec![]);
+        let doll = all.add(Level::Object, NO_IDENTITY, vec![]);
         let eye = all.add(Level::Part, doll, vec![]);
-        let cat = all.add(Level::Object, NOBODY, vec![]);
-        let mut identity = vec![NOBODY; 100];
+        let cat = all.add(Level::Object, NO_IDENTITY, vec![]);
+        let mut identity = vec![NO_IDENTITY; 100];
         identity[44] = eye;
         identity[45] = doll;
         identity[0] = cat;
@@ -292,7 +293,7 @@ mod tests {
         let all = Identities::objects(5);
         // Left, right, upper and lower edge: four pixels each, two of them at the edge; one in the middle.
         let places = [[20, 21, 30, 31], [28, 29, 38, 39], [4, 5, 14, 15], [84, 85, 94, 95], [44, 45, 54, 55]];
-        let mut identity = vec![NOBODY; 100];
+        let mut identity = vec![NO_IDENTITY; 100];
         places.iter().enumerate().for_each(|(k, p)| p.iter().for_each(|i| identity[*i] = k as IdentityId + 1));
         let view = ViewMap::certain(10, identity);
         // 4 / (1 + 4 x 2 / sqrt(4)) = 0.8.

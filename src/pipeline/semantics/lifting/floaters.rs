@@ -7,7 +7,7 @@ use rstar::RTree;
 
 use super::votes::Assignment;
 use crate::math::stats::median;
-use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY};
+use crate::scene::{GaussianCloud, Identities, IdentityId, NO_IDENTITY};
 
 /// Typical distances between Gaussians that connect an object.
 const REACH: f64 = 12.0;
@@ -33,7 +33,7 @@ pub(crate) fn drop_floaters(cloud: &GaussianCloud, identities: &Identities, assi
     let mut members: HashMap<IdentityId, Vec<usize>> = HashMap::new();
     for (i, a) in assignments.iter().enumerate() {
         let object = identities.object_of(a.identity);
-        if object != NOBODY {
+        if object != NO_IDENTITY {
             members.entry(object).or_default().push(i);
         }
     }
@@ -44,7 +44,7 @@ pub(crate) fn drop_floaters(cloud: &GaussianCloud, identities: &Identities, assi
             continue;
         }
         for crumb in pieces.iter().filter(|p| (p.len() as f64) < CRUMB * all.len() as f64) {
-            crumb.iter().for_each(|&i| assignments[i] = Assignment { identity: NOBODY, margin: 0.0 });
+            crumb.iter().for_each(|&i| assignments[i] = Assignment { identity: NO_IDENTITY, margin: 0.0 });
         }
     }
 }
@@ -92,15 +92,18 @@ mod tests {
 
     fn dropped(cloud: &GaussianCloud, of: impl Fn(usize) -> IdentityId) -> Vec<usize> {
         let mut all = Identities::default();
-        let doll = all.add(Level::Object, NOBODY, vec![]);
+        let doll = all.add(Level::Object, NO_IDENTITY, vec![]);
         all.add(Level::Part, doll, vec![]);
-        all.add(Level::Object, NOBODY, vec![]);
+        all.add(Level::Object, NO_IDENTITY, vec![]);
         let before: Vec<Assignment> = (0..cloud.len()).map(|i| Assignment { identity: of(i), margin: 0.9 }).collect();
         let mut after = before.clone();
         drop_floaters(cloud, &all, &mut after);
         let gone = |i: &usize| after[*i] != before[*i];
         let list: Vec<usize> = (0..cloud.len()).filter(gone).collect();
-        assert!(list.iter().all(|&i| after[i] == Assignment { identity: NOBODY, margin: 0.0 }), "they are unknown");
+        assert!(
+            list.iter().all(|&i| after[i] == Assignment { identity: NO_IDENTITY, margin: 0.0 }),
+            "they are unknown"
+        );
         list
     }
 
@@ -110,7 +113,7 @@ mod tests {
         let cloud = block(1_000, &[[0.0, 0.0, 0.2], [0.0, 0.0, 0.33], [0.0, 0.0, 0.335], [2.0, 0.0, 0.0]]);
         assert_eq!(dropped(&cloud, |_| 1), [1_001, 1_002, 1_003]);
         assert_eq!(dropped(&cloud, |i| if i % 2 == 0 { 1 } else { 2 }), [1_001, 1_002, 1_003], "parts hang together");
-        assert_eq!(dropped(&cloud, |i| if i < 1_000 { 1 } else { NOBODY }), [0; 0]);
+        assert_eq!(dropped(&cloud, |i| if i < 1_000 { 1 } else { NO_IDENTITY }), [0; 0]);
         // As an object of their own they are all there is of it.
         assert_eq!(dropped(&cloud, |i| if i < 1_000 { 1 } else { 3 }), [0; 0]);
         assert!(dropped(&GaussianCloud::default(), |_| 1).is_empty());

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use super::error::FindError;
 use super::filters::{self, FilterOptions};
-use super::kept_masks::KeptMasks;
+use super::mask_cache::MaskCache;
 use super::segmenter::{FoundMask, Segmenter};
 use crate::io;
 use crate::models::catalog::{self, ModelRole};
@@ -41,7 +41,7 @@ impl NetworkMasks {
     /// Opens the network of this name: a model of the catalog, or the path of a model's description.
     pub(crate) fn open(name: &str, grid: MaskGrid) -> Result<Self, ModelError> {
         let path = catalog::find(name, ModelRole::Segmenter)?;
-        let mut options = AutomaticOptions { sparing: grid == MaskGrid::Sparing, ..AutomaticOptions::default() };
+        let mut options = AutomaticOptions { adaptive: grid == MaskGrid::Adaptive, ..AutomaticOptions::default() };
         let mut tile_points = options.points_per_side;
         let network: Box<dyn PromptedMasks> = match manifest::kind(&path)?.as_str() {
             "sam" => {
@@ -64,13 +64,13 @@ impl NetworkMasks {
     }
 
     /// The same, with its masks kept in `folder`.
-    pub(crate) fn open_kept(name: &str, grid: MaskGrid, folder: PathBuf) -> Result<KeptMasks, FindError> {
+    pub(crate) fn open_cached(name: &str, grid: MaskGrid, folder: PathBuf) -> Result<MaskCache, FindError> {
         let path = catalog::find(name, ModelRole::Segmenter)?;
         let open = Self::open(name, grid)?;
         // The description holds the checksums of the graphs.
         let description = std::fs::read(&path).map_err(|e| ModelError::Metadata { path, problem: e.to_string() })?;
         let asked = format!("{:?} {:?} {} {}", open.options, open.filters, open.tiles, open.tile_points);
-        Ok(KeptMasks::new(Box::new(open), folder, &[&description, asked.as_bytes()]))
+        Ok(MaskCache::new(Box::new(open), folder, &[&description, asked.as_bytes()]))
     }
 
     /// Finds masks in a picture and reports progress as a share of all runs.

@@ -7,7 +7,7 @@ use super::nearest::nearest;
 use super::votes::{Assignment, UNKNOWN};
 use crate::math::sh::SH_C0;
 use crate::math::stats::median;
-use crate::scene::{GaussianCloud, NOBODY};
+use crate::scene::{GaussianCloud, NO_IDENTITY};
 
 /// Neighbors of a Gaussian.
 const NEIGHBORS: usize = 8;
@@ -60,7 +60,7 @@ pub(crate) fn extend(cloud: &GaussianCloud, assignments: &mut [Assignment], fart
         }
     }
     for b in assignments.iter_mut().filter(|b| b.identity == UNKNOWN) {
-        b.identity = NOBODY;
+        b.identity = NO_IDENTITY;
     }
 }
 
@@ -81,10 +81,10 @@ mod tests {
         let cloud = row(30, 18);
         let mut b = vec![Assignment { identity: UNKNOWN, margin: 0.0 }; 30];
         b[0].identity = 1;
-        b[29].identity = NOBODY;
+        b[29].identity = NO_IDENTITY;
         extend(&cloud, &mut b, 40.0);
         assert!(b[..18].iter().all(|b| b.identity == 1), "{b:?}");
-        assert!(b[18..].iter().all(|b| b.identity == NOBODY));
+        assert!(b[18..].iter().all(|b| b.identity == NO_IDENTITY));
     }
 
     #[test]
@@ -96,7 +96,7 @@ mod tests {
         let mut b = vec![Assignment { identity: UNKNOWN, margin: 0.0 }; 30];
         b[3] = Assignment { identity: 2, margin: 0.5 };
         extend(&cloud, &mut b, 40.0);
-        assert!(b[..15].iter().all(|b| b.identity == 2) && b[15..].iter().all(|b| b.identity == NOBODY));
+        assert!(b[..15].iter().all(|b| b.identity == 2) && b[15..].iter().all(|b| b.identity == NO_IDENTITY));
         assert_eq!((b[3].margin, b[4].margin), (0.5, 0.0));
         extend(&GaussianCloud::default(), &mut [], 40.0);
     }
@@ -113,7 +113,9 @@ mod tests {
             let reached = b.iter().filter(|b| b.identity == 3).count();
             // Half a step either way for rounding; the first one counts.
             assert!((reach..=reach + 1).contains(&reached), "{jump}: {reached}");
-            assert!(b[..reached].iter().all(|b| b.identity == 3) && b[reached..].iter().all(|b| b.identity == NOBODY));
+            assert!(
+                b[..reached].iter().all(|b| b.identity == 3) && b[reached..].iter().all(|b| b.identity == NO_IDENTITY)
+            );
         }
     }
 }

@@ -7,10 +7,10 @@ use std::path::PathBuf;
 use sha2::{Digest, Sha256};
 
 use super::error::FindError;
-use super::kept_frames::{KeptFrames, kept_name, written};
-use super::kept_track::{self, KeptTrack};
+use super::frame_cache::{FrameCache, cache_name, written};
 use super::prompt_points::prompt_points;
 use super::segmenter::FoundMask;
+use super::track_cache::{self, TrackCache};
 use super::votes::UNKNOWN;
 use crate::io::files::hex;
 use crate::models::ModelError;
@@ -53,21 +53,21 @@ impl Sam2Tracker {
         };
         let sizes: Vec<(usize, usize)> = photos.iter().map(size).collect();
         let mut labels: Vec<Vec<IdentityId>> = sizes.iter().map(|(w, h)| vec![UNKNOWN; w * h]).collect();
-        let of_photo = |photo| kept_name((&self.model.about.name, self.model.digest()), photo, written(photo));
+        let of_photo = |photo| cache_name((&self.model.about.name, self.model.digest()), photo, written(photo));
         let of_photos: Vec<String> = photos.iter().map(of_photo).collect();
         let mut ticker = Ticker::new("Tracking masks", found.len() * photos.len());
         for (k, (mask, id)) in found.iter().zip(ids).enumerate() {
             let mask = mask.mask.resized(sizes[seed].0, sizes[seed].1);
             let file = self.cache.as_ref().map(|folder| folder.join(track_name(&of_photos, seed, &mask, prompt)));
             let done = k * photos.len();
-            let masks = match file.as_deref().and_then(|file| kept_track::read(file, &sizes)) {
+            let masks = match file.as_deref().and_then(|file| track_cache::read(file, &sizes)) {
                 Some(masks) => masks,
                 None => {
                     let mut seen = |n: usize| ticker.tick(done + n, observer);
-                    let mut history = KeptTrack::open(file.as_deref());
+                    let mut history = TrackCache::open(file.as_deref());
                     let masks = self.follow_one((photos, &sizes), (seed, &mask, prompt), &mut history, &mut seen)?;
                     // A failed write (a full disk) only costs time later.
-                    let _ = file.map(|file| kept_track::write(&file, &masks));
+                    let _ = file.map(|file| track_cache::write(&file, &masks));
                     masks
                 }
             };
@@ -83,11 +83,11 @@ impl Sam2Tracker {
         &mut self,
         (photos, sizes): (&[Photo], &[(usize, usize)]),
         (seed, mask, prompt): (usize, &Mask, MaskPrompt),
-        history: &mut KeptTrack,
+        history: &mut TrackCache,
         seen: &mut dyn FnMut(usize) -> Result<(), Interrupted>,
     ) -> Result<Vec<Mask>, FindError> {
         let folder = self.cache.clone();
-        let mut frames = KeptFrames { photos, folder, kept: None, secs: &mut self.encode_secs };
+        let mut frames = FrameCache { photos, folder, kept: None, secs: &mut self.encode_secs };
         let mut track = Track::new(&mut self.model, &mut frames, sizes[seed]);
         let prompt = match prompt {
             MaskPrompt::Points => Prompt::Points { points: prompt_points(mask), around: None },

@@ -157,13 +157,13 @@ mod tests {
     use super::*;
     use crate::math::stats::worst_difference;
     use crate::pipeline::observer::Silent;
-    use crate::scene::{Level, NOBODY};
+    use crate::scene::{Level, NO_IDENTITY};
 
     /// Two Gaussians side by side, one of them a part, with the masks that the user would draw: a disc of 4 px around
     /// the center of each, half a length to either side at 51.7 px a length and three lengths away.
     fn scene() -> (GaussianCloud, Identities, Vec<CodeView>) {
         let mut all = Identities::default();
-        let doll = all.add(Level::Object, NOBODY, vec![]);
+        let doll = all.add(Level::Object, NO_IDENTITY, vec![]);
         let eye = all.add(Level::Part, doll, vec![]);
         for (id, code) in [(doll, [0.9, 0.2, 0.5]), (eye, [0.1, 0.3, 0.8])] {
             all.get_mut(id).expect("there").code = code;
@@ -179,7 +179,7 @@ mod tests {
             } else if near(8.62) {
                 eye
             } else {
-                NOBODY
+                NO_IDENTITY
             }
         };
         let views = vec![CodeView { camera, labels: (0..48 * 32).map(label).collect() }];
@@ -209,7 +209,7 @@ mod tests {
         assert!(loss < 0.8 * first, "{loss} {first}");
         // Without masks nothing is learned; with wrong ones, the wrong thing.
         let (codes, of, _) = train(100, |_| UNKNOWN);
-        assert_eq!((codes[0], of), ([0.5; 6], vec![NOBODY; 2]));
+        assert_eq!((codes[0], of), ([0.5; 6], vec![NO_IDENTITY; 2]));
         let (_, of, _) = train(400, |l| [0, 2, 1].get(l as usize).copied().unwrap_or(l));
         assert_eq!(of, [2, 1]);
     }

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::math::finite::{CHECKED, all_finite};
 use crate::math::lanes::Lane;
 use crate::render::{self, ContributionSink, RenderError, RenderSettings, Renderer, TILE_PX};
-use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, NOBODY, SemanticMap};
+use crate::scene::{Camera, GaussianCloud, Identities, IdentityId, NO_IDENTITY, SemanticMap};
 
 /// Label of an unknown pixel.
 pub(crate) const UNKNOWN: IdentityId = render::UNKNOWN;
@@ -35,7 +35,7 @@ pub(crate) const LEAST_SEEN: f32 = 0.1;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Assignment {
-    /// Innermost identity; `NOBODY` if unlabeled, `UNKNOWN` without a vote.
+    /// Innermost identity; `NO_IDENTITY` if unlabeled, `UNKNOWN` without a vote.
     pub(crate) identity: IdentityId,
     /// Share of votes for that identity's object minus the share of the runner-up; 0 without a vote.
     pub(crate) margin: f32,
@@ -55,7 +55,7 @@ impl Votes {
     pub(crate) fn known(map: &SemanticMap, least_seen: f32) -> Self {
         let mut votes = Self::with_least_seen(map.identity_of.len(), least_seen);
         let known = (0..map.identity_of.len()).filter(|i| !map.is_unknown(*i));
-        let weight = |id: IdentityId| if id == NOBODY { KNOWN_NOBODY } else { KNOWN };
+        let weight = |id: IdentityId| if id == NO_IDENTITY { KNOWN_NOBODY } else { KNOWN };
         known.for_each(|i| votes.by_gaussian[i].push((map.identity_of[i], weight(map.identity_of[i]))));
         votes
     }
@@ -163,7 +163,7 @@ fn decide(votes: &[(IdentityId, f32)], objects: &[IdentityId], least: f32) -> As
     if !(total > 0.0 && total >= least) {
         return Assignment { identity: UNKNOWN, margin: 0.0 };
     }
-    let object_of = |id: IdentityId| objects.get(id as usize).copied().unwrap_or(NOBODY);
+    let object_of = |id: IdentityId| objects.get(id as usize).copied().unwrap_or(NO_IDENTITY);
     let mut sums: Vec<(IdentityId, f32)> = Vec::with_capacity(votes.len());
     for &(id, weight) in votes {
         let object = object_of(id);
@@ -223,17 +223,22 @@ mod tests {
     #[test]
     fn objects_win_together_before_their_pieces_compete() {
         let mut all = Identities::default();
-        let doll = all.add(Level::Object, NOBODY, vec![]);
-        let cat = all.add(Level::Object, NOBODY, vec![]);
+        let doll = all.add(Level::Object, NO_IDENTITY, vec![]);
+        let cat = all.add(Level::Object, NO_IDENTITY, vec![]);
         let (eye, ear) = (all.add(Level::Part, doll, vec![]), all.add(Level::Part, doll, vec![]));
         let votes = Votes {
-            by_gaussian: vec![vec![(eye, 2.0), (ear, 3.0), (cat, 4.0)], vec![(NOBODY, 1.0)], vec![], vec![(cat, 0.01)]],
+            by_gaussian: vec![
+                vec![(eye, 2.0), (ear, 3.0), (cat, 4.0)],
+                vec![(NO_IDENTITY, 1.0)],
+                vec![],
+                vec![(cat, 0.01)],
+            ],
             ..Votes::default()
         };
         let b = votes.decide(&all, 0.05);
         assert_eq!(b[0].identity, ear);
         assert!((b[0].margin - 1.0 / 9.0).abs() < 1e-6);
-        assert_eq!((b[1].identity, b[2].identity, b[3].identity), (NOBODY, UNKNOWN, UNKNOWN));
+        assert_eq!((b[1].identity, b[2].identity, b[3].identity), (NO_IDENTITY, UNKNOWN, UNKNOWN));
     }
 
     #[test]

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::colors;
 use super::localize::{Hit, Scorer};
 use super::parse::ParsedQuery;
-use super::recipe::{PartFeatures, Recipe, Rejection, Strategy};
+use super::recipe::{PartEmbedding, QueryConfig, Rejection, Strategy};
 use crate::math::finite::{all_finite, insist};
 use crate::models::{self, TextSource};
 use crate::pipeline::semantics::relevancy::{advantage, score};
@@ -26,7 +26,7 @@ impl TextEmbeddings {
     pub fn learn<S: TextSource + ?Sized>(
         &mut self,
         phrase: &ParsedQuery,
-        recipe: &Recipe,
+        recipe: &QueryConfig,
         source: &mut S,
     ) -> Result<(), S::Error> {
         if self.0.len() > Self::MOST {
@@ -38,7 +38,7 @@ impl TextEmbeddings {
     }
 
     /// Adds the embeddings of the canonical phrases of a recipe.
-    pub(crate) fn learn_canonical<S: TextSource + ?Sized>(&mut self, recipe: &Recipe, source: &mut S) {
+    pub(crate) fn learn_canonical<S: TextSource + ?Sized>(&mut self, recipe: &QueryConfig, source: &mut S) {
         // None of these phrases has to be understood, so no error can occur.
         let _ = self.add(&[], recipe.canonical.iter(), source);
     }
@@ -79,7 +79,7 @@ impl TextEmbeddings {
 }
 
 /// Additional phrases for answering a question.
-fn helpful(phrase: &ParsedQuery, recipe: &Recipe) -> Vec<String> {
+fn helpful(phrase: &ParsedQuery, recipe: &QueryConfig) -> Vec<String> {
     let mut all: Vec<String> = recipe.canonical.iter().map(str::to_owned).collect();
     if matches!(recipe.strategy, Strategy::TwoSteps | Strategy::Joint) {
         all.extend(phrase.implied_whole().map(str::to_owned));
@@ -99,7 +99,7 @@ fn helpful(phrase: &ParsedQuery, recipe: &Recipe) -> Vec<String> {
 /// Phrases of a question that name a color: its own, and the whole's.
 fn colored(phrase: &ParsedQuery) -> impl Iterator<Item = &str> {
     let own = if phrase.whole.is_some() { &phrase.target } else { &phrase.text };
-    std::iter::once(own).chain(&phrase.whole).map(String::as_str).filter(|said| !colors::said(said).is_empty())
+    std::iter::once(own).chain(&phrase.whole).map(String::as_str).filter(|said| !colors::named(said).is_empty())
 }
 
 /// Score above which an identity is nearer to the query than to any canonical phrase.
@@ -119,7 +119,7 @@ pub struct EmbeddingScorer<'a> {
     pub(crate) features: &'a LanguageFeatures,
     /// Embeddings of the phrases that will be asked for; other phrases score nothing.
     pub(crate) phrases: &'a TextEmbeddings,
-    pub(crate) recipe: &'a Recipe,
+    pub(crate) recipe: &'a QueryConfig,
     known: Vec<(String, Option<String>, Vec<f32>)>,
 }
 
@@ -129,7 +129,7 @@ impl<'a> EmbeddingScorer<'a> {
         identities: &'a Identities,
         features: &'a LanguageFeatures,
         phrases: &'a TextEmbeddings,
-        recipe: &'a Recipe,
+        recipe: &'a QueryConfig,
     ) -> Self {
         Self { identities, features, phrases, recipe, known: Vec::new() }
     }
@@ -148,7 +148,7 @@ impl<'a> EmbeddingScorer<'a> {
     }
 
     fn best_view(&self, f: &ViewFeatures, query: &[f32], canonical: &[Vec<f32>]) -> f32 {
-        let views = if self.recipe.parts == PartFeatures::Raw { &f.raw } else { &f.deviated };
+        let views = if self.recipe.parts == PartEmbedding::Raw { &f.raw } else { &f.deviated };
         views.iter().map(|v| advantage(v, query, canonical)).fold(f32::NEG_INFINITY, f32::max)
     }
 
@@ -230,7 +230,7 @@ mod tests {
             })
         };
         for phrase in ["lid", "pot"] {
-            book.learn(&parsed(phrase), &Recipe::default(), &mut encode).expect("encodes");
+            book.learn(&parsed(phrase), &QueryConfig::default(), &mut encode).expect("encodes");
         }
         book
     }
@@ -246,7 +246,7 @@ mod tests {
     #[test]
     fn the_best_view_counts_and_features_can_be_chosen() {
         let (features, phrases) = (features(), book());
-        let (all, recipe) = (all(), Recipe::default());
+        let (all, recipe) = (all(), QueryConfig::default());
         let mut by = EmbeddingScorer::new(&all, &features, &phrases, &recipe);
         let d = by.advantages("lid", None);
         assert!((d[0] + 0.5).abs() < 1e-6 && (d[1] - 0.1).abs() < 1e-6 && d[2] == f32::NEG_INFINITY, "{d:?}");
@@ -254,7 +254,7 @@ mod tests {
         assert!(s[0] < 0.5 && s[1] > 0.5 && s[2] == 0.0);
         // The whole's phrase is one more thing to be better than.
         assert!((by.advantages("lid", Some("pot"))[1] - 0.1).abs() < 1e-6);
-        let raw = Recipe { parts: PartFeatures::Raw, ..Recipe::default() };
+        let raw = QueryConfig { parts: PartEmbedding::Raw, ..QueryConfig::default() };
         by.recipe = &raw;
         assert!((by.advantages("lid", None)[1] - 0.5).abs() < 1e-6);
         assert!(by.advantages("never learned", None).iter().all(|d| *d == f32::NEG_INFINITY));
@@ -269,16 +269,16 @@ mod tests {
                 calls += 1;
                 Ok::<_, ()>(vec![1.0])
             };
-            book.learn(&parsed("lid"), &Recipe::default(), &mut encode).expect("encodes");
+            book.learn(&parsed("lid"), &QueryConfig::default(), &mut encode).expect("encodes");
         }
         assert_eq!(calls, 1 + PAPERS_PHRASES.len());
-        assert_eq!(book.learn(&parsed("pot"), &Recipe::default(), &mut |_: &str| Err("no")), Err("no"));
+        assert_eq!(book.learn(&parsed("pot"), &QueryConfig::default(), &mut |_: &str| Err("no")), Err("no"));
         assert!(book.get("pot").is_none());
     }
 
     #[test]
     fn scores_are_kept_by_phrase_and_whole() {
-        let (features, phrases, all, recipe) = (features(), book(), all(), Recipe::default());
+        let (features, phrases, all, recipe) = (features(), book(), all(), QueryConfig::default());
         let fresh = |phrase: &str, whole: Option<&str>| {
             EmbeddingScorer::new(&all, &features, &phrases, &recipe).scores(phrase, whole)
         };
@@ -299,7 +299,7 @@ mod tests {
     #[test]
     fn a_full_book_begins_anew() {
         let mut book = TextEmbeddings::default();
-        let recipe = Recipe::default();
+        let recipe = QueryConfig::default();
         let learn = |phrase: &str, book: &mut TextEmbeddings| {
             book.learn(&parsed(phrase), &recipe, &mut |_: &str| Ok::<_, ()>(vec![1.0])).expect("encodes")
         };
@@ -313,7 +313,7 @@ mod tests {
 
     #[test]
     fn the_recipe_says_which_phrases_are_needed() {
-        let learned = |phrase: &str, recipe: Recipe| {
+        let learned = |phrase: &str, recipe: QueryConfig| {
             let mut asked = Vec::new();
             let mut encode = |p: &str| {
                 asked.push(p.to_owned());
@@ -323,12 +323,12 @@ mod tests {
             book.learn(&parsed(phrase), &recipe, &mut encode).expect("only what was asked has to be understood");
             asked
         };
-        let of = |strategy, rejection| Recipe { strategy, rejection, ..Recipe::default() };
+        let of = |strategy, rejection| QueryConfig { strategy, rejection, ..QueryConfig::default() };
         let canonical = PAPERS_PHRASES.map(str::to_owned);
         let plain = of(Strategy::OneStep, Rejection::Canonical);
         let with = |first: &[&str]| [first.iter().map(|p| (*p).to_owned()).collect(), canonical.to_vec()].concat();
         assert_eq!(learned("bear nose", plain.clone()), with(&["bear nose"]));
-        let lerf = Recipe { canonical: "lerf".parse().expect("four"), ..plain.clone() };
+        let lerf = QueryConfig { canonical: "lerf".parse().expect("four"), ..plain.clone() };
         assert_eq!(learned("mug", lerf), ["mug", "object", "things", "stuff", "texture"]);
         let steps = learned("bear nose", of(Strategy::TwoSteps, Rejection::Canonical));
         assert_eq!(steps, [with(&["bear nose"]), vec!["bear".into()]].concat());

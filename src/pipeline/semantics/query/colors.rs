@@ -4,7 +4,7 @@ use super::words::words;
 use crate::scene::colors::{COLORS, row};
 
 /// Returns the colors that a phrase names, by row. A last word is the thing itself: an orange.
-pub(crate) fn said(phrase: &str) -> Vec<usize> {
+pub(crate) fn named(phrase: &str) -> Vec<usize> {
     let words = words(phrase);
     words.iter().take(words.len().saturating_sub(1)).filter_map(|w| row(w)).collect()
 }
@@ -37,9 +37,9 @@ mod tests {
 
     #[test]
     fn colors_are_what_something_has_and_not_what_it_is() {
-        assert_eq!(said("red and grey mug").len(), 2);
-        assert_eq!(said("gray mug"), said("grey lamp"));
-        assert!(said("orange").is_empty() && said("mug").is_empty() && said("").is_empty());
+        assert_eq!(named("red and grey mug").len(), 2);
+        assert_eq!(named("gray mug"), named("grey lamp"));
+        assert!(named("orange").is_empty() && named("mug").is_empty() && named("").is_empty());
         assert_eq!(without("the red mugs"), ["the", "mug"]);
         assert_eq!(without("blood orange"), ["blood", "orange"]);
         let others = alternatives("handle of the red mug");

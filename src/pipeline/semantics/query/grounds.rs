@@ -86,21 +86,21 @@ pub(crate) fn unexplained(identities: &Identities, id: IdentityId, phrase: &Pars
 
 /// Returns whether a phrase names a color that `id` does not have, judged by names or Gaussians.
 pub(crate) fn is_of_another_color(identities: &Identities, id: IdentityId, phrase: &ParsedQuery) -> bool {
-    let said = [Some(&phrase.target), phrase.whole.as_ref()].into_iter().flatten().flat_map(|p| colors::said(p));
+    let said = [Some(&phrase.target), phrase.whole.as_ref()].into_iter().flatten().flat_map(|p| colors::named(p));
     said.into_iter().any(|color| has_color(identities, id, phrase, color) == Some(false))
 }
 
 /// Returns whether an identity has a color: by an own name with a color, else by its Gaussians. `None` if unknown.
 pub(crate) fn color_of(identities: &Identities, id: IdentityId, color: usize) -> Option<bool> {
     let names = identities.get(id).map(|i| i.names.as_slice()).unwrap_or_default();
-    let named: Vec<usize> = names.iter().flat_map(|name| colors::said(name)).collect();
+    let named: Vec<usize> = names.iter().flat_map(|name| colors::named(name)).collect();
     if named.is_empty() { identities.colors.has(id, color) } else { Some(named.contains(&color)) }
 }
 
 /// Returns whether the thing that a phrase gives the color to has it, if `id` is the answer. `None` if unknown, or if
 /// the phrase gives the color to nothing.
 fn has_color(identities: &Identities, id: IdentityId, phrase: &ParsedQuery, color: usize) -> Option<bool> {
-    let says = |text: &String| colors::said(text).contains(&color);
+    let says = |text: &String| colors::named(text).contains(&color);
     let has = |id: IdentityId| color_of(identities, id, color);
     let answers: Vec<Option<bool>> = match &phrase.whole {
         Some(whole) if says(whole) && !says(&phrase.target) => identities.ancestors(id).skip(1).map(has).collect(),
@@ -115,14 +115,14 @@ fn has_color(identities: &Identities, id: IdentityId, phrase: &ParsedQuery, colo
 mod tests {
     use super::*;
     use crate::math::sh::SH_C0;
-    use crate::scene::{GaussianCloud, Level, NOBODY, SemanticMap};
+    use crate::scene::{GaussianCloud, Level, NO_IDENTITY, SemanticMap};
 
     /// A white mug with a red handle, and a kettle that is called blue and is red.
     fn scene() -> Identities {
         let mut all = Identities::default();
-        let mug = all.add(Level::Object, NOBODY, vec!["mug".into()]);
+        let mug = all.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
         let handle = all.add(Level::Part, mug, vec!["handle".into()]);
-        let kettle = all.add(Level::Object, NOBODY, vec!["blue kettle".into()]);
+        let kettle = all.add(Level::Object, NO_IDENTITY, vec!["blue kettle".into()]);
         let of = vec![mug, mug, mug, handle, kettle];
         let (white, red) = ([0.9; 3], [0.8, 0.1, 0.1]);
         let cloud = GaussianCloud {
@@ -141,7 +141,7 @@ mod tests {
     #[test]
     fn words_beside_an_identity_are_those_that_neither_it_nor_its_wholes_have() {
         let mut all = scene();
-        let nameless = all.add(Level::Object, NOBODY, vec![]);
+        let nameless = all.add(Level::Object, NO_IDENTITY, vec![]);
         assert_eq!(words_beside(&all, 2, "the green handles of the mug"), ["green"]);
         assert_eq!(words_beside(&all, 1, "red mugs"), ["red"], "a color is a word like any other here");
         assert_eq!(words_beside(&all, 1, "handle of the mug"), ["handle"], "what a piece is called says nothing of it");
@@ -194,14 +194,14 @@ mod tests {
         }
         // Words of a name are no grammar.
         let mut twins = Identities::default();
-        twins.add(Level::Object, NOBODY, vec!["the two sisters".into()]);
+        twins.add(Level::Object, NO_IDENTITY, vec!["the two sisters".into()]);
         assert!(grammar(&twins, "two sisters").is_empty());
         let another = |id, text: &str| is_of_another_color(&all, id, &ParsedQuery::parse(text).expect("words"));
         assert!(another(1, "blue cup") && another(3, "red pot") && another(2, "lid of the blue cup"));
         assert!(!another(1, "white cup") && !another(1, "cup") && !another(3, "blue pot"));
         // Without observed colors nothing is known: no word is explained, and nothing speaks against it.
         let mut unseen = Identities::default();
-        unseen.add(Level::Object, NOBODY, vec!["mug".into()]);
+        unseen.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
         let phrase = ParsedQuery::parse("white mug").expect("words");
         assert_eq!(
             (unexplained(&unseen, 1, &phrase), is_of_another_color(&unseen, 1, &phrase)),

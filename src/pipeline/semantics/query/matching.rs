@@ -107,14 +107,14 @@ fn codes_of(identities: &Identities, target: IdentityId) -> Vec<(Level, [f32; 3]
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::NOBODY;
+    use crate::scene::NO_IDENTITY;
     use crate::scene::semantic_map::BACKGROUND_CODE;
 
     /// A doll with an eye, a cat, and codes one tolerance apart for doll and cat.
     fn scene() -> SemanticMap {
         let mut all = Identities::default();
-        let doll = all.add(Level::Object, NOBODY, vec![]);
-        let cat = all.add(Level::Object, NOBODY, vec![]);
+        let doll = all.add(Level::Object, NO_IDENTITY, vec![]);
+        let cat = all.add(Level::Object, NO_IDENTITY, vec![]);
         let face = all.add(Level::Part, doll, vec![]);
         let eye = all.add(Level::Part, face, vec![]);
         for (id, code) in
@@ -122,7 +122,7 @@ mod tests {
         {
             all.get_mut(id).expect("there").code = code;
         }
-        SemanticMap::from_identities(all, vec![doll, cat, face, eye, NOBODY], vec![1.0; 5], vec![])
+        SemanticMap::from_identities(all, vec![doll, cat, face, eye, NO_IDENTITY], vec![1.0; 5], vec![])
     }
 
     #[test]

@@ -51,7 +51,7 @@ impl Scorer for ByName<'_> {
 
 /// Returns whether names exclude all of `ids`: another color or number, or nothing in common but a color.
 fn is_another(identities: &Identities, phrase: &str, ids: impl Iterator<Item = IdentityId>) -> bool {
-    let (asked, kind) = (colors::said(phrase), colors::without(phrase));
+    let (asked, kind) = (colors::named(phrase), colors::without(phrase));
     let numbers = |text: &str| words(text).into_iter().filter(|w| w.bytes().all(|b| b.is_ascii_digit())).collect();
     let asked_number: Vec<String> = numbers(phrase);
     let fits = |name: &String| {
@@ -59,7 +59,7 @@ fn is_another(identities: &Identities, phrase: &str, ids: impl Iterator<Item = I
         if !asked_number.is_empty() && !has_number.is_empty() && !asked_number.iter().any(|n| has_number.contains(n)) {
             return false;
         }
-        let has = colors::said(name);
+        let has = colors::named(name);
         let same = asked.is_empty() || has.is_empty() || asked.iter().any(|c| has.contains(c));
         same && (asked.is_empty() || words(name).iter().any(|w| kind.contains(w)))
     };
@@ -126,14 +126,14 @@ fn similarity(phrase: &[String], name: &[String]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Level, NOBODY};
+    use crate::scene::{Level, NO_IDENTITY};
 
     fn scene() -> Identities {
         let mut all = Identities::default();
-        let red = all.add(Level::Object, NOBODY, vec!["red controller".into()]);
-        all.add(Level::Object, NOBODY, vec!["Blue_Controller".into(), "手柄".into()]);
+        let red = all.add(Level::Object, NO_IDENTITY, vec!["red controller".into()]);
+        all.add(Level::Object, NO_IDENTITY, vec!["Blue_Controller".into(), "手柄".into()]);
         all.add(Level::Part, red, vec!["button a".into()]);
-        all.add(Level::Object, NOBODY, vec![]);
+        all.add(Level::Object, NO_IDENTITY, vec![]);
         all
     }
 
@@ -141,7 +141,7 @@ mod tests {
     fn another_number_is_another_thing() {
         let mut all = Identities::default();
         let ids: Vec<IdentityId> =
-            ["box 0", "box 2", "lamp"].map(|n| all.add(Level::Object, NOBODY, vec![n.into()])).into();
+            ["box 0", "box 2", "lamp"].map(|n| all.add(Level::Object, NO_IDENTITY, vec![n.into()])).into();
         let another =
             |phrase: &str| ids.iter().map(|id| is_another(&all, phrase, [*id].into_iter())).collect::<Vec<_>>();
         assert_eq!(another("box 1"), [true, true, false]);

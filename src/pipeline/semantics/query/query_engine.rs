@@ -8,7 +8,7 @@ use super::by_embedding::TextEmbeddings;
 use super::names;
 use super::parse::ParsedQuery;
 use super::reading::QueryReading;
-use super::recipe::{Recipe, Understanding};
+use super::recipe::{MatchBy, QueryConfig};
 use super::timing::{StagesMs, ms_since};
 use crate::models::{self, Encoder, ModelError, TextSource};
 use crate::scene::{Identities, LanguageFeatures, LevelFilter, SemanticMap};
@@ -18,13 +18,13 @@ use crate::scene::{Identities, LanguageFeatures, LevelFilter, SemanticMap};
 pub(crate) struct QueryEngine {
     encoder: Option<Box<dyn Encoder>>,
     phrases: TextEmbeddings,
-    recipe: Recipe,
+    recipe: QueryConfig,
 }
 
 impl QueryEngine {
     /// Opens the encoder of the scene's identities, if there is one.
-    pub(crate) fn new(language: Option<&LanguageFeatures>, recipe: Recipe) -> Result<Self, ModelError> {
-        let language = language.filter(|_| recipe.understanding != Understanding::Names);
+    pub(crate) fn new(language: Option<&LanguageFeatures>, recipe: QueryConfig) -> Result<Self, ModelError> {
+        let language = language.filter(|_| recipe.match_by != MatchBy::Names);
         let encoder = language.map(|language| models::encoder(&language.encoder)).transpose()?;
         Ok(Self { encoder, recipe, ..Self::default() })
     }
@@ -41,7 +41,7 @@ impl QueryEngine {
     }
 
     /// Answers by this recipe from now on, with the same encoder.
-    pub(crate) fn answer_by(&mut self, recipe: Recipe) {
+    pub(crate) fn answer_by(&mut self, recipe: QueryConfig) {
         self.recipe = recipe;
     }
 
@@ -67,7 +67,7 @@ impl QueryEngine {
         level: LevelFilter,
     ) -> Result<QueryAnswer, ModelError> {
         let start = Instant::now();
-        let wanted = self.recipe.understanding != Understanding::Names;
+        let wanted = self.recipe.match_by != MatchBy::Names;
         let known = match self.encoder.as_mut().filter(|_| wanted) {
             Some(encoder) => match self.phrases.learn(&reading.phrase, &self.recipe, &mut **encoder) {
                 Ok(()) => true,
@@ -109,7 +109,7 @@ pub(crate) fn answer_encoded(
     map: &SemanticMap,
     reading: &QueryReading,
     level: LevelFilter,
-    recipe: &Recipe,
+    recipe: &QueryConfig,
     encoded: Option<(&TextEmbeddings, &[String])>,
 ) -> QueryAnswer {
     let with = |(features, (phrases, unknown))| Language { features, phrases, unknown };
@@ -121,7 +121,7 @@ pub(crate) fn answer_encoded(
 /// encodes phrases; if it cannot encode the question's, names alone answer.
 pub(crate) fn ask_with<S: TextSource + ?Sized>(
     identities: &Identities,
-    (features, recipe): (&LanguageFeatures, &Recipe),
+    (features, recipe): (&LanguageFeatures, &QueryConfig),
     text: &str,
     level: LevelFilter,
     source: &mut S,
@@ -138,7 +138,7 @@ pub(crate) fn ask_by_name(
     identities: &Identities,
     text: &str,
     level: LevelFilter,
-    recipe: &Recipe,
+    recipe: &QueryConfig,
 ) -> Option<QueryAnswer> {
     QueryReading::new(identities, text, level, recipe).map(|reading| by_name(identities, &reading, level, recipe))
 }
@@ -147,7 +147,7 @@ pub(crate) fn ask_by_name(
 /// encodes phrases, and `phrases` keeps their embeddings.
 pub(crate) fn ask_by_embedding<S: TextSource + ?Sized>(
     identities: &Identities,
-    (features, recipe): (&LanguageFeatures, &Recipe),
+    (features, recipe): (&LanguageFeatures, &QueryConfig),
     text: &str,
     phrases: &mut TextEmbeddings,
     source: &mut S,
@@ -167,7 +167,7 @@ mod tests {
     use super::*;
     use crate::models::IdentityCrop;
     use crate::pipeline::semantics::query::answer::Basis;
-    use crate::scene::{Level, NOBODY, ViewFeatures};
+    use crate::scene::{Level, NO_IDENTITY, ViewFeatures};
 
     /// Knows "red" and the canonical phrases; fails as a damaged network does on "broken".
     struct Small;
@@ -207,7 +207,7 @@ mod tests {
     #[test]
     fn words_that_nobody_knows_are_no_failure_and_a_broken_encoder_is() {
         let mut map = SemanticMap::default();
-        map.identities.add(Level::Object, NOBODY, vec!["lamp".into()]);
+        map.identities.add(Level::Object, NO_IDENTITY, vec!["lamp".into()]);
         let red = ViewFeatures { raw: vec![vec![1.0, 0.0]], deviated: vec![vec![1.0, 0.0]] };
         map.language = Some(LanguageFeatures { encoder: "small".into(), dimension: 2, by_identity: vec![red] });
         let mut engine = QueryEngine { encoder: Some(Box::new(Small)), ..QueryEngine::default() };

@@ -23,7 +23,7 @@ const TEMPERATURE: f32 = 10.0;
 #[serde(rename_all = "kebab-case")]
 #[derive(clap::ValueEnum, strum::Display, strum::VariantArray)]
 #[strum(serialize_all = "kebab-case")]
-pub enum Understanding {
+pub enum MatchBy {
     /// The names that identities have
     Names,
     /// The embeddings that an encoder made of them, as in the paper
@@ -54,7 +54,7 @@ pub enum Strategy {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 #[derive(clap::ValueEnum, strum::Display, strum::VariantArray)]
-pub enum PartFeatures {
+pub enum PartEmbedding {
     /// Moved toward their whole's: the paper's semantic deviation
     #[default]
     #[value(name = "on")]
@@ -99,7 +99,7 @@ pub enum Rejection {
 
 impl Rejection {
     /// Describes the rule in words: "something is always found".
-    pub(crate) fn told(self) -> &'static str {
+    pub(crate) fn text(self) -> &'static str {
         match self {
             Self::Never => "something is always found",
             Self::Canonical => "not found if a canonical phrase is nearer",
@@ -162,14 +162,15 @@ impl fmt::Display for CanonicalPhrases {
 /// All choices of a query, and those made earlier, when objects were found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-pub struct Recipe {
+pub struct QueryConfig {
     /// Source of the scores.
-    pub understanding: Understanding,
+    #[serde(rename = "understanding")]
+    pub match_by: MatchBy,
     /// Strategy for finding pieces.
     pub strategy: Strategy,
     /// Deviated or raw embeddings of parts.
     #[serde(rename = "deviation")]
-    pub parts: PartFeatures,
+    pub parts: PartEmbedding,
     /// Canonical phrases.
     pub canonical: CanonicalPhrases,
     /// Spread of the scores; the order does not depend on it.
@@ -189,12 +190,12 @@ pub struct Recipe {
     pub preparation: Preparation,
 }
 
-impl Default for Recipe {
+impl Default for QueryConfig {
     fn default() -> Self {
         Self {
-            understanding: Understanding::default(),
+            match_by: MatchBy::default(),
             strategy: Strategy::default(),
-            parts: PartFeatures::default(),
+            parts: PartEmbedding::default(),
             canonical: CanonicalPhrases::default(),
             temperature: TEMPERATURE,
             scale: RelevancyScale::default(),
@@ -218,19 +219,19 @@ pub enum RecipeName {
 
 impl RecipeName {
     /// Returns all of its choices.
-    pub fn recipe(self) -> Recipe {
+    pub fn recipe(self) -> QueryConfig {
         match self {
-            Self::Default => Recipe::default(),
-            Self::Paper => Recipe::paper(),
+            Self::Default => QueryConfig::default(),
+            Self::Paper => QueryConfig::paper(),
         }
     }
 }
 
-impl Recipe {
+impl QueryConfig {
     /// Returns all of the paper's choices.
     pub fn paper() -> Self {
         Self {
-            understanding: Understanding::Embedding,
+            match_by: MatchBy::Embedding,
             strategy: Strategy::TwoSteps,
             temperature: 1.0,
             scale: RelevancyScale::Lerf,
@@ -254,7 +255,7 @@ impl Recipe {
     /// Reports the choices that the scene was not prepared with; its answers differ from the recipe's.
     pub(crate) fn unmet(&self, map: &SemanticMap) -> Vec<String> {
         let mut unmet = Vec::new();
-        if self.understanding == Understanding::Embedding && map.language.is_none() {
+        if self.match_by == MatchBy::Embedding && map.language.is_none() {
             unmet.push("no encoder has looked at this scene, so nothing is found by embedding: prepare it with 'fmlgs preprocess --encoder'".into());
         }
         let wanted = self.preparation;
@@ -275,7 +276,7 @@ impl Recipe {
             }
         };
         differs("lifting", wanted.lifting.to_string(), found.lifting.to_string());
-        if self.understanding != Understanding::Names && self.parts == PartFeatures::Deviated {
+        if self.match_by != MatchBy::Names && self.parts == PartEmbedding::Deviated {
             differs("part weight", wanted.part_weight.to_string(), found.part_weight.to_string());
         }
         // Only a recipe with a prompt depends on the way in which masks were followed.
@@ -291,7 +292,7 @@ impl Recipe {
 }
 
 /// The name, if it has one, and all choices.
-impl fmt::Display for Recipe {
+impl fmt::Display for QueryConfig {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let name = self.name().map_or_else(|| "own".into(), |n| n.to_string());
         let Preparation { lifting, part_weight, prompt, grid } = self.preparation;
@@ -299,7 +300,7 @@ impl fmt::Display for Recipe {
             f,
             "recipe {name}: by {}, strategy {}, deviation {} (part weight {part_weight}), canonical phrases {}, \
              temperature {}, relevancy {}, match {} within {:.0}/255, {}, lifting {lifting}",
-            self.understanding,
+            self.match_by,
             self.strategy,
             self.parts,
             self.canonical,
@@ -307,9 +308,9 @@ impl fmt::Display for Recipe {
             self.scale,
             self.masks,
             255.0 * self.tolerance,
-            self.rejection.told(),
+            self.rejection.text(),
         )?;
         prompt.map_or(Ok(()), |prompt| write!(f, ", SAM 2 prompted by {prompt}"))?;
-        grid.map_or(Ok(()), |grid| write!(f, ", masks asked for at {} points of the grid", grid.told()))
+        grid.map_or(Ok(()), |grid| write!(f, ", masks asked for at {} points of the grid", grid.text()))
     }
 }

@@ -1,10 +1,10 @@
 //! Names as they are compared, told apart and found.
 
 use super::*;
-use crate::scene::{Level, NOBODY};
+use crate::scene::{Level, NO_IDENTITY};
 
 fn add(all: &mut Identities, whole: IdentityId, name: &str) -> IdentityId {
-    let level = if whole == NOBODY { Level::Object } else { Level::Part };
+    let level = if whole == NO_IDENTITY { Level::Object } else { Level::Part };
     all.add(level, whole, if name.is_empty() { vec![] } else { vec![name.to_owned()] })
 }
 
@@ -39,7 +39,11 @@ fn case_space_articles_and_marks_around_do_not_count() {
 #[test]
 fn the_same_names_are_told_apart_by_their_wholes_then_by_numbers() {
     let mut all = Identities::default();
-    let mugs = [add(&mut all, NOBODY, "mug"), add(&mut all, NOBODY, "The Mug"), add(&mut all, NOBODY, "red mug")];
+    let mugs = [
+        add(&mut all, NO_IDENTITY, "mug"),
+        add(&mut all, NO_IDENTITY, "The Mug"),
+        add(&mut all, NO_IDENTITY, "red mug"),
+    ];
     let handles = mugs.map(|mug| add(&mut all, mug, "handle"));
     let twins = [add(&mut all, mugs[2], "dot"), add(&mut all, mugs[2], "dot")];
     let full: Vec<String> = all.iter().map(|(id, _)| all.full_name(id)).collect();
@@ -86,10 +90,10 @@ fn the_same_names_are_told_apart_by_their_wholes_then_by_numbers() {
 #[test]
 fn names_that_look_like_full_names_and_numbers_are_told_apart_too() {
     let mut all = Identities::default();
-    let doll = add(&mut all, NOBODY, "doll");
+    let doll = add(&mut all, NO_IDENTITY, "doll");
     let eye = add(&mut all, doll, "eye");
-    let odd =
-        ["eye · doll", "eye", "eye of the doll", "doll #1", "#9", "", "lamp"].map(|name| add(&mut all, NOBODY, name));
+    let odd = ["eye · doll", "eye", "eye of the doll", "doll #1", "#9", "", "lamp"]
+        .map(|name| add(&mut all, NO_IDENTITY, name));
     let lamp = add(&mut all, odd[6], "lamp");
     for (id, identity) in all.iter() {
         assert_eq!(called(&all, &all.full_name(id))[0], id, "{}", all.full_name(id));
@@ -104,12 +108,12 @@ fn names_that_look_like_full_names_and_numbers_are_told_apart_too() {
 #[test]
 fn endless_and_deep_lists_of_names_are_survived() {
     let mut all = Identities::default();
-    let mut whole = NOBODY;
+    let mut whole = NO_IDENTITY;
     for _ in 0..2_000 {
         whole = add(&mut all, whole, &"x".repeat(text::LONGEST_NAME));
     }
     (0..2_000).for_each(|_| {
-        add(&mut all, NOBODY, "mug");
+        add(&mut all, NO_IDENTITY, "mug");
     });
     assert_eq!((called(&all, "mug").len(), called(&all, "mug #3000")), (2_000, vec![3_000]));
     assert_eq!(called(&all, &all.full_name(whole)), [whole]);

@@ -260,9 +260,9 @@ pub(in crate::ui) fn submit_removal(app: &mut App, request: RemoveRequest) {
     if remote::refuses(app, "Removing", "run 'fmlgs remove' there") {
         return;
     }
-    let remove = move |observer: &mut dyn Observer| removal::beside(&request, observer);
+    let remove = move |observer: &mut dyn Observer| removal::run_request(&request, observer);
     app.start(JobInfo::long("Removing").pausable(), remove, |app, removed| {
-        app.state.toast(Tone::Good, removal::told(&removed.name, &removed.report));
+        app.state.toast(Tone::Good, removal::summary(&removed.name, &removed.report));
         app.state.say(Tone::Info, format!("Saved to {}", removed.folder.display()));
         super::open::compare_scene(app, Some(removed.folder.clone()));
         app.state.removed = Some(removed);
@@ -291,7 +291,7 @@ fn delete_removed(app: &mut App) {
     let Some(removed) = app.state.removed.take() else { return };
     match removed.delete() {
         Ok(()) => {
-            app.state.beside = app.state.beside.take().filter(|beside| beside.path != removed.folder);
+            app.state.comparison = app.state.comparison.take().filter(|comparison| comparison.path != removed.folder);
             app.state.toast(Tone::Good, format!("Deleted {}", removed.folder.display()));
         }
         Err(e) => {

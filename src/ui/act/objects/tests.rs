@@ -14,8 +14,8 @@ use crate::jobs::workspace::OpenedPath;
 use crate::jobs::{Folders, OpenedScene};
 use crate::models::catalog;
 use crate::navigate::testing::cloud_of_wall;
-use crate::pipeline::semantics::lifting::build_map::Carry;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::lifting::build_map::MaskPropagation;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::scene::{Dataset, Preparation, SemanticMap};
 use crate::ui::actions::Action;
 use crate::ui::find_dialog::FindDialog;
@@ -155,14 +155,14 @@ fn the_next_search_follows_the_recipe_on_screen_once_that_is_changed() {
     finding.preparation.part_weight = 0.4;
     dialog.follow_recipe(Preparation::default(), &mut finding);
     assert_eq!(finding.preparation.part_weight, 0.4, "nobody has changed the recipe");
-    let paper = Recipe::paper().preparation;
+    let paper = QueryConfig::paper().preparation;
     dialog.follow_recipe(paper, &mut finding);
-    assert_eq!((finding.preparation, finding.carry), (paper, Carry::Sam2));
-    finding.carry = Carry::Both;
+    assert_eq!((finding.preparation, finding.carry), (paper, MaskPropagation::Sam2));
+    finding.carry = MaskPropagation::Both;
     dialog.follow_recipe(Preparation { part_weight: 0.5, ..paper }, &mut finding);
-    assert_eq!((finding.preparation.part_weight, finding.carry), (0.5, Carry::Both));
+    assert_eq!((finding.preparation.part_weight, finding.carry), (0.5, MaskPropagation::Both));
     dialog.follow_recipe(Preparation::default(), &mut finding);
-    assert_eq!((finding.preparation, finding.carry), (Preparation::default(), Carry::Gaussians));
+    assert_eq!((finding.preparation, finding.carry), (Preparation::default(), MaskPropagation::Gaussians));
 }
 
 #[test]

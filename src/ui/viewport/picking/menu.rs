@@ -3,7 +3,7 @@
 use egui::{RichText, Ui};
 
 use crate::navigate::target::Side;
-use crate::scene::{Identities, IdentityId, NOBODY, text};
+use crate::scene::{Identities, IdentityId, NO_IDENTITY, text};
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
 
@@ -17,7 +17,7 @@ pub(super) fn show(ui: &mut Ui, all: &Identities, id: Option<IdentityId>, cx: &m
         }
     };
     let Some(id) = id.filter(|id| all.get(*id).is_some()) else {
-        row(ui, Action::Paint(Some(NOBODY)), "Select an object by clicks\u{2026}");
+        row(ui, Action::SegmentNew(Some(NO_IDENTITY)), "Select an object by clicks\u{2026}");
         row(ui, Action::FrameScene, "Frame the scene");
         row(ui, Action::ResetView, "Reset the view");
         row(ui, Action::Isolate(None), "Show all objects");
@@ -33,8 +33,8 @@ pub(super) fn show(ui: &mut Ui, all: &Identities, id: Option<IdentityId>, cx: &m
     row(ui, Action::Isolate(None), "Show all objects");
     ui.separator();
     row(ui, Action::Correct(id), "Correct by clicks\u{2026}");
-    row(ui, Action::Paint(Some(id)), "Select a new part by clicks\u{2026}");
-    row(ui, Action::Arrange(id), "Move, turn or recolor\u{2026}");
+    row(ui, Action::SegmentNew(Some(id)), "Select a new part by clicks\u{2026}");
+    row(ui, Action::Transform(id), "Transform\u{2026}");
     row(ui, Action::Remove(id), "Remove and fill");
     row(ui, Action::ExportTarget(id), "Export Gaussians\u{2026}");
 }

@@ -193,12 +193,12 @@ fn label(ui: &Ui, shown: Rect, pos: Pos2, name: &str) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Level, NOBODY};
+    use crate::scene::{Level, NO_IDENTITY};
 
     fn doll() -> (Identities, [IdentityId; 5]) {
         let mut all = Identities::default();
-        let doll = all.add(Level::Object, NOBODY, vec!["doll".into()]);
-        let table = all.add(Level::Object, NOBODY, vec!["table".into()]);
+        let doll = all.add(Level::Object, NO_IDENTITY, vec!["doll".into()]);
+        let table = all.add(Level::Object, NO_IDENTITY, vec!["table".into()]);
         let face = all.add(Level::Part, doll, vec!["face".into()]);
         let eye = all.add(Level::Part, face, vec!["eye".into()]);
         let hand = all.add(Level::Part, doll, vec!["hand".into()]);

@@ -13,7 +13,7 @@ use crate::pipeline::semantics::query::localize::Answer;
 use crate::pipeline::semantics::query::matching::{self, MatchMode};
 use crate::pipeline::semantics::query::names;
 use crate::pipeline::semantics::query::reading::mended_text;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::scene::{Bounds, GaussianCloud, Identities, IdentityId, SemanticMap, text};
 use crate::ui::actions::{Action, Pane};
 use crate::ui::ctx::Ctx;
@@ -135,7 +135,7 @@ fn why_unseen(queries: &mut Queries, scene: SearchedScene<'_>, target: IdentityI
         return None;
     }
     let maps = queries.maps.as_ref()?;
-    let Recipe { masks, tolerance, .. } = queries.side().settings.recipe;
+    let QueryConfig { masks, tolerance, .. } = queries.side().settings.recipe;
     let is_there = || maps.mask(semantics, target, MatchMode::Identities, tolerance).area() > 0;
     if masks == MatchMode::Codes && is_there() {
         return Some("blended beyond the tolerance here; the exact mask shows it");
@@ -264,9 +264,9 @@ impl Facts {
         target: IdentityId,
         semantics: &Versioned<SemanticMap>,
         cloud: &GaussianCloud,
-        recipe: &Recipe,
+        recipe: &QueryConfig,
     ) -> Self {
-        let Recipe { masks, tolerance, .. } = *recipe;
+        let QueryConfig { masks, tolerance, .. } = *recipe;
         let inside = matching::gaussians(semantics, target, masks, tolerance);
         let gaussians = inside.iter().filter(|g| **g).count();
         let points = (0..cloud.len()).filter(|&i| inside.get(i) == Some(&true)).map(|i| cloud.world_position(i));
@@ -275,14 +275,14 @@ impl Facts {
     }
 
     /// True if they are about this target as the recipe matches it.
-    pub(super) fn is_of(&self, target: IdentityId, semantics: &Versioned<SemanticMap>, recipe: &Recipe) -> bool {
+    pub(super) fn is_of(&self, target: IdentityId, semantics: &Versioned<SemanticMap>, recipe: &QueryConfig) -> bool {
         self.of == Self::key(target, semantics, recipe)
     }
 
     fn key(
         target: IdentityId,
         semantics: &Versioned<SemanticMap>,
-        recipe: &Recipe,
+        recipe: &QueryConfig,
     ) -> (u64, IdentityId, MatchMode, u32) {
         (semantics.generation(), target, recipe.masks, recipe.tolerance.to_bits())
     }

@@ -35,7 +35,7 @@ use crate::jobs::phrases::colors::PhraseColors;
 use crate::jobs::query::ViewMaps;
 use crate::navigate::Pose;
 use crate::pipeline::semantics::query::matching::MatchMode;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::scene::{GaussianCloud, IdentityId, Mask, ScenePlan, SemanticMap};
 use crate::ui::color_by::ColorBy;
 use crate::worker::Versioned;
@@ -121,17 +121,17 @@ impl Queries {
     }
 
     /// Recipe of the active view.
-    pub(crate) fn recipe(&self) -> &Recipe {
+    pub(crate) fn recipe(&self) -> &QueryConfig {
         &self.side().settings.recipe
     }
 
     /// Recipes of the first and the second view.
-    pub(crate) fn recipes(&self) -> [Recipe; 2] {
+    pub(crate) fn recipes(&self) -> [QueryConfig; 2] {
         self.sides.each_ref().map(|side| side.settings.recipe.clone())
     }
 
     /// Sets the recipes of the first and the second view and answers again.
-    pub(crate) fn set_recipes(&mut self, recipes: &[Recipe; 2], semantics: &SemanticMap) {
+    pub(crate) fn set_recipes(&mut self, recipes: &[QueryConfig; 2], semantics: &SemanticMap) {
         if self.recipes() != *recipes {
             for (side, recipe) in self.sides.iter_mut().zip(recipes) {
                 side.settings.recipe = recipe.clone();

@@ -178,11 +178,11 @@ fn main_direction(centered: &[Vec<f32>]) -> Vec<f32> {
 mod tests {
     use super::*;
     use crate::math::colormap::Colormap;
-    use crate::scene::NOBODY;
+    use crate::scene::NO_IDENTITY;
 
     fn scene() -> (Identities, ViewMap) {
         let mut all = Identities::default();
-        let lamp = all.add(Level::Object, NOBODY, vec!["lamp".into()]);
+        let lamp = all.add(Level::Object, NO_IDENTITY, vec!["lamp".into()]);
         all.add(Level::Part, lamp, vec!["shade".into()]);
         let identity = [[0, 0, 2, 2, 2, 2, 2, 1]; 3].concat();
         (all, ViewMap::certain(8, identity))

@@ -10,7 +10,7 @@ use super::{Asked, OverlaySettings, overlay};
 use crate::jobs::phrases::colors::PhraseColors;
 use crate::jobs::query::ViewMaps;
 use crate::pipeline::semantics::query::matching::MatchMode;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::pipeline::semantics::query::timing::{StagesMs, ms_since};
 use crate::scene::{IdentityId, Mask, SemanticMap};
 use crate::ui::color_by::ColorBy;
@@ -101,7 +101,7 @@ impl QueryOverlay {
 
     fn image(&mut self, painted: &Painted, queries: &PaintedQueries<'_>) -> ColorImage {
         let PaintedQueries { asked, settings, maps, semantics, truth, .. } = queries;
-        let Recipe { masks: mode, tolerance, .. } = settings.recipe;
+        let QueryConfig { masks: mode, tolerance, .. } = settings.recipe;
         let union = |ids: &[IdentityId]| {
             let mut mask = Mask::empty(maps.identities.width_px, maps.identities.height_px);
             ids.iter().for_each(|id| mask.add(&maps.mask(semantics, *id, mode, tolerance)));

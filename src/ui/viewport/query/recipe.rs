@@ -5,12 +5,12 @@ use egui::{PopupCloseBehavior, TextEdit, Ui};
 use strum::VariantArray;
 
 use crate::pipeline::semantics::query::recipe::{
-    CanonicalPhrases, PartFeatures, Recipe, RecipeName, Rejection, RelevancyScale, Strategy, Understanding,
+    CanonicalPhrases, MatchBy, PartEmbedding, QueryConfig, RecipeName, Rejection, RelevancyScale, Strategy,
 };
 use crate::scene::{Lifting, MaskGrid, MaskPrompt};
 
 /// Draws the rows of the recipe in a grid of two columns.
-pub(super) fn show(ui: &mut Ui, recipe: &mut Recipe) {
+pub(super) fn show(ui: &mut Ui, recipe: &mut QueryConfig) {
     ui.weak("Recipe");
     ui.horizontal(|ui| {
         let name = recipe.name();
@@ -36,11 +36,11 @@ pub(super) fn show(ui: &mut Ui, recipe: &mut Recipe) {
     ui.end_row();
 }
 
-fn choices(ui: &mut Ui, recipe: &mut Recipe) {
+fn choices(ui: &mut Ui, recipe: &mut QueryConfig) {
     egui::Grid::new("recipe").num_columns(2).show(ui, |ui| {
-        one_of(ui, "By", Understanding::VARIANTS, &mut recipe.understanding);
+        one_of(ui, "By", MatchBy::VARIANTS, &mut recipe.match_by);
         one_of(ui, "Parts of wholes", Strategy::VARIANTS, &mut recipe.strategy);
-        one_of(ui, "Deviation", PartFeatures::VARIANTS, &mut recipe.parts);
+        one_of(ui, "Deviation", PartEmbedding::VARIANTS, &mut recipe.parts);
         one_of(ui, "Relevancy", RelevancyScale::VARIANTS, &mut recipe.scale);
         one_of(ui, "Not found", Rejection::VARIANTS, &mut recipe.rejection);
         ui.weak("Temperature");

@@ -7,7 +7,7 @@ use super::recipe;
 use crate::math::colormap::Colormap;
 use crate::math::format;
 use crate::pipeline::semantics::query::matching::MatchMode;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::scene::LevelFilter;
 use crate::ui::color_by::ColorBy;
 use crate::ui::theme;
@@ -25,7 +25,7 @@ pub(crate) struct OverlaySettings {
     /// Largest number of answers that are shown.
     pub(crate) top: usize,
     /// Recipe of the queries.
-    pub(crate) recipe: Recipe,
+    pub(crate) recipe: QueryConfig,
     /// Relevancy threshold that is outlined too; 0 for none.
     pub(crate) threshold: f32,
 }
@@ -38,7 +38,7 @@ impl Default for OverlaySettings {
             opacity: 0.6,
             kind: LevelFilter::Auto,
             top: 1,
-            recipe: Recipe::default(),
+            recipe: QueryConfig::default(),
             threshold: 0.0,
         }
     }

@@ -11,7 +11,7 @@ use crate::jobs::query::ViewMaps;
 use crate::pipeline::semantics::query::matching::MatchMode;
 use crate::pipeline::semantics::query::names;
 use crate::pipeline::semantics::query::parse::ParsedQuery;
-use crate::pipeline::semantics::query::recipe::Recipe;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::scene::{GaussianCloud, IdentityId, SemanticMap};
 use crate::worker::Versioned;
 
@@ -105,7 +105,7 @@ impl QuerySide {
     }
 
     /// Texts of the queries, for the text encoder.
-    pub(super) fn texts(&self) -> impl Iterator<Item = (ParsedQuery, Recipe)> {
+    pub(super) fn texts(&self) -> impl Iterator<Item = (ParsedQuery, QueryConfig)> {
         self.all().map(|q| (q.reading.phrase.clone(), self.settings.recipe.clone()))
     }
 
@@ -138,7 +138,7 @@ impl QuerySide {
         semantics: &Versioned<SemanticMap>,
         id: IdentityId,
     ) -> (usize, Option<Vec2>) {
-        let Recipe { masks, tolerance, .. } = self.settings.recipe;
+        let QueryConfig { masks, tolerance, .. } = self.settings.recipe;
         let of = (maps.generation(), semantics.generation(), masks, tolerance.to_bits());
         if self.areas.of != of {
             self.areas = Areas { of, known: BTreeMap::new() };

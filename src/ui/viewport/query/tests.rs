@@ -1,11 +1,11 @@
 //! Queries that are run, pinned and run again.
 
 use super::*;
-use crate::scene::{Identities, Level, NOBODY};
+use crate::scene::{Identities, Level, NO_IDENTITY};
 
 fn semantics() -> SemanticMap {
     let mut identities = Identities::default();
-    let lamp = identities.add(Level::Object, NOBODY, vec!["lamp".into()]);
+    let lamp = identities.add(Level::Object, NO_IDENTITY, vec!["lamp".into()]);
     identities.add(Level::Part, lamp, vec!["shade".into()]);
     SemanticMap { identities, ..SemanticMap::default() }
 }
@@ -100,14 +100,14 @@ fn each_view_answers_by_its_own_recipe() {
             })
         })
     };
-    let default = (Recipe::default(), vec![1]);
+    let default = (QueryConfig::default(), vec![1]);
     assert_eq!(answers(&mut queries), [default.clone(), default.clone()]);
     // By embedding alone nothing is found here: the scene has no embeddings.
-    queries.set_recipes(&[Recipe::default(), Recipe::paper()], &semantics);
-    assert_eq!(answers(&mut queries), [default, (Recipe::paper(), vec![])]);
-    assert_eq!(queries.recipes()[1], Recipe::paper());
+    queries.set_recipes(&[QueryConfig::default(), QueryConfig::paper()], &semantics);
+    assert_eq!(answers(&mut queries), [default, (QueryConfig::paper(), vec![])]);
+    assert_eq!(queries.recipes()[1], QueryConfig::paper());
     queries.work_in(true);
-    assert_eq!((queries.recipe(), queries.recipes()[0].clone()), (&Recipe::paper(), Recipe::default()));
-    let texts: Vec<Recipe> = queries.sides.iter().flat_map(QuerySide::texts).map(|t| t.1).collect();
-    assert_eq!(texts, [Recipe::default(), Recipe::paper()], "the encoder is told");
+    assert_eq!((queries.recipe(), queries.recipes()[0].clone()), (&QueryConfig::paper(), QueryConfig::default()));
+    let texts: Vec<QueryConfig> = queries.sides.iter().flat_map(QuerySide::texts).map(|t| t.1).collect();
+    assert_eq!(texts, [QueryConfig::default(), QueryConfig::paper()], "the encoder is told");
 }

@@ -105,7 +105,7 @@ impl MaskBrush {
             cx.ask(Action::TrueMask(None));
         }
         if ui.button("Done").clicked() {
-            cx.ask(Action::Paint(None));
+            cx.ask(Action::SegmentNew(None));
         }
     }
 }

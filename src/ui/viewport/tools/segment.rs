@@ -17,7 +17,7 @@ use super::{CardPlaces, ToolScene, ViewTool};
 use crate::jobs::select::{self, SelectFor, SelectRequest, SelectStep, Selected, Stroke, kept_as};
 use crate::math::format;
 use crate::pipeline::semantics::lifting::edit::Edit;
-use crate::scene::{Camera, GaussianCloud, Identities, Level, Mask, NOBODY, SemanticMap};
+use crate::scene::{Camera, GaussianCloud, Identities, Level, Mask, NO_IDENTITY, SemanticMap};
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
 use crate::ui::state::{AppState, Tone};
@@ -181,12 +181,12 @@ impl SegmentTool {
     }
 
     fn is_empty(&self) -> bool {
-        self.selected.as_ref().is_none_or(|s| s.id == NOBODY)
+        self.selected.as_ref().is_none_or(|s| s.id == NO_IDENTITY)
     }
 
     /// The edit that applies the selection; `None` without one.
     pub(crate) fn edit(&self) -> Option<Edit> {
-        let selected = self.selected.as_ref().filter(|s| s.id != NOBODY)?;
+        let selected = self.selected.as_ref().filter(|s| s.id != NO_IDENTITY)?;
         Some(kept_as(&self.purpose, self.name.trim().to_owned(), selected.gaussians.clone()))
     }
 
@@ -211,7 +211,7 @@ impl SegmentTool {
                 ui.spinner();
                 String::new()
             }
-            Some(s) if s.id != NOBODY => {
+            Some(s) if s.id != NO_IDENTITY => {
                 format!("{} Gaussians, {:.0} ms", format::count(s.gaussians.len() as u64), s.ms)
             }
             Some(_) => "Nothing is selected".to_owned(),
@@ -267,7 +267,7 @@ impl ViewTool for SegmentTool {
         }
         let shown = area.shown;
         if let (Some(maps), Some(preview), Some(selected)) = (scene.queries.shown_maps(), &self.preview, &self.selected)
-            && selected.id != NOBODY
+            && selected.id != NO_IDENTITY
         {
             self.drawn.paint(ui, shown, preview, maps, selected.id, |mask| outline::image(mask, SELECTED));
         }
@@ -298,7 +298,7 @@ impl ViewTool for SegmentTool {
         theme::card(ui.ctx(), area.constrain_to(rect), |ui| {
             ui.set_width((rect.width() - 40.0).clamp(220.0, 460.0));
             let what = match self.purpose {
-                SelectFor::New(NOBODY) => "a new object".to_owned(),
+                SelectFor::New(NO_IDENTITY) => "a new object".to_owned(),
                 SelectFor::New(of) => format!("a new part of {}", all.full_name(of)),
                 SelectFor::Extent(id) => all.full_name(id),
             };
@@ -314,10 +314,11 @@ impl ViewTool for SegmentTool {
                     ui.label("Keep as");
                     let name = TextEdit::singleline(&mut self.name).hint_text("Name").char_limit(80);
                     ui.add(name.desired_width(130.0)).accessible_name("Name of what is selected");
-                    let text = if of == NOBODY { "an object".to_owned() } else { format!("part of {}", all.label(of)) };
+                    let text =
+                        if of == NO_IDENTITY { "an object".to_owned() } else { format!("part of {}", all.label(of)) };
                     let whole = ComboBox::from_id_salt("whole").selected_text(text).width(120.0);
                     let whole = whole.show_ui(ui, |ui| {
-                        ui.selectable_value(&mut self.purpose, SelectFor::New(NOBODY), "an object");
+                        ui.selectable_value(&mut self.purpose, SelectFor::New(NO_IDENTITY), "an object");
                         for (id, _) in all.iter().filter(|(_, i)| i.level == Level::Object) {
                             let text = format!("part of {}", all.label(id));
                             ui.selectable_value(&mut self.purpose, SelectFor::New(id), text);
@@ -334,7 +335,7 @@ impl ViewTool for SegmentTool {
                     self.take_back();
                 }
                 if ui.button("Cancel").clicked() {
-                    cx.ask(Action::Paint(None));
+                    cx.ask(Action::SegmentNew(None));
                 }
                 self.status(ui);
             });

@@ -109,7 +109,7 @@ impl ViewTool for SplatBrush {
                 ui.add(Slider::new(&mut self.radius_px, 2.0..=120.0).show_value(false).text("brush"));
                 ui.checkbox(&mut self.through, "Through").on_hover_text("Choose what lies behind the surface, too.");
                 if ui.button("Done").clicked() {
-                    cx.ask(Action::Paint(None));
+                    cx.ask(Action::SegmentNew(None));
                 }
             });
         });

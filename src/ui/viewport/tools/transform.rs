@@ -9,7 +9,7 @@ use super::super::split::ViewArea;
 use super::crop::{on_screen, travel};
 use super::{CardPlaces, ToolScene, ViewTool};
 use crate::jobs::rearrange::{Arrangement, SplatEdit, apply};
-use crate::scene::{Bounds, Camera, GaussianCloud, Identities, NOBODY, SemanticMap};
+use crate::scene::{Bounds, Camera, GaussianCloud, Identities, NO_IDENTITY, SemanticMap};
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
 use crate::ui::theme;
@@ -33,10 +33,10 @@ pub(crate) struct TransformTool {
     middle: DVec3,
     radius: f64,
     /// The preview, with the Gaussians and objects that it was made from.
-    shown: Option<Arranged>,
+    shown: Option<TransformPreview>,
 }
 
-struct Arranged {
+struct TransformPreview {
     of: (u64, u64, Arrangement),
     cloud: Versioned<GaussianCloud>,
     map: Option<Versioned<SemanticMap>>,
@@ -73,7 +73,7 @@ impl TransformTool {
         if self.shown.as_ref().is_none_or(|shown| shown.of != of) {
             let (new, new_map) = apply(cloud, Some(map), &SplatEdit::Arrange(self.arrangement)).ok()?;
             let (cloud, map) = (Versioned::new(Arc::new(new)), new_map.map(|map| Versioned::new(Arc::new(map))));
-            self.shown = Some(Arranged { of, cloud, map });
+            self.shown = Some(TransformPreview { of, cloud, map });
         }
         self.shown.as_ref().map(|shown| (shown.cloud.clone(), shown.map.clone()))
     }
@@ -139,7 +139,7 @@ impl TransformTool {
             });
             ui.checkbox(&mut self.arrangement.duplicate, "Leave it where it is, and do this to another one like it");
             ui.horizontal(|ui| {
-                let keep = Action::KeepArranged;
+                let keep = Action::ApplyTransform;
                 let button = ui.add_enabled(self.is_something(), theme::primary_button("Apply"));
                 if button.on_hover_text(keep.tooltip()).clicked() {
                     cx.ask(keep);
@@ -147,12 +147,12 @@ impl TransformTool {
                 if ui.add_enabled(self.is_something(), egui::Button::new("Reset")).clicked() {
                     (self.arrangement, self.degrees) = (Arrangement::of(self.arrangement.id), 0.0);
                 }
-                let whole = all.get(self.arrangement.id).map_or(NOBODY, |i| i.parent);
-                if whole != NOBODY && ui.button("All of it").on_hover_text(all.full_name(whole)).clicked() {
-                    cx.ask(Action::Arrange(whole));
+                let whole = all.get(self.arrangement.id).map_or(NO_IDENTITY, |i| i.parent);
+                if whole != NO_IDENTITY && ui.button("All of it").on_hover_text(all.full_name(whole)).clicked() {
+                    cx.ask(Action::Transform(whole));
                 }
                 if ui.button("Cancel").clicked() {
-                    cx.ask(Action::Paint(None));
+                    cx.ask(Action::SegmentNew(None));
                 }
             });
         });
@@ -192,7 +192,7 @@ mod tests {
     fn the_preview_is_what_is_kept_and_nothing_is_shown_before_a_change() {
         let cloud = GaussianCloud::isotropic((0..6).map(|i| [i as f32, 0.0, 0.0]).collect(), -3.0, 2.0);
         let mut all = Identities::default();
-        all.add(Level::Object, NOBODY, vec!["mug".into()]);
+        all.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
         let map = SemanticMap::from_identities(all, vec![1, 1, 1, 0, 0, 0], vec![1.0; 6], vec![]);
         let mut tool = TransformTool::new(1, &cloud, &map, DVec3::Y);
         let (cloud, map) = (Versioned::new(Arc::new(cloud)), Versioned::new(Arc::new(map)));

@@ -3,9 +3,9 @@
 use crate::pipeline::semantics::relevancy::deviate;
 use crate::scene::{Identities, IdentityId, Level, PART_WEIGHT, SemanticMap};
 
-/// Harm done to a scene before it is queried.
+/// Fault made in a scene before it is queried.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Harm {
+pub(super) enum Fault {
     Nothing,
     /// Everything has the name of another thing, or another part.
     Names,
@@ -30,11 +30,11 @@ fn next_of_level(identities: &Identities) -> Vec<usize> {
     next
 }
 
-pub(super) fn harmed(map: &SemanticMap, harm: Harm) -> SemanticMap {
+pub(super) fn with_fault(map: &SemanticMap, fault: Fault) -> SemanticMap {
     let mut map = map.clone();
     let next = next_of_level(&map.identities);
-    match (harm, &mut map.language) {
-        (Harm::Names, _) => {
+    match (fault, &mut map.language) {
+        (Fault::Names, _) => {
             let names: Vec<Vec<String>> = map.identities.iter().map(|(_, i)| i.names.clone()).collect();
             for (k, from) in next.iter().enumerate() {
                 if let Some(identity) = map.identities.get_mut(k as IdentityId + 1) {
@@ -42,10 +42,10 @@ pub(super) fn harmed(map: &SemanticMap, harm: Harm) -> SemanticMap {
                 }
             }
         }
-        (Harm::Looks, Some(language)) => {
+        (Fault::Looks, Some(language)) => {
             language.by_identity = next.iter().map(|k| language.by_identity[*k].clone()).collect()
         }
-        (Harm::Deviation, Some(language)) => {
+        (Fault::Deviation, Some(language)) => {
             let wholes = language.by_identity.clone();
             for (id, identity) in map.identities.iter().filter(|(_, i)| i.level == Level::Part) {
                 let whole = &wholes[map.identities.object_of(id) as usize - 1].raw;

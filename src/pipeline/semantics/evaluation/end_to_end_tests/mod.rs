@@ -8,7 +8,7 @@ mod controls;
 use std::collections::HashMap;
 use std::path::Path;
 
-use self::controls::{Harm, harmed};
+use self::controls::{Fault, with_fault};
 use crate::io::{self, Opened, labels::Labels};
 use crate::math::stats::mean;
 use crate::models::{self, Encoder, ModelError};
@@ -17,7 +17,7 @@ use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::evaluation::part_recall::{self, Components};
 use crate::pipeline::semantics::evaluation::recipes::Absent;
 use crate::pipeline::semantics::evaluation::{AskedScene, Category, LabeledView, categories, masks};
-use crate::pipeline::semantics::lifting::build_map::{FindOptions, Tools, find_objects};
+use crate::pipeline::semantics::lifting::build_map::{FindOptions, SearchModels, find_objects};
 use crate::pipeline::semantics::lifting::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::lifting::tracker::TrackOptions;
 use crate::pipeline::semantics::query::answer::{Language, QueryAnswer, by_embedding};
@@ -26,7 +26,7 @@ use crate::pipeline::semantics::query::localize::Answer;
 use crate::pipeline::semantics::query::names;
 use crate::pipeline::semantics::query::parse::ParsedQuery;
 use crate::pipeline::semantics::query::query_engine::ask_by_name;
-use crate::pipeline::semantics::query::recipe::{PAPERS_PHRASES, Recipe, Rejection};
+use crate::pipeline::semantics::query::recipe::{PAPERS_PHRASES, QueryConfig, Rejection};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::pipeline::synth::{self, Rig, SynthOptions};
 use crate::pipeline::train::{self, TrainConfig};
@@ -123,12 +123,12 @@ fn open(name: &str, seed: u64, folder: &Path) -> Scene {
 
 impl Scene {
     fn find(&mut self, lifting: Lifting, encoder: Option<&mut (dyn Encoder + 'static)>) -> SemanticMap {
-        let tools = Tools { segmenter: &mut self.masks, follower: None, encoder };
+        let models = SearchModels { segmenter: &mut self.masks, follower: None, encoder };
         // Votes carry the masks of few photos on; codes are trained on those of all.
         let max_seeds = if lifting == Lifting::Votes { TrackOptions::default().max_seeds } else { VIEWS };
         let track = TrackOptions { max_seeds, ..TrackOptions::default() };
         let options = FindOptions { track, lifting, code_steps: CODE_STEPS, ..FindOptions::default() };
-        let found = find_objects(&self.cloud, &self.training, &self.settings, tools, &options, &mut Silent);
+        let found = find_objects(&self.cloud, &self.training, &self.settings, models, &options, &mut Silent);
         found.expect("found").map
     }
 
@@ -161,8 +161,8 @@ fn by_names(scene: &Scene, map: &SemanticMap) -> [f64; 2] {
 }
 
 /// Recipe without the rules that reject more than the scores do: the test measures scores.
-fn plain() -> Recipe {
-    Recipe { rejection: Rejection::Canonical, ..Recipe::default() }
+fn plain() -> QueryConfig {
+    QueryConfig { rejection: Rejection::Canonical, ..QueryConfig::default() }
 }
 
 /// Answers by looks alone; `None` if the encoder knows no word.
@@ -180,18 +180,18 @@ fn by_looks(
     Some(by_embedding(&map.identities, &phrase, LevelFilter::Auto, &recipe, language))
 }
 
-fn measure(seed: u64, harms: &[Harm]) -> Vec<Figures> {
+fn measure(seed: u64, faults: &[Fault]) -> Vec<Figures> {
     let mut encoder = models::encoder(models::DEMO).expect("comes with the program");
-    let mut all = vec![Vec::new(); harms.len()];
+    let mut all = vec![Vec::new(); faults.len()];
     let mut texts = HashMap::new();
     for name in SCENES {
         let folder = tempfile::tempdir().expect("a folder");
         let mut scene = open(name, seed, folder.path());
         let map = scene.find(Lifting::Votes, Some(&mut *encoder));
         let trained = scene.find(Lifting::Paper, None);
-        for (harm, all) in harms.iter().zip(&mut all) {
-            let mut encoder = Known { encoder: &mut *encoder, texts: &mut texts, harm: *harm };
-            all.push(figures(&scene, &harmed(&map, *harm), &harmed(&trained, *harm), &mut encoder));
+        for (fault, all) in faults.iter().zip(&mut all) {
+            let mut encoder = Known { encoder: &mut *encoder, texts: &mut texts, fault: *fault };
+            all.push(figures(&scene, &with_fault(&map, *fault), &with_fault(&trained, *fault), &mut encoder));
         }
     }
     all.iter().map(|each| over_scenes(each)).collect()
@@ -215,12 +215,12 @@ fn over_scenes(each: &[Figures]) -> Figures {
 struct Known<'a> {
     encoder: &'a mut dyn Encoder,
     texts: &'a mut HashMap<String, Vec<f32>>,
-    harm: Harm,
+    fault: Fault,
 }
 
 impl Known<'_> {
     fn text(&mut self, phrase: &str) -> Result<Vec<f32>, ModelError> {
-        if self.harm == Harm::Canonical && PAPERS_PHRASES.contains(&phrase) {
+        if self.fault == Fault::Canonical && PAPERS_PHRASES.contains(&phrase) {
             return Ok(vec![0.0; self.encoder.dimension()]);
         }
         if !self.texts.contains_key(phrase) {
@@ -235,7 +235,7 @@ fn figures(scene: &Scene, map: &SemanticMap, trained: &SemanticMap, encoder: &mu
     let (drawn, blended) = (scene.drawn(map), CodeMap::default());
     let views = scene.views(&drawn, &blended);
     let recall = Components::ROWS.map(|row| {
-        part_recall::row((row, &Recipe::default()), map, features, &views, &mut |p: &str| encoder.text(p))
+        part_recall::row((row, &QueryConfig::default()), map, features, &views, &mut |p: &str| encoder.text(p))
             .expect("encodes")
             .recall
     });
@@ -314,8 +314,8 @@ impl Figures {
 
 #[test]
 fn photos_become_parts_that_are_found() {
-    let harms = [Harm::Nothing, Harm::Names, Harm::Looks, Harm::Deviation, Harm::Canonical];
-    let figures = measure(0, &harms);
+    let faults = [Fault::Nothing, Fault::Names, Fault::Looks, Fault::Deviation, Fault::Canonical];
+    let figures = measure(0, &faults);
     let [right, names, looks, deviation, canonical] = &figures[..] else { panic!("{figures:?}") };
     assert_eq!(right.missed(), [""; 0], "{right:?}");
     let fails = |figures: &Figures, bars: &[&str]| {
@@ -323,7 +323,7 @@ fn photos_become_parts_that_are_found() {
         let all = bars.iter().all(|bar| missed.iter().any(|m| m.starts_with(bar)));
         assert!(all, "{bars:?} among {missed:?}");
     };
-    // Controls: each harm must show in the figures that measure it.
+    // Controls: each fault must show in the figures that measure it.
     fails(names, &["objects by name, votes", "parts by name, votes", "objects by name, g", "parts by name, g"]);
     fails(looks, &["objects by looks", "recall of parts, mul", "recall of parts, d", "recall of parts, t"]);
     fails(looks, &["recall of parts, joint", "order"]);
@@ -337,9 +337,9 @@ fn photos_become_parts_that_are_found() {
 fn spread() {
     for seed in 0..3 {
         let start = std::time::Instant::now();
-        let harms = [Harm::Nothing, Harm::Names, Harm::Looks, Harm::Deviation, Harm::Canonical];
-        for (harm, figures) in harms.iter().zip(measure(seed, &harms)) {
-            println!("seed {seed}, {harm:?}: {figures:.3?}");
+        let faults = [Fault::Nothing, Fault::Names, Fault::Looks, Fault::Deviation, Fault::Canonical];
+        for (fault, figures) in faults.iter().zip(measure(seed, &faults)) {
+            println!("seed {seed}, {fault:?}: {figures:.3?}");
         }
         println!("seed {seed}: {:.1} s", start.elapsed().as_secs_f64());
     }

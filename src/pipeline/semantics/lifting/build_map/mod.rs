@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use serde::{Deserialize, Serialize};
 
-use super::add_photo::{joined, told};
+use super::add_photo::{joined, summary};
 use super::codes;
 use super::embed::embed;
 use super::error::FindError;
@@ -30,7 +30,7 @@ const SEED: u64 = 0;
 
 /// Ways to carry masks to the other photos.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum)]
-pub enum Carry {
+pub enum MaskPropagation {
     /// By the trained Gaussians; no network
     #[default]
     #[value(name = "geometry")]
@@ -91,13 +91,13 @@ pub(crate) fn segmenter<'a>(
 ) -> Result<Box<dyn Segmenter + 'a>, FindError> {
     Ok(match (files, network) {
         (Some(files), _) => Box::new(FileMasks(files)),
-        (None, Some((network, grid))) => Box::new(NetworkMasks::open_kept(network, grid, cache)?),
+        (None, Some((network, grid))) => Box::new(NetworkMasks::open_cached(network, grid, cache)?),
         (None, None) => Box::new(Regions { trained: Some((cloud, settings)), ..Regions::default() }),
     })
 }
 
 /// Segmenter, follower and encoder of a search.
-pub(crate) struct Tools<'a> {
+pub(crate) struct SearchModels<'a> {
     pub(crate) segmenter: &'a mut dyn Segmenter,
     /// Follows masks through the photos, in addition to the Gaussians.
     pub(crate) follower: Option<&'a mut Sam2Tracker>,
@@ -111,11 +111,11 @@ pub(crate) fn find_objects(
     cloud: &GaussianCloud,
     photos: &[Photo],
     settings: &RenderSettings,
-    tools: Tools<'_>,
+    models: SearchModels<'_>,
     options: &FindOptions,
     observer: &mut dyn Observer,
 ) -> Result<Found, FindError> {
-    let Tools { segmenter, follower, encoder } = tools;
+    let SearchModels { segmenter, follower, encoder } = models;
     let prompt = follower.is_some().then_some(options.track.prompt);
     let keep_masks = options.lifting != Lifting::Votes;
     let how = TrackOptions { keep_masks, ..options.track.clone() };
@@ -125,7 +125,7 @@ pub(crate) fn find_objects(
     }
     if let Some(known) = &options.track.known {
         let mut map = joined(known, &tracked, photos);
-        observer.note(Severity::Info, told(known, &map));
+        observer.note(Severity::Info, summary(known, &map));
         let start = Instant::now();
         if let Some(encoder) = encoder {
             map.language = Some(embed(cloud, &map, photos, settings, options.part_weight, encoder, observer)?);

@@ -10,7 +10,7 @@ use crate::pipeline::observer::{Interrupted, Signal, Silent};
 use crate::pipeline::semantics::lifting::segmenter::FoundMask;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::Renderer;
-use crate::scene::{Camera, Identities, Level as Of, Mask, NOBODY};
+use crate::scene::{Camera, Identities, Level as Of, Mask, NO_IDENTITY};
 
 /// Identities of the Gaussians: a doll with an eye on the left, a cat on the right.
 const TRUTH: [IdentityId; 15] = [1, 1, 1, 1, 1, 1, 2, 2, 2, 3, 3, 3, 3, 3, 3];
@@ -72,9 +72,9 @@ impl Segmenter for Told {
 
     fn segment(&mut self, photo: &Photo, max_side_px: u32, _: &mut dyn Observer) -> Result<Vec<FoundMask>, FindError> {
         let mut all = Identities::default();
-        let doll = all.add(Of::Object, NOBODY, vec![]);
+        let doll = all.add(Of::Object, NO_IDENTITY, vec![]);
         all.add(Of::Part, doll, vec![]);
-        all.add(Of::Object, NOBODY, vec![]);
+        all.add(Of::Object, NO_IDENTITY, vec![]);
         let camera = photo.camera.limited_to(max_side_px);
         let settings = RenderSettings::default();
         let view = ViewMap::render(&mut Renderer::new(), &cloud(), &TRUTH, &all, &camera, &settings);
@@ -98,10 +98,10 @@ fn find(
     observer: &mut dyn Observer,
 ) -> Result<Found, FindError> {
     let mut told = told;
-    let tools = Tools { segmenter: &mut told, follower: None, encoder: None };
+    let models = SearchModels { segmenter: &mut told, follower: None, encoder: None };
     let track = TrackOptions { max_seeds, ..TrackOptions::default() };
     let options = FindOptions { track, lifting, code_steps, ..FindOptions::default() };
-    find_objects(&cloud(), &photos(), &RenderSettings::default(), tools, &options, observer)
+    find_objects(&cloud(), &photos(), &RenderSettings::default(), models, &options, observer)
 }
 
 #[test]
@@ -118,7 +118,7 @@ fn what_a_second_photo_shows_is_found_too() {
         let expected = [(Of::Object, 0, names("doll")), (Of::Part, 1, names("eye")), (Of::Object, 0, names("cat"))];
         assert_eq!(list, expected);
         let findings = map.findings.as_ref().expect("noticed");
-        assert!(findings.is_valid(&map.identities) && findings.doubts().is_empty(), "{findings:?}");
+        assert!(findings.is_valid(&map.identities) && findings.conflicts().is_empty(), "{findings:?}");
         let photos: Vec<_> = map.facts().iter().map(|f| f.photos).collect();
         assert_eq!(photos, [None, Some(2), Some(2), Some(1)]);
         assert!(map.margin.iter().all(|m| *m > 0.0), "{:?}", map.margin);
@@ -144,11 +144,11 @@ fn one_more_photo_adds_what_it_shows_of_the_unknown_and_nothing_that_is_known_ch
     let known = Arc::new(known);
     let add = |photo: usize| {
         let mut told = Told { named: true, covers: true };
-        let tools = Tools { segmenter: &mut told, follower: None, encoder: None };
+        let models = SearchModels { segmenter: &mut told, follower: None, encoder: None };
         let track =
             TrackOptions { known: Some(Arc::clone(&known)), seed: Some(photo), max_seeds: 1, ..Default::default() };
         let options = FindOptions { track, ..FindOptions::default() };
-        find_objects(&cloud(), &photos(), &RenderSettings::default(), tools, &options, &mut Silent).expect("found").map
+        find_objects(&cloud(), &photos(), &RenderSettings::default(), models, &options, &mut Silent).expect("found").map
     };
     let map = add(1);
     assert_eq!((&map.identity_of[..9], &map.identity_of[9..]), (&known.identity_of[..9], &[3; 6][..]));
@@ -171,7 +171,7 @@ fn what_no_mask_reached_is_nobodys_and_told() {
     let mut notes = Notes(vec![]);
     let found = find(Told { named: true, covers: true }, (Lifting::Votes, 0), 1, &mut notes).expect("found");
     assert_eq!(found.map.identities.len(), 2);
-    assert_eq!((&found.map.identity_of[..9], &found.map.identity_of[9..]), (&TRUTH[..9], &[NOBODY; 6][..]));
+    assert_eq!((&found.map.identity_of[..9], &found.map.identity_of[9..]), (&TRUTH[..9], &[NO_IDENTITY; 6][..]));
     // The far photo shows the cat, too different in color to be taken for a piece of the near things.
     assert!((0.01..0.3).contains(&found.views[1].unknown) && found.views[0].unknown == 0.0);
     assert!(

@@ -8,7 +8,9 @@ use serde::{Deserialize, Serialize};
 
 use super::codes::{self, RADIUS};
 use crate::math::stats::median;
-use crate::scene::{Findings, GaussianCloud, Identities, IdentityId, Level, NOBODY, SemanticMap, ViewFeatures};
+use crate::scene::{
+    GaussianCloud, Identities, IdentityId, Level, NO_IDENTITY, SegmentationReport, SemanticMap, ViewFeatures,
+};
 
 /// An edit.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -96,7 +98,7 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
                 own => EditError::TooSmall { name, own },
             };
             let parts = pieces(cloud, &own).ok_or_else(too_small)?;
-            let (level, parent) = all.get(*id).map_or((Level::Object, NOBODY), |i| (i.level, i.parent));
+            let (level, parent) = all.get(*id).map_or((Level::Object, NO_IDENTITY), |i| (i.level, i.parent));
             new.identities.mark_by_hand(*id);
             for part in parts.iter().skip(1) {
                 let part = add(&mut new, level, parent, String::new(), part);
@@ -106,19 +108,19 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
             new.findings.iter_mut().for_each(|f| f.forget_seen(*id));
         }
         Edit::AddPiece { of, name, gaussians } => {
-            let inside = if *of == NOBODY { Vec::new() } else { all.descendants(known(*of)?) };
-            let is = |id: &IdentityId| *of == NOBODY || inside.get(*id as usize) == Some(&true);
+            let inside = if *of == NO_IDENTITY { Vec::new() } else { all.descendants(known(*of)?) };
+            let is = |id: &IdentityId| *of == NO_IDENTITY || inside.get(*id as usize) == Some(&true);
             let is_in = |i: &usize| map.identity_of.get(*i).is_some_and(is);
             let own: Vec<usize> = gaussians.iter().map(|i| *i as usize).filter(is_in).collect();
             if own.is_empty() {
                 return Err(match (gaussians.is_empty(), *of) {
                     (true, _) => EditError::Nothing,
-                    (_, NOBODY) => EditError::NotThere,
+                    (_, NO_IDENTITY) => EditError::NotThere,
                     (_, of) if map.members(of).is_empty() => EditError::Empty(all.name(of)),
                     (_, of) => EditError::Outside(all.name(of)),
                 });
             }
-            let level = if *of == NOBODY { Level::Object } else { Level::Part };
+            let level = if *of == NO_IDENTITY { Level::Object } else { Level::Part };
             let piece = add(&mut new, level, *of, name.trim().to_owned(), &own);
             new.identities.mark_by_hand(piece);
         }
@@ -138,7 +140,7 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
 
 fn reshape(map: &mut SemanticMap, id: IdentityId, gaussians: &[u32]) {
     let inside = map.identities.descendants(id);
-    let whole = map.identities.get(id).map_or(NOBODY, |i| i.parent);
+    let whole = map.identities.get(id).map_or(NO_IDENTITY, |i| i.parent);
     let mut listed = vec![false; map.identity_of.len()];
     for &i in gaussians {
         if let Some(listed) = listed.get_mut(i as usize) {
@@ -171,7 +173,7 @@ pub(crate) fn add(
     if let Some(language) = &mut map.language {
         language.by_identity.push(ViewFeatures::default());
     }
-    map.findings.iter_mut().for_each(Findings::add_identity);
+    map.findings.iter_mut().for_each(SegmentationReport::add_identity);
     let codes = map.identities.codes(id);
     for &i in gaussians {
         (map.identity_of[i], map.codes[i]) = (id, codes);
@@ -223,15 +225,15 @@ pub(super) fn renumber(
     let codes_before: Vec<_> = (0..=old.len() as IdentityId).map(|id| old.codes(id)).collect();
     // Wholes before pieces, whatever the numbers were.
     let parent_of = |id: IdentityId| -> IdentityId {
-        let parent = old.get(id).map_or(NOBODY, |i| i.parent);
+        let parent = old.get(id).map_or(NO_IDENTITY, |i| i.parent);
         merged.filter(|(from, _)| *from == parent).map_or(parent, |(_, into)| into)
     };
     let depth = |id: IdentityId| {
-        std::iter::successors(Some(id), |&i| Some(parent_of(i)).filter(|p| *p != NOBODY)).take(old.len()).count()
+        std::iter::successors(Some(id), |&i| Some(parent_of(i)).filter(|p| *p != NO_IDENTITY)).take(old.len()).count()
     };
     let mut order: Vec<IdentityId> = old.iter().map(|(id, _)| id).filter(|id| !gone(*id)).collect();
     order.sort_by_key(|id| (depth(*id), *id));
-    let mut number = vec![NOBODY; old.len() + 1];
+    let mut number = vec![NO_IDENTITY; old.len() + 1];
     let mut features = Vec::new();
     for &id in &order {
         let Some(identity) = old.get(id) else { continue };
@@ -255,7 +257,7 @@ pub(super) fn renumber(
     map.findings.iter_mut().for_each(|f| f.renumber(&number, map.identities.len()));
     for (of, codes) in map.identity_of.iter_mut().zip(&mut map.codes) {
         let before = *of as usize;
-        *of = number.get(before).copied().unwrap_or(NOBODY);
+        *of = number.get(before).copied().unwrap_or(NO_IDENTITY);
         let now = map.identities.codes(*of);
         // Trained codes of unchanged identities are kept.
         if codes_before.get(before) != Some(&now) {

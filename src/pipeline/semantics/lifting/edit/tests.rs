@@ -6,9 +6,9 @@ use crate::scene::LanguageFeatures;
 /// Two dolls of 20 Gaussians each with 10 more as an eye, and a blob of 20 in two places.
 fn scene() -> (SemanticMap, GaussianCloud) {
     let mut all = Identities::default();
-    let red = all.add(Level::Object, NOBODY, vec!["red doll".into()]);
+    let red = all.add(Level::Object, NO_IDENTITY, vec!["red doll".into()]);
     let red_eye = all.add(Level::Part, red, vec!["eye".into()]);
-    let blue = all.add(Level::Object, NOBODY, vec!["blue doll".into()]);
+    let blue = all.add(Level::Object, NO_IDENTITY, vec!["blue doll".into()]);
     let blue_eye = all.add(Level::Part, blue, vec!["eye".into()]);
     codes::assign(&mut all, &[]);
     let of = [vec![red; 20], vec![red_eye; 10], vec![blue; 20], vec![blue_eye; 10]].concat();
@@ -18,7 +18,7 @@ fn scene() -> (SemanticMap, GaussianCloud) {
     let mut map = SemanticMap::from_identities(all, of, vec![1.0; n], vec![]);
     map.language =
         Some(LanguageFeatures { encoder: "t".into(), dimension: 1, by_identity: vec![ViewFeatures::default(); 4] });
-    map.findings = Some(Findings::new(vec![], vec![Default::default(); 4], vec![]));
+    map.findings = Some(SegmentationReport::new(vec![], vec![Default::default(); 4], vec![]));
     (map, cloud)
 }
 
@@ -92,7 +92,7 @@ fn a_piece_takes_only_what_belongs_to_its_whole() {
     assert_eq!((new.identities.name(5), new.sizes()[5]), ("foot".into(), 15));
     assert_eq!(add(1, 40..50), Err(EditError::Outside("red doll".into())));
     assert_eq!(add(1, 0..0), Err(EditError::Nothing));
-    let new = add(NOBODY, 25..35).expect("an object may take what is somebody's");
+    let new = add(NO_IDENTITY, 25..35).expect("an object may take what is somebody's");
     check(&new);
     assert_eq!((new.sizes()[5], new.sizes()[1], new.sizes()[3]), (10, 25, 25));
 }
@@ -107,7 +107,7 @@ fn a_reshaped_identity_consists_of_what_was_selected() {
     let new = reshape(1, 5..40).expect("reshaped");
     check(&new);
     assert_eq!((new.sizes()[0], new.sizes()[1], new.sizes()[2], new.sizes()[3]), (5, 35, 10, 20));
-    assert!(new.identity_of[..5].iter().all(|id| *id == NOBODY) && new.identity_of[35] == 1);
+    assert!(new.identity_of[..5].iter().all(|id| *id == NO_IDENTITY) && new.identity_of[35] == 1);
     // Gaussians that a part loses stay with its whole.
     let new = reshape(2, 25..30).expect("reshaped");
     check(&new);

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use super::edit::{free_code, renumber};
-use crate::scene::{IdentityId, NOBODY, SemanticMap};
+use crate::scene::{IdentityId, NO_IDENTITY, SemanticMap};
 
 /// Least number of Gaussians that must be left of a found object or part.
 const LEAST: usize = 4;
@@ -24,11 +24,11 @@ pub(crate) fn worked_on(map: &SemanticMap) -> Option<SemanticMap> {
 pub(crate) fn joined(found: &SemanticMap, kept: &SemanticMap) -> SemanticMap {
     let (all, old) = (&found.identities, &kept.identities);
     let twin = twins(found, kept);
-    let is_gone = |id: IdentityId| twin[id as usize] != NOBODY;
+    let is_gone = |id: IdentityId| twin[id as usize] != NO_IDENTITY;
     let mut identities = old.clone();
     identities.add_removed(all.removed.iter().cloned());
     // New numbers of the found identities; for one that is gone, that of the next larger one that is not.
-    let mut number = vec![NOBODY; all.len() + 1];
+    let mut number = vec![NO_IDENTITY; all.len() + 1];
     let mut stays = vec![false; all.len() + 1];
     for (id, identity) in all.iter() {
         let parent = identity.parent;
@@ -40,14 +40,14 @@ pub(crate) fn joined(found: &SemanticMap, kept: &SemanticMap) -> SemanticMap {
         let now = identities.add(identity.level, whole, identity.names.clone());
         identities.get_mut(now).into_iter().for_each(|new| new.code = identity.code);
         number[id as usize] = now;
-        stays[id as usize] = parent == NOBODY || stays[parent as usize];
+        stays[id as usize] = parent == NO_IDENTITY || stays[parent as usize];
     }
     for id in 1..=old.len() as IdentityId {
         let code = free_code(&identities);
         identities.get_mut(id).into_iter().for_each(|identity| identity.code = code);
     }
     let n = found.identity_of.len();
-    let is_kept = |i: usize| kept.identity_of[i] != NOBODY;
+    let is_kept = |i: usize| kept.identity_of[i] != NO_IDENTITY;
     let now = |i: usize| if is_kept(i) { kept.identity_of[i] } else { number[found.identity_of[i] as usize] };
     let identity_of = (0..n).map(now).collect();
     let margin = (0..n).map(|i| if is_kept(i) { kept.margin[i] } else { found.margin[i] }).collect();
@@ -59,7 +59,7 @@ pub(crate) fn joined(found: &SemanticMap, kept: &SemanticMap) -> SemanticMap {
     map.prepared = found.prepared;
     map.findings.clone_from(&found.findings);
     if let Some(findings) = &mut map.findings {
-        let of = |id: usize| if twin[id] != NOBODY { twin[id] } else { number[id] };
+        let of = |id: usize| if twin[id] != NO_IDENTITY { twin[id] } else { number[id] };
         let number: Vec<IdentityId> = (0..number.len()).map(of).collect();
         findings.renumber(&number, map.identities.len());
     }
@@ -71,7 +71,7 @@ fn twins(found: &SemanticMap, kept: &SemanticMap) -> Vec<IdentityId> {
     let (sizes, kept_sizes) = (found.sizes(), kept.sizes());
     let mut shared: Vec<BTreeMap<IdentityId, usize>> = vec![BTreeMap::new(); sizes.len()];
     let mut taken = vec![0; sizes.len()];
-    for (of, by) in found.identity_of.iter().zip(&kept.identity_of).filter(|(_, by)| **by != NOBODY) {
+    for (of, by) in found.identity_of.iter().zip(&kept.identity_of).filter(|(_, by)| **by != NO_IDENTITY) {
         for id in found.identities.ancestors(*of) {
             taken[id as usize] += 1;
             for by in kept.identities.ancestors(*by) {
@@ -86,7 +86,7 @@ fn twins(found: &SemanticMap, kept: &SemanticMap) -> Vec<IdentityId> {
         let alike = |by: IdentityId, both: usize| both as f64 / (sizes[id] + kept_sizes[by as usize] - both) as f64;
         let shared = shared[id].iter().map(|(by, both)| (*by, alike(*by, *both)));
         let most = shared.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
-        most.filter(|_| is_gone).map_or(NOBODY, |(by, _)| by)
+        most.filter(|_| is_gone).map_or(NO_IDENTITY, |(by, _)| by)
     };
     (0..sizes.len()).map(twin).collect()
 }

@@ -12,13 +12,13 @@ fn cloud() -> GaussianCloud {
 /// A doll (0 to 19) with a face (10 to 19), and a cat (20 to 29); the rest is unlabeled.
 fn found() -> SemanticMap {
     let mut all = Identities::default();
-    let doll = all.add(Level::Object, NOBODY, vec!["doll".into()]);
+    let doll = all.add(Level::Object, NO_IDENTITY, vec!["doll".into()]);
     let face = all.add(Level::Part, doll, vec!["face".into()]);
-    let cat = all.add(Level::Object, NOBODY, vec!["cat".into()]);
+    let cat = all.add(Level::Object, NO_IDENTITY, vec!["cat".into()]);
     for (id, code) in [(doll, 0.1), (face, 0.5), (cat, 0.9)] {
         all.get_mut(id).expect("there").code = [code; 3];
     }
-    let of = (0..40).map(|i| [doll, face, cat, NOBODY][i / 10]).collect();
+    let of = (0..40).map(|i| [doll, face, cat, NO_IDENTITY][i / 10]).collect();
     SemanticMap::from_identities(all, of, vec![0.75; 40], vec!["a.jpg".into()])
 }
 
@@ -41,7 +41,7 @@ fn every_kind_of_work_by_hand_is_noted_and_nothing_else() {
         (Edit::Rename(3, "kitty".into()), vec![3]),
         (Edit::Merge(3, 1), vec![1]),
         (Edit::Split(2), vec![]),
-        (piece(NOBODY, 30..35), vec![4]),
+        (piece(NO_IDENTITY, 30..35), vec![4]),
         (piece(1, 0..5), vec![4]),
         (Edit::Reshape { id: 2, gaussians: (8..20).collect() }, vec![2]),
     ] {
@@ -64,7 +64,8 @@ fn every_kind_of_work_by_hand_is_noted_and_nothing_else() {
 #[test]
 fn what_is_found_again_where_something_is_kept_is_no_second_one() {
     // Found by clicks: a bow on the doll's head, where the next search finds the doll and a "ribbon".
-    let map = edited(&found(), &[Edit::AddPiece { of: NOBODY, name: "bow".into(), gaussians: (14..20).collect() }]);
+    let map =
+        edited(&found(), &[Edit::AddPiece { of: NO_IDENTITY, name: "bow".into(), gaussians: (14..20).collect() }]);
     let kept = worked_on(&map).expect("the bow");
     assert_eq!((kept.identities.len(), own(&kept, "bow")), (1, (14..20).collect::<Vec<_>>()));
     let mut again = found();
@@ -96,6 +97,6 @@ fn an_object_stays_with_its_parts_and_gets_those_that_it_lacks() {
     assert_eq!((own(&new, "doll"), own(&new, "smile")), (own(&map, "doll"), own(&map, "smile")));
     assert_eq!((own(&new, "boots").len(), own(&new, "cat").len()), (6, 10));
     // The control: nothing is kept, and all is as it was found.
-    let nothing = SemanticMap::from_identities(Identities::default(), vec![NOBODY; 40], vec![0.0; 40], vec![]);
+    let nothing = SemanticMap::from_identities(Identities::default(), vec![NO_IDENTITY; 40], vec![0.0; 40], vec![]);
     assert_eq!(joined(&again, &nothing).identity_of, again.identity_of);
 }

@@ -131,7 +131,7 @@ mod tests {
     use super::super::hierarchy::tests::{cameras, hierarchy, sheet};
     use super::*;
     use crate::render::{RenderSettings, Renderer};
-    use crate::scene::{GaussianCloud, Identities, NOBODY};
+    use crate::scene::{GaussianCloud, Identities, NO_IDENTITY};
 
     /// Votes of the first view, with labels for pixels around places of the sheet.
     fn votes(cloud: &GaussianCloud, said: &[([f64; 2], IdentityId)]) -> Votes {
@@ -161,7 +161,7 @@ mod tests {
     fn a_few_votes_label_what_belongs_together() {
         let (cloud, whose) = sheet();
         let (tree, all) = (hierarchy(&cloud), Identities::objects(2));
-        let said = votes(&cloud, &[([-0.15, 0.0], 1), ([0.15, 0.0], 2), ([-0.6, -0.6], NOBODY)]);
+        let said = votes(&cloud, &[([-0.15, 0.0], 1), ([0.15, 0.0], 2), ([-0.6, -0.6], NO_IDENTITY)]);
         let labels = tree.label(&said, &said, &all, 0.05);
         let voted = |i: &usize| said.weight(*i) >= 0.05;
         let told = (0..whose.len()).filter(voted).count();

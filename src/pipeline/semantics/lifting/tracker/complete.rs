@@ -49,19 +49,19 @@ impl Tracker<'_> {
             };
             let camera = photo.camera.limited_to(SIDE_PX);
             let ends = ends_of(self.cloud, self.settings, &camera);
-            let terrain = Terrain::new(pixels.width_px as usize, &pixels.rgb, ends.as_deref(), &options);
+            let grid = GrowthGrid::new(pixels.width_px as usize, &pixels.rgb, ends.as_deref(), &options);
             let map = self.map_of(view.photo, SIDE_PX, &of)?;
             let mut known = sure(&map, options.share);
             gone::forget(&mut known, gone::pixels(self, view.photo, SIDE_PX)?.as_ref());
-            counts.add(&terrain, &known);
-            terrains.push((view.photo, terrain));
+            counts.add(&grid, &known);
+            terrains.push((view.photo, grid));
             ticker.tick(i + 1, observer)?;
         }
         let colors = counts.compare(options.unseen);
-        for (i, (photo, terrain)) in terrains.iter().enumerate() {
+        for (i, (photo, grid)) in terrains.iter().enumerate() {
             let map = self.map(*photo, SIDE_PX)?;
             let known = sure(&map, options.share);
-            let mut labels = grow(terrain, &known, &colors, &options);
+            let mut labels = grow(grid, &known, &colors, &options);
             // Known pixels come from earlier votes, so only the grown ones vote.
             labels.iter_mut().zip(&known).filter(|(_, k)| **k != UNKNOWN).for_each(|(l, _)| *l = UNKNOWN);
             gone::forget(&mut labels, gone::pixels(self, *photo, SIDE_PX)?.as_ref());
@@ -83,19 +83,19 @@ fn sure(map: &ViewMap, share: f32) -> Vec<IdentityId> {
 }
 
 /// Colors and edges of a photo, in px of the view.
-struct Terrain {
+struct GrowthGrid {
     width: usize,
     /// Cell of each pixel's color.
     cell: Vec<u32>,
     /// Time that a pixel takes for its edges.
-    wall: Vec<f32>,
+    edge_cost: Vec<f32>,
 }
 
 /// Limits and costs of growing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct GrowOptions {
     /// Time limit of growing.
-    patience: f32,
+    time_limit: f32,
     /// Time of a pixel without edges in a color of this identity alone.
     step: f32,
     /// Time per Lab step of an edge, and for the end of a surface.
@@ -113,18 +113,18 @@ struct GrowOptions {
 
 impl Default for GrowOptions {
     fn default() -> Self {
-        Self { patience: 10.0, step: 0.04, edge: 0.12, end: 12.0, color: 0.25, most: 2.5, share: 0.7, unseen: 0.1 }
+        Self { time_limit: 10.0, step: 0.04, edge: 0.12, end: 12.0, color: 0.25, most: 2.5, share: 0.7, unseen: 0.1 }
     }
 }
 
-impl Terrain {
+impl GrowthGrid {
     /// Creates the terrain of sRGB pixels with surface ends, 0 to 1 each.
     fn new(width: usize, rgb: &[[u8; 3]], ends: Option<&[f32]>, options: &GrowOptions) -> Self {
         let colors = lab(rgb);
         let strength = strength(&ImagePlanes { width, channels: &planes(&colors) });
         let end = |i: usize| ends.map_or(0.0, |e| e[i]);
-        let wall = (0..rgb.len()).map(|i| options.edge * strength[i] + options.end * end(i)).collect();
-        Self { width, cell: colors.iter().map(|c| cell(*c)).collect(), wall }
+        let edge_cost = (0..rgb.len()).map(|i| options.edge * strength[i] + options.end * end(i)).collect();
+        Self { width, cell: colors.iter().map(|c| cell(*c)).collect(), edge_cost }
     }
 }
 
@@ -145,8 +145,8 @@ impl ColorCounts {
     }
 
     /// Counts the colors of a view by its known labels.
-    fn add(&mut self, terrain: &Terrain, known: &[IdentityId]) {
-        for (cell, id) in terrain.cell.iter().zip(known) {
+    fn add(&mut self, grid: &GrowthGrid, known: &[IdentityId]) {
+        for (cell, id) in grid.cell.iter().zip(known) {
             if let Some(counts) = self.0.get_mut(*id as usize) {
                 counts[*cell as usize] += 1.0;
             }
@@ -191,7 +191,7 @@ fn smooth_shares(counts: &[f32]) -> Vec<f32> {
 }
 
 /// Grows the `known` labels (`UNKNOWN` elsewhere); returns the label of every pixel.
-fn grow(terrain: &Terrain, known: &[IdentityId], colors: &ColorModels, options: &GrowOptions) -> Vec<IdentityId> {
+fn grow(grid: &GrowthGrid, known: &[IdentityId], colors: &ColorModels, options: &GrowOptions) -> Vec<IdentityId> {
     let n = known.len();
     let mut label = vec![UNKNOWN; n];
     let mut time = vec![f32::INFINITY; n];
@@ -199,7 +199,7 @@ fn grow(terrain: &Terrain, known: &[IdentityId], colors: &ColorModels, options: 
     let mut open: BinaryHeap<Reverse<(u32, u32, IdentityId)>> = BinaryHeap::new();
     for i in (0..n).filter(|&i| known[i] != UNKNOWN) {
         (label[i], time[i]) = (known[i], 0.0);
-        if neighbors(i, terrain.width, n).any(|j| known[j] == UNKNOWN) {
+        if neighbors(i, grid.width, n).any(|j| known[j] == UNKNOWN) {
             open.push(Reverse((0, i as u32, known[i])));
         }
     }
@@ -208,10 +208,10 @@ fn grow(terrain: &Terrain, known: &[IdentityId], colors: &ColorModels, options: 
         if now > time[i] || label[i] != id {
             continue;
         }
-        for j in neighbors(i, terrain.width, n).filter(|&j| known[j] == UNKNOWN) {
-            let against = colors.against(id, terrain.cell[j]);
-            let then = now + options.step + terrain.wall[j] + options.color * against;
-            if against <= options.most && then < time[j] && then <= options.patience {
+        for j in neighbors(i, grid.width, n).filter(|&j| known[j] == UNKNOWN) {
+            let against = colors.against(id, grid.cell[j]);
+            let then = now + options.step + grid.edge_cost[j] + options.color * against;
+            if against <= options.most && then < time[j] && then <= options.time_limit {
                 (time[j], label[j]) = (then, id);
                 open.push(Reverse((then.to_bits(), j as u32, id)));
             }
@@ -223,7 +223,7 @@ fn grow(terrain: &Terrain, known: &[IdentityId], colors: &ColorModels, options: 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::NOBODY;
+    use crate::scene::NO_IDENTITY;
 
     const W: usize = 40;
     const RED: [u8; 3] = [200, 40, 40];
@@ -240,11 +240,11 @@ mod tests {
         let rgb: Vec<[u8; 3]> = (0..W * 10).map(|i| color(i % W)).collect();
         let known: Vec<IdentityId> = (0..W * 10).map(|i| known(i % W)).collect();
         let ends: Option<Vec<f32>> = end.map(|x| (0..W * 10).map(|i| f32::from(u8::from(i % W == x))).collect());
-        let terrain = Terrain::new(W, &rgb, ends.as_deref(), &options);
+        let grid = GrowthGrid::new(W, &rgb, ends.as_deref(), &options);
         let mut counts = ColorCounts::new(2);
-        counts.add(&terrain, &known);
+        counts.add(&grid, &known);
         let colors = counts.compare(options.unseen);
-        grow(&terrain, &known, &colors, &options)[5 * W..6 * W].to_vec()
+        grow(&grid, &known, &colors, &options)[5 * W..6 * W].to_vec()
     }
 
     #[test]
@@ -254,7 +254,7 @@ mod tests {
             if x < 4 {
                 1
             } else if x >= 36 {
-                NOBODY
+                NO_IDENTITY
             } else {
                 UNKNOWN
             }
@@ -262,8 +262,8 @@ mod tests {
         let row = grown(color, known, None);
         // The border stays open: it belongs to both sides a little.
         assert!(row[..16].iter().all(|id| *id == 1), "{row:?}");
-        assert!(row[24..].iter().all(|id| *id == NOBODY), "{row:?}");
-        assert!(row[16..20].iter().all(|id| *id != NOBODY) && row[20..24].iter().all(|id| *id != 1), "{row:?}");
+        assert!(row[24..].iter().all(|id| *id == NO_IDENTITY), "{row:?}");
+        assert!(row[16..20].iter().all(|id| *id != NO_IDENTITY) && row[20..24].iter().all(|id| *id != 1), "{row:?}");
     }
 
     #[test]

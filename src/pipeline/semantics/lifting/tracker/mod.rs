@@ -12,7 +12,7 @@ use std::time::Instant;
 pub(crate) use options::TrackOptions;
 pub(crate) use views::ViewReport;
 
-use super::associate::{Link, disagreements, link};
+use super::associate::{Link, conflicts, link};
 use super::error::FindError;
 use super::floaters::drop_floaters;
 use super::propagate::extend;
@@ -26,8 +26,8 @@ use crate::math::format::things;
 use crate::pipeline::observer::{Observer, Severity, Ticker, begin};
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::render::{RenderSettings, Renderer};
-use crate::scene::findings::{Disagreement, Doubt, Findings, PhotoFinding, Seen};
-use crate::scene::{GaussianCloud, Identities, IdentityId, NOBODY, Photo};
+use crate::scene::findings::{ConflictKind, MaskConflict, PhotoFinding, Seen, SegmentationReport};
+use crate::scene::{GaussianCloud, Identities, IdentityId, NO_IDENTITY, Photo};
 
 /// Least weight of votes for a Gaussian to have an identity, in px of the photos voted on.
 const LEAST_VOTES: f32 = 0.05;
@@ -52,7 +52,7 @@ pub(crate) struct Tracked {
     /// Report of every photo, without the identities that hidden Gaussians inherit from those around them.
     pub(crate) views: Vec<ViewReport>,
     /// Disagreements of masks with the identities known before, with the photo.
-    pub(crate) disagreements: Vec<(usize, Disagreement)>,
+    pub(crate) conflicts: Vec<(usize, ConflictKind)>,
     /// The masks of the photos that were segmented and of those to which they were followed.
     pub(crate) masks: Vec<CodeView>,
     /// Seconds that each stage took, in order.
@@ -61,7 +61,7 @@ pub(crate) struct Tracked {
 
 impl Tracked {
     /// Returns the findings about identities and photos, which are kept with the map.
-    pub(crate) fn findings(&self, photos: &[Photo]) -> Findings {
+    pub(crate) fn findings(&self, photos: &[Photo]) -> SegmentationReport {
         let mut seen = vec![Seen::default(); self.identities.len()];
         for (k, view) in self.views.iter().enumerate() {
             for s in &view.seen {
@@ -69,14 +69,14 @@ impl Tracked {
             }
         }
         let place = |photo: usize| self.views.iter().position(|v| v.photo == photo);
-        let doubt = |(photo, what): &(usize, Disagreement)| {
-            place(*photo).map(|k| Doubt { photo: k as u32, what: what.clone() })
+        let conflict = |(photo, what): &(usize, ConflictKind)| {
+            place(*photo).map(|k| MaskConflict { photo: k as u32, what: what.clone() })
         };
         let name = |v: &ViewReport| PhotoFinding { name: photos[v.photo].name.clone(), unknown: v.unknown };
-        Findings::new(
+        SegmentationReport::new(
             self.views.iter().map(name).collect(),
             seen,
-            self.disagreements.iter().filter_map(doubt).collect(),
+            self.conflicts.iter().filter_map(conflict).collect(),
         )
     }
 }
@@ -110,7 +110,7 @@ pub(crate) fn track(
             Some(map) => Votes::known(map, options.least_seen),
             None => Votes::with_least_seen(cloud.len(), options.least_seen),
         },
-        disagreements: Vec::new(),
+        conflicts: Vec::new(),
         masks: Vec::new(),
         segment_secs: 0.0,
     };
@@ -162,12 +162,12 @@ pub(crate) fn track(
         for (i, now) in assignments.iter_mut().enumerate() {
             // Unlabeled Gaussians may become something new, unknown ones anything: one more photo only adds things.
             let is_new = now.identity != UNKNOWN && now.identity as usize > map.identities.len();
-            if map.identity_of[i] != NOBODY || now.identity == NOBODY || !map.is_unknown(i) && !is_new {
+            if map.identity_of[i] != NO_IDENTITY || now.identity == NO_IDENTITY || !map.is_unknown(i) && !is_new {
                 *now = Assignment { identity: map.identity_of[i], margin: map.margin[i] };
             }
         }
     }
-    let told = Disagreement::told(&t.disagreements, |i| photos[i].name.clone(), |id| t.identities.full_name(id));
+    let told = ConflictKind::summary(&t.conflicts, |i| photos[i].name.clone(), |id| t.identities.full_name(id));
     told.into_iter().for_each(|text| observer.note(Severity::Warning, text));
     let carry_secs = start.elapsed().as_secs_f64() - t.segment_secs - encode_secs - follow_secs;
     let secs = vec![
@@ -176,15 +176,7 @@ pub(crate) fn track(
         ("follow masks", follow_secs),
         ("carry by Gaussians", carry_secs),
     ];
-    Ok(Tracked {
-        identities: t.identities,
-        assignments,
-        seeds,
-        views,
-        disagreements: t.disagreements,
-        masks: t.masks,
-        secs,
-    })
+    Ok(Tracked { identities: t.identities, assignments, seeds, views, conflicts: t.conflicts, masks: t.masks, secs })
 }
 
 /// Masks of a photo, and their identities.
@@ -199,7 +191,7 @@ struct Tracker<'a> {
     removed: Option<RemovedThings>,
     identities: Identities,
     votes: Votes,
-    disagreements: Vec<(usize, Disagreement)>,
+    conflicts: Vec<(usize, ConflictKind)>,
     masks: Vec<CodeView>,
     segment_secs: f64,
 }
@@ -245,20 +237,20 @@ impl Tracker<'_> {
         let links = link(&found, known.as_ref(), &self.identities);
         let stays = known.as_ref().filter(|_| self.options.known.is_some());
         // A mask of known pixels makes no new identity.
-        let is_free = |id: IdentityId| id == UNKNOWN || id == NOBODY;
+        let is_free = |id: IdentityId| id == UNKNOWN || id == NO_IDENTITY;
         let is_old = |mask: &FoundMask| {
             let new = |map: &ViewMap| mask.mask.pixels().filter(|i| is_free(map.identity[*i])).count();
             stays.is_some_and(|map| (new(map) as f64) < NEWS * mask.mask.area() as f64)
         };
         if let Some(known) = &known {
-            let told = disagreements(&found, &links, known, &self.identities);
-            for what in told.into_iter().filter(|d| stays.is_none() || !matches!(d, Disagreement::Split(_))) {
-                self.disagreements.push((photo, what));
+            let told = conflicts(&found, &links, known, &self.identities);
+            for what in told.into_iter().filter(|d| stays.is_none() || !matches!(d, ConflictKind::Split(_))) {
+                self.conflicts.push((photo, what));
             }
         }
         let mut ids = Vec::with_capacity(found.len());
         for (mask, link) in found.iter().zip(&links) {
-            let parent = mask.parent.map_or(NOBODY, |p| ids[p]);
+            let parent = mask.parent.map_or(NO_IDENTITY, |p| ids[p]);
             ids.push(match link {
                 Link::Known(id) => *id,
                 _ if parent == UNKNOWN || is_old(mask) => UNKNOWN,
@@ -318,7 +310,7 @@ impl Tracker<'_> {
                 let known = self.map_of(photo, LABEL_SIDE_PX, &of)?;
                 for id in contradicted(&labels, &known.identity, self.identities.len()) {
                     labels.iter_mut().filter(|l| **l == id).for_each(|l| *l = UNKNOWN);
-                    self.disagreements.push((photo, Disagreement::Drift(id)));
+                    self.conflicts.push((photo, ConflictKind::Drift(id)));
                 }
             }
             gone::forget(&mut labels, gone::pixels(self, photo, LABEL_SIDE_PX)?.as_ref());
@@ -380,9 +372,9 @@ fn contradicted(followed: &[IdentityId], known: &[IdentityId], identities: usize
     (1..counts.len()).filter(|id| apart(&counts[*id])).map(|id| id as IdentityId).collect()
 }
 
-/// Returns the innermost identity of each pixel of a segmented photo; `NOBODY` without a mask.
+/// Returns the innermost identity of each pixel of a segmented photo; `NO_IDENTITY` without a mask.
 pub(crate) fn labels_of(found: &[FoundMask], ids: &[IdentityId], pixels: usize) -> Vec<IdentityId> {
-    let mut labels = vec![NOBODY; pixels];
+    let mut labels = vec![NO_IDENTITY; pixels];
     // Wholes come before pieces, so the innermost is painted last.
     for (mask, id) in found.iter().zip(ids) {
         mask.mask.pixels().for_each(|i| labels[i] = *id);

@@ -29,7 +29,7 @@ fn a_view_reports_who_is_seen_and_what_is_not_known() {
     let map = ViewMap {
         width_px: 4,
         height_px: 1,
-        identity: vec![1, 1, UNKNOWN, NOBODY],
+        identity: vec![1, 1, UNKNOWN, NO_IDENTITY],
         share: vec![1.0, 0.5, 1.0, 0.0],
         alpha: vec![1.0; 4],
     };

@@ -12,7 +12,7 @@ use super::matching::{self, MatchMode};
 use super::names::{self, ByName};
 use super::parse::ParsedQuery;
 use super::reading::QueryReading;
-use super::recipe::{Recipe, Rejection, RelevancyScale, Strategy, Understanding};
+use super::recipe::{MatchBy, QueryConfig, Rejection, RelevancyScale, Strategy};
 use super::timing::{StagesMs, ms_since};
 use crate::models;
 use crate::pipeline::semantics::code_map::CodeMap;
@@ -43,7 +43,7 @@ pub struct QueryAnswer {
     /// Milliseconds of relevancy and localization; the caller adds the other stages.
     pub(crate) stages: StagesMs,
     /// Recipe of the answer.
-    pub(crate) recipe: Recipe,
+    pub(crate) recipe: QueryConfig,
 }
 
 /// Features and encoded phrases for answers by embedding.
@@ -62,16 +62,16 @@ pub(crate) fn answer(
     identities: &Identities,
     reading: &QueryReading,
     level: LevelFilter,
-    recipe: &Recipe,
+    recipe: &QueryConfig,
     language: Option<Language<'_>>,
 ) -> QueryAnswer {
     let phrase = &reading.phrase;
     let nothing = |a: &Answer| matches!(a, Answer::NotFound(_));
-    let language = match (recipe.understanding, language) {
-        (Understanding::Names, _) | (Understanding::Both, None) => return by_name(identities, reading, level, recipe),
-        (Understanding::Embedding, None) => return unanswered(identities, recipe),
-        (Understanding::Embedding, Some(language)) => return by_embedding(identities, phrase, level, recipe, language),
-        (Understanding::Both, Some(language)) => language,
+    let language = match (recipe.match_by, language) {
+        (MatchBy::Names, _) | (MatchBy::Both, None) => return by_name(identities, reading, level, recipe),
+        (MatchBy::Embedding, None) => return unanswered(identities, recipe),
+        (MatchBy::Embedding, Some(language)) => return by_embedding(identities, phrase, level, recipe, language),
+        (MatchBy::Both, Some(language)) => language,
     };
     let named = by_name(identities, reading, level, recipe);
     let is_strict = recipe.rejection == Rejection::Strict;
@@ -123,7 +123,7 @@ fn grounded(identities: &Identities, phrase: &ParsedQuery, language: Language<'_
 }
 
 /// Returns the answer by embedding of a scene without embeddings: nothing is found.
-fn unanswered(identities: &Identities, recipe: &Recipe) -> QueryAnswer {
+fn unanswered(identities: &Identities, recipe: &QueryConfig) -> QueryAnswer {
     QueryAnswer::nothing(Basis::Embedding, identities, recipe)
 }
 
@@ -162,7 +162,7 @@ impl<S: Scorer> Scorer for Timed<'_, S> {
 fn judged<S: Scorer>(
     (identities, phrase, level): (&Identities, &ParsedQuery, LevelFilter),
     whole: &[IdentityId],
-    (basis, recipe): (Basis, &Recipe),
+    (basis, recipe): (Basis, &QueryConfig),
     scorer: &mut S,
     relevancy: impl FnOnce(&Answer, &mut S) -> Vec<f32>,
 ) -> QueryAnswer {
@@ -198,7 +198,7 @@ pub(crate) fn by_name(
     identities: &Identities,
     QueryReading { phrase, called, .. }: &QueryReading,
     level: LevelFilter,
-    recipe: &Recipe,
+    recipe: &QueryConfig,
 ) -> QueryAnswer {
     let mut scorer = ByName { identities, rejection: recipe.rejection };
     judged((identities, phrase, level), called, (Basis::Names, recipe), &mut scorer, |answer, _| {
@@ -220,7 +220,7 @@ pub(crate) fn by_embedding(
     identities: &Identities,
     phrase: &ParsedQuery,
     level: LevelFilter,
-    recipe: &Recipe,
+    recipe: &QueryConfig,
     language: Language<'_>,
 ) -> QueryAnswer {
     let Language { features, phrases, .. } = language;
@@ -236,13 +236,13 @@ pub(crate) fn by_embedding(
 
 impl QueryAnswer {
     /// Creates an answer without look-alikes, with times of zero.
-    pub(crate) fn new(answer: Answer, basis: Basis, relevancy: Vec<f32>, recipe: &Recipe) -> Self {
+    pub(crate) fn new(answer: Answer, basis: Basis, relevancy: Vec<f32>, recipe: &QueryConfig) -> Self {
         let (stages, recipe) = (StagesMs::default(), recipe.clone());
         Self { answer, basis, alike: Vec::new(), is_rough: false, relevancy, stages, recipe }
     }
 
     /// Creates the answer "not found".
-    pub(crate) fn nothing(basis: Basis, identities: &Identities, recipe: &Recipe) -> Self {
+    pub(crate) fn nothing(basis: Basis, identities: &Identities, recipe: &QueryConfig) -> Self {
         Self::new(Answer::NotFound(Vec::new()), basis, vec![0.0; identities.len() + 1], recipe)
     }
 
@@ -277,7 +277,7 @@ impl QueryAnswer {
     /// Converts a score by embedding to this program's default temperature.
     fn usual(&self, score: f32) -> f32 {
         let odds = score / (1.0 - score);
-        let odds = odds.powf(Recipe::default().temperature / self.recipe.temperature);
+        let odds = odds.powf(QueryConfig::default().temperature / self.recipe.temperature);
         if odds.is_finite() { odds / (1.0 + odds) } else { 1.0 }
     }
 
@@ -303,7 +303,7 @@ impl QueryAnswer {
 
     /// Mask of the answer in a view.
     pub(crate) fn mask(&self, map: &ViewMap, codes: Option<&CodeMap>, identities: &Identities, top: usize) -> Mask {
-        let Recipe { masks, tolerance, .. } = self.recipe;
+        let QueryConfig { masks, tolerance, .. } = self.recipe;
         if masks == MatchMode::Relevancy {
             let relevant = self.relevant(map.identity.iter().copied());
             let is = |id: IdentityId| relevant.get(id as usize).copied().unwrap_or(false);

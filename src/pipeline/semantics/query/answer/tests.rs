@@ -3,13 +3,13 @@
 use super::super::localize::Hit;
 use super::*;
 use crate::pipeline::semantics::query::recipe::Rejection;
-use crate::scene::{Level, NOBODY, ViewFeatures};
+use crate::scene::{Level, NO_IDENTITY, ViewFeatures};
 
 fn scene() -> (Identities, LanguageFeatures) {
     let mut all = Identities::default();
-    let lamp = all.add(Level::Object, NOBODY, vec!["lamp".into()]);
+    let lamp = all.add(Level::Object, NO_IDENTITY, vec!["lamp".into()]);
     all.add(Level::Part, lamp, vec!["shade".into()]);
-    let mug = all.add(Level::Object, NOBODY, vec!["mug".into()]);
+    let mug = all.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);
     all.get_mut(lamp).expect("there").code = [0.1, 0.5, 0.5];
     all.get_mut(mug).expect("there").code = [0.9, 0.5, 0.5];
     let f = |v: [f32; 3]| ViewFeatures { raw: vec![v.to_vec()], deviated: vec![v.to_vec()] };
@@ -17,22 +17,22 @@ fn scene() -> (Identities, LanguageFeatures) {
     (all, LanguageFeatures { encoder: "test".into(), dimension: 3, by_identity: of })
 }
 
-fn read(all: &Identities, text: &str, recipe: &Recipe) -> QueryReading {
+fn read(all: &Identities, text: &str, recipe: &QueryConfig) -> QueryReading {
     QueryReading::new(all, text, LevelFilter::Auto, recipe).expect("a phrase")
 }
 
 fn ask(text: &str, with_meaning: bool) -> QueryAnswer {
-    ask_by(text, &Recipe::default(), with_meaning)
+    ask_by(text, &QueryConfig::default(), with_meaning)
 }
 
-fn ask_by(text: &str, recipe: &Recipe, with_meaning: bool) -> QueryAnswer {
+fn ask_by(text: &str, recipe: &QueryConfig, with_meaning: bool) -> QueryAnswer {
     ask_of(scene(), text, recipe, with_meaning)
 }
 
 fn ask_of(
     (all, features): (Identities, LanguageFeatures),
     text: &str,
-    recipe: &Recipe,
+    recipe: &QueryConfig,
     with_meaning: bool,
 ) -> QueryAnswer {
     let phrase = ParsedQuery::parse(text).expect("a phrase");
@@ -79,7 +79,7 @@ fn an_encoder_of_photos_answers_what_names_do_not_know() {
         let phrase = ParsedQuery::parse(text).expect("a phrase");
         let mut phrases = TextEmbeddings::default();
         let mut encode = |p: &str| Ok::<_, ()>(if p == text { to.to_vec() } else { vec![0.5, 0.5, 0.5] });
-        let recipe = Recipe::default();
+        let recipe = QueryConfig::default();
         phrases.learn(&phrase, &recipe, &mut encode).expect("encodes");
         let language = Language { features: &features, phrases: &phrases, unknown: &[] };
         answer(&all, &read(&all, text, &recipe), LevelFilter::Auto, &recipe, Some(language))
@@ -102,7 +102,7 @@ fn the_small_encoder_answers_only_where_nothing_has_a_name() {
         if !has_names {
             all = Identities::objects(3);
         }
-        ask_of((all, features), text, &Recipe::default(), true)
+        ask_of((all, features), text, &QueryConfig::default(), true)
     };
     let small = ask("demo", true, "cup");
     assert_eq!((small.basis, small.chosen(8), small.offers(3)), (Basis::Names, vec![], [vec![], vec![3]]));
@@ -129,25 +129,25 @@ fn words_that_an_encoder_leaves_out_and_colors_that_are_not_so_find_nothing() {
         let all = Identities::objects(3);
         let mut phrases = TextEmbeddings::default();
         // The encoder is asked for the query as it was read: without courtesy.
-        let reading = read(&all, text, &Recipe::default());
+        let reading = read(&all, text, &QueryConfig::default());
         let is_asked = |p: &str| p == reading.phrase.text;
         let mut encode = |p: &str| Ok::<_, ()>(if is_asked(p) { vec![1.0, 0.0, 0.0] } else { vec![0.5, 0.5, 0.5] });
-        phrases.learn(&reading.phrase, &Recipe::default(), &mut encode).expect("encodes");
+        phrases.learn(&reading.phrase, &QueryConfig::default(), &mut encode).expect("encodes");
         let language = Language { features: &features, phrases: &phrases, unknown };
-        answer(&all, &reading, LevelFilter::Auto, &Recipe::default(), Some(language))
+        answer(&all, &reading, LevelFilter::Auto, &QueryConfig::default(), Some(language))
     };
     assert_eq!(ask("steering wheel", &[]).chosen(1), [3]);
     let left_out = ask("steering wheel", &["steering".into()]);
     assert!(left_out.chosen(1).is_empty());
     let all = Identities::objects(3);
-    let reading = read(&all, "steering wheel", &Recipe::default());
+    let reading = read(&all, "steering wheel", &QueryConfig::default());
     assert_eq!(left_out.unexplained(&all, &reading, &["steering".into()]), ["steering"]);
     assert_eq!(ask("my wheel", &["my".into()]).chosen(1), [3], "a word that says nothing may be left out");
 }
 
 #[test]
 fn what_is_ignored_is_nothing_that_is_shown() {
-    let lax = Recipe { rejection: Rejection::Canonical, ..Recipe::default() };
+    let lax = QueryConfig { rejection: Rejection::Canonical, ..QueryConfig::default() };
     let (all, _) = scene();
     let answered = ask_by("mug and lamp", &lax, false);
     assert_eq!(answered.chosen(1), [1, 3]);
@@ -155,7 +155,7 @@ fn what_is_ignored_is_nothing_that_is_shown() {
     // By default, a word that is left over finds nothing; both are offered.
     let strict = ask("mug and lamp", false);
     assert_eq!((strict.chosen(1), strict.offers(3)), (vec![], [vec![1, 3], vec![]]));
-    let reading = read(&all, "mug and lamp", &Recipe::default());
+    let reading = read(&all, "mug and lamp", &QueryConfig::default());
     assert_eq!(strict.unexplained(&all, &reading, &[]), ["and"]);
 }
 
@@ -164,7 +164,7 @@ fn an_answer_is_as_sure_as_it_rests_on_names() {
     let sure = |text: &str| {
         let (all, _) = scene();
         let answered = ask(text, true);
-        let ignored = answered.ignored_words(&all, &read(&all, text, &Recipe::default()), &["beige".to_owned()]);
+        let ignored = answered.ignored_words(&all, &read(&all, text, &QueryConfig::default()), &["beige".to_owned()]);
         (answered.certainty(&ignored), ignored)
     };
     assert_eq!(sure("the lamp's shade"), (Certainty::Certain, vec![]));
@@ -182,7 +182,7 @@ fn what_was_removed_is_not_found_by_its_looks() {
     let ask = |removed: &[&str], text: &str| {
         let (mut all, features) = scene();
         all.removed = removed.iter().map(|name| (*name).into()).collect();
-        ask_of((all, features), text, &Recipe::default(), true).chosen(1)
+        ask_of((all, features), text, &QueryConfig::default(), true).chosen(1)
     };
     assert_eq!(ask(&[], "cup"), [3], "else it looks like the mug");
     assert_eq!(ask(&["paper cup", "lid"], "cup"), [3], "a cup is not a paper cup");
@@ -196,7 +196,7 @@ fn those_that_fit_alike_are_all_chosen_and_top_is_a_limit() {
     let answered = |answer: fn(Vec<Hit>) -> Answer, scores: &[f32]| {
         let hit = |(i, s): (usize, &f32)| Hit { identity: i as IdentityId + 1, score: *s, margin: 0.0 };
         let hits = scores.iter().enumerate().map(hit).collect();
-        QueryAnswer::new(answer(hits), Basis::Names, vec![0.0, 0.25, 0.5], &Recipe::default())
+        QueryAnswer::new(answer(hits), Basis::Names, vec![0.0, 0.25, 0.5], &QueryConfig::default())
     };
     let hits = [0.9, 0.89, 0.6, 0.3];
     assert_eq!(answered(Answer::Ambiguous, &hits).chosen(1), [1, 2], "0.01 apart, under 0.02");
@@ -211,23 +211,23 @@ fn those_that_fit_alike_are_all_chosen_and_top_is_a_limit() {
 
 #[test]
 fn the_recipe_says_what_is_asked_and_when_nothing_fits() {
-    let by = |understanding| Recipe { understanding, ..Recipe::default() };
-    let basis = |text: &str, understanding| {
-        let a = ask_by(text, &by(understanding), true);
+    let by = |match_by| QueryConfig { match_by, ..QueryConfig::default() };
+    let basis = |text: &str, match_by| {
+        let a = ask_by(text, &by(match_by), true);
         (a.basis, a.chosen(1))
     };
     // The encoder takes a cup for the mug; no name knows it. By embedding, "mug" is as good as anything.
-    assert_eq!(basis("cup", Understanding::Both), (Basis::Embedding, vec![3]));
-    assert_eq!(basis("cup", Understanding::Embedding), (Basis::Embedding, vec![3]));
-    assert_eq!(basis("cup", Understanding::Names), (Basis::Names, vec![]));
-    assert_eq!(basis("mug", Understanding::Both), (Basis::Names, vec![3]));
-    assert_eq!(basis("mug", Understanding::Embedding), (Basis::Embedding, vec![]));
-    let nothing = ask_by("mug", &by(Understanding::Embedding), false);
+    assert_eq!(basis("cup", MatchBy::Both), (Basis::Embedding, vec![3]));
+    assert_eq!(basis("cup", MatchBy::Embedding), (Basis::Embedding, vec![3]));
+    assert_eq!(basis("cup", MatchBy::Names), (Basis::Names, vec![]));
+    assert_eq!(basis("mug", MatchBy::Both), (Basis::Names, vec![3]));
+    assert_eq!(basis("mug", MatchBy::Embedding), (Basis::Embedding, vec![]));
+    let nothing = ask_by("mug", &by(MatchBy::Embedding), false);
     assert_eq!((nothing.basis, nothing.chosen(1)), (Basis::Embedding, vec![]), "names are not looked at");
     // Hardly more relevant than a canonical phrase: by 0.0134, under the least advantage of encoders of photos.
     let hardly = |rejection| {
         let (all, features) = scene();
-        let recipe = Recipe { rejection, ..by(Understanding::Embedding) };
+        let recipe = QueryConfig { rejection, ..by(MatchBy::Embedding) };
         let phrase = ParsedQuery::parse("cup").expect("a phrase");
         let mut phrases = TextEmbeddings::default();
         let mut encode = |p: &str| Ok::<_, ()>(if p == "cup" { vec![0.5134, 0.5, 0.5] } else { vec![0.5, 0.5, 0.5] });
@@ -237,16 +237,16 @@ fn the_recipe_says_what_is_asked_and_when_nothing_fits() {
     };
     assert_eq!([Rejection::Never, Rejection::Canonical].map(hardly), [vec![3], vec![3]]);
     assert!(hardly(Rejection::Strict).is_empty());
-    let never = Recipe { rejection: Rejection::Never, ..by(Understanding::Embedding) };
+    let never = QueryConfig { rejection: Rejection::Never, ..by(MatchBy::Embedding) };
     assert!(!ask_by("giraffe", &never, true).chosen(1).is_empty(), "what fits best is the answer");
-    assert!(ask_by("giraffe", &by(Understanding::Embedding), true).chosen(1).is_empty());
+    assert!(ask_by("giraffe", &by(MatchBy::Embedding), true).chosen(1).is_empty());
 }
 
 #[test]
 fn what_has_another_color_is_not_found_by_embedding() {
     let (all, features) = scene();
     let ask = |text: &str, rejection| {
-        let recipe = Recipe { rejection, understanding: Understanding::Embedding, ..Recipe::default() };
+        let recipe = QueryConfig { rejection, match_by: MatchBy::Embedding, ..QueryConfig::default() };
         let phrase = ParsedQuery::parse(text).expect("a phrase");
         let mut phrases = TextEmbeddings::default();
         // The mug is red: any other color fits less, and "mug" is what makes it fit at all.
@@ -267,7 +267,7 @@ fn what_has_another_color_is_not_found_by_embedding() {
 #[test]
 fn relevancy_is_shown_raw_or_on_lerfs_scale_and_cut_at_a_fifth() {
     let answered = |scale| {
-        let recipe = Recipe { scale, masks: MatchMode::Relevancy, ..Recipe::default() };
+        let recipe = QueryConfig { scale, masks: MatchMode::Relevancy, ..QueryConfig::default() };
         // Of the background, and of five identities, the last of which is not in view.
         let relevancy = vec![0.0, 0.4, 0.55, 0.6, 0.7, 0.9];
         QueryAnswer::new(Answer::NotFound(vec![]), Basis::Embedding, relevancy, &recipe)
@@ -288,7 +288,7 @@ fn relevancy_is_shown_raw_or_on_lerfs_scale_and_cut_at_a_fifth() {
 
 #[test]
 fn the_papers_temperature_changes_scores_and_not_how_sure_an_answer_is() {
-    let paper = Recipe { temperature: 1.0, ..Recipe::default() };
+    let paper = QueryConfig { temperature: 1.0, ..QueryConfig::default() };
     let (a, b) = (ask("cup", true), ask_by("cup", &paper, true));
     assert_eq!((a.chosen(1), a.certainty(&[])), (b.chosen(1), b.certainty(&[])));
     let score = |a: &QueryAnswer| a.answer.hits()[0].score;

@@ -4,17 +4,17 @@ use super::super::names::ByName;
 use super::super::recipe::Rejection;
 use super::*;
 use crate::math::sh::SH_C0;
-use crate::scene::{GaussianCloud, NOBODY, SemanticMap};
+use crate::scene::{GaussianCloud, NO_IDENTITY, SemanticMap};
 
 fn scene() -> Identities {
     let mut all = Identities::default();
     for color in ["red", "blue"] {
-        let controller = all.add(Level::Object, NOBODY, vec![format!("{color} controller")]);
+        let controller = all.add(Level::Object, NO_IDENTITY, vec![format!("{color} controller")]);
         for part in ["button a", "left stick"] {
             all.add(Level::Part, controller, vec![part.into()]);
         }
     }
-    all.add(Level::Object, NOBODY, vec!["lamp".into()]);
+    all.add(Level::Object, NO_IDENTITY, vec!["lamp".into()]);
     all
 }
 
@@ -240,7 +240,7 @@ fn a_compound_and_a_forced_kind_reach_the_second_step_without_grammar() {
 #[test]
 fn names_reject_other_colors_and_colors_alone() {
     let mut all = scene();
-    all.add(Level::Object, NOBODY, vec!["brown chair".into()]);
+    all.add(Level::Object, NO_IDENTITY, vec!["brown chair".into()]);
     let verdict_of = |all: &Identities, query: &str, rejection| {
         let phrase = ParsedQuery::parse(query).expect("a phrase");
         let mut scorer = ByName { identities: all, rejection };

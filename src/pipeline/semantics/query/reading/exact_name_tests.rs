@@ -14,7 +14,7 @@ use crate::io::gltf_mesh;
 use crate::pipeline::synth::demo_glb;
 use crate::pipeline::synth::levels::identities;
 use crate::pipeline::synth::options::Levels;
-use crate::scene::{LanguageFeatures, Level, NOBODY, ViewFeatures};
+use crate::scene::{LanguageFeatures, Level, NO_IDENTITY, ViewFeatures};
 
 /// Names that the grammar takes apart, or takes for something else.
 const HARD: [(&str, &[&str]); 16] = [
@@ -44,12 +44,12 @@ fn hard() -> Identities {
     let mut all = Identities::default();
     for _ in 0..2 {
         for (object, parts) in HARD {
-            let id = all.add(Level::Object, NOBODY, vec![object.into(), format!("another {object}")]);
+            let id = all.add(Level::Object, NO_IDENTITY, vec![object.into(), format!("another {object}")]);
             parts.iter().for_each(|part| {
                 all.add(Level::Part, id, vec![(*part).into()]);
             });
         }
-        all.add(Level::Object, NOBODY, vec![]);
+        all.add(Level::Object, NO_IDENTITY, vec![]);
     }
     all
 }
@@ -59,7 +59,7 @@ fn of_meshes(bytes: &[u8], name: &str, path: Option<&Path>) -> Identities {
     let scene = path.map_or_else(|| gltf_mesh::read_slice(bytes, name), gltf_mesh::read).expect("a scene");
     let mut all = Identities::default();
     for one in identities(&scene, Levels::Nodes, name).expect("objects").list {
-        all.add(one.level, one.parent.map_or(NOBODY, u32::from), vec![one.name]);
+        all.add(one.level, one.parent.map_or(NO_IDENTITY, u32::from), vec![one.name]);
     }
     all
 }
@@ -76,9 +76,9 @@ fn of_labels(path: &Path) -> Option<Identities> {
     while placed.len() < wholes.len() {
         let before = placed.len();
         for (name, whole) in &wholes {
-            let of = whole.as_ref().map_or(Some(&NOBODY), |whole| placed.get(whole)).copied();
+            let of = whole.as_ref().map_or(Some(&NO_IDENTITY), |whole| placed.get(whole)).copied();
             if let Some(of) = of.filter(|_| !placed.contains_key(name)) {
-                let level = if of == NOBODY { Level::Object } else { Level::Part };
+                let level = if of == NO_IDENTITY { Level::Object } else { Level::Part };
                 placed.insert(name.clone(), all.add(level, of, vec![name.clone()]));
             }
         }
@@ -123,7 +123,7 @@ fn scenes() -> (Vec<(String, Identities)>, Vec<&'static str>) {
                     let text = std::fs::read_to_string(&path).expect("a text");
                     let mut all = Identities::default();
                     text.lines().filter(|l| !l.trim().is_empty()).for_each(|l| {
-                        all.add(Level::Object, NOBODY, vec![l.to_owned()]);
+                        all.add(Level::Object, NO_IDENTITY, vec![l.to_owned()]);
                     });
                     Some(all)
                 }
@@ -142,35 +142,35 @@ fn scenes() -> (Vec<(String, Identities)>, Vec<&'static str>) {
 struct Asked<'a> {
     all: &'a Identities,
     features: LanguageFeatures,
-    recipe: Recipe,
+    recipe: QueryConfig,
 }
 
 impl<'a> Asked<'a> {
     /// To the encoder of `both`, everything looks like the last identity.
-    fn new(all: &'a Identities, understanding: Understanding) -> Self {
+    fn new(all: &'a Identities, match_by: MatchBy) -> Self {
         let of = |last: bool| if last { vec![1.0, 0.0] } else { vec![0.0, 1.0] };
         let each = all
             .iter()
             .map(|(id, _)| of(id as usize == all.len()))
             .map(|v| ViewFeatures { raw: vec![v.clone()], deviated: vec![v] });
         let features = LanguageFeatures { encoder: "test".into(), dimension: 2, by_identity: each.collect() };
-        Self { all, features, recipe: Recipe { understanding, ..Recipe::default() } }
+        Self { all, features, recipe: QueryConfig { match_by, ..QueryConfig::default() } }
     }
 
-    fn tell(&self, reading: &QueryReading) -> (Answer, Vec<IdentityId>) {
+    fn answer(&self, reading: &QueryReading) -> (Answer, Vec<IdentityId>) {
         let mut phrases = TextEmbeddings::default();
         let phrase = &reading.phrase;
         let mut encode = |p: &str| Ok::<_, ()>(if *p == phrase.text { vec![1.0, 0.0] } else { vec![0.5, 0.5] });
         phrases.learn(phrase, &self.recipe, &mut encode).expect("encodes");
         let language = Language { features: &self.features, phrases: &phrases, unknown: &[] };
-        let language = (self.recipe.understanding == Understanding::Both).then_some(language);
+        let language = (self.recipe.match_by == MatchBy::Both).then_some(language);
         let answered = answer(self.all, reading, LevelFilter::Auto, &self.recipe, language);
         let chosen = answered.chosen(1);
         (answered.answer, chosen)
     }
 
     fn ask(&self, text: &str) -> (Answer, Vec<IdentityId>) {
-        self.tell(&QueryReading::new(self.all, text, LevelFilter::Auto, &self.recipe).expect("a question"))
+        self.answer(&QueryReading::new(self.all, text, LevelFilter::Auto, &self.recipe).expect("a question"))
     }
 
     /// Returns whether one of its names finds `id`, or a whole of it with the same name.
@@ -185,7 +185,7 @@ impl<'a> Asked<'a> {
 }
 
 /// Returns a question in several letter cases, with and without "the".
-fn said(name: &str) -> Vec<String> {
+fn spellings(name: &str) -> Vec<String> {
     let cases = [name.to_owned(), name.to_uppercase(), name.to_lowercase(), format!(" {name}\t")];
     let with = |article: &str| cases.iter().map(|c| format!("{article}{c}")).collect::<Vec<_>>();
     ["", "the ", "THE  "].into_iter().flat_map(with).collect()
@@ -202,17 +202,15 @@ fn by_grammar(all: &Identities, text: &str) -> Option<QueryReading> {
 /// does not find.
 fn ask_all(scene: &str, all: &Identities) -> (usize, Vec<String>, Vec<String>) {
     let (mut asked, mut wrong, mut by_grammar_wrong) = (0, Vec::new(), Vec::new());
-    for understanding in [Understanding::Names, Understanding::Both] {
-        let how = Asked::new(all, understanding);
+    for match_by in [MatchBy::Names, MatchBy::Both] {
+        let how = Asked::new(all, match_by);
         // Every word of every name is compared, so of long lists only some names are asked.
         let is_long = all.len() >= 200;
-        for (id, identity) in
-            all.iter().filter(|(id, _)| understanding == Understanding::Names || !is_long || id % 200 == 0)
-        {
+        for (id, identity) in all.iter().filter(|(id, _)| match_by == MatchBy::Names || !is_long || id % 200 == 0) {
             let is_full = !is_long || id % 200 == 0;
-            for name in identity.names.iter().filter(|_| understanding == Understanding::Names) {
+            for name in identity.names.iter().filter(|_| match_by == MatchBy::Names) {
                 let (_, chosen) = match by_grammar(all, name).filter(|_| is_full) {
-                    Some(reading) => how.tell(&reading),
+                    Some(reading) => how.answer(&reading),
                     None => (Answer::NotFound(vec![]), vec![id; usize::from(!is_full)]),
                 };
                 if !how.is_meant(id, name, &chosen) {
@@ -220,7 +218,7 @@ fn ask_all(scene: &str, all: &Identities) -> (usize, Vec<String>, Vec<String>) {
                 }
             }
             let full = all.full_name(id);
-            for text in identity.names.iter().chain([&full]).flat_map(|name| said(name)) {
+            for text in identity.names.iter().chain([&full]).flat_map(|name| spellings(name)) {
                 asked += 1;
                 let called = all.called(&text, LevelFilter::Auto);
                 let is_exact = key(&text) == key(&full);
@@ -229,7 +227,7 @@ fn ask_all(scene: &str, all: &Identities) -> (usize, Vec<String>, Vec<String>) {
                 let exactly =
                     is_full && matches!(answer, Answer::Found(_)) && chosen == [id] || !is_full && chosen[0] == id;
                 if !is_right || is_exact && !exactly {
-                    wrong.push(format!("{scene}, {understanding:?}: {text:?} is {id} and finds {chosen:?}"));
+                    wrong.push(format!("{scene}, {match_by:?}: {text:?} is {id} and finds {chosen:?}"));
                 }
             }
         }
@@ -309,7 +307,7 @@ fn names_of_any_words_are_found_in_random_trees() {
         let mut all = Identities::default();
         for _ in 0..rng.random_range(1..24) {
             let whole = rng.random_range(0..=all.len() as u32);
-            let level = if whole == NOBODY { Level::Object } else { Level::Part };
+            let level = if whole == NO_IDENTITY { Level::Object } else { Level::Part };
             let name = |rng: &mut Pcg32| {
                 let words: Vec<&str> =
                     (0..rng.random_range(1..5)).map(|_| WORDS[rng.random_range(0..WORDS.len())]).collect();
@@ -318,7 +316,7 @@ fn names_of_any_words_are_found_in_random_trees() {
             let names = (0..rng.random_range(0..3)).map(|_| name(&mut rng)).collect();
             all.add(level, whole, names);
         }
-        let how = Asked::new(&all, Understanding::Both);
+        let how = Asked::new(&all, MatchBy::Both);
         for (id, identity) in all.iter() {
             let full = all.full_name(id);
             assert_eq!(how.ask(&full).1, [id], "tree {tree}: {full:?} of {all:?}");
@@ -336,7 +334,7 @@ fn names_of_any_words_are_found_in_random_trees() {
 #[test]
 fn only_a_whole_name_is_one_and_pieces_of_whole_names_are_parted_there() {
     let all = hard();
-    let read = |text: &str| QueryReading::new(&all, text, LevelFilter::Auto, &Recipe::default()).expect("words");
+    let read = |text: &str| QueryReading::new(&all, text, LevelFilter::Auto, &QueryConfig::default()).expect("words");
     for other in
         ["pink bow on the plush doll", "bow on the plush doll's hood", "set of cups handle", "the set of", "lid · hood"]
     {
@@ -351,7 +349,8 @@ fn only_a_whole_name_is_one_and_pieces_of_whole_names_are_parted_there() {
     assert_eq!((lid.phrase.target.as_str(), lid.phrase.whole.as_deref()), ("lid", Some("doll's house")));
     assert_eq!(read("pink bow on the plush doll's hodo").called, all.called(HARD[0].1[0], LevelFilter::Auto));
     // Names are not used by embedding, and the requested level is respected.
-    let part = |level, recipe: &Recipe| QueryReading::new(&all, "hood", level, recipe).expect("words").called.len();
-    let counts = [part(LevelFilter::Part, &Recipe::default()), part(LevelFilter::Object, &Recipe::default())];
-    assert_eq!((counts, part(LevelFilter::Auto, &Recipe::paper())), ([2, 0], 0));
+    let part =
+        |level, recipe: &QueryConfig| QueryReading::new(&all, "hood", level, recipe).expect("words").called.len();
+    let counts = [part(LevelFilter::Part, &QueryConfig::default()), part(LevelFilter::Object, &QueryConfig::default())];
+    assert_eq!((counts, part(LevelFilter::Auto, &QueryConfig::paper())), ([2, 0], 0));
 }

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 
 use super::grounds::{BINDING, without_courtesy};
 use super::parse::{MAX_CHARS, ParsedQuery, is_glue};
-use super::recipe::{Recipe, Understanding};
+use super::recipe::{MatchBy, QueryConfig};
 use super::words::{singular, words, written};
 use crate::models;
 use crate::scene::identity::whole_names::key;
@@ -36,8 +36,8 @@ const MOST_WORDS: usize = 10;
 
 impl QueryReading {
     /// Reads a query about these identities; `None` if there is nothing in it.
-    pub(crate) fn new(identities: &Identities, query: &str, level: LevelFilter, recipe: &Recipe) -> Option<Self> {
-        if recipe.understanding == Understanding::Embedding {
+    pub(crate) fn new(identities: &Identities, query: &str, level: LevelFilter, recipe: &QueryConfig) -> Option<Self> {
+        if recipe.match_by == MatchBy::Embedding {
             // Names are not used.
             let phrase = ParsedQuery::parse(query)?;
             return Some(Self { phrase, called: Vec::new(), mended: Vec::new(), near: Vec::new() });
@@ -261,7 +261,7 @@ mod tests {
     use super::super::localize::Answer;
     use super::super::recipe::Rejection;
     use super::*;
-    use crate::scene::{Level, NOBODY};
+    use crate::scene::{Level, NO_IDENTITY};
 
     /// Returns the demo's scene, and the lists of questions.
     fn data() -> (Identities, toml::Table) {
@@ -269,7 +269,7 @@ mod tests {
             include_str!("../../../../../tests/data/compounds_and_slips.toml").parse().expect("sound TOML");
         let mut all = Identities::default();
         for (object, parts) in table["scene"].as_table().expect("a table") {
-            let id = all.add(Level::Object, NOBODY, vec![object.clone()]);
+            let id = all.add(Level::Object, NO_IDENTITY, vec![object.clone()]);
             for part in parts.as_array().expect("a list") {
                 all.add(Level::Part, id, vec![part.as_str().expect("a name").into()]);
             }
@@ -285,11 +285,11 @@ mod tests {
     }
 
     /// Describes a reading in the words of the lists.
-    fn told(all: &Identities, reading: &QueryReading) -> String {
-        told_by(all, reading, &Recipe::default())
+    fn summary(all: &Identities, reading: &QueryReading) -> String {
+        summary_by(all, reading, &QueryConfig::default())
     }
 
-    fn told_by(all: &Identities, reading: &QueryReading, recipe: &Recipe) -> String {
+    fn summary_by(all: &Identities, reading: &QueryReading, recipe: &QueryConfig) -> String {
         let answered = by_name(all, reading, LevelFilter::Auto, recipe);
         let first = answered.answer.hits().first().map(|h| all.full_name(h.identity)).unwrap_or_default();
         match answered.answer {
@@ -300,7 +300,7 @@ mod tests {
     }
 
     fn read(all: &Identities, text: &str) -> QueryReading {
-        QueryReading::new(all, text, LevelFilter::Auto, &Recipe::default()).expect("words")
+        QueryReading::new(all, text, LevelFilter::Auto, &QueryConfig::default()).expect("words")
     }
 
     /// Returns a question as read by its grammar alone.
@@ -316,7 +316,7 @@ mod tests {
         assert!(lists[0].len() >= 40);
         let mut wrong = Vec::new();
         for row in lists.iter().flatten() {
-            let found = told(&all, &read(&all, row[0]));
+            let found = summary(&all, &read(&all, row[0]));
             if found != row[1] {
                 wrong.push(format!("{}: {found}, not {}", row[0], row[1]));
             }
@@ -326,13 +326,14 @@ mod tests {
             assert_eq!(read(&all, row[0]).phrase.text, plain(row[0]).phrase.text, "{}", row[0]);
         }
         // Without the reading most are wrong if words may be left over, and a requested object is no piece.
-        let lax = Recipe { rejection: Rejection::Canonical, ..Recipe::default() };
-        let is_plain = |row: &&Vec<&str>| told_by(&all, &plain(row[0]), &lax) == row[1];
+        let lax = QueryConfig { rejection: Rejection::Canonical, ..QueryConfig::default() };
+        let is_plain = |row: &&Vec<&str>| summary_by(&all, &plain(row[0]), &lax) == row[1];
         assert!(lists[0].iter().filter(is_plain).count() * 4 < lists[0].len());
-        let object = QueryReading::new(&all, "kettle spout", LevelFilter::Object, &Recipe::default()).expect("words");
+        let object =
+            QueryReading::new(&all, "kettle spout", LevelFilter::Object, &QueryConfig::default()).expect("words");
         assert_eq!((object.phrase.target.as_str(), object.phrase.whole), ("kettle spout", None));
         // By embedding, names are not used: they decide neither compounds nor slips.
-        let paper = QueryReading::new(&all, "ketle spout", LevelFilter::Auto, &Recipe::paper()).expect("words");
+        let paper = QueryReading::new(&all, "ketle spout", LevelFilter::Auto, &QueryConfig::paper()).expect("words");
         assert_eq!((paper.phrase.text.as_str(), paper.phrase.whole, paper.mended), ("ketle spout", None, vec![]));
     }
 
@@ -346,16 +347,16 @@ mod tests {
             let said: Vec<String> = reading.mended.iter().map(|(a, b)| format!("{a}={b}")).collect();
             let mut wanted: Vec<&str> = row[2].split(' ').collect();
             wanted.sort_by_key(|w| row[0].find(w.split('=').next().unwrap_or_default()));
-            assert_eq!((said.join(" "), told(&all, &reading)), (wanted.join(" "), row[1].into()), "{}", row[0]);
+            assert_eq!((said.join(" "), summary(&all, &reading)), (wanted.join(" "), row[1].into()), "{}", row[0]);
         }
         for row in &own {
             assert!(read(&all, row[0]).mended.is_empty(), "{}", row[0]);
-            assert_ne!(told(&all, &read(&all, row[0])), row[1], "{}", row[0]);
+            assert_ne!(summary(&all, &read(&all, row[0])), row[1], "{}", row[0]);
         }
         assert_eq!(read(&all, "lamb").near, [("lamb".into(), "lamp".into())]);
         // The words of another scene are its own; names are never mended.
         let mut other = Identities::default();
-        other.add(Level::Object, NOBODY, vec!["kettel".into(), "teh".into()]);
+        other.add(Level::Object, NO_IDENTITY, vec!["kettel".into(), "teh".into()]);
         assert!(read(&other, "teh kettel").mended.is_empty());
         assert!(rows(&table, "compounds").iter().all(|row| read(&all, row[0]).mended.is_empty()));
         let mended = read(&all, "buton of teh lmap").mended;
@@ -366,9 +367,9 @@ mod tests {
     #[test]
     fn strange_texts_are_read_in_no_time() {
         let (all, _) = data();
-        assert!(QueryReading::new(&all, " \t", LevelFilter::Auto, &Recipe::default()).is_none());
+        assert!(QueryReading::new(&all, " \t", LevelFilter::Auto, &QueryConfig::default()).is_none());
         for text in ["lamp ".repeat(5_000), "x".repeat(5_000), "的".repeat(900), "a\u{0}b \u{202e}lmap".into()] {
-            assert!(QueryReading::new(&all, &text, LevelFilter::Auto, &Recipe::default()).is_some());
+            assert!(QueryReading::new(&all, &text, LevelFilter::Auto, &QueryConfig::default()).is_some());
         }
     }
 }

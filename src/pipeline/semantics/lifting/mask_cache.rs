@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::error::FindError;
-use super::kept_frames::{kept_name, written};
+use super::frame_cache::{cache_name, written};
 use super::segmenter::{FoundMask, Segmenter};
 use crate::io::labels::rle::Rle;
 use crate::io::{atomic, files};
@@ -18,7 +18,7 @@ use crate::scene::{Level, Photo};
 const MOST_BYTES: u64 = 64 << 20;
 
 /// Masks of a segmenter, computed once.
-pub(crate) struct KeptMasks {
+pub(crate) struct MaskCache {
     inner: Box<dyn Segmenter>,
     folder: PathBuf,
     /// Digest of the network and of its options.
@@ -26,13 +26,13 @@ pub(crate) struct KeptMasks {
 }
 
 #[derive(Serialize, Deserialize)]
-struct KeptMask {
+struct CachedMask {
     level: Level,
     parent: Option<usize>,
     mask: Rle,
 }
 
-impl KeptMasks {
+impl MaskCache {
     /// Keeps the masks of `inner` in `folder`. `with` is everything that they depend on, besides the photo.
     pub(crate) fn new(inner: Box<dyn Segmenter>, folder: PathBuf, with: &[&[u8]]) -> Self {
         let mut sum = Sha256::new();
@@ -46,11 +46,11 @@ impl KeptMasks {
 
     fn file(&self, photo: &Photo, max_side_px: u32) -> PathBuf {
         let asked = format!("{} {max_side_px}", self.digest);
-        self.folder.join(kept_name((self.inner.name(), &asked), photo, written(photo))).with_extension("masks.json")
+        self.folder.join(cache_name((self.inner.name(), &asked), photo, written(photo))).with_extension("masks.json")
     }
 }
 
-impl Segmenter for KeptMasks {
+impl Segmenter for MaskCache {
     fn name(&self) -> &str {
         self.inner.name()
     }
@@ -78,8 +78,8 @@ impl Segmenter for KeptMasks {
 }
 
 fn write(file: &Path, found: &[FoundMask]) -> std::io::Result<()> {
-    let kept = |f: &FoundMask| KeptMask { level: f.level, parent: f.parent, mask: Rle::of(&f.mask) };
-    let kept: Vec<KeptMask> = found.iter().map(kept).collect();
+    let kept = |f: &FoundMask| CachedMask { level: f.level, parent: f.parent, mask: Rle::of(&f.mask) };
+    let kept: Vec<CachedMask> = found.iter().map(kept).collect();
     if let Some(folder) = file.parent() {
         std::fs::create_dir_all(folder)?;
     }
@@ -89,8 +89,8 @@ fn write(file: &Path, found: &[FoundMask]) -> std::io::Result<()> {
 
 /// Reads kept masks of this size; `None` if there are none, or they are damaged.
 fn read(file: &Path, size_px: (u32, u32)) -> Option<Vec<FoundMask>> {
-    let kept: Vec<KeptMask> = serde_json::from_slice(&files::read(file, MOST_BYTES).ok()?).ok()?;
-    let found = |(i, kept): (usize, KeptMask)| {
+    let kept: Vec<CachedMask> = serde_json::from_slice(&files::read(file, MOST_BYTES).ok()?).ok()?;
+    let found = |(i, kept): (usize, CachedMask)| {
         let fits = kept.mask.size_px() == size_px && kept.parent.is_none_or(|p| p < i);
         let mask = fits.then(|| kept.mask.mask().ok()).flatten()?;
         Some(FoundMask { level: kept.level, parent: kept.parent, name: None, mask })
@@ -137,7 +137,7 @@ mod tests {
         let looks = Arc::new(AtomicUsize::new(0));
         let open = |with: &str| {
             let inner = Box::new(Counting(Arc::clone(&looks)));
-            KeptMasks::new(inner, folder.path().join("cache"), &[with.as_bytes()])
+            MaskCache::new(inner, folder.path().join("cache"), &[with.as_bytes()])
         };
         let first = open("one").segment(&photos[0], 64, &mut Silent).expect("found");
         let again = open("one").segment(&photos[0], 64, &mut Silent).expect("found");

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use sha2::{Digest, Sha256};
 
-use super::kept_frames::{put, take};
+use super::frame_cache::{put, take};
 use crate::io::labels::rle::Rle;
 use crate::io::{atomic, files};
 use crate::models::sam2::sequence::{Output, TrackHistory, TrackStep};
@@ -40,7 +40,7 @@ fn part(file: &Path) -> PathBuf {
 }
 
 /// Frames of an unfinished track, one record after another in the order of tracking.
-pub(super) struct KeptTrack {
+pub(super) struct TrackCache {
     /// File, at the start of the next record; `None` once it cannot be kept.
     file: Option<BufReader<File>>,
     /// End of the last record that was read or written, bytes.
@@ -49,7 +49,7 @@ pub(super) struct KeptTrack {
     resumes: bool,
 }
 
-impl KeptTrack {
+impl TrackCache {
     /// Opens the track whose masks will be in `file`; without a file nothing is kept.
     pub(super) fn open(file: Option<&Path>) -> Self {
         let opened = file.and_then(|file| {
@@ -98,7 +98,7 @@ impl KeptTrack {
     }
 }
 
-impl TrackHistory for KeptTrack {
+impl TrackHistory for TrackCache {
     fn earlier(&mut self, step: TrackStep) -> Option<Output> {
         let out = if self.resumes { self.next(step) } else { None };
         self.resumes = out.is_some();
@@ -146,7 +146,7 @@ mod tests {
     fn a_track_goes_on_where_it_was_cut_off() {
         let folder = tempfile::tempdir().expect("folder");
         let file = folder.path().join("deep").join("a.track");
-        let mut kept = KeptTrack::open(Some(&file));
+        let mut kept = TrackCache::open(Some(&file));
         for k in 0..4 {
             assert_eq!(kept.earlier(at(k, false)), None);
             kept.keep(at(k, false), &output(k, k != 2));
@@ -155,7 +155,7 @@ mod tests {
         let bytes = fs::read(part(&file)).expect("kept");
         for (cut, whole) in [(bytes.len(), 4), (bytes.len() - 1, 3), (bytes.len() / 2, 1), (HEAD, 0), (0, 0)] {
             fs::write(part(&file), &bytes[..cut]).expect("cut off");
-            let mut kept = KeptTrack::open(Some(&file));
+            let mut kept = TrackCache::open(Some(&file));
             let again: Vec<Output> = (0..4).map_while(|k| kept.earlier(at(k, false))).collect();
             assert_eq!(again, (0..whole).map(|k| output(k, k != 2)).collect::<Vec<_>>(), "{cut}");
             (whole..4).for_each(|k| kept.keep(at(k, false), &output(k, k != 2)));
@@ -166,18 +166,18 @@ mod tests {
         let mut broken = bytes.clone();
         broken[HEAD + 30] ^= 1;
         fs::write(part(&file), &broken).expect("broken");
-        assert_eq!(KeptTrack::open(Some(&file)).earlier(at(0, false)), None);
+        assert_eq!(TrackCache::open(Some(&file)).earlier(at(0, false)), None);
         fs::write(part(&file), &bytes).expect("whole");
-        assert_eq!(KeptTrack::open(Some(&file)).earlier(at(0, true)), None);
-        assert_eq!(KeptTrack::open(Some(&file)).earlier(at(1, false)), None);
-        assert_eq!(KeptTrack::open(None).earlier(at(0, false)), None);
+        assert_eq!(TrackCache::open(Some(&file)).earlier(at(0, true)), None);
+        assert_eq!(TrackCache::open(Some(&file)).earlier(at(1, false)), None);
+        assert_eq!(TrackCache::open(None).earlier(at(0, false)), None);
     }
 
     #[test]
     fn masks_of_a_complete_track_are_read_again_and_its_frames_are_gone() {
         let folder = tempfile::tempdir().expect("folder");
         let file = folder.path().join("a.track");
-        KeptTrack::open(Some(&file)).keep(at(0, false), &output(1, true));
+        TrackCache::open(Some(&file)).keep(at(0, false), &output(1, true));
         let masks = [Mask::from_fn(5, 4, |i| i % 3 == 0), Mask::empty(6, 2)];
         write(&file, &masks).expect("written");
         assert_eq!(read(&file, &[(5, 4), (6, 2)]).as_deref(), Some(&masks[..]));

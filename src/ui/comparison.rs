@@ -9,7 +9,7 @@ use crate::worker::Versioned;
 
 /// Another scene in the second view.
 #[derive(Clone, Debug)]
-pub struct Beside {
+pub struct ComparedScene {
     pub name: String,
     /// Path of the scene.
     pub path: PathBuf,
@@ -18,7 +18,7 @@ pub struct Beside {
     pub(crate) settings: RenderSettings,
 }
 
-impl Beside {
+impl ComparedScene {
     /// Content of a scene for the second view; `None` if it has no Gaussians.
     pub(crate) fn of(scene: OpenedScene) -> Option<Self> {
         let cloud = scene.cloud.map(Versioned::new)?;

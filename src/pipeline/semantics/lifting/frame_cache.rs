@@ -14,7 +14,7 @@ use crate::models::tensor::Tensor;
 use crate::scene::Photo;
 
 /// Frames that are encoded once, then read from disk.
-pub(super) struct KeptFrames<'a> {
+pub(super) struct FrameCache<'a> {
     pub(super) photos: &'a [Photo],
     pub(super) folder: Option<PathBuf>,
     /// The frame that was used last, because every object asks for it.
@@ -22,7 +22,7 @@ pub(super) struct KeptFrames<'a> {
     pub(super) secs: &'a mut f64,
 }
 
-impl FrameSource for KeptFrames<'_> {
+impl FrameSource for FrameCache<'_> {
     fn len(&self) -> usize {
         self.photos.len()
     }
@@ -33,7 +33,7 @@ impl FrameSource for KeptFrames<'_> {
         }
         let start = std::time::Instant::now();
         let shown = &self.photos[index];
-        let file = self.folder.as_ref().map(|folder| kept_file(folder, (&model.about.name, model.digest()), shown));
+        let file = self.folder.as_ref().map(|folder| cache_file(folder, (&model.about.name, model.digest()), shown));
         let frame = match file.as_deref().and_then(read) {
             Some(frame) => frame,
             None => {
@@ -54,8 +54,8 @@ impl FrameSource for KeptFrames<'_> {
 
 /// Returns the file in `folder` for a photo as encoded by the `model` of this name and digest; another version of
 /// either has another file.
-fn kept_file(folder: &Path, model: (&str, &str), photo: &Photo) -> PathBuf {
-    let [now, first] = [kept_name, first_name].map(|name| folder.join(name(model, photo, written(photo))));
+fn cache_file(folder: &Path, model: (&str, &str), photo: &Photo) -> PathBuf {
+    let [now, first] = [cache_name, first_name].map(|name| folder.join(name(model, photo, written(photo))));
     files::renamed(now, first)
 }
 
@@ -64,7 +64,7 @@ pub(super) fn written(photo: &Photo) -> Option<SystemTime> {
     std::fs::metadata(&photo.path).and_then(|m| m.modified()).ok()
 }
 
-pub(super) fn kept_name((model, digest): (&str, &str), photo: &Photo, written: Option<SystemTime>) -> String {
+pub(super) fn cache_name((model, digest): (&str, &str), photo: &Photo, written: Option<SystemTime>) -> String {
     let mut sum = Sha256::new();
     for part in [photo.path.as_os_str().as_encoded_bytes(), photo.name.as_bytes(), digest.as_bytes()] {
         sum.update((part.len() as u64).to_le_bytes());
@@ -169,10 +169,10 @@ mod tests {
         let old = folder.path().join("sam2.1-tiny-7228bc543858c811.frame");
         assert_eq!(folder.path().join(first_name(model, &photo, None)), old, "as the first version called it");
         std::fs::write(&old, "kept").expect("write");
-        let now = kept_file(folder.path(), model, &photo);
+        let now = cache_file(folder.path(), model, &photo);
         assert_eq!(std::fs::read(&now).expect("there"), b"kept");
-        assert!(!old.exists() && now == kept_file(folder.path(), model, &photo), "it has one name and keeps it");
-        let other = kept_file(folder.path(), ("sam2.1-tiny", "00fe"), &photo);
+        assert!(!old.exists() && now == cache_file(folder.path(), model, &photo), "it has one name and keeps it");
+        let other = cache_file(folder.path(), ("sam2.1-tiny", "00fe"), &photo);
         assert!(other != now && !other.exists(), "the control: another version of the model");
     }
 }
