@@ -36,6 +36,8 @@ pub enum MaskPrompt {
 pub enum MaskGrid {
     /// Every second one, and of the others those between which something changes
     #[default]
+    // The word in scenes of earlier builds.
+    #[serde(alias = "sparing")]
     Adaptive,
     /// All of them, as the official generators (and the paper)
     All,
