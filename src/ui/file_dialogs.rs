@@ -9,7 +9,6 @@ use egui::{Align2, Context, Id, LayerId, Order, TextEdit};
 use egui_file::FileDialog;
 use rfd::{AsyncFileDialog, FileHandle};
 
-use super::app::App;
 use super::dialogs::show_question;
 use crate::worker::Repaint;
 
@@ -25,8 +24,8 @@ enum Kind {
     Save(String),
 }
 
-/// What is done with the chosen path.
-pub(super) type Then = Box<dyn FnOnce(&mut App, PathBuf)>;
+/// What `A`, the window, does with the chosen path.
+type Then<A> = Box<dyn FnOnce(&mut A, PathBuf)>;
 
 /// A request for a path.
 pub(super) struct FileRequest {
@@ -52,16 +51,16 @@ impl FileRequest {
 }
 
 /// A request whose dialog is open.
-struct Open {
+struct Open<A> {
     request: FileRequest,
-    then: Then,
+    then: Then<A>,
     /// Folder in which the dialog opens.
     folder: PathBuf,
 }
 
 /// The window's own dialog.
-struct Own {
-    open: Open,
+struct Own<A> {
+    open: Open<A>,
     dialog: FileDialog,
     /// An existing file that is replaced if the user confirms.
     replaces: Option<PathBuf>,
@@ -75,31 +74,31 @@ enum Answer {
 }
 
 /// File dialogs; the system's runs off the window's thread.
-pub(crate) struct FileDialogs {
+pub(crate) struct FileDialogs<A> {
     sender: Sender<Answer>,
     answers: Receiver<Answer>,
     /// Request that the system's dialog is open for.
-    asked: Option<Open>,
-    own: Option<Own>,
+    asked: Option<Open<A>>,
+    own: Option<Own<A>>,
     /// True if the system has turned out to have no dialog.
     own_only: bool,
 }
 
-impl Default for FileDialogs {
+impl<A> Default for FileDialogs<A> {
     fn default() -> Self {
         let (sender, answers) = bounded(1);
         Self { sender, answers, asked: None, own: None, own_only: false }
     }
 }
 
-impl FileDialogs {
+impl<A> FileDialogs<A> {
     /// Shows a dialog that opens in `folder`, unless one is open already.
     pub(super) fn ask(
         &mut self,
         request: FileRequest,
         folder: Option<&Path>,
         repaint: Repaint,
-        then: Then,
+        then: Then<A>,
     ) -> std::io::Result<()> {
         if self.asked.is_some() || self.own.is_some() {
             return Ok(());
@@ -143,7 +142,7 @@ impl FileDialogs {
     }
 
     /// Draws the window's own dialog. Returns the path chosen in either dialog, with what is done with it.
-    pub(super) fn show(&mut self, ctx: &Context) -> Option<(Then, PathBuf)> {
+    pub(super) fn show(&mut self, ctx: &Context) -> Option<(Then<A>, PathBuf)> {
         if let Ok(answer) = self.answers.try_recv()
             && let Some(open) = self.asked.take()
         {
@@ -162,8 +161,8 @@ impl FileDialogs {
     }
 }
 
-impl Own {
-    fn new(open: Open) -> Self {
+impl<A> Own<A> {
+    fn new(open: Open<A>) -> Self {
         let request = &open.request;
         let dialog = match &request.kind {
             Kind::Folder => FileDialog::select_folder(),
@@ -177,7 +176,7 @@ impl Own {
             Kind::Save(name) => FileDialog::save_file().default_filename(name),
         };
         let mut dialog = dialog
-            .id(Self::layer().id)
+            .id(own_layer().id)
             .title(&request.title)
             .initial_path(&open.folder)
             .show_rename(false)
@@ -187,10 +186,6 @@ impl Own {
             .keep_on_top(true);
         dialog.open();
         Self { open, dialog, replaces: None }
-    }
-
-    fn layer() -> LayerId {
-        LayerId::new(Order::Middle, Id::unique("file dialog"))
     }
 
     /// Draws the dialog. `Some(None)` once it is closed without a path.
@@ -204,7 +199,7 @@ impl Own {
             }
             self.dialog.open();
         }
-        ctx.memory_mut(|m| m.set_modal_layer(Self::layer()));
+        ctx.memory_mut(|m| m.set_modal_layer(own_layer()));
         let state = self.dialog.show(ctx).state();
         name_fields(ctx);
         match state {
@@ -222,9 +217,14 @@ impl Own {
     }
 }
 
+/// Layer of the window's own dialog.
+fn own_layer() -> LayerId {
+    LayerId::new(Order::Middle, Id::unique("file dialog"))
+}
+
 /// Labels the dialog's fields for accessibility, which its crate does not.
 fn name_fields(ctx: &Context) {
-    let all: Vec<Id> = ctx.viewport(|v| v.this_pass.widgets.get_layer(Own::layer()).map(|w| w.id).collect());
+    let all: Vec<Id> = ctx.viewport(|v| v.this_pass.widgets.get_layer(own_layer()).map(|w| w.id).collect());
     let fields = all.into_iter().filter(|id| TextEdit::load_state(ctx, *id).is_some());
     for (field, name) in fields.zip(["Folder", "File name"]) {
         ctx.accesskit_node_builder(field, |node| node.set_label(name));

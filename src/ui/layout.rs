@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use egui::ThemePreference;
 use serde::{Deserialize, Serialize};
 
-use super::chat::ChatSettings;
+use super::chat_model::ChatSettings;
 use super::dock::Dock;
 use crate::jobs::find_objects::FindSettings;
 use crate::pipeline::train::TrainConfig;

@@ -20,6 +20,7 @@ mod dock;
 mod file_dialogs;
 mod find_dialog;
 mod fonts;
+mod frame;
 mod history;
 pub(crate) mod keep_dialog;
 mod keys;

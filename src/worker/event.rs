@@ -1,20 +1,8 @@
 //! Events of jobs: what the status bar, the log and the plots follow. Results do not travel here, but in
 //! [`Task`](super::Task)s.
 
-use super::failure::Failure;
-use super::task::{JobId, JobInfo};
+use super::task::{JobEnd, JobId, JobInfo};
 use crate::pipeline::observer::{Evaluation, Progress, Severity, StepMetrics};
-
-/// End of a job.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum JobEnd {
-    /// The job has finished.
-    Finished,
-    /// The job was canceled.
-    Cancelled,
-    /// The job has failed.
-    Failed(Failure),
-}
 
 /// Event of a job. Each job sends `Started` first and `Ended` last.
 #[derive(Clone, Debug)]

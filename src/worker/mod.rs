@@ -23,14 +23,14 @@ mod view_renderer;
 mod view_request;
 
 pub(crate) use control::Control;
-pub use event::{Event, JobEnd};
+pub use event::Event;
 pub use failure::{Failure, Stop};
 pub(crate) use observer::{CloudSnapshot, Repaint};
 pub(crate) use photos::{RemotePhotos, load_photo};
 pub(crate) use slot::Slot;
 pub use slot::Versioned;
 pub use start::Start;
-pub use task::{JobId, JobInfo, Task};
-pub(crate) use task::{Lane, Makes, TaskResult};
+pub use task::{JobEnd, JobId, JobInfo, Task};
+pub(crate) use task::{JobLane, Makes, TaskResult};
 pub use thread::{QueueFull, Tasks};
 pub use view_modes::ViewMode;

@@ -5,8 +5,7 @@
 
 use crossbeam_channel::{Receiver, Sender, TryRecvError, bounded};
 
-use super::event::JobEnd;
-use super::failure::Stop;
+use super::failure::{Failure, Stop};
 
 /// Identifier of a job: local to one worker, or of a job on another computer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -19,7 +18,7 @@ pub enum JobId {
 
 /// Thread that runs a job, and its priority.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Lane {
+pub enum JobLane {
     /// Jobs of minutes, one after another. They yield to the window.
     #[default]
     Long,
@@ -48,7 +47,7 @@ pub enum Makes {
 pub struct JobInfo {
     /// Title, such as "Opening fox".
     pub title: String,
-    pub(crate) lane: Lane,
+    pub(crate) lane: JobLane,
     pub(crate) makes: Makes,
     pub(crate) can_pause: bool,
     /// True if nobody asked for it: a failure is a passing message.
@@ -65,12 +64,12 @@ impl JobInfo {
 
     /// A long job that the user waits for.
     pub(crate) fn urgent(title: impl Into<String>) -> Self {
-        Self { lane: Lane::Urgent, ..Self::long(title) }
+        Self { lane: JobLane::Urgent, ..Self::long(title) }
     }
 
     /// A short job.
     pub fn short(title: impl Into<String>) -> Self {
-        Self { lane: Lane::Short, ..Self::long(title) }
+        Self { lane: JobLane::Short, ..Self::long(title) }
     }
 
     pub(crate) fn makes(self, makes: Makes) -> Self {
@@ -88,6 +87,17 @@ impl JobInfo {
     pub(crate) fn hint(self, hint: &'static str) -> Self {
         Self { hint, ..self }
     }
+}
+
+/// End of a job.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum JobEnd {
+    /// The job has finished.
+    Finished,
+    /// The job was canceled.
+    Cancelled,
+    /// The job has failed.
+    Failed(Failure),
 }
 
 /// Handle of a job, for its result. Dropping it does not cancel the job.

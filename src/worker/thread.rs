@@ -10,10 +10,10 @@ use std::time::{Duration, Instant};
 
 use crossbeam_channel::{Receiver, Sender, bounded};
 
-use super::event::{Event, JobEnd};
+use super::event::Event;
 use super::failure::{Failure, Stop};
 use super::observer::{CloudSnapshot, JobObserver, Repaint};
-use super::task::{JobId, JobInfo, Lane, Task};
+use super::task::{JobEnd, JobId, JobInfo, JobLane, Task};
 use super::{Control, RemotePhotos, Slot};
 use crate::pipeline::observer::{Observer, Signal};
 
@@ -73,7 +73,7 @@ impl Tasks {
                 (event_sender.clone(), Arc::clone(&clouds), Arc::clone(&controls), repaint.clone());
             let work = move || {
                 for queued in queue {
-                    let yields = queued.info.lane == Lane::Long;
+                    let yields = queued.info.lane == JobLane::Long;
                     let run = || run_one(queued, &events, &clouds, &controls, &repaint);
                     match &pool {
                         Some(pool) if yields => pool.install(run),
@@ -127,8 +127,8 @@ impl Tasks {
         let control = Arc::new(Control::default());
         lock(&self.controls).insert(job, Arc::clone(&control));
         let lane = match info.lane {
-            Lane::Long | Lane::Urgent => &self.long,
-            Lane::Short => &self.short,
+            JobLane::Long | JobLane::Urgent => &self.long,
+            JobLane::Short => &self.short,
         };
         let queued = Queued { job, info, work, control };
         if lane.as_ref().is_some_and(|l| l.try_send(queued).is_ok()) {

@@ -11,7 +11,7 @@ pub use complete::complete;
 use std::collections::VecDeque;
 
 use self::form::{FormItem, FormRequest, Slots, Things, beginning_with, many, sequences};
-use self::task::{Task, task};
+use self::task::{CommandStep, task};
 use super::camera_args::{CLOSENESS, CLOSER, Direction, Distance, FARTHER, NORMAL};
 use super::describe::capital;
 use super::dialog::DialogState;
@@ -35,7 +35,7 @@ const SEPARATORS: [&str; 4] = [",", "and", "then", "?"];
 /// Planner of the command language.
 #[derive(Default)]
 pub struct Commands {
-    tasks: VecDeque<Task>,
+    tasks: VecDeque<CommandStep>,
     refusal: Option<Refusal>,
     said: Vec<String>,
 }
@@ -83,29 +83,29 @@ impl Commands {
         Step::Finish { text: std::mem::take(&mut self.said).join(" "), refusal: self.refusal.take() }
     }
 
-    fn step(&mut self, task: Task, context: &mut PlannerContext<'_>) -> Step {
+    fn step(&mut self, task: CommandStep, context: &mut PlannerContext<'_>) -> Step {
         let dialog = context.dialog;
         let last = dialog.last.filter(|id| context.world.facts(*id).is_some());
         match (task, last) {
-            (Task::Call(call), _) => Step::Call(call),
-            (Task::Closer(factor), Some(id)) => go(Target::Identity(id), Side::Same, dialog.closeness * factor),
-            (Task::Closer(factor), None) => {
+            (CommandStep::Call(call), _) => Step::Call(call),
+            (CommandStep::Closer(factor), Some(id)) => go(Target::Identity(id), Side::Same, dialog.closeness * factor),
+            (CommandStep::Closer(factor), None) => {
                 let direction = if factor >= NORMAL { Direction::Forward } else { Direction::Back };
                 Step::Call(ToolCall::Move { direction, distance: Distance::Default })
             }
-            (Task::From(side), Some(id)) => go(Target::Identity(id), side, dialog.closeness),
-            (Task::From(side), None) => {
+            (CommandStep::From(side), Some(id)) => go(Target::Identity(id), side, dialog.closeness),
+            (CommandStep::From(side), None) => {
                 let text = format!("{}: of what? Name a thing, such as 'the lamp from above'.", capital(side.text()));
                 self.refuse(Refusal::new(RefusalKind::Unclear, text))
             }
-            (Task::Again, _) => match dialog.moved.clone() {
+            (CommandStep::Again, _) => match dialog.moved.clone() {
                 Some(ToolCall::GoTo { target, closeness, .. }) if closeness != NORMAL => {
                     go(target, Side::Same, closeness * if closeness > NORMAL { CLOSER } else { FARTHER })
                 }
                 Some(call) => Step::Call(call),
                 None => self.refuse(Refusal::new(RefusalKind::Unclear, "There is nothing to do again yet.")),
             },
-            (Task::Help, _) => {
+            (CommandStep::Help, _) => {
                 self.said.push(help(context.world.identities()));
                 self.finish()
             }
@@ -121,7 +121,7 @@ impl Commands {
 
 /// Parses a request into tasks; `None` unless every word is understood. Complete names are tried first, then words
 /// of names. Unknown things are accepted last, so that the reply can say that they are not in the scene.
-pub(crate) fn parse(request: &str, identities: &Identities) -> Option<Vec<Task>> {
+pub(crate) fn parse(request: &str, identities: &Identities) -> Option<Vec<CommandStep>> {
     let (tokens, known) = (request_tokens(request), NameWords::new(identities));
     let words: Vec<&str> = tokens.iter().map(|t| t.low.as_str()).collect();
     let with = |things| clauses(&FormRequest { tokens: &tokens, words: &words, known: &known, things }, true);
@@ -137,7 +137,7 @@ pub(crate) fn is_command(text: &str, identities: &Identities) -> bool {
 }
 
 /// Parses a request as one command, or as several in a row.
-fn clauses(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
+fn clauses(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<CommandStep>> {
     if let Some(tasks) = command(request, is_first) {
         return Some(tasks);
     }
@@ -182,14 +182,14 @@ fn opens(words: &[&str], phrase: &str) -> Option<usize> {
 }
 
 /// Parses one command, first as typed, then without polite words: a name may begin or end with one of them.
-fn command(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
+fn command(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<CommandStep>> {
     let all = if request.things == Things::Whole { one(request, is_first) } else { None };
     all.or_else(|| one(&trimmed(request), is_first))
 }
 
 /// Parses one command: the first sequence that matches. With complete names the longest name wins, as "the handle
 /// from above" may be a name. If the first match is a command without a thing, it is kept.
-fn one(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
+fn one(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<CommandStep>> {
     let mut fits = beginning_with(request.words.first()?).filter_map(|sequence| {
         // A command may begin with a name only if the name is known and first: "hide the lamp and the mug from above".
         let begins_with_word = matches!(sequence.items.first(), Some(FormItem::Word(_)));
@@ -207,7 +207,7 @@ fn one(request: &FormRequest<'_>, is_first: bool) -> Option<Vec<Task>> {
 }
 
 /// Tasks of a command, one for each of several things.
-fn tasks(command: &str, mut slots: Slots) -> Option<Vec<Task>> {
+fn tasks(command: &str, mut slots: Slots) -> Option<Vec<CommandStep>> {
     let Some((place, several)) = slots.several.take() else {
         return Some(vec![task(command, &slots)?]);
     };
@@ -219,8 +219,8 @@ fn tasks(command: &str, mut slots: Slots) -> Option<Vec<Task>> {
 }
 
 /// Phrases of a task that name things.
-fn phrases(task: &Task) -> Vec<String> {
-    let Task::Call(call) = task else { return Vec::new() };
+fn phrases(task: &CommandStep) -> Vec<String> {
+    let CommandStep::Call(call) = task else { return Vec::new() };
     let other = match call {
         ToolCall::Measure { to: Some(Reference::Thing(Target::Query(words))), .. } => Some(words),
         ToolCall::Locate { query, .. } => Some(query),
@@ -235,17 +235,17 @@ fn phrases(task: &Task) -> Vec<String> {
 
 /// Splits tasks about all of several things into single ones. If there are several tasks, all their targets must be
 /// found and unambiguous before the first one starts.
-fn settled(tasks: Vec<Task>, context: &mut PlannerContext<'_>) -> Result<Vec<Task>, Refusal> {
+fn settled(tasks: Vec<CommandStep>, context: &mut PlannerContext<'_>) -> Result<Vec<CommandStep>, Refusal> {
     let mut dialog = context.dialog.clone();
     let mut done = Vec::new();
     let is_alone = tasks.len() == 1;
     for task in tasks {
-        if let (Task::Call(call), [phrase]) = (&task, phrases(&task).as_slice())
+        if let (CommandStep::Call(call), [phrase]) = (&task, phrases(&task).as_slice())
             && is_done_to_several(call)
             && let Some(ids) = all_of(phrase, context.world, &dialog)?
         {
             dialog.last = ids.last().copied();
-            done.extend(ids.into_iter().map(|id| Task::Call(call.with_target(Target::Identity(id)))));
+            done.extend(ids.into_iter().map(|id| CommandStep::Call(call.with_target(Target::Identity(id)))));
             continue;
         }
         for phrase in phrases(&task).iter().filter(|_| !is_alone) {

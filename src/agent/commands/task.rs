@@ -9,7 +9,7 @@ use crate::scene::LevelFilter;
 
 /// Step of a plan.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Task {
+pub(crate) enum CommandStep {
     Call(ToolCall),
     /// Multiply the closeness to the last target by this factor; without a target, step forward or back.
     Closer(f64),
@@ -20,7 +20,7 @@ pub(crate) enum Task {
 }
 
 /// Returns the task of a command; `None` if a slot is missing.
-pub(super) fn task(id: &str, slots: &Slots) -> Option<Task> {
+pub(super) fn task(id: &str, slots: &Slots) -> Option<CommandStep> {
     let text = |n: usize| slots.texts.get(n).map(String::as_str);
     let thing = |n: usize| slots.texts.get(n).map(Target::query);
     let go = |closeness| Some(ToolCall::GoTo { target: thing(0)?, side: slots.side.unwrap_or(Side::Same), closeness });
@@ -32,12 +32,12 @@ pub(super) fn task(id: &str, slots: &Slots) -> Option<Task> {
     let describe = |words: String| ToolCall::Describe { target: Some(Target::Query(words)) };
     let measure = |to| Some(ToolCall::Measure { target: thing(0)?, to });
     let list = |kind: Option<&str>, of: Option<Target>| list(kind, of, slots.relation.unwrap_or_default());
-    Some(Task::Call(match id {
-        "help" => return Some(Task::Help),
-        "again" => return Some(Task::Again),
-        "closer" => return Some(Task::Closer(CLOSER)),
-        "farther" => return Some(Task::Closer(FARTHER)),
-        "from_side" => return Some(Task::From(slots.side?)),
+    Some(CommandStep::Call(match id {
+        "help" => return Some(CommandStep::Help),
+        "again" => return Some(CommandStep::Again),
+        "closer" => return Some(CommandStep::Closer(CLOSER)),
+        "farther" => return Some(CommandStep::Closer(FARTHER)),
+        "from_side" => return Some(CommandStep::From(slots.side?)),
         "move" => shift(slots.direction?),
         "back" => shift(Direction::Back),
         "turn_around" => turn(180.0),

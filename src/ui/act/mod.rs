@@ -1,6 +1,6 @@
-//! What actions do: the functions that the rows of [`super::actions`]' table call.
+//! What actions do: the functions that the rows of the table of [`super::actions`] call.
 //!
-//! An action changes the window at once, or starts a job with what is done with its result ([`super::app::App::start`]).
+//! An action changes the window at once, or starts a job and says what is done with its result ([`App::start`]).
 
 pub(super) mod edit;
 pub(super) mod edits;
@@ -12,3 +12,24 @@ pub(super) mod remote;
 pub(super) mod train;
 pub(super) mod view;
 pub(super) mod window;
+
+use super::actions::{Action, action_table};
+use super::app::App;
+use super::history::EditStep;
+use super::viewport::overrides::RenderOverrides;
+use crate::jobs::train::IfChanged;
+
+macro_rules! define_act {
+    (|$app:ident, $ctx:ident|
+     $($name:ident $(($($arg:ident: $ty:ty),+))?: $text:expr, $tip:literal $(, $key:literal)? => $act:expr;)*) => {
+        /// Carries out an action.
+        #[allow(unused_variables)]
+        pub(super) fn act(action: Action, $app: &mut App, $ctx: &egui::Context) {
+            match action {
+                $(Action::$name $(($($arg),+))? => { $act; })*
+            }
+        }
+    };
+}
+
+action_table!(define_act);

@@ -1,11 +1,18 @@
 //! Actions of the user: one table for menus, command palette, shortcut sheet, key bindings and what they do.
 
+use std::path::PathBuf;
+
 use egui::ThemePreference;
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use serde::{Deserialize, Serialize};
 use strum::{IntoStaticStr, VariantArray};
 
-use crate::scene::NO_IDENTITY;
+use crate::io::unposed::Unposed;
+use crate::jobs::remove::RemoveRequest;
+use crate::measure::{Knobs, StageName};
+use crate::navigate::target::Side;
+use crate::pipeline::semantics::lifting::edit::Edit;
+use crate::scene::{CropBox, IdentityId, NO_IDENTITY};
 use crate::ui::color_by::ColorBy;
 use crate::worker::{Start, ViewMode};
 
@@ -91,7 +98,11 @@ pub(crate) struct Shortcut {
     pub(crate) key: &'static str,
 }
 
-macro_rules! actions {
+mod table;
+
+pub(super) use table::action_table;
+
+macro_rules! define_actions {
     (@plain $name:ident) => {
         Some(Self::$name)
     };
@@ -115,32 +126,22 @@ macro_rules! actions {
                 }
             }
 
-            /// Carries out the action.
             #[allow(unused_variables)]
-            pub(in crate::ui) fn act(self, $app: &mut crate::ui::app::App, $ctx: &egui::Context) {
-                match self {
-                    $(Self::$name $(($($arg),+))? => { $act; })*
-                }
-            }
-
-            #[allow(unused_variables)]
-            pub(super) fn row(&self) -> (&'static str, &'static str) {
+            fn row(&self) -> (&'static str, &'static str) {
                 match self {
                     $(Self::$name $(($($arg),+))? => ($tip, concat!("" $(, $key)?)),)*
                 }
             }
 
             /// Actions without arguments that must be given, in the order of the table.
-            pub(super) fn plain() -> Vec<Self> {
-                [$(actions!(@plain $name $(($($ty),+))?)),*].into_iter().flatten().collect()
+            fn plain() -> Vec<Self> {
+                [$(define_actions!(@plain $name $(($($ty),+))?)),*].into_iter().flatten().collect()
             }
         }
     };
 }
 
-mod table;
-
-pub use table::Action;
+action_table!(define_actions);
 
 /// Themes in the order of the menu.
 pub(crate) const THEMES: [ThemePreference; 3] =

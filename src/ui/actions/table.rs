@@ -1,263 +1,253 @@
 //! The table of actions. A row holds an action's name on screen, one sentence on its effect, its key if it has one, and
 //! what it does.
 
-use egui::ThemePreference;
-use glam::{DVec2, DVec3};
-use std::path::PathBuf;
-
-use super::{Axis, Pane};
-use crate::io::unposed::Unposed;
-use crate::jobs::remove::RemoveRequest;
-use crate::jobs::train::IfChanged;
-use crate::measure::{Knobs, StageName};
-use crate::navigate::target::Side;
-use crate::pipeline::semantics::lifting::edit::Edit;
-use crate::scene::{CropBox, IdentityId, NO_IDENTITY};
-use crate::ui::act::{edit, edits, export, objects, open, query, remote, train, view, window};
-use crate::ui::color_by::ColorBy;
-use crate::ui::history::EditStep;
-use crate::ui::viewport::overrides::RenderOverrides;
-use crate::worker::ViewMode;
-
-actions! {
-    |app, ctx|
-    OpenFolder: "Open folder\u{2026}",
-        "COLMAP, transforms.json (nerfstudio, instant-ngp, Blender), LLFF, or a trained scene.", "Ctrl+O"
-        => open::choose_folder(app);
-    OpenFile: "Open file\u{2026}", "A splat (.ply, .sog, .gltf, .glb), a transforms.json, or the scene.json of a trained scene."
-        => open::choose_file(app);
-    Open(path: PathBuf): format!("Open {}", path.display()), "Open this path." => open::open(app, path);
-    FindPoses(photos: Box<Unposed>): format!("Find the camera poses of {}", photos.folder.display()),
-        "Run COLMAP on the photos, in a folder of its own, and open the result." => open::find_poses(app, photos);
-    Connect(url: String): "Connect to another computer",
-        "Look at what 'fmlgs serve' or 'fmlgs train --serve' shows there." => remote::connect(app, &url);
-    OpenDemo: "Open the demo", "A trained tabletop with objects and parts, ready for queries. No download needed."
-        => open::demo(app);
-    TrainDemo: "Train the demo yourself",
-        "Render posed photos of the tabletop and train on them. No download needed." => open::demo_photos(app);
-    ExportPly: "Export Gaussians\u{2026}", "Write the Gaussians as .ply, .spz, .sog, .glb or others that viewers read.", "Ctrl+E"
-        => export::all_gaussians(app);
-    ExportAll: "Export all objects and parts\u{2026}",
-        "Into a folder: a .ply each, and their masks in the photos as ISAT, COCO and id pictures."
-        => export::all_objects(app);
-    ExportPage: "Export page\u{2026}",
-        "One .html that opens in any browser without a server: to orbit, with names to click and camera paths."
-        => export::page(app);
-    Screenshot: "Save the view as .png\u{2026}", "Write the image in the viewport, without the drawn cameras.", "Ctrl+S"
-        => export::screenshot(app);
-    StartTraining: "Start training",
-        "Fit Gaussians to the photos. Resumes from the last checkpoint if the settings are the same.", "Ctrl+T"
-        => train::start(app, false, IfChanged::Ask);
-    TrainAnew: "Begin training anew",
-        "Another training of the same photos, in a folder of its own. The one before stays, and its objects are carried over."
-        => train::start(app, true, IfChanged::Ask);
-    PauseJob: "Pause or resume the running job", "Training, a search for objects, a download: it waits and loses nothing.", "T"
-        => train::pause(app);
-    Cancel: "Cancel the running job", "Stop the running job at its next step. Progress so far is kept."
-        => remote::cancel_job(app);
-    Dismiss: "Deselect, or cancel the running job", "Deselect what is selected; with nothing selected, stop the running job.",
-        "Escape" => view::dismiss(app, ctx);
-    Evaluate: "Evaluate on held-out photos", "PSNR and SSIM on photos held out from training."
-        => train::evaluate(app);
-    FindObjects: "Find objects and parts",
-        "From the labels that came with the photos, or else from what networks or colors tell."
-        => objects::find(app);
-    SegmentPhoto: "Segment this photo",
-        "Find what this photo, or else the nearest one, shows that is nobody's yet. Objects and parts stay; can be undone."
-        => objects::segment_photo(app);
-    ChooseMasks: "Find objects with other masks\u{2026}",
-        "Labels of ISAT, LabelMe, COCO, YOLO, fmlgs synth, SPIn-NeRF, 3D-OVS or LERF-Mask; one labeled photo is enough."
-        => objects::choose_masks(app);
-    FetchModel(id: String): format!("Download the model {id}"), "Download it, verify it, and use it from then on."
-        => objects::install_model(app, id, None);
-    AddModel(id: String): format!("Add files of the model {id}\u{2026}"),
-        "Choose a folder with its files; they are verified and copied." => objects::choose_model_files(app, id);
-    TypeQuery: "Query an object or a part", "A name, or \"the button of the red controller\".", "/"
-        => query::type_query(app, ctx);
-    Ask(text: String): format!("Query {text}"), "A name, or \"the button of the red controller\"."
-        => query::ask(app, &text);
-    RunPhrases(to: Option<PathBuf>): to.as_ref().map_or_else(|| "Run the phrase list".into(),
-            |to| format!("Export phrase masks to {}", to.display())),
-        "Query every phrase of the list, in this view or in all photos." => query::run_phrases(app, to);
-    ExportPhrases: "Export phrase masks\u{2026}", "As .png, COCO .json and a .csv table, in a folder."
-        => query::choose_phrases_folder(app);
-    ChooseTrueMask: "Compare with a true mask\u{2026}",
-        "A .png of this view, white where the object is. Shows hits, misses, false alarms and IoU."
-        => query::choose_true_mask(app);
-    TrueMask(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison with a true mask".into(),
-            |p| format!("Compare with the true mask {}", p.display())),
-        "Hits, misses, false alarms and IoU of the latest answer."
-        => query::compare_with_mask(app, path.as_deref());
-    PaintTrueMask: "Paint a true mask", "Paint what the answer should be here: shows hits, misses, false alarms, IoU."
-        => app.viewport.paint_true_mask(&app.state);
-    SaveTrueMask: "Save the true mask as .png\u{2026}", "White where the object is; can be loaded again."
-        => query::save_true_mask(app);
-    GoToTarget(id: IdentityId, side: Side): format!("Go to #{id}, {}", side.text()),
-        "Fly to its best view, around obstacles." => view::go_to(app, id, side);
-    PlayPath: "Play or pause the camera path", "Fly along the path, or pause where you are.", "Space"
-        => view::play_path(app);
-    StepBack: "Previous frame", "Move back along the path by one frame.", "," => view::step_in_time(app, ctx, -1.0);
-    StepForward: "Next frame", "Move forward along the path by one frame.", "."
-        => view::step_in_time(app, ctx, 1.0);
-    AddKey: "Add keyframe", "Add the current view to the camera path.", "K" => view::add_key(app);
-    OpenPath: "Open a camera path\u{2026}", "A path of this program, or of nerfstudio's viewer."
-        => open::choose_path(app);
-    SavePath: "Save the camera path\u{2026}", "As .json; for nerfstudio, end its name in .nerfstudio.json."
-        => export::camera_path(app);
-    ExportVideo: "Export video\u{2026}", "H.264 (.mp4), .gif, .webp, or .png frames in a folder."
-        => export::video(app);
-    StartChat: "Chat", "Type a command, such as \u{201c}show me the lid of the kettle\u{201d}. \u{201c}help\u{201d} lists all.", "Enter"
-        => query::start_chat(app);
-    SaveChat: "Save conversation\u{2026}", "As Markdown, or .json, with every step and its result."
-        => export::conversation(app);
-    Select(id: Option<IdentityId>): id.map_or_else(|| "Deselect".into(), |id| format!("Select #{id}")),
-        "Outline it in the view; keys and menus act on it." => app.viewport.picking.select(id);
-    SelectNext: "Select the next object", "In the order of the list; with a part selected, the part next to it.", "N"
-        => view::select_sibling(app, false);
-    SelectPrevious: "Select the previous object", "In the order of the list; with a part selected, the part before it.", "P"
-        => view::select_sibling(app, true);
-    SelectInner: "Select a part of the selection", "The first part of what is selected; N and P go through the others.", "O"
-        => view::select_part(app);
-    SelectOuter: "Select the whole of the selection", "What the selected part is a part of.", "U"
-        => view::select_whole(app);
-    IsolateSelected: "Isolate the selection",
-        "Show only the selection, or everything again.", "I" => view::isolate_selected(app);
-    HideSelected: "Hide the selection", "Do not show it in the view.", "H" => view::hide_selected(app);
-    GoToSelected: "Go to the selection", "Fly to its best view.", "G" => view::go_to_selected(app);
-    Isolate(only: Option<IdentityId>): only.map_or_else(|| "Show all objects".into(), |id| format!("Show only #{id}")),
-        "Show everything that was hidden." => view::isolate(app, only);
-    Hide(id: IdentityId): format!("Hide or show #{id}"), "Hide it in the view, or show it again."
-        => view::hide(app, id);
-    ExportTarget(id: IdentityId): format!("Export #{id}\u{2026}"),
-        "Write its Gaussians in the format that 3DGS viewers read." => export::identity(app, id);
-    Remove(id: IdentityId): format!("Remove #{id} and fill"),
-        "Take it out, into a scene of its own that is shown beside this one: what it hid is closed from what is around."
-        => objects::remove(app, &[id]);
-    AnotherFill(request: Box<RemoveRequest>): "Another fill",
-        "Remove it again, with another choice of what hides below it; the scene made before stays."
-        => objects::submit_removal(app, *request);
-    DeleteRemoved: "Delete this scene\u{2026}",
-        "Delete the scene that was made by removing something, which is shown beside this one. This one stays."
-        => objects::ask_to_delete_removed(app);
-    Transform(id: IdentityId): format!("Transform #{id}"),
-        "Drag it along the axes, turn, scale, duplicate or recolor it; can be undone." => edit::transform(app, id);
-    ApplyTransform: "Apply the transform", "Carry out what the view shows of a moved, duplicated or recolored thing."
-        => edit::apply_transform(app);
-    MeasureSplats: "Clean: measure Gaussians",
-        "Size, shape, opacity and neighbors of each, and what the photos show of it: finds floaters and the like."
-        => edit::measure_splats(app);
-    BrushSplats: "Choose Gaussians by brush", "Brush over what is chosen in the Clean pane, once it is measured."
-        => app.viewport.brush_splats(&app.state);
-    DeleteChosen: "Delete the chosen Gaussians",
-        "Delete what is chosen in the Clean pane; can be undone, and the scene that was opened stays as it is."
-        => edit::delete_chosen(app);
-    ExportCrop: "Export what the crop box keeps\u{2026}",
-        "Write the Gaussians whose centers it keeps, hidden ones too, in the format that 3DGS viewers read."
-        => export::crop(app);
-    Change(edit: Edit): match edit {
-            Edit::Rename(_, name) => format!("Rename to {name}"),
-            Edit::Merge(from, into) => format!("Merge #{from} into #{into}"),
-            Edit::Split(id) => format!("Split #{id}"),
-            Edit::AddPiece { name, .. } => format!("Add {name}"),
-            Edit::Reshape { id, .. } => format!("Correct the extent of #{id}"),
-        }, "Correct the segmentation; can be undone." => edit::apply(app, edit);
-    SegmentNew(of: Option<IdentityId>): match *of {
-            None => "Stop selecting".into(),
-            Some(NO_IDENTITY) => "Select a new object".to_owned(),
-            Some(id) => format!("Select a new part of #{id}"),
-        }, "Click on it or draw a line through it, in any view; name it, and it can be asked for everywhere."
-        => edit::segment(app, of);
-    Correct(id: IdentityId): format!("Correct #{id} by clicks"),
-        "Add what it lacks and remove what it has too much, by clicks and lines in any view."
-        => edit::correct(app, id);
-    AddPainted: "Keep the selection", "Make what is selected an object or part, or the extent of the one that is corrected."
-        => edit::add_segment(app);
-    Rename: "Rename", "Type a new name for the selected object or part.", "F2" => edit::start_renaming(app);
-    Undo: "Undo", "Undo the last change to objects, visibility or the camera path.", "Ctrl+Z"
-        => edits::queue(app, EditStep::Undo);
-    Redo: "Redo", "Redo the last undone change.", "Ctrl+Y" => edits::queue(app, EditStep::Redo);
-    FrameScene: "Frame the selection or the scene", "Move until the selection, or the whole scene, fits the view.", "F"
-        => view::frame(app, ctx);
-    ResetView: "Reset the view", "Return to the scene's initial view.", "Home" => view::reset(app, ctx);
-    TurnUp(axis: Axis): format!("Make {} the up direction", axis.text()), "For scenes that lie on their side."
-        => view::turn_up(app, ctx, axis.vector());
-    SetUp(up: DVec3): format!("Make ({:.2}, {:.2}, {:.2}) the up direction", up.x, up.y, up.z),
-        "Use the picked plane as the floor." => view::turn_up(app, ctx, up);
-    Measure: "Measure a distance", "Click two points on surfaces; set the scale from a known length.", "M"
-        => app.viewport.measure(&app.state);
-    Crop: "Crop box", "Show only the Gaussians in a box: drag its faces or type its corners.", "B"
-        => app.viewport.crop(&app.state);
-    SetCrop(crop: Option<CropBox>): if crop.is_some() { "Crop the view" } else { "Remove the crop box" },
-        "Show only what a box keeps, or everything again." => view::set_crop(app, crop);
-    Inspect: "Inspect Gaussians", "Click a pixel to see every property of its Gaussians.", "X"
-        => app.viewport.inspect(&app.state, &app.tasks);
-    InspectAt(at: DVec2): format!("Inspect the Gaussians at ({:.2}, {:.2})", at.x, at.y),
-        "Every property of the Gaussians of a pixel." => app.viewport.inspect_at(at, &app.state, &app.tasks);
-    SetScale(meters: f64): format!("Set the scale to {meters} m per unit"),
-        "Show lengths in meters; saved with the scene." => edit::set_scale(app, meters);
-    PreviousPhoto: "Previous photo", "Look through the camera of the previous photo.", "["
-        => view::step_photo(app, ctx, -1);
-    NextPhoto: "Next photo", "Look through the camera of the next photo.", "]" => view::step_photo(app, ctx, 1);
-    GoToPhoto(index: usize): format!("Go to photo {}", index + 1), "Look through the camera of this photo."
-        => view::go_to_photo(app, ctx, index);
-    Show(mode: ViewMode): match mode {
-            ViewMode::Rgb => "Show RGB".to_owned(),
-            other => format!("Show {}", other.text().to_lowercase()),
-        }, "Choose what the viewport shows." => view::show(app, mode);
-    Tint(by: ColorBy): format!("Color by {}", by.text().to_lowercase()),
-        "Color the view this way; again for the RGB image." => app.viewport.queries.tint(by);
-    ToggleCompare: "Compare with the photo", "Show the photo beside the rendering with a slider between them.", "C"
-        => view::toggle_compare(app, ctx);
-    ToggleSplit: "Split view", "Two views of the scene by one camera, each with its own query and colors.", "8"
-        => view::toggle_split(app);
-    OtherView: "Work in the other view", "Keys, queries and colors act on it from now on.", "0"
-        => view::other_view(app);
-    ChooseComparison: "Compare with another scene\u{2026}",
-        "Show its Gaussians in the second view by the same camera: two trainings of the same photos."
-        => open::choose_comparison(app);
-    OpenComparison(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison with another scene".into(),
-            |p| format!("Compare with the scene {}", p.display())), "Show its Gaussians in the second view."
-        => open::compare_scene(app, path);
-    ToggleDim: "Dim the rest", "Darken everything except answers and the selection.", "9"
-        => app.layout.dim = !app.layout.dim;
-    ToggleCameras: "Show or hide cameras", "Show the camera of every photo in the view.", "V"
-        => app.layout.cameras = !app.layout.cameras;
-    TogglePane(pane: Pane): format!("Show or hide the {} pane", pane.text().to_lowercase()),
-        "Show or hide this pane." => app.layout.toggle(pane);
-    FillWindow: "Fill the window with the view", "Show only the view, full screen; again to show everything.", "F11"
-        => window::fill(app, ctx);
-    ResetPanes: "Reset the panes", "Put every pane back in its initial place." => window::reset_panes(app);
-    UseTheme(theme: ThemePreference): match theme {
-            ThemePreference::Dark => "Dark theme",
-            ThemePreference::Light => "Light theme",
-            ThemePreference::System => "System theme",
-        }, "The view keeps its dark background." => window::use_theme(app, ctx, theme);
-    LargerText: "Larger text", "Enlarge everything in the window." => egui::gui_zoom::zoom_in(ctx);
-    SmallerText: "Smaller text", "Reduce everything in the window." => egui::gui_zoom::zoom_out(ctx);
-    NormalText: "Normal text size", "Reset the size of everything in the window." => ctx.set_zoom_factor(1.0);
-    ShowPane(pane: Pane): format!("Show the {} pane", pane.text().to_lowercase()), "Open this pane."
-        => app.layout.show(pane);
-    ChooseReport: "Open a report\u{2026}", "A report.json of fmlgs report: error vs. run time of every setting."
-        => open::choose_report(app, false);
-    ChooseSecondReport: "Compare with another report\u{2026}", "Shown with hollow markers, and side by side in the tables."
-        => open::choose_report(app, true);
-    OpenReport(path: PathBuf): format!("Open the report {}", path.display()), "Read this report."
-        => open::report(app, path, false);
-    CompareReport(path: PathBuf): format!("Compare with the report {}", path.display()), "Open it as the second report."
-        => open::report(app, path, true);
-    EndComparison: "Stop comparing reports", "Close the second report." => app.state.second_report = None;
-    BenchmarkRendering: "Benchmark rendering",
-        "Render a few views with many settings and compare them with the exact image. Takes minutes; can be canceled and resumed."
-        => train::benchmark_rendering(app);
-    ApplySetting(stage: StageName, knobs: Knobs): format!("Apply a setting of {}", stage.title().to_lowercase()),
-        "Use this setting from now on." => train::apply_setting(app, stage, &knobs);
-    ResetRenderSettings: "Reset render settings", "Render with the scene's own settings, not those taken from a report."
-        => app.viewport.overrides = RenderOverrides::default();
-    ToggleTimes: "Show or hide frame times",
-        "How long each stage of a frame takes: the last, and the median of the last 60.", "F3"
-        => app.layout.times = !app.layout.times;
-    Palette: "Command palette", "Find and run any action by name.", "Ctrl+P" => app.palette.toggle();
-    Shortcuts: "Keyboard shortcuts", "List every key and mouse gesture.", "F1" => app.sheet = !app.sheet;
-    Quit: "Quit", "Close the window. A running training keeps its last checkpoint.", "Ctrl+Q"
-        => ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+/// Hands the table to the macro `$to`: the actions and their texts are made of it in [`super`], what they do in
+/// [`crate::ui::act`].
+macro_rules! action_table {
+    ($to:ident) => {
+        $to! {
+            |app, ctx|
+            OpenFolder: "Open folder\u{2026}",
+                "COLMAP, transforms.json (nerfstudio, instant-ngp, Blender), LLFF, or a trained scene.", "Ctrl+O"
+                => open::choose_folder(app);
+            OpenFile: "Open file\u{2026}", "A splat (.ply, .sog, .gltf, .glb), a transforms.json, or the scene.json of a trained scene."
+                => open::choose_file(app);
+            Open(path: PathBuf): format!("Open {}", path.display()), "Open this path." => open::open(app, path);
+            FindPoses(photos: Box<Unposed>): format!("Find the camera poses of {}", photos.folder.display()),
+                "Run COLMAP on the photos, in a folder of its own, and open the result." => open::find_poses(app, photos);
+            Connect(url: String): "Connect to another computer",
+                "Look at what 'fmlgs serve' or 'fmlgs train --serve' shows there." => remote::connect(app, &url);
+            OpenDemo: "Open the demo", "A trained tabletop with objects and parts, ready for queries. No download needed."
+                => open::demo(app);
+            TrainDemo: "Train the demo yourself",
+                "Render posed photos of the tabletop and train on them. No download needed." => open::demo_photos(app);
+            ExportPly: "Export Gaussians\u{2026}", "Write the Gaussians as .ply, .spz, .sog, .glb or others that viewers read.", "Ctrl+E"
+                => export::all_gaussians(app);
+            ExportAll: "Export all objects and parts\u{2026}",
+                "Into a folder: a .ply each, and their masks in the photos as ISAT, COCO and id pictures."
+                => export::all_objects(app);
+            ExportPage: "Export page\u{2026}",
+                "One .html that opens in any browser without a server: to orbit, with names to click and camera paths."
+                => export::page(app);
+            Screenshot: "Save the view as .png\u{2026}", "Write the image in the viewport, without the drawn cameras.", "Ctrl+S"
+                => export::screenshot(app);
+            StartTraining: "Start training",
+                "Fit Gaussians to the photos. Resumes from the last checkpoint if the settings are the same.", "Ctrl+T"
+                => train::start(app, false, IfChanged::Ask);
+            TrainAnew: "Begin training anew",
+                "Another training of the same photos, in a folder of its own. The one before stays, and its objects are carried over."
+                => train::start(app, true, IfChanged::Ask);
+            PauseJob: "Pause or resume the running job", "Training, a search for objects, a download: it waits and loses nothing.", "T"
+                => train::pause(app);
+            Cancel: "Cancel the running job", "Stop the running job at its next step. Progress so far is kept."
+                => remote::cancel_job(app);
+            Dismiss: "Deselect, or cancel the running job", "Deselect what is selected; with nothing selected, stop the running job.",
+                "Escape" => view::dismiss(app, ctx);
+            Evaluate: "Evaluate on held-out photos", "PSNR and SSIM on photos held out from training."
+                => train::evaluate(app);
+            FindObjects: "Find objects and parts",
+                "From the labels that came with the photos, or else from what networks or colors tell."
+                => objects::find(app);
+            SegmentPhoto: "Segment this photo",
+                "Find what this photo, or else the nearest one, shows that is nobody's yet. Objects and parts stay; can be undone."
+                => objects::segment_photo(app);
+            ChooseMasks: "Find objects with other masks\u{2026}",
+                "Labels of ISAT, LabelMe, COCO, YOLO, fmlgs synth, SPIn-NeRF, 3D-OVS or LERF-Mask; one labeled photo is enough."
+                => objects::choose_masks(app);
+            FetchModel(id: String): format!("Download the model {id}"), "Download it, verify it, and use it from then on."
+                => objects::install_model(app, id, None);
+            AddModel(id: String): format!("Add files of the model {id}\u{2026}"),
+                "Choose a folder with its files; they are verified and copied." => objects::choose_model_files(app, id);
+            TypeQuery: "Query an object or a part", "A name, or \"the button of the red controller\".", "/"
+                => query::type_query(app, ctx);
+            Ask(text: String): format!("Query {text}"), "A name, or \"the button of the red controller\"."
+                => query::ask(app, &text);
+            RunPhrases(to: Option<PathBuf>): to.as_ref().map_or_else(|| "Run the phrase list".into(),
+                    |to| format!("Export phrase masks to {}", to.display())),
+                "Query every phrase of the list, in this view or in all photos." => query::run_phrases(app, to);
+            ExportPhrases: "Export phrase masks\u{2026}", "As .png, COCO .json and a .csv table, in a folder."
+                => query::choose_phrases_folder(app);
+            ChooseTrueMask: "Compare with a true mask\u{2026}",
+                "A .png of this view, white where the object is. Shows hits, misses, false alarms and IoU."
+                => query::choose_true_mask(app);
+            TrueMask(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison with a true mask".into(),
+                    |p| format!("Compare with the true mask {}", p.display())),
+                "Hits, misses, false alarms and IoU of the latest answer."
+                => query::compare_with_mask(app, path.as_deref());
+            PaintTrueMask: "Paint a true mask", "Paint what the answer should be here: shows hits, misses, false alarms, IoU."
+                => app.viewport.paint_true_mask(&app.state);
+            SaveTrueMask: "Save the true mask as .png\u{2026}", "White where the object is; can be loaded again."
+                => query::save_true_mask(app);
+            GoToTarget(id: IdentityId, side: Side): format!("Go to #{id}, {}", side.text()),
+                "Fly to its best view, around obstacles." => view::go_to(app, id, side);
+            PlayPath: "Play or pause the camera path", "Fly along the path, or pause where you are.", "Space"
+                => view::play_path(app);
+            StepBack: "Previous frame", "Move back along the path by one frame.", "," => view::step_in_time(app, ctx, -1.0);
+            StepForward: "Next frame", "Move forward along the path by one frame.", "."
+                => view::step_in_time(app, ctx, 1.0);
+            AddKey: "Add keyframe", "Add the current view to the camera path.", "K" => view::add_key(app);
+            OpenPath: "Open a camera path\u{2026}", "A path of this program, or of nerfstudio's viewer."
+                => open::choose_path(app);
+            SavePath: "Save the camera path\u{2026}", "As .json; for nerfstudio, end its name in .nerfstudio.json."
+                => export::camera_path(app);
+            ExportVideo: "Export video\u{2026}", "H.264 (.mp4), .gif, .webp, or .png frames in a folder."
+                => export::video(app);
+            StartChat: "Chat", "Type a command, such as \u{201c}show me the lid of the kettle\u{201d}. \u{201c}help\u{201d} lists all.", "Enter"
+                => query::start_chat(app);
+            SaveChat: "Save conversation\u{2026}", "As Markdown, or .json, with every step and its result."
+                => export::conversation(app);
+            Select(id: Option<IdentityId>): id.map_or_else(|| "Deselect".into(), |id| format!("Select #{id}")),
+                "Outline it in the view; keys and menus act on it." => app.viewport.picking.select(id);
+            SelectNext: "Select the next object", "In the order of the list; with a part selected, the part next to it.", "N"
+                => view::select_sibling(app, false);
+            SelectPrevious: "Select the previous object", "In the order of the list; with a part selected, the part before it.", "P"
+                => view::select_sibling(app, true);
+            SelectInner: "Select a part of the selection", "The first part of what is selected; N and P go through the others.", "O"
+                => view::select_part(app);
+            SelectOuter: "Select the whole of the selection", "What the selected part is a part of.", "U"
+                => view::select_whole(app);
+            IsolateSelected: "Isolate the selection",
+                "Show only the selection, or everything again.", "I" => view::isolate_selected(app);
+            HideSelected: "Hide the selection", "Do not show it in the view.", "H" => view::hide_selected(app);
+            GoToSelected: "Go to the selection", "Fly to its best view.", "G" => view::go_to_selected(app);
+            Isolate(only: Option<IdentityId>): only.map_or_else(|| "Show all objects".into(), |id| format!("Show only #{id}")),
+                "Show everything that was hidden." => view::isolate(app, only);
+            Hide(id: IdentityId): format!("Hide or show #{id}"), "Hide it in the view, or show it again."
+                => view::hide(app, id);
+            ExportTarget(id: IdentityId): format!("Export #{id}\u{2026}"),
+                "Write its Gaussians in the format that 3DGS viewers read." => export::identity(app, id);
+            Remove(id: IdentityId): format!("Remove #{id} and fill"),
+                "Take it out, into a scene of its own that is shown beside this one: what it hid is closed from what is around."
+                => objects::remove(app, &[id]);
+            AnotherFill(request: Box<RemoveRequest>): "Another fill",
+                "Remove it again, with another choice of what hides below it; the scene made before stays."
+                => objects::submit_removal(app, *request);
+            DeleteRemoved: "Delete this scene\u{2026}",
+                "Delete the scene that was made by removing something, which is shown beside this one. This one stays."
+                => objects::ask_to_delete_removed(app);
+            Transform(id: IdentityId): format!("Transform #{id}"),
+                "Drag it along the axes, turn, scale, duplicate or recolor it; can be undone." => edit::transform(app, id);
+            ApplyTransform: "Apply the transform", "Carry out what the view shows of a moved, duplicated or recolored thing."
+                => edit::apply_transform(app);
+            MeasureSplats: "Clean: measure Gaussians",
+                "Size, shape, opacity and neighbors of each, and what the photos show of it: finds floaters and the like."
+                => edit::measure_splats(app);
+            BrushSplats: "Choose Gaussians by brush", "Brush over what is chosen in the Clean pane, once it is measured."
+                => app.viewport.brush_splats(&app.state);
+            DeleteChosen: "Delete the chosen Gaussians",
+                "Delete what is chosen in the Clean pane; can be undone, and the scene that was opened stays as it is."
+                => edit::delete_chosen(app);
+            ExportCrop: "Export what the crop box keeps\u{2026}",
+                "Write the Gaussians whose centers it keeps, hidden ones too, in the format that 3DGS viewers read."
+                => export::crop(app);
+            Change(edit: Edit): match edit {
+                    Edit::Rename(_, name) => format!("Rename to {name}"),
+                    Edit::Merge(from, into) => format!("Merge #{from} into #{into}"),
+                    Edit::Split(id) => format!("Split #{id}"),
+                    Edit::AddPiece { name, .. } => format!("Add {name}"),
+                    Edit::Reshape { id, .. } => format!("Correct the extent of #{id}"),
+                }, "Correct the segmentation; can be undone." => edit::apply(app, edit);
+            SegmentNew(of: Option<IdentityId>): match *of {
+                    None => "Stop selecting".into(),
+                    Some(NO_IDENTITY) => "Select a new object".to_owned(),
+                    Some(id) => format!("Select a new part of #{id}"),
+                }, "Click on it or draw a line through it, in any view; name it, and it can be asked for everywhere."
+                => edit::segment(app, of);
+            Correct(id: IdentityId): format!("Correct #{id} by clicks"),
+                "Add what it lacks and remove what it has too much, by clicks and lines in any view."
+                => edit::correct(app, id);
+            AddPainted: "Keep the selection", "Make what is selected an object or part, or the extent of the one that is corrected."
+                => edit::add_segment(app);
+            Rename: "Rename", "Type a new name for the selected object or part.", "F2" => edit::start_renaming(app);
+            Undo: "Undo", "Undo the last change to objects, visibility or the camera path.", "Ctrl+Z"
+                => edits::queue(app, EditStep::Undo);
+            Redo: "Redo", "Redo the last undone change.", "Ctrl+Y" => edits::queue(app, EditStep::Redo);
+            FrameScene: "Frame the selection or the scene", "Move until the selection, or the whole scene, fits the view.", "F"
+                => view::frame(app, ctx);
+            ResetView: "Reset the view", "Return to the scene's initial view.", "Home" => view::reset(app, ctx);
+            TurnUp(axis: Axis): format!("Make {} the up direction", axis.text()), "For scenes that lie on their side."
+                => view::turn_up(app, ctx, axis.vector());
+            SetUp(up: DVec3): format!("Make ({:.2}, {:.2}, {:.2}) the up direction", up.x, up.y, up.z),
+                "Use the picked plane as the floor." => view::turn_up(app, ctx, up);
+            Measure: "Measure a distance", "Click two points on surfaces; set the scale from a known length.", "M"
+                => app.viewport.measure(&app.state);
+            Crop: "Crop box", "Show only the Gaussians in a box: drag its faces or type its corners.", "B"
+                => app.viewport.crop(&app.state);
+            SetCrop(crop: Option<CropBox>): if crop.is_some() { "Crop the view" } else { "Remove the crop box" },
+                "Show only what a box keeps, or everything again." => view::set_crop(app, crop);
+            Inspect: "Inspect Gaussians", "Click a pixel to see every property of its Gaussians.", "X"
+                => app.viewport.inspect(&app.state, &app.tasks);
+            InspectAt(at: DVec2): format!("Inspect the Gaussians at ({:.2}, {:.2})", at.x, at.y),
+                "Every property of the Gaussians of a pixel." => app.viewport.inspect_at(at, &app.state, &app.tasks);
+            SetScale(meters: f64): format!("Set the scale to {meters} m per unit"),
+                "Show lengths in meters; saved with the scene." => edit::set_scale(app, meters);
+            PreviousPhoto: "Previous photo", "Look through the camera of the previous photo.", "["
+                => view::step_photo(app, ctx, -1);
+            NextPhoto: "Next photo", "Look through the camera of the next photo.", "]" => view::step_photo(app, ctx, 1);
+            GoToPhoto(index: usize): format!("Go to photo {}", index + 1), "Look through the camera of this photo."
+                => view::go_to_photo(app, ctx, index);
+            Show(mode: ViewMode): match mode {
+                    ViewMode::Rgb => "Show RGB".to_owned(),
+                    other => format!("Show {}", other.text().to_lowercase()),
+                }, "Choose what the viewport shows." => view::show(app, mode);
+            Tint(by: ColorBy): format!("Color by {}", by.text().to_lowercase()),
+                "Color the view this way; again for the RGB image." => app.viewport.queries.tint(by);
+            ToggleCompare: "Compare with the photo", "Show the photo beside the rendering with a slider between them.", "C"
+                => view::toggle_compare(app, ctx);
+            ToggleSplit: "Split view", "Two views of the scene by one camera, each with its own query and colors.", "8"
+                => view::toggle_split(app);
+            OtherView: "Work in the other view", "Keys, queries and colors act on it from now on.", "0"
+                => view::other_view(app);
+            ChooseComparison: "Compare with another scene\u{2026}",
+                "Show its Gaussians in the second view by the same camera: two trainings of the same photos."
+                => open::choose_comparison(app);
+            OpenComparison(path: Option<PathBuf>): path.as_ref().map_or_else(|| "End the comparison with another scene".into(),
+                    |p| format!("Compare with the scene {}", p.display())), "Show its Gaussians in the second view."
+                => open::compare_scene(app, path);
+            ToggleDim: "Dim the rest", "Darken everything except answers and the selection.", "9"
+                => app.layout.dim = !app.layout.dim;
+            ToggleCameras: "Show or hide cameras", "Show the camera of every photo in the view.", "V"
+                => app.layout.cameras = !app.layout.cameras;
+            TogglePane(pane: Pane): format!("Show or hide the {} pane", pane.text().to_lowercase()),
+                "Show or hide this pane." => app.layout.toggle(pane);
+            FillWindow: "Fill the window with the view", "Show only the view, full screen; again to show everything.", "F11"
+                => window::fill(app, ctx);
+            ResetPanes: "Reset the panes", "Put every pane back in its initial place." => window::reset_panes(app);
+            UseTheme(theme: ThemePreference): match theme {
+                    ThemePreference::Dark => "Dark theme",
+                    ThemePreference::Light => "Light theme",
+                    ThemePreference::System => "System theme",
+                }, "The view keeps its dark background." => window::use_theme(app, ctx, theme);
+            LargerText: "Larger text", "Enlarge everything in the window." => egui::gui_zoom::zoom_in(ctx);
+            SmallerText: "Smaller text", "Reduce everything in the window." => egui::gui_zoom::zoom_out(ctx);
+            NormalText: "Normal text size", "Reset the size of everything in the window." => ctx.set_zoom_factor(1.0);
+            ShowPane(pane: Pane): format!("Show the {} pane", pane.text().to_lowercase()), "Open this pane."
+                => app.layout.show(pane);
+            ChooseReport: "Open a report\u{2026}", "A report.json of fmlgs report: error vs. run time of every setting."
+                => open::choose_report(app, false);
+            ChooseSecondReport: "Compare with another report\u{2026}", "Shown with hollow markers, and side by side in the tables."
+                => open::choose_report(app, true);
+            OpenReport(path: PathBuf): format!("Open the report {}", path.display()), "Read this report."
+                => open::report(app, path, false);
+            CompareReport(path: PathBuf): format!("Compare with the report {}", path.display()), "Open it as the second report."
+                => open::report(app, path, true);
+            EndComparison: "Stop comparing reports", "Close the second report." => app.state.second_report = None;
+            BenchmarkRendering: "Benchmark rendering",
+                "Render a few views with many settings and compare them with the exact image. Takes minutes; can be canceled and resumed."
+                => train::benchmark_rendering(app);
+            ApplySetting(stage: StageName, knobs: Knobs): format!("Apply a setting of {}", stage.title().to_lowercase()),
+                "Use this setting from now on." => train::apply_setting(app, stage, &knobs);
+            ResetRenderSettings: "Reset render settings", "Render with the scene's own settings, not those taken from a report."
+                => app.viewport.overrides = RenderOverrides::default();
+            ToggleTimes: "Show or hide frame times",
+                "How long each stage of a frame takes: the last, and the median of the last 60.", "F3"
+                => app.layout.times = !app.layout.times;
+            Palette: "Command palette", "Find and run any action by name.", "Ctrl+P" => app.palette.toggle();
+            Shortcuts: "Keyboard shortcuts", "List every key and mouse gesture.", "F1" => app.sheet = !app.sheet;
+            Quit: "Quit", "Close the window. A running training keeps its last checkpoint.", "Ctrl+Q"
+                => ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+        }
+    };
 }
+
+pub(in crate::ui) use action_table;

@@ -27,7 +27,7 @@ use crate::remote::LinkStatus;
 use crate::render::RenderSettings;
 use crate::scene::findings::IdentityEvidence;
 use crate::scene::{GaussianCloud, IdentityId, Limits, Overrides, SceneFacts, ScenePlan, SemanticMap, text};
-use crate::worker::{Event, JobEnd, JobId, JobInfo, Lane, Makes, Versioned};
+use crate::worker::{Event, JobEnd, JobId, JobInfo, JobLane, Makes, Versioned};
 
 mod messages;
 mod running;
@@ -118,7 +118,7 @@ impl AppState {
         match event {
             Event::Started(job, info) => {
                 let info = JobInfo { title: text::line(&info.title).into_owned(), ..info };
-                if info.lane == Lane::Short {
+                if info.lane == JobLane::Short {
                     self.short_jobs.insert(job, info);
                     return;
                 }

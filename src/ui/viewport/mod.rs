@@ -15,7 +15,7 @@ mod photo;
 pub mod picking;
 pub(crate) mod query;
 mod request;
-mod route;
+pub(crate) mod route;
 mod show;
 pub(crate) mod splat_selection;
 mod split;

@@ -5,14 +5,23 @@ use glam::DVec3;
 
 use crate::jobs::go_to::Explored;
 use crate::scene::Camera;
-use crate::ui::camera::CameraPane;
 use crate::ui::theme;
 
+/// Camera path, for drawing it.
+pub(crate) struct Route {
+    /// Points along the loaded clip.
+    pub(crate) way: Vec<DVec3>,
+    /// Places of the keyframes; true for the chosen one.
+    pub(crate) keys: Vec<(DVec3, bool)>,
+    /// True if the places that the camera can reach are drawn, too.
+    pub(crate) show_reach: bool,
+}
+
 /// Draws the loaded clip, the keyframes of the path, and the keypoints of the scene, as `eye` sees them.
-pub(super) fn show(ui: &Ui, rect: Rect, eye: &Camera, pane: &CameraPane, explored: Option<&Explored>) {
+pub(super) fn show(ui: &Ui, rect: Rect, eye: &Camera, route: &Route, explored: Option<&Explored>) {
     let painter = ui.painter_at(rect);
     let place = |p: DVec3| eye.project(p).map(|q| pos2(rect.left() + q.x as f32, rect.top() + q.y as f32));
-    if let Some(explored) = explored.filter(|_| pane.show_reach) {
+    if let Some(explored) = explored.filter(|_| route.show_reach) {
         for (keypoint, part) in explored.navigator.graph.keypoints.iter().zip(&explored.parts) {
             let Some(at) = place(keypoint.center).filter(|at| rect.contains(*at)) else { continue };
             let color = if *part == 0 { theme::good() } else { theme::error() };
@@ -21,9 +30,8 @@ pub(super) fn show(ui: &Ui, rect: Rect, eye: &Camera, pane: &CameraPane, explore
             painter.circle_filled(at, radius, color.gamma_multiply(0.8));
         }
     }
-    let way = pane.way();
     for stroke in [Stroke::new(4.0, Color32::from_black_alpha(110)), Stroke::new(2.0, theme::accent())] {
-        for pair in way.windows(2) {
+        for pair in route.way.windows(2) {
             if let (Some(a), Some(b)) = (place(pair[0]), place(pair[1]))
                 && (rect.expand(2000.0).contains(a) && rect.expand(2000.0).contains(b))
             {
@@ -31,9 +39,9 @@ pub(super) fn show(ui: &Ui, rect: Rect, eye: &Camera, pane: &CameraPane, explore
             }
         }
     }
-    for (i, (center, chosen)) in pane.key_places().enumerate() {
-        let Some(at) = place(center).filter(|at| rect.contains(*at)) else { continue };
-        let (radius, color) = if chosen { (7.0, theme::accent()) } else { (5.0, theme::text()) };
+    for (i, (center, chosen)) in route.keys.iter().enumerate() {
+        let Some(at) = place(*center).filter(|at| rect.contains(*at)) else { continue };
+        let (radius, color) = if *chosen { (7.0, theme::accent()) } else { (5.0, theme::text()) };
         painter.circle(at, radius, color, Stroke::new(1.5, Color32::from_black_alpha(160)));
         let font = egui::FontId::proportional(11.0);
         painter.text(at + egui::vec2(9.0, -9.0), egui::Align2::LEFT_BOTTOM, (i + 1).to_string(), font, theme::text());

@@ -8,12 +8,12 @@ use super::overlay::ViewCards;
 use super::photo::PhotoView;
 use super::query::SearchedScene;
 use super::request::Moved;
+use super::route::Route;
 use super::split::{self, ViewArea, Views};
 use super::tools::segment::SegmentTool;
 use super::tools::{CardPlaces, Tool};
 use super::visible::VisibleCloud;
 use super::{Viewport, frusta, query, route};
-use crate::ui::camera::CameraPane;
 use crate::ui::ctx::Ctx;
 use crate::worker::ViewMode;
 use crate::worker::view::{QualityBudget, SkipPasses, ViewRequest};
@@ -25,7 +25,7 @@ const MAX_SIDE_PX: u32 = 1600;
 
 impl Viewport {
     /// Draws the viewport into the rest of `ui`.
-    pub(crate) fn show(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, route: Option<&CameraPane>) {
+    pub(crate) fn show(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, route: Option<&Route>) {
         let state = cx.state;
         let Some(scene) = &state.scene else { return };
         let whole = ui.available_rect_before_wrap();
@@ -137,7 +137,7 @@ impl Viewport {
         areas: &[ViewArea],
         is_second: bool,
         picks: bool,
-        route: Option<&CameraPane>,
+        route: Option<&Route>,
         cx: &mut Ctx<'_>,
     ) -> bool {
         let (state, now) = (cx.state, ui.input(|i| i.time));
@@ -157,9 +157,9 @@ impl Viewport {
                 let marked = MarkedScene { cloud, semantics, visibility, selected, eye };
                 self.marks.show(ui, area.shown, &marked, &mut self.queries, cx);
             }
-            if let Some(pane) = route {
+            if let Some(route) = route {
                 let eye = self.display.overlay_camera(&self.eye, area.rect);
-                route::show(ui, area.rect, &eye, pane, state.explored.as_deref());
+                route::show(ui, area.rect, &eye, route, state.explored.as_deref());
             }
             let mut cards = ViewCards {
                 moves: now - self.moved_at < REST_SECS,

@@ -12,7 +12,7 @@ use crate::jobs::models::{self, Source};
 use crate::jobs::remove::{self as removal, RemovalOptions, RemoveRequest};
 use crate::pipeline::observer::Observer;
 use crate::scene::{Camera, IdentityId, SemanticMap};
-use crate::ui::app::{App, context};
+use crate::ui::app::App;
 use crate::ui::dialogs::{DialogAnswer, Question};
 use crate::ui::file_dialogs::FileRequest;
 use crate::ui::find_dialog::Means;
@@ -49,7 +49,7 @@ pub(in crate::ui) fn show_dialogs(app: &mut App, ctx: &egui::Context) {
     }
     let max_seeds = app.layout.finding.max_seeds;
     let mut dialog = std::mem::take(&mut app.find_dialog);
-    let means = dialog.show(ctx, max_seeds, &mut context(app).0);
+    let means = dialog.show(ctx, max_seeds, &mut app.context().0);
     app.find_dialog = dialog;
     if let Some(Means { segmenter, encoder, missing }) = means {
         (app.layout.finding.segmenter, app.layout.finding.encoder) = (Some(segmenter), Some(encoder));

@@ -1,15 +1,13 @@
-//! The application: takes events and results of jobs, draws the window, carries out actions.
+//! The application: the parts of the window, and what they may ask of it.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use egui::Ui;
-
-use super::act::{edits, query, remote, view, window};
-use super::actions::{Action, Pane};
+use super::actions::Action;
 use super::camera::CameraPane;
 use super::chat::Chat;
+use super::ctx::Ctx;
 use super::dialogs::{DialogAnswer, Question};
 use super::file_dialogs::{FileDialogs, FileRequest};
 use super::find_dialog::FindDialog;
@@ -31,11 +29,7 @@ use crate::pipeline::observer::Observer;
 use crate::remote::ServerLink;
 use crate::scene::plan::PlanOverride;
 use crate::scene::resource_log::{self, ResourceKind};
-use crate::worker::{Event, Failure, JobId, JobInfo, Repaint, Stop, Tasks};
-
-mod draw;
-
-pub(super) use draw::context;
+use crate::worker::{Failure, JobId, JobInfo, Repaint, Stop, Tasks};
 
 /// What is done once a job has ended.
 type Then = Box<dyn FnOnce(&mut App)>;
@@ -58,7 +52,7 @@ pub struct App {
     /// The server whose scene is on screen.
     pub(super) link: Option<ServerLink>,
     pub(super) repaint: Repaint,
-    pub(super) dialogs: FileDialogs,
+    pub(super) dialogs: FileDialogs<Self>,
     pub(super) question: Option<(Question, ThenAnswer)>,
     pub(super) find_dialog: FindDialog,
     pub(super) keep_dialog: Option<KeepDialog>,
@@ -66,10 +60,10 @@ pub struct App {
     pub(super) asks_in_vain: bool,
     pub(super) palette: Palette,
     pub(super) sheet: bool,
-    first_page: FirstPage,
-    photos: PhotosPane,
-    thumbnails: ObjectThumbnails,
-    training: TrainingPane,
+    pub(super) first_page: FirstPage,
+    pub(super) photos: PhotosPane,
+    pub(super) thumbnails: ObjectThumbnails,
+    pub(super) training: TrainingPane,
     /// The list of phrases.
     pub phrases: PhrasesPane,
     pub(super) objects: ObjectsPane,
@@ -81,19 +75,19 @@ pub struct App {
     pub(crate) camera: CameraPane,
     /// The conversation with the agent.
     pub(crate) chat: Chat,
-    toasts: Toasts,
+    pub(super) toasts: Toasts,
     pub(super) actions: Vec<Action>,
     /// Window time of the last frame, s.
     pub(super) last_frame: f64,
     /// Lines of the trace that are in the log already.
-    traced: usize,
+    pub(super) traced: usize,
     /// Edits of objects and parts that wait for the running one.
     pub(super) edits: VecDeque<EditStep>,
     pub(super) editing: Option<Editing>,
     /// True if the view fills the window.
     pub(super) full_view: bool,
     /// True if objects were known in the last frame.
-    had_objects: bool,
+    pub(super) had_objects: bool,
 }
 
 impl App {
@@ -238,81 +232,20 @@ impl App {
         self.editing.is_some() || !self.edits.is_empty()
     }
 
-    /// Applies an event, and continues after the end of a job.
-    fn hear(&mut self, event: Event) {
-        let ended = event.is_end().then(|| event.job());
-        self.state.apply(event);
-        if let Some(then) = ended.and_then(|job| self.pending.remove(&job)) {
-            then(self);
-        }
-    }
-
-    /// Takes over all events, results and updates since the last call.
-    fn take_events(&mut self, ctx: &egui::Context) {
+    /// Applies all events since the last call, and continues after the ends of jobs.
+    pub(super) fn take_events(&mut self) {
         while let Some(event) = self.tasks.next_event() {
-            self.hear(event);
+            let ended = event.is_end().then(|| event.job());
+            self.state.apply(event);
+            if let Some(then) = ended.and_then(|job| self.pending.remove(&job)) {
+                then(self);
+            }
         }
-        remote::take_updates(self);
-        self.state.replan(&self.layout.plan, self.layout.config.limits());
-        self.state.stamp_log(resource_log::now_secs());
-        for load in resource_log::since(self.traced) {
-            self.traced += 1;
-            self.state.say_at(Some(load.at_secs), Tone::Info, load.text());
-        }
-        // New objects are the next thing to work with, so their pane comes to the front.
-        let has_objects = self.state.semantics.is_some();
-        let news = if has_objects { Pane::Objects } else { Pane::Training };
-        if std::mem::replace(&mut self.had_objects, has_objects) != has_objects && self.layout.shows(news) {
-            self.layout.dock.activate(news);
-        }
-        self.viewport.update(&mut self.state, &self.tasks);
-        let brushed = self.viewport.take_brushed();
-        let cloud = self.viewport.cloud().map(|cloud| &**cloud);
-        let chosen = self.clean.update(&self.state, cloud, brushed, self.layout.shows(Pane::Clean));
-        self.viewport.visibility.set_chosen(chosen);
-        self.camera.on_scene(self.state.scene_number);
-        for effect in self.chat.news() {
-            edits::settle(self, false);
-            query::effect(self, effect);
-        }
-        edits::next(self);
-        query::send_chat(self);
-        view::play(self, ctx);
-        let Self { state, viewport, tasks, workspace, .. } = self;
-        self.first_page.update(ctx, state, viewport, tasks, workspace);
-        self.photos.update(ctx, state);
-        self.thumbnails.update(ctx, state, viewport.cloud().map(|c| &**c), tasks);
-        self.models.update(state);
-        self.training.curves = self.report.curves(state);
-    }
-}
-
-impl eframe::App for App {
-    fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
-        self.take_events(ctx);
     }
 
-    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
-        let ctx = ui.ctx().clone();
-        theme::begin_frame(&ctx);
-        self.layout.zoom = ctx.zoom_factor();
-        window::take_input(self, &ctx);
-        draw::panes(self, ui);
-        draw::over_everything(self, &ctx);
-        for action in std::mem::take(&mut self.actions) {
-            edits::settle(self, false);
-            action.act(self, &ctx);
-            ctx.request_repaint();
-        }
-        edits::settle(self, !ctx.input(|i| i.pointer.any_down()) && !ctx.text_edit_focused());
-    }
-
-    fn save(&mut self, storage: &mut dyn eframe::Storage) {
-        self.layout.recent = self.state.recent.clone();
-        self.layout.save(storage);
-    }
-
-    fn clear_color(&self, _visuals: &egui::Visuals) -> [f32; 4] {
-        theme::canvas().to_normalized_gamma_f32()
+    /// The context of panes and tools, and the view.
+    pub(super) fn context(&mut self) -> (Ctx<'_>, &mut Viewport) {
+        let Self { state, layout, tasks, thumbnails, actions, viewport, .. } = self;
+        (Ctx { state, layout, tasks, thumbnails, actions }, viewport)
     }
 }

@@ -2,9 +2,9 @@
 
 use egui::{CentralPanel, Frame, Margin, Panel, ScrollArea, Ui};
 
-use super::App;
 use crate::ui::act::objects;
 use crate::ui::actions::{Action, Pane};
+use crate::ui::app::App;
 use crate::ui::ctx::Ctx;
 use crate::ui::dialogs;
 use crate::ui::dock::{DockContents, Place};
@@ -14,14 +14,13 @@ use crate::ui::panes::plan::PlanPane;
 use crate::ui::panes::query::QueryPane;
 use crate::ui::panes::{PaneContents, bars, problems, unposed};
 use crate::ui::theme;
-use crate::ui::viewport::Viewport;
 use crate::ui::viewport::query::closed;
 
 /// The window's bars and panes.
 pub(super) fn panes(app: &mut App, ui: &mut Ui) {
     let bar = Frame::new().fill(theme::panel()).inner_margin(Margin::symmetric(10, 6));
     if !fills_window(app) {
-        let (mut cx, viewport) = context(app);
+        let (mut cx, viewport) = app.context();
         let second = viewport.queries.is_second();
         Panel::top("menus").frame(bar).show(ui, |ui| bars::top(ui, &mut cx, second));
         Panel::bottom("status").frame(bar).show(ui, |ui| bars::status(ui, &mut cx, viewport.picture()));
@@ -52,12 +51,12 @@ pub(super) fn over_everything(app: &mut App, ctx: &egui::Context) {
     }
     objects::show_dialogs(app, ctx);
     if let Some(photos) = app.state.unposed.clone()
-        && !unposed::show(ctx, &photos, &mut context(app).0)
+        && !unposed::show(ctx, &photos, &mut app.context().0)
     {
         app.state.unposed = None;
     }
     if let Some(error) = app.state.error.clone()
-        && dialogs::show_error(ctx, &error, &mut context(app).0)
+        && dialogs::show_error(ctx, &error, &mut app.context().0)
     {
         app.state.error = None;
     }
@@ -69,12 +68,6 @@ pub(super) fn over_everything(app: &mut App, ctx: &egui::Context) {
     app.toasts.show(ctx, &mut app.state, ctx.content_rect().shrink2(egui::vec2(0.0, 44.0)));
 }
 
-/// The context of panes and tools, and the view.
-pub(in crate::ui) fn context(app: &mut App) -> (Ctx<'_>, &mut Viewport) {
-    let App { state, layout, tasks, thumbnails, actions, viewport, .. } = app;
-    (Ctx { state, layout, tasks, thumbnails, actions }, viewport)
-}
-
 /// True if the view fills the window.
 fn fills_window(app: &App) -> bool {
     app.full_view && app.state.scene.is_some()
@@ -84,11 +77,11 @@ fn show_view(app: &mut App, ui: &mut Ui) {
     let rect = ui.available_rect_before_wrap();
     let vain = app.state.why_no_query().filter(|_| app.asks_in_vain);
     let App { state, layout, tasks, thumbnails, actions, viewport, camera, first_page, .. } = app;
-    let route = layout.shows(Pane::Camera).then_some(&*camera);
+    let route = layout.shows(Pane::Camera).then(|| camera.route());
     let has_scene = state.scene.is_some();
     let mut cx = Ctx { state, layout, tasks, thumbnails, actions };
     match has_scene {
-        true => theme::dark(ui, |ui| viewport.show(ui, &mut cx, route)),
+        true => theme::dark(ui, |ui| viewport.show(ui, &mut cx, route.as_ref())),
         false => first_page.show(ui, &mut cx),
     }
     let Some(why) = vain else { return };

@@ -1,0 +1,48 @@
+//! Keys and dropped files, taken before anything is drawn.
+
+use std::path::PathBuf;
+
+use egui::Context;
+
+use crate::measure::is_report;
+use crate::ui::act::{act, edits, query};
+use crate::ui::actions::Action;
+use crate::ui::app::App;
+use crate::ui::keys;
+
+/// Takes keys and dropped files, before anything is drawn.
+pub(super) fn take(app: &mut App, ctx: &Context) {
+    keys::watch_typing(ctx);
+    let has_dialog = app.state.error.is_some()
+        || app.state.unposed.is_some()
+        || app.question.is_some()
+        || app.find_dialog.is_open()
+        || app.keep_dialog.is_some()
+        || app.dialogs.is_own_open();
+    // An open menu takes the keys; Escape closes only the menu.
+    let has_menu = egui::Popup::is_any_open(ctx);
+    if has_menu && ctx.input_mut(|i| i.consume_key(egui::Modifiers::NONE, egui::Key::Escape)) {
+        egui::Popup::close_all(ctx);
+    }
+    query::follow_vain_query(app, ctx);
+    if !app.palette.is_open() && !has_dialog && !app.sheet && !has_menu {
+        for action in keys::pressed(ctx) {
+            if keys::opens_field(&action) {
+                // Before drawing: text typed in this frame belongs to the field.
+                keys::begin_typing(ctx);
+                edits::settle(app, false);
+                act(action, app, ctx);
+            } else {
+                app.actions.push(action);
+            }
+        }
+    }
+    let dropped: Vec<PathBuf> =
+        ctx.input(|i| i.raw.dropped_files.iter().map(|f| f.path().to_path_buf()).take(2).collect());
+    match dropped.as_slice() {
+        [one, other] if is_report(one) && is_report(other) => {
+            app.actions.extend([Action::OpenReport(one.clone()), Action::CompareReport(other.clone())]);
+        }
+        all => app.actions.extend(all.first().cloned().map(Action::Open)),
+    }
+}
