@@ -133,7 +133,7 @@ macro_rules! action_table {
                 "Size, shape, opacity and neighbors of each, and what the photos show of it: finds floaters and the like."
                 => edit::measure_splats(app);
             BrushSplats: "Choose Gaussians by brush", "Brush over what is chosen in the Clean pane, once it is measured."
-                => app.viewport.brush_splats(&app.state);
+                => app.viewport.choose_with(Tool::SplatBrush(Default::default()), &app.state);
             DeleteChosen: "Delete the chosen Gaussians",
                 "Delete what is chosen in the Clean pane; can be undone, and the scene that was opened stays as it is."
                 => edit::delete_chosen(app);

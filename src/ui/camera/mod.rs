@@ -14,7 +14,7 @@ use super::ctx::Ctx;
 use super::panes::PaneContents;
 use super::theme;
 use super::viewport::Viewport;
-use super::viewport::route::Route;
+use super::viewport::route::CameraRoute;
 use crate::io::video::VideoSettings;
 use crate::navigate::camera_spline::{MOST_PICTURES, steps_of};
 use crate::navigate::{CameraSpline, CameraTrajectory, Pose, Speed};
@@ -191,12 +191,12 @@ impl CameraPane {
     }
 
     /// The loaded clip and the keyframes, for drawing them into the view.
-    pub(crate) fn route(&self) -> Route {
+    pub(crate) fn route(&self) -> CameraRoute {
         let last = 120;
         let at = |clip: &Clip, i: i32| clip.at(clip.seconds() * f64::from(i) / f64::from(last)).map(|p| p.center);
         let way = self.player.clip().map(|clip| (0..=last).filter_map(|i| at(clip, i)).collect()).unwrap_or_default();
         let keys = self.path.keys.iter().enumerate().map(|(i, k)| (k.center, self.selected == Some(i))).collect();
-        Route { way, keys, show_reach: self.show_reach }
+        CameraRoute { way, keys, show_reach: self.show_reach }
     }
 
     fn controls(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>) {

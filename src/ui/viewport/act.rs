@@ -9,7 +9,7 @@ use super::tools::crop::CropTool;
 use super::tools::mask_brush::MaskBrush;
 use super::tools::ruler::Ruler;
 use super::tools::segment::SegmentTool;
-use super::tools::splat_brush::{Brushed, SplatBrush};
+use super::tools::splat_brush::Brushed;
 use super::tools::transform::TransformTool;
 use super::visible::VisibleCloud;
 use super::{AppState, Viewport};
@@ -180,10 +180,10 @@ impl Viewport {
         }
     }
 
-    /// Chooses Gaussians with a brush.
-    pub(crate) fn brush_splats(&mut self, state: &AppState) {
+    /// Chooses Gaussians with this tool, if they are a result.
+    pub(crate) fn choose_with(&mut self, tool: Tool, state: &AppState) {
         if state.scene.is_some() {
-            self.tool = state.is_trained().then(|| Tool::SplatBrush(SplatBrush::new()));
+            self.tool = Some(tool).filter(|_| state.is_trained());
         }
     }
 
@@ -202,12 +202,9 @@ impl Viewport {
         Some(arrangement)
     }
 
-    /// Takes the Gaussians brushed over since the last call.
+    /// Takes the Gaussians chosen by the tool since the last call.
     pub(crate) fn take_brushed(&mut self) -> Vec<Brushed> {
-        match &mut self.tool {
-            Some(Tool::SplatBrush(brush)) => brush.take_brushed(),
-            _ => Vec::new(),
-        }
+        self.tool.as_mut().map(|tool| tool.as_dyn().take_brushed()).unwrap_or_default()
     }
 
     /// Number of selected Gaussians, once all clicks and strokes are processed.

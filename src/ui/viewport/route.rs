@@ -8,7 +8,7 @@ use crate::scene::Camera;
 use crate::ui::theme;
 
 /// Camera path, for drawing it.
-pub(crate) struct Route {
+pub(crate) struct CameraRoute {
     /// Points along the loaded clip.
     pub(crate) way: Vec<DVec3>,
     /// Places of the keyframes; true for the chosen one.
@@ -18,7 +18,7 @@ pub(crate) struct Route {
 }
 
 /// Draws the loaded clip, the keyframes of the path, and the keypoints of the scene, as `eye` sees them.
-pub(super) fn show(ui: &Ui, rect: Rect, eye: &Camera, route: &Route, explored: Option<&Explored>) {
+pub(super) fn show(ui: &Ui, rect: Rect, eye: &Camera, route: &CameraRoute, explored: Option<&Explored>) {
     let painter = ui.painter_at(rect);
     let place = |p: DVec3| eye.project(p).map(|q| pos2(rect.left() + q.x as f32, rect.top() + q.y as f32));
     if let Some(explored) = explored.filter(|_| route.show_reach) {

@@ -8,7 +8,7 @@ use super::overlay::ViewCards;
 use super::photo::PhotoView;
 use super::query::SearchedScene;
 use super::request::Moved;
-use super::route::Route;
+use super::route::CameraRoute;
 use super::split::{self, ViewArea, Views};
 use super::tools::segment::SegmentTool;
 use super::tools::{CardPlaces, Tool};
@@ -25,7 +25,7 @@ const MAX_SIDE_PX: u32 = 1600;
 
 impl Viewport {
     /// Draws the viewport into the rest of `ui`.
-    pub(crate) fn show(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, route: Option<&Route>) {
+    pub(crate) fn show(&mut self, ui: &mut Ui, cx: &mut Ctx<'_>, route: Option<&CameraRoute>) {
         let state = cx.state;
         let Some(scene) = &state.scene else { return };
         let whole = ui.available_rect_before_wrap();
@@ -137,7 +137,7 @@ impl Viewport {
         areas: &[ViewArea],
         is_second: bool,
         picks: bool,
-        route: Option<&Route>,
+        route: Option<&CameraRoute>,
         cx: &mut Ctx<'_>,
     ) -> bool {
         let (state, now) = (cx.state, ui.input(|i| i.time));

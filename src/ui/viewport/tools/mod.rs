@@ -18,7 +18,7 @@ use self::mask_brush::MaskBrush;
 use self::preparation::SelectionPreparation;
 use self::ruler::Ruler;
 use self::segment::SegmentTool;
-use self::splat_brush::SplatBrush;
+use self::splat_brush::{Brushed, SplatBrush};
 use self::transform::TransformTool;
 use super::display::Display;
 use super::eye::Eye;
@@ -34,7 +34,7 @@ use crate::ui::state::AppState;
 use crate::worker::{Tasks, Versioned};
 
 /// The tool in use.
-pub(super) enum Tool {
+pub(crate) enum Tool {
     Ruler(Ruler),
     Crop(CropTool),
     Inspect(Box<Inspector>),
@@ -121,6 +121,11 @@ pub(super) trait ViewTool {
 
     /// Draws over the frame of a view; handles for dragging are widgets.
     fn paint(&mut self, _ui: &Ui, _area: ViewArea, _scene: &mut ToolScene<'_>, _cx: &mut Ctx<'_>) {}
+
+    /// Takes the Gaussians that were chosen, or taken out of the choice, since the last call.
+    fn take_brushed(&mut self) -> Vec<Brushed> {
+        Vec::new()
+    }
 
     /// Draws the card.
     fn card(&mut self, ui: &Ui, places: CardPlaces, scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>);

@@ -31,21 +31,18 @@ pub(crate) struct SplatBrush {
     brushed: Vec<Brushed>,
 }
 
-impl SplatBrush {
-    pub(crate) fn new() -> Self {
+impl Default for SplatBrush {
+    fn default() -> Self {
         Self { radius_px: 18.0, through: false, centers: None, brushed: Vec::new() }
     }
+}
 
+impl SplatBrush {
     /// The Gaussians under a dab of this radius in px of the frame.
     fn under(&self, at: DVec2, radius: f64) -> Vec<usize> {
         let centers = self.centers.iter().flat_map(|(_, _, centers)| centers);
         let near = |c: &Option<DVec2>| c.is_some_and(|c| c.distance_squared(at) <= radius * radius);
         centers.enumerate().filter(|(_, c)| near(c)).map(|(i, _)| i).collect()
-    }
-
-    /// Takes the Gaussians brushed over since the last call.
-    pub(crate) fn take_brushed(&mut self) -> Vec<Brushed> {
-        std::mem::take(&mut self.brushed)
     }
 }
 
@@ -94,6 +91,10 @@ impl ViewTool for SplatBrush {
             ui.painter().circle_stroke(pos, self.radius_px, Stroke::new(3.0, Color32::from_black_alpha(160)));
             ui.painter().circle_stroke(pos, self.radius_px, Stroke::new(1.0, Color32::WHITE));
         }
+    }
+
+    fn take_brushed(&mut self) -> Vec<Brushed> {
+        std::mem::take(&mut self.brushed)
     }
 
     fn card(&mut self, ui: &Ui, places: CardPlaces, _scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
@@ -159,7 +160,7 @@ mod tests {
         let under = |depth, numbers| {
             let brush = SplatBrush {
                 centers: Some((camera.clone(), false, centers(&cloud, numbers, &camera, depth))),
-                ..SplatBrush::new()
+                ..SplatBrush::default()
             };
             brush.under(DVec2::new(20.0, 20.0), 4.0)
         };
