@@ -199,10 +199,13 @@ impl PaneContents for CleanPane {
         self.show_measure(ui, &measured.measures);
         theme::section(ui, "By color and place");
         self.choice.show_places(ui, view.picking.selected(), view.visibility.crop());
-        let brush = Action::BrushSplats;
-        if ui.button("Brush\u{2026}").on_hover_text(brush.tooltip()).clicked() {
-            cx.ask(brush);
-        }
+        ui.horizontal(|ui| {
+            for (text, tool) in [("Brush\u{2026}", Action::BrushSplats), ("Pick a color\u{2026}", Action::PickColor)] {
+                if ui.button(text).on_hover_text(tool.tooltip()).clicked() {
+                    cx.ask(tool);
+                }
+            }
+        });
         if before != self.choice {
             self.choose(&measured, state);
         }

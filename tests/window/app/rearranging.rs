@@ -166,3 +166,35 @@ fn gaussians_that_are_brushed_over_are_chosen_and_with_shift_they_are_not() {
     w.harness.run_steps(4);
     assert_eq!(chosen(&w), 0, "the same stroke takes all of it out again");
 }
+
+#[test]
+fn a_click_on_a_color_chooses_its_gaussians_and_with_shift_takes_them_out() {
+    let folder = tempfile::tempdir().expect("folder");
+    let mut w = window(folder.path());
+    w.ask(Action::MeasureSplats);
+    w.until("measures", |a| a.state.log.iter().any(|line| line.text.contains("Gaussians measured")));
+    w.ask(Action::PickColor);
+    w.until("all is drawn", |a| a.viewport.picture().is_some_and(|p| p.full));
+    assert!(w.shows("Click a color: all Gaussians of that color are chosen."));
+    let viewport = w.harness.get_by_role_and_label(Role::Image, "Viewport").rect();
+    let picture = w.app().viewport.picture().expect("drawn").clone();
+    let brightest = picture.rgb.iter().enumerate().max_by_key(|(_, p)| p.iter().map(|v| u32::from(*v)).sum::<u32>());
+    let (place, wide) = (brightest.expect("pixels").0, picture.camera.width_px as usize);
+    let scale = viewport.width() / wide as f32;
+    let at = viewport.min + egui::vec2((place % wide) as f32 + 0.5, (place / wide) as f32 + 0.5) * scale;
+    let click = |w: &mut Window, modifiers: Modifiers| {
+        w.harness.hover_at(at);
+        w.harness.step();
+        let (button, pos) = (egui::PointerButton::Primary, at);
+        let event = |pressed| egui::Event::PointerButton { pos, button, pressed, modifiers };
+        w.harness.input_mut().modifiers = modifiers;
+        w.harness.input_mut().events.extend([true, false].map(event));
+        w.harness.run_steps(4);
+        w.harness.input_mut().modifiers = Modifiers::NONE;
+    };
+    let chosen = |w: &Window| w.harness.get_by_label_contains(" Gaussians (").value().expect("how many are chosen");
+    click(&mut w, Modifiers::NONE);
+    assert!(!chosen(&w).starts_with("0 "), "{}", chosen(&w));
+    click(&mut w, Modifiers::SHIFT);
+    assert!(chosen(&w).starts_with("0 "), "{}", chosen(&w));
+}

@@ -2,6 +2,7 @@
 //! and owns its jobs.
 
 pub(crate) mod crop;
+pub(crate) mod eyedropper;
 pub(crate) mod inspect;
 pub(crate) mod mask_brush;
 pub(crate) mod preparation;
@@ -13,6 +14,7 @@ pub(crate) mod transform;
 use egui::{Rect, Response, Ui};
 
 use self::crop::CropTool;
+use self::eyedropper::Eyedropper;
 use self::inspect::Inspector;
 use self::mask_brush::MaskBrush;
 use self::preparation::SelectionPreparation;
@@ -40,6 +42,7 @@ pub(crate) enum Tool {
     Inspect(Box<Inspector>),
     MaskBrush(MaskBrush),
     SplatBrush(SplatBrush),
+    Eyedropper(Eyedropper),
     Segment(Box<SegmentTool>),
     Transform(TransformTool),
 }
@@ -52,14 +55,15 @@ impl Tool {
             Self::Inspect(tool) => &mut **tool,
             Self::MaskBrush(tool) => tool,
             Self::SplatBrush(tool) => tool,
+            Self::Eyedropper(tool) => tool,
             Self::Segment(tool) => &mut **tool,
             Self::Transform(tool) => tool,
         }
     }
 
-    /// True if the tool paints, selects or transforms: "Done" and "Cancel" of its card end it.
+    /// True if the tool paints, chooses or transforms: "Done" and "Cancel" of its card end it.
     pub(super) fn is_edit(&self) -> bool {
-        matches!(self, Self::MaskBrush(_) | Self::SplatBrush(_) | Self::Segment(_) | Self::Transform(_))
+        !matches!(self, Self::Ruler(_) | Self::Crop(_) | Self::Inspect(_))
     }
 }
 
