@@ -182,15 +182,14 @@ fn a_click_on_a_color_chooses_its_gaussians_and_with_shift_takes_them_out() {
     let (place, wide) = (brightest.expect("pixels").0, picture.camera.width_px as usize);
     let scale = viewport.width() / wide as f32;
     let at = viewport.min + egui::vec2((place % wide) as f32 + 0.5, (place / wide) as f32 + 0.5) * scale;
-    let click = |w: &mut Window, modifiers: Modifiers| {
+    let click = |w: &mut Window, modifiers| {
+        let button = |pressed| Event::PointerButton { pos: at, button: PointerButton::Primary, pressed, modifiers };
+        w.harness.event(Event::ModifiersChanged(modifiers));
         w.harness.hover_at(at);
         w.harness.step();
-        let (button, pos) = (egui::PointerButton::Primary, at);
-        let event = |pressed| egui::Event::PointerButton { pos, button, pressed, modifiers };
-        w.harness.input_mut().modifiers = modifiers;
-        w.harness.input_mut().events.extend([true, false].map(event));
+        [true, false].into_iter().for_each(|pressed| w.harness.event(button(pressed)));
+        w.harness.event(Event::ModifiersChanged(Modifiers::NONE));
         w.harness.run_steps(4);
-        w.harness.input_mut().modifiers = Modifiers::NONE;
     };
     let chosen = |w: &Window| w.harness.get_by_label_contains(" Gaussians (").value().expect("how many are chosen");
     click(&mut w, Modifiers::NONE);
