@@ -178,8 +178,17 @@ fn a_click_on_a_color_chooses_its_gaussians_and_with_shift_takes_them_out() {
     assert!(w.shows("Click a color: all Gaussians of that color are chosen."));
     let viewport = w.harness.get_by_role_and_label(Role::Image, "Viewport").rect();
     let picture = w.app().viewport.picture().expect("drawn").clone();
-    let brightest = picture.rgb.iter().enumerate().max_by_key(|(_, p)| p.iter().map(|v| u32::from(*v)).sum::<u32>());
-    let (place, wide) = (brightest.expect("pixels").0, picture.camera.width_px as usize);
+    // The pixel whose color is nearest to that of a Gaussian.
+    let all = cloud(w.app());
+    let own: Vec<[f32; 3]> =
+        (0..all.len()).map(|i| all.sh[i * all.sh_stride()].map(|v| (0.5 + 0.282_094_8 * v).clamp(0.0, 1.0))).collect();
+    let distance = |p: &[u8; 3]| {
+        let to = |c: &[f32; 3]| (0..3).map(|k| (c[k] - f32::from(p[k]) / 255.0).powi(2)).sum::<f32>();
+        own.iter().map(to).fold(f32::INFINITY, f32::min)
+    };
+    let nearest =
+        (0..picture.rgb.len()).min_by(|a, b| distance(&picture.rgb[*a]).total_cmp(&distance(&picture.rgb[*b])));
+    let (place, wide) = (nearest.expect("pixels"), picture.camera.width_px as usize);
     let scale = viewport.width() / wide as f32;
     let at = viewport.min + egui::vec2((place % wide) as f32 + 0.5, (place / wide) as f32 + 0.5) * scale;
     let click = |w: &mut Window, modifiers| {
