@@ -2,7 +2,6 @@
 
 use std::path::PathBuf;
 
-
 use super::progress::Console;
 use super::{CliError, number, output, view};
 use crate::jobs::bench::{self, BenchRequest};
