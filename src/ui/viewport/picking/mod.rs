@@ -11,7 +11,6 @@ use super::outline;
 use crate::jobs::query::ViewMaps;
 use crate::pipeline::semantics::view_map::ViewMap;
 use crate::scene::{Identities, IdentityId, Mask, PixelBox, SemanticMap, text};
-use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
 use crate::ui::labels::ScreenNames;
 use crate::ui::theme;
@@ -85,7 +84,9 @@ impl Picking {
         let cursor = response.hover_pos().filter(|_| !open && !response.dragged());
         self.hovered = cursor.and_then(under).map(|id| picked(all, id, self.selected, alt));
         if response.clicked() && maps.is_some() && self.selected != self.hovered {
-            cx.ask(Action::Select(self.hovered));
+            self.select(self.hovered);
+            // Panes that were drawn already show the selection, too.
+            response.ctx.request_repaint();
         }
         if response.secondary_clicked() {
             // On the selection the menu is that of the selection, else of the identity that a click would select.
@@ -93,7 +94,8 @@ impl Picking {
             let within = |s: &IdentityId| id.is_some_and(|id| all.ancestors(id).any(|at| at == *s));
             self.menu = self.selected.filter(within).or_else(|| id.map(|id| picked(all, id, None, alt)));
             if self.menu.is_some() && self.menu != self.selected {
-                cx.ask(Action::Select(self.menu));
+                self.select(self.menu);
+                response.ctx.request_repaint();
             }
         }
         response.context_menu(|ui| menu::show(ui, all, self.menu, cx));
