@@ -1,8 +1,9 @@
 //! Another scene beside the current one: its Gaussians in the second view, from the same camera.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
-use crate::jobs::OpenedScene;
+use crate::jobs::{OpenedScene, Scene};
 use crate::render::RenderSettings;
 use crate::scene::GaussianCloud;
 use crate::worker::Versioned;
@@ -21,7 +22,8 @@ pub struct ComparedScene {
 impl ComparedScene {
     /// Content of a scene for the second view; `None` if it has no Gaussians.
     pub(crate) fn of(scene: OpenedScene) -> Option<Self> {
-        let cloud = scene.cloud.map(Versioned::new)?;
-        Some(Self { name: scene.name, path: scene.path, cloud, settings: scene.render })
+        let cloud = Versioned::new(Arc::clone(scene.gaussians()?));
+        let Scene { name, path, settings, .. } = scene.scene;
+        Some(Self { name, path, cloud, settings })
     }
 }

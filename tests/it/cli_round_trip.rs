@@ -141,14 +141,14 @@ fn the_window_and_the_command_line_do_the_same() {
     let scene = open(&trained);
     near(&scene.home.camera([640, 480]), &first_view(&trained));
     fmlgs(&["export", &trained, "--out", &at("out.ply")]).ok();
-    let cloud = scene.cloud.clone().unwrap();
+    let cloud = scene.cloud.clone();
     assert_eq!(splat_ply::read(Path::new(&at("out.ply"))).unwrap(), *cloud);
 
     let dataset = scene.dataset.clone().unwrap();
     let config = TrainConfig { max_side_px: 64, ..TrainConfig::default() };
     // Whatever is set for the next training: the scene knows what it has not seen.
     let config = TrainConfig { holdout_every: 3, ..config };
-    let (out, settings) = (scene.out.clone(), scene.render.clone());
+    let (out, settings) = (scene.out.clone(), scene.settings.clone());
     let (d, c) = (dataset.clone(), cloud.clone());
     let evaluation = workspace.evaluate(d, c, config.clone(), settings.clone(), &out, &mut Silent).unwrap();
     let eval = fmlgs(&["eval", &trained, "--json"]).ok().json();

@@ -114,7 +114,7 @@ pub(crate) fn open_photos(
 
 /// Gives a scene a name that differs from its folder's.
 fn call(scene: &mut OpenedScene, name: &str) {
-    scene.name = name.into();
+    scene.scene.name = name.into();
     if let Some(dataset) = scene.dataset.as_mut().map(Arc::make_mut) {
         dataset.name = name.into();
     }

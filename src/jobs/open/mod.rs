@@ -1,5 +1,6 @@
 //! Opens a scene: the contents of a path, of any kind, for the window and the command line.
 
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -33,15 +34,16 @@ pub struct Scene {
     pub(crate) path: PathBuf,
     /// Folder of the trained scene, if it is one.
     pub(crate) folder: Option<PathBuf>,
-    pub(crate) name: String,
+    /// Short name for titles.
+    pub name: String,
     /// The Gaussians, without zero bands of spherical harmonics.
-    pub(crate) cloud: Arc<GaussianCloud>,
+    pub cloud: Arc<GaussianCloud>,
     /// Degree of the spherical harmonics in its file.
     pub(crate) sh_stored: u8,
     /// The photos' cameras, possibly none.
     pub(crate) cameras: Vec<SceneCamera>,
     /// Render settings: background, filter and so on, as in training.
-    pub(crate) settings: RenderSettings,
+    pub settings: RenderSettings,
     /// True if it has its own background: a splat file does not.
     pub(crate) says_background: bool,
     /// Training settings; defaults if they are unknown.
@@ -201,16 +203,13 @@ pub(crate) fn cameras(dataset: &Dataset, every: usize) -> Vec<SceneCamera> {
 /// A scene with all its data, as the user views and edits it.
 #[derive(Clone, Debug, Default)]
 pub struct OpenedScene {
-    pub(crate) path: PathBuf,
-    /// Short name for titles.
-    pub name: String,
+    /// The Gaussians and what belongs to them; of untrained photos, the sparse points as small Gaussians, if any.
+    pub scene: Scene,
     /// Posed photos, if it has any.
     pub dataset: Option<Arc<Dataset>>,
     /// Indices of held-out photos, if they are known.
     pub(crate) known_held_out: Option<Vec<usize>>,
-    /// The drawn Gaussians: trained ones, or the sparse points as small ones.
-    pub cloud: Option<Arc<GaussianCloud>>,
-    /// True if `cloud` is a result, not just sparse points.
+    /// True if the Gaussians are a result, not just sparse points.
     pub(crate) trained: bool,
     /// Objects and parts, if they were found before.
     pub semantics: Option<Arc<SemanticMap>>,
@@ -218,18 +217,11 @@ pub struct OpenedScene {
     pub(crate) masks: Option<PathBuf>,
     /// Folder in which training keeps its results and checkpoints.
     pub out: PathBuf,
-    pub(crate) history: History,
-    pub(crate) meters_per_unit: Option<f64>,
     /// The first view.
     pub home: HomeView,
-    /// Render settings: background and filter.
-    pub render: RenderSettings,
-    pub(crate) sh_stored: u8,
     pub(crate) facts: SceneFacts,
-    /// Id of the save that its files belong to, if it has one.
-    pub(crate) state: Option<String>,
-    /// Settings of a training run in `out` that can be resumed.
-    pub(crate) resumable: Option<TrainConfig>,
+    /// True if the training run in `out` can be resumed.
+    pub(crate) can_resume: bool,
     /// All training runs of its photos that this program keeps, itself included.
     pub runs: Vec<RunSummary>,
     pub(crate) reports: Vec<PathBuf>,
@@ -240,7 +232,20 @@ pub struct OpenedScene {
     pub remote: Option<Origin>,
 }
 
+impl Deref for OpenedScene {
+    type Target = Scene;
+
+    fn deref(&self) -> &Scene {
+        &self.scene
+    }
+}
+
 impl OpenedScene {
+    /// Returns the drawn Gaussians, if there are any.
+    pub fn gaussians(&self) -> Option<&Arc<GaussianCloud>> {
+        Some(&self.scene.cloud).filter(|cloud| !cloud.is_empty())
+    }
+
     /// Returns the path of its Gaussians: the folder of a trained scene, or a file.
     pub(crate) fn stored(&self) -> &Path {
         if trained::is_scene(&self.out) { &self.out } else { &self.path }
@@ -255,7 +260,7 @@ impl OpenedScene {
 
     /// Length of a unit in meters, if it is known of the scene or of its photos.
     pub(crate) fn meters_per_unit(&self) -> Option<f64> {
-        self.meters_per_unit.or_else(|| self.dataset.as_ref().and_then(|d| d.meters_per_unit))
+        self.scene.meters_per_unit.or_else(|| self.dataset.as_ref().and_then(|d| d.meters_per_unit))
     }
 
     /// Returns the indices of its held-out photos; if they are unknown, every `every`-th.
@@ -275,21 +280,14 @@ impl OpenedScene {
         let has_checkpoint = scene.folder.as_ref().is_some_and(|f| f.join(CHECKPOINT_FILE).is_file());
         let semantics = scene.folder.is_some().then(|| known_objects(&scene, observer)).flatten();
         Self {
-            path: scene.path,
-            name: scene.name,
             dataset,
             known_held_out,
-            cloud: Some(scene.cloud),
             trained: true,
             semantics,
-            out: scene.folder.unwrap_or_default(),
-            history: scene.history,
-            meters_per_unit: scene.meters_per_unit,
+            out: scene.folder.clone().unwrap_or_default(),
             home,
-            render: scene.settings,
-            sh_stored: scene.sh_stored,
-            state: scene.state,
-            resumable: has_checkpoint.then_some(scene.config),
+            can_resume: has_checkpoint,
+            scene,
             ..Self::default()
         }
     }
@@ -305,7 +303,7 @@ pub(crate) fn open(
 ) -> Result<OpenedScene, JobError> {
     let path = &beside::splat_of(&std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf()));
     let mut at = path.clone();
-    let mut scene = match io::open(path)? {
+    let mut opened = match io::open(path)? {
         Opened::Dataset(dataset) => photos(dataset, folders, observer),
         Opened::Cloud(cloud) => {
             let scene = Scene::bare(path, cloud);
@@ -323,21 +321,21 @@ pub(crate) fn open(
             OpenedScene::of(scene, dataset, observer)
         }
     };
-    scene.path = at;
-    scene.runs = scene.dataset.as_ref().map_or_else(Vec::new, |d| recent::runs(folders, &d.root));
-    if let Some(text) = objects_elsewhere(&scene) {
+    opened.scene.path = at;
+    opened.runs = opened.dataset.as_ref().map_or_else(Vec::new, |d| recent::runs(folders, &d.root));
+    if let Some(text) = objects_elsewhere(&opened) {
         observer.note(Severity::Warning, text);
     }
-    let root = scene.dataset.as_ref().map(|d| d.root.clone());
-    scene.masks = root.filter(|root| Labels::open(root).is_ok());
-    scene.report_out = match scene.out.as_os_str().is_empty() {
+    let root = opened.dataset.as_ref().map(|d| d.root.clone());
+    opened.masks = root.filter(|root| Labels::open(root).is_ok());
+    opened.report_out = match opened.out.as_os_str().is_empty() {
         true => folders.report(path),
-        false => scene.out.join("report"),
+        false => opened.out.join("report"),
     };
-    let cloud = scene.cloud.as_deref().filter(|_| scene.trained).map(|c| (c, scene.sh_stored));
-    let facts = plan::facts(machine, scene.dataset.as_deref(), cloud, &TrainConfig::default());
-    scene.facts = facts.with_semantics(scene.semantics.as_deref());
-    Ok(scene)
+    let cloud = opened.trained.then_some((&*opened.cloud, opened.sh_stored));
+    let facts = plan::facts(machine, opened.dataset.as_deref(), cloud, &TrainConfig::default());
+    opened.facts = facts.with_semantics(opened.semantics.as_deref());
+    Ok(opened)
 }
 
 /// Opens photos, with the Gaussians that were trained on them before, if there are any.
@@ -355,13 +353,13 @@ fn photos(dataset: Dataset, folders: &Folders, observer: &mut dyn Observer) -> O
     let dataset = Arc::new(dataset);
     if let Some(before) = before {
         let scene = tolerant(&out, before, observer);
-        let opened = OpenedScene::of(scene, Some(dataset), observer);
-        return OpenedScene { name, ..opened };
+        return OpenedScene::of(Scene { name, ..scene }, Some(dataset), observer);
     }
     let cloud = sparse_cloud(&dataset).map(Arc::new);
-    let render = TrainConfig::default().render_settings(background, dataset.camera_extent().1);
+    let settings = TrainConfig::default().render_settings(background, dataset.camera_extent().1);
     let home = HomeView::new(&dataset.cameras(), cloud.as_deref());
-    OpenedScene { name, dataset: Some(dataset), cloud, out, render, home, ..OpenedScene::default() }
+    let scene = Scene { name, cloud: cloud.unwrap_or_default(), settings, ..Scene::default() };
+    OpenedScene { scene, dataset: Some(dataset), out, home, ..OpenedScene::default() }
 }
 
 /// Returns the near plane's distance for Gaussians without cameras. Small scenes would lie before the default one; in

@@ -56,7 +56,7 @@ pub(crate) fn received(
     let scene = Scene {
         name: info.name,
         path,
-        cloud: Arc::clone(&cloud),
+        cloud,
         sh_stored,
         cameras: info.cameras,
         settings,
@@ -65,13 +65,12 @@ pub(crate) fn received(
         meters_per_unit: info.meters_per_unit.filter(|m| m.is_finite() && *m > 0.0),
         ..Scene::default()
     };
-    let known = is_result.then_some((&*cloud, sh_stored));
+    let known = is_result.then_some((&*scene.cloud, sh_stored));
     let facts = plan::facts(machine, dataset.as_deref(), known, &TrainConfig::default());
     let out = folders.of_remote(&origin.host);
     Ok(OpenedScene {
         facts: facts.with_semantics(map.as_ref()),
         semantics: map.map(Arc::new),
-        cloud: (!cloud.is_empty()).then_some(cloud),
         trained: is_result,
         report_out: out.join("report"),
         out,

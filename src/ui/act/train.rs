@@ -106,7 +106,7 @@ pub(in crate::ui) fn benchmark_rendering(app: &mut App) {
     let subject = Subject {
         name: scene.path.display().to_string(),
         cloud: Arc::clone(&cloud),
-        settings: scene.render.clone(),
+        settings: scene.settings.clone(),
         cameras: vec![(app.viewport.camera(), false)],
         holdout_every: app.layout.config.holdout_every,
         dataset: scene.dataset.clone(),

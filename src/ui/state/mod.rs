@@ -12,13 +12,13 @@ use super::history::ChangeHistory;
 use super::labels::{PhraseTable, ScreenNames};
 pub(crate) use super::train_history::TrainHistory;
 use crate::io::unposed::Unposed;
-use crate::jobs::OpenedScene;
 use crate::jobs::go_to::Explored;
 use crate::jobs::models::ModelList;
 use crate::jobs::rearrange::RearrangedScene;
 use crate::jobs::recent::RunSummary;
 use crate::jobs::remove::StoredRemoval;
 use crate::jobs::workspace::TrainedRun;
+use crate::jobs::{OpenedScene, Scene};
 use crate::math::format;
 use crate::measure::Report;
 use crate::pipeline::observer::{Evaluation, Progress, Severity};
@@ -218,7 +218,7 @@ impl AppState {
 
     /// Render settings of the Gaussians on screen: those of their training, without what the plan leaves out.
     pub(crate) fn render_settings(&self) -> RenderSettings {
-        let scene = self.scene.as_ref().map(|s| s.render.clone()).unwrap_or_default();
+        let scene = self.scene.as_ref().map(|s| s.settings.clone()).unwrap_or_default();
         let sh_degree = if self.is_training() { scene.sh_degree } else { self.plan.sh_degree };
         RenderSettings { sh_degree, antialias: self.antialias, ..scene }
     }
@@ -275,14 +275,14 @@ impl AppState {
         self.training_job = None;
         self.previous = TrainHistory::default();
         let reached = self.history.steps.last().map(|s| s.step);
-        self.resumable = scene.resumable.clone().zip(reached);
+        self.resumable = scene.can_resume.then(|| scene.config.clone()).zip(reached);
         if !is_demo && scene.remote.is_none() {
             self.remember(scene.path.clone());
         }
         self.scene_number += 1;
         (self.explored, self.comparison, self.removed) = (None, None, None);
         self.set_facts(scene.facts.clone());
-        self.antialias = scene.render.antialias;
+        self.antialias = scene.settings.antialias;
         self.set_semantics(scene.semantics.clone());
         (self.labels, self.phrases) = Default::default();
         self.scene = Some(Arc::new(scene));
@@ -333,16 +333,20 @@ impl AppState {
             self.remember(folder.clone());
         }
         self.scene = Some(Arc::new(OpenedScene {
-            path: folder.clone(),
-            name,
+            scene: Scene {
+                path: folder.clone(),
+                name,
+                cloud: Arc::clone(&cloud),
+                state: Some(state),
+                folder: Some(folder.clone()),
+                ..before.scene.clone()
+            },
             trained: true,
-            cloud: Some(Arc::clone(&cloud)),
             semantics: map.clone(),
             report_out: folder.join("report"),
             out: folder,
-            state: Some(state),
             // The new folder has no training to continue.
-            resumable: None,
+            can_resume: false,
             is_edited: true,
             ..(*before).clone()
         }));
@@ -355,8 +359,9 @@ impl AppState {
 
     /// Sets the length of a unit, and reports it.
     pub(crate) fn scaled(&mut self, meters: f64, is_stored: bool) {
-        let scaled = |s: &Arc<OpenedScene>| OpenedScene { meters_per_unit: Some(meters), ..(**s).clone() };
-        self.scene = self.scene.as_ref().map(scaled).map(Arc::new);
+        if let Some(scene) = &mut self.scene {
+            Arc::make_mut(scene).scene.meters_per_unit = Some(meters);
+        }
         let kept = if is_stored { "saved with the scene" } else { "not saved: save or train the scene first" };
         self.toast(Tone::Good, format!("1 unit is {}, {kept}", format::length(1.0, Some(meters))));
     }

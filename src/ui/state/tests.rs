@@ -28,8 +28,7 @@ fn step(n: u64) -> Event {
 fn open(state: &mut AppState, name: &str, warnings: &[&str]) {
     let dataset = Dataset { warnings: warnings.iter().map(|w| (*w).to_owned()).collect(), ..Dataset::default() };
     let scene = OpenedScene {
-        name: name.into(),
-        path: name.into(),
+        scene: Scene { name: name.into(), path: name.into(), ..Scene::default() },
         dataset: Some(Arc::new(dataset)),
         ..OpenedScene::default()
     };

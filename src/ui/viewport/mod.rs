@@ -195,7 +195,7 @@ impl Viewport {
             self.preparation.forget(tasks);
             self.requests.forget();
             self.display.clear();
-            self.set_cloud(scene.cloud.clone());
+            self.set_cloud(scene.gaussians().cloned());
             self.up = None;
             self.queries.clear();
             self.visibility = Visibility::default();

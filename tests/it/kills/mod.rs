@@ -206,7 +206,7 @@ fn edit_for_ever(scene: PathBuf) {
     let workspace = Workspace::new(Folders { data: scene.join("data") });
     let opened = workspace.open(&scene, &mut Silent).expect("a scene");
     let OpenedPath::Scene(opened) = opened else { panic!("not opened") };
-    let (cloud, map) = (opened.cloud.clone().unwrap(), opened.semantics.clone().unwrap());
+    let (cloud, map) = (opened.cloud.clone(), opened.semantics.clone().unwrap());
     let mut other = (*map).clone();
     other.identity_of.reverse();
     // What a kill left may be the one or the other.

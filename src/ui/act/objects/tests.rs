@@ -11,7 +11,7 @@ use super::*;
 use crate::jobs::find_objects::FindSettings;
 use crate::jobs::models::{ModelList, ModelState};
 use crate::jobs::workspace::OpenedPath;
-use crate::jobs::{Folders, OpenedScene};
+use crate::jobs::{Folders, OpenedScene, Scene};
 use crate::models::catalog;
 use crate::navigate::testing::cloud_of_wall;
 use crate::pipeline::semantics::lifting::build_map::MaskPropagation;
@@ -45,11 +45,14 @@ impl Told {
         }
         match info.title.as_str() {
             "Opening photos" => Ok(Box::new(OpenedPath::Scene(Box::new(OpenedScene {
-                name: "photos".into(),
+                scene: Scene {
+                    name: "photos".into(),
+                    path: "photos".into(),
+                    cloud: Arc::new(cloud_of_wall(2.0)),
+                    ..Scene::default()
+                },
                 out: "photos".into(),
-                path: "photos".into(),
                 dataset: Some(Arc::new(Dataset::default())),
-                cloud: Some(Arc::new(cloud_of_wall(2.0))),
                 trained: true,
                 ..OpenedScene::default()
             })))),
