@@ -9,7 +9,9 @@
 mod demo_scene;
 mod english;
 mod front_ends;
+mod links;
 mod names;
+mod rooms;
 mod rules;
 mod source;
 
@@ -105,6 +107,25 @@ fn comments_begin_with_a_noun_or_a_verb_and_sentences_are_short() {
     assert_eq!(complaints(english::sentences, "a.md", &long.repeat(11)), 11);
     let unseen = format!("```\n{}\n```\n| {} |\n", words(60), words(60));
     assert_eq!(complaints(english::sentences, "a.md", &(short.repeat(30) + "\n" + &unseen.repeat(11))), 0);
+}
+
+#[test]
+fn links_of_documents_lead_somewhere() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    check(links::links(root, &english::documents(root)));
+    let n = |text| links::links(root, &[file("docs/a.md", text)]).len();
+    assert_eq!(n("[a](guide.md), [b](../README.md), [c](#one-more), [d](https://x.y/z)\n\n## One more\n"), 0);
+    assert_eq!(n("[a](gone.md), [b](guide.md#no-such-heading), [c](#two)\n\n## One\n"), 3);
+}
+
+#[test]
+fn rooms_of_semantics_use_only_those_before_them() {
+    check(rooms::rooms(&tree()));
+    let n = |path: &str, text| complaints(rooms::rooms, &format!("src/pipeline/semantics/{path}"), text);
+    assert_eq!(n("query/a.rs", "use crate::pipeline::semantics::lifting::codes;"), 0);
+    assert_eq!(n("lifting/a.rs", "use crate::pipeline::semantics::{query::parse, evaluation};"), 2);
+    assert_eq!(n("query/a/b.rs", "use super::super::super::evaluation::score;"), 1);
+    assert_eq!(n("relevancy.rs", "use super::query::parse;"), 1);
 }
 
 /// One made-up file.
