@@ -15,6 +15,7 @@ use crate::ui::actions::Pane;
 use crate::ui::app::App;
 use crate::ui::history::EditStep;
 use crate::ui::state::Tone;
+use crate::ui::viewport::tools::Tool;
 use crate::worker::JobInfo;
 
 /// Corrects objects and parts.
@@ -70,6 +71,15 @@ pub(in crate::ui) fn measure_splats(app: &mut App) {
             app.clean.take(Arc::new(measured));
         }
     });
+}
+
+/// Begins choosing Gaussians with a tool, if they are measured.
+pub(in crate::ui) fn choose_with(app: &mut App, tool: Tool) {
+    if app.clean.is_measured() {
+        return app.viewport.choose_with(tool, &app.state);
+    }
+    app.layout.show(Pane::Clean);
+    app.state.toast(Tone::Info, "Measure the Gaussians first (Clean pane): a choice is made among them.");
 }
 
 /// Deletes the chosen Gaussians.

@@ -133,9 +133,9 @@ macro_rules! action_table {
                 "Size, shape, opacity and neighbors of each, and what the photos show of it: finds floaters and the like."
                 => edit::measure_splats(app);
             BrushSplats: "Choose Gaussians by brush", "Brush over what is chosen in the Clean pane, once it is measured."
-                => app.viewport.choose_with(Tool::SplatBrush(Default::default()), &app.state);
+                => edit::choose_with(app, Tool::SplatBrush(Default::default()));
             PickColor: "Choose Gaussians by color", "Click a color in the view: adds its Gaussians to the choice in the Clean pane."
-                => app.viewport.choose_with(Tool::Eyedropper(Default::default()), &app.state);
+                => edit::choose_with(app, Tool::Eyedropper(Default::default()));
             DeleteChosen: "Delete the chosen Gaussians",
                 "Delete what is chosen in the Clean pane; can be undone, and the scene that was opened stays as it is."
                 => edit::delete_chosen(app);

@@ -82,6 +82,11 @@ impl CleanPane {
         self.chosen.clone().filter(|_| is_shown)
     }
 
+    /// True if Gaussians are measured.
+    pub(crate) fn is_measured(&self) -> bool {
+        self.measured.is_some()
+    }
+
     /// Takes the chosen Gaussians, to delete them.
     pub(crate) fn take_chosen(&mut self) -> Option<Vec<bool>> {
         self.deleted = self.chosen.clone().filter(|c| c.count > 0);

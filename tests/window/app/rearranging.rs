@@ -171,6 +171,8 @@ fn gaussians_that_are_brushed_over_are_chosen_and_with_shift_they_are_not() {
 fn a_click_on_a_color_chooses_its_gaussians_and_with_shift_takes_them_out() {
     let folder = tempfile::tempdir().expect("folder");
     let mut w = window(folder.path());
+    w.ask(Action::PickColor);
+    assert!(w.shows("Measure the Gaussians first") && !w.shows("Click a color"), "there is nothing to choose among");
     w.ask(Action::MeasureSplats);
     w.until("measures", |a| a.state.log.iter().any(|line| line.text.contains("Gaussians measured")));
     w.ask(Action::PickColor);
