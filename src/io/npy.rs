@@ -97,7 +97,9 @@ fn header_len(bytes: &[u8]) -> Option<usize> {
 /// Returns the product of the shape in an `.npy` header; `u64::MAX` if it has none or overflows.
 fn values_claimed(text: &str) -> u64 {
     let tuple = |text: &str| Some(text.split_once("shape")?.1.split_once('(')?.1.split_once(')')?.0.to_owned());
-    let shape = tuple(text).unwrap_or_else(|| "?".into());
+    // Of a shape that is given twice the library would take the last.
+    let is_once = text.matches("shape").count() == 1;
+    let shape = tuple(text).filter(|_| is_once).unwrap_or_else(|| "?".into());
     let entries = shape.split(',').map(str::trim).filter(|e| !e.is_empty());
     let entries: Vec<u64> = entries.map(|e| e.parse().unwrap_or(u64::MAX)).collect();
     // The library multiplies in order: a zero at the end does not help where it has overflowed before.

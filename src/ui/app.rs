@@ -81,11 +81,13 @@ pub struct App {
     pub(super) last_frame: f64,
     /// Lines of the trace that are in the log already.
     pub(super) traced: usize,
-    /// Edits of objects and parts that wait for the running one.
-    pub(super) edits: VecDeque<EditStep>,
+    /// Edits of objects and parts that wait for the running one, with the number of their scene.
+    pub(super) edits: VecDeque<(u64, EditStep)>,
     pub(super) editing: Option<Editing>,
     /// True if the view fills the window.
     pub(super) full_view: bool,
+    /// Counts the searches for objects that were asked for; only the newest waits for its downloads.
+    pub(super) searches: u64,
     /// True if objects were known in the last frame.
     pub(super) had_objects: bool,
 }
@@ -141,6 +143,7 @@ impl App {
             edits: VecDeque::new(),
             editing: None,
             full_view: false,
+            searches: 0,
             had_objects: false,
             actions: first.into_iter().collect(),
         })
@@ -212,6 +215,25 @@ impl App {
                 false
             }
         }
+    }
+
+    /// Starts a job about the open scene: if another scene is open when it ends, its result is dropped, and `then` gets
+    /// nothing.
+    pub(super) fn start_in_scene<T, E>(
+        &mut self,
+        info: JobInfo,
+        work: impl FnOnce(&mut dyn Observer) -> Result<T, E> + Send + 'static,
+        then: impl FnOnce(&mut Self, Option<T>) + 'static,
+    ) -> bool
+    where
+        T: Send + 'static,
+        E: Into<Stop> + 'static,
+    {
+        let scene = self.state.scene_number;
+        self.start_to_end(info, work, move |app, _, result| {
+            let is_open = scene == app.state.scene_number;
+            then(app, result.ok().filter(|_| is_open));
+        })
     }
 
     /// Asks for a path; `then` continues with it.

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-use crossbeam_channel::{Receiver, Sender, bounded};
+use crossbeam_channel::{Receiver, Sender, TrySendError, bounded};
 
 use self::thread::LinkThread;
 use super::Address;
@@ -111,10 +111,12 @@ impl ServerLink {
         Box::new(move |index, photo, side_px| {
             let (task, result) = Task::pair(new_job());
             let title = photo.name.clone();
-            command_sender
-                .try_send(LinkCommand::Photo { job: task.job(), index, side_px, title, result })
-                .ok()
-                .map(|()| task)
+            let command = LinkCommand::Photo { job: task.job(), index, side_px, title, result };
+            match command_sender.try_send(command) {
+                Err(TrySendError::Full(_)) => None,
+                // After the end of the link the task is canceled at once.
+                Ok(()) | Err(TrySendError::Disconnected(_)) => Some(task),
+            }
         })
     }
 }

@@ -112,7 +112,9 @@ pub(in crate::ui) fn set_scale(app: &mut App, meters_per_unit: f64) {
     }
     let workspace = Arc::clone(&app.workspace);
     let store = move |_: &mut dyn Observer| workspace.set_scale(&out, meters_per_unit);
-    app.start(JobInfo::short("Saving the scale"), store, move |app, is_stored| {
-        app.state.scaled(meters_per_unit, is_stored);
+    app.start_in_scene(JobInfo::short("Saving the scale"), store, move |app, is_stored| {
+        if let Some(is_stored) = is_stored {
+            app.state.scaled(meters_per_unit, is_stored);
+        }
     });
 }

@@ -17,19 +17,23 @@ use crate::ui::labels::sentence;
 use crate::ui::state::Tone;
 use crate::worker::{JobInfo, Stop};
 
-/// Remedy of a change that failed.
+/// Remedy of a change of Gaussians that failed.
 const UNCHANGED: &str = "Nothing has changed.";
 
 /// Queues an edit after those requested before.
 pub(in crate::ui) fn queue(app: &mut App, step: EditStep) {
-    app.edits.push_back(step);
+    app.edits.push_back((app.state.scene_number, step));
     next(app);
 }
 
 /// Begins the next edits, up to one that runs as a job.
 pub(in crate::ui) fn next(app: &mut App) {
     while app.editing.is_none() {
-        let Some(step) = app.edits.pop_front() else { return };
+        let Some((scene, step)) = app.edits.pop_front() else { return };
+        // An edit of a scene that is no longer open has no place.
+        if scene != app.state.scene_number {
+            continue;
+        }
         settle(app, true);
         match step {
             EditStep::Request(request) => apply(app, request),
@@ -66,12 +70,13 @@ fn start_edit(app: &mut App, request: EditRequest, editing: Editing) -> bool {
     let map = map.map_or_else(|| Arc::new(empty_map(&cloud)), |map| Arc::clone(&map));
     let (cloud, out, workspace) = (Arc::clone(&cloud), scene.out.clone(), Arc::clone(&app.workspace));
     let change = move |_: &mut dyn Observer| {
-        workspace.edit_objects(&cloud, &map, &request, &out).map_err(|e| Stop::from(e).or_remedy(UNCHANGED))
+        let not_stored = |e| Stop::from(e).or_remedy("The change is not stored.");
+        workspace.edit_objects(&cloud, &map, &request, &out).map_err(not_stored)
     };
     app.editing = Some(editing);
-    let started = app.start_to_end(JobInfo::short("Editing objects"), change, |app, _, map| {
-        if let Ok(map) = map {
-            app.state.set_semantics(Some(map));
+    let started = app.start_in_scene(JobInfo::short("Editing objects"), change, |app, map| {
+        if map.is_some() {
+            app.state.set_semantics(map);
         }
         ended(app);
     });
@@ -105,8 +110,8 @@ fn start_rearrangement(app: &mut App, change: SplatChange, editing: Editing) -> 
         workspace.rearrange(&request).map_err(|e: JobError| Stop::from(e).or_remedy(UNCHANGED))
     };
     app.editing = Some(editing);
-    let started = app.start_to_end(JobInfo::short(title), change, |app, _, done| {
-        if let Ok(done) = done {
+    let started = app.start_in_scene(JobInfo::short(title), change, |app, done| {
+        if let Some(done) = done {
             let cloud = app.state.rearranged(done);
             app.viewport.set_cloud(cloud);
         }
@@ -116,12 +121,12 @@ fn start_rearrangement(app: &mut App, change: SplatChange, editing: Editing) -> 
     started
 }
 
-/// Ends the running edit, and begins the next ones.
+/// Ends the running edit. The next one begins once the viewport has taken over scene and Gaussians: another scene may
+/// have been opened just now.
 fn ended(app: &mut App) {
     if let Some(editing) = app.editing.take() {
         record(app, editing);
     }
-    next(app);
 }
 
 /// Records the end of an edit in the history.

@@ -102,8 +102,10 @@ pub(in crate::ui) fn run_phrases(app: &mut App, to: Option<PathBuf>) {
         export: to,
     };
     let run = move |observer: &mut dyn Observer| phrases::run(&request, observer).map(|rows| (rows, request.export));
-    app.start(JobInfo::long("Running the phrase list").pausable(), run, |app, (rows, to)| {
-        app.state.phrases.finished(rows, to);
+    app.start_in_scene(JobInfo::long("Running the phrase list").pausable(), run, |app, found| {
+        if let Some((rows, to)) = found {
+            app.state.phrases.finished(rows, to);
+        }
     });
 }
 

@@ -88,7 +88,9 @@ pub(in crate::ui) fn evaluate(app: &mut App) {
     let workspace = Arc::clone(&app.workspace);
     let evaluate =
         move |observer: &mut dyn Observer| workspace.evaluate(dataset, cloud, config, settings, &out, observer);
-    app.start(JobInfo::long(title), evaluate, |app, evaluation| app.state.evaluated(evaluation));
+    app.start_in_scene(JobInfo::long(title), evaluate, |app, evaluation| {
+        evaluation.into_iter().for_each(|evaluation| app.state.evaluated(evaluation));
+    });
 }
 
 /// Measures the rendering of the scene, from photos or from the current camera.

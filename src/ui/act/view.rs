@@ -220,9 +220,11 @@ pub(in crate::ui) fn go_to(app: &mut App, id: IdentityId, side: Side) {
     let preference = ViewPreference { side, ..ViewPreference::default() };
     let request = ApproachRequest { explored, cloud, cameras, up, settings, map, id, preference, from, aspect, frames };
     let search = move |_: &mut dyn Observer| Ok::<_, JobError>(go_to::visit(request));
-    app.start(JobInfo::short(title), search, |app, (explored, approached)| {
-        app.state.explored = Some(explored);
-        begin_flight(app, approached);
+    app.start_in_scene(JobInfo::short(title), search, |app, found| {
+        if let Some((explored, approached)) = found {
+            app.state.explored = Some(explored);
+            begin_flight(app, approached);
+        }
     });
 }
 

@@ -64,6 +64,8 @@ pub(super) fn over_everything(app: &mut App, ctx: &egui::Context) {
         let folder = if path.is_dir() { Some(path.as_path()) } else { path.parent() };
         app.layout.folder = folder.map(Into::into);
         then(app, path);
+        // The view and the dialogs of this frame are drawn already.
+        ctx.request_repaint();
     }
     app.toasts.show(ctx, &mut app.state, ctx.content_rect().shrink2(egui::vec2(0.0, 44.0)));
 }

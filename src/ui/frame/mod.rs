@@ -63,6 +63,9 @@ fn take_news(app: &mut App, ctx: &egui::Context) {
     let cloud = app.viewport.cloud().map(|cloud| &**cloud);
     let chosen = app.clean.update(&app.state, cloud, brushed, app.layout.shows(Pane::Clean));
     app.viewport.visibility.set_chosen(chosen);
+    if !app.clean.is_measured() {
+        app.viewport.end_choosing();
+    }
     app.camera.on_scene(app.state.scene_number);
     for effect in app.chat.news() {
         edits::settle(app, false);
@@ -76,5 +79,7 @@ fn take_news(app: &mut App, ctx: &egui::Context) {
     app.photos.update(ctx, state);
     app.thumbnails.update(ctx, state, viewport.cloud().map(|c| &**c), tasks);
     app.models.update(state);
-    app.training.curves = app.report.curves(state);
+    if app.layout.shows(Pane::Training) {
+        app.training.curves = app.report.curves(state);
+    }
 }

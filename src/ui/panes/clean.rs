@@ -241,7 +241,8 @@ impl SplatChoice {
     fn brush(&mut self, brushed: &Brushed, all: usize) {
         let of = Arc::make_mut(&mut self.brushed);
         of.resize(all, None);
-        brushed.numbers.iter().for_each(|i| of[*i] = Some(!brushed.erase));
+        let places = brushed.numbers.iter().filter(|i| **i < all);
+        places.for_each(|i| of[*i] = Some(!brushed.erase));
     }
 
     fn show_places(&mut self, ui: &mut Ui, selected: Option<IdentityId>, crop: Option<CropBox>) {

@@ -187,6 +187,11 @@ impl Viewport {
         }
     }
 
+    /// Ends choosing Gaussians, as their measures are gone.
+    pub(crate) fn end_choosing(&mut self) {
+        drop(self.tool.take_if(|tool| matches!(tool, Tool::SplatBrush(_) | Tool::Eyedropper(_))));
+    }
+
     /// Ends selecting; returns the edit that applies the selection, if there is one.
     pub(crate) fn take_edit(&mut self) -> Option<Edit> {
         let edit = self.segment_tool()?.edit();

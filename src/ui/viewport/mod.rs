@@ -122,6 +122,8 @@ impl Viewport {
 
     /// Shows other Gaussians of the scene.
     pub(crate) fn set_cloud(&mut self, cloud: Option<Arc<GaussianCloud>>) {
+        // Numbers of the Gaussians before do not apply to these.
+        drop(self.take_brushed());
         self.cloud = cloud.map(Versioned::new);
     }
 

@@ -66,6 +66,7 @@ pub(in crate::ui) fn show_dialogs(app: &mut App, ctx: &egui::Context) {
 
 /// Begins a search; asks first if objects and parts were edited by the user.
 fn begin_search(app: &mut App, search: PlannedSearch) {
+    app.searches += 1;
     let by_hand = app.state.semantics.as_deref().map_or_else(Vec::new, |map| find_objects::by_hand(map));
     match by_hand.is_empty() {
         true => find_after(app, search),
@@ -76,8 +77,12 @@ fn begin_search(app: &mut App, search: PlannedSearch) {
 /// Finds objects once their models are installed: downloads the first missing one, or starts the search.
 fn find_after(app: &mut App, mut search: PlannedSearch) {
     let Some(id) = search.missing.pop_front() else { return search_all(app, search) };
-    let scene = app.state.scene_number;
+    let (scene, number) = (app.state.scene_number, app.searches);
     install(app, id, None, move |app, is_installed| {
+        // Another search was asked for since.
+        if number != app.searches {
+            return;
+        }
         if !is_installed {
             let text = "Objects are not looked for: a model is missing. A download that was cut off goes on where it \
                         ended: find objects again.";
@@ -200,13 +205,12 @@ fn start_search(app: &mut App, scope: SearchScope, step: Option<FoundStep>) {
     };
     let (workspace, info) = (Arc::clone(&app.workspace), JobInfo::long(title).makes(Makes::Objects).pausable());
     let find = move |observer: &mut dyn Observer| workspace.find_objects(&request, observer);
-    app.start_to_end(info, find, move |app, _, found| {
-        if let Ok(map) = found {
-            if is_new {
-                app.state.toast(Tone::Good, format!("{} found", map.identities.counted()));
-            }
-            app.state.set_semantics(Some(map));
+    app.start_in_scene(info, find, move |app, found| {
+        let Some(map) = found else { return };
+        if is_new {
+            app.state.toast(Tone::Good, format!("{} found", map.identities.counted()));
         }
+        app.state.set_semantics(Some(map));
         if let Some(step) = step {
             record(app, &step);
         }
@@ -261,7 +265,8 @@ pub(in crate::ui) fn submit_removal(app: &mut App, request: RemoveRequest) {
         return;
     }
     let remove = move |observer: &mut dyn Observer| removal::run_request(&request, observer);
-    app.start(JobInfo::long("Removing").pausable(), remove, |app, removed| {
+    app.start_in_scene(JobInfo::long("Removing").pausable(), remove, |app, removed| {
+        let Some(removed) = removed else { return };
         app.state.toast(Tone::Good, removal::summary(&removed.name, &removed.report));
         app.state.say(Tone::Info, format!("Saved to {}", removed.folder.display()));
         super::open::compare_scene(app, Some(removed.folder.clone()));

@@ -188,3 +188,25 @@ fn built_in_means_need_no_download_and_say_what_they_cannot() {
     assert_eq!(told.so_far(), ["find"]);
     assert_eq!(chosen(&harness), ["regions", "none"]);
 }
+
+#[test]
+fn a_result_about_a_scene_that_is_no_longer_open_is_dropped() {
+    let mut harness = asked(Told::default());
+    let got = Arc::new(Mutex::new(Vec::new()));
+    for another_is_opened in [false, true] {
+        let app = harness.state_mut();
+        app.tasks.script = None;
+        let (given, before) = (Arc::clone(&got), got.lock().expect("not poisoned").len());
+        let give = move |_: &mut App, result| given.lock().expect("not poisoned").push(result);
+        assert!(app.start_in_scene(JobInfo::short("Testing"), |_| Ok::<_, Stop>(7), give));
+        app.state.scene_number += u64::from(another_is_opened);
+        for _ in 0..2_000 {
+            if got.lock().expect("not poisoned").len() > before {
+                break;
+            }
+            harness.step();
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+    assert_eq!(*got.lock().expect("not poisoned"), [Some(7), None]);
+}

@@ -11,6 +11,7 @@ use crate::scene::GaussianCloud;
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
 use crate::ui::theme;
+use crate::worker::ViewMode;
 
 /// The eyedropper, with the color that was picked last and how many Gaussians have it.
 pub(crate) struct Eyedropper {
@@ -46,13 +47,15 @@ impl ViewTool for Eyedropper {
     }
 
     /// Chooses the Gaussians of the clicked color; removes them from the choice with Shift.
-    fn pointer(&mut self, response: &Response, area: ViewArea, scene: &mut ToolScene<'_>, _cx: &mut Ctx<'_>) {
+    fn pointer(&mut self, response: &Response, area: ViewArea, scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
         let (Some(picture), Some(cloud), Some(pos)) =
             (scene.display.picture(), scene.cloud, response.interact_pointer_pos())
         else {
             return;
         };
-        if !response.clicked_by(PointerButton::Primary) || !area.shown.contains(pos) {
+        // Other modes show colors that no Gaussian has, and another scene has other Gaussians.
+        let is_rgb = *cx.layout.mode_of(area.second) == ViewMode::Rgb && !area.is_other;
+        if !is_rgb || !response.clicked_by(PointerButton::Primary) || !area.shown.contains(pos) {
             return;
         }
         let Ok(pixels) = picture.pixels(area.second) else { return };
@@ -81,7 +84,7 @@ impl ViewTool for Eyedropper {
         theme::card(ui.ctx(), area, |ui| {
             ui.set_width((rect.width() - 40.0).clamp(200.0, 430.0));
             ui.label("Click a color: all Gaussians of that color are chosen.");
-            ui.weak("Shift takes them out of the choice.");
+            ui.weak("Shift takes them out of the choice. The view must show RGB.");
             ui.horizontal(|ui| {
                 ui.add(Slider::new(&mut self.tolerance, 0.01..=0.6).show_value(false).text("tolerance"));
                 if let Some(([r, g, b], count)) = self.picked {
