@@ -18,6 +18,8 @@ const COLUMNS: usize = 16;
 /// Thumbnails of the identities on screen.
 #[derive(Default)]
 pub(crate) struct ObjectThumbnails {
+    /// Number of the scene that they are of.
+    scene: u64,
     /// True if any thumbnail was drawn since the last update.
     used: Cell<bool>,
     /// Map of the latest request, and its task until the result is taken.
@@ -35,8 +37,11 @@ impl ObjectThumbnails {
         cloud: Option<&Arc<GaussianCloud>>,
         tasks: &Tasks,
     ) {
+        if self.scene != state.scene_number {
+            *self = Self { scene: state.scene_number, ..Self::default() };
+        }
         let (Some(map), Some(cloud), Some(scene)) = (&state.semantics, cloud, &state.scene) else {
-            *self = Self::default();
+            *self = Self { scene: self.scene, ..Self::default() };
             return;
         };
         let wanted = self.used.take();

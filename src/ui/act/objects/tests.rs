@@ -210,3 +210,24 @@ fn a_result_about_a_scene_that_is_no_longer_open_is_dropped() {
     }
     assert_eq!(*got.lock().expect("not poisoned"), [Some(7), None]);
 }
+
+#[test]
+fn what_was_measured_before_a_benchmark_was_canceled_is_shown() {
+    let mut harness = asked(Told::default());
+    let titles = Arc::new(Mutex::new(Vec::new()));
+    let asked_for = Arc::clone(&titles);
+    harness.state_mut().tasks.script = Some(Box::new(move |info| {
+        asked_for.lock().expect("not poisoned").push(info.title.clone());
+        Some(Err(Stop::Cancelled))
+    }));
+    harness.state_mut().ask(Action::BenchmarkRendering);
+    let read = || titles.lock().expect("not poisoned").iter().any(|title| title.starts_with("Opening the report"));
+    for _ in 0..2_000 {
+        if read() {
+            break;
+        }
+        harness.step();
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    assert!(read(), "{titles:?}");
+}
