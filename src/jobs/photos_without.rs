@@ -12,7 +12,6 @@ use super::{JobError, Scene, export, open, train};
 use crate::io::transforms::opengl_pose;
 use crate::io::{self, IoError, SceneFolder, atomic, files, points_ply, trained};
 use crate::math::grid;
-use crate::math::sh::SH_C0;
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::pipeline::removal::{INVENTED, RemovalOptions, invented_flags, members};
 use crate::pipeline::semantics::lifting::carry::{carry_by, nearest};
@@ -157,7 +156,7 @@ fn points(dataset: &Dataset, from: &Scene, thing: &[bool], cloud: &GaussianCloud
     let flags = invented_flags(cloud).unwrap_or_default();
     let invented = (0..flags.len()).filter(|i| flags[*i] > 0.0).map(|i| SparsePoint {
         position: cloud.world_position(i),
-        rgb: cloud.sh[i * cloud.sh_stride()].map(|v| ((0.5 + SH_C0 as f32 * v).clamp(0.0, 1.0) * 255.0) as u8),
+        rgb: cloud.mean_color(i).map(|v| (v * 255.0) as u8),
     });
     stays.map(|(p, _)| *p).chain(invented).collect()
 }

@@ -85,6 +85,13 @@ pub enum CloudError {
     Degree(u8),
 }
 
+impl GaussianCloud {
+    /// Color of Gaussian `i` in the mean over all directions, 0 to 1 as displayed.
+    pub(crate) fn mean_color(&self, i: usize) -> [f32; 3] {
+        self.sh[i * self.sh_stride()].map(|v| (0.5 + sh::SH_C0 as f32 * v).clamp(0.0, 1.0))
+    }
+}
+
 impl<R: Real> GaussianCloud<R> {
     /// Round gray Gaussians of one size and opacity.
     pub fn isotropic(positions: Vec<[R; 3]>, log_scale: R, opacity_logit: R) -> Self {

@@ -14,7 +14,6 @@ use rstar::primitives::GeomWithData;
 pub(crate) use self::rules::{CleanRule, RuleError};
 use crate::io::{self, IoError};
 use crate::math::Real;
-use crate::math::sh::SH_C0;
 use crate::math::stats::median;
 use crate::pipeline::observer::{Interrupted, Observer, Ticker};
 use crate::render::{RenderError, RenderSettings};
@@ -222,8 +221,7 @@ pub(crate) fn measure(
 
 /// View-independent colors, 0 to 1 as displayed.
 fn colors(cloud: &GaussianCloud) -> Vec<[f32; 3]> {
-    let shown = |v: f32| (0.5 + SH_C0 as f32 * v).clamp(0.0, 1.0);
-    (0..cloud.len()).map(|i| cloud.sh[i * cloud.sh_stride()].map(shown)).collect()
+    (0..cloud.len()).map(|i| cloud.mean_color(i)).collect()
 }
 
 /// Finds the nearest neighbors of each Gaussian with their distances, the nearest first.

@@ -50,15 +50,13 @@ pub(super) fn over_everything(app: &mut App, ctx: &egui::Context) {
         then(app, answer);
     }
     objects::show_dialogs(app, ctx);
-    if let Some(photos) = app.state.unposed.clone()
-        && !unposed::show(ctx, &photos, &mut app.context().0)
-    {
-        app.state.unposed = None;
+    if let Some(photos) = app.state.unposed.take() {
+        let stays = unposed::show(ctx, &photos, &mut app.context().0);
+        app.state.unposed = Some(photos).filter(|_| stays);
     }
-    if let Some(error) = app.state.error.clone()
-        && dialogs::show_error(ctx, &error, &mut app.context().0)
-    {
-        app.state.error = None;
+    if let Some(error) = app.state.error.take() {
+        let is_read = dialogs::show_error(ctx, &error, &mut app.context().0);
+        app.state.error = Some(error).filter(|_| !is_read);
     }
     if let Some((then, path)) = app.dialogs.show(ctx) {
         let folder = if path.is_dir() { Some(path.as_path()) } else { path.parent() };

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use super::error::FindError;
 use super::filters::{self, FilterOptions};
 use super::mask_cache::MaskCache;
-use super::segmenter::{FoundMask, Segmenter};
+use super::segmenter::{FoundMask, Segmenter, with_parts};
 use crate::io;
 use crate::models::catalog::{self, ModelRole};
 use crate::models::sam::automatic::{AutomaticMask, AutomaticOptions, everything};
@@ -14,7 +14,7 @@ use crate::models::sam::{PromptedMasks, Sam};
 use crate::models::sam2::Sam2;
 use crate::models::{ModelError, manifest};
 use crate::pipeline::observer::{Interrupted, Observer, Ticker};
-use crate::scene::{Level, Mask, MaskGrid, Photo, PhotoPixels};
+use crate::scene::{Mask, MaskGrid, Photo, PhotoPixels};
 
 pub(crate) struct NetworkMasks {
     pub(crate) network: Box<dyn PromptedMasks>,
@@ -178,32 +178,20 @@ impl Segmenter for NetworkMasks {
                 masks.extend(self.look_closer(&picture, &object.mask, &mut watch)?);
             }
         }
-        Ok(sorted(objects, &masks, &self.filters))
+        Ok(with_parts(objects, |object| filters::parts(&object.mask, &masks, &self.filters)))
     }
-}
-
-/// Returns the objects, largest first, then their parts among all masks, without names.
-fn sorted(objects: Vec<filters::Kept>, masks: &[Mask], options: &FilterOptions) -> Vec<FoundMask> {
-    let (mut found, mut parts) = (Vec::new(), Vec::new());
-    for (parent, object) in objects.into_iter().enumerate() {
-        let pieces = filters::parts(&object.mask, masks, options);
-        parts.extend(pieces.into_iter().map(|p| (parent, p.mask)));
-        found.push(FoundMask { level: Level::Object, parent: None, name: None, mask: object.mask });
-    }
-    let part = |(parent, mask)| FoundMask { level: Level::Part, parent: Some(parent), name: None, mask };
-    found.extend(parts.into_iter().map(part));
-    found
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::Level;
 
     #[test]
     fn what_lies_inside_something_is_its_part() {
         let mask = |from: usize, to: usize| Mask::from_fn(100, 1, |i| (from..to).contains(&i));
         let (options, masks) = (FilterOptions::default(), [mask(10, 20), mask(0, 50), mask(60, 90), mask(61, 90)]);
-        let found = sorted(filters::objects(&masks, &options), &masks, &options);
+        let found = with_parts(filters::objects(&masks, &options), |o| filters::parts(&o.mask, &masks, &options));
         let list: Vec<_> = found.iter().map(|f| (f.level, f.parent, f.mask.area())).collect();
         // A mask of nearly all of an object is that object.
         assert_eq!(list, [(Level::Object, None, 50), (Level::Object, None, 30), (Level::Part, Some(0), 10)]);

@@ -1,6 +1,7 @@
 //! Masks of one photo, and their sources.
 
 use super::error::FindError;
+use super::filters::Kept;
 use crate::io::labels::{Labels, Region};
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::scene::{Level, Mask, Photo};
@@ -15,6 +16,18 @@ pub struct FoundMask {
     pub(crate) name: Option<String>,
     /// Its pixels.
     pub mask: Mask,
+}
+
+/// Returns the objects, in their order, then the parts that each has, without names.
+pub(super) fn with_parts(objects: Vec<Kept>, parts_of: impl Fn(&Kept) -> Vec<Kept>) -> Vec<FoundMask> {
+    let (mut found, mut parts) = (Vec::new(), Vec::new());
+    for (parent, object) in objects.into_iter().enumerate() {
+        parts.extend(parts_of(&object).into_iter().map(|part| (parent, part.mask)));
+        found.push(FoundMask { level: Level::Object, parent: None, name: None, mask: object.mask });
+    }
+    let part = |(parent, mask)| FoundMask { level: Level::Part, parent: Some(parent), name: None, mask };
+    found.extend(parts.into_iter().map(part));
+    found
 }
 
 /// Finds the objects and parts of a photo.

@@ -1,16 +1,14 @@
 //! Choosing Gaussians by the color under the cursor: those whose own color is near it.
 
-use egui::{Align2, Area, Color32, Id, Order, PointerButton, Response, Sense, Slider, Ui, vec2};
+use egui::{Color32, PointerButton, Response, Sense, Slider, Ui, vec2};
 
 use super::super::split::ViewArea;
 use super::splat_brush::Brushed;
-use super::{CardPlaces, ToolScene, ViewTool};
+use super::{CardPlaces, ToolScene, ViewTool, bottom_card};
 use crate::math::format;
-use crate::math::sh::SH_C0;
 use crate::scene::GaussianCloud;
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
-use crate::ui::theme;
 use crate::worker::ViewMode;
 
 /// The eyedropper, with the color that was picked last and how many Gaussians have it.
@@ -32,7 +30,7 @@ impl Default for Eyedropper {
 fn of_color(cloud: &GaussianCloud, drawn: Option<&[usize]>, color: [u8; 3], tolerance: f32) -> Vec<usize> {
     let color = color.map(|v| f32::from(v) / 255.0);
     let is_near = |i: &usize| {
-        let own = cloud.sh[i * cloud.sh_stride()].map(|v| (0.5 + SH_C0 as f32 * v).clamp(0.0, 1.0));
+        let own = cloud.mean_color(*i);
         (0..3).map(|k| (own[k] - color[k]).powi(2)).sum::<f32>().sqrt() <= tolerance
     };
     match drawn {
@@ -78,11 +76,7 @@ impl ViewTool for Eyedropper {
 
     fn card(&mut self, ui: &Ui, places: CardPlaces, _scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
         let rect = places.active_view;
-        let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(52.0));
-        let area = Area::new(Id::unique("eyedropper")).order(Order::Foreground);
-        let area = area.pivot(Align2::CENTER_BOTTOM).fixed_pos(at).constrain_to(rect);
-        theme::card(ui.ctx(), area, |ui| {
-            ui.set_width((rect.width() - 40.0).clamp(200.0, 430.0));
+        bottom_card(ui, "eyedropper", rect, 200.0..=430.0, |ui| {
             ui.label("Click a color: all Gaussians of that color are chosen.");
             ui.weak("Shift takes them out of the choice. The view must show RGB.");
             ui.horizontal(|ui| {
@@ -103,6 +97,7 @@ impl ViewTool for Eyedropper {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::sh::SH_C0;
 
     #[test]
     fn the_color_and_the_tolerance_decide_among_what_is_drawn() {

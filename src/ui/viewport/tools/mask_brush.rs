@@ -2,18 +2,14 @@
 
 use std::sync::Arc;
 
-use egui::{
-    Align2, Area, Color32, ColorImage, Id, Order, PointerButton, Rect, Response, Slider, TextureHandle, TextureOptions,
-    Ui,
-};
+use egui::{Color32, ColorImage, PointerButton, Rect, Response, Slider, TextureHandle, TextureOptions, Ui};
 
 use super::super::split::ViewArea;
-use super::{CardPlaces, ToolScene, ViewTool};
+use super::{CardPlaces, ToolScene, ViewTool, bottom_card};
 use crate::math::grid::neighbors;
 use crate::scene::{Camera, Mask};
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
-use crate::ui::theme;
 
 /// Largest color difference per channel between neighbors in a fill.
 const SAME_COLOR: u8 = 14;
@@ -166,10 +162,7 @@ impl ViewTool for MaskBrush {
 
     fn card(&mut self, ui: &Ui, places: CardPlaces, _scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
         let rect = places.active_view;
-        let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(52.0));
-        let area = Area::new(Id::unique("brush")).order(Order::Foreground).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
-        theme::card(ui.ctx(), area.constrain_to(rect), |ui| {
-            ui.set_width((rect.width() - 40.0).clamp(200.0, 430.0));
+        bottom_card(ui, "brush", rect, 200.0..=430.0, |ui| {
             ui.label("Paint the true mask of this view: drag to paint, click to select what has the same color.");
             ui.weak("Shift erases. Right-drag and wheel move the view; the paint belongs to this one.");
             ui.horizontal(|ui| {

@@ -11,7 +11,9 @@ pub(crate) mod segment;
 pub(crate) mod splat_brush;
 pub(crate) mod transform;
 
-use egui::{Rect, Response, Ui};
+use std::ops::RangeInclusive;
+
+use egui::{Align2, Area, Id, Order, Rect, Response, Ui};
 
 use self::crop::CropTool;
 use self::eyedropper::Eyedropper;
@@ -33,6 +35,7 @@ use crate::navigate::Pose;
 use crate::scene::{Bounds, Camera, GaussianCloud, SemanticMap};
 use crate::ui::ctx::Ctx;
 use crate::ui::state::AppState;
+use crate::ui::theme;
 use crate::worker::{Tasks, Versioned};
 
 /// The tool in use.
@@ -103,6 +106,16 @@ pub(super) struct CardPlaces {
     pub(super) first_frame: Rect,
     /// The active view.
     pub(super) active_view: Rect,
+}
+
+/// Draws a card at the bottom of the view in `rect`, as wide as fits, within `width`.
+fn bottom_card(ui: &Ui, id: &str, rect: Rect, width: RangeInclusive<f32>, add: impl FnOnce(&mut Ui)) {
+    let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(52.0));
+    let area = Area::new(Id::unique(id)).order(Order::Foreground).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
+    theme::card(ui.ctx(), area.constrain_to(rect), |ui| {
+        ui.set_width((rect.width() - 40.0).clamp(*width.start(), *width.end()));
+        add(ui);
+    });
 }
 
 /// A tool of the view.

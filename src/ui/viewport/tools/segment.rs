@@ -4,16 +4,13 @@
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-use egui::{
-    Align2, Area, Color32, ComboBox, Id, Key, Order, PointerButton, Pos2, Rect, Response, Slider, Stroke as Line,
-    TextEdit, Ui,
-};
+use egui::{Color32, ComboBox, Key, PointerButton, Pos2, Rect, Response, Slider, Stroke as Line, TextEdit, Ui};
 
 use super::super::outline;
 use super::super::picking::DrawnOutline;
 use super::super::split::ViewArea;
 use super::preparation::SelectionPreparation;
-use super::{CardPlaces, ToolScene, ViewTool};
+use super::{CardPlaces, ToolScene, ViewTool, bottom_card};
 use crate::jobs::select::{self, SelectFor, SelectRequest, SelectStep, Selected, Stroke, kept_as};
 use crate::math::format;
 use crate::pipeline::semantics::lifting::edit::Edit;
@@ -292,11 +289,7 @@ impl ViewTool for SegmentTool {
     fn card(&mut self, ui: &Ui, places: CardPlaces, _scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
         let (rect, none, state) = (places.active_view, Identities::default(), cx.state);
         let all = state.semantics.as_ref().map_or(&none, |map| &map.identities);
-        let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(52.0));
-        let area =
-            Area::new(Id::unique("selecting")).order(Order::Foreground).pivot(Align2::CENTER_BOTTOM).fixed_pos(at);
-        theme::card(ui.ctx(), area.constrain_to(rect), |ui| {
-            ui.set_width((rect.width() - 40.0).clamp(220.0, 460.0));
+        bottom_card(ui, "selecting", rect, 220.0..=460.0, |ui| {
             let what = match self.purpose {
                 SelectFor::New(NO_IDENTITY) => "a new object".to_owned(),
                 SelectFor::New(of) => format!("a new part of {}", all.full_name(of)),

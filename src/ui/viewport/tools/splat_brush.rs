@@ -1,15 +1,14 @@
 //! Choosing Gaussians with a brush: those with centers under the brush, on or before the visible surface, or all along
 //! the line of sight.
 
-use egui::{Align2, Area, Color32, Id, Order, PointerButton, Response, Slider, Stroke, Ui};
+use egui::{Color32, PointerButton, Response, Slider, Stroke, Ui};
 use glam::DVec2;
 
 use super::super::split::ViewArea;
-use super::{CardPlaces, ToolScene, ViewTool};
+use super::{CardPlaces, ToolScene, ViewTool, bottom_card};
 use crate::scene::{Camera, GaussianCloud};
 use crate::ui::actions::Action;
 use crate::ui::ctx::Ctx;
-use crate::ui::theme;
 
 /// Largest depth of a center behind the rendered surface to count as on it, as a share of its depth.
 const ON_SURFACE: f64 = 0.02;
@@ -99,11 +98,7 @@ impl ViewTool for SplatBrush {
 
     fn card(&mut self, ui: &Ui, places: CardPlaces, _scene: &mut ToolScene<'_>, cx: &mut Ctx<'_>) {
         let rect = places.active_view;
-        let at = Align2::CENTER_BOTTOM.pos_in_rect(&rect.shrink(52.0));
-        let area = Area::new(Id::unique("splat brush")).order(Order::Foreground);
-        let area = area.pivot(Align2::CENTER_BOTTOM).fixed_pos(at).constrain_to(rect);
-        theme::card(ui.ctx(), area, |ui| {
-            ui.set_width((rect.width() - 40.0).clamp(200.0, 430.0));
+        bottom_card(ui, "splat brush", rect, 200.0..=430.0, |ui| {
             ui.label("Brush over the Gaussians to choose: drag in any view.");
             ui.weak("Shift takes out of the choice. Right-drag and wheel move the view.");
             ui.horizontal(|ui| {

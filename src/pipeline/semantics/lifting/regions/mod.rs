@@ -15,12 +15,12 @@ pub(crate) mod tree;
 
 use self::segment::{Picture, RegionOptions, segment};
 use super::error::FindError;
-use super::filters::{self, FilterOptions};
-use super::segmenter::{FoundMask, Segmenter};
+use super::filters::{self, FilterOptions, Kept};
+use super::segmenter::{FoundMask, Segmenter, with_parts};
 use crate::io;
 use crate::pipeline::observer::Observer;
 use crate::render::RenderSettings;
-use crate::scene::{GaussianCloud, Level, Mask, Photo};
+use crate::scene::{GaussianCloud, Mask, Photo};
 
 /// The built-in segmenter. It covers every photo.
 #[derive(Clone, Debug, Default)]
@@ -59,16 +59,9 @@ impl Regions<'_> {
     pub fn find(&self, picture: &Picture<'_>) -> Vec<FoundMask> {
         let candidates = segment(picture, &self.options);
         let masks: Vec<Mask> = candidates.iter().map(|c| c.mask.clone()).collect();
-        let mut parts = Vec::new();
-        let mut found = Vec::new();
-        for (parent, object) in filters::objects(&masks, &self.filters).into_iter().enumerate() {
-            let pieces = filters::parts(&object.mask, &candidates[object.index].pieces, &self.filters);
-            parts.extend(pieces.into_iter().map(|p| (parent, p.mask)));
-            found.push(FoundMask { level: Level::Object, parent: None, name: None, mask: object.mask });
-        }
-        let part = |(parent, mask)| FoundMask { level: Level::Part, parent: Some(parent), name: None, mask };
-        found.extend(parts.into_iter().map(part));
-        found
+        let pieces = |object: &Kept| &candidates[object.index].pieces;
+        let objects = filters::objects(&masks, &self.filters);
+        with_parts(objects, |object| filters::parts(&object.mask, pieces(object), &self.filters))
     }
 }
 

@@ -1,6 +1,7 @@
 //! Regions of pictures whose objects and parts are known.
 
 use super::*;
+use crate::scene::Level;
 
 const W: usize = 320;
 const H: usize = 240;
