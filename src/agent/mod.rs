@@ -25,6 +25,7 @@ pub mod execute;
 mod language;
 mod listing;
 pub mod llm;
+pub(crate) mod names;
 pub mod planner;
 pub(crate) mod policy;
 pub(crate) mod refusal;

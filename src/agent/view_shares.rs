@@ -10,7 +10,7 @@ use crate::jobs::query;
 use crate::navigate::Pose;
 use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::render::RenderSettings;
-use crate::scene::{Bounds, Camera, GaussianCloud, IdentityId, SemanticMap};
+use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
 /// Components of a scene.
 pub struct AgentScene {
@@ -28,18 +28,6 @@ pub struct AgentScene {
     pub recipe: QueryConfig,
     /// Occupied space of the scene, if it was computed before.
     pub explored: Option<Arc<Explored>>,
-}
-
-impl AgentScene {
-    /// Bounding boxes of all identities, by number, parts included.
-    pub(super) fn bounds(&self) -> Vec<Option<Bounds>> {
-        let Self { cloud, map, .. } = self;
-        let mut places: Vec<Vec<DVec3>> = vec![Vec::new(); map.identities.len() + 1];
-        for (i, &id) in map.identity_of.iter().enumerate().take(cloud.len()) {
-            map.identities.ancestors(id).for_each(|id| places[id as usize].push(cloud.world_position(i)));
-        }
-        places.into_iter().map(Bounds::robust).collect()
-    }
 }
 
 /// Longer side of the picture in which pixels of identities are counted, in px.

@@ -8,6 +8,7 @@ use super::part_recall::Components;
 use super::*;
 use crate::pipeline::semantics::query::answer::Basis;
 use crate::pipeline::semantics::query::localize::{Answer, Hit};
+use crate::pipeline::semantics::query::language::QueryPlace;
 use crate::pipeline::semantics::query::query_engine::ask_by_name;
 use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::pipeline::semantics::relevancy::deviate;
@@ -49,7 +50,7 @@ fn label(name: &str, level: Level, size: [usize; 2], inside: impl Fn(usize) -> b
 
 /// Asks a scene by the names of its identities.
 fn named(map: &SemanticMap) -> impl FnMut(&str) -> Option<QueryAnswer> + '_ {
-    |text| ask_by_name(&map.identities, text, LevelFilter::Auto, &QueryConfig::default())
+    |text| ask_by_name(&map.identities, text, (LevelFilter::Auto, &QueryPlace::default()), &QueryConfig::default())
 }
 
 /// An answer whose relevancies are given, best identity first.

@@ -1,7 +1,7 @@
 //! The lexicon against a list of pairs, and its file.
 
 use super::*;
-use crate::pipeline::semantics::query::words::{singular, words};
+use crate::scene::identity::name_words::{singular, words};
 
 /// Names, asked words and their relation; `tools/lexicon/check.py` reads the same list.
 const PAIRS: &str = include_str!("pairs.txt");
