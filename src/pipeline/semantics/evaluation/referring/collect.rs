@@ -99,13 +99,13 @@ impl SentenceSet {
 
     /// Adds "the mug left of the kettle", and "all mugs left of the kettle" where there may be several.
     pub(super) fn related(&mut self, kind: ReferringKind, head: &TruePhrase, tail: &str, fits: Option<Vec<usize>>) {
+        let found = fits.as_ref().map_or(0, Vec::len);
         if let Some(one) = &head.one {
             let link = self.pick(&["", "", "that is ", "which is "]);
-            // With several, "a" is honest; "the" makes an honest program ask back.
-            self.one(kind, format!("the {one} {link}{tail}"), fits.clone());
+            let article = if found > 1 { self.pick(&["the", "any", "one"]) } else { "the" };
+            self.one(kind, format!("{article} {one} {link}{tail}"), fits.clone());
         }
         let Some(many) = &head.many else { return };
-        let found = fits.as_ref().map_or(0, Vec::len);
         if head.generic {
             let every = self.pick(&["everything {}", "everything that is {}", "all things that are {}"]);
             let every = if found == 1 { every } else { self.pick(&[every, "the objects {}", "all objects {}"]) };

@@ -105,7 +105,7 @@ pub(super) fn write(scope: &TrueScope, set: &mut SentenceSet) {
                 let form = set.pick(comparison.forms).replace("{y}", &format!("the {name}"));
                 set.related(ReferringKind::Compare, head, &form, fits);
             }
-            distances(scope, set, head, (anchor, &name), &rest);
+            distances(scope, set, head, (anchor, name.as_str()), &rest);
         }
         lengths(scope, set, head);
     }

@@ -49,9 +49,9 @@ pub(super) fn write(scope: &TrueScope, set: &mut SentenceSet) {
         for (anchor, name) in &anchors {
             let rest: Vec<usize> = head.fits.iter().copied().filter(|i| i != anchor).collect();
             let of = format!("the {name}");
-            around(scope, set, &head, (*anchor, &of), &rest);
+            around(scope, set, &head, (*anchor, of.as_str()), &rest);
             if rest.len() > 1 {
-                extremes(scope, set, &head, (*anchor, &of), &rest);
+                extremes(scope, set, &head, (*anchor, of.as_str()), &rest);
             }
         }
     }
