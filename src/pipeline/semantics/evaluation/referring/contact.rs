@@ -17,7 +17,7 @@ const FEET: f64 = 0.03;
 const CARRIED: f64 = 0.06;
 const FREE: f64 = 0.12;
 /// Distance in sizes by which feet may sink in.
-const SUNK: f64 = 0.04;
+const SUNK: f64 = 0.05;
 /// Share of the feet that surely carries a thing, and that surely does not.
 const ENOUGH: f64 = 0.3;
 const HARDLY: f64 = 0.02;
