@@ -17,6 +17,7 @@ pub(crate) mod multi_class;
 pub(crate) mod part_recall;
 pub(crate) mod raw_features;
 pub(crate) mod recipes;
+pub(crate) mod ref_lerf;
 pub(crate) mod selection_3d;
 pub(crate) mod spin_nerf;
 pub(crate) mod strokes;
