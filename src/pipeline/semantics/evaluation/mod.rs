@@ -20,6 +20,7 @@ pub(crate) mod raw_features;
 pub(crate) mod recipes;
 #[cfg_attr(not(test), expect(dead_code, reason = "the measurement of the language of questions calls it"))]
 pub(crate) mod referring;
+pub(crate) mod ref_lerf;
 pub(crate) mod selection_3d;
 pub(crate) mod spin_nerf;
 pub(crate) mod strokes;
