@@ -7,7 +7,7 @@ use serde_json::json;
 use super::progress::Console;
 use super::recipe::RecipeArgs;
 use super::scene_args::open_scene;
-use super::{CliError, eval_depth, eval_masks, eval_removal, number, output, table_args};
+use super::{CliError, eval_depth, eval_language, eval_masks, eval_removal, number, output, table_args};
 use crate::jobs::batch::BatchEvaluation;
 use crate::jobs::evaluate::{self, EvaluateOptions, PhotoComparison};
 use crate::jobs::evaluate_masks::Protocol;
@@ -64,6 +64,10 @@ pub(crate) struct EvalArgs {
     /// that holds several
     #[arg(long, conflicts_with_all = ["masks", "depth"])]
     removal: Option<PathBuf>,
+    /// Ask sentences with known answers instead: a list (.jsonl), or sentences generated from the meshes that the photos
+    /// were rendered from (.glb, .gltf)
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["masks", "depth", "removal"])]
+    questions: Option<PathBuf>,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
@@ -73,7 +77,8 @@ pub(crate) struct EvalArgs {
 
 /// The table `[eval]` of a batch.
 pub(super) fn of_table(table: &toml::Table) -> Result<BatchEvaluation, String> {
-    const LEFT_OUT: [&str; 8] = ["photos", "held-out-every", "pictures", "masks", "query", "depth", "removal", "json"];
+    const LEFT_OUT: [&str; 9] =
+        ["photos", "held-out-every", "pictures", "masks", "query", "depth", "removal", "questions", "json"];
     // Labels are those of each scene.
     let args: EvalArgs = table_args::parse("batch eval", table, &["scene", "--masks=labels"], &LEFT_OUT)?;
     let EvalArgs { max_side, keep_borders, protocol, recipe, .. } = args;
@@ -98,6 +103,9 @@ impl EvalArgs {
 }
 
 pub(crate) fn run(args: EvalArgs, quiet: bool) -> Result<(), CliError> {
+    if let Some(file) = &args.questions {
+        return eval_language::run(&open_scene(&args.scene)?, file, &args.recipe.recipe(), args.json);
+    }
     let comparison = args.check()?;
     if let Some(labels) = &args.masks {
         let how = (args.protocol, args.query.as_deref(), &args.recipe.recipe());

@@ -16,6 +16,7 @@ mod edit;
 mod error;
 mod eval;
 mod eval_depth;
+mod eval_language;
 mod eval_masks;
 mod eval_removal;
 mod export;

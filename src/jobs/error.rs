@@ -61,6 +61,9 @@ pub enum JobError {
     EmptyQuery,
     #[error("no match for '{0}'")]
     NoMatch(String),
+    /// A list of sentences cannot be asked.
+    #[error("{0}")]
+    Questions(String),
     /// Several things fit where one is meant.
     #[error("several things fit '{text}': ask for '{names}', or for all of them")]
     SeveralFit {

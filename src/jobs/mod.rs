@@ -9,14 +9,13 @@ pub(crate) mod changed;
 pub(crate) mod clean;
 mod coco;
 pub(crate) mod demo;
-#[cfg(test)]
-mod probe_tests;
 pub(crate) mod demo_questions;
 pub(crate) mod demo_tour;
 pub(crate) mod derived;
 pub mod edit;
 pub(crate) mod error;
 pub(crate) mod evaluate;
+pub(crate) mod evaluate_language;
 pub(crate) mod evaluate_masks;
 pub(crate) mod evaluate_removal;
 mod experiment;

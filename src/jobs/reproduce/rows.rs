@@ -25,12 +25,8 @@ use crate::pipeline::semantics::evaluation::{
 use crate::pipeline::semantics::query::answer::QueryAnswer;
 use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::query::parse::ParsedQuery;
-<<<<<<< HEAD
 use crate::pipeline::semantics::query::language::QueryPlace;
-use crate::pipeline::semantics::query::query_engine::{ask_by_embedding, ask_by_name};
-=======
 use crate::pipeline::semantics::query::query_engine::{QueryEngine, ask_by_embedding, ask_by_name};
->>>>>>> w-ref
 use crate::pipeline::semantics::query::recipe::{MatchBy, PartEmbedding, QueryConfig, RelevancyScale, Strategy};
 use crate::pipeline::semantics::query::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;

@@ -18,7 +18,6 @@ pub(crate) mod multi_class;
 pub(crate) mod part_recall;
 pub(crate) mod raw_features;
 pub(crate) mod recipes;
-#[cfg_attr(not(test), expect(dead_code, reason = "the measurement of the language of questions calls it"))]
 pub(crate) mod referring;
 pub(crate) mod ref_lerf;
 pub(crate) mod selection_3d;
