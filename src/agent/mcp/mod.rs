@@ -134,7 +134,7 @@ impl<S: ServedScene> McpServer<S> {
     }
 
     fn note(&mut self, text: &str) {
-        (self.on)(AgentEvent::Note(text.to_owned()));
+        (self.on)(AgentEvent::Note(brief(text)));
     }
 
     fn answer(&mut self, method: &str, params: &Value) -> Result<Value, RpcError> {
