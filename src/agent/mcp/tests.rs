@@ -191,7 +191,7 @@ fn methods_that_are_unknown_are_refused_and_notifications_never_answered() {
 #[test]
 fn calls_pass_the_checks_of_the_chat() {
     let mut server = built_in();
-    assert_eq!(call(&mut server, &hide("mug")), ("The mug is hidden.\nBy number: #1 mug.".into(), false));
+    assert_eq!(call(&mut server, &hide("mug")), ("The mug is hidden.\nBy number: #1 mug.".to_owned(), false));
     assert!(is_hidden(&server, 1));
     let (text, refused) = call(&mut server, &hide("mug"));
     assert!(refused && text.contains("hidden already"), "{text}");
