@@ -4,9 +4,9 @@
 //! the chat. Names are data here as there. Versions up to 2025-11-25 begin with `initialize`; those since 2026-07-28
 //! state their version in each request. A question has a number, so that no answer reaches another question.
 //!
-//! The crate `rmcp` (3.1, features `server` and `transport-io`) would bring the runtime of tokio, futures, tokio-util,
-//! chrono, schemars, darling and one more syn, for everybody to compile, into a program without async code. One reading
-//! thread and `serde_json`, which are here already, serve a closed list of tools whose schemas exist.
+//! The crate `rmcp` (3.1, features `server` and `transport-io`) would bring a runtime of tokio, futures, tokio-util,
+//! chrono, schemars and darling, for everybody to compile, into a program without async code. One reading thread and
+//! `serde_json`, which are here already, serve a closed list of tools whose schemas exist.
 
 mod cancellations;
 mod message;
