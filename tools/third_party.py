@@ -16,7 +16,10 @@ NAMES = re.compile(r"^(un)?(licen[sc]e|copying|copyright|notice|ofl|ufl|authors)
 # Of sources that a crate brings along; deeper folders are tests and examples.
 DEPTH = 3
 MAX_BYTES = 200_000
-ASSETS = {"PlayCanvas engine (pages that are exported)": ROOT / "assets/page/renderer.LICENSE.txt"}
+ASSETS = {
+    "PlayCanvas engine (pages that are exported)": ROOT / "assets/page/renderer.LICENSE.txt",
+    "WordNet (words that mean the same, and kinds of things)": ROOT / "assets/lexicon.LICENSE.txt",
+}
 
 
 def linked(target: str) -> list[dict]:

@@ -3,9 +3,11 @@
 use super::commands::is_command;
 use super::dialog::DialogState;
 use super::language::CommandLanguage;
-use super::resolve::{Resolved, name_words, resolve, words_of};
+use super::names::words_of;
+use super::resolve::{Resolved, resolve};
 use super::words::{number, ordinal};
 use super::world::World;
+use crate::scene::identity::name_words::words as name_words;
 use crate::scene::{IdentityId, LevelFilter};
 
 /// Answer to a yes-or-no question.

@@ -15,6 +15,7 @@ use crate::jobs::{Folders, Scene, demo, open, query};
 use crate::navigate::Pose;
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::query::answer::{Basis, Certainty};
+use crate::pipeline::semantics::query::language::QueryPlace;
 use crate::pipeline::semantics::query::localize::Answer;
 use crate::pipeline::semantics::query::query_engine::QueryEngine;
 use crate::pipeline::semantics::query::recipe::{MatchBy, QueryConfig, Rejection};
@@ -38,7 +39,7 @@ fn wrong(map: &SemanticMap, recipe: QueryConfig) -> Vec<String> {
     let mut engine = QueryEngine::new(map.language.as_ref(), recipe).expect("an engine");
     let mut wrong = Vec::new();
     for [text, verdict, what] in rows("questions") {
-        let reading = engine.read(&map.identities, &text, LevelFilter::Auto).expect("words");
+        let reading = engine.read(&map.identities, &text).expect("words");
         let answered = engine.answer(map, &reading, LevelFilter::Auto).expect("encodes");
         let chosen = answered.chosen(1);
         let (ignored, unexplained) = engine.left_out(&map.identities, &reading, &answered);
@@ -76,7 +77,7 @@ fn what_is_asked_of_the_demo_is_found_or_said_not_to_be_there() {
 fn where_nothing_has_a_name_the_small_encoder_guesses_and_nothing_is_changed_for_it() {
     let (_data, scene) = opened();
     let mut map = scene.semantics().expect("objects");
-    assert_eq!(query::named(&map, "kettle", LevelFilter::Auto, 1).expect("by name").len(), 1);
+    assert_eq!(query::named(&map, &QueryPlace::default(), "kettle", LevelFilter::Auto, 1).expect("by name").len(), 1);
     for id in 1..=map.identities.len() as IdentityId {
         map.identities.get_mut(id).expect("there").names.clear();
     }
@@ -84,10 +85,10 @@ fn where_nothing_has_a_name_the_small_encoder_guesses_and_nothing_is_changed_for
     let answered = engine.ask(&map, "teddy bear", LevelFilter::Auto).expect("encodes").expect("words");
     assert_eq!((answered.basis, answered.certainty(&[])), (Basis::Embedding, Certainty::Guess), "{answered:?}");
     let id = answered.chosen(1)[0];
-    let refused = query::named(&map, "teddy bear", LevelFilter::Auto, 1).expect_err("only by its looks").to_string();
+    let refused = query::named(&map, &QueryPlace::default(), "teddy bear", LevelFilter::Auto, 1).expect_err("only by its looks").to_string();
     assert!(refused.contains(&format!("ask for '#{id}'")), "{refused}");
     // The number in the refusal is enough to find it.
-    assert_eq!(query::named(&map, &format!("#{id}"), LevelFilter::Auto, 1).expect("by number"), [id]);
+    assert_eq!(query::named(&map, &QueryPlace::default(), &format!("#{id}"), LevelFilter::Auto, 1).expect("by number"), [id]);
 }
 
 fn ends(reply: &Reply) -> &'static str {

@@ -1,9 +1,10 @@
 //! Sentences about things: their kind, place and size.
 
-use super::relation::{Relation, fit};
+use super::relation::Relation;
 use super::world::World;
 use crate::math::format::{self, short};
-use crate::scene::{Bounds, IdentityId, Level, NO_IDENTITY};
+use crate::pipeline::semantics::query::language::relations::{HOLDS, Space};
+use crate::scene::{IdentityId, Level, NO_IDENTITY};
 
 /// Least share of the view for a thing to count as visible.
 pub(crate) const SEEN: f64 = 0.0005;
@@ -42,22 +43,26 @@ pub(crate) fn length(world: &dyn World, units: f64) -> String {
 
 /// Describes the edges of a thing's own upright box, which do not depend on the view.
 pub(crate) fn size(world: &dyn World, id: IdentityId) -> String {
-    let Some(extent) = world.extent(id) else { return "of unknown size".into() };
+    let Some(extent) = world.identities().shapes.extent(id, world.view().up) else { return "of unknown size".into() };
     let [long, wide, high] = [extent.length, extent.width, extent.height].map(|edge| length(world, edge));
     let unknown = if world.meters_per_unit().is_none() { " (the scene's scale in meters is not known)" } else { "" };
     format!("{long} on its longer side, {wide} on its shorter side and {high} high{unknown}")
 }
 
+/// Shapes of the scene, seen from the current view.
+pub(super) fn space(world: &dyn World) -> Space<'_> {
+    Space::new(world.identities(), world.view())
+}
+
 /// Objects in `relation` to an identity, nearest first.
 pub(crate) fn neighbors(world: &dyn World, id: IdentityId, relation: Relation) -> Vec<IdentityId> {
-    let all = world.identities();
-    let Some(anchor) = world.facts(id).and_then(|f| f.bounds) else { return Vec::new() };
-    let frame = world.view().frame();
+    let (all, space) = (world.identities(), space(world));
     let mut found: Vec<(f64, IdentityId)> = Vec::new();
-    for (other, identity) in all.iter().filter(|(_, i)| i.level == Level::Object) {
-        let related = all.ancestors(id).any(|l| l == other) || identity.parent != NO_IDENTITY;
-        let bounds = if related { None } else { world.facts(other).and_then(|f| f.bounds) };
-        found.extend(bounds.and_then(|b| fit(relation, &b, &anchor, &frame)).map(|d| (d, other)));
+    for (other, _) in all.iter().filter(|(_, i)| i.level == Level::Object && i.parent == NO_IDENTITY) {
+        let holds = space.share(relation, other, id).is_some_and(|share| share >= HOLDS[0]);
+        if holds && world.facts(other).is_some() {
+            found.push((space.gap(other, id).unwrap_or(f64::INFINITY), other));
+        }
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
     found.into_iter().map(|(_, id)| id).collect()
@@ -66,27 +71,33 @@ pub(crate) fn neighbors(world: &dyn World, id: IdentityId, relation: Relation) -
 /// Describes the place of a thing by its support and its neighbors; empty if nothing is near.
 pub(crate) fn place(world: &dyn World, id: IdentityId) -> String {
     let object = world.identities().object_of(id);
-    let Some(own) = world.facts(object).and_then(|f| f.bounds) else { return String::new() };
-    let frame = world.view().frame();
-    let others: Vec<(IdentityId, Bounds)> = world
-        .identities()
-        .iter()
-        .filter(|(i, o)| o.parent == NO_IDENTITY && *i != object)
-        .filter_map(|(i, _)| Some((i, world.facts(i)?.bounds?)))
-        .collect();
-    let first = |relation, fits: &dyn Fn(&Bounds) -> bool| {
-        others.iter().find(|(_, b)| fits(b) && fit(relation, &own, b, &frame).is_some()).map(|(id, _)| *id)
-    };
-    let bearer = first(Relation::On, &|_| true);
+    let space = space(world);
+    let others = || world.identities().iter().filter(|(i, o)| o.parent == NO_IDENTITY && *i != object && world.facts(*i).is_some());
+    let holds = |relation, other| space.share(relation, object, other).is_some_and(|share| share >= HOLDS[0]);
+    let bearer = others().map(|(i, _)| i).find(|i| space.rests(object, *i, 1));
     // A smaller thing above is not mentioned: a table is not "under" its mugs.
-    let over = first(Relation::Under, &|b| b.radius() > own.radius());
+    let radius = |id| space.shapes.get(id).map_or(0.0, |s| s.bounds.radius());
+    let over = others().map(|(i, _)| i).find(|i| radius(*i) > radius(object) && holds(Relation::Under, *i));
     let mut said: Vec<String> = bearer.map(|id| format!("on {}", the(world, id))).into_iter().collect();
     said.extend(over.map(|id| format!("under {}", the(world, id))));
     for (relation, words) in [(Relation::RightOf, "left of"), (Relation::LeftOf, "right of")] {
-        let next = neighbors(world, object, relation).into_iter().find(|id| Some(*id) != bearer && Some(*id) != over);
+        let near = |id: &IdentityId| Some(*id) != bearer && Some(*id) != over && beside(&space, object, *id);
+        let next = neighbors(world, object, relation).into_iter().find(near);
         said.extend(next.map(|id| format!("{words} {}", the(world, id))));
     }
     join(&said)
+}
+
+/// Returns whether a thing is beside another and not rather behind or above it.
+fn beside(space: &Space<'_>, object: IdentityId, other: IdentityId) -> bool {
+    let Some((a, b)) = space.shapes.get(object).zip(space.shapes.get(other)) else { return false };
+    let axes = space.axes();
+    let off = |axis| {
+        let (a, b) = (a.span(axis), b.span(axis));
+        ((a.0 + a.1 - b.0 - b.1) * 0.5, (a.0 - b.1).max(b.0 - a.1).max(0.0))
+    };
+    let (sideways, _) = off(axes.right);
+    [axes.ahead, axes.up].into_iter().all(|axis| off(axis).1 <= 1.5 * sideways.abs())
 }
 
 /// Describes one thing in full.

@@ -105,7 +105,7 @@ pub(crate) fn check(
                     call = call.with_target(Target::Identity(id));
                 }
             }
-            Resolved::Several(candidates) => {
+            Resolved::Several(candidates) | Resolved::All(candidates) => {
                 let question = format!("Which one do you mean: {}?", choices(world, &candidates));
                 return CheckedCall::Choose { question, candidates };
             }
@@ -119,7 +119,7 @@ pub(crate) fn check(
                 ids.push(id);
                 *other = Target::Identity(id);
             }
-            Resolved::Several(some) => {
+            Resolved::Several(some) | Resolved::All(some) => {
                 let text = format!("From which one: {}? Please say it in full.", choices(world, &some));
                 return CheckedCall::Refused { refusal: Refusal::new(RefusalKind::Unclear, text), near: some };
             }

@@ -3,10 +3,11 @@
 use super::describe::{self, capital, length, the};
 use super::dialog::DialogState;
 use super::refusal::{Refusal, RefusalKind};
-use super::relation::{Relation, fit, gap};
+use super::relation::Relation;
 use super::resolve::resolve_all;
 use super::tool::Reference;
 use super::world::World;
+use crate::pipeline::semantics::query::language::relations::HOLDS;
 use crate::scene::{IdentityId, LevelFilter, NO_IDENTITY};
 
 /// Identities to list or count.
@@ -29,12 +30,11 @@ pub(super) fn list_ids(
     if of != NO_IDENTITY && relation != Relation::PartOf {
         // Named things may be parts: the buttons on a controller, the handles on the table.
         let Some(named) = named else { return Ok(describe::neighbors(world, of, relation)) };
-        let bounds = |id: IdentityId| world.facts(id).and_then(|f| f.bounds);
-        let (frame, anchor) = (world.view().frame(), bounds(of));
+        let space = describe::space(world);
         let stands = |id: &IdentityId| {
             let bearer = all.ancestors(of).any(|whole| whole == *id);
-            let fits = || fit(relation, &bounds(*id)?, anchor.as_ref()?, &frame);
-            !bearer && if is_piece(id) { matches!(relation, Relation::On | Relation::In) } else { fits().is_some() }
+            let holds = || space.share(relation, *id, of).is_some_and(|share| share >= HOLDS[0]);
+            !bearer && if is_piece(id) { matches!(relation, Relation::On | Relation::In) } else { holds() }
         };
         return Ok(named.into_iter().filter(stands).collect());
     }
@@ -91,7 +91,8 @@ pub(super) fn measure(
         Some(Reference::Thing(_)) => {
             let other = other.ok_or_else(nothing)?;
             let bounds = world.facts(other).and_then(|f| f.bounds).ok_or_else(nothing)?;
-            let (middle, free) = (own.center().distance(bounds.center()), gap(&own, &bounds));
+            let free = describe::space(world).gap(id, other).unwrap_or(0.0);
+            let middle = own.center().distance(bounds.center());
             let name = the(world, other);
             let free = if free > 0.0 { format!("{} apart", length(world, free)) } else { "touching".into() };
             format!("{it} is {} from {name}, middle to middle ({free}).", length(world, middle))

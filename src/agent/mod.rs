@@ -27,6 +27,7 @@ mod language;
 mod listing;
 pub mod llm;
 pub mod mcp;
+pub(crate) mod names;
 pub mod planner;
 pub(crate) mod policy;
 pub(crate) mod refusal;

@@ -131,7 +131,7 @@ fn the_agent_answers_by_the_recipe_of_its_scene() {
     let (mut world, _) = renamed();
     let mut basis = |recipe: Option<QueryConfig>| {
         recipe.iter().for_each(|recipe| world.answer_by(recipe).expect("no encoder is needed"));
-        let answered = world.locate("torch", LevelFilter::Auto).expect("asked");
+        let answered = world.locate("torch", LevelFilter::Auto, &super::world::QueryPlace::default()).expect("asked");
         (answered.basis, answered.chosen(1), answered.recipe)
     };
     assert_eq!(basis(None), (Basis::Names, vec![1], QueryConfig::default()));

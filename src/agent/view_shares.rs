@@ -10,7 +10,7 @@ use crate::jobs::query;
 use crate::navigate::Pose;
 use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::render::RenderSettings;
-use crate::scene::{Bounds, Camera, GaussianCloud, IdentityId, SemanticMap};
+use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
 /// Components of a scene.
 pub struct AgentScene {
@@ -36,16 +36,6 @@ impl AgentScene {
         let of = &self.map.identity_of;
         let is_drawn = |i: &usize| of.get(*i).is_none_or(|id| hidden.get(*id as usize) != Some(&true));
         hidden.contains(&true).then(|| (0..self.cloud.len()).filter(is_drawn).collect())
-    }
-
-    /// Bounding boxes of all identities, by number, parts included.
-    pub(super) fn bounds(&self) -> Vec<Option<Bounds>> {
-        let Self { cloud, map, .. } = self;
-        let mut places: Vec<Vec<DVec3>> = vec![Vec::new(); map.identities.len() + 1];
-        for (i, &id) in map.identity_of.iter().enumerate().take(cloud.len()) {
-            map.identities.ancestors(id).for_each(|id| places[id as usize].push(cloud.world_position(i)));
-        }
-        places.into_iter().map(Bounds::robust).collect()
     }
 }
 

@@ -2,10 +2,11 @@
 //! camera or a file is in [`super::resolve`] and [`super::describe`].
 
 use super::camera_args::{Direction, Distance};
-use super::relation::{Extent, Viewpoint};
+use super::relation::Viewpoint;
 use crate::jobs::query::ask_with;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::query::answer::{Basis, QueryAnswer};
+pub use crate::pipeline::semantics::query::language::QueryPlace;
 use crate::pipeline::semantics::query::query_engine::ask_by_name;
 use crate::pipeline::semantics::query::recipe::{MatchBy, QueryConfig};
 use crate::scene::{Bounds, Identities, IdentityId, LanguageFeatures, Level, LevelFilter};
@@ -61,7 +62,12 @@ pub trait World {
     fn identities(&self) -> &Identities;
 
     /// Answers a query. Errors if the encoder fails.
-    fn locate(&mut self, query: &str, kind: LevelFilter) -> Result<QueryAnswer, WorldError>;
+    fn locate(&mut self, query: &str, kind: LevelFilter, place: &QueryPlace) -> Result<QueryAnswer, WorldError>;
+
+    /// Identities that are no longer in the scene.
+    fn gone(&self) -> Vec<IdentityId> {
+        Vec::new()
+    }
 
     /// Basis of queries: names, embeddings or both.
     fn match_by(&self) -> MatchBy {
@@ -70,11 +76,6 @@ pub trait World {
 
     /// Facts about an identity; `None` if it is not, or no longer, in the scene.
     fn facts(&self, id: IdentityId) -> Option<IdentityFacts>;
-
-    /// Size of an identity, if it has Gaussians. By default the size of its bounding box.
-    fn extent(&self, id: IdentityId) -> Option<Extent> {
-        Extent::of_box(&self.facts(id)?.bounds?, self.view().up)
-    }
 
     /// Current view.
     fn view(&self) -> Viewpoint;
@@ -127,9 +128,9 @@ pub trait World {
 }
 
 /// Answers a query by names alone: [`World::locate`] for scenes without an encoder.
-pub fn locate_by_names(identities: &Identities, query: &str, kind: LevelFilter) -> QueryAnswer {
+pub fn locate_by_names(identities: &Identities, query: &str, kind: LevelFilter, place: &QueryPlace) -> QueryAnswer {
     let recipe = QueryConfig::default();
-    let asked = ask_by_name(identities, query, kind, &recipe);
+    let asked = ask_by_name(identities, query, (kind, place), &recipe);
     asked.unwrap_or_else(|| QueryAnswer::nothing(Basis::Names, identities, &recipe))
 }
 
@@ -139,10 +140,10 @@ pub fn locate_with(
     identities: &Identities,
     features: &LanguageFeatures,
     query: &str,
-    kind: LevelFilter,
+    from: (LevelFilter, &QueryPlace),
     encode: &mut dyn FnMut(&str) -> Vec<f32>,
 ) -> QueryAnswer {
     let recipe = QueryConfig::default();
-    let asked = ask_with(identities, (features, &recipe), query, kind, &mut |phrase: &str| Ok::<_, ()>(encode(phrase)));
+    let asked = ask_with(identities, (features, &recipe), query, from, &mut |phrase: &str| Ok::<_, ()>(encode(phrase)));
     asked.unwrap_or_else(|| QueryAnswer::nothing(Basis::Names, identities, &recipe))
 }

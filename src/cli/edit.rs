@@ -77,8 +77,15 @@ pub(crate) fn run(args: EditArgs, quiet: bool) -> Result<(), CliError> {
     let scene = open_scene(&args.scene)?;
     let map = scene.semantics()?;
     derived::check_place(&scene, &args.out)?;
-    let ids = query::named(&map, &args.text, args.kind, 1)?;
-    let Some(&id) = ids.first() else { return Err(JobError::NoMatch(args.text).into()) };
+    let ids = query::named(&map, &query::seen_from(&scene, None), &args.text, args.kind, 1)?;
+    let id = match ids.as_slice() {
+        [id] => *id,
+        [] => return Err(JobError::NoMatch(args.text).into()),
+        several => {
+            let names: Vec<String> = several.iter().map(|id| map.identities.full_name(*id)).collect();
+            return Err(JobError::SeveralFit { text: args.text, names: names.join("', '") }.into());
+        }
+    };
     let axis = args.axis.unwrap_or_else(|| scene.home().up);
     let to = Placement {
         shift: args.shift.unwrap_or_default(),

@@ -149,7 +149,7 @@ fn to_target(
     from: Pose,
 ) -> Result<(CameraTrajectory, String), CliError> {
     let map = scene.semantics()?;
-    let id = query::identities(&map, query, LevelFilter::Auto, 1)?[0];
+    let id = query::identities(&map, &query::seen_from(scene, None), query, LevelFilter::Auto, 1)?[0];
     let (_, visited) = go_to::visit(ApproachRequest {
         explored: Some(Arc::clone(explored)),
         cloud: Arc::clone(&scene.cloud),

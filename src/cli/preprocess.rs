@@ -34,7 +34,7 @@ pub(crate) struct PreprocessArgs {
     /// Trained scene
     scene: PathBuf,
     /// Path of the masks: id maps of 'fmlgs synth', label files of ISAT (as in lerf_ovs), LabelMe, COCO or YOLO, the
-    /// folders of SPIn-NeRF, 3D-OVS or LERF-Mask, or masklets as in SA-V
+    /// folders of SPIn-NeRF, 3D-OVS, LERF-Mask or Ref-LERF, or masklets as in SA-V
     #[arg(long)]
     masks: Option<PathBuf>,
     /// Source of the masks: 'files', 'regions' (built in, no weights: rough and unnamed), a model of

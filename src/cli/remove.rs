@@ -76,7 +76,7 @@ pub(crate) fn run(args: RemoveArgs, quiet: bool) -> Result<(), CliError> {
     let map = scene.semantics()?;
     let mut ids = Vec::new();
     for text in &args.texts {
-        ids.extend(query::named(&map, text, args.kind, args.top)?);
+        ids.extend(query::named(&map, &query::seen_from(&scene, None), text, args.kind, args.top)?);
     }
     ids.sort_unstable();
     ids.dedup();

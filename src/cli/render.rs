@@ -166,7 +166,7 @@ fn video(args: &RenderArgs, path: &Path, quiet: bool) -> Result<(), CliError> {
     let marked = match &args.mark {
         Some(query) => {
             let map = scene.semantics()?;
-            let ids = query::identities(&map, query, LevelFilter::Auto, 1)?;
+            let ids = query::identities(&map, &query::seen_from(&scene, None), query, LevelFilter::Auto, 1)?;
             Some((Arc::new(map), ids))
         }
         None => None,

@@ -92,7 +92,7 @@ pub(crate) fn run(args: SegmentArgs, quiet: bool) -> Result<(), CliError> {
 fn one(args: &SegmentArgs, text: &str, out: &Path, scene: &Scene, quiet: bool) -> Result<(), CliError> {
     export_splat::check(out, &scene.reads())?;
     let map = scene.semantics()?;
-    let answered = query::answered(&map, text, args.kind, &args.recipe.recipe())?;
+    let answered = query::answered(&map, &query::seen_from(scene, None), text, args.kind, &args.recipe.recipe())?;
     let kept = segment::select(&scene.cloud, &map, &answered, args.top, args.rest)?;
     let count = kept.len();
     let done = args.measure.write(kept, out, scene, quiet)?;

@@ -56,9 +56,9 @@ pub enum IoError {
     Unsupported { path: PathBuf, what: String, remedy: &'static str },
     #[error(
         "{path} holds no labels{passed}: looked for identities.json with id maps (fmlgs synth), images_<factor>/label/*.png \
-         (SPIn-NeRF), segmentations/classes.txt (3D-OVS), test_mask/<view>/*.png (LERF-Mask), and label files in it and the \
-         folders below: .json of ISAT (as in lerf_ovs), LabelMe, COCO (instances) or SA-V (masklets), .txt of YOLO \
-         (segments)"
+         (SPIn-NeRF), segmentations/classes.txt (3D-OVS), test_mask/<view>/*.png (LERF-Mask), json/ with mask/ \
+         (Ref-LERF), and label files in it and the folders below: .json of ISAT (as in lerf_ovs), LabelMe, COCO \
+         (instances) or SA-V (masklets), .txt of YOLO (segments)"
     )]
     NoLabels { path: PathBuf, passed: String },
     #[error("{path} refers to '{entry}', which lies outside the folder {folder}; copy the file into it")]

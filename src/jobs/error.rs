@@ -61,6 +61,14 @@ pub enum JobError {
     EmptyQuery,
     #[error("no match for '{0}'")]
     NoMatch(String),
+    /// Several things fit where one is meant.
+    #[error("several things fit '{text}': ask for '{names}', or for all of them")]
+    SeveralFit {
+        /// The query.
+        text: String,
+        /// Full names.
+        names: String,
+    },
     /// Found only by embedding; changes need a name.
     #[error("no name here says '{text}'; by embedding it may be {name}: to change that, ask for '{name}'")]
     OnlyLooks {

@@ -10,6 +10,7 @@ use super::{JobError, Scene, export, query};
 use crate::io::files;
 use crate::models::catalog::{self, ModelRole};
 use crate::models::lama::LAMA;
+use crate::pipeline::semantics::query::language::QueryPlace;
 use crate::pipeline::depth::{self, TrueDepth};
 use crate::pipeline::metrics::planes;
 use crate::pipeline::observer::{Observer, Ticker};
@@ -171,12 +172,12 @@ fn one(
     comparison: &PhotoComparison,
     observer: &mut dyn Observer,
 ) -> Result<RemovalRow, JobError> {
-    let ids = query::identities(map, name, LevelFilter::Auto, 1)?;
+    let ids = query::identities(map, &QueryPlace::default(), name, LevelFilter::Auto, 1)?;
     let start = std::time::Instant::now();
     let options = RemovalOptions { ids, halo: true, lift_shadow, paint, seed: 0 };
     let ReducedScene { cloud, map: left, report } = remove::run(scene, map, &options, observer)?;
     let secs = start.elapsed().as_secs_f64();
-    let found_again = match query::identities(&left, name, LevelFilter::Auto, 1) {
+    let found_again = match query::identities(&left, &QueryPlace::default(), name, LevelFilter::Auto, 1) {
         Err(JobError::NoMatch(_)) => false,
         found => !found?.is_empty(),
     };

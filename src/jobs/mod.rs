@@ -9,6 +9,8 @@ pub(crate) mod changed;
 pub(crate) mod clean;
 mod coco;
 pub(crate) mod demo;
+#[cfg(test)]
+mod probe_tests;
 pub(crate) mod demo_questions;
 pub(crate) mod demo_tour;
 pub(crate) mod derived;

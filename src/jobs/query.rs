@@ -11,7 +11,8 @@ use crate::pipeline::removal::invented_flags;
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::lifting::votes::UNKNOWN;
 use crate::pipeline::semantics::query::answer::{Basis, QueryAnswer};
-pub(crate) use crate::pipeline::semantics::query::grounds::color_of;
+use crate::pipeline::semantics::query::language::QueryPlace;
+use crate::pipeline::semantics::query::localize::Answer;
 use crate::pipeline::semantics::query::matching::{self, MatchMode};
 pub(crate) use crate::pipeline::semantics::query::query_engine::{QueryEngine, answer_encoded, ask_with};
 use crate::pipeline::semantics::query::reading::QueryReading;
@@ -139,8 +140,9 @@ pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &QueryRequest<'_>) 
     let blend = request.recipe.masks == MatchMode::Codes;
     let maps = ViewMaps::draw(&mut Renderer::new(), drawn, map, request.camera, blend, map.has_parts())?;
     let mut engine = QueryEngine::new(map.language.as_ref(), request.recipe.clone())?;
+    engine.place = seen_from(scene, Some(request.camera));
     let start = Instant::now();
-    let reading = engine.read(&map.identities, request.text, request.level).ok_or(JobError::EmptyQuery)?;
+    let reading = engine.read(&map.identities, request.text).ok_or(JobError::EmptyQuery)?;
     let mut answered = engine.answer(map, &reading, request.level)?;
     let matching_since = Instant::now();
     let mask = maps.of_answer(map, &answered, request.top);
@@ -151,31 +153,45 @@ pub(crate) fn run(scene: &Scene, map: &SemanticMap, request: &QueryRequest<'_>) 
     Ok(QueryResult { answered, reading, mask, unread, ignored_words, unexplained_words, query_ms, maps })
 }
 
-/// Returns the identities of the answer, at most `top` of them.
+/// Place of a camera in a scene, for questions; that of the first photo without one.
+pub(crate) fn seen_from(scene: &Scene, camera: Option<&Camera>) -> QueryPlace {
+    let views = scene.views();
+    let up = Camera::up_of(views.iter()).unwrap_or_else(|| scene.home().up);
+    let at = |camera: &Camera| QueryPlace::new(camera, up, scene.meters_per_unit);
+    camera.or(views.first()).map(at).unwrap_or_default()
+}
+
+/// Returns the identities of the answer: all that are meant together, else at most `top`.
 pub(crate) fn identities(
     map: &SemanticMap,
+    place: &QueryPlace,
     text: &str,
     level: LevelFilter,
     top: usize,
 ) -> Result<Vec<IdentityId>, JobError> {
-    Ok(answered(map, text, level, &QueryConfig::default())?.chosen(top))
+    Ok(answered(map, place, text, level, &QueryConfig::default())?.chosen(top))
 }
 
 /// Returns the same for edits: by names alone.
 ///
 /// # Errors
-/// If nothing is found, or only by embedding.
+/// If nothing is found, or only by embedding, or if several fit where one is meant.
 pub(crate) fn named(
     map: &SemanticMap,
+    place: &QueryPlace,
     text: &str,
     level: LevelFilter,
     top: usize,
 ) -> Result<Vec<IdentityId>, JobError> {
-    let answered = answered(map, text, level, &QueryConfig::default())?;
+    let answered = answered(map, place, text, level, &QueryConfig::default())?;
+    let names = |ids: &[IdentityId]| ids.iter().take(8).map(|id| map.identities.full_name(*id)).collect::<Vec<_>>();
     match (answered.basis, answered.chosen(top)) {
         (Basis::Embedding, ids) => {
-            let name = ids.first().map(|id| map.identities.full_name(*id)).unwrap_or_default();
+            let name = names(&ids).into_iter().next().unwrap_or_default();
             Err(JobError::OnlyLooks { text: text.to_owned(), name })
+        }
+        (Basis::Names, ids) if matches!(answered.answer, Answer::Ambiguous(_)) && top < ids.len() => {
+            Err(JobError::SeveralFit { text: text.to_owned(), names: names(&ids).join("', '") })
         }
         (Basis::Names, ids) => Ok(ids),
     }
@@ -187,11 +203,14 @@ pub(crate) fn named(
 /// If nothing is found, or the encoder fails.
 pub(crate) fn answered(
     map: &SemanticMap,
+    place: &QueryPlace,
     text: &str,
     level: LevelFilter,
     recipe: &QueryConfig,
 ) -> Result<QueryAnswer, JobError> {
-    let answered = QueryEngine::new(map.language.as_ref(), recipe.clone())?.ask(map, text, level)?;
+    let mut engine = QueryEngine::new(map.language.as_ref(), recipe.clone())?;
+    engine.place = place.clone();
+    let answered = engine.ask(map, text, level)?;
     answered.filter(|a| !a.chosen(1).is_empty()).ok_or_else(|| JobError::NoMatch(text.to_owned()))
 }
 

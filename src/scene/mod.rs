@@ -23,6 +23,7 @@ pub(crate) mod preparation;
 pub mod resource_log;
 mod rig;
 pub(crate) mod semantic_map;
+pub(crate) mod shapes;
 pub(crate) mod text;
 pub(crate) mod undo;
 

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use super::colors::SeenColors;
 use super::findings::IdentityEvidence;
+use super::shapes::SeenShapes;
 use super::{
     ExtraProperty, GaussianCloud, Identities, IdentityId, LanguageFeatures, NO_IDENTITY, Preparation,
     SegmentationReport,
@@ -96,13 +97,13 @@ impl SemanticMap {
             let stored = values(name).into_iter().flatten().filter(|v| v.is_finite());
             map.codes.iter_mut().zip(stored).for_each(|(codes, v)| codes[c] = *v);
         }
-        map.see_colors(cloud);
+        map.look_at(cloud);
         Some(map)
     }
 
-    /// Computes the colors of the identities in `cloud`, for queries that name one.
-    pub(crate) fn see_colors(&mut self, cloud: &GaussianCloud) {
-        self.identities.colors = SeenColors::of(cloud, self);
+    /// Computes colors and shapes of the identities in `cloud`, for queries.
+    pub(crate) fn look_at(&mut self, cloud: &GaussianCloud) {
+        (self.identities.colors, self.identities.shapes) = (SeenColors::of(cloud, self), SeenShapes::of(cloud, self));
     }
 
     /// Records Gaussians that are removed from the scene for good, beside earlier ones.

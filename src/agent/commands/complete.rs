@@ -3,8 +3,9 @@
 use super::form::{FormItem, FormRequest, FormSlot, Things, sequences};
 use super::{SEPARATORS, clauses};
 use crate::agent::language::CommandLanguage;
-use crate::agent::resolve::{NameWords, is_thing};
+use crate::agent::names::NameWords;
 use crate::agent::words::request_tokens;
+use crate::pipeline::semantics::query::language::words::Vocabulary;
 use crate::scene::Identities;
 
 /// Returns at most `most` completions of `text` by its next words: names of things first, else in the order of the
@@ -46,7 +47,7 @@ pub fn complete(text: &str, identities: &Identities, most: usize) -> Vec<String>
 
 struct Kept<'a> {
     identities: &'a Identities,
-    known: &'a NameWords,
+    known: &'a NameWords<'a>,
     /// Word that is being typed; empty if the next has not begun.
     begun: &'a str,
 }
@@ -80,7 +81,7 @@ impl Kept<'_> {
                     let said = words[..end].join(" ");
                     let names = matches!(slot, FormSlot::Thing | FormSlot::Things | FormSlot::Kind);
                     let fits = match slot {
-                        _ if names => is_thing(&words[..end], self.known, true),
+                        _ if names => self.known.is_thing(&words[..end], true),
                         FormSlot::Name => true,
                         FormSlot::Distance | FormSlot::Angle => words[0].starts_with(|c: char| c.is_ascii_digit()),
                         _ => options.contains(&said),
@@ -89,7 +90,7 @@ impl Kept<'_> {
                         self.follow(items, &words[end..], next);
                     }
                     if fits && names && end == words.len() {
-                        CommandLanguage::get().relations.iter().for_each(|(r, _)| self.offer(r, false, next));
+                        relations().iter().for_each(|r| self.offer(r, false, next));
                     }
                 }
             }
@@ -117,15 +118,22 @@ impl Kept<'_> {
                 ["objects".to_owned(), "parts".into()].into_iter().chain(names.cloned()).collect()
             }
             FormSlot::Side => language.sides.iter().map(|(w, _)| (*w).to_owned()).collect(),
-            FormSlot::Relation => language.relations.iter().map(|(w, _)| (*w).to_owned()).collect(),
+            FormSlot::Relation => relations(),
             FormSlot::Direction => language.directions.iter().map(|(w, _)| (*w).to_owned()).collect(),
             FormSlot::Turn => fixed(&["left", "right", "up", "down"]),
             FormSlot::Distance => fixed(&["20 cm", "half a meter", "two steps", "a bit"]),
             FormSlot::Angle => fixed(&["90 degrees", "45 degrees"]),
-            FormSlot::Most => language.most.iter().chain(&language.least).map(|(w, _)| w.clone()).collect(),
+            FormSlot::Most => Vocabulary::get().superlatives().map(str::to_owned).collect(),
             FormSlot::Name => Vec::new(),
         }
     }
+}
+
+/// Words of all relations, sorted.
+fn relations() -> Vec<String> {
+    let mut all: Vec<String> = Vocabulary::get().relations().map(|(words, _)| words).collect();
+    all.sort();
+    all
 }
 
 /// Returns the rest of a text after the prefix `begun`, compared without letter case.

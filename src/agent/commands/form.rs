@@ -6,10 +6,11 @@ use std::sync::OnceLock;
 
 use crate::agent::camera_args::{Direction, Distance};
 use crate::agent::language::{CommandHelp, CommandLanguage, commands, find};
+use crate::agent::names::NameWords;
 use crate::agent::relation::Relation;
-use crate::agent::resolve::{NameWords, counted, is_thing};
 use crate::agent::words::{Token, number};
 use crate::navigate::target::Side;
+use crate::pipeline::semantics::query::language::words::{Vocabulary, WordClass};
 use crate::scene::identity::whole_names::key;
 
 /// Kind of a slot.
@@ -152,7 +153,7 @@ fn item(word: &str) -> FormItem {
 pub(super) struct FormRequest<'a> {
     pub(crate) tokens: &'a [Token],
     pub(crate) words: &'a [&'a str],
-    pub(crate) known: &'a NameWords,
+    pub(crate) known: &'a NameWords<'a>,
     pub(crate) things: Things,
 }
 
@@ -193,8 +194,8 @@ impl FormRequest<'_> {
     fn is_thing(&self, words: &[&str]) -> bool {
         match self.things {
             Things::Whole => self.known.whole(words).is_some(),
-            Things::Known => is_thing(words, self.known, true),
-            Things::Any => is_thing(words, self.known, false),
+            Things::Known => self.known.is_thing(words, true),
+            Things::Any => self.known.is_thing(words, false),
         }
     }
 
@@ -208,7 +209,7 @@ impl FormRequest<'_> {
     fn take(&self, slot: FormSlot, at: usize, end: usize, slots: &mut Slots) -> bool {
         let words = &self.words[at..end];
         let text = words.join(" ");
-        let language = CommandLanguage::get();
+        let (language, vocabulary) = (CommandLanguage::get(), Vocabulary::get());
         match slot {
             FormSlot::Thing => {
                 slots.named += words.len();
@@ -219,8 +220,8 @@ impl FormRequest<'_> {
                 slots.texts.push(self.joined(words));
                 let words = if words[0] == "all" { &words[1..] } else { words };
                 // With complete names, a kind must not take in a relation such as "on the table".
-                let is_plain = self.things != Things::Whole || !words.iter().any(|w| language.is_no_name(w));
-                self.known.whole(words).is_some() || is_plain && is_thing(words, self.known, self.things != Things::Any)
+                let is_plain = self.things != Things::Whole || !words.iter().any(|w| vocabulary.is(WordClass::NoName, w));
+                self.known.whole(words).is_some() || is_plain && self.known.is_thing(words, self.things != Things::Any)
             }
             FormSlot::Things => {
                 let parts: Vec<&[&str]> =
@@ -229,7 +230,7 @@ impl FormRequest<'_> {
                 slots.named += words.len();
                 slots.several = Some((slots.texts.len(), parts.iter().map(|p| self.joined(p)).collect()));
                 slots.texts.push(text);
-                !parts.is_empty() && parts.iter().all(|p| self.is_thing(p) || many(p).is_some_and(|p| self.is_thing(p)))
+                !parts.is_empty() && parts.iter().all(|p| self.is_thing(p))
             }
             FormSlot::Name => {
                 let raw: Vec<&str> = self.tokens[at..end].iter().map(|t| t.raw.as_str()).collect();
@@ -241,7 +242,7 @@ impl FormRequest<'_> {
                 slots.side.is_some()
             }
             FormSlot::Relation => {
-                slots.relation = language.relation_at(words).filter(|(_, n)| *n == words.len()).map(|(r, _)| r);
+                slots.relation = vocabulary.relation(words).filter(|(_, n)| *n == words.len()).map(|(r, _)| r);
                 slots.relation.is_some()
             }
             FormSlot::Direction | FormSlot::Turn => {
@@ -259,7 +260,7 @@ impl FormRequest<'_> {
             }
             FormSlot::Most => {
                 slots.most = Some(text);
-                language.most.iter().chain(&language.least).any(|(w, _)| w == words[0]) && words.len() == 1
+                vocabulary.order(words[0]).is_some_and(|o| o.superlative) && words.len() == 1
             }
         }
     }
@@ -267,21 +268,6 @@ impl FormRequest<'_> {
 
 fn quoted(words: &[&str]) -> String {
     words.join(" ").replace(" 's", "'s").replace('"', "")
-}
-
-/// Returns the words after "all", "both" and the like, or words that begin with a number. Such a phrase means every
-/// match.
-pub(super) fn many<'a, 'b>(words: &'b [&'a str]) -> Option<&'b [&'a str]> {
-    let bare = |words: &'b [&'a str]| match words {
-        [first, rest @ ..] if CommandLanguage::get().determiners.iter().any(|d| d == first) => rest,
-        all => all,
-    };
-    let rest = match words {
-        ["all" | "both" | "each", "of", rest @ ..] | ["all" | "both" | "every" | "each", rest @ ..] => rest,
-        _ if counted(bare(words)).is_some() => words,
-        _ => return None,
-    };
-    Some(bare(rest)).filter(|r| !r.is_empty())
 }
 
 /// Reads an amount: "20", "half a", "thirty five".

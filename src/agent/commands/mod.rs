@@ -10,7 +10,7 @@ pub use complete::complete;
 
 use std::collections::VecDeque;
 
-use self::form::{FormItem, FormRequest, Slots, Things, beginning_with, many, sequences};
+use self::form::{FormItem, FormRequest, Slots, Things, beginning_with, sequences};
 use self::task::{CommandStep, task};
 use super::camera_args::{CLOSENESS, CLOSER, Direction, Distance, FARTHER, NORMAL};
 use super::describe::capital;
@@ -19,12 +19,16 @@ use super::execute::CallOutcome;
 use super::language::CommandLanguage;
 use super::planner::{Planner, PlannerContext, Step};
 use super::refusal::{Refusal, RefusalKind};
-use super::resolve::{NameWords, Resolved, is_thing, name_words, resolve, resolve_all, words_of};
+use super::names::{NameWords, words_of};
+use super::resolve::{Resolved, resolve};
 use super::tool::{Reference, Target, ToolCall};
 use super::words::{Token, alike, request_tokens};
 use super::world::World;
 use crate::navigate::target::Side;
+use crate::pipeline::semantics::query::language;
+use crate::pipeline::semantics::query::language::words::Vocabulary;
 use crate::pipeline::semantics::query::recipe::MatchBy;
+use crate::scene::identity::name_words::words as name_words;
 use crate::scene::{Identities, LevelFilter};
 
 /// Maximum number of tasks per request.
@@ -133,7 +137,7 @@ pub(crate) fn parse(request: &str, identities: &Identities) -> Option<Vec<Comman
 pub(crate) fn is_command(text: &str, identities: &Identities) -> bool {
     let words = words_of(text);
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
-    !is_thing(&words, &NameWords::new(identities), false) && parse(text, identities).is_some()
+    !NameWords::new(identities).is_thing(&words, false) && parse(text, identities).is_some()
 }
 
 /// Parses a request as one command, or as several in a row.
@@ -251,7 +255,7 @@ fn settled(tasks: Vec<CommandStep>, context: &mut PlannerContext<'_>) -> Result<
         for phrase in phrases(&task).iter().filter(|_| !is_alone) {
             match resolve(context.world, phrase, LevelFilter::Auto, &dialog) {
                 Resolved::One { id, .. } => dialog.last = Some(id),
-                Resolved::Several(some) => {
+                Resolved::Several(some) | Resolved::All(some) => {
                     let names: Vec<String> = some.iter().map(|id| context.world.identities().full_name(*id)).collect();
                     let text = format!(
                         "Several things fit '{phrase}': {}. Nothing was done; say it in full.",
@@ -283,20 +287,21 @@ fn is_done_to_several(call: &ToolCall) -> bool {
     )
 }
 
-/// Identities of "all bottles", "both controllers" or "the two controllers"; `None` if the phrase means one thing.
+/// Identities of "all bottles", "both controllers" or "the lamp and the mug"; `None` if the phrase means one thing.
 fn all_of(phrase: &str, world: &mut dyn World, dialog: &DialogState) -> Result<Option<Vec<u32>>, Refusal> {
-    let words: Vec<&str> = phrase.split(' ').collect();
-    let is_name = !world.identities().called(phrase, LevelFilter::Auto).is_empty();
-    let Some(rest) = many(&words).filter(|_| !is_name) else { return Ok(None) };
-    let ids = resolve_all(world, &rest.join(" "), LevelFilter::Auto, dialog)?;
+    if !language::means_several(phrase, world.identities()) {
+        return Ok(None);
+    }
+    let ids = match resolve(world, phrase, LevelFilter::Auto, dialog) {
+        Resolved::One { id, .. } => vec![id],
+        Resolved::All(ids) => ids,
+        // The question for one of them comes with the call.
+        Resolved::Several(_) => return Ok(None),
+        Resolved::Missing { refusal, .. } => return Err(refusal),
+    };
     if world.match_by() == MatchBy::Embedding {
         let text = "What is found by embedding is no count: ask for one thing at a time.";
         return Err(Refusal::new(RefusalKind::Unclear, text));
-    }
-    let is_both = words[0] == "both";
-    if is_both && ids.len() != 2 {
-        let text = format!("There are {} of them here, not two.", ids.len());
-        return Err(Refusal::new(RefusalKind::Conflict, text));
     }
     Ok(Some(ids))
 }
@@ -346,7 +351,8 @@ pub(crate) fn nearest(request: &str, identities: &Identities) -> Vec<String> {
 fn corrected(request: &str, identities: &Identities) -> Option<String> {
     let known = NameWords::new(identities);
     let mut words: Vec<&str> = sequences().iter().flat_map(|s| &s.items).filter_map(FormItem::word).collect();
-    words.extend(CommandLanguage::get().relations.iter().flat_map(|(r, _)| r.split(' ')));
+    let relations: Vec<String> = Vocabulary::get().relations().map(|(words, _)| words).collect();
+    words.extend(relations.iter().flat_map(|r| r.split(' ')));
     words.extend(known.words());
     words.sort_unstable();
     words.dedup();

@@ -5,15 +5,13 @@ mod moves;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use glam::DVec3;
-
 use super::camera_args::{Direction, Distance};
 pub use super::effect::Effect;
 use super::effect::Emit;
-use super::relation::{Extent, Viewpoint};
+use super::relation::Viewpoint;
 pub use super::view_shares::AgentScene;
 use super::view_shares::ViewShares;
-use super::world::{Arrival, IdentityFacts, Movement, Unreachable, World, WorldError};
+use super::world::{Arrival, IdentityFacts, Movement, QueryPlace, Unreachable, World, WorldError};
 use crate::jobs::query::QueryEngine;
 use crate::jobs::{export, export_splat, render};
 use crate::navigate::Pose;
@@ -22,10 +20,7 @@ use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::query::answer::QueryAnswer;
 use crate::pipeline::semantics::query::recipe::{MatchBy, QueryConfig};
 use crate::scene::undo::UndoHistory;
-use crate::scene::{Bounds, Camera, Identities, IdentityId, LevelFilter, SemanticMap, text};
-
-/// Maximum number of points of a thing for the measurement of its size.
-const MEASURED_POINTS: usize = 2048;
+use crate::scene::{Camera, Identities, IdentityId, LevelFilter, SemanticMap, text};
 
 /// Scene that the agent acts in.
 pub struct SceneWorld {
@@ -35,7 +30,6 @@ pub struct SceneWorld {
     aspect: f64,
     hidden: Vec<bool>,
     marked: Vec<IdentityId>,
-    bounds: Vec<Option<Bounds>>,
     shares: ViewShares,
     done: UndoHistory<Before>,
     /// Last edit of the user, which the window can undo.
@@ -57,10 +51,12 @@ impl SceneWorld {
     ///
     /// # Errors
     /// If the encoder of its embeddings cannot be loaded.
-    pub fn new(parts: AgentScene, eye: Pose, aspect: f64, emit: Emit) -> Result<Self, WorldError> {
+    pub fn new(mut parts: AgentScene, eye: Pose, aspect: f64, emit: Emit) -> Result<Self, WorldError> {
         let engine = engine(&parts.map, parts.recipe.clone())?;
+        if !parts.map.identities.shapes.are_known() {
+            Arc::make_mut(&mut parts.map).look_at(&parts.cloud);
+        }
         let n = parts.map.identities.len() + 1;
-        let bounds = parts.bounds();
         Ok(Self {
             parts,
             engine,
@@ -68,7 +64,6 @@ impl SceneWorld {
             aspect,
             hidden: vec![false; n],
             marked: Vec::new(),
-            bounds,
             shares: ViewShares::default(),
             done: UndoHistory::default(),
             removing: Vec::new(),
@@ -86,7 +81,6 @@ impl SceneWorld {
                 self.done = UndoHistory::default();
             }
             self.parts.map = Arc::clone(map);
-            self.bounds = self.parts.bounds();
         }
         let hidden: Vec<bool> = (0..=map.identities.len() as IdentityId).map(|id| hidden.contains(&id)).collect();
         if hidden != self.hidden {
@@ -174,9 +168,10 @@ impl World for SceneWorld {
         &self.parts.map.identities
     }
 
-    fn locate(&mut self, query: &str, kind: LevelFilter) -> Result<QueryAnswer, WorldError> {
+    fn locate(&mut self, query: &str, kind: LevelFilter, place: &QueryPlace) -> Result<QueryAnswer, WorldError> {
+        self.engine.place = place.clone();
         let answered = self.engine.ask(&self.parts.map, query, kind).map_err(|e| WorldError(e.to_string()))?;
-        Ok(answered.unwrap_or_else(|| super::world::locate_by_names(&self.parts.map.identities, query, kind)))
+        Ok(answered.unwrap_or_else(|| super::world::locate_by_names(&self.parts.map.identities, query, kind, place)))
     }
 
     fn facts(&self, id: IdentityId) -> Option<IdentityFacts> {
@@ -185,19 +180,10 @@ impl World for SceneWorld {
             names: identity.names.clone(),
             level: identity.level,
             parent: identity.parent,
-            bounds: self.bounds.get(id as usize).copied().flatten(),
+            bounds: self.parts.map.identities.shapes.get(id).map(|s| s.bounds),
             in_view: self.share_of(id),
             hidden: !self.drawn(id),
         })
-    }
-
-    fn extent(&self, id: IdentityId) -> Option<Extent> {
-        let members = self.parts.map.members(id);
-        let place = |i: &usize| self.parts.cloud.world_position(*i);
-        let every = members.len().div_ceil(MEASURED_POINTS).max(1);
-        let points: Vec<DVec3> =
-            members.iter().filter(|i| **i < self.parts.cloud.len()).step_by(every).map(place).collect();
-        Extent::new(&points, self.parts.up)
     }
 
     fn view(&self) -> Viewpoint {

@@ -57,7 +57,7 @@ pub(super) fn fly_to(
             Ok(arrival)
         }
         (problem, nearest) => {
-            let center = scene.bounds.get(id as usize).copied().flatten().map(|b| b.center());
+            let center = scene.parts.map.identities.shapes.get(id).map(|s| s.center());
             let nearest = nearest.and_then(|n| Some(n.view.pose.center.distance(center?)));
             Err(Unreachable { reason: problem.unwrap_or_default(), nearest })
         }
@@ -66,7 +66,7 @@ pub(super) fn fly_to(
 
 /// Turns toward an identity.
 pub(super) fn turn_to(scene: &mut SceneWorld, id: IdentityId) -> Result<Arrival, Unreachable> {
-    let center = scene.bounds.get(id as usize).copied().flatten().map(|b| b.center());
+    let center = scene.parts.map.identities.shapes.get(id).map(|s| s.center());
     let center = center.ok_or_else(|| Unreachable { reason: "it has no Gaussians".into(), nearest: None })?;
     let eye = scene.eye;
     let to = Pose::looking_at(eye.center, center, scene.parts.up, eye.fov_y_rad, &eye.world_from_camera);

@@ -30,6 +30,8 @@ pub(super) fn run(args: &QueryArgs, list: &Path, scene: &Scene, map: SemanticMap
         phrases: phrases::read(list)?,
         colors: PhraseColors::default(),
         level: args.kind,
+        up: scene.home().up,
+        meters: scene.meters_per_unit,
         recipe: args.recipe.recipe(),
         top: args.top,
         truth: args.truth.clone().map_or(TrueMasks::None, TrueMasks::Folder),

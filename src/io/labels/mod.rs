@@ -8,6 +8,7 @@
 //! | `images_<factor>/label/*.png` | SPIn-NeRF ([`spin_nerf`]) |
 //! | `segmentations/classes.txt` | 3D-OVS ([`three_d_ovs`]) |
 //! | `test_mask/<view>/*.png` | LERF-Mask ([`lerf_mask`]) |
+//! | `json/`, `mask/`, `gt_mask/` | Ref-LERF ([`ref_lerf`]) |
 //! | files ([`files`](label_files)), also a single one, and in folders below | ISAT, as in lerf_ovs ([`isat`]); LabelMe; COCO; YOLO's segments; masklets of a video, as in SA-V ([`masklets`]) |
 //!
 //! Masks are drawn on the photos as stored, or on a larger or smaller copy of them; they are
@@ -23,6 +24,7 @@ pub(crate) mod lerf_mask;
 pub(crate) mod masklets;
 pub(crate) mod pictures;
 mod polygons;
+pub(crate) mod ref_lerf;
 pub(crate) mod rle;
 mod sheet;
 pub(crate) mod spin_nerf;
@@ -70,7 +72,7 @@ pub struct Labels {
 enum Source {
     /// Id maps of `fmlgs synth`.
     SynthIds(synth_ids::SynthIds),
-    /// A picture per mask: SPIn-NeRF, 3D-OVS, LERF-Mask.
+    /// A picture per mask: SPIn-NeRF, 3D-OVS, LERF-Mask, Ref-LERF.
     Pictures(pictures::Pictures),
     /// Masklets of a video.
     Masklets(masklets::Masklets),
@@ -87,7 +89,7 @@ impl Labels {
             let addresses = ids.addresses();
             return with(Source::SynthIds(ids), addresses);
         }
-        for find in [spin_nerf::find, three_d_ovs::find, lerf_mask::find] {
+        for find in [spin_nerf::find, three_d_ovs::find, lerf_mask::find, ref_lerf::find] {
             if let Some(pictures) = find(path)? {
                 let addresses = pictures.addresses();
                 return with(Source::Pictures(pictures), addresses);

@@ -7,6 +7,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use glam::DVec3;
 use serde::Serialize;
 use serde_json::json;
 
@@ -18,6 +19,7 @@ use crate::io::labels::pictures;
 use crate::io::{atomic, files};
 use crate::pipeline::observer::{Observer, Ticker};
 use crate::pipeline::semantics::query::answer::{Certainty, QueryAnswer};
+use crate::pipeline::semantics::query::language::QueryPlace;
 use crate::pipeline::semantics::query::matching::MatchMode;
 use crate::pipeline::semantics::query::query_engine::QueryEngine;
 use crate::pipeline::semantics::query::recipe::QueryConfig;
@@ -53,6 +55,10 @@ pub struct PhrasesRequest {
     /// Colors that phrases have already.
     pub(crate) colors: PhraseColors,
     pub(crate) level: LevelFilter,
+    /// Up direction of the scene.
+    pub(crate) up: DVec3,
+    /// Length of a scene unit in meters, if known.
+    pub(crate) meters: Option<f64>,
     pub(crate) recipe: QueryConfig,
     /// Most answers whose pixels go into a mask.
     pub(crate) top: usize,
@@ -117,13 +123,10 @@ pub(crate) fn read(path: &Path) -> Result<Vec<String>, JobError> {
 pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Result<Vec<PhraseRow>, JobError> {
     let PhrasesRequest { cloud, map, settings, views, phrases, level, .. } = request;
     let mut engine = QueryEngine::new(map.language.as_ref(), request.recipe.clone())?;
-    let mut asked = Vec::new();
+    let mut readings = Vec::new();
     for phrase in phrases {
-        let reading = engine.read(&map.identities, phrase, *level);
-        let reading = reading.ok_or_else(|| JobError::Phrases(format!("'{phrase}' has no word to look for")))?;
-        let answered = engine.answer(map, &reading, *level)?;
-        let (ignored, _) = engine.left_out(&map.identities, &reading, &answered);
-        asked.push((answered.certainty(&ignored), answered));
+        let reading = engine.read(&map.identities, phrase);
+        readings.push(reading.ok_or_else(|| JobError::Phrases(format!("'{phrase}' has no word to look for")))?);
     }
     let mut colors = request.colors.clone();
     colors.keep_all(phrases);
@@ -135,7 +138,12 @@ pub(crate) fn run(request: &PhrasesRequest, observer: &mut dyn Observer) -> Resu
         let blend = request.recipe.masks == MatchMode::Codes;
         let maps = ViewMaps::draw(&mut renderer, (cloud, settings), map, camera, blend, map.has_parts())?;
         coco.view(view, camera);
-        for (i, (certainty, answered)) in asked.iter().enumerate() {
+        engine.place = QueryPlace::new(camera, request.up, request.meters);
+        for (i, reading) in readings.iter().enumerate() {
+            // Left and right are those of the view.
+            let answered = &engine.answer(map, reading, *level)?;
+            let (ignored, _) = engine.left_out(&map.identities, reading, answered);
+            let certainty = &answered.certainty(&ignored);
             let mask = maps.of_answer(map, answered, request.top);
             let place = Path::new(&stem(view)).join(format!("{}.png", stems[i]));
             let iou = truth(&request.truth, &place, &mask)?.map(|truth| mask.iou(&truth));

@@ -37,6 +37,8 @@ fn request(phrases: &[&str]) -> PhrasesRequest {
         phrases: phrases.iter().map(|p| (*p).to_owned()).collect(),
         colors: PhraseColors::default(),
         level: LevelFilter::Auto,
+        up: DVec3::NEG_Y,
+        meters: None,
         recipe: QueryConfig::default(),
         top: 1,
         truth: TrueMasks::None,

@@ -1,8 +1,10 @@
 //! Layout of the scenes of each data set, and errors for folders with another layout.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use super::PaperTable;
+use crate::io::labels::ref_lerf::{self, ReferredPhoto};
 use crate::jobs::JobError;
 
 /// A scene of a data set.
@@ -11,6 +13,8 @@ pub(super) struct SceneInput {
     pub(super) name: String,
     pub(super) photos: PathBuf,
     pub(super) labels: PathBuf,
+    /// Sentences of Ref-LERF, by the name of the photo without ending; else empty.
+    pub(super) referred: BTreeMap<String, ReferredPhoto>,
 }
 
 /// Folder of the labels of all scenes, if they do not lie beside the photos.
@@ -30,6 +34,10 @@ fn expected(table: PaperTable) -> &'static str {
             "scenes with parts have posed photos in DATA/SCENE, and labels that name wholes and parts in \
              DATA/label/SCENE (ISAT with 'parent') or in DATA/SCENE (id maps of 'fmlgs synth')"
         }
+        PaperTable::RefLerf => {
+            "Ref-LERF has DATA/SCENE/images, DATA/SCENE/sparse/0, DATA/SCENE/json/test_json/frame_00006.json and \
+             DATA/SCENE/mask"
+        }
     }
 }
 
@@ -47,6 +55,7 @@ pub(super) fn find(table: PaperTable, data: &Path, wanted: &[String]) -> Result<
         PaperTable::SpinNerf => has_spin_labels(&data.join(name)),
         PaperTable::Ovs3d => data.join(name).join("segmentations").is_dir(),
         PaperTable::PartAblation => label_root.join(name).is_dir() || data.join(name).join("identities.json").is_file(),
+        PaperTable::RefLerf => ref_lerf::has_lists(&data.join(name)),
     };
     if table == PaperTable::LerfOvs && !label_root.is_dir() {
         return Err(wrong(&label_root, "no such folder"));
@@ -76,8 +85,13 @@ pub(super) fn find(table: PaperTable, data: &Path, wanted: &[String]) -> Result<
         if table == PaperTable::Ovs3d && !classes.is_file() {
             return Err(wrong(&classes, "no such file"));
         }
-        let labels = if apart.is_dir() { apart } else { photos.clone() };
-        Ok(SceneInput { name, photos, labels })
+        let is_referred = table == PaperTable::RefLerf;
+        let referred = if is_referred { ref_lerf::photos(&photos)? } else { BTreeMap::new() };
+        if is_referred && !referred.values().any(|photo| photo.is_test) {
+            return Err(wrong(&photos, "it has no sentences of a test photo"));
+        }
+        let labels = if apart.is_dir() && !is_referred { apart } else { photos.clone() };
+        Ok(SceneInput { name, photos, labels, referred })
     };
     names.into_iter().map(input).collect()
 }

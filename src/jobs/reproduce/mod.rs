@@ -1,6 +1,6 @@
-//! The paper's tables, one call each: every scene of a data set is trained, its objects are found, and answers to
-//! queries are compared with its labels. Our rows stand beside the paper's printed ones, and beside baselines made of
-//! our own components.
+//! The paper's tables, and ReferSplat's, one call each: every scene of a data set is trained, its objects are found,
+//! and answers to queries are compared with its labels. Our rows stand beside the printed ones, and beside baselines
+//! made of our own components.
 //!
 //! Each scene has a folder, and each of its stages leaves a file at its end: a stopped run is resumed, and no finished
 //! stage is repeated. A folder holds the results of one set of settings only.
@@ -25,7 +25,7 @@ use crate::pipeline::observer::{Observer, Severity};
 use crate::pipeline::semantics::lifting::build_map::REGIONS;
 use crate::pipeline::train::TrainConfig;
 
-/// A table of the paper.
+/// A table of the paper, or of ReferSplat.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, clap::ValueEnum, strum::IntoStaticStr)]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
@@ -41,6 +41,8 @@ pub(crate) enum PaperTable {
     Ovs3d,
     /// Recall of parts as multilevel extraction, semantic deviation and multilevel localization are switched on
     PartAblation,
+    /// Sentences about objects of the LERF scenes, ReferSplat's table; never tried on the real data set
+    RefLerf,
 }
 
 /// Value of `masks` for masks from the labels themselves.

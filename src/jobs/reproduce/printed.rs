@@ -1,11 +1,11 @@
-//! Printed values of the paper: the rows of its tables, in percent and seconds, to stand beside ours.
+//! Printed values of the paper, and of ReferSplat's: rows of tables, in percent and seconds, to stand beside ours.
 
 use super::PaperTable;
 
-/// A table of the paper.
+/// A printed table.
 pub(super) struct PrintedTable {
     pub(super) metric: &'static str,
-    /// Title of the table in the paper.
+    /// Title of the table in the paper, or its source.
     pub(super) title: &'static str,
     /// Its columns by the names of the scenes' folders; the last is for all scenes.
     pub(super) scenes: &'static [&'static str],
@@ -21,7 +21,7 @@ pub(super) const RECALL: &str = "recall of parts, %";
 
 const LERF_SCENES: &[&str] = &["ramen", "figurines", "teatime", "waldo_kitchen"];
 
-/// Returns the paper's tables that are reproduced.
+/// Returns the printed tables that are reproduced.
 pub(super) fn printed(table: PaperTable) -> Vec<PrintedTable> {
     match table {
         PaperTable::LerfOvs => vec![
@@ -117,5 +117,17 @@ pub(super) fn printed(table: PaperTable) -> Vec<PrintedTable> {
                 of(TIME, &[("none", &[0.67]), ("ME", &[0.69]), ("ME + SD", &[0.69]), ("ME + SD + ML", &[0.75])]),
             ]
         }
+        PaperTable::RefLerf => vec![PrintedTable {
+            metric: MIOU,
+            title: "mIoU on Ref-LERF, in ReferSplat (arXiv 2508.08252)",
+            scenes: LERF_SCENES,
+            rows: &[
+                ("Grounded SAM", &[14.1, 16.0, 16.9, 16.2, 15.8]),
+                ("LangSplat", &[12.0, 17.9, 7.6, 17.9, 13.9]),
+                ("GS-Grouping", &[27.9, 8.6, 14.8, 6.3, 14.4]),
+                ("GOI", &[27.1, 16.5, 22.9, 15.7, 20.5]),
+                ("ReferSplat", &[35.2, 25.7, 31.3, 24.4, 29.2]),
+            ],
+        }],
     }
 }

@@ -1,5 +1,5 @@
 //! The measured rows of a table: this program's method, the paper's, and baselines made of our own components. All
-//! query by embedding alone, whatever names labels have, except for the one that says otherwise.
+//! query by embedding alone, whatever names labels have, except for those that say otherwise.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::time::Instant;
@@ -8,6 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::printed::{ACCURACY, LOCALIZATION, MIOU, RECALL};
 use super::{PaperTable, ReproduceSettings};
+use crate::io::labels::ref_lerf::ReferredPhoto;
+use crate::io::labels::stem;
 use crate::jobs::JobError;
 use crate::jobs::evaluate::PhotoComparison;
 use crate::jobs::evaluate_masks::DrawnView;
@@ -18,12 +20,17 @@ use crate::pipeline::semantics::evaluation::by_similarity::{ALIKE, rejoined};
 use crate::pipeline::semantics::evaluation::part_recall::{self, Components, objects_alone};
 use crate::pipeline::semantics::evaluation::raw_features::RawFeatures;
 use crate::pipeline::semantics::evaluation::{
-    AskedScene, LabeledView, Unit, fastlgs_ex, langsplat, lerf_rule, multi_class, spin_nerf,
+    AskedScene, LabeledView, Unit, fastlgs_ex, langsplat, lerf_rule, multi_class, ref_lerf, spin_nerf,
 };
 use crate::pipeline::semantics::query::answer::QueryAnswer;
 use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::query::parse::ParsedQuery;
+<<<<<<< HEAD
+use crate::pipeline::semantics::query::language::QueryPlace;
 use crate::pipeline::semantics::query::query_engine::{ask_by_embedding, ask_by_name};
+=======
+use crate::pipeline::semantics::query::query_engine::{QueryEngine, ask_by_embedding, ask_by_name};
+>>>>>>> w-ref
 use crate::pipeline::semantics::query::recipe::{MatchBy, PartEmbedding, QueryConfig, RelevancyScale, Strategy};
 use crate::pipeline::semantics::query::timing::ms_since;
 use crate::pipeline::semantics::view_map::ViewMap;
@@ -32,6 +39,8 @@ use crate::scene::{LanguageFeatures, LevelFilter, SemanticMap};
 
 pub(super) const POOLED: &str = "running pooled IoU of FastLGS's evaluator, %";
 pub(super) const ARGMAX: &str = "mean IoU by arg-max over all classes, %";
+/// Shares of sentences by their IoU.
+const OVER: [(&str, f64); 2] = [("sentences with IoU over 0.25, %", 0.25), ("sentences with IoU over 0.5, %", 0.5)];
 pub(super) const PART_IOU: &str = "mean IoU of parts, %";
 
 /// A row: the percentage of every query, by metric.
@@ -68,6 +77,15 @@ fn ways() -> [(&'static str, QueryConfig); 4] {
     ]
 }
 
+/// Returns the query recipes for sentences: this program's own, which knows names too, and by embedding alone.
+fn ways_of_sentences() -> [(&'static str, QueryConfig); 3] {
+    [
+        ("this program", QueryConfig::default()),
+        ("this program, by embedding alone", ours()),
+        ("the paper's two steps", QueryConfig::paper()),
+    ]
+}
+
 fn ours() -> QueryConfig {
     QueryConfig { match_by: MatchBy::Embedding, ..QueryConfig::default() }
 }
@@ -81,7 +99,7 @@ pub(super) fn measure(
     comparison: &PhotoComparison,
     map: &SemanticMap,
     drawn: &[DrawnView],
-    query: &str,
+    (query, referred): (&str, &BTreeMap<String, ReferredPhoto>),
 ) -> Result<MeasuredRows, JobError> {
     let language = map
         .language
@@ -90,7 +108,7 @@ pub(super) fn measure(
     let views: Vec<LabeledView<'_>> = drawn.iter().map(DrawnView::labeled).collect();
     let encoder = crate::models::encoder(&language.encoder)?;
     let mut by = ByEmbedding { encoder, phrases: TextEmbeddings::default(), unknown: BTreeSet::new() };
-    let table = Table { which: settings.table, query, classes: classes(&views) };
+    let table = Table { which: settings.table, query, classes: classes(&views), referred };
     let mut rows = Vec::new();
     if settings.table == PaperTable::PartAblation {
         for components in Components::ROWS {
@@ -99,6 +117,11 @@ pub(super) fn measure(
             let ious = percent(row.units.iter().map(|u| u.iou));
             let scores = BTreeMap::from([(RECALL.into(), recall), (PART_IOU.into(), ious)]);
             rows.push(RowResult { name: components_name(components).into(), scores });
+        }
+    } else if settings.table == PaperTable::RefLerf {
+        for (name, recipe) in ways_of_sentences() {
+            let mut engine = QueryEngine::new(map.language.as_ref(), recipe)?;
+            rows.push(table.row(name, map, &views, &mut |text| engine.ask(map, text, LevelFilter::Auto))?);
         }
     } else {
         let objects = objects_alone(language, &map.identities);
@@ -112,7 +135,7 @@ pub(super) fn measure(
         rows.extend(rule_rows(&table, comparison, (map, language), &views, &mut by)?);
         if map.identities.iter().any(|(_, i)| !i.names.is_empty()) {
             let recipe = QueryConfig::default();
-            let mut ask = |text: &str| Ok(ask_by_name(&map.identities, text, LevelFilter::Auto, &recipe));
+            let mut ask = |text: &str| Ok(ask_by_name(&map.identities, text, (LevelFilter::Auto, &QueryPlace::default()), &recipe));
             rows.push(table.row(BY_NAME, map, &views, &mut ask)?);
         }
     }
@@ -170,6 +193,8 @@ struct Table<'a> {
     /// Query if labels have no names.
     query: &'a str,
     classes: Vec<String>,
+    /// Sentences by photo.
+    referred: &'a BTreeMap<String, ReferredPhoto>,
 }
 
 fn percent(values: impl IntoIterator<Item = f64>) -> Vec<f64> {
@@ -181,8 +206,16 @@ impl Table<'_> {
     fn phrases<'b>(&'b self, view: &'b LabeledView<'_>) -> Vec<&'b str> {
         match self.which {
             PaperTable::SpinNerf => vec![self.query],
+            PaperTable::RefLerf => {
+                let asked = self.referred(view).map(|photo| ref_lerf::asked(view, photo)).unwrap_or_default();
+                asked.into_iter().map(|(_, sentence)| sentence).collect()
+            }
             _ => view.categories.iter().map(|c| c.name.as_str()).collect(),
         }
+    }
+
+    fn referred(&self, view: &LabeledView<'_>) -> Option<&ReferredPhoto> {
+        self.referred.get(&stem(view.name))
     }
 
     fn row(
@@ -210,6 +243,13 @@ impl Table<'_> {
                     views.iter().map(|v| multi_class::compare(scene, v, &self.classes)).map(|[a, b]| (a, b)).unzip();
                 let ious = |units: Vec<Vec<Unit>>| percent(units.into_iter().flatten().map(|u| u.iou));
                 BTreeMap::from([(MIOU.to_owned(), ious(own)), (ARGMAX.to_owned(), ious(winner))])
+            }
+            PaperTable::RefLerf => {
+                let units = views.iter().filter_map(|v| Some(ref_lerf::compare(scene, v, self.referred(v)?)));
+                let ious: Vec<f64> = units.flatten().map(|u| u.iou).collect();
+                let over = |least: f64| percent(ious.iter().map(|iou| f64::from(*iou > least)));
+                let shares = OVER.map(|(metric, least)| (metric.to_owned(), over(least)));
+                shares.into_iter().chain([(MIOU.to_owned(), percent(ious.iter().copied()))]).collect()
             }
             PaperTable::LerfOvs | PaperTable::PartAblation => {
                 let units: Vec<_> = views.iter().flat_map(|v| langsplat::compare(scene, v)).collect();

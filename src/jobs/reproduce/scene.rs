@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::layout::SceneInput;
 use super::rows::{self, QueryTimes, RowResult};
 use super::{LABELS, ReproduceSettings};
-use crate::io::labels::Labels;
+use crate::io::labels::{Labels, stem};
 use crate::jobs::changed::ChangedScene;
 use crate::jobs::evaluate::PhotoComparison;
 use crate::jobs::experiment::{Experiment, FoundFacts, TrainedFacts, once, stored};
@@ -84,7 +84,9 @@ impl Split {
         input: &SceneInput,
     ) -> Result<Self, JobError> {
         let photos = &dataset.photos;
-        let labeled: Vec<usize> = (0..photos.len()).filter(|&i| labels.has(&photos[i])).collect();
+        let tested = |i: &usize| input.referred.get(&stem(&photos[*i].name)).is_some_and(|photo| photo.is_test);
+        let labeled = (0..photos.len()).filter(|&i| labels.has(&photos[i]));
+        let (labeled, others): (Vec<usize>, Vec<usize>) = labeled.partition(|i| input.referred.is_empty() || tested(i));
         let Some(first) = labeled.first() else {
             let (labels, photos) = (input.labels.display(), input.photos.display());
             let text = format!(
@@ -93,8 +95,8 @@ impl Split {
             );
             return Err(JobError::Protocol(text));
         };
-        // If labels are the masks, those of the first labeled photo start the search.
-        let seed = (settings.masks == LABELS).then_some(*first);
+        // If labels are the masks, and all are of photos to compare, those of the first start the search.
+        let seed = (settings.masks == LABELS && others.is_empty()).then_some(*first);
         let mut compared: Vec<usize> = labeled.iter().copied().filter(|i| Some(*i) != seed).collect();
         let trained_on = settings.labeled_in_training;
         if !trained_on && 2 * compared.len() > photos.len() {
@@ -159,7 +161,7 @@ fn compare(
     let views = evaluate_masks::draw(&comparison, &map, &mut labels, &compared, split.trained_on)?;
     let query = settings.queries.get(&input.name).cloned();
     let query = query.unwrap_or_else(|| input.name.replace(['_', '-'], " "));
-    let asked = rows::measure(settings, &comparison, &map, &views, &query)?;
+    let asked = rows::measure(settings, &comparison, &map, &views, (query.as_str(), &input.referred))?;
     Ok(SceneResult {
         scene: input.name.clone(),
         photos: dataset.photos.len(),

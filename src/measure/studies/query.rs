@@ -13,6 +13,7 @@ use crate::models::{Encoder, ModelError};
 use crate::pipeline::semantics::code_map::CodeMap;
 use crate::pipeline::semantics::evaluation::part_recall::HIT_IOU;
 use crate::pipeline::semantics::evaluation::{AskedScene, Category, LabeledView, langsplat};
+use crate::pipeline::semantics::query::language::QueryPlace;
 use crate::pipeline::semantics::query::answer::QueryAnswer;
 use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::query::matching::{self, MatchMode};
@@ -223,7 +224,7 @@ fn ask(
 ) -> Result<Option<QueryAnswer>, StudyError> {
     let recipe = &variant.recipe;
     if recipe.match_by == MatchBy::Names {
-        return Ok(ask_by_name(&map.identities, text, LevelFilter::Auto, recipe));
+        return Ok(ask_by_name(&map.identities, text, (LevelFilter::Auto, &QueryPlace::default()), recipe));
     }
     match ask_by_embedding(&map.identities, (features, recipe), text, &mut phrases, encoder) {
         Err(ModelError::NoKnownWord { .. }) => Ok(None),

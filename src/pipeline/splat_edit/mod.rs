@@ -125,7 +125,7 @@ pub(crate) fn apply(
                 recolor(&mut cloud, &thing, color.map(f64::from));
             }
             if *duplicate || color.is_some() {
-                map.see_colors(&cloud);
+                map.look_at(&cloud);
             }
             Ok((cloud, Some(map)))
         }

@@ -28,7 +28,7 @@ mod rig;
 mod surface;
 #[cfg(test)]
 mod tests;
-mod texture;
+pub(crate) mod texture;
 mod trace;
 mod view;
 mod write;

@@ -2,15 +2,19 @@
 //!
 //! A parent's number is smaller than its pieces', so every walk up the tree ends.
 
+pub(crate) mod name_words;
 pub(crate) mod whole_names;
 
 use std::sync::{Arc, OnceLock};
 
 use serde::{Deserialize, Serialize};
 
+use self::name_words::SceneWords;
 use self::whole_names::{WholeNames, key};
+use super::Bounds;
 use super::colors::SeenColors;
 use super::semantic_map::{BACKGROUND_CODE, CODE_CHANNELS};
+use super::shapes::SeenShapes;
 use super::text;
 use crate::math::format::things;
 
@@ -82,13 +86,19 @@ pub struct Identities {
     /// Color of each, once computed from its Gaussians.
     #[serde(skip)]
     pub(crate) colors: SeenColors,
+    /// Shape of each, once computed from its Gaussians.
     #[serde(skip)]
-    whole_names: Known,
+    pub(crate) shapes: SeenShapes,
+    #[serde(skip)]
+    known: Known,
 }
 
 /// Names, computed at first use.
 #[derive(Clone, Debug, Default)]
-struct Known(OnceLock<Arc<WholeNames>>);
+struct Known {
+    whole: OnceLock<Arc<WholeNames>>,
+    words: OnceLock<Arc<SceneWords>>,
+}
 
 impl PartialEq for Known {
     /// Always equal: names follow from the list.
@@ -111,7 +121,7 @@ impl Identities {
     pub fn add(&mut self, level: Level, parent: IdentityId, names: Vec<String>) -> IdentityId {
         let parent = if self.get(parent).is_some() { parent } else { NO_IDENTITY };
         let names = names.iter().map(|name| text::name(name)).collect();
-        self.whole_names = Known::default();
+        self.known = Known::default();
         self.list.push(Identity { level, parent, names, code: [0.5; 3], by_hand: false });
         self.list.len() as IdentityId
     }
@@ -149,7 +159,7 @@ impl Identities {
 
     /// The identity with this number, to change it.
     pub fn get_mut(&mut self, id: IdentityId) -> Option<&mut Identity> {
-        self.whole_names = Known::default();
+        self.known = Known::default();
         self.list.get_mut((id as usize).checked_sub(1)?)
     }
 
@@ -202,7 +212,17 @@ impl Identities {
     }
 
     fn whole_names(&self) -> &WholeNames {
-        self.whole_names.0.get_or_init(|| Arc::new(WholeNames::new(self)))
+        self.known.whole.get_or_init(|| Arc::new(WholeNames::new(self)))
+    }
+
+    /// Words of all names.
+    pub(crate) fn words(&self) -> &SceneWords {
+        self.known.words.get_or_init(|| Arc::new(SceneWords::new(self)))
+    }
+
+    /// Gives identities the shapes of boxes in world space, by number from 0.
+    pub fn set_boxes(&mut self, boxes: &[Option<Bounds>]) {
+        self.shapes = SeenShapes::of_boxes(boxes);
     }
 
     /// An identity and its parents, inside out: itself first, its object last.

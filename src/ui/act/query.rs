@@ -96,6 +96,8 @@ pub(in crate::ui) fn run_phrases(app: &mut App, to: Option<PathBuf>) {
         colors,
         phrases,
         level: LevelFilter::Auto,
+        up: app.viewport.up(&scene),
+        meters: scene.meters_per_unit(),
         recipe: app.viewport.queries.recipe().clone(),
         top: 1,
         truth,

@@ -14,6 +14,8 @@ use super::tools::segment::SegmentTool;
 use super::tools::{CardPlaces, Tool};
 use super::visible::VisibleCloud;
 use super::{Viewport, frusta, query, route};
+use crate::pipeline::semantics::query::language::QueryPlace;
+use crate::pipeline::semantics::query::language::relations::Viewpoint;
 use crate::ui::ctx::Ctx;
 use crate::worker::ViewMode;
 use crate::worker::view::{QualityBudget, SkipPasses, ViewRequest};
@@ -54,7 +56,11 @@ impl Viewport {
         self.request(ui, shown, now, cx);
         if let Some(semantics) = &state.semantics {
             self.queries.keep_up(ui.ctx(), semantics, &state.plan);
-            self.queries.stand(self.pose());
+            let (pose, up) = (self.pose(), self.up(scene));
+            self.queries.stand(pose);
+            let view = Viewpoint { eye: pose.center, forward: pose.forward(), up };
+            let place = QueryPlace { view: Some(view), meters: scene.meters_per_unit(), ..QueryPlace::default() };
+            self.queries.ask_from(place, semantics);
         }
         let areas: Vec<ViewArea> = views.areas(shown, has_other).collect();
         let is_second = self.queries.is_second();

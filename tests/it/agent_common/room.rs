@@ -2,7 +2,7 @@
 
 use fmlgs::agent::camera_args::{Direction, Distance};
 use fmlgs::agent::relation::Viewpoint;
-use fmlgs::agent::world::{Arrival, IdentityFacts, Movement, Unreachable, World, WorldError};
+use fmlgs::agent::world::{Arrival, IdentityFacts, Movement, QueryPlace, Unreachable, World, WorldError};
 use fmlgs::agent::world::{locate_by_names, locate_with};
 use fmlgs::navigate::target::Side;
 use fmlgs::pipeline::semantics::query::answer::QueryAnswer;
@@ -106,6 +106,7 @@ impl Room {
         r.hidden = vec![false; count];
         r.removed = vec![false; count];
         r.exported = vec![false; count];
+        r.identities.set_boxes(&r.boxes);
         r
     }
 
@@ -128,6 +129,7 @@ impl Room {
     pub fn put(&mut self, whole: IdentityId, name: &str) -> IdentityId {
         let id = self.add(whole, &[name], [0.2, 0.0, 0.8], [0.05; 3]);
         [&mut self.hidden, &mut self.removed, &mut self.exported].into_iter().for_each(|of| of.push(false));
+        self.identities.set_boxes(&self.boxes);
         id
     }
 
@@ -153,11 +155,16 @@ impl World for Room {
         &self.identities
     }
 
-    fn locate(&mut self, query: &str, kind: LevelFilter) -> Result<QueryAnswer, WorldError> {
-        let Some(encoder) = self.encoder else { return Ok(locate_by_names(&self.identities, query, kind)) };
+    fn locate(&mut self, query: &str, kind: LevelFilter, place: &QueryPlace) -> Result<QueryAnswer, WorldError> {
+        let Some(encoder) = self.encoder else { return Ok(locate_by_names(&self.identities, query, kind, place)) };
         let canonical = ["object", "stuff", "texture"];
         let mut encode = |phrase: &str| if canonical.contains(&phrase) { vec![0.0, 1.0] } else { vec![1.0, 0.0] };
-        Ok(locate_with(&self.identities, &self.looks(encoder), query, kind, &mut encode))
+        Ok(locate_with(&self.identities, &self.looks(encoder), query, (kind, place), &mut encode))
+    }
+
+    fn gone(&self) -> Vec<IdentityId> {
+        let all = self.identities.iter().map(|(id, _)| id);
+        all.filter(|id| self.identities.ancestors(*id).any(|i| self.removed[i as usize])).collect()
     }
 
     fn facts(&self, id: IdentityId) -> Option<IdentityFacts> {

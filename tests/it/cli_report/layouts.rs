@@ -241,6 +241,33 @@ impl Rendered {
         }
     }
 
+    /// `data/SCENE` as in Ref-LERF, with lists of the photos `labeled`.
+    pub fn ref_lerf(&self, data: &Path, scene: &str, labeled: &[usize]) {
+        let (scene, name) = (data.join(scene), |view: usize| format!("frame_{view:05}.jpg"));
+        self.photos(&scene.join("images"), SIZE, name);
+        self.colmap(&scene.join("sparse/0"), name);
+        self.ref_lerf_lists(&scene, labeled, 0);
+    }
+
+    /// The lists and masks of a scene of Ref-LERF; the first photo is no test. Sentences refer to the object `shift`
+    /// places later.
+    pub fn ref_lerf_lists(&self, scene: &Path, labeled: &[usize], shift: usize) {
+        for (k, &view) in labeled.iter().enumerate() {
+            let (lists, masks) = if k == 0 { ("train_json", "gt_mask") } else { ("test_json", "mask") };
+            let (lists, masks, photo) = (scene.join("json").join(lists), scene.join(masks), format!("frame_{view:05}"));
+            fs::create_dir_all(&lists).unwrap();
+            fs::create_dir_all(masks.join(&photo)).unwrap();
+            let object = |i: usize| {
+                let (own, other) = (&self.objects[i].1, &self.objects[(i + shift) % self.objects.len()].1);
+                let file = format!("{photo}/{own}.png");
+                self.mask(view, own).save(masks.join(&file)).unwrap();
+                json!({ "category": own, "segmentation": file, "sentence": [format!("the {other}"), other] })
+            };
+            let objects: Vec<Value> = (0..self.objects.len()).map(object).collect();
+            fs::write(lists.join(photo + ".json"), json!({ "object": objects }).to_string()).unwrap();
+        }
+    }
+
     /// Pixels of each object in a photo.
     pub fn areas(&self, view: usize) -> BTreeMap<&str, usize> {
         let ids = self.ids(view);

@@ -239,6 +239,46 @@ fn classes_of_a_3d_ovs_scene_are_told_apart() {
 }
 
 #[test]
+fn sentences_of_a_ref_lerf_scene_find_their_objects() {
+    let folder = folder();
+    let data = folder.path().join("ref_lerf");
+    desk().ref_lerf(&data, "teatime", &LABELED);
+    let table = Table { name: "ref-lerf", data: &data, out: folder.path().join("out") };
+    let how = ["--masks", "labels", "--steps", "150", "--json"];
+    let document = table.run(&how).ok().json();
+    let text = fs::read_to_string(table.out.join("table.md")).unwrap();
+    println!("{text}");
+    let scene = &document["scenes"][0];
+    let views: Vec<&str> = scene["views"].as_array().unwrap().iter().map(|v| v.as_str().unwrap()).collect();
+    let is_test = |(name, view): (&&str, &usize)| name.ends_with(&format!("frame_{view:05}.jpg"));
+    assert!(views.len() == 4 && views.iter().zip(&LABELED[1..]).all(is_test), "{views:?}");
+    assert_eq!(scene["trained_on"], false);
+    let ious = table.scores(&document, "this program", MIOU);
+    let right = table.mean(&document, "this program", MIOU);
+    // A thing of a few pixels has none at the size that is compared, and then is not asked for.
+    let asked: usize = LABELED[1..].iter().map(|v| 2 * desk().areas(*v).values().filter(|n| **n > 0).count()).sum();
+    assert!(ious.len() <= asked && 2 * ious.len() > asked, "{} of {asked}", ious.len());
+    assert!(right > 30.0, "{right}");
+    for (least, metric) in [(25.0, "sentences with IoU over 0.25, %"), (50.0, "sentences with IoU over 0.5, %")] {
+        let over = table.scores(&document, "this program", metric);
+        assert_eq!(over.len(), ious.len());
+        assert!(ious.iter().zip(&over).all(|(iou, over)| (*iou > least) == (*over > 50.0)), "{ious:?} {over:?}");
+    }
+    let miou = document["metrics"].as_array().unwrap().iter().find(|m| m["metric"] == MIOU).unwrap();
+    let printed = miou["rows"].as_array().unwrap().iter().find(|r| r["name"] == "ReferSplat").unwrap();
+    assert_eq!((&printed["printed"], &printed["scenes"]["teatime"]), (&true.into(), &31.3.into()));
+    assert!(text.contains("the real data set was never tried"), "{text}");
+
+    // The control: each sentence under another object. Training is not repeated.
+    let trained = changed(&table.out.join("teatime/trained.json"));
+    fs::remove_file(table.out.join("teatime/result.json")).unwrap();
+    desk().ref_lerf_lists(&data.join("teatime"), &LABELED, 1);
+    let wrong = table.mean(&table.run(&how).ok().json(), "this program", MIOU);
+    assert!(wrong < 0.3 * right, "sentences exchanged: {wrong}, right: {right}");
+    assert_eq!(changed(&table.out.join("teatime/trained.json")), trained);
+}
+
+#[test]
 fn the_ablation_of_parts_has_all_its_rows() {
     let folder = folder();
     let data = folder.path().join("parts");
@@ -288,6 +328,19 @@ fn folders_that_are_not_laid_out_so_are_told_with_what_is_missing() {
     fs::write(at("ovs/bed/poses_bounds.npy"), "").unwrap();
     expect(told("3d-ovs", &at("ovs"), &[]), &["bed/segmentations/classes.txt: no such file"]);
     expect(told("part-ablation", &at("ovs"), &[]), &["name wholes and parts"]);
+    fs::create_dir_all(at("ref/ramen/images")).unwrap();
+    expect(told("ref-lerf", &at("ref"), &[]), &["it holds no scene with labels", "json/test_json"]);
+    let lists = at("ref/ramen/json/test_json");
+    fs::create_dir_all(&lists).unwrap();
+    expect(told("ref-lerf", &at("ref"), &[]), &["ref/ramen: it has no sentences of a test photo", "DATA/SCENE/mask"]);
+    let object = r#"{"object": [{"category": "egg", "segmentation": "egg.png", "sentence": ["an egg"]}]}"#;
+    fs::write(lists.join("frame_00006.json"), object).unwrap();
+    expect(
+        told("ref-lerf", &at("ref"), &[]),
+        &["frame_00006.json, object[0].segmentation", "egg.png", "copy the masks"],
+    );
+    fs::write(lists.join("frame_00006.json"), object.replace("sentence", "words")).unwrap();
+    expect(told("ref-lerf", &at("ref"), &[]), &["frame_00006.json, line 1", "missing field `sentence`", "looks like"]);
 
     // Networks that are not here are told before anything is done.
     fs::create_dir_all(at("ovs/bed/images")).unwrap();

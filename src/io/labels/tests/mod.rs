@@ -165,6 +165,63 @@ fn lerf_masks_are_brighter_than_half() {
 }
 
 #[test]
+fn lists_of_ref_lerf_say_what_sentences_refer_to() {
+    let folder = tempfile::tempdir().expect("folder");
+    let root = folder.path().join("ramen");
+    picture(&root.join("mask/frame_00006/egg.png"), 2..5, 1);
+    picture(&root.join("mask/frame_00006/other egg.png"), 6..7, 255);
+    picture(&root.join("gt_mask/egg_7.png"), 0..1, 255);
+    let list = |at: &str, objects: &str| {
+        let path = root.join(at);
+        fs::create_dir_all(path.parent().expect("parent")).expect("folder");
+        fs::write(&path, format!("{{\"object\": [{objects}], \"image\": 3}}")).expect("write");
+    };
+    let egg = |picture: &str, sentence: &str| {
+        format!(r#"{{"category": "egg", "segmentation": "{picture}", "sentence": ["{sentence}"]}}"#)
+    };
+    let [first, again, other] = [("egg", "an egg"), ("egg", "half an egg"), ("other egg", "the other egg")]
+        .map(|(file, sentence)| egg(&format!("frame_00006/{file}.png"), sentence));
+    let of_test = [first, again, other].join(", ");
+    list("json/test_json/frame_00006.json", &of_test);
+    list("json/train_json/frame_00007.json", &[egg("egg_7.png", "x"), egg("gone.png", "y")].join(", "));
+    let labels = Labels::open(&root).expect("labels");
+    let object = Some(Level::Object);
+    assert_eq!(summary(&labels, "frame_00006.jpg"), [("egg".into(), object, 18), ("other egg".into(), object, 6)]);
+    assert_eq!(summary(&labels, "frame_00007.jpg"), [("egg".into(), object, 6)]);
+    let photos = ref_lerf::photos(&root).expect("lists");
+    let told: Vec<_> = photos["frame_00006"].objects.iter().map(|o| o.sentences.join("; ")).collect();
+    assert_eq!(told, ["an egg; half an egg", "the other egg"]);
+    let tests = |photos: &BTreeMap<String, ref_lerf::ReferredPhoto>| {
+        photos.iter().filter(|p| p.1.is_test).map(|p| p.0.clone()).collect::<Vec<_>>()
+    };
+    assert_eq!(tests(&photos), ["frame_00006"]);
+
+    // Together, the photos tested are ReferSplat's; in other scenes none are known.
+    fs::remove_dir_all(root.join("json")).expect("remove");
+    list("json/frame_00006.json", &of_test);
+    list("json/frame_00007.json", &egg("egg_7.png", "x"));
+    assert_eq!(tests(&ref_lerf::photos(&root).expect("lists")), ["frame_00006"]);
+    let unknown = folder.path().join("soup");
+    fs::rename(&root, &unknown).expect("renamed");
+    assert!(tests(&ref_lerf::photos(&unknown).expect("lists")).is_empty());
+    fs::rename(&unknown, &root).expect("renamed");
+
+    for (objects, told) in [
+        (egg("gone.png", "x"), "object[0].segmentation: there is no 'gone.png' in"),
+        (egg("../egg.png", "x"), "outside"),
+        (egg("egg_7.png", "x").replace("sentence", "words"), "missing field `sentence`; a list looks like {\"object\""),
+    ] {
+        list("json/frame_00006.json", &objects);
+        let e = ref_lerf::photos(&root).expect_err("broken").to_string();
+        assert!(e.contains("json/frame_00006.json") && e.contains(told), "{e}");
+    }
+    // JSON of another kind in such folders is no list.
+    fs::remove_file(root.join("json/frame_00007.json")).expect("remove");
+    fs::write(root.join("json/frame_00006.json"), LABEL).expect("write");
+    assert!(ref_lerf::find(&root).expect("no list").is_none() && Labels::open(&root).is_ok());
+}
+
+#[test]
 fn masklets_belong_to_numbered_photos() {
     let folder = tempfile::tempdir().expect("folder");
     let at = folder.path().join("sav.json");

@@ -6,8 +6,10 @@ use glam::DVec3;
 
 use super::part_recall::Components;
 use super::*;
+use crate::io::labels::ref_lerf::{ReferredObject, ReferredPhoto};
 use crate::pipeline::semantics::query::answer::Basis;
 use crate::pipeline::semantics::query::localize::{Answer, Hit};
+use crate::pipeline::semantics::query::language::QueryPlace;
 use crate::pipeline::semantics::query::query_engine::ask_by_name;
 use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::pipeline::semantics::relevancy::deviate;
@@ -49,7 +51,7 @@ fn label(name: &str, level: Level, size: [usize; 2], inside: impl Fn(usize) -> b
 
 /// Asks a scene by the names of its identities.
 fn named(map: &SemanticMap) -> impl FnMut(&str) -> Option<QueryAnswer> + '_ {
-    |text| ask_by_name(&map.identities, text, LevelFilter::Auto, &QueryConfig::default())
+    |text| ask_by_name(&map.identities, text, (LevelFilter::Auto, &QueryPlace::default()), &QueryConfig::default())
 }
 
 /// An answer whose relevancies are given, best identity first.
@@ -88,6 +90,27 @@ fn masks_are_intersection_over_union_by_level() {
     close(&masks::by_level(&units), &[5.0 / 12.0, 0.25]);
     assert!(units.iter().all(|u| u.hit.is_none() && u.view == "a"));
     assert!(masks::by_level(&units[..1])[1].is_nan(), "no parts, no mean");
+}
+
+#[test]
+fn every_sentence_counts_and_hidden_objects_are_not_asked_for() {
+    // The cat is pixels 6..9; the label has 6..8: 2 of 3. The doll is not labeled in this view.
+    let map = scene(vec![]);
+    let view = exact(10, vec![1, 1, 1, 1, 2, 2, 3, 3, 3, 0]);
+    let (camera, blended) = (camera(10, 1), CodeMap::default());
+    let categories = vec![label("cat", Level::Object, [10, 1], |i| (6..8).contains(&i))];
+    let view = LabeledView { name: "a", camera: &camera, exact: &view, blended: &blended, categories };
+    let object = |name: &str, sentences: &[&str]| ReferredObject {
+        name: name.into(),
+        sentences: sentences.iter().map(|s| (*s).to_owned()).collect(),
+        mask: None,
+    };
+    let objects = vec![object("cat", &["the cat", "doll", "giraffe"]), object("doll", &["the doll"])];
+    let photo = ReferredPhoto { is_test: true, objects };
+    let units = ref_lerf::compare(&mut AskedScene { map: &map, ask: &mut named(&map) }, &view, &photo);
+    // Another thing's pixels, and no answer, are nothing of the label.
+    close(&ious(&units), &[2.0 / 3.0, 0.0, 0.0]);
+    assert_eq!(units[0].query, "the cat");
 }
 
 #[test]

@@ -2,7 +2,8 @@
 //!
 //! Labels of a view become categories by name; a scene is asked for each of them, and a protocol compares the answers
 //! with the labels, one unit for each category and view. Views are matched with labels by name, never by index.
-//! [`raw_features`] and [`by_similarity`] are baselines without tracked identities.
+//! [`raw_features`] and [`by_similarity`] are baselines without tracked identities. [`referring`] writes
+//! questions with their truth about scenes of meshes.
 
 pub(crate) mod by_similarity;
 #[cfg(test)]
@@ -17,6 +18,9 @@ pub(crate) mod multi_class;
 pub(crate) mod part_recall;
 pub(crate) mod raw_features;
 pub(crate) mod recipes;
+#[cfg_attr(not(test), expect(dead_code, reason = "the measurement of the language of questions calls it"))]
+pub(crate) mod referring;
+pub(crate) mod ref_lerf;
 pub(crate) mod selection_3d;
 pub(crate) mod spin_nerf;
 pub(crate) mod strokes;

@@ -12,7 +12,7 @@ use crate::pipeline::semantics::query::localize::Answer;
 use crate::pipeline::semantics::query::query_engine::QueryEngine;
 use crate::pipeline::semantics::query::recipe::{MatchBy, PartEmbedding, QueryConfig, Rejection, Strategy};
 use crate::pipeline::semantics::query::timing::ms_since;
-use crate::pipeline::semantics::query::words::words;
+use crate::scene::identity::name_words::words;
 use crate::scene::identity::whole_names::BETWEEN;
 use crate::scene::{Identities, IdentityId, Level, LevelFilter, SemanticMap};
 

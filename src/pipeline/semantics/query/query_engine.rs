@@ -3,8 +3,9 @@
 
 use std::time::Instant;
 
-use super::answer::{Language, QueryAnswer, answer, by_embedding, by_name};
+use super::answer::{Language, QueryAnswer, answer, by_embedding};
 use super::by_embedding::TextEmbeddings;
+use super::language::QueryPlace;
 use super::names;
 use super::parse::ParsedQuery;
 use super::reading::QueryReading;
@@ -19,6 +20,8 @@ pub(crate) struct QueryEngine {
     encoder: Option<Box<dyn Encoder>>,
     phrases: TextEmbeddings,
     recipe: QueryConfig,
+    /// Place from which the scene is asked.
+    pub(crate) place: QueryPlace,
 }
 
 impl QueryEngine {
@@ -36,7 +39,7 @@ impl QueryEngine {
         text: &str,
         level: LevelFilter,
     ) -> Result<Option<QueryAnswer>, ModelError> {
-        let reading = self.read(&map.identities, text, level);
+        let reading = self.read(&map.identities, text);
         reading.map(|reading| self.answer(map, &reading, level)).transpose()
     }
 
@@ -52,8 +55,8 @@ impl QueryEngine {
     }
 
     /// Reads a question; `None` if there is nothing in it.
-    pub(crate) fn read(&self, identities: &Identities, text: &str, level: LevelFilter) -> Option<QueryReading> {
-        QueryReading::new(identities, text, level, &self.recipe)
+    pub(crate) fn read(&self, identities: &Identities, text: &str) -> Option<QueryReading> {
+        QueryReading::new(identities, text, &self.recipe)
     }
 
     /// Answers a question that was read before.
@@ -68,19 +71,20 @@ impl QueryEngine {
     ) -> Result<QueryAnswer, ModelError> {
         let start = Instant::now();
         let wanted = self.recipe.match_by != MatchBy::Names;
-        let known = match self.encoder.as_mut().filter(|_| wanted) {
-            Some(encoder) => match self.phrases.learn(&reading.phrase, &self.recipe, &mut **encoder) {
-                Ok(()) => true,
+        let mut known = false;
+        for phrase in reading.phrases() {
+            let Some(encoder) = self.encoder.as_mut().filter(|_| wanted) else { break };
+            match self.phrases.learn(&phrase, &self.recipe, &mut **encoder) {
+                Ok(()) => known = true,
                 // Words that the encoder does not know are no failure: names may know them.
-                Err(ModelError::NoKnownWord { .. }) => false,
+                Err(ModelError::NoKnownWord { .. }) => {}
                 Err(other) => return Err(other),
-            },
-            None => false,
-        };
+            }
+        }
         let encode = ms_since(start);
         let unknown = self.encoder.as_ref().map(|e| e.unknown_words(&reading.phrase.text)).unwrap_or_default();
         let encoded = known.then_some((&self.phrases, unknown.as_slice()));
-        let answered = answer_encoded(map, reading, level, &self.recipe, encoded);
+        let answered = answer_encoded(map, reading, (level, &self.place), &self.recipe, encoded);
         Ok(QueryAnswer { stages: StagesMs { encode, ..answered.stages }, ..answered })
     }
 
@@ -98,8 +102,7 @@ impl QueryEngine {
         answered: &QueryAnswer,
     ) -> (Vec<String>, Vec<String>) {
         let unknown = self.unknown_words(identities, &reading.phrase);
-        let ignored = answered.ignored_words(identities, reading, &unknown);
-        (ignored, answered.unexplained(identities, reading, &unknown))
+        (answered.ignored_words(&unknown), answered.unexplained(reading, &unknown))
     }
 }
 
@@ -108,13 +111,13 @@ impl QueryEngine {
 pub(crate) fn answer_encoded(
     map: &SemanticMap,
     reading: &QueryReading,
-    level: LevelFilter,
+    from: (LevelFilter, &QueryPlace),
     recipe: &QueryConfig,
     encoded: Option<(&TextEmbeddings, &[String])>,
 ) -> QueryAnswer {
     let with = |(features, (phrases, unknown))| Language { features, phrases, unknown };
     let language = map.language.as_ref().zip(encoded).map(with);
-    answer(&map.identities, reading, level, recipe, language)
+    answer(&map.identities, reading, from, recipe, language)
 }
 
 /// Answers a question by names and these `features`, as the recipe says; `None` if there is nothing in it. `source`
@@ -123,24 +126,25 @@ pub(crate) fn ask_with<S: TextSource + ?Sized>(
     identities: &Identities,
     (features, recipe): (&LanguageFeatures, &QueryConfig),
     text: &str,
-    level: LevelFilter,
+    from: (LevelFilter, &QueryPlace),
     source: &mut S,
 ) -> Option<QueryAnswer> {
-    let reading = QueryReading::new(identities, text, level, recipe)?;
+    let reading = QueryReading::new(identities, text, recipe)?;
     let mut phrases = TextEmbeddings::default();
-    let is_known = phrases.learn(&reading.phrase, recipe, source).is_ok();
-    let language = is_known.then_some(Language { features, phrases: &phrases, unknown: &[] });
-    Some(answer(identities, &reading, level, recipe, language))
+    let learned: Vec<bool> = reading.phrases().iter().map(|p| phrases.learn(p, recipe, source).is_ok()).collect();
+    let language = learned.contains(&true).then_some(Language { features, phrases: &phrases, unknown: &[] });
+    Some(answer(identities, &reading, from, recipe, language))
 }
 
 /// Answers a question by names alone; `None` if there is nothing in it.
 pub(crate) fn ask_by_name(
     identities: &Identities,
     text: &str,
-    level: LevelFilter,
+    from: (LevelFilter, &QueryPlace),
     recipe: &QueryConfig,
 ) -> Option<QueryAnswer> {
-    QueryReading::new(identities, text, level, recipe).map(|reading| by_name(identities, &reading, level, recipe))
+    let reading = QueryReading::new(identities, text, recipe)?;
+    Some(answer(identities, &reading, from, recipe, None))
 }
 
 /// Answers a question by these `features` alone, without regard to names; `None` if there is nothing in it. `source`

@@ -4,6 +4,7 @@ use super::OverlaySettings;
 use super::embeddings::Embeddings;
 use crate::jobs::query::answer_encoded;
 use crate::pipeline::semantics::query::answer::QueryAnswer;
+use crate::pipeline::semantics::query::language::QueryPlace;
 use crate::pipeline::semantics::query::names;
 use crate::pipeline::semantics::query::reading::QueryReading;
 use crate::scene::{IdentityId, SemanticMap};
@@ -32,24 +33,29 @@ impl Asked {
     pub(super) fn new(
         text: &str,
         semantics: &SemanticMap,
+        place: &QueryPlace,
         settings: &OverlaySettings,
         embeddings: &Embeddings,
     ) -> Option<Self> {
         let text = text.trim();
         let OverlaySettings { kind, recipe, .. } = settings;
-        let reading = QueryReading::new(&semantics.identities, text, *kind, recipe)?;
-        let phrase = &reading.phrase;
-        let encoded = embeddings.of(phrase);
-        let unread = encoded.map(|t| t.unknown.as_slice()).unwrap_or_default();
-        let phrases = embeddings.phrases(phrase).map(|phrases| (phrases, unread));
-        let mut answered = answer_encoded(semantics, &reading, *kind, recipe, phrases);
-        answered.stages.encode = encoded.map_or(0.0, |t| t.encode_ms);
-        let to_encoder = encoded.map(|t| t.unknown.as_slice());
-        let unknown = names::unknown_to_all(&semantics.identities, &phrase.text, to_encoder);
-        let ignored = answered.ignored_words(&semantics.identities, &reading, &unknown);
-        let unexplained = answered.unexplained(&semantics.identities, &reading, &unknown);
-        let pending = semantics.language.is_some() && embeddings.is_pending(phrase);
+        let reading = QueryReading::new(&semantics.identities, text, recipe)?;
+        let phrases = reading.phrases();
+        let encoded: Vec<_> = phrases.iter().filter_map(|p| embeddings.of(p)).collect();
+        let unread = encoded.first().map(|t| t.unknown.as_slice()).unwrap_or_default();
+        let known = phrases.iter().find_map(|p| embeddings.phrases(p)).map(|phrases| (phrases, unread));
+        let mut answered = answer_encoded(semantics, &reading, (*kind, place), recipe, known);
+        answered.stages.encode = encoded.iter().map(|t| t.encode_ms).sum();
+        let to_encoder = encoded.first().map(|t| t.unknown.as_slice());
+        let unknown = names::unknown_to_all(&semantics.identities, &reading.phrase.text, to_encoder);
+        let (ignored, unexplained) = (answered.ignored_words(&unknown), answered.unexplained(&reading, &unknown));
+        let pending = semantics.language.is_some() && phrases.iter().any(|p| embeddings.is_pending(p));
         Some(Self { text: text.to_owned(), answered, pending, chosen: None, reading, unexplained, ignored })
+    }
+
+    /// Returns whether the answer depends on the view.
+    pub(super) fn is_of_view(&self) -> bool {
+        self.answered.understood.as_ref().is_some_and(|u| u.of_view)
     }
 
     /// The identities that are shown.

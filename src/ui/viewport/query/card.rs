@@ -12,7 +12,7 @@ use crate::pipeline::semantics::query::answer::{Basis, Certainty};
 use crate::pipeline::semantics::query::localize::Answer;
 use crate::pipeline::semantics::query::matching::{self, MatchMode};
 use crate::pipeline::semantics::query::names;
-use crate::pipeline::semantics::query::reading::mended_text;
+use crate::pipeline::semantics::query::language::slips::mended_text;
 use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::scene::{Bounds, GaussianCloud, Identities, IdentityId, SemanticMap, text};
 use crate::ui::actions::{Action, Pane};

@@ -34,6 +34,7 @@ use super::visible::Visibility;
 use crate::jobs::phrases::colors::PhraseColors;
 use crate::jobs::query::ViewMaps;
 use crate::navigate::Pose;
+use crate::pipeline::semantics::query::language::QueryPlace;
 use crate::pipeline::semantics::query::matching::MatchMode;
 use crate::pipeline::semantics::query::recipe::QueryConfig;
 use crate::scene::{GaussianCloud, IdentityId, Mask, ScenePlan, SemanticMap};
@@ -73,6 +74,8 @@ pub struct Queries {
     /// Reason why embeddings are missing, once reported.
     reported: Option<String>,
     true_mask: TrueMask,
+    /// Place from which the scene is asked.
+    place: QueryPlace,
 }
 
 impl Queries {
@@ -352,6 +355,16 @@ impl Queries {
         }
     }
 
+    /// Sets the place from which the scene is asked, and answers again where left and right depend on it.
+    pub(crate) fn ask_from(&mut self, place: QueryPlace, semantics: &SemanticMap) {
+        if self.place != place {
+            self.place = place;
+            if self.sides.iter().flat_map(QuerySide::all).any(Asked::is_of_view) {
+                self.ask_again(semantics);
+            }
+        }
+    }
+
     /// The true mask of the current view.
     pub(crate) fn truth(&self) -> Option<Arc<Mask>> {
         self.true_mask.here()
@@ -373,7 +386,7 @@ impl Queries {
     }
 
     fn asked(&self, text: &str, semantics: &SemanticMap) -> Option<Asked> {
-        Asked::new(text, semantics, &self.side().settings, &self.embeddings)
+        Asked::new(text, semantics, &self.place, &self.side().settings, &self.embeddings)
     }
 
     /// Number of pixels of an identity in the current view, if its maps are drawn.

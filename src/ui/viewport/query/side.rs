@@ -106,7 +106,7 @@ impl QuerySide {
 
     /// Texts of the queries, for the text encoder.
     pub(super) fn texts(&self) -> impl Iterator<Item = (ParsedQuery, QueryConfig)> {
-        self.all().map(|q| (q.reading.phrase.clone(), self.settings.recipe.clone()))
+        self.all().flat_map(|q| q.reading.phrases()).map(|phrase| (phrase, self.settings.recipe.clone()))
     }
 
     pub(super) fn pinned_texts(&self) -> Vec<String> {

@@ -130,7 +130,7 @@ pub(crate) fn find_objects(
         if let Some(encoder) = encoder {
             map.language = Some(embed(cloud, &map, photos, settings, options.part_weight, encoder, observer)?);
         }
-        map.see_colors(cloud);
+        map.look_at(cloud);
         let Tracked { views, mut secs, .. } = tracked;
         secs.push(("look at identities", start.elapsed().as_secs_f64()));
         return Ok(Found { map, views, secs });
@@ -162,7 +162,7 @@ pub(crate) fn find_objects(
         map.language = Some(embed(cloud, &map, photos, settings, options.part_weight, encoder, observer)?);
         timed("look at identities", start);
     }
-    map.see_colors(cloud);
+    map.look_at(cloud);
     Ok(Found { map, views, secs })
 }
 

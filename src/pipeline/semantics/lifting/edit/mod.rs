@@ -133,7 +133,7 @@ pub(crate) fn apply(map: &SemanticMap, cloud: &GaussianCloud, edit: &Edit) -> Re
         }
     }
     if !matches!(edit, Edit::Rename(..)) {
-        new.see_colors(cloud);
+        new.look_at(cloud);
     }
     Ok(new)
 }

@@ -7,12 +7,14 @@ use rayon::prelude::*;
 
 use super::by_embedding::{EmbeddingScorer, TextEmbeddings};
 use super::grounds;
-use super::localize::{Answer, Hit, Scorer, called, localize, nearest};
+use super::language::evaluate::Why;
+use super::language::{self, Looks, QueryPlace, QueryScene, Understood};
+use super::localize::{Answer, Hit, Scorer, localize};
 use super::matching::{self, MatchMode};
-use super::names::{self, ByName};
+use super::names;
 use super::parse::ParsedQuery;
 use super::reading::QueryReading;
-use super::recipe::{MatchBy, QueryConfig, Rejection, RelevancyScale, Strategy};
+use super::recipe::{MatchBy, QueryConfig, Rejection, RelevancyScale};
 use super::timing::{StagesMs, ms_since};
 use crate::models;
 use crate::pipeline::semantics::code_map::CodeMap;
@@ -44,6 +46,8 @@ pub struct QueryAnswer {
     pub(crate) stages: StagesMs,
     /// Recipe of the answer.
     pub(crate) recipe: QueryConfig,
+    /// Answer of the language, if it was asked.
+    pub(crate) understood: Option<Understood>,
 }
 
 /// Features and encoded phrases for answers by embedding.
@@ -61,28 +65,34 @@ pub(crate) struct Language<'a> {
 pub(crate) fn answer(
     identities: &Identities,
     reading: &QueryReading,
-    level: LevelFilter,
+    (level, place): (LevelFilter, &QueryPlace),
     recipe: &QueryConfig,
     language: Option<Language<'_>>,
 ) -> QueryAnswer {
     let phrase = &reading.phrase;
+    let scene = QueryScene { identities, level, place, by_names: recipe.match_by != MatchBy::Embedding };
     let nothing = |a: &Answer| matches!(a, Answer::NotFound(_));
     let language = match (recipe.match_by, language) {
-        (MatchBy::Names, _) | (MatchBy::Both, None) => return by_name(identities, reading, level, recipe),
+        (MatchBy::Names, _) | (MatchBy::Both, None) => return by_language(scene, reading, recipe, None),
         (MatchBy::Embedding, None) => return unanswered(identities, recipe),
-        (MatchBy::Embedding, Some(language)) => return by_embedding(identities, phrase, level, recipe, language),
+        (MatchBy::Embedding, Some(language)) if reading.is_plain() => {
+            return by_embedding(identities, phrase, level, recipe, language);
+        }
+        (MatchBy::Embedding, Some(language)) => return by_language(scene, reading, recipe, Some(language)),
         (MatchBy::Both, Some(language)) => language,
     };
-    let named = by_name(identities, reading, level, recipe);
-    let is_strict = recipe.rejection == Rejection::Strict;
-    // Under other rules, an answer by name may leave words out; then the encoder comes first.
-    let known = is_strict || !reading.called.is_empty() || names::unknown_words(identities, &phrase.text).is_empty();
-    if known && !nothing(&named.answer) {
+    let named = by_language(scene, reading, recipe, None);
+    // By embedding, there is always an identity that looks most like the phrase.
+    if !nothing(&named.answer) || names::was_removed(identities, &phrase.text) {
         return named;
     }
-    // By embedding, there is always an identity that looks most like the phrase.
-    if nothing(&named.answer) && names::was_removed(identities, &phrase.text) {
-        return named;
+    let is_strict = recipe.rejection == Rejection::Strict;
+    let may = !is_strict || may_answer(identities, language.features);
+    if !reading.is_plain() {
+        let why = named.understood.as_ref().and_then(|u| u.unmet.as_ref()).map(|unmet| unmet.why);
+        // What is understood and not so needs no encoder.
+        let meant = (may && why != Some(Why::Nothing)).then(|| by_language(scene, reading, recipe, Some(language)));
+        return meant.filter(|a| !nothing(&a.answer)).unwrap_or(named);
     }
     let mut meant = by_embedding(identities, phrase, level, recipe, language);
     let first = meant.chosen(1);
@@ -93,10 +103,9 @@ pub(crate) fn answer(
     }
     // Both were computed, whichever is taken.
     let stages = named.stages.and(meant.stages);
-    let taken = match (nothing(&meant.answer), nothing(&named.answer)) {
-        (false, _) if is_strict && !may_answer(identities, language.features) => QueryAnswer { alike, ..named },
-        (true, _) if is_strict && identities.have_names() => QueryAnswer { alike, ..named },
-        (true, false) => named,
+    let taken = match nothing(&meant.answer) {
+        false if !may => QueryAnswer { alike, ..named },
+        true if is_strict && identities.have_names() => QueryAnswer { alike, ..named },
         _ => meant,
     };
     QueryAnswer { stages, ..taken }
@@ -109,9 +118,8 @@ pub(crate) fn may_answer(identities: &Identities, features: &LanguageFeatures) -
 }
 
 /// Rejects an answer by embedding if a word is left out or if the identity has another color than the query says.
-/// Queries about places, comparisons or numbers are rejected too: embeddings do not capture them.
 fn grounded(identities: &Identities, phrase: &ParsedQuery, language: Language<'_>, answer: Answer) -> Answer {
-    let leaves_out = !grounds::telling(language.unknown).is_empty() || grounds::asks_for_more(identities, &phrase.text);
+    let leaves_out = !grounds::telling(language.unknown).is_empty();
     match answer {
         Answer::Found(hits) | Answer::Ambiguous(hits)
             if leaves_out || grounds::is_of_another_color(identities, hits[0].identity, phrase) =>
@@ -148,71 +156,67 @@ impl<S: Scorer> Scorer for Timed<'_, S> {
         self.scorer.resolution()
     }
 
-    fn admits(&mut self, phrase: &ParsedQuery, hit: &Hit) -> bool {
-        self.scorer.admits(phrase, hit)
-    }
-
     fn rejects(&mut self, phrase: &ParsedQuery, hit: &Hit) -> bool {
         self.scorer.rejects(phrase, hit)
     }
 }
 
-/// Localizes by `scorer`, unless the whole query is the name of the identities `whole`; then computes the relevancy
-/// of every identity by `relevancy`.
-fn judged<S: Scorer>(
-    (identities, phrase, level): (&Identities, &ParsedQuery, LevelFilter),
-    whole: &[IdentityId],
-    (basis, recipe): (Basis, &QueryConfig),
-    scorer: &mut S,
-    relevancy: impl FnOnce(&Answer, &mut S) -> Vec<f32>,
-) -> QueryAnswer {
-    let start = Instant::now();
-    let mut timed = Timed { scorer, ms: 0.0 };
-    // Names are words, which are compared one by one.
-    let strategy = match (basis, recipe.strategy) {
-        (Basis::Names, Strategy::Joint) => Strategy::WholeFirst,
-        (_, strategy) => strategy,
-    };
-    let answer = match whole {
-        [] => localize(identities, phrase, level, strategy, &mut timed),
-        ids => called(identities, (ids, &phrase.text), level, &mut timed),
-    };
-    let answer = match answer {
-        // Near hits may be no pieces of the named whole.
-        Answer::NotFound(hits) if basis == Basis::Names && hits.iter().all(|hit| hit.score <= 0.0) => {
-            Answer::NotFound(nearest(identities, &phrase.text, level, &mut timed))
-        }
-        other => other,
-    };
-    let (scored_ms, localized_ms) = (timed.ms, ms_since(start));
-    let relevancy = relevancy(&answer, scorer);
-    let stages = StagesMs {
-        relevancy: scored_ms + ms_since(start) - localized_ms,
-        localize: localized_ms - scored_ms,
-        ..StagesMs::default()
-    };
-    QueryAnswer { stages, ..QueryAnswer::new(answer, basis, relevancy, recipe) }
+/// Search by embedding for the nouns of a sentence.
+struct ByLooks<'a> {
+    identities: &'a Identities,
+    recipe: &'a QueryConfig,
+    language: Language<'a>,
 }
 
-pub(crate) fn by_name(
-    identities: &Identities,
-    QueryReading { phrase, called, .. }: &QueryReading,
-    level: LevelFilter,
-    recipe: &QueryConfig,
-) -> QueryAnswer {
-    let mut scorer = ByName { identities, rejection: recipe.rejection };
-    judged((identities, phrase, level), called, (Basis::Names, recipe), &mut scorer, |answer, _| {
-        let alone = names::scores(identities, &phrase.target);
-        let mut relevancy = vec![0.0; identities.len() + 1];
-        let meant = if let Answer::NotFound(_) = answer { &[] } else { answer.hits() };
-        for (id, identity) in identities.iter() {
-            let hit = meant.iter().find(|h| h.identity == id);
-            // An identity that shares words but not the whole query is related, not meant.
-            let own = hit.map_or(0.5 * alone[id as usize - 1], |h| h.score);
-            relevancy[id as usize] = f32::max(own, relevancy[identity.parent as usize]);
+/// Sureness of what is found by embedding.
+const BY_LOOKS: f64 = 0.8;
+
+impl Looks for ByLooks<'_> {
+    fn find(&mut self, phrase: &ParsedQuery, plural: bool) -> Result<Vec<(IdentityId, f64)>, String> {
+        let mut found = by_embedding(self.identities, phrase, LevelFilter::Auto, self.recipe, self.language);
+        if self.recipe.rejection == Rejection::Strict {
+            found.answer = grounded(self.identities, phrase, self.language, found.answer);
         }
-        relevancy
-    })
+        // Several are meant, or what follows chooses: all that are more like the phrase than like anything.
+        let most = if plural { TOP_LOOKS } else { 3 };
+        Ok(found.chosen(most).into_iter().map(|id| (id, BY_LOOKS)).collect())
+    }
+}
+
+/// Most identities that a plural finds by embedding.
+const TOP_LOOKS: usize = 12;
+
+/// Answers by the language: by names, and with the encoder for words that no name has, if there is one.
+pub(crate) fn by_language(
+    scene: QueryScene<'_>,
+    reading: &QueryReading,
+    recipe: &QueryConfig,
+    encoder: Option<Language<'_>>,
+) -> QueryAnswer {
+    let start = Instant::now();
+    let identities = scene.identities;
+    let mut looks = encoder.map(|language| ByLooks { identities, recipe, language });
+    let looks = looks.as_mut().map(|l| l as &mut dyn Looks);
+    let understood = language::ask(&scene, &reading.text, &reading.sentences, looks);
+    let localize = ms_since(start);
+    let basis = match &understood {
+        Some(u) if u.by_looks || !scene.by_names => Basis::Embedding,
+        _ => Basis::Names,
+    };
+    let answer = told::answer(identities, reading, understood.as_ref());
+    let since = Instant::now();
+    let alone = names::scores(identities, &reading.phrase.target);
+    let mut relevancy = vec![0.0; identities.len() + 1];
+    let meant = if let Answer::NotFound(_) = answer { &[] } else { answer.hits() };
+    for (id, identity) in identities.iter() {
+        let hit = meant.iter().find(|h| h.identity == id);
+        // An identity that shares words but not the whole query is related, not meant.
+        let own = hit.map_or(0.5 * alone[id as usize - 1], |h| h.score);
+        relevancy[id as usize] = f32::max(own, relevancy[identity.parent as usize]);
+    }
+    let stages = StagesMs { relevancy: ms_since(since), localize, ..StagesMs::default() };
+    let is_rough = encoder.is_some_and(|l| models::is_rough(&l.features.encoder));
+    QueryAnswer { stages, understood, is_rough, ..QueryAnswer::new(answer, basis, relevancy, recipe) }
 }
 
 /// Answers by embedding alone.
@@ -224,21 +228,28 @@ pub(crate) fn by_embedding(
     language: Language<'_>,
 ) -> QueryAnswer {
     let Language { features, phrases, .. } = language;
+    let start = Instant::now();
     let mut scorer = EmbeddingScorer::new(identities, features, phrases, recipe);
-    let found = judged((identities, phrase, level), &[], (Basis::Embedding, recipe), &mut scorer, |_, scorer| {
-        let mut relevancy = vec![0.0];
-        relevancy.extend(scorer.scores(&phrase.text, None));
-        relevancy.resize(identities.len() + 1, 0.0);
-        relevancy
-    });
-    QueryAnswer { is_rough: models::is_rough(&features.encoder), ..found }
+    let mut timed = Timed { scorer: &mut scorer, ms: 0.0 };
+    let answer = localize(identities, phrase, level, recipe.strategy, &mut timed);
+    let (scored_ms, localized_ms) = (timed.ms, ms_since(start));
+    let mut relevancy = vec![0.0];
+    relevancy.extend(scorer.scores(&phrase.text, None));
+    relevancy.resize(identities.len() + 1, 0.0);
+    let stages = StagesMs {
+        relevancy: scored_ms + ms_since(start) - localized_ms,
+        localize: localized_ms - scored_ms,
+        ..StagesMs::default()
+    };
+    let is_rough = models::is_rough(&features.encoder);
+    QueryAnswer { stages, is_rough, ..QueryAnswer::new(answer, Basis::Embedding, relevancy, recipe) }
 }
 
 impl QueryAnswer {
     /// Creates an answer without look-alikes, with times of zero.
     pub(crate) fn new(answer: Answer, basis: Basis, relevancy: Vec<f32>, recipe: &QueryConfig) -> Self {
         let (stages, recipe) = (StagesMs::default(), recipe.clone());
-        Self { answer, basis, alike: Vec::new(), is_rough: false, relevancy, stages, recipe }
+        Self { answer, basis, alike: Vec::new(), is_rough: false, relevancy, stages, recipe, understood: None }
     }
 
     /// Creates the answer "not found".
@@ -252,6 +263,8 @@ impl QueryAnswer {
         let hits = self.answer.hits();
         let alike = |first: f32| hits.iter().take_while(|h| first - h.score < self.resolution()).count();
         let (most, threshold) = match &self.answer {
+            // All of several that are meant together.
+            Answer::Found(hits) if self.understood.is_some() => (top.max(hits.len()), 0.0),
             Answer::Found(_) => (top.max(1), self.threshold()),
             Answer::Ambiguous(hits) => (top.max(alike(hits[0].score)), self.threshold()),
             Answer::NotFound(_) => (0, self.threshold()),

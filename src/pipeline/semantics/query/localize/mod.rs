@@ -20,11 +20,6 @@ pub trait Scorer {
     /// Difference of scores under which two identities cannot be told apart.
     fn resolution(&self) -> f32;
 
-    /// Returns whether an identity may be an answer; called if its score suffices.
-    fn admits(&mut self, _phrase: &ParsedQuery, _hit: &Hit) -> bool {
-        true
-    }
-
     /// Returns whether the best identity is to be rejected although its score suffices.
     fn rejects(&mut self, _phrase: &ParsedQuery, _hit: &Hit) -> bool {
         false
@@ -88,47 +83,11 @@ pub fn localize(
     scorer: &mut dyn Scorer,
 ) -> Answer {
     let answer = meant(identities, phrase, level, strategy, scorer);
-    let answer = match &answer {
-        Answer::Found(hits) | Answer::Ambiguous(hits) => {
-            let able = &hits[..hits.partition_point(|hit| hit.score >= scorer.threshold())];
-            let admitted: Vec<Hit> = able.iter().filter(|hit| scorer.admits(phrase, hit)).copied().collect();
-            match admitted.len() {
-                0 => Answer::NotFound(hits.clone()),
-                n if n == able.len() => answer,
-                _ => judge(identities, with_margins(admitted), scorer),
-            }
-        }
-        Answer::NotFound(_) => answer,
-    };
     let answer = match answer {
         Answer::Found(hits) | Answer::Ambiguous(hits) if scorer.rejects(phrase, &hits[0]) => Answer::NotFound(hits),
         other => other,
     };
     answer.cut(TOP)
-}
-
-/// Returns the identities that share most with a text, without regard to its grammar.
-pub(super) fn nearest(identities: &Identities, text: &str, level: LevelFilter, scorer: &mut dyn Scorer) -> Vec<Hit> {
-    let mut hits = ranked(identities, &scorer.scores(text, None), level);
-    hits.retain(|hit| hit.score > 0.0);
-    hits.truncate(TOP);
-    hits
-}
-
-/// Answers with identities whose name is the whole text; the others are only near.
-pub(super) fn called(
-    identities: &Identities,
-    (ids, text): (&[IdentityId], &str),
-    level: LevelFilter,
-    scorer: &mut dyn Scorer,
-) -> Answer {
-    let below = 1.0 - 2.0 * scorer.resolution();
-    let mut scores = scorer.scores(text, None);
-    scores.iter_mut().for_each(|score| *score = score.min(below));
-    ids.iter().filter_map(|id| (*id as usize).checked_sub(1)).for_each(|i| scores[i] = 1.0);
-    let candidates = identities.iter().filter(|(_, i)| level.accepts(i.level)).map(|(id, _)| id);
-    let most = TOP.max(ids.len());
-    judge_first(identities, rank(candidates, &scores), most, scorer).cut(most)
 }
 
 /// Answers by scores alone.
@@ -293,11 +252,6 @@ fn with_margins(mut hits: Vec<Hit>) -> Vec<Hit> {
 
 /// Decides whether the first hit is the answer, nothing is, or others are equally good.
 fn judge(identities: &Identities, hits: Vec<Hit>, scorer: &dyn Scorer) -> Answer {
-    judge_first(identities, hits, TOP, scorer)
-}
-
-/// The same, with at most `most` equal hits.
-fn judge_first(identities: &Identities, hits: Vec<Hit>, most: usize, scorer: &dyn Scorer) -> Answer {
     let Some(first) = hits.first().filter(|h| h.score > 0.0 && h.score >= scorer.threshold()) else {
         return Answer::NotFound(hits);
     };
@@ -305,7 +259,7 @@ fn judge_first(identities: &Identities, hits: Vec<Hit>, most: usize, scorer: &dy
     let related = |id: IdentityId| {
         identities.ancestors(id).any(|i| i == first.identity) || identities.ancestors(first.identity).any(|i| i == id)
     };
-    let rival = hits.iter().take(most).skip(1).find(|h| !related(h.identity));
+    let rival = hits.iter().take(TOP).skip(1).find(|h| !related(h.identity));
     match rival {
         Some(rival) if first.score - rival.score < scorer.resolution() => Answer::Ambiguous(hits),
         _ => Answer::Found(hits),

@@ -1,10 +1,7 @@
 //! Localization by scores from tables.
 
-use super::super::names::ByName;
-use super::super::recipe::Rejection;
 use super::*;
-use crate::math::sh::SH_C0;
-use crate::scene::{GaussianCloud, NO_IDENTITY, SemanticMap};
+use crate::scene::NO_IDENTITY;
 
 fn scene() -> Identities {
     let mut all = Identities::default();
@@ -16,52 +13,6 @@ fn scene() -> Identities {
     }
     all.add(Level::Object, NO_IDENTITY, vec!["lamp".into()]);
     all
-}
-
-fn by_name(all: &Identities, phrase: &ParsedQuery, level: LevelFilter) -> Answer {
-    let mut scorer = ByName { identities: all, rejection: Rejection::Strict };
-    localize(all, phrase, level, Strategy::WholeFirst, &mut scorer)
-}
-
-fn ask(query: &str, level: LevelFilter) -> (Answer, Vec<String>) {
-    let all = scene();
-    let phrase = ParsedQuery::parse(query).expect("a phrase");
-    let answer = by_name(&all, &phrase, level);
-    let names = answer.hits().iter().map(|h| {
-        let line: Vec<String> = all.ancestors(h.identity).map(|i| all.name(i)).collect();
-        line.join(" < ")
-    });
-    let names = names.collect();
-    (answer, names)
-}
-
-#[test]
-fn the_whole_decides_between_pieces_of_the_same_name() {
-    for color in ["red", "blue"] {
-        let (answer, names) = ask(&format!("a button of the {color} controller"), LevelFilter::Auto);
-        assert!(matches!(answer, Answer::Found(_)), "{answer:?}");
-        assert_eq!(names[0], format!("button a < {color} controller"));
-    }
-    let (answer, names) = ask("button a", LevelFilter::Auto);
-    assert!(matches!(answer, Answer::Ambiguous(_)), "{answer:?}");
-    assert_eq!(names[..2], ["button a < red controller", "button a < blue controller"]);
-}
-
-#[test]
-fn a_kind_can_be_forced() {
-    assert_eq!(ask("red controller", LevelFilter::Auto).1[0], "red controller");
-    assert!(matches!(ask("red controller", LevelFilter::Part).0, Answer::NotFound(_)));
-    assert_eq!(ask("left stick of the blue controller", LevelFilter::Object).0.hits().len(), 3);
-}
-
-#[test]
-fn what_is_not_there_is_not_found() {
-    for absent in ["giraffe", "wing of the giraffe", "antenna of the red controller", "shade of the lamp"] {
-        assert!(matches!(ask(absent, LevelFilter::Auto).0, Answer::NotFound(_)), "{absent}");
-    }
-    let all = Identities::default();
-    let phrase = ParsedQuery::parse("lamp").expect("a phrase");
-    assert_eq!(by_name(&all, &phrase, LevelFilter::Auto), Answer::NotFound(vec![]));
 }
 
 /// Scores from a table: (phrase, against) -> score per identity.
@@ -235,40 +186,4 @@ fn a_compound_and_a_forced_kind_reach_the_second_step_without_grammar() {
     // The control: in one step, parts of everything do.
     let answer = by_table(&all, &phrase, LevelFilter::Part, Table(Strategy::OneStep, rows));
     assert_eq!(answer.hits().iter().map(|h| h.identity).collect::<Vec<_>>(), [3, 2, 5, 6]);
-}
-
-#[test]
-fn names_reject_other_colors_and_colors_alone() {
-    let mut all = scene();
-    all.add(Level::Object, NO_IDENTITY, vec!["brown chair".into()]);
-    let verdict_of = |all: &Identities, query: &str, rejection| {
-        let phrase = ParsedQuery::parse(query).expect("a phrase");
-        let mut scorer = ByName { identities: all, rejection };
-        localize(all, &phrase, LevelFilter::Auto, Strategy::WholeFirst, &mut scorer).verdict()
-    };
-    let verdict = |query: &str, rejection| verdict_of(&all, query, rejection);
-    for wrong in ["green chair", "brown house", "leg of the brown house", "button a of the green controller"] {
-        assert_eq!(verdict(wrong, Rejection::Strict), "not found", "{wrong}");
-    }
-    // The control: without it, half of the words are enough.
-    assert_ne!(verdict("green chair", Rejection::Canonical), "not found");
-    assert_ne!(verdict("brown house", Rejection::Canonical), "not found");
-    assert_eq!(verdict("giraffe", Rejection::Canonical), "not found");
-    for right in ["brown chair", "chair", "red controller", "button a of the red controller"] {
-        assert_ne!(verdict(right, Rejection::Strict), "not found", "{right}");
-    }
-    assert_eq!(
-        verdict("brown", Rejection::Strict),
-        verdict("brown", Rejection::Canonical),
-        "a color alone is the kind"
-    );
-    // A thing without a color in its name has its observed color; without one, a color explains nothing.
-    assert_eq!(verdict("green lamp", Rejection::Strict), "not found");
-    let green = [0.2, 0.7, 0.2].map(|c: f64| ((c - 0.5) / SH_C0) as f32);
-    let cloud = GaussianCloud { sh: vec![green], ..GaussianCloud::isotropic(vec![[0.0; 3]], -3.0, 4.0) };
-    let lamp = 7;
-    let mut map = SemanticMap::from_identities(all.clone(), vec![lamp], vec![1.0], vec![]);
-    map.see_colors(&cloud);
-    let seen = ["green lamp", "red lamp"].map(|query| verdict_of(&map.identities, query, Rejection::Strict));
-    assert_eq!(seen, ["found", "not found"]);
 }

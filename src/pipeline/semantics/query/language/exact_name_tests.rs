@@ -6,15 +6,18 @@ use std::path::{Path, PathBuf};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
 
-use super::super::answer::{Language, answer};
-use super::super::by_embedding::TextEmbeddings;
-use super::super::localize::Answer;
-use super::*;
+use crate::pipeline::semantics::query::answer::{Language, answer};
+use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
+use crate::pipeline::semantics::query::language::QueryPlace;
+use crate::pipeline::semantics::query::localize::Answer;
+use crate::pipeline::semantics::query::reading::QueryReading;
+use crate::pipeline::semantics::query::recipe::{MatchBy, QueryConfig};
+use crate::scene::identity::whole_names::key;
 use crate::io::gltf_mesh;
 use crate::pipeline::synth::demo_glb;
 use crate::pipeline::synth::levels::identities;
 use crate::pipeline::synth::options::Levels;
-use crate::scene::{LanguageFeatures, Level, NO_IDENTITY, ViewFeatures};
+use crate::scene::{Identities, IdentityId, LanguageFeatures, Level, LevelFilter, NO_IDENTITY, ViewFeatures};
 
 /// Names that the grammar takes apart, or takes for something else.
 const HARD: [(&str, &[&str]); 16] = [
@@ -164,13 +167,13 @@ impl<'a> Asked<'a> {
         phrases.learn(phrase, &self.recipe, &mut encode).expect("encodes");
         let language = Language { features: &self.features, phrases: &phrases, unknown: &[] };
         let language = (self.recipe.match_by == MatchBy::Both).then_some(language);
-        let answered = answer(self.all, reading, LevelFilter::Auto, &self.recipe, language);
+        let answered = answer(self.all, reading, (LevelFilter::Auto, &QueryPlace::default()), &self.recipe, language);
         let chosen = answered.chosen(1);
         (answered.answer, chosen)
     }
 
     fn ask(&self, text: &str) -> (Answer, Vec<IdentityId>) {
-        self.answer(&QueryReading::new(self.all, text, LevelFilter::Auto, &self.recipe).expect("a question"))
+        self.answer(&QueryReading::new(self.all, text, &self.recipe).expect("a question"))
     }
 
     /// Returns whether one of its names finds `id`, or a whole of it with the same name.
@@ -191,32 +194,15 @@ fn spellings(name: &str) -> Vec<String> {
     ["", "the ", "THE  "].into_iter().flat_map(with).collect()
 }
 
-/// Reads by the grammar alone, as if no whole name were looked up.
-fn by_grammar(all: &Identities, text: &str) -> Option<QueryReading> {
-    let (text, mended, near) = mend_all(all, text);
-    let parsed = ParsedQuery::parse(&text)?;
-    Some(QueryReading { phrase: compound(all, &parsed).unwrap_or(parsed), called: vec![], mended, near })
-}
-
-/// Asks every name of a scene; returns the number of questions, the failures, and the names that the grammar alone
-/// does not find.
-fn ask_all(scene: &str, all: &Identities) -> (usize, Vec<String>, Vec<String>) {
-    let (mut asked, mut wrong, mut by_grammar_wrong) = (0, Vec::new(), Vec::new());
+/// Asks every name of a scene; returns the number of questions, and the failures.
+fn ask_all(scene: &str, all: &Identities) -> (usize, Vec<String>) {
+    let (mut asked, mut wrong) = (0, Vec::new());
     for match_by in [MatchBy::Names, MatchBy::Both] {
         let how = Asked::new(all, match_by);
         // Every word of every name is compared, so of long lists only some names are asked.
         let is_long = all.len() >= 200;
         for (id, identity) in all.iter().filter(|(id, _)| match_by == MatchBy::Names || !is_long || id % 200 == 0) {
             let is_full = !is_long || id % 200 == 0;
-            for name in identity.names.iter().filter(|_| match_by == MatchBy::Names) {
-                let (_, chosen) = match by_grammar(all, name).filter(|_| is_full) {
-                    Some(reading) => how.answer(&reading),
-                    None => (Answer::NotFound(vec![]), vec![id; usize::from(!is_full)]),
-                };
-                if !how.is_meant(id, name, &chosen) {
-                    by_grammar_wrong.push(format!("{scene}: {name}"));
-                }
-            }
             let full = all.full_name(id);
             for text in identity.names.iter().chain([&full]).flat_map(|name| spellings(name)) {
                 asked += 1;
@@ -232,26 +218,22 @@ fn ask_all(scene: &str, all: &Identities) -> (usize, Vec<String>, Vec<String>) {
             }
         }
     }
-    (asked, wrong, by_grammar_wrong)
+    (asked, wrong)
 }
 
 #[test]
 fn every_name_in_every_scene_asked_verbatim_finds_its_identity() {
     let (scenes, missing) = scenes();
-    let (mut asked, mut names, mut wrong, mut by_grammar) = (0, 0, Vec::new(), Vec::new());
+    let (mut asked, mut names, mut wrong) = (0, 0, Vec::new());
     for (scene, all) in &scenes {
-        let (n, lost, before) = ask_all(scene, all);
-        println!("{scene}: {} identities, {} not found, {} by the grammar alone", all.len(), lost.len(), before.len());
+        let (n, lost) = ask_all(scene, all);
+        println!("{scene}: {} identities, {} not found", all.len(), lost.len());
         names += all.iter().flat_map(|(_, i)| &i.names).count();
         asked += n;
         wrong.extend(lost);
-        by_grammar.extend(before);
     }
     println!("{names} names of {} scenes, {asked} questions; left out: {missing:?}", scenes.len());
-    println!("the grammar alone does not find {}:\n{}", by_grammar.len(), by_grammar.join("\n"));
     assert!(wrong.is_empty(), "{} of {asked}:\n{}", wrong.len(), wrong[..wrong.len().min(40)].join("\n"));
-    // The control: without whole names, many are not found.
-    assert!(by_grammar.len() > 40 && by_grammar.iter().any(|n| n.ends_with("pink bow on the plush doll's hood")));
 }
 
 #[test]
@@ -329,28 +311,4 @@ fn names_of_any_words_are_found_in_random_trees() {
             }
         }
     }
-}
-
-#[test]
-fn only_a_whole_name_is_one_and_pieces_of_whole_names_are_parted_there() {
-    let all = hard();
-    let read = |text: &str| QueryReading::new(&all, text, LevelFilter::Auto, &QueryConfig::default()).expect("words");
-    for other in
-        ["pink bow on the plush doll", "bow on the plush doll's hood", "set of cups handle", "the set of", "lid · hood"]
-    {
-        assert!(read(other).called.is_empty(), "{other}");
-    }
-    let handles = all.called("handle of the set of cups", LevelFilter::Auto);
-    assert_eq!((handles.len(), &read("the handle of the set of cups of the set of cups").called), (2, &handles));
-    let door = read("a door of the doll's house of the doll's house").called;
-    assert_eq!(door, all.called("door of the doll's house", LevelFilter::Auto));
-    // If the whole is a name and the piece is none, the grammar divides there; slips are mended first.
-    let lid = read("lid of the doll's huose");
-    assert_eq!((lid.phrase.target.as_str(), lid.phrase.whole.as_deref()), ("lid", Some("doll's house")));
-    assert_eq!(read("pink bow on the plush doll's hodo").called, all.called(HARD[0].1[0], LevelFilter::Auto));
-    // Names are not used by embedding, and the requested level is respected.
-    let part =
-        |level, recipe: &QueryConfig| QueryReading::new(&all, "hood", level, recipe).expect("words").called.len();
-    let counts = [part(LevelFilter::Part, &QueryConfig::default()), part(LevelFilter::Object, &QueryConfig::default())];
-    assert_eq!((counts, part(LevelFilter::Auto, &QueryConfig::paper())), ([2, 0], 0));
 }

@@ -1,0 +1,189 @@
+//! Conditions on the members of a set: places, pieces, colors, comparisons.
+
+use std::ops::Range;
+
+use super::evaluate::{Evaluator, Matches, Member, Outcome, Unmet, Why, is_of_view};
+use super::expression::{Condition, Expression, Order, Relation};
+use super::relations::{HOLDS, Space};
+use super::{adjectives, order};
+use crate::math::format;
+use crate::scene::IdentityId;
+
+/// Share under which a relation does not hold.
+const FAILS: f64 = 0.35;
+
+/// Members of a set for which a condition holds, or does not.
+pub(super) fn filtered(
+    all: &mut Evaluator<'_>,
+    of: &Expression,
+    is: &Condition,
+    not: bool,
+    at: &Range<usize>,
+) -> Outcome {
+    let anchors = anchors(all, is)?;
+    let found = all.set(of)?;
+    let before = found.clone();
+    let mut unclear = found.unclear;
+    let kept = match is {
+        Condition::Adjective(words) => adjectives::described(all, found, words, not, at)?,
+        Condition::Placed(relation, anchor) => {
+            let space = all.space(at);
+            let several = !anchor.is_plural() && anchors[0].len() > 1;
+            let all_of = anchor.is_plural() && relation.is_of_view();
+            let identities = all.scene.identities;
+            let is_piece = |id: IdentityId, whole: IdentityId| id != whole && identities.ancestors(id).any(|i| i == whole);
+            let by_parts = matches!(relation, Relation::On | Relation::In | Relation::PartOf);
+            let share = |m: &Member, a: IdentityId| match &space {
+                _ if by_parts && is_piece(m.id, a) => Some(1.0),
+                Ok(space) => space.share(*relation, m.id, a),
+                Err(_) => None,
+            };
+            if several && !not {
+                // Which of the anchors is meant does not matter if only one has anything there.
+                let with_each = anchors[0].iter().map(|a| found.members.iter().filter(|m| share(m, *a).is_some_and(|s| s >= HOLDS[1])).map(|m| m.id).collect::<Vec<_>>());
+                let mut with_each: Vec<Vec<IdentityId>> = with_each.filter(|ids| !ids.is_empty()).collect();
+                with_each.dedup();
+                unclear |= with_each.len() > 1;
+            }
+            let holds = |m: &Member| {
+                let mut shares = anchors[0].iter().filter_map(|a| share(m, *a));
+                if all_of {
+                    let least = shares.try_fold(1.0, |least: f64, s| Some(least.min(s)));
+                    return least.filter(|_| !anchors[0].contains(&m.id)).unwrap_or(-1.0);
+                }
+                shares.fold(-1.0, f64::max)
+            };
+            let kept = judged(found, not, |m| holds(m));
+            // Without shapes, only the parts of things are known.
+            match space {
+                Err(unmet) if not || kept.members.is_empty() => return Err(unmet),
+                _ => kept,
+            }
+        }
+        Condition::Between(..) => {
+            let space = all.space(at)?;
+            let mut pairs: Vec<[IdentityId; 2]> = Vec::new();
+            let [first, second] = [&anchors[0], &anchors[1]];
+            for (k, a) in first.iter().enumerate() {
+                let from = if first == second { k + 1 } else { 0 };
+                pairs.extend(second.iter().skip(from).map(|b| [*a, *b]));
+            }
+            unclear |= pairs.len() > 1;
+            let holds = |m: &Member| pairs.iter().filter_map(|[a, b]| space.between(m.id, *a, *b)).fold(-1.0, f64::max);
+            judged(found, not, holds)
+        }
+        Condition::Has(_) => {
+            let identities = all.scene.identities;
+            let space = all.space(at).ok();
+            let lies = |s: &Space<'_>, piece: IdentityId, m: &Member| {
+                let share = |relation| s.share(relation, piece, m.id).unwrap_or(0.0);
+                share(Relation::In).max(share(Relation::On))
+            };
+            let has = |m: &Member| {
+                let is_piece = |p: &IdentityId| *p != m.id && identities.ancestors(*p).any(|i| i == m.id);
+                if anchors[0].iter().any(is_piece) {
+                    return 1.0;
+                }
+                let near = anchors[0].iter().filter(|p| **p != m.id).filter_map(|p| Some(lies(space?, *p, m)));
+                near.fold(0.0, f64::max)
+            };
+            judged(found, not, has)
+        }
+        Condition::Compared { order, more, .. } => {
+            unclear |= anchors[0].len() > 1 && !is_plural(is);
+            order::compared(all, found, (*order, *more), &anchors[0], not, at)?
+        }
+        Condition::Measured { order, more, meters } => measured(all, found, (*order, *more != not, *meters), at)?,
+        Condition::Among(_) => judged(found, not, |m| if anchors[0].contains(&m.id) { 1.0 } else { 0.0 }),
+        Condition::Side { order, most } => order::on_side(all, found, (*order, *most != not), at)?,
+    };
+    let kept = Matches { unclear, ..kept };
+    let text = format!("{}{}", all.said(&tail(of, at)), all.seen_from_here(is_of_view(is)));
+    if kept.members.is_empty() {
+        return Err(none_is(all, &before, &text, at));
+    }
+    all.idle += usize::from(kept.members.len() == before.members.len());
+    all.step(&tail(of, at), text, &kept);
+    Ok(kept)
+}
+
+fn is_plural(is: &Condition) -> bool {
+    matches!(is, Condition::Compared { than, .. } if than.is_plural())
+}
+
+/// Bytes of a condition: what stands after the things that it is said of.
+fn tail(of: &Expression, at: &Range<usize>) -> Range<usize> {
+    if of.at.end > of.at.start && of.at.end < at.end && of.at.start <= at.start.max(of.at.start) && of.at.end >= at.start {
+        of.at.end..at.end
+    } else if at.start < of.at.start {
+        at.start..of.at.start
+    } else {
+        at.clone()
+    }
+}
+
+fn ids(all: &mut Evaluator<'_>, e: &Expression) -> Result<Vec<IdentityId>, Unmet> {
+    Ok(all.anchor(e)?.ids())
+}
+
+/// Identities that a condition refers to.
+fn anchors(all: &mut Evaluator<'_>, is: &Condition) -> Result<[Vec<IdentityId>; 2], Unmet> {
+    Ok(match is {
+        // The exact "bowl" may be a piece of the bowl that is meant.
+        Condition::Placed(Relation::In, anchor) => [all.of_any_level(|all| all.inner(|all| all.set(anchor)))?.ids(), Vec::new()],
+        Condition::Placed(_, anchor) | Condition::Among(anchor) => [ids(all, anchor)?, Vec::new()],
+        Condition::Compared { than, .. } => [ids(all, than)?, Vec::new()],
+        Condition::Between(a, b) => [ids(all, a)?, ids(all, b)?],
+        Condition::Has(piece) => match ids(all, piece) {
+            Ok(pieces) => [pieces, Vec::new()],
+            // "A mug without a straw": nothing here has one, if that is a thing at all.
+            Err(unmet) if unmet.why <= Why::Unknown && unmet.words.iter().all(|w| super::is_a_thing(w)) => [Vec::new(), Vec::new()],
+            Err(unmet) => return Err(unmet),
+        },
+        Condition::Adjective(_) | Condition::Measured { .. } | Condition::Side { .. } => [Vec::new(), Vec::new()],
+    })
+}
+
+/// Members for which a relation holds: sure ones alone if there are any, else those for which it may hold.
+pub(super) fn judged(found: Matches, not: bool, share: impl Fn(&Member) -> f64) -> Matches {
+    if not {
+        return found.kept(|m| Some(share(m)).filter(|s| *s < FAILS).map(|_| 1.0));
+    }
+    let found = found.kept(|m| Some(share(m)).filter(|s| *s >= HOLDS[1]));
+    if found.members.iter().any(|m| m.sure >= HOLDS[0]) {
+        return found.kept(|m| Some(m.sure).filter(|s| *s >= HOLDS[0]));
+    }
+    found
+}
+
+fn measured(
+    all: &Evaluator<'_>,
+    found: Matches,
+    (order, more, meters): (Order, bool, f64),
+    at: &Range<usize>,
+) -> Outcome {
+    let Some(scale) = all.scene.place.meters.filter(|m| *m > 0.0) else {
+        let text = "The length of a meter is not known in this scene, so nothing can be compared with a length.";
+        return Err(Unmet { words: vec![all.said(at).into()], ..all.unmet(Why::NotUnderstood, text, at) });
+    };
+    let space = all.space(at)?;
+    let value = |m: &Member| order::value(all, space, m.id, order).map(|v| v * scale);
+    Ok(found.kept(|m| {
+        let v = value(m)?;
+        let (v, limit) = if more { (v, meters) } else { (meters, v) };
+        // Within the precision of a measurement it is a guess.
+        (v >= limit).then_some(if v >= limit * 1.05 { 1.0 } else { HOLDS[1] })
+    }))
+}
+
+/// Reason that none of a set is so.
+fn none_is(all: &Evaluator<'_>, before: &Matches, text: &str, at: &Range<usize>) -> Unmet {
+    let ids: Vec<IdentityId> = before.settled().iter().map(|m| m.id).collect();
+    let names: Vec<String> = ids.iter().take(3).map(|id| all.scene.identities.full_name(*id)).collect();
+    let text = match names.as_slice() {
+        [only] => format!("The {only} is not \u{201c}{text}\u{201d}."),
+        names if names.len() == ids.len() => format!("None of these is \u{201c}{text}\u{201d}: {}.", names.join(", ")),
+        _ => format!("None of {} is \u{201c}{text}\u{201d}.", format::things(ids.len(), "thing")),
+    };
+    Unmet { near: ids, ..all.unmet(Why::Nothing, text, at) }
+}

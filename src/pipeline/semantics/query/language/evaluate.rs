@@ -1,0 +1,383 @@
+//! Evaluation of an expression on a scene: sets of identities, step by step.
+
+use std::ops::Range;
+
+use super::expression::{Condition, Expression, Order, Relation, SetOf};
+use super::relations::{HOLDS, Space};
+use super::{Looks, QueryScene, conditions, nouns, order};
+use crate::scene::{IdentityId, LevelFilter};
+
+/// Identity in a set.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Member {
+    pub(crate) id: IdentityId,
+    /// Sureness from 0 to 1 that it belongs there.
+    pub(crate) sure: f64,
+    /// Fit of the words: 0 for its whole name, 1 for a part of it, 2 for a kind of thing.
+    pub(crate) rank: u8,
+}
+
+/// Set of identities that an expression stands for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct Matches {
+    pub(crate) members: Vec<Member>,
+    /// True if one thing is asked for in a place where several fit, with different results.
+    pub(crate) unclear: bool,
+}
+
+impl Matches {
+    pub(crate) fn new(members: Vec<Member>) -> Self {
+        Self { members, unclear: false }
+    }
+
+    /// Those that the words fit best.
+    pub(crate) fn settled(&self) -> Vec<Member> {
+        let best = self.members.iter().map(|m| m.rank).min();
+        self.members.iter().filter(|m| Some(m.rank) == best).copied().collect()
+    }
+
+    pub(crate) fn ids(&self) -> Vec<IdentityId> {
+        self.members.iter().map(|m| m.id).collect()
+    }
+
+    /// Keeps the members for which `sure` gives a sureness; `None` removes one.
+    pub(crate) fn kept(self, mut sure: impl FnMut(&Member) -> Option<f64>) -> Self {
+        let keep = |m: Member| sure(&m).map(|s| Member { sure: m.sure.min(s), ..m });
+        Self { members: self.members.into_iter().filter_map(keep).collect(), ..self }
+    }
+}
+
+/// Reason for which an expression has no members.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Unmet {
+    pub(crate) why: Why,
+    /// Reason in a sentence.
+    pub(crate) text: String,
+    /// Words that are the reason; may be empty.
+    pub(crate) words: Vec<String>,
+    pub(crate) near: Vec<IdentityId>,
+    /// Bytes of the text that are the reason.
+    pub(crate) at: Range<usize>,
+}
+
+/// Kind of a reason.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Why {
+    /// All words are understood, and nothing in the scene is so.
+    Nothing,
+    /// A word names nothing in the scene.
+    Unknown,
+    /// A word has no meaning here.
+    NotUnderstood,
+    /// The encoder failed.
+    Failed,
+}
+
+/// Step of an evaluation.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct QueryStep {
+    /// Bytes of the text that ask for it.
+    pub(crate) at: Range<usize>,
+    /// Effect in words: "left of the lamp, seen from here".
+    pub(crate) text: String,
+    /// Number of identities that are left.
+    pub(crate) left: usize,
+    /// True if it holds only in part.
+    pub(crate) guess: bool,
+    /// Number of expressions around it.
+    pub(crate) depth: usize,
+}
+
+pub(super) type Outcome = Result<Matches, Unmet>;
+
+/// Evaluator of the readings of one text.
+pub(super) struct Evaluator<'a> {
+    pub(super) scene: &'a QueryScene<'a>,
+    pub(super) space: Option<Space<'a>>,
+    pub(super) text: &'a str,
+    pub(super) looks: Option<&'a mut dyn Looks>,
+    pub(super) steps: Vec<QueryStep>,
+    /// Number of conditions that removed nothing.
+    pub(super) idle: usize,
+    /// True once the view decided.
+    pub(super) of_view: bool,
+    /// Remarks on the way, such as "a kettle is a kind of pot".
+    pub(super) notes: Vec<String>,
+    /// True once a match came from the encoder.
+    pub(super) looked: bool,
+    /// Thing that "one" stands for in a part of a sentence.
+    antecedent: Option<String>,
+    depth: usize,
+    /// True where the level that is asked for does not matter: in anchors and wholes.
+    any_level: bool,
+    /// True if "things" may be what most others stand on.
+    pub(super) with_stages: bool,
+}
+
+impl<'a> Evaluator<'a> {
+    pub(super) fn new(scene: &'a QueryScene<'a>, text: &'a str, looks: Option<&'a mut dyn Looks>) -> Self {
+        let space = scene.place.view.map(|view| Space::new(scene.identities, view));
+        let (steps, notes, looked, antecedent, depth, any_level) = (Vec::new(), Vec::new(), false, None, 0, false);
+        let (with_stages, idle, of_view) = (false, 0, false);
+        Self { scene, space, text, looks, steps, notes, looked, antecedent, depth, any_level, with_stages, idle, of_view }
+    }
+
+    /// Text of some bytes.
+    pub(super) fn said(&self, at: &Range<usize>) -> &'a str {
+        self.text.get(at.clone()).unwrap_or_default()
+    }
+
+    pub(super) fn unmet(&self, why: Why, text: impl Into<String>, at: &Range<usize>) -> Unmet {
+        Unmet { why, text: text.into(), words: Vec::new(), near: Vec::new(), at: at.clone() }
+    }
+
+    /// Shapes and view, which relations and orders need.
+    pub(super) fn space(&self, at: &Range<usize>) -> Result<&Space<'a>, Unmet> {
+        let known = self.space.as_ref().filter(|s| s.shapes.are_known());
+        known.ok_or_else(|| self.unmet(Why::NotUnderstood, "Nothing is known here of where things are.", at))
+    }
+
+    /// Records a step.
+    pub(super) fn step(&mut self, at: &Range<usize>, text: impl Into<String>, found: &Matches) {
+        let left = found.settled();
+        let guess = left.iter().any(|m| m.sure < HOLDS[0]);
+        self.steps.push(QueryStep { at: at.clone(), text: text.into(), left: left.len(), guess, depth: self.depth });
+    }
+
+    /// Evaluates an expression; an empty set is an error.
+    pub(super) fn set(&mut self, e: &Expression) -> Outcome {
+        let found = match &e.set {
+            SetOf::Words { words, plural } => nouns::words(self, words, *plural, &e.at)?,
+            SetOf::Called(name) => nouns::called(self, name, &e.at)?,
+            SetOf::Any { parts, .. } => nouns::any(self, *parts),
+            SetOf::Kin { plural } => match self.antecedent.clone() {
+                Some(word) => nouns::words(self, &[word], *plural, &e.at)?,
+                None => nouns::kin(self, &e.at)?,
+            },
+            SetOf::Last { plural } => nouns::last(self, *plural, &e.at)?,
+            SetOf::Numbered(id) => nouns::numbered(self, *id, &e.at)?,
+            SetOf::PartOf(piece, whole) => self.part_of(piece, whole, e)?,
+            SetOf::Where { of, is, not } => match conditions::filtered(self, of, is, *not, &e.at) {
+                // "What is under the mug": the table.
+                Err(unmet) if unmet.why == Why::Nothing && !self.with_stages && of.is_any() => {
+                    self.with_stages = true;
+                    let again = conditions::filtered(self, of, is, *not, &e.at);
+                    self.with_stages = false;
+                    again.map_err(|_| unmet)?
+                }
+                found => found?,
+            },
+            SetOf::Ranked { of, order, most, first, count, superlative } => {
+                let found = self.set(of)?;
+                order::ranked(self, found, (*order, *most, *superlative), [*first, *count], &e.at)?
+            }
+            SetOf::Nearest { of, to, far, first, count } => {
+                let anchors = self.anchor(to)?;
+                let found = self.set(of)?;
+                order::nearest(self, found, &anchors, *far, [*first, *count], &e.at)?
+            }
+            SetOf::Counted { of, count } => self.counted(of, *count, e)?,
+            SetOf::Every { of, both } => {
+                let found = self.set(of)?;
+                let n = found.settled().len();
+                if *both && n != 2 {
+                    return Err(self.of_number(&found, "two", e));
+                }
+                found
+            }
+            SetOf::One(of) => self.set(of)?,
+            SetOf::Nth { of, nth } => {
+                let found = self.set(of)?;
+                if found.settled().len() < *nth {
+                    return Err(self.of_number(&found, &nth.to_string(), e));
+                }
+                self.notes.push("Say from where to count, such as \u{201c}from the left\u{201d}.".into());
+                Matches { unclear: true, ..found }
+            }
+            SetOf::Other(of) => self.other(of, &e.at)?,
+            SetOf::Union { of, either } => self.union(of, *either, e)?,
+            SetOf::Except(of, but) => {
+                let found = self.set(of)?;
+                let before = std::mem::replace(&mut self.antecedent, of.head());
+                let out = self.inner(|all| all.set(but));
+                self.antecedent = before;
+                let out = out?.ids();
+                let before = found.members.len();
+                let left = found.kept(|m| (!out.contains(&m.id)).then_some(1.0));
+                self.idle += usize::from(left.members.len() == before);
+                self.step(&e.at, format!("without \u{201c}{}\u{201d}", self.said(&but.at)), &left);
+                left
+            }
+        };
+        if found.members.is_empty() {
+            let text = format!("Nothing here is \u{201c}{}\u{201d}.", self.said(&e.at));
+            return Err(self.unmet(Why::Nothing, text, &e.at));
+        }
+        Ok(found)
+    }
+
+    /// Evaluates within an expression: its steps stand deeper.
+    pub(super) fn inner<T>(&mut self, run: impl FnOnce(&mut Self) -> T) -> T {
+        self.depth += 1;
+        let result = run(self);
+        self.depth -= 1;
+        result
+    }
+
+    /// Evaluates the thing that others are compared with.
+    pub(super) fn anchor(&mut self, e: &Expression) -> Outcome {
+        let found = self.of_any_level(|s| s.inner(|s| s.set(e)))?;
+        Ok(Matches { members: found.settled(), unclear: found.unclear })
+    }
+
+    fn part_of(&mut self, piece: &Expression, whole: &Expression, e: &Expression) -> Outcome {
+        let wholes = self.anchor_or_all(whole)?;
+        let all = self.scene.identities;
+        let pieces = self.of_any_level(|s| s.set(piece));
+        let is_in = |id: IdentityId, whole: IdentityId| id != whole && all.ancestors(id).any(|i| i == whole);
+        let pieces = match pieces {
+            Ok(found) => found,
+            Err(unmet) if unmet.why == Why::Failed => return Err(unmet),
+            Err(unmet) => return Err(self.no_piece(piece, &wholes.settled(), unmet, e)),
+        };
+        // The exact "bowl" may lack the part: another match, the fruit bowl, has the apple.
+        for wholes_of in [wholes.settled(), wholes.members.clone()] {
+            let within = |m: &Member| wholes_of.iter().any(|w| is_in(m.id, w.id)).then_some(1.0);
+            let found = pieces.clone().kept(within);
+            if !found.members.is_empty() {
+                let owners = wholes_of.iter().filter(|w| found.members.iter().any(|m| is_in(m.id, w.id))).count();
+                let unclear = found.unclear || wholes.unclear || (owners > 1 && !whole.is_plural());
+                let found = Matches { unclear, ..found };
+                self.step(&e.at, format!("of \u{201c}{}\u{201d}", self.said(&whole.at)), &found);
+                return Ok(found);
+            }
+        }
+        if !matches!(piece.set, SetOf::Words { .. } | SetOf::Called(_)) {
+            let unmet = self.unmet(Why::Nothing, "", &e.at);
+            return Err(self.no_piece(piece, &wholes.settled(), unmet, e));
+        }
+        // Things in or on a thing need not be parts of it: the candle on the cake.
+        let lies = |s: &Space<'_>, m: &Member| {
+            let share = |relation| wholes.members.iter().filter_map(|w| s.share(relation, m.id, w.id)).fold(0.0, f64::max);
+            let touches = (share(Relation::Touching) >= HOLDS[0]).then_some(HOLDS[1]);
+            Some(share(Relation::In)).filter(|share| *share >= HOLDS[0]).or(touches)
+        };
+        let inside = self.space(&e.at).ok().map(|space| pieces.clone().kept(|m| lies(space, m)));
+        match inside.filter(|found| !found.members.is_empty()) {
+            Some(found) => Ok(found),
+            None => {
+                let unmet = self.unmet(Why::Nothing, "", &e.at);
+                Err(self.no_piece(piece, &wholes.settled(), unmet, e))
+            }
+        }
+    }
+
+    fn anchor_or_all(&mut self, e: &Expression) -> Outcome {
+        self.of_any_level(|s| s.inner(|s| s.set(e)))
+    }
+
+    /// Evaluates without regard to the level that is asked for.
+    pub(super) fn of_any_level<T>(&mut self, run: impl FnOnce(&mut Self) -> T) -> T {
+        let before = std::mem::replace(&mut self.any_level, true);
+        let result = run(self);
+        self.any_level = before;
+        result
+    }
+
+    /// Returns whether identities of a level may be matched here.
+    pub(super) fn accepts(&self, id: IdentityId) -> bool {
+        let level = if self.any_level { LevelFilter::Auto } else { self.scene.level };
+        self.scene.identities.get(id).is_some_and(|i| level.accepts(i.level)) && self.scene.is_there(id)
+    }
+
+    fn no_piece(&self, piece: &Expression, wholes: &[Member], unmet: Unmet, e: &Expression) -> Unmet {
+        let all = self.scene.identities;
+        let known: Vec<IdentityId> = wholes.iter().flat_map(|w| all.children(w.id)).filter(|id| self.scene.is_there(*id)).collect();
+        let parts: Vec<String> = known.iter().take(12).map(|id| all.label(*id)).collect();
+        let parts = if parts.is_empty() { "no parts are known of it".into() } else { format!("its parts: {}", parts.join(", ")) };
+        let name = wholes.first().map(|w| all.full_name(w.id)).unwrap_or_default();
+        let text = format!("The {name} has no \u{201c}{}\u{201d} here; {parts}.", self.said(&piece.at));
+        let why = if unmet.why == Why::NotUnderstood { unmet.why } else { Why::Nothing };
+        Unmet { why, text, words: unmet.words, near: known, at: e.at.clone() }
+    }
+
+    fn counted(&mut self, of: &Expression, count: usize, e: &Expression) -> Outcome {
+        let found = self.set(of)?;
+        let n = found.settled().len();
+        if n < count || self.looked {
+            return Err(self.of_number(&found, &count.to_string(), e));
+        }
+        if n > count {
+            self.notes.push(format!("There are {n} of them."));
+        }
+        self.step(&e.at, format!("{count} of them"), &found);
+        Ok(Matches { unclear: found.unclear || n > count, ..found })
+    }
+
+    fn of_number(&self, found: &Matches, asked: &str, e: &Expression) -> Unmet {
+        let ids: Vec<IdentityId> = found.settled().iter().map(|m| m.id).collect();
+        let listed: Vec<String> = ids.iter().take(6).map(|id| self.scene.identities.label(*id)).collect();
+        let listed = listed.join(", ");
+        let text = match ids.len() {
+            _ if self.looked => format!("By embedding, which is no count: {listed}. Say each by its name."),
+            1 => format!("There is 1 of them here, not {asked}: {listed}."),
+            n => format!("There are {n} of them here, not {asked}: {listed}."),
+        };
+        Unmet { near: ids, ..self.unmet(Why::Nothing, text, &e.at) }
+    }
+
+    fn other(&mut self, of: &Expression, at: &Range<usize>) -> Outcome {
+        let found = self.set(of)?;
+        let last = &self.scene.place.talk.last;
+        let others = found.clone().kept(|m| (!last.contains(&m.id)).then_some(1.0));
+        if others.members.len() == found.members.len() {
+            let unmet = self.unmet(Why::NotUnderstood, "I do not know which other one you mean.", at);
+            return Err(Unmet { near: found.ids(), words: vec!["other".into()], ..unmet });
+        }
+        Ok(others)
+    }
+
+    fn union(&mut self, of: &[Expression], either: bool, e: &Expression) -> Outcome {
+        let (mut all, mut missing): (Matches, Option<Unmet>) = (Matches::default(), None);
+        let before = self.antecedent.clone();
+        for one in of {
+            let found = self.inner(|s| s.set(one));
+            if let Some(head) = one.head() {
+                self.antecedent = Some(head);
+            }
+            match found {
+                Ok(found) => {
+                    let several = !one.is_plural() && found.settled().len() > 1;
+                    all.unclear |= found.unclear || several;
+                    let new = found.settled().into_iter().filter(|m| !all.members.iter().any(|o| o.id == m.id));
+                    let new: Vec<Member> = new.map(|m| Member { rank: 0, ..m }).collect();
+                    all.members.extend(new);
+                }
+                Err(unmet) => missing = missing.or(Some(unmet)),
+            }
+        }
+        self.antecedent = before;
+        match missing {
+            Some(unmet) if !either || all.members.is_empty() || unmet.why == Why::NotUnderstood => Err(unmet),
+            _ => {
+                self.step(&e.at, if either { "any of these" } else { "all of these" }, &all);
+                Ok(all)
+            }
+        }
+    }
+
+    /// Remark on a step that depends on the view.
+    pub(super) fn seen_from_here(&mut self, by_view: bool) -> &'static str {
+        self.of_view |= by_view;
+        if by_view { ", seen from here" } else { "" }
+    }
+}
+
+/// Returns whether a condition depends on the view.
+pub(super) fn is_of_view(is: &Condition) -> bool {
+    match is {
+        Condition::Placed(relation, _) => relation.is_of_view(),
+        Condition::Compared { order, .. } | Condition::Side { order, .. } => Order::is_of_view(*order),
+        _ => false,
+    }
+}

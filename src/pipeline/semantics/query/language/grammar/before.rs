@@ -1,0 +1,301 @@
+//! Words before a noun: "all", "two", "second largest", "its", "the kettle's".
+
+use super::after::after;
+use super::{Grammar, LONGEST_NOUN};
+use crate::pipeline::semantics::query::language::expression::{Expression, Order, SetOf};
+use crate::pipeline::semantics::query::language::tokens::{number, ordinal};
+use crate::pipeline::semantics::query::language::words::WordClass;
+use crate::pipeline::semantics::query::lexicon;
+use crate::scene::colors;
+use crate::scene::identity::name_words::{SceneWords, singular, written};
+
+/// Returns readings of the words from `i` to `j` as one set.
+pub(super) fn read(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
+    let end = trimmed(g, i, j);
+    if end < j {
+        return g.set(i, end, false).to_vec();
+    }
+    let mut found = owned(g, i, j);
+    let amount = singular(g.words[i]);
+    let is_amount = g.vocabulary.is(WordClass::Amount, &amount) && !matches!(amount.as_str(), "one" | "all");
+    if !(is_amount && g.words.get(i + 1) == Some(&"of") && g.known.with(&amount).is_empty()) {
+        found.extend(nouns(g, i, j));
+    }
+    if !found.is_empty() && quantified_first(g, i) {
+        // A name such as "left stick" goes before the left one of the sticks.
+        found.extend(quantified(g, i, j));
+        return found;
+    }
+    let mut quantified = quantified(g, i, j);
+    quantified.append(&mut found);
+    quantified
+}
+
+/// End of the words without phrases that exclude nothing, such as "in the scene".
+fn trimmed(g: &Grammar<'_>, i: usize, j: usize) -> usize {
+    let is_rest = |from: &usize| g.vocabulary.here(&g.words[*from..j]) == Some(j - from);
+    let named = |from: usize| (from..j).any(|k| g.known.has(g.words[k]) && !g.vocabulary.is(WordClass::NoName, g.words[k]));
+    (i + 1..j).find(is_rest).filter(|from| !named(*from)).unwrap_or(if j - i > 1 && matches!(g.words[j - 1], "," | "?") { j - 1 } else { j })
+}
+
+/// Returns whether the words may be a name although they begin with a word such as "left".
+fn quantified_first(g: &Grammar<'_>, i: usize) -> bool {
+    g.known.has(g.words[i])
+}
+
+/// Reads "its lid", "the kettle's lid".
+fn owned(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
+    let mut found = Vec::new();
+    if matches!(g.words[i], "its" | "their") && i + 1 < j {
+        let plural = g.words[i] == "their";
+        for piece in g.set(i + 1, j, false).iter() {
+            let last = g.make(SetOf::Last { plural }, i, i + 1);
+            found.push(g.make(SetOf::PartOf(Box::new(piece.clone()), Box::new(last)), i, j));
+        }
+    }
+    for p in (i + 1..j.saturating_sub(1)).rev().filter(|p| g.words[*p] == "'s").collect::<Vec<_>>() {
+        let (whole, piece) = (g.set(i, p, false), g.set(p + 1, j, true));
+        for (whole, piece) in super::pairs(&whole, &piece) {
+            // What follows the piece is said of the piece.
+            found.push(within(piece, &whole, g.at(i, j)));
+        }
+    }
+    found
+}
+
+/// Returns a set restricted to parts of a whole, its noun first: "the kettle's largest part".
+fn within(piece: Expression, whole: &Expression, at: std::ops::Range<usize>) -> Expression {
+    let inner = |of: Box<Expression>| Box::new(within(*of, whole, at.clone()));
+    let set = match piece.set {
+        SetOf::Ranked { of, order, most, first, count, superlative } => {
+            SetOf::Ranked { of: inner(of), order, most, first, count, superlative }
+        }
+        SetOf::Where { of, is, not } => SetOf::Where { of: inner(of), is, not },
+        SetOf::Counted { of, count } => SetOf::Counted { of: inner(of), count },
+        SetOf::Every { of, both } => SetOf::Every { of: inner(of), both },
+        SetOf::Nearest { of, to, far, first, count } => SetOf::Nearest { of: inner(of), to, far, first, count },
+        SetOf::Union { of, either } => {
+            SetOf::Union { of: of.into_iter().map(|e| within(e, whole, at.clone())).collect(), either }
+        }
+        other => SetOf::PartOf(Box::new(Expression::new(other, piece.at)), Box::new(whole.clone())),
+    };
+    Expression::new(set, at)
+}
+
+/// Reads determiners, numbers, orders and pronouns.
+fn quantified(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
+    let word = g.words[i];
+    if let Some(id) = word.strip_prefix('#').and_then(|n| n.parse().ok()).filter(|_| i + 1 == j) {
+        return vec![g.make(SetOf::Numbered(id), i, j)];
+    }
+    let last = |plural| SetOf::Last { plural };
+    match &g.words[i..j] {
+        ["it" | "this" | "that"] | ["this" | "that", "one"] => return vec![g.make(last(false), i, j)],
+        ["them" | "they" | "these" | "those"] | ["these" | "those", "ones"] => return vec![g.make(last(true), i, j)],
+        ["the", "others"] | ["others"] | ["the", "rest"] => {
+            let kin = g.make(SetOf::Kin { plural: true }, i, j);
+            return vec![g.make(SetOf::Other(Box::new(kin)), i, j)];
+        }
+        _ => {}
+    }
+    let after_of = |g: &Grammar<'_>, k: usize| if g.words.get(k) == Some(&"of") { k + 1 } else { k };
+    let wrap = |g: &mut Grammar<'_>, from: usize, make: &dyn Fn(Box<Expression>) -> SetOf| -> Vec<Expression> {
+        let inner = g.set(from, j, false);
+        inner.iter().map(|e| g.make(make(Box::new(e.clone())), i, j)).collect()
+    };
+    if g.is(WordClass::All, i) && i + 1 < j {
+        let both = word == "both";
+        return wrap(g, after_of(g, i + 1), &|of| SetOf::Every { of, both });
+    }
+    if matches!(word, "only" | "just" | "the" | "exactly") && i + 1 < j || g.is(WordClass::Determiner, i) && i + 1 < j {
+        return g.set(i + 1, j, false).to_vec();
+    }
+    if word == "other" && i + 1 < j {
+        return wrap(g, i + 1, &SetOf::Other);
+    }
+    if word == "another" && i + 1 < j {
+        return wrap(g, i + 1, &|of| SetOf::One(Box::new(Expression::new(SetOf::Other(of), 0..0))));
+    }
+    let amount = singular(word);
+    if g.vocabulary.is(WordClass::Amount, &amount) && g.words.get(i + 1) == Some(&"of") && i + 2 < j {
+        let two = matches!(amount.as_str(), "pair" | "couple");
+        return match (two, is_plural(word)) {
+            (true, _) => wrap(g, i + 2, &|of| SetOf::Counted { of, count: 2 }),
+            (false, true) => wrap(g, i + 2, &|of| SetOf::Every { of, both: false }),
+            (false, false) => g.set(i + 2, j, false).to_vec(),
+        };
+    }
+    if let Some(count) = number(word).filter(|n| (1.0..=99.0).contains(n) && n.fract() == 0.0).filter(|_| i + 1 < j) {
+        let count = count as usize;
+        let from = after_of(g, i + 1);
+        if count == 1 {
+            // "One of the mugs" is any of them; "the one of the house" is a piece of it.
+            let of_several = from == i + 1 || g.set(from, j, false).iter().any(Expression::is_plural);
+            return if of_several { wrap(g, from, &SetOf::One) } else { Vec::new() };
+        }
+        return wrap(g, from, &|of| counted(of, count));
+    }
+    if g.is(WordClass::Any, i) && i + 1 < j && word != "one" {
+        return wrap(g, after_of(g, i + 1), &SetOf::One);
+    }
+    ranked(g, i, j)
+}
+
+/// Returns a number of a set: of the largest ones, the first so many.
+fn counted(of: Box<Expression>, number: usize) -> SetOf {
+    match of.set {
+        SetOf::Ranked { of, order, most, first, count: 1, superlative } => {
+            SetOf::Ranked { of, order, most, first, count: number, superlative }
+        }
+        SetOf::Nearest { of, to, far, first, count: 1 } => SetOf::Nearest { of, to, far, first, count: number },
+        _ => SetOf::Counted { of, count: number },
+    }
+}
+
+/// Reads "second largest", "third from the left", "largest two", "largest of the".
+fn ranked(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
+    let (first, at) = match ordinal(g.words[i]) {
+        Some(n) if i + 1 < j => (n, i + 1),
+        _ => (1, i),
+    };
+    if at > i && g.vocabulary.order(g.words[at]).is_none() {
+        let found = from_a_side(g, first, at, i, j);
+        if !found.is_empty() || first < 2 {
+            return found;
+        }
+        let of = g.set(at, j, false).to_vec();
+        return of.into_iter().map(|of| g.make(SetOf::Nth { of: Box::new(of), nth: first }, i, j)).collect();
+    }
+    let Some(choice) = g.vocabulary.order(g.words[at]).filter(|_| first > 0) else { return Vec::new() };
+    let mut from = at + 1;
+    let mut count = 1;
+    if let Some(n) = g.words.get(from).and_then(|w| number(w)).filter(|n| (2.0..=99.0).contains(n) && n.fract() == 0.0) {
+        (count, from) = (n as usize, from + 1);
+    }
+    if matches!(g.words.get(from), Some(&("one" | "ones"))) && matches!(g.words.get(from + 1), Some(&("of" | "from" | "in"))) {
+        from += 1;
+    }
+    if matches!(g.words.get(from), Some(&("of" | "among" | "amongst"))) {
+        from += 1;
+    }
+    let near = matches!(choice.order, Order::Distance) && g.words.get(from) == Some(&"to");
+    if near {
+        return Vec::new();
+    }
+    let make = |of: Expression, g: &Grammar<'_>| {
+        let first = first.saturating_sub(1);
+        let (order, most, superlative) = (choice.order, choice.most, choice.superlative || first > 0);
+        g.make(SetOf::Ranked { of: Box::new(of), order, most, first, count, superlative }, i, j)
+    };
+    if from >= j {
+        // "The largest": of all things.
+        return if from == j && choice.superlative {
+            let any = g.make(SetOf::Any { parts: false, plural: true }, i, j);
+            vec![make(any, g)]
+        } else {
+            Vec::new()
+        };
+    }
+    let inner = g.set(from, j, false);
+    inner.iter().map(|of| make(of.clone(), g)).collect()
+}
+
+/// Reads "third book from the left".
+fn from_a_side(g: &mut Grammar<'_>, nth: usize, from: usize, i: usize, j: usize) -> Vec<Expression> {
+    let found = (from + 1..j.saturating_sub(2)).find(|p| matches!(g.words[*p..*p + 2], ["from", "the"]));
+    let Some(at) = found else { return Vec::new() };
+    let (order, most) = match g.words[at + 2] {
+        "left" => (Order::Right, false),
+        "right" => (Order::Right, true),
+        "top" => (Order::Up, true),
+        "bottom" => (Order::Up, false),
+        "front" => (Order::Distance, false),
+        "back" => (Order::Distance, true),
+        _ => return Vec::new(),
+    };
+    let (most, first) = if nth == 0 { (!most, 0) } else { (most, nth - 1) };
+    // What follows is said of all of them.
+    let tokens = (from..at).chain(at + 3..j).map(|k| g.tokens[k]).collect();
+    let inner = g.of(tokens).all();
+    let make = |of: &Expression| SetOf::Ranked { of: Box::new(of.clone()), order, most, first, count: 1, superlative: true };
+    inner.iter().map(|of| g.make(make(of), i, j)).collect()
+}
+
+/// Reads a noun with what stands after it.
+fn nouns(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
+    let mut found = Vec::new();
+    for k in (i + 1..=j).rev() {
+        let Some(noun) = noun(g, i, k) else { continue };
+        found.extend(after(g, &noun, i, k, j, false));
+    }
+    found
+}
+
+/// Returns the words from `i` to `k` as a noun with adjectives before it.
+fn noun(g: &Grammar<'_>, i: usize, k: usize) -> Option<Expression> {
+    if k - i > 1 && let Some(name) = g.whole_name(i, k) {
+        return Some(g.make(SetOf::Called(name), i, k));
+    }
+    let own = &g.words[i..k];
+    let last = *own.last()?;
+    let generic = singular(last);
+    if k - i == 1 && matches!(*own.last()?, "those" | "that") && matches!(g.words.get(k), Some(&("of" | "with" | "on" | "in" | "from" | "without"))) {
+        return Some(g.make(SetOf::Kin { plural: own[0] == "those" }, i, k));
+    }
+    // The last word may be a letter, such as "button a"; no name ends in "left" that does not say so.
+    let is_letter = k - i > 1 && last == "a" && g.known.has("a");
+    let own = if is_letter { &own[..own.len() - 1] } else { own };
+    if k - i > 1 && g.vocabulary.order(last).is_some() && !g.known.has(last) {
+        return None;
+    }
+    let of_none = |w: &str| g.vocabulary.is(WordClass::NoName, w) && !matches!(w, "everything" | "something" | "anything" | "all");
+    if k - i > LONGEST_NOUN || own.iter().any(|w| of_none(w)) || !own.iter().any(|w| w.chars().any(char::is_alphanumeric)) {
+        return None;
+    }
+    let is_named = !g.known.with(&generic).is_empty();
+    let plural = is_plural(last);
+    let everything = matches!(last, "everything" | "anything" | "whatever" | "stuff" | "all");
+    let single = k - i == 1;
+    let one = matches!(generic.as_str(), "one");
+    if single && !is_named && colors::row(last).is_some() {
+        let any = g.make(SetOf::Any { parts: false, plural: false }, i, k);
+        let is = super::super::expression::Condition::Adjective(vec![last.to_owned()]);
+        return Some(g.make(SetOf::Where { of: Box::new(any), is, not: false }, i, k));
+    }
+    let set = if one && !is_named {
+        SetOf::Kin { plural }
+    } else if g.vocabulary.is(WordClass::Thing, &generic) && !is_named {
+        SetOf::Any { parts: false, plural: plural || everything }
+    } else if g.vocabulary.is(WordClass::Part, &generic) && !is_named {
+        SetOf::Any { parts: true, plural }
+    } else {
+        let all = g.words[i..k].iter().flat_map(|w| spoken(w, g.known)).collect::<Vec<_>>();
+        let words = if all.is_empty() { vec![last.to_owned()] } else { all };
+        return Some(g.make(SetOf::Words { words, plural }, i, k));
+    };
+    let generic = g.make(set, k - 1, k);
+    if single {
+        return Some(generic);
+    }
+    // "Red things": adjectives of a generic word.
+    let adjectives = own[..own.len() - 1].iter().map(|w| (*w).to_owned()).collect();
+    let is = super::super::expression::Condition::Adjective(adjectives);
+    Some(g.make(SetOf::Where { of: Box::new(generic), is, not: false }, i, k))
+}
+
+/// Words of a name as they are compared: in the singular, in American spelling.
+pub(super) fn spoken(word: &str, known: &SceneWords) -> Vec<String> {
+    let plain = |w: String| {
+        if known.has(&w) {
+            return singular(&w);
+        }
+        let single = lexicon::singular_of(&w).map_or_else(|| singular(&w), str::to_owned);
+        lexicon::american(&single).map_or(single.clone(), str::to_owned)
+    };
+    written(word).map(plain).collect()
+}
+
+/// Returns whether a word is an English plural.
+pub(super) fn is_plural(word: &str) -> bool {
+    singular(word) != word || lexicon::singular_of(word).is_some_and(|single| single != word)
+}

@@ -1,0 +1,240 @@
+//! Forms of sentences: what is asked of a set, "how many", "is there", "which is taller".
+
+use super::Grammar;
+use crate::pipeline::semantics::query::language::expression::{Asks, Expression, Order, Sentence, SetOf};
+use crate::pipeline::semantics::query::language::tokens::{Token, is_mark};
+use crate::pipeline::semantics::query::language::words::Vocabulary;
+use crate::scene::{Identities, LevelFilter};
+
+/// Returns all readings of a text, the best first.
+pub(crate) fn sentences(text: &str, tokens: &[Token], identities: &Identities) -> Vec<Sentence> {
+    let tokens: Vec<&Token> = tokens.iter().collect();
+    let whole = Grammar::new(text, tokens.clone(), identities);
+    if let Some(name) = (!tokens.is_empty()).then(|| whole_text(&whole)).flatten() {
+        let set = whole.make(SetOf::Called(name), 0, tokens.len());
+        return vec![Sentence { asks: Asks::Things, set }];
+    }
+    let is_question = tokens.last().is_some_and(|t| t.low == "?");
+    let mut bare = tokens.as_slice();
+    while let [rest @ .., last] = bare
+        && (is_mark(&last.low) || matches!(last.low.as_str(), "please" | "thanks"))
+    {
+        bare = rest;
+    }
+    loop {
+        let words: Vec<&str> = bare.iter().map(|t| t.low.as_str()).collect();
+        let is_name = || !Grammar::new(text, bare.to_vec(), identities).named_at_start();
+        match Vocabulary::get().opener(&words).or((words.first() == Some(&",")).then_some(1)) {
+            Some(n) if n < bare.len() && is_name() => bare = &bare[n..],
+            _ => break,
+        }
+    }
+    let mut reader = SentenceReader { whole: Grammar::new(text, bare.to_vec(), identities), found: Vec::new() };
+    reader.read(is_question);
+    reader.found
+}
+
+fn whole_text(g: &Grammar<'_>) -> Option<String> {
+    let name = g.text.trim();
+    let is_said = g.tokens.len() > 1 || name.chars().any(|c| !c.is_alphanumeric());
+    (is_said && !g.identities.called(name, LevelFilter::Auto).is_empty()).then(|| name.to_owned())
+}
+
+impl Grammar<'_> {
+    /// Returns whether the first words are a whole name, such as "show piece".
+    fn named_at_start(&self) -> bool {
+        (2..=self.words.len().min(6)).any(|k| self.whole_name(0, k).is_some())
+    }
+}
+
+struct SentenceReader<'a> {
+    whole: Grammar<'a>,
+    found: Vec<Sentence>,
+}
+
+impl<'a> SentenceReader<'a> {
+    fn read(&mut self, is_question: bool) {
+        let words = self.whole.words.clone();
+        let n = words.len();
+        match words.as_slice() {
+            ["how", "many", ..] | ["what", "number", "of", ..] => {
+                let from = if words[0] == "how" { 2 } else { 3 };
+                self.count(from);
+            }
+            ["count" | "number", "of", ..] => self.count(2),
+            ["count", ..] => self.count(1),
+            ["is" | "are", "there", ..] => self.plain(Asks::Truth, 2, n),
+            ["do" | "can" | "could", "you" | "we" | "i", "see" | "have" | "find", ..] => self.plain(Asks::Truth, 3, n),
+            ["got" | "any", ..] if is_question || words[0] == "got" => self.plain(Asks::Truth, 1, n),
+            ["does" | "do", ..] => self.has(),
+            ["is" | "are", ..] => self.so(),
+            ["what", "color" | "colour" | "colors" | "colours", "is" | "are", ..] => self.plain(Asks::Colors, 3, n),
+            ["what", "is" | "are", "the", "color" | "colour" | "colors" | "colours", "of", ..] => {
+                self.plain(Asks::Colors, 5, n);
+            }
+            ["how", quantity, "is" | "are", ..] => {
+                if let Some(order) = self.whole.vocabulary.quantity(quantity) {
+                    self.plain(Asks::Size(order), 3, n);
+                }
+            }
+            ["what", "is" | "are", "the", quantity, "of", ..] if self.whole.vocabulary.quantity(quantity).is_some() => {
+                let order = self.whole.vocabulary.quantity(quantity).unwrap_or(Order::Length);
+                self.plain(Asks::Size(order), 5, n);
+            }
+            ["which" | "what" | "whatever" | "who", ..] => self.which(),
+            ["list" | "name" | "tell", ..] => {
+                let from = if words.get(1) == Some(&"me") { 2 } else { 1 };
+                self.plain(Asks::Names, from, n);
+            }
+            _ => {}
+        }
+        if self.found.is_empty() {
+            self.plain(Asks::Things, 0, n);
+        }
+    }
+
+    /// Reads words as a set.
+    fn plain(&mut self, asks: Asks, from: usize, to: usize) {
+        let tokens = self.whole.tokens.get(from..to).unwrap_or_default().to_vec();
+        self.of(asks, tokens);
+    }
+
+    fn of(&mut self, asks: Asks, tokens: Vec<&'a Token>) {
+        let sets = self.whole.of(tokens).all();
+        self.found.extend(sets.into_iter().map(|set| Sentence { asks, set }));
+    }
+
+    /// Reads "how many books are there on the table", "how many buttons does the controller have".
+    fn count(&mut self, from: usize) {
+        let tokens = self.whole.tokens[from..].to_vec();
+        let words = &self.whole.words[from..].to_vec();
+        if let Some(at) = words.iter().position(|w| matches!(*w, "does" | "do"))
+            && let [.., "have" | "contain" | "has"] = words.as_slice()
+            && at > 0
+        {
+            let (pieces, whole) = (&tokens[..at], &tokens[at + 1..tokens.len() - 1]);
+            let (pieces, wholes) = (self.whole.of(pieces.to_vec()).all(), self.whole.of(whole.to_vec()).all());
+            for (piece, whole) in super::pairs(&pieces, &wholes) {
+                let at = piece.at.start..whole.at.end;
+                let set = Expression::new(SetOf::PartOf(Box::new(piece), Box::new(whole)), at);
+                self.found.push(Sentence { asks: Asks::Count, set });
+            }
+            return;
+        }
+        let skip = [&["are", "there"][..], &["is", "there"], &["do", "you", "see"], &["can", "you", "see"], &["do", "i", "see"], &["can", "i", "see"]];
+        for phrase in skip {
+            let found = (1..words.len()).find(|at| words[*at..].starts_with(phrase));
+            if let Some(at) = found {
+                let rest = tokens[..at].iter().chain(&tokens[at + phrase.len()..]).copied().collect();
+                return self.of(Asks::Count, rest);
+            }
+        }
+        self.of(Asks::Count, tokens);
+    }
+
+    /// Reads "does the mug have a handle".
+    fn has(&mut self) {
+        let tokens = self.whole.tokens[1..].to_vec();
+        let at = self.whole.words.iter().skip(1).position(|w| matches!(*w, "have" | "contain"));
+        let Some(at) = at.filter(|at| *at > 0) else { return };
+        self.truth(tokens, at);
+    }
+
+    /// Reads "is the mug left of the kettle": any division into a thing and what is said of it.
+    fn so(&mut self) {
+        let is = self.whole.tokens[0];
+        let n = self.whole.tokens.len();
+        for at in 2..n {
+            let tokens = self.whole.tokens[1..at].iter().copied().chain([is]).chain(self.whole.tokens[at..].iter().copied());
+            self.truth(tokens.collect(), at - 1);
+            if !self.found.is_empty() {
+                return;
+            }
+        }
+    }
+
+    /// Reads a statement whose verb is word `at` as a question of its truth.
+    fn truth(&mut self, tokens: Vec<&'a Token>, at: usize) {
+        let verb = tokens[at].at.clone();
+        let subject = tokens[0].at.start;
+        for set in self.whole.of(tokens).all() {
+            // Something must be said of the subject, not of a thing within it.
+            let is_said = match &set.set {
+                SetOf::Where { of, .. } | SetOf::Ranked { of, .. } | SetOf::Nearest { of, .. } => {
+                    of.at.start >= subject.min(verb.start) && !matches!(set.set, SetOf::Ranked { first: 0, .. } if of.at.is_empty())
+                }
+                _ => false,
+            };
+            if is_said {
+                self.found.push(Sentence { asks: Asks::Truth, set });
+            }
+        }
+    }
+
+    /// Reads "what is on the table", "which mugs are red", "which is taller, the lamp or the kettle".
+    fn which(&mut self) {
+        let words = self.whole.words.clone();
+        let tokens = self.whole.tokens.clone();
+        let n = words.len();
+        let is_verb = |w: &str| matches!(w, "is" | "are" | "stands" | "stand" | "lies" | "lie" | "sits" | "sit" | "was" | "has" | "have");
+        if let Some(comma) = words.iter().rposition(|w| *w == ",").filter(|at| *at + 3 < n && words[at + 1..].contains(&"or")) {
+            // The choices follow: they are what is compared.
+            let verb = words[..comma].iter().position(|w| is_verb(w)).unwrap_or(0);
+            let choices = self.whole.of(tokens[comma + 1..].to_vec()).all();
+            let said: Vec<&Token> = tokens[verb + 1..comma].iter().copied().filter(|t| t.low != "one").collect();
+            for of in choices.iter().take(2) {
+                self.said_of(of, said.clone());
+            }
+            return;
+        }
+        if words.get(1) == Some(&"of") {
+            return self.plain(Asks::Names, 2, n);
+        }
+        if words.get(1).is_some_and(|w| *w == "else") && n > 2 {
+            return self.said_of_anything(2);
+        }
+        if words.get(1).is_some_and(|w| is_verb(w)) {
+            self.said_of_anything(1);
+            if self.found.is_empty() || matches!(words.get(2), Some(&("the" | "a" | "an"))) {
+                // "What is the tallest object": a set, unless that says nothing of a thing.
+                let before = self.found.len();
+                self.plain(Asks::Names, 2, n);
+                if self.found.len() > before {
+                    self.found.drain(..before);
+                }
+            }
+            return;
+        }
+        if words.get(1) == Some(&"parts") && words.get(2).is_some_and(|w| matches!(*w, "does" | "do")) && words[n - 1] == "have" {
+            let of = self.whole.of(tokens[3..n - 1].to_vec()).all();
+            for whole in of {
+                let parts = self.whole.make(SetOf::Any { parts: true, plural: true }, 1, 2);
+                let at = parts.at.start..whole.at.end;
+                let set = Expression::new(SetOf::PartOf(Box::new(parts), Box::new(whole)), at);
+                self.found.push(Sentence { asks: Asks::Names, set });
+            }
+            return;
+        }
+        self.plain(Asks::Names, 1, n);
+    }
+
+    /// Reads what is said of anything, from the verb on.
+    fn said_of_anything(&mut self, verb: usize) {
+        let any = self.whole.make(SetOf::Any { parts: false, plural: true }, 0, verb);
+        self.said_of(&any, self.whole.tokens[verb..].to_vec());
+    }
+
+    fn said_of(&mut self, noun: &Expression, tokens: Vec<&'a Token>) {
+        let mut rest = self.whole.of(tokens);
+        let n = rest.words.len();
+        let sets = super::after::after(&mut rest, noun, 0, 0, n, true);
+        let of_one = |mut set: Expression| {
+            // Of choices, the one that is more so.
+            if let (SetOf::Ranked { superlative, .. }, SetOf::Union { .. }) = (&mut set.set, &noun.set) {
+                *superlative = true;
+            }
+            Sentence { asks: Asks::Names, set }
+        };
+        self.found.extend(sets.into_iter().map(of_one));
+    }
+}

@@ -1,0 +1,85 @@
+//! Compounds, slips and names by the words of the demo's scene.
+
+use crate::pipeline::semantics::query::answer::QueryAnswer;
+use crate::pipeline::semantics::query::language::QueryPlace;
+use crate::pipeline::semantics::query::localize::Answer;
+use crate::pipeline::semantics::query::query_engine::ask_by_name;
+use crate::pipeline::semantics::query::reading::QueryReading;
+use crate::pipeline::semantics::query::recipe::QueryConfig;
+use crate::scene::{Identities, Level, LevelFilter, NO_IDENTITY};
+
+/// Returns the demo's scene, and the lists of questions.
+fn data() -> (Identities, toml::Table) {
+    let table: toml::Table =
+        include_str!("../../../../../tests/data/compounds_and_slips.toml").parse().expect("sound TOML");
+    let mut all = Identities::default();
+    for (object, parts) in table["scene"].as_table().expect("a table") {
+        let id = all.add(Level::Object, NO_IDENTITY, vec![object.clone()]);
+        for part in parts.as_array().expect("a list") {
+            all.add(Level::Part, id, vec![part.as_str().expect("a name").into()]);
+        }
+    }
+    (all, table)
+}
+
+fn rows<'a>(table: &'a toml::Table, list: &str) -> Vec<Vec<&'a str>> {
+    let texts = |row: &'a toml::Value| {
+        row.as_array().expect("a row").iter().map(|t| t.as_str().expect("a text")).collect::<Vec<_>>()
+    };
+    table[list].as_array().expect("a list").iter().map(texts).collect()
+}
+
+fn ask(all: &Identities, text: &str, level: LevelFilter) -> QueryAnswer {
+    ask_by_name(all, text, (level, &QueryPlace::default()), &QueryConfig::default()).expect("words")
+}
+
+fn summary(all: &Identities, text: &str) -> String {
+    let answered = ask(all, text, LevelFilter::Auto);
+    let first = answered.answer.hits().first().map(|h| all.full_name(h.identity)).unwrap_or_default();
+    match answered.answer {
+        Answer::Found(hits) if hits.len() > 1 => format!("all {} {first}", hits.len()),
+        Answer::Found(_) => first,
+        Answer::Ambiguous(_) => format!("ambiguous {first}"),
+        Answer::NotFound(_) => "not found".into(),
+    }
+}
+
+fn mended(all: &Identities, text: &str) -> Vec<(String, String)> {
+    QueryReading::new(all, text, &QueryConfig::default()).expect("words").mended
+}
+
+#[test]
+fn compounds_are_pieces_of_wholes_and_nothing_else_changes() {
+    let (all, table) = data();
+    let lists = [rows(&table, "compounds"), rows(&table, "kept")];
+    assert!(lists[0].len() >= 40);
+    let wrong = |row: &&Vec<&str>| summary(&all, row[0]) != row[1];
+    let wrong: Vec<String> =
+        lists.iter().flatten().filter(wrong).map(|r| format!("{}: {}, not {}", r[0], summary(&all, r[0]), r[1])).collect();
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    // The level that is asked for is respected.
+    assert!(ask(&all, "kettle spout", LevelFilter::Object).chosen(1).is_empty());
+}
+
+#[test]
+fn slips_are_mended_word_by_word_and_words_of_their_own_are_not() {
+    let (all, table) = data();
+    let (slips, own) = (rows(&table, "slips"), rows(&table, "own_words"));
+    assert!(slips.len() >= 40);
+    let mut wrong = Vec::new();
+    for row in &slips {
+        let said: Vec<String> = mended(&all, row[0]).iter().map(|(a, b)| format!("{a}={b}")).collect();
+        let mut wanted: Vec<&str> = row[2].split(' ').filter(|w| !w.starts_with("teh=") && !w.starts_with("hte=")).collect();
+        wanted.sort_by_key(|w| row[0].find(w.split('=').next().unwrap_or_default()));
+        if (said.join(" "), summary(&all, row[0])) != (wanted.join(" "), row[1].into()) {
+            wrong.push(format!("{}: {}, {}, not {row:?}", row[0], said.join(" "), summary(&all, row[0])));
+        }
+    }
+    for row in &own {
+        if !mended(&all, row[0]).is_empty() || summary(&all, row[0]) == row[1] {
+            wrong.push(format!("{}: mended {:?}, found {}", row[0], mended(&all, row[0]), summary(&all, row[0])));
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    assert!(rows(&table, "compounds").iter().all(|row| mended(&all, row[0]).is_empty()));
+}
