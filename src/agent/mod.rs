@@ -3,9 +3,10 @@
 //! Two nested loops, as in the paper. The outer one is a user's request ([`session::Session::say`]); the inner one is
 //! a sequence of calls that may change after each result. A [`planner::Planner`] proposes the next call:
 //! [`commands::Commands`], a small built-in command language, or [`llm::Llm`], any chat model behind an
-//! OpenAI-compatible address. Only a [`tool::ToolCall`] that passes [`execute::check`] is executed: the [`policy`]
-//! permits it, its target is in the scene and unambiguous, it does not conflict with the facts of the scene, and the
-//! user has confirmed it if it is destructive. Names in the scene and the user's words are data throughout.
+//! OpenAI-compatible address. A program that plans by itself makes its calls through [`mcp`]. Only a
+//! [`tool::ToolCall`] that passes [`execute::check`] is executed: the [`policy`] permits it, its target is in the scene
+//! and unambiguous, it does not conflict with the facts of the scene, and the user has confirmed it if it is
+//! destructive. Names in the scene and the user's words are data throughout.
 //!
 //! The scene is a [`world::World`]: [`scene::SceneWorld`] for the window and the command line, a synthetic room for
 //! tests.
@@ -25,6 +26,7 @@ pub mod execute;
 mod language;
 mod listing;
 pub mod llm;
+pub mod mcp;
 pub(crate) mod names;
 pub mod planner;
 pub(crate) mod policy;

@@ -101,8 +101,35 @@ impl Session {
     ) -> Reply {
         let text = self.planner.redact(text);
         self.transcript.add(What::User { text: text.chars().take(2 * MAX_CHARS).collect() });
-        let mut sink = ProgressSink { on, cancel };
-        let mut reply = self.answer(world, &text, &mut sink);
+        let reply = self.answer(world, &text, &mut ProgressSink { on, cancel });
+        self.concluded(world, reply)
+    }
+
+    /// Carries out a call that somebody else has planned, with the checks of all calls. It drops an open question.
+    pub fn call(
+        &mut self,
+        world: &mut dyn World,
+        call: ToolCall,
+        on: &mut dyn FnMut(AgentEvent),
+        cancel: &AtomicBool,
+    ) -> Reply {
+        if self.pending.take().is_some() {
+            self.note("no yes", "The open question is dropped: a call was made instead.");
+        }
+        self.dialog.marked.clear();
+        self.dialog.isolated.clear();
+        let reply = if cancel.load(Ordering::Relaxed) {
+            self.ended(&[], Refusal::new(RefusalKind::Stopped, "Stopped."))
+        } else {
+            match self.attempt(world, call, &mut ProgressSink { on, cancel }) {
+                Ok(outcome) => self.finished(&[outcome], String::new(), None),
+                Err(reply) => *reply,
+            }
+        };
+        self.concluded(world, reply)
+    }
+
+    fn concluded(&mut self, world: &mut dyn World, mut reply: Reply) -> Reply {
         if self.pending.is_none() {
             world.carry_out();
         }
@@ -318,7 +345,8 @@ impl Session {
         Reply { text: text.into(), ..Reply::default() }
     }
 
-    fn refuse(&mut self, kind: RefusalKind, text: &str) -> Reply {
+    /// Refuses a request for a reason of the caller's.
+    pub(super) fn refuse(&mut self, kind: RefusalKind, text: &str) -> Reply {
         self.note("refused", text);
         Reply { text: text.into(), refused: Some(Refusal::new(kind, text)), ..Reply::default() }
     }

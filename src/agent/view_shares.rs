@@ -30,6 +30,15 @@ pub struct AgentScene {
     pub explored: Option<Arc<Explored>>,
 }
 
+impl AgentScene {
+    /// Indices of the Gaussians without the `hidden` ones; `None` if nothing is hidden.
+    pub(super) fn drawn(&self, hidden: &[bool]) -> Option<Vec<usize>> {
+        let of = &self.map.identity_of;
+        let is_drawn = |i: &usize| of.get(*i).is_none_or(|id| hidden.get(*id as usize) != Some(&true));
+        hidden.contains(&true).then(|| (0..self.cloud.len()).filter(is_drawn).collect())
+    }
+}
+
 /// Longer side of the picture in which pixels of identities are counted, in px.
 const COUNT_SIDE_PX: f64 = 256.0;
 
@@ -61,12 +70,9 @@ fn count(parts: &AgentScene, eye: Pose, aspect: f64, hidden: &[bool]) -> Vec<f64
     let [w, h] = [aspect.min(1.0), 1.0 / aspect.max(1.0)].map(|s| (COUNT_SIDE_PX * s).max(1.0) as u32);
     let (camera, identities) = (eye.camera(w, h), &map.identities);
     let mut shares = vec![0.0; identities.len() + 1];
-    let view = if hidden.contains(&true) {
-        let is_kept = |i: &usize| map.identity_of.get(*i).is_none_or(|id| hidden.get(*id as usize) != Some(&true));
-        let kept: Vec<usize> = (0..cloud.len()).filter(is_kept).collect();
-        query::identities_in_view((&cloud.select(&kept), settings), &map.select(&kept), &camera)
-    } else {
-        query::identities_in_view((cloud, settings), map, &camera)
+    let view = match parts.drawn(hidden) {
+        Some(kept) => query::identities_in_view((&cloud.select(&kept), settings), &map.select(&kept), &camera),
+        None => query::identities_in_view((cloud, settings), map, &camera),
     };
     // A view that cannot be rendered shows nothing.
     for id in view.map(|v| v.identity).unwrap_or_default() {

@@ -2,21 +2,16 @@
 
 use std::io::{BufRead, Read};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
 
 use serde_json::json;
 
-use super::agent_work::SceneWork;
-use super::recipe::RecipeArgs;
-use super::scene_args::open_scene;
-use super::{CliError, interrupt, number, output, view};
+use super::agent_scene::{AgentSceneArgs, AgentStage};
+use super::{CliError, interrupt, output};
 use crate::agent::commands::Commands;
 use crate::agent::llm::settings::{LlmSettings, RequestTimeouts};
 use crate::agent::llm::{Llm, SENT, discover};
-use crate::agent::scene::{AgentScene, Effect, SceneWorld};
-use crate::agent::{AgentEvent, Planner, Policy, Session};
-use crate::jobs::{export, render};
-use crate::navigate::Pose;
+use crate::agent::{AgentEvent, Planner, Session, World};
+use crate::jobs::export;
 
 const EXAMPLES: &str = "Examples:\n  \
     fmlgs agent scene/ \"show me the handle of the kettle from the other side\" \"step back half a meter\"\n  \
@@ -39,9 +34,6 @@ pub(crate) struct AgentArgs {
     scene: Option<PathBuf>,
     /// Requests, in order
     text: Vec<String>,
-    /// Photo to start from, by index or name, or a JSON camera file [default: the first photo]
-    #[arg(long)]
-    from: Option<String>,
     /// Planner that turns sentences into steps
     #[arg(long, value_enum, default_value_t = PlannerArg::Commands)]
     planner: PlannerArg,
@@ -60,23 +52,14 @@ pub(crate) struct AgentArgs {
     /// Test the connection to --model at --url, and end
     #[arg(long, conflicts_with = "scene", requires_all = ["url", "model"])]
     test_model: bool,
-    /// Policy file, which says what may be done [default: FMLGS_POLICY, else the built-in one]
-    #[arg(long)]
-    policy: Option<PathBuf>,
-    /// Length of a scene unit in meters [default: the scene's own, if that is known]
-    #[arg(long, value_parser = number::within(1e-9..=1e9))]
-    meters: Option<f64>,
     /// Write the image at the end
     #[arg(long)]
     view: Option<PathBuf>,
-    /// Write the whole conversation: .json, or .md to be read
-    #[arg(long)]
-    transcript: Option<PathBuf>,
     /// Print one JSON document
     #[arg(long)]
     json: bool,
     #[command(flatten)]
-    recipe: RecipeArgs,
+    agent: AgentSceneArgs,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -103,14 +86,6 @@ impl AgentArgs {
             PlannerArg::Commands => Box::new(Commands::default()),
             PlannerArg::Llm => Box::new(Llm::new(settings).map_err(|e| CliError::failed(e.to_string()))?),
         })
-    }
-
-    fn policy(&self) -> Result<Policy, CliError> {
-        let policy = match &self.policy {
-            Some(path) => Policy::load(path),
-            None => Policy::from_environment(),
-        };
-        policy.map_err(|e| CliError::failed(e.to_string()))
     }
 }
 
@@ -139,70 +114,36 @@ pub(crate) fn run(args: AgentArgs) -> Result<(), CliError> {
         let text = discover::test(&args.settings(), &RequestTimeouts::default(), interrupt::flag());
         return output::print(&text.map_err(CliError::failed)?);
     }
-    let (planner, policy) = (args.planner()?, args.policy()?);
+    let (planner, policy) = (args.planner()?, args.agent.policy()?);
     let folder = args.scene.as_deref().unwrap_or(Path::new(""));
-    let scene = open_scene(folder)?;
-    if let Some(view) = &args.view {
-        export::check(view, &[".png"], &scene.reads())?;
+    let mut stage = args.agent.open(folder, args.view.as_deref())?;
+    if !args.json && !stage.lines.is_empty() {
+        output::print(&stage.lines.join("\n"))?;
     }
-    if let Some(transcript) = &args.transcript {
-        export::check(transcript, &[".json", ".md"], &scene.reads())?;
-    }
-    let map = scene.semantics()?;
-    let lines = args.recipe.lines(&map);
-    if !args.json && !lines.is_empty() {
-        output::print(&lines.join("\n"))?;
-    }
-    let camera = view::choose(args.from.as_deref(), &scene)?;
-    let parts = AgentScene {
-        cameras: scene.views(),
-        up: scene.home().up,
-        cloud: scene.cloud,
-        settings: scene.settings,
-        map: Arc::new(map),
-        meters: args.meters.or(scene.meters_per_unit),
-        exports: folder.join("exports"),
-        folder: scene.folder.clone(),
-        recipe: args.recipe.recipe(),
-        explored: None,
-    };
-    let work = Arc::new(Mutex::new(SceneWork::new(&parts, scene.state)));
-    let emit = {
-        let work = Arc::clone(&work);
-        Box::new(move |effect: Effect| work.lock().unwrap_or_else(PoisonError::into_inner).carry_out(&effect))
-    };
-    let (cloud, settings) = (Arc::clone(&parts.cloud), parts.settings.clone());
-    let aspect = f64::from(camera.width_px) / f64::from(camera.height_px);
-    let world = SceneWorld::new(parts, Pose::of(&camera), aspect, emit);
-    let mut world = world.map_err(|e| CliError::failed(e.to_string()))?;
     let mut session = Session::new(policy, planner);
     let mut talk = Talk { json: args.json, ..Talk::default() };
     if args.text.is_empty() {
         let mut requests = Requests { input: std::io::stdin().lock(), line: 0 };
         while let Some(text) = requests.next()? {
             if !text.trim().is_empty() {
-                talk.say(&mut session, &mut world, &text, &work)?;
+                talk.say(&mut session, &mut stage, &text)?;
             }
         }
     }
     for text in &args.text {
-        talk.say(&mut session, &mut world, text, &work)?;
+        talk.say(&mut session, &mut stage, text)?;
     }
-    if let Some(path) = &args.transcript {
-        let json = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
-        let text = if json { session.transcript().to_json() } else { session.transcript().to_markdown() };
-        export::text(path, &text)?;
-    }
+    args.agent.write(session.transcript())?;
     if let Some(path) = &args.view {
-        let camera = world.eye().camera(camera.width_px, camera.height_px).limited_to(1280);
-        render::picture(path, &cloud, &camera, &settings)?;
+        let png = stage.world.picture(&stage.eye().limited_to(1280));
+        export::bytes(path, &png.map_err(|e| CliError::failed(e.to_string()))?)?;
     }
     if args.json {
         output::print_json(&json!({
-            "planner": session.planner(), "requests": talk.told, "recipe": args.recipe.recipe(),
+            "planner": session.planner(), "requests": talk.told, "recipe": args.agent.recipe(),
         }))?;
     }
-    if let Some(failure) = work.lock().unwrap_or_else(PoisonError::into_inner).failure.take() {
+    if let Some(failure) = stage.work().failure.take() {
         return Err(failure);
     }
     if let Some(question) = talk.open {
@@ -261,32 +202,24 @@ struct Talk {
 }
 
 impl Talk {
-    fn say(
-        &mut self,
-        session: &mut Session,
-        world: &mut SceneWorld,
-        text: &str,
-        work: &Mutex<SceneWork>,
-    ) -> Result<(), CliError> {
+    fn say(&mut self, session: &mut Session, stage: &mut AgentStage, text: &str) -> Result<(), CliError> {
         let mut calls = Vec::new();
         let mut on = |event| {
             if let AgentEvent::Call { line, .. } = event {
                 calls.push(line);
             }
         };
-        let reply = session.say(world, text, &mut on, interrupt::flag());
+        let reply = session.say(&mut stage.world, text, &mut on, interrupt::flag());
         if interrupt::asked_to_stop() {
             return Err(CliError::Cancelled("the conversation ends here".into()));
         }
-        let done = std::mem::take(&mut work.lock().unwrap_or_else(PoisonError::into_inner).done);
+        let done = std::mem::take(&mut stage.work().done);
         self.refused = reply.refused.as_ref().map(|r| r.text.clone());
         self.open = reply.pending.map(|_| reply.text.clone());
         if self.json {
             let refused = reply.refused.as_ref().map(|r| json!({ "kind": format!("{:?}", r.kind), "text": r.text }));
-            let names = reply.candidates.iter().map(|id| {
-                use crate::agent::World;
-                world.identities().full_name(*id)
-            });
+            let all = stage.world.identities();
+            let names = reply.candidates.iter().map(|id| all.full_name(*id));
             self.told.push(json!({
                 "request": text,
                 "calls": calls,

@@ -5,6 +5,7 @@
 //! error. Exit codes are listed in `EXIT_CODES`.
 
 mod agent;
+mod agent_scene;
 mod agent_work;
 mod batch;
 mod bench;
@@ -24,6 +25,7 @@ mod generate;
 mod idle;
 mod info;
 mod interrupt;
+mod mcp;
 mod models;
 mod number;
 mod output;
@@ -88,6 +90,7 @@ Examples:
   fmlgs path scene/ --to \"the lid of the kettle\" --out path.json
   fmlgs render scene/ --path path.json --out video.mp4
   fmlgs agent scene/ \"what is on the table?\"
+  fmlgs mcp scene/                      let an AI assistant look around in it (Model Context Protocol)
   fmlgs export scene/ --out scene.ply   for any other splat viewer
   fmlgs batch jobs.toml --shard 1/4     many scenes, settings and seeds, on many machines
   fmlgs serve scene/                    show it to a window on another computer (fmlgs connect)
@@ -131,6 +134,7 @@ enum Command {
     Edit(edit::EditArgs),
     Path(path::PathArgs),
     Agent(agent::AgentArgs),
+    Mcp(mcp::McpArgs),
     Serve(serve::ServeArgs),
     Connect(connect::ConnectArgs),
     Synth(synth::SynthArgs),
@@ -217,6 +221,7 @@ fn run(cli: Cli, open_window: OpenWindow) -> Result<(), CliError> {
         Command::Edit(args) => edit::run(args, quiet),
         Command::Path(args) => path::run(args),
         Command::Agent(args) => agent::run(args),
+        Command::Mcp(args) => mcp::run(args, quiet),
         Command::Serve(args) => serve::run(args, quiet),
         Command::Connect(args) if args.headless => connect::run(args, quiet),
         Command::Connect(args) => window(vec![Start::Remote(args.url_for_window()?)], overrides, open_window),

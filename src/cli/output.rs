@@ -28,6 +28,11 @@ pub(crate) fn print_json(value: &impl Serialize) -> Result<(), CliError> {
     print(&text::json(&serde_json::to_string_pretty(value)?))
 }
 
+/// Prints a message of a protocol, which is JSON on one line.
+pub(crate) fn print_message(json: &str) -> Result<(), CliError> {
+    print(&text::json(json))
+}
+
 /// Prints a message to standard error. Errors of writing are ignored: a closed reader ends no work.
 pub(crate) fn note(text: &str) {
     let _ = writeln!(std::io::stderr(), "{}", text::message(text));

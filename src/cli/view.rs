@@ -16,7 +16,7 @@ pub(crate) fn choose(wanted: Option<&str>, scene: &Scene) -> Result<Camera, CliE
         }
         return Ok(scene.home().camera([640, 480]));
     };
-    if let Some(camera) = of_photo(wanted, &scene.cameras)? {
+    if let Some(camera) = of_photo(wanted, &scene.cameras).map_err(CliError::failed)? {
         return Ok(camera);
     }
     let path = Path::new(wanted);
@@ -34,7 +34,8 @@ pub(crate) fn choose(wanted: Option<&str>, scene: &Scene) -> Result<Camera, CliE
     Err(CliError::failed(format!("no photo and no file is called '{wanted}'. {known}")))
 }
 
-fn of_photo(wanted: &str, cameras: &[SceneCamera]) -> Result<Option<Camera>, CliError> {
+/// The camera of the photo `wanted`, by its index, its name or the end of that; an error if several end so.
+pub(super) fn of_photo(wanted: &str, cameras: &[SceneCamera]) -> Result<Option<Camera>, String> {
     if let Some(exact) = cameras.iter().find(|c| c.name == wanted) {
         return Ok(Some(exact.camera.clone()));
     }
@@ -45,7 +46,7 @@ fn of_photo(wanted: &str, cameras: &[SceneCamera]) -> Result<Option<Camera>, Cli
     match ends.as_slice() {
         [] => Ok(None),
         [one] => Ok(Some(one.camera.clone())),
-        [a, b, ..] => Err(CliError::failed(format!("'{wanted}' may be '{}' or '{}': give more of it", a.name, b.name))),
+        [a, b, ..] => Err(format!("'{wanted}' may be '{}' or '{}': give more of it", a.name, b.name)),
     }
 }
 

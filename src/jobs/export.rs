@@ -59,9 +59,12 @@ pub(crate) fn picture(path: &Path, pixels: &PhotoPixels) -> Result<(), IoError> 
 
 /// Writes a `.png` of `size_px` from raw samples, those of 16 bits in the machine's byte order.
 pub(crate) fn png(path: &Path, samples: &[u8], size_px: [u32; 2], color: ColorType) -> Result<(), IoError> {
-    atomic::write(path, |w| {
-        PngEncoder::new(w).write_image(samples, size_px[0], size_px[1], color.into()).map_err(std::io::Error::other)
-    })
+    atomic::write(path, |w| encode_png(w, samples, size_px, color))
+}
+
+/// Encodes a `.png` as [`png`] writes it.
+pub(super) fn encode_png(out: impl Write, samples: &[u8], size_px: [u32; 2], color: ColorType) -> std::io::Result<()> {
+    PngEncoder::new(out).write_image(samples, size_px[0], size_px[1], color.into()).map_err(std::io::Error::other)
 }
 
 /// Writes rows of values as a NumPy array of shape `[height, width]`.

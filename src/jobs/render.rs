@@ -9,8 +9,9 @@ use image::ColorType;
 use super::{JobError, Scene, export, plan, video};
 use crate::io::{IoError, camera_file, memory};
 use crate::pipeline::observer::{Observer, Severity};
+use crate::pipeline::video::{Marked, picture};
 use crate::render::{BackendChoice, Frame, RenderSettings, Renderer, normals};
-use crate::scene::{Camera, GaussianCloud};
+use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub(crate) enum Quantity {
@@ -66,16 +67,20 @@ pub(crate) fn run(
     Ok(Rendered { frame, backend: renderer.name().to_owned(), millis, sh_degree: settings.sh_degree, flat })
 }
 
-/// Draws the colors of Gaussians into a `.png`.
-pub(crate) fn picture(
-    path: &Path,
+/// Draws the colors of Gaussians as PNG, with these identities outlined.
+pub(crate) fn png(
     cloud: &Arc<GaussianCloud>,
     camera: &Camera,
     settings: &RenderSettings,
-) -> Result<(), JobError> {
-    let frame = Renderer::new().draw(cloud, camera, settings)?;
-    write(path, &frame, camera, Quantity::Picture)?;
-    Ok(())
+    (map, ids): (&SemanticMap, &[IdentityId]),
+) -> Result<Vec<u8>, JobError> {
+    let marked = Marked { map, ids, color: video::MARK, fill: 0 };
+    let pixels = picture(cloud, settings, camera, Some(marked), &mut Renderer::new())?;
+    let mut png = Vec::new();
+    let size = [camera.width_px, camera.height_px];
+    let encoded = export::encode_png(&mut png, pixels.as_flattened(), size, ColorType::Rgb8);
+    encoded.map_err(|e| JobError::Output(format!("the picture cannot be encoded: {e}")))?;
+    Ok(png)
 }
 
 pub(crate) fn camera(path: &Path) -> Result<Camera, IoError> {

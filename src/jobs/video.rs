@@ -13,7 +13,10 @@ use crate::pipeline::video::{self, Marked};
 use crate::render::{BackendChoice, RenderSettings, Renderer};
 use crate::scene::{Camera, CameraPath, GaussianCloud, IdentityId, SemanticMap};
 
-const MARK: [u8; 3] = [255, 64, 160];
+/// Color of marked identities.
+pub(super) const MARK: [u8; 3] = [255, 64, 160];
+/// Weight of that color inside their border in a video, of 8.
+const FILL: u32 = 3;
 
 /// A video to draw.
 #[derive(Clone, Debug)]
@@ -48,7 +51,7 @@ pub(crate) fn backend(wanted: BackendChoice, settings: &RenderSettings) -> Backe
 /// is left of the video then.
 pub(crate) fn run(request: VideoRequest, observer: &mut dyn Observer) -> Result<Video, JobError> {
     let VideoRequest { cloud, draw, cameras, marked, out, settings, backend } = request;
-    let marked = marked.as_ref().map(|(map, ids)| Marked { map, ids, color: MARK });
+    let marked = marked.as_ref().map(|(map, ids)| Marked { map, ids, color: MARK, fill: FILL });
     let choice = self::backend(backend, &draw);
     let mut renderer = Renderer::choose(choice, |why| observer.note(Severity::Warning, why))?;
     let start = Instant::now();

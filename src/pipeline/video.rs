@@ -10,14 +10,13 @@ use crate::io::video::{VideoFileError, VideoSettings, VideoSummary, VideoWriter}
 use crate::render::{DrawError, RenderSettings, Renderer};
 use crate::scene::{Camera, GaussianCloud, IdentityId, SemanticMap};
 
-/// Weight of the highlight color in a pixel, of 8.
-const MARK: u32 = 3;
-
 #[derive(Clone, Copy)]
 pub(crate) struct Marked<'a> {
     pub(crate) map: &'a SemanticMap,
     pub(crate) ids: &'a [IdentityId],
     pub(crate) color: [u8; 3],
+    /// Weight of the color inside the border, of 8.
+    pub(crate) fill: u32,
 }
 
 /// Reasons for which a video could not be made.
@@ -47,23 +46,34 @@ pub(crate) fn write(
     observer.proceed()?;
     let mut writer = VideoWriter::create(out.0, out.1)?;
     for (done, camera) in cameras.iter().enumerate() {
-        let mut pixels = renderer.draw_rgb8(cloud, camera, draw)?;
-        if let Some(marked) = marked.filter(|m| !m.ids.is_empty()) {
-            let Marked { map, ids, .. } = marked;
-            let view = ViewMap::render(renderer, cloud, &map.identity_of, &map.identities, camera, draw)?;
-            for id in ids {
-                let mask = view.mask(&map.identities, *id);
-                mark(&mut pixels, camera.width_px as usize, |i| mask.contains(i), marked.color);
-            }
-        }
-        writer.push(pixels.as_flattened())?;
+        writer.push(picture(cloud, draw, camera, marked, renderer)?.as_flattened())?;
         ticker.tick(done + 1, observer)?;
     }
     Ok(writer.finish()?)
 }
 
+/// Renders the scene from one camera.
+pub(crate) fn picture(
+    cloud: &Arc<GaussianCloud>,
+    draw: &RenderSettings,
+    camera: &Camera,
+    marked: Option<Marked<'_>>,
+    renderer: &mut Renderer,
+) -> Result<Vec<[u8; 3]>, DrawError> {
+    let mut pixels = renderer.draw_rgb8(cloud, camera, draw)?;
+    if let Some(marked) = marked.filter(|m| !m.ids.is_empty()) {
+        let Marked { map, ids, color, fill } = marked;
+        let view = ViewMap::render(renderer, cloud, &map.identity_of, &map.identities, camera, draw)?;
+        for id in ids {
+            let mask = view.mask(&map.identities, *id);
+            mark(&mut pixels, camera.width_px as usize, |i| mask.contains(i), color, fill);
+        }
+    }
+    Ok(pixels)
+}
+
 /// Tints the pixels of a mask, its border strongest.
-fn mark(pixels: &mut [[u8; 3]], width: usize, inside: impl Fn(usize) -> bool, color: [u8; 3]) {
+fn mark(pixels: &mut [[u8; 3]], width: usize, inside: impl Fn(usize) -> bool, color: [u8; 3], fill: u32) {
     let height = pixels.len() / width.max(1);
     for y in 0..height {
         for x in 0..width {
@@ -73,7 +83,7 @@ fn mark(pixels: &mut [[u8; 3]], width: usize, inside: impl Fn(usize) -> bool, co
             }
             let edge = x == 0 || y == 0 || x + 1 == width || y + 1 == height;
             let border = edge || [i - 1, i + 1, i - width, i + width].iter().any(|n| !inside(*n));
-            let weight = if border { 8 } else { MARK };
+            let weight = if border { 8 } else { fill };
             let mix = |c: usize| ((u32::from(pixels[i][c]) * (8 - weight) + u32::from(color[c]) * weight) / 8) as u8;
             pixels[i] = [mix(0), mix(1), mix(2)];
         }
@@ -123,8 +133,13 @@ mod tests {
 
     #[test]
     fn marks_are_strongest_at_their_border() {
-        let mut pixels = vec![[0; 3]; 49];
-        mark(&mut pixels, 7, |i| (1..6).contains(&(i % 7)) && (1..6).contains(&(i / 7)), [255, 0, 0]);
-        assert_eq!((pixels[0], pixels[8], pixels[24]), ([0; 3], [255, 0, 0], [95, 0, 0]));
+        let marked = |fill| {
+            let mut pixels = vec![[0; 3]; 49];
+            let inside = |i: usize| (1..6).contains(&(i % 7)) && (1..6).contains(&(i / 7));
+            mark(&mut pixels, 7, inside, [255, 0, 0], fill);
+            [0, 8, 24].map(|i| pixels[i])
+        };
+        assert_eq!(marked(3), [[0; 3], [255, 0, 0], [95, 0, 0]]);
+        assert_eq!(marked(0), [[0; 3], [255, 0, 0], [0; 3]], "an outline");
     }
 }

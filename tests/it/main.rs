@@ -27,6 +27,7 @@ mod gpu_common;
 mod io_formats;
 mod io_real_data;
 mod kills;
+mod mcp;
 mod model_catalog;
 mod model_fetch;
 mod networks;

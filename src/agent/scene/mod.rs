@@ -13,14 +13,14 @@ pub use super::view_shares::AgentScene;
 use super::view_shares::ViewShares;
 use super::world::{Arrival, IdentityFacts, Movement, QueryPlace, Unreachable, World, WorldError};
 use crate::jobs::query::QueryEngine;
-use crate::jobs::{export, export_splat};
+use crate::jobs::{export, export_splat, render};
 use crate::navigate::Pose;
 use crate::navigate::target::Side;
 use crate::pipeline::observer::Silent;
 use crate::pipeline::semantics::query::answer::QueryAnswer;
 use crate::pipeline::semantics::query::recipe::{MatchBy, QueryConfig};
 use crate::scene::undo::UndoHistory;
-use crate::scene::{Identities, IdentityId, LevelFilter, SemanticMap, text};
+use crate::scene::{Camera, Identities, IdentityId, LevelFilter, SemanticMap, text};
 
 /// Scene that the agent acts in.
 pub struct SceneWorld {
@@ -29,6 +29,7 @@ pub struct SceneWorld {
     eye: Pose,
     aspect: f64,
     hidden: Vec<bool>,
+    marked: Vec<IdentityId>,
     shares: ViewShares,
     done: UndoHistory<Before>,
     /// Last edit of the user, which the window can undo.
@@ -62,6 +63,7 @@ impl SceneWorld {
             eye,
             aspect,
             hidden: vec![false; n],
+            marked: Vec::new(),
             shares: ViewShares::default(),
             done: UndoHistory::default(),
             removing: Vec::new(),
@@ -102,6 +104,24 @@ impl SceneWorld {
     /// Camera pose.
     pub(crate) fn eye(&self) -> Pose {
         self.eye
+    }
+
+    /// Draws what is shown as PNG: without the hidden identities, with the marked ones outlined.
+    ///
+    /// # Errors
+    /// If it cannot be drawn.
+    pub(crate) fn picture(&self, camera: &Camera) -> Result<Vec<u8>, WorldError> {
+        let AgentScene { cloud, map, settings, .. } = &self.parts;
+        let (cloud, map) = match self.parts.drawn(&self.hidden) {
+            Some(kept) => (Arc::new(cloud.select(&kept)), Arc::new(map.select(&kept))),
+            None => (Arc::clone(cloud), Arc::clone(map)),
+        };
+        render::png(&cloud, camera, settings, (&map, &self.marked)).map_err(|e| WorldError(e.to_string()))
+    }
+
+    fn mark(&mut self, ids: &[IdentityId]) {
+        self.marked = ids.to_vec();
+        (self.emit)(Effect::Mark(ids.to_vec()));
     }
 
     /// Returns whether Gaussians of an identity or of any of its parts are drawn.
@@ -191,7 +211,7 @@ impl World for SceneWorld {
     }
 
     fn highlight(&mut self, ids: &[IdentityId]) -> Result<(), WorldError> {
-        (self.emit)(Effect::Mark(ids.to_vec()));
+        self.mark(ids);
         Ok(())
     }
 

@@ -52,7 +52,7 @@ pub(super) fn fly_to(
     match (problem, flight.map(|f| *f)) {
         (None, Some(Approach { view, target, flight })) => {
             let arrival = Arrival { distance: flight.length, in_view: view.covers };
-            (scene.emit)(Effect::Mark(vec![id]));
+            scene.mark(&[id]);
             fly(scene, flight, Some(target), format!("going to {name}"));
             Ok(arrival)
         }

@@ -87,12 +87,14 @@ fn without_stages(g: &Given<'_>, these: &[&str]) -> bool {
 
 pub(super) const RULES: &[Rule] = &[
     // How questions are answered.
-    rule(&["query", "segment", "eval", "batch eval", "agent"], &["tolerance"], |g| {
+    rule(&["query", "segment", "eval", "batch eval", "agent", "mcp"], &["tolerance"], |g| {
         when(!matches_codes(g), "without --match codes")
     }),
-    rule(&["query", "segment", "eval", "batch eval", "agent"], &["deviation", "canonical", "temperature"], |g| {
-        when(g.is("by", "names"), "with --by names, which compares no embeddings")
-    }),
+    rule(
+        &["query", "segment", "eval", "batch eval", "agent", "mcp"],
+        &["deviation", "canonical", "temperature"],
+        |g| when(g.is("by", "names"), "with --by names, which compares no embeddings"),
+    ),
     rule(&["query"], &["relevancy"], |g| when(!g.has("heat"), "without --heat")),
     rule(&["segment", "eval", "batch eval", "report"], &["relevancy"], |_| Some("here: no heat map is drawn")),
     rule(&["query"], &["views", "truth", "export"], |g| when(!g.has("phrases"), "without --phrases")),

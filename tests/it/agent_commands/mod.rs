@@ -2,7 +2,7 @@
 //! not understood, not there or ambiguous do nothing; 200 ordinary sentences against their verdicts.
 
 mod looks;
-mod stored;
+pub mod stored;
 
 use std::fmt::Write as _;
 use std::sync::atomic::AtomicBool;

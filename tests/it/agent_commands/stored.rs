@@ -8,7 +8,7 @@ use fmlgs::scene::Identities;
 use crate::cli_support::{Done, first_version, fmlgs, folder};
 
 /// Objects and parts by the scene's folder.
-fn stored(scene: &Path) -> Identities {
+pub fn stored(scene: &Path) -> Identities {
     let loaded = trained::load(scene).expect("a scene");
     let map = semantic_map::load(scene, loaded.state.as_deref(), &loaded.cloud).expect("readable");
     map.expect("objects").identities
