@@ -35,8 +35,9 @@ fn opened() -> (tempfile::TempDir, Scene) {
 }
 
 /// Questions with a wrong answer under a recipe.
-fn wrong(map: &SemanticMap, recipe: QueryConfig) -> Vec<String> {
+fn wrong(scene: &Scene, map: &SemanticMap, recipe: QueryConfig) -> Vec<String> {
     let mut engine = QueryEngine::new(map.language.as_ref(), recipe).expect("an engine");
+    engine.place = query::seen_from(scene, None);
     let mut wrong = Vec::new();
     for [text, verdict, what] in rows("questions") {
         let reading = engine.read(&map.identities, &text).expect("words");
@@ -44,7 +45,7 @@ fn wrong(map: &SemanticMap, recipe: QueryConfig) -> Vec<String> {
         let chosen = answered.chosen(1);
         let (ignored, unexplained) = engine.left_out(&map.identities, &reading, &answered);
         let told = match answered.answer {
-            Answer::Found(_) => map.identities.full_name(chosen[0]),
+            Answer::Found(_) => chosen.iter().map(|id| map.identities.full_name(*id)).collect::<Vec<_>>().join(" + "),
             Answer::Ambiguous(_) => chosen.len().to_string(),
             Answer::NotFound(_) => unexplained.join(" "),
         };
@@ -61,11 +62,11 @@ fn what_is_asked_of_the_demo_is_found_or_said_not_to_be_there() {
     let map = scene.semantics().expect("objects");
     assert!(map.language.is_some(), "an encoder has looked at it");
     for match_by in [MatchBy::Both, MatchBy::Names] {
-        let wrong = wrong(&map, QueryConfig { match_by, ..QueryConfig::default() });
+        let wrong = wrong(&scene, &map, QueryConfig { match_by, ..QueryConfig::default() });
         assert!(wrong.is_empty(), "{match_by}:\n{}", wrong.join("\n"));
     }
     // Control: where an answer may leave words out and the small encoder answers by itself, much is wrong.
-    let before = wrong(&map, QueryConfig { rejection: Rejection::Canonical, ..QueryConfig::default() });
+    let before = wrong(&scene, &map, QueryConfig { rejection: Rejection::Canonical, ..QueryConfig::default() });
     assert!(before.len() >= 20, "{}", before.join("\n"));
     // The best matches of the encoder are offered.
     let mut engine = QueryEngine::new(map.language.as_ref(), QueryConfig::default()).expect("an engine");

@@ -29,7 +29,7 @@ enum KnownAnswer {
     /// All of these.
     All(BTreeSet<String>),
     /// One of several, or nothing that can be understood: an honest program says so.
-    Open,
+    Open(BTreeSet<String>),
     Nothing,
 }
 
@@ -132,7 +132,7 @@ fn listed(scene: &Scene, file: &Path) -> Result<Vec<KnownQuestion>, JobError> {
         let truth = match row.verdict.as_str() {
             "found" => KnownAnswer::All(row.expect.iter().map(|n| plain(n)).collect()),
             "not found" => KnownAnswer::Nothing,
-            "open" => KnownAnswer::Open,
+            "open" => KnownAnswer::Open(row.expect.iter().map(|n| plain(n)).collect()),
             other => return Err(bad(format!("the verdict '{other}' is none of found, not found, open"))),
         };
         all.push(KnownQuestion { text: row.say, kind: row.kind, truth });
@@ -153,7 +153,7 @@ fn known(of: &Referring, names: &[TrueIdentity]) -> KnownQuestion {
     };
     let truth = match &of.truth {
         ReferringTruth::All(ids) => KnownAnswer::All(ids.iter().map(name).collect()),
-        ReferringTruth::OneOf(_) => KnownAnswer::Open,
+        ReferringTruth::OneOf(ids) => KnownAnswer::Open(ids.iter().map(name).collect()),
         ReferringTruth::Nothing => KnownAnswer::Nothing,
     };
     KnownQuestion { text: of.text.clone(), kind: format!("{:?}", of.kind), truth }
@@ -181,7 +181,11 @@ fn asked(scene: &Scene, map: &SemanticMap, questions: &[KnownQuestion], recipe: 
         let is_none = found.is_empty();
         let (right, wrong) = match &question.truth {
             KnownAnswer::All(truth) => (is_found && found == *truth, is_found && found != *truth),
-            KnownAnswer::Open => (is_open, is_found),
+            // "Is there a knob?" has an answer, whichever is meant.
+            KnownAnswer::Open(truth) => {
+                let all = question.kind == "Question" && found == *truth;
+                (is_open || all, is_found && !all)
+            }
             KnownAnswer::Nothing => (is_none, !is_none),
         };
         let kind = result.by_kind.entry(question.kind.clone()).or_default();
@@ -196,7 +200,7 @@ fn asked(scene: &Scene, map: &SemanticMap, questions: &[KnownQuestion], recipe: 
             let got = format!("{verdict}: {}", found.into_iter().collect::<Vec<_>>().join("; "));
             let wanted = match &question.truth {
                 KnownAnswer::All(truth) => truth.iter().cloned().collect::<Vec<_>>().join("; "),
-                KnownAnswer::Open => "open".to_owned(),
+                KnownAnswer::Open(_) => "open".to_owned(),
                 KnownAnswer::Nothing => "nothing".to_owned(),
             };
             let (text, kind) = (question.text.clone(), question.kind.clone());

@@ -5,7 +5,7 @@ use egui::{Align, Button, Color32, Layout, RichText, Ui};
 
 use super::bar::show_names;
 use super::pins::swatch;
-use super::{Asked, Queries, SearchedScene};
+use super::{Asked, Queries, SearchedScene, steps};
 use crate::math::format;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::query::answer::{Basis, Certainty};
@@ -39,13 +39,15 @@ pub(super) fn show(ui: &mut Ui, queries: &mut Queries, scene: SearchedScene<'_>,
         ui.colored_label(theme::warning(), text);
     }
     let shown = newest.shown(&queries.side().settings);
+    steps::show_said(ui, &newest);
     match (&newest.answered.answer, shown.first()) {
         (Answer::NotFound(_), None) if queries.side().is_settled(ui) => {
             show_nothing(ui, queries, &newest, scene.semantics);
         }
         (Answer::Ambiguous(_), Some(_)) if newest.chosen.is_none() => {
-            show_candidates(ui, queries, &newest, scene.semantics, cx);
+            show_several(ui, queries, &newest, scene.semantics, cx);
         }
+        (Answer::Found(_), Some(_)) if shown.len() > 1 => show_several(ui, queries, &newest, scene.semantics, cx),
         (_, Some(&target)) => show_target(ui, queries, &newest, target, scene, cx),
         _ => {}
     }
@@ -58,8 +60,8 @@ pub(super) fn show(ui: &mut Ui, queries: &mut Queries, scene: SearchedScene<'_>,
     }
 }
 
-/// Draws the choice among several hits.
-fn show_candidates(
+/// Draws several hits with their numbers: all that are meant, or a choice.
+fn show_several(
     ui: &mut Ui,
     queries: &mut Queries,
     newest: &Asked,
@@ -69,12 +71,19 @@ fn show_candidates(
     let shown = newest.shown(&queries.side().settings);
     ui.horizontal(|ui| {
         swatch(ui, queries.color_of(newest));
-        ui.strong("Which one?");
-        ui.weak(format!("{} fit equally.", shown.len()));
+        if matches!(newest.answered.answer, Answer::Ambiguous(_)) {
+            ui.strong("Which one?");
+            ui.weak(format!("{} fit equally.", shown.len()));
+        } else {
+            let (certainty, color, numbers) = certainty(newest);
+            ui.strong(format::things(shown.len(), "thing"));
+            ui.colored_label(color, certainty).on_hover_text(numbers);
+        }
     });
     let mut chosen = None;
-    for id in shown.iter().take(NAMED) {
-        if ui.small_button(cx.state.labels.full_name(&semantics.identities, *id)).clicked() {
+    for (id, n) in shown.iter().zip(1..).take(NAMED) {
+        let name = cx.state.labels.full_name(&semantics.identities, *id);
+        if ui.small_button(format!("{n}  {name}")).on_hover_text("Show this one").clicked() {
             chosen = Some(*id);
         }
     }
@@ -162,6 +171,10 @@ pub(super) fn in_short(
         (Answer::Ambiguous(_), Some(_)) if newest.chosen.is_none() => {
             Some((format!("{} fit", shown.len()), theme::warning(), "Which one? Unfold to choose.".to_owned()))
         }
+        (Answer::Found(_), Some(_)) if shown.len() > 1 => {
+            let (_, color, numbers) = certainty(&newest);
+            Some((format::things(shown.len(), "thing"), color, numbers))
+        }
         (_, Some(&target)) => {
             let name = state.labels.full_name(&semantics.identities, target);
             if state.is_empty(target) {
@@ -195,7 +208,9 @@ fn show_nothing(ui: &mut Ui, queries: &mut Queries, newest: &Asked, semantics: &
         ui.weak("Encoding the query\u{2026}");
         return;
     }
-    ui.colored_label(theme::warning(), nothing_text(newest, &semantics.identities));
+    if !steps::show_misunderstood(ui, newest) {
+        ui.colored_label(theme::warning(), nothing_text(newest, &semantics.identities));
+    }
     let [by_name, by_looks] = newest
         .answered
         .offers(NAMED)

@@ -5,7 +5,7 @@ use egui::{RichText, Ui};
 use strum::VariantArray;
 
 use super::card::Facts;
-use super::{Asked, Queries, settings, times};
+use super::{Asked, Queries, settings, steps, times};
 use crate::math::format;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::query::answer::Basis;
@@ -30,6 +30,8 @@ pub(crate) fn show(
     queries.wanted = true;
     match queries.side().live.clone() {
         Some(newest) => {
+            steps::show_said(ui, &newest);
+            steps::show_steps(ui, queries, &newest, semantics);
             show_hits(ui, queries, &newest, semantics, cx);
             if let Some(&target) = newest.shown(&queries.side().settings).first() {
                 let facts = queries.side_mut().facts_of(target, semantics, cloud);

@@ -16,6 +16,7 @@ mod pins;
 mod recipe;
 mod settings;
 mod side;
+mod steps;
 mod times;
 mod truth;
 
@@ -160,6 +161,12 @@ impl Queries {
             q.shown(&self.side().settings).into_iter().map(move |id| (id, Color32::from_rgb(r, g, b)))
         };
         self.all().flat_map(colored).collect()
+    }
+
+    /// Numbers of the things that the query in the field found together, from 1; none if it found one.
+    pub(super) fn numbers(&self) -> Vec<(IdentityId, usize)> {
+        let shown = self.side().live.as_ref().map(|q| q.shown(&self.side().settings)).unwrap_or_default();
+        if shown.len() < 2 { Vec::new() } else { shown.into_iter().zip(1..).collect() }
     }
 
     /// Identity maps of the current view, once drawn.

@@ -16,6 +16,9 @@ use crate::scene::{IdentityId, Mask, SemanticMap};
 use crate::ui::color_by::ColorBy;
 use crate::worker::Versioned;
 
+/// Most things with an outline each.
+const MOST_OUTLINES: usize = 24;
+
 /// State that the overlay was painted for.
 #[derive(Clone, PartialEq)]
 struct Painted {
@@ -112,7 +115,12 @@ impl QueryOverlay {
             None if mode == MatchMode::Relevancy => (*color, maps.of_answer(semantics, &q.answered, 1)),
             _ => (*color, union(ids)),
         };
-        let masks: Vec<([u8; 3], Mask)> = asked.iter().zip(&painted.shown).map(mask).collect();
+        // Things that were found together have an outline each.
+        let each = |(q, (color, ids)): (&&Asked, &([u8; 3], Vec<IdentityId>))| {
+            let is_apart = truth.is_none() && mode != MatchMode::Relevancy && (2..=MOST_OUTLINES).contains(&ids.len());
+            if is_apart { ids.iter().map(|id| (*color, union(&[*id]))).collect() } else { vec![mask((q, &(*color, ids.clone())))] }
+        };
+        let masks: Vec<([u8; 3], Mask)> = asked.iter().zip(&painted.shown).flat_map(each).collect();
         let lit = painted.lit.as_deref().map(|others| {
             let mut lit = union(others);
             masks.iter().for_each(|(_, mask)| lit.add(mask));

@@ -45,6 +45,9 @@ fn describes(all: &Evaluator<'_>, id: IdentityId, words: &[String], k: usize, he
     let identities = all.scene.identities;
     let known = identities.words();
     let word = &words[k];
+    if matches!(word.as_str(), "colored" | "coloured" | "color" | "very") && k > 0 {
+        return Some(1.0);
+    }
     let has = |id: IdentityId, word: &str| known.names(id).iter().flatten().any(|w| w == word);
     if let Some(color) = row(word) {
         // "Red controller button": the color is that of the controller.
@@ -93,7 +96,7 @@ pub(super) fn color_of(all: &Evaluator<'_>, id: IdentityId, color: usize) -> Opt
 /// Members that adjectives describe; "red or blue" are choices.
 pub(super) fn described(all: &mut Evaluator<'_>, found: Matches, words: &[String], not: bool, at: &Range<usize>) -> Outcome {
     let either = words.iter().any(|w| w == "or" || w == "nor");
-    let words: Vec<String> = words.iter().filter(|w| !JOINTS.contains(&w.as_str())).cloned().collect();
+    let words: Vec<String> = words.iter().filter(|w| !JOINTS.contains(&w.as_str()) && !matches!(w.as_str(), "colored" | "coloured")).cloned().collect();
     if let Some(strange) = words.iter().find(|w| class(all, w) == Adjective::Unknown) {
         let text = format!("\u{201c}{strange}\u{201d} is not understood here.");
         return Err(Unmet { words: vec![strange.clone()], near: found.ids(), ..all.unmet(Why::NotUnderstood, text, at) });

@@ -40,13 +40,18 @@ pub(super) fn filtered(
             };
             if several && !not {
                 // Which of the anchors is meant does not matter if only one has anything there.
-                let with_each = anchors[0].iter().map(|a| found.members.iter().filter(|m| share(m, *a).is_some_and(|s| s >= HOLDS[1])).map(|m| m.id).collect::<Vec<_>>());
+                let own = |m: &Member, a: IdentityId| identities.object_of(a) == identities.object_of(m.id);
+                let with_each = anchors[0].iter().map(|a| found.members.iter().filter(|m| !anchors[0].iter().any(|o| own(m, *o)) && share(m, *a).is_some_and(|s| s >= HOLDS[1])).map(|m| m.id).collect::<Vec<_>>());
                 let mut with_each: Vec<Vec<IdentityId>> = with_each.filter(|ids| !ids.is_empty()).collect();
                 with_each.dedup();
                 unclear |= with_each.len() > 1;
             }
             let holds = |m: &Member| {
-                let mut shares = anchors[0].iter().filter_map(|a| share(m, *a));
+                // "The stick behind the body": the body of the same thing, if it has one.
+                let whole = identities.object_of(m.id);
+                let own = |a: &IdentityId| *a != whole && identities.object_of(*a) == whole;
+                let has_own = several && anchors[0].iter().any(own);
+                let mut shares = anchors[0].iter().filter(|a| !has_own || own(a)).filter_map(|a| share(m, *a));
                 if all_of {
                     let least = shares.try_fold(1.0, |least: f64, s| Some(least.min(s)));
                     return least.filter(|_| !anchors[0].contains(&m.id)).unwrap_or(-1.0);
@@ -94,6 +99,7 @@ pub(super) fn filtered(
             order::compared(all, found, (*order, *more), &anchors[0], not, at)?
         }
         Condition::Measured { order, more, meters } => measured(all, found, (*order, *more != not, *meters), at)?,
+        Condition::Within { near, meters, .. } => within(all, found, (*near, *meters), &anchors[0], not, at)?,
         Condition::Among(_) => judged(found, not, |m| if anchors[0].contains(&m.id) { 1.0 } else { 0.0 }),
         Condition::Side { order, most } => order::on_side(all, found, (*order, *most != not), at)?,
     };
@@ -132,7 +138,7 @@ fn anchors(all: &mut Evaluator<'_>, is: &Condition) -> Result<[Vec<IdentityId>; 
         // The exact "bowl" may be a piece of the bowl that is meant.
         Condition::Placed(Relation::In, anchor) => [all.of_any_level(|all| all.inner(|all| all.set(anchor)))?.ids(), Vec::new()],
         Condition::Placed(_, anchor) | Condition::Among(anchor) => [ids(all, anchor)?, Vec::new()],
-        Condition::Compared { than, .. } => [ids(all, than)?, Vec::new()],
+        Condition::Compared { than: of, .. } | Condition::Within { of, .. } => [ids(all, of)?, Vec::new()],
         Condition::Between(a, b) => [ids(all, a)?, ids(all, b)?],
         Condition::Has(piece) => match ids(all, piece) {
             Ok(pieces) => [pieces, Vec::new()],
@@ -156,16 +162,38 @@ pub(super) fn judged(found: Matches, not: bool, share: impl Fn(&Member) -> f64) 
     found
 }
 
+/// Members within a length of one of several things, or beyond it of all.
+fn within(
+    all: &Evaluator<'_>,
+    found: Matches,
+    (near, meters): (bool, f64),
+    of: &[IdentityId],
+    not: bool,
+    at: &Range<usize>,
+) -> Outcome {
+    let scale = all.scene.place.meters.filter(|m| *m > 0.0).ok_or_else(|| no_scale(all, at))?;
+    let space = all.space(at)?;
+    let share = |m: &Member| {
+        let gaps = of.iter().filter(|id| **id != m.id).filter_map(|id| space.gap(m.id, *id));
+        let gap = gaps.fold(f64::INFINITY, f64::min) * scale;
+        let by = if near { meters - gap } else { gap - meters };
+        if !gap.is_finite() || by < 0.0 { 0.0 } else if by > 0.05 * meters { 1.0 } else { HOLDS[1] }
+    };
+    Ok(judged(found, not, share))
+}
+
+fn no_scale(all: &Evaluator<'_>, at: &Range<usize>) -> Unmet {
+    let text = "The length of a meter is not known in this scene, so nothing can be compared with a length.";
+    Unmet { words: vec![all.said(at).into()], ..all.unmet(Why::NotUnderstood, text, at) }
+}
+
 fn measured(
     all: &Evaluator<'_>,
     found: Matches,
     (order, more, meters): (Order, bool, f64),
     at: &Range<usize>,
 ) -> Outcome {
-    let Some(scale) = all.scene.place.meters.filter(|m| *m > 0.0) else {
-        let text = "The length of a meter is not known in this scene, so nothing can be compared with a length.";
-        return Err(Unmet { words: vec![all.said(at).into()], ..all.unmet(Why::NotUnderstood, text, at) });
-    };
+    let scale = all.scene.place.meters.filter(|m| *m > 0.0).ok_or_else(|| no_scale(all, at))?;
     let space = all.space(at)?;
     let value = |m: &Member| order::value(all, space, m.id, order).map(|v| v * scale);
     Ok(found.kept(|m| {

@@ -13,7 +13,7 @@ pub(crate) struct Member {
     pub(crate) id: IdentityId,
     /// Sureness from 0 to 1 that it belongs there.
     pub(crate) sure: f64,
-    /// Fit of the words: 0 for its whole name, 1 for a part of it, 2 for a kind of thing.
+    /// Fit of the words: 0 for its whole name, 1 for words of it, 2 for words of its wholes too, 3 for a kind of thing.
     pub(crate) rank: u8,
 }
 
@@ -159,7 +159,7 @@ impl<'a> Evaluator<'a> {
             SetOf::PartOf(piece, whole) => self.part_of(piece, whole, e)?,
             SetOf::Where { of, is, not } => match conditions::filtered(self, of, is, *not, &e.at) {
                 // "What is under the mug": the table.
-                Err(unmet) if unmet.why == Why::Nothing && !self.with_stages && of.is_any() => {
+                Err(unmet) if unmet.why == Why::Nothing && !self.with_stages && of.is_any() && matches!(is, Condition::Placed(..)) => {
                     self.with_stages = true;
                     let again = conditions::filtered(self, of, is, *not, &e.at);
                     self.with_stages = false;
@@ -259,8 +259,7 @@ impl<'a> Evaluator<'a> {
         // Things in or on a thing need not be parts of it: the candle on the cake.
         let lies = |s: &Space<'_>, m: &Member| {
             let share = |relation| wholes.members.iter().filter_map(|w| s.share(relation, m.id, w.id)).fold(0.0, f64::max);
-            let touches = (share(Relation::Touching) >= HOLDS[0]).then_some(HOLDS[1]);
-            Some(share(Relation::In)).filter(|share| *share >= HOLDS[0]).or(touches)
+            Some(share(Relation::In)).filter(|share| *share >= HOLDS[0])
         };
         let inside = self.space(&e.at).ok().map(|space| pieces.clone().kept(|m| lies(space, m)));
         match inside.filter(|found| !found.members.is_empty()) {

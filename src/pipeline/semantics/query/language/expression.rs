@@ -104,11 +104,6 @@ pub(crate) enum Order {
 }
 
 impl Order {
-    /// Returns whether the quantity is a length.
-    pub(crate) fn is_length(self) -> bool {
-        matches!(self, Self::Height | Self::Length | Self::Width | Self::Thickness)
-    }
-
     /// Returns whether the order depends on the view.
     pub(crate) fn is_of_view(self) -> bool {
         matches!(self, Self::Right | Self::Distance)
@@ -177,6 +172,8 @@ pub(crate) enum Condition {
     Compared { order: Order, more: bool, than: Inner },
     /// More or less than a length in meters.
     Measured { order: Order, more: bool, meters: f64 },
+    /// Nearer to, or farther from, a thing than a length in meters.
+    Within { near: bool, meters: f64, of: Inner },
     /// Of another set: "that are toys".
     Among(Inner),
     /// On one side of the middle of the picture: "the mugs on the left".
@@ -213,7 +210,9 @@ impl Expression {
     pub(crate) fn is_plural(&self) -> bool {
         match &self.set {
             SetOf::Words { plural, .. } | SetOf::Any { plural, .. } | SetOf::Kin { plural } | SetOf::Last { plural } => *plural,
-            SetOf::Called(_) | SetOf::Numbered(_) | SetOf::One(_) | SetOf::Nth { .. } => false,
+            SetOf::Called(name) => name.split_whitespace().next_back().is_some_and(|w| name_words::singular(&w.to_lowercase()) != w.to_lowercase()),
+            SetOf::Union { of, either: true } => of.iter().any(Self::is_plural),
+            SetOf::Numbered(_) | SetOf::One(_) | SetOf::Nth { .. } => false,
             SetOf::PartOf(of, _) | SetOf::Where { of, .. } | SetOf::Other(of) | SetOf::Except(of, _) => of.is_plural(),
             SetOf::Ranked { count, of, superlative, .. } => *count > 1 || (!superlative && of.is_plural()),
             SetOf::Nearest { count, .. } => *count > 1,

@@ -163,7 +163,8 @@ pub(crate) fn phrases(sentences: &[Sentence]) -> Vec<ParsedQuery> {
             SetOf::Where { of, is, .. } => {
                 collect(of, all);
                 match is {
-                    C::Placed(_, a) | C::Has(a) | C::Among(a) | C::Compared { than: a, .. } => collect(a, all),
+                    C::Placed(_, a) | C::Has(a) | C::Among(a) => collect(a, all),
+                    C::Compared { than: a, .. } | C::Within { of: a, .. } => collect(a, all),
                     C::Between(a, b) => {
                         collect(a, all);
                         collect(b, all);

@@ -7,6 +7,7 @@ use super::evaluate::{Evaluator, Matches, Member, Outcome, Unmet, Why};
 use crate::models;
 use crate::pipeline::semantics::query::lexicon::{self, Kinship};
 use crate::pipeline::semantics::query::parse::ParsedQuery;
+use crate::scene::colors::row;
 use crate::scene::identity::name_words;
 use crate::scene::{IdentityId, Level};
 
@@ -60,7 +61,7 @@ pub(super) fn any(all: &mut Evaluator<'_>, parts: bool) -> Matches {
 /// Identities that "one" may stand for: the candidates of the last question, else all whose name ends in the same
 /// word as the name of the last thing.
 pub(super) fn kin(all: &mut Evaluator<'_>, at: &Range<usize>) -> Outcome {
-    let talk = &all.scene.place.talk;
+    let talk = all.scene.place.talk.clone();
     if !talk.group.is_empty() {
         let there = talk.group.iter().copied().filter(|id| all.scene.is_there(*id));
         return Ok(Matches::new(there.map(member).collect()));
@@ -70,6 +71,9 @@ pub(super) fn kin(all: &mut Evaluator<'_>, at: &Range<usize>) -> Outcome {
     let heads: Vec<&String> = heads.collect();
     let like = |id: &IdentityId| known.names(*id).iter().any(|name| name.last().is_some_and(|w| heads.contains(&w)));
     let found: Vec<Member> = all.scene.identities.iter().map(|(id, _)| id).filter(|id| like(id) && all.accepts(*id)).map(member).collect();
+    if found.is_empty() && talk.last.is_empty() {
+        return Ok(any(all, false));
+    }
     if found.is_empty() {
         let unmet = all.unmet(Why::NotUnderstood, "I do not know what \u{201c}one\u{201d} refers to.", at);
         return Err(Unmet { words: vec![all.said(at).into()], ..unmet });
@@ -114,15 +118,20 @@ pub(super) fn words(all: &mut Evaluator<'_>, words: &[String], plural: bool, at:
 }
 
 fn by_words(all: &mut Evaluator<'_>, words: &[String]) -> Outcome {
-    let mut found = by_heads(all, words);
-    let kinds = by_kind(all, words, &found);
-    found.members.extend(kinds.members);
+    let found = by_heads(all, words);
     if !found.members.is_empty() {
         return Ok(found);
     }
+    // A thing of this name that is not so is another answer than a kind of it.
+    if words.last().is_none_or(|head| !has_head(all, head)) {
+        let kinds = by_kind(all, words);
+        if !kinds.members.is_empty() {
+            return Ok(kinds);
+        }
+    }
     // "The controller red": the color stands behind.
     match words {
-        [rest @ .., head, color] if crate::scene::colors::row(color).is_some() => {
+        [rest @ .., head, color] if row(color).is_some() => {
             let turned: Vec<String> = [color].into_iter().chain(rest).chain([head]).cloned().collect();
             Ok(by_heads(all, &turned))
         }
@@ -143,7 +152,9 @@ fn by_heads(all: &Evaluator<'_>, words: &[String]) -> Matches {
         } else if names.iter().any(|name| is_head(name, head))
             && let Some(sure) = adjectives::described_by(all, id, rest, head)
         {
-            found.push(Member { sure, ..member(id) });
+            // The "fruit bowl" is that rather than the bowl of it.
+            let own = rest.iter().all(|w| row(w).is_some() || names.iter().flatten().any(|n| n == w));
+            found.push(Member { sure, rank: if own { 1 } else { 2 }, ..member(id) });
         }
     }
     Matches::new(found)
@@ -154,11 +165,19 @@ fn by_heads(all: &Evaluator<'_>, words: &[String]) -> Matches {
 fn is_head(name: &[String], head: &str) -> bool {
     let thing = name.split(|w| w == "with" || w == "of").next().unwrap_or_default();
     let tells_apart = |w: &String| w.chars().count() == 1 || w.bytes().all(|b| b.is_ascii_digit());
-    thing.last().is_some_and(|w| w == head) || thing.iter().rev().find(|w| !tells_apart(w)).is_some_and(|w| w == head)
+    let at_a_side = |w: &String| matches!(w.as_str(), "front" | "back" | "rear" | "left" | "right" | "top" | "bottom" | "upper" | "lower");
+    thing.last().is_some_and(|w| w == head)
+        || thing.iter().rev().find(|w| !tells_apart(w) && !at_a_side(w)).is_some_and(|w| w == head)
+}
+
+/// Returns whether a thing of a name with this head is there.
+fn has_head(all: &Evaluator<'_>, head: &str) -> bool {
+    let known = all.scene.identities.words();
+    known.with(head).iter().any(|id| all.accepts(*id) && known.names(*id).iter().any(|name| is_head(name, head)))
 }
 
 /// Identities that are of the kind that the words name; of a whole and its pieces, the whole.
-fn by_kind(all: &mut Evaluator<'_>, words: &[String], named: &Matches) -> Matches {
+fn by_kind(all: &mut Evaluator<'_>, words: &[String]) -> Matches {
     let identities = all.scene.identities;
     let known = identities.words();
     let mut found: Vec<Member> = Vec::new();
@@ -172,7 +191,7 @@ fn by_kind(all: &mut Evaluator<'_>, words: &[String], named: &Matches) -> Matche
                 continue;
             };
             if let Some(sure) = adjectives::described_by(all, id, rest, &asked) {
-                found.push(Member { sure: sure.min(KIND), rank: 2, ..member(id) });
+                found.push(Member { sure: sure.min(KIND), rank: 3, ..member(id) });
                 told.push(match kinship {
                     Kinship::Same => format!("\u{201c}{asked}\u{201d} is another word for {name}."),
                     Kinship::KindOf => format!("A kind of {asked}: {name}."),
@@ -183,11 +202,15 @@ fn by_kind(all: &mut Evaluator<'_>, words: &[String], named: &Matches) -> Matche
             break;
         }
     }
-    found.retain(|m| !named.members.iter().any(|n| n.id == m.id));
+    // Of objects and parts of this kind, the objects.
+    let is_object = |m: &Member| identities.get(m.id).is_some_and(|i| i.level == Level::Object);
+    if found.iter().any(is_object) {
+        found.retain(is_object);
+    }
     let ids: Vec<IdentityId> = found.iter().map(|m| m.id).collect();
     found.retain(|m| !identities.ancestors(m.id).skip(1).any(|i| ids.contains(&i)));
     told.dedup();
-    if !found.is_empty() && named.members.is_empty() {
+    if !found.is_empty() {
         all.notes.extend(told.into_iter().take(4));
     }
     Matches::new(found)
@@ -224,7 +247,7 @@ fn not_there(all: &Evaluator<'_>, words: &[String], at: &Range<usize>) -> Unmet 
         let text = format!("No {head} here is \u{201c}{}\u{201d}. The nearest names: {}.", left.join(" "), near.join(", "));
         return Unmet { why, text, words: left, near: heads, at: at.clone() };
     }
-    let unknown: Vec<String> = words.iter().filter(|w| !known.has(w) && crate::scene::colors::row(w).is_none()).cloned().collect();
+    let unknown: Vec<String> = words.iter().filter(|w| !known.has(w) && row(w).is_none()).cloned().collect();
     let is_like = |word: &str| words.iter().any(|w| super::alike(word, w));
     let near = identities.iter().map(|(id, _)| id).filter(|id| all.scene.is_there(*id));
     let near: Vec<IdentityId> = near.filter(|id| known.names(*id).iter().flatten().any(|w| is_like(w))).take(6).collect();

@@ -35,7 +35,7 @@ pub(super) fn value(all: &Evaluator<'_>, space: &Space<'_>, id: IdentityId, orde
 /// Difference under which two values of an order count as equal.
 fn slack(space: &Space<'_>, id: IdentityId, order: Order, value: f64) -> f64 {
     match order {
-        Order::Up | Order::Right | Order::Distance => 0.1 * space.shapes.get(id).map_or(0.0, |s| s.bounds.radius()),
+        Order::Up | Order::Right | Order::Distance => 0.03 * space.shapes.get(id).map_or(0.0, |s| s.bounds.radius()),
         Order::Lightness => 0.02,
         _ => ALIKE * value.abs(),
     }

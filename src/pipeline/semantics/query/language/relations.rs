@@ -10,7 +10,7 @@ use crate::scene::shapes::{SampledShape, SeenShapes};
 use crate::scene::{Identities, IdentityId, Level};
 
 /// Share from which a relation holds for sure, and from which it is a guess (docs/notes/queries.md).
-pub(crate) const HOLDS: [f64; 2] = [0.9, 0.65];
+pub(crate) const HOLDS: [f64; 2] = [0.9, 0.75];
 
 /// Camera position, view direction and up direction of the scene, in world space.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -46,6 +46,14 @@ pub(super) fn after(g: &mut Grammar<'_>, noun: &Expression, i: usize, k: usize, 
         found.extend(further(g, noun, i, at + n, j));
         return if found.is_empty() && at + n == j { vec![noun.clone()] } else { found };
     }
+    while matches!(g.words[at], "somewhere" | "midway" | "halfway") && at + 1 < j {
+        at += 1;
+    }
+    at += match g.words[at..j] {
+        ["in", "between", ..] => 1,
+        ["in", "the", "space" | "middle" | "gap", "between" | "of", ..] if g.words[at + 3] == "between" => 3,
+        _ => 0,
+    };
     let rest = g.words[at..j].to_vec();
     match rest.as_slice() {
         ["does", "not", "have", ..] | ["do", "not", "have", ..] => having(g, at + 3, j, true, &mut add),
@@ -54,7 +62,23 @@ pub(super) fn after(g: &mut Grammar<'_>, noun: &Expression, i: usize, k: usize, 
         ["with" | "has" | "have" | "having" | "containing" | "holding" | "contains" | "holds" | "carrying", ..] => {
             having(g, at + 1, j, not, &mut add);
         }
+        ["belongs" | "belonging" | "belong", "to", ..] => {
+            for end in (at + 3..=j).rev() {
+                for whole in g.set(at + 2, end, true).to_vec() {
+                    add(g, Condition::Placed(Relation::PartOf, Box::new(whole)), not, end);
+                }
+            }
+        }
         ["without" | "lacking", ..] => having(g, at + 1, j, !not, &mut add),
+        ["whose", "color" | "colour", "is", ..] | ["in" | "of", "color" | "colour", ..] if rest.len() > 2 => {
+            let skip = if rest[0] == "whose" { 3 } else { 2 };
+            if let Some(color) = rest.get(skip).filter(|w| colors::row(w).is_some()) {
+                add(g, Condition::Adjective(vec![(*color).to_owned()]), not, at + skip + 1);
+            }
+        }
+        ["of" | "in", "any", "color" | "colour", "but" | "except", color, ..] if colors::row(color).is_some() => {
+            add(g, Condition::Adjective(vec![(*color).to_owned()]), !not, at + 5);
+        }
         ["between", ..] => {
             for end in (at + 4..=j).rev() {
                 for mid in at + 2..end - 1 {
@@ -115,7 +139,7 @@ pub(super) fn after(g: &mut Grammar<'_>, noun: &Expression, i: usize, k: usize, 
         }
     }
     found.extend(compared(g, noun, [i, at, j], not));
-    if said || not {
+    if said || not || noun.is_any() && colors::row(g.words[at]).is_some() {
         found.extend(predicate(g, noun, [i, at, j], not));
     }
     found
@@ -140,7 +164,7 @@ fn disagrees(g: &Grammar<'_>, noun: &Expression, verb: &str) -> bool {
     // A word such as "fruit" may be meant in the plural, if no thing is called so.
     let is_name = |word: String| g.known.with(&word).iter().any(|id| g.known.names(*id).iter().any(|n| n.last() == Some(&word)));
     let counts = noun.head().is_none_or(is_name);
-    let either = matches!(noun.set, SetOf::Any { .. } | SetOf::Kin { .. } | SetOf::Union { .. } | SetOf::Called(_) | SetOf::Except(..));
+    let either = matches!(noun.set, SetOf::Any { .. } | SetOf::Kin { .. } | SetOf::Union { .. } | SetOf::Except(..));
     match verb {
         "is" | "was" | "has" => !either && noun.is_plural(),
         "are" | "were" | "have" => !either && counts && !noun.is_plural(),
@@ -176,6 +200,17 @@ fn nearest_to_eye(noun: &Expression, far: bool) -> SetOf {
 fn compared(g: &mut Grammar<'_>, noun: &Expression, [i, at, j]: [usize; 3], not: bool) -> Vec<Expression> {
     let mut found = Vec::new();
     let from = if g.words[at] == "the" && at + 1 < j { at + 1 } else { at };
+    if let Some((order, more, n)) = said_at_length(g, from, j) {
+        let mut found = Vec::new();
+        for end in (from + n + 1..=j).rev() {
+            for than in g.set(from + n, end, true).to_vec() {
+                let is = Condition::Compared { order, more, than: Box::new(than) };
+                let made = g.make(SetOf::Where { of: Box::new(noun.clone()), is, not }, i, end);
+                found.extend(further(g, &made, i, end, j));
+            }
+        }
+        return found;
+    }
     let choice = g.vocabulary.order(g.words[from]);
     if let Some(choice) = choice.filter(|c| c.order == Order::Distance && !not) {
         let to = if matches!(g.words.get(from + 1), Some(&("to" | "from"))) { from + 2 } else { from + 1 };
@@ -199,6 +234,25 @@ fn compared(g: &mut Grammar<'_>, noun: &Expression, [i, at, j]: [usize; 3], not:
         let made = g.make(SetOf::Where { of: Box::new(noun.clone()), is, not }, i, end);
         found.extend(further(g, &made, i, end, j));
     };
+    let (near, skip) = match g.words[at..j] {
+        ["within", ..] => (true, 1),
+        ["at", "most", ..] => (true, 2),
+        ["at", "least", ..] => (false, 2),
+        ["no", "further" | "farther" | "more", "than", ..] => (true, 3),
+        ["closer" | "nearer" | "less", "than", ..] => (true, 2),
+        ["more" | "further" | "farther", "than", ..] => (false, 2),
+        _ => (true, 0),
+    };
+    if skip > 0 && let Some((meters, end)) = length(g, at + skip, j) {
+        let to = if g.words.get(end) == Some(&"away") { end + 1 } else { end };
+        if matches!(g.words.get(to), Some(&("of" | "from" | "to"))) {
+            for end in (to + 2..=j).rev() {
+                for anchor in g.set(to + 1, end, true).to_vec() {
+                    add(g, Condition::Within { near, meters, of: Box::new(anchor) }, not, end);
+                }
+            }
+        }
+    }
     if let Some(choice) = choice.filter(|_| g.words.get(from + 1) == Some(&"than")) {
         let (order, more) = (choice.order, choice.most);
         if let Some((meters, end)) = length(g, from + 2, j) {
@@ -227,6 +281,19 @@ fn compared(g: &mut Grammar<'_>, noun: &Expression, [i, at, j]: [usize; 3], not:
         add(g, Condition::Measured { order, more, meters }, not, end);
     }
     found
+}
+
+/// Reads "of greater size than", "less tall than": the quantity, whether more of it, and the number of words.
+fn said_at_length(g: &Grammar<'_>, from: usize, j: usize) -> Option<(Order, bool, usize)> {
+    let words = &g.words[from..j];
+    let skip = usize::from(matches!(words.first(), Some(&("of" | "with"))));
+    let (more, quantity) = match words.get(skip..)? {
+        ["greater" | "more" | "larger", quantity, "than", ..] => (true, quantity),
+        ["smaller" | "less" | "lesser", quantity, "than", ..] => (false, quantity),
+        _ => return None,
+    };
+    let order = g.vocabulary.quantity(quantity)?;
+    Some((if *quantity == "size" { Order::Size } else { order }, more, skip + 3))
 }
 
 /// Number of words at the start that mean the camera.

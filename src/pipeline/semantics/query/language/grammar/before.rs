@@ -2,7 +2,7 @@
 
 use super::after::after;
 use super::{Grammar, LONGEST_NOUN};
-use crate::pipeline::semantics::query::language::expression::{Expression, Order, SetOf};
+use crate::pipeline::semantics::query::language::expression::{Condition, Expression, Order, SetOf};
 use crate::pipeline::semantics::query::language::tokens::{number, ordinal};
 use crate::pipeline::semantics::query::language::words::WordClass;
 use crate::pipeline::semantics::query::lexicon;
@@ -18,8 +18,12 @@ pub(super) fn read(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
     let mut found = owned(g, i, j);
     let amount = singular(g.words[i]);
     let is_amount = g.vocabulary.is(WordClass::Amount, &amount) && !matches!(amount.as_str(), "one" | "all");
-    if !(is_amount && g.words.get(i + 1) == Some(&"of") && g.known.with(&amount).is_empty()) {
+    if !(is_amount && g.words.get(i + 1) == Some(&"of") && g.known.with(&amount).is_empty() && !is_of_the(g, i)) {
         found.extend(nouns(g, i, j));
+    }
+    let is_name = i + 1 < j && g.known.follow(g.words[i], g.words[i + 1]);
+    if !found.is_empty() && is_name {
+        return found;
     }
     if !found.is_empty() && quantified_first(g, i) {
         // A name such as "left stick" goes before the left one of the sticks.
@@ -29,6 +33,19 @@ pub(super) fn read(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
     let mut quantified = quantified(g, i, j);
     quantified.append(&mut found);
     quantified
+}
+
+/// Reads "one of these: A, B", "either A or B".
+pub(super) fn one_of(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
+    let from = match g.words[i..j] {
+        ["either", _, ..] => i + 1,
+        ["one" | "any", "of", "these" | "the" | "those", "," | "following", ..] => {
+            (i + 3..j).find(|k| !matches!(g.words[*k], "," | "following")).unwrap_or(j)
+        }
+        _ => return Vec::new(),
+    };
+    let of = g.set(from, j, true).to_vec();
+    of.into_iter().map(|of| g.make(SetOf::One(Box::new(of)), i, j)).collect()
 }
 
 /// End of the words without phrases that exclude nothing, such as "in the scene".
@@ -41,6 +58,11 @@ fn trimmed(g: &Grammar<'_>, i: usize, j: usize) -> usize {
 /// Returns whether the words may be a name although they begin with a word such as "left".
 fn quantified_first(g: &Grammar<'_>, i: usize) -> bool {
     g.known.has(g.words[i])
+}
+
+/// Returns whether "pieces of the" stands there: parts of a thing. "Pieces of fruit" are fruit.
+fn is_of_the(g: &Grammar<'_>, i: usize) -> bool {
+    matches!(g.words.get(i + 1..i + 3), Some(["of", "the" | "this" | "that"]))
 }
 
 /// Reads "its lid", "the kettle's lid".
@@ -103,8 +125,22 @@ fn quantified(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
         let inner = g.set(from, j, false);
         inner.iter().map(|e| g.make(make(Box::new(e.clone())), i, j)).collect()
     };
+    if word == "not" && i + 2 < j && colors::row(g.words[i + 1]).is_some() {
+        let is = Condition::Adjective(vec![g.words[i + 1].to_owned()]);
+        let of = g.set(i + 2, j, false).to_vec();
+        return of.into_iter().map(|of| g.make(negated(of, &is), i, j)).collect();
+    }
+    if let ["each", "and", "every", ..] = g.words[i..j] {
+        return g.set(i + 2, j, false).to_vec();
+    }
     if g.is(WordClass::All, i) && i + 1 < j {
         let both = word == "both";
+        if both && g.words[i + 1..j].contains(&"and") {
+            return g.set(i + 1, j, true).to_vec();
+        }
+        if let ["one", "of", ..] = g.words[i + 1..j] {
+            return wrap(g, i + 3, &|of| SetOf::Every { of, both });
+        }
         return wrap(g, after_of(g, i + 1), &|of| SetOf::Every { of, both });
     }
     if matches!(word, "only" | "just" | "the" | "exactly") && i + 1 < j || g.is(WordClass::Determiner, i) && i + 1 < j {
@@ -117,7 +153,8 @@ fn quantified(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
         return wrap(g, i + 1, &|of| SetOf::One(Box::new(Expression::new(SetOf::Other(of), 0..0))));
     }
     let amount = singular(word);
-    if g.vocabulary.is(WordClass::Amount, &amount) && g.words.get(i + 1) == Some(&"of") && i + 2 < j {
+    let is_part = g.vocabulary.is(WordClass::Part, &amount) && is_of_the(g, i);
+    if g.vocabulary.is(WordClass::Amount, &amount) && g.words.get(i + 1) == Some(&"of") && i + 2 < j && !is_part {
         let two = matches!(amount.as_str(), "pair" | "couple");
         return match (two, is_plural(word)) {
             (true, _) => wrap(g, i + 2, &|of| SetOf::Counted { of, count: 2 }),
@@ -139,6 +176,16 @@ fn quantified(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
         return wrap(g, after_of(g, i + 1), &SetOf::One);
     }
     ranked(g, i, j)
+}
+
+/// Returns the members of a set that are not so, its noun first: "the non-red buttons of the controller".
+fn negated(of: Expression, is: &Condition) -> SetOf {
+    let inner = |of: Box<Expression>, at| Box::new(Expression::new(negated(*of, is), at));
+    match of.set {
+        SetOf::PartOf(piece, whole) => SetOf::PartOf(inner(piece, of.at.clone()), whole),
+        SetOf::Where { of: inside, is: other, not } => SetOf::Where { of: inner(inside, of.at.clone()), is: other, not },
+        set => SetOf::Where { of: Box::new(Expression::new(set, of.at)), is: is.clone(), not: true },
+    }
 }
 
 /// Returns a number of a set: of the largest ones, the first so many.
@@ -178,9 +225,32 @@ fn ranked(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
     if matches!(g.words.get(from), Some(&("of" | "among" | "amongst"))) {
         from += 1;
     }
-    let near = matches!(choice.order, Order::Distance) && g.words.get(from) == Some(&"to");
-    if near {
-        return Vec::new();
+    if choice.order == Order::Distance {
+        // "The nearest mug to the lamp".
+        if g.words.get(from) == Some(&"to") {
+            return Vec::new();
+        }
+        let far = choice.most;
+        if let [noun @ .., "to" | "from", "me" | "us"] | [noun @ .., "to" | "from", "the", "camera" | "viewer"] = &g.words[from..j]
+            && !noun.is_empty()
+        {
+            let end = from + noun.len();
+            let of = g.set(from, end, false).to_vec();
+            let first = first.saturating_sub(1);
+            let order = |of| SetOf::Ranked { of: Box::new(of), order: Order::Distance, most: far, first, count, superlative: true };
+            return of.into_iter().map(|of| g.make(order(of), i, j)).collect();
+        }
+        for p in (from + 1..j.saturating_sub(1)).filter(|p| matches!(g.words[*p], "to" | "from")).collect::<Vec<_>>() {
+            let (of, to) = (g.set(from, p, false), g.set(p + 1, j, false));
+            let made = super::pairs(&of, &to).into_iter().map(|(of, to)| {
+                let (of, to) = (Box::new(of), Box::new(to));
+                g.make(SetOf::Nearest { of, to, far, first: first.saturating_sub(1), count }, i, j)
+            });
+            let made: Vec<Expression> = made.collect();
+            if !made.is_empty() {
+                return made;
+            }
+        }
     }
     let make = |of: Expression, g: &Grammar<'_>| {
         let first = first.saturating_sub(1);
@@ -245,7 +315,7 @@ fn noun(g: &Grammar<'_>, i: usize, k: usize) -> Option<Expression> {
     // The last word may be a letter, such as "button a"; no name ends in "left" that does not say so.
     let is_letter = k - i > 1 && last == "a" && g.known.has("a");
     let own = if is_letter { &own[..own.len() - 1] } else { own };
-    if k - i > 1 && g.vocabulary.order(last).is_some() && !g.known.has(last) {
+    if g.vocabulary.order(last).is_some() && !g.known.has(last) {
         return None;
     }
     let of_none = |w: &str| g.vocabulary.is(WordClass::NoName, w) && !matches!(w, "everything" | "something" | "anything" | "all");
@@ -254,12 +324,15 @@ fn noun(g: &Grammar<'_>, i: usize, k: usize) -> Option<Expression> {
     }
     let is_named = !g.known.with(&generic).is_empty();
     let plural = is_plural(last);
+    if last == "all" && matches!(g.words.get(k), Some(&"not")) {
+        return None;
+    }
     let everything = matches!(last, "everything" | "anything" | "whatever" | "stuff" | "all");
     let single = k - i == 1;
     let one = matches!(generic.as_str(), "one");
     if single && !is_named && colors::row(last).is_some() {
         let any = g.make(SetOf::Any { parts: false, plural: false }, i, k);
-        let is = super::super::expression::Condition::Adjective(vec![last.to_owned()]);
+        let is = Condition::Adjective(vec![last.to_owned()]);
         return Some(g.make(SetOf::Where { of: Box::new(any), is, not: false }, i, k));
     }
     let set = if one && !is_named {
@@ -279,7 +352,7 @@ fn noun(g: &Grammar<'_>, i: usize, k: usize) -> Option<Expression> {
     }
     // "Red things": adjectives of a generic word.
     let adjectives = own[..own.len() - 1].iter().map(|w| (*w).to_owned()).collect();
-    let is = super::super::expression::Condition::Adjective(adjectives);
+    let is = Condition::Adjective(adjectives);
     Some(g.make(SetOf::Where { of: Box::new(generic), is, not: false }, i, k))
 }
 

@@ -93,6 +93,10 @@ impl<'a> Grammar<'a> {
         if let Some(name) = self.whole_name(i, j) {
             return vec![self.make(SetOf::Called(name), i, j)];
         }
+        let one = before::one_of(self, i, j);
+        if !one.is_empty() {
+            return one;
+        }
         if joined {
             let several = self.several(i, j);
             if !several.is_empty() {
@@ -131,6 +135,9 @@ impl<'a> Grammar<'a> {
     fn several(&mut self, i: usize, j: usize) -> Vec<Expression> {
         for p in i..j {
             let Some(n) = self.vocabulary.except(&self.words[p..j]).filter(|n| p + n < j) else { continue };
+            if p > i && matches!(self.words[p - 1], "color" | "colour") {
+                continue;
+            }
             // "Everything but the lamp" leaves out all that follows.
             let (all, but) = (self.set(i, p, true), self.set(p + n, j, true));
             let of_rest = if p == i { Vec::new() } else { pairs(&all, &but) };
@@ -142,11 +149,8 @@ impl<'a> Grammar<'a> {
                 return made;
             }
         }
-        let shared = self.shared(i, j);
-        if !shared.is_empty() {
-            return shared;
-        }
-        let mut found = Vec::new();
+        let mut found = self.just_its(i, j);
+        found.extend(self.shared(i, j));
         for p in i + 1..j.saturating_sub(1) {
             let Some(n) = self.joint(p, j) else { continue };
             let either = self.words[p..p + n].contains(&"or");
@@ -170,6 +174,15 @@ impl<'a> Grammar<'a> {
             found.extend(before::read(self, i, j));
         }
         found
+    }
+
+    /// Reads "the controller, just its buttons".
+    fn just_its(&mut self, i: usize, j: usize) -> Vec<Expression> {
+        let is_there = |p: &usize| matches!(self.words[*p..j], [",", "just" | "only" | "specifically", "its" | "the", _, ..]);
+        let Some(p) = (i + 1..j.saturating_sub(3)).find(is_there) else { return Vec::new() };
+        let (whole, piece) = (self.set(i, p, false), self.set(p + 3, j, true));
+        let made = pairs(&piece, &whole).into_iter().map(|(a, b)| self.make(SetOf::PartOf(Box::new(a), Box::new(b)), i, j));
+        made.collect()
     }
 
     /// Number of words that join two sets at `p`.
@@ -217,7 +230,7 @@ impl<'a> Grammar<'a> {
     /// Returns whether a word may stand before a noun and be joined with others like it.
     fn is_modifier(&self, at: usize) -> bool {
         let word = self.words[at];
-        let is_name = || !self.known.with(&singular(word)).is_empty() && self.identities.called(word, LevelFilter::Auto).is_empty();
+        let is_name = || singular(word) == word && !self.known.with(word).is_empty() && self.identities.called(word, LevelFilter::Auto).is_empty();
         self.vocabulary.order(word).is_some() || crate::scene::colors::row(word).is_some() || is_name()
     }
 

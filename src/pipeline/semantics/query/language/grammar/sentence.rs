@@ -21,14 +21,20 @@ pub(crate) fn sentences(text: &str, tokens: &[Token], identities: &Identities) -
     {
         bare = rest;
     }
+    let is_question = |bare: &[&Token]| bare.len() == tokens.iter().filter(|t| !is_mark(&t.low)).count() && is_question;
     loop {
         let words: Vec<&str> = bare.iter().map(|t| t.low.as_str()).collect();
         let is_name = || !Grammar::new(text, bare.to_vec(), identities).named_at_start();
+        // "Can you see a lamp?" is a question.
+        if let ["can" | "could" | "do", "you" | "we" | "i", "see" | "find", ..] = words.as_slice() {
+            break;
+        }
         match Vocabulary::get().opener(&words).or((words.first() == Some(&",")).then_some(1)) {
             Some(n) if n < bare.len() && is_name() => bare = &bare[n..],
             _ => break,
         }
     }
+    let is_question = is_question(bare);
     let mut reader = SentenceReader { whole: Grammar::new(text, bare.to_vec(), identities), found: Vec::new() };
     reader.read(is_question);
     reader.found
@@ -81,6 +87,9 @@ impl<'a> SentenceReader<'a> {
                 let order = self.whole.vocabulary.quantity(quantity).unwrap_or(Order::Length);
                 self.plain(Asks::Size(order), 5, n);
             }
+            ["what" | "which", "can", "be", "found" | "seen", ..] if n > 4 => self.said_of_anything(4),
+            ["what" | "which", "do" | "can", "you" | "we" | "i", "see", ..] if n > 4 => self.said_of_anything(4),
+            ["of" | "among", "all" | "the", ..] if words.contains(&"which") => self.of_all(),
             ["which" | "what" | "whatever" | "who", ..] => self.which(),
             ["list" | "name" | "tell", ..] => {
                 let from = if words.get(1) == Some(&"me") { 2 } else { 1 };
@@ -130,6 +139,25 @@ impl<'a> SentenceReader<'a> {
             }
         }
         self.of(Asks::Count, tokens);
+    }
+
+    /// Reads "of all mugs, which one is the largest".
+    fn of_all(&mut self) {
+        let words = self.whole.words.clone();
+        let Some(which) = words.iter().position(|w| *w == "which") else { return };
+        let end = if words[which - 1] == "," { which - 1 } else { which };
+        let from = if matches!(words[1], "all" | "the") { 2 } else { 1 };
+        let is_said = |w: &&str| matches!(*w, "one" | "ones" | "which");
+        let said: Vec<&Token> = self.whole.tokens[which..].iter().copied().filter(|t| !is_said(&t.low.as_str())).collect();
+        for of in self.whole.of(self.whole.tokens[from..end].to_vec()).all() {
+            let before = self.found.len();
+            self.said_of(&of, said.clone());
+            self.found[before..].iter_mut().for_each(|s| {
+                if let SetOf::Ranked { superlative, .. } = &mut s.set.set {
+                    *superlative = true;
+                }
+            });
+        }
     }
 
     /// Reads "does the mug have a handle".
