@@ -49,7 +49,7 @@ fn wrong(scene: &Scene, map: &SemanticMap, recipe: QueryConfig) -> Vec<String> {
             Answer::Ambiguous(_) => chosen.len().to_string(),
             Answer::NotFound(_) => unexplained.join(" "),
         };
-        if answered.answer.verdict() != verdict || (what != "*" && told != what) || !ignored.is_empty() {
+        if (verdict != "*" && answered.answer.verdict() != verdict) || (what != "*" && told != what) || !ignored.is_empty() {
             wrong.push(format!("'{text}': {}, {told}, ignored {ignored:?}", answered.answer.verdict()));
         }
     }

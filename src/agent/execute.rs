@@ -105,6 +105,7 @@ pub(crate) fn check(
                     call = call.with_target(Target::Identity(id));
                 }
             }
+            Resolved::All(found) if marks(&call) => ids = found,
             Resolved::Several(candidates) | Resolved::All(candidates) => {
                 let question = format!("Which one do you mean: {}?", choices(world, &candidates));
                 return CheckedCall::Choose { question, candidates };
@@ -142,6 +143,11 @@ pub(crate) fn check(
         return CheckedCall::Confirm { question, call, ids };
     }
     CheckedCall::Ready { call, ids, note }
+}
+
+/// Returns whether a call marks things, one or several.
+fn marks(call: &ToolCall) -> bool {
+    matches!(call, ToolCall::Locate { .. } | ToolCall::Highlight { .. })
 }
 
 /// Returns whether a call changes the picture, a name or a file.
@@ -227,7 +233,10 @@ pub(crate) fn perform(
 ) -> CallOutcome {
     let id = ids.first().copied().unwrap_or(NO_IDENTITY);
     let mut listed = Vec::new();
-    let done = act(world, &call, id, ids.get(1).copied(), dialog, &mut listed);
+    let done = match ids.as_slice() {
+        [_, _, ..] if marks(&call) => mark_all(world, &ids, dialog, &mut listed),
+        _ => act(world, &call, id, ids.get(1).copied(), dialog, &mut listed),
+    };
     if done.is_ok() && matches!(call, ToolCall::Move { .. } | ToolCall::Turn { .. } | ToolCall::GoTo { .. }) {
         dialog.moved = Some(call.clone());
     }
@@ -240,13 +249,28 @@ pub(crate) fn perform(
         dialog.group.clear();
     }
     // "Are there any mugs?" - "Show me the red one."
-    if let (ToolCall::List { named: Some(_), .. }, false) = (&call, listed.is_empty()) {
+    if let (ToolCall::List { named: Some(_), .. } | ToolCall::Locate { .. } | ToolCall::Highlight { .. }, false) =
+        (&call, listed.is_empty())
+    {
         if let [only] = listed.as_slice() {
             dialog.last = Some(*only);
         }
         dialog.group = listed;
     }
     CallOutcome { call, ids, text, refused }
+}
+
+/// Marks several things together.
+fn mark_all(
+    world: &mut dyn World,
+    ids: &[IdentityId],
+    dialog: &mut DialogState,
+    listed: &mut Vec<IdentityId>,
+) -> Result<String, Refusal> {
+    dialog.marked.extend(ids);
+    world.highlight(&dialog.marked).map_err(|e| Refusal::new(RefusalKind::Failed, capital(&e.0)))?;
+    *listed = ids.to_vec();
+    Ok(format!("Marked in the view: {}.", describe::names(world, ids, 12)))
 }
 
 fn act(

@@ -57,6 +57,11 @@ impl<'a> NameWords<'a> {
         if self.whole(words).is_some() {
             return true;
         }
+        // What ends a sentence is no part of a thing.
+        let ends = ["?", ",", "here", "there", "now", "please", "too", "again", "and", "or"];
+        if words.last().is_none_or(|last| ends.contains(last)) {
+            return false;
+        }
         let text = words.join(" ").replace(" 's", "'s").replace(" ,", ",");
         let mut known = self.things.borrow_mut();
         let [any, known] = *known.entry(text).or_insert_with_key(|text| language::is_thing(text, self.identities));

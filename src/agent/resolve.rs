@@ -54,11 +54,15 @@ pub(crate) fn resolve(world: &mut dyn World, phrase: &str, level: LevelFilter, d
                 _ => None,
             };
             let looked = by_looks.then(|| "(Found by embedding, not by name.)".to_owned());
-            let said = answered.understood.iter().flat_map(|u| u.notes.iter().cloned());
+            let said = answered.understood.iter().flat_map(|u| u.said.iter().chain(&u.notes).cloned());
             let notes: Vec<String> = mended.into_iter().chain(looked).chain(said).collect();
             Resolved::One { id: *id, note: notes.join(" "), by_looks }
         }
         (Answer::Ambiguous(_), _) => Resolved::Several(chosen),
+        _ if answered.basis == Basis::Embedding => {
+            let text = "What is found by embedding is no count: ask for one thing at a time.";
+            Resolved::Missing { refusal: Refusal::new(RefusalKind::NotFound, text), near: chosen }
+        }
         _ => Resolved::All(chosen),
     }
 }
@@ -90,10 +94,13 @@ fn missing(world: &dyn World, answered: &QueryAnswer) -> Resolved {
             let kind = match unmet.why {
                 Why::Nothing => RefusalKind::Conflict,
                 Why::Unknown => RefusalKind::NotFound,
+                // A word that nothing here has, beside a thing that is there.
+                Why::NotUnderstood if !unmet.near.is_empty() => RefusalKind::NotFound,
                 Why::NotUnderstood => RefusalKind::Unclear,
                 Why::Failed => RefusalKind::Failed,
             };
-            (kind, unmet.text.clone())
+            let said = answered.understood.as_ref().and_then(|u| u.said.clone());
+            (kind, said.unwrap_or_else(|| unmet.text.clone()))
         }
         None => (RefusalKind::Unclear, "I am not sure which thing you mean.".to_owned()),
     };

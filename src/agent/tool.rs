@@ -178,6 +178,11 @@ macro_rules! targeted {
 }
 
 impl ToolCall {
+    /// Returns the search for what a sentence asks for.
+    pub(crate) fn ask(sentence: &str) -> Self {
+        Self::Locate { query: sentence.chars().take(MAX_TEXT).collect(), kind: LevelFilter::Auto }
+    }
+
     /// Reads a call from a tool's name and its arguments as JSON.
     ///
     /// # Errors

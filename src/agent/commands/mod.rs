@@ -27,7 +27,6 @@ use super::world::World;
 use crate::navigate::target::Side;
 use crate::pipeline::semantics::query::language;
 use crate::pipeline::semantics::query::language::words::Vocabulary;
-use crate::pipeline::semantics::query::recipe::MatchBy;
 use crate::scene::identity::name_words::words as name_words;
 use crate::scene::{Identities, LevelFilter};
 
@@ -51,7 +50,9 @@ impl Planner for Commands {
 
     fn start(&mut self, request: &str, context: &mut PlannerContext<'_>) {
         *self = Self::default();
-        let Some(tasks) = parse(request, context.world.identities()) else {
+        let identities = context.world.identities();
+        let question = || language::is_question(request, identities).then(|| vec![CommandStep::Call(ToolCall::ask(request))]);
+        let Some(tasks) = parse(request, identities).or_else(question) else {
             self.refusal = Some(not_understood(request, context.world.identities()));
             return;
         };
@@ -248,6 +249,9 @@ fn settled(tasks: Vec<CommandStep>, context: &mut PlannerContext<'_>) -> Result<
             && is_done_to_several(call)
             && let Some(ids) = all_of(phrase, context.world, &dialog)?
         {
+            if matches!(call, ToolCall::Remove { .. }) && language::means_everything(phrase, context.world.identities()) {
+                return Err(Refusal::new(RefusalKind::Unclear, "Say which things to remove."));
+            }
             dialog.last = ids.last().copied();
             done.extend(ids.into_iter().map(|id| CommandStep::Call(call.with_target(Target::Identity(id)))));
             continue;
@@ -299,10 +303,6 @@ fn all_of(phrase: &str, world: &mut dyn World, dialog: &DialogState) -> Result<O
         Resolved::Several(_) => return Ok(None),
         Resolved::Missing { refusal, .. } => return Err(refusal),
     };
-    if world.match_by() == MatchBy::Embedding {
-        let text = "What is found by embedding is no count: ask for one thing at a time.";
-        return Err(Refusal::new(RefusalKind::Unclear, text));
-    }
     Ok(Some(ids))
 }
 

@@ -94,6 +94,16 @@ impl SceneWords {
         self.by_word.contains_key(word) || self.by_word.contains_key(&singular(word))
     }
 
+    /// Returns whether a name ends in this word, in the singular.
+    pub(crate) fn ends(&self, word: &str) -> bool {
+        self.with(word).iter().any(|id| self.names(*id).iter().any(|name| name.last().is_some_and(|w| w == word)))
+    }
+
+    /// Returns whether a name is this one word, in the singular.
+    pub(crate) fn is_name(&self, word: &str) -> bool {
+        self.with(word).iter().any(|id| self.names(*id).iter().any(|name| name.len() == 1 && name[0] == word))
+    }
+
     /// Returns whether a name has these two words one after the other.
     pub(crate) fn follow(&self, first: &str, second: &str) -> bool {
         let second = singular(second);

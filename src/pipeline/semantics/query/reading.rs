@@ -1,7 +1,7 @@
 //! Reading of a typed query in a scene: its slips mended, its sentences, and the phrase that an encoder is asked for.
 
 use super::grounds::without_courtesy;
-use super::language::expression::{Asks, Expression, Sentence, SetOf};
+use super::language::expression::{Asks, Condition, Expression, Sentence, SetOf};
 use super::language::slips::{self, Pairs};
 use super::language::{self};
 use super::parse::ParsedQuery;
@@ -51,6 +51,7 @@ impl QueryReading {
                 SetOf::Words { .. } | SetOf::Called(_) | SetOf::Numbered(_) => true,
                 SetOf::PartOf(piece, whole) => plain(piece) && plain(whole),
                 SetOf::One(of) => plain(of),
+                SetOf::Where { of, is: Condition::Adjective(_), not: false } => matches!(of.set, SetOf::Any { .. }),
                 _ => false,
             }
         }

@@ -83,7 +83,8 @@ fn show_several(
     let mut chosen = None;
     for (id, n) in shown.iter().zip(1..).take(NAMED) {
         let name = cx.state.labels.full_name(&semantics.identities, *id);
-        if ui.small_button(format!("{n}  {name}")).on_hover_text("Show this one").clicked() {
+        let button = ui.small_button(format!("{n}  {name}")).on_hover_text("Show this one");
+        if button.accessible_name(&name).clicked() {
             chosen = Some(*id);
         }
     }
@@ -208,9 +209,8 @@ fn show_nothing(ui: &mut Ui, queries: &mut Queries, newest: &Asked, semantics: &
         ui.weak("Encoding the query\u{2026}");
         return;
     }
-    if !steps::show_misunderstood(ui, newest) {
-        ui.colored_label(theme::warning(), nothing_text(newest, &semantics.identities));
-    }
+    ui.colored_label(theme::warning(), nothing_text(newest, &semantics.identities));
+    steps::show_misunderstood(ui, newest);
     let [by_name, by_looks] = newest
         .answered
         .offers(NAMED)

@@ -6,7 +6,7 @@ use egui::{FontId, RichText, Stroke, TextFormat, Ui};
 
 use super::{Asked, Queries};
 use crate::pipeline::semantics::query::language::Understood;
-use crate::pipeline::semantics::query::language::evaluate::QueryStep;
+use crate::pipeline::semantics::query::language::evaluate::{QueryStep, Why};
 use crate::scene::{SemanticMap, text};
 use crate::ui::theme;
 
@@ -24,11 +24,11 @@ pub(super) fn show_said(ui: &mut Ui, asked: &Asked) {
     }
 }
 
-/// Draws the sentence with what was not understood underlined. Returns false if all was understood.
-pub(super) fn show_misunderstood(ui: &mut Ui, asked: &Asked) -> bool {
+/// Draws the sentence with what was not understood underlined, or the reason that nothing is so.
+pub(super) fn show_misunderstood(ui: &mut Ui, asked: &Asked) {
     let unmet = asked.answered.understood.as_ref().and_then(|u| u.unmet.as_ref());
     let said = &asked.reading.text;
-    let Some(unmet) = unmet.filter(|u| !u.text.is_empty()) else { return false };
+    let Some(unmet) = unmet.filter(|u| !u.text.is_empty()) else { return };
     let low = said.to_lowercase();
     let words = unmet.words.iter().filter_map(|w| low.find(w.as_str()).map(|at| at..at + w.len()));
     // Lower case may have another length in some scripts.
@@ -48,9 +48,12 @@ pub(super) fn show_misunderstood(ui: &mut Ui, asked: &Asked) -> bool {
         }
     }
     job.append(&said[from..], 0.0, plain);
-    ui.add(egui::Label::new(job).wrap());
-    ui.colored_label(theme::warning(), text::shortened(&unmet.text, LONGEST));
-    true
+    if said.contains(' ') {
+        ui.add(egui::Label::new(job).wrap());
+    }
+    if unmet.why == Why::Nothing {
+        ui.label(RichText::new(text::shortened(&unmet.text, LONGEST)).small().color(theme::weak()));
+    }
 }
 
 /// Draws the steps. A click on one asks again without its words.

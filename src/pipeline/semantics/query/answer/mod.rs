@@ -177,8 +177,8 @@ impl Looks for ByLooks<'_> {
         if self.recipe.rejection == Rejection::Strict {
             found.answer = grounded(self.identities, phrase, self.language, found.answer);
         }
-        // Several are meant, or what follows chooses: all that are more like the phrase than like anything.
-        let most = if plural { TOP_LOOKS } else { 3 };
+        // Of several, all that are more like the phrase than like anything.
+        let most = if plural { TOP_LOOKS } else { 1 };
         Ok(found.chosen(most).into_iter().map(|id| (id, BY_LOOKS)).collect())
     }
 }

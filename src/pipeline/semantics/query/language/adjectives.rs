@@ -77,7 +77,7 @@ fn describes(all: &Evaluator<'_>, id: IdentityId, words: &[String], k: usize, he
 fn sureness(verdict: ColorVerdict) -> f64 {
     match verdict {
         ColorVerdict::Yes => 1.0,
-        ColorVerdict::Partly => 0.7,
+        ColorVerdict::Partly => 0.8,
         ColorVerdict::No => 0.0,
     }
 }

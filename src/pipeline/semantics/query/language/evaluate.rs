@@ -296,8 +296,7 @@ impl<'a> Evaluator<'a> {
         let parts = if parts.is_empty() { "no parts are known of it".into() } else { format!("its parts: {}", parts.join(", ")) };
         let name = wholes.first().map(|w| all.full_name(w.id)).unwrap_or_default();
         let text = format!("The {name} has no \u{201c}{}\u{201d} here; {parts}.", self.said(&piece.at));
-        let why = if unmet.why == Why::NotUnderstood { unmet.why } else { Why::Nothing };
-        Unmet { why, text, words: unmet.words, near: known, at: e.at.clone() }
+        Unmet { why: Why::Nothing, text, words: unmet.words, near: known, at: e.at.clone() }
     }
 
     fn counted(&mut self, of: &Expression, count: usize, e: &Expression) -> Outcome {

@@ -140,6 +140,21 @@ pub(crate) fn is_thing(text: &str, identities: &Identities) -> [bool; 2] {
     [any, sets.into_iter().any(|set| phrases(&sentence(set)).iter().all(is_known))]
 }
 
+/// Returns whether a text is a question that is answered in words.
+pub(crate) fn is_question(text: &str, identities: &Identities) -> bool {
+    read(text, identities).first().is_some_and(|s| s.asks != Asks::Things)
+}
+
+/// Returns whether a phrase means all there is.
+pub(crate) fn means_everything(text: &str, identities: &Identities) -> bool {
+    let is_any = |e: &Expression| match &e.set {
+        SetOf::Any { .. } => true,
+        SetOf::Every { of, .. } => matches!(of.set, SetOf::Any { .. }),
+        _ => false,
+    };
+    read(text, identities).iter().any(|s| is_any(&s.set))
+}
+
 /// Returns whether a phrase means several things.
 pub(crate) fn means_several(text: &str, identities: &Identities) -> bool {
     read(text, identities).first().is_some_and(|s| s.set.is_plural())

@@ -33,7 +33,8 @@ pub(super) fn called(all: &mut Evaluator<'_>, name: &str, at: &Range<usize>) -> 
     let is_own = |id: &IdentityId| identities.words().names(*id).contains(&said);
     let mut members: Vec<Member> = exact.iter().map(|id| Member { rank: 0, ..member(*id) }).collect();
     if exact.iter().any(is_own) {
-        members.extend(by_heads(all, &said).members.into_iter().filter(|m| !exact.contains(&m.id)));
+        let others = by_heads(all, &said).members.into_iter().filter(|m| !exact.contains(&m.id));
+        members.extend(others.map(|m| Member { rank: m.rank.max(1), ..m }));
     }
     let found = Matches::new(members);
     all.step(at, format!("called \u{201c}{}\u{201d}", all.said(at)), &found);

@@ -37,6 +37,8 @@ fn slack(space: &Space<'_>, id: IdentityId, order: Order, value: f64) -> f64 {
     match order {
         Order::Up | Order::Right | Order::Distance => 0.03 * space.shapes.get(id).map_or(0.0, |s| s.bounds.radius()),
         Order::Lightness => 0.02,
+        // A volume has the errors of three lengths.
+        Order::Size => 4.0 * ALIKE * value.abs(),
         _ => ALIKE * value.abs(),
     }
 }

@@ -109,8 +109,9 @@ impl<'a> Space<'a> {
         let eye = self.view.eye;
         let in_space = before(t, a, |p| (p - eye).dot(right));
         let depth = |s: &SampledShape| s.points().iter().map(|p| (*p - eye).dot(self.axes.ahead)).fold(f64::INFINITY, f64::min);
+        // What is behind the camera has no side in its picture.
         if depth(t).min(depth(a)) <= 1e-6 {
-            return in_space;
+            return 0.0;
         }
         let in_picture = before(t, a, |p| (p - eye).dot(right) / (p - eye).dot(self.axes.ahead));
         0.5 * (in_space + in_picture)

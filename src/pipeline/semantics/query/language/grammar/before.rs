@@ -225,7 +225,7 @@ fn ranked(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
     if matches!(g.words.get(from), Some(&("of" | "among" | "amongst"))) {
         from += 1;
     }
-    if choice.order == Order::Distance {
+    if choice.order == Order::Distance && from < j {
         // "The nearest mug to the lamp".
         if g.words.get(from) == Some(&"to") {
             return Vec::new();
@@ -315,14 +315,14 @@ fn noun(g: &Grammar<'_>, i: usize, k: usize) -> Option<Expression> {
     // The last word may be a letter, such as "button a"; no name ends in "left" that does not say so.
     let is_letter = k - i > 1 && last == "a" && g.known.has("a");
     let own = if is_letter { &own[..own.len() - 1] } else { own };
-    if g.vocabulary.order(last).is_some() && !g.known.has(last) {
+    if g.vocabulary.order(last).is_some() && !g.known.ends(last) || k - i > 1 && number(own[0]).is_some() && !g.known.has(own[0]) {
         return None;
     }
     let of_none = |w: &str| g.vocabulary.is(WordClass::NoName, w) && !matches!(w, "everything" | "something" | "anything" | "all");
     if k - i > LONGEST_NOUN || own.iter().any(|w| of_none(w)) || !own.iter().any(|w| w.chars().any(char::is_alphanumeric)) {
         return None;
     }
-    let is_named = !g.known.with(&generic).is_empty();
+    let is_named = g.known.is_name(&generic);
     let plural = is_plural(last);
     if last == "all" && matches!(g.words.get(k), Some(&"not")) {
         return None;
@@ -330,7 +330,7 @@ fn noun(g: &Grammar<'_>, i: usize, k: usize) -> Option<Expression> {
     let everything = matches!(last, "everything" | "anything" | "whatever" | "stuff" | "all");
     let single = k - i == 1;
     let one = matches!(generic.as_str(), "one");
-    if single && !is_named && colors::row(last).is_some() {
+    if single && !g.known.ends(&generic) && colors::row(last).is_some() {
         let any = g.make(SetOf::Any { parts: false, plural: false }, i, k);
         let is = Condition::Adjective(vec![last.to_owned()]);
         return Some(g.make(SetOf::Where { of: Box::new(any), is, not: false }, i, k));

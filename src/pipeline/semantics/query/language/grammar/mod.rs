@@ -153,6 +153,10 @@ impl<'a> Grammar<'a> {
         found.extend(self.shared(i, j));
         for p in i + 1..j.saturating_sub(1) {
             let Some(n) = self.joint(p, j) else { continue };
+            // "Red or blue controller" is read above.
+            if !found.is_empty() && p == i + 1 && self.is_modifier(i) {
+                continue;
+            }
             let either = self.words[p..p + n].contains(&"or");
             let (left, right) = (self.set(i, p, false), self.set(p + n, j, true));
             for (a, b) in pairs(&left, &right) {

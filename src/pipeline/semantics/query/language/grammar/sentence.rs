@@ -4,6 +4,7 @@ use super::Grammar;
 use crate::pipeline::semantics::query::language::expression::{Asks, Expression, Order, Sentence, SetOf};
 use crate::pipeline::semantics::query::language::tokens::{Token, is_mark};
 use crate::pipeline::semantics::query::language::words::Vocabulary;
+use crate::scene::identity::name_words::singular;
 use crate::scene::{Identities, LevelFilter};
 
 /// Returns all readings of a text, the best first.
@@ -42,7 +43,7 @@ pub(crate) fn sentences(text: &str, tokens: &[Token], identities: &Identities) -
 
 fn whole_text(g: &Grammar<'_>) -> Option<String> {
     let name = g.text.trim();
-    let is_said = g.tokens.len() > 1 || name.chars().any(|c| !c.is_alphanumeric());
+    let is_said = g.tokens.len() > 1 || singular(&name.to_lowercase()) == name.to_lowercase() || !name.chars().all(char::is_alphanumeric);
     (is_said && !g.identities.called(name, LevelFilter::Auto).is_empty()).then(|| name.to_owned())
 }
 
