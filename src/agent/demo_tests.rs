@@ -49,7 +49,10 @@ fn wrong(scene: &Scene, map: &SemanticMap, recipe: QueryConfig) -> Vec<String> {
             Answer::Ambiguous(_) => chosen.len().to_string(),
             Answer::NotFound(_) => unexplained.join(" "),
         };
-        if (verdict != "*" && answered.answer.verdict() != verdict) || (what != "*" && told != what) || !ignored.is_empty() {
+        if (verdict != "*" && answered.answer.verdict() != verdict)
+            || (what != "*" && told != what)
+            || !ignored.is_empty()
+        {
             wrong.push(format!("'{text}': {}, {told}, ignored {ignored:?}", answered.answer.verdict()));
         }
     }
@@ -86,10 +89,15 @@ fn where_nothing_has_a_name_the_small_encoder_guesses_and_nothing_is_changed_for
     let answered = engine.ask(&map, "teddy bear", LevelFilter::Auto).expect("encodes").expect("words");
     assert_eq!((answered.basis, answered.certainty(&[])), (Basis::Embedding, Certainty::Guess), "{answered:?}");
     let id = answered.chosen(1)[0];
-    let refused = query::named(&map, &QueryPlace::default(), "teddy bear", LevelFilter::Auto, 1).expect_err("only by its looks").to_string();
+    let refused = query::named(&map, &QueryPlace::default(), "teddy bear", LevelFilter::Auto, 1)
+        .expect_err("only by its looks")
+        .to_string();
     assert!(refused.contains(&format!("ask for '#{id}'")), "{refused}");
     // The number in the refusal is enough to find it.
-    assert_eq!(query::named(&map, &QueryPlace::default(), &format!("#{id}"), LevelFilter::Auto, 1).expect("by number"), [id]);
+    assert_eq!(
+        query::named(&map, &QueryPlace::default(), &format!("#{id}"), LevelFilter::Auto, 1).expect("by number"),
+        [id]
+    );
 }
 
 fn ends(reply: &Reply) -> &'static str {

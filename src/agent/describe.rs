@@ -72,7 +72,9 @@ pub(crate) fn neighbors(world: &dyn World, id: IdentityId, relation: Relation) -
 pub(crate) fn place(world: &dyn World, id: IdentityId) -> String {
     let object = world.identities().object_of(id);
     let space = space(world);
-    let others = || world.identities().iter().filter(|(i, o)| o.parent == NO_IDENTITY && *i != object && world.facts(*i).is_some());
+    let others = || {
+        world.identities().iter().filter(|(i, o)| o.parent == NO_IDENTITY && *i != object && world.facts(*i).is_some())
+    };
     let holds = |relation, other| space.share(relation, object, other).is_some_and(|share| share >= HOLDS[0]);
     let bearer = others().map(|(i, _)| i).find(|i| space.rests(object, *i, 1));
     // A smaller thing above is not mentioned: a table is not "under" its mugs.

@@ -52,7 +52,6 @@ impl CommandLanguage {
     fn read() -> Result<Self, toml::de::Error> {
         toml::from_str(include_str!("../../assets/commands.toml"))
     }
-
 }
 
 /// All commands; if two match, the first wins.

@@ -6,10 +6,11 @@ use super::dialog::DialogState;
 use super::refusal::{Refusal, RefusalKind};
 use super::world::World;
 use crate::pipeline::semantics::query::answer::{Basis, QueryAnswer};
-use crate::pipeline::semantics::query::language::evaluate::Why;
+use crate::pipeline::semantics::query::language::outcome::Why;
 use crate::pipeline::semantics::query::language::slips::{mend, mended_text};
 use crate::pipeline::semantics::query::language::{QueryPlace, SpokenOf};
 use crate::pipeline::semantics::query::localize::Answer;
+use crate::pipeline::semantics::query::recipe::MatchBy;
 use crate::scene::{IdentityId, LevelFilter};
 
 /// Offers of things that look like a phrase.
@@ -75,6 +76,9 @@ pub(crate) fn resolve_all(
     dialog: &DialogState,
 ) -> Result<Vec<IdentityId>, Refusal> {
     match resolve(world, phrase, level, dialog) {
+        Resolved::One { by_looks: true, .. } if world.match_by() != MatchBy::Embedding => {
+            Err(Refusal::new(RefusalKind::NotFound, "By embedding, which is no count: ask for one thing at a time."))
+        }
         Resolved::One { id, .. } => Ok(vec![id]),
         Resolved::All(ids) | Resolved::Several(ids) => Ok(ids),
         Resolved::Missing { refusal, .. } => Err(refusal),

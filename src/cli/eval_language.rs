@@ -16,7 +16,9 @@ pub(super) fn run(scene: &Scene, file: &Path, recipe: &QueryConfig, as_json: boo
     let map = scene.semantics()?;
     let found = evaluate_language::run(scene, &map, file, recipe)?;
     if as_json {
-        return output::print_json(&json!({ "scene": scene.path, "questions": file, "recipe": recipe, "result": found }));
+        return output::print_json(
+            &json!({ "scene": scene.path, "questions": file, "recipe": recipe, "result": found }),
+        );
     }
     let row = |kind: &str, t: &LanguageTally| {
         let share = |n: usize| format!("{:.1} %", 100.0 * n as f64 / t.asked.max(1) as f64);

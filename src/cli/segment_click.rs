@@ -51,7 +51,10 @@ pub(crate) fn run(
 ) -> Result<(), CliError> {
     let map = Arc::new(scene.known_semantics()?.unwrap_or_else(|| select::empty_map(&scene.cloud)));
     let whole = match &args.part_of {
-        Some(text) => query::identities(&map, &query::seen_from(scene, None), text, LevelFilter::Auto, 1)?.first().copied().unwrap_or(NO_IDENTITY),
+        Some(text) => query::identities(&map, &query::seen_from(scene, None), text, LevelFilter::Auto, 1)?
+            .first()
+            .copied()
+            .unwrap_or(NO_IDENTITY),
         None => NO_IDENTITY,
     };
     let purpose = SelectFor::New(whole);

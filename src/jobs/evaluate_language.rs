@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 use super::query::{QueryEngine, seen_from};
 use super::{JobError, Scene};
 use crate::io::{files, gltf_mesh};
+use crate::math::stats::median;
 use crate::pipeline::semantics::evaluation::referring::{self, Referring, ReferringTruth, controls};
 use crate::pipeline::semantics::query::localize::Answer;
 use crate::pipeline::semantics::query::recipe::QueryConfig;
-use crate::math::stats::median;
 use crate::pipeline::synth::{Levels, TrueIdentity};
 use crate::scene::{Identities, IdentityId, LevelFilter, SemanticMap};
 
@@ -93,7 +93,12 @@ pub(crate) const COUNT: usize = 600;
 ///
 /// # Errors
 /// If the file cannot be read, or the encoder fails.
-pub(crate) fn run(scene: &Scene, map: &SemanticMap, file: &Path, recipe: &QueryConfig) -> Result<LanguageResult, JobError> {
+pub(crate) fn run(
+    scene: &Scene,
+    map: &SemanticMap,
+    file: &Path,
+    recipe: &QueryConfig,
+) -> Result<LanguageResult, JobError> {
     let is_list = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("jsonl"));
     if is_list {
         return asked(scene, map, &listed(scene, file)?, recipe);
@@ -165,7 +170,12 @@ fn plain(name: &str) -> String {
     name.split(" \u{b7} ").map(bare).collect::<Vec<_>>().join(" \u{b7} ")
 }
 
-fn asked(scene: &Scene, map: &SemanticMap, questions: &[KnownQuestion], recipe: &QueryConfig) -> Result<LanguageResult, JobError> {
+fn asked(
+    scene: &Scene,
+    map: &SemanticMap,
+    questions: &[KnownQuestion],
+    recipe: &QueryConfig,
+) -> Result<LanguageResult, JobError> {
     let mut engine = QueryEngine::new(map.language.as_ref(), recipe.clone())?;
     engine.place = seen_from(scene, None);
     let mut result = LanguageResult::default();

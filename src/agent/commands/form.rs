@@ -220,7 +220,8 @@ impl FormRequest<'_> {
                 slots.texts.push(self.joined(words));
                 let words = if words[0] == "all" { &words[1..] } else { words };
                 // With complete names, a kind must not take in a relation such as "on the table".
-                let is_plain = self.things != Things::Whole || !words.iter().any(|w| vocabulary.is(WordClass::NoName, w));
+                let is_plain =
+                    self.things != Things::Whole || !words.iter().any(|w| vocabulary.is(WordClass::NoName, w));
                 self.known.whole(words).is_some() || is_plain && self.known.is_thing(words, self.things != Things::Any)
             }
             FormSlot::Things => {

@@ -17,9 +17,9 @@ use super::describe::capital;
 use super::dialog::DialogState;
 use super::execute::CallOutcome;
 use super::language::CommandLanguage;
+use super::names::{NameWords, words_of};
 use super::planner::{Planner, PlannerContext, Step};
 use super::refusal::{Refusal, RefusalKind};
-use super::names::{NameWords, words_of};
 use super::resolve::{Resolved, resolve};
 use super::tool::{Reference, Target, ToolCall};
 use super::words::{Token, alike, request_tokens};
@@ -51,7 +51,8 @@ impl Planner for Commands {
     fn start(&mut self, request: &str, context: &mut PlannerContext<'_>) {
         *self = Self::default();
         let identities = context.world.identities();
-        let question = || language::is_question(request, identities).then(|| vec![CommandStep::Call(ToolCall::ask(request))]);
+        let question =
+            || language::is_question(request, identities).then(|| vec![CommandStep::Call(ToolCall::ask(request))]);
         let Some(tasks) = parse(request, identities).or_else(question) else {
             self.refusal = Some(not_understood(request, context.world.identities()));
             return;
@@ -249,7 +250,8 @@ fn settled(tasks: Vec<CommandStep>, context: &mut PlannerContext<'_>) -> Result<
             && is_done_to_several(call)
             && let Some(ids) = all_of(phrase, context.world, &dialog)?
         {
-            if matches!(call, ToolCall::Remove { .. }) && language::means_everything(phrase, context.world.identities()) {
+            if matches!(call, ToolCall::Remove { .. }) && language::means_everything(phrase, context.world.identities())
+            {
                 return Err(Refusal::new(RefusalKind::Unclear, "Say which things to remove."));
             }
             dialog.last = ids.last().copied();

@@ -13,8 +13,8 @@ use super::{CliError, number, output, view};
 use crate::jobs::query::{self, QueryRequest, QueryResult};
 use crate::jobs::{export, render};
 use crate::pipeline::semantics::query::answer::Basis;
-use crate::pipeline::semantics::query::localize::{Answer, Hit};
 use crate::pipeline::semantics::query::language::slips::mended_text;
+use crate::pipeline::semantics::query::localize::{Answer, Hit};
 use crate::pipeline::semantics::query::timing::ms_since;
 use crate::scene::{IdentityId, LevelFilter, SemanticMap};
 

@@ -24,8 +24,8 @@ use crate::pipeline::semantics::evaluation::{
 };
 use crate::pipeline::semantics::query::answer::QueryAnswer;
 use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
-use crate::pipeline::semantics::query::parse::ParsedQuery;
 use crate::pipeline::semantics::query::language::QueryPlace;
+use crate::pipeline::semantics::query::parse::ParsedQuery;
 use crate::pipeline::semantics::query::query_engine::{QueryEngine, ask_by_embedding, ask_by_name};
 use crate::pipeline::semantics::query::recipe::{MatchBy, PartEmbedding, QueryConfig, RelevancyScale, Strategy};
 use crate::pipeline::semantics::query::timing::ms_since;
@@ -131,7 +131,9 @@ pub(super) fn measure(
         rows.extend(rule_rows(&table, comparison, (map, language), &views, &mut by)?);
         if map.identities.iter().any(|(_, i)| !i.names.is_empty()) {
             let recipe = QueryConfig::default();
-            let mut ask = |text: &str| Ok(ask_by_name(&map.identities, text, (LevelFilter::Auto, &QueryPlace::default()), &recipe));
+            let mut ask = |text: &str| {
+                Ok(ask_by_name(&map.identities, text, (LevelFilter::Auto, &QueryPlace::default()), &recipe))
+            };
             rows.push(table.row(BY_NAME, map, &views, &mut ask)?);
         }
     }

@@ -72,7 +72,8 @@ impl SceneWords {
             identity.names.iter().flat_map(|n| written(n)).for_each(|w| {
                 scene.written.insert(singular(&w), w);
             });
-            let full = all.ancestors(id).filter_map(|i| all.get(i)?.names.first()).map(|n| written(n).count() + 2).sum();
+            let full =
+                all.ancestors(id).filter_map(|i| all.get(i)?.names.first()).map(|n| written(n).count() + 2).sum();
             scene.longest = names.iter().map(Vec::len).max().unwrap_or(0).max(full).max(scene.longest);
             scene.of.push(NamedWords { names });
         }
@@ -141,7 +142,10 @@ mod tests {
         let red = all.add(Level::Object, NO_IDENTITY, vec!["Red_Controllers".into(), "手柄".into()]);
         let button = all.add(Level::Part, red, vec!["button a".into()]);
         let words = all.words();
-        assert_eq!((words.with("controller"), words.with("手柄"), words.with("button")), (&[red][..], &[red][..], &[button][..]));
+        assert_eq!(
+            (words.with("controller"), words.with("手柄"), words.with("button")),
+            (&[red][..], &[red][..], &[button][..])
+        );
         assert!(words.has("controllers") && words.has("a") && !words.has("lamp") && words.with("lamp").is_empty());
         assert_eq!(words.names(button), [vec!["button".to_owned(), "a".into()]]);
         assert!(words.written().any(|w| w == ("controller", "controllers")) && words.longest >= 4);

@@ -69,7 +69,9 @@ impl Marks {
         let MarkedScene { cloud, semantics, visibility, selected, eye } = scene;
         for (id, n) in queries.numbers().into_iter().take(MOST_NUMBERS) {
             let center = semantics.identities.shapes.get(id).map(|s| s.center());
-            if let Some(at) = center.and_then(|c| eye.project(c)).map(|p| place(shown, p)).filter(|p| shown.contains(*p)) {
+            if let Some(at) =
+                center.and_then(|c| eye.project(c)).map(|p| place(shown, p)).filter(|p| shown.contains(*p))
+            {
                 number(&ui.painter_at(shown), at, n);
             }
         }

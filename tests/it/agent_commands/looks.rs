@@ -96,7 +96,11 @@ fn what_only_looks_so_is_offered_or_asked_about() {
     assert!(all.is_empty(), "{}", all.join("\n"));
     // The small one's guess is an offer.
     let reply = say(&mut session(), &mut Room::with_encoder(Some("demo")), "hide the banana");
-    assert!(reply.text.contains("no \u{201c}banana\u{201d}") && reply.text.contains("Looks most like: piano"), "{}", reply.text);
+    assert!(
+        reply.text.contains("no \u{201c}banana\u{201d}") && reply.text.contains("Looks most like: piano"),
+        "{}",
+        reply.text
+    );
     // The control: without an encoder there is no such offer.
     let reply = say(&mut session(), &mut Room::with_encoder(None), "hide the banana");
     assert!(!reply.text.contains("Looks most like"), "{}", reply.text);

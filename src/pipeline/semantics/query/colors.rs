@@ -1,7 +1,7 @@
 //! Color words in questions and names: a thing of another color is another thing.
 
-use crate::scene::identity::name_words::words;
 use crate::scene::colors::{COLORS, row};
+use crate::scene::identity::name_words::words;
 
 /// Returns the colors that a phrase names, by row. A last word is the thing itself: an orange.
 pub(crate) fn named(phrase: &str) -> Vec<usize> {

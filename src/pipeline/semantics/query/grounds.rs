@@ -33,7 +33,9 @@ pub(crate) fn is_of_another_color(identities: &Identities, id: IdentityId, phras
     let named = |text: &String, owner: IdentityId| {
         colors::named(text).into_iter().any(|color| color_of(identities, owner, color) == Some(false))
     };
-    let of_whole = |whole: &String| identities.ancestors(id).skip(1).all(|i| named(whole, i)) && identities.ancestors(id).count() > 1;
+    let of_whole = |whole: &String| {
+        identities.ancestors(id).skip(1).all(|i| named(whole, i)) && identities.ancestors(id).count() > 1
+    };
     named(&phrase.target, id) || phrase.whole.as_ref().is_some_and(of_whole)
 }
 
@@ -87,7 +89,12 @@ mod tests {
         let another = |id, text: &str| is_of_another_color(&all, id, &ParsedQuery::parse(text).expect("words"));
         // Names come before what is seen.
         assert!(another(1, "blue cup") && another(3, "red pot") && another(2, "lid of the blue cup"));
-        assert!(!another(1, "white cup") && !another(1, "cup") && !another(3, "blue pot") && !another(2, "lid of the white cup"));
+        assert!(
+            !another(1, "white cup")
+                && !another(1, "cup")
+                && !another(3, "blue pot")
+                && !another(2, "lid of the white cup")
+        );
         // Without observed colors nothing is known, and nothing speaks against it.
         let mut unseen = Identities::default();
         unseen.add(Level::Object, NO_IDENTITY, vec!["mug".into()]);

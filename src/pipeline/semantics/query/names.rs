@@ -24,7 +24,8 @@ pub(crate) fn scores(identities: &Identities, phrase: &str) -> Vec<f32> {
 /// encoder, if there is one.
 pub(crate) fn unknown_to_all(identities: &Identities, phrase: &str, to_encoder: Option<&[String]>) -> Vec<String> {
     let known = identities.words();
-    let numbers: HashSet<String> = identities.iter().filter(|(_, i)| i.names.is_empty()).map(|(id, _)| id.to_string()).collect();
+    let numbers: HashSet<String> =
+        identities.iter().filter(|(_, i)| i.names.is_empty()).map(|(id, _)| id.to_string()).collect();
     let mut unknown = words(phrase);
     unknown.retain(|w| !is_glue(w) && !known.has(w) && !numbers.contains(w));
     unknown.retain(|w| to_encoder.is_none_or(|words| words.contains(w)));

@@ -118,7 +118,11 @@ impl QueryOverlay {
         // Things that were found together have an outline each.
         let each = |(q, (color, ids)): (&&Asked, &([u8; 3], Vec<IdentityId>))| {
             let is_apart = truth.is_none() && mode != MatchMode::Relevancy && (2..=MOST_OUTLINES).contains(&ids.len());
-            if is_apart { ids.iter().map(|id| (*color, union(&[*id]))).collect() } else { vec![mask((q, &(*color, ids.clone())))] }
+            if is_apart {
+                ids.iter().map(|id| (*color, union(&[*id]))).collect()
+            } else {
+                vec![mask((q, &(*color, ids.clone())))]
+            }
         };
         let masks: Vec<([u8; 3], Mask)> = asked.iter().zip(&painted.shown).flat_map(each).collect();
         let lit = painted.lit.as_deref().map(|others| {

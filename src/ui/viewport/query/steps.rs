@@ -6,7 +6,7 @@ use egui::{FontId, RichText, Stroke, TextFormat, Ui};
 
 use super::{Asked, Queries};
 use crate::pipeline::semantics::query::language::Understood;
-use crate::pipeline::semantics::query::language::evaluate::{QueryStep, Why};
+use crate::pipeline::semantics::query::language::outcome::{QueryStep, Why};
 use crate::scene::{SemanticMap, text};
 use crate::ui::theme;
 
@@ -96,7 +96,8 @@ fn without(said: &str, step: &QueryStep) -> Option<String> {
     let (before, after) = (said.get(..step.at.start)?, said.get(step.at.end..)?);
     let words = [before, after].join(" ");
     let left = words.split_whitespace().collect::<Vec<_>>().join(" ");
-    let says = left.split(' ').any(|w| w.chars().count() > 3 || !["the", "a", "an", "of", "on", "in", "is"].contains(&w));
+    let says =
+        left.split(' ').any(|w| w.chars().count() > 3 || !["the", "a", "an", "of", "on", "in", "is"].contains(&w));
     (!left.is_empty() && says && left.len() < said.len()).then_some(left)
 }
 
@@ -110,6 +111,9 @@ mod tests {
         let said = "the mug left of the lamp";
         assert_eq!(without(said, &step(7..24)).as_deref(), Some("the mug"));
         assert_eq!(without(said, &step(4..7)).as_deref(), Some("the left of the lamp"));
-        assert_eq!((without(said, &step(0..24)), without(said, &step(4..24)), without(said, &step(4..99))), (None, None, None));
+        assert_eq!(
+            (without(said, &step(0..24)), without(said, &step(4..24)), without(said, &step(4..99))),
+            (None, None, None)
+        );
     }
 }

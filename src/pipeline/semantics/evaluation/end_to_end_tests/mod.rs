@@ -22,10 +22,10 @@ use crate::pipeline::semantics::lifting::segmenter::{FileMasks, Segmenter};
 use crate::pipeline::semantics::lifting::tracker::TrackOptions;
 use crate::pipeline::semantics::query::answer::{Language, QueryAnswer, by_embedding};
 use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
+use crate::pipeline::semantics::query::language::QueryPlace;
 use crate::pipeline::semantics::query::localize::Answer;
 use crate::pipeline::semantics::query::names;
 use crate::pipeline::semantics::query::parse::ParsedQuery;
-use crate::pipeline::semantics::query::language::QueryPlace;
 use crate::pipeline::semantics::query::query_engine::ask_by_name;
 use crate::pipeline::semantics::query::recipe::{PAPERS_PHRASES, QueryConfig, Rejection};
 use crate::pipeline::semantics::view_map::ViewMap;
@@ -155,7 +155,8 @@ impl Scene {
 fn by_names(scene: &Scene, map: &SemanticMap) -> [f64; 2] {
     let drawn = scene.drawn(map);
     let blended = CodeMap::default();
-    let mut ask = |text: &str| ask_by_name(&map.identities, text, (LevelFilter::Auto, &QueryPlace::default()), &plain());
+    let mut ask =
+        |text: &str| ask_by_name(&map.identities, text, (LevelFilter::Auto, &QueryPlace::default()), &plain());
     let mut asked = AskedScene { map, ask: &mut ask };
     let views = scene.views(&drawn, &blended);
     masks::by_level(&views.iter().flat_map(|v| masks::compare(&mut asked, v)).collect::<Vec<_>>())
@@ -257,7 +258,9 @@ fn figures(scene: &Scene, map: &SemanticMap, trained: &SemanticMap, encoder: &mu
     let not_there = [absent.kinds, absent.colors];
     let is_found = |answered: QueryAnswer| !matches!(answered.answer, Answer::NotFound(_));
     let mut seen = |name: &String| by_looks(map, features, &mut book, encoder, name).map(is_found);
-    let named = |name: &String| ask_by_name(&map.identities, name, (LevelFilter::Auto, &QueryPlace::default()), &plain()).map(is_found);
+    let named = |name: &String| {
+        ask_by_name(&map.identities, name, (LevelFilter::Auto, &QueryPlace::default()), &plain()).map(is_found)
+    };
     let found = |list: &Vec<String>, ask: &mut dyn FnMut(&String) -> Option<bool>| {
         share(&list.iter().map(|name| ask(name).expect("its words are known")).collect::<Vec<_>>())
     };

@@ -158,7 +158,7 @@ impl MeshFacts {
     }
 
     /// Distance of a thing's middle from the viewer.
-    pub(super) fn from_eye(&self, thing: usize) -> f64 {
+    pub(super) fn distance_to_eye(&self, thing: usize) -> f64 {
         self.shapes[thing].bounds.center().distance(self.view.eye)
     }
 

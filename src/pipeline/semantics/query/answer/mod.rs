@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::by_embedding::{EmbeddingScorer, TextEmbeddings};
 use super::grounds;
-use super::language::evaluate::Why;
+use super::language::outcome::Why;
 use super::language::{self, Looks, QueryPlace, QueryScene, Understood};
 use super::localize::{Answer, Hit, Scorer, localize};
 use super::matching::{self, MatchMode};

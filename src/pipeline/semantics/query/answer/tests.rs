@@ -46,7 +46,13 @@ fn ask_of(
     };
     phrases.learn(&phrase, recipe, &mut encode).expect("encodes");
     let language = Language { features: &features, phrases: &phrases, unknown: &[] };
-    answer(&all, &read(&all, text, recipe), (LevelFilter::Auto, &QueryPlace::default()), recipe, with_meaning.then_some(language))
+    answer(
+        &all,
+        &read(&all, text, recipe),
+        (LevelFilter::Auto, &QueryPlace::default()),
+        recipe,
+        with_meaning.then_some(language),
+    )
 }
 
 #[test]
@@ -226,10 +232,18 @@ fn the_recipe_says_what_is_asked_and_when_nothing_fits() {
         let recipe = QueryConfig { rejection, ..by(MatchBy::Embedding) };
         let phrase = ParsedQuery::parse("beaker").expect("a phrase");
         let mut phrases = TextEmbeddings::default();
-        let mut encode = |p: &str| Ok::<_, ()>(if p == "beaker" { vec![0.5134, 0.5, 0.5] } else { vec![0.5, 0.5, 0.5] });
+        let mut encode =
+            |p: &str| Ok::<_, ()>(if p == "beaker" { vec![0.5134, 0.5, 0.5] } else { vec![0.5, 0.5, 0.5] });
         phrases.learn(&phrase, &recipe, &mut encode).expect("encodes");
         let language = Language { features: &features, phrases: &phrases, unknown: &[] };
-        answer(&all, &read(&all, "beaker", &recipe), (LevelFilter::Auto, &QueryPlace::default()), &recipe, Some(language)).chosen(1)
+        answer(
+            &all,
+            &read(&all, "beaker", &recipe),
+            (LevelFilter::Auto, &QueryPlace::default()),
+            &recipe,
+            Some(language),
+        )
+        .chosen(1)
     };
     assert_eq!([Rejection::Never, Rejection::Canonical].map(hardly), [vec![3], vec![3]]);
     assert!(hardly(Rejection::Strict).is_empty());
@@ -252,7 +266,8 @@ fn what_has_another_color_is_not_found_by_embedding() {
         };
         phrases.learn(&phrase, &recipe, &mut encode).expect("encodes");
         let language = Language { features: &features, phrases: &phrases, unknown: &[] };
-        answer(&all, &read(&all, text, &recipe), (LevelFilter::Auto, &QueryPlace::default()), &recipe, Some(language)).chosen(1)
+        answer(&all, &read(&all, text, &recipe), (LevelFilter::Auto, &QueryPlace::default()), &recipe, Some(language))
+            .chosen(1)
     };
     assert_eq!(ask("red mug", Rejection::Strict), [3]);
     assert!(ask("blue mug", Rejection::Strict).is_empty());

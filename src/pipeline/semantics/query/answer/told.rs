@@ -34,12 +34,14 @@ pub(super) fn answer(identities: &Identities, reading: &QueryReading, understood
     let known = identities.words();
     // A name of which every word is said is as sure as a whole name.
     let is_said = |id: IdentityId| known.names(id).iter().any(|name| name.iter().all(|w| said.contains(w)));
-    let score = |id: IdentityId, sure: f64| (if is_said(id) || known.names(id).is_empty() { sure } else { 0.9 * sure }) as f32;
+    let score =
+        |id: IdentityId, sure: f64| (if is_said(id) || known.names(id).is_empty() { sure } else { 0.9 * sure }) as f32;
     let settled = understood.found.settled();
     if understood.is_ambiguous() {
         return Answer::Ambiguous(settled.iter().map(|m| Hit { identity: m.id, score: 1.0, margin: 0.0 }).collect());
     }
-    let mut hits: Vec<Hit> = settled.iter().map(|m| Hit { identity: m.id, score: score(m.id, m.sure), margin: 0.0 }).collect();
+    let mut hits: Vec<Hit> =
+        settled.iter().map(|m| Hit { identity: m.id, score: score(m.id, m.sure), margin: 0.0 }).collect();
     hits.iter_mut().for_each(|hit| hit.margin = hit.score);
     Answer::Found(hits)
 }
@@ -61,7 +63,9 @@ impl QueryAnswer {
     /// `unknown` are the words that nothing here knows.
     pub(crate) fn unexplained(&self, reading: &QueryReading, unknown: &[String]) -> Vec<String> {
         match (&self.answer, &self.understood) {
-            (Answer::NotFound(_), Some(understood)) => understood.unmet.as_ref().map(|u| u.words.clone()).unwrap_or_default(),
+            (Answer::NotFound(_), Some(understood)) => {
+                understood.unmet.as_ref().map(|u| u.words.clone()).unwrap_or_default()
+            }
             (Answer::NotFound(_), None) if self.basis == Basis::Names => vec![reading.text.clone()],
             (Answer::NotFound(_), None) => grounds::telling(unknown),
             _ => Vec::new(),

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::evaluate::{Evaluator, Matches, Outcome, Unmet, Why};
+use super::evaluate::{Evaluator, Outcome};
+use super::outcome::{Matches, Unmet, Why};
 use super::relations::HOLDS;
 use crate::pipeline::semantics::query::lexicon;
 use crate::scene::IdentityId;
@@ -86,7 +87,8 @@ fn sureness(verdict: ColorVerdict) -> f64 {
 pub(super) fn color_of(all: &Evaluator<'_>, id: IdentityId, color: usize) -> Option<f64> {
     let identities = all.scene.identities;
     let names = identities.words().names(id);
-    let named: Vec<usize> = names.iter().flat_map(|name| name.iter().take(name.len().saturating_sub(1)).filter_map(|w| row(w))).collect();
+    let named: Vec<usize> =
+        names.iter().flat_map(|name| name.iter().take(name.len().saturating_sub(1)).filter_map(|w| row(w))).collect();
     if !named.is_empty() {
         return Some(if named.contains(&color) { 1.0 } else { 0.0 });
     }
@@ -94,15 +96,32 @@ pub(super) fn color_of(all: &Evaluator<'_>, id: IdentityId, color: usize) -> Opt
 }
 
 /// Members that adjectives describe; "red or blue" are choices.
-pub(super) fn described(all: &mut Evaluator<'_>, found: Matches, words: &[String], not: bool, at: &Range<usize>) -> Outcome {
+pub(super) fn described(
+    all: &mut Evaluator<'_>,
+    found: Matches,
+    words: &[String],
+    not: bool,
+    at: &Range<usize>,
+) -> Outcome {
     let either = words.iter().any(|w| w == "or" || w == "nor");
-    let words: Vec<String> = words.iter().filter(|w| !JOINTS.contains(&w.as_str()) && !matches!(w.as_str(), "colored" | "coloured")).cloned().collect();
+    let words: Vec<String> = words
+        .iter()
+        .filter(|w| !JOINTS.contains(&w.as_str()) && !matches!(w.as_str(), "colored" | "coloured"))
+        .cloned()
+        .collect();
     if let Some(strange) = words.iter().find(|w| class(all, w) == Adjective::Unknown) {
         let text = format!("\u{201c}{strange}\u{201d} is not understood here.");
-        return Err(Unmet { words: vec![strange.clone()], near: found.ids(), ..all.unmet(Why::NotUnderstood, text, at) });
+        return Err(Unmet {
+            words: vec![strange.clone()],
+            near: found.ids(),
+            ..all.unmet(Why::NotUnderstood, text, at)
+        });
     }
     let sure = |id: IdentityId| {
-        let each = words.iter().enumerate().map(|(k, _)| describes(all, id, if either { &words[k..=k] } else { &words }, if either { 0 } else { k }, "").unwrap_or(0.0));
+        let each = words.iter().enumerate().map(|(k, _)| {
+            describes(all, id, if either { &words[k..=k] } else { &words }, if either { 0 } else { k }, "")
+                .unwrap_or(0.0)
+        });
         if either { each.fold(0.0, f64::max) } else { each.fold(1.0, f64::min) }
     };
     Ok(super::conditions::judged(found, not, |m| sure(m.id)))

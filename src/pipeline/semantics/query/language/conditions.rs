@@ -2,8 +2,9 @@
 
 use std::ops::Range;
 
-use super::evaluate::{Evaluator, Matches, Member, Outcome, Unmet, Why, is_of_view};
+use super::evaluate::{Evaluator, Outcome, is_of_view};
 use super::expression::{Condition, Expression, Order, Relation};
+use super::outcome::{Matches, Member, Unmet, Why};
 use super::relations::{HOLDS, Space};
 use super::{adjectives, order};
 use crate::math::format;
@@ -31,7 +32,8 @@ pub(super) fn filtered(
             let several = !anchor.is_plural() && anchors[0].len() > 1;
             let all_of = anchor.is_plural() && relation.is_of_view();
             let identities = all.scene.identities;
-            let is_piece = |id: IdentityId, whole: IdentityId| id != whole && identities.ancestors(id).any(|i| i == whole);
+            let is_piece =
+                |id: IdentityId, whole: IdentityId| id != whole && identities.ancestors(id).any(|i| i == whole);
             let by_parts = matches!(relation, Relation::On | Relation::In | Relation::PartOf);
             let share = |m: &Member, a: IdentityId| match &space {
                 _ if by_parts && is_piece(m.id, a) => Some(1.0),
@@ -41,7 +43,16 @@ pub(super) fn filtered(
             if several && !not {
                 // Which of the anchors is meant does not matter if only one has anything there.
                 let own = |m: &Member, a: IdentityId| identities.object_of(a) == identities.object_of(m.id);
-                let with_each = anchors[0].iter().map(|a| found.members.iter().filter(|m| !anchors[0].iter().any(|o| own(m, *o)) && share(m, *a).is_some_and(|s| s >= HOLDS[1])).map(|m| m.id).collect::<Vec<_>>());
+                let with_each = anchors[0].iter().map(|a| {
+                    found
+                        .members
+                        .iter()
+                        .filter(|m| {
+                            !anchors[0].iter().any(|o| own(m, *o)) && share(m, *a).is_some_and(|s| s >= HOLDS[1])
+                        })
+                        .map(|m| m.id)
+                        .collect::<Vec<_>>()
+                });
                 let mut with_each: Vec<Vec<IdentityId>> = with_each.filter(|ids| !ids.is_empty()).collect();
                 with_each.dedup();
                 unclear |= with_each.len() > 1;
@@ -50,7 +61,7 @@ pub(super) fn filtered(
                 // "The stick behind the body": the body of the same thing, if it has one.
                 let whole = identities.object_of(m.id);
                 let own = |a: &IdentityId| *a != whole && identities.object_of(*a) == whole;
-                let has_own = several && anchors[0].iter().any(own);
+                let has_own = anchors[0].len() > 1 && anchors[0].iter().any(own);
                 let mut shares = anchors[0].iter().filter(|a| !has_own || own(a)).filter_map(|a| share(m, *a));
                 if all_of {
                     let least = shares.try_fold(1.0, |least: f64, s| Some(least.min(s)));
@@ -119,7 +130,11 @@ fn is_plural(is: &Condition) -> bool {
 
 /// Bytes of a condition: what stands after the things that it is said of.
 fn tail(of: &Expression, at: &Range<usize>) -> Range<usize> {
-    if of.at.end > of.at.start && of.at.end < at.end && of.at.start <= at.start.max(of.at.start) && of.at.end >= at.start {
+    if of.at.end > of.at.start
+        && of.at.end < at.end
+        && of.at.start <= at.start.max(of.at.start)
+        && of.at.end >= at.start
+    {
         of.at.end..at.end
     } else if at.start < of.at.start {
         at.start..of.at.start
@@ -136,14 +151,18 @@ fn ids(all: &mut Evaluator<'_>, e: &Expression) -> Result<Vec<IdentityId>, Unmet
 fn anchors(all: &mut Evaluator<'_>, is: &Condition) -> Result<[Vec<IdentityId>; 2], Unmet> {
     Ok(match is {
         // The exact "bowl" may be a piece of the bowl that is meant.
-        Condition::Placed(Relation::In, anchor) => [all.of_any_level(|all| all.inner(|all| all.set(anchor)))?.ids(), Vec::new()],
+        Condition::Placed(Relation::In, anchor) => {
+            [all.of_any_level(|all| all.inner(|all| all.set(anchor)))?.ids(), Vec::new()]
+        }
         Condition::Placed(_, anchor) | Condition::Among(anchor) => [ids(all, anchor)?, Vec::new()],
         Condition::Compared { than: of, .. } | Condition::Within { of, .. } => [ids(all, of)?, Vec::new()],
         Condition::Between(a, b) => [ids(all, a)?, ids(all, b)?],
         Condition::Has(piece) => match ids(all, piece) {
             Ok(pieces) => [pieces, Vec::new()],
             // "A mug without a straw": nothing here has one, if that is a thing at all.
-            Err(unmet) if unmet.why <= Why::Unknown && unmet.words.iter().all(|w| super::is_a_thing(w)) => [Vec::new(), Vec::new()],
+            Err(unmet) if unmet.why <= Why::Unknown && unmet.words.iter().all(|w| super::is_a_thing(w)) => {
+                [Vec::new(), Vec::new()]
+            }
             Err(unmet) => return Err(unmet),
         },
         Condition::Adjective(_) | Condition::Measured { .. } | Condition::Side { .. } => [Vec::new(), Vec::new()],
@@ -177,7 +196,13 @@ fn within(
         let gaps = of.iter().filter(|id| **id != m.id).filter_map(|id| space.gap(m.id, *id));
         let gap = gaps.fold(f64::INFINITY, f64::min) * scale;
         let by = if near { meters - gap } else { gap - meters };
-        if !gap.is_finite() || by < 0.0 { 0.0 } else if by > 0.05 * meters { 1.0 } else { HOLDS[1] }
+        if !gap.is_finite() || by < 0.0 {
+            0.0
+        } else if by > 0.05 * meters {
+            1.0
+        } else {
+            HOLDS[1]
+        }
     };
     Ok(judged(found, not, share))
 }

@@ -3,90 +3,10 @@
 use std::ops::Range;
 
 use super::expression::{Condition, Expression, Order, Relation, SetOf};
+use super::outcome::{Matches, Member, QueryStep, Unmet, Why};
 use super::relations::{HOLDS, Space};
 use super::{Looks, QueryScene, conditions, nouns, order};
 use crate::scene::{IdentityId, LevelFilter};
-
-/// Identity in a set.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Member {
-    pub(crate) id: IdentityId,
-    /// Sureness from 0 to 1 that it belongs there.
-    pub(crate) sure: f64,
-    /// Fit of the words: 0 for its whole name, 1 for words of it, 2 for words of its wholes too, 3 for a kind of thing.
-    pub(crate) rank: u8,
-}
-
-/// Set of identities that an expression stands for.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Matches {
-    pub(crate) members: Vec<Member>,
-    /// True if one thing is asked for in a place where several fit, with different results.
-    pub(crate) unclear: bool,
-}
-
-impl Matches {
-    pub(crate) fn new(members: Vec<Member>) -> Self {
-        Self { members, unclear: false }
-    }
-
-    /// Those that the words fit best.
-    pub(crate) fn settled(&self) -> Vec<Member> {
-        let best = self.members.iter().map(|m| m.rank).min();
-        self.members.iter().filter(|m| Some(m.rank) == best).copied().collect()
-    }
-
-    pub(crate) fn ids(&self) -> Vec<IdentityId> {
-        self.members.iter().map(|m| m.id).collect()
-    }
-
-    /// Keeps the members for which `sure` gives a sureness; `None` removes one.
-    pub(crate) fn kept(self, mut sure: impl FnMut(&Member) -> Option<f64>) -> Self {
-        let keep = |m: Member| sure(&m).map(|s| Member { sure: m.sure.min(s), ..m });
-        Self { members: self.members.into_iter().filter_map(keep).collect(), ..self }
-    }
-}
-
-/// Reason for which an expression has no members.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Unmet {
-    pub(crate) why: Why,
-    /// Reason in a sentence.
-    pub(crate) text: String,
-    /// Words that are the reason; may be empty.
-    pub(crate) words: Vec<String>,
-    pub(crate) near: Vec<IdentityId>,
-    /// Bytes of the text that are the reason.
-    pub(crate) at: Range<usize>,
-}
-
-/// Kind of a reason.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(crate) enum Why {
-    /// All words are understood, and nothing in the scene is so.
-    Nothing,
-    /// A word names nothing in the scene.
-    Unknown,
-    /// A word has no meaning here.
-    NotUnderstood,
-    /// The encoder failed.
-    Failed,
-}
-
-/// Step of an evaluation.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct QueryStep {
-    /// Bytes of the text that ask for it.
-    pub(crate) at: Range<usize>,
-    /// Effect in words: "left of the lamp, seen from here".
-    pub(crate) text: String,
-    /// Number of identities that are left.
-    pub(crate) left: usize,
-    /// True if it holds only in part.
-    pub(crate) guess: bool,
-    /// Number of expressions around it.
-    pub(crate) depth: usize,
-}
 
 pub(super) type Outcome = Result<Matches, Unmet>;
 
@@ -119,7 +39,21 @@ impl<'a> Evaluator<'a> {
         let space = scene.place.view.map(|view| Space::new(scene.identities, view));
         let (steps, notes, looked, antecedent, depth, any_level) = (Vec::new(), Vec::new(), false, None, 0, false);
         let (with_stages, idle, of_view) = (false, 0, false);
-        Self { scene, space, text, looks, steps, notes, looked, antecedent, depth, any_level, with_stages, idle, of_view }
+        Self {
+            scene,
+            space,
+            text,
+            looks,
+            steps,
+            notes,
+            looked,
+            antecedent,
+            depth,
+            any_level,
+            with_stages,
+            idle,
+            of_view,
+        }
     }
 
     /// Text of some bytes.
@@ -159,7 +93,12 @@ impl<'a> Evaluator<'a> {
             SetOf::PartOf(piece, whole) => self.part_of(piece, whole, e)?,
             SetOf::Where { of, is, not } => match conditions::filtered(self, of, is, *not, &e.at) {
                 // "What is under the mug": the table.
-                Err(unmet) if unmet.why == Why::Nothing && !self.with_stages && of.is_any() && matches!(is, Condition::Placed(..)) => {
+                Err(unmet)
+                    if unmet.why == Why::Nothing
+                        && !self.with_stages
+                        && of.is_any()
+                        && matches!(is, Condition::Placed(..)) =>
+                {
                     self.with_stages = true;
                     let again = conditions::filtered(self, of, is, *not, &e.at);
                     self.with_stages = false;
@@ -258,7 +197,8 @@ impl<'a> Evaluator<'a> {
         }
         // Things in or on a thing need not be parts of it: the candle on the cake.
         let lies = |s: &Space<'_>, m: &Member| {
-            let share = |relation| wholes.members.iter().filter_map(|w| s.share(relation, m.id, w.id)).fold(0.0, f64::max);
+            let share =
+                |relation| wholes.members.iter().filter_map(|w| s.share(relation, m.id, w.id)).fold(0.0, f64::max);
             Some(share(Relation::In)).filter(|share| *share >= HOLDS[0])
         };
         let inside = self.space(&e.at).ok().map(|space| pieces.clone().kept(|m| lies(space, m)));
@@ -291,9 +231,14 @@ impl<'a> Evaluator<'a> {
 
     fn no_piece(&self, piece: &Expression, wholes: &[Member], unmet: Unmet, e: &Expression) -> Unmet {
         let all = self.scene.identities;
-        let known: Vec<IdentityId> = wholes.iter().flat_map(|w| all.children(w.id)).filter(|id| self.scene.is_there(*id)).collect();
+        let known: Vec<IdentityId> =
+            wholes.iter().flat_map(|w| all.children(w.id)).filter(|id| self.scene.is_there(*id)).collect();
         let parts: Vec<String> = known.iter().take(12).map(|id| all.label(*id)).collect();
-        let parts = if parts.is_empty() { "no parts are known of it".into() } else { format!("its parts: {}", parts.join(", ")) };
+        let parts = if parts.is_empty() {
+            "no parts are known of it".into()
+        } else {
+            format!("its parts: {}", parts.join(", "))
+        };
         let name = wholes.first().map(|w| all.full_name(w.id)).unwrap_or_default();
         let text = format!("The {name} has no \u{201c}{}\u{201d} here; {parts}.", self.said(&piece.at));
         Unmet { why: Why::Nothing, text, words: unmet.words, near: known, at: e.at.clone() }

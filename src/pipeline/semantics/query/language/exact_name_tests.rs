@@ -6,17 +6,17 @@ use std::path::{Path, PathBuf};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg32;
 
+use crate::io::gltf_mesh;
 use crate::pipeline::semantics::query::answer::{Language, answer};
 use crate::pipeline::semantics::query::by_embedding::TextEmbeddings;
 use crate::pipeline::semantics::query::language::QueryPlace;
 use crate::pipeline::semantics::query::localize::Answer;
 use crate::pipeline::semantics::query::reading::QueryReading;
 use crate::pipeline::semantics::query::recipe::{MatchBy, QueryConfig};
-use crate::scene::identity::whole_names::key;
-use crate::io::gltf_mesh;
 use crate::pipeline::synth::demo_glb;
 use crate::pipeline::synth::levels::identities;
 use crate::pipeline::synth::options::Levels;
+use crate::scene::identity::whole_names::key;
 use crate::scene::{Identities, IdentityId, LanguageFeatures, Level, LevelFilter, NO_IDENTITY, ViewFeatures};
 
 /// Names that the grammar takes apart, or takes for something else.

@@ -131,32 +131,68 @@ pub(crate) enum SetOf {
     /// By a whole name.
     Called(String),
     /// Any object ("thing"), or any part.
-    Any { parts: bool, plural: bool },
+    Any {
+        parts: bool,
+        plural: bool,
+    },
     /// Things like the one that was spoken of last ("one").
-    Kin { plural: bool },
+    Kin {
+        plural: bool,
+    },
     /// Identity that was spoken of last ("it"), or all of the last answer ("them").
-    Last { plural: bool },
+    Last {
+        plural: bool,
+    },
     /// By number.
     Numbered(IdentityId),
     PartOf(Inner, Inner),
     /// Those of a set for which a condition holds, or does not.
-    Where { of: Inner, is: Condition, not: bool },
+    Where {
+        of: Inner,
+        is: Condition,
+        not: bool,
+    },
     /// Those with the most or the least of a quantity: `count` of them, after the `first`.
-    Ranked { of: Inner, order: Order, most: bool, first: usize, count: usize, superlative: bool },
+    Ranked {
+        of: Inner,
+        order: Order,
+        most: bool,
+        first: usize,
+        count: usize,
+        superlative: bool,
+    },
     /// Those nearest to another thing, or farthest from it.
-    Nearest { of: Inner, to: Inner, far: bool, first: usize, count: usize },
+    Nearest {
+        of: Inner,
+        to: Inner,
+        far: bool,
+        first: usize,
+        count: usize,
+    },
     /// One by its place in an order that is not said: "the third mug".
-    Nth { of: Inner, nth: usize },
+    Nth {
+        of: Inner,
+        nth: usize,
+    },
     /// All of an exact number.
-    Counted { of: Inner, count: usize },
+    Counted {
+        of: Inner,
+        count: usize,
+    },
     /// All of them; `both` if there must be two.
-    Every { of: Inner, both: bool },
+    Every {
+        of: Inner,
+        both: bool,
+    },
     /// Any one of them ("a mug").
     One(Inner),
     /// All but the last one that was spoken of.
     Other(Inner),
     /// All of several sets; with `either`, those that are there.
-    Union { of: Vec<Expression>, either: bool },
+    Union {
+        of: Vec<Expression>,
+        either: bool,
+    },
     Except(Inner, Inner),
 }
 
@@ -169,15 +205,30 @@ pub(crate) enum Condition {
     Between(Inner, Inner),
     Has(Inner),
     /// More or less of a quantity than another thing.
-    Compared { order: Order, more: bool, than: Inner },
+    Compared {
+        order: Order,
+        more: bool,
+        than: Inner,
+    },
     /// More or less than a length in meters.
-    Measured { order: Order, more: bool, meters: f64 },
+    Measured {
+        order: Order,
+        more: bool,
+        meters: f64,
+    },
     /// Nearer to, or farther from, a thing than a length in meters.
-    Within { near: bool, meters: f64, of: Inner },
+    Within {
+        near: bool,
+        meters: f64,
+        of: Inner,
+    },
     /// Of another set: "that are toys".
     Among(Inner),
     /// On one side of the middle of the picture: "the mugs on the left".
-    Side { order: Order, most: bool },
+    Side {
+        order: Order,
+        most: bool,
+    },
 }
 
 /// Sentence: a question about a set.
@@ -209,8 +260,14 @@ impl Expression {
     /// Returns whether several things are meant.
     pub(crate) fn is_plural(&self) -> bool {
         match &self.set {
-            SetOf::Words { plural, .. } | SetOf::Any { plural, .. } | SetOf::Kin { plural } | SetOf::Last { plural } => *plural,
-            SetOf::Called(name) => name.split_whitespace().next_back().is_some_and(|w| name_words::singular(&w.to_lowercase()) != w.to_lowercase()),
+            SetOf::Words { plural, .. }
+            | SetOf::Any { plural, .. }
+            | SetOf::Kin { plural }
+            | SetOf::Last { plural } => *plural,
+            SetOf::Called(name) => name
+                .split_whitespace()
+                .next_back()
+                .is_some_and(|w| name_words::singular(&w.to_lowercase()) != w.to_lowercase()),
             SetOf::Union { of, either: true } => of.iter().any(Self::is_plural),
             SetOf::Numbered(_) | SetOf::One(_) | SetOf::Nth { .. } => false,
             SetOf::PartOf(of, _) | SetOf::Where { of, .. } | SetOf::Other(of) | SetOf::Except(of, _) => of.is_plural(),

@@ -15,6 +15,7 @@ pub(crate) mod expression;
 pub(crate) mod grammar;
 pub(crate) mod nouns;
 pub(crate) mod order;
+pub(crate) mod outcome;
 pub(crate) mod relations;
 pub(crate) mod said;
 pub(crate) mod slips;
@@ -23,8 +24,9 @@ pub(crate) mod words;
 
 use glam::DVec3;
 
-use self::evaluate::{Evaluator, Matches, QueryStep, Unmet};
+use self::evaluate::Evaluator;
 use self::expression::{Asks, Expression, Sentence, SetOf};
+use self::outcome::{Matches, QueryStep, Unmet};
 use self::relations::Viewpoint;
 use super::lexicon;
 use super::parse::ParsedQuery;
@@ -109,6 +111,8 @@ pub(crate) struct Understood {
     pub(crate) of_view: bool,
     /// Number of conditions that removed nothing.
     idle: usize,
+    /// True if it joins several sets.
+    is_union: bool,
 }
 
 impl Understood {
@@ -132,9 +136,8 @@ pub(crate) fn is_thing(text: &str, identities: &Identities) -> [bool; 2] {
     let all = tokens::tokens(text);
     let sets = grammar::Grammar::new(text, all.iter().collect(), identities).all();
     let known = identities.words();
-    let is_known = |phrase: &ParsedQuery| {
-        phrase.text.split(' ').all(|w| known.has(w) || crate::scene::colors::row(w).is_some())
-    };
+    let is_known =
+        |phrase: &ParsedQuery| phrase.text.split(' ').all(|w| known.has(w) || crate::scene::colors::row(w).is_some());
     let sentence = |set: Expression| [Sentence { asks: Asks::Things, set }];
     let any = !sets.is_empty();
     [any, sets.into_iter().any(|set| phrases(&sentence(set)).iter().all(is_known))]
@@ -238,8 +241,9 @@ fn answer<'a>(
         Ok(found) => (found, None),
         Err(unmet) => (Matches::default(), Some(unmet)),
     };
+    let is_union = matches!(sentence.set.set, SetOf::Union { .. });
     let (asks, said, readings) = (sentence.asks, None, 1);
-    Understood { found, plural, asks, steps, notes, said, unmet, by_looks: looked, readings, of_view, idle }
+    Understood { found, plural, asks, steps, notes, said, unmet, by_looks: looked, readings, of_view, idle, is_union }
 }
 
 /// Chooses between the answers of two readings: one that finds a thing, and clearly; if both do and differ, both.
@@ -267,6 +271,11 @@ fn better(old: Understood, new: Understood) -> Understood {
     // A condition is said in order to tell things apart: "the mug on the table that is taller than the lamp".
     if old.idle != new.idle {
         return if old.idle < new.idle { old } else { new };
+    }
+    // "The lid and the knob of the kettle": both of the kettle, if it has both.
+    let (a, b) = (ids(&old), ids(&new));
+    if old.is_union && new.is_union && (a.iter().all(|id| b.contains(id)) || b.iter().all(|id| a.contains(id))) {
+        return if a.len() < b.len() { old } else { new };
     }
     let known = ids(&old);
     let more = new.found.settled().into_iter().filter(|m| !known.contains(&m.id));

@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use super::adjectives::{self, Adjective};
-use super::evaluate::{Evaluator, Matches, Member, Outcome, Unmet, Why};
+use super::evaluate::{Evaluator, Outcome};
+use super::outcome::{Matches, Member, Unmet, Why};
 use crate::models;
 use crate::pipeline::semantics::query::lexicon::{self, Kinship};
 use crate::pipeline::semantics::query::parse::ParsedQuery;
@@ -47,7 +48,8 @@ pub(super) fn any(all: &mut Evaluator<'_>, parts: bool) -> Matches {
     let stages = all.space.as_ref().filter(|s| s.shapes.are_known() && !all.with_stages);
     let stages = stages.map(|s| s.stages()).unwrap_or_default();
     let level = if parts { Level::Part } else { Level::Object };
-    let wanted = identities.iter().filter(|(id, i)| i.level == level && !stages.contains(id) && all.scene.is_there(*id));
+    let wanted =
+        identities.iter().filter(|(id, i)| i.level == level && !stages.contains(id) && all.scene.is_there(*id));
     let found: Vec<Member> = wanted.map(|(id, _)| member(id)).collect();
     if !stages.is_empty() && !parts && found.len() < identities.count(level) {
         let names: Vec<String> = stages.iter().map(|id| identities.label(*id)).collect();
@@ -71,7 +73,8 @@ pub(super) fn kin(all: &mut Evaluator<'_>, at: &Range<usize>) -> Outcome {
     let heads = talk.last.iter().filter_map(|id| known.names(*id).first()?.last());
     let heads: Vec<&String> = heads.collect();
     let like = |id: &IdentityId| known.names(*id).iter().any(|name| name.last().is_some_and(|w| heads.contains(&w)));
-    let found: Vec<Member> = all.scene.identities.iter().map(|(id, _)| id).filter(|id| like(id) && all.accepts(*id)).map(member).collect();
+    let found: Vec<Member> =
+        all.scene.identities.iter().map(|(id, _)| id).filter(|id| like(id) && all.accepts(*id)).map(member).collect();
     if found.is_empty() && talk.last.is_empty() {
         return Ok(any(all, false));
     }
@@ -107,7 +110,11 @@ pub(super) fn words(all: &mut Evaluator<'_>, words: &[String], plural: bool, at:
     let found = if all.scene.by_names { by_words(all, words)? } else { Matches::default() };
     if !found.members.is_empty() {
         // All of several are meant, also those with more in their names.
-        let found = if plural { Matches::new(found.members.into_iter().map(|m| Member { rank: m.rank.max(1), ..m }).collect()) } else { found };
+        let found = if plural {
+            Matches::new(found.members.into_iter().map(|m| Member { rank: m.rank.max(1), ..m }).collect())
+        } else {
+            found
+        };
         all.step(at, format!("\u{201c}{}\u{201d}", all.said(at)), &found);
         return Ok(found);
     }
@@ -166,7 +173,9 @@ fn by_heads(all: &Evaluator<'_>, words: &[String]) -> Matches {
 fn is_head(name: &[String], head: &str) -> bool {
     let thing = name.split(|w| w == "with" || w == "of").next().unwrap_or_default();
     let tells_apart = |w: &String| w.chars().count() == 1 || w.bytes().all(|b| b.is_ascii_digit());
-    let at_a_side = |w: &String| matches!(w.as_str(), "front" | "back" | "rear" | "left" | "right" | "top" | "bottom" | "upper" | "lower");
+    let at_a_side = |w: &String| {
+        matches!(w.as_str(), "front" | "back" | "rear" | "left" | "right" | "top" | "bottom" | "upper" | "lower")
+    };
     thing.last().is_some_and(|w| w == head)
         || thing.iter().rev().find(|w| !tells_apart(w) && !at_a_side(w)).is_some_and(|w| w == head)
 }
@@ -188,7 +197,9 @@ fn by_kind(all: &mut Evaluator<'_>, words: &[String]) -> Matches {
         let asked = kind.join(" ");
         for (id, _) in identities.iter().filter(|(id, _)| all.accepts(*id)) {
             let named = known.names(id).iter().map(|name| name.join(" "));
-            let Some((name, kinship)) = named.clone().find_map(|name| Some((name.clone(), lexicon::is_a(&name, &asked)?))) else {
+            let Some((name, kinship)) =
+                named.clone().find_map(|name| Some((name.clone(), lexicon::is_a(&name, &asked)?)))
+            else {
                 continue;
             };
             if let Some(sure) = adjectives::described_by(all, id, rest, &asked) {
@@ -218,14 +229,20 @@ fn by_kind(all: &mut Evaluator<'_>, words: &[String]) -> Matches {
 }
 
 /// Identities that the encoder finds, if it may be used; `None` if not, or if there are none.
-fn looked_for(all: &mut Evaluator<'_>, words: &[String], plural: bool, at: &Range<usize>) -> Result<Option<Matches>, Unmet> {
+fn looked_for(
+    all: &mut Evaluator<'_>,
+    words: &[String],
+    plural: bool,
+    at: &Range<usize>,
+) -> Result<Option<Matches>, Unmet> {
     let phrase = ParsedQuery::undivided(words.join(" "));
     let Some(looks) = all.looks.as_deref_mut() else { return Ok(None) };
     let seen = match looks.find(&phrase, plural) {
         Ok(seen) => seen,
         Err(problem) => return Err(all.unmet(Why::Failed, problem, at)),
     };
-    let found: Vec<Member> = seen.into_iter().filter(|(id, _)| all.accepts(*id)).map(|(id, sure)| Member { sure, ..member(id) }).collect();
+    let found: Vec<Member> =
+        seen.into_iter().filter(|(id, _)| all.accepts(*id)).map(|(id, sure)| Member { sure, ..member(id) }).collect();
     all.looked |= !found.is_empty();
     Ok((!found.is_empty()).then(|| Matches::new(found)))
 }
@@ -235,8 +252,14 @@ fn not_there(all: &Evaluator<'_>, words: &[String], at: &Range<usize>) -> Unmet 
     let identities = all.scene.identities;
     let known = identities.words();
     let said: String = words.join(" ").chars().take(80).collect();
-    let Some((head, rest)) = words.split_last() else { return all.unmet(Why::NotUnderstood, "Nothing is asked for.", at) };
-    let heads = known.with(head).iter().copied().filter(|id| all.accepts(*id) && known.names(*id).iter().any(|n| is_head(n, head)));
+    let Some((head, rest)) = words.split_last() else {
+        return all.unmet(Why::NotUnderstood, "Nothing is asked for.", at);
+    };
+    let heads = known
+        .with(head)
+        .iter()
+        .copied()
+        .filter(|id| all.accepts(*id) && known.names(*id).iter().any(|n| is_head(n, head)));
     let heads: Vec<IdentityId> = heads.take(6).collect();
     if !heads.is_empty() {
         // The thing is there, but not so.
@@ -245,15 +268,22 @@ fn not_there(all: &Evaluator<'_>, words: &[String], at: &Range<usize>) -> Unmet 
         let strange = left.iter().any(|w| adjectives::class(all, w) == Adjective::Unknown);
         let why = if strange { Why::NotUnderstood } else { Why::Unknown };
         let near: Vec<String> = heads.iter().take(3).map(|id| identities.full_name(*id)).collect();
-        let text = format!("No {head} here is \u{201c}{}\u{201d}. The nearest names: {}.", left.join(" "), near.join(", "));
+        let text =
+            format!("No {head} here is \u{201c}{}\u{201d}. The nearest names: {}.", left.join(" "), near.join(", "));
         return Unmet { why, text, words: left, near: heads, at: at.clone() };
     }
     let unknown: Vec<String> = words.iter().filter(|w| !known.has(w) && row(w).is_none()).cloned().collect();
     let is_like = |word: &str| words.iter().any(|w| super::alike(word, w));
     let near = identities.iter().map(|(id, _)| id).filter(|id| all.scene.is_there(*id));
-    let near: Vec<IdentityId> = near.filter(|id| known.names(*id).iter().flatten().any(|w| is_like(w))).take(6).collect();
+    let near: Vec<IdentityId> =
+        near.filter(|id| known.names(*id).iter().flatten().any(|w| is_like(w))).take(6).collect();
     let list = |ids: &[IdentityId]| ids.iter().map(|id| identities.full_name(*id)).collect::<Vec<_>>().join(", ");
-    let some: Vec<IdentityId> = identities.iter().filter(|(id, i)| i.level == Level::Object && !i.names.is_empty() && all.scene.is_there(*id)).map(|(id, _)| id).take(8).collect();
+    let some: Vec<IdentityId> = identities
+        .iter()
+        .filter(|(id, i)| i.level == Level::Object && !i.names.is_empty() && all.scene.is_there(*id))
+        .map(|(id, _)| id)
+        .take(8)
+        .collect();
     let more = match (near.is_empty(), some.is_empty()) {
         (false, _) => format!(" The nearest names: {}.", list(&near)),
         (true, false) => format!(" Some names here: {}.", list(&some)),

@@ -3,8 +3,9 @@
 use std::ops::Range;
 
 use super::conditions::judged;
-use super::evaluate::{Evaluator, Matches, Member, Outcome, Unmet, Why};
+use super::evaluate::{Evaluator, Outcome};
 use super::expression::Order;
+use super::outcome::{Matches, Member, Unmet, Why};
 use super::relations::Space;
 use crate::scene::{IdentityId, Level};
 
@@ -91,7 +92,8 @@ fn pick(
         return Err(Unmet { near, ..all.unmet(Why::Nothing, text, at) });
     }
     let last = first + count - 1;
-    let alike = |a: usize, b: usize| (values[b].0 - values[a].0).abs() <= slack(&values[a]).max(slack(&values[b])).max(1e-12);
+    let alike =
+        |a: usize, b: usize| (values[b].0 - values[a].0).abs() <= slack(&values[a]).max(slack(&values[b])).max(1e-12);
     let (mut from, mut to) = (first, last);
     while from > 0 && alike(from - 1, from) {
         from -= 1;
@@ -123,7 +125,8 @@ pub(super) fn nearest(
         };
         // What carries a thing touches it, and is not meant by "nearest".
         let carries = |id: IdentityId| {
-            identities.get(id).is_some_and(|i| i.level == Level::Object) && (space.rests(anchor.id, id, 4) || space.rests(id, anchor.id, 4))
+            identities.get(id).is_some_and(|i| i.level == Level::Object)
+                && (space.rests(anchor.id, id, 4) || space.rests(id, anchor.id, 4))
         };
         let far_of = |m: &Member| {
             let gap = space.gap(m.id, anchor.id)?;
@@ -133,7 +136,8 @@ pub(super) fn nearest(
         };
         let members = found.settled();
         let all_free = members.iter().filter(|m| !related(m.id) && !carries(m.id)).copied().collect::<Vec<_>>();
-        let free = if all_free.is_empty() { members.into_iter().filter(|m| !related(m.id)).collect() } else { all_free };
+        let free =
+            if all_free.is_empty() { members.into_iter().filter(|m| !related(m.id)).collect() } else { all_free };
         let mut values: Vec<(f64, Member)> = free.iter().filter_map(|m| Some((far_of(m)?, *m))).collect();
         values.sort_by(|a, b| a.0.total_cmp(&b.0));
         let size = space.shapes.get(anchor.id).map_or(0.0, |s| s.bounds.radius());
@@ -166,7 +170,13 @@ pub(super) fn compared(
             let theirs = of(*other)?;
             let slack = slack(space, m.id, order, own).max(slack(space, *other, order, theirs)).max(1e-12);
             let by = sign * (own - theirs);
-            Some(if by > slack { 1.0 } else if by > -slack { 0.7 } else { 0.0 })
+            Some(if by > slack {
+                1.0
+            } else if by > -slack {
+                0.7
+            } else {
+                0.0
+            })
         };
         than.iter().filter_map(over).fold(1.0, f64::min)
     };

@@ -90,7 +90,13 @@ impl<'a> Space<'a> {
             Relation::Under => {
                 let lifted = self.over(t, a, 0.0).max(self.over(a, t, 0.0)) >= 0.5;
                 let carried = self.rests(anchor, thing, 1);
-                if carried { 1.0 } else if lifted { before(t, a, |p| p.dot(up)) } else { 0.0 }
+                if carried {
+                    1.0
+                } else if lifted {
+                    before(t, a, |p| p.dot(up))
+                } else {
+                    0.0
+                }
             }
             Relation::In => self.inside(t, a).max(self.heaped(thing, t, anchor, a)),
             Relation::Near => near(t, a, 1.0),
@@ -108,7 +114,8 @@ impl<'a> Space<'a> {
     fn beside(&self, t: &SampledShape, a: &SampledShape, right: DVec3) -> f64 {
         let eye = self.view.eye;
         let in_space = before(t, a, |p| (p - eye).dot(right));
-        let depth = |s: &SampledShape| s.points().iter().map(|p| (*p - eye).dot(self.axes.ahead)).fold(f64::INFINITY, f64::min);
+        let depth =
+            |s: &SampledShape| s.points().iter().map(|p| (*p - eye).dot(self.axes.ahead)).fold(f64::INFINITY, f64::min);
         // What is behind the camera has no side in its picture.
         if depth(t).min(depth(a)) <= 1e-6 {
             return 0.0;
@@ -140,10 +147,12 @@ impl<'a> Space<'a> {
     /// Returns 1 for a piece that lies on another piece inside: the pear on the apple in the bowl.
     fn heaped(&self, thing: IdentityId, t: &SampledShape, anchor: IdentityId, a: &SampledShape) -> f64 {
         let parent = self.identities.get(thing).map(|i| i.parent);
-        let siblings = self.identities.iter().filter(|(id, i)| Some(i.parent) == parent && ![thing, anchor].contains(id));
+        let siblings =
+            self.identities.iter().filter(|(id, i)| Some(i.parent) == parent && ![thing, anchor].contains(id));
         let is_under = |b: &SampledShape| self.inside(b, a) >= HOLDS[0] && self.carries(t, b);
         let small = t.bounds.radius() < a.bounds.radius();
-        let lies = small && siblings.filter(|(_, i)| i.level == Level::Part).filter_map(|(id, _)| self.shapes.get(id)).any(is_under);
+        let lies = small
+            && siblings.filter(|(_, i)| i.level == Level::Part).filter_map(|(id, _)| self.shapes.get(id)).any(is_under);
         f64::from(u8::from(lies))
     }
 
@@ -155,7 +164,10 @@ impl<'a> Space<'a> {
         let gap = bottom.0 - top.1;
         // A table is not on the ball under it: both stand on the floor.
         let is_higher = bottom.0 - top.0 > 0.25 * under && bottom.1 > top.1;
-        is_higher && gap >= -0.35 * height - 0.05 * under && gap <= 0.3 * height + 0.02 * under && self.over(t, a, 0.02) >= 0.4
+        is_higher
+            && gap >= -0.35 * height - 0.05 * under
+            && gap <= 0.3 * height + 0.02 * under
+            && self.over(t, a, 0.02) >= 0.4
     }
 
     /// Returns whether `thing` rests on `anchor`, on a piece of it, or on something that does and carries little else.
@@ -170,10 +182,13 @@ impl<'a> Space<'a> {
             return false;
         }
         let stages = self.stages();
-        let between = self.identities.iter().filter(|(id, i)| {
-            i.level == Level::Object && *id != thing && *id != anchor && !stages.contains(id)
-        });
-        between.filter(|(id, _)| self.shapes.get(*id).is_some_and(|b| self.carries(t, b))).any(|(id, _)| self.rests(id, anchor, depth - 1))
+        let between = self
+            .identities
+            .iter()
+            .filter(|(id, i)| i.level == Level::Object && *id != thing && *id != anchor && !stages.contains(id));
+        between
+            .filter(|(id, _)| self.shapes.get(*id).is_some_and(|b| self.carries(t, b)))
+            .any(|(id, _)| self.rests(id, anchor, depth - 1))
     }
 
     /// Objects that directly or indirectly carry at least half of the others: floor, table.
@@ -185,7 +200,8 @@ impl<'a> Space<'a> {
         /// Largest footprints that are tried, and most things that are tried with them.
         const TRIED: [usize; 2] = [12, 400];
         let objects = self.identities.iter().filter(|(_, i)| i.level == Level::Object);
-        let objects: Vec<(IdentityId, &SampledShape)> = objects.filter_map(|(id, _)| Some((id, self.shapes.get(id)?))).collect();
+        let objects: Vec<(IdentityId, &SampledShape)> =
+            objects.filter_map(|(id, _)| Some((id, self.shapes.get(id)?))).collect();
         let footprint = |s: &SampledShape| {
             let [a, b] = [self.axes.right, self.axes.ahead].map(|axis| s.span(axis));
             (a.1 - a.0) * (b.1 - b.0)
@@ -196,7 +212,9 @@ impl<'a> Space<'a> {
         let every = objects.len().div_ceil(TRIED[1]).max(1);
         let tried: Vec<_> = objects.iter().step_by(every).collect();
         let direct = |id: IdentityId, t: &SampledShape, on: IdentityId, a: &SampledShape| {
-            id != on && (self.carries(t, a) || self.identities.children(on).filter_map(|p| self.shapes.get(p)).any(|a| self.carries(t, a)))
+            id != on
+                && (self.carries(t, a)
+                    || self.identities.children(on).filter_map(|p| self.shapes.get(p)).any(|a| self.carries(t, a)))
         };
         let mut carried: Vec<(IdentityId, Vec<IdentityId>)> = Vec::new();
         for (on, a) in &widest {
@@ -254,16 +272,14 @@ fn share_of(shape: &SampledShape, fits: impl Fn(&&DVec3) -> bool) -> f64 {
     all.iter().filter(fits).count() as f64 / all.len().max(1) as f64
 }
 
-/// Share of pairs of points of which that of `t` comes before that of `a`.
+/// Share of the points of `t` that come before most of `a`.
 fn before(t: &SampledShape, a: &SampledShape, value: impl Fn(DVec3) -> f64) -> f64 {
+    /// Share of an anchor that may come before a thing that is before it.
+    const OVERLAP: f64 = 0.25;
     let mut after: Vec<f64> = a.spread().iter().map(|p| value(*p)).collect();
     after.sort_by(f64::total_cmp);
-    let passed = |p: &DVec3| {
-        let x = value(*p);
-        after.len() - after.partition_point(|y| *y <= x)
-    };
-    let pairs: usize = t.spread().iter().map(passed).sum();
-    pairs as f64 / (after.len() * t.spread().len()).max(1) as f64
+    let limit = after.get((OVERLAP * after.len() as f64) as usize).copied().unwrap_or(f64::NEG_INFINITY);
+    share_of(t, |p| value(**p) < limit)
 }
 
 /// Nearness of two things, 1 within half of `reach` times the size of the smaller one, falling to 0 at twice of it.
@@ -299,14 +315,15 @@ mod tests {
     fn sides_are_those_of_the_view() {
         let view = Viewpoint { eye: DVec3::new(0.0, -3.0, 1.0), forward: DVec3::new(0.0, 1.0, -0.3), up: DVec3::Z };
         assert!((view.frame().right - DVec3::X).length() < 1e-9);
-        let all = scene(&[([0.0; 3], [0.4, 0.3, 0.2]), ([-0.4, 0.0, 0.0], [0.1; 3]), ([-0.15, 0.0, 0.0], [0.3, 0.3, 0.1])]);
+        let all =
+            scene(&[([0.0; 3], [0.4, 0.3, 0.2]), ([-0.4, 0.0, 0.0], [0.1; 3]), ([-0.15, 0.0, 0.0], [0.3, 0.3, 0.1])]);
         let (laptop, mug, mat) = (1, 2, 3);
         assert_eq!(share(&all, view, Relation::LeftOf, mug, laptop), 1.0);
         assert_eq!(share(&all, view, Relation::RightOf, mug, laptop), 0.0);
         assert_eq!(share(&all, view, Relation::RightOf, laptop, mug), 1.0);
         // Half over it: neither sure nor wrong.
         let half = share(&all, view, Relation::LeftOf, mat, laptop);
-        assert!((HOLDS[1]..1.0).contains(&half), "{half}");
+        assert!((0.3..1.0).contains(&half), "{half}");
         let turned = Viewpoint { eye: -view.eye, forward: -view.forward, ..view };
         assert_eq!(share(&all, turned, Relation::RightOf, mug, laptop), 1.0, "seen from the other side");
         let from_left = Viewpoint { eye: DVec3::new(-3.0, 0.0, 1.0), forward: DVec3::X, ..view };
@@ -344,9 +361,15 @@ mod tests {
         let knob = all.add(Level::Part, 1, vec![]);
         let view = Viewpoint { eye: DVec3::new(0.0, -3.0, 0.0), forward: DVec3::Y, up: DVec3::Z };
         assert_eq!(share(&all, view, Relation::On, knob, 1), 1.0);
-        assert_eq!((share(&all, view, Relation::PartOf, knob, 2), share(&all, view, Relation::LeftOf, 1, knob)), (0.0, -1.0));
+        assert_eq!(
+            (share(&all, view, Relation::PartOf, knob, 2), share(&all, view, Relation::LeftOf, 1, knob)),
+            (0.0, -1.0)
+        );
         let space = Space::new(&all, view);
-        assert_eq!((space.between(3, 1, 2), space.between(1, 3, 2), space.between(1, 1, 2)), (Some(1.0), Some(0.0), None));
+        assert_eq!(
+            (space.between(3, 1, 2), space.between(1, 3, 2), space.between(1, 1, 2)),
+            (Some(1.0), Some(0.0), None)
+        );
         assert!((space.gap(1, 2).unwrap_or(0.0) - 1.8).abs() < 1e-9 && space.stages().is_empty());
         assert_eq!(all.get(knob).map(|k| k.parent == NO_IDENTITY), Some(false));
     }
@@ -354,7 +377,13 @@ mod tests {
     #[test]
     fn what_most_things_stand_on_is_a_stage() {
         let mug = |x: f64| ([x, 0.0, 0.85], [0.1, 0.1, 0.1]);
-        let all = scene(&[([0.0, 0.0, -0.05], [9.0, 9.0, 0.1]), ([0.0, 0.0, 0.4], [2.0, 1.0, 0.8]), mug(-0.5), mug(0.0), mug(0.5)]);
+        let all = scene(&[
+            ([0.0, 0.0, -0.05], [9.0, 9.0, 0.1]),
+            ([0.0, 0.0, 0.4], [2.0, 1.0, 0.8]),
+            mug(-0.5),
+            mug(0.0),
+            mug(0.5),
+        ]);
         let view = Viewpoint { eye: DVec3::new(0.0, -3.0, 1.0), forward: DVec3::Y, up: DVec3::Z };
         assert_eq!(Space::new(&all, view).stages(), [1, 2]);
         // Control: a tray with one of three things on it is none.

@@ -1,7 +1,7 @@
 //! Answers in words: counts, names, yes and no, colors and sizes.
 
-use super::evaluate::{Unmet, Why};
 use super::expression::{Asks, Order};
+use super::outcome::{Unmet, Why};
 use super::{QueryScene, Understood};
 use crate::math::format;
 use crate::scene::IdentityId;
@@ -48,7 +48,11 @@ fn colors(scene: &QueryScene<'_>, ids: &[IdentityId]) -> String {
         let has = |row: &usize| scene.identities.colors.judge(*id, *row) == Some(ColorVerdict::Yes);
         let named: Vec<&str> = (0..COLORS.len()).filter(has).map(|row| COLORS[row][0]).collect();
         let name = capital(&scene.identities.full_name(*id));
-        if named.is_empty() { format!("{name}: no color that has a name.") } else { format!("{name}: {}.", named.join(", ")) }
+        if named.is_empty() {
+            format!("{name}: no color that has a name.")
+        } else {
+            format!("{name}: {}.", named.join(", "))
+        }
     };
     ids.iter().take(MOST).map(of).collect::<Vec<_>>().join(" ")
 }

@@ -6,8 +6,8 @@ use super::tokens::MAX_CHARS;
 use super::words::{Vocabulary, WordClass};
 use crate::models;
 use crate::pipeline::semantics::query::lexicon;
-use crate::scene::{Identities, colors};
 use crate::scene::identity::name_words::{SceneWords, singular};
+use crate::scene::{Identities, colors};
 
 /// Pairs of a typed word and another one.
 pub(crate) type Pairs = Vec<(String, String)>;
@@ -81,7 +81,11 @@ fn slip(word: &str, known: &SceneWords) -> Slip {
     // "toycar": two words of a name, or of the language.
     let cuts = word.char_indices().skip(2).map(|(at, _)| word.split_at(at)).filter(|(_, b)| b.len() > 1);
     let is_word = |w: &str| known.has(w) && w.len() > 2;
-    if let Some((a, b)) = cuts.clone().find(|(a, b)| known.follow(a, b)).or_else(|| cuts.clone().find(|(a, b)| is_word(a) && is_word(b) && !models::is_word(word))) {
+    if let Some((a, b)) = cuts
+        .clone()
+        .find(|(a, b)| known.follow(a, b))
+        .or_else(|| cuts.clone().find(|(a, b)| is_word(a) && is_word(b) && !models::is_word(word)))
+    {
         return Slip::Of(format!("{a} {b}"));
     }
     let most = if letters >= LONG { 2 } else { 1 };
@@ -112,7 +116,13 @@ fn slip(word: &str, known: &SceneWords) -> Slip {
     match near.as_slice() {
         // Two words at the same distance are a guess.
         [a, b, ..] if a.0 == b.0 => Slip::None,
-        [(_, other, is_name), ..] if is_own() => if *is_name { Slip::Near((*other).to_owned()) } else { Slip::None },
+        [(_, other, is_name), ..] if is_own() => {
+            if *is_name {
+                Slip::Near((*other).to_owned())
+            } else {
+                Slip::None
+            }
+        }
         [(_, other, _), ..] => Slip::Of((*other).to_owned()),
         [] => Slip::None,
     }

@@ -54,8 +54,12 @@ fn compounds_are_pieces_of_wholes_and_nothing_else_changes() {
     let lists = [rows(&table, "compounds"), rows(&table, "kept")];
     assert!(lists[0].len() >= 40);
     let wrong = |row: &&Vec<&str>| summary(&all, row[0]) != row[1];
-    let wrong: Vec<String> =
-        lists.iter().flatten().filter(wrong).map(|r| format!("{}: {}, not {}", r[0], summary(&all, r[0]), r[1])).collect();
+    let wrong: Vec<String> = lists
+        .iter()
+        .flatten()
+        .filter(wrong)
+        .map(|r| format!("{}: {}, not {}", r[0], summary(&all, r[0]), r[1]))
+        .collect();
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
     // The level that is asked for is respected.
     assert!(ask(&all, "kettle spout", LevelFilter::Object).chosen(1).is_empty());
@@ -75,7 +79,9 @@ fn any_words_in_any_order_are_read_in_no_time() {
     for _ in 0..20_000 {
         let n = rng.random_range(1..14);
         let text = (0..n).map(|_| words[rng.random_range(0..words.len())]).collect::<Vec<_>>().join(" ");
-        if let Some(answered) = ask_by_name(&all, &text, (LevelFilter::Auto, &QueryPlace::default()), &QueryConfig::default()) {
+        if let Some(answered) =
+            ask_by_name(&all, &text, (LevelFilter::Auto, &QueryPlace::default()), &QueryConfig::default())
+        {
             assert!(answered.chosen(1).iter().all(|id| all.get(*id).is_some()), "{text}");
         }
     }
@@ -89,7 +95,8 @@ fn slips_are_mended_word_by_word_and_words_of_their_own_are_not() {
     let mut wrong = Vec::new();
     for row in &slips {
         let said: Vec<String> = mended(&all, row[0]).iter().map(|(a, b)| format!("{a}={b}")).collect();
-        let mut wanted: Vec<&str> = row[2].split(' ').filter(|w| !w.starts_with("teh=") && !w.starts_with("hte=")).collect();
+        let mut wanted: Vec<&str> =
+            row[2].split(' ').filter(|w| !w.starts_with("teh=") && !w.starts_with("hte=")).collect();
         wanted.sort_by_key(|w| row[0].find(w.split('=').next().unwrap_or_default()));
         if (said.join(" "), summary(&all, row[0])) != (wanted.join(" "), row[1].into()) {
             wrong.push(format!("{}: {}, {}, not {row:?}", row[0], said.join(" "), summary(&all, row[0])));

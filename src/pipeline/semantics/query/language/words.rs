@@ -86,7 +86,8 @@ fn phrases<T>(list: impl IntoIterator<Item = (String, T)>) -> Phrases<T> {
 /// Longest phrase that `words` begin with, with its number of words.
 fn begins<'l, T>(all: &'l Phrases<T>, words: &[&str]) -> Option<(&'l T, usize)> {
     let begun = all.get(*words.first()?)?.iter();
-    let found = begun.filter(|(phrase, _)| phrase.len() <= words.len() && phrase.iter().zip(words).all(|(a, b)| a == b));
+    let found =
+        begun.filter(|(phrase, _)| phrase.len() <= words.len() && phrase.iter().zip(words).all(|(a, b)| a == b));
     found.map(|(phrase, value)| (value, phrase.len())).max_by_key(|(_, n)| *n)
 }
 
@@ -214,6 +215,9 @@ mod tests {
         assert!(tallest.superlative && !taller.superlative && tallest.order == taller.order && taller.most);
         assert!(words.is(WordClass::NoName, "and") && !words.is(WordClass::NoName, "lamp"));
         assert!(words.relation(&["lamp"]).is_none() && words.except(&["but", "not", "it"]) == Some(2));
-        assert_eq!((words.unit("cm"), words.quantity("tall"), words.opener(&["show", "me", "it"])), (Some(0.01), Some(Order::Height), Some(2)));
+        assert_eq!(
+            (words.unit("cm"), words.quantity("tall"), words.opener(&["show", "me", "it"])),
+            (Some(0.01), Some(Order::Height), Some(2))
+        );
     }
 }

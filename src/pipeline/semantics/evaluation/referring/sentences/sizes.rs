@@ -104,7 +104,7 @@ fn sideways(facts: &MeshFacts, thing: usize) -> [f64; 3] {
 
 fn away(facts: &MeshFacts, thing: usize) -> [f64; 3] {
     let [ahead, distance] = [ViewReading::Ahead, ViewReading::Distance].map(|reading| facts.span(thing, reading));
-    [ahead.middle(), distance.middle(), facts.from_eye(thing)]
+    [ahead.middle(), distance.middle(), facts.distance_to_eye(thing)]
 }
 
 impl TrueOrder {

@@ -8,7 +8,14 @@ use crate::scene::colors;
 
 /// Returns the readings of a noun (words `i` to `k`) with all words up to `j` said of it. With `said`, a verb was there
 /// already: "the mug is red".
-pub(super) fn after(g: &mut Grammar<'_>, noun: &Expression, i: usize, k: usize, j: usize, said: bool) -> Vec<Expression> {
+pub(super) fn after(
+    g: &mut Grammar<'_>,
+    noun: &Expression,
+    i: usize,
+    k: usize,
+    j: usize,
+    said: bool,
+) -> Vec<Expression> {
     if k == j {
         return vec![noun.clone()];
     }
@@ -20,7 +27,7 @@ pub(super) fn after(g: &mut Grammar<'_>, noun: &Expression, i: usize, k: usize, 
         if matches!(word, "not" | "neither") {
             not = !not;
         } else if word == "," && at + 1 < j && matches!(g.words[at + 1], "which" | "that" | "who") {
-        } else if matches!(word, "and" | "but") && at > k && at == k {
+            // The clause follows.
         } else if g.is(WordClass::Standing, at) && !is_side(g, at, j) {
             said |= matches!(word, "is" | "are" | "was" | "were" | "that" | "which" | "who");
             closely |= matches!(word, "directly" | "immediately" | "right" | "just");
@@ -106,7 +113,8 @@ pub(super) fn after(g: &mut Grammar<'_>, noun: &Expression, i: usize, k: usize, 
                     // "Directly behind": the nearest one there.
                     let is = Condition::Placed(relation, Box::new(anchor.clone()));
                     let there = g.make(SetOf::Where { of: Box::new(noun.clone()), is, not }, i, end);
-                    let set = SetOf::Nearest { of: Box::new(there), to: Box::new(anchor), far: false, first: 0, count: 1 };
+                    let set =
+                        SetOf::Nearest { of: Box::new(there), to: Box::new(anchor), far: false, first: 0, count: 1 };
                     let made = g.make(set, i, end);
                     close.extend(further(g, &made, i, end, j));
                 } else {
@@ -151,7 +159,10 @@ fn further(g: &mut Grammar<'_>, made: &Expression, i: usize, end: usize, j: usiz
     if end + 1 < j && matches!(g.words[end], "and" | "but" | ",") {
         let rest = &g.words[end + 1..j];
         let goes_on = g.vocabulary.relation(rest).is_some()
-            || matches!(rest[0], "that" | "which" | "not" | "with" | "without" | "has" | "have" | "is" | "are" | "between" | "and");
+            || matches!(
+                rest[0],
+                "that" | "which" | "not" | "with" | "without" | "has" | "have" | "is" | "are" | "between" | "and"
+            );
         if goes_on {
             next = end + 1;
         }
@@ -162,7 +173,8 @@ fn further(g: &mut Grammar<'_>, made: &Expression, i: usize, end: usize, j: usiz
 /// Returns whether a verb is not of the number of its subject: "the table that are".
 fn disagrees(g: &Grammar<'_>, noun: &Expression, verb: &str) -> bool {
     // A word such as "fruit" may be meant in the plural, if no thing is called so.
-    let is_name = |word: String| g.known.with(&word).iter().any(|id| g.known.names(*id).iter().any(|n| n.last() == Some(&word)));
+    let is_name =
+        |word: String| g.known.with(&word).iter().any(|id| g.known.names(*id).iter().any(|n| n.last() == Some(&word)));
     let counts = noun.head().is_none_or(is_name);
     let either = matches!(noun.set, SetOf::Any { .. } | SetOf::Kin { .. } | SetOf::Union { .. } | SetOf::Except(..));
     match verb {
@@ -193,7 +205,14 @@ fn having<'a>(g: &mut Grammar<'a>, from: usize, j: usize, not: bool, add: &mut A
 }
 
 fn nearest_to_eye(noun: &Expression, far: bool) -> SetOf {
-    SetOf::Ranked { of: Box::new(noun.clone()), order: Order::Distance, most: far, first: 0, count: 1, superlative: true }
+    SetOf::Ranked {
+        of: Box::new(noun.clone()),
+        order: Order::Distance,
+        most: far,
+        first: 0,
+        count: 1,
+        superlative: true,
+    }
 }
 
 /// Reads "nearest to the lamp", "taller than the mug", "over 20 cm tall".
@@ -215,12 +234,17 @@ fn compared(g: &mut Grammar<'_>, noun: &Expression, [i, at, j]: [usize; 3], not:
     if let Some(choice) = choice.filter(|c| c.order == Order::Distance && !not) {
         let to = if matches!(g.words.get(from + 1), Some(&("to" | "from"))) { from + 2 } else { from + 1 };
         let far = choice.most;
-        if to < j && is_eye(&g.words[to..j]).is_some() {
-            let end = to + is_eye(&g.words[to..j]).unwrap_or(0);
+        let to = if g.words.get(from + 1) == Some(&"away") && g.words.get(from + 2) == Some(&"from") {
+            from + 3
+        } else {
+            to
+        };
+        if let Some(n) = (to < j).then(|| is_eye(g, &g.words[to..j])).flatten() {
+            let end = to + n;
             let made = g.make(nearest_to_eye(noun, far), i, end);
             return further(g, &made, i, end, j);
         }
-        if choice.superlative || to == from + 2 {
+        if choice.superlative || to >= from + 2 {
             for end in (to + 1..=j).rev() {
                 for anchor in g.set(to, end, true).to_vec() {
                     let (of, to) = (Box::new(noun.clone()), Box::new(anchor));
@@ -243,7 +267,9 @@ fn compared(g: &mut Grammar<'_>, noun: &Expression, [i, at, j]: [usize; 3], not:
         ["more" | "further" | "farther", "than", ..] => (false, 2),
         _ => (true, 0),
     };
-    if skip > 0 && let Some((meters, end)) = length(g, at + skip, j) {
+    if skip > 0
+        && let Some((meters, end)) = length(g, at + skip, j)
+    {
         let to = if g.words.get(end) == Some(&"away") { end + 1 } else { end };
         if matches!(g.words.get(to), Some(&("of" | "from" | "to"))) {
             for end in (to + 2..=j).rev() {
@@ -274,8 +300,9 @@ fn compared(g: &mut Grammar<'_>, noun: &Expression, [i, at, j]: [usize; 3], not:
         _ => return found,
     };
     if let Some((meters, end)) = length(g, at + skip, j) {
-        let (order, end) = match g.words.get(end).and_then(|w| g.vocabulary.quantity(w)) {
-            Some(order) if end < j => (order, end + 1),
+        let to = if g.words.get(end) == Some(&"in") && end + 1 < j { end + 1 } else { end };
+        let (order, end) = match g.words.get(to).and_then(|w| g.vocabulary.quantity(w)) {
+            Some(order) if to < j => (order, to + 1),
             _ => (Order::Length, end),
         };
         add(g, Condition::Measured { order, more, meters }, not, end);
@@ -297,8 +324,14 @@ fn said_at_length(g: &Grammar<'_>, from: usize, j: usize) -> Option<(Order, bool
 }
 
 /// Number of words at the start that mean the camera.
-fn is_eye(words: &[&str]) -> Option<usize> {
+fn is_eye(g: &Grammar<'_>, words: &[&str]) -> Option<usize> {
     match words {
+        // A thing of this name comes first.
+        ["the", "camera" | "viewer" | "eye", ..] | ["camera" | "viewer", ..]
+            if words.iter().take(2).any(|w| g.known.ends(w)) =>
+        {
+            None
+        }
         ["me" | "us" | "here", ..] => Some(1),
         ["the", "camera" | "viewer" | "eye", ..] | ["my", "eye", ..] => Some(2),
         ["camera" | "viewer"] => Some(1),
@@ -327,7 +360,7 @@ fn predicate(g: &mut Grammar<'_>, noun: &Expression, [i, at, j]: [usize; 3], not
         let words = &g.words[from..end];
         let plain = |w: &&str| !g.vocabulary.is(WordClass::NoName, w) || matches!(*w, "or" | "and" | "nor");
         let last_is_color = words.last().is_some_and(|w| colors::row(w).is_some() || colors::tone(w).is_some());
-        if last_is_color && words.iter().all(|w| plain(w)) && words.len() <= 5 {
+        if last_is_color && words.iter().all(plain) && words.len() <= 5 {
             let adjectives = words.iter().map(|w| (*w).to_owned()).collect();
             let made = SetOf::Where { of: Box::new(noun.clone()), is: Condition::Adjective(adjectives), not };
             let made = g.make(made, i, end);
@@ -335,10 +368,21 @@ fn predicate(g: &mut Grammar<'_>, noun: &Expression, [i, at, j]: [usize; 3], not
         }
     }
     if let Some(choice) = g.vocabulary.order(g.words[from]).filter(|_| !not) {
-        let end = if matches!(g.words.get(from + 1), Some(&("one" | "ones" | "away" | "back"))) { from + 2 } else { from + 1 };
+        let end = if matches!(g.words.get(from + 1), Some(&("one" | "ones" | "away" | "back"))) {
+            from + 2
+        } else {
+            from + 1
+        };
         if end <= j && g.words.get(end) != Some(&"than") {
             let (order, most) = (choice.order, choice.most);
-            let set = SetOf::Ranked { of: Box::new(noun.clone()), order, most, first: 0, count: 1, superlative: choice.superlative };
+            let set = SetOf::Ranked {
+                of: Box::new(noun.clone()),
+                order,
+                most,
+                first: 0,
+                count: 1,
+                superlative: choice.superlative,
+            };
             let made = g.make(set, i, end);
             found.extend(further(g, &made, i, end, j));
         }

@@ -1,13 +1,13 @@
 //! Words before a noun: "all", "two", "second largest", "its", "the kettle's".
 
+use super::Grammar;
 use super::after::after;
-use super::{Grammar, LONGEST_NOUN};
+use super::noun::{is_plural, noun};
 use crate::pipeline::semantics::query::language::expression::{Condition, Expression, Order, SetOf};
 use crate::pipeline::semantics::query::language::tokens::{number, ordinal};
 use crate::pipeline::semantics::query::language::words::WordClass;
-use crate::pipeline::semantics::query::lexicon;
 use crate::scene::colors;
-use crate::scene::identity::name_words::{SceneWords, singular, written};
+use crate::scene::identity::name_words::singular;
 
 /// Returns readings of the words from `i` to `j` as one set.
 pub(super) fn read(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
@@ -51,8 +51,12 @@ pub(super) fn one_of(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression>
 /// End of the words without phrases that exclude nothing, such as "in the scene".
 fn trimmed(g: &Grammar<'_>, i: usize, j: usize) -> usize {
     let is_rest = |from: &usize| g.vocabulary.here(&g.words[*from..j]) == Some(j - from);
-    let named = |from: usize| (from..j).any(|k| g.known.has(g.words[k]) && !g.vocabulary.is(WordClass::NoName, g.words[k]));
-    (i + 1..j).find(is_rest).filter(|from| !named(*from)).unwrap_or(if j - i > 1 && matches!(g.words[j - 1], "," | "?") { j - 1 } else { j })
+    let named =
+        |from: usize| (from..j).any(|k| g.known.has(g.words[k]) && !g.vocabulary.is(WordClass::NoName, g.words[k]));
+    (i + 1..j)
+        .find(is_rest)
+        .filter(|from| !named(*from))
+        .unwrap_or(if j - i > 1 && matches!(g.words[j - 1], "," | "?") { j - 1 } else { j })
 }
 
 /// Returns whether the words may be a name although they begin with a word such as "left".
@@ -143,7 +147,7 @@ fn quantified(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
         }
         return wrap(g, after_of(g, i + 1), &|of| SetOf::Every { of, both });
     }
-    if matches!(word, "only" | "just" | "the" | "exactly") && i + 1 < j || g.is(WordClass::Determiner, i) && i + 1 < j {
+    if i + 1 < j && (matches!(word, "only" | "just" | "exactly") || g.is(WordClass::Determiner, i)) {
         return g.set(i + 1, j, false).to_vec();
     }
     if word == "other" && i + 1 < j {
@@ -183,7 +187,9 @@ fn negated(of: Expression, is: &Condition) -> SetOf {
     let inner = |of: Box<Expression>, at| Box::new(Expression::new(negated(*of, is), at));
     match of.set {
         SetOf::PartOf(piece, whole) => SetOf::PartOf(inner(piece, of.at.clone()), whole),
-        SetOf::Where { of: inside, is: other, not } => SetOf::Where { of: inner(inside, of.at.clone()), is: other, not },
+        SetOf::Where { of: inside, is: other, not } => {
+            SetOf::Where { of: inner(inside, of.at.clone()), is: other, not }
+        }
         set => SetOf::Where { of: Box::new(Expression::new(set, of.at)), is: is.clone(), not: true },
     }
 }
@@ -216,10 +222,13 @@ fn ranked(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
     let Some(choice) = g.vocabulary.order(g.words[at]).filter(|_| first > 0) else { return Vec::new() };
     let mut from = at + 1;
     let mut count = 1;
-    if let Some(n) = g.words.get(from).and_then(|w| number(w)).filter(|n| (2.0..=99.0).contains(n) && n.fract() == 0.0) {
+    if let Some(n) = g.words.get(from).and_then(|w| number(w)).filter(|n| (2.0..=99.0).contains(n) && n.fract() == 0.0)
+    {
         (count, from) = (n as usize, from + 1);
     }
-    if matches!(g.words.get(from), Some(&("one" | "ones"))) && matches!(g.words.get(from + 1), Some(&("of" | "from" | "in"))) {
+    if matches!(g.words.get(from), Some(&("one" | "ones")))
+        && matches!(g.words.get(from + 1), Some(&("of" | "from" | "in")))
+    {
         from += 1;
     }
     if matches!(g.words.get(from), Some(&("of" | "among" | "amongst"))) {
@@ -231,13 +240,22 @@ fn ranked(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
             return Vec::new();
         }
         let far = choice.most;
-        if let [noun @ .., "to" | "from", "me" | "us"] | [noun @ .., "to" | "from", "the", "camera" | "viewer"] = &g.words[from..j]
+        if let [noun @ .., "to" | "from", "me" | "us"] | [noun @ .., "to" | "from", "the", "camera" | "viewer"] =
+            &g.words[from..j]
             && !noun.is_empty()
+            && !(g.words[j - 1] != "me" && g.known.ends(g.words[j - 1]))
         {
             let end = from + noun.len();
             let of = g.set(from, end, false).to_vec();
             let first = first.saturating_sub(1);
-            let order = |of| SetOf::Ranked { of: Box::new(of), order: Order::Distance, most: far, first, count, superlative: true };
+            let order = |of| SetOf::Ranked {
+                of: Box::new(of),
+                order: Order::Distance,
+                most: far,
+                first,
+                count,
+                superlative: true,
+            };
             return of.into_iter().map(|of| g.make(order(of), i, j)).collect();
         }
         for p in (from + 1..j.saturating_sub(1)).filter(|p| matches!(g.words[*p], "to" | "from")).collect::<Vec<_>>() {
@@ -287,7 +305,8 @@ fn from_a_side(g: &mut Grammar<'_>, nth: usize, from: usize, i: usize, j: usize)
     // What follows is said of all of them.
     let tokens = (from..at).chain(at + 3..j).map(|k| g.tokens[k]).collect();
     let inner = g.of(tokens).all();
-    let make = |of: &Expression| SetOf::Ranked { of: Box::new(of.clone()), order, most, first, count: 1, superlative: true };
+    let make =
+        |of: &Expression| SetOf::Ranked { of: Box::new(of.clone()), order, most, first, count: 1, superlative: true };
     inner.iter().map(|of| g.make(make(of), i, j)).collect()
 }
 
@@ -299,76 +318,4 @@ fn nouns(g: &mut Grammar<'_>, i: usize, j: usize) -> Vec<Expression> {
         found.extend(after(g, &noun, i, k, j, false));
     }
     found
-}
-
-/// Returns the words from `i` to `k` as a noun with adjectives before it.
-fn noun(g: &Grammar<'_>, i: usize, k: usize) -> Option<Expression> {
-    if k - i > 1 && let Some(name) = g.whole_name(i, k) {
-        return Some(g.make(SetOf::Called(name), i, k));
-    }
-    let own = &g.words[i..k];
-    let last = *own.last()?;
-    let generic = singular(last);
-    if k - i == 1 && matches!(*own.last()?, "those" | "that") && matches!(g.words.get(k), Some(&("of" | "with" | "on" | "in" | "from" | "without"))) {
-        return Some(g.make(SetOf::Kin { plural: own[0] == "those" }, i, k));
-    }
-    // The last word may be a letter, such as "button a"; no name ends in "left" that does not say so.
-    let is_letter = k - i > 1 && last == "a" && g.known.has("a");
-    let own = if is_letter { &own[..own.len() - 1] } else { own };
-    if g.vocabulary.order(last).is_some() && !g.known.ends(last) || k - i > 1 && number(own[0]).is_some() && !g.known.has(own[0]) {
-        return None;
-    }
-    let of_none = |w: &str| g.vocabulary.is(WordClass::NoName, w) && !matches!(w, "everything" | "something" | "anything" | "all");
-    if k - i > LONGEST_NOUN || own.iter().any(|w| of_none(w)) || !own.iter().any(|w| w.chars().any(char::is_alphanumeric)) {
-        return None;
-    }
-    let is_named = g.known.is_name(&generic);
-    let plural = is_plural(last);
-    if last == "all" && matches!(g.words.get(k), Some(&"not")) {
-        return None;
-    }
-    let everything = matches!(last, "everything" | "anything" | "whatever" | "stuff" | "all");
-    let single = k - i == 1;
-    let one = matches!(generic.as_str(), "one");
-    if single && !g.known.ends(&generic) && colors::row(last).is_some() {
-        let any = g.make(SetOf::Any { parts: false, plural: false }, i, k);
-        let is = Condition::Adjective(vec![last.to_owned()]);
-        return Some(g.make(SetOf::Where { of: Box::new(any), is, not: false }, i, k));
-    }
-    let set = if one && !is_named {
-        SetOf::Kin { plural }
-    } else if g.vocabulary.is(WordClass::Thing, &generic) && !is_named {
-        SetOf::Any { parts: false, plural: plural || everything }
-    } else if g.vocabulary.is(WordClass::Part, &generic) && !is_named {
-        SetOf::Any { parts: true, plural }
-    } else {
-        let all = g.words[i..k].iter().flat_map(|w| spoken(w, g.known)).collect::<Vec<_>>();
-        let words = if all.is_empty() { vec![last.to_owned()] } else { all };
-        return Some(g.make(SetOf::Words { words, plural }, i, k));
-    };
-    let generic = g.make(set, k - 1, k);
-    if single {
-        return Some(generic);
-    }
-    // "Red things": adjectives of a generic word.
-    let adjectives = own[..own.len() - 1].iter().map(|w| (*w).to_owned()).collect();
-    let is = Condition::Adjective(adjectives);
-    Some(g.make(SetOf::Where { of: Box::new(generic), is, not: false }, i, k))
-}
-
-/// Words of a name as they are compared: in the singular, in American spelling.
-pub(super) fn spoken(word: &str, known: &SceneWords) -> Vec<String> {
-    let plain = |w: String| {
-        if known.has(&w) {
-            return singular(&w);
-        }
-        let single = lexicon::singular_of(&w).map_or_else(|| singular(&w), str::to_owned);
-        lexicon::american(&single).map_or(single.clone(), str::to_owned)
-    };
-    written(word).map(plain).collect()
-}
-
-/// Returns whether a word is an English plural.
-pub(super) fn is_plural(word: &str) -> bool {
-    singular(word) != word || lexicon::singular_of(word).is_some_and(|single| single != word)
 }

@@ -5,6 +5,7 @@
 
 mod after;
 mod before;
+mod noun;
 mod sentence;
 
 use std::collections::HashMap;
@@ -113,7 +114,8 @@ impl<'a> Grammar<'a> {
         }
         let from = if matches!(self.words[i], "the" | "a" | "an") && i + 1 < j { i + 1 } else { i };
         let is_number = self.words[from].starts_with('#');
-        let may_be = self.known.has(self.words[from].trim_start_matches('"').split(' ').next()?) || !self.words[from].is_ascii();
+        let may_be =
+            self.known.has(self.words[from].trim_start_matches('"').split(' ').next()?) || !self.words[from].is_ascii();
         // One word is read as any other, so that it can be meant in the plural.
         if !may_be && !is_number && j - from < 2 || j - from > self.known.longest.max(2) + 2 {
             return None;
@@ -182,10 +184,12 @@ impl<'a> Grammar<'a> {
 
     /// Reads "the controller, just its buttons".
     fn just_its(&mut self, i: usize, j: usize) -> Vec<Expression> {
-        let is_there = |p: &usize| matches!(self.words[*p..j], [",", "just" | "only" | "specifically", "its" | "the", _, ..]);
+        let is_there =
+            |p: &usize| matches!(self.words[*p..j], [",", "just" | "only" | "specifically", "its" | "the", _, ..]);
         let Some(p) = (i + 1..j.saturating_sub(3)).find(is_there) else { return Vec::new() };
         let (whole, piece) = (self.set(i, p, false), self.set(p + 3, j, true));
-        let made = pairs(&piece, &whole).into_iter().map(|(a, b)| self.make(SetOf::PartOf(Box::new(a), Box::new(b)), i, j));
+        let made =
+            pairs(&piece, &whole).into_iter().map(|(a, b)| self.make(SetOf::PartOf(Box::new(a), Box::new(b)), i, j));
         made.collect()
     }
 
@@ -193,6 +197,7 @@ impl<'a> Grammar<'a> {
     fn joint(&self, p: usize, j: usize) -> Option<usize> {
         match self.words[p..j] {
             [",", "and" | "or", ..] | ["as", "well", "as", ..] => Some(if self.words[p] == "as" { 3 } else { 2 }),
+            ["together" | "along", "with", ..] => Some(2),
             ["," | "and" | "or" | "plus" | "&" | "+" | "nor", ..] => Some(1),
             _ => None,
         }
@@ -234,7 +239,12 @@ impl<'a> Grammar<'a> {
     /// Returns whether a word may stand before a noun and be joined with others like it.
     fn is_modifier(&self, at: usize) -> bool {
         let word = self.words[at];
-        let is_name = || singular(word) == word && !self.known.with(word).is_empty() && self.identities.called(word, LevelFilter::Auto).is_empty();
+        let is_name = || {
+            singular(word) == word
+                && !self.known.with(word).is_empty()
+                && !self.known.ends(word)
+                && self.identities.called(word, LevelFilter::Auto).is_empty()
+        };
         self.vocabulary.order(word).is_some() || crate::scene::colors::row(word).is_some() || is_name()
     }
 
@@ -249,7 +259,10 @@ impl<'a> Grammar<'a> {
         let mut left = self.of(tokens);
         let n = left.words.len();
         let (left, right) = (left.set(0, n, false), self.set(from, j, false));
-        pairs(&left, &right).into_iter().map(|(a, b)| self.make(SetOf::Union { of: vec![a, b], either }, i, j)).collect()
+        pairs(&left, &right)
+            .into_iter()
+            .map(|(a, b)| self.make(SetOf::Union { of: vec![a, b], either }, i, j))
+            .collect()
     }
 }
 
@@ -265,7 +278,10 @@ impl Grammar<'_> {
         let mut right = self.of(tokens);
         let n = right.words.len();
         let (left, right) = (self.set(i, p, false), right.set(0, n, false));
-        pairs(&left, &right).into_iter().map(|(a, b)| self.make(SetOf::Union { of: vec![a, b], either }, i, j)).collect()
+        pairs(&left, &right)
+            .into_iter()
+            .map(|(a, b)| self.make(SetOf::Union { of: vec![a, b], either }, i, j))
+            .collect()
     }
 }
 

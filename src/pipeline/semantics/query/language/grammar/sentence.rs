@@ -43,7 +43,9 @@ pub(crate) fn sentences(text: &str, tokens: &[Token], identities: &Identities) -
 
 fn whole_text(g: &Grammar<'_>) -> Option<String> {
     let name = g.text.trim();
-    let is_said = g.tokens.len() > 1 || singular(&name.to_lowercase()) == name.to_lowercase() || !name.chars().all(char::is_alphanumeric);
+    let is_said = g.tokens.len() > 1
+        || singular(&name.to_lowercase()) == name.to_lowercase()
+        || !name.chars().all(char::is_alphanumeric);
     (is_said && !g.identities.called(name, LevelFilter::Auto).is_empty()).then(|| name.to_owned())
 }
 
@@ -131,7 +133,14 @@ impl<'a> SentenceReader<'a> {
             }
             return;
         }
-        let skip = [&["are", "there"][..], &["is", "there"], &["do", "you", "see"], &["can", "you", "see"], &["do", "i", "see"], &["can", "i", "see"]];
+        let skip = [
+            &["are", "there"][..],
+            &["is", "there"],
+            &["do", "you", "see"],
+            &["can", "you", "see"],
+            &["do", "i", "see"],
+            &["can", "i", "see"],
+        ];
         for phrase in skip {
             let found = (1..words.len()).find(|at| words[*at..].starts_with(phrase));
             if let Some(at) = found {
@@ -149,7 +158,8 @@ impl<'a> SentenceReader<'a> {
         let end = if words[which - 1] == "," { which - 1 } else { which };
         let from = if matches!(words[1], "all" | "the") { 2 } else { 1 };
         let is_said = |w: &&str| matches!(*w, "one" | "ones" | "which");
-        let said: Vec<&Token> = self.whole.tokens[which..].iter().copied().filter(|t| !is_said(&t.low.as_str())).collect();
+        let said: Vec<&Token> =
+            self.whole.tokens[which..].iter().copied().filter(|t| !is_said(&t.low.as_str())).collect();
         for of in self.whole.of(self.whole.tokens[from..end].to_vec()).all() {
             let before = self.found.len();
             self.said_of(&of, said.clone());
@@ -174,7 +184,8 @@ impl<'a> SentenceReader<'a> {
         let is = self.whole.tokens[0];
         let n = self.whole.tokens.len();
         for at in 2..n {
-            let tokens = self.whole.tokens[1..at].iter().copied().chain([is]).chain(self.whole.tokens[at..].iter().copied());
+            let tokens =
+                self.whole.tokens[1..at].iter().copied().chain([is]).chain(self.whole.tokens[at..].iter().copied());
             self.truth(tokens.collect(), at - 1);
             if !self.found.is_empty() {
                 return;
@@ -190,7 +201,8 @@ impl<'a> SentenceReader<'a> {
             // Something must be said of the subject, not of a thing within it.
             let is_said = match &set.set {
                 SetOf::Where { of, .. } | SetOf::Ranked { of, .. } | SetOf::Nearest { of, .. } => {
-                    of.at.start >= subject.min(verb.start) && !matches!(set.set, SetOf::Ranked { first: 0, .. } if of.at.is_empty())
+                    of.at.start >= subject.min(verb.start)
+                        && !matches!(set.set, SetOf::Ranked { first: 0, .. } if of.at.is_empty())
                 }
                 _ => false,
             };
@@ -205,8 +217,12 @@ impl<'a> SentenceReader<'a> {
         let words = self.whole.words.clone();
         let tokens = self.whole.tokens.clone();
         let n = words.len();
-        let is_verb = |w: &str| matches!(w, "is" | "are" | "stands" | "stand" | "lies" | "lie" | "sits" | "sit" | "was" | "has" | "have");
-        if let Some(comma) = words.iter().rposition(|w| *w == ",").filter(|at| *at + 3 < n && words[at + 1..].contains(&"or")) {
+        let is_verb = |w: &str| {
+            matches!(w, "is" | "are" | "stands" | "stand" | "lies" | "lie" | "sits" | "sit" | "was" | "has" | "have")
+        };
+        if let Some(comma) =
+            words.iter().rposition(|w| *w == ",").filter(|at| *at + 3 < n && words[at + 1..].contains(&"or"))
+        {
             // The choices follow: they are what is compared.
             let verb = words[..comma].iter().position(|w| is_verb(w)).unwrap_or(0);
             let choices = self.whole.of(tokens[comma + 1..].to_vec()).all();
@@ -234,7 +250,10 @@ impl<'a> SentenceReader<'a> {
             }
             return;
         }
-        if words.get(1) == Some(&"parts") && words.get(2).is_some_and(|w| matches!(*w, "does" | "do")) && words[n - 1] == "have" {
+        if words.get(1) == Some(&"parts")
+            && words.get(2).is_some_and(|w| matches!(*w, "does" | "do"))
+            && words[n - 1] == "have"
+        {
             let of = self.whole.of(tokens[3..n - 1].to_vec()).all();
             for whole in of {
                 let parts = self.whole.make(SetOf::Any { parts: true, plural: true }, 1, 2);
@@ -256,7 +275,20 @@ impl<'a> SentenceReader<'a> {
     fn said_of(&mut self, noun: &Expression, tokens: Vec<&'a Token>) {
         let mut rest = self.whole.of(tokens);
         let n = rest.words.len();
-        let sets = super::after::after(&mut rest, noun, 0, 0, n, true);
+        let out = (1..n).find_map(|p| Some((p, rest.vocabulary.except(&rest.words[p..])?))).filter(|(p, m)| p + m < n);
+        let sets = match out {
+            // "What is on the table, except the lamp".
+            Some((p, m)) => {
+                let of = super::after::after(&mut rest, noun, 0, 0, p, true);
+                let but = rest.set(p + m, n, true);
+                let made = super::pairs(&of, &but).into_iter().map(|(of, but)| {
+                    let at = of.at.start.min(but.at.start)..of.at.end.max(but.at.end);
+                    Expression::new(SetOf::Except(Box::new(of), Box::new(but)), at)
+                });
+                made.collect()
+            }
+            None => super::after::after(&mut rest, noun, 0, 0, n, true),
+        };
         let of_one = |mut set: Expression| {
             // Of choices, the one that is more so.
             if let (SetOf::Ranked { superlative, .. }, SetOf::Union { .. }) = (&mut set.set, &noun.set) {
